@@ -1,0 +1,34 @@
+//! What a task asks of the world.
+
+use std::borrow::Cow;
+
+use tactflow_runtime::device::RoleType;
+use tactflow_runtime::node::{Need, PortSpec};
+use tactflow_runtime::signal::Kind;
+
+fn port(name: &'static str, doc: &'static str, kind: Kind, args: &'static [&'static str]) -> PortSpec {
+    let args = args.iter().map(|arg| Cow::Borrowed(*arg)).collect();
+    PortSpec { name: name.into(), doc: doc.into(), kind, args, need: Need::Required }
+}
+
+/// An array of tactels.
+#[must_use]
+pub fn tactile_pad() -> RoleType {
+    RoleType {
+        name: "tactile_pad".into(),
+        summary: "an array of tactels that gives an image".into(),
+        outputs: vec![port("image", "The newest image, in the device's unit.", Kind::Image, &["U", "self"])],
+        commands: vec![],
+    }
+}
+
+/// An arm that takes joint velocities.
+#[must_use]
+pub fn velocity_arm() -> RoleType {
+    RoleType {
+        name: "velocity_arm".into(),
+        summary: "an arm that takes joint velocities".into(),
+        outputs: vec![port("position", "Measured joint positions [rad].", Kind::Joints, &["rad", "self"])],
+        commands: vec![port("velocity", "Joint velocities [rad/s].", Kind::Joints, &["rad/s", "self"])],
+    }
+}

@@ -1,0 +1,74 @@
+//! What a graph may be made of: a plain list of node types, device types and roles.
+
+use crate::device::{Device, DeviceType, RoleType, device_type};
+use crate::node::{Node, NodeType, of};
+
+/// A list of node types, device types and roles. Several can be joined: somebody else's crate adds its own.
+#[derive(Default)]
+pub struct Catalogue {
+    nodes: Vec<Box<dyn NodeType>>,
+    devices: Vec<Box<dyn DeviceType>>,
+    roles: Vec<RoleType>,
+}
+
+impl Catalogue {
+    /// An empty list.
+    #[must_use]
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// With one more node.
+    #[must_use]
+    pub fn node<N: Node>(self) -> Self {
+        self.node_type(of::<N>())
+    }
+
+    /// With one more node that is known only at run time.
+    #[must_use]
+    pub fn node_type(mut self, node: Box<dyn NodeType>) -> Self {
+        self.nodes.push(node);
+        self
+    }
+
+    /// With one more device.
+    #[must_use]
+    pub fn device<D: Device>(mut self) -> Self {
+        self.devices.push(device_type::<D>());
+        self
+    }
+
+    /// With one more role.
+    #[must_use]
+    pub fn role(mut self, role: RoleType) -> Self {
+        self.roles.push(role);
+        self
+    }
+
+    /// With all that is in another list.
+    #[must_use]
+    pub fn join(mut self, other: Self) -> Self {
+        self.nodes.extend(other.nodes);
+        self.devices.extend(other.devices);
+        self.roles.extend(other.roles);
+        self
+    }
+
+    /// The node types.
+    #[must_use]
+    pub fn nodes(&self) -> &[Box<dyn NodeType>] {
+        &self.nodes
+    }
+
+    /// The device types.
+    #[must_use]
+    pub fn devices(&self) -> &[Box<dyn DeviceType>] {
+        &self.devices
+    }
+
+    /// The roles.
+    #[must_use]
+    pub fn roles(&self) -> &[RoleType] {
+        &self.roles
+    }
+}

@@ -1,0 +1,93 @@
+//! Live devices: an async driver on one side, preallocated latest-value slots, and the tick on the other side.
+
+use std::sync::Arc;
+use std::time::Instant;
+
+use async_trait::async_trait;
+use tokio::sync::{Notify, watch};
+use triple_buffer::{Input, Output, TripleBuffer};
+
+use super::{Commands, DeviceError, Samples};
+
+/// A device that runs on its own, in real time.
+///
+/// A real robot's driver declares a command timeout of its own: for what this process cannot observe (kill -9, a loss
+/// of power) nobody else can stop the arm.
+#[async_trait]
+pub trait Live: Send {
+    /// Runs until [`Link::stopped`] or a failure.
+    ///
+    /// # Errors
+    /// When the device fails; the run ends.
+    async fn run(self: Box<Self>, link: Link) -> Result<(), DeviceError>;
+}
+
+/// A live device's end of the link to the graph.
+pub struct Link {
+    staging: Samples,
+    samples: Input<Samples>,
+    commands: Output<Commands>,
+    sampled: Arc<Notify>,
+    commanded: Arc<Notify>,
+    stop: watch::Receiver<bool>,
+    epoch: Instant,
+}
+
+impl Link {
+    /// A moment in the graph's clock [ns].
+    #[must_use]
+    pub fn stamp(&self, at: Instant) -> i64 {
+        at.saturating_duration_since(self.epoch).as_nanos() as i64
+    }
+
+    /// Writes samples and publishes them; the graph sees the newest.
+    pub fn publish(&mut self, write: impl FnOnce(&mut Samples)) {
+        write(&mut self.staging);
+        self.samples.input_buffer_mut().clone_from(&self.staging);
+        self.samples.publish();
+        self.sampled.notify_one();
+    }
+
+    /// The newest commands.
+    pub fn commands(&mut self) -> &Commands {
+        self.commands.read()
+    }
+
+    /// Waits for the next commands.
+    pub async fn commanded(&self) {
+        self.commanded.notified().await;
+    }
+
+    /// Waits for the end of the run.
+    pub async fn stopped(&self) {
+        let mut stop = self.stop.clone();
+        // An error means that the graph's end is gone, which is an end too.
+        let _ = stop.wait_for(|stop| *stop).await;
+    }
+}
+
+/// The graph's end of the link to a live device.
+pub(crate) struct Linked {
+    pub(crate) samples: Output<Samples>,
+    pub(crate) commands: Input<Commands>,
+    pub(crate) sampled: Arc<Notify>,
+    pub(crate) commanded: Arc<Notify>,
+    pub(crate) stop: watch::Sender<bool>,
+}
+
+pub(crate) fn link(samples: &Samples, commands: &Commands, epoch: Instant) -> (Link, Linked) {
+    let (samples_in, samples_out) = TripleBuffer::new(samples).split();
+    let (commands_in, commands_out) = TripleBuffer::new(commands).split();
+    let (sampled, commanded) = (Arc::new(Notify::new()), Arc::new(Notify::new()));
+    let (stop, stopping) = watch::channel(false);
+    let link = Link {
+        staging: samples.clone(),
+        samples: samples_in,
+        commands: commands_out,
+        sampled: Arc::clone(&sampled),
+        commanded: Arc::clone(&commanded),
+        stop: stopping,
+        epoch,
+    };
+    (link, Linked { samples: samples_out, commands: commands_in, sampled, commanded, stop })
+}

@@ -1,0 +1,155 @@
+//! The edge: what a sensor or a robot looks like to a graph. Time and I/O exist only here.
+//!
+//! A *role* is what a task asks for: `tactile_pad`, `velocity_arm`. A *device* fills one role or several. There are two
+//! contracts: a [`Stepped`] device is synchronous and deterministic (simulation, replay, mock, lockstep); a [`Live`] one
+//! is an async driver that fills a latest-value slot, so that a slow disk or network makes a sample old, never a tick
+//! late.
+
+mod exchange;
+mod live;
+
+use std::borrow::Cow;
+use std::fmt;
+use std::marker::PhantomData;
+
+use crate::node::{Mistakes, Param, ParamSpec, PortSpec, Reader, Value};
+use crate::signal::Shape;
+
+pub use exchange::{Commands, Samples};
+pub use live::{Link, Live};
+pub(crate) use live::{Linked, link};
+
+/// What a task asks of the world: ports it reads and ports it commands.
+#[derive(Debug, Clone)]
+pub struct RoleType {
+    /// Its name under `[roles]`.
+    pub name: Cow<'static, str>,
+    /// What it is, in one line.
+    pub summary: Cow<'static, str>,
+    /// What it gives; the frame `"self"` is the role's own.
+    pub outputs: Vec<PortSpec>,
+    /// What it takes; joint vectors only.
+    pub commands: Vec<PortSpec>,
+}
+
+/// How a device fills one role.
+#[derive(Debug, Clone)]
+pub struct Filled {
+    /// The role's type.
+    pub role: Cow<'static, str>,
+    /// Shape of each of the role's outputs.
+    pub outputs: Vec<Shape>,
+    /// Shape of each of the role's commands.
+    pub commands: Vec<Shape>,
+    /// What a graph file may take from the device: `threshold = { from = "pad.threshold" }`.
+    pub facts: Vec<(Cow<'static, str>, toml::Value)>,
+}
+
+/// What a device says of itself before it runs.
+#[derive(Debug, Clone)]
+pub struct Description {
+    /// The roles it can fill. Its ports are numbered through all of them, in this order.
+    pub fills: Vec<Filled>,
+    /// Nominal time between two samples [s].
+    pub period: f64,
+}
+
+/// What went wrong with a device while it ran.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct DeviceError(pub String);
+
+impl fmt::Display for DeviceError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.0)
+    }
+}
+
+impl std::error::Error for DeviceError {}
+
+/// A synchronous device: deterministic, without a thread.
+pub trait Stepped: Send {
+    /// Time of the next sample in the device's own time from its start [ns]; `None` when there will be no more.
+    fn next(&self) -> Option<i64>;
+
+    /// Takes the commands that hold since the last call and gives everything sampled up to `now` [ns].
+    ///
+    /// # Errors
+    /// When the device fails; the run ends.
+    fn exchange(&mut self, now: i64, commands: &Commands, samples: &mut Samples) -> Result<(), DeviceError>;
+}
+
+/// How a device runs.
+pub enum Driver {
+    /// Step by step with the graph.
+    Stepped(Box<dyn Stepped>),
+    /// On its own, in real time.
+    Live(Box<dyn Live>),
+}
+
+/// A device that is described and ready to run.
+pub struct Opened {
+    /// What it says of itself.
+    pub description: Description,
+    /// How it runs.
+    pub driver: Driver,
+}
+
+/// A device type.
+pub trait Device: Sized + 'static {
+    /// What a bench file may set.
+    type Params: Param;
+
+    /// Its `type` in a bench file.
+    const NAME: &'static str;
+    /// What it is, in one line.
+    const SUMMARY: &'static str;
+
+    /// Opens the device. A live one does not connect yet: it connects when it runs.
+    ///
+    /// # Errors
+    /// What is wrong with the parameters or with the files they name.
+    fn open(params: Self::Params) -> Result<Opened, Mistakes>;
+}
+
+/// The erased form of a device type: what a catalogue lists.
+pub trait DeviceType: Send + Sync {
+    /// Its `type` in a bench file.
+    fn name(&self) -> Cow<'static, str>;
+    /// What it is, in one line.
+    fn summary(&self) -> Cow<'static, str>;
+    /// What a bench file may set.
+    fn params(&self) -> Vec<ParamSpec>;
+    /// Reads the parameters and opens the device; every mistake goes to the reader.
+    fn open(&self, table: &Value, reader: &mut Reader<'_>) -> Option<Opened>;
+}
+
+struct Typed<D>(PhantomData<fn() -> D>);
+
+pub(crate) fn device_type<D: Device>() -> Box<dyn DeviceType> {
+    Box::new(Typed::<D>(PhantomData))
+}
+
+impl<D: Device> DeviceType for Typed<D> {
+    fn name(&self) -> Cow<'static, str> {
+        D::NAME.into()
+    }
+
+    fn summary(&self) -> Cow<'static, str> {
+        D::SUMMARY.into()
+    }
+
+    fn params(&self) -> Vec<ParamSpec> {
+        D::Params::fields()
+    }
+
+    fn open(&self, table: &Value, reader: &mut Reader<'_>) -> Option<Opened> {
+        let params = D::Params::read(table, reader)?;
+        match D::open(params) {
+            Ok(opened) => Some(opened),
+            Err(mistakes) => {
+                reader.mistakes.extend(mistakes);
+                None
+            }
+        }
+    }
+}

@@ -1,0 +1,188 @@
+//! What is wrong with a graph file: the place, the mistake and a way out.
+
+use std::fmt;
+use std::ops::Range;
+
+use annotate_snippets::{AnnotationKind, Group, Level, Renderer, Snippet};
+
+use crate::graph::Sources;
+
+macro_rules! codes {
+    ($($(#[doc = $doc:literal])* $Code:ident $name:literal),* $(,)?) => {
+        /// The sorts of mistakes a graph file can have.
+        #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+        pub enum Code { $($(#[doc = $doc])* $Code),* }
+
+        impl Code {
+            /// Every code.
+            pub const ALL: &'static [Self] = &[$(Self::$Code),*];
+
+            /// Its name, as shown in brackets.
+            #[must_use]
+            pub const fn name(self) -> &'static str {
+                match self { $(Self::$Code => $name),* }
+            }
+        }
+    };
+}
+
+codes! {
+    /// The file is not TOML.
+    Syntax "syntax",
+    /// A file cannot be read.
+    Unreadable "unreadable",
+    /// A file of data is not what it should be.
+    BadData "bad-data",
+    /// A key that means nothing here.
+    UnknownKey "unknown-key",
+    /// A key that must be there is not.
+    MissingKey "missing-key",
+    /// A value of the wrong type or out of its range.
+    BadValue "bad-value",
+    /// A name that cannot be one.
+    BadName "bad-name",
+    /// Two things with one name.
+    DuplicateName "duplicate-name",
+    /// A type that no catalogue lists.
+    UnknownType "unknown-type",
+    /// A wire from a port that does not exist.
+    UnknownPort "unknown-port",
+    /// A wire to an input that does not exist.
+    UnknownInput "unknown-input",
+    /// An input that needs a wire and has none.
+    MissingInput "missing-input",
+    /// A wire between two kinds.
+    KindMismatch "kind-mismatch",
+    /// A wire between two units.
+    UnitMismatch "unit-mismatch",
+    /// A wire between two frames.
+    FrameMismatch "frame-mismatch",
+    /// A wire between two sizes.
+    ShapeMismatch "shape-mismatch",
+    /// Wires that run in a circle.
+    Loop "loop",
+    /// A part that contains itself.
+    EndlessPart "endless-part",
+    /// A fact that no device states.
+    UnknownFact "unknown-fact",
+    /// A role that the bench binds to no device.
+    UnboundRole "unbound-role",
+    /// A device that cannot fill the role it is bound to.
+    WrongRole "wrong-role",
+    /// A device that the bench does not have.
+    UnknownDevice "unknown-device",
+    /// A command of a device that nothing drives.
+    UndrivenCommand "undriven-command",
+    /// A graph without a clock, or with one that cannot tick.
+    BadClock "bad-clock",
+}
+
+impl fmt::Display for Code {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+/// One mistake of a graph.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Diagnostic {
+    /// What sort of mistake.
+    pub code: Code,
+    /// What is wrong: lower case, no full stop, names in backticks.
+    pub message: String,
+    /// The smallest token that is wrong, in [`Sources`].
+    pub span: Range<usize>,
+    /// Other places that matter, each with what it has to do with it.
+    pub notes: Vec<(Range<usize>, String)>,
+    /// What to do.
+    pub help: Option<String>,
+}
+
+impl Diagnostic {
+    /// A mistake at a place.
+    pub fn new(code: Code, span: Range<usize>, message: impl Into<String>) -> Self {
+        Self { code, message: message.into(), span, notes: Vec::new(), help: None }
+    }
+
+    /// The same with a way out.
+    #[must_use]
+    pub fn help(mut self, help: impl Into<String>) -> Self {
+        self.help = Some(help.into());
+        self
+    }
+
+    /// The same with another place that matters.
+    #[must_use]
+    pub fn note(mut self, span: Range<usize>, text: impl Into<String>) -> Self {
+        self.notes.push((span, text.into()));
+        self
+    }
+}
+
+/// Everything that is wrong with a graph, with the texts it stands in.
+#[derive(Debug, Clone)]
+pub struct Report {
+    /// The files that were read.
+    pub sources: Sources,
+    /// What is wrong, in the order of the places.
+    pub diagnostics: Vec<Diagnostic>,
+}
+
+impl Report {
+    /// The mistakes in the order of their places, each once.
+    #[must_use]
+    pub fn new(sources: Sources, mut diagnostics: Vec<Diagnostic>) -> Self {
+        diagnostics.sort_by(|a, b| (a.span.start, a.span.end, &a.message).cmp(&(b.span.start, b.span.end, &b.message)));
+        diagnostics.dedup();
+        Self { sources, diagnostics }
+    }
+
+    /// The text for a person, with or without colours.
+    #[must_use]
+    pub fn render(&self, has_colour: bool) -> String {
+        let renderer = if has_colour { Renderer::styled() } else { Renderer::plain() };
+        let mut text = String::new();
+        for diagnostic in &self.diagnostics {
+            text.push_str(&self.render_one(diagnostic, &renderer));
+            text.push_str("\n\n");
+        }
+        let count = self.diagnostics.len();
+        text.push_str(&format!("{count} mistake{}\n", if count == 1 { "" } else { "s" }));
+        text
+    }
+
+    fn render_one(&self, diagnostic: &Diagnostic, renderer: &Renderer) -> String {
+        let main = self.sources.file_at(diagnostic.span.start);
+        let place = AnnotationKind::Primary.span(main.local(&diagnostic.span));
+        let mut snippet = Snippet::source(&main.text).path(&main.name).annotation(place);
+        let mut others: Vec<Group<'_>> = Vec::new();
+        for (span, label) in &diagnostic.notes {
+            let file = self.sources.file_at(span.start);
+            let place = AnnotationKind::Context.span(file.local(span));
+            if std::ptr::eq(file, main) {
+                snippet = snippet.annotation(place.label(label));
+            } else {
+                let snippet = Snippet::source(&file.text).path(&file.name).annotation(place);
+                others.push(Level::NOTE.secondary_title(label).element(snippet));
+            }
+        }
+        let title = Level::ERROR.primary_title(&diagnostic.message).id(diagnostic.code.name());
+        let mut groups = vec![title.element(snippet)];
+        groups.append(&mut others);
+        if let Some(help) = &diagnostic.help {
+            groups.push(Group::with_title(Level::HELP.secondary_title(help)));
+        }
+        renderer.render(&groups)
+    }
+}
+
+/// A way out of a misspelt name: the one that is meant, or all there are.
+pub(crate) fn closest<'n>(name: &str, known: impl Iterator<Item = &'n str>, what: &str) -> String {
+    let known: Vec<&str> = known.collect();
+    let score = |other: &&&str| strsim::damerau_levenshtein(name, other);
+    match known.iter().min_by_key(score).filter(|best| score(best) <= 1 + name.chars().count() / 4) {
+        Some(best) => format!("did you mean `{best}`?"),
+        None if known.is_empty() => format!("there are no {what} here"),
+        None => format!("{what} here: {}", known.iter().map(|n| format!("`{n}`")).collect::<Vec<_>>().join(", ")),
+    }
+}

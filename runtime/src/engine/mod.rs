@@ -1,0 +1,5 @@
+//! How a plan runs.
+
+mod station;
+
+pub(crate) use station::{Station, Watch};

@@ -1,0 +1,102 @@
+//! One node in its place: when it steps, what its absence does, and when its state is reset.
+
+use crate::node::{AnyNode, Bus, Need, PortId, Tick, Wires};
+use crate::signal::Stamp;
+
+/// What a station looks at before it steps its node.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Watch {
+    mark: u32,
+    lag: u8,
+    is_trigger: bool,
+    is_required: bool,
+}
+
+impl Watch {
+    /// How an input declared with `need` watches the port with that mark.
+    pub(crate) fn new(need: Need, mark: u32) -> Self {
+        Self {
+            mark,
+            lag: u8::from(need == Need::Delayed),
+            is_trigger: matches!(need, Need::Required | Need::Trigger | Need::Many | Need::Delayed),
+            is_required: matches!(need, Need::Required | Need::Sampled),
+        }
+    }
+}
+
+/// A node with its wires, its ports and what it watches.
+pub(crate) struct Station {
+    node: Box<dyn AnyNode>,
+    wires: Wires,
+    outputs: Box<[PortId]>,
+    watches: Box<[Watch]>,
+    is_every_tick: bool,
+    absence: Absence,
+}
+
+/// Whether something required is absent, and since when.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Absence {
+    Nothing,
+    Since(i64),
+    Reset,
+}
+
+impl Station {
+    /// A node whose inputs are wired to ports that exist: for each input its need and its ports.
+    pub(crate) fn new(
+        node: Box<dyn AnyNode>,
+        inputs: &[(Need, Vec<PortId>)],
+        outputs: Vec<PortId>,
+        is_every_tick: bool,
+    ) -> Self {
+        let watches = inputs.iter().flat_map(|(need, ports)| ports.iter().map(|port| Watch::new(*need, port.mark)));
+        Self {
+            node,
+            wires: Wires::new(inputs),
+            outputs: outputs.into(),
+            watches: watches.collect(),
+            is_every_tick,
+            absence: Absence::Nothing,
+        }
+    }
+
+    /// Steps the node if a trigger is new or lost, and makes its outputs absent if something required is.
+    pub(crate) fn visit(&mut self, tick: &Tick, bus: &mut Bus) {
+        let (mut is_woken, mut is_missing, mut stamp) = (self.is_every_tick, false, Stamp::TIMELESS);
+        for watch in &self.watches {
+            let mark = &bus.marks[watch.mark as usize];
+            let is_present = mark.is_present();
+            is_woken |=
+                mark.changed_in(tick.index.wrapping_sub(u64::from(watch.lag))) & (watch.is_trigger | !is_present);
+            is_missing |= watch.is_required & !is_present;
+            if watch.is_trigger & is_present {
+                stamp = stamp.oldest(mark.stamp());
+            }
+        }
+        if is_missing {
+            self.starve(tick, bus);
+        } else {
+            self.absence = Absence::Nothing;
+            if is_woken {
+                self.node.step(&Tick { stamp, ..*tick }, bus, &self.wires, &self.outputs);
+            }
+        }
+    }
+
+    /// Makes the outputs absent; resets the state once, when that has lasted.
+    #[cold]
+    fn starve(&mut self, tick: &Tick, bus: &mut Bus) {
+        match self.absence {
+            Absence::Nothing => {
+                self.node.lose(tick.index, bus, &self.outputs);
+                self.absence = Absence::Since(tick.now);
+            }
+            Absence::Since(since) if tick.now - since >= tick.reset_after => {
+                self.node.reset();
+                self.absence = Absence::Reset;
+            }
+            Absence::Since(_) | Absence::Reset => {}
+        }
+    }
+}

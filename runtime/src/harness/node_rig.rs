@@ -1,0 +1,156 @@
+//! One node on a table: set its inputs, step, look at its outputs.
+
+use std::path::Path;
+
+use crate::engine::Station;
+use crate::graph::{Sources, parse_table};
+use crate::node::{Bus, Given, Mistakes, Need, Node, NodeSpec, PortId, Reader, Tick, of};
+use crate::signal::{Freshness, Mark, Shape, Signal, Stamp};
+
+/// A node with nothing around it, for its own tests. It steps as in a graph: when a trigger is new or lost.
+///
+/// Every tick is 1 ms after the last unless said otherwise; an input that is set is a new sample of that moment.
+pub struct NodeRig {
+    station: Station,
+    spec: NodeSpec,
+    bus: Bus,
+    inputs: Vec<(String, PortId)>,
+    outputs: Vec<PortId>,
+    shapes: Vec<Shape>,
+    /// The tick that the next step takes place in.
+    pub tick: Tick,
+}
+
+impl NodeRig {
+    /// The node with the parameters of a TOML text and wires of the given shapes, by the names of a graph file
+    /// (`in.x` is `x`).
+    ///
+    /// # Errors
+    /// What the node says is wrong.
+    ///
+    /// # Panics
+    /// If the text is not TOML, or a name is no input.
+    pub fn new<N: Node>(params: &str, wires: &[(&str, Shape)]) -> Result<Self, Mistakes> {
+        let mut sources = Sources::default();
+        let file = sources.add_file(Path::new("test.toml"), params);
+        let table = parse_table(file).unwrap_or_else(|errors| panic!("{errors:?}"));
+        let mut reader = Reader::new(&sources);
+        let node_type = of::<N>();
+        let spec = node_type.spec();
+        let configured = node_type.configure(&table, &mut reader);
+        let Some(configured) = configured.filter(|_| reader.mistakes.is_empty()) else {
+            return Err(reader.mistakes);
+        };
+        let mut bus = Bus::default();
+        let mut given = vec![Vec::new(); spec.inputs.len()];
+        let mut wired: Vec<(Need, Vec<PortId>)> = spec.inputs.iter().map(|input| (input.need, Vec::new())).collect();
+        let mut inputs = Vec::new();
+        for (name, shape) in wires {
+            let named = spec.inputs.iter().position(|input| input.name == *name && input.need != Need::Many);
+            let i = named.or_else(|| spec.inputs.iter().position(|input| input.need == Need::Many));
+            let i = i.unwrap_or_else(|| panic!("`{}` has no input `{name}`", N::NAME));
+            assert_eq!(shape.kind(), spec.inputs[i].kind, "input `{name}`");
+            let port = bus.add(shape);
+            given[i].push(((*name).to_owned(), shape.clone()));
+            wired[i].1.push(port);
+            inputs.push(((*name).to_owned(), port));
+        }
+        let built = configured.build(Given { inputs: given, period: 0.001 })?;
+        let outputs: Vec<PortId> = built.outputs.iter().map(|shape| bus.add(shape)).collect();
+        let station = Station::new(built.node, &wired, outputs.clone(), N::EVERY_TICK);
+        Ok(Self { station, spec, bus, inputs, outputs, shapes: built.outputs, tick: Tick::first() })
+    }
+
+    fn input(&self, name: &str) -> PortId {
+        let found = self.inputs.iter().find(|(input, _)| input == name);
+        found.unwrap_or_else(|| panic!("no wire is called `{name}`")).1
+    }
+
+    fn output(&self, name: &str) -> usize {
+        let found = self.spec.outputs.iter().position(|output| output.name == name);
+        found.unwrap_or_else(|| panic!("no output is called `{name}`"))
+    }
+
+    /// A new sample of this moment on an input.
+    ///
+    /// # Panics
+    /// If there is no such wire.
+    pub fn set<T: Signal>(&mut self, input: &str, value: T) {
+        let stamp = Stamp { nanos: self.tick.now, device: 0 };
+        self.edit(input, stamp, |old: &mut T| *old = value);
+    }
+
+    /// A new value with a stamp of its own on an input, changed in place.
+    ///
+    /// # Panics
+    /// If there is no such wire.
+    pub fn edit<T: Signal>(&mut self, input: &str, stamp: Stamp, change: impl FnOnce(&mut T)) {
+        let port = self.input(input);
+        let value = &mut T::arena_mut(&mut self.bus.arenas)[port.slot as usize];
+        change(value);
+        let mark = &mut self.bus.marks[port.mark as usize];
+        mark.renew(self.tick.index, stamp);
+        *mark = value.mark(*mark, self.tick.index);
+    }
+
+    /// The input goes away.
+    ///
+    /// # Panics
+    /// If there is no such wire.
+    pub fn lose(&mut self, input: &str) {
+        let port = self.input(input);
+        self.bus.marks[port.mark as usize].lose(self.tick.index);
+    }
+
+    /// Runs the tick, then lets `ms` milliseconds pass.
+    pub fn step_ms(&mut self, ms: f64) {
+        self.station.visit(&self.tick, &mut self.bus);
+        let nanos = (ms * 1e6) as i64;
+        self.tick =
+            Tick { index: self.tick.index + 1, now: self.tick.now + nanos, dt: nanos as f64 * 1e-9, ..self.tick };
+    }
+
+    /// Runs the tick, then lets a millisecond pass.
+    pub fn step(&mut self) {
+        self.step_ms(1.0);
+    }
+
+    /// What the last step left on an output; `None` if it is absent.
+    ///
+    /// # Panics
+    /// If there is no such output of that kind.
+    #[must_use]
+    pub fn get<T: Signal>(&self, output: &str) -> Option<&T> {
+        let i = self.output(output);
+        assert_eq!(self.shapes[i].kind(), T::KIND, "output `{output}`");
+        let port = self.outputs[i];
+        self.mark(output).is_present().then(|| &T::arena(&self.bus.arenas)[port.slot as usize])
+    }
+
+    /// Mark of an output.
+    ///
+    /// # Panics
+    /// If there is no such output.
+    #[must_use]
+    pub fn mark(&self, output: &str) -> Mark {
+        self.bus.marks[self.outputs[self.output(output)].mark as usize]
+    }
+
+    /// Freshness of an output in the tick of the last step.
+    ///
+    /// # Panics
+    /// If there is no such output.
+    #[must_use]
+    pub fn freshness(&self, output: &str) -> Freshness {
+        self.mark(output).freshness(self.tick.index - 1)
+    }
+
+    /// Shape of an output as the node set it.
+    ///
+    /// # Panics
+    /// If there is no such output.
+    #[must_use]
+    pub fn shape(&self, output: &str) -> &Shape {
+        &self.shapes[self.output(output)]
+    }
+}

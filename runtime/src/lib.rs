@@ -1,0 +1,15 @@
+//! tactflow's runtime: what a tactile-servoing graph is, how it is checked, and how it runs.
+//!
+//! It knows no node, no sensor and no robot: those stand in a [`Catalogue`](catalogue::Catalogue). In reading order:
+//! [`signal`] (what travels on a wire), [`node`] (the contract), [`graph`] (text in, plan or all mistakes out),
+//! [`diagnostic`] (what load says) and [`fault`] (what a run says), [`engine`] (the tick), [`device`] (the edge),
+//! [`record`], [`harness`], and `cli` (the command line as a library function, behind the feature `cli`).
+
+pub mod catalogue;
+pub mod device;
+pub mod diagnostic;
+pub mod engine;
+pub mod graph;
+pub mod harness;
+pub mod node;
+pub mod signal;

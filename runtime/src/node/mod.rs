@@ -1,0 +1,144 @@
+//! The node contract: plain data in, plain data out.
+//!
+//! A node is one file with four blocks, [`params!`](crate::params), [`inputs!`](crate::inputs),
+//! [`outputs!`](crate::outputs) and [`state!`](crate::state), and one `impl` [`Node`]. Names, types, units and docs
+//! come from those blocks and feed the check, its messages and the reference. `docs/writing-a-node.md` builds one.
+//!
+//! How an input is declared says when it wakes the node and what its absence does:
+//!
+//! | declared | seen in `step` | wakes the node when | when it is absent |
+//! |---|---|---|---|
+//! | `T` | `In<T>` | new or lost | the outputs are absent |
+//! | `Sampled<T>` | `In<T>` | lost | the outputs are absent |
+//! | `Trigger<T>` | `Option<In<T>>` | new or lost | `None` |
+//! | `Option<T>` | `Option<In<T>>` | lost | `None` |
+//! | `Many<T>` | `Many<T>`, each named in the graph | any is new or lost | that one is `None` |
+//! | `Delayed<T>` | `Option<In<T>>` as the last tick left it | it was new or lost then | `None` |
+
+mod erased;
+mod macros;
+mod mistake;
+mod params;
+mod ports;
+
+use crate::signal::Stamp;
+
+pub use crate::graph::Value;
+pub use erased::{AnyNode, Built, Configured, Given, NodeSpec, NodeType, of};
+pub use mistake::{At, Mistake, Mistakes};
+pub use params::{Count, FilePath, Map, NonNegative, Param, ParamSpec, Positive, Reader, read_leaf};
+pub use ports::{Bus, In, InputSet, Many, Need, Out, OutputSet, PortId, PortSpec, View, Wires};
+
+/// A node: configuration in `self`, made at load; state apart, so that a mode is a second configuration.
+pub trait Node: Sized + Send + 'static {
+    /// What the graph file may set.
+    type Params: Param;
+    /// What the node reads.
+    type Inputs<'a>: InputSet<'a>;
+    /// What the node writes.
+    type Outputs: OutputSet;
+    /// What the node remembers from one step to the next; `()` if nothing.
+    type State: Clone + Send + 'static;
+
+    /// Its `type` in a graph file.
+    const NAME: &'static str;
+    /// What it does, in one line.
+    const SUMMARY: &'static str;
+    /// Whether it steps in every tick, and not only when a trigger is new or lost: sinks and generators.
+    const EVERY_TICK: bool = false;
+
+    /// Makes the node: reads the shapes of the inputs and sets those of the outputs. May fail, may allocate.
+    ///
+    /// # Errors
+    /// What is wrong with the parameters or the wires, each with its place.
+    fn new(params: Self::Params, setup: &mut Setup<Self>) -> Result<Self, Mistakes>;
+
+    /// A fresh state: what a reset means.
+    fn state(&self) -> Self::State;
+
+    /// One step. Cannot fail, block, allocate, log or read a clock. An output that is not written is absent.
+    fn step(&self, tick: &Tick, inputs: Self::Inputs<'_>, out: &mut Self::Outputs, state: &mut Self::State);
+}
+
+/// What a node is made from, beside its parameters.
+pub struct Setup<N: Node> {
+    /// Shapes of the inputs, as the wires give them.
+    pub inputs: <N::Inputs<'static> as InputSet<'static>>::Shapes,
+    /// Shapes of the outputs, for the node to set. Units that follow from the declaration are filled in afterwards.
+    pub outputs: <N::Outputs as OutputSet>::Shapes,
+    /// Nominal time between two ticks of the graph [s].
+    pub period: f64,
+}
+
+/// What a step is told of the time: a node reads no clock.
+#[derive(Debug, Clone, Copy)]
+pub struct Tick {
+    /// Number of the tick, from 1.
+    pub index: u64,
+    /// Time of the tick in the graph's clock [ns].
+    pub now: i64,
+    /// Time since the last tick [s]; what every-tick nodes integrate with.
+    pub dt: f64,
+    /// Oldest stamp among the node's triggers; its outputs carry it.
+    pub stamp: Stamp,
+    /// Greatest time between two samples that counts as one step [s].
+    pub max_gap: f64,
+    /// How long something must be absent before its state is reset [ns].
+    pub reset_after: i64,
+}
+
+impl Tick {
+    /// A first tick at time zero, for tests of a node.
+    #[must_use]
+    pub const fn first() -> Self {
+        Self { index: 1, now: 0, dt: 0.0, stamp: Stamp::TIMELESS, max_gap: 0.1, reset_after: 20_000_000 }
+    }
+}
+
+/// The time between two samples of one device, for whatever integrates or differentiates: part of a node's state.
+///
+/// A sum of the steps is the time between the first and the last sample, however the ticks fell.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Interval {
+    last: Option<Stamp>,
+}
+
+impl Interval {
+    /// Time since the last new sample [s]: zero for the first, or when another device took it; at most the greatest
+    /// gap. Only to be called with something new.
+    pub fn step(&mut self, stamp: Stamp, tick: &Tick) -> f64 {
+        let stamp = if stamp.is_timeless() { Stamp { nanos: tick.now, ..stamp } } else { stamp };
+        let last = self.last.replace(stamp);
+        match last.filter(|last| last.device == stamp.device) {
+            Some(last) => ((stamp.nanos - last.nanos).max(0) as f64 * 1e-9).min(tick.max_gap),
+            None => 0.0,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_interval_is_between_two_samples_of_one_device() {
+        let tick = Tick { now: 50_000_000, ..Tick::first() };
+        let stamp = |ms: i64, device| Stamp { nanos: ms * 1_000_000, device };
+        let mut interval = Interval::default();
+        let cases = [
+            (stamp(0, 1), 0.0, "the first"),
+            (stamp(4, 1), 0.004, "the next"),
+            (stamp(4, 1), 0.0, "the same once more"),
+            (stamp(2, 1), 0.0, "one that goes back"),
+            (stamp(900, 1), 0.1, "after a gap"),
+            (stamp(904, 2), 0.0, "another device"),
+            (Stamp::TIMELESS, 0.0, "generated, first"),
+            (Stamp::TIMELESS, 0.0, "generated, in the same tick"),
+        ];
+        for (stamp, dt, what) in cases {
+            assert!((interval.step(stamp, &tick) - dt).abs() < 1e-12, "{what}");
+        }
+        let later = Tick { now: 60_000_000, ..tick };
+        assert!((interval.step(Stamp::TIMELESS, &later) - 0.01).abs() < 1e-12);
+    }
+}

@@ -1,0 +1,316 @@
+//! Parameters: read from the graph file value by value, so that every mistake of a node shows at once, on its token.
+
+use std::collections::BTreeMap;
+use std::ops::{Deref, Range};
+use std::path::PathBuf;
+
+use serde::de::DeserializeOwned;
+
+use super::{At, Mistake, Mistakes};
+use crate::diagnostic::{Code, closest};
+use crate::graph::{Item, Key, Sources, Table, Value};
+
+/// What is known of a parameter without a graph.
+#[derive(Debug, Clone)]
+pub struct ParamSpec {
+    /// Name in the graph file.
+    pub name: &'static str,
+    /// Meaning, with the unit in brackets.
+    pub doc: &'static str,
+    /// What it takes, for a person.
+    pub takes: &'static str,
+    /// Default as written in the node's file; none if it must be given.
+    pub default: Option<&'static str>,
+    /// Whether it may be left out.
+    pub is_optional: bool,
+    /// The parameters of a nested table.
+    pub fields: Vec<ParamSpec>,
+}
+
+impl ParamSpec {
+    /// The description of a field of type `T`.
+    #[must_use]
+    pub fn of<T: Param>(name: &'static str, doc: &'static str, default: Option<&'static str>) -> Self {
+        let is_optional = default.is_some() || T::when_missing().is_some();
+        Self { name, doc, takes: T::EXPECTS, default, is_optional, fields: T::fields() }
+    }
+}
+
+/// Something a graph file may set.
+pub trait Param: Sized {
+    /// What it takes, for a person: `a number`.
+    const EXPECTS: &'static str;
+
+    /// Reads it; a mistake goes to the reader.
+    fn read(value: &Value, reader: &mut Reader<'_>) -> Option<Self>;
+
+    /// The fields of a table.
+    #[must_use]
+    fn fields() -> Vec<ParamSpec> {
+        Vec::new()
+    }
+
+    /// What it is when it is not given and has no default; none if it must be given.
+    #[must_use]
+    fn when_missing() -> Option<Self> {
+        None
+    }
+}
+
+/// Collects the mistakes while parameters are read.
+pub struct Reader<'a> {
+    sources: &'a Sources,
+    /// What is wrong so far.
+    pub mistakes: Mistakes,
+}
+
+/// A table that is being read: what is left of it, and its place.
+pub struct OpenTable {
+    rest: Table,
+    span: Range<usize>,
+}
+
+impl<'a> Reader<'a> {
+    /// A reader of values that stand in `sources`.
+    #[must_use]
+    pub const fn new(sources: &'a Sources) -> Self {
+        Self { sources, mistakes: Vec::new() }
+    }
+
+    /// Says that the value at `span` will not do.
+    pub fn bad(&mut self, span: Range<usize>, message: impl Into<String>) {
+        self.mistakes.push(Mistake::new(Code::BadValue, At::Span(span), message));
+    }
+
+    /// Says that `value` is not what is expected.
+    pub fn wrong_type(&mut self, value: &Value, expected: &str) {
+        self.bad(value.span.clone(), format!("expected {expected}, found {}", value.described()));
+    }
+
+    /// Opens a table.
+    pub fn table(&mut self, value: &Value) -> Option<OpenTable> {
+        match &value.item {
+            Item::Table(table) => Some(OpenTable { rest: table.clone(), span: value.span.clone() }),
+            _ => {
+                self.wrong_type(value, "a table");
+                None
+            }
+        }
+    }
+
+    /// Reads one field of a table; `None` stands for a mistake that is noted.
+    pub fn field<T: Param>(
+        &mut self,
+        table: &mut OpenTable,
+        name: &'static str,
+        default: Option<fn() -> T>,
+    ) -> Option<T> {
+        if let Some((_, value)) = table.rest.remove(name) {
+            return T::read(&value, self);
+        }
+        let default = default.map(|default| default()).or_else(T::when_missing);
+        if default.is_none() {
+            let message = format!("`{name}` is missing: {}", T::EXPECTS);
+            self.mistakes.push(Mistake::new(Code::MissingKey, At::Span(table.span.clone()), message));
+        }
+        default
+    }
+
+    /// Every key that is left is one too many.
+    pub fn close(&mut self, table: OpenTable, known: &[&str]) {
+        for (key, _) in table.rest.entries {
+            let message = format!("`{}` is not a parameter here", key.name);
+            let help = closest(&key.name, known.iter().copied(), "parameters");
+            self.mistakes.push(Mistake::new(Code::UnknownKey, At::Span(key.span), message).help(help));
+        }
+    }
+
+    /// A path as it stands at `span`, taken from the folder of the file it stands in.
+    #[must_use]
+    pub fn path(&self, text: &str, span: &Range<usize>) -> PathBuf {
+        self.sources.folder(span.start).join(text)
+    }
+}
+
+/// Reads a value whose type serde knows: what most leaves need.
+pub fn read_leaf<T: DeserializeOwned>(value: &Value, reader: &mut Reader<'_>, expects: &str) -> Option<T> {
+    let read = T::deserialize(value);
+    if read.is_err() {
+        reader.wrong_type(value, expects);
+    }
+    read.ok()
+}
+
+macro_rules! leaves {
+    ($($type:ty: $expects:literal),*) => {$(
+        impl Param for $type {
+            const EXPECTS: &'static str = $expects;
+            fn read(value: &Value, reader: &mut Reader<'_>) -> Option<Self> {
+                read_leaf(value, reader, Self::EXPECTS)
+            }
+        }
+    )*};
+}
+
+leaves!(bool: "true or false", String: "a string", u64: "a whole number, 0 or more", usize: "a whole number, 0 or more");
+
+impl Param for f64 {
+    const EXPECTS: &'static str = "a number";
+
+    fn read(value: &Value, reader: &mut Reader<'_>) -> Option<Self> {
+        let number: Self = read_leaf(value, reader, Self::EXPECTS)?;
+        if !number.is_finite() {
+            reader.bad(value.span.clone(), "expected a finite number");
+            return None;
+        }
+        Some(number)
+    }
+}
+
+macro_rules! ranges {
+    ($($(#[$doc:meta])* $Name:ident($type:ty): $expects:literal, $holds:expr;)*) => {$(
+        $(#[$doc])*
+        #[derive(Debug, Clone, Copy, PartialEq, PartialOrd)]
+        pub struct $Name(pub $type);
+
+        impl Param for $Name {
+            const EXPECTS: &'static str = $expects;
+            fn read(value: &Value, reader: &mut Reader<'_>) -> Option<Self> {
+                let number: $type = read_leaf(value, reader, $expects)?;
+                let holds: fn($type) -> bool = $holds;
+                if !holds(number) {
+                    reader.wrong_type(value, $expects);
+                    return None;
+                }
+                Some(Self(number))
+            }
+        }
+
+        impl Deref for $Name {
+            type Target = $type;
+            fn deref(&self) -> &$type { &self.0 }
+        }
+    )*};
+}
+
+ranges! {
+    /// A finite number greater than zero.
+    Positive(f64): "a number greater than 0", |x| x > 0.0 && x.is_finite();
+    /// A finite number that is not below zero.
+    NonNegative(f64): "a number, 0 or more", |x| x >= 0.0 && x.is_finite();
+    /// How many, at least one.
+    Count(usize): "a whole number from 1 to 1000000", |n| (1..=1_000_000).contains(&n);
+}
+
+/// A file, named relative to the file it stands in.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct FilePath {
+    /// Where it is.
+    pub path: PathBuf,
+    /// Where its name stands.
+    pub span: Range<usize>,
+}
+
+impl Param for FilePath {
+    const EXPECTS: &'static str = "the path of a file";
+
+    fn read(value: &Value, reader: &mut Reader<'_>) -> Option<Self> {
+        let text: String = read_leaf(value, reader, Self::EXPECTS)?;
+        Some(Self { path: reader.path(&text, &value.span), span: value.span.clone() })
+    }
+}
+
+impl<T: Param> Param for Option<T> {
+    const EXPECTS: &'static str = T::EXPECTS;
+
+    fn read(value: &Value, reader: &mut Reader<'_>) -> Option<Self> {
+        T::read(value, reader).map(Some)
+    }
+
+    fn fields() -> Vec<ParamSpec> {
+        T::fields()
+    }
+
+    fn when_missing() -> Option<Self> {
+        Some(None)
+    }
+}
+
+impl<T: Param> Param for Vec<T> {
+    const EXPECTS: &'static str = "a list";
+
+    fn read(value: &Value, reader: &mut Reader<'_>) -> Option<Self> {
+        let Item::Array(items) = &value.item else {
+            reader.wrong_type(value, Self::EXPECTS);
+            return None;
+        };
+        let read: Vec<Option<T>> = items.iter().map(|item| T::read(item, reader)).collect();
+        read.into_iter().collect()
+    }
+}
+
+impl<T: Param, const N: usize> Param for [T; N] {
+    const EXPECTS: &'static str = match N {
+        2 => "a list of 2",
+        3 => "a list of 3",
+        6 => "a list of 6",
+        16 => "a list of 16",
+        _ => "a list of the right length",
+    };
+
+    fn read(value: &Value, reader: &mut Reader<'_>) -> Option<Self> {
+        match &value.item {
+            Item::Array(items) if items.len() == N => Vec::<T>::read(value, reader)?.try_into().ok(),
+            _ => {
+                reader.wrong_type(value, &format!("a list of {N}"));
+                None
+            }
+        }
+    }
+}
+
+/// A table whose keys the graph chooses: the names of features, mostly.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Map<T>(pub BTreeMap<String, T>);
+
+impl<T: Param> Param for Map<T> {
+    const EXPECTS: &'static str = "a table with an entry for each name";
+
+    fn read(value: &Value, reader: &mut Reader<'_>) -> Option<Self> {
+        let Item::Table(table) = &value.item else {
+            reader.wrong_type(value, Self::EXPECTS);
+            return None;
+        };
+        let read = |(key, value): &(Key, Value)| Some((key.name.clone(), T::read(value, reader)?));
+        let entries: Vec<Option<(String, T)>> = table.entries.iter().map(read).collect();
+        entries.into_iter().collect::<Option<_>>().map(Self)
+    }
+
+    fn fields() -> Vec<ParamSpec> {
+        T::fields()
+    }
+}
+
+impl<T> Map<T> {
+    /// The entries in the order of `names`; it is a mistake at `param` to leave one out or to have one more.
+    ///
+    /// # Errors
+    /// Names every feature without an entry and every entry without a feature.
+    pub fn in_order<'n>(&self, param: &str, names: impl Iterator<Item = &'n str> + Clone) -> Result<Vec<&T>, Mistakes> {
+        let mut mistakes = Mistakes::new();
+        let listed = || names.clone().map(|name| format!("`{name}`")).collect::<Vec<_>>().join(", ");
+        for key in self.0.keys() {
+            if !names.clone().any(|name| name == key) {
+                let help = closest(key, names.clone(), "features");
+                mistakes
+                    .push(Mistake::key(format!("{param}.{key}"), format!("no feature is called `{key}`")).help(help));
+            }
+        }
+        for name in names.clone().filter(|name| !self.0.contains_key(*name)) {
+            let message = format!("`{param}` has no entry for feature `{name}`");
+            let mistake = Mistake::new(Code::MissingKey, At::Key(param.into()), message);
+            mistakes.push(mistake.help(format!("give `{param}.{name}`; the features here are {}", listed())));
+        }
+        if mistakes.is_empty() { Ok(names.map(|name| &self.0[name]).collect()) } else { Err(mistakes) }
+    }
+}

@@ -1,0 +1,330 @@
+//! Ports: how a step sees its inputs and hands over its outputs.
+
+use std::borrow::Cow;
+use std::ops::Deref;
+
+use super::Tick;
+use crate::signal::{Arenas, Freshness, Kind, Mark, Shape, Signal, Stamp};
+
+/// When an input wakes its node, and what its absence does; see the table in [`node`](super).
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Need {
+    /// Required, and a trigger.
+    Required,
+    /// Required, but only its loss wakes.
+    Sampled,
+    /// Optional, and a trigger.
+    Trigger,
+    /// Optional; only its loss wakes.
+    Optional,
+    /// Any number of them, each named in the graph, optional and a trigger.
+    Many,
+    /// Read as the last tick left it; optional, and a trigger one tick late.
+    Delayed,
+}
+
+/// What is known of a port without a graph.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PortSpec {
+    /// Name in the graph file.
+    pub name: Cow<'static, str>,
+    /// What it carries, with its unit.
+    pub doc: Cow<'static, str>,
+    /// Kind of signal.
+    pub kind: Kind,
+    /// Unit, then frames: `"N"`, `"E/s"`, `"base"`; a capital letter is a variable, `"$name"` the parameter `name`.
+    pub args: Cow<'static, [Cow<'static, str>]>,
+    /// When it wakes; of no meaning for an output.
+    pub need: Need,
+}
+
+/// Where a port's value and mark are.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct PortId {
+    /// Index into the arena of its kind.
+    pub slot: u32,
+    /// Index of its mark.
+    pub mark: u32,
+}
+
+impl PortId {
+    /// No port: an input that is not wired.
+    pub const NONE: Self = Self { slot: u32::MAX, mark: u32::MAX };
+}
+
+/// Every value of a running graph, with its mark.
+#[derive(Debug, Default)]
+pub struct Bus {
+    /// Marks of all ports.
+    pub marks: Vec<Mark>,
+    /// Values of all ports.
+    pub arenas: Arenas,
+    /// Port whose value was not finite when it was written in this tick, by its mark's index.
+    pub not_finite: Option<u32>,
+}
+
+impl Bus {
+    /// Makes room for one more port.
+    pub fn add(&mut self, shape: &Shape) -> PortId {
+        self.marks.push(Mark::default());
+        PortId { slot: self.arenas.add(shape), mark: self.marks.len() as u32 - 1 }
+    }
+}
+
+/// The wires of one node: a port for each input, in the order of the declaration.
+#[derive(Debug, Clone, Default)]
+pub struct Wires {
+    single: Box<[PortId]>,
+    many: Box<[PortId]>,
+}
+
+impl Wires {
+    /// Wires from the ports of each input: at most one for a plain input, any number for `Many`.
+    #[must_use]
+    pub fn new(inputs: &[(Need, Vec<PortId>)]) -> Self {
+        let mut many = Vec::new();
+        let single = inputs.iter().map(|(need, ports)| match need {
+            Need::Many => {
+                let start = many.len() as u32;
+                many.extend_from_slice(ports);
+                PortId { slot: start, mark: ports.len() as u32 }
+            }
+            _ => ports.first().copied().unwrap_or(PortId::NONE),
+        });
+        let single = single.collect();
+        Self { single, many: many.into() }
+    }
+
+    /// The port of input `i`, if it is wired.
+    #[must_use]
+    pub fn port(&self, i: usize) -> Option<PortId> {
+        Some(self.single[i]).filter(|port| *port != PortId::NONE)
+    }
+
+    /// The ports of the variadic input `i`.
+    #[must_use]
+    pub fn ports(&self, i: usize) -> &[PortId] {
+        let PortId { slot, mark } = self.single[i];
+        &self.many[slot as usize..(slot + mark) as usize]
+    }
+}
+
+/// A value that is there.
+#[derive(Debug, Clone, Copy)]
+pub struct In<'a, T> {
+    value: &'a T,
+    mark: Mark,
+    tick: u64,
+}
+
+impl<'a, T> In<'a, T> {
+    /// A value with its mark, as seen in `tick`.
+    pub const fn new(value: &'a T, mark: Mark, tick: u64) -> Self {
+        Self { value, mark, tick }
+    }
+
+    /// The value, for as long as the tick lasts.
+    #[must_use]
+    pub const fn value(&self) -> &'a T {
+        self.value
+    }
+
+    /// Whether it was made in this tick; otherwise it is held.
+    #[must_use]
+    pub const fn is_new(&self) -> bool {
+        self.mark.changed_in(self.tick)
+    }
+
+    /// Stamp of the sample it came from.
+    #[must_use]
+    pub const fn stamp(&self) -> Stamp {
+        self.mark.stamp()
+    }
+}
+
+impl<T> Deref for In<'_, T> {
+    type Target = T;
+    fn deref(&self) -> &T {
+        self.value
+    }
+}
+
+/// The wires of a variadic input, in the order of the graph file.
+#[derive(Debug, Clone, Copy)]
+pub struct Many<'a, T> {
+    values: &'a [T],
+    marks: &'a [Mark],
+    ports: &'a [PortId],
+    tick: u64,
+}
+
+impl<'a, T> Many<'a, T> {
+    /// Number of wires.
+    #[must_use]
+    pub const fn len(&self) -> usize {
+        self.ports.len()
+    }
+
+    /// Whether nothing is wired.
+    #[must_use]
+    pub const fn is_empty(&self) -> bool {
+        self.ports.is_empty()
+    }
+
+    /// What comes in on wire `i`, if it is there.
+    #[must_use]
+    pub fn get(&self, i: usize) -> Option<In<'a, T>> {
+        let port = self.ports[i];
+        let mark = self.marks[port.mark as usize];
+        mark.is_present().then(|| In::new(&self.values[port.slot as usize], mark, self.tick))
+    }
+
+    /// Freshness of wire `i`.
+    #[must_use]
+    pub fn freshness(&self, i: usize) -> Freshness {
+        self.marks[self.ports[i].mark as usize].freshness(self.tick)
+    }
+
+    /// What comes in on each wire.
+    pub fn iter(&self) -> impl Iterator<Item = Option<In<'a, T>>> {
+        (0..self.len()).map(|i| self.get(i))
+    }
+}
+
+/// How one input is seen in a step.
+pub trait View<'a>: Sized {
+    /// Its signal.
+    type Signal: Signal;
+    /// What the node learns of its shape at load.
+    type Shape;
+
+    /// What input `i` shows in `tick`.
+    fn fetch(bus: &'a Bus, wires: &'a Wires, i: usize, tick: u64) -> Self;
+    /// The shape, from the named wires of the input.
+    fn shape(wires: Vec<(String, Shape)>) -> Self::Shape;
+}
+
+fn shape_of<T: Signal>(shape: &Shape) -> T::Shape {
+    T::shape_of(shape).expect("the check has compared the kinds").clone()
+}
+
+impl<'a, T: Signal> View<'a> for In<'a, T> {
+    type Signal = T;
+    type Shape = T::Shape;
+
+    fn fetch(bus: &'a Bus, wires: &'a Wires, i: usize, tick: u64) -> Self {
+        let port = wires.single[i];
+        In::new(&T::arena(&bus.arenas)[port.slot as usize], bus.marks[port.mark as usize], tick)
+    }
+
+    fn shape(wires: Vec<(String, Shape)>) -> T::Shape {
+        shape_of::<T>(&wires.first().expect("the check has seen that it is wired").1)
+    }
+}
+
+impl<'a, T: Signal> View<'a> for Option<In<'a, T>> {
+    type Signal = T;
+    type Shape = Option<T::Shape>;
+
+    fn fetch(bus: &'a Bus, wires: &'a Wires, i: usize, tick: u64) -> Self {
+        let port = wires.port(i)?;
+        let mark = bus.marks[port.mark as usize];
+        mark.is_present().then(|| In::new(&T::arena(&bus.arenas)[port.slot as usize], mark, tick))
+    }
+
+    fn shape(wires: Vec<(String, Shape)>) -> Option<T::Shape> {
+        wires.first().map(|(_, shape)| shape_of::<T>(shape))
+    }
+}
+
+impl<'a, T: Signal> View<'a> for Many<'a, T> {
+    type Signal = T;
+    type Shape = Vec<(String, T::Shape)>;
+
+    fn fetch(bus: &'a Bus, wires: &'a Wires, i: usize, tick: u64) -> Self {
+        Many { values: T::arena(&bus.arenas), marks: &bus.marks, ports: wires.ports(i), tick }
+    }
+
+    fn shape(wires: Vec<(String, Shape)>) -> Self::Shape {
+        wires.into_iter().map(|(name, shape)| (name, shape_of::<T>(&shape))).collect()
+    }
+}
+
+/// All inputs of a node; made by [`inputs!`](crate::inputs).
+pub trait InputSet<'a>: Sized {
+    /// What the node learns of its inputs at load.
+    type Shapes;
+
+    /// The declaration.
+    fn specs() -> Vec<PortSpec>;
+    /// The shapes, from the named wires of each input.
+    fn shapes(wires: Vec<Vec<(String, Shape)>>) -> Self::Shapes;
+    /// What the inputs show in `tick`.
+    fn fetch(bus: &'a Bus, wires: &'a Wires, tick: u64) -> Self;
+}
+
+/// A value for a step to write. What it does not write is absent, but for the components of a feature vector.
+#[derive(Debug, Default)]
+pub struct Out<T> {
+    value: T,
+    is_written: bool,
+}
+
+impl<T: Signal> Out<T> {
+    /// Writes the value.
+    pub fn set(&mut self, value: T) {
+        *self.write() = value;
+    }
+
+    /// The value, to be written whole and in place.
+    pub const fn write(&mut self) -> &mut T {
+        self.is_written = true;
+        &mut self.value
+    }
+
+    /// Takes the buffer from the bus for one step.
+    #[doc(hidden)]
+    pub fn take(bus: &mut Bus, port: PortId) -> Self {
+        Self { value: std::mem::take(&mut T::arena_mut(&mut bus.arenas)[port.slot as usize]), is_written: false }
+    }
+
+    /// Puts the buffer back and marks what the step did.
+    #[doc(hidden)]
+    pub fn put(self, bus: &mut Bus, port: PortId, tick: &Tick) {
+        let mark = &mut bus.marks[port.mark as usize];
+        if self.is_written {
+            mark.renew(tick.index, tick.stamp);
+            *mark = self.value.mark(*mark, tick.index);
+            if T::KIND != Kind::Image && !self.value.is_finite() {
+                bus.not_finite = bus.not_finite.or(Some(port.mark));
+            }
+        } else if !T::KEEPS {
+            mark.lose(tick.index);
+        }
+        T::arena_mut(&mut bus.arenas)[port.slot as usize] = self.value;
+    }
+
+    /// Makes the port absent.
+    #[doc(hidden)]
+    pub fn lose(bus: &mut Bus, port: PortId, tick: u64) {
+        bus.marks[port.mark as usize].lose(tick);
+        T::arena_mut(&mut bus.arenas)[port.slot as usize].lose(tick);
+    }
+}
+
+/// All outputs of a node; made by [`outputs!`](crate::outputs).
+pub trait OutputSet: Sized {
+    /// The shapes, for the node to set.
+    type Shapes: Default;
+
+    /// The declaration.
+    fn specs() -> Vec<PortSpec>;
+    /// The shapes as the node set them, in the order of the declaration.
+    fn into_shapes(shapes: Self::Shapes) -> Vec<Shape>;
+    /// Takes all buffers from the bus for one step.
+    fn take(bus: &mut Bus, ports: &[PortId]) -> Self;
+    /// Puts all buffers back and marks what the step did.
+    fn put(self, bus: &mut Bus, ports: &[PortId], tick: &Tick);
+    /// Makes all outputs absent.
+    fn lose(bus: &mut Bus, ports: &[PortId], tick: u64);
+}

@@ -1,0 +1,219 @@
+//! The list of kinds, and what all kinds have in common.
+
+use std::fmt;
+
+use super::{
+    Features, FeaturesShape, Grid, Image, ImageShape, Jacobian, Joints, JointsShape, Mark, Mask, Pose, PoseShape,
+    Regions, RegionsShape, Twist, TwistShape, Unit, all_finite,
+};
+
+/// A single number.
+pub type Scalar = f64;
+/// A yes or no.
+pub type Flag = bool;
+
+/// What is known of a scalar at load.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct ScalarShape {
+    /// Its unit.
+    pub unit: Unit,
+}
+
+/// Nothing is known of a flag at load.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct FlagShape;
+
+/// A value that travels on a wire: one type a kind.
+pub trait Signal: Default + Clone + Send + 'static {
+    /// Which kind.
+    const KIND: Kind;
+    /// What is known of it at load.
+    type Shape: Clone + Default + PartialEq + fmt::Debug + Into<Shape> + 'static;
+
+    /// A value of that shape; the only place where a value allocates.
+    fn allocate(shape: &Self::Shape) -> Self;
+
+    /// Whether every number in it is finite. Images are checked once, where they enter.
+    fn is_finite(&self) -> bool;
+
+    /// The mark of the value after a step that wrote it, given the mark that follows from the step.
+    fn mark(&self, from_step: Mark, _tick: u64) -> Mark {
+        from_step
+    }
+
+    /// What becomes of the value when its port is made absent.
+    fn lose(&mut self, _tick: u64) {}
+
+    /// Whether a step that writes nothing leaves the value as it is, instead of making it absent.
+    const KEEPS: bool = false;
+
+    /// The shape of this kind, if `shape` is one.
+    fn shape_of(shape: &Shape) -> Option<&Self::Shape>;
+    /// The values of this kind.
+    fn arena(arenas: &Arenas) -> &Vec<Self>;
+    /// The values of this kind, to be written.
+    fn arena_mut(arenas: &mut Arenas) -> &mut Vec<Self>;
+}
+
+macro_rules! kinds {
+    ($($kind:ident $shape:ident $arena:ident $word:literal { $($item:tt)* })*) => {
+        /// The kinds of signals: a closed set.
+        #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+        pub enum Kind { $(#[doc = concat!("A ", $word, ".")] $kind),* }
+
+        impl fmt::Display for Kind {
+            fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.write_str(match self { $(Self::$kind => $word),* })
+            }
+        }
+
+        /// What is known of any signal at load.
+        #[derive(Debug, Clone, PartialEq)]
+        pub enum Shape { $(#[doc = concat!("Of a ", $word, ".")] $kind($shape)),* }
+
+        impl Shape {
+            /// Which kind the shape is of.
+            #[must_use]
+            pub const fn kind(&self) -> Kind {
+                match self { $(Self::$kind(_) => Kind::$kind),* }
+            }
+        }
+
+        /// The values of a graph, kind by kind.
+        #[derive(Debug, Default, Clone)]
+        pub struct Arenas { $($arena: Vec<$kind>),* }
+
+        impl Arenas {
+            /// Makes room for one more value of that shape and tells its slot.
+            pub fn add(&mut self, shape: &Shape) -> u32 {
+                match shape { $(Shape::$kind(shape) => {
+                    self.$arena.push(<$kind as Signal>::allocate(shape));
+                    self.$arena.len() as u32 - 1
+                })* }
+            }
+
+            /// Exchanges a value of `kind` with one of another arena.
+            pub fn swap(&mut self, kind: Kind, slot: u32, other: &mut Self, other_slot: u32) {
+                match kind { $(Kind::$kind =>
+                    std::mem::swap(&mut self.$arena[slot as usize], &mut other.$arena[other_slot as usize])),* }
+            }
+
+            /// Whether a value of `kind` is finite.
+            #[must_use]
+            pub fn is_finite(&self, kind: Kind, slot: u32) -> bool {
+                match kind { $(Kind::$kind => self.$arena[slot as usize].is_finite()),* }
+            }
+        }
+
+        $(
+            impl From<$shape> for Shape {
+                fn from(shape: $shape) -> Self { Self::$kind(shape) }
+            }
+
+            impl Signal for $kind {
+                const KIND: Kind = Kind::$kind;
+                type Shape = $shape;
+                fn shape_of(shape: &Shape) -> Option<&$shape> {
+                    match shape { Shape::$kind(shape) => Some(shape), _ => None }
+                }
+                fn arena(arenas: &Arenas) -> &Vec<Self> { &arenas.$arena }
+                fn arena_mut(arenas: &mut Arenas) -> &mut Vec<Self> { &mut arenas.$arena }
+                $($item)*
+            }
+        )*
+    };
+}
+
+/// The shape of a mask is that of the array it lies on.
+pub type MaskShape = Grid;
+/// What is known of a Jacobian at load: the joints of its columns.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct JacobianShape(pub JointsShape);
+
+kinds! {
+    Scalar ScalarShape scalars "scalar" {
+        fn allocate(_: &ScalarShape) -> Self { 0.0 }
+        fn is_finite(&self) -> bool { all_finite(&[*self]) }
+    }
+    Flag FlagShape flags "flag" {
+        fn allocate(_: &FlagShape) -> Self { false }
+        fn is_finite(&self) -> bool { true }
+    }
+    Features FeaturesShape features "feature vector" {
+        fn allocate(shape: &FeaturesShape) -> Self { Self::absent(shape.features.len()) }
+        fn is_finite(&self) -> bool { Self::is_finite(self) }
+        fn mark(&self, _: Mark, tick: u64) -> Mark { Self::mark(self, tick) }
+        fn lose(&mut self, tick: u64) { self.lose_all(tick); }
+        const KEEPS: bool = true;
+    }
+    Image ImageShape images "image" {
+        fn allocate(shape: &ImageShape) -> Self { Self::zeros(shape.rows, shape.cols) }
+        fn is_finite(&self) -> bool { Self::is_finite(self) }
+    }
+    Mask MaskShape masks "mask" {
+        fn allocate(grid: &MaskShape) -> Self { Self::empty(grid.rows, grid.cols) }
+        fn is_finite(&self) -> bool { true }
+    }
+    Regions RegionsShape regions "list of regions" {
+        fn allocate(shape: &RegionsShape) -> Self { Self::with_room(shape.grid.rows, shape.grid.cols) }
+        fn is_finite(&self) -> bool { self.list().iter().all(|region| all_finite(&[region.force])) }
+    }
+    Twist TwistShape twists "twist" {
+        fn allocate(_: &TwistShape) -> Self { Self::default() }
+        fn is_finite(&self) -> bool { all_finite(self.0.as_slice()) }
+    }
+    Pose PoseShape poses "pose" {
+        fn allocate(_: &PoseShape) -> Self { Self::default() }
+        fn is_finite(&self) -> bool {
+            all_finite(self.0.translation.vector.as_slice()) && all_finite(self.0.rotation.matrix().as_slice())
+        }
+    }
+    Joints JointsShape joints "joint vector" {
+        fn allocate(shape: &JointsShape) -> Self { Self::zeros(shape.joints.len()) }
+        fn is_finite(&self) -> bool { all_finite(&self.0) }
+    }
+    Jacobian JacobianShape jacobians "Jacobian" {
+        fn allocate(shape: &JacobianShape) -> Self { Self::zeros(shape.0.joints.len()) }
+        fn is_finite(&self) -> bool { self.0.iter().all(|column| all_finite(column.0.as_slice())) }
+    }
+}
+
+impl Kind {
+    /// Whether a port of this kind names a unit before its frame.
+    #[must_use]
+    pub const fn has_unit(self) -> bool {
+        matches!(self, Self::Scalar | Self::Features | Self::Image | Self::Regions | Self::Joints)
+    }
+
+    /// The kind with its article, for messages.
+    #[must_use]
+    pub fn with_article(self) -> String {
+        let article = if self == Self::Image { "an" } else { "a" };
+        format!("{article} {self}")
+    }
+}
+
+impl Shape {
+    /// The unit, of a kind that has one for the whole.
+    #[must_use]
+    pub const fn unit(&self) -> Option<Unit> {
+        match self {
+            Self::Scalar(shape) => Some(shape.unit),
+            Self::Image(shape) => Some(shape.unit),
+            Self::Regions(shape) => Some(shape.unit),
+            Self::Joints(shape) => Some(shape.unit),
+            _ => None,
+        }
+    }
+
+    /// Sets the unit, of a kind that has one for the whole.
+    pub const fn set_unit(&mut self, unit: Unit) {
+        match self {
+            Self::Scalar(shape) => shape.unit = unit,
+            Self::Image(shape) => shape.unit = unit,
+            Self::Regions(shape) => shape.unit = unit,
+            Self::Joints(shape) => shape.unit = unit,
+            _ => {}
+        }
+    }
+}

@@ -1,0 +1,30 @@
+//! What travels on a wire: a closed set of kinds, each with its shape, its unit and its frame.
+//!
+//! Own crates add nodes, not kinds; so the recorder, the finite check and the bridges have one place each. The size of
+//! a value is fixed once its shape is known, so every slot is allocated at load and none after it.
+
+mod features;
+mod freshness;
+mod image;
+mod joints;
+mod kind;
+mod mask;
+mod regions;
+mod spatial;
+mod unit;
+
+pub use features::{Component, Feature, Features, FeaturesShape};
+pub use freshness::{Freshness, Mark, Stamp};
+pub use image::{Image, ImageShape};
+pub use joints::{Jacobian, Joint, Joints, JointsShape};
+pub use kind::{Arenas, Flag, FlagShape, JacobianShape, Kind, MaskShape, Scalar, ScalarShape, Shape, Signal};
+pub use mask::{Grid, Mask};
+pub use regions::{Region, Regions, RegionsShape, Run};
+pub use spatial::{Pose, PoseShape, Twist, TwistShape};
+pub use unit::{Base, Unit};
+
+/// Whether no bit pattern of `values` is an infinity or NaN: bits and no float sums, so that it vectorises.
+pub(crate) fn all_finite(values: &[f64]) -> bool {
+    const EXPONENT: u64 = 0x7ff0_0000_0000_0000;
+    !values.iter().fold(false, |bad, v| bad | (v.to_bits() & EXPONENT == EXPONENT))
+}
