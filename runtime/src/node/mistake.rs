@@ -1,7 +1,9 @@
 //! What a node says is wrong with its parameters or its wires.
 
+use std::io;
 use std::ops::Range;
 
+use super::FilePath;
 use crate::diagnostic::Code;
 
 /// The place of a mistake, in the words of the graph file.
@@ -15,6 +17,15 @@ pub enum At {
     Input(String),
     /// A place that is known already.
     Span(Range<usize>),
+    /// A place in a file of data that the graph names.
+    Data {
+        /// The file, and where its name stands.
+        file: FilePath,
+        /// Its text.
+        text: String,
+        /// The place in that text.
+        span: Range<usize>,
+    },
     /// The node as a whole.
     Node,
 }
@@ -54,6 +65,19 @@ impl Mistake {
     /// What comes in on an input does not fit the rest.
     pub fn input(name: impl Into<String>, message: impl Into<String>) -> Self {
         Self::new(Code::ShapeMismatch, At::Input(name.into()), message)
+    }
+
+    /// A file of data is not what it should be, at a place in its text.
+    pub fn data(file: &FilePath, text: &str, span: Range<usize>, message: impl Into<String>) -> Self {
+        let at = At::Data { file: file.clone(), text: text.to_owned(), span };
+        Self::new(Code::BadData, at, message)
+    }
+
+    /// A file cannot be read.
+    #[must_use]
+    pub fn unreadable(file: &FilePath, error: &io::Error) -> Self {
+        let message = format!("cannot read `{}`: {error}", file.path.display());
+        Self::new(Code::Unreadable, At::Span(file.span.clone()), message)
     }
 
     /// The same mistake with a way out.
