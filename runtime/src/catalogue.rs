@@ -33,8 +33,14 @@ impl Catalogue {
 
     /// With one more device.
     #[must_use]
-    pub fn device<D: Device>(mut self) -> Self {
-        self.devices.push(device_type::<D>());
+    pub fn device<D: Device>(self) -> Self {
+        self.device_type(device_type::<D>())
+    }
+
+    /// With one more device that is known only at run time.
+    #[must_use]
+    pub fn device_type(mut self, device: Box<dyn DeviceType>) -> Self {
+        self.devices.push(device);
         self
     }
 

@@ -6,10 +6,14 @@
 //! [`record`], [`harness`], and `cli` (the command line as a library function, behind the feature `cli`).
 
 pub mod catalogue;
+#[cfg(feature = "cli")]
+pub mod cli;
 pub mod device;
 pub mod diagnostic;
 pub mod engine;
+pub mod fault;
 pub mod graph;
 pub mod harness;
 pub mod node;
+pub mod record;
 pub mod signal;

@@ -91,3 +91,18 @@ pub(crate) fn link(samples: &Samples, commands: &Commands, epoch: Instant) -> (L
     };
     (link, Linked { samples: samples_out, commands: commands_in, sampled, commanded, stop })
 }
+
+impl Linked {
+    /// Hands over the commands and takes the newest samples, if there are any. Buffers rotate; nothing is copied but
+    /// the commands.
+    pub(crate) fn exchange(&mut self, commands: &Commands, samples: &mut Samples) {
+        for (slot, values) in self.commands.input_buffer_mut().values.iter_mut().zip(&commands.values) {
+            slot.copy_from_slice(values);
+        }
+        self.commands.publish();
+        self.commanded.notify_one();
+        if self.samples.update() {
+            std::mem::swap(samples, self.samples.output_buffer_mut());
+        }
+    }
+}

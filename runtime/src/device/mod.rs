@@ -71,6 +71,11 @@ pub trait Stepped: Send {
     /// Time of the next sample in the device's own time from its start [ns]; `None` when there will be no more.
     fn next(&self) -> Option<i64>;
 
+    /// Time of the last sample there will be, if that is known [ns]: for a progress bar.
+    fn end(&self) -> Option<i64> {
+        None
+    }
+
     /// Takes the commands that hold since the last call and gives everything sampled up to `now` [ns].
     ///
     /// # Errors

@@ -1,5 +1,298 @@
-//! How a plan runs.
+//! How a plan runs. [`Engine`] holds everything that a tick touches; the tick itself (`tick`: latch, step, commit) and
+//! what it is made of (`station`, `inlet`, `command`) name no lock, no clock and no tokio. `timeline` says when the
+//! next tick is; `shell` is the edge to real time, to live devices and to the operator.
 
+mod command;
+mod inlet;
+mod shell;
 mod station;
+mod tick;
+mod timeline;
 
-pub(crate) use station::{Station, Watch};
+use std::panic::{AssertUnwindSafe, catch_unwind};
+
+use crate::device::{Commands, Driver, Linked, Live, Samples, Stepped};
+use crate::fault::{Cause, Fault};
+use crate::graph::{Plan, PlannedPort, Producer, Source, Sources};
+use crate::node::{Bus, PortId, Tick};
+use crate::signal::Stamp;
+use command::CommandSlot;
+use inlet::Inlet;
+use timeline::Timeline;
+
+pub use inlet::Counters;
+pub use shell::{End, Outcome, RunOptions, run};
+pub(crate) use station::Station;
+pub use tick::Timing;
+
+/// A graph that runs.
+pub struct Engine {
+    core: tick::Core,
+    decks: Vec<Deck>,
+    timeline: Timeline,
+    ports: Vec<(PlannedPort, PortId)>,
+    /// Name and place of each station.
+    names: Vec<(String, String)>,
+    /// Name of each role, and the place of the device behind it.
+    roles: Vec<(String, String)>,
+    timing: Timing,
+    sources: Sources,
+}
+
+/// A device with what it is handed and what it hands over.
+struct Deck {
+    name: String,
+    place: String,
+    samples: Samples,
+    commands: Commands,
+    edge: Edge,
+}
+
+enum Edge {
+    Stepped(Box<dyn Stepped>),
+    /// A live device that the shell has not started yet.
+    Idle(Box<dyn Live>),
+    Live(Linked),
+    /// A device that failed: it is not touched again.
+    Gone,
+}
+
+impl Engine {
+    /// Allocates everything that the plan needs; nothing allocates in a tick.
+    #[must_use]
+    pub fn new(plan: Plan) -> Self {
+        let mut bus = Bus::default();
+        let mut ids = std::collections::BTreeMap::new();
+        let mut ports = Vec::new();
+        let mut inlets = Vec::new();
+        for (i, role) in plan.roles.iter().enumerate() {
+            for (port, planned) in role.ports.iter().enumerate() {
+                let id = bus.add(&planned.shape);
+                ids.insert(Source { producer: Producer::Role(i), port }, id);
+                inlets.push(Inlet::new(&planned.shape, role.device, role.first_port + port, id));
+                ports.push((planned.clone(), id));
+            }
+        }
+        for node in &plan.nodes {
+            for (port, planned) in node.ports.iter().enumerate() {
+                let id = bus.add(&planned.shape);
+                ids.insert(Source { producer: Producer::Node(node.index), port }, id);
+                ports.push((planned.clone(), id));
+            }
+        }
+        let names = plan.nodes.iter().map(|node| (node.name.clone(), plan.sources.locate(node.span.start))).collect();
+        let place = |device: usize| plan.sources.locate(plan.devices[device].span.start);
+        let roles = plan.roles.iter().map(|role| (role.name.clone(), place(role.device))).collect();
+        let slots = plan.commands.iter().map(|command| CommandSlot::new(ids[&command.source], command)).collect();
+        let decks = plan.devices.into_iter().map(|device| Deck {
+            place: plan.sources.locate(device.span.start),
+            name: device.name,
+            samples: Samples::with_shapes(device.outputs.iter()),
+            commands: Commands::with_shapes(device.commands.iter()),
+            edge: match device.driver {
+                Driver::Stepped(driver) => Edge::Stepped(driver),
+                Driver::Live(driver) => Edge::Idle(driver),
+            },
+        });
+        let decks: Vec<Deck> = decks.collect();
+        let station = |node: crate::graph::PlannedNode| {
+            let inputs: Vec<_> =
+                node.inputs.iter().map(|(need, from)| (*need, from.iter().map(|s| ids[s]).collect())).collect();
+            let outputs = (0..node.ports.len()).map(|port| ids[&Source { producer: Producer::Node(node.index), port }]);
+            Station::new(node.node, &inputs, outputs.collect(), node.is_every_tick)
+        };
+        let stations: Vec<Station> = plan.nodes.into_iter().map(station).collect();
+        let tick = Tick {
+            index: 0,
+            now: 0,
+            dt: 0.0,
+            stamp: Stamp::TIMELESS,
+            max_gap: plan.max_gap,
+            reset_after: plan.reset_after,
+        };
+        Self {
+            timing: Timing::new(stations.len()),
+            core: tick::Core::new(bus, stations, inlets, slots, tick),
+            decks,
+            timeline: Timeline::new(plan.clock, plan.period),
+            ports,
+            names,
+            roles,
+            sources: plan.sources,
+        }
+    }
+
+    /// Time of the next tick in virtual time [ns]; `None` when a device has ended.
+    #[must_use]
+    pub fn next(&self) -> Option<i64> {
+        let mut clock = None;
+        for (i, deck) in self.decks.iter().enumerate() {
+            if let Edge::Stepped(driver) = &deck.edge {
+                let next = driver.next()?;
+                if self.timeline.is_clock(i) {
+                    clock = Some(next);
+                }
+            }
+        }
+        Some(self.timeline.next(clock))
+    }
+
+    /// Runs the tick at `now` [ns]: exchange with the devices, latch, step, commit.
+    ///
+    /// # Errors
+    /// The reason of a fault; nothing was commanded in this tick.
+    pub fn tick(&mut self, now: i64) -> Result<(), Fault> {
+        let clock = self.clock_sample();
+        self.core.begin(now);
+        self.exchange(now)?;
+        let outcome = catch_unwind(AssertUnwindSafe(|| self.core.run(&mut self.decks, &mut self.timing)));
+        self.timeline.ticked(now, clock);
+        match outcome {
+            Ok(None) => Ok(()),
+            Ok(Some(mark)) => Err(self.not_finite(mark)),
+            Err(panic) => Err(self.panicked(&*panic)),
+        }
+    }
+
+    /// Time of the clock device's next sample before this tick.
+    fn clock_sample(&self) -> Option<i64> {
+        self.decks.iter().enumerate().find_map(|(i, deck)| match &deck.edge {
+            Edge::Stepped(driver) if self.timeline.is_clock(i) => driver.next(),
+            _ => None,
+        })
+    }
+
+    /// Hands the commands of the last tick to the devices and takes what they have sampled up to `now`.
+    fn exchange(&mut self, now: i64) -> Result<(), Fault> {
+        for deck in &mut self.decks {
+            match &mut deck.edge {
+                Edge::Stepped(driver) => {
+                    if let Err(error) = driver.exchange(now, &deck.commands, &mut deck.samples) {
+                        deck.edge = Edge::Gone;
+                        return Err(Fault {
+                            node: deck.name.clone(),
+                            port: None,
+                            tick: self.core.tick.index,
+                            time: now,
+                            cause: Cause::Device(error.0),
+                            place: deck.place.clone(),
+                        });
+                    }
+                }
+                Edge::Live(linked) => {
+                    linked.exchange(&deck.commands, &mut deck.samples);
+                }
+                Edge::Idle(_) | Edge::Gone => {}
+            }
+        }
+        Ok(())
+    }
+
+    /// One period of the end of a run: the commands go one step further down to zero, and the devices are told.
+    /// Whether they are zero.
+    pub fn wind_down(&mut self) -> bool {
+        let now = self.core.tick.now + self.timeline.period();
+        self.core.begin(now);
+        let is_still = self.core.ramp(&mut self.decks, self.timeline.period() as f64 * 1e-9);
+        // A device that fails now has had its zero or will time out by itself; the reason of the stop stays the first.
+        let _ = self.exchange(now);
+        is_still
+    }
+
+    fn not_finite(&self, mark: u32) -> Fault {
+        let (port, _) = self.ports.iter().find(|(_, id)| id.mark == mark).expect("every mark is a port's");
+        let (node, name) = port.name.rsplit_once('.').expect("a port's name has two parts");
+        let (_, place) =
+            self.names.iter().chain(&self.roles).find(|(known, _)| known == node).expect("a port has an owner");
+        self.fault(node, Some(name.to_owned()), Cause::NotFinite, place.clone())
+    }
+
+    fn panicked(&self, panic: &(dyn std::any::Any + Send)) -> Fault {
+        let text = panic.downcast_ref::<&str>().map(|text| (*text).to_owned());
+        let message = text.or_else(|| panic.downcast_ref::<String>().cloned()).unwrap_or_else(|| "no message".into());
+        let (node, place) = &self.names[self.core.current()];
+        self.fault(node, None, Cause::Panicked(message), place.clone())
+    }
+
+    fn fault(&self, node: &str, port: Option<String>, cause: Cause, place: String) -> Fault {
+        Fault { node: node.into(), port, tick: self.core.tick.index, time: self.core.tick.now, cause, place }
+    }
+
+    /// Time of the last sample that the clock device will give, if it knows [ns].
+    #[must_use]
+    pub fn end(&self) -> Option<i64> {
+        self.decks.iter().enumerate().find_map(|(i, deck)| match &deck.edge {
+            Edge::Stepped(driver) if self.timeline.is_clock(i) => driver.end(),
+            _ => None,
+        })
+    }
+
+    /// Number of the last tick.
+    #[must_use]
+    pub const fn ticks(&self) -> u64 {
+        self.core.tick.index
+    }
+
+    /// Time of the last tick in the graph's clock [ns].
+    #[must_use]
+    pub const fn now(&self) -> i64 {
+        self.core.tick.now
+    }
+
+    /// Nominal time between two ticks [ns].
+    #[must_use]
+    pub const fn period(&self) -> i64 {
+        self.timeline.period()
+    }
+
+    /// Every value, as the last tick left it.
+    #[must_use]
+    pub const fn bus(&self) -> &Bus {
+        &self.core.bus
+    }
+
+    /// Every port, those of the roles first, and where its value is.
+    #[must_use]
+    pub fn ports(&self) -> &[(PlannedPort, PortId)] {
+        &self.ports
+    }
+
+    /// The names of the nodes in the order in which they step.
+    pub fn order(&self) -> impl Iterator<Item = &str> {
+        self.names.iter().map(|(name, _)| name.as_str())
+    }
+
+    /// What came in on each role's ports, in the order of [`ports`](Self::ports).
+    pub fn counters(&self) -> impl Iterator<Item = &Counters> {
+        self.core.inlets.iter().map(|inlet| &inlet.counters)
+    }
+
+    /// How long the nodes took.
+    #[must_use]
+    pub const fn timing(&self) -> &Timing {
+        &self.timing
+    }
+
+    /// The command that a device holds: those of its ports, end to end.
+    #[must_use]
+    pub fn commands(&self, device: &str) -> Option<Vec<f64>> {
+        let deck = self.decks.iter().find(|deck| deck.name == device)?;
+        Some(deck.commands.values.iter().flat_map(|values| values.iter().copied()).collect())
+    }
+
+    /// The texts the graph was read from.
+    #[must_use]
+    pub const fn sources(&self) -> &Sources {
+        &self.sources
+    }
+
+    /// Runs latch, step and commit once more on what the devices have last given: for measurements of the bare tick.
+    ///
+    /// Every sample counts as new again.
+    pub fn tick_bare(&mut self) {
+        let now = self.core.tick.now + self.timeline.period();
+        self.core.begin(now);
+        self.core.refresh(&mut self.decks);
+        self.core.run(&mut self.decks, &mut self.timing);
+    }
+}

@@ -1,7 +1,24 @@
 //! A graph: text in, plan or all mistakes out. Pure, but for the files it reads.
+//!
+//! In the order of the work: `document` (what the sections hold), `load` (files, parts and `--set` become one flat
+//! graph), `wires` (where each comes from), `devices` (the bench is opened), `order`, `frames`, `units`, and `check`,
+//! which builds the nodes on the way to a `plan`.
 
+mod check;
+mod devices;
+mod document;
+mod frames;
+mod load;
+mod order;
+mod plan;
 mod sources;
+mod units;
 mod value;
+mod wires;
 
+pub use check::plan;
+pub use load::Request;
+pub(crate) use plan::{Clock, PlannedCommand, PlannedNode, Producer, Source};
+pub use plan::{Plan, PlannedPort};
 pub use sources::{SourceFile, Sources};
 pub use value::{Item, Key, Table, Value, parse_table};

@@ -16,6 +16,7 @@
 macro_rules! params {
     ($Name:ident: $($(#[doc = $doc:literal])* $field:ident: $ty:ty $(= $default:expr)?),* $(,)?) => {
         #[doc = concat!("Parameters: `", stringify!($Name), "`.")]
+        #[allow(unreachable_pub, reason = "a node's module may be private")]
         #[derive(Debug, Clone)]
         pub struct $Name { $($(#[doc = $doc])* pub $field: $ty),* }
 

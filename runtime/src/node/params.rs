@@ -202,6 +202,23 @@ ranges! {
     Count(usize): "a whole number from 1 to 1000000", |n| (1..=1_000_000).contains(&n);
 }
 
+/// A name and where it stands.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Word {
+    /// The name.
+    pub text: String,
+    /// Where it stands.
+    pub span: Range<usize>,
+}
+
+impl Param for Word {
+    const EXPECTS: &'static str = "a string";
+
+    fn read(value: &Value, reader: &mut Reader<'_>) -> Option<Self> {
+        Some(Self { text: read_leaf(value, reader, Self::EXPECTS)?, span: value.span.clone() })
+    }
+}
+
 /// A file, named relative to the file it stands in.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct FilePath {

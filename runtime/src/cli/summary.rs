@@ -1,0 +1,183 @@
+//! What came out of a run: a line a port, and how long the nodes took.
+
+use std::fmt::Write;
+
+use super::course::Course;
+use crate::engine::{Engine, Outcome};
+use crate::record::Columns;
+use crate::signal::Freshness;
+
+/// Freshness of one port, counted over the ticks.
+#[derive(Debug, Clone, Copy, Default)]
+struct Counts {
+    new: u64,
+    held: u64,
+    absent: u64,
+}
+
+/// What one column did.
+#[derive(Debug, Clone)]
+struct Figures {
+    low: f64,
+    high: f64,
+    sum: f64,
+    count: u64,
+    course: Course,
+}
+
+impl Figures {
+    fn new() -> Self {
+        Self { low: f64::INFINITY, high: f64::NEG_INFINITY, sum: 0.0, count: 0, course: Course::new() }
+    }
+
+    fn add(&mut self, value: f64) {
+        self.course.add(value);
+        if !value.is_nan() {
+            self.low = self.low.min(value);
+            self.high = self.high.max(value);
+            self.sum += value;
+            self.count += 1;
+        }
+    }
+}
+
+/// Collects what came out of every tick.
+pub(super) struct Summary {
+    columns: Columns,
+    row: Vec<f64>,
+    counts: Vec<Counts>,
+    figures: Vec<Figures>,
+}
+
+impl Summary {
+    pub(super) fn new(engine: &Engine) -> Self {
+        let columns = Columns::new(engine.ports());
+        Self {
+            row: vec![0.0; columns.list.len()],
+            counts: vec![Counts::default(); engine.ports().len()],
+            figures: vec![Figures::new(); columns.list.len()],
+            columns,
+        }
+    }
+
+    /// Takes in the tick that the engine has just run.
+    pub(super) fn add(&mut self, engine: &Engine) {
+        for ((_, id), counts) in engine.ports().iter().zip(&mut self.counts) {
+            match engine.bus().marks[id.mark as usize].freshness(engine.ticks()) {
+                Freshness::New => counts.new += 1,
+                Freshness::Held => counts.held += 1,
+                Freshness::Lost | Freshness::Absent => counts.absent += 1,
+            }
+        }
+        self.columns.read(engine.bus(), &mut self.row);
+        for (figures, value) in self.figures.iter_mut().zip(&self.row) {
+            figures.add(*value);
+        }
+    }
+
+    /// The table of ports, the table of nodes and what else there is to say.
+    pub(super) fn render(&self, engine: &Engine, outcome: &Outcome) -> String {
+        let mut text = self.ports(engine);
+        text.push('\n');
+        text.push_str(&nodes(engine));
+        for ((port, _), counters) in engine.ports().iter().zip(engine.counters()) {
+            if counters.repeated + counters.went_back > 0 {
+                let (repeated, back) = (counters.repeated, counters.went_back);
+                // Writing to a string cannot fail.
+                let _ = writeln!(text, "`{}`: {repeated} samples repeated, {back} dropped for going back", port.name);
+            }
+        }
+        if outcome.late > 0 {
+            let _ = writeln!(text, "{} ticks began more than a period late", outcome.late);
+        }
+        text
+    }
+
+    fn ports(&self, engine: &Engine) -> String {
+        let mut rows =
+            vec![["port", "unit", "new", "held", "absent", "min", "mean", "max", "over time"].map(String::from)];
+        let mut columns = self.columns.list.iter().zip(&self.figures);
+        for ((port, _), counts) in engine.ports().iter().zip(&self.counts) {
+            let counted = [counts.new, counts.held, counts.absent].map(|count| count.to_string());
+            let width = Columns::width(&port.shape);
+            let mut counted = Some(counted);
+            if width != 1 {
+                let unit = port.shape.unit().filter(|_| width == 0).map_or_else(String::new, |unit| unit.to_string());
+                let [new, held, absent] = counted.take().unwrap_or_default();
+                let name = port.name.clone();
+                rows.push([name, unit, new, held, absent, String::new(), String::new(), String::new(), String::new()]);
+            }
+            for (column, figures) in columns.by_ref().take(width) {
+                let [new, held, absent] = counted.take().unwrap_or_default();
+                let part = column.name.strip_prefix(&port.name).filter(|part| !part.is_empty());
+                let name = part.map_or_else(|| port.name.clone(), |part| format!("  {part}"));
+                let [low, mean, high] = match figures.count {
+                    0 => ["-"; 3].map(String::from),
+                    count => [figures.low, figures.sum / count as f64, figures.high].map(number),
+                };
+                rows.push([name, column.unit.to_string(), new, held, absent, low, mean, high, figures.course.line()]);
+            }
+        }
+        table(&rows, 2, 8)
+    }
+}
+
+fn nodes(engine: &Engine) -> String {
+    let timing = engine.timing();
+    if timing.ticks == 0 {
+        return String::new();
+    }
+    let mut rows = vec![["node", "mean", "longest"].map(String::from)];
+    for (name, time) in engine.order().zip(&timing.nodes) {
+        let mean = time.total.as_nanos() as u64 / timing.ticks;
+        rows.push([name.to_owned(), format!("{mean} ns"), format!("{} ns", time.longest.as_nanos())]);
+    }
+    let mut text = table(&rows, 1, usize::MAX);
+    let _ = writeln!(text, "timed in {} of {} ticks", timing.ticks, engine.ticks());
+    text
+}
+
+/// A number in few characters.
+fn number(value: f64) -> String {
+    let size = value.abs();
+    match size {
+        0.0 => "0".into(),
+        _ if !(1e-4..1e6).contains(&size) => format!("{value:.2e}"),
+        _ if size < 1.0 => format!("{value:.5}"),
+        _ if size < 100.0 => format!("{value:.3}"),
+        _ => format!("{value:.1}"),
+    }
+}
+
+/// Columns in line: those before `first_right` and from `first_left` on are flush left, those between flush right.
+fn table<const N: usize>(rows: &[[String; N]], first_right: usize, first_left: usize) -> String {
+    let width = |i: usize| rows.iter().map(|row| row[i].chars().count()).max().unwrap_or(0);
+    let widths: [usize; N] = std::array::from_fn(width);
+    let mut text = String::new();
+    for row in rows {
+        let mut line = String::new();
+        for (i, (cell, width)) in row.iter().zip(widths).enumerate() {
+            let pad = " ".repeat(width - cell.chars().count());
+            let is_right = (first_right..first_left).contains(&i);
+            let cell = if is_right { format!("{pad}{cell}") } else { format!("{cell}{pad}") };
+            line.push_str(&cell);
+            line.push_str("  ");
+        }
+        text.push_str(line.trim_end());
+        text.push('\n');
+    }
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_are_short() {
+        let cases = [(0.0, "0"), (0.0123456, "0.01235"), (12.3456, "12.346"), (1234.5, "1234.5"), (-1e-9, "-1.00e-9")];
+        for (value, text) in cases {
+            assert_eq!(number(value), text);
+        }
+    }
+}

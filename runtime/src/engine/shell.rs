@@ -1,0 +1,238 @@
+//! The edge to real time: pacing, live devices, the operator's Ctrl-C; and the end of every run, which is a ramp to zero.
+
+use std::io;
+use std::time::{Duration, Instant};
+
+use tokio::runtime::{Builder, Runtime};
+use tokio::sync::watch;
+use tokio::task::JoinSet;
+
+use super::{Edge, Engine};
+use crate::device::{DeviceError, link};
+use crate::fault::{Cause, Fault};
+
+/// How to run.
+#[derive(Debug, Clone, Default)]
+pub struct RunOptions {
+    /// How long at most, in the graph's clock [s].
+    pub duration: Option<f64>,
+    /// Whether virtual time is paced by the wall clock; live devices always are.
+    pub is_realtime: bool,
+}
+
+/// Why a run ended.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum End {
+    /// A device has no more samples.
+    Finished,
+    /// The time is over.
+    Duration,
+    /// The operator wanted it.
+    Interrupted,
+    /// Something went wrong.
+    Fault(Box<Fault>),
+}
+
+/// How a run went.
+#[derive(Debug, Clone)]
+pub struct Outcome {
+    /// Why it ended.
+    pub end: End,
+    /// Time of the last tick in the graph's clock [ns].
+    pub time: i64,
+    /// Time it took.
+    pub wall: Duration,
+    /// Ticks that began more than a period late; counted with a real clock only.
+    pub late: u64,
+}
+
+/// Runs until a device ends, the time is over, the operator interrupts or something goes wrong; then the commands ramp
+/// to zero. `observe` is called after every tick.
+///
+/// # Errors
+/// If the operating system gives no runtime for live devices and signals.
+pub fn run(engine: &mut Engine, options: &RunOptions, observe: &mut dyn FnMut(&Engine)) -> io::Result<Outcome> {
+    let runtime = Builder::new_multi_thread().worker_threads(1).enable_all().build()?;
+    let mut shell = Shell::start(engine, options, &runtime)?;
+    let end = shell.run(engine, observe);
+    shell.stop(engine);
+    let wall = shell.epoch.elapsed();
+    Ok(Outcome { end, time: engine.now(), wall, late: shell.late })
+}
+
+struct Shell<'a> {
+    runtime: &'a Runtime,
+    epoch: Instant,
+    is_real: bool,
+    /// Last time of a tick [ns].
+    until: i64,
+    interrupted: watch::Receiver<bool>,
+    drivers: JoinSet<(usize, Result<(), DeviceError>)>,
+    late: u64,
+}
+
+impl<'a> Shell<'a> {
+    fn start(engine: &mut Engine, options: &RunOptions, runtime: &'a Runtime) -> io::Result<Self> {
+        let epoch = Instant::now();
+        let mut drivers = JoinSet::new();
+        for (i, deck) in engine.decks.iter_mut().enumerate() {
+            let edge = std::mem::replace(&mut deck.edge, Edge::Gone);
+            deck.edge = match edge {
+                Edge::Idle(driver) => {
+                    let (theirs, ours) = link(&deck.samples, &deck.commands, epoch);
+                    drivers.spawn_on(async move { (i, driver.run(theirs).await) }, runtime.handle());
+                    Edge::Live(ours)
+                }
+                other => other,
+            };
+        }
+        let is_real = options.is_realtime || !drivers.is_empty();
+        let until = options.duration.map_or(i64::MAX, |seconds| (seconds * 1e9) as i64);
+        let interrupted = runtime.block_on(async { interrupts() })?;
+        Ok(Self { runtime, epoch, is_real, until, interrupted, drivers, late: 0 })
+    }
+
+    fn run(&mut self, engine: &mut Engine, observe: &mut dyn FnMut(&Engine)) -> End {
+        loop {
+            if *self.interrupted.borrow() {
+                return End::Interrupted;
+            }
+            let Some(next) = engine.next() else { return End::Finished };
+            if next > self.until {
+                return End::Duration;
+            }
+            let now = if self.is_real { self.wait(engine, next) } else { next };
+            if let Some(fault) = self.failed_driver(engine, now) {
+                return End::Fault(fault.into());
+            }
+            if *self.interrupted.borrow() {
+                return End::Interrupted;
+            }
+            match engine.tick(now) {
+                Ok(()) => observe(engine),
+                Err(fault) => return End::Fault(fault.into()),
+            }
+        }
+    }
+
+    /// Waits for the next sample of a live clock, or until `next` [ns]; the time of the tick.
+    fn wait(&mut self, engine: &Engine, next: i64) -> i64 {
+        let due = self.epoch + Duration::from_nanos(next.max(0) as u64);
+        let sampled = engine.decks.iter().enumerate().find_map(|(i, deck)| match &deck.edge {
+            Edge::Live(linked) if engine.timeline.is_clock(i) => Some(linked.sampled.clone()),
+            _ => None,
+        });
+        let has_live_clock = sampled.is_some();
+        let mut interrupted = self.interrupted.clone();
+        self.runtime.block_on(async {
+            let sample = async {
+                match &sampled {
+                    Some(sampled) => sampled.notified().await,
+                    None => std::future::pending().await,
+                }
+            };
+            tokio::select! {
+                () = sample => {}
+                () = sleep_until(due) => {}
+                _ = interrupted.wait_for(|is| *is) => {}
+            }
+        });
+        let now = self.epoch.elapsed().as_nanos() as i64;
+        if now > next + engine.period() {
+            self.late += 1;
+        }
+        // Stepped devices live in virtual time: a late tick is still the tick of its time.
+        if has_live_clock { now } else { next.max(engine.now()) }
+    }
+
+    /// The fault of a live device that has ended with an error, or that has ended at all.
+    fn failed_driver(&mut self, engine: &mut Engine, now: i64) -> Option<Fault> {
+        let (device, result) = match self.drivers.try_join_next()? {
+            Ok(ended) => ended,
+            Err(error) => (usize::MAX, Err(DeviceError(error.to_string()))),
+        };
+        let message = result.err().map_or_else(|| "it ended before the run did".to_owned(), |error| error.0);
+        let deck = engine.decks.get_mut(device);
+        let (node, place) = deck.map_or_else(Default::default, |deck| {
+            deck.edge = Edge::Gone;
+            (deck.name.clone(), deck.place.clone())
+        });
+        Some(Fault { node, port: None, tick: engine.ticks(), time: now, cause: Cause::Device(message), place })
+    }
+
+    /// Ramps every command to zero, in real time where the run was, and lets the drivers end.
+    fn stop(&mut self, engine: &mut Engine) {
+        /// How long a driver may take to end.
+        const GRACE: Duration = Duration::from_secs(1);
+        while !engine.wind_down() {
+            if self.is_real {
+                std::thread::sleep(Duration::from_nanos(engine.period() as u64));
+            }
+        }
+        engine.wind_down();
+        for deck in &engine.decks {
+            if let Edge::Live(linked) = &deck.edge {
+                linked.stop.send_replace(true);
+            }
+        }
+        let drivers = std::mem::take(&mut self.drivers);
+        let _ = self.runtime.block_on(tokio::time::timeout(GRACE, drivers.join_all()));
+    }
+}
+
+/// Timers are good to a millisecond; the rest of the way is slept by the thread itself.
+async fn sleep_until(due: Instant) {
+    const COARSE: Duration = Duration::from_millis(2);
+    tokio::time::sleep_until((due - COARSE.min(due.saturating_duration_since(Instant::now()))).into()).await;
+    std::thread::sleep(due.saturating_duration_since(Instant::now()));
+}
+
+/// Becomes true at the first Ctrl-C or SIGTERM; a second one ends the process at once.
+fn interrupts() -> io::Result<watch::Receiver<bool>> {
+    const INTERRUPTED: i32 = 130;
+    let (sender, receiver) = watch::channel(false);
+    let mut terminated = terminations()?;
+    tokio::spawn(async move {
+        loop {
+            tokio::select! {
+                result = tokio::signal::ctrl_c() => if result.is_err() { return },
+                () = terminated.next() => {}
+            }
+            if sender.send_replace(true) {
+                std::process::exit(INTERRUPTED);
+            }
+        }
+    });
+    Ok(receiver)
+}
+
+#[cfg(unix)]
+struct Terminations(tokio::signal::unix::Signal);
+
+#[cfg(unix)]
+fn terminations() -> io::Result<Terminations> {
+    Ok(Terminations(tokio::signal::unix::signal(tokio::signal::unix::SignalKind::terminate())?))
+}
+
+#[cfg(unix)]
+impl Terminations {
+    async fn next(&mut self) {
+        self.0.recv().await;
+    }
+}
+
+#[cfg(not(unix))]
+struct Terminations;
+
+#[cfg(not(unix))]
+#[expect(clippy::unnecessary_wraps, reason = "the same form as on unix")]
+fn terminations() -> io::Result<Terminations> {
+    Ok(Terminations)
+}
+
+#[cfg(not(unix))]
+impl Terminations {
+    async fn next(&mut self) {
+        std::future::pending().await
+    }
+}

@@ -1,0 +1,139 @@
+//! The tick: latch, step, commit. One thread, a fixed order, no queue, no lock, no allocation, no clock, no `async`.
+
+use std::time::{Duration, Instant};
+
+use super::Deck;
+use super::command::CommandSlot;
+use super::inlet::Inlet;
+use super::station::Station;
+use crate::node::{Bus, Tick};
+
+/// Everything a tick touches.
+pub(super) struct Core {
+    pub(super) bus: Bus,
+    pub(super) inlets: Vec<Inlet>,
+    pub(super) tick: Tick,
+    stations: Vec<Station>,
+    slots: Vec<CommandSlot>,
+    /// The station that steps: what a panic is blamed on.
+    current: usize,
+}
+
+impl Core {
+    pub(super) const fn new(
+        bus: Bus,
+        stations: Vec<Station>,
+        inlets: Vec<Inlet>,
+        slots: Vec<CommandSlot>,
+        tick: Tick,
+    ) -> Self {
+        Self { bus, inlets, tick, stations, slots, current: 0 }
+    }
+
+    /// Moves on to the tick at `now`.
+    pub(super) fn begin(&mut self, now: i64) {
+        let dt = if self.tick.index == 0 { 0.0 } else { (now - self.tick.now) as f64 * 1e-9 };
+        self.tick = Tick { index: self.tick.index + 1, now, dt, ..self.tick };
+    }
+
+    /// Latches the newest samples, steps the nodes and hands over the commands. Commands nothing if a value was not
+    /// finite, and tells the mark of the first port where it was.
+    pub(super) fn run(&mut self, decks: &mut [Deck], timing: &mut Timing) -> Option<u32> {
+        self.latch(decks);
+        if timing.is_due(self.tick.index) {
+            self.step_timed(timing);
+        } else {
+            self.step();
+        }
+        if self.bus.not_finite.is_none() {
+            self.commit(decks);
+        }
+        self.bus.not_finite
+    }
+
+    fn latch(&mut self, decks: &mut [Deck]) {
+        for inlet in &mut self.inlets {
+            inlet.latch(&mut decks[inlet.device].samples, &mut self.bus, self.tick.index);
+        }
+    }
+
+    fn step(&mut self) {
+        for (i, station) in self.stations.iter_mut().enumerate() {
+            self.current = i;
+            station.visit(&self.tick, &mut self.bus);
+        }
+    }
+
+    fn step_timed(&mut self, timing: &mut Timing) {
+        let mut before = Instant::now();
+        for (i, station) in self.stations.iter_mut().enumerate() {
+            self.current = i;
+            station.visit(&self.tick, &mut self.bus);
+            let after = Instant::now();
+            timing.nodes[i].add(after - before);
+            before = after;
+        }
+        timing.ticks += 1;
+    }
+
+    fn commit(&mut self, decks: &mut [Deck]) {
+        for slot in &mut self.slots {
+            slot.commit(&self.bus, &mut decks[slot.device].commands, self.tick.dt);
+        }
+    }
+
+    /// Ramps every command one step of `dt` [s] toward zero; whether all are zero.
+    pub(super) fn ramp(&mut self, decks: &mut [Deck], dt: f64) -> bool {
+        self.slots.iter_mut().fold(true, |still, slot| slot.ramp(&mut decks[slot.device].commands, dt) & still)
+    }
+
+    /// Makes what the devices last gave count as new once more.
+    pub(super) fn refresh(&mut self, decks: &mut [Deck]) {
+        for inlet in &mut self.inlets {
+            inlet.refresh(&mut decks[inlet.device].samples, &mut self.bus, self.tick.now);
+        }
+    }
+
+    pub(super) const fn current(&self) -> usize {
+        self.current
+    }
+}
+
+/// How long one node took.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct NodeTime {
+    /// Sum over the ticks that were timed.
+    pub total: Duration,
+    /// Longest of them.
+    pub longest: Duration,
+}
+
+impl NodeTime {
+    fn add(&mut self, time: Duration) {
+        self.total += time;
+        self.longest = self.longest.max(time);
+    }
+}
+
+/// How long the nodes took, in a few of the ticks: a stamp at every node of every tick would cost more than the nodes.
+#[derive(Debug, Clone)]
+pub struct Timing {
+    /// Each node, in the order in which they step.
+    pub nodes: Vec<NodeTime>,
+    /// How many ticks were timed.
+    pub ticks: u64,
+    every: u64,
+}
+
+impl Timing {
+    /// One tick of as many is timed.
+    const EVERY: u64 = 16;
+
+    pub(super) fn new(nodes: usize) -> Self {
+        Self { nodes: vec![NodeTime::default(); nodes], ticks: 0, every: Self::EVERY }
+    }
+
+    const fn is_due(&self, tick: u64) -> bool {
+        tick.is_multiple_of(self.every)
+    }
+}

@@ -1,0 +1,276 @@
+//! From a request to a plan, or to everything that is wrong.
+
+use std::collections::BTreeMap;
+
+use super::devices::{self, Opened};
+use super::document::GraphTable;
+use super::frames::Frames;
+use super::load::{Flat, Loader, Request};
+use super::order::order;
+use super::plan::{Clock, Plan, PlannedCommand, PlannedNode, PlannedPort, PlannedRole, Producer, Source};
+use super::units::Units;
+use super::wires::{CommandWire, Model, Wire};
+use super::{Sources, Value};
+use crate::catalogue::Catalogue;
+use crate::diagnostic::{Code, Diagnostic, Report};
+use crate::node::{Configured, Given, Need, Reader};
+use crate::signal::Shape;
+
+/// Checks a graph and builds it.
+///
+/// # Errors
+/// Every mistake of its files at once.
+pub fn plan(catalogue: &Catalogue, request: &Request) -> Result<Plan, Report> {
+    let mut loader = Loader::default();
+    let flat = loader.load(request);
+    let Loader { mut sources, diagnostics: mut found, .. } = loader;
+    let has_unread = found.iter().any(|d| matches!(d.code, Code::Syntax | Code::Unreadable));
+    if has_unread {
+        // What a file that was not read would have declared would be missed everywhere.
+        return Err(Report::new(sources, found));
+    }
+    let model = Model::new(&flat, catalogue, &mut found);
+    let opened = devices::open(&model, catalogue, flat.bench.as_ref(), &mut sources, &mut found);
+    let wires = model.wires(&mut found);
+    let commands = model.commands(&mut found);
+    let order = order(&model, &wires, &mut found);
+    let frames = Frames::unify(&model, catalogue, &order, &wires, &commands, &mut found);
+    let clock = clock(&flat, &opened, &mut found);
+    let period = clock.map_or(1.0, |(_, period)| period);
+    let mut builder =
+        Builder { catalogue, model: &model, opened: &opened, frames, found, sources, period, ports: BTreeMap::new() };
+    builder.roles();
+    let nodes: Vec<PlannedNode> = order.iter().filter_map(|node| builder.node(*node, &wires[*node])).collect();
+    builder.delayed(&wires);
+    let planned: Vec<PlannedCommand> = commands.iter().filter_map(|wire| builder.command(wire)).collect();
+    let roles = builder.planned_roles();
+    let Builder { found, sources, .. } = builder;
+    match (clock, found.is_empty()) {
+        (Some((clock, _)), true) => {
+            Ok(finish(Parts { roles, nodes, commands: planned, clock, period, sources }, opened, flat.table.as_ref()))
+        }
+        _ => Err(Report::new(sources, found)),
+    }
+}
+
+/// What a plan is put together from.
+struct Parts {
+    roles: Vec<PlannedRole>,
+    nodes: Vec<PlannedNode>,
+    commands: Vec<PlannedCommand>,
+    clock: Clock,
+    period: f64,
+    sources: Sources,
+}
+
+fn finish(parts: Parts, opened: Opened, table: Option<&GraphTable>) -> Plan {
+    /// As many periods are one step at most.
+    const GREATEST_GAP: f64 = 5.0;
+    let max_gap = table.and_then(|table| table.max_gap_ms).map_or(GREATEST_GAP * parts.period, |ms| *ms * 1e-3);
+    let reset_after = table.map_or(0, |table| (*table.reset_after_ms * 1e6) as i64);
+    Plan {
+        roles: parts.roles,
+        devices: opened.devices,
+        nodes: parts.nodes,
+        commands: parts.commands,
+        clock: parts.clock,
+        period: ((parts.period * 1e9).round() as i64).max(1),
+        max_gap,
+        reset_after,
+        sources: parts.sources,
+    }
+}
+
+/// What makes the graph tick, and how often [s].
+fn clock(flat: &Flat, opened: &Opened, found: &mut Vec<Diagnostic>) -> Option<(Clock, f64)> {
+    // A graph whose own section could not be read has been told so.
+    let table = flat.table.as_ref()?;
+    let (word, rate) = (table.clock.as_ref(), table.rate_hz);
+    let mut wrong = |span: std::ops::Range<usize>, message: String, help: &str| {
+        found.push(Diagnostic::new(Code::BadClock, span, message).help(help));
+    };
+    match (word, rate) {
+        (Some(word), None) => {
+            let Some(role) = flat.roles.iter().position(|(key, _)| key.name == word.text) else {
+                let roles = flat.roles.iter().map(|(key, _)| key.name.as_str());
+                let help = crate::diagnostic::closest(&word.text, roles, "roles");
+                wrong(word.span.clone(), format!("the clock `{}` is not a role", word.text), &help);
+                return None;
+            };
+            let bound = opened.roles.get(role)?.as_ref()?;
+            Some((Clock::Device(bound.device), opened.periods[bound.device]))
+        }
+        (None, Some(rate)) => Some((Clock::Rate, 1.0 / *rate)),
+        (Some(word), Some(_)) => {
+            wrong(word.span.clone(), "the graph has two clocks".into(), "keep `clock` or `rate_hz`");
+            None
+        }
+        (None, None) => {
+            let help = "add `clock = \"role\"` or `rate_hz = 250` under [graph]";
+            wrong(flat.place.clone(), "the graph has no clock".into(), help);
+            None
+        }
+    }
+}
+
+struct Builder<'a> {
+    catalogue: &'a Catalogue,
+    model: &'a Model<'a>,
+    opened: &'a Opened,
+    frames: Frames,
+    found: Vec<Diagnostic>,
+    sources: Sources,
+    period: f64,
+    /// Ports whose shape is known so far.
+    ports: BTreeMap<Source, PlannedPort>,
+}
+
+impl Builder<'_> {
+    fn port(&mut self, source: Source, shape: Shape) -> PlannedPort {
+        let frames = self.frames.of(self.model, source);
+        let port = PlannedPort { name: self.model.port_name(source), shape, frames };
+        self.ports.insert(source, port.clone());
+        port
+    }
+
+    fn roles(&mut self) {
+        for (i, bound) in self.opened.roles.iter().enumerate() {
+            for (port, shape) in bound.iter().flat_map(|bound| &bound.filled.outputs).enumerate() {
+                self.port(Source { producer: Producer::Role(i), port }, shape.clone());
+            }
+        }
+    }
+
+    fn planned_roles(&self) -> Vec<PlannedRole> {
+        let role = |(i, bound): (usize, &Option<devices::BoundRole>)| {
+            let bound = bound.as_ref()?;
+            let source = |port| Source { producer: Producer::Role(i), port };
+            let ports = (0..bound.filled.outputs.len()).map(|port| self.ports[&source(port)].clone()).collect();
+            let name = self.model.flat.roles[i].0.name.clone();
+            Some(PlannedRole { name, device: bound.device, first_port: bound.first_output, ports })
+        };
+        self.opened.roles.iter().enumerate().filter_map(role).collect()
+    }
+
+    fn node(&mut self, index: usize, wires: &[Wire]) -> Option<PlannedNode> {
+        let node = &self.model.flat.nodes[index];
+        let (kind, spec) = self.model.nodes[index].as_ref()?;
+        let configured = self.configure(*kind, &node.block.params);
+        let mut inputs: Vec<(Need, Vec<Source>)> = spec.inputs.iter().map(|input| (input.need, Vec::new())).collect();
+        let mut given = Given { inputs: vec![Vec::new(); spec.inputs.len()], period: self.period };
+        let mut units = Units::default();
+        let mut is_whole = wires.len() == node.block.wires.len();
+        for wire in wires {
+            let input = &spec.inputs[wire.input];
+            inputs[wire.input].1.push(wire.source);
+            if input.need == Need::Delayed {
+                continue;
+            }
+            let Some(port) = self.ports.get(&wire.source) else {
+                is_whole = false;
+                continue;
+            };
+            let consumer = format!("{}.{}", node.name, wire.key.name);
+            if let Err(takes) = units.take(input, &consumer, &port.shape) {
+                self.found.push(unit_mismatch(port, &consumer, &takes, wire));
+                is_whole = false;
+            }
+            given.inputs[wire.input].push((wire.key.name.clone(), port.shape.clone()));
+        }
+        let missing =
+            |(need, ports): &(Need, Vec<Source>)| matches!(need, Need::Required | Need::Sampled) && ports.is_empty();
+        if !is_whole || inputs.iter().any(missing) {
+            return None;
+        }
+        let built = match configured?.build(given) {
+            Ok(built) => built,
+            Err(mistakes) => {
+                let block = &node.block;
+                devices::place(mistakes, &block.params, &block.wires, &mut self.sources, &mut self.found);
+                return None;
+            }
+        };
+        let mut ports = Vec::new();
+        for (port, (mut shape, output)) in built.outputs.into_iter().zip(&spec.outputs).enumerate() {
+            units.give(output, &mut shape);
+            ports.push(self.port(Source { producer: Producer::Node(index), port }, shape));
+        }
+        Some(PlannedNode {
+            index,
+            name: node.name.clone(),
+            node: built.node,
+            inputs,
+            ports,
+            is_every_tick: spec.every_tick,
+            span: node.block.key.span.clone(),
+        })
+    }
+
+    fn configure(&mut self, kind: usize, params: &Value) -> Option<Box<dyn Configured>> {
+        let mut params = params.clone();
+        let has_facts = devices::fill_facts(&mut params, self.model, self.opened, &mut self.found);
+        let mut reader = Reader::new(&self.sources);
+        if !has_facts {
+            return None;
+        }
+        let configured = self.catalogue.nodes()[kind].configure(&params, &mut reader);
+        let mistakes = reader.mistakes;
+        let is_good = mistakes.is_empty();
+        devices::place(mistakes, &params, &[], &mut self.sources, &mut self.found);
+        configured.filter(|_| is_good)
+    }
+
+    /// Delayed inputs are compared once every shape is known.
+    fn delayed(&mut self, wires: &[Vec<Wire>]) {
+        for (index, wires) in wires.iter().enumerate() {
+            let Some((_, spec)) = &self.model.nodes[index] else { continue };
+            for wire in wires.iter().filter(|wire| spec.inputs[wire.input].need == Need::Delayed) {
+                let Some(port) = self.ports.get(&wire.source) else { continue };
+                let consumer = format!("{}.{}", self.model.flat.nodes[index].name, wire.key.name);
+                if let Err(takes) = Units::default().take(&spec.inputs[wire.input], &consumer, &port.shape) {
+                    self.found.push(unit_mismatch(port, &consumer, &takes, wire));
+                }
+            }
+        }
+    }
+
+    fn command(&mut self, wire: &CommandWire) -> Option<PlannedCommand> {
+        let bound = self.opened.roles[wire.role].as_ref()?;
+        let role = self.model.roles[wire.role]?;
+        let port = self.ports.get(&wire.source)?;
+        let (spec, takes) = (&role.commands[wire.command], &bound.filled.commands[wire.command]);
+        let consumer = format!("{}.{}", self.model.flat.roles[wire.role].0.name, spec.name);
+        let mismatch = |code, text: String| {
+            let message = format!("`{}` {text}", port.name);
+            Diagnostic::new(code, wire.word.span.clone(), message)
+        };
+        if let Err(unit) = Units::default().take(spec, &consumer, &port.shape) {
+            let has = port.shape.unit().map(|unit| unit.to_string()).unwrap_or_default();
+            self.found.push(mismatch(Code::UnitMismatch, format!("is in `{has}`, but `{consumer}` {unit}")));
+            return None;
+        }
+        let (has, wants) = (joint_names(&port.shape), joint_names(takes));
+        if has != wants {
+            let text = format!("has the joints {has:?}, but `{consumer}` takes {wants:?}");
+            self.found.push(mismatch(Code::ShapeMismatch, text));
+            return None;
+        }
+        Some(PlannedCommand { source: wire.source, device: bound.device, command: bound.first_command + wire.command })
+    }
+}
+
+fn joint_names(shape: &Shape) -> Vec<&str> {
+    match shape {
+        Shape::Joints(shape) => shape.joints.iter().map(|joint| joint.name.as_str()).collect(),
+        _ => Vec::new(),
+    }
+}
+
+fn unit_mismatch(port: &PlannedPort, consumer: &str, takes: &str, wire: &Wire) -> Diagnostic {
+    let has = match port.shape.unit() {
+        Some(unit) => format!("is in `{unit}`"),
+        None => format!("is {}", port.shape.kind().with_article()),
+    };
+    let message = format!("`{}` {has}, but `{consumer}` {takes}", port.name);
+    Diagnostic::new(Code::UnitMismatch, wire.word.span.clone(), message)
+}

@@ -1,0 +1,237 @@
+//! The bench: opens the devices that the graph's roles are bound to.
+
+use std::ops::Range;
+
+use super::document::Bench;
+use super::plan::PlannedDevice;
+use super::wires::Model;
+use super::{Item, Key, Sources, Value};
+use crate::catalogue::Catalogue;
+use crate::device::{Description, Filled};
+use crate::diagnostic::{Code, Diagnostic, closest};
+use crate::node::{Mistake, Reader, Word};
+
+/// A role with the device that fills it.
+#[derive(Debug, Clone)]
+pub(crate) struct BoundRole {
+    /// Index among the opened devices.
+    pub(crate) device: usize,
+    pub(crate) filled: Filled,
+    /// Number of the role's first output among the device's.
+    pub(crate) first_output: usize,
+    /// Number of the role's first command among the device's.
+    pub(crate) first_command: usize,
+}
+
+/// The devices that are needed, and which role each fills.
+#[derive(Default)]
+pub(crate) struct Opened {
+    pub(crate) devices: Vec<PlannedDevice>,
+    /// Nominal time between two samples of each device [s].
+    pub(crate) periods: Vec<f64>,
+    pub(crate) roles: Vec<Option<BoundRole>>,
+}
+
+/// Opens what the roles are bound to.
+pub(crate) fn open(
+    model: &Model<'_>,
+    catalogue: &Catalogue,
+    bench: Option<&Bench>,
+    sources: &mut Sources,
+    found: &mut Vec<Diagnostic>,
+) -> Opened {
+    let mut opener =
+        Opener { catalogue, sources, found, names: Vec::new(), taken: Vec::new(), opened: Opened::default() };
+    if let Some(bench) = bench {
+        opener.check_types(bench);
+    }
+    for (i, (key, kind)) in model.flat.roles.iter().enumerate() {
+        let role = match bench {
+            Some(bench) if model.roles[i].is_some() => opener.role(bench, key, kind),
+            _ => None,
+        };
+        opener.opened.roles.push(role);
+    }
+    opener.opened
+}
+
+struct Opener<'a> {
+    catalogue: &'a Catalogue,
+    sources: &'a mut Sources,
+    found: &'a mut Vec<Diagnostic>,
+    /// Devices that were opened or tried, with the description if it went well.
+    names: Vec<(String, Option<(usize, Description)>)>,
+    /// Roles of a device that are filled already: device, index of the filling, by whom.
+    taken: Vec<(usize, usize, String)>,
+    opened: Opened,
+}
+
+impl Opener<'_> {
+    fn check_types(&mut self, bench: &Bench) {
+        for kind in bench.devices.iter().filter_map(|device| device.kind.as_ref()) {
+            if !self.catalogue.devices().iter().any(|device| device.name() == kind.text) {
+                let names: Vec<_> = self.catalogue.devices().iter().map(|device| device.name()).collect();
+                let help = closest(&kind.text, names.iter().map(|name| &**name), "device types");
+                let message = format!("there is no device type `{}`", kind.text);
+                self.found.push(Diagnostic::new(Code::UnknownType, kind.span.clone(), message).help(help));
+            }
+        }
+    }
+
+    fn role(&mut self, bench: &Bench, key: &Key, kind: &Word) -> Option<BoundRole> {
+        let Some((_, word)) = bench.bind.iter().find(|(role, _)| role.name == key.name) else {
+            let message = format!("the bench binds role `{}` to no device", key.name);
+            let help = format!("add `{} = \"device\"` under [bind] in the bench", key.name);
+            self.found.push(Diagnostic::new(Code::UnboundRole, key.span.clone(), message).help(help));
+            return None;
+        };
+        let (device, description) = self.device(bench, word)?;
+        let is_free = |i: &usize| !self.taken.iter().any(|(d, filled, _)| (*d, filled) == (device, i));
+        let mut fitting = (0..description.fills.len()).filter(|i| description.fills[*i].role == kind.text);
+        let Some(fills) = fitting.clone().find(is_free) else {
+            let by = fitting.next().and_then(|i| self.taken.iter().find(|(d, filled, _)| (*d, *filled) == (device, i)));
+            let message = match by {
+                Some((_, _, by)) => format!("device `{}` fills role `{by}` already", word.text),
+                None => format!("device `{}` cannot be a `{}`, which role `{}` is", word.text, kind.text, key.name),
+            };
+            let roles: Vec<_> = description.fills.iter().map(|filled| format!("`{}`", filled.role)).collect();
+            let diagnostic = Diagnostic::new(Code::WrongRole, word.span.clone(), message);
+            self.found.push(diagnostic.help(format!("it can be: {}", roles.join(", "))));
+            return None;
+        };
+        self.taken.push((device, fills, key.name.clone()));
+        let before = &description.fills[..fills];
+        Some(BoundRole {
+            device,
+            first_output: before.iter().map(|filled| filled.outputs.len()).sum(),
+            first_command: before.iter().map(|filled| filled.commands.len()).sum(),
+            filled: description.fills[fills].clone(),
+        })
+    }
+
+    fn device(&mut self, bench: &Bench, word: &Word) -> Option<(usize, Description)> {
+        if let Some((_, opened)) = self.names.iter().find(|(name, _)| *name == word.text) {
+            return opened.clone();
+        }
+        let opened = self.open(bench, word);
+        self.names.push((word.text.clone(), opened.clone()));
+        opened
+    }
+
+    fn open(&mut self, bench: &Bench, word: &Word) -> Option<(usize, Description)> {
+        let Some(block) = bench.devices.iter().find(|device| device.key.name == word.text) else {
+            let message = format!("the bench has no device `{}`", word.text);
+            let help = closest(&word.text, bench.devices.iter().map(|device| device.key.name.as_str()), "devices");
+            self.found.push(Diagnostic::new(Code::UnknownDevice, word.span.clone(), message).help(help));
+            return None;
+        };
+        let kind = block.kind.as_ref()?;
+        let device = self.catalogue.devices().iter().find(|device| device.name() == kind.text)?;
+        let mut reader = Reader::new(self.sources);
+        let opened = device.open(&block.params, &mut reader);
+        let mistakes = reader.mistakes;
+        place(mistakes, &block.params, &[], self.sources, self.found);
+        let opened = opened?;
+        let all = |ports: fn(&Filled) -> &Vec<crate::signal::Shape>| {
+            opened.description.fills.iter().flat_map(|filled| ports(filled).clone()).collect()
+        };
+        self.opened.devices.push(PlannedDevice {
+            name: word.text.clone(),
+            outputs: all(|filled| &filled.outputs),
+            commands: all(|filled| &filled.commands),
+            driver: opened.driver,
+            span: block.key.span.clone(),
+        });
+        self.opened.periods.push(opened.description.period);
+        Some((self.opened.devices.len() - 1, opened.description))
+    }
+}
+
+/// Gives mistakes their place: in the block they speak of, in a wire, or in a file of data.
+pub(crate) fn place(
+    mistakes: Vec<Mistake>,
+    block: &Value,
+    wires: &[(Key, Word)],
+    sources: &mut Sources,
+    found: &mut Vec<Diagnostic>,
+) {
+    use crate::node::At;
+    for Mistake { code, at, message, help } in mistakes {
+        let mut notes = Vec::new();
+        let span = match at {
+            At::Span(span) => span,
+            At::Node => block.span.clone(),
+            At::Param(path) => lookup(block, &path).map_or(block.span.clone(), |(_, value)| value),
+            At::Key(path) => lookup(block, &path).map_or(block.span.clone(), |(key, _)| key),
+            At::Input(name) => {
+                wires.iter().find(|(key, _)| key.name == name).map_or(&block.span, |(_, w)| &w.span).clone()
+            }
+            At::Data { file, text, span } => {
+                notes.push((file.span.clone(), "the file is named here".to_owned()));
+                let base = sources.add_file(&file.path, text).base;
+                base + span.start..base + span.end
+            }
+        };
+        found.push(Diagnostic { code, message, span, notes, help });
+    }
+}
+
+/// Places of the key and of the value at a dotted path.
+fn lookup(block: &Value, path: &str) -> Option<(Range<usize>, Range<usize>)> {
+    let mut value = block;
+    let mut key = block.span.clone();
+    for name in path.split('.') {
+        let (found, inner) = value.as_table()?.entry(name)?;
+        (key, value) = (found.span.clone(), inner);
+    }
+    Some((key, value.span.clone()))
+}
+
+/// Puts the facts of devices in the place of every `{ from = "role.fact" }`.
+pub(crate) fn fill_facts(value: &mut Value, model: &Model<'_>, opened: &Opened, found: &mut Vec<Diagnostic>) -> bool {
+    let span = value.span.clone();
+    let table = match &mut value.item {
+        Item::Array(items) => {
+            return items.iter_mut().fold(true, |good, item| fill_facts(item, model, opened, found) & good);
+        }
+        Item::Table(table) => table,
+        _ => return true,
+    };
+    let from = table
+        .entry("from")
+        .filter(|_| table.entries.len() == 1)
+        .and_then(|(_, from)| Some(Word { text: from.as_str()?.to_owned(), span: from.span.clone() }));
+    let Some(word) = from else {
+        return table.entries.iter_mut().fold(true, |good, (_, item)| fill_facts(item, model, opened, found) & good);
+    };
+    match fact(&word, model, opened) {
+        Ok(Some(fact)) => *value = Value::from_toml(&fact, &span),
+        Ok(None) => return false,
+        Err(diagnostic) => {
+            found.push(*diagnostic);
+            return false;
+        }
+    }
+    true
+}
+
+fn fact(word: &Word, model: &Model<'_>, opened: &Opened) -> Result<Option<toml::Value>, Box<Diagnostic>> {
+    let wrong = |message: String, help: String| {
+        Err(Box::new(Diagnostic::new(Code::UnknownFact, word.span.clone(), message).help(help)))
+    };
+    let roles = || model.flat.roles.iter().map(|(key, _)| key.name.as_str());
+    let (role, name) = word.text.split_once('.').unwrap_or((&word.text, ""));
+    let Some(index) = roles().position(|known| known == role) else {
+        return wrong(format!("there is no role `{role}` to ask for a fact"), closest(role, roles(), "roles"));
+    };
+    // A device that could not be opened has had its say.
+    let Some(bound) = &opened.roles[index] else { return Ok(None) };
+    let facts = &bound.filled.facts;
+    match facts.iter().find(|(fact, _)| fact == name) {
+        Some((_, value)) => Ok(Some(value.clone())),
+        None => {
+            let help = closest(name, facts.iter().map(|(fact, _)| &**fact), "facts");
+            wrong(format!("the device behind `{role}` states no `{name}`"), help)
+        }
+    }
+}

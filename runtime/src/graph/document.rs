@@ -1,0 +1,211 @@
+//! What the sections of a graph file, a part and a bench hold, before anything is looked up.
+
+use std::ops::Range;
+
+use super::{Item, Key, Sources, Table, Value};
+use crate::diagnostic::{Code, Diagnostic, closest};
+use crate::node::{At, FilePath, Mistake, NonNegative, Param, Positive, Reader, Word};
+
+crate::params! { GraphTable:
+    /// Role whose samples trigger the ticks.
+    clock: Option<Word>,
+    /// Ticks per second of a graph that has no role for a clock [Hz].
+    rate_hz: Option<Positive>,
+    /// Bench it runs on unless another is named.
+    bench: Option<FilePath>,
+    /// Greatest time between two samples that counts as one step; five periods unless said [ms].
+    max_gap_ms: Option<Positive>,
+    /// How long something must be absent before the state behind it is reset [ms].
+    reset_after_ms: NonNegative = NonNegative(20.0),
+}
+
+/// A block of a node or a device: its type, its wires, and what is left are its parameters.
+#[derive(Debug, Clone)]
+pub(crate) struct Block {
+    pub(crate) key: Key,
+    pub(crate) kind: Option<Word>,
+    pub(crate) wires: Vec<(Key, Word)>,
+    pub(crate) params: Value,
+}
+
+/// A block of a part: the file, the wires into it, and what is set in it.
+#[derive(Debug, Clone)]
+pub(crate) struct PartBlock {
+    pub(crate) key: Key,
+    pub(crate) file: Option<FilePath>,
+    pub(crate) wires: Vec<(Key, Word)>,
+    pub(crate) set: Table,
+}
+
+/// A graph file or a part.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Document {
+    /// The section [graph] and its place, if there is one; no table if it has mistakes.
+    pub(crate) graph: Option<(Range<usize>, Option<GraphTable>)>,
+    pub(crate) roles: Vec<(Key, Word)>,
+    pub(crate) nodes: Vec<Block>,
+    pub(crate) parts: Vec<PartBlock>,
+    pub(crate) commands: Vec<(Key, Key, Word)>,
+    pub(crate) inputs: Vec<(Key, Word)>,
+    pub(crate) exports: Vec<(Key, Word)>,
+}
+
+/// A bench file.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Bench {
+    pub(crate) devices: Vec<Block>,
+    pub(crate) bind: Vec<(Key, Word)>,
+}
+
+/// Reads sections and collects what is wrong with them.
+pub(crate) struct Sections<'a> {
+    reader: Reader<'a>,
+    diagnostics: Vec<Diagnostic>,
+}
+
+impl<'a> Sections<'a> {
+    pub(crate) const fn new(sources: &'a Sources) -> Self {
+        Self { reader: Reader::new(sources), diagnostics: Vec::new() }
+    }
+
+    /// Everything that was wrong.
+    pub(crate) fn finish(self) -> Vec<Diagnostic> {
+        let mut diagnostics = self.diagnostics;
+        diagnostics.extend(self.reader.mistakes.into_iter().map(spanned));
+        diagnostics
+    }
+
+    /// The sections of a graph file.
+    pub(crate) fn graph(&mut self, root: &Table) -> Document {
+        self.known(root, &["graph", "roles", "parts", "nodes", "commands"]);
+        let graph =
+            root.entry("graph").map(|(key, value)| (key.span.clone(), GraphTable::read(value, &mut self.reader)));
+        let commands = self.table(root.get("commands")).entries.into_iter().flat_map(|(role, value)| {
+            let wires = self.words(Some(&value));
+            wires.into_iter().map(move |(command, word)| (role.clone(), command, word))
+        });
+        let commands = commands.collect();
+        Document { graph, roles: self.names(root.get("roles")), commands, ..self.body(root) }
+    }
+
+    /// The sections of a part.
+    pub(crate) fn part(&mut self, root: &Table) -> Document {
+        self.known(root, &["inputs", "exports", "parts", "nodes"]);
+        let (inputs, exports) = (self.names(root.get("inputs")), self.names(root.get("exports")));
+        Document { inputs, exports, ..self.body(root) }
+    }
+
+    /// The sections of a bench.
+    pub(crate) fn bench(&mut self, root: &Table) -> Bench {
+        self.known(root, &["devices", "bind"]);
+        let devices = self.named_tables(root.get("devices"));
+        let devices = devices.into_iter().map(|(key, table)| self.block(key, table)).collect();
+        Bench { devices, bind: self.words(root.get("bind")) }
+    }
+
+    fn body(&mut self, root: &Table) -> Document {
+        let nodes = self.named_tables(root.get("nodes"));
+        let nodes = nodes.into_iter().map(|(key, table)| self.node(key, table)).collect();
+        let parts = self.named_tables(root.get("parts"));
+        let parts = parts.into_iter().map(|(key, table)| self.part_block(key, table)).collect();
+        Document { nodes, parts, ..Document::default() }
+    }
+
+    fn node(&mut self, key: Key, mut table: Table) -> Block {
+        let wires = table.remove("in").map(|(_, value)| value);
+        Block { wires: self.words(wires.as_ref()), ..self.block(key, table) }
+    }
+
+    fn block(&mut self, key: Key, mut table: Table) -> Block {
+        let kind = match table.remove("type") {
+            Some((_, value)) => Word::read(&value, &mut self.reader),
+            None => {
+                let message = format!("`{}` has no `type`", key.name);
+                self.diagnostics.push(Diagnostic::new(Code::MissingKey, key.span.clone(), message));
+                None
+            }
+        };
+        // What is missing among the parameters is shown at the block's name.
+        let params = Value { span: key.span.clone(), item: Item::Table(table) };
+        Block { key, kind, wires: Vec::new(), params }
+    }
+
+    fn part_block(&mut self, key: Key, mut table: Table) -> PartBlock {
+        let wires = table.remove("in").map(|(_, value)| value);
+        let wires = self.words(wires.as_ref());
+        let set = table.remove("set").map(|(_, value)| value);
+        let set = self.table(set.as_ref());
+        let file = match table.remove("file") {
+            Some((_, value)) => FilePath::read(&value, &mut self.reader),
+            None => {
+                let message = format!("part `{}` has no `file`", key.name);
+                self.diagnostics.push(Diagnostic::new(Code::MissingKey, key.span.clone(), message));
+                None
+            }
+        };
+        self.known(&table, &["file", "in", "set"]);
+        PartBlock { key, file, wires, set }
+    }
+
+    /// Every key must be one of `keys`.
+    fn known(&mut self, table: &Table, keys: &[&str]) {
+        for (key, _) in table.entries.iter().filter(|(key, _)| !keys.contains(&key.name.as_str())) {
+            let diagnostic =
+                Diagnostic::new(Code::UnknownKey, key.span.clone(), format!("`{}` means nothing here", key.name));
+            self.diagnostics.push(diagnostic.help(closest(&key.name, keys.iter().copied(), "keys")));
+        }
+    }
+
+    fn table(&mut self, value: Option<&Value>) -> Table {
+        match value.map(|value| (value, value.as_table())) {
+            Some((_, Some(table))) => table.clone(),
+            Some((value, None)) => {
+                self.reader.wrong_type(value, "a table");
+                Table::default()
+            }
+            None => Table::default(),
+        }
+    }
+
+    /// Keys with a string each.
+    fn words(&mut self, value: Option<&Value>) -> Vec<(Key, Word)> {
+        let table = self.table(value);
+        let read = |(key, value): (Key, Value)| Some((key, Word::read(&value, &mut self.reader)?));
+        table.entries.into_iter().filter_map(read).collect()
+    }
+
+    /// Keys that are names, with a string each.
+    fn names(&mut self, value: Option<&Value>) -> Vec<(Key, Word)> {
+        let words = self.words(value);
+        words.iter().for_each(|(key, _)| self.name(key));
+        words
+    }
+
+    /// Keys that are names, with a table each.
+    fn named_tables(&mut self, value: Option<&Value>) -> Vec<(Key, Table)> {
+        let mut tables = Vec::new();
+        for (key, value) in self.table(value).entries {
+            self.name(&key);
+            let table = self.table(Some(&value));
+            tables.push((key, table));
+        }
+        tables
+    }
+
+    fn name(&mut self, key: &Key) {
+        let is_word = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '_';
+        if !(key.name.starts_with(|c: char| c.is_ascii_lowercase()) && key.name.chars().all(is_word))
+            || key.name == "inputs"
+        {
+            let message = format!("`{}` cannot be a name", key.name);
+            let help = "a name is made of small letters, digits and `_`, starts with a letter and is not `inputs`";
+            self.diagnostics.push(Diagnostic::new(Code::BadName, key.span.clone(), message).help(help));
+        }
+    }
+}
+
+/// A mistake that knows its place.
+fn spanned(mistake: Mistake) -> Diagnostic {
+    let At::Span(span) = mistake.at else { unreachable!("a reader points at places") };
+    Diagnostic { code: mistake.code, message: mistake.message, span, notes: Vec::new(), help: mistake.help }
+}

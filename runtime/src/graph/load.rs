@@ -1,0 +1,332 @@
+//! From files to one flat graph: parts are put in place, `--set` and overrides are merged.
+
+use std::collections::BTreeMap;
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+
+use super::document::{Bench, Block, Document, GraphTable, PartBlock, Sections};
+use super::{Item, Key, Sources, Table, Value, parse_table};
+use crate::diagnostic::{Code, Diagnostic, closest};
+use crate::node::Word;
+
+/// What to load.
+#[derive(Debug, Clone, Default)]
+pub struct Request {
+    /// The graph file.
+    pub graph: PathBuf,
+    /// The graph's text, if it does not stand in the file.
+    pub text: Option<String>,
+    /// The bench, if it is not the graph's own.
+    pub bench: Option<PathBuf>,
+    /// The bench's text, if it does not stand in a file.
+    pub bench_text: Option<String>,
+    /// Values laid over those of the files, each `key=value`.
+    pub set: Vec<String>,
+}
+
+impl Request {
+    /// The graph of a file, on its own bench.
+    pub fn file(path: impl Into<PathBuf>) -> Self {
+        Self { graph: path.into(), ..Self::default() }
+    }
+
+    /// A graph that is given as text; its paths are relative to the working folder.
+    pub fn text(text: impl Into<String>) -> Self {
+        Self { graph: "graph.toml".into(), text: Some(text.into()), ..Self::default() }
+    }
+
+    /// On another bench.
+    #[must_use]
+    pub fn bench(mut self, path: impl Into<PathBuf>) -> Self {
+        self.bench = Some(path.into());
+        self
+    }
+
+    /// With a value laid over those of the files: `nodes.pid.gains.x.kp=3`.
+    #[must_use]
+    pub fn set(mut self, assignment: impl Into<String>) -> Self {
+        self.set.push(assignment.into());
+        self
+    }
+}
+
+/// A name in a scope.
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum Entity {
+    Role(usize),
+    Node(usize),
+    Part(usize),
+}
+
+/// The names that a file's wires can use.
+#[derive(Debug, Default)]
+pub(crate) struct Scope {
+    pub(crate) names: BTreeMap<String, (Key, Entity)>,
+    pub(crate) exports: Vec<(Key, Word)>,
+    /// Wires into the part, and the scope they stand in.
+    pub(crate) inputs: Vec<(Key, Word)>,
+    pub(crate) parent: Option<usize>,
+}
+
+/// A node in its scope, with its full name.
+#[derive(Debug)]
+pub(crate) struct FlatNode {
+    pub(crate) name: String,
+    pub(crate) scope: usize,
+    pub(crate) block: Block,
+}
+
+/// A graph without parts, and its bench.
+#[derive(Debug, Default)]
+pub(crate) struct Flat {
+    pub(crate) table: Option<GraphTable>,
+    /// Where to show what is missing in the graph as a whole.
+    pub(crate) place: Range<usize>,
+    pub(crate) roles: Vec<(Key, Word)>,
+    pub(crate) nodes: Vec<FlatNode>,
+    pub(crate) scopes: Vec<Scope>,
+    pub(crate) commands: Vec<(Key, Key, Word)>,
+    pub(crate) bench: Option<Bench>,
+}
+
+/// Reads files and notes what is wrong with them.
+#[derive(Default)]
+pub(crate) struct Loader {
+    pub(crate) sources: Sources,
+    pub(crate) diagnostics: Vec<Diagnostic>,
+    open_parts: Vec<PathBuf>,
+}
+
+impl Loader {
+    /// Reads everything that the request names.
+    pub(crate) fn load(&mut self, request: &Request) -> Flat {
+        let mut flat = Flat::default();
+        let root = match &request.text {
+            Some(text) => self.parse(&request.graph, text.clone()),
+            None => self.read(&request.graph, None),
+        };
+        let (graph_set, bench_set) = self.set(&request.set);
+        let Some(mut root) = root else { return flat };
+        flat.place = root.1;
+        root.0.merge(graph_set);
+        let document = self.sections(|sections| sections.graph(&root.0));
+        flat.table = match &document.graph {
+            Some((span, table)) => {
+                flat.place = span.clone();
+                table.clone()
+            }
+            None => {
+                let message = "the graph has no section [graph]";
+                let help = "add [graph] with `clock = \"role\"` or `rate_hz = 250`, and a `bench`";
+                self.diagnostics.push(Diagnostic::new(Code::MissingKey, flat.place.clone(), message).help(help));
+                None
+            }
+        };
+        flat.bench = self.bench(request, &flat, bench_set);
+        flat.roles.clone_from(&document.roles);
+        flat.commands.clone_from(&document.commands);
+        self.flatten(document, "", Scope::default(), &mut flat);
+        flat
+    }
+
+    fn sections<T>(&mut self, read: impl FnOnce(&mut Sections<'_>) -> T) -> T {
+        let mut sections = Sections::new(&self.sources);
+        let result = read(&mut sections);
+        let found = sections.finish();
+        self.diagnostics.extend(found);
+        result
+    }
+
+    fn bench(&mut self, request: &Request, flat: &Flat, set: Table) -> Option<Bench> {
+        // A graph whose own section could not be read has been told so.
+        let named = flat.table.as_ref()?.bench.as_ref();
+        if let Some(text) = &request.bench_text {
+            let mut root = self.parse(Path::new("bench.toml"), text.clone())?.0;
+            root.merge(set);
+            return Some(self.sections(|sections| sections.bench(&root)));
+        }
+        let (path, span) = match (&request.bench, named) {
+            (Some(path), _) => (path.clone(), None),
+            (None, Some(file)) => (file.path.clone(), Some(file.span.clone())),
+            (None, None) => {
+                let diagnostic =
+                    Diagnostic::new(Code::MissingKey, flat.place.clone(), "the graph names no bench to run on");
+                let help = "add `bench = \"benches/….toml\"` under [graph], or give one with `--bench`";
+                self.diagnostics.push(diagnostic.help(help));
+                return None;
+            }
+        };
+        let mut root = self.read(&path, span)?.0;
+        root.merge(set);
+        Some(self.sections(|sections| sections.bench(&root)))
+    }
+
+    /// Reads and parses a file; `from` is where its name stands.
+    fn read(&mut self, path: &Path, from: Option<Range<usize>>) -> Option<(Table, Range<usize>)> {
+        match std::fs::read_to_string(path) {
+            Ok(text) => self.parse(path, text),
+            Err(error) => {
+                let message = format!("cannot read `{}`: {error}", path.display());
+                let span = from.unwrap_or_else(|| {
+                    let file = self.sources.add("command line", path.display().to_string(), "");
+                    file.base..file.base + file.text.len()
+                });
+                self.diagnostics.push(Diagnostic::new(Code::Unreadable, span, message));
+                None
+            }
+        }
+    }
+
+    fn parse(&mut self, path: &Path, text: String) -> Option<(Table, Range<usize>)> {
+        let file = self.sources.add_file(path, text);
+        // Without a section to point at, the place of the whole is the file's first line.
+        let first_line = file.base..file.base + file.text.lines().next().map_or(0, str::len);
+        match parse_table(file) {
+            Ok(Value { item: Item::Table(table), .. }) => Some((table, first_line)),
+            Ok(_) => None,
+            Err(mistakes) => {
+                self.diagnostics.extend(mistakes);
+                None
+            }
+        }
+    }
+
+    /// What the command line sets: for the graph, and for the bench.
+    fn set(&mut self, assignments: &[String]) -> (Table, Table) {
+        let (mut graph, mut bench) = (Table::default(), Table::default());
+        for assignment in assignments {
+            let Some(table) = self.assignment(assignment) else { continue };
+            for (key, value) in table.entries {
+                let of_bench = matches!(key.name.as_str(), "devices" | "bind");
+                let target = if of_bench { &mut bench } else { &mut graph };
+                target.merge(Table { entries: vec![(key, value)] });
+            }
+        }
+        (graph, bench)
+    }
+
+    /// One `key=value`; what is no TOML value is a string, so that nobody has to quote twice in a shell.
+    fn assignment(&mut self, text: &str) -> Option<Table> {
+        let quoted = text.split_once('=').map(|(key, value)| format!("{key}={value:?}"));
+        for text in [Some(text.to_owned()), quoted].into_iter().flatten() {
+            let file = self.sources.add("--set", text, "");
+            if let Ok(Value { item: Item::Table(table), .. }) = parse_table(file) {
+                return Some(table);
+            }
+        }
+        let file = self.sources.add("--set", text, "");
+        let span = file.base..file.base + file.text.len();
+        let diagnostic = Diagnostic::new(Code::Syntax, span, "this is not `key=value`");
+        self.diagnostics.push(diagnostic.help("for example `--set nodes.pid.gains.x.kp=3`"));
+        None
+    }
+
+    /// Puts the nodes and parts of a document into the graph.
+    fn flatten(&mut self, document: Document, prefix: &str, mut scope: Scope, flat: &mut Flat) -> usize {
+        let index = flat.scopes.len();
+        flat.scopes.push(Scope::default());
+        scope.exports = document.exports;
+        for (i, (key, _)) in document.roles.iter().enumerate() {
+            self.declare(&mut scope, key, Entity::Role(i));
+        }
+        for block in document.nodes {
+            self.declare(&mut scope, &block.key, Entity::Node(flat.nodes.len()));
+            flat.nodes.push(FlatNode { name: format!("{prefix}{}", block.key.name), scope: index, block });
+        }
+        for part in document.parts {
+            if let Some(inner) = self.part(&part, prefix, index, flat) {
+                self.declare(&mut scope, &part.key, Entity::Part(inner));
+            }
+        }
+        flat.scopes[index] = scope;
+        index
+    }
+
+    fn declare(&mut self, scope: &mut Scope, key: &Key, entity: Entity) {
+        if let Some((first, _)) = scope.names.get(&key.name) {
+            let message = format!("`{}` is the name of two things", key.name);
+            let diagnostic = Diagnostic::new(Code::DuplicateName, key.span.clone(), message);
+            let diagnostic = diagnostic.note(first.span.clone(), "the first is here");
+            self.diagnostics.push(diagnostic.help("roles, nodes and parts share one namespace: rename one of them"));
+            return;
+        }
+        scope.names.insert(key.name.clone(), (key.clone(), entity));
+    }
+
+    fn part(&mut self, part: &PartBlock, prefix: &str, parent: usize, flat: &mut Flat) -> Option<usize> {
+        let file = part.file.as_ref()?;
+        let canonical = file.path.canonicalize().unwrap_or_else(|_| file.path.clone());
+        if self.open_parts.contains(&canonical) {
+            let message = format!("part `{}` contains itself", part.key.name);
+            self.diagnostics.push(Diagnostic::new(Code::EndlessPart, file.span.clone(), message));
+            return None;
+        }
+        let mut root = self.read(&file.path, Some(file.span.clone()))?.0;
+        self.override_with(&mut root, &part.set);
+        let document = self.sections(|sections| sections.part(&root));
+        self.check_part_wires(part, &document);
+        self.open_parts.push(canonical);
+        let scope = Scope { inputs: part.wires.clone(), parent: Some(parent), ..Scope::default() };
+        let inner = self.flatten(document, &format!("{prefix}{}.", part.key.name), scope, flat);
+        self.open_parts.pop();
+        Some(inner)
+    }
+
+    /// `set.NAME` lays values over node NAME, or over what is set in part NAME.
+    fn override_with(&mut self, root: &mut Table, set: &Table) {
+        let names = |section: &str| -> Vec<String> {
+            let table = root.get(section).and_then(Value::as_table);
+            table.map(|table| table.entries.iter().map(|(key, _)| key.name.clone()).collect()).unwrap_or_default()
+        };
+        let (nodes, parts) = (names("nodes"), names("parts"));
+        for (key, value) in &set.entries {
+            let path: &[&str] = match () {
+                () if nodes.contains(&key.name) => &["nodes"],
+                () if parts.contains(&key.name) => &["parts", "set"],
+                () => {
+                    let message = format!("the part has no node or part `{}`", key.name);
+                    let help = closest(&key.name, nodes.iter().chain(&parts).map(String::as_str), "nodes and parts");
+                    self.diagnostics.push(Diagnostic::new(Code::UnknownKey, key.span.clone(), message).help(help));
+                    continue;
+                }
+            };
+            root.merge(nested(path, key, value));
+        }
+    }
+
+    fn check_part_wires(&mut self, part: &PartBlock, document: &Document) {
+        for (key, _) in &part.wires {
+            if !document.inputs.iter().any(|(input, _)| input.name == key.name) {
+                let message = format!("part `{}` has no input `{}`", part.key.name, key.name);
+                let help = closest(&key.name, document.inputs.iter().map(|(input, _)| input.name.as_str()), "inputs");
+                self.diagnostics.push(Diagnostic::new(Code::UnknownInput, key.span.clone(), message).help(help));
+            }
+        }
+        for (input, doc) in &document.inputs {
+            if !part.wires.iter().any(|(key, _)| key.name == input.name) {
+                let message = format!("part `{}` needs `in.{}`: {}", part.key.name, input.name, doc.text);
+                let diagnostic = Diagnostic::new(Code::MissingInput, part.key.span.clone(), message);
+                let help = format!("add `in.{} = \"…\"`", input.name);
+                self.diagnostics.push(diagnostic.note(input.span.clone(), "the part declares it here").help(help));
+            }
+        }
+    }
+}
+
+/// A value in a table in a table: `nodes.NAME`, or `parts.NAME.set`.
+fn nested(path: &[&str], key: &Key, value: &Value) -> Table {
+    let named = |name: &str, table: Table| {
+        let key = Key { name: name.to_owned(), span: key.span.clone() };
+        Table { entries: vec![(key, Value { span: value.span.clone(), item: Item::Table(table) })] }
+    };
+    let inner = match (path, &value.item) {
+        ([_, set], Item::Table(table)) => Table {
+            entries: vec![(
+                key.clone(),
+                Value { span: value.span.clone(), item: Item::Table(named(set, table.clone())) },
+            )],
+        },
+        _ => Table { entries: vec![(key.clone(), value.clone())] },
+    };
+    named(path[0], inner)
+}

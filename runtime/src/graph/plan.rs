@@ -1,0 +1,133 @@
+//! What a check hands to the engine: everything looked up, built and in order.
+
+use std::ops::Range;
+
+use super::Sources;
+use crate::device::Driver;
+use crate::node::{AnyNode, Need};
+use crate::signal::Shape;
+
+/// What a wire can come from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub(crate) enum Producer {
+    /// A role, by its index in the graph file.
+    Role(usize),
+    /// A node, by its index in the flat graph.
+    Node(usize),
+}
+
+/// One output of a role or a node.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub(crate) struct Source {
+    pub(crate) producer: Producer,
+    pub(crate) port: usize,
+}
+
+/// A port with everything that is known of it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PlannedPort {
+    /// Its name: `node.port`.
+    pub name: String,
+    /// Its shape, units filled in.
+    pub shape: Shape,
+    /// Its frames, where the wires tell them.
+    pub frames: Vec<Option<String>>,
+}
+
+/// A role and the device that fills it.
+pub(crate) struct PlannedRole {
+    pub(crate) name: String,
+    /// Index of the device.
+    pub(crate) device: usize,
+    /// Number of the role's first output among the device's.
+    pub(crate) first_port: usize,
+    pub(crate) ports: Vec<PlannedPort>,
+}
+
+/// A device, opened.
+pub(crate) struct PlannedDevice {
+    pub(crate) name: String,
+    pub(crate) driver: Driver,
+    pub(crate) outputs: Vec<Shape>,
+    pub(crate) commands: Vec<Shape>,
+    /// Where its name stands in the bench.
+    pub(crate) span: Range<usize>,
+}
+
+/// A node, built.
+pub(crate) struct PlannedNode {
+    /// Its index in the flat graph, by which wires know it.
+    pub(crate) index: usize,
+    pub(crate) name: String,
+    pub(crate) node: Box<dyn AnyNode>,
+    pub(crate) inputs: Vec<(Need, Vec<Source>)>,
+    pub(crate) ports: Vec<PlannedPort>,
+    pub(crate) is_every_tick: bool,
+    /// Where its name stands.
+    pub(crate) span: Range<usize>,
+}
+
+/// A command of a device, and what drives it.
+pub(crate) struct PlannedCommand {
+    pub(crate) source: Source,
+    pub(crate) device: usize,
+    /// Its number among the device's commands.
+    pub(crate) command: usize,
+}
+
+/// What makes the graph tick.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum Clock {
+    /// The samples of a device.
+    Device(usize),
+    /// A rate.
+    Rate,
+}
+
+/// A graph that is checked and built: it cannot fail to wire.
+pub struct Plan {
+    pub(crate) roles: Vec<PlannedRole>,
+    pub(crate) devices: Vec<PlannedDevice>,
+    /// In the order in which they step.
+    pub(crate) nodes: Vec<PlannedNode>,
+    pub(crate) commands: Vec<PlannedCommand>,
+    pub(crate) clock: Clock,
+    /// Nominal time between two ticks [ns].
+    pub(crate) period: i64,
+    /// Greatest time between two samples that counts as one step [s].
+    pub(crate) max_gap: f64,
+    /// How long something must be absent before the state behind it is reset [ns].
+    pub(crate) reset_after: i64,
+    pub(crate) sources: Sources,
+}
+
+impl Plan {
+    /// Every port of the graph: those of the roles, then those of the nodes in the order in which they step.
+    pub fn ports(&self) -> impl Iterator<Item = &PlannedPort> {
+        let roles = self.roles.iter().flat_map(|role| &role.ports);
+        roles.chain(self.nodes.iter().flat_map(|node| &node.ports))
+    }
+
+    /// The names of the nodes in the order in which they step.
+    pub fn order(&self) -> impl Iterator<Item = &str> {
+        self.nodes.iter().map(|node| node.name.as_str())
+    }
+
+    /// Whether any device runs on its own, so that only real time will do.
+    #[must_use]
+    pub fn is_live(&self) -> bool {
+        self.devices.iter().any(|device| matches!(device.driver, Driver::Live(_)))
+    }
+
+    /// Nominal time between two ticks [s].
+    #[must_use]
+    pub fn period(&self) -> f64 {
+        self.period as f64 * 1e-9
+    }
+
+    /// The texts the graph was read from.
+    #[must_use]
+    pub const fn sources(&self) -> &Sources {
+        &self.sources
+    }
+}

@@ -1,0 +1,281 @@
+//! Looks up where each wire comes from and whether it goes where its kind is taken.
+
+use super::Key;
+use super::load::{Entity, Flat};
+use super::plan::{Producer, Source};
+use crate::catalogue::Catalogue;
+use crate::device::RoleType;
+use crate::diagnostic::{Code, Diagnostic, closest};
+use crate::node::{Need, NodeSpec, PortSpec, Word};
+
+/// A wire that goes somewhere.
+#[derive(Debug, Clone)]
+pub(crate) struct Wire {
+    /// Index of the input in the node's declaration.
+    pub(crate) input: usize,
+    pub(crate) key: Key,
+    pub(crate) word: Word,
+    pub(crate) source: Source,
+}
+
+/// A command wire that goes somewhere.
+#[derive(Debug, Clone)]
+pub(crate) struct CommandWire {
+    pub(crate) role: usize,
+    /// Index of the command in the role's declaration.
+    pub(crate) command: usize,
+    pub(crate) word: Word,
+    pub(crate) source: Source,
+}
+
+/// The declarations behind a flat graph; none where the type is unknown.
+pub(crate) struct Model<'a> {
+    pub(crate) flat: &'a Flat,
+    pub(crate) roles: Vec<Option<&'a RoleType>>,
+    /// Index of the type in the catalogue, and its declaration.
+    pub(crate) nodes: Vec<Option<(usize, NodeSpec)>>,
+}
+
+impl<'a> Model<'a> {
+    /// Looks up every type.
+    pub(crate) fn new(flat: &'a Flat, catalogue: &'a Catalogue, found: &mut Vec<Diagnostic>) -> Self {
+        let specs: Vec<NodeSpec> = catalogue.nodes().iter().map(|node| node.spec()).collect();
+        let mut unknown = |word: &Word, what: &str, names: Vec<&str>| {
+            let message = format!("there is no {what} `{}`", word.text);
+            let help = closest(&word.text, names.into_iter(), &format!("{what}s"));
+            found.push(Diagnostic::new(Code::UnknownType, word.span.clone(), message).help(help));
+        };
+        let role = |(_, kind): &(Key, Word)| {
+            let role = catalogue.roles().iter().find(|role| role.name == kind.text);
+            if role.is_none() {
+                unknown(kind, "role", catalogue.roles().iter().map(|role| &*role.name).collect());
+            }
+            role
+        };
+        let roles = flat.roles.iter().map(role).collect();
+        let nodes = flat.nodes.iter().map(|node| {
+            let kind = node.block.kind.as_ref()?;
+            let index = specs.iter().position(|spec| spec.name == kind.text);
+            if index.is_none() {
+                unknown(kind, "node type", specs.iter().map(|spec| &*spec.name).collect());
+            }
+            index.map(|index| (index, specs[index].clone()))
+        });
+        let nodes = nodes.collect();
+        Self { flat, roles, nodes }
+    }
+
+    /// The declaration of a producer's outputs.
+    pub(crate) fn outputs(&self, producer: Producer) -> Option<&[PortSpec]> {
+        match producer {
+            Producer::Role(i) => self.roles[i].map(|role| role.outputs.as_slice()),
+            Producer::Node(i) => self.nodes[i].as_ref().map(|(_, spec)| spec.outputs.as_slice()),
+        }
+    }
+
+    /// Full name of a producer.
+    pub(crate) fn name(&self, producer: Producer) -> &str {
+        match producer {
+            Producer::Role(i) => &self.flat.roles[i].0.name,
+            Producer::Node(i) => &self.flat.nodes[i].name,
+        }
+    }
+
+    /// Declaration of the port a wire comes from.
+    pub(crate) fn port(&self, source: Source) -> &PortSpec {
+        &self.outputs(source.producer).expect("a wire comes from a known port")[source.port]
+    }
+
+    /// `node.port` of a source.
+    pub(crate) fn port_name(&self, source: Source) -> String {
+        format!("{}.{}", self.name(source.producer), self.port(source).name)
+    }
+
+    /// The wires of each node that go somewhere.
+    pub(crate) fn wires(&self, found: &mut Vec<Diagnostic>) -> Vec<Vec<Wire>> {
+        let mut all = Vec::new();
+        for (i, node) in self.flat.nodes.iter().enumerate() {
+            let Some((_, spec)) = &self.nodes[i] else {
+                all.push(Vec::new());
+                continue;
+            };
+            let wire = |(key, word): &(Key, Word)| self.wire(i, spec, key, word, found);
+            all.push(node.block.wires.iter().filter_map(wire).collect());
+            self.missing(i, spec, found);
+        }
+        all
+    }
+
+    fn wire(&self, node: usize, spec: &NodeSpec, key: &Key, word: &Word, found: &mut Vec<Diagnostic>) -> Option<Wire> {
+        let source = self.resolve(self.flat.nodes[node].scope, word, 0).unwrap_or_else(|diagnostic| {
+            found.push(*diagnostic);
+            None
+        });
+        let named = spec.inputs.iter().position(|input| input.need != Need::Many && input.name == key.name);
+        let Some(input) = named.or_else(|| spec.inputs.iter().position(|input| input.need == Need::Many)) else {
+            let message = format!("`{}` has no input `{}`", spec.name, key.name);
+            let help = closest(&key.name, spec.inputs.iter().map(|input| &*input.name), "inputs");
+            found.push(Diagnostic::new(Code::UnknownInput, key.span.clone(), message).help(help));
+            return None;
+        };
+        let source = source?;
+        let (has, takes) = (self.port(source).kind, spec.inputs[input].kind);
+        if has != takes {
+            let consumer = format!("{}.{}", self.flat.nodes[node].name, key.name);
+            found.push(self.kind_mismatch(source, &consumer, takes, word));
+            return None;
+        }
+        Some(Wire { input, key: key.clone(), word: word.clone(), source })
+    }
+
+    fn kind_mismatch(&self, source: Source, consumer: &str, takes: crate::signal::Kind, word: &Word) -> Diagnostic {
+        let port = self.port_name(source);
+        let has = self.port(source).kind.with_article();
+        let message = format!("`{port}` is {has}, but `{consumer}` takes {}", takes.with_article());
+        let outputs = self.outputs(source.producer).unwrap_or_default();
+        let other = outputs.iter().find(|output| output.kind == takes);
+        let help = other.map(|other| {
+            let written = word.text.rsplit_once('.').map_or("", |(node, _)| node);
+            format!("`{written}.{}` is {}", other.name, takes.with_article())
+        });
+        Diagnostic { help, ..Diagnostic::new(Code::KindMismatch, word.span.clone(), message) }
+    }
+
+    fn missing(&self, node: usize, spec: &NodeSpec, found: &mut Vec<Diagnostic>) {
+        let block = &self.flat.nodes[node].block;
+        for input in spec.inputs.iter().filter(|input| matches!(input.need, Need::Required | Need::Sampled)) {
+            if !block.wires.iter().any(|(key, _)| key.name == input.name) {
+                let name = &input.name;
+                let message = format!("`{}` needs `in.{name}`, {}", block.key.name, input.kind.with_article());
+                let help = self.candidate(self.flat.nodes[node].scope, node, input);
+                let help = format!("add `in.{name} = \"{}\"`", help.as_deref().unwrap_or("node.port"));
+                found.push(Diagnostic::new(Code::MissingInput, block.key.span.clone(), message).help(help));
+            }
+        }
+    }
+
+    /// A port of the scope that has the kind of an input.
+    fn candidate(&self, scope: usize, node: usize, input: &PortSpec) -> Option<String> {
+        self.flat.scopes[scope].names.iter().find_map(|(name, (_, entity))| {
+            let outputs = match *entity {
+                Entity::Role(i) => self.outputs(Producer::Role(i)),
+                Entity::Node(i) if i != node => self.outputs(Producer::Node(i)),
+                _ => None,
+            };
+            let port = outputs?.iter().find(|output| output.kind == input.kind && output.name == input.name)?;
+            Some(format!("{name}.{}", port.name))
+        })
+    }
+
+    /// Where the port named by `word` is; `None` if it comes from something whose type is unknown.
+    fn resolve(&self, scope: usize, word: &Word, depth: usize) -> Result<Option<Source>, Box<Diagnostic>> {
+        const DEEPEST: usize = 64;
+        let wrong = |message: String, help: String| {
+            Box::new(Diagnostic::new(Code::UnknownPort, word.span.clone(), message).help(help))
+        };
+        if depth > DEEPEST {
+            let message = format!("`{}` comes from itself, through the inputs and exports of parts", word.text);
+            return Err(Box::new(Diagnostic::new(Code::Loop, word.span.clone(), message)));
+        }
+        let names = &self.flat.scopes[scope].names;
+        let Some((name, port)) = word.text.split_once('.').filter(|(_, port)| !port.contains('.')) else {
+            let ports = names.get(&word.text).map(|(_, entity)| self.ports_of(*entity)).unwrap_or_default();
+            let example = ports.first().map_or("node.port".into(), |port| format!("{}.{port}", word.text));
+            return Err(wrong(format!("`{}` is no port", word.text), format!("a port is written like `{example}`")));
+        };
+        if name == "inputs"
+            && let Some(parent) = self.flat.scopes[scope].parent
+        {
+            let inputs = &self.flat.scopes[scope].inputs;
+            return match inputs.iter().find(|(key, _)| key.name == port) {
+                Some((_, word)) => self.resolve(parent, word, depth + 1),
+                None => {
+                    let help = closest(port, inputs.iter().map(|(key, _)| key.name.as_str()), "inputs");
+                    Err(wrong(format!("the part has no input `{port}`"), help))
+                }
+            };
+        }
+        let Some((_, entity)) = names.get(name) else {
+            let help = closest(name, names.keys().map(String::as_str), "roles, nodes and parts");
+            return Err(wrong(format!("nothing here is called `{name}`"), help));
+        };
+        let no_port = || {
+            let ports = self.ports_of(*entity);
+            wrong(format!("`{name}` has no output `{port}`"), closest(port, ports.into_iter(), "outputs"))
+        };
+        let producer = match *entity {
+            Entity::Role(i) => Producer::Role(i),
+            Entity::Node(i) => Producer::Node(i),
+            Entity::Part(inner) => {
+                let export = self.flat.scopes[inner].exports.iter().find(|(key, _)| key.name == port);
+                let (_, word) = export.ok_or_else(no_port)?;
+                return self.resolve(inner, word, depth + 1);
+            }
+        };
+        let Some(outputs) = self.outputs(producer) else { return Ok(None) };
+        let port = outputs.iter().position(|output| output.name == port).ok_or_else(no_port)?;
+        Ok(Some(Source { producer, port }))
+    }
+
+    fn ports_of(&self, entity: Entity) -> Vec<&str> {
+        let names = |producer| self.outputs(producer).unwrap_or_default().iter().map(|port| &*port.name).collect();
+        match entity {
+            Entity::Role(i) => names(Producer::Role(i)),
+            Entity::Node(i) => names(Producer::Node(i)),
+            Entity::Part(inner) => self.flat.scopes[inner].exports.iter().map(|(key, _)| key.name.as_str()).collect(),
+        }
+    }
+
+    /// The command wires that go somewhere; a command that nothing drives is a mistake.
+    pub(crate) fn commands(&self, found: &mut Vec<Diagnostic>) -> Vec<CommandWire> {
+        let mut wires = Vec::new();
+        for (role, command, word) in &self.flat.commands {
+            let index = self.flat.roles.iter().position(|(key, _)| key.name == role.name);
+            let Some(index) = index else {
+                let message = format!("there is no role `{}`", role.name);
+                let help = closest(&role.name, self.flat.roles.iter().map(|(key, _)| key.name.as_str()), "roles");
+                found.push(Diagnostic::new(Code::UnknownPort, role.span.clone(), message).help(help));
+                continue;
+            };
+            wires.extend(self.command(index, command, word, found));
+        }
+        self.undriven(found);
+        wires
+    }
+
+    fn command(&self, role: usize, key: &Key, word: &Word, found: &mut Vec<Diagnostic>) -> Option<CommandWire> {
+        let source = self.resolve(0, word, 0).unwrap_or_else(|diagnostic| {
+            found.push(*diagnostic);
+            None
+        });
+        let commands = &self.roles[role]?.commands;
+        let Some(command) = commands.iter().position(|command| command.name == key.name) else {
+            let message = format!("`{}` takes no command `{}`", self.name(Producer::Role(role)), key.name);
+            let help = closest(&key.name, commands.iter().map(|command| &*command.name), "commands");
+            found.push(Diagnostic::new(Code::UnknownInput, key.span.clone(), message).help(help));
+            return None;
+        };
+        let source = source?;
+        let takes = commands[command].kind;
+        if self.port(source).kind != takes {
+            let consumer = format!("{}.{}", self.name(Producer::Role(role)), key.name);
+            found.push(self.kind_mismatch(source, &consumer, takes, word));
+            return None;
+        }
+        Some(CommandWire { role, command, word: word.clone(), source })
+    }
+
+    fn undriven(&self, found: &mut Vec<Diagnostic>) {
+        for ((key, _), role) in self.flat.roles.iter().zip(&self.roles) {
+            for command in role.iter().flat_map(|role| &role.commands) {
+                let is_driven =
+                    |(role, driven, _): &&(Key, Key, Word)| role.name == key.name && driven.name == command.name;
+                if !self.flat.commands.iter().any(|wire| is_driven(&wire)) {
+                    let message = format!("nothing drives `{}.{}`", key.name, command.name);
+                    let help = format!("add `{}.{} = \"node.port\"` under [commands]", key.name, command.name);
+                    found.push(Diagnostic::new(Code::UndrivenCommand, key.span.clone(), message).help(help));
+                }
+            }
+        }
+    }
+}

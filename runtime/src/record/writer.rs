@@ -1,0 +1,78 @@
+//! Rows as text.
+
+use std::io::{self, Write};
+use std::path::Path;
+
+use serde::Serializer;
+use serde::ser::SerializeMap;
+
+use super::Column;
+
+/// A format of rows.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Format {
+    /// Comma-separated values; units stand in comments before the header.
+    Csv,
+    /// One JSON object a line; the first tells the units.
+    Ndjson,
+}
+
+impl Format {
+    /// The format that a file's name asks for.
+    #[must_use]
+    pub fn of(path: &Path) -> Option<Self> {
+        match path.extension()?.to_str()? {
+            "csv" => Some(Self::Csv),
+            "ndjson" => Some(Self::Ndjson),
+            _ => None,
+        }
+    }
+
+    /// Writes what stands before the rows.
+    pub(super) fn header(self, columns: &[Column], out: &mut impl Write) -> io::Result<()> {
+        match self {
+            Self::Csv => {
+                writeln!(out, "# time [s]")?;
+                for column in columns {
+                    writeln!(out, "# {} [{}]", column.name, column.unit)?;
+                }
+                write!(out, "time")?;
+                columns.iter().try_for_each(|column| write!(out, ",{}", column.name))?;
+                writeln!(out)
+            }
+            Self::Ndjson => {
+                let units = columns.iter().map(|column| (column.name.as_str(), column.unit.to_string()));
+                let units: serde_json::Map<_, _> = std::iter::once(("time", "s".to_owned()))
+                    .chain(units)
+                    .map(|(name, unit)| (name.to_owned(), unit.into()))
+                    .collect();
+                serde_json::to_writer(&mut *out, &serde_json::json!({ "units": units }))?;
+                writeln!(out)
+            }
+        }
+    }
+
+    /// Writes one row: the time [ns] and a value a column, NaN where there is none.
+    pub(super) fn row(self, columns: &[Column], time: i64, row: &[f64], out: &mut impl Write) -> io::Result<()> {
+        let seconds = time as f64 * 1e-9;
+        match self {
+            Self::Csv => {
+                write!(out, "{seconds:?}")?;
+                for value in row {
+                    if value.is_nan() { write!(out, ",")? } else { write!(out, ",{value:?}")? }
+                }
+                writeln!(out)
+            }
+            Self::Ndjson => {
+                let mut json = serde_json::Serializer::new(&mut *out);
+                let mut map = json.serialize_map(Some(columns.len() + 1))?;
+                map.serialize_entry("time", &seconds)?;
+                for (column, value) in columns.iter().zip(row) {
+                    map.serialize_entry(&column.name, &Some(value).filter(|value| !value.is_nan()))?;
+                }
+                map.end()?;
+                writeln!(out)
+            }
+        }
+    }
+}
