@@ -1,0 +1,38 @@
+//! What the tests share: where things are, and small nodes that make one sentence of the semantics visible.
+
+pub mod nodes;
+
+use std::path::{Path, PathBuf};
+
+use tactflow_runtime::catalogue::Catalogue;
+
+/// The folder of the workspace.
+#[must_use]
+pub fn workspace() -> &'static Path {
+    Path::new(env!("CARGO_MANIFEST_DIR")).parent().expect("the tests stand in the workspace")
+}
+
+/// Every graph that ships.
+#[must_use]
+pub fn shipped_graphs() -> Vec<PathBuf> {
+    toml_files(&workspace().join("graphs"))
+}
+
+/// The TOML files of a folder, sorted by name.
+///
+/// # Panics
+/// If the folder cannot be read.
+#[must_use]
+pub fn toml_files(folder: &Path) -> Vec<PathBuf> {
+    let entries = std::fs::read_dir(folder).unwrap_or_else(|error| panic!("{}: {error}", folder.display()));
+    let paths = entries.map(|entry| entry.expect("a folder can be listed").path());
+    let mut files: Vec<PathBuf> = paths.filter(|path| path.extension().is_some_and(|end| end == "toml")).collect();
+    files.sort();
+    files
+}
+
+/// Everything that ships, and the nodes of the tests.
+#[must_use]
+pub fn catalogue() -> Catalogue {
+    tactflow_nodes::catalogue().join(nodes::catalogue())
+}

@@ -1,0 +1,37 @@
+//! Nodes that make one sentence of the semantics visible each, and the role that feeds them.
+
+pub mod breaks;
+pub mod count;
+pub mod pair;
+pub mod unit_delay;
+
+use tactflow_runtime::catalogue::Catalogue;
+use tactflow_runtime::device::RoleType;
+use tactflow_runtime::harness::Source;
+use tactflow_runtime::node::{Need, PortSpec};
+use tactflow_runtime::signal::{Kind, ScalarShape, Unit};
+
+/// The nodes and the role.
+#[must_use]
+pub fn catalogue() -> Catalogue {
+    Catalogue::new()
+        .role(length())
+        .node::<breaks::Breaks>()
+        .node::<count::Count>()
+        .node::<pair::Pair>()
+        .node::<unit_delay::UnitDelay>()
+}
+
+/// A role that gives a length.
+fn length() -> RoleType {
+    let args = vec!["m".into(), "self".into()].into();
+    let value = PortSpec { name: "value".into(), doc: "A length.".into(), kind: Kind::Scalar, args, need: Need::Required };
+    RoleType { name: "length".into(), summary: "a length".into(), outputs: vec![value], commands: vec![] }
+}
+
+/// The role `role` as a length that a test feeds, every 10 ms nominally.
+#[must_use]
+pub fn length_by_hand(role: &'static str) -> Source {
+    let outputs = vec![ScalarShape { unit: Unit::METRE }.into()];
+    Source { role, kind: "length", period: 0.01, outputs, commands: vec![] }
+}

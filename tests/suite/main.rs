@@ -1,0 +1,4 @@
+//! The suite: one module a subject.
+
+mod freshness;
+mod faults;
