@@ -2,3 +2,4 @@
 
 mod freshness;
 mod faults;
+mod live;

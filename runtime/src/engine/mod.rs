@@ -137,17 +137,21 @@ impl Engine {
         Some(self.timeline.next(clock))
     }
 
-    /// Runs the tick at `now` [ns]: exchange with the devices, latch, step, commit.
+    /// Runs the tick at `now` [ns]: exchange with the devices, then latch, step and commit.
     ///
     /// # Errors
     /// The reason of a fault; nothing was commanded in this tick.
     pub fn tick(&mut self, now: i64) -> Result<(), Fault> {
-        let clock = self.clock_sample();
-        self.core.begin(now);
         self.exchange(now)?;
-        let outcome = catch_unwind(AssertUnwindSafe(|| self.core.run(&mut self.decks, &mut self.timing)));
-        self.timeline.ticked(now, clock);
-        match outcome {
+        self.step()
+    }
+
+    /// The second half of a tick: latch, step, commit. It neither allocates nor calls the operating system.
+    ///
+    /// # Errors
+    /// The reason of a fault; nothing was commanded in this tick.
+    pub fn step(&mut self) -> Result<(), Fault> {
+        match catch_unwind(AssertUnwindSafe(|| self.core.run(&mut self.decks, &mut self.timing))) {
             Ok(None) => Ok(()),
             Ok(Some(mark)) => Err(self.not_finite(mark)),
             Err(panic) => Err(self.panicked(&*panic)),
@@ -162,8 +166,19 @@ impl Engine {
         })
     }
 
-    /// Hands the commands of the last tick to the devices and takes what they have sampled up to `now`.
-    fn exchange(&mut self, now: i64) -> Result<(), Fault> {
+    /// The first half of a tick at `now` [ns]: hands the commands of the last tick to the devices and takes what they
+    /// have sampled since.
+    ///
+    /// # Errors
+    /// If a device fails.
+    pub fn exchange(&mut self, now: i64) -> Result<(), Fault> {
+        let clock = self.clock_sample();
+        self.core.begin(now);
+        self.timeline.ticked(now, clock);
+        self.exchange_with_devices(now)
+    }
+
+    fn exchange_with_devices(&mut self, now: i64) -> Result<(), Fault> {
         for deck in &mut self.decks {
             match &mut deck.edge {
                 Edge::Stepped(driver) => {
@@ -195,7 +210,7 @@ impl Engine {
         self.core.begin(now);
         let is_still = self.core.ramp(&mut self.decks, self.timeline.period() as f64 * 1e-9);
         // A device that fails now has had its zero or will time out by itself; the reason of the stop stays the first.
-        let _ = self.exchange(now);
+        let _ = self.exchange_with_devices(now);
         is_still
     }
 

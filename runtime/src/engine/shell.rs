@@ -176,7 +176,8 @@ impl<'a> Shell<'a> {
             }
         }
         let drivers = std::mem::take(&mut self.drivers);
-        let _ = self.runtime.block_on(tokio::time::timeout(GRACE, drivers.join_all()));
+        // What has not ended by then ends with the runtime.
+        let _ = self.runtime.block_on(async { tokio::time::timeout(GRACE, drivers.join_all()).await });
     }
 }
 

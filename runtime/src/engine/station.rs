@@ -61,8 +61,9 @@ impl Station {
         }
     }
 
-    /// Steps the node if a trigger is new or lost, and makes its outputs absent if something required is.
-    pub(crate) fn visit(&mut self, tick: &Tick, bus: &mut Bus) {
+    /// Steps the node if a trigger is new or lost, and makes its outputs absent if something required is. The tick's
+    /// stamp becomes the oldest of the triggers'.
+    pub(crate) fn visit(&mut self, tick: &mut Tick, bus: &mut Bus) {
         let (mut is_woken, mut is_missing, mut stamp) = (self.is_every_tick, false, Stamp::TIMELESS);
         for watch in &self.watches {
             let mark = &bus.marks[watch.mark as usize];
@@ -79,7 +80,8 @@ impl Station {
         } else {
             self.absence = Absence::Nothing;
             if is_woken {
-                self.node.step(&Tick { stamp, ..*tick }, bus, &self.wires, &self.outputs);
+                tick.stamp = stamp;
+                self.node.step(tick, bus, &self.wires, &self.outputs);
             }
         }
     }

@@ -104,7 +104,7 @@ impl NodeRig {
 
     /// Runs the tick, then lets `ms` milliseconds pass.
     pub fn step_ms(&mut self, ms: f64) {
-        self.station.visit(&self.tick, &mut self.bus);
+        self.station.visit(&mut self.tick, &mut self.bus);
         let nanos = (ms * 1e6) as i64;
         self.tick =
             Tick { index: self.tick.index + 1, now: self.tick.now + nanos, dt: nanos as f64 * 1e-9, ..self.tick };

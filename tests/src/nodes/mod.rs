@@ -2,7 +2,9 @@
 
 pub mod breaks;
 pub mod count;
+pub mod line_length;
 pub mod pair;
+pub mod plus;
 pub mod unit_delay;
 
 use tactflow_runtime::catalogue::Catalogue;
@@ -16,9 +18,11 @@ use tactflow_runtime::signal::{Kind, ScalarShape, Unit};
 pub fn catalogue() -> Catalogue {
     Catalogue::new()
         .role(length())
+        .device::<line_length::LineLength>()
         .node::<breaks::Breaks>()
         .node::<count::Count>()
         .node::<pair::Pair>()
+        .node::<plus::Plus>()
         .node::<unit_delay::UnitDelay>()
 }
 

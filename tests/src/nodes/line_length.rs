@@ -1,0 +1,56 @@
+//! `line_length`: a live length: a number a line from a TCP connection.
+
+use std::time::Instant;
+
+use async_trait::async_trait;
+use tactflow_runtime::device::{Description, Device, DeviceError, Driver, Filled, Link, Live, Opened};
+use tactflow_runtime::node::Mistakes;
+use tactflow_runtime::params;
+use tactflow_runtime::signal::{Scalar, ScalarShape, Unit};
+use tokio::io::{AsyncBufReadExt, BufReader};
+use tokio::net::TcpStream;
+
+params! {
+    /// Where the numbers come from.
+    address: String,
+}
+
+/// The connection that will be made.
+pub struct LineLength {
+    address: String,
+}
+
+impl Device for LineLength {
+    type Params = Params;
+
+    const NAME: &'static str = "line_length";
+    const SUMMARY: &'static str = "a number a line from a TCP connection";
+
+    fn open(params: Params) -> Result<Opened, Mistakes> {
+        let outputs = vec![ScalarShape { unit: Unit::METRE }.into()];
+        let filled = Filled { role: "length".into(), outputs, commands: vec![], facts: vec![] };
+        let description = Description { fills: vec![filled], period: 0.01 };
+        Ok(Opened { description, driver: Driver::Live(Box::new(Self { address: params.address })) })
+    }
+}
+
+#[async_trait]
+impl Live for LineLength {
+    async fn run(self: Box<Self>, mut link: Link) -> Result<(), DeviceError> {
+        let failed = |error: std::io::Error| DeviceError(format!("{}: {error}", self.address));
+        let stream = TcpStream::connect(&self.address).await.map_err(failed)?;
+        let mut lines = BufReader::new(stream).lines();
+        let mut sequence = 0;
+        loop {
+            let line = tokio::select! {
+                line = lines.next_line() => line.map_err(failed)?,
+                () = link.stopped() => return Ok(()),
+            };
+            let line = line.ok_or_else(|| DeviceError("the peer hung up".into()))?;
+            let number: f64 = line.parse().map_err(|_| DeviceError(format!("`{line}` is not a number")))?;
+            let stamp = link.stamp(Instant::now());
+            sequence += 1;
+            link.publish(|samples| *samples.write::<Scalar>(0, stamp, sequence) = number);
+        }
+    }
+}

@@ -1,0 +1,44 @@
+//! `plus`: adds a constant: the smallest node there is, to measure what a node costs.
+
+use tactflow_runtime::node::{Mistakes, Node, Setup, Tick};
+use tactflow_runtime::{inputs, outputs, params};
+
+params! {
+    /// What is added [m].
+    by: f64 = 1.0,
+}
+
+inputs! {
+    /// A length.
+    value: Scalar["m"],
+}
+
+outputs! {
+    /// The sum.
+    value: Scalar["m"],
+}
+
+/// What is added.
+pub struct Plus {
+    by: f64,
+}
+
+impl Node for Plus {
+    type Params = Params;
+    type Inputs<'a> = Inputs<'a>;
+    type Outputs = Outputs;
+    type State = ();
+
+    const NAME: &'static str = "plus";
+    const SUMMARY: &'static str = "adds a constant";
+
+    fn new(params: Params, _: &mut Setup<Self>) -> Result<Self, Mistakes> {
+        Ok(Self { by: params.by })
+    }
+
+    fn state(&self) {}
+
+    fn step(&self, _: &Tick, inputs: Inputs<'_>, out: &mut Outputs, (): &mut ()) {
+        out.value.set(*inputs.value + self.by);
+    }
+}

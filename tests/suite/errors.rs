@@ -1,0 +1,114 @@
+//! Broken graphs: the expected message stands under the offending token, in the file itself.
+//!
+//! `#  ^^^^ code: message` speaks of the line above it, `#       help: …` of the message above. With `TACTFLOW_BLESS=1`
+//! the comments are written anew; read the difference before you commit it.
+
+use std::collections::BTreeSet;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use tactflow_runtime::diagnostic::{Code, Diagnostic, Report};
+use tactflow_runtime::graph::{Request, Sources, plan};
+use tactflow_tests::{catalogue, toml_files, workspace};
+
+fn folder() -> PathBuf {
+    workspace().join("tests/errors")
+}
+
+fn is_expectation(line: &str) -> bool {
+    let comment = line.trim_start().strip_prefix('#').map(str::trim_start);
+    comment.is_some_and(|text| text.starts_with('^') || text.starts_with("help: "))
+}
+
+/// What a diagnostic looks like under its line.
+fn comment(diagnostic: &Diagnostic, sources: &Sources) -> Vec<String> {
+    let file = sources.file_at(diagnostic.span.start);
+    let (_, column) = file.line_column(diagnostic.span.start);
+    let local = file.local(&diagnostic.span);
+    let width = file.text[local].lines().next().map_or(0, |line| line.chars().count()).max(1);
+    // The `#` of the comment takes the first column.
+    let (skip, width) = if column == 1 { (0, width.saturating_sub(1).max(1)) } else { (column - 2, width) };
+    let pad = " ".repeat(skip);
+    let mut lines = vec![format!("#{pad}{} {}: {}", "^".repeat(width), diagnostic.code, diagnostic.message)];
+    if let Some(help) = &diagnostic.help {
+        lines.push(format!("#{pad}{} help: {help}", " ".repeat(width)));
+    }
+    lines
+}
+
+/// The file as it should be, given everything that is wrong with it.
+fn annotated(path: &Path, report: &Report) -> String {
+    let name = path.display().to_string();
+    let text = fs::read_to_string(path).unwrap();
+    let mut result = String::new();
+    for (i, line) in text.lines().enumerate().filter(|(_, line)| !is_expectation(line)) {
+        result.push_str(line);
+        result.push('\n');
+        for diagnostic in &report.diagnostics {
+            let file = report.sources.file_at(diagnostic.span.start);
+            if file.name == name && file.line_column(diagnostic.span.start).0 == i + 1 {
+                comment(diagnostic, &report.sources).iter().for_each(|line| {
+                    result.push_str(line);
+                    result.push('\n');
+                });
+            }
+        }
+    }
+    result
+}
+
+fn report(path: &Path) -> Report {
+    match plan(&catalogue(), &Request::file(path)) {
+        Ok(_) => panic!("{} loads", path.display()),
+        Err(report) => report,
+    }
+}
+
+/// The graph, and the parts and benches beside it that a report speaks of.
+fn files(report: &Report) -> BTreeSet<PathBuf> {
+    let names = report.diagnostics.iter().map(|d| report.sources.file_at(d.span.start).name.clone());
+    names.map(PathBuf::from).filter(|path| path.extension().is_some_and(|end| end == "toml")).collect()
+}
+
+#[test]
+fn every_mistake_shows_on_its_token_and_nothing_else_does() {
+    let is_blessing = std::env::var_os("TACTFLOW_BLESS").is_some();
+    let mut wrong = Vec::new();
+    for graph in toml_files(&folder()) {
+        let report = report(&graph);
+        let mut files = files(&report);
+        files.insert(graph.clone());
+        for file in files {
+            let expected = annotated(&file, &report);
+            if fs::read_to_string(&file).unwrap() != expected {
+                if is_blessing {
+                    fs::write(&file, &expected).unwrap();
+                }
+                wrong.push(format!("{} should be\n{expected}\n{}", file.display(), report.render(false)));
+            }
+        }
+    }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
+
+#[test]
+fn every_code_has_a_file() {
+    let mut seen = BTreeSet::new();
+    for graph in toml_files(&folder()) {
+        seen.extend(report(&graph).diagnostics.into_iter().map(|diagnostic| diagnostic.code));
+    }
+    let missing: Vec<_> = Code::ALL.iter().filter(|code| !seen.contains(code)).map(|code| code.name()).collect();
+    assert!(missing.is_empty(), "no file in tests/errors shows {missing:?}");
+}
+
+#[test]
+fn no_mistake_is_told_twice() {
+    for graph in toml_files(&folder()) {
+        let report = report(&graph);
+        let mut places = BTreeSet::new();
+        for diagnostic in &report.diagnostics {
+            let key = (diagnostic.span.start, diagnostic.span.end, diagnostic.code);
+            assert!(places.insert(key), "{}: {}", graph.display(), diagnostic.message);
+        }
+    }
+}

@@ -1,0 +1,94 @@
+//! A live device: a sensor in another process, on the wall clock.
+
+use std::io::{BufRead, BufReader};
+use std::process::{Child, Command, Stdio};
+
+use tactflow_runtime::engine::{self, End, Engine, RunOptions};
+use tactflow_runtime::fault::Cause;
+use tactflow_runtime::graph::{Request, plan};
+use tactflow_runtime::signal::{Scalar, Signal};
+use tactflow_tests::{catalogue, workspace};
+
+const GRAPH: &str = "
+[graph]
+clock = \"a\"
+[roles]
+a = \"length\"
+[nodes.count]
+type = \"count\"
+in.value = \"a.value\"
+";
+
+/// The peer and the port it listens on; it ends with the test.
+struct Peer {
+    child: Child,
+    port: String,
+}
+
+impl Peer {
+    fn start(count: u32, silence_s: f64, last_word: &str) -> Self {
+        let script = workspace().join("tests/peers/numbers.py");
+        let mut command = Command::new("python3");
+        command.arg(script).args([&count.to_string(), &silence_s.to_string(), last_word]);
+        let mut child = command.stdout(Stdio::piped()).spawn().expect("python3 is there");
+        let mut port = String::new();
+        BufReader::new(child.stdout.take().unwrap()).read_line(&mut port).unwrap();
+        Self { child, port: port.trim().to_owned() }
+    }
+}
+
+impl Drop for Peer {
+    fn drop(&mut self) {
+        // A peer that has ended by itself cannot be killed, and need not.
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}
+
+/// Runs the graph on a peer; how it ended, and the steps and the ages [ms] of `count` after each tick.
+fn run(peer: &Peer, duration: f64) -> (End, Vec<f64>, Vec<f64>) {
+    let bench = format!("devices.tcp.type = \"line_length\"\ndevices.tcp.address = \"127.0.0.1:{}\"\nbind.a = \"tcp\"", peer.port);
+    let request = Request { bench_text: Some(bench), ..Request::text(GRAPH) };
+    let plan = plan(&catalogue(), &request).unwrap_or_else(|report| panic!("{}", report.render(false)));
+    assert!(plan.is_live());
+    let mut engine = Engine::new(plan);
+    let id = engine.ports().iter().find(|(port, _)| port.name == "count.steps").unwrap().1;
+    let (mut steps, mut ages) = (Vec::new(), Vec::new());
+    let options = RunOptions { duration: Some(duration), is_realtime: true };
+    let outcome = engine::run(&mut engine, &options, &mut |engine| {
+        let mark = engine.bus().marks[id.mark as usize];
+        steps.push(Scalar::arena(&engine.bus().arenas)[id.slot as usize]);
+        ages.push(mark.stamp().age(engine.now()) as f64 * 1e-6);
+    });
+    (outcome.unwrap().end, steps, ages)
+}
+
+#[test]
+fn every_sample_counts_once_and_silence_makes_it_old() {
+    let peer = Peer::start(20, 5.0, "0");
+    let (end, steps, ages) = run(&peer, 0.8);
+    assert_eq!(end, End::Duration);
+    let last = *steps.last().unwrap();
+    assert!((10.0..=20.0).contains(&last), "{last} of 20 samples; a late reader sees the newest only");
+    assert!(steps.len() as f64 > last + 20.0, "a timer ticks on: {} ticks", steps.len());
+    assert!(*ages.last().unwrap() > 200.0, "{ages:?}");
+}
+
+#[test]
+fn a_peer_that_hangs_up_or_talks_nonsense_is_a_fault_of_the_device() {
+    for (last_word, message) in [("hang-up", "the peer hung up"), ("garbage", "`garbage` is not a number")] {
+        let (end, ..) = run(&Peer::start(5, 0.0, last_word), 5.0);
+        let End::Fault(fault) = end else { panic!("{end:?}") };
+        assert_eq!((fault.node.as_str(), fault.cause), ("tcp", Cause::Device(message.into())));
+    }
+}
+
+#[test]
+fn a_peer_that_is_not_there_is_a_fault_of_the_device() {
+    let peer = Peer::start(1, 0.0, "0");
+    let nobody = Peer { port: "1".into(), child: Command::new("true").spawn().unwrap() };
+    drop(peer);
+    let (end, ..) = run(&nobody, 5.0);
+    let End::Fault(fault) = end else { panic!("{end:?}") };
+    assert!(matches!(&fault.cause, Cause::Device(message) if message.contains("127.0.0.1:1")), "{fault}");
+}
