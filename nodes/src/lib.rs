@@ -20,4 +20,7 @@ pub fn catalogue() -> Catalogue {
         .node::<servo::projector::Projector>()
         .node::<arm::arm_state::ArmState>()
         .node::<arm::ik_sink::IkSink>()
+        .device::<devices::mock_arm::MockArm>()
+        .device::<devices::mock_pad::MockPad>()
+        .device::<devices::tekscan::TekscanMovie>()
 }

@@ -139,7 +139,10 @@ mod tests {
             solve(&columns, &twist, damping, &mut got);
             let wanted = by_eigenvalues(&columns, &twist, damping);
             let off = (DVector::from_vec(got) - &wanted).norm();
-            prop_assert!(off <= 1e-7 * (1.0 + wanted.norm()), "off by {}", off);
+            // What rounding costs at the condition of the matrix that is factorised: 1e-10 for an arm at the default.
+            let largest: f64 = columns.iter().flatten().map(|x| x * x).sum();
+            let condition = 1.0 + (largest / (damping * damping)).powi(2);
+            prop_assert!(off <= 4.0 * f64::EPSILON * condition * (1.0 + wanted.norm()), "off by {}", off);
         }
 
         #[test]

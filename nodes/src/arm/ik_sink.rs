@@ -184,5 +184,4 @@ fn check(params: &Params, joints: &JointsShape, columns: &JointsShape, period: f
 }
 
 #[cfg(test)]
-#[path = "ik_sink_tests.rs"]
 mod tests;

@@ -8,7 +8,7 @@ use crate::arm::chain::Chain;
 use crate::arm::model::chain_of;
 use crate::arm::mount::Mount;
 
-const LWR: &str = include_str!("../../../graphs/robots/lwr4p.urdf");
+const LWR: &str = include_str!("../../../../graphs/robots/lwr4p.urdf");
 const BENT: [f64; 7] = [0.2, 0.6, 0.1, -1.2, 0.3, 0.9, 0.0];
 
 fn lwr() -> Chain {
