@@ -14,5 +14,13 @@ use tactflow_runtime::catalogue::Catalogue;
 /// Everything there is: one line each.
 #[must_use]
 pub fn catalogue() -> Catalogue {
-    Catalogue::new().role(roles::tactile_pad()).role(roles::velocity_arm()).node::<servo::projector::Projector>()
+    Catalogue::new()
+        .role(roles::tactile_pad())
+        .role(roles::velocity_arm())
+        .node::<servo::projector::Projector>()
+        .node::<arm::arm_state::ArmState>()
+        .node::<arm::ik_sink::IkSink>()
+        .device::<devices::mock_arm::MockArm>()
+        .device::<devices::mock_pad::MockPad>()
+        .device::<devices::tekscan::TekscanMovie>()
 }

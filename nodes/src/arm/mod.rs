@@ -1,1 +1,10 @@
-//! .
+//! From a twist to joint velocities (paper section IV, eq. 4): kinematics from a robot's model, and the sink.
+
+pub mod arm_state;
+pub mod chain;
+pub mod damped;
+pub mod ik_sink;
+pub mod joint_limits;
+pub mod model;
+pub mod mount;
+pub mod null_space;

@@ -1,0 +1,281 @@
+//! A serial chain of joints: forward kinematics and the spatial Jacobian in one pass.
+//!
+//! T(q) = F_1 M_1(q_1) … F_n M_n(q_n) F_tip, with fixed transforms F and one joint's motion M each. Column i of the
+//! spatial Jacobian is the twist, at the base's origin, that unit speed of joint i gives: `[p x w; w]` for a revolute
+//! joint with axis w through p, `[w; 0]` for a prismatic one, both in the base's frame (Lynch and Park, *Modern
+//! Robotics*, section 5.1.1). It does not depend on what comes after the joint, so neither on the mount.
+//!
+//! Numerics: an axis that is not one of its frame's own is made its z by two turns folded into the fixed transforms, so
+//! a revolute joint turns two columns of a matrix and nothing else; fixed turns that are the identity are left out.
+
+use nalgebra::{IsometryMatrix3, Matrix3, Rotation3, Translation3, Vector3};
+use tactflow_runtime::signal::{Joint, Pose, Twist};
+
+/// A serial chain from a base to a sensor.
+#[derive(Debug, Clone)]
+pub struct Chain {
+    joints: Vec<Joint>,
+    links: Box<[Link]>,
+    tip: IsometryMatrix3<f64>,
+}
+
+/// How a joint moves.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Motion {
+    /// Turns about its axis.
+    Revolute,
+    /// Slides along its axis.
+    Prismatic,
+}
+
+/// A joint with the fixed transform before it.
+#[derive(Debug, Clone)]
+pub struct Segment {
+    /// From the frame after the last joint to this joint's.
+    pub fixed: IsometryMatrix3<f64>,
+    /// Unit vector of the axis in the joint's frame.
+    pub axis: Vector3<f64>,
+    /// How it moves.
+    pub motion: Motion,
+    /// Its name and its limits.
+    pub joint: Joint,
+}
+
+/// A segment as the pass wants it.
+#[derive(Debug, Clone)]
+struct Link {
+    offset: [f64; 3],
+    turn: Option<[[f64; 3]; 3]>,
+    motion: Motion,
+    axis: Axis,
+    sign: f64,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Axis {
+    X,
+    Y,
+    Z,
+}
+
+type Columns = [[f64; 3]; 3];
+
+impl Chain {
+    /// A chain of these segments, with a fixed transform from the last joint to the sensor.
+    #[must_use]
+    pub fn new(segments: Vec<Segment>, tip: IsometryMatrix3<f64>) -> Self {
+        let mut folded = Rotation3::identity();
+        let mut links = Vec::new();
+        let mut joints = Vec::new();
+        for segment in segments {
+            let (axis, sign, aligned) = own_axis(&segment.axis);
+            let offset = folded.inverse() * segment.fixed.translation.vector;
+            let turn = folded.inverse() * segment.fixed.rotation * aligned;
+            folded = aligned;
+            let turn = (turn != Rotation3::identity()).then(|| (*turn.matrix()).into());
+            links.push(Link { offset: offset.into(), turn, motion: segment.motion, axis, sign });
+            joints.push(segment.joint);
+        }
+        let back = IsometryMatrix3::from_parts(Translation3::identity(), folded.inverse());
+        Self { joints, links: links.into(), tip: back * tip }
+    }
+
+    /// The joints from the base to the tip.
+    #[must_use]
+    pub fn joints(&self) -> &[Joint] {
+        &self.joints
+    }
+
+    /// Pose of the sensor in the base, and the spatial Jacobian's columns, at joint positions `q` [rad, or m].
+    ///
+    /// # Panics
+    /// If `q` or `columns` has not one entry a joint.
+    pub fn forward(&self, q: &[f64], columns: &mut [Twist]) -> Pose {
+        assert_eq!((q.len(), columns.len()), (self.links.len(), self.links.len()), "one entry a joint");
+        let mut turn: Columns = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+        let mut place = [0.0; 3];
+        for ((link, q), column) in self.links.iter().zip(q).zip(columns) {
+            place = plus(place, times(&turn, link.offset));
+            if let Some(fixed) = &link.turn {
+                turn = [times(&turn, fixed[0]), times(&turn, fixed[1]), times(&turn, fixed[2])];
+            }
+            let axis = scaled(turn[link.axis as usize], link.sign);
+            match link.motion {
+                Motion::Revolute => {
+                    let v = cross(place, axis);
+                    column.0 = [v[0], v[1], v[2], axis[0], axis[1], axis[2]].into();
+                    let (sin, cos) = libm::sincos(*q);
+                    turn = turned(turn, link.axis, link.sign * sin, cos);
+                }
+                Motion::Prismatic => {
+                    column.0 = [axis[0], axis[1], axis[2], 0.0, 0.0, 0.0].into();
+                    place = plus(place, scaled(axis, *q));
+                }
+            }
+        }
+        let rotation = Rotation3::from_matrix_unchecked(Matrix3::from(turn));
+        Pose(IsometryMatrix3::from_parts(Translation3::from(place), rotation) * self.tip)
+    }
+}
+
+/// The axis of the frame that `axis` lies on, its sign and the identity; or z and a turn that takes z to `axis`.
+fn own_axis(axis: &Vector3<f64>) -> (Axis, f64, Rotation3<f64>) {
+    let own = match [axis.x != 0.0, axis.y != 0.0, axis.z != 0.0] {
+        [true, false, false] => Some((Axis::X, axis.x)),
+        [false, true, false] => Some((Axis::Y, axis.y)),
+        [false, false, true] => Some((Axis::Z, axis.z)),
+        _ => None,
+    };
+    if let Some((own, along)) = own {
+        return (own, along.signum(), Rotation3::identity());
+    }
+    // The unit vector furthest from the axis gives the best conditioned right angle.
+    let away = if axis.x.abs() <= axis.y.abs().min(axis.z.abs()) {
+        Vector3::x()
+    } else if axis.y.abs() <= axis.z.abs() {
+        Vector3::y()
+    } else {
+        Vector3::z()
+    };
+    let y = axis.cross(&away).normalize();
+    let basis = Matrix3::from_columns(&[y.cross(axis), y, *axis]);
+    (Axis::Z, 1.0, Rotation3::from_matrix_unchecked(basis))
+}
+
+#[inline]
+fn plus(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+    [a[0] + b[0], a[1] + b[1], a[2] + b[2]]
+}
+
+#[inline]
+fn scaled(a: [f64; 3], by: f64) -> [f64; 3] {
+    [a[0] * by, a[1] * by, a[2] * by]
+}
+
+#[inline]
+fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+}
+
+#[inline]
+fn times(m: &Columns, v: [f64; 3]) -> [f64; 3] {
+    let mut out = [0.0; 3];
+    for i in 0..3 {
+        out[i] = m[0][i] * v[0] + m[1][i] * v[1] + m[2][i] * v[2];
+    }
+    out
+}
+
+/// `m` followed by a turn about one of its own axes.
+#[inline]
+fn turned([x, y, z]: Columns, axis: Axis, sin: f64, cos: f64) -> Columns {
+    let mix = |a: [f64; 3], b: [f64; 3]| (plus(scaled(a, cos), scaled(b, sin)), plus(scaled(b, cos), scaled(a, -sin)));
+    match axis {
+        Axis::X => {
+            let (y, z) = mix(y, z);
+            [x, y, z]
+        }
+        Axis::Y => {
+            let (z, x) = mix(z, x);
+            [x, y, z]
+        }
+        Axis::Z => {
+            let (x, y) = mix(x, y);
+            [x, y, z]
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::{Matrix4, Unit};
+    use proptest::prelude::*;
+
+    use super::*;
+
+    fn segment(xyz: [f64; 3], rpy: [f64; 3], axis: [f64; 3], motion: Motion) -> Segment {
+        let fixed = super::super::mount::pose_of(xyz, rpy);
+        Segment { fixed, axis: Vector3::from(axis).normalize(), motion, joint: Joint::default() }
+    }
+
+    /// T(q) by textbook products of nalgebra's transforms.
+    fn product(segments: &[Segment], tip: &IsometryMatrix3<f64>, q: &[f64]) -> IsometryMatrix3<f64> {
+        let mut pose = IsometryMatrix3::identity();
+        for (segment, q) in segments.iter().zip(q) {
+            let moved = match segment.motion {
+                Motion::Revolute => {
+                    let turn = Rotation3::from_axis_angle(&Unit::new_unchecked(segment.axis), *q);
+                    IsometryMatrix3::from_parts(Translation3::identity(), turn)
+                }
+                Motion::Prismatic => {
+                    IsometryMatrix3::from_parts(Translation3::from(segment.axis * *q), Rotation3::identity())
+                }
+            };
+            pose = pose * segment.fixed * moved;
+        }
+        pose * tip
+    }
+
+    /// The spatial twist of (dT/dq_i) T^-1, by central differences.
+    fn difference(chain: &Chain, q: &[f64], i: usize) -> Twist {
+        const STEP: f64 = 1e-6;
+        let mut columns = vec![Twist::default(); q.len()];
+        let mut at = |by: f64| {
+            let mut q = q.to_vec();
+            q[i] += by;
+            chain.forward(&q, &mut columns).0.to_homogeneous()
+        };
+        let rate: Matrix4<f64> = (at(STEP) - at(-STEP)) / (2.0 * STEP);
+        let twist = rate * at(0.0).try_inverse().unwrap();
+        let linear = Vector3::new(twist[(0, 3)], twist[(1, 3)], twist[(2, 3)]);
+        Twist::new(linear, Vector3::new(twist[(2, 1)], twist[(0, 2)], twist[(1, 0)]))
+    }
+
+    fn any_segment() -> impl Strategy<Value = Segment> {
+        let three = || prop::array::uniform3(-1.0..1.0f64);
+        let axes = vec![[1.0, 0.0, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, 0.0, -3.0]];
+        let skew = three().prop_filter("an axis", |axis| Vector3::from(*axis).norm() > 0.1);
+        let turn = prop_oneof![Just([0.0; 3]), three()];
+        let motion = prop_oneof![3 => Just(Motion::Revolute), 1 => Just(Motion::Prismatic)];
+        (three(), turn, prop_oneof![prop::sample::select(axes), skew], motion)
+            .prop_map(|(xyz, rpy, axis, motion)| segment(xyz, rpy, axis, motion))
+    }
+
+    proptest! {
+        #[test]
+        fn any_chain_agrees_with_the_textbook(
+            segments in prop::collection::vec(any_segment(), 1..9),
+            q in prop::array::uniform8(-3.0..3.0f64),
+            tip in prop::array::uniform6(-1.0..1.0f64),
+        ) {
+            let q = &q[..segments.len()];
+            let tip = super::super::mount::pose_of([tip[0], tip[1], tip[2]], [tip[3], tip[4], tip[5]]);
+            let chain = Chain::new(segments.clone(), tip);
+            let mut columns = vec![Twist::default(); q.len()];
+            let pose = chain.forward(q, &mut columns).0.to_homogeneous();
+            prop_assert!((pose - product(&segments, &tip, q).to_homogeneous()).norm() < 1e-12);
+            for (i, column) in columns.iter().enumerate() {
+                prop_assert!((column.0 - difference(&chain, q, i).0).norm() < 1e-7, "column {}", i);
+            }
+        }
+    }
+
+    #[test]
+    fn a_skew_axis_is_the_z_of_its_basis() {
+        for axis in [[1.0, 2.0, 3.0], [3.0, -1.0, 2.0], [1e-9, 1.0, 0.0], [-1.0, -1.0, -1.0]] {
+            let axis = Vector3::from(axis).normalize();
+            let (own, sign, basis) = own_axis(&axis);
+            assert_eq!((own, sign), (Axis::Z, 1.0));
+            assert!((basis * Vector3::z() - axis).norm() < 1e-15);
+            assert!((basis.matrix().determinant() - 1.0).abs() < 1e-14);
+        }
+    }
+
+    #[test]
+    #[should_panic(expected = "one entry a joint")]
+    fn too_few_positions_are_our_bug() {
+        let chain =
+            Chain::new(vec![segment([0.0; 3], [0.0; 3], [1.0, 0.0, 0.0], Motion::Revolute)], Default::default());
+        chain.forward(&[], &mut [Twist::default()]);
+    }
+}

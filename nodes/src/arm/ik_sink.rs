@@ -1,0 +1,187 @@
+//! `ik_sink`: joint velocities for a twist of the sensor (paper section IV), within the arm's limits, or none.
+//!
+//! 1. Twist and Jacobian are moved from the base's origin to the sensor's, along its axes (Ad of the inverse pose,
+//!    eq. 4): damping is not frame-invariant, so it is done where metres and radians mean what the task means.
+//! 2. [`damped::solve`]: a damped inverse that damps only what is near-singular.
+//! 3. [`null_space::project`]: motion toward a posture that leaves the sensor exactly still, if one is given.
+//! 4. [`joint_limits`]: speed and position limits that keep the direction; the posture gets what the task leaves.
+//!
+//! A twist that is absent, or a twist or an arm that is older than `max_age_ms`, lets the last command fade linearly to
+//! zero; the first fresh one takes over by itself. Invariant: no velocity is ever held without a fresh sample behind it.
+
+use tactflow_runtime::node::{Mistake, Mistakes, Node, NonNegative, Positive, Setup, Tick};
+use tactflow_runtime::signal::{Joint, JointsShape, Pose, Twist, Unit};
+use tactflow_runtime::{inputs, outputs, params, state};
+
+use super::{damped, joint_limits, null_space};
+
+params! {
+    /// Singular values below this are damped [1, and m].
+    damping: Positive = Positive(0.05),
+    /// Posture that the arm drifts to where the sensor's motion leaves it free, one entry a joint [rad].
+    posture: Option<Vec<f64>>,
+    /// How fast it drifts there [1/s].
+    posture_gain: NonNegative = NonNegative(0.5),
+    /// Greatest speed toward a position limit, per distance to it [1/s].
+    limit_gain: Positive = Positive(5.0),
+    /// Greatest age of the twist and of the arm's state [ms]; five periods of the graph unless given.
+    max_age_ms: Option<Positive>,
+    /// Time in which a command fades to zero when nothing fresh comes [ms].
+    ramp_ms: Positive = Positive(100.0),
+}
+
+inputs! {
+    /// Spatial twist of the sensor in the base [m/s, rad/s].
+    twist: Trigger<Twist["B"]>,
+    /// Pose of the sensor in the base.
+    sensor_pose: Pose["S", "B"],
+    /// Spatial Jacobian of the sensor in the base [m/s, rad/s per rad/s].
+    jacobian: Jacobian["B", "R"],
+    /// Joint positions with their limits [rad; m for a prismatic joint].
+    joints: Joints["rad", "R"],
+}
+
+outputs! {
+    /// Joint velocities [rad/s; m/s for a prismatic joint].
+    velocity: Joints["rad/s", "R"],
+}
+
+state! {
+    /// The last command that was fresh [rad/s].
+    last: Vec<f64>,
+    /// How much of it is left, 1 to 0.
+    left: f64,
+    /// The Jacobian's columns at the sensor.
+    columns: Vec<[f64; 6]>,
+    /// Room to work in for the null space.
+    rows: Vec<null_space::Row>,
+    /// Motion toward the posture [rad/s].
+    drift: Vec<f64>,
+}
+
+/// The sink's settings and the arm's limits.
+pub struct IkSink {
+    joints: Vec<Joint>,
+    damping: f64,
+    posture: Option<Vec<f64>>,
+    posture_gain: f64,
+    limit_gain: f64,
+    max_age: i64,
+    ramp: f64,
+}
+
+impl Node for IkSink {
+    type Params = Params;
+    type Inputs<'a> = Inputs<'a>;
+    type Outputs = Outputs;
+    type State = State;
+
+    const NAME: &'static str = "ik_sink";
+    const SUMMARY: &'static str = "joint velocities for a twist, within the arm's limits";
+    const EVERY_TICK: bool = true;
+
+    fn new(params: Params, setup: &mut Setup<Self>) -> Result<Self, Mistakes> {
+        let shape = &setup.inputs.joints;
+        let mistakes = check(&params, shape, &setup.inputs.jacobian.0, setup.period);
+        if !mistakes.is_empty() {
+            return Err(mistakes);
+        }
+        setup.outputs.velocity = shape.in_unit(Unit::RADIAN.per_second());
+        let max_age = params.max_age_ms.map_or(5.0 * setup.period, |age| *age * 1e-3);
+        Ok(Self {
+            joints: shape.joints.clone(),
+            damping: *params.damping,
+            posture: params.posture,
+            posture_gain: *params.posture_gain,
+            limit_gain: *params.limit_gain,
+            max_age: (max_age * 1e9) as i64,
+            ramp: *params.ramp_ms * 1e-3,
+        })
+    }
+
+    fn state(&self) -> State {
+        let count = self.joints.len();
+        State {
+            last: vec![0.0; count],
+            left: 0.0,
+            columns: vec![[0.0; 6]; count],
+            rows: vec![[0.0; 8]; count],
+            drift: vec![0.0; count],
+        }
+    }
+
+    fn step(&self, tick: &Tick, inputs: Inputs<'_>, out: &mut Outputs, state: &mut State) {
+        let velocity = &mut out.velocity.write().0;
+        let q = &inputs.joints.0;
+        let is_arm_fresh = inputs.joints.stamp().oldest(inputs.jacobian.stamp()).age(tick.now) <= self.max_age;
+        let twist = inputs.twist.filter(|twist| is_arm_fresh && twist.stamp().age(tick.now) <= self.max_age);
+        let Some(twist) = twist else {
+            state.left = (state.left - tick.dt / self.ramp).max(0.0);
+            for (velocity, last) in velocity.iter_mut().zip(&state.last) {
+                *velocity = last * state.left;
+            }
+            joint_limits::limit(&self.joints, q, self.limit_gain, velocity);
+            return;
+        };
+        let pose = &inputs.sensor_pose;
+        for (column, of_base) in state.columns.iter_mut().zip(&inputs.jacobian.0) {
+            *column = at_sensor(pose, of_base);
+        }
+        damped::solve(&state.columns, &at_sensor(pose, &twist), self.damping, velocity);
+        joint_limits::limit(&self.joints, q, self.limit_gain, velocity);
+        if let Some(posture) = &self.posture {
+            for ((drift, posture), q) in state.drift.iter_mut().zip(posture).zip(q) {
+                *drift = self.posture_gain * (posture - q);
+            }
+            null_space::project(&state.columns, &mut state.rows, &mut state.drift);
+            joint_limits::add_within(&self.joints, q, self.limit_gain, velocity, &state.drift);
+        }
+        state.last.copy_from_slice(velocity);
+        state.left = 1.0;
+    }
+}
+
+/// A spatial twist in the base as the twist of the sensor's origin along the sensor's axes: Ad(T^-1).
+#[inline]
+fn at_sensor(Pose(pose): &Pose, twist: &Twist) -> [f64; 6] {
+    let (p, r) = (&pose.translation.vector, pose.rotation.matrix());
+    let [vx, vy, vz, wx, wy, wz] = twist.0.into();
+    let v = [vx + wy * p.z - wz * p.y, vy + wz * p.x - wx * p.z, vz + wx * p.y - wy * p.x];
+    let w = [wx, wy, wz];
+    let turned = |a: [f64; 3], i: usize| r[(0, i)] * a[0] + r[(1, i)] * a[1] + r[(2, i)] * a[2];
+    [turned(v, 0), turned(v, 1), turned(v, 2), turned(w, 0), turned(w, 1), turned(w, 2)]
+}
+
+fn check(params: &Params, joints: &JointsShape, columns: &JointsShape, period: f64) -> Mistakes {
+    let mut mistakes = Mistakes::new();
+    let names = |shape: &JointsShape| shape.joints.iter().map(|joint| joint.name.clone()).collect::<Vec<_>>();
+    if names(joints) != names(columns) {
+        let message = format!("the Jacobian is of {:?}, but the joints are {:?}", names(columns), names(joints));
+        mistakes.push(Mistake::input("jacobian", message).help("take both from one `arm_state`"));
+    }
+    if *params.damping < damped::LEAST {
+        let message = format!("`damping` of less than {} drowns in rounding", damped::LEAST);
+        mistakes.push(Mistake::param("damping", message));
+    }
+    if *params.limit_gain * period > 0.5 {
+        let message = format!("a joint would cross its limit: `limit_gain` is more than {} 1/s", 0.5 / period);
+        mistakes.push(Mistake::param("limit_gain", message).help("half the rate of the graph is the most"));
+    }
+    let Some(posture) = &params.posture else { return mistakes };
+    let count = joints.joints.len();
+    if posture.len() != count {
+        let message = format!("`posture` has {} entries, but the arm has {count} joints", posture.len());
+        mistakes.push(Mistake::param("posture", message));
+    }
+    for (joint, entry) in joints.joints.iter().zip(posture) {
+        if !(joint.lower..=joint.upper).contains(entry) {
+            let Joint { name, lower, upper, .. } = joint;
+            let message = format!("joint `{name}` cannot be at {entry}: it goes from {lower:.4} to {upper:.4}");
+            mistakes.push(Mistake::param("posture", message));
+        }
+    }
+    mistakes
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,121 @@
+//! The exact null space of a 6xn Jacobian, n > 6: the joint motion that leaves the sensor still.
+//!
+//! J^T = Q R by Householder reflections, so the last n - 6 columns of Q span directions with J Q_2 = 0, whatever the
+//! rank of J. The projector Q_2 Q_2^T is applied as reflections and never formed. A damped projector would leak
+//! posture into the task; this one does not, to rounding.
+
+/// Room for the work on one joint: the six entries of its row of J^T, its motion, and what makes it a whole number of
+/// vector lanes.
+pub type Row = [f64; 8];
+
+/// Takes out of `motion` whatever moves the sensor. `rows` is room to work in, an entry a joint.
+///
+/// With 6 joints or fewer nothing is left.
+pub fn project(columns: &[[f64; 6]], rows: &mut [Row], motion: &mut [f64]) {
+    if columns.len() <= 6 {
+        motion.fill(0.0);
+        return;
+    }
+    for ((row, [a, b, c, d, e, f]), motion) in rows.iter_mut().zip(columns).zip(&*motion) {
+        *row = [*a, *b, *c, *d, *e, *f, *motion, 0.0];
+    }
+    let scales: [f64; 6] = std::array::from_fn(|k| eliminate(&mut rows[k..], k));
+    motion[..6].fill(0.0);
+    for (motion, row) in motion.iter_mut().zip(&*rows).skip(6) {
+        *motion = row[6];
+    }
+    for k in (0..6).rev() {
+        reflect(&rows[k..], k, scales[k], &mut motion[k..]);
+    }
+}
+
+/// Step `k` of the factorisation, on the rows from `k` on: reflects all columns after column `k`, leaves the reflector
+/// v in column `k` and gives its scale 2/(v^T v).
+#[inline]
+fn eliminate(rows: &mut [Row], k: usize) -> f64 {
+    let mut along = [0.0; 8];
+    for row in &*rows {
+        for j in 0..8 {
+            along[j] += row[k] * row[j];
+        }
+    }
+    // v is the column with its norm added to the first entry, so v^T v = 2 norm (norm + |first|).
+    let norm = along[k].sqrt();
+    if norm == 0.0 {
+        return 0.0;
+    }
+    let first = rows[0];
+    let added = if first[k] < 0.0 { -norm } else { norm };
+    let scale = 1.0 / (norm * (norm + first[k].abs()));
+    for j in 0..8 {
+        along[j] = scale * (along[j] + added * first[j]);
+    }
+    // The columns before hold their reflectors.
+    along[..k].fill(0.0);
+    rows[0][k] += added;
+    for row in rows {
+        let by = row[k];
+        for j in 0..8 {
+            row[j] -= by * along[j];
+        }
+        row[k] = by;
+    }
+    scale
+}
+
+/// Reflects `motion` by the reflector in column `k`.
+#[inline]
+fn reflect(rows: &[Row], k: usize, scale: f64, motion: &mut [f64]) {
+    let along: f64 = rows.iter().zip(&*motion).map(|(row, x)| row[k] * x).sum();
+    for (row, x) in rows.iter().zip(motion) {
+        *x -= scale * along * row[k];
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::{DMatrix, DVector};
+    use proptest::prelude::*;
+
+    use super::*;
+
+    fn projected(columns: &[[f64; 6]], motion: &[f64]) -> DVector<f64> {
+        let mut out = motion.to_vec();
+        project(columns, &mut vec![[0.0; 8]; columns.len()], &mut out);
+        DVector::from_vec(out)
+    }
+
+    proptest! {
+        #[test]
+        fn it_leaves_the_sensor_still_and_is_the_projector(
+            columns in prop::collection::vec(prop::array::uniform6(-1.0..1.0f64), 7..10),
+            motion in prop::array::uniform9(-1.0..1.0f64),
+            is_singular in any::<bool>(),
+        ) {
+            let mut columns = columns;
+            if is_singular {
+                for column in &mut columns {
+                    column[5] = column[0] - column[1];
+                }
+            }
+            let motion = &motion[..columns.len()];
+            let jacobian = DMatrix::from_fn(6, columns.len(), |i, j| columns[j][i]);
+            let once = projected(&columns, motion);
+            prop_assert!((&jacobian * &once).norm() < 1e-13 * columns.len() as f64);
+            prop_assert!((projected(&columns, once.as_slice()) - &once).norm() < 1e-13);
+            if !is_singular {
+                let wanted = DVector::from_column_slice(motion);
+                let gone = jacobian.clone().pseudo_inverse(1e-12).unwrap() * (&jacobian * &wanted);
+                let sigma = jacobian.singular_values().min();
+                prop_assert!((once - (wanted - gone)).norm() < 1e-12 / sigma.min(1.0));
+            }
+        }
+    }
+
+    #[test]
+    fn a_jacobian_of_zeros_and_an_arm_without_a_null_space() {
+        let still = projected(&[[0.0; 6]; 8], &[1.0; 8]);
+        assert_eq!(still.as_slice(), [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 1.0]);
+        assert_eq!(projected(&[[0.5; 6]; 6], &[1.0; 6]), DVector::zeros(6));
+    }
+}

@@ -1,0 +1,187 @@
+//! `mock_pad`: a pad that is pressed as its bench says, and that misbehaves as its bench says.
+//!
+//! A press is a smooth bump of force, (1 - d²/r²)² at distance d from a point or from a bar. Its samples at the tactels
+//! are scaled so that they sum to the press's force over an endless array: exact while it is on the pad, and falling
+//! smoothly to zero as it slides off. No foam, no noise, no hysteresis.
+
+mod glitch;
+mod press;
+
+use tactflow_runtime::device::{Commands, Description, Device, DeviceError, Driver, Filled, Opened, Samples, Stepped};
+use tactflow_runtime::node::{Count, Mistake, Mistakes, NonNegative, Positive};
+use tactflow_runtime::params;
+use tactflow_runtime::signal::{Image, ImageShape, Unit};
+
+use super::period_of;
+
+pub use glitch::{Glitch, Trouble};
+pub use press::Press;
+
+params! {
+    /// Number of rows.
+    rows: Count = Count(16),
+    /// Number of columns.
+    cols: Count = Count(16),
+    /// Distance between the centres of two neighbours, along x and along y [m].
+    pitch: Positive = Positive(0.005),
+    /// Unit of a tactel's value.
+    unit: String = "N".into(),
+    /// Frames per second [1/s].
+    rate_hz: Positive = Positive(250.0),
+    /// How long there are frames [s]; for ever unless given.
+    for_s: Option<Positive>,
+    /// What presses on it.
+    press: Vec<Press> = vec![],
+    /// When it misbehaves, and how.
+    glitch: Vec<Glitch> = vec![],
+    /// What it states as its noise threshold [unit of a tactel].
+    threshold: NonNegative = NonNegative(0.015),
+}
+
+/// The most tactels that a pad has.
+const MOST: usize = 1 << 22;
+
+/// The script and how far it has got.
+#[derive(Debug)]
+pub struct MockPad {
+    shape: ImageShape,
+    presses: Vec<Press>,
+    glitches: Vec<Glitch>,
+    period: i64,
+    frames: i64,
+    next: i64,
+    served: Option<i64>,
+}
+
+/// A frame that is due.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+struct Due {
+    /// Frame whose values it has.
+    frame: i64,
+    stamp: i64,
+    sequence: u64,
+    is_nan: bool,
+}
+
+impl Device for MockPad {
+    type Params = Params;
+
+    const NAME: &'static str = "mock_pad";
+    const SUMMARY: &'static str = "a pad that is pressed, and misbehaves, as its bench says";
+
+    fn open(params: Params) -> Result<Opened, Mistakes> {
+        let mut mistakes = Mistakes::new();
+        let unit = params.unit.parse::<Unit>().unwrap_or_else(|message| {
+            mistakes.push(Mistake::param("unit", message));
+            Unit::ONE
+        });
+        if params.rows.0 * params.cols.0 > MOST {
+            let message = format!("{} by {} tactels are more than {MOST}", params.rows.0, params.cols.0);
+            mistakes.push(Mistake::param("rows", message));
+        }
+        let wrong = params.press.iter().filter_map(|press| press.mistake(*params.pitch));
+        mistakes.extend(wrong.map(|message| Mistake::param("press", message)));
+        let period = period_of(params.rate_hz).map_err(|more| mistakes.extend(more)).unwrap_or(1);
+        if !mistakes.is_empty() {
+            return Err(mistakes);
+        }
+        let shape = ImageShape { rows: params.rows.0, cols: params.cols.0, pitch: [*params.pitch; 2], unit };
+        let facts = vec![("dead".into(), toml::Value::Array(vec![])), ("threshold".into(), (*params.threshold).into())];
+        let outputs = vec![shape.clone().into()];
+        let filled = Filled { role: "tactile_pad".into(), outputs, commands: vec![], facts };
+        let description = Description { fills: vec![filled], period: period as f64 * 1e-9 };
+        let pad = Self::new(shape, period, params);
+        Ok(Opened { description, driver: Driver::Stepped(Box::new(pad)) })
+    }
+}
+
+impl MockPad {
+    fn new(shape: ImageShape, period: i64, params: Params) -> Self {
+        let end = params.for_s.map_or(i64::MAX, |end| nanos(*end));
+        let frames = end / period + i64::from(end % period != 0);
+        let mut pad =
+            Self { shape, presses: params.press, glitches: params.glitch, period, frames, next: 0, served: None };
+        pad.next = pad.after_silence(0);
+        pad
+    }
+
+    fn glitch(&self, frame: i64) -> Option<&Glitch> {
+        let time = frame.saturating_mul(self.period);
+        self.glitches.iter().find(|glitch| glitch.holds_at(time))
+    }
+
+    fn silence(&self, frame: i64) -> Option<&Glitch> {
+        self.glitch(frame).filter(|glitch| glitch.kind == Trouble::Silence)
+    }
+
+    /// The first frame from `frame` on that is not in a silence.
+    fn after_silence(&self, mut frame: i64) -> i64 {
+        while let Some(silence) = self.silence(frame).filter(|_| frame < self.frames) {
+            let end = silence.end();
+            frame = (end / self.period + i64::from(end % self.period != 0)).max(frame + 1);
+        }
+        frame
+    }
+
+    /// The newest frame up to `now` that was not served yet, if there is one; what comes before it is skipped.
+    fn due(&mut self, now: i64) -> Option<Due> {
+        if now < 0 {
+            return None;
+        }
+        let mut frame = (now / self.period).min(self.frames - 1);
+        while let Some(silence) = self.silence(frame).filter(|_| frame >= self.next) {
+            frame = ((silence.start() - 1).div_euclid(self.period)).min(frame - 1);
+        }
+        if frame < self.next {
+            return None;
+        }
+        self.next = self.after_silence(frame + 1);
+        let time = frame * self.period;
+        let plain = |frame: i64| Due { frame, stamp: frame * self.period, sequence: frame as u64 + 1, is_nan: false };
+        match self.glitch(frame).map(|glitch| (glitch.kind, glitch.start())) {
+            // What was served last comes once more; before anything was, there is nothing to repeat.
+            Some((Trouble::Repeat, _)) => self.served.map(plain),
+            Some((Trouble::Nan, _)) => Some(Due { is_nan: true, ..plain(frame) }),
+            // The clock runs back from the glitch's start, so that every stamp lies before the last good one.
+            Some((Trouble::Back, start)) => {
+                Some(Due { stamp: start - (time - start) - 2 * self.period, ..plain(frame) })
+            }
+            Some((Trouble::Silence, _)) | None => {
+                self.served = Some(frame);
+                Some(plain(frame))
+            }
+        }
+    }
+
+    fn render(&self, due: Due, cells: &mut [f32]) {
+        cells.fill(0.0);
+        let seconds = (due.frame * self.period) as f64 * 1e-9;
+        for press in &self.presses {
+            press.add(&self.shape, seconds, cells);
+        }
+        if due.is_nan {
+            cells[cells.len() / 2] = f32::NAN;
+        }
+    }
+}
+
+impl Stepped for MockPad {
+    fn next(&self) -> Option<i64> {
+        (self.next < self.frames).then(|| self.next.saturating_mul(self.period))
+    }
+
+    fn exchange(&mut self, now: i64, _: &Commands, samples: &mut Samples) -> Result<(), DeviceError> {
+        if let Some(due) = self.due(now) {
+            self.render(due, samples.write::<Image>(0, due.stamp, due.sequence).cells_mut());
+        }
+        Ok(())
+    }
+}
+
+/// Seconds as nanoseconds; what does not fit is for ever.
+fn nanos(seconds: f64) -> i64 {
+    (seconds * 1e9).round() as i64
+}
+
+#[cfg(test)]
+mod tests;

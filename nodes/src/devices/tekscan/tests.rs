@@ -1,0 +1,236 @@
+use tactflow_runtime::signal::{Shape, Unit};
+
+use super::*;
+use crate::devices::testing::{Bench, open};
+
+const PATH: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../graphs/recordings/pressuRe/iscan_test.csv");
+const FINGER: &str = include_str!("../../../../graphs/recordings/pressuRe/iscan_test.csv");
+
+/// Two frames of 2 by 3 cells, the corner without a sensel.
+const SMALL: &str = "\
+DATA_TYPE MOVIE
+ROWS 2
+COLS 3
+ROW_SPACING 0.5 inches
+COL_SPACING 4 millimeters
+NOISE_THRESHOLD 3
+SECONDS_PER_FRAME 0.1
+START_FRAME 1
+END_FRAME 2
+UNITS raw
+ASCII_DATA @@
+
+Frame 1, 0,, 12/2/2019 6:21:52.34PM,,,Raw Sum=,,15
+B,1,2
+3,4,5
+
+Frame 2, 0.1,, 12/2/2019 6:21:52.44PM,,,Raw Sum=,,7
+B,0,0
+0,0,7
+@@
+";
+
+fn line_of(text: &str, at: usize) -> usize {
+    text[..at].matches('\n').count() + 1
+}
+
+fn flaws(bytes: &[u8]) -> Vec<(usize, String)> {
+    match read(bytes) {
+        Ok(_) => vec![],
+        Err(Refusal::Stranger) => vec![(0, "stranger".into())],
+        Err(Refusal::Damaged { text, flaws }) => {
+            flaws.into_iter().map(|flaw| (line_of(&text, flaw.span.start), flaw.message)).collect()
+        }
+    }
+}
+
+#[test]
+fn the_whole_recording_agrees_with_its_own_sums() {
+    let movie = parse(FINGER).unwrap();
+    let sums: Vec<f64> =
+        FINGER.lines().filter_map(|line| line.split("Raw Sum=,,").nth(1)?.trim().parse().ok()).collect();
+    assert_eq!((movie.frames.len(), sums.len()), (309, 309));
+    for (cells, sum) in movie.cells.chunks(28 * 28).zip(&sums) {
+        assert_eq!(cells.iter().map(|cell| f64::from(*cell)).sum::<f64>(), *sum);
+    }
+    assert!((movie.shape.pitch[0] - 0.00127).abs() < 1e-15 && (movie.shape.pitch[1] - 0.00127).abs() < 1e-15);
+    assert_eq!((movie.threshold, movie.period, movie.shape.unit), (Some(3.0), 0.1, Unit::RAW));
+    // Two rows and columns of the map at each border have no sensel, and two of each in its middle.
+    assert_eq!(movie.dead.len(), 28 * 28 - 22 * 22);
+    let one_more = FINGER.replacen("B,B,5,0,0", "B,B,6,0,0", 1);
+    assert_eq!(flaws(one_more.as_bytes()), [(28, "`Raw Sum` says 310, but the cells of frame 1 sum to 311".into())]);
+}
+
+#[test]
+fn a_small_movie_in_any_dress() {
+    let movie = parse(SMALL).unwrap();
+    assert_eq!(movie.cells, [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 0.0, 0.0, 0.0, 0.0, 0.0, 7.0]);
+    assert_eq!(movie.frames, [Frame { number: 1, time: 0 }, Frame { number: 2, time: 100_000_000 }]);
+    assert_eq!((movie.dead.as_slice(), movie.shape.rows, movie.shape.cols), ([0].as_slice(), 2, 3));
+    assert_eq!(movie.shape.pitch, [0.004, 0.0127], "x runs along the columns");
+    let same = [
+        SMALL.replace('\n', "\r\n"),
+        format!("\u{feff}{SMALL}"),
+        format!("{}\n\n", SMALL.trim_end()),
+        SMALL.trim_end().into(),
+        SMALL.replace("1,2\n", " 1 , 2 \n"),
+        SMALL.replace("START_FRAME 1\nEND_FRAME 2\n", ""),
+        SMALL.replace("SECONDS_PER_FRAME 0.1\n", ""),
+    ];
+    for text in same {
+        assert_eq!(read(text.as_bytes()).ok().as_ref(), Some(&movie), "{text}");
+    }
+    let bare =
+        parse(&SMALL.replace("NOISE_THRESHOLD 3\n", "").replace("UNITS raw", "UNITS kPa").replace("=,,15", "=,,9"));
+    let bare = bare.expect("the sum is of raw values and says nothing of others");
+    assert_eq!((bare.threshold, bare.shape.unit.to_string().as_str()), (None, "kPa"));
+}
+
+#[test]
+fn damaged_files_say_what_and_where() {
+    let huge = "9".repeat(30);
+    let cases: &[(&str, &str, usize, &str)] = &[
+        ("ROWS 2\n", "", 10, "the header has no `ROWS`"),
+        ("UNITS raw\n", "", 10, "the header has no `UNITS`"),
+        ("COL_SPACING 4 millimeters\n", "", 10, "the header has no `COL_SPACING`"),
+        ("MOVIE", "FRAME", 1, "the file is a `FRAME`, not a `MOVIE`"),
+        ("ROWS 2", "ROWS two", 2, "`ROWS` is not a whole number: `two`"),
+        ("ROWS 2", "ROWS 0", 2, "`ROWS` is at least 1"),
+        ("ROWS 2", "ROWS -2", 2, "`ROWS` is not a whole number: `-2`"),
+        ("ROWS 2", "ROWS 4000000000", 2, "a frame of 4000000000 by 3 cells is more than the file holds"),
+        (
+            "COLS 3",
+            "COLS 18446744073709551615",
+            2,
+            "a frame of 2 by 18446744073709551615 cells is more than the file holds",
+        ),
+        ("COLS 3", &format!("COLS {huge}"), 3, &format!("`COLS` is not a whole number: `{huge}`")),
+        ("COLS 3", "COLS 3\nROWS 2", 4, "`ROWS` is given twice"),
+        ("0.5 inches", "0.5 feet", 4, "`ROW_SPACING` is in `centimeters`, `millimeters` or `inches`, not `feet`"),
+        ("4 millimeters", "0 millimeters", 5, "`COL_SPACING` is greater than 0"),
+        ("THRESHOLD 3", "THRESHOLD none", 6, "`NOISE_THRESHOLD` is not a number: `none`"),
+        ("FRAME 0.1", "FRAME -0.1", 7, "`SECONDS_PER_FRAME` is greater than 0"),
+        ("START_FRAME 1", "START_FRAME 5", 13, "the first frame is 1, but `START_FRAME` says otherwise"),
+        ("END_FRAME 2", "END_FRAME 3", 9, "`END_FRAME` promises 3 frames, but the last is frame 2"),
+        ("UNITS raw", "UNITS PSI", 10, "the unit `PSI` is not known here; `raw`, `kPa` and `N` are"),
+        ("ASCII_DATA @@\n", "", 12, "the header has no `ASCII_DATA @@` at its end"),
+        ("Frame 1,", "Frame one,", 13, "the frame's number is not a whole number: `one`"),
+        (" 0.1,,", " ,,", 17, "the frame's time is not a number: ``"),
+        (" 0.1,,", " 1e30,,", 17, "the frame's time is no number of seconds from 0 to 1e9: `1e30`"),
+        ("1, 0,,", "1, 0.2,,", 17, "the time goes back"),
+        ("Frame 2,", "Frame 3,", 17, "frame 3 comes after frame 1"),
+        ("=,,15", "=,,", 13, "`Raw Sum=` has no number: the line is cut off"),
+        ("=,,15", "=,,16", 13, "`Raw Sum` says 16, but the cells of frame 1 sum to 15"),
+        ("3,4,5", "3,4.,x", 15, "this cell is not a number: `x`"),
+        ("3,4,5", "3,NaN,5", 15, "this cell is not finite: `NaN`"),
+        ("3,4,5", "3,-inf,5", 15, "this cell is not finite: `-inf`"),
+        ("3,4,5", "3,1e39,5", 15, "this cell is too large: `1e39`"),
+        ("3,4,5", "3,4", 15, "row 2 of frame 1 has 2 cells, but `COLS` promises 3"),
+        ("3,4,5", "3,4,5,6", 15, "row 2 of frame 1 has 4 cells, but `COLS` promises 3"),
+        ("3,4,5\n", "", 15, "frame 1 ends after 1 of its 2 rows"),
+        ("3,4,5\n\n", "", 15, "frame 1 ends after 1 of its 2 rows"),
+        ("0,0,7\n", "", 19, "frame 2 ends after 1 of its 2 rows"),
+        (
+            "0,0,7\n@@\n",
+            "0,0",
+            19,
+            "row 2 of frame 2 has 2 cells, but `COLS` promises 3: the file ends in the middle of it",
+        ),
+        ("0,0,7\n@@\n", "", 18, "frame 2 ends after 1 of its 2 rows"),
+        ("0,0,7\n@@\n", "0,0,7\n", 19, "the file ends after frame 2 without `@@`: it is truncated"),
+        ("B,0,0", "0,0,0", 18, "there was no sensel here in the first frame"),
+        ("B,0,0", "B,B,0", 18, "there was a sensel here in the first frame"),
+        ("\nFrame 2", "\nhello\nFrame 2", 17, "expected a frame or `@@`, found `hello`"),
+        ("@@\n\nFrame 1", "@@\n@@\nFrame 1", 12, "the movie has no frame"),
+        ("7\n@@\n", "7\n@@\nmore", 21, "something comes after the movie's end, `@@`"),
+        ("DATA_TYPE", "FATA_TYPE", 0, "stranger"),
+    ];
+    for (from, to, line, message) in cases {
+        assert!(SMALL.contains(from), "{from}");
+        let got = flaws(SMALL.replacen(from, to, 1).as_bytes());
+        assert_eq!(got, [(*line, (*message).to_owned())], "{from} -> {to}");
+    }
+    assert_eq!(flaws(b""), [(0, "stranger".into())]);
+    assert_eq!(flaws(b"\x89PNG\r\n"), [(0, "stranger".into())]);
+    assert_eq!(flaws(b"DATA_TYPE MOVIE\nROWS \xff\xfe"), [(2, "this is not UTF-8 text".into())]);
+    let several = flaws(SMALL.replace("ROWS 2\n", "").replace("UNITS raw", "UNITS x").as_bytes());
+    assert_eq!(several.len(), 2, "every mistake of the header at once: {several:?}");
+}
+
+#[test]
+fn no_damage_makes_it_panic() {
+    let start = FINGER.find("\nFrame 4,").unwrap();
+    let movie = format!("{}@@\n", &FINGER[..start]).replace("END_FRAME 309", "END_FRAME 3");
+    assert_eq!(parse(&movie).unwrap().frames.len(), 3);
+    // The 64-bit splitmix generator (Steele et al. 2014), so that every run damages the same.
+    let mut seed = 2013u64;
+    let mut random = |below: usize| {
+        seed = seed.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mixed = (seed ^ (seed >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        let mixed = (mixed ^ (mixed >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        ((mixed ^ (mixed >> 31)) % below as u64) as usize
+    };
+    let mut refused = 0;
+    for round in 0..6000 {
+        let mut bytes = if round % 2 == 0 { SMALL.as_bytes().to_vec() } else { movie.as_bytes().to_vec() };
+        for _ in 0..=random(3) {
+            let (a, b) = (random(bytes.len()), random(bytes.len()));
+            match random(6) {
+                0 => bytes.truncate(a.max(1)),
+                1 => bytes.swap(a, b),
+                2 => bytes[a] ^= 1 << random(8),
+                3 => bytes[a] = random(256) as u8,
+                4 => drop(bytes.drain(a.min(b)..a.max(b).min(a.min(b) + 40))),
+                _ => bytes.insert(a, b"9-.,B\n\r@e"[random(9)]),
+            }
+            if bytes.is_empty() {
+                bytes.push(b'D');
+            }
+        }
+        match read(&bytes) {
+            Ok(movie) => assert_eq!(movie.cells.len(), movie.frames.len() * movie.shape.tactels()),
+            Err(Refusal::Stranger) => refused += 1,
+            Err(Refusal::Damaged { text, flaws }) => {
+                refused += 1;
+                assert!(!flaws.is_empty() && flaws.iter().all(|flaw| text.get(flaw.span.clone()).is_some()));
+            }
+        }
+    }
+    assert!(refused > 4000, "{refused} of 6000 were seen to be damaged");
+}
+
+#[test]
+fn frames_are_served_once_and_the_newest_wins() {
+    let mut bench = Bench::new(open::<TekscanMovie>(&format!("file = '{PATH}'")).unwrap());
+    let Shape::Image(shape) = &bench.fill().outputs[0] else { panic!("an image") };
+    assert_eq!((shape.rows, shape.cols), (28, 28));
+    assert_eq!(bench.fact("threshold"), Some(&3.0.into()));
+    assert_eq!(bench.fact("frames"), Some(&309.into()));
+    assert_eq!(bench.fact("dead").unwrap()[1], vec![0, 1].into());
+    let force = |bench: &mut Bench| {
+        let image: &mut Image = bench.samples.write(0, 0, 0);
+        let sum: f32 = image.cells().iter().sum();
+        image.cells_mut().fill(f32::NAN);
+        sum
+    };
+    assert_eq!(bench.device.next(), Some(0));
+    bench.exchange(0);
+    assert_eq!((force(&mut bench), bench.device.next()), (310.0, Some(100_000_000)));
+    bench.exchange(99_999_999);
+    assert!(force(&mut bench).is_nan(), "nothing is due");
+    bench.exchange(350_000_000);
+    assert_eq!((force(&mut bench), bench.device.next()), (309.0, Some(400_000_000)), "frame 4 and neither 2 nor 3");
+    bench.exchange(i64::MAX);
+    assert_eq!((force(&mut bench), bench.device.next()), (29.0, None));
+    bench.exchange(i64::MAX);
+    assert!(force(&mut bench).is_nan(), "the movie is over");
+}
+
+#[test]
+fn a_missing_file_and_another_file_are_mistakes_where_the_bench_names_them() {
+    for (path, message) in [("nowhere.csv", "cannot read"), (concat!(env!("CARGO_MANIFEST_DIR"), "/Cargo.toml"), "`")] {
+        let mistakes = open::<TekscanMovie>(&format!("file = '{path}'")).err().unwrap();
+        assert_eq!(mistakes[0].at, At::Span(7..9 + path.len()));
+        assert!(mistakes[0].message.starts_with(message), "{mistakes:?}");
+    }
+}
