@@ -14,5 +14,14 @@ use tactflow_runtime::catalogue::Catalogue;
 /// Everything there is: one line each.
 #[must_use]
 pub fn catalogue() -> Catalogue {
-    Catalogue::new().role(roles::tactile_pad()).role(roles::velocity_arm()).node::<servo::projector::Projector>()
+    Catalogue::new()
+        .role(roles::tactile_pad())
+        .role(roles::velocity_arm())
+        .node::<servo::feature_error::FeatureError>()
+        .node::<servo::pid::Pid>()
+        .node::<servo::inverse_jacobian::InverseJacobian>()
+        .node::<servo::projector::Projector>()
+        .node::<servo::twist_source::TwistSource>()
+        .node::<servo::twist_adder::TwistAdder>()
+        .node::<servo::adjoint::Adjoint>()
 }
