@@ -1,3 +1,10 @@
 //! From features to a twist of the sensor (paper section IV).
 
+pub mod adjoint;
+pub mod axial;
+pub mod feature_error;
+pub mod inverse_jacobian;
+pub mod pid;
 pub mod projector;
+pub mod twist_adder;
+pub mod twist_source;

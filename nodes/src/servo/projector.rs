@@ -36,7 +36,8 @@ impl Node for Projector {
 
     fn new(params: Params, _: &mut Setup<Self>) -> Result<Self, Mistakes> {
         if params.select.iter().any(|entry| *entry > 1) {
-            return Err(Mistake::param("select", "`select` is made of ones and zeros").into());
+            let mistake = Mistake::param("select", "`select` is made of ones and zeros");
+            return Err(mistake.help("1 passes a component, 0 deletes it").into());
         }
         Ok(Self { passes: params.select.map(|entry| entry == 1) })
     }
@@ -53,6 +54,9 @@ impl Node for Projector {
 
 #[cfg(test)]
 mod tests {
+    use proptest::array::uniform6;
+    use proptest::prelude::*;
+    use tactflow_runtime::diagnostic::Code;
     use tactflow_runtime::harness::NodeRig;
     use tactflow_runtime::signal::{Twist, TwistShape};
 
@@ -70,11 +74,42 @@ mod tests {
         assert_eq!(rig.get::<Twist>("twist"), Some(&Twist([1.0, 0.0, 3.0, 0.0, 0.0, 6.0].into())));
     }
 
+    proptest! {
+        #[test]
+        fn to_project_twice_is_to_project_once(select in uniform6(0..=1_u8), twist in uniform6(-9.0..9.0)) {
+            let select = format!("select = {select:?}");
+            let (mut first, mut second) = (rig(&select).unwrap(), rig(&select).unwrap());
+            first.set("twist", Twist(twist.into()));
+            first.step();
+            let once = *first.get::<Twist>("twist").unwrap();
+            second.set("twist", once);
+            second.step();
+            prop_assert_eq!(second.get::<Twist>("twist"), Some(&once));
+        }
+    }
+
+    #[test]
+    fn a_deleted_component_is_zero_whatever_it_was() {
+        let mut rig = rig("select = [1, 0, 0, 0, 0, 0]").unwrap();
+        rig.set("twist", Twist([1.0, -2.0, f64::MAX, f64::INFINITY, f64::NAN, -0.0].into()));
+        rig.step();
+        let bits = rig.get::<Twist>("twist").unwrap().0.map(f64::to_bits);
+        assert_eq!(bits, Twist([1.0, 0.0, 0.0, 0.0, 0.0, 0.0].into()).0.map(f64::to_bits));
+    }
+
     #[test]
     fn bad_diagonals() {
-        for bad in ["select = [1, 0, 2, 0, 0, 1]", "select = [1, 1]", "select = 1", "", "select = [1, 1, 1, 1, 1, -1]"]
-        {
-            assert!(rig(bad).is_err(), "{bad}");
+        let cases = [
+            ("select = [1, 0, 2, 0, 0, 1]", Code::BadValue),
+            ("select = [1, 1]", Code::BadValue),
+            ("select = 1", Code::BadValue),
+            ("select = [1, 1, 1, 1, 1, -1]", Code::BadValue),
+            ("select = [1, 1, 1, 1, 1, 0.5]", Code::BadValue),
+            ("", Code::MissingKey),
+        ];
+        for (bad, code) in cases {
+            let mistakes = rig(bad).err().unwrap();
+            assert_eq!((mistakes.len(), mistakes[0].code), (1, code), "{bad}");
         }
     }
 }

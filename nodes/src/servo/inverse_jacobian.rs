@@ -1,0 +1,166 @@
+//! `inverse_jacobian`: maps the control of each feature to a twist of the sensor (paper eq. 5, the matrix J_s^-1).
+//!
+//! The twist is the sum of column times control over the features that are there, in their order. e = setpoint -
+//! measured for every feature, so every sign lives in the columns, and they are data because conventions differ between
+//! sensors. With z out of the pad toward the object, a right-handed frame and alpha counted from +x toward +y:
+//!
+//! ```toml
+//! #                    vx  vy  vz   wx   wy  wz
+//! columns.x        = [ -1,  0,  0,   0, -20,  0 ]
+//! columns.y        = [  0, -1,  0,  20,   0,  0 ]
+//! columns.pressure = [  0,  0,  1,   0,   0,  0 ]
+//! columns.alpha    = [  0,  0,  0,   0,   0, -1 ]
+//! ```
+//!
+//! The rolling rows (wx of y, wy of x) need opposite signs: with equal ones, as eq. 5 prints them, the contact is lost.
+
+use tactflow_runtime::node::{Map, Mistakes, Node, Setup, Tick};
+use tactflow_runtime::signal::Twist;
+use tactflow_runtime::{inputs, outputs, params};
+
+params! {
+    /// Column of each feature, `[vx, vy, vz, wx, wy, wz]` [m per feature unit, rad per feature unit].
+    columns: Map<[f64; 6]>,
+}
+
+inputs! {
+    /// Control of each feature [the feature's unit per second].
+    control: Features["_/s", "A"],
+}
+
+outputs! {
+    /// Twist that reduces the errors [m/s, rad/s].
+    twist: Twist["A"],
+}
+
+/// The columns of the inverse Jacobian, in the order of the features.
+pub struct InverseJacobian {
+    columns: Box<[Twist]>,
+}
+
+impl Node for InverseJacobian {
+    type Params = Params;
+    type Inputs<'a> = Inputs<'a>;
+    type Outputs = Outputs;
+    type State = ();
+
+    const NAME: &'static str = "inverse_jacobian";
+    const SUMMARY: &'static str = "maps the control of each feature to a twist of the sensor";
+
+    fn new(params: Params, setup: &mut Setup<Self>) -> Result<Self, Mistakes> {
+        let names = setup.inputs.control.features.iter().map(|feature| feature.name.as_str());
+        let columns = params.columns.in_order("columns", names)?;
+        Ok(Self { columns: columns.into_iter().map(|column| Twist((*column).into())).collect() })
+    }
+
+    fn state(&self) {}
+
+    fn step(&self, _: &Tick, inputs: Inputs<'_>, out: &mut Outputs, (): &mut ()) {
+        let mut sum = Twist::default();
+        for (column, control) in self.columns.iter().zip(inputs.control.components()) {
+            if let Some(control) = control.get() {
+                sum.0 += column.0 * control;
+            }
+        }
+        out.twist.set(sum);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::Vector3;
+    use proptest::prelude::*;
+    use tactflow_runtime::diagnostic::Code;
+    use tactflow_runtime::harness::NodeRig;
+    use tactflow_runtime::node::At;
+    use tactflow_runtime::signal::{Feature, Features, FeaturesShape, Stamp, Unit};
+
+    use super::*;
+
+    const COLUMNS: &str = "
+        columns.alpha    = [  0,  0, 0,  0,   0, -1 ]
+        columns.pressure = [  0,  0, 1,  0,   0,  0 ]
+        columns.x        = [ -1,  0, 0,  0, -20,  0 ]
+        columns.y        = [  0, -1, 0, 20,   0,  0 ]";
+
+    fn rig(params: &str) -> Result<NodeRig, Mistakes> {
+        let units = [("x", Unit::METRE), ("y", Unit::METRE), ("pressure", Unit::NEWTON), ("alpha", Unit::AXIAL)];
+        let features = units.map(|(name, unit)| Feature { name: name.into(), unit: unit.per_second() });
+        NodeRig::new::<InverseJacobian>(params, &[("control", FeaturesShape { features: features.into() }.into())])
+    }
+
+    fn control(rig: &mut NodeRig, values: [Option<f64>; 4]) {
+        let stamp = Stamp { nanos: rig.tick.now, device: 0 };
+        let tick = rig.tick.index;
+        rig.edit("control", stamp, |control: &mut Features| {
+            for (i, value) in values.into_iter().enumerate() {
+                match value {
+                    Some(value) => control.set(i, value, tick, stamp),
+                    None => control.lose(i, tick),
+                }
+            }
+        });
+        rig.step();
+    }
+
+    #[test]
+    fn the_sum_is_over_the_features_that_are_there() {
+        let cases: [([Option<f64>; 4], [f64; 6]); 6] = [
+            ([Some(1.0), None, None, None], [-1.0, 0.0, 0.0, 0.0, -20.0, 0.0]),
+            ([None, Some(1.0), None, None], [0.0, -1.0, 0.0, 20.0, 0.0, 0.0]),
+            ([None, None, Some(1.0), None], [0.0, 0.0, 1.0, 0.0, 0.0, 0.0]),
+            ([None, None, None, Some(1.0)], [0.0, 0.0, 0.0, 0.0, 0.0, -1.0]),
+            ([Some(2.0), Some(3.0), Some(4.0), Some(5.0)], [-2.0, -3.0, 4.0, 60.0, -40.0, -5.0]),
+            ([Some(2.0), None, Some(4.0), None], [-2.0, 0.0, 4.0, 0.0, -40.0, 0.0]),
+        ];
+        let mut rig = rig(COLUMNS).unwrap();
+        for (values, twist) in cases {
+            control(&mut rig, values);
+            assert_eq!(rig.get::<Twist>("twist"), Some(&Twist(twist.into())), "{values:?}");
+        }
+        control(&mut rig, [None; 4]);
+        assert_eq!(rig.get::<Twist>("twist"), None, "nothing to reduce is no twist");
+    }
+
+    proptest! {
+        #[test]
+        fn the_sensor_slides_toward_the_contact_and_rolls_away_from_it(x in -0.04..0.04, y in -0.04..0.04) {
+            prop_assume!(x * x + y * y > 1e-8);
+            let mut rig = rig(COLUMNS).unwrap();
+            control(&mut rig, [Some(0.0 - x), Some(0.0 - y), None, None]);
+            let twist = *rig.get::<Twist>("twist").unwrap();
+            let contact = Vector3::new(x, y, 0.0);
+            prop_assert!(twist.linear().dot(&contact) > 0.0);
+            // z points toward the object: where it touches the pad gives way, so the contact wanders to the middle.
+            prop_assert!(twist.angular().cross(&contact).z < 0.0);
+        }
+    }
+
+    #[test]
+    fn columns_and_features_must_agree() {
+        let cases = [
+            (
+                COLUMNS.replace("columns.pressure", "columns.force"),
+                vec![
+                    (Code::UnknownKey, At::Key("columns.force".into())),
+                    (Code::MissingKey, At::Key("columns".into())),
+                ],
+            ),
+            (COLUMNS.replace("columns.y ", "# "), vec![(Code::MissingKey, At::Key("columns".into()))]),
+            (
+                format!("{COLUMNS}\ncolumns.z = [0, 0, 1, 0, 0, 0]"),
+                vec![(Code::UnknownKey, At::Key("columns.z".into()))],
+            ),
+        ];
+        for (text, expected) in cases {
+            let mistakes = rig(&text).err().unwrap();
+            let found: Vec<_> = mistakes.into_iter().map(|mistake| (mistake.code, mistake.at)).collect();
+            assert_eq!(found, expected, "{text}");
+        }
+        for bad in ["[0, 0, 1, 0, 0]", "[0, 0, 1, 0, 0, 0, 0]", "1.0", "[0, 0, 1, 0, 0, nan]"] {
+            let text = COLUMNS.replace("[  0,  0, 1,  0,   0,  0 ]", bad);
+            let mistakes = rig(&text).err().unwrap();
+            assert_eq!((mistakes.len(), mistakes[0].code), (1, Code::BadValue), "{bad}");
+        }
+    }
+}

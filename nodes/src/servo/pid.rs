@@ -1,0 +1,526 @@
+//! `pid`: a PID controller on every feature, each on its own (paper eq. 3, the matrices K_P, K_I, K_D).
+//!
+//! u = kp e + I + kd de/dt, with I the sum of ki e dt. Time is that between the stamps of a component's samples, so a
+//! gain means the same at 100 Hz and at 1 kHz, and one sample is never integrated twice; the paper sums without dt, so
+//! its KI is ki times the period and its KD is kd over the period. The integral is kept in units of the control, so a
+//! change of ki makes no jump; it runs only near the target (`within`), is bounded, and does not grow outwards while
+//! the output is at its limit. The error of a line's direction is differenced modulo pi.
+//!
+//! A held component stays as it is. An absent one contributes nothing and resets only itself, and only when it has been
+//! away for long: a frame of flicker does not wipe an integral.
+
+use tactflow_runtime::node::{Interval, Map, Mistakes, Node, Positive, Setup, Tick};
+use tactflow_runtime::signal::{Freshness, Unit};
+use tactflow_runtime::{inputs, outputs, params, state};
+
+use super::axial::wrap_axial;
+
+params! { Gains:
+    /// Proportional gain [1/s].
+    kp: f64 = 0.0,
+    /// Integral gain [1/s²].
+    ki: f64 = 0.0,
+    /// Derivative gain [1].
+    kd: f64 = 0.0,
+    /// Integrates only while the error is at most this; always when not given [the feature's unit].
+    within: Option<Positive>,
+    /// Bound on the integral's part of the control [the feature's unit per second].
+    bound: Positive = Positive(1.0),
+    /// Bound on the whole control; none when not given [the feature's unit per second].
+    limit: Option<Positive>,
+}
+
+params! {
+    /// Gains of each feature.
+    gains: Map<Gains>,
+}
+
+inputs! {
+    /// Error of each feature [any unit].
+    error: Features["_", "A"],
+}
+
+outputs! {
+    /// Control of each feature [the feature's unit per second].
+    control: Features["_/s", "A"],
+}
+
+state! {
+    /// What is remembered of each feature.
+    memories: Vec<Memory>,
+    /// Time of the last step [ns].
+    stepped: i64,
+}
+
+/// What is remembered of one feature.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Memory {
+    /// The integral's part of the control [the feature's unit per second].
+    integral: f64,
+    /// Error of the last sample [the feature's unit].
+    error: f64,
+    interval: Interval,
+    /// When it went away, if it did [ns].
+    lost_at: Option<i64>,
+}
+
+/// The control law of each feature.
+pub struct Pid {
+    laws: Box<[Law]>,
+}
+
+struct Law {
+    kp: f64,
+    ki: f64,
+    kd: f64,
+    within: f64,
+    bound: f64,
+    limit: f64,
+    is_axial: bool,
+}
+
+impl Node for Pid {
+    type Params = Params;
+    type Inputs<'a> = Inputs<'a>;
+    type Outputs = Outputs;
+    type State = State;
+
+    const NAME: &'static str = "pid";
+    const SUMMARY: &'static str = "a PID controller on every feature";
+
+    fn new(params: Params, setup: &mut Setup<Self>) -> Result<Self, Mistakes> {
+        let shape = &setup.inputs.error;
+        let names = shape.features.iter().map(|feature| feature.name.as_str());
+        let gains = params.gains.in_order("gains", names)?;
+        let laws = gains.into_iter().zip(&shape.features).map(|(gains, feature)| Law::new(gains, feature.unit));
+        let laws = laws.collect();
+        setup.outputs.control = shape.map_units(Unit::per_second);
+        Ok(Self { laws })
+    }
+
+    fn state(&self) -> State {
+        State { memories: vec![Memory::default(); self.laws.len()], stepped: 0 }
+    }
+
+    fn step(&self, tick: &Tick, inputs: Inputs<'_>, out: &mut Outputs, state: &mut State) {
+        let control = out.control.write();
+        let parts = self.laws.iter().zip(&mut state.memories).zip(inputs.error.components());
+        for (i, ((law, memory), component)) in parts.enumerate() {
+            match (component.freshness(tick.index), component.get()) {
+                (Freshness::New, Some(error)) => {
+                    memory.came_back(tick);
+                    let dt = memory.interval.step(component.stamp(), tick);
+                    control.set(i, law.control(error, dt, memory), tick.index, component.stamp());
+                }
+                (_, Some(_)) => {}
+                (freshness, None) => {
+                    // Absent without having been seen to go: all went at once, and the node was not stepped then.
+                    let went = if freshness == Freshness::Lost { tick.now } else { state.stepped };
+                    memory.lost_at.get_or_insert(went);
+                    control.lose(i, tick.index);
+                }
+            }
+        }
+        state.stepped = tick.now;
+    }
+}
+
+impl Memory {
+    /// Decides, now that the feature is there, whether it was away for so long that it starts afresh.
+    fn came_back(&mut self, tick: &Tick) {
+        if self.lost_at.take().is_some_and(|lost_at| tick.now - lost_at >= tick.reset_after) {
+            *self = Self::default();
+        }
+    }
+}
+
+impl Law {
+    fn new(gains: &Gains, unit: Unit) -> Self {
+        let or_none = |bound: Option<Positive>| bound.map_or(f64::INFINITY, |bound| *bound);
+        Self {
+            kp: gains.kp,
+            ki: gains.ki,
+            kd: gains.kd,
+            within: or_none(gains.within),
+            bound: *gains.bound,
+            limit: or_none(gains.limit),
+            is_axial: unit.is_axial(),
+        }
+    }
+
+    /// The control for an error that came `dt` [s] after the last one.
+    fn control(&self, error: f64, dt: f64, memory: &mut Memory) -> f64 {
+        let change = error - memory.error;
+        let change = if self.is_axial { wrap_axial(change) } else { change };
+        let slope = if dt > 0.0 { change / dt } else { 0.0 };
+        let others = self.kp * error + self.kd * slope;
+        let growth = if error.abs() <= self.within { self.ki * error * dt } else { 0.0 };
+        let integral = integrate(memory.integral, growth, others, self.limit);
+        memory.integral = snap(integral.clamp(-self.bound, self.bound));
+        memory.error = error;
+        (others + memory.integral).clamp(-self.limit, self.limit)
+    }
+}
+
+/// The integral after it has grown, beside `others` in a sum of at most `limit`: outwards it goes no further than to
+/// the limit, and not at all past it; inwards it is free.
+fn integrate(integral: f64, growth: f64, others: f64, limit: f64) -> f64 {
+    if growth > 0.0 {
+        (integral + growth).min((limit - others).max(integral))
+    } else {
+        (integral + growth).max((-limit - others).min(integral))
+    }
+}
+
+/// Zero for what is subnormal: arithmetic with such numbers is slow.
+fn snap(value: f64) -> f64 {
+    if value.abs() < f64::MIN_POSITIVE { 0.0 } else { value }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::f64::consts::PI;
+
+    use proptest::prelude::*;
+    use tactflow_runtime::diagnostic::Code;
+    use tactflow_runtime::harness::NodeRig;
+    use tactflow_runtime::node::At;
+    use tactflow_runtime::signal::{Feature, Features, FeaturesShape, Shape, Stamp};
+
+    use super::*;
+
+    fn shape(features: &[(&str, Unit)]) -> FeaturesShape {
+        let feature = |(name, unit): &(&str, Unit)| Feature { name: (*name).into(), unit: *unit };
+        FeaturesShape { features: features.iter().map(feature).collect() }
+    }
+
+    /// A controller of one feature of that unit.
+    fn one(unit: Unit, gains: &str) -> NodeRig {
+        NodeRig::new::<Pid>(&format!("gains.e = {{ {gains} }}"), &[("error", shape(&[("e", unit)]).into())]).unwrap()
+    }
+
+    /// A controller of `x`, a length, and `y`, another.
+    fn two(gains: &str) -> NodeRig {
+        let shape = shape(&[("x", Unit::METRE), ("y", Unit::METRE)]);
+        NodeRig::new::<Pid>(&format!("gains.x = {{ {gains} }}\ngains.y = {{ {gains} }}"), &[("error", shape.into())])
+            .unwrap()
+    }
+
+    fn at(nanos: i64) -> Stamp {
+        Stamp { nanos, device: 0 }
+    }
+
+    /// Component `i` of the error is new with that stamp, or goes.
+    fn put(rig: &mut NodeRig, i: usize, value: Option<f64>, stamp: Stamp) {
+        let tick = rig.tick.index;
+        rig.edit("error", stamp, |error: &mut Features| match value {
+            Some(value) => error.set(i, value, tick, stamp),
+            None => error.lose(i, tick),
+        });
+    }
+
+    fn control(rig: &NodeRig, i: usize) -> Option<f64> {
+        rig.get::<Features>("control").and_then(|control| control.components()[i].get())
+    }
+
+    /// A new error on component 0 at this moment; the control; then `ms` pass.
+    fn feed(rig: &mut NodeRig, error: f64, ms: f64) -> f64 {
+        let now = at(rig.tick.now);
+        put(rig, 0, Some(error), now);
+        rig.step_ms(ms);
+        control(rig, 0).unwrap()
+    }
+
+    fn assert_near(found: f64, expected: f64, what: &str) {
+        assert!((found - expected).abs() < 1e-9 * (1.0 + expected.abs()), "{what}: {found}, not {expected}");
+    }
+
+    #[test]
+    fn the_control_has_the_units_per_second() {
+        let wires = [("error", Shape::from(shape(&[("x", Unit::METRE), ("alpha", Unit::AXIAL)])))];
+        let rig = NodeRig::new::<Pid>("gains = { x = {}, alpha = {} }", &wires).unwrap();
+        let expected = shape(&[("x", Unit::METRE.per_second()), ("alpha", Unit::RADIAN.per_second())]);
+        assert_eq!(rig.shape("control"), &Shape::from(expected));
+    }
+
+    #[test]
+    fn a_constant_error_gives_a_ramp() {
+        let mut rig = one(Unit::METRE, "kp = 3.0, ki = 2.0, kd = 5.0");
+        for k in 0..200 {
+            assert_near(feed(&mut rig, 0.5, 4.0), 1.5 + 0.5 * 2.0 * 0.004 * f64::from(k), "kp e + ki e t");
+            if k == 0 {
+                assert_near(control(&rig, 0).unwrap(), 1.5, "the first sample has no slope and no time");
+            }
+        }
+    }
+
+    #[test]
+    fn a_ramp_of_the_error_gives_its_slope() {
+        let mut rig = one(Unit::METRE, "kd = 0.25");
+        assert_eq!(feed(&mut rig, 7.0, 4.0), 0.0);
+        for (k, ms) in [(1, 1.0), (2, 8.0), (3, 4.0), (4, 4.0)] {
+            let error = 7.0 - 3.0 * rig.tick.now as f64 * 1e-9;
+            assert_near(feed(&mut rig, error, ms), 0.25 * -3.0, &format!("sample {k}"));
+        }
+    }
+
+    #[test]
+    fn a_sine_gives_the_sums_of_calculus_books() {
+        let (speed, dt) = (5.0, 0.004);
+        let mut integral = one(Unit::METRE, "ki = 1.0");
+        let mut slope = one(Unit::METRE, "kd = 1.0");
+        for k in 0..1000 {
+            let t = dt * f64::from(k);
+            let (half, error) = (speed * dt / 2.0, libm::sin(speed * t));
+            // Lagrange: the sum of sin(j w dt) for j = 1..=k.
+            let sum = (libm::cos(half) - libm::cos(speed * t + half)) / (2.0 * libm::sin(half));
+            assert_near(feed(&mut integral, error, 4.0), dt * sum, "integral");
+            let chord = libm::cos(speed * t - half) * libm::sin(half) * 2.0 / dt;
+            let found = feed(&mut slope, error, 4.0);
+            assert_near(found, if k == 0 { 0.0 } else { chord }, "slope");
+        }
+    }
+
+    #[test]
+    fn a_gain_means_the_same_at_any_rate() {
+        // An error that is constant for 20 ms at a time, and one that is smooth; over 2 s.
+        let stairs = |t: f64| [0.3, -0.1, 0.2, 0.05, -0.4][(t / 0.02 - 1e-6).max(0.0) as usize % 5];
+        let smooth = |t: f64| libm::cos(3.0 * t);
+        for (hz, ms) in [(100, 10.0), (250, 4.0), (1000, 1.0)] {
+            let mut rigs = [one(Unit::METRE, "ki = 2.0"), one(Unit::METRE, "ki = 2.0")];
+            let mut found = [0.0; 2];
+            for k in 0..=2 * hz {
+                let t = f64::from(k) / f64::from(hz);
+                found = [feed(&mut rigs[0], stairs(t), ms), feed(&mut rigs[1], smooth(t), ms)];
+            }
+            assert_near(found[0], 2.0 * 0.02 * 20.0 * 0.05, &format!("stairs at {hz} Hz"));
+            let exact = 2.0 * libm::sin(6.0) / 3.0;
+            assert!((found[1] - exact).abs() < 4.0 / f64::from(hz), "smooth at {hz} Hz: {}, not {exact}", found[1]);
+        }
+    }
+
+    #[test]
+    fn a_repeated_frame_counts_once() {
+        let mut rig = one(Unit::METRE, "ki = 1.0, kd = 1.0");
+        let mut last = f64::NAN;
+        for k in 0..=1000 {
+            // 1 kHz of ticks, 250 Hz of stamps; some repeat the frame, in some nothing is new.
+            if k % 4 != 3 {
+                put(&mut rig, 0, Some(0.5), at(k / 4 * 4_000_000));
+            }
+            rig.step();
+            last = control(&rig, 0).unwrap();
+        }
+        assert_near(last, 0.5, "0.5 for one second");
+    }
+
+    #[test]
+    fn it_integrates_near_the_target_only_and_within_the_bound() {
+        let cases = [
+            ("ki = 1.0, bound = 10.0", 2.0, 8.0),
+            ("ki = 1.0, bound = 10.0", -2.0, -8.0),
+            ("ki = 1.0, bound = 0.5", 2.0, 0.5),
+            ("ki = 1.0, bound = 0.5", -2.0, -0.5),
+            ("ki = 1.0", 2.0, 1.0),
+            ("ki = 1.0, within = 2.0, bound = 10.0", 2.0, 8.0),
+            ("ki = 1.0, within = 2.0, bound = 10.0", -2.0, -8.0),
+            ("ki = 1.0, within = 1.9, bound = 10.0", 2.0, 0.0),
+            ("ki = 1.0, within = 1.9, bound = 10.0", -2.0, 0.0),
+        ];
+        for (gains, error, expected) in cases {
+            let mut rig = one(Unit::METRE, gains);
+            let found = (0..=400).map(|_| feed(&mut rig, error, 10.0)).last().unwrap();
+            assert_near(found, expected, &format!("{gains} at {error} for 4 s"));
+        }
+        let mut rig = one(Unit::METRE, "ki = 1.0, within = 0.5");
+        for error in [0.4, 0.4, 5.0, 5.0] {
+            feed(&mut rig, error, 10.0);
+        }
+        assert_near(control(&rig, 0).unwrap(), 0.004, "far from the target the integral stays");
+    }
+
+    #[test]
+    fn at_the_limit_the_integral_does_not_wind_up() {
+        for sign in [1.0, -1.0] {
+            let mut rig = one(Unit::METRE, "ki = 1.0, bound = 10.0, limit = 1.0");
+            let found = (0..=500).map(|_| feed(&mut rig, sign, 10.0)).last().unwrap();
+            assert_near(found, sign, "at the limit after 5 s");
+            let found = (0..50).map(|_| feed(&mut rig, -sign, 10.0)).last().unwrap();
+            assert_near(found, 0.5 * sign, "it comes back at once, and not after 4 s");
+
+            let mut rig = one(Unit::METRE, "kp = 2.0, ki = 1.0, limit = 1.0");
+            let found = (0..100).map(|_| feed(&mut rig, sign, 10.0)).last().unwrap();
+            assert_eq!(found, sign, "limited by the proportional part alone");
+            assert_eq!(feed(&mut rig, 0.0, 10.0), 0.0, "so nothing was integrated");
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn an_integral_grows_no_further_than_to_the_limit(
+            integral in -3.0_f64..3.0, growth in -1.0_f64..1.0, others in -3.0_f64..3.0, limit in 0.1_f64..3.0,
+        ) {
+            let next = integrate(integral, growth, others, limit);
+            let step = next - integral;
+            prop_assert!(step * growth >= 0.0 && step.abs() <= growth.abs() + 1e-15, "never against the error");
+            let (before, after) = (others + integral, others + next);
+            prop_assert!(after.abs() <= limit.max(before.abs()) + 1e-12, "never further out");
+            let is_free = (before + growth).abs() <= limit || before * growth < 0.0 && growth.abs() <= before.abs();
+            prop_assert!(!is_free || (step - growth).abs() < 1e-12, "free within the limit and inwards");
+            prop_assert_eq!(integrate(integral, growth, others, f64::INFINITY), integral + growth);
+        }
+
+        #[test]
+        fn the_control_keeps_its_limit(errors in proptest::collection::vec(-5.0_f64..5.0, 1..60)) {
+            let mut rig = one(Unit::METRE, "kp = 1.0, ki = 20.0, kd = 0.01, bound = 0.7, limit = 0.9");
+            for error in errors {
+                let found = feed(&mut rig, error, 4.0);
+                prop_assert!(found.abs() <= 0.9);
+            }
+            let integral = feed(&mut rig, 0.0, 4.0);
+            let at_rest = feed(&mut rig, 0.0, 4.0);
+            prop_assert!(integral.is_finite() && at_rest.abs() <= 0.7);
+        }
+    }
+
+    #[test]
+    fn a_jump_of_pi_is_no_speed() {
+        let cases = [(Unit::AXIAL, 0.04 / 0.004), (Unit::RADIAN, (0.04 - PI) / 0.004)];
+        for (unit, expected) in cases {
+            let mut rig = one(unit, "kd = 1.0");
+            feed(&mut rig, PI / 2.0 - 0.02, 4.0);
+            assert_near(feed(&mut rig, -PI / 2.0 + 0.02, 4.0), expected, &unit.to_string());
+        }
+    }
+
+    #[test]
+    fn a_flicker_keeps_the_integral_and_an_absence_resets_it() {
+        // How long x is away [ms], whether y goes with it and how long, and what is left of an integral of 0.1.
+        let cases: [(i32, i32, f64); 6] =
+            [(4, 0, 0.1), (18, 0, 0.1), (20, 0, 0.0), (100, 0, 0.0), (12, 8, 0.1), (26, 12, 0.0)];
+        for (away, both, left) in cases {
+            let mut rig = two("ki = 1.0");
+            for _ in 0..=50 {
+                let now = at(rig.tick.now);
+                put(&mut rig, 0, Some(1.0), now);
+                put(&mut rig, 1, Some(1.0), now);
+                rig.step_ms(2.0);
+            }
+            for k in 0..away / 2 {
+                let now = at(rig.tick.now);
+                put(&mut rig, 0, None, now);
+                put(&mut rig, 1, (2 * k >= both).then_some(0.0), now);
+                rig.step_ms(2.0);
+                assert_eq!(control(&rig, 0), None);
+                assert_eq!(control(&rig, 1).is_some(), 2 * k >= both, "{away} ms");
+            }
+            assert_near(feed(&mut rig, 0.0, 2.0), left, &format!("x away for {away} ms, y for {both}"));
+            let y = control(&rig, 1).unwrap();
+            assert_near(y, 0.1, "y was away for less");
+        }
+    }
+
+    #[test]
+    fn an_absence_that_began_for_all_at_once_is_counted_from_its_start() {
+        let mut rig = two("ki = 1.0");
+        for _ in 0..=50 {
+            let now = at(rig.tick.now);
+            put(&mut rig, 0, Some(1.0), now);
+            put(&mut rig, 1, Some(1.0), now);
+            rig.step_ms(2.0);
+        }
+        for ms in 0..30 {
+            let now = at(rig.tick.now);
+            put(&mut rig, 0, None, now);
+            put(&mut rig, 1, (ms >= 15).then_some(0.0), now);
+            rig.step();
+        }
+        assert_near(control(&rig, 1).unwrap(), 0.1, "away for 15 ms");
+        assert_eq!(feed(&mut rig, 0.0, 1.0), 0.0, "away for 30 ms, though for 15 of them nothing was stepped");
+    }
+
+    #[test]
+    fn nothing_at_all_for_long_resets_everything() {
+        let mut rig = one(Unit::METRE, "ki = 1.0");
+        for _ in 0..=50 {
+            feed(&mut rig, 1.0, 2.0);
+        }
+        for _ in 0..40 {
+            rig.lose("error");
+            rig.step();
+        }
+        assert_eq!(feed(&mut rig, 0.0, 1.0), 0.0);
+    }
+
+    #[test]
+    fn a_jump_over_a_flicker_is_a_speed_over_the_real_time() {
+        let mut rig = one(Unit::METRE, "kd = 1.0");
+        feed(&mut rig, 0.0, 1.0);
+        feed(&mut rig, 0.0, 1.0);
+        for _ in 0..9 {
+            let now = at(rig.tick.now);
+            put(&mut rig, 0, None, now);
+            rig.step();
+        }
+        assert_near(feed(&mut rig, 0.5, 1.0), 0.5 / 0.010, "over the 10 ms since the last sample");
+    }
+
+    #[test]
+    fn a_component_is_on_its_own() {
+        let mut rig = two("kp = 1.0, ki = 1.0");
+        for k in 0..=100 {
+            let now = at(rig.tick.now);
+            put(&mut rig, 1, Some(1.0), now);
+            if k % 10 == 0 {
+                put(&mut rig, 0, Some(1.0), now);
+            }
+            rig.step();
+            let (tick, stamp) = (rig.tick.index - 1, at(k / 10 * 10_000_000));
+            let x = rig.get::<Features>("control").unwrap().components()[0];
+            let expected = if k % 10 == 0 { Freshness::New } else { Freshness::Held };
+            assert_eq!((x.freshness(tick), x.stamp()), (expected, stamp), "tick {k}");
+            assert_near(x.get().unwrap(), 1.0 + (k / 10) as f64 * 0.010, "a held component is not integrated");
+            assert_near(control(&rig, 1).unwrap(), 1.0 + k as f64 * 0.001, "nor is its neighbour held up");
+        }
+        let now = at(rig.tick.now);
+        put(&mut rig, 0, None, now);
+        rig.step();
+        assert_eq!(control(&rig, 0), None);
+        assert_near(control(&rig, 1).unwrap(), 1.1, "what is absent leaves the other as it is");
+    }
+
+    #[test]
+    fn what_is_subnormal_becomes_zero() {
+        let mut rig = one(Unit::METRE, "ki = 1.0");
+        feed(&mut rig, 1e-306, 4.0);
+        assert_eq!(feed(&mut rig, 1e-306, 4.0), 0.0);
+        assert_eq!([f64::MIN_POSITIVE, -1.0, 1e-310, -1e-310].map(snap), [f64::MIN_POSITIVE, -1.0, 0.0, 0.0]);
+    }
+
+    #[test]
+    fn gains_and_features_must_agree() {
+        let missing = (Code::MissingKey, At::Key("gains".into()));
+        let cases = [
+            ("gains = { x = {} }", vec![missing.clone()]),
+            ("gains = {}", vec![missing.clone(), missing.clone()]),
+            ("gains = { x = {}, y = {}, z = {} }", vec![(Code::UnknownKey, At::Key("gains.z".into()))]),
+            ("gains = { x = {}, Y = {} }", vec![(Code::UnknownKey, At::Key("gains.Y".into())), missing]),
+        ];
+        let wires = [("error", Shape::from(shape(&[("x", Unit::METRE), ("y", Unit::METRE)])))];
+        for (params, expected) in cases {
+            let mistakes = NodeRig::new::<Pid>(params, &wires).err().unwrap();
+            let found: Vec<_> = mistakes.into_iter().map(|mistake| (mistake.code, mistake.at)).collect();
+            assert_eq!(found, expected, "{params}");
+        }
+        let bad = ["kq = 1.0", "kp = \"high\"", "kp = nan", "within = 0.0", "bound = -1.0", "bound = 0", "limit = 0.0"];
+        for bad in bad {
+            let params = format!("gains = {{ x = {{ {bad} }}, y = {{}} }}");
+            let mistakes = NodeRig::new::<Pid>(&params, &wires).err().unwrap();
+            let start = params.find(bad).unwrap();
+            let token = start..start + bad.len();
+            assert_eq!(mistakes.len(), 1, "{bad}");
+            let At::Span(span) = &mistakes[0].at else { panic!("{bad}: {:?}", mistakes[0].at) };
+            assert!(token.start <= span.start && span.end <= token.end, "{bad}: {span:?} is not in {token:?}");
+        }
+    }
+}

@@ -1,0 +1,120 @@
+//! `twist_source`: a constant twist, for guidance: the external motion that is superimposed on the servoing (paper Fig. 6).
+//!
+//! Generated motion does not vanish with the contact by itself. It is timeless, so no sink's `max_age_ms` ever stops
+//! it, unless a gate is wired: then it is as old as the gate, and absent unless the gate is there and set.
+
+use tactflow_runtime::node::{Mistakes, Node, Setup, Tick};
+use tactflow_runtime::signal::Twist;
+use tactflow_runtime::{inputs, outputs, params};
+
+params! {
+    /// The twist, `[vx, vy, vz, wx, wy, wz]` [m/s, rad/s].
+    twist: [f64; 6],
+    /// Frame of the twist; what it is wired to decides when this is not said.
+    frame: Option<String>,
+}
+
+inputs! {
+    /// What must be set for the motion to go on; without this wire it always does.
+    gate: Trigger<Flag>,
+}
+
+outputs! {
+    /// The twist [m/s, rad/s].
+    twist: Twist["$frame"],
+}
+
+/// The twist, and whether it waits for a gate.
+pub struct TwistSource {
+    twist: Twist,
+    is_gated: bool,
+}
+
+impl Node for TwistSource {
+    type Params = Params;
+    type Inputs<'a> = Inputs<'a>;
+    type Outputs = Outputs;
+    type State = ();
+
+    const NAME: &'static str = "twist_source";
+    const SUMMARY: &'static str = "a constant twist, for guidance";
+    const EVERY_TICK: bool = true;
+
+    fn new(params: Params, setup: &mut Setup<Self>) -> Result<Self, Mistakes> {
+        Ok(Self { twist: Twist(params.twist.into()), is_gated: setup.inputs.gate.is_some() })
+    }
+
+    fn state(&self) {}
+
+    fn step(&self, _: &Tick, inputs: Inputs<'_>, out: &mut Outputs, (): &mut ()) {
+        if !self.is_gated || inputs.gate.is_some_and(|gate| *gate) {
+            out.twist.set(self.twist);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use tactflow_runtime::harness::NodeRig;
+    use tactflow_runtime::signal::{FlagShape, Freshness, Stamp};
+
+    use super::*;
+
+    const GUIDE: &str = "twist = [0, 0.02, 0, 0, 0, 0.1]\nframe = \"pad\"";
+
+    #[test]
+    fn without_a_gate_it_is_new_and_timeless_in_every_tick() {
+        let mut rig = NodeRig::new::<TwistSource>(GUIDE, &[]).unwrap();
+        for _ in 0..3 {
+            rig.step();
+            assert_eq!(rig.get::<Twist>("twist"), Some(&Twist([0.0, 0.02, 0.0, 0.0, 0.0, 0.1].into())));
+            assert_eq!(rig.freshness("twist"), Freshness::New);
+            assert!(rig.mark("twist").stamp().is_timeless());
+        }
+    }
+
+    #[test]
+    fn with_a_gate_it_moves_only_while_that_is_set_and_is_as_old() {
+        let mut rig = NodeRig::new::<TwistSource>(GUIDE, &[("gate", FlagShape.into())]).unwrap();
+        let cases: [(&str, Option<bool>, Freshness); 7] = [
+            ("never there", None, Freshness::Absent),
+            ("shut", Some(false), Freshness::Absent),
+            ("set", Some(true), Freshness::New),
+            ("still set", Some(true), Freshness::New),
+            ("shut again", Some(false), Freshness::Lost),
+            ("set again", Some(true), Freshness::New),
+            ("gone", None, Freshness::Lost),
+        ];
+        for (what, gate, expected) in cases {
+            let now = Stamp { nanos: rig.tick.now, device: 0 };
+            match gate {
+                Some(gate) => rig.set("gate", gate),
+                None => rig.lose("gate"),
+            }
+            rig.step();
+            assert_eq!(rig.freshness("twist"), expected, "{what}");
+            if expected == Freshness::New {
+                assert_eq!(rig.mark("twist").stamp(), now, "{what}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_held_gate_keeps_the_motion_but_lets_it_grow_old() {
+        let mut rig = NodeRig::new::<TwistSource>(GUIDE, &[("gate", FlagShape.into())]).unwrap();
+        rig.set("gate", true);
+        for _ in 0..3 {
+            rig.step();
+            assert_eq!((rig.freshness("twist"), rig.mark("twist").stamp().nanos), (Freshness::New, 0));
+        }
+    }
+
+    #[test]
+    fn bad_twists() {
+        for bad in
+            ["", "twist = [0, 0, 0]", "twist = [0, 0, 0, 0, 0, inf]", "twist = 1", "twist = [0,0,0,0,0,0]\nframe = 1"]
+        {
+            assert!(NodeRig::new::<TwistSource>(bad, &[]).is_err(), "{bad}");
+        }
+    }
+}
