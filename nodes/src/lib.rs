@@ -14,5 +14,14 @@ use tactflow_runtime::catalogue::Catalogue;
 /// Everything there is: one line each.
 #[must_use]
 pub fn catalogue() -> Catalogue {
-    Catalogue::new().role(roles::tactile_pad()).role(roles::velocity_arm()).node::<servo::projector::Projector>()
+    Catalogue::new()
+        .role(roles::tactile_pad())
+        .role(roles::velocity_arm())
+        .node::<touch::tactile_source::TactileSource>()
+        .node::<touch::calibrate::Calibrate>()
+        .node::<touch::binarize::Binarize>()
+        .node::<touch::label::Label>()
+        .node::<touch::moments::Moments>()
+        .node::<touch::smooth::Smooth>()
+        .node::<servo::projector::Projector>()
 }
