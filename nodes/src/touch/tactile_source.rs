@@ -1,0 +1,188 @@
+//! `tactile_source`: a pad's image in the sensor's frame, with what a guard must know of the whole of it.
+//!
+//! Row i runs along the sensor's +y and column j along +x; devices count otherwise, so rows and columns may change
+//! places and be taken in reverse. `sum` and `peak` read every tactel and not a chosen region: force ceilings and the
+//! checks of recordings hang on them. The sum is made in f64, in lanes whose number is fixed: exact for whole counts,
+//! and the same bits on every machine.
+
+use tactflow_runtime::node::{Mistake, Mistakes, Node, Setup, Tick};
+use tactflow_runtime::signal::ImageShape;
+use tactflow_runtime::{inputs, outputs, params};
+
+params! {
+    /// Whether rows and columns change places, before any flip.
+    transpose: bool = false,
+    /// Whether the columns come in reverse order: the device counts them against the sensor's +x.
+    flip_x: bool = false,
+    /// Whether the rows come in reverse order: the device counts them against the sensor's +y.
+    flip_y: bool = false,
+}
+
+inputs! {
+    /// The newest image, as the pad counts its rows and columns [the pad's unit].
+    image: Image["U", "A"],
+}
+
+outputs! {
+    /// The image in the sensor's frame: row i along +y, column j along +x [the pad's unit].
+    image: Image["U", "A"],
+    /// Sum over the whole image [the pad's unit].
+    sum: Scalar["U", "A"],
+    /// Greatest tactel of the whole image [the pad's unit].
+    peak: Scalar["U", "A"],
+}
+
+const LANES: usize = 8;
+
+/// Where each tactel comes from; nothing if the pad counts as the sensor does.
+pub struct TactileSource {
+    order: Option<Box<[u32]>>,
+}
+
+impl Node for TactileSource {
+    type Params = Params;
+    type Inputs<'a> = Inputs<'a>;
+    type Outputs = Outputs;
+    type State = ();
+
+    const NAME: &'static str = "tactile_source";
+    const SUMMARY: &'static str = "a pad's image in the sensor's frame, with its sum and its peak";
+
+    fn new(params: Params, setup: &mut Setup<Self>) -> Result<Self, Mistakes> {
+        let image = &setup.inputs.image;
+        if image.tactels() == 0 {
+            let message = format!("an image of {} by {} has no tactels", image.rows, image.cols);
+            return Err(Mistake::input("image", message).into());
+        }
+        setup.outputs.image = turned(image, params.transpose);
+        let is_turned = params.transpose | params.flip_x | params.flip_y;
+        Ok(Self { order: is_turned.then(|| order(&setup.outputs.image, &params)) })
+    }
+
+    fn state(&self) {}
+
+    fn step(&self, _: &Tick, inputs: Inputs<'_>, out: &mut Outputs, (): &mut ()) {
+        let (from, to) = (inputs.image.cells(), out.image.write().cells_mut());
+        match &self.order {
+            None => to.copy_from_slice(from),
+            Some(order) => {
+                for (cell, at) in to.iter_mut().zip(order) {
+                    *cell = from[*at as usize];
+                }
+            }
+        }
+        out.sum.set(sum(to));
+        out.peak.set(peak(to));
+    }
+}
+
+fn turned(image: &ImageShape, transpose: bool) -> ImageShape {
+    if !transpose {
+        return image.clone();
+    }
+    let [along_x, along_y] = image.pitch;
+    ImageShape { rows: image.cols, cols: image.rows, pitch: [along_y, along_x], unit: image.unit }
+}
+
+/// Index in the device's image of each tactel of the sensor's.
+fn order(sensor: &ImageShape, params: &Params) -> Box<[u32]> {
+    let &ImageShape { rows, cols, .. } = sensor;
+    let from = |i: usize, j: usize| {
+        let i = if params.flip_y { rows - 1 - i } else { i };
+        let j = if params.flip_x { cols - 1 - j } else { j };
+        (if params.transpose { j * rows + i } else { i * cols + j }) as u32
+    };
+    (0..rows).flat_map(|i| (0..cols).map(move |j| from(i, j))).collect()
+}
+
+fn sum(cells: &[f32]) -> f64 {
+    let mut lanes = [0.0; LANES];
+    for chunk in cells.chunks(LANES) {
+        for (lane, value) in lanes.iter_mut().zip(chunk) {
+            *lane += f64::from(*value);
+        }
+    }
+    let [a, b, c, d, e, f, g, h] = lanes;
+    ((a + e) + (c + g)) + ((b + f) + (d + h))
+}
+
+fn peak(cells: &[f32]) -> f64 {
+    let greater = |a: f32, b: f32| if b > a { b } else { a };
+    let mut lanes = [f32::NEG_INFINITY; LANES];
+    for chunk in cells.chunks(LANES) {
+        for (lane, value) in lanes.iter_mut().zip(chunk) {
+            *lane = greater(*lane, *value);
+        }
+    }
+    lanes.into_iter().fold(f32::NEG_INFINITY, greater).into()
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+    use tactflow_runtime::harness::NodeRig;
+    use tactflow_runtime::signal::{Image, Scalar, Shape, Unit};
+
+    use super::*;
+
+    fn shape(rows: usize, cols: usize) -> Shape {
+        ImageShape { rows, cols, pitch: [0.001, 0.002], unit: Unit::RAW }.into()
+    }
+
+    fn run(params: &str, cols: usize, cells: &[f32]) -> NodeRig {
+        let mut rig = NodeRig::new::<TactileSource>(params, &[("image", shape(cells.len() / cols, cols))]).unwrap();
+        rig.set("image", Image::from_cells(cols, cells));
+        rig.step();
+        rig
+    }
+
+    #[test]
+    fn the_device_is_turned_into_the_sensors_frame() {
+        let device = [1.0, 2.0, 3.0, 4.0, 5.0, 6.0];
+        let wide = |cells: [f32; 6]| Image::from_cells(3, &cells);
+        let tall = |cells: [f32; 6]| Image::from_cells(2, &cells);
+        let cases = [
+            ("", wide([1.0, 2.0, 3.0, 4.0, 5.0, 6.0])),
+            ("flip_x = true", wide([3.0, 2.0, 1.0, 6.0, 5.0, 4.0])),
+            ("flip_y = true", wide([4.0, 5.0, 6.0, 1.0, 2.0, 3.0])),
+            ("flip_x = true\nflip_y = true", wide([6.0, 5.0, 4.0, 3.0, 2.0, 1.0])),
+            ("transpose = true", tall([1.0, 4.0, 2.0, 5.0, 3.0, 6.0])),
+            ("transpose = true\nflip_x = true", tall([4.0, 1.0, 5.0, 2.0, 6.0, 3.0])),
+            ("transpose = true\nflip_y = true", tall([3.0, 6.0, 2.0, 5.0, 1.0, 4.0])),
+        ];
+        for (params, sensor) in cases {
+            let rig = run(params, 3, &device);
+            assert_eq!(rig.get::<Image>("image"), Some(&sensor), "{params}");
+            assert_eq!((rig.get("sum"), rig.get("peak")), (Some(&21.0), Some(&6.0)), "{params}");
+            let Shape::Image(shape) = rig.shape("image") else { panic!("an image") };
+            assert_eq!((shape.rows, shape.cols), (sensor.rows(), sensor.cols()), "{params}");
+            let pitch = if params.contains("transpose") { [0.002, 0.001] } else { [0.001, 0.002] };
+            assert_eq!(shape.pitch, pitch, "{params}");
+        }
+    }
+
+    #[test]
+    fn an_image_of_nothing_is_refused() {
+        for (rows, cols) in [(0, 0), (0, 4), (4, 0)] {
+            assert!(NodeRig::new::<TactileSource>("", &[("image", shape(rows, cols))]).is_err(), "{rows} by {cols}");
+        }
+    }
+
+    #[test]
+    fn the_sum_of_counts_is_exact_where_f32_is_not() {
+        let mut cells = vec![1.0; 4097];
+        cells[4000] = 16_777_216.0;
+        let rig = run("", 4097, &cells);
+        assert_eq!(rig.get::<Scalar>("sum"), Some(&16_781_312.0));
+    }
+
+    proptest! {
+        #[test]
+        fn sum_and_peak_read_every_tactel(cells in prop::collection::vec(-5000..5000i32, 1..300), flip in any::<bool>()) {
+            let image: Vec<f32> = cells.iter().map(|count| *count as f32).collect();
+            let rig = run(&format!("flip_x = {flip}"), image.len(), &image);
+            prop_assert_eq!(rig.get::<Scalar>("sum"), Some(&f64::from(cells.iter().sum::<i32>())));
+            prop_assert_eq!(rig.get::<Scalar>("peak"), Some(&f64::from(*cells.iter().max().unwrap())));
+        }
+    }
+}
