@@ -111,6 +111,12 @@ impl Diagnostic {
         self
     }
 
+    /// The same with a way out, if there is one.
+    #[must_use]
+    pub(crate) fn with_help(self, help: Option<String>) -> Self {
+        Self { help, ..self }
+    }
+
     /// The same with another place that matters.
     #[must_use]
     pub fn note(mut self, span: Range<usize>, text: impl Into<String>) -> Self {
@@ -176,11 +182,16 @@ impl Report {
     }
 }
 
+/// The name that a misspelt one is meant to be, if one is near.
+pub(crate) fn meant<'n>(name: &str, known: impl Iterator<Item = &'n str>) -> Option<&'n str> {
+    let score = |other: &&str| strsim::damerau_levenshtein(name, other);
+    known.min_by_key(score).filter(|best| score(best) <= 1 + name.chars().count() / 4)
+}
+
 /// A way out of a misspelt name: the one that is meant, or all there are.
 pub(crate) fn closest<'n>(name: &str, known: impl Iterator<Item = &'n str>, what: &str) -> String {
     let known: Vec<&str> = known.collect();
-    let score = |other: &&&str| strsim::damerau_levenshtein(name, other);
-    match known.iter().min_by_key(score).filter(|best| score(best) <= 1 + name.chars().count() / 4) {
+    match meant(name, known.iter().copied()) {
         Some(best) => format!("did you mean `{best}`?"),
         None if known.is_empty() => format!("there are no {what} here"),
         None => format!("{what} here: {}", known.iter().map(|n| format!("`{n}`")).collect::<Vec<_>>().join(", ")),

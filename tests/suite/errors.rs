@@ -9,10 +9,11 @@ use std::path::{Path, PathBuf};
 
 use tactflow_runtime::diagnostic::{Code, Diagnostic, Report};
 use tactflow_runtime::graph::{Request, Sources, plan};
-use tactflow_tests::{catalogue, toml_files, workspace};
+use tactflow_tests::{catalogue, toml_files};
 
+/// Relative to this crate, where tests run: messages show paths as they are given.
 fn folder() -> PathBuf {
-    workspace().join("tests/errors")
+    PathBuf::from("errors")
 }
 
 fn is_expectation(line: &str) -> bool {

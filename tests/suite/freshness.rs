@@ -55,7 +55,9 @@ fn a_frame_with_the_stamp_of_the_last_is_not_new_either() {
 #[test]
 fn a_stamp_that_goes_back_is_dropped_and_counted() {
     let mut rig = rig(&["a"], COUNT);
-    for (ms, stamp, sequence, value) in [(0.0, 0.0, 1, 1.0), (10.0, 10.0, 2, 2.0), (20.0, 5.0, 3, 99.0), (30.0, 30.0, 4, 4.0)] {
+    for (ms, stamp, sequence, value) in
+        [(0.0, 0.0, 1, 1.0), (10.0, 10.0, 2, 2.0), (20.0, 5.0, 3, 99.0), (30.0, 30.0, 4, 4.0)]
+    {
         rig.feed_as("a", 0, ms, stamp, sequence, value);
         rig.tick(ms).unwrap();
         assert_ne!(number(&rig, "a.value"), Some(99.0));

@@ -47,7 +47,10 @@ impl Drop for Peer {
 
 /// Runs the graph on a peer; how it ended, and the steps and the ages [ms] of `count` after each tick.
 fn run(peer: &Peer, duration: f64) -> (End, Vec<f64>, Vec<f64>) {
-    let bench = format!("devices.tcp.type = \"line_length\"\ndevices.tcp.address = \"127.0.0.1:{}\"\nbind.a = \"tcp\"", peer.port);
+    let bench = format!(
+        "devices.tcp.type = \"line_length\"\ndevices.tcp.address = \"127.0.0.1:{}\"\nbind.a = \"tcp\"",
+        peer.port
+    );
     let request = Request { bench_text: Some(bench), ..Request::text(GRAPH) };
     let plan = plan(&catalogue(), &request).unwrap_or_else(|report| panic!("{}", report.render(false)));
     assert!(plan.is_live());

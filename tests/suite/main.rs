@@ -1,5 +1,6 @@
 //! The suite: one module a subject.
 
-mod freshness;
+mod errors;
 mod faults;
+mod freshness;
 mod live;

@@ -49,7 +49,7 @@ pub(super) fn run(catalogue: &Catalogue, args: RunArgs, colour: Colour) -> u8 {
         }
     };
     println!("\n{}", summary.render(&engine, &outcome));
-    println!("{}", ending(&outcome, &engine));
+    println!("{}", ending(&outcome));
     let code = if let End::Fault(fault) = &outcome.end {
         eprintln!("error: {fault}; every command went to zero");
         FAULTED
@@ -92,7 +92,7 @@ fn quietly<T>(work: impl FnOnce() -> T) -> T {
     result
 }
 
-fn ending(outcome: &Outcome, engine: &Engine) -> String {
+fn ending(outcome: &Outcome) -> String {
     let why = match outcome.end {
         End::Finished => "the recording is over",
         End::Duration => "the time is over",
@@ -101,7 +101,7 @@ fn ending(outcome: &Outcome, engine: &Engine) -> String {
     };
     let (time, wall) = (seconds(outcome.time), outcome.wall.as_secs_f64());
     let speed = time / wall.max(1e-9);
-    format!("{why} after {time:.3} s and {} ticks; it took {wall:.3} s, {speed:.1}x real time", engine.ticks())
+    format!("{why} after {time:.3} s and {} ticks; it took {wall:.3} s, {speed:.0}x real time", outcome.ticks)
 }
 
 fn period(engine: &Engine) -> String {

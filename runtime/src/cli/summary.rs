@@ -79,7 +79,7 @@ impl Summary {
     pub(super) fn render(&self, engine: &Engine, outcome: &Outcome) -> String {
         let mut text = self.ports(engine);
         text.push('\n');
-        text.push_str(&nodes(engine));
+        text.push_str(&nodes(engine, outcome));
         for ((port, _), counters) in engine.ports().iter().zip(engine.counters()) {
             if counters.repeated + counters.went_back > 0 {
                 let (repeated, back) = (counters.repeated, counters.went_back);
@@ -122,7 +122,7 @@ impl Summary {
     }
 }
 
-fn nodes(engine: &Engine) -> String {
+fn nodes(engine: &Engine, outcome: &Outcome) -> String {
     let timing = engine.timing();
     if timing.ticks == 0 {
         return String::new();
@@ -133,7 +133,7 @@ fn nodes(engine: &Engine) -> String {
         rows.push([name.to_owned(), format!("{mean} ns"), format!("{} ns", time.longest.as_nanos())]);
     }
     let mut text = table(&rows, 1, usize::MAX);
-    let _ = writeln!(text, "timed in {} of {} ticks", timing.ticks, engine.ticks());
+    let _ = writeln!(text, "timed in {} of {} ticks", timing.ticks, outcome.ticks);
     text
 }
 

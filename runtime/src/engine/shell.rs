@@ -38,8 +38,10 @@ pub enum End {
 pub struct Outcome {
     /// Why it ended.
     pub end: End,
-    /// Time of the last tick in the graph's clock [ns].
+    /// Time of the last tick in the graph's clock, the ramp to zero aside [ns].
     pub time: i64,
+    /// Number of ticks, the ramp to zero aside.
+    pub ticks: u64,
     /// Time it took.
     pub wall: Duration,
     /// Ticks that began more than a period late; counted with a real clock only.
@@ -55,9 +57,9 @@ pub fn run(engine: &mut Engine, options: &RunOptions, observe: &mut dyn FnMut(&E
     let runtime = Builder::new_multi_thread().worker_threads(1).enable_all().build()?;
     let mut shell = Shell::start(engine, options, &runtime)?;
     let end = shell.run(engine, observe);
+    let (time, ticks) = (engine.now(), engine.ticks());
     shell.stop(engine);
-    let wall = shell.epoch.elapsed();
-    Ok(Outcome { end, time: engine.now(), wall, late: shell.late })
+    Ok(Outcome { end, time, ticks, wall: shell.epoch.elapsed(), late: shell.late })
 }
 
 struct Shell<'a> {

@@ -8,12 +8,12 @@ use super::frames::Frames;
 use super::load::{Flat, Loader, Request};
 use super::order::order;
 use super::plan::{Clock, Plan, PlannedCommand, PlannedNode, PlannedPort, PlannedRole, Producer, Source};
-use super::units::Units;
+use super::units::{Clash, Units};
 use super::wires::{CommandWire, Model, Wire};
 use super::{Sources, Value};
 use crate::catalogue::Catalogue;
 use crate::diagnostic::{Code, Diagnostic, Report};
-use crate::node::{Configured, Given, Need, Reader};
+use crate::node::{Configured, Given, Need, NodeSpec, PortSpec, Reader, Word};
 use crate::signal::Shape;
 
 /// Checks a graph and builds it.
@@ -171,15 +171,15 @@ impl Builder<'_> {
                 continue;
             };
             let consumer = format!("{}.{}", node.name, wire.key.name);
-            if let Err(takes) = units.take(input, &consumer, &port.shape) {
-                self.found.push(unit_mismatch(port, &consumer, &takes, wire));
+            if let Err(clash) = units.take(input, &consumer, &port.shape) {
+                self.found.push(unit_mismatch(port, &consumer, &clash, &wire.word).with_help(self.rate_maker(input)));
                 is_whole = false;
             }
             given.inputs[wire.input].push((wire.key.name.clone(), port.shape.clone()));
         }
         let missing =
             |(need, ports): &(Need, Vec<Source>)| matches!(need, Need::Required | Need::Sampled) && ports.is_empty();
-        if !is_whole || inputs.iter().any(missing) {
+        if !is_whole || inputs.iter().any(missing) || self.frames.has_clash(index) {
             return None;
         }
         let built = match configured?.build(given) {
@@ -220,6 +220,18 @@ impl Builder<'_> {
         configured.filter(|_| is_good)
     }
 
+    /// How to make rates for an input that takes nothing else: a node that takes any unit and gives it per second.
+    fn rate_maker(&self, input: &PortSpec) -> Option<String> {
+        let has =
+            |port: &PortSpec, unit: &str| port.kind == input.kind && port.args.first().is_some_and(|arg| arg == unit);
+        let specs = self.catalogue.nodes().iter().map(|node| node.spec());
+        let makes = |spec: &NodeSpec| {
+            spec.inputs.iter().any(|port| has(port, "_")) && spec.outputs.iter().any(|port| has(port, "_/s"))
+        };
+        let maker = specs.into_iter().find(makes).filter(|_| has(input, "_/s"))?;
+        Some(format!("put a `{}` between them", maker.name))
+    }
+
     /// Delayed inputs are compared once every shape is known.
     fn delayed(&mut self, wires: &[Vec<Wire>]) {
         for (index, wires) in wires.iter().enumerate() {
@@ -227,8 +239,8 @@ impl Builder<'_> {
             for wire in wires.iter().filter(|wire| spec.inputs[wire.input].need == Need::Delayed) {
                 let Some(port) = self.ports.get(&wire.source) else { continue };
                 let consumer = format!("{}.{}", self.model.flat.nodes[index].name, wire.key.name);
-                if let Err(takes) = Units::default().take(&spec.inputs[wire.input], &consumer, &port.shape) {
-                    self.found.push(unit_mismatch(port, &consumer, &takes, wire));
+                if let Err(clash) = Units::default().take(&spec.inputs[wire.input], &consumer, &port.shape) {
+                    self.found.push(unit_mismatch(port, &consumer, &clash, &wire.word));
                 }
             }
         }
@@ -240,19 +252,14 @@ impl Builder<'_> {
         let port = self.ports.get(&wire.source)?;
         let (spec, takes) = (&role.commands[wire.command], &bound.filled.commands[wire.command]);
         let consumer = format!("{}.{}", self.model.flat.roles[wire.role].0.name, spec.name);
-        let mismatch = |code, text: String| {
-            let message = format!("`{}` {text}", port.name);
-            Diagnostic::new(code, wire.word.span.clone(), message)
-        };
-        if let Err(unit) = Units::default().take(spec, &consumer, &port.shape) {
-            let has = port.shape.unit().map(|unit| unit.to_string()).unwrap_or_default();
-            self.found.push(mismatch(Code::UnitMismatch, format!("is in `{has}`, but `{consumer}` {unit}")));
+        if let Err(clash) = Units::default().take(spec, &consumer, &port.shape) {
+            self.found.push(unit_mismatch(port, &consumer, &clash, &wire.word));
             return None;
         }
         let (has, wants) = (joint_names(&port.shape), joint_names(takes));
         if has != wants {
-            let text = format!("has the joints {has:?}, but `{consumer}` takes {wants:?}");
-            self.found.push(mismatch(Code::ShapeMismatch, text));
+            let message = format!("`{}` has the joints {has:?}, but `{consumer}` takes {wants:?}", port.name);
+            self.found.push(Diagnostic::new(Code::ShapeMismatch, wire.word.span.clone(), message));
             return None;
         }
         Some(PlannedCommand { source: wire.source, device: bound.device, command: bound.first_command + wire.command })
@@ -266,11 +273,7 @@ fn joint_names(shape: &Shape) -> Vec<&str> {
     }
 }
 
-fn unit_mismatch(port: &PlannedPort, consumer: &str, takes: &str, wire: &Wire) -> Diagnostic {
-    let has = match port.shape.unit() {
-        Some(unit) => format!("is in `{unit}`"),
-        None => format!("is {}", port.shape.kind().with_article()),
-    };
-    let message = format!("`{}` {has}, but `{consumer}` {takes}", port.name);
-    Diagnostic::new(Code::UnitMismatch, wire.word.span.clone(), message)
+fn unit_mismatch(port: &PlannedPort, consumer: &str, clash: &Clash, word: &Word) -> Diagnostic {
+    let message = format!("`{}` {}, but `{consumer}` takes {}", port.name, clash.has, clash.takes);
+    Diagnostic::new(Code::UnitMismatch, word.span.clone(), message)
 }

@@ -95,8 +95,11 @@ impl Opener<'_> {
                 None => format!("device `{}` cannot be a `{}`, which role `{}` is", word.text, kind.text, key.name),
             };
             let roles: Vec<_> = description.fills.iter().map(|filled| format!("`{}`", filled.role)).collect();
-            let diagnostic = Diagnostic::new(Code::WrongRole, word.span.clone(), message);
-            self.found.push(diagnostic.help(format!("it can be: {}", roles.join(", "))));
+            let help = match by {
+                Some(_) => "give each role a device of its own".to_owned(),
+                None => format!("it can be: {}", roles.join(", ")),
+            };
+            self.found.push(Diagnostic::new(Code::WrongRole, word.span.clone(), message).help(help));
             return None;
         };
         self.taken.push((device, fills, key.name.clone()));

@@ -1,6 +1,6 @@
 //! Frames: unified over all wires, so that one adjoint serves every frame and a wrong one is a load error.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use super::load::FlatNode;
 use super::plan::{Producer, Source};
@@ -16,9 +16,16 @@ pub(crate) struct Frames {
     variables: BTreeMap<(Producer, String), usize>,
     parents: Vec<usize>,
     known: Vec<Option<String>>,
+    /// Nodes with a wire in the wrong frame.
+    clashes: BTreeSet<usize>,
 }
 
 impl Frames {
+    /// Whether a wire of that node is in the wrong frame: it has been told, and the node cannot be built.
+    pub(crate) fn has_clash(&self, node: usize) -> bool {
+        self.clashes.contains(&node)
+    }
+
     /// Unifies the frames of all wires; wires that tell most come first, so that a mistake shows where it is.
     pub(crate) fn unify(
         model: &Model<'_>,
@@ -38,7 +45,10 @@ impl Frames {
                 let input = &spec.inputs[wire.input];
                 let consumer = format!("{}.{}", model.flat.nodes[node].name, wire.key.name);
                 let end = End { owner: Producer::Node(node), port: input, name: consumer };
-                found.extend(frames.wire(model, wire.source, &wire.word, &end, &specs));
+                if let Some(clash) = frames.wire(model, wire.source, &wire.word, &end, &specs) {
+                    frames.clashes.insert(node);
+                    found.push(clash);
+                }
             }
         }
         for wire in commands {

@@ -63,7 +63,9 @@ pub(crate) enum Entity {
 pub(crate) struct Scope {
     pub(crate) names: BTreeMap<String, (Key, Entity)>,
     pub(crate) exports: Vec<(Key, Word)>,
-    /// Wires into the part, and the scope they stand in.
+    /// Inputs that the part declares.
+    pub(crate) declared: Vec<(Key, Word)>,
+    /// Wires into the part; they stand in the scope of its parent.
     pub(crate) inputs: Vec<(Key, Word)>,
     pub(crate) parent: Option<usize>,
 }
@@ -225,7 +227,7 @@ impl Loader {
     fn flatten(&mut self, document: Document, prefix: &str, mut scope: Scope, flat: &mut Flat) -> usize {
         let index = flat.scopes.len();
         flat.scopes.push(Scope::default());
-        scope.exports = document.exports;
+        (scope.exports, scope.declared) = (document.exports, document.inputs);
         for (i, (key, _)) in document.roles.iter().enumerate() {
             self.declare(&mut scope, key, Entity::Role(i));
         }

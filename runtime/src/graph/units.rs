@@ -32,6 +32,15 @@ fn variable(text: &str) -> Pattern {
     Pattern::Variable { name, per_tactel: text.contains("/tactel"), per_second: text.ends_with("/s") }
 }
 
+/// What comes in is not what is taken.
+#[derive(Debug, PartialEq, Eq)]
+pub(crate) struct Clash {
+    /// What comes in: `is in `m``.
+    pub(crate) has: String,
+    /// What is taken: ``N``.
+    pub(crate) takes: String,
+}
+
 /// What the variables of one node stand for, and which input told.
 #[derive(Debug, Default)]
 pub(crate) struct Units {
@@ -39,29 +48,34 @@ pub(crate) struct Units {
 }
 
 impl Units {
-    /// Takes the unit of what comes in; says what the input takes instead if it does not fit.
-    pub(crate) fn take(&mut self, port: &PortSpec, name: &str, shape: &Shape) -> Result<(), String> {
+    /// Takes the unit of what comes in on the input called `name`.
+    pub(crate) fn take(&mut self, port: &PortSpec, name: &str, shape: &Shape) -> Result<(), Clash> {
         if let Shape::Features(features) = shape {
             let slow = features.features.iter().find(|feature| feature.unit.per_second == 0);
             return match (pattern(port), slow) {
                 (Some(Pattern::AnyRate), Some(feature)) => {
-                    Err(format!("takes features per second, and `{}` is in `{}`", feature.name, feature.unit))
+                    let has = format!("has `{}` in `{}`", feature.name, feature.unit);
+                    Err(Clash { has, takes: "features per second".into() })
                 }
                 _ => Ok(()),
             };
         }
         let Some(unit) = shape.unit() else { return Ok(()) };
-        match pattern(port) {
-            None | Some(Pattern::Any) => Ok(()),
-            Some(Pattern::AnyRate) if unit.per_second > 0 => Ok(()),
-            Some(Pattern::AnyRate) => Err(format!("takes something per second, not `{unit}`")),
-            Some(Pattern::Known(takes)) if takes == unit => Ok(()),
-            Some(Pattern::Known(takes)) => Err(format!("takes `{takes}`")),
+        let takes = match pattern(port) {
+            None | Some(Pattern::Any) => return Ok(()),
+            Some(Pattern::AnyRate) if unit.per_second > 0 => return Ok(()),
+            Some(Pattern::AnyRate) => "something per second".into(),
+            Some(Pattern::Known(takes)) if takes == unit => return Ok(()),
+            Some(Pattern::Known(takes)) => format!("`{takes}`"),
             Some(Pattern::Variable { name: letter, .. }) => {
                 let (takes, by) = self.known.entry(letter).or_insert_with(|| (unit, name.to_owned()));
-                if *takes == unit { Ok(()) } else { Err(format!("takes `{takes}` like `{by}`")) }
+                if *takes == unit {
+                    return Ok(());
+                }
+                format!("`{takes}` like `{by}`")
             }
-        }
+        };
+        Err(Clash { has: format!("is in `{unit}`"), takes })
     }
 
     /// Fills in the unit of an output that follows from its declaration.
@@ -103,7 +117,8 @@ mod tests {
         }
         let mut units = Units::default();
         units.take(&port("U"), "n.a", &scalar("raw")).unwrap();
-        assert_eq!(units.take(&port("U"), "n.b", &scalar("N")), Err("takes `raw` like `n.a`".into()));
+        let clash = units.take(&port("U"), "n.b", &scalar("N")).unwrap_err();
+        assert_eq!((clash.has.as_str(), clash.takes.as_str()), ("is in `N`", "`raw` like `n.a`"));
         for (pattern, gives) in [("U", "raw"), ("U/tactel", "raw/tactel"), ("U/s", "raw/s"), ("m", "m"), ("V", "1")] {
             let mut shape = scalar("1");
             units.give(&port(pattern), &mut shape);

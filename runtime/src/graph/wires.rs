@@ -1,11 +1,11 @@
 //! Looks up where each wire comes from and whether it goes where its kind is taken.
 
 use super::Key;
-use super::load::{Entity, Flat};
+use super::load::{Entity, Flat, Scope};
 use super::plan::{Producer, Source};
 use crate::catalogue::Catalogue;
 use crate::device::RoleType;
-use crate::diagnostic::{Code, Diagnostic, closest};
+use crate::diagnostic::{Code, Diagnostic, closest, meant};
 use crate::node::{Need, NodeSpec, PortSpec, Word};
 
 /// A wire that goes somewhere.
@@ -143,8 +143,11 @@ impl<'a> Model<'a> {
 
     fn missing(&self, node: usize, spec: &NodeSpec, found: &mut Vec<Diagnostic>) {
         let block = &self.flat.nodes[node].block;
+        let names = || spec.inputs.iter().map(|input| &*input.name);
         for input in spec.inputs.iter().filter(|input| matches!(input.need, Need::Required | Need::Sampled)) {
-            if !block.wires.iter().any(|(key, _)| key.name == input.name) {
+            let is_meant =
+                |key: &Key| !names().any(|name| name == key.name) && meant(&key.name, names()) == Some(&input.name);
+            if !block.wires.iter().any(|(key, _)| key.name == input.name || is_meant(key)) {
                 let name = &input.name;
                 let message = format!("`{}` needs `in.{name}`, {}", block.key.name, input.kind.with_article());
                 let help = self.candidate(self.flat.nodes[node].scope, node, input);
@@ -186,14 +189,14 @@ impl<'a> Model<'a> {
         if name == "inputs"
             && let Some(parent) = self.flat.scopes[scope].parent
         {
-            let inputs = &self.flat.scopes[scope].inputs;
-            return match inputs.iter().find(|(key, _)| key.name == port) {
-                Some((_, word)) => self.resolve(parent, word, depth + 1),
-                None => {
-                    let help = closest(port, inputs.iter().map(|(key, _)| key.name.as_str()), "inputs");
-                    Err(wrong(format!("the part has no input `{port}`"), help))
-                }
-            };
+            let Scope { inputs, declared, .. } = &self.flat.scopes[scope];
+            if !declared.iter().any(|(key, _)| key.name == port) {
+                let help = closest(port, declared.iter().map(|(key, _)| key.name.as_str()), "inputs");
+                return Err(wrong(format!("the part has no input `{port}`"), help));
+            }
+            // An input that is declared and not wired has been complained about.
+            let wired = inputs.iter().find(|(key, _)| key.name == port);
+            return wired.map_or(Ok(None), |(_, word)| self.resolve(parent, word, depth + 1));
         }
         let Some((_, entity)) = names.get(name) else {
             let help = closest(name, names.keys().map(String::as_str), "roles, nodes and parts");

@@ -7,8 +7,9 @@ use std::path::PathBuf;
 use serde::de::DeserializeOwned;
 
 use super::{At, Mistake, Mistakes};
-use crate::diagnostic::{Code, closest};
+use crate::diagnostic::{Code, closest, meant};
 use crate::graph::{Item, Key, Sources, Table, Value};
+use crate::signal::Unit;
 
 /// What is known of a parameter without a graph.
 #[derive(Debug, Clone)]
@@ -68,6 +69,8 @@ pub struct Reader<'a> {
 pub struct OpenTable {
     rest: Table,
     span: Range<usize>,
+    /// Fields that must be given and are not.
+    missing: Vec<(&'static str, &'static str)>,
 }
 
 impl<'a> Reader<'a> {
@@ -90,7 +93,9 @@ impl<'a> Reader<'a> {
     /// Opens a table.
     pub fn table(&mut self, value: &Value) -> Option<OpenTable> {
         match &value.item {
-            Item::Table(table) => Some(OpenTable { rest: table.clone(), span: value.span.clone() }),
+            Item::Table(table) => {
+                Some(OpenTable { rest: table.clone(), span: value.span.clone(), missing: Vec::new() })
+            }
             _ => {
                 self.wrong_type(value, "a table");
                 None
@@ -110,14 +115,20 @@ impl<'a> Reader<'a> {
         }
         let default = default.map(|default| default()).or_else(T::when_missing);
         if default.is_none() {
-            let message = format!("`{name}` is missing: {}", T::EXPECTS);
-            self.mistakes.push(Mistake::new(Code::MissingKey, At::Span(table.span.clone()), message));
+            table.missing.push((name, T::EXPECTS));
         }
         default
     }
 
-    /// Every key that is left is one too many.
+    /// Every key that is left is one too many, and what was not given is missing, unless it was only misspelt.
     pub fn close(&mut self, table: OpenTable, known: &[&str]) {
+        for (name, expects) in table.missing {
+            let is_misspelt = |(key, _): &(Key, Value)| meant(&key.name, known.iter().copied()) == Some(name);
+            if !table.rest.entries.iter().any(is_misspelt) {
+                let message = format!("`{name}` is missing: expected {expects}");
+                self.mistakes.push(Mistake::new(Code::MissingKey, At::Span(table.span.clone()), message));
+            }
+        }
         for (key, _) in table.rest.entries {
             let message = format!("`{}` is not a parameter here", key.name);
             let help = closest(&key.name, known.iter().copied(), "parameters");
@@ -216,6 +227,21 @@ impl Param for Word {
 
     fn read(value: &Value, reader: &mut Reader<'_>) -> Option<Self> {
         Some(Self { text: read_leaf(value, reader, Self::EXPECTS)?, span: value.span.clone() })
+    }
+}
+
+impl Param for Unit {
+    const EXPECTS: &'static str = "a unit";
+
+    fn read(value: &Value, reader: &mut Reader<'_>) -> Option<Self> {
+        let text: String = read_leaf(value, reader, Self::EXPECTS)?;
+        match text.parse() {
+            Ok(unit) => Some(unit),
+            Err(message) => {
+                reader.bad(value.span.clone(), message);
+                None
+            }
+        }
     }
 }
 
@@ -323,7 +349,8 @@ impl<T> Map<T> {
                     .push(Mistake::key(format!("{param}.{key}"), format!("no feature is called `{key}`")).help(help));
             }
         }
-        for name in names.clone().filter(|name| !self.0.contains_key(*name)) {
+        let is_misspelt = |name: &str| self.0.keys().any(|key| meant(key, names.clone()) == Some(name));
+        for name in names.clone().filter(|name| !self.0.contains_key(*name) && !is_misspelt(name)) {
             let message = format!("`{param}` has no entry for feature `{name}`");
             let mistake = Mistake::new(Code::MissingKey, At::Key(param.into()), message);
             mistakes.push(mistake.help(format!("give `{param}.{name}`; the features here are {}", listed())));

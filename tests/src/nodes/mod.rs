@@ -29,7 +29,8 @@ pub fn catalogue() -> Catalogue {
 /// A role that gives a length.
 fn length() -> RoleType {
     let args = vec!["m".into(), "self".into()].into();
-    let value = PortSpec { name: "value".into(), doc: "A length.".into(), kind: Kind::Scalar, args, need: Need::Required };
+    let value =
+        PortSpec { name: "value".into(), doc: "A length.".into(), kind: Kind::Scalar, args, need: Need::Required };
     RoleType { name: "length".into(), summary: "a length".into(), outputs: vec![value], commands: vec![] }
 }
 
