@@ -22,8 +22,8 @@ params! {
     posture: Option<Vec<f64>>,
     /// How fast it drifts there [1/s].
     posture_gain: NonNegative = NonNegative(0.5),
-    /// Greatest speed toward a position limit, per distance to it [1/s].
-    limit_gain: Positive = Positive(5.0),
+    /// Greatest speed toward a position limit, per distance to it [1/s]; 5, or half the graph's rate if that is less.
+    limit_gain: Option<Positive>,
     /// Greatest age of the twist and of the arm's state [ms]; five periods of the graph unless given.
     max_age_ms: Option<Positive>,
     /// Time in which a command fades to zero when nothing fresh comes [ms].
@@ -93,7 +93,7 @@ impl Node for IkSink {
             damping: *params.damping,
             posture: params.posture,
             posture_gain: *params.posture_gain,
-            limit_gain: *params.limit_gain,
+            limit_gain: params.limit_gain.map_or(most_gain(setup.period).min(5.0), |gain| *gain),
             max_age: (max_age * 1e9) as i64,
             ramp: *params.ramp_ms * 1e-3,
         })
@@ -152,6 +152,11 @@ fn at_sensor(Pose(pose): &Pose, twist: &Twist) -> [f64; 6] {
     [turned(v, 0), turned(v, 1), turned(v, 2), turned(w, 0), turned(w, 1), turned(w, 2)]
 }
 
+/// Greatest gain toward a limit that leaves a margin of one tick's delay [1/s].
+fn most_gain(period: f64) -> f64 {
+    0.5 / period
+}
+
 fn check(params: &Params, joints: &JointsShape, columns: &JointsShape, period: f64) -> Mistakes {
     let mut mistakes = Mistakes::new();
     let names = |shape: &JointsShape| shape.joints.iter().map(|joint| joint.name.clone()).collect::<Vec<_>>();
@@ -163,8 +168,9 @@ fn check(params: &Params, joints: &JointsShape, columns: &JointsShape, period: f
         let message = format!("`damping` of less than {} drowns in rounding", damped::LEAST);
         mistakes.push(Mistake::param("damping", message));
     }
-    if *params.limit_gain * period > 0.5 {
-        let message = format!("a joint would cross its limit: `limit_gain` is more than {} 1/s", 0.5 / period);
+    let most = most_gain(period);
+    if params.limit_gain.is_some_and(|gain| *gain > most) {
+        let message = format!("a joint could cross its limit: `limit_gain` is more than {most} 1/s");
         mistakes.push(Mistake::param("limit_gain", message).help("half the rate of the graph is the most"));
     }
     let Some(posture) = &params.posture else { return mistakes };

@@ -211,7 +211,7 @@ fn bad_settings() {
         (
             "limit_gain = 501",
             At::Param("limit_gain".into()),
-            "a joint would cross its limit: `limit_gain` is more than 500 1/s",
+            "a joint could cross its limit: `limit_gain` is more than 500 1/s",
         ),
         ("posture = [0, 0]", At::Param("posture".into()), "`posture` has 2 entries, but the arm has 7 joints"),
         (
