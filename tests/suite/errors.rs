@@ -37,21 +37,22 @@ fn comment(diagnostic: &Diagnostic, sources: &Sources) -> Vec<String> {
     lines
 }
 
-/// The file as it should be, given everything that is wrong with it.
-fn annotated(path: &Path, report: &Report) -> String {
+/// The file as it should be, given everything that is wrong with it in any graph.
+fn annotated(path: &Path, reports: &[Report]) -> String {
     let name = path.display().to_string();
     let text = fs::read_to_string(path).unwrap();
     let mut result = String::new();
     for (i, line) in text.lines().enumerate().filter(|(_, line)| !is_expectation(line)) {
         result.push_str(line);
         result.push('\n');
-        for diagnostic in &report.diagnostics {
+        let mut seen = BTreeSet::new();
+        for (report, diagnostic) in reports.iter().flat_map(|report| report.diagnostics.iter().map(move |d| (report, d))) {
             let file = report.sources.file_at(diagnostic.span.start);
-            if file.name == name && file.line_column(diagnostic.span.start).0 == i + 1 {
-                comment(diagnostic, &report.sources).iter().for_each(|line| {
-                    result.push_str(line);
-                    result.push('\n');
-                });
+            let is_here = file.name == name && file.line_column(diagnostic.span.start).0 == i + 1;
+            let comment = comment(diagnostic, &report.sources).join("\n");
+            if is_here && seen.insert(comment.clone()) {
+                result.push_str(&comment);
+                result.push('\n');
             }
         }
     }
@@ -65,28 +66,20 @@ fn report(path: &Path) -> Report {
     }
 }
 
-/// The graph, and the parts and benches beside it that a report speaks of.
-fn files(report: &Report) -> BTreeSet<PathBuf> {
-    let names = report.diagnostics.iter().map(|d| report.sources.file_at(d.span.start).name.clone());
-    names.map(PathBuf::from).filter(|path| path.extension().is_some_and(|end| end == "toml")).collect()
-}
-
 #[test]
 fn every_mistake_shows_on_its_token_and_nothing_else_does() {
     let is_blessing = std::env::var_os("TACTFLOW_BLESS").is_some();
+    let graphs = toml_files(&folder());
+    let reports: Vec<Report> = graphs.iter().map(|graph| report(graph)).collect();
+    let beside = ["benches", "parts"].iter().flat_map(|name| toml_files(&folder().join(name)));
     let mut wrong = Vec::new();
-    for graph in toml_files(&folder()) {
-        let report = report(&graph);
-        let mut files = files(&report);
-        files.insert(graph.clone());
-        for file in files {
-            let expected = annotated(&file, &report);
-            if fs::read_to_string(&file).unwrap() != expected {
-                if is_blessing {
-                    fs::write(&file, &expected).unwrap();
-                }
-                wrong.push(format!("{} should be\n{expected}\n{}", file.display(), report.render(false)));
+    for file in graphs.iter().cloned().chain(beside) {
+        let expected = annotated(&file, &reports);
+        if fs::read_to_string(&file).unwrap() != expected {
+            if is_blessing {
+                fs::write(&file, &expected).unwrap();
             }
+            wrong.push(format!("{} should be\n{expected}", file.display()));
         }
     }
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));

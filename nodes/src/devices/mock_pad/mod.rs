@@ -25,7 +25,7 @@ params! {
     /// Distance between the centres of two neighbours, along x and along y [m].
     pitch: Positive = Positive(0.005),
     /// Unit of a tactel's value.
-    unit: String = "N".into(),
+    unit: Unit = Unit::NEWTON,
     /// Frames per second [1/s].
     rate_hz: Positive = Positive(250.0),
     /// How long there are frames [s]; for ever unless given.
@@ -71,10 +71,6 @@ impl Device for MockPad {
 
     fn open(params: Params) -> Result<Opened, Mistakes> {
         let mut mistakes = Mistakes::new();
-        let unit = params.unit.parse::<Unit>().unwrap_or_else(|message| {
-            mistakes.push(Mistake::param("unit", message));
-            Unit::ONE
-        });
         if params.rows.0 * params.cols.0 > MOST {
             let message = format!("{} by {} tactels are more than {MOST}", params.rows.0, params.cols.0);
             mistakes.push(Mistake::param("rows", message));
@@ -85,7 +81,7 @@ impl Device for MockPad {
         if !mistakes.is_empty() {
             return Err(mistakes);
         }
-        let shape = ImageShape { rows: params.rows.0, cols: params.cols.0, pitch: [*params.pitch; 2], unit };
+        let shape = ImageShape { rows: params.rows.0, cols: params.cols.0, pitch: [*params.pitch; 2], unit: params.unit };
         let facts = vec![("dead".into(), toml::Value::Array(vec![])), ("threshold".into(), (*params.threshold).into())];
         let outputs = vec![shape.clone().into()];
         let filled = Filled { role: "tactile_pad".into(), outputs, commands: vec![], facts };
@@ -168,6 +164,10 @@ impl MockPad {
 impl Stepped for MockPad {
     fn next(&self) -> Option<i64> {
         (self.next < self.frames).then(|| self.next.saturating_mul(self.period))
+    }
+
+    fn end(&self) -> Option<i64> {
+        (self.frames < i64::MAX / self.period).then(|| (self.frames - 1) * self.period)
     }
 
     fn exchange(&mut self, now: i64, _: &Commands, samples: &mut Samples) -> Result<(), DeviceError> {

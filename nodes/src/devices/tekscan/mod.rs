@@ -54,6 +54,10 @@ impl Stepped for TekscanMovie {
         self.movie.frames.get(self.next).map(|frame| frame.time)
     }
 
+    fn end(&self) -> Option<i64> {
+        self.movie.frames.last().map(|frame| frame.time)
+    }
+
     fn exchange(&mut self, now: i64, _: &Commands, samples: &mut Samples) -> Result<(), DeviceError> {
         let left = &self.movie.frames[self.next..];
         let due = left.partition_point(|frame| frame.time <= now);
