@@ -2,7 +2,7 @@
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
-/// The angle of the same line in (-pi/2, pi/2] [rad] (paper section IV: the angular error is measured modulo pi).
+/// The angle of the same line in (-pi/2, pi/2], as the paper takes the angular error (section IV, below eq. 3).
 ///
 /// Exact: the remainder and both shifts are free of rounding, so wrapping once more changes no bit, and an angle that
 /// is in range passes as it is.

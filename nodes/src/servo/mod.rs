@@ -3,6 +3,7 @@
 pub mod adjoint;
 pub mod axial;
 pub mod feature_error;
+pub mod integral;
 pub mod inverse_jacobian;
 pub mod pid;
 pub mod projector;
