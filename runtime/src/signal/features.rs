@@ -22,7 +22,7 @@ pub struct FeaturesShape {
 
 impl FeaturesShape {
     /// Names of the features, in order.
-    pub fn names(&self) -> impl Iterator<Item = &str> {
+    pub fn names(&self) -> impl Iterator<Item = &str> + Clone {
         self.features.iter().map(|feature| feature.name.as_str())
     }
 
