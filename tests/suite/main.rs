@@ -4,3 +4,5 @@ mod errors;
 mod faults;
 mod freshness;
 mod live;
+mod tick;
+mod tidy;

@@ -1,0 +1,95 @@
+//! What a tick does not do: allocate, or call the operating system.
+
+use tactflow_runtime::engine::Engine;
+use tactflow_runtime::graph::{Request, plan};
+use tactflow_tests::{catalogue, shipped_graphs};
+
+fn engine(graph: &std::path::Path) -> Engine {
+    let plan = plan(&catalogue(), &Request::file(graph));
+    Engine::new(plan.unwrap_or_else(|report| panic!("{}", report.render(false))))
+}
+
+#[test]
+fn the_tick_neither_allocates_nor_frees_in_any_shipped_graph() {
+    for graph in shipped_graphs() {
+        let mut engine = engine(&graph);
+        let mut ticks = 0;
+        while let Some(now) = engine.next().filter(|_| ticks < 3000) {
+            engine.exchange(now).unwrap();
+            // From latch to commit: contact comes, flickers and goes in every graph, and states are reset.
+            let counted = allocation_counter::measure(|| engine.step().unwrap());
+            assert_eq!(counted.count_total, 0, "{} in tick {}", graph.display(), engine.ticks());
+            ticks += 1;
+        }
+        assert!(ticks > 300, "{}: {ticks} ticks", graph.display());
+    }
+}
+
+#[test]
+fn the_counter_counts() {
+    let counted = allocation_counter::measure(|| drop(std::hint::black_box(vec![1_u8; 100])));
+    assert_eq!(counted.count_total, 1);
+}
+
+/// A thread that may only do what [`ALLOWED`] lists runs every tick of every shipped graph; any other call to the
+/// operating system would end this process at once, so it is done in a process of its own.
+#[cfg(target_os = "linux")]
+#[test]
+fn the_tick_makes_no_system_call() {
+    let test = std::env::current_exe().unwrap();
+    let run = |mode: &str| {
+        let mut command = std::process::Command::new(&test);
+        command.args(["--exact", "tick::in_a_jail", "--ignored", "--nocapture"]).env("TACTFLOW_JAIL", mode);
+        command.output().unwrap()
+    };
+    let inside = run("ticks");
+    let said = String::from_utf8_lossy(&inside.stdout).into_owned();
+    assert!(said.contains("every tick ran"), "{:?}\n{said}\n{}", inside.status, String::from_utf8_lossy(&inside.stderr));
+    let outside = run("escape");
+    assert!(!outside.status.success(), "the jail holds nobody");
+}
+
+/// What the jailed thread runs; only of use to the test above.
+#[cfg(target_os = "linux")]
+#[test]
+#[ignore = "run by `the_tick_makes_no_system_call` in a process of its own"]
+fn in_a_jail() {
+    let mode = std::env::var("TACTFLOW_JAIL").expect("run by another test");
+    let mut engines: Vec<Engine> = shipped_graphs().iter().map(|graph| engine(graph)).collect();
+    // Whatever a first panic or a first float would set up lazily is set up by the first tick.
+    for engine in &mut engines {
+        let now = engine.next().unwrap();
+        engine.tick(now).unwrap();
+    }
+    jail();
+    if mode == "escape" {
+        // Any call that is not allowed.
+        let _ = std::fs::metadata("/");
+    }
+    for engine in &mut engines {
+        let mut ticks = 0;
+        while let Some(now) = engine.next().filter(|_| ticks < 3000) {
+            engine.tick(now).unwrap();
+            ticks += 1;
+        }
+    }
+    println!("every tick ran");
+    std::process::exit(0);
+}
+
+/// From here on this thread may write, free memory and end; anything else kills the process.
+#[cfg(target_os = "linux")]
+fn jail() {
+    use seccompiler::{BpfProgram, SeccompAction, SeccompFilter, TargetArch, apply_filter};
+
+    /// `write`, `munmap`, `exit_group`, `sigaltstack`, `exit` on x86-64: what saying the last word and ending takes.
+    #[cfg(target_arch = "x86_64")]
+    const ALLOWED: [i64; 5] = [1, 11, 231, 131, 60];
+    #[cfg(target_arch = "aarch64")]
+    const ALLOWED: [i64; 5] = [64, 215, 94, 132, 93];
+    let rules = ALLOWED.iter().map(|call| (*call, vec![])).collect();
+    let arch = TargetArch::try_from(std::env::consts::ARCH).expect("a known architecture");
+    let filter = SeccompFilter::new(rules, SeccompAction::KillProcess, SeccompAction::Allow, arch).unwrap();
+    let program: BpfProgram = filter.try_into().unwrap();
+    apply_filter(&program).unwrap();
+}
