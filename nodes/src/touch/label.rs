@@ -195,10 +195,10 @@ fn paint(runs: &[Run], region: usize, mask: &mut Mask) {
     let words = mask.words_mut();
     for run in runs.iter().filter(|run| usize::from(run.region) == region) {
         let (start, end) = (usize::from(run.start), usize::from(run.end));
-        let row = &mut words[usize::from(run.row) * stride..][..stride];
-        for k in start / 64..end.div_ceil(64) {
-            let (from, to) = (start.saturating_sub(64 * k), (end - 64 * k).min(64));
-            row[k] |= (u64::MAX << from) & (u64::MAX >> (64 - to));
+        let first = usize::from(run.row) * stride;
+        let touched = &mut words[first + start / 64..first + end.div_ceil(64)];
+        for (word, at) in touched.iter_mut().zip((start / 64 * 64..).step_by(64)) {
+            *word |= (u64::MAX << start.saturating_sub(at)) & (u64::MAX >> (at + 64).saturating_sub(end));
         }
     }
 }
@@ -238,7 +238,8 @@ mod tests {
     fn the_contact_is_the_first_of_the_largest_that_are_enough() {
         let two = ["11..1", "..1.1", "....9"];
         let ring = ["1111", "1..1", "1.11", "1..."];
-        let cases: [(&str, &[&str], Option<&[&str]>, usize); 14] = [
+        type Rows<'a> = &'a [&'a str];
+        let cases: [(&str, Rows<'_>, Option<Rows<'_>>, usize); 14] = [
             ("", &["..", ".."], None, 0),
             ("", &["1"], Some(&["1"]), 1),
             ("", &two, Some(&["11...", "..1..", "....."]), 2),
