@@ -107,8 +107,11 @@ mod tests {
     fn the_threshold_itself_is_not_above_it() {
         for threshold in [0.0, 0.15, 1.0, -2.5, 4095.0] {
             let at = threshold as f32;
-            let mask = run(threshold, 3, &[at, at.next_up(), at.next_down()]);
-            assert_eq!(mask.words(), [0b010], "{threshold}");
+            for zeros in [0, 16, 17] {
+                let cells = [vec![at; zeros], vec![at, at.next_up(), at.next_down()]].concat();
+                let mask = run(threshold, cells.len(), &cells);
+                assert_eq!(mask.words(), [0b010 << zeros], "{threshold}");
+            }
         }
     }
 

@@ -267,6 +267,25 @@ mod tests {
     }
 
     #[test]
+    fn a_run_goes_on_over_the_border_of_two_words_but_not_into_the_next_row() {
+        // the tactels of two rows of 130, and how many runs they make
+        let cases: [(&[(usize, usize)], usize); 4] = [
+            (&[(0, 63), (1, 64)], 2),
+            (&[(0, 63), (0, 64)], 1),
+            (&[(0, 127), (1, 128)], 2),
+            (&[(0, 127), (0, 129)], 2),
+        ];
+        for (tactels, runs) in cases {
+            let mut mask = Mask::empty(2, 130);
+            tactels.iter().for_each(|(i, j)| mask.insert(*i, *j));
+            let mut rig = rig("neighbours = 4", 2, 130).unwrap();
+            show(&mut rig, &Image::zeros(2, 130), &mask);
+            let regions = rig.get::<Regions>("regions").unwrap();
+            assert_eq!((regions.runs().len(), regions.list().len()), (runs, runs), "{tactels:?}");
+        }
+    }
+
+    #[test]
     fn what_is_refused() {
         for bad in ["neighbours = 6", "min_area = 0", "min_area = -1", "min_force = \"1\"", "neighbors = 4"] {
             assert!(rig(bad, 4, 4).is_err(), "{bad}");

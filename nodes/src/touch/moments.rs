@@ -267,6 +267,22 @@ mod tests {
     }
 
     #[test]
+    fn a_line_is_as_anisotropic_as_can_be() {
+        let mut uniform = uniform(3);
+        for round in 0..200 {
+            let values: Vec<f64> = (0..16).map(|_| 0.1 + uniform()).collect();
+            let mut rig = rig("min_anisotropy = 0.999999", 16, 16, PITCH);
+            show(&mut rig, &render(16, 16, |i, j| if i == j { values[i] } else { 0.0 }), 0.0);
+            let anisotropy = get(&rig, "anisotropy").unwrap();
+            assert!(anisotropy <= 1.0, "{anisotropy} in round {round}");
+            assert_near(get(&rig, "orientation"), Some(libm::atan2(PITCH[1], PITCH[0])), "along the diagonal");
+        }
+        let mut rig = rig("min_anisotropy = 1", 2, 3, PITCH);
+        show(&mut rig, &render(2, 3, |i, _| i as f64), 0.0);
+        assert_eq!((get(&rig, "anisotropy"), get(&rig, "orientation")), (Some(1.0), Some(0.0)));
+    }
+
+    #[test]
     fn a_shift_by_a_tactel_is_a_shift_by_the_pitch() {
         let at = |di: usize, dj: usize| {
             let mut rig = rig("", 16, 16, PITCH);
