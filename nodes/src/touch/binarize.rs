@@ -18,6 +18,9 @@ outputs! {
     mask: Mask["A"],
 }
 
+/// Tactels that are compared at once.
+const BLOCK: usize = 16;
+
 /// The threshold.
 pub struct Binarize {
     threshold: f32,
@@ -59,21 +62,28 @@ impl Node for Binarize {
 
 /// Bit j tells whether tactel j of at most 64 is above the threshold.
 fn pack(tactels: &[f32], threshold: f32) -> u64 {
-    let (eights, rest) = tactels.as_chunks::<8>();
+    let (blocks, rest) = tactels.as_chunks::<BLOCK>();
     let mut word = 0;
-    for (k, eight) in eights.iter().enumerate() {
-        word |= above(eight, threshold) << (8 * k);
+    for (k, block) in blocks.iter().enumerate() {
+        word |= pack_block(block, threshold) << (BLOCK * k);
     }
-    for (j, value) in rest.iter().enumerate() {
-        word |= u64::from(*value > threshold) << (8 * eights.len() + j);
+    if rest.is_empty() {
+        return word;
     }
-    word
+    // The last block laps over the one before: its bits there are the same.
+    match tactels.last_chunk::<BLOCK>() {
+        Some(block) => word | pack_block(block, threshold) << (tactels.len() - BLOCK),
+        None => rest.iter().rev().fold(0, |word, value| word << 1 | u64::from(*value > threshold)),
+    }
 }
 
-/// Eight comparisons as eight bytes of 0 or 1, which one multiplication gathers in the topmost byte.
-fn above(eight: &[f32; 8], threshold: f32) -> u64 {
-    const GATHER: u64 = 0x0102_0408_1020_4080;
-    u64::from_le_bytes(eight.map(|value| u8::from(value > threshold))).wrapping_mul(GATHER) >> 56
+/// Compares all, then gathers: two loops that become vectors.
+fn pack_block(block: &[f32; BLOCK], threshold: f32) -> u64 {
+    let mut bits = [0u32; BLOCK];
+    for (j, (bit, value)) in bits.iter_mut().zip(block).enumerate() {
+        *bit = if *value > threshold { 1 << j } else { 0 };
+    }
+    bits.iter().fold(0, |word, bit| word | bit).into()
 }
 
 #[cfg(test)]
@@ -97,8 +107,11 @@ mod tests {
     fn the_threshold_itself_is_not_above_it() {
         for threshold in [0.0, 0.15, 1.0, -2.5, 4095.0] {
             let at = threshold as f32;
-            let mask = run(threshold, 3, &[at, at.next_up(), at.next_down()]);
-            assert_eq!(mask.words(), [0b010], "{threshold}");
+            for zeros in [0, 16, 17] {
+                let cells = [vec![at; zeros], vec![at, at.next_up(), at.next_down()]].concat();
+                let mask = run(threshold, cells.len(), &cells);
+                assert_eq!(mask.words(), [0b010 << zeros], "{threshold}");
+            }
         }
     }
 

@@ -195,10 +195,10 @@ fn paint(runs: &[Run], region: usize, mask: &mut Mask) {
     let words = mask.words_mut();
     for run in runs.iter().filter(|run| usize::from(run.region) == region) {
         let (start, end) = (usize::from(run.start), usize::from(run.end));
-        let row = &mut words[usize::from(run.row) * stride..][..stride];
-        for k in start / 64..end.div_ceil(64) {
-            let (from, to) = (start.saturating_sub(64 * k), (end - 64 * k).min(64));
-            row[k] |= (u64::MAX << from) & (u64::MAX >> (64 - to));
+        let first = usize::from(run.row) * stride;
+        let touched = &mut words[first + start / 64..first + end.div_ceil(64)];
+        for (word, at) in touched.iter_mut().zip((start / 64 * 64..).step_by(64)) {
+            *word |= (u64::MAX << start.saturating_sub(at)) & (u64::MAX >> (at + 64).saturating_sub(end));
         }
     }
 }
@@ -238,7 +238,8 @@ mod tests {
     fn the_contact_is_the_first_of_the_largest_that_are_enough() {
         let two = ["11..1", "..1.1", "....9"];
         let ring = ["1111", "1..1", "1.11", "1..."];
-        let cases: [(&str, &[&str], Option<&[&str]>, usize); 14] = [
+        type Rows<'a> = &'a [&'a str];
+        let cases: [(&str, Rows<'_>, Option<Rows<'_>>, usize); 14] = [
             ("", &["..", ".."], None, 0),
             ("", &["1"], Some(&["1"]), 1),
             ("", &two, Some(&["11...", "..1..", "....."]), 2),
@@ -262,6 +263,25 @@ mod tests {
             assert_eq!(rig.get::<Mask>("region"), region.as_ref(), "{params} {rows:?}");
             assert_eq!(rig.get::<Flag>("present"), Some(&region.is_some()), "{params} {rows:?}");
             assert_eq!(rig.get::<Regions>("regions").unwrap().list().len(), count, "{params} {rows:?}");
+        }
+    }
+
+    #[test]
+    fn a_run_goes_on_over_the_border_of_two_words_but_not_into_the_next_row() {
+        // the tactels of two rows of 130, and how many runs they make
+        let cases: [(&[(usize, usize)], usize); 4] = [
+            (&[(0, 63), (1, 64)], 2),
+            (&[(0, 63), (0, 64)], 1),
+            (&[(0, 127), (1, 128)], 2),
+            (&[(0, 127), (0, 129)], 2),
+        ];
+        for (tactels, runs) in cases {
+            let mut mask = Mask::empty(2, 130);
+            tactels.iter().for_each(|(i, j)| mask.insert(*i, *j));
+            let mut rig = rig("neighbours = 4", 2, 130).unwrap();
+            show(&mut rig, &Image::zeros(2, 130), &mask);
+            let regions = rig.get::<Regions>("regions").unwrap();
+            assert_eq!((regions.runs().len(), regions.list().len()), (runs, runs), "{tactels:?}");
         }
     }
 

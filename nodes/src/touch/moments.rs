@@ -165,7 +165,7 @@ impl Ellipse {
 
 #[cfg(test)]
 mod tests {
-    use std::f64::consts::{FRAC_PI_2, PI};
+    use std::f64::consts::{FRAC_PI_2, PI, SQRT_2};
 
     use nalgebra::{Matrix2, Vector2};
     use proptest::prelude::*;
@@ -267,6 +267,22 @@ mod tests {
     }
 
     #[test]
+    fn a_line_is_as_anisotropic_as_can_be() {
+        let mut uniform = uniform(3);
+        for round in 0..200 {
+            let values: Vec<f64> = (0..16).map(|_| 0.1 + uniform()).collect();
+            let mut rig = rig("min_anisotropy = 0.999999", 16, 16, PITCH);
+            show(&mut rig, &render(16, 16, |i, j| if i == j { values[i] } else { 0.0 }), 0.0);
+            let anisotropy = get(&rig, "anisotropy").unwrap();
+            assert!(anisotropy <= 1.0, "{anisotropy} in round {round}");
+            assert_near(get(&rig, "orientation"), Some(libm::atan2(PITCH[1], PITCH[0])), "along the diagonal");
+        }
+        let mut rig = rig("min_anisotropy = 1", 2, 3, PITCH);
+        show(&mut rig, &render(2, 3, |i, _| i as f64), 0.0);
+        assert_eq!((get(&rig, "anisotropy"), get(&rig, "orientation")), (Some(1.0), Some(0.0)));
+    }
+
+    #[test]
     fn a_shift_by_a_tactel_is_a_shift_by_the_pitch() {
         let at = |di: usize, dj: usize| {
             let mut rig = rig("", 16, 16, PITCH);
@@ -285,23 +301,25 @@ mod tests {
         }
     }
 
-    /// A line of 10 mm and more on a pad of 80 by 80 mm, spread by the foam; turned about a point off the middle.
-    fn bar(degrees: f64, sigma_mm: [f64; 2], pitch: [f64; 2]) -> Image {
+    /// An edge of some length on a pad of 80 by 80 mm, spread by 4 mm of foam, turned about a point off the middle.
+    fn bar(degrees: f64, length_mm: f64, pitch: [f64; 2]) -> Image {
         let (sine, cosine) = libm::sincos(degrees.to_radians());
         let (cols, rows) = ((0.08 / pitch[0]) as usize, (0.08 / pitch[1]) as usize);
+        let foam_mm = 4.0 * SQRT_2;
         render(rows, cols, |i, j| {
             let x = 1e3 * (j as f64 - (cols as f64 - 1.0) / 2.0) * pitch[0] - 1.3;
             let y = 1e3 * (i as f64 - (rows as f64 - 1.0) / 2.0) * pitch[1] + 0.7;
-            let (along, across) = ((cosine * x + sine * y) / sigma_mm[0], (cosine * y - sine * x) / sigma_mm[1]);
-            libm::exp(-0.5 * (along * along + across * across))
+            let (along, across) = (cosine * x + sine * y, cosine * y - sine * x);
+            let end = |sign: f64| libm::erf((0.5 * length_mm + sign * along) / foam_mm);
+            0.5 * (end(1.0) + end(-1.0)) * libm::exp(-(across / foam_mm).powi(2))
         })
     }
 
     /// Root of the mean squared error over all angles [degrees].
-    fn angle_error(pitch: [f64; 2], threshold: f32, noise: f64) -> f64 {
+    fn angle_error(length_mm: f64, pitch: [f64; 2], threshold: f32, noise: f64) -> f64 {
         let mut uniform = uniform(7);
         let squares = (-89..=90).map(|degrees| {
-            let mut image = bar(f64::from(degrees), [11.0, 4.0], pitch);
+            let mut image = bar(f64::from(degrees), length_mm, pitch);
             for cell in image.cells_mut() {
                 let gauss = (0..12).map(|_| uniform()).sum::<f64>() - 6.0;
                 *cell += (noise * gauss) as f32;
@@ -319,14 +337,16 @@ mod tests {
     fn the_orientation_of_a_bar_is_its_angle() {
         // The step at the edge of the mask is what is left without noise; a lower threshold makes it smaller.
         let cases = [
-            ([0.005; 2], 0.003, 0.0, 0.05),
-            ([0.004, 0.008], 0.003, 0.0, 0.1),
-            ([0.005; 2], 0.1, 0.0, 0.4),
-            ([0.005; 2], 0.1, 0.02, 0.4),
+            (40.0, [0.005; 2], 0.003, 0.0, 0.03),
+            (40.0, [0.004, 0.006], 0.003, 0.0, 0.03),
+            (60.0, [0.005; 2], 0.1, 0.0, 0.2),
+            (60.0, [0.005; 2], 0.1, 0.02, 0.3),
+            (40.0, [0.005; 2], 0.1, 0.02, 0.6),
         ];
-        for (pitch, threshold, noise, bound) in cases {
-            let error = angle_error(pitch, threshold, noise);
-            assert!(error < bound, "{error} degrees at {pitch:?}, threshold {threshold}, noise {noise}");
+        for (length_mm, pitch, threshold, noise, bound) in cases {
+            let error = angle_error(length_mm, pitch, threshold, noise);
+            let what = format!("{length_mm} mm, pitch {pitch:?}, threshold {threshold}, noise {noise}");
+            assert!(error < bound, "{error} degrees for {what}");
         }
     }
 

@@ -71,8 +71,9 @@ impl Node for TactileSource {
                 }
             }
         }
-        out.sum.set(sum(to));
-        out.peak.set(peak(to));
+        let (sum, peak) = sum_and_peak(to);
+        out.sum.set(sum);
+        out.peak.set(peak);
     }
 }
 
@@ -95,26 +96,23 @@ fn order(sensor: &ImageShape, params: &Params) -> Box<[u32]> {
     (0..rows).flat_map(|i| (0..cols).map(move |j| from(i, j))).collect()
 }
 
-fn sum(cells: &[f32]) -> f64 {
-    let mut lanes = [0.0; LANES];
-    for chunk in cells.chunks(LANES) {
-        for (lane, value) in lanes.iter_mut().zip(chunk) {
-            *lane += f64::from(*value);
-        }
-    }
-    let [a, b, c, d, e, f, g, h] = lanes;
-    ((a + e) + (c + g)) + ((b + f) + (d + h))
-}
-
-fn peak(cells: &[f32]) -> f64 {
+fn sum_and_peak(cells: &[f32]) -> (f64, f64) {
     let greater = |a: f32, b: f32| if b > a { b } else { a };
-    let mut lanes = [f32::NEG_INFINITY; LANES];
-    for chunk in cells.chunks(LANES) {
-        for (lane, value) in lanes.iter_mut().zip(chunk) {
-            *lane = greater(*lane, *value);
+    let (mut sums, mut peaks) = ([0.0; LANES], [f32::NEG_INFINITY; LANES]);
+    let (chunks, rest) = cells.as_chunks::<LANES>();
+    for chunk in chunks {
+        for lane in 0..LANES {
+            sums[lane] += f64::from(chunk[lane]);
+            peaks[lane] = greater(peaks[lane], chunk[lane]);
         }
     }
-    lanes.into_iter().fold(f32::NEG_INFINITY, greater).into()
+    for (lane, value) in rest.iter().enumerate() {
+        sums[lane] += f64::from(*value);
+        peaks[lane] = greater(peaks[lane], *value);
+    }
+    let [a, b, c, d, e, f, g, h] = sums;
+    let sum = ((a + e) + (c + g)) + ((b + f) + (d + h));
+    (sum, peaks.into_iter().fold(f32::NEG_INFINITY, greater).into())
 }
 
 #[cfg(test)]
