@@ -2,6 +2,8 @@
 #![allow(clippy::print_stdout, reason = "a bench prints what it measured")]
 
 mod chain;
+mod finger_press;
+mod fused;
 
 use std::hint::black_box;
 use std::time::Instant;
@@ -37,6 +39,33 @@ fn chains() {
     println!("one more node costs {per_node:.2} ns");
 }
 
+/// Greatest ratio of the graph's tick to the same arithmetic fused by hand.
+const MOST: f64 = 1.25;
+
+fn finger_press() {
+    let mut whole = finger_press::Pair::new();
+    let same = (0..whole.frames()).filter(|_| whole.step()).count();
+    println!("joint velocities of graph and fused function have the same bits in {same} of {} ticks", whole.frames());
+    assert_eq!(same, whole.frames());
+
+    // In the middle of a press.
+    const FRAME: usize = 150;
+    let mut pair = finger_press::Pair::new();
+    (0..=FRAME).for_each(|_| assert!(pair.step()));
+    let (cells, q) = (pair.cells(FRAME).to_vec(), pair.q());
+    let finger_press::Pair { engine, fused, .. } = &mut pair;
+    let mut out = [0.0; 7];
+    let mut graph = || black_box(&mut *engine).tick_bare();
+    let mut by_hand = || {
+        black_box(fused.tick(black_box(&cells), black_box(&q), 0.1, 0.1, &mut out));
+        black_box((fused.sum, fused.peak, out));
+    };
+    let medians = medians(&mut [&mut graph, &mut by_hand], 500);
+    let ratio = medians[0] / medians[1];
+    println!("finger press, a tick: graph {:.0} ns, fused {:.0} ns, ratio {ratio:.3} (at most {MOST})", medians[0], medians[1]);
+}
+
 fn main() {
     chains();
+    finger_press();
 }

@@ -1,7 +1,9 @@
 //! `binarize`: the tactels that are strictly greater than a threshold (paper section III).
 
 use tactflow_runtime::node::{Mistake, Mistakes, Node, Setup, Tick};
+use tactflow_runtime::signal::Mask;
 use tactflow_runtime::{inputs, outputs, params};
+use wide::f32x8;
 
 params! {
     /// A tactel belongs to the mask if it is greater than this, compared at the image's 32 bits [unit of the image].
@@ -19,7 +21,7 @@ outputs! {
 }
 
 /// Tactels that are compared at once.
-const BLOCK: usize = 16;
+const BLOCK: usize = 8;
 
 /// The threshold.
 pub struct Binarize {
@@ -48,14 +50,18 @@ impl Node for Binarize {
     fn state(&self) {}
 
     fn step(&self, _: &Tick, inputs: Inputs<'_>, out: &mut Outputs, (): &mut ()) {
-        let mask = out.mask.write();
-        // An array without columns has no words either.
-        let (cols, stride) = (mask.cols().max(1), mask.stride().max(1));
-        let rows = inputs.image.cells().chunks_exact(cols);
-        for (words, row) in mask.words_mut().chunks_exact_mut(stride).zip(rows) {
-            for (word, tactels) in words.iter_mut().zip(row.chunks(64)) {
-                *word = pack(tactels, self.threshold);
-            }
+        binarize(inputs.image.cells(), self.threshold, out.mask.write());
+    }
+}
+
+/// Makes the mask the cells above the threshold.
+pub fn binarize(cells: &[f32], threshold: f32, mask: &mut Mask) {
+    // An array without columns has no words either.
+    let (cols, stride) = (mask.cols().max(1), mask.stride().max(1));
+    let rows = cells.chunks_exact(cols);
+    for (words, row) in mask.words_mut().chunks_exact_mut(stride).zip(rows) {
+        for (word, tactels) in words.iter_mut().zip(row.chunks(64)) {
+            *word = pack(tactels, threshold);
         }
     }
 }
@@ -77,13 +83,9 @@ fn pack(tactels: &[f32], threshold: f32) -> u64 {
     }
 }
 
-/// Compares all, then gathers: two loops that become vectors.
+/// Compares all lanes at once and gathers their signs.
 fn pack_block(block: &[f32; BLOCK], threshold: f32) -> u64 {
-    let mut bits = [0u32; BLOCK];
-    for (j, (bit, value)) in bits.iter_mut().zip(block).enumerate() {
-        *bit = if *value > threshold { 1 << j } else { 0 };
-    }
-    bits.iter().fold(0, |word, bit| word | bit).into()
+    u64::from(f32x8::new(*block).simd_gt(f32x8::splat(threshold)).to_bitmask())
 }
 
 #[cfg(test)]

@@ -96,7 +96,7 @@ fn is_countable(grid: &Grid) -> bool {
 
 /// Lists the runs in raster order. Until [`number`], the `region` of each is its parent among the runs: itself, or one
 /// before it.
-fn trace(mask: &Mask, reach: u32, runs: &mut Vec<Run>) {
+pub fn trace(mask: &Mask, reach: u32, runs: &mut Vec<Run>) {
     runs.clear();
     let mut above = 0..0;
     for i in 0..mask.rows() {
@@ -159,7 +159,7 @@ fn root(runs: &mut [Run], mut id: usize) -> usize {
 }
 
 /// Numbers the regions in the order of their first runs, and adds up their areas and forces in raster order.
-fn number(image: &Image, runs: &mut [Run], regions: &mut Vec<Region>) {
+pub fn number(image: &Image, runs: &mut [Run], regions: &mut Vec<Region>) {
     regions.clear();
     for id in 0..runs.len() {
         let Run { row, start, end, region: parent } = runs[id];
@@ -177,7 +177,8 @@ fn number(image: &Image, runs: &mut [Run], regions: &mut Vec<Region>) {
 }
 
 /// The first of the largest regions that are large and strong enough.
-fn contact(regions: &[Region], min_area: usize, min_force: f64) -> Option<usize> {
+#[must_use]
+pub fn contact(regions: &[Region], min_area: usize, min_force: f64) -> Option<usize> {
     let mut largest = None;
     let mut area = 0;
     for (i, region) in regions.iter().enumerate() {
@@ -189,7 +190,7 @@ fn contact(regions: &[Region], min_area: usize, min_force: f64) -> Option<usize>
 }
 
 /// Makes the mask the tactels of one region.
-fn paint(runs: &[Run], region: usize, mask: &mut Mask) {
+pub fn paint(runs: &[Run], region: usize, mask: &mut Mask) {
     mask.clear();
     let stride = mask.stride();
     let words = mask.words_mut();

@@ -26,7 +26,8 @@ fn on_one_array(image: &ImageShape, input: &str, mask: &Grid) -> Result<(), Mist
 }
 
 /// Direction of the axis whose doubled angle has this sine and cosine, up to a common factor: in (-pi/2, pi/2] [rad].
-fn axis(sine: f64, cosine: f64) -> f64 {
+#[must_use]
+pub fn axis(sine: f64, cosine: f64) -> f64 {
     let angle = 0.5 * libm::atan2(sine, cosine);
     // A sine of -0, or one too small to count, would give the other name of the same axis.
     if angle > -FRAC_PI_2 { angle } else { FRAC_PI_2 }

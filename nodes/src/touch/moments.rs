@@ -92,19 +92,25 @@ impl Node for Moments {
 
 /// Sums over a region, places counted in tactels from its first tactel in raster order.
 #[derive(Debug, Default)]
-struct Sums {
+pub struct Sums {
     /// Row and column of that first tactel.
-    first: [f64; 2],
-    area: f64,
-    force: f64,
-    x: f64,
-    y: f64,
+    pub first: [f64; 2],
+    /// Number of tactels.
+    pub area: f64,
+    /// Sum of their values.
+    pub force: f64,
+    /// Sum of value times column.
+    pub x: f64,
+    /// Sum of value times row.
+    pub y: f64,
     xx: f64,
     xy: f64,
     yy: f64,
 }
 
-fn add_up(image: &Image, region: &Mask) -> Sums {
+/// One pass over the tactels of a region, in raster order.
+#[must_use]
+pub fn add_up(image: &Image, region: &Mask) -> Sums {
     let mut sums = Sums::default();
     let Some(at) = region.words().iter().position(|word| *word != 0) else { return sums };
     let stride = region.stride();
@@ -138,13 +144,17 @@ fn add_up(image: &Image, region: &Mask) -> Sums {
 }
 
 /// Second central moments: their sum, and the double of the axis they give, as a sine and a cosine times its strength.
-struct Ellipse {
+pub struct Ellipse {
     spread: f64,
-    sine: f64,
-    cosine: f64,
+    /// Sine of the doubled axis, times its strength.
+    pub sine: f64,
+    /// Cosine of the doubled axis, times its strength.
+    pub cosine: f64,
 }
 
-fn ellipse(sums: &Sums, pitch: [f64; 2]) -> Ellipse {
+/// The ellipse with the second central moments of a region whose force is positive.
+#[must_use]
+pub fn ellipse(sums: &Sums, pitch: [f64; 2]) -> Ellipse {
     let (x, y) = (sums.x / sums.force, sums.y / sums.force);
     let m20 = (sums.xx / sums.force - x * x) * pitch[0] * pitch[0];
     let m02 = (sums.yy / sums.force - y * y) * pitch[1] * pitch[1];
@@ -154,7 +164,8 @@ fn ellipse(sums: &Sums, pitch: [f64; 2]) -> Ellipse {
 
 impl Ellipse {
     /// From 0 to 1; zero without extent, and where tactels below zero leave no positive spread.
-    fn anisotropy(&self) -> f64 {
+    #[must_use]
+    pub fn anisotropy(&self) -> f64 {
         if self.spread > 0.0 {
             ((self.sine * self.sine + self.cosine * self.cosine).sqrt() / self.spread).min(1.0)
         } else {

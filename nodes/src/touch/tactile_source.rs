@@ -96,7 +96,9 @@ fn order(sensor: &ImageShape, params: &Params) -> Box<[u32]> {
     (0..rows).flat_map(|i| (0..cols).map(move |j| from(i, j))).collect()
 }
 
-fn sum_and_peak(cells: &[f32]) -> (f64, f64) {
+/// Sum and greatest of all cells, in eight lanes and a fixed tree: the same bits on every machine.
+#[must_use]
+pub fn sum_and_peak(cells: &[f32]) -> (f64, f64) {
     let greater = |a: f32, b: f32| if b > a { b } else { a };
     let (mut sums, mut peaks) = ([0.0; LANES], [f32::NEG_INFINITY; LANES]);
     let (chunks, rest) = cells.as_chunks::<LANES>();

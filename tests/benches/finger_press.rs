@@ -1,0 +1,88 @@
+//! The finger press as a graph and fused by hand, side by side.
+
+use std::path::Path;
+
+use tactflow_nodes::devices::tekscan::{Movie, parse};
+use tactflow_runtime::engine::Engine;
+use tactflow_runtime::graph::{Request, plan};
+use tactflow_runtime::signal::{Joints, Signal};
+use tactflow_tests::{catalogue, workspace};
+
+use crate::fused::Fused;
+
+/// The graph on its bench, and the same by hand.
+pub(crate) struct Pair {
+    pub(crate) engine: Engine,
+    pub(crate) fused: Fused,
+    movie: Movie,
+    /// Frames that both have seen.
+    seen: usize,
+    /// When contact and axis were there last [ticks].
+    contact: Option<usize>,
+    axis: Option<usize>,
+}
+
+fn read(path: &Path) -> String {
+    std::fs::read_to_string(path).unwrap_or_else(|error| panic!("{}: {error}", path.display()))
+}
+
+fn joints(engine: &Engine, name: &str) -> [f64; 7] {
+    let (_, id) = engine.ports().iter().find(|(port, _)| port.name == name).expect("the graph has that port");
+    Joints::arena(&engine.bus().arenas)[id.slot as usize].0[..].try_into().expect("seven joints")
+}
+
+impl Pair {
+    pub(crate) fn new() -> Self {
+        let graphs = workspace().join("graphs");
+        let plan = plan(&catalogue(), &Request::file(graphs.join("finger_press.toml")));
+        let engine = Engine::new(plan.unwrap_or_else(|report| panic!("{}", report.render(false))));
+        let movie = parse(&read(&graphs.join("recordings/pressuRe/iscan_test.csv"))).expect("the recording is sound");
+        let fused = Fused::new(movie.shape.clone(), &movie.dead, &graphs.join("robots/lwr4p.urdf"));
+        Self { engine, fused, movie, seen: 0, contact: None, axis: None }
+    }
+
+    /// The cells of a frame.
+    pub(crate) fn cells(&self, frame: usize) -> &[f32] {
+        let tactels = self.movie.shape.tactels();
+        &self.movie.cells[frame * tactels..][..tactels]
+    }
+
+    /// Runs both on the next frame; whether their joint velocities have the same bits.
+    pub(crate) fn step(&mut self) -> bool {
+        let now = self.engine.next().expect("frames are left");
+        self.engine.tick(now).expect("the recording is sound");
+        let (q, wanted) = (joints(&self.engine, "arm.position"), joints(&self.engine, "move.ik.velocity"));
+        let time = |frame: usize| self.movie.frames[frame].time;
+        // As in the graph: a feature that is away for a tick of this slow recording is away for good.
+        let is_gone = |last: Option<usize>| last.is_some_and(|last| last + 1 < self.seen);
+        let (contact_gone, axis_gone) = (is_gone(self.contact), is_gone(self.axis));
+        if contact_gone {
+            self.fused.reset();
+        } else if axis_gone {
+            self.fused.reset_axes();
+        }
+        let dt = match self.contact.filter(|_| !contact_gone) {
+            Some(last) => (time(self.seen) - time(last)) as f64 * 1e-9,
+            None => 0.0,
+        };
+        let tick = if self.seen == 0 { 0.0 } else { (time(self.seen) - time(self.seen - 1)) as f64 * 1e-9 };
+        let mut out = [0.0; 7];
+        let tactels = self.movie.shape.tactels();
+        let cells = &self.movie.cells[self.seen * tactels..][..tactels];
+        let (has_contact, has_axis) = self.fused.tick(cells, &q, dt, tick, &mut out);
+        self.contact = if has_contact { Some(self.seen) } else { self.contact };
+        self.axis = if has_axis { Some(self.seen) } else { self.axis };
+        self.seen += 1;
+        out.map(f64::to_bits) == wanted.map(f64::to_bits)
+    }
+
+    /// Frames of the recording.
+    pub(crate) fn frames(&self) -> usize {
+        self.movie.frames.len()
+    }
+
+    /// The arm's joints as the last tick saw them.
+    pub(crate) fn q(&self) -> [f64; 7] {
+        joints(&self.engine, "arm.position")
+    }
+}

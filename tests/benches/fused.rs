@@ -1,0 +1,180 @@
+//! The whole tick of `graphs/finger_press.toml` fused by hand: the same arithmetic in one function, without a graph.
+//!
+//! It calls the nodes' own kernels and keeps everything else in locals; it has no freshness, no marks, no units and no
+//! modes, and it would have to be written again for the next task.
+
+use std::path::Path;
+
+use tactflow_nodes::arm::chain::Chain;
+use tactflow_nodes::arm::{damped, joint_limits, model, mount::Mount, null_space};
+use tactflow_nodes::servo::{adjoint::adjoint, axial::wrap_axial, integral::integrate};
+use tactflow_nodes::touch::{axis, binarize::binarize, label, moments, tactile_source::sum_and_peak};
+use tactflow_runtime::node::FilePath;
+use tactflow_runtime::signal::{Grid, Image, ImageShape, Joint, Mask, Pose, Regions, Signal, Twist};
+
+const WINDOW: usize = 3;
+const COLUMNS: [[f64; 6]; 4] = [
+    [-1.0, 0.0, 0.0, 0.0, -20.0, 0.0],
+    [0.0, -1.0, 0.0, 20.0, 0.0, 0.0],
+    [0.0, 0.0, 0.0005, 0.0, 0.0, 0.0],
+    [0.0, 0.0, 0.0, 0.0, 0.0, -1.0],
+];
+const POSTURE: [f64; 7] = [0.0, 0.5, 0.0, -1.3, 0.0, 1.3, 0.0];
+
+/// The controller and everything it remembers.
+pub(crate) struct Fused {
+    shape: ImageShape,
+    alive: Box<[f32]>,
+    image: Image,
+    mask: Mask,
+    region: Mask,
+    regions: Regions,
+    pressures: Ring,
+    axes: Ring,
+    integral: f64,
+    chain: Chain,
+    joints: Vec<Joint>,
+    columns: Vec<Twist>,
+    at_sensor: [[f64; 6]; 7],
+    rows: [null_space::Row; 7],
+    last: [f64; 7],
+    left: f64,
+    /// Read off by the bench, so that nothing is optimised away.
+    pub(crate) sum: f64,
+    pub(crate) peak: f64,
+}
+
+/// The last samples of a feature.
+#[derive(Default)]
+struct Ring {
+    samples: [[f64; 2]; WINDOW],
+    next: usize,
+    count: usize,
+}
+
+impl Ring {
+    fn mean(&mut self, sample: [f64; 2]) -> [f64; 2] {
+        self.samples[self.next] = sample;
+        self.next = (self.next + 1) % WINDOW;
+        self.count = (self.count + 1).min(WINDOW);
+        let start = if self.count < WINDOW { 0 } else { self.next };
+        let (newer, older) = self.samples[..self.count].split_at(start);
+        let sum = older.iter().chain(newer).fold([0.0; 2], |[a, b], s| [a + s[0], b + s[1]]);
+        sum.map(|sum| sum / self.count as f64)
+    }
+}
+
+impl Fused {
+    /// The task of the graph on that array, with dead tactels, and the arm of that model.
+    pub(crate) fn new(shape: ImageShape, dead: &[usize], urdf: &Path) -> Self {
+        let file = FilePath { path: urdf.into(), span: 0..0 };
+        let mount = Mount { xyz: [0.0, 0.0, 0.03], rpy: [0.0; 3] };
+        let chain = model::load(&file, "lwr_7_link", &mount).unwrap_or_else(|mistakes| panic!("{mistakes:?}"));
+        let grid = Grid::from(&shape);
+        let (rows, cols) = (shape.rows, shape.cols);
+        Self {
+            alive: (0..rows * cols).map(|at| if dead.contains(&at) { 0.0 } else { 1.0 }).collect(),
+            image: Image::zeros(rows, cols),
+            mask: Mask::allocate(&grid),
+            region: Mask::allocate(&grid),
+            regions: Regions::with_room(rows, cols),
+            pressures: Ring::default(),
+            axes: Ring::default(),
+            integral: 0.0,
+            joints: chain.joints().to_vec(),
+            chain,
+            columns: vec![Twist::default(); 7],
+            at_sensor: [[0.0; 6]; 7],
+            rows: [[0.0; 8]; 7],
+            last: [0.0; 7],
+            left: 0.0,
+            sum: 0.0,
+            peak: 0.0,
+            shape,
+        }
+    }
+
+    /// Forgets what a contact that was lost for long had built up.
+    pub(crate) fn reset(&mut self) {
+        (self.pressures, self.axes, self.integral) = (Ring::default(), Ring::default(), 0.0);
+    }
+
+    /// Forgets the axes only: the patch was round for long.
+    pub(crate) fn reset_axes(&mut self) {
+        self.axes = Ring::default();
+    }
+
+    /// One tick: the recording's cells and the arm's joints in, joint velocities out. `dt` is the time between the last
+    /// two samples of the contact [s], `tick` that between the ticks. Tells whether there is a contact and an axis.
+    pub(crate) fn tick(&mut self, cells: &[f32], q: &[f64], dt: f64, tick: f64, out: &mut [f64; 7]) -> (bool, bool) {
+        (self.sum, self.peak) = sum_and_peak(cells);
+        for ((to, from), gain) in self.image.cells_mut().iter_mut().zip(cells).zip(&self.alive) {
+            *to = (from - 0.0) * gain;
+        }
+        binarize(self.image.cells(), 3.0, &mut self.mask);
+        let (runs, regions) = self.regions.parts_mut();
+        label::trace(&self.mask, 1, runs);
+        label::number(&self.image, runs, regions);
+        let contact = label::contact(regions, 6, 100.0);
+        let Pose(pose) = self.chain.forward(q, &mut self.columns);
+        let Some(contact) = contact else {
+            self.left = (self.left - tick / 0.1).max(0.0);
+            for (out, last) in out.iter_mut().zip(&self.last) {
+                *out = last * self.left;
+            }
+            joint_limits::limit(&self.joints, q, 5.0, out);
+            return (false, false);
+        };
+        label::paint(runs, contact, &mut self.region);
+        let (twist, has_axis) = self.servo(dt);
+        let spatial = adjoint(&Pose(pose), &twist);
+        let r = pose.rotation.matrix();
+        let p = pose.translation.vector;
+        let at_sensor = |twist: &Twist| {
+            let [vx, vy, vz, wx, wy, wz] = twist.0.into();
+            let v = [vx + wy * p.z - wz * p.y, vy + wz * p.x - wx * p.z, vz + wx * p.y - wy * p.x];
+            let w = [wx, wy, wz];
+            let turned = |a: [f64; 3], i: usize| r[(0, i)] * a[0] + r[(1, i)] * a[1] + r[(2, i)] * a[2];
+            [turned(v, 0), turned(v, 1), turned(v, 2), turned(w, 0), turned(w, 1), turned(w, 2)]
+        };
+        for (to, column) in self.at_sensor.iter_mut().zip(&self.columns) {
+            *to = at_sensor(column);
+        }
+        damped::solve(&self.at_sensor, &at_sensor(&spatial), 0.05, out);
+        joint_limits::limit(&self.joints, q, 5.0, out);
+        let mut drift: [f64; 7] = std::array::from_fn(|i| 0.5 * (POSTURE[i] - q[i]));
+        null_space::project(&self.at_sensor, &mut self.rows, &mut drift);
+        joint_limits::add_within(&self.joints, q, 5.0, out, &drift);
+        (self.last, self.left) = (*out, 1.0);
+        (true, has_axis)
+    }
+
+    /// From the region to the twist of the sensor (eqs. 1-3 and 5).
+    fn servo(&mut self, dt: f64) -> (Twist, bool) {
+        let sums = moments::add_up(&self.image, &self.region);
+        let pressure = self.pressures.mean([sums.force / sums.area, 0.0])[0];
+        let (j, i) = (sums.x / sums.force, sums.y / sums.force);
+        let (x, y) = (self.shape.x(sums.first[1] + j), self.shape.y(sums.first[0] + i));
+        let ellipse = moments::ellipse(&sums, self.shape.pitch);
+        let has_axis = ellipse.anisotropy() >= 0.1;
+        let mut control = [0.5 * (0.0 - x), 0.5 * (0.0 - y), 0.0, 0.0];
+        let error = 40.0 - pressure;
+        let growth = if error.abs() <= 10.0 { 0.1 * error * dt } else { 0.0 };
+        self.integral = integrate(self.integral, growth, 5.0, 0.5 * error, f64::INFINITY);
+        control[2] = 0.5 * error + self.integral;
+        if has_axis {
+            let (sine, cosine) = libm::sincos(2.0 * axis(ellipse.sine, ellipse.cosine));
+            let [cosine, sine] = self.axes.mean([cosine, sine]);
+            control[3] = 0.5 * wrap_axial(0.0 - axis(sine, cosine));
+        }
+        let mut twist = Twist::default();
+        for (column, control) in COLUMNS.iter().zip(control).take(3 + usize::from(has_axis)) {
+            for (sum, entry) in twist.0.iter_mut().zip(column) {
+                *sum += entry * control;
+            }
+        }
+        (twist.0[3], twist.0[4]) = (0.0, 0.0);
+        twist.0[1] += 0.005;
+        (twist, has_axis)
+    }
+}
