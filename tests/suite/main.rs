@@ -1,7 +1,9 @@
 //! The suite: one module a subject.
 
+mod bad_data;
 mod cli;
 mod course;
+mod determinism;
 mod errors;
 mod faults;
 mod freshness;
