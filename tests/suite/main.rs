@@ -8,4 +8,5 @@ mod errors;
 mod faults;
 mod freshness;
 mod live;
+mod mutations;
 mod tool;
