@@ -6,6 +6,7 @@ use tactflow_runtime::engine::Engine;
 use tactflow_runtime::fault::Fault;
 use tactflow_runtime::graph::{Plan, Request, plan};
 use tactflow_runtime::record::Columns;
+use tactflow_runtime::signal::Signal;
 use tactflow_tests::{catalogue, workspace};
 
 /// A shipped graph, by the name of its file.
@@ -49,4 +50,22 @@ pub(crate) fn course(plan: Plan, most: usize) -> Course {
     }
     let names = columns.list.iter().map(|column| format!("{} [{}]", column.name, column.unit));
     Course { columns: names.zip(bits).collect(), times, fault }
+}
+
+/// Runs a graph to its end and shows every tick.
+pub(crate) fn watch(request: &Request, mut look: impl FnMut(&Engine)) {
+    let mut engine = Engine::new(loaded(request));
+    while let Some(next) = engine.next() {
+        engine.tick(next).unwrap_or_else(|fault| panic!("{fault}"));
+        look(&engine);
+    }
+}
+
+/// What is on a port; none if it is absent.
+pub(crate) fn get<'e, T: Signal>(engine: &'e Engine, port: &str) -> Option<&'e T> {
+    let found = engine.ports().iter().find(|(planned, _)| planned.name == port);
+    let (planned, id) = found.unwrap_or_else(|| panic!("there is no port `{port}`"));
+    assert_eq!(planned.shape.kind(), T::KIND, "`{port}`");
+    let bus = engine.bus();
+    bus.marks[id.mark as usize].is_present().then(|| &T::arena(&bus.arenas)[id.slot as usize])
 }

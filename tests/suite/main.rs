@@ -9,4 +9,5 @@ mod faults;
 mod freshness;
 mod live;
 mod mutations;
+mod oracles;
 mod tool;
