@@ -8,6 +8,7 @@ mod errors;
 mod faults;
 mod freshness;
 mod live;
+mod merge;
 mod mutations;
 mod oracles;
 mod tool;
