@@ -178,6 +178,7 @@ fn what_is_whole_loads() {
 }
 
 #[test]
+#[allow(clippy::print_stderr, reason = "who tests must know what was left out")]
 fn every_damage_has_its_message() {
     let is_blessing = std::env::var_os("TACTFLOW_BLESS").is_some();
     let mut wrong = Vec::new();

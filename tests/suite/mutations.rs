@@ -225,11 +225,12 @@ fn no_mutant_passes_silently() {
     for (fate, count) in results.iter().flat_map(|(_, counts)| counts) {
         *counts.entry(*fate).or_default() += count;
     }
-    println!("{counts:?}");
     let silent: Vec<String> = results.into_iter().flat_map(|(silent, _)| silent).collect();
     assert!(silent.is_empty(), "{} pass silently, of {counts:?}\n{}", silent.len(), silent.join("\n"));
     let of = |fate: Fate| counts.get(&fate).copied().unwrap_or(0);
     let total: usize = counts.values().sum();
     assert!(total > SEEDS.len() * MUTANTS, "{counts:?}");
     assert!(of(Fate::Told) * 10 > total * 6, "most mutants are mistakes, and told: {counts:?}");
+    let meant: usize = counts.iter().filter(|(fate, _)| matches!(fate, Fate::Meant(_))).map(|(_, count)| count).sum();
+    assert!(meant * 10 < total, "few are another graph that could be meant: {counts:?}");
 }
