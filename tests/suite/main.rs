@@ -5,6 +5,7 @@ mod bad_data;
 mod cli;
 mod course;
 mod determinism;
+mod docs;
 mod errors;
 mod faults;
 mod freshness;
