@@ -151,8 +151,8 @@ mod tests {
         ) {
             let mut got = vec![0.0; columns.len()];
             solve(&columns, &twist, LEAST, &mut got);
-            // 1.04 / eps is the maximum over s of the closed form.
-            let bound = 1.1 * Vector6::from(twist).norm() / LEAST;
+            // 2/3 / eps is the maximum over s of the closed form, at s = eps; the rest is rounding.
+            let bound = 0.67 * Vector6::from(twist).norm() / LEAST;
             prop_assert!(DVector::from_vec(got).norm() <= bound);
         }
     }
