@@ -185,3 +185,59 @@ fn the_reference_lists_every_role_and_every_device() {
         assert!(page.contains(&format!("`{}`", device.name())), "{}", device.name());
     }
 }
+
+/// The Rust files below a folder, relative to it.
+fn rust_files(root: &Path, folder: &Path, files: &mut Vec<String>) {
+    for entry in fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        if path.is_dir() {
+            rust_files(root, &path, files);
+        } else {
+            files.push(path.strip_prefix(root).unwrap().display().to_string());
+        }
+    }
+}
+
+#[test]
+fn the_architecture_lists_every_file_of_the_runtime() {
+    let root = workspace().join("runtime/src");
+    let mut files = Vec::new();
+    rust_files(&root, &root, &mut files);
+    let mut listed = first_cells(&page("ARCHITECTURE.md"), "| file of `runtime/src` | what it holds |");
+    files.sort();
+    listed.sort();
+    assert_eq!(listed, files);
+}
+
+#[test]
+fn every_invariant_names_tests_that_exist() {
+    let page = page("ARCHITECTURE.md");
+    let rows: Vec<&str> = page.lines().filter(|line| line.starts_with("| I")).collect();
+    assert_eq!(rows.len(), 8);
+    for row in rows {
+        let tests: Vec<(&str, &str)> = row.split('`').filter_map(|word| word.split_once(".rs::")).collect();
+        assert!(!tests.is_empty(), "{row}");
+        for (path, name) in tests {
+            let text = file(&format!("{path}.rs"));
+            assert!(text.contains(&format!("fn {name}(")), "{path}.rs has no {name}");
+        }
+    }
+}
+
+#[test]
+fn every_link_of_the_pages_leads_somewhere() {
+    let docs = workspace().join("docs");
+    let decisions = fs::read_dir(docs.join("decisions")).unwrap().map(|entry| entry.unwrap().path());
+    let mut pages: Vec<PathBuf> = decisions.collect();
+    pages.extend(["ARCHITECTURE.md", "graph-files.md", "writing-a-node.md"].map(|name| docs.join(name)));
+    let mut links = 0;
+    for page in pages {
+        let text = fs::read_to_string(&page).unwrap();
+        for target in text.split("](").skip(1).filter_map(|rest| rest.split(')').next()) {
+            let is_there = page.parent().unwrap().join(target.split('#').next().unwrap()).exists();
+            assert!(is_there || target.contains("://"), "{}: {target}", page.display());
+            links += 1;
+        }
+    }
+    assert!(links > 10, "{links} links");
+}
