@@ -65,7 +65,31 @@ fn finger_press() {
     println!("finger press, a tick: graph {:.0} ns, fused {:.0} ns, ratio {ratio:.3} (at most {MOST})", medians[0], medians[1]);
 }
 
+/// Runs one of the two alone, for a tool that counts instructions: `tick -- graph 1000`.
+fn count(what: &str, ticks: u32) {
+    const FRAME: usize = 150;
+    let mut pair = finger_press::Pair::new();
+    (0..=FRAME).for_each(|_| assert!(pair.step()));
+    let (cells, q) = (pair.cells(FRAME).to_vec(), pair.q());
+    let mut out = [0.0; 7];
+    for _ in 0..ticks {
+        match what {
+            "graph" => pair.engine.tick_bare(),
+            "fused" => {
+                black_box(pair.fused.tick(black_box(&cells), black_box(&q), 0.1, 0.1, &mut out));
+            }
+            other => panic!("`{other}` is neither `graph` nor `fused`"),
+        }
+    }
+}
+
 fn main() {
-    chains();
-    finger_press();
+    let arguments: Vec<String> = std::env::args().skip(1).filter(|argument| argument != "--bench").collect();
+    match arguments.as_slice() {
+        [what, ticks] => count(what, ticks.parse().expect("a number of ticks")),
+        _ => {
+            chains();
+            finger_press();
+        }
+    }
 }
