@@ -3,6 +3,7 @@
 //! It calls the nodes' own kernels and keeps everything else in locals; it has no freshness, no marks, no units and no
 //! modes, and it would have to be written again for the next task.
 
+use std::hint::black_box;
 use std::path::Path;
 
 use tactflow_nodes::arm::chain::Chain;
@@ -44,6 +45,9 @@ pub(crate) struct Fused {
     regions: Regions,
     pressures: Ring,
     axes: Ring,
+    /// What a graph file sets is read at run time here too.
+    laws: [Law; 4],
+    inverse: [[f64; 6]; 4],
     integrals: [f64; 4],
     errors: [f64; 4],
     chain: Chain,
@@ -95,6 +99,8 @@ impl Fused {
             regions: Regions::with_room(rows, cols),
             pressures: Ring::default(),
             axes: Ring::default(),
+            laws: black_box(LAWS),
+            inverse: black_box(COLUMNS),
             integrals: [0.0; 4],
             errors: [0.0; 4],
             joints: chain.joints().to_vec(),
@@ -181,7 +187,7 @@ impl Fused {
             errors[3] = wrap_axial(0.0 - axis(sine, cosine));
         }
         let mut twist = Twist::default();
-        for (i, (error, law)) in errors.into_iter().zip(&LAWS).enumerate().take(3 + usize::from(has_axis)) {
+        for (i, (error, law)) in errors.into_iter().zip(&self.laws).enumerate().take(3 + usize::from(has_axis)) {
             let change = error - self.errors[i];
             let slope = if dt > 0.0 { (if i == 3 { wrap_axial(change) } else { change }) / dt } else { 0.0 };
             let others = law.kp * error + law.kd * slope;
@@ -189,7 +195,7 @@ impl Fused {
             self.integrals[i] = integrate(self.integrals[i], growth, law.bound, others, law.limit);
             self.errors[i] = error;
             let control = (others + self.integrals[i]).clamp(-law.limit, law.limit);
-            for (sum, entry) in twist.0.iter_mut().zip(&COLUMNS[i]) {
+            for (sum, entry) in twist.0.iter_mut().zip(&self.inverse[i]) {
                 *sum += entry * control;
             }
         }

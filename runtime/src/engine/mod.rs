@@ -313,13 +313,16 @@ impl Engine {
         &self.sources
     }
 
-    /// Runs latch, step and commit once more on what the devices have last given: for measurements of the bare tick.
-    ///
-    /// Every sample counts as new again.
-    pub fn tick_bare(&mut self) {
+    /// Makes what the devices have last given count as sampled anew a period later: for measurements of a tick.
+    pub fn refresh(&mut self) {
         let now = self.core.tick.now + self.timeline.period();
         self.core.begin(now);
         self.core.refresh(&mut self.decks);
-        self.core.run(&mut self.decks, &mut self.timing);
+    }
+
+    /// Latch, step and commit without what guards and measures them: no finite check, no timing, nothing that catches a
+    /// panic. For measurements.
+    pub fn step_bare(&mut self) {
+        self.core.run_bare(&mut self.decks);
     }
 }
