@@ -79,7 +79,10 @@ fn finger_press() {
     let medians = medians(&mut [&mut by_hand, &mut bare, &mut graph], 500);
     println!("finger press, a tick fused by hand: {:.0} ns", medians[0]);
     for (what, time, most) in [("bare", medians[1], MOST_BARE), ("guarded and timed", medians[2], MOST)] {
-        println!("finger press, a tick of the graph, {what}: {time:.0} ns, ratio {:.3} (at most {most})", time / medians[0]);
+        println!(
+            "finger press, a tick of the graph, {what}: {time:.0} ns, ratio {:.3} (at most {most})",
+            time / medians[0]
+        );
     }
 }
 

@@ -46,7 +46,9 @@ fn annotated(path: &Path, reports: &[Report]) -> String {
         result.push_str(line);
         result.push('\n');
         let mut seen = BTreeSet::new();
-        for (report, diagnostic) in reports.iter().flat_map(|report| report.diagnostics.iter().map(move |d| (report, d))) {
+        for (report, diagnostic) in
+            reports.iter().flat_map(|report| report.diagnostics.iter().map(move |d| (report, d)))
+        {
             let file = report.sources.file_at(diagnostic.span.start);
             let is_here = file.name == name && file.line_column(diagnostic.span.start).0 == i + 1;
             let comment = comment(diagnostic, &report.sources).join("\n");

@@ -1,8 +1,17 @@
 //! The suite: one module a subject.
+#![allow(clippy::unwrap_used, reason = "clippy knows a test by its attribute, and this crate is nothing but tests")]
 
+mod bad_data;
+mod cli;
+mod course;
+mod determinism;
 mod errors;
 mod faults;
 mod freshness;
 mod live;
+mod merge;
+mod mutations;
+mod oracles;
 mod tick;
 mod tidy;
+mod tool;

@@ -9,7 +9,8 @@
 //! A twist that is absent, or a twist or an arm that is older than `max_age_ms`, lets the last command fade linearly to
 //! zero; the first fresh one takes over by itself. Invariant: no velocity is ever held without a fresh sample behind it.
 
-use tactflow_runtime::node::{Mistake, Mistakes, Node, NonNegative, Positive, Setup, Tick};
+use tactflow_runtime::diagnostic::Code;
+use tactflow_runtime::node::{At, Mistake, Mistakes, Node, NonNegative, Positive, Setup, Tick};
 use tactflow_runtime::signal::{Joint, JointsShape, Pose, Twist, Unit};
 use tactflow_runtime::{inputs, outputs, params, state};
 
@@ -82,7 +83,12 @@ impl Node for IkSink {
 
     fn new(params: Params, setup: &mut Setup<Self>) -> Result<Self, Mistakes> {
         let shape = &setup.inputs.joints;
-        let mistakes = check(&params, shape, &setup.inputs.jacobian.0, setup.period);
+        let mut mistakes = check(&params, shape, &setup.inputs.jacobian.0, setup.period);
+        if setup.inputs.twist.is_none() {
+            // It may be absent, but an arm that nothing can ever move is a wire that was forgotten.
+            let mistake = Mistake::new(Code::MissingInput, At::Node, "`ik_sink` needs `in.twist`, a twist");
+            mistakes.push(mistake.help("add `in.twist = \"adjoint.twist\"`: an absent twist is no motion"));
+        }
         if !mistakes.is_empty() {
             return Err(mistakes);
         }

@@ -103,7 +103,16 @@ impl<'a> Model<'a> {
             all.push(node.block.wires.iter().filter_map(wire).collect());
             self.missing(i, spec, found);
         }
+        self.exports(found);
         all
+    }
+
+    /// An export comes from a port whether or not this graph takes it: the next one would find it broken.
+    fn exports(&self, found: &mut Vec<Diagnostic>) {
+        for (scope, Scope { exports, .. }) in self.flat.scopes.iter().enumerate() {
+            let broken = exports.iter().filter_map(|(_, word)| self.resolve(scope, word, 0).err());
+            found.extend(broken.map(|diagnostic| *diagnostic));
+        }
     }
 
     fn wire(&self, node: usize, spec: &NodeSpec, key: &Key, word: &Word, found: &mut Vec<Diagnostic>) -> Option<Wire> {

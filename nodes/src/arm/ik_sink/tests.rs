@@ -1,7 +1,8 @@
+//! `ik_sink` against limits, ages and the twist it is asked for.
+
 use proptest::prelude::*;
 use tactflow_runtime::harness::NodeRig;
-use tactflow_runtime::node::At;
-use tactflow_runtime::signal::{Jacobian, JacobianShape, Joints, PoseShape, Stamp, TwistShape};
+use tactflow_runtime::signal::{Jacobian, JacobianShape, Joints, PoseShape, Shape, Stamp, TwistShape};
 
 use super::*;
 use crate::arm::chain::Chain;
@@ -16,14 +17,24 @@ fn lwr() -> Chain {
 }
 
 fn rig(params: &str) -> Result<NodeRig, Mistakes> {
+    NodeRig::new::<IkSink>(params, &wires())
+}
+
+fn wires() -> [(&'static str, Shape); 4] {
     let joints = JointsShape { joints: lwr().joints().to_vec(), unit: Unit::RADIAN };
-    let wires = [
+    [
         ("twist", TwistShape.into()),
         ("sensor_pose", PoseShape.into()),
         ("jacobian", JacobianShape(joints.clone()).into()),
         ("joints", joints.into()),
-    ];
-    NodeRig::new::<IkSink>(params, &wires)
+    ]
+}
+
+#[test]
+fn a_sink_that_no_twist_is_wired_to_does_not_load() {
+    let mistakes = NodeRig::new::<IkSink>("", &wires()[1..]).err().unwrap();
+    let said: Vec<_> = mistakes.iter().map(|mistake| (mistake.code, &*mistake.message)).collect();
+    assert_eq!(said, [(Code::MissingInput, "`ik_sink` needs `in.twist`, a twist")]);
 }
 
 fn set_arm(rig: &mut NodeRig, chain: &Chain, q: &[f64; 7]) -> Vec<Twist> {

@@ -81,7 +81,8 @@ impl Device for MockPad {
         if !mistakes.is_empty() {
             return Err(mistakes);
         }
-        let shape = ImageShape { rows: params.rows.0, cols: params.cols.0, pitch: [*params.pitch; 2], unit: params.unit };
+        let shape =
+            ImageShape { rows: params.rows.0, cols: params.cols.0, pitch: [*params.pitch; 2], unit: params.unit };
         let facts = vec![("dead".into(), toml::Value::Array(vec![])), ("threshold".into(), (*params.threshold).into())];
         let outputs = vec![shape.clone().into()];
         let filled = Filled { role: "tactile_pad".into(), outputs, commands: vec![], facts };

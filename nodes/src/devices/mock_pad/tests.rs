@@ -1,3 +1,5 @@
+//! `mock_pad` against its script.
+
 use proptest::prelude::*;
 use tactflow_runtime::signal::Shape;
 
@@ -152,6 +154,7 @@ fn bad_settings() {
         let mistakes = open::<MockPad>(params).err().expect(params);
         assert!(mistakes.len() == 1 && mistakes[0].message.starts_with(message), "{params}: {mistakes:?}");
     }
-    let several = open::<MockPad>("rows = 100000\ncols = 100000\nrate_hz = 1e9\npress = [{ radius = 9 }]").err().unwrap();
+    let several =
+        open::<MockPad>("rows = 100000\ncols = 100000\nrate_hz = 1e9\npress = [{ radius = 9 }]").err().unwrap();
     assert_eq!(several.len(), 3);
 }
