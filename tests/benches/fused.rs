@@ -3,6 +3,7 @@
 //! It calls the nodes' own kernels and keeps everything else in locals; it has no freshness, no marks, no units and no
 //! modes, and it would have to be written again for the next task.
 
+use std::hint::black_box;
 use std::path::Path;
 
 use tactflow_nodes::arm::chain::Chain;
@@ -19,11 +20,24 @@ const COLUMNS: [[f64; 6]; 4] = [
     [0.0, 0.0, 0.0005, 0.0, 0.0, 0.0],
     [0.0, 0.0, 0.0, 0.0, 0.0, -1.0],
 ];
+/// The control law of each feature.
+struct Law {
+    kp: f64,
+    ki: f64,
+    kd: f64,
+    within: f64,
+    bound: f64,
+    limit: f64,
+}
+
+const P: Law = Law { kp: 0.5, ki: 0.0, kd: 0.0, within: f64::INFINITY, bound: 1.0, limit: f64::INFINITY };
+const LAWS: [Law; 4] = [P, P, Law { ki: 0.1, within: 10.0, bound: 5.0, ..P }, P];
 const POSTURE: [f64; 7] = [0.0, 0.5, 0.0, -1.3, 0.0, 1.3, 0.0];
 
 /// The controller and everything it remembers.
 pub(crate) struct Fused {
     shape: ImageShape,
+    offset: Box<[f32]>,
     alive: Box<[f32]>,
     image: Image,
     mask: Mask,
@@ -31,7 +45,11 @@ pub(crate) struct Fused {
     regions: Regions,
     pressures: Ring,
     axes: Ring,
-    integral: f64,
+    /// What a graph file sets is read at run time here too.
+    laws: [Law; 4],
+    inverse: [[f64; 6]; 4],
+    integrals: [f64; 4],
+    errors: [f64; 4],
     chain: Chain,
     joints: Vec<Joint>,
     columns: Vec<Twist>,
@@ -73,6 +91,7 @@ impl Fused {
         let grid = Grid::from(&shape);
         let (rows, cols) = (shape.rows, shape.cols);
         Self {
+            offset: vec![0.0; rows * cols].into(),
             alive: (0..rows * cols).map(|at| if dead.contains(&at) { 0.0 } else { 1.0 }).collect(),
             image: Image::zeros(rows, cols),
             mask: Mask::allocate(&grid),
@@ -80,7 +99,10 @@ impl Fused {
             regions: Regions::with_room(rows, cols),
             pressures: Ring::default(),
             axes: Ring::default(),
-            integral: 0.0,
+            laws: black_box(LAWS),
+            inverse: black_box(COLUMNS),
+            integrals: [0.0; 4],
+            errors: [0.0; 4],
             joints: chain.joints().to_vec(),
             chain,
             columns: vec![Twist::default(); 7],
@@ -96,7 +118,7 @@ impl Fused {
 
     /// Forgets what a contact that was lost for long had built up.
     pub(crate) fn reset(&mut self) {
-        (self.pressures, self.axes, self.integral) = (Ring::default(), Ring::default(), 0.0);
+        (self.pressures, self.axes, self.integrals) = (Ring::default(), Ring::default(), [0.0; 4]);
     }
 
     /// Forgets the axes only: the patch was round for long.
@@ -108,8 +130,9 @@ impl Fused {
     /// two samples of the contact [s], `tick` that between the ticks. Tells whether there is a contact and an axis.
     pub(crate) fn tick(&mut self, cells: &[f32], q: &[f64], dt: f64, tick: f64, out: &mut [f64; 7]) -> (bool, bool) {
         (self.sum, self.peak) = sum_and_peak(cells);
-        for ((to, from), gain) in self.image.cells_mut().iter_mut().zip(cells).zip(&self.alive) {
-            *to = (from - 0.0) * gain;
+        let lines = self.offset.iter().zip(&self.alive);
+        for ((to, from), (offset, gain)) in self.image.cells_mut().iter_mut().zip(cells).zip(lines) {
+            *to = (from - offset) * gain;
         }
         binarize(self.image.cells(), 3.0, &mut self.mask);
         let (runs, regions) = self.regions.parts_mut();
@@ -157,19 +180,22 @@ impl Fused {
         let (x, y) = (self.shape.x(sums.first[1] + j), self.shape.y(sums.first[0] + i));
         let ellipse = moments::ellipse(&sums, self.shape.pitch);
         let has_axis = ellipse.anisotropy() >= 0.1;
-        let mut control = [0.5 * (0.0 - x), 0.5 * (0.0 - y), 0.0, 0.0];
-        let error = 40.0 - pressure;
-        let growth = if error.abs() <= 10.0 { 0.1 * error * dt } else { 0.0 };
-        self.integral = integrate(self.integral, growth, 5.0, 0.5 * error, f64::INFINITY);
-        control[2] = 0.5 * error + self.integral;
+        let mut errors = [0.0 - x, 0.0 - y, 40.0 - pressure, 0.0];
         if has_axis {
             let (sine, cosine) = libm::sincos(2.0 * axis(ellipse.sine, ellipse.cosine));
             let [cosine, sine] = self.axes.mean([cosine, sine]);
-            control[3] = 0.5 * wrap_axial(0.0 - axis(sine, cosine));
+            errors[3] = wrap_axial(0.0 - axis(sine, cosine));
         }
         let mut twist = Twist::default();
-        for (column, control) in COLUMNS.iter().zip(control).take(3 + usize::from(has_axis)) {
-            for (sum, entry) in twist.0.iter_mut().zip(column) {
+        for (i, (error, law)) in errors.into_iter().zip(&self.laws).enumerate().take(3 + usize::from(has_axis)) {
+            let change = error - self.errors[i];
+            let slope = if dt > 0.0 { (if i == 3 { wrap_axial(change) } else { change }) / dt } else { 0.0 };
+            let others = law.kp * error + law.kd * slope;
+            let growth = if error.abs() <= law.within { law.ki * error * dt } else { 0.0 };
+            self.integrals[i] = integrate(self.integrals[i], growth, law.bound, others, law.limit);
+            self.errors[i] = error;
+            let control = (others + self.integrals[i]).clamp(-law.limit, law.limit);
+            for (sum, entry) in twist.0.iter_mut().zip(&self.inverse[i]) {
                 *sum += entry * control;
             }
         }

@@ -44,7 +44,12 @@ fn the_tick_makes_no_system_call() {
     };
     let inside = run("ticks");
     let said = String::from_utf8_lossy(&inside.stdout).into_owned();
-    assert!(said.contains("every tick ran"), "{:?}\n{said}\n{}", inside.status, String::from_utf8_lossy(&inside.stderr));
+    assert!(
+        said.contains("every tick ran"),
+        "{:?}\n{said}\n{}",
+        inside.status,
+        String::from_utf8_lossy(&inside.stderr)
+    );
     let outside = run("escape");
     assert!(!outside.status.success(), "the jail holds nobody");
 }

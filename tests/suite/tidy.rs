@@ -67,7 +67,8 @@ fn the_tick_names_no_lock_and_no_tokio() {
     for part in parts {
         let path = workspace().join(format!("runtime/src/engine/{part}.rs"));
         let code = code(&fs::read_to_string(&path).unwrap());
-        for word in ["tokio", "Mutex", "RwLock", "Condvar", "mpsc", "async", "await", "Box::new", "Vec::new", "format!"] {
+        for word in ["tokio", "Mutex", "RwLock", "Condvar", "mpsc", "async", "await", "Box::new", "Vec::new", "format!"]
+        {
             assert!(!code.contains(word), "{} names {word}", path.display());
         }
     }
@@ -83,7 +84,19 @@ fn only_the_edge_names_tokio() {
 
 #[test]
 fn transcendental_functions_come_from_libm() {
-    let methods = [".sin()", ".cos()", ".tan()", ".atan2(", ".acos()", ".asin()", ".exp()", ".ln()", ".powf(", ".sin_cos()", ".mul_add("];
+    let methods = [
+        ".sin()",
+        ".cos()",
+        ".tan()",
+        ".atan2(",
+        ".acos()",
+        ".asin()",
+        ".exp()",
+        ".ln()",
+        ".powf(",
+        ".sin_cos()",
+        ".mul_add(",
+    ];
     for (path, text) in sources(&["runtime/src", "nodes/src"]) {
         let code = code(&text);
         for method in methods.iter().filter(|_| !path.ends_with("tests.rs")) {

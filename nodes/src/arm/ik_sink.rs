@@ -129,11 +129,12 @@ impl Node for IkSink {
             joint_limits::limit(&self.joints, q, self.limit_gain, velocity);
             return;
         };
-        let pose = &inputs.sensor_pose;
+        // A copy, so that it stays in registers while the columns are written.
+        let pose = *inputs.sensor_pose.value();
         for (column, of_base) in state.columns.iter_mut().zip(&inputs.jacobian.0) {
-            *column = at_sensor(pose, of_base);
+            *column = at_sensor(&pose, of_base);
         }
-        damped::solve(&state.columns, &at_sensor(pose, &twist), self.damping, velocity);
+        damped::solve(&state.columns, &at_sensor(&pose, &twist), self.damping, velocity);
         joint_limits::limit(&self.joints, q, self.limit_gain, velocity);
         if let Some(posture) = &self.posture {
             for ((drift, posture), q) in state.drift.iter_mut().zip(posture).zip(q) {

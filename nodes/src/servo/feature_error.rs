@@ -77,8 +77,8 @@ impl Node for FeatureError {
     fn step(&self, tick: &Tick, inputs: Inputs<'_>, out: &mut Outputs, (): &mut ()) {
         let is_complete = self.required.iter().all(|i| inputs.feature.get(*i).is_some());
         let error = out.error.write();
-        for (i, target) in self.targets.iter().enumerate() {
-            let Some(measured) = inputs.feature.get(i).filter(|_| is_complete) else {
+        for (i, (target, measured)) in self.targets.iter().zip(inputs.feature.iter()).enumerate() {
+            let Some(measured) = measured.filter(|_| is_complete) else {
                 error.lose(i, tick.index);
                 continue;
             };

@@ -80,7 +80,7 @@ impl Node for Smooth {
 impl State {
     fn push(&mut self, sample: [f64; 2]) {
         self.ring[self.next] = sample;
-        self.next = (self.next + 1) % self.ring.len();
+        self.next = if self.next + 1 < self.ring.len() { self.next + 1 } else { 0 };
         self.count = (self.count + 1).min(self.ring.len());
     }
 

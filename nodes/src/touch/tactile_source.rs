@@ -63,15 +63,15 @@ impl Node for TactileSource {
 
     fn step(&self, _: &Tick, inputs: Inputs<'_>, out: &mut Outputs, (): &mut ()) {
         let (from, to) = (inputs.image.cells(), out.image.write().cells_mut());
-        match &self.order {
-            None => to.copy_from_slice(from),
+        let (sum, peak) = match &self.order {
+            None => copy_sum_and_peak(from, to),
             Some(order) => {
                 for (cell, at) in to.iter_mut().zip(order) {
                     *cell = from[*at as usize];
                 }
+                sum_and_peak(to)
             }
-        }
-        let (sum, peak) = sum_and_peak(to);
+        };
         out.sum.set(sum);
         out.peak.set(peak);
     }
@@ -99,22 +99,58 @@ fn order(sensor: &ImageShape, params: &Params) -> Box<[u32]> {
 /// Sum and greatest of all cells, in eight lanes and a fixed tree: the same bits on every machine.
 #[must_use]
 pub fn sum_and_peak(cells: &[f32]) -> (f64, f64) {
-    let greater = |a: f32, b: f32| if b > a { b } else { a };
-    let (mut sums, mut peaks) = ([0.0; LANES], [f32::NEG_INFINITY; LANES]);
-    let (chunks, rest) = cells.as_chunks::<LANES>();
-    for chunk in chunks {
+    let mut lanes = Lanes::default();
+    let (chunks, rest) = cells.as_chunks();
+    chunks.iter().for_each(|chunk| lanes.add(chunk));
+    lanes.finish(rest)
+}
+
+/// The same of cells that are copied on the way.
+fn copy_sum_and_peak(from: &[f32], to: &mut [f32]) -> (f64, f64) {
+    let mut lanes = Lanes::default();
+    let ((chunks, rest), (copies, copied)) = (from.as_chunks(), to.as_chunks_mut());
+    for (chunk, copy) in chunks.iter().zip(copies) {
+        *copy = *chunk;
+        lanes.add(chunk);
+    }
+    copied.copy_from_slice(rest);
+    lanes.finish(rest)
+}
+
+struct Lanes {
+    sums: [f64; LANES],
+    peaks: [f32; LANES],
+}
+
+impl Default for Lanes {
+    fn default() -> Self {
+        Self { sums: [0.0; LANES], peaks: [f32::NEG_INFINITY; LANES] }
+    }
+}
+
+fn greater(a: f32, b: f32) -> f32 {
+    if b > a { b } else { a }
+}
+
+impl Lanes {
+    #[inline]
+    fn add(&mut self, chunk: &[f32; LANES]) {
         for lane in 0..LANES {
-            sums[lane] += f64::from(chunk[lane]);
-            peaks[lane] = greater(peaks[lane], chunk[lane]);
+            self.sums[lane] += f64::from(chunk[lane]);
+            self.peaks[lane] = greater(self.peaks[lane], chunk[lane]);
         }
     }
-    for (lane, value) in rest.iter().enumerate() {
-        sums[lane] += f64::from(*value);
-        peaks[lane] = greater(peaks[lane], *value);
+
+    /// Adds what is left of a last chunk, and the lanes.
+    fn finish(mut self, rest: &[f32]) -> (f64, f64) {
+        for (lane, value) in rest.iter().enumerate() {
+            self.sums[lane] += f64::from(*value);
+            self.peaks[lane] = greater(self.peaks[lane], *value);
+        }
+        let [a, b, c, d, e, f, g, h] = self.sums;
+        let sum = ((a + e) + (c + g)) + ((b + f) + (d + h));
+        (sum, self.peaks.into_iter().fold(f32::NEG_INFINITY, greater).into())
     }
-    let [a, b, c, d, e, f, g, h] = sums;
-    let sum = ((a + e) + (c + g)) + ((b + f) + (d + h));
-    (sum, peaks.into_iter().fold(f32::NEG_INFINITY, greater).into())
 }
 
 #[cfg(test)]

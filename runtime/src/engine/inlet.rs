@@ -41,6 +41,12 @@ impl Inlet {
         }
     }
 
+    /// Whether a sample that has not been taken over yet is finite: an image is checked once, here at the edge.
+    pub(super) fn is_finite(&self, samples: &Samples) -> bool {
+        let sample = samples.ports[self.port];
+        sample.writes == self.writes || samples.arenas.is_finite(self.kind, sample.slot)
+    }
+
     /// Takes the newest sample over, if there is one. The buffers are exchanged, not copied.
     pub(super) fn latch(&mut self, samples: &mut Samples, bus: &mut Bus, tick: u64) {
         let sample = samples.ports[self.port];
@@ -55,9 +61,6 @@ impl Inlet {
             _ => {
                 self.last = Some((sample.stamp, sample.sequence));
                 self.counters.new += 1;
-                if !samples.arenas.is_finite(self.kind, sample.slot) {
-                    bus.not_finite = bus.not_finite.or(Some(self.id.mark));
-                }
                 bus.arenas.swap(self.kind, self.id.slot, &mut samples.arenas, sample.slot);
                 bus.marks[self.id.mark as usize].renew(tick, Stamp { nanos: sample.stamp, device: self.device as u16 });
             }

@@ -152,8 +152,8 @@ impl Engine {
     /// The reason of a fault; nothing was commanded in this tick.
     pub fn step(&mut self) -> Result<(), Fault> {
         match catch_unwind(AssertUnwindSafe(|| self.core.run(&mut self.decks, &mut self.timing))) {
-            Ok(None) => Ok(()),
-            Ok(Some(mark)) => Err(self.not_finite(mark)),
+            Ok(true) => Ok(()),
+            Ok(false) => Err(self.first_not_finite()),
             Err(panic) => Err(self.panicked(&*panic)),
         }
     }
@@ -175,7 +175,13 @@ impl Engine {
         let clock = self.clock_sample();
         self.core.begin(now);
         self.timeline.ticked(now, clock);
-        self.exchange_with_devices(now)
+        self.exchange_with_devices(now)?;
+        let decks = &self.decks;
+        match self.core.inlets.iter().position(|inlet| !inlet.is_finite(&decks[inlet.device].samples)) {
+            // The ports of the roles come first, an inlet each.
+            Some(inlet) => Err(self.not_finite(&self.ports[inlet].0)),
+            None => Ok(()),
+        }
     }
 
     fn exchange_with_devices(&mut self, now: i64) -> Result<(), Fault> {
@@ -214,8 +220,14 @@ impl Engine {
         is_still
     }
 
-    fn not_finite(&self, mark: u32) -> Fault {
-        let (port, _) = self.ports.iter().find(|(_, id)| id.mark == mark).expect("every mark is a port's");
+    /// Ports stand in the order in which they are written, so the first that is not finite is the one that made it so.
+    fn first_not_finite(&self) -> Fault {
+        let is_bad = |(port, id): &&(PlannedPort, PortId)| !self.core.bus.arenas.is_finite(port.shape.kind(), id.slot);
+        let (port, _) = self.ports.iter().find(is_bad).expect("one of them is not finite");
+        self.not_finite(port)
+    }
+
+    fn not_finite(&self, port: &PlannedPort) -> Fault {
         let (node, name) = port.name.rsplit_once('.').expect("a port's name has two parts");
         let (_, place) =
             self.names.iter().chain(&self.roles).find(|(known, _)| known == node).expect("a port has an owner");
@@ -301,13 +313,16 @@ impl Engine {
         &self.sources
     }
 
-    /// Runs latch, step and commit once more on what the devices have last given: for measurements of the bare tick.
-    ///
-    /// Every sample counts as new again.
-    pub fn tick_bare(&mut self) {
+    /// Makes what the devices have last given count as sampled anew a period later: for measurements of a tick.
+    pub fn refresh(&mut self) {
         let now = self.core.tick.now + self.timeline.period();
         self.core.begin(now);
         self.core.refresh(&mut self.decks);
-        self.core.run(&mut self.decks, &mut self.timing);
+    }
+
+    /// Latch, step and commit without what guards and measures them: no finite check, no timing, nothing that catches a
+    /// panic. For measurements.
+    pub fn step_bare(&mut self) {
+        self.core.run_bare(&mut self.decks);
     }
 }

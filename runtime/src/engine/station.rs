@@ -3,23 +3,23 @@
 use crate::node::{AnyNode, Bus, Need, PortId, Tick, Wires};
 use crate::signal::Stamp;
 
-/// What a station looks at before it steps its node.
+/// What a station looks at before it steps its node, beside the required triggers.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Watch {
+struct Watch {
     mark: u32,
-    lag: u8,
+    lag: u64,
     is_trigger: bool,
     is_required: bool,
 }
 
 impl Watch {
     /// How an input declared with `need` watches the port with that mark.
-    pub(crate) fn new(need: Need, mark: u32) -> Self {
+    fn new(need: Need, mark: u32) -> Self {
         Self {
             mark,
-            lag: u8::from(need == Need::Delayed),
-            is_trigger: matches!(need, Need::Required | Need::Trigger | Need::Many | Need::Delayed),
-            is_required: matches!(need, Need::Required | Need::Sampled),
+            lag: u64::from(need == Need::Delayed),
+            is_trigger: matches!(need, Need::Trigger | Need::Many | Need::Delayed),
+            is_required: need == Need::Sampled,
         }
     }
 }
@@ -29,7 +29,9 @@ pub(crate) struct Station {
     node: Box<dyn AnyNode>,
     wires: Wires,
     outputs: Box<[PortId]>,
-    watches: Box<[Watch]>,
+    /// Marks of the required triggers: what most inputs are, so they have a loop of their own.
+    required: Box<[u32]>,
+    others: Box<[Watch]>,
     is_every_tick: bool,
     absence: Absence,
 }
@@ -50,12 +52,15 @@ impl Station {
         outputs: Vec<PortId>,
         is_every_tick: bool,
     ) -> Self {
-        let watches = inputs.iter().flat_map(|(need, ports)| ports.iter().map(|port| Watch::new(*need, port.mark)));
+        let all = || inputs.iter().flat_map(|(need, ports)| ports.iter().map(|port| (*need, port.mark)));
+        let (required, others) = (all().filter(|(need, _)| *need == Need::Required), all());
+        let others = others.filter(|(need, _)| *need != Need::Required);
         Self {
             node,
             wires: Wires::new(inputs),
             outputs: outputs.into(),
-            watches: watches.collect(),
+            required: required.map(|(_, mark)| mark).collect(),
+            others: others.map(|(need, mark)| Watch::new(need, mark)).collect(),
             is_every_tick,
             absence: Absence::Nothing,
         }
@@ -65,11 +70,15 @@ impl Station {
     /// stamp becomes the oldest of the triggers'.
     pub(crate) fn visit(&mut self, tick: &mut Tick, bus: &mut Bus) {
         let (mut is_woken, mut is_missing, mut stamp) = (self.is_every_tick, false, Stamp::TIMELESS);
-        for watch in &self.watches {
+        for mark in self.required.iter().map(|mark| &bus.marks[*mark as usize]) {
+            is_woken |= mark.changed_in(tick.index);
+            is_missing |= !mark.is_present();
+            stamp = stamp.oldest(mark.stamp());
+        }
+        for watch in &self.others {
             let mark = &bus.marks[watch.mark as usize];
             let is_present = mark.is_present();
-            is_woken |=
-                mark.changed_in(tick.index.wrapping_sub(u64::from(watch.lag))) & (watch.is_trigger | !is_present);
+            is_woken |= mark.changed_in(tick.index.wrapping_sub(watch.lag)) & (watch.is_trigger | !is_present);
             is_missing |= watch.is_required & !is_present;
             if watch.is_trigger & is_present {
                 stamp = stamp.oldest(mark.stamp());

@@ -36,19 +36,27 @@ impl Core {
         self.tick = Tick { index: self.tick.index + 1, now, dt, ..self.tick };
     }
 
-    /// Latches the newest samples, steps the nodes and hands over the commands. Commands nothing if a value was not
-    /// finite, and tells the mark of the first port where it was.
-    pub(super) fn run(&mut self, decks: &mut [Deck], timing: &mut Timing) -> Option<u32> {
+    /// Latches the newest samples, steps the nodes and hands over the commands; nothing is commanded if any value is not
+    /// finite. Whether all are.
+    pub(super) fn run(&mut self, decks: &mut [Deck], timing: &mut Timing) -> bool {
         self.latch(decks);
         if timing.is_due(self.tick.index) {
             self.step_timed(timing);
         } else {
             self.step();
         }
-        if self.bus.not_finite.is_none() {
+        let is_finite = self.bus.arenas.are_finite();
+        if is_finite {
             self.commit(decks);
         }
-        self.bus.not_finite
+        is_finite
+    }
+
+    /// A tick without what guards and measures it: latch, step, commit.
+    pub(super) fn run_bare(&mut self, decks: &mut [Deck]) {
+        self.latch(decks);
+        self.step();
+        self.commit(decks);
     }
 
     fn latch(&mut self, decks: &mut [Deck]) {

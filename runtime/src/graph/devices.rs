@@ -200,11 +200,9 @@ pub(crate) fn fill_facts(value: &mut Value, model: &Model<'_>, opened: &Opened, 
         Item::Table(table) => table,
         _ => return true,
     };
-    let from = table
-        .entry("from")
-        .filter(|_| table.entries.len() == 1)
-        .and_then(|(_, from)| Some(Word { text: from.as_str()?.to_owned(), span: from.span.clone() }));
-    let Some(word) = from else {
+    let from = table.get("from").filter(|_| table.is_fact());
+    let word = from.and_then(|from| Some(Word { text: from.as_str()?.to_owned(), span: from.span.clone() }));
+    let Some(word) = word else {
         return table.entries.iter_mut().fold(true, |good, (_, item)| fill_facts(item, model, opened, found) & good);
     };
     match fact(&word, model, opened) {

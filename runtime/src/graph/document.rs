@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use super::{Item, Key, Sources, Table, Value};
-use crate::diagnostic::{Code, Diagnostic, closest};
+use crate::diagnostic::{Code, Diagnostic, closest, meant};
 use crate::node::{At, FilePath, Mistake, NonNegative, Param, Positive, Reader, Word};
 
 crate::params! { GraphTable:
@@ -99,29 +99,33 @@ impl<'a> Sections<'a> {
     pub(crate) fn bench(&mut self, root: &Table) -> Bench {
         self.known(root, &["devices", "bind"]);
         let devices = self.named_tables(root.get("devices"));
-        let devices = devices.into_iter().map(|(key, table)| self.block(key, table)).collect();
+        let names = names_of(&devices);
+        let devices = devices.into_iter().map(|(key, table)| self.block(key, table, &names)).collect();
         Bench { devices, bind: self.words(root.get("bind")) }
     }
 
     fn body(&mut self, root: &Table) -> Document {
         let nodes = self.named_tables(root.get("nodes"));
-        let nodes = nodes.into_iter().map(|(key, table)| self.node(key, table)).collect();
+        let names = names_of(&nodes);
+        let nodes = nodes.into_iter().map(|(key, table)| self.node(key, table, &names)).collect();
         let parts = self.named_tables(root.get("parts"));
         let parts = parts.into_iter().map(|(key, table)| self.part_block(key, table)).collect();
         Document { nodes, parts, ..Document::default() }
     }
 
-    fn node(&mut self, key: Key, mut table: Table) -> Block {
-        let wires = table.remove("in").map(|(_, value)| value);
-        Block { wires: self.words(wires.as_ref()), ..self.block(key, table) }
+    fn node(&mut self, key: Key, mut table: Table, names: &[String]) -> Block {
+        Block { wires: self.wires(&mut table), ..self.block(key, table, names) }
     }
 
-    fn block(&mut self, key: Key, mut table: Table) -> Block {
+    fn block(&mut self, key: Key, mut table: Table, names: &[String]) -> Block {
         let kind = match table.remove("type") {
             Some((_, value)) => Word::read(&value, &mut self.reader),
             None => {
                 let message = format!("`{}` has no `type`", key.name);
-                self.diagnostics.push(Diagnostic::new(Code::MissingKey, key.span.clone(), message));
+                // `--set nodes.pidd.…` makes a block of its own.
+                let others = names.iter().map(String::as_str).filter(|name| *name != key.name);
+                let help = meant(&key.name, others).map(|name| format!("did you mean `{name}`?"));
+                self.diagnostics.push(Diagnostic::new(Code::MissingKey, key.span.clone(), message).with_help(help));
                 None
             }
         };
@@ -131,8 +135,7 @@ impl<'a> Sections<'a> {
     }
 
     fn part_block(&mut self, key: Key, mut table: Table) -> PartBlock {
-        let wires = table.remove("in").map(|(_, value)| value);
-        let wires = self.words(wires.as_ref());
+        let wires = self.wires(&mut table);
         let set = table.remove("set").map(|(_, value)| value);
         let set = self.table(set.as_ref());
         let file = match table.remove("file") {
@@ -145,6 +148,18 @@ impl<'a> Sections<'a> {
         };
         self.known(&table, &["file", "in", "set"]);
         PartBlock { key, file, wires, set }
+    }
+
+    /// The wires of a block: its table `in`.
+    fn wires(&mut self, table: &mut Table) -> Vec<(Key, Word)> {
+        let wires = table.remove("in").map(|(_, value)| value);
+        let wires = self.words(wires.as_ref());
+        for (key, _) in wires.iter().filter(|(key, _)| key.name == "from") {
+            let diagnostic = Diagnostic::new(Code::BadName, key.span.clone(), "a wire cannot be called `from`");
+            self.diagnostics
+                .push(diagnostic.help("`{ from = \"role.fact\" }` asks a device for a fact: choose another name"));
+        }
+        wires
     }
 
     /// Every key must be one of `keys`.
@@ -202,6 +217,10 @@ impl<'a> Sections<'a> {
             self.diagnostics.push(Diagnostic::new(Code::BadName, key.span.clone(), message).help(help));
         }
     }
+}
+
+fn names_of(tables: &[(Key, Table)]) -> Vec<String> {
+    tables.iter().map(|(key, _)| key.name.clone()).collect()
 }
 
 /// A mistake that knows its place.

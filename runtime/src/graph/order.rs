@@ -14,7 +14,8 @@ struct Edge {
     wire: (usize, usize),
 }
 
-/// The nodes in the order in which they step: as in the file, as far as the wires allow.
+/// The nodes in the order in which they step: rank by rank, those that wait for nothing first, as in the file within a
+/// rank. So a node seldom waits for what the one before it has just written, and the processor works on both at once.
 ///
 /// A delayed input reads what the last tick left, so its node steps before the one it reads.
 pub(crate) fn order(model: &Model<'_>, wires: &[Vec<Wire>], found: &mut Vec<Diagnostic>) -> Vec<usize> {
@@ -23,10 +24,11 @@ pub(crate) fn order(model: &Model<'_>, wires: &[Vec<Wire>], found: &mut Vec<Diag
     let mut order = Vec::new();
     while !rest.is_empty() {
         let is_free = |node: &usize| !edges.iter().any(|edge| edge.then == *node);
-        if let Some(at) = rest.iter().position(is_free) {
-            let node = rest.remove(at);
-            edges.retain(|edge| edge.first != node);
-            order.push(node);
+        let (free, bound): (Vec<usize>, Vec<usize>) = rest.iter().partition(|node| is_free(node));
+        if !free.is_empty() {
+            edges.retain(|edge| !free.contains(&edge.first));
+            order.extend(free);
+            rest = bound;
         } else {
             let circle = circle(rest[0], &edges);
             found.push(describe(model, wires, &circle));

@@ -72,13 +72,18 @@ impl Table {
         Some(self.entries.remove(at))
     }
 
+    /// Whether the table asks a device for a fact: `{ from = "pad.threshold" }` is one value and no table to merge with.
+    pub(super) fn is_fact(&self) -> bool {
+        matches!(self.entries.as_slice(), [(key, value)] if key.name == "from" && value.as_str().is_some())
+    }
+
     /// Lays another table over this one: tables merge, everything else replaces, nothing deletes. The one merge rule.
     pub fn merge(&mut self, over: Self) {
         for (key, value) in over.entries {
             match self.entries.iter_mut().find(|(mine, _)| mine.name == key.name) {
                 None => self.entries.push((key, value)),
                 Some((mine, old)) => match (&mut old.item, value.item) {
-                    (Item::Table(old), Item::Table(new)) => old.merge(new),
+                    (Item::Table(old), Item::Table(new)) if !old.is_fact() => old.merge(new),
                     (item, new) => {
                         *item = new;
                         (old.span, mine.span) = (value.span, key.span);

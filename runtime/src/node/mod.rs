@@ -98,21 +98,28 @@ impl Tick {
 /// The time between two samples of one device, for whatever integrates or differentiates: part of a node's state.
 ///
 /// A sum of the steps is the time between the first and the last sample, however the ticks fell.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Interval {
-    last: Option<Stamp>,
+    last: Stamp,
+}
+
+impl Default for Interval {
+    fn default() -> Self {
+        Self { last: Self::NEVER }
+    }
 }
 
 impl Interval {
+    /// The stamp of no device.
+    const NEVER: Stamp = Stamp { nanos: 0, device: u16::MAX - 1 };
+
     /// Time since the last new sample [s]: zero for the first, or when another device took it; at most the greatest
     /// gap. Only to be called with something new.
     pub fn step(&mut self, stamp: Stamp, tick: &Tick) -> f64 {
         let stamp = if stamp.is_timeless() { Stamp { nanos: tick.now, ..stamp } } else { stamp };
-        let last = self.last.replace(stamp);
-        match last.filter(|last| last.device == stamp.device) {
-            Some(last) => ((stamp.nanos - last.nanos).max(0) as f64 * 1e-9).min(tick.max_gap),
-            None => 0.0,
-        }
+        let last = std::mem::replace(&mut self.last, stamp);
+        let nanos = if last.device == stamp.device { (stamp.nanos - last.nanos).max(0) } else { 0 };
+        (nanos as f64 * 1e-9).min(tick.max_gap)
     }
 }
 

@@ -59,8 +59,6 @@ pub struct Bus {
     pub marks: Vec<Mark>,
     /// Values of all ports.
     pub arenas: Arenas,
-    /// Port whose value was not finite when it was written in this tick, by its mark's index.
-    pub not_finite: Option<u32>,
 }
 
 impl Bus {
@@ -113,13 +111,13 @@ impl Wires {
 #[derive(Debug, Clone, Copy)]
 pub struct In<'a, T> {
     value: &'a T,
-    mark: Mark,
+    mark: &'a Mark,
     tick: u64,
 }
 
 impl<'a, T> In<'a, T> {
     /// A value with its mark, as seen in `tick`.
-    pub const fn new(value: &'a T, mark: Mark, tick: u64) -> Self {
+    pub const fn new(value: &'a T, mark: &'a Mark, tick: u64) -> Self {
         Self { value, mark, tick }
     }
 
@@ -175,7 +173,7 @@ impl<'a, T> Many<'a, T> {
     #[must_use]
     pub fn get(&self, i: usize) -> Option<In<'a, T>> {
         let port = self.ports[i];
-        let mark = self.marks[port.mark as usize];
+        let mark = &self.marks[port.mark as usize];
         mark.is_present().then(|| In::new(&self.values[port.slot as usize], mark, self.tick))
     }
 
@@ -214,7 +212,7 @@ impl<'a, T: Signal> View<'a> for In<'a, T> {
 
     fn fetch(bus: &'a Bus, wires: &'a Wires, i: usize, tick: u64) -> Self {
         let port = wires.single[i];
-        In::new(&T::arena(&bus.arenas)[port.slot as usize], bus.marks[port.mark as usize], tick)
+        In::new(&T::arena(&bus.arenas)[port.slot as usize], &bus.marks[port.mark as usize], tick)
     }
 
     fn shape(wires: Vec<(String, Shape)>) -> T::Shape {
@@ -228,7 +226,7 @@ impl<'a, T: Signal> View<'a> for Option<In<'a, T>> {
 
     fn fetch(bus: &'a Bus, wires: &'a Wires, i: usize, tick: u64) -> Self {
         let port = wires.port(i)?;
-        let mark = bus.marks[port.mark as usize];
+        let mark = &bus.marks[port.mark as usize];
         mark.is_present().then(|| In::new(&T::arena(&bus.arenas)[port.slot as usize], mark, tick))
     }
 
@@ -285,7 +283,7 @@ impl<T: Signal> Out<T> {
     /// Takes the buffer from the bus for one step.
     #[doc(hidden)]
     pub fn take(bus: &mut Bus, port: PortId) -> Self {
-        Self { value: std::mem::take(&mut T::arena_mut(&mut bus.arenas)[port.slot as usize]), is_written: false }
+        Self { value: T::take(&mut T::arena_mut(&mut bus.arenas)[port.slot as usize]), is_written: false }
     }
 
     /// Puts the buffer back and marks what the step did.
@@ -295,9 +293,6 @@ impl<T: Signal> Out<T> {
         if self.is_written {
             mark.renew(tick.index, tick.stamp);
             *mark = self.value.mark(*mark, tick.index);
-            if T::KIND != Kind::Image && !self.value.is_finite() {
-                bus.not_finite = bus.not_finite.or(Some(port.mark));
-            }
         } else if !T::KEEPS {
             mark.lose(tick.index);
         }

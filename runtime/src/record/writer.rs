@@ -41,13 +41,11 @@ impl Format {
                 writeln!(out)
             }
             Self::Ndjson => {
+                write!(out, "{{\"units\":")?;
                 let units = columns.iter().map(|column| (column.name.as_str(), column.unit.to_string()));
-                let units: serde_json::Map<_, _> = std::iter::once(("time", "s".to_owned()))
-                    .chain(units)
-                    .map(|(name, unit)| (name.to_owned(), unit.into()))
-                    .collect();
-                serde_json::to_writer(&mut *out, &serde_json::json!({ "units": units }))?;
-                writeln!(out)
+                let mut json = serde_json::Serializer::new(&mut *out);
+                json.collect_map(std::iter::once(("time", "s".to_owned())).chain(units))?;
+                writeln!(out, "}}")
             }
         }
     }

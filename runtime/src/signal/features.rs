@@ -101,22 +101,13 @@ impl Features {
 
     /// Mark of the whole vector: there if any component is, changed if any changed, as old as the oldest.
     pub(crate) fn mark(&self, tick: u64) -> Mark {
-        let mut whole = Mark::default();
         let (mut any, mut changed, mut stamp) = (false, false, Stamp::TIMELESS);
-        for component in &self.components {
-            changed |= component.mark.changed_in(tick);
-            if component.mark.is_present() {
-                any = true;
-                stamp = stamp.oldest(component.mark.stamp());
-            }
+        for Component { mark, .. } in &self.components {
+            changed |= mark.changed_in(tick);
+            any |= mark.is_present();
+            stamp = if mark.is_present() { stamp.oldest(mark.stamp()) } else { stamp };
         }
-        if any || changed {
-            whole.renew(if changed { tick } else { u64::MAX }, stamp);
-        }
-        if !any {
-            whole.lose(tick);
-        }
-        whole
+        Mark::new(if changed { tick } else { u64::MAX }, stamp, any)
     }
 
     pub(crate) fn is_finite(&self) -> bool {

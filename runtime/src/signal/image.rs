@@ -92,7 +92,10 @@ impl Image {
     #[must_use]
     pub fn is_finite(&self) -> bool {
         const EXPONENT: u32 = 0x7f80_0000;
-        !self.cells.iter().fold(false, |bad, v| bad | (v.to_bits() & EXPONENT == EXPONENT))
+        const ONE: u32 = 1 << 23;
+        // An exponent of ones, and no other, carries into the sign.
+        let carries = self.cells.iter().fold(0, |carries, v| carries | ((v.to_bits() & EXPONENT) + ONE));
+        carries >> 31 == 0
     }
 }
 

@@ -33,12 +33,17 @@ pub trait Signal: Default + Clone + Send + 'static {
     /// A value of that shape; the only place where a value allocates.
     fn allocate(shape: &Self::Shape) -> Self;
 
-    /// Whether every number in it is finite. Images are checked once, where they enter.
+    /// Whether every number in it is finite; what is absent counts as finite.
     fn is_finite(&self) -> bool;
 
     /// The mark of the value after a step that wrote it, given the mark that follows from the step.
     fn mark(&self, from_step: Mark, _tick: u64) -> Mark {
         from_step
+    }
+
+    /// Takes the buffer out of its slot for one step. What is plain and small starts afresh and leaves its slot alone.
+    fn take(slot: &mut Self) -> Self {
+        std::mem::take(slot)
     }
 
     /// What becomes of the value when its port is made absent.
@@ -98,6 +103,12 @@ macro_rules! kinds {
                     std::mem::swap(&mut self.$arena[slot as usize], &mut other.$arena[other_slot as usize])),* }
             }
 
+            /// Whether every value is finite, images aside: those are checked once, where they enter.
+            #[must_use]
+            pub fn are_finite(&self) -> bool {
+                $((Kind::$kind == Kind::Image || self.$arena.iter().fold(true, |all, value| all & value.is_finite())) &)* true
+            }
+
             /// Whether a value of `kind` is finite.
             #[must_use]
             pub fn is_finite(&self, kind: Kind, slot: u32) -> bool {
@@ -133,10 +144,12 @@ pub struct JacobianShape(pub JointsShape);
 kinds! {
     Scalar ScalarShape scalars "scalar" {
         fn allocate(_: &ScalarShape) -> Self { 0.0 }
+        fn take(_: &mut Self) -> Self { 0.0 }
         fn is_finite(&self) -> bool { all_finite(&[*self]) }
     }
     Flag FlagShape flags "flag" {
         fn allocate(_: &FlagShape) -> Self { false }
+        fn take(_: &mut Self) -> Self { false }
         fn is_finite(&self) -> bool { true }
     }
     Features FeaturesShape features "feature vector" {
@@ -160,10 +173,12 @@ kinds! {
     }
     Twist TwistShape twists "twist" {
         fn allocate(_: &TwistShape) -> Self { Self::default() }
+        fn take(_: &mut Self) -> Self { Self::default() }
         fn is_finite(&self) -> bool { all_finite(self.0.as_slice()) }
     }
     Pose PoseShape poses "pose" {
         fn allocate(_: &PoseShape) -> Self { Self::default() }
+        fn take(_: &mut Self) -> Self { Self::default() }
         fn is_finite(&self) -> bool {
             all_finite(self.0.translation.vector.as_slice()) && all_finite(self.0.rotation.matrix().as_slice())
         }

@@ -24,7 +24,11 @@ pub use spatial::{Pose, PoseShape, Twist, TwistShape};
 pub use unit::{Base, Unit};
 
 /// Whether no bit pattern of `values` is an infinity or NaN: bits and no float sums, so that it vectorises.
+#[inline]
 pub(crate) fn all_finite(values: &[f64]) -> bool {
     const EXPONENT: u64 = 0x7ff0_0000_0000_0000;
-    !values.iter().fold(false, |bad, v| bad | (v.to_bits() & EXPONENT == EXPONENT))
+    const ONE: u64 = 1 << 52;
+    // An exponent of ones, and no other, carries into the sign.
+    let carries = values.iter().fold(0, |carries, v| carries | ((v.to_bits() & EXPONENT) + ONE));
+    carries >> 63 == 0
 }

@@ -1,3 +1,5 @@
+//! `ik_sink` against limits, ages and the twist it is asked for.
+
 use proptest::prelude::*;
 use tactflow_runtime::harness::NodeRig;
 use tactflow_runtime::signal::{Jacobian, JacobianShape, Joints, PoseShape, Shape, Stamp, TwistShape};

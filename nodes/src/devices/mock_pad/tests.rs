@@ -1,3 +1,5 @@
+//! `mock_pad` against its script.
+
 use proptest::prelude::*;
 use tactflow_runtime::signal::Shape;
 

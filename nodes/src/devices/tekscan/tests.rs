@@ -1,3 +1,5 @@
+//! `tekscan_movie` against the shipped recording and damaged copies of it.
+
 use tactflow_runtime::signal::{Shape, Unit};
 
 use super::*;
