@@ -1,6 +1,7 @@
 //! The suite: one module a subject.
 #![allow(clippy::unwrap_used, reason = "clippy knows a test by its attribute, and this crate is nothing but tests")]
 
+mod absence;
 mod bad_data;
 mod cli;
 mod course;

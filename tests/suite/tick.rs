@@ -78,7 +78,7 @@ fn in_a_jail() {
             ticks += 1;
         }
     }
-    println!("every tick ran");
+    std::io::Write::write_all(&mut std::io::stdout(), b"every tick ran\n").unwrap();
     std::process::exit(0);
 }
 

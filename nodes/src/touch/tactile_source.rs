@@ -135,17 +135,17 @@ fn greater(a: f32, b: f32) -> f32 {
 impl Lanes {
     #[inline]
     fn add(&mut self, chunk: &[f32; LANES]) {
-        for lane in 0..LANES {
-            self.sums[lane] += f64::from(chunk[lane]);
-            self.peaks[lane] = greater(self.peaks[lane], chunk[lane]);
+        for ((sum, peak), value) in self.sums.iter_mut().zip(&mut self.peaks).zip(chunk) {
+            *sum += f64::from(*value);
+            *peak = greater(*peak, *value);
         }
     }
 
     /// Adds what is left of a last chunk, and the lanes.
     fn finish(mut self, rest: &[f32]) -> (f64, f64) {
-        for (lane, value) in rest.iter().enumerate() {
-            self.sums[lane] += f64::from(*value);
-            self.peaks[lane] = greater(self.peaks[lane], *value);
+        for ((sum, peak), value) in self.sums.iter_mut().zip(&mut self.peaks).zip(rest) {
+            *sum += f64::from(*value);
+            *peak = greater(*peak, *value);
         }
         let [a, b, c, d, e, f, g, h] = self.sums;
         let sum = ((a + e) + (c + g)) + ((b + f) + (d + h));

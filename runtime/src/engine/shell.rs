@@ -71,6 +71,7 @@ struct Shell<'a> {
     interrupted: watch::Receiver<bool>,
     drivers: JoinSet<(usize, Result<(), DeviceError>)>,
     late: u64,
+    is_on_timer: bool,
 }
 
 impl<'a> Shell<'a> {
@@ -81,6 +82,7 @@ impl<'a> Shell<'a> {
             let edge = std::mem::replace(&mut deck.edge, Edge::Gone);
             deck.edge = match edge {
                 Edge::Idle(driver) => {
+                    tracing::info!("device `{}` starts", deck.name);
                     let (theirs, ours) = link(&deck.samples, &deck.commands, epoch);
                     drivers.spawn_on(async move { (i, driver.run(theirs).await) }, runtime.handle());
                     Edge::Live(ours)
@@ -91,7 +93,7 @@ impl<'a> Shell<'a> {
         let is_real = options.is_realtime || !drivers.is_empty();
         let until = options.duration.map_or(i64::MAX, |seconds| (seconds * 1e9) as i64);
         let interrupted = runtime.block_on(async { interrupts() })?;
-        Ok(Self { runtime, epoch, is_real, until, interrupted, drivers, late: 0 })
+        Ok(Self { runtime, epoch, is_real, until, interrupted, drivers, late: 0, is_on_timer: false })
     }
 
     fn run(&mut self, engine: &mut Engine, observe: &mut dyn FnMut(&Engine)) -> End {
@@ -114,7 +116,19 @@ impl<'a> Shell<'a> {
                 Ok(()) => observe(engine),
                 Err(fault) => return End::Fault(fault.into()),
             }
+            self.watch_clock(engine);
         }
+    }
+
+    /// Tells when a timer takes the clock device's place, and when the device is back.
+    fn watch_clock(&mut self, engine: &Engine) {
+        let seconds = engine.now() as f64 * 1e-9;
+        match (self.is_on_timer, engine.timeline.is_on_timer()) {
+            (false, true) => tracing::warn!("at {seconds:.3} s: the clock device is silent, a timer takes its place"),
+            (true, false) => tracing::info!("at {seconds:.3} s: the clock device is back"),
+            _ => {}
+        }
+        self.is_on_timer = engine.timeline.is_on_timer();
     }
 
     /// Waits for the next sample of a live clock, or until `next` [ns]; the time of the tick.

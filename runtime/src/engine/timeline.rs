@@ -28,6 +28,11 @@ impl Timeline {
         self.clock == Clock::Device(device)
     }
 
+    /// Whether a timer stands in for the clock device.
+    pub(super) const fn is_on_timer(&self) -> bool {
+        self.is_on_timer
+    }
+
     /// Latest time of the next tick: when a sample of the clock device is given up [ns].
     pub(super) fn deadline(&self) -> i64 {
         let patience = if self.is_on_timer || self.clock == Clock::Rate { 1 } else { PATIENCE };

@@ -47,6 +47,12 @@ pub fn plan(catalogue: &Catalogue, request: &Request) -> Result<Plan, Report> {
     let Builder { found, sources, .. } = builder;
     match (clock, found.is_empty()) {
         (Some((clock, _)), true) => {
+            for node in &nodes {
+                tracing::debug!("next in the order: `{}` ({})", node.name, sources.locate(node.span.start));
+            }
+            for device in &opened.devices {
+                tracing::info!("opened device `{}` ({})", device.name, sources.locate(device.span.start));
+            }
             Ok(finish(Parts { roles, nodes, commands: planned, clock, period, sources }, opened, flat.table.as_ref()))
         }
         _ => Err(Report::new(sources, found)),

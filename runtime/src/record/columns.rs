@@ -51,7 +51,7 @@ impl Columns {
         columns
     }
 
-    /// Number of columns of the port with that mark.
+    /// Number of columns of a port of that shape.
     #[must_use]
     pub fn width(shape: &Shape) -> usize {
         columns_of(shape).map_or(0, |(_, suffixes)| suffixes.len())
