@@ -129,8 +129,11 @@ impl Node for Pid {
 impl Memory {
     /// Decides, now that the feature is there, whether it was away for so long that it starts afresh.
     fn came_back(&mut self, tick: &Tick) {
-        if self.lost_at.take().is_some_and(|lost_at| tick.now - lost_at >= tick.reset_after) {
-            *self = Self::default();
+        if let Some(lost_at) = self.lost_at {
+            self.lost_at = None;
+            if tick.now - lost_at >= tick.reset_after {
+                *self = Self::default();
+            }
         }
     }
 }

@@ -87,7 +87,12 @@ impl State {
     fn mean(&self) -> [f64; 2] {
         // Until the ring is full, its oldest sample is the first; then it is the one to be written next.
         let (newer, older) = self.ring[..self.count].split_at(if self.count < self.ring.len() { 0 } else { self.next });
-        let sum = older.iter().chain(newer).fold([0.0; 2], |[a, b], sample| [a + sample[0], b + sample[1]]);
+        let mut sum = [0.0; 2];
+        for samples in [older, newer] {
+            for [a, b] in samples {
+                sum = [sum[0] + a, sum[1] + b];
+            }
+        }
         sum.map(|sum| sum / self.count as f64)
     }
 }
