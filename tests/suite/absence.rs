@@ -55,7 +55,11 @@ fn without_contact_everything_behind_is_lost_once_and_then_absent() {
     let mut seen = Vec::new();
     for (ms, image) in [(0.0, press(&SQUARE)), (10.0, press(&[])), (20.0, press(&[]))] {
         show(&mut rig, ms, image);
-        seen.push((rig.get::<Flag>("label.present").copied(), rig.freshness("moments.x"), rig.freshness("count.steps")));
+        seen.push((
+            rig.get::<Flag>("label.present").copied(),
+            rig.freshness("moments.x"),
+            rig.freshness("count.steps"),
+        ));
     }
     let expected = [
         (Some(true), Freshness::New, Freshness::New),

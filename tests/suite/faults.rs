@@ -1,9 +1,11 @@
 //! Whatever the process can observe going wrong ends in a stop that names node, port and tick.
 
+use tactflow_runtime::engine::{End, Engine, RunOptions, run};
 use tactflow_runtime::fault::Cause;
+use tactflow_runtime::graph::{Request, plan};
 use tactflow_runtime::harness::GraphRig;
-use tactflow_tests::catalogue;
 use tactflow_tests::nodes::length_by_hand;
+use tactflow_tests::{catalogue, workspace};
 
 fn rig(how: &str) -> GraphRig {
     let text = format!(
@@ -45,4 +47,44 @@ fn a_sample_that_is_not_finite_is_a_fault_of_its_role() {
     rig.feed("a", 0, 0.0, f64::NAN);
     let fault = rig.tick(0.0).unwrap_err();
     assert_eq!((fault.node.as_str(), fault.port.as_deref(), fault.tick), ("a", Some("value"), 1));
+}
+
+/// The hybrid task on the mock bench, whose pad gives a NaN in the middle of a press.
+fn hybrid_with_a_nan() -> Engine {
+    let request = Request::file(workspace().join("graphs/hybrid.toml"));
+    let request = request.set("devices.pad.glitch=[{ at_s = 1.0, for_s = 0.1, kind = 'nan' }]");
+    Engine::new(plan(&catalogue(), &request).unwrap_or_else(|report| panic!("{}", report.render(false))))
+}
+
+#[test]
+fn after_a_fault_every_command_goes_to_zero_in_a_straight_line() {
+    let mut engine = hybrid_with_a_nan();
+    let fault = loop {
+        let now = engine.next().unwrap();
+        if let Err(fault) = engine.tick(now) {
+            break fault;
+        }
+    };
+    assert_eq!((fault.node.as_str(), fault.port.as_deref(), fault.cause), ("pad", Some("image"), Cause::NotFinite));
+    let start = engine.commands("arm").unwrap();
+    assert!(start.iter().any(|velocity| velocity.abs() > 0.01), "the arm moves: {start:?}");
+    // 100 ms at 250 Hz.
+    for step in 1..=25 {
+        let is_still = engine.wind_down();
+        let left = f64::from(25 - step) / 25.0;
+        let now = engine.commands("arm").unwrap();
+        let is_on_the_line = now.iter().zip(&start).all(|(now, start)| (now - start * left).abs() < 1e-9);
+        assert!(is_on_the_line, "step {step}: {now:?} of {start:?}");
+        assert!(!is_still || step == 25, "step {step}");
+    }
+    engine.wind_down();
+    assert!(engine.commands("arm").unwrap().iter().all(|velocity| *velocity == 0.0));
+}
+
+#[test]
+fn a_run_that_faults_leaves_the_arm_still() {
+    let mut engine = hybrid_with_a_nan();
+    let outcome = run(&mut engine, &RunOptions::default(), &mut |_| {}).unwrap();
+    assert!(matches!(outcome.end, End::Fault(_)), "{:?}", outcome.end);
+    assert!(engine.commands("arm").unwrap().iter().all(|velocity| *velocity == 0.0));
 }

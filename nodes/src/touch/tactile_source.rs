@@ -134,10 +134,14 @@ fn greater(a: f32, b: f32) -> f32 {
 
 impl Lanes {
     #[inline]
+    #[expect(
+        clippy::needless_range_loop,
+        reason = "an index into arrays of one length becomes vectors, three iterators do not"
+    )]
     fn add(&mut self, chunk: &[f32; LANES]) {
-        for ((sum, peak), value) in self.sums.iter_mut().zip(&mut self.peaks).zip(chunk) {
-            *sum += f64::from(*value);
-            *peak = greater(*peak, *value);
+        for lane in 0..LANES {
+            self.sums[lane] += f64::from(chunk[lane]);
+            self.peaks[lane] = greater(self.peaks[lane], chunk[lane]);
         }
     }
 

@@ -1,4 +1,5 @@
-//! The tick: latch, step, commit. One thread, a fixed order, no queue, no lock, no allocation, no clock, no `async`.
+//! The tick: latch, step, commit. One thread, a fixed order, no queue, no lock, no allocation, no `async`; and no clock
+//! but the one that times the nodes in a few of the ticks.
 
 use std::time::{Duration, Instant};
 

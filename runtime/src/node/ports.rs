@@ -282,12 +282,14 @@ impl<T: Signal> Out<T> {
 
     /// Takes the buffer from the bus for one step.
     #[doc(hidden)]
+    #[inline(always)]
     pub fn take(bus: &mut Bus, port: PortId) -> Self {
         Self { value: T::take(&mut T::arena_mut(&mut bus.arenas)[port.slot as usize]), is_written: false }
     }
 
     /// Puts the buffer back and marks what the step did.
     #[doc(hidden)]
+    #[inline(always)]
     pub fn put(self, bus: &mut Bus, port: PortId, tick: &Tick) {
         let mark = &mut bus.marks[port.mark as usize];
         if self.is_written {
