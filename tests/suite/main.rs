@@ -7,6 +7,7 @@ mod cli;
 mod course;
 mod determinism;
 mod docs;
+mod erased;
 mod errors;
 mod faults;
 mod freshness;

@@ -1,0 +1,98 @@
+//! The erased contract: a node that is known only at run time, from data, without the typed one.
+
+use tactflow_runtime::graph::Value;
+use tactflow_runtime::harness::GraphRig;
+use tactflow_runtime::node::{
+    AnyNode, Built, Bus, Configured, Given, Mistake, Mistakes, Need, NodeSpec, NodeType, Param, PortId, PortSpec,
+    Reader, Tick, Wires,
+};
+use tactflow_runtime::signal::{Freshness, Kind, Scalar, Shape, Signal};
+use tactflow_tests::catalogue;
+use tactflow_tests::nodes::length_by_hand;
+
+/// A polynomial whose name and coefficients come from somewhere at run time.
+#[derive(Clone)]
+struct Polynomial {
+    name: String,
+    coefficients: Vec<f64>,
+}
+
+impl NodeType for Polynomial {
+    fn spec(&self) -> NodeSpec {
+        let port = |name: &'static str| PortSpec {
+            name: name.into(),
+            doc: "A length.".into(),
+            kind: Kind::Scalar,
+            args: vec!["m".into()].into(),
+            need: Need::Required,
+        };
+        NodeSpec {
+            name: self.name.clone().into(),
+            summary: "a polynomial".into(),
+            params: Vec::new(),
+            inputs: vec![port("x")],
+            outputs: vec![port("y")],
+            every_tick: false,
+        }
+    }
+
+    fn configure(&self, table: &Value, reader: &mut Reader<'_>) -> Option<Box<dyn Configured>> {
+        let mut open = reader.table(table)?;
+        let scale = reader.field::<f64>(&mut open, "scale", Some(|| 1.0));
+        reader.close(open, &["scale"]);
+        let coefficients = self.coefficients.iter().map(|c| c * scale.unwrap_or(1.0)).collect();
+        Some(Box::new(Self { coefficients, ..self.clone() }))
+    }
+}
+
+impl Configured for Polynomial {
+    fn build(self: Box<Self>, given: Given) -> Result<Built, Mistakes> {
+        if self.coefficients.is_empty() {
+            return Err(Mistake::param("scale", "there is nothing to scale").into());
+        }
+        let outputs: Vec<Shape> = vec![given.inputs[0][0].1.clone()];
+        Ok(Built { node: self, outputs })
+    }
+}
+
+impl AnyNode for Polynomial {
+    fn step(&mut self, tick: &Tick, bus: &mut Bus, wires: &Wires, outputs: &[PortId]) {
+        let from = wires.port(0).expect("`x` is required");
+        let x = Scalar::arena(&bus.arenas)[from.slot as usize];
+        let y = self.coefficients.iter().rev().fold(0.0, |sum, c| sum * x + c);
+        Scalar::arena_mut(&mut bus.arenas)[outputs[0].slot as usize] = y;
+        bus.marks[outputs[0].mark as usize].renew(tick.index, tick.stamp);
+    }
+
+    fn lose(&mut self, tick: u64, bus: &mut Bus, outputs: &[PortId]) {
+        bus.marks[outputs[0].mark as usize].lose(tick);
+    }
+
+    fn reset(&mut self) {}
+}
+
+fn rig(params: &str) -> Result<GraphRig, String> {
+    let node = Polynomial { name: "poly_7".into(), coefficients: vec![1.0, 0.0, 2.0] };
+    let text = format!(
+        "[graph]\nclock = \"a\"\n[roles]\na = \"length\"\n[nodes.p]\ntype = \"poly_7\"\nin.x = \"a.value\"\n{params}"
+    );
+    let rig = GraphRig::new(catalogue().node_type(Box::new(node)), &text, vec![length_by_hand("a")]);
+    rig.map_err(|report| report.render(false))
+}
+
+#[test]
+fn a_node_made_of_data_runs_like_any_other() {
+    let mut rig = rig("scale = 10.0").unwrap();
+    rig.feed("a", 0, 0.0, 3.0);
+    rig.tick(0.0).unwrap();
+    assert_eq!((rig.get::<Scalar>("p.y"), rig.freshness("p.y")), (Some(&190.0), Freshness::New));
+    rig.tick(10.0).unwrap();
+    assert_eq!((rig.freshness("p.y"), rig.age_ms("p.y")), (Freshness::Held, 10.0));
+}
+
+#[test]
+fn its_mistakes_show_on_their_token_like_any_other() {
+    let text = rig("scal = 10.0").err().unwrap();
+    assert!(text.contains("graph.toml:8:1") && text.contains("did you mean `scale`?"), "{text}");
+    assert_eq!(f64::EXPECTS, "a number");
+}
