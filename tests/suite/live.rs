@@ -26,10 +26,10 @@ struct Peer {
 }
 
 impl Peer {
-    fn start(count: u32, silence_s: f64, last_word: &str) -> Self {
+    fn start(count: u32, interval_s: f64, silence_s: f64, last_word: &str) -> Self {
         let script = workspace().join("tests/peers/numbers.py");
         let mut command = Command::new("python3");
-        command.arg(script).args([&count.to_string(), &silence_s.to_string(), last_word]);
+        command.arg(script).args([&count.to_string(), &interval_s.to_string(), &silence_s.to_string(), last_word]);
         let mut child = command.stdout(Stdio::piped()).spawn().expect("python3 is there");
         let mut port = String::new();
         BufReader::new(child.stdout.take().unwrap()).read_line(&mut port).unwrap();
@@ -68,7 +68,7 @@ fn run(peer: &Peer, duration: f64) -> (End, Vec<f64>, Vec<f64>) {
 
 #[test]
 fn every_sample_counts_once_and_silence_makes_it_old() {
-    let peer = Peer::start(20, 5.0, "0");
+    let peer = Peer::start(20, 0.01, 5.0, "0");
     let (end, steps, ages) = run(&peer, 0.8);
     assert_eq!(end, End::Duration);
     let last = *steps.last().unwrap();
@@ -78,9 +78,18 @@ fn every_sample_counts_once_and_silence_makes_it_old() {
 }
 
 #[test]
+fn a_clock_device_that_is_late_is_waited_for() {
+    // Every 20 ms where 10 are nominal: late, but within the three periods of patience.
+    let (_, _, ages) = run(&Peer::start(40, 0.02, 5.0, "0"), 0.7);
+    let on_time = ages.iter().filter(|age| **age < 5.0).count();
+    let in_between = ages.iter().filter(|age| (5.0..20.0).contains(*age)).count();
+    assert!(on_time >= 15 && in_between * 2 < on_time, "a timer ticks between the samples: {ages:?}");
+}
+
+#[test]
 fn a_peer_that_hangs_up_or_talks_nonsense_is_a_fault_of_the_device() {
     for (last_word, message) in [("hang-up", "the peer hung up"), ("garbage", "`garbage` is not a number")] {
-        let (end, ..) = run(&Peer::start(5, 0.0, last_word), 5.0);
+        let (end, ..) = run(&Peer::start(5, 0.01, 0.0, last_word), 5.0);
         let End::Fault(fault) = end else { panic!("{end:?}") };
         assert_eq!((fault.node.as_str(), fault.cause), ("tcp", Cause::Device(message.into())));
     }
@@ -88,7 +97,7 @@ fn a_peer_that_hangs_up_or_talks_nonsense_is_a_fault_of_the_device() {
 
 #[test]
 fn a_peer_that_is_not_there_is_a_fault_of_the_device() {
-    let peer = Peer::start(1, 0.0, "0");
+    let peer = Peer::start(1, 0.01, 0.0, "0");
     let nobody = Peer { port: "1".into(), child: Command::new("true").spawn().unwrap() };
     drop(peer);
     let (end, ..) = run(&nobody, 5.0);

@@ -94,15 +94,17 @@ pub(crate) fn link(samples: &Samples, commands: &Commands, epoch: Instant) -> (L
 
 impl Linked {
     /// Hands over the commands and takes the newest samples, if there are any. Buffers rotate; nothing is copied but
-    /// the commands.
-    pub(crate) fn exchange(&mut self, commands: &Commands, samples: &mut Samples) {
+    /// the commands. Whether there were any.
+    pub(crate) fn exchange(&mut self, commands: &Commands, samples: &mut Samples) -> bool {
         for (slot, values) in self.commands.input_buffer_mut().values.iter_mut().zip(&commands.values) {
             slot.copy_from_slice(values);
         }
         self.commands.publish();
         self.commanded.notify_one();
-        if self.samples.update() {
+        let is_newer = self.samples.update();
+        if is_newer {
             std::mem::swap(samples, self.samples.output_buffer_mut());
         }
+        is_newer
     }
 }

@@ -158,7 +158,7 @@ impl Engine {
         }
     }
 
-    /// Time of the clock device's next sample before this tick.
+    /// Time of a stepped clock device's next sample.
     fn clock_sample(&self) -> Option<i64> {
         self.decks.iter().enumerate().find_map(|(i, deck)| match &deck.edge {
             Edge::Stepped(driver) if self.timeline.is_clock(i) => driver.next(),
@@ -172,10 +172,10 @@ impl Engine {
     /// # Errors
     /// If a device fails.
     pub fn exchange(&mut self, now: i64) -> Result<(), Fault> {
-        let clock = self.clock_sample();
+        let due = self.clock_sample().is_some_and(|sample| sample <= now);
         self.core.begin(now);
-        self.timeline.ticked(now, clock);
-        self.exchange_with_devices(now)?;
+        let has_sampled = self.exchange_with_devices(now)? || due;
+        self.timeline.ticked(now, has_sampled);
         let decks = &self.decks;
         match self.core.inlets.iter().position(|inlet| !inlet.is_finite(&decks[inlet.device].samples)) {
             // The ports of the roles come first, an inlet each.
@@ -184,8 +184,10 @@ impl Engine {
         }
     }
 
-    fn exchange_with_devices(&mut self, now: i64) -> Result<(), Fault> {
-        for deck in &mut self.decks {
+    /// Whether a live clock device has sampled.
+    fn exchange_with_devices(&mut self, now: i64) -> Result<bool, Fault> {
+        let mut has_sampled = false;
+        for (i, deck) in self.decks.iter_mut().enumerate() {
             match &mut deck.edge {
                 Edge::Stepped(driver) => {
                     if let Err(error) = driver.exchange(now, &deck.commands, &mut deck.samples) {
@@ -201,12 +203,13 @@ impl Engine {
                     }
                 }
                 Edge::Live(linked) => {
-                    linked.exchange(&deck.commands, &mut deck.samples);
+                    let is_newer = linked.exchange(&deck.commands, &mut deck.samples);
+                    has_sampled |= is_newer && self.timeline.is_clock(i);
                 }
                 Edge::Idle(_) | Edge::Gone => {}
             }
         }
-        Ok(())
+        Ok(has_sampled)
     }
 
     /// One period of the end of a run: the commands go one step further down to zero, and the devices are told.

@@ -87,12 +87,23 @@ impl Station {
         if is_missing {
             self.starve(tick, bus);
         } else {
-            self.absence = Absence::Nothing;
+            if self.absence != Absence::Nothing {
+                self.come_back(tick);
+            }
             if is_woken {
                 tick.stamp = stamp;
                 self.node.step(tick, bus, &self.wires, &self.outputs);
             }
         }
+    }
+
+    /// Ends an absence. A slow graph may not have ticked while it lasted, so whether it was long is asked here too.
+    #[cold]
+    fn come_back(&mut self, tick: &Tick) {
+        if matches!(self.absence, Absence::Since(since) if tick.now - since >= tick.reset_after) {
+            self.node.reset();
+        }
+        self.absence = Absence::Nothing;
     }
 
     /// Makes the outputs absent; resets the state once, when that has lasted.

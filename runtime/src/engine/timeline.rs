@@ -49,9 +49,9 @@ impl Timeline {
         self.last.map_or(next, |last| next.max(last + 1))
     }
 
-    /// There was a tick at `now`; `sample` is the time of the clock device's sample that was due next.
-    pub(super) fn ticked(&mut self, now: i64, sample: Option<i64>) {
-        self.is_on_timer = self.clock != Clock::Rate && sample.is_none_or(|sample| sample > now);
+    /// There was a tick at `now`; whether the clock device sampled since the last.
+    pub(super) fn ticked(&mut self, now: i64, has_sampled: bool) {
+        self.is_on_timer = self.clock != Clock::Rate && !has_sampled;
         self.last = Some(now);
     }
 }
@@ -68,7 +68,7 @@ mod tests {
         while let Some(&sample) = samples.peek() {
             let now = timeline.next(Some(sample));
             ticks.push(now);
-            timeline.ticked(now, Some(sample));
+            timeline.ticked(now, sample <= now);
             samples.next_if(|sample| *sample <= now);
         }
         assert_eq!(ticks, [0, 10, 20, 50, 60, 70, 80, 90, 100, 110]);
@@ -80,7 +80,7 @@ mod tests {
         for expected in [0, 4, 8] {
             let now = timeline.next(None);
             assert_eq!(now, expected);
-            timeline.ticked(now, None);
+            timeline.ticked(now, false);
         }
     }
 }

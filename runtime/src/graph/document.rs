@@ -4,13 +4,13 @@ use std::ops::Range;
 
 use super::{Item, Key, Sources, Table, Value};
 use crate::diagnostic::{Code, Diagnostic, closest, meant};
-use crate::node::{At, FilePath, Mistake, NonNegative, Param, Positive, Reader, Word};
+use crate::node::{At, FilePath, Mistake, NonNegative, Param, Positive, Rate, Reader, Word};
 
 crate::params! { GraphTable:
     /// Role whose samples trigger the ticks.
     clock: Option<Word>,
     /// Ticks per second of a graph that has no role for a clock [Hz].
-    rate_hz: Option<Positive>,
+    rate_hz: Option<Rate>,
     /// Bench it runs on unless another is named.
     bench: Option<FilePath>,
     /// Greatest time between two samples that counts as one step; five periods unless said [ms].

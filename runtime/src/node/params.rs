@@ -209,6 +209,8 @@ ranges! {
     Positive(f64): "a number greater than 0", |x| x > 0.0 && x.is_finite();
     /// A finite number that is not below zero.
     NonNegative(f64): "a number, 0 or more", |x| x >= 0.0 && x.is_finite();
+    /// A rate [Hz] whose period is a sensible number of nanoseconds.
+    Rate(f64): "a rate from 0.001 to 1000000", |x| (1e-3..=1e6).contains(&x);
     /// How many, at least one.
     Count(usize): "a whole number from 1 to 1000000", |n| (1..=1_000_000).contains(&n);
 }
