@@ -6,7 +6,7 @@
 use std::borrow::Cow;
 
 use tactflow_runtime::device::{Commands, Description, Device, DeviceError, Driver, Filled, Opened, Samples, Stepped};
-use tactflow_runtime::node::{FilePath, Mistake, Mistakes, Positive};
+use tactflow_runtime::node::{FilePath, Mistake, Mistakes, Rate};
 use tactflow_runtime::params;
 use tactflow_runtime::signal::{Joint, Joints, JointsShape, Unit};
 
@@ -24,7 +24,7 @@ params! {
     /// Joint positions at the start, one a joint [rad; m for a prismatic joint].
     start: Vec<f64>,
     /// Samples of the positions per second [1/s].
-    rate_hz: Positive = Positive(250.0),
+    rate_hz: Rate = Rate(250.0),
 }
 
 /// The arm's joints and where they are.
@@ -45,7 +45,7 @@ impl Device for MockArm {
 
     fn open(params: Params) -> Result<Opened, Mistakes> {
         let chain = load(&params.urdf, &params.tip, &params.mount)?;
-        let period = period_of(params.rate_hz)?;
+        let period = period_of(params.rate_hz);
         let joints = chain.joints().to_vec();
         check_start(&joints, &params.start)?;
         let shape = JointsShape { joints: joints.clone(), unit: Unit::RADIAN };
@@ -175,8 +175,11 @@ mod tests {
         let cases = [
             ("start = [0, 0]", "`start` has 2 entries, but the arm has 7 joints"),
             ("start = [0, 0, 0, 0, 0, 0, 3]", "joint `lwr_a6_joint` cannot start at 3: it goes from -2.9671 to 2.9671"),
-            ("start = [0, 0, 0, 0, 0, 0, 0]\nrate_hz = 1e7", "`rate_hz` is from 0.001 to 100000"),
-            ("start = [0, 0, 0, 0, 0, 0, 0]\nrate_hz = 1e-9", "`rate_hz` is from 0.001 to 100000"),
+            ("start = [0, 0, 0, 0, 0, 0, 0]\nrate_hz = 1e7", "expected a rate from 0.001 to 1000000, found 10000000"),
+            (
+                "start = [0, 0, 0, 0, 0, 0, 0]\nrate_hz = 1e-9",
+                "expected a rate from 0.001 to 1000000, found 0.000000001",
+            ),
         ];
         for (params, message) in cases {
             assert_eq!(arm(params).err().unwrap()[0].message, message);

@@ -8,7 +8,7 @@ mod glitch;
 mod press;
 
 use tactflow_runtime::device::{Commands, Description, Device, DeviceError, Driver, Filled, Opened, Samples, Stepped};
-use tactflow_runtime::node::{Count, Mistake, Mistakes, NonNegative, Positive};
+use tactflow_runtime::node::{Count, Mistake, Mistakes, NonNegative, Positive, Rate};
 use tactflow_runtime::params;
 use tactflow_runtime::signal::{Image, ImageShape, Unit};
 
@@ -27,7 +27,7 @@ params! {
     /// Unit of a tactel's value.
     unit: Unit = Unit::NEWTON,
     /// Frames per second [1/s].
-    rate_hz: Positive = Positive(250.0),
+    rate_hz: Rate = Rate(250.0),
     /// How long there are frames [s]; for ever unless given.
     for_s: Option<Positive>,
     /// What presses on it.
@@ -77,7 +77,7 @@ impl Device for MockPad {
         }
         let wrong = params.press.iter().filter_map(|press| press.mistake(*params.pitch));
         mistakes.extend(wrong.map(|message| Mistake::param("press", message)));
-        let period = period_of(params.rate_hz).map_err(|more| mistakes.extend(more)).unwrap_or(1);
+        let period = period_of(params.rate_hz);
         if !mistakes.is_empty() {
             return Err(mistakes);
         }
