@@ -1,6 +1,7 @@
 //! What a graph may be made of: a plain list of node types, device types and roles.
 
 use crate::device::{Device, DeviceType, RoleType, device_type};
+use crate::graph::declares_a_unit;
 use crate::node::{Node, NodeType, of};
 
 /// A list of node types, device types and roles. Several can be joined: somebody else's crate adds its own.
@@ -25,8 +26,17 @@ impl Catalogue {
     }
 
     /// With one more node that is known only at run time.
+    ///
+    /// # Panics
+    /// If there is a node of that name already, or if a port declares a unit that is neither one nor a variable.
     #[must_use]
     pub fn node_type(mut self, node: Box<dyn NodeType>) -> Self {
+        let spec = node.spec();
+        let is_taken = self.nodes.iter().any(|other| other.spec().name == spec.name);
+        assert!(!is_taken, "two nodes are called `{}`", spec.name);
+        for port in spec.inputs.iter().chain(&spec.outputs) {
+            assert!(declares_a_unit(port), "`{}.{}` declares the unit {:?}", spec.name, port.name, port.args.first());
+        }
         self.nodes.push(node);
         self
     }
@@ -54,7 +64,7 @@ impl Catalogue {
     /// With all that is in another list.
     #[must_use]
     pub fn join(mut self, other: Self) -> Self {
-        self.nodes.extend(other.nodes);
+        self = other.nodes.into_iter().fold(self, Self::node_type);
         self.devices.extend(other.devices);
         self.roles.extend(other.roles);
         self

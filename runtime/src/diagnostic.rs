@@ -33,6 +33,8 @@ codes! {
     Unreadable "unreadable",
     /// A file of data is not what it should be.
     BadData "bad-data",
+    /// A part or a bench where a graph is wanted, or the like.
+    WrongFile "wrong-file",
     /// A key that means nothing here.
     UnknownKey "unknown-key",
     /// A key that must be there is not.

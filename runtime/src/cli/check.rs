@@ -1,6 +1,6 @@
 //! `check`: graphs are checked and built, and nothing runs.
 
-use super::{CheckArgs, Colour, complain};
+use super::{CheckArgs, Colour, complain, say};
 use crate::catalogue::Catalogue;
 use crate::graph::plan;
 
@@ -10,7 +10,7 @@ pub(super) fn check(catalogue: &Catalogue, args: CheckArgs, colour: Colour) -> u
         match plan(catalogue, &args.on.request(graph.clone())) {
             Ok(plan) => {
                 let (nodes, period) = (plan.order().count(), plan.period());
-                println!("{}: ok, {nodes} nodes, a tick each {}", graph.display(), milliseconds(period));
+                say(&format!("{}: ok, {nodes} nodes, a tick each {}", graph.display(), milliseconds(period)));
             }
             Err(report) => code = complain(&report, colour),
         }

@@ -50,8 +50,10 @@ impl Course {
     pub(super) fn line(&self) -> String {
         let means = || self.points.iter().map(|(sum, count)| (*count > 0).then(|| sum / f64::from(*count)));
         let (low, high) = means().flatten().fold((f64::MAX, f64::MIN), |(low, high), x| (low.min(x), high.max(x)));
+        // What differs by rounding alone is flat.
+        let is_flat = high - low <= 1e-12 + 1e-9 * high.abs().max(low.abs());
         let bar = |mean: f64| {
-            let height = if high > low { (mean - low) / (high - low) } else { 0.0 };
+            let height = if is_flat { 0.0 } else { (mean - low) / (high - low) };
             BARS[((height * BARS.len() as f64) as usize).min(BARS.len() - 1)]
         };
         means().map(|mean| mean.map_or(' ', bar)).collect()
@@ -73,6 +75,7 @@ mod tests {
         assert_eq!(line((0..8).map(f64::from)), "▁▂▃▄▅▆▇█");
         assert_eq!(line([1.0, f64::NAN, 2.0]), "▁ █");
         assert_eq!(line([3.0; 4]), "▁▁▁▁");
+        assert_eq!(line([0.3, 0.1 + 0.2, 0.3]), "▁▁▁");
         assert_eq!(line([f64::NAN; 3]), "   ");
     }
 

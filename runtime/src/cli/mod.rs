@@ -5,7 +5,7 @@
 //!     tactflow_runtime::cli::main(&tactflow_runtime::catalogue::Catalogue::new())
 //! }
 //! ```
-#![allow(clippy::print_stdout, clippy::print_stderr, reason = "this is where the tool speaks")]
+#![allow(clippy::print_stderr, reason = "this is where the tool speaks")]
 
 mod check;
 mod course;
@@ -13,7 +13,7 @@ mod progress;
 mod run;
 mod summary;
 
-use std::io::IsTerminal;
+use std::io::{IsTerminal, Write};
 use std::path::PathBuf;
 use std::process::ExitCode;
 
@@ -63,7 +63,7 @@ struct RunArgs {
     #[command(flatten)]
     on: OnArgs,
     /// Run at most this long in the graph's time: 20s, 500ms, 2min
-    #[arg(long = "for", value_name = "TIME", value_parser = duration)]
+    #[arg(long = "for", value_name = "TIME", value_parser = duration, allow_hyphen_values = true)]
     duration: Option<f64>,
     /// Pace the run by the wall clock; otherwise virtual time runs as fast as it can
     #[arg(long)]
@@ -140,6 +140,12 @@ fn log(cli: &Cli) {
     let filter = EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new(level));
     let is_coloured = cli.color.is_on(&std::io::stderr());
     tracing_subscriber::fmt().with_env_filter(filter).with_ansi(is_coloured).with_writer(std::io::stderr).init();
+}
+
+/// Prints to standard output. A reader that has seen enough, `head` say, is no mistake of ours.
+fn say(text: &str) {
+    let mut out = std::io::stdout().lock();
+    let _ = writeln!(out, "{text}").and_then(|()| out.flush());
 }
 
 /// Shows what is wrong with a graph.

@@ -6,7 +6,7 @@ use std::path::Path;
 use super::check::milliseconds;
 use super::progress::Progress;
 use super::summary::Summary;
-use super::{Colour, FAULTED, NOT_LOADED, RunArgs, complain};
+use super::{Colour, FAULTED, NOT_LOADED, RunArgs, complain, say};
 use crate::catalogue::Catalogue;
 use crate::engine::{self, End, Engine, Outcome, RunOptions};
 use crate::graph::plan;
@@ -26,7 +26,7 @@ pub(super) fn run(catalogue: &Catalogue, args: RunArgs, colour: Colour) -> u8 {
             return NOT_LOADED;
         }
     };
-    println!("{}: {} nodes, a tick each {}", args.graph.display(), engine.order().count(), period(&engine));
+    say(&format!("{}: {} nodes, a tick each {}", args.graph.display(), engine.order().count(), period(&engine)));
     let mut summary = Summary::new(&engine);
     let mut progress = Progress::new(args.duration.or_else(|| engine.end().map(seconds)));
     let options = RunOptions { duration: args.duration, is_realtime: args.realtime };
@@ -48,8 +48,8 @@ pub(super) fn run(catalogue: &Catalogue, args: RunArgs, colour: Colour) -> u8 {
             return FAULTED;
         }
     };
-    println!("\n{}", summary.render(&engine, &outcome));
-    println!("{}", ending(&outcome));
+    say(&format!("\n{}", summary.render(&engine, &outcome)));
+    say(&ending(&outcome));
     let code = if let End::Fault(fault) = &outcome.end {
         eprintln!("error: {fault}; every command went to zero");
         FAULTED
@@ -69,7 +69,7 @@ fn report_file(path: Option<&Path>, written: io::Result<u64>) -> u8 {
     let Some(path) = path else { return 0 };
     match written {
         Ok(0) => {
-            println!("wrote {}", path.display());
+            say(&format!("wrote {}", path.display()));
             0
         }
         Ok(dropped) => {
@@ -94,7 +94,7 @@ fn quietly<T>(work: impl FnOnce() -> T) -> T {
 
 fn ending(outcome: &Outcome) -> String {
     let why = match outcome.end {
-        End::Finished => "the recording is over",
+        End::Finished => "a device has no more samples",
         End::Duration => "the time is over",
         End::Interrupted => "interrupted",
         End::Fault(_) => "a fault",

@@ -5,7 +5,7 @@ use std::fmt::Write;
 use super::course::Course;
 use crate::engine::{Engine, Outcome};
 use crate::record::Columns;
-use crate::signal::Freshness;
+use crate::signal::{Freshness, Shape};
 
 /// Freshness of one port, counted over the ticks.
 #[derive(Debug, Clone, Copy, Default)]
@@ -101,7 +101,9 @@ impl Summary {
             let counted = [counts.new, counts.held, counts.absent].map(|count| count.to_string());
             let width = Columns::width(&port.shape);
             let mut counted = Some(counted);
-            if width != 1 {
+            // A vector has a line of its own, even one of a single component.
+            let is_scalar = matches!(port.shape, Shape::Scalar(_) | Shape::Flag(_));
+            if !is_scalar {
                 let unit = port.shape.unit().filter(|_| width == 0).map_or_else(String::new, |unit| unit.to_string());
                 let [new, held, absent] = counted.take().unwrap_or_default();
                 let name = port.name.clone();

@@ -24,7 +24,7 @@ pub fn plan(catalogue: &Catalogue, request: &Request) -> Result<Plan, Report> {
     let mut loader = Loader::default();
     let flat = loader.load(request);
     let Loader { mut sources, diagnostics: mut found, .. } = loader;
-    let has_unread = found.iter().any(|d| matches!(d.code, Code::Syntax | Code::Unreadable | Code::EndlessPart));
+    let has_unread = found.iter().any(|d| matches!(d.code, Code::Syntax | Code::Unreadable | Code::EndlessPart | Code::WrongFile));
     if has_unread {
         // What a file that was not read would have declared would be missed everywhere.
         return Err(Report::new(sources, found));

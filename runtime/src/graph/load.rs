@@ -109,6 +109,11 @@ impl Loader {
         };
         let (graph_set, bench_set) = self.set(&request.set);
         let Some(mut root) = root else { return flat };
+        if let Some(what) = other_file(&root.0, "graph") {
+            let message = format!("this is {what}, not a graph");
+            self.diagnostics.push(Diagnostic::new(Code::WrongFile, root.1, message));
+            return flat;
+        }
         flat.place = root.1;
         root.0.merge(graph_set);
         let document = self.sections(|sections| sections.graph(&root.0));
@@ -158,7 +163,12 @@ impl Loader {
                 return None;
             }
         };
-        let mut root = self.read(&path, span)?.0;
+        let (mut root, place) = self.read(&path, span)?;
+        if let Some(what) = other_file(&root, "devices") {
+            let message = format!("this is {what}, not a bench");
+            self.diagnostics.push(Diagnostic::new(Code::WrongFile, place, message));
+            return None;
+        }
         root.merge(set);
         Some(self.sections(|sections| sections.bench(&root)))
     }
@@ -247,7 +257,8 @@ impl Loader {
     fn declare(&mut self, scope: &mut Scope, key: &Key, entity: Entity) {
         if let Some((first, _)) = scope.names.get(&key.name) {
             let message = format!("`{}` is the name of two things", key.name);
-            let diagnostic = Diagnostic::new(Code::DuplicateName, key.span.clone(), message);
+            let (first, second) = if first.span.start < key.span.start { (first, key) } else { (key, first) };
+            let diagnostic = Diagnostic::new(Code::DuplicateName, second.span.clone(), message);
             let diagnostic = diagnostic.note(first.span.clone(), "the first is here");
             self.diagnostics.push(diagnostic.help("roles, nodes and parts share one namespace: rename one of them"));
             return;
@@ -313,6 +324,15 @@ impl Loader {
             }
         }
     }
+}
+
+/// What a file is that lacks its section `wanted` and has those of another sort of file.
+fn other_file(root: &Table, wanted: &str) -> Option<&'static str> {
+    if root.get(wanted).is_some() {
+        return None;
+    }
+    let sorts = [("graph", "a graph"), ("devices", "a bench"), ("exports", "a part")];
+    sorts.iter().find(|(section, _)| root.get(section).is_some()).map(|(_, what)| *what)
 }
 
 /// A value in a table in a table: `nodes.NAME`, or `parts.NAME.set`.

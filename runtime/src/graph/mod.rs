@@ -21,4 +21,5 @@ pub use load::Request;
 pub(crate) use plan::{Clock, PlannedCommand, PlannedNode, Producer, Source};
 pub use plan::{Plan, PlannedPort};
 pub use sources::{SourceFile, Sources};
+pub(crate) use units::declares_a_unit;
 pub use value::{Item, Key, Table, Value, parse_table};

@@ -48,9 +48,14 @@ impl Sources {
         self.files.last().expect("it was just pushed")
     }
 
-    /// Adds a file of text; paths in it are relative to its folder.
+    /// Adds a file of text; paths in it are relative to its folder. The same file twice has one place, so that a
+    /// mistake in a part that is used twice is told once.
     pub fn add_file(&mut self, path: &Path, text: impl Into<String>) -> &SourceFile {
-        self.add(path.display().to_string(), text, path.parent().unwrap_or(Path::new("")))
+        let (name, text) = (path.display().to_string(), text.into());
+        if let Some(at) = self.files.iter().position(|file| file.name == name && file.text == text) {
+            return &self.files[at];
+        }
+        self.add(name, text, path.parent().unwrap_or(Path::new("")))
     }
 
     /// The text that the place `at` is in.

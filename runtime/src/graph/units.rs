@@ -28,8 +28,18 @@ fn pattern(port: &PortSpec) -> Option<Pattern> {
 }
 
 fn variable(text: &str) -> Pattern {
-    let name = text.chars().next().expect("a unit is not empty");
+    let name = text.chars().next().unwrap_or('?');
     Pattern::Variable { name, per_tactel: text.contains("/tactel"), per_second: text.ends_with("/s") }
+}
+
+/// Whether the unit that a port declares is a unit, a wildcard or a variable: a capital letter, by itself or divided.
+pub(crate) fn declares_a_unit(port: &PortSpec) -> bool {
+    match (pattern(port), port.args.first()) {
+        (Some(Pattern::Variable { name, .. }), Some(text)) => {
+            name.is_ascii_uppercase() && matches!(&text[1..], "" | "/tactel" | "/s" | "/tactel/s")
+        }
+        _ => true,
+    }
 }
 
 /// What comes in is not what is taken.
@@ -106,6 +116,14 @@ mod tests {
 
     fn scalar(unit: &str) -> Shape {
         ScalarShape { unit: unit.parse().unwrap() }.into()
+    }
+
+    #[test]
+    fn what_a_port_may_declare() {
+        let cases = [("N", true), ("U", true), ("U/tactel/s", true), ("_/s", true), ("newton", false), ("Um", false)];
+        for (unit, is_good) in cases.into_iter().chain([("", false)]) {
+            assert_eq!(declares_a_unit(&port(unit)), is_good, "{unit}");
+        }
     }
 
     #[test]
