@@ -26,23 +26,28 @@ fn medians(functions: &mut [&mut dyn FnMut()], calls: u32) -> Vec<f64> {
 }
 
 fn chains() {
-    let lengths = [1, 8, 64, 512];
+    let lengths = [0, 1, 8, 64, 512];
     let mut rigs = lengths.map(chain::chain);
-    let [a, b, c, d] = rigs.each_mut();
-    let mut ticks = [a, b, c, d].map(|rig| {
+    let mut ticks = rigs.each_mut().map(|rig| {
         move || {
             rig.engine.refresh();
             black_box(&mut rig.engine).step_bare();
         }
     });
-    let [a, b, c, d] = ticks.each_mut();
-    let medians = medians(&mut [a, b, c, d], 2000);
-    for (length, median) in lengths.iter().zip(&medians) {
-        println!("chain of {length:3} scalar nodes: {median:8.1} ns a tick, {:5.2} ns a node", median / *length as f64);
+    let [a, b, c, d, e] = ticks.each_mut();
+    let medians = medians(&mut [a, b, c, d, e], 2000);
+    println!("a tick without a node: {:.1} ns", medians[0]);
+    for (length, median) in lengths.iter().zip(&medians).skip(1) {
+        let each = (median - medians[0]) / *length as f64;
+        let verdict = if each <= MOST_NODE { "good" } else { "TOO MUCH" };
+        println!(
+            "chain of {length:3} scalar nodes: {median:7.1} ns, {each:5.2} ns a node, at most {MOST_NODE}: {verdict}"
+        );
     }
-    let per_node = (medians[3] - medians[0]) / (lengths[3] - lengths[0]) as f64;
-    println!("one more node costs {per_node:.2} ns");
 }
+
+/// Greatest time of a scalar node [ns].
+const MOST_NODE: f64 = 10.0;
 
 /// Greatest ratio of the graph's bare tick to the same arithmetic fused by hand.
 const MOST_BARE: f64 = 1.25;
@@ -79,9 +84,10 @@ fn finger_press() {
     let medians = medians(&mut [&mut by_hand, &mut bare, &mut graph], 500);
     println!("finger press, a tick fused by hand: {:.0} ns", medians[0]);
     for (what, time, most) in [("bare", medians[1], MOST_BARE), ("guarded and timed", medians[2], MOST)] {
+        let ratio = time / medians[0];
+        let verdict = if ratio <= most { "good" } else { "TOO MUCH" };
         println!(
-            "finger press, a tick of the graph, {what}: {time:.0} ns, ratio {:.3} (at most {most})",
-            time / medians[0]
+            "finger press, a tick of the graph, {what}: {time:.0} ns, ratio {ratio:.3}, at most {most}: {verdict}"
         );
     }
 }
@@ -99,10 +105,14 @@ fn count(what: &str, ticks: u32) {
                 pair.engine.refresh();
                 pair.engine.step_bare();
             }
+            "guarded" => {
+                pair.engine.refresh();
+                pair.engine.step().expect("the recording is sound");
+            }
             "fused" => {
                 black_box(pair.fused.tick(black_box(&cells), black_box(&q), 0.1, 0.1, &mut out));
             }
-            other => panic!("`{other}` is neither `graph` nor `fused`"),
+            other => panic!("`{other}` is none of `graph`, `guarded` and `fused`"),
         }
     }
 }

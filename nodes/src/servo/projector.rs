@@ -2,12 +2,12 @@
 //!
 //! P is diagonal with ones and zeros, so a component either passes unchanged or is exactly zero: P P = P.
 
-use tactflow_runtime::node::{Mistake, Mistakes, Node, Setup, Tick};
+use tactflow_runtime::node::{Bit, Mistakes, Node, Setup, Tick};
 use tactflow_runtime::{inputs, outputs, params};
 
 params! {
     /// Diagonal of P, `[vx, vy, vz, wx, wy, wz]`: 1 passes a component, 0 deletes it.
-    select: [u64; 6],
+    select: [Bit; 6],
 }
 
 inputs! {
@@ -35,11 +35,7 @@ impl Node for Projector {
     const SUMMARY: &'static str = "selects the components of a twist";
 
     fn new(params: Params, _: &mut Setup<Self>) -> Result<Self, Mistakes> {
-        if params.select.iter().any(|entry| *entry > 1) {
-            let mistake = Mistake::param("select", "`select` is made of ones and zeros");
-            return Err(mistake.help("1 passes a component, 0 deletes it").into());
-        }
-        Ok(Self { passes: params.select.map(|entry| entry == 1) })
+        Ok(Self { passes: params.select.map(|entry| *entry == 1) })
     }
 
     fn state(&self) {}

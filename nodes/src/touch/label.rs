@@ -9,7 +9,7 @@
 
 use std::ops::Range;
 
-use tactflow_runtime::node::{Count, Mistake, Mistakes, Node, Setup, Tick};
+use tactflow_runtime::node::{Count, Mistake, Mistakes, Node, Param, Reader, Setup, Tick, Value, read_leaf};
 use tactflow_runtime::signal::{Grid, Image, Mask, Region, RegionsShape, Run};
 use tactflow_runtime::{inputs, outputs, params};
 
@@ -17,7 +17,7 @@ use super::on_one_array;
 
 params! {
     /// How many neighbours a tactel has: 4 (edges) or 8 (corners too).
-    neighbours: u64 = 8,
+    neighbours: Neighbours = Neighbours::Eight,
     /// Least area of a contact [tactels].
     min_area: Count = Count(1),
     /// Least sum over a contact [unit of the image].
@@ -38,6 +38,30 @@ outputs! {
     regions: Regions["U", "A"],
     /// Whether there is a contact.
     present: Flag,
+}
+
+/// Which tactels are neighbours.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Neighbours {
+    /// Those with a common edge.
+    Four,
+    /// Those with a common corner too.
+    Eight,
+}
+
+impl Param for Neighbours {
+    const EXPECTS: &'static str = "4 or 8";
+
+    fn read(value: &Value, reader: &mut Reader<'_>) -> Option<Self> {
+        match read_leaf::<u64>(value, reader, Self::EXPECTS)? {
+            4 => Some(Self::Four),
+            8 => Some(Self::Eight),
+            _ => {
+                reader.wrong_type(value, Self::EXPECTS);
+                None
+            }
+        }
+    }
 }
 
 /// What makes tactels neighbours, and a region a contact.
@@ -66,9 +90,8 @@ impl Node for Label {
             return Err(Mistake::input("mask", message).help("label a part of it").into());
         }
         let reach = match params.neighbours {
-            4 => 0,
-            8 => 1,
-            _ => return Err(Mistake::param("neighbours", "`neighbours` is 4 or 8").into()),
+            Neighbours::Four => 0,
+            Neighbours::Eight => 1,
         };
         setup.outputs.region = mask.clone();
         setup.outputs.regions = RegionsShape { grid: mask.clone(), unit: image.unit };

@@ -61,8 +61,19 @@ pub(super) fn run(catalogue: &Catalogue, args: RunArgs, colour: Colour) -> u8 {
 
 fn recorder(path: &Path, engine: &Engine, may_wait: bool) -> Result<Recorder, String> {
     let format = Format::of(path).ok_or_else(|| format!("`{}` is neither .csv nor .ndjson", path.display()))?;
+    if is_something_else(path) {
+        return Err(format!("`{}` exists and is no record of a run: it is not overwritten", path.display()));
+    }
     Recorder::create(path, format, engine, may_wait)
         .map_err(|error| format!("cannot create `{}`: {error}", path.display()))
+}
+
+/// Whether a file exists that no run has recorded: a recording that is being played, say.
+fn is_something_else(path: &Path) -> bool {
+    let mut start = String::new();
+    let read =
+        std::fs::File::open(path).and_then(|file| io::Read::read_to_string(&mut io::Read::take(file, 16), &mut start));
+    read.is_ok() && !start.is_empty() && !Format::STARTS.iter().any(|known| start.starts_with(known))
 }
 
 fn report_file(path: Option<&Path>, written: io::Result<u64>) -> u8 {
@@ -83,13 +94,14 @@ fn report_file(path: Option<&Path>, written: io::Result<u64>) -> u8 {
     }
 }
 
-/// A panic of a node is told as a fault, with its name and its tick: not by the standard library as well.
+/// A panic of a node or a device is told as a fault, with its name and its tick: not by the standard library as well.
 fn quietly<T>(work: impl FnOnce() -> T) -> T {
     let hook = std::panic::take_hook();
     std::panic::set_hook(Box::new(|_| {}));
-    let result = work();
+    let result = std::panic::catch_unwind(std::panic::AssertUnwindSafe(work));
     std::panic::set_hook(hook);
-    result
+    // Whatever else panics is a mistake of ours, and is told with everything that helps to find it.
+    result.unwrap_or_else(|panic| std::panic::resume_unwind(panic))
 }
 
 fn ending(outcome: &Outcome) -> String {

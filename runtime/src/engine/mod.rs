@@ -11,7 +11,7 @@ mod timeline;
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
-use crate::device::{Commands, Driver, Linked, Live, Samples, Stepped};
+use crate::device::{Commands, DeviceError, Driver, Linked, Live, Samples, Stepped};
 use crate::fault::{Cause, Fault};
 use crate::graph::{Plan, PlannedPort, Producer, Source, Sources};
 use crate::node::{Bus, PortId, Tick};
@@ -190,7 +190,11 @@ impl Engine {
         for (i, deck) in self.decks.iter_mut().enumerate() {
             match &mut deck.edge {
                 Edge::Stepped(driver) => {
-                    if let Err(error) = driver.exchange(now, &deck.commands, &mut deck.samples) {
+                    let exchange = || driver.exchange(now, &deck.commands, &mut deck.samples);
+                    let result = catch_unwind(AssertUnwindSafe(exchange));
+                    let failed =
+                        result.unwrap_or_else(|panic| Err(DeviceError(format!("it panicked: {}", said(&*panic)))));
+                    if let Err(error) = failed {
                         deck.edge = Edge::Gone;
                         return Err(Fault {
                             node: deck.name.clone(),
@@ -238,10 +242,8 @@ impl Engine {
     }
 
     fn panicked(&self, panic: &(dyn std::any::Any + Send)) -> Fault {
-        let text = panic.downcast_ref::<&str>().map(|text| (*text).to_owned());
-        let message = text.or_else(|| panic.downcast_ref::<String>().cloned()).unwrap_or_else(|| "no message".into());
         let (node, place) = &self.names[self.core.current()];
-        self.fault(node, None, Cause::Panicked(message), place.clone())
+        self.fault(node, None, Cause::Panicked(said(panic)), place.clone())
     }
 
     fn fault(&self, node: &str, port: Option<String>, cause: Cause, place: String) -> Fault {
@@ -328,4 +330,10 @@ impl Engine {
     pub fn step_bare(&mut self) {
         self.core.run_bare(&mut self.decks);
     }
+}
+
+/// What a panic had to say.
+fn said(panic: &(dyn std::any::Any + Send)) -> String {
+    let text = panic.downcast_ref::<&str>().map(|text| (*text).to_owned());
+    text.or_else(|| panic.downcast_ref::<String>().cloned()).unwrap_or_else(|| "no message".into())
 }

@@ -69,7 +69,9 @@ struct Shell<'a> {
     /// Last time of a tick [ns].
     until: i64,
     interrupted: watch::Receiver<bool>,
-    drivers: JoinSet<(usize, Result<(), DeviceError>)>,
+    drivers: JoinSet<Result<(), DeviceError>>,
+    /// Which device each driver is of.
+    tasks: Vec<(tokio::task::Id, usize)>,
     late: u64,
     is_on_timer: bool,
 }
@@ -77,14 +79,15 @@ struct Shell<'a> {
 impl<'a> Shell<'a> {
     fn start(engine: &mut Engine, options: &RunOptions, runtime: &'a Runtime) -> io::Result<Self> {
         let epoch = Instant::now();
-        let mut drivers = JoinSet::new();
+        let (mut drivers, mut tasks) = (JoinSet::new(), Vec::new());
         for (i, deck) in engine.decks.iter_mut().enumerate() {
             let edge = std::mem::replace(&mut deck.edge, Edge::Gone);
             deck.edge = match edge {
                 Edge::Idle(driver) => {
                     tracing::info!("device `{}` starts", deck.name);
                     let (theirs, ours) = link(&deck.samples, &deck.commands, epoch);
-                    drivers.spawn_on(async move { (i, driver.run(theirs).await) }, runtime.handle());
+                    let task = drivers.spawn_on(driver.run(theirs), runtime.handle());
+                    tasks.push((task.id(), i));
                     Edge::Live(ours)
                 }
                 other => other,
@@ -93,7 +96,7 @@ impl<'a> Shell<'a> {
         let is_real = options.is_realtime || !drivers.is_empty();
         let until = options.duration.map_or(i64::MAX, |seconds| (seconds * 1e9) as i64);
         let interrupted = runtime.block_on(async { interrupts() })?;
-        Ok(Self { runtime, epoch, is_real, until, interrupted, drivers, late: 0, is_on_timer: false })
+        Ok(Self { runtime, epoch, is_real, until, interrupted, drivers, tasks, late: 0, is_on_timer: false })
     }
 
     fn run(&mut self, engine: &mut Engine, observe: &mut dyn FnMut(&Engine)) -> End {
@@ -163,16 +166,15 @@ impl<'a> Shell<'a> {
 
     /// The fault of a live device that has ended with an error, or that has ended at all.
     fn failed_driver(&mut self, engine: &mut Engine, now: i64) -> Option<Fault> {
-        let (device, result) = match self.drivers.try_join_next()? {
-            Ok(ended) => ended,
-            Err(error) => (usize::MAX, Err(DeviceError(error.to_string()))),
+        let (task, message) = match self.drivers.try_join_next_with_id()? {
+            Ok((task, Ok(()))) => (task, "it ended before the run did".to_owned()),
+            Ok((task, Err(error))) => (task, error.0),
+            Err(error) => (error.id(), panic_of(error)),
         };
-        let message = result.err().map_or_else(|| "it ended before the run did".to_owned(), |error| error.0);
-        let deck = engine.decks.get_mut(device);
-        let (node, place) = deck.map_or_else(Default::default, |deck| {
-            deck.edge = Edge::Gone;
-            (deck.name.clone(), deck.place.clone())
-        });
+        let (_, device) = self.tasks.iter().find(|(id, _)| *id == task).expect("every driver is of a device");
+        let deck = &mut engine.decks[*device];
+        deck.edge = Edge::Gone;
+        let (node, place) = (deck.name.clone(), deck.place.clone());
         Some(Fault { node, port: None, tick: engine.ticks(), time: now, cause: Cause::Device(message), place })
     }
 
@@ -194,6 +196,13 @@ impl<'a> Shell<'a> {
         let drivers = std::mem::take(&mut self.drivers);
         // What has not ended by then ends with the runtime.
         let _ = self.runtime.block_on(async { tokio::time::timeout(GRACE, drivers.join_all()).await });
+    }
+}
+
+fn panic_of(error: tokio::task::JoinError) -> String {
+    match error.try_into_panic() {
+        Ok(panic) => format!("it panicked: {}", super::said(&*panic)),
+        Err(error) => error.to_string(),
     }
 }
 

@@ -9,11 +9,11 @@ use super::load::{Flat, Loader, Request};
 use super::order::order;
 use super::plan::{Clock, Plan, PlannedCommand, PlannedNode, PlannedPort, PlannedRole, Producer, Source};
 use super::units::{Clash, Units};
-use super::wires::{CommandWire, Model, Wire};
+use super::wires::{CommandWire, Model, Origin, Wire};
 use super::{Sources, Value};
 use crate::catalogue::Catalogue;
 use crate::diagnostic::{Code, Diagnostic, Report};
-use crate::node::{Configured, Given, Need, NodeSpec, PortSpec, Reader, Word};
+use crate::node::{Configured, Given, Need, NodeSpec, PortSpec, Reader};
 use crate::signal::Shape;
 
 /// Checks a graph and builds it.
@@ -24,7 +24,8 @@ pub fn plan(catalogue: &Catalogue, request: &Request) -> Result<Plan, Report> {
     let mut loader = Loader::default();
     let flat = loader.load(request);
     let Loader { mut sources, diagnostics: mut found, .. } = loader;
-    let has_unread = found.iter().any(|d| matches!(d.code, Code::Syntax | Code::Unreadable | Code::EndlessPart | Code::WrongFile));
+    let has_unread =
+        found.iter().any(|d| matches!(d.code, Code::Syntax | Code::Unreadable | Code::EndlessPart | Code::WrongFile));
     if has_unread {
         // What a file that was not read would have declared would be missed everywhere.
         return Err(Report::new(sources, found));
@@ -178,7 +179,7 @@ impl Builder<'_> {
             };
             let consumer = format!("{}.{}", node.name, wire.key.name);
             if let Err(clash) = units.take(input, &consumer, &port.shape) {
-                self.found.push(unit_mismatch(port, &consumer, &clash, &wire.word).with_help(self.rate_maker(input)));
+                self.found.push(unit_mismatch(port, &consumer, &clash, &wire.origin).with_help(self.rate_maker(input)));
                 is_whole = false;
             }
             given.inputs[wire.input].push((wire.key.name.clone(), port.shape.clone()));
@@ -246,7 +247,7 @@ impl Builder<'_> {
                 let Some(port) = self.ports.get(&wire.source) else { continue };
                 let consumer = format!("{}.{}", self.model.flat.nodes[index].name, wire.key.name);
                 if let Err(clash) = Units::default().take(&spec.inputs[wire.input], &consumer, &port.shape) {
-                    self.found.push(unit_mismatch(port, &consumer, &clash, &wire.word));
+                    self.found.push(unit_mismatch(port, &consumer, &clash, &wire.origin));
                 }
             }
         }
@@ -259,13 +260,13 @@ impl Builder<'_> {
         let (spec, takes) = (&role.commands[wire.command], &bound.filled.commands[wire.command]);
         let consumer = format!("{}.{}", self.model.flat.roles[wire.role].0.name, spec.name);
         if let Err(clash) = Units::default().take(spec, &consumer, &port.shape) {
-            self.found.push(unit_mismatch(port, &consumer, &clash, &wire.word));
+            self.found.push(unit_mismatch(port, &consumer, &clash, &wire.origin));
             return None;
         }
         let (has, wants) = (joint_names(&port.shape), joint_names(takes));
         if has != wants {
             let message = format!("`{}` has the joints {has:?}, but `{consumer}` takes {wants:?}", port.name);
-            self.found.push(Diagnostic::new(Code::ShapeMismatch, wire.word.span.clone(), message));
+            self.found.push(wire.origin.mistake(Code::ShapeMismatch, message));
             return None;
         }
         Some(PlannedCommand { source: wire.source, device: bound.device, command: bound.first_command + wire.command })
@@ -279,7 +280,7 @@ fn joint_names(shape: &Shape) -> Vec<&str> {
     }
 }
 
-fn unit_mismatch(port: &PlannedPort, consumer: &str, clash: &Clash, word: &Word) -> Diagnostic {
+fn unit_mismatch(port: &PlannedPort, consumer: &str, clash: &Clash, origin: &Origin) -> Diagnostic {
     let message = format!("`{}` {}, but `{consumer}` takes {}", port.name, clash.has, clash.takes);
-    Diagnostic::new(Code::UnitMismatch, word.span.clone(), message)
+    origin.mistake(Code::UnitMismatch, message)
 }

@@ -44,6 +44,7 @@ pub(crate) fn open(
         Opener { catalogue, sources, found, names: Vec::new(), taken: Vec::new(), opened: Opened::default() };
     if let Some(bench) = bench {
         opener.check_types(bench);
+        opener.check_rest(bench, &model.flat.roles);
     }
     for (i, (key, kind)) in model.flat.roles.iter().enumerate() {
         let role = match bench {
@@ -54,6 +55,9 @@ pub(crate) fn open(
     }
     opener.opened
 }
+
+/// Periods of a device that make sense, in nanoseconds too [s].
+const PERIODS: std::ops::RangeInclusive<f64> = 1e-6..=1e3;
 
 struct Opener<'a> {
     catalogue: &'a Catalogue,
@@ -67,6 +71,29 @@ struct Opener<'a> {
 }
 
 impl Opener<'_> {
+    /// What no role asks for is not opened, but what it says must still mean something.
+    fn check_rest(&mut self, bench: &Bench, roles: &[(Key, Word)]) {
+        let names = || bench.devices.iter().map(|device| device.key.name.as_str());
+        let is_used = |role: &Key| roles.iter().any(|(key, _)| key.name == role.name);
+        for (_, word) in bench.bind.iter().filter(|(role, _)| !is_used(role)) {
+            if !names().any(|name| name == word.text) {
+                self.found.push(no_device(word, bench));
+            }
+        }
+        for device in &bench.devices {
+            let is_opened = bench.bind.iter().any(|(role, word)| word.text == device.key.name && is_used(role));
+            let kind = device.kind.as_ref().filter(|_| !is_opened);
+            let kind = self.catalogue.devices().iter().find(|known| kind.is_some_and(|kind| known.name() == kind.text));
+            let (Some(kind), Some(table)) = (kind, device.params.as_table()) else { continue };
+            let params = kind.params();
+            for (key, _) in table.entries.iter().filter(|(key, _)| !params.iter().any(|param| param.name == key.name)) {
+                let message = format!("`{}` is not a parameter here", key.name);
+                let help = closest(&key.name, params.iter().map(|param| param.name), "parameters");
+                self.found.push(Diagnostic::new(Code::UnknownKey, key.span.clone(), message).help(help));
+            }
+        }
+    }
+
     fn check_types(&mut self, bench: &Bench) {
         for kind in bench.devices.iter().filter_map(|device| device.kind.as_ref()) {
             if !self.catalogue.devices().iter().any(|device| device.name() == kind.text) {
@@ -123,9 +150,7 @@ impl Opener<'_> {
 
     fn open(&mut self, bench: &Bench, word: &Word) -> Option<(usize, Description)> {
         let Some(block) = bench.devices.iter().find(|device| device.key.name == word.text) else {
-            let message = format!("the bench has no device `{}`", word.text);
-            let help = closest(&word.text, bench.devices.iter().map(|device| device.key.name.as_str()), "devices");
-            self.found.push(Diagnostic::new(Code::UnknownDevice, word.span.clone(), message).help(help));
+            self.found.push(no_device(word, bench));
             return None;
         };
         let kind = block.kind.as_ref()?;
@@ -135,6 +160,13 @@ impl Opener<'_> {
         let mistakes = reader.mistakes;
         place(mistakes, &block.params, &[], self.sources, self.found);
         let opened = opened?;
+        let period = opened.description.period;
+        if !PERIODS.contains(&period) {
+            let message = format!("device `{}` says that it samples every {period:e} s", word.text);
+            let help = format!("a period is from {:e} to {:e} s", PERIODS.start(), PERIODS.end());
+            self.found.push(Diagnostic::new(Code::BadClock, block.key.span.clone(), message).help(help));
+            return None;
+        }
         let all = |ports: fn(&Filled) -> &Vec<crate::signal::Shape>| {
             opened.description.fills.iter().flat_map(|filled| ports(filled).clone()).collect()
         };
@@ -148,6 +180,12 @@ impl Opener<'_> {
         self.opened.periods.push(opened.description.period);
         Some((self.opened.devices.len() - 1, opened.description))
     }
+}
+
+fn no_device(word: &Word, bench: &Bench) -> Diagnostic {
+    let message = format!("the bench has no device `{}`", word.text);
+    let help = closest(&word.text, bench.devices.iter().map(|device| device.key.name.as_str()), "devices");
+    Diagnostic::new(Code::UnknownDevice, word.span.clone(), message).help(help)
 }
 
 /// Gives mistakes their place: in the block they speak of, in a wire, or in a file of data.

@@ -159,6 +159,7 @@ impl<'a> Sections<'a> {
             self.diagnostics
                 .push(diagnostic.help("`{ from = \"role.fact\" }` asks a device for a fact: choose another name"));
         }
+        wires.iter().for_each(|(key, _)| self.name(key));
         wires
     }
 

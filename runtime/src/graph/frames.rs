@@ -4,10 +4,10 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use super::load::FlatNode;
 use super::plan::{Producer, Source};
-use super::wires::{CommandWire, Model, Wire};
+use super::wires::{CommandWire, Model, Origin, Wire};
 use crate::catalogue::Catalogue;
 use crate::diagnostic::{Code, Diagnostic};
-use crate::node::{NodeSpec, PortSpec, Word};
+use crate::node::{NodeSpec, PortSpec};
 use crate::signal::Kind;
 
 /// Which frame every variable of every node stands for.
@@ -45,7 +45,7 @@ impl Frames {
                 let input = &spec.inputs[wire.input];
                 let consumer = format!("{}.{}", model.flat.nodes[node].name, wire.key.name);
                 let end = End { owner: Producer::Node(node), port: input, name: consumer };
-                if let Some(clash) = frames.wire(model, wire.source, &wire.word, &end, &specs) {
+                if let Some(clash) = frames.wire(model, wire.source, &wire.origin, &end, &specs) {
                     frames.clashes.insert(node);
                     found.push(clash);
                 }
@@ -55,7 +55,7 @@ impl Frames {
             let command = &model.roles[wire.role].expect("only known roles have commands").commands[wire.command];
             let name = format!("{}.{}", model.name(Producer::Role(wire.role)), command.name);
             let end = End { owner: Producer::Role(wire.role), port: command, name };
-            found.extend(frames.wire(model, wire.source, &wire.word, &end, &specs));
+            found.extend(frames.wire(model, wire.source, &wire.origin, &end, &specs));
         }
         frames
     }
@@ -69,7 +69,7 @@ impl Frames {
         &mut self,
         model: &Model<'_>,
         source: Source,
-        word: &Word,
+        origin: &Origin,
         end: &End<'_>,
         specs: &[NodeSpec],
     ) -> Option<Diagnostic> {
@@ -80,8 +80,8 @@ impl Frames {
             let (from, kind) = (model.port_name(source), port.kind);
             let message =
                 format!("`{from}` is {}, but `{}` takes {}", typed(kind, &has), end.name, typed(kind, &takes));
-            let help = self.converter(model, kind, &has, &takes, specs, word);
-            return Some(Diagnostic { help, ..Diagnostic::new(Code::FrameMismatch, word.span.clone(), message) });
+            let help = self.converter(model, kind, &has, &takes, specs, origin);
+            return Some(origin.mistake(Code::FrameMismatch, message).with_help(help));
         }
         for (a, b) in frame_args(port).iter().zip(frame_args(end.port)) {
             let (a, b) = (self.variable(model, source.producer, a), self.variable(model, end.owner, b));
@@ -98,7 +98,7 @@ impl Frames {
         has: &[Option<String>],
         takes: &[Option<String>],
         specs: &[NodeSpec],
-        word: &Word,
+        origin: &Origin,
     ) -> Option<String> {
         let (spec, input, pose) = specs.iter().find_map(|spec| {
             let input = spec.inputs.iter().find(|input| input.kind == kind)?;
@@ -108,20 +108,22 @@ impl Frames {
             is_converter.then_some((spec, input, pose))
         })?;
         let wanted = [has.first()?.clone(), takes.first()?.clone()];
-        let source = self.find_pose(model, &wanted);
+        let article = if spec.name.starts_with(['a', 'e', 'i', 'o']) { "an" } else { "a" };
+        let name = &spec.name;
+        let Some(source) = self.find_pose(model, &wanted).and_then(|source| model.name_in(origin.scope, source)) else {
+            let [from, to] = wanted.map(|frame| frame.unwrap_or_else(|| "?".into()));
+            return Some(format!(
+                "put {article} `{name}` between them, with a pose of `{from}` in `{to}`: nothing here gives one yet"
+            ));
+        };
+        let (twist, from) = (&input.name, &origin.word.text);
         Some(format!(
-            "put {} `{}` between them: type = \"{}\", in.{} = \"{}\", in.{} = \"{}\"",
-            if spec.name.starts_with(['a', 'e', 'i', 'o']) { "an" } else { "a" },
-            spec.name,
-            spec.name,
-            input.name,
-            word.text,
+            "put {article} `{name}` between them:\n[nodes.{name}]\ntype = \"{name}\"\nin.{twist} = \"{from}\"\nin.{} = \"{source}\"",
             pose.name,
-            source.unwrap_or_else(|| "node.pose".into()),
         ))
     }
 
-    fn find_pose(&mut self, model: &Model<'_>, wanted: &[Option<String>]) -> Option<String> {
+    fn find_pose(&mut self, model: &Model<'_>, wanted: &[Option<String>]) -> Option<Source> {
         let nodes = (0..model.nodes.len()).map(Producer::Node);
         let sources: Vec<Source> = nodes
             .flat_map(|producer| {
@@ -130,7 +132,7 @@ impl Frames {
                 poses.map(move |(port, _)| Source { producer, port }).collect::<Vec<_>>()
             })
             .collect();
-        sources.into_iter().find(|source| self.of(model, *source) == wanted).map(|source| model.port_name(source))
+        sources.into_iter().find(|source| self.of(model, *source) == wanted)
     }
 
     fn known(&mut self, model: &Model<'_>, owner: Producer, port: &PortSpec) -> Vec<Option<String>> {

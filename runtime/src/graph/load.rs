@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use super::document::{Bench, Block, Document, GraphTable, PartBlock, Sections};
 use super::{Item, Key, Sources, Table, Value, parse_table};
-use crate::diagnostic::{Code, Diagnostic, closest};
+use crate::diagnostic::{Code, Diagnostic, closest, meant};
 use crate::node::Word;
 
 /// What to load.
@@ -97,7 +97,14 @@ pub(crate) struct Loader {
     pub(crate) sources: Sources,
     pub(crate) diagnostics: Vec<Diagnostic>,
     open_parts: Vec<PathBuf>,
+    /// Whether there were too many parts to go on.
+    is_full: bool,
 }
+
+/// As deep parts may stand in parts.
+const DEEPEST: usize = 32;
+/// As many parts a graph may have.
+const MOST_PARTS: usize = 4096;
 
 impl Loader {
     /// Reads everything that the request names.
@@ -219,10 +226,13 @@ impl Loader {
 
     /// One `key=value`; what is no TOML value is a string, so that nobody has to quote twice in a shell.
     fn assignment(&mut self, text: &str) -> Option<Table> {
-        let quoted = text.split_once('=').map(|(key, value)| format!("{key}={value:?}"));
+        let is_line = !text.contains(['\n', '\r']);
+        let quoted = text.split_once('=').filter(|_| is_line).map(|(key, value)| format!("{key}={value:?}"));
         for text in [Some(text.to_owned()), quoted].into_iter().flatten() {
             let file = self.sources.add("--set", text, "");
-            if let Ok(Value { item: Item::Table(table), .. }) = parse_table(file) {
+            if let Ok(Value { item: Item::Table(table), .. }) = parse_table(file)
+                && is_one_assignment(&table, &file.text)
+            {
                 return Some(table);
             }
         }
@@ -267,7 +277,14 @@ impl Loader {
     }
 
     fn part(&mut self, part: &PartBlock, prefix: &str, parent: usize, flat: &mut Flat) -> Option<usize> {
-        let file = part.file.as_ref()?;
+        let file = part.file.as_ref().filter(|_| !self.is_full)?;
+        if self.open_parts.len() >= DEEPEST || flat.scopes.len() > MOST_PARTS {
+            let message =
+                format!("parts are nested deeper than {DEEPEST}, or there are more than {MOST_PARTS} of them");
+            self.diagnostics.push(Diagnostic::new(Code::EndlessPart, file.span.clone(), message));
+            self.is_full = true;
+            return None;
+        }
         let canonical = file.path.canonicalize().unwrap_or_else(|_| file.path.clone());
         if self.open_parts.contains(&canonical) {
             let message = format!("part `{}` contains itself", part.key.name);
@@ -315,8 +332,11 @@ impl Loader {
                 self.diagnostics.push(Diagnostic::new(Code::UnknownInput, key.span.clone(), message).help(help));
             }
         }
+        let names = || document.inputs.iter().map(|(input, _)| input.name.as_str());
         for (input, doc) in &document.inputs {
-            if !part.wires.iter().any(|(key, _)| key.name == input.name) {
+            let is_meant =
+                |key: &Key| !names().any(|name| name == key.name) && meant(&key.name, names()) == Some(&input.name);
+            if !part.wires.iter().any(|(key, _)| key.name == input.name || is_meant(key)) {
                 let message = format!("part `{}` needs `in.{}`: {}", part.key.name, input.name, doc.text);
                 let diagnostic = Diagnostic::new(Code::MissingInput, part.key.span.clone(), message);
                 let help = format!("add `in.{} = \"…\"`", input.name);
@@ -324,6 +344,14 @@ impl Loader {
             }
         }
     }
+}
+
+/// Whether a text sets one thing: an assignment on a line, and no header, comment or second one.
+fn is_one_assignment(table: &Table, text: &str) -> bool {
+    table.entries.len() == 1
+        && text.contains('=')
+        && !text.contains(['\n', '\r'])
+        && !text.trim_start().starts_with('[')
 }
 
 /// What a file is that lacks its section `wanted` and has those of another sort of file.

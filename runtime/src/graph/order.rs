@@ -12,6 +12,7 @@ struct Edge {
     then: usize,
     /// The consumer's index and its wire, whichever steps first.
     wire: (usize, usize),
+    is_delayed: bool,
 }
 
 /// The nodes in the order in which they step: rank by rank, those that wait for nothing first, as in the file within a
@@ -20,6 +21,7 @@ struct Edge {
 /// A delayed input reads what the last tick left, so its node steps before the one it reads.
 pub(crate) fn order(model: &Model<'_>, wires: &[Vec<Wire>], found: &mut Vec<Diagnostic>) -> Vec<usize> {
     let mut edges = edges(model, wires);
+    found.extend(delayed_roles(model, wires));
     let mut rest: Vec<usize> = (0..wires.len()).collect();
     let mut order = Vec::new();
     while !rest.is_empty() {
@@ -40,6 +42,23 @@ pub(crate) fn order(model: &Model<'_>, wires: &[Vec<Wire>], found: &mut Vec<Diag
     order
 }
 
+/// A role is latched before every node, so there is nothing of the last tick left to read.
+fn delayed_roles(model: &Model<'_>, wires: &[Vec<Wire>]) -> Vec<Diagnostic> {
+    let mut mistakes = Vec::new();
+    for (node, wires) in wires.iter().enumerate() {
+        let Some((_, spec)) = &model.nodes[node] else { continue };
+        let from_role = |wire: &&Wire| {
+            spec.inputs[wire.input].need == Need::Delayed && matches!(wire.source.producer, Producer::Role(_))
+        };
+        for wire in wires.iter().filter(from_role) {
+            let (name, key) = (&model.flat.nodes[node].name, &wire.key.name);
+            let message = format!("`{name}.{key}` reads what the last tick left, which a role does not keep");
+            mistakes.push(wire.origin.mistake(Code::Loop, message).help("wire it from a node"));
+        }
+    }
+    mistakes
+}
+
 fn edges(model: &Model<'_>, wires: &[Vec<Wire>]) -> Vec<Edge> {
     let mut edges = Vec::new();
     for (consumer, wires) in wires.iter().enumerate() {
@@ -48,7 +67,7 @@ fn edges(model: &Model<'_>, wires: &[Vec<Wire>]) -> Vec<Edge> {
             let (_, spec) = model.nodes[consumer].as_ref().expect("only known nodes have wires");
             let is_delayed = spec.inputs[wire.input].need == Need::Delayed;
             let (first, then) = if is_delayed { (consumer, producer) } else { (producer, consumer) };
-            edges.push(Edge { first, then, wire: (consumer, i) });
+            edges.push(Edge { first, then, wire: (consumer, i), is_delayed });
         }
     }
     edges
@@ -75,12 +94,16 @@ fn describe(model: &Model<'_>, wires: &[Vec<Wire>], circle: &[Edge]) -> Diagnost
         let wire = &wires[consumer][i];
         let text =
             format!("`{}` -> `{}.{}`", model.port_name(wire.source), model.flat.nodes[consumer].name, wire.key.name);
-        (wire.word.span.clone(), text)
+        (wire.origin.word.span.clone(), text)
     };
     let steps: Vec<_> = circle.iter().map(step).collect();
     let path = steps.iter().map(|(_, text)| text.as_str()).collect::<Vec<_>>().join(", ");
     let (span, _) = steps.last().expect("a circle has wires").clone();
     let mut diagnostic = Diagnostic::new(Code::Loop, span, format!("wires run in a circle: {path}"));
     diagnostic.notes = steps.iter().rev().skip(1).rev().cloned().collect();
-    diagnostic.help("let one of them go through a node that declares a delay")
+    diagnostic.help(if circle.iter().all(|edge| edge.is_delayed) {
+        "a circle of delays alone holds nothing: let it go through a node that declares none"
+    } else {
+        "let one of them go through a node that declares a delay"
+    })
 }

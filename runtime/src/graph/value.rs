@@ -83,7 +83,7 @@ impl Table {
             match self.entries.iter_mut().find(|(mine, _)| mine.name == key.name) {
                 None => self.entries.push((key, value)),
                 Some((mine, old)) => match (&mut old.item, value.item) {
-                    (Item::Table(old), Item::Table(new)) if !old.is_fact() => old.merge(new),
+                    (Item::Table(old), Item::Table(new)) if !old.is_fact() && !new.is_fact() => old.merge(new),
                     (item, new) => {
                         *item = new;
                         (old.span, mine.span) = (value.span, key.span);

@@ -14,8 +14,30 @@ pub(crate) struct Wire {
     /// Index of the input in the node's declaration.
     pub(crate) input: usize,
     pub(crate) key: Key,
-    pub(crate) word: Word,
+    pub(crate) origin: Origin,
     pub(crate) source: Source,
+}
+
+/// Where a wire was written: the node's own, or the one into its part that it passes on.
+#[derive(Debug, Clone)]
+pub(crate) struct Origin {
+    /// The wire that says where it comes from.
+    pub(crate) word: Word,
+    /// The scope it stands in.
+    pub(crate) scope: usize,
+    /// The node's own wire, where that only passes on an input of its part.
+    pub(crate) inner: Option<Word>,
+}
+
+impl Origin {
+    /// A mistake of this wire.
+    pub(crate) fn mistake(&self, code: Code, message: String) -> Diagnostic {
+        let diagnostic = Diagnostic::new(code, self.word.span.clone(), message);
+        match &self.inner {
+            Some(inner) => diagnostic.note(inner.span.clone(), "the part takes it here"),
+            None => diagnostic,
+        }
+    }
 }
 
 /// A command wire that goes somewhere.
@@ -24,7 +46,7 @@ pub(crate) struct CommandWire {
     pub(crate) role: usize,
     /// Index of the command in the role's declaration.
     pub(crate) command: usize,
-    pub(crate) word: Word,
+    pub(crate) origin: Origin,
     pub(crate) source: Source,
 }
 
@@ -131,23 +153,56 @@ impl<'a> Model<'a> {
         let (has, takes) = (self.port(source).kind, spec.inputs[input].kind);
         if has != takes {
             let consumer = format!("{}.{}", self.flat.nodes[node].name, key.name);
-            found.push(self.kind_mismatch(source, &consumer, takes, word));
+            let origin = self.origin(self.flat.nodes[node].scope, word);
+            found.push(self.kind_mismatch(source, &consumer, takes, &origin));
             return None;
         }
-        Some(Wire { input, key: key.clone(), word: word.clone(), source })
+        Some(Wire { input, key: key.clone(), origin: self.origin(self.flat.nodes[node].scope, word), source })
     }
 
-    fn kind_mismatch(&self, source: Source, consumer: &str, takes: crate::signal::Kind, word: &Word) -> Diagnostic {
+    /// Where a wire was written.
+    fn origin(&self, scope: usize, word: &Word) -> Origin {
+        let (mut at, mut outer) = (scope, word);
+        while let (Some(("inputs", port)), Some(parent)) = (outer.text.split_once('.'), self.flat.scopes[at].parent) {
+            let Some((_, wire)) = self.flat.scopes[at].inputs.iter().find(|(key, _)| key.name == port) else { break };
+            (at, outer) = (parent, wire);
+        }
+        Origin { word: outer.clone(), scope: at, inner: (at != scope).then(|| word.clone()) }
+    }
+
+    /// A port as the wires of a scope name it, if they can.
+    pub(crate) fn name_in(&self, scope: usize, source: Source) -> Option<String> {
+        let names = self.flat.scopes[scope].names.iter();
+        names.into_iter().find_map(|(name, (_, entity))| match *entity {
+            Entity::Role(i) if source.producer == Producer::Role(i) => {
+                Some(format!("{name}.{}", self.port(source).name))
+            }
+            Entity::Node(i) if source.producer == Producer::Node(i) => {
+                Some(format!("{name}.{}", self.port(source).name))
+            }
+            Entity::Part(inner) => {
+                let mut exports = self.flat.scopes[inner].exports.iter();
+                let export =
+                    exports.find(|(_, word)| matches!(self.resolve(inner, word, 0), Ok(Some(s)) if s == source))?;
+                Some(format!("{name}.{}", export.0.name))
+            }
+            _ => None,
+        })
+    }
+
+    fn kind_mismatch(&self, source: Source, consumer: &str, takes: crate::signal::Kind, origin: &Origin) -> Diagnostic {
         let port = self.port_name(source);
         let has = self.port(source).kind.with_article();
         let message = format!("`{port}` is {has}, but `{consumer}` takes {}", takes.with_article());
         let outputs = self.outputs(source.producer).unwrap_or_default();
         let other = outputs.iter().find(|output| output.kind == takes);
         let help = other.map(|other| {
-            let written = word.text.rsplit_once('.').map_or("", |(node, _)| node);
+            let written = origin.word.text.rsplit_once('.').map_or("", |(node, _)| node);
             format!("`{written}.{}` is {}", other.name, takes.with_article())
         });
-        Diagnostic { help, ..Diagnostic::new(Code::KindMismatch, word.span.clone(), message) }
+        // What an export hides is no way out.
+        let help = help.filter(|_| self.name_in(origin.scope, source).is_some_and(|name| name == origin.word.text));
+        origin.mistake(Code::KindMismatch, message).with_help(help)
     }
 
     fn missing(&self, node: usize, spec: &NodeSpec, found: &mut Vec<Diagnostic>) {
@@ -172,7 +227,13 @@ impl<'a> Model<'a> {
             let outputs = match *entity {
                 Entity::Role(i) => self.outputs(Producer::Role(i)),
                 Entity::Node(i) if i != node => self.outputs(Producer::Node(i)),
-                _ => None,
+                Entity::Node(_) => None,
+                Entity::Part(inner) => {
+                    let (export, word) =
+                        self.flat.scopes[inner].exports.iter().find(|(key, _)| key.name == input.name)?;
+                    let source = self.resolve(inner, word, 0).ok().flatten()?;
+                    return (self.port(source).kind == input.kind).then(|| format!("{name}.{}", export.name));
+                }
             };
             let port = outputs?.iter().find(|output| output.kind == input.kind && output.name == input.name)?;
             Some(format!("{name}.{}", port.name))
@@ -191,9 +252,12 @@ impl<'a> Model<'a> {
         }
         let names = &self.flat.scopes[scope].names;
         let Some((name, port)) = word.text.split_once('.').filter(|(_, port)| !port.contains('.')) else {
-            let ports = names.get(&word.text).map(|(_, entity)| self.ports_of(*entity)).unwrap_or_default();
-            let example = ports.first().map_or("node.port".into(), |port| format!("{}.{port}", word.text));
-            return Err(wrong(format!("`{}` is no port", word.text), format!("a port is written like `{example}`")));
+            let first = word.text.split('.').next().unwrap_or_default();
+            let ports = names.get(first).map(|(_, entity)| self.ports_of(*entity)).unwrap_or_default();
+            let list = ports.iter().map(|port| format!("`{first}.{port}`")).collect::<Vec<_>>().join(", ");
+            let help =
+                if list.is_empty() { "a port is written `node.port`".into() } else { format!("ports here: {list}") };
+            return Err(wrong(format!("`{}` is no port", word.text), help));
         };
         if name == "inputs"
             && let Some(parent) = self.flat.scopes[scope].parent
@@ -271,10 +335,10 @@ impl<'a> Model<'a> {
         let takes = commands[command].kind;
         if self.port(source).kind != takes {
             let consumer = format!("{}.{}", self.name(Producer::Role(role)), key.name);
-            found.push(self.kind_mismatch(source, &consumer, takes, word));
+            found.push(self.kind_mismatch(source, &consumer, takes, &self.origin(0, word)));
             return None;
         }
-        Some(CommandWire { role, command, word: word.clone(), source })
+        Some(CommandWire { role, command, origin: self.origin(0, word), source })
     }
 
     fn undriven(&self, found: &mut Vec<Diagnostic>) {
@@ -282,9 +346,18 @@ impl<'a> Model<'a> {
             for command in role.iter().flat_map(|role| &role.commands) {
                 let is_driven =
                     |(role, driven, _): &&(Key, Key, Word)| role.name == key.name && driven.name == command.name;
-                if !self.flat.commands.iter().any(|wire| is_driven(&wire)) {
+                // A command wire that goes nowhere has been complained about, and may be the one that is missing.
+                let is_strange = |(role, driven, _): &&(Key, Key, Word)| {
+                    let roles =
+                        || self.flat.roles.iter().zip(&self.roles).filter(|((key, _), _)| key.name == role.name);
+                    let known = roles()
+                        .any(|(_, kind)| kind.is_some_and(|kind| kind.commands.iter().any(|c| c.name == driven.name)));
+                    !known && (role.name == key.name || roles().next().is_none())
+                };
+                if !self.flat.commands.iter().any(|wire| is_driven(&wire) || is_strange(&wire)) {
                     let message = format!("nothing drives `{}.{}`", key.name, command.name);
-                    let help = format!("add `{}.{} = \"node.port\"` under [commands]", key.name, command.name);
+                    let port = self.candidate(0, usize::MAX, command).unwrap_or_else(|| "node.port".into());
+                    let help = format!("add `{}.{} = \"{port}\"` under [commands]", key.name, command.name);
                     found.push(Diagnostic::new(Code::UndrivenCommand, key.span.clone(), message).help(help));
                 }
             }

@@ -122,16 +122,19 @@ impl<'a> Reader<'a> {
 
     /// Every key that is left is one too many, and what was not given is missing, unless it was only misspelt.
     pub fn close(&mut self, table: OpenTable, known: &[&str]) {
+        // One that is missing and one that is strange are one mistake.
+        let is_renamed = table.missing.len() == 1 && table.rest.entries.len() == 1;
+        let renamed = table.missing.first().filter(|_| is_renamed).map(|(name, _)| format!("did you mean `{name}`?"));
         for (name, expects) in table.missing {
             let is_misspelt = |(key, _): &(Key, Value)| meant(&key.name, known.iter().copied()) == Some(name);
-            if !table.rest.entries.iter().any(is_misspelt) {
+            if !is_renamed && !table.rest.entries.iter().any(is_misspelt) {
                 let message = format!("`{name}` is missing: expected {expects}");
                 self.mistakes.push(Mistake::new(Code::MissingKey, At::Span(table.span.clone()), message));
             }
         }
         for (key, _) in table.rest.entries {
             let message = format!("`{}` is not a parameter here", key.name);
-            let help = closest(&key.name, known.iter().copied(), "parameters");
+            let help = renamed.clone().unwrap_or_else(|| closest(&key.name, known.iter().copied(), "parameters"));
             self.mistakes.push(Mistake::new(Code::UnknownKey, At::Span(key.span), message).help(help));
         }
     }
@@ -211,6 +214,8 @@ ranges! {
     NonNegative(f64): "a number, 0 or more", |x| x >= 0.0 && x.is_finite();
     /// A rate [Hz] whose period is a sensible number of nanoseconds.
     Rate(f64): "a rate from 0.001 to 1000000", |x| (1e-3..=1e6).contains(&x);
+    /// A switch written as a number, as in a diagonal matrix.
+    Bit(u64): "0 or 1", |n| n <= 1;
     /// How many, at least one.
     Count(usize): "a whole number from 1 to 1000000", |n| (1..=1_000_000).contains(&n);
 }
@@ -344,15 +349,21 @@ impl<T> Map<T> {
     pub fn in_order<'n>(&self, param: &str, names: impl Iterator<Item = &'n str> + Clone) -> Result<Vec<&T>, Mistakes> {
         let mut mistakes = Mistakes::new();
         let listed = || names.clone().map(|name| format!("`{name}`")).collect::<Vec<_>>().join(", ");
+        let strange = self.0.keys().filter(|key| !names.clone().any(|name| name == *key)).count();
+        let mut missing = names.clone().filter(|name| !self.0.contains_key(*name));
+        // One that is missing and one that is strange are one mistake.
+        let renamed = missing.next().filter(|_| strange == 1 && missing.next().is_none());
         for key in self.0.keys() {
             if !names.clone().any(|name| name == key) {
-                let help = closest(key, names.clone(), "features");
+                let help = renamed.map(|name| format!("did you mean `{name}`?"));
+                let help = help.unwrap_or_else(|| closest(key, names.clone(), "features"));
                 mistakes
                     .push(Mistake::key(format!("{param}.{key}"), format!("no feature is called `{key}`")).help(help));
             }
         }
         let is_misspelt = |name: &str| self.0.keys().any(|key| meant(key, names.clone()) == Some(name));
-        for name in names.clone().filter(|name| !self.0.contains_key(*name) && !is_misspelt(name)) {
+        let is_told = |name: &str| renamed == Some(name) || is_misspelt(name);
+        for name in names.clone().filter(|name| !self.0.contains_key(*name) && !is_told(name)) {
             let message = format!("`{param}` has no entry for feature `{name}`");
             let mistake = Mistake::new(Code::MissingKey, At::Key(param.into()), message);
             mistakes.push(mistake.help(format!("give `{param}.{name}`; the features here are {}", listed())));

@@ -18,6 +18,9 @@ pub enum Format {
 }
 
 impl Format {
+    /// How the files of each format begin.
+    pub const STARTS: [&'static str; 2] = ["# time [s]", "{\"units\":"];
+
     /// The format that a file's name asks for.
     #[must_use]
     pub fn of(path: &Path) -> Option<Self> {
