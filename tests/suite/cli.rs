@@ -340,3 +340,19 @@ fn a_file_that_no_run_has_recorded_is_not_overwritten() {
         assert_eq!(say(&["run", HYBRID, "--for", "1s", "--out", &path]).code, 0, "a record may be made anew");
     }
 }
+
+#[test]
+fn the_readme_shows_what_the_tool_prints() {
+    let readme = fs::read_to_string(tactflow_tests::workspace().join("README.md")).unwrap();
+    let blocks: Vec<&str> = readme.split("```text\n").skip(1).map(|rest| rest.split("```").next().unwrap()).collect();
+    let [run, mistake] = blocks.as_slice() else { panic!("the README shows {} outputs", blocks.len()) };
+    let out = say(&["run", PRESS]).out;
+    for line in run.lines() {
+        assert!(out.lines().any(|printed| printed == line), "`{line}` is not printed");
+    }
+    let err = say(&["check", "tests/errors/frame_mismatch.toml"]).err;
+    assert!(err.starts_with(mistake.trim_end()), "{err}");
+    let graph = readme.split("```toml\n").nth(1).and_then(|rest| rest.split("```").next()).unwrap();
+    let shipped = fs::read_to_string(tactflow_tests::workspace().join(HYBRID)).unwrap();
+    assert!(shipped.ends_with(graph), "the README's graph is not {HYBRID}");
+}

@@ -38,8 +38,17 @@ pub fn plan(catalogue: &Catalogue, request: &Request) -> Result<Plan, Report> {
     let frames = Frames::unify(&model, catalogue, &order, &wires, &commands, &mut found);
     let clock = clock(&flat, &opened, &mut found);
     let period = clock.map_or(1.0, |(_, period)| period);
-    let mut builder =
-        Builder { catalogue, model: &model, opened: &opened, frames, found, sources, period, ports: BTreeMap::new() };
+    let mut builder = Builder {
+        catalogue,
+        model: &model,
+        opened: &opened,
+        frames,
+        found,
+        sources,
+        period,
+        ports: BTreeMap::new(),
+        units: BTreeMap::new(),
+    };
     builder.roles();
     let nodes: Vec<PlannedNode> = order.iter().filter_map(|node| builder.node(*node, &wires[*node])).collect();
     builder.delayed(&wires);
@@ -130,6 +139,8 @@ struct Builder<'a> {
     period: f64,
     /// Ports whose shape is known so far.
     ports: BTreeMap<Source, PlannedPort>,
+    /// What the variables of each node stand for.
+    units: BTreeMap<usize, Units>,
 }
 
 impl Builder<'_> {
@@ -202,6 +213,7 @@ impl Builder<'_> {
             units.give(output, &mut shape);
             ports.push(self.port(Source { producer: Producer::Node(index), port }, shape));
         }
+        self.units.insert(index, units);
         Some(PlannedNode {
             index,
             name: node.name.clone(),
@@ -246,7 +258,8 @@ impl Builder<'_> {
             for wire in wires.iter().filter(|wire| spec.inputs[wire.input].need == Need::Delayed) {
                 let Some(port) = self.ports.get(&wire.source) else { continue };
                 let consumer = format!("{}.{}", self.model.flat.nodes[index].name, wire.key.name);
-                if let Err(clash) = Units::default().take(&spec.inputs[wire.input], &consumer, &port.shape) {
+                let units = self.units.entry(index).or_default();
+                if let Err(clash) = units.take(&spec.inputs[wire.input], &consumer, &port.shape) {
                     self.found.push(unit_mismatch(port, &consumer, &clash, &wire.origin));
                 }
             }

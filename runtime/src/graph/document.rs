@@ -61,11 +61,13 @@ pub(crate) struct Bench {
 pub(crate) struct Sections<'a> {
     reader: Reader<'a>,
     diagnostics: Vec<Diagnostic>,
+    /// Blocks that are no tables: that has been told, and is all there is to tell.
+    broken: Vec<Key>,
 }
 
 impl<'a> Sections<'a> {
     pub(crate) const fn new(sources: &'a Sources) -> Self {
-        Self { reader: Reader::new(sources), diagnostics: Vec::new() }
+        Self { reader: Reader::new(sources), diagnostics: Vec::new(), broken: Vec::new() }
     }
 
     /// Everything that was wrong.
@@ -120,6 +122,7 @@ impl<'a> Sections<'a> {
     fn block(&mut self, key: Key, mut table: Table, names: &[String]) -> Block {
         let kind = match table.remove("type") {
             Some((_, value)) => Word::read(&value, &mut self.reader),
+            None if self.broken.contains(&key) => None,
             None => {
                 let message = format!("`{}` has no `type`", key.name);
                 // `--set nodes.pidd.…` makes a block of its own.
@@ -140,6 +143,7 @@ impl<'a> Sections<'a> {
         let set = self.table(set.as_ref());
         let file = match table.remove("file") {
             Some((_, value)) => FilePath::read(&value, &mut self.reader),
+            None if self.broken.contains(&key) => None,
             None => {
                 let message = format!("part `{}` has no `file`", key.name);
                 self.diagnostics.push(Diagnostic::new(Code::MissingKey, key.span.clone(), message));
@@ -153,13 +157,15 @@ impl<'a> Sections<'a> {
     /// The wires of a block: its table `in`.
     fn wires(&mut self, table: &mut Table) -> Vec<(Key, Word)> {
         let wires = table.remove("in").map(|(_, value)| value);
-        let wires = self.words(wires.as_ref());
-        for (key, _) in wires.iter().filter(|(key, _)| key.name == "from") {
-            let diagnostic = Diagnostic::new(Code::BadName, key.span.clone(), "a wire cannot be called `from`");
-            self.diagnostics
-                .push(diagnostic.help("`{ from = \"role.fact\" }` asks a device for a fact: choose another name"));
-        }
-        wires.iter().for_each(|(key, _)| self.name(key));
+        let mut wires = self.words(wires.as_ref());
+        wires.retain(|(key, _)| {
+            if key.name == "from" {
+                let diagnostic = Diagnostic::new(Code::BadName, key.span.clone(), "a wire cannot be called `from`");
+                let help = "`{ from = \"role.fact\" }` asks a device for a fact: choose another name";
+                self.diagnostics.push(diagnostic.help(help));
+            }
+            key.name != "from" && self.name(key)
+        });
         wires
     }
 
@@ -193,7 +199,9 @@ impl<'a> Sections<'a> {
     /// Keys that are names, with a string each.
     fn names(&mut self, value: Option<&Value>) -> Vec<(Key, Word)> {
         let words = self.words(value);
-        words.iter().for_each(|(key, _)| self.name(key));
+        for (key, _) in &words {
+            self.name(key);
+        }
         words
     }
 
@@ -203,20 +211,25 @@ impl<'a> Sections<'a> {
         for (key, value) in self.table(value).entries {
             self.name(&key);
             let table = self.table(Some(&value));
+            if value.as_table().is_none() {
+                self.broken.push(key.clone());
+            }
             tables.push((key, table));
         }
         tables
     }
 
-    fn name(&mut self, key: &Key) {
+    /// Whether a key is a name.
+    fn name(&mut self, key: &Key) -> bool {
         let is_word = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '_';
-        if !(key.name.starts_with(|c: char| c.is_ascii_lowercase()) && key.name.chars().all(is_word))
-            || key.name == "inputs"
-        {
+        let starts_well = key.name.starts_with(|c: char| c.is_ascii_lowercase());
+        let is_name = starts_well && key.name.chars().all(is_word) && key.name != "inputs";
+        if !is_name {
             let message = format!("`{}` cannot be a name", key.name);
             let help = "a name is made of small letters, digits and `_`, starts with a letter and is not `inputs`";
             self.diagnostics.push(Diagnostic::new(Code::BadName, key.span.clone(), message).help(help));
         }
+        is_name
     }
 }
 
