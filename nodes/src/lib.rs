@@ -28,6 +28,7 @@
 //! ```
 
 pub mod arm;
+pub mod builtin;
 pub mod devices;
 pub mod roles;
 pub mod servo;

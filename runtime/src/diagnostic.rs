@@ -185,13 +185,15 @@ impl Report {
 }
 
 /// The name that a misspelt one is meant to be, if one is near.
-pub(crate) fn meant<'n>(name: &str, known: impl Iterator<Item = &'n str>) -> Option<&'n str> {
+#[must_use]
+pub fn meant<'n>(name: &str, known: impl Iterator<Item = &'n str>) -> Option<&'n str> {
     let score = |other: &&str| strsim::damerau_levenshtein(name, other);
     known.min_by_key(score).filter(|best| score(best) <= 1 + name.chars().count() / 4)
 }
 
 /// A way out of a misspelt name: the one that is meant, or all there are.
-pub(crate) fn closest<'n>(name: &str, known: impl Iterator<Item = &'n str>, what: &str) -> String {
+#[must_use]
+pub fn closest<'n>(name: &str, known: impl Iterator<Item = &'n str>, what: &str) -> String {
     let known: Vec<&str> = known.collect();
     match meant(name, known.iter().copied()) {
         Some(best) => format!("did you mean `{best}`?"),

@@ -29,6 +29,8 @@ impl NodeType for Polynomial {
         NodeSpec {
             name: self.name.clone().into(),
             summary: "a polynomial".into(),
+            doc: "".into(),
+            example: "".into(),
             params: Vec::new(),
             inputs: vec![port("x")],
             outputs: vec![port("y")],

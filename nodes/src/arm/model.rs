@@ -6,7 +6,6 @@
 //! speed limit is refused, because a sink cannot limit it.
 
 use std::collections::BTreeMap;
-use std::fs;
 
 use nalgebra::{IsometryMatrix3, Vector3};
 use tactflow_runtime::node::{FilePath, Mistake, Mistakes};
@@ -15,6 +14,7 @@ use urdf_rs::JointType;
 
 use super::chain::{Chain, Motion, Segment};
 use super::mount::{Mount, pose_of};
+use crate::builtin;
 
 /// Position limit of a joint that has none [rad, or m].
 pub const UNBOUNDED: f64 = 1e9;
@@ -45,12 +45,17 @@ pub enum Place {
 /// # Errors
 /// What is wrong with the file, at its place, or with the tip.
 pub fn load(urdf: &FilePath, tip: &str, mount: &Mount) -> Result<Chain, Mistakes> {
-    let text = fs::read_to_string(&urdf.path).map_err(|error| Mistake::unreadable(urdf, &error))?;
-    chain_of(&text, tip, mount).map_err(|flaw| {
+    let bytes = builtin::read(urdf)?;
+    let text = str::from_utf8(&bytes).map_err(|error| {
+        let text = String::from_utf8_lossy(&bytes);
+        let at = error.valid_up_to();
+        Mistake::data(urdf, &text, at..at + 3, "this is not UTF-8 text")
+    })?;
+    chain_of(text, tip, mount).map_err(|flaw| {
         let mistake = match flaw.at {
             Place::Tip => Mistake::param("tip", flaw.message),
-            Place::Model => Mistake::data(urdf, &text, 0..0, flaw.message),
-            Place::Name(name) => Mistake::data(urdf, &text, find(&text, &name), flaw.message),
+            Place::Model => Mistake::data(urdf, text, 0..0, flaw.message),
+            Place::Name(name) => Mistake::data(urdf, text, find(text, &name), flaw.message),
         };
         mistake.into()
     })

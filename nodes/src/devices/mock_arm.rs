@@ -42,6 +42,26 @@ impl Device for MockArm {
 
     const NAME: &'static str = "mock_arm";
     const SUMMARY: &'static str = "an arm without dynamics that does exactly as it is told";
+    const DOC: &'static str = "It integrates the commanded joint velocity exactly and stops at its position limits. It \
+        leaves out inertia, friction, compliance, delay and noise: what works on it need not work on an arm.\n\n\
+        It states the facts `urdf`, `tip` and `mount` for `arm_state`.";
+    const EXAMPLE: &'static str = r#"
+[roles]
+arm = "velocity_arm"
+
+[commands]
+arm.velocity = "ik.velocity"
+
+[bind]
+arm = "arm"
+
+[devices.arm]
+type = "mock_arm"
+urdf = "builtin:lwr4p.urdf"          # a KUKA LWR 4+
+tip = "lwr_7_link"
+mount = { xyz = [0.0, 0.0, 0.03] }   # of the sensor on the tip [m]
+start = [0.0, 0.5, 0.0, -1.3, 0.0, 1.3, 0.0]   # [rad]
+"#;
 
     fn open(params: Params) -> Result<Opened, Mistakes> {
         let chain = load(&params.urdf, &params.tip, &params.mount)?;
@@ -109,7 +129,10 @@ fn check_start(joints: &[Joint], start: &[f64]) -> Result<(), Mistakes> {
 
 /// What `arm_state` wants to know. The path is absolute, since the graph that asks may stand in another folder.
 fn facts(params: &Params) -> Result<Vec<(Cow<'static, str>, toml::Value)>, Mistakes> {
-    let urdf = std::path::absolute(&params.urdf.path).map_err(|error| Mistake::unreadable(&params.urdf, &error))?;
+    let urdf = match params.urdf.builtin() {
+        Some(_) => params.urdf.path.clone(),
+        None => std::path::absolute(&params.urdf.path).map_err(|error| Mistake::unreadable(&params.urdf, &error))?,
+    };
     let Some(urdf) = urdf.to_str() else {
         return Err(Mistake::param("urdf", "the path of the model is not UTF-8 text").into());
     };

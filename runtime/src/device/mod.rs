@@ -109,6 +109,11 @@ pub trait Device: Sized + 'static {
     /// What it is, in one line.
     const SUMMARY: &'static str;
 
+    /// What else there is to know, for the reference. Markdown.
+    const DOC: &'static str = "";
+    /// What plugs it into a graph, to paste: `[roles]`, `[commands]`, `[bind]` and `[devices.…]`.
+    const EXAMPLE: &'static str = "";
+
     /// Opens the device. A live one does not connect yet: it connects when it runs.
     ///
     /// # Errors
@@ -122,6 +127,14 @@ pub trait DeviceType: Send + Sync {
     fn name(&self) -> Cow<'static, str>;
     /// What it is, in one line.
     fn summary(&self) -> Cow<'static, str>;
+    /// What else there is to know, in Markdown; empty if nothing.
+    fn doc(&self) -> Cow<'static, str> {
+        "".into()
+    }
+    /// What plugs it into a graph, to paste; empty if there is nothing.
+    fn example(&self) -> Cow<'static, str> {
+        "".into()
+    }
     /// What a bench file may set.
     fn params(&self) -> Vec<ParamSpec>;
     /// Reads the parameters and opens the device; every mistake goes to the reader.
@@ -141,6 +154,14 @@ impl<D: Device> DeviceType for Typed<D> {
 
     fn summary(&self) -> Cow<'static, str> {
         D::SUMMARY.into()
+    }
+
+    fn doc(&self) -> Cow<'static, str> {
+        D::DOC.into()
+    }
+
+    fn example(&self) -> Cow<'static, str> {
+        D::EXAMPLE.into()
     }
 
     fn params(&self) -> Vec<ParamSpec> {

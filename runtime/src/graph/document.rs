@@ -79,7 +79,7 @@ impl<'a> Sections<'a> {
 
     /// The sections of a graph file.
     pub(crate) fn graph(&mut self, root: &Table) -> Document {
-        self.known(root, &["graph", "roles", "parts", "nodes", "commands"]);
+        self.known(root, &["graph", "roles", "parts", "nodes", "commands", "devices", "bind"]);
         let graph =
             root.entry("graph").map(|(key, value)| (key.span.clone(), GraphTable::read(value, &mut self.reader)));
         let commands = self.table(root.get("commands")).entries.into_iter().flat_map(|(role, value)| {
@@ -97,9 +97,14 @@ impl<'a> Sections<'a> {
         Document { inputs, exports, ..self.body(root) }
     }
 
-    /// The sections of a bench.
+    /// The sections of a bench file.
     pub(crate) fn bench(&mut self, root: &Table) -> Bench {
         self.known(root, &["devices", "bind"]);
+        self.own_bench(root)
+    }
+
+    /// The sections of a bench, in a file with others.
+    pub(crate) fn own_bench(&mut self, root: &Table) -> Bench {
         let devices = self.named_tables(root.get("devices"));
         let names = names_of(&devices);
         let devices = devices.into_iter().map(|(key, table)| self.block(key, table, &names)).collect();

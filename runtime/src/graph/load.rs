@@ -136,7 +136,7 @@ impl Loader {
                 None
             }
         };
-        flat.bench = self.bench(request, &flat, bench_set);
+        flat.bench = self.bench(request, &flat, &root.0, bench_set);
         flat.roles.clone_from(&document.roles);
         flat.commands.clone_from(&document.commands);
         self.flatten(document, "", Scope::default(), &mut flat);
@@ -151,7 +151,8 @@ impl Loader {
         result
     }
 
-    fn bench(&mut self, request: &Request, flat: &Flat, set: Table) -> Option<Bench> {
+    /// The bench that is asked for, the graph's own sections of one, or the one it names.
+    fn bench(&mut self, request: &Request, flat: &Flat, graph: &Table, set: Table) -> Option<Bench> {
         // A graph whose own section could not be read has been told so.
         let named = flat.table.as_ref()?.bench.as_ref();
         if let Some(text) = &request.bench_text {
@@ -159,13 +160,27 @@ impl Loader {
             root.merge(set);
             return Some(self.sections(|sections| sections.bench(&root)));
         }
+        let own = graph.entry("devices").or_else(|| graph.entry("bind")).map(|(key, _)| key.span.clone());
+        if let (Some(own), Some(file)) = (&own, named) {
+            let message = "the graph has devices of its own and names a bench";
+            let diagnostic = Diagnostic::new(Code::DuplicateName, file.span.clone(), message);
+            let help = "take one of them out; `--bench` takes the place of either";
+            self.diagnostics.push(diagnostic.note(own.clone(), "its own are here").help(help));
+            return None;
+        }
+        if own.is_some() && request.bench.is_none() {
+            let mut root = graph.clone();
+            root.merge(set);
+            return Some(self.sections(|sections| sections.own_bench(&root)));
+        }
         let (path, span) = match (&request.bench, named) {
             (Some(path), _) => (path.clone(), None),
             (None, Some(file)) => (file.path.clone(), Some(file.span.clone())),
             (None, None) => {
                 let diagnostic =
                     Diagnostic::new(Code::MissingKey, flat.place.clone(), "the graph names no bench to run on");
-                let help = "add `bench = \"benches/….toml\"` under [graph], or give one with `--bench`";
+                let help = "add `bench = \"benches/….toml\"` under [graph], give one with `--bench`, or write \
+                            [bind] and [devices] here";
                 self.diagnostics.push(diagnostic.help(help));
                 return None;
             }

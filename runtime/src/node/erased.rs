@@ -18,6 +18,10 @@ pub struct NodeSpec {
     pub name: Cow<'static, str>,
     /// What it does, in one line.
     pub summary: Cow<'static, str>,
+    /// How it does it, in Markdown; empty if there is nothing more to say.
+    pub doc: Cow<'static, str>,
+    /// A block to paste; empty if there is none.
+    pub example: Cow<'static, str>,
     /// What a graph file may set.
     pub params: Vec<ParamSpec>,
     /// What it reads.
@@ -86,6 +90,8 @@ impl<N: Node> NodeType for Typed<N> {
         NodeSpec {
             name: N::NAME.into(),
             summary: N::SUMMARY.into(),
+            doc: N::DOC.into(),
+            example: N::EXAMPLE.into(),
             params: N::Params::fields(),
             inputs: <N::Inputs<'static> as InputSet<'static>>::specs(),
             outputs: N::Outputs::specs(),

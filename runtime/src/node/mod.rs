@@ -26,7 +26,7 @@ use crate::signal::Stamp;
 pub use crate::graph::Value;
 pub use erased::{AnyNode, Built, Configured, Given, NodeSpec, NodeType, of};
 pub use mistake::{At, Mistake, Mistakes};
-pub use params::{Bit, Count, FilePath, Map, NonNegative, Param, ParamSpec, Positive, Rate, Reader, Word, read_leaf};
+pub use params::{Bit, Count, FilePath, Map, NonNegative, Param, ParamSpec, Positive, Rate, Ratio, Reader, Word, read_leaf};
 pub use ports::{Bus, In, InputSet, Many, Need, Out, OutputSet, PortId, PortSpec, View, Wires};
 
 /// A node: configuration in `self`, made at load; state apart, so that a mode is a second configuration.
@@ -44,6 +44,11 @@ pub trait Node: Sized + Send + 'static {
     const NAME: &'static str;
     /// What it does, in one line.
     const SUMMARY: &'static str;
+    /// How it does it, for the reference: the equation and its source, when to use it, what to look out for. Markdown.
+    const DOC: &'static str = "";
+    /// A block `[nodes.…]` to paste. Its wires may name the blocks of other nodes' examples and the roles of devices'
+    /// examples: `describe` puts all of them together to a graph that loads.
+    const EXAMPLE: &'static str = "";
     /// Whether it steps in every tick, and not only when a trigger is new or lost: sinks and generators.
     const EVERY_TICK: bool = false;
 

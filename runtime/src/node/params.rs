@@ -19,7 +19,7 @@ pub struct ParamSpec {
     /// Meaning, with the unit in brackets.
     pub doc: &'static str,
     /// What it takes, for a person.
-    pub takes: &'static str,
+    pub takes: String,
     /// Default as written in the node's file; none if it must be given.
     pub default: Option<&'static str>,
     /// Whether it may be left out.
@@ -33,7 +33,7 @@ impl ParamSpec {
     #[must_use]
     pub fn of<T: Param>(name: &'static str, doc: &'static str, default: Option<&'static str>) -> Self {
         let is_optional = default.is_some() || T::when_missing().is_some();
-        Self { name, doc, takes: T::EXPECTS, default, is_optional, fields: T::fields() }
+        Self { name, doc, takes: T::takes(), default, is_optional, fields: T::fields() }
     }
 }
 
@@ -44,6 +44,12 @@ pub trait Param: Sized {
 
     /// Reads it; a mistake goes to the reader.
     fn read(value: &Value, reader: &mut Reader<'_>) -> Option<Self>;
+
+    /// What it takes in full, for the reference: `a list, each a number`.
+    #[must_use]
+    fn takes() -> String {
+        Self::EXPECTS.into()
+    }
 
     /// The fields of a table.
     #[must_use]
@@ -212,6 +218,8 @@ ranges! {
     Positive(f64): "a number greater than 0", |x| x > 0.0 && x.is_finite();
     /// A finite number that is not below zero.
     NonNegative(f64): "a number, 0 or more", |x| x >= 0.0 && x.is_finite();
+    /// A number from 0 to 1.
+    Ratio(f64): "a number from 0 to 1", |x| (0.0..=1.0).contains(&x);
     /// A rate [Hz] whose period is a sensible number of nanoseconds.
     Rate(f64): "a rate from 0.001 to 1000000", |x| (1e-3..=1e6).contains(&x);
     /// A switch written as a number, as in a diagonal matrix.
@@ -252,7 +260,7 @@ impl Param for Unit {
     }
 }
 
-/// A file, named relative to the file it stands in.
+/// A file, named relative to the file it stands in; or `builtin:NAME`, one that the catalogue brings along.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct FilePath {
     /// Where it is.
@@ -261,12 +269,25 @@ pub struct FilePath {
     pub span: Range<usize>,
 }
 
+impl FilePath {
+    /// What the name of a file starts with that the catalogue brings along, and no disk: it is relative to nothing.
+    pub const BUILTIN: &str = "builtin:";
+
+    /// The name of a file that the catalogue brings along.
+    #[must_use]
+    pub fn builtin(&self) -> Option<&str> {
+        self.path.to_str()?.strip_prefix(Self::BUILTIN)
+    }
+}
+
 impl Param for FilePath {
     const EXPECTS: &'static str = "the path of a file";
 
     fn read(value: &Value, reader: &mut Reader<'_>) -> Option<Self> {
         let text: String = read_leaf(value, reader, Self::EXPECTS)?;
-        Some(Self { path: reader.path(&text, &value.span), span: value.span.clone() })
+        let is_builtin = text.starts_with(Self::BUILTIN);
+        let path = if is_builtin { PathBuf::from(text) } else { reader.path(&text, &value.span) };
+        Some(Self { path, span: value.span.clone() })
     }
 }
 
@@ -275,6 +296,10 @@ impl<T: Param> Param for Option<T> {
 
     fn read(value: &Value, reader: &mut Reader<'_>) -> Option<Self> {
         T::read(value, reader).map(Some)
+    }
+
+    fn takes() -> String {
+        T::takes()
     }
 
     fn fields() -> Vec<ParamSpec> {
@@ -297,6 +322,14 @@ impl<T: Param> Param for Vec<T> {
         let read: Vec<Option<T>> = items.iter().map(|item| T::read(item, reader)).collect();
         read.into_iter().collect()
     }
+
+    fn takes() -> String {
+        format!("a list, each {}", T::takes())
+    }
+
+    fn fields() -> Vec<ParamSpec> {
+        T::fields()
+    }
 }
 
 impl<T: Param, const N: usize> Param for [T; N] {
@@ -317,6 +350,14 @@ impl<T: Param, const N: usize> Param for [T; N] {
             }
         }
     }
+
+    fn takes() -> String {
+        format!("a list of {N}, each {}", T::takes())
+    }
+
+    fn fields() -> Vec<ParamSpec> {
+        T::fields()
+    }
 }
 
 /// A table whose keys the graph chooses: the names of features, mostly.
@@ -334,6 +375,10 @@ impl<T: Param> Param for Map<T> {
         let read = |(key, value): &(Key, Value)| Some((key.name.clone(), T::read(value, reader)?));
         let entries: Vec<Option<(String, T)>> = table.entries.iter().map(read).collect();
         entries.into_iter().collect::<Option<_>>().map(Self)
+    }
+
+    fn takes() -> String {
+        format!("a table, for each name {}", T::takes())
     }
 
     fn fields() -> Vec<ParamSpec> {
