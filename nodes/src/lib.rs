@@ -40,6 +40,7 @@ use tactflow_runtime::catalogue::Catalogue;
 #[must_use]
 pub fn catalogue() -> Catalogue {
     Catalogue::new()
+        .files(builtin::FILES)
         .role(roles::tactile_pad())
         .role(roles::velocity_arm())
         .device::<devices::tekscan::TekscanMovie>()

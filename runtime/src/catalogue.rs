@@ -1,7 +1,7 @@
 //! What a graph may be made of: a plain list of node types, device types and roles.
 
 use crate::device::{Device, DeviceType, RoleType, device_type};
-use crate::graph::declares_a_unit;
+use crate::graph::{BuiltinFile, declares_a_unit};
 use crate::node::{Node, NodeType, of};
 
 /// A list of node types, device types and roles. Several can be joined: somebody else's crate adds its own.
@@ -10,6 +10,7 @@ pub struct Catalogue {
     nodes: Vec<Box<dyn NodeType>>,
     devices: Vec<Box<dyn DeviceType>>,
     roles: Vec<RoleType>,
+    files: Vec<BuiltinFile>,
 }
 
 impl Catalogue {
@@ -61,12 +62,20 @@ impl Catalogue {
         self
     }
 
+    /// With files that `builtin:NAME` stands for, wherever a file is named.
+    #[must_use]
+    pub fn files(mut self, files: &[BuiltinFile]) -> Self {
+        self.files.extend(files);
+        self
+    }
+
     /// With all that is in another list.
     #[must_use]
     pub fn join(mut self, other: Self) -> Self {
         self = other.nodes.into_iter().fold(self, Self::node_type);
         self.devices.extend(other.devices);
         self.roles.extend(other.roles);
+        self.files.extend(other.files);
         self
     }
 
@@ -80,6 +89,12 @@ impl Catalogue {
     #[must_use]
     pub fn devices(&self) -> &[Box<dyn DeviceType>] {
         &self.devices
+    }
+
+    /// The files that `builtin:NAME` stands for.
+    #[must_use]
+    pub fn builtin_files(&self) -> &[BuiltinFile] {
+        &self.files
     }
 
     /// The roles.

@@ -85,7 +85,7 @@ impl Ring {
 impl Fused {
     /// The task of the graph on that array, with dead tactels, and the arm of that model.
     pub(crate) fn new(shape: ImageShape, dead: &[usize], urdf: &Path) -> Self {
-        let file = FilePath { path: urdf.into(), span: 0..0 };
+        let file = FilePath { path: urdf.into(), span: 0..0, builtin: None };
         let mount = Mount { xyz: [0.0, 0.0, 0.03], rpy: [0.0; 3] };
         let chain = model::load(&file, "lwr_7_link", &mount).unwrap_or_else(|mistakes| panic!("{mistakes:?}"));
         let grid = Grid::from(&shape);

@@ -14,7 +14,6 @@ use urdf_rs::JointType;
 
 use super::chain::{Chain, Motion, Segment};
 use super::mount::{Mount, pose_of};
-use crate::builtin;
 
 /// Position limit of a joint that has none [rad, or m].
 pub const UNBOUNDED: f64 = 1e9;
@@ -45,7 +44,7 @@ pub enum Place {
 /// # Errors
 /// What is wrong with the file, at its place, or with the tip.
 pub fn load(urdf: &FilePath, tip: &str, mount: &Mount) -> Result<Chain, Mistakes> {
-    let bytes = builtin::read(urdf)?;
+    let bytes = urdf.bytes()?;
     let text = str::from_utf8(&bytes).map_err(|error| {
         let text = String::from_utf8_lossy(&bytes);
         let at = error.valid_up_to();
@@ -191,7 +190,7 @@ mod tests {
     const LWR: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../graphs/robots/lwr4p.urdf");
 
     fn file(path: &str) -> FilePath {
-        FilePath { path: path.into(), span: 3..7 }
+        FilePath { path: path.into(), span: 3..7, builtin: None }
     }
 
     #[test]

@@ -129,7 +129,7 @@ fn check_start(joints: &[Joint], start: &[f64]) -> Result<(), Mistakes> {
 
 /// What `arm_state` wants to know. The path is absolute, since the graph that asks may stand in another folder.
 fn facts(params: &Params) -> Result<Vec<(Cow<'static, str>, toml::Value)>, Mistakes> {
-    let urdf = match params.urdf.builtin() {
+    let urdf = match params.urdf.builtin {
         Some(_) => params.urdf.path.clone(),
         None => std::path::absolute(&params.urdf.path).map_err(|error| Mistake::unreadable(&params.urdf, &error))?,
     };

@@ -7,9 +7,11 @@ use tactflow_runtime::device::{Commands, Description, Device, Driver, Filled, Op
 use tactflow_runtime::graph::{Sources, parse_table};
 use tactflow_runtime::node::{Mistakes, Param, Reader};
 
+use crate::builtin;
+
 /// Opens a device with the parameters of a TOML text, as a bench file would.
 pub(super) fn open<D: Device>(params: &str) -> Result<Opened, Mistakes> {
-    let mut sources = Sources::default();
+    let mut sources = Sources::with_builtin(builtin::FILES);
     let table = parse_table(sources.add_file(Path::new("bench.toml"), params)).expect("the test's TOML");
     let mut reader = Reader::new(&sources);
     let catalogue = Catalogue::new().device::<D>();
@@ -18,7 +20,7 @@ pub(super) fn open<D: Device>(params: &str) -> Result<Opened, Mistakes> {
 
 /// Reads parameters that are known to be right.
 pub(super) fn read<P: Param>(params: &str) -> P {
-    let mut sources = Sources::default();
+    let mut sources = Sources::with_builtin(builtin::FILES);
     let table = parse_table(sources.add_file(Path::new("bench.toml"), params)).expect("the test's TOML");
     P::read(&table, &mut Reader::new(&sources)).expect("the test's parameters")
 }

@@ -21,7 +21,7 @@ use crate::signal::Shape;
 /// # Errors
 /// Every mistake of its files at once.
 pub fn plan(catalogue: &Catalogue, request: &Request) -> Result<Plan, Report> {
-    let mut loader = Loader::default();
+    let mut loader = Loader::new(catalogue.builtin_files());
     let flat = loader.load(request);
     let Loader { mut sources, diagnostics: mut found, .. } = loader;
     let has_unread =

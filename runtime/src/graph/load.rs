@@ -5,7 +5,7 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 use super::document::{Bench, Block, Document, GraphTable, PartBlock, Sections};
-use super::{Item, Key, Sources, Table, Value, parse_table};
+use super::{BuiltinFile, Item, Key, Sources, Table, Value, parse_table};
 use crate::diagnostic::{Code, Diagnostic, closest, meant};
 use crate::node::Word;
 
@@ -107,6 +107,11 @@ const DEEPEST: usize = 32;
 const MOST_PARTS: usize = 4096;
 
 impl Loader {
+    /// A loader that knows the files a catalogue brings along.
+    pub(crate) fn new(builtin: &[BuiltinFile]) -> Self {
+        Self { sources: Sources::with_builtin(builtin), ..Self::default() }
+    }
+
     /// Reads everything that the request names.
     pub(crate) fn load(&mut self, request: &Request) -> Flat {
         let mut flat = Flat::default();
@@ -197,15 +202,20 @@ impl Loader {
 
     /// Reads and parses a file; `from` is where its name stands.
     fn read(&mut self, path: &Path, from: Option<Range<usize>>) -> Option<(Table, Range<usize>)> {
-        match std::fs::read_to_string(path) {
+        let text = match self.sources.builtin(path) {
+            Ok(Some(bytes)) => Ok(String::from_utf8_lossy(bytes).into_owned()),
+            Ok(None) => std::fs::read_to_string(path).map_err(|error| (error.to_string(), None)),
+            Err((message, help)) => Err((message, Some(help))),
+        };
+        match text {
             Ok(text) => self.parse(path, text),
-            Err(error) => {
+            Err((error, help)) => {
                 let message = format!("cannot read `{}`: {error}", path.display());
                 let span = from.unwrap_or_else(|| {
                     let file = self.sources.add("command line", path.display().to_string(), "");
                     file.base..file.base + file.text.len()
                 });
-                self.diagnostics.push(Diagnostic::new(Code::Unreadable, span, message));
+                self.diagnostics.push(Diagnostic::new(Code::Unreadable, span, message).with_help(help));
                 None
             }
         }

@@ -20,6 +20,6 @@ pub use check::plan;
 pub use load::Request;
 pub(crate) use plan::{Clock, PlannedCommand, PlannedNode, Producer, Source};
 pub use plan::{Plan, PlannedPort};
-pub use sources::{SourceFile, Sources};
+pub use sources::{BuiltinFile, SourceFile, Sources};
 pub(crate) use units::declares_a_unit;
 pub use value::{Item, Key, Table, Value, parse_table};

@@ -3,6 +3,8 @@
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
+use crate::diagnostic::closest;
+
 /// One text.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct SourceFile {
@@ -33,13 +35,47 @@ impl SourceFile {
     }
 }
 
+/// A file that a catalogue brings along: its name behind `builtin:`, and its bytes.
+pub type BuiltinFile = (&'static str, &'static [u8]);
+
+/// What the path of a file starts with that a catalogue brings along, and no disk.
+const BUILTIN: &str = "builtin:";
+
 /// All texts a graph was read from: files, and what the command line sets.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Sources {
     files: Vec<SourceFile>,
+    builtin: Vec<BuiltinFile>,
 }
 
 impl Sources {
+    /// No text yet, and files that `builtin:NAME` stands for.
+    #[must_use]
+    pub fn with_builtin(files: &[BuiltinFile]) -> Self {
+        Self { files: Vec::new(), builtin: files.to_vec() }
+    }
+
+    /// The bytes of `builtin:NAME`; none for a path on the disk.
+    ///
+    /// # Errors
+    /// What is wrong and a way out, when nothing of that name is built in.
+    pub fn builtin(&self, path: &Path) -> Result<Option<&'static [u8]>, (String, String)> {
+        let Some(name) = path.to_str().and_then(|path| path.strip_prefix(BUILTIN)) else { return Ok(None) };
+        match self.builtin.iter().find(|(other, _)| *other == name) {
+            Some((_, bytes)) => Ok(Some(bytes)),
+            None => {
+                let help = closest(name, self.builtin.iter().map(|(name, _)| *name), "built-in files");
+                Err((format!("no file `{name}` is built in"), help))
+            }
+        }
+    }
+
+    /// A path as it is written at `at`: relative to the folder of the file it stands in.
+    #[must_use]
+    pub fn path(&self, text: &str, at: usize) -> PathBuf {
+        if text.starts_with(BUILTIN) { PathBuf::from(text) } else { self.folder(at).join(text) }
+    }
+
     /// Adds a text; paths in it are relative to `folder`.
     pub fn add(&mut self, name: impl Into<String>, text: impl Into<String>, folder: impl Into<PathBuf>) -> &SourceFile {
         // One byte lies between two files, so that the place just past the end of one is not in the next.
@@ -86,6 +122,18 @@ impl Sources {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_builtin_file_is_found_by_its_name_and_on_no_disk() {
+        let mut sources = Sources::with_builtin(&[("arm.urdf", b"<robot/>")]);
+        let base = sources.add_file(Path::new("a/one.toml"), "x = 1").base;
+        assert_eq!(sources.builtin(Path::new("arm.urdf")), Ok(None));
+        assert_eq!(sources.builtin(Path::new("builtin:arm.urdf")), Ok(Some(b"<robot/>".as_slice())));
+        let (message, help) = sources.builtin(Path::new("builtin:arm.udrf")).unwrap_err();
+        assert_eq!((message.as_str(), help.as_str()), ("no file `arm.udrf` is built in", "did you mean `arm.urdf`?"));
+        assert_eq!(sources.path("b.csv", base), Path::new("a/b.csv"));
+        assert_eq!(sources.path("builtin:b.csv", base), Path::new("builtin:b.csv"));
+    }
 
     #[test]
     fn a_place_is_found_in_its_own_text() {

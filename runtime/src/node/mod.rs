@@ -26,7 +26,9 @@ use crate::signal::Stamp;
 pub use crate::graph::Value;
 pub use erased::{AnyNode, Built, Configured, Given, NodeSpec, NodeType, of};
 pub use mistake::{At, Mistake, Mistakes};
-pub use params::{Bit, Count, FilePath, Map, NonNegative, Param, ParamSpec, Positive, Rate, Ratio, Reader, Word, read_leaf};
+pub use params::{
+    Bit, Count, FilePath, Map, NonNegative, Param, ParamSpec, Positive, Rate, Ratio, Reader, Word, read_leaf,
+};
 pub use ports::{Bus, In, InputSet, Many, Need, Out, OutputSet, PortId, PortSpec, View, Wires};
 
 /// A node: configuration in `self`, made at load; state apart, so that a mode is a second configuration.

@@ -1,5 +1,6 @@
 //! Parameters: read from the graph file value by value, so that every mistake of a node shows at once, on its token.
 
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::ops::{Deref, Range};
 use std::path::PathBuf;
@@ -145,10 +146,16 @@ impl<'a> Reader<'a> {
         }
     }
 
-    /// A path as it stands at `span`, taken from the folder of the file it stands in.
-    #[must_use]
-    pub fn path(&self, text: &str, span: &Range<usize>) -> PathBuf {
-        self.sources.folder(span.start).join(text)
+    /// A file as it is named at `span`: relative to the folder of the file it stands in, or built in.
+    pub fn file(&mut self, text: &str, span: Range<usize>) -> Option<FilePath> {
+        let path = self.sources.path(text, span.start);
+        match self.sources.builtin(&path) {
+            Ok(builtin) => Some(FilePath { path, span, builtin }),
+            Err((message, help)) => {
+                self.mistakes.push(Mistake::new(Code::Unreadable, At::Span(span), message).help(help));
+                None
+            }
+        }
     }
 }
 
@@ -267,16 +274,20 @@ pub struct FilePath {
     pub path: PathBuf,
     /// Where its name stands.
     pub span: Range<usize>,
+    /// Its bytes, if it is one that the catalogue brings along.
+    pub builtin: Option<&'static [u8]>,
 }
 
 impl FilePath {
-    /// What the name of a file starts with that the catalogue brings along, and no disk: it is relative to nothing.
-    pub const BUILTIN: &str = "builtin:";
-
-    /// The name of a file that the catalogue brings along.
-    #[must_use]
-    pub fn builtin(&self) -> Option<&str> {
-        self.path.to_str()?.strip_prefix(Self::BUILTIN)
+    /// Reads the whole file.
+    ///
+    /// # Errors
+    /// When it cannot be read, at the place of its name.
+    pub fn bytes(&self) -> Result<Cow<'static, [u8]>, Mistake> {
+        match self.builtin {
+            Some(bytes) => Ok(Cow::Borrowed(bytes)),
+            None => std::fs::read(&self.path).map(Cow::Owned).map_err(|error| Mistake::unreadable(self, &error)),
+        }
     }
 }
 
@@ -285,9 +296,7 @@ impl Param for FilePath {
 
     fn read(value: &Value, reader: &mut Reader<'_>) -> Option<Self> {
         let text: String = read_leaf(value, reader, Self::EXPECTS)?;
-        let is_builtin = text.starts_with(Self::BUILTIN);
-        let path = if is_builtin { PathBuf::from(text) } else { reader.path(&text, &value.span) };
-        Some(Self { path, span: value.span.clone() })
+        reader.file(&text, value.span.clone())
     }
 }
 

@@ -6,8 +6,6 @@
 mod header;
 mod parse;
 
-use std::fs;
-
 use tactflow_runtime::device::{Commands, Description, Device, DeviceError, Driver, Filled, Opened, Samples, Stepped};
 use tactflow_runtime::diagnostic::Code;
 use tactflow_runtime::node::{At, FilePath, Mistake, Mistakes};
@@ -36,7 +34,7 @@ impl Device for TekscanMovie {
 
     fn open(params: Params) -> Result<Opened, Mistakes> {
         let file = params.file;
-        let bytes = fs::read(&file.path).map_err(|error| Mistake::unreadable(&file, &error))?;
+        let bytes = file.bytes()?;
         let movie = read(&bytes).map_err(|refusal| refusal.into_mistakes(&file))?;
         let filled = Filled {
             role: "tactile_pad".into(),
