@@ -7,6 +7,7 @@
 mod hints;
 mod tekscan;
 pub mod text;
+mod units;
 
 #[cfg(test)]
 mod testing;
