@@ -1,11 +1,8 @@
-//! `tekscan_movie` against the shipped recording and damaged copies of it.
-
-use tactflow_runtime::signal::{Shape, Unit};
+//! The format of Tekscan against the shipped recording and damaged copies of it.
 
 use super::*;
-use crate::devices::testing::{Bench, open};
+use crate::recordings::testing::{check_damages, complaints, count_refused};
 
-const PATH: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../graphs/recordings/pressuRe/iscan_test.csv");
 const FINGER: &str = include_str!("../../../../graphs/recordings/pressuRe/iscan_test.csv");
 
 /// Two frames of 2 by 3 cells, the corner without a sensel.
@@ -32,18 +29,12 @@ B,0,0
 @@
 ";
 
-fn line_of(text: &str, at: usize) -> usize {
-    text[..at].matches('\n').count() + 1
+fn parse(text: &str) -> Result<Recording, Refusal> {
+    read(text.as_bytes(), &Hints::default())
 }
 
 fn flaws(bytes: &[u8]) -> Vec<(usize, String)> {
-    match read(bytes) {
-        Ok(_) => vec![],
-        Err(Refusal::Stranger) => vec![(0, "stranger".into())],
-        Err(Refusal::Damaged { text, flaws }) => {
-            flaws.into_iter().map(|flaw| (line_of(&text, flaw.span.start), flaw.message)).collect()
-        }
-    }
+    complaints(crate::recordings::read(bytes, "movie.csv", &Hints::default()))
 }
 
 #[test]
@@ -67,25 +58,89 @@ fn the_whole_recording_agrees_with_its_own_sums() {
 fn a_small_movie_in_any_dress() {
     let movie = parse(SMALL).unwrap();
     assert_eq!(movie.cells, [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 0.0, 0.0, 0.0, 0.0, 0.0, 7.0]);
-    assert_eq!(movie.frames, [Frame { number: 1, time: 0 }, Frame { number: 2, time: 100_000_000 }]);
+    let frames: Vec<_> = movie.frames.iter().map(|frame| (frame.number, frame.time, frame.start)).collect();
+    assert_eq!(frames, [(1, 0, 0), (2, 100_000_000, 6)]);
     assert_eq!((movie.dead.as_slice(), movie.shape.rows, movie.shape.cols), ([0].as_slice(), 2, 3));
     assert_eq!(movie.shape.pitch, [0.004, 0.0127], "x runs along the columns");
+    let spreadsheet = |text: &str| text.lines().map(|line| format!("{line},,,,,,\n")).collect::<String>();
+    let wide: String = SMALL.encode_utf16().flat_map(|unit| unit.to_le_bytes()).map(char::from).collect();
+    assert_eq!(read(&wide.chars().map(|c| c as u8).collect::<Vec<_>>(), &Hints::default()).as_ref(), Ok(&movie));
+    let semicolons = SMALL.replace(',', ";").replace("0.1", "0,1").replace("0.5", "0,5").replace("1;2", "1,0;2,00");
     let same = [
         SMALL.replace('\n', "\r\n"),
+        SMALL.replace('\n', "\r"),
         format!("\u{feff}{SMALL}"),
-        format!("{}\n\n", SMALL.trim_end()),
+        format!("\n{SMALL}\n\n"),
         SMALL.trim_end().into(),
         SMALL.replace("1,2\n", " 1 , 2 \n"),
         SMALL.replace("START_FRAME 1\nEND_FRAME 2\n", ""),
+        SMALL.replace("START_FRAME 1\nEND_FRAME 2\n", "START_FRAME 11\nEND_FRAME 12\n"),
         SMALL.replace("SECONDS_PER_FRAME 0.1\n", ""),
+        SMALL.replace("SECONDS_PER_FRAME 0.1\n", "SECONDS_PER_FRAME 0\nMICRO_SECOND 100000\n"),
+        SMALL.replace(" 0.1,,", " 0.0,,"),
+        SMALL.replace(" 0,,", " 7.5,,").replace(" 0.1,,", " 7.6,,"),
+        SMALL.replace(", 0,,", ",,,").replace(", 0.1,,", ",,,"),
+        SMALL.replace(", 0,, 12/2/2019 6:21:52.34PM,,,Raw Sum=,,15", "").replace("2, 0.1,, 12", "2\t12"),
+        SMALL.replace("0.5 inches", "12.7 millimetres").replace("4 millimeters", "4mm"),
+        SMALL.replace("ROWS 2", "rows 2").replace("MOVIE", "movie").replace("raw", "Raw"),
+        SMALL.replace("UNITS raw", "UNITS raw\nMAP_INDEX 0\nMAP_INDEX 1"),
+        SMALL.replace("UNITS raw", "COMMENTS:\nFrame by frame,\n\nROWS of teeth\nunits are raw\nUNITS raw"),
+        SMALL.replace("Sum=,,15", "Sum= 15").replace("Sum=,,7", "Sum=7.4"),
+        SMALL.replace("@@\n\n", "%%\n\n").replace("\n@@\n", "\n%%\n"),
+        SMALL.replace("B,1,2", "B 1 2").replace("3,4,5", "3 4  5").replace("B,0,0", "B 0 0").replace("0,0,7", "0 0 7"),
+        SMALL
+            .replace("B,1,2", "B\t1\t2\t")
+            .replace("3,4,5", "3\t4\t5")
+            .replace("B,0,0", "b\t0\t0")
+            .replace("0,0,7", "0\t0\t7"),
+        spreadsheet(SMALL),
+        spreadsheet(SMALL).replace("DATA_TYPE MOVIE", "\"DATA_TYPE MOVIE\""),
+        semicolons,
     ];
     for text in same {
-        assert_eq!(read(text.as_bytes()).ok().as_ref(), Some(&movie), "{text}");
+        assert_eq!(parse(&text).as_ref(), Ok(&movie), "{text}");
     }
-    let bare =
-        parse(&SMALL.replace("NOISE_THRESHOLD 3\n", "").replace("UNITS raw", "UNITS kPa").replace("=,,15", "=,,9"));
-    let bare = bare.expect("the sum is of raw values and says nothing of others");
-    assert_eq!((bare.threshold, bare.shape.unit.to_string().as_str()), (None, "kPa"));
+}
+
+#[test]
+fn an_insole_that_only_numbers_its_frames() {
+    let text = SMALL.replace(", 0,, 12/2/2019 6:21:52.34PM,,,Raw Sum=,,15", "");
+    let text = text.replace(", 0.1,, 12/2/2019 6:21:52.44PM,,,Raw Sum=,,7", "").replace("UNITS raw", "UNITS KPa");
+    let movie = parse(&text.replace("FRAME 0.1", "FRAME 0.032")).unwrap();
+    assert_eq!((movie.frames[1].time, movie.period), (32_000_000, 0.032));
+    assert_eq!(movie.threshold, None, "the filter counts and knows no kPa");
+    let silent = text.replace("SECONDS_PER_FRAME 0.1\n", "");
+    assert_eq!(flaws(silent.as_bytes()), [(0, "the file does not say how fast its frames came".into())]);
+    let hinted = read(silent.as_bytes(), &Hints { rate_hz: Some(50.0), ..Hints::default() }).unwrap();
+    assert_eq!((hinted.frames[1].time, hinted.period), (20_000_000, 0.02));
+}
+
+#[test]
+fn pressures_become_kpa_and_forces_newtons() {
+    let cases =
+        [("PSI", "kPa", 6.894_757), ("N/cm²", "kPa", 10.0), ("mmHg", "kPa", 0.133_322_4), ("lbs", "N", 4.448_222)];
+    for (name, ours, factor) in cases {
+        let latin: Vec<u8> = SMALL.replace("UNITS raw", &format!("UNITS {name}")).chars().map(|c| c as u8).collect();
+        let movie = read(&latin, &Hints::default()).expect(name);
+        assert_eq!(movie.shape.unit.to_string(), ours);
+        assert!((f64::from(movie.cells[5]) / 5.0 / factor - 1.0).abs() < 1e-6, "{name}: {:?}", movie.cells);
+    }
+}
+
+#[test]
+fn hints_fill_gaps_and_contradict_nothing() {
+    let unsaid = SMALL.replace("UNITS raw\n", "").replace("COL_SPACING 4 millimeters\n", "");
+    let hints = Hints { unit: Some(Unit::RAW), pitch: Some([0.004, 0.0127]), ..Hints::default() };
+    assert_eq!(read(unsaid.as_bytes(), &hints), parse(SMALL));
+    let cases = [
+        (Hints { unit: Some(Unit::NEWTON), ..Hints::default() }, "the file says otherwise: raw"),
+        (Hints { pitch: Some([0.004, 0.004]), ..Hints::default() }, "the file says otherwise: [4, 12.7] mm"),
+        (Hints { rate_hz: Some(50.0), ..Hints::default() }, "the file says otherwise: 10 frames a second"),
+        (Hints { size: Some([3, 2]), ..Hints::default() }, "the file says otherwise: 2 rows by 3 columns"),
+    ];
+    for (hints, message) in cases {
+        assert_eq!(complaints(read(SMALL.as_bytes(), &hints)), [(0, message.into())]);
+    }
 }
 
 #[test]
@@ -107,14 +162,20 @@ fn damaged_files_say_what_and_where() {
             "a frame of 2 by 18446744073709551615 cells is more than the file holds",
         ),
         ("COLS 3", &format!("COLS {huge}"), 3, &format!("`COLS` is not a whole number: `{huge}`")),
-        ("COLS 3", "COLS 3\nROWS 2", 4, "`ROWS` is given twice"),
+        ("COLS 3", "COLS 3\nROWS 3", 4, "`ROWS` is given twice"),
         ("0.5 inches", "0.5 feet", 4, "`ROW_SPACING` is in `centimeters`, `millimeters` or `inches`, not `feet`"),
         ("4 millimeters", "0 millimeters", 5, "`COL_SPACING` is greater than 0"),
         ("THRESHOLD 3", "THRESHOLD none", 6, "`NOISE_THRESHOLD` is not a number: `none`"),
         ("FRAME 0.1", "FRAME -0.1", 7, "`SECONDS_PER_FRAME` is greater than 0"),
         ("START_FRAME 1", "START_FRAME 5", 13, "the first frame is 1, but `START_FRAME` says otherwise"),
         ("END_FRAME 2", "END_FRAME 3", 9, "`END_FRAME` promises 3 frames, but the last is frame 2"),
-        ("UNITS raw", "UNITS PSI", 10, "the unit `PSI` is not known here; `raw`, `kPa` and `N` are"),
+        (
+            "UNITS raw",
+            "UNITS stone",
+            10,
+            "the unit `stone` is not known here; known are `raw`, pressures (`kPa`, `N/cm2`, `PSI`, `mmHg`, …) and \
+             forces (`N`, `lbs`, `kg`, …)",
+        ),
         ("ASCII_DATA @@\n", "", 12, "the header has no `ASCII_DATA @@` at its end"),
         ("Frame 1,", "Frame one,", 13, "the frame's number is not a whole number: `one`"),
         (" 0.1,,", " ,,", 17, "the frame's time is not a number: ``"),
@@ -145,16 +206,13 @@ fn damaged_files_say_what_and_where() {
         ("\nFrame 2", "\nhello\nFrame 2", 17, "expected a frame or `@@`, found `hello`"),
         ("@@\n\nFrame 1", "@@\n@@\nFrame 1", 12, "the movie has no frame"),
         ("7\n@@\n", "7\n@@\nmore", 21, "something comes after the movie's end, `@@`"),
-        ("DATA_TYPE", "FATA_TYPE", 0, "stranger"),
     ];
-    for (from, to, line, message) in cases {
-        assert!(SMALL.contains(from), "{from}");
-        let got = flaws(SMALL.replacen(from, to, 1).as_bytes());
-        assert_eq!(got, [(*line, (*message).to_owned())], "{from} -> {to}");
-    }
+    check_damages(SMALL, "movie.csv", &Hints::default(), cases);
     assert_eq!(flaws(b""), [(0, "stranger".into())]);
     assert_eq!(flaws(b"\x89PNG\r\n"), [(0, "stranger".into())]);
-    assert_eq!(flaws(b"DATA_TYPE MOVIE\nROWS \xff\xfe"), [(2, "this is not UTF-8 text".into())]);
+    for cut in 0..SMALL.trim_end().len() {
+        assert_ne!(flaws(&SMALL.as_bytes()[..cut]), [], "cut after {cut} bytes");
+    }
     let several = flaws(SMALL.replace("ROWS 2\n", "").replace("UNITS raw", "UNITS x").as_bytes());
     assert_eq!(several.len(), 2, "every mistake of the header at once: {several:?}");
 }
@@ -164,75 +222,6 @@ fn no_damage_makes_it_panic() {
     let start = FINGER.find("\nFrame 4,").unwrap();
     let movie = format!("{}@@\n", &FINGER[..start]).replace("END_FRAME 309", "END_FRAME 3");
     assert_eq!(parse(&movie).unwrap().frames.len(), 3);
-    // The 64-bit splitmix generator (Steele et al. 2014), so that every run damages the same.
-    let mut seed = 2013u64;
-    let mut random = |below: usize| {
-        seed = seed.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mixed = (seed ^ (seed >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        let mixed = (mixed ^ (mixed >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((mixed ^ (mixed >> 31)) % below as u64) as usize
-    };
-    let mut refused = 0;
-    for round in 0..6000 {
-        let mut bytes = if round % 2 == 0 { SMALL.as_bytes().to_vec() } else { movie.as_bytes().to_vec() };
-        for _ in 0..=random(3) {
-            let (a, b) = (random(bytes.len()), random(bytes.len()));
-            match random(6) {
-                0 => bytes.truncate(a.max(1)),
-                1 => bytes.swap(a, b),
-                2 => bytes[a] ^= 1 << random(8),
-                3 => bytes[a] = random(256) as u8,
-                4 => drop(bytes.drain(a.min(b)..a.max(b).min(a.min(b) + 40))),
-                _ => bytes.insert(a, b"9-.,B\n\r@e"[random(9)]),
-            }
-            if bytes.is_empty() {
-                bytes.push(b'D');
-            }
-        }
-        match read(&bytes) {
-            Ok(movie) => assert_eq!(movie.cells.len(), movie.frames.len() * movie.shape.tactels()),
-            Err(Refusal::Stranger) => refused += 1,
-            Err(Refusal::Damaged { text, flaws }) => {
-                refused += 1;
-                assert!(!flaws.is_empty() && flaws.iter().all(|flaw| text.get(flaw.span.clone()).is_some()));
-            }
-        }
-    }
+    let refused = count_refused(&[SMALL.as_bytes(), movie.as_bytes()], "movie.csv", &Hints::default(), 6000);
     assert!(refused > 4000, "{refused} of 6000 were seen to be damaged");
-}
-
-#[test]
-fn frames_are_served_once_and_the_newest_wins() {
-    let mut bench = Bench::new(open::<TekscanMovie>(&format!("file = '{PATH}'")).unwrap());
-    let Shape::Image(shape) = &bench.fill().outputs[0] else { panic!("an image") };
-    assert_eq!((shape.rows, shape.cols), (28, 28));
-    assert_eq!(bench.fact("threshold"), Some(&3.0.into()));
-    assert_eq!(bench.fact("frames"), Some(&309.into()));
-    assert_eq!(bench.fact("dead").unwrap()[1], vec![0, 1].into());
-    let force = |bench: &mut Bench| {
-        let image: &mut Image = bench.samples.write(0, 0, 0);
-        let sum: f32 = image.cells().iter().sum();
-        image.cells_mut().fill(f32::NAN);
-        sum
-    };
-    assert_eq!(bench.device.next(), Some(0));
-    bench.exchange(0);
-    assert_eq!((force(&mut bench), bench.device.next()), (310.0, Some(100_000_000)));
-    bench.exchange(99_999_999);
-    assert!(force(&mut bench).is_nan(), "nothing is due");
-    bench.exchange(350_000_000);
-    assert_eq!((force(&mut bench), bench.device.next()), (309.0, Some(400_000_000)), "frame 4 and neither 2 nor 3");
-    bench.exchange(i64::MAX);
-    assert_eq!((force(&mut bench), bench.device.next()), (29.0, None));
-    bench.exchange(i64::MAX);
-    assert!(force(&mut bench).is_nan(), "the movie is over");
-}
-
-#[test]
-fn a_missing_file_and_another_file_are_mistakes_where_the_bench_names_them() {
-    for (path, message) in [("nowhere.csv", "cannot read"), (concat!(env!("CARGO_MANIFEST_DIR"), "/Cargo.toml"), "`")] {
-        let mistakes = open::<TekscanMovie>(&format!("file = '{path}'")).err().unwrap();
-        assert_eq!(mistakes[0].at, At::Span(7..9 + path.len()));
-        assert!(mistakes[0].message.starts_with(message), "{mistakes:?}");
-    }
 }
