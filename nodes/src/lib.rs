@@ -33,9 +33,14 @@ pub mod devices;
 pub mod recordings;
 pub mod roles;
 pub mod servo;
+#[cfg(feature = "cli")]
+mod tool;
 pub mod touch;
 
 use tactflow_runtime::catalogue::Catalogue;
+
+#[cfg(feature = "cli")]
+pub use tool::tool;
 
 /// Everything there is: one line each.
 #[must_use]

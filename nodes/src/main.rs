@@ -2,8 +2,6 @@
 
 use std::process::ExitCode;
 
-use tactflow_runtime::cli::Tool;
-
 fn main() -> ExitCode {
-    Tool::new(tactflow_nodes::catalogue()).main()
+    tactflow_nodes::tool(tactflow_nodes::catalogue()).main()
 }

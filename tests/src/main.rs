@@ -2,8 +2,6 @@
 
 use std::process::ExitCode;
 
-use tactflow_runtime::cli::Tool;
-
 fn main() -> ExitCode {
-    Tool::new(tactflow_tests::catalogue()).main()
+    tactflow_nodes::tool(tactflow_tests::catalogue()).main()
 }

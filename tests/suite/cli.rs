@@ -177,7 +177,7 @@ fn a_mistake_in_set_points_into_set() {
         let title = format!("error[{code}]: {message}\n");
         let at = err.find(&title).unwrap_or_else(|| panic!("{assignment}: `{title}` is not in\n{err}"));
         let next = err[at + title.len()..].lines().next().unwrap().trim_start();
-        assert_eq!(next, format!("--> --set:{place}"), "{assignment}: {err}");
+        assert_eq!(next, format!("--> command line:{place}"), "{assignment}: {err}");
     }
 }
 

@@ -10,6 +10,7 @@ mod docs;
 mod erased;
 mod errors;
 mod faults;
+mod features;
 mod freshness;
 mod live;
 mod merge;

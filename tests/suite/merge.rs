@@ -104,9 +104,9 @@ fn a_mistake_shows_where_the_value_stands_that_is_in_force() {
     let cases: [(&str, &[&str], &str, &str, &str); 8] = [
         ("set.last.by = \"x\"", &[], "bad-value", "graph.toml:14:15", wrong),
         ("set.inner.one.by = \"x\"", &[], "bad-value", "graph.toml:14:20", wrong),
-        ("set.last.by = 1.0", &["parts.first.set.last.by=x"], "bad-value", "--set:1:25", wrong),
-        ("", &["parts.first.set.inner.two.by=x"], "bad-value", "--set:1:30", wrong),
-        ("", &["parts.first.set.last.bye=1"], "unknown-key", "--set:1:22", "`bye` is not a parameter here"),
+        ("set.last.by = 1.0", &["parts.first.set.last.by=x"], "bad-value", "command line:1:25", wrong),
+        ("", &["parts.first.set.inner.two.by=x"], "bad-value", "command line:1:30", wrong),
+        ("", &["parts.first.set.last.bye=1"], "unknown-key", "command line:1:22", "`bye` is not a parameter here"),
         (
             "set.inner.one.in.value = \"inputs.vale\"",
             &[],
@@ -139,14 +139,14 @@ fn a_value_that_a_good_one_lies_over_is_no_mistake() {
 fn what_a_node_refuses_when_it_is_built_shows_at_the_value_in_force_too() {
     let wrong = "1e300 is too large for a tactel: images are of 32-bit floats";
     let request = shipped("finger_press.toml").set("parts.touch.set.binarize.threshold=1e300");
-    assert_eq!(mistakes(&request), [("bad-value", "--set:1:36".to_owned(), wrong.to_owned())]);
+    assert_eq!(mistakes(&request), [("bad-value", "command line:1:36".to_owned(), wrong.to_owned())]);
 }
 
 #[test]
 fn one_mistake_in_a_part_of_two_instances_is_told_once() {
     let request = request("set.inner.one.by = \"x\"").set("parts.second.set.inner.one.by=y");
     let places: Vec<String> = mistakes(&request).into_iter().map(|(_, place, _)| place).collect();
-    assert_eq!(places, ["graph.toml:14:20", "--set:1:31"]);
+    assert_eq!(places, ["graph.toml:14:20", "command line:1:31"]);
 }
 
 #[test]

@@ -32,6 +32,7 @@ use crate::graph::Request;
 
 /// The parser of arguments, for commands of one's own.
 pub use clap;
+pub use run::{Job, duration};
 use shell::Colour;
 pub use shell::Shell;
 

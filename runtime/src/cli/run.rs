@@ -8,7 +8,7 @@ use super::progress::Progress;
 use super::summary::Summary;
 use super::{FAULTED, NOT_LOADED, OnArgs, Shell};
 use crate::engine::{self, End, Engine, Outcome, RunOptions};
-use crate::graph::plan;
+use crate::graph::{Plan, Request, plan};
 use crate::record::{Format, Recorder};
 
 /// Run a graph and print what came out
@@ -37,50 +37,77 @@ pub(super) struct Run {
 }
 
 pub(super) fn run(args: Run, shell: &Shell) -> u8 {
-    let plan = match plan(shell.catalogue(), &args.on.request(args.graph.clone())) {
-        Ok(plan) => plan,
-        Err(report) => return shell.complain(&report),
-    };
-    let is_real = args.realtime || plan.is_live();
-    let mut engine = Engine::new(plan);
-    let mut recorder = match args.out.as_deref().map(|path| recorder(path, &engine, !is_real)).transpose() {
-        Ok(recorder) => recorder,
-        Err(message) => {
-            shell.error(message);
-            return NOT_LOADED;
+    let title = args.graph.display().to_string();
+    let Run { graph, on, duration, realtime, out } = args;
+    Job { request: on.request(graph), title, duration, realtime, out }.run(shell)
+}
+
+/// A run of a graph from the command line.
+pub struct Job {
+    /// What runs.
+    pub request: Request,
+    /// What to call it.
+    pub title: String,
+    /// Run at most this long in the graph's time [s].
+    pub duration: Option<f64>,
+    /// Whether it is paced by the wall clock.
+    pub realtime: bool,
+    /// Where each tick is recorded, as .csv or .ndjson.
+    pub out: Option<PathBuf>,
+}
+
+impl Job {
+    /// Runs it and prints what came out; gives the exit code.
+    #[must_use]
+    pub fn run(&self, shell: &Shell) -> u8 {
+        match plan(shell.catalogue(), &self.request) {
+            Ok(plan) => self.go(plan, shell),
+            Err(report) => shell.complain(&report),
         }
-    };
-    shell.say(&format!("{}: {} nodes, a tick each {}", args.graph.display(), engine.order().count(), period(&engine)));
-    let mut summary = Summary::new(&engine);
-    let mut progress = Progress::new(args.duration.or_else(|| engine.end().map(seconds)));
-    let options = RunOptions { duration: args.duration, is_realtime: args.realtime };
-    let outcome = quietly(|| {
-        engine::run(&mut engine, &options, &mut |engine| {
-            summary.add(engine);
-            if let Some(recorder) = &mut recorder {
-                recorder.record(engine);
+    }
+
+    fn go(&self, plan: Plan, shell: &Shell) -> u8 {
+        let is_real = self.realtime || plan.is_live();
+        let mut engine = Engine::new(plan);
+        let mut recorder = match self.out.as_deref().map(|path| recorder(path, &engine, !is_real)).transpose() {
+            Ok(recorder) => recorder,
+            Err(message) => {
+                shell.error(message);
+                return NOT_LOADED;
             }
-            progress.show(seconds(engine.now()), engine.ticks());
-        })
-    });
-    progress.clear();
-    let written = recorder.map_or(Ok(0), Recorder::finish);
-    let outcome = match outcome {
-        Ok(outcome) => outcome,
-        Err(error) => {
-            shell.error(format_args!("cannot run: {error}"));
-            return FAULTED;
-        }
-    };
-    shell.say(&format!("\n{}", summary.render(&engine, &outcome)));
-    shell.say(&ending(&outcome));
-    let code = if let End::Fault(fault) = &outcome.end {
-        shell.error(format_args!("{fault}; every command went to zero"));
-        FAULTED
-    } else {
-        0
-    };
-    code.max(report_file(shell, args.out.as_deref(), written))
+        };
+        shell.say(&format!("{}: {} nodes, a tick each {}", self.title, engine.order().count(), period(&engine)));
+        let mut summary = Summary::new(&engine);
+        let mut progress = Progress::new(self.duration.or_else(|| engine.end().map(seconds)));
+        let options = RunOptions { duration: self.duration, is_realtime: self.realtime };
+        let outcome = quietly(|| {
+            engine::run(&mut engine, &options, &mut |engine| {
+                summary.add(engine);
+                if let Some(recorder) = &mut recorder {
+                    recorder.record(engine);
+                }
+                progress.show(seconds(engine.now()), engine.ticks());
+            })
+        });
+        progress.clear();
+        let written = recorder.map_or(Ok(0), Recorder::finish);
+        let outcome = match outcome {
+            Ok(outcome) => outcome,
+            Err(error) => {
+                shell.error(format_args!("cannot run: {error}"));
+                return FAULTED;
+            }
+        };
+        shell.say(&format!("\n{}", summary.render(&engine, &outcome)));
+        shell.say(&ending(&outcome));
+        let code = if let End::Fault(fault) = &outcome.end {
+            shell.error(format_args!("{fault}; every command went to zero"));
+            FAULTED
+        } else {
+            0
+        };
+        code.max(report_file(shell, self.out.as_deref(), written))
+    }
 }
 
 fn recorder(path: &Path, engine: &Engine, may_wait: bool) -> Result<Recorder, String> {
@@ -148,8 +175,11 @@ fn seconds(nanos: i64) -> f64 {
     nanos as f64 * 1e-9
 }
 
-/// A time with its unit, in seconds.
-fn duration(text: &str) -> Result<f64, String> {
+/// A time with its unit, in seconds: a parser for arguments.
+///
+/// # Errors
+/// What is wrong with it.
+pub fn duration(text: &str) -> Result<f64, String> {
     const UNITS: [(&str, f64); 4] = [("ms", 1e-3), ("min", 60.0), ("s", 1.0), ("h", 3600.0)];
     let found = UNITS.iter().find_map(|(unit, seconds)| Some((text.strip_suffix(unit)?, seconds)));
     let (number, seconds) = found.ok_or("give a time with its unit: 20s, 500ms, 2min, 1h")?;

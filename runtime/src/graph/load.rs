@@ -254,14 +254,14 @@ impl Loader {
         let is_line = !text.contains(['\n', '\r']);
         let quoted = text.split_once('=').filter(|_| is_line).map(|(key, value)| format!("{key}={value:?}"));
         for text in [Some(text.to_owned()), quoted].into_iter().flatten() {
-            let file = self.sources.add("--set", text, "");
+            let file = self.sources.add("command line", text, "");
             if let Ok(Value { item: Item::Table(table), .. }) = parse_table(file)
                 && is_one_assignment(&table, &file.text)
             {
                 return Some(table);
             }
         }
-        let file = self.sources.add("--set", text, "");
+        let file = self.sources.add("command line", text, "");
         let span = file.base..file.base + file.text.len();
         let diagnostic = Diagnostic::new(Code::Syntax, span, "this is not `key=value`");
         self.diagnostics.push(diagnostic.help("for example `--set nodes.pid.gains.x.kp=3`"));

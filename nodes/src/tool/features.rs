@@ -1,0 +1,224 @@
+//! `features`: the touch part over any recording, and the features of the contact as a table.
+//!
+//! It is a graph like any other, made from the command line: `--graph` prints it, to go on with.
+
+use std::fmt::Write;
+use std::path::{Path, PathBuf};
+use std::str::FromStr;
+
+use tactflow_runtime::cli::{Job, Shell, clap, duration};
+use tactflow_runtime::graph::Request;
+
+use crate::recordings::{self, Hints, Recording};
+
+/// The features of the contact in a recording: where it is, how strong, along which line
+#[derive(clap::Parser)]
+#[command(
+    name = "features",
+    after_help = "Every format of the device `recording` is read; `tactflow describe recording` lists them.
+
+Examples:
+  tactflow features press.csv -o features.csv
+  tactflow features plate.zip --pitch-mm 7.62,5.08 --for 2s
+  tactflow features pad.npy --pitch-mm 5,5 --rate-hz 250 --unit N --threshold 0.02 --min-area 6
+  tactflow features press.csv --graph > press.toml"
+)]
+pub(super) struct Features {
+    /// The recording, also zipped
+    recording: PathBuf,
+    /// Write a row a frame, as .csv or .ndjson
+    #[arg(short, long, value_name = "FILE")]
+    out: Option<PathBuf>,
+    /// Print the graph that finds the features, and run nothing
+    #[arg(long, conflicts_with = "out")]
+    graph: bool,
+    /// A tactel is touched above this [unit of the recording]; the file's own, or 5 % of its greatest value
+    #[arg(long, value_name = "VALUE", allow_hyphen_values = true, value_parser = finite)]
+    threshold: Option<f64>,
+    /// Least area of a contact [tactels]
+    #[arg(long, value_name = "TACTELS", default_value_t = 4, value_parser = clap::value_parser!(u32).range(1..))]
+    min_area: u32,
+    /// Least sum over a contact [unit of the recording]
+    #[arg(long, value_name = "VALUE", default_value_t = 0.0, value_parser = finite)]
+    min_force: f64,
+    /// Number of frames that pressure and orientation are averaged over
+    #[arg(long, value_name = "FRAMES", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..))]
+    window: u32,
+    #[command(flatten)]
+    hints: HintArgs,
+    /// Stop after this time of the recording: 20s, 500ms, 2min
+    #[arg(long = "for", value_name = "TIME", value_parser = duration)]
+    duration: Option<f64>,
+}
+
+/// What the file may leave open.
+#[derive(clap::Args)]
+struct HintArgs {
+    /// Name of the format, if it is not recognised
+    #[arg(long, value_name = "NAME")]
+    format: Option<String>,
+    /// Unit of the values, where the file does not say it: raw, N, kPa
+    #[arg(long, value_name = "UNIT")]
+    unit: Option<String>,
+    /// Distance of neighbours along x and y [mm], where the file does not say it: 5,5
+    #[arg(long, value_name = "X,Y", value_parser = pair::<f64>)]
+    pitch_mm: Option<[f64; 2]>,
+    /// Frames per second, where the file does not say it
+    #[arg(long, value_name = "HZ", value_parser = finite)]
+    rate_hz: Option<f64>,
+    /// Number of rows and columns, where the file does not say it: 16,16
+    #[arg(long, value_name = "ROWS,COLS", value_parser = pair::<u32>)]
+    size: Option<[u32; 2]>,
+}
+
+/// What counts as touched where a file does not say it: this part of its greatest value.
+const PART_OF_PEAK: f64 = 0.05;
+
+pub(super) fn features(args: Features, shell: &Shell) -> u8 {
+    let read = std::fs::read(&args.recording).ok().and_then(|bytes| args.hints.read(&bytes, &args.recording));
+    // What is wrong with it is told when the graph is checked: once, and at its place.
+    let threshold = read.as_ref().map_or(Threshold::given(0.0), |recording| args.threshold(recording));
+    let text = args.graph_text(&threshold);
+    if args.graph && read.is_some() {
+        shell.say(text.trim_end());
+        return 0;
+    }
+    if let Some(recording) = &read {
+        shell.say(&args.headline(recording, &threshold));
+    }
+    let request = Request { set: args.settings(), ..Request::text(text) };
+    let title = format!("features of {}", args.recording.display());
+    Job { request, title, duration: args.duration, realtime: false, out: args.out }.run(shell)
+}
+
+/// A threshold, and where it is from.
+struct Threshold {
+    value: f64,
+    from: String,
+}
+
+impl Threshold {
+    fn given(value: f64) -> Self {
+        Self { value, from: "as given".into() }
+    }
+}
+
+impl Features {
+    fn threshold(&self, recording: &Recording) -> Threshold {
+        if let Some(value) = self.threshold {
+            return Threshold::given(value);
+        }
+        if let Some(value) = recording.threshold {
+            return Threshold { value, from: "as the file says".into() };
+        }
+        let peak = recording.cells.iter().fold(0.0_f32, |peak, cell| peak.max(*cell));
+        let value = f64::from(peak) * PART_OF_PEAK;
+        let from = format!("{} % of the greatest value; --threshold sets another", PART_OF_PEAK * 100.0);
+        Threshold { value, from }
+    }
+
+    /// What was read, and what counts as a contact.
+    fn headline(&self, recording: &Recording, threshold: &Threshold) -> String {
+        let shape = &recording.shape;
+        let [x, y] = shape.pitch.map(|pitch| (pitch * 1e6).round() * 1e-3);
+        let seconds = recording.frames.last().map_or(0.0, |frame| frame.time as f64 * 1e-9);
+        format!(
+            "{}: {}, {} by {} tactels of {x} by {y} mm, {} frames in {seconds:.2} s, in {}\n\
+             contact: the largest region of at least {} tactels above {:.4} {} ({})",
+            self.recording.display(),
+            recording.format,
+            shape.rows,
+            shape.cols,
+            recording.frames.len(),
+            shape.unit,
+            self.min_area,
+            threshold.value,
+            shape.unit,
+            threshold.from,
+        )
+    }
+
+    /// The graph, without what the command line says of the recording.
+    fn graph_text(&self, threshold: &Threshold) -> String {
+        let Self { min_area, min_force, window, .. } = self;
+        let mut text = format!(
+            r#"# The features of the contact in a recording.
+[graph]
+clock = "pad"
+
+[roles]
+pad = "tactile_pad"
+
+[parts.touch]
+file = "builtin:parts/touch.toml"
+in.image = "pad.image"
+set.calibrate.dead = {{ from = "pad.dead" }}
+set.binarize.threshold = {:?}       # [unit of the recording], {}
+set.label = {{ min_area = {min_area}, min_force = {min_force:?} }}   # [tactels, unit of the recording]
+set.pressure.window = {window}
+set.orientation.window = {window}
+
+[bind]
+pad = "recording"
+
+[devices.recording]
+type = "recording"
+"#,
+            threshold.value, threshold.from
+        );
+        if self.graph {
+            for setting in self.settings() {
+                let setting = setting.strip_prefix(DEVICE).expect("they are all the device's");
+                // Writing to a string cannot fail.
+                let _ = writeln!(text, "{setting}");
+            }
+        }
+        text
+    }
+
+    /// What the command line says of the recording, as `--set` would: there its mistakes are shown.
+    fn settings(&self) -> Vec<String> {
+        let HintArgs { format, unit, pitch_mm, rate_hz, size } = &self.hints;
+        let word = |text: &str| toml::Value::from(text).to_string();
+        // A graph that is printed may be put anywhere.
+        let path = if self.graph { std::path::absolute(&self.recording).ok() } else { None };
+        let path = path.as_ref().unwrap_or(&self.recording).to_string_lossy();
+        let mut settings = vec![format!("{DEVICE}file = {}", word(&path))];
+        settings.extend(format.as_ref().map(|format| format!("{DEVICE}format = {}", word(format))));
+        settings.extend(unit.as_ref().map(|unit| format!("{DEVICE}unit = {}", word(unit))));
+        settings.extend(pitch_mm.as_ref().map(|pitch| format!("{DEVICE}pitch_mm = {pitch:?}")));
+        settings.extend(rate_hz.map(|rate| format!("{DEVICE}rate_hz = {rate:?}")));
+        settings.extend(size.as_ref().map(|size| format!("{DEVICE}size = {size:?}")));
+        settings
+    }
+}
+
+const DEVICE: &str = "devices.recording.";
+
+impl HintArgs {
+    /// The recording, if there is nothing wrong with it.
+    fn read(&self, bytes: &[u8], path: &Path) -> Option<Recording> {
+        let hints = Hints {
+            format: self.format.clone(),
+            unit: self.unit.as_ref().map(|unit| unit.parse().ok()).unwrap_or_default(),
+            pitch: self.pitch_mm.map(|pitch| pitch.map(|mm| mm * 1e-3)),
+            rate_hz: self.rate_hz,
+            size: self.size.map(|size| size.map(|count| count as usize)),
+        };
+        recordings::read(bytes, &path.to_string_lossy(), &hints).ok()
+    }
+}
+
+/// Two of a kind with a comma between them.
+fn pair<T: FromStr>(text: &str) -> Result<[T; 2], String> {
+    let read = |text: &str| text.trim().parse().map_err(|_| format!("`{text}` is not a number"));
+    let (first, second) = text.split_once(',').ok_or("expected two numbers with a comma between them")?;
+    Ok([read(first)?, read(second)?])
+}
+
+fn finite(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(number) if number.is_finite() => Ok(number),
+        _ => Err("expected a number".into()),
+    }
+}

@@ -1,0 +1,56 @@
+//! `features`: any recording as a table of features, from the command line alone.
+
+use std::fs;
+
+use crate::tool::{peer, said, say, tool};
+
+const PRESS: &str = "graphs/recordings/pressuRe/iscan_test.csv";
+
+#[test]
+fn a_recording_becomes_a_table_a_row_a_frame() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("features.csv");
+    let path = path.to_str().unwrap();
+    let said = say(&["features", PRESS, "-o", path]);
+    assert_eq!((said.code, said.err.as_str()), (0, ""));
+    let [read, contact] = [0, 1].map(|line| said.out.lines().nth(line).unwrap());
+    assert!(read.contains("28 by 28 tactels of 1.27 by 1.27 mm, 309 frames in 31.10 s, in raw"), "{read}");
+    assert!(contact.ends_with("at least 4 tactels above 3.0000 raw (as the file says)"), "{contact}");
+    assert!(peer("rows.py", &[path]).starts_with("309 rows, "));
+    let table = fs::read_to_string(path).unwrap();
+    let mut rows = table.lines().filter(|line| !line.starts_with('#'));
+    let at = rows.next().unwrap().split(',').position(|name| name == "touch.source.sum").unwrap();
+    let sums: Vec<f64> = rows.map(|row| row.split(',').nth(at).unwrap().parse().unwrap()).collect();
+    let recorded = fs::read_to_string(tactflow_tests::workspace().join(PRESS)).unwrap();
+    let vendor: Vec<f64> = recorded.lines().filter_map(|line| line.split("Raw Sum=,,").nth(1)?.parse().ok()).collect();
+    assert_eq!(sums, vendor, "the sum of each frame is the vendor's");
+}
+
+#[test]
+fn the_graph_behind_it_checks_from_any_folder() {
+    let graph = say(&["features", PRESS, "--graph", "--threshold", "5", "--min-area", "6"]);
+    assert_eq!((graph.code, graph.err.as_str()), (0, ""));
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("press.toml"), &graph.out).unwrap();
+    let run = said(tool(&["run", "press.toml", "--for", "2s"]).current_dir(folder.path()));
+    assert_eq!((run.code, run.err.as_str()), (0, ""), "{}", graph.out);
+    assert!(graph.out.contains("set.binarize.threshold = 5.0 "), "{}", graph.out);
+}
+
+#[test]
+fn what_is_wrong_is_told_once_with_a_way_out() {
+    let cases: [(&[&str], &str); 6] = [
+        (&["features", "nowhere.csv"], "cannot read `nowhere.csv`: No such file"),
+        (&["features", "Cargo.toml"], "`Cargo.toml` is no recording of a known format: it begins with `[workspace]`"),
+        (&["features", PRESS, "--pitch-mm", "5"], "expected two numbers with a comma between them"),
+        (&["features", PRESS, "--pitch-mm", "5,5"], "the file says otherwise: [1.27, 1.27] mm"),
+        (&["features", PRESS, "--unit", "pounds"], "`pounds` is not a unit"),
+        (&["features", PRESS, "--threshold", "nan"], "expected a number"),
+    ];
+    for (args, message) in cases {
+        let said = say(args);
+        assert_eq!(said.code, 2, "{args:?}");
+        assert_eq!(said.err.lines().filter(|line| line.starts_with("error")).count(), 1, "{}", said.err);
+        assert!(said.err.contains(message), "{args:?}: {}", said.err);
+    }
+}
