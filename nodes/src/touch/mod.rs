@@ -2,11 +2,52 @@
 //!
 //! A pad's image passes [`tactile_source`] (the sensor's frame) → [`calibrate`] → [`binarize`] → [`label`] (which
 //! tactels are the contact) → [`moments`] (where it is, how strong, along which line) → [`smooth`].
+//!
+//! Beside them: [`select_region`] takes other regions than the contact; [`hough`], [`eccentricity`], [`principal_axes`]
+//! and [`contact_area`] say more of a region's shape; [`one_pole`] and [`median`] are other filters.
+
+/// Declares a parameter that is one of a few words.
+macro_rules! words {
+    ($(#[$doc:meta])* $Name:ident {
+        $(#[$first_doc:meta])* $First:ident = $first:literal,
+        $($(#[$other_doc:meta])* $Other:ident = $other:literal),* $(,)?
+    }) => {
+        $(#[$doc])*
+        #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+        pub enum $Name { $(#[$first_doc])* $First, $($(#[$other_doc])* $Other),* }
+
+        impl tactflow_runtime::node::Param for $Name {
+            const EXPECTS: &'static str = concat!("one of `", $first, "`" $(, ", `", $other, "`")*);
+
+            fn read(
+                value: &tactflow_runtime::node::Value,
+                reader: &mut tactflow_runtime::node::Reader<'_>,
+            ) -> Option<Self> {
+                let word: String = tactflow_runtime::node::read_leaf(value, reader, Self::EXPECTS)?;
+                match word.as_str() {
+                    $first => Some(Self::$First),
+                    $($other => Some(Self::$Other),)*
+                    _ => {
+                        reader.wrong_type(value, Self::EXPECTS);
+                        None
+                    }
+                }
+            }
+        }
+    };
+}
 
 pub mod binarize;
 pub mod calibrate;
+pub mod contact_area;
+pub mod eccentricity;
+pub mod hough;
 pub mod label;
+pub mod median;
 pub mod moments;
+pub mod one_pole;
+pub mod principal_axes;
+pub mod select_region;
 pub mod smooth;
 pub mod tactile_source;
 
@@ -14,6 +55,9 @@ use std::f64::consts::FRAC_PI_2;
 
 use tactflow_runtime::node::{Mistake, Mistakes};
 use tactflow_runtime::signal::{Grid, ImageShape};
+
+/// Mean length of the unit vectors of doubled axes below which the axes cancel each other [1].
+const LEAST_RESULTANT: f64 = 1e-6;
 
 /// Refuses a mask that does not lie on the array of the image; `input` is the wire that brings the mask.
 fn on_one_array(image: &ImageShape, input: &str, mask: &Grid) -> Result<(), Mistakes> {
