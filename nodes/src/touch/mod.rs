@@ -77,6 +77,17 @@ pub fn axis(sine: f64, cosine: f64) -> f64 {
     if angle > -FRAC_PI_2 { angle } else { FRAC_PI_2 }
 }
 
+/// An axis as the unit vector of its double, cosine and sine, which can be averaged: 89 and -89 degrees are neighbours.
+fn doubled(angle: f64) -> [f64; 2] {
+    let (sine, cosine) = libm::sincos(2.0 * angle);
+    [cosine, sine]
+}
+
+/// The axis whose double is the direction of a mean of such vectors; none if they cancel each other.
+fn halved([cosine, sine]: [f64; 2]) -> Option<f64> {
+    ((cosine * cosine + sine * sine).sqrt() >= LEAST_RESULTANT).then(|| axis(sine, cosine))
+}
+
 /// Numbers in [0, 1) that are the same in every run.
 #[cfg(test)]
 fn uniform(mut seed: u64) -> impl FnMut() -> f64 {

@@ -145,7 +145,8 @@ fn rule(params: &Params) -> Result<Rule, Mistakes> {
         (Method::Fixed, Some(stay)) => {
             if stay >= enter && mistakes.is_empty() {
                 let message = "`release` is not lower than `threshold`";
-                let help = "a tactel enters above `threshold` and stays above `release`; leave it out for one threshold";
+                let help =
+                    "a tactel enters above `threshold` and stays above `release`; leave it out for one threshold";
                 mistakes.push(Mistake::param("release", message).help(help));
             }
             Rule::Hysteresis { enter, stay }

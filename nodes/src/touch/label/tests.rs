@@ -64,12 +64,8 @@ fn the_contact_is_the_first_of_the_largest_that_are_enough() {
 #[test]
 fn a_run_goes_on_over_the_border_of_two_words_but_not_into_the_next_row() {
     // the tactels of two rows of 130, and how many runs they make
-    let cases: [(&[(usize, usize)], usize); 4] = [
-        (&[(0, 63), (1, 64)], 2),
-        (&[(0, 63), (0, 64)], 1),
-        (&[(0, 127), (1, 128)], 2),
-        (&[(0, 127), (0, 129)], 2),
-    ];
+    let cases: [(&[(usize, usize)], usize); 4] =
+        [(&[(0, 63), (1, 64)], 2), (&[(0, 63), (0, 64)], 1), (&[(0, 127), (1, 128)], 2), (&[(0, 127), (0, 129)], 2)];
     for (tactels, runs) in cases {
         let mut mask = Mask::empty(2, 130);
         tactels.iter().for_each(|(i, j)| mask.insert(*i, *j));
@@ -82,11 +78,18 @@ fn a_run_goes_on_over_the_border_of_two_words_but_not_into_the_next_row() {
 
 #[test]
 fn what_is_refused() {
-    for bad in ["choose = \"smallest\"", "choose = 1", "neighbours = 6", "min_area = 0", "min_area = -1", "min_force = \"1\"", "neighbors = 4"] {
+    for bad in [
+        "choose = \"smallest\"",
+        "choose = 1",
+        "neighbours = 6",
+        "min_area = 0",
+        "min_area = -1",
+        "min_force = \"1\"",
+        "neighbors = 4",
+    ] {
         assert!(rig(bad, 4, 4).is_err(), "{bad}");
     }
-    for (rows, cols, fits) in
-        [(256, 63, true), (1, 65535, true), (65535, 1, true), (65535, 2, true), (255, 513, true)]
+    for (rows, cols, fits) in [(256, 63, true), (1, 65535, true), (65535, 1, true), (65535, 2, true), (255, 513, true)]
     {
         assert_eq!(rig("", rows, cols).is_ok(), fits, "{rows} by {cols}");
     }
