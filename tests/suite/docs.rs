@@ -61,7 +61,7 @@ fn shipped(name: &str) -> PathBuf {
 fn the_walkthrough_shows_the_node_as_it_is() {
     let page = page("writing-a-node.md");
     let shown = blocks(&page, "rust").concat();
-    let real = file("tests/src/nodes/one_pole.rs");
+    let real = file("tests/src/nodes/low_pass.rs");
     for (i, (shown, real)) in shown.lines().zip(real.lines()).enumerate() {
         assert_eq!(shown, real, "line {} of the file", i + 1);
     }

@@ -2,11 +2,52 @@
 //!
 //! A pad's image passes [`tactile_source`] (the sensor's frame) → [`calibrate`] → [`binarize`] → [`label`] (which
 //! tactels are the contact) → [`moments`] (where it is, how strong, along which line) → [`smooth`].
+//!
+//! Beside them: [`select_region`] takes other regions than the contact; [`hough`], [`eccentricity`], [`principal_axes`]
+//! and [`contact_area`] say more of a region's shape; [`one_pole`] and [`median`] are other filters.
+
+/// Declares a parameter that is one of a few words.
+macro_rules! words {
+    ($(#[$doc:meta])* $Name:ident {
+        $(#[$first_doc:meta])* $First:ident = $first:literal,
+        $($(#[$other_doc:meta])* $Other:ident = $other:literal),* $(,)?
+    }) => {
+        $(#[$doc])*
+        #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+        pub enum $Name { $(#[$first_doc])* $First, $($(#[$other_doc])* $Other),* }
+
+        impl tactflow_runtime::node::Param for $Name {
+            const EXPECTS: &'static str = concat!("one of `", $first, "`" $(, ", `", $other, "`")*);
+
+            fn read(
+                value: &tactflow_runtime::node::Value,
+                reader: &mut tactflow_runtime::node::Reader<'_>,
+            ) -> Option<Self> {
+                let word: String = tactflow_runtime::node::read_leaf(value, reader, Self::EXPECTS)?;
+                match word.as_str() {
+                    $first => Some(Self::$First),
+                    $($other => Some(Self::$Other),)*
+                    _ => {
+                        reader.wrong_type(value, Self::EXPECTS);
+                        None
+                    }
+                }
+            }
+        }
+    };
+}
 
 pub mod binarize;
 pub mod calibrate;
+pub mod contact_area;
+pub mod eccentricity;
+pub mod hough;
 pub mod label;
+pub mod median;
 pub mod moments;
+pub mod one_pole;
+pub mod principal_axes;
+pub mod select_region;
 pub mod smooth;
 pub mod tactile_source;
 
@@ -14,6 +55,9 @@ use std::f64::consts::FRAC_PI_2;
 
 use tactflow_runtime::node::{Mistake, Mistakes};
 use tactflow_runtime::signal::{Grid, ImageShape};
+
+/// Mean length of the unit vectors of doubled axes below which the axes cancel each other [1].
+const LEAST_RESULTANT: f64 = 1e-6;
 
 /// Refuses a mask that does not lie on the array of the image; `input` is the wire that brings the mask.
 fn on_one_array(image: &ImageShape, input: &str, mask: &Grid) -> Result<(), Mistakes> {
@@ -31,6 +75,17 @@ pub fn axis(sine: f64, cosine: f64) -> f64 {
     let angle = 0.5 * libm::atan2(sine, cosine);
     // A sine of -0, or one too small to count, would give the other name of the same axis.
     if angle > -FRAC_PI_2 { angle } else { FRAC_PI_2 }
+}
+
+/// An axis as the unit vector of its double, cosine and sine, which can be averaged: 89 and -89 degrees are neighbours.
+fn doubled(angle: f64) -> [f64; 2] {
+    let (sine, cosine) = libm::sincos(2.0 * angle);
+    [cosine, sine]
+}
+
+/// The axis whose double is the direction of a mean of such vectors; none if they cancel each other.
+fn halved([cosine, sine]: [f64; 2]) -> Option<f64> {
+    ((cosine * cosine + sine * sine).sqrt() >= LEAST_RESULTANT).then(|| axis(sine, cosine))
 }
 
 /// Numbers in [0, 1) that are the same in every run.

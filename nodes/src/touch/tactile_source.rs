@@ -46,7 +46,21 @@ impl Node for TactileSource {
     type State = ();
 
     const NAME: &'static str = "tactile_source";
-    const SUMMARY: &'static str = "a pad's image in the sensor's frame, with its sum and its peak";
+    const SUMMARY: &'static str = "take a pad's image into the sensor's frame, with its sum and its peak";
+    const DOC: &'static str = "The first node behind a pad. Everything after it counts rows along the sensor's +y and \
+        columns along its +x, from the middle of the pad, with z out of the pad toward the object. Devices count \
+        otherwise: `transpose` exchanges rows and columns, then `flip_x` and `flip_y` reverse the columns and the rows. \
+        Try it: press the corner toward +x and +y; `x` and `y` of `moments` must both be positive.\n\n\
+        `sum` and `peak` read every tactel and not a chosen region, so that a second contact, or one that is too small to \
+        count, is seen too: force ceilings hang on them. The sum is exact for whole counts, and has the same bits on every \
+        machine.\n\n\
+        All outputs are absent while the pad gives nothing. A frame that the pad repeats is not new.";
+    const EXAMPLE: &'static str = r#"
+[nodes.source]
+type = "tactile_source"
+in.image = "pad.image"
+flip_y = false                      # set it where the device's first row is the one toward +y
+"#;
 
     fn new(params: Params, setup: &mut Setup<Self>) -> Result<Self, Mistakes> {
         let image = &setup.inputs.image;

@@ -11,6 +11,8 @@ pub enum Base {
     One,
     /// Metre.
     Metre,
+    /// Square metre.
+    SquareMetre,
     /// Radian.
     Radian,
     /// Radian of an axis without a direction: 0 and pi are the same line.
@@ -25,9 +27,10 @@ pub enum Base {
     Tactel,
 }
 
-const NAMES: [(Base, &str); 8] = [
+const NAMES: [(Base, &str); 9] = [
     (Base::One, "1"),
     (Base::Metre, "m"),
+    (Base::SquareMetre, "m2"),
     (Base::Radian, "rad"),
     (Base::Axial, "rad mod pi"),
     (Base::Newton, "N"),
@@ -52,6 +55,8 @@ impl Unit {
     pub const ONE: Self = Self::of(Base::One);
     /// Metre.
     pub const METRE: Self = Self::of(Base::Metre);
+    /// Square metre.
+    pub const SQUARE_METRE: Self = Self::of(Base::SquareMetre);
     /// Radian.
     pub const RADIAN: Self = Self::of(Base::Radian);
     /// Radian of a line's direction, modulo pi.

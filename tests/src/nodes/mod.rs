@@ -3,7 +3,7 @@
 pub mod breaks;
 pub mod count;
 pub mod line_length;
-pub mod one_pole;
+pub mod low_pass;
 pub mod pair;
 pub mod plus;
 pub mod unit_delay;
@@ -22,7 +22,7 @@ pub fn catalogue() -> Catalogue {
         .device::<line_length::LineLength>()
         .node::<breaks::Breaks>()
         .node::<count::Count>()
-        .node::<one_pole::OnePole>()
+        .node::<low_pass::LowPass>()
         .node::<pair::Pair>()
         .node::<plus::Plus>()
         .node::<unit_delay::UnitDelay>()

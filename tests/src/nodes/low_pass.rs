@@ -1,4 +1,4 @@
-//! `one_pole`: a low-pass filter of the first order, T dy/dt = x - y.
+//! `low_pass`: a low-pass filter of the first order, T dy/dt = x - y.
 //!
 //! Each sample is one implicit Euler step, y += dt / (T + dt) (x - y): no step overshoots, however late a sample comes.
 //! dt is the time between two samples, so T means the same at 100 Hz and at 1 kHz. The first sample passes as it is.
@@ -31,17 +31,17 @@ state! {
 }
 
 /// The filter's time.
-pub struct OnePole {
+pub struct LowPass {
     time: f64,
 }
 
-impl Node for OnePole {
+impl Node for LowPass {
     type Params = Params;
     type Inputs<'a> = Inputs<'a>;
     type Outputs = Outputs;
     type State = State;
 
-    const NAME: &'static str = "one_pole";
+    const NAME: &'static str = "low_pass";
     const SUMMARY: &'static str = "a low-pass filter of the first order";
 
     fn new(params: Params, setup: &mut Setup<Self>) -> Result<Self, Mistakes> {
@@ -85,7 +85,7 @@ mod tests {
     use super::*;
 
     fn rig(time: f64, unit: Unit) -> Result<NodeRig, Mistakes> {
-        NodeRig::new::<OnePole>(&format!("time = {time}"), &[("value", ScalarShape { unit }.into())])
+        NodeRig::new::<LowPass>(&format!("time = {time}"), &[("value", ScalarShape { unit }.into())])
     }
 
     /// What comes out of a sample, `ms` before the next.

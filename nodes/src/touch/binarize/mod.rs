@@ -1,0 +1,206 @@
+//! `binarize`: the tactels that are strictly greater than a threshold (paper section III).
+//!
+//! With a second threshold, `release`, a tactel enters above the one and stays above the other: |R| then does not
+//! flicker at the edge of a contact, and p = f / |R| does not jump with it. With `method = "otsu"` the threshold is the
+//! image's own (N. Otsu, "A threshold selection method from gray-level histograms", 1979), but never below the given one.
+
+mod otsu;
+
+use tactflow_runtime::node::{Mistake, Mistakes, Node, Setup, Tick};
+use tactflow_runtime::signal::Mask;
+use tactflow_runtime::{inputs, outputs, params, state};
+use wide::f32x8;
+
+pub use otsu::otsu;
+
+words! {
+    /// Where the threshold comes from.
+    Method {
+        /// It is `threshold`.
+        Fixed = "fixed",
+        /// The image's own, by Otsu's method.
+        Otsu = "otsu",
+    }
+}
+
+params! {
+    /// A tactel belongs to the mask if it is greater than this, compared at the image's 32 bits; with
+    /// `method = "otsu"` the least that the image's own threshold may be [unit of the image].
+    threshold: f64,
+    /// A tactel that is in the mask stays in it while it is greater than this, which is lower than `threshold`;
+    /// not given, there is only the one threshold [unit of the image].
+    release: Option<f64>,
+    /// Where the threshold comes from: "fixed" takes `threshold` as it is, "otsu" the image's own.
+    method: Method = Method::Fixed,
+}
+
+inputs! {
+    /// The image.
+    image: Image["U", "A"],
+}
+
+outputs! {
+    /// The tactels above the threshold.
+    mask: Mask["A"],
+}
+
+state! {
+    /// The words of the last mask; of use only to `release`.
+    last: Vec<u64>,
+}
+
+/// Tactels that are compared at once.
+const BLOCK: usize = 8;
+
+/// How tactels are chosen.
+#[derive(Debug, Clone, Copy)]
+enum Rule {
+    Above(f32),
+    Hysteresis { enter: f32, stay: f32 },
+    Otsu { least: f32 },
+}
+
+/// The rule, and the size of its memory.
+pub struct Binarize {
+    rule: Rule,
+    words: usize,
+}
+
+impl Node for Binarize {
+    type Params = Params;
+    type Inputs<'a> = Inputs<'a>;
+    type Outputs = Outputs;
+    type State = State;
+
+    const NAME: &'static str = "binarize";
+    const SUMMARY: &'static str = "find the tactels above a threshold: fixed, with hysteresis, or the image's own";
+    const DOC: &'static str = "A tactel belongs to the mask if its value is strictly greater than `threshold` (paper \
+        section III). The threshold itself is not above it.\n\n\
+        **Two thresholds.** At the edge of a contact a tactel near the threshold comes and goes with the noise, so that \
+        |R| flickers and p = f / |R| (eq. 2) jumps with it. Give `release`, lower than `threshold`: a tactel enters above \
+        `threshold` and stays while it is above `release`. It remembers the last mask; the memory is lost when the \
+        image has been away for `reset_after_ms`. A gap of four times a tactel's noise takes \
+        the changes of |R| at the rim of a still contact from 9 frames in 10 to 1 in 7.\n\n\
+        **The image's own threshold.** `method = \"otsu\"` splits the values of each image into the two classes whose \
+        means are farthest apart (greatest variance between them, N. Otsu 1979), over 256 steps from the least to \
+        the greatest tactel. It is for pads without a calibration, and for contacts that stand out clearly. \
+        `threshold` is then the least that it may become, so that noise on an empty pad is no contact: an image \
+        without a tactel above `threshold` gives an empty mask, and one whose tactels are all equal is compared with \
+        `threshold` alone. It cuts off the weak rim of a contact, and follows the strength of the contact: \
+        |R| and p mean less than with a fixed threshold.\n\n\
+        `release` and `method = \"otsu\"` exclude each other: a threshold that moves from image to image has no second \
+        one below it.";
+    const EXAMPLE: &'static str = r#"
+[nodes.binarize]
+type = "binarize"
+in.image = "calibrate.image"
+threshold = 0.015                   # a tactel enters above this [N]
+release = 0.010                     # and stays above this [N]
+"#;
+
+    fn new(params: Params, setup: &mut Setup<Self>) -> Result<Self, Mistakes> {
+        setup.outputs.mask = (&setup.inputs.image).into();
+        let grid = &setup.outputs.mask;
+        Ok(Self { rule: rule(&params)?, words: grid.rows * grid.cols.div_ceil(64) })
+    }
+
+    fn state(&self) -> State {
+        State { last: vec![0; self.words] }
+    }
+
+    fn step(&self, _: &Tick, inputs: Inputs<'_>, out: &mut Outputs, state: &mut State) {
+        let (cells, mask) = (inputs.image.cells(), out.mask.write());
+        match self.rule {
+            Rule::Above(threshold) => binarize(cells, threshold, mask),
+            Rule::Hysteresis { enter, stay } => {
+                for_each_word(cells, mask, |at, tactels| {
+                    let word = pack(tactels, enter) | pack(tactels, stay) & state.last[at];
+                    state.last[at] = word;
+                    word
+                });
+            }
+            Rule::Otsu { least } => {
+                let threshold = otsu(cells).map_or(least, |threshold| threshold.max(least));
+                binarize(cells, threshold, mask);
+            }
+        }
+    }
+}
+
+/// The rule that the parameters ask for.
+fn rule(params: &Params) -> Result<Rule, Mistakes> {
+    let mut mistakes = Mistakes::new();
+    let mut narrow = |name: &str, number: f64| {
+        if !(number as f32).is_finite() {
+            let message = format!("{number:e} is too large for a tactel: images are of 32-bit floats");
+            mistakes.push(Mistake::param(name, message));
+        }
+        number as f32
+    };
+    let enter = narrow("threshold", params.threshold);
+    let stay = params.release.map(|release| narrow("release", release));
+    let rule = match (params.method, stay) {
+        (Method::Fixed, None) => Rule::Above(enter),
+        (Method::Otsu, None) => Rule::Otsu { least: enter },
+        (Method::Fixed, Some(stay)) => {
+            if stay >= enter && mistakes.is_empty() {
+                let message = "`release` is not lower than `threshold`";
+                let help =
+                    "a tactel enters above `threshold` and stays above `release`; leave it out for one threshold";
+                mistakes.push(Mistake::param("release", message).help(help));
+            }
+            Rule::Hysteresis { enter, stay }
+        }
+        (Method::Otsu, Some(_)) => {
+            let message = "`release` means nothing with `method = \"otsu\"`: that threshold moves from image to image";
+            mistakes.push(Mistake::key("release", message).help("leave one of the two out"));
+            Rule::Above(enter)
+        }
+    };
+    if mistakes.is_empty() { Ok(rule) } else { Err(mistakes) }
+}
+
+/// Makes the mask the cells above the threshold.
+pub fn binarize(cells: &[f32], threshold: f32, mask: &mut Mask) {
+    for_each_word(cells, mask, |_, tactels| pack(tactels, threshold));
+}
+
+/// Makes each word of the mask what `pack` makes of its number and its at most 64 tactels.
+#[inline]
+fn for_each_word(cells: &[f32], mask: &mut Mask, mut pack: impl FnMut(usize, &[f32]) -> u64) {
+    // An array without columns has no words either.
+    let (cols, stride) = (mask.cols().max(1), mask.stride().max(1));
+    let rows = cells.chunks_exact(cols);
+    let mut at = 0;
+    for (words, row) in mask.words_mut().chunks_exact_mut(stride).zip(rows) {
+        for (word, tactels) in words.iter_mut().zip(row.chunks(64)) {
+            *word = pack(at, tactels);
+            at += 1;
+        }
+    }
+}
+
+/// Bit j tells whether tactel j of at most 64 is above the threshold.
+fn pack(tactels: &[f32], threshold: f32) -> u64 {
+    let (blocks, rest) = tactels.as_chunks::<BLOCK>();
+    let mut word = 0;
+    for (k, block) in blocks.iter().enumerate() {
+        word |= pack_block(block, threshold) << (BLOCK * k);
+    }
+    if rest.is_empty() {
+        return word;
+    }
+    // The last block laps over the one before: its bits there are the same.
+    match tactels.last_chunk::<BLOCK>() {
+        Some(block) => word | pack_block(block, threshold) << (tactels.len() - BLOCK),
+        None => rest.iter().rev().fold(0, |word, value| word << 1 | u64::from(*value > threshold)),
+    }
+}
+
+/// Compares all lanes at once and gathers their signs.
+fn pack_block(block: &[f32; BLOCK], threshold: f32) -> u64 {
+    u64::from(f32x8::new(*block).simd_gt(f32x8::splat(threshold)).to_bitmask())
+}
+
+#[cfg(test)]
+mod tests;

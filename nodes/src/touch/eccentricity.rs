@@ -1,0 +1,166 @@
+//! `eccentricity`: how long a contact is: sqrt(1 - b² / a²) of the ellipse with the same second moments.
+//!
+//! a² and b² are the greatest and the least variance of the region's tactels, counted as points, each with its weight.
+
+use tactflow_runtime::node::{Mistakes, Node, Setup, Tick};
+use tactflow_runtime::signal::ImageShape;
+use tactflow_runtime::{inputs, outputs, params};
+
+use super::moments::{Weighing, Weight, ellipse};
+use super::on_one_array;
+
+params! {
+    /// What a tactel counts: its "force", its "excess" above `threshold`, or the same as all others ("area").
+    weight: Weight = Weight::Force,
+    /// Where the excess begins, for `weight = "excess"`: that of the `binarize` [unit of the image].
+    threshold: Option<f64>,
+}
+
+inputs! {
+    /// The image that forces are taken from.
+    image: Image["U", "A"],
+    /// The tactels of the contact, R.
+    region: Mask["A"],
+}
+
+outputs! {
+    /// From 0 for a circle to 1 for a line [1]; absent for a region without extent, a single tactel say.
+    eccentricity: Scalar["1", "A"],
+}
+
+/// The array, and the weight.
+pub struct Eccentricity {
+    shape: ImageShape,
+    weighing: Weighing,
+}
+
+impl Node for Eccentricity {
+    type Params = Params;
+    type Inputs<'a> = Inputs<'a>;
+    type Outputs = Outputs;
+    type State = ();
+
+    const NAME: &'static str = "eccentricity";
+    const SUMMARY: &'static str = "tell a round contact from a long one: the eccentricity of its ellipse";
+    const DOC: &'static str = "The ellipse with the same second central moments as the region has the half axes a and \
+        b, up to a common factor; this is sqrt(1 - b² / a²): 0 for a circle or a square, 0.87 when it is twice as long \
+        as wide, 0.98 at five times, 1 for a single row of tactels.\n\n\
+        It grows steeply for shapes that are almost round, so a round patch with noise shows 0.2 to 0.4. The \
+        `anisotropy` of `moments`, A, is flat there and says the same: the eccentricity is sqrt(2 A / (1 + A)). \
+        `principal_axes` gives a and b in metres.\n\n\
+        Tactels count as points, each with its `weight` as in `moments`. A region without extent, a single tactel, has \
+        none: the output is absent.";
+    const EXAMPLE: &'static str = r#"
+[nodes.eccentricity]
+type = "eccentricity"
+in.image = "calibrate.image"
+in.region = "label.region"
+"#;
+
+    fn new(params: Params, setup: &mut Setup<Self>) -> Result<Self, Mistakes> {
+        let shape = setup.inputs.image.clone();
+        on_one_array(&shape, "region", &setup.inputs.region)?;
+        Ok(Self { shape, weighing: Weighing::new(params.weight, params.threshold)? })
+    }
+
+    fn state(&self) {}
+
+    fn step(&self, _: &Tick, inputs: Inputs<'_>, out: &mut Outputs, (): &mut ()) {
+        let sums = self.weighing.add_up(&inputs.image, &inputs.region);
+        if sums.force > 0.0 {
+            let [long, short] = ellipse(&sums, self.shape.pitch).variances();
+            if long > 0.0 {
+                out.eccentricity.set((1.0 - short / long).sqrt());
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use tactflow_runtime::harness::NodeRig;
+    use tactflow_runtime::node::At;
+    use tactflow_runtime::signal::{Grid, Image, Mask, Scalar, Unit};
+
+    use super::super::moments::Moments;
+    use super::super::uniform;
+    use super::*;
+
+    fn rig<N: Node>(params: &str) -> Result<NodeRig, Mistakes> {
+        let image = ImageShape { rows: 20, cols: 24, pitch: [0.005, 0.004], unit: Unit::NEWTON };
+        NodeRig::new::<N>(params, &[("region", Grid::from(&image).into()), ("image", image.into())])
+    }
+
+    /// Shows an image, what is above zero as the region, and reads an output.
+    fn show(rig: &mut NodeRig, value: &dyn Fn(usize, usize) -> f64, output: &str) -> Option<f64> {
+        let (mut image, mut region) = (Image::zeros(20, 24), Mask::empty(20, 24));
+        for (i, j) in (0..20).flat_map(|i| (0..24).map(move |j| (i, j))).filter(|(i, j)| value(*i, *j) > 0.0) {
+            image.cells_mut()[i * 24 + j] = value(i, j) as f32;
+            region.insert(i, j);
+        }
+        rig.set("image", image);
+        rig.set("region", region);
+        rig.step();
+        rig.get::<Scalar>(output).copied()
+    }
+
+    #[test]
+    fn shapes_in_closed_form() {
+        let patch = |rows: usize, cols: usize| {
+            move |i: usize, j: usize| if (3..3 + rows).contains(&i) && (2..2 + cols).contains(&j) { 2.0 } else { 0.0 }
+        };
+        // An ellipse of half axes a and b [m] about the middle, with its values cut at 10 standard deviations.
+        let print = |a: f64, b: f64| {
+            move |i: usize, j: usize| {
+                let (x, y) = ((j as f64 - 11.5) * 0.005 / a, (i as f64 - 9.5) * 0.004 / b);
+                libm::exp(-0.5 * (x * x + y * y))
+            }
+        };
+        let even = |rows: f64, cols: f64| {
+            let (x, y) = ((cols * cols - 1.0) * 0.005 * 0.005, (rows * rows - 1.0) * 0.004 * 0.004);
+            (1.0 - x.min(y) / x.max(y)).sqrt()
+        };
+        type Value = Box<dyn Fn(usize, usize) -> f64>;
+        let cases: [(&str, Value, Option<f64>); 7] = [
+            ("nothing", Box::new(patch(0, 0)), None),
+            ("a tactel", Box::new(patch(1, 1)), None),
+            ("a row", Box::new(patch(1, 7)), Some(1.0)),
+            ("a column", Box::new(patch(7, 1)), Some(1.0)),
+            ("a patch", Box::new(patch(3, 7)), Some(even(3.0, 7.0))),
+            ("a round print", Box::new(print(0.008, 0.008)), Some(0.0)),
+            ("a long print", Box::new(print(0.012, 0.006)), Some(0.75_f64.sqrt())),
+        ];
+        for (what, value, expected) in cases {
+            let found = show(&mut rig::<Eccentricity>("").unwrap(), &value, "eccentricity");
+            let near = |(a, b): (f64, f64)| (a * a - b * b).abs() < 2e-2;
+            assert!(found.zip(expected).map_or(found == expected, near), "{what}: {found:?}, not {expected:?}");
+        }
+    }
+
+    #[test]
+    fn it_is_what_the_anisotropy_says_with_any_weight() {
+        let mut uniform = uniform(9);
+        for round in 0..60 {
+            let cells: Vec<f64> = (0..480).map(|_| uniform() - 0.7).collect();
+            for weight in ["", "weight = \"area\"", "weight = \"excess\"\nthreshold = 0.1"] {
+                let value = |i: usize, j: usize| cells[i * 24 + j];
+                let found = show(&mut rig::<Eccentricity>(weight).unwrap(), &value, "eccentricity").unwrap();
+                let a = show(&mut rig::<Moments>(weight).unwrap(), &value, "anisotropy").unwrap();
+                assert!((found * found - 2.0 * a / (1.0 + a)).abs() < 1e-12, "round {round}, {weight}");
+            }
+        }
+    }
+
+    #[test]
+    fn what_is_refused() {
+        let cases = [
+            ("weight = \"excess\"", At::Param("weight".into())),
+            ("threshold = 0.1", At::Key("threshold".into())),
+            ("weight = \"area\"\nthreshold = 0.1", At::Key("threshold".into())),
+        ];
+        for (params, at) in cases {
+            assert_eq!(rig::<Eccentricity>(params).err().unwrap()[0].at, at, "{params}");
+        }
+        assert!(rig::<Eccentricity>("weight = \"mass\"").is_err());
+    }
+}
