@@ -13,7 +13,7 @@
 //! | `Trigger<T>` | `Option<In<T>>` | new or lost | `None` |
 //! | `Option<T>` | `Option<In<T>>` | lost | `None` |
 //! | `Many<T>` | `Many<T>`, each named in the graph | any is new or lost | that one is `None` |
-//! | `Delayed<T>` | `Option<In<T>>` as the last tick left it | it was new or lost then | `None` |
+//! | `Delayed<T>` | `Option<In<T>>` as the last tick left it | it was new or lost then, where no other input wakes it | `None` |
 
 mod erased;
 mod macros;
