@@ -30,6 +30,7 @@
 pub mod arm;
 pub mod builtin;
 pub mod devices;
+pub mod recordings;
 pub mod roles;
 pub mod servo;
 pub mod touch;
@@ -43,8 +44,8 @@ pub fn catalogue() -> Catalogue {
         .files(builtin::FILES)
         .role(roles::tactile_pad())
         .role(roles::velocity_arm())
-        .device::<devices::tekscan::TekscanMovie>()
         .device::<devices::mock_pad::MockPad>()
+        .device::<devices::recording::Player>()
         .device::<devices::mock_arm::MockArm>()
         .node::<touch::tactile_source::TactileSource>()
         .node::<touch::calibrate::Calibrate>()

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use tactflow_nodes::devices::tekscan::{Movie, parse};
+use tactflow_nodes::recordings::{self, Hints, Recording};
 use tactflow_runtime::engine::Engine;
 use tactflow_runtime::graph::{Request, plan};
 use tactflow_runtime::signal::{Joints, Signal};
@@ -14,7 +14,7 @@ use crate::fused::Fused;
 pub(crate) struct Pair {
     pub(crate) engine: Engine,
     pub(crate) fused: Fused,
-    movie: Movie,
+    movie: Recording,
     /// Frames that both have seen.
     seen: usize,
     /// When contact and axis were there last [ticks].
@@ -22,8 +22,8 @@ pub(crate) struct Pair {
     axis: Option<usize>,
 }
 
-fn read(path: &Path) -> String {
-    std::fs::read_to_string(path).unwrap_or_else(|error| panic!("{}: {error}", path.display()))
+fn read(path: &Path) -> Vec<u8> {
+    std::fs::read(path).unwrap_or_else(|error| panic!("{}: {error}", path.display()))
 }
 
 fn joints(engine: &Engine, name: &str) -> [f64; 7] {
@@ -36,7 +36,8 @@ impl Pair {
         let graphs = workspace().join("graphs");
         let plan = plan(&catalogue(), &Request::file(graphs.join("finger_press.toml")));
         let engine = Engine::new(plan.unwrap_or_else(|report| panic!("{}", report.render(false))));
-        let movie = parse(&read(&graphs.join("recordings/pressuRe/iscan_test.csv"))).expect("the recording is sound");
+        let file = read(&graphs.join("recordings/pressuRe/iscan_test.csv"));
+        let movie = recordings::read(&file, "iscan_test.csv", &Hints::default()).expect("the recording is sound");
         let fused = Fused::new(movie.shape.clone(), &movie.dead, &graphs.join("robots/lwr4p.urdf"));
         Self { engine, fused, movie, seen: 0, contact: None, axis: None }
     }

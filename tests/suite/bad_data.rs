@@ -17,7 +17,7 @@ pad = "pad"
 arm = "arm"
 
 [devices.pad]
-type = "tekscan_movie"
+type = "recording"
 file = "pad.csv"
 
 [devices.arm]

@@ -2,7 +2,7 @@
 
 pub mod mock_arm;
 pub mod mock_pad;
-pub mod tekscan;
+pub mod recording;
 
 #[cfg(test)]
 mod testing;

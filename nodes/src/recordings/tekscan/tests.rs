@@ -1,11 +1,8 @@
-//! `tekscan_movie` against the shipped recording and damaged copies of it.
-
-use tactflow_runtime::signal::{Shape, Unit};
+//! The format of Tekscan against the shipped recording and damaged copies of it.
 
 use super::*;
-use crate::devices::testing::{Bench, open};
+use crate::recordings::testing::{check_damages, complaints, count_refused};
 
-const PATH: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../graphs/recordings/pressuRe/iscan_test.csv");
 const FINGER: &str = include_str!("../../../../graphs/recordings/pressuRe/iscan_test.csv");
 
 /// Two frames of 2 by 3 cells, the corner without a sensel.
@@ -32,18 +29,12 @@ B,0,0
 @@
 ";
 
-fn line_of(text: &str, at: usize) -> usize {
-    text[..at].matches('\n').count() + 1
+fn parse(text: &str) -> Result<Recording, Refusal> {
+    read(text.as_bytes(), &Hints::default())
 }
 
 fn flaws(bytes: &[u8]) -> Vec<(usize, String)> {
-    match read(bytes) {
-        Ok(_) => vec![],
-        Err(Refusal::Stranger) => vec![(0, "stranger".into())],
-        Err(Refusal::Damaged { text, flaws }) => {
-            flaws.into_iter().map(|flaw| (line_of(&text, flaw.span.start), flaw.message)).collect()
-        }
-    }
+    complaints(crate::recordings::read(bytes, "movie.csv", &Hints::default()))
 }
 
 #[test]
@@ -67,7 +58,8 @@ fn the_whole_recording_agrees_with_its_own_sums() {
 fn a_small_movie_in_any_dress() {
     let movie = parse(SMALL).unwrap();
     assert_eq!(movie.cells, [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 0.0, 0.0, 0.0, 0.0, 0.0, 7.0]);
-    assert_eq!(movie.frames, [Frame { number: 1, time: 0 }, Frame { number: 2, time: 100_000_000 }]);
+    let frames: Vec<_> = movie.frames.iter().map(|frame| (frame.number, frame.time, frame.start)).collect();
+    assert_eq!(frames, [(1, 0, 0), (2, 100_000_000, 6)]);
     assert_eq!((movie.dead.as_slice(), movie.shape.rows, movie.shape.cols), ([0].as_slice(), 2, 3));
     assert_eq!(movie.shape.pitch, [0.004, 0.0127], "x runs along the columns");
     let same = [
@@ -80,7 +72,7 @@ fn a_small_movie_in_any_dress() {
         SMALL.replace("SECONDS_PER_FRAME 0.1\n", ""),
     ];
     for text in same {
-        assert_eq!(read(text.as_bytes()).ok().as_ref(), Some(&movie), "{text}");
+        assert_eq!(parse(&text).as_ref(), Ok(&movie), "{text}");
     }
     let bare =
         parse(&SMALL.replace("NOISE_THRESHOLD 3\n", "").replace("UNITS raw", "UNITS kPa").replace("=,,15", "=,,9"));
@@ -147,14 +139,9 @@ fn damaged_files_say_what_and_where() {
         ("7\n@@\n", "7\n@@\nmore", 21, "something comes after the movie's end, `@@`"),
         ("DATA_TYPE", "FATA_TYPE", 0, "stranger"),
     ];
-    for (from, to, line, message) in cases {
-        assert!(SMALL.contains(from), "{from}");
-        let got = flaws(SMALL.replacen(from, to, 1).as_bytes());
-        assert_eq!(got, [(*line, (*message).to_owned())], "{from} -> {to}");
-    }
+    check_damages(SMALL, "movie.csv", &Hints::default(), cases);
     assert_eq!(flaws(b""), [(0, "stranger".into())]);
     assert_eq!(flaws(b"\x89PNG\r\n"), [(0, "stranger".into())]);
-    assert_eq!(flaws(b"DATA_TYPE MOVIE\nROWS \xff\xfe"), [(2, "this is not UTF-8 text".into())]);
     let several = flaws(SMALL.replace("ROWS 2\n", "").replace("UNITS raw", "UNITS x").as_bytes());
     assert_eq!(several.len(), 2, "every mistake of the header at once: {several:?}");
 }
@@ -164,75 +151,6 @@ fn no_damage_makes_it_panic() {
     let start = FINGER.find("\nFrame 4,").unwrap();
     let movie = format!("{}@@\n", &FINGER[..start]).replace("END_FRAME 309", "END_FRAME 3");
     assert_eq!(parse(&movie).unwrap().frames.len(), 3);
-    // The 64-bit splitmix generator (Steele et al. 2014), so that every run damages the same.
-    let mut seed = 2013u64;
-    let mut random = |below: usize| {
-        seed = seed.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mixed = (seed ^ (seed >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        let mixed = (mixed ^ (mixed >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((mixed ^ (mixed >> 31)) % below as u64) as usize
-    };
-    let mut refused = 0;
-    for round in 0..6000 {
-        let mut bytes = if round % 2 == 0 { SMALL.as_bytes().to_vec() } else { movie.as_bytes().to_vec() };
-        for _ in 0..=random(3) {
-            let (a, b) = (random(bytes.len()), random(bytes.len()));
-            match random(6) {
-                0 => bytes.truncate(a.max(1)),
-                1 => bytes.swap(a, b),
-                2 => bytes[a] ^= 1 << random(8),
-                3 => bytes[a] = random(256) as u8,
-                4 => drop(bytes.drain(a.min(b)..a.max(b).min(a.min(b) + 40))),
-                _ => bytes.insert(a, b"9-.,B\n\r@e"[random(9)]),
-            }
-            if bytes.is_empty() {
-                bytes.push(b'D');
-            }
-        }
-        match read(&bytes) {
-            Ok(movie) => assert_eq!(movie.cells.len(), movie.frames.len() * movie.shape.tactels()),
-            Err(Refusal::Stranger) => refused += 1,
-            Err(Refusal::Damaged { text, flaws }) => {
-                refused += 1;
-                assert!(!flaws.is_empty() && flaws.iter().all(|flaw| text.get(flaw.span.clone()).is_some()));
-            }
-        }
-    }
+    let refused = count_refused(&[SMALL.as_bytes(), movie.as_bytes()], "movie.csv", &Hints::default(), 6000);
     assert!(refused > 4000, "{refused} of 6000 were seen to be damaged");
-}
-
-#[test]
-fn frames_are_served_once_and_the_newest_wins() {
-    let mut bench = Bench::new(open::<TekscanMovie>(&format!("file = '{PATH}'")).unwrap());
-    let Shape::Image(shape) = &bench.fill().outputs[0] else { panic!("an image") };
-    assert_eq!((shape.rows, shape.cols), (28, 28));
-    assert_eq!(bench.fact("threshold"), Some(&3.0.into()));
-    assert_eq!(bench.fact("frames"), Some(&309.into()));
-    assert_eq!(bench.fact("dead").unwrap()[1], vec![0, 1].into());
-    let force = |bench: &mut Bench| {
-        let image: &mut Image = bench.samples.write(0, 0, 0);
-        let sum: f32 = image.cells().iter().sum();
-        image.cells_mut().fill(f32::NAN);
-        sum
-    };
-    assert_eq!(bench.device.next(), Some(0));
-    bench.exchange(0);
-    assert_eq!((force(&mut bench), bench.device.next()), (310.0, Some(100_000_000)));
-    bench.exchange(99_999_999);
-    assert!(force(&mut bench).is_nan(), "nothing is due");
-    bench.exchange(350_000_000);
-    assert_eq!((force(&mut bench), bench.device.next()), (309.0, Some(400_000_000)), "frame 4 and neither 2 nor 3");
-    bench.exchange(i64::MAX);
-    assert_eq!((force(&mut bench), bench.device.next()), (29.0, None));
-    bench.exchange(i64::MAX);
-    assert!(force(&mut bench).is_nan(), "the movie is over");
-}
-
-#[test]
-fn a_missing_file_and_another_file_are_mistakes_where_the_bench_names_them() {
-    for (path, message) in [("nowhere.csv", "cannot read"), (concat!(env!("CARGO_MANIFEST_DIR"), "/Cargo.toml"), "`")] {
-        let mistakes = open::<TekscanMovie>(&format!("file = '{path}'")).err().unwrap();
-        assert_eq!(mistakes[0].at, At::Span(7..9 + path.len()));
-        assert!(mistakes[0].message.starts_with(message), "{mistakes:?}");
-    }
 }

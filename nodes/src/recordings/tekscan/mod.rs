@@ -4,134 +4,38 @@
 //! a cell where there is no sensel. Anything else is refused at its place: a recording that was cut or edited by hand
 //! must not pass as data. Nothing is allocated from a number in the header before the file is seen to hold as much.
 
-use std::ops::Range;
+mod header;
 
 use tactflow_runtime::signal::{ImageShape, Unit};
 
-use super::header::{self, Header};
+use super::text::{self, Flaw, Lines, Piece, Wrong, flaw, shortened};
+use super::{Format, Frame, Hints, Recording, Refusal, Window};
+use header::Header;
 
-/// A movie.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Movie {
-    /// Size, pitch and unit of the frames.
-    pub shape: ImageShape,
-    /// The frames, in order.
-    pub frames: Vec<Frame>,
-    /// The values of all frames, one after the other; 0 where there is no sensel.
-    pub cells: Vec<f32>,
-    /// Index of each cell in a frame where there is no sensel.
-    pub dead: Vec<usize>,
-    /// Greatest value that the sensor's own filter takes for noise, in the unit of the cells.
-    pub threshold: Option<f64>,
-    /// Nominal time between two frames [s].
-    pub period: f64,
+pub(super) const FORMAT: Format = Format {
+    name: "tekscan",
+    title: "Tekscan ASCII movie (.csv, .asf)",
+    recognises: |head| head.text.trim_start().starts_with("DATA_TYPE "),
+    read,
+};
+
+fn read(bytes: &[u8], hints: &Hints) -> Result<Recording, Refusal> {
+    text::read(bytes, hints, parse)
 }
 
-/// One frame.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Frame {
-    /// Its number in the file.
-    pub number: u64,
-    /// Its time [ns].
-    pub time: i64,
-}
-
-/// What is wrong with a text, and where.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Flaw {
-    /// The place.
-    pub span: Range<usize>,
-    /// What is wrong.
-    pub message: String,
-}
-
-pub(super) fn flaw<T>(at: &Piece<'_>, message: impl Into<String>) -> Result<T, Flaw> {
-    Err(Flaw { span: at.span(), message: message.into() })
-}
-
-/// A piece of the text that knows its place.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Piece<'t> {
-    pub(super) text: &'t str,
-    pub(super) start: usize,
-}
-
-impl<'t> Piece<'t> {
-    pub(super) fn span(&self) -> Range<usize> {
-        self.start..self.start + self.text.len()
-    }
-
-    /// Without the blanks around it.
-    pub(super) fn trimmed(self) -> Self {
-        let start = self.start + self.text.len() - self.text.trim_start().len();
-        Self { text: self.text.trim(), start }
-    }
-
-    pub(super) fn split(self, at: char) -> impl Iterator<Item = Self> + Clone {
-        let offset = move |part: &str| part.as_ptr() as usize - self.text.as_ptr() as usize + self.start;
-        self.text.split(at).map(move |text| Self { text, start: offset(text) })
-    }
-
-    /// A finite number.
-    pub(super) fn number(self, what: &str) -> Result<f64, Flaw> {
-        match self.text.parse::<f64>() {
-            Ok(number) if number.is_finite() => Ok(number),
-            Ok(_) => flaw(&self, format!("{what} is not finite: `{}`", shortened(self.text))),
-            Err(_) => flaw(&self, format!("{what} is not a number: `{}`", shortened(self.text))),
-        }
-    }
-
-    /// A whole number.
-    pub(super) fn count(self, what: &str) -> Result<u64, Flaw> {
-        self.text.parse().or_else(|_| flaw(&self, format!("{what} is not a whole number: `{}`", shortened(self.text))))
-    }
-}
-
-/// The lines of a text, without their ends.
-pub(super) struct Lines<'t> {
-    text: &'t str,
-    next: usize,
-}
-
-impl<'t> Lines<'t> {
-    /// The place just past the last character.
-    fn end(&self) -> Piece<'t> {
-        let text = self.text.trim_end();
-        Piece { text: &text[text.len()..], start: text.len() }
-    }
-
-    fn is_at_end(&self) -> bool {
-        self.next >= self.text.len()
-    }
-}
-
-impl<'t> Iterator for Lines<'t> {
-    type Item = Piece<'t>;
-
-    fn next(&mut self) -> Option<Piece<'t>> {
-        let rest = &self.text[self.next..];
-        if rest.is_empty() {
-            return None;
-        }
-        let start = self.next;
-        let line = rest.split_once('\n').map_or(rest, |(line, _)| line);
-        self.next = (start + line.len() + 1).min(self.text.len());
-        Some(Piece { text: line.strip_suffix('\r').unwrap_or(line), start })
-    }
-}
-
-/// Reads a movie.
-///
-/// # Errors
-/// Everything that is wrong with the header, or the first thing that is wrong with the frames.
-pub fn parse(text: &str) -> Result<Movie, Vec<Flaw>> {
-    let mut lines = Lines { text, next: 0 };
+/// Reads a movie: everything that is wrong with its header, or the first thing that is wrong with its frames.
+fn parse(text: &str, hints: &Hints) -> Result<Recording, Wrong> {
+    let mut lines = Lines::new(text);
     let header = header::read(&mut lines, text.len())?;
     let mut reader = Reader { header: &header, frames: Vec::new(), cells: Vec::new(), dead: Vec::new() };
-    reader.frames(&mut lines).map_err(|flaw| vec![flaw])?;
+    reader.frames(&mut lines)?;
     let Reader { frames, cells, dead, .. } = reader;
-    let period = header.period.unwrap_or_else(|| mean_step(&frames));
-    Ok(Movie { shape: header.shape, frames, cells, dead, threshold: header.threshold, period })
+    let period = hints.period(Some(header.period.unwrap_or_else(|| mean_step(&frames))))?;
+    let Header { mut shape, threshold, .. } = header;
+    shape.unit = hints.unit(Some(shape.unit))?;
+    shape.pitch = hints.pitch(Some(shape.pitch))?;
+    hints.size(Some([shape.rows, shape.cols]))?;
+    Ok(Recording { format: FORMAT.name, shape, frames, cells, dead, threshold, period, force: None })
 }
 
 /// Mean time between two frames [s]; a second if that says nothing.
@@ -198,6 +102,7 @@ impl Reader<'_> {
             }
             _ => {}
         }
+        let start = self.cells.len();
         let mut total = 0.0;
         for row in 0..self.header.shape.rows {
             total += self.row(frame.number, row, lines)?;
@@ -213,7 +118,9 @@ impl Reader<'_> {
             }
             _ => {}
         }
-        self.frames.push(frame);
+        let ImageShape { rows, cols, .. } = self.header.shape;
+        let window = Window::whole(rows, cols);
+        self.frames.push(Frame { number: frame.number, time: frame.time, window, start });
         Ok(())
     }
 
@@ -262,11 +169,17 @@ impl Reader<'_> {
     }
 }
 
+/// What the line before a frame says.
+struct Line {
+    number: u64,
+    time: i64,
+}
+
 /// A sum, and where it stands.
 type Sum<'t> = Option<(f64, Piece<'t>)>;
 
 /// `Frame 3, 0.2,, …,,,Raw Sum=,,308`: its number, its time and its sum, if there is one.
-fn frame_line(line: Piece<'_>) -> Result<(Frame, Sum<'_>), Flaw> {
+fn frame_line(line: Piece<'_>) -> Result<(Line, Sum<'_>), Flaw> {
     let mut fields = line.split(',').map(Piece::trimmed);
     let first = fields.next().expect("a split gives at least one");
     let number = first.text.strip_prefix("Frame").unwrap_or(first.text);
@@ -277,7 +190,7 @@ fn frame_line(line: Piece<'_>) -> Result<(Frame, Sum<'_>), Flaw> {
     if !(0.0..1e9).contains(&seconds) {
         return flaw(&time, format!("the frame's time is no number of seconds from 0 to 1e9: `{}`", time.text));
     }
-    let frame = Frame { number, time: (seconds * 1e9).round() as i64 };
+    let frame = Line { number, time: (seconds * 1e9).round() as i64 };
     let Some(key) = fields.find(|field| field.text.starts_with("Raw Sum")) else { return Ok((frame, None)) };
     match fields.find(|field| !field.text.is_empty()) {
         Some(sum) => Ok((frame, Some((sum.number("the frame's sum")?, sum)))),
@@ -285,11 +198,5 @@ fn frame_line(line: Piece<'_>) -> Result<(Frame, Sum<'_>), Flaw> {
     }
 }
 
-/// A text that a message can hold.
-pub(super) fn shortened(text: &str) -> String {
-    let mut short: String = text.chars().take(40).collect();
-    if short.len() < text.len() {
-        short.push('…');
-    }
-    short
-}
+#[cfg(test)]
+mod tests;

@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use tactflow_runtime::signal::{Base, ImageShape, Unit};
 
-use super::parse::{Flaw, Lines, Piece, flaw, shortened};
+use crate::recordings::text::{Flaw, Lines, Piece, flaw, shortened};
 
 /// What the header says that matters.
 #[derive(Debug, Clone, PartialEq)]

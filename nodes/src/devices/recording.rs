@@ -1,0 +1,188 @@
+//! `recording`: a file of a tactile or pressure sensor as a pad.
+//!
+//! The file is read whole when the device is opened, so a mistake in it shows before anything runs. Frames come at the
+//! times that the file gives them; those between two exchanges are skipped but for the newest, and none is served
+//! twice. What the readers take is in [`crate::recordings`].
+
+use std::borrow::Cow;
+
+use tactflow_runtime::device::{Commands, Description, Device, DeviceError, Driver, Filled, Opened, Samples, Stepped};
+use tactflow_runtime::diagnostic::Code;
+use tactflow_runtime::node::{At, Count, FilePath, Mistake, Mistakes, Positive, Rate};
+use tactflow_runtime::params;
+use tactflow_runtime::signal::{Image, Unit};
+
+use crate::recordings::{self, Hints, Recording, Refusal};
+
+params! {
+    /// The recording.
+    file: FilePath,
+    /// Name of its format; recognised unless given.
+    format: Option<String>,
+    /// Unit of the values, where the file does not say it.
+    unit: Option<Unit>,
+    /// Distance between the centres of two neighbours along x and along y, where the file does not say it [mm].
+    pitch_mm: Option<[Positive; 2]>,
+    /// Frames per second, where the file does not say it [1/s].
+    rate_hz: Option<Rate>,
+    /// Number of rows and of columns, where the file does not say it.
+    size: Option<[Count; 2]>,
+}
+
+/// A recording that is being shown.
+#[derive(Debug)]
+pub struct Player {
+    recording: Recording,
+    next: usize,
+}
+
+impl Device for Player {
+    type Params = Params;
+
+    const NAME: &'static str = "recording";
+    const SUMMARY: &'static str = "a recorded file of a tactile or pressure sensor as a pad";
+
+    fn open(params: Params) -> Result<Opened, Mistakes> {
+        let file = &params.file;
+        let hints = hints(&params)?;
+        let bytes = file.bytes()?;
+        let recording = recordings::read(&bytes, &file.path.to_string_lossy(), &hints)
+            .map_err(|refusal| mistakes(refusal, file, &bytes))?;
+        let filled = Filled {
+            role: "tactile_pad".into(),
+            outputs: vec![recording.shape.clone().into()],
+            commands: vec![],
+            facts: facts(&recording),
+        };
+        let description = Description { fills: vec![filled], period: recording.period };
+        Ok(Opened { description, driver: Driver::Stepped(Box::new(Self { recording, next: 0 })) })
+    }
+}
+
+fn hints(params: &Params) -> Result<Hints, Mistakes> {
+    if let Some(format) = &params.format
+        && !recordings::FORMATS.iter().any(|known| known.name == format)
+    {
+        let names: Vec<String> = recordings::FORMATS.iter().map(|format| format!("`{}`", format.name)).collect();
+        let mistake = Mistake::param("format", format!("`{format}` is no format that can be read here"));
+        return Err(mistake.help(format!("formats are {}", names.join(", "))).into());
+    }
+    Ok(Hints {
+        format: params.format.clone(),
+        unit: params.unit,
+        pitch: params.pitch_mm.map(|pitch| pitch.map(|mm| *mm * 1e-3)),
+        rate_hz: params.rate_hz.map(|rate| *rate),
+        size: params.size.map(|size| size.map(|count| count.0)),
+    })
+}
+
+fn mistakes(refusal: Refusal, file: &FilePath, bytes: &[u8]) -> Mistakes {
+    let name = file.path.display();
+    let here = |message: String| Mistake::new(Code::BadData, At::Span(file.span.clone()), message);
+    match refusal {
+        Refusal::Stranger => {
+            let head = recordings::Head::new(bytes, "");
+            let line = head.text.lines().find(|line| !line.trim().is_empty()).unwrap_or("");
+            let begins = recordings::text::shortened(line.trim());
+            let message = format!("`{name}` is no recording of a known format: it begins with `{begins}`");
+            here(message).help(format!("formats are {}", recordings::list())).into()
+        }
+        Refusal::Damaged { text, flaws } => {
+            flaws.into_iter().map(|flaw| Mistake::data(file, &text, flaw.span, flaw.message)).collect()
+        }
+        Refusal::Broken { message, help } => {
+            let mistake = here(format!("`{name}`: {message}"));
+            match help {
+                Some(help) => mistake.help(help).into(),
+                None => mistake.into(),
+            }
+        }
+        Refusal::Silent { message, help } => here(message).help(help).into(),
+        Refusal::Contradicted { hint, message } => Mistake::param(hint, message).into(),
+    }
+}
+
+impl Stepped for Player {
+    fn next(&self) -> Option<i64> {
+        self.recording.frames.get(self.next).map(|frame| frame.time)
+    }
+
+    fn end(&self) -> Option<i64> {
+        self.recording.frames.last().map(|frame| frame.time)
+    }
+
+    fn exchange(&mut self, now: i64, _: &Commands, samples: &mut Samples) -> Result<(), DeviceError> {
+        let left = &self.recording.frames[self.next..];
+        let due = left.partition_point(|frame| frame.time <= now);
+        if due > 0 {
+            self.next += due;
+            let newest = self.next - 1;
+            let frame = self.recording.frames[newest];
+            self.recording.show(newest, samples.write::<Image>(0, frame.time, frame.number).cells_mut());
+        }
+        Ok(())
+    }
+}
+
+fn facts(recording: &Recording) -> Vec<(Cow<'static, str>, toml::Value)> {
+    let cols = recording.shape.cols;
+    let place = |index: &usize| toml::Value::from(vec![(index / cols) as i64, (index % cols) as i64]);
+    let dead: Vec<toml::Value> = recording.dead.iter().map(place).collect();
+    let mut facts = vec![
+        ("dead".into(), dead.into()),
+        ("frames".into(), (recording.frames.len() as i64).into()),
+        ("format".into(), recording.format.into()),
+    ];
+    if let Some(threshold) = recording.threshold {
+        facts.push(("threshold".into(), threshold.into()));
+    }
+    facts
+}
+
+#[cfg(test)]
+mod tests {
+    use tactflow_runtime::signal::Shape;
+
+    use super::*;
+    use crate::devices::testing::{Bench, open};
+
+    const PATH: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../graphs/recordings/pressuRe/iscan_test.csv");
+
+    #[test]
+    fn frames_are_served_once_and_the_newest_wins() {
+        let mut bench = Bench::new(open::<Player>(&format!("file = '{PATH}'")).unwrap());
+        let Shape::Image(shape) = &bench.fill().outputs[0] else { panic!("an image") };
+        assert_eq!((shape.rows, shape.cols), (28, 28));
+        assert_eq!(bench.fact("threshold"), Some(&3.0.into()));
+        assert_eq!(bench.fact("frames"), Some(&309.into()));
+        assert_eq!(bench.fact("dead").unwrap()[1], vec![0, 1].into());
+        let force = |bench: &mut Bench| {
+            let image: &mut Image = bench.samples.write(0, 0, 0);
+            let sum: f32 = image.cells().iter().sum();
+            image.cells_mut().fill(f32::NAN);
+            sum
+        };
+        assert_eq!(bench.device.next(), Some(0));
+        bench.exchange(0);
+        assert_eq!((force(&mut bench), bench.device.next()), (310.0, Some(100_000_000)));
+        bench.exchange(99_999_999);
+        assert!(force(&mut bench).is_nan(), "nothing is due");
+        bench.exchange(350_000_000);
+        assert_eq!((force(&mut bench), bench.device.next()), (309.0, Some(400_000_000)), "frame 4 and neither 2 nor 3");
+        bench.exchange(i64::MAX);
+        assert_eq!((force(&mut bench), bench.device.next()), (29.0, None));
+        bench.exchange(i64::MAX);
+        assert!(force(&mut bench).is_nan(), "the movie is over");
+    }
+
+    #[test]
+    fn a_missing_file_and_another_file_are_mistakes_where_the_bench_names_them() {
+        for (path, message) in
+            [("nowhere.csv", "cannot read"), (concat!(env!("CARGO_MANIFEST_DIR"), "/Cargo.toml"), "`")]
+        {
+            let mistakes = open::<Player>(&format!("file = '{path}'")).err().unwrap();
+            assert_eq!(mistakes[0].at, At::Span(7..9 + path.len()));
+            assert!(mistakes[0].message.starts_with(message), "{mistakes:?}");
+        }
+    }
+}

@@ -1,0 +1,84 @@
+//! What the tests of the formats share.
+
+use super::{Hints, Recording, Refusal, read};
+
+/// The 64-bit splitmix generator (Steele et al. 2014), so that every run damages the same.
+pub(super) struct Random(pub(super) u64);
+
+impl Random {
+    pub(super) fn below(&mut self, below: usize) -> usize {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mixed = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        let mixed = (mixed ^ (mixed >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        ((mixed ^ (mixed >> 31)) % below as u64) as usize
+    }
+
+    /// Cuts, swaps, flips, inserts and repeats a few bytes.
+    fn damage(&mut self, bytes: &mut Vec<u8>) {
+        for _ in 0..=self.below(3) {
+            if bytes.is_empty() {
+                return;
+            }
+            let (a, b) = (self.below(bytes.len()), self.below(bytes.len()));
+            let (from, to) = (a.min(b), a.max(b).min(a.min(b) + 40));
+            match self.below(8) {
+                0 => bytes.truncate(a),
+                1 => bytes.swap(a, b),
+                2 => bytes[a] ^= 1 << self.below(8),
+                3 => bytes[a] = self.below(256) as u8,
+                4 => drop(bytes.drain(from..to)),
+                5 => drop(bytes.splice(a..a, b"99999999999".iter().copied())),
+                6 => drop(bytes.splice(b..b, bytes[from..to].to_vec())),
+                _ => bytes.insert(a, b"9-.,;B\n\r\t@e \""[self.below(13)]),
+            }
+        }
+    }
+}
+
+/// What is wrong, each with its line; a line of 0 is no place in the text.
+pub(super) fn complaints(read: Result<Recording, Refusal>) -> Vec<(usize, String)> {
+    match read {
+        Ok(recording) => {
+            assert!(recording.is_sound(), "{:?} {:?}", recording.shape, recording.frames);
+            vec![]
+        }
+        Err(Refusal::Stranger) => vec![(0, "stranger".into())],
+        Err(Refusal::Damaged { text, flaws }) => {
+            assert!(!flaws.is_empty(), "a refusal says why");
+            let line = |at: usize| text[..at].matches('\n').count() + 1;
+            let check = |span: &std::ops::Range<usize>| assert!(text.get(span.clone()).is_some(), "{span:?}");
+            flaws
+                .into_iter()
+                .inspect(|flaw| check(&flaw.span))
+                .map(|flaw| (line(flaw.span.start), flaw.message))
+                .collect()
+        }
+        Err(
+            Refusal::Broken { message, .. } | Refusal::Silent { message, .. } | Refusal::Contradicted { message, .. },
+        ) => {
+            vec![(0, message)]
+        }
+    }
+}
+
+/// Checks a table of damages: in `good`, `from` becomes `to` once, and what is then wrong, with its line.
+pub(super) fn check_damages(good: &str, name: &str, hints: &Hints, cases: &[(&str, &str, usize, &str)]) {
+    assert_eq!(complaints(read(good.as_bytes(), name, hints)), [], "it is good");
+    for (from, to, line, message) in cases {
+        assert!(good.contains(from), "{from}");
+        let got = complaints(read(good.replacen(from, to, 1).as_bytes(), name, hints));
+        assert_eq!(got, [(*line, (*message).to_owned())], "{from} -> {to}");
+    }
+}
+
+/// Damages good files at random: each is then read soundly or refused at a place. How many of them are refused.
+pub(super) fn count_refused(good: &[&[u8]], name: &str, hints: &Hints, rounds: usize) -> usize {
+    let mut random = Random(2013);
+    let mut refused = 0;
+    for round in 0..rounds {
+        let mut bytes = good[round % good.len()].to_vec();
+        random.damage(&mut bytes);
+        refused += usize::from(!complaints(read(&bytes, name, hints)).is_empty());
+    }
+    refused
+}
