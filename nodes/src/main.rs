@@ -2,6 +2,8 @@
 
 use std::process::ExitCode;
 
+use tactflow_runtime::cli::Tool;
+
 fn main() -> ExitCode {
-    tactflow_runtime::cli::main(&tactflow_nodes::catalogue())
+    Tool::new(tactflow_nodes::catalogue()).main()
 }

@@ -1,18 +1,30 @@
 //! `check`: graphs are checked and built, and nothing runs.
 
-use super::{CheckArgs, Colour, complain, say};
-use crate::catalogue::Catalogue;
+use std::path::PathBuf;
+
+use super::{OnArgs, Shell};
 use crate::graph::plan;
 
-pub(super) fn check(catalogue: &Catalogue, args: CheckArgs, colour: Colour) -> u8 {
+/// Check graphs like a compiler would, without running them
+#[derive(clap::Parser)]
+#[command(name = "check")]
+pub(super) struct Check {
+    /// The graph files
+    #[arg(required = true)]
+    graphs: Vec<PathBuf>,
+    #[command(flatten)]
+    on: OnArgs,
+}
+
+pub(super) fn check(args: Check, shell: &Shell) -> u8 {
     let mut code = 0;
     for graph in args.graphs {
-        match plan(catalogue, &args.on.request(graph.clone())) {
+        match plan(shell.catalogue(), &args.on.request(graph.clone())) {
             Ok(plan) => {
                 let (nodes, period) = (plan.order().count(), plan.period());
-                say(&format!("{}: ok, {nodes} nodes, a tick each {}", graph.display(), milliseconds(period)));
+                shell.say(&format!("{}: ok, {nodes} nodes, a tick each {}", graph.display(), milliseconds(period)));
             }
-            Err(report) => code = complain(&report, colour),
+            Err(report) => code = shell.complain(&report),
         }
     }
     code

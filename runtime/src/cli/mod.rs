@@ -1,41 +1,99 @@
 //! The command line, as a library function: a node crate gets the whole tool from a five-line `main`.
 //!
 //! ```no_run
+//! use tactflow_runtime::catalogue::Catalogue;
+//! use tactflow_runtime::cli::Tool;
+//!
 //! fn main() -> std::process::ExitCode {
-//!     tactflow_runtime::cli::main(&tactflow_runtime::catalogue::Catalogue::new())
+//!     Tool::new(Catalogue::new()).main()
 //! }
 //! ```
+//!
+//! Every command is a [`Subcommand`], those that are always there too. A crate adds its own with [`Tool::command`], and
+//! [`derived`] makes one from arguments that clap derives.
 #![allow(clippy::print_stderr, reason = "this is where the tool speaks")]
 
 mod check;
 mod course;
 mod progress;
 mod run;
+mod shell;
 mod summary;
 
-use std::io::{IsTerminal, Write};
+use std::marker::PhantomData;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use clap::{Args, Parser, Subcommand, ValueEnum};
+use clap::{Args, CommandFactory, FromArgMatches, Parser};
 use tracing_subscriber::EnvFilter;
 
 use crate::catalogue::Catalogue;
-use crate::diagnostic::Report;
 use crate::graph::Request;
 
-/// A run that faulted.
-const FAULTED: u8 = 1;
-/// A file that does not load, or a command line that is not understood.
-const NOT_LOADED: u8 = 2;
+/// The parser of arguments, for commands of one's own.
+pub use clap;
+use shell::Colour;
+pub use shell::Shell;
+
+/// Exit code of what went wrong while it ran.
+pub const FAULTED: u8 = 1;
+/// Exit code of a file that does not load, and of a command line that is not understood.
+pub const NOT_LOADED: u8 = 2;
+
+/// A command of the tool.
+pub trait Subcommand {
+    /// Its name, its arguments and its help.
+    fn command(&self) -> clap::Command;
+
+    /// Does it; the result is the exit code.
+    fn run(&self, matches: &clap::ArgMatches, shell: &Shell) -> u8;
+}
+
+/// The command whose name and arguments are those of `A`.
+///
+/// ```
+/// use tactflow_runtime::cli::{Shell, clap, derived};
+///
+/// /// Greet somebody
+/// #[derive(clap::Parser)]
+/// #[command(name = "greet")]
+/// struct Greet {
+///     /// Whom
+///     name: String,
+/// }
+///
+/// let greet = derived(|greet: Greet, shell: &Shell| {
+///     shell.say(&format!("hello {}", greet.name));
+///     0
+/// });
+/// assert_eq!(greet.command().get_name(), "greet");
+/// ```
+pub fn derived<A: Parser + 'static>(run: impl Fn(A, &Shell) -> u8 + 'static) -> Box<dyn Subcommand> {
+    Box::new(Derived { run, arguments: PhantomData })
+}
+
+struct Derived<A, F> {
+    run: F,
+    arguments: PhantomData<A>,
+}
+
+impl<A: CommandFactory + FromArgMatches, F: Fn(A, &Shell) -> u8> Subcommand for Derived<A, F> {
+    fn command(&self) -> clap::Command {
+        A::command()
+    }
+
+    fn run(&self, matches: &clap::ArgMatches, shell: &Shell) -> u8 {
+        let arguments = A::from_arg_matches(matches).expect("they were parsed as the command declares them");
+        (self.run)(arguments, shell)
+    }
+}
 
 /// Tactile servoing from graph files.
 #[derive(Parser)]
 #[command(name = "tactflow", version, max_term_width = 100)]
+#[command(subcommand_required = true, arg_required_else_help = true)]
 #[command(after_help = "Exit codes: 0 all went well; 1 the run ended in a fault; 2 a file does not load.")]
 struct Cli {
-    #[command(subcommand)]
-    command: Command,
     /// When to use colours; `auto` means on a terminal, unless NO_COLOR is set
     #[arg(long, global = true, value_enum, default_value_t = Colour::Auto, value_name = "WHEN")]
     color: Colour,
@@ -44,44 +102,7 @@ struct Cli {
     verbose: u8,
 }
 
-#[derive(Subcommand)]
-enum Command {
-    /// Run a graph and print what came out
-    Run(RunArgs),
-    /// Check graphs like a compiler would, without running them
-    Check(CheckArgs),
-}
-
-#[derive(Args)]
-#[command(after_help = "Examples:
-  tactflow run graphs/finger_press.toml
-  tactflow run graphs/finger_press.toml --for 5s --out press.csv
-  tactflow run graphs/hybrid.toml --set nodes.pid.gains.x.kp=3 --set devices.pad.rate_hz=500")]
-struct RunArgs {
-    /// The graph file
-    graph: PathBuf,
-    #[command(flatten)]
-    on: OnArgs,
-    /// Run at most this long in the graph's time: 20s, 500ms, 2min
-    #[arg(long = "for", value_name = "TIME", value_parser = duration, allow_hyphen_values = true)]
-    duration: Option<f64>,
-    /// Pace the run by the wall clock; otherwise virtual time runs as fast as it can
-    #[arg(long)]
-    realtime: bool,
-    /// Write a row a tick and a column a scalar, as .csv or .ndjson
-    #[arg(long, value_name = "FILE")]
-    out: Option<PathBuf>,
-}
-
-#[derive(Args)]
-struct CheckArgs {
-    /// The graph files
-    #[arg(required = true)]
-    graphs: Vec<PathBuf>,
-    #[command(flatten)]
-    on: OnArgs,
-}
-
+/// Which graph on which bench, with what laid over them.
 #[derive(Args)]
 struct OnArgs {
     /// Bench to run on instead of the graph's own
@@ -98,41 +119,56 @@ impl OnArgs {
     }
 }
 
-#[derive(Clone, Copy, PartialEq, ValueEnum)]
-enum Colour {
-    Auto,
-    Always,
-    Never,
+/// The tool: a catalogue and commands.
+pub struct Tool {
+    catalogue: Catalogue,
+    commands: Vec<Box<dyn Subcommand>>,
 }
 
-impl Colour {
-    fn is_on(self, stream: &impl IsTerminal) -> bool {
-        match self {
-            Self::Always => true,
-            Self::Never => false,
-            Self::Auto => stream.is_terminal() && std::env::var_os("NO_COLOR").is_none_or(|value| value.is_empty()),
-        }
+impl Tool {
+    /// The tool with the commands that need nothing but a catalogue.
+    #[must_use]
+    pub fn new(catalogue: Catalogue) -> Self {
+        Self { catalogue, commands: vec![derived(run::run), derived(check::check)] }
     }
-}
 
-/// Runs the tool on the process's arguments.
-#[must_use]
-pub fn main(catalogue: &Catalogue) -> ExitCode {
-    let cli = match Cli::try_parse() {
-        Ok(cli) => cli,
-        Err(error) => {
-            let code = if error.use_stderr() { NOT_LOADED } else { 0 };
-            // Nothing is left to say where even that cannot be printed.
-            let _ = error.print();
-            return code.into();
-        }
-    };
-    log(&cli);
-    let code = match cli.command {
-        Command::Run(args) => run::run(catalogue, args, cli.color),
-        Command::Check(args) => check::check(catalogue, args, cli.color),
-    };
-    code.into()
+    /// With one more command.
+    ///
+    /// # Panics
+    /// If there is a command of that name already.
+    #[must_use]
+    pub fn command(mut self, command: Box<dyn Subcommand>) -> Self {
+        let name = command.command().get_name().to_owned();
+        let is_taken = self.commands.iter().any(|other| other.command().get_name() == name);
+        assert!(!is_taken, "two commands are called `{name}`");
+        self.commands.push(command);
+        self
+    }
+
+    /// Runs the tool on the process's arguments.
+    #[must_use]
+    pub fn main(self) -> ExitCode {
+        let matches = match self.arguments().try_get_matches() {
+            Ok(matches) => matches,
+            Err(error) => {
+                let code = if error.use_stderr() { NOT_LOADED } else { 0 };
+                // Nothing is left to say where even that cannot be printed.
+                let _ = error.print();
+                return code.into();
+            }
+        };
+        let cli = Cli::from_arg_matches(&matches).expect("they were parsed as they are declared");
+        log(&cli);
+        let shell = Shell::new(self.catalogue, cli.color);
+        let (name, matches) = matches.subcommand().expect("one is required");
+        let command = self.commands.iter().find(|command| command.command().get_name() == name);
+        command.expect("clap knows no others").run(matches, &shell).into()
+    }
+
+    /// All arguments, with those of every command.
+    fn arguments(&self) -> clap::Command {
+        Cli::command().subcommands(self.commands.iter().map(|command| command.command()))
+    }
 }
 
 fn log(cli: &Cli) {
@@ -142,47 +178,18 @@ fn log(cli: &Cli) {
     tracing_subscriber::fmt().with_env_filter(filter).with_ansi(is_coloured).with_writer(std::io::stderr).init();
 }
 
-/// Prints to standard output. A reader that has seen enough, `head` say, is no mistake of ours.
-fn say(text: &str) {
-    let mut out = std::io::stdout().lock();
-    let _ = writeln!(out, "{text}").and_then(|()| out.flush());
-}
-
-/// Shows what is wrong with a graph.
-fn complain(report: &Report, colour: Colour) -> u8 {
-    eprint!("{}", report.render(colour.is_on(&std::io::stderr())));
-    NOT_LOADED
-}
-
-/// A time with its unit, in seconds.
-fn duration(text: &str) -> Result<f64, String> {
-    const UNITS: [(&str, f64); 4] = [("ms", 1e-3), ("min", 60.0), ("s", 1.0), ("h", 3600.0)];
-    let found = UNITS.iter().find_map(|(unit, seconds)| Some((text.strip_suffix(unit)?, seconds)));
-    let (number, seconds) = found.ok_or("give a time with its unit: 20s, 500ms, 2min, 1h")?;
-    match number.trim().parse::<f64>() {
-        Ok(number) if number > 0.0 && number.is_finite() => Ok(number * seconds),
-        _ => Err(format!("`{number}` is not a number greater than 0")),
-    }
-}
-
 #[cfg(test)]
 mod tests {
-    use clap::CommandFactory;
-
     use super::*;
 
     #[test]
     fn the_arguments_are_sound() {
-        Cli::command().debug_assert();
+        Tool::new(Catalogue::new()).arguments().debug_assert();
     }
 
     #[test]
-    fn times_have_units() {
-        for (text, seconds) in [("20s", 20.0), ("500ms", 0.5), ("2min", 120.0), ("1.5 h", 5400.0)] {
-            assert_eq!(duration(text), Ok(seconds), "{text}");
-        }
-        for text in ["20", "", "s", "-1s", "0s", "nans", "infs", "3 days"] {
-            assert!(duration(text).is_err(), "{text}");
-        }
+    #[should_panic(expected = "two commands are called `run`")]
+    fn a_command_is_there_once() {
+        let _ = Tool::new(Catalogue::new()).command(derived(run::run));
     }
 }

@@ -1,32 +1,56 @@
 //! `run`: a graph runs, and what came out is printed.
 
 use std::io;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use super::check::milliseconds;
 use super::progress::Progress;
 use super::summary::Summary;
-use super::{Colour, FAULTED, NOT_LOADED, RunArgs, complain, say};
-use crate::catalogue::Catalogue;
+use super::{FAULTED, NOT_LOADED, OnArgs, Shell};
 use crate::engine::{self, End, Engine, Outcome, RunOptions};
 use crate::graph::plan;
 use crate::record::{Format, Recorder};
 
-pub(super) fn run(catalogue: &Catalogue, args: RunArgs, colour: Colour) -> u8 {
-    let plan = match plan(catalogue, &args.on.request(args.graph.clone())) {
+/// Run a graph and print what came out
+#[derive(clap::Parser)]
+#[command(
+    name = "run",
+    after_help = "Examples:
+  tactflow run graphs/finger_press.toml
+  tactflow run graphs/finger_press.toml --for 5s --out press.csv
+  tactflow run graphs/hybrid.toml --set nodes.pid.gains.x.kp=3 --set devices.pad.rate_hz=500"
+)]
+pub(super) struct Run {
+    /// The graph file
+    graph: PathBuf,
+    #[command(flatten)]
+    on: OnArgs,
+    /// Run at most this long in the graph's time: 20s, 500ms, 2min
+    #[arg(long = "for", value_name = "TIME", value_parser = duration, allow_hyphen_values = true)]
+    duration: Option<f64>,
+    /// Pace the run by the wall clock; otherwise virtual time runs as fast as it can
+    #[arg(long)]
+    realtime: bool,
+    /// Write a row a tick and a column a scalar, as .csv or .ndjson
+    #[arg(long, value_name = "FILE")]
+    out: Option<PathBuf>,
+}
+
+pub(super) fn run(args: Run, shell: &Shell) -> u8 {
+    let plan = match plan(shell.catalogue(), &args.on.request(args.graph.clone())) {
         Ok(plan) => plan,
-        Err(report) => return complain(&report, colour),
+        Err(report) => return shell.complain(&report),
     };
     let is_real = args.realtime || plan.is_live();
     let mut engine = Engine::new(plan);
     let mut recorder = match args.out.as_deref().map(|path| recorder(path, &engine, !is_real)).transpose() {
         Ok(recorder) => recorder,
         Err(message) => {
-            eprintln!("error: {message}");
+            shell.error(message);
             return NOT_LOADED;
         }
     };
-    say(&format!("{}: {} nodes, a tick each {}", args.graph.display(), engine.order().count(), period(&engine)));
+    shell.say(&format!("{}: {} nodes, a tick each {}", args.graph.display(), engine.order().count(), period(&engine)));
     let mut summary = Summary::new(&engine);
     let mut progress = Progress::new(args.duration.or_else(|| engine.end().map(seconds)));
     let options = RunOptions { duration: args.duration, is_realtime: args.realtime };
@@ -44,19 +68,19 @@ pub(super) fn run(catalogue: &Catalogue, args: RunArgs, colour: Colour) -> u8 {
     let outcome = match outcome {
         Ok(outcome) => outcome,
         Err(error) => {
-            eprintln!("error: cannot run: {error}");
+            shell.error(format_args!("cannot run: {error}"));
             return FAULTED;
         }
     };
-    say(&format!("\n{}", summary.render(&engine, &outcome)));
-    say(&ending(&outcome));
+    shell.say(&format!("\n{}", summary.render(&engine, &outcome)));
+    shell.say(&ending(&outcome));
     let code = if let End::Fault(fault) = &outcome.end {
-        eprintln!("error: {fault}; every command went to zero");
+        shell.error(format_args!("{fault}; every command went to zero"));
         FAULTED
     } else {
         0
     };
-    code.max(report_file(args.out.as_deref(), written))
+    code.max(report_file(shell, args.out.as_deref(), written))
 }
 
 fn recorder(path: &Path, engine: &Engine, may_wait: bool) -> Result<Recorder, String> {
@@ -76,19 +100,19 @@ fn is_something_else(path: &Path) -> bool {
     read.is_ok() && !start.is_empty() && !Format::STARTS.iter().any(|known| start.starts_with(known))
 }
 
-fn report_file(path: Option<&Path>, written: io::Result<u64>) -> u8 {
+fn report_file(shell: &Shell, path: Option<&Path>, written: io::Result<u64>) -> u8 {
     let Some(path) = path else { return 0 };
     match written {
         Ok(0) => {
-            say(&format!("wrote {}", path.display()));
+            shell.say(&format!("wrote {}", path.display()));
             0
         }
         Ok(dropped) => {
-            eprintln!("warning: {} lacks {dropped} rows: the disk was too slow", path.display());
+            shell.warning(format_args!("{} lacks {dropped} rows: the disk was too slow", path.display()));
             0
         }
         Err(error) => {
-            eprintln!("error: cannot write `{}`: {error}", path.display());
+            shell.error(format_args!("cannot write `{}`: {error}", path.display()));
             FAULTED
         }
     }
@@ -122,4 +146,30 @@ fn period(engine: &Engine) -> String {
 
 fn seconds(nanos: i64) -> f64 {
     nanos as f64 * 1e-9
+}
+
+/// A time with its unit, in seconds.
+fn duration(text: &str) -> Result<f64, String> {
+    const UNITS: [(&str, f64); 4] = [("ms", 1e-3), ("min", 60.0), ("s", 1.0), ("h", 3600.0)];
+    let found = UNITS.iter().find_map(|(unit, seconds)| Some((text.strip_suffix(unit)?, seconds)));
+    let (number, seconds) = found.ok_or("give a time with its unit: 20s, 500ms, 2min, 1h")?;
+    match number.trim().parse::<f64>() {
+        Ok(number) if number > 0.0 && number.is_finite() => Ok(number * seconds),
+        _ => Err(format!("`{number}` is not a number greater than 0")),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn times_have_units() {
+        for (text, seconds) in [("20s", 20.0), ("500ms", 0.5), ("2min", 120.0), ("1.5 h", 5400.0)] {
+            assert_eq!(duration(text), Ok(seconds), "{text}");
+        }
+        for text in ["20", "", "s", "-1s", "0s", "nans", "infs", "3 days"] {
+            assert!(duration(text).is_err(), "{text}");
+        }
+    }
 }

@@ -20,7 +20,7 @@ pub enum At {
     /// A place in a file of data that the graph names.
     Data {
         /// The file, and where its name stands.
-        file: FilePath,
+        file: Box<FilePath>,
         /// Its text.
         text: String,
         /// The place in that text.
@@ -69,7 +69,7 @@ impl Mistake {
 
     /// A file of data is not what it should be, at a place in its text.
     pub fn data(file: &FilePath, text: &str, span: Range<usize>, message: impl Into<String>) -> Self {
-        let at = At::Data { file: file.clone(), text: text.to_owned(), span };
+        let at = At::Data { file: Box::new(file.clone()), text: text.to_owned(), span };
         Self::new(Code::BadData, at, message)
     }
 
