@@ -6,6 +6,10 @@
 
 pub mod curve;
 pub mod file;
+pub mod fit;
+pub mod log;
+pub mod report;
+pub mod samples;
 
 use tactflow_runtime::signal::Unit;
 
@@ -27,3 +31,8 @@ pub struct Calibration {
     /// The tactels, row after row; none where one is dead.
     pub tactels: Vec<Option<Tactel>>,
 }
+
+#[cfg(test)]
+mod testing;
+#[cfg(test)]
+mod tests;
