@@ -148,6 +148,26 @@ impl Curve {
         }
     }
 
+    /// How far from zero s is under a force, up to the largest: the characteristic itself, for a picture.
+    #[must_use]
+    pub fn reading(&self, force: f64) -> f64 {
+        match self {
+            Self::Linear { gain } => force / f64::from(gain.abs()),
+            Self::Rational { gain, squash, .. } => force / (f64::from(gain.abs()) + f64::from(squash.abs()) * force),
+            Self::Piecewise { knots } => {
+                let mut last = [0.0; 2];
+                for knot in knots.iter().map(|knot| knot.map(f64::from)) {
+                    if force <= knot[1] {
+                        let part = if knot[1] > last[1] { (force - last[1]) / (knot[1] - last[1]) } else { 1.0 };
+                        return (last[0] + part * (knot[0] - last[0])).abs();
+                    }
+                    last = knot;
+                }
+                last[0].abs()
+            }
+        }
+    }
+
     /// The largest force, if the curve has an end.
     #[must_use]
     pub fn most(&self) -> Option<f32> {
@@ -306,6 +326,14 @@ mod tests {
     }
 
     proptest! {
+        #[test]
+        fn the_characteristic_and_its_inverse_belong_together(curve in any_curve(), part in 0.0..1.0f64) {
+            let force = part * f64::from(curve.most().unwrap());
+            let back = f64::from(curve.force(curve.reading(force) as f32));
+            // Where the curve is flat, 32 bits of a reading are few of a force; flat knots have a range of readings.
+            prop_assert!((back - force).abs() < 0.01 * f64::from(curve.most().unwrap()), "{} of {}", back, force);
+        }
+
         #[test]
         fn more_is_never_less_and_never_out_of_bounds(curve in any_curve(), s in -1e4..1e5f32, more in 0.0..1e5f32) {
             let (one, other) = (curve.force(s), curve.force(s + more));

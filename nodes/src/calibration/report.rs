@@ -45,6 +45,8 @@ pub struct Finding {
     pub samples: usize,
     /// Whether it stays at its largest reading while the force goes on; those samples do not count.
     pub is_saturated: bool,
+    /// 1 if what it reads rises with the force, -1 if it falls.
+    pub sign: f32,
     /// Standard deviation of what it reads unloaded [reading].
     pub noise: f64,
     /// Residual of each sort of curve under a force, root mean square [N].
@@ -119,6 +121,7 @@ fn examine(samples: &Samples<'_>, i: usize, [lowest, highest]: [f32; 2]) -> (Fin
         state: State::Dead,
         samples: 0,
         is_saturated: false,
+        sign: answer.sign,
         noise: answer.noise,
         rms: [0.0; 3],
         hysteresis: None,
