@@ -123,6 +123,16 @@ impl<'t> Piece<'t> {
         head.eq_ignore_ascii_case(prefix).then(|| self.part(&self.text[prefix.len()..]))
     }
 
+    /// Without a quote before it.
+    pub(super) fn part_after_quote(self) -> Self {
+        self.part(self.text.trim_start_matches('"')).trimmed()
+    }
+
+    /// A finite number that may have a comma before its decimals.
+    pub(super) fn decimal(self, what: &str) -> Result<f64, Flaw> {
+        Notation { separator: None, has_decimal_comma: true }.number(self, what)
+    }
+
     /// A finite number.
     pub(super) fn number(self, what: &str) -> Result<f64, Flaw> {
         match self.text.parse::<f64>() {
@@ -182,7 +192,7 @@ impl<'t> Iterator for Lines<'t> {
 pub(super) struct Notation {
     /// What stands between two numbers; nothing if blanks do.
     pub(super) separator: Option<char>,
-    /// Whether a comma stands before the decimals.
+    /// Whether a comma may stand before the decimals: no comma stands between two numbers.
     pub(super) has_decimal_comma: bool,
 }
 
@@ -190,15 +200,13 @@ impl Notation {
     /// What a row of numbers shows: `;`, a tab, a comma or blanks. A comma beside another separator is a decimal one.
     pub(super) fn of(row: &str) -> Self {
         let row = row.trim();
-        let has_decimal_comma = row.contains(',');
-        match row {
-            row if row.contains(';') => Self { separator: Some(';'), has_decimal_comma },
-            row if row.contains('\t') => Self { separator: Some('\t'), has_decimal_comma },
-            row if has_decimal_comma && !is_decimal_comma_between_blanks(row) => {
-                Self { separator: Some(','), has_decimal_comma: false }
-            }
-            _ => Self { separator: None, has_decimal_comma },
-        }
+        let separator = match row {
+            row if row.contains(';') => Some(';'),
+            row if row.contains('\t') => Some('\t'),
+            row if row.contains(',') && !is_decimal_comma_between_blanks(row) => Some(','),
+            _ => None,
+        };
+        Self { separator, has_decimal_comma: separator != Some(',') }
     }
 
     /// The fields of a row, trimmed. Separators at the end of a row are not followed by a field.

@@ -2,106 +2,182 @@
 
 use std::ops::Range;
 
-use tactflow_runtime::signal::{Base, ImageShape, Unit};
+use tactflow_runtime::signal::{ImageShape, Unit};
 
+use crate::recordings::Hints;
 use crate::recordings::text::{Flaw, Lines, Piece, flaw, shortened};
+use crate::recordings::units;
 
 /// What the header says that matters.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Header {
+pub(super) struct Header<'t> {
     /// Size, pitch and unit of the frames.
     pub(super) shape: ImageShape,
+    /// What one of the file's unit is in ours.
+    pub(super) factor: f64,
     /// Number of the first frame.
     pub(super) start_frame: Option<u64>,
     /// Number of the last frame, and where that stands.
     pub(super) end_frame: Option<(u64, Range<usize>)>,
-    /// Noise threshold, in the unit of the cells.
+    /// Noise threshold [raw].
     pub(super) threshold: Option<f64>,
     /// Nominal time between two frames [s].
     pub(super) period: Option<f64>,
+    /// The line that ends the movie.
+    pub(super) mark: &'t str,
 }
 
-const UNITS: [(&str, Unit); 3] = [("raw", Unit::RAW), ("kPa", Unit::of(Base::Kilopascal)), ("N", Unit::NEWTON)];
-const LENGTHS: [(&str, f64); 3] = [("centimeters", 0.01), ("millimeters", 0.001), ("inches", 0.0254)];
+/// The keys that matter.
+const KEYS: [&str; 13] = [
+    "DATA_TYPE",
+    "ROWS",
+    "COLS",
+    "ROW_SPACING",
+    "COL_SPACING",
+    "UNITS",
+    "START_FRAME",
+    "END_FRAME",
+    "NOISE_THRESHOLD",
+    "SECONDS_PER_FRAME",
+    "MILLISECONDS_PER_FRAME",
+    "FRAMES_PER_SECOND",
+    "MICRO_SECOND",
+];
+
+/// The shortest time between two frames that is one [µs]: anything below is a flag.
+const SHORTEST: f64 = 50.0;
 
 /// Reads the header, up to and with its line `ASCII_DATA @@`, of a file of `bytes` bytes.
-pub(super) fn read(lines: &mut Lines<'_>, bytes: usize) -> Result<Header, Vec<Flaw>> {
+pub(super) fn read<'t>(lines: &mut Lines<'t>, bytes: usize, hints: &Hints) -> Result<Header<'t>, Vec<Flaw>> {
     let mut keys = Keys { keys: Vec::new(), flaws: Vec::new(), end: Piece { text: "", start: 0 } };
-    let has_end = keys.collect(lines);
-    let mut header = None;
-    if has_end {
-        header = keys.header(bytes);
+    let header = keys.collect(lines).and_then(|mark| keys.header(mark, bytes, hints));
+    match header {
+        Some(header) if keys.flaws.is_empty() => Ok(header),
+        _ => Err(keys.flaws),
     }
-    if keys.flaws.is_empty() { Ok(header.expect("without a flaw it is whole")) } else { Err(keys.flaws) }
+}
+
+/// A line without what a spreadsheet adds: quotes around it, separators behind it.
+pub(super) fn bare(line: Piece<'_>) -> Piece<'_> {
+    let is_dress = |c: char| c.is_whitespace() || ",;\"".contains(c);
+    line.part(line.text.trim_end_matches(is_dress)).trimmed().part_after_quote()
 }
 
 struct Keys<'t> {
-    keys: Vec<(&'t str, Piece<'t>)>,
+    keys: Vec<(&'static str, Piece<'t>)>,
     flaws: Vec<Flaw>,
     end: Piece<'t>,
 }
 
 impl<'t> Keys<'t> {
-    /// Collects the lines of the header; whether it has an end.
-    fn collect(&mut self, lines: &mut Lines<'t>) -> bool {
+    /// Collects the lines of the header; the mark that ends the movie, if the header has an end.
+    fn collect(&mut self, lines: &mut Lines<'t>) -> Option<&'t str> {
+        let mut is_comment = false;
         for line in lines {
-            let line = line.trimmed();
-            let key = line.text.split_whitespace().next().unwrap_or("");
+            let line = bare(line);
+            let key = line.text.split(|c: char| c.is_whitespace() || ",;:=".contains(c)).next().unwrap_or("");
             self.end = Piece { text: key, start: line.start };
-            if key == "Frame" {
+            let is_gap = |c: char| c.is_whitespace() || ",;:=".contains(c);
+            let value = line.part(line.text[key.len()..].trim_start_matches(is_gap));
+            if key == "ASCII_DATA" {
+                return Some(if value.text.is_empty() { "@@" } else { value.text });
+            }
+            if key == "Frame" && (!is_comment || value.text.starts_with(|c: char| c.is_ascii_digit())) {
                 break;
             }
-            let value = Piece { text: &line.text[key.len()..], start: line.start + key.len() }.trimmed();
-            if key == "ASCII_DATA" {
-                return true;
+            let known = KEYS.iter().find(|known| known.eq_ignore_ascii_case(key));
+            match known {
+                // A comment may begin with any word.
+                Some(known) if is_comment && (*known != key || self.find(known).is_some()) => {}
+                Some(known) => {
+                    is_comment = false;
+                    self.add(known, value);
+                }
+                None => is_comment |= key == "COMMENTS",
             }
-            if self.keys.iter().any(|(other, _)| *other == key) && !key.is_empty() {
-                self.flaws
-                    .push(Flaw { span: self.end.span(), message: format!("`{}` is given twice", shortened(key)) });
-            }
-            self.keys.push((key, value));
         }
         self.flaws.push(Flaw { span: self.end.span(), message: "the header has no `ASCII_DATA @@` at its end".into() });
-        false
+        None
     }
 
-    fn header(&mut self, bytes: usize) -> Option<Header> {
+    fn add(&mut self, key: &'static str, value: Piece<'t>) {
+        match self.find(key) {
+            Some(other) if other.text != value.text => {
+                let message = format!("`{key}` is given twice");
+                self.flaws.push(Flaw { span: self.end.span(), message });
+            }
+            Some(_) => {}
+            None => self.keys.push((key, value)),
+        }
+    }
+
+    fn find(&self, key: &str) -> Option<Piece<'t>> {
+        self.keys.iter().find(|(other, _)| *other == key).map(|(_, value)| *value)
+    }
+
+    fn header(&mut self, mark: &'t str, bytes: usize, hints: &Hints) -> Option<Header<'t>> {
         let movie = |value: Piece<'_>| match value.text {
-            "MOVIE" => Ok(()),
+            text if text.eq_ignore_ascii_case("MOVIE") => Ok(()),
             other => flaw(&value, format!("the file is a `{}`, not a `MOVIE`", shortened(other))),
         };
-        let is_movie = self.required("DATA_TYPE", movie);
-        let rows = self.required("ROWS", |value| size(value, "ROWS"));
-        let cols = self.required("COLS", |value| size(value, "COLS"));
-        let x = self.required("COL_SPACING", |value| length(value, "COL_SPACING"));
-        let y = self.required("ROW_SPACING", |value| length(value, "ROW_SPACING"));
-        let unit = self.required("UNITS", unit);
+        self.optional("DATA_TYPE", movie);
+        let [known_rows, known_cols] = hints.size.map_or([None; 2], |size| size.map(Some));
+        let [known_x, known_y] = hints.pitch.map_or([None; 2], |pitch| pitch.map(Some));
+        let rows = self.required("ROWS", known_rows, |value| size(value, "ROWS"));
+        let cols = self.required("COLS", known_cols, |value| size(value, "COLS"));
+        let x = self.required("COL_SPACING", known_x, |value| length(value, "COL_SPACING"));
+        let y = self.required("ROW_SPACING", known_y, |value| length(value, "ROW_SPACING"));
+        let unit = self.required("UNITS", hints.unit.map(|unit| (unit, 1.0)), unit);
         let start_frame = self.optional("START_FRAME", |value| value.count("`START_FRAME`"));
         let end_frame = self.optional("END_FRAME", |value| Ok((value.count("`END_FRAME`")?, value.span())));
-        let threshold = self.optional("NOISE_THRESHOLD", |value| value.number("`NOISE_THRESHOLD`"));
-        let period = self.optional("SECONDS_PER_FRAME", |value| positive(value, "SECONDS_PER_FRAME"));
+        let threshold = self.optional("NOISE_THRESHOLD", |value| value.decimal("`NOISE_THRESHOLD`"));
+        let period = self.period();
         let (rows, cols) = (rows?, cols?);
         // A cell takes a character and what ends it.
         if rows.checked_mul(cols).and_then(|cells| cells.checked_mul(2)).is_none_or(|least| least > bytes) {
-            let (_, value) = self.keys.iter().find(|(key, _)| *key == "ROWS").expect("it was read");
+            let at = self.find("ROWS").unwrap_or(self.end);
             let message = format!("a frame of {rows} by {cols} cells is more than the file holds");
-            self.flaws.push(Flaw { span: value.span(), message });
+            self.flaws.push(Flaw { span: at.span(), message });
         }
-        is_movie?;
-        let shape = ImageShape { rows, cols, pitch: [x?, y?], unit: unit? };
-        Some(Header { shape, start_frame, end_frame, threshold, period })
+        let (unit, factor) = unit?;
+        let shape = ImageShape { rows, cols, pitch: [x?, y?], unit };
+        // The sensor's own filter counts, whatever the values were turned into.
+        let threshold = threshold.filter(|_| unit == Unit::RAW);
+        Some(Header { shape, factor, start_frame, end_frame, threshold, period, mark })
+    }
+
+    /// The time between two frames [s], however the header says it.
+    fn period(&mut self) -> Option<f64> {
+        let none_is_zero = |number: f64| Some(number).filter(|number| *number > 0.0);
+        let mut time = |key| self.optional(key, |value| not_negative(value, key)).and_then(none_is_zero);
+        let seconds = time("SECONDS_PER_FRAME");
+        let milliseconds = time("MILLISECONDS_PER_FRAME").map(|ms| ms / 1e3);
+        let rate = time("FRAMES_PER_SECOND").map(|rate| 1.0 / rate);
+        let microseconds = time("MICRO_SECOND").filter(|us| *us >= SHORTEST).map(|us| us / 1e6);
+        let period = seconds.or(milliseconds).or(rate).or(microseconds);
+        period.filter(|period| period.is_finite() && *period > 0.0)
     }
 
     fn optional<T>(&mut self, key: &str, read: impl FnOnce(Piece<'t>) -> Result<T, Flaw>) -> Option<T> {
-        let (_, value) = self.keys.iter().find(|(other, _)| *other == key)?;
-        read(*value).map_err(|flaw| self.flaws.push(flaw)).ok()
+        let value = self.find(key)?;
+        read(value).map_err(|flaw| self.flaws.push(flaw)).ok()
     }
 
-    fn required<T>(&mut self, key: &str, read: impl FnOnce(Piece<'t>) -> Result<T, Flaw>) -> Option<T> {
-        if !self.keys.iter().any(|(other, _)| *other == key) {
-            self.flaws.push(Flaw { span: self.end.span(), message: format!("the header has no `{key}`") });
+    /// What a key says; what is known from elsewhere if there is none.
+    fn required<T>(
+        &mut self,
+        key: &str,
+        known: Option<T>,
+        read: impl FnOnce(Piece<'t>) -> Result<T, Flaw>,
+    ) -> Option<T> {
+        match (self.find(key), known) {
+            (None, None) => {
+                self.flaws.push(Flaw { span: self.end.span(), message: format!("the header has no `{key}`") });
+                None
+            }
+            (None, known) => known,
+            (Some(_), _) => self.optional(key, read),
         }
-        self.optional(key, read)
     }
 }
 
@@ -112,29 +188,28 @@ fn size(value: Piece<'_>, key: &str) -> Result<usize, Flaw> {
     }
 }
 
-fn positive(value: Piece<'_>, key: &str) -> Result<f64, Flaw> {
-    let number = value.number(&format!("`{key}`"))?;
-    if number > 0.0 { Ok(number) } else { flaw(&value, format!("`{key}` is greater than 0")) }
+fn not_negative(value: Piece<'_>, key: &str) -> Result<f64, Flaw> {
+    let number = value.words().next().unwrap_or(value).decimal(&format!("`{key}`"))?;
+    if number >= 0.0 { Ok(number) } else { flaw(&value, format!("`{key}` is greater than 0")) }
 }
 
 /// `0.127 centimeters` in metres.
 fn length(value: Piece<'_>, key: &str) -> Result<f64, Flaw> {
-    let (number, name) = value.text.split_once(char::is_whitespace).unwrap_or((value.text, ""));
-    let number = positive(Piece { text: number, start: value.start }, key)?;
-    match LENGTHS.iter().find(|(length, _)| *length == name.trim()) {
-        Some((_, metres)) => Ok(number * metres),
-        None => flaw(
-            &value,
-            format!("`{key}` is in `centimeters`, `millimeters` or `inches`, not `{}`", shortened(name.trim())),
-        ),
+    let is_number = |c: char| c.is_ascii_digit() || ".,+-".contains(c);
+    let name = value.text.trim_start_matches(is_number);
+    let number = value.part(&value.text[..value.text.len() - name.len()]);
+    let number = not_negative(number, key)?;
+    match units::metres(name) {
+        Some(metres) if number > 0.0 && (number * metres).is_finite() => Ok(number * metres),
+        Some(_) => flaw(&value, format!("`{key}` is greater than 0")),
+        None => {
+            let name = shortened(name.trim());
+            flaw(&value, format!("`{key}` is in `centimeters`, `millimeters` or `inches`, not `{name}`"))
+        }
     }
 }
 
-fn unit(value: Piece<'_>) -> Result<Unit, Flaw> {
-    match UNITS.iter().find(|(name, _)| *name == value.text) {
-        Some((_, unit)) => Ok(*unit),
-        None => {
-            flaw(&value, format!("the unit `{}` is not known here; `raw`, `kPa` and `N` are", shortened(value.text)))
-        }
-    }
+fn unit(value: Piece<'_>) -> Result<(Unit, f64), Flaw> {
+    let unknown = || format!("the unit `{}` is not known here; known are {}", shortened(value.text), units::KNOWN);
+    units::unit(value.text).ok_or_else(|| Flaw { span: value.span(), message: unknown() })
 }

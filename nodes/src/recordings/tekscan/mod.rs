@@ -1,23 +1,26 @@
-//! The text of a Tekscan ASCII movie: a header of `KEY value` lines up to `ASCII_DATA`, then frames, then `@@`.
+//! The text of a Tekscan ASCII movie: a header of `KEY value` lines up to `ASCII_DATA @@`, then frames, then `@@`.
 //!
-//! A frame is a line `Frame 3, 0.2,, 12/2/2019 6:21:52.54PM,,,Raw Sum=,,308` and a line of cells for each row; `B` is
-//! a cell where there is no sensel. Anything else is refused at its place: a recording that was cut or edited by hand
-//! must not pass as data. Nothing is allocated from a number in the header before the file is seen to hold as much.
+//! I-Scan, F-Scan and CONFORMat write it, as `.csv` and as `.asf`. A frame is a line `Frame 3`, with or without more
+//! (`Frame 3, 0.2,, 12/2/2019 6:21:52.54PM,,,Raw Sum=,,308`), and a line of cells for each row; `B` is a cell where
+//! there is no sensel. Pressures become kPa, forces become N. Anything else is refused at its place: a recording that
+//! was cut or edited by hand must not pass as data. The header names the mark that ends the movie, so a file without
+//! that mark is cut off.
 
 mod header;
 
 use tactflow_runtime::signal::{ImageShape, Unit};
 
-use super::text::{self, Flaw, Lines, Piece, Wrong, flaw, shortened};
-use super::{Format, Frame, Hints, Recording, Refusal, Window};
+use super::text::{self, Flaw, Lines, Notation, Piece, Wrong, flaw, shortened};
+use super::{Format, Frame, Head, Hints, Recording, Refusal, Window};
 use header::Header;
 
-pub(super) const FORMAT: Format = Format {
-    name: "tekscan",
-    title: "Tekscan ASCII movie (.csv, .asf)",
-    recognises: |head| head.text.trim_start().starts_with("DATA_TYPE "),
-    read,
-};
+pub(super) const FORMAT: Format =
+    Format { name: "tekscan", title: "Tekscan ASCII movie (.csv, .asf)", recognises, read };
+
+fn recognises(head: &Head<'_>) -> bool {
+    let is_key = |line: &str| line.starts_with("DATA_TYPE ") || line.starts_with("ASCII_DATA");
+    head.text.lines().any(|line| is_key(line.trim_start().trim_start_matches('"')))
+}
 
 fn read(bytes: &[u8], hints: &Hints) -> Result<Recording, Refusal> {
     text::read(bytes, hints, parse)
@@ -26,11 +29,22 @@ fn read(bytes: &[u8], hints: &Hints) -> Result<Recording, Refusal> {
 /// Reads a movie: everything that is wrong with its header, or the first thing that is wrong with its frames.
 fn parse(text: &str, hints: &Hints) -> Result<Recording, Wrong> {
     let mut lines = Lines::new(text);
-    let header = header::read(&mut lines, text.len())?;
-    let mut reader = Reader { header: &header, frames: Vec::new(), cells: Vec::new(), dead: Vec::new() };
+    let header = header::read(&mut lines, text.len(), hints)?;
+    let tactels = header.shape.tactels();
+    // Both counts are of what is there.
+    let frames = text.matches("Frame").count().min(text.len() / (2 * tactels));
+    let mut reader = Reader {
+        header: &header,
+        notation: None,
+        first: None,
+        times: Vec::new(),
+        frames: Vec::with_capacity(frames),
+        cells: Vec::with_capacity(frames * tactels),
+        dead: Vec::new(),
+    };
     reader.frames(&mut lines)?;
-    let Reader { frames, cells, dead, .. } = reader;
-    let period = hints.period(Some(header.period.unwrap_or_else(|| mean_step(&frames))))?;
+    let Reader { mut frames, cells, dead, times, .. } = reader;
+    let period = set_times(&mut frames, &times, header.period, hints)?;
     let Header { mut shape, threshold, .. } = header;
     shape.unit = hints.unit(Some(shape.unit))?;
     shape.pitch = hints.pitch(Some(shape.pitch))?;
@@ -38,18 +52,30 @@ fn parse(text: &str, hints: &Hints) -> Result<Recording, Wrong> {
     Ok(Recording { format: FORMAT.name, shape, frames, cells, dead, threshold, period, force: None })
 }
 
-/// Mean time between two frames [s]; a second if that says nothing.
-fn mean_step(frames: &[Frame]) -> f64 {
-    match frames {
-        [first, .., last] if last.time > first.time => {
-            (last.time - first.time) as f64 * 1e-9 / (frames.len() - 1) as f64
-        }
-        _ => 1.0,
+/// Gives the frames their times and says the nominal time between two of them [s].
+///
+/// Times that the file rounds until two are one are no times: then the frames come at the nominal rate.
+fn set_times(frames: &mut [Frame], times: &[i64], period: Option<f64>, hints: &Hints) -> Result<f64, Refusal> {
+    let is_alone = frames.len() == 1;
+    let mean = match times {
+        [first, .., last] if last > first => Some((last - first) as f64 * 1e-9 / (times.len() - 1) as f64),
+        _ => hints.rate_hz.map(|rate| 1.0 / rate).or(is_alone.then_some(1.0)),
+    };
+    let period = hints.period(period.or(mean))?;
+    let are_times = times.len() == frames.len() && times.is_sorted_by(|a, b| a < b);
+    for (index, frame) in frames.iter_mut().enumerate() {
+        frame.time = if are_times { times[index] - times[0] } else { (index as f64 * period * 1e9).round() as i64 };
     }
+    Ok(period)
 }
 
 struct Reader<'h> {
-    header: &'h Header,
+    header: &'h Header<'h>,
+    notation: Option<Notation>,
+    /// Where the number of the first frame stands.
+    first: Option<std::ops::Range<usize>>,
+    /// The times that the file gives the frames [ns]; none if it gives the first none.
+    times: Vec<i64>,
     frames: Vec<Frame>,
     cells: Vec<f32>,
     dead: Vec<usize>,
@@ -58,11 +84,11 @@ struct Reader<'h> {
 impl Reader<'_> {
     fn frames(&mut self, lines: &mut Lines<'_>) -> Result<(), Flaw> {
         while let Some(line) = lines.next() {
-            let line = line.trimmed();
+            let line = header::bare(line);
             match line.text {
                 "" => {}
-                "@@" => return self.end(line, lines),
-                text if text.starts_with("Frame") => self.frame(line, lines)?,
+                text if text == self.header.mark => return self.end(line, lines),
+                _ if is_frame_line(line) => self.frame(line, lines)?,
                 text => return flaw(&line, format!("expected a frame or `@@`, found `{}`", shortened(text))),
             }
         }
@@ -72,55 +98,78 @@ impl Reader<'_> {
 
     /// The `@@`: nothing may be missing before it, and nothing may come after it.
     fn end(&self, at: Piece<'_>, lines: &mut Lines<'_>) -> Result<(), Flaw> {
-        let Some(last) = self.frames.last() else { return flaw(&at, "the movie has no frame") };
-        match &self.header.end_frame {
-            Some((end, span)) if last.number != *end => {
+        let (Some(first), Some(last)) = (self.frames.first(), self.frames.last()) else {
+            return flaw(&at, "the movie has no frame");
+        };
+        let Header { start_frame, end_frame, .. } = self.header;
+        // A part of a movie may be numbered anew.
+        let end = end_frame.as_ref().map(|(end, _)| *end);
+        let count = self.frames.len() as u64;
+        let is_whole = start_frame.zip(end).is_some_and(|(start, end)| end.checked_sub(start) == Some(count - 1));
+        match (start_frame, end_frame) {
+            _ if is_whole => {}
+            (Some(start), _) if *start != first.number => {
+                let message = format!("the first frame is {}, but `START_FRAME` says otherwise", first.number);
+                let span = self.first.clone().expect("it was noted with the first frame");
+                return Err(Flaw { span, message });
+            }
+            (_, Some((end, span))) if last.number != *end => {
                 let message = format!("`END_FRAME` promises {end} frames, but the last is frame {}", last.number);
                 return Err(Flaw { span: span.clone(), message });
             }
             _ => {}
         }
-        match lines.find(|line| !line.text.trim().is_empty()) {
-            Some(line) => flaw(&line.trimmed(), "something comes after the movie's end, `@@`"),
+        match lines.map(header::bare).find(|line| !line.text.is_empty()) {
+            Some(line) => flaw(&line, "something comes after the movie's end, `@@`"),
             None => Ok(()),
         }
     }
 
     fn frame(&mut self, line: Piece<'_>, lines: &mut Lines<'_>) -> Result<(), Flaw> {
-        let (frame, sum) = frame_line(line)?;
-        let number = line.split(',').next().expect("a split gives at least one").trimmed();
+        let Line { number, at, time, sum } = frame_line(line)?;
         match self.frames.last() {
-            Some(last) if last.number.checked_add(1) != Some(frame.number) => {
-                return flaw(&number, format!("frame {} comes after frame {}", frame.number, last.number));
+            Some(last) if last.number.checked_add(1) != Some(number) => {
+                return flaw(&at, format!("frame {number} comes after frame {}", last.number));
             }
-            Some(last) if last.time > frame.time => {
-                let at = line.split(',').nth(1).expect("the time was read from it").trimmed();
-                return flaw(&at, "the time goes back");
-            }
-            None if self.header.start_frame.is_some_and(|start| start != frame.number) => {
-                return flaw(&number, format!("the first frame is {}, but `START_FRAME` says otherwise", frame.number));
-            }
+            None => self.first = Some(at.span()),
             _ => {}
         }
+        self.time(time)?;
         let start = self.cells.len();
         let mut total = 0.0;
         for row in 0..self.header.shape.rows {
-            total += self.row(frame.number, row, lines)?;
+            total += self.row(number, row, lines)?;
         }
         match sum {
-            Some((wanted, at))
-                if self.header.shape.unit == Unit::RAW && (total - wanted).abs() > 1e-9 * total.abs() =>
-            {
-                return flaw(
-                    &at,
-                    format!("`Raw Sum` says {wanted}, but the cells of frame {} sum to {total}", frame.number),
-                );
+            // A sum of averages is rounded to a count.
+            Some((wanted, at)) if self.header.shape.unit == Unit::RAW && (total - wanted).abs() > 0.5 => {
+                let message = format!("`Raw Sum` says {wanted}, but the cells of frame {number} sum to {total}");
+                return flaw(&at, message);
             }
             _ => {}
         }
         let ImageShape { rows, cols, .. } = self.header.shape;
-        let window = Window::whole(rows, cols);
-        self.frames.push(Frame { number: frame.number, time: frame.time, window, start });
+        self.frames.push(Frame { number, time: 0, window: Window::whole(rows, cols), start });
+        Ok(())
+    }
+
+    /// Notes the time of the next frame. The first frame decides whether they have times.
+    fn time(&mut self, field: Option<Piece<'_>>) -> Result<(), Flaw> {
+        let is_first = self.frames.is_empty();
+        let Some(field) = field.filter(|field| !is_first || field.decimal("").is_ok()) else { return Ok(()) };
+        if !is_first && self.times.is_empty() {
+            return Ok(());
+        }
+        let seconds = field.decimal("the frame's time")?;
+        if !(0.0..1e9).contains(&seconds) {
+            let text = shortened(field.text);
+            return flaw(&field, format!("the frame's time is no number of seconds from 0 to 1e9: `{text}`"));
+        }
+        let time = (seconds * 1e9).round() as i64;
+        if self.times.last().is_some_and(|last| *last > time) {
+            return flaw(&field, "the time goes back");
+        }
+        self.times.push(time);
         Ok(())
     }
 
@@ -128,10 +177,11 @@ impl Reader<'_> {
     fn row(&mut self, frame: u64, row: usize, lines: &mut Lines<'_>) -> Result<f64, Flaw> {
         let ImageShape { rows, cols, .. } = self.header.shape;
         let line = lines.next().map_or_else(|| lines.end(), Piece::trimmed);
-        if line.text.is_empty() || line.text == "@@" || line.text.starts_with("Frame") {
+        if line.text.is_empty() || line.text == self.header.mark || is_frame_line(line) {
             return flaw(&line, format!("frame {frame} ends after {row} of its {rows} rows"));
         }
-        let found = line.split(',').count();
+        let notation = *self.notation.get_or_insert_with(|| Notation::of(line.text));
+        let found = notation.fields(line).count();
         if found != cols {
             let cut = if lines.is_at_end() { ": the file ends in the middle of it" } else { "" };
             let message =
@@ -139,16 +189,16 @@ impl Reader<'_> {
             return flaw(&line, message);
         }
         let mut sum = 0.0;
-        for (col, cell) in line.split(',').enumerate() {
-            let value = self.cell(row * cols + col, cell.trimmed())?;
+        for (col, cell) in notation.fields(line).enumerate() {
+            let value = self.cell(row * cols + col, cell, notation)?;
             sum += f64::from(value);
             self.cells.push(value);
         }
         Ok(sum)
     }
 
-    fn cell(&mut self, index: usize, cell: Piece<'_>) -> Result<f32, Flaw> {
-        let is_dead = cell.text == "B";
+    fn cell(&mut self, index: usize, cell: Piece<'_>, notation: Notation) -> Result<f32, Flaw> {
+        let is_dead = matches!(cell.text, "B" | "b");
         if self.frames.is_empty() {
             if is_dead {
                 self.dead.push(index);
@@ -164,36 +214,45 @@ impl Reader<'_> {
         if is_dead {
             return Ok(0.0);
         }
-        let value = cell.number("this cell")? as f32;
-        if value.is_finite() { Ok(value) } else { flaw(&cell, format!("this cell is too large: `{}`", cell.text)) }
+        let value = (notation.number(cell, "this cell")? * self.header.factor) as f32;
+        if value.is_finite() {
+            Ok(value)
+        } else {
+            flaw(&cell, format!("this cell is too large: `{}`", shortened(cell.text)))
+        }
     }
+}
+
+fn is_frame_line(line: Piece<'_>) -> bool {
+    line.part_after_quote().after("Frame").is_some()
 }
 
 /// What the line before a frame says.
-struct Line {
+struct Line<'t> {
     number: u64,
-    time: i64,
+    /// Where the number stands.
+    at: Piece<'t>,
+    /// What stands where the time would.
+    time: Option<Piece<'t>>,
+    /// The sum of all cells [raw], and where it stands.
+    sum: Option<(f64, Piece<'t>)>,
 }
 
-/// A sum, and where it stands.
-type Sum<'t> = Option<(f64, Piece<'t>)>;
-
-/// `Frame 3, 0.2,, …,,,Raw Sum=,,308`: its number, its time and its sum, if there is one.
-fn frame_line(line: Piece<'_>) -> Result<(Line, Sum<'_>), Flaw> {
-    let mut fields = line.split(',').map(Piece::trimmed);
-    let first = fields.next().expect("a split gives at least one");
-    let number = first.text.strip_prefix("Frame").unwrap_or(first.text);
-    let number = Piece { text: number, start: first.start + first.text.len() - number.len() }.trimmed();
-    let number = number.count("the frame's number")?;
-    let Some(time) = fields.next() else { return flaw(&line, format!("frame {number} has no time")) };
-    let seconds = time.number("the frame's time")?;
-    if !(0.0..1e9).contains(&seconds) {
-        return flaw(&time, format!("the frame's time is no number of seconds from 0 to 1e9: `{}`", time.text));
-    }
-    let frame = Line { number, time: (seconds * 1e9).round() as i64 };
-    let Some(key) = fields.find(|field| field.text.starts_with("Raw Sum")) else { return Ok((frame, None)) };
-    match fields.find(|field| !field.text.is_empty()) {
-        Some(sum) => Ok((frame, Some((sum.number("the frame's sum")?, sum)))),
+/// `Frame 3`, `Frame 3, 0.2,, …,,,Raw Sum=,,308`: its number, its time and its sum, if there are such.
+fn frame_line(line: Piece<'_>) -> Result<Line<'_>, Flaw> {
+    let rest = line.part_after_quote().after("Frame").expect("it is such a line");
+    let rest = rest.part(rest.text.trim_start_matches([':', '#', '=', ' ', '\t']));
+    let mut fields = Notation::of(rest.text).fields(rest);
+    let at = fields.next().unwrap_or(rest);
+    let number = at.count("the frame's number")?;
+    let time = fields.next();
+    let Some(key) = fields.find(|field| field.after("Raw Sum").is_some()) else {
+        return Ok(Line { number, at, time, sum: None });
+    };
+    let beside = key.text.split_once('=').map(|(_, sum)| key.part(sum).trimmed());
+    let sum = beside.filter(|sum| !sum.text.is_empty()).or_else(|| fields.find(|field| !field.text.is_empty()));
+    match sum {
+        Some(sum) => Ok(Line { number, at, time, sum: Some((sum.decimal("the frame's sum")?, sum)) }),
         None => flaw(&key, "`Raw Sum=` has no number: the line is cut off"),
     }
 }

@@ -62,22 +62,85 @@ fn a_small_movie_in_any_dress() {
     assert_eq!(frames, [(1, 0, 0), (2, 100_000_000, 6)]);
     assert_eq!((movie.dead.as_slice(), movie.shape.rows, movie.shape.cols), ([0].as_slice(), 2, 3));
     assert_eq!(movie.shape.pitch, [0.004, 0.0127], "x runs along the columns");
+    let spreadsheet = |text: &str| text.lines().map(|line| format!("{line},,,,,,\n")).collect::<String>();
+    let wide: String = SMALL.encode_utf16().flat_map(|unit| unit.to_le_bytes()).map(char::from).collect();
+    assert_eq!(read(&wide.chars().map(|c| c as u8).collect::<Vec<_>>(), &Hints::default()).as_ref(), Ok(&movie));
+    let semicolons = SMALL.replace(',', ";").replace("0.1", "0,1").replace("0.5", "0,5").replace("1;2", "1,0;2,00");
     let same = [
         SMALL.replace('\n', "\r\n"),
+        SMALL.replace('\n', "\r"),
         format!("\u{feff}{SMALL}"),
-        format!("{}\n\n", SMALL.trim_end()),
+        format!("\n{SMALL}\n\n"),
         SMALL.trim_end().into(),
         SMALL.replace("1,2\n", " 1 , 2 \n"),
         SMALL.replace("START_FRAME 1\nEND_FRAME 2\n", ""),
+        SMALL.replace("START_FRAME 1\nEND_FRAME 2\n", "START_FRAME 11\nEND_FRAME 12\n"),
         SMALL.replace("SECONDS_PER_FRAME 0.1\n", ""),
+        SMALL.replace("SECONDS_PER_FRAME 0.1\n", "SECONDS_PER_FRAME 0\nMICRO_SECOND 100000\n"),
+        SMALL.replace(" 0.1,,", " 0.0,,"),
+        SMALL.replace(" 0,,", " 7.5,,").replace(" 0.1,,", " 7.6,,"),
+        SMALL.replace(", 0,,", ",,,").replace(", 0.1,,", ",,,"),
+        SMALL.replace(", 0,, 12/2/2019 6:21:52.34PM,,,Raw Sum=,,15", "").replace("2, 0.1,, 12", "2\t12"),
+        SMALL.replace("0.5 inches", "12.7 millimetres").replace("4 millimeters", "4mm"),
+        SMALL.replace("ROWS 2", "rows 2").replace("MOVIE", "movie").replace("raw", "Raw"),
+        SMALL.replace("UNITS raw", "UNITS raw\nMAP_INDEX 0\nMAP_INDEX 1"),
+        SMALL.replace("UNITS raw", "COMMENTS:\nFrame by frame,\n\nROWS of teeth\nunits are raw\nUNITS raw"),
+        SMALL.replace("Sum=,,15", "Sum= 15").replace("Sum=,,7", "Sum=7.4"),
+        SMALL.replace("@@\n\n", "%%\n\n").replace("\n@@\n", "\n%%\n"),
+        SMALL.replace("B,1,2", "B 1 2").replace("3,4,5", "3 4  5").replace("B,0,0", "B 0 0").replace("0,0,7", "0 0 7"),
+        SMALL
+            .replace("B,1,2", "B\t1\t2\t")
+            .replace("3,4,5", "3\t4\t5")
+            .replace("B,0,0", "b\t0\t0")
+            .replace("0,0,7", "0\t0\t7"),
+        spreadsheet(SMALL),
+        spreadsheet(SMALL).replace("DATA_TYPE MOVIE", "\"DATA_TYPE MOVIE\""),
+        semicolons,
     ];
     for text in same {
         assert_eq!(parse(&text).as_ref(), Ok(&movie), "{text}");
     }
-    let bare =
-        parse(&SMALL.replace("NOISE_THRESHOLD 3\n", "").replace("UNITS raw", "UNITS kPa").replace("=,,15", "=,,9"));
-    let bare = bare.expect("the sum is of raw values and says nothing of others");
-    assert_eq!((bare.threshold, bare.shape.unit.to_string().as_str()), (None, "kPa"));
+}
+
+#[test]
+fn an_insole_that_only_numbers_its_frames() {
+    let text = SMALL.replace(", 0,, 12/2/2019 6:21:52.34PM,,,Raw Sum=,,15", "");
+    let text = text.replace(", 0.1,, 12/2/2019 6:21:52.44PM,,,Raw Sum=,,7", "").replace("UNITS raw", "UNITS KPa");
+    let movie = parse(&text.replace("FRAME 0.1", "FRAME 0.032")).unwrap();
+    assert_eq!((movie.frames[1].time, movie.period), (32_000_000, 0.032));
+    assert_eq!(movie.threshold, None, "the filter counts and knows no kPa");
+    let silent = text.replace("SECONDS_PER_FRAME 0.1\n", "");
+    assert_eq!(flaws(silent.as_bytes()), [(0, "the file does not say how fast its frames came".into())]);
+    let hinted = read(silent.as_bytes(), &Hints { rate_hz: Some(50.0), ..Hints::default() }).unwrap();
+    assert_eq!((hinted.frames[1].time, hinted.period), (20_000_000, 0.02));
+}
+
+#[test]
+fn pressures_become_kpa_and_forces_newtons() {
+    let cases =
+        [("PSI", "kPa", 6.894_757), ("N/cm²", "kPa", 10.0), ("mmHg", "kPa", 0.133_322_4), ("lbs", "N", 4.448_222)];
+    for (name, ours, factor) in cases {
+        let latin: Vec<u8> = SMALL.replace("UNITS raw", &format!("UNITS {name}")).chars().map(|c| c as u8).collect();
+        let movie = read(&latin, &Hints::default()).expect(name);
+        assert_eq!(movie.shape.unit.to_string(), ours);
+        assert!((f64::from(movie.cells[5]) / 5.0 / factor - 1.0).abs() < 1e-6, "{name}: {:?}", movie.cells);
+    }
+}
+
+#[test]
+fn hints_fill_gaps_and_contradict_nothing() {
+    let unsaid = SMALL.replace("UNITS raw\n", "").replace("COL_SPACING 4 millimeters\n", "");
+    let hints = Hints { unit: Some(Unit::RAW), pitch: Some([0.004, 0.0127]), ..Hints::default() };
+    assert_eq!(read(unsaid.as_bytes(), &hints), parse(SMALL));
+    let cases = [
+        (Hints { unit: Some(Unit::NEWTON), ..Hints::default() }, "the file says otherwise: raw"),
+        (Hints { pitch: Some([0.004, 0.004]), ..Hints::default() }, "the file says otherwise: [4, 12.7] mm"),
+        (Hints { rate_hz: Some(50.0), ..Hints::default() }, "the file says otherwise: 10 frames a second"),
+        (Hints { size: Some([3, 2]), ..Hints::default() }, "the file says otherwise: 2 rows by 3 columns"),
+    ];
+    for (hints, message) in cases {
+        assert_eq!(complaints(read(SMALL.as_bytes(), &hints)), [(0, message.into())]);
+    }
 }
 
 #[test]
@@ -99,14 +162,20 @@ fn damaged_files_say_what_and_where() {
             "a frame of 2 by 18446744073709551615 cells is more than the file holds",
         ),
         ("COLS 3", &format!("COLS {huge}"), 3, &format!("`COLS` is not a whole number: `{huge}`")),
-        ("COLS 3", "COLS 3\nROWS 2", 4, "`ROWS` is given twice"),
+        ("COLS 3", "COLS 3\nROWS 3", 4, "`ROWS` is given twice"),
         ("0.5 inches", "0.5 feet", 4, "`ROW_SPACING` is in `centimeters`, `millimeters` or `inches`, not `feet`"),
         ("4 millimeters", "0 millimeters", 5, "`COL_SPACING` is greater than 0"),
         ("THRESHOLD 3", "THRESHOLD none", 6, "`NOISE_THRESHOLD` is not a number: `none`"),
         ("FRAME 0.1", "FRAME -0.1", 7, "`SECONDS_PER_FRAME` is greater than 0"),
         ("START_FRAME 1", "START_FRAME 5", 13, "the first frame is 1, but `START_FRAME` says otherwise"),
         ("END_FRAME 2", "END_FRAME 3", 9, "`END_FRAME` promises 3 frames, but the last is frame 2"),
-        ("UNITS raw", "UNITS PSI", 10, "the unit `PSI` is not known here; `raw`, `kPa` and `N` are"),
+        (
+            "UNITS raw",
+            "UNITS stone",
+            10,
+            "the unit `stone` is not known here; known are `raw`, pressures (`kPa`, `N/cm2`, `PSI`, `mmHg`, …) and \
+             forces (`N`, `lbs`, `kg`, …)",
+        ),
         ("ASCII_DATA @@\n", "", 12, "the header has no `ASCII_DATA @@` at its end"),
         ("Frame 1,", "Frame one,", 13, "the frame's number is not a whole number: `one`"),
         (" 0.1,,", " ,,", 17, "the frame's time is not a number: ``"),
@@ -137,11 +206,13 @@ fn damaged_files_say_what_and_where() {
         ("\nFrame 2", "\nhello\nFrame 2", 17, "expected a frame or `@@`, found `hello`"),
         ("@@\n\nFrame 1", "@@\n@@\nFrame 1", 12, "the movie has no frame"),
         ("7\n@@\n", "7\n@@\nmore", 21, "something comes after the movie's end, `@@`"),
-        ("DATA_TYPE", "FATA_TYPE", 0, "stranger"),
     ];
     check_damages(SMALL, "movie.csv", &Hints::default(), cases);
     assert_eq!(flaws(b""), [(0, "stranger".into())]);
     assert_eq!(flaws(b"\x89PNG\r\n"), [(0, "stranger".into())]);
+    for cut in 0..SMALL.trim_end().len() {
+        assert_ne!(flaws(&SMALL.as_bytes()[..cut]), [], "cut after {cut} bytes");
+    }
     let several = flaws(SMALL.replace("ROWS 2\n", "").replace("UNITS raw", "UNITS x").as_bytes());
     assert_eq!(several.len(), 2, "every mistake of the header at once: {several:?}");
 }
