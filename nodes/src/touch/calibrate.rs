@@ -6,7 +6,7 @@
 use std::str::FromStr;
 
 use tactflow_runtime::graph::{Item, Value};
-use tactflow_runtime::node::{Mistake, Mistakes, Node, Param, Reader, Setup, Tick};
+use tactflow_runtime::node::{Mistake, Mistakes, Node, Param, Reader, Setup, Tick, Written};
 use tactflow_runtime::signal::{ImageShape, Unit};
 use tactflow_runtime::{inputs, outputs, params};
 
@@ -51,6 +51,13 @@ impl Param for PerTactel {
                 reader.wrong_type(value, Self::EXPECTS);
                 None
             }
+        }
+    }
+
+    fn written(&self) -> Option<Written> {
+        match self {
+            Self::All(value) => value.written(),
+            Self::Rows(rows) => rows.written(),
         }
     }
 }
