@@ -9,7 +9,7 @@
 
 use std::ops::Range;
 
-use tactflow_runtime::node::{Count, Mistake, Mistakes, Node, Param, Reader, Setup, Tick, Value, read_leaf};
+use tactflow_runtime::node::{Count, Mistake, Mistakes, Node, Param, Reader, Setup, Tick, Value, Written, read_leaf};
 use tactflow_runtime::signal::{Grid, Image, Mask, Region, RegionsShape, Run};
 use tactflow_runtime::{inputs, outputs, params};
 
@@ -61,6 +61,13 @@ impl Param for Neighbours {
                 None
             }
         }
+    }
+
+    fn written(&self) -> Option<Written> {
+        Some(match self {
+            Self::Four => 4.into(),
+            Self::Eight => 8.into(),
+        })
     }
 }
 

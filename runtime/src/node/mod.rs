@@ -18,6 +18,7 @@
 mod erased;
 mod macros;
 mod mistake;
+mod param_spec;
 mod params;
 mod ports;
 
@@ -26,9 +27,8 @@ use crate::signal::Stamp;
 pub use crate::graph::Value;
 pub use erased::{AnyNode, Built, Configured, Given, NodeSpec, NodeType, of};
 pub use mistake::{At, Mistake, Mistakes};
-pub use params::{
-    Bit, Count, FilePath, Map, NonNegative, Param, ParamSpec, Positive, Rate, Ratio, Reader, Word, read_leaf,
-};
+pub use param_spec::{ParamSpec, Repeats, Written, written_table};
+pub use params::{Bit, Count, FilePath, Map, NonNegative, Param, Positive, Rate, Ratio, Reader, Word, read_leaf};
 pub use ports::{Bus, In, InputSet, Many, Need, Out, OutputSet, PortId, PortSpec, View, Wires};
 
 /// A node: configuration in `self`, made at load; state apart, so that a mode is a second configuration.

@@ -13,7 +13,9 @@ use std::str::FromStr;
 
 use tactflow_runtime::diagnostic::Code;
 use tactflow_runtime::graph::{Item, Value};
-use tactflow_runtime::node::{At, Count, FilePath, Mistake, Mistakes, Node, Param, Positive, Reader, Setup, Tick};
+use tactflow_runtime::node::{
+    At, Count, FilePath, Mistake, Mistakes, Node, Param, Positive, Reader, Setup, Tick, Written,
+};
 use tactflow_runtime::signal::{ImageShape, Unit};
 use tactflow_runtime::{inputs, outputs, params, state};
 
@@ -81,6 +83,13 @@ impl Param for PerTactel {
                 reader.wrong_type(value, Self::EXPECTS);
                 None
             }
+        }
+    }
+
+    fn written(&self) -> Option<Written> {
+        match self {
+            Self::All(value) => value.written(),
+            Self::Rows(rows) => rows.written(),
         }
     }
 }
