@@ -29,6 +29,7 @@
 
 pub mod arm;
 pub mod builtin;
+pub mod calibration;
 pub mod devices;
 pub mod recordings;
 pub mod roles;

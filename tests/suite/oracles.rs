@@ -2,4 +2,5 @@
 
 mod lines;
 mod motion;
+mod plates;
 mod touch;

@@ -204,6 +204,7 @@ impl HintArgs {
             pitch: self.pitch_mm.map(|pitch| pitch.map(|mm| mm * 1e-3)),
             rate_hz: self.rate_hz,
             size: self.size.map(|size| size.map(|count| count as usize)),
+            ..Hints::default()
         };
         recordings::read(bytes, &path.to_string_lossy(), &hints).ok()
     }

@@ -53,8 +53,11 @@ impl Station {
         is_every_tick: bool,
     ) -> Self {
         let all = || inputs.iter().flat_map(|(need, ports)| ports.iter().map(|port| (*need, port.mark)));
+        // A delayed input closes a loop: there it would wake the node with what the node itself has made, and hold its
+        // stamp back for ever. So it wakes only a node that nothing else wakes.
+        let is_woken = all().any(|(need, _)| matches!(need, Need::Required | Need::Trigger | Need::Many));
         let (required, others) = (all().filter(|(need, _)| *need == Need::Required), all());
-        let others = others.filter(|(need, _)| *need != Need::Required);
+        let others = others.filter(|(need, _)| *need != Need::Required && !(is_woken && *need == Need::Delayed));
         Self {
             node,
             wires: Wires::new(inputs),

@@ -202,7 +202,7 @@ fn frame_param(node: &FlatNode, spec: &NodeSpec, param: &str) -> Option<String> 
     let given = node.block.params.as_table().and_then(|table| table.get(param)).map(|value| value.as_str());
     given
         .unwrap_or_else(|| {
-            let default = spec.params.iter().find(|spec| spec.name == param)?.default?;
+            let default = spec.params.iter().find(|spec| spec.name == param)?.default.as_deref()?;
             default.split('"').nth(1)
         })
         .map(str::to_owned)

@@ -25,7 +25,11 @@ macro_rules! params {
 
             fn fields() -> Vec<$crate::node::ParamSpec> {
                 vec![$($crate::node::ParamSpec::of::<$ty>(
-                    stringify!($field), concat!($($doc, "\n"),*), None$(.or(Some(stringify!($default))))?)),*]
+                    stringify!($field), concat!($($doc, "\n"),*), None$(.or(Some(|| $default)))?, stringify!($($default)?))),*]
+            }
+
+            fn written(&self) -> Option<$crate::node::Written> {
+                $crate::node::written_table([$((stringify!($field), $crate::node::Param::written(&self.$field))),*])
             }
 
             #[allow(unused_mut, unused_variables, reason = "a node may have no parameters")]

@@ -13,11 +13,12 @@
 //! | `Trigger<T>` | `Option<In<T>>` | new or lost | `None` |
 //! | `Option<T>` | `Option<In<T>>` | lost | `None` |
 //! | `Many<T>` | `Many<T>`, each named in the graph | any is new or lost | that one is `None` |
-//! | `Delayed<T>` | `Option<In<T>>` as the last tick left it | it was new or lost then | `None` |
+//! | `Delayed<T>` | `Option<In<T>>` as the last tick left it | it was new or lost then, where no other input wakes it | `None` |
 
 mod erased;
 mod macros;
 mod mistake;
+mod param_spec;
 mod params;
 mod ports;
 
@@ -26,9 +27,8 @@ use crate::signal::Stamp;
 pub use crate::graph::Value;
 pub use erased::{AnyNode, Built, Configured, Given, NodeSpec, NodeType, of};
 pub use mistake::{At, Mistake, Mistakes};
-pub use params::{
-    Bit, Count, FilePath, Map, NonNegative, Param, ParamSpec, Positive, Rate, Ratio, Reader, Word, read_leaf,
-};
+pub use param_spec::{ParamSpec, Repeats, Written, written_table};
+pub use params::{Bit, Count, FilePath, Map, NonNegative, Param, Positive, Rate, Ratio, Reader, Word, read_leaf};
 pub use ports::{Bus, In, InputSet, Many, Need, Out, OutputSet, PortId, PortSpec, View, Wires};
 
 /// A node: configuration in `self`, made at load; state apart, so that a mode is a second configuration.

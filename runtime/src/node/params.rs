@@ -7,41 +7,17 @@ use std::path::PathBuf;
 
 use serde::de::DeserializeOwned;
 
-use super::{At, Mistake, Mistakes};
+use super::{At, Mistake, Mistakes, ParamSpec, Repeats, Written};
 use crate::diagnostic::{Code, closest, meant};
 use crate::graph::{Item, Key, Sources, Table, Value};
 use crate::signal::Unit;
-
-/// What is known of a parameter without a graph.
-#[derive(Debug, Clone)]
-pub struct ParamSpec {
-    /// Name in the graph file.
-    pub name: &'static str,
-    /// Meaning, with the unit in brackets.
-    pub doc: &'static str,
-    /// What it takes, for a person.
-    pub takes: String,
-    /// Default as written in the node's file; none if it must be given.
-    pub default: Option<&'static str>,
-    /// Whether it may be left out.
-    pub is_optional: bool,
-    /// The parameters of a nested table.
-    pub fields: Vec<ParamSpec>,
-}
-
-impl ParamSpec {
-    /// The description of a field of type `T`.
-    #[must_use]
-    pub fn of<T: Param>(name: &'static str, doc: &'static str, default: Option<&'static str>) -> Self {
-        let is_optional = default.is_some() || T::when_missing().is_some();
-        Self { name, doc, takes: T::takes(), default, is_optional, fields: T::fields() }
-    }
-}
 
 /// Something a graph file may set.
 pub trait Param: Sized {
     /// What it takes, for a person: `a number`.
     const EXPECTS: &'static str;
+    /// How often the fields are there.
+    const REPEATS: Repeats = Repeats::Once;
 
     /// Reads it; a mistake goes to the reader.
     fn read(value: &Value, reader: &mut Reader<'_>) -> Option<Self>;
@@ -61,6 +37,12 @@ pub trait Param: Sized {
     /// What it is when it is not given and has no default; none if it must be given.
     #[must_use]
     fn when_missing() -> Option<Self> {
+        None
+    }
+
+    /// As a graph file would say it, for the reference; none if it says nothing, or cannot say it.
+    #[must_use]
+    fn written(&self) -> Option<Written> {
         None
     }
 }
@@ -175,6 +157,9 @@ macro_rules! leaves {
             fn read(value: &Value, reader: &mut Reader<'_>) -> Option<Self> {
                 read_leaf(value, reader, Self::EXPECTS)
             }
+            fn written(&self) -> Option<Written> {
+                Written::try_from(self).ok()
+            }
         }
     )*};
 }
@@ -191,6 +176,10 @@ impl Param for f64 {
             return None;
         }
         Some(number)
+    }
+
+    fn written(&self) -> Option<Written> {
+        Some((*self).into())
     }
 }
 
@@ -210,6 +199,9 @@ macro_rules! ranges {
                     return None;
                 }
                 Some(Self(number))
+            }
+            fn written(&self) -> Option<Written> {
+                self.0.written()
             }
         }
 
@@ -250,6 +242,10 @@ impl Param for Word {
     fn read(value: &Value, reader: &mut Reader<'_>) -> Option<Self> {
         Some(Self { text: read_leaf(value, reader, Self::EXPECTS)?, span: value.span.clone() })
     }
+
+    fn written(&self) -> Option<Written> {
+        self.text.written()
+    }
 }
 
 impl Param for Unit {
@@ -264,6 +260,10 @@ impl Param for Unit {
                 None
             }
         }
+    }
+
+    fn written(&self) -> Option<Written> {
+        Some(self.to_string().into())
     }
 }
 
@@ -298,10 +298,15 @@ impl Param for FilePath {
         let text: String = read_leaf(value, reader, Self::EXPECTS)?;
         reader.file(&text, value.span.clone())
     }
+
+    fn written(&self) -> Option<Written> {
+        Some(self.path.to_str()?.into())
+    }
 }
 
 impl<T: Param> Param for Option<T> {
     const EXPECTS: &'static str = T::EXPECTS;
+    const REPEATS: Repeats = T::REPEATS;
 
     fn read(value: &Value, reader: &mut Reader<'_>) -> Option<Self> {
         T::read(value, reader).map(Some)
@@ -318,10 +323,15 @@ impl<T: Param> Param for Option<T> {
     fn when_missing() -> Option<Self> {
         Some(None)
     }
+
+    fn written(&self) -> Option<Written> {
+        self.as_ref()?.written()
+    }
 }
 
 impl<T: Param> Param for Vec<T> {
     const EXPECTS: &'static str = "a list";
+    const REPEATS: Repeats = Repeats::PerEntry;
 
     fn read(value: &Value, reader: &mut Reader<'_>) -> Option<Self> {
         let Item::Array(items) = &value.item else {
@@ -339,6 +349,10 @@ impl<T: Param> Param for Vec<T> {
     fn fields() -> Vec<ParamSpec> {
         T::fields()
     }
+
+    fn written(&self) -> Option<Written> {
+        self.iter().map(Param::written).collect::<Option<Vec<_>>>().map(Written::Array)
+    }
 }
 
 impl<T: Param, const N: usize> Param for [T; N] {
@@ -349,6 +363,7 @@ impl<T: Param, const N: usize> Param for [T; N] {
         16 => "a list of 16",
         _ => "a list of the right length",
     };
+    const REPEATS: Repeats = Repeats::PerEntry;
 
     fn read(value: &Value, reader: &mut Reader<'_>) -> Option<Self> {
         match &value.item {
@@ -367,6 +382,10 @@ impl<T: Param, const N: usize> Param for [T; N] {
     fn fields() -> Vec<ParamSpec> {
         T::fields()
     }
+
+    fn written(&self) -> Option<Written> {
+        self.iter().map(Param::written).collect::<Option<Vec<_>>>().map(Written::Array)
+    }
 }
 
 /// A table whose keys the graph chooses: the names of features, mostly.
@@ -375,6 +394,7 @@ pub struct Map<T>(pub BTreeMap<String, T>);
 
 impl<T: Param> Param for Map<T> {
     const EXPECTS: &'static str = "a table with an entry for each name";
+    const REPEATS: Repeats = Repeats::PerName;
 
     fn read(value: &Value, reader: &mut Reader<'_>) -> Option<Self> {
         let Item::Table(table) = &value.item else {
@@ -392,6 +412,11 @@ impl<T: Param> Param for Map<T> {
 
     fn fields() -> Vec<ParamSpec> {
         T::fields()
+    }
+
+    fn written(&self) -> Option<Written> {
+        let entries = self.0.iter().map(|(name, value)| Some((name.clone(), value.written()?)));
+        entries.collect::<Option<toml::Table>>().map(Written::Table)
     }
 }
 

@@ -19,7 +19,7 @@ pub enum Need {
     Optional,
     /// Any number of them, each named in the graph, optional and a trigger.
     Many,
-    /// Read as the last tick left it; optional, and a trigger one tick late.
+    /// Read as the last tick left it; optional, and a trigger one tick late where the node has no other.
     Delayed,
 }
 

@@ -1,0 +1,152 @@
+//! Calibration files: written and read back, and damaged.
+
+use proptest::prelude::*;
+
+use super::*;
+
+fn read_back(calibration: &Calibration) -> Calibration {
+    let text = write(calibration, "a test");
+    assert!(is_calibration(&text));
+    read(&text).unwrap_or_else(|flaws| panic!("{flaws:?}\n{text}"))
+}
+
+/// A finite number of 32 bits, of any size.
+fn number() -> impl Strategy<Value = f32> {
+    any::<u32>().prop_map(f32::from_bits).prop_filter("finite", |number| number.is_finite())
+}
+
+fn tactel(kind: Kind) -> BoxedStrategy<Option<Tactel>> {
+    let gain = || number().prop_filter("a slope", |gain| *gain != 0.0);
+    let curve = match kind {
+        Kind::Linear => gain().prop_map(|gain| Curve::Linear { gain }).boxed(),
+        Kind::Rational => (gain(), number(), number())
+            .prop_map(|(gain, squash, most)| Curve::Rational {
+                gain,
+                squash: squash.abs().copysign(gain),
+                most: most.abs(),
+            })
+            .boxed(),
+        Kind::Piecewise => prop::collection::vec((1e-3..1e5f32, 0.0..1e3f32), 1..12)
+            .prop_map(|steps| {
+                let mut last = [0.0, 0.0];
+                let knots = steps.into_iter().map(|(s, force)| {
+                    last = [last[0] + s, last[1] + force];
+                    last
+                });
+                Curve::Piecewise { knots: knots.collect() }
+            })
+            .boxed(),
+    };
+    let curve = curve.prop_filter("without a flaw", |curve| curve.flaw().is_none());
+    prop::option::weighted(0.8, (number(), curve).prop_map(|(offset, curve)| Tactel { offset, curve })).boxed()
+}
+
+fn calibration() -> impl Strategy<Value = Calibration> {
+    let kind = prop::sample::select(KINDS.to_vec());
+    (kind, 1..4usize, 1..5usize).prop_flat_map(|(kind, rows, cols)| {
+        prop::collection::vec(tactel(kind), rows * cols).prop_map(move |tactels| Calibration {
+            kind,
+            rows,
+            cols,
+            reading: Unit::RAW,
+            unit: Unit::NEWTON,
+            tactels,
+        })
+    })
+}
+
+proptest! {
+    #[test]
+    fn what_is_written_is_read_bit_for_bit(calibration in calibration()) {
+        let back = read_back(&calibration);
+        // Two floats that differ only in a zero's sign would be equal; their text is not.
+        prop_assert_eq!(format!("{:?}", &back), format!("{:?}", &calibration));
+    }
+}
+
+const GOOD: &str = r#"# by hand
+kind = "calibration"
+version = 1
+curve = "rational"
+rows = 2
+cols = 2
+reading = "raw"
+unit = "N"
+dead = [[0, 1]]
+tactels = [
+  { at = [0, 0], offset = 10, gain = 0.01, squash = 0.001, most = 4.5 },
+  { at = [1, 1], offset = 11.5, gain = 0.02, squash = 0, most = 5 },
+  { at = [1, 0], offset = -3, gain = 0.03, squash = 0.003, most = 6 },
+]
+"#;
+
+const KNOTS: &str = r#"kind = "calibration"
+version = 1
+curve = "piecewise"
+rows = 1
+cols = 1
+reading = "raw"
+unit = "N"
+tactels = [{ at = [0, 0], offset = 10, readings = [10, 20, 30], forces = [0.5, 1.5, 4] }]
+"#;
+
+#[test]
+fn a_file_written_by_hand_is_read_in_any_order() {
+    let calibration = read(GOOD).unwrap();
+    let offsets: Vec<Option<f32>> = calibration.tactels.iter().map(|t| t.as_ref().map(|t| t.offset)).collect();
+    assert_eq!(offsets, [Some(10.0), None, Some(-3.0), Some(11.5)]);
+    assert_eq!((calibration.kind, calibration.unit), (Kind::Rational, Unit::NEWTON));
+    assert!(read(KNOTS).is_ok());
+}
+
+#[test]
+fn every_mistake_stands_at_its_place() {
+    let cases = [
+        (GOOD, "kind = \"calibration\"", "kind = \"bench\"", "\"bench\"", "this is no calibration file"),
+        (GOOD, "kind = \"calibration\"\n", "", "", "this is no calibration file"),
+        (GOOD, "version = 1", "version = 2", "2", "this tool reads version 1 of the format, not 2"),
+        (GOOD, "\"rational\"", "\"cubic\"", "\"cubic\"", "expected `linear`, `rational` or `piecewise`"),
+        (GOOD, "\"rational\"", "\"linear\"", "squash", "`squash` is not a parameter here"),
+        (GOOD, "rows = 2", "rows = 0", "0", "expected a whole number from 1"),
+        (GOOD, "rows = 2", "row = 2", "row", "`row` is not a parameter here"),
+        (GOOD, "rows = 2", "rows = 1", "[1, 1]", "tactel [1, 1] is not on an array of 1 by 2"),
+        (GOOD, "rows = 2", "rows = 1000000", "[\n  {", "tactel [2, 0] is missing, and 1999995 more"),
+        (GOOD, "\"raw\"", "\"counts\"", "\"counts\"", "`counts` is not a unit"),
+        (GOOD, "[[0, 1]]", "[]", "[\n  {", "tactel [0, 1] is missing"),
+        (GOOD, "[[0, 1]]", "[[0, 1], [0, 1]]", "[0, 1]", "tactel [0, 1] is given twice"),
+        (GOOD, "[[0, 1]]", "[[0, 1], [1]]", "[1]", "expected a list of 2"),
+        (GOOD, "at = [1, 0]", "at = [1, 1]", "[1, 1]", "tactel [1, 1] is given twice"),
+        (GOOD, "at = [1, 0]", "at = [0, 1]", "[0, 1]", "tactel [0, 1] is given twice"),
+        (GOOD, "gain = 0.02", "gain = 0", "0", "a `gain` of 0 measures nothing"),
+        (GOOD, "gain = 0.02", "gain = 1e99", "1e99", "too large: images are of 32-bit floats"),
+        (GOOD, "gain = 0.02", "gain = nan", "nan", "expected a finite number"),
+        (GOOD, "gain = 0.02", "gain = \"x\"", "\"x\"", "expected a number"),
+        (GOOD, "gain = 0.02, ", "", "{ at = [1, 1]", "`gain` is missing: expected a number"),
+        (GOOD, "squash = 0.001", "squash = -1", "-1", "`squash` has the sign of `gain`"),
+        (GOOD, "most = 5", "most = -5", "-5", "`most` is the largest force"),
+        (GOOD, "offset = -3", "offset = 1e50", "1e50", "too large"),
+        (KNOTS, "[0.5, 1.5, 4]", "[0.5, 1.5]", "[0.5, 1.5]", "3 readings, but 2 forces"),
+        (KNOTS, "[0.5, 1.5, 4]", "[0.5, 0.4, 4]", "[0.5, 0.4, 4]", "`forces` never fall, but 0.4 comes after 0.5"),
+        (KNOTS, "[10, 20, 30]", "[10, 10, 30]", "[10, 10, 30]", "`readings` go on in one direction from 0"),
+        (KNOTS, "[10, 20, 30]", "[10, 20, 1e40]", "[10, 20, 1e40]", "too large"),
+    ];
+    for (good, from, to, marked, message) in cases {
+        assert!(good.contains(from), "{from}");
+        let text = good.replacen(from, to, 1);
+        let flaws = read(&text).expect_err(message);
+        let flaw = &flaws[0];
+        assert!(flaw.message.starts_with(message), "{from} -> {to}: {flaws:?}");
+        assert!(text[flaw.span.clone()].starts_with(marked), "{from} -> {to}: {:?}", &text[flaw.span.clone()]);
+        assert!(flaws.len() == 1 || to.contains("linear") || to == "rows = 1", "{from} -> {to}: {flaws:?}");
+    }
+}
+
+#[test]
+fn what_is_no_toml_says_so_and_many_mistakes_are_cut_short() {
+    assert!(read("rows = = 2").is_err() && !is_calibration("rows = = 2"));
+    assert!(!is_calibration("kind = 1") && !is_calibration(""));
+    assert!(is_calibration("kind = \"calibration\"\nversion = 9"), "a later one is one too");
+    let line = "  { at = [0, 0], offset = 10, gain = 0, squash = 0, most = 1 },\n";
+    let text = GOOD.replacen("tactels = [\n", &format!("tactels = [\n{}", line.repeat(50)), 1);
+    assert_eq!(read(&text).unwrap_err().len(), MOST_FLAWS);
+}

@@ -1,0 +1,308 @@
+//! Curves through the samples of one tactel: robust, deterministic and monotone.
+//!
+//! Samples of each branch, force rising and force falling, are gathered in bins of force, narrow where the curve is
+//! steep; each bin gives one point, the median of its forces and of its readings, which keep their order. So a long
+//! dwell does not outweigh a press, stray readings do not count, and both branches weigh the same: a curve runs through
+//! the middle of the hysteresis. All fits go through the zero, so an unloaded tactel gives no force.
+//!
+//! The squashed curve and the knots are fitted to the readings, s over f, as the noise is there, by least squares with
+//! Huber's weights; the straight line to the forces, where it is wrong anyway.
+
+use super::Curve;
+use super::samples::{Sample, median};
+
+/// Number of bins of a branch.
+const BINS: usize = 24;
+
+/// Number of segments of a piecewise curve, at most.
+const SEGMENTS: usize = 8;
+
+/// Samples from which on a bin counts fully.
+const FULL: f64 = 8.0;
+
+/// Least samples with a force, and least points, of a tactel that a curve is fitted to.
+const LEAST: (usize, usize) = (20, 5);
+
+/// What a point must read beyond the knot before, as a part of the range, for both to be told apart.
+const LEAST_STEP: f64 = 0.002;
+
+/// A bin: scaled so that the largest force and the reading there are about 1.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Point {
+    x: f64,
+    y: f64,
+    weight: f64,
+    count: usize,
+    is_loading: bool,
+}
+
+/// The points of a tactel, and what 1 stands for.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Points {
+    points: Vec<Point>,
+    /// The largest force [N].
+    pub most: f64,
+    /// The reading beyond the zero at the largest forces [reading].
+    pub range: f64,
+    /// The forward curve: knots of x and y, from (0, 0).
+    middle: Vec<[f64; 2]>,
+}
+
+impl Points {
+    /// Gathers samples; none if they are too few for a curve.
+    #[must_use]
+    pub fn new(samples: &[Sample]) -> Option<Self> {
+        let most = samples.iter().fold(0.0, |most: f64, sample| most.max(sample.force));
+        let loaded = samples.iter().filter(|sample| sample.force > super::log::NOTHING * most).count();
+        if most <= 0.0 || loaded < LEAST.0 {
+            return None;
+        }
+        let mut bins: Vec<[Vec<f64>; 2]> = vec![Default::default(); 2 * BINS];
+        for Sample { force, s, is_loading } in samples {
+            // The edges of the bins are squares.
+            let bin = ((force / most).max(0.0).sqrt() * BINS as f64) as usize;
+            let [forces, readings] = &mut bins[bin.min(BINS - 1) * 2 + usize::from(*is_loading)];
+            forces.push(*force);
+            readings.push(*s);
+        }
+        let mut points = Vec::new();
+        for (i, [forces, readings]) in bins.iter_mut().enumerate().filter(|(_, [forces, _])| !forces.is_empty()) {
+            let count = forces.len();
+            let weight = (count as f64 / FULL).min(1.0);
+            points.push(Point { x: median(forces) / most, y: median(readings), weight, count, is_loading: i % 2 == 1 });
+        }
+        let range = points.iter().filter(|point| point.x > 0.8).fold(0.0, |range: f64, point| range.max(point.y));
+        if range <= 0.0 || points.len() < LEAST.1 {
+            return None;
+        }
+        points.iter_mut().for_each(|point| point.y /= range);
+        let mut points = Self { points, most, range, middle: Vec::new() };
+        points.middle = points.knots();
+        (points.middle.len() > 1).then_some(points)
+    }
+
+    /// The straight line with the least error of the force, for readings that rise with it (`sign` 1) or fall (-1).
+    #[must_use]
+    pub fn linear(&self, sign: f32) -> Curve {
+        let sum = |g: fn(&Point) -> f64| self.points.iter().map(|point| point.weight * g(point)).sum::<f64>();
+        let slope = sum(|point| point.x * point.y) / sum(|point| point.y * point.y).max(1e-9);
+        Curve::Linear { gain: (slope * self.most / self.range) as f32 * sign }
+    }
+
+    /// The squashed curve y = x / (g + q x).
+    #[must_use]
+    pub fn rational(&self, sign: f32) -> Curve {
+        let mut curve = self.first_guess();
+        for _ in 0..5 {
+            let residuals: Vec<f64> = self.points.iter().map(|point| point.y - squashed(curve, point.x)).collect();
+            curve = self.descend(curve, &self.weights(&residuals));
+        }
+        let [g, q] = curve;
+        Curve::Rational {
+            gain: (g * self.most / self.range) as f32 * sign,
+            squash: (q / self.range) as f32 * sign,
+            most: self.most as f32,
+        }
+    }
+
+    /// The weights of the points, less for those that are far off.
+    fn weights(&self, residuals: &[f64]) -> Vec<f64> {
+        let mut sizes: Vec<f64> = residuals.iter().map(|residual| residual.abs()).collect();
+        let bound = (1.5 * 1.4826 * median(&mut sizes)).max(1e-6);
+        let huber = |residual: &f64| (bound / residual.abs()).min(1.0);
+        self.points.iter().zip(residuals).map(|(point, residual)| point.weight * huber(residual)).collect()
+    }
+
+    /// A squashed curve from x / y = g + q x, which is linear.
+    fn first_guess(&self) -> [f64; 2] {
+        let mut sums = [0.0; 5];
+        for point in self.points.iter().filter(|point| point.y > 0.05 && point.x > 0.0) {
+            let (x, z, w) = (point.x, point.x / point.y, point.weight * point.y * point.y);
+            let terms = [w, w * x, w * x * x, w * z, w * z * x];
+            sums.iter_mut().zip(terms).for_each(|(sum, term)| *sum += term);
+        }
+        let [w, wx, wxx, wz, wzx] = sums;
+        let determinant = w * wxx - wx * wx;
+        if determinant <= 1e-12 {
+            return [1.0, 0.0];
+        }
+        inside([(wz * wxx - wzx * wx) / determinant, (w * wzx - wx * wz) / determinant])
+    }
+
+    /// Levenberg and Marquardt's descent of the weighted squares, from `curve` on.
+    fn descend(&self, mut curve: [f64; 2], weights: &[f64]) -> [f64; 2] {
+        let cost = |curve: [f64; 2]| -> f64 {
+            let residual = |p: &Point| p.y - squashed(curve, p.x);
+            self.points.iter().zip(weights).map(|(p, w)| w * residual(p) * residual(p)).sum()
+        };
+        let mut damping = 1e-3;
+        let mut last = cost(curve);
+        for _ in 0..40 {
+            let [g, q] = curve;
+            // Of the weighted normal equations: the matrix [a b; b d] and the right side [e f].
+            let (mut a, mut b, mut d, mut e, mut f) = (0.0, 0.0, 0.0, 0.0, 0.0);
+            for (p, w) in self.points.iter().zip(weights) {
+                let m = squashed(curve, p.x);
+                let (dg, dq, r) = (-m / (g + q * p.x.max(0.0)), -m * m, p.y - m);
+                a += w * dg * dg;
+                b += w * dg * dq;
+                d += w * dq * dq;
+                e += w * dg * r;
+                f += w * dq * r;
+            }
+            let (a, d) = (a * (1.0 + damping) + 1e-15, d * (1.0 + damping) + 1e-15);
+            let determinant = a * d - b * b;
+            if determinant <= 0.0 {
+                break;
+            }
+            let next = inside([g + (e * d - f * b) / determinant, q + (f * a - e * b) / determinant]);
+            let now = cost(next);
+            if now < last {
+                (curve, last, damping) = (next, now, damping * 0.3);
+            } else {
+                damping *= 4.0;
+            }
+        }
+        curve
+    }
+
+    /// Straight lines between knots.
+    #[must_use]
+    pub fn piecewise(&self, sign: f32) -> Curve {
+        let knots = self.middle[1..].iter().map(|[x, y]| [(y * self.range) as f32 * sign, (x * self.most) as f32]);
+        Curve::Piecewise { knots: knots.collect() }
+    }
+
+    /// The knots of the forward curve: least squares, then made to rise, from (0, 0).
+    fn knots(&self) -> Vec<[f64; 2]> {
+        let places = self.places();
+        let mut weights: Vec<f64> = self.points.iter().map(|point| point.weight).collect();
+        let mut heights = Vec::new();
+        for _ in 0..5 {
+            heights = self.heights(&places, &weights);
+            let knots: Vec<[f64; 2]> =
+                places.iter().copied().zip(heights.iter().copied()).map(<[f64; 2]>::from).collect();
+            let residuals: Vec<f64> = self.points.iter().map(|p| p.y - between(&knots, p.x)).collect();
+            weights = self.weights(&residuals);
+        }
+        let mut knots = vec![[0.0, 0.0]];
+        for (x, y) in places.iter().zip(rising(&heights)).skip(1) {
+            if y > knots.last().map_or(0.0, |last| last[1]) + LEAST_STEP {
+                knots.push([*x, y]);
+            }
+        }
+        knots
+    }
+
+    /// Where the knots are: at squares, but only so close that points lie between any two.
+    fn places(&self) -> Vec<f64> {
+        let between = |from: f64, to: f64| self.points.iter().filter(|p| p.x > from && p.x <= to).count();
+        let mut places = vec![0.0];
+        for k in 1..=SEGMENTS {
+            let (last, x) = (places[places.len() - 1], (k as f64 / SEGMENTS as f64).powi(2));
+            if between(last, x) >= 2 {
+                places.push(x);
+            } else if k == SEGMENTS {
+                if places.len() > 1 {
+                    places.pop();
+                }
+                places.push(x);
+            }
+        }
+        places
+    }
+
+    /// The heights at the places with the least weighted squares, the first of them 0: a tridiagonal system.
+    fn heights(&self, places: &[f64], weights: &[f64]) -> Vec<f64> {
+        let count = places.len();
+        let (mut diagonal, mut above, mut right) = (vec![1e-9; count], vec![0.0; count], vec![0.0; count]);
+        for (p, w) in self.points.iter().zip(weights) {
+            let x = p.x.clamp(0.0, 1.0);
+            let k = places.partition_point(|place| *place < x).clamp(1, count - 1);
+            let t = (x - places[k - 1]) / (places[k] - places[k - 1]);
+            diagonal[k - 1] += w * (1.0 - t) * (1.0 - t);
+            diagonal[k] += w * t * t;
+            above[k - 1] += w * t * (1.0 - t);
+            right[k - 1] += w * (1.0 - t) * p.y;
+            right[k] += w * t * p.y;
+        }
+        // The first is known to be 0, so it falls out of the others' equations.
+        for k in 2..count {
+            let by = above[k - 1] / diagonal[k - 1];
+            diagonal[k] -= by * above[k - 1];
+            right[k] -= by * right[k - 1];
+        }
+        let mut heights = vec![0.0; count];
+        for k in (1..count).rev() {
+            let next = if k + 1 < count { above[k] * heights[k + 1] } else { 0.0 };
+            heights[k] = (right[k] - next) / diagonal[k];
+        }
+        heights
+    }
+
+    /// Greatest distance of the two branches, as a part of the range of the reading; none if there is but one branch.
+    #[must_use]
+    pub fn hysteresis(&self) -> Option<f64> {
+        let beyond = |is_loading: bool| -> Vec<[f64; 2]> {
+            let points = self.points.iter().filter(|p| p.is_loading == is_loading && p.count >= 3);
+            points.map(|p| [p.x, p.y - between(&self.middle, p.x)]).collect()
+        };
+        let (up, down) = (beyond(true), beyond(false));
+        let reaches = |points: &[[f64; 2]]| points.len() >= 4 && points.last().is_some_and(|last| last[0] > 0.7);
+        if !reaches(&up) || !reaches(&down) {
+            return None;
+        }
+        let distances = down.iter().map(|[x, y]| (y - between(&up, *x)).abs());
+        Some(distances.fold(0.0, f64::max))
+    }
+
+    /// What is read beyond the zero under a force, on the middle of the two branches [reading].
+    #[must_use]
+    pub fn reading(&self, force: f64) -> f64 {
+        between(&self.middle, force / self.most) * self.range
+    }
+
+    /// The branches as (force, reading beyond the zero), for a picture: rising, then falling.
+    #[must_use]
+    pub fn branches(&self) -> [Vec<[f64; 2]>; 2] {
+        [true, false].map(|is_loading| {
+            let points = self.points.iter().filter(|p| p.is_loading == is_loading);
+            points.map(|p| [p.x * self.most, p.y * self.range]).collect()
+        })
+    }
+}
+
+/// The nearest squashed curve: g and q are not negative, and g is not quite zero.
+fn inside([g, q]: [f64; 2]) -> [f64; 2] {
+    [g.max(1e-3), q.max(0.0)]
+}
+
+/// The squashed curve's height at `x`; below zero there is none.
+fn squashed([g, q]: [f64; 2], x: f64) -> f64 {
+    let x = x.max(0.0);
+    x / (g + q * x)
+}
+
+/// Height at `x` of straight lines through points whose x rise; level beyond the ends.
+fn between(points: &[[f64; 2]], x: f64) -> f64 {
+    let after = points.partition_point(|point| point[0] < x);
+    match (after.checked_sub(1).and_then(|before| points.get(before)), points.get(after)) {
+        (Some([x0, y0]), Some([x1, y1])) => y0 + (x - x0) / (x1 - x0) * (y1 - y0),
+        (Some(point), None) | (None, Some(point)) => point[1],
+        (None, None) => 0.0,
+    }
+}
+
+/// The nearest numbers that never fall: neighbours that do are pooled.
+fn rising(numbers: &[f64]) -> Vec<f64> {
+    let mut pools: Vec<(f64, usize)> = Vec::new();
+    for number in numbers {
+        let mut pool = (*number, 1);
+        while let Some((mean, count)) = pools.pop_if(|(mean, _)| *mean > pool.0) {
+            let sum = mean * count as f64 + pool.0 * pool.1 as f64;
+            pool = (sum / (count + pool.1) as f64, count + pool.1);
+        }
+        pools.push(pool);
+    }
+    pools.into_iter().flat_map(|(mean, count)| std::iter::repeat_n(mean, count)).collect()
+}

@@ -1,0 +1,168 @@
+//! What a calibration is made from: frames of a pad, each with the force that was measured beside it.
+
+use tactflow_runtime::signal::Unit;
+
+use crate::recordings::Recording;
+
+/// A log of presses.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Log {
+    /// Number of rows.
+    pub rows: usize,
+    /// Number of columns.
+    pub cols: usize,
+    /// Unit of what the sensor reads.
+    pub unit: Unit,
+    /// Reference force of each frame [N].
+    pub force: Vec<f64>,
+    /// The readings of all frames, one frame after the other, row after row.
+    pub cells: Vec<f32>,
+    /// Index of each tactel that does not exist.
+    pub absent: Vec<usize>,
+}
+
+/// What part of the largest force counts as nothing: a frame below it is unloaded.
+pub const NOTHING: f64 = 0.01;
+
+/// The fewest unloaded frames from which a zero is taken.
+const FEWEST_UNLOADED: usize = 3;
+
+impl Log {
+    /// The log that a recording is.
+    ///
+    /// # Errors
+    /// What it lacks.
+    pub fn new(recording: &Recording) -> Result<Self, String> {
+        let Some(force) = recording.force.clone() else {
+            return Err("it has no reference force: a column (or array) `force` [N], one value a frame".into());
+        };
+        let shape = &recording.shape;
+        let mut cells = vec![0.0; shape.tactels() * recording.frames.len()];
+        for (i, image) in cells.chunks_exact_mut(shape.tactels()).enumerate() {
+            recording.show(i, image);
+        }
+        let absent = recording.dead.clone();
+        let log = Self { rows: shape.rows, cols: shape.cols, unit: shape.unit, force, cells, absent };
+        log.check()?;
+        Ok(log)
+    }
+
+    /// Whether it can be used.
+    ///
+    /// # Errors
+    /// What it lacks.
+    pub fn check(&self) -> Result<(), String> {
+        if self.unit == Unit::NEWTON {
+            return Err("its readings are in N already".into());
+        }
+        if let Some(i) = self.force.iter().position(|force| !force.is_finite()) {
+            return Err(format!("the force of frame {} is not a finite number", i + 1));
+        }
+        let (most, least) =
+            self.force.iter().fold((0.0, 0.0), |(most, least), force| (force.max(most), force.min(least)));
+        if most <= 0.0 || -least > 0.5 * most {
+            let range = format!("from {least} N to {most} N");
+            return Err(format!("its force goes {range}: it counts as positive what presses on the pad"));
+        }
+        let unloaded = (0..self.frames()).filter(|i| self.is_unloaded(*i, most)).count();
+        if unloaded < FEWEST_UNLOADED {
+            let percent = 100.0 * NOTHING;
+            return Err(format!(
+                "only {unloaded} of its frames are unloaded (below {percent} % of {most} N): the zero of each tactel is \
+                 taken there, so record a second before the first press"
+            ));
+        }
+        Ok(())
+    }
+
+    /// Number of tactels.
+    #[must_use]
+    pub const fn tactels(&self) -> usize {
+        self.rows * self.cols
+    }
+
+    /// Number of frames.
+    #[must_use]
+    pub const fn frames(&self) -> usize {
+        self.force.len()
+    }
+
+    /// The largest force [N].
+    #[must_use]
+    pub fn most(&self) -> f64 {
+        self.force.iter().fold(0.0, |most: f64, force| most.max(*force))
+    }
+
+    /// Whether frame `i` is unloaded, in a log whose largest force is `most` [N].
+    #[must_use]
+    pub fn is_unloaded(&self, i: usize, most: f64) -> bool {
+        self.force[i] < NOTHING * most
+    }
+
+    /// What a tactel reads in a frame.
+    #[must_use]
+    pub fn reading(&self, frame: usize, tactel: usize) -> f32 {
+        self.cells[frame * self.tactels() + tactel]
+    }
+
+    /// Whether each frame belongs to a rise of the force or to a fall. A change of less than `step` [N] turns nothing.
+    #[must_use]
+    pub fn is_loading(&self, step: f64) -> Vec<bool> {
+        let mut is_loading = vec![true; self.frames()];
+        let (mut is_rising, mut turn) = (true, 0);
+        for i in 1..self.frames() {
+            let change = self.force[i] - self.force[turn];
+            let onward = if is_rising { change } else { -change };
+            if onward >= 0.0 {
+                turn = i;
+            } else if onward < -step {
+                // It turned at the last extreme.
+                is_rising = !is_rising;
+                is_loading[turn + 1..i].fill(is_rising);
+                turn = i;
+            }
+            is_loading[i] = is_rising;
+        }
+        is_loading
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn log(force: &[f64]) -> Log {
+        Log { rows: 1, cols: 1, unit: Unit::RAW, force: force.to_vec(), cells: vec![0.0; force.len()], absent: vec![] }
+    }
+
+    #[test]
+    fn a_rise_ends_where_the_fall_begins_and_noise_turns_nothing() {
+        let cases: [(&[f64], &str); 5] = [
+            (&[0.0, 1.0, 2.0, 1.0, 0.0], "uuudd"),
+            (&[0.0, 1.0, 0.9, 2.0, 1.95, 2.0, 1.0, 0.0, 0.1, 1.0], "uuuuuudduu"),
+            (&[0.0, 0.0, 1.0, 1.0, 1.0, 0.0, 0.0, 1.0], "uuuuuddu"),
+            (&[2.0, 1.0, 0.0], "udd"),
+            (&[0.0], "u"),
+        ];
+        for (force, expected) in cases {
+            let said: String = log(force).is_loading(0.3).iter().map(|up| if *up { 'u' } else { 'd' }).collect();
+            assert_eq!(said, expected, "{force:?}");
+        }
+    }
+
+    #[test]
+    fn a_log_that_cannot_be_used_says_why() {
+        let good = log(&[0.0, 0.0, 0.0, 1.0, 5.0, 0.0]);
+        assert_eq!(good.check(), Ok(()));
+        let cases = [
+            (log(&[0.0; 9]), "its force goes from 0 N to 0 N"),
+            (log(&[0.0, 0.0, 0.0, -5.0]), "its force goes from -5 N to 0 N"),
+            (log(&[0.0, 0.0, f64::NAN]), "the force of frame 3 is not a finite number"),
+            (log(&[0.0, 0.0, 1.0]), "only 2 of its frames are unloaded (below 1 % of 1 N)"),
+            (Log { unit: Unit::NEWTON, ..good }, "its readings are in N already"),
+        ];
+        for (log, message) in cases {
+            assert!(log.check().unwrap_err().starts_with(message), "{message}: {:?}", log.check());
+        }
+    }
+}

@@ -1,0 +1,352 @@
+//! From logs to a calibration, and how good it is.
+
+use std::fmt::Write;
+
+use tactflow_runtime::signal::Unit;
+
+use super::curve::KINDS;
+use super::fit::Points;
+use super::log::{Log, NOTHING};
+use super::samples::{Load, Sample, Samples};
+use super::{Calibration, Curve, Kind, Tactel};
+
+/// How a calibration is made.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Settings {
+    /// How the pad was loaded.
+    pub load: Load,
+    /// Sort of the curves; the simplest that is good enough unless it is given.
+    pub curve: Option<Kind>,
+    /// Least response of a live tactel; a part of the greatest unless it is given [reading].
+    pub dead_below: Option<f64>,
+    /// How many tactels share a uniform load; the live ones unless it is given.
+    pub bearing: Option<usize>,
+}
+
+/// Whether a tactel can be used.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum State {
+    /// It has a curve.
+    Good,
+    /// It never answers.
+    Dead,
+    /// There are too few samples of it.
+    Few,
+    /// Its samples give no curve that rises.
+    Unfit,
+}
+
+/// What is known of one tactel.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Finding {
+    /// Whether it can be used.
+    pub state: State,
+    /// Number of its samples under a force.
+    pub samples: usize,
+    /// Whether it stays at its largest reading while the force goes on; those samples do not count.
+    pub is_saturated: bool,
+    /// 1 if what it reads rises with the force, -1 if it falls.
+    pub sign: f32,
+    /// Standard deviation of what it reads unloaded [reading].
+    pub noise: f64,
+    /// Residual of each sort of curve under a force, root mean square [N].
+    pub rms: [f64; 3],
+    /// Greatest distance of its branches, as a part of the range; none if there is but one branch.
+    pub hysteresis: Option<f64>,
+    /// Its points, if there are enough.
+    pub points: Option<Points>,
+}
+
+/// A calibration, and how good it is.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Report {
+    /// The curves.
+    pub calibration: Calibration,
+    /// What is known of each tactel, row after row.
+    pub findings: Vec<Finding>,
+    /// Residual of each sort of curve over all samples, root mean square [N].
+    pub rms: [f64; 3],
+    /// The largest force on one tactel [N].
+    pub most: f64,
+}
+
+/// A sort of curve is good enough if no other has a residual that is less than this part of its own.
+const GOOD_ENOUGH: f64 = 0.9;
+
+/// Samples at the largest reading that are a saturation, if their forces differ by that part of the largest force.
+const SATURATED: (usize, f64) = (5, 0.05);
+
+/// Makes a calibration from logs of one array.
+///
+/// # Errors
+/// When there is nothing that could be calibrated.
+pub fn calibrate(logs: &[Log], settings: &Settings) -> Result<Report, String> {
+    let first = logs.first().ok_or("there is no log")?;
+    let samples = Samples::new(logs, settings.load, settings.dead_below, settings.bearing);
+    let ceilings = ceilings(logs);
+    let mut findings = Vec::new();
+    let mut curves: Vec<Option<[Curve; 3]>> = Vec::new();
+    let (mut squares, mut count) = ([0.0; 3], 0);
+    for i in 0..first.tactels() {
+        let (finding, fitted) = examine(&samples, i, ceilings);
+        if fitted.is_some() {
+            let add = |(sum, rms): (&mut f64, &f64)| *sum += rms * rms * finding.samples as f64;
+            squares.iter_mut().zip(&finding.rms).for_each(add);
+            count += finding.samples;
+        }
+        findings.push(finding);
+        curves.push(fitted);
+    }
+    if count == 0 {
+        return Err(nothing(&findings, settings));
+    }
+    let rms = squares.map(|sum| (sum / count as f64).sqrt());
+    let best = rms.iter().fold(f64::INFINITY, |best, rms| best.min(*rms));
+    let is_good_enough = |kind: &Kind| rms[*kind as usize] * GOOD_ENOUGH <= best;
+    let kind = settings.curve.or_else(|| KINDS.into_iter().find(is_good_enough)).unwrap_or(Kind::Piecewise);
+    let tactels = curves.into_iter().zip(&samples.answers).map(|(curves, answer)| {
+        let curve = curves?.into_iter().find(|curve| curve.kind() == kind)?;
+        Some(Tactel { offset: answer.offset, curve })
+    });
+    let tactels = tactels.collect();
+    let Log { rows, cols, unit: reading, .. } = *first;
+    let calibration = Calibration { kind, rows, cols, reading, unit: Unit::NEWTON, tactels };
+    Ok(Report { calibration, findings, rms, most: samples.most * samples.share })
+}
+
+/// Fits all sorts of curves to one tactel.
+fn examine(samples: &Samples<'_>, i: usize, [lowest, highest]: [f32; 2]) -> (Finding, Option<[Curve; 3]>) {
+    let answer = &samples.answers[i];
+    let mut finding = Finding {
+        state: State::Dead,
+        samples: 0,
+        is_saturated: false,
+        sign: answer.sign,
+        noise: answer.noise,
+        rms: [0.0; 3],
+        hysteresis: None,
+        points: None,
+    };
+    if answer.is_dead {
+        return (finding, None);
+    }
+    let mut own = samples.of(i);
+    let end = if answer.sign > 0.0 { highest } else { lowest };
+    let forces = own.iter().filter(|(_, reading)| *reading == end).map(|(sample, _)| sample.force);
+    let (least, most) =
+        forces.clone().fold((f64::INFINITY, 0.0), |(a, b), force| (f64::min(a, force), f64::max(b, force)));
+    finding.is_saturated = forces.count() >= SATURATED.0 && most - least > SATURATED.1 * samples.most * samples.share;
+    if finding.is_saturated {
+        own.retain(|(_, reading)| *reading != end);
+    }
+    let own: Vec<Sample> = own.into_iter().map(|(sample, _)| sample).collect();
+    finding.samples = own.iter().filter(|sample| sample.force > NOTHING * samples.most * samples.share).count();
+    let Some(points) = Points::new(&own) else {
+        finding.state = State::Few;
+        return (finding, None);
+    };
+    let curves = [points.linear(answer.sign), points.rational(answer.sign), points.piecewise(answer.sign)];
+    finding.state = State::Unfit;
+    if curves.iter().any(|curve| curve.flaw().is_some()) {
+        return (finding, None);
+    }
+    finding.state = State::Good;
+    for (rms, curve) in finding.rms.iter_mut().zip(&curves) {
+        let error = |sample: &Sample| f64::from(curve.force(sample.s as f32 * answer.sign)) - sample.force;
+        let loaded = own.iter().filter(|sample| sample.force > NOTHING * samples.most * samples.share);
+        let squares: f64 = loaded.map(|sample| error(sample) * error(sample)).sum();
+        *rms = (squares / finding.samples as f64).sqrt();
+    }
+    finding.hysteresis = points.hysteresis();
+    finding.points = Some(points);
+    (finding, Some(curves))
+}
+
+/// The lowest and the highest reading of all.
+fn ceilings(logs: &[Log]) -> [f32; 2] {
+    let cells = logs.iter().flat_map(|log| &log.cells);
+    cells.fold([f32::INFINITY, f32::NEG_INFINITY], |[low, high], cell| [low.min(*cell), high.max(*cell)])
+}
+
+fn nothing(findings: &[Finding], settings: &Settings) -> String {
+    let count = |state| findings.iter().filter(|finding| finding.state == state).count();
+    let (dead, few, unfit) = (count(State::Dead), count(State::Few), count(State::Unfit));
+    let what = format!("{dead} tactels never answer, {few} have too few samples, {unfit} give no rising curve");
+    let way_out = match settings.load {
+        Load::Probe => "is the log of a probe on one tactel at a time, or is the load uniform?",
+        Load::Uniform => "is the log of a uniform load, or of a probe on one tactel at a time?",
+    };
+    format!("no tactel can be calibrated: {what}; {way_out}")
+}
+
+impl Report {
+    /// The sort of the curves.
+    #[must_use]
+    pub const fn kind(&self) -> Kind {
+        self.calibration.kind
+    }
+
+    /// The tactels in a state, as `[row, column]`.
+    #[must_use]
+    pub fn in_state(&self, state: State) -> Vec<[usize; 2]> {
+        self.places(|finding| finding.state == state)
+    }
+
+    fn places(&self, is_meant: impl Fn(&Finding) -> bool) -> Vec<[usize; 2]> {
+        let cols = self.calibration.cols;
+        (0..self.findings.len()).filter(|i| is_meant(&self.findings[*i])).map(|i| [i / cols, i % cols]).collect()
+    }
+
+    /// The report for a person; with a line for `each` tactel, or only for the worst.
+    #[must_use]
+    pub fn text(&self, each: bool) -> String {
+        let Calibration { rows, cols, reading, .. } = &self.calibration;
+        let good: Vec<&Finding> = self.findings.iter().filter(|finding| finding.state == State::Good).collect();
+        let mut text = format!(
+            "{} of {rows} x {cols} tactels calibrated, readings in {reading}, forces up to {:.3} N a tactel\n\n",
+            good.len(),
+            self.most
+        );
+        text.push_str("residual (RMS)     all samples   median tactel    worst tactel   median of range\n");
+        for kind in KINDS {
+            let k = kind as usize;
+            let rms = sorted(good.iter().map(|finding| finding.rms[k]));
+            let parts = sorted(good.iter().map(|finding| finding.part(k)));
+            let mark = if kind == self.kind() { "*" } else { " " };
+            line(
+                &mut text,
+                format_args!(
+                    "{mark} {kind:<12} {:>13} {:>15} {:>15} {:>17}",
+                    newton(self.rms[k]),
+                    newton(middle(&rms)),
+                    newton(last(&rms)),
+                    percent(middle(&parts))
+                ),
+            );
+        }
+        line(&mut text, format_args!("* written to the file\n"));
+        let hysteresis = sorted(good.iter().filter_map(|finding| finding.hysteresis));
+        let noise = sorted(good.iter().map(|finding| finding.noise));
+        match hysteresis.is_empty() {
+            true => line(&mut text, format_args!("hysteresis   not measured: the force never rises and falls again")),
+            false => line(
+                &mut text,
+                format_args!(
+                    "hysteresis   median {}, greatest {} of the range of the reading",
+                    percent(middle(&hysteresis)),
+                    percent(last(&hysteresis))
+                ),
+            ),
+        }
+        line(
+            &mut text,
+            format_args!(
+                "noise        median {:.2} {reading}, greatest {:.2} {reading}, unloaded",
+                middle(&noise),
+                last(&noise)
+            ),
+        );
+        let groups = [
+            ("dead", "never answer", self.in_state(State::Dead)),
+            (
+                "saturated",
+                "stay at the largest reading; calibrated below it",
+                self.places(|finding| finding.is_saturated),
+            ),
+            ("too few", "have too few samples; left out", self.in_state(State::Few)),
+            ("unfit", "give no rising curve; left out", self.in_state(State::Unfit)),
+        ];
+        for (name, what, places) in groups {
+            line(&mut text, format_args!("{name:<12} {}", listed(&places, what)));
+        }
+        self.table(&mut text, each);
+        text
+    }
+
+    fn table(&self, text: &mut String, each: bool) {
+        let k = self.kind() as usize;
+        let good = |i: &usize| self.findings[*i].state == State::Good;
+        let mut order: Vec<usize> = (0..self.findings.len()).filter(good).collect();
+        if !each {
+            order.sort_by(|a, b| self.findings[*b].rms[k].total_cmp(&self.findings[*a].rms[k]));
+            order.truncate(WORST);
+        }
+        let title = if each { "every tactel" } else { "the worst tactels" };
+        let reading = self.calibration.reading;
+        line(text, format_args!("\n{title}, {} curve", self.kind()));
+        let unit = format!("[{reading}]");
+        line(
+            text,
+            format_args!(
+                "      at   samples   force [N] {:>15}   RMS [N]   RMS [%]   hysteresis [%]",
+                format!("range {unit}")
+            ),
+        );
+        for i in order {
+            let finding = &self.findings[i];
+            let Some(points) = &finding.points else { continue };
+            let at = format!("[{}, {}]", i / self.calibration.cols, i % self.calibration.cols);
+            let hysteresis = finding.hysteresis.map_or_else(|| "-".into(), |part| format!("{:.1}", 100.0 * part));
+            line(
+                text,
+                format_args!(
+                    "{at:>8} {:>9} {:>11.3} {:>15.1} {:>9.4} {:>9.2} {hysteresis:>16}",
+                    finding.samples,
+                    points.most,
+                    points.range,
+                    finding.rms[k],
+                    100.0 * finding.part(k)
+                ),
+            );
+        }
+    }
+}
+
+/// How many of the worst tactels are shown.
+const WORST: usize = 5;
+
+impl Finding {
+    /// Residual of a sort of curve as a part of the largest force.
+    fn part(&self, k: usize) -> f64 {
+        self.points.as_ref().map_or(0.0, |points| self.rms[k] / points.most)
+    }
+}
+
+fn line(text: &mut String, line: std::fmt::Arguments<'_>) {
+    writeln!(text, "{line}").expect("a string takes all");
+}
+
+fn sorted(numbers: impl Iterator<Item = f64>) -> Vec<f64> {
+    let mut numbers: Vec<f64> = numbers.collect();
+    numbers.sort_unstable_by(f64::total_cmp);
+    numbers
+}
+
+fn middle(sorted: &[f64]) -> f64 {
+    sorted.get(sorted.len() / 2).copied().unwrap_or(0.0)
+}
+
+fn last(sorted: &[f64]) -> f64 {
+    sorted.last().copied().unwrap_or(0.0)
+}
+
+fn newton(force: f64) -> String {
+    format!("{force:.4} N")
+}
+
+fn percent(part: f64) -> String {
+    format!("{:.1} %", 100.0 * part)
+}
+
+/// A few places and how many there are.
+fn listed(places: &[[usize; 2]], what: &str) -> String {
+    const SHOWN: usize = 8;
+    if places.is_empty() {
+        return "none".into();
+    }
+    let mut list: Vec<String> = places.iter().take(SHOWN).map(|[i, j]| format!("[{i}, {j}]")).collect();
+    if places.len() > SHOWN {
+        list.push(format!("and {} more", places.len() - SHOWN));
+    }
+    format!("{} {what}: {}", places.len(), list.join(", "))
+}

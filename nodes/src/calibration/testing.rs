@@ -1,0 +1,138 @@
+//! A pad whose curves are known: squashed, spread, hysteretic, noisy, of 12 bits, with dead tactels. And its logs.
+
+use tactflow_runtime::signal::Unit;
+
+use super::log::Log;
+
+/// The largest force on a tactel [N].
+pub(super) const MOST: f64 = 5.0;
+
+/// Greatest distance of the two branches, as a part of the range.
+pub(super) const HYSTERESIS: f64 = 0.1;
+
+/// The largest reading of 12 bits.
+const TOP: f64 = 4095.0;
+
+/// Numbers that are the same in every run.
+pub(super) struct Random(u64);
+
+impl Random {
+    /// A number in [0, 1).
+    pub(super) fn uniform(&mut self) -> f64 {
+        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (self.0 >> 40) as f64 / 16_777_216.0
+    }
+
+    /// A number of the normal distribution: the sum of twelve uniform ones has its first three moments.
+    pub(super) fn normal(&mut self) -> f64 {
+        (0..12).map(|_| self.uniform()).sum::<f64>() - 6.0
+    }
+}
+
+/// One tactel as it really is: offset + a f / (f + b).
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Truth {
+    pub(super) offset: f64,
+    pub(super) a: f64,
+    pub(super) b: f64,
+    pub(super) is_dead: bool,
+}
+
+impl Truth {
+    /// What it reads, without noise and steps, in the middle of its branches.
+    pub(super) fn middle(&self, force: f64) -> f64 {
+        let force = force.max(0.0);
+        self.offset + if self.is_dead { 0.0 } else { self.a * force / (force + self.b) }
+    }
+
+    /// The same on one of its branches.
+    fn branch(&self, force: f64, is_loading: bool) -> f64 {
+        let x = (force / MOST).clamp(0.0, 1.0);
+        let range = self.middle(MOST) - self.offset;
+        let side = if is_loading { -0.5 } else { 0.5 };
+        self.middle(force) + side * HYSTERESIS * range * 4.0 * x * (1.0 - x)
+    }
+
+    /// The force of a reading, exactly, up to the largest one: what no calibration can beat.
+    pub(super) fn force(&self, reading: f64) -> f64 {
+        let s = (reading - self.offset).clamp(0.0, self.middle(MOST) - self.offset);
+        self.b * s / (self.a - s)
+    }
+}
+
+/// A pad.
+pub(super) struct Pad {
+    pub(super) rows: usize,
+    pub(super) cols: usize,
+    pub(super) truths: Vec<Truth>,
+    pub(super) random: Random,
+    /// Standard deviation of the noise [counts].
+    pub(super) noise: f64,
+}
+
+impl Pad {
+    /// A pad whose gains are spread by a quarter and whose offsets are 5 to 10 % of the range; some tactels are dead.
+    pub(super) fn new(rows: usize, cols: usize, dead: &[usize], seed: u64) -> Self {
+        let mut random = Random(seed);
+        let truth = |i: usize| {
+            let a = 3400.0 * libm::exp(0.25 * random.normal());
+            let b = 3.0 * libm::exp(0.15 * random.normal());
+            let offset = TOP * (0.05 + 0.05 * random.uniform());
+            Truth { offset, a, b, is_dead: dead.contains(&i) }
+        };
+        let truths = (0..rows * cols).map(truth).collect();
+        Self { rows, cols, truths, random, noise: 4.0 }
+    }
+
+    /// A frame: the force on each tactel, and whether it rises.
+    fn frame(&mut self, log: &mut Log, reference: f64, is_loading: bool, force: impl Fn(usize) -> f64) {
+        // The strain gauge of the paper's bench is good to 2.5 mN.
+        log.force.push(reference + 0.00125 * self.random.normal());
+        for i in 0..self.truths.len() {
+            let reading = self.truths[i].branch(force(i), is_loading) + self.noise * self.random.normal();
+            log.cells.push(reading.round().clamp(0.0, TOP) as f32);
+        }
+    }
+
+    fn log(&self) -> Log {
+        let (force, cells, absent) = (vec![], vec![], vec![]);
+        Log { rows: self.rows, cols: self.cols, unit: Unit::RAW, force, cells, absent }
+    }
+
+    /// A bladder that presses on all live tactels alike, `cycles` times, with `half` frames up and as many down.
+    pub(super) fn uniform(&mut self, cycles: usize, half: usize) -> Log {
+        let live = self.truths.iter().filter(|truth| !truth.is_dead).count() as f64;
+        let mut log = self.log();
+        (0..50).for_each(|_| self.frame(&mut log, 0.0, true, |_| 0.0));
+        for _ in 0..cycles {
+            for (force, is_loading) in cycle(half) {
+                self.frame(&mut log, force * live, is_loading, |_| force);
+            }
+            (0..20).for_each(|_| self.frame(&mut log, 0.0, true, |_| 0.0));
+        }
+        log
+    }
+
+    /// A probe that presses one tactel after the other; a neighbour feels a part of it, `coupling`.
+    pub(super) fn probe(&mut self, cycles: usize, half: usize, coupling: f64) -> Log {
+        let (cols, mut log) = (self.cols, self.log());
+        for pressed in 0..self.truths.len() {
+            (0..10).for_each(|_| self.frame(&mut log, 0.0, true, |_| 0.0));
+            for (force, is_loading) in (0..cycles).flat_map(|_| cycle(half)) {
+                let on = move |i: usize| {
+                    let far = (i / cols).abs_diff(pressed / cols) + (i % cols).abs_diff(pressed % cols);
+                    force * [1.0, coupling].get(far).copied().unwrap_or(0.0)
+                };
+                self.frame(&mut log, force, is_loading, on);
+            }
+        }
+        log
+    }
+}
+
+/// The forces of a press, up and down.
+fn cycle(half: usize) -> impl Iterator<Item = (f64, bool)> {
+    let up = (1..=half).map(move |k| (MOST * k as f64 / half as f64, true));
+    let down = (0..half).rev().map(move |k| (MOST * k as f64 / half as f64, false));
+    up.chain(down)
+}

@@ -1,0 +1,298 @@
+//! `calibrate` against tables and against its own curves.
+
+use tactflow_runtime::harness::NodeRig;
+use tactflow_runtime::node::At;
+use tactflow_runtime::signal::{FlagShape, Image, Shape};
+
+use super::*;
+use crate::calibration::{Curve, Kind, Tactel};
+
+fn rig(params: &str) -> Result<NodeRig, Mistakes> {
+    let shape = ImageShape { rows: 2, cols: 3, pitch: [0.005, 0.004], unit: Unit::RAW };
+    NodeRig::new::<Calibrate>(params, &[("image", shape.into())])
+}
+
+#[test]
+fn a_line_per_tactel() {
+    let cases = [
+        ("", [10.0, 20.0, 30.0, 40.0, 50.0, 60.0]),
+        ("offset = 10", [0.0, 10.0, 20.0, 30.0, 40.0, 50.0]),
+        ("gain = 0.5", [5.0, 10.0, 15.0, 20.0, 25.0, 30.0]),
+        ("offset = 20\ngain = -2.0", [20.0, 0.0, -20.0, -40.0, -60.0, -80.0]),
+        ("offset = [[1, 2, 3], [4, 5, 6]]", [9.0, 18.0, 27.0, 36.0, 45.0, 54.0]),
+        ("offset = 10\ngain = [[1, 2, 3], [4, 5, 6]]", [0.0, 20.0, 60.0, 120.0, 200.0, 300.0]),
+        ("dead = [[0, 1], [1, 2]]", [10.0, 0.0, 30.0, 40.0, 50.0, 0.0]),
+        ("offset = 100\ndead = [[1, 0]]", [-90.0, -80.0, -70.0, 0.0, -50.0, -40.0]),
+    ];
+    for (params, calibrated) in cases {
+        let mut rig = rig(params).unwrap();
+        rig.set("image", Image::from_cells(3, &[10.0, 20.0, 30.0, 40.0, 50.0, 60.0]));
+        rig.step();
+        assert_eq!(rig.get::<Image>("image"), Some(&Image::from_cells(3, &calibrated)), "{params}");
+    }
+}
+
+#[test]
+fn the_unit_is_the_inputs_unless_it_is_named() {
+    for (params, unit) in [("", Unit::RAW), ("unit = \"N\"", Unit::NEWTON), ("unit = \"1\"", Unit::ONE)] {
+        let expected = ImageShape { rows: 2, cols: 3, pitch: [0.005, 0.004], unit };
+        assert_eq!(rig(params).unwrap().shape("image"), &Shape::from(expected), "{params}");
+    }
+}
+
+#[test]
+fn every_mistake_stands_at_its_parameter() {
+    let cases = [
+        ("offset = [[1, 2, 3]]", "offset", "`offset` has 1 rows, but the image has 2"),
+        ("gain = [[1, 2, 3], [4, 5]]", "gain", "row 1 of `gain` has 2 numbers, but the image has 3 columns"),
+        ("gain = 1e39", "gain", "1e39 is too large for a tactel: images are of 32-bit floats"),
+        ("offset = [[0, 0, 0], [0, -1e300, 0]]", "offset", "-1e300 is too large"),
+        ("unit = \"Nm\"", "unit", "`Nm` is not a unit"),
+        ("dead = [[2, 0]]", "dead", "tactel [2, 0] is not on an array of 2 by 3"),
+        ("dead = [[0, 3]]", "dead", "tactel [0, 3] is not on an array of 2 by 3"),
+    ];
+    for (params, at, message) in cases {
+        let mistakes = rig(params).err().unwrap();
+        assert_eq!(mistakes.len(), 1, "{params}: {mistakes:?}");
+        assert_eq!(mistakes[0].at, At::Param(at.into()), "{params}");
+        assert!(mistakes[0].message.starts_with(message), "{params}: {}", mistakes[0].message);
+    }
+    let all = rig("offset = [[1]]\ngain = 1e39\nunit = \"x\"\ndead = [[9, 9]]").err().unwrap();
+    assert_eq!(all.len(), 4, "{all:?}");
+    for wrong in
+        ["gain = \"1\"", "gain = [1, 2]", "gain = { from = 1 }", "gain = inf", "dead = [[1]]", "dead = [[-1, 0]]"]
+    {
+        assert!(rig(wrong).is_err(), "{wrong}");
+    }
+}
+
+/// A rig with a calibration file of that text.
+fn with_file(name: &str, text: &str, params: &str) -> Result<NodeRig, Mistakes> {
+    let path = std::env::temp_dir().join(format!("tactflow-calibrate-{}-{name}.toml", std::process::id()));
+    std::fs::write(&path, text).unwrap();
+    let rig = rig(&format!("file = '{}'\n{params}", path.display()));
+    std::fs::remove_file(path).unwrap();
+    rig
+}
+
+/// A calibration of two by three tactels, of which the fifth is dead.
+fn calibration(kind: Kind) -> Calibration {
+    let tactel = |i: usize| {
+        let by = 1.0 + 0.1 * i as f32;
+        let curve = match kind {
+            Kind::Linear => Curve::Linear { gain: 0.01 * by },
+            Kind::Rational => Curve::Rational { gain: 0.01 * by, squash: 0.002 * by, most: 3.0 * by },
+            Kind::Piecewise => {
+                let knots = [[40.0, 0.3], [100.0, 1.1], [130.0, 2.0 * by]];
+                Curve::Piecewise { knots: knots[..=i % 3].to_vec() }
+            }
+        };
+        (i != 4).then_some(Tactel { offset: 7.5 * by, curve })
+    };
+    Calibration {
+        kind,
+        rows: 2,
+        cols: 3,
+        reading: Unit::RAW,
+        unit: Unit::NEWTON,
+        tactels: (0..6).map(tactel).collect(),
+    }
+}
+
+#[test]
+fn a_file_gives_the_bits_of_its_curves() {
+    for kind in [Kind::Linear, Kind::Rational, Kind::Piecewise] {
+        let calibration = calibration(kind);
+        let text = file::write(&calibration, "a test");
+        let mut rig = with_file(kind.name(), &text, "dead = [[0, 1]]").unwrap();
+        let Shape::Image(shape) = rig.shape("image") else { panic!("an image") };
+        assert_eq!((shape.rows, shape.cols, shape.unit), (2, 3, Unit::NEWTON));
+        for reading in [-1e30, -50.0, 0.0, 7.5, 8.0, 20.0, 60.0, 111.1, 150.0, 1e4, 1e30f32] {
+            rig.set("image", Image::from_cells(3, &[reading; 6]));
+            rig.step();
+            let tactels = calibration.tactels.iter().enumerate();
+            let forces = tactels.map(|(i, tactel)| match tactel {
+                Some(tactel) if i != 1 => tactel.curve.force(reading - tactel.offset),
+                _ => 0.0,
+            });
+            let forces: Vec<u32> = forces.map(|force| (force + 0.0).to_bits()).collect();
+            let cells = rig.get::<Image>("image").unwrap().cells();
+            assert_eq!(cells.iter().map(|cell| (cell + 0.0).to_bits()).collect::<Vec<_>>(), forces, "{kind} {reading}");
+        }
+    }
+}
+
+#[test]
+fn a_mistake_in_the_file_shows_in_the_file_and_one_about_it_where_it_is_named() {
+    let good = file::write(&calibration(Kind::Rational), "a test");
+    let data = |name: &str, from: &str, to: &str, marked: &str| {
+        assert!(good.contains(from), "{from}");
+        let damaged = good.replacen(from, to, 1);
+        let mistakes = with_file(name, &damaged, "").err().unwrap();
+        let [Mistake { at: At::Data { text, span, .. }, .. }] = &mistakes[..] else { panic!("{mistakes:?}") };
+        assert_eq!((&text[span.clone()], text), (marked, &damaged));
+    };
+    data("gain", "gain = 0.01,", "gain = 0,", "0");
+    data("kind", "kind = \"calibration\"", "kind = \"bench\"", "\"bench\"");
+    let cases = [
+        (good.clone(), "offset = 0", At::Key("offset".into()), "`offset` and `file` exclude each other"),
+        (good.clone(), "gain = 1", At::Key("gain".into()), "`gain` and `file` exclude each other"),
+        (good.clone(), "unit = 'N'", At::Key("unit".into()), "`unit` and `file` exclude each other"),
+        (
+            good.replace("\"raw\"", "\"kPa\""),
+            "",
+            At::Param("file".into()),
+            "calibrates readings in `kPa`, but the image is in `raw`",
+        ),
+        (
+            file::write(&Calibration { rows: 3, cols: 2, ..calibration(Kind::Linear) }, ""),
+            "",
+            At::Param("file".into()),
+            "calibrates 3 by 2 tactels, but the image has 2 by 3",
+        ),
+    ];
+    for (text, params, at, message) in cases {
+        let mistakes = with_file("about", &text, params).err().unwrap();
+        assert_eq!(mistakes.len(), 1, "{mistakes:?}");
+        assert!(mistakes[0].at == at && mistakes[0].message.ends_with(message), "{mistakes:?}");
+    }
+    let missing = rig("file = 'nowhere.toml'").err().unwrap();
+    assert!(missing[0].message.starts_with("cannot read `nowhere.toml`"), "{missing:?}");
+}
+
+/// A pad of one tactel row with wires for tare and contact.
+fn tared(params: &str, wires: &[&str]) -> Result<NodeRig, Mistakes> {
+    let image = ImageShape { rows: 1, cols: 3, pitch: [0.005; 2], unit: Unit::RAW };
+    let mut shapes = vec![("image", Shape::from(image))];
+    shapes.extend(wires.iter().map(|wire| (*wire, Shape::from(FlagShape))));
+    NodeRig::new::<Calibrate>(params, &shapes)
+}
+
+/// A frame of a pad of three tactels that read `value` and a bit more, and what the first is calibrated to.
+fn frame(rig: &mut NodeRig, value: f32) -> f32 {
+    rig.set("image", Image::from_cells(3, &[value, value + 1.0, value + 2.0]));
+    rig.step();
+    rig.get::<Image>("image").unwrap().cells()[0]
+}
+
+const WINDOW: &str = "offset = 10\ngain = 2\ndead = [[0, 2]]\ntare_window = 4";
+
+#[test]
+fn the_mean_of_the_window_becomes_the_zero_of_each_tactel() {
+    let mut rig = tared(WINDOW, &["tare", "present"]).unwrap();
+    rig.set("tare", false);
+    rig.set("present", false);
+    assert_eq!(frame(&mut rig, 12.0), 4.0);
+    rig.set("tare", true);
+    for value in [12.0, 13.0, 15.0, 16.0] {
+        assert_eq!(frame(&mut rig, value), 2.0 * (value - 10.0), "the old zero holds through the window");
+    }
+    assert_eq!(frame(&mut rig, 15.0), 2.0, "the mean is 14");
+    assert_eq!(rig.get::<Image>("image").unwrap().cells(), [2.0, 2.0, 0.0], "each its own; the dead stay dead");
+    for _ in 0..9 {
+        assert_eq!(frame(&mut rig, 20.0), 12.0, "a command that stays set is one command");
+    }
+    rig.set("tare", false);
+    frame(&mut rig, 20.0);
+    rig.set("tare", true);
+    (0..4).for_each(|_| assert_eq!(frame(&mut rig, 20.0), 12.0));
+    assert_eq!(frame(&mut rig, 20.0), 0.0, "and the next is another");
+    rig.lose("image");
+    rig.step_ms(30.0);
+    rig.step();
+    rig.set("tare", false);
+    assert_eq!(frame(&mut rig, 20.0), 20.0, "a lasting absence goes back to what was calibrated");
+}
+
+#[test]
+fn a_contact_at_any_time_of_the_window_ends_the_attempt() {
+    // Frames are numbered from that of the command, which is 1; `present` after a frame is what the next step sees.
+    for touched in 0..8 {
+        let mut rig = tared(WINDOW, &["tare", "present"]).unwrap();
+        let mut last = 0.0;
+        for i in 0..10 {
+            rig.set("present", i - 1 == touched);
+            rig.set("tare", i == 1);
+            last = frame(&mut rig, 14.0);
+        }
+        let is_tared = !(0..=4).contains(&touched);
+        assert_eq!(last, if is_tared { 0.0 } else { 8.0 }, "a contact in frame {touched}");
+    }
+}
+
+#[test]
+fn what_is_not_known_is_no_unloaded_pad() {
+    let mut rig = tared(WINDOW, &["tare", "present"]).unwrap();
+    rig.set("tare", true);
+    (0..9).for_each(|_| assert_eq!(frame(&mut rig, 14.0), 8.0, "nobody has said that nothing touches it"));
+    rig.set("present", false);
+    (0..4).for_each(|_| assert_eq!(frame(&mut rig, 14.0), 8.0, "the command has waited"));
+    assert_eq!(frame(&mut rig, 14.0), 0.0);
+    rig.set("tare", false);
+    frame(&mut rig, 15.0);
+    rig.set("tare", true);
+    frame(&mut rig, 15.0);
+    rig.lose("present");
+    (0..9).for_each(|_| assert_eq!(frame(&mut rig, 15.0), 2.0, "lost in the window"));
+}
+
+#[test]
+fn a_held_frame_counts_once() {
+    let mut rig = tared(WINDOW, &["tare", "present"]).unwrap();
+    rig.set("present", false);
+    rig.set("tare", true);
+    for value in [10.0, 10.0, 10.0, 18.0] {
+        frame(&mut rig, value);
+        rig.step();
+        // The loss of an optional wire wakes the node, with the frame it has seen.
+        rig.lose("tare");
+        rig.step();
+        rig.step();
+    }
+    assert_eq!(frame(&mut rig, 12.0), 0.0, "the mean of four frames is 12");
+}
+
+#[test]
+fn one_tactel_beyond_the_bound_keeps_the_zeros_of_all() {
+    for (bound, force) in [("4.9", 8.0), ("5.1", 0.0)] {
+        // The second tactel reads 15: five more than calibrated. The third, which reads 16, is dead.
+        let mut rig = tared(&format!("{WINDOW}\ntare_bound = {bound}"), &["tare"]).unwrap();
+        rig.set("tare", true);
+        let last = (0..6).map(|_| frame(&mut rig, 14.0)).last();
+        assert_eq!(last, Some(force), "{bound}");
+    }
+}
+
+#[test]
+fn the_first_frames_are_the_zero_if_nothing_touches_the_pad() {
+    for (touched, force) in [(None, 0.0), (Some(0), 8.0), (Some(3), 8.0), (Some(4), 0.0)] {
+        let mut rig = tared(&format!("{WINDOW}\ntare_at_start = true"), &["present"]).unwrap();
+        let mut last = 0.0;
+        for i in 0..6 {
+            if i > 0 {
+                rig.set("present", touched == Some(i - 1));
+            }
+            last = frame(&mut rig, 14.0);
+        }
+        assert_eq!(last, force, "{touched:?}");
+    }
+}
+
+#[test]
+fn a_tare_that_nothing_guards_is_refused() {
+    let cases = [
+        ("", vec!["tare"], At::Input("tare".into())),
+        ("tare_at_start = true", vec![], At::Param("tare_at_start".into())),
+    ];
+    for (params, wires, at) in cases {
+        let mistakes = tared(params, &wires).err().unwrap();
+        assert_eq!((mistakes.len(), &mistakes[0].at), (1, &at), "{mistakes:?}");
+        assert!(tared(&format!("{params}\ntare_bound = 5.0"), &wires).is_ok());
+        let watched: Vec<&str> = wires.iter().copied().chain(["present"]).collect();
+        assert!(tared(params, &watched).is_ok());
+    }
+    assert!(tared("", &["present"]).is_ok(), "what is not used does no harm");
+    for wrong in ["tare_window = 0", "tare_bound = 0", "tare_at_start = 1"] {
+        assert!(tared(wrong, &["present"]).is_err(), "{wrong}");
+    }
+}

@@ -1,0 +1,163 @@
+//! What is known of a parameter without a graph: for the reference, and for whoever shows a graph with its defaults.
+
+use super::Param;
+
+/// A parameter as a graph file would say it.
+pub type Written = toml::Value;
+
+/// A table of parameters as a graph file would say it; what says nothing is left out.
+#[doc(hidden)]
+#[must_use]
+pub fn written_table<const N: usize>(fields: [(&str, Option<Written>); N]) -> Option<Written> {
+    let entries = fields.into_iter().filter_map(|(name, value)| Some((name.to_owned(), value?)));
+    Some(Written::Table(entries.collect()))
+}
+
+/// What is known of a parameter without a graph.
+#[derive(Debug, Clone)]
+pub struct ParamSpec {
+    /// Name in the graph file.
+    pub name: &'static str,
+    /// Meaning, with the unit in brackets.
+    pub doc: &'static str,
+    /// What it takes, for a person.
+    pub takes: String,
+    /// Default as a graph file would say it; none if it must be given, or is nothing at all when it is left out.
+    pub default: Option<String>,
+    /// Whether it may be left out.
+    pub is_optional: bool,
+    /// How often the fields are there.
+    pub repeats: Repeats,
+    /// The parameters of a nested table.
+    pub fields: Vec<ParamSpec>,
+}
+
+/// How often the fields of a nested table are there.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Repeats {
+    /// Once.
+    Once,
+    /// Once for each name that the graph chooses.
+    PerName,
+    /// Once for each entry of a list.
+    PerEntry,
+}
+
+impl ParamSpec {
+    /// The description of a field of type `T`; `source` is its default as written in the node's file.
+    #[must_use]
+    pub fn of<T: Param>(
+        name: &'static str,
+        doc: &'static str,
+        default: Option<fn() -> T>,
+        source: &'static str,
+    ) -> Self {
+        let is_optional = default.is_some() || T::when_missing().is_some();
+        let default = default.map(|value| value().written().map_or_else(|| word(source), |value| value.to_string()));
+        Self { name, doc, takes: T::takes(), default, is_optional, repeats: T::REPEATS, fields: T::fields() }
+    }
+
+    /// The unit: what its doc ends with in brackets.
+    #[must_use]
+    pub fn unit(&self) -> Option<&'static str> {
+        let doc = self.doc.trim_end().trim_end_matches('.');
+        Some(doc.strip_suffix(']')?.rsplit_once('[')?.1)
+    }
+}
+
+/// A default that cannot say itself what a graph file would say: `Choose::LastSeen` is the word `"last_seen"`.
+fn word(source: &str) -> String {
+    let Some((_, variant)) = source.rsplit_once("::") else { return source.into() };
+    if !variant.chars().all(char::is_alphanumeric) {
+        return source.into();
+    }
+    let mut word = String::new();
+    for c in variant.chars() {
+        if c.is_uppercase() && !word.is_empty() {
+            word.push('_');
+        }
+        word.extend(c.to_lowercase());
+    }
+    format!("\"{word}\"")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::node::{Map, NonNegative, Reader, Value, Word};
+    use crate::signal::Unit;
+
+    /// A choice between words.
+    #[derive(Debug, Clone)]
+    pub struct Choice;
+
+    impl Choice {
+        #[allow(non_upper_case_globals, reason = "a stand-in for the variant of an enum")]
+        const LastSeen: Self = Self;
+    }
+
+    impl Param for Choice {
+        const EXPECTS: &'static str = "`last_seen`";
+        fn read(_: &Value, _: &mut Reader<'_>) -> Option<Self> {
+            Some(Self)
+        }
+    }
+
+    crate::params! { Inner:
+        /// Place [m].
+        xyz: [f64; 3] = [0.0; 3],
+        /// A name.
+        of: Option<Word>,
+    }
+
+    crate::params! {
+        /// Must be given [N].
+        force: f64,
+        /// A time [ms].
+        time_ms: NonNegative = NonNegative(20.0),
+        /// A name.
+        base: String = "base".into(),
+        /// A unit.
+        unit: Unit = Unit::NEWTON.per_tactel(),
+        /// A word.
+        choose: Choice = Choice::LastSeen,
+        /// A table.
+        mount: Inner = Inner { xyz: [0.0, 0.0, 1e-3], of: None },
+        /// A list of tables.
+        press: Vec<Inner> = vec![],
+        /// A table for each name.
+        gains: Map<Inner>,
+        /// May be left out [rad/s].
+        speed: Option<f64>,
+    }
+
+    #[test]
+    fn a_default_reads_as_in_a_graph_file() {
+        let specs = Params::fields();
+        let defaults: Vec<_> =
+            specs.iter().map(|spec| (spec.name, spec.default.as_deref(), spec.is_optional)).collect();
+        let expected = [
+            ("force", None, false),
+            ("time_ms", Some("20.0"), true),
+            ("base", Some("\"base\""), true),
+            ("unit", Some("\"N/tactel\""), true),
+            ("choose", Some("\"last_seen\""), true),
+            ("mount", Some("{ xyz = [0.0, 0.0, 0.001] }"), true),
+            ("press", Some("[]"), true),
+            ("gains", None, false),
+            ("speed", None, true),
+        ];
+        assert_eq!(defaults, expected);
+        let repeats = |name| specs.iter().find(|spec| spec.name == name).map(|spec| spec.repeats);
+        assert_eq!(repeats("mount"), Some(Repeats::Once));
+        assert_eq!(repeats("press"), Some(Repeats::PerEntry));
+        assert_eq!(repeats("gains"), Some(Repeats::PerName));
+    }
+
+    #[test]
+    fn the_unit_stands_at_the_end_of_the_doc() {
+        let units: Vec<_> = Params::fields().iter().map(ParamSpec::unit).collect();
+        assert_eq!(units[..3], [Some("N"), Some("ms"), None]);
+        assert_eq!(units[8], Some("rad/s"));
+    }
+}
