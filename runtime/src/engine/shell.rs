@@ -214,16 +214,14 @@ async fn sleep_until(due: Instant) {
 }
 
 /// Becomes true at the first Ctrl-C or SIGTERM; a second one ends the process at once.
+///
+/// They are caught from here on, and not only once the task has begun: on a busy machine that may take a while.
 fn interrupts() -> io::Result<watch::Receiver<bool>> {
     const INTERRUPTED: i32 = 130;
     let (sender, receiver) = watch::channel(false);
-    let mut terminated = terminations()?;
+    let mut signals = Signals::catch()?;
     tokio::spawn(async move {
-        loop {
-            tokio::select! {
-                result = tokio::signal::ctrl_c() => if result.is_err() { return },
-                () = terminated.next() => {}
-            }
+        while signals.next().await.is_ok() {
             if sender.send_replace(true) {
                 std::process::exit(INTERRUPTED);
             }
@@ -233,32 +231,38 @@ fn interrupts() -> io::Result<watch::Receiver<bool>> {
 }
 
 #[cfg(unix)]
-struct Terminations(tokio::signal::unix::Signal);
-
-#[cfg(unix)]
-fn terminations() -> io::Result<Terminations> {
-    Ok(Terminations(tokio::signal::unix::signal(tokio::signal::unix::SignalKind::terminate())?))
+struct Signals {
+    interrupt: tokio::signal::unix::Signal,
+    terminate: tokio::signal::unix::Signal,
 }
 
 #[cfg(unix)]
-impl Terminations {
-    async fn next(&mut self) {
-        self.0.recv().await;
+impl Signals {
+    fn catch() -> io::Result<Self> {
+        use tokio::signal::unix::{SignalKind, signal};
+        Ok(Self { interrupt: signal(SignalKind::interrupt())?, terminate: signal(SignalKind::terminate())? })
+    }
+
+    async fn next(&mut self) -> io::Result<()> {
+        tokio::select! {
+            _ = self.interrupt.recv() => {}
+            _ = self.terminate.recv() => {}
+        }
+        Ok(())
     }
 }
 
 #[cfg(not(unix))]
-struct Terminations;
+struct Signals;
 
 #[cfg(not(unix))]
 #[expect(clippy::unnecessary_wraps, reason = "the same form as on unix")]
-fn terminations() -> io::Result<Terminations> {
-    Ok(Terminations)
-}
+impl Signals {
+    fn catch() -> io::Result<Self> {
+        Ok(Self)
+    }
 
-#[cfg(not(unix))]
-impl Terminations {
-    async fn next(&mut self) {
-        std::future::pending().await
+    async fn next(&mut self) -> io::Result<()> {
+        tokio::signal::ctrl_c().await
     }
 }
