@@ -18,3 +18,4 @@ mod oracles;
 mod tick;
 mod tidy;
 mod tool;
+mod touch;
