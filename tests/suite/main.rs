@@ -19,3 +19,4 @@ mod oracles;
 mod tick;
 mod tidy;
 mod tool;
+mod touch;

@@ -45,9 +45,8 @@ impl Node for Eccentricity {
     const DOC: &'static str = "The ellipse with the same second central moments as the region has the half axes a and \
         b, up to a common factor; this is sqrt(1 - b² / a²): 0 for a circle or a square, 0.87 when it is twice as long \
         as wide, 0.98 at five times, 1 for a single row of tactels.\n\n\
-        It grows steeply for shapes that are almost round, so a round patch with noise shows 0.2 to 0.4. The \
-        `anisotropy` of `moments`, A, is flat there and says the same: the eccentricity is sqrt(2 A / (1 + A)). \
-        `principal_axes` gives a and b in metres.\n\n\
+        It grows steeply where shapes are almost round. The `anisotropy` of `moments`, A, is flat there and says the \
+        same: the eccentricity is sqrt(2 A / (1 + A)), so 0.05 is 0.31. `principal_axes` gives a and b in metres.\n\n\
         Tactels count as points, each with its `weight` as in `moments`. A region without extent, a single tactel, has \
         none: the output is absent.";
     const EXAMPLE: &'static str = r#"

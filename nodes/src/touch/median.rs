@@ -59,7 +59,7 @@ impl Node for Median {
         **Axes.** The direction of a line (`rad mod pi`) has no order of size. The median is then the sample whose \
         distances to all others, taken the short way round modulo pi, have the least sum; of two that are equal, the \
         newer. It is always one of the samples, so there is one even for axes that cancel each other.\n\n\
-        A step comes through half a window late, and unrounded. Against white noise a `smooth` of the same window is \
+        A step comes through half a window late, and stays a step. Against white noise a `smooth` of the same window is \
         better: the median leaves 1.25 times its deviation. Take a short `median` first and a `smooth` after it when there is \
         both.\n\n\
         Absence makes the output absent. The window is kept through a flicker and forgotten after `reset_after_ms`.";

@@ -1,7 +1,7 @@
 //! Sums over a region, and the ellipse with its second moments: what all nodes that tell of a shape share.
 
 use tactflow_runtime::diagnostic::Code;
-use tactflow_runtime::node::{At, Mistake};
+use tactflow_runtime::node::{At, Mistake, Mistakes};
 use tactflow_runtime::signal::{Image, Mask};
 
 words! {
@@ -32,7 +32,7 @@ impl Weighing {
     ///
     /// # Errors
     /// If a threshold is missing, or is given where it means nothing.
-    pub fn new(weight: Weight, threshold: Option<f64>) -> Result<Self, Mistake> {
+    pub fn new(weight: Weight, threshold: Option<f64>) -> Result<Self, Mistakes> {
         match (weight, threshold) {
             (Weight::Force, None) => Ok(Self::Force),
             (Weight::Area, None) => Ok(Self::Area),
@@ -40,11 +40,11 @@ impl Weighing {
             (Weight::Excess, None) => {
                 let message = "`weight = \"excess\"` needs the `threshold` that it counts from";
                 let mistake = Mistake::new(Code::MissingKey, At::Param("weight".into()), message);
-                Err(mistake.help("give that of the `binarize`: its `release`, if it has one"))
+                Err(mistake.help("give that of the `binarize`: its `release`, if it has one").into())
             }
             (Weight::Force | Weight::Area, Some(_)) => {
                 let mistake = Mistake::key("threshold", "`threshold` means nothing without `weight = \"excess\"`");
-                Err(mistake.help("say `weight = \"excess\"`, or leave it out"))
+                Err(mistake.help("say `weight = \"excess\"`, or leave it out").into())
             }
         }
     }

@@ -185,10 +185,50 @@ fn the_orientation_of_a_bar_is_its_angle() {
 }
 
 #[test]
+fn a_weight_changes_place_and_shape_but_neither_force_nor_pressure() {
+    // A row of 1, 2 and 6 above a threshold of 0.5: the weighted mean column, and anisotropy 1.
+    let image = render(4, 8, |i, j| if i == 2 { [0.0, 0.5, 1.0, 2.0, 6.0, 0.0, 0.0, 0.0][j] } else { 0.0 });
+    let cases = [
+        ("", (2.0 + 3.0 * 2.0 + 4.0 * 6.0) / 9.0),
+        ("weight = \"force\"", (2.0 + 3.0 * 2.0 + 4.0 * 6.0) / 9.0),
+        ("weight = \"area\"", 3.0),
+        ("weight = \"excess\"\nthreshold = 0.5", (2.0 * 0.5 + 3.0 * 1.5 + 4.0 * 5.5) / 7.5),
+        ("weight = \"excess\"\nthreshold = 1.5", (3.0 * 0.5 + 4.0 * 4.5) / 5.0),
+    ];
+    for (params, column) in cases {
+        let mut rig = rig(params, 4, 8, PITCH);
+        show(&mut rig, &image, 0.5);
+        assert_near(get(&rig, "x"), Some((column - 3.5) * PITCH[0]), params);
+        assert_near(get(&rig, "y"), Some(0.5 * PITCH[1]), params);
+        let found = ["force", "area", "pressure", "anisotropy", "orientation"].map(|output| get(&rig, output));
+        assert_eq!(found, [9.0, 3.0, 3.0, 1.0, 0.0].map(Some), "{params}");
+    }
+    let mut rig = rig("weight = \"excess\"\nthreshold = 7", 4, 8, PITCH);
+    show(&mut rig, &image, 0.5);
+    let found = ["force", "pressure", "x", "y", "anisotropy", "orientation"].map(|output| get(&rig, output).is_some());
+    assert_eq!(found, [true, true, false, false, false, false], "nothing is above it");
+}
+
+#[test]
+fn a_tactel_enters_with_nothing_when_the_excess_counts() {
+    // The last tactel of a row passes the threshold: how far the centre jumps.
+    let jump = |params: &str| {
+        let at = |last: f64| {
+            let mut rig = rig(params, 1, 6, PITCH);
+            show(&mut rig, &render(1, 6, |_, j| [3.0, 4.0, 3.0, 2.0, last, 0.0][j]), 0.5);
+            get(&rig, "x").unwrap()
+        };
+        at(0.501) - at(0.499)
+    };
+    assert!(jump("") > 1e-4 && jump("weight = \"excess\"\nthreshold = 0.5") < 5e-6);
+}
+
+#[test]
 fn what_is_refused() {
     let image = ImageShape { rows: 4, cols: 5, pitch: PITCH, unit: Unit::NEWTON };
     let grid = Grid::from(&image);
-    for bad in ["min_anisotropy = -0.1", "min_anisotropy = 1.1", "min_anisotropy = nan"] {
+    let weights = ["weight = \"excess\"", "threshold = 0.1", "weight = \"area\"\nthreshold = 0.1", "weight = 1"];
+    for bad in ["min_anisotropy = -0.1", "min_anisotropy = 1.1", "min_anisotropy = nan"].into_iter().chain(weights) {
         let wires = [("image", image.clone().into()), ("region", grid.clone().into())];
         assert!(NodeRig::new::<Moments>(bad, &wires).is_err(), "{bad}");
     }
