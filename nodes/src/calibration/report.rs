@@ -187,6 +187,13 @@ impl Report {
         self.calibration.kind
     }
 
+    /// The median over the tactels of the residual as a part of the largest force.
+    #[must_use]
+    pub fn typical_residual(&self) -> f64 {
+        let good = self.findings.iter().filter(|finding| finding.state == State::Good);
+        middle(&sorted(good.map(|finding| finding.part(self.kind() as usize))))
+    }
+
     /// The tactels in a state, as `[row, column]`.
     #[must_use]
     pub fn in_state(&self, state: State) -> Vec<[usize; 2]> {
@@ -225,7 +232,7 @@ impl Report {
                 ),
             );
         }
-        line(&mut text, format_args!("* written to the file\n"));
+        line(&mut text, format_args!("* chosen\n"));
         let hysteresis = sorted(good.iter().filter_map(|finding| finding.hysteresis));
         let noise = sorted(good.iter().map(|finding| finding.noise));
         match hysteresis.is_empty() {

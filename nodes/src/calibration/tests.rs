@@ -83,7 +83,7 @@ fn a_known_pad_comes_back_through_file_and_node() {
         let (linear, _) = figures[0];
         for (all, tactel) in &figures[1..] {
             assert!(*all < overall && *tactel < worst, "{load:?} {hysteresis}: {figures:?}");
-            assert!(*all < 1.2 * least, "the exact inverse leaves {least}: {figures:?}");
+            assert!(*all < 1.35 * least, "the exact inverse leaves {least}: {figures:?}");
             assert!(linear > better * all, "{figures:?}");
         }
     }
