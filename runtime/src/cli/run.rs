@@ -41,6 +41,7 @@ pub(super) fn run(args: Run, shell: &Shell) -> u8 {
         Ok(plan) => plan,
         Err(report) => return shell.complain(&report),
     };
+    plan.warnings().iter().for_each(|report| shell.show(report));
     let is_real = args.realtime || plan.is_live();
     let mut engine = Engine::new(plan);
     let mut recorder = match args.out.as_deref().map(|path| recorder(path, &engine, !is_real)).transpose() {
