@@ -5,5 +5,5 @@ use std::process::ExitCode;
 use tactflow_runtime::cli::Tool;
 
 fn main() -> ExitCode {
-    Tool::new(tactflow_tests::catalogue()).main()
+    Tool::new(tactflow_tests::catalogue()).command(tactflow_nodes::calibration::command::command()).main()
 }

@@ -274,7 +274,7 @@ const fn need(need: Need) -> &'static str {
         Need::Trigger => "optional, wakes the node",
         Need::Optional => "optional, only its loss wakes the node",
         Need::Many => "any number, each named in the graph; each wakes the node",
-        Need::Delayed => "optional, as the last tick left it; wakes the node one tick late",
+        Need::Delayed => "optional, as the last tick left it; wakes the node only if no other input does",
     }
 }
 

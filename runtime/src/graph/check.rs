@@ -15,7 +15,7 @@ use super::{Sources, Value};
 use crate::catalogue::Catalogue;
 use crate::diagnostic::{Code, Diagnostic, Report};
 use crate::node::{Configured, Given, Need, NodeSpec, PortSpec, Reader};
-use crate::signal::Shape;
+use crate::signal::{FlagShape, Kind, Shape};
 
 /// Checks a graph and builds it.
 ///
@@ -187,6 +187,10 @@ impl Builder<'_> {
             let input = &spec.inputs[wire.input];
             inputs[wire.input].1.push(wire.source);
             if input.need == Need::Delayed {
+                // What it brings is made later, so its shape is not known yet; of a flag there is nothing to know.
+                if input.kind == Kind::Flag {
+                    given.inputs[wire.input].push((wire.key.name.clone(), FlagShape.into()));
+                }
                 continue;
             }
             let Some(port) = self.ports.get(&wire.source) else {
