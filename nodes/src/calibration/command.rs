@@ -250,7 +250,7 @@ fn refused(refusal: Refusal, name: &str) -> Failure {
             let help = help.map_or_else(String::new, |help| format!("; {help}"));
             format!("`{name}`: {message}{help}").into()
         }
-        Refusal::Silent { message, .. } => format!("`{name}`: {message}; give it with `--unit` or `--size`").into(),
+        Refusal::Silent { message, .. } => format!("`{name}`: {message}; give it, as `--size 16x16`").into(),
         Refusal::Contradicted { hint, message } => format!("`{name}`: `{hint}`: {message}").into(),
     }
 }
