@@ -53,6 +53,7 @@ pub fn catalogue() -> Catalogue {
         .device::<devices::mock_pad::MockPad>()
         .device::<devices::recording::Player>()
         .device::<devices::mock_arm::MockArm>()
+        .group("touch: from a tactile image to features of the contact")
         .node::<touch::tactile_source::TactileSource>()
         .node::<touch::calibrate::Calibrate>()
         .node::<touch::binarize::Binarize>()
@@ -66,6 +67,7 @@ pub fn catalogue() -> Catalogue {
         .node::<touch::smooth::Smooth>()
         .node::<touch::one_pole::OnePole>()
         .node::<touch::median::Median>()
+        .group("servo: from features to a twist of the sensor")
         .node::<servo::feature_error::FeatureError>()
         .node::<servo::pid::Pid>()
         .node::<servo::inverse_jacobian::InverseJacobian>()
@@ -73,6 +75,7 @@ pub fn catalogue() -> Catalogue {
         .node::<servo::twist_source::TwistSource>()
         .node::<servo::twist_adder::TwistAdder>()
         .node::<servo::adjoint::Adjoint>()
+        .group("arm: from a twist of the sensor to joint velocities")
         .node::<arm::arm_state::ArmState>()
         .node::<arm::ik_sink::IkSink>()
 }

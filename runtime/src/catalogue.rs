@@ -8,6 +8,8 @@ use crate::node::{Node, NodeType, of};
 #[derive(Default)]
 pub struct Catalogue {
     nodes: Vec<Box<dyn NodeType>>,
+    /// Titles of groups, and with which node each starts.
+    groups: Vec<(usize, &'static str)>,
     devices: Vec<Box<dyn DeviceType>>,
     roles: Vec<RoleType>,
     files: Vec<BuiltinFile>,
@@ -18,6 +20,13 @@ impl Catalogue {
     #[must_use]
     pub fn new() -> Self {
         Self::default()
+    }
+
+    /// The nodes that follow belong together: what they are for, in a line, for lists and the reference.
+    #[must_use]
+    pub fn group(mut self, title: &'static str) -> Self {
+        self.groups.push((self.nodes.len(), title));
+        self
     }
 
     /// With one more node.
@@ -72,6 +81,11 @@ impl Catalogue {
     /// With all that is in another list.
     #[must_use]
     pub fn join(mut self, other: Self) -> Self {
+        let before = self.nodes.len();
+        // What belongs to no group there does not fall into the last one here.
+        let start = (!self.groups.is_empty()).then_some((before, ""));
+        self.groups.extend(start.filter(|_| other.groups.first().is_none_or(|(at, _)| *at > 0)));
+        self.groups.extend(other.groups.iter().map(|(at, title)| (before + at, *title)));
         self = other.nodes.into_iter().fold(self, Self::node_type);
         self.devices.extend(other.devices);
         self.roles.extend(other.roles);
@@ -83,6 +97,14 @@ impl Catalogue {
     #[must_use]
     pub fn nodes(&self) -> &[Box<dyn NodeType>] {
         &self.nodes
+    }
+
+    /// The groups of node types in reading order, each with its title; those of no group have an empty one.
+    pub fn groups(&self) -> impl Iterator<Item = (&'static str, &[Box<dyn NodeType>])> {
+        let first = self.groups.first().map_or(self.nodes.len(), |(at, _)| *at);
+        let ends = self.groups.iter().skip(1).map(|(at, _)| *at).chain([self.nodes.len()]);
+        let titled = self.groups.iter().zip(ends).map(|((start, title), end)| (*title, &self.nodes[*start..end]));
+        [("", &self.nodes[..first])].into_iter().chain(titled).filter(|(_, nodes)| !nodes.is_empty())
     }
 
     /// The device types.
@@ -101,5 +123,53 @@ impl Catalogue {
     #[must_use]
     pub fn roles(&self) -> &[RoleType] {
         &self.roles
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::node::{Configured, NodeSpec, Reader, Value};
+
+    /// A node of which only the name matters.
+    struct Named(&'static str);
+
+    impl NodeType for Named {
+        fn spec(&self) -> NodeSpec {
+            let (name, none) = (self.0.into(), || "".into());
+            let ports = (Vec::new(), Vec::new());
+            NodeSpec {
+                name,
+                summary: none(),
+                doc: none(),
+                example: none(),
+                params: Vec::new(),
+                inputs: ports.0,
+                outputs: ports.1,
+                every_tick: false,
+            }
+        }
+
+        fn configure(&self, _: &Value, _: &mut Reader<'_>) -> Option<Box<dyn Configured>> {
+            None
+        }
+    }
+
+    fn named(catalogue: Catalogue, name: &'static str) -> Catalogue {
+        catalogue.node_type(Box::new(Named(name)))
+    }
+
+    #[test]
+    fn a_group_goes_to_the_next_and_a_joined_catalogue_keeps_its_own() {
+        let first = named(named(Catalogue::new(), "a").group("one"), "b");
+        let second = named(named(Catalogue::new(), "c").group("two").group("empty").group("three"), "d");
+        let all = first.join(second).join(named(Catalogue::new().group("four"), "e"));
+        let groups: Vec<(&str, Vec<String>)> = all
+            .groups()
+            .map(|(title, nodes)| (title, nodes.iter().map(|node| node.spec().name.into_owned()).collect()))
+            .collect();
+        let groups: Vec<(&str, String)> = groups.into_iter().map(|(title, names)| (title, names.concat())).collect();
+        let expected = [("", "a"), ("one", "b"), ("", "c"), ("three", "d"), ("four", "e")];
+        assert_eq!(groups, expected.map(|(title, names)| (title, names.to_owned())));
     }
 }

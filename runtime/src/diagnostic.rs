@@ -77,6 +77,39 @@ codes! {
     UndrivenCommand "undriven-command",
     /// A graph without a clock, or with one that cannot tick.
     BadClock "bad-clock",
+    /// A node from which nothing follows that anything uses.
+    UnreadNode "unread-node",
+}
+
+/// How bad it is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum Severity {
+    /// The graph does not load.
+    Error,
+    /// The graph loads, but may not be what was meant.
+    Warning,
+}
+
+impl Severity {
+    /// Its name, as shown before the code.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Error => "error",
+            Self::Warning => "warning",
+        }
+    }
+}
+
+impl Code {
+    /// How bad a mistake of this sort is.
+    #[must_use]
+    pub const fn severity(self) -> Severity {
+        match self {
+            Self::UnreadNode => Severity::Warning,
+            _ => Severity::Error,
+        }
+    }
 }
 
 impl fmt::Display for Code {
@@ -85,7 +118,7 @@ impl fmt::Display for Code {
     }
 }
 
-/// One mistake of a graph.
+/// One mistake of a graph, or something to be looked at.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Diagnostic {
     /// What sort of mistake.
@@ -154,8 +187,13 @@ impl Report {
             text.push_str(&self.render_one(diagnostic, &renderer));
             text.push_str("\n\n");
         }
-        let count = self.diagnostics.len();
-        text.push_str(&format!("{count} mistake{}\n", if count == 1 { "" } else { "s" }));
+        let is_warning = |diagnostic: &&Diagnostic| diagnostic.code.severity() == Severity::Warning;
+        let warnings = self.diagnostics.iter().filter(is_warning).count();
+        let counts = [(self.diagnostics.len() - warnings, "mistake"), (warnings, "warning")];
+        let counts = counts.iter().filter(|(count, _)| *count > 0);
+        let counts: Vec<String> =
+            counts.map(|(count, what)| format!("{count} {what}{}", if *count == 1 { "" } else { "s" })).collect();
+        text.push_str(&format!("{}\n", counts.join(", ")));
         text
     }
 
@@ -174,7 +212,11 @@ impl Report {
                 others.push(Level::NOTE.secondary_title(label).element(snippet));
             }
         }
-        let title = Level::ERROR.primary_title(&diagnostic.message).id(diagnostic.code.name());
+        let level = match diagnostic.code.severity() {
+            Severity::Error => Level::ERROR,
+            Severity::Warning => Level::WARNING,
+        };
+        let title = level.primary_title(&diagnostic.message).id(diagnostic.code.name());
         let mut groups = vec![title.element(snippet)];
         groups.append(&mut others);
         if let Some(help) = &diagnostic.help {

@@ -229,7 +229,9 @@ fn every_link_of_the_pages_leads_somewhere() {
     let docs = workspace().join("docs");
     let decisions = fs::read_dir(docs.join("decisions")).unwrap().map(|entry| entry.unwrap().path());
     let mut pages: Vec<PathBuf> = decisions.collect();
-    pages.extend(["ARCHITECTURE.md", "graph-files.md", "writing-a-node.md"].map(|name| docs.join(name)));
+    pages.extend(
+        ["ARCHITECTURE.md", "calibration.md", "graph-files.md", "writing-a-node.md"].map(|name| docs.join(name)),
+    );
     let mut links = 0;
     for page in pages {
         let text = fs::read_to_string(&page).unwrap();

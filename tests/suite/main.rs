@@ -3,6 +3,7 @@
 
 mod absence;
 mod bad_data;
+mod calibrate;
 mod cli;
 mod course;
 mod determinism;

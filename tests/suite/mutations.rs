@@ -115,7 +115,7 @@ impl Copy {
 /// What became of a mutant.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 enum Fate {
-    /// It does not load, or its run ends in a fault.
+    /// It does not load, or a warning is given, or its run ends in a fault.
     Told,
     /// It loads and does the same.
     Same,
@@ -138,6 +138,9 @@ fn fate(copy: &Copy, name: &str, original: &Course, before: &str, after: &str) -
         }
     };
     assert!(start.elapsed() < LONGEST, "it took {:?} to load", start.elapsed());
+    if plan.warnings().is_some() {
+        return Fate::Told;
+    }
     let course = course(plan, TICKS);
     assert!(start.elapsed() < 2 * LONGEST, "it took {:?} to load and run", start.elapsed());
     if course.fault.is_some() {

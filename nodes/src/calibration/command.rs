@@ -104,6 +104,9 @@ pub fn command() -> Box<dyn Subcommand> {
     derived(run)
 }
 
+/// Residual, as a part of the largest force, from which on a calibration is none.
+const USELESS: f64 = 0.25;
+
 /// Why it cannot be done.
 enum Failure {
     Words(String),
@@ -148,6 +151,15 @@ fn make(args: &Calibrate, shell: &Shell) -> Result<(), Failure> {
     let settings = Settings { load, curve: args.curve.map(Kind::from), dead_below: args.dead_below, bearing };
     let report = calibrate(&logs, &settings)?;
     shell.say(report.text(args.each).trim_end());
+    let residual = report.typical_residual();
+    if residual > USELESS {
+        let percent = 100.0 * residual;
+        let message = format!(
+            "the curves are off by {percent:.0} % of the range, so nothing is written; was the pad loaded as `--load` \
+             says, and is `force` the force of the same frames?"
+        );
+        return Err(Failure::Words(message));
+    }
     if let Some(path) = &args.out {
         write(path, &file::write(&report.calibration, &origin(args, &report)))?;
         shell.say(&format!("\nwrote {}: calibrate takes it as `file = \"…\"`", path.display()));
@@ -238,7 +250,7 @@ fn refused(refusal: Refusal, name: &str) -> Failure {
             let help = help.map_or_else(String::new, |help| format!("; {help}"));
             format!("`{name}`: {message}{help}").into()
         }
-        Refusal::Silent { message, .. } => format!("`{name}`: {message}; give it with `--unit` or `--size`").into(),
+        Refusal::Silent { message, .. } => format!("`{name}`: {message}; give it, as `--size 16x16`").into(),
         Refusal::Contradicted { hint, message } => format!("`{name}`: `{hint}`: {message}").into(),
     }
 }

@@ -49,11 +49,11 @@ pub struct Points {
 }
 
 impl Points {
-    /// Gathers samples; none if they are too few for a curve.
+    /// Gathers samples; none if they are too few for a curve. A force of up to `nothing` [N] is none.
     #[must_use]
-    pub fn new(samples: &[Sample]) -> Option<Self> {
+    pub fn new(samples: &[Sample], nothing: f64) -> Option<Self> {
         let most = samples.iter().fold(0.0, |most: f64, sample| most.max(sample.force));
-        let loaded = samples.iter().filter(|sample| sample.force > super::log::NOTHING * most).count();
+        let loaded = samples.iter().filter(|sample| sample.force > nothing).count();
         if most <= 0.0 || loaded < LEAST.0 {
             return None;
         }
@@ -305,4 +305,99 @@ fn rising(numbers: &[f64]) -> Vec<f64> {
         pools.push(pool);
     }
     pools.into_iter().flat_map(|(mean, count)| std::iter::repeat_n(mean, count)).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    /// Samples of a characteristic, up and down, with some unloaded ones.
+    fn samples(s: impl Fn(f64) -> f64, most: f64) -> Vec<Sample> {
+        let force = |k: usize| most * (k as f64 / 400.0);
+        let up = (0..=400).map(|k| Sample { force: force(k), s: s(force(k)), is_loading: true });
+        let down = (0..400).rev().map(|k| Sample { force: force(k), s: s(force(k)), is_loading: false });
+        let rest = (0..50).map(|_| Sample { force: 0.0, s: 0.0, is_loading: true });
+        rest.chain(up).chain(down).collect()
+    }
+
+    proptest! {
+        #[test]
+        fn what_is_squashed_is_found_again(a in 500.0..5000.0f64, b in 0.5..50.0f64, most in 1.0..20.0f64) {
+            let points = Points::new(&samples(|f| a * f / (f + b), most), 0.01).unwrap();
+            let Curve::Rational { gain, squash, .. } = points.rational(1.0) else { panic!("squashed") };
+            prop_assert!((f64::from(gain) * a / b - 1.0).abs() < 1e-3, "gain {} for {}", gain, b / a);
+            prop_assert!((f64::from(squash) * a - 1.0).abs() < 1e-3 * (1.0 + b / most), "squash {} for {}", squash, 1.0 / a);
+            prop_assert!(points.hysteresis().unwrap() < 0.005);
+        }
+
+        #[test]
+        fn strays_do_not_count(a in 1000.0..4000.0f64, b in 1.0..10.0f64, every in 12..30usize, by in 300.0..3000.0f64) {
+            let clean = samples(|f| a * f / (f + b), 5.0);
+            let mut stray = clean.clone();
+            stray.iter_mut().skip(60).step_by(every).for_each(|sample| sample.s += by);
+            let at = |samples: &[Sample], kind: usize| {
+                let points = Points::new(samples, 0.01).unwrap();
+                let curve = [points.rational(1.0), points.piecewise(1.0)][kind].clone();
+                f64::from(curve.force((a * 2.5 / (2.5 + b)) as f32))
+            };
+            for kind in 0..2 {
+                let moved = (at(&stray, kind) - at(&clean, kind)).abs();
+                prop_assert!(moved < 0.1, "strays of {} counts move 2.5 N by {}", by, moved);
+            }
+        }
+
+        #[test]
+        fn pooled_neighbours_are_the_nearest_that_rise(numbers in prop::collection::vec(-5.0..5.0f64, 1..12)) {
+            // The closed form: the greatest of the least means of all stretches that begin and end around each.
+            let mean = |from: usize, to: usize| numbers[from..=to].iter().sum::<f64>() / (to + 1 - from) as f64;
+            for (i, number) in rising(&numbers).into_iter().enumerate() {
+                let least = |from: usize| (i..numbers.len()).map(|to| mean(from, to)).fold(f64::INFINITY, f64::min);
+                let exact = (0..=i).map(least).fold(f64::NEG_INFINITY, f64::max);
+                prop_assert!((number - exact).abs() < 1e-9, "{} at {} of {:?}", number, i, numbers);
+            }
+        }
+
+        #[test]
+        fn no_heights_near_the_best_are_better(noise in prop::collection::vec(-0.1..0.1f64, 200), which in 1..6usize, by in -0.05..0.05f64) {
+            let samples: Vec<Sample> = noise.iter().enumerate().map(|(i, noise)| {
+                let force = i as f64 / 199.0;
+                Sample { force, s: force.sqrt() + noise, is_loading: true }
+            }).collect();
+            let points = Points::new(&samples, 0.01).unwrap();
+            let (places, weights) = (points.places(), vec![1.0; points.points.len()]);
+            let best = points.heights(&places, &weights);
+            let cost = |heights: &[f64]| {
+                let knots: Vec<[f64; 2]> = places.iter().zip(heights).map(|(x, y)| [*x, *y]).collect();
+                points.points.iter().map(|p| (p.y - between(&knots, p.x)).powi(2)).sum::<f64>()
+            };
+            let mut other = best.clone();
+            let which = which.min(other.len() - 1);
+            other[which] += by;
+            prop_assert!(best[0] == 0.0 && cost(&best) <= cost(&other) + 1e-12);
+        }
+    }
+
+    #[test]
+    fn a_straight_line_is_found_and_knots_lie_on_it() {
+        let points = Points::new(&samples(|f| 120.0 * f, 4.0), 0.01).unwrap();
+        let Curve::Linear { gain } = points.linear(-1.0) else { panic!("a line") };
+        assert!((gain + 1.0 / 120.0).abs() < 1e-7, "{gain}");
+        let Curve::Piecewise { knots } = points.piecewise(-1.0) else { panic!("knots") };
+        assert_eq!(knots.len(), SEGMENTS);
+        for [s, force] in knots {
+            assert!((s + 120.0 * force).abs() < 0.01, "{s} for {force} N");
+        }
+    }
+
+    #[test]
+    fn too_little_gives_no_points() {
+        let all = samples(|f| 100.0 * f, 4.0);
+        assert!(Points::new(&all[..60], 0.01).is_none(), "ten with a force");
+        assert!(Points::new(&[], 0.01).is_none());
+        assert!(Points::new(&all, 3.9).is_none(), "the rest is nothing");
+        assert!(Points::new(&samples(|_| 0.0, 4.0), 0.01).is_none(), "no answer");
+        assert!(Points::new(&samples(|f| -f, 4.0), 0.01).is_none(), "the wrong way");
+    }
 }

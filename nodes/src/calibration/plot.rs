@@ -9,7 +9,7 @@ use super::report::{Report, State};
 
 /// Size of the picture and of the frame in it.
 const SIZE: [f64; 2] = [720.0, 480.0];
-const FRAME: [[f64; 2]; 2] = [[64.0, 24.0], [704.0, 424.0]];
+const FRAME: [[f64; 2]; 2] = [[64.0, 36.0], [704.0, 424.0]];
 
 /// The most tactels that are drawn; of more, every second, third, …
 const MOST_DRAWN: usize = 1024;
@@ -54,7 +54,7 @@ pub fn svg(report: &Report) -> String {
     let (least, most) = readings.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| (a.min(x), b.max(x)));
     // From zero, unless that would press all curves to one side.
     let from = if least > 0.0 && least < 0.5 * most { 0.0 } else { least };
-    let x = Scale { from, to: most.max(from + 1e-9), pixels: [FRAME[0][0], FRAME[1][0]] };
+    let x = Scale { from, to: (from + 1.02 * (most - from)).max(from + 1e-9), pixels: [FRAME[0][0], FRAME[1][0]] };
     let y = Scale { from: 0.0, to: 1.04 * report.most, pixels: [FRAME[1][1], FRAME[0][1]] };
     let mut svg = format!(
         "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {} {}\" font-family=\"sans-serif\" font-size=\"13\">\n\
@@ -67,13 +67,13 @@ pub fn svg(report: &Report) -> String {
         report.kind()
     );
     axes(&mut svg, x, y, &format!("reading [{}]", calibration.reading), "reference force on a tactel [N]");
-    svg.push_str("<g fill=\"none\" stroke=\"#3d85c6\" stroke-opacity=\"0.35\" stroke-width=\"0.7\">\n");
+    svg.push_str("<g fill=\"none\" stroke=\"#3d85c6\" stroke-opacity=\"0.5\" stroke-width=\"0.9\">\n");
     branches.iter().for_each(|line| polyline(&mut svg, line, x, y));
     svg.push_str("</g>\n<g fill=\"none\" stroke=\"#d9730d\" stroke-width=\"3\" stroke-linejoin=\"round\">\n");
     polyline(&mut svg, &mean, x, y);
     svg.push_str("</g>\n");
     let legend = format!("thin: {} tactels, as measured; thick: mean of the fitted curves", good.len());
-    text(&mut svg, [FRAME[0][0] + 12.0, FRAME[0][1] + 18.0], "start", &legend);
+    text(&mut svg, [FRAME[0][0], FRAME[0][1] - 14.0], "start", &legend);
     svg.push_str("</svg>\n");
     svg
 }

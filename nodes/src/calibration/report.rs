@@ -130,18 +130,19 @@ fn examine(samples: &Samples<'_>, i: usize, [lowest, highest]: [f32; 2]) -> (Fin
     if answer.is_dead {
         return (finding, None);
     }
+    let (most, nothing) = (samples.most * samples.share, NOTHING * samples.most * samples.share);
     let mut own = samples.of(i);
     let end = if answer.sign > 0.0 { highest } else { lowest };
     let forces = own.iter().filter(|(_, reading)| *reading == end).map(|(sample, _)| sample.force);
-    let (least, most) =
+    let (low, high) =
         forces.clone().fold((f64::INFINITY, 0.0), |(a, b), force| (f64::min(a, force), f64::max(b, force)));
-    finding.is_saturated = forces.count() >= SATURATED.0 && most - least > SATURATED.1 * samples.most * samples.share;
+    finding.is_saturated = forces.count() >= SATURATED.0 && high - low > SATURATED.1 * most;
     if finding.is_saturated {
         own.retain(|(_, reading)| *reading != end);
     }
     let own: Vec<Sample> = own.into_iter().map(|(sample, _)| sample).collect();
-    finding.samples = own.iter().filter(|sample| sample.force > NOTHING * samples.most * samples.share).count();
-    let Some(points) = Points::new(&own) else {
+    finding.samples = own.iter().filter(|sample| sample.force > nothing).count();
+    let Some(points) = Points::new(&own, nothing) else {
         finding.state = State::Few;
         return (finding, None);
     };
@@ -153,8 +154,8 @@ fn examine(samples: &Samples<'_>, i: usize, [lowest, highest]: [f32; 2]) -> (Fin
     finding.state = State::Good;
     for (rms, curve) in finding.rms.iter_mut().zip(&curves) {
         let error = |sample: &Sample| f64::from(curve.force(sample.s as f32 * answer.sign)) - sample.force;
-        let loaded = own.iter().filter(|sample| sample.force > NOTHING * samples.most * samples.share);
-        let squares: f64 = loaded.map(|sample| error(sample) * error(sample)).sum();
+        let squares: f64 =
+            own.iter().filter(|sample| sample.force > nothing).map(|sample| error(sample) * error(sample)).sum();
         *rms = (squares / finding.samples as f64).sqrt();
     }
     finding.hysteresis = points.hysteresis();
@@ -184,6 +185,13 @@ impl Report {
     #[must_use]
     pub const fn kind(&self) -> Kind {
         self.calibration.kind
+    }
+
+    /// The median over the tactels of the residual as a part of the largest force.
+    #[must_use]
+    pub fn typical_residual(&self) -> f64 {
+        let good = self.findings.iter().filter(|finding| finding.state == State::Good);
+        middle(&sorted(good.map(|finding| finding.part(self.kind() as usize))))
     }
 
     /// The tactels in a state, as `[row, column]`.
@@ -224,7 +232,7 @@ impl Report {
                 ),
             );
         }
-        line(&mut text, format_args!("* written to the file\n"));
+        line(&mut text, format_args!("* chosen\n"));
         let hysteresis = sorted(good.iter().filter_map(|finding| finding.hysteresis));
         let noise = sorted(good.iter().map(|finding| finding.noise));
         match hysteresis.is_empty() {

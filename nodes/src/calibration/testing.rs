@@ -7,9 +7,6 @@ use super::log::Log;
 /// The largest force on a tactel [N].
 pub(super) const MOST: f64 = 5.0;
 
-/// Greatest distance of the two branches, as a part of the range.
-pub(super) const HYSTERESIS: f64 = 0.1;
-
 /// The largest reading of 12 bits.
 const TOP: f64 = 4095.0;
 
@@ -46,11 +43,11 @@ impl Truth {
     }
 
     /// The same on one of its branches.
-    fn branch(&self, force: f64, is_loading: bool) -> f64 {
+    fn branch(&self, force: f64, is_loading: bool, hysteresis: f64) -> f64 {
         let x = (force / MOST).clamp(0.0, 1.0);
         let range = self.middle(MOST) - self.offset;
         let side = if is_loading { -0.5 } else { 0.5 };
-        self.middle(force) + side * HYSTERESIS * range * 4.0 * x * (1.0 - x)
+        self.middle(force) + side * hysteresis * range * 4.0 * x * (1.0 - x)
     }
 
     /// The force of a reading, exactly, up to the largest one: what no calibration can beat.
@@ -68,6 +65,10 @@ pub(super) struct Pad {
     pub(super) random: Random,
     /// Standard deviation of the noise [counts].
     pub(super) noise: f64,
+    /// Greatest distance of the two branches, as a part of the range.
+    pub(super) hysteresis: f64,
+    /// Whether readings fall from the top instead of rising from zero.
+    pub(super) is_falling: bool,
 }
 
 impl Pad {
@@ -75,13 +76,14 @@ impl Pad {
     pub(super) fn new(rows: usize, cols: usize, dead: &[usize], seed: u64) -> Self {
         let mut random = Random(seed);
         let truth = |i: usize| {
-            let a = 3400.0 * libm::exp(0.25 * random.normal());
+            // More would leave the 12 bits; that has a test of its own.
+            let a = (3400.0 * libm::exp(0.25 * random.normal())).min(5400.0);
             let b = 3.0 * libm::exp(0.15 * random.normal());
             let offset = TOP * (0.05 + 0.05 * random.uniform());
             Truth { offset, a, b, is_dead: dead.contains(&i) }
         };
         let truths = (0..rows * cols).map(truth).collect();
-        Self { rows, cols, truths, random, noise: 4.0 }
+        Self { rows, cols, truths, random, noise: 4.0, hysteresis: 0.1, is_falling: false }
     }
 
     /// A frame: the force on each tactel, and whether it rises.
@@ -89,8 +91,9 @@ impl Pad {
         // The strain gauge of the paper's bench is good to 2.5 mN.
         log.force.push(reference + 0.00125 * self.random.normal());
         for i in 0..self.truths.len() {
-            let reading = self.truths[i].branch(force(i), is_loading) + self.noise * self.random.normal();
-            log.cells.push(reading.round().clamp(0.0, TOP) as f32);
+            let reading = self.truths[i].branch(force(i), is_loading, self.hysteresis);
+            let counts = (reading + self.noise * self.random.normal()).round().clamp(0.0, TOP);
+            log.cells.push((if self.is_falling { TOP - counts } else { counts }) as f32);
         }
     }
 

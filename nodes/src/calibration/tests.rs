@@ -6,7 +6,7 @@ use tactflow_runtime::signal::{Image, ImageShape};
 use super::log::Log;
 use super::report::{Report, Settings, State, calibrate};
 use super::samples::Load;
-use super::testing::{HYSTERESIS, MOST, Pad};
+use super::testing::{MOST, Pad};
 use super::*;
 use crate::touch::calibrate::Calibrate;
 
@@ -62,18 +62,203 @@ fn least(pad: &Pad, log: &Log) -> f64 {
 
 #[test]
 fn a_known_pad_comes_back_through_file_and_node() {
-    for (load, name) in [(Load::Uniform, "uniform"), (Load::Probe, "probe")] {
-        let mut pad = Pad::new(8, 8, &DEAD, 7);
+    // Per load: the pad's own hysteresis, and what may be left overall and at the worst tactel [N of 5 N].
+    let cases = [
+        (Load::Uniform, 0.1, 0.26, 0.35, 2.0),
+        (Load::Probe, 0.1, 0.26, 0.35, 2.0),
+        (Load::Uniform, 0.0, 0.025, 0.1, 15.0),
+        (Load::Probe, 0.0, 0.025, 0.1, 15.0),
+    ];
+    for (load, hysteresis, overall, worst, better) in cases {
+        let mut pad = Pad { hysteresis, ..Pad::new(8, 8, &DEAD, 7) };
         let log = if load == Load::Uniform { pad.uniform(4, 250) } else { pad.probe(2, 100, 0.2) };
         let fresh = pad.uniform(3, 200);
         let least = least(&pad, &fresh);
-        let mut figures = Vec::new();
-        for kind in curve::KINDS {
+        let figures = curve::KINDS.map(|kind| {
             let report = made(log.clone(), load, Some(kind));
-            let mut rig = node(&report.calibration, &format!("{name}-{kind}"));
-            println!("{}", report.text(false));
-            figures.push(errors(&pad, &fresh, &mut rig));
+            assert_eq!(report.kind(), kind);
+            errors(&pad, &fresh, &mut node(&report.calibration, &format!("{load:?}-{hysteresis}-{kind}")))
+        });
+        let (linear, _) = figures[0];
+        for (all, tactel) in &figures[1..] {
+            assert!(*all < overall && *tactel < worst, "{load:?} {hysteresis}: {figures:?}");
+            assert!(*all < 1.35 * least, "the exact inverse leaves {least}: {figures:?}");
+            assert!(linear > better * all, "{figures:?}");
         }
-        println!("{name}: least {least:.4} N, {figures:.4?}");
     }
+}
+
+#[test]
+fn hysteresis_and_dead_tactels_are_found() {
+    for (load, hysteresis, seed) in
+        [(Load::Uniform, 0.05, 1), (Load::Uniform, 0.2, 2), (Load::Probe, 0.1, 3), (Load::Probe, 0.15, 4)]
+    {
+        let mut pad = Pad { hysteresis, ..Pad::new(8, 8, &DEAD, seed) };
+        // One is stuck at the largest reading, one at nothing.
+        (pad.truths[17].offset, pad.truths[40].offset) = (4095.0, 0.0);
+        let log = if load == Load::Uniform { pad.uniform(3, 200) } else { pad.probe(3, 80, 0.25) };
+        let report = made(log, load, None);
+        let dead: Vec<usize> = report.in_state(State::Dead).iter().map(|[i, j]| i * 8 + j).collect();
+        assert_eq!(dead, DEAD, "{load:?}");
+        assert!(report.in_state(State::Few).is_empty() && report.in_state(State::Unfit).is_empty());
+        for (i, finding) in report.findings.iter().enumerate().filter(|(i, _)| !DEAD.contains(i)) {
+            let found = finding.hysteresis.unwrap();
+            let tolerance = if finding.is_saturated { 0.05 } else { 0.02 };
+            assert!((found - hysteresis).abs() < tolerance, "{load:?}, tactel {i}: {found} for {hysteresis}");
+        }
+    }
+}
+
+#[test]
+fn a_dead_tactel_is_one_that_answers_by_less_than_is_said() {
+    let mut pad = Pad::new(2, 4, &[], 5);
+    pad.truths[6].a *= 0.1;
+    let log = pad.uniform(2, 100);
+    let dead = |dead_below| {
+        let settings = Settings { dead_below, ..settings(Load::Uniform, None) };
+        calibrate(std::slice::from_ref(&log), &settings).unwrap().in_state(State::Dead)
+    };
+    assert_eq!(dead(None), Vec::<[usize; 2]>::new());
+    assert_eq!(dead(Some(500.0)), [[1, 2]]);
+    // A cell that the recording says is none is dead, whatever it reads.
+    let absent = Log { absent: vec![0], ..log.clone() };
+    assert_eq!(made(absent, Load::Uniform, None).in_state(State::Dead), [[0, 0]]);
+}
+
+#[test]
+fn dead_tactels_bear_a_part_of_the_load_if_that_is_said() {
+    let mut pad = Pad { hysteresis: 0.0, ..Pad::new(4, 4, &[0, 1, 2, 3], 6) };
+    let log = pad.uniform(2, 100);
+    let settings = Settings { bearing: Some(16), ..settings(Load::Uniform, None) };
+    let report = calibrate(std::slice::from_ref(&log), &settings).unwrap();
+    assert!((report.most - MOST * 12.0 / 16.0).abs() < 0.01, "{}", report.most);
+    assert!((made(log, Load::Uniform, None).most - MOST).abs() < 0.01);
+}
+
+#[test]
+fn a_sensor_that_falls_under_a_force_is_calibrated_too() {
+    let mut pad = Pad { hysteresis: 0.0, is_falling: true, ..Pad::new(4, 4, &[5], 8) };
+    let log = pad.uniform(3, 150);
+    let fresh = pad.uniform(1, 100);
+    for kind in curve::KINDS {
+        let report = made(log.clone(), Load::Uniform, Some(kind));
+        assert_eq!(report.in_state(State::Dead), [[1, 1]]);
+        let (overall, _) = errors(&pad, &fresh, &mut node(&report.calibration, &format!("falling-{kind}")));
+        assert!(overall < if kind == Kind::Linear { 0.6 } else { 0.03 }, "{kind}: {overall} N");
+    }
+}
+
+#[test]
+fn a_saturated_tactel_is_calibrated_below_its_end() {
+    let mut pad = Pad { hysteresis: 0.0, ..Pad::new(2, 3, &[], 9) };
+    // It reaches 4095 counts at about 2.2 N.
+    (pad.truths[4].a, pad.truths[4].b, pad.truths[4].offset) = (9000.0, 3.0, 300.0);
+    let report = made(pad.uniform(2, 250), Load::Uniform, Some(Kind::Rational));
+    let saturated: Vec<bool> = report.findings.iter().map(|finding| finding.is_saturated).collect();
+    assert_eq!(saturated, [false, false, false, false, true, false]);
+    let Some(Tactel { curve, offset }) = &report.calibration.tactels[4] else { panic!("it has a curve") };
+    let end = 3.0 * 3795.0 / (9000.0 - 3795.0);
+    assert!((f64::from(curve.most().unwrap()) - end).abs() < 0.05, "{curve:?}");
+    let force = curve.force(pad.truths[4].middle(1.0) as f32 - offset);
+    assert!((force - 1.0).abs() < 0.02, "{force} N for 1 N");
+}
+
+#[test]
+fn tactels_that_the_probe_did_not_reach_are_left_out() {
+    let mut pad = Pad::new(4, 4, &[], 10);
+    let whole = pad.probe(1, 60, 0.2);
+    // 10 unloaded frames and 120 of the press for each tactel: the first six and a bit.
+    let frames = 6 * 130 + 40;
+    let log =
+        Log { force: whole.force[..frames].to_vec(), cells: whole.cells[..frames * 16].to_vec(), ..whole.clone() };
+    let report = made(log, Load::Probe, None);
+    let good: Vec<usize> = (0..16).filter(|i| report.calibration.tactels[*i].is_some()).collect();
+    assert!(good.starts_with(&[0, 1, 2, 3, 4, 5]) && good.len() <= 7, "{good:?}");
+    // Two logs together are as good as one.
+    let rest =
+        Log { force: whole.force[6 * 130..].to_vec(), cells: whole.cells[6 * 130 * 16..].to_vec(), ..whole.clone() };
+    let first = Log { force: whole.force[..6 * 130].to_vec(), cells: whole.cells[..6 * 130 * 16].to_vec(), ..whole };
+    let report = calibrate(&[first, rest], &settings(Load::Probe, None)).unwrap();
+    assert!(report.calibration.tactels.iter().all(Option::is_some));
+}
+
+#[test]
+fn nothing_to_calibrate_is_said_with_a_way_out() {
+    let mut pad = Pad::new(2, 2, &[0, 1, 2, 3], 11);
+    let log = pad.uniform(1, 50);
+    let log = Log { force: log.force.iter().enumerate().map(|(i, _)| if i < 50 { 0.0 } else { 3.0 }).collect(), ..log };
+    for (load, way_out) in [(Load::Probe, "or is the load uniform?"), (Load::Uniform, "or of a probe on one tactel")] {
+        let message = calibrate(std::slice::from_ref(&log), &settings(load, None)).unwrap_err();
+        assert!(message.contains("4 tactels never answer") && message.contains(way_out), "{message}");
+    }
+    assert_eq!(calibrate(&[], &settings(Load::Probe, None)).unwrap_err(), "there is no log");
+}
+
+#[test]
+fn the_simplest_curve_that_is_good_enough_is_taken() {
+    let mut pad = Pad { hysteresis: 0.0, ..Pad::new(2, 3, &[], 12) };
+    assert_eq!(made(pad.uniform(2, 200), Load::Uniform, None).kind(), Kind::Rational);
+    // So little squashed that a line will do: less than the noise.
+    for truth in &mut pad.truths {
+        (truth.a, truth.b) = (2000.0 * 4000.0 / MOST, 4000.0);
+    }
+    assert_eq!(made(pad.uniform(2, 200), Load::Uniform, None).kind(), Kind::Linear);
+    // A knee that no squashed curve has.
+    let knee = |force: f64| if force < 2.0 { 200.0 * force } else { 400.0 + 800.0 * (force - 2.0) };
+    let mut log = pad.uniform(2, 200);
+    for (i, cells) in log.cells.chunks_exact_mut(6).enumerate() {
+        let force = log.force[i] / 6.0;
+        cells.iter_mut().for_each(|cell| *cell = 300.0 + knee(force.max(0.0)).round() as f32);
+    }
+    let report = made(log, Load::Uniform, None);
+    assert_eq!(report.kind(), Kind::Piecewise);
+    assert!(report.rms[2] < 0.05 && report.rms[1] > 0.2, "{:?}", report.rms);
+}
+
+#[test]
+fn the_report_says_what_was_found_in_units() {
+    let mut pad = Pad::new(4, 4, &[7], 13);
+    let report = made(pad.uniform(2, 100), Load::Uniform, None);
+    let text = report.text(false);
+    for part in [
+        "15 of 4 x 4 tactels calibrated, readings in raw, forces up to 5.0",
+        "* rational ",
+        " N  ",
+        "hysteresis   median 1",
+        " % of the range of the reading",
+        " raw, unloaded",
+        "dead         1 never answer: [1, 3]",
+        "saturated    ",
+        "the worst tactels, rational curve",
+        "force [N]     range [raw]   RMS [N]   RMS [%]   hysteresis [%]",
+    ] {
+        assert!(text.contains(part), "no {part:?} in\n{text}");
+    }
+    assert_eq!(report.text(true).lines().count() - text.lines().count(), 10, "all of 15 instead of 5");
+    let only_up = {
+        let log = pad.uniform(1, 100);
+        let upto = 150;
+        Log { force: log.force[..upto].to_vec(), cells: log.cells[..upto * 16].to_vec(), ..log }
+    };
+    let text = made(only_up, Load::Uniform, None).text(true);
+    assert!(text.contains("hysteresis   not measured") && text.lines().last().unwrap().ends_with(" -"), "{text}");
+}
+
+#[test]
+fn the_picture_has_every_tactel_and_the_mean_in_its_frame() {
+    let mut pad = Pad::new(3, 4, &[7], 14);
+    let svg = plot::svg(&made(pad.uniform(2, 100), Load::Uniform, None));
+    let lines: Vec<&str> = svg.lines().filter(|line| line.starts_with("<polyline")).collect();
+    assert_eq!(lines.len(), 2 * 11 + 1, "two branches a tactel, and the mean");
+    for line in lines {
+        let points = line.split('"').nth(1).unwrap();
+        let inside = |point: &str| {
+            let (x, y) = point.split_once(',').unwrap();
+            let (x, y): (f64, f64) = (x.parse().unwrap(), y.parse().unwrap());
+            (60.0..=706.0).contains(&x) && (22.0..=426.0).contains(&y)
+        };
+        assert!(points.split(' ').count() > 10 && points.split(' ').all(inside), "{line}");
+    }
+    assert!(svg.contains(">reading [raw]<") && svg.contains(">reference force on a tactel [N]<"));
+    assert!(svg.starts_with("<svg ") && svg.ends_with("</svg>\n") && !svg.contains("NaN"));
 }

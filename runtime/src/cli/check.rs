@@ -1,33 +1,106 @@
 //! `check`: graphs are checked and built, and nothing runs.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
-use super::{OnArgs, Shell};
-use crate::graph::plan;
+use serde::Serialize;
+
+use super::describe::Format;
+use super::json::{Diagnosed, diagnosed};
+use super::{NOT_LOADED, OnArgs, Shell};
+use crate::diagnostic::Report;
+use crate::graph::{Plan, plan};
 
 /// Check graphs like a compiler would, without running them
 #[derive(clap::Parser)]
-#[command(name = "check")]
+#[command(
+    name = "check",
+    after_help = "Examples:
+  tactflow check graphs/*.toml
+  tactflow check graphs/hybrid.toml --bench benches/lab.toml --deny-warnings"
+)]
 pub(super) struct Check {
     /// The graph files
     #[arg(required = true)]
     graphs: Vec<PathBuf>,
     #[command(flatten)]
     on: OnArgs,
+    /// Fail on warnings too
+    #[arg(long)]
+    deny_warnings: bool,
+    /// How to print it
+    #[arg(long, value_enum, default_value_t = Format::Text, value_name = "FORMAT")]
+    format: Format,
 }
 
 pub(super) fn check(args: Check, shell: &Shell) -> u8 {
     let mut code = 0;
-    for graph in args.graphs {
-        match plan(shell.catalogue(), &args.on.request(graph.clone())) {
-            Ok(plan) => {
-                let (nodes, period) = (plan.order().count(), plan.period());
-                shell.say(&format!("{}: ok, {nodes} nodes, a tick each {}", graph.display(), milliseconds(period)));
+    let mut checked = Vec::new();
+    for graph in &args.graphs {
+        let result = plan(shell.catalogue(), &args.on.request(graph.clone()));
+        let (report, figures) = match &result {
+            Ok(plan) => (plan.warnings(), Some(Figures::of(plan))),
+            Err(report) => (Some(report.clone()), None),
+        };
+        let is_good = figures.is_some() && (report.is_none() || !args.deny_warnings);
+        if !is_good {
+            code = NOT_LOADED;
+        }
+        match args.format {
+            Format::Json => checked.push(Checked::of(graph, is_good, report.as_ref(), figures)),
+            Format::Text => {
+                report.iter().for_each(|report| shell.show(report));
+                if let Some(figures) = figures.filter(|_| is_good) {
+                    let tick = milliseconds(figures.period_s);
+                    shell.say(&format!("{}: ok, {} nodes, a tick each {tick}", graph.display(), figures.nodes));
+                }
             }
-            Err(report) => code = shell.complain(&report),
         }
     }
+    if args.format == Format::Json {
+        shell.say_json(&checked);
+    }
     code
+}
+
+/// What the JSON says of one graph.
+#[derive(Serialize)]
+struct Checked {
+    graph: String,
+    ok: bool,
+    diagnostics: Vec<Diagnosed>,
+    /// Of a graph that loads.
+    figures: Option<Figures>,
+}
+
+impl Checked {
+    fn of(graph: &Path, ok: bool, report: Option<&Report>, figures: Option<Figures>) -> Self {
+        let diagnostics = report.map(diagnosed).unwrap_or_default();
+        Self { graph: graph.display().to_string(), ok, diagnostics, figures }
+    }
+}
+
+#[derive(Serialize)]
+struct Figures {
+    nodes: usize,
+    ports: usize,
+    /// Nominal time between two ticks [s].
+    period_s: f64,
+    /// Whether a device runs in real time.
+    is_live: bool,
+    /// The nodes in the order in which they step.
+    order: Vec<String>,
+}
+
+impl Figures {
+    fn of(plan: &Plan) -> Self {
+        Self {
+            nodes: plan.order().count(),
+            ports: plan.ports().count(),
+            period_s: plan.period(),
+            is_live: plan.is_live(),
+            order: plan.order().map(str::to_owned).collect(),
+        }
+    }
 }
 
 /// A time for a person [s].

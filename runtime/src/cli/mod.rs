@@ -15,7 +15,14 @@
 
 mod check;
 mod course;
+mod describe;
+mod entry;
+mod example;
+mod json;
+mod list;
+mod page;
 mod progress;
+mod prose;
 mod run;
 mod shell;
 mod summary;
@@ -130,7 +137,10 @@ impl Tool {
     /// The tool with the commands that need nothing but a catalogue.
     #[must_use]
     pub fn new(catalogue: Catalogue) -> Self {
-        Self { catalogue, commands: vec![derived(run::run), derived(check::check)] }
+        Self {
+            catalogue,
+            commands: vec![derived(run::run), derived(check::check), derived(list::list), derived(describe::describe)],
+        }
     }
 
     /// With one more command.

@@ -67,6 +67,7 @@ impl Job {
     }
 
     fn go(&self, plan: Plan, shell: &Shell) -> u8 {
+        plan.warnings().iter().for_each(|report| shell.show(report));
         let is_real = self.realtime || plan.is_live();
         let mut engine = Engine::new(plan);
         let mut recorder = match self.out.as_deref().map(|path| recorder(path, &engine, !is_real)).transpose() {

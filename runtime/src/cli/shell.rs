@@ -38,9 +38,19 @@ impl Shell {
         let _ = writeln!(out, "{text}").and_then(|()| out.flush());
     }
 
-    /// Shows what is wrong with a graph; gives the exit code.
-    pub fn complain(&self, report: &Report) -> u8 {
+    /// Prints something for a program to standard output, as JSON.
+    pub fn say_json(&self, value: &impl serde::Serialize) {
+        self.say(&serde_json::to_string_pretty(value).expect("what is said has names for keys, and finite numbers"));
+    }
+
+    /// Shows what is wrong with a graph, on standard error.
+    pub fn show(&self, report: &Report) {
         eprint!("{}", report.render(self.colour.is_on(&std::io::stderr())));
+    }
+
+    /// Shows what is wrong with a graph that does not load; gives the exit code.
+    pub fn complain(&self, report: &Report) -> u8 {
+        self.show(report);
         NOT_LOADED
     }
 

@@ -9,12 +9,13 @@ use super::load::{Flat, Loader, Request};
 use super::order::order;
 use super::plan::{Clock, Plan, PlannedCommand, PlannedNode, PlannedPort, PlannedRole, Producer, Source};
 use super::units::{Clash, Units};
+use super::unread::unread;
 use super::wires::{CommandWire, Model, Origin, Wire};
 use super::{Sources, Value};
 use crate::catalogue::Catalogue;
 use crate::diagnostic::{Code, Diagnostic, Report};
 use crate::node::{Configured, Given, Need, NodeSpec, PortSpec, Reader};
-use crate::signal::Shape;
+use crate::signal::{FlagShape, Kind, Shape};
 
 /// Checks a graph and builds it.
 ///
@@ -63,7 +64,9 @@ pub fn plan(catalogue: &Catalogue, request: &Request) -> Result<Plan, Report> {
             for device in &opened.devices {
                 tracing::info!("opened device `{}` ({})", device.name, sources.locate(device.span.start));
             }
-            Ok(finish(Parts { roles, nodes, commands: planned, clock, period, sources }, opened, flat.table.as_ref()))
+            let warnings = unread(&model, &wires, &commands);
+            let parts = Parts { roles, nodes, commands: planned, clock, period, sources, warnings };
+            Ok(finish(parts, opened, flat.table.as_ref()))
         }
         _ => Err(Report::new(sources, found)),
     }
@@ -77,6 +80,7 @@ struct Parts {
     clock: Clock,
     period: f64,
     sources: Sources,
+    warnings: Vec<Diagnostic>,
 }
 
 fn finish(parts: Parts, opened: Opened, table: Option<&GraphTable>) -> Plan {
@@ -94,6 +98,7 @@ fn finish(parts: Parts, opened: Opened, table: Option<&GraphTable>) -> Plan {
         max_gap,
         reset_after,
         sources: parts.sources,
+        warnings: parts.warnings,
     }
 }
 
@@ -182,6 +187,10 @@ impl Builder<'_> {
             let input = &spec.inputs[wire.input];
             inputs[wire.input].1.push(wire.source);
             if input.need == Need::Delayed {
+                // What it brings is made later, so its shape is not known yet; of a flag there is nothing to know.
+                if input.kind == Kind::Flag {
+                    given.inputs[wire.input].push((wire.key.name.clone(), FlagShape.into()));
+                }
                 continue;
             }
             let Some(port) = self.ports.get(&wire.source) else {

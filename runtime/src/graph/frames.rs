@@ -192,7 +192,7 @@ struct End<'a> {
 }
 
 /// The frames among a port's arguments.
-fn frame_args(port: &PortSpec) -> &[std::borrow::Cow<'static, str>] {
+pub(crate) fn frame_args(port: &PortSpec) -> &[std::borrow::Cow<'static, str>] {
     let from = usize::from(port.kind.has_unit()).min(port.args.len());
     &port.args[from..]
 }

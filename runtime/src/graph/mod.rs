@@ -13,13 +13,15 @@ mod order;
 mod plan;
 mod sources;
 mod units;
+mod unread;
 mod value;
 mod wires;
 
 pub use check::plan;
+pub(crate) use frames::frame_args;
 pub use load::Request;
 pub(crate) use plan::{Clock, PlannedCommand, PlannedNode, Producer, Source};
 pub use plan::{Plan, PlannedPort};
 pub use sources::{BuiltinFile, SourceFile, Sources};
-pub(crate) use units::declares_a_unit;
+pub(crate) use units::{declares_a_unit, may_fit};
 pub use value::{Item, Key, Table, Value, parse_table};

@@ -4,6 +4,7 @@ use std::ops::Range;
 
 use super::Sources;
 use crate::device::Driver;
+use crate::diagnostic::{Diagnostic, Report};
 use crate::node::{AnyNode, Need};
 use crate::signal::Shape;
 
@@ -99,9 +100,17 @@ pub struct Plan {
     /// How long something must be absent before the state behind it is reset [ns].
     pub(crate) reset_after: i64,
     pub(crate) sources: Sources,
+    pub(crate) warnings: Vec<Diagnostic>,
 }
 
 impl Plan {
+    /// What may not be as it was meant, though the graph loads; none if there is nothing.
+    #[must_use]
+    pub fn warnings(&self) -> Option<Report> {
+        let report = || Report::new(self.sources.clone(), self.warnings.clone());
+        (!self.warnings.is_empty()).then(report)
+    }
+
     /// Every port of the graph: those of the roles, then those of the nodes in the order in which they step.
     pub fn ports(&self) -> impl Iterator<Item = &PlannedPort> {
         let roles = self.roles.iter().flat_map(|role| &role.ports);

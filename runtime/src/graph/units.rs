@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use super::frames::frame_args;
 use crate::node::PortSpec;
 use crate::signal::{Shape, Unit};
 
@@ -40,6 +41,22 @@ pub(crate) fn declares_a_unit(port: &PortSpec) -> bool {
         }
         _ => true,
     }
+}
+
+/// Whether a wire from an output to an input can be right, as far as their declarations tell.
+pub(crate) fn may_fit(output: &PortSpec, input: &PortSpec) -> bool {
+    let units = match (pattern(output), pattern(input)) {
+        (Some(Pattern::Known(has)), Some(Pattern::Known(takes))) => has == takes,
+        (Some(Pattern::Known(has)), Some(Pattern::AnyRate)) => has.per_second > 0,
+        (Some(Pattern::Variable { per_second, .. }), Some(Pattern::Known(takes))) => {
+            !per_second || takes.per_second > 0
+        }
+        _ => true,
+    };
+    let is_fixed = |frame: &str| frame != "self" && frame.starts_with(|c: char| c.is_ascii_lowercase());
+    let frames = frame_args(output).iter().zip(frame_args(input));
+    let do_frames_fit = frames.into_iter().all(|(a, b)| a == b || !is_fixed(a) || !is_fixed(b));
+    output.kind == input.kind && units && do_frames_fit
 }
 
 /// What comes in is not what is taken.

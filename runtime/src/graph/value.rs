@@ -73,7 +73,7 @@ impl Table {
     }
 
     /// Whether the table asks a device for a fact: `{ from = "pad.threshold" }` is one value and no table to merge with.
-    pub(super) fn is_fact(&self) -> bool {
+    pub(crate) fn is_fact(&self) -> bool {
         matches!(self.entries.as_slice(), [(key, value)] if key.name == "from" && value.as_str().is_some())
     }
 

@@ -137,6 +137,14 @@ impl<'a> Model<'a> {
         }
     }
 
+    /// What the parts export.
+    pub(crate) fn exported(&self) -> impl Iterator<Item = Producer> {
+        let scopes = self.flat.scopes.iter().enumerate();
+        let words =
+            scopes.flat_map(|(scope, Scope { exports, .. })| exports.iter().map(move |(_, word)| (scope, word)));
+        words.filter_map(|(scope, word)| Some(self.resolve(scope, word, 0).ok()??.producer))
+    }
+
     fn wire(&self, node: usize, spec: &NodeSpec, key: &Key, word: &Word, found: &mut Vec<Diagnostic>) -> Option<Wire> {
         let source = self.resolve(self.flat.nodes[node].scope, word, 0).unwrap_or_else(|diagnostic| {
             found.push(*diagnostic);

@@ -89,6 +89,7 @@ mod tests {
 
     /// A choice between words.
     #[derive(Debug, Clone)]
+    #[allow(unreachable_pub, reason = "it is the type of a public field")]
     pub struct Choice;
 
     impl Choice {

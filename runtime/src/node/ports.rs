@@ -19,7 +19,8 @@ pub enum Need {
     Optional,
     /// Any number of them, each named in the graph, optional and a trigger.
     Many,
-    /// Read as the last tick left it; optional, and a trigger one tick late where the node has no other.
+    /// Read as the last tick left it; optional, and a trigger one tick late where the node has no other. Its shape is
+    /// not known when the node is made, but for a flag's, which says no more than that there is a wire.
     Delayed,
 }
 

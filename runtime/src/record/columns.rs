@@ -4,7 +4,7 @@ use nalgebra::UnitQuaternion;
 
 use crate::graph::PlannedPort;
 use crate::node::{Bus, PortId};
-use crate::signal::{Arenas, Features, Flag, Joints, Pose, Scalar, Shape, Signal, Twist, Unit};
+use crate::signal::{Arenas, Features, Flag, Joints, Kind, Pose, Scalar, Shape, Signal, Twist, Unit};
 
 /// One scalar of a port.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -96,6 +96,20 @@ fn columns_of(shape: &Shape) -> Option<(Part, Vec<(String, Unit)>)> {
         }
         Shape::Image(_) | Shape::Mask(_) | Shape::Regions(_) | Shape::Jacobian(_) => return None,
     })
+}
+
+/// How a port of that kind is recorded, for the reference.
+#[must_use]
+pub const fn recorded(kind: Kind) -> &'static str {
+    match kind {
+        Kind::Scalar => "a column",
+        Kind::Flag => "a column, 0 or 1",
+        Kind::Features => "a column for each name",
+        Kind::Twist => "the columns `vx` `vy` `vz` [m/s] and `wx` `wy` `wz` [rad/s]",
+        Kind::Pose => "the columns `x` `y` `z` [m] and the quaternion `qx` `qy` `qz` `qw`",
+        Kind::Joints => "a column for each joint, by its name",
+        Kind::Image | Kind::Mask | Kind::Regions | Kind::Jacobian => "not at all",
+    }
 }
 
 /// Reads one port into the front of `row` and tells how many columns it has.

@@ -4,6 +4,6 @@ mod columns;
 mod recorder;
 mod writer;
 
-pub use columns::{Column, Columns};
+pub use columns::{Column, Columns, recorded};
 pub use recorder::Recorder;
 pub use writer::Format;

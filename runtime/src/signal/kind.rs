@@ -61,10 +61,34 @@ pub trait Signal: Default + Clone + Send + 'static {
 }
 
 macro_rules! kinds {
-    ($($kind:ident $shape:ident $arena:ident $word:literal { $($item:tt)* })*) => {
+    ($($kind:ident $shape:ident $arena:ident $name:literal $word:literal: $summary:literal, $doc:literal
+        { $($item:tt)* })*) => {
         /// The kinds of signals: a closed set.
         #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-        pub enum Kind { $(#[doc = concat!("A ", $word, ".")] $kind),* }
+        pub enum Kind { $(#[doc = concat!("A ", $word, ": ", $summary, ".")] $kind),* }
+
+        impl Kind {
+            /// Every kind.
+            pub const ALL: &'static [Self] = &[$(Self::$kind),*];
+
+            /// Its name, in one word.
+            #[must_use]
+            pub const fn name(self) -> &'static str {
+                match self { $(Self::$kind => $name),* }
+            }
+
+            /// What it is, in one line.
+            #[must_use]
+            pub const fn summary(self) -> &'static str {
+                match self { $(Self::$kind => $summary),* }
+            }
+
+            /// What else there is to know, for the reference: its unit, its frames and its shape. Markdown.
+            #[must_use]
+            pub const fn doc(self) -> &'static str {
+                match self { $(Self::$kind => $doc),* }
+            }
+        }
 
         impl fmt::Display for Kind {
             fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -142,52 +166,66 @@ pub type MaskShape = Grid;
 pub struct JacobianShape(pub JointsShape);
 
 kinds! {
-    Scalar ScalarShape scalars "scalar" {
+    Scalar ScalarShape scalars "scalar" "scalar": "a number with a unit",
+        "It belongs to a frame. Its unit is known at load." {
         fn allocate(_: &ScalarShape) -> Self { 0.0 }
         fn take(_: &mut Self) -> Self { 0.0 }
         fn is_finite(&self) -> bool { all_finite(&[*self]) }
     }
-    Flag FlagShape flags "flag" {
+    Flag FlagShape flags "flag" "flag": "a yes or no",
+        "It has no unit. Gates and conditions are flags." {
         fn allocate(_: &FlagShape) -> Self { false }
         fn take(_: &mut Self) -> Self { false }
         fn is_finite(&self) -> bool { true }
     }
-    Features FeaturesShape features "feature vector" {
+    Features FeaturesShape features "features" "feature vector": "named numbers, each with a unit and a freshness of its own",
+        "The names are known at load: they come from the graph file, where wires or tables name them. Each component can be \
+        absent while the others are there; the vector is there if any component is. The vector belongs to one frame." {
         fn allocate(shape: &FeaturesShape) -> Self { Self::absent(shape.features.len()) }
         fn is_finite(&self) -> bool { Self::is_finite(self) }
         fn mark(&self, _: Mark, tick: u64) -> Mark { Self::mark(self, tick) }
         fn lose(&mut self, tick: u64) { self.lose_all(tick); }
         const KEEPS: bool = true;
     }
-    Image ImageShape images "image" {
+    Image ImageShape images "image" "image": "a number for each tactel of a pad, row after row",
+        "All tactels have one unit. Its shape is rows, columns and the pitch along x and y [m]: column j runs along the \
+        sensor's x, row i along its y, and z points out of the pad toward the object. It belongs to the frame of its pad." {
         fn allocate(shape: &ImageShape) -> Self { Self::zeros(shape.rows, shape.cols) }
         fn is_finite(&self) -> bool { Self::is_finite(self) }
     }
-    Mask MaskShape masks "mask" {
+    Mask MaskShape masks "mask" "mask": "a yes or no for each tactel of a pad",
+        "Its shape is the rows and columns of the array it lies on, and it belongs to the frame of its pad." {
         fn allocate(grid: &MaskShape) -> Self { Self::empty(grid.rows, grid.cols) }
         fn is_finite(&self) -> bool { true }
     }
-    Regions RegionsShape regions "list of regions" {
+    Regions RegionsShape regions "regions" "list of regions": "the connected regions of a mask, each with its area and its force",
+        "The force is in the unit of the image it was summed from. Its shape is that of the array. They stand in the order \
+        of their first tactels, row after row." {
         fn allocate(shape: &RegionsShape) -> Self { Self::with_room(shape.grid.rows, shape.grid.cols) }
         fn is_finite(&self) -> bool { self.list().iter().all(|region| all_finite(&[region.force])) }
     }
-    Twist TwistShape twists "twist" {
+    Twist TwistShape twists "twist" "twist": "a velocity: linear and angular",
+        "The order is `[v, omega]`, in m/s and rad/s. A twist in a sensor's frame is that of the sensor's origin along the \
+        sensor's axes; one in `base` is spatial, at the base's origin (paper eq. 4)." {
         fn allocate(_: &TwistShape) -> Self { Self::default() }
         fn take(_: &mut Self) -> Self { Self::default() }
         fn is_finite(&self) -> bool { all_finite(self.0.as_slice()) }
     }
-    Pose PoseShape poses "pose" {
+    Pose PoseShape poses "pose" "pose": "where one frame is in another",
+        "A rotation and a translation [m] that take points of the first frame to the second." {
         fn allocate(_: &PoseShape) -> Self { Self::default() }
         fn take(_: &mut Self) -> Self { Self::default() }
         fn is_finite(&self) -> bool {
             all_finite(self.0.translation.vector.as_slice()) && all_finite(self.0.rotation.matrix().as_slice())
         }
     }
-    Joints JointsShape joints "joint vector" {
+    Joints JointsShape joints "joints" "joint vector": "a number for each joint of an arm, from the base to the tip",
+        "All have one unit: rad for positions, rad/s for velocities. Its shape is the list of joints with their limits." {
         fn allocate(shape: &JointsShape) -> Self { Self::zeros(shape.joints.len()) }
         fn is_finite(&self) -> bool { all_finite(&self.0) }
     }
-    Jacobian JacobianShape jacobians "Jacobian" {
+    Jacobian JacobianShape jacobians "jacobian" "Jacobian": "the twist that unit speed of each joint gives",
+        "A column for each joint, at the origin of the frame it is given in." {
         fn allocate(shape: &JacobianShape) -> Self { Self::zeros(shape.0.joints.len()) }
         fn is_finite(&self) -> bool { self.0.iter().all(|column| all_finite(column.0.as_slice())) }
     }

@@ -1,0 +1,203 @@
+//! A whole graph around one node or one device, put together from the examples of the catalogue.
+//!
+//! Each node's example is one block whose wires name blocks of other nodes' examples and roles of devices' examples.
+//! What is needed is followed from block to block; the text stays as it was written, comments and all.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use crate::catalogue::Catalogue;
+use crate::graph::{Item, Sources, Table, Value, parse_table};
+
+/// What the example is of.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Asked<'a> {
+    /// A node type.
+    Node(&'a str),
+    /// A device type.
+    Device(&'a str),
+}
+
+/// The example of one node or one device, taken apart.
+struct Piece {
+    /// Its type.
+    kind: String,
+    is_device: bool,
+    /// What others call it: blocks of nodes, or roles.
+    names: Vec<String>,
+    /// Of those, the roles that take no commands.
+    sensors: Vec<String>,
+    /// What it names.
+    needs: Vec<String>,
+    /// Its text by section: `[roles]`, `[commands]`, `[bind]`; under no name, its blocks.
+    sections: BTreeMap<&'static str, String>,
+}
+
+/// Sections that several devices share.
+const SHARED: [&str; 3] = ["roles", "commands", "bind"];
+
+/// The graph, or why there is none.
+///
+/// # Errors
+/// Which example is missing, or is no TOML.
+pub(super) fn compose(catalogue: &Catalogue, asked: Asked<'_>) -> Result<String, String> {
+    let pieces = pieces(catalogue)?;
+    let is_asked = |piece: &Piece| match asked {
+        Asked::Node(name) => !piece.is_device && piece.kind == name,
+        Asked::Device(name) => piece.is_device && piece.kind == name,
+    };
+    let (Asked::Node(name) | Asked::Device(name)) = asked;
+    let start = pieces.iter().position(is_asked).ok_or_else(|| format!("`{name}` has no example"))?;
+    let mut chosen = vec![start];
+    if pieces[start].is_device {
+        // A sensor by itself does nothing: with it comes what reads it.
+        let reads =
+            |piece: &Piece| !piece.is_device && piece.needs.iter().any(|need| pieces[start].names.contains(need));
+        chosen.extend(pieces.iter().position(reads));
+    }
+    let mut at = 0;
+    while let Some(piece) = chosen.get(at).map(|index| &pieces[*index]) {
+        at += 1;
+        for need in &piece.needs {
+            if chosen.iter().any(|index| pieces[*index].names.contains(need)) {
+                continue;
+            }
+            // A device is no choice if it fills a role that another one fills already.
+            let is_taken = |name: &String| chosen.iter().any(|index| pieces[*index].names.contains(name));
+            let is_free = |piece: &Piece| !piece.names.iter().any(is_taken);
+            let provider = pieces.iter().position(|piece| piece.names.contains(need) && is_free(piece));
+            let provider =
+                provider.ok_or_else(|| format!("no example brings the `{need}` that `{}` needs", piece.kind))?;
+            chosen.push(provider);
+        }
+    }
+    chosen.sort_unstable();
+    let chosen: Vec<&Piece> = chosen.iter().map(|index| &pieces[*index]).collect();
+    Ok(text(&chosen, &pieces[start]))
+}
+
+/// The block of a node or a device by itself, as it was written.
+pub(super) fn block(example: &str) -> Option<&str> {
+    Some(example.trim()).filter(|text| !text.is_empty())
+}
+
+fn pieces(catalogue: &Catalogue) -> Result<Vec<Piece>, String> {
+    let mut pieces = Vec::new();
+    let nodes = catalogue.nodes().iter().map(|node| node.spec()).map(|spec| (spec.name, spec.example, false));
+    let devices = catalogue.devices().iter().map(|device| (device.name(), device.example(), true));
+    for (kind, example, is_device) in nodes.chain(devices) {
+        if !example.trim().is_empty() {
+            pieces.push(piece(catalogue, &kind, &example, is_device)?);
+        }
+    }
+    Ok(pieces)
+}
+
+fn piece(catalogue: &Catalogue, kind: &str, example: &str, is_device: bool) -> Result<Piece, String> {
+    let mut sources = Sources::default();
+    let parsed = parse_table(sources.add_file(Path::new("example"), example));
+    let Ok(Value { item: Item::Table(root), .. }) = parsed else {
+        return Err(format!("the example of `{kind}` is no TOML"));
+    };
+    let table = |name: &str| root.get(name).and_then(Value::as_table).cloned().unwrap_or_default();
+    let keys = |table: &Table| table.entries.iter().map(|(key, _)| key.name.clone()).collect();
+    let (nodes, roles) = (table("nodes"), table("roles"));
+    let is_sensor = |kind: &str| catalogue.roles().iter().any(|role| role.name == kind && role.commands.is_empty());
+    let sensors = roles.entries.iter().filter(|(_, kind)| kind.as_str().is_some_and(is_sensor));
+    let sensors = sensors.map(|(key, _)| key.name.clone()).collect();
+    let mut needs = Vec::new();
+    for (_, node) in &nodes.entries {
+        let wires = node.as_table().and_then(|node| node.get("in"));
+        wires.into_iter().for_each(|wires| ports(wires, &mut needs));
+        facts(node, &mut needs);
+    }
+    table("commands").entries.iter().for_each(|(_, wires)| ports(wires, &mut needs));
+    let names = keys(if is_device { &roles } else { &nodes });
+    Ok(Piece { kind: kind.to_owned(), is_device, names, sensors, needs, sections: sections(example) })
+}
+
+/// The first parts of the ports that wires name.
+fn ports(wires: &Value, needs: &mut Vec<String>) {
+    let words = wires.as_table().into_iter().flat_map(|wires| &wires.entries).filter_map(|(_, word)| word.as_str());
+    needs.extend(words.filter_map(|word| Some(word.split_once('.')?.0.to_owned())));
+}
+
+/// The roles whose facts are asked for.
+fn facts(value: &Value, needs: &mut Vec<String>) {
+    match &value.item {
+        Item::Table(table) if table.is_fact() => ports(value, needs),
+        Item::Table(table) => table.entries.iter().for_each(|(_, inner)| facts(inner, needs)),
+        Item::Array(items) => items.iter().for_each(|inner| facts(inner, needs)),
+        _ => {}
+    }
+}
+
+/// A text by sections; a comment above a header belongs to it.
+fn sections(example: &str) -> BTreeMap<&'static str, String> {
+    let mut sections: BTreeMap<&'static str, String> = BTreeMap::new();
+    let (mut section, mut comments) = ("", String::new());
+    for line in example.trim().lines() {
+        if line.starts_with('#') {
+            comments.push_str(line);
+            comments.push('\n');
+            continue;
+        }
+        let header = line.strip_prefix('[').and_then(|rest| rest.split(']').next());
+        let shared = header.and_then(|header| SHARED.into_iter().find(|shared| *shared == header));
+        let is_block = header.is_some_and(|header| header.starts_with("nodes.") || header.starts_with("devices."));
+        section = if is_block { "" } else { shared.unwrap_or(section) };
+        let text = sections.entry(section).or_default();
+        text.push_str(&std::mem::take(&mut comments));
+        if shared.is_none() {
+            text.push_str(line);
+            text.push('\n');
+        }
+    }
+    sections.entry(section).or_default().push_str(&comments);
+    sections
+}
+
+fn text(chosen: &[&Piece], asked: &Piece) -> String {
+    let devices = || chosen.iter().filter(|piece| piece.is_device);
+    let clock = devices().flat_map(|device| &device.sensors).chain(devices().flat_map(|device| &device.names)).next();
+    let clock = clock.map_or_else(|| "rate_hz = 250".to_owned(), |role| format!("clock = \"{role}\""));
+    let shared = |name: &str| {
+        let lines: String =
+            devices().filter_map(|device| device.sections.get(name)).map(|text| trimmed(text)).collect();
+        (!lines.is_empty()).then(|| format!("[{name}]\n{lines}"))
+    };
+    let block = |piece: &&Piece| {
+        let text = trimmed(piece.sections.get("").map_or("", String::as_str));
+        if std::ptr::eq(*piece, asked) { format!("# ==== {} ====\n{text}", piece.kind) } else { text }
+    };
+    let nodes = chosen.iter().filter(|piece| !piece.is_device).map(block);
+    let head = [Some(format!("[graph]\n{clock}\n")), shared("roles"), shared("commands")];
+    let tail = shared("bind").into_iter().chain(devices().map(block));
+    let all: Vec<String> = head.into_iter().flatten().chain(nodes).chain(tail).collect();
+    all.join("\n")
+}
+
+/// Without empty lines around it.
+fn trimmed(text: &str) -> String {
+    match text.trim_matches('\n') {
+        "" => String::new(),
+        text => format!("{text}\n"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_text_falls_into_its_sections_and_keeps_its_comments() {
+        let text = "\n# What a task asks.\n[roles]\narm = \"x\"   # the arm\n\n[bind]\narm = \"a\"\n\n# The one.\n[devices.a]\n\
+                    type = \"t\"\nlist = [\n[1, 2],\n]\n[[devices.a.press]]\nforce = 3.0\n# end\n";
+        let sections = sections(text);
+        assert_eq!(sections["roles"], "# What a task asks.\narm = \"x\"   # the arm\n\n");
+        assert_eq!(sections["bind"], "arm = \"a\"\n\n");
+        let block =
+            "# The one.\n[devices.a]\ntype = \"t\"\nlist = [\n[1, 2],\n]\n[[devices.a.press]]\nforce = 3.0\n# end\n";
+        assert_eq!(sections[""], block);
+    }
+}
