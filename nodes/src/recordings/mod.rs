@@ -5,6 +5,7 @@
 //! a header before the file is seen to hold as much, and nothing is mended silently.
 
 mod hints;
+mod novel_asc;
 mod novel_lst;
 mod tekscan;
 pub mod text;
@@ -19,7 +20,7 @@ pub use hints::Hints;
 pub use text::Flaw;
 
 /// Every format that is read: one line each, those that are sure of themselves first.
-pub const FORMATS: &[Format] = &[tekscan::FORMAT, novel_lst::FORMAT];
+pub const FORMATS: &[Format] = &[tekscan::FORMAT, novel_lst::FORMAT, novel_asc::FORMAT];
 
 /// The most cells of an array of which a file holds only windows.
 pub const MOST_CELLS: usize = 1 << 18;
