@@ -51,8 +51,8 @@ fn recognises(head: &Head<'_>) -> bool {
         // The first row or the second is longer than what is looked at.
         (Some((first, is_whole)), _) => {
             let is_table = ["csv", "tsv", "txt"].contains(&&*head.ending) && width(names_of(first), first) > 1;
-            let last = first.text.rfind([',', ';', '\t', ' ']).filter(|_| !is_whole);
-            is_table || is_row_of_numbers(&first.text[..last.unwrap_or(first.text.len())])
+            let end = if is_whole { Some(first.text.len()) } else { first.text.rfind([',', ';', '\t', ' ']) };
+            is_table || end.is_some_and(|end| is_row_of_numbers(&first.text[..end]))
         }
         (None, _) => false,
     }
