@@ -24,6 +24,10 @@ pub struct Hints {
 /// How far a number of the file and one of the bench may be apart, as a part of them: files round.
 const ROUNDING: f64 = 5e-3;
 
+/// The shortest and the longest time between two frames that can be played [s].
+const SHORTEST: f64 = 1e-6;
+const LONGEST: f64 = 1e3;
+
 fn agree(a: f64, b: f64) -> bool {
     (a - b).abs() <= ROUNDING * a.abs().max(b.abs())
 }
@@ -57,7 +61,12 @@ impl Hints {
         let help = "give the bench's device a `rate_hz`: the frames per second of the recording";
         let given = self.rate_hz.map(|rate| 1.0 / rate);
         let show = |period: &f64| format!("{} frames a second", (1e6 / period).round() / 1e6);
-        choose(said, given, "rate_hz", help, |a, b| agree(*a, *b), show)
+        let period = choose(said, given, "rate_hz", help, |a, b| agree(*a, *b), show)?;
+        if (SHORTEST..=LONGEST).contains(&period) {
+            Ok(period)
+        } else {
+            Err(Refusal::broken(format!("a frame each {period} s is none that can be played")))
+        }
     }
 
     /// The number of rows and of columns, from what the file says of it.

@@ -9,6 +9,7 @@ mod csv;
 mod fields;
 mod footscan;
 mod hints;
+mod novel_lst;
 mod npy;
 mod reel;
 mod tekscan;
@@ -27,8 +28,16 @@ pub use hints::Hints;
 pub use text::Flaw;
 
 /// Every format that is read: one line each, those that are sure of themselves first.
-pub const FORMATS: &[Format] =
-    &[npy::NPY, npy::NPZ, tekscan::FORMAT, zebris::FORMAT, xsensor::FORMAT, footscan::FORMAT, csv::FORMAT];
+pub const FORMATS: &[Format] = &[
+    npy::NPY,
+    npy::NPZ,
+    tekscan::FORMAT,
+    novel_lst::FORMAT,
+    zebris::FORMAT,
+    xsensor::FORMAT,
+    footscan::FORMAT,
+    csv::FORMAT,
+];
 
 /// The most cells of an array of which a file holds only windows.
 pub const MOST_CELLS: usize = 1 << 18;
