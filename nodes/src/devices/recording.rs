@@ -27,6 +27,8 @@ params! {
     rate_hz: Option<Rate>,
     /// Number of rows and of columns, where the file does not say it.
     size: Option<[Count; 2]>,
+    /// Name of the pad to play, where the file has several.
+    pad: Option<String>,
 }
 
 /// A recording that is being shown.
@@ -73,6 +75,7 @@ fn hints(params: &Params) -> Result<Hints, Mistakes> {
         pitch: params.pitch_mm.map(|pitch| pitch.map(|mm| *mm * 1e-3)),
         rate_hz: params.rate_hz.map(|rate| *rate),
         size: params.size.map(|size| size.map(|count| count.0)),
+        pad: params.pad.clone(),
     })
 }
 

@@ -17,6 +17,8 @@ pub struct Hints {
     pub rate_hz: Option<f64>,
     /// Number of rows and of columns.
     pub size: Option<[usize; 2]>,
+    /// Name of the pad, where a file has several.
+    pub pad: Option<String>,
 }
 
 /// How far a number of the file and one of the bench may be apart, as a part of them: files round.

@@ -4,12 +4,21 @@
 //! file does not say, [`Hints`] may; where both say something, they must agree. Nothing is allocated from a number in
 //! a header before the file is seen to hold as much, and nothing is mended silently.
 
+mod archive;
+mod csv;
+mod fields;
+mod footscan;
 mod hints;
 mod novel_asc;
 mod novel_lst;
+mod npy;
+mod reel;
 mod tekscan;
 pub mod text;
 mod units;
+mod xsensor;
+mod zebris;
+mod zip;
 
 #[cfg(test)]
 mod testing;
@@ -20,7 +29,17 @@ pub use hints::Hints;
 pub use text::Flaw;
 
 /// Every format that is read: one line each, those that are sure of themselves first.
-pub const FORMATS: &[Format] = &[tekscan::FORMAT, novel_lst::FORMAT, novel_asc::FORMAT];
+pub const FORMATS: &[Format] = &[
+    npy::NPY,
+    npy::NPZ,
+    tekscan::FORMAT,
+    novel_lst::FORMAT,
+    novel_asc::FORMAT,
+    zebris::FORMAT,
+    xsensor::FORMAT,
+    footscan::FORMAT,
+    csv::FORMAT,
+];
 
 /// The most cells of an array of which a file holds only windows.
 pub const MOST_CELLS: usize = 1 << 18;
@@ -218,11 +237,19 @@ pub fn recognise(head: &Head<'_>) -> Option<&'static Format> {
     FORMATS.iter().find(|format| (format.recognises)(head))
 }
 
-/// Reads a file, in the format that a hint names or that it is recognised by. Its name matters only for its ending.
+/// Reads a file, or the one in an archive, in the format that a hint names or that it is recognised by. Its name matters
+/// only for its ending.
 ///
 /// # Errors
 /// Why it cannot be read.
 pub fn read(bytes: &[u8], name: &str, hints: &Hints) -> Result<Recording, Refusal> {
+    match archive::unpack(bytes, name, hints)? {
+        Some((unpacked, name)) => read_plain(&unpacked, &name, hints),
+        None => read_plain(bytes, name, hints),
+    }
+}
+
+fn read_plain(bytes: &[u8], name: &str, hints: &Hints) -> Result<Recording, Refusal> {
     let format = match &hints.format {
         Some(name) => FORMATS.iter().find(|format| format.name == name),
         None => recognise(&Head::new(bytes, name)),
@@ -234,5 +261,5 @@ pub fn read(bytes: &[u8], name: &str, hints: &Hints) -> Result<Recording, Refusa
 #[must_use]
 pub fn list() -> String {
     let lines: Vec<String> = FORMATS.iter().map(|format| format!("`{}`: {}", format.name, format.title)).collect();
-    lines.join("; ")
+    format!("{}; any of them in a `.zip` or `.gz`", lines.join("; "))
 }

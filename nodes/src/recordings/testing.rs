@@ -1,5 +1,7 @@
 //! What the tests of the formats share.
 
+use std::io::Write;
+
 use super::{Hints, Recording, Refusal, read};
 
 /// The 64-bit splitmix generator (Steele et al. 2014), so that every run damages the same.
@@ -81,4 +83,37 @@ pub(super) fn count_refused(good: &[&[u8]], name: &str, hints: &Hints, rounds: u
         refused += usize::from(!complaints(read(&bytes, name, hints)).is_empty());
     }
     refused
+}
+
+/// A zip archive of those members, stored (0) or deflated (8).
+pub(super) fn zipped(method: u16, members: &[(&str, &[u8])]) -> Vec<u8> {
+    let (mut archive, mut directory) = (Vec::new(), Vec::new());
+    for (name, bytes) in members {
+        let mut packed = bytes.to_vec();
+        if method == 8 {
+            let mut deflated = flate2::write::DeflateEncoder::new(Vec::new(), flate2::Compression::default());
+            deflated.write_all(bytes).unwrap();
+            packed = deflated.finish().unwrap();
+        }
+        let mut crc = flate2::Crc::new();
+        crc.update(bytes);
+        let mut common = Vec::new();
+        common.extend([20, 0, 0, 0]);
+        common.extend(method.to_le_bytes());
+        common.extend([0; 4]);
+        for number in [crc.sum(), packed.len() as u32, bytes.len() as u32] {
+            common.extend(number.to_le_bytes());
+        }
+        common.extend((name.len() as u16).to_le_bytes());
+        common.extend([0; 2]);
+        let at = archive.len() as u32;
+        archive.extend([b"PK\x03\x04", &*common, name.as_bytes(), &packed].concat());
+        directory.extend([b"PK\x01\x02\x14\x00", &*common, &[0; 10], &at.to_le_bytes(), name.as_bytes()].concat());
+    }
+    let (at, count) = (archive.len() as u32, members.len() as u16);
+    let size = directory.len() as u32;
+    archive.extend(directory);
+    archive.extend([b"PK\x05\x06\0\0\0\0", &count.to_le_bytes()[..], &count.to_le_bytes()].concat());
+    archive.extend([&size.to_le_bytes()[..], &at.to_le_bytes(), &[0; 2]].concat());
+    archive
 }

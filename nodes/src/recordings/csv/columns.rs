@@ -1,0 +1,213 @@
+//! What the columns of a CSV file are: by their names, or one tactel after the other.
+
+use super::super::text::{Flaw, Notation, Piece, Wrong, flaw, shortened};
+use super::super::{Hints, MOST_CELLS};
+
+/// The columns of a file with a frame a row.
+#[derive(Debug)]
+pub(super) struct Columns {
+    /// Rows and columns of the array.
+    pub(super) size: (usize, usize),
+    /// Number of columns of the file.
+    pub(super) count: usize,
+    /// Unit of the time [s].
+    pub(super) second: f64,
+    /// What each is; without names, each is a tactel.
+    named: Option<Vec<Place>>,
+}
+
+/// What a column is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Role {
+    /// The tactel with that index in a frame.
+    Tactel(usize),
+    /// The time.
+    Time,
+    /// A force measured beside the pad.
+    Force,
+    /// A number that is not used.
+    Passed,
+}
+
+/// A role in little room: the row and the column of a tactel, or one of three marks.
+type Place = (u32, u32);
+
+const TIME: Place = (u32::MAX, 0);
+const FORCE: Place = (u32::MAX, 1);
+const PASSED: Place = (u32::MAX, 2);
+
+impl Columns {
+    /// One tactel after the other.
+    pub(super) const fn plain(rows: usize, cols: usize) -> Self {
+        Self { size: (rows, cols), count: rows * cols, second: 1.0, named: None }
+    }
+
+    /// As a row of names says, and the bench for tactels whose names do not say where they are.
+    pub(super) fn named(names: Piece<'_>, hints: &Hints) -> Result<Self, Wrong> {
+        let notation = names_of(names);
+        let count = notation.fields(names).count();
+        if count > MOST_CELLS {
+            let message = format!("{count} columns are more than the {MOST_CELLS} that are read");
+            return Err(flaw::<()>(&names, message).unwrap_err().into());
+        }
+        let mut columns = Self { size: (0, 0), count, second: 1.0, named: None };
+        let mut places = Vec::with_capacity(count);
+        let mut have_places = None;
+        for name in notation.fields(names).map(unquoted) {
+            let place = match columns.mark(name)? {
+                Some(mark) if mark != PASSED && places.contains(&mark) => {
+                    return Err(flaw::<()>(&name, format!("`{}` is here twice", shortened(name.text)))
+                        .unwrap_err()
+                        .into());
+                }
+                Some(mark) => mark,
+                None => {
+                    let place = place(name.text);
+                    if *have_places.get_or_insert(place.is_some()) != place.is_some() {
+                        let message = format!("`{}` says no row and column, as other names do", shortened(name.text));
+                        let message =
+                            if place.is_none() { message } else { "only some names say a row and a column".into() };
+                        return Err(flaw::<()>(&name, message).unwrap_err().into());
+                    }
+                    place.unwrap_or((0, 0))
+                }
+            };
+            places.push(place);
+        }
+        columns.size = match have_places {
+            Some(true) => {
+                let size = settle(&mut places).or_else(|message| flaw(&names, message))?;
+                hints.size(Some([size.0, size.1]))?;
+                size
+            }
+            _ => in_order(&mut places, names, hints)?,
+        };
+        columns.named = Some(places);
+        Ok(columns)
+    }
+
+    /// What the column of that number is.
+    pub(super) fn role(&self, column: usize) -> Option<Role> {
+        match &self.named {
+            None => (column < self.count).then_some(Role::Tactel(column)),
+            Some(places) => places.get(column).map(|place| match *place {
+                TIME => Role::Time,
+                FORCE => Role::Force,
+                PASSED => Role::Passed,
+                (row, col) => Role::Tactel(row as usize * self.size.1 + col as usize),
+            }),
+        }
+    }
+
+    /// The mark of a column that is no tactel.
+    fn mark(&mut self, name: Piece<'_>) -> Result<Option<Place>, Flaw> {
+        let lower = if name.text.len() > 40 { String::new() } else { name.text.to_lowercase() };
+        let (base, unit) = match lower.split_once(['[', '(']) {
+            Some((base, unit)) => (base.trim(), unit.trim_end_matches([']', ')']).trim()),
+            None => lower.rsplit_once('_').unwrap_or((&lower, "")),
+        };
+        match base {
+            "time" | "t" | "timestamp" | "zeit" => {}
+            "force" if matches!(unit, "" | "n") => return Ok(Some(FORCE)),
+            "force" => return flaw(&name, "a force beside the pad is in `N`"),
+            "frame" | "index" if unit.is_empty() => return Ok(Some(PASSED)),
+            "" if name.text.is_empty() => return Ok(Some(PASSED)),
+            _ => return Ok(None),
+        }
+        self.second = match unit {
+            "" | "s" | "sec" | "seconds" => 1.0,
+            "ms" => 1e-3,
+            "us" | "µs" | "μs" => 1e-6,
+            "ns" => 1e-9,
+            // `t_0` is a tactel.
+            _ if base == "t" => return Ok(None),
+            _ => return flaw(&name, "a time is in `s`, `ms`, `us` or `ns`"),
+        };
+        Ok(Some(TIME))
+    }
+}
+
+/// What parts a row of names.
+pub(super) fn names_of(names: Piece<'_>) -> Notation {
+    let separator = ['\t', ';', ','].into_iter().find(|separator| names.text.contains(*separator));
+    Notation { separator, has_decimal_comma: false }
+}
+
+fn unquoted(name: Piece<'_>) -> Piece<'_> {
+    name.part(name.text.trim_matches(['"', '\''])).trimmed()
+}
+
+/// The row and the column in a name like `t0_3`, `r0c3` or `x3y0`: one with just two numbers.
+fn place(name: &str) -> Option<Place> {
+    if name.len() > 40 {
+        return None;
+    }
+    let mut numbers = name.split(|c: char| !c.is_ascii_digit()).filter(|digits| !digits.is_empty());
+    let (first, second) = (numbers.next()?.parse().ok()?, numbers.next()?.parse().ok()?);
+    let letter = name.chars().take_while(|c| !c.is_ascii_digit()).filter(|c| c.is_alphabetic()).last();
+    let is_column_first = matches!(letter, Some('x' | 'X' | 'c' | 'C')) && name.contains(['y', 'Y', 'r', 'R']);
+    let place = if is_column_first { (second, first) } else { (first, second) };
+    (numbers.next().is_none() && place.0 < u32::MAX).then_some(place)
+}
+
+/// Counts the places from 0: each of the array must be there once. Its size.
+fn settle(places: &mut [Place]) -> Result<(usize, usize), String> {
+    let tactels = || places.iter().filter(|place| place.0 != u32::MAX);
+    let range = |of: fn(&Place) -> u32| (tactels().map(of).min().unwrap_or(0), tactels().map(of).max().unwrap_or(0));
+    let ((top, bottom), (left, right)) = (range(|place| place.0), range(|place| place.1));
+    if top > 1 || left > 1 {
+        return Err("the names of the tactels count rows and columns from 0 or from 1".into());
+    }
+    let size = ((bottom - top) as usize + 1, (right - left) as usize + 1);
+    let found = tactels().count();
+    if size.0.checked_mul(size.1) != Some(found) {
+        return Err(format!("the names go up to {} rows by {} columns, but are {found}", size.0, size.1));
+    }
+    let mut is_there = vec![false; found];
+    for place in places.iter_mut().filter(|place| place.0 != u32::MAX) {
+        *place = (place.0 - top, place.1 - left);
+        let index = place.0 as usize * size.1 + place.1 as usize;
+        if std::mem::replace(&mut is_there[index], true) {
+            return Err(format!("row {} and column {} are named twice", place.0 + top, place.1 + left));
+        }
+    }
+    Ok(size)
+}
+
+/// Takes the tactels row after row. The size of the array.
+fn in_order(places: &mut [Place], names: Piece<'_>, hints: &Hints) -> Result<(usize, usize), Wrong> {
+    let [rows, cols] = hints.size(None)?;
+    let found = places.iter().filter(|place| place.0 != u32::MAX).count();
+    if rows.checked_mul(cols) != Some(found) {
+        let message = format!("these are the names of {found} tactels, not of {rows} by {cols}");
+        return Err(flaw::<()>(&names, message).unwrap_err().into());
+    }
+    let tactels = places.iter_mut().filter(|place| place.0 != u32::MAX);
+    tactels.enumerate().for_each(|(i, place)| *place = ((i / cols) as u32, (i % cols) as u32));
+    Ok((rows, cols))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_name_says_a_row_and_a_column() {
+        let cases = [
+            ("t0_3", Some((0, 3))),
+            ("r12c7", Some((12, 7))),
+            ("taxel[2][5]", Some((2, 5))),
+            ("x3y1", Some((1, 3))),
+            ("c3r1", Some((1, 3))),
+            ("0_3", Some((0, 3))),
+            ("row1_col2", Some((1, 2))),
+            ("t3", None),
+            ("t1_2_3", None),
+            ("temperature", None),
+            ("t99999999999_1", None),
+        ];
+        for (name, expected) in cases {
+            assert_eq!(place(name), expected, "{name}");
+        }
+    }
+}

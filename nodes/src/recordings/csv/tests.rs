@@ -1,0 +1,186 @@
+//! Plain CSV: two layouts, names, and what is wrong where.
+
+use tactflow_runtime::signal::Unit;
+
+use super::super::testing::{check_damages, complaints, count_refused};
+use super::super::{Refusal, read};
+use super::*;
+
+const NAMED: &str =
+    "# a press\ntime,force,r0c0,r0c1,r1c0,r1c1\n0.5,1.25,1,2,3,4\n0.75,2.5,5,6,7,nope\n1.0,3.5,9,10,11,12\n";
+
+fn hints() -> Hints {
+    Hints { unit: Some(Unit::RAW), pitch: Some([0.004, 0.005]), ..Hints::default() }
+}
+
+fn sized(rows: usize, cols: usize) -> Hints {
+    Hints { size: Some([rows, cols]), rate_hz: Some(100.0), ..hints() }
+}
+
+fn named() -> String {
+    NAMED.replace("nope", "8")
+}
+
+#[test]
+fn names_say_where_a_column_belongs() {
+    let recording = read(named().as_bytes(), "press.csv", &hints()).unwrap();
+    assert_eq!(recording.shape, ImageShape { rows: 2, cols: 2, pitch: [0.004, 0.005], unit: Unit::RAW });
+    assert_eq!(recording.cells, [1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0, 10.0, 11.0, 12.0]);
+    let times: Vec<i64> = recording.frames.iter().map(|frame| frame.time).collect();
+    assert_eq!((times, recording.period), (vec![0, 250_000_000, 500_000_000], 0.25));
+    assert_eq!(recording.force.as_deref(), Some(&[1.25, 2.5, 3.5][..]));
+}
+
+#[test]
+fn the_same_written_otherwise_reads_the_same() {
+    let good = read(named().as_bytes(), "", &hints()).unwrap();
+    let cases = [
+        named().replace(',', ";").replace('.', ","),
+        named().replace(',', "\t"),
+        named().replace(',', "\t").replace('.', ","),
+        named().replace(',', "  "),
+        named().replace('\n', "\r\n"),
+        named().replace('\n', ",\n").replace("press,", "press"),
+        named().replace("time", "\"Time [s]\"").replace("force", "\"Force [N]\""),
+        named().replace("time", "time_ms").replace("0.5,", "500,").replace("0.75", "750").replace("1.0", "1000"),
+        named().replace("r0c0,r0c1,r1c0,r1c1", "t1_1,t1_2,t2_1,t2_2"),
+        named().replace("r0c0,r0c1,r1c0,r1c1", "x0y0,x1y0,x0y1,x1y1"),
+        named().replace("0.5,1.25,1,2,3,4", "\n# the first\n 0.5, 1.25, 1, 2, 3, 4\n"),
+        // The columns in another order, and the index that a data frame of pandas writes.
+        ",r1c1,r1c0,time,r0c1,r0c0,force\n0,4,3,0.5,2,1,1.25\n1,8,7,0.75,6,5,2.5\n2,12,11,1.0,10,9,3.5\n".into(),
+    ];
+    for text in cases {
+        assert_eq!(read(text.as_bytes(), "", &hints()).as_ref(), Ok(&good), "{text}");
+    }
+    let other = Hints { size: Some([2, 2]), ..hints() };
+    let text = named().replace("r0c0,r0c1,r1c0,r1c1", "a,b,c,d");
+    assert_eq!(read(text.as_bytes(), "", &other).as_ref(), Ok(&good));
+    assert_eq!(
+        complaints(read(text.as_bytes(), "", &hints()))[0].1,
+        "the file does not say how many rows and columns it has"
+    );
+}
+
+#[test]
+fn frames_are_rows_or_blocks_as_the_size_or_the_blank_lines_say() {
+    let cells = [1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0, 10.0, 11.0, 12.0];
+    let unsized_ = Hints { rate_hz: Some(100.0), ..hints() };
+    let cases = [
+        ("1,2,3,4,5,6\n7,8,9,10,11,12\n", sized(2, 3)),
+        ("1,2,3\n4,5,6\n7,8,9\n10,11,12\n", sized(2, 3)),
+        ("1,2,3\n4,5,6\n\n\n7,8,9\n10,11,12\n\n", sized(2, 3)),
+        ("1 2 3\n4 5 6\n\n7 8 9\n10 11 12", unsized_.clone()),
+        ("# one\n\n1;2;3\n4;5;6\n\n# two\n7;8;9\n10;11;12\n", unsized_.clone()),
+    ];
+    for (text, hints) in cases {
+        let recording = read(text.as_bytes(), "", &hints).unwrap_or_else(|refusal| panic!("{text}: {refusal:?}"));
+        assert_eq!((recording.shape.rows, recording.shape.cols), (2, 3), "{text}");
+        assert_eq!(recording.cells, cells, "{text}");
+        assert_eq!(recording.frames[1].time, 10_000_000, "{text}");
+    }
+    for text in ["1,2,3\n4,5,6\n", "1,2,3\n\n4,5,6\n"] {
+        let refusal = read(text.as_bytes(), "", &unsized_);
+        assert!(matches!(&refusal, Err(Refusal::Silent { help, .. }) if help.contains("t0_0,t0_1")), "{refusal:?}");
+    }
+}
+
+#[test]
+fn a_tactel_that_is_nan_throughout_does_not_exist() {
+    let text = "1,NaN,3,4\n5,nan,7,8\n";
+    let recording = read(text.as_bytes(), "", &sized(2, 2)).unwrap();
+    assert_eq!((&*recording.dead, &*recording.cells), (&[1][..], &[1.0, 0.0, 3.0, 4.0, 5.0, 0.0, 7.0, 8.0][..]));
+    let got = complaints(read(text.replace("nan", "6").as_bytes(), "", &sized(2, 2)));
+    assert_eq!(got, [(2, "this cell is a number, but in the first frame it was none".into())]);
+    let got = complaints(read(text.replace('7', "nan").as_bytes(), "", &sized(2, 2)));
+    assert_eq!(got, [(2, "this cell is no number, but in the first frame it was one".into())]);
+}
+
+#[test]
+fn what_is_wrong_is_said_where_it_is() {
+    let cases = [
+        ("5,6,7,8", "5,6,7,eight", 4, "this cell is not a number: `eight`"),
+        ("5,6,7,8", "5,6,7", 4, "frame 2 has 5 columns, but should have 6"),
+        ("5,6,7,8", "5,6,7,8,9", 4, "frame 2 has 7 columns, but should have 6"),
+        ("5,6,7,8", "5,,7,8", 4, "this cell is not a number: ``"),
+        ("5,6,7,8", "5,6,7,1e300", 4, "this cell is too large"),
+        ("0.75", "0.25", 4, "a time is a number from that of the first frame to 1e9 s after it"),
+        ("1.0,", "0.6,", 5, "the time goes back"),
+        ("2.5", "nan", 4, "a force is a number"),
+        ("force", "time", 2, "`time` is here twice"),
+        ("time", "time_fortnights", 2, "a time is in `s`, `ms`, `us` or `ns`"),
+        ("force", "force_kn", 2, "a force beside the pad is in `N`"),
+        ("r1c1", "r1c0", 2, "the names go up to 2 rows by 2 columns, but are 4 but"),
+        ("r1c1", "r1", 2, "`r1` says no row and column, as other names do"),
+        ("r1c1", "r2c1", 2, "the names go up to 3 rows by 2 columns, but are 4"),
+        ("r0c0,r0c1,", "r5c0,r5c1,", 2, "the names go up to 5 rows by 2 columns, but are 4"),
+    ];
+    let cases: Vec<_> = cases.into_iter().filter(|case| !case.3.ends_with(" but")).collect();
+    check_damages(&named(), "", &hints(), &cases);
+    let twice = named().replace("r1c1", "r1c0");
+    assert_eq!(complaints(read(twice.as_bytes(), "", &hints())), [(2, "row 1 and column 0 are named twice".into())]);
+
+    let blocks = "1,2,3\n4,5,6\n\n7,8,9\n10,11,12\n\n0,0,0\n0,0,0\n";
+    let unsized_ = Hints { rate_hz: Some(100.0), ..hints() };
+    let cases = [
+        ("\n0,0,0\n0", "0,0,0\n0", 6, "frame 2 goes on after its 2 rows"),
+        ("\n10,11,12\n\n0,0,0\n0,0,0\n", "", 4, "frame 2 ends after 1 of its 2 rows: the file is cut off"),
+        ("10,11,12", "10,11", 5, "row 2 of frame 2 has 2 cells, but should have 3"),
+        ("7,8,9\n", "7,8,9\n\n", 5, "frame 2 ends after 1 of its 2 rows"),
+    ];
+    check_damages(blocks, "", &unsized_, &cases);
+    let got = complaints(read(blocks.as_bytes(), "", &sized(4, 4)));
+    assert_eq!(got[0].1, "the first row has 3 numbers: that is neither a frame of 4 by 4 tactels nor a row of it");
+}
+
+#[test]
+fn what_the_file_does_not_say_is_asked_for() {
+    let bare = named().replace("time,", "").replace("0.5,1", "1").replace("0.75,2", "2").replace("1.0,3", "3");
+    for (hints, message) in [
+        (Hints { pitch: None, ..hints() }, "the file does not say the pitch of its tactels"),
+        (Hints { unit: None, ..hints() }, "the file does not say the unit of its values"),
+        (hints(), "the file does not say how fast its frames came"),
+    ] {
+        assert_eq!(complaints(read(bare.as_bytes(), "", &hints)), [(0, message.into())]);
+    }
+    let hints = Hints { rate_hz: Some(50.0), ..hints() };
+    assert_eq!(read(bare.as_bytes(), "", &hints).unwrap().frames[2].time, 40_000_000);
+    assert_eq!(complaints(read(named().as_bytes(), "", &hints)).len(), 1, "the times say 4 a second");
+}
+
+#[test]
+fn other_texts_are_no_csv() {
+    let others = [
+        "",
+        "hello",
+        "name = 3\n",
+        "[package]\nname = \"x\"\n",
+        "1\n2\n3\n",
+        "a,b\nc,d\n1,2\n",
+        "a b c\n1,2,3\n",
+        "\u{89}PNG\r\n1,2,3",
+        "<robot>\n1,2",
+    ];
+    for text in others {
+        assert_eq!(read(text.as_bytes(), "x.csv", &hints()), Err(Refusal::Stranger), "{text}");
+    }
+}
+
+#[test]
+fn a_first_row_longer_than_what_is_looked_at_is_still_recognised() {
+    let names: Vec<String> = (0..16_384).map(|i| format!("t{}_{}", i / 128, i % 128)).collect();
+    let row = vec!["0"; 16_384].join(",");
+    let text = format!("{}\n{row}\n{row}\n", names.join(","));
+    let recording = read(text.as_bytes(), "big.csv", &Hints { rate_hz: Some(1.0), ..hints() }).unwrap();
+    assert_eq!((recording.shape.rows, recording.shape.cols), (128, 128));
+    let row = vec!["0.25"; 16_384].join(",");
+    let recording = read(format!("{row}\n{row}").as_bytes(), "", &sized(128, 128)).unwrap();
+    assert_eq!(recording.frames.len(), 2);
+}
+
+#[test]
+fn damage_is_refused_or_read_soundly() {
+    let refused = count_refused(&[named().as_bytes()], "", &hints(), 2000);
+    assert!((1000..2000).contains(&refused), "{refused}");
+    let refused = count_refused(&[b"1,2,3\n4,5,6\n\n7,8,9\n10,11,12\n"], "", &sized(2, 3), 2000);
+    assert!((1000..2000).contains(&refused), "{refused}");
+}

@@ -1,0 +1,271 @@
+//! `footscan`: the text export of an RSscan plate ("Entire Plate Roll Off", often named `.xls` though it is text).
+//!
+//! A frame is a line `Frame 12 (95.24 ms)` and a line of cells for each row; blank lines are between the frames, and
+//! what stands before the first frame is passed over. The file says neither unit nor pitch. The cells are forces: the
+//! sum of a frame is the load [N]. The plates of 0.5, 1 and 2 m are 64 sensors wide, with 5.08 mm across the plate,
+//! which is along a row of the file, and 7.62 mm along the plate, from row to row; that is taken for whatever is no
+//! wider than 64 columns, unless the bench says otherwise.
+
+use tactflow_runtime::signal::{ImageShape, Unit};
+
+use super::reel::{Reel, bounded};
+use super::text::{self, Flaw, Lines, Notation, Piece, Wrong, flaw};
+use super::{Format, Head, Hints, Recording};
+
+pub(super) const FORMAT: Format = Format {
+    name: "footscan",
+    title: "RSscan footscan, the whole plate's roll-off as text",
+    recognises,
+    read: |bytes, hints| text::read(bytes, hints, parse),
+};
+
+/// Distance of the plates' sensors along a row and from row to row [m].
+const PITCH: [f64; 2] = [0.005_08, 0.007_62];
+
+/// Greatest number of columns of those plates.
+const WIDEST: usize = 64;
+
+/// A frame's line and a row of numbers after it.
+fn recognises(head: &Head<'_>) -> bool {
+    let mut lines = Lines::new(&head.text);
+    let has_frame = lines.any(|line| matches!(frame_line(line.trimmed()), Some(Ok(_))));
+    let is_row = |row: Piece<'_>| {
+        let notation = Notation::of(row.text);
+        notation.fields(row).next().is_some_and(|cell| notation.number(cell, "").is_ok())
+    };
+    has_frame && lines.find(|line| !line.text.trim().is_empty()).is_some_and(is_row)
+}
+
+/// What a frame's line says.
+struct FrameLine<'t> {
+    number: u64,
+    /// Its time [ns], and where that stands.
+    time: Option<(i64, Piece<'t>)>,
+}
+
+/// `Frame 12 (95.24 ms)`, if the line is such a one.
+fn frame_line(line: Piece<'_>) -> Option<Result<FrameLine<'_>, Flaw>> {
+    let rest = line.after("frame")?;
+    let (number, time) = rest.text.split_once('(').map_or((rest.text, None), |(number, time)| (number, Some(time)));
+    let number = rest.part(number).trimmed();
+    let is_number = number.text.starts_with(|c: char| c.is_ascii_digit());
+    is_number.then(|| {
+        let number = number.count("the frame's number")?;
+        let time = time.map(|time| stamp(rest.part(time).trimmed())).transpose()?;
+        Ok(FrameLine { number, time })
+    })
+}
+
+/// `95.24 ms)`.
+fn stamp(text: Piece<'_>) -> Result<(i64, Piece<'_>), Flaw> {
+    let Some((inside, "")) = text.text.split_once(')') else {
+        return flaw(&text, "a frame's time ends with `)`, and so does its line");
+    };
+    let inside = text.part(inside).trimmed();
+    let end = inside.text.find(char::is_alphabetic).unwrap_or(inside.text.len());
+    let number = inside.part(&inside.text[..end]).trimmed().decimal("the frame's time")?;
+    let nanoseconds = match &*inside.text[end..].to_ascii_lowercase() {
+        "ms" => number * 1e6,
+        "s" | "sec" => number * 1e9,
+        _ => return flaw(&inside, "a frame's time is in `ms` or `s`"),
+    };
+    if (0.0..1e18).contains(&nanoseconds) {
+        Ok((nanoseconds.round() as i64, inside))
+    } else {
+        flaw(&inside, "the frame's time is not from 0 to 1e9 s")
+    }
+}
+
+fn parse(text: &str, hints: &Hints) -> Result<Recording, Wrong> {
+    let mut reader = Reader { reel: Reel::default(), size: None, has_times: true };
+    let mut lines = Lines::new(text);
+    let mut next = lines.by_ref().map(Piece::trimmed).find(|line| frame_line(*line).is_some());
+    while let Some(line) = next {
+        next = reader.frame(line, &mut lines)?;
+    }
+    let Reader { mut reel, size, has_times } = reader;
+    let Some((rows, cols)) = size.filter(|_| !reel.frames.is_empty()) else {
+        return Err(flaw::<()>(&lines.end(), "the file has no frame").unwrap_err().into());
+    };
+    let unit = hints.unit.unwrap_or(Unit::NEWTON);
+    let pitch = hints.pitch(if cols <= WIDEST && hints.pitch.is_none() { Some(PITCH) } else { None })?;
+    hints.size(Some([rows, cols]))?;
+    let period = hints.period(reel.mean_step())?;
+    if has_times {
+        reel.start_at_zero();
+    } else {
+        reel.tick(period);
+    }
+    let shape = ImageShape { rows, cols, pitch, unit };
+    let Reel { frames, cells, dead } = reel;
+    Ok(Recording { format: FORMAT.name, shape, frames, cells, dead, threshold: None, period, force: None })
+}
+
+struct Reader {
+    reel: Reel,
+    /// Rows and columns of the first frame.
+    size: Option<(usize, usize)>,
+    /// Whether the frames say their times.
+    has_times: bool,
+}
+
+impl Reader {
+    /// Reads a frame whose line is `line`; gives the line of the next, if there is one.
+    fn frame<'t>(&mut self, line: Piece<'t>, lines: &mut Lines<'t>) -> Result<Option<Piece<'t>>, Flaw> {
+        let FrameLine { number, time } = frame_line(line).expect("it was asked before")?;
+        let last = self.reel.frames.last();
+        if let Some(last) = last
+            && last.number.checked_add(1) != Some(number)
+        {
+            return flaw(&line, format!("frame {number} comes after frame {}", last.number));
+        }
+        if last.is_some() && self.has_times != time.is_some() {
+            return flaw(&line, "some frames have a time, and some have none");
+        }
+        self.has_times = time.is_some();
+        if let (Some(last), Some((time, at))) = (last, time)
+            && last.time > time
+        {
+            return flaw(&at, "the time goes back");
+        }
+        let next = self.rows(number, lines)?;
+        let (rows, cols) = self.size.expect("the rows were counted");
+        self.reel.frame(number, time.map_or(0, |(time, _)| time), rows, cols);
+        Ok(next)
+    }
+
+    /// Reads the rows of a frame, up to the next frame's line or the end.
+    fn rows<'t>(&mut self, frame: u64, lines: &mut Lines<'t>) -> Result<Option<Piece<'t>>, Flaw> {
+        let mut rows = 0;
+        let mut next = None;
+        while let Some(line) = lines.next() {
+            let line = line.trimmed();
+            if line.text.is_empty() {
+                continue;
+            }
+            if frame_line(line).is_some() {
+                next = Some(line);
+                break;
+            }
+            self.row(frame, rows, line)?;
+            rows += 1;
+        }
+        let end = next.unwrap_or_else(|| lines.end());
+        match self.size {
+            Some((wanted, _)) if !self.reel.frames.is_empty() && rows != wanted => {
+                flaw(&end, format!("frame {frame} ends after {rows} rows, but those before it have {wanted}"))
+            }
+            Some((_, cols)) => {
+                self.size = Some((rows, cols));
+                Ok(next)
+            }
+            None => flaw(&end, format!("frame {frame} has no rows")),
+        }
+    }
+
+    fn row(&mut self, frame: u64, row: usize, line: Piece<'_>) -> Result<(), Flaw> {
+        let notation = Notation::of(line.text);
+        let found = notation.fields(line).count();
+        let (_, cols) = *self.size.get_or_insert((0, found));
+        if found != cols {
+            return flaw(
+                &line,
+                format!("row {} of frame {frame} has {found} cells, but the first has {cols}", row + 1),
+            );
+        }
+        bounded(row + 1, cols).or_else(|message| flaw(&line, message))?;
+        for (col, cell) in notation.fields(line).enumerate() {
+            let value = notation.number(cell, "this cell")?;
+            self.reel.cell(row * cols + col, value).or_else(|message| flaw(&cell, message))?;
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::testing::{check_damages, complaints, count_refused};
+    use super::super::{Refusal, read};
+    use super::*;
+
+    const GOOD: &str = "Frame 0 (0.00 ms)\r\n0.0\t0.4\t0.0\r\n0.0\t1.1\t2.5\r\n\r\n\
+        Frame 1 (7.94 ms)\r\n0.0\t0.7\t0.0\r\n0.4\t1.4\t11.5\r\n\r\n";
+
+    #[test]
+    fn a_plate_is_read_with_its_times_and_the_pitch_of_its_sensors() {
+        let recording = read(GOOD.as_bytes(), "sel_1 - 3-4-2010 - Entire Plate Roll Off", &Hints::default()).unwrap();
+        assert_eq!(recording.shape, ImageShape { rows: 2, cols: 3, pitch: PITCH, unit: Unit::NEWTON });
+        assert_eq!(recording.cells, [0.0, 0.4, 0.0, 0.0, 1.1, 2.5, 0.0, 0.7, 0.0, 0.4, 1.4, 11.5]);
+        let times: Vec<i64> = recording.frames.iter().map(|frame| frame.time).collect();
+        assert_eq!(times, [0, 7_940_000]);
+        assert!((recording.period - 0.00794).abs() < 1e-15);
+    }
+
+    #[test]
+    fn the_same_written_otherwise_reads_the_same() {
+        let hints = Hints { rate_hz: Some(1000.0 / 7.94), ..Hints::default() };
+        let good = read(GOOD.as_bytes(), "", &hints).unwrap();
+        let body = |text: &str| text.replace("\r\n", "\n");
+        let cases = [
+            body(GOOD),
+            body(GOOD).replace("\n\n", "\n\n\n"),
+            body(GOOD).replace("\n\n", "\n").replace("ms", "MS"),
+            GOOD.trim_end().to_owned(),
+            body(GOOD).replace("\t0.0\n", "\t0.0\t\n"),
+            body(GOOD).replace('.', ",").replace('\t', "\t "),
+            body(GOOD).replace('.', ",").replace('\t', ";"),
+            body(GOOD).replace('\t', ","),
+            body(GOOD).replace('\t', "  "),
+            body(GOOD).replace("(7.94 ms)", "( 0.00794 s )").replace("Frame", "FRAME"),
+            body(GOOD).replace(" (0.00 ms)", "").replace(" (7.94 ms)", ""),
+            body(GOOD).replace("(0.00 ms)", "(8.00 ms)").replace("(7.94", "(15.94"),
+            body(GOOD).replace("Frame 1", "Frame 2").replace("Frame 0", "Frame 1"),
+            format!("footscan 7 gait\r\nSelma\t3-4-2010\r\n\r\n{GOOD}"),
+            format!("\u{feff}{GOOD}"),
+        ];
+        for text in cases {
+            let mut got = read(text.as_bytes(), "", &hints).unwrap_or_else(|refusal| panic!("{text}: {refusal:?}"));
+            got.frames.iter_mut().zip(&good.frames).for_each(|(frame, good)| frame.number = good.number);
+            got.period = good.period;
+            assert_eq!(got, good, "{text}");
+        }
+    }
+
+    #[test]
+    fn what_is_wrong_is_said_where_it_is() {
+        let good = GOOD.replace("\r\n", "\n");
+        let cases = [
+            ("Frame 1", "Frame 3", 5, "frame 3 comes after frame 0"),
+            ("\n\nFrame 1 (7.94 ms)", "", 4, "the file has no frame but"),
+            ("7.94", "-7.94", 5, "the frame's time is not from 0 to 1e9 s"),
+            ("0.00 ms", "8.00 ms", 5, "the time goes back"),
+            ("7.94 ms)", "7.94 ms", 5, "a frame's time ends with `)`, and so does its line"),
+            ("7.94 ms", "7.94 h", 5, "a frame's time is in `ms` or `s`"),
+            (" (7.94 ms)", "", 5, "some frames have a time, and some have none"),
+            ("0.4\t1.4\t11.5", "0.4\t1.4", 7, "row 2 of frame 1 has 2 cells, but the first has 3"),
+            ("0.4\t1.4\t11.5\n", "", 6, "frame 1 ends after 1 rows, but those before it have 2"),
+            ("0.0\t1.1\t2.5\n", "", 6, "frame 1 ends after 2 rows, but those before it have 1"),
+            ("11.5", "eleven", 7, "this cell is not a number: `eleven`"),
+            ("11.5", "1e39", 7, "this cell is too large"),
+        ];
+        let cases: Vec<_> = cases.into_iter().filter(|case| !case.3.ends_with("but")).collect();
+        check_damages(&good, "", &Hints::default(), &cases);
+        assert_eq!(complaints(parse("Frame 0 (0 ms)\n", &Hints::default()).map_err(|_| Refusal::Stranger)).len(), 1);
+    }
+
+    #[test]
+    fn a_wide_array_needs_its_pitch_from_the_bench() {
+        let row = vec!["1.0"; 65].join("\t");
+        let text = format!("Frame 0 (0 ms)\n{row}\n\nFrame 1 (8 ms)\n{row}\n");
+        let refusal = read(text.as_bytes(), "", &Hints::default());
+        assert_eq!(complaints(refusal), [(0, "the file does not say the pitch of its tactels".into())]);
+        let hints = Hints { pitch: Some([0.001, 0.002]), ..Hints::default() };
+        assert_eq!(read(text.as_bytes(), "", &hints).unwrap().shape.pitch, [0.001, 0.002]);
+    }
+
+    #[test]
+    fn damage_is_refused_or_read_soundly() {
+        let refused = count_refused(&[GOOD.as_bytes()], "", &Hints::default(), 2000);
+        assert!((1000..2000).contains(&refused), "{refused}");
+    }
+}

@@ -1,0 +1,190 @@
+//! An array as numpy saves it: `\x93NUMPY`, a version, a header in Python's notation, the elements.
+
+use super::super::text::shortened;
+
+/// How an array begins.
+pub(crate) const MAGIC: &[u8] = b"\x93NUMPY";
+
+/// An array whose elements are still in the file.
+#[derive(Debug, Clone)]
+pub(super) struct Array<'a> {
+    /// Number of elements along each axis.
+    pub(super) shape: Vec<usize>,
+    kind: Kind,
+    /// Whether the first axis is the one that runs fastest.
+    is_fortran: bool,
+    is_big: bool,
+    /// Bytes of an element.
+    pub(super) width: usize,
+    bytes: &'a [u8],
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Kind {
+    Bool,
+    Signed,
+    Unsigned,
+    Float,
+    Bytes,
+    Text,
+}
+
+impl<'a> Array<'a> {
+    /// Reads a file of one array; the file must hold just as many bytes as its header says.
+    pub(super) fn read(file: &'a [u8]) -> Result<Self, String> {
+        let array = Self::begin(file)?;
+        let wanted = array.shape.iter().try_fold(array.width, |size, axis| size.checked_mul(*axis));
+        if wanted == Some(array.bytes.len()) {
+            return Ok(array);
+        }
+        let (shape, width, found) = (named(&array.shape), array.width, array.bytes.len());
+        Err(format!("its header says {shape} elements of {width} bytes, but {found} bytes come after it"))
+    }
+
+    /// Reads the header of a file that may be cut off after it.
+    pub(super) fn begin(file: &'a [u8]) -> Result<Self, String> {
+        let (header, bytes) = split(file).ok_or("the header of the array is cut off")?;
+        let header = str::from_utf8(header).map_err(|_| "the header of the array is no text")?;
+        let value = |key: &str| value(header, key).ok_or_else(|| format!("the header of the array has no `{key}`"));
+        let (is_big, kind, width) = element(value("descr")?)?;
+        let is_fortran = match value("fortran_order")?.split([',', '}']).next().unwrap_or("").trim() {
+            "True" => true,
+            "False" => false,
+            other => {
+                return Err(format!("`fortran_order` of the array is `True` or `False`, not `{}`", shortened(other)));
+            }
+        };
+        let shape = shape(value("shape")?)?;
+        Ok(Self { shape, kind, is_fortran, is_big, width, bytes })
+    }
+
+    /// Whether its elements are numbers.
+    pub(super) const fn is_number(&self) -> bool {
+        !matches!(self.kind, Kind::Bytes | Kind::Text)
+    }
+
+    /// Number of elements.
+    pub(super) fn len(&self) -> usize {
+        self.shape.iter().product()
+    }
+
+    /// Where an element is among all, by its index along each axis.
+    pub(super) fn place(&self, index: &[usize]) -> usize {
+        let step = |place: usize, (index, axis): (&usize, &usize)| place * axis + index;
+        let axes = index.iter().zip(&self.shape);
+        if self.is_fortran { axes.rev().fold(0, step) } else { axes.fold(0, step) }
+    }
+
+    /// The number at a place.
+    pub(super) fn number(&self, place: usize) -> f64 {
+        let bytes = &self.bytes[place * self.width..][..self.width];
+        let bits = bytes.iter().enumerate().fold(0, |bits, (i, byte)| {
+            let shift = 8 * if self.is_big { self.width - 1 - i } else { i };
+            bits | u64::from(*byte) << shift
+        });
+        let unused = 64 - 8 * self.width as u32;
+        match (self.kind, self.width) {
+            (Kind::Float, 2) => half(bits as u16),
+            (Kind::Float, 4) => f32::from_bits(bits as u32).into(),
+            (Kind::Float, _) => f64::from_bits(bits),
+            (Kind::Signed, _) => (((bits << unused) as i64) >> unused) as f64,
+            _ => bits as f64,
+        }
+    }
+
+    /// All numbers, if it has one axis or none.
+    pub(super) fn numbers(&self) -> Option<impl ExactSizeIterator<Item = f64> + Clone + '_> {
+        (self.is_number() && self.shape.len() <= 1).then(|| (0..self.len()).map(|place| self.number(place)))
+    }
+
+    /// The text, if it is a single one.
+    pub(super) fn text(&self) -> Option<String> {
+        let step = match self.kind {
+            Kind::Text => 4,
+            Kind::Bytes => 1,
+            _ => return None,
+        };
+        let letter = |bytes: &[u8]| match (bytes, self.is_big) {
+            ([byte], _) => char::from(*byte),
+            (bytes, is_big) => {
+                let bytes: [u8; 4] = bytes.try_into().expect("four at a time");
+                let code = if is_big { u32::from_be_bytes(bytes) } else { u32::from_le_bytes(bytes) };
+                char::from_u32(code).unwrap_or(char::REPLACEMENT_CHARACTER)
+            }
+        };
+        let is_short = self.len() == 1 && self.width <= 256;
+        is_short.then(|| self.bytes.chunks_exact(step).map(letter).filter(|letter| *letter != '\0').collect())
+    }
+}
+
+/// The header and what comes after it.
+fn split(file: &[u8]) -> Option<(&[u8], &[u8])> {
+    let rest = file.strip_prefix(MAGIC)?;
+    let (version, rest) = rest.split_first_chunk::<2>()?;
+    let (size, rest) = if version[0] == 1 {
+        let (size, rest) = rest.split_first_chunk()?;
+        (u16::from_le_bytes(*size).into(), rest)
+    } else {
+        let (size, rest) = rest.split_first_chunk()?;
+        (usize::try_from(u32::from_le_bytes(*size)).ok()?, rest)
+    };
+    rest.split_at_checked(size)
+}
+
+/// What stands behind `'key':`.
+fn value<'h>(header: &'h str, key: &str) -> Option<&'h str> {
+    let (_, rest) = header.split_once(&format!("'{key}'")).or_else(|| header.split_once(&format!("\"{key}\"")))?;
+    Some(rest.trim_start().strip_prefix(':')?.trim_start())
+}
+
+/// `'<f8'`: byte order, kind and size.
+fn element(text: &str) -> Result<(bool, Kind, usize), String> {
+    let strange = || format!("elements `{}` are not read: save plain numbers", shortened(text));
+    let quote = text.chars().next().filter(|quote| matches!(quote, '\'' | '"')).ok_or_else(strange)?;
+    let name = text[1..].split(quote).next().unwrap_or("");
+    let (order, name) = match name.split_at_checked(1) {
+        Some((order @ ("<" | ">" | "=" | "|"), rest)) => (order, rest),
+        _ => ("=", name),
+    };
+    let (kind, size) = name.split_at_checked(1).ok_or_else(strange)?;
+    let size: usize = size.parse().map_err(|_| strange())?;
+    let (kind, width) = match (kind, size) {
+        ("b", 1) => (Kind::Bool, 1),
+        ("i", 1 | 2 | 4 | 8) => (Kind::Signed, size),
+        ("u", 1 | 2 | 4 | 8) => (Kind::Unsigned, size),
+        ("f", 2 | 4 | 8) => (Kind::Float, size),
+        ("S", 1..=256) => (Kind::Bytes, size),
+        ("U", 1..=64) => (Kind::Text, 4 * size),
+        _ => return Err(strange()),
+    };
+    Ok((order == ">" || order == "=" && cfg!(target_endian = "big"), kind, width))
+}
+
+/// `(309, 28, 28)`.
+fn shape(text: &str) -> Result<Vec<usize>, String> {
+    let strange = || "the shape of the array cannot be read".to_owned();
+    let (axes, _) = text.strip_prefix('(').and_then(|text| text.split_once(')')).ok_or_else(strange)?;
+    let axes: Vec<&str> = axes.split(',').map(str::trim).filter(|axis| !axis.is_empty()).take(33).collect();
+    if axes.len() > 32 {
+        return Err(strange());
+    }
+    axes.into_iter().map(|axis| axis.trim_end_matches('L').parse().map_err(|_| strange())).collect()
+}
+
+/// `[309, 28, 28]`.
+pub(super) fn named(shape: &[usize]) -> String {
+    let axes: Vec<String> = shape.iter().map(ToString::to_string).collect();
+    format!("[{}]", axes.join(", "))
+}
+
+/// A number of 16 bits (IEEE 754 binary16).
+pub(super) fn half(bits: u16) -> f64 {
+    const LEAST: f64 = 1.0 / 16_777_216.0;
+    let (sign, exponent, fraction) = (u64::from(bits >> 15) << 63, u64::from(bits >> 10 & 31), u64::from(bits & 1023));
+    let magnitude = match exponent {
+        0 => return if sign == 0 { fraction as f64 * LEAST } else { -(fraction as f64) * LEAST },
+        31 => 0x7ff,
+        _ => exponent + 1023 - 15,
+    };
+    f64::from_bits(sign | magnitude << 52 | fraction << 42)
+}

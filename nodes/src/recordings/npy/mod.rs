@@ -1,0 +1,244 @@
+//! `npy` and `npz`: arrays of numpy.
+//!
+//! An `.npy` is an array `[frames, rows, columns]` of integers or floats; one of `[frames, tactels]` needs the bench's
+//! `size`. Row i runs along the pad's y, column j along its x. A tactel that is NaN in the first frame does not exist,
+//! and then it is NaN in all. Unit, pitch and rate are the bench's to say.
+//!
+//! An `.npz` may say them itself. It holds the array as `images`, or as the only one with three axes, and may hold
+//! `time` [s] and `force` [N] (one number a frame), `rate_hz` [1/s], `pitch_mm` [mm] or `pitch` [m] (one number, or
+//! that along x and that along y) and `unit` (a text, as `np.array("N")`). Others are passed over.
+
+mod array;
+
+#[cfg(test)]
+mod tests;
+
+use tactflow_runtime::signal::ImageShape;
+
+use self::array::{Array, named};
+use super::reel::{Reel, bounded};
+use super::zip::{self, LARGEST, Member};
+use super::{Format, Frame, HEAD, Hints, Recording, Refusal, units};
+
+pub(super) const NPY: Format = Format {
+    name: "npy",
+    title: "a numpy array [frames, rows, columns] (`.npy`)",
+    recognises: |head| head.bytes.starts_with(array::MAGIC),
+    read: |bytes, hints| recording(NPY.name, bytes, &Beside::default(), hints),
+};
+
+pub(super) const NPZ: Format = Format {
+    name: "npz",
+    title: "numpy arrays `images`, `time`, `force`, … (`.npz`)",
+    recognises: |head| is_npz(head.bytes),
+    read: read_npz,
+};
+
+/// Whether a zip archive's first member is an array.
+pub(super) fn is_npz(head: &[u8]) -> bool {
+    zip::first_name(head).is_some_and(|name| name.ends_with(b".npy"))
+}
+
+/// What stands beside the images.
+#[derive(Default)]
+struct Beside {
+    time: Option<Vec<f64>>,
+    force: Option<Vec<f64>>,
+    rate_hz: Option<f64>,
+    pitch: Option<[f64; 2]>,
+    /// Unit as the file names it.
+    unit: Option<String>,
+}
+
+fn read_npz(bytes: &[u8], hints: &Hints) -> Result<Recording, Refusal> {
+    let mut beside = Beside::default();
+    let mut images: Option<Member<'_>> = None;
+    let mut cubes = Vec::new();
+    for member in zip::members(bytes).map_err(Refusal::broken)? {
+        let member = member.map_err(Refusal::broken)?;
+        let name = member.name();
+        match name.strip_suffix(".npy") {
+            Some("images") => images = Some(member),
+            Some(key @ ("time" | "force" | "rate_hz" | "pitch_mm" | "pitch" | "unit")) => {
+                let file = unpack(&member, bytes)?;
+                let known = Array::read(&file).and_then(|array| beside.take(key, &array));
+                known.map_err(|message| Refusal::broken(format!("`{key}`: {message}")))?;
+            }
+            Some(_) if cubes.len() < 2 && has_three_axes(&member, bytes)? => cubes.push(member),
+            _ => {}
+        }
+    }
+    let images = match (images.as_ref(), &*cubes) {
+        (Some(images), _) | (None, [images]) => *images,
+        (None, others) => {
+            let count = if others.is_empty() { "none" } else { "several" };
+            return Err(Refusal::Broken {
+                message: format!("no array is called `images`, and {count} of the others have three axes"),
+                help: Some("save the frames as `images`, with the axes [frames, rows, columns]".into()),
+            });
+        }
+    };
+    recording(NPZ.name, &unpack(&images, bytes)?, &beside, hints)
+}
+
+fn unpack(member: &Member<'_>, archive: &[u8]) -> Result<Vec<u8>, Refusal> {
+    let mut out = Vec::new();
+    let mut source = member.open(archive).map_err(Refusal::broken)?;
+    if !source.read(HEAD as u64, &mut out).map_err(Refusal::broken)? {
+        Array::begin(&out).map_err(|message| Refusal::broken(format!("`{}`: {message}", member.name())))?;
+        if !source.read(LARGEST, &mut out).map_err(Refusal::broken)? {
+            return Err(Refusal::broken(format!("`{}` is more than {} MiB", member.name(), LARGEST >> 20)));
+        }
+    }
+    source.verify(out.len() as u64).map_err(Refusal::broken)?;
+    Ok(out)
+}
+
+fn has_three_axes(member: &Member<'_>, archive: &[u8]) -> Result<bool, Refusal> {
+    let mut head = Vec::new();
+    member.open(archive).and_then(|mut source| source.read(4096, &mut head)).map_err(Refusal::broken)?;
+    Ok(Array::begin(&head).is_ok_and(|array| array.shape.len() == 3))
+}
+
+impl Beside {
+    fn take(&mut self, key: &str, array: &Array<'_>) -> Result<(), String> {
+        if key == "unit" {
+            self.unit = Some(array.text().ok_or("a unit is a single text")?);
+            return Ok(());
+        }
+        let numbers = array.numbers().ok_or("this has one axis at most, and numbers")?;
+        if let Some(wrong) = numbers.clone().find(|number| !number.is_finite()) {
+            return Err(format!("`{wrong}` is not finite"));
+        }
+        let one = || match (numbers.clone().next(), numbers.len()) {
+            (Some(number), 1) if number > 0.0 => Ok(number),
+            _ => Err("this is a single number greater than 0".to_owned()),
+        };
+        match key {
+            "time" => self.time = Some(numbers.collect()),
+            "force" => self.force = Some(numbers.collect()),
+            "rate_hz" => self.rate_hz = Some(one()?),
+            _ => {
+                let metres = if key == "pitch" { 1.0 } else { 1e-3 };
+                let pitch: Vec<f64> = numbers.take(3).map(|pitch| pitch * metres).collect();
+                self.pitch = Some(match *pitch {
+                    [both] if both > 0.0 => [both; 2],
+                    [x, y] if x > 0.0 && y > 0.0 => [x, y],
+                    _ => return Err("a pitch is one or two numbers greater than 0".into()),
+                });
+            }
+        }
+        Ok(())
+    }
+}
+
+fn recording(format: &'static str, file: &[u8], beside: &Beside, hints: &Hints) -> Result<Recording, Refusal> {
+    let array = Array::read(file).map_err(Refusal::broken)?;
+    let [count, rows, cols] = axes(&array, hints)?;
+    let (unit, factor) = match &beside.unit {
+        None => (hints.unit(None)?, 1.0),
+        Some(name) => {
+            let known =
+                units::unit(name).ok_or_else(|| Refusal::broken(format!("`unit`: `{name}` is not known here")))?;
+            (hints.unit(Some(known.0))?, known.1)
+        }
+    };
+    let shape = ImageShape { rows, cols, pitch: hints.pitch(beside.pitch)?, unit };
+    for (name, numbers) in [("time", &beside.time), ("force", &beside.force)] {
+        if let Some(numbers) = numbers
+            && numbers.len() != count
+        {
+            return Err(Refusal::broken(format!(
+                "`{name}` has {} numbers, but there are {count} frames",
+                numbers.len()
+            )));
+        }
+    }
+    let mut reel = Reel::default();
+    reel.frames.reserve_exact(count);
+    reel.cells.reserve_exact(array.len());
+    fill(&mut reel, &array, [count, rows, cols], factor).map_err(Refusal::broken)?;
+    let said = match &beside.time {
+        Some(time) => {
+            stamp(&mut reel.frames, time).map_err(Refusal::broken)?;
+            reel.mean_step()
+        }
+        None => beside.rate_hz.map(|rate| 1.0 / rate),
+    };
+    let period = hints.period(said)?;
+    if beside.time.is_none() {
+        reel.tick(period);
+    }
+    let (Reel { frames, cells, dead }, force) = (reel, beside.force.clone());
+    Ok(Recording { format, shape, frames, cells, dead, threshold: None, period, force })
+}
+
+/// Frames, rows and columns.
+fn axes(array: &Array<'_>, hints: &Hints) -> Result<[usize; 3], Refusal> {
+    if !array.is_number() {
+        return Err(Refusal::broken("the elements of the array are no numbers"));
+    }
+    let [count, rows, cols] = match *array.shape {
+        [count, rows, cols] => {
+            hints.size(Some([rows, cols]))?;
+            [count, rows, cols]
+        }
+        [count, tactels] => {
+            let [rows, cols] = hints.size(None)?;
+            if rows.checked_mul(cols) != Some(tactels) {
+                let message =
+                    format!("a row of the array has {tactels} numbers, which are not {rows} by {cols} tactels");
+                return Err(Refusal::Contradicted { hint: "size", message });
+            }
+            [count, rows, cols]
+        }
+        _ => {
+            let message = format!("an array {} is no [frames, rows, columns]", named(&array.shape));
+            return Err(Refusal::broken(message));
+        }
+    };
+    bounded(rows, cols).map_err(Refusal::broken)?;
+    if count == 0 {
+        return Err(Refusal::broken("the array has no frame"));
+    }
+    // What a frame takes here must not be many times what it takes in the file.
+    let bytes = rows * cols * array.width;
+    if size_of::<Frame>() + 4 * rows * cols > 9 * bytes {
+        let help = Some("save the array with wider numbers, as `float64`".into());
+        return Err(Refusal::Broken { message: format!("frames of {bytes} bytes are too small to be read"), help });
+    }
+    Ok([count, rows, cols])
+}
+
+fn fill(reel: &mut Reel, array: &Array<'_>, [count, rows, cols]: [usize; 3], factor: f64) -> Result<(), String> {
+    let is_flat = array.shape.len() == 2;
+    for frame in 0..count {
+        for tactel in 0..rows * cols {
+            let (row, col) = (tactel / cols, tactel % cols);
+            let place = if is_flat { array.place(&[frame, tactel]) } else { array.place(&[frame, row, col]) };
+            let value = array.number(place) * factor;
+            reel.cell(tactel, value)
+                .map_err(|message| format!("frame {frame}, row {row}, column {col}: {message}: `{value:?}`"))?;
+        }
+        reel.frame(frame as u64, 0, rows, cols);
+    }
+    Ok(())
+}
+
+/// Gives the frames their times, counted from the first [s].
+fn stamp(frames: &mut [Frame], time: &[f64]) -> Result<(), String> {
+    let start = time.first().copied().unwrap_or(0.0);
+    let mut last = 0;
+    for (i, (frame, time)) in frames.iter_mut().zip(time).enumerate() {
+        let since = time - start;
+        if !(0.0..1e9).contains(&since) {
+            return Err(format!("`time`: {time} s of frame {i} is not from 0 to 1e9 s after the first"));
+        }
+        frame.time = (since * 1e9).round() as i64;
+        if frame.time < last {
+            return Err(format!("`time`: it goes back at frame {i}"));
+        }
+        last = frame.time;
+    }
+    Ok(())
+}
