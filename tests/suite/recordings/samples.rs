@@ -32,6 +32,7 @@ pub(super) fn samples(frames: usize) -> Vec<Sample> {
     let plate = footscan(frames);
     vec![
         sample("tekscan", "movie.csv", tekscan(frames), &none),
+        sample("novel-lst", "emed.lst", novel_lst(frames), &none),
         sample("zebris", "RawDataGaitAnalysis.txt", zebris(frames), &none),
         sample("xsensor", "insoles.csv", xsensor(frames), &left),
         sample("footscan", "Entire Plate Roll Off", plate.clone(), &none),
@@ -58,6 +59,28 @@ fn tekscan(frames: usize) -> Vec<u8> {
     }
     text.push_str("@@\n");
     text.into_bytes()
+}
+
+fn novel_lst(frames: usize) -> Vec<u8> {
+    let mut text = String::new();
+    for i in 1..=frames {
+        let _ = write!(
+            text,
+            "\n\t\t\t\tPage {i}\n\n\tFile: C:\\novel\\2.dat \tMatrix: 64x95 \n\tSensor area: 0.25 cm²\tTime/picture:10.0 ms\n\
+             \tMV over frames\n\tSensor size: 0.500x0.500 cm\n\tnovel munich/st.paul/london\n\
+             \tPict-No.: {i}  Force[N]=sum*sensor_area in row/column\n\n\t26\t27\t28\tForce\n"
+        );
+        let cells = [[0.0, (i % 8) as f64 * 10.0, 5.0], [2.5, 0.0, 15.0]];
+        let newton = |cells: &[f64]| 0.025 * cells.iter().sum::<f64>();
+        for (row, cells) in cells.iter().enumerate() {
+            let [a, b, c] = cells;
+            let _ = write!(text, "{}\t{a:.2}\t{b:.2}\t{c:.2}\t{:.2}\n", 30 + row, newton(cells));
+        }
+        let column = |col: usize| newton(&[cells[0][col], cells[1][col]]);
+        let total = newton(&cells.concat());
+        let _ = write!(text, "Force\t{:.2}\t{:.2}\t{:.2}\t{total:.2}\n\u{c}", column(0), column(1), column(2));
+    }
+    text.chars().map(|c| c as u32 as u8).collect()
 }
 
 fn zebris(frames: usize) -> Vec<u8> {
