@@ -9,6 +9,7 @@ mod csv;
 mod fields;
 mod footscan;
 mod hints;
+mod novel_asc;
 mod novel_lst;
 mod npy;
 mod reel;
@@ -33,6 +34,7 @@ pub const FORMATS: &[Format] = &[
     npy::NPZ,
     tekscan::FORMAT,
     novel_lst::FORMAT,
+    novel_asc::FORMAT,
     zebris::FORMAT,
     xsensor::FORMAT,
     footscan::FORMAT,

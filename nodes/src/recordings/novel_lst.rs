@@ -12,7 +12,7 @@ mod header;
 
 use tactflow_runtime::signal::{Base, ImageShape, Unit};
 
-use super::text::{self, Flaw, Lines, Notation, Piece, Wrong, flaw, shortened};
+use super::text::{self, Flaw, Lines, Piece, Wrong, flaw, shortened};
 use super::{Format, Frame, Head, Hints, MOST_CELLS, Recording, Refusal, Window};
 use header::{Grid, Header, Page, digit, label};
 
