@@ -28,6 +28,9 @@ const ROUNDING: f64 = 5e-3;
 const SHORTEST: f64 = 1e-6;
 const LONGEST: f64 = 1e3;
 
+/// How a message about something missing begins.
+const SILENT: &str = "the file does not say ";
+
 fn agree(a: f64, b: f64) -> bool {
     (a - b).abs() <= ROUNDING * a.abs().max(b.abs())
 }
@@ -69,6 +72,34 @@ impl Hints {
         }
     }
 
+    /// Unit, pitch and period together, so that all that is missing is said at once.
+    ///
+    /// # Errors
+    /// When nobody says one of them, or they differ.
+    pub fn complete(
+        &self,
+        unit: Option<Unit>,
+        pitch: Option<[f64; 2]>,
+        period: Option<f64>,
+    ) -> Result<(Unit, [f64; 2], f64), Refusal> {
+        let found = (self.unit(unit), self.pitch(pitch), self.period(period));
+        let refusals = match found {
+            (Ok(unit), Ok(pitch), Ok(period)) => return Ok((unit, pitch, period)),
+            (unit, pitch, period) => [unit.err(), pitch.err(), period.err()],
+        };
+        let (mut missing, mut ways_out) = (Vec::new(), Vec::new());
+        for refusal in refusals.into_iter().flatten() {
+            match refusal {
+                Refusal::Silent { message, help } => {
+                    missing.push(message.trim_start_matches(SILENT).to_owned());
+                    ways_out.push(help);
+                }
+                other => return Err(other),
+            }
+        }
+        Err(Refusal::Silent { message: format!("{SILENT}{}", missing.join(", or ")), help: ways_out.join("; ") })
+    }
+
     /// The number of rows and of columns, from what the file says of it.
     ///
     /// # Errors
@@ -103,7 +134,7 @@ fn choose<T>(
                 "size" => "how many rows and columns it has",
                 _ => "the unit of its values",
             };
-            Err(Refusal::Silent { message: format!("the file does not say {what}"), help: help.into() })
+            Err(Refusal::Silent { message: format!("{SILENT}{what}"), help: help.into() })
         }
     }
 }

@@ -86,11 +86,10 @@ fn parse(text: &str, hints: &Hints) -> Result<Recording, Wrong> {
     };
     hints.size(Some([rows, cols]))?;
     let (unit, factor) = unit.unzip();
-    let unit = hints.unit(unit)?;
-    let pitch = hints.pitch(pitch[0].zip(pitch[1]).map(|(x, y)| [x, y]))?;
+    let pitch = pitch[0].zip(pitch[1]).map(|(x, y)| [x, y]);
     // Stamps of whole seconds say when the frames came only to the second.
     let has_times = reel.frames.is_sorted_by(|a, b| a.time < b.time);
-    let period = hints.period(reel.mean_step().filter(|_| has_times))?;
+    let (unit, pitch, period) = hints.complete(unit, pitch, reel.mean_step().filter(|_| has_times))?;
     if has_times {
         reel.start_at_zero();
     } else {

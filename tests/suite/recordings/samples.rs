@@ -32,6 +32,8 @@ pub(super) fn samples(frames: usize) -> Vec<Sample> {
     let plate = footscan(frames);
     vec![
         sample("tekscan", "movie.csv", tekscan(frames), &none),
+        sample("novel-lst", "emed.lst", novel_lst(frames), &none),
+        sample("novel-asc", "mat.asc", novel_asc(frames), &none),
         sample("zebris", "RawDataGaitAnalysis.txt", zebris(frames), &none),
         sample("xsensor", "insoles.csv", xsensor(frames), &left),
         sample("footscan", "Entire Plate Roll Off", plate.clone(), &none),
@@ -57,6 +59,59 @@ fn tekscan(frames: usize) -> Vec<u8> {
         let _ = write!(text, "B,0,0,5\n0,{a},{b},9\n0,8,15,10\n\n");
     }
     text.push_str("@@\n");
+    text.into_bytes()
+}
+
+fn novel_lst(frames: usize) -> Vec<u8> {
+    let mut text = String::new();
+    for i in 1..=frames {
+        let _ = write!(
+            text,
+            "\n\t\t\t\tPage {i}\n\n\tFile: C:\\novel\\2.dat \tMatrix: 64x95 \n\tSensor area: 0.25 cm²\tTime/picture:10.0 ms\n\
+             \tMV over frames\n\tSensor size: 0.500x0.500 cm\n\tnovel munich/st.paul/london\n\
+             \tPict-No.: {i}  Force[N]=sum*sensor_area in row/column\n\n\t26\t27\t28\tForce\n"
+        );
+        let cells = [[0.0, (i % 8) as f64 * 10.0, 5.0], [2.5, 0.0, 15.0]];
+        let newton = |cells: &[f64]| 0.025 * cells.iter().sum::<f64>();
+        for (row, cells) in cells.iter().enumerate() {
+            let [a, b, c] = cells;
+            let _ = write!(text, "{}\t{a:.2}\t{b:.2}\t{c:.2}\t{:.2}\n", 30 + row, newton(cells));
+        }
+        let column = |col: usize| newton(&[cells[0][col], cells[1][col]]);
+        let total = newton(&cells.concat());
+        let _ = write!(text, "Force\t{:.2}\t{:.2}\t{:.2}\t{total:.2}\n\u{c}", column(0), column(1), column(2));
+    }
+    text.chars().map(|c| c as u32 as u8).collect()
+}
+
+/// A mat of two by three sensors of 0.5 cm², of which one is missing and one is pressed.
+fn novel_asc(frames: usize) -> Vec<u8> {
+    let mut text = format!(
+        "file name: small.mat date/time 17.06.23 15.21\nmat type s2160_001\n\
+         total times [secs]: 44.458 time per frame [secs]: 0.04000 scanning rate [Hz]: 25\n\
+         pressure values in kPa\n\n\nelectrical:\ntime[secs] 1 2 3 4 5\n"
+    );
+    let moments = || (0..frames).map(|i| (i as f64 * 0.04, (i % 9) as f64 * 10.0));
+    for (time, pressure) in moments() {
+        let _ = writeln!(text, "{time:.5} 0.000 {pressure:.3} 0.000 0.000 0.000");
+    }
+    text.push_str("\n\n time[secs] force[N]   x[cm]   y[cm]\n\n");
+    for (time, pressure) in moments() {
+        let _ = writeln!(text, "{time:.5} {:.3} 0.250 0.500", 0.05 * pressure);
+    }
+    text.push_str("\n\nsensor 1 2 3 4 5\ncorner[cm]\n");
+    for (name, corners) in [
+        ("x[0]", "0.0000 0.0000 0.5000 0.5000 1.0000"),
+        ("y[0]", "2.0000 1.0000 2.0000 1.0000 2.0000"),
+        ("x[1]", "0.0000 0.0000 0.5000 0.5000 1.0000"),
+        ("y[1]", "1.0000 0.0000 1.0000 0.0000 1.0000"),
+        ("x[2]", "0.5000 0.5000 1.0000 1.0000 1.5000"),
+        ("y[2]", "1.0000 0.0000 1.0000 0.0000 1.0000"),
+        ("x[3]", "0.5000 0.5000 1.0000 1.0000 1.5000"),
+        ("y[3]", "2.0000 1.0000 2.0000 1.0000 2.0000"),
+    ] {
+        let _ = writeln!(text, "{name} {corners}");
+    }
     text.into_bytes()
 }
 

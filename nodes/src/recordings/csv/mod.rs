@@ -101,9 +101,9 @@ fn parse(text: &str, hints: &Hints) -> Result<Recording, Wrong> {
         return Err(flaw::<()>(&Lines::new(text).end(), "there are names, but no frame").unwrap_err().into());
     }
     reel.frames.iter_mut().zip(&time).for_each(|(frame, time)| frame.time = *time);
-    // These three are the bench's to say; what is missing is said of the first only.
-    let shape = ImageShape { rows, cols, unit: hints.unit(None)?, pitch: hints.pitch(None)? };
-    let period = hints.period(reel.mean_step().filter(|_| !time.is_empty()))?;
+    let said = reel.mean_step().filter(|_| !time.is_empty());
+    let (unit, pitch, period) = hints.complete(None, None, said)?;
+    let shape = ImageShape { rows, cols, unit, pitch };
     if time.is_empty() {
         reel.tick(period);
     }
