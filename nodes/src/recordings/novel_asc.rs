@@ -182,14 +182,17 @@ impl<'t> Reader<'t> {
                 return flaw(&line, "these are not the sensors that have pressures");
             }
             self.corners.is_begun = true;
-        } else if first.starts_with("x[") || first.starts_with("y[") {
-            let places = numbers(line, |field| field.decimal("this place"))?;
+        } else if first.starts_with("x[") || first.starts_with("y[") || first == "area" {
+            let places = numbers(line, |field| field.decimal("this figure"))?;
             if places.len() != self.labels.len() {
                 let cut = if self.lines.is_at_end() { ": the file ends in the middle of it" } else { "" };
-                let message = format!("there are {} places of {} sensors{cut}", places.len(), self.labels.len());
+                let message = format!("there are {} numbers of {} sensors{cut}", places.len(), self.labels.len());
                 return flaw(&line, message);
             }
-            self.corners.add(usize::from(first.starts_with('y')), &places);
+            // `x[0]` to `x[3]` are corners, `x[c]` is the centre.
+            if first.split_once('[').is_some_and(|(_, which)| which.starts_with(|c: char| c.is_ascii_digit())) {
+                self.corners.add(usize::from(first.starts_with('y')), &places);
+            }
         }
         Ok(self.next_line())
     }

@@ -40,6 +40,8 @@ x[2]   0.5000   0.5000   1.0000   1.0000   1.5000
 y[2]   1.0000   0.0000   1.0000   0.0000   1.0000
 x[3]   0.5000   0.5000   1.0000   1.0000   1.5000
 y[3]   2.0000   1.0000   2.0000   1.0000   2.0000
+x[c]   0.2500   0.2500   0.7500   0.7500   1.2500
+y[c]   1.5000   0.5000   1.5000   0.5000   1.5000
 area   0.5000   0.5000   0.5000   0.5000   0.5000
 ";
 
@@ -76,6 +78,7 @@ fn a_small_mat_in_any_dress() {
             .replace("2.0000", "20"),
         head.to_owned() + &rest.lines().map(tabs).collect::<String>(),
         SMALL[..SMALL.find("area").unwrap()].into(),
+        SMALL[..SMALL.find("x[c]").unwrap()].into(),
         SMALL.replace("0.750", "0.751"),
         milliseconds,
         SMALL.replace("electrical:", "mask definition:\nheel: 1,2").replace("0.750", "0.250"),
@@ -125,6 +128,9 @@ fn large(pressures: &[(usize, f64)]) -> String {
         line(&mut text, &format!("x[{corner}]"), &|k| format!("{:.4}", 0.528 * (sensors[k].0 + right) as f64));
         line(&mut text, &format!("y[{corner}]"), &|k| format!("{:.4}", 1.028 * (28 - sensors[k].1 + top) as f64));
     }
+    line(&mut text, "x[c]", &|k| format!("{:.4}", 0.528 * (sensors[k].0 as f64 + 0.5)));
+    line(&mut text, "y[c]", &|k| format!("{:.4}", 1.028 * (28.5 - sensors[k].1 as f64)));
+    line(&mut text, "area", &|_| "0.5428".into());
     text
 }
 
@@ -189,21 +195,21 @@ fn damaged_files_say_what_and_where() {
         ("5.84000    0.750   0.817   1.100", "5.84000", 20, "there is no force at this time"),
         ("sensor        1", "sensor        9", 24, "these are not the sensors that have pressures"),
         ("corner[cm]", "corner[ft]", 25, "the corners are in `cm` or `mm`"),
-        ("x[1]   0.0000   0.0000", "x[1]   0.0000", 28, "there are 4 places of 5 sensors"),
-        ("x[1]   0.0000", "x[1]   0.0x00", 28, "this place is not a number: `0.0x00`"),
-        ("x[1]   0.0000", "x[1]   -1.000", 34, "the sensors lie in no rows and columns of one size"),
+        ("x[1]   0.0000   0.0000", "x[1]   0.0000", 28, "there are 4 numbers of 5 sensors"),
+        ("x[1]   0.0000", "x[1]   0.0x00", 28, "this figure is not a number: `0.0x00`"),
+        ("x[1]   0.0000", "x[1]   -1.000", 36, "the sensors lie in no rows and columns of one size"),
         (
             "x[1]   0.0000",
             "z[1]   0.0000",
-            34,
+            36,
             "a sensor has 4 corners, but there are 3 lines of x and 4 of y: it is truncated",
         ),
     ];
     check_damages(SMALL, "mat.asc", &Hints::default(), cases);
     let moved = SMALL.replace("1.0000\ny[0]", "0.5000\ny[0]").replace("1.0000\ny[1]", "0.5000\ny[1]");
     let moved = moved.replace("1.5000\n", "1.0000\n");
-    assert_eq!(complaints(parse(&moved)), [(34, "two sensors lie at one place".into())]);
-    let end = SMALL.find("\narea").unwrap();
+    assert_eq!(complaints(parse(&moved)), [(36, "two sensors lie at one place".into())]);
+    let end = SMALL.find("\nx[c]").unwrap();
     for cut in 0..end {
         // Of the last number, 2.0000, nothing is missing from its first digit on.
         let is_number = cut + 6 > end;
