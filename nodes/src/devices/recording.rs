@@ -179,6 +179,19 @@ mod tests {
     }
 
     #[test]
+    fn a_packed_recording_plays_as_it_is() {
+        let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../graphs/recordings/pawlabeling/dog1_sel_1.zip");
+        let mut bench = Bench::new(open::<Player>(&format!("file = '{path}'")).unwrap());
+        let Shape::Image(shape) = &bench.fill().outputs[0] else { panic!("an image") };
+        assert_eq!((shape.rows, shape.cols), (256, 63));
+        assert_eq!(bench.fact("format"), Some(&"footscan".into()));
+        bench.exchange(0);
+        let image: &mut Image = bench.samples.write(0, 0, 0);
+        let load: f32 = image.cells().iter().sum();
+        assert!((load - 11.9).abs() < 1e-3, "{load} N");
+    }
+
+    #[test]
     fn a_missing_file_and_another_file_are_mistakes_where_the_bench_names_them() {
         for (path, message) in
             [("nowhere.csv", "cannot read"), (concat!(env!("CARGO_MANIFEST_DIR"), "/Cargo.toml"), "`")]

@@ -82,7 +82,7 @@ fn parse(text: &str, hints: &Hints) -> Result<Recording, Wrong> {
     reader.read()?;
     let Reader { mut reel, lines, unit, threshold, size, pitch, .. } = reader;
     let Some([rows, cols]) = size.filter(|_| !reel.frames.is_empty()) else {
-        return Err(flaw::<()>(&lines.end(), "the file has no frame").unwrap_err().into());
+        return flaw(&lines.end(), "the file has no frame").map_err(Wrong::from);
     };
     hints.size(Some([rows, cols]))?;
     let (unit, factor) = unit.unzip();
