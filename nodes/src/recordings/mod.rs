@@ -260,6 +260,6 @@ fn read_plain(bytes: &[u8], name: &str, hints: &Hints) -> Result<Recording, Refu
 /// Every format by name, for messages.
 #[must_use]
 pub fn list() -> String {
-    let lines: Vec<String> = FORMATS.iter().map(|format| format!("`{}`: {}", format.name, format.title)).collect();
-    format!("{}; any of them in a `.zip` or `.gz`", lines.join("; "))
+    let lines = FORMATS.iter().map(|format| format!("\n  `{}`: {}", format.name, format.title));
+    format!("these are read, also in a `.zip` or `.gz`:{}", lines.collect::<String>())
 }

@@ -38,6 +38,8 @@ struct Reader<'t> {
     has_masks: bool,
     /// Numbers of the sensors.
     labels: Vec<u64>,
+    /// What one of the file's times is in seconds.
+    second: f64,
     /// Times of the moments [s].
     times: Vec<f64>,
     /// Pressures, moment after moment.
@@ -55,6 +57,7 @@ fn parse(text: &str, hints: &Hints) -> Result<Recording, Wrong> {
         unit: None,
         has_masks: false,
         labels: Vec::new(),
+        second: 1.0,
         times: Vec::new(),
         cells: Vec::new(),
         corners: Corners::default(),
@@ -104,6 +107,7 @@ impl<'t> Reader<'t> {
     /// Reads the line of the sensors.
     fn sensors(&mut self, line: Piece<'t>) -> Result<(), Wrong> {
         self.notation = Notation::of(line.text);
+        self.second = if line.after("time[ms]").is_some() { 1e-3 } else { 1.0 };
         for field in self.notation.fields(line).skip(1) {
             if field.text.contains('[') {
                 let message = "the file holds forces over time and not the pressures of the sensors";
@@ -139,7 +143,7 @@ impl<'t> Reader<'t> {
             if !time.text.starts_with(|c: char| c.is_ascii_digit() || c == '-' || c == '.') {
                 return Ok(Some(line));
             }
-            let seconds = self.notation.number(time, "this time")?;
+            let seconds = self.notation.number(time, "this time")? * self.second;
             if self.times.last().is_some_and(|last| *last >= seconds) {
                 return flaw(&time, "the time does not go on");
             }
@@ -204,7 +208,7 @@ impl<'t> Reader<'t> {
                 return Ok(Some(line));
             }
             let mut words = line.words();
-            let time = words.next().unwrap_or(line).decimal("this time")?;
+            let time = words.next().unwrap_or(line).decimal("this time")? * self.second;
             match words.next() {
                 Some(force) => self.forces.push((time, force.decimal("this force")?, force)),
                 None => return flaw(&line, "there is no force at this time"),

@@ -149,7 +149,7 @@ impl<'t> Reader<'t> {
             let is_feed = next.is_some_and(|line| line.text.contains('\u{c}'));
             self.has_feeds |= is_feed;
             let line = next.map_or_else(|| self.lines.end(), Piece::trimmed);
-            if line.after("Force").is_some() && grid.has_force {
+            if line.after("Force").is_some() && first.is_some() {
                 self.forces(grid, line, start)?;
                 break;
             }
@@ -221,7 +221,7 @@ impl<'t> Reader<'t> {
         let cols = grid.columns.len();
         let fields = grid.notation.fields(line).skip(1);
         let found = fields.clone().count();
-        if found != cols + 1 {
+        if found != cols + 1 && (grid.has_force || found != cols) {
             return flaw(&line, format!("the row `Force` has {found} numbers, but the head of its page {}", cols + 1));
         }
         let count = (self.cells.len() - start) / cols;

@@ -61,6 +61,8 @@ fn a_small_mat_in_any_dress() {
     let times: Vec<i64> = recording.frames.iter().map(|frame| frame.time / 1000).collect();
     assert_eq!((times.as_slice(), recording.period), ([0, 40_000, 80_000].as_slice(), 0.04));
     let tabs = |line: &str| line.split_whitespace().collect::<Vec<_>>().join("\t") + "\t\n";
+    let times = [("5.76000", "5760"), ("5.80000", "5800"), ("5.84000", "5840"), ("5.88000", "5880.0")];
+    let milliseconds = times.iter().fold(SMALL.replace("time[secs]", "time[ms]"), |text, (s, ms)| text.replace(s, ms));
     let (head, rest) = SMALL.split_at(SMALL.find("time[secs]  ").unwrap());
     let same = [
         SMALL.replace('\n', "\r\n"),
@@ -75,6 +77,7 @@ fn a_small_mat_in_any_dress() {
         head.to_owned() + &rest.lines().map(tabs).collect::<String>(),
         SMALL[..SMALL.find("area").unwrap()].into(),
         SMALL.replace("0.750", "0.751"),
+        milliseconds,
         SMALL.replace("electrical:", "mask definition:\nheel: 1,2").replace("0.750", "0.250"),
     ];
     for text in same {

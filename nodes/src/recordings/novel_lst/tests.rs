@@ -116,6 +116,10 @@ fn a_small_listing_in_any_dress() {
     }
     let blanks = parse(&SMALL.replace('\t', " ")).unwrap();
     assert_eq!((blanks.frames, blanks.cells), (recording.frames.clone(), recording.cells.clone()));
+    let below = [("\t2\t3\tForce", "\t2\t3"), ("\t0.25\n", "\n"), ("\t0.63\n", "\n"), ("\t0.06\n", "\n")];
+    let below = below.iter().fold(SMALL.to_owned(), |text, (from, to)| text.replacen(from, to, 1));
+    assert_eq!(parse(&below).as_ref(), Ok(&recording), "with the forces of columns alone");
+    assert_eq!(parse(&below.replace("\t0.94\n", "\n")).as_ref(), Ok(&recording), "and without the total");
     let columns: [(&str, &str); 10] = [
         ("\t2\t3\tForce", "\t2\t3"),
         ("\t0.25\n", "\n"),
