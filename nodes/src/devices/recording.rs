@@ -5,6 +5,7 @@
 //! twice. What the readers take is in [`crate::recordings`].
 
 use std::borrow::Cow;
+use std::sync::Arc;
 
 use tactflow_runtime::device::{Commands, Description, Device, DeviceError, Driver, Filled, Opened, Samples, Stepped};
 use tactflow_runtime::diagnostic::Code;
@@ -121,7 +122,8 @@ fn mistakes(refusal: Refusal, file: &FilePath, bytes: &[u8]) -> Mistakes {
             here(message).help(recordings::list()).into()
         }
         Refusal::Damaged { text, flaws } => {
-            flaws.into_iter().map(|flaw| Mistake::data(file, &text, flaw.span, flaw.message)).collect()
+            let text: Arc<str> = text.into();
+            flaws.into_iter().map(|flaw| Mistake::data(file, text.clone(), flaw.span, flaw.message)).collect()
         }
         Refusal::Broken { message, help } => {
             let mistake = here(format!("`{name}`: {message}"));
