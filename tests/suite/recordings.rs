@@ -81,7 +81,7 @@ fn large_files_take_no_more_than_ten_times_as_much_memory() {
         assert_eq!(check(&bytes, unpacked, name, &hints), None, "{name}");
     }
     for name in [
-        "pressuRe/emed_test.lst",
+        "pressuRe/emed_test.zip",
         "pressuRe/iscan_test.csv",
         "pawlabeling/dog1_sel_1.zip",
         "pawlabeling/zebris_gait.zip",

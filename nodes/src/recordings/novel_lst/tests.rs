@@ -3,7 +3,7 @@
 use super::*;
 use crate::recordings::testing::{check_damages, complaints, count_refused};
 
-const EMED: &[u8] = include_bytes!("../../../../graphs/recordings/pressuRe/emed_test.lst");
+const EMED: &[u8] = include_bytes!("../../../../graphs/recordings/pressuRe/emed_test.zip");
 
 /// Two pictures and a summary of an array of 4 columns and 5 rows.
 const SMALL: &str = "
@@ -48,14 +48,20 @@ fn parse(text: &str) -> Result<Recording, Refusal> {
     read(text.as_bytes(), &Hints::default())
 }
 
+/// The shipped recording as the text that it is.
+fn emed() -> String {
+    let (bytes, _) = crate::recordings::archive::unpack(EMED, "emed_test.zip", &Hints::default()).unwrap().unwrap();
+    text::decode(&bytes).into_owned()
+}
+
 fn flaws(text: &str) -> Vec<(usize, String)> {
     complaints(crate::recordings::read(text.as_bytes(), "emed.lst", &Hints::default()))
 }
 
 #[test]
 fn the_whole_recording_agrees_with_its_own_forces() {
-    let recording = crate::recordings::read(EMED, "emed_test.lst", &Hints::default()).unwrap();
-    let text = text::decode(EMED);
+    let recording = crate::recordings::read(EMED, "emed_test.zip", &Hints::default()).unwrap();
+    let text = emed();
     let pages: Vec<&str> = text.split('\u{c}').filter(|page| page.contains("Page")).collect();
     assert_eq!((recording.frames.len(), pages.len()), (106, 106));
     assert_eq!((recording.shape.rows, recording.shape.cols, recording.shape.pitch), (95, 64, [0.005; 2]));
@@ -201,7 +207,7 @@ fn damaged_files_say_what_and_where() {
 
 #[test]
 fn no_damage_makes_it_panic() {
-    let text = text::decode(EMED);
+    let text = emed();
     let three = text.find("\t\t\t\tPage 4").unwrap();
     let part: Vec<u8> = text[..three].trim_end().chars().map(|c| c as u8).collect();
     let refused = count_refused(&[SMALL.as_bytes(), &part], "emed.lst", &Hints::default(), 4000);
