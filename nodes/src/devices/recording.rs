@@ -5,6 +5,7 @@
 //! twice. What the readers take is in [`crate::recordings`].
 
 use std::borrow::Cow;
+use std::sync::Arc;
 
 use tactflow_runtime::device::{Commands, Description, Device, DeviceError, Driver, Filled, Opened, Samples, Stepped};
 use tactflow_runtime::diagnostic::Code;
@@ -121,7 +122,8 @@ fn mistakes(refusal: Refusal, file: &FilePath, bytes: &[u8]) -> Mistakes {
             here(message).help(recordings::list()).into()
         }
         Refusal::Damaged { text, flaws } => {
-            flaws.into_iter().map(|flaw| Mistake::data(file, &text, flaw.span, flaw.message)).collect()
+            let text: Arc<str> = text.into();
+            flaws.into_iter().map(|flaw| Mistake::data(file, text.clone(), flaw.span, flaw.message)).collect()
         }
         Refusal::Broken { message, help } => {
             let mistake = here(format!("`{name}`: {message}"));
@@ -213,6 +215,19 @@ mod tests {
         assert_eq!((force(&mut bench), bench.device.next()), (29.0, None));
         bench.exchange(i64::MAX);
         assert!(force(&mut bench).is_nan(), "the movie is over");
+    }
+
+    #[test]
+    fn a_packed_recording_plays_as_it_is() {
+        let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../graphs/recordings/pawlabeling/dog1_sel_1.zip");
+        let mut bench = Bench::new(open::<Player>(&format!("file = '{path}'")).unwrap());
+        let Shape::Image(shape) = &bench.fill().outputs[0] else { panic!("an image") };
+        assert_eq!((shape.rows, shape.cols), (256, 63));
+        assert_eq!(bench.fact("format"), Some(&"footscan".into()));
+        bench.exchange(0);
+        let image: &mut Image = bench.samples.write(0, 0, 0);
+        let load: f32 = image.cells().iter().sum();
+        assert!((load - 11.9).abs() < 1e-3, "{load} N");
     }
 
     #[test]

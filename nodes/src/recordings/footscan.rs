@@ -85,7 +85,7 @@ fn parse(text: &str, hints: &Hints) -> Result<Recording, Wrong> {
     }
     let Reader { mut reel, size, has_times } = reader;
     let Some((rows, cols)) = size.filter(|_| !reel.frames.is_empty()) else {
-        return Err(flaw::<()>(&lines.end(), "the file has no frame").unwrap_err().into());
+        return flaw(&lines.end(), "the file has no frame").map_err(Wrong::from);
     };
     hints.size(Some([rows, cols]))?;
     let unit = hints.unit.unwrap_or(Unit::NEWTON);
@@ -153,7 +153,7 @@ impl Reader {
     fn rows<'t>(&mut self, frame: u64, lines: &mut Lines<'t>) -> Result<Option<Piece<'t>>, Flaw> {
         let mut rows = 0;
         let mut next = None;
-        while let Some(line) = lines.next() {
+        for line in lines.by_ref() {
             let line = line.trimmed();
             if line.text.is_empty() {
                 continue;

@@ -129,7 +129,7 @@ fn parse(text: &str, hints: &Hints) -> Result<Recording, Wrong> {
         let found = reel.frames.len();
         let message = format!("`Frame count` promises {count} frames, but the file has {found}");
         let at = if (found as u64) < count { lines.end() } else { at };
-        return Err(flaw::<()>(&at, message).unwrap_err().into());
+        return flaw(&at, message).map_err(Wrong::from);
     }
     reel.start_at_zero();
     hints.size(Some([rows, cols]))?;

@@ -55,7 +55,7 @@ fn tekscan(frames: usize) -> Vec<u8> {
     for i in 0..frames {
         let (a, b) = (i % 10, i % 7);
         let sum = 5 + a + b + 9 + 8 + 15 + 10;
-        let _ = write!(text, "Frame {}, {:.1},, 12/2/2019 6:21:52PM,,,Raw Sum=,,{sum}\n", i + 1, i as f64 / 10.0);
+        let _ = writeln!(text, "Frame {}, {:.1},, 12/2/2019 6:21:52PM,,,Raw Sum=,,{sum}", i + 1, i as f64 / 10.0);
         let _ = write!(text, "B,0,0,5\n0,{a},{b},9\n0,8,15,10\n\n");
     }
     text.push_str("@@\n");
@@ -75,7 +75,7 @@ fn novel_lst(frames: usize) -> Vec<u8> {
         let newton = |cells: &[f64]| 0.025 * cells.iter().sum::<f64>();
         for (row, cells) in cells.iter().enumerate() {
             let [a, b, c] = cells;
-            let _ = write!(text, "{}\t{a:.2}\t{b:.2}\t{c:.2}\t{:.2}\n", 30 + row, newton(cells));
+            let _ = writeln!(text, "{}\t{a:.2}\t{b:.2}\t{c:.2}\t{:.2}", 30 + row, newton(cells));
         }
         let column = |col: usize| newton(&[cells[0][col], cells[1][col]]);
         let total = newton(&cells.concat());
@@ -86,11 +86,10 @@ fn novel_lst(frames: usize) -> Vec<u8> {
 
 /// A mat of two by three sensors of 0.5 cm², of which one is missing and one is pressed.
 fn novel_asc(frames: usize) -> Vec<u8> {
-    let mut text = format!(
-        "file name: small.mat date/time 17.06.23 15.21\nmat type s2160_001\n\
+    let mut text = "file name: small.mat date/time 17.06.23 15.21\nmat type s2160_001\n\
          total times [secs]: 44.458 time per frame [secs]: 0.04000 scanning rate [Hz]: 25\n\
          pressure values in kPa\n\n\nelectrical:\ntime[secs] 1 2 3 4 5\n"
-    );
+        .to_owned();
     let moments = || (0..frames).map(|i| (i as f64 * 0.04, (i % 9) as f64 * 10.0));
     for (time, pressure) in moments() {
         let _ = writeln!(text, "{time:.5} 0.000 {pressure:.3} 0.000 0.000 0.000");
@@ -159,9 +158,8 @@ fn footscan(frames: usize) -> Vec<u8> {
 fn csv_rows(frames: usize) -> Vec<u8> {
     let mut text = "# a press\ntime_ms,force,r0c0,r0c1,r1c0,r1c1\n".to_owned();
     for i in 0..frames {
-        let _ = write!(text, "{},{}.5,1,2,3,{}\n", 40 * i, i % 9, i % 8);
+        let _ = writeln!(text, "{},{}.5,1,2,3,{}", 40 * i, i % 9, i % 8);
     }
-    // As small as rows can be.
     text.into_bytes()
 }
 
