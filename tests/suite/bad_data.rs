@@ -85,7 +85,7 @@ const CASES: [(&str, &str, Damage); 30] = [
     ("movie_with_no_rows", "pad.csv", Edit("ROWS 3", "ROWS 0")),
     ("movie_larger_than_the_file", "pad.csv", Edit("ROWS 3", "ROWS 99999999999")),
     ("movie_with_a_wrong_sum", "pad.csv", Edit("Raw Sum=,,73", "Raw Sum=,,74")),
-    ("movie_of_an_unknown_unit", "pad.csv", Edit("UNITS raw", "UNITS psi")),
+    ("movie_of_an_unknown_unit", "pad.csv", Edit("UNITS raw", "UNITS stone")),
     ("movie_that_is_empty", "pad.csv", Bytes(b"")),
     ("movie_that_is_binary", "pad.csv", Bytes(b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR\xff\xfe")),
     ("movie_with_bytes_that_are_no_text", "pad.csv", Splice("0,8,14,9", b"0,\xff\xfe\x00,14,9")),

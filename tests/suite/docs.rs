@@ -176,6 +176,17 @@ fn the_reference_lists_every_code_and_every_unit() {
 }
 
 #[test]
+fn the_reference_lists_every_format_of_a_recording() {
+    let listed = first_cells(&page("graph-files.md"), "| `format` |").join(" ");
+    let listed: Vec<&str> = listed.split([' ', ',', '`']).filter(|name| !name.is_empty()).collect();
+    let mut formats: Vec<&str> = tactflow_nodes::recordings::FORMATS.iter().map(|format| format.name).collect();
+    formats.sort_unstable();
+    let mut sorted = listed.clone();
+    sorted.sort_unstable();
+    assert_eq!(sorted, formats);
+}
+
+#[test]
 fn the_reference_lists_every_role_and_every_device() {
     let page = page("graph-files.md");
     let catalogue = tactflow_nodes::catalogue();

@@ -17,6 +17,7 @@ mod live;
 mod merge;
 mod mutations;
 mod oracles;
+mod recordings;
 mod tick;
 mod tidy;
 mod tool;

@@ -48,7 +48,7 @@ pub fn load(urdf: &FilePath, tip: &str, mount: &Mount) -> Result<Chain, Mistakes
     let text = str::from_utf8(&bytes).map_err(|error| {
         let text = String::from_utf8_lossy(&bytes);
         let at = error.valid_up_to();
-        Mistake::data(urdf, &text, at..at + 3, "this is not UTF-8 text")
+        Mistake::data(urdf, &*text, at..at + 3, "this is not UTF-8 text")
     })?;
     chain_of(text, tip, mount).map_err(|flaw| {
         let mistake = match flaw.at {

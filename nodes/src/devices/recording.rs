@@ -5,6 +5,7 @@
 //! twice. What the readers take is in [`crate::recordings`].
 
 use std::borrow::Cow;
+use std::sync::Arc;
 
 use tactflow_runtime::device::{Commands, Description, Device, DeviceError, Driver, Filled, Opened, Samples, Stepped};
 use tactflow_runtime::diagnostic::Code;
@@ -42,7 +43,36 @@ impl Device for Player {
     type Params = Params;
 
     const NAME: &'static str = "recording";
-    const SUMMARY: &'static str = "a recorded file of a tactile or pressure sensor as a pad";
+    const SUMMARY: &'static str =
+        "plays a recorded file of a tactile or pressure sensor (Tekscan, novel, XSENSOR, CSV, …) as a pad";
+    const DOC: &'static str = "The format is recognised by what the file begins with, or named by `format`:\n\n\
+        - `tekscan`: ASCII movies of I-Scan, F-Scan and CONFORMat, `.csv` or `.asf`\n\
+        - `novel-lst`: listings of novel's emed and pliance, `.lst`\n\
+        - `novel-asc`: texts of novel's pliance, `.asc`; an insole of pedar has no rows and columns and is refused\n\
+        - `footscan`: texts of RSscan's footscan plates\n\
+        - `zebris`: `RawDataGaitAnalysis` texts of Zebris treadmills and plates\n\
+        - `xsensor`: `.csv` of XSENSOR\n\
+        - `csv`: plain tables, a frame a row or a frame a block\n\
+        - `npy`, `npz`: arrays of numpy, frames x rows x columns\n\n\
+        Any of them may be in a `.zip` or `.gz`. Pressures become kPa and forces N, whatever the file counts in.\n\n\
+        The file is read whole before anything runs. What is damaged is refused with its line; nothing is mended \
+        silently. `unit`, `pitch_mm`, `rate_hz` and `size` say what a file leaves open; where it says otherwise, \
+        that is an error. `pad` picks one of several pads in a file.\n\n\
+        Frames come at the times of the file, the first at once. Those between two ticks are skipped but for the \
+        newest. Rows and columns are counted as in the file: `tactile_source` turns them into the sensor's frame.\n\n\
+        It states the facts `dead` (places without a sensor, as [row, column]), `frames`, `format`, and `threshold` \
+        if the file says below what its values are noise.";
+    const EXAMPLE: &'static str = r#"
+[roles]
+pad = "tactile_pad"
+
+[bind]
+pad = "pad"
+
+[devices.pad]
+type = "recording"
+file = "builtin:finger_press.csv"   # a finger on a Tekscan I-Scan: 28 by 28 sensels, 1.27 mm apart, raw, 10 Hz
+"#;
 
     fn open(params: Params) -> Result<Opened, Mistakes> {
         let file = &params.file;
@@ -85,13 +115,15 @@ fn mistakes(refusal: Refusal, file: &FilePath, bytes: &[u8]) -> Mistakes {
     match refusal {
         Refusal::Stranger => {
             let head = recordings::Head::new(bytes, "");
-            let line = head.text.lines().find(|line| !line.trim().is_empty()).unwrap_or("");
-            let begins = recordings::text::shortened(line.trim());
-            let message = format!("`{name}` is no recording of a known format: it begins with `{begins}`");
-            here(message).help(format!("formats are {}", recordings::list())).into()
+            let line = head.text.lines().map(str::trim).find(|line| !line.is_empty());
+            let begins = line.map(|line| format!("it begins with `{}`", recordings::text::shortened(line)));
+            let begins = begins.unwrap_or_else(|| "it is empty".into());
+            let message = format!("`{name}` is no recording of a known format: {begins}");
+            here(message).help(recordings::list()).into()
         }
         Refusal::Damaged { text, flaws } => {
-            flaws.into_iter().map(|flaw| Mistake::data(file, &text, flaw.span, flaw.message)).collect()
+            let text: Arc<str> = text.into();
+            flaws.into_iter().map(|flaw| Mistake::data(file, text.clone(), flaw.span, flaw.message)).collect()
         }
         Refusal::Broken { message, help } => {
             let mistake = here(format!("`{name}`: {message}"));
@@ -152,6 +184,13 @@ mod tests {
     const PATH: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../graphs/recordings/pressuRe/iscan_test.csv");
 
     #[test]
+    fn the_doc_names_every_format() {
+        for format in recordings::FORMATS {
+            assert!(Player::DOC.contains(&format!("`{}`", format.name)), "{}", format.name);
+        }
+    }
+
+    #[test]
     fn frames_are_served_once_and_the_newest_wins() {
         let mut bench = Bench::new(open::<Player>(&format!("file = '{PATH}'")).unwrap());
         let Shape::Image(shape) = &bench.fill().outputs[0] else { panic!("an image") };
@@ -176,6 +215,19 @@ mod tests {
         assert_eq!((force(&mut bench), bench.device.next()), (29.0, None));
         bench.exchange(i64::MAX);
         assert!(force(&mut bench).is_nan(), "the movie is over");
+    }
+
+    #[test]
+    fn a_packed_recording_plays_as_it_is() {
+        let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../graphs/recordings/pawlabeling/dog1_sel_1.zip");
+        let mut bench = Bench::new(open::<Player>(&format!("file = '{path}'")).unwrap());
+        let Shape::Image(shape) = &bench.fill().outputs[0] else { panic!("an image") };
+        assert_eq!((shape.rows, shape.cols), (256, 63));
+        assert_eq!(bench.fact("format"), Some(&"footscan".into()));
+        bench.exchange(0);
+        let image: &mut Image = bench.samples.write(0, 0, 0);
+        let load: f32 = image.cells().iter().sum();
+        assert!((load - 11.9).abs() < 1e-3, "{load} N");
     }
 
     #[test]

@@ -45,7 +45,7 @@ struct FrameLine<'t> {
 
 /// `Frame 12 (95.24 ms)`, if the line is such a one.
 fn frame_line(line: Piece<'_>) -> Option<Result<FrameLine<'_>, Flaw>> {
-    let rest = line.after("frame")?;
+    let rest = line.after("frame").or_else(|| line.after("bild"))?;
     let (number, time) = rest.text.split_once('(').map_or((rest.text, None), |(number, time)| (number, Some(time)));
     let number = rest.part(number).trimmed();
     let is_number = number.text.starts_with(|c: char| c.is_ascii_digit());
@@ -79,18 +79,18 @@ fn stamp(text: Piece<'_>) -> Result<(i64, Piece<'_>), Flaw> {
 fn parse(text: &str, hints: &Hints) -> Result<Recording, Wrong> {
     let mut reader = Reader { reel: Reel::default(), size: None, has_times: true };
     let mut lines = Lines::new(text);
-    let mut next = lines.by_ref().map(Piece::trimmed).find(|line| frame_line(*line).is_some());
+    let mut next = first_frame(&mut lines)?;
     while let Some(line) = next {
         next = reader.frame(line, &mut lines)?;
     }
     let Reader { mut reel, size, has_times } = reader;
     let Some((rows, cols)) = size.filter(|_| !reel.frames.is_empty()) else {
-        return Err(flaw::<()>(&lines.end(), "the file has no frame").unwrap_err().into());
+        return flaw(&lines.end(), "the file has no frame").map_err(Wrong::from);
     };
-    let unit = hints.unit.unwrap_or(Unit::NEWTON);
-    let pitch = hints.pitch(if cols <= WIDEST && hints.pitch.is_none() { Some(PITCH) } else { None })?;
     hints.size(Some([rows, cols]))?;
-    let period = hints.period(reel.mean_step())?;
+    let unit = hints.unit.unwrap_or(Unit::NEWTON);
+    let pitch = (cols <= WIDEST && hints.pitch.is_none()).then_some(PITCH);
+    let (unit, pitch, period) = hints.complete(Some(unit), pitch, reel.mean_step())?;
     if has_times {
         reel.start_at_zero();
     } else {
@@ -99,6 +99,21 @@ fn parse(text: &str, hints: &Hints) -> Result<Recording, Wrong> {
     let shape = ImageShape { rows, cols, pitch, unit };
     let Reel { frames, cells, dead } = reel;
     Ok(Recording { format: FORMAT.name, shape, frames, cells, dead, threshold: None, period, force: None })
+}
+
+/// Passes over what stands before the first frame, if that is no row of cells.
+fn first_frame<'t>(lines: &mut Lines<'t>) -> Result<Option<Piece<'t>>, Flaw> {
+    for line in lines.map(Piece::trimmed) {
+        if frame_line(line).is_some() {
+            return Ok(Some(line));
+        }
+        let notation = Notation::of(line.text);
+        let mut cells = notation.fields(line);
+        if cells.clone().nth(1).is_some() && cells.all(|cell| notation.number(cell, "").is_ok()) {
+            return flaw(&line, "a row of cells stands before the line of its frame");
+        }
+    }
+    Ok(None)
 }
 
 struct Reader {
@@ -138,7 +153,7 @@ impl Reader {
     fn rows<'t>(&mut self, frame: u64, lines: &mut Lines<'t>) -> Result<Option<Piece<'t>>, Flaw> {
         let mut rows = 0;
         let mut next = None;
-        while let Some(line) = lines.next() {
+        for line in lines.by_ref() {
             let line = line.trimmed();
             if line.text.is_empty() {
                 continue;
@@ -184,8 +199,8 @@ impl Reader {
 
 #[cfg(test)]
 mod tests {
+    use super::super::read;
     use super::super::testing::{check_damages, complaints, count_refused};
-    use super::super::{Refusal, read};
     use super::*;
 
     const GOOD: &str = "Frame 0 (0.00 ms)\r\n0.0\t0.4\t0.0\r\n0.0\t1.1\t2.5\r\n\r\n\
@@ -235,8 +250,8 @@ mod tests {
     fn what_is_wrong_is_said_where_it_is() {
         let good = GOOD.replace("\r\n", "\n");
         let cases = [
+            ("Frame 0", "Fram 0", 2, "a row of cells stands before the line of its frame"),
             ("Frame 1", "Frame 3", 5, "frame 3 comes after frame 0"),
-            ("\n\nFrame 1 (7.94 ms)", "", 4, "the file has no frame but"),
             ("7.94", "-7.94", 5, "the frame's time is not from 0 to 1e9 s"),
             ("0.00 ms", "8.00 ms", 5, "the time goes back"),
             ("7.94 ms)", "7.94 ms", 5, "a frame's time ends with `)`, and so does its line"),
@@ -248,9 +263,11 @@ mod tests {
             ("11.5", "eleven", 7, "this cell is not a number: `eleven`"),
             ("11.5", "1e39", 7, "this cell is too large"),
         ];
-        let cases: Vec<_> = cases.into_iter().filter(|case| !case.3.ends_with("but")).collect();
         check_damages(&good, "", &Hints::default(), &cases);
-        assert_eq!(complaints(parse("Frame 0 (0 ms)\n", &Hints::default()).map_err(|_| Refusal::Stranger)).len(), 1);
+        let forced = Hints { format: Some("footscan".into()), ..Hints::default() };
+        let got = complaints(read(b"Frame 0 (0 ms)\n", "", &forced));
+        assert_eq!(got, [(1, "frame 0 has no rows".into())]);
+        assert_eq!(complaints(read(b"hello", "", &forced)), [(1, "the file has no frame".into())]);
     }
 
     #[test]

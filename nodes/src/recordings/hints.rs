@@ -24,6 +24,13 @@ pub struct Hints {
 /// How far a number of the file and one of the bench may be apart, as a part of them: files round.
 const ROUNDING: f64 = 5e-3;
 
+/// The shortest and the longest time between two frames that can be played [s].
+const SHORTEST: f64 = 1e-6;
+const LONGEST: f64 = 1e3;
+
+/// How a message about something missing begins.
+const SILENT: &str = "the file does not say ";
+
 fn agree(a: f64, b: f64) -> bool {
     (a - b).abs() <= ROUNDING * a.abs().max(b.abs())
 }
@@ -57,7 +64,40 @@ impl Hints {
         let help = "give the bench's device a `rate_hz`: the frames per second of the recording";
         let given = self.rate_hz.map(|rate| 1.0 / rate);
         let show = |period: &f64| format!("{} frames a second", (1e6 / period).round() / 1e6);
-        choose(said, given, "rate_hz", help, |a, b| agree(*a, *b), show)
+        let period = choose(said, given, "rate_hz", help, |a, b| agree(*a, *b), show)?;
+        if (SHORTEST..=LONGEST).contains(&period) {
+            Ok(period)
+        } else {
+            Err(Refusal::broken(format!("a frame each {period} s is none that can be played")))
+        }
+    }
+
+    /// Unit, pitch and period together, so that all that is missing is said at once.
+    ///
+    /// # Errors
+    /// When nobody says one of them, or they differ.
+    pub fn complete(
+        &self,
+        unit: Option<Unit>,
+        pitch: Option<[f64; 2]>,
+        period: Option<f64>,
+    ) -> Result<(Unit, [f64; 2], f64), Refusal> {
+        let found = (self.unit(unit), self.pitch(pitch), self.period(period));
+        let refusals = match found {
+            (Ok(unit), Ok(pitch), Ok(period)) => return Ok((unit, pitch, period)),
+            (unit, pitch, period) => [unit.err(), pitch.err(), period.err()],
+        };
+        let (mut missing, mut ways_out) = (Vec::new(), Vec::new());
+        for refusal in refusals.into_iter().flatten() {
+            match refusal {
+                Refusal::Silent { message, help } => {
+                    missing.push(message.trim_start_matches(SILENT).to_owned());
+                    ways_out.push(help);
+                }
+                other => return Err(other),
+            }
+        }
+        Err(Refusal::Silent { message: format!("{SILENT}{}", missing.join(", or ")), help: ways_out.join("; ") })
     }
 
     /// The number of rows and of columns, from what the file says of it.
@@ -94,7 +134,7 @@ fn choose<T>(
                 "size" => "how many rows and columns it has",
                 _ => "the unit of its values",
             };
-            Err(Refusal::Silent { message: format!("the file does not say {what}"), help: help.into() })
+            Err(Refusal::Silent { message: format!("{SILENT}{what}"), help: help.into() })
         }
     }
 }

@@ -9,6 +9,8 @@ mod csv;
 mod fields;
 mod footscan;
 mod hints;
+mod novel_asc;
+mod novel_lst;
 mod npy;
 mod reel;
 mod tekscan;
@@ -27,8 +29,17 @@ pub use hints::Hints;
 pub use text::Flaw;
 
 /// Every format that is read: one line each, those that are sure of themselves first.
-pub const FORMATS: &[Format] =
-    &[npy::NPY, npy::NPZ, tekscan::FORMAT, zebris::FORMAT, xsensor::FORMAT, footscan::FORMAT, csv::FORMAT];
+pub const FORMATS: &[Format] = &[
+    npy::NPY,
+    npy::NPZ,
+    tekscan::FORMAT,
+    novel_lst::FORMAT,
+    novel_asc::FORMAT,
+    zebris::FORMAT,
+    xsensor::FORMAT,
+    footscan::FORMAT,
+    csv::FORMAT,
+];
 
 /// The most cells of an array of which a file holds only windows.
 pub const MOST_CELLS: usize = 1 << 18;
@@ -249,6 +260,6 @@ fn read_plain(bytes: &[u8], name: &str, hints: &Hints) -> Result<Recording, Refu
 /// Every format by name, for messages.
 #[must_use]
 pub fn list() -> String {
-    let lines: Vec<String> = FORMATS.iter().map(|format| format!("`{}`: {}", format.name, format.title)).collect();
-    format!("{}; any of them in a `.zip` or `.gz`", lines.join("; "))
+    let lines = FORMATS.iter().map(|format| format!("\n  `{}`: {}", format.name, format.title));
+    format!("these are read, also in a `.zip` or `.gz`:{}", lines.collect::<String>())
 }

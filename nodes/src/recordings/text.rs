@@ -107,11 +107,6 @@ impl<'t> Piece<'t> {
         self.part(self.text.trim())
     }
 
-    /// The parts between a character.
-    pub(super) fn split(self, at: char) -> impl Iterator<Item = Self> + Clone {
-        self.text.split(at).map(move |text| self.part(text))
-    }
-
     /// The parts between blanks.
     pub(super) fn words(self) -> impl Iterator<Item = Self> + Clone {
         self.text.split_whitespace().map(move |text| self.part(text))

@@ -22,7 +22,9 @@ pub(super) const FORMAT: Format = Format {
     read: |bytes, hints| text::read(bytes, hints, parse),
 };
 
+/// A day [ns], and the longest time that a recording may take.
 const DAY: i64 = 86_400_000_000_000;
+const LONGEST: i64 = 400 * DAY;
 
 /// How many pads a message lists.
 const LISTED: usize = 32;
@@ -82,15 +84,14 @@ fn parse(text: &str, hints: &Hints) -> Result<Recording, Wrong> {
     reader.read()?;
     let Reader { mut reel, lines, unit, threshold, size, pitch, .. } = reader;
     let Some([rows, cols]) = size.filter(|_| !reel.frames.is_empty()) else {
-        return Err(flaw::<()>(&lines.end(), "the file has no frame").unwrap_err().into());
+        return flaw(&lines.end(), "the file has no frame").map_err(Wrong::from);
     };
     hints.size(Some([rows, cols]))?;
     let (unit, factor) = unit.unzip();
-    let unit = hints.unit(unit)?;
-    let pitch = hints.pitch(pitch[0].zip(pitch[1]).map(|(x, y)| [x, y]))?;
+    let pitch = pitch[0].zip(pitch[1]).map(|(x, y)| [x, y]);
     // Stamps of whole seconds say when the frames came only to the second.
     let has_times = reel.frames.is_sorted_by(|a, b| a.time < b.time);
-    let period = hints.period(reel.mean_step().filter(|_| has_times))?;
+    let (unit, pitch, period) = hints.complete(unit, pitch, reel.mean_step().filter(|_| has_times))?;
     if has_times {
         reel.start_at_zero();
     } else {
@@ -254,7 +255,7 @@ impl<'t> Reader<'t> {
         if let Some(last) = self.reel.frames.last()
             && last.time > time
         {
-            if last.time - time < DAY / 2 {
+            if last.time - time < DAY / 2 || self.day >= LONGEST {
                 return flaw(&value, "the time goes back");
             }
             self.day += DAY;
@@ -429,6 +430,18 @@ mod tests {
         assert_eq!(read(plain.as_bytes(), "", &Hints::default()), Ok(recording.clone()));
         let nameless = MAT.replace("Sensor:,\"PX100\"\n", "").replace("23:59:59,950", "11:59:59.950 PM");
         assert_eq!(read(nameless.as_bytes(), "", &Hints::default()), Ok(recording));
+    }
+
+    #[test]
+    fn midnights_without_end_are_no_time() {
+        let mut text = MAT.split_once("\nFrame:").unwrap().0.to_owned();
+        for i in 1..1000 {
+            let time = ["12:00:00", "00:00:00"][i % 2];
+            text += &format!(
+                "\nFrame:,{i}\nTime:,{time}\nSensor:,PX100\nRows:,2\nColumns:,2\nSensels:\n\"0\",\"0\"\n\"0\",\"0\"\n"
+            );
+        }
+        assert_eq!(complaints(read(text.as_bytes(), "", &Hints::default()))[0].1, "the time goes back");
     }
 
     #[test]

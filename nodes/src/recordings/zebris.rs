@@ -47,7 +47,8 @@ struct Entry<'t> {
 }
 
 fn entry(line: Piece<'_>) -> Entry<'_> {
-    let (key, value) = line.text.split_once(['\t', ';']).unwrap_or((line.text, &line.text[line.text.len()..]));
+    let parted = line.text.split_once(['\t', ';']).or_else(|| line.text.rsplit_once(','));
+    let (key, value) = parted.unwrap_or((line.text, &line.text[line.text.len()..]));
     let (name, unit) = key.split_once(',').unwrap_or((key, ""));
     Entry { name: line.part(name).trimmed(), unit: unit.trim(), value: line.part(value).trimmed() }
 }
@@ -128,13 +129,13 @@ fn parse(text: &str, hints: &Hints) -> Result<Recording, Wrong> {
         let found = reel.frames.len();
         let message = format!("`Frame count` promises {count} frames, but the file has {found}");
         let at = if (found as u64) < count { lines.end() } else { at };
-        return Err(flaw::<()>(&at, message).unwrap_err().into());
+        return flaw(&at, message).map_err(Wrong::from);
     }
     reel.start_at_zero();
     hints.size(Some([rows, cols]))?;
-    let unit = hints.unit(unit)?;
-    let pitch = hints.pitch(platform.width.zip(platform.height).map(|(width, height)| [width, height]))?;
-    let period = hints.period(platform.rate.map(|rate| 1.0 / rate).or_else(|| reel.mean_step()))?;
+    let pitch = platform.width.zip(platform.height).map(|(width, height)| [width, height]);
+    let period = platform.rate.map(|rate| 1.0 / rate).or_else(|| reel.mean_step());
+    let (unit, pitch, period) = hints.complete(unit, pitch, period)?;
     let shape = ImageShape { rows, cols, pitch, unit };
     let Reel { frames, cells, dead } = reel;
     Ok(Recording { format: FORMAT.name, shape, frames, cells, dead, threshold: None, period, force: None })
@@ -214,15 +215,17 @@ impl<'t> Reader<'t> {
         let mut found = None;
         loop {
             let line = self.line();
-            if line.text.starts_with("x1") && line.text.split_whitespace().next() == Some("x1") {
-                let names = line.text.split_whitespace().count();
+            let names =
+                line.text.split(|c: char| c.is_whitespace() || c == ';' || c == ',').filter(|name| !name.is_empty());
+            if names.clone().next().is_some_and(|name| name.eq_ignore_ascii_case("x1")) {
+                let names = names.count();
                 if names != self.cols {
                     let message = format!("frame {frame} names {names} columns, but `Columns` promises {}", self.cols);
                     return flaw(&line, message);
                 }
                 return found.map_or_else(|| flaw(&line, format!("frame {frame} has no `Time`")), Ok);
             }
-            if line.text.is_empty() || line.text == "}" || line.text.starts_with("y1") || frame_number(line).is_some() {
+            if line.text.is_empty() || line.text == "}" || line.after("y1").is_some() || frame_number(line).is_some() {
                 return flaw(&line, format!("frame {frame} ends without its columns"));
             }
             let Entry { name, unit, value } = entry(line);
@@ -234,9 +237,10 @@ impl<'t> Reader<'t> {
 
     fn row(&mut self, frame: u64, row: usize) -> Result<(), Flaw> {
         let line = self.line();
-        let notation = Notation { separator: None, has_decimal_comma: true };
+        let notation = Notation::of(line.text);
         let mut fields = notation.fields(line);
-        let name = fields.next().filter(|name| name.text.strip_prefix('y').is_some_and(|n| n.parse() == Ok(row + 1)));
+        let name =
+            fields.next().filter(|name| name.text.strip_prefix(['y', 'Y']).is_some_and(|n| n.parse() == Ok(row + 1)));
         if name.is_none() {
             return flaw(&line, format!("expected row `y{}` of frame {frame}", row + 1));
         }
@@ -352,6 +356,10 @@ y2\t0.00\t0.00\t0.00
         let wide = |text: &str| text.encode_utf16().flat_map(u16::to_le_bytes).collect::<Vec<u8>>();
         let cases = [
             latin(GOOD),
+            latin(&GOOD.replace('\t', ";")),
+            latin(&GOOD.replace('\t', ";").replace("0.50", "0,50").replace("34.50", "34,50")),
+            latin(&GOOD.replace('\t', ",")),
+            latin(&GOOD.replace('\t', "\t ").to_uppercase().replace("MM", "mm").replace("TIME, MS", "Time, ms")),
             latin(&GOOD.replace('\n', "\r\n")),
             wide(GOOD),
             latin(&GOOD.replace("0.00", "0,00").replace("0.50", "0,50").replace("8.47", "8,47")),

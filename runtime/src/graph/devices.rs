@@ -209,7 +209,7 @@ pub(crate) fn place(
             }
             At::Data { file, text, span } => {
                 notes.push((file.span.clone(), "the file is named here".to_owned()));
-                let base = sources.add_file(&file.path, text).base;
+                let base = sources.add_file(&file.path, &*text).base;
                 base + span.start..base + span.end
             }
         };

@@ -2,6 +2,7 @@
 
 use std::io;
 use std::ops::Range;
+use std::sync::Arc;
 
 use super::FilePath;
 use crate::diagnostic::Code;
@@ -21,8 +22,8 @@ pub enum At {
     Data {
         /// The file, and where its name stands.
         file: Box<FilePath>,
-        /// Its text.
-        text: String,
+        /// Its text, which all mistakes in it share.
+        text: Arc<str>,
         /// The place in that text.
         span: Range<usize>,
     },
@@ -68,8 +69,8 @@ impl Mistake {
     }
 
     /// A file of data is not what it should be, at a place in its text.
-    pub fn data(file: &FilePath, text: &str, span: Range<usize>, message: impl Into<String>) -> Self {
-        let at = At::Data { file: Box::new(file.clone()), text: text.to_owned(), span };
+    pub fn data(file: &FilePath, text: impl Into<Arc<str>>, span: Range<usize>, message: impl Into<String>) -> Self {
+        let at = At::Data { file: Box::new(file.clone()), text: text.into(), span };
         Self::new(Code::BadData, at, message)
     }
 

@@ -67,7 +67,29 @@ impl Device for MockPad {
     type Params = Params;
 
     const NAME: &'static str = "mock_pad";
-    const SUMMARY: &'static str = "a pad that is pressed, and misbehaves, as its bench says";
+    const SUMMARY: &'static str =
+        "a simulated pad that is pressed by points and bars, and misbehaves, as its bench says";
+    const DOC: &'static str = "Each `press` is a smooth bump of force, (1 - d²/r²)² at distance d from a point or from a \
+        bar, that comes, moves and goes as it is told. Its tactels sum to its `force` while it is on the pad, and it \
+        slides off smoothly. There is no foam, no noise and no hysteresis: the pad is for trying out a graph and for \
+        tests whose result is known, not for tuning gains.\n\n\
+        A `glitch` makes it misbehave for a while: `repeat` shows an old frame again, `silence` none, `nan` a value \
+        that is no number, `back` stamps that lie in the past. A graph should be tried with each of them.\n\n\
+        It states the facts `dead` (no tactel is) and `threshold`.";
+    const EXAMPLE: &'static str = r#"
+[roles]
+pad = "tactile_pad"
+
+[bind]
+pad = "pad"
+
+[devices.pad]
+type = "mock_pad"                   # 16 by 16 tactels, 5 mm apart, in N, 250 frames a second
+for_s = 4.0                         # [s]
+press = [
+    { from_s = 0.5, to_s = 3.5, at = [-0.010, 0.005], speed = [0.004, 0.0], force = 4.0 },   # [s, s, m, m/s, N]
+]
+"#;
 
     fn open(params: Params) -> Result<Opened, Mistakes> {
         let mut mistakes = Mistakes::new();

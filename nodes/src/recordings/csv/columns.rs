@@ -48,7 +48,7 @@ impl Columns {
         let count = notation.fields(names).count();
         if count > MOST_CELLS {
             let message = format!("{count} columns are more than the {MOST_CELLS} that are read");
-            return Err(flaw::<()>(&names, message).unwrap_err().into());
+            return flaw(&names, message).map_err(Wrong::from);
         }
         let mut columns = Self { size: (0, 0), count, second: 1.0, named: None };
         let mut places = Vec::with_capacity(count);
@@ -56,9 +56,7 @@ impl Columns {
         for name in notation.fields(names).map(unquoted) {
             let place = match columns.mark(name)? {
                 Some(mark) if mark != PASSED && places.contains(&mark) => {
-                    return Err(flaw::<()>(&name, format!("`{}` is here twice", shortened(name.text)))
-                        .unwrap_err()
-                        .into());
+                    return flaw(&name, format!("`{}` is here twice", shortened(name.text))).map_err(Wrong::from);
                 }
                 Some(mark) => mark,
                 None => {
@@ -67,7 +65,7 @@ impl Columns {
                         let message = format!("`{}` says no row and column, as other names do", shortened(name.text));
                         let message =
                             if place.is_none() { message } else { "only some names say a row and a column".into() };
-                        return Err(flaw::<()>(&name, message).unwrap_err().into());
+                        return flaw(&name, message).map_err(Wrong::from);
                     }
                     place.unwrap_or((0, 0))
                 }
@@ -180,7 +178,7 @@ fn in_order(places: &mut [Place], names: Piece<'_>, hints: &Hints) -> Result<(us
     let found = places.iter().filter(|place| place.0 != u32::MAX).count();
     if rows.checked_mul(cols) != Some(found) {
         let message = format!("these are the names of {found} tactels, not of {rows} by {cols}");
-        return Err(flaw::<()>(&names, message).unwrap_err().into());
+        return flaw(&names, message).map_err(Wrong::from);
     }
     let tactels = places.iter_mut().filter(|place| place.0 != u32::MAX);
     tactels.enumerate().for_each(|(i, place)| *place = ((i / cols) as u32, (i % cols) as u32));

@@ -51,8 +51,8 @@ fn recognises(head: &Head<'_>) -> bool {
         // The first row or the second is longer than what is looked at.
         (Some((first, is_whole)), _) => {
             let is_table = ["csv", "tsv", "txt"].contains(&&*head.ending) && width(names_of(first), first) > 1;
-            let last = first.text.rfind([',', ';', '\t', ' ']).filter(|_| !is_whole);
-            is_table || is_row_of_numbers(&first.text[..last.unwrap_or(first.text.len())])
+            let end = if is_whole { Some(first.text.len()) } else { first.text.rfind([',', ';', '\t', ' ']) };
+            is_table || end.is_some_and(|end| is_row_of_numbers(&first.text[..end]))
         }
         (None, _) => false,
     }
@@ -78,7 +78,7 @@ fn number(notation: Notation, cell: Piece<'_>, what: &str) -> Result<f64, Flaw> 
 fn parse(text: &str, hints: &Hints) -> Result<Recording, Wrong> {
     let lines = Lines::new(text);
     let Some(first) = lines.clone().find(is_content) else {
-        return Err(flaw::<()>(&lines.end(), "the file has no frame").unwrap_err().into());
+        return flaw(&lines.end(), "the file has no frame").map_err(Wrong::from);
     };
     let names = (!is_row_of_numbers(first.text)).then_some(first);
     let layout = match names {
@@ -88,7 +88,7 @@ fn parse(text: &str, hints: &Hints) -> Result<Recording, Wrong> {
     let (rows, cols) = layout.size();
     bounded(rows, cols).or_else(|message| flaw(&first, message))?;
     if rows * cols < LEAST {
-        return Err(flaw::<()>(&first, format!("an image has at least {LEAST} tactels")).unwrap_err().into());
+        return flaw(&first, format!("an image has at least {LEAST} tactels")).map_err(Wrong::from);
     }
     let mut reader = Reader { reel: Reel::default(), time: vec![], force: vec![] };
     reader.reserve(lines.clone(), rows * cols);
@@ -98,12 +98,12 @@ fn parse(text: &str, hints: &Hints) -> Result<Recording, Wrong> {
     }
     let Reader { mut reel, time, force } = reader;
     if reel.frames.is_empty() {
-        return Err(flaw::<()>(&Lines::new(text).end(), "there are names, but no frame").unwrap_err().into());
+        return flaw(&Lines::new(text).end(), "there are names, but no frame").map_err(Wrong::from);
     }
     reel.frames.iter_mut().zip(&time).for_each(|(frame, time)| frame.time = *time);
-    // These three are the bench's to say; what is missing is said of the first only.
-    let shape = ImageShape { rows, cols, unit: hints.unit(None)?, pitch: hints.pitch(None)? };
-    let period = hints.period(reel.mean_step().filter(|_| !time.is_empty()))?;
+    let said = reel.mean_step().filter(|_| !time.is_empty());
+    let (unit, pitch, period) = hints.complete(None, None, said)?;
+    let shape = ImageShape { rows, cols, unit, pitch };
     if time.is_empty() {
         reel.tick(period);
     }
@@ -140,7 +140,7 @@ fn layout(first: Piece<'_>, lines: Lines<'_>, hints: &Hints) -> Result<Layout, W
                 let message = format!(
                     "the first row has {width} numbers: that is neither a frame of {rows} by {cols} tactels nor a row of it"
                 );
-                Err(flaw::<()>(&first, message).unwrap_err().into())
+                flaw(&first, message).map_err(Wrong::from)
             }
         };
     }
@@ -233,7 +233,7 @@ impl Reader {
     fn blocks(&mut self, mut lines: Lines<'_>, rows: usize, cols: usize, are_parted: bool) -> Result<(), Flaw> {
         let mut row = 0;
         let mut was_blank = true;
-        while let Some(line) = lines.next() {
+        for line in lines.by_ref() {
             let number = self.reel.frames.len() + 1;
             if line.text.trim().is_empty() {
                 was_blank = true;

@@ -17,6 +17,7 @@ use tactflow_runtime::signal::ImageShape;
 
 use self::array::{Array, named};
 use super::reel::{Reel, bounded};
+use super::text::shortened;
 use super::zip::{self, LARGEST, Member};
 use super::{Format, Frame, HEAD, Hints, Recording, Refusal, units};
 
@@ -135,40 +136,27 @@ impl Beside {
 fn recording(format: &'static str, file: &[u8], beside: &Beside, hints: &Hints) -> Result<Recording, Refusal> {
     let array = Array::read(file).map_err(Refusal::broken)?;
     let [count, rows, cols] = axes(&array, hints)?;
-    let (unit, factor) = match &beside.unit {
-        None => (hints.unit(None)?, 1.0),
-        Some(name) => {
-            let known =
-                units::unit(name).ok_or_else(|| Refusal::broken(format!("`unit`: `{name}` is not known here")))?;
-            (hints.unit(Some(known.0))?, known.1)
-        }
-    };
-    let shape = ImageShape { rows, cols, pitch: hints.pitch(beside.pitch)?, unit };
     for (name, numbers) in [("time", &beside.time), ("force", &beside.force)] {
-        if let Some(numbers) = numbers
-            && numbers.len() != count
-        {
-            return Err(Refusal::broken(format!(
-                "`{name}` has {} numbers, but there are {count} frames",
-                numbers.len()
-            )));
+        if let Some(found) = numbers.as_ref().map(Vec::len).filter(|found| *found != count) {
+            return Err(Refusal::broken(format!("`{name}` has {found} numbers, but there are {count} frames")));
         }
     }
+    let known =
+        |name: &String| units::unit(name).ok_or_else(|| format!("`unit`: `{}` is not known here", shortened(name)));
+    let (unit, factor) = beside.unit.as_ref().map(known).transpose().map_err(Refusal::broken)?.unzip();
     let mut reel = Reel::default();
     reel.frames.reserve_exact(count);
     reel.cells.reserve_exact(array.len());
-    fill(&mut reel, &array, [count, rows, cols], factor).map_err(Refusal::broken)?;
-    let said = match &beside.time {
-        Some(time) => {
-            stamp(&mut reel.frames, time).map_err(Refusal::broken)?;
-            reel.mean_step()
-        }
-        None => beside.rate_hz.map(|rate| 1.0 / rate),
-    };
-    let period = hints.period(said)?;
+    fill(&mut reel, &array, [count, rows, cols], factor.unwrap_or(1.0)).map_err(Refusal::broken)?;
+    if let Some(time) = &beside.time {
+        stamp(&mut reel.frames, time).map_err(Refusal::broken)?;
+    }
+    let said = reel.mean_step().or(beside.rate_hz.map(|rate| 1.0 / rate));
+    let (unit, pitch, period) = hints.complete(unit, beside.pitch, said)?;
     if beside.time.is_none() {
         reel.tick(period);
     }
+    let shape = ImageShape { rows, cols, pitch, unit };
     let (Reel { frames, cells, dead }, force) = (reel, beside.force.clone());
     Ok(Recording { format, shape, frames, cells, dead, threshold: None, period, force })
 }

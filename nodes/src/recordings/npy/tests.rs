@@ -47,16 +47,16 @@ fn archive(method: u16) -> Vec<u8> {
 
 #[test]
 fn an_array_of_any_type_and_order_is_the_same_recording() {
+    type Encode = fn(u8) -> Vec<u8>;
     let good = read(&arange(), "a.npy", &hints()).unwrap();
     assert_eq!((good.shape.rows, good.shape.cols, good.frames.len(), good.period), (2, 3, 2, 0.01));
     assert_eq!(good.cells, (0..12).map(|i| i as f32).collect::<Vec<_>>());
     assert_eq!(good.frames[1].time, 10_000_000);
-    let each = |bytes: fn(u8) -> Vec<u8>| (0..12).flat_map(bytes).collect::<Vec<u8>>();
+    let each = |bytes: Encode| (0..12).flat_map(bytes).collect::<Vec<u8>>();
     // The first axis fastest: frame, row and column of place p are p % 2, p / 2 % 2 and p / 4.
-    let fortran = |bytes: fn(u8) -> Vec<u8>| {
-        (0..12).flat_map(|p: u8| bytes(6 * (p % 2) + 3 * (p / 2 % 2) + p / 4)).collect::<Vec<u8>>()
-    };
-    let cases: [(&str, fn(u8) -> Vec<u8>); 12] = [
+    let fortran =
+        |bytes: Encode| (0..12).flat_map(|p: u8| bytes(6 * (p % 2) + 3 * (p / 2 % 2) + p / 4)).collect::<Vec<u8>>();
+    let cases: [(&str, Encode); 12] = [
         ("<f8", |v| f64::from(v).to_le_bytes().into()),
         (">f8", |v| f64::from(v).to_be_bytes().into()),
         ("<f4", |v| f32::from(v).to_le_bytes().into()),

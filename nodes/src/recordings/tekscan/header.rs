@@ -196,9 +196,13 @@ fn not_negative(value: Piece<'_>, key: &str) -> Result<f64, Flaw> {
 /// `0.127 centimeters` in metres.
 fn length(value: Piece<'_>, key: &str) -> Result<f64, Flaw> {
     let is_number = |c: char| c.is_ascii_digit() || ".,+-".contains(c);
-    let name = value.text.trim_start_matches(is_number);
-    let number = value.part(&value.text[..value.text.len() - name.len()]);
-    let number = not_negative(number, key)?;
+    // `5.08e-3 meters` is in two words, `4mm` need not be.
+    let split = value.text.split_once(char::is_whitespace);
+    let (number, name) = split.unwrap_or_else(|| {
+        let name = value.text.trim_start_matches(is_number);
+        value.text.split_at(value.text.len() - name.len())
+    });
+    let number = not_negative(value.part(number), key)?;
     match units::metres(name) {
         Some(metres) if number > 0.0 && (number * metres).is_finite() => Ok(number * metres),
         Some(_) => flaw(&value, format!("`{key}` is greater than 0")),

@@ -82,6 +82,7 @@ fn a_small_movie_in_any_dress() {
         SMALL.replace(", 0,,", ",,,").replace(", 0.1,,", ",,,"),
         SMALL.replace(", 0,, 12/2/2019 6:21:52.34PM,,,Raw Sum=,,15", "").replace("2, 0.1,, 12", "2\t12"),
         SMALL.replace("0.5 inches", "12.7 millimetres").replace("4 millimeters", "4mm"),
+        SMALL.replace("4 millimeters", "4e-003 meters"),
         SMALL.replace("ROWS 2", "rows 2").replace("MOVIE", "movie").replace("raw", "Raw"),
         SMALL.replace("UNITS raw", "UNITS raw\nMAP_INDEX 0\nMAP_INDEX 1"),
         SMALL.replace("UNITS raw", "COMMENTS:\nFrame by frame,\n\nROWS of teeth\nunits are raw\nUNITS raw"),

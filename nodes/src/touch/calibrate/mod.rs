@@ -214,7 +214,7 @@ fn of_file(path: &FilePath, params: &Params, image: &ImageShape, mistakes: &mut 
         Ok(calibration) => calibration,
         Err(flaws) => {
             mistakes.extend(flaws.into_iter().map(|flaw| {
-                let mistake = Mistake::data(path, &text, flaw.span, flaw.message);
+                let mistake = Mistake::data(path, &*text, flaw.span, flaw.message);
                 Mistake { help: flaw.help, ..mistake }
             }));
             return nothing;

@@ -1,5 +1,7 @@
 //! `calibrate` against tables and against its own curves.
 
+use std::sync::Arc;
+
 use tactflow_runtime::harness::NodeRig;
 use tactflow_runtime::node::At;
 use tactflow_runtime::signal::{FlagShape, Image, Shape};
@@ -130,7 +132,7 @@ fn a_mistake_in_the_file_shows_in_the_file_and_one_about_it_where_it_is_named() 
         let damaged = good.replacen(from, to, 1);
         let mistakes = with_file(name, &damaged, "").err().unwrap();
         let [Mistake { at: At::Data { text, span, .. }, .. }] = &mistakes[..] else { panic!("{mistakes:?}") };
-        assert_eq!((&text[span.clone()], text), (marked, &damaged));
+        assert_eq!((&text[span.clone()], text), (marked, &Arc::from(damaged.as_str())));
     };
     data("gain", "gain = 0.01,", "gain = 0,", "0");
     data("kind", "kind = \"calibration\"", "kind = \"bench\"", "\"bench\"");
