@@ -35,6 +35,7 @@ impl NodeType for Polynomial {
             inputs: vec![port("x")],
             outputs: vec![port("y")],
             every_tick: false,
+            logs: false,
         }
     }
 

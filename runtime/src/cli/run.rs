@@ -4,6 +4,7 @@ use std::io;
 use std::path::Path;
 
 use super::check::milliseconds;
+use super::log::Log;
 use super::progress::Progress;
 use super::summary::Summary;
 use super::{Colour, FAULTED, NOT_LOADED, RunArgs, complain, say};
@@ -28,11 +29,13 @@ pub(super) fn run(catalogue: &Catalogue, args: RunArgs, colour: Colour) -> u8 {
     };
     say(&format!("{}: {} nodes, a tick each {}", args.graph.display(), engine.order().count(), period(&engine)));
     let mut summary = Summary::new(&engine);
+    let mut log = Log::new(&engine);
     let mut progress = Progress::new(args.duration.or_else(|| engine.end().map(seconds)));
     let options = RunOptions { duration: args.duration, is_realtime: args.realtime };
     let outcome = quietly(|| {
         engine::run(&mut engine, &options, &mut |engine| {
             summary.add(engine);
+            log.write(engine);
             if let Some(recorder) = &mut recorder {
                 recorder.record(engine);
             }

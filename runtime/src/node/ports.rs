@@ -265,7 +265,16 @@ pub trait InputSet<'a>: Sized {
 #[derive(Debug, Default)]
 pub struct Out<T> {
     value: T,
-    is_written: bool,
+    done: Done,
+}
+
+/// What a step did with an output.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+enum Done {
+    #[default]
+    Nothing,
+    Kept,
+    Written,
 }
 
 impl<T: Signal> Out<T> {
@@ -276,15 +285,21 @@ impl<T: Signal> Out<T> {
 
     /// The value, to be written whole and in place.
     pub const fn write(&mut self) -> &mut T {
-        self.is_written = true;
+        self.done = Done::Written;
         &mut self.value
+    }
+
+    /// Leaves the output as it was: a value that was there is held, and does not count as new once more. For a node
+    /// that is woken by one input and passes another on.
+    pub const fn keep(&mut self) {
+        self.done = Done::Kept;
     }
 
     /// Takes the buffer from the bus for one step.
     #[doc(hidden)]
     #[inline(always)]
     pub fn take(bus: &mut Bus, port: PortId) -> Self {
-        Self { value: T::take(&mut T::arena_mut(&mut bus.arenas)[port.slot as usize]), is_written: false }
+        Self { value: T::take(&mut T::arena_mut(&mut bus.arenas)[port.slot as usize]), done: Done::Nothing }
     }
 
     /// Puts the buffer back and marks what the step did.
@@ -292,11 +307,14 @@ impl<T: Signal> Out<T> {
     #[inline(always)]
     pub fn put(self, bus: &mut Bus, port: PortId, tick: &Tick) {
         let mark = &mut bus.marks[port.mark as usize];
-        if self.is_written {
-            mark.renew(tick.index, tick.stamp);
-            *mark = self.value.mark(*mark, tick.index);
-        } else if !T::KEEPS {
-            mark.lose(tick.index);
+        match self.done {
+            Done::Written => {
+                mark.renew(tick.index, tick.stamp);
+                *mark = self.value.mark(*mark, tick.index);
+            }
+            Done::Kept if T::STAYS => return,
+            Done::Nothing if !T::KEEPS => mark.lose(tick.index),
+            Done::Kept | Done::Nothing => {}
         }
         T::arena_mut(&mut bus.arenas)[port.slot as usize] = self.value;
     }

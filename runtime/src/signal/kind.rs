@@ -41,10 +41,13 @@ pub trait Signal: Default + Clone + Send + 'static {
         from_step
     }
 
-    /// Takes the buffer out of its slot for one step. What is plain and small starts afresh and leaves its slot alone.
+    /// Takes the buffer out of its slot for one step. What [stays](Self::STAYS) starts afresh.
     fn take(slot: &mut Self) -> Self {
         std::mem::take(slot)
     }
+
+    /// Whether a slot keeps its value while a step writes another: what is plain and small.
+    const STAYS: bool = false;
 
     /// What becomes of the value when its port is made absent.
     fn lose(&mut self, _tick: u64) {}
@@ -145,11 +148,13 @@ kinds! {
     Scalar ScalarShape scalars "scalar" {
         fn allocate(_: &ScalarShape) -> Self { 0.0 }
         fn take(_: &mut Self) -> Self { 0.0 }
+        const STAYS: bool = true;
         fn is_finite(&self) -> bool { all_finite(&[*self]) }
     }
     Flag FlagShape flags "flag" {
         fn allocate(_: &FlagShape) -> Self { false }
         fn take(_: &mut Self) -> Self { false }
+        const STAYS: bool = true;
         fn is_finite(&self) -> bool { true }
     }
     Features FeaturesShape features "feature vector" {
@@ -174,11 +179,13 @@ kinds! {
     Twist TwistShape twists "twist" {
         fn allocate(_: &TwistShape) -> Self { Self::default() }
         fn take(_: &mut Self) -> Self { Self::default() }
+        const STAYS: bool = true;
         fn is_finite(&self) -> bool { all_finite(self.0.as_slice()) }
     }
     Pose PoseShape poses "pose" {
         fn allocate(_: &PoseShape) -> Self { Self::default() }
         fn take(_: &mut Self) -> Self { Self::default() }
+        const STAYS: bool = true;
         fn is_finite(&self) -> bool {
             all_finite(self.0.translation.vector.as_slice()) && all_finite(self.0.rotation.matrix().as_slice())
         }
