@@ -9,6 +9,7 @@ mod determinism;
 mod docs;
 mod erased;
 mod errors;
+mod examples;
 mod faults;
 mod freshness;
 mod live;
