@@ -128,7 +128,7 @@ fn a_probe_is_heard_without_a_switch_and_can_be_silenced() {
     let nothing = "moments.x is absent, moments.force is absent, label.present = 0";
     assert_eq!(lines[0], format!("at 0.000 s: watch: {nothing}"));
     assert!(
-        lines[4].starts_with("at 0.400 s: watch: moments.x = 0.01000 m, moments.force = 3.000 N, label.present = 1")
+        lines[4].starts_with("at 0.400 s: watch: moments.x = 0.01000 m, moments.force = 2.995 N, label.present = 1")
     );
     assert_eq!(lines[9], format!("at 0.900 s: watch: {nothing}"));
     assert!(!run.out.contains("watch: "), "the summary is as it was");

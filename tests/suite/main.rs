@@ -11,6 +11,7 @@ mod erased;
 mod errors;
 mod examples;
 mod faults;
+mod flow;
 mod freshness;
 mod live;
 mod merge;

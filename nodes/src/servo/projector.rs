@@ -6,7 +6,7 @@ use tactflow_runtime::node::{Bit, Mistakes, Node, Setup, Tick};
 use tactflow_runtime::{inputs, outputs, params};
 
 params! {
-    /// Diagonal of P, `[vx, vy, vz, wx, wy, wz]`: 1 passes a component, 0 deletes it.
+    /// Diagonal of P, `[vx, vy, vz, wx, wy, wz]`: 1 passes a component, 0 deletes it [1].
     select: [Bit; 6],
 }
 

@@ -33,19 +33,27 @@ impl Log {
         Self { nodes: engine.logged().iter().map(entry).collect() }
     }
 
+    /// Whether a node said so in the tick that the engine has just run, and somebody listens.
+    pub(super) fn is_due(&self, engine: &Engine) -> bool {
+        self.nodes.iter().any(|entry| entry.is_due(engine)) && tracing::enabled!(target: TARGET, Level::INFO)
+    }
+
     /// Writes a line for each node that said so in the tick that the engine has just run.
     pub(super) fn write(&mut self, engine: &Engine) {
-        if self.nodes.is_empty() || !tracing::enabled!(target: TARGET, Level::INFO) {
-            return;
+        let seconds = engine.now() as f64 * 1e-9;
+        for entry in self.nodes.iter_mut().filter(|entry| entry.is_due(engine)) {
+            entry.columns.read(engine.bus(), &mut entry.row);
+            let values = line(&entry.columns.list, &entry.row);
+            tracing::info!(target: TARGET, "at {seconds:.3} s: {}: {values}", entry.node);
         }
-        let (bus, seconds) = (engine.bus(), engine.now() as f64 * 1e-9);
-        for Entry { node, due, columns, row } in &mut self.nodes {
-            let is_new = bus.marks[due.mark as usize].freshness(engine.ticks()) == Freshness::New;
-            if is_new && Flag::arena(&bus.arenas)[due.slot as usize] {
-                columns.read(bus, row);
-                tracing::info!(target: TARGET, "at {seconds:.3} s: {node}: {}", line(&columns.list, row));
-            }
-        }
+    }
+}
+
+impl Entry {
+    fn is_due(&self, engine: &Engine) -> bool {
+        let bus = engine.bus();
+        let is_new = bus.marks[self.due.mark as usize].freshness(engine.ticks()) == Freshness::New;
+        is_new && Flag::arena(&bus.arenas)[self.due.slot as usize]
     }
 }
 

@@ -35,7 +35,10 @@ pub(super) fn run(catalogue: &Catalogue, args: RunArgs, colour: Colour) -> u8 {
     let outcome = quietly(|| {
         engine::run(&mut engine, &options, &mut |engine| {
             summary.add(engine);
-            log.write(engine);
+            if log.is_due(engine) {
+                progress.clear();
+                log.write(engine);
+            }
             if let Some(recorder) = &mut recorder {
                 recorder.record(engine);
             }

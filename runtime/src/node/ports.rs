@@ -343,3 +343,54 @@ pub trait OutputSet: Sized {
     /// Makes all outputs absent.
     fn lose(bus: &mut Bus, ports: &[PortId], tick: u64);
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::signal::{Joints, JointsShape, Scalar, ScalarShape};
+
+    /// A port of a bus of its own that a first step has written.
+    fn written<T: Signal>(shape: T::Shape, value: T) -> (Bus, PortId) {
+        let mut bus = Bus::default();
+        let port = bus.add(&shape.into());
+        let mut out = Out::<T>::take(&mut bus, port);
+        out.set(value);
+        out.put(&mut bus, port, &Tick::first());
+        (bus, port)
+    }
+
+    fn second(step: impl FnOnce(&mut Out<Scalar>)) -> (Freshness, Scalar) {
+        let (mut bus, port) = written(ScalarShape::default(), 1.5);
+        let mut out = Out::take(&mut bus, port);
+        step(&mut out);
+        out.put(&mut bus, port, &Tick { index: 2, ..Tick::first() });
+        (bus.marks[port.mark as usize].freshness(2), Scalar::arena(&bus.arenas)[port.slot as usize])
+    }
+
+    #[test]
+    fn what_is_kept_is_held_and_what_is_not_written_is_lost() {
+        assert_eq!(second(|out| out.set(2.5)), (Freshness::New, 2.5));
+        assert_eq!(second(|out| out.keep()), (Freshness::Held, 1.5));
+        assert_eq!(second(|_| ()).0, Freshness::Lost);
+    }
+
+    #[test]
+    fn a_buffer_that_is_kept_comes_back_into_its_slot() {
+        let (mut bus, port) = written(JointsShape::default(), Joints([1.0, 2.0].into()));
+        let mut out = Out::<Joints>::take(&mut bus, port);
+        out.keep();
+        out.put(&mut bus, port, &Tick { index: 2, ..Tick::first() });
+        assert_eq!(Joints::arena(&bus.arenas)[port.slot as usize], Joints([1.0, 2.0].into()));
+        assert_eq!(bus.marks[port.mark as usize].freshness(2), Freshness::Held);
+    }
+
+    #[test]
+    fn what_is_absent_stays_so_when_it_is_kept() {
+        let mut bus = Bus::default();
+        let port = bus.add(&ScalarShape::default().into());
+        let mut out = Out::<Scalar>::take(&mut bus, port);
+        out.keep();
+        out.put(&mut bus, port, &Tick::first());
+        assert_eq!(bus.marks[port.mark as usize].freshness(1), Freshness::Absent);
+    }
+}
