@@ -139,26 +139,29 @@ mod tests {
         }
     }
 
+    /// Freshness and value of the output.
+    type Out = (Freshness, Option<f64>);
+
     fn table<N: Node, T: Signal + PartialEq + std::fmt::Debug>(port: &str, shape: Shape, make: fn(f64) -> T) {
-        let steps: [(&str, Comes<f64>, Comes<bool>, Freshness, Option<f64>); 15] = [
-            ("nothing yet", Nothing, Nothing, Freshness::Absent, None),
-            ("no flag", New(1.0), Nothing, Freshness::Absent, None),
-            ("shut", New(2.0), New(false), Freshness::Absent, None),
-            ("it opens on what is held", Nothing, New(true), Freshness::New, Some(2.0)),
-            ("held", Nothing, Nothing, Freshness::Held, Some(2.0)),
-            ("held, though the flag is new", Nothing, New(true), Freshness::Held, Some(2.0)),
-            ("new, though the flag is held", New(3.0), Nothing, Freshness::New, Some(3.0)),
-            ("it shuts", Nothing, New(false), Freshness::Lost, None),
-            ("shut still", New(4.0), Nothing, Freshness::Absent, None),
-            ("it opens", New(5.0), New(true), Freshness::New, Some(5.0)),
-            ("the flag goes", Nothing, Lost, Freshness::Lost, None),
-            ("and comes back", Nothing, New(true), Freshness::New, Some(5.0)),
-            ("the value goes", Lost, New(true), Freshness::Lost, None),
-            ("away", Nothing, New(true), Freshness::Absent, None),
-            ("and comes back", New(6.0), Nothing, Freshness::New, Some(6.0)),
+        let steps: [(&str, Comes<f64>, Comes<bool>, Out); 15] = [
+            ("nothing yet", Nothing, Nothing, (Freshness::Absent, None)),
+            ("no flag", New(1.0), Nothing, (Freshness::Absent, None)),
+            ("shut", New(2.0), New(false), (Freshness::Absent, None)),
+            ("it opens on what is held", Nothing, New(true), (Freshness::New, Some(2.0))),
+            ("held", Nothing, Nothing, (Freshness::Held, Some(2.0))),
+            ("held, though the flag is new", Nothing, New(true), (Freshness::Held, Some(2.0))),
+            ("new, though the flag is held", New(3.0), Nothing, (Freshness::New, Some(3.0))),
+            ("it shuts", Nothing, New(false), (Freshness::Lost, None)),
+            ("shut still", New(4.0), Nothing, (Freshness::Absent, None)),
+            ("it opens", New(5.0), New(true), (Freshness::New, Some(5.0))),
+            ("the flag goes", Nothing, Lost, (Freshness::Lost, None)),
+            ("and comes back", Nothing, New(true), (Freshness::New, Some(5.0))),
+            ("the value goes", Lost, New(true), (Freshness::Lost, None)),
+            ("away", Nothing, New(true), (Freshness::Absent, None)),
+            ("and comes back", New(6.0), Nothing, (Freshness::New, Some(6.0))),
         ];
         let mut rig = NodeRig::new::<N>("", &[(port, shape), ("gate", FlagShape.into())]).unwrap();
-        for (what, value, gate, freshness, expected) in steps {
+        for (what, value, gate, (freshness, expected)) in steps {
             bring(&mut rig, "gate", gate);
             let value = match value {
                 New(value) => New(make(value)),

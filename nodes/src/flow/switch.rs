@@ -140,29 +140,32 @@ mod tests {
         }
     }
 
+    /// What comes in on `on`, `off` and `select`, and freshness and value of what comes out.
+    type Step = (&'static str, Comes<f64>, Comes<f64>, Comes<bool>, (Freshness, Option<f64>));
+
     fn table<N: Node, T: Signal + PartialEq + std::fmt::Debug>(port: &str, shape: &Shape, make: fn(f64) -> T) {
         const GONE: Option<Option<f64>> = Some(None);
         let new = |value: f64| Some(Some(value));
         let say = |flag: bool| Some(Some(flag));
-        let steps: [(&str, Comes<f64>, Comes<f64>, Comes<bool>, Freshness, Option<f64>); 14] = [
-            ("no choice yet", new(1.0), new(-1.0), None, Freshness::Absent, None),
-            ("on, which is held", None, None, say(true), Freshness::New, Some(1.0)),
-            ("nothing happens", None, None, None, Freshness::Held, Some(1.0)),
-            ("the same choice once more", None, None, say(true), Freshness::Held, Some(1.0)),
-            ("only the other is new", None, new(-2.0), None, Freshness::Held, Some(1.0)),
-            ("on is new", new(2.0), None, None, Freshness::New, Some(2.0)),
-            ("off, which is held", None, None, say(false), Freshness::New, Some(-2.0)),
-            ("only the other goes", GONE, None, None, Freshness::Held, Some(-2.0)),
-            ("on, which is not there", None, None, say(true), Freshness::Lost, None),
-            ("on comes", new(3.0), None, None, Freshness::New, Some(3.0)),
-            ("the choice goes", None, None, Some(None), Freshness::Lost, None),
-            ("and comes back", None, None, say(true), Freshness::New, Some(3.0)),
-            ("on goes", GONE, None, None, Freshness::Lost, None),
-            ("off stands in only when it is chosen", None, new(-4.0), say(false), Freshness::New, Some(-4.0)),
+        let steps: [Step; 14] = [
+            ("no choice yet", new(1.0), new(-1.0), None, (Freshness::Absent, None)),
+            ("on, which is held", None, None, say(true), (Freshness::New, Some(1.0))),
+            ("nothing happens", None, None, None, (Freshness::Held, Some(1.0))),
+            ("the same choice once more", None, None, say(true), (Freshness::Held, Some(1.0))),
+            ("only the other is new", None, new(-2.0), None, (Freshness::Held, Some(1.0))),
+            ("on is new", new(2.0), None, None, (Freshness::New, Some(2.0))),
+            ("off, which is held", None, None, say(false), (Freshness::New, Some(-2.0))),
+            ("only the other goes", GONE, None, None, (Freshness::Held, Some(-2.0))),
+            ("on, which is not there", None, None, say(true), (Freshness::Lost, None)),
+            ("on comes", new(3.0), None, None, (Freshness::New, Some(3.0))),
+            ("the choice goes", None, None, Some(None), (Freshness::Lost, None)),
+            ("and comes back", None, None, say(true), (Freshness::New, Some(3.0))),
+            ("on goes", GONE, None, None, (Freshness::Lost, None)),
+            ("off stands in only when it is chosen", None, new(-4.0), say(false), (Freshness::New, Some(-4.0))),
         ];
         let wires = [("on", shape.clone()), ("off", shape.clone()), ("select", FlagShape.into())];
         let mut rig = NodeRig::new::<N>("", &wires).unwrap();
-        for (what, on, off, select, freshness, expected) in steps {
+        for (what, on, off, select, (freshness, expected)) in steps {
             bring(&mut rig, "on", on.map(|on| on.map(make)));
             bring(&mut rig, "off", off.map(|off| off.map(make)));
             bring(&mut rig, "select", select);
