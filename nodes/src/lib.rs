@@ -1,7 +1,8 @@
 //! The catalogue of tactflow: one node per file, the devices, and the roles they fill.
 //!
 //! [`touch`] turns a tactile image into features, [`servo`] turns features into a twist of the sensor, [`arm`] turns
-//! the twist into joint velocities; [`devices`] are the edge.
+//! the twist into joint velocities; [`flow`] opens, chooses, delays, makes and shows signals of any sort; [`devices`]
+//! are the edge.
 //!
 //! A graph runs from Rust on sources that a test feeds, in virtual time:
 //!
@@ -31,6 +32,7 @@ pub mod arm;
 pub mod builtin;
 pub mod calibration;
 pub mod devices;
+pub mod flow;
 pub mod recordings;
 pub mod roles;
 pub mod servo;
@@ -39,6 +41,8 @@ mod tool;
 pub mod touch;
 
 use tactflow_runtime::catalogue::Catalogue;
+use tactflow_runtime::diagnostic::Code;
+use tactflow_runtime::node::{At, Mistake};
 
 #[cfg(feature = "cli")]
 pub use tool::tool;
@@ -74,8 +78,27 @@ pub fn catalogue() -> Catalogue {
         .node::<servo::projector::Projector>()
         .node::<servo::twist_source::TwistSource>()
         .node::<servo::twist_adder::TwistAdder>()
+        .node::<servo::twist_of::TwistOf>()
+        .node::<servo::edge_guard::EdgeGuard>()
         .node::<servo::adjoint::Adjoint>()
         .group("arm: from a twist of the sensor to joint velocities")
         .node::<arm::arm_state::ArmState>()
+        .node::<arm::contact_point::ContactPoint>()
         .node::<arm::ik_sink::IkSink>()
+        .group("flow: what waits, chooses, generates and shows")
+        .node::<flow::contact_debounce::ContactDebounce>()
+        .node::<flow::gate::Gate>()
+        .node::<flow::gate::TwistGate>()
+        .node::<flow::switch::Switch>()
+        .node::<flow::switch::TwistSwitch>()
+        .node::<flow::delay::Delay>()
+        .node::<flow::delay::TwistDelay>()
+        .node::<flow::signal_generator::SignalGenerator>()
+        .node::<flow::probe::Probe>()
+}
+
+/// An input that may be absent, but is of no use when nothing is wired to it.
+fn unwired(node: &str, input: &str, kind: &str, example: &str) -> Mistake {
+    let message = format!("`{node}` needs `in.{input}`, {kind}");
+    Mistake::new(Code::MissingInput, At::Node, message).help(format!("add `in.{input} = \"{example}\"`"))
 }

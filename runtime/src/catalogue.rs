@@ -3,6 +3,7 @@
 use crate::device::{Device, DeviceType, RoleType, device_type};
 use crate::graph::{BuiltinFile, declares_a_unit};
 use crate::node::{Node, NodeType, of};
+use crate::signal::Kind;
 
 /// A list of node types, device types and roles. Several can be joined: somebody else's crate adds its own.
 #[derive(Default)]
@@ -38,7 +39,8 @@ impl Catalogue {
     /// With one more node that is known only at run time.
     ///
     /// # Panics
-    /// If there is a node of that name already, or if a port declares a unit that is neither one nor a variable.
+    /// If there is a node of that name already, if a port declares a unit that is neither one nor a variable, or if a
+    /// node logs and has no flag to say when.
     #[must_use]
     pub fn node_type(mut self, node: Box<dyn NodeType>) -> Self {
         let spec = node.spec();
@@ -47,6 +49,8 @@ impl Catalogue {
         for port in spec.inputs.iter().chain(&spec.outputs) {
             assert!(declares_a_unit(port), "`{}.{}` declares the unit {:?}", spec.name, port.name, port.args.first());
         }
+        let says_when = spec.outputs.first().is_some_and(|port| port.kind == Kind::Flag);
+        assert!(!spec.logs || says_when, "the first output of `{}` is no flag that says when to log", spec.name);
         self.nodes.push(node);
         self
     }
@@ -147,6 +151,7 @@ mod tests {
                 inputs: ports.0,
                 outputs: ports.1,
                 every_tick: false,
+                logs: false,
             }
         }
 

@@ -1,5 +1,6 @@
 //! What the tests share: where things are, and small nodes that make one sentence of the semantics visible.
 
+pub mod examples;
 pub mod nodes;
 
 use std::path::{Path, PathBuf};

@@ -12,6 +12,7 @@ use crate::tool::{Said, peer, said, say, tool};
 const PRESS: &str = "graphs/finger_press.toml";
 const HYBRID: &str = "graphs/hybrid.toml";
 const BREAKS: &str = "tests/data/breaks.toml";
+const PROBE: &str = "tests/data/probe.toml";
 
 /// A name in a folder of its own, for a file that the tool will make.
 fn in_new_folder(name: &str) -> (TempDir, String) {
@@ -117,6 +118,24 @@ fn for_ends_a_run_in_the_graphs_time() {
         assert_eq!(run.code, 0);
         assert!(ending.starts_with("the time is over") && ending.contains(&format!(" {ticks} ticks;")), "{ending}");
     }
+}
+
+#[test]
+fn a_probe_is_heard_without_a_switch_and_can_be_silenced() {
+    let run = say(&["run", PROBE]);
+    let lines: Vec<&str> = run.err.lines().filter_map(|line| Some(line.split_once("INFO probe: ")?.1)).collect();
+    assert_eq!((run.code, lines.len(), run.err.lines().count()), (0, 10, 10), "{}", run.err);
+    let nothing = "moments.x is absent, moments.force is absent, label.present = 0";
+    assert_eq!(lines[0], format!("at 0.000 s: watch: {nothing}"));
+    assert!(
+        lines[4].starts_with("at 0.400 s: watch: moments.x = 0.01000 m, moments.force = 2.995 N, label.present = 1")
+    );
+    assert_eq!(lines[9], format!("at 0.900 s: watch: {nothing}"));
+    assert!(!run.out.contains("watch: "), "the summary is as it was");
+    let silenced = said(tool(&["run", PROBE]).env("RUST_LOG", "warn"));
+    assert_eq!((silenced.code, silenced.err.as_str()), (0, ""));
+    let often = say(&["run", PROBE, "--set", "nodes.watch.every_ms=0"]);
+    assert_eq!(often.err.lines().count(), 250, "one for each image");
 }
 
 #[test]

@@ -15,6 +15,7 @@ use tactflow_tests::nodes::length_by_hand;
 struct Polynomial {
     name: String,
     coefficients: Vec<f64>,
+    logs: bool,
 }
 
 impl NodeType for Polynomial {
@@ -35,6 +36,7 @@ impl NodeType for Polynomial {
             inputs: vec![port("x")],
             outputs: vec![port("y")],
             every_tick: false,
+            logs: self.logs,
         }
     }
 
@@ -74,7 +76,7 @@ impl AnyNode for Polynomial {
 }
 
 fn rig(params: &str) -> Result<GraphRig, String> {
-    let node = Polynomial { name: "poly_7".into(), coefficients: vec![1.0, 0.0, 2.0] };
+    let node = Polynomial { name: "poly_7".into(), coefficients: vec![1.0, 0.0, 2.0], logs: false };
     let text = format!(
         "[graph]\nclock = \"a\"\n[roles]\na = \"length\"\n[nodes.p]\ntype = \"poly_7\"\nin.x = \"a.value\"\n{params}"
     );
@@ -97,4 +99,11 @@ fn its_mistakes_show_on_their_token_like_any_other() {
     let text = rig("scal = 10.0").err().unwrap();
     assert!(text.contains("graph.toml:8:1") && text.contains("did you mean `scale`?"), "{text}");
     assert_eq!(f64::EXPECTS, "a number");
+}
+
+#[test]
+#[should_panic(expected = "the first output of `poly_8` is no flag that says when to log")]
+fn a_node_that_logs_says_when() {
+    let node = Polynomial { name: "poly_8".into(), coefficients: vec![], logs: true };
+    drop(catalogue().node_type(Box::new(node)));
 }

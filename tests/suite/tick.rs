@@ -2,26 +2,33 @@
 
 use tactflow_runtime::engine::Engine;
 use tactflow_runtime::graph::{Request, plan};
+use tactflow_tests::examples::graph_of_all;
 use tactflow_tests::{catalogue, shipped_graphs};
 
-fn engine(graph: &std::path::Path) -> Engine {
-    let plan = plan(&catalogue(), &Request::file(graph));
+/// Every shipped graph, and one of the examples of all nodes: by name, how to load it.
+fn graphs() -> Vec<(String, Request)> {
+    let shipped = shipped_graphs().into_iter().map(|graph| (graph.display().to_string(), Request::file(graph)));
+    shipped.chain([("all examples".into(), Request::text(graph_of_all(&catalogue())))]).collect()
+}
+
+fn engine(request: &Request) -> Engine {
+    let plan = plan(&catalogue(), request);
     Engine::new(plan.unwrap_or_else(|report| panic!("{}", report.render(false))))
 }
 
 #[test]
 fn the_tick_neither_allocates_nor_frees_in_any_shipped_graph() {
-    for graph in shipped_graphs() {
-        let mut engine = engine(&graph);
+    for (graph, request) in graphs() {
+        let mut engine = engine(&request);
         let mut ticks = 0;
         while let Some(now) = engine.next().filter(|_| ticks < 3000) {
             engine.exchange(now).unwrap();
             // From latch to commit: contact comes, flickers and goes in every graph, and states are reset.
             let counted = allocation_counter::measure(|| engine.step().unwrap());
-            assert_eq!(counted.count_total, 0, "{} in tick {}", graph.display(), engine.ticks());
+            assert_eq!(counted.count_total, 0, "{graph} in tick {}", engine.ticks());
             ticks += 1;
         }
-        assert!(ticks > 300, "{}: {ticks} ticks", graph.display());
+        assert!(ticks > 300, "{graph}: {ticks} ticks");
     }
 }
 
@@ -60,7 +67,7 @@ fn the_tick_makes_no_system_call() {
 #[ignore = "run by `the_tick_makes_no_system_call` in a process of its own"]
 fn in_a_jail() {
     let mode = std::env::var("TACTFLOW_JAIL").expect("run by another test");
-    let mut engines: Vec<Engine> = shipped_graphs().iter().map(|graph| engine(graph)).collect();
+    let mut engines: Vec<Engine> = graphs().iter().map(|(_, request)| engine(request)).collect();
     // Whatever a first panic or a first float would set up lazily is set up by the first tick.
     for engine in &mut engines {
         let now = engine.next().unwrap();

@@ -50,7 +50,24 @@ impl Node for ArmState {
     type State = ();
 
     const NAME: &'static str = "arm_state";
-    const SUMMARY: &'static str = "pose and Jacobian of the sensor from the joint positions";
+    const SUMMARY: &'static str = "where the sensor is and how the joints move it: forward kinematics and Jacobian";
+    const DOC: &'static str = "T_gs = T_ge T_es, the paper's section IV: the chain from the model's root to `tip`, \
+        and the `mount` of the sensor on it. It is worked out once here for everybody: `adjoint` and \
+        `contact_point` take the pose, `ik_sink` takes all three outputs.\n\n\
+        The Jacobian is spatial: its columns are twists at the base's origin, and meet what `adjoint` gives. The \
+        textbook's \"geometric\" Jacobian at the tip is another.\n\n\
+        Model, tip and mount are facts of the arm's device, so a graph takes them from there and fits any arm. \
+        `sensor` is the role whose frame the pose is of. The joints of the wire have to be the model's, in its \
+        order.";
+    const EXAMPLE: &'static str = r#"
+[nodes.state]
+type = "arm_state"
+in.position = "arm.position"
+sensor = "pad"
+urdf = { from = "arm.urdf" }
+tip = { from = "arm.tip" }
+mount = { from = "arm.mount" }
+"#;
 
     fn new(params: Params, setup: &mut Setup<Self>) -> Result<Self, Mistakes> {
         let chain = load(&params.urdf, &params.tip, &params.mount)?;

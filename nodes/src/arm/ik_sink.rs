@@ -78,7 +78,26 @@ impl Node for IkSink {
     type State = State;
 
     const NAME: &'static str = "ik_sink";
-    const SUMMARY: &'static str = "joint velocities for a twist, within the arm's limits";
+    const SUMMARY: &'static str = "moves the arm: joint velocities for a twist, within the arm's limits";
+    const DOC: &'static str = "Resolved motion rate control, as in the paper's section IV. Twist and Jacobian are \
+        moved to the sensor's origin, where metres and radians mean what the task means; a damped inverse damps \
+        only the directions whose singular value is below `damping`, so far from a singularity the twist is met \
+        exactly.\n\n\
+        An arm with more than six joints is free to choose its elbow: `posture` says where it drifts, at \
+        `posture_gain`, along motions that leave the sensor still. Speed and position limits of the model are \
+        kept: a command that is too fast is slowed down as a whole and keeps its direction.\n\n\
+        Without a twist, or when twist or arm are older than `max_age_ms`, the last command fades to zero over \
+        `ramp_ms`; the first fresh twist takes over. No velocity is held without a fresh sample behind it. It \
+        keeps no limit on force and none on the speed of the sensor: keep the gains and the guidance small.";
+    const EXAMPLE: &'static str = r#"
+[nodes.ik]
+type = "ik_sink"
+in.twist = "to_base.twist"
+in.sensor_pose = "state.sensor_pose"
+in.jacobian = "state.jacobian"
+in.joints = "state.joints"
+posture = [0.0, 0.5, 0.0, -1.3, 0.0, 1.3, 0.0]   # [rad]
+"#;
     const EVERY_TICK: bool = true;
 
     fn new(params: Params, setup: &mut Setup<Self>) -> Result<Self, Mistakes> {

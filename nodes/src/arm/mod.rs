@@ -2,6 +2,7 @@
 
 pub mod arm_state;
 pub mod chain;
+pub mod contact_point;
 pub mod damped;
 pub mod ik_sink;
 pub mod joint_limits;

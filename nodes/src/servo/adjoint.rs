@@ -33,7 +33,20 @@ impl Node for Adjoint {
     type State = ();
 
     const NAME: &'static str = "adjoint";
-    const SUMMARY: &'static str = "expresses a twist in another frame";
+    const SUMMARY: &'static str = "expresses a motion in another frame, the sensor's in the base's";
+    const DOC: &'static str = "V_B = Ad_T V_A with T = (R, p) the pose of A in B and Ad_T = [R, p^ R; 0, R]: the \
+        paper's eq. 4. It stands between what is said in the sensor's frame and an arm that moves in the base's.\n\n\
+        A twist in the base is spatial: its linear part is the velocity of that point of the body which passes \
+        through the base's origin, and not that of the sensor. A slow roll of a sensor that is 0.7 m away looks \
+        fast there. So limit and plot motions in the sensor's frame, and give the result only to what takes a \
+        spatial twist, such as `ik_sink`.\n\n\
+        Both inputs are needed; the result is as old as the older of them.";
+    const EXAMPLE: &'static str = r#"
+[nodes.to_base]
+type = "adjoint"
+in.twist = "sum.twist"
+in.pose = "state.sensor_pose"
+"#;
 
     fn new(_: Params, _: &mut Setup<Self>) -> Result<Self, Mistakes> {
         Ok(Self)

@@ -45,7 +45,23 @@ impl Node for FeatureError {
     type State = ();
 
     const NAME: &'static str = "feature_error";
-    const SUMMARY: &'static str = "setpoint minus measurement, for every feature";
+    const SUMMARY: &'static str = "sets the targets of a task: setpoint minus measurement, for every feature";
+    const DOC: &'static str = "The vector Δf of the paper's eq. 3: e = setpoint - measured, for every feature that \
+        is wired, under the name it is wired by. The same names come back in `pid` and `inverse_jacobian`, in this \
+        order; a name that is missing there does not load.\n\n\
+        The sign is the same for every feature: which way the sensor moves is said by the columns of \
+        `inverse_jacobian` and nowhere else. A setpoint has the unit of its feature. The error of a line's \
+        direction is wrapped into (-pi/2, pi/2], since a line looks the same after half a turn.\n\n\
+        Each component is as fresh as its own input. A feature that is absent, such as the direction of a round \
+        patch, leaves the others alone; list it in `requires` if there shall be no error at all without it.";
+    const EXAMPLE: &'static str = r#"
+[nodes.error]
+type = "feature_error"
+in.x = "moments.x"
+in.y = "moments.y"
+in.pressure = "smooth.value"
+setpoint = { x = 0.0, y = 0.0, pressure = 0.1 }   # [m, m, N per tactel]
+"#;
 
     fn new(params: Params, setup: &mut Setup<Self>) -> Result<Self, Mistakes> {
         let wires = &setup.inputs.feature;

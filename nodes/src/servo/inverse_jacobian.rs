@@ -45,7 +45,25 @@ impl Node for InverseJacobian {
     type State = ();
 
     const NAME: &'static str = "inverse_jacobian";
-    const SUMMARY: &'static str = "maps the control of each feature to a twist of the sensor";
+    const SUMMARY: &'static str = "turns the control of each feature into a motion of the sensor";
+    const DOC: &'static str = "The twist is the sum over the features of column times control: the matrix J_s^-1 \
+        of the paper's eq. 5, a column a feature. The columns are the only place where signs live. With z out of \
+        the pad toward the object, a right-handed frame and e = setpoint - measured, those of the example are \
+        right.\n\n\
+        The first two columns slide the pad and roll it as well, by 20 rad for each metre of slide: with 1 instead \
+        of 20 it hardly rolls. The rolling entries (wy of x, wx of y) have opposite signs; with equal ones, as the \
+        paper prints them, the contact is lost. A wrong sign runs away at once, so try a new sensor's signs one at \
+        a time, with the others projected out.\n\n\
+        A feature that is absent contributes nothing. Which components are used in the end is said by `projector`.";
+    const EXAMPLE: &'static str = r#"
+[nodes.jacobian]
+type = "inverse_jacobian"
+in.control = "pid.control"
+#                    vx  vy  vz   wx   wy  wz
+columns.x        = [ -1,  0,  0,   0, -20,  0 ]   # [1, rad per m]
+columns.y        = [  0, -1,  0,  20,   0,  0 ]
+columns.pressure = [  0,  0,  1,   0,   0,  0 ]   # [m per N per tactel]
+"#;
 
     fn new(params: Params, setup: &mut Setup<Self>) -> Result<Self, Mistakes> {
         let names = setup.inputs.control.features.iter().map(|feature| feature.name.as_str());

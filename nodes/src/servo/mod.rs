@@ -2,10 +2,12 @@
 
 pub mod adjoint;
 pub mod axial;
+pub mod edge_guard;
 pub mod feature_error;
 pub mod integral;
 pub mod inverse_jacobian;
 pub mod pid;
 pub mod projector;
 pub mod twist_adder;
+pub mod twist_of;
 pub mod twist_source;

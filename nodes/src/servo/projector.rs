@@ -6,7 +6,7 @@ use tactflow_runtime::node::{Bit, Mistakes, Node, Setup, Tick};
 use tactflow_runtime::{inputs, outputs, params};
 
 params! {
-    /// Diagonal of P, `[vx, vy, vz, wx, wy, wz]`: 1 passes a component, 0 deletes it.
+    /// Diagonal of P, `[vx, vy, vz, wx, wy, wz]`: 1 passes a component, 0 deletes it [1].
     select: [Bit; 6],
 }
 
@@ -32,7 +32,20 @@ impl Node for Projector {
     type State = ();
 
     const NAME: &'static str = "projector";
-    const SUMMARY: &'static str = "selects the components of a twist";
+    const SUMMARY: &'static str = "selects which components of a motion are used, and so what a task controls";
+    const DOC: &'static str = "The matrix P of the paper's eq. 3: a diagonal of ones and zeros over `[vx, vy, vz, \
+        wx, wy, wz]`. What is 1 passes unchanged, what is 0 is exactly zero.\n\n\
+        A task is mostly its P: `[1, 1, 0, 0, 0, 0]` holds the contact's place, `[0, 0, 1, 0, 0, 0]` its pressure, \
+        fourth and fifth entry let the pad roll, and the last one follows the direction of an edge.\n\n\
+        A component that is deleted here is free for guidance, which a `twist_adder` adds behind it. Along a line \
+        that is longer than the pad the centre of gravity measures nothing: set that entry of P to 0. A feature \
+        that is projected out goes on integrating in `pid`; give it no ki, or a `within`.";
+    const EXAMPLE: &'static str = r#"
+[nodes.projector]
+type = "projector"
+in.twist = "jacobian.twist"
+select = [1, 1, 1, 0, 0, 0]         # place and pressure, no rolling
+"#;
 
     fn new(params: Params, _: &mut Setup<Self>) -> Result<Self, Mistakes> {
         Ok(Self { passes: params.select.map(|entry| *entry == 1) })

@@ -29,7 +29,18 @@ impl Node for TwistAdder {
     type State = ();
 
     const NAME: &'static str = "twist_adder";
-    const SUMMARY: &'static str = "superimposes twists of one frame";
+    const SUMMARY: &'static str = "adds motions of one frame, such as servoing and guidance";
+    const DOC: &'static str = "The sum of all twists that are wired, each under a name of your choice: the \
+        superposition of the paper's section IV. All are in one frame; a wire in another frame does not load, and \
+        the message says which `adjoint` to put between.\n\n\
+        An absent twist is zero motion, and the sum is absent when all are. It is taken in the order of the wires, \
+        so it is the same to the last bit in every run, and it is as old as the oldest twist in it.";
+    const EXAMPLE: &'static str = r#"
+[nodes.sum]
+type = "twist_adder"
+in.touch = "projector.twist"
+in.guide = "guide.twist"
+"#;
 
     fn new(_: Params, setup: &mut Setup<Self>) -> Result<Self, Mistakes> {
         if setup.inputs.twist.is_empty() {

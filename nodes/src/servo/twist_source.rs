@@ -37,7 +37,20 @@ impl Node for TwistSource {
     type State = ();
 
     const NAME: &'static str = "twist_source";
-    const SUMMARY: &'static str = "a constant twist, for guidance";
+    const SUMMARY: &'static str = "a constant motion, to approach an object or to guide along it";
+    const DOC: &'static str = "Gives one twist in every tick: the external motion V_ext of the paper's Fig. 6, \
+        which a `twist_adder` superimposes on the servoing. Take it to approach along +z, to slide along an edge, \
+        or to roll.\n\n\
+        Wire `in.gate`: the motion goes on only while that flag is there and set, and is as old as the flag, so it \
+        ends with the contact and when the pad falls silent. Without a gate it never ends by itself.\n\n\
+        The twist is in the frame that it is wired to, mostly the sensor's. Guidance along a component that the \
+        projector controls works against the controller: delete that entry of P.";
+    const EXAMPLE: &'static str = r#"
+[nodes.guide]                       # along the pad's y, while there is a contact
+type = "twist_source"
+in.gate = "label.present"
+twist = [0, 0.01, 0, 0, 0, 0]       # [m/s, rad/s]
+"#;
     const EVERY_TICK: bool = true;
 
     fn new(params: Params, setup: &mut Setup<Self>) -> Result<Self, Mistakes> {

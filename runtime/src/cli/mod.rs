@@ -20,6 +20,7 @@ mod entry;
 mod example;
 mod json;
 mod list;
+mod log;
 mod page;
 mod progress;
 mod prose;
@@ -184,6 +185,8 @@ impl Tool {
 
 fn log(cli: &Cli) {
     let level = ["warn", "info", "debug"][usize::from(cli.verbose.min(2))];
+    // What the graph asks to see is seen without a switch.
+    let level = format!("{level},{}=info", log::TARGET);
     let filter = EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new(level));
     let is_coloured = cli.color.is_on(&std::io::stderr());
     tracing_subscriber::fmt().with_env_filter(filter).with_ansi(is_coloured).with_writer(std::io::stderr).init();

@@ -4,6 +4,7 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 use super::check::milliseconds;
+use super::log::Log;
 use super::progress::Progress;
 use super::summary::Summary;
 use super::{FAULTED, NOT_LOADED, OnArgs, Shell};
@@ -79,11 +80,16 @@ impl Job {
         };
         shell.say(&format!("{}: {} nodes, a tick each {}", self.title, engine.order().count(), period(&engine)));
         let mut summary = Summary::new(&engine);
+        let mut log = Log::new(&engine);
         let mut progress = Progress::new(self.duration.or_else(|| engine.end().map(seconds)));
         let options = RunOptions { duration: self.duration, is_realtime: self.realtime };
         let outcome = quietly(|| {
             engine::run(&mut engine, &options, &mut |engine| {
                 summary.add(engine);
+                if log.is_due(engine) {
+                    progress.clear();
+                    log.write(engine);
+                }
                 if let Some(recorder) = &mut recorder {
                     recorder.record(engine);
                 }

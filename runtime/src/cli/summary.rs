@@ -140,7 +140,7 @@ fn nodes(engine: &Engine, outcome: &Outcome) -> String {
 }
 
 /// A number in few characters.
-fn number(value: f64) -> String {
+pub(super) fn number(value: f64) -> String {
     let size = value.abs();
     match size {
         0.0 => "0".into(),

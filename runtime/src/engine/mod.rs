@@ -31,12 +31,24 @@ pub struct Engine {
     decks: Vec<Deck>,
     timeline: Timeline,
     ports: Vec<(PlannedPort, PortId)>,
+    logged: Vec<Logged>,
     /// Name and place of each station.
     names: Vec<(String, String)>,
     /// Name of each role, and the place of the device behind it.
     roles: Vec<(String, String)>,
     timing: Timing,
     sources: Sources,
+}
+
+/// A node that logs what comes in on its wires.
+#[derive(Debug, Clone)]
+pub struct Logged {
+    /// Name of the node.
+    pub node: String,
+    /// The flag that says when.
+    pub due: PortId,
+    /// What its wires come from, in the order of its inputs.
+    pub inputs: Vec<(PlannedPort, PortId)>,
 }
 
 /// A device with what it is handed and what it hands over.
@@ -80,6 +92,14 @@ impl Engine {
                 ports.push((planned.clone(), id));
             }
         }
+        let logged = plan.nodes.iter().filter(|node| node.is_logged).map(|node| {
+            let sources = node.inputs.iter().flat_map(|(_, sources)| sources).map(|source| ids[source]);
+            let port =
+                |id: PortId| ports.iter().find(|(_, known)| *known == id).expect("a wire comes from a port").clone();
+            let due = ids[&Source { producer: Producer::Node(node.index), port: 0 }];
+            Logged { node: node.name.clone(), due, inputs: sources.map(port).collect() }
+        });
+        let logged = logged.collect();
         let names = plan.nodes.iter().map(|node| (node.name.clone(), plan.sources.locate(node.span.start))).collect();
         let place = |device: usize| plan.sources.locate(plan.devices[device].span.start);
         let roles = plan.roles.iter().map(|role| (role.name.clone(), place(role.device))).collect();
@@ -116,6 +136,7 @@ impl Engine {
             decks,
             timeline: Timeline::new(plan.clock, plan.period),
             ports,
+            logged,
             names,
             roles,
             sources: plan.sources,
@@ -287,6 +308,12 @@ impl Engine {
     #[must_use]
     pub fn ports(&self) -> &[(PlannedPort, PortId)] {
         &self.ports
+    }
+
+    /// The nodes that log, in the order in which they step.
+    #[must_use]
+    pub fn logged(&self) -> &[Logged] {
+        &self.logged
     }
 
     /// The names of the nodes in the order in which they step.

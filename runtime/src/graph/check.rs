@@ -219,7 +219,7 @@ impl Builder<'_> {
         };
         let mut ports = Vec::new();
         for (port, (mut shape, output)) in built.outputs.into_iter().zip(&spec.outputs).enumerate() {
-            units.give(output, &mut shape);
+            units.give(output, &format!("{}.{}", node.name, output.name), &mut shape);
             ports.push(self.port(Source { producer: Producer::Node(index), port }, shape));
         }
         self.units.insert(index, units);
@@ -230,6 +230,7 @@ impl Builder<'_> {
             inputs,
             ports,
             is_every_tick: spec.every_tick,
+            is_logged: spec.logs,
             span: node.block.key.span.clone(),
         })
     }

@@ -64,6 +64,8 @@ pub(crate) struct PlannedNode {
     pub(crate) inputs: Vec<(Need, Vec<Source>)>,
     pub(crate) ports: Vec<PlannedPort>,
     pub(crate) is_every_tick: bool,
+    /// Whether the tool logs its inputs; see [`Node::LOGS`](crate::node::Node::LOGS).
+    pub(crate) is_logged: bool,
     /// Where its name stands.
     pub(crate) span: Range<usize>,
 }

@@ -105,14 +105,17 @@ impl Units {
         Err(Clash { has: format!("is in `{unit}`"), takes })
     }
 
-    /// Fills in the unit of an output that follows from its declaration.
-    pub(crate) fn give(&self, port: &PortSpec, shape: &mut Shape) {
+    /// Fills in the unit of an output, called `name`, that follows from its declaration. What nothing has told so far
+    /// is what the node says: an input that is delayed has to agree.
+    pub(crate) fn give(&mut self, port: &PortSpec, name: &str, shape: &mut Shape) {
         match pattern(port) {
             Some(Pattern::Known(unit)) => shape.set_unit(unit),
-            Some(Pattern::Variable { name, per_tactel, per_second }) => {
-                if let Some((unit, _)) = self.known.get(&name) {
+            Some(Pattern::Variable { name: letter, per_tactel, per_second }) => {
+                if let Some((unit, _)) = self.known.get(&letter) {
                     let unit = if per_tactel { unit.per_tactel() } else { *unit };
                     shape.set_unit(if per_second { unit.per_second() } else { unit });
+                } else if let Some(unit) = shape.unit().filter(|_| !per_tactel && !per_second) {
+                    self.known.insert(letter, (unit, name.to_owned()));
                 }
             }
             None | Some(Pattern::Any | Pattern::AnyRate) => {}
@@ -156,8 +159,11 @@ mod tests {
         assert_eq!((clash.has.as_str(), clash.takes.as_str()), ("is in `N`", "`raw` like `n.a`"));
         for (pattern, gives) in [("U", "raw"), ("U/tactel", "raw/tactel"), ("U/s", "raw/s"), ("m", "m"), ("V", "1")] {
             let mut shape = scalar("1");
-            units.give(&port(pattern), &mut shape);
+            units.give(&port(pattern), "n.y", &mut shape);
             assert_eq!(shape.unit().unwrap().to_string(), gives);
         }
+        units.give(&port("W"), "n.y", &mut scalar("kPa"));
+        let clash = units.take(&port("W"), "n.c", &scalar("N")).unwrap_err();
+        assert_eq!(clash.takes, "`kPa` like `n.y`", "an input that is compared later");
     }
 }

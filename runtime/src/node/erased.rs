@@ -30,6 +30,8 @@ pub struct NodeSpec {
     pub outputs: Vec<PortSpec>,
     /// Whether it steps in every tick.
     pub every_tick: bool,
+    /// Whether the tool logs what came in on its wires; see [`Node::LOGS`].
+    pub logs: bool,
 }
 
 /// What a node is made from: the shapes its wires bring, by input in the order of the declaration.
@@ -96,6 +98,7 @@ impl<N: Node> NodeType for Typed<N> {
             inputs: <N::Inputs<'static> as InputSet<'static>>::specs(),
             outputs: N::Outputs::specs(),
             every_tick: N::EVERY_TICK,
+            logs: N::LOGS,
         }
     }
 

@@ -53,6 +53,9 @@ pub trait Node: Sized + Send + 'static {
     const EXAMPLE: &'static str = "";
     /// Whether it steps in every tick, and not only when a trigger is new or lost: sinks and generators.
     const EVERY_TICK: bool = false;
+    /// Whether the tool logs what came in on the wires, after each tick in which the first output, a flag, is new and
+    /// set. A step never logs: it decides, and the edge writes.
+    const LOGS: bool = false;
 
     /// Makes the node: reads the shapes of the inputs and sets those of the outputs. May fail, may allocate.
     ///

@@ -266,7 +266,16 @@ pub trait InputSet<'a>: Sized {
 #[derive(Debug, Default)]
 pub struct Out<T> {
     value: T,
-    is_written: bool,
+    done: Done,
+}
+
+/// What a step did with an output.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+enum Done {
+    #[default]
+    Nothing,
+    Kept,
+    Written,
 }
 
 impl<T: Signal> Out<T> {
@@ -277,15 +286,21 @@ impl<T: Signal> Out<T> {
 
     /// The value, to be written whole and in place.
     pub const fn write(&mut self) -> &mut T {
-        self.is_written = true;
+        self.done = Done::Written;
         &mut self.value
+    }
+
+    /// Leaves the output as it was: a value that was there is held, and does not count as new once more. For a node
+    /// that is woken by one input and passes another on.
+    pub const fn keep(&mut self) {
+        self.done = Done::Kept;
     }
 
     /// Takes the buffer from the bus for one step.
     #[doc(hidden)]
     #[inline(always)]
     pub fn take(bus: &mut Bus, port: PortId) -> Self {
-        Self { value: T::take(&mut T::arena_mut(&mut bus.arenas)[port.slot as usize]), is_written: false }
+        Self { value: T::take(&mut T::arena_mut(&mut bus.arenas)[port.slot as usize]), done: Done::Nothing }
     }
 
     /// Puts the buffer back and marks what the step did.
@@ -293,11 +308,14 @@ impl<T: Signal> Out<T> {
     #[inline(always)]
     pub fn put(self, bus: &mut Bus, port: PortId, tick: &Tick) {
         let mark = &mut bus.marks[port.mark as usize];
-        if self.is_written {
-            mark.renew(tick.index, tick.stamp);
-            *mark = self.value.mark(*mark, tick.index);
-        } else if !T::KEEPS {
-            mark.lose(tick.index);
+        match self.done {
+            Done::Written => {
+                mark.renew(tick.index, tick.stamp);
+                *mark = self.value.mark(*mark, tick.index);
+            }
+            Done::Kept if T::STAYS => return,
+            Done::Nothing if !T::KEEPS => mark.lose(tick.index),
+            Done::Kept | Done::Nothing => {}
         }
         T::arena_mut(&mut bus.arenas)[port.slot as usize] = self.value;
     }
@@ -325,4 +343,55 @@ pub trait OutputSet: Sized {
     fn put(self, bus: &mut Bus, ports: &[PortId], tick: &Tick);
     /// Makes all outputs absent.
     fn lose(bus: &mut Bus, ports: &[PortId], tick: u64);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::signal::{Joints, JointsShape, Scalar, ScalarShape};
+
+    /// A port of a bus of its own that a first step has written.
+    fn written<T: Signal>(shape: T::Shape, value: T) -> (Bus, PortId) {
+        let mut bus = Bus::default();
+        let port = bus.add(&shape.into());
+        let mut out = Out::<T>::take(&mut bus, port);
+        out.set(value);
+        out.put(&mut bus, port, &Tick::first());
+        (bus, port)
+    }
+
+    fn second(step: impl FnOnce(&mut Out<Scalar>)) -> (Freshness, Scalar) {
+        let (mut bus, port) = written(ScalarShape::default(), 1.5);
+        let mut out = Out::take(&mut bus, port);
+        step(&mut out);
+        out.put(&mut bus, port, &Tick { index: 2, ..Tick::first() });
+        (bus.marks[port.mark as usize].freshness(2), Scalar::arena(&bus.arenas)[port.slot as usize])
+    }
+
+    #[test]
+    fn what_is_kept_is_held_and_what_is_not_written_is_lost() {
+        assert_eq!(second(|out| out.set(2.5)), (Freshness::New, 2.5));
+        assert_eq!(second(|out| out.keep()), (Freshness::Held, 1.5));
+        assert_eq!(second(|_| ()).0, Freshness::Lost);
+    }
+
+    #[test]
+    fn a_buffer_that_is_kept_comes_back_into_its_slot() {
+        let (mut bus, port) = written(JointsShape::default(), Joints([1.0, 2.0].into()));
+        let mut out = Out::<Joints>::take(&mut bus, port);
+        out.keep();
+        out.put(&mut bus, port, &Tick { index: 2, ..Tick::first() });
+        assert_eq!(Joints::arena(&bus.arenas)[port.slot as usize], Joints([1.0, 2.0].into()));
+        assert_eq!(bus.marks[port.mark as usize].freshness(2), Freshness::Held);
+    }
+
+    #[test]
+    fn what_is_absent_stays_so_when_it_is_kept() {
+        let mut bus = Bus::default();
+        let port = bus.add(&ScalarShape::default().into());
+        let mut out = Out::<Scalar>::take(&mut bus, port);
+        out.keep();
+        out.put(&mut bus, port, &Tick::first());
+        assert_eq!(bus.marks[port.mark as usize].freshness(1), Freshness::Absent);
+    }
 }

@@ -41,10 +41,13 @@ pub trait Signal: Default + Clone + Send + 'static {
         from_step
     }
 
-    /// Takes the buffer out of its slot for one step. What is plain and small starts afresh and leaves its slot alone.
+    /// Takes the buffer out of its slot for one step. What [stays](Self::STAYS) starts afresh.
     fn take(slot: &mut Self) -> Self {
         std::mem::take(slot)
     }
+
+    /// Whether a slot keeps its value while a step writes another: what is plain and small.
+    const STAYS: bool = false;
 
     /// What becomes of the value when its port is made absent.
     fn lose(&mut self, _tick: u64) {}
@@ -170,12 +173,14 @@ kinds! {
         "It belongs to a frame. Its unit is known at load." {
         fn allocate(_: &ScalarShape) -> Self { 0.0 }
         fn take(_: &mut Self) -> Self { 0.0 }
+        const STAYS: bool = true;
         fn is_finite(&self) -> bool { all_finite(&[*self]) }
     }
     Flag FlagShape flags "flag" "flag": "a yes or no",
         "It has no unit. Gates and conditions are flags." {
         fn allocate(_: &FlagShape) -> Self { false }
         fn take(_: &mut Self) -> Self { false }
+        const STAYS: bool = true;
         fn is_finite(&self) -> bool { true }
     }
     Features FeaturesShape features "features" "feature vector": "named numbers, each with a unit and a freshness of its own",
@@ -209,12 +214,14 @@ kinds! {
         sensor's axes; one in `base` is spatial, at the base's origin (paper eq. 4)." {
         fn allocate(_: &TwistShape) -> Self { Self::default() }
         fn take(_: &mut Self) -> Self { Self::default() }
+        const STAYS: bool = true;
         fn is_finite(&self) -> bool { all_finite(self.0.as_slice()) }
     }
     Pose PoseShape poses "pose" "pose": "where one frame is in another",
         "A rotation and a translation [m] that take points of the first frame to the second." {
         fn allocate(_: &PoseShape) -> Self { Self::default() }
         fn take(_: &mut Self) -> Self { Self::default() }
+        const STAYS: bool = true;
         fn is_finite(&self) -> bool {
             all_finite(self.0.translation.vector.as_slice()) && all_finite(self.0.rotation.matrix().as_slice())
         }
