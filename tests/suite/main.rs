@@ -15,6 +15,7 @@ mod live;
 mod merge;
 mod mutations;
 mod oracles;
+mod reference;
 mod tick;
 mod tidy;
 mod tool;

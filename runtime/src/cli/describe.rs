@@ -8,7 +8,7 @@ use super::prose::{Look, markdown};
 use super::{NOT_LOADED, Shell};
 use crate::diagnostic::meant;
 
-/// Describe a node, a device, a role or a kind of signal: ports, parameters and a whole graph to paste
+/// Describe one of them in full, with a graph to paste
 #[derive(clap::Parser)]
 #[command(
     name = "describe",

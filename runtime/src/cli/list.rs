@@ -5,7 +5,7 @@ use super::entry::{Entries, Entry, Sort};
 use super::prose::{Block, Item, Look};
 use super::{NOT_LOADED, Shell};
 
-/// List what a graph may be made of: nodes, devices, roles, kinds of signals and built-in files
+/// List nodes, devices, roles, kinds of signals and built-in files
 #[derive(clap::Parser)]
 #[command(
     name = "list",

@@ -14,6 +14,7 @@
 #![allow(clippy::print_stderr, reason = "this is where the tool speaks")]
 
 mod check;
+mod completions;
 mod course;
 mod describe;
 mod entry;
@@ -23,8 +24,10 @@ mod list;
 mod page;
 mod progress;
 mod prose;
+mod reference;
 mod run;
 mod shell;
+mod show;
 mod summary;
 
 use std::marker::PhantomData;
@@ -39,6 +42,7 @@ use crate::graph::Request;
 
 /// The parser of arguments, for commands of one's own.
 pub use clap;
+pub use reference::reference;
 use shell::Colour;
 pub use shell::Shell;
 
@@ -138,7 +142,14 @@ impl Tool {
     pub fn new(catalogue: Catalogue) -> Self {
         Self {
             catalogue,
-            commands: vec![derived(run::run), derived(check::check), derived(list::list), derived(describe::describe)],
+            commands: vec![
+                derived(run::run),
+                derived(check::check),
+                derived(list::list),
+                derived(describe::describe),
+                derived(show::show),
+                derived(completions::completions),
+            ],
         }
     }
 
@@ -169,7 +180,8 @@ impl Tool {
         };
         let cli = Cli::from_arg_matches(&matches).expect("they were parsed as they are declared");
         log(&cli);
-        let shell = Shell::new(self.catalogue, cli.color);
+        let arguments = self.arguments();
+        let shell = Shell::new(self.catalogue, cli.color, arguments);
         let (name, matches) = matches.subcommand().expect("one is required");
         let command = self.commands.iter().find(|command| command.command().get_name() == name);
         command.expect("clap knows no others").run(matches, &shell).into()

@@ -82,6 +82,8 @@ pub(crate) struct FlatNode {
 #[derive(Debug, Default)]
 pub(crate) struct Flat {
     pub(crate) table: Option<GraphTable>,
+    /// The section [graph] as it is written.
+    pub(crate) settings: Option<Value>,
     /// Where to show what is missing in the graph as a whole.
     pub(crate) place: Range<usize>,
     pub(crate) roles: Vec<(Key, Word)>,
@@ -141,6 +143,7 @@ impl Loader {
                 None
             }
         };
+        flat.settings = root.0.get("graph").cloned();
         flat.bench = self.bench(request, &flat, &root.0, bench_set);
         flat.roles.clone_from(&document.roles);
         flat.commands.clone_from(&document.commands);
