@@ -2,8 +2,10 @@
 #![allow(clippy::unwrap_used, reason = "clippy knows a test by its attribute, and this crate is nothing but tests")]
 
 mod absence;
+mod answers;
 mod bad_data;
 mod cli;
+mod complete;
 mod course;
 mod determinism;
 mod docs;

@@ -1,6 +1,6 @@
 //! The reference under docs/reference is what the catalogue says today. With `TACTFLOW_BLESS=1` it is written anew.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::PathBuf;
 
@@ -30,13 +30,13 @@ fn the_reference_is_current() {
 
 #[test]
 fn every_node_and_device_has_its_place_in_the_index() {
-    let index = fs::read_to_string(folder().join("README.md")).unwrap();
     let catalogue = tactflow_nodes::catalogue();
+    let pages: BTreeMap<String, String> = reference(&catalogue).into_iter().collect();
+    let index = &pages["README.md"];
     let nodes = catalogue.nodes().iter().map(|node| node.spec().name.into_owned());
     for name in nodes.chain(catalogue.devices().iter().map(|device| device.name().into_owned())) {
         let line = index.lines().find(|line| line.contains(&format!("[`{name}`]"))).unwrap_or_else(|| panic!("{name}"));
         let file = line.split("](").nth(1).and_then(|rest| rest.split('#').next()).unwrap();
-        let page = fs::read_to_string(folder().join(file)).unwrap();
-        assert!(page.lines().any(|heading| heading == format!("## `{name}`")), "{file} has no {name}");
+        assert!(pages[file].lines().any(|heading| heading == format!("## `{name}`")), "{file} has no {name}");
     }
 }

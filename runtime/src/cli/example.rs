@@ -36,6 +36,15 @@ struct Piece {
 /// Sections that several devices share.
 const SHARED: [&str; 3] = ["roles", "commands", "bind"];
 
+/// A whole graph around a node or a device, by its name.
+///
+/// # Errors
+/// Which example is missing, or is no TOML.
+pub fn example(catalogue: &Catalogue, name: &str) -> Result<String, String> {
+    let is_node = catalogue.nodes().iter().any(|node| node.spec().name == name);
+    compose(catalogue, if is_node { Asked::Node(name) } else { Asked::Device(name) })
+}
+
 /// The graph, or why there is none.
 ///
 /// # Errors

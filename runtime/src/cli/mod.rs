@@ -42,6 +42,7 @@ use crate::graph::Request;
 
 /// The parser of arguments, for commands of one's own.
 pub use clap;
+pub use example::example;
 pub use reference::reference;
 use shell::Colour;
 pub use shell::Shell;
