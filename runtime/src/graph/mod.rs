@@ -19,11 +19,14 @@ mod value;
 mod wires;
 
 pub use check::plan;
+#[cfg(feature = "cli")]
 pub(crate) use frames::frame_args;
 pub use load::Request;
 pub use outline::{NOWHERE, Origin, Outline, OutlinedBlock, OutlinedRole, OutlinedWire, Setting};
 pub(crate) use plan::{Clock, PlannedCommand, PlannedNode, Producer, Source};
 pub use plan::{Plan, PlannedPort};
 pub use sources::{BuiltinFile, SourceFile, Sources};
-pub(crate) use units::{declares_a_unit, may_fit};
+pub(crate) use units::declares_a_unit;
+#[cfg(feature = "cli")]
+pub(crate) use units::may_fit;
 pub use value::{Item, Key, Table, Value, parse_table};

@@ -5,8 +5,8 @@
 
 use std::collections::BTreeSet;
 
-use super::may_fit;
 use super::plan::Producer;
+use super::units::may_fit;
 use super::wires::{CommandWire, Model, Wire};
 use crate::diagnostic::{Code, Diagnostic};
 use crate::node::Need;
