@@ -74,11 +74,10 @@ fn missing(catalogue: &Catalogue, said: &Said) -> Vec<String> {
     params(&said.params, "", &mut note);
     match example(catalogue, &said.name) {
         Err(why) => note(true, format!("an example: {why}")),
-        Ok(text) => {
-            if let Err(why) = runs_anywhere(catalogue, &text) {
-                note(true, format!("an example that runs:\n{why}\n{text}"));
-            }
-        }
+        Ok(text) => match runs_anywhere(catalogue, &text, None) {
+            Err(why) => note(true, format!("an example that runs:\n{why}\n{text}")),
+            Ok(()) => defaults(catalogue, said, &text, &mut note),
+        },
     }
     missing
 }
@@ -93,10 +92,28 @@ fn params(specs: &[ParamSpec], path: &str, note: &mut impl FnMut(bool, String)) 
     }
 }
 
+/// A default can be pasted where the parameter stands: it reads as the reference shows it.
+fn defaults(catalogue: &Catalogue, said: &Said, text: &str, note: &mut impl FnMut(bool, String)) {
+    let root: toml::Table = text.parse().expect("it has loaded");
+    for section in ["nodes", "devices"] {
+        let blocks = root.get(section).and_then(toml::Value::as_table).into_iter().flatten();
+        for (block, _) in blocks.filter(|(_, block)| block["type"].as_str() == Some(&said.name)) {
+            for param in &said.params {
+                // One that is given in the example may be there because the default would not do.
+                let is_given = root[section][block].get(param.name).is_some();
+                let Some(default) = param.default.as_ref().filter(|_| !is_given) else { continue };
+                let set = format!("{section}.{block}.{}={default}", param.name);
+                note(runs_anywhere(catalogue, text, Some(&set)).is_err(), format!("a default that reads: {set}"));
+            }
+        }
+    }
+}
+
 /// An example loads in a folder where nothing else is: what it needs is built in.
-fn runs_anywhere(catalogue: &Catalogue, text: &str) -> Result<(), String> {
+fn runs_anywhere(catalogue: &Catalogue, text: &str, set: Option<&str>) -> Result<(), String> {
     let folder = tempfile::tempdir().unwrap();
     let request = Request { text: Some(text.to_owned()), ..Request::file(folder.path().join("try.toml")) };
+    let request = set.map_or(request.clone(), |set| request.set(set));
     plan(catalogue, &request).map(drop).map_err(|report| report.render(false))
 }
 
