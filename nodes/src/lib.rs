@@ -43,9 +43,10 @@ pub fn catalogue() -> Catalogue {
         .files(builtin::FILES)
         .role(roles::tactile_pad())
         .role(roles::velocity_arm())
-        .device::<devices::tekscan::TekscanMovie>()
+        // The first that fills a role is the one that examples take.
         .device::<devices::mock_pad::MockPad>()
         .device::<devices::mock_arm::MockArm>()
+        .device::<devices::tekscan::TekscanMovie>()
         .group("touch: from a tactile image to features of the contact")
         .node::<touch::tactile_source::TactileSource>()
         .node::<touch::calibrate::Calibrate>()

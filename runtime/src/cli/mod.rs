@@ -104,7 +104,8 @@ impl<A: CommandFactory + FromArgMatches, F: Fn(A, &Shell) -> u8> Subcommand for 
 #[derive(Parser)]
 #[command(name = "tactflow", version, max_term_width = 100)]
 #[command(subcommand_required = true, arg_required_else_help = true)]
-#[command(after_help = "Exit codes: 0 all went well; 1 the run ended in a fault; 2 a file does not load.")]
+#[command(after_help = "Exit codes: 0 all went well; 1 the run ended in a fault; 2 a file does not load, or the \
+                       command line is not understood.")]
 struct Cli {
     /// When to use colours; `auto` means on a terminal, unless NO_COLOR is set
     #[arg(long, global = true, value_enum, default_value_t = Colour::Auto, value_name = "WHEN")]

@@ -2,7 +2,7 @@
 //!
 //! In the order of the work: `document` (what the sections hold), `load` (files, parts and `--set` become one flat
 //! graph), `wires` (where each comes from), `devices` (the bench is opened), `order`, `frames`, `units`, and `check`,
-//! which builds the nodes on the way to a `plan`.
+//! which builds the nodes on the way to a `plan`. `unread` looks for loose ends, and `outline` says where all came from.
 
 mod check;
 mod devices;
