@@ -52,7 +52,7 @@ fn a_list_finds_a_node_by_what_it_is_for() {
         assert!(list.split_whitespace().any(|name| name == found), "{args:?}: {list}");
         assert!(!list.contains(other), "{args:?}: {list}");
     }
-    assert_eq!(json(&["list", "nodes", "unicorn"], 0), "\n");
+    assert_eq!(json(&["list", "nodes", "unicorn"], 2), "\n");
     let nothing = say(&["list", "nodes", "unicorn"]);
     let message = "error: nothing in the catalogue speaks of `nodes unicorn`\n";
     assert_eq!((nothing.code, nothing.out.as_str(), nothing.err.as_str()), (2, "", message));

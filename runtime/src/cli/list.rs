@@ -36,15 +36,12 @@ pub(super) fn list(args: List, shell: &Shell) -> u8 {
     });
     if args.format == Format::Json {
         shell.say_json(&found.iter().map(Line::of).collect::<Vec<_>>());
-        return 0;
-    }
-    if found.is_empty() {
+    } else if found.is_empty() {
         shell.error(format_args!("nothing in the catalogue speaks of `{}`", args.words.join(" ")));
-        return NOT_LOADED;
+    } else {
+        shell.say(&Look::new(shell.has_colour()).render(&blocks(&found)));
     }
-    let look = Look::new(shell.has_colour());
-    shell.say(&look.render(&blocks(&found)));
-    0
+    if found.is_empty() { NOT_LOADED } else { 0 }
 }
 
 /// What the JSON of a list says of one thing.
