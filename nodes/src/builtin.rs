@@ -9,5 +9,6 @@ pub const FILES: &[BuiltinFile] = &[
     ("finger_press.csv", include_bytes!("../../graphs/recordings/pressuRe/iscan_test.csv")),
     ("lwr4p.urdf", include_bytes!("../../graphs/robots/lwr4p.urdf")),
     ("parts/touch.toml", include_bytes!("../../graphs/parts/touch.toml")),
+    ("parts/ruler.toml", include_bytes!("../../graphs/parts/ruler.toml")),
     ("parts/move.toml", include_bytes!("../../graphs/parts/move.toml")),
 ];

@@ -54,6 +54,7 @@ pub fn catalogue() -> Catalogue {
         .files(builtin::FILES)
         .role(roles::tactile_pad())
         .role(roles::velocity_arm())
+        // The first that fills a role is the one that examples take.
         .device::<devices::mock_pad::MockPad>()
         .device::<devices::recording::Player>()
         .device::<devices::mock_arm::MockArm>()

@@ -239,7 +239,8 @@ fn every_invariant_names_tests_that_exist() {
 fn every_link_of_the_pages_leads_somewhere() {
     let docs = workspace().join("docs");
     let decisions = fs::read_dir(docs.join("decisions")).unwrap().map(|entry| entry.unwrap().path());
-    let mut pages: Vec<PathBuf> = decisions.collect();
+    let reference = fs::read_dir(docs.join("reference")).unwrap().map(|entry| entry.unwrap().path());
+    let mut pages: Vec<PathBuf> = decisions.chain(reference).collect();
     pages.extend(
         ["ARCHITECTURE.md", "calibration.md", "graph-files.md", "writing-a-node.md"].map(|name| docs.join(name)),
     );

@@ -42,7 +42,7 @@ fn what_is_wrong_is_told_once_with_a_way_out() {
     let cases: [(&[&str], &str); 6] = [
         (&["features", "nowhere.csv"], "cannot read `nowhere.csv`: No such file"),
         (&["features", "Cargo.toml"], "`Cargo.toml` is no recording of a known format: it begins with `[workspace]`"),
-        (&["features", PRESS, "--pitch-mm", "5"], "expected two numbers with a comma between them"),
+        (&["features", PRESS, "--pitch-mm", "5"], "expected two numbers, as 16x16"),
         (&["features", PRESS, "--pitch-mm", "5,5"], "the file says otherwise: [1.27, 1.27] mm"),
         (&["features", PRESS, "--unit", "pounds"], "`pounds` is not a unit"),
         (&["features", PRESS, "--threshold", "nan"], "expected a number"),

@@ -2,9 +2,11 @@
 #![allow(clippy::unwrap_used, reason = "clippy knows a test by its attribute, and this crate is nothing but tests")]
 
 mod absence;
+mod answers;
 mod bad_data;
 mod calibrate;
 mod cli;
+mod complete;
 mod course;
 mod determinism;
 mod docs;
@@ -20,6 +22,7 @@ mod merge;
 mod mutations;
 mod oracles;
 mod recordings;
+mod reference;
 mod tick;
 mod tidy;
 mod tool;

@@ -8,7 +8,7 @@ use tactflow_tests::{catalogue, shipped_graphs};
 /// Every shipped graph, and one of the examples of all nodes: by name, how to load it.
 fn graphs() -> Vec<(String, Request)> {
     let shipped = shipped_graphs().into_iter().map(|graph| (graph.display().to_string(), Request::file(graph)));
-    shipped.chain([("all examples".into(), Request::text(graph_of_all(&catalogue())))]).collect()
+    shipped.chain([("all examples".into(), Request::text(graph_of_all(&tactflow_nodes::catalogue())))]).collect()
 }
 
 fn engine(request: &Request) -> Engine {

@@ -23,9 +23,9 @@ params! {
     posture: Option<Vec<f64>>,
     /// How fast it drifts there [1/s].
     posture_gain: NonNegative = NonNegative(0.5),
-    /// Greatest speed toward a position limit, per distance to it [1/s]; 5, or half the graph's rate if that is less.
+    /// Greatest speed toward a position limit, per distance to it; 5, or half the graph's rate if that is less [1/s].
     limit_gain: Option<Positive>,
-    /// Greatest age of the twist and of the arm's state [ms]; five periods of the graph unless given.
+    /// Greatest age of the twist and of the arm's state; five periods of the graph unless given [ms].
     max_age_ms: Option<Positive>,
     /// Time in which a command fades to zero when nothing fresh comes [ms].
     ramp_ms: Positive = Positive(100.0),

@@ -5,7 +5,6 @@
 //! this runs in a graph: there the node `calibrate` takes the file.
 
 #[cfg(feature = "cli")]
-pub mod command;
 pub mod curve;
 pub mod file;
 pub mod fit;

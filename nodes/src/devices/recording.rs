@@ -100,6 +100,7 @@ fn hints(params: &Params) -> Result<Hints, Mistakes> {
         return Err(mistake.help(format!("formats are {}", names.join(", "))).into());
     }
     Ok(Hints {
+        assumed: None,
         format: params.format.clone(),
         unit: params.unit,
         pitch: params.pitch_mm.map(|pitch| pitch.map(|mm| *mm * 1e-3)),

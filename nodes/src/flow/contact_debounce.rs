@@ -71,7 +71,8 @@ impl Node for ContactDebounce {
     type State = State;
 
     const NAME: &'static str = "contact_debounce";
-    const SUMMARY: &'static str = "a contact that does not flicker: it counts once it has lasted for some samples";
+    const SUMMARY: &'static str =
+        "makes a contact that does not flicker: it counts once it has lasted for some samples";
     const DOC: &'static str = "Looks at the newest `samples` flags, five unless given. `present` is set once all \
         of them have a contact and cleared once none has, so a contact of a few frames never counts and a gap of a \
         few frames changes nothing. The price is a delay of `samples - 1` frames, 16 ms at 250 Hz.\n\n\

@@ -17,6 +17,8 @@ pub struct Hints {
     pub rate_hz: Option<f64>,
     /// Number of rows and of columns.
     pub size: Option<[usize; 2]>,
+    /// What is taken where neither the file nor a hint says it; nothing unless it does not matter.
+    pub assumed: Option<Assumed>,
     /// Name of the pad, where a file has several.
     pub pad: Option<String>,
 }
@@ -35,6 +37,17 @@ fn agree(a: f64, b: f64) -> bool {
     (a - b).abs() <= ROUNDING * a.abs().max(b.abs())
 }
 
+/// What is taken where nobody says it, by those to whom it does not matter.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Assumed {
+    /// Unit of the cells.
+    pub unit: Unit,
+    /// Distance between the centres of two neighbours along x and along y [m].
+    pub pitch: [f64; 2],
+    /// Frames per second [1/s].
+    pub rate_hz: f64,
+}
+
 impl Hints {
     /// The unit, from what the file says of it.
     ///
@@ -42,7 +55,8 @@ impl Hints {
     /// When nobody says it, or they differ.
     pub fn unit(&self, said: Option<Unit>) -> Result<Unit, Refusal> {
         let help = "give the bench's device a `unit`, as `unit = \"kPa\"`, or `unit = \"raw\"` for plain counts";
-        choose(said, self.unit, "unit", help, |a, b| a == b, Unit::to_string)
+        let given = self.given(said.is_some(), self.unit, |assumed| assumed.unit);
+        choose(said, given, "unit", help, |a, b| a == b, Unit::to_string)
     }
 
     /// The pitch along x and along y [m], from what the file says of it.
@@ -53,7 +67,8 @@ impl Hints {
         let help = "give the bench's device a `pitch_mm = [x, y]`: the distances between the centres of two neighbours";
         let same = |a: &[f64; 2], b: &[f64; 2]| agree(a[0], b[0]) && agree(a[1], b[1]);
         let show = |pitch: &[f64; 2]| format!("[{}, {}] mm", millimetres(pitch[0]), millimetres(pitch[1]));
-        choose(said, self.pitch, "pitch_mm", help, same, show)
+        let given = self.given(said.is_some(), self.pitch, |assumed| assumed.pitch);
+        choose(said, given, "pitch_mm", help, same, show)
     }
 
     /// The nominal time between two frames [s], from what the file says of it.
@@ -62,7 +77,7 @@ impl Hints {
     /// When nobody says it, or they differ.
     pub fn period(&self, said: Option<f64>) -> Result<f64, Refusal> {
         let help = "give the bench's device a `rate_hz`: the frames per second of the recording";
-        let given = self.rate_hz.map(|rate| 1.0 / rate);
+        let given = self.given(said.is_some(), self.rate_hz, |assumed| assumed.rate_hz).map(|rate| 1.0 / rate);
         let show = |period: &f64| format!("{} frames a second", (1e6 / period).round() / 1e6);
         let period = choose(said, given, "rate_hz", help, |a, b| agree(*a, *b), show)?;
         if (SHORTEST..=LONGEST).contains(&period) {
@@ -98,6 +113,11 @@ impl Hints {
             }
         }
         Err(Refusal::Silent { message: format!("{SILENT}{}", missing.join(", or ")), help: ways_out.join("; ") })
+    }
+
+    /// What is known from elsewhere, and where nobody says anything, what is assumed.
+    fn given<T>(&self, is_said: bool, hint: Option<T>, assumed: impl Fn(&Assumed) -> T) -> Option<T> {
+        hint.or_else(|| self.assumed.as_ref().filter(|_| !is_said).map(assumed))
     }
 
     /// The number of rows and of columns, from what the file says of it.

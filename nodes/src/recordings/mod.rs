@@ -25,7 +25,7 @@ mod testing;
 
 use tactflow_runtime::signal::ImageShape;
 
-pub use hints::Hints;
+pub use hints::{Assumed, Hints};
 pub use text::Flaw;
 
 /// Every format that is read: one line each, those that are sure of themselves first.

@@ -4,11 +4,11 @@
 
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
-use std::str::FromStr;
 
 use tactflow_runtime::cli::{Job, Shell, clap, duration};
 use tactflow_runtime::graph::Request;
 
+use super::pair;
 use crate::recordings::{self, Hints, Recording};
 
 /// The features of the contact in a recording: where it is, how strong, along which line
@@ -19,8 +19,8 @@ use crate::recordings::{self, Hints, Recording};
 
 Examples:
   tactflow features press.csv -o features.csv
-  tactflow features plate.zip --pitch-mm 7.62,5.08 --for 2s
-  tactflow features pad.npy --pitch-mm 5,5 --rate-hz 250 --unit N --threshold 0.02 --min-area 6
+  tactflow features plate.zip --pitch-mm 5.08x7.62 --for 2s
+  tactflow features pad.npy --pitch-mm 5x5 --rate-hz 250 --unit N --threshold 0.02 --min-area 6
   tactflow features press.csv --graph > press.toml"
 )]
 pub(super) struct Features {
@@ -60,14 +60,14 @@ struct HintArgs {
     /// Unit of the values, where the file does not say it: raw, N, kPa
     #[arg(long, value_name = "UNIT")]
     unit: Option<String>,
-    /// Distance of neighbours along x and y [mm], where the file does not say it: 5,5
-    #[arg(long, value_name = "X,Y", value_parser = pair::<f64>)]
+    /// Distance of neighbours along x and y [mm], where the file does not say it: 5x5
+    #[arg(long, value_name = "XxY", value_parser = pair::<f64>)]
     pitch_mm: Option<[f64; 2]>,
     /// Frames per second, where the file does not say it
     #[arg(long, value_name = "HZ", value_parser = finite)]
     rate_hz: Option<f64>,
-    /// Number of rows and columns, where the file does not say it: 16,16
-    #[arg(long, value_name = "ROWS,COLS", value_parser = pair::<u32>)]
+    /// Number of rows and columns, where the file does not say it: 16x16
+    #[arg(long, value_name = "ROWSxCOLS", value_parser = pair::<u32>)]
     size: Option<[u32; 2]>,
 }
 
@@ -208,13 +208,6 @@ impl HintArgs {
         };
         recordings::read(bytes, &path.to_string_lossy(), &hints).ok()
     }
-}
-
-/// Two of a kind with a comma between them.
-fn pair<T: FromStr>(text: &str) -> Result<[T; 2], String> {
-    let read = |text: &str| text.trim().parse().map_err(|_| format!("`{text}` is not a number"));
-    let (first, second) = text.split_once(',').ok_or("expected two numbers with a comma between them")?;
-    Ok([read(first)?, read(second)?])
 }
 
 fn finite(text: &str) -> Result<f64, String> {

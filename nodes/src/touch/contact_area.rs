@@ -47,7 +47,7 @@ impl Node for ContactArea {
     type State = ();
 
     const NAME: &'static str = "contact_area";
-    const SUMMARY: &'static str = "measure the area of a contact in square metres";
+    const SUMMARY: &'static str = "measures the area of a contact in square metres";
     const DOC: &'static str = "`area` is the number of tactels of the region times the area of one, the pitch along x \
         times the pitch along y. It jumps by a whole tactel whenever one passes the threshold, though the contact \
         hardly changed.\n\n\

@@ -41,7 +41,7 @@ impl Node for Eccentricity {
     type State = ();
 
     const NAME: &'static str = "eccentricity";
-    const SUMMARY: &'static str = "tell a round contact from a long one: the eccentricity of its ellipse";
+    const SUMMARY: &'static str = "tells a round contact from a long one: the eccentricity of its ellipse";
     const DOC: &'static str = "The ellipse with the same second central moments as the region has the half axes a and \
         b, up to a common factor; this is sqrt(1 - b² / a²): 0 for a circle or a square, 0.87 when it is twice as long \
         as wide, 0.98 at five times, 1 for a single row of tactels.\n\n\

@@ -77,7 +77,7 @@ impl Node for Hough {
     type State = State;
 
     const NAME: &'static str = "hough";
-    const SUMMARY: &'static str = "find the line through a contact by the Hough transform: direction and offset";
+    const SUMMARY: &'static str = "finds the line through a contact by the Hough transform: direction and offset";
 
     const DOC: &'static str = "Every tactel votes for all lines through it: for a direction a, for the offset \
         r = y cos a - x sin a (Duda and Hart 1972; paper section III and Fig. 4). The votes count the tactel's `weight` as in \

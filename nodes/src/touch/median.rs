@@ -52,7 +52,7 @@ impl Node for Median {
     type State = State;
 
     const NAME: &'static str = "median";
-    const SUMMARY: &'static str = "take single wrong samples out of a feature: the median of the newest";
+    const SUMMARY: &'static str = "takes single wrong samples out of a feature: the median of the newest";
     const DOC: &'static str = "The middle one of the last `window` samples in order of size; of an even number, the mean of \
         the two in the middle; of fewer, as long as there are fewer. A glitch of fewer than half the window \
         leaves no trace at all, where a mean is pulled along. Each sample counts once, however long it is held.\n\n\

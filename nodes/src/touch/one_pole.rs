@@ -53,7 +53,7 @@ impl Node for OnePole {
     type State = State;
 
     const NAME: &'static str = "one_pole";
-    const SUMMARY: &'static str = "smooth a feature with a low-pass filter of the first order";
+    const SUMMARY: &'static str = "smooths a feature with a low-pass filter of the first order";
     const DOC: &'static str = "T dy/dt = x - y, solved exactly from sample to sample: y += (1 - exp(-dt / T)) (x - y), with dt \
         from the stamps of the samples. So T means the same at 100 Hz and at 1 kHz, and when samples come irregularly. \
         Give `time_constant_ms`, T, or `cutoff_hz`, 1 / (2 pi T): 40 ms are 4 Hz.\n\n\

@@ -49,7 +49,7 @@ impl Node for PrincipalAxes {
     type State = ();
 
     const NAME: &'static str = "principal_axes";
-    const SUMMARY: &'static str = "measure how long and how wide a contact is, and along which line it lies";
+    const SUMMARY: &'static str = "measures how long and how wide a contact is, and along which line it lies";
     const DOC: &'static str = "The second central moments of a region make a 2 by 2 covariance in square metres. `major` \
         and `minor` are the square roots of its eigenvalues, the standard deviations along the long and the short \
         axis; `orientation` is the direction of the long one, the same as that of `moments`.\n\n\

@@ -74,7 +74,7 @@ impl Node for SelectRegion {
     type State = State;
 
     const NAME: &'static str = "select_region";
-    const SUMMARY: &'static str = "take one of several contacts: the n-th largest, strongest, or nearest to a point";
+    const SUMMARY: &'static str = "takes one of several contacts: the n-th largest, strongest, or nearest to a point";
     const DOC: &'static str = "`label` lists all regions of a mask; this takes one of them, for `moments` and the \
         others that want a region. One such node a contact, all on one `label`, gives each its own features.\n\n\
         Regions with less than `min_area` tactels or less than `min_force` are not counted. The others are ordered by \

@@ -63,7 +63,7 @@ impl Node for Smooth {
     type State = State;
 
     const NAME: &'static str = "smooth";
-    const SUMMARY: &'static str = "smooth a feature: the mean over the newest samples, or over a time";
+    const SUMMARY: &'static str = "smooths a feature: the mean over the newest samples, or over a time";
     const DOC: &'static str = "The mean of the last samples, as the paper takes it of force and orientation over ten \
         (section V). Of fewer, as long as there are fewer. Each sample counts once, however long it is held.\n\n\
         **The window** is a number of samples, `window`, or a time, `window_ms`; not both. A time means the same at \

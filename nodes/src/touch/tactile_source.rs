@@ -46,7 +46,7 @@ impl Node for TactileSource {
     type State = ();
 
     const NAME: &'static str = "tactile_source";
-    const SUMMARY: &'static str = "take a pad's image into the sensor's frame, with its sum and its peak";
+    const SUMMARY: &'static str = "takes a pad's image into the sensor's frame, with its sum and its peak";
     const DOC: &'static str = "The first node behind a pad. Everything after it counts rows along the sensor's +y and \
         columns along its +x, from the middle of the pad, with z out of the pad toward the object. Devices count \
         otherwise: `transpose` exchanges rows and columns, then `flip_x` and `flip_y` reverse the columns and the rows. \

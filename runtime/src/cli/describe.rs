@@ -8,7 +8,7 @@ use super::prose::{Look, markdown};
 use super::{NOT_LOADED, Shell};
 use crate::diagnostic::meant;
 
-/// Describe a node, a device, a role or a kind of signal: ports, parameters and a whole graph to paste
+/// Describe one of them in full, with a graph to paste
 #[derive(clap::Parser)]
 #[command(
     name = "describe",
@@ -31,20 +31,15 @@ pub(super) struct Describe {
 /// How to print what is meant for a person or for a program.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub(super) enum Format {
-    /// For a person
     Text,
-    /// For a program
     Json,
 }
 
 /// How to print a page.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum PageFormat {
-    /// For a terminal
     Text,
-    /// For a program
     Json,
-    /// For a page of documentation
     Markdown,
 }
 

@@ -1,5 +1,7 @@
 //! What the catalogue says of one thing: the page of `describe`, as data. Its JSON is this, and its text is made of it.
 
+use std::borrow::Cow;
+
 use serde::Serialize;
 
 use super::example::{self, Asked};
@@ -212,8 +214,7 @@ impl<'a> Entries<'a> {
         let roles = self.catalogue.roles().iter().map(|role| (&role.name, &role.outputs));
         let nodes = self.nodes.iter().map(|(_, spec)| (&spec.name, &spec.outputs));
         let all = roles.chain(nodes).flat_map(|(owner, ports)| ports.iter().map(move |port| (owner, port)));
-        let fits = all.filter(|(_, output)| may_fit(output, port));
-        Port { fits: fits.map(|(owner, port)| format!("{owner}.{}", port.name)).collect(), ..declared(port) }
+        Port { fits: best_first(port, all.filter(|(_, output)| may_fit(output, port))), ..declared(port) }
     }
 
     /// A port that something writes, and where a wire from it can go.
@@ -221,9 +222,15 @@ impl<'a> Entries<'a> {
         let roles = self.catalogue.roles().iter().map(|role| (&role.name, &role.commands));
         let nodes = self.nodes.iter().map(|(_, spec)| (&spec.name, &spec.inputs));
         let all = nodes.chain(roles).flat_map(|(owner, ports)| ports.iter().map(move |port| (owner, port)));
-        let fits = all.filter(|(_, input)| may_fit(port, input));
-        Port { fits: fits.map(|(owner, port)| format!("{owner}.{}", port.name)).collect(), ..declared(port) }
+        Port { fits: best_first(port, all.filter(|(_, input)| may_fit(port, input))), ..declared(port) }
     }
+}
+
+/// Names of the ports at the other end: those that declare the same unit before those that may have it.
+fn best_first<'p>(port: &PortSpec, others: impl Iterator<Item = (&'p Cow<'static, str>, &'p PortSpec)>) -> Vec<String> {
+    let mut others: Vec<_> = others.collect();
+    others.sort_by_key(|(_, other)| port.kind.has_unit() && other.args.first() != port.args.first());
+    others.into_iter().map(|(owner, other)| format!("{owner}.{}", other.name)).collect()
 }
 
 fn entry(sort: Sort, name: &str, summary: &str, doc: &str) -> Entry {

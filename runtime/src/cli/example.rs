@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use crate::catalogue::Catalogue;
-use crate::graph::{Item, Sources, Table, Value, parse_table};
+use crate::graph::{Item, Request, Sources, Table, Value, parse_table, plan};
 
 /// What the example is of.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -29,12 +29,23 @@ struct Piece {
     sensors: Vec<String>,
     /// What it names.
     needs: Vec<String>,
+    /// The ports that its wires name.
+    wires: Vec<String>,
     /// Its text by section: `[roles]`, `[commands]`, `[bind]`; under no name, its blocks.
     sections: BTreeMap<&'static str, String>,
 }
 
 /// Sections that several devices share.
 const SHARED: [&str; 3] = ["roles", "commands", "bind"];
+
+/// A whole graph around a node or a device, by its name.
+///
+/// # Errors
+/// Which example is missing, or is no TOML.
+pub fn example(catalogue: &Catalogue, name: &str) -> Result<String, String> {
+    let is_node = catalogue.nodes().iter().any(|node| node.spec().name == name);
+    compose(catalogue, if is_node { Asked::Node(name) } else { Asked::Device(name) })
+}
 
 /// The graph, or why there is none.
 ///
@@ -73,7 +84,26 @@ pub(super) fn compose(catalogue: &Catalogue, asked: Asked<'_>) -> Result<String,
     }
     chosen.sort_unstable();
     let chosen: Vec<&Piece> = chosen.iter().map(|index| &pieces[*index]).collect();
-    Ok(text(&chosen, &pieces[start]))
+    Ok(put_between(catalogue, &chosen, &pieces[start]).unwrap_or_else(|| text(&chosen, &pieces[start], None)))
+}
+
+/// Where a command is driven and nobody reads the node that is asked for, it is put into one of the wires it reads:
+/// those that read the wire read its output instead, if that makes a graph of which nothing is to be said.
+fn put_between(catalogue: &Catalogue, chosen: &[&Piece], asked: &Piece) -> Option<String> {
+    let is_clean = |text: &String| {
+        let plan = plan(catalogue, &Request::text(text.as_str()));
+        plan.is_ok_and(|plan| plan.warnings().is_none())
+    };
+    let is_read = chosen.iter().any(|piece| piece.needs.iter().any(|need| asked.names.contains(need)));
+    let is_driving = chosen.iter().any(|piece| piece.sections.contains_key("commands"));
+    if is_read || !is_driving || asked.is_device {
+        return None;
+    }
+    let spec = catalogue.nodes().iter().map(|node| node.spec()).find(|spec| spec.name == asked.kind)?;
+    let outputs =
+        || asked.names.iter().flat_map(|name| spec.outputs.iter().map(move |port| format!("{name}.{}", port.name)));
+    let wires = asked.wires.iter().flat_map(|wire| outputs().map(move |output| (wire.clone(), output)));
+    wires.map(|(from, to)| text(chosen, asked, Some((&from, &to)))).find(is_clean)
 }
 
 /// The block of a node or a device by itself, as it was written.
@@ -105,27 +135,33 @@ fn piece(catalogue: &Catalogue, kind: &str, example: &str, is_device: bool) -> R
     let is_sensor = |kind: &str| catalogue.roles().iter().any(|role| role.name == kind && role.commands.is_empty());
     let sensors = roles.entries.iter().filter(|(_, kind)| kind.as_str().is_some_and(is_sensor));
     let sensors = sensors.map(|(key, _)| key.name.clone()).collect();
-    let mut needs = Vec::new();
+    let (mut needs, mut wires) = (Vec::new(), Vec::new());
     for (_, node) in &nodes.entries {
-        let wires = node.as_table().and_then(|node| node.get("in"));
-        wires.into_iter().for_each(|wires| ports(wires, &mut needs));
+        let inputs = node.as_table().and_then(|node| node.get("in")).and_then(Value::as_table);
+        wires.extend(inputs.into_iter().flat_map(words));
         facts(node, &mut needs);
     }
-    table("commands").entries.iter().for_each(|(_, wires)| ports(wires, &mut needs));
+    table("commands")
+        .entries
+        .iter()
+        .filter_map(|(_, wires)| wires.as_table())
+        .for_each(|drive| wires.extend(words(drive)));
+    needs.extend(wires.iter().filter_map(|wire| Some(wire.split_once('.')?.0.to_owned())));
     let names = keys(if is_device { &roles } else { &nodes });
-    Ok(Piece { kind: kind.to_owned(), is_device, names, sensors, needs, sections: sections(example) })
+    Ok(Piece { kind: kind.to_owned(), is_device, names, sensors, needs, wires, sections: sections(example) })
 }
 
-/// The first parts of the ports that wires name.
-fn ports(wires: &Value, needs: &mut Vec<String>) {
-    let words = wires.as_table().into_iter().flat_map(|wires| &wires.entries).filter_map(|(_, word)| word.as_str());
-    needs.extend(words.filter_map(|word| Some(word.split_once('.')?.0.to_owned())));
+/// The texts in a table.
+fn words(table: &Table) -> impl Iterator<Item = String> {
+    table.entries.iter().filter_map(|(_, word)| word.as_str().map(str::to_owned))
 }
 
 /// The roles whose facts are asked for.
 fn facts(value: &Value, needs: &mut Vec<String>) {
     match &value.item {
-        Item::Table(table) if table.is_fact() => ports(value, needs),
+        Item::Table(table) if table.is_fact() => {
+            needs.extend(words(table).filter_map(|fact| Some(fact.split_once('.')?.0.to_owned())));
+        }
         Item::Table(table) => table.entries.iter().for_each(|(_, inner)| facts(inner, needs)),
         Item::Array(items) => items.iter().for_each(|inner| facts(inner, needs)),
         _ => {}
@@ -157,18 +193,23 @@ fn sections(example: &str) -> BTreeMap<&'static str, String> {
     sections
 }
 
-fn text(chosen: &[&Piece], asked: &Piece) -> String {
+/// The graph; with another port in the place of one, everywhere but in the piece that is asked for.
+fn text(chosen: &[&Piece], asked: &Piece, swap: Option<(&str, &str)>) -> String {
+    let swapped = |text: String| match swap {
+        Some((from, to)) => text.replace(&format!("\"{from}\""), &format!("\"{to}\"")),
+        None => text,
+    };
     let devices = || chosen.iter().filter(|piece| piece.is_device);
     let clock = devices().flat_map(|device| &device.sensors).chain(devices().flat_map(|device| &device.names)).next();
     let clock = clock.map_or_else(|| "rate_hz = 250".to_owned(), |role| format!("clock = \"{role}\""));
     let shared = |name: &str| {
         let lines: String =
             devices().filter_map(|device| device.sections.get(name)).map(|text| trimmed(text)).collect();
-        (!lines.is_empty()).then(|| format!("[{name}]\n{lines}"))
+        (!lines.is_empty()).then(|| swapped(format!("[{name}]\n{lines}")))
     };
     let block = |piece: &&Piece| {
         let text = trimmed(piece.sections.get("").map_or("", String::as_str));
-        if std::ptr::eq(*piece, asked) { format!("# ==== {} ====\n{text}", piece.kind) } else { text }
+        if std::ptr::eq(*piece, asked) { format!("# ==== {} ====\n{text}", piece.kind) } else { swapped(text) }
     };
     let nodes = chosen.iter().filter(|piece| !piece.is_device).map(block);
     let head = [Some(format!("[graph]\n{clock}\n")), shared("roles"), shared("commands")];
@@ -186,18 +227,4 @@ fn trimmed(text: &str) -> String {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_text_falls_into_its_sections_and_keeps_its_comments() {
-        let text = "\n# What a task asks.\n[roles]\narm = \"x\"   # the arm\n\n[bind]\narm = \"a\"\n\n# The one.\n[devices.a]\n\
-                    type = \"t\"\nlist = [\n[1, 2],\n]\n[[devices.a.press]]\nforce = 3.0\n# end\n";
-        let sections = sections(text);
-        assert_eq!(sections["roles"], "# What a task asks.\narm = \"x\"   # the arm\n\n");
-        assert_eq!(sections["bind"], "arm = \"a\"\n\n");
-        let block =
-            "# The one.\n[devices.a]\ntype = \"t\"\nlist = [\n[1, 2],\n]\n[[devices.a.press]]\nforce = 3.0\n# end\n";
-        assert_eq!(sections[""], block);
-    }
-}
+mod tests;

@@ -1,11 +1,11 @@
-//! What is wrong with a graph, for a program.
+//! Diagnostics, places and values for a program.
 
 use std::ops::Range;
 
 use serde::Serialize;
 
 use crate::diagnostic::{Diagnostic, Report};
-use crate::graph::Sources;
+use crate::graph::{Item, Sources, Value};
 
 /// A diagnostic with its place.
 #[derive(Debug, Serialize)]
@@ -61,6 +61,18 @@ pub(super) fn place(sources: &Sources, span: &Range<usize>) -> Place {
     let (line, column) = file.line_column(span.start);
     let length = file.text[file.local(span)].chars().count();
     Place { file: file.name.clone(), line, column, length }
+}
+
+/// A value of a graph file.
+pub(super) fn json(value: &Value) -> serde_json::Value {
+    match &value.item {
+        Item::String(text) | Item::Datetime(text) => text.as_str().into(),
+        Item::Integer(number) => (*number).into(),
+        Item::Float(number) => (*number).into(),
+        Item::Boolean(value) => (*value).into(),
+        Item::Array(items) => items.iter().map(json).collect(),
+        Item::Table(table) => table.entries.iter().map(|(key, value)| (key.name.clone(), json(value))).collect(),
+    }
 }
 
 #[cfg(test)]

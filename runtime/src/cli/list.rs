@@ -5,7 +5,7 @@ use super::entry::{Entries, Entry, Sort};
 use super::prose::{Block, Item, Look};
 use super::{NOT_LOADED, Shell};
 
-/// List what a graph may be made of: nodes, devices, roles, kinds of signals and built-in files
+/// List nodes, devices, roles, kinds of signals and built-in files
 #[derive(clap::Parser)]
 #[command(
     name = "list",
@@ -36,15 +36,12 @@ pub(super) fn list(args: List, shell: &Shell) -> u8 {
     });
     if args.format == Format::Json {
         shell.say_json(&found.iter().map(Line::of).collect::<Vec<_>>());
-        return 0;
-    }
-    if found.is_empty() {
+    } else if found.is_empty() {
         shell.error(format_args!("nothing in the catalogue speaks of `{}`", args.words.join(" ")));
-        return NOT_LOADED;
+    } else {
+        shell.say(&Look::new(shell.has_colour()).render(&blocks(&found)));
     }
-    let look = Look::new(shell.has_colour());
-    shell.say(&look.render(&blocks(&found)));
-    0
+    if found.is_empty() { NOT_LOADED } else { 0 }
 }
 
 /// What the JSON of a list says of one thing.

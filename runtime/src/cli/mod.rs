@@ -14,6 +14,7 @@
 #![allow(clippy::print_stderr, reason = "this is where the tool speaks")]
 
 mod check;
+mod completions;
 mod course;
 mod describe;
 mod entry;
@@ -24,8 +25,10 @@ mod log;
 mod page;
 mod progress;
 mod prose;
+mod reference;
 mod run;
 mod shell;
+mod show;
 mod summary;
 
 use std::marker::PhantomData;
@@ -40,6 +43,8 @@ use crate::graph::Request;
 
 /// The parser of arguments, for commands of one's own.
 pub use clap;
+pub use example::example;
+pub use reference::reference;
 pub use run::{Job, duration};
 use shell::Colour;
 pub use shell::Shell;
@@ -101,7 +106,8 @@ impl<A: CommandFactory + FromArgMatches, F: Fn(A, &Shell) -> u8> Subcommand for 
 #[derive(Parser)]
 #[command(name = "tactflow", version, max_term_width = 100)]
 #[command(subcommand_required = true, arg_required_else_help = true)]
-#[command(after_help = "Exit codes: 0 all went well; 1 the run ended in a fault; 2 a file does not load.")]
+#[command(after_help = "Exit codes: 0 all went well; 1 the run ended in a fault; 2 a file does not load, or the \
+                       command line is not understood.")]
 struct Cli {
     /// When to use colours; `auto` means on a terminal, unless NO_COLOR is set
     #[arg(long, global = true, value_enum, default_value_t = Colour::Auto, value_name = "WHEN")]
@@ -140,7 +146,14 @@ impl Tool {
     pub fn new(catalogue: Catalogue) -> Self {
         Self {
             catalogue,
-            commands: vec![derived(run::run), derived(check::check), derived(list::list), derived(describe::describe)],
+            commands: vec![
+                derived(run::run),
+                derived(check::check),
+                derived(list::list),
+                derived(describe::describe),
+                derived(show::show),
+                derived(completions::completions),
+            ],
         }
     }
 
@@ -171,7 +184,8 @@ impl Tool {
         };
         let cli = Cli::from_arg_matches(&matches).expect("they were parsed as they are declared");
         log(&cli);
-        let shell = Shell::new(self.catalogue, cli.color);
+        let arguments = self.arguments();
+        let shell = Shell::new(self.catalogue, cli.color, arguments);
         let (name, matches) = matches.subcommand().expect("one is required");
         let command = self.commands.iter().find(|command| command.command().get_name() == name);
         command.expect("clap knows no others").run(matches, &shell).into()

@@ -13,8 +13,8 @@ pub(super) fn page(entry: &Entry, has_fits: bool) -> Vec<Block> {
     blocks.extend(entry.recorded.map(|recorded| Block::Prose(format!("Recorded with `--out`: {recorded}."))));
     blocks.extend(entry.steps.map(|steps| Block::Prose(format!("Steps {steps}."))));
     match entry.sort {
-        Sort::Device if has_fits => blocks.extend(listed("Fills the roles: ", &entry.fits)),
-        Sort::Role if has_fits => blocks.extend(listed("Filled by the devices: ", &entry.fits)),
+        Sort::Device => blocks.extend(listed("Fills the roles: ", &entry.fits)),
+        Sort::Role => blocks.extend(listed("Filled by the devices: ", &entry.fits)),
         _ => {}
     }
     let (inputs, outputs) = match entry.sort {

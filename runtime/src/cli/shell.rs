@@ -13,11 +13,18 @@ use crate::diagnostic::Report;
 pub struct Shell {
     catalogue: Catalogue,
     colour: Colour,
+    arguments: clap::Command,
 }
 
 impl Shell {
-    pub(super) const fn new(catalogue: Catalogue, colour: Colour) -> Self {
-        Self { catalogue, colour }
+    pub(super) const fn new(catalogue: Catalogue, colour: Colour, arguments: clap::Command) -> Self {
+        Self { catalogue, colour, arguments }
+    }
+
+    /// The arguments of the tool, with those of all commands.
+    #[must_use]
+    pub const fn arguments(&self) -> &clap::Command {
+        &self.arguments
     }
 
     /// What graphs may be made of.

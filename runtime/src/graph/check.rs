@@ -11,7 +11,7 @@ use super::plan::{Clock, Plan, PlannedCommand, PlannedNode, PlannedPort, Planned
 use super::units::{Clash, Units};
 use super::unread::unread;
 use super::wires::{CommandWire, Model, Origin, Wire};
-use super::{Sources, Value};
+use super::{Sources, Value, outline};
 use crate::catalogue::Catalogue;
 use crate::diagnostic::{Code, Diagnostic, Report};
 use crate::node::{Configured, Given, Need, NodeSpec, PortSpec, Reader};
@@ -56,50 +56,41 @@ pub fn plan(catalogue: &Catalogue, request: &Request) -> Result<Plan, Report> {
     let planned: Vec<PlannedCommand> = commands.iter().filter_map(|wire| builder.command(wire)).collect();
     let roles = builder.planned_roles();
     let Builder { found, sources, .. } = builder;
-    match (clock, found.is_empty()) {
-        (Some((clock, _)), true) => {
-            for node in &nodes {
-                tracing::debug!("next in the order: `{}` ({})", node.name, sources.locate(node.span.start));
-            }
-            for device in &opened.devices {
-                tracing::info!("opened device `{}` ({})", device.name, sources.locate(device.span.start));
-            }
-            let warnings = unread(&model, &wires, &commands);
-            let parts = Parts { roles, nodes, commands: planned, clock, period, sources, warnings };
-            Ok(finish(parts, opened, flat.table.as_ref()))
-        }
-        _ => Err(Report::new(sources, found)),
+    let Some((clock, _)) = clock.filter(|_| found.is_empty()) else { return Err(Report::new(sources, found)) };
+    say_what_is_there(&nodes, &opened, &sources);
+    let max_gap = max_gap(flat.table.as_ref(), period);
+    let parts = outline::Parts {
+        catalogue,
+        model: &model,
+        opened: &opened,
+        wires: &wires,
+        commands: &commands,
+        sources: &sources,
+        max_gap,
+    };
+    let outline = parts.outline();
+    let warnings = unread(&model, &wires, &commands);
+    let reset_after = flat.table.as_ref().map_or(0, |table| (*table.reset_after_ms * 1e6) as i64);
+    let period = ((period * 1e9).round() as i64).max(1);
+    let (devices, commands) = (opened.devices, planned);
+    Ok(Plan { roles, devices, nodes, commands, clock, period, max_gap, reset_after, sources, warnings, outline })
+}
+
+/// For those who run the tool with `-v`.
+fn say_what_is_there(nodes: &[PlannedNode], opened: &Opened, sources: &Sources) {
+    for node in nodes {
+        tracing::debug!("next in the order: `{}` ({})", node.name, sources.locate(node.span.start));
+    }
+    for device in &opened.devices {
+        tracing::info!("opened device `{}` ({})", device.name, sources.locate(device.span.start));
     }
 }
 
-/// What a plan is put together from.
-struct Parts {
-    roles: Vec<PlannedRole>,
-    nodes: Vec<PlannedNode>,
-    commands: Vec<PlannedCommand>,
-    clock: Clock,
-    period: f64,
-    sources: Sources,
-    warnings: Vec<Diagnostic>,
-}
-
-fn finish(parts: Parts, opened: Opened, table: Option<&GraphTable>) -> Plan {
+/// Greatest time between two samples that counts as one step [s].
+fn max_gap(table: Option<&GraphTable>, period: f64) -> f64 {
     /// As many periods are one step at most.
     const GREATEST_GAP: f64 = 5.0;
-    let max_gap = table.and_then(|table| table.max_gap_ms).map_or(GREATEST_GAP * parts.period, |ms| *ms * 1e-3);
-    let reset_after = table.map_or(0, |table| (*table.reset_after_ms * 1e6) as i64);
-    Plan {
-        roles: parts.roles,
-        devices: opened.devices,
-        nodes: parts.nodes,
-        commands: parts.commands,
-        clock: parts.clock,
-        period: ((parts.period * 1e9).round() as i64).max(1),
-        max_gap,
-        reset_after,
-        sources: parts.sources,
-        warnings: parts.warnings,
-    }
+    table.and_then(|table| table.max_gap_ms).map_or(GREATEST_GAP * period, |ms| *ms * 1e-3)
 }
 
 /// What makes the graph tick, and how often [s].

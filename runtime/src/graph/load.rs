@@ -82,6 +82,8 @@ pub(crate) struct FlatNode {
 #[derive(Debug, Default)]
 pub(crate) struct Flat {
     pub(crate) table: Option<GraphTable>,
+    /// The section [graph] as it is written.
+    pub(crate) settings: Option<Value>,
     /// Where to show what is missing in the graph as a whole.
     pub(crate) place: Range<usize>,
     pub(crate) roles: Vec<(Key, Word)>,
@@ -141,6 +143,7 @@ impl Loader {
                 None
             }
         };
+        flat.settings = root.0.get("graph").cloned();
         flat.bench = self.bench(request, &flat, &root.0, bench_set);
         flat.roles.clone_from(&document.roles);
         flat.commands.clone_from(&document.commands);
@@ -212,7 +215,7 @@ impl Loader {
             Err((error, help)) => {
                 let message = format!("cannot read `{}`: {error}", path.display());
                 let span = from.unwrap_or_else(|| {
-                    let file = self.sources.add("command line", path.display().to_string(), "");
+                    let file = self.sources.add(Sources::COMMAND_LINE, path.display().to_string(), "");
                     file.base..file.base + file.text.len()
                 });
                 self.diagnostics.push(Diagnostic::new(Code::Unreadable, span, message).with_help(help));
@@ -254,14 +257,14 @@ impl Loader {
         let is_line = !text.contains(['\n', '\r']);
         let quoted = text.split_once('=').filter(|_| is_line).map(|(key, value)| format!("{key}={value:?}"));
         for text in [Some(text.to_owned()), quoted].into_iter().flatten() {
-            let file = self.sources.add("command line", text, "");
+            let file = self.sources.add(Sources::COMMAND_LINE, text, "");
             if let Ok(Value { item: Item::Table(table), .. }) = parse_table(file)
                 && is_one_assignment(&table, &file.text)
             {
                 return Some(table);
             }
         }
-        let file = self.sources.add("command line", text, "");
+        let file = self.sources.add(Sources::COMMAND_LINE, text, "");
         let span = file.base..file.base + file.text.len();
         let diagnostic = Diagnostic::new(Code::Syntax, span, "this is not `key=value`");
         self.diagnostics.push(diagnostic.help("for example `--set nodes.pid.gains.x.kp=3`"));

@@ -2,7 +2,7 @@
 //!
 //! In the order of the work: `document` (what the sections hold), `load` (files, parts and `--set` become one flat
 //! graph), `wires` (where each comes from), `devices` (the bench is opened), `order`, `frames`, `units`, and `check`,
-//! which builds the nodes on the way to a `plan`.
+//! which builds the nodes on the way to a `plan`. `unread` looks for loose ends, and `outline` says where all came from.
 
 mod check;
 mod devices;
@@ -10,6 +10,7 @@ mod document;
 mod frames;
 mod load;
 mod order;
+mod outline;
 mod plan;
 mod sources;
 mod units;
@@ -18,10 +19,14 @@ mod value;
 mod wires;
 
 pub use check::plan;
+#[cfg(feature = "cli")]
 pub(crate) use frames::frame_args;
 pub use load::Request;
+pub use outline::{NOWHERE, Origin, Outline, OutlinedBlock, OutlinedRole, OutlinedWire, Setting};
 pub(crate) use plan::{Clock, PlannedCommand, PlannedNode, Producer, Source};
 pub use plan::{Plan, PlannedPort};
 pub use sources::{BuiltinFile, SourceFile, Sources};
-pub(crate) use units::{declares_a_unit, may_fit};
+pub(crate) use units::declares_a_unit;
+#[cfg(feature = "cli")]
+pub(crate) use units::may_fit;
 pub use value::{Item, Key, Table, Value, parse_table};

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use super::Sources;
+use super::{Outline, Sources};
 use crate::device::Driver;
 use crate::diagnostic::{Diagnostic, Report};
 use crate::node::{AnyNode, Need};
@@ -103,6 +103,7 @@ pub struct Plan {
     pub(crate) reset_after: i64,
     pub(crate) sources: Sources,
     pub(crate) warnings: Vec<Diagnostic>,
+    pub(crate) outline: Outline,
 }
 
 impl Plan {
@@ -117,6 +118,17 @@ impl Plan {
     pub fn ports(&self) -> impl Iterator<Item = &PlannedPort> {
         let roles = self.roles.iter().flat_map(|role| &role.ports);
         roles.chain(self.nodes.iter().flat_map(|node| &node.ports))
+    }
+
+    /// The graph as it runs, with where each value comes from.
+    #[must_use]
+    pub const fn outline(&self) -> &Outline {
+        &self.outline
+    }
+
+    /// The outputs of a node.
+    pub fn outputs(&self, node: &str) -> impl Iterator<Item = &PlannedPort> {
+        self.nodes.iter().filter(move |planned| planned.name == node).flat_map(|planned| &planned.ports)
     }
 
     /// The names of the nodes in the order in which they step.

@@ -8,7 +8,7 @@ use crate::diagnostic::closest;
 /// One text.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct SourceFile {
-    /// Path as the user would write it, or what else the text is: `--set`.
+    /// Path as the user would write it, or [`Sources::COMMAND_LINE`].
     pub name: String,
     /// The text.
     pub text: String,
@@ -49,6 +49,9 @@ pub struct Sources {
 }
 
 impl Sources {
+    /// Name of the texts that the command line gives.
+    pub const COMMAND_LINE: &str = "command line";
+
     /// No text yet, and files that `builtin:NAME` stands for.
     #[must_use]
     pub fn with_builtin(files: &[BuiltinFile]) -> Self {

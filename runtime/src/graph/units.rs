@@ -147,6 +147,31 @@ mod tests {
     }
 
     #[test]
+    fn what_may_fit_as_far_as_the_declarations_tell() {
+        let cases = [
+            ("N", "N", true),
+            ("N", "m", false),
+            ("U", "m", true),
+            ("U/s", "m", false),
+            ("U/s", "m/s", true),
+            ("m", "_/s", false),
+            ("m/s", "_/s", true),
+            ("m", "_", true),
+        ];
+        for (gives, takes, fits) in cases {
+            assert_eq!(may_fit(&port(gives), &port(takes)), fits, "{gives} to {takes}");
+        }
+        let in_frame = |frame: &'static str| PortSpec { args: vec!["m".into(), frame.into()].into(), ..port("m") };
+        for (from, to, fits) in
+            [("base", "base", true), ("base", "tool", false), ("base", "A", true), ("$of", "base", true)]
+        {
+            assert_eq!(may_fit(&in_frame(from), &in_frame(to)), fits, "{from} to {to}");
+        }
+        let flag = PortSpec { kind: Kind::Flag, args: vec![].into(), ..port("m") };
+        assert!(!may_fit(&flag, &port("_")));
+    }
+
+    #[test]
     fn what_goes_in_and_what_follows() {
         let cases =
             [("N", "N", true), ("N", "m", false), ("_", "kPa", true), ("_/s", "m/s", true), ("_/s", "m", false)];

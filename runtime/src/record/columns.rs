@@ -140,3 +140,38 @@ fn write(row: &mut [f64], values: impl IntoIterator<Item = f64>) -> usize {
     }
     count
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::signal::{
+        FeaturesShape, FlagShape, ImageShape, JacobianShape, JointsShape, MaskShape, PoseShape, RegionsShape,
+        ScalarShape, TwistShape,
+    };
+
+    #[test]
+    fn what_is_said_to_be_recorded_has_columns_and_nothing_else_has() {
+        let shapes: [Shape; 10] = [
+            ScalarShape::default().into(),
+            FlagShape.into(),
+            FeaturesShape::default().into(),
+            ImageShape::default().into(),
+            MaskShape::default().into(),
+            RegionsShape::default().into(),
+            TwistShape.into(),
+            PoseShape.into(),
+            JointsShape::default().into(),
+            JacobianShape::default().into(),
+        ];
+        assert!(Kind::ALL.iter().all(|kind| shapes.iter().any(|shape| shape.kind() == *kind)));
+        for shape in shapes {
+            let said = recorded(shape.kind());
+            let columns = columns_of(&shape).map(|(_, columns)| columns);
+            assert_eq!(said == "not at all", columns.is_none(), "{}", shape.kind());
+            // Those whose columns have fixed names are said by these names.
+            for (name, _) in columns.iter().flatten().filter(|(name, _)| !name.is_empty()) {
+                assert!(said.contains(&format!("`{name}`")), "{}: {name}", shape.kind());
+            }
+        }
+    }
+}

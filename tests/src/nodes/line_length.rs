@@ -25,6 +25,18 @@ impl Device for LineLength {
 
     const NAME: &'static str = "line_length";
     const SUMMARY: &'static str = "a number a line from a TCP connection";
+    const DOC: &'static str = "Each line is a length in metres. It runs in real time.";
+    const EXAMPLE: &'static str = r#"
+[roles]
+length = "length"
+
+[bind]
+length = "ruler"
+
+[devices.ruler]
+type = "line_length"
+address = "127.0.0.1:4000"
+"#;
 
     fn open(params: Params) -> Result<Opened, Mistakes> {
         let outputs = vec![ScalarShape { unit: Unit::METRE }.into()];

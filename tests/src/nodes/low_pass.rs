@@ -43,6 +43,15 @@ impl Node for LowPass {
 
     const NAME: &'static str = "low_pass";
     const SUMMARY: &'static str = "a low-pass filter of the first order";
+    const DOC: &'static str = "T dy/dt = x - y, one implicit Euler step a sample: it never overshoots, however late a \
+        sample comes, and T means the same at any rate. The first sample passes as it is.\n\n\
+        It refuses the direction of a line, which has no plain mean: take a `smooth` for that.";
+    const EXAMPLE: &'static str = r#"
+[nodes.low_pass]
+type = "low_pass"
+in.value = "moments.pressure"
+time = 0.05                         # [s]
+"#;
 
     fn new(params: Params, setup: &mut Setup<Self>) -> Result<Self, Mistakes> {
         if setup.inputs.value.unit.is_axial() {

@@ -20,6 +20,7 @@ pub fn catalogue() -> Catalogue {
     Catalogue::new()
         .role(length())
         .device::<line_length::LineLength>()
+        .group("tests: nodes that make one sentence of the semantics visible each")
         .node::<breaks::Breaks>()
         .node::<count::Count>()
         .node::<low_pass::LowPass>()

@@ -31,6 +31,13 @@ impl Node for Plus {
 
     const NAME: &'static str = "plus";
     const SUMMARY: &'static str = "adds a constant";
+    const DOC: &'static str = "y = x + `by`. It is there to measure what a node costs.";
+    const EXAMPLE: &'static str = r#"
+[nodes.plus]
+type = "plus"
+in.value = "length.value"
+by = 0.5                            # [m]
+"#;
 
     fn new(params: Params, _: &mut Setup<Self>) -> Result<Self, Mistakes> {
         Ok(Self { by: params.by })

@@ -31,6 +31,13 @@ impl Node for UnitDelay {
 
     const NAME: &'static str = "unit_delay";
     const SUMMARY: &'static str = "what its input was one tick ago";
+    const DOC: &'static str = "It closes a loop: what reads it may be what it reads.";
+    const EXAMPLE: &'static str = r#"
+# What was added a tick ago.
+[nodes.unit_delay]
+type = "unit_delay"
+in.value = "plus.value"
+"#;
     const EVERY_TICK: bool = true;
 
     fn new(params: Params, _: &mut Setup<Self>) -> Result<Self, Mistakes> {

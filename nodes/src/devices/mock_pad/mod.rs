@@ -28,7 +28,7 @@ params! {
     unit: Unit = Unit::NEWTON,
     /// Frames per second [1/s].
     rate_hz: Rate = Rate(250.0),
-    /// How long there are frames [s]; for ever unless given.
+    /// How long there are frames; for ever unless given [s].
     for_s: Option<Positive>,
     /// What presses on it.
     press: Vec<Press> = vec![],

@@ -8,7 +8,7 @@ params! {
     Press:
     /// When it begins [s].
     from_s: f64 = 0.0,
-    /// When it is over [s]; never unless given.
+    /// When it is over; never unless given [s].
     to_s: Option<f64>,
     /// Where its middle is when it begins, from the middle of the pad [m].
     at: [f64; 2] = [0.0, 0.0],

@@ -73,7 +73,7 @@ impl Node for Binarize {
     type State = State;
 
     const NAME: &'static str = "binarize";
-    const SUMMARY: &'static str = "find the tactels above a threshold: fixed, with hysteresis, or the image's own";
+    const SUMMARY: &'static str = "finds the tactels above a threshold: fixed, with hysteresis, or the image's own";
     const DOC: &'static str = "A tactel belongs to the mask if its value is strictly greater than `threshold` (paper \
         section III). The threshold itself is not above it.\n\n\
         **Two thresholds.** At the edge of a contact a tactel near the threshold comes and goes with the noise, so that \

@@ -109,7 +109,7 @@ impl Node for Calibrate {
 
     const NAME: &'static str = "calibrate";
     const SUMMARY: &'static str =
-        "turn what each tactel reads into a force, by a line or by the curves of a calibration file";
+        "turns what each tactel reads into a force, by a line or by the curves of a calibration file";
     const DOC: &'static str = "\
 Every tactel of a foam sensor has its own zero and its own squashed curve (paper section III, fig. 1). This node inverts \
 them: `force = curve(value - offset)`, tactel by tactel.\n\n\

@@ -12,7 +12,7 @@ mod nearest;
 
 use std::ops::Range;
 
-use tactflow_runtime::node::{Count, Mistake, Mistakes, Node, Param, Reader, Setup, Tick, Value, read_leaf};
+use tactflow_runtime::node::{Count, Mistake, Mistakes, Node, Param, Reader, Setup, Tick, Value, Written, read_leaf};
 use tactflow_runtime::signal::{Grid, Image, Mask, Region, RegionsShape, Run};
 use tactflow_runtime::{inputs, outputs, params, state};
 
@@ -88,6 +88,13 @@ impl Param for Neighbours {
             }
         }
     }
+
+    fn written(&self) -> Option<Written> {
+        Some(match self {
+            Self::Four => 4.into(),
+            Self::Eight => 8.into(),
+        })
+    }
 }
 
 /// What makes tactels neighbours, and a region a contact.
@@ -107,7 +114,7 @@ impl Node for Label {
     type State = State;
 
     const NAME: &'static str = "label";
-    const SUMMARY: &'static str = "find the connected regions of a mask, and the one that is the contact";
+    const SUMMARY: &'static str = "finds the connected regions of a mask, and the one that is the contact";
     const DOC: &'static str = "Tactels of the mask that are neighbours make a region (connected components, paper \
         section III). The contact R is the largest one; `regions` lists all of them, for `select_region`.\n\n\
         **Absence.** A noisy pad has a region in almost every frame, even when nothing touches it: 99.96 % at white noise \

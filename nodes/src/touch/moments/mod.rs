@@ -71,7 +71,7 @@ impl Node for Moments {
     type State = ();
 
     const NAME: &'static str = "moments";
-    const SUMMARY: &'static str = "measure a contact: force, pressure, centre of gravity and orientation";
+    const SUMMARY: &'static str = "measures a contact: force, pressure, centre of gravity and orientation";
     const DOC: &'static str = "The features of the paper's section III, from the tactels of a region R with the values \
         f_ij at the places c_ij:\n\n\
         - `force` f = Σ f_ij (eq. 1), `area` |R|, `pressure` p = f / |R| (eq. 2);\n\

@@ -1,18 +1,20 @@
 //! `tactflow calibrate`: logs in, a calibration file, a picture and a report out.
 
+use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 
 use tactflow_runtime::cli::clap::{self, Parser, ValueEnum};
-use tactflow_runtime::cli::{NOT_LOADED, Shell, Subcommand, derived};
+use tactflow_runtime::cli::{NOT_LOADED, Shell};
 use tactflow_runtime::diagnostic::{Code, Diagnostic, Report as Mistakes};
 use tactflow_runtime::graph::Sources;
 use tactflow_runtime::signal::Unit;
 
-use super::log::Log;
-use super::report::{Report, Settings, State, calibrate};
-use super::samples::Load;
-use super::{Kind, file, plot};
-use crate::recordings::{self, Hints, Recording, Refusal};
+use super::pair;
+use crate::calibration::log::Log;
+use crate::calibration::report::{Report, Settings, State, calibrate};
+use crate::calibration::samples::Load;
+use crate::calibration::{Kind, file, plot};
+use crate::recordings::{self, Assumed, Hints, Refusal};
 
 /// Make a calibration file for a pad from logs with a reference force
 #[derive(Parser)]
@@ -28,7 +30,7 @@ Examples:
 
 Exit codes: 0 all went well; 2 a log or a file cannot be used."
 )]
-struct Calibrate {
+pub(super) struct Calibrate {
     /// The logs, all of one pad
     #[arg(required = true, value_name = "LOG")]
     logs: Vec<PathBuf>,
@@ -49,7 +51,7 @@ struct Calibrate {
     dead_below: Option<f64>,
     /// How many tactels share the force of a uniform load; the live ones unless given
     #[arg(long, value_name = "COUNT")]
-    bearing: Option<std::num::NonZeroUsize>,
+    bearing: Option<NonZeroUsize>,
     /// Report every tactel, not only the worst
     #[arg(long)]
     each: bool,
@@ -60,8 +62,8 @@ struct Calibrate {
     #[arg(long)]
     unit: Option<Unit>,
     /// Rows and columns, where a log does not say them: 16x16
-    #[arg(long, value_name = "ROWSxCOLS", value_parser = size)]
-    size: Option<[usize; 2]>,
+    #[arg(long, value_name = "ROWSxCOLS", value_parser = pair::<NonZeroUsize>)]
+    size: Option<[NonZeroUsize; 2]>,
 }
 
 #[derive(Clone, Copy, ValueEnum)]
@@ -92,17 +94,8 @@ fn positive(text: &str) -> Result<f64, String> {
     number.ok_or_else(|| format!("`{text}` is not a number greater than 0"))
 }
 
-fn size(text: &str) -> Result<[usize; 2], String> {
-    let side = |text: &str| text.trim().parse().ok().filter(|side: &usize| *side > 0);
-    let sides = text.split_once('x').and_then(|(rows, cols)| Some([side(rows)?, side(cols)?]));
-    sides.ok_or_else(|| "give rows and columns as 16x16".into())
-}
-
-/// The command, for a tool.
-#[must_use]
-pub fn command() -> Box<dyn Subcommand> {
-    derived(run)
-}
+/// A calibration need not know how far the tactels are apart, nor how fast the frames came.
+const ASSUMED: Assumed = Assumed { unit: Unit::RAW, pitch: [0.005; 2], rate_hz: 100.0 };
 
 /// Residual, as a part of the largest force, from which on a calibration is none.
 const USELESS: f64 = 0.25;
@@ -119,7 +112,7 @@ impl From<String> for Failure {
     }
 }
 
-fn run(args: Calibrate, shell: &Shell) -> u8 {
+pub(super) fn run(args: Calibrate, shell: &Shell) -> u8 {
     match make(&args, shell) {
         Ok(()) => 0,
         Err(Failure::Words(words)) => {
@@ -147,7 +140,7 @@ fn make(args: &Calibrate, shell: &Shell) -> Result<(), Failure> {
         LoadArg::Probe => Load::Probe,
         LoadArg::Uniform => Load::Uniform,
     };
-    let bearing = args.bearing.map(std::num::NonZeroUsize::get);
+    let bearing = args.bearing.map(NonZeroUsize::get);
     let settings = Settings { load, curve: args.curve.map(Kind::from), dead_below: args.dead_below, bearing };
     let report = calibrate(&logs, &settings)?;
     shell.say(report.text(args.each).trim_end());
@@ -207,32 +200,15 @@ fn origin(args: &Calibrate, report: &Report) -> String {
 fn read(path: &Path, args: &Calibrate) -> Result<Log, Failure> {
     let name = path.display().to_string();
     let bytes = std::fs::read(path).map_err(|error| format!("cannot read `{name}`: {error}"))?;
-    let recording = recording(&bytes, &name, args).map_err(|refusal| refused(refusal, &name))?;
+    let hints = Hints {
+        format: args.format.clone(),
+        unit: args.unit,
+        size: args.size.map(|size| size.map(NonZeroUsize::get)),
+        assumed: Some(ASSUMED),
+        ..Hints::default()
+    };
+    let recording = recordings::read(&bytes, &name, &hints).map_err(|refusal| refused(refusal, &name))?;
     Log::new(&recording).map_err(|message| Failure::Words(format!("`{name}` cannot be used: {message}")))
-}
-
-/// A recording, of which a calibration need not know how far its tactels are apart, nor how fast its frames came.
-fn recording(bytes: &[u8], name: &str, args: &Calibrate) -> Result<Recording, Refusal> {
-    let mut hints = Hints { format: args.format.clone(), unit: args.unit, size: args.size, ..Hints::default() };
-    // What is not said is made up, one by one: a hint that contradicts a file that does say it is a mistake.
-    let made_up: [fn(&mut Hints); 3] = [
-        |hints| hints.pitch = Some([0.005; 2]),
-        |hints| hints.rate_hz = Some(100.0),
-        |hints| hints.unit = hints.unit.or(Some(Unit::RAW)),
-    ];
-    let mut result = recordings::read(bytes, name, &hints);
-    for _ in 0..made_up.len() {
-        let Err(Refusal::Silent { .. }) = &result else { break };
-        // The one whose absence it is about: with it, the file is read, or is silent about the next.
-        let tries = made_up.iter().map(|make_up| {
-            let mut more = hints.clone();
-            make_up(&mut more);
-            (recordings::read(bytes, name, &more), more)
-        });
-        let Some((next, more)) = tries.into_iter().find(|(next, _)| *next != result) else { break };
-        (result, hints) = (next, more);
-    }
-    result
 }
 
 fn refused(refusal: Refusal, name: &str) -> Failure {

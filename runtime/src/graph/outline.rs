@@ -1,0 +1,275 @@
+//! A graph as it runs: flat, with every value that was laid over another, every default and every fact, and where each
+//! of them comes from. For a person who asks.
+
+use std::ops::Range;
+use std::path::Path;
+
+use super::devices::{self, Opened};
+use super::document::{Block, GraphTable};
+use super::plan::Producer;
+use super::wires::{CommandWire, Model, Wire};
+use super::{Item, Key, Sources, Table, Value, parse_table};
+use crate::catalogue::Catalogue;
+use crate::node::{FilePath, Param, ParamSpec, Repeats, Word};
+
+/// The place of a default in a list of tables: nobody wrote it.
+pub const NOWHERE: Range<usize> = 0..0;
+
+/// A graph as it runs.
+#[derive(Debug, Clone, Default)]
+pub struct Outline {
+    /// Section `[graph]`, but for the bench, which is in the other sections.
+    pub settings: Vec<Setting>,
+    /// The roles: name, type, and the device that fills it.
+    pub roles: Vec<OutlinedRole>,
+    /// What drives each command: `role.command`.
+    pub commands: Vec<OutlinedWire>,
+    /// The nodes, in the order of the files.
+    pub nodes: Vec<OutlinedBlock>,
+    /// The devices that are used.
+    pub devices: Vec<OutlinedBlock>,
+}
+
+/// A role and its device.
+#[derive(Debug, Clone)]
+pub struct OutlinedRole {
+    /// Its name.
+    pub name: String,
+    /// Its type, and where that stands.
+    pub kind: Word,
+    /// The device that fills it, and where that stands.
+    pub device: Word,
+}
+
+/// A wire.
+#[derive(Debug, Clone)]
+pub struct OutlinedWire {
+    /// Name of the input, or of the command.
+    pub name: String,
+    /// The port it comes from: `node.port`, through all parts.
+    pub source: String,
+    /// Where that was written.
+    pub span: Range<usize>,
+}
+
+/// A node or a device.
+#[derive(Debug, Clone)]
+pub struct OutlinedBlock {
+    /// Its full name.
+    pub name: String,
+    /// Where its name stands.
+    pub span: Range<usize>,
+    /// Its type, and where that stands.
+    pub kind: Word,
+    /// Its wires.
+    pub wires: Vec<OutlinedWire>,
+    /// Its parameters, in the order of the declaration.
+    pub settings: Vec<Setting>,
+}
+
+/// A value that something is set to.
+#[derive(Debug, Clone)]
+pub struct Setting {
+    /// Dotted path in its block.
+    pub path: String,
+    /// The value.
+    pub value: Value,
+    /// Where it comes from.
+    pub origin: Origin,
+}
+
+/// Where a value comes from.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Origin {
+    /// It was written there.
+    Written(Range<usize>),
+    /// Nobody wrote it.
+    Default,
+    /// A device states it.
+    Fact {
+        /// `role.fact`
+        fact: String,
+        /// Where the device's name stands.
+        device: Range<usize>,
+    },
+}
+
+/// What the outline of a graph without mistakes is made from.
+pub(crate) struct Parts<'a> {
+    pub(crate) catalogue: &'a Catalogue,
+    pub(crate) model: &'a Model<'a>,
+    pub(crate) opened: &'a Opened,
+    pub(crate) wires: &'a [Vec<Wire>],
+    pub(crate) commands: &'a [CommandWire],
+    pub(crate) sources: &'a Sources,
+    /// Greatest time between two samples that counts as one step [s].
+    pub(crate) max_gap: f64,
+}
+
+impl Parts<'_> {
+    pub(crate) fn outline(&self) -> Outline {
+        let flat = self.model.flat;
+        let name = |wire: &CommandWire| {
+            let command = self.model.roles[wire.role].map(|role| role.commands[wire.command].name.clone());
+            format!("{}.{}", self.model.name(Producer::Role(wire.role)), command.unwrap_or_default())
+        };
+        let commands = self.commands.iter().map(|wire| OutlinedWire {
+            name: name(wire),
+            source: self.model.port_name(wire.source),
+            span: wire.origin.word.span.clone(),
+        });
+        Outline {
+            settings: self.graph(),
+            roles: self.roles(),
+            commands: commands.collect(),
+            nodes: (0..flat.nodes.len()).filter_map(|node| self.node(node)).collect(),
+            devices: self.opened.devices.iter().filter_map(|device| self.device(&device.name)).collect(),
+        }
+    }
+
+    fn graph(&self) -> Vec<Setting> {
+        let mut settings = Vec::new();
+        let given = self.model.flat.settings.as_ref().and_then(Value::as_table);
+        self.table(given, &GraphTable::fields(), "", &mut settings);
+        settings.retain(|setting| setting.path != "bench");
+        if !settings.iter().any(|setting| setting.path == "max_gap_ms") {
+            // A whole number of microseconds, so that no digits are there by chance.
+            let gap = Value { span: NOWHERE, item: Item::Float((self.max_gap * 1e6).round() * 1e-3) };
+            settings.push(Setting { path: "max_gap_ms".into(), value: gap, origin: Origin::Default });
+        }
+        settings
+    }
+
+    fn roles(&self) -> Vec<OutlinedRole> {
+        let bind = self.model.flat.bench.iter().flat_map(|bench| &bench.bind);
+        let device = |role: &str| bind.clone().find(|(key, _)| key.name == role).map(|(_, word)| word.clone());
+        let roles = self.model.flat.roles.iter();
+        let role = |(key, kind): &(Key, Word)| {
+            Some(OutlinedRole { name: key.name.clone(), kind: kind.clone(), device: device(&key.name)? })
+        };
+        roles.filter_map(role).collect()
+    }
+
+    fn node(&self, index: usize) -> Option<OutlinedBlock> {
+        let node = &self.model.flat.nodes[index];
+        let (_, spec) = self.model.nodes[index].as_ref()?;
+        let wire = |wire: &Wire| OutlinedWire {
+            name: wire.key.name.clone(),
+            source: self.model.port_name(wire.source),
+            span: wire.origin.word.span.clone(),
+        };
+        let wires = self.wires[index].iter().map(wire).collect();
+        Some(OutlinedBlock { name: node.name.clone(), wires, ..self.block(&node.block, &spec.params)? })
+    }
+
+    fn device(&self, name: &str) -> Option<OutlinedBlock> {
+        let bench = self.model.flat.bench.as_ref()?;
+        let block = bench.devices.iter().find(|device| device.key.name == name)?;
+        let kind = block.kind.as_ref()?;
+        let known = self.catalogue.devices().iter().find(|device| device.name() == kind.text)?;
+        self.block(block, &known.params())
+    }
+
+    fn block(&self, block: &Block, specs: &[ParamSpec]) -> Option<OutlinedBlock> {
+        let mut settings = Vec::new();
+        self.table(block.params.as_table(), specs, "", &mut settings);
+        Some(OutlinedBlock {
+            name: block.key.name.clone(),
+            span: block.key.span.clone(),
+            kind: block.kind.clone()?,
+            wires: Vec::new(),
+            settings,
+        })
+    }
+
+    /// The settings of a table: what is given, and the defaults of what is not.
+    fn table(&self, given: Option<&Table>, specs: &[ParamSpec], path: &str, settings: &mut Vec<Setting>) {
+        for spec in specs {
+            let path = format!("{path}{}", spec.name);
+            match given.and_then(|table| table.get(spec.name)) {
+                Some(value) => self.value(value, spec, path, settings),
+                None => settings.extend(default(spec).map(|value| Setting { path, value, origin: Origin::Default })),
+            }
+        }
+        let is_declared = |name: &str| specs.iter().any(|spec| spec.name == name);
+        // A node that is known only at run time may take more than it declares.
+        for (key, value) in given.iter().flat_map(|table| &table.entries).filter(|(key, _)| !is_declared(&key.name)) {
+            settings.push(self.setting(value, format!("{path}{}", key.name)));
+        }
+    }
+
+    fn value(&self, value: &Value, spec: &ParamSpec, path: String, settings: &mut Vec<Setting>) {
+        let table = value.as_table().filter(|table| !table.is_fact());
+        match (table, spec.repeats) {
+            (Some(table), Repeats::Once) if !spec.fields.is_empty() => {
+                self.table(Some(table), &spec.fields, &format!("{path}."), settings);
+            }
+            (Some(table), Repeats::PerName) => {
+                for (key, value) in &table.entries {
+                    let path = format!("{path}.{}", key.name);
+                    match value.as_table().filter(|table| !table.is_fact() && !spec.fields.is_empty()) {
+                        Some(table) => self.table(Some(table), &spec.fields, &format!("{path}."), settings),
+                        None => settings.push(self.setting(value, path)),
+                    }
+                }
+            }
+            _ => {
+                let mut setting = self.setting(value, path);
+                self.resolve(&mut setting, spec);
+                complete(&mut setting.value, spec);
+                settings.push(setting);
+            }
+        }
+    }
+
+    /// A value as it was written, or the fact that it asks for.
+    fn setting(&self, value: &Value, path: String) -> Setting {
+        let fact = value.as_table().filter(|table| table.is_fact());
+        let word = fact.and_then(|table| table.get("from")).and_then(Value::as_str);
+        let role = word.and_then(|word| {
+            self.model.flat.roles.iter().position(|(key, _)| word.starts_with(&format!("{}.", key.name)))
+        });
+        let mut filled = value.clone();
+        // The graph has no mistakes, so every fact is there.
+        devices::fill_facts(&mut filled, self.model, self.opened, &mut Vec::new());
+        let bound = role.and_then(|role| self.opened.roles[role].as_ref());
+        let origin = match (word, bound) {
+            (Some(word), Some(bound)) => {
+                Origin::Fact { fact: word.to_owned(), device: self.opened.devices[bound.device].span.clone() }
+            }
+            _ => Origin::Written(value.span.clone()),
+        };
+        Setting { path, value: filled, origin }
+    }
+
+    /// The path of a file, which stands relative to the file it is written in, as seen from the working folder.
+    fn resolve(&self, setting: &mut Setting, spec: &ParamSpec) {
+        if let (Origin::Written(span), Item::String(text)) = (&setting.origin, &mut setting.value.item)
+            && spec.takes == FilePath::EXPECTS
+        {
+            *text = self.sources.path(text, span.start).display().to_string();
+        }
+    }
+}
+
+/// Fills the defaults into the tables of a list.
+fn complete(value: &mut Value, spec: &ParamSpec) {
+    let Item::Array(items) = &mut value.item else { return };
+    for item in items {
+        let Item::Table(table) = &mut item.item else { continue };
+        for field in &spec.fields {
+            let default = default(field).filter(|_| table.get(field.name).is_none());
+            let key = Key { name: field.name.to_owned(), span: NOWHERE };
+            table.entries.extend(default.map(|value| (key, Value { span: NOWHERE, ..value })));
+        }
+    }
+}
+
+/// The default of a parameter as a value; none if nothing is set.
+fn default(spec: &ParamSpec) -> Option<Value> {
+    let text = spec.default.as_ref()?;
+    let mut sources = Sources::default();
+    let parsed = parse_table(sources.add_file(Path::new("default"), format!("value = {text}")));
+    let value = parsed.ok().and_then(|value| value.as_table()?.get("value").cloned());
+    Some(value.unwrap_or_else(|| Value { span: NOWHERE, item: Item::String(text.clone()) }))
+}
