@@ -75,16 +75,18 @@ struct HintArgs {
 const PART_OF_PEAK: f64 = 0.05;
 
 pub(super) fn features(args: Features, shell: &Shell) -> u8 {
-    let read = std::fs::read(&args.recording).ok().and_then(|bytes| args.hints.read(&bytes, &args.recording));
-    // What is wrong with it is told when the graph is checked: once, and at its place.
-    let threshold = read.as_ref().map_or(Threshold::given(0.0), |recording| args.threshold(recording));
+    // What is wrong with the recording is told when the graph is checked: once, and at its place.
+    let (headline, threshold) = match args.look() {
+        Some((headline, threshold)) => (Some(headline), threshold),
+        None => (None, Threshold::given(0.0)),
+    };
     let text = args.graph_text(&threshold);
-    if args.graph && read.is_some() {
-        shell.say(text.trim_end());
-        return 0;
-    }
-    if let Some(recording) = &read {
-        shell.say(&args.headline(recording, &threshold));
+    if let Some(headline) = headline {
+        if args.graph {
+            shell.say(text.trim_end());
+            return 0;
+        }
+        shell.say(&headline);
     }
     let request = Request { set: args.settings(), ..Request::text(text) };
     let title = format!("features of {}", args.recording.display());
@@ -104,6 +106,14 @@ impl Threshold {
 }
 
 impl Features {
+    /// What there is to say of the recording, and what counts as touched in it. It is not kept: the graph reads it anew.
+    fn look(&self) -> Option<(String, Threshold)> {
+        let bytes = std::fs::read(&self.recording).ok()?;
+        let recording = self.hints.read(&bytes, &self.recording)?;
+        let threshold = self.threshold(&recording);
+        Some((self.headline(&recording, &threshold), threshold))
+    }
+
     fn threshold(&self, recording: &Recording) -> Threshold {
         if let Some(value) = self.threshold {
             return Threshold::given(value);
