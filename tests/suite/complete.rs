@@ -91,7 +91,8 @@ fn runs_anywhere(catalogue: &Catalogue, text: &str, set: Option<&str>) -> Result
     let folder = tempfile::tempdir().unwrap();
     let request = Request { text: Some(text.to_owned()), ..Request::file(folder.path().join("try.toml")) };
     let request = set.map_or(request.clone(), |set| request.set(set));
-    plan(catalogue, &request).map(drop).map_err(|report| report.render(false))
+    let plan = plan(catalogue, &request).map_err(|report| report.render(false))?;
+    plan.warnings().map_or(Ok(()), |warnings| Err(warnings.render(false)))
 }
 
 #[test]

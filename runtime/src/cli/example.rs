@@ -8,6 +8,8 @@ use std::path::Path;
 
 use crate::catalogue::Catalogue;
 use crate::graph::{Item, Request, Sources, Table, Value, parse_table, plan};
+use crate::node::{Need, NodeSpec, PortSpec};
+use crate::signal::Kind;
 
 /// What the example is of.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -84,26 +86,48 @@ pub(super) fn compose(catalogue: &Catalogue, asked: Asked<'_>) -> Result<String,
     }
     chosen.sort_unstable();
     let chosen: Vec<&Piece> = chosen.iter().map(|index| &pieces[*index]).collect();
-    Ok(put_between(catalogue, &chosen, &pieces[start]).unwrap_or_else(|| text(&chosen, &pieces[start], None)))
+    let asked = &pieces[start];
+    if asked.is_device || !is_unread(&chosen, asked) {
+        return Ok(text(&chosen, asked, None));
+    }
+    let used = put_between(catalogue, &chosen, asked).or_else(|| watched(catalogue, &chosen, asked));
+    Ok(used.unwrap_or_else(|| text(&chosen, asked, None)))
 }
 
-/// Where a command is driven and nobody reads the node that is asked for, it is put into one of the wires it reads:
-/// those that read the wire read its output instead, if that makes a graph of which nothing is to be said.
-fn put_between(catalogue: &Catalogue, chosen: &[&Piece], asked: &Piece) -> Option<String> {
-    let is_clean = |text: &String| {
-        let plan = plan(catalogue, &Request::text(text.as_str()));
-        plan.is_ok_and(|plan| plan.warnings().is_none())
-    };
+/// Whether a command is driven and nobody reads the node that is asked for.
+fn is_unread(chosen: &[&Piece], asked: &Piece) -> bool {
     let is_read = chosen.iter().any(|piece| piece.needs.iter().any(|need| asked.names.contains(need)));
-    let is_driving = chosen.iter().any(|piece| piece.sections.contains_key("commands"));
-    if is_read || !is_driving || asked.is_device {
-        return None;
-    }
+    !is_read && chosen.iter().any(|piece| piece.sections.contains_key("commands"))
+}
+
+/// Whether a graph loads and there is nothing to be said of it.
+fn is_clean(catalogue: &Catalogue, text: &String) -> bool {
+    let plan = plan(catalogue, &Request::text(text.as_str()));
+    plan.is_ok_and(|plan| plan.warnings().is_none())
+}
+
+/// The asked node in one of the wires it reads: those that read the wire read its output instead, if that makes a graph
+/// of which nothing is to be said.
+fn put_between(catalogue: &Catalogue, chosen: &[&Piece], asked: &Piece) -> Option<String> {
     let spec = catalogue.nodes().iter().map(|node| node.spec()).find(|spec| spec.name == asked.kind)?;
     let outputs =
         || asked.names.iter().flat_map(|name| spec.outputs.iter().map(move |port| format!("{name}.{}", port.name)));
     let wires = asked.wires.iter().flat_map(|wire| outputs().map(move |output| (wire.clone(), output)));
-    wires.map(|(from, to)| text(chosen, asked, Some((&from, &to)))).find(is_clean)
+    wires.map(|(from, to)| text(chosen, asked, Some((&from, &to)))).find(|text| is_clean(catalogue, text))
+}
+
+/// The asked node with one that logs behind it: what only measures is there to be looked at.
+fn watched(catalogue: &Catalogue, chosen: &[&Piece], asked: &Piece) -> Option<String> {
+    let specs: Vec<NodeSpec> = catalogue.nodes().iter().map(|node| node.spec()).collect();
+    let takes = |port: &PortSpec| port.need == Need::Many && port.kind == Kind::Scalar;
+    let logs = specs.iter().find(|spec| spec.logs && spec.inputs.iter().any(takes))?;
+    let spec = specs.iter().find(|spec| spec.name == asked.kind)?;
+    let name = asked.names.first()?;
+    let scalars = spec.outputs.iter().filter(|port| port.kind == Kind::Scalar);
+    let wires: Vec<String> = scalars.map(|port| format!("in.{0} = \"{name}.{0}\"\n", port.name)).collect();
+    let whole = text(chosen, asked, None);
+    let whole = format!("{whole}\n[nodes.seen]\ntype = \"{}\"\n{}", logs.name, wires.concat());
+    Some(whole).filter(|text| is_clean(catalogue, text))
 }
 
 /// The block of a node or a device by itself, as it was written.
