@@ -4,7 +4,6 @@
 //! and reads them, [`report`] says how good they are and [`plot`] draws them, as Fig. 1 of the paper does. Nothing of
 //! this runs in a graph: there the node `calibrate` takes the file.
 
-#[cfg(feature = "cli")]
 pub mod curve;
 pub mod file;
 pub mod fit;

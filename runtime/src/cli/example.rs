@@ -101,8 +101,8 @@ fn is_unread(chosen: &[&Piece], asked: &Piece) -> bool {
 }
 
 /// Whether a graph loads and there is nothing to be said of it.
-fn is_clean(catalogue: &Catalogue, text: &String) -> bool {
-    let plan = plan(catalogue, &Request::text(text.as_str()));
+fn is_clean(catalogue: &Catalogue, text: &str) -> bool {
+    let plan = plan(catalogue, &Request::text(text));
     plan.is_ok_and(|plan| plan.warnings().is_none())
 }
 

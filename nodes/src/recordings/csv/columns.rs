@@ -131,7 +131,7 @@ pub(super) fn names_of(names: Piece<'_>) -> Notation {
     Notation { separator, has_decimal_comma: false }
 }
 
-fn unquoted(name: Piece<'_>) -> Piece<'_> {
+pub(super) fn unquoted(name: Piece<'_>) -> Piece<'_> {
     name.part(name.text.trim_matches(['"', '\''])).trimmed()
 }
 

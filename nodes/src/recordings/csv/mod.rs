@@ -7,8 +7,8 @@
 //! line between two frames; with the bench's `size` the blank lines may be missing.
 //!
 //! Lines that begin with `#` are comments. Beside `;`, tabs and blanks a comma is a decimal one. A tactel that is `nan`
-//! in the first frame does not exist, and then it is `nan` in all. Unit and pitch are the bench's to say, and the rate
-//! where there is no time.
+//! or an empty cell in the first frame does not exist, and then it is so in all. Unit and pitch are the bench's to say,
+//! and the rate where there is no time.
 
 mod columns;
 
@@ -17,7 +17,7 @@ mod tests;
 
 use tactflow_runtime::signal::ImageShape;
 
-use self::columns::{Columns, Role, names_of};
+use self::columns::{Columns, Role, names_of, unquoted};
 use super::reel::{Reel, bounded};
 use super::text::{self, Flaw, Lines, Notation, Piece, Wrong, flaw};
 use super::{Format, Head, Hints, Recording, Refusal};
@@ -45,7 +45,8 @@ fn recognises(head: &Head<'_>) -> bool {
         (Some((first, true)), Some((second, true))) => {
             let (above, below) = (names_of(first), Notation::of(second.text));
             let is_alike = above.separator == below.separator && width(above, first) == width(below, second);
-            is_row_of_numbers(second.text) && width(below, second) > 1 && (is_alike || is_row_of_numbers(first.text))
+            let is_named = is_alike && is_mostly_numbers(second);
+            width(below, second) > 1 && (is_named || is_row_of_numbers(first.text) && is_row_of_numbers(second.text))
         }
         (Some((first, true)), None) => is_row_of_numbers(first.text) && width(Notation::of(first.text), first) > 1,
         // The first row or the second is longer than what is looked at.
@@ -70,9 +71,18 @@ fn is_row_of_numbers(line: &str) -> bool {
     cells.peek().is_some() && cells.all(|cell| number(notation, cell, "").is_ok())
 }
 
-/// A number, or NaN by its name.
+/// Whether more than half of a row are numbers: what is wrong with the others is told at their place.
+fn is_mostly_numbers(line: Piece<'_>) -> bool {
+    let notation = Notation::of(line.text);
+    let are_numbers = || notation.fields(line).map(|cell| number(notation, cell, "").is_ok());
+    2 * are_numbers().filter(|is_number| *is_number).count() > are_numbers().count()
+}
+
+/// A number, perhaps in quotes; or NaN by its name, or as a cell with nothing in it.
 fn number(notation: Notation, cell: Piece<'_>, what: &str) -> Result<f64, Flaw> {
-    if cell.text.eq_ignore_ascii_case("nan") { Ok(f64::NAN) } else { notation.number(cell, what) }
+    let cell = unquoted(cell);
+    let is_missing = cell.text.is_empty() || cell.text.eq_ignore_ascii_case("nan");
+    if is_missing { Ok(f64::NAN) } else { notation.number(cell, what) }
 }
 
 fn parse(text: &str, hints: &Hints) -> Result<Recording, Wrong> {

@@ -46,6 +46,13 @@ fn the_same_written_otherwise_reads_the_same() {
         named().replace("r0c0,r0c1,r1c0,r1c1", "t1_1,t1_2,t2_1,t2_2"),
         named().replace("r0c0,r0c1,r1c0,r1c1", "x0y0,x1y0,x0y1,x1y1"),
         named().replace("0.5,1.25,1,2,3,4", "\n# the first\n 0.5, 1.25, 1, 2, 3, 4\n"),
+        // Every cell in quotes, as careful writers have it.
+        named()
+            .replace(',', "\",\"")
+            .replace('\n', "\"\n\"")
+            .replacen("# a press\"", "# a press", 1)
+            .trim_end_matches('"')
+            .into(),
         // The columns in another order, and the index that a data frame of pandas writes.
         ",r1c1,r1c0,time,r0c1,r0c0,force\n0,4,3,0.5,2,1,1.25\n1,8,7,0.75,6,5,2.5\n2,12,11,1.0,10,9,3.5\n".into(),
     ];
@@ -59,6 +66,22 @@ fn the_same_written_otherwise_reads_the_same() {
         complaints(read(text.as_bytes(), "", &hints()))[0].1,
         "the file does not say how many rows and columns it has"
     );
+}
+
+#[test]
+fn a_cell_with_nothing_in_it_is_a_tactel_that_does_not_exist() {
+    let text = "time,r0c0,r0c1,r1c0,r1c1\n0,1,,3,4\n0.1,5,,7,8\n";
+    let recording = read(text.as_bytes(), "pad.csv", &hints()).unwrap();
+    assert_eq!((recording.dead, recording.cells), (vec![1], vec![1.0, 0.0, 3.0, 4.0, 5.0, 0.0, 7.0, 8.0]));
+}
+
+#[test]
+fn a_table_with_a_column_of_words_is_told_where_it_stands() {
+    let text = "time,r0c0,r0c1,r1c0,r1c1\n2026-11-21,1,2,3,4\n2026-11-22,5,6,7,8\n";
+    let told = complaints(read(text.as_bytes(), "pad.csv", &hints()));
+    assert_eq!(told, [(2, "this cell is not a number: `2026-11-21`".to_owned())]);
+    let words = "name,age,town\nAda,36,London\n";
+    assert_eq!(read(words.as_bytes(), "people.csv", &hints()), Err(Refusal::Stranger));
 }
 
 #[test]
@@ -101,7 +124,7 @@ fn what_is_wrong_is_said_where_it_is() {
         ("5,6,7,8", "5,6,7,eight", 4, "this cell is not a number: `eight`"),
         ("5,6,7,8", "5,6,7", 4, "frame 2 has 5 columns, but should have 6"),
         ("5,6,7,8", "5,6,7,8,9", 4, "frame 2 has 7 columns, but should have 6"),
-        ("5,6,7,8", "5,,7,8", 4, "this cell is not a number: ``"),
+        ("5,6,7,8", "5,,7,8", 4, "this cell is no number, but in the first frame it was one"),
         ("5,6,7,8", "5,6,7,1e300", 4, "this cell is too large"),
         ("0.75", "0.25", 4, "a time is a number from that of the first frame to 1e9 s after it"),
         ("1.0,", "0.6,", 5, "the time goes back"),
