@@ -5,7 +5,7 @@ use std::ops::Range;
 
 use annotate_snippets::{AnnotationKind, Group, Level, Renderer, Snippet};
 
-use crate::graph::Sources;
+use crate::graph::{SourceFile, Sources};
 
 macro_rules! codes {
     ($($(#[doc = $doc:literal])* $Code:ident $name:literal),* $(,)?) => {
@@ -199,12 +199,12 @@ impl Report {
 
     fn render_one(&self, diagnostic: &Diagnostic, renderer: &Renderer) -> String {
         let main = self.sources.file_at(diagnostic.span.start);
-        let place = AnnotationKind::Primary.span(main.local(&diagnostic.span));
+        let place = AnnotationKind::Primary.span(shown(main, &diagnostic.span));
         let mut snippet = Snippet::source(&main.text).path(&main.name).annotation(place);
         let mut others: Vec<Group<'_>> = Vec::new();
         for (span, label) in &diagnostic.notes {
             let file = self.sources.file_at(span.start);
-            let place = AnnotationKind::Context.span(file.local(span));
+            let place = AnnotationKind::Context.span(shown(file, span));
             if std::ptr::eq(file, main) {
                 snippet = snippet.annotation(place.label(label));
             } else {
@@ -224,6 +224,13 @@ impl Report {
         }
         renderer.render(&groups)
     }
+}
+
+/// As much of a place as is marked: nobody reads a million carets.
+fn shown(file: &SourceFile, span: &Range<usize>) -> Range<usize> {
+    const MOST: usize = 200;
+    let local = file.local(span);
+    local.start..local.end.min(file.text.floor_char_boundary(local.start + MOST))
 }
 
 /// The name that a misspelt one is meant to be, if one is near.
