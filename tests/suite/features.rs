@@ -27,6 +27,21 @@ fn a_recording_becomes_a_table_a_row_a_frame() {
 }
 
 #[test]
+fn every_recording_that_ships_is_read_as_it_is() {
+    let cases = [
+        ("pressuRe/emed_test.zip", "novel-lst, 95 by 64 tactels of 5 by 5 mm, 106 frames in 1.05 s, in kPa"),
+        ("pawlabeling/dog1_sel_1.zip", "footscan, 256 by 63 tactels of 5.08 by 7.62 mm, 249 frames in 1.97 s, in N"),
+        ("pawlabeling/zebris_gait.zip", "zebris, 56 by 128 tactels of 8.47 by 8.46 mm, 1472 frames in 14.71 s, in kPa"),
+    ];
+    for (name, headline) in cases {
+        let path = format!("graphs/recordings/{name}");
+        let said = say(&["features", &path, "--for", "200ms"]);
+        assert_eq!((said.code, said.err.as_str()), (0, ""), "{name}");
+        assert_eq!(said.out.lines().next(), Some(&*format!("{path}: {headline}")));
+    }
+}
+
+#[test]
 fn the_graph_behind_it_checks_from_any_folder() {
     let graph = say(&["features", PRESS, "--graph", "--threshold", "5", "--min-area", "6"]);
     assert_eq!((graph.code, graph.err.as_str()), (0, ""));
