@@ -164,6 +164,11 @@ tare_at_start = true                # the first 50 frames are the zero, if nothi
         if let Some(rules) = &self.rules {
             rules.step(&inputs, &self.offset, &self.lines, state);
         }
+        // A command that is lost wakes the node as well: without a frame of the pad there is no new image.
+        if !inputs.image.is_new() {
+            out.image.keep();
+            return;
+        }
         self.lines.apply(inputs.image.cells(), &state.offset, out.image.write().cells_mut());
     }
 }

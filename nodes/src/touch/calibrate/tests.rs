@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use tactflow_runtime::harness::NodeRig;
 use tactflow_runtime::node::At;
-use tactflow_runtime::signal::{FlagShape, Image, Shape};
+use tactflow_runtime::signal::{FlagShape, Freshness, Image, Shape};
 
 use super::*;
 use crate::calibration::{Curve, Kind, Tactel};
@@ -297,4 +297,16 @@ fn a_tare_that_nothing_guards_is_refused() {
     for wrong in ["tare_window = 0", "tare_bound = 0", "tare_at_start = 1"] {
         assert!(tared(wrong, &["present"]).is_err(), "{wrong}");
     }
+}
+
+#[test]
+fn a_command_that_goes_away_makes_no_image() {
+    let mut rig = tared(WINDOW, &["tare", "present"]).unwrap();
+    rig.set("tare", false);
+    assert_eq!(frame(&mut rig, 12.0), 4.0);
+    rig.lose("tare");
+    rig.step();
+    assert_eq!(rig.freshness("image"), Freshness::Held, "no frame came, so none goes on");
+    assert_eq!(frame(&mut rig, 13.0), 6.0);
+    assert_eq!(rig.freshness("image"), Freshness::New);
 }
