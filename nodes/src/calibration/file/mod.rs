@@ -30,6 +30,9 @@ pub struct Flaw {
 /// The most flaws that are told of one file.
 const MOST_FLAWS: usize = 8;
 
+/// The most knots of a curve. The node has room for as many for every tactel as the one with the most has.
+const MOST_KNOTS: usize = 64;
+
 /// The version of the format that is written, and the only one that is read.
 const VERSION: u64 = 1;
 
@@ -248,6 +251,11 @@ impl File<'_> {
                 if line.readings.len() != line.forces.len() {
                     let message = format!("{} readings, but {} forces", line.readings.len(), line.forces.len());
                     self.flaws.push(flaw(&place(value, "forces"), message));
+                    return None;
+                }
+                if line.readings.len() > MOST_KNOTS {
+                    let message = format!("{} knots, but a curve has {MOST_KNOTS} at most", line.readings.len());
+                    self.flaws.push(flaw(&place(value, "readings"), message));
                     return None;
                 }
                 let knots = line.readings.iter().zip(&line.forces).map(|(s, f)| [*s as f32, *f as f32]).collect();

@@ -150,3 +150,15 @@ fn what_is_no_toml_says_so_and_many_mistakes_are_cut_short() {
     let text = GOOD.replacen("tactels = [\n", &format!("tactels = [\n{}", line.repeat(50)), 1);
     assert_eq!(read(&text).unwrap_err().len(), MOST_FLAWS);
 }
+
+/// The node keeps as many segments for every tactel as the one with the most has: one long line must not blow them up.
+#[test]
+fn a_curve_has_so_many_knots_at_most() {
+    let with = |count: usize| {
+        let list = (1..=count).map(|k| k.to_string()).collect::<Vec<_>>().join(", ");
+        read(&KNOTS.replace("10, 20, 30", &list).replace("0.5, 1.5, 4", &list))
+    };
+    assert!(with(64).is_ok());
+    let flaws = with(65).unwrap_err();
+    assert_eq!((flaws.len(), flaws[0].message.as_str()), (1, "65 knots, but a curve has 64 at most"));
+}
