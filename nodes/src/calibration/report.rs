@@ -83,6 +83,13 @@ const SATURATED: (usize, f64) = (5, 0.05);
 pub fn calibrate(logs: &[Log], settings: &Settings) -> Result<Report, String> {
     let first = logs.first().ok_or("there is no log")?;
     let samples = Samples::new(logs, settings.load, settings.dead_below, settings.bearing);
+    if samples.is_shared {
+        return Err(
+            "most tactels answer to most presses alike, so the force is not on one tactel at a time: is the load \
+                    uniform?"
+                .into(),
+        );
+    }
     let ceilings = ceilings(logs);
     let mut findings = Vec::new();
     let mut curves: Vec<Option<[Curve; 3]>> = Vec::new();

@@ -60,6 +60,10 @@ const ALIKE: f64 = 0.85;
 /// How much more a tactel answers to a press on it than to one beside it, at least.
 const WEAK: f64 = 1.5;
 
+/// A tactel that answers with at least this part of the greatest response to a press may be pressed itself; foam passes
+/// less of it on.
+const PRESSED: f64 = 0.3;
+
 /// Who bears the force of a frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Bearer {
@@ -90,6 +94,8 @@ pub struct Samples<'l> {
     pub most: f64,
     /// The part of a frame's force that is on one tactel.
     pub share: f64,
+    /// Whether a load that should be on one tactel at a time is on most of them at once.
+    pub is_shared: bool,
 }
 
 impl<'l> Samples<'l> {
@@ -103,7 +109,7 @@ impl<'l> Samples<'l> {
         let frame = |is_loading: bool| (bearer, is_loading);
         let frames = logs.iter().map(|log| log.is_loading(TURN * most).into_iter().map(frame).collect()).collect();
         let answers = (0..tactels).map(|i| zero(logs, most, i)).collect();
-        let mut samples = Self { logs, frames, answers, most, share: 1.0 };
+        let mut samples = Self { logs, frames, answers, most, share: 1.0, is_shared: false };
         match load {
             Load::Uniform => samples.share_out(dead_below, bearing),
             Load::Probe => samples.find_presses(dead_below),
@@ -133,6 +139,8 @@ impl<'l> Samples<'l> {
             }
         }
         self.bury(dead_below);
+        let shared = stretches.iter().filter(|(log, frames)| self.is_on_most(*log, frames)).count();
+        self.is_shared = 2 * shared > stretches.len();
         let presses = stretches.into_iter().filter_map(|(log, frames)| self.press(log, frames));
         let presses: Vec<Press> = presses.collect();
         // A press on a dead tactel makes a neighbour answer, but less than the presses on that one itself do.
@@ -182,6 +190,19 @@ impl<'l> Samples<'l> {
             }
         }
         sums.into_iter().map(|sum| sum / count).collect()
+    }
+
+    /// Whether most live tactels answer to a stretch as if they were pressed all at once: about as much as they ever
+    /// do, and not much less than the one that answers the most.
+    fn is_on_most(&self, log: usize, frames: &Range<usize>) -> bool {
+        let responses = self.responses(log, frames);
+        let live: Vec<usize> = (0..responses.len()).filter(|i| !self.answers[*i].is_dead).collect();
+        let size = |i: &usize| responses[*i].abs();
+        let part = |i: &usize| size(i) / self.answers[*i].response;
+        let greatest = |of: &dyn Fn(&usize) -> f64| live.iter().map(of).fold(0.0, f64::max);
+        let (most, best) = (greatest(&size), greatest(&part));
+        let pressed = live.iter().filter(|i| size(i) >= PRESSED * most && part(i) >= ALIKE * best).count();
+        pressed > 1 && 2 * pressed > live.len()
     }
 
     /// The tactel that a stretch is a press on: of those that answer about as much as they ever do, the one that

@@ -183,6 +183,26 @@ fn tactels_that_the_probe_did_not_reach_are_left_out() {
 }
 
 #[test]
+fn a_uniform_load_is_not_taken_for_a_probe() {
+    for (rows, cols, dead) in [(4, 4, &[][..]), (1, 2, &[]), (3, 5, &[0, 7])] {
+        let log = Pad::new(rows, cols, dead, 5).uniform(3, 60);
+        let message = calibrate(std::slice::from_ref(&log), &settings(Load::Probe, None)).unwrap_err();
+        assert!(message.starts_with("most tactels answer to most presses alike"), "{message}");
+    }
+    // A probe on one tactel only, and foam that passes a part of it on to all that answer.
+    let mut pad = Pad::new(3, 3, &[], 5);
+    let mut log = pad.probe(1, 60, 0.15);
+    let (frames, tactels) = (130 * 5, log.tactels());
+    log.force[..frames - 130].fill(0.0);
+    let rest = log.cells[..10 * tactels].repeat((frames - 130) / 10);
+    log.cells[..rest.len()].copy_from_slice(&rest);
+    log.force.truncate(frames);
+    log.cells.truncate(frames * tactels);
+    let report = made(log, Load::Probe, None);
+    assert_eq!(report.in_state(State::Good), [[1, 1]], "only the one in the middle was pressed");
+}
+
+#[test]
 fn nothing_to_calibrate_is_said_with_a_way_out() {
     let mut pad = Pad::new(2, 2, &[0, 1, 2, 3], 11);
     let log = pad.uniform(1, 50);

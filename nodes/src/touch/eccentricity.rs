@@ -151,6 +151,21 @@ mod tests {
     }
 
     #[test]
+    fn tactels_below_zero_that_leave_no_spread_leave_no_shape() {
+        // A strong middle between two that pull: the sum is positive, the variance along x is not.
+        let (mut image, mut region) = (Image::zeros(20, 24), Mask::empty(20, 24));
+        for (i, j, value) in [(2, 5, 0.3), (3, 4, -1.0), (3, 5, 9.0), (3, 6, -1.0), (4, 5, 0.3)] {
+            image.cells_mut()[i * 24 + j] = value;
+            region.insert(i, j);
+        }
+        let mut rig = rig::<Eccentricity>("").unwrap();
+        rig.set("image", image);
+        rig.set("region", region);
+        rig.step();
+        assert_eq!(rig.get::<Scalar>("eccentricity"), None);
+    }
+
+    #[test]
     fn what_is_refused() {
         let cases = [
             ("weight = \"excess\"", At::Param("weight".into())),

@@ -97,7 +97,8 @@ time_constant_ms = 20               # [ms]
         let next = if self.is_axial { doubled(*inputs.value) } else { [*inputs.value, 0.0] };
         let value = match state.last {
             Some([a, b]) => {
-                let share = -libm::expm1(-dt / self.time);
+                // With a time of next to nothing, no time at all would be none of it and all of it.
+                let share = if dt > 0.0 { -libm::expm1(-dt / self.time) } else { 0.0 };
                 [toward(a, next[0], share), toward(b, next[1], share)]
             }
             None => next,
@@ -232,6 +233,11 @@ mod tests {
         let mut values = (1..200).map(|ms| show(&mut decaying, f64::from(ms), 0.0).unwrap());
         assert!(values.all(|value| value == 0.0 || value.is_normal()));
         assert_eq!(show(&mut decaying, 200.0, 0.0), Some(0.0));
+        let mut at_once = built("cutoff_hz = 1e308", Unit::NEWTON).unwrap();
+        for (ms, value) in [(0.0, 1.0), (0.0, 2.0), (1.0, 3.0)] {
+            let shown = show(&mut at_once, ms, value).unwrap();
+            assert!(shown.is_finite(), "{value} came out as {shown}");
+        }
         let mut far = rig(1.0, Unit::NEWTON);
         show(&mut far, 0.0, f64::MAX);
         assert!(show(&mut far, 1.0, -f64::MAX).unwrap().is_finite());

@@ -30,7 +30,7 @@ pub struct Flaw {
 /// The most flaws that are told of one file.
 const MOST_FLAWS: usize = 8;
 
-/// The most knots of a curve: every tactel takes as much room as the one with the most.
+/// The most knots of a curve. The node has room for as many for every tactel as the one with the most has.
 const MOST_KNOTS: usize = 64;
 
 /// The version of the format that is written, and the only one that is read.

@@ -113,8 +113,11 @@ ramp_tactels = 1.0
         }
         let (margin, ramp) = (*params.margin_tactels, *params.ramp_tactels);
         let half = (shape.rows.min(shape.cols).max(1) as f64 - 1.0) / 2.0;
-        if margin + ramp > half {
-            let (rows, cols) = (shape.rows, shape.cols);
+        let (rows, cols) = (shape.rows, shape.cols);
+        if half <= 0.0 {
+            let message = format!("{rows} by {cols} tactels have no middle: a contact on them is always at the rim");
+            mistakes.push(Mistake::input("image", message).help("leave the `edge_guard` out"));
+        } else if margin + ramp > half {
             let message = format!(
                 "a margin of {margin} and a ramp of {ramp} tactels leave no middle of {rows} by {cols} tactels"
             );

@@ -236,6 +236,9 @@ fn a_pad_without_a_middle_and_a_guard_without_a_contact() {
     assert_eq!(small[0].at, At::Param("margin_tactels".into()));
     assert_eq!(small[0].message, "a margin of 2 and a ramp of 1 tactels leave no middle of 4 by 16 tactels");
     assert!(rig("margin_tactels = 0.5", 4, 16).is_ok(), "just enough");
+    let strip = rig("margin_tactels = 0.0", 1, 16).err().unwrap();
+    assert_eq!(strip[0].at, At::Input("image".into()));
+    assert_eq!(strip[0].message, "1 by 16 tactels have no middle: a contact on them is always at the rim");
     let image = ImageShape { rows: 16, cols: 16, pitch: [PITCH; 2], unit: Unit::NEWTON };
     let wires = [("twist", TwistShape.into()), ("image", image.into())];
     let mistakes = NodeRig::new::<EdgeGuard>("", &wires).err().unwrap();

@@ -157,9 +157,14 @@ impl Ellipse {
             0.0
         }
     }
-    /// Variance along the long and along the short axis [m²]; zero without extent.
+
+    /// Variance along the long and along the short axis [m²]; zero without extent, and where tactels below zero leave no
+    /// positive spread.
     #[must_use]
     pub fn variances(&self) -> [f64; 2] {
+        if self.spread <= 0.0 {
+            return [0.0; 2];
+        }
         let strength = libm::hypot(self.sine, self.cosine);
         [self.spread + strength, self.spread - strength].map(|sum| (0.5 * sum).max(0.0))
     }
