@@ -164,6 +164,27 @@ fn a_saturated_tactel_is_calibrated_below_its_end() {
 }
 
 #[test]
+fn a_falling_sensor_saturates_at_its_lowest_reading_and_a_dwell_is_no_saturation() {
+    let mut falling = Pad { hysteresis: 0.0, is_falling: true, ..Pad::new(2, 3, &[], 9) };
+    (falling.truths[4].a, falling.truths[4].b, falling.truths[4].offset) = (9000.0, 3.0, 300.0);
+    let report = made(falling.uniform(2, 250), Load::Uniform, None);
+    assert_eq!(report.findings.iter().position(|finding| finding.is_saturated), Some(4));
+    assert_eq!(report.findings.iter().filter(|finding| finding.is_saturated).count(), 1);
+
+    // Without noise, a force that is held gives the largest reading again and again.
+    let mut pad = Pad { hysteresis: 0.0, noise: 0.0, ..Pad::new(1, 2, &[], 9) };
+    let mut log = pad.uniform(1, 100);
+    let (top, tactels) = (50 + 99, log.tactels());
+    for _ in 0..20 {
+        log.force.push(log.force[top]);
+        let held = log.cells[top * tactels..(top + 1) * tactels].to_vec();
+        log.cells.extend(held);
+    }
+    let report = made(log, Load::Uniform, None);
+    assert!(report.findings.iter().all(|finding| !finding.is_saturated), "nothing is past its end");
+}
+
+#[test]
 fn tactels_that_the_probe_did_not_reach_are_left_out() {
     let mut pad = Pad::new(4, 4, &[], 10);
     let whole = pad.probe(1, 60, 0.2);

@@ -218,6 +218,25 @@ mod tests {
     }
 
     #[test]
+    fn a_tactel_amid_its_region_counts_whole_though_the_image_dips_there() {
+        // As a hysteresis may leave it: the middle is in the region, but below the threshold.
+        let (mut image, mut region) = (Image::zeros(7, 7), Mask::empty(7, 7));
+        for (i, j) in (2..5).flat_map(|i| (2..5).map(move |j| (i, j))) {
+            image.cells_mut()[i * 7 + j] = if (i, j) == (3, 3) { 0.1 } else { 1.0 };
+            region.insert(i, j);
+        }
+        let (_, dipped) = areas_of("threshold = 0.5", image.clone(), region);
+        // The other tactels see the middle as it is; the middle itself has all of its sixteen points.
+        let mut region = Mask::empty(7, 7);
+        (2..5)
+            .flat_map(|i| (2..5).map(move |j| (i, j)))
+            .filter(|at| *at != (3, 3))
+            .for_each(|(i, j)| region.insert(i, j));
+        let (_, hollow) = areas_of("threshold = 0.5", image, region);
+        assert!(dipped > hollow, "{dipped} and {hollow} tactels");
+    }
+
+    #[test]
     fn areas_in_closed_form() {
         let one = |i: usize, j: usize| f64::from(u8::from((i, j) == (3, 4)));
         let corner = |i: usize, j: usize| f64::from(u8::from((i, j) == (0, 0)));

@@ -125,6 +125,7 @@ fn every_mistake_stands_at_its_place() {
         (GOOD, "squash = 0.001", "squash = -1", "-1", "`squash` has the sign of `gain`"),
         (GOOD, "most = 5", "most = -5", "-5", "`most` is the largest force"),
         (GOOD, "offset = -3", "offset = 1e50", "1e50", "too large"),
+        (KNOTS, "[0, 0]", "[0, 1]", "[0, 1]", "tactel [0, 1] is not on an array of 1 by 1"),
         (KNOTS, "[0.5, 1.5, 4]", "[0.5, 1.5]", "[0.5, 1.5]", "3 readings, but 2 forces"),
         (KNOTS, "[0.5, 1.5, 4]", "[0.5, 0.4, 4]", "[0.5, 0.4, 4]", "`forces` never fall, but 0.4 comes after 0.5"),
         (KNOTS, "[10, 20, 30]", "[10, 10, 30]", "[10, 10, 30]", "`readings` go on in one direction from 0"),

@@ -213,6 +213,28 @@ fn flicker_is_no_way_out_but_a_lost_contact_is_forgotten() {
     }
     assert_eq!(show(&mut rig, None), (Some(-0.01), Some(false)), "20 ms after");
     assert_eq!(show(&mut rig, Some(6.0)), (Some(0.0), Some(true)));
+    assert_eq!(show(&mut rig, None), (Some(0.0), Some(true)), "each flicker is counted by itself");
+}
+
+#[test]
+fn margin_and_ramp_are_in_tactels_of_their_axis() {
+    let fences = |axis: usize, place: f64| {
+        let shape = ImageShape { rows: 12, cols: 16, pitch: [0.005, 0.002], unit: Unit::NEWTON };
+        let metre = || Shape::from(ScalarShape { unit: Unit::METRE });
+        let image = Image::zeros(shape.rows, shape.cols);
+        let wires = [("twist", TwistShape.into()), ("x", metre()), ("y", metre()), ("image", shape.into())];
+        let mut rig = NodeRig::new::<EdgeGuard>("margin_tactels = 1.5\nramp_tactels = 2", &wires).unwrap();
+        rig.set("image", image);
+        rig.set("twist", Twist([-1.0, -1.0, 0.0, 0.0, 0.0, 0.0].into()));
+        rig.set("x", if axis == 0 { place } else { 0.0 });
+        rig.set("y", if axis == 1 { place } else { 0.0 });
+        rig.step();
+        rig.get::<Twist>("twist").unwrap().0[axis]
+    };
+    // Six tactels of 5 mm along x and four of 2 mm along y are free; half of the ramp is a tactel before.
+    for (axis, place) in [(0, 0.025), (1, 0.006)] {
+        assert!((fences(axis, place) + 0.5).abs() < 1e-9, "axis {axis}: {}", fences(axis, place));
+    }
 }
 
 #[test]

@@ -115,7 +115,7 @@ fn hysteresis_takes_the_flicker_out_of_a_contact() {
 #[test]
 fn otsu_splits_between_two_classes_and_never_below_the_floor() {
     // least threshold, cells, how many tactels are above
-    let cases: [(f64, &[f32], usize); 9] = [
+    let cases: [(f64, &[f32], usize); 10] = [
         (0.1, &[0.0; 8], 0),
         (0.1, &[0.09, 0.01, 0.02, 0.1], 0),
         (0.1, &[5.0; 8], 8),
@@ -125,6 +125,8 @@ fn otsu_splits_between_two_classes_and_never_below_the_floor() {
         (-1.0, &[-0.5, -0.5, 0.0], 1),
         (0.0, &[0.0, f32::MAX, -f32::MAX], 1),
         (0.0, &[0.0, 1e-45], 1),
+        // Both splits are as good: the lower one is taken.
+        (-1.0, &[2.0, 0.0, 1.0], 2),
     ];
     for (least, cells, count) in cases {
         let mut rig = rig(&format!("threshold = {least:?}\nmethod = \"otsu\""), 1, cells.len()).unwrap();

@@ -300,6 +300,21 @@ fn a_tare_that_nothing_guards_is_refused() {
 }
 
 #[test]
+fn a_command_that_went_away_between_two_frames_is_another_when_it_comes_back() {
+    let mut rig = tared(WINDOW, &["tare", "present"]).unwrap();
+    rig.set("present", false);
+    rig.set("tare", true);
+    for value in [16.0, 16.0, 16.0] {
+        frame(&mut rig, value);
+    }
+    rig.lose("tare");
+    rig.step();
+    rig.set("tare", true);
+    (0..4).for_each(|_| assert_eq!(frame(&mut rig, 14.0), 8.0, "the window begins anew"));
+    assert_eq!(frame(&mut rig, 14.0), 0.0, "and knows nothing of the frames before");
+}
+
+#[test]
 fn a_command_that_goes_away_makes_no_image() {
     let mut rig = tared(WINDOW, &["tare", "present"]).unwrap();
     rig.set("tare", false);
