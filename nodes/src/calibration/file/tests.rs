@@ -150,3 +150,9 @@ fn what_is_no_toml_says_so_and_many_mistakes_are_cut_short() {
     let text = GOOD.replacen("tactels = [\n", &format!("tactels = [\n{}", line.repeat(50)), 1);
     assert_eq!(read(&text).unwrap_err().len(), MOST_FLAWS);
 }
+
+#[test]
+fn a_file_that_is_no_toml_is_told_once() {
+    let log = "time,force,t0_0\n0.0,0.1,200\n0.1,0.2,300\n";
+    assert_eq!(read(log).unwrap_err().len(), 1);
+}
