@@ -114,7 +114,7 @@ fn a_name_that_is_misspelt_is_guessed() {
     for (args, help) in cases {
         let said = say(&args);
         assert_eq!((said.code, said.out.as_str()), (2, ""), "{args:?}");
-        let first = format!("error: there is no node, device, role or kind `{}`", args[1]);
+        let first = format!("error: there is no node, device, role, kind or file `{}`", args[1]);
         assert_eq!(said.err, format!("{first}\n{help}\n"));
     }
 }
@@ -277,8 +277,30 @@ fn completions_are_what_each_shell_reads() {
         let said = say(&["completions", shell]);
         assert_eq!((said.code, said.err.as_str()), (0, ""), "{shell}");
         assert!(said.out.contains(word) && said.out.contains("describe"), "{shell}");
+        assert_eq!(
+            said.out.contains("edge_guard"),
+            matches!(shell, "bash" | "zsh"),
+            "{shell}: what there is to describe"
+        );
     }
     assert_eq!(say(&["completions", "cmd"]).code, 2);
+}
+
+#[test]
+fn a_part_that_comes_along_shows_what_goes_in_and_out() {
+    let said = say(&["describe", "builtin:parts/touch.toml"]);
+    assert_eq!((said.code, said.err.as_str()), (0, ""));
+    for text in ["The file\n", "[inputs]\nimage = ", "[exports]\nx = \"moments.x\""] {
+        assert!(said.out.contains(text), "{text}: {}", said.out);
+    }
+}
+
+#[test]
+fn the_words_of_other_books_find_the_filters() {
+    for (word, node) in [("average", "smooth"), ("lowpass", "one_pole")] {
+        let said = say(&["list", word]);
+        assert!(said.out.contains(&format!("\n  {node} ")), "{word}: {}{}", said.out, said.err);
+    }
 }
 
 #[test]

@@ -36,6 +36,25 @@ fn log() -> String {
     text
 }
 
+/// A log of a bladder on three live tactels and a dead one, up and down twice.
+fn bladder() -> String {
+    let mut text = String::from("time,force,t0_0,t0_1,t1_0,t1_1\n");
+    let forces = std::iter::repeat_n(0, 10).chain((0..2).flat_map(|_| (1..=60).chain((0..60).rev())));
+    for (frame, k) in forces.enumerate() {
+        let force = f64::from(k) / 12.0;
+        let read = |i: f64| (200.0 + (3000.0 + 400.0 * i) * force / (force + 2.0 + 0.5 * i)).round();
+        text.push_str(&format!(
+            "{:.2},{:.4},{},{},{},200\n",
+            frame as f64 * 0.01,
+            3.0 * force,
+            read(0.0),
+            read(1.0),
+            read(2.0)
+        ));
+    }
+    text
+}
+
 fn folder(files: &[(&str, &str)]) -> TempDir {
     let folder = TempDir::new().unwrap();
     files.iter().for_each(|(name, text)| fs::write(folder.path().join(name), text).unwrap());
@@ -107,6 +126,7 @@ fn what_cannot_be_used_is_refused_with_exit_code_2() {
     let torn = log.replacen("0.03,0.0000,", "0.03,x,", 1);
     // The force of each frame stands beside a frame that came 30 earlier.
     let late = late_by(30, &log);
+    let bladder = bladder();
     let files = [
         ("press.csv", log.as_str()),
         ("forceless.csv", &forceless),
@@ -114,10 +134,11 @@ fn what_cannot_be_used_is_refused_with_exit_code_2() {
         ("wide.csv", &wide),
         ("torn.csv", &torn),
         ("late.csv", &late),
+        ("bladder.csv", &bladder),
         ("notes.txt", "do not lose me"),
     ];
     let folder = folder(&files);
-    let cases: [(&[&str], &str); 12] = [
+    let cases: [(&[&str], &str); 14] = [
         (&["nowhere.csv"], "error: cannot read `nowhere.csv`"),
         (&["forceless.csv"], "error: `forceless.csv` cannot be used: it has no reference force"),
         (&["loaded.csv"], "error: `loaded.csv` cannot be used: only 0 of its frames are unloaded"),
@@ -134,6 +155,8 @@ fn what_cannot_be_used_is_refused_with_exit_code_2() {
             "error: no tactel can be calibrated: 1 tactels never answer",
         ),
         (&["late.csv", "-o", "new.toml"], "% of the range, so nothing is written"),
+        (&["bladder.csv", "-o", "new.toml"], "most tactels answer to most presses alike"),
+        (&["press.csv", "--bearing", "4"], "error: `--bearing` means nothing without `--load uniform`"),
         (&["press.csv", "--curve", "cubic"], "invalid value 'cubic'"),
         (&["press.csv", "--dead-below", "0"], "`0` is not a number greater than 0"),
     ];

@@ -184,6 +184,12 @@ fn a_mistake_in_set_points_into_set() {
         ("nodes.pidd.gains.x.kp=3", "missing-key", "1:7", "`pidd` has no `type`"),
         ("node.pid.gains.x.kp=3", "unknown-key", "1:1", "`node` means nothing here"),
         ("parts.touch.set.labl.min_area=3", "unknown-key", "1:17", "the part has no node or part `labl`"),
+        (
+            "nodes.touch.label.min_area=3",
+            "unknown-key",
+            "1:7",
+            "`touch` is a part: its nodes are set through `parts.touch.set`",
+        ),
         ("devices.pad.rows=-1", "bad-value", "1:18", "expected a whole number from 1 to 1000000, found -1"),
         ("devices.pad.row=4", "unknown-key", "1:13", "`row` is not a parameter here"),
         ("bind.pad=padd", "unknown-device", "1:10", "the bench has no device `padd`"),
@@ -197,6 +203,7 @@ fn a_mistake_in_set_points_into_set() {
         let at = err.find(&title).unwrap_or_else(|| panic!("{assignment}: `{title}` is not in\n{err}"));
         let next = err[at + title.len()..].lines().next().unwrap().trim_start();
         assert_eq!(next, format!("--> command line:{place}"), "{assignment}: {err}");
+        assert!(err.ends_with("\n1 mistake\n"), "{assignment}: {err}");
     }
 }
 
@@ -340,6 +347,18 @@ fn a_reader_that_has_seen_enough_is_no_mistake() {
     drop(child.stdout.take());
     let said = child.wait_with_output().unwrap();
     assert_eq!((said.status.code(), String::from_utf8_lossy(&said.stderr).as_ref()), (Some(0), ""));
+}
+
+#[test]
+#[cfg(target_os = "linux")]
+fn what_cannot_be_printed_is_told_and_ends_with_1() {
+    for args in [["describe", "pid"], ["show", HYBRID], ["run", PRESS]] {
+        let full = fs::OpenOptions::new().write(true).open("/dev/full").unwrap();
+        let Said { code, err, .. } = crate::tool::said_into(&mut tool(&args), full);
+        assert_eq!(code, 1, "{args:?}");
+        assert_eq!(err.lines().count(), 1, "{err}");
+        assert!(err.starts_with("error: cannot write to standard output: No space left"), "{err}");
+    }
 }
 
 #[test]

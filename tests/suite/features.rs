@@ -54,18 +54,38 @@ fn the_graph_behind_it_checks_from_any_folder() {
 
 #[test]
 fn what_is_wrong_is_told_once_with_a_way_out() {
-    let cases: [(&[&str], &str); 6] = [
+    let cases: [(&[&str], &str); 9] = [
         (&["features", "nowhere.csv"], "cannot read `nowhere.csv`: No such file"),
         (&["features", "Cargo.toml"], "`Cargo.toml` is no recording of a known format: it begins with `[workspace]`"),
-        (&["features", PRESS, "--pitch-mm", "5"], "expected two numbers, as 16x16"),
+        (&["features", PRESS, "--pitch-mm", "5"], "expected two numbers, as 5x5"),
+        (&["features", PRESS, "--pitch-mm", "0x5"], "expected two numbers greater than 0"),
+        (&["features", PRESS, "--rate-hz", "0"], "`0` is not a number greater than 0"),
+        (&["features", PRESS, "--for", "-1s"], "`-1` is not a number greater than 0"),
         (&["features", PRESS, "--pitch-mm", "5,5"], "the file says otherwise: [1.27, 1.27] mm"),
         (&["features", PRESS, "--unit", "pounds"], "`pounds` is not a unit"),
         (&["features", PRESS, "--threshold", "nan"], "expected a number"),
     ];
     for (args, message) in cases {
         let said = say(args);
+        assert!(said.out.is_empty(), "{args:?}: {}", said.out);
         assert_eq!(said.code, 2, "{args:?}");
         assert_eq!(said.err.lines().filter(|line| line.starts_with("error")).count(), 1, "{}", said.err);
         assert!(said.err.contains(message), "{args:?}: {}", said.err);
     }
+}
+
+#[test]
+fn what_a_file_leaves_open_is_asked_for_by_the_options_of_the_command() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("pad.csv");
+    fs::write(&path, "1,2,3,4\n2,3,4,5\n").unwrap();
+    let path = path.to_str().unwrap();
+    let size = say(&["features", path]);
+    assert!(size.err.contains("`--size 16x16`"), "{}", size.err);
+    let rest = say(&["features", path, "--size", "2x2"]);
+    for option in ["`--unit kPa`", "`--pitch-mm 5x5`", "`--rate-hz 250`"] {
+        assert!(rest.err.contains(option), "{option}: {}", rest.err);
+    }
+    let whole = say(&["features", path, "--size", "2x2", "--unit", "kPa", "--pitch-mm", "5x5", "--rate-hz", "250"]);
+    assert_eq!((whole.code, whole.err.as_str()), (0, ""));
 }

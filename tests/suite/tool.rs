@@ -34,6 +34,15 @@ pub(crate) fn said(command: &mut Command) -> Said {
     Said { code, out: text(output.stdout), err: text(output.stderr) }
 }
 
+/// Runs a command to its end, with its standard output in a file.
+#[cfg(target_os = "linux")]
+pub(crate) fn said_into(command: &mut Command, out: std::fs::File) -> Said {
+    let child = command.stdout(out).stderr(Stdio::piped()).spawn().expect("the tool starts");
+    let output = child.wait_with_output().expect("the tool ends");
+    let err = String::from_utf8(output.stderr).expect("the tool speaks UTF-8");
+    Said { code: output.status.code().expect("it ends by itself"), out: String::new(), err }
+}
+
 /// Runs one of the Python peers and gives what it printed.
 pub(crate) fn peer(script: &str, args: &[&str]) -> String {
     let path = workspace().join("tests/peers").join(script);

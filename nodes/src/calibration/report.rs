@@ -84,11 +84,9 @@ pub fn calibrate(logs: &[Log], settings: &Settings) -> Result<Report, String> {
     let first = logs.first().ok_or("there is no log")?;
     let samples = Samples::new(logs, settings.load, settings.dead_below, settings.bearing);
     if samples.is_shared {
-        return Err(
-            "most tactels answer to most presses alike, so the force is not on one tactel at a time: is the load \
-                    uniform?"
-                .into(),
-        );
+        let message = "most tactels answer to most presses alike, so the force is not on one tactel at a time: if the \
+                       load is on all of them, say `--load uniform`";
+        return Err(message.into());
     }
     let ceilings = ceilings(logs);
     let mut findings = Vec::new();

@@ -54,7 +54,7 @@ impl Hints {
     /// # Errors
     /// When nobody says it, or they differ.
     pub fn unit(&self, said: Option<Unit>) -> Result<Unit, Refusal> {
-        let help = "give the bench's device a `unit`, as `unit = \"kPa\"`, or `unit = \"raw\"` for plain counts";
+        let help = "give the bench's device a `unit`, as `unit = \"kPa\"`, or `unit = \"raw\"` for plain counts (`features`: `--unit kPa`)";
         let given = self.given(said.is_some(), self.unit, |assumed| assumed.unit);
         choose(said, given, "unit", help, |a, b| a == b, Unit::to_string)
     }
@@ -64,7 +64,8 @@ impl Hints {
     /// # Errors
     /// When nobody says it, or they differ.
     pub fn pitch(&self, said: Option<[f64; 2]>) -> Result<[f64; 2], Refusal> {
-        let help = "give the bench's device a `pitch_mm = [x, y]`: the distances between the centres of two neighbours";
+        let help = "give the bench's device a `pitch_mm = [x, y]`: the distances between the centres of two neighbours \
+                    (`features`: `--pitch-mm 5x5`)";
         let same = |a: &[f64; 2], b: &[f64; 2]| agree(a[0], b[0]) && agree(a[1], b[1]);
         let show = |pitch: &[f64; 2]| format!("[{}, {}] mm", millimetres(pitch[0]), millimetres(pitch[1]));
         let given = self.given(said.is_some(), self.pitch, |assumed| assumed.pitch);
@@ -76,7 +77,8 @@ impl Hints {
     /// # Errors
     /// When nobody says it, or they differ.
     pub fn period(&self, said: Option<f64>) -> Result<f64, Refusal> {
-        let help = "give the bench's device a `rate_hz`: the frames per second of the recording";
+        let help =
+            "give the bench's device a `rate_hz`: the frames per second of the recording (`features`: `--rate-hz 250`)";
         let given = self.given(said.is_some(), self.rate_hz, |assumed| assumed.rate_hz).map(|rate| 1.0 / rate);
         let show = |period: &f64| format!("{} frames a second", (1e6 / period).round() / 1e6);
         let period = choose(said, given, "rate_hz", help, |a, b| agree(*a, *b), show)?;
@@ -125,7 +127,7 @@ impl Hints {
     /// # Errors
     /// When nobody says it, or they differ.
     pub fn size(&self, said: Option<[usize; 2]>) -> Result<[usize; 2], Refusal> {
-        let help = "give the bench's device its `size = [rows, columns]`";
+        let help = "give the bench's device its `size = [rows, columns]` (`features`: `--size 16x16`)";
         choose(said, self.size, "size", help, |a, b| a == b, |[rows, cols]| format!("{rows} rows by {cols} columns"))
     }
 }

@@ -9,7 +9,7 @@ use tactflow_runtime::diagnostic::{Code, Diagnostic, Report as Mistakes};
 use tactflow_runtime::graph::Sources;
 use tactflow_runtime::signal::Unit;
 
-use super::pair;
+use super::{pair, positive};
 use crate::calibration::log::Log;
 use crate::calibration::report::{Report, Settings, State, calibrate};
 use crate::calibration::samples::Load;
@@ -47,7 +47,7 @@ pub(super) struct Calibrate {
     #[arg(long, value_name = "FILE")]
     svg: Option<PathBuf>,
     /// A tactel whose reading rises by less than this is dead [unit of the reading]; 5 % of the greatest rise unless given
-    #[arg(long, value_name = "READING", value_parser = positive)]
+    #[arg(long, value_name = "READING", value_parser = positive, allow_hyphen_values = true)]
     dead_below: Option<f64>,
     /// How many tactels share the force of a uniform load; the live ones unless given
     #[arg(long, value_name = "COUNT")]
@@ -89,11 +89,6 @@ impl From<CurveArg> for Kind {
     }
 }
 
-fn positive(text: &str) -> Result<f64, String> {
-    let number = text.parse().ok().filter(|number: &f64| *number > 0.0 && number.is_finite());
-    number.ok_or_else(|| format!("`{text}` is not a number greater than 0"))
-}
-
 /// A calibration need not know how far the tactels are apart, nor how fast the frames came.
 const ASSUMED: Assumed = Assumed { unit: Unit::RAW, pitch: [0.005; 2], rate_hz: 100.0 };
 
@@ -124,6 +119,11 @@ pub(super) fn run(args: Calibrate, shell: &Shell) -> u8 {
 }
 
 fn make(args: &Calibrate, shell: &Shell) -> Result<(), Failure> {
+    if args.bearing.is_some() && matches!(args.load, LoadArg::Probe) {
+        return Err("`--bearing` means nothing without `--load uniform`: the force of a probe is on one tactel"
+            .to_owned()
+            .into());
+    }
     // Before the work, not after it.
     args.out.as_deref().map_or(Ok(()), |path| may_replace(path, "calibration file", file::is_calibration))?;
     args.svg.as_deref().map_or(Ok(()), |path| may_replace(path, "SVG picture", |text| text.contains("<svg")))?;

@@ -3,12 +3,13 @@
 //! It is a graph like any other, made from the command line: `--graph` prints it, to go on with.
 
 use std::fmt::Write;
+use std::num::NonZeroU32;
 use std::path::{Path, PathBuf};
 
 use tactflow_runtime::cli::{Job, Shell, clap, duration};
 use tactflow_runtime::graph::Request;
 
-use super::pair;
+use super::{pair, positive};
 use crate::recordings::{self, Hints, Recording};
 
 /// The features of the contact in a recording: where it is, how strong, along which line
@@ -47,7 +48,7 @@ pub(super) struct Features {
     #[command(flatten)]
     hints: HintArgs,
     /// Stop after this time of the recording: 20s, 500ms, 2min
-    #[arg(long = "for", value_name = "TIME", value_parser = duration)]
+    #[arg(long = "for", value_name = "TIME", value_parser = duration, allow_hyphen_values = true)]
     duration: Option<f64>,
 }
 
@@ -61,14 +62,14 @@ struct HintArgs {
     #[arg(long, value_name = "UNIT")]
     unit: Option<String>,
     /// Distance of neighbours along x and y [mm], where the file does not say it: 5x5
-    #[arg(long, value_name = "XxY", value_parser = pair::<f64>)]
+    #[arg(long, value_name = "XxY", value_parser = lengths)]
     pitch_mm: Option<[f64; 2]>,
     /// Frames per second, where the file does not say it
-    #[arg(long, value_name = "HZ", value_parser = finite)]
+    #[arg(long, value_name = "HZ", value_parser = positive)]
     rate_hz: Option<f64>,
     /// Number of rows and columns, where the file does not say it: 16x16
-    #[arg(long, value_name = "ROWSxCOLS", value_parser = pair::<u32>)]
-    size: Option<[u32; 2]>,
+    #[arg(long, value_name = "ROWSxCOLS", value_parser = pair::<NonZeroU32>)]
+    size: Option<[NonZeroU32; 2]>,
 }
 
 /// What counts as touched where a file does not say it: this part of its greatest value.
@@ -210,13 +211,23 @@ impl HintArgs {
     fn read(&self, bytes: &[u8], path: &Path) -> Option<Recording> {
         let hints = Hints {
             format: self.format.clone(),
-            unit: self.unit.as_ref().map(|unit| unit.parse().ok()).unwrap_or_default(),
+            unit: self.unit.as_ref().map(|unit| unit.parse()).transpose().ok()?,
             pitch: self.pitch_mm.map(|pitch| pitch.map(|mm| mm * 1e-3)),
             rate_hz: self.rate_hz,
-            size: self.size.map(|size| size.map(|count| count as usize)),
+            size: self.size.map(|size| size.map(|count| count.get() as usize)),
             ..Hints::default()
         };
         recordings::read(bytes, &path.to_string_lossy(), &hints).ok()
+    }
+}
+
+/// Two lengths that are some.
+fn lengths(text: &str) -> Result<[f64; 2], String> {
+    let two = pair::<f64>(text)?;
+    if two.iter().all(|length| *length > 0.0 && length.is_finite()) {
+        Ok(two)
+    } else {
+        Err("expected two numbers greater than 0".into())
     }
 }
 

@@ -58,7 +58,7 @@ impl Node for OnePole {
         from the stamps of the samples. So T means the same at 100 Hz and at 1 kHz, and when samples come irregularly. \
         Give `time_constant_ms`, T, or `cutoff_hz`, 1 / (2 pi T): 40 ms are 4 Hz.\n\n\
         It follows a ramp T late, and leaves dt / (2 T) of the variance of white noise: as much as a `smooth` with \
-        a window of 2 T. Unlike that it never quite forgets, and needs no window.\n\n\
+        a window of 2 T. Also called a lowpass or an exponential average. Unlike that it never quite forgets, and needs no window.\n\n\
         The first sample passes as it is. A gap counts as `max_gap_ms` of the graph at most. A sample of another device than \
         the last one changes nothing, as their times cannot be compared; the next one does.\n\n\
         **Axes.** The direction of a line (`rad mod pi`) is filtered as (cos 2a, sin 2a) and halved by one arctangent, \

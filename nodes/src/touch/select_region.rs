@@ -83,8 +83,9 @@ impl Node for SelectRegion {
         region that comes first, row by row.\n\n\
         Without a region of that rank, `region` is absent and `present` is not set.\n\n\
         There is no memory in it: two contacts of about the same area change their ranks from frame to frame. \
-        Where contacts stay in their places, `by = \"distance\"` keeps them apart; a single contact is followed by \
-        `choose = \"nearest\"` of `label`.";
+        Where contacts stay in their places, `by = \"distance\"` keeps them apart while all of them are there: when \
+        one is lifted, the nearest to its `point` is another one. A second contact that must be there is that of \
+        `rank = 2`. A single contact is followed by `choose = \"nearest\"` of `label`.";
     const EXAMPLE: &'static str = r#"
 [nodes.select_region]
 type = "select_region"

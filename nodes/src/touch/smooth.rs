@@ -64,7 +64,7 @@ impl Node for Smooth {
 
     const NAME: &'static str = "smooth";
     const SUMMARY: &'static str = "smooths a feature: the mean over the newest samples, or over a time";
-    const DOC: &'static str = "The mean of the last samples, as the paper takes it of force and orientation over ten \
+    const DOC: &'static str = "The mean of the last samples (a moving average), as the paper takes it of force and orientation over ten \
         (section V). Of fewer, as long as there are fewer. Each sample counts once, however long it is held.\n\n\
         **The window** is a number of samples, `window`, or a time, `window_ms`; not both. A time means the same at \
         every rate: the samples that are less than `window_ms` older than the newest count, by their stamps, however \

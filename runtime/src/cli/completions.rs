@@ -1,6 +1,9 @@
 //! `completions`: what a shell wants to know to complete the tool's arguments.
 
+use clap::builder::{PossibleValue, PossibleValuesParser};
+
 use super::Shell;
+use super::entry::Entries;
 
 /// Print the completions for a shell
 #[derive(clap::Parser)]
@@ -19,7 +22,13 @@ pub(super) struct Completions {
 
 pub(super) fn completions(args: Completions, shell: &Shell) -> u8 {
     let mut text = Vec::new();
-    clap_complete::generate(args.shell, &mut shell.arguments().clone(), "tactflow", &mut text);
+    // What `describe` takes is known here; there it is looked up, so that a name that is wrong gets an answer.
+    let all = Entries::new(shell.catalogue()).all();
+    let names = PossibleValuesParser::new(all.into_iter().map(|entry| PossibleValue::new(entry.name)));
+    let arguments = shell.arguments().clone();
+    let mut arguments =
+        arguments.mut_subcommand("describe", |describe| describe.mut_arg("name", |name| name.value_parser(names)));
+    clap_complete::generate(args.shell, &mut arguments, "tactflow", &mut text);
     shell.say(String::from_utf8_lossy(&text).trim_end());
     0
 }

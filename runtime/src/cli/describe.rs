@@ -91,5 +91,5 @@ fn unknown(name: &str, all: &[Entry]) -> String {
         Some(best) => format!("did you mean `{best}`?"),
         None => format!("`tactflow list` shows what there is, and `tactflow list {name}` where the word occurs"),
     };
-    format!("there is no node, device, role or kind `{name}`\nhelp: {help}")
+    format!("there is no node, device, role, kind or file `{name}`\nhelp: {help}")
 }

@@ -258,7 +258,9 @@ fn file(name: &str, bytes: &[u8]) -> Entry {
     let said = first.and_then(|line| line.strip_prefix("# ")).map(|line| line.trim_end_matches('.').to_owned());
     let size = format!("{} kB", bytes.len().div_ceil(1000));
     let summary = said.map_or_else(|| size.clone(), |said| format!("{said} ({size})"));
-    entry(Sort::File, &format!("builtin:{name}"), &summary, "")
+    // What takes a part wants to see what goes in, what comes out and what can be set.
+    let text = std::str::from_utf8(bytes).ok().filter(|_| name.ends_with(".toml"));
+    Entry { block: text.map(str::to_owned), ..entry(Sort::File, &format!("builtin:{name}"), &summary, "") }
 }
 
 fn declared(port: &PortSpec) -> Port {

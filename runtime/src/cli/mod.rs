@@ -188,7 +188,10 @@ impl Tool {
         let shell = Shell::new(self.catalogue, cli.color, arguments);
         let (name, matches) = matches.subcommand().expect("one is required");
         let command = self.commands.iter().find(|command| command.command().get_name() == name);
-        command.expect("clap knows no others").run(matches, &shell).into()
+        match command.expect("clap knows no others").run(matches, &shell) {
+            0 if shell.is_cut() => FAULTED.into(),
+            code => code.into(),
+        }
     }
 
     /// All arguments, with those of every command.

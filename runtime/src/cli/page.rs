@@ -40,7 +40,10 @@ pub(super) fn page(entry: &Entry, has_fits: bool) -> Vec<Block> {
         (Some(example), _) => {
             blocks.extend([Block::Heading("Example: a graph that runs".to_owned()), Block::Code(example.clone())]);
         }
-        (None, Some(block)) => blocks.extend([Block::Heading("Example".to_owned()), Block::Code(block.clone())]),
+        (None, Some(block)) => {
+            let heading = if entry.sort == Sort::File { "The file" } else { "Example" };
+            blocks.extend([Block::Heading(heading.to_owned()), Block::Code(block.clone())]);
+        }
         (None, None) => {}
     }
     blocks

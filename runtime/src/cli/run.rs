@@ -33,7 +33,7 @@ pub(super) struct Run {
     #[arg(long)]
     realtime: bool,
     /// Write a row a tick and a column a scalar, as .csv or .ndjson
-    #[arg(long, value_name = "FILE")]
+    #[arg(short, long, value_name = "FILE")]
     out: Option<PathBuf>,
 }
 

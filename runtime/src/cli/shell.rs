@@ -1,7 +1,8 @@
 //! What a command speaks through: the catalogue, colours, and where words go.
 
 use std::fmt::Display;
-use std::io::{IsTerminal, Write};
+use std::io::{ErrorKind, IsTerminal, Write};
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use clap::ValueEnum;
 
@@ -14,11 +15,13 @@ pub struct Shell {
     catalogue: Catalogue,
     colour: Colour,
     arguments: clap::Command,
+    /// Whether something that was to be said is lost.
+    is_cut: AtomicBool,
 }
 
 impl Shell {
     pub(super) const fn new(catalogue: Catalogue, colour: Colour, arguments: clap::Command) -> Self {
-        Self { catalogue, colour, arguments }
+        Self { catalogue, colour, arguments, is_cut: AtomicBool::new(false) }
     }
 
     /// The arguments of the tool, with those of all commands.
@@ -39,10 +42,19 @@ impl Shell {
         self.colour.is_on(&std::io::stdout())
     }
 
-    /// Prints to standard output, and ends the line. A reader that has seen enough, `head` say, is no mistake of ours.
+    /// Prints to standard output, and ends the line. A reader that has seen enough, `head` say, is no mistake of ours;
+    /// a disk that is full is one of somebody's, and is told once.
     pub fn say(&self, text: &str) {
         let mut out = std::io::stdout().lock();
-        let _ = writeln!(out, "{text}").and_then(|()| out.flush());
+        let Err(error) = writeln!(out, "{text}").and_then(|()| out.flush()) else { return };
+        if error.kind() != ErrorKind::BrokenPipe && !self.is_cut.swap(true, Ordering::Relaxed) {
+            self.error(format_args!("cannot write to standard output: {error}"));
+        }
+    }
+
+    /// Whether something that was to be said is lost.
+    pub(super) fn is_cut(&self) -> bool {
+        self.is_cut.load(Ordering::Relaxed)
     }
 
     /// Prints something for a program to standard output, as JSON.

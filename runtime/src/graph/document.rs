@@ -114,10 +114,25 @@ impl<'a> Sections<'a> {
     fn body(&mut self, root: &Table) -> Document {
         let nodes = self.named_tables(root.get("nodes"));
         let names = names_of(&nodes);
-        let nodes = nodes.into_iter().map(|(key, table)| self.node(key, table, &names)).collect();
         let parts = self.named_tables(root.get("parts"));
+        let nodes = nodes.into_iter().filter(|(key, table)| !self.is_in_part(key, table, &parts));
+        let nodes: Vec<(Key, Table)> = nodes.collect();
+        let nodes = nodes.into_iter().map(|(key, table)| self.node(key, table, &names)).collect();
         let parts = parts.into_iter().map(|(key, table)| self.part_block(key, table)).collect();
         Document { nodes, parts, ..Document::default() }
+    }
+
+    /// Whether what looks like a node is meant for one in a part, as `--set nodes.PART.NODE.…` is: `show` calls it so.
+    fn is_in_part(&mut self, key: &Key, table: &Table, parts: &[(Key, Table)]) -> bool {
+        let is_part = parts.iter().any(|(part, _)| part.name == key.name);
+        if !is_part || table.get("type").is_some() {
+            return false;
+        }
+        let message = format!("`{0}` is a part: its nodes are set through `parts.{0}.set`", key.name);
+        let node = table.entries.first().map_or("NODE", |(node, _)| &node.name);
+        let help = format!("write `parts.{}.set.{node}.…`", key.name);
+        self.diagnostics.push(Diagnostic::new(Code::UnknownKey, key.span.clone(), message).help(help));
+        true
     }
 
     fn node(&mut self, key: Key, mut table: Table, names: &[String]) -> Block {

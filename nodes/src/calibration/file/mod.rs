@@ -140,7 +140,8 @@ pub fn read(text: &str) -> Result<Calibration, Vec<Flaw>> {
     let mut sources = Sources::default();
     let root = parse_table(sources.add("", text, "")).map_err(|mistakes| {
         let flaw = |mistake: tactflow_runtime::diagnostic::Diagnostic| flaw(&mistake.span, mistake.message.clone());
-        mistakes.into_iter().take(MOST_FLAWS).map(flaw).collect::<Vec<_>>()
+        // After the first, the reader of TOML is lost: in a file that is none it is as wrong in each line.
+        mistakes.into_iter().take(1).map(flaw).collect::<Vec<_>>()
     })?;
     let mut file = File { reader: Reader::new(&sources), flaws: Vec::new() };
     let calibration = file.whole(&root);

@@ -163,3 +163,9 @@ fn a_curve_has_so_many_knots_at_most() {
     let flaws = with(65).unwrap_err();
     assert_eq!((flaws.len(), flaws[0].message.as_str()), (1, "65 knots, but a curve has 64 at most"));
 }
+
+#[test]
+fn a_file_that_is_no_toml_is_told_once() {
+    let log = "time,force,t0_0\n0.0,0.1,200\n0.1,0.2,300\n";
+    assert_eq!(read(log).unwrap_err().len(), 1);
+}

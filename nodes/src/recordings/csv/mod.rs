@@ -232,8 +232,11 @@ impl Reader {
     /// A time as nanoseconds from the first.
     fn since(&self, start: &mut Option<f64>, seconds: f64, at: Piece<'_>) -> Result<i64, Flaw> {
         let since = seconds - *start.get_or_insert(seconds);
+        if since < 0.0 {
+            return flaw(&at, "the time goes back");
+        }
         if !(0.0..1e9).contains(&since) {
-            return flaw(&at, "a time is a number from that of the first frame to 1e9 s after it");
+            return flaw(&at, "a time is a number, and no more than 1e9 s after that of the first frame");
         }
         let time = (since * 1e9).round() as i64;
         if self.time.last().is_some_and(|last| *last > time) { flaw(&at, "the time goes back") } else { Ok(time) }

@@ -139,7 +139,14 @@ fn value<'h>(header: &'h str, key: &str) -> Option<&'h str> {
 
 /// `'<f8'`: byte order, kind and size.
 fn element(text: &str) -> Result<(bool, Kind, usize), String> {
-    let strange = || format!("elements `{}` are not read: save plain numbers", shortened(text));
+    // A list of fields ends with the list, a name with its quote.
+    let end = match text.chars().next() {
+        Some(quote @ ('\'' | '"')) => text[1..].find(quote).map(|at| at + 2),
+        Some('[') => text.find(']').map(|at| at + 1),
+        _ => None,
+    };
+    let strange =
+        || format!("elements `{}` are not read: save plain numbers", shortened(&text[..end.unwrap_or(text.len())]));
     let quote = text.chars().next().filter(|quote| matches!(quote, '\'' | '"')).ok_or_else(strange)?;
     let name = text[1..].split(quote).next().unwrap_or("");
     let (order, name) = match name.split_at_checked(1) {
