@@ -81,9 +81,10 @@ gate! {
     "lets a scalar pass only while a flag is set",
     "`value` passes while `gate` is set. While it is not, or is absent, there is no value, as if the sensor had none: \
     what comes after resets, fades or waits as it does when a contact is lost.\n\n\
-    What passes counts as new only when it came in new, so a mean or an integral behind the gate takes no sample twice, \
-    however often the flag comes. When the gate opens on a value that is held, that passes at once, with the stamp it \
-    had. For a gate that does not flicker wire `contact_debounce.present`.",
+    While the gate is open, what passes counts as new only when it came in new, however often the flag comes. When the \
+    gate opens on a value that is held, that passes at once, with the stamp it had: an integral takes nothing of it \
+    twice, but a `smooth` or a `median` behind a gate that shuts and opens on one sample does. For a gate that does not \
+    flicker wire `contact_debounce.present`.",
     r#"
 [nodes.gate]
 type = "gate"

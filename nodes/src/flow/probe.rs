@@ -57,7 +57,8 @@ impl Node for Probe {
         INFO probe: at 0.512 s: watch: moments.force = 1.500 N, moments.x is absent\n\
         ```\n\n\
         A line is due when anything on the wires is new or gets lost, and no sooner than `every_ms` after the last \
-        one. Nothing is printed from within the tick: the node raises a flag, and the tool writes after the tick, \
+        one. What comes sooner shows with the next line that is due, and not at all if nothing comes after it. Nothing \
+        is printed from within the tick: the node raises a flag, and the tool writes after the tick, \
         so a probe delays no command. `RUST_LOG=warn` turns it off, `--out` records every tick instead.\n\n\
         Without `every_ms` a graph that runs faster than real time prints thousands of lines a second.";
     const EXAMPLE: &'static str = r#"

@@ -121,7 +121,8 @@ this pad: its size and the unit of its readings are compared. A `dead` tactel is
 added to those of the file.\n\n\
 The zero of foam drifts. When `in.tare` becomes set, the mean of the next `tare_window` frames becomes the zero of each \
 tactel; with `tare_at_start` the first frames do. A pad is only tared while nothing touches it: wire `in.present` to the \
-`label` behind, give a `tare_bound`, or both. A contact during the window, or in the frame before, ends the attempt, and \
+`label` behind (not to a `contact_debounce`, which tells of a contact only some frames after it began), give a \
+`tare_bound`, or both. A contact during the window, or in the frame before, ends the attempt, and \
 so does a single tactel that is off by more than the bound; then the old zero stays, all of it. Between two tares \
 nothing changes: a long contact does not become the new zero. Frames that come twice count once. When the image has \
 been absent for long, the zero is the calibrated one again.";
