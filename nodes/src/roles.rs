@@ -19,6 +19,7 @@ pub fn tactile_pad() -> RoleType {
         summary: "an array of tactels that gives an image".into(),
         outputs: vec![port("image", "The newest image, in the device's unit.", Kind::Image, &["U", "self"])],
         commands: vec![],
+        limits: vec![],
     }
 }
 
@@ -30,5 +31,20 @@ pub fn velocity_arm() -> RoleType {
         summary: "an arm that takes joint velocities".into(),
         outputs: vec![port("position", "Measured joint positions [rad].", Kind::Joints, &["rad", "self"])],
         commands: vec![port("velocity", "Joint velocities [rad/s].", Kind::Joints, &["rad/s", "self"])],
+        limits: LIMITS.map(Cow::Borrowed).into(),
     }
 }
+
+/// What every command of an arm must have crossed, in the order in which a motion does.
+const LIMITS: [&str; 10] = [
+    "bumpless",
+    "force",
+    "peak",
+    "workspace",
+    "speed",
+    "acceleration",
+    "lead",
+    "joint_position",
+    "joint_speed",
+    "joint_acceleration",
+];

@@ -152,6 +152,7 @@ mod tests {
                 outputs: ports.1,
                 every_tick: false,
                 logs: false,
+                limits: crate::node::Limits::NONE,
             }
         }
 

@@ -37,6 +37,7 @@ impl NodeType for Polynomial {
             outputs: vec![port("y")],
             every_tick: false,
             logs: self.logs,
+            limits: tactflow_runtime::node::Limits::NONE,
         }
     }
 
@@ -55,7 +56,7 @@ impl Configured for Polynomial {
             return Err(Mistake::param("scale", "there is nothing to scale").into());
         }
         let outputs: Vec<Shape> = vec![given.inputs[0][0].1.clone()];
-        Ok(Built { node: self, outputs })
+        Ok(Built { node: self, outputs, is_still: false })
     }
 }
 

@@ -95,7 +95,7 @@ impl Device for Brittle {
     const SUMMARY: &'static str = "a driver that panics";
 
     fn open(_: Empty) -> Result<Opened, Mistakes> {
-        let outputs = vec![ScalarShape { unit: Unit::METRE }.into()];
+        let outputs = vec![ScalarShape::of(Unit::METRE).into()];
         let filled = Filled { role: "length".into(), outputs, commands: vec![], facts: vec![] };
         Ok(Opened {
             description: Description { fills: vec![filled], period: 0.01 },

@@ -94,7 +94,7 @@ mod tests {
     use super::*;
 
     fn rig(params: &str) -> NodeRig {
-        let metre = || Shape::from(ScalarShape { unit: Unit::METRE });
+        let metre = || Shape::from(ScalarShape::of(Unit::METRE));
         let wires = [("x", metre()), ("y", metre()), ("pose", PoseShape.into())];
         NodeRig::new::<ContactPoint>(params, &wires).unwrap()
     }

@@ -20,9 +20,9 @@ params! {
     /// Singular values below this are damped [1, and m].
     damping: Positive = Positive(0.05),
     /// Posture that the arm drifts to where the sensor's motion leaves it free, one entry a joint [rad].
-    posture: Option<Vec<f64>>,
+    live posture: Option<Vec<f64>>,
     /// How fast it drifts there [1/s].
-    posture_gain: NonNegative = NonNegative(0.5),
+    live posture_gain: NonNegative = NonNegative(0.5),
     /// Greatest speed toward a position limit, per distance to it; 5, or half the graph's rate if that is less [1/s].
     limit_gain: Option<Positive>,
     /// Greatest age of the twist and of the arm's state; five periods of the graph unless given [ms].

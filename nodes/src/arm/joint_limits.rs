@@ -57,7 +57,7 @@ mod tests {
     use super::*;
 
     fn joint(lower: f64, upper: f64, speed: f64) -> Joint {
-        Joint { name: String::new(), lower, upper, speed }
+        Joint { name: String::new(), lower, upper, speed, ..Joint::default() }
     }
 
     #[test]

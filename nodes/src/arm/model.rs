@@ -149,7 +149,7 @@ fn segment_of(joint: &urdf_rs::Joint, fixed: IsometryMatrix3<f64>) -> Result<Seg
     if !(limit.velocity > 0.0 && limit.velocity.is_finite()) {
         return bad("has no speed limit: `<limit>` needs a `velocity` greater than 0");
     }
-    let joint = Joint { name: joint.name.clone(), lower, upper, speed: limit.velocity };
+    let joint = Joint { name: joint.name.clone(), lower, upper, speed: limit.velocity, ..Joint::default() };
     Ok(Segment { fixed, axis: axis.normalize(), motion, joint })
 }
 

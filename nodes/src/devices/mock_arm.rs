@@ -174,8 +174,8 @@ mod tests {
     #[test]
     fn it_integrates_exactly_and_stops_at_its_limits() {
         let joints = vec![
-            Joint { name: "a".into(), lower: -1.0, upper: 1.0, speed: 1.0 },
-            Joint { name: "b".into(), lower: -1.0, upper: 1.0, speed: 1.0 },
+            Joint { name: "a".into(), lower: -1.0, upper: 1.0, speed: 1.0, acceleration: 10.0 },
+            Joint { name: "b".into(), lower: -1.0, upper: 1.0, speed: 1.0, acceleration: 10.0 },
         ];
         let mut arm = MockArm { joints, position: vec![0.0, 0.5], period: 4_000_000, last: None, sequence: 0 };
         let steps = [

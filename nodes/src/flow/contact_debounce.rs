@@ -238,6 +238,6 @@ mod tests {
         for (samples, is_good) in [("1", true), ("64", true), ("65", false), ("0", false), ("5000000000", false)] {
             assert_eq!(rig(&format!("samples = {samples}")).is_ok(), is_good, "{samples}");
         }
-        assert_eq!(rig("").unwrap().shape("state"), &ScalarShape { unit: Unit::ONE }.into());
+        assert_eq!(rig("").unwrap().shape("state"), &ScalarShape::of(Unit::ONE).into());
     }
 }

@@ -98,7 +98,7 @@ delay! {
         initial: Option<f64>,
     },
     |initial| initial,
-    |params, outputs| outputs.value = ScalarShape { unit: params.unit },
+    |params, outputs| outputs.value = ScalarShape::of(params.unit),
     "what a scalar was one tick ago, so that a loop is allowed",
     "A wire that goes round in a circle does not load, as no node of it could step first. A delay breaks the circle: it \
     gives what its input was one tick ago. Its unit must be said, since the input is not known yet when the graph is \
@@ -197,7 +197,7 @@ mod tests {
 
     #[test]
     fn what_comes_out_when() {
-        let shape = ScalarShape { unit: Unit::NEWTON }.into();
+        let shape = ScalarShape::of(Unit::NEWTON).into();
         table::<Delay, Scalar>("value", &shape, ["unit = 'N'", "unit = 'N'\ninitial = 9.0"], |value| value);
         let twist = ["", "initial = [9, 0, 0, 0, 0, 0]"];
         table::<TwistDelay, Twist>("twist", &TwistShape.into(), twist, along_x);
@@ -205,7 +205,7 @@ mod tests {
 
     #[test]
     fn what_is_delayed_is_as_old_as_its_sample_and_what_is_made_up_is_of_no_age() {
-        let shape = ScalarShape { unit: Unit::NEWTON };
+        let shape = ScalarShape::of(Unit::NEWTON);
         let mut rig = NodeRig::new::<Delay>("unit = 'N'\ninitial = 0.0", &[("value", shape.clone().into())]).unwrap();
         assert_eq!(rig.shape("value"), &shape.into());
         rig.step();

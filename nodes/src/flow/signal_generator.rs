@@ -141,7 +141,7 @@ duration = 20.0                     # [s]
         if !mistakes.is_empty() {
             return Err(mistakes);
         }
-        setup.outputs.value = ScalarShape { unit: params.unit };
+        setup.outputs.value = ScalarShape::of(params.unit);
         let first = params.frequency.map_or(0.0, |frequency| *frequency);
         Ok(Self {
             form: params.form,
@@ -347,7 +347,7 @@ mod tests {
     #[test]
     fn without_a_gate_it_is_new_and_timeless_in_every_tick() {
         let mut rig = rig("form = 'step'").unwrap();
-        assert_eq!(rig.shape("value"), &ScalarShape { unit: Unit::METRE.per_second() }.into());
+        assert_eq!(rig.shape("value"), &ScalarShape::of(Unit::METRE.per_second()).into());
         for _ in 0..3 {
             rig.step();
             assert_eq!((rig.freshness("value"), rig.get::<Scalar>("value")), (Freshness::New, Some(&1.0)));

@@ -176,7 +176,7 @@ mod tests {
 
     #[test]
     fn what_comes_out_when() {
-        table::<Switch, Scalar>("value", &ScalarShape { unit: Unit::NEWTON }.into(), |value| value);
+        table::<Switch, Scalar>("value", &ScalarShape::of(Unit::NEWTON).into(), |value| value);
         table::<TwistSwitch, Twist>("twist", &TwistShape.into(), along_x);
     }
 

@@ -12,7 +12,7 @@ use super::axial::wrap_axial;
 
 params! {
     /// Target of each feature [the feature's unit].
-    setpoint: Map<f64>,
+    live setpoint: Map<f64>,
     /// Features without which there is no error at all; without any other, only its own component is absent.
     requires: Vec<String> = Vec::new(),
 }
@@ -142,7 +142,7 @@ mod tests {
     const SETPOINT: &str = "setpoint = { force = 1.5, alpha = 0.5, y = 0.0 }";
 
     fn rig(params: &str) -> Result<NodeRig, Mistakes> {
-        let wires = WIRES.map(|(name, unit)| (name, Shape::from(ScalarShape { unit })));
+        let wires = WIRES.map(|(name, unit)| (name, Shape::from(ScalarShape::of(unit))));
         NodeRig::new::<FeatureError>(params, &wires)
     }
 

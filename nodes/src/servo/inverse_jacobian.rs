@@ -20,7 +20,7 @@ use tactflow_runtime::{inputs, outputs, params};
 
 params! {
     /// Column of each feature, `[vx, vy, vz, wx, wy, wz]` [m per feature unit, rad per feature unit].
-    columns: Map<[f64; 6]>,
+    live columns: Map<[f64; 6]>,
 }
 
 inputs! {

@@ -7,7 +7,7 @@ use tactflow_runtime::{inputs, outputs, params};
 
 params! {
     /// Diagonal of P, `[vx, vy, vz, wx, wy, wz]`: 1 passes a component, 0 deletes it [1].
-    select: [Bit; 6],
+    live select: [Bit; 6],
 }
 
 inputs! {

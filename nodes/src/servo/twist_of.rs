@@ -87,7 +87,7 @@ mod tests {
     const NAMES: [&str; 6] = ["vx", "vy", "vz", "wx", "wy", "wz"];
 
     fn rig(names: &[&str]) -> Result<NodeRig, Mistakes> {
-        let shape = || Shape::from(ScalarShape { unit: Unit::METRE.per_second() });
+        let shape = || Shape::from(ScalarShape::of(Unit::METRE.per_second()));
         let wires: Vec<(&str, Shape)> = names.iter().map(|name| (*name, shape())).collect();
         NodeRig::new::<TwistOf>("", &wires)
     }

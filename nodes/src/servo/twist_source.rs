@@ -8,8 +8,8 @@ use tactflow_runtime::signal::Twist;
 use tactflow_runtime::{inputs, outputs, params};
 
 params! {
-    /// The twist, `[vx, vy, vz, wx, wy, wz]` [m/s, rad/s].
-    twist: [f64; 6],
+    /// The twist, `[vx, vy, vz, wx, wy, wz]`; with zeros alone there is none [m/s, rad/s].
+    live twist: [f64; 6],
     /// Frame of the twist; what it is wired to decides when this is not said.
     frame: Option<String>,
 }
@@ -27,6 +27,7 @@ outputs! {
 /// The twist, and whether it waits for a gate.
 pub struct TwistSource {
     twist: Twist,
+    is_still: bool,
     is_gated: bool,
 }
 
@@ -42,7 +43,8 @@ impl Node for TwistSource {
         which a `twist_adder` superimposes on the servoing. Take it to approach along +z, to slide along an edge, \
         or to roll.\n\n\
         Wire `in.gate`: the motion goes on only while that flag is there and set, and is as old as the flag, so it \
-        ends with the contact and when the pad falls silent. Without a gate it never ends by itself.\n\n\
+        ends with the contact and when the pad falls silent. Without a gate it never ends by itself: a mode in which \
+        it moves the arm has to say what ends it. A twist of zeros is no motion, for the modes it has no part in.\n\n\
         The twist is in the frame that it is wired to, mostly the sensor's. Guidance along a component that the \
         projector controls works against the controller: delete that entry of P.";
     const EXAMPLE: &'static str = r#"
@@ -54,12 +56,17 @@ twist = [0, 0.01, 0, 0, 0, 0]       # [m/s, rad/s]
     const EVERY_TICK: bool = true;
 
     fn new(params: Params, setup: &mut Setup<Self>) -> Result<Self, Mistakes> {
-        Ok(Self { twist: Twist(params.twist.into()), is_gated: setup.inputs.gate.is_some() })
+        setup.is_still = params.twist == [0.0; 6];
+        let (is_still, is_gated) = (setup.is_still, setup.inputs.gate.is_some());
+        Ok(Self { twist: Twist(params.twist.into()), is_still, is_gated })
     }
 
     fn state(&self) {}
 
     fn step(&self, _: &Tick, inputs: Inputs<'_>, out: &mut Outputs, (): &mut ()) {
+        if self.is_still {
+            return;
+        }
         if !self.is_gated || inputs.gate.is_some_and(|gate| *gate) {
             out.twist.set(self.twist);
         }

@@ -130,7 +130,7 @@ mod tests {
     use super::*;
 
     fn built(params: &str, unit: Unit) -> Result<NodeRig, Mistakes> {
-        NodeRig::new::<Median>(params, &[("value", ScalarShape { unit }.into())])
+        NodeRig::new::<Median>(params, &[("value", ScalarShape::of(unit).into())])
     }
 
     fn rig(window: usize, unit: Unit) -> NodeRig {

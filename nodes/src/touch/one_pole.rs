@@ -128,7 +128,7 @@ mod tests {
     use super::*;
 
     fn built(params: &str, unit: Unit) -> Result<NodeRig, Mistakes> {
-        NodeRig::new::<OnePole>(params, &[("value", ScalarShape { unit }.into())])
+        NodeRig::new::<OnePole>(params, &[("value", ScalarShape::of(unit).into())])
     }
 
     fn rig(ms: f64, unit: Unit) -> NodeRig {

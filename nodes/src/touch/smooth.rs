@@ -192,7 +192,7 @@ mod tests {
 
     fn rig(window: usize, unit: Unit) -> NodeRig {
         let params = format!("window = {window}");
-        NodeRig::new::<Smooth>(&params, &[("value", ScalarShape { unit }.into())]).unwrap()
+        NodeRig::new::<Smooth>(&params, &[("value", ScalarShape::of(unit).into())]).unwrap()
     }
 
     fn show(rig: &mut NodeRig, value: f64) -> Option<f64> {
@@ -253,7 +253,7 @@ mod tests {
     }
 
     fn built(params: &str) -> Result<NodeRig, Mistakes> {
-        NodeRig::new::<Smooth>(params, &[("value", ScalarShape { unit: Unit::NEWTON }.into())])
+        NodeRig::new::<Smooth>(params, &[("value", ScalarShape::of(Unit::NEWTON).into())])
     }
 
     #[test]

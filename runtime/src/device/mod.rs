@@ -30,6 +30,9 @@ pub struct RoleType {
     pub outputs: Vec<PortSpec>,
     /// What it takes; joint vectors only.
     pub commands: Vec<PortSpec>,
+    /// What must hold of every command; see [`Limits`](crate::node::Limits). The names of a node's `holds`, in the order
+    /// in which a motion crosses them.
+    pub limits: Vec<Cow<'static, str>>,
 }
 
 /// How a device fills one role.

@@ -135,7 +135,7 @@ mod tests {
     }
 
     fn scalar(unit: &str) -> Shape {
-        ScalarShape { unit: unit.parse().unwrap() }.into()
+        ScalarShape::of(unit.parse().unwrap()).into()
     }
 
     #[test]

@@ -3,11 +3,13 @@
 //! [`of`] makes it from a [`Node`]; a node that is known only at run time, in another process say, implements
 //! [`NodeType`] itself.
 
+use std::any::Any;
 use std::borrow::Cow;
 use std::marker::PhantomData;
 
 use super::{
-    Bus, InputSet, Mistakes, Node, OutputSet, Param, ParamSpec, PortId, PortSpec, Reader, Setup, Tick, Value, Wires,
+    Bus, Components, InputSet, Limits, Mistakes, Node, OutputSet, Param, ParamSpec, PortId, PortSpec, Reader, Setup,
+    Tick, Value, Wires,
 };
 use crate::signal::Shape;
 
@@ -32,6 +34,8 @@ pub struct NodeSpec {
     pub every_tick: bool,
     /// Whether the tool logs what came in on its wires; see [`Node::LOGS`].
     pub logs: bool,
+    /// What holds of the motion it gives.
+    pub limits: Limits,
 }
 
 /// What a node is made from: the shapes its wires bring, by input in the order of the declaration.
@@ -67,16 +71,39 @@ pub struct Built {
     pub node: Box<dyn AnyNode>,
     /// Shape of each output in the order of the declaration.
     pub outputs: Vec<Shape>,
+    /// Whether it starts no motion by itself; see [`Setup`].
+    pub is_still: bool,
 }
 
 /// A node that can run.
-pub trait AnyNode: Send {
+pub trait AnyNode: Any + Send {
     /// One step: reads its wires from the bus and writes and marks its outputs.
     fn step(&mut self, tick: &Tick, bus: &mut Bus, wires: &Wires, outputs: &[PortId]);
     /// Makes every output absent.
     fn lose(&mut self, tick: u64, bus: &mut Bus, outputs: &[PortId]);
     /// Puts the state back to what it was at first, without allocating.
     fn reset(&mut self);
+    /// Takes over the configuration of another node of its type, for a mode; its number, or the other if it cannot. That
+    /// of the node itself has number 0.
+    ///
+    /// # Errors
+    /// The other node, if its type knows no modes.
+    fn adopt(&mut self, other: Box<dyn AnyNode>) -> Result<usize, Box<dyn AnyNode>> {
+        Err(other)
+    }
+    /// Goes on with the configuration of that number, without allocating; the state stays.
+    fn switch(&mut self, configuration: usize) {
+        let _ = configuration;
+    }
+    /// See [`Node::uses`].
+    fn uses(&self, wanted: &[Components]) -> Vec<Components> {
+        let _ = wanted;
+        Vec::new()
+    }
+    /// See [`Node::want`].
+    fn want(&mut self, wanted: &[Components]) {
+        let _ = wanted;
+    }
 }
 
 /// The erased form of a node written against the typed contract.
@@ -99,6 +126,7 @@ impl<N: Node> NodeType for Typed<N> {
             outputs: N::Outputs::specs(),
             every_tick: N::EVERY_TICK,
             logs: N::LOGS,
+            limits: N::LIMITS,
         }
     }
 
@@ -113,17 +141,26 @@ struct WithParams<N: Node>(N::Params);
 impl<N: Node> Configured for WithParams<N> {
     fn build(self: Box<Self>, given: Given) -> Result<Built, Mistakes> {
         let inputs = <N::Inputs<'static> as InputSet<'static>>::shapes(given.inputs);
-        let mut setup = Setup::<N> { inputs, outputs: Default::default(), period: given.period };
+        let mut setup = Setup::<N> { inputs, outputs: Default::default(), period: given.period, is_still: false };
         let node = N::new(self.0, &mut setup)?;
-        let outputs = N::Outputs::into_shapes(setup.outputs);
-        let (state, fresh) = (node.state(), node.state());
-        Ok(Built { node: Box::new(Cell { node, state, fresh }), outputs })
+        let (outputs, is_still) = (N::Outputs::into_shapes(setup.outputs), setup.is_still);
+        let state = node.state();
+        let cell = Cell { active: Configuration { fresh: node.state(), node }, state, parked: vec![None], number: 0 };
+        Ok(Built { node: Box::new(cell), outputs, is_still })
     }
 }
 
 struct Cell<N: Node> {
-    node: N,
+    active: Configuration<N>,
     state: N::State,
+    /// The other configurations by their numbers; the place of the active one is empty.
+    parked: Vec<Option<Configuration<N>>>,
+    /// Number of the active one.
+    number: usize,
+}
+
+struct Configuration<N: Node> {
+    node: N,
     fresh: N::State,
 }
 
@@ -131,7 +168,7 @@ impl<N: Node> AnyNode for Cell<N> {
     fn step(&mut self, tick: &Tick, bus: &mut Bus, wires: &Wires, outputs: &[PortId]) {
         let mut out = N::Outputs::take(bus, outputs);
         let inputs = N::Inputs::fetch(bus, wires, tick.index);
-        self.node.step(tick, inputs, &mut out, &mut self.state);
+        self.active.node.step(tick, inputs, &mut out, &mut self.state);
         out.put(bus, outputs, tick);
     }
 
@@ -140,6 +177,30 @@ impl<N: Node> AnyNode for Cell<N> {
     }
 
     fn reset(&mut self) {
-        self.state.clone_from(&self.fresh);
+        self.state.clone_from(&self.active.fresh);
+    }
+
+    fn adopt(&mut self, other: Box<dyn AnyNode>) -> Result<usize, Box<dyn AnyNode>> {
+        if (&*other as &dyn Any).is::<Self>() {
+            let other = (other as Box<dyn Any>).downcast::<Self>().expect("just asked");
+            self.parked.push(Some(other.active));
+            return Ok(self.parked.len() - 1);
+        }
+        Err(other)
+    }
+
+    fn switch(&mut self, configuration: usize) {
+        if let Some(next) = self.parked[configuration].take() {
+            self.parked[self.number] = Some(std::mem::replace(&mut self.active, next));
+            self.number = configuration;
+        }
+    }
+
+    fn uses(&self, wanted: &[Components]) -> Vec<Components> {
+        self.active.node.uses(wanted)
+    }
+
+    fn want(&mut self, wanted: &[Components]) {
+        self.active.node.want(wanted);
     }
 }

@@ -1,20 +1,28 @@
 //! The four blocks of a node file. Each declares plain data once; the check, the messages and the reference read it.
 
-/// Declares the parameters of a node: a field each, with its doc, its type and, after `=`, its default.
+/// Declares the parameters of a node: a field each, with its doc, its type and, after `=`, its default. A `live` one may
+/// change while the graph runs, in a mode; what the others say is settled at load: a window, a name, a size.
 ///
 /// Without a name the struct is called `Params`; a parameter that is a table of its own gets one: `params! { Gains: … }`.
 ///
 /// ```
 /// tactflow_runtime::params! {
 ///     /// Proportional gain [1/s].
-///     kp: f64,
-///     /// Bound on the output [m/s].
-///     bound: f64 = 1.0,
+///     live kp: f64,
+///     /// Number of samples in the mean.
+///     window: usize = 10,
 /// }
 /// ```
 #[macro_export]
 macro_rules! params {
-    ($Name:ident: $($(#[doc = $doc:literal])* $field:ident: $ty:ty $(= $default:expr)?),* $(,)?) => {
+    (@list $Name:ident [$($done:tt)*]) => { $crate::params! { @emit $Name $($done)* } };
+    (@list $Name:ident [$($done:tt)*] $(#[doc = $doc:literal])* live $field:ident: $ty:ty $(= $default:expr)? $(, $($rest:tt)*)?) => {
+        $crate::params! { @list $Name [$($done)* { [$($doc)*] true $field ($ty) [$($default)?] }] $($($rest)*)? }
+    };
+    (@list $Name:ident [$($done:tt)*] $(#[doc = $doc:literal])* $field:ident: $ty:ty $(= $default:expr)? $(, $($rest:tt)*)?) => {
+        $crate::params! { @list $Name [$($done)* { [$($doc)*] false $field ($ty) [$($default)?] }] $($($rest)*)? }
+    };
+    (@emit $Name:ident $({ [$($doc:literal)*] $is_live:literal $field:ident ($ty:ty) [$($default:expr)?] })*) => {
         #[doc = concat!("Parameters: `", stringify!($Name), "`.")]
         #[allow(unreachable_pub, reason = "a node's module may be private")]
         #[derive(Debug, Clone)]
@@ -25,7 +33,8 @@ macro_rules! params {
 
             fn fields() -> Vec<$crate::node::ParamSpec> {
                 vec![$($crate::node::ParamSpec::of::<$ty>(
-                    stringify!($field), concat!($($doc, "\n"),*), None$(.or(Some(|| $default)))?, stringify!($($default)?))),*]
+                    stringify!($field), concat!($($doc, "\n"),*), None$(.or(Some(|| $default)))?,
+                    stringify!($($default)?), $is_live)),*]
             }
 
             fn written(&self) -> Option<$crate::node::Written> {
@@ -41,7 +50,10 @@ macro_rules! params {
             }
         }
     };
-    ($($body:tt)*) => { $crate::params! { Params: $($body)* } };
+    ($Name:ident: $(#[$($first:tt)*] $($body:tt)*)?) => {
+        $crate::params! { @list $Name [] $(#[$($first)*] $($body)*)? }
+    };
+    ($($body:tt)*) => { $crate::params! { @list Params [] $($body)* } };
 }
 
 /// Declares what a node remembers from one step to the next; a reset copies a fresh state over it without allocating.

@@ -16,6 +16,7 @@
 //! | `Delayed<T>` | `Option<In<T>>` as the last tick left it | it was new or lost then, where no other input wakes it | `None` |
 
 mod erased;
+mod limits;
 mod macros;
 mod mistake;
 mod param_spec;
@@ -26,6 +27,7 @@ use crate::signal::Stamp;
 
 pub use crate::graph::Value;
 pub use erased::{AnyNode, Built, Configured, Given, NodeSpec, NodeType, of};
+pub use limits::{Components, Limits};
 pub use mistake::{At, Mistake, Mistakes};
 pub use param_spec::{ParamSpec, Repeats, Written, written_table};
 pub use params::{Bit, Count, FilePath, Map, NonNegative, Param, Positive, Rate, Ratio, Reader, Word, read_leaf};
@@ -56,6 +58,8 @@ pub trait Node: Sized + Send + 'static {
     /// Whether the tool logs what came in on the wires, after each tick in which the first output, a flag, is new and
     /// set. A step never logs: it decides, and the edge writes.
     const LOGS: bool = false;
+    /// What holds of the motion it gives.
+    const LIMITS: Limits = Limits::NONE;
 
     /// Makes the node: reads the shapes of the inputs and sets those of the outputs. May fail, may allocate.
     ///
@@ -65,6 +69,19 @@ pub trait Node: Sized + Send + 'static {
 
     /// A fresh state: what a reset means.
     fn state(&self) -> Self::State;
+
+    /// Which components of each input matter, in the order of the declaration, if of each output only those matter that
+    /// are `wanted`: for a node that passes components on one by one. An empty list is all of all of them.
+    fn uses(&self, wanted: &[Components]) -> Vec<Components> {
+        let _ = wanted;
+        Vec::new()
+    }
+
+    /// Told at load which components of each output anything reads: a feature that is projected out is not, and what
+    /// is gathered for it would be gathered in vain.
+    fn want(&mut self, wanted: &[Components]) {
+        let _ = wanted;
+    }
 
     /// One step. Cannot fail, block, allocate, log or read a clock. An output that is not written is absent.
     fn step(&self, tick: &Tick, inputs: Self::Inputs<'_>, out: &mut Self::Outputs, state: &mut Self::State);
@@ -78,6 +95,9 @@ pub struct Setup<N: Node> {
     pub outputs: <N::Outputs as OutputSet>::Shapes,
     /// Nominal time between two ticks of the graph [s].
     pub period: f64,
+    /// For the node to set: whether with these parameters it starts no motion by itself, though no sample is behind what
+    /// it gives. What has samples behind it need not say so.
+    pub is_still: bool,
 }
 
 /// What a step is told of the time: a node reads no clock.

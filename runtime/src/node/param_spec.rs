@@ -30,6 +30,8 @@ pub struct ParamSpec {
     pub repeats: Repeats,
     /// The parameters of a nested table.
     pub fields: Vec<ParamSpec>,
+    /// Whether it may change while the graph runs: a mode can set it.
+    pub is_live: bool,
 }
 
 /// How often the fields of a nested table are there.
@@ -51,10 +53,11 @@ impl ParamSpec {
         doc: &'static str,
         default: Option<fn() -> T>,
         source: &'static str,
+        is_live: bool,
     ) -> Self {
         let is_optional = default.is_some() || T::when_missing().is_some();
         let default = default.map(|value| value().written().map_or_else(|| word(source), |value| value.to_string()));
-        Self { name, doc, takes: T::takes(), default, is_optional, repeats: T::REPEATS, fields: T::fields() }
+        Self { name, doc, takes: T::takes(), default, is_optional, repeats: T::REPEATS, fields: T::fields(), is_live }
     }
 
     /// The unit: what its doc ends with in brackets.

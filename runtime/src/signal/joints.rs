@@ -4,7 +4,7 @@ use super::spatial::Twist;
 use super::unit::Unit;
 
 /// One joint of an arm, as known at load.
-#[derive(Debug, Clone, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Joint {
     /// Its name, as in the robot's model.
     pub name: String,
@@ -14,6 +14,14 @@ pub struct Joint {
     pub upper: f64,
     /// Greatest speed [rad/s].
     pub speed: f64,
+    /// Greatest acceleration [rad/s²]; infinite if nothing is known of it.
+    pub acceleration: f64,
+}
+
+impl Default for Joint {
+    fn default() -> Self {
+        Self { name: String::new(), lower: 0.0, upper: 0.0, speed: 0.0, acceleration: f64::INFINITY }
+    }
 }
 
 /// What is known of a joint vector, or of a Jacobian's columns, at load.

@@ -13,10 +13,32 @@ pub type Scalar = f64;
 pub type Flag = bool;
 
 /// What is known of a scalar at load.
-#[derive(Debug, Clone, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct ScalarShape {
     /// Its unit.
     pub unit: Unit,
+    /// Least and greatest value it can have [its unit]; infinite where nothing is known.
+    pub range: [f64; 2],
+}
+
+impl Default for ScalarShape {
+    fn default() -> Self {
+        Self::of(Unit::default())
+    }
+}
+
+impl ScalarShape {
+    /// Of a scalar with that unit, of whatever size.
+    #[must_use]
+    pub const fn of(unit: Unit) -> Self {
+        Self { unit, range: [f64::NEG_INFINITY, f64::INFINITY] }
+    }
+
+    /// The same for a scalar from `least` to `greatest` [its unit].
+    #[must_use]
+    pub const fn within(self, least: f64, greatest: f64) -> Self {
+        Self { range: [least, greatest], ..self }
+    }
 }
 
 /// Nothing is known of a flag at load.

@@ -39,7 +39,7 @@ address = "127.0.0.1:4000"
 "#;
 
     fn open(params: Params) -> Result<Opened, Mistakes> {
-        let outputs = vec![ScalarShape { unit: Unit::METRE }.into()];
+        let outputs = vec![ScalarShape::of(Unit::METRE).into()];
         let filled = Filled { role: "length".into(), outputs, commands: vec![], facts: vec![] };
         let description = Description { fills: vec![filled], period: 0.01 };
         Ok(Opened { description, driver: Driver::Live(Box::new(Self { address: params.address })) })

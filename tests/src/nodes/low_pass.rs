@@ -94,7 +94,7 @@ mod tests {
     use super::*;
 
     fn rig(time: f64, unit: Unit) -> Result<NodeRig, Mistakes> {
-        NodeRig::new::<LowPass>(&format!("time = {time}"), &[("value", ScalarShape { unit }.into())])
+        NodeRig::new::<LowPass>(&format!("time = {time}"), &[("value", ScalarShape::of(unit).into())])
     }
 
     /// What comes out of a sample, `ms` before the next.

@@ -34,12 +34,18 @@ fn length() -> RoleType {
     let args = vec!["m".into(), "self".into()].into();
     let value =
         PortSpec { name: "value".into(), doc: "A length.".into(), kind: Kind::Scalar, args, need: Need::Required };
-    RoleType { name: "length".into(), summary: "a length".into(), outputs: vec![value], commands: vec![] }
+    RoleType {
+        name: "length".into(),
+        summary: "a length".into(),
+        outputs: vec![value],
+        commands: vec![],
+        limits: vec![],
+    }
 }
 
 /// The role `role` as a length that a test feeds, every 10 ms nominally.
 #[must_use]
 pub fn length_by_hand(role: &'static str) -> Source {
-    let outputs = vec![ScalarShape { unit: Unit::METRE }.into()];
+    let outputs = vec![ScalarShape::of(Unit::METRE).into()];
     Source { role, kind: "length", period: 0.01, outputs, commands: vec![] }
 }

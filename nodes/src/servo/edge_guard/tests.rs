@@ -159,7 +159,7 @@ fn the_servo_itself_is_never_held_back() {
 }
 
 fn rig(params: &str, rows: usize, cols: usize) -> Result<NodeRig, Mistakes> {
-    let metre = || Shape::from(ScalarShape { unit: Unit::METRE });
+    let metre = || Shape::from(ScalarShape::of(Unit::METRE));
     let image = ImageShape { rows, cols, pitch: [PITCH; 2], unit: Unit::NEWTON };
     let wires = [("twist", TwistShape.into()), ("x", metre()), ("y", metre()), ("image", image.into())];
     NodeRig::new::<EdgeGuard>(params, &wires)
@@ -220,7 +220,7 @@ fn flicker_is_no_way_out_but_a_lost_contact_is_forgotten() {
 fn margin_and_ramp_are_in_tactels_of_their_axis() {
     let fences = |axis: usize, place: f64| {
         let shape = ImageShape { rows: 12, cols: 16, pitch: [0.005, 0.002], unit: Unit::NEWTON };
-        let metre = || Shape::from(ScalarShape { unit: Unit::METRE });
+        let metre = || Shape::from(ScalarShape::of(Unit::METRE));
         let image = Image::zeros(shape.rows, shape.cols);
         let wires = [("twist", TwistShape.into()), ("x", metre()), ("y", metre()), ("image", shape.into())];
         let mut rig = NodeRig::new::<EdgeGuard>("margin_tactels = 1.5\nramp_tactels = 2", &wires).unwrap();

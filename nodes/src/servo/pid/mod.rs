@@ -33,7 +33,7 @@ params! { Gains:
 
 params! {
     /// Gains of each feature.
-    gains: Map<Gains>,
+    live gains: Map<Gains>,
 }
 
 inputs! {

@@ -104,7 +104,7 @@ type = "still_motor"
 "#;
 
     fn open(_: Params) -> Result<Opened, Mistakes> {
-        let joint = Joint { name: "a".into(), lower: -1.0, upper: 1.0, speed: 1.0 };
+        let joint = Joint { name: "a".into(), lower: -1.0, upper: 1.0, speed: 1.0, acceleration: 10.0 };
         let shape = JointsShape { joints: vec![joint], unit: Unit::RADIAN };
         let commands = vec![shape.in_unit(Unit::RADIAN.per_second()).into()];
         let filled = Filled { role: "motor".into(), outputs: vec![shape.into()], commands, facts: vec![] };
@@ -131,7 +131,7 @@ fn world() -> Catalogue {
         need: Need::Required,
     };
     let (outputs, commands) = (vec![port("position", "rad")], vec![port("velocity", "rad/s")]);
-    let role = RoleType { name: "motor".into(), summary: "".into(), outputs, commands };
+    let role = RoleType { name: "motor".into(), summary: "".into(), outputs, commands, limits: vec![] };
     Catalogue::new().role(role).node::<follow::Follow>().node::<bound::Bound>().device::<Motor>()
 }
 
