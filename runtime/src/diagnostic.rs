@@ -75,6 +75,10 @@ codes! {
     UnknownDevice "unknown-device",
     /// A command of a device that nothing drives.
     UndrivenCommand "undriven-command",
+    /// A command that has not crossed every limit that its device asks for.
+    UnlimitedCommand "unlimited-command",
+    /// A limit that a node asks for and [limits] does not say.
+    MissingLimit "missing-limit",
     /// A graph without a clock, or with one that cannot tick.
     BadClock "bad-clock",
     /// A node from which nothing follows that anything uses.

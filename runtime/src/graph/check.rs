@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use super::devices::{self, Opened};
 use super::document::GraphTable;
 use super::frames::Frames;
+use super::limits;
 use super::load::{Flat, Loader, Request};
 use super::order::order;
 use super::plan::{Clock, Plan, PlannedCommand, PlannedNode, PlannedPort, PlannedRole, Producer, Source};
@@ -36,7 +37,9 @@ pub fn plan(catalogue: &Catalogue, request: &Request) -> Result<Plan, Report> {
     let wires = model.wires(&mut found);
     let commands = model.commands(&mut found);
     let order = order(&model, &wires, &mut found);
-    let frames = Frames::unify(&model, catalogue, &order, &wires, &commands, &mut found);
+    let mut frames = Frames::unify(&model, catalogue, &order, &wires, &commands, &mut found);
+    limits::compare(&model, &mut found);
+    limits::prove(&model, catalogue, &mut frames, &wires, &commands, &mut found);
     let clock = clock(&flat, &opened, &mut found);
     let period = clock.map_or(1.0, |(_, period)| period);
     let mut builder = Builder {

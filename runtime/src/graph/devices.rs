@@ -3,6 +3,7 @@
 use std::ops::Range;
 
 use super::document::Bench;
+use super::limits;
 use super::plan::PlannedDevice;
 use super::wires::Model;
 use super::{Item, Key, Sources, Value};
@@ -228,7 +229,8 @@ fn lookup(block: &Value, path: &str) -> Option<(Range<usize>, Range<usize>)> {
     Some((key, value.span.clone()))
 }
 
-/// Puts the facts of devices in the place of every `{ from = "role.fact" }`.
+/// Puts the facts of devices in the place of every `{ from = "role.fact" }`, and the numbers of [limits] in that of
+/// `{ from = "limits.key" }`.
 pub(crate) fn fill_facts(value: &mut Value, model: &Model<'_>, opened: &Opened, found: &mut Vec<Diagnostic>) -> bool {
     let span = value.span.clone();
     let table = match &mut value.item {
@@ -243,8 +245,8 @@ pub(crate) fn fill_facts(value: &mut Value, model: &Model<'_>, opened: &Opened, 
     let Some(word) = word else {
         return table.entries.iter_mut().fold(true, |good, (_, item)| fill_facts(item, model, opened, found) & good);
     };
-    match fact(&word, model, opened) {
-        Ok(Some(fact)) => *value = Value::from_toml(&fact, &span),
+    match fact(&word, &span, model, opened) {
+        Ok(Some(fact)) => *value = fact,
         Ok(None) => return false,
         Err(diagnostic) => {
             found.push(*diagnostic);
@@ -254,12 +256,21 @@ pub(crate) fn fill_facts(value: &mut Value, model: &Model<'_>, opened: &Opened, 
     true
 }
 
-fn fact(word: &Word, model: &Model<'_>, opened: &Opened) -> Result<Option<toml::Value>, Box<Diagnostic>> {
+fn fact(
+    word: &Word,
+    span: &Range<usize>,
+    model: &Model<'_>,
+    opened: &Opened,
+) -> Result<Option<Value>, Box<Diagnostic>> {
     let wrong = |message: String, help: String| {
         Err(Box::new(Diagnostic::new(Code::UnknownFact, word.span.clone(), message).help(help)))
     };
     let roles = || model.flat.roles.iter().map(|(key, _)| key.name.as_str());
     let (role, name) = word.text.split_once('.').unwrap_or((&word.text, ""));
+    if role == limits::SECTION {
+        // What is missing there has been told at the section.
+        return Ok(model.flat.limits.as_ref().and_then(|(_, table)| table.get(name)).cloned());
+    }
     let Some(index) = roles().position(|known| known == role) else {
         return wrong(format!("there is no role `{role}` to ask for a fact"), closest(role, roles(), "roles"));
     };
@@ -267,7 +278,7 @@ fn fact(word: &Word, model: &Model<'_>, opened: &Opened) -> Result<Option<toml::
     let Some(bound) = &opened.roles[index] else { return Ok(None) };
     let facts = &bound.filled.facts;
     match facts.iter().find(|(fact, _)| fact == name) {
-        Some((_, value)) => Ok(Some(value.clone())),
+        Some((_, value)) => Ok(Some(Value::from_toml(value, span))),
         None => {
             let help = closest(name, facts.iter().map(|(fact, _)| &**fact), "facts");
             wrong(format!("the device behind `{role}` states no `{name}`"), help)

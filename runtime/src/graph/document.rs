@@ -46,6 +46,8 @@ pub(crate) struct Document {
     pub(crate) nodes: Vec<Block>,
     pub(crate) parts: Vec<PartBlock>,
     pub(crate) commands: Vec<(Key, Key, Word)>,
+    /// The section [limits] and its place.
+    pub(crate) limits: Option<(Range<usize>, Table)>,
     pub(crate) inputs: Vec<(Key, Word)>,
     pub(crate) exports: Vec<(Key, Word)>,
 }
@@ -56,6 +58,9 @@ pub(crate) struct Bench {
     pub(crate) devices: Vec<Block>,
     pub(crate) bind: Vec<(Key, Word)>,
 }
+
+/// What cannot be a name: what wires and facts call something else.
+const RESERVED: [&str; 2] = ["inputs", super::limits::SECTION];
 
 /// Reads sections and collects what is wrong with them.
 pub(crate) struct Sections<'a> {
@@ -79,7 +84,7 @@ impl<'a> Sections<'a> {
 
     /// The sections of a graph file.
     pub(crate) fn graph(&mut self, root: &Table) -> Document {
-        self.known(root, &["graph", "roles", "parts", "nodes", "commands", "devices", "bind"]);
+        self.known(root, &["graph", "roles", "parts", "nodes", "commands", "limits", "devices", "bind"]);
         let graph =
             root.entry("graph").map(|(key, value)| (key.span.clone(), GraphTable::read(value, &mut self.reader)));
         let commands = self.table(root.get("commands")).entries.into_iter().flat_map(|(role, value)| {
@@ -87,7 +92,8 @@ impl<'a> Sections<'a> {
             wires.into_iter().map(move |(command, word)| (role.clone(), command, word))
         });
         let commands = commands.collect();
-        Document { graph, roles: self.names(root.get("roles")), commands, ..self.body(root) }
+        let limits = root.entry("limits").map(|(key, value)| (key.span.clone(), self.table(Some(value))));
+        Document { graph, roles: self.names(root.get("roles")), commands, limits, ..self.body(root) }
     }
 
     /// The sections of a part.
@@ -243,10 +249,11 @@ impl<'a> Sections<'a> {
     fn name(&mut self, key: &Key) -> bool {
         let is_word = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '_';
         let starts_well = key.name.starts_with(|c: char| c.is_ascii_lowercase());
-        let is_name = starts_well && key.name.chars().all(is_word) && key.name != "inputs";
+        let is_name = starts_well && key.name.chars().all(is_word) && !RESERVED.contains(&key.name.as_str());
         if !is_name {
             let message = format!("`{}` cannot be a name", key.name);
-            let help = "a name is made of small letters, digits and `_`, starts with a letter and is not `inputs`";
+            let help =
+                "a name is made of small letters, digits and `_`, starts with a letter and is not `inputs` or `limits`";
             self.diagnostics.push(Diagnostic::new(Code::BadName, key.span.clone(), message).help(help));
         }
         is_name

@@ -90,6 +90,8 @@ pub(crate) struct Flat {
     pub(crate) nodes: Vec<FlatNode>,
     pub(crate) scopes: Vec<Scope>,
     pub(crate) commands: Vec<(Key, Key, Word)>,
+    /// The section [limits] and its place.
+    pub(crate) limits: Option<(Range<usize>, Table)>,
     pub(crate) bench: Option<Bench>,
 }
 
@@ -147,6 +149,7 @@ impl Loader {
         flat.bench = self.bench(request, &flat, &root.0, bench_set);
         flat.roles.clone_from(&document.roles);
         flat.commands.clone_from(&document.commands);
+        flat.limits.clone_from(&document.limits);
         self.flatten(document, "", Scope::default(), &mut flat);
         flat
     }

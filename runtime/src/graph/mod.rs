@@ -8,6 +8,7 @@ mod check;
 mod devices;
 mod document;
 mod frames;
+mod limits;
 mod load;
 mod order;
 mod outline;

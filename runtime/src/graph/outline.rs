@@ -237,7 +237,8 @@ impl Parts<'_> {
             (Some(word), Some(bound)) => {
                 Origin::Fact { fact: word.to_owned(), device: self.opened.devices[bound.device].span.clone() }
             }
-            _ => Origin::Written(value.span.clone()),
+            // A number of [limits] stands where that says it.
+            _ => Origin::Written(filled.span.clone()),
         };
         Setting { path, value: filled, origin }
     }

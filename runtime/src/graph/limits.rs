@@ -1,0 +1,226 @@
+//! The proof that every command crosses the limits, and the section `[limits]` that the limiters take their numbers from.
+//!
+//! A role names what must hold of its commands. From each command the wire is followed back, through the nodes that pass
+//! a motion on, and what they hold is gathered; a node in between that may break a limit makes it count for nothing.
+
+use std::collections::BTreeSet;
+use std::ops::Range;
+
+use super::frames::Frames;
+use super::load::Flat;
+use super::plan::{Producer, Source};
+use super::wires::{CommandWire, Model, Wire};
+use super::{Item, Value};
+use crate::catalogue::Catalogue;
+use crate::diagnostic::{Code, Diagnostic, closest};
+use crate::node::{NodeSpec, ParamSpec};
+use crate::signal::Kind;
+
+/// What parameters call the section in `{ from = "limits.…" }`.
+pub(crate) const SECTION: &str = "limits";
+
+/// A number of the section that a parameter asks for.
+struct Asked<'a> {
+    key: String,
+    span: Range<usize>,
+    /// The parameter that it is for.
+    spec: Option<&'a ParamSpec>,
+}
+
+/// Compares the section with what the nodes take from it: a number that nobody takes limits nothing.
+pub(crate) fn compare(model: &Model<'_>, found: &mut Vec<Diagnostic>) {
+    let mut asked = Vec::new();
+    for (node, kind) in model.flat.nodes.iter().zip(&model.nodes) {
+        let specs = kind.as_ref().map_or(&[][..], |(_, spec)| &spec.params);
+        let entries = node.block.params.as_table().into_iter().flat_map(|table| &table.entries);
+        for (key, value) in entries {
+            collect(value, specs.iter().find(|spec| spec.name == key.name), &mut asked);
+        }
+    }
+    let given = || model.flat.limits.iter().flat_map(|(_, table)| &table.entries);
+    let names: BTreeSet<&str> = asked.iter().map(|asked| asked.key.as_str()).collect();
+    for (key, _) in given().filter(|(key, _)| !names.contains(key.name.as_str())) {
+        let message = format!("`{}` limits nothing: no node takes it", key.name);
+        let missing = names.iter().copied().filter(|name| !given().any(|(key, _)| key.name == *name));
+        let help = closest(&key.name, missing, "limits that are asked for");
+        found.push(Diagnostic::new(Code::UnknownKey, key.span.clone(), message).help(help));
+    }
+    missing(model.flat, &asked, found);
+}
+
+fn missing(flat: &Flat, asked: &[Asked<'_>], found: &mut Vec<Diagnostic>) {
+    let mut told = BTreeSet::new();
+    let is_given = |key: &str| flat.limits.as_ref().is_some_and(|(_, table)| table.get(key).is_some());
+    let missing: Vec<&Asked<'_>> =
+        asked.iter().filter(|asked| !is_given(&asked.key) && told.insert(asked.key.as_str())).collect();
+    let Some(first) = missing.first() else { return };
+    let lines = missing.iter().map(|asked| {
+        let doc = asked.spec.and_then(|spec| spec.doc.lines().next()).unwrap_or_default().trim();
+        format!("\n{} = …   # {}", asked.key, doc.trim_end_matches('.'))
+    });
+    let names: Vec<String> = missing.iter().map(|asked| format!("`{}`", asked.key)).collect();
+    let (span, message) = match &flat.limits {
+        Some((span, _)) => (span.clone(), format!("[limits] does not say {}", names.join(", "))),
+        None => (flat.place.clone(), format!("the graph has no section [limits]: it has to say {}", names.join(", "))),
+    };
+    let diagnostic =
+        Diagnostic::new(Code::MissingLimit, span, message).note(first.span.clone(), "it is asked for here");
+    found.push(diagnostic.help(format!("add under [limits]:{}", lines.collect::<String>())));
+}
+
+fn collect<'a>(value: &Value, spec: Option<&'a ParamSpec>, asked: &mut Vec<Asked<'a>>) {
+    match &value.item {
+        Item::Array(items) => items.iter().for_each(|item| collect(item, spec, asked)),
+        Item::Table(table) if table.is_fact() => {
+            let from = table.get("from").expect("a fact has it");
+            if let Some((SECTION, key)) = from.as_str().and_then(|text| text.split_once('.')) {
+                asked.push(Asked { key: key.to_owned(), span: from.span.clone(), spec });
+            }
+        }
+        Item::Table(table) => table.entries.iter().for_each(|(_, item)| collect(item, spec, asked)),
+        _ => {}
+    }
+}
+
+/// A node on the way of a command that passes a motion on.
+struct Stop<'a> {
+    node: usize,
+    spec: &'a NodeSpec,
+    /// What its motion comes from.
+    source: Source,
+}
+
+/// Proves that each command has crossed what its role asks for, or says what is missing and where it belongs.
+pub(crate) fn prove(
+    model: &Model<'_>,
+    catalogue: &Catalogue,
+    frames: &mut Frames,
+    wires: &[Vec<Wire>],
+    commands: &[CommandWire],
+    found: &mut Vec<Diagnostic>,
+) {
+    for command in commands {
+        let role = model.roles[command.role].expect("only known roles have commands");
+        // A wire that goes nowhere has been complained about, and what stands behind it is not known.
+        let Some(path) = path(model, wires, command.source) else { continue };
+        let mut held: Vec<&str> = Vec::new();
+        let mut lost: Vec<(&str, &str)> = Vec::new();
+        for stop in path.iter().rev() {
+            let limits = &stop.spec.limits;
+            lost.retain(|(limit, _)| !limits.holds.contains(limit));
+            let name = model.flat.nodes[stop.node].name.as_str();
+            lost.extend(held.iter().filter(|held| limits.breaks.contains(held)).map(|held| (*held, name)));
+            held.retain(|held| !limits.breaks.contains(held));
+            held.extend(limits.holds);
+        }
+        let missing: Vec<&str> =
+            role.limits.iter().map(|limit| &**limit).filter(|limit| !held.contains(limit)).collect();
+        if !missing.is_empty() {
+            found.push(unlimited(model, catalogue, command, &path, &missing, &lost));
+        }
+        found.extend(other_frame(model, frames, &path));
+    }
+}
+
+/// The nodes that a motion passes through, the last one first; none if a wire in between is missing.
+fn path<'a>(model: &'a Model<'_>, wires: &[Vec<Wire>], from: Source) -> Option<Vec<Stop<'a>>> {
+    let (mut path, mut at) = (Vec::<Stop<'_>>::new(), from);
+    while let Producer::Node(node) = at.producer {
+        let (_, spec) = model.nodes[node].as_ref()?;
+        let Some(through) = spec.limits.through else { break };
+        let input = spec.inputs.iter().position(|input| input.name == through)?;
+        let source = wires[node].iter().find(|wire| wire.input == input)?.source;
+        if path.iter().any(|stop| stop.node == node) {
+            return None;
+        }
+        path.push(Stop { node, spec, source });
+        at = source;
+    }
+    Some(path)
+}
+
+fn unlimited(
+    model: &Model<'_>,
+    catalogue: &Catalogue,
+    command: &CommandWire,
+    path: &[Stop<'_>],
+    missing: &[&str],
+    lost: &[(&str, &str)],
+) -> Diagnostic {
+    let role = model.roles[command.role].expect("only known roles have commands");
+    let consumer = format!("{}.{}", model.name(Producer::Role(command.role)), role.commands[command.command].name);
+    let names = missing.iter().map(|limit| format!("`{limit}`")).collect::<Vec<_>>().join(", ");
+    let source = model.port_name(command.source);
+    let message =
+        format!("`{consumer}` takes only what has crossed every limit, but `{source}` has not crossed {names}");
+    let mut helps = Vec::new();
+    let mut told = BTreeSet::new();
+    for limit in missing {
+        if let Some((_, by)) = lost.iter().find(|(lost, _)| lost == limit) {
+            helps.push(format!("`{by}` comes after what holds `{limit}` and may break it: put it before that"));
+            continue;
+        }
+        let holds = |spec: &NodeSpec| spec.limits.holds.contains(limit);
+        let Some(spec) = catalogue.nodes().iter().map(|node| node.spec()).find(holds) else { continue };
+        if told.insert(spec.name.to_string()) {
+            helps.push(between(model, command, &consumer, path, &spec));
+        }
+    }
+    let diagnostic = command.origin.mistake(Code::UnlimitedCommand, message);
+    diagnostic.with_help((!helps.is_empty()).then(|| helps.join("\n")))
+}
+
+/// Where on the way a limiter belongs: behind everything that must come before it.
+fn between(model: &Model<'_>, command: &CommandWire, consumer: &str, path: &[Stop<'_>], limiter: &NodeSpec) -> String {
+    let order = &model.roles[command.role].expect("only known roles have commands").limits;
+    let rank = |spec: &NodeSpec| {
+        let ranks = spec.limits.holds.iter().filter_map(|limit| order.iter().position(|known| known == limit));
+        ranks.max()
+    };
+    let (name, through) = (&limiter.name, limiter.limits.through.unwrap_or_default());
+    let kind = limiter.inputs.iter().find(|input| input.name == through).map(|input| input.kind);
+    // Links from the command back to where the motion comes from: who takes it, and what is taken.
+    let mut links = vec![(consumer.to_owned(), command.source)];
+    for stop in path {
+        let through = stop.spec.limits.through.unwrap_or_default();
+        links.push((format!("{}.{through}", model.flat.nodes[stop.node].name), stop.source));
+    }
+    let later = path.iter().rposition(|stop| rank(stop.spec) > rank(limiter)).map_or(0, |at| at + 1);
+    let fits = |(_, source): &&(String, Source)| Some(model.port(*source).kind) == kind;
+    let link = links[later..].iter().find(fits).or_else(|| links.iter().rev().find(fits));
+    let Some((taker, source)) = link else { return format!("put a `{name}` on the way of the motion") };
+    let article = if name.starts_with(['a', 'e', 'i', 'o', 'u']) { "an" } else { "a" };
+    let needs = limiter
+        .inputs
+        .iter()
+        .filter(|input| matches!(input.need, crate::node::Need::Required | crate::node::Need::Sampled));
+    let mut block = format!(
+        "put {article} `{name}` between `{}` and `{taker}`:\n[nodes.{name}]\ntype = \"{name}\"",
+        model.port_name(*source)
+    );
+    block.push_str(&format!("\nin.{through} = \"{}\"", model.port_name(*source)));
+    for input in needs.filter(|input| input.name != through) {
+        block.push_str(&format!("\nin.{} = \"…\"", input.name));
+    }
+    for param in limiter.params.iter().filter(|param| !param.is_optional) {
+        let unit = param.unit().map(|unit| format!("   # [{unit}]")).unwrap_or_default();
+        block.push_str(&format!("\n{} = …{unit}", param.name));
+    }
+    block
+}
+
+/// A limiter of a twist means the sensor's own motion: in another frame the same numbers limit something else.
+fn other_frame(model: &Model<'_>, frames: &mut Frames, path: &[Stop<'_>]) -> Option<Diagnostic> {
+    let mut limiters = path.iter().rev().filter(|stop| !stop.spec.limits.holds.is_empty());
+    let mut frame = |stop: &Stop<'_>| {
+        let source = Source { producer: Producer::Node(stop.node), port: 0 };
+        let is_twist = model.port(source).kind == Kind::Twist;
+        is_twist.then(|| frames.of(model, source).into_iter().next().flatten()).flatten()
+    };
+    let first = limiters.find_map(|stop| Some((stop, frame(stop)?)))?;
+    let (other, its) = limiters.find_map(|stop| Some((stop, frame(stop).filter(|frame| *frame != first.1)?)))?;
+    let (node, before) = (&model.flat.nodes[other.node], &model.flat.nodes[first.0.node].name);
+    let message = format!("`{}` limits a twist in `{its}`, but `{before}` before it one in `{}`", node.name, first.1);
+    let diagnostic = Diagnostic::new(Code::FrameMismatch, node.block.key.span.clone(), message);
+    Some(diagnostic.help("limits are of the sensor's own motion: put it before the change of frame"))
+}
