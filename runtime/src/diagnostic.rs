@@ -79,6 +79,22 @@ codes! {
     UnlimitedCommand "unlimited-command",
     /// A limit that a node asks for and [limits] does not say.
     MissingLimit "missing-limit",
+    /// A mode that is not there.
+    UnknownMode "unknown-mode",
+    /// A mode that no way leads to.
+    UnreachableMode "unreachable-mode",
+    /// A way out of a mode that does not say what it waits for, or says too much.
+    BadCondition "bad-condition",
+    /// Two ways out of a mode that can hold at once.
+    OverlappingConditions "overlapping-conditions",
+    /// A bound that what it bounds never crosses, or always has.
+    BoundOutOfRange "bound-out-of-range",
+    /// A port that is absent in a mode that looks at it.
+    AbsentPort "absent-port",
+    /// A parameter that a mode cannot set.
+    NotLive "not-live",
+    /// Motion that starts by itself and that nothing ends.
+    UngatedMotion "ungated-motion",
     /// A graph without a clock, or with one that cannot tick.
     BadClock "bad-clock",
     /// A node from which nothing follows that anything uses.

@@ -11,6 +11,8 @@ pub enum Cause {
     Panicked(String),
     /// A device failed.
     Device(String),
+    /// A mode came to what it calls a failure.
+    Mode(String),
 }
 
 /// A controlled stop with its reason.
@@ -39,6 +41,7 @@ impl fmt::Display for Fault {
         match &self.cause {
             Cause::NotFinite => write!(f, "`{name}` is not a finite number")?,
             Cause::Panicked(message) => write!(f, "node `{name}` panicked: {message}")?,
+            Cause::Mode(why) => write!(f, "mode `{name}` failed: {why}")?,
             Cause::Device(message) => write!(f, "device `{name}` failed: {message}")?,
         }
         write!(f, " in tick {} at {:.3} s ({})", self.tick, self.time as f64 * 1e-9, self.place)

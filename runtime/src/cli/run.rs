@@ -165,6 +165,7 @@ fn quietly<T>(work: impl FnOnce() -> T) -> T {
 fn ending(outcome: &Outcome) -> String {
     let why = match outcome.end {
         End::Finished => "a device has no more samples",
+        End::Done => "the graph says that it is done",
         End::Duration => "the time is over",
         End::Interrupted => "interrupted",
         End::Fault(_) => "a fault",

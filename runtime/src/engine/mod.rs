@@ -4,6 +4,7 @@
 
 mod command;
 mod inlet;
+mod modes;
 mod shell;
 mod station;
 mod tick;
@@ -18,9 +19,11 @@ use crate::node::{Bus, PortId, Tick};
 use crate::signal::Stamp;
 use command::CommandSlot;
 use inlet::Inlet;
+use modes::{Modes, Verdict};
 use timeline::Timeline;
 
 pub use inlet::Counters;
+pub use modes::Change;
 pub use shell::{End, Outcome, RunOptions, run};
 pub(crate) use station::Station;
 pub use tick::Timing;
@@ -37,6 +40,8 @@ pub struct Engine {
     /// Name of each role, and the place of the device behind it.
     roles: Vec<(String, String)>,
     timing: Timing,
+    modes: Option<Modes>,
+    is_done: bool,
     sources: Sources,
 }
 
@@ -77,10 +82,12 @@ impl Engine {
         let mut ids = std::collections::BTreeMap::new();
         let mut ports = Vec::new();
         let mut inlets = Vec::new();
+        let mut kinds = std::collections::BTreeMap::new();
         for (i, role) in plan.roles.iter().enumerate() {
             for (port, planned) in role.ports.iter().enumerate() {
                 let id = bus.add(&planned.shape);
                 ids.insert(Source { producer: Producer::Role(i), port }, id);
+                kinds.insert(Source { producer: Producer::Role(i), port }, (id, planned.shape.kind()));
                 inlets.push(Inlet::new(&planned.shape, role.device, role.first_port + port, id));
                 ports.push((planned.clone(), id));
             }
@@ -89,6 +96,7 @@ impl Engine {
             for (port, planned) in node.ports.iter().enumerate() {
                 let id = bus.add(&planned.shape);
                 ids.insert(Source { producer: Producer::Node(node.index), port }, id);
+                kinds.insert(Source { producer: Producer::Node(node.index), port }, (id, planned.shape.kind()));
                 ports.push((planned.clone(), id));
             }
         }
@@ -130,9 +138,14 @@ impl Engine {
             max_gap: plan.max_gap,
             reset_after: plan.reset_after,
         };
+        let (timing, mut core) = (Timing::new(stations.len()), tick::Core::new(bus, stations, inlets, slots, tick));
+        let modes = plan.modes.map(|modes| Modes::new(modes, &kinds));
+        modes.iter().for_each(|modes| core.switch(modes.configurations()));
         Self {
-            timing: Timing::new(stations.len()),
-            core: tick::Core::new(bus, stations, inlets, slots, tick),
+            timing,
+            core,
+            modes,
+            is_done: false,
             decks,
             timeline: Timeline::new(plan.clock, plan.period),
             ports,
@@ -173,10 +186,44 @@ impl Engine {
     /// The reason of a fault; nothing was commanded in this tick.
     pub fn step(&mut self) -> Result<(), Fault> {
         match catch_unwind(AssertUnwindSafe(|| self.core.run(&mut self.decks, &mut self.timing))) {
-            Ok(true) => Ok(()),
+            Ok(true) => self.decide(),
             Ok(false) => Err(self.first_not_finite()),
             Err(panic) => Err(self.panicked(&*panic)),
         }
+    }
+
+    /// The boundary between two ticks: another mode, if the conditions of the present one say so.
+    fn decide(&mut self) -> Result<(), Fault> {
+        let Some(modes) = &mut self.modes else { return Ok(()) };
+        match modes.decide(&self.core.bus, &self.core.tick, None) {
+            Verdict::Stay => {}
+            Verdict::Switched => self.core.switch(modes.configurations()),
+            Verdict::Done => self.is_done = true,
+            Verdict::Failed => {
+                let ((why, place), name) = (modes.taken(), modes.name().to_owned());
+                let (why, place) = (Cause::Mode(why.to_owned()), self.sources.locate(place));
+                return Err(self.fault(&name, None, why, place));
+            }
+        }
+        Ok(())
+    }
+
+    /// Whether a mode says that the task is done.
+    #[must_use]
+    pub const fn is_done(&self) -> bool {
+        self.is_done
+    }
+
+    /// Name of the mode that the next tick is in; none in a graph without modes.
+    #[must_use]
+    pub fn mode(&self) -> Option<&str> {
+        self.modes.as_ref().map(Modes::name)
+    }
+
+    /// The modes so far, each with when it began and why, the start first.
+    #[must_use]
+    pub fn changes(&self) -> Vec<Change> {
+        self.modes.iter().flat_map(Modes::changes).collect()
     }
 
     /// Time of a stepped clock device's next sample.

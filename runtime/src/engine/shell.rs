@@ -27,6 +27,8 @@ pub enum End {
     Finished,
     /// The time is over.
     Duration,
+    /// A mode says that the task is done.
+    Done,
     /// The operator wanted it.
     Interrupted,
     /// Something went wrong.
@@ -120,6 +122,9 @@ impl<'a> Shell<'a> {
                 Err(fault) => return End::Fault(fault.into()),
             }
             self.watch_clock(engine);
+            if engine.is_done() {
+                return End::Done;
+            }
         }
     }
 

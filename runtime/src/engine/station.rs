@@ -69,6 +69,11 @@ impl Station {
         }
     }
 
+    /// Goes on with another configuration of the node; its state stays.
+    pub(super) fn switch(&mut self, configuration: usize) {
+        self.node.switch(configuration);
+    }
+
     /// Steps the node if a trigger is new or lost, and makes its outputs absent if something required is. The tick's
     /// stamp becomes the oldest of the triggers'.
     pub(crate) fn visit(&mut self, tick: &mut Tick, bus: &mut Bus) {

@@ -103,6 +103,13 @@ impl Core {
         }
     }
 
+    /// Gives stations the configurations of another mode: by their places, the number of each.
+    pub(super) fn switch(&mut self, configurations: &[(usize, usize)]) {
+        for (place, configuration) in configurations {
+            self.stations[*place].switch(*configuration);
+        }
+    }
+
     pub(super) const fn current(&self) -> usize {
         self.current
     }

@@ -5,17 +5,17 @@ use std::collections::BTreeMap;
 use super::devices::{self, Opened};
 use super::document::GraphTable;
 use super::frames::Frames;
-use super::limits;
 use super::load::{Flat, Loader, Request};
-use super::order::order;
+use super::order::{Wiring, order};
 use super::plan::{Clock, Plan, PlannedCommand, PlannedNode, PlannedPort, PlannedRole, Producer, Source};
 use super::units::{Clash, Units};
 use super::unread::unread;
 use super::wires::{CommandWire, Model, Origin, Wire};
 use super::{Sources, Value, outline};
+use super::{limits, modes};
 use crate::catalogue::Catalogue;
 use crate::diagnostic::{Code, Diagnostic, Report};
-use crate::node::{Configured, Given, Need, NodeSpec, PortSpec, Reader};
+use crate::node::{Built, Configured, Given, Need, NodeSpec, PortSpec, Reader};
 use crate::signal::{FlagShape, Kind, Shape};
 
 /// Checks a graph and builds it.
@@ -52,10 +52,13 @@ pub fn plan(catalogue: &Catalogue, request: &Request) -> Result<Plan, Report> {
         period,
         ports: BTreeMap::new(),
         units: BTreeMap::new(),
+        kept: BTreeMap::new(),
     };
     builder.roles();
-    let nodes: Vec<PlannedNode> = order.iter().filter_map(|node| builder.node(*node, &wires[*node])).collect();
+    let mut nodes: Vec<PlannedNode> = order.iter().filter_map(|node| builder.node(*node, &wires[*node])).collect();
     builder.delayed(&wires);
+    let wiring = Wiring { order: &order, wires: &wires, commands: &commands };
+    let modes = modes::plan(&mut builder, &mut nodes, &wiring);
     let planned: Vec<PlannedCommand> = commands.iter().filter_map(|wire| builder.command(wire)).collect();
     let roles = builder.planned_roles();
     let Builder { found, sources, .. } = builder;
@@ -76,7 +79,7 @@ pub fn plan(catalogue: &Catalogue, request: &Request) -> Result<Plan, Report> {
     let reset_after = flat.table.as_ref().map_or(0, |table| (*table.reset_after_ms * 1e6) as i64);
     let period = ((period * 1e9).round() as i64).max(1);
     let (devices, commands) = (opened.devices, planned);
-    Ok(Plan { roles, devices, nodes, commands, clock, period, max_gap, reset_after, sources, warnings, outline })
+    Ok(Plan { roles, devices, nodes, commands, clock, period, max_gap, reset_after, sources, warnings, outline, modes })
 }
 
 /// For those who run the tool with `-v`.
@@ -128,18 +131,22 @@ fn clock(flat: &Flat, opened: &Opened, found: &mut Vec<Diagnostic>) -> Option<(C
     }
 }
 
-struct Builder<'a> {
+/// Builds the nodes one after the other and notes what is wrong with them.
+pub(crate) struct Builder<'a> {
     catalogue: &'a Catalogue,
-    model: &'a Model<'a>,
+    pub(crate) model: &'a Model<'a>,
     opened: &'a Opened,
     frames: Frames,
-    found: Vec<Diagnostic>,
+    pub(crate) found: Vec<Diagnostic>,
     sources: Sources,
-    period: f64,
+    /// Nominal time between two ticks [s].
+    pub(crate) period: f64,
     /// Ports whose shape is known so far.
-    ports: BTreeMap<Source, PlannedPort>,
+    pub(crate) ports: BTreeMap<Source, PlannedPort>,
     /// What the variables of each node stand for.
     units: BTreeMap<usize, Units>,
+    /// What each node was made from, and whether it starts no motion by itself.
+    kept: BTreeMap<usize, (Given, bool)>,
 }
 
 impl Builder<'_> {
@@ -203,7 +210,7 @@ impl Builder<'_> {
         if !is_whole || inputs.iter().any(missing) || self.frames.has_clash(index) {
             return None;
         }
-        let built = match configured?.build(given) {
+        let built = match configured?.build(given.clone()) {
             Ok(built) => built,
             Err(mistakes) => {
                 let block = &node.block;
@@ -217,6 +224,7 @@ impl Builder<'_> {
             ports.push(self.port(Source { producer: Producer::Node(index), port }, shape));
         }
         self.units.insert(index, units);
+        self.kept.insert(index, (given, built.is_still));
         Some(PlannedNode {
             index,
             name: node.name.clone(),
@@ -227,6 +235,35 @@ impl Builder<'_> {
             is_logged: spec.logs,
             span: node.block.key.span.clone(),
         })
+    }
+
+    /// Whether a node starts no motion by itself as the base graph sets it.
+    pub(crate) fn is_still(&self, node: usize) -> bool {
+        self.kept.get(&node).is_some_and(|(_, is_still)| *is_still)
+    }
+
+    /// A node once more, with other parameters: from what it was made the first time, with the same outputs.
+    pub(crate) fn variant(&mut self, index: usize, params: &Value) -> Option<Built> {
+        let (kind, spec) = self.model.nodes[index].as_ref()?;
+        let (given, _) = self.kept.get(&index)?.clone();
+        let block = &self.model.flat.nodes[index].block;
+        let mut built = match self.configure(*kind, params)?.build(given) {
+            Ok(built) => built,
+            Err(mistakes) => {
+                devices::place(mistakes, params, &block.wires, &mut self.sources, &mut self.found);
+                return None;
+            }
+        };
+        let name = &self.model.flat.nodes[index].name;
+        for (port, (shape, output)) in built.outputs.iter_mut().zip(&spec.outputs).enumerate() {
+            self.units.get_mut(&index)?.give(output, &format!("{name}.{}", output.name), shape);
+            if self.ports[&Source { producer: Producer::Node(index), port }].shape != *shape {
+                let message = format!("`{name}.{}` would be of another shape: no mode can set that", output.name);
+                self.found.push(Diagnostic::new(Code::NotLive, params.span.clone(), message));
+                return None;
+            }
+        }
+        Some(built)
     }
 
     fn configure(&mut self, kind: usize, params: &Value) -> Option<Box<dyn Configured>> {

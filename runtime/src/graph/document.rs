@@ -2,6 +2,7 @@
 
 use std::ops::Range;
 
+use super::modes::{self, ModeBlock};
 use super::{Item, Key, Sources, Table, Value};
 use crate::diagnostic::{Code, Diagnostic, closest, meant};
 use crate::node::{At, FilePath, Mistake, NonNegative, Param, Positive, Rate, Reader, Word};
@@ -11,6 +12,8 @@ crate::params! { GraphTable:
     clock: Option<Word>,
     /// Ticks per second of a graph that has no role for a clock [Hz].
     rate_hz: Option<Rate>,
+    /// Mode that it starts in.
+    start: Option<Word>,
     /// Bench it runs on unless another is named.
     bench: Option<FilePath>,
     /// Greatest time between two samples that counts as one step; five periods unless said [ms].
@@ -48,6 +51,7 @@ pub(crate) struct Document {
     pub(crate) commands: Vec<(Key, Key, Word)>,
     /// The section [limits] and its place.
     pub(crate) limits: Option<(Range<usize>, Table)>,
+    pub(crate) modes: Vec<ModeBlock>,
     pub(crate) inputs: Vec<(Key, Word)>,
     pub(crate) exports: Vec<(Key, Word)>,
 }
@@ -84,7 +88,7 @@ impl<'a> Sections<'a> {
 
     /// The sections of a graph file.
     pub(crate) fn graph(&mut self, root: &Table) -> Document {
-        self.known(root, &["graph", "roles", "parts", "nodes", "commands", "limits", "devices", "bind"]);
+        self.known(root, &["graph", "roles", "parts", "nodes", "commands", "limits", "modes", "devices", "bind"]);
         let graph =
             root.entry("graph").map(|(key, value)| (key.span.clone(), GraphTable::read(value, &mut self.reader)));
         let commands = self.table(root.get("commands")).entries.into_iter().flat_map(|(role, value)| {
@@ -93,7 +97,9 @@ impl<'a> Sections<'a> {
         });
         let commands = commands.collect();
         let limits = root.entry("limits").map(|(key, value)| (key.span.clone(), self.table(Some(value))));
-        Document { graph, roles: self.names(root.get("roles")), commands, limits, ..self.body(root) }
+        let modes = self.named_tables(root.get("modes"));
+        let modes = modes::modes(modes, &mut self.reader);
+        Document { graph, roles: self.names(root.get("roles")), commands, limits, modes, ..self.body(root) }
     }
 
     /// The sections of a part.

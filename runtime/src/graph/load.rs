@@ -5,6 +5,7 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 use super::document::{Bench, Block, Document, GraphTable, PartBlock, Sections};
+use super::modes::ModeBlock;
 use super::{BuiltinFile, Item, Key, Sources, Table, Value, parse_table};
 use crate::diagnostic::{Code, Diagnostic, closest, meant};
 use crate::node::Word;
@@ -92,6 +93,7 @@ pub(crate) struct Flat {
     pub(crate) commands: Vec<(Key, Key, Word)>,
     /// The section [limits] and its place.
     pub(crate) limits: Option<(Range<usize>, Table)>,
+    pub(crate) modes: Vec<ModeBlock>,
     pub(crate) bench: Option<Bench>,
 }
 
@@ -150,6 +152,7 @@ impl Loader {
         flat.roles.clone_from(&document.roles);
         flat.commands.clone_from(&document.commands);
         flat.limits.clone_from(&document.limits);
+        flat.modes.clone_from(&document.modes);
         self.flatten(document, "", Scope::default(), &mut flat);
         flat
     }

@@ -10,6 +10,7 @@ mod document;
 mod frames;
 mod limits;
 mod load;
+mod modes;
 mod order;
 mod outline;
 mod plan;
@@ -17,12 +18,14 @@ mod sources;
 mod units;
 mod unread;
 mod value;
+mod wanted;
 mod wires;
 
 pub use check::plan;
 #[cfg(feature = "cli")]
 pub(crate) use frames::frame_args;
 pub use load::Request;
+pub(crate) use modes::{Condition, PlannedExit, PlannedModes, Sort, Test};
 pub use outline::{NOWHERE, Origin, Outline, OutlinedBlock, OutlinedRole, OutlinedWire, Setting};
 pub(crate) use plan::{Clock, PlannedCommand, PlannedNode, Producer, Source};
 pub use plan::{Plan, PlannedPort};

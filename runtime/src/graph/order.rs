@@ -1,9 +1,18 @@
 //! The order in which the nodes step, or the circle that forbids one.
 
 use super::plan::Producer;
-use super::wires::{Model, Wire};
+use super::wires::{CommandWire, Model, Wire};
 use crate::diagnostic::{Code, Diagnostic};
 use crate::node::Need;
+
+/// Who reads what, and in which order all step.
+#[derive(Clone, Copy)]
+pub(crate) struct Wiring<'a> {
+    pub(crate) order: &'a [usize],
+    /// The wires of each node.
+    pub(crate) wires: &'a [Vec<Wire>],
+    pub(crate) commands: &'a [CommandWire],
+}
 
 /// A wire between two nodes that says which one steps first.
 #[derive(Debug, Clone)]

@@ -2,6 +2,7 @@
 
 use std::ops::Range;
 
+use super::modes::PlannedModes;
 use super::{Outline, Sources};
 use crate::device::Driver;
 use crate::diagnostic::{Diagnostic, Report};
@@ -104,6 +105,7 @@ pub struct Plan {
     pub(crate) sources: Sources,
     pub(crate) warnings: Vec<Diagnostic>,
     pub(crate) outline: Outline,
+    pub(crate) modes: Option<PlannedModes>,
 }
 
 impl Plan {

@@ -249,7 +249,7 @@ impl<'a> Model<'a> {
     }
 
     /// Where the port named by `word` is; `None` if it comes from something whose type is unknown.
-    fn resolve(&self, scope: usize, word: &Word, depth: usize) -> Result<Option<Source>, Box<Diagnostic>> {
+    pub(crate) fn resolve(&self, scope: usize, word: &Word, depth: usize) -> Result<Option<Source>, Box<Diagnostic>> {
         const DEEPEST: usize = 64;
         let wrong = |message: String, help: String| {
             Box::new(Diagnostic::new(Code::UnknownPort, word.span.clone(), message).help(help))

@@ -101,8 +101,9 @@ pub trait AnyNode: Any + Send {
         Vec::new()
     }
     /// See [`Node::want`].
-    fn want(&mut self, wanted: &[Components]) {
+    fn want(&mut self, wanted: &[Components]) -> bool {
         let _ = wanted;
+        false
     }
 }
 
@@ -200,7 +201,7 @@ impl<N: Node> AnyNode for Cell<N> {
         self.active.node.uses(wanted)
     }
 
-    fn want(&mut self, wanted: &[Components]) {
-        self.active.node.want(wanted);
+    fn want(&mut self, wanted: &[Components]) -> bool {
+        self.active.node.want(wanted)
     }
 }

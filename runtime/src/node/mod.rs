@@ -78,9 +78,10 @@ pub trait Node: Sized + Send + 'static {
     }
 
     /// Told at load which components of each output anything reads: a feature that is projected out is not, and what
-    /// is gathered for it would be gathered in vain.
-    fn want(&mut self, wanted: &[Components]) {
+    /// is gathered for it would be gathered in vain. Whether the node leaves the others absent from then on.
+    fn want(&mut self, wanted: &[Components]) -> bool {
         let _ = wanted;
+        false
     }
 
     /// One step. Cannot fail, block, allocate, log or read a clock. An output that is not written is absent.

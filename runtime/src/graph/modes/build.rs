@@ -1,0 +1,232 @@
+//! Each mode as whole sets of parameters: the nodes that it changes are made once more, and take part as a further
+//! configuration of the node that runs.
+
+use std::collections::BTreeMap;
+
+use super::super::check::Builder;
+use super::super::document::Block;
+use super::super::load::{Entity, Flat};
+use super::super::order::Wiring;
+use super::super::plan::{PlannedNode, PlannedPort, Producer, Source};
+use super::super::wanted::wanted;
+use super::super::{Item, Table, Value};
+use super::conditions::Lookup;
+use super::{Condition, ModeBlock, Movers, PlannedMode, PlannedModes, Test, Watched};
+use super::{exits, overlaps, start, ungated, unreachable};
+use crate::diagnostic::{Code, Diagnostic, closest};
+use crate::node::{AnyNode, Components, NodeSpec};
+use crate::signal::Kind;
+
+/// A node as a mode has it.
+struct Variant {
+    node: Box<dyn AnyNode>,
+    is_still: bool,
+}
+
+/// Checks the modes and gives the nodes their configurations. Without modes the graph itself is looked at as one.
+pub(crate) fn plan(builder: &mut Builder<'_>, nodes: &mut [PlannedNode], wiring: &Wiring<'_>) -> Option<PlannedModes> {
+    let flat = builder.model.flat;
+    let base = wanted(builder.model, wiring, &|index| node(nodes, index).map(|node| &*node.node));
+    let mut frozen = BTreeMap::new();
+    for node in &mut *nodes {
+        frozen.insert(node.index, node.node.want(&base[node.index]));
+    }
+    let movers = Movers::new(builder.model, wiring);
+    let word = flat.table.as_ref().and_then(|table| table.start.as_ref());
+    if flat.modes.is_empty() {
+        let found = movers.of(&|node| builder.is_still(node));
+        ungated(builder.model, &found, None, &mut builder.found);
+        start(word, &flat.place, &[], &mut builder.found);
+        return None;
+    }
+    let first = start(word, &flat.place, &flat.modes, &mut builder.found);
+    let mut modes = Vec::new();
+    for block in &flat.modes {
+        let mut mode = PlannedMode {
+            name: block.key.name.clone(),
+            exits: conditions(block, builder, nodes),
+            configurations: Vec::new(),
+        };
+        let mut variants = variants(block, builder);
+        let of = |index: usize| variants.get(&index).map(|variant| &*variant.node);
+        let reads = wanted(builder.model, wiring, &|index| of(index).or_else(|| node(nodes, index).map(|n| &*n.node)));
+        again(builder, nodes, &base, &reads, &mut variants);
+        for (index, variant) in &mut variants {
+            variant.node.want(&reads[*index]);
+        }
+        absent(block, &mode, &reads, &frozen, builder);
+        let is_still =
+            |node: usize| variants.get(&node).map_or_else(|| builder.is_still(node), |variant| variant.is_still);
+        let found = movers.of(&is_still);
+        ungated(builder.model, &found, Some((block, &mode)), &mut builder.found);
+        adopt(block, variants, nodes, &mut mode, &mut builder.found);
+        modes.push(mode);
+    }
+    let names: Vec<&str> = flat.modes.iter().map(|mode| mode.key.name.as_str()).collect();
+    modes.iter().for_each(|mode| overlaps(mode, &names, &mut builder.found));
+    let start = first?;
+    unreachable(start, &flat.modes, &modes, &mut builder.found);
+    Some(PlannedModes { modes, start })
+}
+
+fn node(nodes: &[PlannedNode], index: usize) -> Option<&PlannedNode> {
+    nodes.iter().find(|node| node.index == index)
+}
+
+fn conditions(block: &ModeBlock, builder: &mut Builder<'_>, nodes: &[PlannedNode]) -> Vec<super::PlannedExit> {
+    let flat = builder.model.flat;
+    let ports = &builder.ports;
+    let port = |source: Source| -> Option<&PlannedPort> { ports.get(&source) };
+    let poses = nodes.iter().flat_map(|node| {
+        let ports = node.ports.iter().enumerate().filter(|(_, port)| port.shape.kind() == Kind::Pose);
+        ports.map(|(port, _)| Source { producer: Producer::Node(node.index), port })
+    });
+    let lookup = Lookup {
+        model: builder.model,
+        modes: flat.modes.iter().map(|mode| mode.key.name.as_str()).collect(),
+        port: &port,
+        poses: poses.collect(),
+        patience: (5e9 * builder.period) as i64,
+    };
+    exits(block, &lookup, &mut builder.found)
+}
+
+/// The nodes that a mode sets something of, made with what it says.
+fn variants(block: &ModeBlock, builder: &mut Builder<'_>) -> BTreeMap<usize, Variant> {
+    let mut tables = BTreeMap::new();
+    tables_of(builder.model.flat, 0, &block.set, &mut tables, &mut builder.found);
+    let mut variants = BTreeMap::new();
+    for (index, table) in tables {
+        let Some((_, spec)) = &builder.model.nodes[index] else { continue };
+        let block = &builder.model.flat.nodes[index].block;
+        if settled(spec, block, &table, &mut builder.found) {
+            continue;
+        }
+        let mut params = block.params.clone();
+        if let Item::Table(base) = &mut params.item {
+            base.merge(table);
+        }
+        variants.extend(
+            builder
+                .variant(index, &params)
+                .map(|built| (index, Variant { node: built.node, is_still: built.is_still })),
+        );
+    }
+    variants
+}
+
+/// What a mode sets of each node, through the parts.
+fn tables_of(flat: &Flat, scope: usize, set: &Table, tables: &mut BTreeMap<usize, Table>, found: &mut Vec<Diagnostic>) {
+    let names = &flat.scopes[scope].names;
+    for (key, value) in &set.entries {
+        let Some(table) = value.as_table() else {
+            let message = format!("`{}` is not set as a whole: name the parameter", key.name);
+            found.push(
+                Diagnostic::new(Code::BadValue, value.span.clone(), message)
+                    .help(format!("`set.{}.PARAMETER = …`", key.name)),
+            );
+            continue;
+        };
+        match names.get(&key.name) {
+            Some((_, Entity::Node(node))) => tables.entry(*node).or_default().merge(table.clone()),
+            Some((_, Entity::Part(inner))) => tables_of(flat, *inner, table, tables, found),
+            Some((_, Entity::Role(_))) => {
+                let message = format!("`{}` is a role: a mode sets parameters of nodes", key.name);
+                found.push(Diagnostic::new(Code::UnknownKey, key.span.clone(), message));
+            }
+            None => {
+                let message = format!("there is no node or part `{}` to set", key.name);
+                let known = names.iter().filter(|(_, (_, entity))| !matches!(entity, Entity::Role(_)));
+                let help = closest(&key.name, known.map(|(name, _)| name.as_str()), "nodes and parts");
+                found.push(Diagnostic::new(Code::UnknownKey, key.span.clone(), message).help(help));
+            }
+        }
+    }
+}
+
+/// Whether a mode sets what is settled at load; that is told.
+fn settled(spec: &NodeSpec, block: &Block, set: &Table, found: &mut Vec<Diagnostic>) -> bool {
+    let live = || spec.params.iter().filter(|param| param.is_live).map(|param| format!("`{}`", param.name));
+    let before = found.len();
+    for (key, _) in &set.entries {
+        let param = spec.params.iter().find(|param| param.name == key.name);
+        let message = match (key.name.as_str(), param) {
+            ("type" | "in", _) => format!("`{}` is the same in every mode: a mode sets parameters", key.name),
+            (_, Some(param)) if !param.is_live => {
+                format!("`{}` of `{}` is settled at load: a mode cannot set it", key.name, block.key.name)
+            }
+            _ => continue,
+        };
+        let live: Vec<String> = live().collect();
+        let help = match live.is_empty() {
+            true => format!("no parameter of a `{}` can be set in a mode", spec.name),
+            false => format!("a mode can set: {}", live.join(", ")),
+        };
+        found.push(Diagnostic::new(Code::NotLive, key.span.clone(), message).help(help));
+    }
+    found.len() > before
+}
+
+/// Nodes that a mode does not set, but of which it reads other components than the base graph: made once more.
+fn again(
+    builder: &mut Builder<'_>,
+    nodes: &[PlannedNode],
+    base: &[Vec<Components>],
+    reads: &[Vec<Components>],
+    variants: &mut BTreeMap<usize, Variant>,
+) {
+    for index in nodes.iter().map(|node| node.index) {
+        if base[index] == reads[index] || variants.contains_key(&index) {
+            continue;
+        }
+        let params: Value = builder.model.flat.nodes[index].block.params.clone();
+        let built = builder.variant(index, &params);
+        variants.extend(built.map(|built| (index, Variant { node: built.node, is_still: built.is_still })));
+    }
+}
+
+/// Conditions on what is absent in their mode: a feature that its projector deletes.
+fn absent(
+    block: &ModeBlock,
+    mode: &PlannedMode,
+    reads: &[Vec<Components>],
+    frozen: &BTreeMap<usize, bool>,
+    builder: &mut Builder<'_>,
+) {
+    for exit in &mode.exits {
+        let (Condition::Port(watched, _) | Condition::Lost(watched, _)) = &exit.condition else { continue };
+        let Watched { source: Source { producer: Producer::Node(node), port }, feature } = *watched else { continue };
+        let read = reads[node][port];
+        let is_read = feature.map_or(!read.is_empty(), |feature| read.has(feature));
+        if is_read || !frozen.get(&node).copied().unwrap_or(false) {
+            continue;
+        }
+        let what = if matches!(exit.condition, Condition::Port(_, Test::Absent)) { "always" } else { "never" };
+        let message =
+            format!("in mode `{}` nothing reads that, so it is absent: {} is {what} so", block.key.name, exit.text);
+        let help = "select the feature in this mode, or look at what it is made from";
+        builder.found.push(Diagnostic::new(Code::AbsentPort, exit.span.clone(), message).help(help));
+    }
+}
+
+fn adopt(
+    block: &ModeBlock,
+    variants: BTreeMap<usize, Variant>,
+    nodes: &mut [PlannedNode],
+    mode: &mut PlannedMode,
+    found: &mut Vec<Diagnostic>,
+) {
+    for (index, variant) in variants {
+        let Some(place) = nodes.iter().position(|node| node.index == index) else { continue };
+        match nodes[place].node.adopt(variant.node) {
+            Ok(number) => mode.configurations.push((place, number)),
+            Err(_) => {
+                let message = format!(
+                    "the type of `{}` knows no modes: mode `{}` cannot change it",
+                    nodes[place].name, block.key.name
+                );
+                found.push(Diagnostic::new(Code::NotLive, block.key.span.clone(), message));
+            }
+        }
+    }
+}

@@ -1,0 +1,101 @@
+//! Motion without contact: what moves the arm though no sample is behind it, and is ended by nothing.
+//!
+//! A generator without a gate goes on for ever. It may run in a mode that watches a signal or bounds its time or its
+//! way, and nowhere else.
+
+use std::collections::BTreeSet;
+
+use super::super::order::Wiring;
+use super::super::plan::Producer;
+use super::super::wires::{Model, Wire};
+use super::{Condition, ModeBlock, PlannedMode, Sort};
+use crate::diagnostic::{Code, Diagnostic};
+use crate::node::Need;
+use crate::signal::Kind;
+
+/// What of a graph can move by itself.
+pub(crate) struct Movers<'a> {
+    model: &'a Model<'a>,
+    wires: &'a [Vec<Wire>],
+    order: &'a [usize],
+    /// Nodes that a command follows from.
+    driving: BTreeSet<usize>,
+}
+
+impl<'a> Movers<'a> {
+    pub(crate) fn new(model: &'a Model<'a>, &Wiring { order, wires, commands }: &Wiring<'a>) -> Self {
+        let mut open: Vec<usize> = commands.iter().filter_map(|wire| node_of(wire.source.producer)).collect();
+        let mut driving: BTreeSet<usize> = open.iter().copied().collect();
+        while let Some(node) = open.pop() {
+            let sources = wires[node].iter().filter_map(|wire| node_of(wire.source.producer));
+            open.extend(sources.filter(|source| driving.insert(*source)).collect::<Vec<_>>());
+        }
+        Self { model, wires, order, driving }
+    }
+
+    /// The nodes that start a motion by themselves, given which nodes are still in a mode.
+    pub(crate) fn of(&self, is_still: &dyn Fn(usize) -> bool) -> Vec<usize> {
+        let (mut sampled, mut still, mut movers) = (BTreeSet::new(), BTreeSet::new(), Vec::new());
+        for &node in self.order {
+            let Some((_, spec)) = &self.model.nodes[node] else { continue };
+            let wires = || self.wires[node].iter().filter(|wire| spec.inputs[wire.input].need != Need::Delayed);
+            let is_sampled = |wire: &Wire| node_of(wire.source.producer).is_none_or(|source| sampled.contains(&source));
+            if wires().any(is_sampled) {
+                sampled.insert(node);
+                continue;
+            }
+            let sources: Vec<usize> = wires().filter_map(|wire| node_of(wire.source.producer)).collect();
+            let all_still = !sources.is_empty() && sources.iter().all(|source| still.contains(source));
+            if is_still(node) || all_still {
+                still.insert(node);
+            } else if spec.outputs.iter().any(|port| matches!(port.kind, Kind::Twist | Kind::Joints))
+                && self.driving.contains(&node)
+                && !sources.iter().any(|source| movers.contains(source))
+            {
+                movers.push(node);
+            }
+        }
+        movers
+    }
+}
+
+const fn node_of(producer: Producer) -> Option<usize> {
+    match producer {
+        Producer::Node(node) => Some(node),
+        Producer::Role(_) => None,
+    }
+}
+
+/// Tells of motion that nothing ends: in a mode, or in a graph without modes.
+pub(crate) fn ungated(
+    model: &Model<'_>,
+    movers: &[usize],
+    mode: Option<(&ModeBlock, &PlannedMode)>,
+    found: &mut Vec<Diagnostic>,
+) {
+    let is_ended = mode.is_some_and(|(_, mode)| {
+        mode.exits.iter().any(|exit| {
+            exit.sort == Sort::OnLost || matches!(exit.condition, Condition::Elapsed(_) | Condition::Travel(..))
+        })
+    });
+    for &node in movers.iter().filter(|_| !is_ended) {
+        let (name, key) = (&model.flat.nodes[node].name, &model.flat.nodes[node].block.key);
+        let gate = format!("wire `in.gate` of `{name}`");
+        let diagnostic = match mode {
+            Some((block, _)) => {
+                let message =
+                    format!("`{name}` moves the arm in mode `{}` without a gate, and nothing ends it", block.key.name);
+                let help = format!(
+                    "add a bound, as `fail = {{ after_ms = 10000, after_travel_mm = 60 }}`, or `on_lost`, or {gate}"
+                );
+                Diagnostic::new(Code::UngatedMotion, block.key.span.clone(), message).help(help)
+            }
+            None => {
+                let message = format!("`{name}` moves the arm without a gate, and nothing ends it");
+                let help = format!("{gate}, or let it move only in a mode that ends");
+                Diagnostic::new(Code::UngatedMotion, key.span.clone(), message).help(help)
+            }
+        };
+        found.push(diagnostic);
+    }
+}
