@@ -19,6 +19,7 @@ mod flow;
 mod freshness;
 mod live;
 mod merge;
+mod modes;
 mod mutations;
 mod oracles;
 mod recordings;

@@ -59,6 +59,7 @@ in.region = "label.region"
     fn new(params: Params, setup: &mut Setup<Self>) -> Result<Self, Mistakes> {
         let shape = setup.inputs.image.clone();
         on_one_array(&shape, "region", &setup.inputs.region)?;
+        setup.outputs.eccentricity.range = [0.0, 1.0];
         Ok(Self { shape, weighing: Weighing::new(params.weight, params.threshold)? })
     }
 

@@ -72,6 +72,7 @@ window = 5                          # two wrong samples leave no trace [samples]
 
     fn new(params: Params, setup: &mut Setup<Self>) -> Result<Self, Mistakes> {
         let window = *params.window;
+        setup.outputs.value.range = setup.inputs.value.range;
         if window > MOST {
             let mistake = Mistake::param("window", format!("a median is of at most {MOST} samples"));
             return Err(mistake.help("a `smooth` has no such bound").into());

@@ -74,6 +74,7 @@ time_constant_ms = 20               # [ms]
 
     fn new(params: Params, setup: &mut Setup<Self>) -> Result<Self, Mistakes> {
         let is_axial = setup.inputs.value.unit.is_axial();
+        setup.outputs.value.range = setup.inputs.value.range;
         match (params.time_constant_ms, params.cutoff_hz) {
             (Some(ms), None) => Ok(Self { time: *ms * 1e-3, is_axial }),
             (None, Some(hz)) => Ok(Self { time: 0.5 / (PI * *hz), is_axial }),

@@ -88,6 +88,7 @@ window_ms = 40                      # ten frames at 250 Hz [ms]
 
     fn new(params: Params, setup: &mut Setup<Self>) -> Result<Self, Mistakes> {
         let is_axial = setup.inputs.value.unit.is_axial();
+        setup.outputs.value.range = setup.inputs.value.range;
         let (room, time) = match (params.window, params.window_ms) {
             (window, None) => (window.map_or(WINDOW, |window| *window), None),
             (None, Some(ms)) => {

@@ -5,7 +5,7 @@ use tactflow_runtime::{inputs, outputs, params};
 
 params! {
     /// What is added [m].
-    by: f64 = 1.0,
+    live by: f64 = 1.0,
 }
 
 inputs! {

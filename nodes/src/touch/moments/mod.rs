@@ -106,6 +106,9 @@ threshold = 0.010                   # as the `release` of the `binarize` [N]
         let shape = setup.inputs.image.clone();
         on_one_array(&shape, "region", &setup.inputs.region)?;
         let weighing = Weighing::new(params.weight, params.threshold)?;
+        let (x, y) = (shape.x(shape.cols as f64 - 1.0), shape.y(shape.rows as f64 - 1.0));
+        (setup.outputs.x.range, setup.outputs.y.range) = ([-x, x], [-y, y]);
+        setup.outputs.area.range = [0.0, shape.tactels() as f64];
         Ok(Self { shape, weighing, min_anisotropy: *params.min_anisotropy })
     }
 

@@ -65,7 +65,7 @@ pub(crate) fn plan(builder: &mut Builder<'_>, nodes: &mut [PlannedNode], wiring:
     let names: Vec<&str> = flat.modes.iter().map(|mode| mode.key.name.as_str()).collect();
     modes.iter().for_each(|mode| overlaps(mode, &names, &mut builder.found));
     let start = first?;
-    unreachable(start, &flat.modes, &modes, &mut builder.found);
+    unreachable(start, &flat.modes, &mut builder.found);
     Some(PlannedModes { modes, start })
 }
 
@@ -96,12 +96,10 @@ fn variants(block: &ModeBlock, builder: &mut Builder<'_>) -> BTreeMap<usize, Var
     let mut tables = BTreeMap::new();
     tables_of(builder.model.flat, 0, &block.set, &mut tables, &mut builder.found);
     let mut variants = BTreeMap::new();
-    for (index, table) in tables {
+    for (index, mut table) in tables {
         let Some((_, spec)) = &builder.model.nodes[index] else { continue };
         let block = &builder.model.flat.nodes[index].block;
-        if settled(spec, block, &table, &mut builder.found) {
-            continue;
-        }
+        settled(spec, block, &mut table, &mut builder.found);
         let mut params = block.params.clone();
         if let Item::Table(base) = &mut params.item {
             base.merge(table);
@@ -144,18 +142,17 @@ fn tables_of(flat: &Flat, scope: usize, set: &Table, tables: &mut BTreeMap<usize
     }
 }
 
-/// Whether a mode sets what is settled at load; that is told.
-fn settled(spec: &NodeSpec, block: &Block, set: &Table, found: &mut Vec<Diagnostic>) -> bool {
+/// What a mode sets that is settled at load: that is told, and taken out.
+fn settled(spec: &NodeSpec, block: &Block, set: &mut Table, found: &mut Vec<Diagnostic>) {
     let live = || spec.params.iter().filter(|param| param.is_live).map(|param| format!("`{}`", param.name));
-    let before = found.len();
-    for (key, _) in &set.entries {
+    set.entries.retain(|(key, _)| {
         let param = spec.params.iter().find(|param| param.name == key.name);
         let message = match (key.name.as_str(), param) {
             ("type" | "in", _) => format!("`{}` is the same in every mode: a mode sets parameters", key.name),
             (_, Some(param)) if !param.is_live => {
                 format!("`{}` of `{}` is settled at load: a mode cannot set it", key.name, block.key.name)
             }
-            _ => continue,
+            _ => return true,
         };
         let live: Vec<String> = live().collect();
         let help = match live.is_empty() {
@@ -163,8 +160,8 @@ fn settled(spec: &NodeSpec, block: &Block, set: &Table, found: &mut Vec<Diagnost
             false => format!("a mode can set: {}", live.join(", ")),
         };
         found.push(Diagnostic::new(Code::NotLive, key.span.clone(), message).help(help));
-    }
-    found.len() > before
+        false
+    });
 }
 
 /// Nodes that a mode does not set, but of which it reads other components than the base graph: made once more.

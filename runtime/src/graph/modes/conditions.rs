@@ -1,5 +1,6 @@
 //! What ends a mode, looked up: each exit has one condition, on a port that can be what it asks for.
 
+use std::f64::consts::FRAC_PI_2;
 use std::ops::Range;
 
 use super::super::plan::{PlannedPort, Source};
@@ -247,6 +248,11 @@ fn port_condition(
     Ok(Some((Condition::Port(watched, test), text)))
 }
 
+/// A bound to four places, for a message.
+fn short(bound: f64) -> f64 {
+    (bound * 1e4).round() / 1e4
+}
+
 /// A bound on a number, which its declared range has to leave open.
 fn number(
     when: &Word,
@@ -268,23 +274,23 @@ fn number(
         let message = format!("nothing is above {least} and below {greatest}");
         return Err(Box::new(Diagnostic::new(Code::BoundOutOfRange, when.span.clone(), message)));
     }
+    let text = match (exit.within, exit.above, exit.below) {
+        (Some(size), ..) => format!("within {}", *size),
+        (_, Some(above), None) => format!("above {above}"),
+        (_, None, Some(below)) => format!("below {below}"),
+        _ => format!("between {least} and {greatest}"),
+    };
     let Some(planned) = (lookup.port)(watched.source) else { return Ok(None) };
     if let Shape::Scalar(shape) = &planned.shape {
-        let [low, high] = shape.range;
         let unit = shape.unit;
+        let [low, high] = if unit.is_axial() { [-FRAC_PI_2, FRAC_PI_2] } else { shape.range };
         let (never, always) = (least >= high || greatest <= low, least < low && greatest > high);
         if (never || always) && low < high {
             let what = if never { "never" } else { "always" };
-            let message = format!("`{name}` is {what} so: it is from {low} to {high} {unit}");
+            let message = format!("`{name}` is {what} {text}: it is from {} to {} {unit}", short(low), short(high));
             return Err(Box::new(Diagnostic::new(Code::BoundOutOfRange, when.span.clone(), message)));
         }
     }
-    let hysteresis = exit.hysteresis.map_or(0.0, |by| *by);
-    let text = match (exit.within, exit.above, exit.below) {
-        (Some(size), ..) => format!("`{name}` is within {}", *size),
-        (_, Some(above), None) => format!("`{name}` is above {above}"),
-        (_, None, Some(below)) => format!("`{name}` is below {below}"),
-        _ => format!("`{name}` is between {least} and {greatest}"),
-    };
+    let (hysteresis, text) = (exit.hysteresis.map_or(0.0, |by| *by), format!("`{name}` is {text}"));
     Ok(Some((Condition::Port(watched, Test::Between { least, greatest, hysteresis }), text)))
 }

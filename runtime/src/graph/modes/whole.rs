@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 use std::ops::Range;
 
-use super::{ModeBlock, PlannedMode};
+use super::ModeBlock;
 use crate::diagnostic::{Code, Diagnostic, closest};
 use crate::node::Word;
 
@@ -36,15 +36,18 @@ pub(crate) fn start(
 }
 
 /// Modes that no way leads to from the start.
-pub(crate) fn unreachable(start: usize, blocks: &[ModeBlock], modes: &[PlannedMode], found: &mut Vec<Diagnostic>) {
+pub(crate) fn unreachable(start: usize, modes: &[ModeBlock], found: &mut Vec<Diagnostic>) {
     let (mut reached, mut open) = (BTreeSet::from([start]), vec![start]);
     while let Some(mode) = open.pop() {
-        let next = modes[mode].exits.iter().filter_map(|exit| exit.to);
+        // By their names: a way that has a mistake of its own leads there all the same.
+        let names = modes[mode].exits.iter().filter_map(|(_, _, exit)| exit.to.as_ref());
+        let next = names.filter_map(|to| modes.iter().position(|mode| mode.key.name == to.text));
         open.extend(next.filter(|to| reached.insert(*to)).collect::<Vec<_>>());
     }
-    for (i, block) in blocks.iter().enumerate().filter(|(i, _)| !reached.contains(i)) {
-        let message = format!("mode `{}` is never entered", block.key.name);
-        let help = format!("add `go = {{ to = \"{}\", … }}` to a mode, or take it out", modes[i].name);
-        found.push(Diagnostic::new(Code::UnreachableMode, block.key.span.clone(), message).help(help));
+    for (_, mode) in modes.iter().enumerate().filter(|(i, _)| !reached.contains(i)) {
+        let name = &mode.key.name;
+        let message = format!("mode `{name}` is never entered");
+        let help = format!("add `go = {{ to = \"{name}\", … }}` to a mode, or take it out");
+        found.push(Diagnostic::new(Code::UnreachableMode, mode.key.span.clone(), message).help(help));
     }
 }
