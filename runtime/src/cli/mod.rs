@@ -30,6 +30,7 @@ mod run;
 mod shell;
 mod show;
 mod summary;
+mod timeline;
 
 use std::marker::PhantomData;
 use std::path::PathBuf;

@@ -3,6 +3,7 @@
 use std::fmt::Write;
 
 use super::course::Course;
+use super::timeline::Timeline;
 use crate::engine::{Engine, Outcome};
 use crate::record::Columns;
 use crate::signal::{Freshness, Shape};
@@ -47,6 +48,7 @@ pub(super) struct Summary {
     row: Vec<f64>,
     counts: Vec<Counts>,
     figures: Vec<Figures>,
+    timeline: Timeline,
 }
 
 impl Summary {
@@ -57,6 +59,7 @@ impl Summary {
             counts: vec![Counts::default(); engine.ports().len()],
             figures: vec![Figures::new(); columns.list.len()],
             columns,
+            timeline: Timeline::new(engine),
         }
     }
 
@@ -69,6 +72,7 @@ impl Summary {
                 Freshness::Lost | Freshness::Absent => counts.absent += 1,
             }
         }
+        self.timeline.add(engine);
         self.columns.read(engine.bus(), &mut self.row);
         for (figures, value) in self.figures.iter_mut().zip(&self.row) {
             figures.add(*value);
@@ -80,6 +84,8 @@ impl Summary {
         let mut text = self.ports(engine);
         text.push('\n');
         text.push_str(&nodes(engine, outcome));
+        text.push('\n');
+        text.push_str(&self.timeline.render(engine));
         for ((port, _), counters) in engine.ports().iter().zip(engine.counters()) {
             if counters.repeated + counters.went_back > 0 {
                 let (repeated, back) = (counters.repeated, counters.went_back);
@@ -152,7 +158,7 @@ pub(super) fn number(value: f64) -> String {
 }
 
 /// Columns in line: those before `first_right` and from `first_left` on are flush left, those between flush right.
-fn table<const N: usize>(rows: &[[String; N]], first_right: usize, first_left: usize) -> String {
+pub(super) fn table<const N: usize>(rows: &[[String; N]], first_right: usize, first_left: usize) -> String {
     let width = |i: usize| rows.iter().map(|row| row[i].chars().count()).max().unwrap_or(0);
     let widths: [usize; N] = std::array::from_fn(width);
     let mut text = String::new();

@@ -35,6 +35,8 @@ pub struct Engine {
     timeline: Timeline,
     ports: Vec<(PlannedPort, PortId)>,
     logged: Vec<Logged>,
+    /// Name and place of each limit's share.
+    limits: Vec<(String, PortId)>,
     /// Name and place of each station.
     names: Vec<(String, String)>,
     /// Name of each role, and the place of the device behind it.
@@ -108,6 +110,11 @@ impl Engine {
             Logged { node: node.name.clone(), due, inputs: sources.map(port).collect() }
         });
         let logged = logged.collect();
+        let is_share = |name: &str| {
+            plan.nodes.iter().any(|node| node.holds.iter().any(|limit| name == format!("{}.{limit}", node.name)))
+        };
+        let limits = ports.iter().filter(|(port, _)| is_share(&port.name)).map(|(port, id)| (port.name.clone(), *id));
+        let limits = limits.collect();
         let names = plan.nodes.iter().map(|node| (node.name.clone(), plan.sources.locate(node.span.start))).collect();
         let place = |device: usize| plan.sources.locate(plan.devices[device].span.start);
         let roles = plan.roles.iter().map(|role| (role.name.clone(), place(role.device))).collect();
@@ -150,6 +157,7 @@ impl Engine {
             timeline: Timeline::new(plan.clock, plan.period),
             ports,
             logged,
+            limits,
             names,
             roles,
             sources: plan.sources,
@@ -361,6 +369,11 @@ impl Engine {
     #[must_use]
     pub fn logged(&self) -> &[Logged] {
         &self.logged
+    }
+
+    /// Where each limit says what share of the motion it lets pass, from 0 to 1: its name, `node.limit`, and its port.
+    pub fn limits(&self) -> impl Iterator<Item = (&str, PortId)> {
+        self.limits.iter().map(|(name, id)| (name.as_str(), *id))
     }
 
     /// The names of the nodes in the order in which they step.

@@ -233,6 +233,7 @@ impl Builder<'_> {
             ports,
             is_every_tick: spec.every_tick,
             is_logged: spec.logs,
+            holds: spec.limits.holds,
             span: node.block.key.span.clone(),
         })
     }

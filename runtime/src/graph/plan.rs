@@ -67,6 +67,8 @@ pub(crate) struct PlannedNode {
     pub(crate) is_every_tick: bool,
     /// Whether the tool logs its inputs; see [`Node::LOGS`](crate::node::Node::LOGS).
     pub(crate) is_logged: bool,
+    /// The limits it holds; each has an output of that name.
+    pub(crate) holds: &'static [&'static str],
     /// Where its name stands.
     pub(crate) span: Range<usize>,
 }
