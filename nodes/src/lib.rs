@@ -33,6 +33,7 @@ pub mod builtin;
 pub mod calibration;
 pub mod devices;
 pub mod flow;
+pub mod limits;
 pub mod recordings;
 pub mod roles;
 pub mod servo;
@@ -86,6 +87,8 @@ pub fn catalogue() -> Catalogue {
         .node::<arm::arm_state::ArmState>()
         .node::<arm::contact_point::ContactPoint>()
         .node::<arm::ik_sink::IkSink>()
+        .group("limits: what an arm's command has to cross")
+        .node::<limits::joint_limit::JointLimit>()
         .group("flow: what waits, chooses, generates and shows")
         .node::<flow::contact_debounce::ContactDebounce>()
         .node::<flow::gate::Gate>()

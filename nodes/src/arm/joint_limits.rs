@@ -38,7 +38,7 @@ pub fn add_within(joints: &[Joint], q: &[f64], gain: f64, velocity: &mut [f64], 
 }
 
 /// The greatest factor up to 1 that brings every entry within its bounds; the bounds contain 0.
-fn share(velocity: &[f64], bounds: impl Iterator<Item = (f64, f64)>) -> f64 {
+pub(crate) fn share(velocity: &[f64], bounds: impl Iterator<Item = (f64, f64)>) -> f64 {
     let largest = velocity.iter().fold(0.0, |largest: f64, v| largest.max(v.abs()));
     let mut share = 1.0f64;
     for (v, (least, greatest)) in velocity.iter().zip(bounds) {
