@@ -57,6 +57,8 @@ pub(super) struct Entry {
     pub(super) params: Vec<Param>,
     /// Roles that a device fills, or devices that fill a role, as far as the examples tell.
     pub(super) fits: Vec<String>,
+    /// Limits that a node holds, or that a role's commands must have crossed.
+    pub(super) limits: Vec<String>,
     /// How a kind is recorded.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) recorded: Option<&'static str>,
@@ -93,6 +95,8 @@ pub(super) struct Param {
     /// As a graph file would say it.
     pub(super) default: Option<String>,
     pub(super) is_required: bool,
+    /// Whether a mode can set it.
+    pub(super) is_live: bool,
     pub(super) doc: String,
     /// How the path of a field goes on after the parameter's name.
     #[serde(skip)]
@@ -150,6 +154,7 @@ impl<'a> Entries<'a> {
         let inputs = spec.inputs.iter().map(|port| Port { need: Some(need(port.need)), ..self.input(port) });
         Entry {
             group,
+            limits: spec.limits.holds.iter().map(ToString::to_string).collect(),
             steps: Some(if spec.every_tick { "in every tick" } else { "when an input that wakes it is new or lost" }),
             inputs: inputs.collect(),
             outputs: spec.outputs.iter().map(|port| self.output(port)).collect(),
@@ -184,6 +189,7 @@ impl<'a> Entries<'a> {
             outputs: role.outputs.iter().map(|port| self.output(port)).collect(),
             commands: role.commands.iter().map(|port| self.input(port)).collect(),
             fits: fills.map(|device| device.name().into_owned()).collect(),
+            limits: role.limits.iter().map(ToString::to_string).collect(),
             ..entry(Sort::Role, &role.name, &role.summary, "")
         }
     }
@@ -246,6 +252,7 @@ fn entry(sort: Sort, name: &str, summary: &str, doc: &str) -> Entry {
         commands: Vec::new(),
         params: Vec::new(),
         fits: Vec::new(),
+        limits: Vec::new(),
         recorded: None,
         block: None,
         example: None,
@@ -294,6 +301,7 @@ fn param(spec: &ParamSpec) -> Param {
         unit: spec.unit(),
         default: spec.default.clone(),
         is_required: !spec.is_optional,
+        is_live: spec.is_live,
         doc: spec.doc.trim().lines().map(str::trim).collect::<Vec<_>>().join(" "),
         then: match spec.repeats {
             Repeats::Once => ".",

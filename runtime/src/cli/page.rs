@@ -17,6 +17,10 @@ pub(super) fn page(entry: &Entry, has_fits: bool) -> Vec<Block> {
         Sort::Role => blocks.extend(listed("Filled by the devices: ", &entry.fits)),
         _ => {}
     }
+    match entry.sort {
+        Sort::Role => blocks.extend(listed("Its commands have crossed the limits: ", &entry.limits)),
+        _ => blocks.extend(listed("Holds the limits: ", &entry.limits)),
+    }
     let (inputs, outputs) = match entry.sort {
         Sort::Kind => ("Taken by", "Given by"),
         _ => ("Inputs", "Outputs"),
@@ -115,7 +119,8 @@ fn params(specs: &[Param], path: &str, items: &mut Vec<Item>) {
             (None, true) => "required".to_owned(),
             (None, false) => "may be left out".to_owned(),
         };
-        let what = format!("{}; {default}", param.takes);
+        let live = if param.is_live { "; live" } else { "" };
+        let what = format!("{}; {default}{live}", param.takes);
         items.push(Item { name: name.clone(), what, more: vec![param.doc.clone()] });
         params(&param.fields, &format!("{name}{}", param.then), items);
     }

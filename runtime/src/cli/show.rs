@@ -78,6 +78,9 @@ fn text(plan: &Plan, has_colour: bool) -> String {
     page.section("graph", &settings(&outline.settings), &[]);
     page.section("roles", &roles.iter().map(|role| word(&role.name, &role.kind)).collect::<Vec<_>>(), &[]);
     page.section("commands", &commands.iter().map(|command| wire("", command)).collect::<Vec<_>>(), &[]);
+    for mode in &outline.modes {
+        page.section(&format!("modes.{}", mode.name), &settings(&mode.settings), &[]);
+    }
     for node in stepped(plan) {
         let gives: Vec<String> = plan.outputs(&node.name).map(|port| format!("# {}", carried(port))).collect();
         page.section(&format!("nodes.{}", node.name), &block(node), &gives);
@@ -242,6 +245,7 @@ struct Shown {
     graph: Vec<ShownSetting>,
     roles: Vec<ShownRole>,
     commands: Vec<ShownWire>,
+    modes: Vec<ShownMode>,
     nodes: Vec<ShownBlock>,
     devices: Vec<ShownBlock>,
 }
@@ -251,6 +255,13 @@ struct ShownRole {
     name: String,
     r#type: String,
     device: String,
+}
+
+#[derive(Serialize)]
+struct ShownMode {
+    name: String,
+    /// `set.…` for each value that it sets, and its exits.
+    settings: Vec<ShownSetting>,
 }
 
 #[derive(Serialize)]
@@ -308,6 +319,8 @@ impl Shown {
             params: settings(&block.settings),
             outputs: plan.outputs(&block.name).map(ShownPort::of).collect(),
         };
+        let modes = outline.modes.iter();
+        let modes = modes.map(|mode| ShownMode { name: mode.name.clone(), settings: settings(&mode.settings) });
         let roles = outline.roles.iter().map(|role| ShownRole {
             name: role.name.clone(),
             r#type: role.kind.text.clone(),
@@ -318,6 +331,7 @@ impl Shown {
             graph: settings(&outline.settings),
             roles: roles.collect(),
             commands: outline.commands.iter().map(wire).collect(),
+            modes: modes.collect(),
             nodes: stepped(plan).map(block).collect(),
             devices: outline.devices.iter().map(|device| ShownBlock { outputs: Vec::new(), ..block(device) }).collect(),
         }

@@ -26,7 +26,7 @@ pub use check::plan;
 pub(crate) use frames::frame_args;
 pub use load::Request;
 pub(crate) use modes::{Condition, PlannedExit, PlannedModes, Sort, Test};
-pub use outline::{NOWHERE, Origin, Outline, OutlinedBlock, OutlinedRole, OutlinedWire, Setting};
+pub use outline::{NOWHERE, Origin, Outline, OutlinedBlock, OutlinedMode, OutlinedRole, OutlinedWire, Setting};
 pub(crate) use plan::{Clock, PlannedCommand, PlannedNode, Producer, Source};
 pub use plan::{Plan, PlannedPort};
 pub use sources::{BuiltinFile, SourceFile, Sources};

@@ -6,6 +6,7 @@ use std::path::Path;
 
 use super::devices::{self, Opened};
 use super::document::{Block, GraphTable};
+use super::modes::ModeBlock;
 use super::plan::Producer;
 use super::wires::{CommandWire, Model, Wire};
 use super::{Item, Key, Sources, Table, Value, parse_table};
@@ -24,6 +25,8 @@ pub struct Outline {
     pub roles: Vec<OutlinedRole>,
     /// What drives each command: `role.command`.
     pub commands: Vec<OutlinedWire>,
+    /// The modes: each with what it sets and what ends it.
+    pub modes: Vec<OutlinedMode>,
     /// The nodes, in the order of the files.
     pub nodes: Vec<OutlinedBlock>,
     /// The devices that are used.
@@ -39,6 +42,15 @@ pub struct OutlinedRole {
     pub kind: Word,
     /// The device that fills it, and where that stands.
     pub device: Word,
+}
+
+/// A mode.
+#[derive(Debug, Clone)]
+pub struct OutlinedMode {
+    /// Its name.
+    pub name: String,
+    /// `set.…` for each value that it sets, and its exits as they are written.
+    pub settings: Vec<Setting>,
 }
 
 /// A wire.
@@ -122,6 +134,7 @@ impl Parts<'_> {
             settings: self.graph(),
             roles: self.roles(),
             commands: commands.collect(),
+            modes: flat.modes.iter().map(mode).collect(),
             nodes: (0..flat.nodes.len()).filter_map(|node| self.node(node)).collect(),
             devices: self.opened.devices.iter().filter_map(|device| self.device(&device.name)).collect(),
         }
@@ -249,6 +262,32 @@ impl Parts<'_> {
             && spec.takes == FilePath::EXPECTS
         {
             *text = self.sources.path(text, span.start).display().to_string();
+        }
+    }
+}
+
+fn mode(block: &ModeBlock) -> OutlinedMode {
+    let mut settings = Vec::new();
+    for (key, value) in &block.table.entries {
+        match value.as_table().filter(|_| key.name == "set") {
+            Some(_) => leaves(value, "set", 4, &mut settings),
+            None => leaves(value, &key.name, 0, &mut settings),
+        }
+    }
+    OutlinedMode { name: block.key.name.clone(), settings }
+}
+
+/// What is written in a table, so many tables deep at most.
+fn leaves(value: &Value, path: &str, depth: usize, settings: &mut Vec<Setting>) {
+    match value.as_table().filter(|table| depth > 0 && !table.is_fact()) {
+        Some(table) => {
+            for (key, value) in &table.entries {
+                leaves(value, &format!("{path}.{}", key.name), depth - 1, settings);
+            }
+        }
+        None => {
+            let origin = Origin::Written(value.span.clone());
+            settings.push(Setting { path: path.to_owned(), value: value.clone(), origin });
         }
     }
 }

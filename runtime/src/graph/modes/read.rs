@@ -10,6 +10,8 @@ use crate::node::{At, Mistake, NonNegative, Param, Positive, Reader, Word};
 #[derive(Debug, Clone)]
 pub(crate) struct ModeBlock {
     pub(crate) key: Key,
+    /// The block as it is written.
+    pub(crate) table: Table,
     /// Values laid over those of the nodes.
     pub(crate) set: Table,
     /// What ends it, with its sort and its place.
@@ -118,6 +120,7 @@ pub(crate) fn modes(tables: Vec<(Key, Table)>, reader: &mut Reader<'_>) -> Vec<M
 }
 
 fn mode(key: Key, mut table: Table, reader: &mut Reader<'_>) -> ModeBlock {
+    let whole = table.clone();
     let set = match table.remove("set") {
         Some((_, Value { item: Item::Table(set), .. })) => set,
         Some((_, value)) => {
@@ -141,7 +144,7 @@ fn mode(key: Key, mut table: Table, reader: &mut Reader<'_>) -> ModeBlock {
             crate::diagnostic::closest(&other.name, ["set", "go", "on_lost", "done", "fail"].into_iter(), "keys");
         reader.mistakes.push(Mistake::new(Code::UnknownKey, At::Span(other.span), message).help(help));
     }
-    ModeBlock { key, set, exits }
+    ModeBlock { key, table: whole, set, exits }
 }
 
 /// The exits of one table: a bound on the time and one on the way may stand together, and the first of them counts.
