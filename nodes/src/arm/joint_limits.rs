@@ -18,13 +18,14 @@ pub fn interval(joint: &Joint, q: f64, gain: f64) -> (f64, f64) {
     (least, greatest)
 }
 
-/// Scales `velocity` until every joint is within its limits.
-pub fn limit(joints: &[Joint], q: &[f64], gain: f64, velocity: &mut [f64]) {
+/// Scales `velocity` until every joint is within its limits; gives the factor.
+pub fn limit(joints: &[Joint], q: &[f64], gain: f64, velocity: &mut [f64]) -> f64 {
     let bounds = || joints.iter().zip(q).map(|(joint, q)| interval(joint, *q, gain));
     let share = share(velocity, bounds());
     for (velocity, (least, greatest)) in velocity.iter_mut().zip(bounds()) {
         *velocity = (*velocity * share).clamp(least, greatest);
     }
+    share
 }
 
 /// Adds as much of `extra` to a `velocity` within the limits as stays within them.
@@ -81,7 +82,7 @@ mod tests {
     fn the_slowest_joint_sets_the_pace_and_the_rest_is_for_the_posture() {
         let joints = [joint(-9.0, 9.0, 1.0), joint(-9.0, 9.0, 2.0)];
         let mut velocity = [2.0, -1.0];
-        limit(&joints, &[0.0; 2], 1.0, &mut velocity);
+        assert_eq!(limit(&joints, &[0.0; 2], 1.0, &mut velocity), 0.5);
         assert_eq!(velocity, [1.0, -0.5]);
         add_within(&joints, &[0.0; 2], 1.0, &mut velocity, &[-1.0, -6.0]);
         assert_eq!(velocity, [0.75, -2.0]);
