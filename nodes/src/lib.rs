@@ -1,7 +1,7 @@
 //! The catalogue of tactflow: one node per file, the devices, and the roles they fill.
 //!
 //! [`touch`] turns a tactile image into features, [`servo`] turns features into a twist of the sensor, [`arm`] turns
-//! the twist into joint velocities; [`flow`] opens, chooses, delays, makes and shows signals of any sort; [`devices`]
+//! the twist into joint velocities, which [`limits`] keep within bounds; [`flow`] opens, chooses, delays, makes and shows signals of any sort; [`devices`]
 //! are the edge.
 //!
 //! A graph runs from Rust on sources that a test feeds, in virtual time:
@@ -33,6 +33,7 @@ pub mod builtin;
 pub mod calibration;
 pub mod devices;
 pub mod flow;
+pub mod limits;
 pub mod recordings;
 pub mod roles;
 pub mod servo;
@@ -82,6 +83,12 @@ pub fn catalogue() -> Catalogue {
         .node::<servo::twist_of::TwistOf>()
         .node::<servo::edge_guard::EdgeGuard>()
         .node::<servo::adjoint::Adjoint>()
+        .group("limits: what every motion crosses on its way to an arm")
+        .node::<limits::bumpless::Bumpless>()
+        .node::<limits::contact_limit::ContactLimit>()
+        .node::<limits::workspace_limit::WorkspaceLimit>()
+        .node::<limits::twist_limit::TwistLimit>()
+        .node::<limits::acceleration_limit::AccelerationLimit>()
         .group("arm: from a twist of the sensor to joint velocities")
         .node::<arm::arm_state::ArmState>()
         .node::<arm::contact_point::ContactPoint>()
