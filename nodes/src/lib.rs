@@ -1,7 +1,7 @@
 //! The catalogue of tactflow: one node per file, the devices, and the roles they fill.
 //!
 //! [`touch`] turns a tactile image into features, [`servo`] turns features into a twist of the sensor, [`arm`] turns
-//! the twist into joint velocities; [`flow`] opens, chooses, delays, makes and shows signals of any sort; [`devices`]
+//! the twist into joint velocities, which [`limits`] keep within bounds; [`flow`] opens, chooses, delays, makes and shows signals of any sort; [`devices`]
 //! are the edge.
 //!
 //! A graph runs from Rust on sources that a test feeds, in virtual time:
@@ -83,12 +83,17 @@ pub fn catalogue() -> Catalogue {
         .node::<servo::twist_of::TwistOf>()
         .node::<servo::edge_guard::EdgeGuard>()
         .node::<servo::adjoint::Adjoint>()
+        .group("limits: what every motion crosses on its way to an arm")
+        .node::<limits::bumpless::Bumpless>()
+        .node::<limits::contact_limit::ContactLimit>()
+        .node::<limits::workspace_limit::WorkspaceLimit>()
+        .node::<limits::twist_limit::TwistLimit>()
+        .node::<limits::acceleration_limit::AccelerationLimit>()
+        .node::<limits::joint_limit::JointLimit>()
         .group("arm: from a twist of the sensor to joint velocities")
         .node::<arm::arm_state::ArmState>()
         .node::<arm::contact_point::ContactPoint>()
         .node::<arm::ik_sink::IkSink>()
-        .group("limits: what an arm's command has to cross")
-        .node::<limits::joint_limit::JointLimit>()
         .group("flow: what waits, chooses, generates and shows")
         .node::<flow::contact_debounce::ContactDebounce>()
         .node::<flow::gate::Gate>()

@@ -2,6 +2,7 @@
 
 pub mod examples;
 pub mod nodes;
+pub mod saboteur;
 
 use std::path::{Path, PathBuf};
 

@@ -24,6 +24,7 @@ mod mutations;
 mod oracles;
 mod recordings;
 mod reference;
+mod situations;
 mod tick;
 mod tidy;
 mod tool;

@@ -13,9 +13,9 @@ const NEGLIGIBLE: f64 = 1e-9;
 /// Least and greatest velocity of a joint at position `q`; a joint that is outside its range may only move back.
 #[must_use]
 pub fn interval(joint: &Joint, q: f64, gain: f64) -> (f64, f64) {
-    let least = -(gain * (q - joint.lower)).clamp(0.0, joint.speed);
-    let greatest = (gain * (joint.upper - q)).clamp(0.0, joint.speed);
-    (least, greatest)
+    // Not `clamp`, which passes on what is no number: such a position leaves no room.
+    let within = |room: f64| (gain * room).max(0.0).min(joint.speed);
+    (-within(q - joint.lower), within(joint.upper - q))
 }
 
 /// Scales `velocity` until every joint is within its limits; gives the factor.
@@ -71,6 +71,7 @@ mod tests {
             (2.0, (-3.0, 0.0), "at its limit"),
             (2.5, (-3.0, 0.0), "past its upper limit"),
             (-9.0, (0.0, 3.0), "past its lower limit"),
+            (f64::NAN, (0.0, 0.0), "nowhere"),
         ];
         for (q, (least, greatest), what) in cases {
             let got = interval(&joint, q, 4.0);

@@ -17,7 +17,7 @@
 
 use tactflow_runtime::diagnostic::Code;
 use tactflow_runtime::node::{At, Limits, Mistake, Mistakes, Node, Positive, Ratio, Setup, Tick};
-use tactflow_runtime::signal::{Joint, Joints, JointsShape, ScalarShape, Unit};
+use tactflow_runtime::signal::{Joint, Joints, JointsShape, ScalarShape, Stamp, Unit};
 use tactflow_runtime::{inputs, outputs, params, state};
 
 use crate::arm::joint_limits::share;
@@ -144,7 +144,7 @@ lead_rad = 0.1
 
     fn step(&self, tick: &Tick, inputs: Inputs<'_>, out: &mut Outputs, state: &mut State) {
         let arm = inputs.position.stamp().oldest(inputs.equilibrium.stamp());
-        let is_fresh = |stamp: tactflow_runtime::signal::Stamp| stamp.age(tick.now) <= self.max_age;
+        let is_fresh = |stamp: Stamp| stamp.age(tick.now) <= self.max_age;
         let wanted = inputs.velocity.filter(|velocity| is_fresh(velocity.stamp()) && is_fresh(arm));
         if wanted.is_none() && state.last.iter().all(|v| *v == 0.0) {
             return;
@@ -200,12 +200,12 @@ fn room(joint: &Joint, q: f64, equilibrium: f64, lead: f64, last: f64, gap: f64)
 
 /// Greatest speed from which a joint stops within `distance`, when it goes on for `delay` [s] before it brakes.
 fn stopping(distance: f64, acceleration: f64, delay: f64) -> f64 {
-    if distance <= 0.0 {
-        return 0.0;
+    if distance > 0.0 && distance.is_finite() {
+        // The root of v τ + v²/(2a) = d, in the form in which nothing cancels.
+        return 2.0 * distance / (delay + (delay * delay + 2.0 * distance / acceleration).sqrt());
     }
-    // The root of v τ + v²/(2a) = d, in the form in which nothing cancels; at an infinite distance any speed will do.
-    let root = 2.0 * distance / (delay + (delay * delay + 2.0 * distance / acceleration).sqrt());
-    if root.is_nan() { f64::INFINITY } else { root }
+    // At an infinite distance any speed will do; at what is no number none.
+    if distance > 0.0 { f64::INFINITY } else { 0.0 }
 }
 
 /// Moves `last` toward `target`, on a straight line but for the joints that have to brake by themselves. Gives the

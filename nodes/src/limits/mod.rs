@@ -1,3 +1,10 @@
-//! What keeps a motion within limits: each node holds some of what an arm's command must have crossed.
+//! Limiters: what every motion crosses on its way to an arm. Each holds a limit and says what share of the motion it
+//! lets pass; the check proves that none is missing.
 
+pub mod acceleration_limit;
+pub mod bumpless;
+pub mod contact_limit;
 pub mod joint_limit;
+pub mod share;
+pub mod twist_limit;
+pub mod workspace_limit;

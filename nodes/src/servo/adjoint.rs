@@ -5,7 +5,7 @@
 //! it meets the spatial Jacobian, and not the one whose rows are taken at the tip.
 
 use nalgebra::Vector3;
-use tactflow_runtime::node::{Mistakes, Node, Setup, Tick};
+use tactflow_runtime::node::{Limits, Mistakes, Node, Setup, Tick};
 use tactflow_runtime::signal::{Pose, Twist};
 use tactflow_runtime::{inputs, outputs, params};
 
@@ -47,6 +47,7 @@ type = "adjoint"
 in.twist = "sum.twist"
 in.pose = "state.sensor_pose"
 "#;
+    const LIMITS: Limits = Limits::passed("twist");
 
     fn new(_: Params, _: &mut Setup<Self>) -> Result<Self, Mistakes> {
         Ok(Self)

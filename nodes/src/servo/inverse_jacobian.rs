@@ -14,7 +14,7 @@
 //!
 //! The rolling rows (wx of y, wy of x) need opposite signs: with equal ones, as eq. 5 prints them, the contact is lost.
 
-use tactflow_runtime::node::{Map, Mistakes, Node, Setup, Tick};
+use tactflow_runtime::node::{Components, Map, Mistakes, Node, Setup, Tick};
 use tactflow_runtime::signal::Twist;
 use tactflow_runtime::{inputs, outputs, params};
 
@@ -72,6 +72,11 @@ columns.pressure = [  0,  0,  1,   0,   0,  0 ]   # [m per N per tactel]
     }
 
     fn state(&self) {}
+
+    fn uses(&self, wanted: &[Components]) -> Vec<Components> {
+        let gives = |column: &Twist| (0..6).any(|i| column.0[i] != 0.0 && wanted[0].has(i));
+        vec![Components::of(self.columns.len(), |i| gives(&self.columns[i]))]
+    }
 
     fn step(&self, _: &Tick, inputs: Inputs<'_>, out: &mut Outputs, (): &mut ()) {
         let mut sum = Twist::default();
@@ -138,6 +143,18 @@ mod tests {
         }
         control(&mut rig, [None; 4]);
         assert_eq!(rig.get::<Twist>("twist"), None, "nothing to reduce is no twist");
+    }
+
+    #[test]
+    fn a_feature_is_used_if_its_column_gives_what_is_wanted() {
+        let columns = [[-1.0, 0.0, 0.0, 0.0, -20.0, 0.0], [0.0, 0.0, 1.0, 0.0, 0.0, 0.0]];
+        let jacobian = InverseJacobian { columns: columns.map(|column| Twist(column.into())).into() };
+        // vx, vy, vz, wx, wy, wz; of the features x and pressure.
+        let cases = [([0; 6], [0, 0]), ([1, 0, 0, 0, 0, 0], [1, 0]), ([0, 0, 0, 0, 1, 0], [1, 0]), ([1; 6], [1, 1])];
+        for (wanted, used) in cases.into_iter().chain([([0, 1, 1, 1, 0, 1], [0, 1])]) {
+            let wanted = Components::of(6, |i| wanted[i] == 1);
+            assert_eq!(jacobian.uses(&[wanted]), [Components::of(2, |i| used[i] == 1)], "{wanted:?}");
+        }
     }
 
     proptest! {

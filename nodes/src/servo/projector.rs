@@ -2,7 +2,7 @@
 //!
 //! P is diagonal with ones and zeros, so a component either passes unchanged or is exactly zero: P P = P.
 
-use tactflow_runtime::node::{Bit, Mistakes, Node, Setup, Tick};
+use tactflow_runtime::node::{Bit, Components, Mistakes, Node, Setup, Tick};
 use tactflow_runtime::{inputs, outputs, params};
 
 params! {
@@ -38,8 +38,9 @@ impl Node for Projector {
         A task is mostly its P: `[1, 1, 0, 0, 0, 0]` holds the contact's place, `[0, 0, 1, 0, 0, 0]` its pressure, \
         fourth and fifth entry let the pad roll, and the last one follows the direction of an edge.\n\n\
         A component that is deleted here is free for guidance, which a `twist_adder` adds behind it. Along a line \
-        that is longer than the pad the centre of gravity measures nothing: set that entry of P to 0. A feature \
-        that is projected out goes on integrating in `pid`; give it no ki, or a `within`.";
+        that is longer than the pad the centre of gravity measures nothing: set that entry of P to 0.\n\n\
+        A feature of which nothing passes is frozen in `pid`: it gathers nothing, and starts afresh in a mode that \
+        selects it again.";
     const EXAMPLE: &'static str = r#"
 [nodes.projector]
 type = "projector"
@@ -52,6 +53,10 @@ select = [1, 1, 1, 0, 0, 0]         # place and pressure, no rolling
     }
 
     fn state(&self) {}
+
+    fn uses(&self, wanted: &[Components]) -> Vec<Components> {
+        vec![Components::of(6, |i| self.passes[i] && wanted[0].has(i))]
+    }
 
     fn step(&self, _: &Tick, inputs: Inputs<'_>, out: &mut Outputs, (): &mut ()) {
         let twist = out.twist.write();
@@ -73,6 +78,14 @@ mod tests {
 
     fn rig(params: &str) -> Result<NodeRig, Mistakes> {
         NodeRig::new::<Projector>(params, &[("twist", TwistShape.into())])
+    }
+
+    #[test]
+    fn what_it_deletes_it_does_not_use() {
+        let passes = [true, false, true, false, false, true];
+        let projector = Projector { passes };
+        assert_eq!(projector.uses(&[Components::ALL]), [Components::of(6, |i| passes[i])]);
+        assert_eq!(projector.uses(&[Components::of(6, |i| i < 2)]), [Components::of(6, |i| i == 0)]);
     }
 
     #[test]

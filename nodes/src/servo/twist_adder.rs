@@ -4,7 +4,7 @@
 //! as the oldest twist in it.
 
 use tactflow_runtime::diagnostic::Code;
-use tactflow_runtime::node::{At, Mistake, Mistakes, Node, Setup, Tick};
+use tactflow_runtime::node::{At, Components, Mistake, Mistakes, Node, Setup, Tick};
 use tactflow_runtime::{inputs, outputs, params};
 
 params! {}
@@ -51,6 +51,10 @@ in.guide = "guide.twist"
     }
 
     fn state(&self) {}
+
+    fn uses(&self, wanted: &[Components]) -> Vec<Components> {
+        wanted.into()
+    }
 
     fn step(&self, _: &Tick, inputs: Inputs<'_>, out: &mut Outputs, (): &mut ()) {
         let mut twists = inputs.twist.iter().flatten();

@@ -1,6 +1,6 @@
 //! One node in its place: when it steps, what its absence does, and when its state is reset.
 
-use crate::node::{AnyNode, Bus, Need, PortId, Tick, Wires};
+use crate::node::{AnyNode, Bus, Components, Need, PortId, Tick, Wires};
 use crate::signal::Stamp;
 
 /// What a station looks at before it steps its node, beside the required triggers.
@@ -67,6 +67,11 @@ impl Station {
             is_every_tick,
             absence: Absence::Nothing,
         }
+    }
+
+    /// Tells the node which components of its outputs anything reads.
+    pub(crate) fn want(&mut self, wanted: &[Components]) {
+        self.node.want(wanted);
     }
 
     /// Goes on with another configuration of the node; its state stays.

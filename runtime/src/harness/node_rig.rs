@@ -4,7 +4,7 @@ use std::path::Path;
 
 use crate::engine::Station;
 use crate::graph::{Sources, parse_table};
-use crate::node::{Bus, Given, Mistakes, Need, Node, NodeSpec, PortId, Reader, Tick, of};
+use crate::node::{Bus, Components, Given, Mistakes, Need, Node, NodeSpec, PortId, Reader, Tick, of};
 use crate::signal::{Freshness, Mark, Shape, Signal, Stamp};
 
 /// A node with nothing around it, for its own tests. It steps as in a graph: when a trigger is new or lost.
@@ -69,6 +69,11 @@ impl NodeRig {
     fn output(&self, name: &str) -> usize {
         let found = self.spec.outputs.iter().position(|output| output.name == name);
         found.unwrap_or_else(|| panic!("no output is called `{name}`"))
+    }
+
+    /// Tells the node which components of its outputs anything reads, as a mode does.
+    pub fn want(&mut self, wanted: &[Components]) {
+        self.station.want(wanted);
     }
 
     /// A new sample of this moment on an input.

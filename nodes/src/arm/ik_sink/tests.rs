@@ -3,7 +3,7 @@
 use proptest::prelude::*;
 use tactflow_runtime::harness::NodeRig;
 use tactflow_runtime::node::At;
-use tactflow_runtime::signal::{Jacobian, JacobianShape, Joints, PoseShape, Shape, TwistShape};
+use tactflow_runtime::signal::{Jacobian, JacobianShape, Joints, PoseShape, Shape, Stamp, TwistShape};
 
 use super::*;
 use crate::arm::chain::Chain;
@@ -191,6 +191,25 @@ fn a_joint_at_its_limit_stops_the_task_and_the_share_says_so() {
     });
     shares.sort_by(f64::total_cmp);
     assert_eq!(shares, [0.0, 1.0], "and the other end it leaves");
+}
+
+#[test]
+fn what_is_no_number_is_no_panic() {
+    type Spoil = fn(&mut NodeRig, Stamp);
+    let spoils: [Spoil; 4] = [
+        |rig, now| rig.edit("twist", now, |twist: &mut Twist| twist.0[0] = f64::NAN),
+        |rig, now| rig.edit("sensor_pose", now, |pose: &mut Pose| pose.0.translation.vector.x = f64::NAN),
+        |rig, now| rig.edit("jacobian", now, |jacobian: &mut Jacobian| jacobian.0[0].0[0] = f64::NAN),
+        |rig, now| rig.edit("joints", now, |joints: &mut Joints| joints.0[0] = f64::NAN),
+    ];
+    for spoil in spoils {
+        let (chain, mut rig) = (lwr(), rig("posture = [0, 0.5, 0, -1, 0, 1, 0]").unwrap());
+        set_arm(&mut rig, &chain, &BENT);
+        rig.set("twist", Twist([0.01; 6].into()));
+        let now = Stamp { nanos: rig.tick.now, device: 0 };
+        spoil(&mut rig, now);
+        rig.step();
+    }
 }
 
 #[test]

@@ -162,7 +162,7 @@ proptest! {
     ) {
         let v = stopping(distance, acceleration, delay);
         prop_assert!((v * delay + v * v / (2.0 * acceleration) - distance).abs() < 1e-9 * distance);
-        prop_assert_eq!(stopping(-distance, acceleration, delay), 0.0);
+        prop_assert_eq!([-distance, 0.0, f64::NAN].map(|d| stopping(d, acceleration, delay)), [0.0; 3]);
     }
 }
 

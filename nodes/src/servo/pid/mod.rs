@@ -9,7 +9,7 @@
 //! A held component stays as it is. An absent one contributes nothing and resets only itself, and only when it has been
 //! away for long: a frame of flicker does not wipe an integral.
 
-use tactflow_runtime::node::{Interval, Map, Mistakes, Node, Positive, Setup, Tick};
+use tactflow_runtime::node::{Components, Interval, Map, Mistakes, Node, Positive, Setup, Tick};
 use tactflow_runtime::signal::{Freshness, Unit};
 use tactflow_runtime::{inputs, outputs, params, state};
 
@@ -78,6 +78,8 @@ struct Law {
     bound: f64,
     limit: f64,
     is_axial: bool,
+    /// Whether anything reads its control; otherwise it is frozen.
+    is_wanted: bool,
 }
 
 impl Node for Pid {
@@ -96,7 +98,9 @@ impl Node for Pid {
         `within`, never grows beyond `bound`, and does not grow outward while the control is at its `limit`.\n\n\
         A repeated sample is neither integrated nor differentiated. A feature that is absent contributes nothing; \
         its integral is kept through flicker, and forgotten when it stays away for the graph's `reset_after_ms`. \
-        kd amplifies noise: smooth the feature first, or leave it 0.";
+        kd amplifies noise: smooth the feature first, or leave it 0.\n\n\
+        A feature that nothing uses, since a projector deletes all that it gives, is frozen: its control is absent, \
+        and it starts afresh in a mode that selects it.";
     const EXAMPLE: &'static str = r#"
 [nodes.pid]
 type = "pid"
@@ -120,10 +124,24 @@ gains.pressure = { kp = 0.2, ki = 0.06, within = 0.02 }   # integrates only near
         State { memories: vec![Memory::default(); self.laws.len()], stepped: 0 }
     }
 
+    fn uses(&self, wanted: &[Components]) -> Vec<Components> {
+        wanted.into()
+    }
+
+    fn want(&mut self, wanted: &[Components]) -> bool {
+        self.laws.iter_mut().enumerate().for_each(|(i, law)| law.is_wanted = wanted[0].has(i));
+        true
+    }
+
     fn step(&self, tick: &Tick, inputs: Inputs<'_>, out: &mut Outputs, state: &mut State) {
         let control = out.control.write();
         let parts = self.laws.iter().zip(&mut state.memories).zip(inputs.error.components());
         for (i, ((law, memory), component)) in parts.enumerate() {
+            if !law.is_wanted {
+                control.lose(i, tick.index);
+                *memory = Memory::default();
+                continue;
+            }
             match (component.freshness(tick.index), component.get()) {
                 (Freshness::New, Some(error)) => {
                     memory.came_back(tick);
@@ -166,6 +184,7 @@ impl Law {
             bound: *gains.bound,
             limit: or_none(gains.limit),
             is_axial: unit.is_axial(),
+            is_wanted: true,
         }
     }
 

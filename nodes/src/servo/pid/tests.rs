@@ -73,6 +73,22 @@ fn assert_near(found: f64, expected: f64, what: &str) {
 }
 
 #[test]
+fn what_nobody_wants_is_frozen_and_starts_afresh() {
+    let mut rig = charged();
+    rig.want(&[Components::of(2, |i| i == 0)]);
+    for _ in 0..5 {
+        feed_all(&mut rig, &[Some(1.0); 2], 2.0);
+        assert_eq!(control(&rig, 1), None);
+    }
+    assert_near(control(&rig, 0).unwrap(), 0.11, "the other goes on");
+    rig.want(&[Components::ALL]);
+    feed_all(&mut rig, &[Some(1.0); 2], 2.0);
+    assert_near(control(&rig, 1).unwrap(), 0.0, "nothing was gathered, and nothing is left");
+    feed_all(&mut rig, &[Some(1.0); 2], 2.0);
+    assert_near(control(&rig, 1).unwrap(), 0.002, "it gathers again");
+}
+
+#[test]
 fn the_control_has_the_units_per_second() {
     let rig = alike(&[("x", Unit::METRE), ("alpha", Unit::AXIAL)], "");
     let expected = shape(&[("x", Unit::METRE.per_second()), ("alpha", Unit::RADIAN.per_second())]);

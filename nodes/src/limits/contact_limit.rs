@@ -1,0 +1,181 @@
+//! `contact_limit`: ceilings on the force of the whole image and on its highest tactel. They bar the way in alone.
+//!
+//! At a point (x, y) of the pad, with z out of it toward the object, the pad goes toward the object at the speed
+//! vz + wx y - wy x. For the force that point is the centre of gravity of the whole image, for the peak the highest
+//! tactel. From `begin` of a ceiling on that speed is limited, to zero at the ceiling and above, linearly; what is too
+//! much is taken off vz, so a roll goes on about the contact, and the way out is always free.
+//!
+//! It reads the whole image and no chosen region: an object at the rim presses as hard as one in the middle. Without a
+//! fresh image there is no motion.
+
+use tactflow_runtime::node::{Limits, Mistake, Mistakes, Node, Positive, Ratio, Setup, Tick};
+use tactflow_runtime::signal::{Image, ImageShape, ScalarShape, Stamp, Twist, Unit};
+use tactflow_runtime::{inputs, outputs, params, state};
+
+params! {
+    /// Ceiling of the whole image's sum [unit of the image].
+    force: Positive,
+    /// Ceiling of a single tactel [unit of the image].
+    peak: Positive,
+    /// Share of a ceiling from which on the way in is slowed down; 1 bars it only at the ceiling [1].
+    begin: Ratio = Ratio(0.8),
+    /// Greatest speed of the way in at `begin` [m/s].
+    approach_m_per_s: Positive,
+    /// Greatest age of the image; five periods of the graph unless given [ms].
+    max_age_ms: Option<Positive>,
+}
+
+inputs! {
+    /// Twist of the sensor's origin, in the sensor's frame [m/s, rad/s].
+    twist: Twist["A"],
+    /// The whole image, calibrated.
+    image: Sampled<Image["U", "A"]>,
+}
+
+outputs! {
+    /// The same motion, but for what goes too far in [m/s, rad/s].
+    twist: Twist["A"],
+    /// Share of the way in that the ceiling of the sum lets pass [1].
+    force: Scalar["1"],
+    /// Share of the way in that the ceiling of a tactel lets pass [1].
+    peak: Scalar["1"],
+}
+
+state! {
+    /// Stamp of the image that was summed up.
+    stamp: Stamp,
+    /// What it says.
+    load: Load,
+}
+
+/// What presses on the pad.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Load {
+    /// Sum of what presses [unit of the image].
+    sum: f64,
+    /// Its centre [m].
+    centre: [f64; 2],
+    /// The highest tactel [unit of the image].
+    peak: f64,
+    /// Its place [m].
+    place: [f64; 2],
+}
+
+/// The ceilings and the pad.
+pub struct ContactLimit {
+    shape: ImageShape,
+    force: f64,
+    peak: f64,
+    begin: f64,
+    approach: f64,
+    max_age: i64,
+}
+
+impl Node for ContactLimit {
+    type Params = Params;
+    type Inputs<'a> = Inputs<'a>;
+    type Outputs = Outputs;
+    type State = State;
+
+    const NAME: &'static str = "contact_limit";
+    const SUMMARY: &'static str = "bars the way into an object when the force or a single tactel is at its ceiling";
+    const DOC: &'static str = "Two ceilings: `force` on the sum of the whole image and `peak` on its highest tactel. From \
+        `begin` of a ceiling on the way in is slowed down, and at the ceiling it is barred; the way out is always free, \
+        and a roll goes on about the contact. What counts is the speed at the contact, vz + wx y - wy x with z out of \
+        the pad, at the centre of gravity for the force and at the highest tactel for the peak.\n\n\
+        It reads the whole image, since what presses beside the chosen region presses too. When the image is older \
+        than `max_age_ms` there is no motion: a blind sensor does not move. Negative tactels do not count.\n\n\
+        The ceilings are in the unit of the image; on pressures the sum is no force.";
+    const EXAMPLE: &'static str = r#"
+[nodes.contact_limit]
+type = "contact_limit"
+in.twist = "bumpless.twist"
+in.image = "calibrate.image"
+force = 15.0                        # [N]
+peak = 3.0                          # [N]
+approach_m_per_s = 0.05
+"#;
+    const LIMITS: Limits =
+        Limits { through: Some("twist"), holds: &["force", "peak"], breaks: &["workspace", "speed", "acceleration"] };
+
+    fn new(params: Params, setup: &mut Setup<Self>) -> Result<Self, Mistakes> {
+        if *params.peak > *params.force {
+            let message = "no tactel reaches a `peak` that is greater than the `force` of all";
+            return Err(Mistake::param("peak", message).help("let `peak` be at most `force`").into());
+        }
+        let share = ScalarShape::of(Unit::ONE).within(0.0, 1.0);
+        (setup.outputs.force, setup.outputs.peak) = (share.clone(), share);
+        let max_age = params.max_age_ms.map_or(5.0 * setup.period, |age| *age * 1e-3);
+        Ok(Self {
+            shape: setup.inputs.image.clone(),
+            force: *params.force,
+            peak: *params.peak,
+            begin: *params.begin,
+            approach: *params.approach_m_per_s,
+            max_age: (max_age * 1e9) as i64,
+        })
+    }
+
+    fn state(&self) -> State {
+        State { stamp: Stamp::TIMELESS, load: Load::default() }
+    }
+
+    fn step(&self, tick: &Tick, inputs: Inputs<'_>, out: &mut Outputs, state: &mut State) {
+        let stamp = inputs.image.stamp();
+        if stamp.age(tick.now) > self.max_age {
+            return;
+        }
+        if state.stamp != stamp {
+            (state.stamp, state.load) = (stamp, load(&self.shape, &inputs.image));
+        }
+        let (load, mut twist) = (&state.load, *inputs.twist);
+        let force = self.bar(&mut twist, load.centre, load.sum / self.force);
+        let peak = self.bar(&mut twist, load.place, load.peak / self.peak);
+        out.twist.set(twist);
+        // What is no number in the image is none here either, and ends the run.
+        out.force.set(force + 0.0 * load.sum);
+        out.peak.set(peak + 0.0 * load.peak);
+    }
+}
+
+impl ContactLimit {
+    /// Limits the way in at a point that bears so many times its ceiling; the share of it that passes.
+    fn bar(&self, twist: &mut Twist, [x, y]: [f64; 2], times: f64) -> f64 {
+        if times < self.begin {
+            return 1.0;
+        }
+        let allowed = if times < 1.0 { self.approach * (1.0 - times) / (1.0 - self.begin) } else { 0.0 };
+        let [_, _, vz, wx, wy, _] = twist.0.into();
+        let way_in = vz + wx * y - wy * x;
+        if way_in <= allowed {
+            return 1.0;
+        }
+        twist.0[2] -= way_in - allowed;
+        allowed / way_in
+    }
+}
+
+/// Sums an image up. What is no number makes the sum none.
+fn load(shape: &ImageShape, image: &Image) -> Load {
+    let mut load = Load::default();
+    let mut moments = [0.0; 2];
+    for (i, row) in image.cells().chunks(shape.cols).enumerate() {
+        let (y, mut sum) = (shape.y(i as f64), 0.0);
+        for (j, cell) in row.iter().enumerate() {
+            let value = f64::from(*cell);
+            // Not `max`, which takes what is no number for nothing.
+            let value = if value < 0.0 { 0.0 } else { value };
+            sum += value;
+            moments[0] += value * shape.x(j as f64);
+            if value > load.peak {
+                (load.peak, load.place) = (value, [shape.x(j as f64), y]);
+            }
+        }
+        load.sum += sum;
+        moments[1] += sum * y;
+    }
+    if load.sum > 0.0 {
+        load.centre = moments.map(|moment| moment / load.sum);
+    }
+    load
+}

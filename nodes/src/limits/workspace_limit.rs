@@ -1,0 +1,116 @@
+//! `workspace_limit`: keeps the sensor's origin in a box of the base.
+//!
+//! Toward a face at distance d the origin goes at most as fast as it can stop: v τ + v²/(2a) <= d, with τ twice the
+//! longest tick that counts as one, since a command acts a tick after what it was made from. At a face, and past it,
+//! only the way back is free. The whole twist is scaled by one factor, so its direction stays.
+
+use tactflow_runtime::node::{Limits, Mistake, Mistakes, Node, Positive, Setup, Tick};
+use tactflow_runtime::signal::{ScalarShape, Twist, Unit};
+use tactflow_runtime::{inputs, outputs, params};
+
+params! {
+    /// The corner of the box with the least coordinates, `[x, y, z]` in the base [m].
+    min_m: [f64; 3],
+    /// The corner with the greatest [m].
+    max_m: [f64; 3],
+    /// Deceleration that a stop before a face counts on [m/s²].
+    deceleration_m_per_s2: Positive,
+    /// Greatest age of the pose; five periods of the graph unless given [ms].
+    max_age_ms: Option<Positive>,
+}
+
+inputs! {
+    /// Twist of the sensor's origin, in the sensor's frame [m/s, rad/s].
+    twist: Twist["A"],
+    /// Pose of the sensor in the base [m].
+    pose: Sampled<Pose["A", "B"]>,
+}
+
+outputs! {
+    /// The same motion, slowed down before a face [m/s, rad/s].
+    twist: Twist["A"],
+    /// Share of the motion that passes [1].
+    workspace: Scalar["1"],
+}
+
+/// The box.
+pub struct WorkspaceLimit {
+    min: [f64; 3],
+    max: [f64; 3],
+    deceleration: f64,
+    max_age: i64,
+}
+
+/// Share of the speed below which the way toward a face does not count: rounding alone would freeze a motion along it.
+const NEGLIGIBLE: f64 = 1e-9;
+
+impl Node for WorkspaceLimit {
+    type Params = Params;
+    type Inputs<'a> = Inputs<'a>;
+    type Outputs = Outputs;
+    type State = ();
+
+    const NAME: &'static str = "workspace_limit";
+    const SUMMARY: &'static str = "keeps the sensor in a box of the workspace, with room to brake";
+    const DOC: &'static str = "The sensor's origin stays between the corners `min_m` and `max_m` of a box in the base. \
+        It brakes before a face, so that it can stop with `deceleration_m_per_s2`, and at the face only the way back \
+        is free. The motion is slowed down as a whole and keeps its direction: along a face it goes on only if the \
+        task does not push against it.\n\n\
+        It looks at the sensor's origin and at no other point: a large sensor or its holder needs a smaller box. When \
+        the pose is older than `max_age_ms` there is no motion.";
+    const EXAMPLE: &'static str = r#"
+[nodes.workspace_limit]
+type = "workspace_limit"
+in.twist = "contact_limit.twist"
+in.pose = "state.sensor_pose"
+min_m = [-0.8, -0.4, 0.1]
+max_m = [-0.3, 0.4, 0.7]
+deceleration_m_per_s2 = 0.5
+"#;
+    const LIMITS: Limits = Limits { through: Some("twist"), holds: &["workspace"], breaks: &["acceleration"] };
+
+    fn new(params: Params, setup: &mut Setup<Self>) -> Result<Self, Mistakes> {
+        let flat = (0..3).find(|axis| params.min_m[*axis] >= params.max_m[*axis]);
+        if let Some(axis) = flat {
+            let (min, max) = (params.min_m[axis], params.max_m[axis]);
+            let message = format!("the box is empty along {}: from {min} to {max} m", ["x", "y", "z"][axis]);
+            return Err(Mistake::param("max_m", message).help("let each entry be greater than that of `min_m`").into());
+        }
+        setup.outputs.workspace = ScalarShape::of(Unit::ONE).within(0.0, 1.0);
+        let max_age = params.max_age_ms.map_or(5.0 * setup.period, |age| *age * 1e-3);
+        let deceleration = *params.deceleration_m_per_s2;
+        Ok(Self { min: params.min_m, max: params.max_m, deceleration, max_age: (max_age * 1e9) as i64 })
+    }
+
+    fn state(&self) {}
+
+    fn step(&self, tick: &Tick, inputs: Inputs<'_>, out: &mut Outputs, (): &mut ()) {
+        if inputs.pose.stamp().age(tick.now) > self.max_age {
+            return;
+        }
+        let (twist, pose) = (*inputs.twist, inputs.pose.0);
+        let velocity = pose.rotation * twist.linear();
+        let speed = velocity.norm();
+        let mut share = 1.0_f64;
+        for axis in 0..3 {
+            let (v, place) = (velocity[axis], pose.translation.vector[axis]);
+            let distance = if v > 0.0 { self.max[axis] - place } else { place - self.min[axis] };
+            let allowed = stoppable(distance, self.deceleration, 2.0 * tick.max_gap);
+            if v.abs() > allowed && v.abs() > NEGLIGIBLE * speed {
+                share = share.min(allowed / v.abs());
+            }
+        }
+        out.twist.set(Twist(twist.0 * share));
+        out.workspace.set(share);
+    }
+}
+
+/// Greatest speed from which a stop within `distance` is possible, `delay` [s] later, with that deceleration.
+fn stoppable(distance: f64, deceleration: f64, delay: f64) -> f64 {
+    if distance <= 0.0 {
+        return 0.0;
+    }
+    let lost = deceleration * delay;
+    // The root without the difference of two large numbers.
+    2.0 * deceleration * distance / (lost + (lost * lost + 2.0 * deceleration * distance).sqrt())
+}
