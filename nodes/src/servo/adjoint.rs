@@ -44,7 +44,7 @@ impl Node for Adjoint {
     const EXAMPLE: &'static str = r#"
 [nodes.to_base]
 type = "adjoint"
-in.twist = "sum.twist"
+in.twist = "acceleration_limit.twist"
 in.pose = "state.sensor_pose"
 "#;
     const LIMITS: Limits = Limits::passed("twist");
