@@ -89,6 +89,7 @@ pub fn catalogue() -> Catalogue {
         .node::<limits::workspace_limit::WorkspaceLimit>()
         .node::<limits::twist_limit::TwistLimit>()
         .node::<limits::acceleration_limit::AccelerationLimit>()
+        .node::<limits::joint_limit::JointLimit>()
         .group("arm: from a twist of the sensor to joint velocities")
         .node::<arm::arm_state::ArmState>()
         .node::<arm::contact_point::ContactPoint>()

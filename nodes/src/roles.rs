@@ -29,11 +29,17 @@ pub fn velocity_arm() -> RoleType {
     RoleType {
         name: "velocity_arm".into(),
         summary: "an arm that takes joint velocities".into(),
-        outputs: vec![port("position", "Measured joint positions [rad].", Kind::Joints, &["rad", "self"])],
+        outputs: vec![
+            port("position", "Measured joint positions [rad].", Kind::Joints, &["rad", "self"]),
+            port("equilibrium", EQUILIBRIUM, Kind::Joints, &["rad", "self"]),
+        ],
         commands: vec![port("velocity", "Joint velocities [rad/s].", Kind::Joints, &["rad/s", "self"])],
         limits: LIMITS.map(Cow::Borrowed).into(),
     }
 }
+
+const EQUILIBRIUM: &str = "Posture that the commands have moved to: where a compliant arm would be if nothing held it; \
+    of a stiff arm its position [rad].";
 
 /// What every command of an arm must have crossed, in the order in which a motion does.
 const LIMITS: [&str; 10] = [

@@ -1,4 +1,4 @@
-//! `ik_sink`: joint velocities for a twist of the sensor (paper section IV), within the arm's limits, or none.
+//! `ik_sink`: joint velocities for a twist of the sensor (paper section IV), within the arm's limits.
 //!
 //! 1. Twist and Jacobian are moved from the base's origin to the sensor's, along its axes (Ad of the inverse pose,
 //!    eq. 4): damping is not frame-invariant, so it is done where metres and radians mean what the task means.
@@ -6,12 +6,10 @@
 //! 3. [`null_space::project`]: motion toward a posture that leaves the sensor exactly still, if one is given.
 //! 4. [`joint_limits`]: speed and position limits that keep the direction; the posture gets what the task leaves.
 //!
-//! A twist that is absent, or a twist or an arm that is older than `max_age_ms`, lets the last command fade linearly to
-//! zero; the first fresh one takes over by itself. Invariant: no velocity is ever held without a fresh sample behind it.
+//! It is a map and remembers nothing: no twist, no velocity. What becomes of a motion that ends is the limiters'.
 
-use tactflow_runtime::diagnostic::Code;
-use tactflow_runtime::node::{At, Mistake, Mistakes, Node, NonNegative, Positive, Setup, Tick};
-use tactflow_runtime::signal::{Joint, JointsShape, Pose, Twist, Unit};
+use tactflow_runtime::node::{Limits, Mistake, Mistakes, Node, NonNegative, Positive, Setup, Tick};
+use tactflow_runtime::signal::{Joint, JointsShape, Pose, ScalarShape, Twist, Unit};
 use tactflow_runtime::{inputs, outputs, params, state};
 
 use super::{damped, joint_limits, null_space};
@@ -25,15 +23,11 @@ params! {
     live posture_gain: NonNegative = NonNegative(0.5),
     /// Greatest speed toward a position limit, per distance to it; 5, or half the graph's rate if that is less [1/s].
     limit_gain: Option<Positive>,
-    /// Greatest age of the twist and of the arm's state; five periods of the graph unless given [ms].
-    max_age_ms: Option<Positive>,
-    /// Time in which a command fades to zero when nothing fresh comes [ms].
-    ramp_ms: Positive = Positive(100.0),
 }
 
 inputs! {
     /// Spatial twist of the sensor in the base [m/s, rad/s].
-    twist: Trigger<Twist["B"]>,
+    twist: Twist["B"],
     /// Pose of the sensor in the base.
     sensor_pose: Pose["S", "B"],
     /// Spatial Jacobian of the sensor in the base [m/s, rad/s per rad/s].
@@ -45,13 +39,11 @@ inputs! {
 outputs! {
     /// Joint velocities [rad/s; m/s for a prismatic joint].
     velocity: Joints["rad/s", "R"],
+    /// How much of the wanted twist's motion the joints' limits leave; the posture's is not counted [1].
+    share: Scalar["1"],
 }
 
 state! {
-    /// The last command that was fresh [rad/s].
-    last: Vec<f64>,
-    /// How much of it is left, 1 to 0.
-    left: f64,
     /// The Jacobian's columns at the sensor.
     columns: Vec<[f64; 6]>,
     /// Room to work in for the null space.
@@ -67,8 +59,6 @@ pub struct IkSink {
     posture: Option<Vec<f64>>,
     posture_gain: f64,
     limit_gain: f64,
-    max_age: i64,
-    ramp: f64,
 }
 
 impl Node for IkSink {
@@ -86,9 +76,9 @@ impl Node for IkSink {
         An arm with more than six joints is free to choose its elbow: `posture` says where it drifts, at \
         `posture_gain`, along motions that leave the sensor still. Speed and position limits of the model are \
         kept: a command that is too fast is slowed down as a whole and keeps its direction.\n\n\
-        Without a twist, or when twist or arm are older than `max_age_ms`, the last command fades to zero over \
-        `ramp_ms`; the first fresh twist takes over. No velocity is held without a fresh sample behind it. It \
-        keeps no limit on force and none on the speed of the sensor: keep the gains and the guidance small.";
+        One joint at its limit stops the whole motion that needs it: `share` says how much of the twist's motion is \
+        left, 1 far from every limit. Without a twist there is no velocity. How a motion begins and ends, and that \
+        nothing old goes on, is up to the limiters: a `joint_limit` has to come between it and the arm.";
     const EXAMPLE: &'static str = r#"
 [nodes.ik]
 type = "ik_sink"
@@ -98,63 +88,40 @@ in.jacobian = "state.jacobian"
 in.joints = "state.joints"
 posture = [0.0, 0.5, 0.0, -1.3, 0.0, 1.3, 0.0]   # [rad]
 "#;
-    const EVERY_TICK: bool = true;
+    const LIMITS: Limits = Limits::passed("twist");
 
     fn new(params: Params, setup: &mut Setup<Self>) -> Result<Self, Mistakes> {
         let shape = &setup.inputs.joints;
-        let mut mistakes = check(&params, shape, &setup.inputs.jacobian.0, setup.period);
-        if setup.inputs.twist.is_none() {
-            // It may be absent, but an arm that nothing can ever move is a wire that was forgotten.
-            let mistake = Mistake::new(Code::MissingInput, At::Node, "`ik_sink` needs `in.twist`, a twist");
-            mistakes.push(mistake.help("add `in.twist = \"adjoint.twist\"`: an absent twist is no motion"));
-        }
+        let mistakes = check(&params, shape, &setup.inputs.jacobian.0, setup.period);
         if !mistakes.is_empty() {
             return Err(mistakes);
         }
         setup.outputs.velocity = shape.in_unit(Unit::RADIAN.per_second());
-        let max_age = params.max_age_ms.map_or(5.0 * setup.period, |age| *age * 1e-3);
+        setup.outputs.share = ScalarShape::of(Unit::ONE).within(0.0, 1.0);
         Ok(Self {
             joints: shape.joints.clone(),
             damping: *params.damping,
             posture: params.posture,
             posture_gain: *params.posture_gain,
             limit_gain: params.limit_gain.map_or(most_gain(setup.period).min(5.0), |gain| *gain),
-            max_age: (max_age * 1e9) as i64,
-            ramp: *params.ramp_ms * 1e-3,
         })
     }
 
     fn state(&self) -> State {
         let count = self.joints.len();
-        State {
-            last: vec![0.0; count],
-            left: 0.0,
-            columns: vec![[0.0; 6]; count],
-            rows: vec![[0.0; 8]; count],
-            drift: vec![0.0; count],
-        }
+        State { columns: vec![[0.0; 6]; count], rows: vec![[0.0; 8]; count], drift: vec![0.0; count] }
     }
 
-    fn step(&self, tick: &Tick, inputs: Inputs<'_>, out: &mut Outputs, state: &mut State) {
+    fn step(&self, _: &Tick, inputs: Inputs<'_>, out: &mut Outputs, state: &mut State) {
         let velocity = &mut out.velocity.write().0;
         let q = &inputs.joints.0;
-        let is_arm_fresh = inputs.joints.stamp().oldest(inputs.jacobian.stamp()).age(tick.now) <= self.max_age;
-        let twist = inputs.twist.filter(|twist| is_arm_fresh && twist.stamp().age(tick.now) <= self.max_age);
-        let Some(twist) = twist else {
-            state.left = (state.left - tick.dt / self.ramp).max(0.0);
-            for (velocity, last) in velocity.iter_mut().zip(&state.last) {
-                *velocity = last * state.left;
-            }
-            joint_limits::limit(&self.joints, q, self.limit_gain, velocity);
-            return;
-        };
         // A copy, so that it stays in registers while the columns are written.
         let pose = *inputs.sensor_pose.value();
         for (column, of_base) in state.columns.iter_mut().zip(&inputs.jacobian.0) {
             *column = at_sensor(&pose, of_base);
         }
-        damped::solve(&state.columns, &at_sensor(&pose, &twist), self.damping, velocity);
-        joint_limits::limit(&self.joints, q, self.limit_gain, velocity);
+        damped::solve(&state.columns, &at_sensor(&pose, &inputs.twist), self.damping, velocity);
+        out.share.set(joint_limits::limit(&self.joints, q, self.limit_gain, velocity));
         if let Some(posture) = &self.posture {
             for ((drift, posture), q) in state.drift.iter_mut().zip(posture).zip(q) {
                 *drift = self.posture_gain * (posture - q);
@@ -162,8 +129,6 @@ posture = [0.0, 0.5, 0.0, -1.3, 0.0, 1.3, 0.0]   # [rad]
             null_space::project(&state.columns, &mut state.rows, &mut state.drift);
             joint_limits::add_within(&self.joints, q, self.limit_gain, velocity, &state.drift);
         }
-        state.last.copy_from_slice(velocity);
-        state.left = 1.0;
     }
 }
 

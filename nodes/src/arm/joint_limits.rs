@@ -13,18 +13,19 @@ const NEGLIGIBLE: f64 = 1e-9;
 /// Least and greatest velocity of a joint at position `q`; a joint that is outside its range may only move back.
 #[must_use]
 pub fn interval(joint: &Joint, q: f64, gain: f64) -> (f64, f64) {
-    let least = -(gain * (q - joint.lower)).clamp(0.0, joint.speed);
-    let greatest = (gain * (joint.upper - q)).clamp(0.0, joint.speed);
-    (least, greatest)
+    // Not `clamp`, which passes on what is no number: such a position leaves no room.
+    let within = |room: f64| (gain * room).max(0.0).min(joint.speed);
+    (-within(q - joint.lower), within(joint.upper - q))
 }
 
-/// Scales `velocity` until every joint is within its limits.
-pub fn limit(joints: &[Joint], q: &[f64], gain: f64, velocity: &mut [f64]) {
+/// Scales `velocity` until every joint is within its limits; gives the factor.
+pub fn limit(joints: &[Joint], q: &[f64], gain: f64, velocity: &mut [f64]) -> f64 {
     let bounds = || joints.iter().zip(q).map(|(joint, q)| interval(joint, *q, gain));
     let share = share(velocity, bounds());
     for (velocity, (least, greatest)) in velocity.iter_mut().zip(bounds()) {
         *velocity = (*velocity * share).clamp(least, greatest);
     }
+    share
 }
 
 /// Adds as much of `extra` to a `velocity` within the limits as stays within them.
@@ -38,7 +39,7 @@ pub fn add_within(joints: &[Joint], q: &[f64], gain: f64, velocity: &mut [f64], 
 }
 
 /// The greatest factor up to 1 that brings every entry within its bounds; the bounds contain 0.
-fn share(velocity: &[f64], bounds: impl Iterator<Item = (f64, f64)>) -> f64 {
+pub(crate) fn share(velocity: &[f64], bounds: impl Iterator<Item = (f64, f64)>) -> f64 {
     let largest = velocity.iter().fold(0.0, |largest: f64, v| largest.max(v.abs()));
     let mut share = 1.0f64;
     for (v, (least, greatest)) in velocity.iter().zip(bounds) {
@@ -70,6 +71,7 @@ mod tests {
             (2.0, (-3.0, 0.0), "at its limit"),
             (2.5, (-3.0, 0.0), "past its upper limit"),
             (-9.0, (0.0, 3.0), "past its lower limit"),
+            (f64::NAN, (0.0, 0.0), "nowhere"),
         ];
         for (q, (least, greatest), what) in cases {
             let got = interval(&joint, q, 4.0);
@@ -81,7 +83,7 @@ mod tests {
     fn the_slowest_joint_sets_the_pace_and_the_rest_is_for_the_posture() {
         let joints = [joint(-9.0, 9.0, 1.0), joint(-9.0, 9.0, 2.0)];
         let mut velocity = [2.0, -1.0];
-        limit(&joints, &[0.0; 2], 1.0, &mut velocity);
+        assert_eq!(limit(&joints, &[0.0; 2], 1.0, &mut velocity), 0.5);
         assert_eq!(velocity, [1.0, -0.5]);
         add_within(&joints, &[0.0; 2], 1.0, &mut velocity, &[-1.0, -6.0]);
         assert_eq!(velocity, [0.75, -2.0]);

@@ -1,16 +1,19 @@
 //! `mock_arm`: an arm that does exactly as it is told.
 //!
-//! It integrates the commanded velocity exactly, q += v dt, and stops at its position limits. It is kinematic: it
-//! leaves out inertia, friction, compliance, delay and noise, so what works on it need not work on an arm.
+//! It integrates the commanded velocity exactly, q_eq += v dt: that is the equilibrium, where a compliant arm would be if
+//! nothing held it. The position is the same, but it stops at the ends of the joints, and it stays while somebody holds
+//! the arm. The equilibrium then runs ahead, also past an end, and the position springs to it when the arm is let go:
+//! that is the windup that a bound on the lead is for. It is kinematic: it leaves out inertia, friction, stiffness,
+//! delay and noise, so what works on it need not work on an arm.
 
 use std::borrow::Cow;
 
 use tactflow_runtime::device::{Commands, Description, Device, DeviceError, Driver, Filled, Opened, Samples, Stepped};
-use tactflow_runtime::node::{FilePath, Mistake, Mistakes, Rate};
+use tactflow_runtime::node::{FilePath, Mistake, Mistakes, NonNegative, Positive, Rate};
 use tactflow_runtime::params;
 use tactflow_runtime::signal::{Joint, Joints, JointsShape, Unit};
 
-use super::period_of;
+use super::{nanos, period_of};
 use crate::arm::model::load;
 use crate::arm::mount::Mount;
 
@@ -25,6 +28,18 @@ params! {
     start: Vec<f64>,
     /// Samples of the positions per second [1/s].
     rate_hz: Rate = Rate(250.0),
+    /// What it states as the greatest acceleration of each joint; it does as it is told [rad/s²; m/s² if prismatic].
+    acceleration: Positive = Positive(10.0),
+    /// When somebody holds the arm.
+    hold: Vec<Hold> = vec![],
+}
+
+params! {
+    Hold:
+    /// When it is seized [s].
+    from_s: NonNegative,
+    /// When it is let go [s].
+    to_s: NonNegative,
 }
 
 /// The arm's joints and where they are.
@@ -32,6 +47,9 @@ params! {
 pub struct MockArm {
     joints: Vec<Joint>,
     position: Vec<f64>,
+    /// What the commands add up to.
+    equilibrium: Vec<f64>,
+    holds: Vec<Hold>,
     period: i64,
     last: Option<i64>,
     sequence: u64,
@@ -42,15 +60,19 @@ impl Device for MockArm {
 
     const NAME: &'static str = "mock_arm";
     const SUMMARY: &'static str = "an arm without dynamics that does exactly as it is told";
-    const DOC: &'static str = "It integrates the commanded joint velocity exactly and stops at its position limits. It \
-        leaves out inertia, friction, compliance, delay and noise: what works on it need not work on an arm.\n\n\
+    const DOC: &'static str = "It integrates the commanded joint velocity exactly: that is its `equilibrium`. Its \
+        `position` is the same, but it stops at the ends of the joints, and while somebody holds it, as each `hold` \
+        says. The equilibrium runs ahead then, and when the arm is let go it springs to it: a `joint_limit` keeps that \
+        lead small.\n\n\
+        It leaves out inertia, friction, stiffness, delay and noise: what works on it need not work on an arm. It \
+        states `acceleration` and does not keep to it.\n\n\
         It states the facts `urdf`, `tip` and `mount` for `arm_state`.";
     const EXAMPLE: &'static str = r#"
 [roles]
 arm = "velocity_arm"
 
 [commands]
-arm.velocity = "ik.velocity"
+arm.velocity = "joint_limit.velocity"
 
 [bind]
 arm = "arm"
@@ -66,16 +88,18 @@ start = [0.0, 0.5, 0.0, -1.3, 0.0, 1.3, 0.0]   # [rad]
     fn open(params: Params) -> Result<Opened, Mistakes> {
         let chain = load(&params.urdf, &params.tip, &params.mount)?;
         let period = period_of(params.rate_hz);
-        let joints = chain.joints().to_vec();
+        let acceleration = *params.acceleration;
+        let joints: Vec<Joint> = chain.joints().iter().map(|joint| Joint { acceleration, ..joint.clone() }).collect();
         check_start(&joints, &params.start)?;
+        check_holds(&params.hold)?;
         let shape = JointsShape { joints: joints.clone(), unit: Unit::RADIAN };
         let filled = Filled {
             role: "velocity_arm".into(),
-            outputs: vec![shape.clone().into()],
+            outputs: vec![shape.clone().into(), shape.clone().into()],
             commands: vec![shape.in_unit(Unit::RADIAN.per_second()).into()],
             facts: facts(&params)?,
         };
-        let arm = Self { joints, position: params.start, period, last: None, sequence: 0 };
+        let arm = Self::new(joints, params.start, params.hold, period);
         let description = Description { fills: vec![filled], period: period as f64 * 1e-9 };
         Ok(Opened { description, driver: Driver::Stepped(Box::new(arm)) })
     }
@@ -89,27 +113,44 @@ impl Stepped for MockArm {
     fn exchange(&mut self, now: i64, commands: &Commands, samples: &mut Samples) -> Result<(), DeviceError> {
         if self.advance(now, commands.joints(0))? {
             samples.write::<Joints>(0, now, self.sequence).0.copy_from_slice(&self.position);
+            samples.write::<Joints>(1, now, self.sequence).0.copy_from_slice(&self.equilibrium);
         }
         Ok(())
     }
 }
 
 impl MockArm {
+    fn new(joints: Vec<Joint>, start: Vec<f64>, holds: Vec<Hold>, period: i64) -> Self {
+        Self { joints, equilibrium: start.clone(), position: start, holds, period, last: None, sequence: 0 }
+    }
+
     /// Moves with `velocity` from the last exchange to `now`; whether time went on, so that there is a new sample.
     fn advance(&mut self, now: i64, velocity: &[f64]) -> Result<bool, DeviceError> {
         if self.last.is_some_and(|last| now <= last) {
             return Ok(false);
         }
         let dt = (now - self.last.unwrap_or(now)) as f64 * 1e-9;
-        for ((q, v), joint) in self.position.iter_mut().zip(velocity).zip(&self.joints) {
+        let is_held = self.holds.iter().any(|hold| (nanos(*hold.from_s)..nanos(*hold.to_s)).contains(&now));
+        let places = self.equilibrium.iter_mut().zip(&mut self.position);
+        for (((equilibrium, q), v), joint) in places.zip(velocity).zip(&self.joints) {
             if !v.is_finite() {
                 return Err(DeviceError(format!("the velocity commanded to joint `{}` is not finite", joint.name)));
             }
-            *q = (*q + v * dt).clamp(joint.lower, joint.upper);
+            *equilibrium += v * dt;
+            if !is_held {
+                *q = equilibrium.clamp(joint.lower, joint.upper);
+            }
         }
         (self.last, self.sequence) = (Some(now), self.sequence + 1);
         Ok(true)
     }
+}
+
+fn check_holds(holds: &[Hold]) -> Result<(), Mistakes> {
+    let backward = holds.iter().filter(|hold| *hold.to_s <= *hold.from_s);
+    let message = |hold: &Hold| format!("a hold from {} s to {} s lasts no time", *hold.from_s, *hold.to_s);
+    let mistakes: Mistakes = backward.map(|hold| Mistake::param("hold", message(hold))).collect();
+    if mistakes.is_empty() { Ok(()) } else { Err(mistakes) }
 }
 
 fn check_start(joints: &[Joint], start: &[f64]) -> Result<(), Mistakes> {
@@ -146,8 +187,12 @@ fn facts(params: &Params) -> Result<Vec<(Cow<'static, str>, toml::Value)>, Mista
 mod tests {
     use std::path::Path;
 
+    use tactflow_runtime::harness::NodeRig;
+    use tactflow_runtime::signal::Shape;
+
     use super::*;
-    use crate::devices::testing::{Bench, open};
+    use crate::devices::testing::{Bench, open, read};
+    use crate::limits::joint_limit::JointLimit;
 
     const URDF: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../graphs/robots/lwr4p.urdf");
 
@@ -159,6 +204,10 @@ mod tests {
     fn it_samples_at_its_rate_and_says_what_it_is() {
         let mut bench = arm("start = [0, 0.5, 0, -1, 0, 1, 0]\nmount = { xyz = [0, 0, 0.05] }").unwrap();
         assert_eq!(bench.description.period, 0.004);
+        for shape in bench.fill().outputs.iter().chain(&bench.fill().commands) {
+            let Shape::Joints(shape) = shape else { panic!("joints") };
+            assert!(shape.joints.iter().all(|joint| joint.acceleration == 10.0));
+        }
         for now in [0, 4_000_000, 8_000_000] {
             assert_eq!(bench.device.next(), Some(now));
             bench.exchange(now);
@@ -171,26 +220,71 @@ mod tests {
         assert_eq!(bench.fact("mount").unwrap()["rpy"], vec![0.0; 3].into());
     }
 
+    fn two_joints(holds: &str) -> MockArm {
+        let joint = |name: &str| Joint { name: name.into(), lower: -1.0, upper: 1.0, speed: 1.0, acceleration: 10.0 };
+        let params: Params = read(&format!("urdf = 'none'\ntip = ''\nstart = []\nhold = {holds}"));
+        MockArm::new(vec![joint("a"), joint("b")], vec![0.0, 0.5], params.hold, 4_000_000)
+    }
+
     #[test]
-    fn it_integrates_exactly_and_stops_at_its_limits() {
-        let joints = vec![
-            Joint { name: "a".into(), lower: -1.0, upper: 1.0, speed: 1.0, acceleration: 10.0 },
-            Joint { name: "b".into(), lower: -1.0, upper: 1.0, speed: 1.0, acceleration: 10.0 },
-        ];
-        let mut arm = MockArm { joints, position: vec![0.0, 0.5], period: 4_000_000, last: None, sequence: 0 };
+    fn it_integrates_exactly_and_at_its_ends_the_equilibrium_runs_ahead() {
+        let mut arm = two_joints("[]");
         let steps = [
-            (5_000_000, [9.0, 9.0], true, [0.0, 0.5], "the first exchange is where time starts"),
-            (255_000_000, [1.0, -2.0], true, [0.25, 0.0], "a quarter of a second"),
-            (255_000_000, [1.0, -2.0], false, [0.25, 0.0], "the same moment once more"),
-            (200_000_000, [1.0, -2.0], false, [0.25, 0.0], "a moment that is gone"),
-            (755_000_000, [2.0, 0.5], true, [1.0, 0.25], "against a stop"),
-            (1_255_000_000, [-1.0, 0.0], true, [0.5, 0.25], "and back at once"),
+            (5, [9.0, 9.0], true, [0.0, 0.5], [0.0, 0.5], "the first exchange is where time starts"),
+            (255, [1.0, -2.0], true, [0.25, 0.0], [0.25, 0.0], "a quarter of a second"),
+            (255, [1.0, -2.0], false, [0.25, 0.0], [0.25, 0.0], "the same moment once more"),
+            (200, [1.0, -2.0], false, [0.25, 0.0], [0.25, 0.0], "a moment that is gone"),
+            (755, [2.0, 0.5], true, [1.0, 0.25], [1.25, 0.25], "against an end"),
+            (1255, [-0.25, 0.0], true, [1.0, 0.25], [1.125, 0.25], "it does not come back at once"),
+            (1755, [-1.0, 0.0], true, [0.625, 0.25], [0.625, 0.25], "but when the lead is used up"),
         ];
-        for (now, velocity, is_new, position, what) in steps {
-            assert_eq!((arm.advance(now, &velocity), arm.position.as_slice()), (Ok(is_new), &position[..]), "{what}");
+        for (ms, velocity, is_new, position, equilibrium, what) in steps {
+            assert_eq!(arm.advance(ms * 1_000_000, &velocity), Ok(is_new), "{what}");
+            assert_eq!((&*arm.position, &*arm.equilibrium), (&position[..], &equilibrium[..]), "{what}");
         }
-        assert_eq!(arm.sequence, 4);
+        assert_eq!(arm.sequence, 5);
         assert!(arm.advance(2_000_000_000, &[f64::NAN, 0.0]).unwrap_err().0.contains("joint `a`"));
+    }
+
+    #[test]
+    fn somebody_holds_it_and_it_springs_when_it_is_let_go() {
+        let mut arm = two_joints("[{ from_s = 0.25, to_s = 0.75 }]");
+        let steps = [
+            (0, [0.0, 0.5], [0.0, 0.5], "the start"),
+            (125, [0.125, 0.5], [0.125, 0.5], "free"),
+            (250, [0.125, 0.5], [0.25, 0.5], "seized"),
+            (625, [0.125, 0.5], [0.625, 0.5], "held"),
+            (750, [0.75, 0.5], [0.75, 0.5], "let go"),
+        ];
+        for (ms, position, equilibrium, what) in steps {
+            arm.advance(ms * 1_000_000, &[1.0, 0.0]).unwrap();
+            assert_eq!((&*arm.position, &*arm.equilibrium), (&position[..], &equilibrium[..]), "{what}");
+        }
+    }
+
+    #[test]
+    fn behind_a_joint_limit_an_arm_that_is_held_springs_by_no_more_than_the_lead() {
+        let mut arm = two_joints("[{ from_s = 0.1, to_s = 3 }]");
+        let shape = JointsShape { joints: arm.joints.clone(), unit: Unit::RADIAN };
+        let velocity = shape.in_unit(Unit::RADIAN.per_second());
+        let wires = [("velocity", velocity.into()), ("position", shape.clone().into()), ("equilibrium", shape.into())];
+        let mut rig = NodeRig::new::<JointLimit>("lead_rad = 0.1", &wires).unwrap();
+        rig.tick.max_gap = 0.02;
+        let (mut command, mut most, mut spring, mut last) = (vec![0.0; 2], 0.0f64, 0.0f64, 0.0);
+        for tick in 0..1000 {
+            arm.advance(tick * 4_000_000, &command).unwrap();
+            most = most.max(arm.equilibrium[0] - arm.position[0]);
+            spring = spring.max(arm.position[0] - last);
+            last = arm.position[0];
+            rig.set("velocity", Joints([0.5, 0.0].into()));
+            rig.set("position", Joints(arm.position.as_slice().into()));
+            rig.set("equilibrium", Joints(arm.equilibrium.as_slice().into()));
+            rig.step_ms(4.0);
+            command.copy_from_slice(&rig.get::<Joints>("velocity").unwrap().0);
+        }
+        assert!(most > 0.099 && most <= 0.1 + 1e-12, "the lead grows up to its bound and no further: {most}");
+        assert!(spring > 0.099 && spring < 0.11, "and that is how far it springs: {spring}");
+        assert!(arm.position[0] > 0.5, "then it goes on: {}", arm.position[0]);
     }
 
     #[test]
@@ -198,6 +292,10 @@ mod tests {
         let cases = [
             ("start = [0, 0]", "`start` has 2 entries, but the arm has 7 joints"),
             ("start = [0, 0, 0, 0, 0, 0, 3]", "joint `lwr_a6_joint` cannot start at 3: it goes from -2.9671 to 2.9671"),
+            (
+                "start = [0, 0, 0, 0, 0, 0, 0]\nhold = [{ from_s = 2, to_s = 1 }]",
+                "a hold from 2 s to 1 s lasts no time",
+            ),
             ("start = [0, 0, 0, 0, 0, 0, 0]\nrate_hz = 1e7", "expected a rate from 0.001 to 1000000, found 10000000"),
             (
                 "start = [0, 0, 0, 0, 0, 0, 0]\nrate_hz = 1e-9",

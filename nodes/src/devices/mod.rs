@@ -13,3 +13,8 @@ use tactflow_runtime::node::Rate;
 fn period_of(rate_hz: Rate) -> i64 {
     (1e9 / *rate_hz).round() as i64
 }
+
+/// Seconds as nanoseconds; what does not fit is for ever.
+fn nanos(seconds: f64) -> i64 {
+    (seconds * 1e9).round() as i64
+}

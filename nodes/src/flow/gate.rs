@@ -98,7 +98,7 @@ gate! {
     TwistGate in twist: "twist_gate", twist: Twist["A"],
     "lets a motion pass only while a flag is set; otherwise there is none",
     "`twist` passes while `gate` is set. While it is not, or is absent, the twist is absent, which is zero motion: a \
-    `twist_adder` leaves it out, and `ik_sink` fades to zero.\n\n\
+    `twist_adder` leaves it out, and the limiters bring the arm to rest.\n\n\
     Generated motion does not end with the contact by itself; a gate on `label.present` ends it. `twist_source` has such \
     a gate built in. What passes is as old as the twist or the flag, whichever is older.",
     r#"

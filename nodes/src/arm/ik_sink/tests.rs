@@ -1,7 +1,8 @@
-//! `ik_sink` against limits, ages and the twist it is asked for.
+//! `ik_sink` against limits and the twist it is asked for.
 
 use proptest::prelude::*;
 use tactflow_runtime::harness::NodeRig;
+use tactflow_runtime::node::At;
 use tactflow_runtime::signal::{Jacobian, JacobianShape, Joints, PoseShape, Shape, Stamp, TwistShape};
 
 use super::*;
@@ -28,13 +29,6 @@ fn wires() -> [(&'static str, Shape); 4] {
         ("jacobian", JacobianShape(joints.clone()).into()),
         ("joints", joints.into()),
     ]
-}
-
-#[test]
-fn a_sink_that_no_twist_is_wired_to_does_not_load() {
-    let mistakes = NodeRig::new::<IkSink>("", &wires()[1..]).err().unwrap();
-    let said: Vec<_> = mistakes.iter().map(|mistake| (mistake.code, &*mistake.message)).collect();
-    assert_eq!(said, [(Code::MissingInput, "`ik_sink` needs `in.twist`, a twist")]);
 }
 
 fn set_arm(rig: &mut NodeRig, chain: &Chain, q: &[f64; 7]) -> Vec<Twist> {
@@ -114,18 +108,13 @@ proptest! {
         posture in prop::array::uniform7(-2.0..2.0f64),
     ) {
         let chain = lwr();
-        let mut rig = rig(&format!("posture = {posture:?}\nposture_gain = 3.0\nramp_ms = 20.0")).unwrap();
+        let mut rig = rig(&format!("posture = {posture:?}\nposture_gain = 3.0")).unwrap();
         let mut q = BENT;
         for twist in twists {
-            for ms in 0..400 {
+            for _ in 0..400 {
                 let columns = set_arm(&mut rig, &chain, &q);
                 let pose = chain.forward(&q, &mut columns.clone());
-                // For a quarter of the time there is no twist, so that the ramp is in it too.
-                if ms < 300 {
-                    rig.set("twist", spatial(&pose, twist));
-                } else {
-                    rig.lose("twist");
-                }
+                rig.set("twist", spatial(&pose, twist));
                 rig.step();
                 for ((q, v), joint) in q.iter_mut().zip(velocity(&rig)).zip(chain.joints()) {
                     prop_assert!(v.abs() <= joint.speed, "{}: {}", joint.name, v);
@@ -157,61 +146,69 @@ fn an_arm_that_is_free_drifts_to_its_posture() {
 }
 
 #[test]
-fn nothing_fresh_fades_to_nothing_and_comes_back() {
-    let chain = lwr();
-    let push = Twist([0.01, 0.0, 0.02, 0.0, 0.0, 0.1].into());
-    let old = |rig: &NodeRig, ms: i64| Stamp { nanos: rig.tick.now - ms * 1_000_000, device: 0 };
-    // The rig ticks at 1 kHz, so the greatest age is 5 ms.
-    type Spoil = fn(&mut NodeRig, &dyn Fn(&NodeRig, i64) -> Stamp);
-    let spoils: [(&str, Spoil); 4] = [
-        ("the twist is lost", |rig, _| rig.lose("twist")),
-        ("the twist is old", |rig, old| rig.edit("twist", old(rig, 6), |_: &mut Twist| {})),
-        ("the joints are old", |rig, old| rig.edit("joints", old(rig, 6), |_: &mut Joints| {})),
-        ("the Jacobian is old", |rig, old| rig.edit("jacobian", old(rig, 6), |_: &mut Jacobian| {})),
-    ];
-    for (what, spoil) in spoils {
-        let mut rig = rig("ramp_ms = 10.0").unwrap();
-        let fresh = |rig: &mut NodeRig| {
-            set_arm(rig, &chain, &BENT);
-            rig.set("twist", push);
-        };
-        for _ in 0..3 {
-            fresh(&mut rig);
-            rig.step();
+fn without_a_twist_there_is_no_velocity() {
+    let (chain, mut rig) = (lwr(), rig("").unwrap());
+    for is_there in [true, false, true] {
+        set_arm(&mut rig, &chain, &BENT);
+        if is_there {
+            rig.set("twist", Twist([0.01; 6].into()));
+        } else {
+            rig.lose("twist");
         }
-        let full = velocity(&rig);
-        assert!(full.iter().any(|v| v.abs() > 0.01), "{what}");
-        for tick in 1..15 {
-            fresh(&mut rig);
-            spoil(&mut rig, &old);
-            rig.step();
-            let left = (1.0 - 0.1 * f64::from(tick)).max(0.0);
-            for (v, full) in velocity(&rig).iter().zip(full) {
-                assert!((v - left * full).abs() < 1e-12, "{what}, tick {tick}: {v} of {full}");
-            }
-        }
-        assert_eq!(velocity(&rig), [0.0; 7], "{what}");
-        fresh(&mut rig);
         rig.step();
-        assert_eq!(velocity(&rig), full, "{what}: it resumes");
+        assert_eq!(rig.get::<Joints>("velocity").is_some(), is_there);
+        assert_eq!(rig.get::<f64>("share").is_some(), is_there);
     }
 }
 
 #[test]
-fn a_held_twist_counts_until_it_is_too_old_and_generated_motion_never_is() {
-    let chain = lwr();
-    for (stamp, lasts) in [(None, 5), (Some(Stamp::TIMELESS), 50)] {
+fn a_joint_at_its_limit_stops_the_task_and_the_share_says_so() {
+    let (chain, push) = (lwr(), [0.0, 0.0, 0.05, 0.0, 0.0, 0.0]);
+    let share = |q: &[f64; 7], scale: f64| {
         let mut rig = rig("").unwrap();
-        set_arm(&mut rig, &chain, &BENT);
-        let stamp = stamp.unwrap_or(Stamp { nanos: rig.tick.now, device: 0 });
-        rig.edit("twist", stamp, |twist: &mut Twist| *twist = Twist([0.01; 6].into()));
+        let columns = set_arm(&mut rig, &chain, q);
+        let pose = chain.forward(q, &mut columns.clone());
+        rig.set("twist", spatial(&pose, push.map(|x| scale * x)));
         rig.step();
-        let full = velocity(&rig);
-        for tick in 1..=50 {
-            set_arm(&mut rig, &chain, &BENT);
-            rig.step();
-            assert_eq!(velocity(&rig) == full, tick <= lasts, "tick {tick}");
-        }
+        (*rig.get::<f64>("share").unwrap(), velocity(&rig))
+    };
+    let (free, small) = share(&BENT, 1e-3);
+    assert_eq!(free, 1.0);
+    let (slowed, fast) = share(&BENT, 1000.0);
+    assert!(slowed > 0.0 && slowed < 0.1, "{slowed}");
+    for (fast, small) in fast.iter().zip(small) {
+        assert!((fast - slowed * 1e6 * small).abs() < 1e-9, "{fast} of {small}");
+    }
+    // The joint that this push moves most stands at either end: toward one of them it would have to move on.
+    let most = (0..7).max_by(|i, j| small[*i].abs().total_cmp(&small[*j].abs())).unwrap();
+    let joint = &chain.joints()[most];
+    let mut shares = [joint.lower, joint.upper].map(|end| {
+        let mut q = BENT;
+        q[most] = end;
+        let (share, velocity) = share(&q, 1.0);
+        assert_eq!(share == 0.0, velocity == [0.0; 7]);
+        share
+    });
+    shares.sort_by(f64::total_cmp);
+    assert_eq!(shares, [0.0, 1.0], "and the other end it leaves");
+}
+
+#[test]
+fn what_is_no_number_is_no_panic() {
+    type Spoil = fn(&mut NodeRig, Stamp);
+    let spoils: [Spoil; 4] = [
+        |rig, now| rig.edit("twist", now, |twist: &mut Twist| twist.0[0] = f64::NAN),
+        |rig, now| rig.edit("sensor_pose", now, |pose: &mut Pose| pose.0.translation.vector.x = f64::NAN),
+        |rig, now| rig.edit("jacobian", now, |jacobian: &mut Jacobian| jacobian.0[0].0[0] = f64::NAN),
+        |rig, now| rig.edit("joints", now, |joints: &mut Joints| joints.0[0] = f64::NAN),
+    ];
+    for spoil in spoils {
+        let (chain, mut rig) = (lwr(), rig("posture = [0, 0.5, 0, -1, 0, 1, 0]").unwrap());
+        set_arm(&mut rig, &chain, &BENT);
+        rig.set("twist", Twist([0.01; 6].into()));
+        let now = Stamp { nanos: rig.tick.now, device: 0 };
+        spoil(&mut rig, now);
+        rig.step();
     }
 }
 
@@ -237,8 +234,12 @@ fn bad_settings() {
     }
     let joints = JointsShape { joints: lwr().joints().to_vec(), unit: Unit::RADIAN };
     let fewer = JointsShape { joints: joints.joints[..6].to_vec(), unit: Unit::RADIAN };
-    let wires =
-        [("sensor_pose", PoseShape.into()), ("jacobian", JacobianShape(fewer).into()), ("joints", joints.into())];
+    let wires = [
+        ("twist", TwistShape.into()),
+        ("sensor_pose", PoseShape.into()),
+        ("jacobian", JacobianShape(fewer).into()),
+        ("joints", joints.into()),
+    ];
     let mistakes = NodeRig::new::<IkSink>("", &wires).err().unwrap();
     assert_eq!(mistakes[0].at, At::Input("jacobian".into()));
 }

@@ -3,26 +3,36 @@
 use tactflow_runtime::node::{NonNegative, Param, Positive, Reader, Value, read_leaf};
 use tactflow_runtime::params;
 
-use super::nanos;
+use crate::devices::nanos;
 
 /// A way to misbehave.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Trouble {
     /// The last frame comes again and again, under its old sequence number.
     Repeat,
+    /// The last frame comes again and again, under new sequence numbers and stamps: a stuck sensor.
+    Freeze,
     /// No frame comes.
     Silence,
     /// One cell is not a number.
     Nan,
     /// The stamps lie before those that were.
     Back,
+    /// The device fails, and a plug that was out does not come back by itself.
+    Unplug,
 }
 
-const TROUBLES: [(&str, Trouble); 4] =
-    [("repeat", Trouble::Repeat), ("silence", Trouble::Silence), ("nan", Trouble::Nan), ("back", Trouble::Back)];
+const TROUBLES: [(&str, Trouble); 6] = [
+    ("repeat", Trouble::Repeat),
+    ("freeze", Trouble::Freeze),
+    ("silence", Trouble::Silence),
+    ("nan", Trouble::Nan),
+    ("back", Trouble::Back),
+    ("unplug", Trouble::Unplug),
+];
 
 impl Param for Trouble {
-    const EXPECTS: &'static str = "`repeat`, `silence`, `nan` or `back`";
+    const EXPECTS: &'static str = "`repeat`, `freeze`, `silence`, `nan`, `back` or `unplug`";
 
     fn read(value: &Value, reader: &mut Reader<'_>) -> Option<Self> {
         let name: String = read_leaf(value, reader, Self::EXPECTS)?;

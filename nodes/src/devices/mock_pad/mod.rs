@@ -12,7 +12,7 @@ use tactflow_runtime::node::{Count, Mistake, Mistakes, NonNegative, Positive, Ra
 use tactflow_runtime::params;
 use tactflow_runtime::signal::{Image, ImageShape, Unit};
 
-use super::period_of;
+use super::{nanos, period_of};
 
 pub use glitch::{Glitch, Trouble};
 pub use press::Press;
@@ -73,8 +73,9 @@ impl Device for MockPad {
         bar, that comes, moves and goes as it is told. Its tactels sum to its `force` while it is on the pad, and it \
         slides off smoothly. There is no foam, no noise and no hysteresis: the pad is for trying out a graph and for \
         tests whose result is known, not for tuning gains.\n\n\
-        A `glitch` makes it misbehave for a while: `repeat` shows an old frame again, `silence` none, `nan` a value \
-        that is no number, `back` stamps that lie in the past. A graph should be tried with each of them.\n\n\
+        A `glitch` makes it misbehave for a while: `repeat` shows an old frame again, `freeze` shows it as if it were \
+        new, `silence` shows none, `nan` a value that is no number, `back` stamps that lie in the past; with `unplug` \
+        the device fails, and stays failed also after `for_s`. A graph should be tried with each of them.\n\n\
         It states the facts `dead` (no tactel is) and `threshold`.";
     const EXAMPLE: &'static str = r#"
 [roles]
@@ -160,12 +161,18 @@ impl MockPad {
         match self.glitch(frame).map(|glitch| (glitch.kind, glitch.start())) {
             // What was served last comes once more; before anything was, there is nothing to repeat.
             Some((Trouble::Repeat, _)) => self.served.map(plain),
+            // A stuck sensor: before anything was served it is stuck with this one.
+            Some((Trouble::Freeze, _)) => {
+                let stuck = *self.served.get_or_insert(frame);
+                Some(Due { frame: stuck, ..plain(frame) })
+            }
             Some((Trouble::Nan, _)) => Some(Due { is_nan: true, ..plain(frame) }),
             // The clock runs back from the glitch's start, so that every stamp lies before the last good one.
             Some((Trouble::Back, start)) => {
                 Some(Due { stamp: start - (time - start) - 2 * self.period, ..plain(frame) })
             }
-            Some((Trouble::Silence, _)) | None => {
+            // An unplugged pad fails in `exchange`, before it is asked what is due.
+            Some((Trouble::Silence | Trouble::Unplug, _)) | None => {
                 self.served = Some(frame);
                 Some(plain(frame))
             }
@@ -194,16 +201,14 @@ impl Stepped for MockPad {
     }
 
     fn exchange(&mut self, now: i64, _: &Commands, samples: &mut Samples) -> Result<(), DeviceError> {
+        if self.glitches.iter().any(|glitch| glitch.kind == Trouble::Unplug && now >= glitch.start()) {
+            return Err(DeviceError("its plug is out".into()));
+        }
         if let Some(due) = self.due(now) {
             self.render(due, samples.write::<Image>(0, due.stamp, due.sequence).cells_mut());
         }
         Ok(())
     }
-}
-
-/// Seconds as nanoseconds; what does not fit is for ever.
-fn nanos(seconds: f64) -> i64 {
-    (seconds * 1e9).round() as i64
 }
 
 #[cfg(test)]

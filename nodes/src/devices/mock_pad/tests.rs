@@ -106,6 +106,10 @@ fn glitches() {
             "repeat",
             [Some((0, 1, false)), Some((4, 2, false)), Some((4, 2, false)), Some((4, 2, false)), Some((16, 5, false))],
         ),
+        (
+            "freeze",
+            [Some((0, 1, false)), Some((4, 2, false)), Some((8, 3, false)), Some((12, 4, false)), Some((16, 5, false))],
+        ),
         ("silence", [Some((0, 1, false)), Some((4, 2, false)), None, None, Some((16, 5, false))]),
         (
             "nan",
@@ -124,6 +128,32 @@ fn glitches() {
     let mut bench = Bench::new(open::<MockPad>(&script("nan")).unwrap());
     bench.exchange(8 * MS);
     assert!(!bench.samples.write::<Image>(0, 0, 0).is_finite());
+}
+
+#[test]
+fn a_frozen_pad_shows_one_image_under_new_stamps() {
+    let moving = "press = [{ speed = [0.5, 0] }]\nglitch = [{ at_s = 0.008, for_s = 0.008, kind = 'freeze' }]";
+    let mut bench = Bench::new(open::<MockPad>(moving).unwrap());
+    let cells = [0, 4, 8, 12, 16].map(|ms| {
+        bench.exchange(ms * MS);
+        // What was written stays until the next exchange.
+        bench.samples.write::<Image>(0, 0, 0).cells().to_vec()
+    });
+    let same: Vec<bool> = cells.windows(2).map(|pair| pair[0] == pair[1]).collect();
+    assert_eq!(same, [false, true, true, false]);
+    let mut stuck = pad("glitch = [{ at_s = 0, for_s = 1, kind = 'freeze' }]");
+    let due = [8, 12].map(|ms| stuck.due(ms * MS).map(|due| (due.frame, due.sequence)));
+    assert_eq!(due, [Some((2, 3)), Some((2, 4))], "with what it saw first");
+}
+
+#[test]
+fn an_unplugged_pad_fails_and_stays_failed() {
+    let mut bench = Bench::new(open::<MockPad>("glitch = [{ at_s = 0.008, for_s = 0.004, kind = 'unplug' }]").unwrap());
+    let mut exchange = |ms: i64| bench.device.exchange(ms * MS, &bench.commands, &mut bench.samples);
+    assert_eq!((exchange(0), exchange(4)), (Ok(()), Ok(())));
+    for ms in [8, 12, 500] {
+        assert_eq!(exchange(ms), Err(DeviceError("its plug is out".into())), "{ms}");
+    }
 }
 
 #[test]
@@ -147,7 +177,10 @@ fn bad_settings() {
         ("press = [{ radius = 0.001 }]", "a bump of radius 0.001 m falls between tactels that are 0.005 m apart"),
         ("press = [{ radius = 9 }]", "a bump of 18 m is wider than 1000 tactels"),
         ("rate_hz = 1e9", "expected a rate from 0.001"),
-        ("glitch = [{ at_s = 0, for_s = 1, kind = 'sulk' }]", "expected `repeat`, `silence`, `nan` or `back`, found"),
+        (
+            "glitch = [{ at_s = 0, for_s = 1, kind = 'sulk' }]",
+            "expected `repeat`, `freeze`, `silence`, `nan`, `back` or `unplug`, found",
+        ),
         ("glitch = [{ at_s = -1, for_s = 1, kind = 'nan' }]", "expected a number, 0 or more"),
     ];
     for (params, message) in cases {
