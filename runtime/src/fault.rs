@@ -11,6 +11,22 @@ pub enum Cause {
     Panicked(String),
     /// A device failed.
     Device(String),
+    /// The newest sample of a role is too old.
+    Stale {
+        /// How old it is [ns].
+        age: i64,
+        /// How old it may be [ns].
+        max_age: i64,
+    },
+    /// The clock device is silent.
+    SilentClock,
+    /// A tick began too late.
+    Late {
+        /// By how much [ns].
+        by: i64,
+    },
+    /// The operator wanted it.
+    Operator,
     /// A mode came to what it calls a failure.
     Mode(String),
 }
@@ -41,11 +57,22 @@ impl fmt::Display for Fault {
         match &self.cause {
             Cause::NotFinite => write!(f, "`{name}` is not a finite number")?,
             Cause::Panicked(message) => write!(f, "node `{name}` panicked: {message}")?,
+            Cause::Stale { age, max_age } => {
+                write!(f, "`{name}` is {:.1} ms old, and may be {:.1} ms old", ms(*age), ms(*max_age))?;
+            }
+            Cause::SilentClock => write!(f, "the clock device `{name}` is silent")?,
+            Cause::Late { by } => write!(f, "a tick began {:.1} ms late", ms(*by))?,
+            Cause::Operator => write!(f, "the operator stopped it")?,
             Cause::Mode(why) => write!(f, "mode `{name}` failed: {why}")?,
             Cause::Device(message) => write!(f, "device `{name}` failed: {message}")?,
         }
-        write!(f, " in tick {} at {:.3} s ({})", self.tick, self.time as f64 * 1e-9, self.place)
+        write!(f, " in tick {} at {:.3} s", self.tick, self.time as f64 * 1e-9)?;
+        if self.place.is_empty() { Ok(()) } else { write!(f, " ({})", self.place) }
     }
+}
+
+fn ms(nanos: i64) -> f64 {
+    nanos as f64 * 1e-6
 }
 
 impl std::error::Error for Fault {}

@@ -19,7 +19,11 @@ use crate::record::{Format, Recorder};
     after_help = "Examples:
   tactflow run graphs/finger_press.toml
   tactflow run graphs/finger_press.toml --for 5s --out press.csv
-  tactflow run graphs/hybrid.toml --set nodes.pid.gains.x.kp=3 --set devices.pad.rate_hz=500"
+  tactflow run graphs/hybrid.toml --set nodes.pid.gains.x.kp=3 --set devices.pad.rate_hz=500
+  tactflow run graphs/hybrid.toml --send 0.8s:stop --send 1.2s:resume
+
+Words: `stop` brings every command to zero, `resume` lets them go on; what else a graph
+waits for is in its modes, as `on = \"word\"`."
 )]
 pub(super) struct Run {
     /// The graph file
@@ -32,6 +36,12 @@ pub(super) struct Run {
     /// Pace the run by the wall clock; otherwise virtual time runs as fast as it can
     #[arg(long)]
     realtime: bool,
+    /// Send a word at a time of the graph, as 2s:resume; may be given several times
+    #[arg(long, value_name = "TIME:WORD", value_parser = word)]
+    send: Vec<(f64, String)>,
+    /// Take words from the standard input while it runs, one a line; needs a real clock
+    #[arg(long)]
+    listen: bool,
     /// Write a row a tick and a column a scalar, as .csv or .ndjson
     #[arg(short, long, value_name = "FILE")]
     out: Option<PathBuf>,
@@ -39,8 +49,8 @@ pub(super) struct Run {
 
 pub(super) fn run(args: Run, shell: &Shell) -> u8 {
     let title = args.graph.display().to_string();
-    let Run { graph, on, duration, realtime, out } = args;
-    Job { request: on.request(graph), title, duration, realtime, out }.run(shell)
+    let Run { graph, on, duration, realtime, send, listen, out } = args;
+    Job { request: on.request(graph), title, duration, realtime, send, listen, out }.run(shell)
 }
 
 /// A run of a graph from the command line.
@@ -53,6 +63,10 @@ pub struct Job {
     pub duration: Option<f64>,
     /// Whether it is paced by the wall clock.
     pub realtime: bool,
+    /// Words that are sent: when, in the graph's time [s], and which.
+    pub send: Vec<(f64, String)>,
+    /// Whether words come in over the standard input.
+    pub listen: bool,
     /// Where each tick is recorded, as .csv or .ndjson.
     pub out: Option<PathBuf>,
 }
@@ -70,6 +84,10 @@ impl Job {
     fn go(&self, plan: Plan, shell: &Shell) -> u8 {
         plan.warnings().iter().for_each(|report| shell.show(report));
         let is_real = self.realtime || plan.is_live();
+        if self.listen && !is_real {
+            shell.error("`--listen` needs a real clock: add `--realtime`, or send words with `--send 2s:resume`");
+            return NOT_LOADED;
+        }
         let mut engine = Engine::new(plan);
         let mut recorder = match self.out.as_deref().map(|path| recorder(path, &engine, !is_real)).transpose() {
             Ok(recorder) => recorder,
@@ -82,7 +100,8 @@ impl Job {
         let mut summary = Summary::new(&engine);
         let mut log = Log::new(&engine);
         let mut progress = Progress::new(self.duration.or_else(|| engine.end().map(seconds)));
-        let options = RunOptions { duration: self.duration, is_realtime: self.realtime };
+        let (sends, listens) = (self.send.clone(), self.listen);
+        let options = RunOptions { duration: self.duration, is_realtime: self.realtime, sends, listens };
         let outcome = quietly(|| {
             engine::run(&mut engine, &options, &mut |engine| {
                 summary.add(engine);
@@ -194,6 +213,14 @@ pub fn duration(text: &str) -> Result<f64, String> {
     match number.trim().parse::<f64>() {
         Ok(number) if number > 0.0 && number.is_finite() => Ok(number * seconds),
         _ => Err(format!("`{number}` is not a number greater than 0")),
+    }
+}
+
+/// A word and when it is sent: `2s:resume`.
+fn word(text: &str) -> Result<(f64, String), String> {
+    match text.split_once(':') {
+        Some((time, word)) if !word.trim().is_empty() => Ok((duration(time)?, word.trim().to_owned())),
+        _ => Err("give a time and a word: 2s:resume".into()),
     }
 }
 

@@ -4,7 +4,7 @@ use std::fmt::Write;
 
 use super::course::Course;
 use super::timeline::Timeline;
-use crate::engine::{Engine, Outcome};
+use crate::engine::{Counters, Engine, Outcome};
 use crate::record::Columns;
 use crate::signal::{Freshness, Shape};
 
@@ -87,10 +87,10 @@ impl Summary {
         text.push('\n');
         text.push_str(&self.timeline.render(engine));
         for ((port, _), counters) in engine.ports().iter().zip(engine.counters()) {
-            if counters.repeated + counters.went_back > 0 {
-                let (repeated, back) = (counters.repeated, counters.went_back);
+            let counted = counted(counters);
+            if !counted.is_empty() {
                 // Writing to a string cannot fail.
-                let _ = writeln!(text, "`{}`: {repeated} samples repeated, {back} dropped for going back", port.name);
+                let _ = writeln!(text, "samples of `{}`: {counted}", port.name);
             }
         }
         if outcome.late > 0 {
@@ -128,6 +128,19 @@ impl Summary {
         }
         table(&rows, 2, 8)
     }
+}
+
+/// What came in and was not as it should be, in words.
+fn counted(counters: &Counters) -> String {
+    let counts = [
+        (counters.repeated, "repeated"),
+        (counters.gaps, "missing in the sequence"),
+        (counters.late, "late by more than a period"),
+        (counters.went_back, "dropped for going back"),
+        (counters.not_finite, "dropped for not being finite"),
+    ];
+    let counts = counts.into_iter().filter(|(count, _)| *count > 0);
+    counts.map(|(count, what)| format!("{count} {what}")).collect::<Vec<_>>().join(", ")
 }
 
 fn nodes(engine: &Engine, outcome: &Outcome) -> String {

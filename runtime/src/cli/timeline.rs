@@ -4,6 +4,7 @@ use std::fmt::Write;
 
 use super::summary::{number, table};
 use crate::engine::{Change, Engine};
+use crate::graph::Policy;
 use crate::node::PortId;
 use crate::signal::{Scalar, Signal};
 
@@ -53,6 +54,7 @@ impl Timeline {
     /// The modes, and what limited the motion; nothing of what the graph does not have.
     pub(super) fn render(&self, engine: &Engine) -> String {
         let mut text = modes(&engine.changes(), engine.now());
+        text.push_str(&halts(engine));
         text.push_str(&self.limits(engine.now()));
         text
     }
@@ -94,6 +96,25 @@ fn modes(changes: &[Change], end: i64) -> String {
     // Writing to a string cannot fail.
     let _ = write!(text, "{}", table(&rows, 1, 3));
     text.push('\n');
+    text
+}
+
+/// When the commands were held, and why.
+fn halts(engine: &Engine) -> String {
+    let mut text = String::new();
+    for halt in engine.halts().iter().take(SHOWN) {
+        let what = if halt.policy == Policy::Stop { "stopped" } else { "held" };
+        let lasted = match halt.until {
+            Some(until) => format!("for {:.3} s", (until - halt.fault.time) as f64 * 1e-9),
+            None => "to the end".to_owned(),
+        };
+        // Writing to a string cannot fail.
+        let _ = writeln!(text, "{what} {lasted}: {}", halt.fault);
+    }
+    let more = engine.halts().len().saturating_sub(SHOWN) as u64 + engine.more_halts();
+    if more > 0 {
+        let _ = writeln!(text, "held or stopped {more} more times");
+    }
     text
 }
 

@@ -66,6 +66,11 @@ impl Commands {
         Self { values: shapes.map(zeros).collect() }
     }
 
+    /// Whether nothing is commanded.
+    pub(crate) fn are_zero(&self) -> bool {
+        self.values.iter().flatten().all(|value| *value == 0.0)
+    }
+
     /// The command of port `port`, one value a joint.
     #[must_use]
     pub fn joints(&self, port: usize) -> &[f64] {

@@ -1,57 +1,100 @@
-//! The runtime's own hand on a device's command: what the graph commands, or a ramp to zero, never the last velocity.
+//! The runtime's own hand on a device's command: what the graph commands, or the way to zero, never the last velocity.
+//!
+//! It follows the graph's command exactly. When nothing drives it any more, or while commands are halted, it goes to zero
+//! in a straight line, as fast as the joints' accelerations allow; and when it may follow again, it catches up by the
+//! same accelerations before it follows.
 
 use crate::device::Commands;
 use crate::graph::PlannedCommand;
 use crate::node::{Bus, PortId};
 use crate::signal::{Joints, Signal};
 
-/// Time in which a command that nothing drives any more goes to zero [s].
-const RAMP: f64 = 0.1;
-
 /// One command port of a device.
 pub(super) struct CommandSlot {
     pub(super) device: usize,
     source: PortId,
     command: usize,
-    /// What is left of the ramp, from 1 to 0.
-    left: f64,
+    /// Greatest acceleration of each joint [rad/s²]; infinite where nothing bounds it.
+    accelerations: Box<[f64]>,
+    /// Whether it has caught up with what the graph commands.
+    follows: bool,
 }
 
 impl CommandSlot {
-    pub(super) const fn new(source: PortId, planned: &PlannedCommand) -> Self {
-        Self { device: planned.device, source, command: planned.command, left: 1.0 }
+    pub(super) fn new(source: PortId, planned: PlannedCommand) -> Self {
+        let PlannedCommand { device, command, accelerations, .. } = planned;
+        Self { device, source, command, accelerations: accelerations.into(), follows: false }
     }
 
-    /// Takes over what the graph commands; ramps on if it commands nothing.
-    pub(super) fn commit(&mut self, bus: &Bus, commands: &mut Commands, dt: f64) {
-        if bus.marks[self.source.mark as usize].is_present() {
-            self.left = 1.0;
-            let Joints(values) = &Joints::arena(&bus.arenas)[self.source.slot as usize];
-            commands.values[self.command].copy_from_slice(values);
-        } else {
+    /// Takes over what the graph commands; goes on toward zero if it commands nothing, or if all is halted.
+    pub(super) fn commit(&mut self, bus: &Bus, commands: &mut Commands, dt: f64, is_halted: bool) {
+        if is_halted || !bus.marks[self.source.mark as usize].is_present() {
             self.ramp(commands, dt);
+            return;
+        }
+        let Joints(wanted) = &Joints::arena(&bus.arenas)[self.source.slot as usize];
+        let values = &mut commands.values[self.command];
+        if self.follows {
+            values.copy_from_slice(wanted);
+        } else {
+            self.follows = approach(values, |i| wanted[i], &self.accelerations, dt);
         }
     }
 
-    /// One step of the ramp of `dt` [s]; whether the command is zero.
+    /// One step of `dt` [s] toward zero; whether the command is zero.
     pub(super) fn ramp(&mut self, commands: &mut Commands, dt: f64) -> bool {
-        let left = (self.left - dt / RAMP).max(0.0);
-        let factor = if self.left > 0.0 { left / self.left } else { 0.0 };
-        commands.values[self.command].iter_mut().for_each(|value| *value *= factor);
-        self.left = left;
-        left <= 0.0
+        self.follows = false;
+        approach(&mut commands.values[self.command], |_| 0.0, &self.accelerations, dt)
     }
+}
+
+/// Moves `values` toward `wanted` on a straight line, no joint by more than its acceleration allows; whether they are
+/// there.
+fn approach(values: &mut [f64], wanted: impl Fn(usize) -> f64, accelerations: &[f64], dt: f64) -> bool {
+    let mut share = 1.0_f64;
+    for (i, (value, acceleration)) in values.iter().zip(accelerations).enumerate() {
+        let (change, most) = ((wanted(i) - value).abs(), acceleration * dt);
+        // Without a bound on the acceleration `most` may be no number, and is no bound.
+        if change > most {
+            share = share.min(most / change);
+        }
+    }
+    for (i, value) in values.iter_mut().enumerate() {
+        *value = if share < 1.0 { *value + (wanted(i) - *value) * share } else { wanted(i) };
+    }
+    share >= 1.0
 }
 
 #[cfg(test)]
 mod tests {
+    use proptest::prelude::*;
+
     use super::*;
+    use crate::signal::{JointsShape, Stamp};
+
+    /// A slot for two joints, and the bus its command comes over.
+    fn slot(accelerations: [f64; 2]) -> (CommandSlot, Bus, Commands) {
+        let mut bus = Bus::default();
+        let source = bus.add(&JointsShape { joints: vec![Default::default(); 2], ..Default::default() }.into());
+        let slot = CommandSlot { device: 0, source, command: 0, accelerations: accelerations.into(), follows: false };
+        (slot, bus, Commands { values: vec![vec![0.0, 0.0].into()] })
+    }
+
+    fn drive(bus: &mut Bus, slot: &CommandSlot, wanted: Option<[f64; 2]>) {
+        let mark = &mut bus.marks[slot.source.mark as usize];
+        match wanted {
+            Some(wanted) => {
+                mark.renew(1, Stamp::TIMELESS);
+                Joints::arena_mut(&mut bus.arenas)[slot.source.slot as usize].0.copy_from_slice(&wanted);
+            }
+            None => mark.lose(1),
+        }
+    }
 
     #[test]
     fn a_ramp_is_linear_and_ends_at_zero() {
-        let source = PortId::NONE;
-        let mut slot = CommandSlot { device: 0, source, command: 0, left: 1.0 };
-        let mut commands = Commands { values: vec![vec![2.0, -1.0].into()] };
+        let (mut slot, _, mut commands) = slot([20.0, 20.0]);
+        commands.values[0].copy_from_slice(&[2.0, -1.0]);
         let mut last = 2.0;
         for step in 1..=10 {
             let is_still = slot.ramp(&mut commands, 0.01);
@@ -63,5 +106,42 @@ mod tests {
         }
         assert!(slot.ramp(&mut commands, 0.01));
         assert_eq!(commands.joints(0), [0.0, 0.0]);
+    }
+
+    #[test]
+    fn without_a_bound_on_the_acceleration_it_is_there_at_once() {
+        let (mut slot, mut bus, mut commands) = slot([f64::INFINITY; 2]);
+        drive(&mut bus, &slot, Some([3.0, 4.0]));
+        slot.commit(&bus, &mut commands, 0.0, false);
+        assert_eq!(commands.joints(0), [3.0, 4.0]);
+        slot.commit(&bus, &mut commands, 0.0, true);
+        assert_eq!(commands.joints(0), [0.0, 0.0]);
+    }
+
+    proptest! {
+        #[test]
+        fn it_never_steps_and_never_holds_what_nothing_drives(
+            what in prop::collection::vec((prop::option::of(prop::array::uniform2(-1.0..1.0f64)), any::<bool>()), 1..60),
+            dt in 0.0..0.02f64,
+        ) {
+            let accelerations = [5.0, 2.0];
+            let (mut slot, mut bus, mut commands) = slot(accelerations);
+            // A command that changes as it may, as a limiter gives it.
+            let (mut given, mut last) = ([0.0; 2], [0.0; 2]);
+            for (wanted, is_halted) in what {
+                if let Some(wanted) = wanted {
+                    approach(&mut given, |i| wanted[i], &accelerations, dt);
+                }
+                drive(&mut bus, &slot, wanted.map(|_| given));
+                slot.commit(&bus, &mut commands, dt, is_halted);
+                let now: [f64; 2] = commands.joints(0).try_into().unwrap();
+                for i in 0..2 {
+                    prop_assert!((now[i] - last[i]).abs() <= accelerations[i] * dt + 1e-12);
+                    let is_driven = wanted.is_some() && !is_halted;
+                    prop_assert!(is_driven || now[i].abs() < last[i].abs() || now[i] == 0.0 || dt == 0.0);
+                }
+                last = now;
+            }
+        }
     }
 }

@@ -1,8 +1,9 @@
 //! Where a device's samples come into the graph: each counts as new once, and none goes back in time.
 
 use crate::device::Samples;
+use crate::graph::{PlannedRole, Policy};
 use crate::node::{Bus, PortId};
-use crate::signal::{Kind, Shape, Stamp};
+use crate::signal::{Kind, Stamp};
 
 /// What came in on a port.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -11,8 +12,14 @@ pub struct Counters {
     pub new: u64,
     /// Samples that were there already: the same sequence number or the same stamp.
     pub repeated: u64,
+    /// Sequence numbers that never came.
+    pub gaps: u64,
+    /// Samples that were older than a period of their device when they came in.
+    pub late: u64,
     /// Samples that were dropped because they are older than the last.
     pub went_back: u64,
+    /// Samples that were dropped because they are not finite.
+    pub not_finite: u64,
 }
 
 /// A role's port and the device's port behind it.
@@ -24,17 +31,25 @@ pub(super) struct Inlet {
     id: PortId,
     /// Writes of the device that were seen.
     writes: u64,
+    /// How old the newest sample may be, and a period of its device [ns].
+    max_age: i64,
+    period: i64,
+    /// What it does when it is older.
+    pub(super) stale: Policy,
     /// Stamp and sequence number of the last sample that was new.
     last: Option<(i64, u64)>,
 }
 
 impl Inlet {
-    pub(super) const fn new(shape: &Shape, device: usize, port: usize, id: PortId) -> Self {
+    pub(super) fn new(role: &PlannedRole, port: usize, id: PortId) -> Self {
         Self {
-            device,
-            counters: Counters { new: 0, repeated: 0, went_back: 0 },
-            kind: shape.kind(),
-            port,
+            device: role.device,
+            counters: Counters::default(),
+            kind: role.ports[port].shape.kind(),
+            port: role.first_port + port,
+            max_age: role.max_age,
+            period: role.period,
+            stale: role.stale,
             id,
             writes: 0,
             last: None,
@@ -48,12 +63,13 @@ impl Inlet {
     }
 
     /// Takes the newest sample over, if there is one. The buffers are exchanged, not copied.
-    pub(super) fn latch(&mut self, samples: &mut Samples, bus: &mut Bus, tick: u64) {
+    pub(super) fn latch(&mut self, samples: &mut Samples, bus: &mut Bus, tick: u64, now: i64) {
         let sample = samples.ports[self.port];
         if sample.writes == self.writes {
             return;
         }
         self.writes = sample.writes;
+        let missing = self.last.map_or(0, |(_, last)| sample.sequence.saturating_sub(last + 1));
         match self.last {
             Some((_, sequence)) if sequence == sample.sequence => self.counters.repeated += 1,
             Some((stamp, _)) if sample.stamp == stamp => self.counters.repeated += 1,
@@ -61,10 +77,32 @@ impl Inlet {
             _ => {
                 self.last = Some((sample.stamp, sample.sequence));
                 self.counters.new += 1;
+                self.counters.gaps += missing;
+                self.counters.late += u64::from(now - sample.stamp > self.period);
                 bus.arenas.swap(self.kind, self.id.slot, &mut samples.arenas, sample.slot);
                 bus.marks[self.id.mark as usize].renew(tick, Stamp { nanos: sample.stamp, device: self.device as u16 });
             }
         }
+    }
+
+    /// Drops a sample that is not finite.
+    pub(super) fn reject(&mut self, samples: &Samples) {
+        self.writes = samples.ports[self.port].writes;
+        self.counters.not_finite += 1;
+    }
+
+    /// Whether there was a sample, and the newest is too old at `now` [ns]; what is only counted is not asked.
+    pub(super) fn is_stale(&self, now: i64) -> bool {
+        self.stale != Policy::Count && self.age(now).is_some_and(|age| age > self.max_age)
+    }
+
+    /// Age of the newest sample at `now`, if there is one, and how old it may be [ns].
+    pub(super) fn ages(&self, now: i64) -> (i64, i64) {
+        (self.age(now).unwrap_or(0), self.max_age)
+    }
+
+    fn age(&self, now: i64) -> Option<i64> {
+        self.last.map(|(stamp, _)| now - stamp)
     }
 
     /// Hands the value back as if the device had sampled it again at `now`.

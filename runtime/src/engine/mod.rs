@@ -2,26 +2,28 @@
 //! what it is made of (`station`, `inlet`, `command`) name no lock, no clock and no tokio. `timeline` says when the
 //! next tick is; `shell` is the edge to real time, to live devices and to the operator.
 
+mod build;
 mod command;
+mod course;
+mod halt;
 mod inlet;
 mod modes;
 mod shell;
 mod station;
 mod tick;
 mod timeline;
+mod trouble;
+mod words;
 
-use std::panic::{AssertUnwindSafe, catch_unwind};
-
-use crate::device::{Commands, DeviceError, Driver, Linked, Live, Samples, Stepped};
-use crate::fault::{Cause, Fault};
-use crate::graph::{Plan, PlannedPort, Producer, Source, Sources};
-use crate::node::{Bus, PortId, Tick};
-use crate::signal::Stamp;
-use command::CommandSlot;
-use inlet::Inlet;
-use modes::{Modes, Verdict};
+use crate::device::{Commands, Linked, Live, Samples, Stepped};
+use crate::graph::{PlannedPort, Policy, PolicyTable, Sources};
+use crate::node::{Bus, PortId};
+use halt::Halts;
+use modes::Modes;
 use timeline::Timeline;
+use trouble::Trouble;
 
+pub use halt::Halt;
 pub use inlet::Counters;
 pub use modes::Change;
 pub use shell::{End, Outcome, RunOptions, run};
@@ -44,6 +46,16 @@ pub struct Engine {
     timing: Timing,
     modes: Option<Modes>,
     is_done: bool,
+    policy: PolicyTable,
+    halts: Halts,
+    /// What went wrong in this tick, and what it does; the strictest.
+    trouble: Option<(Policy, Trouble)>,
+    /// What the last panic had to say.
+    panic: String,
+    /// A word from outside that no mode has seen yet.
+    sent: Option<String>,
+    /// Ticks that began too late.
+    late: u64,
     sources: Sources,
 }
 
@@ -65,6 +77,8 @@ struct Deck {
     samples: Samples,
     commands: Commands,
     edge: Edge,
+    /// Why it failed, if it did.
+    failed: Option<String>,
 }
 
 enum Edge {
@@ -77,93 +91,6 @@ enum Edge {
 }
 
 impl Engine {
-    /// Allocates everything that the plan needs; nothing allocates in a tick.
-    #[must_use]
-    pub fn new(plan: Plan) -> Self {
-        let mut bus = Bus::default();
-        let mut ids = std::collections::BTreeMap::new();
-        let mut ports = Vec::new();
-        let mut inlets = Vec::new();
-        let mut kinds = std::collections::BTreeMap::new();
-        for (i, role) in plan.roles.iter().enumerate() {
-            for (port, planned) in role.ports.iter().enumerate() {
-                let id = bus.add(&planned.shape);
-                ids.insert(Source { producer: Producer::Role(i), port }, id);
-                kinds.insert(Source { producer: Producer::Role(i), port }, (id, planned.shape.kind()));
-                inlets.push(Inlet::new(&planned.shape, role.device, role.first_port + port, id));
-                ports.push((planned.clone(), id));
-            }
-        }
-        for node in &plan.nodes {
-            for (port, planned) in node.ports.iter().enumerate() {
-                let id = bus.add(&planned.shape);
-                ids.insert(Source { producer: Producer::Node(node.index), port }, id);
-                kinds.insert(Source { producer: Producer::Node(node.index), port }, (id, planned.shape.kind()));
-                ports.push((planned.clone(), id));
-            }
-        }
-        let logged = plan.nodes.iter().filter(|node| node.is_logged).map(|node| {
-            let sources = node.inputs.iter().flat_map(|(_, sources)| sources).map(|source| ids[source]);
-            let port =
-                |id: PortId| ports.iter().find(|(_, known)| *known == id).expect("a wire comes from a port").clone();
-            let due = ids[&Source { producer: Producer::Node(node.index), port: 0 }];
-            Logged { node: node.name.clone(), due, inputs: sources.map(port).collect() }
-        });
-        let logged = logged.collect();
-        let is_share = |name: &str| {
-            plan.nodes.iter().any(|node| node.holds.iter().any(|limit| name == format!("{}.{limit}", node.name)))
-        };
-        let limits = ports.iter().filter(|(port, _)| is_share(&port.name)).map(|(port, id)| (port.name.clone(), *id));
-        let limits = limits.collect();
-        let names = plan.nodes.iter().map(|node| (node.name.clone(), plan.sources.locate(node.span.start))).collect();
-        let place = |device: usize| plan.sources.locate(plan.devices[device].span.start);
-        let roles = plan.roles.iter().map(|role| (role.name.clone(), place(role.device))).collect();
-        let slots = plan.commands.iter().map(|command| CommandSlot::new(ids[&command.source], command)).collect();
-        let decks = plan.devices.into_iter().map(|device| Deck {
-            place: plan.sources.locate(device.span.start),
-            name: device.name,
-            samples: Samples::with_shapes(device.outputs.iter()),
-            commands: Commands::with_shapes(device.commands.iter()),
-            edge: match device.driver {
-                Driver::Stepped(driver) => Edge::Stepped(driver),
-                Driver::Live(driver) => Edge::Idle(driver),
-            },
-        });
-        let decks: Vec<Deck> = decks.collect();
-        let station = |node: crate::graph::PlannedNode| {
-            let inputs: Vec<_> =
-                node.inputs.iter().map(|(need, from)| (*need, from.iter().map(|s| ids[s]).collect())).collect();
-            let outputs = (0..node.ports.len()).map(|port| ids[&Source { producer: Producer::Node(node.index), port }]);
-            Station::new(node.node, &inputs, outputs.collect(), node.is_every_tick)
-        };
-        let stations: Vec<Station> = plan.nodes.into_iter().map(station).collect();
-        let tick = Tick {
-            index: 0,
-            now: 0,
-            dt: 0.0,
-            stamp: Stamp::TIMELESS,
-            max_gap: plan.max_gap,
-            reset_after: plan.reset_after,
-        };
-        let (timing, mut core) = (Timing::new(stations.len()), tick::Core::new(bus, stations, inlets, slots, tick));
-        let modes = plan.modes.map(|modes| Modes::new(modes, &kinds));
-        modes.iter().for_each(|modes| core.switch(modes.configurations()));
-        Self {
-            timing,
-            core,
-            modes,
-            is_done: false,
-            decks,
-            timeline: Timeline::new(plan.clock, plan.period),
-            ports,
-            logged,
-            limits,
-            names,
-            roles,
-            sources: plan.sources,
-        }
-    }
-
     /// Time of the next tick in virtual time [ns]; `None` when a device has ended.
     #[must_use]
     pub fn next(&self) -> Option<i64> {
@@ -177,43 +104,6 @@ impl Engine {
             }
         }
         Some(self.timeline.next(clock))
-    }
-
-    /// Runs the tick at `now` [ns]: exchange with the devices, then latch, step and commit.
-    ///
-    /// # Errors
-    /// The reason of a fault; nothing was commanded in this tick.
-    pub fn tick(&mut self, now: i64) -> Result<(), Fault> {
-        self.exchange(now)?;
-        self.step()
-    }
-
-    /// The second half of a tick: latch, step, commit. It neither allocates nor calls the operating system.
-    ///
-    /// # Errors
-    /// The reason of a fault; nothing was commanded in this tick.
-    pub fn step(&mut self) -> Result<(), Fault> {
-        match catch_unwind(AssertUnwindSafe(|| self.core.run(&mut self.decks, &mut self.timing))) {
-            Ok(true) => self.decide(),
-            Ok(false) => Err(self.first_not_finite()),
-            Err(panic) => Err(self.panicked(&*panic)),
-        }
-    }
-
-    /// The boundary between two ticks: another mode, if the conditions of the present one say so.
-    fn decide(&mut self) -> Result<(), Fault> {
-        let Some(modes) = &mut self.modes else { return Ok(()) };
-        match modes.decide(&self.core.bus, &self.core.tick, None) {
-            Verdict::Stay => {}
-            Verdict::Switched => self.core.switch(modes.configurations()),
-            Verdict::Done => self.is_done = true,
-            Verdict::Failed => {
-                let ((why, place), name) = (modes.taken(), modes.name().to_owned());
-                let (why, place) = (Cause::Mode(why.to_owned()), self.sources.locate(place));
-                return Err(self.fault(&name, None, why, place));
-            }
-        }
-        Ok(())
     }
 
     /// Whether a mode says that the task is done.
@@ -234,96 +124,28 @@ impl Engine {
         self.modes.iter().flat_map(Modes::changes).collect()
     }
 
-    /// Time of a stepped clock device's next sample.
-    fn clock_sample(&self) -> Option<i64> {
-        self.decks.iter().enumerate().find_map(|(i, deck)| match &deck.edge {
-            Edge::Stepped(driver) if self.timeline.is_clock(i) => driver.next(),
-            _ => None,
-        })
+    /// Every time in which the commands were held, with its reason, up to a thousand.
+    #[must_use]
+    pub fn halts(&self) -> &[Halt] {
+        self.halts.list()
     }
 
-    /// The first half of a tick at `now` [ns]: hands the commands of the last tick to the devices and takes what they
-    /// have sampled since.
-    ///
-    /// # Errors
-    /// If a device fails.
-    pub fn exchange(&mut self, now: i64) -> Result<(), Fault> {
-        let due = self.clock_sample().is_some_and(|sample| sample <= now);
-        self.core.begin(now);
-        let has_sampled = self.exchange_with_devices(now)? || due;
-        self.timeline.ticked(now, has_sampled);
-        let decks = &self.decks;
-        match self.core.inlets.iter().position(|inlet| !inlet.is_finite(&decks[inlet.device].samples)) {
-            // The ports of the roles come first, an inlet each.
-            Some(inlet) => Err(self.not_finite(&self.ports[inlet].0)),
-            None => Ok(()),
-        }
+    /// Times in which the commands were held that are not in [that list](Self::halts).
+    #[must_use]
+    pub const fn more_halts(&self) -> u64 {
+        self.halts.more
     }
 
-    /// Whether a live clock device has sampled.
-    fn exchange_with_devices(&mut self, now: i64) -> Result<bool, Fault> {
-        let mut has_sampled = false;
-        for (i, deck) in self.decks.iter_mut().enumerate() {
-            match &mut deck.edge {
-                Edge::Stepped(driver) => {
-                    let exchange = || driver.exchange(now, &deck.commands, &mut deck.samples);
-                    let result = catch_unwind(AssertUnwindSafe(exchange));
-                    let failed =
-                        result.unwrap_or_else(|panic| Err(DeviceError(format!("it panicked: {}", said(&*panic)))));
-                    if let Err(error) = failed {
-                        deck.edge = Edge::Gone;
-                        return Err(Fault {
-                            node: deck.name.clone(),
-                            port: None,
-                            tick: self.core.tick.index,
-                            time: now,
-                            cause: Cause::Device(error.0),
-                            place: deck.place.clone(),
-                        });
-                    }
-                }
-                Edge::Live(linked) => {
-                    let is_newer = linked.exchange(&deck.commands, &mut deck.samples);
-                    has_sampled |= is_newer && self.timeline.is_clock(i);
-                }
-                Edge::Idle(_) | Edge::Gone => {}
-            }
-        }
-        Ok(has_sampled)
+    /// Whether the commands wait for the operator.
+    #[must_use]
+    pub fn is_stopped(&self) -> bool {
+        self.halts.is_stopped()
     }
 
-    /// One period of the end of a run: the commands go one step further down to zero, and the devices are told.
-    /// Whether they are zero.
-    pub fn wind_down(&mut self) -> bool {
-        let now = self.core.tick.now + self.timeline.period();
-        self.core.begin(now);
-        let is_still = self.core.ramp(&mut self.decks, self.timeline.period() as f64 * 1e-9);
-        // A device that fails now has had its zero or will time out by itself; the reason of the stop stays the first.
-        let _ = self.exchange_with_devices(now);
-        is_still
-    }
-
-    /// Ports stand in the order in which they are written, so the first that is not finite is the one that made it so.
-    fn first_not_finite(&self) -> Fault {
-        let is_bad = |(port, id): &&(PlannedPort, PortId)| !self.core.bus.arenas.is_finite(port.shape.kind(), id.slot);
-        let (port, _) = self.ports.iter().find(is_bad).expect("one of them is not finite");
-        self.not_finite(port)
-    }
-
-    fn not_finite(&self, port: &PlannedPort) -> Fault {
-        let (node, name) = port.name.rsplit_once('.').expect("a port's name has two parts");
-        let (_, place) =
-            self.names.iter().chain(&self.roles).find(|(known, _)| known == node).expect("a port has an owner");
-        self.fault(node, Some(name.to_owned()), Cause::NotFinite, place.clone())
-    }
-
-    fn panicked(&self, panic: &(dyn std::any::Any + Send)) -> Fault {
-        let (node, place) = &self.names[self.core.current()];
-        self.fault(node, None, Cause::Panicked(said(panic)), place.clone())
-    }
-
-    fn fault(&self, node: &str, port: Option<String>, cause: Cause, place: String) -> Fault {
-        Fault { node: node.into(), port, tick: self.core.tick.index, time: self.core.tick.now, cause, place }
+    /// Ticks that began too late.
+    #[must_use]
+    pub const fn late(&self) -> u64 {
+        self.late
     }
 
     /// Time of the last sample that the clock device will give, if it knows [ns].
@@ -417,10 +239,4 @@ impl Engine {
     pub fn step_bare(&mut self) {
         self.core.run_bare(&mut self.decks);
     }
-}
-
-/// What a panic had to say.
-fn said(panic: &(dyn std::any::Any + Send)) -> String {
-    let text = panic.downcast_ref::<&str>().map(|text| (*text).to_owned());
-    text.or_else(|| panic.downcast_ref::<String>().cloned()).unwrap_or_else(|| "no message".into())
 }

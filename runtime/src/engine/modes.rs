@@ -20,7 +20,7 @@ const MOST_CHANGES: usize = 10_000;
 pub struct Change {
     /// Time of the tick after which it was [ns].
     pub time: i64,
-    /// Number of that tick; 0 for the start.
+    /// Number of that tick.
     pub tick: u64,
     /// Name of the mode that begins.
     pub mode: String,
@@ -48,9 +48,19 @@ pub(super) struct Modes {
     entered: Option<i64>,
     /// The exit that was taken last.
     taken: usize,
-    /// Time, tick, mode that began and exit that was taken of the one before.
-    changes: Vec<(i64, u64, usize, Option<(usize, usize)>)>,
+    /// Time, tick, mode that began and why.
+    changes: Vec<(i64, u64, usize, Why)>,
     start: usize,
+}
+
+/// Why a mode began.
+#[derive(Debug, Clone, Copy)]
+enum Why {
+    Start,
+    /// The operator let the commands go on after a stop.
+    Resumed,
+    /// An exit of a mode.
+    Exit(usize, usize),
 }
 
 struct Mode {
@@ -136,13 +146,13 @@ impl Modes {
 
     /// Begins at the start again: after a stop nothing is known of what the robot touches.
     pub(super) fn restart(&mut self, tick: &Tick) {
-        self.enter(self.start, None, tick);
+        self.enter(self.start, Why::Resumed, tick);
     }
 
     /// Looks at the conditions with what the tick has left on the bus, and a word that was sent.
     pub(super) fn decide(&mut self, bus: &Bus, tick: &Tick, sent: Option<&str>) -> Verdict {
         if self.entered.is_none() {
-            self.enter(self.now, None, tick);
+            self.enter(self.now, Why::Start, tick);
         }
         let entered = self.entered.unwrap_or(tick.now);
         let mut chosen = None;
@@ -159,18 +169,18 @@ impl Modes {
             (Sort::Fail, _) => Verdict::Failed,
             (Sort::Done, _) | (_, None) => Verdict::Done,
             (Sort::OnLost | Sort::Go, Some(to)) => {
-                self.enter(to, Some((self.now, chosen)), tick);
+                self.enter(to, Why::Exit(self.now, chosen), tick);
                 Verdict::Switched
             }
         }
     }
 
-    fn enter(&mut self, mode: usize, by: Option<(usize, usize)>, tick: &Tick) {
+    fn enter(&mut self, mode: usize, why: Why, tick: &Tick) {
         self.now = mode;
         self.entered = Some(tick.now);
         self.modes[mode].exits.iter_mut().for_each(|exit| exit.memory = Memory::default());
         if self.changes.len() < MOST_CHANGES {
-            self.changes.push((tick.now, if by.is_some() { tick.index } else { 0 }, mode, by));
+            self.changes.push((tick.now, tick.index, mode, why));
         }
     }
 
@@ -187,11 +197,15 @@ impl Modes {
 
     /// Every change so far, the start first.
     pub(super) fn changes(&self) -> impl Iterator<Item = Change> {
-        self.changes.iter().map(|(time, tick, mode, by)| Change {
+        self.changes.iter().map(|(time, tick, mode, why)| Change {
             time: *time,
             tick: *tick,
             mode: self.modes[*mode].name.clone(),
-            why: by.map_or_else(String::new, |(mode, exit)| self.modes[mode].exits[exit].planned.text.clone()),
+            why: match *why {
+                Why::Start => String::new(),
+                Why::Resumed => "the operator let it go on".into(),
+                Why::Exit(mode, exit) => self.modes[mode].exits[exit].planned.text.clone(),
+            },
         })
     }
 }

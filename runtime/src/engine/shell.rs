@@ -7,9 +7,10 @@ use tokio::runtime::{Builder, Runtime};
 use tokio::sync::watch;
 use tokio::task::JoinSet;
 
+use super::words::Words;
 use super::{Edge, Engine};
 use crate::device::{DeviceError, link};
-use crate::fault::{Cause, Fault};
+use crate::fault::Fault;
 
 /// How to run.
 #[derive(Debug, Clone, Default)]
@@ -18,6 +19,11 @@ pub struct RunOptions {
     pub duration: Option<f64>,
     /// Whether virtual time is paced by the wall clock; live devices always are.
     pub is_realtime: bool,
+    /// Words that are sent from outside: when, in the graph's time [s], and which. `stop` halts all commands, `resume`
+    /// lets them go on, others are for the modes.
+    pub sends: Vec<(f64, String)>,
+    /// Whether words come in over the standard input, one a line.
+    pub listens: bool,
 }
 
 /// Why a run ended.
@@ -61,7 +67,7 @@ pub fn run(engine: &mut Engine, options: &RunOptions, observe: &mut dyn FnMut(&E
     let end = shell.run(engine, observe);
     let (time, ticks) = (engine.now(), engine.ticks());
     shell.stop(engine);
-    Ok(Outcome { end, time, ticks, wall: shell.epoch.elapsed(), late: shell.late })
+    Ok(Outcome { end, time, ticks, wall: shell.epoch.elapsed(), late: engine.late() })
 }
 
 struct Shell<'a> {
@@ -74,7 +80,7 @@ struct Shell<'a> {
     drivers: JoinSet<Result<(), DeviceError>>,
     /// Which device each driver is of.
     tasks: Vec<(tokio::task::Id, usize)>,
-    late: u64,
+    words: Words,
     is_on_timer: bool,
 }
 
@@ -98,7 +104,8 @@ impl<'a> Shell<'a> {
         let is_real = options.is_realtime || !drivers.is_empty();
         let until = options.duration.map_or(i64::MAX, |seconds| (seconds * 1e9) as i64);
         let interrupted = runtime.block_on(async { interrupts() })?;
-        Ok(Self { runtime, epoch, is_real, until, interrupted, drivers, tasks, late: 0, is_on_timer: false })
+        let words = Words::new(&options.sends, options.listens);
+        Ok(Self { runtime, epoch, is_real, until, interrupted, drivers, tasks, words, is_on_timer: false })
     }
 
     fn run(&mut self, engine: &mut Engine, observe: &mut dyn FnMut(&Engine)) -> End {
@@ -110,22 +117,47 @@ impl<'a> Shell<'a> {
             if next > self.until {
                 return End::Duration;
             }
-            let now = if self.is_real { self.wait(engine, next) } else { next };
-            if let Some(fault) = self.failed_driver(engine, now) {
-                return End::Fault(fault.into());
-            }
-            if *self.interrupted.borrow() {
-                return End::Interrupted;
-            }
-            match engine.tick(now) {
-                Ok(()) => observe(engine),
+            match self.tick(engine, next) {
+                Ok(true) => observe(engine),
+                Ok(false) => return End::Interrupted,
                 Err(fault) => return End::Fault(fault.into()),
             }
             self.watch_clock(engine);
             if engine.is_done() {
                 return End::Done;
             }
+            if let Some(fault) = self.hopeless(engine) {
+                return End::Fault(fault.into());
+            }
         }
+    }
+
+    /// The tick that is next [ns], with what came from outside since the last. Whether there was one: not if the
+    /// operator wants the end.
+    fn tick(&mut self, engine: &mut Engine, next: i64) -> Result<bool, Fault> {
+        let (now, late) = if self.is_real { self.wait(engine, next) } else { (next, 0) };
+        if *self.interrupted.borrow() {
+            return Ok(false);
+        }
+        self.failed_driver(engine);
+        while let Some(word) = self.words.next(now) {
+            engine.send(&word);
+        }
+        if late > engine.period() {
+            engine.is_late(late)?;
+        }
+        engine.tick(now).map(|()| true)
+    }
+
+    /// The reason of a halt that nothing can end any more: a stop when no word can come, or, in virtual time without an
+    /// end, the loss of a device. Such a run would go on for ever.
+    fn hopeless(&self, engine: &Engine) -> Option<Fault> {
+        let waits = engine.is_stopped() && !self.words.may_come();
+        let is_endless =
+            !self.is_real && self.until == i64::MAX && engine.decks.iter().any(|deck| deck.failed.is_some());
+        let is_still = || engine.decks.iter().all(|deck| deck.commands.are_zero());
+        let last = engine.halts().last().filter(|_| (waits || is_endless) && is_still())?;
+        Some(last.fault.clone())
     }
 
     /// Tells when a timer takes the clock device's place, and when the device is back.
@@ -139,8 +171,8 @@ impl<'a> Shell<'a> {
         self.is_on_timer = engine.timeline.is_on_timer();
     }
 
-    /// Waits for the next sample of a live clock, or until `next` [ns]; the time of the tick.
-    fn wait(&mut self, engine: &Engine, next: i64) -> i64 {
+    /// Waits for the next sample of a live clock, or until `next` [ns]; the time of the tick, and how late it is [ns].
+    fn wait(&self, engine: &Engine, next: i64) -> (i64, i64) {
         let due = self.epoch + Duration::from_nanos(next.max(0) as u64);
         let sampled = engine.decks.iter().enumerate().find_map(|(i, deck)| match &deck.edge {
             Edge::Live(linked) if engine.timeline.is_clock(i) => Some(linked.sampled.clone()),
@@ -162,25 +194,21 @@ impl<'a> Shell<'a> {
             }
         });
         let now = self.epoch.elapsed().as_nanos() as i64;
-        if now > next + engine.period() {
-            self.late += 1;
-        }
         // Stepped devices live in virtual time: a late tick is still the tick of its time.
-        if has_live_clock { now } else { next.max(engine.now()) }
+        (if has_live_clock { now } else { next.max(engine.now()) }, now - next)
     }
 
-    /// The fault of a live device that has ended with an error, or that has ended at all.
-    fn failed_driver(&mut self, engine: &mut Engine, now: i64) -> Option<Fault> {
-        let (task, message) = match self.drivers.try_join_next_with_id()? {
-            Ok((task, Ok(()))) => (task, "it ended before the run did".to_owned()),
-            Ok((task, Err(error))) => (task, error.0),
-            Err(error) => (error.id(), panic_of(error)),
-        };
-        let (_, device) = self.tasks.iter().find(|(id, _)| *id == task).expect("every driver is of a device");
-        let deck = &mut engine.decks[*device];
-        deck.edge = Edge::Gone;
-        let (node, place) = (deck.name.clone(), deck.place.clone());
-        Some(Fault { node, port: None, tick: engine.ticks(), time: now, cause: Cause::Device(message), place })
+    /// Live devices that have ended with an error, or that have ended at all, are lost.
+    fn failed_driver(&mut self, engine: &mut Engine) {
+        while let Some(ended) = self.drivers.try_join_next_with_id() {
+            let (task, message) = match ended {
+                Ok((task, Ok(()))) => (task, "it ended before the run did".to_owned()),
+                Ok((task, Err(error))) => (task, error.0),
+                Err(error) => (error.id(), panic_of(error)),
+            };
+            let (_, device) = self.tasks.iter().find(|(id, _)| *id == task).expect("every driver is of a device");
+            engine.lose_device(*device, message);
+        }
     }
 
     /// Ramps every command to zero, in real time where the run was, and lets the drivers end.
@@ -206,7 +234,7 @@ impl<'a> Shell<'a> {
 
 fn panic_of(error: tokio::task::JoinError) -> String {
     match error.try_into_panic() {
-        Ok(panic) => format!("it panicked: {}", super::said(&*panic)),
+        Ok(panic) => format!("it panicked: {}", super::trouble::said(&*panic)),
         Err(error) => error.to_string(),
     }
 }

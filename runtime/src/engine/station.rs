@@ -42,6 +42,8 @@ enum Absence {
     Nothing,
     Since(i64),
     Reset,
+    /// The node panicked at that time: it is not stepped before it is reset.
+    Broken(i64),
 }
 
 impl Station {
@@ -100,8 +102,8 @@ impl Station {
         if is_missing {
             self.starve(tick, bus);
         } else {
-            if self.absence != Absence::Nothing {
-                self.come_back(tick);
+            if self.absence != Absence::Nothing && !self.come_back(tick) {
+                return;
             }
             if is_woken {
                 tick.stamp = stamp;
@@ -110,13 +112,32 @@ impl Station {
         }
     }
 
-    /// Ends an absence. A slow graph may not have ticked while it lasted, so whether it was long is asked here too.
+    /// Ends an absence, if it may end. A slow graph may not have ticked while it lasted, so whether it was long is asked
+    /// here too.
     #[cold]
-    fn come_back(&mut self, tick: &Tick) {
-        if matches!(self.absence, Absence::Since(since) if tick.now - since >= tick.reset_after) {
-            self.node.reset();
+    fn come_back(&mut self, tick: &Tick) -> bool {
+        match self.absence {
+            Absence::Since(since) | Absence::Broken(since) if tick.now - since >= tick.reset_after => self.node.reset(),
+            Absence::Broken(_) => return false,
+            Absence::Nothing | Absence::Since(_) | Absence::Reset => {}
         }
         self.absence = Absence::Nothing;
+        true
+    }
+
+    /// The node panicked: from now on it is not stepped until it is reset.
+    pub(super) const fn break_down(&mut self, now: i64) {
+        self.absence = Absence::Broken(now);
+    }
+
+    /// Whether the node waits for its reset after a panic.
+    pub(super) fn is_broken(&self) -> bool {
+        matches!(self.absence, Absence::Broken(_))
+    }
+
+    /// Makes the state fresh.
+    pub(super) fn reset(&mut self) {
+        self.node.reset();
     }
 
     /// Makes the outputs absent; resets the state once, when that has lasted.
@@ -127,11 +148,11 @@ impl Station {
                 self.node.lose(tick.index, bus, &self.outputs);
                 self.absence = Absence::Since(tick.now);
             }
-            Absence::Since(since) if tick.now - since >= tick.reset_after => {
+            Absence::Since(since) | Absence::Broken(since) if tick.now - since >= tick.reset_after => {
                 self.node.reset();
                 self.absence = Absence::Reset;
             }
-            Absence::Since(_) | Absence::Reset => {}
+            Absence::Since(_) | Absence::Reset | Absence::Broken(_) => {}
         }
     }
 }

@@ -7,6 +7,7 @@ use super::Deck;
 use super::command::CommandSlot;
 use super::inlet::Inlet;
 use super::station::Station;
+use crate::graph::Policy;
 use crate::node::{Bus, Tick};
 
 /// Everything a tick touches.
@@ -37,32 +38,27 @@ impl Core {
         self.tick = Tick { index: self.tick.index + 1, now, dt, ..self.tick };
     }
 
-    /// Latches the newest samples, steps the nodes and hands over the commands; nothing is commanded if any value is not
-    /// finite. Whether all are.
-    pub(super) fn run(&mut self, decks: &mut [Deck], timing: &mut Timing) -> bool {
-        self.latch(decks);
+    /// Steps the nodes, each at most once. Whether all values are finite.
+    pub(super) fn run(&mut self, timing: &mut Timing) -> bool {
         if timing.is_due(self.tick.index) {
             self.step_timed(timing);
         } else {
             self.step();
         }
-        let is_finite = self.bus.arenas.are_finite();
-        if is_finite {
-            self.commit(decks);
-        }
-        is_finite
+        self.bus.arenas.are_finite()
     }
 
     /// A tick without what guards and measures it: latch, step, commit.
     pub(super) fn run_bare(&mut self, decks: &mut [Deck]) {
         self.latch(decks);
         self.step();
-        self.commit(decks);
+        self.commit(decks, false);
     }
 
-    fn latch(&mut self, decks: &mut [Deck]) {
+    /// Takes the newest samples over.
+    pub(super) fn latch(&mut self, decks: &mut [Deck]) {
         for inlet in &mut self.inlets {
-            inlet.latch(&mut decks[inlet.device].samples, &mut self.bus, self.tick.index);
+            inlet.latch(&mut decks[inlet.device].samples, &mut self.bus, self.tick.index, self.tick.now);
         }
     }
 
@@ -85,9 +81,16 @@ impl Core {
         timing.ticks += 1;
     }
 
-    fn commit(&mut self, decks: &mut [Deck]) {
+    /// The sample that is too old now and whose policy is the strictest.
+    pub(super) fn stale(&self) -> Option<(Policy, usize)> {
+        let stale = self.inlets.iter().enumerate().filter(|(_, inlet)| inlet.is_stale(self.tick.now));
+        stale.map(|(i, inlet)| (inlet.stale, i)).max_by_key(|(policy, _)| *policy)
+    }
+
+    /// Hands over the commands, or lets them go to zero.
+    pub(super) fn commit(&mut self, decks: &mut [Deck], is_halted: bool) {
         for slot in &mut self.slots {
-            slot.commit(&self.bus, &mut decks[slot.device].commands, self.tick.dt);
+            slot.commit(&self.bus, &mut decks[slot.device].commands, self.tick.dt, is_halted);
         }
     }
 
@@ -108,6 +111,21 @@ impl Core {
         for (place, configuration) in configurations {
             self.stations[*place].switch(*configuration);
         }
+    }
+
+    /// Makes the states of a station and of all that come after it fresh.
+    pub(super) fn reset_from(&mut self, station: usize) {
+        self.stations[station..].iter_mut().for_each(Station::reset);
+    }
+
+    /// The station that stepped last panicked: it waits for its reset.
+    pub(super) fn break_down(&mut self) {
+        self.stations[self.current].break_down(self.tick.now);
+    }
+
+    /// The first station that waits for its reset after a panic.
+    pub(super) fn broken(&self) -> Option<usize> {
+        self.stations.iter().position(Station::is_broken)
     }
 
     pub(super) const fn current(&self) -> usize {

@@ -8,6 +8,7 @@ use super::frames::Frames;
 use super::load::{Flat, Loader, Request};
 use super::order::{Wiring, order};
 use super::plan::{Clock, Plan, PlannedCommand, PlannedNode, PlannedPort, PlannedRole, Producer, Source};
+use super::policy::{PolicyTable, unknown_roles};
 use super::units::{Clash, Units};
 use super::unread::unread;
 use super::wires::{CommandWire, Model, Origin, Wire};
@@ -39,6 +40,8 @@ pub fn plan(catalogue: &Catalogue, request: &Request) -> Result<Plan, Report> {
     let order = order(&model, &wires, &mut found);
     let mut frames = Frames::unify(&model, catalogue, &order, &wires, &commands, &mut found);
     limits::compare(&model, &mut found);
+    let names = flat.roles.iter().map(|(key, _)| key.name.as_str());
+    flat.policy.iter().for_each(|(section, _)| unknown_roles(section, names.clone(), &mut found));
     limits::prove(&model, catalogue, &mut frames, &wires, &commands, &mut found);
     let clock = clock(&flat, &opened, &mut found);
     let period = clock.map_or(1.0, |(_, period)| period);
@@ -60,7 +63,8 @@ pub fn plan(catalogue: &Catalogue, request: &Request) -> Result<Plan, Report> {
     let wiring = Wiring { order: &order, wires: &wires, commands: &commands };
     let modes = modes::plan(&mut builder, &mut nodes, &wiring);
     let planned: Vec<PlannedCommand> = commands.iter().filter_map(|wire| builder.command(wire)).collect();
-    let roles = builder.planned_roles();
+    let policy = flat.policy.as_ref().map_or_else(PolicyTable::default, |(_, policy)| policy.clone());
+    let roles = builder.planned_roles(&policy);
     let Builder { found, sources, .. } = builder;
     let Some((clock, _)) = clock.filter(|_| found.is_empty()) else { return Err(Report::new(sources, found)) };
     say_what_is_there(&nodes, &opened, &sources);
@@ -79,7 +83,21 @@ pub fn plan(catalogue: &Catalogue, request: &Request) -> Result<Plan, Report> {
     let reset_after = flat.table.as_ref().map_or(0, |table| (*table.reset_after_ms * 1e6) as i64);
     let period = ((period * 1e9).round() as i64).max(1);
     let (devices, commands) = (opened.devices, planned);
-    Ok(Plan { roles, devices, nodes, commands, clock, period, max_gap, reset_after, sources, warnings, outline, modes })
+    Ok(Plan {
+        roles,
+        devices,
+        nodes,
+        commands,
+        clock,
+        period,
+        max_gap,
+        reset_after,
+        sources,
+        warnings,
+        outline,
+        modes,
+        policy,
+    })
 }
 
 /// For those who run the tool with `-v`.
@@ -165,13 +183,16 @@ impl Builder<'_> {
         }
     }
 
-    fn planned_roles(&self) -> Vec<PlannedRole> {
+    fn planned_roles(&self, policy: &PolicyTable) -> Vec<PlannedRole> {
         let role = |(i, bound): (usize, &Option<devices::BoundRole>)| {
             let bound = bound.as_ref()?;
             let source = |port| Source { producer: Producer::Role(i), port };
             let ports = (0..bound.filled.outputs.len()).map(|port| self.ports[&source(port)].clone()).collect();
             let name = self.model.flat.roles[i].0.name.clone();
-            Some(PlannedRole { name, device: bound.device, first_port: bound.first_output, ports })
+            let period = self.opened.periods[bound.device];
+            let (max_age, stale) = policy.of(&name, period);
+            let (device, first_port, period) = (bound.device, bound.first_output, (period * 1e9) as i64);
+            Some(PlannedRole { name, device, first_port, ports, max_age, stale, period })
         };
         self.opened.roles.iter().enumerate().filter_map(role).collect()
     }
@@ -324,8 +345,19 @@ impl Builder<'_> {
             self.found.push(wire.origin.mistake(Code::ShapeMismatch, message));
             return None;
         }
-        Some(PlannedCommand { source: wire.source, device: bound.device, command: bound.first_command + wire.command })
+        let accelerations = accelerations(&port.shape).zip(accelerations(takes)).map(|(a, b)| a.min(b)).collect();
+        let command = bound.first_command + wire.command;
+        Some(PlannedCommand { source: wire.source, device: bound.device, command, accelerations })
     }
+}
+
+/// Greatest acceleration of each joint [rad/s²].
+fn accelerations(shape: &Shape) -> impl Iterator<Item = f64> {
+    let joints = match shape {
+        Shape::Joints(shape) => shape.joints.as_slice(),
+        _ => &[],
+    };
+    joints.iter().map(|joint| joint.acceleration)
 }
 
 fn joint_names(shape: &Shape) -> Vec<&str> {

@@ -3,6 +3,7 @@
 use std::ops::Range;
 
 use super::modes::{self, ModeBlock};
+use super::policy::PolicyTable;
 use super::{Item, Key, Sources, Table, Value};
 use crate::diagnostic::{Code, Diagnostic, closest, meant};
 use crate::node::{At, FilePath, Mistake, NonNegative, Param, Positive, Rate, Reader, Word};
@@ -52,6 +53,8 @@ pub(crate) struct Document {
     /// The section [limits] and its place.
     pub(crate) limits: Option<(Range<usize>, Table)>,
     pub(crate) modes: Vec<ModeBlock>,
+    /// The section [policy], as it is written and as it reads.
+    pub(crate) policy: Option<(Value, PolicyTable)>,
     pub(crate) inputs: Vec<(Key, Word)>,
     pub(crate) exports: Vec<(Key, Word)>,
 }
@@ -88,7 +91,10 @@ impl<'a> Sections<'a> {
 
     /// The sections of a graph file.
     pub(crate) fn graph(&mut self, root: &Table) -> Document {
-        self.known(root, &["graph", "roles", "parts", "nodes", "commands", "limits", "modes", "devices", "bind"]);
+        self.known(
+            root,
+            &["graph", "roles", "parts", "nodes", "commands", "limits", "modes", "policy", "devices", "bind"],
+        );
         let graph =
             root.entry("graph").map(|(key, value)| (key.span.clone(), GraphTable::read(value, &mut self.reader)));
         let commands = self.table(root.get("commands")).entries.into_iter().flat_map(|(role, value)| {
@@ -97,9 +103,11 @@ impl<'a> Sections<'a> {
         });
         let commands = commands.collect();
         let limits = root.entry("limits").map(|(key, value)| (key.span.clone(), self.table(Some(value))));
+        let policy = root.get("policy");
+        let policy = policy.and_then(|value| Some((value.clone(), PolicyTable::read(value, &mut self.reader)?)));
         let modes = self.named_tables(root.get("modes"));
         let modes = modes::modes(modes, &mut self.reader);
-        Document { graph, roles: self.names(root.get("roles")), commands, limits, modes, ..self.body(root) }
+        Document { graph, roles: self.names(root.get("roles")), commands, limits, modes, policy, ..self.body(root) }
     }
 
     /// The sections of a part.

@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 
 use super::document::{Bench, Block, Document, GraphTable, PartBlock, Sections};
 use super::modes::ModeBlock;
+use super::policy::PolicyTable;
 use super::{BuiltinFile, Item, Key, Sources, Table, Value, parse_table};
 use crate::diagnostic::{Code, Diagnostic, closest, meant};
 use crate::node::Word;
@@ -94,6 +95,8 @@ pub(crate) struct Flat {
     /// The section [limits] and its place.
     pub(crate) limits: Option<(Range<usize>, Table)>,
     pub(crate) modes: Vec<ModeBlock>,
+    /// The section [policy], as it is written and as it reads.
+    pub(crate) policy: Option<(Value, PolicyTable)>,
     pub(crate) bench: Option<Bench>,
 }
 
@@ -153,6 +156,7 @@ impl Loader {
         flat.commands.clone_from(&document.commands);
         flat.limits.clone_from(&document.limits);
         flat.modes.clone_from(&document.modes);
+        flat.policy.clone_from(&document.policy);
         self.flatten(document, "", Scope::default(), &mut flat);
         flat
     }

@@ -3,6 +3,7 @@
 use std::ops::Range;
 
 use super::modes::PlannedModes;
+use super::policy::{Policy, PolicyTable};
 use super::{Outline, Sources};
 use crate::device::Driver;
 use crate::diagnostic::{Diagnostic, Report};
@@ -44,6 +45,11 @@ pub(crate) struct PlannedRole {
     /// Number of the role's first output among the device's.
     pub(crate) first_port: usize,
     pub(crate) ports: Vec<PlannedPort>,
+    /// How old the newest sample may be [ns], and what it does when it is older.
+    pub(crate) max_age: i64,
+    pub(crate) stale: Policy,
+    /// Nominal time between two samples of the device [ns].
+    pub(crate) period: i64,
 }
 
 /// A device, opened.
@@ -79,6 +85,8 @@ pub(crate) struct PlannedCommand {
     pub(crate) device: usize,
     /// Its number among the device's commands.
     pub(crate) command: usize,
+    /// Greatest acceleration of each joint [rad/s²]; infinite where nothing bounds it.
+    pub(crate) accelerations: Vec<f64>,
 }
 
 /// What makes the graph tick.
@@ -108,6 +116,7 @@ pub struct Plan {
     pub(crate) warnings: Vec<Diagnostic>,
     pub(crate) outline: Outline,
     pub(crate) modes: Option<PlannedModes>,
+    pub(crate) policy: PolicyTable,
 }
 
 impl Plan {

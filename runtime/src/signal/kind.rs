@@ -146,6 +146,13 @@ macro_rules! kinds {
                 })* }
             }
 
+            /// A value as it was at first, in the place of one that is lost or spoilt.
+            pub fn renew(&mut self, slot: u32, shape: &Shape) {
+                match shape { $(Shape::$kind(shape) => {
+                    self.$arena[slot as usize] = <$kind as Signal>::allocate(shape);
+                })* }
+            }
+
             /// Exchanges a value of `kind` with one of another arena.
             pub fn swap(&mut self, kind: Kind, slot: u32, other: &mut Self, other_slot: u32) {
                 match kind { $(Kind::$kind =>

@@ -1,0 +1,118 @@
+//! From a plan to an engine: everything that a tick touches is allocated here, once.
+
+use std::collections::BTreeMap;
+
+use super::command::CommandSlot;
+use super::halt::Halts;
+use super::inlet::Inlet;
+use super::modes::Modes;
+use super::station::Station;
+use super::tick::Core;
+use super::timeline::Timeline;
+use super::{Deck, Edge, Engine, Logged, Timing};
+use crate::device::{Commands, Driver, Samples};
+use crate::graph::{Plan, PlannedDevice, PlannedNode, PlannedPort, Producer, Source, Sources};
+use crate::node::{Bus, PortId, Tick};
+use crate::signal::Stamp;
+
+/// Where every port is.
+type Ids = BTreeMap<Source, PortId>;
+
+impl Engine {
+    /// Allocates everything that the plan needs; nothing allocates in a tick.
+    #[must_use]
+    pub fn new(plan: Plan) -> Self {
+        let (mut bus, mut ids, mut ports, mut inlets) = (Bus::default(), Ids::new(), Vec::new(), Vec::new());
+        let mut add = |source: Source, planned: &PlannedPort| {
+            let id = bus.add(&planned.shape);
+            ids.insert(source, id);
+            ports.push((planned.clone(), id));
+            id
+        };
+        for (i, role) in plan.roles.iter().enumerate() {
+            for (port, planned) in role.ports.iter().enumerate() {
+                let id = add(Source { producer: Producer::Role(i), port }, planned);
+                inlets.push(Inlet::new(role, port, id));
+            }
+        }
+        for node in &plan.nodes {
+            for (port, planned) in node.ports.iter().enumerate() {
+                add(Source { producer: Producer::Node(node.index), port }, planned);
+            }
+        }
+        let logged = plan.nodes.iter().filter(|node| node.is_logged).map(|node| logged(node, &ids, &ports)).collect();
+        let place = |device: usize| plan.sources.locate(plan.devices[device].span.start);
+        let roles = plan.roles.iter().map(|role| (role.name.clone(), place(role.device))).collect();
+        let names = plan.nodes.iter().map(|node| (node.name.clone(), plan.sources.locate(node.span.start))).collect();
+        let limits = limits(&plan.nodes, &ports);
+        let slot = |command: crate::graph::PlannedCommand| CommandSlot::new(ids[&command.source], command);
+        let slots = plan.commands.into_iter().map(slot).collect();
+        let decks = plan.devices.into_iter().map(|device| deck(device, &plan.sources)).collect();
+        let stations: Vec<Station> = plan.nodes.into_iter().map(|node| station(node, &ids, &mut bus)).collect();
+        let (max_gap, reset_after) = (plan.max_gap, plan.reset_after);
+        let tick = Tick { index: 0, now: 0, dt: 0.0, stamp: Stamp::TIMELESS, max_gap, reset_after };
+        let (timing, mut core) = (Timing::new(stations.len()), Core::new(bus, stations, inlets, slots, tick));
+        let kind = |id: PortId| ports.iter().find(|(_, known)| *known == id).map(|(port, _)| port.shape.kind());
+        let modes = plan.modes.map(|modes| {
+            let kinds = ids.iter().map(|(source, id)| (*source, (*id, kind(*id).expect("a port has a kind"))));
+            Modes::new(modes, &kinds.collect())
+        });
+        modes.iter().for_each(|modes| core.switch(modes.configurations()));
+        Self {
+            timing,
+            core,
+            modes,
+            is_done: false,
+            decks,
+            timeline: Timeline::new(plan.clock, plan.period),
+            ports,
+            logged,
+            limits,
+            names,
+            roles,
+            policy: plan.policy,
+            halts: Halts::new(),
+            trouble: None,
+            panic: String::new(),
+            sent: None,
+            late: 0,
+            sources: plan.sources,
+        }
+    }
+}
+
+fn logged(node: &PlannedNode, ids: &Ids, ports: &[(PlannedPort, PortId)]) -> Logged {
+    let sources = node.inputs.iter().flat_map(|(_, sources)| sources).map(|source| ids[source]);
+    let port = |id: PortId| ports.iter().find(|(_, known)| *known == id).expect("a wire comes from a port").clone();
+    let due = ids[&Source { producer: Producer::Node(node.index), port: 0 }];
+    Logged { node: node.name.clone(), due, inputs: sources.map(port).collect() }
+}
+
+/// The shares that the limiters tell.
+fn limits(nodes: &[PlannedNode], ports: &[(PlannedPort, PortId)]) -> Vec<(String, PortId)> {
+    let is_share =
+        |name: &str| nodes.iter().any(|node| node.holds.iter().any(|limit| name == format!("{}.{limit}", node.name)));
+    let shares = ports.iter().filter(|(port, _)| is_share(&port.name));
+    shares.map(|(port, id)| (port.name.clone(), *id)).collect()
+}
+
+fn deck(device: PlannedDevice, sources: &Sources) -> Deck {
+    Deck {
+        place: sources.locate(device.span.start),
+        name: device.name,
+        samples: Samples::with_shapes(device.outputs.iter()),
+        commands: Commands::with_shapes(device.commands.iter()),
+        edge: match device.driver {
+            Driver::Stepped(driver) => Edge::Stepped(driver),
+            Driver::Live(driver) => Edge::Idle(driver),
+        },
+        failed: None,
+    }
+}
+
+fn station(node: PlannedNode, ids: &Ids, _bus: &mut Bus) -> Station {
+    let inputs = node.inputs.iter().map(|(need, from)| (*need, from.iter().map(|source| ids[source]).collect()));
+    let inputs: Vec<_> = inputs.collect();
+    let outputs = (0..node.ports.len()).map(|port| ids[&Source { producer: Producer::Node(node.index), port }]);
+    Station::new(node.node, &inputs, outputs.collect(), node.is_every_tick)
+}

@@ -1,0 +1,234 @@
+//! The course of a tick from the outside in: exchange with the devices, latch, step, commit, and what each trouble on the
+//! way does.
+
+use std::panic::{AssertUnwindSafe, catch_unwind};
+
+use super::modes::Verdict;
+use super::trouble::{Trouble, said};
+use super::{Edge, Engine};
+use crate::device::DeviceError;
+use crate::fault::{Cause, Fault};
+use crate::graph::Policy;
+
+impl Engine {
+    /// Runs the tick at `now` [ns]: exchange with the devices, then latch, step and commit.
+    ///
+    /// # Errors
+    /// The reason of a fault; nothing was commanded in this tick.
+    pub fn tick(&mut self, now: i64) -> Result<(), Fault> {
+        self.exchange(now)?;
+        self.step()
+    }
+
+    /// The first half of a tick at `now` [ns]: hands the commands of the last tick to the devices and takes what they
+    /// have sampled since.
+    ///
+    /// # Errors
+    /// If a device fails or gives what is not finite, and the policy of that is a fault.
+    pub fn exchange(&mut self, now: i64) -> Result<(), Fault> {
+        let due = self.clock_sample().is_some_and(|sample| sample <= now);
+        self.core.begin(now);
+        let has_sampled = self.exchange_with_devices(now)? || due;
+        self.timeline.ticked(now, has_sampled);
+        if self.timeline.is_on_timer() {
+            self.meet(self.policy.clock, Trouble::Clock)?;
+        }
+        for i in 0..self.core.inlets.len() {
+            let (inlet, decks) = (&mut self.core.inlets[i], &self.decks);
+            let samples = &decks[inlet.device].samples;
+            if !inlet.is_finite(samples) {
+                inlet.reject(samples);
+                self.meet(self.policy.not_finite.0, Trouble::NotFinite(i))?;
+            }
+        }
+        Ok(())
+    }
+
+    /// The second half of a tick: latch, step, commit. It neither allocates nor calls the operating system, but when
+    /// something goes wrong.
+    ///
+    /// # Errors
+    /// The reason of a fault; nothing was commanded in this tick.
+    pub fn step(&mut self) -> Result<(), Fault> {
+        self.core.latch(&mut self.decks);
+        if let Some((policy, inlet)) = self.core.stale() {
+            self.meet(policy, Trouble::Stale(inlet))?;
+        }
+        match catch_unwind(AssertUnwindSafe(|| self.core.run(&mut self.timing))) {
+            Ok(true) => {}
+            Ok(false) => self.not_finite()?,
+            Err(panic) => self.panicked(said(&*panic))?,
+        }
+        if let Some(station) = self.core.broken() {
+            self.meet(self.policy.panic.0, Trouble::Panicked(station))?;
+        }
+        self.settle();
+        self.core.commit(&mut self.decks, self.halts.is_halted());
+        self.decide()
+    }
+
+    /// Notes a trouble of this tick; the strictest is what counts.
+    fn meet(&mut self, policy: Policy, trouble: Trouble) -> Result<(), Fault> {
+        match policy {
+            Policy::Count => {}
+            Policy::Fault => return Err(self.tell(trouble)),
+            Policy::Hold | Policy::Stop => {
+                let is_stricter = self.trouble.is_none_or(|(known, _)| policy > known);
+                self.trouble = if is_stricter { Some((policy, trouble)) } else { self.trouble };
+            }
+        }
+        Ok(())
+    }
+
+    /// Halts because of the trouble of this tick, or goes on if there is none.
+    fn settle(&mut self) {
+        let trouble = self.trouble.take();
+        if let Some((policy, trouble)) = trouble
+            && self.halts.is_news(policy)
+        {
+            let fault = self.tell(trouble);
+            self.halts.trouble(policy, fault);
+        }
+        let resumes = self.halts.settle(trouble.is_some(), self.core.tick.now);
+        if let Some(modes) = self.modes.as_mut().filter(|_| resumes) {
+            modes.restart(&self.core.tick);
+            self.core.switch(modes.configurations());
+        }
+    }
+
+    /// A word from outside: `stop` and `resume` halt the commands and let them go on, any other is for the modes.
+    pub fn send(&mut self, word: &str) {
+        match word {
+            "stop" => self.trouble = Some((Policy::Stop, Trouble::Operator)),
+            "resume" => self.halts.resume(),
+            other => self.sent = Some(other.to_owned()),
+        }
+    }
+
+    /// A tick begins `by` [ns] too late, by a real clock.
+    ///
+    /// # Errors
+    /// If the policy of that is a fault.
+    pub fn is_late(&mut self, by: i64) -> Result<(), Fault> {
+        self.late += 1;
+        self.meet(self.policy.deadline, Trouble::Late(by))
+    }
+
+    /// The boundary between two ticks: another mode, if the conditions of the present one say so. While the operator is
+    /// waited for, modes wait too.
+    fn decide(&mut self) -> Result<(), Fault> {
+        let sent = self.sent.take();
+        let Some(modes) = self.modes.as_mut().filter(|_| !self.halts.is_stopped()) else { return Ok(()) };
+        match modes.decide(&self.core.bus, &self.core.tick, sent.as_deref()) {
+            Verdict::Stay => {}
+            Verdict::Switched => self.core.switch(modes.configurations()),
+            Verdict::Done => self.is_done = true,
+            Verdict::Failed => {
+                let ((why, place), name) = (modes.taken(), modes.name().to_owned());
+                let (why, place) = (Cause::Mode(why.to_owned()), self.sources.locate(place));
+                return Err(self.fault(&name, None, why, place));
+            }
+        }
+        Ok(())
+    }
+
+    /// One period of the end of a run: the commands go one step further down to zero, and the devices are told.
+    /// Whether they are zero.
+    pub fn wind_down(&mut self) -> bool {
+        let now = self.core.tick.now + self.timeline.period();
+        self.core.begin(now);
+        let is_still = self.core.ramp(&mut self.decks, self.timeline.period() as f64 * 1e-9);
+        // A device that fails now has had its zero or will time out by itself; the reason of the stop stays the first.
+        let _ = self.exchange_with_devices(now);
+        is_still
+    }
+
+    /// Time of a stepped clock device's next sample.
+    fn clock_sample(&self) -> Option<i64> {
+        self.decks.iter().enumerate().find_map(|(i, deck)| match &deck.edge {
+            Edge::Stepped(driver) if self.timeline.is_clock(i) => driver.next(),
+            _ => None,
+        })
+    }
+
+    /// Whether a live clock device has sampled.
+    fn exchange_with_devices(&mut self, now: i64) -> Result<bool, Fault> {
+        let mut has_sampled = false;
+        for i in 0..self.decks.len() {
+            let deck = &mut self.decks[i];
+            match &mut deck.edge {
+                Edge::Stepped(driver) => {
+                    let exchange = || driver.exchange(now, &deck.commands, &mut deck.samples);
+                    let result = catch_unwind(AssertUnwindSafe(exchange));
+                    let result =
+                        result.unwrap_or_else(|panic| Err(DeviceError(format!("it panicked: {}", said(&*panic)))));
+                    if let Err(DeviceError(why)) = result {
+                        self.lose_device(i, why);
+                    }
+                }
+                Edge::Live(linked) => {
+                    let is_newer = linked.exchange(&deck.commands, &mut deck.samples);
+                    has_sampled |= is_newer && self.timeline.is_clock(i);
+                }
+                Edge::Idle(_) | Edge::Gone => {}
+            }
+            if self.decks[i].failed.is_some() {
+                self.meet(self.policy.device.0, Trouble::Device(i))?;
+            }
+        }
+        Ok(has_sampled)
+    }
+
+    /// A device has failed: it is not touched again.
+    pub(super) fn lose_device(&mut self, device: usize, why: String) {
+        let deck = &mut self.decks[device];
+        (deck.edge, deck.failed) = (Edge::Gone, Some(why));
+    }
+
+    /// A value is not finite: if the run goes on, what the node gave is taken back, and with it all that may follow.
+    #[cold]
+    fn not_finite(&mut self) -> Result<(), Fault> {
+        // Ports stand in the order in which they are written, so the first that is not finite made the others so.
+        let bus = &self.core.bus;
+        let is_bad = |port: &usize| {
+            let (planned, id) = &self.ports[*port];
+            !bus.arenas.is_finite(planned.shape.kind(), id.slot)
+        };
+        let port = (0..self.ports.len()).find(is_bad).expect("one of them is not finite");
+        self.meet(self.policy.not_finite.0, Trouble::NotFiniteAt(port))?;
+        let station = self.station_of(port);
+        self.take_back(station);
+        self.core.reset_from(station);
+        Ok(())
+    }
+
+    /// A node has panicked: if the run goes on, it waits for its reset, and what was not stepped in this tick is absent.
+    #[cold]
+    fn panicked(&mut self, why: String) -> Result<(), Fault> {
+        self.panic = why;
+        self.meet(self.policy.panic.0, Trouble::Panicked(self.core.current()))?;
+        self.core.break_down();
+        self.take_back(self.core.current());
+        Ok(())
+    }
+
+    /// Makes the outputs of a station and of all that come after it absent. A node that panicked may have lost its
+    /// buffers, so they are made anew.
+    fn take_back(&mut self, station: usize) {
+        let from = self.ports.iter().position(|(port, _)| owner(&port.name) == self.names[station].0);
+        for (port, id) in &self.ports[from.unwrap_or(self.ports.len())..] {
+            self.core.bus.marks[id.mark as usize].lose(self.core.tick.index);
+            self.core.bus.arenas.renew(id.slot, &port.shape);
+        }
+    }
+
+    fn station_of(&self, port: usize) -> usize {
+        let name = owner(&self.ports[port].0.name);
+        self.names.iter().position(|(known, _)| known == name).unwrap_or(0)
+    }
+}
+
+/// Name of the node or the role that a port belongs to.
+pub(super) fn owner(port: &str) -> &str {
+    port.rsplit_once('.').expect("a port's name has two parts").0
+}

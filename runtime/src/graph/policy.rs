@@ -1,0 +1,130 @@
+//! The section `[policy]`: what each sort of trouble does, and how old a sample may be.
+
+use super::{Item, Value};
+use crate::diagnostic::{Code, Diagnostic, closest};
+use crate::node::{Map, Param, Positive, Reader, Written};
+
+/// What a trouble does.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Policy {
+    /// It is counted.
+    Count,
+    /// Commands ramp to zero, and go on by themselves when the trouble is over.
+    Hold,
+    /// Commands ramp to zero, and wait for the operator.
+    Stop,
+    /// Commands ramp to zero, and the run ends.
+    Fault,
+}
+
+impl Policy {
+    const WORDS: [(&'static str, Self); 4] =
+        [("count", Self::Count), ("hold", Self::Hold), ("stop", Self::Stop), ("fault", Self::Fault)];
+
+    fn word(self) -> &'static str {
+        Self::WORDS.iter().find(|(_, policy)| *policy == self).map_or("", |(word, _)| word)
+    }
+
+    fn from(value: &Value) -> Option<Self> {
+        let word = value.as_str()?;
+        Self::WORDS.iter().find(|(known, _)| *known == word).map(|(_, policy)| *policy)
+    }
+}
+
+impl Param for Policy {
+    const EXPECTS: &'static str = "`count`, `hold`, `stop` or `fault`";
+
+    fn read(value: &Value, reader: &mut Reader<'_>) -> Option<Self> {
+        let found = Self::from(value);
+        if found.is_none() {
+            reader.wrong_type(value, Self::EXPECTS);
+        }
+        found
+    }
+
+    fn written(&self) -> Option<Written> {
+        Some(self.word().into())
+    }
+}
+
+/// A policy that does something: for what cannot go on as if nothing was.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Firm(pub(crate) Policy);
+
+impl Param for Firm {
+    const EXPECTS: &'static str = "`hold`, `stop` or `fault`";
+
+    fn read(value: &Value, reader: &mut Reader<'_>) -> Option<Self> {
+        let found = Policy::from(value).filter(|policy| *policy != Policy::Count);
+        if found.is_none() {
+            reader.wrong_type(value, Self::EXPECTS);
+        }
+        found.map(Self)
+    }
+
+    fn written(&self) -> Option<Written> {
+        self.0.written()
+    }
+}
+
+crate::params! { RolePolicy:
+    /// How old the newest sample of the role may be [ms].
+    max_age_ms: Option<Positive>,
+    /// What it does when it is older.
+    stale: Option<Policy>,
+}
+
+crate::params! { PolicyTable:
+    /// The newest sample of a role is too old.
+    stale: Policy = Policy::Hold,
+    /// The clock device is silent, and a timer stands in for it.
+    clock: Policy = Policy::Hold,
+    /// A value is not a finite number.
+    not_finite: Firm = Firm(Policy::Fault),
+    /// A tick began more than a period late; with a real clock only.
+    deadline: Policy = Policy::Count,
+    /// A node panicked.
+    panic: Firm = Firm(Policy::Fault),
+    /// A device failed.
+    device: Firm = Firm(Policy::Fault),
+    /// How old the newest sample of a role may be; five periods of its device unless given [ms].
+    max_age_ms: Option<Positive>,
+    /// What holds for single roles.
+    roles: Map<RolePolicy> = Map(std::collections::BTreeMap::new()),
+}
+
+impl Default for PolicyTable {
+    fn default() -> Self {
+        let nothing = Value { span: 0..0, item: Item::Table(super::Table::default()) };
+        let sources = super::Sources::default();
+        Self::read(&nothing, &mut Reader::new(&sources)).expect("every policy has a default")
+    }
+}
+
+impl PolicyTable {
+    /// How old the newest sample of a role may be, whose device samples every `period` [s], and what it does when it is
+    /// older; the age in ns.
+    pub(crate) fn of(&self, role: &str, period: f64) -> (i64, Policy) {
+        /// As many periods of its device a sample is good for.
+        const PERIODS: f64 = 5.0;
+        let own = self.roles.0.get(role);
+        let age = own.and_then(|own| own.max_age_ms).or(self.max_age_ms).map_or(PERIODS * period, |ms| *ms * 1e-3);
+        ((age * 1e9) as i64, own.and_then(|own| own.stale).unwrap_or(self.stale))
+    }
+}
+
+/// Policies of roles that are not there.
+pub(crate) fn unknown_roles<'n>(
+    section: &Value,
+    roles: impl Iterator<Item = &'n str> + Clone,
+    found: &mut Vec<Diagnostic>,
+) {
+    let own = section.as_table().and_then(|table| table.get("roles")).and_then(Value::as_table);
+    for (key, _) in own.iter().flat_map(|table| &table.entries) {
+        if !roles.clone().any(|role| role == key.name) {
+            let message = format!("there is no role `{}` to have a policy", key.name);
+            let help = closest(&key.name, roles.clone(), "roles");
+            found.push(Diagnostic::new(Code::UnknownKey, key.span.clone(), message).help(help));
+        }
+    }
+}
