@@ -158,7 +158,7 @@ fn recordings_are_as_shown() {
         let mut engine = Engine::new(plan.unwrap_or_else(|report| panic!("{}", report.render(false))));
         let path = folder.join(name);
         let mut recorder = Recorder::create(&path, format, &engine, true).unwrap();
-        let options = RunOptions { duration: Some(0.04), is_realtime: false };
+        let options = RunOptions { duration: Some(0.04), is_realtime: false, ..RunOptions::default() };
         engine::run(&mut engine, &options, &mut |engine| recorder.record(engine)).unwrap();
         recorder.finish().unwrap();
         assert_eq!([fs::read_to_string(path).unwrap()], *blocks(&page, fence));

@@ -59,7 +59,7 @@ fn run(peer: &Peer, duration: f64) -> (End, Vec<f64>, Vec<f64>) {
     let mut engine = Engine::new(plan);
     let id = engine.ports().iter().find(|(port, _)| port.name == "count.steps").unwrap().1;
     let (mut steps, mut ages) = (Vec::new(), Vec::new());
-    let options = RunOptions { duration: Some(duration), is_realtime: true };
+    let options = RunOptions { duration: Some(duration), is_realtime: true, ..RunOptions::default() };
     let outcome = engine::run(&mut engine, &options, &mut |engine| {
         let mark = engine.bus().marks[id.mark as usize];
         steps.push(Scalar::arena(&engine.bus().arenas)[id.slot as usize]);
