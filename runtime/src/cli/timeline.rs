@@ -44,7 +44,8 @@ impl Timeline {
                 continue;
             }
             let share = Scalar::arena(&bus.arenas)[limit.id.slot as usize];
-            if share < 1.0 {
+            // Rounding is no limit.
+            if share < 1.0 - 1e-6 {
                 limit.time += dt;
                 limit.least = limit.least.min(share);
             }
