@@ -60,9 +60,9 @@ params! {
     /// Frame of the signal, if it has one; what it is wired to decides when this is not said.
     frame: Option<String>,
     /// Height of a step, end of a ramp, peak of a sine or a chirp, all over the offset [`unit`].
-    amplitude: f64 = 1.0,
+    live amplitude: f64 = 1.0,
     /// What it is before and after, and what the rest is added to [`unit`].
-    offset: f64 = 0.0,
+    live offset: f64 = 0.0,
     /// When it starts: the graph's time, or the time since the gate opened [s].
     start: NonNegative = NonNegative(0.0),
     /// How long it lasts; for ever unless given. A ramp and a chirp need it [s].
@@ -141,6 +141,7 @@ duration = 20.0                     # [s]
         if !mistakes.is_empty() {
             return Err(mistakes);
         }
+        setup.is_still = params.amplitude == 0.0 && params.offset == 0.0;
         setup.outputs.value = ScalarShape::of(params.unit);
         let first = params.frequency.map_or(0.0, |frequency| *frequency);
         Ok(Self {

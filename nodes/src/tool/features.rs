@@ -91,7 +91,8 @@ pub(super) fn features(args: Features, shell: &Shell) -> u8 {
     }
     let request = Request { set: args.settings(), ..Request::text(text) };
     let title = format!("features of {}", args.recording.display());
-    Job { request, title, duration: args.duration, realtime: false, send: vec![], listen: false, out: args.out }.run(shell)
+    Job { request, title, duration: args.duration, realtime: false, send: vec![], listen: false, out: args.out }
+        .run(shell)
 }
 
 /// A threshold, and where it is from.

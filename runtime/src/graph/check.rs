@@ -261,7 +261,8 @@ impl Builder<'_> {
 
     /// Whether a node starts no motion by itself as the base graph sets it.
     pub(crate) fn is_still(&self, node: usize) -> bool {
-        self.kept.get(&node).is_some_and(|(_, is_still)| *is_still)
+        // One that could not be made has been told of.
+        self.kept.get(&node).is_none_or(|(_, is_still)| *is_still)
     }
 
     /// A node once more, with other parameters: from what it was made the first time, with the same outputs.

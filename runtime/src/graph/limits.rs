@@ -153,6 +153,9 @@ fn unlimited(
     let source = model.port_name(command.source);
     let message =
         format!("`{consumer}` takes only what has crossed every limit, but `{source}` has not crossed {names}");
+    if let Some(part) = whole(model, catalogue, command, missing).filter(|_| lost.is_empty()) {
+        return command.origin.mistake(Code::UnlimitedCommand, message).help(part);
+    }
     let mut helps = Vec::new();
     let mut told = BTreeSet::new();
     for limit in missing {
@@ -168,6 +171,37 @@ fn unlimited(
     }
     let diagnostic = command.origin.mistake(Code::UnlimitedCommand, message);
     diagnostic.with_help((!helps.is_empty()).then(|| helps.join("\n")))
+}
+
+/// A part that the catalogue brings along and that holds all that is missing, where a single limiter would not do.
+fn whole(model: &Model<'_>, catalogue: &Catalogue, command: &CommandWire, missing: &[&str]) -> Option<String> {
+    let specs: Vec<NodeSpec> = catalogue.nodes().iter().map(|node| node.spec()).collect();
+    let limiters: BTreeSet<&str> = missing
+        .iter()
+        .filter_map(|limit| specs.iter().find(|spec| spec.limits.holds.contains(limit)))
+        .map(|spec| &*spec.name)
+        .collect();
+    if limiters.len() < 3 {
+        return None;
+    }
+    let parts = catalogue.builtin_files().iter().filter(|(name, _)| name.ends_with(".toml"));
+    let mut parts =
+        parts.filter_map(|(name, bytes)| Some((*name, str::from_utf8(bytes).ok()?.parse::<toml::Table>().ok()?)));
+    let (file, part) = parts.find(|(_, part)| {
+        let nodes = part.get("nodes").and_then(toml::Value::as_table);
+        let kinds: Vec<&str> = nodes.into_iter().flatten().filter_map(|(_, node)| node.get("type")?.as_str()).collect();
+        limiters.iter().all(|limiter| kinds.contains(limiter))
+    })?;
+    let name = file.rsplit('/').next()?.strip_suffix(".toml")?;
+    let role = model.name(Producer::Role(command.role));
+    let taken = &model.roles[command.role]?.commands[command.command].name;
+    let mut text =
+        format!("let the motion go through a part that holds them all:\n[parts.{name}]\nfile = \"builtin:{file}\"");
+    for (input, what) in part.get("inputs").and_then(toml::Value::as_table).into_iter().flatten() {
+        text.push_str(&format!("\nin.{input} = \"…\"   # {}", what.as_str().unwrap_or_default()));
+    }
+    text.push_str(&format!("\n[commands]\n{role}.{taken} = \"{name}.{taken}\""));
+    Some(text)
 }
 
 /// Where on the way a limiter belongs: behind everything that must come before it.

@@ -199,8 +199,9 @@ fn absent(
             continue;
         }
         let what = if matches!(exit.condition, Condition::Port(_, Test::Absent)) { "always" } else { "never" };
-        let message =
-            format!("in mode `{}` nothing reads that, so it is absent: {} is {what} so", block.key.name, exit.text);
+        let name = exit.text.split('`').nth(1).unwrap_or_default();
+        let mode = &block.key.name;
+        let message = format!("`{name}` is absent in mode `{mode}`, where nothing reads it: this {what} holds");
         let help = "select the feature in this mode, or look at what it is made from";
         builder.found.push(Diagnostic::new(Code::AbsentPort, exit.span.clone(), message).help(help));
     }

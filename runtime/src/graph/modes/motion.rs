@@ -35,7 +35,9 @@ impl<'a> Movers<'a> {
 
     /// The nodes that start a motion by themselves, given which nodes are still in a mode.
     pub(crate) fn of(&self, is_still: &dyn Fn(usize) -> bool) -> Vec<usize> {
-        let (mut sampled, mut still, mut movers) = (BTreeSet::new(), BTreeSet::new(), Vec::new());
+        let (mut sampled, mut still) = (BTreeSet::new(), BTreeSet::new());
+        // Those that start a motion, and all that only passes it on.
+        let (mut movers, mut moved) = (Vec::new(), BTreeSet::new());
         for &node in self.order {
             let Some((_, spec)) = &self.model.nodes[node] else { continue };
             let wires = || self.wires[node].iter().filter(|wire| spec.inputs[wire.input].need != Need::Delayed);
@@ -46,12 +48,13 @@ impl<'a> Movers<'a> {
             }
             let sources: Vec<usize> = wires().filter_map(|wire| node_of(wire.source.producer)).collect();
             let all_still = !sources.is_empty() && sources.iter().all(|source| still.contains(source));
+            let gives_motion = spec.outputs.iter().any(|port| matches!(port.kind, Kind::Twist | Kind::Joints));
             if is_still(node) || all_still {
                 still.insert(node);
-            } else if spec.outputs.iter().any(|port| matches!(port.kind, Kind::Twist | Kind::Joints))
-                && self.driving.contains(&node)
-                && !sources.iter().any(|source| movers.contains(source))
-            {
+            } else if sources.iter().any(|source| moved.contains(source)) {
+                moved.insert(node);
+            } else if gives_motion && self.driving.contains(&node) {
+                moved.insert(node);
                 movers.push(node);
             }
         }
