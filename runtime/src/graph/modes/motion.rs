@@ -81,24 +81,23 @@ pub(crate) fn ungated(
             exit.sort == Sort::OnLost || matches!(exit.condition, Condition::Elapsed(_) | Condition::Travel(..))
         })
     });
-    for &node in movers.iter().filter(|_| !is_ended) {
-        let (name, key) = (&model.flat.nodes[node].name, &model.flat.nodes[node].block.key);
-        let gate = format!("wire `in.gate` of `{name}`");
-        let diagnostic = match mode {
-            Some((block, _)) => {
-                let message =
-                    format!("`{name}` moves the arm in mode `{}` without a gate, and nothing ends it", block.key.name);
-                let help = format!(
-                    "add a bound, as `fail = {{ after_ms = 10000, after_travel_mm = 60 }}`, or `on_lost`, or {gate}"
-                );
-                Diagnostic::new(Code::UngatedMotion, block.key.span.clone(), message).help(help)
-            }
-            None => {
-                let message = format!("`{name}` moves the arm without a gate, and nothing ends it");
-                let help = format!("{gate}, or let it move only in a mode that ends");
-                Diagnostic::new(Code::UngatedMotion, key.span.clone(), message).help(help)
-            }
-        };
-        found.push(diagnostic);
+    if is_ended || movers.is_empty() {
+        return;
+    }
+    let name = |node: &usize| format!("`{}`", model.flat.nodes[*node].name);
+    if let Some((block, _)) = mode {
+        let names = movers.iter().map(name).collect::<Vec<_>>().join(", ");
+        let mode = &block.key.name;
+        let message = format!("in mode `{mode}` the arm is moved without a gate, and nothing ends it: by {names}");
+        let bound = "add a bound, as `fail = { after_ms = 10000, after_travel_mm = 60 }`, or `on_lost`";
+        let diagnostic = Diagnostic::new(Code::UngatedMotion, block.key.span.clone(), message);
+        found.push(diagnostic.help(format!("{bound}, or wire `in.gate` of {names}")));
+        return;
+    }
+    for node in movers {
+        let (name, key) = (name(node), &model.flat.nodes[*node].block.key);
+        let message = format!("{name} moves the arm without a gate, and nothing ends it");
+        let help = format!("wire `in.gate` of {name}, or let it move only in a mode that ends");
+        found.push(Diagnostic::new(Code::UngatedMotion, key.span.clone(), message).help(help));
     }
 }
