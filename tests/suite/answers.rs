@@ -222,9 +222,9 @@ fn a_broken_graph_is_not_shown() {
 fn diagnostics_are_there_for_programs() {
     let said = json(&["check", HYBRID, "tests/errors/frame_mismatch.toml", "tests/errors/unread_node.toml"], 2);
     let lines = [
-        "graphs/hybrid.toml: ok True, 14 nodes, 0.004 s",
+        "graphs/hybrid.toml: ok True, 22 nodes, 0.004 s",
         "tests/errors/frame_mismatch.toml: ok False",
-        "tests/errors/unread_node.toml: ok True, 11 nodes, 0.004 s",
+        "tests/errors/unread_node.toml: ok True, 17 nodes, 0.004 s",
     ];
     assert_lines(&said, &lines);
     assert!(said.contains("error[frame-mismatch] tests/errors/frame_mismatch.toml:"), "{said}");
@@ -242,7 +242,7 @@ fn diagnostics_are_there_for_programs() {
 fn a_warning_fails_nothing_unless_it_is_asked_to() {
     let graph = "tests/errors/unread_node.toml";
     let told = say(&["check", graph]);
-    assert_eq!((told.code, told.out.as_str()), (0, "tests/errors/unread_node.toml: ok, 11 nodes, a tick each 4 ms\n"));
+    assert_eq!((told.code, told.out.as_str()), (0, "tests/errors/unread_node.toml: ok, 17 nodes, a tick each 4 ms\n"));
     assert!(told.err.starts_with("warning[unread-node]: nothing reads any output of `label`\n"), "{}", told.err);
     assert!(told.err.ends_with("\n3 warnings\n"), "{}", told.err);
     let denied = say(&["check", "--deny-warnings", graph]);

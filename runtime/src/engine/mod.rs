@@ -4,7 +4,7 @@
 
 mod build;
 mod command;
-mod course;
+mod cycle;
 mod halt;
 mod inlet;
 mod modes;

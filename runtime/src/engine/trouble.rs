@@ -1,7 +1,7 @@
 //! What can go wrong in a tick, and how it is told: node, port, tick, cause and place.
 
 use super::Engine;
-use super::course::owner;
+use super::cycle::owner;
 use crate::fault::{Cause, Fault};
 
 /// A trouble of a tick, in numbers: it is put into words only when it has to be told.
