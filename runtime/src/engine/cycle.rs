@@ -105,7 +105,10 @@ impl Engine {
     /// A word from outside: `stop` and `resume` halt the commands and let them go on, any other is for the modes.
     pub fn send(&mut self, word: &str) {
         match word {
-            "stop" => self.trouble = Some((Policy::Stop, Trouble::Operator)),
+            "stop" => {
+                self.halts.stop();
+                self.trouble = Some((Policy::Stop, Trouble::Operator));
+            }
             "resume" => self.halts.resume(),
             other => self.sent = Some(other.to_owned()),
         }
@@ -221,7 +224,9 @@ impl Engine {
     /// Makes the outputs of a station and of all that come after it absent. A node that panicked may have lost its
     /// buffers, so they are made anew.
     fn take_back(&mut self, station: usize) {
-        let from = self.ports.iter().position(|(port, _)| owner(&port.name) == self.names[station].0);
+        // The first that has any: a node may be without outputs, and those after it were not stepped all the same.
+        let first = |name: &String| self.ports.iter().position(|(port, _)| owner(&port.name) == name);
+        let from = self.names[station..].iter().find_map(|(name, _)| first(name));
         for (port, id) in &self.ports[from.unwrap_or(self.ports.len())..] {
             self.core.bus.marks[id.mark as usize].lose(self.core.tick.index);
             self.core.bus.arenas.renew(id.slot, &port.shape);

@@ -159,6 +159,11 @@ impl Engine {
         })
     }
 
+    /// Whether a device that is left knows of an end of its samples.
+    fn has_end(&self) -> bool {
+        self.decks.iter().any(|deck| matches!(&deck.edge, Edge::Stepped(driver) if driver.end().is_some()))
+    }
+
     /// Number of the last tick.
     #[must_use]
     pub const fn ticks(&self) -> u64 {
