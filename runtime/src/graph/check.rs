@@ -63,7 +63,7 @@ pub fn plan(catalogue: &Catalogue, request: &Request) -> Result<Plan, Report> {
     let wiring = Wiring { order: &order, wires: &wires, commands: &commands };
     let modes = modes::plan(&mut builder, &mut nodes, &wiring);
     let planned: Vec<PlannedCommand> = commands.iter().filter_map(|wire| builder.command(wire)).collect();
-    let policy = flat.policy.as_ref().map_or_else(PolicyTable::default, |(_, policy)| policy.clone());
+    let policy = flat.policy.as_ref().and_then(|(_, policy)| policy.clone()).unwrap_or_default();
     let roles = builder.planned_roles(&policy);
     let Builder { found, sources, .. } = builder;
     let Some((clock, _)) = clock.filter(|_| found.is_empty()) else { return Err(Report::new(sources, found)) };
