@@ -19,14 +19,7 @@ pub enum Cause {
         max_age: i64,
     },
     /// What comes to a node over a wire is too old.
-    StaleWire {
-        /// The port it comes from.
-        from: String,
-        /// How old it is [ns].
-        age: i64,
-        /// How old it may be [ns].
-        max_age: i64,
-    },
+    StaleWire(Box<StaleWire>),
     /// The clock device is silent.
     SilentClock,
     /// A tick began too late.
@@ -38,6 +31,17 @@ pub enum Cause {
     Operator,
     /// A mode came to what it calls a failure.
     Mode(String),
+}
+
+/// What came over a wire that may grow only so old.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct StaleWire {
+    /// The port it comes from.
+    pub from: String,
+    /// How old it is [ns].
+    pub age: i64,
+    /// How old it may be [ns].
+    pub max_age: i64,
 }
 
 /// A controlled stop with its reason.
@@ -69,7 +73,8 @@ impl fmt::Display for Fault {
             Cause::Stale { age, max_age } => {
                 write!(f, "`{name}` is {:.1} ms old, and may be {:.1} ms old", ms(*age), ms(*max_age))?;
             }
-            Cause::StaleWire { from, age, max_age } => {
+            Cause::StaleWire(wire) => {
+                let StaleWire { from, age, max_age } = &**wire;
                 write!(f, "`{from}` is {:.1} ms old for `{name}`, and may be {:.1} ms old", ms(*age), ms(*max_age))?;
             }
             Cause::SilentClock => write!(f, "the clock device `{name}` is silent")?,

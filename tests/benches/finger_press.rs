@@ -52,7 +52,8 @@ impl Pair {
     pub(crate) fn step(&mut self) -> bool {
         let now = self.engine.next().expect("frames are left");
         self.engine.tick(now).expect("the recording is sound");
-        let (q, wanted) = (joints(&self.engine, "arm.position"), joints(&self.engine, "move.ik.velocity"));
+        let arm = ["arm.position", "arm.equilibrium"].map(|port| joints(&self.engine, port));
+        let wanted = joints(&self.engine, "move.joints.velocity");
         let time = |frame: usize| self.movie.frames[frame].time;
         // As in the graph: a feature that is away for a tick of this slow recording is away for good.
         let is_gone = |last: Option<usize>| last.is_some_and(|last| last + 1 < self.seen);
@@ -70,7 +71,7 @@ impl Pair {
         let mut out = [0.0; 7];
         let tactels = self.movie.shape.tactels();
         let cells = &self.movie.cells[self.seen * tactels..][..tactels];
-        let (has_contact, has_axis) = self.fused.tick(cells, &q, dt, tick, &mut out);
+        let (has_contact, has_axis) = self.fused.tick(cells, [&arm[0], &arm[1]], dt, tick, &mut out);
         self.contact = if has_contact { Some(self.seen) } else { self.contact };
         self.axis = if has_axis { Some(self.seen) } else { self.axis };
         self.seen += 1;
@@ -82,8 +83,8 @@ impl Pair {
         self.movie.frames.len()
     }
 
-    /// The arm's joints as the last tick saw them.
-    pub(crate) fn q(&self) -> [f64; 7] {
-        joints(&self.engine, "arm.position")
+    /// The arm's joints and their equilibrium as the last tick saw them.
+    pub(crate) fn arm(&self) -> [[f64; 7]; 2] {
+        ["arm.position", "arm.equilibrium"].map(|port| joints(&self.engine, port))
     }
 }

@@ -8,9 +8,10 @@ use std::path::Path;
 
 use tactflow_nodes::arm::chain::Chain;
 use tactflow_nodes::arm::{damped, joint_limits, model, mount::Mount, null_space};
+use tactflow_nodes::limits::{acceleration_limit, bumpless, contact_limit, joint_limit, share::share, workspace_limit};
 use tactflow_nodes::servo::{adjoint::adjoint, axial::wrap_axial, integral::integrate};
 use tactflow_nodes::touch::{axis, binarize::binarize, label, moments, tactile_source::sum_and_peak};
-use tactflow_runtime::node::FilePath;
+use tactflow_runtime::node::{FilePath, Tick};
 use tactflow_runtime::signal::{Grid, Image, ImageShape, Joint, Mask, Pose, Regions, Signal, Twist};
 
 const WINDOW: usize = 3;
@@ -55,8 +56,9 @@ pub(crate) struct Fused {
     columns: Vec<Twist>,
     at_sensor: [[f64; 6]; 7],
     rows: [null_space::Row; 7],
-    last: [f64; 7],
-    left: f64,
+    smooth: [Twist; 2],
+    reached: Twist,
+    limited: joint_limit::State,
     /// Read off by the bench, so that nothing is optimised away.
     pub(crate) sum: f64,
     pub(crate) peak: f64,
@@ -103,13 +105,15 @@ impl Fused {
             inverse: black_box(COLUMNS),
             integrals: [0.0; 4],
             errors: [0.0; 4],
-            joints: chain.joints().to_vec(),
+            // What the graph's limit and the arm agree on.
+            joints: chain.joints().iter().map(|joint| Joint { acceleration: 5.0, ..joint.clone() }).collect(),
             chain,
             columns: vec![Twist::default(); 7],
             at_sensor: [[0.0; 6]; 7],
             rows: [[0.0; 8]; 7],
-            last: [0.0; 7],
-            left: 0.0,
+            smooth: [Twist::default(); 2],
+            reached: Twist::default(),
+            limited: joint_limit::State::of(7),
             sum: 0.0,
             peak: 0.0,
             shape,
@@ -126,9 +130,17 @@ impl Fused {
         self.axes = Ring::default();
     }
 
-    /// One tick: the recording's cells and the arm's joints in, joint velocities out. `dt` is the time between the last
-    /// two samples of the contact [s], `tick` that between the ticks. Tells whether there is a contact and an axis.
-    pub(crate) fn tick(&mut self, cells: &[f32], q: &[f64], dt: f64, tick: f64, out: &mut [f64; 7]) -> (bool, bool) {
+    /// One tick: the recording's cells, the arm's joints and its equilibrium in, joint velocities out. `dt` is the time
+    /// between the last two samples of the contact [s], `tick` that between the ticks. Tells whether there is a contact and
+    /// an axis.
+    pub(crate) fn tick(
+        &mut self,
+        cells: &[f32],
+        arm: [&[f64]; 2],
+        dt: f64,
+        tick: f64,
+        out: &mut [f64; 7],
+    ) -> (bool, bool) {
         (self.sum, self.peak) = sum_and_peak(cells);
         let lines = self.offset.iter().zip(&self.alive);
         for ((to, from), (offset, gain)) in self.image.cells_mut().iter_mut().zip(cells).zip(lines) {
@@ -139,18 +151,46 @@ impl Fused {
         label::trace(&self.mask, 1, runs);
         label::number(&self.image, runs, regions);
         let contact = label::contact(regions, 6, 100.0);
-        let Pose(pose) = self.chain.forward(q, &mut self.columns);
-        let Some(contact) = contact else {
-            self.left = (self.left - tick / 0.1).max(0.0);
-            for (out, last) in out.iter_mut().zip(&self.last) {
-                *out = last * self.left;
-            }
-            joint_limits::limit(&self.joints, q, 5.0, out);
-            return (false, false);
-        };
-        label::paint(runs, contact, &mut self.region);
-        let (twist, has_axis) = self.servo(dt);
-        let spatial = adjoint(&Pose(pose), &twist);
+        let pose = self.chain.forward(arm[0], &mut self.columns);
+        let (mut wanted, mut has_axis) = (None, false);
+        if let Some(contact) = contact {
+            label::paint(runs, contact, &mut self.region);
+            let (twist, axis) = self.servo(dt);
+            (wanted, has_axis) = (Some(twist), axis);
+        }
+        let tick = Tick { dt: tick, max_gap: 0.5, ..Tick::first() };
+        let mut velocity = [0.0; 7];
+        let moves = self.limit(wanted, &pose, &tick).map(|twist| self.solve(&twist, &pose, arm[0], &mut velocity));
+        let wanted = moves.map(|()| &velocity[..]);
+        self.limited.limit(&self.joints, 0.6, &tick, wanted, arm[0], arm[1]);
+        out.copy_from_slice(self.limited.velocities());
+        (contact.is_some(), has_axis)
+    }
+
+    /// The limits of the sensor's twist.
+    fn limit(&mut self, wanted: Option<Twist>, pose: &Pose, tick: &Tick) -> Option<Twist> {
+        let (dt, [last, offset]) = (tick.dt.min(tick.max_gap), &mut self.smooth);
+        let half = [0.5 * 1.0 * dt, 0.5 * 10.0 * dt];
+        let mut twist = bumpless::smooth(&wanted.unwrap_or_default(), last, offset, half);
+        let is_there = wanted.is_some() || *offset != Twist::default();
+        if is_there {
+            let load = contact_limit::load(&self.shape, &self.image);
+            contact_limit::bar(&mut twist, load.centre, load.sum / 2000.0, 0.8, 0.05);
+            contact_limit::bar(&mut twist, load.place, load.peak / 240.0, 0.8, 0.05);
+            let (velocity, place) = (pose.0.rotation * twist.linear(), pose.0.translation.vector);
+            let corners = [[-0.8, -0.4, 0.1], [-0.3, 0.4, 0.7]];
+            twist.0 *= workspace_limit::share(&velocity, &place, corners, 1.0, 2.0 * tick.max_gap);
+            twist.0 *= share(&twist, 0.05, 0.8);
+        } else {
+            twist = Twist::default();
+        }
+        acceleration_limit::approach(&mut self.reached, &twist, dt, 10.0 * dt);
+        (is_there || self.reached != Twist::default()).then_some(self.reached)
+    }
+
+    /// From a twist of the sensor to joint velocities.
+    fn solve(&mut self, twist: &Twist, Pose(pose): &Pose, q: &[f64], out: &mut [f64; 7]) {
+        let spatial = adjoint(&Pose(*pose), twist);
         let r = pose.rotation.matrix();
         let p = pose.translation.vector;
         let at_sensor = |twist: &Twist| {
@@ -168,8 +208,6 @@ impl Fused {
         let mut drift: [f64; 7] = std::array::from_fn(|i| 0.5 * (POSTURE[i] - q[i]));
         null_space::project(&self.at_sensor, &mut self.rows, &mut drift);
         joint_limits::add_within(&self.joints, q, 5.0, out, &drift);
-        (self.last, self.left) = (*out, 1.0);
-        (true, has_axis)
     }
 
     /// From the region to the twist of the sensor (eqs. 1-3 and 5).

@@ -64,7 +64,7 @@ fn finger_press() {
     const FRAME: usize = 150;
     let mut pair = finger_press::Pair::new();
     (0..=FRAME).for_each(|_| assert!(pair.step()));
-    let (cells, q) = (pair.cells(FRAME).to_vec(), pair.q());
+    let (cells, arm) = (pair.cells(FRAME).to_vec(), pair.arm());
     let mut guarded = finger_press::Pair::new();
     (0..=FRAME).for_each(|_| assert!(guarded.step()));
     let finger_press::Pair { engine, fused, .. } = &mut pair;
@@ -78,7 +78,7 @@ fn finger_press() {
         black_box(&mut guarded.engine).step().expect("the recording is sound");
     };
     let mut by_hand = || {
-        black_box(fused.tick(black_box(&cells), black_box(&q), 0.1, 0.1, &mut out));
+        black_box(fused.tick(black_box(&cells), black_box([&arm[0][..], &arm[1][..]]), 0.1, 0.1, &mut out));
         black_box((fused.sum, fused.peak, out));
     };
     let medians = medians(&mut [&mut by_hand, &mut bare, &mut graph], 500);
@@ -97,7 +97,7 @@ fn count(what: &str, ticks: u32) {
     const FRAME: usize = 150;
     let mut pair = finger_press::Pair::new();
     (0..=FRAME).for_each(|_| assert!(pair.step()));
-    let (cells, q) = (pair.cells(FRAME).to_vec(), pair.q());
+    let (cells, arm) = (pair.cells(FRAME).to_vec(), pair.arm());
     let mut out = [0.0; 7];
     for _ in 0..ticks {
         match what {
@@ -110,7 +110,13 @@ fn count(what: &str, ticks: u32) {
                 pair.engine.step().expect("the recording is sound");
             }
             "fused" => {
-                black_box(pair.fused.tick(black_box(&cells), black_box(&q), 0.1, 0.1, &mut out));
+                black_box(pair.fused.tick(
+                    black_box(&cells),
+                    black_box([&arm[0][..], &arm[1][..]]),
+                    0.1,
+                    0.1,
+                    &mut out,
+                ));
             }
             other => panic!("`{other}` is none of `graph`, `guarded` and `fused`"),
         }

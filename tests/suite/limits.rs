@@ -134,8 +134,8 @@ fn a_limiter_says_what_it_does_and_no_mode_can_set_it() {
     assert_eq!(limiters, 6);
     // Whatever an arm asks for, some node holds.
     for limit in catalogue.roles().iter().flat_map(|role| &role.limits) {
-        let holds = |node: &Box<dyn tactflow_runtime::node::NodeType>| node.spec().limits.holds.contains(&&**limit);
-        assert!(catalogue.nodes().iter().any(holds), "{limit}");
+        let is_held = catalogue.nodes().iter().any(|node| node.spec().limits.holds.contains(&&**limit));
+        assert!(is_held, "{limit}");
     }
 }
 

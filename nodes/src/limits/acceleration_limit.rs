@@ -5,7 +5,7 @@
 //! convex set is in it. A bound that moves faster than the accelerations is met as fast as they allow.
 
 use tactflow_runtime::node::{Limits, Mistakes, Node, Positive, Setup, Tick};
-use tactflow_runtime::signal::{ScalarShape, Twist, Unit};
+use tactflow_runtime::signal::{ScalarShape, Stamp, Twist, Unit};
 use tactflow_runtime::{inputs, outputs, params, state};
 
 use super::share::share;
@@ -53,7 +53,7 @@ impl Node for AccelerationLimit {
     const SUMMARY: &'static str = "limits the acceleration of the sensor, and brings it to rest when nothing comes";
     const DOC: &'static str = "The motion follows what is wanted on a straight line, as fast as both accelerations \
         allow. It is the last limiter of a twist: what scales a motion behind it would make it jump again.\n\n\
-        When the motion is absent or older than `max_age_ms`, it goes to zero by the same rule, is there until it \
+        When the motion is absent or older than `max_age_ms`, or the runtime holds all commands, it goes to zero by the same rule, is there until it \
         rests, and absent then. A generated motion is of no age.";
     const EXAMPLE: &'static str = r#"
 [nodes.acceleration_limit]
@@ -80,14 +80,22 @@ angular_rad_per_s2 = 10.0
     }
 
     fn step(&self, tick: &Tick, inputs: Inputs<'_>, out: &mut Outputs, state: &mut State) {
-        let wanted = inputs.twist.filter(|twist| twist.stamp().age(tick.now) <= self.max_age);
+        let is_fresh = |stamp: Stamp| stamp.age(tick.now) <= self.max_age && !tick.is_halted;
+        let wanted = inputs.twist.filter(|twist| is_fresh(twist.stamp()));
         let target = wanted.map_or_else(Twist::default, |twist| *twist);
-        let (dt, change) = (tick.dt.min(tick.max_gap), Twist(target.0 - state.reached.0));
-        let share = share(&change, self.linear * dt, self.angular * dt);
-        state.reached = if share < 1.0 { Twist(state.reached.0 + change.0 * share) } else { target };
+        let dt = tick.dt.min(tick.max_gap);
+        let share = approach(&mut state.reached, &target, self.linear * dt, self.angular * dt);
         if wanted.is_some() || state.reached != Twist::default() {
             out.twist.set(state.reached);
             out.acceleration.set(share);
         }
     }
+}
+
+/// Moves `reached` toward `target` on a straight line, by at most so much [m/s, rad/s]; the share of the way that it went.
+pub fn approach(reached: &mut Twist, target: &Twist, linear: f64, angular: f64) -> f64 {
+    let change = Twist(target.0 - reached.0);
+    let share = share(&change, linear, angular);
+    *reached = if share < 1.0 { Twist(reached.0 + change.0 * share) } else { *target };
+    share
 }

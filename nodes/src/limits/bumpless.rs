@@ -87,24 +87,33 @@ angular_rad_per_s2 = 10.0
     fn step(&self, tick: &Tick, inputs: Inputs<'_>, out: &mut Outputs, state: &mut State) {
         let dt = tick.dt.min(tick.max_gap);
         let (linear, angular) = (0.5 * self.linear * dt, 0.5 * self.angular * dt);
-        let wanted = inputs.twist.map_or_else(Twist::default, |twist| *twist);
-        let change = Twist(wanted.0 - state.last.0);
-        let passes = share(&change, linear, angular);
-        state.last = wanted;
-        state.offset.0 -= change.0 * (1.0 - passes);
-        let fades = share(&state.offset, linear, angular);
-        if fades < 1.0 {
-            state.offset.0 -= state.offset.0 * fades;
-        } else {
-            state.offset = Twist::default();
-        }
-        if inputs.twist.is_none() && state.offset == Twist::default() {
+        // What the runtime holds at zero starts from zero when it may go on.
+        let twist = inputs.twist.filter(|_| !tick.is_halted);
+        let wanted = twist.map_or_else(Twist::default, |twist| *twist);
+        let smooth = smooth(&wanted, &mut state.last, &mut state.offset, [linear, angular]);
+        if twist.is_none() && state.offset == Twist::default() {
             return;
         }
-        out.twist.set(Twist(wanted.0 + state.offset.0));
+        out.twist.set(smooth);
         let (own, left) = (times(&wanted, self.linear, self.angular), times(&state.offset, self.linear, self.angular));
         out.bumpless.set(if left > 0.0 { own / (own + left) } else { 1.0 });
     }
+}
+
+/// The motion without its jump, given the motion and the offset of the last tick, which change by at most `half` [m/s,
+/// rad/s] each.
+pub fn smooth(wanted: &Twist, last: &mut Twist, offset: &mut Twist, [linear, angular]: [f64; 2]) -> Twist {
+    let change = Twist(wanted.0 - last.0);
+    let passes = share(&change, linear, angular);
+    *last = *wanted;
+    offset.0 -= change.0 * (1.0 - passes);
+    let fades = share(offset, linear, angular);
+    if fades < 1.0 {
+        offset.0 -= offset.0 * fades;
+    } else {
+        *offset = Twist::default();
+    }
+    Twist(wanted.0 + offset.0)
 }
 
 #[cfg(test)]

@@ -52,13 +52,13 @@ state! {
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Load {
     /// Sum of what presses [unit of the image].
-    sum: f64,
+    pub sum: f64,
     /// Its centre [m].
-    centre: [f64; 2],
+    pub centre: [f64; 2],
     /// The highest tactel [unit of the image].
-    peak: f64,
+    pub peak: f64,
     /// Its place [m].
-    place: [f64; 2],
+    pub place: [f64; 2],
 }
 
 /// The ceilings and the pad.
@@ -129,8 +129,8 @@ approach_m_per_s = 0.05
             (state.stamp, state.load) = (stamp, load(&self.shape, &inputs.image));
         }
         let (load, mut twist) = (&state.load, *inputs.twist);
-        let force = self.bar(&mut twist, load.centre, load.sum / self.force);
-        let peak = self.bar(&mut twist, load.place, load.peak / self.peak);
+        let force = bar(&mut twist, load.centre, load.sum / self.force, self.begin, self.approach);
+        let peak = bar(&mut twist, load.place, load.peak / self.peak, self.begin, self.approach);
         out.twist.set(twist);
         // What is no number in the image is none here either, and ends the run.
         out.force.set(force + 0.0 * load.sum);
@@ -138,25 +138,25 @@ approach_m_per_s = 0.05
     }
 }
 
-impl ContactLimit {
-    /// Limits the way in at a point that bears so many times its ceiling; the share of it that passes.
-    fn bar(&self, twist: &mut Twist, [x, y]: [f64; 2], times: f64) -> f64 {
-        if times < self.begin {
-            return 1.0;
-        }
-        let allowed = if times < 1.0 { self.approach * (1.0 - times) / (1.0 - self.begin) } else { 0.0 };
-        let [_, _, vz, wx, wy, _] = twist.0.into();
-        let way_in = vz + wx * y - wy * x;
-        if way_in <= allowed {
-            return 1.0;
-        }
-        twist.0[2] -= way_in - allowed;
-        allowed / way_in
+/// Limits the way in at a point that bears so many `times` its ceiling, to at most `approach` [m/s] where it begins; the
+/// share of it that passes.
+pub fn bar(twist: &mut Twist, [x, y]: [f64; 2], times: f64, begin: f64, approach: f64) -> f64 {
+    if times < begin {
+        return 1.0;
     }
+    let allowed = if times < 1.0 { approach * (1.0 - times) / (1.0 - begin) } else { 0.0 };
+    let [_, _, vz, wx, wy, _] = twist.0.into();
+    let way_in = vz + wx * y - wy * x;
+    if way_in <= allowed {
+        return 1.0;
+    }
+    twist.0[2] -= way_in - allowed;
+    allowed / way_in
 }
 
 /// Sums an image up. What is no number makes the sum none.
-fn load(shape: &ImageShape, image: &Image) -> Load {
+#[must_use]
+pub fn load(shape: &ImageShape, image: &Image) -> Load {
     let mut load = Load::default();
     let mut moments = [0.0; 2];
     for (i, row) in image.cells().chunks(shape.cols).enumerate() {

@@ -138,41 +138,74 @@ lead_rad = 0.1
     }
 
     fn state(&self) -> State {
-        let count = self.joints.len();
-        State { last: vec![0.0; count], target: vec![0.0; count], room: vec![Room::default(); count] }
+        State::of(self.joints.len())
     }
 
     fn step(&self, tick: &Tick, inputs: Inputs<'_>, out: &mut Outputs, state: &mut State) {
         let arm = inputs.position.stamp().oldest(inputs.equilibrium.stamp());
-        let is_fresh = |stamp: Stamp| stamp.age(tick.now) <= self.max_age;
+        let is_fresh = |stamp: Stamp| stamp.age(tick.now) <= self.max_age && !tick.is_halted;
         let wanted = inputs.velocity.filter(|velocity| is_fresh(velocity.stamp()) && is_fresh(arm));
-        if wanted.is_none() && state.last.iter().all(|v| *v == 0.0) {
+        let wanted = wanted.map(|velocity| &*velocity.value().0);
+        let (position, equilibrium) = (&inputs.position.0, &inputs.equilibrium.0);
+        let Some([lead, position, speed, acceleration]) =
+            state.limit(&self.joints, self.lead, tick, wanted, position, equilibrium)
+        else {
             return;
-        }
-        for (i, joint) in self.joints.iter().enumerate() {
-            let (q, equilibrium) = (inputs.position.0[i], inputs.equilibrium.0[i]);
-            state.room[i] = room(joint, q, equilibrium, self.lead, state.last[i], tick.max_gap);
-        }
-        let rooms = || state.room.iter();
-        let (mut lead, mut position, mut speed) = (1.0, 1.0, 1.0);
-        state.target.fill(0.0);
-        if let Some(wanted) = wanted {
-            speed = share(&wanted.0, rooms().map(|room| room.speed));
-            position = share(&wanted.0, rooms().map(|room| room.position));
-            lead = share(&wanted.0, rooms().map(|room| room.lead));
-            let share = f64::min(speed, position).min(lead);
-            for ((target, wanted), room) in state.target.iter_mut().zip(&wanted.0).zip(&state.room) {
-                let (least, greatest) = room.all();
-                *target = (wanted * share).clamp(least, greatest);
-            }
-        }
-        let dt = tick.dt.min(tick.max_gap);
-        let acceleration = follow(&self.joints, dt, &state.target, &state.room, &mut state.last);
+        };
         out.velocity.write().0.copy_from_slice(&state.last);
         out.lead.set(lead);
         out.joint_position.set(position);
         out.joint_speed.set(speed);
         out.joint_acceleration.set(acceleration);
+    }
+}
+
+impl State {
+    /// A fresh state for so many joints.
+    #[must_use]
+    pub fn of(count: usize) -> Self {
+        Self { last: vec![0.0; count], target: vec![0.0; count], room: vec![Room::default(); count] }
+    }
+
+    /// The velocities that were given last [rad/s].
+    #[must_use]
+    pub fn velocities(&self) -> &[f64] {
+        &self.last
+    }
+
+    /// One step toward what is wanted, within all limits. Gives the shares that the lead, the positions, the speeds and
+    /// the accelerations let pass; nothing if nothing is wanted and all joints stand.
+    pub fn limit(
+        &mut self,
+        joints: &[Joint],
+        lead: f64,
+        tick: &Tick,
+        wanted: Option<&[f64]>,
+        position: &[f64],
+        equilibrium: &[f64],
+    ) -> Option<[f64; 4]> {
+        if wanted.is_none() && self.last.iter().all(|v| *v == 0.0) {
+            return None;
+        }
+        for (i, joint) in joints.iter().enumerate() {
+            self.room[i] = room(joint, position[i], equilibrium[i], lead, self.last[i], tick.max_gap);
+        }
+        let rooms = || self.room.iter();
+        let mut shares = [1.0; 4];
+        self.target.fill(0.0);
+        if let Some(wanted) = wanted {
+            shares[0] = share(wanted, rooms().map(|room| room.lead));
+            shares[1] = share(wanted, rooms().map(|room| room.position));
+            shares[2] = share(wanted, rooms().map(|room| room.speed));
+            let share = shares[0].min(shares[1]).min(shares[2]);
+            for ((target, wanted), room) in self.target.iter_mut().zip(wanted).zip(&self.room) {
+                let (least, greatest) = room.all();
+                *target = (wanted * share).clamp(least, greatest);
+            }
+        }
+        let dt = tick.dt.min(tick.max_gap);
+        shares[3] = follow(joints, dt, &self.target, &self.room, &mut self.last);
+        Some(shares)
     }
 }
 

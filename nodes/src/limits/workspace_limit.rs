@@ -4,6 +4,7 @@
 //! longest tick that counts as one, since a command acts a tick after what it was made from. At a face, and past it,
 //! only the way back is free. The whole twist is scaled by one factor, so its direction stays.
 
+use nalgebra::Vector3;
 use tactflow_runtime::node::{Limits, Mistake, Mistakes, Node, Positive, Setup, Tick};
 use tactflow_runtime::signal::{ScalarShape, Twist, Unit};
 use tactflow_runtime::{inputs, outputs, params};
@@ -89,20 +90,33 @@ deceleration_m_per_s2 = 0.5
             return;
         }
         let (twist, pose) = (*inputs.twist, inputs.pose.0);
-        let velocity = pose.rotation * twist.linear();
-        let speed = velocity.norm();
-        let mut share = 1.0_f64;
-        for axis in 0..3 {
-            let (v, place) = (velocity[axis], pose.translation.vector[axis]);
-            let distance = if v > 0.0 { self.max[axis] - place } else { place - self.min[axis] };
-            let allowed = stoppable(distance, self.deceleration, 2.0 * tick.max_gap);
-            if v.abs() > allowed && v.abs() > NEGLIGIBLE * speed {
-                share = share.min(allowed / v.abs());
-            }
-        }
+        let (velocity, place) = (pose.rotation * twist.linear(), pose.translation.vector);
+        let share = share(&velocity, &place, [self.min, self.max], self.deceleration, 2.0 * tick.max_gap);
         out.twist.set(Twist(twist.0 * share));
         out.workspace.set(share);
     }
+}
+
+/// The greatest factor up to 1 with which a velocity at a place can still be stopped within a box, after a `delay` [s].
+#[must_use]
+pub fn share(
+    velocity: &Vector3<f64>,
+    place: &Vector3<f64>,
+    [min, max]: [[f64; 3]; 2],
+    deceleration: f64,
+    delay: f64,
+) -> f64 {
+    let speed = velocity.norm();
+    let mut share = 1.0_f64;
+    for axis in 0..3 {
+        let v = velocity[axis];
+        let distance = if v > 0.0 { max[axis] - place[axis] } else { place[axis] - min[axis] };
+        let allowed = stoppable(distance, deceleration, delay);
+        if v.abs() > allowed && v.abs() > NEGLIGIBLE * speed {
+            share = share.min(allowed / v.abs());
+        }
+    }
+    share
 }
 
 /// Greatest speed from which a stop within `distance` is possible, `delay` [s] later, with that deceleration.

@@ -55,7 +55,7 @@ impl Engine {
         let stations = plan.nodes.into_iter().map(|node| station(node, &ids, &mut bus, &mut watched));
         let stations: Vec<Station> = stations.collect();
         let (max_gap, reset_after) = (plan.max_gap, plan.reset_after);
-        let tick = Tick { index: 0, now: 0, dt: 0.0, stamp: Stamp::TIMELESS, max_gap, reset_after };
+        let tick = Tick { index: 0, now: 0, dt: 0.0, stamp: Stamp::TIMELESS, max_gap, reset_after, is_halted: false };
         let (timing, mut core) = (Timing::new(stations.len()), Core::new(bus, stations, inlets, slots, tick));
         let kind = |id: PortId| ports.iter().find(|(_, known)| *known == id).map(|(port, _)| port.shape.kind());
         let modes = plan.modes.map(|modes| {

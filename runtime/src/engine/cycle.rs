@@ -69,6 +69,7 @@ impl Engine {
             self.meet(self.policy.panic.0, Trouble::Panicked(station))?;
         }
         self.settle();
+        self.core.tick.is_halted = self.halts.is_halted();
         self.core.commit(&mut self.decks, self.halts.is_halted());
         self.decide()
     }

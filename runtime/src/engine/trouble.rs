@@ -5,7 +5,7 @@ use std::ops::Range;
 use super::Engine;
 use super::cycle::owner;
 use super::station::Aged;
-use crate::fault::{Cause, Fault};
+use crate::fault::{Cause, Fault, StaleWire};
 use crate::graph::Policy;
 
 /// A wire whose age does more than that its node goes without.
@@ -53,8 +53,8 @@ impl Engine {
                 let WatchedWire { aged, node, span, .. } = &self.watched[wire];
                 let age = self.core.bus.marks[aged.from as usize].stamp().age(self.core.tick.now);
                 let from = self.ports.iter().find(|(_, id)| id.mark == aged.from).map_or("", |(port, _)| &port.name);
-                let cause = Cause::StaleWire { from: from.to_owned(), age, max_age: aged.max_age };
-                self.fault(node, None, cause, self.sources.locate(span.start))
+                let wire = StaleWire { from: from.to_owned(), age, max_age: aged.max_age };
+                self.fault(node, None, Cause::StaleWire(wire.into()), self.sources.locate(span.start))
             }
             // The ports of the roles come first, an inlet each.
             Trouble::NotFinite(port) | Trouble::NotFiniteAt(port) => self.of_port(port, Cause::NotFinite),

@@ -1,23 +1,18 @@
 //! From a request to a plan, or to everything that is wrong.
 
-use std::collections::BTreeMap;
-
+use super::build::Builder;
 use super::devices::{self, Opened};
 use super::document::GraphTable;
 use super::frames::Frames;
 use super::load::{Flat, Loader, Request};
 use super::order::{Wiring, order};
-use super::plan::{Clock, Plan, PlannedCommand, PlannedNode, PlannedPort, PlannedRole, PlannedWire, Producer, Source};
+use super::plan::{Clock, Plan, PlannedCommand, PlannedNode};
 use super::policy::{PolicyTable, unknown_roles};
-use super::units::{Clash, Units};
 use super::unread::unread;
-use super::wires::{CommandWire, Model, Origin, Wire};
-use super::{Sources, Value, outline};
-use super::{limits, modes};
+use super::wires::Model;
+use super::{Sources, limits, modes, outline};
 use crate::catalogue::Catalogue;
 use crate::diagnostic::{Code, Diagnostic, Report};
-use crate::node::{Built, Configured, Given, Need, NodeSpec, PortSpec, Reader};
-use crate::signal::{FlagShape, Kind, Shape};
 
 /// Checks a graph and builds it.
 ///
@@ -45,19 +40,7 @@ pub fn plan(catalogue: &Catalogue, request: &Request) -> Result<Plan, Report> {
     limits::prove(&model, catalogue, &mut frames, &wires, &commands, &mut found);
     let clock = clock(&flat, &opened, &mut found);
     let period = clock.map_or(1.0, |(_, period)| period);
-    let mut builder = Builder {
-        catalogue,
-        model: &model,
-        opened: &opened,
-        frames,
-        found,
-        sources,
-        period,
-        ports: BTreeMap::new(),
-        units: BTreeMap::new(),
-        kept: BTreeMap::new(),
-    };
-    builder.roles();
+    let mut builder = Builder::new(catalogue, &model, &opened, frames, (found, sources), period);
     let mut nodes: Vec<PlannedNode> = order.iter().filter_map(|node| builder.node(*node, &wires[*node])).collect();
     builder.delayed(&wires);
     let wiring = Wiring { order: &order, wires: &wires, commands: &commands };
@@ -65,7 +48,7 @@ pub fn plan(catalogue: &Catalogue, request: &Request) -> Result<Plan, Report> {
     let planned: Vec<PlannedCommand> = commands.iter().filter_map(|wire| builder.command(wire)).collect();
     let policy = flat.policy.as_ref().and_then(|(_, policy)| policy.clone()).unwrap_or_default();
     let roles = builder.planned_roles(&policy);
-    let Builder { found, sources, .. } = builder;
+    let (found, sources) = builder.finish();
     let Some((clock, _)) = clock.filter(|_| found.is_empty()) else { return Err(Report::new(sources, found)) };
     say_what_is_there(&nodes, &opened, &sources);
     let max_gap = max_gap(flat.table.as_ref(), period);
@@ -147,236 +130,4 @@ fn clock(flat: &Flat, opened: &Opened, found: &mut Vec<Diagnostic>) -> Option<(C
             None
         }
     }
-}
-
-/// Builds the nodes one after the other and notes what is wrong with them.
-pub(crate) struct Builder<'a> {
-    catalogue: &'a Catalogue,
-    pub(crate) model: &'a Model<'a>,
-    opened: &'a Opened,
-    frames: Frames,
-    pub(crate) found: Vec<Diagnostic>,
-    sources: Sources,
-    /// Nominal time between two ticks [s].
-    pub(crate) period: f64,
-    /// Ports whose shape is known so far.
-    pub(crate) ports: BTreeMap<Source, PlannedPort>,
-    /// What the variables of each node stand for.
-    units: BTreeMap<usize, Units>,
-    /// What each node was made from, and whether it starts no motion by itself.
-    kept: BTreeMap<usize, (Given, bool)>,
-}
-
-impl Builder<'_> {
-    fn port(&mut self, source: Source, shape: Shape) -> PlannedPort {
-        let frames = self.frames.of(self.model, source);
-        let port = PlannedPort { name: self.model.port_name(source), shape, frames };
-        self.ports.insert(source, port.clone());
-        port
-    }
-
-    fn roles(&mut self) {
-        for (i, bound) in self.opened.roles.iter().enumerate() {
-            for (port, shape) in bound.iter().flat_map(|bound| &bound.filled.outputs).enumerate() {
-                self.port(Source { producer: Producer::Role(i), port }, shape.clone());
-            }
-        }
-    }
-
-    fn planned_roles(&self, policy: &PolicyTable) -> Vec<PlannedRole> {
-        let role = |(i, bound): (usize, &Option<devices::BoundRole>)| {
-            let bound = bound.as_ref()?;
-            let source = |port| Source { producer: Producer::Role(i), port };
-            let ports = (0..bound.filled.outputs.len()).map(|port| self.ports[&source(port)].clone()).collect();
-            let name = self.model.flat.roles[i].0.name.clone();
-            let period = self.opened.periods[bound.device];
-            let (max_age, stale) = policy.of(&name, period);
-            let (device, first_port, period) = (bound.device, bound.first_output, (period * 1e9) as i64);
-            Some(PlannedRole { name, device, first_port, ports, max_age, stale, period })
-        };
-        self.opened.roles.iter().enumerate().filter_map(role).collect()
-    }
-
-    fn node(&mut self, index: usize, wires: &[Wire]) -> Option<PlannedNode> {
-        let node = &self.model.flat.nodes[index];
-        let (kind, spec) = self.model.nodes[index].as_ref()?;
-        let configured = self.configure(*kind, &node.block.params);
-        let mut inputs: Vec<(Need, Vec<PlannedWire>)> =
-            spec.inputs.iter().map(|input| (input.need, Vec::new())).collect();
-        let mut given = Given { inputs: vec![Vec::new(); spec.inputs.len()], period: self.period };
-        let mut units = Units::default();
-        let mut is_whole = wires.len() == node.block.wires.len();
-        for wire in wires {
-            let input = &spec.inputs[wire.input];
-            inputs[wire.input].1.push(PlannedWire {
-                source: wire.source,
-                age: wire.origin.age(self.model.flat),
-                span: wire.origin.word.span.clone(),
-            });
-            if input.need == Need::Delayed {
-                // What it brings is made later, so its shape is not known yet; of a flag there is nothing to know.
-                if input.kind == Kind::Flag {
-                    given.inputs[wire.input].push((wire.key.name.clone(), FlagShape.into()));
-                }
-                continue;
-            }
-            let Some(port) = self.ports.get(&wire.source) else {
-                is_whole = false;
-                continue;
-            };
-            let consumer = format!("{}.{}", node.name, wire.key.name);
-            if let Err(clash) = units.take(input, &consumer, &port.shape) {
-                self.found.push(unit_mismatch(port, &consumer, &clash, &wire.origin).with_help(self.rate_maker(input)));
-                is_whole = false;
-            }
-            given.inputs[wire.input].push((wire.key.name.clone(), port.shape.clone()));
-        }
-        let missing = |(need, ports): &(Need, Vec<PlannedWire>)| {
-            matches!(need, Need::Required | Need::Sampled) && ports.is_empty()
-        };
-        if !is_whole || inputs.iter().any(missing) || self.frames.has_clash(index) {
-            return None;
-        }
-        let built = match configured?.build(given.clone()) {
-            Ok(built) => built,
-            Err(mistakes) => {
-                let block = &node.block;
-                devices::place(mistakes, &block.params, &block.wires, &mut self.sources, &mut self.found);
-                return None;
-            }
-        };
-        let mut ports = Vec::new();
-        for (port, (mut shape, output)) in built.outputs.into_iter().zip(&spec.outputs).enumerate() {
-            units.give(output, &format!("{}.{}", node.name, output.name), &mut shape);
-            ports.push(self.port(Source { producer: Producer::Node(index), port }, shape));
-        }
-        self.units.insert(index, units);
-        self.kept.insert(index, (given, built.is_still));
-        Some(PlannedNode {
-            index,
-            name: node.name.clone(),
-            node: built.node,
-            inputs,
-            ports,
-            is_every_tick: spec.every_tick,
-            is_logged: spec.logs,
-            holds: spec.limits.holds,
-            span: node.block.key.span.clone(),
-        })
-    }
-
-    /// Whether a node starts no motion by itself as the base graph sets it.
-    pub(crate) fn is_still(&self, node: usize) -> bool {
-        // One that could not be made has been told of.
-        self.kept.get(&node).is_none_or(|(_, is_still)| *is_still)
-    }
-
-    /// A node once more, with other parameters: from what it was made the first time, with the same outputs.
-    pub(crate) fn variant(&mut self, index: usize, params: &Value) -> Option<Built> {
-        let (kind, spec) = self.model.nodes[index].as_ref()?;
-        let (given, _) = self.kept.get(&index)?.clone();
-        let block = &self.model.flat.nodes[index].block;
-        let mut built = match self.configure(*kind, params)?.build(given) {
-            Ok(built) => built,
-            Err(mistakes) => {
-                devices::place(mistakes, params, &block.wires, &mut self.sources, &mut self.found);
-                return None;
-            }
-        };
-        let name = &self.model.flat.nodes[index].name;
-        for (port, (shape, output)) in built.outputs.iter_mut().zip(&spec.outputs).enumerate() {
-            self.units.get_mut(&index)?.give(output, &format!("{name}.{}", output.name), shape);
-            if self.ports[&Source { producer: Producer::Node(index), port }].shape != *shape {
-                let message = format!("`{name}.{}` would be of another shape: no mode can set that", output.name);
-                self.found.push(Diagnostic::new(Code::NotLive, params.span.clone(), message));
-                return None;
-            }
-        }
-        Some(built)
-    }
-
-    fn configure(&mut self, kind: usize, params: &Value) -> Option<Box<dyn Configured>> {
-        let mut params = params.clone();
-        let has_facts = devices::fill_facts(&mut params, self.model, self.opened, &mut self.found);
-        let mut reader = Reader::new(&self.sources);
-        if !has_facts {
-            return None;
-        }
-        let configured = self.catalogue.nodes()[kind].configure(&params, &mut reader);
-        let mistakes = reader.mistakes;
-        let is_good = mistakes.is_empty();
-        devices::place(mistakes, &params, &[], &mut self.sources, &mut self.found);
-        configured.filter(|_| is_good)
-    }
-
-    /// How to make rates for an input that takes nothing else: a node that takes any unit and gives it per second.
-    fn rate_maker(&self, input: &PortSpec) -> Option<String> {
-        let has =
-            |port: &PortSpec, unit: &str| port.kind == input.kind && port.args.first().is_some_and(|arg| arg == unit);
-        let specs = self.catalogue.nodes().iter().map(|node| node.spec());
-        let makes = |spec: &NodeSpec| {
-            spec.inputs.iter().any(|port| has(port, "_")) && spec.outputs.iter().any(|port| has(port, "_/s"))
-        };
-        let maker = specs.into_iter().find(makes).filter(|_| has(input, "_/s"))?;
-        Some(format!("put a `{}` between them", maker.name))
-    }
-
-    /// Delayed inputs are compared once every shape is known.
-    fn delayed(&mut self, wires: &[Vec<Wire>]) {
-        for (index, wires) in wires.iter().enumerate() {
-            let Some((_, spec)) = &self.model.nodes[index] else { continue };
-            for wire in wires.iter().filter(|wire| spec.inputs[wire.input].need == Need::Delayed) {
-                let Some(port) = self.ports.get(&wire.source) else { continue };
-                let consumer = format!("{}.{}", self.model.flat.nodes[index].name, wire.key.name);
-                let units = self.units.entry(index).or_default();
-                if let Err(clash) = units.take(&spec.inputs[wire.input], &consumer, &port.shape) {
-                    self.found.push(unit_mismatch(port, &consumer, &clash, &wire.origin));
-                }
-            }
-        }
-    }
-
-    fn command(&mut self, wire: &CommandWire) -> Option<PlannedCommand> {
-        let bound = self.opened.roles[wire.role].as_ref()?;
-        let role = self.model.roles[wire.role]?;
-        let port = self.ports.get(&wire.source)?;
-        let (spec, takes) = (&role.commands[wire.command], &bound.filled.commands[wire.command]);
-        let consumer = format!("{}.{}", self.model.flat.roles[wire.role].0.name, spec.name);
-        if let Err(clash) = Units::default().take(spec, &consumer, &port.shape) {
-            self.found.push(unit_mismatch(port, &consumer, &clash, &wire.origin));
-            return None;
-        }
-        let (has, wants) = (joint_names(&port.shape), joint_names(takes));
-        if has != wants {
-            let message = format!("`{}` has the joints {has:?}, but `{consumer}` takes {wants:?}", port.name);
-            self.found.push(wire.origin.mistake(Code::ShapeMismatch, message));
-            return None;
-        }
-        let accelerations = accelerations(&port.shape).zip(accelerations(takes)).map(|(a, b)| a.min(b)).collect();
-        let command = bound.first_command + wire.command;
-        // A sink of commands takes nothing that is older than five periods, unless its wire says so.
-        let max_age = wire.origin.age(self.model.flat).map_or((5e9 * self.period) as i64, |age| age.max_age);
-        Some(PlannedCommand { source: wire.source, device: bound.device, command, max_age, accelerations })
-    }
-}
-
-/// Greatest acceleration of each joint [rad/s²].
-fn accelerations(shape: &Shape) -> impl Iterator<Item = f64> {
-    let joints = match shape {
-        Shape::Joints(shape) => shape.joints.as_slice(),
-        _ => &[],
-    };
-    joints.iter().map(|joint| joint.acceleration)
-}
-
-fn joint_names(shape: &Shape) -> Vec<&str> {
-    match shape {
-        Shape::Joints(shape) => shape.joints.iter().map(|joint| joint.name.as_str()).collect(),
-        _ => Vec::new(),
-    }
-}
-
-fn unit_mismatch(port: &PlannedPort, consumer: &str, clash: &Clash, origin: &Origin) -> Diagnostic {
-    let message = format!("`{}` {}, but `{consumer}` takes {}", port.name, clash.has, clash.takes);
-    origin.mistake(Code::UnitMismatch, message)
 }

@@ -4,6 +4,7 @@
 //! graph), `wires` (where each comes from), `devices` (the bench is opened), `order`, `frames`, `units`, and `check`,
 //! which builds the nodes on the way to a `plan`. `unread` looks for loose ends, and `outline` says where all came from.
 
+mod build;
 mod check;
 mod devices;
 mod document;

@@ -116,13 +116,23 @@ pub struct Tick {
     pub max_gap: f64,
     /// How long something must be absent before its state is reset [ns].
     pub reset_after: i64,
+    /// Whether the runtime holds all commands at zero: what remembers its own motion comes to rest too.
+    pub is_halted: bool,
 }
 
 impl Tick {
     /// A first tick at time zero, for tests of a node.
     #[must_use]
     pub const fn first() -> Self {
-        Self { index: 1, now: 0, dt: 0.0, stamp: Stamp::TIMELESS, max_gap: 0.1, reset_after: 20_000_000 }
+        Self {
+            index: 1,
+            now: 0,
+            dt: 0.0,
+            stamp: Stamp::TIMELESS,
+            max_gap: 0.1,
+            reset_after: 20_000_000,
+            is_halted: false,
+        }
     }
 }
 

@@ -3,7 +3,7 @@
 
 use std::collections::BTreeMap;
 
-use super::super::check::Builder;
+use super::super::build::Builder;
 use super::super::document::Block;
 use super::super::load::{Entity, Flat};
 use super::super::order::Wiring;
