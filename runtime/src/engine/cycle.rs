@@ -28,6 +28,9 @@ impl Engine {
     pub fn exchange(&mut self, now: i64) -> Result<(), Fault> {
         let due = self.clock_sample().is_some_and(|sample| sample <= now);
         self.core.begin(now);
+        if let Some(by) = self.lateness.take() {
+            self.meet(self.policy.deadline, Trouble::Late(by))?;
+        }
         let has_sampled = self.exchange_with_devices(now)? || due;
         self.timeline.ticked(now, has_sampled);
         if self.timeline.is_on_timer() {
@@ -115,13 +118,10 @@ impl Engine {
         }
     }
 
-    /// A tick begins `by` [ns] too late, by a real clock.
-    ///
-    /// # Errors
-    /// If the policy of that is a fault.
-    pub fn is_late(&mut self, by: i64) -> Result<(), Fault> {
+    /// The next tick begins `by` [ns] too late, by a real clock.
+    pub fn is_late(&mut self, by: i64) {
         self.late += 1;
-        self.meet(self.policy.deadline, Trouble::Late(by))
+        self.lateness = Some(by);
     }
 
     /// The boundary between two ticks: another mode, if the conditions of the present one say so. While the operator is

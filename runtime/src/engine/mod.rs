@@ -58,6 +58,8 @@ pub struct Engine {
     sent: Option<String>,
     /// Ticks that began too late.
     late: u64,
+    /// How late the next tick begins, if too late [ns].
+    lateness: Option<i64>,
     sources: Sources,
 }
 

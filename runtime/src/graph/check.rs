@@ -7,7 +7,7 @@ use super::frames::Frames;
 use super::load::{Flat, Loader, Request};
 use super::order::{Wiring, order};
 use super::plan::{Clock, Plan, PlannedCommand, PlannedNode};
-use super::policy::{PolicyTable, unknown_roles};
+use super::policy::unknown_roles;
 use super::unread::unread;
 use super::wires::Model;
 use super::{Sources, limits, modes, outline};
