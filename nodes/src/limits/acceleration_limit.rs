@@ -8,7 +8,7 @@ use tactflow_runtime::node::{Limits, Mistakes, Node, Positive, Setup, Tick};
 use tactflow_runtime::signal::{ScalarShape, Twist, Unit};
 use tactflow_runtime::{inputs, outputs, params, state};
 
-use super::share::share;
+use super::share::{countable, share};
 
 params! {
     /// Greatest change of the linear velocity [m/s²].
@@ -54,7 +54,9 @@ impl Node for AccelerationLimit {
     const DOC: &'static str = "The motion follows what is wanted on a straight line, as fast as both accelerations \
         allow. It is the last limiter of a twist: what scales a motion behind it would make it jump again.\n\n\
         When the motion is absent or older than `max_age_ms`, it goes to zero by the same rule, is there until it \
-        rests, and absent then. A generated motion is of no age.";
+        rests, and absent then. A generated motion is of no age. What is left of an absent motion is of no age either \
+        and goes all the way down here. What is left of an old one is as old as that: a `joint_limit` behind it drops \
+        it too, and brings the joints to rest by its own accelerations.";
     const EXAMPLE: &'static str = r#"
 [nodes.acceleration_limit]
 type = "acceleration_limit"
@@ -81,7 +83,7 @@ angular_rad_per_s2 = 10.0
 
     fn step(&self, tick: &Tick, inputs: Inputs<'_>, out: &mut Outputs, state: &mut State) {
         let wanted = inputs.twist.filter(|twist| twist.stamp().age(tick.now) <= self.max_age);
-        let target = wanted.map_or_else(Twist::default, |twist| *twist);
+        let target = wanted.map_or_else(Twist::default, |twist| countable(&twist));
         let (dt, change) = (tick.dt.min(tick.max_gap), Twist(target.0 - state.reached.0));
         let share = share(&change, self.linear * dt, self.angular * dt);
         state.reached = if share < 1.0 { Twist(state.reached.0 + change.0 * share) } else { target };

@@ -10,7 +10,7 @@ use tactflow_runtime::node::{Limits, Mistakes, Node, Positive, Setup, Tick};
 use tactflow_runtime::signal::{ScalarShape, Twist, Unit};
 use tactflow_runtime::{inputs, outputs, params, state};
 
-use super::share::{share, times};
+use super::share::{countable, share, times};
 
 params! {
     /// Greatest change of the linear velocity [m/s²].
@@ -87,7 +87,7 @@ angular_rad_per_s2 = 10.0
     fn step(&self, tick: &Tick, inputs: Inputs<'_>, out: &mut Outputs, state: &mut State) {
         let dt = tick.dt.min(tick.max_gap);
         let (linear, angular) = (0.5 * self.linear * dt, 0.5 * self.angular * dt);
-        let wanted = inputs.twist.map_or_else(Twist::default, |twist| *twist);
+        let wanted = inputs.twist.map_or_else(Twist::default, |twist| countable(&twist));
         let change = Twist(wanted.0 - state.last.0);
         let passes = share(&change, linear, angular);
         state.last = wanted;

@@ -12,6 +12,8 @@ use tactflow_runtime::node::{Limits, Mistake, Mistakes, Node, Positive, Ratio, S
 use tactflow_runtime::signal::{Image, ImageShape, ScalarShape, Stamp, Twist, Unit};
 use tactflow_runtime::{inputs, outputs, params, state};
 
+use super::share::countable;
+
 params! {
     /// Ceiling of the whole image's sum [unit of the image].
     force: Positive,
@@ -42,8 +44,8 @@ outputs! {
 }
 
 state! {
-    /// Stamp of the image that was summed up.
-    stamp: Stamp,
+    /// Stamp of the image that was summed up, if one was.
+    stamp: Option<Stamp>,
     /// What it says.
     load: Load,
 }
@@ -95,6 +97,8 @@ force = 15.0                        # [N]
 peak = 3.0                          # [N]
 approach_m_per_s = 0.05
 "#;
+    // The image and its age move on while a motion is held.
+    const EVERY_TICK: bool = true;
     const LIMITS: Limits =
         Limits { through: Some("twist"), holds: &["force", "peak"], breaks: &["workspace", "speed", "acceleration"] };
 
@@ -117,7 +121,7 @@ approach_m_per_s = 0.05
     }
 
     fn state(&self) -> State {
-        State { stamp: Stamp::TIMELESS, load: Load::default() }
+        State { stamp: None, load: Load::default() }
     }
 
     fn step(&self, tick: &Tick, inputs: Inputs<'_>, out: &mut Outputs, state: &mut State) {
@@ -125,10 +129,10 @@ approach_m_per_s = 0.05
         if stamp.age(tick.now) > self.max_age {
             return;
         }
-        if state.stamp != stamp {
-            (state.stamp, state.load) = (stamp, load(&self.shape, &inputs.image));
+        if inputs.image.is_new() || state.stamp != Some(stamp) {
+            (state.stamp, state.load) = (Some(stamp), load(&self.shape, &inputs.image));
         }
-        let (load, mut twist) = (&state.load, *inputs.twist);
+        let (load, mut twist) = (&state.load, countable(&inputs.twist));
         let force = self.bar(&mut twist, load.centre, load.sum / self.force);
         let peak = self.bar(&mut twist, load.place, load.peak / self.peak);
         out.twist.set(twist);
@@ -141,7 +145,7 @@ approach_m_per_s = 0.05
 impl ContactLimit {
     /// Limits the way in at a point that bears so many times its ceiling; the share of it that passes.
     fn bar(&self, twist: &mut Twist, [x, y]: [f64; 2], times: f64) -> f64 {
-        if times < self.begin {
+        if times < self.begin || times <= 0.0 {
             return 1.0;
         }
         let allowed = if times < 1.0 { self.approach * (1.0 - times) / (1.0 - self.begin) } else { 0.0 };
