@@ -225,13 +225,13 @@ fn past(gap: f64, turning: f64, flip: usize, margin: f64) -> f64 {
 
 #[test]
 fn turning_to_and_fro_holds_back_the_braking_by_no_more_than_is_said() {
-    // With turns that are reversed in 0.16 s (those that ship) and in 0.8 s: speed times that time.
-    for (gap, turning) in [(0.1, 10.0), (0.02, 10.0), (0.02, 2.0)] {
+    // Turns that are reversed in 0.16 s and in 0.8 s: speed times that time, and the worst that was found.
+    for (gap, turning, found) in [(0.1, 10.0, 1e-6), (0.02, 10.0, 0.0023), (0.02, 2.0, 0.018)] {
         let bound = 0.05 * (2.0 * 0.8 / turning) + 0.05 * 0.008;
         let flips = [1, 3, 10, 20, 30, 40, 80];
         let tries = flips.iter().flat_map(|flip| (0..15).map(move |mm| (*flip, f64::from(mm) * 1e-3)));
         let worst = tries.map(|(flip, margin)| past(gap, turning, flip, margin)).fold(f64::NEG_INFINITY, f64::max);
         assert!(worst <= bound, "{worst} m past the face, with {turning} rad/s²");
-        assert!(gap < 0.1 || worst < 1e-6, "{worst} m past the face with what ships");
+        assert!(worst < found, "{worst} m past the face, with {turning} rad/s² and a gap of {gap} s");
     }
 }

@@ -61,7 +61,8 @@ impl Node for WorkspaceLimit {
         It counts on what comes behind it: let `deceleration_m_per_s2` be at most the linear acceleration of the \
         `acceleration_limit`. That keeps the direction of a change, so turning to and fro at full speed holds back the \
         braking. A face is then passed by at most the greatest speed times the time in which the whole motion can be \
-        reversed; with 0.05 m/s, 0.8 rad/s, 1 m/s², 10 rad/s² and a `max_gap_ms` of 100 it is not passed at all.\n\n\
+        reversed: at most 8 mm with 0.05 m/s, 0.8 rad/s, 1 m/s² and 10 rad/s², and 2.3 mm is the worst that was found \
+        at 250 Hz.\n\n\
         It looks at the sensor's origin and at no other point: a large sensor or its holder needs a smaller box. When \
         the pose is older than `max_age_ms` there is no motion.";
     const EXAMPLE: &'static str = r#"
