@@ -18,6 +18,15 @@ pub enum Cause {
         /// How old it may be [ns].
         max_age: i64,
     },
+    /// What comes to a node over a wire is too old.
+    StaleWire {
+        /// The port it comes from.
+        from: String,
+        /// How old it is [ns].
+        age: i64,
+        /// How old it may be [ns].
+        max_age: i64,
+    },
     /// The clock device is silent.
     SilentClock,
     /// A tick began too late.
@@ -59,6 +68,9 @@ impl fmt::Display for Fault {
             Cause::Panicked(message) => write!(f, "node `{name}` panicked: {message}")?,
             Cause::Stale { age, max_age } => {
                 write!(f, "`{name}` is {:.1} ms old, and may be {:.1} ms old", ms(*age), ms(*max_age))?;
+            }
+            Cause::StaleWire { from, age, max_age } => {
+                write!(f, "`{from}` is {:.1} ms old for `{name}`, and may be {:.1} ms old", ms(*age), ms(*max_age))?;
             }
             Cause::SilentClock => write!(f, "the clock device `{name}` is silent")?,
             Cause::Late { by } => write!(f, "a tick began {:.1} ms late", ms(*by))?,

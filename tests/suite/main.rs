@@ -23,6 +23,7 @@ mod merge;
 mod modes;
 mod mutations;
 mod oracles;
+mod policies;
 mod recordings;
 mod reference;
 mod situations;

@@ -17,7 +17,7 @@
 
 use tactflow_runtime::diagnostic::Code;
 use tactflow_runtime::node::{At, Limits, Mistake, Mistakes, Node, Positive, Ratio, Setup, Tick};
-use tactflow_runtime::signal::{Joint, Joints, JointsShape, ScalarShape, Stamp, Unit};
+use tactflow_runtime::signal::{Joint, JointsShape, ScalarShape, Stamp, Unit};
 use tactflow_runtime::{inputs, outputs, params, state};
 
 use crate::arm::joint_limits::share;

@@ -6,14 +6,17 @@ use super::command::CommandSlot;
 use super::halt::Halts;
 use super::inlet::Inlet;
 use super::modes::Modes;
-use super::station::Station;
+use super::station::{Aged, Station};
 use super::tick::Core;
 use super::timeline::Timeline;
+use super::trouble::WatchedWire;
 use super::{Deck, Edge, Engine, Logged, Timing};
 use crate::device::{Commands, Driver, Samples};
-use crate::graph::{Plan, PlannedDevice, PlannedNode, PlannedPort, Producer, Source, Sources};
+use crate::graph::{
+    Age, Plan, PlannedDevice, PlannedNode, PlannedPort, PlannedWire, Policy, Producer, Source, Sources,
+};
 use crate::node::{Bus, PortId, Tick};
-use crate::signal::Stamp;
+use crate::signal::{Mark, Stamp};
 
 /// Where every port is.
 type Ids = BTreeMap<Source, PortId>;
@@ -48,7 +51,9 @@ impl Engine {
         let slot = |command: crate::graph::PlannedCommand| CommandSlot::new(ids[&command.source], command);
         let slots = plan.commands.into_iter().map(slot).collect();
         let decks = plan.devices.into_iter().map(|device| deck(device, &plan.sources)).collect();
-        let stations: Vec<Station> = plan.nodes.into_iter().map(|node| station(node, &ids, &mut bus)).collect();
+        let mut watched = Vec::new();
+        let stations = plan.nodes.into_iter().map(|node| station(node, &ids, &mut bus, &mut watched));
+        let stations: Vec<Station> = stations.collect();
         let (max_gap, reset_after) = (plan.max_gap, plan.reset_after);
         let tick = Tick { index: 0, now: 0, dt: 0.0, stamp: Stamp::TIMELESS, max_gap, reset_after };
         let (timing, mut core) = (Timing::new(stations.len()), Core::new(bus, stations, inlets, slots, tick));
@@ -73,6 +78,7 @@ impl Engine {
             policy: plan.policy,
             halts: Halts::new(),
             trouble: None,
+            watched,
             panic: String::new(),
             sent: None,
             late: 0,
@@ -82,7 +88,7 @@ impl Engine {
 }
 
 fn logged(node: &PlannedNode, ids: &Ids, ports: &[(PlannedPort, PortId)]) -> Logged {
-    let sources = node.inputs.iter().flat_map(|(_, sources)| sources).map(|source| ids[source]);
+    let sources = node.inputs.iter().flat_map(|(_, wires)| wires).map(|wire| ids[&wire.source]);
     let port = |id: PortId| ports.iter().find(|(_, known)| *known == id).expect("a wire comes from a port").clone();
     let due = ids[&Source { producer: Producer::Node(node.index), port: 0 }];
     Logged { node: node.name.clone(), due, inputs: sources.map(port).collect() }
@@ -110,9 +116,23 @@ fn deck(device: PlannedDevice, sources: &Sources) -> Deck {
     }
 }
 
-fn station(node: PlannedNode, ids: &Ids, _bus: &mut Bus) -> Station {
-    let inputs = node.inputs.iter().map(|(need, from)| (*need, from.iter().map(|source| ids[source]).collect()));
-    let inputs: Vec<_> = inputs.collect();
+/// A node in its place. A wire that may grow only so old has a mark of its own, and shares the value.
+fn station(node: PlannedNode, ids: &Ids, bus: &mut Bus, watched: &mut Vec<WatchedWire>) -> Station {
+    let mut aged = Vec::new();
+    let mut end = |wire: &PlannedWire| {
+        let id = ids[&wire.source];
+        let Some(Age { max_age, stale }) = wire.age else { return id };
+        bus.marks.push(Mark::default());
+        let to = bus.marks.len() as u32 - 1;
+        aged.push(Aged { from: id.mark, to, max_age });
+        if stale > Policy::Hold {
+            let (aged, span) = (Aged { from: id.mark, to, max_age }, wire.span.clone());
+            watched.push(WatchedWire { aged, stale, node: node.name.clone(), span });
+        }
+        PortId { mark: to, ..id }
+    };
+    let inputs: Vec<_> =
+        node.inputs.iter().map(|(need, wires)| (*need, wires.iter().map(&mut end).collect())).collect();
     let outputs = (0..node.ports.len()).map(|port| ids[&Source { producer: Producer::Node(node.index), port }]);
-    Station::new(node.node, &inputs, outputs.collect(), node.is_every_tick)
+    Station::new(node.node, &inputs, outputs.collect(), node.is_every_tick).with_aged(aged)
 }

@@ -6,7 +6,7 @@
 
 use crate::device::Commands;
 use crate::graph::PlannedCommand;
-use crate::node::{Bus, PortId};
+use crate::node::{Bus, PortId, Tick};
 use crate::signal::{Joints, Signal};
 
 /// One command port of a device.
@@ -14,6 +14,8 @@ pub(super) struct CommandSlot {
     pub(super) device: usize,
     source: PortId,
     command: usize,
+    /// How old the command may be [ns].
+    max_age: i64,
     /// Greatest acceleration of each joint [rad/s²]; infinite where nothing bounds it.
     accelerations: Box<[f64]>,
     /// Whether it has caught up with what the graph commands.
@@ -22,13 +24,15 @@ pub(super) struct CommandSlot {
 
 impl CommandSlot {
     pub(super) fn new(source: PortId, planned: PlannedCommand) -> Self {
-        let PlannedCommand { device, command, accelerations, .. } = planned;
-        Self { device, source, command, accelerations: accelerations.into(), follows: false }
+        let PlannedCommand { device, command, max_age, accelerations, .. } = planned;
+        Self { device, source, command, max_age, accelerations: accelerations.into(), follows: false }
     }
 
-    /// Takes over what the graph commands; goes on toward zero if it commands nothing, or if all is halted.
-    pub(super) fn commit(&mut self, bus: &Bus, commands: &mut Commands, dt: f64, is_halted: bool) {
-        if is_halted || !bus.marks[self.source.mark as usize].is_present() {
+    /// Takes over what the graph commands; goes on toward zero if it commands nothing, or nothing that is fresh, or if all
+    /// is halted.
+    pub(super) fn commit(&mut self, bus: &Bus, commands: &mut Commands, tick: &Tick, is_halted: bool) {
+        let (mark, dt) = (&bus.marks[self.source.mark as usize], tick.dt);
+        if is_halted || !mark.is_present() || mark.stamp().age(tick.now) > self.max_age {
             self.ramp(commands, dt);
             return;
         }
@@ -76,7 +80,14 @@ mod tests {
     fn slot(accelerations: [f64; 2]) -> (CommandSlot, Bus, Commands) {
         let mut bus = Bus::default();
         let source = bus.add(&JointsShape { joints: vec![Default::default(); 2], ..Default::default() }.into());
-        let slot = CommandSlot { device: 0, source, command: 0, accelerations: accelerations.into(), follows: false };
+        let slot = CommandSlot {
+            device: 0,
+            source,
+            command: 0,
+            max_age: 100,
+            accelerations: accelerations.into(),
+            follows: false,
+        };
         (slot, bus, Commands { values: vec![vec![0.0, 0.0].into()] })
     }
 
@@ -112,10 +123,21 @@ mod tests {
     fn without_a_bound_on_the_acceleration_it_is_there_at_once() {
         let (mut slot, mut bus, mut commands) = slot([f64::INFINITY; 2]);
         drive(&mut bus, &slot, Some([3.0, 4.0]));
-        slot.commit(&bus, &mut commands, 0.0, false);
+        slot.commit(&bus, &mut commands, &Tick::first(), false);
         assert_eq!(commands.joints(0), [3.0, 4.0]);
-        slot.commit(&bus, &mut commands, 0.0, true);
+        slot.commit(&bus, &mut commands, &Tick::first(), true);
         assert_eq!(commands.joints(0), [0.0, 0.0]);
+    }
+
+    #[test]
+    fn what_is_too_old_is_not_followed() {
+        let (mut slot, mut bus, mut commands) = slot([f64::INFINITY; 2]);
+        drive(&mut bus, &slot, Some([3.0, 4.0]));
+        bus.marks[slot.source.mark as usize].renew(1, Stamp { nanos: 0, device: 0 });
+        for (now, expected) in [(100, [3.0, 4.0]), (101, [0.0, 0.0])] {
+            slot.commit(&bus, &mut commands, &Tick { now, ..Tick::first() }, false);
+            assert_eq!(commands.joints(0), expected, "{now} ns");
+        }
     }
 
     proptest! {
@@ -133,7 +155,7 @@ mod tests {
                     approach(&mut given, |i| wanted[i], &accelerations, dt);
                 }
                 drive(&mut bus, &slot, wanted.map(|_| given));
-                slot.commit(&bus, &mut commands, dt, is_halted);
+                slot.commit(&bus, &mut commands, &Tick { dt, ..Tick::first() }, is_halted);
                 let now: [f64; 2] = commands.joints(0).try_into().unwrap();
                 for i in 0..2 {
                     prop_assert!((now[i] - last[i]).abs() <= accelerations[i] * dt + 1e-12);

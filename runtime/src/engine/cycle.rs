@@ -59,6 +59,12 @@ impl Engine {
             Ok(false) => self.not_finite()?,
             Err(panic) => self.panicked(said(&*panic))?,
         }
+        for i in 0..self.watched.len() {
+            let wire = &self.watched[i];
+            if wire.aged.is_stale(&self.core.bus, self.core.tick.now) {
+                self.meet(wire.stale, Trouble::StaleWire(i))?;
+            }
+        }
         if let Some(station) = self.core.broken() {
             self.meet(self.policy.panic.0, Trouble::Panicked(station))?;
         }

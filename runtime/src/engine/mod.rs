@@ -21,7 +21,7 @@ use crate::node::{Bus, PortId};
 use halt::Halts;
 use modes::Modes;
 use timeline::Timeline;
-use trouble::Trouble;
+use trouble::{Trouble, WatchedWire};
 
 pub use halt::Halt;
 pub use inlet::Counters;
@@ -48,6 +48,8 @@ pub struct Engine {
     is_done: bool,
     policy: PolicyTable,
     halts: Halts,
+    /// Wires whose age does more than that their node goes without.
+    watched: Vec<WatchedWire>,
     /// What went wrong in this tick, and what it does; the strictest.
     trouble: Option<(Policy, Trouble)>,
     /// What the last panic had to say.

@@ -24,6 +24,35 @@ impl Watch {
     }
 }
 
+/// A wire that may grow only so old: past that, its node does without.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Aged {
+    /// Mark of the port that it comes from.
+    pub(crate) from: u32,
+    /// Mark that its node sees instead.
+    pub(crate) to: u32,
+    /// How old it may be [ns].
+    pub(crate) max_age: i64,
+}
+
+impl Aged {
+    /// Whether what is there is too old at `now` [ns].
+    pub(super) fn is_stale(&self, bus: &Bus, now: i64) -> bool {
+        let mark = &bus.marks[self.from as usize];
+        mark.is_present() && mark.stamp().age(now) > self.max_age
+    }
+
+    /// Passes the mark on, or lets the value go.
+    fn pass(&self, bus: &mut Bus, tick: &Tick) {
+        let from = bus.marks[self.from as usize];
+        if from.is_present() && !self.is_stale(bus, tick.now) {
+            bus.marks[self.to as usize] = from;
+        } else {
+            bus.marks[self.to as usize].lose(tick.index);
+        }
+    }
+}
+
 /// A node with its wires, its ports and what it watches.
 pub(crate) struct Station {
     node: Box<dyn AnyNode>,
@@ -32,6 +61,7 @@ pub(crate) struct Station {
     /// Marks of the required triggers: what most inputs are, so they have a loop of their own.
     required: Box<[u32]>,
     others: Box<[Watch]>,
+    aged: Box<[Aged]>,
     is_every_tick: bool,
     absence: Absence,
 }
@@ -66,9 +96,15 @@ impl Station {
             outputs: outputs.into(),
             required: required.map(|(_, mark)| mark).collect(),
             others: others.map(|(need, mark)| Watch::new(need, mark)).collect(),
+            aged: Box::default(),
             is_every_tick,
             absence: Absence::Nothing,
         }
+    }
+
+    /// The same with wires that may grow only so old.
+    pub(super) fn with_aged(self, aged: Vec<Aged>) -> Self {
+        Self { aged: aged.into(), ..self }
     }
 
     /// Tells the node which components of its outputs anything reads.
@@ -84,6 +120,9 @@ impl Station {
     /// Steps the node if a trigger is new or lost, and makes its outputs absent if something required is. The tick's
     /// stamp becomes the oldest of the triggers'.
     pub(crate) fn visit(&mut self, tick: &mut Tick, bus: &mut Bus) {
+        for aged in &self.aged {
+            aged.pass(bus, tick);
+        }
         let (mut is_woken, mut is_missing, mut stamp) = (self.is_every_tick, false, Stamp::TIMELESS);
         for mark in self.required.iter().map(|mark| &bus.marks[*mark as usize]) {
             is_woken |= mark.changed_in(tick.index);

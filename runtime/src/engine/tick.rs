@@ -90,7 +90,7 @@ impl Core {
     /// Hands over the commands, or lets them go to zero.
     pub(super) fn commit(&mut self, decks: &mut [Deck], is_halted: bool) {
         for slot in &mut self.slots {
-            slot.commit(&self.bus, &mut decks[slot.device].commands, self.tick.dt, is_halted);
+            slot.commit(&self.bus, &mut decks[slot.device].commands, &self.tick, is_halted);
         }
     }
 

@@ -1,14 +1,29 @@
 //! What can go wrong in a tick, and how it is told: node, port, tick, cause and place.
 
+use std::ops::Range;
+
 use super::Engine;
 use super::cycle::owner;
+use super::station::Aged;
 use crate::fault::{Cause, Fault};
+use crate::graph::Policy;
+
+/// A wire whose age does more than that its node goes without.
+pub(super) struct WatchedWire {
+    pub(super) aged: Aged,
+    pub(super) stale: Policy,
+    pub(super) node: String,
+    /// Where it is written.
+    pub(super) span: Range<usize>,
+}
 
 /// A trouble of a tick, in numbers: it is put into words only when it has to be told.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Trouble {
     /// The newest sample of an inlet is too old.
     Stale(usize),
+    /// What came over a watched wire is too old.
+    StaleWire(usize),
     /// A sample of an inlet is not finite.
     NotFinite(usize),
     /// A port is not finite.
@@ -33,6 +48,13 @@ impl Engine {
             Trouble::Stale(inlet) => {
                 let (age, max_age) = self.core.inlets[inlet].ages(self.core.tick.now);
                 self.of_port(inlet, Cause::Stale { age, max_age })
+            }
+            Trouble::StaleWire(wire) => {
+                let WatchedWire { aged, node, span, .. } = &self.watched[wire];
+                let age = self.core.bus.marks[aged.from as usize].stamp().age(self.core.tick.now);
+                let from = self.ports.iter().find(|(_, id)| id.mark == aged.from).map_or("", |(port, _)| &port.name);
+                let cause = Cause::StaleWire { from: from.to_owned(), age, max_age: aged.max_age };
+                self.fault(node, None, cause, self.sources.locate(span.start))
             }
             // The ports of the roles come first, an inlet each.
             Trouble::NotFinite(port) | Trouble::NotFiniteAt(port) => self.of_port(port, Cause::NotFinite),

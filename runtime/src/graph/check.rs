@@ -7,7 +7,7 @@ use super::document::GraphTable;
 use super::frames::Frames;
 use super::load::{Flat, Loader, Request};
 use super::order::{Wiring, order};
-use super::plan::{Clock, Plan, PlannedCommand, PlannedNode, PlannedPort, PlannedRole, Producer, Source};
+use super::plan::{Clock, Plan, PlannedCommand, PlannedNode, PlannedPort, PlannedRole, PlannedWire, Producer, Source};
 use super::policy::{PolicyTable, unknown_roles};
 use super::units::{Clash, Units};
 use super::unread::unread;
@@ -201,13 +201,18 @@ impl Builder<'_> {
         let node = &self.model.flat.nodes[index];
         let (kind, spec) = self.model.nodes[index].as_ref()?;
         let configured = self.configure(*kind, &node.block.params);
-        let mut inputs: Vec<(Need, Vec<Source>)> = spec.inputs.iter().map(|input| (input.need, Vec::new())).collect();
+        let mut inputs: Vec<(Need, Vec<PlannedWire>)> =
+            spec.inputs.iter().map(|input| (input.need, Vec::new())).collect();
         let mut given = Given { inputs: vec![Vec::new(); spec.inputs.len()], period: self.period };
         let mut units = Units::default();
         let mut is_whole = wires.len() == node.block.wires.len();
         for wire in wires {
             let input = &spec.inputs[wire.input];
-            inputs[wire.input].1.push(wire.source);
+            inputs[wire.input].1.push(PlannedWire {
+                source: wire.source,
+                age: wire.origin.age(self.model.flat),
+                span: wire.origin.word.span.clone(),
+            });
             if input.need == Need::Delayed {
                 // What it brings is made later, so its shape is not known yet; of a flag there is nothing to know.
                 if input.kind == Kind::Flag {
@@ -226,8 +231,9 @@ impl Builder<'_> {
             }
             given.inputs[wire.input].push((wire.key.name.clone(), port.shape.clone()));
         }
-        let missing =
-            |(need, ports): &(Need, Vec<Source>)| matches!(need, Need::Required | Need::Sampled) && ports.is_empty();
+        let missing = |(need, ports): &(Need, Vec<PlannedWire>)| {
+            matches!(need, Need::Required | Need::Sampled) && ports.is_empty()
+        };
         if !is_whole || inputs.iter().any(missing) || self.frames.has_clash(index) {
             return None;
         }
@@ -348,7 +354,9 @@ impl Builder<'_> {
         }
         let accelerations = accelerations(&port.shape).zip(accelerations(takes)).map(|(a, b)| a.min(b)).collect();
         let command = bound.first_command + wire.command;
-        Some(PlannedCommand { source: wire.source, device: bound.device, command, accelerations })
+        // A sink of commands takes nothing that is older than five periods, unless its wire says so.
+        let max_age = wire.origin.age(self.model.flat).map_or((5e9 * self.period) as i64, |age| age.max_age);
+        Some(PlannedCommand { source: wire.source, device: bound.device, command, max_age, accelerations })
     }
 }
 

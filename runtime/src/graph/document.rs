@@ -1,9 +1,10 @@
 //! What the sections of a graph file, a part and a bench hold, before anything is looked up.
 
+use std::collections::BTreeMap;
 use std::ops::Range;
 
 use super::modes::{self, ModeBlock};
-use super::policy::PolicyTable;
+use super::policy::{Age, PolicyTable, WireTable};
 use super::{Item, Key, Sources, Table, Value};
 use crate::diagnostic::{Code, Diagnostic, closest, meant};
 use crate::node::{At, FilePath, Mistake, NonNegative, Param, Positive, Rate, Reader, Word};
@@ -73,13 +74,15 @@ const RESERVED: [&str; 2] = ["inputs", super::limits::SECTION];
 pub(crate) struct Sections<'a> {
     reader: Reader<'a>,
     diagnostics: Vec<Diagnostic>,
+    /// Wires that may grow only so old, by the places of their sources.
+    pub(crate) ages: BTreeMap<usize, Age>,
     /// Blocks that are no tables: that has been told, and is all there is to tell.
     broken: Vec<Key>,
 }
 
 impl<'a> Sections<'a> {
     pub(crate) const fn new(sources: &'a Sources) -> Self {
-        Self { reader: Reader::new(sources), diagnostics: Vec::new(), broken: Vec::new() }
+        Self { reader: Reader::new(sources), diagnostics: Vec::new(), ages: BTreeMap::new(), broken: Vec::new() }
     }
 
     /// Everything that was wrong.
@@ -98,7 +101,7 @@ impl<'a> Sections<'a> {
         let graph =
             root.entry("graph").map(|(key, value)| (key.span.clone(), GraphTable::read(value, &mut self.reader)));
         let commands = self.table(root.get("commands")).entries.into_iter().flat_map(|(role, value)| {
-            let wires = self.words(Some(&value));
+            let wires = self.wire_words(Some(&value));
             wires.into_iter().map(move |(command, word)| (role.clone(), command, word))
         });
         let commands = commands.collect();
@@ -197,7 +200,7 @@ impl<'a> Sections<'a> {
     /// The wires of a block: its table `in`.
     fn wires(&mut self, table: &mut Table) -> Vec<(Key, Word)> {
         let wires = table.remove("in").map(|(_, value)| value);
-        let mut wires = self.words(wires.as_ref());
+        let mut wires = self.wire_words(wires.as_ref());
         wires.retain(|(key, _)| {
             if key.name == "from" {
                 let diagnostic = Diagnostic::new(Code::BadName, key.span.clone(), "a wire cannot be called `from`");
@@ -233,6 +236,20 @@ impl<'a> Sections<'a> {
     fn words(&mut self, value: Option<&Value>) -> Vec<(Key, Word)> {
         let table = self.table(value);
         let read = |(key, value): (Key, Value)| Some((key, Word::read(&value, &mut self.reader)?));
+        table.entries.into_iter().filter_map(read).collect()
+    }
+
+    /// Keys with a wire each: where it comes from, or a table that says how old it may be too.
+    fn wire_words(&mut self, value: Option<&Value>) -> Vec<(Key, Word)> {
+        let table = self.table(value);
+        let read = |(key, value): (Key, Value)| {
+            if value.as_table().is_none() {
+                return Some((key, Word::read(&value, &mut self.reader)?));
+            }
+            let wire = WireTable::read(&value, &mut self.reader)?;
+            self.ages.insert(wire.from.span.start, Age::of(&wire));
+            Some((key, wire.from))
+        };
         table.entries.into_iter().filter_map(read).collect()
     }
 

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use super::document::{Bench, Block, Document, GraphTable, PartBlock, Sections};
 use super::modes::ModeBlock;
-use super::policy::PolicyTable;
+use super::policy::{Age, PolicyTable};
 use super::{BuiltinFile, Item, Key, Sources, Table, Value, parse_table};
 use crate::diagnostic::{Code, Diagnostic, closest, meant};
 use crate::node::Word;
@@ -98,6 +98,8 @@ pub(crate) struct Flat {
     /// The section [policy], as it is written and as it reads.
     pub(crate) policy: Option<(Value, PolicyTable)>,
     pub(crate) bench: Option<Bench>,
+    /// Wires that may grow only so old, by the places of their sources.
+    pub(crate) ages: BTreeMap<usize, Age>,
 }
 
 /// Reads files and notes what is wrong with them.
@@ -105,6 +107,7 @@ pub(crate) struct Flat {
 pub(crate) struct Loader {
     pub(crate) sources: Sources,
     pub(crate) diagnostics: Vec<Diagnostic>,
+    ages: BTreeMap<usize, Age>,
     open_parts: Vec<PathBuf>,
     /// Whether there were too many parts to go on.
     is_full: bool,
@@ -158,13 +161,16 @@ impl Loader {
         flat.modes.clone_from(&document.modes);
         flat.policy.clone_from(&document.policy);
         self.flatten(document, "", Scope::default(), &mut flat);
+        flat.ages.clone_from(&self.ages);
         flat
     }
 
     fn sections<T>(&mut self, read: impl FnOnce(&mut Sections<'_>) -> T) -> T {
         let mut sections = Sections::new(&self.sources);
         let result = read(&mut sections);
+        let ages = std::mem::take(&mut sections.ages);
         let found = sections.finish();
+        self.ages.extend(ages);
         self.diagnostics.extend(found);
         result
     }

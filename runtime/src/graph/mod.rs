@@ -28,10 +28,10 @@ pub(crate) use frames::frame_args;
 pub use load::Request;
 pub(crate) use modes::{Condition, PlannedExit, PlannedModes, Sort, Test};
 pub use outline::{NOWHERE, Origin, Outline, OutlinedBlock, OutlinedMode, OutlinedRole, OutlinedWire, Setting};
-pub(crate) use plan::{Clock, PlannedCommand, PlannedDevice, PlannedNode, PlannedRole, Producer, Source};
+pub(crate) use plan::{Clock, PlannedCommand, PlannedDevice, PlannedNode, PlannedRole, PlannedWire, Producer, Source};
 pub use plan::{Plan, PlannedPort};
 pub use policy::Policy;
-pub(crate) use policy::PolicyTable;
+pub(crate) use policy::{Age, PolicyTable};
 pub use sources::{BuiltinFile, SourceFile, Sources};
 pub(crate) use units::declares_a_unit;
 #[cfg(feature = "cli")]

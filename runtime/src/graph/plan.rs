@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use super::modes::PlannedModes;
-use super::policy::{Policy, PolicyTable};
+use super::policy::{Age, Policy, PolicyTable};
 use super::{Outline, Sources};
 use crate::device::Driver;
 use crate::diagnostic::{Diagnostic, Report};
@@ -62,13 +62,22 @@ pub(crate) struct PlannedDevice {
     pub(crate) span: Range<usize>,
 }
 
+/// Where a wire comes from, and how old what comes over it may be.
+#[derive(Debug, Clone)]
+pub(crate) struct PlannedWire {
+    pub(crate) source: Source,
+    pub(crate) age: Option<Age>,
+    /// Where it is written.
+    pub(crate) span: Range<usize>,
+}
+
 /// A node, built.
 pub(crate) struct PlannedNode {
     /// Its index in the flat graph, by which wires know it.
     pub(crate) index: usize,
     pub(crate) name: String,
     pub(crate) node: Box<dyn AnyNode>,
-    pub(crate) inputs: Vec<(Need, Vec<Source>)>,
+    pub(crate) inputs: Vec<(Need, Vec<PlannedWire>)>,
     pub(crate) ports: Vec<PlannedPort>,
     pub(crate) is_every_tick: bool,
     /// Whether the tool logs its inputs; see [`Node::LOGS`](crate::node::Node::LOGS).
@@ -85,6 +94,8 @@ pub(crate) struct PlannedCommand {
     pub(crate) device: usize,
     /// Its number among the device's commands.
     pub(crate) command: usize,
+    /// How old it may be [ns].
+    pub(crate) max_age: i64,
     /// Greatest acceleration of each joint [rad/s²]; infinite where nothing bounds it.
     pub(crate) accelerations: Vec<f64>,
 }

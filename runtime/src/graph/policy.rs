@@ -2,7 +2,7 @@
 
 use super::{Item, Value};
 use crate::diagnostic::{Code, Diagnostic, closest};
-use crate::node::{Map, Param, Positive, Reader, Written};
+use crate::node::{Map, Param, Positive, Reader, Word, Written};
 
 /// What a trouble does.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -64,6 +64,34 @@ impl Param for Firm {
 
     fn written(&self) -> Option<Written> {
         self.0.written()
+    }
+}
+
+crate::params! { WireTable:
+    /// Where it comes from.
+    from: Word,
+    /// How old what comes over the wire may be [ms].
+    max_age_ms: Positive,
+    /// What else is done when it is older; `hold` is only that the node does without.
+    stale: Policy = Policy::Hold,
+}
+
+/// How old what comes over a wire may be [ns], and what is done when it is older.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Age {
+    pub(crate) max_age: i64,
+    pub(crate) stale: Policy,
+}
+
+impl Age {
+    pub(crate) fn of(table: &WireTable) -> Self {
+        Self { max_age: (*table.max_age_ms * 1e6) as i64, stale: table.stale }
+    }
+
+    /// What holds where both hold.
+    pub(crate) fn and(self, other: Option<Self>) -> Self {
+        let Some(other) = other else { return self };
+        Self { max_age: self.max_age.min(other.max_age), stale: self.stale.max(other.stale) }
     }
 }
 

@@ -3,6 +3,7 @@
 use super::Key;
 use super::load::{Entity, Flat, Scope};
 use super::plan::{Producer, Source};
+use super::policy::Age;
 use crate::catalogue::Catalogue;
 use crate::device::RoleType;
 use crate::diagnostic::{Code, Diagnostic, closest, meant};
@@ -30,6 +31,13 @@ pub(crate) struct Origin {
 }
 
 impl Origin {
+    /// How old what comes over the wire may be: as the node's own wire says, and the one into its part.
+    pub(crate) fn age(&self, flat: &Flat) -> Option<Age> {
+        let of = |word: &Word| flat.ages.get(&word.span.start).copied();
+        let inner = self.inner.as_ref().and_then(of);
+        of(&self.word).map(|age| age.and(inner)).or(inner)
+    }
+
     /// A mistake of this wire.
     pub(crate) fn mistake(&self, code: Code, message: String) -> Diagnostic {
         let diagnostic = Diagnostic::new(code, self.word.span.clone(), message);

@@ -61,9 +61,10 @@ pub(super) fn could_be_meant(before: &str, after: &str) -> Option<Meant> {
         ([], [], Some((path, old, new)), None) => other_value(path, old, new),
         ([gone], [], None, _) => may_be_left_out(&old.0, gone).then_some(Meant::Omitted),
         ([left, ..], [], None, _) => {
-            // A line of a part's overrides can set several.
-            let is_one_line = gone.iter().all(|path| is_override(path) && path[..4] == left[..4]);
-            is_one_line.then_some(Meant::Omitted)
+            // A line of a part's overrides can set several, and what a mode does about a loss says several things.
+            let is_override = gone.iter().all(|path| is_override(path) && path[..4] == left[..4]);
+            let is_on_lost = gone.iter().all(|path| is_on_lost(path) && path[..3] == left[..3]);
+            (is_override || is_on_lost).then_some(Meant::Omitted)
         }
         ([gone], [come], None, _) => {
             let is_beside = gone[..gone.len() - 1] == come[..come.len() - 1] && old.1[*gone] == new.1[*come];
@@ -118,12 +119,18 @@ fn is_override(path: &[String]) -> bool {
     path.len() > 4 && path[0] == "parts" && path[2] == "set"
 }
 
+fn is_on_lost(path: &[String]) -> bool {
+    path.len() > 3 && path[0] == "modes" && path[2] == "on_lost"
+}
+
 /// Whether a graph that lacks the leaf at `path` is as good: the catalogue says so.
 fn may_be_left_out(root: &Table, path: &[String]) -> bool {
     let names: Vec<&str> = path.iter().map(String::as_str).collect();
     match names.as_slice() {
         // What a part sets over its own file, that file sets as well or its node has a default for.
         ["parts", _, "set", _, ..] => true,
+        // A mode is the graph with its own parameters laid over, as many as it likes.
+        ["modes", _, "set", _, ..] => true,
         ["nodes", node, "in", input] => spec(root, "nodes", node).is_some_and(|spec| {
             let input = spec.inputs.iter().find(|port| port.name == *input || port.need == Need::Many);
             matches!(input.map(|port| port.need), Some(Need::Many | Need::Optional | Need::Trigger))

@@ -25,7 +25,7 @@ params! {
 }
 
 /// The most tactels that a bump reaches across.
-const WIDEST: f64 = 1000.0;
+const WIDEST: f64 = 256.0;
 
 impl Press {
     /// What is wrong with it on a pad of that pitch [m].

@@ -2,7 +2,7 @@
 
 use proptest::prelude::*;
 use tactflow_runtime::harness::NodeRig;
-use tactflow_runtime::signal::{Freshness, Shape, Stamp};
+use tactflow_runtime::signal::{Freshness, Joints, Shape, Stamp};
 
 use super::*;
 

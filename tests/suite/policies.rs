@@ -1,0 +1,283 @@
+//! What each trouble does: counted, held, stopped or a fault; wires that may grow only so old; and samples that come twice,
+//! late or not at all, which change nothing that the distinct ones would not.
+
+use proptest::prelude::*;
+use tactflow_runtime::engine::{End, Engine, RunOptions, run};
+use tactflow_runtime::fault::Fault;
+use tactflow_runtime::graph::{Request, plan};
+use tactflow_runtime::harness::GraphRig;
+use tactflow_runtime::signal::{Features, Freshness};
+use tactflow_tests::nodes::length_by_hand;
+use tactflow_tests::saboteur::{How, Sabotage, sabotaged};
+use tactflow_tests::{catalogue, workspace};
+
+/// A trouble from 0.8 s to 1.0 s, and what a fault says of it.
+#[derive(Debug, Clone, Copy)]
+struct Case {
+    key: &'static str,
+    glitch: Option<&'static str>,
+    sabotage: Option<(&'static str, How)>,
+    says: &'static str,
+    /// Whether it is over at 1.0 s.
+    ends: bool,
+}
+
+const CASES: [Case; 6] = [
+    Case { key: "stale", glitch: Some("repeat"), sabotage: None, says: "`pad.image` is 24.0 ms old", ends: true },
+    Case {
+        key: "clock",
+        glitch: Some("silence"),
+        sabotage: None,
+        says: "the clock device `pad` is silent",
+        ends: true,
+    },
+    Case { key: "not_finite", glitch: Some("nan"), sabotage: None, says: "`pad.image` is not a finite", ends: true },
+    Case {
+        key: "not_finite",
+        glitch: None,
+        sabotage: Some(("pid", How::Nan)),
+        says: "`pid.control` is not",
+        ends: true,
+    },
+    Case { key: "panic", glitch: None, sabotage: Some(("pid", How::Panic)), says: "node `pid` panicked", ends: true },
+    Case { key: "device", glitch: Some("unplug"), sabotage: None, says: "device `pad` failed", ends: false },
+];
+
+fn engine(case: Case, policy: &str) -> Engine {
+    let mut request = Request::file(workspace().join("graphs/hybrid.toml"))
+        .set("devices.pad.press=[{ from_s = 0.3, force = 3.0, at = [0.008, -0.004] }]")
+        .set("devices.pad.for_s=9.0")
+        .set(format!("policy.{}='{policy}'", case.key));
+    if let Some(glitch) = case.glitch {
+        request = request.set(format!("devices.pad.glitch=[{{ at_s = 0.8, for_s = 0.2, kind = '{glitch}' }}]"));
+    }
+    let catalogue = match case.sabotage {
+        Some((target, how)) => sabotaged(&Sabotage { target: target.into(), how, from: 200, to: 250 }),
+        None => catalogue(),
+    };
+    Engine::new(plan(&catalogue, &request).unwrap_or_else(|report| panic!("{}", report.render(false))))
+}
+
+/// Runs to `until` [s]; whether the arm moves then.
+fn moves(engine: &mut Engine, until: f64) -> Result<bool, Fault> {
+    while let Some(next) = engine.next().filter(|next| *next <= (until * 1e9) as i64) {
+        engine.tick(next)?;
+    }
+    Ok(engine.commands("arm").unwrap().iter().any(|velocity| velocity.abs() > 1e-3))
+}
+
+#[test]
+fn what_each_trouble_does_under_each_policy() {
+    let hook = std::panic::take_hook();
+    std::panic::set_hook(Box::new(|_| {}));
+    for case in CASES {
+        let mut held = engine(case, "hold");
+        assert_eq!(moves(&mut held, 0.79), Ok(true), "{case:?}");
+        assert_eq!(moves(&mut held, 0.99), Ok(false), "{case:?} holds");
+        assert_eq!(moves(&mut held, 1.6), Ok(case.ends), "{case:?} goes on by itself");
+        let halt = &held.halts()[0];
+        assert!(halt.fault.to_string().starts_with(case.says), "{case:?}: {}", halt.fault);
+        assert_eq!(halt.until.is_some(), case.ends, "{case:?}");
+
+        let mut stopped = engine(case, "stop");
+        assert_eq!(moves(&mut stopped, 0.99), Ok(false), "{case:?} stops");
+        assert_eq!(moves(&mut stopped, 1.6), Ok(false), "{case:?} waits for the operator");
+        assert!(stopped.is_stopped());
+        stopped.send("resume");
+        assert_eq!(moves(&mut stopped, 2.4), Ok(case.ends), "{case:?} goes on when it may");
+
+        let fault = moves(&mut engine(case, "fault"), 2.0).unwrap_err();
+        assert!(fault.to_string().starts_with(case.says), "{case:?}: {fault}");
+        assert!((0.79..0.9).contains(&(fault.time as f64 * 1e-9)), "{case:?}: {fault}");
+    }
+    std::panic::set_hook(hook);
+}
+
+#[test]
+fn what_is_only_counted_changes_nothing() {
+    let mut counted = engine(CASES[0], "count");
+    assert_eq!(moves(&mut counted, 0.79), Ok(true));
+    assert_eq!(moves(&mut counted, 1.6), Ok(true));
+    assert!(counted.halts().is_empty());
+    let image = counted.counters().next().unwrap();
+    assert!(image.repeated >= 49, "{image:?}");
+}
+
+#[test]
+fn each_port_counts_what_came_in() {
+    let text = "[graph]\nclock = \"a\"\n[roles]\na = \"length\"\n[policy]\nnot_finite = \"hold\"\n";
+    let mut rig = GraphRig::new(catalogue(), text, vec![length_by_hand("a")]).unwrap();
+    // When it comes, the stamp and the sequence number it says, and its value; a period is 10 ms.
+    let samples = [
+        (0.0, 0.0, 1, 1.0),
+        (10.0, 10.0, 2, 1.0),
+        (20.0, 10.0, 2, 1.0),
+        (30.0, 30.0, 5, 1.0),
+        (60.0, 45.0, 6, 1.0),
+        (70.0, 40.0, 7, 1.0),
+        (80.0, 80.0, 7, f64::NAN),
+        (90.0, 90.0, 7, 1.0),
+    ];
+    for (at, stamp, sequence, value) in samples {
+        rig.feed_as("a", 0, at, stamp, sequence, value);
+        rig.tick(at).unwrap();
+    }
+    let found = rig.engine.counters().next().unwrap();
+    let counts = [found.new, found.repeated, found.gaps, found.late, found.went_back, found.not_finite];
+    assert_eq!(counts, [5, 1, 2, 1, 1, 1], "{found:?}");
+}
+
+fn wire(wire: &str) -> GraphRig {
+    let text = format!(
+        "[graph]\nclock = \"a\"\nreset_after_ms = 1000\n[roles]\na = \"length\"\n[policy]\nstale = \"count\"\n\
+         [nodes.count]\ntype = \"count\"\nin.value = {wire}\n[nodes.other]\ntype = \"count\"\nin.value = \"a.value\"\n"
+    );
+    GraphRig::new(catalogue(), &text, vec![length_by_hand("a")]).unwrap_or_else(|r| panic!("{}", r.render(false)))
+}
+
+#[test]
+fn a_wire_may_grow_only_so_old() {
+    let mut rig = wire("{ from = \"a.value\", max_age_ms = 15 }");
+    let mut seen = Vec::new();
+    for (ms, is_new) in [(0, true), (10, true), (20, false), (30, false), (40, false), (50, true), (60, false)] {
+        let ms = f64::from(ms);
+        if is_new {
+            rig.feed("a", 0, ms, 1.0);
+        }
+        rig.tick(ms).unwrap();
+        seen.push(rig.freshness("count.steps"));
+        assert!(rig.get::<f64>("other.steps").is_some(), "the other goes on");
+    }
+    use Freshness::{Absent, Held, Lost, New};
+    assert_eq!(seen, [New, New, Held, Lost, Absent, New, Held]);
+    assert_eq!(rig.get::<f64>("count.steps"), Some(&3.0), "state is kept, and nothing counted twice");
+}
+
+#[test]
+fn an_old_wire_can_stop_or_end_the_run() {
+    let mut rig = wire("{ from = \"a.value\", max_age_ms = 15, stale = \"fault\" }");
+    rig.feed("a", 0, 0.0, 1.0);
+    rig.tick(0.0).unwrap();
+    let fault = rig.tick(20.0).unwrap_err();
+    let expected =
+        "`a.value` is 20.0 ms old for `count`, and may be 15.0 ms old in tick 2 at 0.020 s (graph.toml:10:21)";
+    assert_eq!(fault.to_string(), expected);
+    let mut rig = wire("{ from = \"a.value\", max_age_ms = 15, stale = \"stop\" }");
+    rig.feed("a", 0, 0.0, 1.0);
+    rig.tick(0.0).unwrap();
+    rig.tick(20.0).unwrap();
+    assert!(rig.engine.is_stopped());
+}
+
+#[test]
+fn a_stop_that_nobody_can_end_ends_the_run() {
+    let case = CASES[2];
+    let options = |sends: &[(f64, &str)]| RunOptions {
+        duration: Some(2.0),
+        sends: sends.iter().map(|(at, word)| (*at, (*word).to_owned())).collect(),
+        ..RunOptions::default()
+    };
+    let mut engine_ = engine(case, "stop");
+    let outcome = run(&mut engine_, &options(&[]), &mut |_| {}).unwrap();
+    let End::Fault(fault) = outcome.end else { panic!("{:?}", outcome.end) };
+    assert!(fault.to_string().starts_with(case.says), "{fault}");
+    assert!(outcome.time < 1_000_000_000, "as soon as the arm stands: {}", outcome.time);
+    let mut engine_ = engine(case, "stop");
+    let outcome = run(&mut engine_, &options(&[(1.5, "resume")]), &mut |_| {}).unwrap();
+    assert_eq!(outcome.end, End::Duration);
+    let mut lost = engine(CASES[5], "hold");
+    let outcome = run(&mut lost, &RunOptions::default(), &mut |_| {}).unwrap();
+    assert!(matches!(outcome.end, End::Fault(_)), "a device that is gone does not come back: {:?}", outcome.end);
+}
+
+/// What integrates, averages and differentiates, on one length.
+const MEMORIES: &str = "
+[graph]
+clock = 'a'
+max_gap_ms = 100000
+[roles]
+a = 'length'
+[nodes.smooth]
+type = 'smooth'
+in.value = 'a.value'
+window = 4
+[nodes.recent]
+type = 'smooth'
+in.value = 'a.value'
+window_ms = 50
+[nodes.median]
+type = 'median'
+in.value = 'a.value'
+window = 5
+[nodes.pole]
+type = 'one_pole'
+in.value = 'a.value'
+time_constant_ms = 30
+[nodes.error]
+type = 'feature_error'
+in.x = 'a.value'
+setpoint = { x = 0.5 }
+[nodes.pid]
+type = 'pid'
+in.error = 'error.error'
+gains.x = { kp = 1.0, ki = 2.0, kd = 0.1 }
+[nodes.count]
+type = 'count'
+in.value = 'smooth.value'
+";
+
+fn remembered(rig: &GraphRig) -> Vec<u64> {
+    let scalars = ["smooth.value", "recent.value", "median.value", "pole.value", "count.steps", "count.time"];
+    let mut values: Vec<f64> = scalars.iter().map(|port| *rig.get::<f64>(port).unwrap()).collect();
+    values.extend(rig.get::<Features>("pid.control").unwrap().components()[0].get());
+    values.into_iter().map(f64::to_bits).collect()
+}
+
+/// What comes in a tick.
+#[derive(Debug, Clone, Copy)]
+enum Comes {
+    New(f64),
+    /// The last sample again, under its number.
+    Again,
+    /// One with an older stamp than the last.
+    Older,
+    Nothing,
+}
+
+proptest! {
+    #[test]
+    fn what_comes_twice_late_or_not_at_all_changes_nothing_that_the_distinct_samples_would_not(
+        pattern in prop::collection::vec(
+            prop_oneof![
+                3 => (-1.0..1.0f64).prop_map(Comes::New),
+                2 => Just(Comes::Again),
+                1 => Just(Comes::Older),
+                2 => Just(Comes::Nothing),
+            ],
+            1..60,
+        ),
+    ) {
+        let rig = || GraphRig::new(catalogue(), MEMORIES, vec![length_by_hand("a")]).unwrap();
+        let (mut messy, mut clean) = (rig(), rig());
+        let (mut last, mut sequence) = (None, 0);
+        for (i, comes) in pattern.into_iter().enumerate() {
+            let ms = 10.0 * i as f64;
+            match (comes, last) {
+                (Comes::New(value), _) => {
+                    sequence += 1;
+                    last = Some((ms, value));
+                    messy.feed_as("a", 0, ms, ms, sequence, value);
+                    clean.feed_as("a", 0, ms, ms, sequence, value);
+                    clean.tick(ms).unwrap();
+                }
+                (Comes::Again, Some((stamp, value))) => messy.feed_as("a", 0, ms, stamp, sequence, value),
+                (Comes::Older, Some((stamp, _))) => messy.feed_as("a", 0, ms, stamp - 1.0, sequence + 1000, 9.0),
+                (Comes::Again | Comes::Older, None) | (Comes::Nothing, _) => {}
+            }
+            messy.tick(ms).unwrap();
+            if last.is_some() {
+                prop_assert_eq!(remembered(&messy), remembered(&clean), "after {} ms", ms);
+            }
+        }
+    }
+}
