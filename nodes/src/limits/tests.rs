@@ -204,7 +204,7 @@ fn past(gap: f64, turning: f64, flip: usize, margin: f64) -> f64 {
     let mut smooth = rig::<AccelerationLimit>(&accelerations);
     let (mut x, mut told, mut worst) = (0.05, Twist::default(), f64::NEG_INFINITY);
     for tick in 0..1000 {
-        let sign = if tick / flip % 2 == 0 { 1.0 } else { -1.0 };
+        let sign = if (tick / flip).is_multiple_of(2) { 1.0 } else { -1.0 };
         // Toward the face until it is near; then along it, so that nothing scales the turning down.
         let ahead = if 0.1 - x > margin { 0.05 } else { 0.0 };
         near.tick.max_gap = gap;
