@@ -60,19 +60,27 @@ def described(entries):
             print(f"example of {entry['example'].count('[nodes.')} nodes")
 
 
+def settings(entries):
+    for setting in entries:
+        origin = setting["origin"]
+        assert origin in ("written", "default", "fact"), setting
+        assert (setting["place"] is None) == (origin == "default"), setting
+        assert (setting["fact"] is None) == (origin != "fact"), setting
+        where = "" if origin == "default" else " " + place(setting["place"])
+        fact = f" {setting['fact']}" if setting["fact"] else ""
+        print(f"{setting['path']} = {json.dumps(setting['value'])} {origin}{fact}{where}")
+
+
 def shown(graph):
+    print("[policy]")
+    settings(graph["policy"])
     for node in graph["nodes"] + graph["devices"]:
         print(f"[{node['name']}] {node['type']}")
         for wire in node["inputs"]:
-            print(f"in.{wire['name']} = {wire['source']} {place(wire['place'])}")
-        for setting in node["params"]:
-            origin = setting["origin"]
-            assert origin in ("written", "default", "fact"), setting
-            assert (setting["place"] is None) == (origin == "default"), setting
-            assert (setting["fact"] is None) == (origin != "fact"), setting
-            where = "" if origin == "default" else " " + place(setting["place"])
-            fact = f" {setting['fact']}" if setting["fact"] else ""
-            print(f"{setting['path']} = {json.dumps(setting['value'])} {origin}{fact}{where}")
+            assert (wire["max_age_ms"] is None) == (wire["stale"] is None), wire
+            age = f" {wire['max_age_ms']} ms {wire['stale']}" if wire["stale"] else ""
+            print(f"in.{wire['name']} = {wire['source']}{age} {place(wire['place'])}")
+        settings(node["params"])
         for port in node["outputs"]:
             print(f"gives {port['name']} | {port['kind']} | {port['unit']} | {port['frames']}")
 

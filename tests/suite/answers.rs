@@ -212,6 +212,38 @@ fn a_graph_is_shown_with_where_everything_comes_from() {
 }
 
 #[test]
+fn what_a_trouble_does_is_shown_with_its_defaults_and_so_is_the_age_of_a_wire() {
+    let args = [
+        "show",
+        PRESS,
+        "--set=policy.device=hold",
+        "--set=policy.roles.pad.max_age_ms=300",
+        "--set=nodes.guide.in.gate={ from = 'touch.present', max_age_ms = 40 }",
+    ];
+    let text = say(&args);
+    assert_eq!((text.code, text.err.as_str()), (0, ""));
+    let lines = [
+        "[policy]",
+        "stale = \"hold\" # default",
+        "not_finite = \"fault\" # default",
+        "deadline = \"count\" # default",
+        "device = \"hold\" # command line",
+        "roles.pad.max_age_ms = 300 # command line",
+        "in.gate = { from = \"touch.label.present\", max_age_ms = 40, stale = \"hold\" } # command line",
+    ];
+    assert_lines(&text.out, &lines);
+    let shown: toml::Table = text.out.parse().expect("what is shown is TOML");
+    assert_eq!(shown["policy"]["roles"]["pad"]["max_age_ms"].as_integer(), Some(300));
+    let lines = [
+        "stale = \"hold\" default",
+        "device = \"hold\" written command line:1:15+6",
+        "roles.pad.max_age_ms = 300 written command line:1:29+3",
+        "in.gate = touch.label.present 40.0 ms hold command line:1:30+15",
+    ];
+    assert_lines(&json(&args, 0), &lines);
+}
+
+#[test]
 fn a_broken_graph_is_not_shown() {
     let graph = "tests/errors/kind_mismatch.toml";
     let (shown, checked) = (say(&["show", graph]), say(&["check", graph]));

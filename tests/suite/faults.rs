@@ -4,6 +4,8 @@ use tactflow_runtime::engine::{End, Engine, RunOptions, run};
 use tactflow_runtime::fault::Cause;
 use tactflow_runtime::graph::{Request, plan};
 use tactflow_runtime::harness::GraphRig;
+use tactflow_runtime::node::{Mistakes, Node, Setup, Tick};
+use tactflow_runtime::signal::Freshness;
 use tactflow_tests::nodes::length_by_hand;
 use tactflow_tests::{catalogue, workspace};
 
@@ -47,6 +49,59 @@ fn a_sample_that_is_not_finite_is_a_fault_of_its_role() {
     rig.feed("a", 0, 0.0, f64::NAN);
     let fault = rig.tick(0.0).unwrap_err();
     assert_eq!((fault.node.as_str(), fault.port.as_deref(), fault.tick), ("a", Some("value"), 1));
+}
+
+/// A node that gives nothing, and panics in the third tick.
+struct Mute;
+
+impl Node for Mute {
+    type Params = mute::Params;
+    type Inputs<'a> = mute::Inputs<'a>;
+    type Outputs = mute::Outputs;
+    type State = ();
+
+    const NAME: &'static str = "mute";
+    const SUMMARY: &'static str = "gives nothing, and panics once";
+
+    fn new(_: mute::Params, _: &mut Setup<Self>) -> Result<Self, Mistakes> {
+        Ok(Self)
+    }
+
+    fn state(&self) {}
+
+    fn step(&self, tick: &Tick, _: mute::Inputs<'_>, _: &mut mute::Outputs, (): &mut ()) {
+        assert!(tick.index != 3, "as told");
+    }
+}
+
+mod mute {
+    use tactflow_runtime::{inputs, outputs, params};
+
+    params! {}
+    inputs! {
+        /// What it looks at.
+        value: Scalar["m"],
+    }
+    outputs! {}
+}
+
+#[test]
+fn what_comes_after_a_panic_is_absent_also_behind_a_node_that_gives_nothing() {
+    let text = "[graph]\nclock = 'a'\n[policy]\npanic = 'hold'\n[roles]\na = 'length'\n\
+                [nodes.first]\ntype = 'count'\nin.value = 'a.value'\n[nodes.mute]\ntype = 'mute'\n\
+                in.value = 'a.value'\n[nodes.second]\ntype = 'count'\nin.value = 'a.value'\n";
+    let mut rig = GraphRig::new(catalogue().node::<Mute>(), text, vec![length_by_hand("a")])
+        .unwrap_or_else(|report| panic!("{}", report.render(false)));
+    assert_eq!(rig.engine.order().collect::<Vec<_>>(), ["first", "mute", "second"]);
+    let mut seen = Vec::new();
+    for tick in 0..5 {
+        let ms = f64::from(tick) * 10.0;
+        rig.feed("a", 0, ms, 1.0);
+        rig.tick(ms).unwrap();
+        seen.push([rig.freshness("first.steps"), rig.freshness("second.steps")]);
+    }
+    use Freshness::{Lost, New};
+    assert_eq!(seen, [[New, New], [New, New], [New, Lost], [New, New], [New, New]]);
 }
 
 #[test]

@@ -47,16 +47,21 @@ impl Drop for Peer {
     }
 }
 
-/// Runs the graph on a peer; how it ended, and the steps and the ages [ms] of `count` after each tick.
-fn run(peer: &Peer, duration: f64) -> (End, Vec<f64>, Vec<f64>) {
+/// A graph on a peer.
+fn engine(peer: &Peer, graph: &str) -> Engine {
     let bench = format!(
         "devices.tcp.type = \"line_length\"\ndevices.tcp.address = \"127.0.0.1:{}\"\nbind.a = \"tcp\"",
         peer.port
     );
-    let request = Request { bench_text: Some(bench), ..Request::text(GRAPH) };
+    let request = Request { bench_text: Some(bench), ..Request::text(graph) };
     let plan = plan(&catalogue(), &request).unwrap_or_else(|report| panic!("{}", report.render(false)));
     assert!(plan.is_live());
-    let mut engine = Engine::new(plan);
+    Engine::new(plan)
+}
+
+/// Runs the graph on a peer; how it ended, and the steps and the ages [ms] of `count` after each tick.
+fn run(peer: &Peer, duration: f64) -> (End, Vec<f64>, Vec<f64>) {
+    let mut engine = engine(peer, GRAPH);
     let id = engine.ports().iter().find(|(port, _)| port.name == "count.steps").unwrap().1;
     let (mut steps, mut ages) = (Vec::new(), Vec::new());
     let options = RunOptions { duration: Some(duration), is_realtime: true, ..RunOptions::default() };
@@ -133,6 +138,22 @@ fn a_peer_that_hangs_up_or_talks_nonsense_is_a_fault_of_the_device() {
         let End::Fault(fault) = end else { panic!("{end:?}") };
         assert_eq!((fault.node.as_str(), fault.cause), ("tcp", Cause::Device(message.into())));
     }
+}
+
+#[test]
+fn a_peer_that_hangs_up_is_held_and_told_when_the_graph_says_so() {
+    let peer = Peer::start(5, 0.01, 0.0, "hang-up");
+    let mut engine = engine(&peer, &format!("{GRAPH}\n[policy]\ndevice = \"hold\"\n"));
+    let options = RunOptions { duration: Some(0.6), ..RunOptions::default() };
+    let outcome = engine::run(&mut engine, &options, &mut |_| {}).unwrap();
+    assert_eq!(outcome.end, End::Duration);
+    assert!(outcome.ticks >= 20, "a timer ticks on without the clock device: {} ticks", outcome.ticks);
+    // That the clock is silent may be seen first, so the device is the reason of this halt or of the next.
+    let lost = engine.halts().iter().find(|halt| matches!(halt.fault.cause, Cause::Device(_)));
+    let causes: Vec<String> = engine.halts().iter().map(|halt| halt.fault.to_string()).collect();
+    let lost = lost.unwrap_or_else(|| panic!("{causes:?}"));
+    assert_eq!((lost.fault.node.as_str(), &lost.fault.cause), ("tcp", &Cause::Device("the peer hung up".into())));
+    assert_eq!(engine.halts().last().unwrap().until, None, "what is gone does not come back: {causes:?}");
 }
 
 #[test]

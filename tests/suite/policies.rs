@@ -103,6 +103,81 @@ fn what_is_only_counted_changes_nothing() {
     assert!(image.repeated >= 49, "{image:?}");
 }
 
+/// A graph whose two lengths come every 10 ms, with a policy.
+fn lengths(policy: &str) -> GraphRig {
+    let text = format!(
+        "[graph]\nclock = \"a\"\n[roles]\na = \"length\"\nb = \"length\"\n[policy]\nclock = \"count\"\n{policy}\n"
+    );
+    let rig = GraphRig::new(catalogue(), &text, vec![length_by_hand("a"), length_by_hand("b")]);
+    rig.unwrap_or_else(|report| panic!("{}", report.render(false)))
+}
+
+#[test]
+fn a_tick_that_begins_late_is_told_with_its_own_number() {
+    for (policy, faults, halts, is_stopped) in
+        [("count", false, 0, false), ("hold", false, 1, false), ("stop", false, 1, true), ("fault", true, 0, false)]
+    {
+        let mut rig = lengths(&format!("deadline = \"{policy}\""));
+        let mut fault = None;
+        for (i, ms) in [0.0, 10.0, 35.0, 40.0].into_iter().enumerate() {
+            rig.feed("a", 0, ms, 1.0);
+            if i == 2 {
+                rig.engine.is_late(15_000_000);
+            }
+            fault = fault.or(rig.tick(ms).err());
+        }
+        assert_eq!((fault.is_some(), rig.engine.halts().len()), (faults, halts), "{policy}");
+        assert_eq!((rig.engine.is_stopped(), rig.engine.late()), (is_stopped, 1), "{policy}");
+        if let Some(fault) = fault.or(rig.engine.halts().first().map(|halt| halt.fault.clone())) {
+            assert_eq!(fault.to_string(), "a tick began 15.0 ms late in tick 3 at 0.035 s", "{policy}");
+        }
+        let until = rig.engine.halts().first().map(|halt| halt.until);
+        assert!(until.is_none() || (until == Some(Some(40_000_000))) == (policy == "hold"), "{policy}: {until:?}");
+    }
+}
+
+#[test]
+fn each_role_has_its_own_age_and_policy() {
+    // What is set, when `a` is heard of no more, and when `b` is: in ms after the last sample of both.
+    let cases = [
+        ("", 60.0, 60.0, "hold"),
+        ("max_age_ms = 25", 30.0, 30.0, "hold"),
+        ("max_age_ms = 25\nroles.b.max_age_ms = 40", 30.0, 50.0, "hold"),
+        ("roles.a.max_age_ms = 20", 30.0, 60.0, "hold"),
+        ("stale = \"count\"\nroles.b = { stale = \"stop\" }", f64::INFINITY, 60.0, "stop"),
+        ("stale = \"stop\"\nroles.a.stale = \"count\"", f64::INFINITY, 60.0, "stop"),
+    ];
+    for (policy, a, b, what) in cases {
+        // Each is silent alone, so that the other does not hide it.
+        for (silent, expected) in [("a", a), ("b", b)] {
+            let mut rig = lengths(policy);
+            let mut found = f64::INFINITY;
+            for tick in 0..10 {
+                let ms = f64::from(tick) * 10.0;
+                for role in ["a", "b"].into_iter().filter(|role| tick == 0 || *role != silent) {
+                    rig.feed(role, 0, ms, 1.0);
+                }
+                rig.tick(ms).unwrap();
+                if !rig.engine.halts().is_empty() {
+                    found = found.min(ms);
+                }
+            }
+            assert_eq!(found, expected, "{silent} is silent under `{policy}`");
+            assert_eq!(rig.engine.is_stopped(), expected.is_finite() && what == "stop", "{silent}: `{policy}`");
+        }
+    }
+}
+
+#[test]
+fn what_was_never_there_is_not_old() {
+    let mut rig = lengths("stale = \"fault\"");
+    for tick in 0..20 {
+        let ms = f64::from(tick) * 10.0;
+        rig.feed("a", 0, ms, 1.0);
+        rig.tick(ms).unwrap();
+    }
+}
+
 #[test]
 fn each_port_counts_what_came_in() {
     let text = "[graph]\nclock = \"a\"\n[roles]\na = \"length\"\n[policy]\nnot_finite = \"hold\"\n";

@@ -202,24 +202,31 @@ fn seconds(nanos: i64) -> f64 {
     nanos as f64 * 1e-9
 }
 
-/// A time with its unit, in seconds: a parser for arguments.
+/// A time with its unit that is not zero, in seconds: a parser for arguments.
 ///
 /// # Errors
 /// What is wrong with it.
 pub fn duration(text: &str) -> Result<f64, String> {
+    time(text, "greater than 0", |number| number > 0.0)
+}
+
+/// A time with its unit, in seconds, whose number is in a range.
+fn time(text: &str, range: &str, is_in_range: impl Fn(f64) -> bool) -> Result<f64, String> {
     const UNITS: [(&str, f64); 4] = [("ms", 1e-3), ("min", 60.0), ("s", 1.0), ("h", 3600.0)];
     let found = UNITS.iter().find_map(|(unit, seconds)| Some((text.strip_suffix(unit)?, seconds)));
     let (number, seconds) = found.ok_or("give a time with its unit: 20s, 500ms, 2min, 1h")?;
     match number.trim().parse::<f64>() {
-        Ok(number) if number > 0.0 && number.is_finite() => Ok(number * seconds),
-        _ => Err(format!("`{number}` is not a number greater than 0")),
+        Ok(number) if is_in_range(number) && number.is_finite() => Ok(number * seconds),
+        _ => Err(format!("`{number}` is not a number {range}")),
     }
 }
 
 /// A word and when it is sent: `2s:resume`.
 fn word(text: &str) -> Result<(f64, String), String> {
     match text.split_once(':') {
-        Some((time, word)) if !word.trim().is_empty() => Ok((duration(time)?, word.trim().to_owned())),
+        Some((at, word)) if !word.trim().is_empty() => {
+            Ok((time(at, "from 0", |number| number >= 0.0)?, word.trim().to_owned()))
+        }
         _ => Err("give a time and a word: 2s:resume".into()),
     }
 }
@@ -235,6 +242,16 @@ mod tests {
         }
         for text in ["20", "", "s", "-1s", "0s", "nans", "infs", "3 days"] {
             assert!(duration(text).is_err(), "{text}");
+        }
+    }
+
+    #[test]
+    fn a_word_has_a_time() {
+        for (text, at, said) in [("2s:resume", 2.0, "resume"), ("0s: stop ", 0.0, "stop"), ("5ms:a:b", 0.005, "a:b")] {
+            assert_eq!(word(text), Ok((at, said.to_owned())), "{text}");
+        }
+        for text in ["resume", "2s", "2s:", "2s: ", ":stop", "2:stop", "-1s:stop", "nans:stop", "infs:stop"] {
+            assert!(word(text).is_err(), "{text}");
         }
     }
 }

@@ -65,7 +65,8 @@ fn text(plan: &Plan, has_colour: bool) -> String {
     let mut page = Page { text: String::new(), has_colour };
     let word = |name: &str, word: &Word| Line::new(name, &word.text, at(sources, word.span.start));
     let wire = |prefix: &str, wire: &OutlinedWire| {
-        Line::new(&format!("{prefix}{}", wire.name), &wire.source, at(sources, wire.span.start))
+        let text = format!("{prefix}{} = {}", wire.name, from(wire));
+        Line { text, origin: at(sources, wire.span.start), below: String::new() }
     };
     let settings = |settings: &[Setting]| settings.iter().map(|setting| line(setting, sources)).collect::<Vec<_>>();
     let block = |block: &OutlinedBlock| {
@@ -78,6 +79,7 @@ fn text(plan: &Plan, has_colour: bool) -> String {
     page.section("graph", &settings(&outline.settings), &[]);
     page.section("roles", &roles.iter().map(|role| word(&role.name, &role.kind)).collect::<Vec<_>>(), &[]);
     page.section("commands", &commands.iter().map(|command| wire("", command)).collect::<Vec<_>>(), &[]);
+    page.section("policy", &settings(&outline.policy), &[]);
     for mode in &outline.modes {
         page.section(&format!("modes.{}", mode.name), &settings(&mode.settings), &[]);
     }
@@ -90,6 +92,15 @@ fn text(plan: &Plan, has_colour: bool) -> String {
         page.section(&format!("devices.{}", device.name), &block(device), &[]);
     }
     page.text
+}
+
+/// Where a wire comes from, and how old what comes over it may be, as TOML.
+fn from(wire: &OutlinedWire) -> String {
+    let source = toml::Value::from(wire.source.as_str());
+    match wire.age {
+        Some((ms, stale)) => format!("{{ from = {source}, max_age_ms = {ms}, stale = \"{}\" }}", stale.word()),
+        None => source.to_string(),
+    }
 }
 
 /// `file:line`.
@@ -245,6 +256,7 @@ struct Shown {
     graph: Vec<ShownSetting>,
     roles: Vec<ShownRole>,
     commands: Vec<ShownWire>,
+    policy: Vec<ShownSetting>,
     modes: Vec<ShownMode>,
     nodes: Vec<ShownBlock>,
     devices: Vec<ShownBlock>,
@@ -278,6 +290,9 @@ struct ShownBlock {
 struct ShownWire {
     name: String,
     source: String,
+    /// How old what comes over it may be, and what is done when it is older; null if it does not say that.
+    max_age_ms: Option<f64>,
+    stale: Option<&'static str>,
     place: Place,
 }
 
@@ -308,6 +323,8 @@ impl Shown {
         let wire = |wire: &OutlinedWire| ShownWire {
             name: wire.name.clone(),
             source: wire.source.clone(),
+            max_age_ms: wire.age.map(|(ms, _)| ms),
+            stale: wire.age.map(|(_, stale)| stale.word()),
             place: place(sources, &wire.span),
         };
         let settings = |settings: &[Setting]| settings.iter().map(|setting| shown(setting, sources)).collect();
@@ -331,6 +348,7 @@ impl Shown {
             graph: settings(&outline.settings),
             roles: roles.collect(),
             commands: outline.commands.iter().map(wire).collect(),
+            policy: settings(&outline.policy),
             modes: modes.collect(),
             nodes: stepped(plan).map(block).collect(),
             devices: outline.devices.iter().map(|device| ShownBlock { outputs: Vec::new(), ..block(device) }).collect(),

@@ -74,7 +74,8 @@ pub trait Stepped: Send {
     /// Time of the next sample in the device's own time from its start [ns]; `None` when there will be no more.
     fn next(&self) -> Option<i64>;
 
-    /// Time of the last sample there will be, if that is known [ns]: for a progress bar.
+    /// Time of the last sample there will be, if that is known [ns]: for a progress bar, and to know that a
+    /// run ends by itself.
     fn end(&self) -> Option<i64> {
         None
     }

@@ -82,6 +82,7 @@ impl Engine {
             panic: String::new(),
             sent: None,
             late: 0,
+            lateness: None,
             sources: plan.sources,
         }
     }

@@ -28,6 +28,9 @@ impl Engine {
     pub fn exchange(&mut self, now: i64) -> Result<(), Fault> {
         let due = self.clock_sample().is_some_and(|sample| sample <= now);
         self.core.begin(now);
+        if let Some(by) = self.lateness.take() {
+            self.meet(self.policy.deadline, Trouble::Late(by))?;
+        }
         let has_sampled = self.exchange_with_devices(now)? || due;
         self.timeline.ticked(now, has_sampled);
         if self.timeline.is_on_timer() {
@@ -106,19 +109,19 @@ impl Engine {
     /// A word from outside: `stop` and `resume` halt the commands and let them go on, any other is for the modes.
     pub fn send(&mut self, word: &str) {
         match word {
-            "stop" => self.trouble = Some((Policy::Stop, Trouble::Operator)),
+            "stop" => {
+                self.halts.stop();
+                self.trouble = Some((Policy::Stop, Trouble::Operator));
+            }
             "resume" => self.halts.resume(),
             other => self.sent = Some(other.to_owned()),
         }
     }
 
-    /// A tick begins `by` [ns] too late, by a real clock.
-    ///
-    /// # Errors
-    /// If the policy of that is a fault.
-    pub fn is_late(&mut self, by: i64) -> Result<(), Fault> {
+    /// The next tick begins `by` [ns] too late, by a real clock.
+    pub fn is_late(&mut self, by: i64) {
         self.late += 1;
-        self.meet(self.policy.deadline, Trouble::Late(by))
+        self.lateness = Some(by);
     }
 
     /// The boundary between two ticks: another mode, if the conditions of the present one say so. While the operator is
@@ -222,7 +225,9 @@ impl Engine {
     /// Makes the outputs of a station and of all that come after it absent. A node that panicked may have lost its
     /// buffers, so they are made anew.
     fn take_back(&mut self, station: usize) {
-        let from = self.ports.iter().position(|(port, _)| owner(&port.name) == self.names[station].0);
+        // The first that has any: a node may be without outputs, and those after it were not stepped all the same.
+        let first = |name: &String| self.ports.iter().position(|(port, _)| owner(&port.name) == name);
+        let from = self.names[station..].iter().find_map(|(name, _)| first(name));
         for (port, id) in &self.ports[from.unwrap_or(self.ports.len())..] {
             self.core.bus.marks[id.mark as usize].lose(self.core.tick.index);
             self.core.bus.arenas.renew(id.slot, &port.shape);

@@ -59,6 +59,11 @@ impl Halts {
         self.resumes = true;
     }
 
+    /// The operator wants a stop: what was said before of going on holds no more.
+    pub(super) const fn stop(&mut self) {
+        self.resumes = false;
+    }
+
     /// Everything so far.
     pub(super) fn list(&self) -> &[Halt] {
         &self.list

@@ -58,6 +58,8 @@ pub struct Engine {
     sent: Option<String>,
     /// Ticks that began too late.
     late: u64,
+    /// How late the next tick begins, if too late [ns].
+    lateness: Option<i64>,
     sources: Sources,
 }
 
@@ -157,6 +159,11 @@ impl Engine {
             Edge::Stepped(driver) if self.timeline.is_clock(i) => driver.end(),
             _ => None,
         })
+    }
+
+    /// Whether a device that is left knows of an end of its samples.
+    fn has_end(&self) -> bool {
+        self.decks.iter().any(|deck| matches!(&deck.edge, Edge::Stepped(driver) if driver.end().is_some()))
     }
 
     /// Number of the last tick.

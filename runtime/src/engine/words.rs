@@ -1,8 +1,8 @@
 //! Words from outside: those that were given beforehand for a time of the graph, and those that come in while it runs.
 
 use std::collections::VecDeque;
-use std::io::BufRead;
-use std::sync::mpsc::{Receiver, channel};
+use std::io::{BufRead, BufReader, Read};
+use std::sync::mpsc::{Receiver, TryRecvError, channel};
 
 /// Where words come from.
 pub(super) struct Words {
@@ -17,13 +17,16 @@ impl Words {
         let mut planned: Vec<(i64, String)> =
             planned.iter().map(|(seconds, word)| ((seconds * 1e9) as i64, word.clone())).collect();
         planned.sort_by_key(|(at, _)| *at);
-        Self { planned: planned.into(), heard: listens.then(listen) }
+        Self { planned: planned.into(), heard: listens.then(|| listen(std::io::stdin())) }
     }
 
     /// The next word that is due at `now` [ns].
     pub(super) fn next(&mut self, now: i64) -> Option<String> {
-        let heard = self.heard.as_ref().and_then(|heard| heard.try_recv().ok());
-        heard.or_else(|| self.planned.pop_front_if(|(at, _)| *at <= now).map(|(_, word)| word))
+        let heard = self.heard.as_ref().map(Receiver::try_recv);
+        if heard == Some(Err(TryRecvError::Disconnected)) {
+            self.heard = None;
+        }
+        heard.and_then(Result::ok).or_else(|| self.planned.pop_front_if(|(at, _)| *at <= now).map(|(_, word)| word))
     }
 
     /// Whether another word can come.
@@ -32,11 +35,11 @@ impl Words {
     }
 }
 
-/// The lines of the standard input, read by a thread that ends with the process.
-fn listen() -> Receiver<String> {
+/// The lines of an input, read by a thread that ends with it, or with the process.
+fn listen(input: impl Read + Send + 'static) -> Receiver<String> {
     let (sender, receiver) = channel();
     std::thread::spawn(move || {
-        for line in std::io::stdin().lock().lines().map_while(Result::ok) {
+        for line in BufReader::new(input).lines().map_while(Result::ok) {
             let word = line.trim();
             if !word.is_empty() && sender.send(word.to_owned()).is_err() {
                 break;
@@ -57,5 +60,15 @@ mod tests {
         assert_eq!(words.next(250_000_000).as_deref(), Some("a"));
         assert_eq!(words.next(250_000_000).as_deref(), Some("b"));
         assert!(words.next(i64::MAX).is_none() && !words.may_come());
+    }
+
+    #[test]
+    fn an_input_that_has_ended_gives_no_more_words() {
+        let mut words = Words { planned: VecDeque::new(), heard: Some(listen(&b"  stop \n\nresume"[..])) };
+        let mut heard = Vec::new();
+        while words.may_come() {
+            heard.extend(words.next(0));
+        }
+        assert_eq!(heard, ["stop", "resume"]);
     }
 }

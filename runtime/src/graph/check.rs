@@ -7,7 +7,7 @@ use super::frames::Frames;
 use super::load::{Flat, Loader, Request};
 use super::order::{Wiring, order};
 use super::plan::{Clock, Plan, PlannedCommand, PlannedNode};
-use super::policy::{PolicyTable, unknown_roles};
+use super::policy::unknown_roles;
 use super::unread::unread;
 use super::wires::Model;
 use super::{Sources, limits, modes, outline};
@@ -46,7 +46,7 @@ pub fn plan(catalogue: &Catalogue, request: &Request) -> Result<Plan, Report> {
     let wiring = Wiring { order: &order, wires: &wires, commands: &commands };
     let modes = modes::plan(&mut builder, &mut nodes, &wiring);
     let planned: Vec<PlannedCommand> = commands.iter().filter_map(|wire| builder.command(wire)).collect();
-    let policy = flat.policy.as_ref().map_or_else(PolicyTable::default, |(_, policy)| policy.clone());
+    let policy = flat.policy.as_ref().and_then(|(_, policy)| policy.clone()).unwrap_or_default();
     let roles = builder.planned_roles(&policy);
     let (found, sources) = builder.finish();
     let Some((clock, _)) = clock.filter(|_| found.is_empty()) else { return Err(Report::new(sources, found)) };

@@ -30,6 +30,8 @@ pub(crate) struct Block {
     pub(crate) key: Key,
     pub(crate) kind: Option<Word>,
     pub(crate) wires: Vec<(Key, Word)>,
+    /// Inputs whose wire cannot be read: that has been told.
+    pub(crate) unread: Vec<Key>,
     pub(crate) params: Value,
 }
 
@@ -39,6 +41,8 @@ pub(crate) struct PartBlock {
     pub(crate) key: Key,
     pub(crate) file: Option<FilePath>,
     pub(crate) wires: Vec<(Key, Word)>,
+    /// Inputs whose wire cannot be read: that has been told.
+    pub(crate) unread: Vec<Key>,
     pub(crate) set: Table,
 }
 
@@ -55,7 +59,7 @@ pub(crate) struct Document {
     pub(crate) limits: Option<(Range<usize>, Table)>,
     pub(crate) modes: Vec<ModeBlock>,
     /// The section [policy], as it is written and as it reads.
-    pub(crate) policy: Option<(Value, PolicyTable)>,
+    pub(crate) policy: Option<(Value, Option<PolicyTable>)>,
     pub(crate) inputs: Vec<(Key, Word)>,
     pub(crate) exports: Vec<(Key, Word)>,
 }
@@ -101,13 +105,13 @@ impl<'a> Sections<'a> {
         let graph =
             root.entry("graph").map(|(key, value)| (key.span.clone(), GraphTable::read(value, &mut self.reader)));
         let commands = self.table(root.get("commands")).entries.into_iter().flat_map(|(role, value)| {
-            let wires = self.wire_words(Some(&value));
+            let (wires, _) = self.wire_words(Some(&value));
             wires.into_iter().map(move |(command, word)| (role.clone(), command, word))
         });
         let commands = commands.collect();
         let limits = root.entry("limits").map(|(key, value)| (key.span.clone(), self.table(Some(value))));
         let policy = root.get("policy");
-        let policy = policy.and_then(|value| Some((value.clone(), PolicyTable::read(value, &mut self.reader)?)));
+        let policy = policy.map(|value| (value.clone(), PolicyTable::read(value, &mut self.reader)));
         let modes = self.named_tables(root.get("modes"));
         let modes = modes::modes(modes, &mut self.reader);
         Document { graph, roles: self.names(root.get("roles")), commands, limits, modes, policy, ..self.body(root) }
@@ -159,7 +163,8 @@ impl<'a> Sections<'a> {
     }
 
     fn node(&mut self, key: Key, mut table: Table, names: &[String]) -> Block {
-        Block { wires: self.wires(&mut table), ..self.block(key, table, names) }
+        let (wires, unread) = self.wires(&mut table);
+        Block { wires, unread, ..self.block(key, table, names) }
     }
 
     fn block(&mut self, key: Key, mut table: Table, names: &[String]) -> Block {
@@ -177,11 +182,11 @@ impl<'a> Sections<'a> {
         };
         // What is missing among the parameters is shown at the block's name.
         let params = Value { span: key.span.clone(), item: Item::Table(table) };
-        Block { key, kind, wires: Vec::new(), params }
+        Block { key, kind, wires: Vec::new(), unread: Vec::new(), params }
     }
 
     fn part_block(&mut self, key: Key, mut table: Table) -> PartBlock {
-        let wires = self.wires(&mut table);
+        let (wires, unread) = self.wires(&mut table);
         let set = table.remove("set").map(|(_, value)| value);
         let set = self.table(set.as_ref());
         let file = match table.remove("file") {
@@ -194,13 +199,13 @@ impl<'a> Sections<'a> {
             }
         };
         self.known(&table, &["file", "in", "set"]);
-        PartBlock { key, file, wires, set }
+        PartBlock { key, file, wires, unread, set }
     }
 
-    /// The wires of a block: its table `in`.
-    fn wires(&mut self, table: &mut Table) -> Vec<(Key, Word)> {
+    /// The wires of a block, its table `in`, and those that cannot be read.
+    fn wires(&mut self, table: &mut Table) -> (Vec<(Key, Word)>, Vec<Key>) {
         let wires = table.remove("in").map(|(_, value)| value);
-        let mut wires = self.wire_words(wires.as_ref());
+        let (mut wires, unread) = self.wire_words(wires.as_ref());
         wires.retain(|(key, _)| {
             if key.name == "from" {
                 let diagnostic = Diagnostic::new(Code::BadName, key.span.clone(), "a wire cannot be called `from`");
@@ -209,7 +214,7 @@ impl<'a> Sections<'a> {
             }
             key.name != "from" && self.name(key)
         });
-        wires
+        (wires, unread)
     }
 
     /// Every key must be one of `keys`.
@@ -239,18 +244,30 @@ impl<'a> Sections<'a> {
         table.entries.into_iter().filter_map(read).collect()
     }
 
-    /// Keys with a wire each: where it comes from, or a table that says how old it may be too.
-    fn wire_words(&mut self, value: Option<&Value>) -> Vec<(Key, Word)> {
-        let table = self.table(value);
-        let read = |(key, value): (Key, Value)| {
-            if value.as_table().is_none() {
-                return Some((key, Word::read(&value, &mut self.reader)?));
+    /// Keys with a wire each: where it comes from, or a table that says how old it may be too. And the keys of those that
+    /// cannot be read.
+    fn wire_words(&mut self, value: Option<&Value>) -> (Vec<(Key, Word)>, Vec<Key>) {
+        let (mut wires, mut unread) = (Vec::new(), Vec::new());
+        for (key, value) in self.table(value).entries {
+            let from =
+                if value.as_table().is_some() { self.aged_wire(&value) } else { Word::read(&value, &mut self.reader) };
+            match from {
+                Some(from) => wires.push((key, from)),
+                None => unread.push(key),
             }
-            let wire = WireTable::read(&value, &mut self.reader)?;
+        }
+        (wires, unread)
+    }
+
+    /// Where a wire comes from that may grow only so old.
+    fn aged_wire(&mut self, value: &Value) -> Option<Word> {
+        if let Some(wire) = WireTable::read(value, &mut self.reader) {
             self.ages.insert(wire.from.span.start, Age::of(&wire));
-            Some((key, wire.from))
-        };
-        table.entries.into_iter().filter_map(read).collect()
+            return Some(wire.from);
+        }
+        // What is wrong with it has been told; where it comes from is looked up all the same, if it says that.
+        let from = value.as_table().and_then(|table| table.get("from"))?;
+        Some(Word { text: from.as_str()?.to_owned(), span: from.span.clone() })
     }
 
     /// Keys that are names, with a string each.

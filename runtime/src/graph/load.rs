@@ -96,7 +96,7 @@ pub(crate) struct Flat {
     pub(crate) limits: Option<(Range<usize>, Table)>,
     pub(crate) modes: Vec<ModeBlock>,
     /// The section [policy], as it is written and as it reads.
-    pub(crate) policy: Option<(Value, PolicyTable)>,
+    pub(crate) policy: Option<(Value, Option<PolicyTable>)>,
     pub(crate) bench: Option<Bench>,
     /// Wires that may grow only so old, by the places of their sources.
     pub(crate) ages: BTreeMap<usize, Age>,
@@ -380,7 +380,8 @@ impl Loader {
         for (input, doc) in &document.inputs {
             let is_meant =
                 |key: &Key| !names().any(|name| name == key.name) && meant(&key.name, names()) == Some(&input.name);
-            if !part.wires.iter().any(|(key, _)| key.name == input.name || is_meant(key)) {
+            let mut wired = part.wires.iter().map(|(key, _)| key).chain(&part.unread);
+            if !wired.any(|key| key.name == input.name || is_meant(key)) {
                 let message = format!("part `{}` needs `in.{}`: {}", part.key.name, input.name, doc.text);
                 let diagnostic = Diagnostic::new(Code::MissingInput, part.key.span.clone(), message);
                 let help = format!("add `in.{} = \"…\"`", input.name);

@@ -8,7 +8,8 @@ use super::devices::{self, Opened};
 use super::document::{Block, GraphTable};
 use super::modes::ModeBlock;
 use super::plan::Producer;
-use super::wires::{CommandWire, Model, Wire};
+use super::policy::{Policy, PolicyTable};
+use super::wires::{self, CommandWire, Model, Wire};
 use super::{Item, Key, Sources, Table, Value, parse_table};
 use crate::catalogue::Catalogue;
 use crate::node::{FilePath, Param, ParamSpec, Repeats, Word};
@@ -25,6 +26,8 @@ pub struct Outline {
     pub roles: Vec<OutlinedRole>,
     /// What drives each command: `role.command`.
     pub commands: Vec<OutlinedWire>,
+    /// Section `[policy]`: what each trouble does.
+    pub policy: Vec<Setting>,
     /// The modes: each with what it sets and what ends it.
     pub modes: Vec<OutlinedMode>,
     /// The nodes, in the order of the files.
@@ -60,6 +63,8 @@ pub struct OutlinedWire {
     pub name: String,
     /// The port it comes from: `node.port`, through all parts.
     pub source: String,
+    /// How old what comes over it may be [ms], and what is done when it is older; if it says that.
+    pub age: Option<(f64, Policy)>,
     /// Where that was written.
     pub span: Range<usize>,
 }
@@ -128,12 +133,14 @@ impl Parts<'_> {
         let commands = self.commands.iter().map(|wire| OutlinedWire {
             name: name(wire),
             source: self.model.port_name(wire.source),
+            age: self.age(&wire.origin),
             span: wire.origin.word.span.clone(),
         });
         Outline {
             settings: self.graph(),
             roles: self.roles(),
             commands: commands.collect(),
+            policy: self.policy(),
             modes: flat.modes.iter().map(mode).collect(),
             nodes: (0..flat.nodes.len()).filter_map(|node| self.node(node)).collect(),
             devices: self.opened.devices.iter().filter_map(|device| self.device(&device.name)).collect(),
@@ -153,6 +160,17 @@ impl Parts<'_> {
         settings
     }
 
+    fn age(&self, wire: &wires::Origin) -> Option<(f64, Policy)> {
+        wire.age(self.model.flat).map(|age| (age.max_age as f64 * 1e-6, age.stale))
+    }
+
+    fn policy(&self) -> Vec<Setting> {
+        let mut settings = Vec::new();
+        let given = self.model.flat.policy.as_ref().and_then(|(section, _)| section.as_table());
+        self.table(given, &PolicyTable::fields(), "", &mut settings);
+        settings
+    }
+
     fn roles(&self) -> Vec<OutlinedRole> {
         let bind = self.model.flat.bench.iter().flat_map(|bench| &bench.bind);
         let device = |role: &str| bind.clone().find(|(key, _)| key.name == role).map(|(_, word)| word.clone());
@@ -169,6 +187,7 @@ impl Parts<'_> {
         let wire = |wire: &Wire| OutlinedWire {
             name: wire.key.name.clone(),
             source: self.model.port_name(wire.source),
+            age: self.age(&wire.origin),
             span: wire.origin.word.span.clone(),
         };
         let wires = self.wires[index].iter().map(wire).collect();

@@ -21,7 +21,9 @@ impl Policy {
     const WORDS: [(&'static str, Self); 4] =
         [("count", Self::Count), ("hold", Self::Hold), ("stop", Self::Stop), ("fault", Self::Fault)];
 
-    fn word(self) -> &'static str {
+    /// What it is called in a graph file.
+    #[must_use]
+    pub fn word(self) -> &'static str {
         Self::WORDS.iter().find(|(_, policy)| *policy == self).map_or("", |(word, _)| word)
     }
 

@@ -227,7 +227,8 @@ impl<'a> Model<'a> {
         for input in spec.inputs.iter().filter(|input| matches!(input.need, Need::Required | Need::Sampled)) {
             let is_meant =
                 |key: &Key| !names().any(|name| name == key.name) && meant(&key.name, names()) == Some(&input.name);
-            if !block.wires.iter().any(|(key, _)| key.name == input.name || is_meant(key)) {
+            let mut wired = block.wires.iter().map(|(key, _)| key).chain(&block.unread);
+            if !wired.any(|key| key.name == input.name || is_meant(key)) {
                 let name = &input.name;
                 let message = format!("`{}` needs `in.{name}`, {}", block.key.name, input.kind.with_article());
                 let help = self.candidate(self.flat.nodes[node].scope, node, input);

@@ -100,6 +100,11 @@ impl GraphRig {
         self.engine.tick(nanos(ms))
     }
 
+    /// Sends a word from outside; it is there in the next tick.
+    pub fn send(&mut self, word: &str) {
+        self.engine.send(word);
+    }
+
     fn port(&self, name: &str) -> PortId {
         let found = self.engine.ports().iter().find(|(port, _)| port.name == name);
         found.unwrap_or_else(|| panic!("there is no port `{name}`")).1

@@ -1,0 +1,120 @@
+//! What the operator says: which word counts, what is heard, and when nobody is left to say one.
+
+use std::io::Write;
+use std::process::{Command, Stdio};
+use std::time::{Duration, Instant};
+
+use tactflow_runtime::engine::{End, Engine, RunOptions, run};
+use tactflow_runtime::graph::{Request, plan};
+use tactflow_runtime::harness::GraphRig;
+use tactflow_tests::catalogue;
+use tactflow_tests::nodes::length_by_hand;
+
+use crate::tool::{say, tool};
+
+const HYBRID: &str = "graphs/hybrid.toml";
+
+#[test]
+fn the_last_of_several_words_counts() {
+    // What is said at once, before a stop and after one, and whether all is stopped then.
+    let cases: [(&[&str], bool); 6] = [
+        (&["stop"], true),
+        (&["resume"], false),
+        (&["stop", "resume"], false),
+        (&["resume", "stop"], true),
+        (&["stop", "resume", "stop"], true),
+        (&["resume", "stop", "resume"], false),
+    ];
+    for (words, is_stopped) in cases {
+        for before in [None, Some("stop")] {
+            let text = "[graph]\nclock = \"a\"\n[roles]\na = \"length\"\n";
+            let mut rig = GraphRig::new(catalogue(), text, vec![length_by_hand("a")]).unwrap();
+            before.into_iter().for_each(|word| rig.send(word));
+            for tick in 0..4 {
+                if tick == 1 {
+                    words.iter().for_each(|word| rig.send(word));
+                }
+                rig.feed("a", 0, f64::from(tick) * 10.0, 1.0);
+                rig.tick(f64::from(tick) * 10.0).unwrap();
+            }
+            assert_eq!(rig.engine.is_stopped(), is_stopped, "{words:?} after {before:?}");
+        }
+    }
+}
+
+#[test]
+fn a_stop_is_told_from_its_beginning_to_its_end() {
+    let text = "[graph]\nclock = \"a\"\n[roles]\na = \"length\"\n";
+    let mut rig = GraphRig::new(catalogue(), text, vec![length_by_hand("a")]).unwrap();
+    for (ms, word) in [(0.0, None), (10.0, Some("stop")), (20.0, None), (30.0, Some("resume")), (40.0, None)] {
+        word.into_iter().for_each(|word| rig.send(word));
+        rig.feed("a", 0, ms, 1.0);
+        rig.tick(ms).unwrap();
+    }
+    let halts: Vec<(String, Option<i64>)> =
+        rig.engine.halts().iter().map(|halt| (halt.fault.to_string(), halt.until)).collect();
+    assert_eq!(halts, [("the operator stopped it in tick 2 at 0.010 s".to_owned(), Some(30_000_000))]);
+}
+
+/// Two pads that end after half a second; one of them is unplugged at 0.1 s.
+const PADS: &str = "
+[graph]
+clock = 'kept'
+[policy]
+device = 'hold'
+stale = 'count'
+[roles]
+kept = 'tactile_pad'
+lost = 'tactile_pad'
+[bind]
+kept = 'a'
+lost = 'b'
+[devices.a]
+type = 'mock_pad'
+for_s = 0.5
+[devices.b]
+type = 'mock_pad'
+for_s = 0.5
+glitch = [{ at_s = 0.1, for_s = 1.0, kind = 'unplug' }]
+";
+
+#[test]
+fn what_is_left_of_the_devices_plays_to_its_end() {
+    let request = Request::text(PADS);
+    let plan = plan(&catalogue(), &request).unwrap_or_else(|report| panic!("{}", report.render(false)));
+    let mut engine = Engine::new(plan);
+    let outcome = run(&mut engine, &RunOptions::default(), &mut |_| {}).unwrap();
+    assert_eq!(outcome.end, End::Finished);
+    assert!(outcome.time > 450_000_000, "{} ns", outcome.time);
+    assert!(engine.halts()[0].fault.to_string().starts_with("device `b` failed: its plug is out"));
+}
+
+/// Runs the hybrid task by the wall clock, with lines on the standard input and then its end.
+fn heard(lines: &str) -> (i32, String, Duration) {
+    let begin = Instant::now();
+    let mut command: Command = tool(&["run", HYBRID, "--realtime", "--listen", "--for", "3s"]);
+    let mut child = command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+    child.stdin.take().unwrap().write_all(lines.as_bytes()).unwrap();
+    let output = child.wait_with_output().unwrap();
+    let text = String::from_utf8_lossy(&output.stderr).into_owned();
+    (output.status.code().unwrap(), text, begin.elapsed())
+}
+
+#[test]
+fn a_stop_after_which_the_standard_input_ends_ends_the_run() {
+    let (code, err, took) = heard("stop\n");
+    assert!(code == 1 && err.contains("error: the operator stopped it"), "{code}: {err}");
+    assert!(took < Duration::from_secs(3), "{took:?}");
+    let (code, err, _) = heard("stop\nresume\n");
+    assert_eq!(code, 0, "{err}");
+}
+
+#[test]
+fn words_for_times_of_the_graph_give_the_same_run_twice() {
+    let args = ["run", HYBRID, "--for", "1s", "--send", "0.2s:stop", "--send", "0.5s:resume"];
+    let [first, second] = [say(&args), say(&args)];
+    assert_eq!(first.code, 0, "{}", first.err);
+    assert!(first.out.contains("stopped for 0.300 s: the operator stopped it in tick 51 at 0.200 s"), "{}", first.out);
+    let halt = |text: &str| text.lines().find(|line| line.starts_with("stopped for")).unwrap().to_owned();
+    assert_eq!(halt(&first.out), halt(&second.out));
+}
