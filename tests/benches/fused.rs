@@ -174,7 +174,7 @@ impl Fused {
         let mut twist = bumpless::smooth(&wanted.unwrap_or_default(), last, offset, half);
         let is_there = wanted.is_some() || *offset != Twist::default();
         if is_there {
-            let load = contact_limit::load(&self.shape, &self.image);
+            let load = contact_limit::load(&self.shape, &self.image, [0.8 * 2000.0, 0.8 * 240.0]);
             contact_limit::bar(&mut twist, load.centre, load.sum / 2000.0, 0.8, 0.05);
             contact_limit::bar(&mut twist, load.place, load.peak / 240.0, 0.8, 0.05);
             let (velocity, place) = (pose.0.rotation * twist.linear(), pose.0.translation.vector);

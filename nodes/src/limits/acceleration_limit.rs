@@ -8,7 +8,7 @@ use tactflow_runtime::node::{Limits, Mistakes, Node, Positive, Setup, Tick};
 use tactflow_runtime::signal::{ScalarShape, Stamp, Twist, Unit};
 use tactflow_runtime::{inputs, outputs, params, state};
 
-use super::share::share;
+use super::share::{countable, share};
 
 params! {
     /// Greatest change of the linear velocity [m/s²].
@@ -53,8 +53,10 @@ impl Node for AccelerationLimit {
     const SUMMARY: &'static str = "limits the acceleration of the sensor, and brings it to rest when nothing comes";
     const DOC: &'static str = "The motion follows what is wanted on a straight line, as fast as both accelerations \
         allow. It is the last limiter of a twist: what scales a motion behind it would make it jump again.\n\n\
-        When the motion is absent or older than `max_age_ms`, or the runtime holds all commands, it goes to zero by the same rule, is there until it \
-        rests, and absent then. A generated motion is of no age.";
+        When the motion is absent or older than `max_age_ms`, or the runtime holds all commands, it goes to zero by the \
+        same rule, is there until it rests, and absent then. A generated motion is of no age. What is left of an absent motion is of no age either \
+        and goes all the way down here. What is left of an old one is as old as that: a `joint_limit` behind it drops \
+        it too, and brings the joints to rest by its own accelerations.";
     const EXAMPLE: &'static str = r#"
 [nodes.acceleration_limit]
 type = "acceleration_limit"
@@ -82,7 +84,7 @@ angular_rad_per_s2 = 10.0
     fn step(&self, tick: &Tick, inputs: Inputs<'_>, out: &mut Outputs, state: &mut State) {
         let is_fresh = |stamp: Stamp| stamp.age(tick.now) <= self.max_age && !tick.is_halted;
         let wanted = inputs.twist.filter(|twist| is_fresh(twist.stamp()));
-        let target = wanted.map_or_else(Twist::default, |twist| *twist);
+        let target = wanted.map_or_else(Twist::default, |twist| countable(&twist));
         let dt = tick.dt.min(tick.max_gap);
         let share = approach(&mut state.reached, &target, self.linear * dt, self.angular * dt);
         if wanted.is_some() || state.reached != Twist::default() {

@@ -10,7 +10,7 @@ use tactflow_runtime::node::{Limits, Mistakes, Node, Positive, Setup, Tick};
 use tactflow_runtime::signal::{ScalarShape, Twist, Unit};
 use tactflow_runtime::{inputs, outputs, params, state};
 
-use super::share::{share, times};
+use super::share::{countable, share, times};
 
 params! {
     /// Greatest change of the linear velocity [m/s²].
@@ -89,7 +89,7 @@ angular_rad_per_s2 = 10.0
         let (linear, angular) = (0.5 * self.linear * dt, 0.5 * self.angular * dt);
         // What the runtime holds at zero starts from zero when it may go on.
         let twist = inputs.twist.filter(|_| !tick.is_halted);
-        let wanted = twist.map_or_else(Twist::default, |twist| *twist);
+        let wanted = twist.map_or_else(Twist::default, |twist| countable(&twist));
         let smooth = smooth(&wanted, &mut state.last, &mut state.offset, [linear, angular]);
         if twist.is_none() && state.offset == Twist::default() {
             return;

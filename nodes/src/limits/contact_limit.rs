@@ -12,6 +12,8 @@ use tactflow_runtime::node::{Limits, Mistake, Mistakes, Node, Positive, Ratio, S
 use tactflow_runtime::signal::{Image, ImageShape, ScalarShape, Stamp, Twist, Unit};
 use tactflow_runtime::{inputs, outputs, params, state};
 
+use super::share::countable;
+
 params! {
     /// Ceiling of the whole image's sum [unit of the image].
     force: Positive,
@@ -42,8 +44,8 @@ outputs! {
 }
 
 state! {
-    /// Stamp of the image that was summed up.
-    stamp: Stamp,
+    /// Stamp of the image that was summed up, if one was.
+    stamp: Option<Stamp>,
     /// What it says.
     load: Load,
 }
@@ -95,6 +97,8 @@ force = 15.0                        # [N]
 peak = 3.0                          # [N]
 approach_m_per_s = 0.05
 "#;
+    // The image and its age move on while a motion is held.
+    const EVERY_TICK: bool = true;
     const LIMITS: Limits =
         Limits { through: Some("twist"), holds: &["force", "peak"], breaks: &["workspace", "speed", "acceleration"] };
 
@@ -117,7 +121,7 @@ approach_m_per_s = 0.05
     }
 
     fn state(&self) -> State {
-        State { stamp: Stamp::TIMELESS, load: Load::default() }
+        State { stamp: None, load: Load::default() }
     }
 
     fn step(&self, tick: &Tick, inputs: Inputs<'_>, out: &mut Outputs, state: &mut State) {
@@ -125,10 +129,11 @@ approach_m_per_s = 0.05
         if stamp.age(tick.now) > self.max_age {
             return;
         }
-        if state.stamp != stamp {
-            (state.stamp, state.load) = (stamp, load(&self.shape, &inputs.image));
+        if inputs.image.is_new() || state.stamp != Some(stamp) {
+            (state.stamp, state.load) =
+                (Some(stamp), load(&self.shape, &inputs.image, [self.begin * self.force, self.begin * self.peak]));
         }
-        let (load, mut twist) = (&state.load, *inputs.twist);
+        let (load, mut twist) = (&state.load, countable(&inputs.twist));
         let force = bar(&mut twist, load.centre, load.sum / self.force, self.begin, self.approach);
         let peak = bar(&mut twist, load.place, load.peak / self.peak, self.begin, self.approach);
         out.twist.set(twist);
@@ -141,7 +146,7 @@ approach_m_per_s = 0.05
 /// Limits the way in at a point that bears so many `times` its ceiling, to at most `approach` [m/s] where it begins; the
 /// share of it that passes.
 pub fn bar(twist: &mut Twist, [x, y]: [f64; 2], times: f64, begin: f64, approach: f64) -> f64 {
-    if times < begin {
+    if times < begin || times <= 0.0 {
         return 1.0;
     }
     let allowed = if times < 1.0 { approach * (1.0 - times) / (1.0 - begin) } else { 0.0 };
@@ -154,28 +159,55 @@ pub fn bar(twist: &mut Twist, [x, y]: [f64; 2], times: f64, begin: f64, approach
     allowed / way_in
 }
 
-/// Sums an image up. What is no number makes the sum none.
+/// Sums an image up. What is no number makes the sum none. The places are worked out only of what is at least as much as
+/// `from`: a sum, and a peak.
 #[must_use]
-pub fn load(shape: &ImageShape, image: &Image) -> Load {
-    let mut load = Load::default();
-    let mut moments = [0.0; 2];
-    for (i, row) in image.cells().chunks(shape.cols).enumerate() {
-        let (y, mut sum) = (shape.y(i as f64), 0.0);
-        for (j, cell) in row.iter().enumerate() {
-            let value = f64::from(*cell);
-            // Not `max`, which takes what is no number for nothing.
-            let value = if value < 0.0 { 0.0 } else { value };
-            sum += value;
-            moments[0] += value * shape.x(j as f64);
-            if value > load.peak {
-                (load.peak, load.place) = (value, [shape.x(j as f64), y]);
+pub fn load(shape: &ImageShape, image: &Image, from: [f64; 2]) -> Load {
+    let (sum, peak) = weigh(image.cells());
+    let mut load = Load { sum, peak, ..Load::default() };
+    let rows = || image.cells().chunks(shape.cols).enumerate();
+    if sum >= from[0] && sum > 0.0 {
+        let mut moments = [0.0; 2];
+        for (i, row) in rows() {
+            let (mut force, mut moment) = (0.0, 0.0);
+            for (j, cell) in row.iter().enumerate() {
+                let value = pressed(*cell);
+                force += value;
+                moment += value * shape.x(j as f64);
             }
+            moments = [moments[0] + moment, moments[1] + force * shape.y(i as f64)];
         }
-        load.sum += sum;
-        moments[1] += sum * y;
+        load.centre = moments.map(|moment| moment / sum);
     }
-    if load.sum > 0.0 {
-        load.centre = moments.map(|moment| moment / load.sum);
+    if peak >= from[1] && peak > 0.0 {
+        let highest = |(i, row): (usize, &[f32])| Some((i, row.iter().position(|cell| f64::from(*cell) == peak)?));
+        let place = rows().find_map(highest).map(|(i, j)| [shape.x(j as f64), shape.y(i as f64)]);
+        load.place = place.unwrap_or_default();
     }
     load
+}
+
+/// What a tactel bears. Not `max`, which takes what is no number for nothing.
+fn pressed(cell: f32) -> f64 {
+    f64::from(if cell < 0.0 { 0.0 } else { cell })
+}
+
+/// Sum and greatest of what the tactels bear, in eight lanes and a fixed order: the same bits on every machine.
+fn weigh(cells: &[f32]) -> (f64, f64) {
+    let (mut sums, mut peaks) = ([0.0_f64; 8], [0.0_f32; 8]);
+    let mut add = |lane: usize, cell: f32| {
+        sums[lane] += pressed(cell);
+        peaks[lane] = if cell > peaks[lane] { cell } else { peaks[lane] };
+    };
+    let (chunks, rest) = cells.as_chunks::<8>();
+    for chunk in chunks {
+        for (lane, cell) in chunk.iter().enumerate() {
+            add(lane, *cell);
+        }
+    }
+    for (lane, cell) in rest.iter().enumerate() {
+        add(lane, *cell);
+    }
+    let peak = peaks.into_iter().fold(0.0, |a: f32, b| if b > a { b } else { a });
+    (sums.into_iter().sum(), f64::from(peak))
 }

@@ -8,3 +8,6 @@ pub mod joint_limit;
 pub mod share;
 pub mod twist_limit;
 pub mod workspace_limit;
+
+#[cfg(test)]
+mod tests;

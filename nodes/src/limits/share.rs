@@ -1,6 +1,17 @@
-//! How much of a twist stays within two bounds, one on its linear and one on its angular part.
+//! How much of a twist stays within two bounds, one on its linear and one on its angular part; and the largest there is.
 
 use tactflow_runtime::signal::Twist;
+
+/// Largest component of a twist that limiters reckon with: what is larger counts as this, so that no sum and no square of
+/// finite numbers overflows [m/s, rad/s].
+const LARGEST: f64 = 1e100;
+
+/// The twist with every component within the largest that limiters reckon with.
+#[must_use]
+pub fn countable(twist: &Twist) -> Twist {
+    // `clamp` passes on what is no number, which ends the run at the port that gave it.
+    Twist(twist.0.map(|v| v.clamp(-LARGEST, LARGEST)))
+}
 
 /// The greatest factor up to 1 that brings the linear part to at most `linear` and the angular part to at most `angular`.
 ///

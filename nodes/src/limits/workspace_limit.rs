@@ -9,6 +9,8 @@ use tactflow_runtime::node::{Limits, Mistake, Mistakes, Node, Positive, Setup, T
 use tactflow_runtime::signal::{ScalarShape, Twist, Unit};
 use tactflow_runtime::{inputs, outputs, params};
 
+use super::share::countable;
+
 params! {
     /// The corner of the box with the least coordinates, `[x, y, z]` in the base [m].
     min_m: [f64; 3],
@@ -57,6 +59,11 @@ impl Node for WorkspaceLimit {
         It brakes before a face, so that it can stop with `deceleration_m_per_s2`, and at the face only the way back \
         is free. The motion is slowed down as a whole and keeps its direction: along a face it goes on only if the \
         task does not push against it.\n\n\
+        It counts on what comes behind it: let `deceleration_m_per_s2` be at most the linear acceleration of the \
+        `acceleration_limit`. That keeps the direction of a change, so turning to and fro at full speed holds back the \
+        braking. A face is then passed by at most the greatest speed times the time in which the whole motion can be \
+        reversed: at most 8 mm with 0.05 m/s, 0.8 rad/s, 1 m/s² and 10 rad/s², and 2.3 mm is the worst that was found \
+        at 250 Hz.\n\n\
         It looks at the sensor's origin and at no other point: a large sensor or its holder needs a smaller box. When \
         the pose is older than `max_age_ms` there is no motion.";
     const EXAMPLE: &'static str = r#"
@@ -68,6 +75,8 @@ min_m = [-0.8, -0.4, 0.1]
 max_m = [-0.3, 0.4, 0.7]
 deceleration_m_per_s2 = 0.5
 "#;
+    // The pose and its age move on while a motion is held.
+    const EVERY_TICK: bool = true;
     const LIMITS: Limits = Limits { through: Some("twist"), holds: &["workspace"], breaks: &["acceleration"] };
 
     fn new(params: Params, setup: &mut Setup<Self>) -> Result<Self, Mistakes> {
@@ -89,7 +98,7 @@ deceleration_m_per_s2 = 0.5
         if inputs.pose.stamp().age(tick.now) > self.max_age {
             return;
         }
-        let (twist, pose) = (*inputs.twist, inputs.pose.0);
+        let (twist, pose) = (countable(&inputs.twist), inputs.pose.0);
         let (velocity, place) = (pose.rotation * twist.linear(), pose.translation.vector);
         let share = share(&velocity, &place, [self.min, self.max], self.deceleration, 2.0 * tick.max_gap);
         out.twist.set(Twist(twist.0 * share));

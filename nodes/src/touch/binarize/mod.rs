@@ -26,10 +26,10 @@ words! {
 params! {
     /// A tactel belongs to the mask if it is greater than this, compared at the image's 32 bits; with
     /// `method = "otsu"` the least that the image's own threshold may be [unit of the image].
-    threshold: f64,
+    live threshold: f64,
     /// A tactel that is in the mask stays in it while it is greater than this, which is lower than `threshold`;
     /// not given, there is only the one threshold [unit of the image].
-    release: Option<f64>,
+    live release: Option<f64>,
     /// Where the threshold comes from: "fixed" takes `threshold` as it is, "otsu" the image's own.
     method: Method = Method::Fixed,
 }
@@ -45,7 +45,7 @@ outputs! {
 }
 
 state! {
-    /// The words of the last mask; of use only to `release`.
+    /// The words of the last mask; of use only to `release`, which a mode may add.
     last: Vec<u64>,
 }
 
@@ -111,7 +111,10 @@ release = 0.010                     # and stays above this [N]
     fn step(&self, _: &Tick, inputs: Inputs<'_>, out: &mut Outputs, state: &mut State) {
         let (cells, mask) = (inputs.image.cells(), out.mask.write());
         match self.rule {
-            Rule::Above(threshold) => binarize(cells, threshold, mask),
+            Rule::Above(threshold) => {
+                binarize(cells, threshold, mask);
+                state.last.copy_from_slice(mask.words());
+            }
             Rule::Hysteresis { enter, stay } => {
                 for_each_word(cells, mask, |at, tactels| {
                     let word = pack(tactels, enter) | pack(tactels, stay) & state.last[at];

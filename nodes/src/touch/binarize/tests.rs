@@ -1,7 +1,7 @@
 //! `binarize` tactel by tactel, against naive references.
 
 use proptest::prelude::*;
-use tactflow_runtime::harness::NodeRig;
+use tactflow_runtime::harness::{GraphRig, NodeRig, Source};
 use tactflow_runtime::node::At;
 use tactflow_runtime::signal::{Image, ImageShape, Mask, Unit};
 
@@ -202,5 +202,41 @@ proptest! {
         let splits = cells.iter().filter_map(|split| between(&cells, |value| value > f64::from(*split)));
         let finest = splits.fold(0.0, f64::max);
         prop_assert!(found >= 0.97 * finest, "{found} against {finest}");
+    }
+}
+
+#[test]
+fn a_mode_that_adds_a_release_goes_on_from_the_mask_before_it() {
+    let graph = r#"
+        graph = { clock = "pad", start = "one" }
+        roles.pad = "tactile_pad"
+        nodes.binarize = { type = "binarize", in.image = "pad.image", threshold = 1.0 }
+        [modes.one]
+        go = { to = "two", after_ms = 20 }
+        [modes.two]
+        set.binarize.release = 0.5
+        go = { to = "one", after_ms = 20 }
+    "#;
+    let shape = ImageShape { rows: 1, cols: 3, pitch: [0.005; 2], unit: Unit::NEWTON };
+    let pad = Source { role: "pad", kind: "tactile_pad", period: 0.01, outputs: vec![shape.into()], commands: vec![] };
+    let mut rig = GraphRig::new(crate::catalogue(), graph, vec![pad]).unwrap_or_else(|r| panic!("{}", r.render(false)));
+    // The first tactel is left between both thresholds, the second enters late, the third enters once and goes.
+    let frames = [
+        ([2.0, 0.7, 2.0], "one", 0b101),
+        ([0.7, 0.7, 0.1], "one", 0b000),
+        ([2.0, 0.7, 0.1], "one", 0b001),
+        ([0.7, 0.7, 0.7], "two", 0b001),
+        ([0.7, 2.0, 0.7], "two", 0b011),
+        ([0.7, 0.7, 0.7], "one", 0b000),
+        ([0.7, 0.7, 2.0], "one", 0b100),
+        ([0.7, 0.7, 0.7], "two", 0b100),
+    ];
+    for (i, (cells, mode, words)) in frames.into_iter().enumerate() {
+        let ms = 10.0 * i as f64;
+        rig.feed("pad", 0, ms, Image::from_cells(3, &cells));
+        let before = rig.engine.mode().map(str::to_owned);
+        rig.tick(ms).unwrap();
+        assert_eq!(rig.get::<Mask>("binarize.mask").unwrap().words(), [words], "{i}, in {before:?}");
+        assert_eq!(before.as_deref(), Some(mode), "{i}");
     }
 }

@@ -34,9 +34,9 @@ params! {
     /// How many neighbours a tactel has: 4 (edges) or 8 (corners too).
     neighbours: Neighbours = Neighbours::Eight,
     /// Least area of a contact [tactels].
-    min_area: Count = Count(1),
+    live min_area: Count = Count(1),
     /// Least sum over a contact [unit of the image].
-    min_force: f64 = 0.0,
+    live min_force: f64 = 0.0,
     /// Which of those regions is the contact: the "largest", or the "nearest" to where the contact was last.
     choose: Choose = Choose::Largest,
 }

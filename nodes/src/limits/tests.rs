@@ -1,0 +1,237 @@
+//! Limiters of a twist where it matters most: motions of any size, images that change while a motion is held, motions
+//! that grow old, and a sensor that runs at the side of its box.
+
+use nalgebra::IsometryMatrix3;
+use tactflow_runtime::harness::NodeRig;
+use tactflow_runtime::node::{Node, of};
+use tactflow_runtime::signal::{
+    Freshness, Image, ImageShape, Pose, PoseShape, Scalar, Shape, Stamp, Twist, TwistShape, Unit,
+};
+
+use super::acceleration_limit::AccelerationLimit;
+use super::bumpless::Bumpless;
+use super::contact_limit::ContactLimit;
+use super::twist_limit::TwistLimit;
+use super::workspace_limit::WorkspaceLimit;
+
+const SPEEDS: &str = "linear_m_per_s = 0.05\nangular_rad_per_s = 0.8";
+const ACCELERATIONS: &str = "linear_m_per_s2 = 1.0\nangular_rad_per_s2 = 10.0";
+const BOX: &str = "min_m = [-0.1, -0.1, -0.1]\nmax_m = [0.1, 0.1, 0.1]\ndeceleration_m_per_s2 = 1.0";
+const CEILINGS: &str = "force = 10.0\npeak = 4.0\napproach_m_per_s = 0.2";
+
+fn rig<N: Node>(params: &str) -> NodeRig {
+    let pad = ImageShape { rows: 2, cols: 2, pitch: [0.01; 2], unit: Unit::NEWTON };
+    let all: [(&str, Shape); 3] = [("twist", TwistShape.into()), ("image", pad.into()), ("pose", PoseShape.into())];
+    let inputs = of::<N>().spec().inputs;
+    let wires = all.into_iter().filter(|(name, _)| inputs.iter().any(|input| input.name == *name));
+    NodeRig::new::<N>(params, &wires.collect::<Vec<_>>()).unwrap_or_else(|mistakes| panic!("{}: {mistakes:?}", N::NAME))
+}
+
+fn at(x: f64, y: f64, z: f64) -> Pose {
+    Pose(IsometryMatrix3::translation(x, y, z))
+}
+
+fn twist(parts: [f64; 6]) -> Twist {
+    Twist(parts.into())
+}
+
+fn get(rig: &NodeRig) -> Option<Twist> {
+    rig.get::<Twist>("twist").copied()
+}
+
+#[test]
+fn a_finite_motion_of_any_size_gives_a_finite_one() {
+    let mut limiters = [
+        (rig::<Bumpless>(ACCELERATIONS), "bumpless"),
+        (rig::<ContactLimit>(CEILINGS), "force"),
+        (rig::<WorkspaceLimit>(BOX), "workspace"),
+        (rig::<TwistLimit>(SPEEDS), "speed"),
+        (rig::<AccelerationLimit>(ACCELERATIONS), "acceleration"),
+    ];
+    for (rig, limit) in &mut limiters {
+        for size in [1e-320, 1e-160, 1e100, 1e155, 1e200, 1e308, f64::MAX] {
+            for sign in [1.0, -1.0, 1.0] {
+                rig.set("twist", twist([size, -size, size, size, size, -size].map(|v| sign * v)));
+                match *limit {
+                    "force" => rig.set("image", Image::from_cells(2, &[9.0, 0.0, 0.0, 9.0])),
+                    "workspace" => rig.set("pose", at(0.1, 0.0, 0.0)),
+                    _ => {}
+                }
+                rig.step();
+                let out = get(rig).unwrap();
+                assert!(out.0.iter().all(|v| v.is_finite()), "`{limit}` of {size:e}: {out:?}");
+                let share = *rig.get::<Scalar>(limit).unwrap();
+                assert!((0.0..=1.0).contains(&share), "`{limit}` of {size:e} says {share}");
+            }
+        }
+    }
+}
+
+#[test]
+fn a_face_bars_the_way_to_a_motion_of_any_size() {
+    let mut rig = rig::<WorkspaceLimit>(BOX);
+    for size in [1e-3, 1.0, 1e150, 1e200, f64::MAX] {
+        for along in [0.0, 1.0] {
+            rig.set("pose", at(0.1, 0.0, 0.0));
+            rig.set("twist", twist([size, along * size, 0.0, 0.0, 0.0, 0.0]));
+            rig.step();
+            assert_eq!(get(&rig), Some(Twist::default()), "{size:e}");
+            assert_eq!(rig.get::<Scalar>("workspace"), Some(&0.0));
+        }
+    }
+}
+
+#[test]
+fn what_presses_counts_as_soon_as_it_is_seen_though_the_motion_is_held() {
+    let mut rig = rig::<ContactLimit>(CEILINGS);
+    let into = twist([0.0, 0.0, 0.1, 0.0, 0.0, 0.0]);
+    rig.set("image", Image::from_cells(2, &[0.0; 4]));
+    rig.set("twist", into);
+    rig.step();
+    assert_eq!(get(&rig), Some(into), "nothing presses");
+    rig.set("image", Image::from_cells(2, &[5.0; 4]));
+    rig.step();
+    assert_eq!(get(&rig), Some(Twist::default()), "the motion is the same, and the pad is at its ceiling");
+}
+
+#[test]
+fn an_image_of_no_age_counts_too() {
+    let mut rig = rig::<ContactLimit>(CEILINGS);
+    for (cell, passes) in [(5.0, 0.0), (0.0, 0.1), (5.0, 0.0)] {
+        rig.edit("image", Stamp::TIMELESS, |image: &mut Image| *image = Image::from_cells(2, &[cell; 4]));
+        rig.set("twist", twist([0.0, 0.0, 0.1, 0.0, 0.0, 0.0]));
+        rig.step();
+        assert_eq!(get(&rig).unwrap().0[2], passes, "{cell} on each tactel");
+    }
+}
+
+#[test]
+fn nothing_that_presses_limits_nothing() {
+    // At a share of 0 the way in is slowed down from the first touch on, and not before.
+    let mut rig = rig::<ContactLimit>(&format!("{CEILINGS}\nbegin = 0"));
+    let into = twist([0.0, 0.0, 0.5, 0.0, 0.0, 0.0]);
+    for (cell, passes) in [(0.0, 0.5), (-3.0, 0.5), (0.025, 0.2 * 0.99), (2.5, 0.0)] {
+        rig.set("image", Image::from_cells(2, &[cell; 4]));
+        rig.set("twist", into);
+        rig.step();
+        assert!((get(&rig).unwrap().0[2] - passes).abs() < 1e-7, "{cell} on each tactel: {:?}", get(&rig));
+    }
+}
+
+#[test]
+fn the_way_in_is_slowed_down_in_a_straight_line_from_begin_to_the_ceiling() {
+    let mut rig = rig::<ContactLimit>(CEILINGS);
+    // Times the ceiling of the sum, and what is left of a way in of 0.5 m/s; 0.2 m/s are allowed at 0.8.
+    let cases = [(0.79, 0.5), (0.8, 0.2), (0.9, 0.1), (0.95, 0.05), (1.0, 0.0), (3.0, 0.0)];
+    for (times, passes) in cases {
+        // Spread over the pad, so that no tactel is near its own ceiling of 4 until the last case.
+        rig.set("image", Image::from_cells(2, &[(10.0 * times / 4.0) as f32; 4]));
+        rig.set("twist", twist([0.3, 0.0, 0.5, 0.0, 0.0, 0.2]));
+        rig.step();
+        let out = get(&rig).unwrap();
+        assert!((out.0[2] - passes).abs() < 1e-6, "{times} of the ceiling: {out:?}");
+        assert!((rig.get::<Scalar>("force").unwrap() - passes / 0.5).abs() < 1e-6);
+        assert_eq!((out.0[0], out.0[5]), (0.3, 0.2), "the rest goes on");
+    }
+}
+
+#[test]
+fn an_old_image_or_pose_is_no_motion() {
+    let along = twist([0.01, 0.0, 0.0, 0.0, 0.0, 0.0]);
+    let mut blind = rig::<ContactLimit>(&format!("{CEILINGS}\nmax_age_ms = 3"));
+    let mut lost = rig::<WorkspaceLimit>(&format!("{BOX}\nmax_age_ms = 3"));
+    blind.set("image", Image::from_cells(2, &[0.0; 4]));
+    lost.set("pose", at(0.0, 0.0, 0.0));
+    for ms in 0..8 {
+        let expected = (ms <= 3).then_some(along);
+        for rig in [&mut blind, &mut lost] {
+            // The motion comes once and is held: it must not need a new one to be stopped.
+            if ms == 0 {
+                rig.set("twist", along);
+            }
+            rig.step();
+            assert_eq!(get(rig), expected, "{ms} ms old");
+        }
+    }
+}
+
+#[test]
+fn a_motion_that_is_gone_or_old_fades_in_a_straight_line_and_is_absent_then() {
+    let wanted = twist([0.02, 0.0, 0.0, 0.0, 0.0, 0.0]);
+    for is_lost in [true, false] {
+        let mut rig = rig::<AccelerationLimit>(&format!("{ACCELERATIONS}\nmax_age_ms = 3"));
+        for _ in 0..30 {
+            rig.set("twist", wanted);
+            rig.step();
+        }
+        assert_eq!(get(&rig), Some(wanted));
+        let begin = if is_lost { 0 } else { 3 };
+        if is_lost {
+            rig.lose("twist");
+        }
+        for ms in 0..begin {
+            rig.step();
+            assert_eq!(get(&rig), Some(wanted), "{ms} ms old");
+        }
+        for ms in 1..20 {
+            rig.step();
+            let left = get(&rig).unwrap().0[0];
+            assert!((left - (0.02 - 1e-3 * f64::from(ms))).abs() < 1e-12, "{left} after {ms} ms");
+            // What comes of an old motion is no younger than it.
+            assert_eq!(rig.mark("twist").stamp().is_timeless(), is_lost);
+        }
+        (0..2).for_each(|_| rig.step());
+        assert_eq!(rig.freshness("twist"), Freshness::Absent);
+    }
+}
+
+#[test]
+fn no_time_is_no_change_and_a_long_gap_counts_as_the_longest() {
+    let mut rig = rig::<AccelerationLimit>(ACCELERATIONS);
+    let (far, cases) = (twist([5.0, 0.0, 0.0, 0.0, 0.0, 0.0]), [(0.0, 0.0), (0.0, 0.0), (40.0, 0.0), (900.0, 0.04)]);
+    for (ms, reached) in cases.into_iter().chain([(0.0, 0.14)]) {
+        rig.set("twist", far);
+        rig.step_ms(ms);
+        assert!((get(&rig).unwrap().0[0] - reached).abs() < 1e-12, "{:?}, not {reached}", get(&rig));
+    }
+}
+
+/// How far past a face of its box a sensor gets that goes straight at it and turns to and fro as fast as it may: the
+/// acceleration limit keeps the direction of a change, so that the turning holds back the braking.
+fn past(gap: f64, turning: f64, flip: usize, margin: f64) -> f64 {
+    let accelerations = format!("linear_m_per_s2 = 1.0\nangular_rad_per_s2 = {turning}");
+    let (mut near, mut slow) = (rig::<WorkspaceLimit>(BOX), rig::<TwistLimit>(SPEEDS));
+    let mut smooth = rig::<AccelerationLimit>(&accelerations);
+    let (mut x, mut told, mut worst) = (0.05, Twist::default(), f64::NEG_INFINITY);
+    for tick in 0..1000 {
+        let sign = if (tick / flip).is_multiple_of(2) { 1.0 } else { -1.0 };
+        // Toward the face until it is near; then along it, so that nothing scales the turning down.
+        let ahead = if 0.1 - x > margin { 0.05 } else { 0.0 };
+        near.tick.max_gap = gap;
+        near.set("pose", at(x, 0.0, 0.0));
+        near.set("twist", twist([ahead, 0.0, 0.0, sign * 0.8, 0.0, 0.0]));
+        near.step_ms(4.0);
+        slow.set("twist", get(&near).unwrap());
+        slow.step_ms(4.0);
+        smooth.set("twist", get(&slow).unwrap());
+        smooth.step_ms(4.0);
+        // The sensor does as it is told a tick later.
+        x += told.linear().x * 0.004;
+        told = get(&smooth).unwrap();
+        worst = f64::max(worst, x - 0.1);
+    }
+    worst
+}
+
+#[test]
+fn turning_to_and_fro_holds_back_the_braking_by_no_more_than_is_said() {
+    // Turns that are reversed in 0.16 s and in 0.8 s: speed times that time, and the worst that was found.
+    for (gap, turning, found) in [(0.1, 10.0, 1e-6), (0.02, 10.0, 0.0023), (0.02, 2.0, 0.018)] {
+        let bound = 0.05 * (2.0 * 0.8 / turning) + 0.05 * 0.008;
+        let flips = [1, 3, 10, 20, 30, 40, 80];
+        let tries = flips.iter().flat_map(|flip| (0..15).map(move |mm| (*flip, f64::from(mm) * 1e-3)));
+        let worst = tries.map(|(flip, margin)| past(gap, turning, flip, margin)).fold(f64::NEG_INFINITY, f64::max);
+        assert!(worst <= bound, "{worst} m past the face, with {turning} rad/s²");
+        assert!(worst < found, "{worst} m past the face, with {turning} rad/s² and a gap of {gap} s");
+    }
+}
