@@ -295,6 +295,40 @@ fn an_old_wire_can_stop_or_end_the_run() {
 }
 
 #[test]
+fn an_old_feature_takes_the_others_with_it_only_on_their_common_wire() {
+    let present = |own: &str, common: &str| {
+        let text = format!(
+            "[graph]\nclock = 'a'\n[policy]\nstale = 'count'\n[roles]\na = 'length'\nb = 'length'\n\
+             [nodes.x]\ntype = 'count'\nin.value = 'a.value'\n[nodes.y]\ntype = 'count'\nin.value = 'b.value'\n\
+             [nodes.error]\ntype = 'feature_error'\nin.x = 'x.steps'\nin.y = {own}\nsetpoint = {{ x = 0.0, y = 0.0 }}\n\
+             [nodes.pid]\ntype = 'pid'\nin.error = {common}\ngains.x.kp = 1.0\ngains.y.kp = 1.0\n"
+        );
+        let mut rig = GraphRig::new(catalogue(), &text, vec![length_by_hand("a"), length_by_hand("b")])
+            .unwrap_or_else(|report| panic!("{}", report.render(false)));
+        for tick in 0..6 {
+            let ms = f64::from(tick) * 10.0;
+            rig.feed("a", 0, ms, 1.0);
+            if tick == 0 {
+                rig.feed("b", 0, ms, 1.0);
+            }
+            rig.tick(ms).unwrap();
+        }
+        let control = rig.get::<Features>("pid.control").map(Features::components);
+        control.map(|both| [both[0].get().is_some(), both[1].get().is_some()])
+    };
+    let aged = |port: &str| format!("{{ from = '{port}', max_age_ms = 25 }}");
+    let cases = [
+        ("'y.steps'".to_owned(), "'error.error'".to_owned(), Some([true, true])),
+        (aged("y.steps"), "'error.error'".to_owned(), Some([true, false])),
+        ("'y.steps'".to_owned(), aged("error.error"), None),
+        (aged("y.steps"), aged("error.error"), Some([true, false])),
+    ];
+    for (own, common, expected) in cases {
+        assert_eq!(present(&own, &common), expected, "{own}, {common}");
+    }
+}
+
+#[test]
 fn an_old_command_ramps_and_does_what_its_wire_says() {
     // The pad repeats its frame from 0.8 s to 1.0 s, which is only counted.
     let commanded = |stale: &str| {
