@@ -415,6 +415,8 @@ fn remembered(rig: &GraphRig) -> Vec<u64> {
 #[derive(Debug, Clone, Copy)]
 enum Comes {
     New(f64),
+    /// A new one that was taken so long ago [ms].
+    Delayed(f64, f64),
     /// The last sample again, under its number.
     Again,
     /// One with an older stamp than the last.
@@ -428,6 +430,7 @@ proptest! {
         pattern in prop::collection::vec(
             prop_oneof![
                 3 => (-1.0..1.0f64).prop_map(Comes::New),
+                2 => (-1.0..1.0f64, 0.1..9.0f64).prop_map(|(value, late)| Comes::Delayed(value, late)),
                 2 => Just(Comes::Again),
                 1 => Just(Comes::Older),
                 2 => Just(Comes::Nothing),
@@ -441,12 +444,14 @@ proptest! {
         for (i, comes) in pattern.into_iter().enumerate() {
             let ms = 10.0 * i as f64;
             match (comes, last) {
-                (Comes::New(value), _) => {
+                (Comes::New(value) | Comes::Delayed(value, _), _) => {
+                    let stamp = if let Comes::Delayed(_, late) = comes { ms - late } else { ms };
                     sequence += 1;
-                    last = Some((ms, value));
-                    messy.feed_as("a", 0, ms, ms, sequence, value);
-                    clean.feed_as("a", 0, ms, ms, sequence, value);
-                    clean.tick(ms).unwrap();
+                    last = Some((stamp, value));
+                    messy.feed_as("a", 0, ms, stamp, sequence, value);
+                    // Here it comes when it was taken.
+                    clean.feed_as("a", 0, stamp, stamp, sequence, value);
+                    clean.tick(stamp).unwrap();
                 }
                 (Comes::Again, Some((stamp, value))) => messy.feed_as("a", 0, ms, stamp, sequence, value),
                 (Comes::Older, Some((stamp, _))) => messy.feed_as("a", 0, ms, stamp - 1.0, sequence + 1000, 9.0),
