@@ -110,6 +110,15 @@ fn a_stop_after_which_the_standard_input_ends_ends_the_run() {
 }
 
 #[test]
+fn a_stop_that_nobody_can_end_says_so_and_what_would() {
+    let stop = say(&["run", HYBRID, "--send", "0.2s:stop"]);
+    let expected = "error: the operator stopped it in tick 51 at 0.200 s; every command went to zero, and nobody was \
+                    left to send `resume`: `--send 2s:resume` does, or a line with `--listen`\n";
+    assert_eq!(stop.code, 1);
+    assert!(stop.err.ends_with(expected), "{}", stop.err);
+}
+
+#[test]
 fn words_for_times_of_the_graph_give_the_same_run_twice() {
     let args = ["run", HYBRID, "--for", "1s", "--send", "0.2s:stop", "--send", "0.5s:resume"];
     let [first, second] = [say(&args), say(&args)];

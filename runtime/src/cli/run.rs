@@ -9,6 +9,7 @@ use super::progress::Progress;
 use super::summary::Summary;
 use super::{FAULTED, NOT_LOADED, OnArgs, Shell};
 use crate::engine::{self, End, Engine, Outcome, RunOptions};
+use crate::fault::Fault;
 use crate::graph::{Plan, Request, plan};
 use crate::record::{Format, Recorder};
 
@@ -127,7 +128,7 @@ impl Job {
         shell.say(&format!("\n{}", summary.render(&engine, &outcome)));
         shell.say(&ending(&outcome));
         let code = if let End::Fault(fault) = &outcome.end {
-            shell.error(format_args!("{fault}; every command went to zero"));
+            shell.error(format_args!("{fault}; every command went to zero{}", hopeless(&engine, fault)));
             FAULTED
         } else {
             0
@@ -179,6 +180,16 @@ fn quietly<T>(work: impl FnOnce() -> T) -> T {
     std::panic::set_hook(hook);
     // Whatever else panics is a mistake of ours, and is told with everything that helps to find it.
     result.unwrap_or_else(|panic| std::panic::resume_unwind(panic))
+}
+
+/// What else there is to say of a fault that is a stop which nobody could end.
+fn hopeless(engine: &Engine, fault: &Fault) -> &'static str {
+    let is_the_stop = engine.halts().last().is_some_and(|halt| halt.fault == *fault);
+    if engine.is_stopped() && is_the_stop {
+        ", and nobody was left to send `resume`: `--send 2s:resume` does, or a line with `--listen`"
+    } else {
+        ""
+    }
 }
 
 fn ending(outcome: &Outcome) -> String {
