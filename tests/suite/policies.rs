@@ -44,6 +44,10 @@ const CASES: [Case; 6] = [
 ];
 
 fn engine(case: Case, policy: &str) -> Engine {
+    engine_with(case, policy, &[])
+}
+
+fn engine_with(case: Case, policy: &str, set: &[&str]) -> Engine {
     let mut request = Request::file(workspace().join("graphs/hybrid.toml"))
         .set("devices.pad.press=[{ from_s = 0.3, force = 3.0, at = [0.008, -0.004] }]")
         .set("devices.pad.for_s=9.0")
@@ -51,6 +55,7 @@ fn engine(case: Case, policy: &str) -> Engine {
     if let Some(glitch) = case.glitch {
         request = request.set(format!("devices.pad.glitch=[{{ at_s = 0.8, for_s = 0.2, kind = '{glitch}' }}]"));
     }
+    let request = set.iter().fold(request, |request, set| request.set(*set));
     let catalogue = match case.sabotage {
         Some((target, how)) => sabotaged(&Sabotage { target: target.into(), how, from: 200, to: 250 }),
         None => catalogue(),
@@ -229,6 +234,51 @@ fn a_wire_may_grow_only_so_old() {
 }
 
 #[test]
+fn a_wire_through_parts_is_as_old_as_the_strictest_on_its_way_allows() {
+    let folder = tempfile::tempdir().unwrap();
+    let wire = |from: &str, age: &str| match age {
+        "" => format!("in.value = \"{from}\""),
+        age => format!("in.value = {{ from = \"{from}\", max_age_ms = {age} }}"),
+    };
+    // The ages on the node's own wire, on that into its part, and on that into the part around; and the first tick, of
+    // one every 10 ms, in which the node does without a sample of 0 ms.
+    let cases = [
+        ("", "", "", f64::INFINITY),
+        ("15", "", "", 20.0),
+        ("", "25", "", 30.0),
+        ("", "", "35", 40.0),
+        ("45", "25", "35", 30.0),
+        ("35", "45", "15", 20.0),
+    ];
+    for (own, inner, outer, expected) in cases {
+        let own = wire("inputs.value", own);
+        let part = |body: &str| format!("[inputs]\nvalue = \"a length\"\n{body}\n");
+        let write = |name: &str, text: String| std::fs::write(folder.path().join(name), text).unwrap();
+        write("inner.toml", part(&format!("[nodes.count]\ntype = \"count\"\n{own}")));
+        let inner = wire("inputs.value", inner);
+        write("outer.toml", part(&format!("[parts.inner]\nfile = \"inner.toml\"\n{inner}")));
+        let file = folder.path().join("outer.toml");
+        let text = format!(
+            "[graph]\nclock = \"a\"\n[roles]\na = \"length\"\n[policy]\nstale = \"count\"\n\
+             [parts.outer]\nfile = {:?}\n{}\n",
+            file.to_str().unwrap(),
+            wire("a.value", outer),
+        );
+        let mut rig = GraphRig::new(catalogue(), &text, vec![length_by_hand("a")])
+            .unwrap_or_else(|report| panic!("{}", report.render(false)));
+        rig.feed("a", 0, 0.0, 1.0);
+        let mut found = f64::INFINITY;
+        for ms in [0.0, 10.0, 20.0, 30.0, 40.0, 50.0] {
+            rig.tick(ms).unwrap();
+            if rig.freshness("outer.inner.count.steps") == Freshness::Lost {
+                found = found.min(ms);
+            }
+        }
+        assert_eq!(found, expected, "{own}; {inner}; {outer}");
+    }
+}
+
+#[test]
 fn an_old_wire_can_stop_or_end_the_run() {
     let mut rig = wire("{ from = \"a.value\", max_age_ms = 15, stale = \"fault\" }");
     rig.feed("a", 0, 0.0, 1.0);
@@ -242,6 +292,59 @@ fn an_old_wire_can_stop_or_end_the_run() {
     rig.tick(0.0).unwrap();
     rig.tick(20.0).unwrap();
     assert!(rig.engine.is_stopped());
+}
+
+#[test]
+fn an_old_feature_takes_the_others_with_it_only_on_their_common_wire() {
+    let present = |own: &str, common: &str| {
+        let text = format!(
+            "[graph]\nclock = 'a'\n[policy]\nstale = 'count'\n[roles]\na = 'length'\nb = 'length'\n\
+             [nodes.x]\ntype = 'count'\nin.value = 'a.value'\n[nodes.y]\ntype = 'count'\nin.value = 'b.value'\n\
+             [nodes.error]\ntype = 'feature_error'\nin.x = 'x.steps'\nin.y = {own}\nsetpoint = {{ x = 0.0, y = 0.0 }}\n\
+             [nodes.pid]\ntype = 'pid'\nin.error = {common}\ngains.x.kp = 1.0\ngains.y.kp = 1.0\n"
+        );
+        let mut rig = GraphRig::new(catalogue(), &text, vec![length_by_hand("a"), length_by_hand("b")])
+            .unwrap_or_else(|report| panic!("{}", report.render(false)));
+        for tick in 0..6 {
+            let ms = f64::from(tick) * 10.0;
+            rig.feed("a", 0, ms, 1.0);
+            if tick == 0 {
+                rig.feed("b", 0, ms, 1.0);
+            }
+            rig.tick(ms).unwrap();
+        }
+        let control = rig.get::<Features>("pid.control").map(Features::components);
+        control.map(|both| [both[0].get().is_some(), both[1].get().is_some()])
+    };
+    let aged = |port: &str| format!("{{ from = '{port}', max_age_ms = 25 }}");
+    let cases = [
+        ("'y.steps'".to_owned(), "'error.error'".to_owned(), Some([true, true])),
+        (aged("y.steps"), "'error.error'".to_owned(), Some([true, false])),
+        ("'y.steps'".to_owned(), aged("error.error"), None),
+        (aged("y.steps"), aged("error.error"), Some([true, false])),
+    ];
+    for (own, common, expected) in cases {
+        assert_eq!(present(&own, &common), expected, "{own}, {common}");
+    }
+}
+
+#[test]
+fn an_old_command_ramps_and_does_what_its_wire_says() {
+    // The pad repeats its frame from 0.8 s to 1.0 s, which is only counted.
+    let commanded = |stale: &str| {
+        let wire = format!("{{ from = 'move.velocity', max_age_ms = 6, stale = '{stale}' }}");
+        engine_with(CASES[0], "count", &[&format!("commands.arm.velocity={wire}")])
+    };
+    for (stale, is_stopped) in [("hold", false), ("stop", true)] {
+        let mut engine = commanded(stale);
+        assert_eq!(moves(&mut engine, 0.79), Ok(true), "{stale}");
+        assert_eq!(moves(&mut engine, 0.99), Ok(false), "{stale}");
+        assert_eq!(moves(&mut engine, 1.6), Ok(!is_stopped), "{stale}");
+        assert_eq!((engine.is_stopped(), engine.halts().len()), (is_stopped, usize::from(is_stopped)), "{stale}");
+    }
+    let fault = moves(&mut commanded("fault"), 2.0).unwrap_err();
+    let says = "`move.joints.velocity` is 8.0 ms old for `arm.velocity`, and may be 6.0 ms old in tick 202 at 0.804 s";
+    assert!(fault.to_string().starts_with(says), "{fault}");
 }
 
 #[test]

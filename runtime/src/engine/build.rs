@@ -13,7 +13,7 @@ use super::trouble::WatchedWire;
 use super::{Deck, Edge, Engine, Logged, Timing};
 use crate::device::{Commands, Driver, Samples};
 use crate::graph::{
-    Age, Plan, PlannedDevice, PlannedNode, PlannedPort, PlannedWire, Policy, Producer, Source, Sources,
+    Age, Plan, PlannedCommand, PlannedDevice, PlannedNode, PlannedPort, PlannedWire, Policy, Producer, Source, Sources,
 };
 use crate::node::{Bus, PortId, Tick};
 use crate::signal::{Mark, Stamp};
@@ -48,10 +48,11 @@ impl Engine {
         let roles = plan.roles.iter().map(|role| (role.name.clone(), place(role.device))).collect();
         let names = plan.nodes.iter().map(|node| (node.name.clone(), plan.sources.locate(node.span.start))).collect();
         let limits = limits(&plan.nodes, &ports);
-        let slot = |command: crate::graph::PlannedCommand| CommandSlot::new(ids[&command.source], command);
+        let mut watched: Vec<WatchedWire> =
+            plan.commands.iter().filter_map(|command| watched_command(command, ids[&command.source])).collect();
+        let slot = |command: PlannedCommand| CommandSlot::new(ids[&command.source], command);
         let slots = plan.commands.into_iter().map(slot).collect();
         let decks = plan.devices.into_iter().map(|device| deck(device, &plan.sources)).collect();
-        let mut watched = Vec::new();
         let stations = plan.nodes.into_iter().map(|node| station(node, &ids, &mut bus, &mut watched));
         let stations: Vec<Station> = stations.collect();
         let (max_gap, reset_after) = (plan.max_gap, plan.reset_after);
@@ -117,6 +118,15 @@ fn deck(device: PlannedDevice, sources: &Sources) -> Deck {
     }
 }
 
+/// A command whose age does more than that it ramps to zero.
+fn watched_command(command: &PlannedCommand, id: PortId) -> Option<WatchedWire> {
+    let (Age { max_age, stale }, [role, name]) = (command.age, command.name.clone());
+    // Its slot looks at the mark itself.
+    let aged = Aged { from: id.mark, to: id.mark, max_age };
+    let watched = WatchedWire { aged, stale, node: role, port: Some(name), span: command.span.clone() };
+    (stale > Policy::Hold).then_some(watched)
+}
+
 /// A node in its place. A wire that may grow only so old has a mark of its own, and shares the value.
 fn station(node: PlannedNode, ids: &Ids, bus: &mut Bus, watched: &mut Vec<WatchedWire>) -> Station {
     let mut aged = Vec::new();
@@ -128,7 +138,7 @@ fn station(node: PlannedNode, ids: &Ids, bus: &mut Bus, watched: &mut Vec<Watche
         aged.push(Aged { from: id.mark, to, max_age });
         if stale > Policy::Hold {
             let (aged, span) = (Aged { from: id.mark, to, max_age }, wire.span.clone());
-            watched.push(WatchedWire { aged, stale, node: node.name.clone(), span });
+            watched.push(WatchedWire { aged, stale, node: node.name.clone(), port: None, span });
         }
         PortId { mark: to, ..id }
     };

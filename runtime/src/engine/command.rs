@@ -24,8 +24,8 @@ pub(super) struct CommandSlot {
 
 impl CommandSlot {
     pub(super) fn new(source: PortId, planned: PlannedCommand) -> Self {
-        let PlannedCommand { device, command, max_age, accelerations, .. } = planned;
-        Self { device, source, command, max_age, accelerations: accelerations.into(), follows: false }
+        let PlannedCommand { device, command, age, accelerations, .. } = planned;
+        Self { device, source, command, max_age: age.max_age, accelerations: accelerations.into(), follows: false }
     }
 
     /// Takes over what the graph commands; goes on toward zero if it commands nothing, or nothing that is fresh, or if all

@@ -124,11 +124,13 @@ mod tests {
     fn a_hold_ends_with_its_trouble_and_a_stop_with_the_operators_word() {
         // Policy of the trouble in a tick, whether the operator says to go on, and whether commands are halted after.
         let (hold, stop) = (Some(Policy::Hold), Some(Policy::Stop));
-        let cases: [&[(Option<Policy>, bool, bool)]; 5] = [
+        let cases: [&[(Option<Policy>, bool, bool)]; 6] = [
             &[(hold, false, true), (hold, false, true), (None, false, false)],
             &[(stop, false, true), (None, false, true), (None, true, false)],
             &[(hold, false, true), (stop, false, true), (None, false, true), (None, true, false)],
             &[(stop, false, true), (stop, true, true), (None, false, false)],
+            // What stops anew after the word is a new stop.
+            &[(stop, false, true), (stop, true, true), (stop, false, true), (None, false, true), (None, true, false)],
             &[(stop, false, true), (hold, false, true), (None, false, true), (None, true, false), (None, false, false)],
         ];
         for case in cases {

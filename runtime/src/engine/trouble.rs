@@ -12,7 +12,9 @@ use crate::graph::Policy;
 pub(super) struct WatchedWire {
     pub(super) aged: Aged,
     pub(super) stale: Policy,
+    /// The node it comes to; or the role, with the command.
     pub(super) node: String,
+    pub(super) port: Option<String>,
     /// Where it is written.
     pub(super) span: Range<usize>,
 }
@@ -50,11 +52,11 @@ impl Engine {
                 self.of_port(inlet, Cause::Stale { age, max_age })
             }
             Trouble::StaleWire(wire) => {
-                let WatchedWire { aged, node, span, .. } = &self.watched[wire];
+                let WatchedWire { aged, node, port, span, .. } = &self.watched[wire];
                 let age = self.core.bus.marks[aged.from as usize].stamp().age(self.core.tick.now);
                 let from = self.ports.iter().find(|(_, id)| id.mark == aged.from).map_or("", |(port, _)| &port.name);
                 let wire = StaleWire { from: from.to_owned(), age, max_age: aged.max_age };
-                self.fault(node, None, Cause::StaleWire(wire.into()), self.sources.locate(span.start))
+                self.fault(node, port.clone(), Cause::StaleWire(wire.into()), self.sources.locate(span.start))
             }
             // The ports of the roles come first, an inlet each.
             Trouble::NotFinite(port) | Trouble::NotFiniteAt(port) => self.of_port(port, Cause::NotFinite),

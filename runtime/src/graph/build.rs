@@ -7,7 +7,7 @@ use super::Value;
 use super::devices::{self, Opened};
 use super::frames::Frames;
 use super::plan::{PlannedCommand, PlannedNode, PlannedPort, PlannedRole, PlannedWire, Producer, Source};
-use super::policy::PolicyTable;
+use super::policy::{Age, Policy, PolicyTable};
 use super::units::{Clash, Units};
 use super::wires::{CommandWire, Model, Origin, Wire};
 use crate::catalogue::Catalogue;
@@ -98,7 +98,7 @@ impl Builder<'_> {
             let input = &spec.inputs[wire.input];
             inputs[wire.input].1.push(PlannedWire {
                 source: wire.source,
-                age: wire.origin.age(self.model.flat),
+                age: wire.origin.age,
                 span: wire.origin.word.span.clone(),
             });
             if input.need == Need::Delayed {
@@ -243,8 +243,16 @@ impl Builder<'_> {
         let accelerations = accelerations(&port.shape).zip(accelerations(takes)).map(|(a, b)| a.min(b)).collect();
         let command = bound.first_command + wire.command;
         // A sink of commands takes nothing that is older than five periods, unless its wire says so.
-        let max_age = wire.origin.age(self.model.flat).map_or((5e9 * self.period) as i64, |age| age.max_age);
-        Some(PlannedCommand { source: wire.source, device: bound.device, command, max_age, accelerations })
+        let usual = Age { max_age: (5e9 * self.period) as i64, stale: Policy::Hold };
+        Some(PlannedCommand {
+            source: wire.source,
+            device: bound.device,
+            command,
+            name: [self.model.flat.roles[wire.role].0.name.clone(), spec.name.to_string()],
+            age: wire.origin.age.unwrap_or(usual),
+            span: wire.origin.word.span.clone(),
+            accelerations,
+        })
     }
 }
 

@@ -133,7 +133,7 @@ impl Parts<'_> {
         let commands = self.commands.iter().map(|wire| OutlinedWire {
             name: name(wire),
             source: self.model.port_name(wire.source),
-            age: self.age(&wire.origin),
+            age: age(&wire.origin),
             span: wire.origin.word.span.clone(),
         });
         Outline {
@@ -160,10 +160,6 @@ impl Parts<'_> {
         settings
     }
 
-    fn age(&self, wire: &wires::Origin) -> Option<(f64, Policy)> {
-        wire.age(self.model.flat).map(|age| (age.max_age as f64 * 1e-6, age.stale))
-    }
-
     fn policy(&self) -> Vec<Setting> {
         let mut settings = Vec::new();
         let given = self.model.flat.policy.as_ref().and_then(|(section, _)| section.as_table());
@@ -187,7 +183,7 @@ impl Parts<'_> {
         let wire = |wire: &Wire| OutlinedWire {
             name: wire.key.name.clone(),
             source: self.model.port_name(wire.source),
-            age: self.age(&wire.origin),
+            age: age(&wire.origin),
             span: wire.origin.word.span.clone(),
         };
         let wires = self.wires[index].iter().map(wire).collect();
@@ -283,6 +279,10 @@ impl Parts<'_> {
             *text = self.sources.path(text, span.start).display().to_string();
         }
     }
+}
+
+fn age(wire: &wires::Origin) -> Option<(f64, Policy)> {
+    wire.age.map(|age| (age.max_age as f64 * 1e-6, age.stale))
 }
 
 fn mode(block: &ModeBlock) -> OutlinedMode {

@@ -94,8 +94,12 @@ pub(crate) struct PlannedCommand {
     pub(crate) device: usize,
     /// Its number among the device's commands.
     pub(crate) command: usize,
-    /// How old it may be [ns].
-    pub(crate) max_age: i64,
+    /// Names of the role and of the command.
+    pub(crate) name: [String; 2],
+    /// How old it may be, and what more than a ramp is done when it is older.
+    pub(crate) age: Age,
+    /// Where its wire is written.
+    pub(crate) span: Range<usize>,
     /// Greatest acceleration of each joint [rad/s²]; infinite where nothing bounds it.
     pub(crate) accelerations: Vec<f64>,
 }

@@ -28,16 +28,11 @@ pub(crate) struct Origin {
     pub(crate) scope: usize,
     /// The node's own wire, where that only passes on an input of its part.
     pub(crate) inner: Option<Word>,
+    /// How old what comes over the wire may be, as the strictest says of the node's own and all into the parts around.
+    pub(crate) age: Option<Age>,
 }
 
 impl Origin {
-    /// How old what comes over the wire may be: as the node's own wire says, and the one into its part.
-    pub(crate) fn age(&self, flat: &Flat) -> Option<Age> {
-        let of = |word: &Word| flat.ages.get(&word.span.start).copied();
-        let inner = self.inner.as_ref().and_then(of);
-        of(&self.word).map(|age| age.and(inner)).or(inner)
-    }
-
     /// A mistake of this wire.
     pub(crate) fn mistake(&self, code: Code, message: String) -> Diagnostic {
         let diagnostic = Diagnostic::new(code, self.word.span.clone(), message);
@@ -178,12 +173,14 @@ impl<'a> Model<'a> {
 
     /// Where a wire was written.
     fn origin(&self, scope: usize, word: &Word) -> Origin {
-        let (mut at, mut outer) = (scope, word);
+        let of = |word: &Word| self.flat.ages.get(&word.span.start).copied();
+        let (mut at, mut outer, mut age) = (scope, word, of(word));
         while let (Some(("inputs", port)), Some(parent)) = (outer.text.split_once('.'), self.flat.scopes[at].parent) {
             let Some((_, wire)) = self.flat.scopes[at].inputs.iter().find(|(key, _)| key.name == port) else { break };
             (at, outer) = (parent, wire);
+            age = of(wire).map(|own| own.and(age)).or(age);
         }
-        Origin { word: outer.clone(), scope: at, inner: (at != scope).then(|| word.clone()) }
+        Origin { age, word: outer.clone(), scope: at, inner: (at != scope).then(|| word.clone()) }
     }
 
     /// A port as the wires of a scope name it, if they can.
