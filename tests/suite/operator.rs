@@ -127,3 +127,22 @@ fn words_for_times_of_the_graph_give_the_same_run_twice() {
     let halt = |text: &str| text.lines().find(|line| line.starts_with("stopped for")).unwrap().to_owned();
     assert_eq!(halt(&first.out), halt(&second.out));
 }
+
+#[test]
+fn a_word_that_nothing_waits_for_is_told() {
+    let text = "[graph]\nclock = \"a\"\nstart = \"one\"\n[roles]\na = \"length\"\n[modes.one]\n\
+                go = { to = \"two\", on = \"back\" }\n[modes.two]\n";
+    let mut rig = GraphRig::new(catalogue(), text, vec![length_by_hand("a")]).unwrap();
+    assert_eq!(rig.engine.send("bakc"), Err("nothing waits for `bakc`: did you mean `back`?".into()));
+    assert_eq!(rig.engine.send("STOP"), Ok(()), "in any case");
+    rig.tick(0.0).unwrap();
+    assert!(rig.engine.is_stopped());
+    let why = "`back` is not heard while the commands wait for `resume`";
+    assert_eq!(rig.engine.send("back"), Err(why.into()));
+    let refused = say(&["run", HYBRID, "--send", "1s:bck"]);
+    assert_eq!((refused.code, refused.out.as_str()), (2, ""));
+    assert!(refused.err.contains("nothing waits for the word `bck`: words here: `resume`, `stop`"), "{}", refused.err);
+    let late = say(&["run", HYBRID, "--for", "1s", "--send", "9s:stop"]);
+    assert_eq!(late.code, 0);
+    assert!(late.err.contains("`stop` was not sent: the run ended before 9 s"), "{}", late.err);
+}

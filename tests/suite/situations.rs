@@ -131,7 +131,7 @@ impl Watch {
         let (mut fault, mut send) = (None, send.iter().peekable());
         while let Some(next) = self.engine.next().filter(|next| *next <= until && !self.engine.is_done()) {
             while let Some((_, word)) = send.next_if(|(at, _)| (at * 1e9) as i64 <= next) {
-                self.engine.send(word);
+                self.engine.send(word).unwrap();
             }
             let dt = (next - self.engine.now()) as f64 * 1e-9;
             if let Err(error) = self.engine.tick(next) {

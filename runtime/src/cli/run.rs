@@ -90,6 +90,10 @@ impl Job {
             return NOT_LOADED;
         }
         let mut engine = Engine::new(plan);
+        if let Some(why) = self.unheard(&engine) {
+            shell.error(why);
+            return NOT_LOADED;
+        }
         let mut recorder = match self.out.as_deref().map(|path| recorder(path, &engine, !is_real)).transpose() {
             Ok(recorder) => recorder,
             Err(message) => {
@@ -127,6 +131,9 @@ impl Job {
         };
         shell.say(&format!("\n{}", summary.render(&engine, &outcome)));
         shell.say(&ending(&outcome));
+        for (at, word) in self.send.iter().filter(|(at, _)| *at > seconds(outcome.time)) {
+            shell.warning(format_args!("`{word}` was not sent: the run ended before {at} s"));
+        }
         let code = if let End::Fault(fault) = &outcome.end {
             shell.error(format_args!("{fault}; every command went to zero{}", hopeless(&engine, fault)));
             FAULTED
@@ -134,6 +141,24 @@ impl Job {
             0
         };
         code.max(report_file(shell, self.out.as_deref(), written))
+    }
+}
+
+/// Whether a word is the runtime's own, in any case.
+fn is_own(word: &str) -> bool {
+    ["stop", "resume"].iter().any(|own| word.eq_ignore_ascii_case(own))
+}
+
+impl Job {
+    /// Why a word that shall be sent is one that nothing waits for.
+    fn unheard(&self, engine: &Engine) -> Option<String> {
+        let is_known = |word: &str| engine.words().any(|known| known == word || is_own(word));
+        let (_, word) = self.send.iter().find(|(_, word)| !is_known(word))?;
+        let known: std::collections::BTreeSet<&str> = engine.words().collect();
+        Some(format!(
+            "nothing waits for the word `{word}`: {}",
+            crate::diagnostic::closest(word, known.into_iter(), "words")
+        ))
     }
 }
 

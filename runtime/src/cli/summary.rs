@@ -85,7 +85,7 @@ impl Summary {
         text.push('\n');
         text.push_str(&nodes(engine, outcome));
         text.push('\n');
-        text.push_str(&self.timeline.render(engine));
+        text.push_str(&self.timeline.render(engine, outcome.time));
         for ((port, _), counters) in engine.ports().iter().zip(engine.counters()) {
             let counted = counted(counters);
             if !counted.is_empty() {

@@ -53,10 +53,10 @@ impl Timeline {
     }
 
     /// The modes, and what limited the motion; nothing of what the graph does not have.
-    pub(super) fn render(&self, engine: &Engine) -> String {
-        let mut text = modes(&engine.changes(), engine.now());
+    pub(super) fn render(&self, engine: &Engine, end: i64) -> String {
+        let mut text = modes(&engine.changes(), end);
         text.push_str(&halts(engine));
-        text.push_str(&self.limits(engine.now()));
+        text.push_str(&self.limits(end));
         text
     }
 
@@ -64,7 +64,7 @@ impl Timeline {
         if self.limits.is_empty() {
             return String::new();
         }
-        let acted: Vec<&Limit> = self.limits.iter().filter(|limit| limit.least < 1.0).collect();
+        let acted: Vec<&Limit> = self.limits.iter().filter(|limit| limit.time > 0.0).collect();
         if acted.is_empty() {
             return "no limit touched the motion\n".into();
         }
@@ -115,6 +115,9 @@ fn halts(engine: &Engine) -> String {
     let more = engine.halts().len().saturating_sub(SHOWN) as u64 + engine.more_halts();
     if more > 0 {
         let _ = writeln!(text, "held or stopped {more} more times");
+    }
+    if !text.is_empty() {
+        text.push('\n');
     }
     text
 }

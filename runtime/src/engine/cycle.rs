@@ -3,10 +3,11 @@
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
-use super::modes::Verdict;
+use super::modes::{Modes, Verdict};
 use super::trouble::{Trouble, said};
 use super::{Edge, Engine};
 use crate::device::DeviceError;
+use crate::diagnostic::closest;
 use crate::fault::{Cause, Fault};
 use crate::graph::Policy;
 
@@ -106,16 +107,31 @@ impl Engine {
         }
     }
 
-    /// A word from outside: `stop` and `resume` halt the commands and let them go on, any other is for the modes.
-    pub fn send(&mut self, word: &str) {
-        match word {
-            "stop" => {
-                self.halts.stop();
-                self.trouble = Some((Policy::Stop, Trouble::Operator));
-            }
-            "resume" => self.halts.resume(),
-            other => self.sent = Some(other.to_owned()),
+    /// A word from outside: `stop` and `resume`, in any case, halt the commands and let them go on; others are for the
+    /// modes. One that no mode waits for changes nothing, and while the operator is waited for modes hear none.
+    ///
+    /// # Errors
+    /// Why nobody hears it.
+    pub fn send(&mut self, word: &str) -> Result<(), String> {
+        if word.eq_ignore_ascii_case("stop") {
+            self.halts.stop();
+            self.trouble = Some((Policy::Stop, Trouble::Operator));
+        } else if word.eq_ignore_ascii_case("resume") {
+            self.halts.resume();
+        } else if !self.words().any(|known| known == word) {
+            let known = self.words().collect::<std::collections::BTreeSet<_>>();
+            return Err(format!("nothing waits for `{word}`: {}", closest(word, known.into_iter(), "words")));
+        } else if self.halts.is_stopped() {
+            return Err(format!("`{word}` is not heard while the commands wait for `resume`"));
+        } else {
+            self.sent = Some(word.to_owned());
         }
+        Ok(())
+    }
+
+    /// The words that something waits for.
+    pub fn words(&self) -> impl Iterator<Item = &str> {
+        ["stop", "resume"].into_iter().chain(self.modes.iter().flat_map(Modes::words))
     }
 
     /// The next tick begins `by` [ns] too late, by a real clock.

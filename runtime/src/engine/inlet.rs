@@ -36,6 +36,8 @@ pub(super) struct Inlet {
     period: i64,
     /// What it does when it is older.
     pub(super) stale: Policy,
+    /// Sequence number of the last sample that came, whatever became of it.
+    seen: Option<u64>,
     /// Stamp and sequence number of the last sample that was new.
     last: Option<(i64, u64)>,
 }
@@ -52,6 +54,7 @@ impl Inlet {
             stale: role.stale,
             id,
             writes: 0,
+            seen: None,
             last: None,
         }
     }
@@ -69,7 +72,7 @@ impl Inlet {
             return;
         }
         self.writes = sample.writes;
-        let missing = self.last.map_or(0, |(_, last)| sample.sequence.saturating_sub(last + 1));
+        let missing = self.seen.replace(sample.sequence).map_or(0, |seen| sample.sequence.saturating_sub(seen + 1));
         match self.last {
             Some((_, sequence)) if sequence == sample.sequence => self.counters.repeated += 1,
             Some((stamp, _)) if sample.stamp == stamp => self.counters.repeated += 1,
@@ -87,7 +90,8 @@ impl Inlet {
 
     /// Drops a sample that is not finite.
     pub(super) fn reject(&mut self, samples: &Samples) {
-        self.writes = samples.ports[self.port].writes;
+        let sample = samples.ports[self.port];
+        (self.writes, self.seen) = (sample.writes, Some(sample.sequence));
         self.counters.not_finite += 1;
     }
 

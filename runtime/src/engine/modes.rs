@@ -184,6 +184,15 @@ impl Modes {
         }
     }
 
+    /// The words that any mode waits for.
+    pub(super) fn words(&self) -> impl Iterator<Item = &str> {
+        let exits = self.modes.iter().flat_map(|mode| &mode.exits);
+        exits.filter_map(|exit| match &exit.planned.condition {
+            Condition::Sent(word) => Some(word.as_str()),
+            _ => None,
+        })
+    }
+
     /// Name of the present mode.
     pub(super) fn name(&self) -> &str {
         &self.modes[self.now].name

@@ -141,7 +141,9 @@ impl<'a> Shell<'a> {
         }
         self.failed_driver(engine);
         while let Some(word) = self.words.next(now) {
-            engine.send(&word);
+            if let Err(why) = engine.send(&word) {
+                tracing::warn!("{why}");
+            }
         }
         if late > engine.period() {
             engine.is_late(late);

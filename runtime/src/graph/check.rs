@@ -34,10 +34,10 @@ pub fn plan(catalogue: &Catalogue, request: &Request) -> Result<Plan, Report> {
     let commands = model.commands(&mut found);
     let order = order(&model, &wires, &mut found);
     let mut frames = Frames::unify(&model, catalogue, &order, &wires, &commands, &mut found);
-    limits::compare(&model, &mut found);
+    let is_limited = limits::prove(&model, catalogue, &mut frames, &wires, &commands, &mut found);
+    limits::compare(&model, is_limited, &mut found);
     let names = flat.roles.iter().map(|(key, _)| key.name.as_str());
     flat.policy.iter().for_each(|(section, _)| unknown_roles(section, names.clone(), &mut found));
-    limits::prove(&model, catalogue, &mut frames, &wires, &commands, &mut found);
     let clock = clock(&flat, &opened, &mut found);
     let period = clock.map_or(1.0, |(_, period)| period);
     let mut builder = Builder::new(catalogue, &model, &opened, frames, (found, sources), period);

@@ -13,7 +13,7 @@ use super::wires::{CommandWire, Model, Wire};
 use super::{Item, Value};
 use crate::catalogue::Catalogue;
 use crate::diagnostic::{Code, Diagnostic, closest};
-use crate::node::{NodeSpec, ParamSpec};
+use crate::node::{NodeSpec, ParamSpec, Word};
 use crate::signal::Kind;
 
 /// What parameters call the section in `{ from = "limits.…" }`.
@@ -27,8 +27,9 @@ struct Asked<'a> {
     spec: Option<&'a ParamSpec>,
 }
 
-/// Compares the section with what the nodes take from it: a number that nobody takes limits nothing.
-pub(crate) fn compare(model: &Model<'_>, found: &mut Vec<Diagnostic>) {
+/// Compares the section with what the nodes take from it: a number that nobody takes limits nothing. Where a limiter is
+/// missing, that is what is wrong, and its number is no mistake.
+pub(crate) fn compare(model: &Model<'_>, is_limited: bool, found: &mut Vec<Diagnostic>) {
     let mut asked = Vec::new();
     for (node, kind) in model.flat.nodes.iter().zip(&model.nodes) {
         let specs = kind.as_ref().map_or(&[][..], |(_, spec)| &spec.params);
@@ -39,10 +40,14 @@ pub(crate) fn compare(model: &Model<'_>, found: &mut Vec<Diagnostic>) {
     }
     let given = || model.flat.limits.iter().flat_map(|(_, table)| &table.entries);
     let names: BTreeSet<&str> = asked.iter().map(|asked| asked.key.as_str()).collect();
-    for (key, _) in given().filter(|(key, _)| !names.contains(key.name.as_str())) {
+    for (key, _) in given().filter(|(key, _)| is_limited && !names.contains(key.name.as_str())) {
         let message = format!("`{}` limits nothing: no node takes it", key.name);
-        let missing = names.iter().copied().filter(|name| !given().any(|(key, _)| key.name == *name));
-        let help = closest(&key.name, missing, "limits that are asked for");
+        let missing: Vec<&str> =
+            names.iter().copied().filter(|name| !given().any(|(key, _)| key.name == *name)).collect();
+        let help = match missing.is_empty() {
+            true => "every limit that is asked for is given: take it out".to_owned(),
+            false => closest(&key.name, missing.into_iter(), "limits that are asked for"),
+        };
         found.push(Diagnostic::new(Code::UnknownKey, key.span.clone(), message).help(help));
     }
     missing(model.flat, &asked, found);
@@ -86,11 +91,13 @@ fn collect<'a>(value: &Value, spec: Option<&'a ParamSpec>, asked: &mut Vec<Asked
 struct Stop<'a> {
     node: usize,
     spec: &'a NodeSpec,
-    /// What its motion comes from.
+    /// What its motion comes from, and as its file says it.
     source: Source,
+    word: &'a Word,
 }
 
-/// Proves that each command has crossed what its role asks for, or says what is missing and where it belongs.
+/// Proves that each command has crossed what its role asks for, or says what is missing and where it belongs. Whether all
+/// have.
 pub(crate) fn prove(
     model: &Model<'_>,
     catalogue: &Catalogue,
@@ -98,7 +105,8 @@ pub(crate) fn prove(
     wires: &[Vec<Wire>],
     commands: &[CommandWire],
     found: &mut Vec<Diagnostic>,
-) {
+) -> bool {
+    let mut is_limited = true;
     for command in commands {
         let role = model.roles[command.role].expect("only known roles have commands");
         // A wire that goes nowhere has been complained about, and what stands behind it is not known.
@@ -116,24 +124,27 @@ pub(crate) fn prove(
         let missing: Vec<&str> =
             role.limits.iter().map(|limit| &**limit).filter(|limit| !held.contains(limit)).collect();
         if !missing.is_empty() {
+            is_limited = false;
             found.push(unlimited(model, catalogue, command, &path, &missing, &lost));
         }
         found.extend(other_frame(model, frames, &path));
     }
+    is_limited
 }
 
 /// The nodes that a motion passes through, the last one first; none if a wire in between is missing.
-fn path<'a>(model: &'a Model<'_>, wires: &[Vec<Wire>], from: Source) -> Option<Vec<Stop<'a>>> {
+fn path<'a>(model: &'a Model<'_>, wires: &'a [Vec<Wire>], from: Source) -> Option<Vec<Stop<'a>>> {
     let (mut path, mut at) = (Vec::<Stop<'_>>::new(), from);
     while let Producer::Node(node) = at.producer {
         let (_, spec) = model.nodes[node].as_ref()?;
         let Some(through) = spec.limits.through else { break };
         let input = spec.inputs.iter().position(|input| input.name == through)?;
-        let source = wires[node].iter().find(|wire| wire.input == input)?.source;
+        let wire = wires[node].iter().find(|wire| wire.input == input)?;
+        let (source, word) = (wire.source, wire.origin.inner.as_ref().unwrap_or(&wire.origin.word));
         if path.iter().any(|stop| stop.node == node) {
             return None;
         }
-        path.push(Stop { node, spec, source });
+        path.push(Stop { node, spec, source, word });
         at = source;
     }
     Some(path)
@@ -156,7 +167,7 @@ fn unlimited(
     if let Some(part) = whole(model, catalogue, command, missing).filter(|_| lost.is_empty()) {
         return command.origin.mistake(Code::UnlimitedCommand, message).help(part);
     }
-    let mut helps = Vec::new();
+    let (mut helps, mut places) = (Vec::new(), Vec::new());
     let mut told = BTreeSet::new();
     for limit in missing {
         if let Some((_, by)) = lost.iter().find(|(lost, _)| lost == limit) {
@@ -166,10 +177,13 @@ fn unlimited(
         let holds = |spec: &NodeSpec| spec.limits.holds.contains(limit);
         let Some(spec) = catalogue.nodes().iter().map(|node| node.spec()).find(holds) else { continue };
         if told.insert(spec.name.to_string()) {
-            helps.push(between(model, command, &consumer, path, &spec));
+            let (help, place) = between(model, command, &consumer, path, &spec);
+            helps.push(help);
+            places.extend(place.map(|place| (place, format!("a `{}` belongs here", spec.name))));
         }
     }
-    let diagnostic = command.origin.mistake(Code::UnlimitedCommand, message);
+    let mut diagnostic = command.origin.mistake(Code::UnlimitedCommand, message);
+    diagnostic.notes.extend(places.into_iter().filter(|(place, _)| *place != command.origin.word.span));
     diagnostic.with_help((!helps.is_empty()).then(|| helps.join("\n")))
 }
 
@@ -205,7 +219,13 @@ fn whole(model: &Model<'_>, catalogue: &Catalogue, command: &CommandWire, missin
 }
 
 /// Where on the way a limiter belongs: behind everything that must come before it.
-fn between(model: &Model<'_>, command: &CommandWire, consumer: &str, path: &[Stop<'_>], limiter: &NodeSpec) -> String {
+fn between(
+    model: &Model<'_>,
+    command: &CommandWire,
+    consumer: &str,
+    path: &[Stop<'_>],
+    limiter: &NodeSpec,
+) -> (String, Option<Range<usize>>) {
     let order = &model.roles[command.role].expect("only known roles have commands").limits;
     let rank = |spec: &NodeSpec| {
         let ranks = spec.limits.holds.iter().filter_map(|limit| order.iter().position(|known| known == limit));
@@ -213,26 +233,32 @@ fn between(model: &Model<'_>, command: &CommandWire, consumer: &str, path: &[Sto
     };
     let (name, through) = (&limiter.name, limiter.limits.through.unwrap_or_default());
     let kind = limiter.inputs.iter().find(|input| input.name == through).map(|input| input.kind);
-    // Links from the command back to where the motion comes from: who takes it, and what is taken.
-    let mut links = vec![(consumer.to_owned(), command.source)];
+    // Links from the command back to where the motion comes from: who takes it, what is taken, and as which words.
+    let mut links = vec![(consumer.to_owned(), command.source, &command.origin.word)];
     for stop in path {
         let through = stop.spec.limits.through.unwrap_or_default();
-        links.push((format!("{}.{through}", model.flat.nodes[stop.node].name), stop.source));
+        links.push((format!("{}.{through}", model.flat.nodes[stop.node].block.key.name), stop.source, stop.word));
     }
+    // Behind a change of frame a twist is not the sensor's own any more.
+    let changes_frame = |stop: &Stop<'_>| {
+        let gives = model.outputs(Producer::Node(stop.node)).and_then(|ports| ports.first()).map(|port| port.kind);
+        stop.spec.limits.holds.is_empty() && gives == Some(model.port(stop.source).kind)
+    };
     let later = path.iter().rposition(|stop| rank(stop.spec) > rank(limiter)).map_or(0, |at| at + 1);
-    let fits = |(_, source): &&(String, Source)| Some(model.port(*source).kind) == kind;
-    let link = links[later..].iter().find(fits).or_else(|| links.iter().rev().find(fits));
-    let Some((taker, source)) = link else { return format!("put a `{name}` on the way of the motion") };
+    let fits = |at: &usize| Some(model.port(links[*at].1).kind) == kind && !path[*at..].iter().any(changes_frame);
+    let at = (later..links.len()).find(fits).or_else(|| (0..links.len()).rev().find(fits));
+    let Some((taker, _, word)) = at.map(|at| &links[at]) else {
+        return (format!("put a `{name}` on the way of the motion"), None);
+    };
     let article = if name.starts_with(['a', 'e', 'i', 'o', 'u']) { "an" } else { "a" };
     let needs = limiter
         .inputs
         .iter()
         .filter(|input| matches!(input.need, crate::node::Need::Required | crate::node::Need::Sampled));
     let mut block = format!(
-        "put {article} `{name}` between `{}` and `{taker}`:\n[nodes.{name}]\ntype = \"{name}\"",
-        model.port_name(*source)
+        "put {article} `{name}` between `{0}` and `{taker}`:\n[nodes.{name}]\ntype = \"{name}\"\nin.{through} = \"{0}\"",
+        word.text
     );
-    block.push_str(&format!("\nin.{through} = \"{}\"", model.port_name(*source)));
     for input in needs.filter(|input| input.name != through) {
         block.push_str(&format!("\nin.{} = \"…\"", input.name));
     }
@@ -240,7 +266,7 @@ fn between(model: &Model<'_>, command: &CommandWire, consumer: &str, path: &[Sto
         let unit = param.unit().map(|unit| format!("   # [{unit}]")).unwrap_or_default();
         block.push_str(&format!("\n{} = …{unit}", param.name));
     }
-    block
+    (block, Some(word.span.clone()))
 }
 
 /// A limiter of a twist means the sensor's own motion: in another frame the same numbers limit something else.

@@ -102,7 +102,7 @@ impl GraphRig {
 
     /// Sends a word from outside; it is there in the next tick.
     pub fn send(&mut self, word: &str) {
-        self.engine.send(word);
+        self.engine.send(word).unwrap_or_else(|why| panic!("{why}"));
     }
 
     fn port(&self, name: &str) -> PortId {

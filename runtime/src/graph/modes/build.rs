@@ -12,7 +12,7 @@ use super::super::wanted::wanted;
 use super::super::{Item, Table, Value};
 use super::conditions::Lookup;
 use super::{Condition, ModeBlock, Movers, PlannedMode, PlannedModes, Test, Watched};
-use super::{exits, overlaps, start, ungated, unreachable};
+use super::{ended, exits, overlaps, start, ungated, unreachable};
 use crate::diagnostic::{Code, Diagnostic, closest};
 use crate::node::{AnyNode, Components, NodeSpec};
 use crate::signal::Kind;
@@ -40,7 +40,7 @@ pub(crate) fn plan(builder: &mut Builder<'_>, nodes: &mut [PlannedNode], wiring:
         return None;
     }
     let first = start(word, &flat.place, &flat.modes, &mut builder.found);
-    let mut modes = Vec::new();
+    let (mut modes, mut moving) = (Vec::new(), Vec::new());
     for block in &flat.modes {
         let mut mode = PlannedMode {
             name: block.key.name.clone(),
@@ -57,13 +57,16 @@ pub(crate) fn plan(builder: &mut Builder<'_>, nodes: &mut [PlannedNode], wiring:
         absent(block, &mode, &reads, &frozen, builder);
         let is_still =
             |node: usize| variants.get(&node).map_or_else(|| builder.is_still(node), |variant| variant.is_still);
-        let found = movers.of(&is_still);
-        ungated(builder.model, &found, Some((block, &mode)), &mut builder.found);
+        moving.push(movers.of(&is_still));
         adopt(block, variants, nodes, &mut mode, &mut builder.found);
         modes.push(mode);
     }
     let names: Vec<&str> = flat.modes.iter().map(|mode| mode.key.name.as_str()).collect();
     modes.iter().for_each(|mode| overlaps(mode, &names, &mut builder.found));
+    let ended = ended(&modes, &moving, builder.model, wiring.wires);
+    for (i, block) in flat.modes.iter().enumerate().filter(|(i, _)| !ended[*i]) {
+        ungated(builder.model, &moving[i], Some(block), &mut builder.found);
+    }
     let start = first?;
     unreachable(start, &flat.modes, &mut builder.found);
     Some(PlannedModes { modes, start })

@@ -141,6 +141,9 @@ fn condition(
         return Ok(source.map(|source| (Condition::Travel(source, *mm * 1e-3), text)));
     }
     let word = exit.on.as_ref().expect("one of them is given");
+    if word.text.trim() != word.text || word.text.is_empty() {
+        return Err(Box::new(bad(&word.span, "a word from outside has letters, and no blanks around them")));
+    }
     if ["stop", "resume"].contains(&word.text.as_str()) {
         let help = "`stop` and `resume` halt the run and let it go on: choose another word";
         return Err(Box::new(bad(&word.span, format!("`{}` is the runtime's own word", word.text)).help(help)));
@@ -187,7 +190,8 @@ fn watched(word: &Word, lookup: &Lookup<'_>) -> Result<Option<(Watched, String)>
         None => (word.clone(), None),
     };
     let Some(source) = lookup.model.resolve(0, &port, 0)? else { return Ok(None) };
-    let name = lookup.model.port_name(source);
+    // As the file calls it.
+    let name = port.text.clone();
     let Some(feature) = feature else { return Ok(Some((Watched { source, feature: None }, name))) };
     let Some(planned) = (lookup.port)(source) else { return Ok(None) };
     let Shape::Features(shape) = &planned.shape else {

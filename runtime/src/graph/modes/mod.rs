@@ -17,7 +17,7 @@ use super::plan::Source;
 
 pub(crate) use build::plan;
 use conditions::exits;
-use motion::{Movers, ungated};
+use motion::{Movers, ended, ungated};
 use overlap::overlaps;
 pub(crate) use read::{ModeBlock, Sort, modes};
 use whole::{start, unreachable};

@@ -8,7 +8,7 @@ use std::collections::BTreeSet;
 use super::super::order::Wiring;
 use super::super::plan::Producer;
 use super::super::wires::{Model, Wire};
-use super::{Condition, ModeBlock, PlannedMode, Sort};
+use super::{Condition, ModeBlock, PlannedExit, PlannedMode, Sort};
 use crate::diagnostic::{Code, Diagnostic};
 use crate::node::Need;
 use crate::signal::Kind;
@@ -69,29 +69,60 @@ const fn node_of(producer: Producer) -> Option<usize> {
     }
 }
 
+/// Which modes end the motion that starts in them by itself: by a bound on time or way that ends the run or leads to a
+/// mode that does not move by itself, at once or through others; or by the loss of a signal of a sensor.
+pub(crate) fn ended(modes: &[PlannedMode], movers: &[Vec<usize>], model: &Model<'_>, wires: &[Vec<Wire>]) -> Vec<bool> {
+    let mut ended: Vec<bool> = movers.iter().map(Vec::is_empty).collect();
+    // Modes that only hand the motion on to each other in a circle are never reached.
+    loop {
+        let is_end = |exit: &PlannedExit| {
+            let is_bound = matches!(exit.condition, Condition::Elapsed(_) | Condition::Travel(..));
+            match (exit.sort, &exit.condition) {
+                (Sort::Fail | Sort::Done, _) => is_bound,
+                (Sort::Go, _) => is_bound && exit.to.is_some_and(|to| ended[to]),
+                (Sort::OnLost, Condition::Lost(watched, _)) => senses(model, wires, watched.source.producer),
+                (Sort::OnLost, _) => false,
+            }
+        };
+        let next: Vec<bool> = modes.iter().zip(&ended).map(|(mode, is)| *is || mode.exits.iter().any(is_end)).collect();
+        if next == ended {
+            return ended;
+        }
+        ended = next;
+    }
+}
+
+/// Whether something follows from a device that only gives: from a sensor, and not from the arm alone.
+fn senses(model: &Model<'_>, wires: &[Vec<Wire>], producer: Producer) -> bool {
+    let (mut open, mut seen) = (vec![producer], BTreeSet::new());
+    while let Some(producer) = open.pop() {
+        match producer {
+            Producer::Role(role) if model.roles[role].is_some_and(|role| role.commands.is_empty()) => return true,
+            Producer::Role(_) => {}
+            Producer::Node(node) if seen.insert(node) => {
+                open.extend(wires[node].iter().map(|wire| wire.source.producer))
+            }
+            Producer::Node(_) => {}
+        }
+    }
+    false
+}
+
 /// Tells of motion that nothing ends: in a mode, or in a graph without modes.
-pub(crate) fn ungated(
-    model: &Model<'_>,
-    movers: &[usize],
-    mode: Option<(&ModeBlock, &PlannedMode)>,
-    found: &mut Vec<Diagnostic>,
-) {
-    let is_ended = mode.is_some_and(|(_, mode)| {
-        mode.exits.iter().any(|exit| {
-            exit.sort == Sort::OnLost || matches!(exit.condition, Condition::Elapsed(_) | Condition::Travel(..))
-        })
-    });
-    if is_ended || movers.is_empty() {
+pub(crate) fn ungated(model: &Model<'_>, movers: &[usize], mode: Option<&ModeBlock>, found: &mut Vec<Diagnostic>) {
+    if movers.is_empty() {
         return;
     }
     let name = |node: &usize| format!("`{}`", model.flat.nodes[*node].name);
-    if let Some((block, _)) = mode {
+    if let Some(block) = mode {
         let names = movers.iter().map(name).collect::<Vec<_>>().join(", ");
         let mode = &block.key.name;
         let message = format!("in mode `{mode}` the arm is moved without a gate, and nothing ends it: by {names}");
-        let bound = "add a bound, as `fail = { after_ms = 10000, after_travel_mm = 60 }`, or `on_lost`";
+        let bound = "add a bound, as `fail = { after_ms = 10000, after_travel_mm = 60 }`, or `on_lost` of a signal of \
+                     the sensor";
         let diagnostic = Diagnostic::new(Code::UngatedMotion, block.key.span.clone(), message);
-        found.push(diagnostic.help(format!("{bound}, or wire `in.gate` of {names}")));
+        let circle = "a `go` counts if it leads to a mode that stands still, or ends in one";
+        found.push(diagnostic.help(format!("{bound}, or wire `in.gate` of {names}; {circle}")));
         return;
     }
     for node in movers {

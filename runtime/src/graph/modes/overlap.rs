@@ -22,7 +22,8 @@ pub(crate) fn overlaps(mode: &PlannedMode, names: &[&str], found: &mut Vec<Diagn
             second.text
         );
         let diagnostic = Diagnostic::new(Code::OverlappingConditions, second.span.clone(), message);
-        let help = "give the one that shall win `priority = 1`, or let them exclude each other";
+        let more = second.priority + 1;
+        let help = format!("give the one that shall win `priority = {more}`, or let them exclude each other");
         found.push(diagnostic.note(first.span.clone(), "the other is here").help(help));
     }
 }

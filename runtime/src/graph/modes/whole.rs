@@ -3,6 +3,7 @@
 use std::collections::BTreeSet;
 use std::ops::Range;
 
+use super::super::{Item, Value};
 use super::ModeBlock;
 use crate::diagnostic::{Code, Diagnostic, closest};
 use crate::node::Word;
@@ -40,8 +41,9 @@ pub(crate) fn unreachable(start: usize, modes: &[ModeBlock], found: &mut Vec<Dia
     let (mut reached, mut open) = (BTreeSet::from([start]), vec![start]);
     while let Some(mode) = open.pop() {
         // By their names: a way that has a mistake of its own leads there all the same.
-        let names = modes[mode].exits.iter().filter_map(|(_, _, exit)| exit.to.as_ref());
-        let next = names.filter_map(|to| modes.iter().position(|mode| mode.key.name == to.text));
+        let mut names = Vec::new();
+        modes[mode].table.entries.iter().for_each(|(_, value)| targets(value, &mut names));
+        let next = names.iter().filter_map(|to| modes.iter().position(|mode| mode.key.name == **to));
         open.extend(next.filter(|to| reached.insert(*to)).collect::<Vec<_>>());
     }
     for (_, mode) in modes.iter().enumerate().filter(|(i, _)| !reached.contains(i)) {
@@ -49,5 +51,14 @@ pub(crate) fn unreachable(start: usize, modes: &[ModeBlock], found: &mut Vec<Dia
         let message = format!("mode `{name}` is never entered");
         let help = format!("add `go = {{ to = \"{name}\", … }}` to a mode, or take it out");
         found.push(Diagnostic::new(Code::UnreachableMode, mode.key.span.clone(), message).help(help));
+    }
+}
+
+/// What is written behind every `to` of a value.
+fn targets<'v>(value: &'v Value, names: &mut Vec<&'v str>) {
+    match &value.item {
+        Item::Array(items) => items.iter().for_each(|item| targets(item, names)),
+        Item::Table(table) => names.extend(table.get("to").and_then(Value::as_str)),
+        _ => {}
     }
 }
