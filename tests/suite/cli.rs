@@ -209,7 +209,7 @@ fn a_mistake_in_set_points_into_set() {
 
 #[test]
 fn rows_are_read_by_a_reader_that_is_not_ours_and_say_the_same_in_both_formats() {
-    for (graph, rows) in [(PRESS, "309 rows, 134 columns, "), (HYBRID, "1000 rows, 132 columns, ")] {
+    for (graph, rows) in [(PRESS, "309 rows, 134 columns, "), (HYBRID, "1000 rows, 134 columns, ")] {
         let [csv, ndjson] = ["rows.csv", "rows.ndjson"].map(|name| {
             let (_folder, path) = in_new_folder(name);
             let run = say(&["run", graph, "--out", &path]);
@@ -393,4 +393,28 @@ fn the_readme_shows_what_the_tool_prints() {
     let graph = readme.split("```toml\n").nth(1).and_then(|rest| rest.split("```").next()).unwrap();
     let shipped = fs::read_to_string(tactflow_tests::workspace().join(HYBRID)).unwrap();
     assert!(shipped.ends_with(graph), "the README's graph is not {HYBRID}");
+}
+
+#[test]
+fn a_record_tells_the_mode_and_when_commands_are_held() {
+    let (_folder, path) = in_new_folder("modes.csv");
+    say(&["run", HYBRID, "--for", "1s", "--send", "0.8s:stop", "--send", "0.9s:resume", "--out", &path]);
+    let text = fs::read_to_string(path).unwrap();
+    let mut rows =
+        text.lines().filter(|line| !line.starts_with('#')).map(|line| line.split(',').take(3).collect::<Vec<_>>());
+    assert_eq!(rows.next().unwrap(), ["time", "mode", "halted"]);
+    let at = |time: &str| {
+        text.lines()
+            .find(|line| line.starts_with(&format!("{time},")))
+            .unwrap()
+            .split(',')
+            .skip(1)
+            .take(2)
+            .collect::<Vec<_>>()
+    };
+    for (time, mode, halted) in
+        [("0.4", "0.0", "0.0"), ("0.6", "1.0", "0.0"), ("0.852", "1.0", "1.0"), ("0.96", "1.0", "0.0")]
+    {
+        assert_eq!(at(time), [mode, halted], "at {time} s");
+    }
 }

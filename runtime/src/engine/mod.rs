@@ -122,6 +122,18 @@ impl Engine {
         self.modes.as_ref().map(Modes::name)
     }
 
+    /// Number of that mode, from 0 in the order of the file.
+    #[must_use]
+    pub fn mode_number(&self) -> Option<usize> {
+        self.modes.as_ref().map(Modes::number)
+    }
+
+    /// Whether every command is held at zero, or on its way there.
+    #[must_use]
+    pub fn is_halted(&self) -> bool {
+        self.halts.is_halted()
+    }
+
     /// The modes so far, each with when it began and why, the start first.
     #[must_use]
     pub fn changes(&self) -> Vec<Change> {

@@ -198,6 +198,11 @@ impl Modes {
         &self.modes[self.now].name
     }
 
+    /// Number of the present mode, in the order of the file.
+    pub(super) const fn number(&self) -> usize {
+        self.now
+    }
+
     /// The exit that was taken last: its words and its place.
     pub(super) fn taken(&self) -> (&str, usize) {
         let exit = &self.modes[self.now].exits[self.taken].planned;

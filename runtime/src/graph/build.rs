@@ -88,7 +88,7 @@ impl Builder<'_> {
     pub(crate) fn node(&mut self, index: usize, wires: &[Wire]) -> Option<PlannedNode> {
         let node = &self.model.flat.nodes[index];
         let (kind, spec) = self.model.nodes[index].as_ref()?;
-        let configured = self.configure(*kind, &node.block.params);
+        let (configured, params) = self.configure(*kind, &node.block.params);
         let mut inputs: Vec<(Need, Vec<PlannedWire>)> =
             spec.inputs.iter().map(|input| (input.need, Vec::new())).collect();
         let mut given = Given { inputs: vec![Vec::new(); spec.inputs.len()], period: self.period };
@@ -129,7 +129,7 @@ impl Builder<'_> {
             Ok(built) => built,
             Err(mistakes) => {
                 let block = &node.block;
-                devices::place(mistakes, &block.params, &block.wires, &mut self.sources, &mut self.found);
+                devices::place(mistakes, &params, &block.wires, &mut self.sources, &mut self.found);
                 return None;
             }
         };
@@ -164,10 +164,11 @@ impl Builder<'_> {
         let (kind, spec) = self.model.nodes[index].as_ref()?;
         let (given, _) = self.kept.get(&index)?.clone();
         let block = &self.model.flat.nodes[index].block;
-        let mut built = match self.configure(*kind, params)?.build(given) {
+        let (configured, params) = self.configure(*kind, params);
+        let mut built = match configured?.build(given) {
             Ok(built) => built,
             Err(mistakes) => {
-                devices::place(mistakes, params, &block.wires, &mut self.sources, &mut self.found);
+                devices::place(mistakes, &params, &block.wires, &mut self.sources, &mut self.found);
                 return None;
             }
         };
@@ -183,18 +184,20 @@ impl Builder<'_> {
         Some(built)
     }
 
-    fn configure(&mut self, kind: usize, params: &Value) -> Option<Box<dyn Configured>> {
+    /// Reads the parameters of a node, and gives them back with all facts filled in: a mistake shows where a number of
+    /// [limits] stands, and not where it is asked for.
+    fn configure(&mut self, kind: usize, params: &Value) -> (Option<Box<dyn Configured>>, Value) {
         let mut params = params.clone();
         let has_facts = devices::fill_facts(&mut params, self.model, self.opened, &mut self.found);
         let mut reader = Reader::new(&self.sources);
         if !has_facts {
-            return None;
+            return (None, params);
         }
         let configured = self.catalogue.nodes()[kind].configure(&params, &mut reader);
         let mistakes = reader.mistakes;
         let is_good = mistakes.is_empty();
         devices::place(mistakes, &params, &[], &mut self.sources, &mut self.found);
-        configured.filter(|_| is_good)
+        (configured.filter(|_| is_good), params)
     }
 
     /// How to make rates for an input that takes nothing else: a node that takes any unit and gives it per second.

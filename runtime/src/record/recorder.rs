@@ -10,6 +10,7 @@ use rtrb::{Consumer, Producer, RingBuffer};
 
 use super::{Column, Columns, Format};
 use crate::engine::Engine;
+use crate::signal::Unit;
 
 /// Rows that fit in the ring at least.
 const ROOM: usize = 4096;
@@ -20,6 +21,8 @@ const NAP: Duration = Duration::from_millis(1);
 pub struct Recorder {
     columns: Columns,
     row: Vec<f64>,
+    /// Number of columns that come from no port.
+    own: usize,
     ring: Producer<f64>,
     thread: JoinHandle<io::Result<()>>,
     /// Whether a full ring makes the tick wait; with a real clock a row is dropped instead.
@@ -35,20 +38,26 @@ impl Recorder {
     /// If the file cannot be created.
     pub fn create(path: &Path, format: Format, engine: &Engine, may_wait: bool) -> io::Result<Self> {
         let columns = Columns::new(engine.ports());
+        let own = own_columns(engine);
+        let list: Vec<Column> = own.iter().chain(&columns.list).cloned().collect();
         let mut out = BufWriter::new(File::create(path)?);
-        format.header(&columns.list, &mut out)?;
-        let width = columns.list.len() + 1;
+        format.header(&list, &mut out)?;
+        let width = list.len() + 1;
         let (ring, drain) = RingBuffer::new(width * ROOM);
-        let list = columns.list.clone();
         let thread = std::thread::spawn(move || write_rows(drain, format, &list, out));
-        Ok(Self { row: vec![0.0; width], columns, ring, thread, may_wait, dropped: 0 })
+        Ok(Self { row: vec![0.0; width], own: own.len(), columns, ring, thread, may_wait, dropped: 0 })
     }
 
     /// Records the tick that the engine has just run.
     pub fn record(&mut self, engine: &Engine) {
         // A time in nanoseconds is exact in the bits of a float, if not in its value.
         self.row[0] = f64::from_bits(engine.now() as u64);
-        self.columns.read(engine.bus(), &mut self.row[1..]);
+        let (own, ports) = self.row[1..].split_at_mut(self.own);
+        if let [mode, halted] = own {
+            *mode = engine.mode_number().map_or(f64::NAN, |mode| mode as f64);
+            *halted = f64::from(u8::from(engine.is_halted()));
+        }
+        self.columns.read(engine.bus(), ports);
         while self.ring.slots() < self.row.len() {
             if !self.may_wait || self.ring.is_abandoned() {
                 self.dropped += 1;
@@ -73,6 +82,13 @@ impl Recorder {
         self.thread.join().map_err(|_| io::Error::other("the recorder's thread panicked"))??;
         Ok(self.dropped)
     }
+}
+
+/// Of a graph with modes: which one the next tick is in, counted from 0 in the order of the file, and whether the commands
+/// are held.
+fn own_columns(engine: &Engine) -> Vec<Column> {
+    let names = if engine.mode().is_some() { &["mode", "halted"][..] } else { &[] };
+    names.iter().map(|name| Column { name: (*name).to_owned(), unit: Unit::ONE }).collect()
 }
 
 fn write_rows(mut ring: Consumer<f64>, format: Format, columns: &[Column], mut out: impl Write) -> io::Result<()> {
