@@ -171,12 +171,14 @@ impl Fused {
     fn limit(&mut self, wanted: Option<Twist>, pose: &Pose, tick: &Tick) -> Option<Twist> {
         let (dt, [last, offset]) = (tick.dt.min(tick.max_gap), &mut self.smooth);
         let half = [0.5 * 1.0 * dt, 0.5 * 10.0 * dt];
-        let mut twist = bumpless::smooth(&wanted.unwrap_or_default(), last, offset, half);
+        let mut target = wanted.unwrap_or_default();
+        target.0 *= share(&target, 0.05, 0.8);
+        let mut twist = bumpless::smooth(&target, last, offset, half);
         let is_there = wanted.is_some() || *offset != Twist::default();
         if is_there {
-            let load = contact_limit::load(&self.shape, &self.image, [0.8 * 2000.0, 0.8 * 240.0]);
-            contact_limit::bar(&mut twist, load.centre, load.sum / 2000.0, 0.8, 0.05);
-            contact_limit::bar(&mut twist, load.place, load.peak / 240.0, 0.8, 0.05);
+            let load = contact_limit::load(&self.shape, &self.image, [0.5 * 2000.0, 0.5 * 240.0]);
+            contact_limit::bar(&mut twist, load.centre, load.sum / 2000.0, 0.5, 0.05);
+            contact_limit::bar(&mut twist, load.place, load.peak / 240.0, 0.5, 0.05);
             let (velocity, place) = (pose.0.rotation * twist.linear(), pose.0.translation.vector);
             let corners = [[-0.8, -0.4, 0.1], [-0.3, 0.4, 0.7]];
             twist.0 *= workspace_limit::share(&velocity, &place, corners, 1.0, 2.0 * tick.max_gap);

@@ -1,10 +1,15 @@
 //! Whatever the process can observe going wrong ends in a stop that names node, port and tick.
 
+use std::borrow::Cow;
+use std::sync::{Arc, Mutex};
+
+use tactflow_runtime::device::{Commands, DeviceError, DeviceType, Driver, Opened, Samples, Stepped};
 use tactflow_runtime::engine::{End, Engine, RunOptions, run};
 use tactflow_runtime::fault::Cause;
 use tactflow_runtime::graph::{Request, plan};
 use tactflow_runtime::harness::GraphRig;
 use tactflow_runtime::node::{Mistakes, Node, Setup, Tick};
+use tactflow_runtime::node::{ParamSpec, Reader, Value};
 use tactflow_runtime::signal::Freshness;
 use tactflow_tests::nodes::length_by_hand;
 use tactflow_tests::{catalogue, workspace};
@@ -154,4 +159,64 @@ fn a_run_that_faults_leaves_the_arm_still() {
     let outcome = run(&mut engine, &RunOptions::default(), &mut |_| {}).unwrap();
     assert!(matches!(outcome.end, End::Fault(_)), "{:?}", outcome.end);
     assert!(engine.commands("arm").unwrap().iter().all(|velocity| *velocity == 0.0));
+}
+
+/// An arm that notes what it is told.
+struct Spy {
+    arm: Box<dyn Stepped>,
+    told: Arc<Mutex<Vec<f64>>>,
+}
+
+impl Stepped for Spy {
+    fn next(&self) -> Option<i64> {
+        self.arm.next()
+    }
+
+    fn exchange(&mut self, now: i64, commands: &Commands, samples: &mut Samples) -> Result<(), DeviceError> {
+        let fastest = commands.joints(0).iter().fold(0.0, |fastest: f64, velocity| fastest.max(velocity.abs()));
+        self.told.lock().unwrap().push(fastest);
+        self.arm.exchange(now, commands, samples)
+    }
+}
+
+struct SpyType {
+    told: Arc<Mutex<Vec<f64>>>,
+}
+
+impl DeviceType for SpyType {
+    fn name(&self) -> Cow<'static, str> {
+        "spy_arm".into()
+    }
+
+    fn summary(&self) -> Cow<'static, str> {
+        "a mock arm that notes what it is told".into()
+    }
+
+    fn params(&self) -> Vec<ParamSpec> {
+        Vec::new()
+    }
+
+    fn open(&self, table: &Value, reader: &mut Reader<'_>) -> Option<Opened> {
+        let nodes = tactflow_nodes::catalogue();
+        let arm = nodes.devices().iter().find(|device| device.name() == "mock_arm")?.open(table, reader)?;
+        let Driver::Stepped(arm_) = arm.driver else { return None };
+        let spy = Spy { arm: arm_, told: Arc::clone(&self.told) };
+        Some(Opened { description: arm.description, driver: Driver::Stepped(Box::new(spy)) })
+    }
+}
+
+#[test]
+fn an_arm_is_told_to_stand_still_though_the_device_before_it_has_failed() {
+    let told = Arc::new(Mutex::new(Vec::new()));
+    let request = Request::file(workspace().join("graphs/hybrid.toml"))
+        .set("devices.arm.type='spy_arm'")
+        .set("devices.pad.press=[{ from_s = 0.3, force = 3.0, at = [0.008, -0.004] }]")
+        .set("devices.pad.glitch=[{ at_s = 0.8, for_s = 5, kind = 'unplug' }]");
+    let catalogue = catalogue().device_type(Box::new(SpyType { told: Arc::clone(&told) }));
+    let plan = plan(&catalogue, &request).unwrap_or_else(|report| panic!("{}", report.render(false)));
+    let outcome = run(&mut Engine::new(plan), &RunOptions::default(), &mut |_| {}).unwrap();
+    assert!(matches!(outcome.end, End::Fault(_)), "{:?}", outcome.end);
+    let told = told.lock().unwrap();
+    assert!(told.iter().any(|fastest| *fastest > 0.05), "it moved");
+    assert_eq!(told.last(), Some(&0.0), "{:?}", &told[told.len() - 8..]);
 }

@@ -150,3 +150,16 @@ fn a_failure_names_the_mode_its_reason_and_its_line() {
     let expected = "mode `one` failed: 15 ms have passed in tick 3 at 0.020 s (graph.toml:14:8)";
     assert_eq!(fault.to_string(), expected);
 }
+
+#[test]
+fn a_switch_acts_at_once_and_does_not_wait_for_the_next_sample() {
+    let mut rig = good("[modes.one]\nset.plus.by = 10.0\ngo = { to = 'two', after_ms = 20 }\n[modes.two]");
+    rig.feed("a", 0, 0.0, 1.0);
+    let mut seen = Vec::new();
+    for i in 0..5 {
+        rig.tick(10.0 * f64::from(i)).unwrap();
+        seen.push(*rig.get::<f64>("plus.value").unwrap());
+    }
+    assert_eq!(seen, [11.0, 11.0, 11.0, 1.0, 1.0], "the sensor is silent, and the mode is another");
+    assert!((rig.age_ms("plus.value") - 40.0).abs() < 1e-9, "what it gives is as old as its sample");
+}

@@ -17,6 +17,11 @@ params! {
     linear_m_per_s2: Positive,
     /// Greatest change of the angular velocity [rad/s²].
     angular_rad_per_s2: Positive,
+    /// What is wanted faster than this counts as so fast: otherwise a motion that ends has to come down from a speed that
+    /// nobody ever went; none unless given [m/s].
+    linear_m_per_s: Option<Positive>,
+    /// The same for the rotation [rad/s].
+    angular_rad_per_s: Option<Positive>,
 }
 
 inputs! {
@@ -27,7 +32,7 @@ inputs! {
 outputs! {
     /// The same without jumps [m/s, rad/s].
     twist: Twist["A"],
-    /// How much of the output is the input, beside what is left of a jump [1].
+    /// How much of what is wanted is in the output, beside what is left of a jump [1].
     bumpless: Scalar["1"],
 }
 
@@ -38,10 +43,11 @@ state! {
     offset: Twist,
 }
 
-/// The accelerations.
+/// The accelerations and the speeds.
 pub struct Bumpless {
     linear: f64,
     angular: f64,
+    speeds: [f64; 2],
 }
 
 impl Node for Bumpless {
@@ -56,6 +62,9 @@ impl Node for Bumpless {
         the wanted motion jump. What a change exceeds half of the accelerations by becomes an offset, which fades at \
         the other half; so the output is smooth before any limiter sees it, and it is exactly the input, without lag, \
         as soon as the offset is gone.\n\n\
+        What is wanted faster than `linear_m_per_s` and `angular_rad_per_s` counts as so fast, in the same direction: a \
+        controller may want a hundred times what the arm may do, and when its contact is lost the motion would have \
+        to come down from there. Give it the speeds of the `twist_limit` behind it.\n\n\
         An absent motion is none: the output goes on until it has come to rest, and is absent then. It stands behind \
         the sum of all motions and before the limiters, which it knows nothing of.";
     const EXAMPLE: &'static str = r#"
@@ -77,7 +86,8 @@ angular_rad_per_s2 = 10.0
             return Err(crate::unwired(Self::NAME, "twist", "a twist", "sum.twist").into());
         }
         setup.outputs.bumpless = ScalarShape::of(Unit::ONE).within(0.0, 1.0);
-        Ok(Self { linear: *params.linear_m_per_s2, angular: *params.angular_rad_per_s2 })
+        let speeds = [params.linear_m_per_s, params.angular_rad_per_s].map(|speed| speed.map_or(f64::INFINITY, |s| *s));
+        Ok(Self { linear: *params.linear_m_per_s2, angular: *params.angular_rad_per_s2, speeds })
     }
 
     fn state(&self) -> State {
@@ -89,14 +99,16 @@ angular_rad_per_s2 = 10.0
         let (linear, angular) = (0.5 * self.linear * dt, 0.5 * self.angular * dt);
         // What the runtime holds at zero starts from zero when it may go on.
         let twist = inputs.twist.filter(|_| !tick.is_halted);
-        let wanted = twist.map_or_else(Twist::default, |twist| countable(&twist));
+        let mut wanted = twist.map_or_else(Twist::default, |twist| countable(&twist));
+        let pace = share(&wanted, self.speeds[0], self.speeds[1]);
+        wanted.0 *= pace;
         let smooth = smooth(&wanted, &mut state.last, &mut state.offset, [linear, angular]);
         if twist.is_none() && state.offset == Twist::default() {
             return;
         }
         out.twist.set(smooth);
         let (own, left) = (times(&wanted, self.linear, self.angular), times(&state.offset, self.linear, self.angular));
-        out.bumpless.set(if left > 0.0 { own / (own + left) } else { 1.0 });
+        out.bumpless.set(pace * if left > 0.0 { own / (own + left) } else { 1.0 });
     }
 }
 
@@ -156,6 +168,21 @@ mod tests {
             rig.step();
         }
         assert_eq!(rig.freshness("twist"), Freshness::Absent);
+    }
+
+    #[test]
+    fn a_motion_that_ends_comes_down_from_the_speed_that_was_gone() {
+        let params = format!("{ACCELERATIONS}\nlinear_m_per_s = 0.05\nangular_rad_per_s = 0.8");
+        let mut rig = NodeRig::new::<Bumpless>(&params, &[("twist", TwistShape.into())]).unwrap();
+        for _ in 0..200 {
+            rig.set("twist", along_x(9.0));
+            rig.step();
+        }
+        assert!((rig.get::<Twist>("twist").unwrap().0[0] - 0.05).abs() < 1e-12);
+        rig.lose("twist");
+        // 0.05 m/s at half of 1 m/s² are 100 ms.
+        (0..101).for_each(|_| rig.step());
+        assert_eq!(rig.get::<Twist>("twist"), None);
     }
 
     #[test]

@@ -20,7 +20,7 @@ params! {
     /// Ceiling of a single tactel [unit of the image].
     peak: Positive,
     /// Share of a ceiling from which on the way in is slowed down; 1 bars it only at the ceiling [1].
-    begin: Ratio = Ratio(0.8),
+    begin: Ratio = Ratio(0.5),
     /// Greatest speed of the way in at `begin` [m/s].
     approach_m_per_s: Positive,
     /// Greatest age of the image; five periods of the graph unless given [ms].
@@ -87,6 +87,8 @@ impl Node for ContactLimit {
         the pad, at the centre of gravity for the force and at the highest tactel for the peak.\n\n\
         It reads the whole image, since what presses beside the chosen region presses too. When the image is older \
         than `max_age_ms` there is no motion: a blind sensor does not move. Negative tactels do not count.\n\n\
+        It does not foresee what a stiff object adds while the motion brakes: about the stiffness times the way of a \
+        stop. Against hard objects take a lower `begin` or a smaller `approach_m_per_s`.\n\n\
         The ceilings are in the unit of the image; on pressures the sum is no force.";
     const EXAMPLE: &'static str = r#"
 [nodes.contact_limit]

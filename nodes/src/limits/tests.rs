@@ -120,7 +120,7 @@ fn nothing_that_presses_limits_nothing() {
 
 #[test]
 fn the_way_in_is_slowed_down_in_a_straight_line_from_begin_to_the_ceiling() {
-    let mut rig = rig::<ContactLimit>(CEILINGS);
+    let mut rig = rig::<ContactLimit>(&format!("{CEILINGS}\nbegin = 0.8"));
     // Times the ceiling of the sum, and what is left of a way in of 0.5 m/s; 0.2 m/s are allowed at 0.8.
     let cases = [(0.79, 0.5), (0.8, 0.2), (0.9, 0.1), (0.95, 0.05), (1.0, 0.0), (3.0, 0.0)];
     for (times, passes) in cases {

@@ -137,6 +137,7 @@ fn counted(counters: &Counters) -> String {
         (counters.gaps, "missing in the sequence"),
         (counters.late, "late by more than a period"),
         (counters.went_back, "dropped for going back"),
+        (counters.ahead, "dropped for lying in the future"),
         (counters.not_finite, "dropped for not being finite"),
     ];
     let counts = counts.into_iter().filter(|(count, _)| *count > 0);

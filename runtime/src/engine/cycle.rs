@@ -32,7 +32,12 @@ impl Engine {
         if let Some(by) = self.lateness.take() {
             self.meet(self.policy.deadline, Trouble::Late(by))?;
         }
-        let has_sampled = self.exchange_with_devices(now)? || due;
+        let has_sampled = self.exchange_with_devices(now) || due;
+        for i in 0..self.decks.len() {
+            if self.decks[i].failed.is_some() {
+                self.meet(self.policy.device.0, Trouble::Device(i))?;
+            }
+        }
         self.timeline.ticked(now, has_sampled);
         if self.timeline.is_on_timer() {
             self.meet(self.policy.clock, Trouble::Clock)?;
@@ -165,7 +170,7 @@ impl Engine {
         self.core.begin(now);
         let is_still = self.core.ramp(&mut self.decks, self.timeline.period() as f64 * 1e-9);
         // A device that fails now has had its zero or will time out by itself; the reason of the stop stays the first.
-        let _ = self.exchange_with_devices(now);
+        self.exchange_with_devices(now);
         is_still
     }
 
@@ -177,8 +182,9 @@ impl Engine {
         })
     }
 
-    /// Whether a live clock device has sampled.
-    fn exchange_with_devices(&mut self, now: i64) -> Result<bool, Fault> {
+    /// Hands every device its commands and takes its samples: one that fails keeps no other from its command. Whether a
+    /// live clock device has sampled.
+    fn exchange_with_devices(&mut self, now: i64) -> bool {
         let mut has_sampled = false;
         for i in 0..self.decks.len() {
             let deck = &mut self.decks[i];
@@ -198,11 +204,8 @@ impl Engine {
                 }
                 Edge::Idle(_) | Edge::Gone => {}
             }
-            if self.decks[i].failed.is_some() {
-                self.meet(self.policy.device.0, Trouble::Device(i))?;
-            }
         }
-        Ok(has_sampled)
+        has_sampled
     }
 
     /// A device has failed: it is not touched again.

@@ -18,6 +18,8 @@ pub struct Counters {
     pub late: u64,
     /// Samples that were dropped because they are older than the last.
     pub went_back: u64,
+    /// Samples that were dropped because their stamp lies more than a period ahead of the graph's clock.
+    pub ahead: u64,
     /// Samples that were dropped because they are not finite.
     pub not_finite: u64,
 }
@@ -77,6 +79,8 @@ impl Inlet {
             Some((_, sequence)) if sequence == sample.sequence => self.counters.repeated += 1,
             Some((stamp, _)) if sample.stamp == stamp => self.counters.repeated += 1,
             Some((stamp, _)) if sample.stamp < stamp => self.counters.went_back += 1,
+            // Taken over, it would look fresh for as long as it lies ahead, and keep all that come after it out.
+            _ if sample.stamp - now > self.period => self.counters.ahead += 1,
             _ => {
                 self.last = Some((sample.stamp, sample.sequence));
                 self.counters.new += 1;

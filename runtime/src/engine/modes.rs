@@ -232,7 +232,8 @@ impl Exit {
             (Condition::Sent(word), _) => sent == Some(word),
             (Condition::Travel(_, greatest), Look::Port(place)) => self.memory.travel(bus, tick, place.id) > *greatest,
             (Condition::Lost(_, after), Look::Port(place)) => {
-                let says_yes = seen(bus, tick, place).is_some_and(|seen| seen.is_new && seen.value != Some(0.0));
+                let says_yes = seen(bus, tick, place)
+                    .is_some_and(|seen| seen.is_new && (place.kind != Kind::Flag || seen.value != Some(0.0)));
                 if says_yes {
                     self.memory.said_yes = Some(tick.now);
                 }

@@ -1,6 +1,7 @@
 //! The edge to real time: pacing, live devices, the operator's Ctrl-C; and the end of every run, which is a ramp to zero.
 
 use std::io;
+use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::time::{Duration, Instant};
 
 use tokio::runtime::{Builder, Runtime};
@@ -64,9 +65,11 @@ pub struct Outcome {
 pub fn run(engine: &mut Engine, options: &RunOptions, observe: &mut dyn FnMut(&Engine)) -> io::Result<Outcome> {
     let runtime = Builder::new_multi_thread().worker_threads(1).enable_all().build()?;
     let mut shell = Shell::start(engine, options, &runtime)?;
-    let end = shell.run(engine, observe);
+    // Whatever unwinds through here, the arm is brought to rest first.
+    let end = catch_unwind(AssertUnwindSafe(|| shell.run(engine, observe)));
     let (time, ticks) = (engine.now(), engine.ticks());
     shell.stop(engine);
+    let end = end.unwrap_or_else(|panic| resume_unwind(panic));
     Ok(Outcome { end, time, ticks, wall: shell.epoch.elapsed(), late: engine.late() })
 }
 
@@ -74,6 +77,8 @@ struct Shell<'a> {
     runtime: &'a Runtime,
     epoch: Instant,
     is_real: bool,
+    /// Whether any device runs on its own.
+    is_live: bool,
     /// Last time of a tick [ns].
     until: i64,
     interrupted: watch::Receiver<bool>,
@@ -101,11 +106,12 @@ impl<'a> Shell<'a> {
                 other => other,
             };
         }
-        let is_real = options.is_realtime || !drivers.is_empty();
+        let is_live = !drivers.is_empty();
+        let is_real = options.is_realtime || is_live;
         let until = options.duration.map_or(i64::MAX, |seconds| (seconds * 1e9) as i64);
         let interrupted = runtime.block_on(async { interrupts() })?;
         let words = Words::new(&options.sends, options.listens);
-        Ok(Self { runtime, epoch, is_real, until, interrupted, drivers, tasks, words, is_on_timer: false })
+        Ok(Self { runtime, epoch, is_real, is_live, until, interrupted, drivers, tasks, words, is_on_timer: false })
     }
 
     fn run(&mut self, engine: &mut Engine, observe: &mut dyn FnMut(&Engine)) -> End {
@@ -196,8 +202,9 @@ impl<'a> Shell<'a> {
             }
         });
         let now = self.epoch.elapsed().as_nanos() as i64;
-        // Stepped devices live in virtual time: a late tick is still the tick of its time.
-        (if has_live_clock { now } else { next.max(engine.now()) }, now - next)
+        // Stepped devices live in virtual time: a late tick is still the tick of its time. A live one would get all ticks
+        // that were missed at once.
+        (if has_live_clock || self.is_live { now } else { next.max(engine.now()) }, now - next)
     }
 
     /// Live devices that have ended with an error, or that have ended at all, are lost.
@@ -217,12 +224,18 @@ impl<'a> Shell<'a> {
     fn stop(&mut self, engine: &mut Engine) {
         /// How long a driver may take to end.
         const GRACE: Duration = Duration::from_secs(1);
+        /// How long a driver has for its last command.
+        const LAST_WORD: Duration = Duration::from_millis(50);
         while !engine.wind_down() {
             if self.is_real {
                 std::thread::sleep(Duration::from_nanos(engine.period() as u64));
             }
         }
         engine.wind_down();
+        if self.is_live {
+            // A driver reads the zero before it hears that it may end.
+            std::thread::sleep(LAST_WORD);
+        }
         for deck in &engine.decks {
             if let Edge::Live(linked) = &deck.edge {
                 linked.stop.send_replace(true);
@@ -269,19 +282,26 @@ fn interrupts() -> io::Result<watch::Receiver<bool>> {
 struct Signals {
     interrupt: tokio::signal::unix::Signal,
     terminate: tokio::signal::unix::Signal,
+    /// The terminal is gone.
+    hangup: tokio::signal::unix::Signal,
 }
 
 #[cfg(unix)]
 impl Signals {
     fn catch() -> io::Result<Self> {
         use tokio::signal::unix::{SignalKind, signal};
-        Ok(Self { interrupt: signal(SignalKind::interrupt())?, terminate: signal(SignalKind::terminate())? })
+        Ok(Self {
+            interrupt: signal(SignalKind::interrupt())?,
+            terminate: signal(SignalKind::terminate())?,
+            hangup: signal(SignalKind::hangup())?,
+        })
     }
 
     async fn next(&mut self) -> io::Result<()> {
         tokio::select! {
             _ = self.interrupt.recv() => {}
             _ = self.terminate.recv() => {}
+            _ = self.hangup.recv() => {}
         }
         Ok(())
     }

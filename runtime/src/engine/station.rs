@@ -63,6 +63,9 @@ pub(crate) struct Station {
     others: Box<[Watch]>,
     aged: Box<[Aged]>,
     is_every_tick: bool,
+    /// Number of the node's configuration, and whether it has not stepped with it yet.
+    configuration: usize,
+    is_switched: bool,
     absence: Absence,
 }
 
@@ -98,6 +101,8 @@ impl Station {
             others: others.map(|(need, mark)| Watch::new(need, mark)).collect(),
             aged: Box::default(),
             is_every_tick,
+            configuration: 0,
+            is_switched: false,
             absence: Absence::Nothing,
         }
     }
@@ -112,8 +117,11 @@ impl Station {
         self.node.want(wanted);
     }
 
-    /// Goes on with another configuration of the node; its state stays.
+    /// Goes on with another configuration of the node; its state stays. It steps with what it has, and does not wait for
+    /// the next sample: a slow sensor must not keep the motion of the mode before.
     pub(super) fn switch(&mut self, configuration: usize) {
+        self.is_switched |= configuration != self.configuration;
+        self.configuration = configuration;
         self.node.switch(configuration);
     }
 
@@ -123,7 +131,8 @@ impl Station {
         for aged in &self.aged {
             aged.pass(bus, tick);
         }
-        let (mut is_woken, mut is_missing, mut stamp) = (self.is_every_tick, false, Stamp::TIMELESS);
+        let is_switched = std::mem::take(&mut self.is_switched);
+        let (mut is_woken, mut is_missing, mut stamp) = (self.is_every_tick | is_switched, false, Stamp::TIMELESS);
         for mark in self.required.iter().map(|mark| &bus.marks[*mark as usize]) {
             is_woken |= mark.changed_in(tick.index);
             is_missing |= !mark.is_present();

@@ -42,6 +42,7 @@ pub fn plan(catalogue: &Catalogue, request: &Request) -> Result<Plan, Report> {
     let period = clock.map_or(1.0, |(_, period)| period);
     let mut builder = Builder::new(catalogue, &model, &opened, frames, (found, sources), period);
     let mut nodes: Vec<PlannedNode> = order.iter().filter_map(|node| builder.node(*node, &wires[*node])).collect();
+    builder.found.extend(short_gap(&flat, period));
     builder.delayed(&wires);
     let wiring = Wiring { order: &order, wires: &wires, commands: &commands };
     let modes = modes::plan(&mut builder, &mut nodes, &wiring);
@@ -98,6 +99,16 @@ fn max_gap(table: Option<&GraphTable>, period: f64) -> f64 {
     /// As many periods are one step at most.
     const GREATEST_GAP: f64 = 5.0;
     table.and_then(|table| table.max_gap_ms).map_or(GREATEST_GAP * period, |ms| *ms * 1e-3)
+}
+
+/// A greatest gap that is shorter than a period: every step would count as less than it is.
+fn short_gap(flat: &Flat, period: f64) -> Option<Diagnostic> {
+    let gap = *flat.table.as_ref()?.max_gap_ms?;
+    let span = flat.settings.as_ref()?.as_table()?.get("max_gap_ms")?.span.clone();
+    // A period is a whole number of nanoseconds, so the same number may be a little more.
+    let message = format!("`max_gap_ms` of {gap} is less than a period, {:.3} ms", period * 1e3);
+    let is_short = gap * 1e-3 < period * (1.0 - 1e-6);
+    is_short.then(|| Diagnostic::new(Code::BadValue, span, message).help("a period is the least that makes sense"))
 }
 
 /// What makes the graph tick, and how often [s].

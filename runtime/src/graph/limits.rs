@@ -50,6 +50,7 @@ pub(crate) fn compare(model: &Model<'_>, is_limited: bool, found: &mut Vec<Diagn
         };
         found.push(Diagnostic::new(Code::UnknownKey, key.span.clone(), message).help(help));
     }
+    asked.iter().for_each(|asked| found.extend(other_unit(asked)));
     missing(model.flat, &asked, found);
 }
 
@@ -71,6 +72,25 @@ fn missing(flat: &Flat, asked: &[Asked<'_>], found: &mut Vec<Diagnostic>) {
     let diagnostic =
         Diagnostic::new(Code::MissingLimit, span, message).note(first.span.clone(), "it is asked for here");
     found.push(diagnostic.help(format!("add under [limits]:{}", lines.collect::<String>())));
+}
+
+/// A number whose name says another unit than the parameter that takes it.
+fn other_unit(asked: &Asked<'_>) -> Option<Diagnostic> {
+    const UNITS: [(&str, &str); 7] = [
+        ("_m_per_s2", "m/s²"),
+        ("_rad_per_s2", "rad/s²"),
+        ("_m_per_s", "m/s"),
+        ("_rad_per_s", "rad/s"),
+        ("_n", "N"),
+        ("_rad", "rad"),
+        ("_m", "m"),
+    ];
+    let (_, says) = UNITS.iter().find(|(end, _)| asked.key.ends_with(end))?;
+    let spec = asked.spec?;
+    let takes = spec.unit()?.split(';').next()?.trim();
+    let is_known = UNITS.iter().any(|(_, unit)| *unit == takes);
+    let message = format!("`{}` is in {says}, but `{}` takes {takes}", asked.key, spec.name);
+    (is_known && takes != *says).then(|| Diagnostic::new(Code::UnitMismatch, asked.span.clone(), message))
 }
 
 fn collect<'a>(value: &Value, spec: Option<&'a ParamSpec>, asked: &mut Vec<Asked<'a>>) {
