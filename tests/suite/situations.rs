@@ -1,5 +1,6 @@
 //! What the arm is told in each of a table of situations: `situations/NAME.toml` says what happens to a graph that
-//! ships, `situations/NAME.csv` what came of it. With `TACTFLOW_BLESS=1` the latter are written anew; read the difference
+//! ships, `situations/NAME.csv` what came of it, the ramp at the end too; `situations/spoilt` holds the same of runs in which a
+//! type of node goes wrong. With `TACTFLOW_BLESS=1` the latter are written anew; read the difference
 //! before you commit it.
 //!
 //! In all of them, tick by tick: neither the motion before the limiters nor the one behind them nor any joint ever
@@ -7,7 +8,7 @@
 
 use std::fmt::Write;
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
 use tactflow_runtime::engine::Engine;
@@ -156,6 +157,10 @@ impl Watch {
                 assert!((new - old).abs() <= self.allowed.joint * period + 1e-9, "{what}: from {old} to {new}");
                 assert!(new.abs() <= old.abs() && new * old >= 0.0, "{what}: from {old} to {new} is not toward zero");
             }
+            let time = self.engine.now() as f64 * 1e-9;
+            write!(self.csv, "{time:.3},ramp{}", ",".repeat(12)).unwrap();
+            now.iter().for_each(|velocity| write!(self.csv, ",{velocity:.5}").unwrap());
+            self.csv.push('\n');
             last = now;
             if is_still {
                 break;
@@ -185,13 +190,22 @@ fn check(path: &Path) {
     let are_meant = halts.len() == situation.halts.len()
         && halts.iter().zip(&situation.halts).all(|(halt, meant)| halt.starts_with(meant));
     assert!(are_meant, "{what}: {halts:#?}");
-    let file = path.with_extension("csv");
+    compare(&path.with_extension("csv"), &watch.csv);
+}
+
+/// Compares a course with the one that is kept.
+fn compare(file: &Path, csv: &str) {
     if std::env::var_os("TACTFLOW_BLESS").is_some() {
-        fs::write(&file, &watch.csv).unwrap();
+        fs::write(file, csv).unwrap();
     }
-    let known = fs::read_to_string(&file).unwrap_or_default();
-    let differs = known.lines().zip(watch.csv.lines()).find(|(known, now)| known != now);
-    assert!(differs.is_none() && known.len() == watch.csv.len(), "{what}: {differs:?}");
+    let known = fs::read_to_string(file).unwrap_or_default();
+    let differs = known.lines().zip(csv.lines()).find(|(known, now)| known != now);
+    assert!(differs.is_none() && known.len() == csv.len(), "{}: {differs:?}", file.display());
+}
+
+/// Where the course is kept of a run in which that node type goes wrong.
+fn spoilt(kind: &str, how: &str) -> PathBuf {
+    workspace().join(format!("tests/situations/spoilt/{how}_{kind}.csv"))
 }
 
 #[test]
@@ -240,7 +254,7 @@ fn a_nan_at_each_node_in_turn_ends_the_run_and_names_it() {
         assert!(names.contains(&fault.node), "{kind}: {fault}");
         assert!(fault.to_string().contains("is not a finite number in tick"), "{fault}");
         assert!(fault.tick >= 20 && fault.place.contains(".toml:"), "{fault}");
-        drop(watch);
+        compare(&spoilt(kind, "nan"), &watch.csv);
     }
 }
 
@@ -248,12 +262,13 @@ fn a_nan_at_each_node_in_turn_ends_the_run_and_names_it() {
 fn a_panic_at_each_node_in_turn_ends_the_run_and_names_it() {
     let hook = std::panic::take_hook();
     std::panic::set_hook(Box::new(|_| {}));
-    let faults: Vec<_> =
-        types().into_iter().map(|(kind, names)| (names, sabotage(&kind, How::Panic, u64::MAX, &[]).1)).collect();
+    let spoilt_runs: Vec<_> =
+        types().into_iter().map(|(kind, names)| (sabotage(&kind, How::Panic, u64::MAX, &[]), kind, names)).collect();
     std::panic::set_hook(hook);
-    for (names, fault) in faults {
+    for ((watch, fault), kind, names) in spoilt_runs {
         let fault = fault.unwrap_or_else(|| panic!("{names:?}: nothing happened"));
         assert!(names.contains(&fault.node) && fault.tick >= 20, "{fault}");
         assert!(fault.to_string().contains("panicked: sabotage in tick"), "{fault}");
+        compare(&spoilt(&kind, "panic"), &watch.csv);
     }
 }
