@@ -137,8 +137,8 @@ impl AnyNode for Saboteur {
         self.sound.adopt(other.sound)
     }
 
-    fn switch(&mut self, configuration: usize) {
-        self.sound.switch(configuration);
+    fn switch(&mut self, configuration: usize) -> bool {
+        self.sound.switch(configuration)
     }
 
     fn uses(&self, wanted: &[Components]) -> Vec<Components> {

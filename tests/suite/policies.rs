@@ -127,7 +127,7 @@ fn a_tick_that_begins_late_is_told_with_its_own_number() {
         for (i, ms) in [0.0, 10.0, 35.0, 40.0].into_iter().enumerate() {
             rig.feed("a", 0, ms, 1.0);
             if i == 2 {
-                rig.engine.is_late(15_000_000);
+                rig.engine.begin_late(15_000_000);
             }
             fault = fault.or(rig.tick(ms).err());
         }

@@ -140,7 +140,7 @@ impl Engine {
     }
 
     /// The next tick begins `by` [ns] too late, by a real clock.
-    pub fn is_late(&mut self, by: i64) {
+    pub fn begin_late(&mut self, by: i64) {
         self.late += 1;
         self.lateness = Some(by);
     }

@@ -74,7 +74,8 @@ impl Inlet {
             return;
         }
         self.writes = sample.writes;
-        let missing = self.seen.replace(sample.sequence).map_or(0, |seen| sample.sequence.saturating_sub(seen + 1));
+        let missing =
+            self.seen.replace(sample.sequence).map_or(0, |seen| sample.sequence.saturating_sub(seen.saturating_add(1)));
         match self.last {
             Some((_, sequence)) if sequence == sample.sequence => self.counters.repeated += 1,
             Some((stamp, _)) if sample.stamp == stamp => self.counters.repeated += 1,

@@ -152,7 +152,7 @@ impl<'a> Shell<'a> {
             }
         }
         if late > engine.period() {
-            engine.is_late(late);
+            engine.begin_late(late);
         }
         engine.tick(now).map(|()| true)
     }

@@ -63,8 +63,7 @@ pub(crate) struct Station {
     others: Box<[Watch]>,
     aged: Box<[Aged]>,
     is_every_tick: bool,
-    /// Number of the node's configuration, and whether it has not stepped with it yet.
-    configuration: usize,
+    /// Whether the node has another configuration, and has not stepped with it yet.
     is_switched: bool,
     absence: Absence,
 }
@@ -101,7 +100,6 @@ impl Station {
             others: others.map(|(need, mark)| Watch::new(need, mark)).collect(),
             aged: Box::default(),
             is_every_tick,
-            configuration: 0,
             is_switched: false,
             absence: Absence::Nothing,
         }
@@ -120,9 +118,7 @@ impl Station {
     /// Goes on with another configuration of the node; its state stays. It steps with what it has, and does not wait for
     /// the next sample: a slow sensor must not keep the motion of the mode before.
     pub(super) fn switch(&mut self, configuration: usize) {
-        self.is_switched |= configuration != self.configuration;
-        self.configuration = configuration;
-        self.node.switch(configuration);
+        self.is_switched |= self.node.switch(configuration);
     }
 
     /// Steps the node if a trigger is new or lost, and makes its outputs absent if something required is. The tick's

@@ -91,9 +91,10 @@ pub trait AnyNode: Any + Send {
     fn adopt(&mut self, other: Box<dyn AnyNode>) -> Result<usize, Box<dyn AnyNode>> {
         Err(other)
     }
-    /// Goes on with the configuration of that number, without allocating; the state stays.
-    fn switch(&mut self, configuration: usize) {
+    /// Goes on with the configuration of that number, without allocating; the state stays. Whether it is another.
+    fn switch(&mut self, configuration: usize) -> bool {
         let _ = configuration;
+        false
     }
     /// See [`Node::uses`].
     fn uses(&self, wanted: &[Components]) -> Vec<Components> {
@@ -190,11 +191,11 @@ impl<N: Node> AnyNode for Cell<N> {
         Err(other)
     }
 
-    fn switch(&mut self, configuration: usize) {
-        if let Some(next) = self.parked[configuration].take() {
-            self.parked[self.number] = Some(std::mem::replace(&mut self.active, next));
-            self.number = configuration;
-        }
+    fn switch(&mut self, configuration: usize) -> bool {
+        let Some(next) = self.parked[configuration].take() else { return false };
+        self.parked[self.number] = Some(std::mem::replace(&mut self.active, next));
+        self.number = configuration;
+        true
     }
 
     fn uses(&self, wanted: &[Components]) -> Vec<Components> {
