@@ -28,6 +28,9 @@
 //! # Ok::<(), tactflow_runtime::fault::Fault>(())
 //! ```
 
+#[macro_use]
+mod words;
+
 pub mod arm;
 pub mod builtin;
 pub mod calibration;
@@ -37,6 +40,7 @@ pub mod limits;
 pub mod recordings;
 pub mod roles;
 pub mod servo;
+pub mod sim;
 #[cfg(feature = "cli")]
 mod tool;
 pub mod touch;
@@ -59,6 +63,7 @@ pub fn catalogue() -> Catalogue {
         .device::<devices::mock_pad::MockPad>()
         .device::<devices::recording::Player>()
         .device::<devices::mock_arm::MockArm>()
+        .device::<sim::bench::SimBench>()
         .group("touch: from a tactile image to features of the contact")
         .node::<touch::tactile_source::TactileSource>()
         .node::<touch::calibrate::Calibrate>()

@@ -6,13 +6,12 @@
 //! that is the windup that a bound on the lead is for. It is kinematic: it leaves out inertia, friction, stiffness,
 //! delay and noise, so what works on it need not work on an arm.
 
-use std::borrow::Cow;
-
 use tactflow_runtime::device::{Commands, Description, Device, DeviceError, Driver, Filled, Opened, Samples, Stepped};
 use tactflow_runtime::node::{FilePath, Mistake, Mistakes, NonNegative, Positive, Rate};
 use tactflow_runtime::params;
 use tactflow_runtime::signal::{Joint, Joints, JointsShape, Unit};
 
+use super::arm_facts::{check_start, facts};
 use super::{nanos, period_of};
 use crate::arm::model::load;
 use crate::arm::mount::Mount;
@@ -97,7 +96,7 @@ start = [0.0, 0.5, 0.0, -1.3, 0.0, 1.3, 0.0]   # [rad]
             role: "velocity_arm".into(),
             outputs: vec![shape.clone().into(), shape.clone().into()],
             commands: vec![shape.in_unit(Unit::RADIAN.per_second()).into()],
-            facts: facts(&params)?,
+            facts: facts(&params.urdf, &params.tip, &params.mount)?,
         };
         let arm = Self::new(joints, params.start, params.hold, period);
         let description = Description { fills: vec![filled], period: period as f64 * 1e-9 };
@@ -153,36 +152,6 @@ fn check_holds(holds: &[Hold]) -> Result<(), Mistakes> {
     let message = |hold: &Hold| format!("a hold from {} s to {} s lasts no time", *hold.from_s, *hold.to_s);
     let mistakes: Mistakes = backward.map(|hold| Mistake::param("hold", message(hold))).collect();
     if mistakes.is_empty() { Ok(()) } else { Err(mistakes) }
-}
-
-fn check_start(joints: &[Joint], start: &[f64]) -> Result<(), Mistakes> {
-    if start.len() != joints.len() {
-        let message = format!("`start` has {} entries, but the arm has {} joints", start.len(), joints.len());
-        return Err(Mistake::param("start", message).into());
-    }
-    let outside = joints.iter().zip(start).filter(|(joint, q)| !(joint.lower..=joint.upper).contains(*q));
-    let mistakes: Mistakes = outside
-        .map(|(Joint { name, lower, upper, .. }, q)| {
-            let message = format!("joint `{name}` cannot start at {q}: it goes from {lower:.4} to {upper:.4}");
-            Mistake::param("start", message)
-        })
-        .collect();
-    if mistakes.is_empty() { Ok(()) } else { Err(mistakes) }
-}
-
-/// What `arm_state` wants to know. The path is absolute, since the graph that asks may stand in another folder.
-fn facts(params: &Params) -> Result<Vec<(Cow<'static, str>, toml::Value)>, Mistakes> {
-    let urdf = match params.urdf.builtin {
-        Some(_) => params.urdf.path.clone(),
-        None => std::path::absolute(&params.urdf.path).map_err(|error| Mistake::unreadable(&params.urdf, &error))?,
-    };
-    let Some(urdf) = urdf.to_str() else {
-        return Err(Mistake::param("urdf", "the path of the model is not UTF-8 text").into());
-    };
-    let list = |numbers: [f64; 3]| toml::Value::from(numbers.to_vec());
-    let mount = [("xyz".into(), list(params.mount.xyz)), ("rpy".into(), list(params.mount.rpy))];
-    let mount = toml::Value::Table(mount.into_iter().collect());
-    Ok(vec![("urdf".into(), urdf.into()), ("tip".into(), params.tip.as_str().into()), ("mount".into(), mount)])
 }
 
 #[cfg(test)]

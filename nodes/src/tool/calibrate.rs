@@ -9,7 +9,7 @@ use tactflow_runtime::diagnostic::{Code, Diagnostic, Report as Mistakes};
 use tactflow_runtime::graph::Sources;
 use tactflow_runtime::signal::Unit;
 
-use super::{pair, positive};
+use super::{may_replace, pair, positive};
 use crate::calibration::log::Log;
 use crate::calibration::report::{Report, Settings, State, calibrate};
 use crate::calibration::samples::Load;
@@ -162,16 +162,6 @@ fn make(args: &Calibrate, shell: &Shell) -> Result<(), Failure> {
         shell.say(&format!("wrote {}", path.display()));
     }
     Ok(())
-}
-
-/// Refuses to replace what is something else.
-fn may_replace(path: &Path, what: &str, is_one: impl Fn(&str) -> bool) -> Result<(), String> {
-    match std::fs::read(path) {
-        Ok(bytes) if str::from_utf8(&bytes).is_ok_and(is_one) => Ok(()),
-        Ok(_) => Err(format!("`{}` is there and is no {what}: it is not replaced", path.display())),
-        Err(error) if error.kind() == std::io::ErrorKind::NotFound => Ok(()),
-        Err(error) => Err(format!("cannot write `{}`: {error}", path.display())),
-    }
 }
 
 fn write(path: &Path, text: &str) -> Result<(), String> {

@@ -2,7 +2,9 @@
 
 mod calibrate;
 mod features;
+mod press;
 
+use std::path::Path;
 use std::str::FromStr;
 
 use tactflow_runtime::catalogue::Catalogue;
@@ -11,7 +13,10 @@ use tactflow_runtime::cli::{Tool, derived};
 /// The whole tool, on a catalogue that has this crate's in it.
 #[must_use]
 pub fn tool(catalogue: Catalogue) -> Tool {
-    Tool::new(catalogue).command(derived(features::features)).command(derived(calibrate::run))
+    Tool::new(catalogue)
+        .command(derived(features::features))
+        .command(derived(calibrate::run))
+        .command(derived(press::run))
 }
 
 /// Two of a kind, as 5x5 or 5,5: a parser for arguments.
@@ -25,4 +30,14 @@ fn pair<T: FromStr>(text: &str) -> Result<[T; 2], String> {
 fn positive(text: &str) -> Result<f64, String> {
     let number = text.parse().ok().filter(|number: &f64| *number > 0.0 && number.is_finite());
     number.ok_or_else(|| format!("`{text}` is not a number greater than 0"))
+}
+
+/// Refuses to replace what is something else.
+fn may_replace(path: &Path, what: &str, is_one: impl Fn(&str) -> bool) -> Result<(), String> {
+    match std::fs::read(path) {
+        Ok(bytes) if str::from_utf8(&bytes).is_ok_and(is_one) => Ok(()),
+        Ok(_) => Err(format!("`{}` is there and is no {what}: it is not replaced", path.display())),
+        Err(error) if error.kind() == std::io::ErrorKind::NotFound => Ok(()),
+        Err(error) => Err(format!("cannot write `{}`: {error}", path.display())),
+    }
 }

@@ -6,37 +6,6 @@
 //! Beside them: [`select_region`] takes other regions than the contact; [`hough`], [`eccentricity`], [`principal_axes`]
 //! and [`contact_area`] say more of a region's shape; [`one_pole`] and [`median`] are other filters.
 
-/// Declares a parameter that is one of a few words.
-macro_rules! words {
-    ($(#[$doc:meta])* $Name:ident {
-        $(#[$first_doc:meta])* $First:ident = $first:literal,
-        $($(#[$other_doc:meta])* $Other:ident = $other:literal),* $(,)?
-    }) => {
-        $(#[$doc])*
-        #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-        pub enum $Name { $(#[$first_doc])* $First, $($(#[$other_doc])* $Other),* }
-
-        impl tactflow_runtime::node::Param for $Name {
-            const EXPECTS: &'static str = concat!("one of `", $first, "`" $(, ", `", $other, "`")*);
-
-            fn read(
-                value: &tactflow_runtime::node::Value,
-                reader: &mut tactflow_runtime::node::Reader<'_>,
-            ) -> Option<Self> {
-                let word: String = tactflow_runtime::node::read_leaf(value, reader, Self::EXPECTS)?;
-                match word.as_str() {
-                    $first => Some(Self::$First),
-                    $($other => Some(Self::$Other),)*
-                    _ => {
-                        reader.wrong_type(value, Self::EXPECTS);
-                        None
-                    }
-                }
-            }
-        }
-    };
-}
-
 pub mod binarize;
 pub mod calibrate;
 pub mod contact_area;

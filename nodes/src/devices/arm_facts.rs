@@ -1,0 +1,49 @@
+//! What every arm states of itself.
+
+use std::borrow::Cow;
+
+use tactflow_runtime::node::{FilePath, Mistake, Mistakes};
+use tactflow_runtime::signal::Joint;
+
+use crate::arm::mount::Mount;
+
+/// Whether an arm can start at these positions [rad; m for a prismatic joint].
+///
+/// # Errors
+/// What is wrong with the parameter `start`.
+pub(crate) fn check_start(joints: &[Joint], start: &[f64]) -> Result<(), Mistakes> {
+    if start.len() != joints.len() {
+        let message = format!("`start` has {} entries, but the arm has {} joints", start.len(), joints.len());
+        return Err(Mistake::param("start", message).into());
+    }
+    let outside = joints.iter().zip(start).filter(|(joint, q)| !(joint.lower..=joint.upper).contains(*q));
+    let mistakes: Mistakes = outside
+        .map(|(Joint { name, lower, upper, .. }, q)| {
+            let message = format!("joint `{name}` cannot start at {q}: it goes from {lower:.4} to {upper:.4}");
+            Mistake::param("start", message)
+        })
+        .collect();
+    if mistakes.is_empty() { Ok(()) } else { Err(mistakes) }
+}
+
+/// What `arm_state` wants to know. The path is absolute, since the graph that asks may stand in another folder.
+///
+/// # Errors
+/// When the path of the model cannot be told.
+pub(crate) fn facts(
+    urdf: &FilePath,
+    tip: &str,
+    mount: &Mount,
+) -> Result<Vec<(Cow<'static, str>, toml::Value)>, Mistakes> {
+    let path = match urdf.builtin {
+        Some(_) => urdf.path.clone(),
+        None => std::path::absolute(&urdf.path).map_err(|error| Mistake::unreadable(urdf, &error))?,
+    };
+    let Some(path) = path.to_str() else {
+        return Err(Mistake::param("urdf", "the path of the model is not UTF-8 text").into());
+    };
+    let list = |numbers: [f64; 3]| toml::Value::from(numbers.to_vec());
+    let mount = [("xyz".into(), list(mount.xyz)), ("rpy".into(), list(mount.rpy))];
+    let mount = toml::Value::Table(mount.into_iter().collect());
+    Ok(vec![("urdf".into(), path.into()), ("tip".into(), tip.into()), ("mount".into(), mount)])
+}

@@ -1,0 +1,313 @@
+//! `sim_bench`: the simulated bench as a device: a pad, an arm and what they touch.
+//!
+//! It is stepped: it lives in virtual time, and the same commands and the same seed give the same bits. Between two
+//! exchanges the world goes on in steps of `step_s` at most, with the velocity that was commanded last. An image is
+//! taken at each beat of `rate_hz` and shown `latency_s` later, with the stamp of the moment it was taken.
+
+use std::borrow::Cow;
+use std::collections::VecDeque;
+
+use tactflow_runtime::device::{Commands, Description, Device, DeviceError, Driver, Filled, Opened, Samples, Stepped};
+use tactflow_runtime::node::{Count, FilePath, Mistake, Mistakes, NonNegative, Positive, Rate};
+use tactflow_runtime::params;
+use tactflow_runtime::signal::{Image, ImageShape, Joint, Joints, JointsShape, Unit};
+
+use super::contact::Contact;
+use super::foam::Foam;
+use super::imprint::Imprint;
+use super::joints::{Arm, Joint as SimJoint};
+use super::object::{Object, Thing};
+use super::random::Random;
+use super::readout::{Electronics, Readout};
+use super::world::{World, start};
+use crate::arm::chain::Chain;
+use crate::arm::model::load;
+use crate::arm::mount::Mount;
+use crate::devices::arm_facts::{check_start, facts};
+use crate::devices::{nanos, period_of};
+
+params! {
+    /// Seed of the noise and of where the objects are scattered.
+    seed: u64 = 1,
+    /// How long it runs; for ever unless given [s].
+    for_s: Option<Positive>,
+    /// What there is to touch.
+    objects: Vec<Thing> = vec![],
+    /// Number of rows of the pad.
+    rows: Count = Count(16),
+    /// Number of columns of the pad.
+    cols: Count = Count(16),
+    /// Distance between the centres of two neighbours, along x and along y [m].
+    pitch: Positive = Positive(0.005),
+    /// Frames per second [1/s].
+    rate_hz: Rate = Rate(250.0),
+    /// Time from when an image is taken until it is there [s].
+    latency_s: NonNegative = NonNegative(0.004),
+    /// The pad's calibration, which `calibrate` takes from it.
+    calibration: Option<FilePath>,
+    /// What it states as its noise threshold [N].
+    threshold: NonNegative = NonNegative(0.015),
+    /// What it states as the unit of pressure, the p = 1 of the paper [N per tactel].
+    pressure: Positive = Positive(0.1),
+    /// What the foam is like.
+    foam: Foam = Foam::USUAL,
+    /// What the electronics are like.
+    electronics: Electronics = Electronics::USUAL,
+    /// The arm's model.
+    urdf: FilePath,
+    /// Link that carries the sensor.
+    tip: String,
+    /// Pose of the sensor on that link.
+    mount: Mount = Mount::NONE,
+    /// Joint positions at the start, one a joint [rad].
+    start: Vec<f64>,
+    /// Stiffness of the joints [N m/rad].
+    stiffness: Positive = Positive(200.0),
+    /// Damping of the joints, of critical damping.
+    damping_ratio: NonNegative = NonNegative(0.2),
+    /// Inertia of each joint; those of an LWR's seven joints unless given [kg m²].
+    inertia: Option<Vec<f64>>,
+    /// Dry friction of the joints [N m].
+    friction: NonNegative = NonNegative(0.1),
+    /// What it states as the greatest acceleration of each joint [rad/s²].
+    acceleration: Positive = Positive(10.0),
+    /// Longest step of the simulation [s].
+    step_s: Positive = Positive(0.002),
+}
+
+/// Inertia of the joints of an LWR in a bent posture, rotors and all [kg m²].
+const INERTIA: [f64; 7] = [2.0, 2.0, 1.0, 0.8, 0.3, 0.25, 0.1];
+
+/// The bench.
+pub struct SimBench {
+    world: World,
+    readout: Readout,
+    joints: Vec<Joint>,
+    period: i64,
+    latency: i64,
+    end: i64,
+    last: Option<i64>,
+    /// Images that were taken and are not there yet, with their stamps.
+    taken: VecDeque<(i64, Vec<f32>)>,
+    /// Number of images that were shown.
+    shown: u64,
+    /// Number of exchanges that brought time on.
+    sequence: u64,
+    threshold: f64,
+}
+
+impl Device for SimBench {
+    type Params = Params;
+
+    const NAME: &'static str = "sim_bench";
+    const SUMMARY: &'static str = "a simulated bench: a pad of foam on an arm in joint impedance, and objects to touch";
+    const DOC: &'static str = "\
+The bench closes the loop without hardware: what the arm is told moves the pad, and what the pad touches gives the image \
+and pushes the arm back.\n\n\
+The pad is an elastic foundation of foam on a rigid plate, felt at points no more than 1 mm apart, each a spring that \
+stiffens, in series with the object's own stiffness. The foam spreads a load over its neighbours, and friction sticks and \
+slips at every tactel. Each tactel has its own squashed curve, hysteresis, creep and noise, and reads 12 bits: the image \
+is in raw counts, and `calibration` names the file that makes forces of them.\n\n\
+The arm is as in the paper: every joint a spring and a damper toward a posture that the commanded velocity moves, so the \
+pad yields and tilts under a load.\n\n\
+Objects stand where they are seen from the sensor at the start, z ahead of it: `at = [0.01, 0, 0.05]` is 1 cm to the \
+sensor's x and 5 cm before it. They are fixed, stand on a `mount` that gives way, or move as their `motion` says.\n\n\
+It lives in virtual time, and the same commands and seed give the same bits; with `--realtime` it is paced by the clock. \
+As `ground_truth` it gives what no sensor knows, to scenarios and records only.\n\n\
+Left out: gravity and the coupling of the joints, objects that turn, columns of foam that push each other, wear and \
+temperature.";
+    const EXAMPLE: &'static str = r#"
+[roles]
+pad = "tactile_pad"
+arm = "velocity_arm"
+
+[commands]
+arm.velocity = "joint_limit.velocity"
+
+[bind]
+pad = "bench"
+arm = "bench"
+
+[devices.bench]
+type = "sim_bench"
+for_s = 4.0                         # [s]
+urdf = "builtin:lwr4p.urdf"         # a KUKA LWR 4+
+tip = "lwr_7_link"
+mount = { xyz = [0.0, 0.0, 0.03] }  # of the sensor on the tip [m]
+start = [0.0, 0.5, 0.0, -1.3, 0.0, 1.3, 0.0]   # [rad]
+objects = [
+    { shape = "ball", radius = 0.04, at = [0.01, -0.005, 0.041] },   # 1 mm before the pad [m]
+]
+"#;
+
+    fn open(params: Params) -> Result<Opened, Mistakes> {
+        let chain = load(&params.urdf, &params.tip, &params.mount)?;
+        let acceleration = *params.acceleration;
+        let joints: Vec<Joint> = chain.joints().iter().map(|joint| Joint { acceleration, ..joint.clone() }).collect();
+        check_start(&joints, &params.start)?;
+        let shape = ImageShape { rows: params.rows.0, cols: params.cols.0, pitch: [*params.pitch; 2], unit: Unit::RAW };
+        check(&params, &shape)?;
+        let fills = vec![pad(&params, &shape)?, arm(&params, &joints)?];
+        let period = period_of(params.rate_hz);
+        let description = Description { fills, period: period as f64 * 1e-9 };
+        let bench = Self::new(params, chain, joints, shape, period)?;
+        Ok(Opened { description, driver: Driver::Stepped(Box::new(bench)) })
+    }
+}
+
+/// The most tactels that a simulated pad has.
+const MOST: usize = 128 * 128;
+/// The most frames that an image may be late by.
+const LATEST: f64 = 1000.0;
+
+fn check(params: &Params, shape: &ImageShape) -> Result<(), Mistakes> {
+    let mut mistakes = Mistakes::new();
+    if shape.tactels() > MOST {
+        let message = format!("{} by {} tactels are more than {MOST}", shape.rows, shape.cols);
+        mistakes.push(Mistake::param("rows", message));
+    }
+    if *params.latency_s * *params.rate_hz > LATEST {
+        mistakes.push(Mistake::param("latency_s", format!("an image may be late by {LATEST} frames at most")));
+    }
+    let foam = &params.foam;
+    if *foam.static_friction < *foam.sliding_friction {
+        mistakes.push(Mistake::param("foam.static_friction", "friction at rest is not less than in motion"));
+    }
+    if *params.step_s > 0.002 {
+        mistakes.push(Mistake::param("step_s", "the foam's motion needs steps of 0.002 s or less"));
+    }
+    if let Some(inertia) = &params.inertia {
+        if inertia.len() != params.start.len() {
+            let message =
+                format!("`inertia` has {} entries, but the arm has {} joints", inertia.len(), params.start.len());
+            mistakes.push(Mistake::param("inertia", message));
+        }
+        if inertia.iter().any(|inertia| !(0.01..=1e3).contains(inertia)) {
+            mistakes.push(Mistake::param("inertia", "an inertia is from 0.01 to 1000 kg m²"));
+        }
+    } else if params.start.len() != INERTIA.len() {
+        let message = format!("an arm of {} joints needs `inertia`", params.start.len());
+        mistakes.push(Mistake::new(
+            tactflow_runtime::diagnostic::Code::MissingKey,
+            tactflow_runtime::node::At::Node,
+            message,
+        ));
+    }
+    if mistakes.is_empty() { Ok(()) } else { Err(mistakes) }
+}
+
+fn pad(params: &Params, shape: &ImageShape) -> Result<Filled, Mistakes> {
+    let mut calibration = toml::Table::new();
+    if let Some(file) = &params.calibration {
+        let path = match file.builtin {
+            Some(_) => file.path.clone(),
+            None => std::path::absolute(&file.path).map_err(|error| Mistake::unreadable(file, &error))?,
+        };
+        let path = path.to_str().ok_or_else(|| Mistake::param("calibration", "the path is not UTF-8 text"))?;
+        calibration.insert("file".into(), path.into());
+    }
+    let facts: Vec<(Cow<'static, str>, toml::Value)> = vec![
+        ("dead".into(), toml::Value::Array(vec![])),
+        ("threshold".into(), (*params.threshold).into()),
+        ("pressure".into(), (*params.pressure).into()),
+        ("calibration".into(), calibration.into()),
+    ];
+    Ok(Filled { role: "tactile_pad".into(), outputs: vec![shape.clone().into()], commands: vec![], facts })
+}
+
+fn arm(params: &Params, joints: &[Joint]) -> Result<Filled, Mistakes> {
+    let shape = JointsShape { joints: joints.to_vec(), unit: Unit::RADIAN };
+    Ok(Filled {
+        role: "velocity_arm".into(),
+        outputs: vec![shape.clone().into(), shape.clone().into()],
+        commands: vec![shape.in_unit(Unit::RADIAN.per_second()).into()],
+        facts: facts(&params.urdf, &params.tip, &params.mount)?,
+    })
+}
+
+impl SimBench {
+    fn new(params: Params, chain: Chain, joints: Vec<Joint>, shape: ImageShape, period: i64) -> Result<Self, Mistakes> {
+        let inertia = params.inertia.unwrap_or_else(|| INERTIA.to_vec());
+        let joint = |inertia: f64| SimJoint {
+            stiffness: *params.stiffness,
+            damping_ratio: *params.damping_ratio,
+            inertia,
+            friction: *params.friction,
+        };
+        let arm = Arm::new(chain, inertia.into_iter().map(joint).collect(), params.start);
+        let from = start(&arm);
+        let mut scatter = Random::new(params.seed, 3);
+        let place = |thing: &Thing| {
+            let most = *thing.scatter;
+            Object::new(thing, from, [scatter.uniform(-most, most), scatter.uniform(-most, most)])
+        };
+        let objects = params.objects.iter().map(place).collect::<Result<Vec<_>, _>>()?;
+        let contact = Contact::new(shape.clone(), params.foam.clone());
+        let imprint = Imprint::new(&shape, contact.fine(), *params.foam.spread);
+        let readout = Readout::new(shape.tactels(), params.electronics, params.seed);
+        let world = World::new(arm, objects, contact, imprint, shape, *params.step_s);
+        let end = params.for_s.map_or(i64::MAX, |end| nanos(*end));
+        let (latency, threshold) = (nanos(*params.latency_s), *params.threshold);
+        let taken = VecDeque::new();
+        Ok(Self { world, readout, joints, period, latency, end, last: None, taken, shown: 0, sequence: 0, threshold })
+    }
+
+    /// Goes on to `now` [ns]; an image is taken at each beat on the way.
+    fn advance(&mut self, now: i64, velocity: &[f64]) {
+        let begin = self.last.unwrap_or(-1);
+        let mut beat = (begin.div_euclid(self.period) + 1) * self.period;
+        while beat <= now {
+            self.world.advance(beat as f64 * 1e-9, velocity);
+            let forces = self.world.image();
+            let mut counts = vec![0.0; forces.len()];
+            self.readout.read(self.period as f64 * 1e-9, forces, &mut counts);
+            self.taken.push_back((beat, counts));
+            beat += self.period;
+        }
+        if beat - self.period < now {
+            self.world.advance(now as f64 * 1e-9, velocity);
+        }
+        self.last = Some(now);
+    }
+
+    /// Shows the newest image that is there by `now`.
+    fn show(&mut self, now: i64, samples: &mut Samples) {
+        let mut newest = None;
+        while self.taken.front().is_some_and(|(stamp, _)| stamp + self.latency <= now) {
+            newest = self.taken.pop_front();
+            self.shown += 1;
+        }
+        if let Some((stamp, counts)) = newest {
+            samples.write::<Image>(0, stamp, self.shown).cells_mut().copy_from_slice(&counts);
+        }
+    }
+}
+
+impl Stepped for SimBench {
+    fn next(&self) -> Option<i64> {
+        let next = self.last.map_or(0, |last| (last / self.period + 1) * self.period);
+        (next < self.end).then_some(next)
+    }
+
+    fn end(&self) -> Option<i64> {
+        (self.end < i64::MAX).then(|| (self.end - 1) / self.period * self.period)
+    }
+
+    fn exchange(&mut self, now: i64, commands: &Commands, samples: &mut Samples) -> Result<(), DeviceError> {
+        if self.last.is_some_and(|last| now <= last) {
+            return Ok(());
+        }
+        let velocity = commands.joints(0);
+        if let Some(i) = velocity.iter().position(|v| !v.is_finite()) {
+            let name = &self.joints[i].name;
+            return Err(DeviceError(format!("the velocity commanded to joint `{name}` is not finite")));
+        }
+        self.advance(now, velocity);
+        self.sequence += 1;
+        self.show(now, samples);
+        let arm = &self.world.arm;
+        samples.write::<Joints>(1, now, self.sequence).0.copy_from_slice(&arm.position);
+        samples.write::<Joints>(2, now, self.sequence).0.copy_from_slice(&arm.equilibrium);
+        Ok(())
+    }
+}

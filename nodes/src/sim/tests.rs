@@ -1,0 +1,251 @@
+//! The simulation against closed forms.
+
+use nalgebra::{IsometryMatrix3, Vector3};
+use parry3d_f64::math::{Pose3, Vec3};
+use tactflow_runtime::node::{NonNegative, Positive};
+use tactflow_runtime::signal::{ImageShape, Joint as Limits, Unit};
+
+use super::contact::{Contact, Motion};
+use super::foam::Foam;
+use super::imprint::Imprint;
+use super::joints::{Arm, Joint};
+use super::object::{Look, Move, Object, Thing};
+use super::world::{World, start};
+use crate::arm::chain::{Chain, Motion as JointMotion, Segment};
+use crate::arm::model::load;
+use crate::arm::mount::Mount;
+
+fn shape() -> ImageShape {
+    ImageShape { rows: 16, cols: 16, pitch: [0.005; 2], unit: Unit::RAW }
+}
+
+fn thing(shape: Look, at: [f64; 3]) -> Thing {
+    Thing {
+        shape,
+        at,
+        turn: [0.0; 3],
+        radius: None,
+        length: None,
+        size: None,
+        points: None,
+        stiffness: None,
+        mount: None,
+        mass: Positive(1.0),
+        scatter: NonNegative(0.0),
+        motion: vec![],
+    }
+}
+
+fn ball(radius: f64, at: [f64; 3]) -> Thing {
+    Thing { radius: Some(Positive(radius)), ..thing(Look::Ball, at) }
+}
+
+fn object(thing: &Thing) -> Object {
+    Object::new(thing, Pose3::IDENTITY, [0.0; 2]).unwrap()
+}
+
+/// A pad at rest in the base, moved along its z.
+fn pad(z: f64) -> Motion {
+    Motion { pose: Pose3::from_translation(Vec3::new(0.0, 0.0, z)), linear: Vec3::ZERO, angular: Vec3::ZERO }
+}
+
+/// Foam that loses nothing.
+fn lossless() -> Foam {
+    Foam {
+        damping: NonNegative(0.0),
+        static_friction: NonNegative(0.0),
+        sliding_friction: NonNegative(0.0),
+        ..Foam::USUAL
+    }
+}
+
+fn world(arm: Arm, foam: Foam, things: &[Thing], step: f64) -> World {
+    let from = start(&arm);
+    let objects = things.iter().map(|thing| Object::new(thing, from, [0.0; 2]).unwrap()).collect();
+    let contact = Contact::new(shape(), foam.clone());
+    let imprint = Imprint::new(&shape(), contact.fine(), *foam.spread);
+    World::new(arm, objects, contact, imprint, shape(), step)
+}
+
+/// A slide along the pad's z.
+fn slide(joint: Joint) -> Arm {
+    let limits = Limits { lower: -1.0, upper: 1.0, ..Limits::default() };
+    let motion = JointMotion::Prismatic;
+    let segment = Segment { fixed: IsometryMatrix3::identity(), axis: Vector3::z(), motion, joint: limits };
+    Arm::new(Chain::new(vec![segment], IsometryMatrix3::identity()), vec![joint], vec![0.0])
+}
+
+/// The paper's arm.
+fn lwr(damping_ratio: f64, friction: f64) -> Arm {
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../graphs/robots/lwr4p.urdf");
+    let urdf = tactflow_runtime::node::FilePath { path: path.into(), span: 0..0, builtin: None };
+    let chain = load(&urdf, "lwr_7_link", &Mount { xyz: [0.0, 0.0, 0.03], rpy: [0.0; 3] }).unwrap();
+    let inertia = [2.0, 2.0, 1.0, 0.8, 0.3, 0.25, 0.1];
+    let joint = |inertia: f64| Joint { stiffness: 200.0, damping_ratio, inertia, friction };
+    Arm::new(chain, inertia.map(joint).into(), vec![0.0, 0.5, 0.0, -1.3, 0.0, 1.3, 0.0])
+}
+
+#[test]
+fn at_rest_the_slide_and_the_foam_balance() {
+    let joint = Joint { stiffness: 5000.0, damping_ratio: 1.0, inertia: 2.0, friction: 0.0 };
+    let soft = |stiffness: f64| Thing { stiffness: Some(Positive(stiffness)), ..thing(Look::Plane, [0.0, 0.0, 0.002]) };
+    let mounted = |mount: f64| Thing { mount: Some(Positive(mount)), ..thing(Look::Plane, [0.0, 0.0, 0.002]) };
+    // Stiffness of the foam of 256 tactels, alone or with a spring in series.
+    let foam = 256.0 * 300.0;
+    let cases = [
+        (thing(Look::Plane, [0.0, 0.0, 0.002]), foam),
+        (soft(100.0), 256.0 / (1.0 / 300.0 + 1.0 / 100.0)),
+        (mounted(2e4), 1.0 / (1.0 / foam + 1.0 / 2e4)),
+    ];
+    for (plane, stiffness) in cases {
+        let mut world = world(slide(joint), Foam::USUAL, &[plane], 0.001);
+        world.advance(1.0, &[0.01]);
+        world.advance(4.0, &[0.0]);
+        // K (0.01 - z) = k (z - 0.002)
+        let wanted = 5000.0 * (0.01 - 0.002) / (1.0 + 5000.0 / stiffness);
+        let force = world.truth(0.015).force;
+        assert!((force - wanted).abs() < 1e-3 * wanted, "{force} N, not {wanted} N");
+        let clean: f64 = world.image().iter().sum();
+        assert!((clean - force).abs() < 1e-9, "the image shares out all of it: {clean}");
+    }
+}
+
+#[test]
+fn a_ball_leaves_a_disc_whose_area_grows_as_hertz_has_it() {
+    for radius in [0.02, 0.04, 0.1] {
+        for depth in [0.0005, 0.001, 0.002] {
+            let object = object(&ball(radius, [0.0007, -0.0011, radius]));
+            let mut contact = Contact::new(shape(), lossless());
+            contact.step(0.001, &pad(depth), &[object], &mut [Vec3::ZERO]);
+            // a² = 2 R d - d², and the force is the foundation's modulus times the volume of the cap.
+            let area = std::f64::consts::PI * (2.0 * radius * depth - depth * depth);
+            let volume = std::f64::consts::PI * depth * depth * (radius - depth / 3.0);
+            let touched = contact.touching().len() as f64 * 1e-6;
+            assert!((touched / area - 1.0).abs() < 0.03, "{radius} {depth}: {touched} m², not {area} m²");
+            let force = contact.normal();
+            assert!((force / (volume * 300.0 / 25e-6) - 1.0).abs() < 0.01, "{radius} {depth}: {force} N");
+            let wrench = contact.wrench();
+            assert!((wrench.force.z + force).abs() < 1e-9 && wrench.force.x.abs() < 0.01 * force, "{wrench:?}");
+        }
+    }
+}
+
+#[test]
+fn energy_does_not_grow() {
+    let undamped = Joint { stiffness: 500.0, damping_ratio: 0.0, inertia: 2.0, friction: 0.0 };
+    let ellipsoid = Thing { size: Some([0.12, 0.08, 0.06]), ..thing(Look::Ellipsoid, [0.01, 0.015, 0.035]) };
+    let tilted = Thing { turn: [0.3, -0.2, 0.5], ..ellipsoid };
+    let soft = Thing { stiffness: Some(Positive(150.0)), ..ball(0.04, [0.0, 0.0, 0.043]) };
+    let cases = [
+        (slide(undamped), lossless(), soft.clone(), true),
+        (slide(undamped), Foam::USUAL, soft, false),
+        (lwr(0.0, 0.0), lossless(), tilted.clone(), true),
+        (lwr(0.2, 0.1), Foam::USUAL, tilted, false),
+    ];
+    for (case, (arm, foam, thing, is_lossless)) in cases.into_iter().enumerate() {
+        let mut world = world(arm, foam, &[thing], 0.00025);
+        // Tensed like a bow, and let go.
+        for (q, by) in world.arm.equilibrium.iter_mut().zip([0.02, 0.03, 0.02, -0.03, 0.02, 0.03, 0.1]) {
+            *q += by;
+        }
+        let first = world.energy();
+        let (mut most, mut least, mut touched) = (first, first, false);
+        let still = vec![0.0; world.arm.position.len()];
+        for step in 1..=4000 {
+            world.advance(f64::from(step) * 0.00025, &still);
+            most = most.max(world.energy());
+            least = least.min(world.energy());
+            touched |= world.contact.normal() > 1.0;
+        }
+        assert!(touched, "case {case} touches");
+        assert!(most < 1.01 * first, "case {case}: from {first} J to {most} J");
+        assert_eq!(least > 0.98 * first, is_lossless, "case {case}: from {first} J to {least} J");
+    }
+}
+
+#[test]
+fn the_step_does_not_matter() {
+    let run = |step: f64| {
+        let mut world = world(lwr(0.2, 0.1), Foam::USUAL, &[ball(0.04, [0.01, -0.005, 0.042])], step);
+        let mut forces = Vec::new();
+        for beat in 1..=500 {
+            // Down, then aside.
+            let wanted = if beat < 200 { [0.0, 0.0, -0.02] } else { [0.005, 0.01, 0.0] };
+            let velocity = world.arm.moves(wanted.into());
+            world.advance(f64::from(beat) * 0.004, &velocity);
+            forces.push(world.truth(0.015));
+        }
+        forces
+    };
+    let fine = run(0.00025);
+    let greatest = fine.iter().fold(0.0, |most: f64, truth| most.max(truth.force));
+    assert!(greatest > 2.0, "it presses: {greatest} N");
+    for step in [0.002, 0.001] {
+        for (truth, exact) in run(step).iter().zip(&fine) {
+            assert!((truth.force - exact.force).abs() < 0.02 * greatest, "{step}: {truth:?} {exact:?}");
+            assert!((truth.tangential - exact.tangential).abs() < 0.03 * greatest, "{step}: {truth:?} {exact:?}");
+        }
+    }
+}
+
+#[test]
+fn friction_stays_in_its_cone_sticks_and_slips() {
+    let objects = [object(&thing(Look::Plane, [0.0, 0.0, 0.0]))];
+    let mut contact = Contact::new(shape(), Foam::USUAL);
+    let normal = 256.0 * 0.3;
+    let mut slid = 0.0;
+    let mut at_rest: f64 = 0.0;
+    for step in 0..4000 {
+        let speed = if step < 2000 { 2e-4 } else { 0.02 };
+        let moving = Motion { linear: Vec3::new(0.6, 0.8, 0.0) * speed, ..pad(0.001) };
+        contact.step(0.001, &moving, &objects, &mut [Vec3::ZERO]);
+        slid += speed * 0.001;
+        let [x, y] = contact.friction();
+        let friction = x.hypot(y);
+        assert!(friction <= 0.4 * contact.normal() + 1e-9, "within the cone of rest: {friction} N");
+        assert!(friction < 1e-12 || (x * 0.8 - y * 0.6).abs() < 1e-9 && x <= 0.0, "against the motion");
+        if step < 2000 {
+            // It sticks: the foam shears.
+            assert!((friction - 256.0 * 200.0 * slid).abs() < 1e-6 * normal, "{friction} at {slid}");
+            at_rest = at_rest.max(friction);
+        }
+    }
+    assert!((contact.normal() - normal).abs() < 1e-9);
+    let [x, y] = contact.friction();
+    let wanted = (0.3 + 0.1 / (1.0 + 400.0)) * normal;
+    assert!((x.hypot(y) - wanted).abs() < 1e-6, "slipping at 20 mm/s: {} N", x.hypot(y));
+    assert!(at_rest > 0.8 * x.hypot(y), "{at_rest}");
+}
+
+#[test]
+fn a_load_at_the_rim_is_all_felt_and_one_in_the_middle_is_where_it_is() {
+    let mut imprint = Imprint::new(&shape(), 5, 0.003);
+    for (x, y) in [(0.0, 0.0), (0.0123, -0.0087), (0.038, 0.0), (-0.0385, 0.0385)] {
+        let objects = [object(&ball(0.003, [x, y, 0.003]))];
+        let mut contact = Contact::new(shape(), Foam::USUAL);
+        contact.step(0.001, &pad(0.002), &objects, &mut [Vec3::ZERO]);
+        let clean = imprint.of(contact.touching());
+        let sum: f64 = clean.iter().sum();
+        assert!((sum - contact.normal()).abs() < 1e-9 * sum, "at ({x}, {y})");
+        let at = |index: usize| [shape().x((index % 16) as f64), shape().y((index / 16) as f64)];
+        let moment = |axis: usize| clean.iter().enumerate().map(|(i, f)| f * at(i)[axis]).sum::<f64>() / sum;
+        if x.abs() < 0.02 {
+            assert!((moment(0) - x).abs() < 2e-4 && (moment(1) - y).abs() < 2e-4, "({}, {})", moment(0), moment(1));
+        }
+    }
+}
+
+#[test]
+fn objects_are_moved_smoothly_by_their_script() {
+    let motion = vec![Move { from_s: NonNegative(1.0), to_s: NonNegative(2.0), by: [0.0, 0.01, 0.0] }];
+    let mut object = object(&Thing { motion, ..ball(0.04, [0.0, 0.0, 0.05]) });
+    let mut last = 0.0;
+    for step in 1..=3000 {
+        object.step(f64::from(step) * 0.001, 0.001, Vec3::ZERO);
+        let y = object.pose.translation.y;
+        assert!((object.velocity.y - (y - last) / 0.001).abs() < 1e-4, "its velocity is that of its place");
+        assert!(object.velocity.y <= 0.0151);
+        last = y;
+    }
+    assert!((last - 0.01).abs() < 1e-12);
+}

@@ -1,0 +1,101 @@
+//! What a simulation knows and no sensor does: for scenarios and for records.
+
+use parry3d_f64::math::Vec3;
+use tactflow_runtime::signal::ImageShape;
+
+use super::contact::{Contact, Motion};
+use super::object::Object;
+
+/// The truth of a moment.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Truth {
+    /// Force along the pad's z, positive when it is pressed [N].
+    pub force: f64,
+    /// Friction in the pad's plane [N].
+    pub tangential: f64,
+    /// Greatest force on a tactel of the clean image [N].
+    pub peak: f64,
+    /// Where the force acts [m]; none without contact.
+    pub middle: Option<[f64; 2]>,
+    /// Mean force of the tactels above the threshold [N per tactel]; none without contact.
+    pub pressure: Option<f64>,
+    /// Number of those tactels.
+    pub tactels: usize,
+    /// Angle of the object's line from the pad's x toward its y [rad]; none if it has none near the pad.
+    pub orientation: Option<f64>,
+    /// Area of foam that is pressed in [m²].
+    pub area: f64,
+    /// Greatest indentation [m].
+    pub depth: f64,
+    /// Angle between the pad's z and the inward normal of the object where it is touched [rad]; none without contact.
+    pub tilt: Option<f64>,
+}
+
+impl Truth {
+    /// Of a pad whose clean image is `clean` [N].
+    #[must_use]
+    pub fn of(
+        pad: &Motion,
+        contact: &Contact,
+        objects: &[Object],
+        shape: &ImageShape,
+        clean: &[f64],
+        threshold: f64,
+    ) -> Self {
+        let force = contact.normal();
+        let [x, y] = contact.friction();
+        let (sum, tactels) =
+            clean.iter().filter(|cell| **cell > threshold).fold((0.0, 0), |(sum, count), cell| (sum + cell, count + 1));
+        let area = shape.pitch[0] * shape.pitch[1] / (contact.fine() * contact.fine()) as f64;
+        Self {
+            force,
+            tangential: (x * x + y * y).sqrt(),
+            peak: clean.iter().fold(0.0, |peak: f64, cell| peak.max(*cell)),
+            middle: middle(contact, force),
+            pressure: (tactels > 0).then(|| sum / f64::from(tactels)),
+            tactels: tactels as usize,
+            orientation: orientation(pad, objects, shape),
+            area: contact.touching().len() as f64 * area,
+            depth: contact.touching().iter().fold(0.0, |depth: f64, touch| depth.max(touch.depth)),
+            tilt: tilt(pad, contact, force),
+        }
+    }
+}
+
+fn middle(contact: &Contact, force: f64) -> Option<[f64; 2]> {
+    let sum = contact.touching().iter().fold([0.0; 2], |[sx, sy], touch| {
+        let [x, y] = contact.place(touch.point);
+        [sx + touch.force * x, sy + touch.force * y]
+    });
+    (force > 0.0).then(|| [sum[0] / force, sum[1] / force])
+}
+
+/// The angle of the nearest line that passes under the pad.
+fn orientation(pad: &Motion, objects: &[Object], shape: &ImageShape) -> Option<f64> {
+    let place = pad.pose.translation;
+    let lines = objects.iter().filter_map(|object| {
+        let line = object.shape.line(object.pose.inverse_transform_point(place))?;
+        let along = pad.pose.rotation.inverse() * (object.pose.rotation * line.along);
+        Some((pad.pose.inverse_transform_point(object.pose.transform_point(line.at)), along))
+    });
+    let (at, along) = lines.min_by(|(a, _), (b, _)| a.length().total_cmp(&b.length()))?;
+    let half = [shape.cols as f64 * shape.pitch[0] / 2.0, shape.rows as f64 * shape.pitch[1] / 2.0];
+    let is_under = at.x.abs() < half[0] && at.y.abs() < half[1];
+    let angle = libm::atan2(along.y, along.x);
+    let half_turn = std::f64::consts::PI;
+    let axial = if angle <= -half_turn / 2.0 {
+        angle + half_turn
+    } else if angle > half_turn / 2.0 {
+        angle - half_turn
+    } else {
+        angle
+    };
+    (is_under && along.x * along.x + along.y * along.y > 1e-6).then_some(axial)
+}
+
+fn tilt(pad: &Motion, contact: &Contact, force: f64) -> Option<f64> {
+    let normal = contact.touching().iter().fold(Vec3::ZERO, |sum, touch| sum + touch.normal() * touch.force);
+    let inward = -normal.normalize_or_zero();
+    let cos = inward.dot(pad.pose.rotation * Vec3::Z);
+    (force > 0.0).then(|| libm::acos(cos.clamp(-1.0, 1.0)))
+}

@@ -1,0 +1,87 @@
+//! The simulated bench as physics: an arm that carries a pad, and objects, stepped together.
+
+use parry3d_f64::math::{Pose3, Vec3};
+use tactflow_runtime::signal::ImageShape;
+
+use super::contact::{Contact, Motion};
+use super::imprint::Imprint;
+use super::joints::Arm;
+use super::object::Object;
+use super::truth::Truth;
+
+/// Everything that has mass, gives way or is touched.
+pub struct World {
+    pub(super) arm: Arm,
+    pub(super) objects: Vec<Object>,
+    pub(super) contact: Contact,
+    imprint: Imprint,
+    shape: ImageShape,
+    /// Force on each object [N].
+    loads: Vec<Vec3>,
+    /// [s]
+    time: f64,
+    /// Longest step [s].
+    longest: f64,
+}
+
+impl World {
+    /// A world at time 0, with steps of at most `longest` [s].
+    #[must_use]
+    pub fn new(
+        arm: Arm,
+        objects: Vec<Object>,
+        contact: Contact,
+        imprint: Imprint,
+        shape: ImageShape,
+        longest: f64,
+    ) -> Self {
+        let loads = vec![Vec3::ZERO; objects.len()];
+        Self { arm, objects, contact, imprint, shape, loads, time: 0.0, longest }
+    }
+
+    /// Goes on to `time` [s] with the joints' equilibrium moving at `velocity` [rad/s].
+    pub fn advance(&mut self, time: f64, velocity: &[f64]) {
+        let steps = ((time - self.time) / self.longest - 1e-9).ceil().max(1.0);
+        let (begin, dt) = (self.time, (time - self.time) / steps);
+        for step in 1..=steps as u64 {
+            let now = begin + dt * step as f64;
+            for (object, load) in self.objects.iter_mut().zip(&self.loads) {
+                object.step(now, dt, *load);
+            }
+            self.contact.step(dt, &self.arm.motion(), &self.objects, &mut self.loads);
+            self.arm.step(dt, velocity, &self.contact.wrench());
+        }
+        self.time = time;
+    }
+
+    /// Where the pad is and how it moves.
+    #[must_use]
+    pub fn pad(&self) -> Motion {
+        self.arm.motion()
+    }
+
+    /// The clean image [N].
+    pub fn image(&mut self) -> &[f64] {
+        self.imprint.of(self.contact.touching())
+    }
+
+    /// What is true now; tactels count from `threshold` [N].
+    pub fn truth(&mut self, threshold: f64) -> Truth {
+        let pad = self.arm.motion();
+        let clean = self.imprint.of(self.contact.touching());
+        Truth::of(&pad, &self.contact, &self.objects, &self.shape, clean, threshold)
+    }
+
+    /// The energy that is stored in motion, springs, foam and friction [J].
+    #[cfg(test)]
+    pub(super) fn energy(&self) -> f64 {
+        let objects: f64 = self.objects.iter().map(Object::energy).sum();
+        self.arm.energy() + self.contact.energy(&self.objects) + objects
+    }
+}
+
+/// The pose that a sensor has in the base.
+#[must_use]
+pub fn start(arm: &Arm) -> Pose3 {
+    super::joints::pose3(&arm.pose)
+}

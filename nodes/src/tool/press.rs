@@ -1,0 +1,103 @@
+//! `tactflow press`: the simulated pad under a bladder, as the log that a calibration is made from.
+
+use std::fmt::Write as _;
+use std::io::{BufWriter, Write as _};
+use std::num::NonZeroUsize;
+use std::path::{Path, PathBuf};
+
+use tactflow_runtime::cli::clap::{self, Parser};
+use tactflow_runtime::cli::{NOT_LOADED, Shell};
+
+use super::{may_replace, pair, positive};
+use crate::sim::readout::{Electronics, Readout};
+
+/// Press the simulated pad with a bladder and write the log
+#[derive(Parser)]
+#[command(name = "press")]
+#[command(
+    after_help = "The bladder presses on all tactels alike, slowly up to the largest force and down again, after a second without a load.
+The log has the columns time [s], force [N] and what each tactel reads [raw], as `tactflow calibrate` takes it.
+
+Examples:
+  tactflow press -o press.csv
+  tactflow calibrate press.csv --load uniform -o pad.toml
+  tactflow run graphs/hybrid.toml --set devices.bench.calibration=pad.toml
+
+Exit codes: 0 all went well; 2 the log cannot be written."
+)]
+pub(super) struct Press {
+    /// Write the log; one that is there is replaced, any other file is not
+    #[arg(short, long, value_name = "FILE")]
+    out: PathBuf,
+    /// Which pad: the `electronics.serial` of a `sim_bench`
+    #[arg(long, default_value_t = *SERIAL)]
+    serial: u64,
+    /// Rows and columns of the pad
+    #[arg(long, value_name = "ROWSxCOLS", value_parser = pair::<NonZeroUsize>, default_value = "16x16")]
+    size: [NonZeroUsize; 2],
+    /// Largest force on a tactel [N]
+    #[arg(long, value_name = "NEWTONS", value_parser = positive, default_value = "3")]
+    most: f64,
+}
+
+const SERIAL: &u64 = &Electronics::USUAL.serial;
+/// Frames per second of the log [1/s].
+const RATE: f64 = 50.0;
+/// Time before the first press, and between two [s].
+const REST: f64 = 1.0;
+/// Time of a press, up and down [s].
+const PRESS: f64 = 10.0;
+/// Number of presses.
+const PRESSES: u32 = 3;
+
+pub(super) fn run(args: Press, shell: &Shell) -> u8 {
+    let done = may_replace(&args.out, "press log", |text| text.starts_with("time,force,t0_0"))
+        .and_then(|()| write(&args).map_err(|error| format!("cannot write `{}`: {error}", args.out.display())));
+    match done {
+        Ok(frames) => {
+            shell.say(&format!("wrote {}: {frames} frames at {RATE} Hz", shown(&args.out)));
+            0
+        }
+        Err(message) => {
+            shell.error(message);
+            NOT_LOADED
+        }
+    }
+}
+
+fn shown(path: &Path) -> String {
+    path.display().to_string()
+}
+
+fn write(args: &Press) -> std::io::Result<usize> {
+    let [rows, cols] = args.size.map(NonZeroUsize::get);
+    let tactels = rows * cols;
+    let mut readout = Readout::new(tactels, Electronics { serial: args.serial, ..Electronics::USUAL }, args.serial);
+    let mut file = BufWriter::new(std::fs::File::create(&args.out)?);
+    let names = (0..rows).flat_map(|i| (0..cols).map(move |j| format!(",t{i}_{j}")));
+    writeln!(file, "time,force{}", names.collect::<String>())?;
+    let mut counts = vec![0.0; tactels];
+    let frames = ((REST + f64::from(PRESSES) * (PRESS + REST)) * RATE) as usize;
+    let mut line = String::new();
+    for frame in 0..frames {
+        let time = frame as f64 / RATE;
+        let each = args.most * bladder(time);
+        readout.read(1.0 / RATE, &vec![each; tactels], &mut counts);
+        line.clear();
+        // Writing to a string cannot fail.
+        let _ = write!(line, "{time:.2},{:.6}", each * tactels as f64);
+        counts.iter().for_each(|count| {
+            let _ = write!(line, ",{count}");
+        });
+        writeln!(file, "{line}")?;
+    }
+    file.flush()?;
+    Ok(frames)
+}
+
+/// How far the bladder is blown up at a time [s], from 0 to 1.
+fn bladder(time: f64) -> f64 {
+    let in_cycle = time % (REST + PRESS) - REST;
+    let t = in_cycle / PRESS;
+    if in_cycle < 0.0 { 0.0 } else { 1.0 - (2.0 * t - 1.0).abs() }
+}
