@@ -144,6 +144,20 @@ impl<'a> Model<'a> {
         }
     }
 
+    /// What the parts of the graph export, as its wires name it, and the port behind each.
+    pub(crate) fn exports_by_name(&self) -> Vec<(String, String)> {
+        let names = self.flat.scopes.first().into_iter().flat_map(|scope| &scope.names);
+        let parts = names.filter_map(|(name, (_, entity))| match entity {
+            Entity::Part(inner) => Some((name, *inner)),
+            _ => None,
+        });
+        let exports = parts.flat_map(|(name, inner)| {
+            self.flat.scopes[inner].exports.iter().map(move |(key, word)| (format!("{name}.{}", key.name), inner, word))
+        });
+        let port = |(name, inner, word)| Some((name, self.port_name(self.resolve(inner, word, 0).ok()??)));
+        exports.filter_map(port).collect()
+    }
+
     /// What the parts export.
     pub(crate) fn exported(&self) -> impl Iterator<Item = Producer> {
         let scopes = self.flat.scopes.iter().enumerate();
