@@ -59,6 +59,7 @@ pub fn catalogue() -> Catalogue {
         .files(builtin::FILES)
         .role(roles::tactile_pad())
         .role(roles::velocity_arm())
+        .role(roles::ground_truth())
         // The first that fills a role is the one that examples take.
         .device::<devices::mock_pad::MockPad>()
         .device::<devices::recording::Player>()

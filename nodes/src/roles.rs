@@ -20,6 +20,7 @@ pub fn tactile_pad() -> RoleType {
         outputs: vec![port("image", "The newest image, in the device's unit.", Kind::Image, &["U", "self"])],
         commands: vec![],
         limits: vec![],
+        is_observed: false,
     }
 }
 
@@ -35,11 +36,51 @@ pub fn velocity_arm() -> RoleType {
         ],
         commands: vec![port("velocity", "Joint velocities [rad/s].", Kind::Joints, &["rad/s", "self"])],
         limits: LIMITS.map(Cow::Borrowed).into(),
+        is_observed: false,
     }
 }
 
 const EQUILIBRIUM: &str = "Posture that the commands have moved to: where a compliant arm would be if nothing held it; \
     of a stiff arm its position [rad].";
+
+/// What a simulation knows of the contact and no sensor tells: for scenarios and the recorder. A device that fills it
+/// gives all of it, and says of what does not apply that it is absent.
+#[must_use]
+pub fn ground_truth() -> RoleType {
+    let scalar = |name, doc, unit: &'static [&'static str]| port(name, doc, Kind::Scalar, unit);
+    RoleType {
+        name: "ground_truth".into(),
+        summary: "what a simulation knows of the contact and no sensor tells".into(),
+        outputs: vec![
+            scalar("force", "Normal force on the pad [N].", &["N"]),
+            scalar("tangential", "Tangential force on the pad [N].", &["N"]),
+            scalar("peak", "Greatest force on one tactel [N].", &["N"]),
+            scalar("x", "Centre of pressure in the sensor's frame; absent without contact [m].", &["m"]),
+            scalar("y", "Centre of pressure in the sensor's frame; absent without contact [m].", &["m"]),
+            scalar("pressure", PRESSURE, &["N/tactel"]),
+            scalar("orientation", ORIENTATION, &["rad"]),
+            scalar("area", "Area of the contact [m²].", &["m2"]),
+            scalar("depth", "Greatest depth that the object is pressed in [m].", &["m"]),
+            port("image", "The image without noise, spread and drift [N].", Kind::Image, &["N", "self"]),
+            scalar("tilt", TILT, &["rad"]),
+            scalar("path", PATH, &["m"]),
+            scalar("distance", DISTANCE, &["m"]),
+            scalar("coverage", "Share of the surface within reach that is near a reported point [1].", &["1"]),
+        ],
+        commands: vec![],
+        limits: vec![],
+        is_observed: true,
+    }
+}
+
+const PRESSURE: &str = "Mean force on the tactels in contact, of the image without noise; absent without contact \
+    [N/tactel].";
+const ORIENTATION: &str = "Angle of the edge, pen or cable in the sensor's frame, from +x toward +y, in (-pi/2, pi/2]; \
+    absent if there is none [rad].";
+const TILT: &str = "Angle between the sensor's z and the object's inward normal at the contact; absent without contact \
+    [rad].";
+const PATH: &str = "Distance of the contact's middle from the object's axis, edge or path; absent if it has none [m].";
+const DISTANCE: &str = "Distance of the reported contact point from the object's surface; absent without a report [m].";
 
 /// What every command of an arm must have crossed, in the order in which a motion does.
 const LIMITS: [&str; 10] = [

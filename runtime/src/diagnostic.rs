@@ -71,6 +71,8 @@ codes! {
     UnboundRole "unbound-role",
     /// A device that cannot fill the role it is bound to.
     WrongRole "wrong-role",
+    /// A task that reads what only a scenario and the recorder may read.
+    ObservedRole "observed-role",
     /// A device that the bench does not have.
     UnknownDevice "unknown-device",
     /// A command of a device that nothing drives.

@@ -3,6 +3,7 @@
 pub mod examples;
 pub mod nodes;
 pub mod saboteur;
+pub mod true_pad;
 
 use std::path::{Path, PathBuf};
 

@@ -22,6 +22,7 @@ mod live;
 mod merge;
 mod modes;
 mod mutations;
+mod observed;
 mod operator;
 mod oracles;
 mod policies;

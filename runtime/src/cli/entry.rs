@@ -185,12 +185,23 @@ impl<'a> Entries<'a> {
     fn role(&self, role: &RoleType) -> Entry {
         let devices = self.catalogue.devices().iter().map(|device| &**device);
         let fills = devices.filter(|device| self.roles_of(*device).iter().any(|name| *name == role.name));
+        let observed = || {
+            let name = role.observed_name();
+            format!(
+                "Only a scenario and the recorder read it. A bench binds it as `{name} = \"device\"`, and no task declares it."
+            )
+        };
+        let doc = role.is_observed.then(observed).unwrap_or_default();
         Entry {
-            outputs: role.outputs.iter().map(|port| self.output(port)).collect(),
+            outputs: role
+                .outputs
+                .iter()
+                .map(|port| if role.is_observed { declared(port) } else { self.output(port) })
+                .collect(),
             commands: role.commands.iter().map(|port| self.input(port)).collect(),
             fits: fills.map(|device| device.name().into_owned()).collect(),
             limits: role.limits.iter().map(ToString::to_string).collect(),
-            ..entry(Sort::Role, &role.name, &role.summary, "")
+            ..entry(Sort::Role, &role.name, &role.summary, &doc)
         }
     }
 
@@ -217,7 +228,8 @@ impl<'a> Entries<'a> {
 
     /// A port that something reads, and where its wire can come from.
     fn input(&self, port: &PortSpec) -> Port {
-        let roles = self.catalogue.roles().iter().map(|role| (&role.name, &role.outputs));
+        let readable = self.catalogue.roles().iter().filter(|role| !role.is_observed);
+        let roles = readable.map(|role| (&role.name, &role.outputs));
         let nodes = self.nodes.iter().map(|(_, spec)| (&spec.name, &spec.outputs));
         let all = roles.chain(nodes).flat_map(|(owner, ports)| ports.iter().map(move |port| (owner, port)));
         Port { fits: best_first(port, all.filter(|(_, output)| may_fit(output, port))), ..declared(port) }

@@ -19,6 +19,8 @@ pub(crate) struct Sample {
     pub(crate) sequence: u64,
     /// How often the device has written the port.
     pub(crate) writes: u64,
+    /// Whether the last write says that there is no value.
+    pub(crate) is_absent: bool,
 }
 
 impl Samples {
@@ -28,7 +30,7 @@ impl Samples {
         let mut samples = Self::default();
         for shape in shapes {
             let slot = samples.arenas.add(shape);
-            samples.ports.push(Sample { kind: shape.kind(), slot, stamp: 0, sequence: 0, writes: 0 });
+            samples.ports.push(Sample { kind: shape.kind(), slot, stamp: 0, sequence: 0, writes: 0, is_absent: false });
         }
         samples
     }
@@ -40,9 +42,17 @@ impl Samples {
     pub fn write<T: Signal>(&mut self, port: usize, stamp: i64, sequence: u64) -> &mut T {
         let sample = &mut self.ports[port];
         assert_eq!(sample.kind, T::KIND, "port {port} of the device");
-        (sample.stamp, sample.sequence) = (stamp, sequence);
+        (sample.stamp, sample.sequence, sample.is_absent) = (stamp, sequence, false);
         sample.writes += 1;
         &mut T::arena_mut(&mut self.arenas)[sample.slot as usize]
+    }
+
+    /// Says that port `port` has no value in the sample taken at `stamp` [ns], the `sequence`-th of its device: what the
+    /// port gave before is absent from then on, until it is written again.
+    pub fn clear(&mut self, port: usize, stamp: i64, sequence: u64) {
+        let sample = &mut self.ports[port];
+        (sample.stamp, sample.sequence, sample.is_absent) = (stamp, sequence, true);
+        sample.writes += 1;
     }
 }
 

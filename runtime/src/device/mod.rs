@@ -33,6 +33,23 @@ pub struct RoleType {
     /// What must hold of every command; see [`Limits`](crate::node::Limits). The names of a node's `holds`, in the order
     /// in which a motion crosses them.
     pub limits: Vec<Cow<'static, str>>,
+    /// Whether only a scenario and the recorder may read it: what a simulation knows and no sensor can. A bench binds it
+    /// under the last word of its name, and no task declares it.
+    pub is_observed: bool,
+}
+
+impl RoleType {
+    /// Whether a bench means this role by `name`, if it is one that only a scenario and the recorder may read.
+    #[must_use]
+    pub fn is_observed_as(&self, name: &str) -> bool {
+        self.is_observed && (self.name == name || self.observed_name() == name)
+    }
+
+    /// The last word of its name: under this a bench binds it, if it is observed.
+    #[must_use]
+    pub fn observed_name(&self) -> &str {
+        self.name.rsplit('_').next().unwrap_or(&self.name)
+    }
 }
 
 /// How a device fills one role.

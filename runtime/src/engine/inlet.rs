@@ -64,7 +64,7 @@ impl Inlet {
     /// Whether a sample that has not been taken over yet is finite: an image is checked once, here at the edge.
     pub(super) fn is_finite(&self, samples: &Samples) -> bool {
         let sample = samples.ports[self.port];
-        sample.writes == self.writes || samples.arenas.is_finite(self.kind, sample.slot)
+        sample.writes == self.writes || sample.is_absent || samples.arenas.is_finite(self.kind, sample.slot)
     }
 
     /// Takes the newest sample over, if there is one. The buffers are exchanged, not copied.
@@ -87,8 +87,13 @@ impl Inlet {
                 self.counters.new += 1;
                 self.counters.gaps += missing;
                 self.counters.late += u64::from(now - sample.stamp > self.period);
-                bus.arenas.swap(self.kind, self.id.slot, &mut samples.arenas, sample.slot);
-                bus.marks[self.id.mark as usize].renew(tick, Stamp { nanos: sample.stamp, device: self.device as u16 });
+                let mark = &mut bus.marks[self.id.mark as usize];
+                if sample.is_absent {
+                    mark.lose(tick);
+                } else {
+                    bus.arenas.swap(self.kind, self.id.slot, &mut samples.arenas, sample.slot);
+                    mark.renew(tick, Stamp { nanos: sample.stamp, device: self.device as u16 });
+                }
             }
         }
     }

@@ -1,10 +1,11 @@
 //! How a plan runs. [`Engine`] holds everything that a tick touches; the tick itself (`tick`: latch, step, commit) and
 //! what it is made of (`station`, `inlet`, `command`) name no lock, no clock and no tokio. `timeline` says when the
-//! next tick is; `shell` is the edge to real time, to live devices and to the operator.
+//! next tick is; `drive` is the loop, and `shell` the edge to real time, to live devices and to the operator.
 
 mod build;
 mod command;
 mod cycle;
+mod drive;
 mod halt;
 mod inlet;
 mod modes;
@@ -23,10 +24,11 @@ use modes::Modes;
 use timeline::Timeline;
 use trouble::{Trouble, WatchedWire};
 
+pub use drive::run_virtual;
 pub use halt::Halt;
 pub use inlet::Counters;
 pub use modes::Change;
-pub use shell::{End, Outcome, RunOptions, run};
+pub use shell::{End, Interrupt, Outcome, RunOptions, run};
 pub(crate) use station::Station;
 pub use tick::Timing;
 
@@ -171,6 +173,11 @@ impl Engine {
             Edge::Stepped(driver) if self.timeline.is_clock(i) => driver.end(),
             _ => None,
         })
+    }
+
+    /// Whether a device runs on its own, in real time.
+    fn is_live(&self) -> bool {
+        self.decks.iter().any(|deck| matches!(deck.edge, Edge::Idle(_) | Edge::Live(_)))
     }
 
     /// Whether a device that is left knows of an end of its samples.

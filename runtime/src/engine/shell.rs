@@ -8,6 +8,7 @@ use tokio::runtime::{Builder, Runtime};
 use tokio::sync::watch;
 use tokio::task::JoinSet;
 
+use super::drive::{Pace, drive, hopeless};
 use super::words::Words;
 use super::{Edge, Engine};
 use crate::device::{DeviceError, link};
@@ -66,7 +67,7 @@ pub fn run(engine: &mut Engine, options: &RunOptions, observe: &mut dyn FnMut(&E
     let runtime = Builder::new_multi_thread().worker_threads(1).enable_all().build()?;
     let mut shell = Shell::start(engine, options, &runtime)?;
     // Whatever unwinds through here, the arm is brought to rest first.
-    let end = catch_unwind(AssertUnwindSafe(|| shell.run(engine, observe)));
+    let end = catch_unwind(AssertUnwindSafe(|| drive(engine, shell.until, &mut shell, observe)));
     let (time, ticks) = (engine.now(), engine.ticks());
     shell.stop(engine);
     let end = end.unwrap_or_else(|panic| resume_unwind(panic));
@@ -113,33 +114,13 @@ impl<'a> Shell<'a> {
         let words = Words::new(&options.sends, options.listens);
         Ok(Self { runtime, epoch, is_real, is_live, until, interrupted, drivers, tasks, words, is_on_timer: false })
     }
+}
 
-    fn run(&mut self, engine: &mut Engine, observe: &mut dyn FnMut(&Engine)) -> End {
-        loop {
-            if *self.interrupted.borrow() {
-                return End::Interrupted;
-            }
-            let Some(next) = engine.next() else { return End::Finished };
-            if next > self.until {
-                return End::Duration;
-            }
-            match self.tick(engine, next) {
-                Ok(true) => observe(engine),
-                Ok(false) => return End::Interrupted,
-                Err(fault) => return End::Fault(fault.into()),
-            }
-            self.watch_clock(engine);
-            if engine.is_done() {
-                return End::Done;
-            }
-            if let Some(fault) = self.hopeless(engine) {
-                return End::Fault(fault.into());
-            }
-        }
+impl Pace for Shell<'_> {
+    fn is_interrupted(&self) -> bool {
+        *self.interrupted.borrow()
     }
 
-    /// The tick that is next [ns], with what came from outside since the last. Whether there was one: not if the
-    /// operator wants the end.
     fn tick(&mut self, engine: &mut Engine, next: i64) -> Result<bool, Fault> {
         let (now, late) = if self.is_real { self.wait(engine, next) } else { (next, 0) };
         if *self.interrupted.borrow() {
@@ -157,17 +138,13 @@ impl<'a> Shell<'a> {
         engine.tick(now).map(|()| true)
     }
 
-    /// The reason of a halt that nothing can end any more: a stop when no word can come, or, in virtual time without an
-    /// end, the loss of a device. Such a run would go on for ever.
-    fn hopeless(&self, engine: &Engine) -> Option<Fault> {
-        let waits = engine.is_stopped() && !self.words.may_come();
-        let has_lost = || engine.decks.iter().any(|deck| deck.failed.is_some());
-        let is_endless = !self.is_real && self.until == i64::MAX && has_lost() && !engine.has_end();
-        let is_still = || engine.decks.iter().all(|deck| deck.commands.are_zero());
-        let last = engine.halts().last().filter(|_| (waits || is_endless) && is_still())?;
-        Some(last.fault.clone())
+    fn after(&mut self, engine: &Engine) -> Option<Fault> {
+        self.watch_clock(engine);
+        hopeless(engine, self.words.may_come(), !self.is_real && self.until == i64::MAX)
     }
+}
 
+impl Shell<'_> {
     /// Tells when a timer takes the clock device's place, and when the device is back.
     fn watch_clock(&mut self, engine: &Engine) {
         let seconds = engine.now() as f64 * 1e-9;
@@ -259,6 +236,32 @@ async fn sleep_until(due: Instant) {
     const COARSE: Duration = Duration::from_millis(2);
     tokio::time::sleep_until((due - COARSE.min(due.saturating_duration_since(Instant::now()))).into()).await;
     std::thread::sleep(due.saturating_duration_since(Instant::now()));
+}
+
+/// The operator's wish to end what runs, for those who run without [`run`]: from here on Ctrl-C and SIGTERM are caught. A
+/// second one ends the process at once.
+pub struct Interrupt {
+    /// What listens for them lives in it.
+    _runtime: Runtime,
+    interrupted: watch::Receiver<bool>,
+}
+
+impl Interrupt {
+    /// Catches them.
+    ///
+    /// # Errors
+    /// If the operating system gives no runtime for signals.
+    pub fn catch() -> io::Result<Self> {
+        let runtime = Builder::new_multi_thread().worker_threads(1).enable_all().build()?;
+        let interrupted = runtime.block_on(async { interrupts() })?;
+        Ok(Self { _runtime: runtime, interrupted })
+    }
+
+    /// Whether the operator wants the end.
+    #[must_use]
+    pub fn is_requested(&self) -> bool {
+        *self.interrupted.borrow()
+    }
 }
 
 /// Becomes true at the first Ctrl-C or SIGTERM; a second one ends the process at once.

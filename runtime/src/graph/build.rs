@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use super::Sources;
 use super::Value;
 use super::devices::{self, Opened};
-use super::frames::Frames;
+use super::frames::{Frames, frame_args};
 use super::plan::{PlannedCommand, PlannedNode, PlannedPort, PlannedRole, PlannedWire, Producer, Source};
 use super::policy::{Age, Policy, PolicyTable};
 use super::units::{Clash, Units};
@@ -82,7 +82,29 @@ impl Builder<'_> {
             let (device, first_port, period) = (bound.device, bound.first_output, (period * 1e9) as i64);
             Some(PlannedRole { name, device, first_port, ports, max_age, stale, period })
         };
-        self.opened.roles.iter().enumerate().filter_map(role).collect()
+        let declared = self.opened.roles.iter().enumerate().filter_map(role);
+        declared.chain(self.observed_roles()).collect()
+    }
+
+    /// Roles that no wire comes from: whatever becomes of their samples, the run goes on as it would without them.
+    fn observed_roles(&self) -> impl Iterator<Item = PlannedRole> {
+        self.model.observed.iter().zip(&self.opened.observed).filter_map(|((key, _, role), bound)| {
+            let bound = bound.as_ref()?;
+            let port = |(spec, shape): (&PortSpec, &Shape)| PlannedPort {
+                name: format!("{}.{}", key.name, spec.name),
+                shape: shape.clone(),
+                frames: frame_args(spec).iter().map(|_| Some(key.name.clone())).collect(),
+            };
+            Some(PlannedRole {
+                name: key.name.clone(),
+                device: bound.device,
+                first_port: bound.first_output,
+                ports: role.outputs.iter().zip(&bound.filled.outputs).map(port).collect(),
+                max_age: i64::MAX,
+                stale: Policy::Count,
+                period: (self.opened.periods[bound.device] * 1e9) as i64,
+            })
+        })
     }
 
     pub(crate) fn node(&mut self, index: usize, wires: &[Wire]) -> Option<PlannedNode> {

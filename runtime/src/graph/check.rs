@@ -19,7 +19,11 @@ use crate::diagnostic::{Code, Diagnostic, Report};
 /// # Errors
 /// Every mistake of its files at once.
 pub fn plan(catalogue: &Catalogue, request: &Request) -> Result<Plan, Report> {
-    let mut loader = Loader::new(catalogue.builtin_files());
+    plan_in(Loader::new(catalogue.builtin_files()), catalogue, request)
+}
+
+/// The same, with what is read put behind what the loader has read already.
+pub(crate) fn plan_in(mut loader: Loader, catalogue: &Catalogue, request: &Request) -> Result<Plan, Report> {
     let flat = loader.load(request);
     let Loader { mut sources, diagnostics: mut found, .. } = loader;
     let has_unread =
@@ -66,6 +70,7 @@ pub fn plan(catalogue: &Catalogue, request: &Request) -> Result<Plan, Report> {
     let warnings = unread(&model, &wires, &commands);
     let reset_after = flat.table.as_ref().map_or(0, |table| (*table.reset_after_ms * 1e6) as i64);
     let period = ((period * 1e9).round() as i64).max(1);
+    let (exports, facts) = (model.exports_by_name(), opened.facts(&model));
     let (devices, commands) = (opened.devices, planned);
     Ok(Plan {
         roles,
@@ -81,6 +86,8 @@ pub fn plan(catalogue: &Catalogue, request: &Request) -> Result<Plan, Report> {
         outline,
         modes,
         policy,
+        exports,
+        facts,
     })
 }
 

@@ -31,6 +31,18 @@ pub(crate) struct Opened {
     /// Nominal time between two samples of each device [s].
     pub(crate) periods: Vec<f64>,
     pub(crate) roles: Vec<Option<BoundRole>>,
+    /// What only a scenario and the recorder may read, as the model has it.
+    pub(crate) observed: Vec<Option<BoundRole>>,
+}
+
+impl Opened {
+    /// What the devices state of themselves: `role.fact`, and the value.
+    pub(crate) fn facts(&self, model: &Model<'_>) -> Vec<(String, toml::Value)> {
+        let observed = model.observed.iter().map(|(key, ..)| *key).zip(&self.observed);
+        let roles = model.flat.roles.iter().map(|(key, _)| key).zip(&self.roles).chain(observed);
+        let facts = roles.flat_map(|(key, bound)| bound.iter().flat_map(|bound| &bound.filled.facts).map(move |f| (key, f)));
+        facts.map(|(key, (fact, value))| (format!("{}.{fact}", key.name), value.clone())).collect()
+    }
 }
 
 /// Opens what the roles are bound to.
@@ -45,7 +57,7 @@ pub(crate) fn open(
         Opener { catalogue, sources, found, names: Vec::new(), taken: Vec::new(), opened: Opened::default() };
     if let Some(bench) = bench {
         opener.check_types(bench);
-        opener.check_rest(bench, &model.flat.roles);
+        opener.check_rest(bench, model);
     }
     for (i, (key, kind)) in model.flat.roles.iter().enumerate() {
         let role = match bench {
@@ -53,6 +65,11 @@ pub(crate) fn open(
             _ => None,
         };
         opener.opened.roles.push(role);
+    }
+    for (key, _, role) in &model.observed {
+        let kind = Word { text: role.name.to_string(), span: key.span.clone() };
+        let bound = bench.and_then(|bench| opener.role(bench, key, &kind));
+        opener.opened.observed.push(bound);
     }
     opener.opened
 }
@@ -73,9 +90,12 @@ struct Opener<'a> {
 
 impl Opener<'_> {
     /// What no role asks for is not opened, but what it says must still mean something.
-    fn check_rest(&mut self, bench: &Bench, roles: &[(Key, Word)]) {
+    fn check_rest(&mut self, bench: &Bench, model: &Model<'_>) {
         let names = || bench.devices.iter().map(|device| device.key.name.as_str());
-        let is_used = |role: &Key| roles.iter().any(|(key, _)| key.name == role.name);
+        let is_used = |role: &Key| {
+            let declared = model.flat.roles.iter().map(|(key, _)| key);
+            declared.chain(model.observed.iter().map(|(key, ..)| *key)).any(|key| key.name == role.name)
+        };
         for (_, word) in bench.bind.iter().filter(|(role, _)| !is_used(role)) {
             if !names().any(|name| name == word.text) {
                 self.found.push(no_device(word, bench));

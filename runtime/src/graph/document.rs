@@ -313,7 +313,7 @@ fn names_of(tables: &[(Key, Table)]) -> Vec<String> {
 }
 
 /// A mistake that knows its place.
-fn spanned(mistake: Mistake) -> Diagnostic {
+pub(crate) fn spanned(mistake: Mistake) -> Diagnostic {
     let At::Span(span) = mistake.at else { unreachable!("a reader points at places") };
     Diagnostic { code: mistake.code, message: mistake.message, span, notes: Vec::new(), help: mistake.help }
 }

@@ -135,7 +135,8 @@ impl Loader {
         let Some(mut root) = root else { return flat };
         if let Some(what) = other_file(&root.0, "graph") {
             let message = format!("this is {what}, not a graph");
-            self.diagnostics.push(Diagnostic::new(Code::WrongFile, root.1, message));
+            let help = (what == SCENARIO).then(|| "`tactflow verify` runs it".to_owned());
+            self.diagnostics.push(Diagnostic::new(Code::WrongFile, root.1, message).with_help(help));
             return flat;
         }
         flat.place = root.1;
@@ -220,7 +221,7 @@ impl Loader {
     }
 
     /// Reads and parses a file; `from` is where its name stands.
-    fn read(&mut self, path: &Path, from: Option<Range<usize>>) -> Option<(Table, Range<usize>)> {
+    pub(crate) fn read(&mut self, path: &Path, from: Option<Range<usize>>) -> Option<(Table, Range<usize>)> {
         let text = match self.sources.builtin(path) {
             Ok(Some(bytes)) => Ok(String::from_utf8_lossy(bytes).into_owned()),
             Ok(None) => std::fs::read_to_string(path).map_err(|error| (error.to_string(), None)),
@@ -399,12 +400,15 @@ fn is_one_assignment(table: &Table, text: &str) -> bool {
         && !text.trim_start().starts_with('[')
 }
 
+/// What a file with the section [scenario] is.
+const SCENARIO: &str = "a scenario";
+
 /// What a file is that lacks its section `wanted` and has those of another sort of file.
-fn other_file(root: &Table, wanted: &str) -> Option<&'static str> {
+pub(crate) fn other_file(root: &Table, wanted: &str) -> Option<&'static str> {
     if root.get(wanted).is_some() {
         return None;
     }
-    let sorts = [("graph", "a graph"), ("devices", "a bench"), ("exports", "a part")];
+    let sorts = [("scenario", SCENARIO), ("graph", "a graph"), ("devices", "a bench"), ("exports", "a part")];
     sorts.iter().find(|(section, _)| root.get(section).is_some()).map(|(_, what)| *what)
 }
 

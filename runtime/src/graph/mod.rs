@@ -24,6 +24,9 @@ mod wanted;
 mod wires;
 
 pub use check::plan;
+pub(crate) use check::plan_in;
+pub(crate) use document::spanned;
+pub(crate) use load::{Loader, other_file};
 #[cfg(feature = "cli")]
 pub(crate) use frames::frame_args;
 pub use load::Request;

@@ -132,6 +132,8 @@ pub struct Plan {
     pub(crate) outline: Outline,
     pub(crate) modes: Option<PlannedModes>,
     pub(crate) policy: PolicyTable,
+    pub(crate) exports: Vec<(String, String)>,
+    pub(crate) facts: Vec<(String, toml::Value)>,
 }
 
 impl Plan {
@@ -146,6 +148,23 @@ impl Plan {
     pub fn ports(&self) -> impl Iterator<Item = &PlannedPort> {
         let roles = self.roles.iter().flat_map(|role| &role.ports);
         roles.chain(self.nodes.iter().flat_map(|node| &node.ports))
+    }
+
+    /// What the parts of the graph export, as its wires name it, and the port behind each.
+    #[must_use]
+    pub fn exports(&self) -> &[(String, String)] {
+        &self.exports
+    }
+
+    /// What the devices state of themselves: `role.fact`, and the value.
+    #[must_use]
+    pub fn facts(&self) -> &[(String, toml::Value)] {
+        &self.facts
+    }
+
+    /// The names of the modes, in the order of the file.
+    pub fn modes(&self) -> impl Iterator<Item = &str> {
+        self.modes.iter().flat_map(|modes| &modes.modes).map(|mode| mode.name.as_str())
     }
 
     /// The graph as it runs, with where each value comes from.

@@ -59,6 +59,8 @@ pub(crate) struct Model<'a> {
     pub(crate) roles: Vec<Option<&'a RoleType>>,
     /// Index of the type in the catalogue, and its declaration.
     pub(crate) nodes: Vec<Option<(usize, NodeSpec)>>,
+    /// What the bench binds and only a scenario and the recorder may read: name, device and type.
+    pub(crate) observed: Vec<(&'a Key, &'a Word, &'a RoleType)>,
 }
 
 impl<'a> Model<'a> {
@@ -73,11 +75,12 @@ impl<'a> Model<'a> {
         let role = |(_, kind): &(Key, Word)| {
             let role = catalogue.roles().iter().find(|role| role.name == kind.text);
             if role.is_none() {
-                unknown(kind, "role", catalogue.roles().iter().map(|role| &*role.name).collect());
+                let tasks = catalogue.roles().iter().filter(|role| !role.is_observed);
+                unknown(kind, "role", tasks.map(|role| &*role.name).collect());
             }
             role
         };
-        let roles = flat.roles.iter().map(role).collect();
+        let roles: Vec<Option<&RoleType>> = flat.roles.iter().map(role).collect();
         let nodes = flat.nodes.iter().map(|node| {
             let kind = node.block.kind.as_ref()?;
             let index = specs.iter().position(|spec| spec.name == kind.text);
@@ -87,7 +90,8 @@ impl<'a> Model<'a> {
             index.map(|index| (index, specs[index].clone()))
         });
         let nodes = nodes.collect();
-        Self { flat, roles, nodes }
+        let roles = flat.roles.iter().zip(roles).map(|((_, kind), role)| not_observed(kind, role?, found)).collect();
+        Self { flat, roles, nodes, observed: observed(flat, catalogue, found) }
     }
 
     /// The declaration of a producer's outputs.
@@ -138,6 +142,20 @@ impl<'a> Model<'a> {
             let broken = exports.iter().filter_map(|(_, word)| self.resolve(scope, word, 0).err());
             found.extend(broken.map(|diagnostic| *diagnostic));
         }
+    }
+
+    /// What the parts of the graph export, as its wires name it, and the port behind each.
+    pub(crate) fn exports_by_name(&self) -> Vec<(String, String)> {
+        let names = self.flat.scopes.first().into_iter().flat_map(|scope| &scope.names);
+        let parts = names.filter_map(|(name, (_, entity))| match entity {
+            Entity::Part(inner) => Some((name, *inner)),
+            _ => None,
+        });
+        let exports = parts.flat_map(|(name, inner)| {
+            self.flat.scopes[inner].exports.iter().map(move |(key, word)| (format!("{name}.{}", key.name), inner, word))
+        });
+        let port = |(name, inner, word)| Some((name, self.port_name(self.resolve(inner, word, 0).ok()??)));
+        exports.filter_map(port).collect()
     }
 
     /// What the parts export.
@@ -286,6 +304,10 @@ impl<'a> Model<'a> {
             return wired.map_or(Ok(None), |(_, word)| self.resolve(parent, word, depth + 1));
         }
         let Some((_, entity)) = names.get(name) else {
+            if self.observed.iter().any(|(key, ..)| key.name == name) {
+                let message = format!("`{}` is for scenarios and the recorder: no task reads it", word.text);
+                return Err(Box::new(Diagnostic::new(Code::ObservedRole, word.span.clone(), message).help(UNSEEN)));
+            }
             let help = closest(name, names.keys().map(String::as_str), "roles, nodes and parts");
             return Err(wrong(format!("nothing here is called `{name}`"), help));
         };
@@ -377,4 +399,46 @@ impl<'a> Model<'a> {
             }
         }
     }
+}
+
+/// What to do instead of reading what only a simulation knows.
+const UNSEEN: &str = "a task knows what its sensors give, so that it runs on a robot too: take a port of a sensor or of \
+                      a node, and check this one in a scenario";
+
+/// The type of a role, unless it is one that no task may declare: that is told.
+fn not_observed<'r>(kind: &Word, role: &'r RoleType, found: &mut Vec<Diagnostic>) -> Option<&'r RoleType> {
+    if role.is_observed {
+        let message = format!("a `{}` is for scenarios and the recorder: no task declares it", kind.text);
+        let help = format!("take it out: a bench binds it, as `{} = \"device\"`", role.observed_name());
+        found.push(Diagnostic::new(Code::ObservedRole, kind.span.clone(), message).help(help));
+    }
+    (!role.is_observed).then_some(role)
+}
+
+/// What the bench binds beside what the task declares, and only a scenario and the recorder may read.
+fn observed<'a>(
+    flat: &'a Flat,
+    catalogue: &'a Catalogue,
+    found: &mut Vec<Diagnostic>,
+) -> Vec<(&'a Key, &'a Word, &'a RoleType)> {
+    let bound = flat.bench.iter().flat_map(|bench| &bench.bind);
+    let undeclared = bound.filter(|(key, _)| !flat.roles.iter().any(|(role, _)| role.name == key.name));
+    let all = undeclared.filter_map(|(key, device)| {
+        let role = catalogue.roles().iter().find(|role| role.is_observed_as(&key.name))?;
+        Some((key, device, role))
+    });
+    let mut all: Vec<_> = all.collect();
+    all.retain(|(key, ..)| {
+        let taken = flat.scopes.first().and_then(|scope| scope.names.get(&key.name));
+        if let Some((other, _)) = taken {
+            let message = format!("`{}` is the name of two things", key.name);
+            let diagnostic = Diagnostic::new(Code::DuplicateName, other.span.clone(), message);
+            let diagnostic = diagnostic.note(key.span.clone(), "the bench binds a role of that name here");
+            found.push(
+                diagnostic.help("what a scenario reads has its name from the bench: rename the node or the part"),
+            );
+        }
+        taken.is_none()
+    });
+    all
 }

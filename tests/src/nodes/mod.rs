@@ -20,6 +20,7 @@ pub fn catalogue() -> Catalogue {
     Catalogue::new()
         .role(length())
         .device::<line_length::LineLength>()
+        .device::<crate::true_pad::TruePad>()
         .group("tests: nodes that make one sentence of the semantics visible each")
         .node::<breaks::Breaks>()
         .node::<count::Count>()
@@ -40,6 +41,7 @@ fn length() -> RoleType {
         outputs: vec![value],
         commands: vec![],
         limits: vec![],
+        is_observed: false,
     }
 }
 

@@ -1,0 +1,139 @@
+//! `true_pad`: a pad that is pressed by a round thing which slides to the middle, and that knows the truth of it.
+//!
+//! From `from_s` on the contact lies at `at · exp(-(t - from_s) / tau_s)` on the x axis, so that what a scenario measures
+//! of it is known in closed form. The image has white noise of the seed, the truth has none.
+
+use tactflow_runtime::device::{Commands, Description, Device, DeviceError, Driver, Filled, Opened, Samples, Stepped};
+use tactflow_runtime::node::{Mistakes, NonNegative, Positive};
+use tactflow_runtime::params;
+use tactflow_runtime::signal::{Image, ImageShape, Scalar, ScalarShape, Shape, Unit};
+
+params! {
+    /// Seed of the noise.
+    seed: u64 = 1,
+    /// Standard deviation of a tactel [N].
+    noise: NonNegative = NonNegative(0.0),
+    /// When it is touched [s].
+    from_s: NonNegative = NonNegative(0.5),
+    /// When it is let go; never unless given [s].
+    to_s: Option<Positive>,
+    /// Where it is touched [m].
+    at: f64 = 0.01,
+    /// How long the contact takes for all but 1/e of its way to the middle [s].
+    tau_s: Positive = Positive(0.25),
+    /// When the plug is pulled; never unless given [s].
+    unplug_s: Option<Positive>,
+    /// When the samples end; never unless given [s].
+    for_s: Option<Positive>,
+}
+
+/// The pad and how far it is.
+#[derive(Debug)]
+pub struct TruePad {
+    params: Params,
+    random: u64,
+    next: i64,
+}
+
+const PERIOD: i64 = 4_000_000;
+const SIDE: usize = 16;
+const PITCH: f64 = 0.005;
+const FORCE: f64 = 3.0;
+const RADIUS: f64 = 0.012;
+
+/// Units of the truth's scalars, in the order of the role; the image stands between.
+const TRUTH: [&str; 14] = ["N", "N", "N", "m", "m", "N/tactel", "rad", "m2", "m", "image", "rad", "m", "m", "1"];
+
+impl Device for TruePad {
+    type Params = Params;
+
+    const NAME: &'static str = "true_pad";
+    const SUMMARY: &'static str = "a pad that is pressed, and that knows the truth of it";
+
+    fn open(params: Params) -> Result<Opened, Mistakes> {
+        let image: Shape = ImageShape { rows: SIDE, cols: SIDE, pitch: [PITCH; 2], unit: Unit::NEWTON }.into();
+        let truth = TRUTH.map(|unit| match unit {
+            "image" => image.clone(),
+            unit => ScalarShape::of(unit.parse().expect("it is a unit")).into(),
+        });
+        let facts = vec![("threshold".into(), 0.015.into()), ("noise".into(), (*params.noise).into())];
+        let pad = Filled { role: "tactile_pad".into(), outputs: vec![image], commands: vec![], facts };
+        let truth = Filled { role: "ground_truth".into(), outputs: truth.into(), commands: vec![], facts: vec![] };
+        let random = params.seed;
+        Ok(Opened {
+            description: Description { fills: vec![pad, truth], period: PERIOD as f64 * 1e-9 },
+            driver: Driver::Stepped(Box::new(Self { params, random, next: 0 })),
+        })
+    }
+}
+
+impl TruePad {
+    /// Where the contact is at `time` [s], if there is one [m].
+    fn contact(&self, time: f64) -> Option<f64> {
+        let since = time - *self.params.from_s;
+        let is_let_go = self.params.to_s.is_some_and(|to| time >= *to);
+        (since >= 0.0 && !is_let_go).then(|| self.params.at * libm::exp(-since / *self.params.tau_s))
+    }
+
+    /// A number from 0 to 1 (splitmix64).
+    fn uniform(&mut self) -> f64 {
+        self.random = self.random.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = self.random;
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
+    }
+
+    /// Twelve uniform numbers less six have a variance of one.
+    fn normal(&mut self) -> f64 {
+        (0..12).map(|_| self.uniform()).sum::<f64>() - 6.0
+    }
+}
+
+/// The image without noise.
+fn clean(x: f64) -> Vec<f32> {
+    let place = |i: usize| (i as f64 - (SIDE - 1) as f64 / 2.0) * PITCH;
+    let bump = |i: usize| {
+        let (dx, dy) = (place(i % SIDE) - x, place(i / SIDE));
+        let rest = (1.0 - (dx * dx + dy * dy) / (RADIUS * RADIUS)).max(0.0);
+        rest * rest
+    };
+    let cells: Vec<f64> = (0..SIDE * SIDE).map(bump).collect();
+    let sum: f64 = cells.iter().sum();
+    cells.iter().map(|cell| (cell / sum * FORCE) as f32).collect()
+}
+
+impl Stepped for TruePad {
+    fn next(&self) -> Option<i64> {
+        let is_over = self.params.for_s.is_some_and(|end| self.next as f64 * 1e-9 >= *end);
+        (!is_over).then_some(self.next)
+    }
+
+    fn exchange(&mut self, now: i64, _: &Commands, samples: &mut Samples) -> Result<(), DeviceError> {
+        if now < self.next {
+            return Ok(());
+        }
+        let (stamp, sequence) = (self.next, (self.next / PERIOD) as u64 + 1);
+        self.next += PERIOD;
+        let time = stamp as f64 * 1e-9;
+        if self.params.unplug_s.is_some_and(|at| time >= *at) {
+            return Err(DeviceError("its plug is out".into()));
+        }
+        let contact = self.contact(time);
+        let image = contact.map_or_else(|| vec![0.0; SIDE * SIDE], clean);
+        let noisy: Vec<f32> = image.iter().map(|cell| cell + (*self.params.noise * self.normal()) as f32).collect();
+        samples.write::<Image>(0, stamp, sequence).cells_mut().copy_from_slice(&noisy);
+        samples.write::<Image>(10, stamp, sequence).cells_mut().copy_from_slice(&image);
+        *samples.write::<Scalar>(1, stamp, sequence) = if contact.is_some() { FORCE } else { 0.0 };
+        for (port, value) in [(4, contact), (5, contact.map(|_| 0.0))] {
+            match value {
+                Some(value) => *samples.write::<Scalar>(port, stamp, sequence) = value,
+                None => samples.clear(port, stamp, sequence),
+            }
+        }
+        for port in (1..=TRUTH.len()).filter(|port| ![1, 4, 5, 10].contains(port)) {
+            samples.clear(port, stamp, sequence);
+        }
+        Ok(())
+    }
+}
