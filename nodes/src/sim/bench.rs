@@ -10,7 +10,7 @@ use std::collections::VecDeque;
 use tactflow_runtime::device::{Commands, Description, Device, DeviceError, Driver, Filled, Opened, Samples, Stepped};
 use tactflow_runtime::node::{Count, FilePath, Mistake, Mistakes, NonNegative, Positive, Rate};
 use tactflow_runtime::params;
-use tactflow_runtime::signal::{Image, ImageShape, Joint, Joints, JointsShape, Unit};
+use tactflow_runtime::signal::{Image, ImageShape, Joint, Joints, JointsShape, Kind, Scalar, ScalarShape, Unit};
 
 use super::contact::Contact;
 use super::foam::Foam;
@@ -25,6 +25,7 @@ use crate::arm::model::load;
 use crate::arm::mount::Mount;
 use crate::devices::arm_facts::{check_start, facts};
 use crate::devices::{nanos, period_of};
+use crate::roles::ground_truth;
 
 params! {
     /// Seed of the noise and of where the objects are scattered.
@@ -147,7 +148,7 @@ objects = [
         check_start(&joints, &params.start)?;
         let shape = ImageShape { rows: params.rows.0, cols: params.cols.0, pitch: [*params.pitch; 2], unit: Unit::RAW };
         check(&params, &shape)?;
-        let fills = vec![pad(&params, &shape)?, arm(&params, &joints)?];
+        let fills = vec![pad(&params, &shape)?, arm(&params, &joints)?, truth(&shape)];
         let period = period_of(params.rate_hz);
         let description = Description { fills, period: period as f64 * 1e-9 };
         let bench = Self::new(params, chain, joints, shape, period)?;
@@ -223,6 +224,22 @@ fn arm(params: &Params, joints: &[Joint]) -> Result<Filled, Mistakes> {
         commands: vec![shape.in_unit(Unit::RADIAN.per_second()).into()],
         facts: facts(&params.urdf, &params.tip, &params.mount)?,
     })
+}
+
+/// Number of the first port of the ground truth.
+const TRUTH: usize = 3;
+/// Which of its ports is the image.
+const IMAGE: usize = 9;
+
+fn truth(shape: &ImageShape) -> Filled {
+    let role = ground_truth();
+    let outputs = role.outputs.iter().map(|port| match port.args.first() {
+        Some(unit) if port.kind == Kind::Scalar => {
+            ScalarShape::of(unit.parse().expect("the role's units are units")).into()
+        }
+        _ => ImageShape { unit: Unit::NEWTON, ..shape.clone() }.into(),
+    });
+    Filled { outputs: outputs.collect(), commands: vec![], facts: vec![], role: role.name.clone() }
 }
 
 impl SimBench {
@@ -308,6 +325,41 @@ impl Stepped for SimBench {
         let arm = &self.world.arm;
         samples.write::<Joints>(1, now, self.sequence).0.copy_from_slice(&arm.position);
         samples.write::<Joints>(2, now, self.sequence).0.copy_from_slice(&arm.equilibrium);
+        self.tell(now, samples);
         Ok(())
+    }
+}
+
+impl SimBench {
+    /// Gives the ground truth, in the order of the role's outputs.
+    fn tell(&mut self, now: i64, samples: &mut Samples) {
+        let truth = self.world.truth(self.threshold);
+        let noise = truth.pressure.map(|pressure| self.readout.noise(pressure, truth.tactels));
+        let values = [
+            Some(truth.force),
+            Some(truth.tangential),
+            Some(truth.peak),
+            truth.middle.map(|[x, _]| x),
+            truth.middle.map(|[_, y]| y),
+            truth.pressure,
+            truth.orientation,
+            Some(truth.area),
+            Some(truth.depth),
+            None,
+            truth.tilt,
+            None,
+            None,
+            None,
+            noise.map(|[common, _]| common),
+            noise.map(|[_, own]| own),
+        ];
+        for (port, value) in values.into_iter().enumerate().filter(|(port, _)| *port != IMAGE) {
+            match value {
+                Some(value) => *samples.write::<Scalar>(TRUTH + port, now, self.sequence) = value,
+                None => samples.clear(TRUTH + port, now, self.sequence),
+            }
+        }
+        let cells = samples.write::<Image>(TRUTH + IMAGE, now, self.sequence).cells_mut();
+        cells.iter_mut().zip(self.world.image()).for_each(|(cell, force)| *cell = *force as f32);
     }
 }

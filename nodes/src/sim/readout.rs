@@ -106,6 +106,18 @@ impl Readout {
     }
 }
 
+impl Readout {
+    /// Standard deviation that both shares of the noise, the common one and the tactels' own, give the mean force of
+    /// `tactels` tactels, of `pressure` on average [N per tactel].
+    #[must_use]
+    pub fn noise(&self, pressure: f64, tactels: usize) -> [f64; 2] {
+        let electronics = &self.electronics;
+        // The slope of the curve that is neither more nor less sensitive than others.
+        let slope = *electronics.range / *electronics.squash * libm::exp(-pressure / *electronics.squash);
+        [*electronics.common_noise * pressure, *electronics.own_noise / slope / (tactels as f64).sqrt()]
+    }
+}
+
 impl Tactel {
     fn feel(&mut self, force: f64, creep: f64, electronics: &Electronics) -> f64 {
         let change = force - self.force;
