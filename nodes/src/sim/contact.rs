@@ -246,7 +246,7 @@ impl Contact {
             let [x, y] = self.place(touch.point);
             let arm = x_axis * x + y_axis * y - z * touch.depth;
             let object = &objects[touch.object];
-            let relative = object.velocity - (pad.linear + pad.angular.cross(arm));
+            let relative = object.velocity_at(pad.pose.translation + arm) - (pad.linear + pad.angular.cross(arm));
             let facing = (-touch.normal.dot(z)).max(STEEPEST);
             let rate = touch.normal.dot(relative) / facing;
             let force = self.column.force(touch.depth, rate, object.softness * parts);
@@ -272,7 +272,8 @@ impl Contact {
             }
             let (x, y) = (self.shape.x((index % cols) as f64), self.shape.y((index / cols) as f64));
             let arm = x_axis * x + y_axis * y;
-            let relative = pad.linear + pad.angular.cross(arm) - objects[tactel.object].velocity;
+            let relative =
+                pad.linear + pad.angular.cross(arm) - objects[tactel.object].velocity_at(pad.pose.translation + arm);
             let velocity = [relative.dot(x_axis), relative.dot(y_axis)];
             tactel.rub(dt, velocity, self.shear, &self.foam);
             let push = x_axis * tactel.friction[0] + y_axis * tactel.friction[1];
