@@ -4,6 +4,7 @@ use std::ops::Range;
 
 use super::modes::PlannedModes;
 use super::policy::{Age, Policy, PolicyTable};
+use super::shown::PlannedView;
 use super::{Outline, Sources};
 use crate::device::Driver;
 use crate::diagnostic::{Diagnostic, Report};
@@ -132,6 +133,8 @@ pub struct Plan {
     pub(crate) outline: Outline,
     pub(crate) modes: Option<PlannedModes>,
     pub(crate) policy: PolicyTable,
+    /// What a run shows.
+    pub(crate) view: PlannedView,
 }
 
 impl Plan {
