@@ -32,3 +32,4 @@ mod tick;
 mod tidy;
 mod tool;
 mod touch;
+mod view;

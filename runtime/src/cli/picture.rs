@@ -124,7 +124,7 @@ impl<'a> Easel<'a> {
     }
 
     /// What the shades mean.
-    pub(super) fn legend(self, scale: Scale, unit: Unit, has_mark: bool) -> String {
+    pub(super) fn legend(self, scale: Scale, unit: Unit) -> String {
         let steps = if self.has_colour { COLOURS.len() } else { SHADES.len() };
         let step = |i: usize| {
             let value = scale.low + (scale.high - scale.low) * i as f64 / (steps - 1) as f64;
@@ -132,8 +132,7 @@ impl<'a> Easel<'a> {
         };
         let reset = if self.has_colour { RESET } else { "" };
         let ramp: String = (0..steps).map(step).collect();
-        let mark = if has_mark { format!("   {MARK} centre of the contact") } else { String::new() };
-        format!("{} {ramp}{reset} {} {unit}{mark}", number(scale.low), number(scale.high))
+        format!("{} {ramp}{reset} {} {unit}", number(scale.low), number(scale.high))
     }
 
     /// What is to be known of the pad and of the way it is drawn.
@@ -186,7 +185,7 @@ mod tests {
             image.mark = Some(outside);
             assert!(!easel.lines(&image, scale).concat().contains(MARK), "{outside:?}");
         }
-        assert_eq!(easel.legend(scale, Unit::NEWTON, true), "0 . ::--==++**##%%@@ 8.000 N   >< centre of the contact");
+        assert_eq!(easel.legend(scale, Unit::NEWTON), "0 . ::--==++**##%%@@ 8.000 N");
     }
 
     #[test]

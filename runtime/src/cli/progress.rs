@@ -87,10 +87,14 @@ fn draw(strokes: &Receiver<Stroke>) {
     }
 }
 
-/// A text in the place of one of as many lines: each line is written over, so that nothing flickers.
+/// A text in the place of one of as many lines: each line is written over, so that nothing flickers, and none is broken
+/// where the terminal ends, so that the lines are as many as they seem.
 fn redrawn(lines: usize, text: &str) -> String {
     let up = if lines > 1 { format!("\x1b[{}A", lines - 1) } else { String::new() };
-    format!("\r{up}{}\x1b[J", text.lines().map(|line| format!("{line}\x1b[K")).collect::<Vec<_>>().join("\r\n"))
+    format!(
+        "\x1b[?7l\r{up}{}\x1b[J\x1b[?7h",
+        text.lines().map(|line| format!("{line}\x1b[K")).collect::<Vec<_>>().join("\r\n")
+    )
 }
 
 /// What is shown with the line of progress below, or that line alone if there is no room for more.
@@ -138,8 +142,8 @@ mod tests {
 
     #[test]
     fn a_text_is_drawn_over_the_one_before() {
-        assert_eq!(redrawn(0, "a\nb"), "\ra\x1b[K\r\nb\x1b[K\x1b[J");
-        assert_eq!(redrawn(2, "c"), "\r\x1b[1Ac\x1b[K\x1b[J");
-        assert_eq!(redrawn(3, ""), "\r\x1b[2A\x1b[J");
+        assert_eq!(redrawn(0, "a\nb"), "\x1b[?7l\ra\x1b[K\r\nb\x1b[K\x1b[J\x1b[?7h");
+        assert_eq!(redrawn(2, "c"), "\x1b[?7l\r\x1b[1Ac\x1b[K\x1b[J\x1b[?7h");
+        assert_eq!(redrawn(3, ""), "\x1b[?7l\r\x1b[2A\x1b[J\x1b[?7h");
     }
 }

@@ -99,7 +99,10 @@ impl Summary {
             None => [self.ports(engine), nodes(engine, outcome), story + &self.timeline.limits(outcome.time)],
         };
         let parts = parts.iter().map(|part| part.trim_end()).filter(|part| !part.is_empty());
-        let mut text = parts.collect::<Vec<_>>().join("\n\n") + "\n";
+        let mut text = parts.collect::<Vec<_>>().join("\n\n");
+        if !text.is_empty() {
+            text.push('\n');
+        }
         for ((port, _), counters) in engine.ports().iter().zip(engine.counters()) {
             let counted = counted(counters);
             if !counted.is_empty() {

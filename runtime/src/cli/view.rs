@@ -150,7 +150,8 @@ impl View {
         let width = page.width - panel;
         let names: Vec<&str> = self.plots.iter().map(|plot| plot.name.as_str()).collect();
         let tail = (last - first) * TAIL;
-        let mut text = format!("{} over time; mean ± standard deviation of the last {tail:.3} s\n", names.join(", "));
+        let title = format!("{} over time; mean ± deviation of the last {tail:.3} s", names.join(", "));
+        let mut text = wrapped(&title, page.width) + "\n";
         let mut columns = self.columns.list.iter().zip(&self.courses).zip(&self.row);
         for plot in &self.plots {
             for ((column, course), value) in columns.by_ref().take(plot.count) {
@@ -262,20 +263,20 @@ impl Film {
         // No picture becomes coarser so that more of them fit.
         let fits = |(_, width, easel): &(usize, usize, Easel<'_>)| *width >= CAPTION && easel.block == one.block;
         let (count, _, easel) = (1..=3).rev().map(easel).find(fits).unwrap_or((1, page.width, one));
-        self.draw(easel, &self.frames(count))
+        self.draw(easel, page.width, &self.frames(count))
     }
 
     /// The image as it is now.
     fn now(&self, page: Page) -> String {
         let easel = Easel::new(&self.shape, page.width, page.has_colour);
-        self.draw(easel, &self.last.iter().map(|frame| ("now", frame)).collect::<Vec<_>>())
+        self.draw(easel, page.width, &self.last.iter().map(|frame| ("now", frame)).collect::<Vec<_>>())
     }
 
-    fn draw(&self, easel: Easel<'_>, frames: &[(&str, &Frame)]) -> String {
+    fn draw(&self, easel: Easel<'_>, page: usize, frames: &[(&str, &Frame)]) -> String {
         if frames.is_empty() {
             return format!("{}: absent\n", self.name);
         }
-        let mut text = format!("{}: {}\n", self.name, easel.about());
+        let mut text = wrapped(&format!("{}: {}", self.name, easel.about()), page) + "\n";
         let scale = easel.scale(&frames.iter().map(|(_, frame)| *frame).collect::<Vec<_>>());
         let width = easel.width().max(CAPTION);
         let captions = frames.iter().map(|(what, frame)| format!("{:.3} s: {what}", frame.time as f64 * 1e-9));
@@ -285,8 +286,31 @@ impl Film {
             text.push_str(&row(pictures.iter().map(|lines| (easel.width(), lines[i].clone())), width));
         }
         let has_mark = frames.iter().any(|(_, frame)| frame.mark.is_some());
-        text + &easel.legend(scale, self.shape.unit, has_mark) + "\n"
+        let mark = match has_mark {
+            false => "",
+            true if page < NARROW => ";\n  >< centre of the contact",
+            true => "; >< centre of the contact",
+        };
+        text + &easel.legend(scale, self.shape.unit) + mark + "\n"
     }
+}
+
+/// A text whose parts, which `;` divides, go to lines of their own where there is no room.
+fn wrapped(text: &str, width: usize) -> String {
+    let (mut lines, mut room) = (String::new(), width);
+    for (i, part) in text.split("; ").enumerate() {
+        let length = part.chars().count() + 2;
+        let (between, indent) = match i {
+            0 => ("", 0),
+            _ if length <= room => ("; ", 0),
+            _ => (";\n  ", 2),
+        };
+        room = if indent > 0 { width } else { room };
+        room = room.saturating_sub(length + indent);
+        lines.push_str(between);
+        lines.push_str(part);
+    }
+    lines
 }
 
 /// Texts side by side, each with how wide it is seen to be.

@@ -44,9 +44,10 @@ impl Shown {
             let source = source(model, word, found)?;
             let kind = model.port(source).kind;
             if !can_be_shown(kind) {
+                let help = "show the image behind it, or anything that `--out` records";
                 let message =
                     format!("`{}` is {}, and only images and numbers can be shown", word.text, kind.with_article());
-                found.push(Diagnostic::new(Code::KindMismatch, word.span.clone(), message));
+                found.push(Diagnostic::new(Code::KindMismatch, word.span.clone(), message).help(help));
             }
             if seen.contains(&source) {
                 let message = format!("`{}` is shown already", word.text);
