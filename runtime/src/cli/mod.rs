@@ -13,6 +13,7 @@
 //! [`derived`] makes one from arguments that clap derives.
 #![allow(clippy::print_stderr, reason = "this is where the tool speaks")]
 
+mod chart;
 mod check;
 mod completions;
 mod course;
@@ -23,6 +24,7 @@ mod json;
 mod list;
 mod log;
 mod page;
+mod picture;
 mod progress;
 mod prose;
 mod reference;
@@ -31,6 +33,7 @@ mod shell;
 mod show;
 mod summary;
 mod timeline;
+mod view;
 
 use std::marker::PhantomData;
 use std::path::PathBuf;
@@ -46,7 +49,7 @@ use crate::graph::Request;
 pub use clap;
 pub use example::example;
 pub use reference::reference;
-pub use run::{Job, duration};
+pub use run::{Job, Print, duration};
 use shell::Colour;
 pub use shell::Shell;
 
