@@ -33,3 +33,4 @@ mod tick;
 mod tidy;
 mod tool;
 mod touch;
+mod verify;

@@ -20,12 +20,7 @@ pub(super) trait Pace {
 }
 
 /// Ticks until `until` [ns], or until something ends it before. `observe` is called after every tick.
-pub(super) fn drive(
-    engine: &mut Engine,
-    until: i64,
-    pace: &mut impl Pace,
-    observe: &mut dyn FnMut(&Engine),
-) -> End {
+pub(super) fn drive(engine: &mut Engine, until: i64, pace: &mut impl Pace, observe: &mut dyn FnMut(&Engine)) -> End {
     loop {
         if pace.is_interrupted() {
             return End::Interrupted;

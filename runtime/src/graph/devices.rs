@@ -40,7 +40,8 @@ impl Opened {
     pub(crate) fn facts(&self, model: &Model<'_>) -> Vec<(String, toml::Value)> {
         let observed = model.observed.iter().map(|(key, ..)| *key).zip(&self.observed);
         let roles = model.flat.roles.iter().map(|(key, _)| key).zip(&self.roles).chain(observed);
-        let facts = roles.flat_map(|(key, bound)| bound.iter().flat_map(|bound| &bound.filled.facts).map(move |f| (key, f)));
+        let facts =
+            roles.flat_map(|(key, bound)| bound.iter().flat_map(|bound| &bound.filled.facts).map(move |f| (key, f)));
         facts.map(|(key, (fact, value))| (format!("{}.{fact}", key.name), value.clone())).collect()
     }
 }

@@ -26,10 +26,10 @@ mod wires;
 pub use check::plan;
 pub(crate) use check::plan_in;
 pub(crate) use document::spanned;
-pub(crate) use load::{Loader, other_file};
 #[cfg(feature = "cli")]
 pub(crate) use frames::frame_args;
 pub use load::Request;
+pub(crate) use load::{Loader, other_file};
 pub(crate) use modes::{Condition, PlannedExit, PlannedModes, Sort, Test};
 pub use outline::{NOWHERE, Origin, Outline, OutlinedBlock, OutlinedMode, OutlinedRole, OutlinedWire, Setting};
 pub(crate) use plan::{Clock, PlannedCommand, PlannedDevice, PlannedNode, PlannedRole, PlannedWire, Producer, Source};
