@@ -268,7 +268,7 @@ fn colours_are_for_terminals_and_for_those_who_ask() {
 }
 
 /// A run that ends with the test at the latest.
-struct Running(Child);
+pub(crate) struct Running(Child);
 
 impl Drop for Running {
     fn drop(&mut self) {
@@ -280,7 +280,7 @@ impl Drop for Running {
 
 impl Running {
     /// Starts a run and waits until its first rows are in the file.
-    fn start(args: &[&str], file: &Path) -> Self {
+    pub(crate) fn start(args: &[&str], file: &Path) -> Self {
         const PATIENCE: Duration = Duration::from_secs(20);
         let running = Self(tool(args).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap());
         let start = Instant::now();
@@ -291,13 +291,13 @@ impl Running {
         running
     }
 
-    fn signal(&self, name: &str) {
+    pub(crate) fn signal(&self, name: &str) {
         let status = Command::new("kill").args([name, &self.0.id().to_string()]).status().unwrap();
         assert!(status.success());
     }
 
     /// How long it took to end, and what it said.
-    fn end(mut self) -> (Duration, Said) {
+    pub(crate) fn end(mut self) -> (Duration, Said) {
         let start = Instant::now();
         let read = |pipe: &mut dyn std::io::Read| std::io::read_to_string(pipe).unwrap();
         let out = read(self.0.stdout.as_mut().unwrap());

@@ -34,3 +34,4 @@ mod tidy;
 mod tool;
 mod touch;
 mod view;
+mod verify;

@@ -237,7 +237,7 @@ fn is_something_else(path: &Path) -> bool {
 }
 
 /// A panic of a node or a device is told as a fault, with its name and its tick: not by the standard library as well.
-fn quietly<T>(work: impl FnOnce() -> T) -> T {
+pub(super) fn quietly<T>(work: impl FnOnce() -> T) -> T {
     let hook = std::panic::take_hook();
     std::panic::set_hook(Box::new(|_| {}));
     let result = std::panic::catch_unwind(std::panic::AssertUnwindSafe(work));

@@ -1,0 +1,190 @@
+//! `tactflow verify`: what is met, what is missed, what fails and what does not load, on a pad whose truth is known.
+
+use std::fs;
+use std::path::Path;
+
+use tactflow_runtime::scenario::judge::Figure;
+use tactflow_runtime::scenario::{Scenario, Trial};
+use tactflow_tests::{catalogue, workspace};
+
+use crate::cli::Running;
+use crate::tool::{Said, peer, say};
+
+const SLIDE: &str = "tests/scenarios/slide.toml";
+const MISSED: &str = "tests/scenarios/missed.toml";
+const FAULT: &str = "tests/scenarios/fault.toml";
+const MOCK: &str = "tests/scenarios/mock.toml";
+const NEVER: &str = "tests/scenarios/never.toml";
+
+/// The cells of the rows of the table: those that two blanks or more lie between.
+fn rows(text: &str) -> Vec<Vec<&str>> {
+    let lines = text.lines().take_while(|line| !line.is_empty());
+    lines.map(|line| line.split("  ").map(str::trim).filter(|cell| !cell.is_empty()).collect()).collect()
+}
+
+/// The row of a figure of a check.
+fn row<'t>(text: &'t str, check: &str, figure: &str) -> Vec<&'t str> {
+    let found = rows(text).into_iter().find(|row| row.windows(2).any(|pair| pair == [check, figure]));
+    found.unwrap_or_else(|| panic!("no row has `{figure}` of `{check}`:\n{text}"))
+}
+
+#[test]
+fn what_is_met_ends_with_0_and_prints_figure_bound_paper_and_mark() {
+    let Said { code, out, err } = say(&["verify", SLIDE]);
+    assert_eq!((code, err.as_str()), (0, ""), "{out}");
+    assert_eq!(row(&out, "x", "response")[..6], ["slide", "x", "response", "s", "0.48000", "≤ 0.52000"]);
+    assert_eq!(row(&out, "x", "response")[6], "0.90000", "the paper's");
+    assert!(rows(&out)[1..].iter().all(|row| *row.last().unwrap() == "met" || row.len() < 9), "{out}");
+    assert!(out.contains("slide: 6 seeds of 4 s, pad.noise = 0.002, devices.pad.tau_s = 0.25\n"), "{out}");
+    assert!(out.ends_with("\n11 met, 0 missed, 4 told, in 6 runs\n"), "{out}");
+}
+
+#[test]
+fn what_is_missed_ends_with_1_and_is_printed_all_the_same() {
+    let Said { code, out, err } = say(&["verify", MISSED]);
+    assert_eq!((code, err.as_str()), (1, ""));
+    let marks = [
+        ("x", "response", "MISSED"),
+        ("x", "error", "MISSED"),
+        ("reach", "max", "MISSED"),
+        ("reach", "min", "met"),
+        ("never_lost", "lost", "MISSED"),
+        ("stays_in", "away", "MISSED"),
+        ("ends_in", "ends", "MISSED"),
+    ];
+    for (check, figure, mark) in marks {
+        assert_eq!(row(&out, check, figure).last(), Some(&mark), "{figure} of {check}:\n{out}");
+    }
+    // The contact is there for 1.5 s of the 2.5 s after it came, a tick each 4 ms; the last of them is at 2.5 s.
+    assert_eq!(row(&out, "never_lost", "lost")[3], "1.004");
+    assert!(out.ends_with("\n1 met, 6 missed, 1 told, in 1 runs\n"), "{out}");
+}
+
+#[test]
+fn a_fault_is_a_row_and_the_others_run() {
+    let Said { code, out, err } = say(&["verify", FAULT, NEVER, MOCK]);
+    assert_eq!(code, 1);
+    let fault = "`pad` failed: its plug is out in tick 376 at 1.500 s (tests/scenarios/benches/unplugged.toml:4:10)";
+    let never = "error: never: `touch.present` was never set, so that no figure has a time 0";
+    let lines = [format!("error: fault, seed 3: device {fault}"), format!("error: fault, seed 7: device {fault}")];
+    assert_eq!(err.lines().collect::<Vec<_>>(), [&lines[0], &lines[1], never]);
+    let remarks: Vec<_> = rows(&out).into_iter().filter(|row| row.last() == Some(&"FAILED")).collect();
+    assert_eq!(remarks, [["fault", "2 of 2 runs failed", "FAILED"], ["never", "1 of 1 runs failed", "FAILED"]]);
+    assert_eq!(row(&out, "pressure", "max").last(), Some(&"met"), "{out}");
+}
+
+#[test]
+fn what_does_not_load_ends_with_2_and_the_others_run() {
+    let cases = [
+        ("tests/errors/scenarios/names.toml", "error[unknown-port]: there is no port `error.error.z`"),
+        ("tests/errors/scenarios/seeds.toml", "error[unknown-key]: no device of this bench has a `seed`"),
+        ("graphs/hybrid.toml", "error[wrong-file]: this is a graph, not a scenario"),
+        ("tests/nowhere.toml", "error[unreadable]: cannot read `tests/nowhere.toml`"),
+    ];
+    for (file, message) in cases {
+        let Said { code, out, err } = say(&["verify", file, MOCK]);
+        assert_eq!(code, 2, "{file}: {err}");
+        assert!(err.contains(message), "{file}: {err}");
+        assert!(out.contains("does not load") && row(&out, "pressure", "max").last() == Some(&"met"), "{file}: {out}");
+    }
+    let empty = tempfile::tempdir().unwrap();
+    let folder = empty.path().to_str().unwrap();
+    let Said { code, err, .. } = say(&["verify", folder]);
+    assert_eq!((code, err), (2, format!("error: there is no scenario in `{folder}`\n")));
+}
+
+#[test]
+fn the_json_is_json_and_does_not_depend_on_the_number_of_jobs() {
+    let folder = "tests/scenarios";
+    let said = say(&["verify", folder, "--json", "--jobs", "1"]);
+    for args in [["--json", "--jobs", "5"], ["--format", "json", "-j3"]] {
+        let other = say(&[&["verify", folder], &args[..]].concat());
+        assert_eq!((other.code, &other.out), (said.code, &said.out), "{args:?}");
+    }
+    assert_eq!(said.code, 1);
+    let file = tempfile::NamedTempFile::new().unwrap();
+    fs::write(file.path(), &said.out).unwrap();
+    let expected = "fault: not ok, 2 runs, 2 failed, told told\n\
+        missed: not ok, 1 runs, 0 failed, missed missed told missed met missed missed missed\n\
+        mock: ok, 1 runs, 0 failed, met told told met\n\
+        never: not ok, 1 runs, 1 failed, told told\n\
+        slide: ok, 6 runs, 0 failed, met met met met told told met met met met told told met met met\n";
+    assert_eq!(peer("verified.py", &[file.path().to_str().unwrap()]), expected);
+}
+
+#[test]
+fn seeds_can_be_overridden_and_each_run_recorded() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("records");
+    let said = say(&["verify", SLIDE, MOCK, "--seeds", "3", "--out", path.to_str().unwrap()]);
+    assert_eq!((said.code, said.err.as_str()), (0, ""), "{}", said.out);
+    let mut names: Vec<String> =
+        fs::read_dir(&path).unwrap().map(|entry| entry.unwrap().file_name().into_string().unwrap()).collect();
+    names.sort();
+    assert_eq!(names, ["mock.csv", "slide-1.csv", "slide-2.csv", "slide-3.csv"]);
+    let [first, second] = ["slide-1.csv", "slide-2.csv"].map(|name| fs::read_to_string(path.join(name)).unwrap());
+    assert!(first.contains("truth.x") && first != second, "another seed is other noise");
+    assert_eq!(row(&said.out, "x", "response").len(), 9, "three seeds have no interval: {}", said.out);
+}
+
+/// The figure of a check in each run.
+fn values(scenario: &Scenario, trials: &[Trial], check: &str, figure: Figure) -> Vec<f64> {
+    let rows = scenario.rows(trials);
+    let row = rows.iter().find(|row| row.check == check && row.figure == figure).expect("it is asked");
+    row.values.iter().map(|value| value.expect("it is measured")).collect()
+}
+
+#[test]
+fn figures_of_the_truth_are_those_of_the_closed_form_whatever_the_seed() {
+    let scenario = Scenario::load(&catalogue(), &workspace().join(SLIDE)).unwrap_or_else(|report| {
+        panic!("{}", report.render(false));
+    });
+    let run = |seed| scenario.run(&catalogue(), seed, None, &|| false).expect("nobody interrupts it");
+    let trials: Vec<Trial> = scenario.runs().into_iter().map(run).collect();
+    // Ten samples of 2 exp(-t/tau), each 4 ms, have the mean of the last times a geometric sum.
+    let (tau, period) = (0.25, 0.004);
+    let sum: f64 = (0..10).map(|k| libm::exp(f64::from(k) * period / tau)).sum::<f64>() / 10.0;
+    let exact = tau * libm::log(2.0 * sum / 0.3);
+    for response in values(&scenario, &trials, "true_x", Figure::Response) {
+        assert!((0.0..period).contains(&(response - exact)), "{response}, not {exact}");
+    }
+    let measured = values(&scenario, &trials, "x", Figure::Error);
+    assert!(measured.iter().any(|error| *error != measured[0]), "a seed is noise: {measured:?}");
+    // White noise of 2 mN a tactel moves the centre of a contact of 3 N by some hundredths of a tactel.
+    assert!(values(&scenario, &trials, "noise", Figure::Std).iter().all(|std| (1e-3..1e-2).contains(std)));
+}
+
+#[test]
+fn check_knows_a_scenario_and_run_says_what_it_is() {
+    let good = say(&["check", SLIDE]);
+    let expected = format!("{SLIDE}: ok, a scenario of 6 runs, 4 s each; `verify` runs it\n");
+    assert_eq!((good.code, good.err.as_str(), good.out), (0, "", expected));
+    let bad = say(&["check", "tests/errors/scenarios/names.toml", "--format", "json"]);
+    assert!(bad.code == 2 && bad.out.contains("\"code\": \"unknown-mode\""), "{}", bad.out);
+    let set = say(&["check", SLIDE, "--set", "nodes.error.setpoint.x=1"]);
+    assert!(set.code == 2 && set.err.contains("is a scenario: it names its bench, and sets nothing"), "{}", set.err);
+    let run = say(&["run", SLIDE]);
+    assert!(run.code == 2 && run.err.contains("this is a scenario, not a graph"), "{}", run.err);
+    assert!(run.err.contains("help: `tactflow verify` runs it"), "{}", run.err);
+}
+
+#[test]
+fn ctrl_c_ends_it_cleanly_and_says_so() {
+    let folder = tempfile::tempdir().unwrap();
+    let endless = folder.path().join("endless.toml");
+    let tests = workspace().join("tests/scenarios/tasks/slide.toml");
+    let text = format!("[scenario]\ngraph = {tests:?}\nfor_s = 1e6\n[check.x]\nof = \"touch.x\"\nnever_above = 1.0\n");
+    fs::write(&endless, text).unwrap();
+    let [scenario, out] = [&endless, &folder.path().join("out")].map(|path| path.to_str().unwrap().to_owned());
+    let running = Running::start(&["verify", &scenario, "--out", &out], &Path::new(&out).join("endless.csv"));
+    running.signal("-INT");
+    let (_, said) = running.end();
+    assert_eq!((said.code, said.err.as_str()), (1, "error: interrupted: some runs are missing\n"));
+}
+
+#[test]
+fn the_page_shows_a_scenario_that_runs() {
+    let page = fs::read_to_string(workspace().join("docs/scenarios.md")).unwrap();
+    let shown = page.split("```toml\n").nth(1).and_then(|rest| rest.split("```").next()).unwrap();
+    assert_eq!(shown, fs::read_to_string(workspace().join(SLIDE)).unwrap());
+}
