@@ -33,5 +33,5 @@ mod tick;
 mod tidy;
 mod tool;
 mod touch;
-mod view;
 mod verify;
+mod view;

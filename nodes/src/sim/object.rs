@@ -157,7 +157,13 @@ impl Object {
     /// How fast it moves at a point in the base [m/s].
     #[must_use]
     pub fn velocity_at(&self, point: Vec3) -> Vec3 {
-        self.velocity + (self.axis * self.spin).cross(point - self.pose.translation)
+        self.velocity + self.spin().cross(point - self.pose.translation)
+    }
+
+    /// How it turns, in the base [rad/s].
+    #[must_use]
+    pub fn spin(&self) -> Vec3 {
+        self.axis * self.spin
     }
 
     /// The energy of the mount and of the mass on it [J].

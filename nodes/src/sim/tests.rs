@@ -224,7 +224,8 @@ fn a_load_at_the_rim_is_all_felt_and_one_in_the_middle_is_where_it_is() {
         let objects = [object(&ball(0.003, [x, y, 0.003]))];
         let mut contact = Contact::new(shape(), Foam::USUAL);
         contact.step(0.001, &pad(0.002), &objects, &mut [Vec3::ZERO]);
-        let clean = imprint.of(contact.touching());
+        imprint.take(contact.touching());
+        let clean = imprint.forces();
         let sum: f64 = clean.iter().sum();
         assert!((sum - contact.normal()).abs() < 1e-9 * sum, "at ({x}, {y})");
         let at = |index: usize| [shape().x((index % 16) as f64), shape().y((index / 16) as f64)];

@@ -22,6 +22,8 @@ pub struct World {
     time: f64,
     /// Longest step [s].
     longest: f64,
+    /// Whether the imprint is of an earlier time.
+    is_old: bool,
 }
 
 impl World {
@@ -36,7 +38,7 @@ impl World {
         longest: f64,
     ) -> Self {
         let loads = vec![Vec3::ZERO; objects.len()];
-        Self { arm, objects, contact, imprint, shape, loads, time: 0.0, longest }
+        Self { arm, objects, contact, imprint, shape, loads, time: 0.0, longest, is_old: true }
     }
 
     /// Goes on to `time` [s] with the joints' equilibrium moving at `velocity` [rad/s].
@@ -52,6 +54,7 @@ impl World {
             self.arm.step(dt, velocity, &self.contact.wrench());
         }
         self.time = time;
+        self.is_old = true;
     }
 
     /// Where the pad is and how it moves.
@@ -62,14 +65,17 @@ impl World {
 
     /// The clean image [N].
     pub fn image(&mut self) -> &[f64] {
-        self.imprint.of(self.contact.touching())
+        if std::mem::take(&mut self.is_old) {
+            self.imprint.take(self.contact.touching());
+        }
+        self.imprint.forces()
     }
 
     /// What is true now; tactels count from `threshold` [N].
     pub fn truth(&mut self, threshold: f64) -> Truth {
+        self.image();
         let pad = self.arm.motion();
-        let clean = self.imprint.of(self.contact.touching());
-        Truth::of(&pad, &self.contact, &self.objects, &self.shape, clean, threshold)
+        Truth::of(&pad, &self.contact, &self.objects, &self.shape, self.imprint.forces(), threshold)
     }
 
     /// The energy that is stored in motion, springs, foam and friction [J].

@@ -33,8 +33,8 @@ mod shell;
 mod show;
 mod summary;
 mod timeline;
-mod view;
 mod verify;
+mod view;
 
 use std::marker::PhantomData;
 use std::path::PathBuf;
