@@ -20,12 +20,7 @@ pub(super) trait Pace {
 }
 
 /// Ticks until `until` [ns], or until something ends it before. `observe` is called after every tick.
-pub(super) fn drive(
-    engine: &mut Engine,
-    until: i64,
-    pace: &mut impl Pace,
-    observe: &mut dyn FnMut(&Engine),
-) -> End {
+pub(super) fn drive(engine: &mut Engine, until: i64, pace: &mut impl Pace, observe: &mut dyn FnMut(&Engine)) -> End {
     loop {
         if pace.is_interrupted() {
             return End::Interrupted;
@@ -76,6 +71,8 @@ pub fn run_virtual(
     let end = drive(engine, (duration * 1e9) as i64, &mut Virtual { is_interrupted }, observe);
     let (time, ticks) = (engine.now(), engine.ticks());
     while !engine.wind_down() {}
+    engine.wind_down();
+    engine.finish(&end.to_string());
     Outcome { end, time, ticks, wall: epoch.elapsed(), late: 0 }
 }
 

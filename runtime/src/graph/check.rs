@@ -6,10 +6,10 @@ use super::document::GraphTable;
 use super::frames::Frames;
 use super::load::{Flat, Loader, Request};
 use super::order::{Wiring, order};
-use super::plan::{Clock, Plan, PlannedCommand, PlannedNode};
+use super::plan::{Clock, Plan, PlannedCommand, PlannedNode, PlannedReport};
 use super::policy::unknown_roles;
 use super::unread::unread;
-use super::wires::Model;
+use super::wires::{CommandWire, Model};
 use super::{Sources, limits, modes, outline};
 use crate::catalogue::Catalogue;
 use crate::diagnostic::{Code, Diagnostic, Report};
@@ -50,7 +50,9 @@ pub(crate) fn plan_in(mut loader: Loader, catalogue: &Catalogue, request: &Reque
     builder.delayed(&wires);
     let wiring = Wiring { order: &order, wires: &wires, commands: &commands };
     let modes = modes::plan(&mut builder, &mut nodes, &wiring);
-    let planned: Vec<PlannedCommand> = commands.iter().filter_map(|wire| builder.command(wire)).collect();
+    let (told, driven): (Vec<&CommandWire>, Vec<&CommandWire>) = commands.iter().partition(|wire| wire.is_report);
+    let planned: Vec<PlannedCommand> = driven.into_iter().filter_map(|wire| builder.command(wire)).collect();
+    let reports: Vec<PlannedReport> = told.into_iter().filter_map(|wire| builder.report(wire)).collect();
     let policy = flat.policy.as_ref().and_then(|(_, policy)| policy.clone()).unwrap_or_default();
     let roles = builder.planned_roles(&policy);
     let (found, sources) = builder.finish();
@@ -77,6 +79,7 @@ pub(crate) fn plan_in(mut loader: Loader, catalogue: &Catalogue, request: &Reque
         devices,
         nodes,
         commands,
+        reports,
         clock,
         period,
         max_gap,

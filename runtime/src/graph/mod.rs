@@ -26,13 +26,15 @@ mod wires;
 pub use check::plan;
 pub(crate) use check::plan_in;
 pub(crate) use document::spanned;
-pub(crate) use load::{Loader, other_file};
 #[cfg(feature = "cli")]
 pub(crate) use frames::frame_args;
 pub use load::Request;
+pub(crate) use load::{Loader, other_file};
 pub(crate) use modes::{Condition, PlannedExit, PlannedModes, Sort, Test};
 pub use outline::{NOWHERE, Origin, Outline, OutlinedBlock, OutlinedMode, OutlinedRole, OutlinedWire, Setting};
-pub(crate) use plan::{Clock, PlannedCommand, PlannedDevice, PlannedNode, PlannedRole, PlannedWire, Producer, Source};
+pub(crate) use plan::{
+    Clock, PlannedCommand, PlannedDevice, PlannedNode, PlannedReport, PlannedRole, PlannedWire, Producer, Source,
+};
 pub use plan::{Plan, PlannedPort};
 pub use policy::Policy;
 pub(crate) use policy::{Age, PolicyTable};

@@ -1,6 +1,6 @@
 //! Nodes whose work is lost: in a graph that drives a command, nothing follows from them that anything uses.
 //!
-//! A wire that was deleted by mistake leaves such a node behind. What is used is what a command follows from, what a
+//! A wire that was deleted by mistake leaves such a node behind. What is used is what a command or a report follows from, what a
 //! node without outputs reads or one that logs, and what a part exports: whether a task takes it is the task's business.
 
 use std::collections::BTreeSet;
@@ -13,7 +13,7 @@ use crate::node::Need;
 
 /// What is to be looked at; nothing in a graph without commands, which is there to be recorded.
 pub(crate) fn unread(model: &Model<'_>, wires: &[Vec<Wire>], commands: &[CommandWire]) -> Vec<Diagnostic> {
-    if commands.is_empty() {
+    if commands.iter().all(|wire| wire.is_report) {
         return Vec::new();
     }
     let readers = |node: usize| {
