@@ -19,6 +19,7 @@ pub fn tactile_pad() -> RoleType {
         summary: "an array of tactels that gives an image".into(),
         outputs: vec![port("image", "The newest image, in the device's unit.", Kind::Image, &["U", "self"])],
         commands: vec![],
+        reports: vec![],
         limits: vec![],
         is_observed: false,
     }
@@ -35,10 +36,13 @@ pub fn velocity_arm() -> RoleType {
             port("equilibrium", EQUILIBRIUM, Kind::Joints, &["rad", "self"]),
         ],
         commands: vec![port("velocity", "Joint velocities [rad/s].", Kind::Joints, &["rad/s", "self"])],
+        reports: vec![port("contact", CONTACT, Kind::Pose, &["C", "base"])],
         limits: LIMITS.map(Cow::Borrowed).into(),
         is_observed: false,
     }
 }
+
+const CONTACT: &str = "Where the task finds the contact in the base: the robot as a ruler [m].";
 
 const EQUILIBRIUM: &str = "Posture that the commands have moved to: where a compliant arm would be if nothing held it; \
     of a stiff arm its position [rad].";
@@ -70,6 +74,7 @@ pub fn ground_truth() -> RoleType {
             scalar("own_noise", OWN_NOISE, &["N/tactel"]),
         ],
         commands: vec![],
+        reports: vec![],
         limits: vec![],
         is_observed: true,
     }

@@ -9,7 +9,7 @@ use std::sync::Arc;
 
 use tactflow_runtime::device::{Commands, Description, Device, DeviceError, Driver, Filled, Opened, Samples, Stepped};
 use tactflow_runtime::diagnostic::Code;
-use tactflow_runtime::node::{At, Count, FilePath, Mistake, Mistakes, Positive, Rate};
+use tactflow_runtime::node::{At, Count, FilePath, Mistake, Mistakes, NonNegative, Positive, Rate};
 use tactflow_runtime::params;
 use tactflow_runtime::signal::{Image, Unit};
 
@@ -30,6 +30,10 @@ params! {
     size: Option<[Count; 2]>,
     /// Name of the pad to play, where the file has several.
     pad: Option<String>,
+    /// What it states as the noise threshold, where the file does not say it or says it for other tasks [unit of a tactel].
+    threshold: Option<NonNegative>,
+    /// What it states as the unit of pressure, the p = 1 of the paper; not stated unless given [unit of a tactel per tactel].
+    pressure: Option<Positive>,
 }
 
 /// A recording that is being shown.
@@ -61,7 +65,8 @@ impl Device for Player {
         Frames come at the times of the file, the first at once. Those between two ticks are skipped but for the \
         newest. Rows and columns are counted as in the file: `tactile_source` turns them into the sensor's frame.\n\n\
         It states the facts `dead` (places without a sensor, as [row, column]), `frames`, `format`, and `threshold` \
-        if the file says below what its values are noise.";
+        if it is given or the file says below what its values are noise; and `pressure`, if it is given. Its \
+        `calibration` names the dead places, and leaves the values as they are.";
     const EXAMPLE: &'static str = r#"
 [roles]
 pad = "tactile_pad"
@@ -84,7 +89,7 @@ file = "builtin:finger_press.csv"   # a finger on a Tekscan I-Scan: 28 by 28 sen
             role: "tactile_pad".into(),
             outputs: vec![recording.shape.clone().into()],
             commands: vec![],
-            facts: facts(&recording),
+            facts: facts(&recording, &params),
         };
         let description = Description { fills: vec![filled], period: recording.period };
         Ok(Opened { description, driver: Driver::Stepped(Box::new(Self { recording, next: 0 })) })
@@ -160,18 +165,20 @@ impl Stepped for Player {
     }
 }
 
-fn facts(recording: &Recording) -> Vec<(Cow<'static, str>, toml::Value)> {
+fn facts(recording: &Recording, params: &Params) -> Vec<(Cow<'static, str>, toml::Value)> {
     let cols = recording.shape.cols;
     let place = |index: &usize| toml::Value::from(vec![(index / cols) as i64, (index % cols) as i64]);
     let dead: Vec<toml::Value> = recording.dead.iter().map(place).collect();
     let mut facts = vec![
+        ("calibration".into(), toml::Table::from_iter([("dead".to_owned(), dead.clone().into())]).into()),
         ("dead".into(), dead.into()),
         ("frames".into(), (recording.frames.len() as i64).into()),
         ("format".into(), recording.format.into()),
     ];
-    if let Some(threshold) = recording.threshold {
+    if let Some(threshold) = params.threshold.map(|threshold| *threshold).or(recording.threshold) {
         facts.push(("threshold".into(), threshold.into()));
     }
+    facts.extend(params.pressure.map(|pressure| ("pressure".into(), (*pressure).into())));
     facts
 }
 

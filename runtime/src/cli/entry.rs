@@ -54,6 +54,8 @@ pub(super) struct Entry {
     pub(super) outputs: Vec<Port>,
     /// What a role takes.
     pub(super) commands: Vec<Port>,
+    /// What a role may be told without moving.
+    pub(super) reports: Vec<Port>,
     pub(super) params: Vec<Param>,
     /// Roles that a device fills, or devices that fill a role, as far as the examples tell.
     pub(super) fits: Vec<String>,
@@ -199,6 +201,7 @@ impl<'a> Entries<'a> {
                 .map(|port| if role.is_observed { declared(port) } else { self.output(port) })
                 .collect(),
             commands: role.commands.iter().map(|port| self.input(port)).collect(),
+            reports: role.reports.iter().map(|port| self.input(port)).collect(),
             fits: fills.map(|device| device.name().into_owned()).collect(),
             limits: role.limits.iter().map(ToString::to_string).collect(),
             ..entry(Sort::Role, &role.name, &role.summary, &doc)
@@ -214,7 +217,7 @@ impl<'a> Entries<'a> {
         for role in self.catalogue.roles() {
             let outputs = role.outputs.iter().filter(is_meant);
             entry.outputs.extend(outputs.map(|port| named(&role.name, port, self.output(port))));
-            let commands = role.commands.iter().filter(is_meant);
+            let commands = role.commands.iter().chain(&role.reports).filter(is_meant);
             entry.inputs.extend(commands.map(|port| named(&role.name, port, self.input(port))));
         }
         for (_, spec) in &self.nodes {
@@ -239,7 +242,8 @@ impl<'a> Entries<'a> {
     fn output(&self, port: &PortSpec) -> Port {
         let roles = self.catalogue.roles().iter().map(|role| (&role.name, &role.commands));
         let nodes = self.nodes.iter().map(|(_, spec)| (&spec.name, &spec.inputs));
-        let all = nodes.chain(roles).flat_map(|(owner, ports)| ports.iter().map(move |port| (owner, port)));
+        let told = self.catalogue.roles().iter().map(|role| (&role.name, &role.reports));
+        let all = nodes.chain(roles).chain(told).flat_map(|(owner, ports)| ports.iter().map(move |port| (owner, port)));
         Port { fits: best_first(port, all.filter(|(_, input)| may_fit(port, input))), ..declared(port) }
     }
 }
@@ -262,6 +266,7 @@ fn entry(sort: Sort, name: &str, summary: &str, doc: &str) -> Entry {
         inputs: Vec::new(),
         outputs: Vec::new(),
         commands: Vec::new(),
+        reports: Vec::new(),
         params: Vec::new(),
         fits: Vec::new(),
         limits: Vec::new(),

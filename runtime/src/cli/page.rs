@@ -27,8 +27,12 @@ pub(super) fn page(entry: &Entry, has_fits: bool) -> Vec<Block> {
     };
     if entry.sort != Sort::Kind || has_fits {
         let is_kind = entry.sort == Sort::Kind;
-        let sections =
-            [(inputs, "in.", &entry.inputs), (outputs, "", &entry.outputs), ("Commands", "", &entry.commands)];
+        let sections = [
+            (inputs, "in.", &entry.inputs),
+            (outputs, "", &entry.outputs),
+            ("Commands", "", &entry.commands),
+            ("Reports", "", &entry.reports),
+        ];
         for (heading, prefix, ports) in sections.into_iter().filter(|(_, _, ports)| !ports.is_empty()) {
             let prefix = if is_kind { "" } else { prefix };
             blocks.push(Block::Heading(heading.to_owned()));

@@ -56,10 +56,20 @@ impl Samples {
     }
 }
 
-/// The command of each command port of a device.
+/// The command of each command port of a device, and what the task reports to it.
 #[derive(Debug, Clone, Default)]
 pub struct Commands {
     pub(crate) values: Vec<Box<[f64]>>,
+    arenas: Arenas,
+    reports: Vec<Option<Report>>,
+}
+
+/// What a wire reports; none where there is no wire.
+#[derive(Debug, Clone, Copy)]
+struct Report {
+    kind: Kind,
+    slot: u32,
+    is_present: bool,
 }
 
 impl Commands {
@@ -73,7 +83,61 @@ impl Commands {
             Shape::Joints(shape) => vec![0.0; shape.joints.len()].into(),
             other => panic!("a command cannot be {}", other.kind().with_article()),
         };
-        Self { values: shapes.map(zeros).collect() }
+        Self { values: shapes.map(zeros).collect(), ..Self::default() }
+    }
+
+    /// With room for one more report, of a shape that a wire gives; without one it stays absent.
+    #[must_use]
+    pub fn with_report(mut self, shape: Option<&Shape>) -> Self {
+        let room = |shape: &Shape| Report { kind: shape.kind(), slot: self.arenas.add(shape), is_present: false };
+        let report = shape.map(room);
+        self.reports.push(report);
+        self
+    }
+
+    /// What is reported to report port `port`: none while it is absent, or if nothing is wired to it. The reports of a
+    /// device are numbered through all the roles that it fills.
+    #[must_use]
+    pub fn report<T: Signal>(&self, port: usize) -> Option<&T> {
+        let report = (*self.reports.get(port)?)?;
+        let is_there = report.is_present && report.kind == T::KIND;
+        is_there.then(|| &T::arena(&self.arenas)[report.slot as usize])
+    }
+
+    /// Reports a value to port `port`, as a graph does.
+    ///
+    /// # Panics
+    /// If nothing of that kind is reported there.
+    pub fn tell<T: Signal>(&mut self, port: usize, value: &T) {
+        let report = self.reports[port].as_mut().expect("a report that is told has room");
+        assert_eq!(report.kind, T::KIND, "report {port} of the device");
+        report.is_present = true;
+        value.copy_to(&mut T::arena_mut(&mut self.arenas)[report.slot as usize]);
+    }
+
+    /// Takes over what is reported to port `port` from a slot of `arenas`, or that it is absent.
+    pub(crate) fn take_report(&mut self, port: usize, arenas: &Arenas, slot: Option<u32>) {
+        let Some(report) = &mut self.reports[port] else { return };
+        report.is_present = slot.is_some();
+        if let Some(slot) = slot {
+            arenas.copy(report.kind, slot, &mut self.arenas, report.slot);
+        }
+    }
+
+    /// Reports nothing any more.
+    pub(crate) fn fall_silent(&mut self) {
+        self.reports.iter_mut().flatten().for_each(|report| report.is_present = false);
+    }
+
+    /// Takes over commands and reports of the same shapes, in place.
+    pub(crate) fn copy_from(&mut self, other: &Self) {
+        for (slot, values) in self.values.iter_mut().zip(&other.values) {
+            slot.copy_from_slice(values);
+        }
+        for (port, report) in other.reports.iter().enumerate() {
+            let there = report.filter(|report| report.is_present);
+            self.take_report(port, &other.arenas, there.map(|report| report.slot));
+        }
     }
 
     /// Whether nothing is commanded.

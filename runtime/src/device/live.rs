@@ -96,9 +96,7 @@ impl Linked {
     /// Hands over the commands and takes the newest samples, if there are any. Buffers rotate; nothing is copied but
     /// the commands. Whether there were any.
     pub(crate) fn exchange(&mut self, commands: &Commands, samples: &mut Samples) -> bool {
-        for (slot, values) in self.commands.input_buffer_mut().values.iter_mut().zip(&commands.values) {
-            slot.copy_from_slice(values);
-        }
+        self.commands.input_buffer_mut().copy_from(commands);
         self.commands.publish();
         self.commanded.notify_one();
         let is_newer = self.samples.update();

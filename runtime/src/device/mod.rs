@@ -30,6 +30,8 @@ pub struct RoleType {
     pub outputs: Vec<PortSpec>,
     /// What it takes; joint vectors only.
     pub commands: Vec<PortSpec>,
+    /// What a task may tell it without moving it, of any kind; a graph need not. No limits hold of them.
+    pub reports: Vec<PortSpec>,
     /// What must hold of every command; see [`Limits`](crate::node::Limits). The names of a node's `holds`, in the order
     /// in which a motion crosses them.
     pub limits: Vec<Cow<'static, str>>,
@@ -102,6 +104,12 @@ pub trait Stepped: Send {
     /// # Errors
     /// When the device fails; the run ends.
     fn exchange(&mut self, now: i64, commands: &Commands, samples: &mut Samples) -> Result<(), DeviceError>;
+
+    /// The run is over, for that reason, and every command has been zero in the last exchange. A device that failed is
+    /// not told: it was dropped when it did.
+    fn finish(&mut self, reason: &str) {
+        let _ = reason;
+    }
 }
 
 /// How a device runs.

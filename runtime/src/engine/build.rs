@@ -1,8 +1,9 @@
 //! From a plan to an engine: everything that a tick touches is allocated here, once.
 
 use std::collections::BTreeMap;
+use std::ops::Range;
 
-use super::command::CommandSlot;
+use super::command::{CommandSlot, ReportSlot};
 use super::halt::Halts;
 use super::inlet::Inlet;
 use super::modes::Modes;
@@ -13,11 +14,11 @@ use super::trouble::WatchedWire;
 use super::{Deck, Edge, Engine, Logged, Timing, View};
 use crate::device::{Commands, Driver, Samples};
 use crate::graph::{
-    Age, Plan, PlannedCommand, PlannedDevice, PlannedNode, PlannedPort, PlannedShow, PlannedView, PlannedWire, Policy,
-    Producer, Source, Sources,
+    Age, Plan, PlannedCommand, PlannedDevice, PlannedNode, PlannedPort, PlannedReport, PlannedShow, PlannedView,
+    PlannedWire, Policy, Producer, Source, Sources,
 };
 use crate::node::{Bus, PortId, Tick};
-use crate::signal::{Mark, Stamp};
+use crate::signal::{Mark, Shape, Stamp};
 
 /// Where every port is.
 type Ids = BTreeMap<Source, PortId>;
@@ -50,16 +51,26 @@ impl Engine {
         let names = plan.nodes.iter().map(|node| (node.name.clone(), plan.sources.locate(node.span.start))).collect();
         let view = view(plan.view, &ids, &ports);
         let limits = limits(&plan.nodes, &ports);
+        let commands = plan.commands.iter().map(|wire| (wire.source, &wire.name, wire.age, &wire.span));
+        let told = plan.reports.iter().map(|wire| (wire.source, &wire.name, wire.age, &wire.span));
+        let ends = commands.chain(told);
         let mut watched: Vec<WatchedWire> =
-            plan.commands.iter().filter_map(|command| watched_command(command, ids[&command.source])).collect();
+            ends.filter_map(|(source, name, age, span)| watched_end(name, age, span, ids[&source])).collect();
         let slot = |command: PlannedCommand| CommandSlot::new(ids[&command.source], command);
         let slots = plan.commands.into_iter().map(slot).collect();
-        let decks = plan.devices.into_iter().map(|device| deck(device, &plan.sources)).collect();
+        let tell = |report: &PlannedReport| ReportSlot::new(ids[&report.source], report);
+        let told = plan.reports.iter().map(tell).collect();
+        let shape = |(device, report): (usize, usize)| {
+            let planned = plan.reports.iter().find(|planned| (planned.device, planned.report) == (device, report));
+            planned.map(|planned| &planned.shape)
+        };
+        let devices = plan.devices.into_iter().enumerate();
+        let decks = devices.map(|(i, device)| deck(device, |report| shape((i, report)), &plan.sources)).collect();
         let stations = plan.nodes.into_iter().map(|node| station(node, &ids, &mut bus, &mut watched));
         let stations: Vec<Station> = stations.collect();
         let (max_gap, reset_after) = (plan.max_gap, plan.reset_after);
         let tick = Tick { index: 0, now: 0, dt: 0.0, stamp: Stamp::TIMELESS, max_gap, reset_after, is_halted: false };
-        let (timing, mut core) = (Timing::new(stations.len()), Core::new(bus, stations, inlets, slots, tick));
+        let (timing, mut core) = (Timing::new(stations.len()), Core::new(bus, stations, inlets, (slots, told), tick));
         let kind = |id: PortId| ports.iter().find(|(_, known)| *known == id).map(|(port, _)| port.shape.kind());
         let modes = plan.modes.map(|modes| {
             let kinds = ids.iter().map(|(source, id)| (*source, (*id, kind(*id).expect("a port has a kind"))));
@@ -116,12 +127,13 @@ fn limits(nodes: &[PlannedNode], ports: &[(PlannedPort, PortId)]) -> Vec<(String
     shares.map(|(port, id)| (port.name.clone(), *id)).collect()
 }
 
-fn deck(device: PlannedDevice, sources: &Sources) -> Deck {
+fn deck<'s>(device: PlannedDevice, report: impl Fn(usize) -> Option<&'s Shape>, sources: &Sources) -> Deck {
+    let commands = Commands::with_shapes(device.commands.iter());
     Deck {
         place: sources.locate(device.span.start),
         name: device.name,
         samples: Samples::with_shapes(device.outputs.iter()),
-        commands: Commands::with_shapes(device.commands.iter()),
+        commands: (0..device.reports).fold(commands, |commands, i| commands.with_report(report(i))),
         edge: match device.driver {
             Driver::Stepped(driver) => Edge::Stepped(driver),
             Driver::Live(driver) => Edge::Idle(driver),
@@ -130,12 +142,12 @@ fn deck(device: PlannedDevice, sources: &Sources) -> Deck {
     }
 }
 
-/// A command whose age does more than that it ramps to zero.
-fn watched_command(command: &PlannedCommand, id: PortId) -> Option<WatchedWire> {
-    let (Age { max_age, stale }, [role, name]) = (command.age, command.name.clone());
+/// A command or a report whose age does more than that it ramps to zero or falls silent.
+fn watched_end(name: &[String; 2], age: Age, span: &Range<usize>, id: PortId) -> Option<WatchedWire> {
+    let (Age { max_age, stale }, [role, name]) = (age, name.clone());
     // Its slot looks at the mark itself.
     let aged = Aged { from: id.mark, to: id.mark, max_age };
-    let watched = WatchedWire { aged, stale, node: role, port: Some(name), span: command.span.clone() };
+    let watched = WatchedWire { aged, stale, node: role, port: Some(name), span: span.clone() };
     (stale > Policy::Hold).then_some(watched)
 }
 

@@ -5,7 +5,7 @@
 //! same accelerations before it follows.
 
 use crate::device::Commands;
-use crate::graph::PlannedCommand;
+use crate::graph::{PlannedCommand, PlannedReport};
 use crate::node::{Bus, PortId, Tick};
 use crate::signal::{Joints, Signal};
 
@@ -52,6 +52,29 @@ impl CommandSlot {
     }
 }
 
+/// One report to a device: what the graph tells it, as it is and while it is fresh. It moves nothing, so it goes on while
+/// commands are held.
+pub(super) struct ReportSlot {
+    pub(super) device: usize,
+    source: PortId,
+    report: usize,
+    /// How old the report may be [ns].
+    max_age: i64,
+}
+
+impl ReportSlot {
+    pub(super) const fn new(source: PortId, planned: &PlannedReport) -> Self {
+        Self { device: planned.device, source, report: planned.report, max_age: planned.age.max_age }
+    }
+
+    /// Takes over what the graph reports, or that it reports nothing.
+    pub(super) fn commit(&self, bus: &Bus, commands: &mut Commands, tick: &Tick) {
+        let mark = &bus.marks[self.source.mark as usize];
+        let is_there = mark.is_present() && mark.stamp().age(tick.now) <= self.max_age;
+        commands.take_report(self.report, &bus.arenas, is_there.then_some(self.source.slot));
+    }
+}
+
 /// Moves `values` toward `wanted` on a straight line, no joint by more than its acceleration allows; whether they are
 /// there.
 fn approach(values: &mut [f64], wanted: impl Fn(usize) -> f64, accelerations: &[f64], dt: f64) -> bool {
@@ -88,7 +111,8 @@ mod tests {
             accelerations: accelerations.into(),
             follows: false,
         };
-        (slot, bus, Commands { values: vec![vec![0.0, 0.0].into()] })
+        let joints = JointsShape { joints: vec![Default::default(); 2], ..Default::default() };
+        (slot, bus, Commands::with_shapes([&joints.into()].into_iter()))
     }
 
     fn drive(bus: &mut Bus, slot: &CommandSlot, wanted: Option<[f64; 2]>) {

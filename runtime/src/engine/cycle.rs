@@ -174,6 +174,16 @@ impl Engine {
         is_still
     }
 
+    /// Tells the devices that the run is over, and why.
+    pub(super) fn finish(&mut self, reason: &str) {
+        for deck in &mut self.decks {
+            if let Edge::Stepped(driver) = &mut deck.edge {
+                // A device that panics at its end has had its zero; the reason of the end stays the first.
+                let _ = catch_unwind(AssertUnwindSafe(|| driver.finish(reason)));
+            }
+        }
+    }
+
     /// Time of a stepped clock device's next sample.
     fn clock_sample(&self) -> Option<i64> {
         self.decks.iter().enumerate().find_map(|(i, deck)| match &deck.edge {

@@ -71,6 +71,8 @@ pub fn run_virtual(
     let end = drive(engine, (duration * 1e9) as i64, &mut Virtual { is_interrupted }, observe);
     let (time, ticks) = (engine.now(), engine.ticks());
     while !engine.wind_down() {}
+    engine.wind_down();
+    engine.finish(&end.to_string());
     Outcome { end, time, ticks, wall: epoch.elapsed(), late: 0 }
 }
 

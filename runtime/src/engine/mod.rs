@@ -19,6 +19,7 @@ mod words;
 use crate::device::{Commands, Linked, Live, Samples, Stepped};
 use crate::graph::{PlannedPort, Policy, PolicyTable, Sources};
 use crate::node::{Bus, PortId};
+use crate::signal::Signal;
 use halt::Halts;
 use modes::Modes;
 use timeline::Timeline;
@@ -263,6 +264,12 @@ impl Engine {
     pub fn commands(&self, device: &str) -> Option<Vec<f64>> {
         let deck = self.decks.iter().find(|deck| deck.name == device)?;
         Some(deck.commands.values.iter().flat_map(|values| values.iter().copied()).collect())
+    }
+
+    /// What a device is told on its report port `port`; none if nothing is.
+    #[must_use]
+    pub fn report<T: Signal>(&self, device: &str, port: usize) -> Option<&T> {
+        self.decks.iter().find(|deck| deck.name == device)?.commands.report(port)
     }
 
     /// The texts the graph was read from.

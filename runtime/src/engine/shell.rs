@@ -1,8 +1,8 @@
 //! The edge to real time: pacing, live devices, the operator's Ctrl-C; and the end of every run, which is a ramp to zero.
 
-use std::io;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::time::{Duration, Instant};
+use std::{fmt, io};
 
 use tokio::runtime::{Builder, Runtime};
 use tokio::sync::watch;
@@ -43,6 +43,18 @@ pub enum End {
     Fault(Box<Fault>),
 }
 
+impl fmt::Display for End {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Finished => f.write_str("a device has no more samples"),
+            Self::Duration => f.write_str("the time is over"),
+            Self::Done => f.write_str("the task is done"),
+            Self::Interrupted => f.write_str("the operator ended it"),
+            Self::Fault(fault) => fault.fmt(f),
+        }
+    }
+}
+
 /// How a run went.
 #[derive(Debug, Clone)]
 pub struct Outcome {
@@ -70,6 +82,7 @@ pub fn run(engine: &mut Engine, options: &RunOptions, observe: &mut dyn FnMut(&E
     let end = catch_unwind(AssertUnwindSafe(|| drive(engine, shell.until, &mut shell, observe)));
     let (time, ticks) = (engine.now(), engine.ticks());
     shell.stop(engine);
+    engine.finish(&end.as_ref().map_or_else(|_| "a panic".to_owned(), ToString::to_string));
     let end = end.unwrap_or_else(|panic| resume_unwind(panic));
     Ok(Outcome { end, time, ticks, wall: shell.epoch.elapsed(), late: engine.late() })
 }

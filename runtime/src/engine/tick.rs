@@ -4,7 +4,7 @@
 use std::time::{Duration, Instant};
 
 use super::Deck;
-use super::command::CommandSlot;
+use super::command::{CommandSlot, ReportSlot};
 use super::inlet::Inlet;
 use super::station::Station;
 use crate::graph::Policy;
@@ -17,19 +17,20 @@ pub(super) struct Core {
     pub(super) tick: Tick,
     stations: Vec<Station>,
     slots: Vec<CommandSlot>,
+    told: Vec<ReportSlot>,
     /// The station that steps: what a panic is blamed on.
     current: usize,
 }
 
 impl Core {
-    pub(super) const fn new(
+    pub(super) fn new(
         bus: Bus,
         stations: Vec<Station>,
         inlets: Vec<Inlet>,
-        slots: Vec<CommandSlot>,
+        (slots, told): (Vec<CommandSlot>, Vec<ReportSlot>),
         tick: Tick,
     ) -> Self {
-        Self { bus, inlets, tick, stations, slots, current: 0 }
+        Self { bus, inlets, tick, stations, slots, told, current: 0 }
     }
 
     /// Moves on to the tick at `now`.
@@ -87,15 +88,19 @@ impl Core {
         stale.map(|(i, inlet)| (inlet.stale, i)).max_by_key(|(policy, _)| *policy)
     }
 
-    /// Hands over the commands, or lets them go to zero.
+    /// Hands over the commands, or lets them go to zero; and what is reported.
     pub(super) fn commit(&mut self, decks: &mut [Deck], is_halted: bool) {
         for slot in &mut self.slots {
             slot.commit(&self.bus, &mut decks[slot.device].commands, &self.tick, is_halted);
         }
+        for report in &self.told {
+            report.commit(&self.bus, &mut decks[report.device].commands, &self.tick);
+        }
     }
 
-    /// Ramps every command one step of `dt` [s] toward zero; whether all are zero.
+    /// Ramps every command one step of `dt` [s] toward zero; whether all are zero. The nodes rest, so nothing is reported.
     pub(super) fn ramp(&mut self, decks: &mut [Deck], dt: f64) -> bool {
+        decks.iter_mut().for_each(|deck| deck.commands.fall_silent());
         self.slots.iter_mut().fold(true, |still, slot| slot.ramp(&mut decks[slot.device].commands, dt) & still)
     }
 

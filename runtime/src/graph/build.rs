@@ -6,7 +6,9 @@ use super::Sources;
 use super::Value;
 use super::devices::{self, Opened};
 use super::frames::{Frames, frame_args};
-use super::plan::{PlannedCommand, PlannedNode, PlannedPort, PlannedRole, PlannedWire, Producer, Source};
+use super::plan::{
+    PlannedCommand, PlannedNode, PlannedPort, PlannedReport, PlannedRole, PlannedWire, Producer, Source,
+};
 use super::policy::{Age, Policy, PolicyTable};
 use super::units::{Clash, Units};
 use super::wires::{CommandWire, Model, Origin, Wire};
@@ -251,33 +253,56 @@ impl Builder<'_> {
 
     pub(crate) fn command(&mut self, wire: &CommandWire) -> Option<PlannedCommand> {
         let bound = self.opened.roles[wire.role].as_ref()?;
-        let role = self.model.roles[wire.role]?;
-        let port = self.ports.get(&wire.source)?;
-        let (spec, takes) = (&role.commands[wire.command], &bound.filled.commands[wire.command]);
-        let consumer = format!("{}.{}", self.model.flat.roles[wire.role].0.name, spec.name);
-        if let Err(clash) = Units::default().take(spec, &consumer, &port.shape) {
-            self.found.push(unit_mismatch(port, &consumer, &clash, &wire.origin));
-            return None;
-        }
+        let port = self.taken(wire)?;
+        let (spec, takes) = (self.model.taken(wire), &bound.filled.commands[wire.command]);
         let (has, wants) = (joint_names(&port.shape), joint_names(takes));
         if has != wants {
+            let consumer = self.model.taken_name(wire);
             let message = format!("`{}` has the joints {has:?}, but `{consumer}` takes {wants:?}", port.name);
             self.found.push(wire.origin.mistake(Code::ShapeMismatch, message));
             return None;
         }
         let accelerations = accelerations(&port.shape).zip(accelerations(takes)).map(|(a, b)| a.min(b)).collect();
-        let command = bound.first_command + wire.command;
-        // A sink of commands takes nothing that is older than five periods, unless its wire says so.
-        let usual = Age { max_age: (5e9 * self.period) as i64, stale: Policy::Hold };
         Some(PlannedCommand {
             source: wire.source,
             device: bound.device,
-            command,
+            command: bound.first_command + wire.command,
             name: [self.model.flat.roles[wire.role].0.name.clone(), spec.name.to_string()],
-            age: wire.origin.age.unwrap_or(usual),
+            age: self.age(wire),
             span: wire.origin.word.span.clone(),
             accelerations,
         })
+    }
+
+    pub(crate) fn report(&mut self, wire: &CommandWire) -> Option<PlannedReport> {
+        let bound = self.opened.roles[wire.role].as_ref()?;
+        Some(PlannedReport {
+            source: wire.source,
+            shape: self.taken(wire)?.shape,
+            device: bound.device,
+            report: bound.first_report + wire.command,
+            name: [self.model.flat.roles[wire.role].0.name.clone(), self.model.taken(wire).name.to_string()],
+            age: self.age(wire),
+            span: wire.origin.word.span.clone(),
+        })
+    }
+
+    /// What a command wire brings, if it is in the unit that is taken.
+    fn taken(&mut self, wire: &CommandWire) -> Option<PlannedPort> {
+        let port = self.ports.get(&wire.source)?;
+        let consumer = self.model.taken_name(wire);
+        match Units::default().take(self.model.taken(wire), &consumer, &port.shape) {
+            Ok(()) => Some(port.clone()),
+            Err(clash) => {
+                self.found.push(unit_mismatch(port, &consumer, &clash, &wire.origin));
+                None
+            }
+        }
+    }
+
+    /// A device takes nothing that is older than five periods, unless its wire says so.
+    fn age(&self, wire: &CommandWire) -> Age {
+        wire.origin.age.unwrap_or(Age { max_age: (5e9 * self.period) as i64, stale: Policy::Hold })
     }
 }
 

@@ -6,11 +6,11 @@ use super::document::GraphTable;
 use super::frames::Frames;
 use super::load::{Flat, Loader, Request};
 use super::order::{Wiring, order};
-use super::plan::{Clock, Plan, PlannedCommand, PlannedNode};
+use super::plan::{Clock, Plan, PlannedCommand, PlannedNode, PlannedReport};
 use super::policy::unknown_roles;
 use super::shown::Shown;
 use super::unread::unread;
-use super::wires::Model;
+use super::wires::{CommandWire, Model};
 use super::{Sources, limits, modes, outline};
 use crate::catalogue::Catalogue;
 use crate::diagnostic::{Code, Diagnostic, Report};
@@ -53,7 +53,9 @@ pub(crate) fn plan_in(mut loader: Loader, catalogue: &Catalogue, request: &Reque
     shown.check_units(&builder.ports, &mut builder.found);
     let wiring = Wiring { order: &order, wires: &wires, commands: &commands };
     let modes = modes::plan(&mut builder, &mut nodes, &wiring);
-    let planned: Vec<PlannedCommand> = commands.iter().filter_map(|wire| builder.command(wire)).collect();
+    let (told, driven): (Vec<&CommandWire>, Vec<&CommandWire>) = commands.iter().partition(|wire| wire.is_report);
+    let planned: Vec<PlannedCommand> = driven.into_iter().filter_map(|wire| builder.command(wire)).collect();
+    let reports: Vec<PlannedReport> = told.into_iter().filter_map(|wire| builder.report(wire)).collect();
     let policy = flat.policy.as_ref().and_then(|(_, policy)| policy.clone()).unwrap_or_default();
     let roles = builder.planned_roles(&policy);
     let ports = std::mem::take(&mut builder.ports);
@@ -82,6 +84,7 @@ pub(crate) fn plan_in(mut loader: Loader, catalogue: &Catalogue, request: &Reque
         devices,
         nodes,
         commands,
+        reports,
         clock,
         period,
         max_gap,

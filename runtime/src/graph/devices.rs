@@ -22,6 +22,8 @@ pub(crate) struct BoundRole {
     pub(crate) first_output: usize,
     /// Number of the role's first command among the device's.
     pub(crate) first_command: usize,
+    /// Number of the role's first report among the device's.
+    pub(crate) first_report: usize,
 }
 
 /// The devices that are needed, and which role each fills.
@@ -157,8 +159,14 @@ impl Opener<'_> {
             device,
             first_output: before.iter().map(|filled| filled.outputs.len()).sum(),
             first_command: before.iter().map(|filled| filled.commands.len()).sum(),
+            first_report: before.iter().map(|filled| self.reports(filled)).sum(),
             filled: description.fills[fills].clone(),
         })
+    }
+
+    /// How many things a role can be told.
+    fn reports(&self, filled: &Filled) -> usize {
+        self.catalogue.roles().iter().find(|role| role.name == filled.role).map_or(0, |role| role.reports.len())
     }
 
     fn device(&mut self, bench: &Bench, word: &Word) -> Option<(usize, Description)> {
@@ -192,10 +200,12 @@ impl Opener<'_> {
         let all = |ports: fn(&Filled) -> &Vec<crate::signal::Shape>| {
             opened.description.fills.iter().flat_map(|filled| ports(filled).clone()).collect()
         };
+        let reports = opened.description.fills.iter().map(|filled| self.reports(filled)).sum();
         self.opened.devices.push(PlannedDevice {
             name: word.text.clone(),
             outputs: all(|filled| &filled.outputs),
             commands: all(|filled| &filled.commands),
+            reports,
             driver: opened.driver,
             span: block.key.span.clone(),
         });

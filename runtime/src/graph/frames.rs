@@ -52,9 +52,7 @@ impl Frames {
             }
         }
         for wire in commands {
-            let command = &model.roles[wire.role].expect("only known roles have commands").commands[wire.command];
-            let name = format!("{}.{}", model.name(Producer::Role(wire.role)), command.name);
-            let end = End { owner: Producer::Role(wire.role), port: command, name };
+            let end = End { owner: Producer::Role(wire.role), port: model.taken(wire), name: model.taken_name(wire) };
             found.extend(frames.wire(model, wire.source, &wire.origin, &end, &specs));
         }
         frames

@@ -127,7 +127,7 @@ pub(crate) fn prove(
     found: &mut Vec<Diagnostic>,
 ) -> bool {
     let mut is_limited = true;
-    for command in commands {
+    for command in commands.iter().filter(|command| !command.is_report) {
         let role = model.roles[command.role].expect("only known roles have commands");
         // A wire that goes nowhere has been complained about, and what stands behind it is not known.
         let Some(path) = path(model, wires, command.source) else { continue };

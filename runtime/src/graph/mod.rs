@@ -33,7 +33,9 @@ pub use load::Request;
 pub(crate) use load::{Loader, other_file};
 pub(crate) use modes::{Condition, PlannedExit, PlannedModes, Sort, Test};
 pub use outline::{NOWHERE, Origin, Outline, OutlinedBlock, OutlinedMode, OutlinedRole, OutlinedWire, Setting};
-pub(crate) use plan::{Clock, PlannedCommand, PlannedDevice, PlannedNode, PlannedRole, PlannedWire, Producer, Source};
+pub(crate) use plan::{
+    Clock, PlannedCommand, PlannedDevice, PlannedNode, PlannedReport, PlannedRole, PlannedWire, Producer, Source,
+};
 pub use plan::{Plan, PlannedPort};
 pub use policy::Policy;
 pub(crate) use policy::{Age, PolicyTable};

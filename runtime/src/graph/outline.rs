@@ -7,7 +7,6 @@ use std::path::Path;
 use super::devices::{self, Opened};
 use super::document::{Block, GraphTable};
 use super::modes::ModeBlock;
-use super::plan::Producer;
 use super::policy::{Policy, PolicyTable};
 use super::wires::{self, CommandWire, Model, Wire};
 use super::{Item, Key, Sources, Table, Value, parse_table};
@@ -24,7 +23,7 @@ pub struct Outline {
     pub settings: Vec<Setting>,
     /// The roles: name, type, and the device that fills it.
     pub roles: Vec<OutlinedRole>,
-    /// What drives each command: `role.command`.
+    /// What drives each command and what is reported: `role.command`.
     pub commands: Vec<OutlinedWire>,
     /// Section `[policy]`: what each trouble does.
     pub policy: Vec<Setting>,
@@ -126,12 +125,8 @@ pub(crate) struct Parts<'a> {
 impl Parts<'_> {
     pub(crate) fn outline(&self) -> Outline {
         let flat = self.model.flat;
-        let name = |wire: &CommandWire| {
-            let command = self.model.roles[wire.role].map(|role| role.commands[wire.command].name.clone());
-            format!("{}.{}", self.model.name(Producer::Role(wire.role)), command.unwrap_or_default())
-        };
         let commands = self.commands.iter().map(|wire| OutlinedWire {
-            name: name(wire),
+            name: self.model.taken_name(wire),
             source: self.model.port_name(wire.source),
             age: age(&wire.origin),
             span: wire.origin.word.span.clone(),

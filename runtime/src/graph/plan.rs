@@ -59,6 +59,8 @@ pub(crate) struct PlannedDevice {
     pub(crate) driver: Driver,
     pub(crate) outputs: Vec<Shape>,
     pub(crate) commands: Vec<Shape>,
+    /// How many things it can be told.
+    pub(crate) reports: usize,
     /// Where its name stands in the bench.
     pub(crate) span: Range<usize>,
 }
@@ -105,6 +107,22 @@ pub(crate) struct PlannedCommand {
     pub(crate) accelerations: Vec<f64>,
 }
 
+/// What a device is told without moving it.
+pub(crate) struct PlannedReport {
+    pub(crate) source: Source,
+    /// Shape of what the wire brings.
+    pub(crate) shape: Shape,
+    pub(crate) device: usize,
+    /// Its number among the device's reports.
+    pub(crate) report: usize,
+    /// Names of the role and of the report.
+    pub(crate) name: [String; 2],
+    /// How old it may be, and what more than falling silent is done when it is older.
+    pub(crate) age: Age,
+    /// Where its wire is written.
+    pub(crate) span: Range<usize>,
+}
+
 /// What makes the graph tick.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Clock {
@@ -121,6 +139,7 @@ pub struct Plan {
     /// In the order in which they step.
     pub(crate) nodes: Vec<PlannedNode>,
     pub(crate) commands: Vec<PlannedCommand>,
+    pub(crate) reports: Vec<PlannedReport>,
     pub(crate) clock: Clock,
     /// Nominal time between two ticks [ns].
     pub(crate) period: i64,

@@ -1,7 +1,8 @@
 //! Nodes whose work is lost: in a graph that drives a command, nothing follows from them that anything uses.
 //!
-//! A wire that was deleted by mistake leaves such a node behind. What is used is what a command follows from, what a
-//! node without outputs reads or one that logs, what the graph shows, and what a part exports: whether a task takes it is the task's business.
+//! A wire that was deleted by mistake leaves such a node behind. What is used is what a command or a report follows from,
+//! what a node without outputs reads or one that logs, what the graph shows, and what a part exports: whether a task takes
+//! it is the task's business.
 
 use std::collections::BTreeSet;
 
@@ -18,7 +19,7 @@ pub(crate) fn unread(
     commands: &[CommandWire],
     shown: impl Iterator<Item = Source>,
 ) -> Vec<Diagnostic> {
-    if commands.is_empty() {
+    if commands.iter().all(|wire| wire.is_report) {
         return Vec::new();
     }
     let readers = |node: usize| {

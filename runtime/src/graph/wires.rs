@@ -43,12 +43,14 @@ impl Origin {
     }
 }
 
-/// A command wire that goes somewhere.
+/// A wire under [commands] that goes somewhere.
 #[derive(Debug, Clone)]
 pub(crate) struct CommandWire {
     pub(crate) role: usize,
-    /// Index of the command in the role's declaration.
+    /// Index of the command, or of the report, in the role's declaration.
     pub(crate) command: usize,
+    /// Whether it only tells the role something, and moves nothing.
+    pub(crate) is_report: bool,
     pub(crate) origin: Origin,
     pub(crate) source: Source,
 }
@@ -108,6 +110,17 @@ impl<'a> Model<'a> {
             Producer::Role(i) => &self.flat.roles[i].0.name,
             Producer::Node(i) => &self.flat.nodes[i].name,
         }
+    }
+
+    /// Declaration of what a command wire goes to.
+    pub(crate) fn taken(&self, wire: &CommandWire) -> &PortSpec {
+        let role = self.roles[wire.role].expect("only known roles have commands");
+        &(if wire.is_report { &role.reports } else { &role.commands })[wire.command]
+    }
+
+    /// `role.command` of a command wire.
+    pub(crate) fn taken_name(&self, wire: &CommandWire) -> String {
+        format!("{}.{}", self.name(Producer::Role(wire.role)), self.taken(wire).name)
     }
 
     /// Declaration of the port a wire comes from.
@@ -338,7 +351,7 @@ impl<'a> Model<'a> {
         }
     }
 
-    /// The command wires that go somewhere; a command that nothing drives is a mistake.
+    /// The wires of commands and reports that go somewhere; a command that nothing drives is a mistake.
     pub(crate) fn commands(&self, found: &mut Vec<Diagnostic>) -> Vec<CommandWire> {
         let mut wires = Vec::new();
         for (role, command, word) in &self.flat.commands {
@@ -360,21 +373,22 @@ impl<'a> Model<'a> {
             found.push(*diagnostic);
             None
         });
-        let commands = &self.roles[role]?.commands;
-        let Some(command) = commands.iter().position(|command| command.name == key.name) else {
+        let RoleType { commands, reports, .. } = self.roles[role]?;
+        let taken = commands.iter().map(|port| (false, port)).chain(reports.iter().map(|port| (true, port)));
+        let Some((place, (is_report, takes))) = taken.enumerate().find(|(_, (_, port))| port.name == key.name) else {
             let message = format!("`{}` takes no command `{}`", self.name(Producer::Role(role)), key.name);
-            let help = closest(&key.name, commands.iter().map(|command| &*command.name), "commands");
+            let help = closest(&key.name, commands.iter().chain(reports).map(|port| &*port.name), "commands");
             found.push(Diagnostic::new(Code::UnknownInput, key.span.clone(), message).help(help));
             return None;
         };
         let source = source?;
-        let takes = commands[command].kind;
-        if self.port(source).kind != takes {
+        if self.port(source).kind != takes.kind {
             let consumer = format!("{}.{}", self.name(Producer::Role(role)), key.name);
-            found.push(self.kind_mismatch(source, &consumer, takes, &self.origin(0, word)));
+            found.push(self.kind_mismatch(source, &consumer, takes.kind, &self.origin(0, word)));
             return None;
         }
-        Some(CommandWire { role, command, origin: self.origin(0, word), source })
+        let command = if is_report { place - commands.len() } else { place };
+        Some(CommandWire { role, command, is_report, origin: self.origin(0, word), source })
     }
 
     fn undriven(&self, found: &mut Vec<Diagnostic>) {
@@ -386,8 +400,11 @@ impl<'a> Model<'a> {
                 let is_strange = |(role, driven, _): &&(Key, Key, Word)| {
                     let roles =
                         || self.flat.roles.iter().zip(&self.roles).filter(|((key, _), _)| key.name == role.name);
-                    let known = roles()
-                        .any(|(_, kind)| kind.is_some_and(|kind| kind.commands.iter().any(|c| c.name == driven.name)));
+                    let known = roles().any(|(_, kind)| {
+                        kind.is_some_and(|kind| {
+                            kind.commands.iter().chain(&kind.reports).any(|c| c.name == driven.name)
+                        })
+                    });
                     !known && (role.name == key.name || roles().next().is_none())
                 };
                 if !self.flat.commands.iter().any(|wire| is_driven(&wire) || is_strange(&wire)) {

@@ -68,6 +68,11 @@ pub struct Features {
 }
 
 impl Features {
+    /// Takes over a value of the same shape, in place.
+    pub(crate) fn copy_from(&mut self, other: &Self) {
+        self.components.clone_from(&other.components);
+    }
+
     /// As many absent components as there are features.
     #[must_use]
     pub fn absent(count: usize) -> Self {

@@ -43,6 +43,12 @@ pub struct Image {
 }
 
 impl Image {
+    /// Takes over a value of the same shape, in place.
+    pub(crate) fn copy_from(&mut self, other: &Self) {
+        self.cells.clone_from(&other.cells);
+        self.cols = other.cols;
+    }
+
     /// An image of zeros.
     #[must_use]
     pub fn zeros(rows: usize, cols: usize) -> Self {

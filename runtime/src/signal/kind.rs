@@ -71,6 +71,11 @@ pub trait Signal: Default + Clone + Send + 'static {
     /// Whether a slot keeps its value while a step writes another: what is plain and small.
     const STAYS: bool = false;
 
+    /// Copies the value into a slot of the same shape, in place.
+    fn copy_to(&self, slot: &mut Self) {
+        slot.clone_from(self);
+    }
+
     /// What becomes of the value when its port is made absent.
     fn lose(&mut self, _tick: u64) {}
 
@@ -159,6 +164,12 @@ macro_rules! kinds {
                     std::mem::swap(&mut self.$arena[slot as usize], &mut other.$arena[other_slot as usize])),* }
             }
 
+            /// Copies a value of `kind` to a slot of another arena that has its shape.
+            pub fn copy(&self, kind: Kind, slot: u32, other: &mut Self, other_slot: u32) {
+                match kind { $(Kind::$kind =>
+                    self.$arena[slot as usize].copy_to(&mut other.$arena[other_slot as usize])),* }
+            }
+
             /// Whether every value is finite, images aside: those are checked once, where they enter.
             #[must_use]
             pub fn are_finite(&self) -> bool {
@@ -216,6 +227,7 @@ kinds! {
         "The names are known at load: they come from the graph file, where wires or tables name them. Each component can be \
         absent while the others are there; the vector is there if any component is. The vector belongs to one frame." {
         fn allocate(shape: &FeaturesShape) -> Self { Self::absent(shape.features.len()) }
+        fn copy_to(&self, slot: &mut Self) { slot.copy_from(self); }
         fn is_finite(&self) -> bool { Self::is_finite(self) }
         fn mark(&self, _: Mark, tick: u64) -> Mark { Self::mark(self, tick) }
         fn lose(&mut self, tick: u64) { self.lose_all(tick); }
@@ -225,17 +237,20 @@ kinds! {
         "All tactels have one unit. Its shape is rows, columns and the pitch along x and y [m]: column j runs along the \
         sensor's x, row i along its y, and z points out of the pad toward the object. It belongs to the frame of its pad." {
         fn allocate(shape: &ImageShape) -> Self { Self::zeros(shape.rows, shape.cols) }
+        fn copy_to(&self, slot: &mut Self) { slot.copy_from(self); }
         fn is_finite(&self) -> bool { Self::is_finite(self) }
     }
     Mask MaskShape masks "mask" "mask": "a yes or no for each tactel of a pad",
         "Its shape is the rows and columns of the array it lies on, and it belongs to the frame of its pad." {
         fn allocate(grid: &MaskShape) -> Self { Self::empty(grid.rows, grid.cols) }
+        fn copy_to(&self, slot: &mut Self) { slot.copy_from(self); }
         fn is_finite(&self) -> bool { true }
     }
     Regions RegionsShape regions "regions" "list of regions": "the connected regions of a mask, each with its area and its force",
         "The force is in the unit of the image it was summed from. Its shape is that of the array. They stand in the order \
         of their first tactels, row after row." {
         fn allocate(shape: &RegionsShape) -> Self { Self::with_room(shape.grid.rows, shape.grid.cols) }
+        fn copy_to(&self, slot: &mut Self) { slot.copy_from(self); }
         fn is_finite(&self) -> bool { self.list().iter().all(|region| all_finite(&[region.force])) }
     }
     Twist TwistShape twists "twist" "twist": "a velocity: linear and angular",
@@ -258,11 +273,13 @@ kinds! {
     Joints JointsShape joints "joints" "joint vector": "a number for each joint of an arm, from the base to the tip",
         "All have one unit: rad for positions, rad/s for velocities. Its shape is the list of joints with their limits." {
         fn allocate(shape: &JointsShape) -> Self { Self::zeros(shape.joints.len()) }
+        fn copy_to(&self, slot: &mut Self) { slot.0.clone_from(&self.0); }
         fn is_finite(&self) -> bool { all_finite(&self.0) }
     }
     Jacobian JacobianShape jacobians "jacobian" "Jacobian": "the twist that unit speed of each joint gives",
         "A column for each joint, at the origin of the frame it is given in." {
         fn allocate(shape: &JacobianShape) -> Self { Self::zeros(shape.0.joints.len()) }
+        fn copy_to(&self, slot: &mut Self) { slot.0.clone_from(&self.0); }
         fn is_finite(&self) -> bool { self.0.iter().all(|column| all_finite(column.0.as_slice())) }
     }
 }

@@ -28,6 +28,12 @@ pub struct Mask {
 }
 
 impl Mask {
+    /// Takes over a value of the same shape, in place.
+    pub(crate) fn copy_from(&mut self, other: &Self) {
+        self.words.clone_from(&other.words);
+        (self.cols, self.stride) = (other.cols, other.stride);
+    }
+
     /// The empty set of an array of `rows` by `cols`.
     #[must_use]
     pub fn empty(rows: usize, cols: usize) -> Self {

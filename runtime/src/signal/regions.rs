@@ -42,6 +42,12 @@ pub struct Regions {
 }
 
 impl Regions {
+    /// Takes over a value of the same shape, in place.
+    pub(crate) fn copy_from(&mut self, other: &Self) {
+        self.runs.clone_from(&other.runs);
+        self.regions.clone_from(&other.regions);
+    }
+
     /// An empty list with room for every region that an array of `rows` by `cols` can have.
     #[must_use]
     pub fn with_room(rows: usize, cols: usize) -> Self {

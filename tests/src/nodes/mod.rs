@@ -40,6 +40,7 @@ fn length() -> RoleType {
         summary: "a length".into(),
         outputs: vec![value],
         commands: vec![],
+        reports: vec![],
         limits: vec![],
         is_observed: false,
     }

@@ -7,6 +7,8 @@
 mod glitch;
 mod press;
 
+use std::borrow::Cow;
+
 use tactflow_runtime::device::{Commands, Description, Device, DeviceError, Driver, Filled, Opened, Samples, Stepped};
 use tactflow_runtime::node::{Count, Mistake, Mistakes, NonNegative, Positive, Rate};
 use tactflow_runtime::params;
@@ -36,6 +38,8 @@ params! {
     glitch: Vec<Glitch> = vec![],
     /// What it states as its noise threshold [unit of a tactel].
     threshold: NonNegative = NonNegative(0.015),
+    /// What it states as the unit of pressure, the p = 1 of the paper [unit of a tactel per tactel].
+    pressure: Positive = Positive(0.1),
 }
 
 /// The most tactels that a pad has.
@@ -76,7 +80,7 @@ impl Device for MockPad {
         A `glitch` makes it misbehave for a while: `repeat` shows an old frame again, `freeze` shows it as if it were \
         new, `silence` shows none, `nan` a value that is no number, `back` stamps that lie in the past; with `unplug` \
         the device fails, and stays failed also after `for_s`. A graph should be tried with each of them.\n\n\
-        It states the facts `dead` (no tactel is) and `threshold`.";
+        It states the facts `dead` (no tactel is), `threshold`, `pressure`, and `calibration`: it is calibrated already.";
     const EXAMPLE: &'static str = r#"
 [roles]
 pad = "tactile_pad"
@@ -106,13 +110,24 @@ press = [
         }
         let shape =
             ImageShape { rows: params.rows.0, cols: params.cols.0, pitch: [*params.pitch; 2], unit: params.unit };
-        let facts = vec![("dead".into(), toml::Value::Array(vec![])), ("threshold".into(), (*params.threshold).into())];
+        let facts = facts(&params);
         let outputs = vec![shape.clone().into()];
         let filled = Filled { role: "tactile_pad".into(), outputs, commands: vec![], facts };
         let description = Description { fills: vec![filled], period: period as f64 * 1e-9 };
         let pad = Self::new(shape, period, params);
         Ok(Opened { description, driver: Driver::Stepped(Box::new(pad)) })
     }
+}
+
+/// What a task may ask of it: its values are forces already.
+fn facts(params: &Params) -> Vec<(Cow<'static, str>, toml::Value)> {
+    let calibration = toml::Table::from_iter([("gain".to_owned(), 1.0.into())]);
+    vec![
+        ("dead".into(), toml::Value::Array(vec![])),
+        ("threshold".into(), (*params.threshold).into()),
+        ("pressure".into(), (*params.pressure).into()),
+        ("calibration".into(), calibration.into()),
+    ]
 }
 
 impl MockPad {

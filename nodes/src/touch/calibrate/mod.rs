@@ -30,16 +30,32 @@ params! {
     gain: Option<PerTactel>,
     /// Unit of the calibrated image; that of the input if it is not given.
     unit: Option<String>,
-    /// Tactels that measure nothing, as `[row, column]` from 0.
+    /// Tactels that measure nothing, as `[row, column]` from 0; those that the device states are added.
     dead: Vec<[usize; 2]> = Vec::new(),
     /// A calibration file with a curve for each tactel, instead of `offset`, `gain` and `unit`.
     file: Option<FilePath>,
+    /// What the pad's device states of its calibration: `{ from = "pad.calibration" }`. Any of `offset`, `gain`, `unit` and `file` here takes the place of all four there.
+    device: Option<Stated>,
     /// Number of frames whose mean is the new zero when it is taken anew.
     tare_window: Count = Count(50),
     /// How far the zero of a tactel may be from the calibrated one, or none is taken anew; any unless given [unit of the input].
     tare_bound: Option<Positive>,
     /// Whether the first frames are taken for the zero.
     tare_at_start: bool = false,
+}
+
+params! {
+    Stated:
+    /// What an unloaded tactel reads: a number for all, or a list of rows; 0 unless given [unit of the input].
+    offset: Option<PerTactel>,
+    /// Slope: a number for all, or a list of rows; 1 unless given [output unit per input unit].
+    gain: Option<PerTactel>,
+    /// Unit of the calibrated image; that of the input if it is not given.
+    unit: Option<String>,
+    /// Tactels that measure nothing, as `[row, column]` from 0.
+    dead: Vec<[usize; 2]> = Vec::new(),
+    /// A calibration file with a curve for each tactel, instead of `offset`, `gain` and `unit`.
+    file: Option<FilePath>,
 }
 
 inputs! {
@@ -119,6 +135,9 @@ Without a `file` the curve is a straight line, `(value - offset) * gain`, which 
 force below zero and stay at the largest force that was calibrated: beyond it, nobody has measured. The file must be of \
 this pad: its size and the unit of its readings are compared. A `dead` tactel is 0; tactels that have died since can be \
 added to those of the file.\n\n\
+A task takes all of that from the pad's device, with `device = { from = \"pad.calibration\" }`, and fits any pad. What \
+stands here beside it goes before it: any of `offset`, `gain`, `unit` and `file` takes the place of all four there. Dead \
+tactels add up.\n\n\
 The zero of foam drifts. When `in.tare` becomes set, the mean of the next `tare_window` frames becomes the zero of each \
 tactel; with `tare_at_start` the first frames do. A pad is only tared while nothing touches it: wire `in.present` to the \
 `label` behind (not to a `contact_debounce`, which tells of a contact only some frames after it began), give a \
@@ -140,10 +159,16 @@ tare_at_start = true                # the first 50 frames are the zero, if nothi
         let mut mistakes = Mistakes::new();
         let image = setup.inputs.image.clone();
         let rules = Rules::new(&params, &setup.inputs, &mut mistakes);
-        let is_dead = dead(&params.dead, &image, &mut mistakes);
-        let (mut offset, mut lines, unit) = match &params.file {
-            Some(path) => of_file(path, &params, &image, &mut mistakes),
-            None => of_params(&params, &image, &mut mistakes),
+        let mut is_dead = dead("dead", &params.dead, &image, &mut mistakes);
+        let (stated, device) = (curve(&params), params.device.as_ref());
+        if let Some(device) = device {
+            let dead = dead("device.dead", &device.dead, &image, &mut mistakes);
+            is_dead.iter_mut().zip(dead).for_each(|(is_dead, also)| *is_dead |= also);
+        }
+        let curve = stated.or_else(|| device.map(Curve::of_device)).unwrap_or_default();
+        let (mut offset, mut lines, unit) = match curve.file {
+            Some(path) => of_file(path, &curve, &image, &mut mistakes),
+            None => of_params(&curve, &image, &mut mistakes),
         };
         if !mistakes.is_empty() {
             return Err(mistakes);
@@ -174,13 +199,38 @@ tare_at_start = true                # the first 50 frames are the zero, if nothi
     }
 }
 
+/// Zeros and curves as somebody states them: the graph, or else the device.
+#[derive(Default)]
+struct Curve<'p> {
+    /// What comes before the names of its parameters.
+    at: &'static str,
+    offset: Option<&'p PerTactel>,
+    gain: Option<&'p PerTactel>,
+    unit: Option<&'p str>,
+    file: Option<&'p FilePath>,
+}
+
+impl<'p> Curve<'p> {
+    fn of_device(Stated { offset, gain, unit, file, .. }: &'p Stated) -> Self {
+        let (offset, gain) = (offset.as_ref(), gain.as_ref());
+        Self { at: "device.", offset, gain, unit: unit.as_deref(), file: file.as_ref() }
+    }
+}
+
+/// What the graph itself says; none if it leaves it to the device.
+fn curve(Params { offset, gain, unit, file, .. }: &Params) -> Option<Curve<'_>> {
+    let (offset, gain) = (offset.as_ref(), gain.as_ref());
+    let says = offset.is_some() || gain.is_some() || unit.is_some() || file.is_some();
+    says.then_some(Curve { at: "", offset, gain, unit: unit.as_deref(), file: file.as_ref() })
+}
+
 /// Which tactels are dead.
-fn dead(list: &[[usize; 2]], image: &ImageShape, mistakes: &mut Mistakes) -> Vec<bool> {
+fn dead(name: &str, list: &[[usize; 2]], image: &ImageShape, mistakes: &mut Mistakes) -> Vec<bool> {
     let mut is_dead = vec![false; image.tactels()];
     for [i, j] in list {
         if *i >= image.rows || *j >= image.cols {
             let message = format!("tactel [{i}, {j}] is not on an array of {} by {}", image.rows, image.cols);
-            mistakes.push(Mistake::param("dead", message).help("rows and columns count from 0"));
+            mistakes.push(Mistake::param(name, message).help("rows and columns count from 0"));
         } else {
             is_dead[i * image.cols + j] = true;
         }
@@ -188,23 +238,24 @@ fn dead(list: &[[usize; 2]], image: &ImageShape, mistakes: &mut Mistakes) -> Vec
     is_dead
 }
 
-/// Zero, curves and unit as the graph file has them: straight lines.
-fn of_params(params: &Params, image: &ImageShape, mistakes: &mut Mistakes) -> (Vec<f32>, Lines, Unit) {
-    let offset = spread("offset", params.offset.as_ref().unwrap_or(&PerTactel::All(0.0)), image, mistakes);
-    let gain = spread("gain", params.gain.as_ref().unwrap_or(&PerTactel::All(1.0)), image, mistakes);
-    let unit = params.unit.as_deref().map_or(Ok(image.unit), Unit::from_str);
+/// Zero, curves and unit as numbers: straight lines.
+fn of_params(curve: &Curve<'_>, image: &ImageShape, mistakes: &mut Mistakes) -> (Vec<f32>, Lines, Unit) {
+    let at = |name: &str| format!("{}{name}", curve.at);
+    let offset = spread(&at("offset"), curve.offset.unwrap_or(&PerTactel::All(0.0)), image, mistakes);
+    let gain = spread(&at("gain"), curve.gain.unwrap_or(&PerTactel::All(1.0)), image, mistakes);
+    let unit = curve.unit.map_or(Ok(image.unit), Unit::from_str);
     let unit = unit.unwrap_or_else(|message| {
-        mistakes.push(Mistake::param("unit", message));
+        mistakes.push(Mistake::param(at("unit"), message));
         image.unit
     });
     (offset, Lines::linear(gain), unit)
 }
 
 /// Zero, curves and unit as a calibration file has them.
-fn of_file(path: &FilePath, params: &Params, image: &ImageShape, mistakes: &mut Mistakes) -> (Vec<f32>, Lines, Unit) {
-    let given = [("offset", params.offset.is_some()), ("gain", params.gain.is_some()), ("unit", params.unit.is_some())];
+fn of_file(path: &FilePath, curve: &Curve<'_>, image: &ImageShape, mistakes: &mut Mistakes) -> (Vec<f32>, Lines, Unit) {
+    let given = [("offset", curve.offset.is_some()), ("gain", curve.gain.is_some()), ("unit", curve.unit.is_some())];
     for (name, _) in given.into_iter().filter(|(_, is_given)| *is_given) {
-        let mistake = Mistake::key(name, format!("`{name}` and `file` exclude each other"));
+        let mistake = Mistake::key(format!("{}{name}", curve.at), format!("`{name}` and `file` exclude each other"));
         mistakes.push(mistake.help(format!("the file has its own: leave out `{name}`, or `file`")));
     }
     let nothing = (Vec::new(), Lines::linear(Vec::new()), image.unit);
@@ -226,7 +277,7 @@ fn of_file(path: &FilePath, params: &Params, image: &ImageShape, mistakes: &mut 
             return nothing;
         }
     };
-    let at = || At::Param("file".into());
+    let at = || At::Param(format!("{}file", curve.at));
     let Calibration { rows, cols, reading, unit, .. } = calibration;
     if (rows, cols) != (image.rows, image.cols) {
         let message = format!(

@@ -24,6 +24,11 @@ fn a_line_per_tactel() {
         ("offset = [[1, 2, 3], [4, 5, 6]]", [9.0, 18.0, 27.0, 36.0, 45.0, 54.0]),
         ("offset = 10\ngain = [[1, 2, 3], [4, 5, 6]]", [0.0, 20.0, 60.0, 120.0, 200.0, 300.0]),
         ("dead = [[0, 1], [1, 2]]", [10.0, 0.0, 30.0, 40.0, 50.0, 0.0]),
+        ("device = { offset = 10, gain = 2 }", [0.0, 20.0, 40.0, 60.0, 80.0, 100.0]),
+        // What the graph says takes the place of all that the device states, but for what is dead.
+        ("device = { offset = 10, gain = 2, file = \"none.toml\" }\ngain = 3", [30.0, 60.0, 90.0, 120.0, 150.0, 180.0]),
+        ("device = { dead = [[0, 0]] }\ndead = [[1, 2]]", [0.0, 20.0, 30.0, 40.0, 50.0, 0.0]),
+        ("device = { dead = [[0, 0]] }\noffset = 10", [0.0, 10.0, 20.0, 30.0, 40.0, 50.0]),
         ("offset = 100\ndead = [[1, 0]]", [-90.0, -80.0, -70.0, 0.0, -50.0, -40.0]),
     ];
     for (params, calibrated) in cases {
@@ -32,6 +37,22 @@ fn a_line_per_tactel() {
         rig.step();
         assert_eq!(rig.get::<Image>("image"), Some(&Image::from_cells(3, &calibrated)), "{params}");
     }
+}
+
+#[test]
+fn a_mistake_of_the_device_shows_where_it_is_asked() {
+    let cases = [
+        ("device = { gain = [[1, 2, 3]] }", "device.gain", "`device.gain` has 1 rows, but the image has 2"),
+        ("device = { dead = [[2, 0]] }", "device.dead", "tactel [2, 0] is not on an array of 2 by 3"),
+        ("device = { unit = \"pounds\" }", "device.unit", "`pounds`"),
+    ];
+    for (params, at, message) in cases {
+        let mistakes = rig(params).err().unwrap();
+        assert_eq!((mistakes.len(), &mistakes[0].at), (1, &At::Param(at.into())), "{params}: {mistakes:?}");
+        assert!(mistakes[0].message.contains(message), "{params}: {mistakes:?}");
+    }
+    let mistakes = rig("device = { gain = 2, file = \"none.toml\" }").err().unwrap();
+    assert_eq!(mistakes[0].at, At::Key("device.gain".into()), "{mistakes:?}");
 }
 
 #[test]

@@ -131,8 +131,15 @@ fn world() -> Catalogue {
         need: Need::Required,
     };
     let (outputs, commands) = (vec![port("position", "rad")], vec![port("velocity", "rad/s")]);
-    let role =
-        RoleType { name: "motor".into(), summary: "".into(), outputs, commands, limits: vec![], is_observed: false };
+    let role = RoleType {
+        name: "motor".into(),
+        summary: "".into(),
+        outputs,
+        commands,
+        reports: vec![],
+        limits: vec![],
+        is_observed: false,
+    };
     Catalogue::new().role(role).node::<follow::Follow>().node::<bound::Bound>().device::<Motor>()
 }
 

@@ -24,7 +24,8 @@ pub(crate) struct Movers<'a> {
 
 impl<'a> Movers<'a> {
     pub(crate) fn new(model: &'a Model<'a>, &Wiring { order, wires, commands }: &Wiring<'a>) -> Self {
-        let mut open: Vec<usize> = commands.iter().filter_map(|wire| node_of(wire.source.producer)).collect();
+        let mut open: Vec<usize> =
+            commands.iter().filter(|wire| !wire.is_report).filter_map(|wire| node_of(wire.source.producer)).collect();
         let mut driving: BTreeSet<usize> = open.iter().copied().collect();
         while let Some(node) = open.pop() {
             let sources = wires[node].iter().filter_map(|wire| node_of(wire.source.producer));
