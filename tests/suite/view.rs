@@ -124,6 +124,15 @@ fn what_is_usual_is_shown_of_a_graph_that_does_not_say() {
 }
 
 #[test]
+fn what_only_the_page_shows_is_not_lost() {
+    let extra = ["--set=nodes.extra.type=smooth", "--set=nodes.extra.in.value=touch.x", "--deny-warnings"];
+    let check = |more: &[&str]| say(&[&["check", HYBRID], &extra[..], more].concat());
+    let lost = check(&[]);
+    assert!(lost.code == 2 && lost.err.contains("nothing reads any output of `extra`"), "{}", lost.err);
+    assert_eq!(check(&["--set=graph.show=['extra.value']"]).err, "");
+}
+
+#[test]
 fn every_task_says_what_it_shows_and_its_page_fits_on_a_screen() {
     for graph in fs::read_dir(tactflow_tests::workspace().join("graphs")).unwrap() {
         let path = graph.unwrap().path();

@@ -7,7 +7,7 @@ use std::io::{IsTerminal, Write, stderr};
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::time::{Duration, Instant};
 
-use super::view::Page;
+use super::prose::Look;
 
 /// Nothing is shown of a run that is over before.
 const PATIENCE: Duration = Duration::from_millis(500);
@@ -43,7 +43,7 @@ impl Progress {
     }
 
     /// The run is at `time` [s] and `ticks`; `live` draws what it shows.
-    pub(super) fn show(&mut self, time: f64, ticks: u64, live: impl FnOnce(Page) -> Option<String>) {
+    pub(super) fn show(&mut self, time: f64, ticks: u64, live: impl FnOnce(Look) -> Vec<String>) {
         // A look at the clock costs more than a tick: not in every one.
         let Some(pen) = self.pen.as_ref().filter(|_| ticks.is_multiple_of(16)) else { return };
         let now = Instant::now();
@@ -53,7 +53,7 @@ impl Progress {
             let line = line(time, ticks, self.end, (now - self.start).as_secs_f64());
             let size = terminal_size::terminal_size_of(stderr());
             let [width, height] = size.map_or([0, 0], |(width, height)| [width.0, height.0].map(usize::from));
-            let live = Page::of_width(width, self.has_colour).and_then(live).unwrap_or_default();
+            let live = Look::of_width(width, self.has_colour).map(live).unwrap_or_default();
             // One that is still being written is the one that is seen.
             let _ = pen.try_send(Stroke::Draw(fitted(&live, &line, [width, height])));
         }
@@ -97,11 +97,13 @@ fn redrawn(lines: usize, text: &str) -> String {
     )
 }
 
-/// What is shown with the line of progress below, or that line alone if there is no room for more.
-fn fitted(live: &str, line: &str, [width, height]: [usize; 2]) -> String {
+/// What is shown with the line of progress below: as many of its parts as there is room for.
+fn fitted(live: &[String], line: &str, [width, height]: [usize; 2]) -> String {
     let line: String = line.chars().take(if width == 0 { usize::MAX } else { width.saturating_sub(1) }).collect();
-    let has_room = !live.is_empty() && live.lines().count() + 2 < height;
-    if has_room { format!("{}\n\n{line}", live.trim_end()) } else { line }
+    let with = |parts: &[String]| [parts, std::slice::from_ref(&line)].concat().join("\n");
+    // The last row is left to the line that the shell begins afterwards.
+    let fits = |text: &String| text.lines().count() < height;
+    (1..=live.len()).rev().map(|count| with(&live[..count])).find(fits).unwrap_or_else(|| line.clone())
 }
 
 fn line(time: f64, ticks: u64, end: Option<f64>, wall: f64) -> String {
@@ -132,12 +134,13 @@ mod tests {
 
     #[test]
     fn what_has_no_room_is_left_out_and_the_line_is_cut() {
-        let live = "a\nb\nc\n";
-        assert_eq!(fitted(live, "line", [80, 6]), "a\nb\nc\n\nline");
-        assert_eq!(fitted(live, "line", [80, 5]), "line");
-        assert_eq!(fitted("", "line", [80, 50]), "line");
-        assert_eq!(fitted(live, "a long line", [7, 4]), "a long");
-        assert_eq!(fitted(live, "a long line", [0, 0]), "a long line", "a terminal that does not tell its size");
+        let live = ["a\nb\n", "c\n"].map(String::from);
+        assert_eq!(fitted(&live, "line", [80, 7]), "a\nb\n\nc\n\nline");
+        assert_eq!(fitted(&live, "line", [80, 6]), "a\nb\n\nline");
+        assert_eq!(fitted(&live, "line", [80, 4]), "line");
+        assert_eq!(fitted(&[], "line", [80, 50]), "line");
+        assert_eq!(fitted(&live, "a long line", [7, 4]), "a long");
+        assert_eq!(fitted(&live, "a long line", [0, 0]), "a long line", "a terminal that does not tell its size");
     }
 
     #[test]

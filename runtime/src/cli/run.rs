@@ -6,8 +6,8 @@ use std::path::{Path, PathBuf};
 use super::check::milliseconds;
 use super::log::Log;
 use super::progress::Progress;
+use super::prose::Look;
 use super::summary::Summary;
-use super::view::Page;
 use super::{FAULTED, NOT_LOADED, OnArgs, Shell};
 use crate::engine::{self, End, Engine, Outcome, RunOptions};
 use crate::fault::Fault;
@@ -155,7 +155,7 @@ impl Job {
                 return FAULTED;
             }
         };
-        let page = Page::on_output(shell.has_colour());
+        let page = Look::new(shell.has_colour());
         self.say(shell, &format!("\n{}", summary.render(&engine, &outcome, page).trim_end()));
         self.say(shell, &ending(&outcome));
         self.close(shell, &engine, &outcome, written)

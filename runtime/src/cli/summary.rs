@@ -3,8 +3,9 @@
 use std::fmt::Write;
 
 use super::course::Course;
+use super::prose::Look;
 use super::timeline::Timeline;
-use super::view::{Page, View};
+use super::view::View;
 use crate::engine::{Counters, Engine, Outcome};
 use crate::record::Columns;
 use crate::signal::{Freshness, Shape};
@@ -86,13 +87,13 @@ impl Summary {
         }
     }
 
-    /// What is shown while it runs.
-    pub(super) fn live(&self, page: Page) -> Option<String> {
-        self.view.as_ref().map(|view| view.live(page))
+    /// What is shown while it runs, part by part.
+    pub(super) fn live(&self, page: Look) -> Vec<String> {
+        self.view.as_ref().map(|view| view.live(page)).unwrap_or_default()
     }
 
     /// The story and what is shown, or the tables of ports and of nodes and the story; then what else there is to say.
-    pub(super) fn render(&self, engine: &Engine, outcome: &Outcome, page: Page) -> String {
+    pub(super) fn render(&self, engine: &Engine, outcome: &Outcome, page: Look) -> String {
         let story = Timeline::story(engine, outcome.time);
         let parts = match &self.view {
             Some(view) => [story, view.page(page), self.timeline.limits(outcome.time)],

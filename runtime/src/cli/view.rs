@@ -5,6 +5,7 @@ use std::fmt::Write;
 use super::chart::{chart, time_axis};
 use super::course::{Course, Point};
 use super::picture::{Easel, Frame};
+use super::prose::Look;
 use super::summary::number;
 use crate::engine::Engine;
 use crate::node::{Bus, PortId};
@@ -23,31 +24,6 @@ const NARROW: usize = 70;
 const GAP: usize = 2;
 /// As much room the words above a picture take.
 const CAPTION: usize = 26;
-
-/// How a page is drawn.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Page {
-    pub(super) width: usize,
-    pub(super) has_colour: bool,
-}
-
-impl Page {
-    /// As wide as a page gets.
-    const WIDEST: usize = 100;
-    /// On what is narrower there is no page.
-    const NARROWEST: usize = 40;
-
-    /// A page on the standard output: as wide as the terminal, and not wider than it is good to read.
-    pub(super) fn on_output(has_colour: bool) -> Self {
-        let width = terminal_size::terminal_size().map_or(Self::WIDEST, |(width, _)| usize::from(width.0));
-        Self { width: width.clamp(Self::NARROWEST, Self::WIDEST), has_colour }
-    }
-
-    /// A page on a terminal of that width, if it is wide enough.
-    pub(super) fn of_width(width: usize, has_colour: bool) -> Option<Self> {
-        (width >= Self::NARROWEST).then_some(Self { width: width.min(Self::WIDEST), has_colour })
-    }
-}
 
 /// Watches the ports that are shown, in bounded memory.
 pub(super) struct View {
@@ -125,19 +101,19 @@ impl View {
     }
 
     /// The images at three moments, and the curves of the whole run.
-    pub(super) fn page(&self, page: Page) -> String {
+    pub(super) fn page(&self, page: Look) -> String {
         let films = self.films.iter().map(|film| film.moments(page));
         films.chain(self.curves(page, 6)).collect::<Vec<_>>().join("\n")
     }
 
-    /// The same while it runs: the first image as it is now, and low curves.
-    pub(super) fn live(&self, page: Page) -> String {
+    /// The same while it runs, what is wanted first before the rest: the first image as it is now, and low curves.
+    pub(super) fn live(&self, page: Look) -> Vec<String> {
         let film = self.films.first().map(|film| film.now(page));
-        film.into_iter().chain(self.curves(page, 3)).collect::<Vec<_>>().join("\n")
+        film.into_iter().chain(self.curves(page, 3)).collect()
     }
 
     /// The curves, none higher than that, with the axis of time below them.
-    fn curves(&self, page: Page, most: usize) -> Option<String> {
+    fn curves(&self, page: Look, most: usize) -> Option<String> {
         let [first, last] = self.span.filter(|_| !self.courses.is_empty())?.map(|nanos| nanos as f64 * 1e-9);
         let height = match self.courses.len() {
             1 => 6,
@@ -254,7 +230,7 @@ impl Film {
     }
 
     /// The first image with a contact, the strongest and the last, side by side.
-    fn moments(&self, page: Page) -> String {
+    fn moments(&self, page: Look) -> String {
         let easel = |count: usize| {
             let width = (page.width - GAP * (count - 1)) / count;
             (count, width, Easel::new(&self.shape, width, page.has_colour))
@@ -267,7 +243,7 @@ impl Film {
     }
 
     /// The image as it is now.
-    fn now(&self, page: Page) -> String {
+    fn now(&self, page: Look) -> String {
         let easel = Easel::new(&self.shape, page.width, page.has_colour);
         self.draw(easel, page.width, &self.last.iter().map(|frame| ("now", frame)).collect::<Vec<_>>())
     }
