@@ -10,12 +10,12 @@ use std::collections::VecDeque;
 use tactflow_runtime::device::{Commands, Description, Device, DeviceError, Driver, Filled, Opened, Samples, Stepped};
 use tactflow_runtime::node::{Count, FilePath, Mistake, Mistakes, NonNegative, Positive, Rate};
 use tactflow_runtime::params;
-use tactflow_runtime::signal::{Image, ImageShape, Joint, Joints, JointsShape, Kind, Scalar, ScalarShape, Unit};
+use tactflow_runtime::signal::{Image, ImageShape, Joint, Joints, JointsShape, Kind, Pose, Scalar, ScalarShape, Unit};
 
 use super::contact::Contact;
 use super::foam::Foam;
 use super::imprint::Imprint;
-use super::joints::{Arm, Joint as SimJoint};
+use super::joints::{Arm, Joint as SimJoint, pose3};
 use super::object::{Object, Thing};
 use super::random::Random;
 use super::readout::{Electronics, Readout};
@@ -325,14 +325,15 @@ impl Stepped for SimBench {
         let arm = &self.world.arm;
         samples.write::<Joints>(1, now, self.sequence).0.copy_from_slice(&arm.position);
         samples.write::<Joints>(2, now, self.sequence).0.copy_from_slice(&arm.equilibrium);
-        self.tell(now, samples);
+        self.tell(now, commands.report::<Pose>(0), samples);
         Ok(())
     }
 }
 
 impl SimBench {
     /// Gives the ground truth, in the order of the role's outputs.
-    fn tell(&mut self, now: i64, samples: &mut Samples) {
+    fn tell(&mut self, now: i64, report: Option<&Pose>, samples: &mut Samples) {
+        let measured = report.and_then(|pose| self.world.measure(pose3(pose).translation));
         let truth = self.world.truth(self.threshold);
         let noise = truth.pressure.map(|pressure| self.readout.noise(pressure, truth.tactels));
         let values = [
@@ -347,9 +348,9 @@ impl SimBench {
             Some(truth.depth),
             None,
             truth.tilt,
-            None,
-            None,
-            None,
+            measured.and_then(|measured| measured.path),
+            measured.map(|measured| measured.distance),
+            self.world.coverage(),
             noise.map(|[common, _]| common),
             noise.map(|[_, own]| own),
         ];

@@ -7,6 +7,7 @@ use super::contact::{Contact, Motion};
 use super::imprint::Imprint;
 use super::joints::Arm;
 use super::object::Object;
+use super::survey::{Measured, Survey, measure};
 use super::truth::Truth;
 
 /// Everything that has mass, gives way or is touched.
@@ -22,6 +23,8 @@ pub struct World {
     time: f64,
     /// Longest step [s].
     longest: f64,
+    /// What has been measured of the first object that has an end.
+    survey: Option<(usize, Survey)>,
     /// Whether the imprint is of an earlier time.
     is_old: bool,
 }
@@ -38,7 +41,10 @@ impl World {
         longest: f64,
     ) -> Self {
         let loads = vec![Vec3::ZERO; objects.len()];
-        Self { arm, objects, contact, imprint, shape, loads, time: 0.0, longest, is_old: true }
+        let from = start(&arm);
+        let surveys = objects.iter().enumerate().filter_map(|(i, object)| Some((i, Survey::new(object, from)?)));
+        let survey = surveys.take(1).next();
+        Self { survey, arm, objects, contact, imprint, shape, loads, time: 0.0, longest, is_old: true }
     }
 
     /// Goes on to `time` [s] with the joints' equilibrium moving at `velocity` [rad/s].
@@ -76,6 +82,20 @@ impl World {
         self.image();
         let pad = self.arm.motion();
         Truth::of(&pad, &self.contact, &self.objects, &self.shape, self.imprint.forces(), threshold)
+    }
+
+    /// What a point in the base that the graph has measured is worth; it counts for the coverage.
+    pub fn measure(&mut self, point: Vec3) -> Option<Measured> {
+        if let Some((object, survey)) = &mut self.survey {
+            survey.add(&self.objects[*object], point);
+        }
+        measure(&self.objects, self.arm.motion().pose, point)
+    }
+
+    /// Share of the surface that has been measured; none if the object has no end.
+    #[must_use]
+    pub fn coverage(&self) -> Option<f64> {
+        self.survey.as_ref().map(|(_, survey)| survey.coverage())
     }
 
     /// The energy that is stored in motion, springs, foam and friction [J].
