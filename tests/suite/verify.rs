@@ -124,6 +124,9 @@ fn seeds_can_be_overridden_and_each_run_recorded() {
     assert_eq!(names, ["mock.csv", "slide-1.csv", "slide-2.csv", "slide-3.csv"]);
     let [first, second] = ["slide-1.csv", "slide-2.csv"].map(|name| fs::read_to_string(path.join(name)).unwrap());
     assert!(first.contains("truth.x") && first != second, "another seed is other noise");
+    let alone = folder.path().join("alone.csv");
+    say(&["run", "graphs/hybrid.toml", "--for=4s", "--out", alone.to_str().unwrap()]);
+    assert!(fs::read(alone).unwrap() == fs::read(path.join("mock.csv")).unwrap(), "a run is a run");
     assert_eq!(row(&said.out, "x", "response").len(), 9, "three seeds have no interval: {}", said.out);
 }
 
@@ -152,6 +155,59 @@ fn figures_of_the_truth_are_those_of_the_closed_form_whatever_the_seed() {
     assert!(measured.iter().any(|error| *error != measured[0]), "a seed is noise: {measured:?}");
     // White noise of 2 mN a tactel moves the centre of a contact of 3 N by some hundredths of a tactel.
     assert!(values(&scenario, &trials, "noise", Figure::Std).iter().all(|std| (1e-3..1e-2).contains(std)));
+}
+
+/// A scenario of a text in a folder of its own; `TESTS` stands for the folder of the tests.
+fn written(files: &[(&str, &str)]) -> Result<Scenario, String> {
+    let folder = tempfile::tempdir().unwrap();
+    for (name, text) in files {
+        let text = text.replace("TESTS", workspace().join("tests").to_str().unwrap());
+        fs::write(folder.path().join(name), text).unwrap();
+    }
+    let (name, _) = files[0];
+    Scenario::load(&catalogue(), &folder.path().join(name)).map_err(|report| report.render(false))
+}
+
+#[test]
+fn a_value_that_is_held_is_no_sample_of_the_mean() {
+    // A tick each 2 ms, but a sample each 4 ms: ten of them are there after 36 ms, and no sooner.
+    let task = "graph = { rate_hz = 500, bench = 'TESTS/scenarios/benches/slide.toml' }\nroles.pad = 'tactile_pad'\n\
+        [parts.touch]\nfile = 'TESTS/../graphs/parts/touch.toml'\nin.image = 'pad.image'\n\
+        [nodes.error]\ntype = 'feature_error'\nin.x = 'touch.x'\nsetpoint.x = 0.0\n";
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("task.toml");
+    fs::write(&path, task.replace("TESTS", workspace().join("tests").to_str().unwrap())).unwrap();
+    let scenario = format!(
+        "[scenario]\ngraph = {path:?}\nfor_s = 2.0\nfrom = 'touch.present'\n\
+         [check.scalar]\nof = 'truth.force'\nsettles_to = 3.0\nwithin = 0.1\n\
+         [check.feature]\nof = 'error.error.x'\nsettles_to = 0.0\nwithin = 1.0\n"
+    );
+    let scenario = written(&[("held.toml", &scenario)]).unwrap();
+    let trial = scenario.run(&catalogue(), None, None, &|| false).unwrap();
+    for check in ["scalar", "feature"] {
+        let [response] = values(&scenario, std::slice::from_ref(&trial), check, Figure::Response)[..] else { panic!() };
+        assert!((response - 0.036).abs() < 1e-9, "{check}: {response}");
+    }
+}
+
+#[test]
+fn what_cannot_be_a_scenario_is_told() {
+    let cases = [
+        ("[check.x]\nof = 'touch.x'\n", "error[missing-key]: the scenario has no section [scenario]"),
+        ("scenario = 3\n", "error[bad-value]: expected a table, found 3"),
+        ("check = 3\n[scenario]\n", "error[bad-value]: expected a table of checks, found 3"),
+        ("[scenario]\ngraph = 'x'\n[scenario]\n", "error[syntax]"),
+        (
+            "[scenario]\ngraph = 'live.toml'\nfor_s = 1.0\n[check.x]\nof = 'length.value'\n",
+            "error[wrong-role]: a device of this bench runs in real time, but a scenario in virtual time",
+        ),
+    ];
+    let live = "graph.rate_hz = 100\nroles.length = 'length'\nbind.length = 'length'\n\
+        [devices.length]\ntype = 'line_length'\naddress = '127.0.0.1:9'\n";
+    for (text, message) in cases {
+        let said = written(&[("scenario.toml", text), ("live.toml", live)]).expect_err(text);
+        assert!(said.contains(message), "{text}: {said}");
+    }
 }
 
 #[test]
