@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::Path;
 
-use tactflow_runtime::scenario::judge::Figure;
+use tactflow_runtime::scenario::judge::{Figure, Mark, Row};
 use tactflow_runtime::scenario::{Scenario, Trial};
 use tactflow_tests::{catalogue, workspace};
 
@@ -191,6 +191,56 @@ fn a_value_that_is_held_is_no_sample_of_the_mean() {
 }
 
 #[test]
+fn a_run_may_be_done_early_but_samples_may_not_end_early() {
+    let task = |modes: &str, pad: &str| {
+        format!(
+            "graph.clock = 'pad'\nroles.pad = 'tactile_pad'\nbind = {{ pad = 'pad', truth = 'pad' }}\n\
+             [devices.pad]\ntype = 'true_pad'\n{pad}\n\
+             [nodes.source]\ntype = 'tactile_source'\nin.image = 'pad.image'\n{modes}\n"
+        )
+    };
+    let run = |task: &str, asks: &str| {
+        let folder = tempfile::tempdir().unwrap();
+        let [graph, scenario] = ["task.toml", "scenario.toml"].map(|name| folder.path().join(name));
+        fs::write(&graph, task).unwrap();
+        let text = format!("[scenario]\ngraph = 'task.toml'\nfor_s = 2.0\n{asks}\n[check.x]\nof = 'truth.force'\n");
+        fs::write(&scenario, text).unwrap();
+        let loaded =
+            Scenario::load(&catalogue(), &scenario).unwrap_or_else(|report| panic!("{}", report.render(false)));
+        let trial = loaded.run(&catalogue(), None, None, &|| false).unwrap();
+        let marks: Vec<Mark> = loaded.rows(std::slice::from_ref(&trial)).iter().map(Row::mark).collect();
+        (trial, marks)
+    };
+    let modes = "[modes.feel]\ndone = { after_ms = 1000 }\n[modes.other]\ngo = { to = 'feel', after_ms = 10 }\n";
+    let with_modes = task(modes, "").replace("graph.clock = 'pad'", "graph = { clock = 'pad', start = 'other' }");
+    let (trial, marks) = run(&with_modes, "ends_in = 'done'\nstays_in = 'feel'");
+    assert_eq!((trial.failure, &marks[2..]), (None, &[Mark::Met; 2][..]));
+    assert!((trial.time - 1.012).abs() < 0.01, "{}", trial.time);
+    let only = with_modes.replace("to = 'feel', after_ms = 10", "to = 'feel', after_ms = 9000");
+    let (trial, marks) = run(&only, "ends_in = 'other'\nstays_in = 'feel'");
+    assert_eq!(
+        (trial.failure, &marks[2..]),
+        (None, &[Mark::Missed, Mark::Met][..]),
+        "a mode never reached, and the end"
+    );
+    // The last of two seconds of samples is a period before their end.
+    let (trial, _) = run(&task("", "for_s = 2.0"), "");
+    assert_eq!((trial.failure, (trial.time * 1e3).round()), (None, 1996.0));
+    let (trial, _) = run(&task("", "for_s = 1.9"), "");
+    assert_eq!(trial.failure.as_deref(), Some("the samples of a device end after 1.896 s"));
+    assert_eq!(trial.figures, [None, None]);
+}
+
+#[test]
+fn colours_are_for_those_who_ask() {
+    let [plain, asked] = ["never", "always"].map(|when| say(&["verify", MISSED, "--color", when]).out);
+    assert!(!plain.contains('\u{1b}'));
+    assert!(asked.contains("\u{1b}[1;31mMISSED\u{1b}[0m") && asked.contains("\u{1b}[32mmet\u{1b}[0m"));
+    let stripped = asked.replace("\u{1b}[1;31m", "").replace("\u{1b}[32m", "").replace("\u{1b}[0m", "");
+    assert_eq!(stripped, plain, "colours take no room");
+}
+
+#[test]
 fn what_cannot_be_a_scenario_is_told() {
     let cases = [
         ("[check.x]\nof = 'touch.x'\n", "error[missing-key]: the scenario has no section [scenario]"),
@@ -201,11 +251,25 @@ fn what_cannot_be_a_scenario_is_told() {
             "[scenario]\ngraph = 'live.toml'\nfor_s = 1.0\n[check.x]\nof = 'length.value'\n",
             "error[wrong-role]: a device of this bench runs in real time, but a scenario in virtual time",
         ),
+        (
+            "[scenario]\ngraph = 'TESTS/../graphs/hybrid.toml'\nbench = 'TESTS/scenarios/benches/slide.toml'\nfor_s = 1.0\n",
+            "error[unbound-role]: the bench binds role `arm` to no device",
+        ),
+        (
+            "[scenario]\ngraph = 'TESTS/scenarios/tasks/slide.toml'\nbench = 'no_device.toml'\nfor_s = 1.0\n",
+            "error[unknown-device]: the bench has no device `pda`",
+        ),
+        (
+            "[scenario]\ngraph = 'TESTS/scenarios/tasks/slide.toml'\nbench = 'live.toml'\nfor_s = 1.0\n",
+            "error[unbound-role]: the bench binds role `pad` to no device",
+        ),
     ];
     let live = "graph.rate_hz = 100\nroles.length = 'length'\nbind.length = 'length'\n\
         [devices.length]\ntype = 'line_length'\naddress = '127.0.0.1:9'\n";
+    let no_device = "bind.pad = 'pda'\ndevices.pad.type = 'true_pad'\n";
     for (text, message) in cases {
-        let said = written(&[("scenario.toml", text), ("live.toml", live)]).expect_err(text);
+        let files = [("scenario.toml", text), ("live.toml", live), ("no_device.toml", no_device)];
+        let said = written(&files).expect_err(text);
         assert!(said.contains(message), "{text}: {said}");
     }
 }
