@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::Path;
 
-use tactflow_runtime::scenario::judge::Figure;
+use tactflow_runtime::scenario::judge::{Figure, Mark, Row};
 use tactflow_runtime::scenario::{Scenario, Trial};
 use tactflow_tests::{catalogue, workspace};
 
@@ -124,6 +124,9 @@ fn seeds_can_be_overridden_and_each_run_recorded() {
     assert_eq!(names, ["mock.csv", "slide-1.csv", "slide-2.csv", "slide-3.csv"]);
     let [first, second] = ["slide-1.csv", "slide-2.csv"].map(|name| fs::read_to_string(path.join(name)).unwrap());
     assert!(first.contains("truth.x") && first != second, "another seed is other noise");
+    let alone = folder.path().join("alone.csv");
+    say(&["run", "graphs/hybrid.toml", "--for=4s", "--out", alone.to_str().unwrap()]);
+    assert!(fs::read(alone).unwrap() == fs::read(path.join("mock.csv")).unwrap(), "a run is a run");
     assert_eq!(row(&said.out, "x", "response").len(), 9, "three seeds have no interval: {}", said.out);
 }
 
@@ -152,6 +155,123 @@ fn figures_of_the_truth_are_those_of_the_closed_form_whatever_the_seed() {
     assert!(measured.iter().any(|error| *error != measured[0]), "a seed is noise: {measured:?}");
     // White noise of 2 mN a tactel moves the centre of a contact of 3 N by some hundredths of a tactel.
     assert!(values(&scenario, &trials, "noise", Figure::Std).iter().all(|std| (1e-3..1e-2).contains(std)));
+}
+
+/// A scenario of a text in a folder of its own; `TESTS` stands for the folder of the tests.
+fn written(files: &[(&str, &str)]) -> Result<Scenario, String> {
+    let folder = tempfile::tempdir().unwrap();
+    for (name, text) in files {
+        let text = text.replace("TESTS", workspace().join("tests").to_str().unwrap());
+        fs::write(folder.path().join(name), text).unwrap();
+    }
+    let (name, _) = files[0];
+    Scenario::load(&catalogue(), &folder.path().join(name)).map_err(|report| report.render(false))
+}
+
+#[test]
+fn a_value_that_is_held_is_no_sample_of_the_mean() {
+    // A tick each 2 ms, but a sample each 4 ms: ten of them are there after 36 ms, and no sooner.
+    let task = "graph = { rate_hz = 500, bench = 'TESTS/scenarios/benches/slide.toml' }\nroles.pad = 'tactile_pad'\n\
+        [parts.touch]\nfile = 'TESTS/../graphs/parts/touch.toml'\nin.image = 'pad.image'\n\
+        [nodes.error]\ntype = 'feature_error'\nin.x = 'touch.x'\nsetpoint.x = 0.0\n";
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("task.toml");
+    fs::write(&path, task.replace("TESTS", workspace().join("tests").to_str().unwrap())).unwrap();
+    let scenario = format!(
+        "[scenario]\ngraph = {path:?}\nfor_s = 2.0\nfrom = 'touch.present'\n\
+         [check.scalar]\nof = 'truth.force'\nsettles_to = 3.0\nwithin = 0.1\n\
+         [check.feature]\nof = 'error.error.x'\nsettles_to = 0.0\nwithin = 1.0\n"
+    );
+    let scenario = written(&[("held.toml", &scenario)]).unwrap();
+    let trial = scenario.run(&catalogue(), None, None, &|| false).unwrap();
+    for check in ["scalar", "feature"] {
+        let [response] = values(&scenario, std::slice::from_ref(&trial), check, Figure::Response)[..] else { panic!() };
+        assert!((response - 0.036).abs() < 1e-9, "{check}: {response}");
+    }
+}
+
+#[test]
+fn a_run_may_be_done_early_but_samples_may_not_end_early() {
+    let task = |modes: &str, pad: &str| {
+        format!(
+            "graph.clock = 'pad'\nroles.pad = 'tactile_pad'\nbind = {{ pad = 'pad', truth = 'pad' }}\n\
+             [devices.pad]\ntype = 'true_pad'\n{pad}\n\
+             [nodes.source]\ntype = 'tactile_source'\nin.image = 'pad.image'\n{modes}\n"
+        )
+    };
+    let run = |task: &str, asks: &str| {
+        let folder = tempfile::tempdir().unwrap();
+        let [graph, scenario] = ["task.toml", "scenario.toml"].map(|name| folder.path().join(name));
+        fs::write(&graph, task).unwrap();
+        let text = format!("[scenario]\ngraph = 'task.toml'\nfor_s = 2.0\n{asks}\n[check.x]\nof = 'truth.force'\n");
+        fs::write(&scenario, text).unwrap();
+        let loaded =
+            Scenario::load(&catalogue(), &scenario).unwrap_or_else(|report| panic!("{}", report.render(false)));
+        let trial = loaded.run(&catalogue(), None, None, &|| false).unwrap();
+        let marks: Vec<Mark> = loaded.rows(std::slice::from_ref(&trial)).iter().map(Row::mark).collect();
+        (trial, marks)
+    };
+    let modes = "[modes.feel]\ndone = { after_ms = 1000 }\n[modes.other]\ngo = { to = 'feel', after_ms = 10 }\n";
+    let with_modes = task(modes, "").replace("graph.clock = 'pad'", "graph = { clock = 'pad', start = 'other' }");
+    let (trial, marks) = run(&with_modes, "ends_in = 'done'\nstays_in = 'feel'");
+    assert_eq!((trial.failure, &marks[2..]), (None, &[Mark::Met; 2][..]));
+    assert!((trial.time - 1.012).abs() < 0.01, "{}", trial.time);
+    let only = with_modes.replace("to = 'feel', after_ms = 10", "to = 'feel', after_ms = 9000");
+    let (trial, marks) = run(&only, "ends_in = 'other'\nstays_in = 'feel'");
+    assert_eq!(
+        (trial.failure, &marks[2..]),
+        (None, &[Mark::Missed, Mark::Met][..]),
+        "a mode never reached, and the end"
+    );
+    // The last of two seconds of samples is a period before their end.
+    let (trial, _) = run(&task("", "for_s = 2.0"), "");
+    assert_eq!((trial.failure, (trial.time * 1e3).round()), (None, 1996.0));
+    let (trial, _) = run(&task("", "for_s = 1.9"), "");
+    assert_eq!(trial.failure.as_deref(), Some("the samples of a device end after 1.896 s"));
+    assert_eq!(trial.figures, [None, None]);
+}
+
+#[test]
+fn colours_are_for_those_who_ask() {
+    let [plain, asked] = ["never", "always"].map(|when| say(&["verify", MISSED, "--color", when]).out);
+    assert!(!plain.contains('\u{1b}'));
+    assert!(asked.contains("\u{1b}[1;31mMISSED\u{1b}[0m") && asked.contains("\u{1b}[32mmet\u{1b}[0m"));
+    let stripped = asked.replace("\u{1b}[1;31m", "").replace("\u{1b}[32m", "").replace("\u{1b}[0m", "");
+    assert_eq!(stripped, plain, "colours take no room");
+}
+
+#[test]
+fn what_cannot_be_a_scenario_is_told() {
+    let cases = [
+        ("[check.x]\nof = 'touch.x'\n", "error[missing-key]: the scenario has no section [scenario]"),
+        ("scenario = 3\n", "error[bad-value]: expected a table, found 3"),
+        ("check = 3\n[scenario]\n", "error[bad-value]: expected a table of checks, found 3"),
+        ("[scenario]\ngraph = 'x'\n[scenario]\n", "error[syntax]"),
+        (
+            "[scenario]\ngraph = 'live.toml'\nfor_s = 1.0\n[check.x]\nof = 'length.value'\n",
+            "error[wrong-role]: a device of this bench runs in real time, but a scenario in virtual time",
+        ),
+        (
+            "[scenario]\ngraph = 'TESTS/../graphs/hybrid.toml'\nbench = 'TESTS/scenarios/benches/slide.toml'\nfor_s = 1.0\n",
+            "error[unbound-role]: the bench binds role `arm` to no device",
+        ),
+        (
+            "[scenario]\ngraph = 'TESTS/scenarios/tasks/slide.toml'\nbench = 'no_device.toml'\nfor_s = 1.0\n",
+            "error[unknown-device]: the bench has no device `pda`",
+        ),
+        (
+            "[scenario]\ngraph = 'TESTS/scenarios/tasks/slide.toml'\nbench = 'live.toml'\nfor_s = 1.0\n",
+            "error[unbound-role]: the bench binds role `pad` to no device",
+        ),
+    ];
+    let live = "graph.rate_hz = 100\nroles.length = 'length'\nbind.length = 'length'\n\
+        [devices.length]\ntype = 'line_length'\naddress = '127.0.0.1:9'\n";
+    let no_device = "bind.pad = 'pda'\ndevices.pad.type = 'true_pad'\n";
+    for (text, message) in cases {
+        let files = [("scenario.toml", text), ("live.toml", live), ("no_device.toml", no_device)];
+        let said = written(&files).expect_err(text);
+        assert!(said.contains(message), "{text}: {said}");
+    }
 }
 
 #[test]

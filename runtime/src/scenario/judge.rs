@@ -197,7 +197,8 @@ mod tests {
     #[test]
     fn medians_and_the_worst() {
         const NONE: f64 = f64::NAN;
-        let cases: [(Figure, &[f64], Option<f64>, Option<f64>); 8] = [
+        type Case = (Figure, &'static [f64], Option<f64>, Option<f64>);
+        let cases: [Case; 8] = [
             (Figure::Std, &[3.0, 1.0, 2.0], Some(2.0), Some(3.0)),
             (Figure::Std, &[4.0, 1.0, 2.0, 3.0], Some(2.5), Some(4.0)),
             (Figure::Min, &[3.0, 1.0, 2.0], Some(2.0), Some(1.0)),

@@ -213,3 +213,53 @@ impl Check {
         self.figures.iter().map(figure).collect()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A decay from 2 with a time constant of 0.5 s, for 4 s.
+    fn decay() -> Vec<Reading> {
+        let at = |tick: u32| f64::from(tick) * 0.004;
+        (0..=1000).map(|tick| Reading { time: at(tick), value: 2.0 * (-at(tick) / 0.5).exp(), is_new: true }).collect()
+    }
+
+    /// Mean and variance of the decay from `from` on, as integrals.
+    fn expected(from: f64) -> (f64, f64) {
+        let (length, start, end) = (4.0 - from, (-from / 0.5).exp(), (-4.0f64 / 0.5).exp());
+        let mean = 2.0 * 0.5 * (start - end) / length;
+        (mean, 4.0 * 0.25 * (start * start - end * end) / length - mean * mean)
+    }
+
+    #[test]
+    fn a_short_steady_state_begins_with_the_response_and_a_deviation_when_it_is_told_to() {
+        let figures = vec![Figure::Response, Figure::Error, Figure::Std];
+        let check = |after, steady| Check {
+            column: String::new(),
+            unit: 1.0,
+            settles: Some((0.0, 0.3)),
+            after,
+            steady,
+            figures: figures.clone(),
+        };
+        let response = check(None, 10.0).figures(&decay())[0].unwrap();
+        assert!((response - 0.967).abs() < 0.005, "{response}");
+        // When it is looked at, how long its end is, and from when on the error and the deviation are taken.
+        let cases = [
+            (None, 10.0, response, response),
+            (None, 2.0, 2.0, response),
+            (Some(2.5), 10.0, response, 2.5),
+            (Some(0.1), 1.0, 3.0, 0.1),
+        ];
+        for (after, steady, of_error, of_std) in cases {
+            let figures = check(after, steady).figures(&decay());
+            let (error, std) = (expected(of_error).0, expected(of_std).1.sqrt());
+            assert!(
+                (figures[1].unwrap() / error - 1.0).abs() < 0.01,
+                "{after:?} {steady}: {:?}, not {error}",
+                figures[1]
+            );
+            assert!((figures[2].unwrap() / std - 1.0).abs() < 0.01, "{after:?} {steady}: {:?}, not {std}", figures[2]);
+        }
+    }
+}
