@@ -114,7 +114,9 @@ pad yields and tilts under a load.\n\n\
 Objects stand where they are seen from the sensor at the start, z ahead of it: `at = [0.01, 0, 0.05]` is 1 cm to the \
 sensor's x and 5 cm before it. They are fixed, stand on a `mount` that gives way, or move as their `motion` says.\n\n\
 It lives in virtual time, and the same commands and seed give the same bits; with `--realtime` it is paced by the clock. \
-As `ground_truth` it gives what no sensor knows, to scenarios and records only.\n\n\
+The pad states the facts `dead`, `threshold`, `pressure` and `calibration`, and of its noise `common_noise`, the \
+standard deviation that all tactels share, as a part of what they read, and `own_noise`, each tactel's own [raw]. The arm \
+states `urdf`, `tip` and `mount`. As `ground_truth` it gives what no sensor knows, to scenarios and records only.\n\n\
 Left out: gravity and the coupling of the joints, objects that turn, columns of foam that push each other, wear and \
 temperature.";
     const EXAMPLE: &'static str = r#"
@@ -212,6 +214,8 @@ fn pad(params: &Params, shape: &ImageShape) -> Result<Filled, Mistakes> {
         ("threshold".into(), (*params.threshold).into()),
         ("pressure".into(), (*params.pressure).into()),
         ("calibration".into(), calibration.into()),
+        ("common_noise".into(), (*params.electronics.common_noise).into()),
+        ("own_noise".into(), (*params.electronics.own_noise).into()),
     ];
     Ok(Filled { role: "tactile_pad".into(), outputs: vec![shape.clone().into()], commands: vec![], facts })
 }

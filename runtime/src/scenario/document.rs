@@ -30,6 +30,10 @@ crate::params! { ScenarioTable:
 crate::params! { CheckTable:
     /// Port, or part of one, as the record names it or as the task's wires do.
     of: Word,
+    /// Port, or part of one, that is taken off it: the truth off what was measured, say.
+    minus: Option<Word>,
+    /// Period of the number, which is brought to half of it on either side of 0: half a turn for the angle of a line [unit of the check].
+    modulo: Option<Positive>,
     /// What it settles to [unit of the check].
     settles_to: Option<f64>,
     /// How near that is near enough [unit of the check].

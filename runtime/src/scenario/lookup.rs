@@ -147,6 +147,10 @@ impl Lookup<'_> {
             self.found.push(Diagnostic::new(Code::UnknownKey, block.place("paper"), message).help(help));
         }
         let (column, _) = self.column(&table.of)?;
+        let minus = match &table.minus {
+            Some(word) => Some(self.taken_off(word, &column)?),
+            None => None,
+        };
         let (unit_name, unit) = match table.unit.as_ref().and_then(|unit| unit.0.iter().next()) {
             Some((name, unit)) => (name.clone(), **unit),
             None => (column.unit.to_string(), 1.0),
@@ -157,6 +161,8 @@ impl Lookup<'_> {
         });
         let check = Check {
             column: column.name,
+            minus,
+            modulo: table.modulo.map(|period| *period),
             unit,
             settles: table.settles_to.zip(table.within.map(|within| *within)),
             after: table.after_s.map(|after| *after),
@@ -164,6 +170,17 @@ impl Lookup<'_> {
             figures: asked.iter().map(|(figure, _)| *figure).collect(),
         };
         Some((check, rows.collect()))
+    }
+
+    /// The column that is taken off another; it has its unit.
+    fn taken_off(&mut self, word: &Word, other: &Column) -> Option<String> {
+        let (column, _) = self.column(word)?;
+        if column.unit != other.unit {
+            let message = format!("`{}` is in {}, but `{}` is in {}", word.text, column.unit, other.name, other.unit);
+            self.found.push(Diagnostic::new(Code::UnitMismatch, word.span.clone(), message));
+            return None;
+        }
+        Some(column.name)
     }
 
     fn modes(&mut self, table: &ScenarioTable) {

@@ -51,6 +51,10 @@ pub struct Scenario {
 #[derive(Debug, Clone)]
 struct Check {
     column: String,
+    /// The number that is taken off.
+    minus: Option<String>,
+    /// Period of the difference [unit of the check].
+    modulo: Option<f64>,
     /// How much its unit is in the port's.
     unit: f64,
     /// What it settles to, and how near.

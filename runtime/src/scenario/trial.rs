@@ -123,7 +123,7 @@ struct Watch<'s> {
     row: Vec<f64>,
     from: Option<Eye>,
     never_lost: Option<Eye>,
-    eyes: Vec<Eye>,
+    eyes: Vec<(Eye, Option<Eye>)>,
     /// Time 0 of all figures in the graph's clock [ns].
     zero: Option<i64>,
     readings: Vec<Vec<Reading>>,
@@ -142,7 +142,7 @@ impl<'s> Watch<'s> {
             row: vec![0.0; columns.list.len()],
             from: scenario.from.as_ref().map(|(_, column)| eye(column)),
             never_lost: scenario.never_lost.as_ref().map(eye),
-            eyes: scenario.checks.iter().map(|check| eye(&check.column)).collect(),
+            eyes: scenario.checks.iter().map(|check| (eye(&check.column), check.minus.as_ref().map(eye))).collect(),
             zero: None,
             readings: vec![Vec::new(); scenario.checks.len()],
             lost: 0,
@@ -166,8 +166,9 @@ impl<'s> Watch<'s> {
         let Some(zero) = self.zero else { return };
         self.lost += u64::from(!is_set(self.never_lost));
         let time = seconds(engine.now() - zero);
-        for ((eye, check), readings) in self.eyes.iter().zip(&self.scenario.checks).zip(&mut self.readings) {
-            let value = self.row[eye.column] / check.unit;
+        for (((eye, minus), check), readings) in self.eyes.iter().zip(&self.scenario.checks).zip(&mut self.readings) {
+            let off = minus.map_or(0.0, |minus| self.row[minus.column]);
+            let value = check.wrapped((self.row[eye.column] - off) / check.unit);
             readings.push(Reading { time, value, is_new: eye.is_new(engine) });
         }
     }
@@ -193,6 +194,11 @@ impl<'s> Watch<'s> {
 }
 
 impl Check {
+    /// A value within half a period on either side of 0, if it has one.
+    fn wrapped(&self, value: f64) -> f64 {
+        self.modulo.map_or(value, |period| value - period * (value / period).round())
+    }
+
     /// Its figures, of what was read from time 0 on.
     fn figures(&self, readings: &[Reading]) -> Vec<Option<f64>> {
         let response = self.settles.and_then(|(target, within)| measure::response(readings, target, within));
