@@ -52,6 +52,8 @@ params! {
     pressure: Positive = Positive(0.1),
     /// What the foam is like.
     foam: Foam = Foam::USUAL,
+    /// Distance of the points at which the pad is felt; a fine probe needs finer ones than a ball [m].
+    points_apart: Positive = Positive(0.001),
     /// What the electronics are like.
     electronics: Electronics = Electronics::USUAL,
     /// The arm's model.
@@ -176,6 +178,9 @@ fn check(params: &Params, shape: &ImageShape) -> Result<(), Mistakes> {
     if *foam.static_friction < *foam.sliding_friction {
         mistakes.push(Mistake::param("foam.static_friction", "friction at rest is not less than in motion"));
     }
+    if !(0.0001..=0.001).contains(&*params.points_apart) {
+        mistakes.push(Mistake::param("points_apart", "the points of the pad are 0.0001 to 0.001 m apart"));
+    }
     if *params.step_s > 0.002 {
         mistakes.push(Mistake::param("step_s", "the foam's motion needs steps of 0.002 s or less"));
     }
@@ -263,7 +268,7 @@ impl SimBench {
             Object::new(thing, from, [scatter.uniform(-most, most), scatter.uniform(-most, most)])
         };
         let objects = params.objects.iter().map(place).collect::<Result<Vec<_>, _>>()?;
-        let contact = Contact::new(shape.clone(), params.foam.clone());
+        let contact = Contact::new(shape.clone(), params.foam.clone(), *params.points_apart);
         let imprint = Imprint::new(&shape, contact.fine(), *params.foam.spread);
         let readout = Readout::new(shape.tactels(), params.electronics, params.seed);
         let world = World::new(arm, objects, contact, imprint, shape, *params.step_s);

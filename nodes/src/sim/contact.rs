@@ -1,6 +1,6 @@
 //! The foam against the objects: how deep each point of the pad is pressed in, and what that does to the pad.
 //!
-//! Every tactel has 5 by 5 points or more, no more than 1 mm apart, each the end of a column of foam. The depth of a
+//! Every tactel of 5 mm has 5 by 5 points or more, no more than 1 mm apart, each the end of a column of foam. The depth of a
 //! column is found by a ray through it, from the plate outward. Its force f acts along the pad's z; the object's
 //! surface, of normal n, is without friction at such a point, so the pad feels f n / |n_z|: the gradient of the energy of
 //! the columns, and no more work comes out than went in.
@@ -16,8 +16,6 @@ use tactflow_runtime::signal::ImageShape;
 use super::foam::{Column, Foam};
 use super::object::Object;
 
-/// Greatest distance of two points [m].
-const POINTS_APART: f64 = 0.001;
 /// Speed over which friction falls from that at rest to that in motion [m/s].
 const STRIBECK: f64 = 0.001;
 /// Tactels along a block.
@@ -126,11 +124,11 @@ impl Touch {
 const NONE: u32 = u32::MAX;
 
 impl Contact {
-    /// A pad that touches nothing.
+    /// A pad that touches nothing, felt at points that are `apart` at most [m].
     #[must_use]
-    pub fn new(shape: ImageShape, foam: Foam) -> Self {
+    pub fn new(shape: ImageShape, foam: Foam, apart: f64) -> Self {
         let side = shape.pitch[0].max(shape.pitch[1]);
-        let fine = (side / POINTS_APART - 1e-9).ceil().max(1.0) as usize;
+        let fine = (side / apart - 1e-9).ceil().max(1.0) as usize;
         let area = shape.pitch[0] * shape.pitch[1];
         let points = fine * fine;
         let along = |point: usize| (point as f64 + 0.5) / fine as f64 - 0.5;
