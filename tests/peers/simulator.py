@@ -309,7 +309,7 @@ def serve(link, args, world):
     begin, heard, seq = time.monotonic(), time.monotonic(), args.first
     for frame in range(round(args.seconds / DT)):
         t = args.clock + frame * DT
-        obs = {"type": "obs", "seq": seq, "t": t, "q": world.q, "dq": world.dq, "q_eq": world.q_eq, "img": world.image()}
+        obs = {"type": "obs", "seq": seq, "t": t, "q": world.q[:], "dq": world.dq[:], "q_eq": world.q_eq[:], "img": world.image()}
         if frame == args.at:
             if args.misbehave == "close":
                 return seen

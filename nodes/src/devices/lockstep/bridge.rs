@@ -96,7 +96,7 @@ impl Bridge {
         let line = self.socket.line()?;
         let mut frame = self.frame(&line)?;
         while !self.is_lockstep && frame.is_some() {
-            let Some(line) = self.socket.line_at_hand().map_err(|why| self.in_line(why))? else { break };
+            let Some(line) = self.socket.line_at_hand()? else { break };
             frame = self.frame(&line)?;
         }
         self.is_over = frame.is_none();
@@ -110,7 +110,7 @@ impl Bridge {
         let wrong = |why: String| Err(self.in_line(format!("obs {}: {why}", obs.seq)));
         if let Some((seq, t)) = self.newest {
             if obs.seq <= seq {
-                return wrong(format!("`seq` comes after {seq}, but it grows with every frame"));
+                return wrong(format!("`seq` is {} after {seq}, but it grows with every frame", obs.seq));
             }
             if obs.t < t {
                 return wrong(format!("`t` is {} after {t}: the clock of a simulator does not go back", obs.t));

@@ -20,6 +20,8 @@ pub(super) struct Socket {
     read: usize,
     /// Lines that were taken.
     pub(super) lines: u64,
+    /// Whether the rest of a line that is too long is still to come.
+    skips: bool,
     /// Whether the simulator has closed its end.
     is_closed: bool,
     patience: Duration,
@@ -48,7 +50,7 @@ impl Socket {
         // Each command is one small packet that the simulator waits for.
         stream.set_nodelay(true)?;
         stream.set_write_timeout(Some(patience))?;
-        Ok(Self { stream, buffer: Vec::new(), read: 0, lines: 0, is_closed: false, patience })
+        Ok(Self { stream, buffer: Vec::new(), read: 0, lines: 0, skips: false, is_closed: false, patience })
     }
 
     /// Sends a line.
@@ -109,18 +111,30 @@ impl Socket {
     fn take(&mut self) -> Result<Option<String>, String> {
         let rest = &self.buffer[self.read..];
         let end = rest.iter().position(|byte| *byte == b'\n');
-        if end.unwrap_or(rest.len()) > LONGEST {
-            self.lines += 1;
-            return Err("the line is longer than 1 MiB".into());
+        let is_too_long = end.unwrap_or(rest.len()) > LONGEST;
+        let Some(end) = end else {
+            if is_too_long || self.skips {
+                (self.read, self.buffer) = (0, Vec::new());
+            }
+            let is_news = is_too_long && !self.skips;
+            self.skips |= is_too_long;
+            return if is_news { Err(self.too_long(1)) } else { Ok(None) };
+        };
+        if is_too_long || self.skips {
+            (self.read, self.lines) = (self.read + end + 1, self.lines + 1);
+            return if std::mem::take(&mut self.skips) { self.take() } else { Err(self.too_long(0)) };
         }
-        let Some(end) = end else { return Ok(None) };
         let line = String::from_utf8(rest[..end].to_vec());
         (self.read, self.lines) = (self.read + end + 1, self.lines + 1);
         if self.read == self.buffer.len() || self.read > LONGEST {
             self.buffer.drain(..self.read);
             self.read = 0;
         }
-        line.map(Some).map_err(|_| "the line is not UTF-8 text".into())
+        line.map(Some).map_err(|_| format!("line {}: it is not UTF-8 text", self.lines))
+    }
+
+    fn too_long(&self, more: u64) -> String {
+        format!("line {}: it is longer than 1 MiB", self.lines + more)
     }
 
     /// Reads once, waiting for as long as it may; whether anything came.
