@@ -65,6 +65,7 @@ pub fn catalogue() -> Catalogue {
         .device::<devices::recording::Player>()
         .device::<devices::mock_arm::MockArm>()
         .device::<sim::bench::SimBench>()
+        .device::<devices::lockstep::Lockstep>()
         .group("touch: from a tactile image to features of the contact")
         .node::<touch::tactile_source::TactileSource>()
         .node::<touch::calibrate::Calibrate>()

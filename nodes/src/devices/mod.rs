@@ -1,6 +1,7 @@
 //! The edge: what gives images and takes joint velocities. One device a file.
 
 pub(crate) mod arm_facts;
+pub mod lockstep;
 pub mod mock_arm;
 pub mod mock_pad;
 pub mod recording;

@@ -164,6 +164,33 @@ mod tests {
         }
     }
 
+    #[test]
+    fn a_report_is_what_is_there_and_fresh_and_needs_no_new_room() {
+        let (mut bus, shape) =
+            (Bus::default(), JointsShape { joints: vec![Default::default(); 2], ..Default::default() });
+        let source = bus.add(&shape.clone().into());
+        let report = ReportSlot { device: 0, source, report: 1, max_age: 100 };
+        let mut commands = Commands::default().with_report(None).with_report(Some(&shape.into()));
+        let room = Joints::arena(&bus.arenas)[0].0.as_ptr();
+        let mut tell = |wanted: Option<i64>, now: i64| {
+            let mark = &mut bus.marks[source.mark as usize];
+            wanted.map_or_else(|| mark.lose(1), |nanos| mark.renew(1, Stamp { nanos, device: 0 }));
+            Joints::arena_mut(&mut bus.arenas)[source.slot as usize].0.fill(now as f64);
+            report.commit(&bus, &mut commands, &Tick { now, ..Tick::first() });
+            let told = commands.report::<Joints>(1).map(|joints| (joints.0[1], joints.0.as_ptr()));
+            assert!(commands.report::<Joints>(0).is_none() && commands.report::<bool>(1).is_none());
+            assert!(told.is_none_or(|(_, place)| place != room));
+            told
+        };
+        let first = tell(Some(0), 0).unwrap();
+        assert_eq!(tell(Some(0), 100), Some((100.0, first.1)), "in the same place");
+        assert_eq!(tell(Some(0), 101), None, "too old");
+        assert_eq!(tell(Some(50), 101), Some((101.0, first.1)));
+        assert_eq!(tell(None, 102), None, "absent");
+        commands.fall_silent();
+        assert!(commands.report::<Joints>(1).is_none());
+    }
+
     proptest! {
         #[test]
         fn it_never_steps_and_never_holds_what_nothing_drives(

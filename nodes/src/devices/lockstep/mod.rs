@@ -1,0 +1,172 @@
+//! `lockstep`: a pad and an arm in a simulator of somebody else's, over a line of TCP.
+//!
+//! The simulator says what it is when the device is opened, so a task is checked against it before anything moves. Each
+//! exchange answers the frame that was shown last and waits for the next, so simulator and graph take turns. A frame
+//! counts from the simulator's own clock. `docs/lockstep.md` has the protocol.
+
+mod bridge;
+mod json;
+mod message;
+mod socket;
+
+use std::borrow::Cow;
+use std::time::Duration;
+
+use tactflow_runtime::device::{Description, Device, Driver, Filled, Opened};
+use tactflow_runtime::diagnostic::Code;
+use tactflow_runtime::node::{At, FilePath, Mistake, Mistakes, Positive};
+use tactflow_runtime::params;
+use tactflow_runtime::signal::{ImageShape, Joint, JointsShape, Unit};
+
+use super::arm_facts;
+use crate::arm::model::load;
+use crate::builtin;
+use bridge::Bridge;
+use message::{Hello, Sizes};
+use socket::Socket;
+
+params! {
+    /// Where the simulator listens, as `host:port`.
+    address: String = "127.0.0.1:7777".into(),
+    /// How long to try to connect [s].
+    connect_s: Positive = Positive(5.0),
+    /// How long the simulator may be silent when it is its turn [s].
+    reply_s: Positive = Positive(5.0),
+    /// The arm's model; that which the simulator names unless given.
+    urdf: Option<FilePath>,
+    /// Greatest acceleration of each joint, of which the protocol says nothing [rad/s²].
+    acceleration: Positive = Positive(10.0),
+}
+
+/// The device; what runs is a [`Bridge`].
+pub struct Lockstep;
+
+impl Device for Lockstep {
+    type Params = Params;
+
+    const NAME: &'static str = "lockstep";
+    const SUMMARY: &'static str =
+        "a pad and an arm in another program: any simulator that speaks the lockstep protocol";
+    const DOC: &'static str = "\
+The device connects to a simulator that listens at `address` and speaks lines of JSON; `docs/lockstep.md` says how to \
+write one. It stands in for the built-in bench: `tactflow run graphs/hybrid.toml --bench graphs/benches/lockstep.toml`.\n\n\
+The simulator says first what it is: its joints with their limits, where the sensor is mounted, the pad's size, pitch, \
+scale and threshold. So the simulator has to be there when a graph is checked, too. It names the arm's model; `lwr4p` is \
+built in, and `urdf` names a file for any other.\n\n\
+In lockstep it waits for each command, and a run is as fast as both are. Otherwise it runs by its own clock: then the \
+newest frame counts, and those before it are counted as gaps. Frames carry the simulator's time.\n\n\
+At the end of a run the commands go to zero first, frame by frame, and then the simulator is told. It may end the run \
+itself. What it says wrongly, a value that is not finite, silence and a closed connection are faults that name the \
+message and the field; where it still listens, the arm is brought to rest before it is left.\n\n\
+It states the facts `urdf`, `tip` and `mount` of the arm and `dead`, `threshold`, `pressure` and `calibration` of the \
+pad. What a task reports as `contact` goes out as `est`.";
+    const EXAMPLE: &'static str = r#"
+[roles]
+pad = "tactile_pad"
+arm = "velocity_arm"
+
+[commands]
+arm.velocity = "joint_limit.velocity"
+
+[bind]
+pad = "bench"
+arm = "bench"
+
+[devices.bench]
+type = "lockstep"
+address = "127.0.0.1:7777"
+"#;
+
+    fn open(params: Params) -> Result<Opened, Mistakes> {
+        let at = |why: String| refusal(&params.address, why);
+        let [connect, reply] = [params.connect_s, params.reply_s].map(|time| Duration::from_secs_f64(time.min(1e6)));
+        let mut socket = Socket::connect(&params.address, connect, reply).map_err(|why| {
+            let message = format!("cannot connect to the simulator at `{}`: {why}", params.address);
+            let mistake = Mistake::new(Code::Unreadable, At::Param("address".into()), message);
+            mistake.help("start the simulator first, or give its address: `--set devices.bench.address=127.0.0.1:7777`")
+        })?;
+        let line = socket.line().map_err(|why| at(format!("no hello: {why}")))?;
+        let hello = message::hello(&line).map_err(|why| at(format!("hello (line 1): {why}")))?;
+        let fills = vec![pad(&hello), arm(&hello, &params)?];
+        let period = (hello.dt * 1e9).round();
+        let sizes = Sizes { joints: hello.joints.len(), rows: hello.rows, cols: hello.cols };
+        let bridge = Bridge::new(socket, params.address, sizes, &hello, *params.acceleration);
+        let description = Description { fills, period: period * 1e-9 };
+        Ok(Opened { description, driver: Driver::Stepped(Box::new(bridge)) })
+    }
+}
+
+/// What the simulator says will not do.
+fn refusal(address: &str, why: String) -> Mistakes {
+    Mistake::new(Code::BadData, At::Param("address".into()), format!("the simulator at `{address}`: {why}")).into()
+}
+
+type Facts = Vec<(Cow<'static, str>, toml::Value)>;
+
+fn pad(hello: &Hello) -> Filled {
+    let shape = ImageShape { rows: hello.rows, cols: hello.cols, pitch: [hello.pitch; 2], unit: Unit::RAW };
+    let calibration: toml::Table =
+        [("gain".to_owned(), (hello.newton_per_unit / hello.counts_per_unit).into()), ("unit".to_owned(), "N".into())]
+            .into_iter()
+            .collect();
+    let facts: Facts = vec![
+        ("dead".into(), toml::Value::Array(vec![])),
+        ("threshold".into(), (hello.threshold_units * hello.newton_per_unit).into()),
+        ("pressure".into(), hello.newton_per_unit.into()),
+        ("calibration".into(), calibration.into()),
+    ];
+    Filled { role: "tactile_pad".into(), outputs: vec![shape.into()], commands: vec![], facts }
+}
+
+fn arm(hello: &Hello, params: &Params) -> Result<Filled, Mistakes> {
+    let urdf = match &params.urdf {
+        Some(file) => file.clone(),
+        None => model(&hello.urdf).ok_or_else(|| {
+            let message = format!(
+                "the simulator at `{}` names the model `{}`, which is not built in",
+                params.address, hello.urdf
+            );
+            let mistake = Mistake::new(Code::Unreadable, At::Param("address".into()), message);
+            mistake.help(format!("give its file: `urdf = \"{}.urdf\"`; built in is {}", stem(&hello.urdf), models()))
+        })?,
+    };
+    let chain = load(&urdf, &hello.tip, &hello.mount)?;
+    let model: Vec<&str> = chain.joints().iter().map(|joint| joint.name.as_str()).collect();
+    if hello.joints != model {
+        let why =
+            format!("its `joints` are {:?}, but those of the model up to `{}` are {model:?}", hello.joints, hello.tip);
+        return Err(refusal(&params.address, why));
+    }
+    let joint = |(i, name): (usize, &String)| Joint {
+        name: name.clone(),
+        lower: hello.q_min[i],
+        upper: hello.q_max[i],
+        speed: hello.dq_max[i],
+        acceleration: *params.acceleration,
+    };
+    let shape = JointsShape { joints: hello.joints.iter().enumerate().map(joint).collect(), unit: Unit::RADIAN };
+    Ok(Filled {
+        role: "velocity_arm".into(),
+        outputs: vec![shape.clone().into(), shape.clone().into()],
+        commands: vec![shape.in_unit(Unit::RADIAN.per_second()).into()],
+        facts: arm_facts::facts(&urdf, &hello.tip, &hello.mount)?,
+    })
+}
+
+/// The name of a model without folders and ending.
+fn stem(name: &str) -> &str {
+    let file = name.rsplit(['/', '\\', ':']).next().unwrap_or(name);
+    file.strip_suffix(".urdf").unwrap_or(file)
+}
+
+/// The model of that name among those that are built in.
+fn model(name: &str) -> Option<FilePath> {
+    let is_meant = |file: &str| file.strip_suffix(".urdf").is_some_and(|known| known.eq_ignore_ascii_case(stem(name)));
+    let (file, bytes) = builtin::FILES.iter().find(|(file, _)| is_meant(file))?;
+    Some(FilePath { path: format!("builtin:{file}").into(), span: 0..0, builtin: Some(bytes) })
+}
+
+fn models() -> String {
+    let names = builtin::FILES.iter().filter_map(|(file, _)| file.strip_suffix(".urdf"));
+    names.map(|name| format!("`{name}`")).collect::<Vec<_>>().join(", ")
+}

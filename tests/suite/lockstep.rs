@@ -1,0 +1,226 @@
+//! The lockstep bridge against a simulator in another language, which knows nothing of this one.
+
+use std::io::{BufRead, BufReader, Read};
+use std::process::{Child, Command, Stdio};
+use std::time::{Duration, Instant};
+
+use serde_json::Value;
+use tactflow_tests::workspace;
+
+use crate::tool::{Said, said, tool};
+
+/// The simulator and the port it listens on; it ends with the test.
+struct Peer {
+    child: Child,
+    out: BufReader<std::process::ChildStdout>,
+    port: String,
+}
+
+impl Peer {
+    fn start(args: &str) -> Self {
+        let script = workspace().join("tests/peers/simulator.py");
+        let mut command = Command::new("python3");
+        command.arg(script).args(args.split_whitespace()).stdout(Stdio::piped());
+        let mut child = command.spawn().expect("python3 is there");
+        let mut out = BufReader::new(child.stdout.take().unwrap());
+        let mut port = String::new();
+        out.read_line(&mut port).unwrap();
+        Self { child, out, port: port.trim().to_owned() }
+    }
+
+    /// What it saw, once it has ended.
+    fn seen(mut self) -> Value {
+        let mut text = String::new();
+        self.out.read_to_string(&mut text).unwrap();
+        assert!(self.child.wait().unwrap().success(), "{text}");
+        serde_json::from_str(&text).unwrap_or_else(|error| panic!("{error}: {text}"))
+    }
+}
+
+impl Drop for Peer {
+    fn drop(&mut self) {
+        // One that has ended by itself cannot be killed, and need not.
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}
+
+fn command(graph: &str, port: &str, more: &[&str]) -> Command {
+    let address = format!("devices.bench.address=127.0.0.1:{port}");
+    let graph = format!("graphs/{graph}.toml");
+    let mut args = vec!["run", &graph, "--bench", "graphs/benches/lockstep.toml", "--set", &address];
+    args.extend(more);
+    tool(&args)
+}
+
+/// Runs a graph with a simulator; what the tool said, and what the simulator saw.
+fn run(graph: &str, simulator: &str, more: &[&str]) -> (Said, Value) {
+    let peer = Peer::start(simulator);
+    let said = said(&mut command(graph, &peer.port, more));
+    (said, peer.seen())
+}
+
+fn number(seen: &Value, name: &str) -> f64 {
+    seen[name].as_f64().unwrap_or_else(|| panic!("{name}: {seen}"))
+}
+
+#[test]
+fn every_servo_task_runs_on_it_with_no_other_change() {
+    let cases = [
+        ("force", "--scene pen --seconds 1.5", 375.0),
+        ("position", "--scene ball --gap -0.0015 --seconds 1", 250.0),
+        ("hybrid", "--scene ball --offset 0.01 -0.005 --seconds 1.5", 375.0),
+        ("rolling", "--scene ball --offset 0.01 0 --seconds 1.5", 375.0),
+        ("edge", "--scene edge --gap -0.0015 --seconds 0.6", 150.0),
+        ("cable", "--scene cable --radius 0.006 --angle 1.57 --gap -0.0015 --seconds 0.6", 150.0),
+        ("explore", "--scene plane --seconds 1", 250.0),
+    ];
+    for (graph, simulator, frames) in cases {
+        let (said, seen) = run(graph, simulator, &[]);
+        assert_eq!(said.code, 0, "{graph}: {}", said.err);
+        assert!(said.out.contains("a device has no more samples"), "{graph}: {}", said.out);
+        // Each frame was answered once, by its number, and the simulator ended the run.
+        assert_eq!((number(&seen, "commands"), &seen["end"]), (frames, &Value::Null), "{graph}: {seen}");
+        assert_eq!(seen["seqs"][4].as_f64(), Some(frames), "{graph}: {seen}");
+        assert!(number(&seen, "reports") > 20.0 && number(&seen, "q_eq_moved") > 0.001, "{graph}: {seen}");
+    }
+}
+
+#[test]
+fn a_ball_is_found_centred_and_measured() {
+    let (said, seen) = run("hybrid", "--scene ball --offset 0.01 -0.005 --seconds 5", &[]);
+    assert_eq!(said.code, 0, "{}", said.err);
+    assert!(number(&seen, "found") < 1.0 && number(&seen, "force") > 0.5, "{seen}");
+    // Two tactels and one tactel off at the start [tactels].
+    assert!(number(&seen, "x").abs() < 0.3 && number(&seen, "y").abs() < 0.3, "{seen}");
+    // The ruler takes the pad's plane for the surface, and the foam gives way by a millimetre or two [m].
+    assert!(number(&seen, "off") < 0.002, "{seen}");
+    assert_eq!(seen["end"], Value::Null, "the simulator ends it: {seen}");
+}
+
+/// What a simulator does wrong, the end of the message, and how many commands it gets after the last good frame: at
+/// least two where it still listens, since the arm moves too fast to stop within one.
+const WRONGS: [(&str, &str, bool); 14] = [
+    ("nan", "line 252: obs 251: number 8 of `img` is NaN, and not finite", true),
+    ("inf", "line 252: obs 251: number 3 of `q` is inf, and not finite", true),
+    ("null", "line 252: obs 251: entry 1 of `dq` is null, and not a number", true),
+    ("short", "line 252: obs 251: `img` has 255 numbers, but the pad has 16x16 = 256", true),
+    ("missing", "line 252: obs 251: `q_eq` is missing", true),
+    ("back-t", "line 252: obs 251: `t` is 0 after 0.996: the clock of a simulator does not go back", true),
+    ("back-seq", "line 252: obs 250: `seq` is 250 after 250, but it grows with every frame", true),
+    ("type", "line 252: a message is of type `picture`, and neither `obs` nor `end`", true),
+    ("garbage", "line 252: it is not UTF-8 text", true),
+    ("words", "line 252: expected `{` at byte 1, found `ready when y`", true),
+    ("long", "line 252: it is longer than 1 MiB", true),
+    ("silent", "the simulator has said nothing for 0.4 s", true),
+    ("partial", "the simulator has closed the connection without an `end` in the middle of a message", false),
+    ("close", "the simulator has closed the connection without an `end`", false),
+];
+
+#[test]
+fn a_simulator_that_does_wrong_is_named_and_left_with_the_arm_at_rest() {
+    for (wrong, message, listens) in WRONGS {
+        let simulator = format!("--scene none --seconds 2 --at 250 --misbehave {wrong}");
+        let settings = ["--set", "devices.bench.reply_s=0.4", "--set", "devices.bench.acceleration=0.1"];
+        let (said, seen) = run("hybrid", &simulator, &settings);
+        assert_eq!(said.code, 1, "{wrong}: {}", said.err);
+        let line = said.err.lines().find(|line| line.starts_with("error: ")).unwrap_or_default();
+        assert!(line.contains("device `bench` failed: the simulator at `127.0.0.1:"), "{wrong}: {line}");
+        assert!(line.contains(&format!("{message} in tick 251")), "{wrong}: {line}");
+        assert!(said.out.contains("a fault after 1.000 s"), "{wrong}: {}", said.out);
+        let told = seen["end"].as_str().unwrap_or_default();
+        assert_eq!(told.ends_with(message), listens, "{wrong}: {seen}");
+        if listens {
+            assert_eq!(number(&seen, "last_dq"), 0.0, "{wrong}: {seen}");
+            assert!(number(&seen, "commands") > 252.0, "it goes to zero by steps, {wrong}: {seen}");
+        } else {
+            assert!(number(&seen, "last_dq") > 0.0, "it moved when the line was cut: {seen}");
+        }
+        // No joint ever changed its speed by more than it bears in a frame [rad/s].
+        assert!(number(&seen, "step") <= 0.1 * 0.004 + 1e-9, "{wrong}: {seen}");
+    }
+}
+
+#[test]
+fn a_hello_that_will_not_do_is_told_before_anything_runs() {
+    let cases = [
+        ("proto", "hello (line 1): `proto` is 2, but the protocol that is spoken here is 1"),
+        ("missing", "hello (line 1): `pitch` is missing"),
+        ("nan", "hello (line 1): number 1 of `dq_max` is NaN, and not finite"),
+        ("short", "hello (line 1): `q_min` has 6 numbers, but there are 7 `joints`"),
+        ("mirror", "hello (line 1): `T_es` is no pose: its rotation mirrors"),
+        ("dt", "hello (line 1): `dt` is 0, and has to be greater than 0"),
+        ("urdf", "names the model `panda`, which is not built in"),
+        ("names", "its `joints` are [\"lwr_a6_joint\""),
+        ("tip", "the model has no link `hand`"),
+        ("garbage", "hello (line 1): expected `{` at byte 1, found `220 mail.exa`"),
+        ("silent", "no hello: the simulator has said nothing for 0.4 s"),
+        ("close", "no hello: the simulator has closed the connection without an `end`"),
+    ];
+    for (wrong, message) in cases {
+        let peer = Peer::start(&format!("--seconds 1 --silence 1 --misbehave hello-{wrong}"));
+        let said = said(&mut command("hybrid", &peer.port, &["--set", "devices.bench.reply_s=0.4"]));
+        assert_eq!(said.code, 1, "{wrong}: {}", said.err);
+        assert!(said.err.contains(message), "{wrong}: {}", said.err);
+        assert!(said.err.contains("1 mistake"), "{wrong}: {}", said.err);
+        assert!(said.err.contains(&peer.port), "{wrong}: {}", said.err);
+        assert!(!said.out.contains("ticks"), "{wrong}: {}", said.out);
+    }
+}
+
+#[test]
+fn nobody_listens() {
+    let port = std::net::TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap().port().to_string();
+    let said = said(&mut command("hybrid", &port, &["--set", "devices.bench.connect_s=0.2"]));
+    let message = format!("cannot connect to the simulator at `127.0.0.1:{port}`");
+    assert!(
+        said.code == 1 && said.err.contains(&message) && said.err.contains("start the simulator first"),
+        "{}",
+        said.err
+    );
+}
+
+#[test]
+fn the_graph_ends_with_a_ramp_and_says_why() {
+    let settings = ["--for", "1", "--set", "devices.bench.acceleration=0.1"];
+    let (said, seen) = run("hybrid", "--scene none --seconds 9", &settings);
+    assert_eq!(said.code, 0, "{}", said.err);
+    assert_eq!((seen["end"].as_str(), number(&seen, "last_dq")), (Some("the time is over"), 0.0), "{seen}");
+    assert!(number(&seen, "step") <= 0.1 * 0.004 + 1e-9 && number(&seen, "commands") > 255.0, "{seen}");
+    // A fault of the task: it has found nothing within its way.
+    let (said, seen) = run("hybrid", "--scene none --seconds 9", &["--set", "modes.approach.fail.after_ms=500"]);
+    assert_eq!((said.code, number(&seen, "last_dq")), (1, 0.0), "{seen}");
+    assert!(seen["end"].as_str().is_some_and(|end| end.contains("approach")), "{seen}");
+}
+
+#[test]
+fn a_graph_that_is_only_checked_says_so() {
+    let peer = Peer::start("--seconds 1");
+    let address = format!("devices.bench.address=127.0.0.1:{}", peer.port);
+    let args = ["check", "graphs/hybrid.toml", "--bench", "graphs/benches/lockstep.toml", "--set", &address];
+    let said = said(&mut tool(&args));
+    assert_eq!(said.code, 0, "{}", said.err);
+    assert_eq!(peer.seen()["end"].as_str(), Some("the graph does not run"));
+}
+
+#[test]
+fn a_clock_and_numbers_of_its_own_and_a_frame_that_is_missing() {
+    let simulator = "--scene ball --seconds 1 --first 1000 --clock 5000.25 --misbehave gap --at 100";
+    let (said, seen) = run("hybrid", simulator, &[]);
+    assert_eq!(said.code, 0, "{}", said.err);
+    assert_eq!((number(&seen, "commands"), seen["seqs"][4].as_u64()), (250.0, Some(1250)), "{seen}");
+    assert!(said.out.contains("after 0.") || said.out.contains("after 1."), "{}", said.out);
+    let counted = said.out.lines().any(|line| line.contains("1 missing") || line.contains("gap"));
+    assert!(counted, "{}", said.out);
+}
+
+#[test]
+fn a_simulator_on_the_wall_clock_is_followed_and_not_queued() {
+    let begin = Instant::now();
+    let (said, seen) = run("hybrid", "--scene ball --seconds 2 --wall", &[]);
+    assert_eq!(said.code, 0, "{}", said.err);
+    assert!(begin.elapsed() > Duration::from_secs(2));
+    assert!(number(&seen, "found") < 1.5, "{seen}");
+    // It may skip frames on a busy machine, but the last command is for one of the last frames.
+    assert!(number(&seen, "commands") > 100.0 && seen["seqs"][4].as_f64().unwrap() > 480.0, "{seen}");
+}
