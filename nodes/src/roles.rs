@@ -69,7 +69,9 @@ pub fn ground_truth() -> RoleType {
             scalar("tilt", TILT, &["rad"]),
             scalar("path", PATH, &["m"]),
             scalar("distance", DISTANCE, &["m"]),
-            scalar("coverage", "Share of the surface within reach that is near a reported point [1].", &["1"]),
+            scalar("coverage", COVERAGE, &["1"]),
+            scalar("common_noise", COMMON_NOISE, &["N/tactel"]),
+            scalar("own_noise", OWN_NOISE, &["N/tactel"]),
         ],
         commands: vec![],
         reports: vec![],
@@ -84,8 +86,15 @@ const ORIENTATION: &str = "Angle of the edge, pen or cable in the sensor's frame
     absent if there is none [rad].";
 const TILT: &str = "Angle between the sensor's z and the object's inward normal at the contact; absent without contact \
     [rad].";
-const PATH: &str = "Distance of the contact's middle from the object's axis, edge or path; absent if it has none [m].";
+const PATH: &str = "Distance, in the sensor's plane, of the reported contact point from the object's axis, edge or course; \
+    absent if it has none [m].";
 const DISTANCE: &str = "Distance of the reported contact point from the object's surface; absent without a report [m].";
+const COVERAGE: &str =
+    "Share of the surface that faced the sensor at the start and is within 1 cm of a reported point [1].";
+const COMMON_NOISE: &str = "Standard deviation that the noise all tactels share gives the pressure; absent without contact \
+    [N/tactel].";
+const OWN_NOISE: &str =
+    "Standard deviation that each tactel's own noise gives the pressure; absent without contact [N/tactel].";
 
 /// What every command of an arm must have crossed, in the order in which a motion does.
 const LIMITS: [&str; 10] = [

@@ -3,7 +3,7 @@
 //! It knows no node, no sensor and no robot: those stand in a [`Catalogue`](catalogue::Catalogue). In reading order:
 //! [`signal`] (what travels on a wire), [`node`] (the contract), [`graph`] (text in, plan or all mistakes out),
 //! [`diagnostic`] (what load says) and [`fault`] (what a run says), [`engine`] (the tick), [`device`] (the edge),
-//! [`record`], [`harness`], and `cli` (the command line as a library function, behind the feature `cli`).
+//! [`record`], [`scenario`] (what must come out of a run), [`harness`], and `cli` (the command line as a library function, behind the feature `cli`).
 
 pub mod catalogue;
 #[cfg(feature = "cli")]
@@ -16,4 +16,5 @@ pub mod graph;
 pub mod harness;
 pub mod node;
 pub mod record;
+pub mod scenario;
 pub mod signal;

@@ -25,7 +25,9 @@ fn in_new_folder(name: &str) -> (TempDir, String) {
 fn what_goes_well_ends_with_0_and_says_nothing_on_stderr() {
     let run = say(&["run", PRESS]);
     assert_eq!((run.code, run.err.as_str()), (0, ""));
-    for text in ["22 nodes, a tick each 100 ms", "move.ik.velocity", "no more samples after 31.1", "309 ticks"] {
+    for text in
+        ["22 nodes, a tick each 100 ms", "touch.image: 28x28 tactels", "no more samples after 31.1", "309 ticks"]
+    {
         assert!(run.out.contains(text), "`{text}` is not in\n{}", run.out);
     }
     let check = say(&["check", PRESS, HYBRID]);
@@ -160,6 +162,7 @@ fn set_reaches_graph_part_and_bench_and_needs_no_quotes() {
     let run = say(&[
         "run",
         PRESS,
+        "--ports",
         "--for=1s",
         "--set=nodes.guide.twist=[0, 0.25, 0, 0, 0, 0]",
         "--set=parts.touch.set.label.min_area=500",
@@ -169,7 +172,7 @@ fn set_reaches_graph_part_and_bench_and_needs_no_quotes() {
     assert_eq!((run.code, run.err.as_str()), (0, ""));
     assert!(line(&run.out, "touch.moments.area").contains(" 0     0      10 "), "no contact has 500 tactels");
     assert!(line(&run.out, ".lwr_a3_joint").contains(" -1.250 "), "{}", run.out);
-    let open = say(&["run", PRESS, "--for=1s", "--set=nodes.guide.twist=[0, 0.25, 0, 0, 0, 0]"]);
+    let open = say(&["run", PRESS, "--ports", "--for=1s", "--set=nodes.guide.twist=[0, 0.25, 0, 0, 0, 0]"]);
     let moves =
         |text: &str| text.lines().skip_while(|line| !line.starts_with("guide.twist")).nth(2).unwrap().to_owned();
     assert!(moves(&open.out).contains(" 0.25000"), "{}", open.out);
@@ -265,7 +268,7 @@ fn colours_are_for_terminals_and_for_those_who_ask() {
 }
 
 /// A run that ends with the test at the latest.
-struct Running(Child);
+pub(crate) struct Running(Child);
 
 impl Drop for Running {
     fn drop(&mut self) {
@@ -277,7 +280,7 @@ impl Drop for Running {
 
 impl Running {
     /// Starts a run and waits until its first rows are in the file.
-    fn start(args: &[&str], file: &Path) -> Self {
+    pub(crate) fn start(args: &[&str], file: &Path) -> Self {
         const PATIENCE: Duration = Duration::from_secs(20);
         let running = Self(tool(args).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap());
         let start = Instant::now();
@@ -288,13 +291,13 @@ impl Running {
         running
     }
 
-    fn signal(&self, name: &str) {
+    pub(crate) fn signal(&self, name: &str) {
         let status = Command::new("kill").args([name, &self.0.id().to_string()]).status().unwrap();
         assert!(status.success());
     }
 
     /// How long it took to end, and what it said.
-    fn end(mut self) -> (Duration, Said) {
+    pub(crate) fn end(mut self) -> (Duration, Said) {
         let start = Instant::now();
         let read = |pipe: &mut dyn std::io::Read| std::io::read_to_string(pipe).unwrap();
         let out = read(self.0.stdout.as_mut().unwrap());
@@ -325,7 +328,7 @@ fn ctrl_c_ends_an_endless_run_cleanly_and_soon() {
 #[test]
 fn help_names_every_option() {
     let shared = ["--bench <FILE>", "--set <KEY=VALUE>", "--color <WHEN>", "--verbose", "--help"];
-    let run = ["<GRAPH>", "--for <TIME>", "--realtime", "--out <FILE>", "Examples:"];
+    let run = ["<GRAPH>", "--for <TIME>", "--realtime", "--out <FILE>", "--ports", "--quiet", "Examples:"];
     let texts: [(&[&str], &[&str]); 3] = [
         (&["--help"], &["run ", "check ", "--color <WHEN>", "--version", "Exit codes: 0 all went well; 1 "]),
         (&["run", "--help"], &run),
@@ -384,7 +387,7 @@ fn the_readme_shows_what_the_tool_prints() {
     let readme = fs::read_to_string(tactflow_tests::workspace().join("README.md")).unwrap();
     let blocks: Vec<&str> = readme.split("```text\n").skip(1).map(|rest| rest.split("```").next().unwrap()).collect();
     let [run, mistake] = blocks.as_slice() else { panic!("the README shows {} outputs", blocks.len()) };
-    let out = say(&["run", PRESS]).out;
+    let out = say(&["run", HYBRID]).out;
     for line in run.lines() {
         assert!(out.lines().any(|printed| printed == line), "`{line}` is not printed");
     }

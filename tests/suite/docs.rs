@@ -242,7 +242,8 @@ fn every_link_of_the_pages_leads_somewhere() {
     let reference = fs::read_dir(docs.join("reference")).unwrap().map(|entry| entry.unwrap().path());
     let mut pages: Vec<PathBuf> = decisions.chain(reference).collect();
     pages.extend(
-        ["ARCHITECTURE.md", "calibration.md", "graph-files.md", "writing-a-node.md"].map(|name| docs.join(name)),
+        ["ARCHITECTURE.md", "calibration.md", "graph-files.md", "scenarios.md", "writing-a-node.md"]
+            .map(|name| docs.join(name)),
     );
     let mut links = 0;
     for page in pages {

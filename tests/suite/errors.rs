@@ -1,4 +1,4 @@
-//! Broken graphs: the expected message stands under the offending token, in the file itself.
+//! Broken graphs and scenarios: the expected message stands under the offending token, in the file itself.
 //!
 //! `#  ^^^^ code: message` speaks of the line above it, `#       help: …` and `#           | …` of the message above. With `TACTFLOW_BLESS=1`
 //! the comments are written anew; read the difference before you commit it.
@@ -9,6 +9,7 @@ use std::path::{Path, PathBuf};
 
 use tactflow_runtime::diagnostic::{Code, Diagnostic, Report};
 use tactflow_runtime::graph::{Request, Sources, plan};
+use tactflow_runtime::scenario::Scenario;
 use tactflow_tests::{catalogue, toml_files};
 
 /// Relative to this crate, where tests run: messages show paths as they are given.
@@ -64,7 +65,16 @@ fn annotated(path: &Path, reports: &[Report]) -> String {
     result
 }
 
+/// The broken graphs, and the broken scenarios.
+fn broken() -> Vec<PathBuf> {
+    [folder(), folder().join("scenarios")].iter().flat_map(|folder| toml_files(folder)).collect()
+}
+
 fn report(path: &Path) -> Report {
+    if path.parent().is_some_and(|folder| folder.ends_with("scenarios")) {
+        let loaded = Scenario::load(&catalogue(), path);
+        return loaded.err().unwrap_or_else(|| panic!("{} loads", path.display()));
+    }
     match plan(&catalogue(), &Request::file(path)) {
         Ok(plan) => plan.warnings().unwrap_or_else(|| panic!("{} loads, and nothing is said", path.display())),
         Err(report) => report,
@@ -74,7 +84,7 @@ fn report(path: &Path) -> Report {
 #[test]
 fn every_mistake_shows_on_its_token_and_nothing_else_does() {
     let is_blessing = std::env::var_os("TACTFLOW_BLESS").is_some();
-    let graphs = toml_files(&folder());
+    let graphs = broken();
     let reports: Vec<Report> = graphs.iter().map(|graph| report(graph)).collect();
     let beside = ["benches", "parts"].iter().flat_map(|name| toml_files(&folder().join(name)));
     let mut wrong = Vec::new();
@@ -93,7 +103,7 @@ fn every_mistake_shows_on_its_token_and_nothing_else_does() {
 #[test]
 fn every_code_has_a_file() {
     let mut seen = BTreeSet::new();
-    for graph in toml_files(&folder()) {
+    for graph in broken() {
         seen.extend(report(&graph).diagnostics.into_iter().map(|diagnostic| diagnostic.code));
     }
     let missing: Vec<_> = Code::ALL.iter().filter(|code| !seen.contains(code)).map(|code| code.name()).collect();
@@ -102,7 +112,7 @@ fn every_code_has_a_file() {
 
 #[test]
 fn no_mistake_is_told_twice() {
-    for graph in toml_files(&folder()) {
+    for graph in broken() {
         let report = report(&graph);
         let mut end = 0;
         for diagnostic in &report.diagnostics {

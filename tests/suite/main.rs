@@ -35,3 +35,5 @@ mod tick;
 mod tidy;
 mod tool;
 mod touch;
+mod verify;
+mod view;

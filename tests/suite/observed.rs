@@ -2,8 +2,9 @@
 
 use tactflow_runtime::engine::{self, Engine, RunOptions};
 use tactflow_runtime::graph::{Request, plan};
+use tactflow_runtime::harness::{GraphRig, Source};
 use tactflow_runtime::record::Columns;
-use tactflow_runtime::signal::Freshness;
+use tactflow_runtime::signal::{Freshness, Image, ImageShape, ScalarShape, Unit};
 use tactflow_tests::catalogue;
 
 const TASK: &str = r#"
@@ -64,4 +65,22 @@ fn a_port_that_is_cleared_is_lost_once_and_then_absent_until_it_is_written() {
     use Freshness::{Absent, Lost, New};
     // Touched from 20 ms to 40 ms, a sample each 4 ms.
     assert_eq!(course, [[Absent; 5].as_slice(), &[New; 5], &[Lost], &[Absent; 2]].concat());
+}
+
+#[test]
+fn a_run_goes_on_without_the_truth() {
+    let shape = ImageShape { rows: 2, cols: 2, pitch: [0.005; 2], unit: Unit::NEWTON };
+    let pad = Source { role: "pad", kind: "tactile_pad", period: 0.004, outputs: vec![shape.into()], commands: vec![] };
+    let newton = ScalarShape::of(Unit::NEWTON);
+    let truth =
+        Source { role: "truth", kind: "ground_truth", period: 0.004, outputs: vec![newton.into()], commands: vec![] };
+    let mut rig = GraphRig::new(catalogue(), TASK, vec![pad, truth]).unwrap_or_else(|r| panic!("{}", r.render(false)));
+    rig.feed("truth", 0, 0.0, 1.0);
+    for tick in 0..50 {
+        let ms = 4.0 * f64::from(tick);
+        rig.feed("pad", 0, ms, Image::from_cells(2, &[0.5, 0.0, 0.0, 1.5]));
+        rig.tick(ms).unwrap();
+    }
+    assert_eq!((rig.get("truth.force"), rig.get("source.sum")), (Some(&1.0), Some(&2.0)));
+    assert!(!rig.engine.is_halted(), "nobody waits for what no wire comes from");
 }

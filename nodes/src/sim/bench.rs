@@ -10,12 +10,12 @@ use std::collections::VecDeque;
 use tactflow_runtime::device::{Commands, Description, Device, DeviceError, Driver, Filled, Opened, Samples, Stepped};
 use tactflow_runtime::node::{Count, FilePath, Mistake, Mistakes, NonNegative, Positive, Rate};
 use tactflow_runtime::params;
-use tactflow_runtime::signal::{Image, ImageShape, Joint, Joints, JointsShape, Unit};
+use tactflow_runtime::signal::{Image, ImageShape, Joint, Joints, JointsShape, Kind, Pose, Scalar, ScalarShape, Unit};
 
 use super::contact::Contact;
 use super::foam::Foam;
 use super::imprint::Imprint;
-use super::joints::{Arm, Joint as SimJoint};
+use super::joints::{Arm, Joint as SimJoint, pose3};
 use super::object::{Object, Thing};
 use super::random::Random;
 use super::readout::{Electronics, Readout};
@@ -25,6 +25,7 @@ use crate::arm::model::load;
 use crate::arm::mount::Mount;
 use crate::devices::arm_facts::{check_start, facts};
 use crate::devices::{nanos, period_of};
+use crate::roles::ground_truth;
 
 params! {
     /// Seed of the noise and of where the objects are scattered.
@@ -51,6 +52,8 @@ params! {
     pressure: Positive = Positive(0.1),
     /// What the foam is like.
     foam: Foam = Foam::USUAL,
+    /// Distance of the points at which the pad is felt; a fine probe needs finer ones than a ball [m].
+    points_apart: Positive = Positive(0.001),
     /// What the electronics are like.
     electronics: Electronics = Electronics::USUAL,
     /// The arm's model.
@@ -113,7 +116,9 @@ pad yields and tilts under a load.\n\n\
 Objects stand where they are seen from the sensor at the start, z ahead of it: `at = [0.01, 0, 0.05]` is 1 cm to the \
 sensor's x and 5 cm before it. They are fixed, stand on a `mount` that gives way, or move as their `motion` says.\n\n\
 It lives in virtual time, and the same commands and seed give the same bits; with `--realtime` it is paced by the clock. \
-As `ground_truth` it gives what no sensor knows, to scenarios and records only.\n\n\
+The pad states the facts `dead`, `threshold`, `pressure` and `calibration`, and of its noise `common_noise`, the \
+standard deviation that all tactels share, as a part of what they read, and `own_noise`, each tactel's own [raw]. The arm \
+states `urdf`, `tip` and `mount`. As `ground_truth` it gives what no sensor knows, to scenarios and records only.\n\n\
 Left out: gravity and the coupling of the joints, objects that turn, columns of foam that push each other, wear and \
 temperature.";
     const EXAMPLE: &'static str = r#"
@@ -147,7 +152,7 @@ objects = [
         check_start(&joints, &params.start)?;
         let shape = ImageShape { rows: params.rows.0, cols: params.cols.0, pitch: [*params.pitch; 2], unit: Unit::RAW };
         check(&params, &shape)?;
-        let fills = vec![pad(&params, &shape)?, arm(&params, &joints)?];
+        let fills = vec![pad(&params, &shape)?, arm(&params, &joints)?, truth(&shape)];
         let period = period_of(params.rate_hz);
         let description = Description { fills, period: period as f64 * 1e-9 };
         let bench = Self::new(params, chain, joints, shape, period)?;
@@ -172,6 +177,9 @@ fn check(params: &Params, shape: &ImageShape) -> Result<(), Mistakes> {
     let foam = &params.foam;
     if *foam.static_friction < *foam.sliding_friction {
         mistakes.push(Mistake::param("foam.static_friction", "friction at rest is not less than in motion"));
+    }
+    if !(0.0001..=0.001).contains(&*params.points_apart) {
+        mistakes.push(Mistake::param("points_apart", "the points of the pad are 0.0001 to 0.001 m apart"));
     }
     if *params.step_s > 0.002 {
         mistakes.push(Mistake::param("step_s", "the foam's motion needs steps of 0.002 s or less"));
@@ -211,6 +219,8 @@ fn pad(params: &Params, shape: &ImageShape) -> Result<Filled, Mistakes> {
         ("threshold".into(), (*params.threshold).into()),
         ("pressure".into(), (*params.pressure).into()),
         ("calibration".into(), calibration.into()),
+        ("common_noise".into(), (*params.electronics.common_noise).into()),
+        ("own_noise".into(), (*params.electronics.own_noise).into()),
     ];
     Ok(Filled { role: "tactile_pad".into(), outputs: vec![shape.clone().into()], commands: vec![], facts })
 }
@@ -223,6 +233,22 @@ fn arm(params: &Params, joints: &[Joint]) -> Result<Filled, Mistakes> {
         commands: vec![shape.in_unit(Unit::RADIAN.per_second()).into()],
         facts: facts(&params.urdf, &params.tip, &params.mount)?,
     })
+}
+
+/// Number of the first port of the ground truth.
+const TRUTH: usize = 3;
+/// Which of its ports is the image.
+const IMAGE: usize = 9;
+
+fn truth(shape: &ImageShape) -> Filled {
+    let role = ground_truth();
+    let outputs = role.outputs.iter().map(|port| match port.args.first() {
+        Some(unit) if port.kind == Kind::Scalar => {
+            ScalarShape::of(unit.parse().expect("the role's units are units")).into()
+        }
+        _ => ImageShape { unit: Unit::NEWTON, ..shape.clone() }.into(),
+    });
+    Filled { outputs: outputs.collect(), commands: vec![], facts: vec![], role: role.name.clone() }
 }
 
 impl SimBench {
@@ -242,7 +268,7 @@ impl SimBench {
             Object::new(thing, from, [scatter.uniform(-most, most), scatter.uniform(-most, most)])
         };
         let objects = params.objects.iter().map(place).collect::<Result<Vec<_>, _>>()?;
-        let contact = Contact::new(shape.clone(), params.foam.clone());
+        let contact = Contact::new(shape.clone(), params.foam.clone(), *params.points_apart);
         let imprint = Imprint::new(&shape, contact.fine(), *params.foam.spread);
         let readout = Readout::new(shape.tactels(), params.electronics, params.seed);
         let world = World::new(arm, objects, contact, imprint, shape, *params.step_s);
@@ -308,6 +334,42 @@ impl Stepped for SimBench {
         let arm = &self.world.arm;
         samples.write::<Joints>(1, now, self.sequence).0.copy_from_slice(&arm.position);
         samples.write::<Joints>(2, now, self.sequence).0.copy_from_slice(&arm.equilibrium);
+        self.tell(now, commands.report::<Pose>(0), samples);
         Ok(())
+    }
+}
+
+impl SimBench {
+    /// Gives the ground truth, in the order of the role's outputs.
+    fn tell(&mut self, now: i64, report: Option<&Pose>, samples: &mut Samples) {
+        let measured = report.and_then(|pose| self.world.measure(pose3(pose).translation));
+        let truth = self.world.truth(self.threshold);
+        let noise = truth.pressure.map(|pressure| self.readout.noise(pressure, truth.tactels));
+        let values = [
+            Some(truth.force),
+            Some(truth.tangential),
+            Some(truth.peak),
+            truth.middle.map(|[x, _]| x),
+            truth.middle.map(|[_, y]| y),
+            truth.pressure,
+            truth.orientation,
+            Some(truth.area),
+            Some(truth.depth),
+            None,
+            truth.tilt,
+            measured.and_then(|measured| measured.path),
+            measured.map(|measured| measured.distance),
+            self.world.coverage(),
+            noise.map(|[common, _]| common),
+            noise.map(|[_, own]| own),
+        ];
+        for (port, value) in values.into_iter().enumerate().filter(|(port, _)| *port != IMAGE) {
+            match value {
+                Some(value) => *samples.write::<Scalar>(TRUTH + port, now, self.sequence) = value,
+                None => samples.clear(TRUTH + port, now, self.sequence),
+            }
+        }
+        let cells = samples.write::<Image>(TRUTH + IMAGE, now, self.sequence).cells_mut();
+        cells.iter_mut().zip(self.world.image()).for_each(|(cell, force)| *cell = *force as f32);
     }
 }

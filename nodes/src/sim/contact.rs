@@ -1,6 +1,6 @@
 //! The foam against the objects: how deep each point of the pad is pressed in, and what that does to the pad.
 //!
-//! Every tactel has 5 by 5 points or more, no more than 1 mm apart, each the end of a column of foam. The depth of a
+//! Every tactel of 5 mm has 5 by 5 points or more, no more than 1 mm apart, each the end of a column of foam. The depth of a
 //! column is found by a ray through it, from the plate outward. Its force f acts along the pad's z; the object's
 //! surface, of normal n, is without friction at such a point, so the pad feels f n / |n_z|: the gradient of the energy of
 //! the columns, and no more work comes out than went in.
@@ -10,14 +10,12 @@
 //!
 //! What is far from every object is culled, by blocks of 4 by 4 tactels, then by tactels.
 
-use parry3d_f64::math::{Pose3, Vec3};
+use parry3d_f64::math::{Mat3, Pose3, Vec3};
 use tactflow_runtime::signal::ImageShape;
 
 use super::foam::{Column, Foam};
 use super::object::Object;
 
-/// Greatest distance of two points [m].
-const POINTS_APART: f64 = 0.001;
 /// Speed over which friction falls from that at rest to that in motion [m/s].
 const STRIBECK: f64 = 0.001;
 /// Tactels along a block.
@@ -64,6 +62,8 @@ pub struct Contact {
     slots: Vec<u32>,
     /// Tactels of a row that may touch an object.
     near: Vec<usize>,
+    /// How each object moves over the pad.
+    slides: Vec<Slide>,
     /// What acts on the pad at its origin, in the base.
     wrench: Wrench,
 }
@@ -77,9 +77,29 @@ pub struct Touch {
     pub force: f64,
     /// Indentation [m].
     pub depth: f64,
+    /// Normal of the object there, out of it, in the pad's frame.
+    pub normal: Vec3,
     object: usize,
-    /// Of the object, in the base.
-    normal: Vec3,
+    tactel: usize,
+}
+
+/// How an object moves over the pad: the velocity of its point at the pad's origin, and its turn, in the pad's frame.
+#[derive(Debug, Clone, Copy)]
+struct Slide {
+    linear: Vec3,
+    angular: Vec3,
+}
+
+impl Slide {
+    fn of(object: &Object, pad: &Motion) -> Self {
+        let local = |v: Vec3| pad.pose.inverse_transform_vector(v);
+        let linear = object.velocity_at(pad.pose.translation) - pad.linear;
+        Self { linear: local(linear), angular: local(object.spin() - pad.angular) }
+    }
+
+    fn at(&self, place: Vec3) -> Vec3 {
+        self.linear + self.angular.cross(place)
+    }
 }
 
 /// A tactel's friction.
@@ -104,11 +124,11 @@ impl Touch {
 const NONE: u32 = u32::MAX;
 
 impl Contact {
-    /// A pad that touches nothing.
+    /// A pad that touches nothing, felt at points that are `apart` at most [m].
     #[must_use]
-    pub fn new(shape: ImageShape, foam: Foam) -> Self {
+    pub fn new(shape: ImageShape, foam: Foam, apart: f64) -> Self {
         let side = shape.pitch[0].max(shape.pitch[1]);
-        let fine = (side / POINTS_APART - 1e-9).ceil().max(1.0) as usize;
+        let fine = (side / apart - 1e-9).ceil().max(1.0) as usize;
         let area = shape.pitch[0] * shape.pitch[1];
         let points = fine * fine;
         let along = |point: usize| (point as f64 + 0.5) / fine as f64 - 0.5;
@@ -122,6 +142,7 @@ impl Contact {
             xs: (0..shape.cols * fine).map(|point| shape.x(along(point))).collect(),
             ys: (0..shape.rows * fine).map(|point| shape.y(along(point))).collect(),
             near: Vec::with_capacity(shape.cols),
+            slides: Vec::new(),
             wrench: Wrench::default(),
             shape,
             foam,
@@ -169,6 +190,8 @@ impl Contact {
         for touch in self.touching.drain(..) {
             self.slots[touch.point[0] * self.xs.len() + touch.point[1]] = NONE;
         }
+        self.slides.clear();
+        self.slides.extend(objects.iter().map(|object| Slide::of(object, pad)));
         for (index, object) in objects.iter().enumerate() {
             self.find(pad, index, object);
         }
@@ -177,9 +200,13 @@ impl Contact {
             self.touching.sort_unstable_by_key(|touch| touch.point);
         }
         loads.fill(Vec3::ZERO);
-        self.wrench = Wrench::default();
-        self.press(pad, objects, loads);
-        self.rub(dt, pad, objects, loads);
+        let mut wrench = Wrench::default();
+        self.press(objects, &mut wrench, loads);
+        self.rub(dt, &mut wrench, loads);
+        // From the pad's frame to the base's.
+        let turn = pad.pose.rotation;
+        self.wrench = Wrench { force: turn * wrench.force, moment: turn * wrench.moment };
+        loads.iter_mut().for_each(|load| *load = turn * *load);
     }
 
     /// Finds the points that an object touches.
@@ -187,6 +214,7 @@ impl Contact {
         let thickness = *self.foam.thickness;
         let local = |v: Vec3| object.pose.rotation.inverse() * (pad.pose.rotation * v);
         let ray = Rays {
+            to_pad: Mat3::from_quat(pad.pose.rotation.inverse() * object.pose.rotation),
             origin: object.pose.inverse_transform_point(pad.pose.translation) - local(Vec3::Z) * thickness,
             axes: [local(Vec3::X), local(Vec3::Y), local(Vec3::Z)],
             thickness,
@@ -209,75 +237,63 @@ impl Contact {
 
     /// Finds the points of a row of tactels that an object touches, among those that are near.
     fn find_in_row(&mut self, row: usize, ray: &Rays, index: usize, object: &Object) {
-        let fine = self.fine;
+        let (fine, width) = (self.fine, self.xs.len());
         for y in row * fine..(row + 1) * fine {
             let from = ray.origin + ray.axes[1] * self.ys[y];
-            for x in self.near.iter().flat_map(|j| j * fine..(j + 1) * fine) {
-                let origin = from + ray.axes[0] * self.xs[x];
-                let Some(hit) = object.shape.cast(origin, ray.axes[2], ray.thickness) else { continue };
-                let depth = ray.thickness - hit.time;
-                let touch = Touch {
-                    point: [y, x],
-                    force: 0.0,
-                    depth,
-                    object: index,
-                    normal: object.pose.rotation * hit.normal,
-                };
-                let slot = &mut self.slots[y * self.xs.len() + x];
-                if *slot == NONE {
-                    *slot = self.touching.len() as u32;
-                    self.touching.push(touch);
-                } else if self.touching[*slot as usize].depth < depth {
-                    self.touching[*slot as usize] = touch;
+            for &near in &self.near {
+                let tactel = row * self.shape.cols + near;
+                for x in near * fine..(near + 1) * fine {
+                    let origin = from + ray.axes[0] * self.xs[x];
+                    let Some(hit) = object.shape.cast(origin, ray.axes[2], ray.thickness) else { continue };
+                    let depth = ray.thickness - hit.time;
+                    let normal = ray.to_pad * hit.normal;
+                    let touch = Touch { point: [y, x], force: 0.0, depth, normal, object: index, tactel };
+                    let slot = &mut self.slots[y * width + x];
+                    if *slot == NONE {
+                        *slot = self.touching.len() as u32;
+                        self.touching.push(touch);
+                    } else if self.touching[*slot as usize].depth < depth {
+                        self.touching[*slot as usize] = touch;
+                    }
                 }
             }
         }
     }
 
-    /// The forces of the columns.
-    fn press(&mut self, pad: &Motion, objects: &[Object], loads: &mut [Vec3]) {
-        let z = pad.pose.rotation * Vec3::Z;
-        let [x_axis, y_axis] = [pad.pose.rotation * Vec3::X, pad.pose.rotation * Vec3::Y];
+    /// The forces of the columns, in the pad's frame.
+    fn press(&mut self, objects: &[Object], wrench: &mut Wrench, loads: &mut [Vec3]) {
         // A point's part of a tactel is softer by as much as it is smaller.
         let parts = (self.fine * self.fine) as f64 * (0.005 * 0.005) / (self.shape.pitch[0] * self.shape.pitch[1]);
         self.tactels.iter_mut().for_each(|tactel| tactel.normal = 0.0);
-        for at in 0..self.touching.len() {
-            let touch = self.touching[at];
-            let [x, y] = self.place(touch.point);
-            let arm = x_axis * x + y_axis * y - z * touch.depth;
-            let object = &objects[touch.object];
-            let relative = object.velocity - (pad.linear + pad.angular.cross(arm));
-            let facing = (-touch.normal.dot(z)).max(STEEPEST);
-            let rate = touch.normal.dot(relative) / facing;
-            let force = self.column.force(touch.depth, rate, object.softness * parts);
-            let push = touch.normal * (force / facing);
-            self.wrench.force += push;
-            self.wrench.moment += arm.cross(push);
+        for touch in &mut self.touching {
+            let place = Vec3::new(self.xs[touch.point[1]], self.ys[touch.point[0]], -touch.depth);
+            let facing = (-touch.normal.z).max(STEEPEST);
+            let rate = touch.normal.dot(self.slides[touch.object].at(place)) / facing;
+            touch.force = self.column.force(touch.depth, rate, objects[touch.object].softness * parts);
+            let push = touch.normal * (touch.force / facing);
+            wrench.force += push;
+            wrench.moment += place.cross(push);
             loads[touch.object] -= push;
-            self.touching[at].force = force;
-            let tactel = &mut self.tactels[touch.point[0] / self.fine * self.shape.cols + touch.point[1] / self.fine];
-            tactel.normal += force;
+            let tactel = &mut self.tactels[touch.tactel];
+            tactel.normal += touch.force;
             tactel.object = touch.object;
         }
     }
 
-    /// The forces of the bristles.
-    fn rub(&mut self, dt: f64, pad: &Motion, objects: &[Object], loads: &mut [Vec3]) {
-        let [x_axis, y_axis] = [pad.pose.rotation * Vec3::X, pad.pose.rotation * Vec3::Y];
+    /// The forces of the bristles, in the pad's frame.
+    fn rub(&mut self, dt: f64, wrench: &mut Wrench, loads: &mut [Vec3]) {
         let cols = self.shape.cols;
         for (index, tactel) in self.tactels.iter_mut().enumerate() {
             if tactel.normal == 0.0 {
                 (tactel.shear, tactel.friction) = ([0.0; 2], [0.0; 2]);
                 continue;
             }
-            let (x, y) = (self.shape.x((index % cols) as f64), self.shape.y((index / cols) as f64));
-            let arm = x_axis * x + y_axis * y;
-            let relative = pad.linear + pad.angular.cross(arm) - objects[tactel.object].velocity;
-            let velocity = [relative.dot(x_axis), relative.dot(y_axis)];
-            tactel.rub(dt, velocity, self.shear, &self.foam);
-            let push = x_axis * tactel.friction[0] + y_axis * tactel.friction[1];
-            self.wrench.force += push;
-            self.wrench.moment += arm.cross(push);
+            let place = Vec3::new(self.shape.x((index % cols) as f64), self.shape.y((index / cols) as f64), 0.0);
+            let slide = -self.slides[tactel.object].at(place);
+            tactel.rub(dt, [slide.x, slide.y], self.shear, &self.foam);
+            let push = Vec3::new(tactel.friction[0], tactel.friction[1], 0.0);
+            wrench.force += push;
+            wrench.moment += place.cross(push);
             loads[tactel.object] -= push;
         }
     }
@@ -316,6 +332,8 @@ struct Rays {
     /// The pad's.
     axes: [Vec3; 3],
     thickness: f64,
+    /// From the object's frame to the pad's.
+    to_pad: Mat3,
 }
 
 impl Rays {

@@ -55,8 +55,14 @@ impl Imprint {
         }
     }
 
-    /// The force on each tactel [N] under these points, sorted by their rows.
-    pub fn of(&mut self, touching: &[Touch]) -> &[f64] {
+    /// The force on each tactel, as it was last taken [N].
+    #[must_use]
+    pub fn forces(&self) -> &[f64] {
+        &self.image
+    }
+
+    /// Takes the imprint of these points, sorted by their rows.
+    pub fn take(&mut self, touching: &[Touch]) {
         self.image.fill(0.0);
         for line in touching.chunk_by(|a, b| a.point[0] == b.point[0]) {
             self.row.fill(0.0);
@@ -70,6 +76,5 @@ impl Imprint {
                 row.iter_mut().zip(&self.row).for_each(|(cell, load)| *cell += share * load);
             }
         }
-        &self.image
     }
 }

@@ -60,7 +60,9 @@ params! {
     /// When it ends [s].
     to_s: NonNegative,
     /// By how much, in the sensor's axes at the start [m].
-    by: [f64; 3],
+    by: [f64; 3] = [0.0; 3],
+    /// By how much it is turned about its middle, about the sensor's z at the start [rad].
+    turn: f64 = 0.0,
 }
 
 /// An object in the base.
@@ -69,14 +71,27 @@ pub struct Object {
     /// How much its surface gives way under a tactel of 5 mm by 5 mm [m/N].
     pub(super) softness: f64,
     home: Pose3,
-    moves: Vec<(f64, f64, Vec3)>,
+    script: Vec<Step>,
+    /// What it is turned about, in the base.
+    axis: Vec3,
     /// Stiffness of the mount [N/m], and the mass on it [kg].
     mount: Option<(f64, f64)>,
     /// How far the mount has given way [m].
     sag: Vec3,
     sag_speed: Vec3,
     pub(super) pose: Pose3,
-    pub(super) velocity: Vec3,
+    velocity: Vec3,
+    /// [rad/s]
+    spin: f64,
+}
+
+/// A step of the script.
+struct Step {
+    from: f64,
+    to: f64,
+    /// In the base.
+    by: Vec3,
+    turn: f64,
 }
 
 /// Damping of a mount, of the critical.
@@ -95,18 +110,24 @@ impl Object {
         }
         let at = Vec3::from(thing.at) + Vec3::new(offset[0], offset[1], 0.0);
         let home = start * Pose3::from_parts(at, turned(thing.turn));
-        let moves =
-            thing.motion.iter().map(|step| (*step.from_s, *step.to_s, start.rotation * Vec3::from(step.by))).collect();
+        let step = |step: &Move| Step {
+            from: *step.from_s,
+            to: *step.to_s,
+            by: start.rotation * Vec3::from(step.by),
+            turn: step.turn,
+        };
         Ok(Self {
             shape,
             softness: thing.stiffness.map_or(0.0, |stiffness| 1.0 / *stiffness),
             home,
-            moves,
+            script: thing.motion.iter().map(step).collect(),
+            axis: start.rotation * Vec3::Z,
             mount: thing.mount.map(|stiffness| (*stiffness, *thing.mass)),
             sag: Vec3::ZERO,
             sag_speed: Vec3::ZERO,
             pose: home,
             velocity: Vec3::ZERO,
+            spin: 0.0,
         })
     }
 
@@ -118,13 +139,31 @@ impl Object {
             self.sag += self.sag_speed * dt;
         }
         let (mut place, mut velocity) = (self.home.translation + self.sag, self.sag_speed);
-        for (from, to, by) in &self.moves {
-            let (share, rate) = eased((time - from) / (to - from));
-            place += *by * share;
-            velocity += *by * (rate / (to - from));
+        let (mut turn, mut spin) = (0.0, 0.0);
+        for step in &self.script {
+            let span = step.to - step.from;
+            let (share, rate) = eased((time - step.from) / span);
+            place += step.by * share;
+            velocity += step.by * (rate / span);
+            turn += step.turn * share;
+            spin += step.turn * rate / span;
         }
-        self.pose.translation = place;
-        self.velocity = velocity;
+        let (sin, cos) = libm::sincos(turn / 2.0);
+        let turned = Rot3::from_xyzw(self.axis.x * sin, self.axis.y * sin, self.axis.z * sin, cos);
+        self.pose = Pose3::from_parts(place, turned * self.home.rotation);
+        (self.velocity, self.spin) = (velocity, spin);
+    }
+
+    /// How fast it moves at a point in the base [m/s].
+    #[must_use]
+    pub fn velocity_at(&self, point: Vec3) -> Vec3 {
+        self.velocity + self.spin().cross(point - self.pose.translation)
+    }
+
+    /// How it turns, in the base [rad/s].
+    #[must_use]
+    pub fn spin(&self) -> Vec3 {
+        self.axis * self.spin
     }
 
     /// The energy of the mount and of the mass on it [J].

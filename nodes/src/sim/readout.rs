@@ -26,9 +26,9 @@ params! {
     /// Time that creep takes [s].
     creep_s: Positive = Positive(15.0),
     /// Standard deviation of the noise that all tactels have in common, of what is read.
-    common_noise: NonNegative = NonNegative(0.038),
+    common_noise: NonNegative = NonNegative(0.036),
     /// Standard deviation of each tactel's own noise [counts].
-    own_noise: NonNegative = NonNegative(4.0),
+    own_noise: NonNegative = NonNegative(3.0),
 }
 
 impl Electronics {
@@ -41,8 +41,8 @@ impl Electronics {
         hysteresis: Ratio(0.06),
         creep: Ratio(0.03),
         creep_s: Positive(15.0),
-        common_noise: NonNegative(0.038),
-        own_noise: NonNegative(4.0),
+        common_noise: NonNegative(0.036),
+        own_noise: NonNegative(3.0),
     };
 }
 
@@ -103,6 +103,18 @@ impl Readout {
             let noise = *electronics.own_noise * self.noise.normal();
             *count = (tactel.offset + answer * common + noise).round().clamp(0.0, TOP) as f32;
         }
+    }
+}
+
+impl Readout {
+    /// Standard deviation that both shares of the noise, the common one and the tactels' own, give the mean force of
+    /// `tactels` tactels, of `pressure` on average [N per tactel].
+    #[must_use]
+    pub fn noise(&self, pressure: f64, tactels: usize) -> [f64; 2] {
+        let electronics = &self.electronics;
+        // The slope of the curve that is neither more nor less sensitive than others.
+        let slope = *electronics.range / *electronics.squash * libm::exp(-pressure / *electronics.squash);
+        [*electronics.common_noise * pressure, *electronics.own_noise / slope / (tactels as f64).sqrt()]
     }
 }
 
@@ -192,9 +204,9 @@ mod tests {
             (values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / values.len() as f64).sqrt()
         };
         let means: Vec<f64> = frames.iter().map(|f| f.iter().map(|v| f64::from(*v)).sum::<f64>() / 256.0).collect();
-        assert!((std(&means) / answer / 0.038 - 1.0).abs() < 0.06, "{}", std(&means) / answer);
+        assert!((std(&means) / answer / 0.036 - 1.0).abs() < 0.06, "{}", std(&means) / answer);
         let own: Vec<f64> = frames.iter().zip(&means).map(|(f, mean)| f64::from(f[7]) - mean).collect();
-        assert!((std(&own) / 4.0 - 1.0).abs() < 0.06, "{}", std(&own));
+        assert!((std(&own) / 3.0 - 1.0).abs() < 0.06, "{}", std(&own));
     }
 
     #[test]

@@ -57,7 +57,7 @@ impl Truth {
             orientation: orientation(pad, objects, shape),
             area: contact.touching().len() as f64 * area,
             depth: contact.touching().iter().fold(0.0, |depth: f64, touch| depth.max(touch.depth)),
-            tilt: tilt(pad, contact, force),
+            tilt: tilt(contact, force),
         }
     }
 }
@@ -93,9 +93,8 @@ fn orientation(pad: &Motion, objects: &[Object], shape: &ImageShape) -> Option<f
     (is_under && along.x * along.x + along.y * along.y > 1e-6).then_some(axial)
 }
 
-fn tilt(pad: &Motion, contact: &Contact, force: f64) -> Option<f64> {
-    let normal = contact.touching().iter().fold(Vec3::ZERO, |sum, touch| sum + touch.normal() * touch.force);
-    let inward = -normal.normalize_or_zero();
-    let cos = inward.dot(pad.pose.rotation * Vec3::Z);
+fn tilt(contact: &Contact, force: f64) -> Option<f64> {
+    let normal = contact.touching().iter().fold(Vec3::ZERO, |sum, touch| sum + touch.normal * touch.force);
+    let cos = -normal.normalize_or_zero().z;
     (force > 0.0).then(|| libm::acos(cos.clamp(-1.0, 1.0)))
 }

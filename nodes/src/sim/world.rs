@@ -7,6 +7,7 @@ use super::contact::{Contact, Motion};
 use super::imprint::Imprint;
 use super::joints::Arm;
 use super::object::Object;
+use super::survey::{Measured, Survey, measure};
 use super::truth::Truth;
 
 /// Everything that has mass, gives way or is touched.
@@ -22,6 +23,10 @@ pub struct World {
     time: f64,
     /// Longest step [s].
     longest: f64,
+    /// What has been measured of the first object that has an end.
+    survey: Option<(usize, Survey)>,
+    /// Whether the imprint is of an earlier time.
+    is_old: bool,
 }
 
 impl World {
@@ -36,7 +41,10 @@ impl World {
         longest: f64,
     ) -> Self {
         let loads = vec![Vec3::ZERO; objects.len()];
-        Self { arm, objects, contact, imprint, shape, loads, time: 0.0, longest }
+        let from = start(&arm);
+        let surveys = objects.iter().enumerate().filter_map(|(i, object)| Some((i, Survey::new(object, from)?)));
+        let survey = surveys.take(1).next();
+        Self { survey, arm, objects, contact, imprint, shape, loads, time: 0.0, longest, is_old: true }
     }
 
     /// Goes on to `time` [s] with the joints' equilibrium moving at `velocity` [rad/s].
@@ -52,6 +60,7 @@ impl World {
             self.arm.step(dt, velocity, &self.contact.wrench());
         }
         self.time = time;
+        self.is_old = true;
     }
 
     /// Where the pad is and how it moves.
@@ -62,14 +71,31 @@ impl World {
 
     /// The clean image [N].
     pub fn image(&mut self) -> &[f64] {
-        self.imprint.of(self.contact.touching())
+        if std::mem::take(&mut self.is_old) {
+            self.imprint.take(self.contact.touching());
+        }
+        self.imprint.forces()
     }
 
     /// What is true now; tactels count from `threshold` [N].
     pub fn truth(&mut self, threshold: f64) -> Truth {
+        self.image();
         let pad = self.arm.motion();
-        let clean = self.imprint.of(self.contact.touching());
-        Truth::of(&pad, &self.contact, &self.objects, &self.shape, clean, threshold)
+        Truth::of(&pad, &self.contact, &self.objects, &self.shape, self.imprint.forces(), threshold)
+    }
+
+    /// What a point in the base that the graph has measured is worth; it counts for the coverage.
+    pub fn measure(&mut self, point: Vec3) -> Option<Measured> {
+        if let Some((object, survey)) = &mut self.survey {
+            survey.add(&self.objects[*object], point);
+        }
+        measure(&self.objects, self.arm.motion().pose, point)
+    }
+
+    /// Share of the surface that has been measured; none if the object has no end.
+    #[must_use]
+    pub fn coverage(&self) -> Option<f64> {
+        self.survey.as_ref().map(|(_, survey)| survey.coverage())
     }
 
     /// The energy that is stored in motion, springs, foam and friction [J].

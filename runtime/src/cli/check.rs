@@ -9,6 +9,7 @@ use super::json::{Diagnosed, diagnosed};
 use super::{NOT_LOADED, OnArgs, Shell};
 use crate::diagnostic::Report;
 use crate::graph::{Plan, plan};
+use crate::scenario::Scenario;
 
 /// Check graphs like a compiler would, without running them
 #[derive(clap::Parser)]
@@ -19,7 +20,7 @@ use crate::graph::{Plan, plan};
   tactflow check graphs/hybrid.toml --bench benches/lab.toml --deny-warnings"
 )]
 pub(super) struct Check {
-    /// The graph files
+    /// The graph files, and scenarios
     #[arg(required = true)]
     graphs: Vec<PathBuf>,
     #[command(flatten)]
@@ -36,6 +37,12 @@ pub(super) fn check(args: Check, shell: &Shell) -> u8 {
     let mut code = 0;
     let mut checked = Vec::new();
     for graph in &args.graphs {
+        if is_scenario(graph) {
+            let (scenario, checked_as) = scenario(graph, &args, shell);
+            code = code.max(scenario);
+            checked.extend(checked_as);
+            continue;
+        }
         let result = plan(shell.catalogue(), &args.on.request(graph.clone()));
         let (report, figures) = match &result {
             Ok(plan) => (plan.warnings(), Some(Figures::of(plan))),
@@ -60,6 +67,31 @@ pub(super) fn check(args: Check, shell: &Shell) -> u8 {
         shell.say_json(&checked);
     }
     code
+}
+
+/// Whether a file is a scenario; what cannot be read is told of as a graph.
+fn is_scenario(path: &Path) -> bool {
+    std::fs::read_to_string(path).is_ok_and(|text| Scenario::is_one(&text))
+}
+
+/// Checks a scenario with its task and its bench: the exit code, and what the JSON says.
+fn scenario(path: &Path, args: &Check, shell: &Shell) -> (u8, Option<Checked>) {
+    if args.on.bench.is_some() || !args.on.set.is_empty() {
+        shell.error(format_args!("`{}` is a scenario: it names its bench, and sets nothing", path.display()));
+        return (NOT_LOADED, None);
+    }
+    let loaded = Scenario::load(shell.catalogue(), path);
+    let code = if loaded.is_ok() { 0 } else { NOT_LOADED };
+    match (&loaded, args.format) {
+        (_, Format::Json) => return (code, Some(Checked::of(path, loaded.is_ok(), loaded.as_ref().err(), None))),
+        (Ok(scenario), Format::Text) => {
+            let (runs, length) = (scenario.runs().len(), scenario.for_s);
+            let runs = if runs == 1 { "1 run".to_owned() } else { format!("{runs} runs") };
+            shell.say(&format!("{}: ok, a scenario of {runs}, {length} s each; `verify` runs it", path.display()));
+        }
+        (Err(report), Format::Text) => shell.show(report),
+    }
+    (code, None)
 }
 
 /// What the JSON says of one graph.

@@ -13,6 +13,7 @@
 //! [`derived`] makes one from arguments that clap derives.
 #![allow(clippy::print_stderr, reason = "this is where the tool speaks")]
 
+mod chart;
 mod check;
 mod completions;
 mod course;
@@ -23,6 +24,7 @@ mod json;
 mod list;
 mod log;
 mod page;
+mod picture;
 mod progress;
 mod prose;
 mod reference;
@@ -31,6 +33,8 @@ mod shell;
 mod show;
 mod summary;
 mod timeline;
+mod verify;
+mod view;
 
 use std::marker::PhantomData;
 use std::path::PathBuf;
@@ -46,7 +50,7 @@ use crate::graph::Request;
 pub use clap;
 pub use example::example;
 pub use reference::reference;
-pub use run::{Job, duration};
+pub use run::{Job, Print, duration};
 use shell::Colour;
 pub use shell::Shell;
 
@@ -107,8 +111,10 @@ impl<A: CommandFactory + FromArgMatches, F: Fn(A, &Shell) -> u8> Subcommand for 
 #[derive(Parser)]
 #[command(name = "tactflow", version, max_term_width = 100)]
 #[command(subcommand_required = true, arg_required_else_help = true)]
-#[command(after_help = "Exit codes: 0 all went well; 1 the run ended in a fault; 2 a file does not load, or the \
-                       command line is not understood.")]
+#[command(
+    after_help = "Exit codes: 0 all went well; 1 the run ended in a fault, or a scenario is not met; 2 a file does not load, or the \
+                       command line is not understood."
+)]
 struct Cli {
     /// When to use colours; `auto` means on a terminal, unless NO_COLOR is set
     #[arg(long, global = true, value_enum, default_value_t = Colour::Auto, value_name = "WHEN")]
@@ -150,6 +156,7 @@ impl Tool {
             commands: vec![
                 derived(run::run),
                 derived(check::check),
+                derived(verify::verify),
                 derived(list::list),
                 derived(describe::describe),
                 derived(show::show),

@@ -29,6 +29,8 @@ pub(super) struct Item {
 
 /// As wide as a page gets.
 const WIDEST: usize = 100;
+/// On what is narrower nothing is drawn.
+const NARROWEST: usize = 40;
 /// As wide as the column of names gets.
 const WIDEST_NAME: usize = 24;
 
@@ -43,7 +45,12 @@ impl Look {
     /// As the terminal is, if there is one.
     pub(super) fn new(has_colour: bool) -> Self {
         let width = terminal_size::terminal_size().map_or(WIDEST, |(width, _)| usize::from(width.0));
-        Self { width: width.clamp(40, WIDEST), has_colour }
+        Self { width: width.clamp(NARROWEST, WIDEST), has_colour }
+    }
+
+    /// On a terminal of that width, if it is wide enough.
+    pub(super) fn of_width(width: usize, has_colour: bool) -> Option<Self> {
+        (width >= NARROWEST).then_some(Self { width: width.min(WIDEST), has_colour })
     }
 
     /// The blocks as text.

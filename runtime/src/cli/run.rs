@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use super::check::milliseconds;
 use super::log::Log;
 use super::progress::Progress;
+use super::prose::Look;
 use super::summary::Summary;
 use super::{FAULTED, NOT_LOADED, OnArgs, Shell};
 use crate::engine::{self, End, Engine, Outcome, RunOptions};
@@ -46,12 +47,34 @@ pub(super) struct Run {
     /// Write a row a tick and a column a scalar, as .csv or .ndjson
     #[arg(short, long, value_name = "FILE")]
     out: Option<PathBuf>,
+    /// Print a line for every port and the time of every node, instead of what the graph shows
+    #[arg(long)]
+    ports: bool,
+    /// Print neither how far it is nor what came out; only what goes wrong
+    #[arg(short, long, conflicts_with = "ports")]
+    quiet: bool,
 }
 
 pub(super) fn run(args: Run, shell: &Shell) -> u8 {
     let title = args.graph.display().to_string();
-    let Run { graph, on, duration, realtime, send, listen, out } = args;
-    Job { request: on.request(graph), title, duration, realtime, send, listen, out }.run(shell)
+    let Run { graph, on, duration, realtime, send, listen, out, ports, quiet } = args;
+    let print = match (ports, quiet) {
+        (true, _) => Print::Ports,
+        (_, true) => Print::Nothing,
+        _ => Print::Page,
+    };
+    Job { request: on.request(graph), title, duration, realtime, send, listen, out, print }.run(shell)
+}
+
+/// What a run prints.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Print {
+    /// What the graph shows.
+    Page,
+    /// A line for every port, and one for every node.
+    Ports,
+    /// Nothing but what goes wrong.
+    Nothing,
 }
 
 /// A run of a graph from the command line.
@@ -70,6 +93,8 @@ pub struct Job {
     pub listen: bool,
     /// Where each tick is recorded, as .csv or .ndjson.
     pub out: Option<PathBuf>,
+    /// What is printed.
+    pub print: Print,
 }
 
 impl Job {
@@ -101,10 +126,11 @@ impl Job {
                 return NOT_LOADED;
             }
         };
-        shell.say(&format!("{}: {} nodes, a tick each {}", self.title, engine.order().count(), period(&engine)));
-        let mut summary = Summary::new(&engine);
+        self.say(shell, &format!("{}: {} nodes, a tick each {}", self.title, engine.order().count(), period(&engine)));
+        let mut summary = Summary::new(&engine, self.print == Print::Ports);
         let mut log = Log::new(&engine);
-        let mut progress = Progress::new(self.duration.or_else(|| engine.end().map(seconds)));
+        let (end, is_quiet) = (self.duration.or_else(|| engine.end().map(seconds)), self.print == Print::Nothing);
+        let mut progress = Progress::new(end, is_quiet, shell.has_colour_on_stderr());
         let (sends, listens) = (self.send.clone(), self.listen);
         let options = RunOptions { duration: self.duration, is_realtime: self.realtime, sends, listens };
         let outcome = quietly(|| {
@@ -117,7 +143,7 @@ impl Job {
                 if let Some(recorder) = &mut recorder {
                     recorder.record(engine);
                 }
-                progress.show(seconds(engine.now()), engine.ticks());
+                progress.show(seconds(engine.now()), engine.ticks(), |page| summary.live(page));
             })
         });
         progress.clear();
@@ -129,18 +155,49 @@ impl Job {
                 return FAULTED;
             }
         };
-        shell.say(&format!("\n{}", summary.render(&engine, &outcome)));
-        shell.say(&ending(&outcome));
+        let page = Look::new(shell.has_colour());
+        self.say(shell, &format!("\n{}", summary.render(&engine, &outcome, page).trim_end()));
+        self.say(shell, &ending(&outcome));
+        self.close(shell, &engine, &outcome, written)
+    }
+
+    /// What went wrong or was not done, and the exit code.
+    fn close(&self, shell: &Shell, engine: &Engine, outcome: &Outcome, written: io::Result<u64>) -> u8 {
         for (at, word) in self.send.iter().filter(|(at, _)| *at > seconds(outcome.time)) {
             shell.warning(format_args!("`{word}` was not sent: the run ended before {at} s"));
         }
         let code = if let End::Fault(fault) = &outcome.end {
-            shell.error(format_args!("{fault}; every command went to zero{}", hopeless(&engine, fault)));
+            shell.error(format_args!("{fault}; every command went to zero{}", hopeless(engine, fault)));
             FAULTED
         } else {
             0
         };
-        code.max(report_file(shell, self.out.as_deref(), written))
+        code.max(self.report_file(shell, written))
+    }
+
+    /// Prints what is no mistake, where that is wanted.
+    fn say(&self, shell: &Shell, text: &str) {
+        if self.print != Print::Nothing {
+            shell.say(text);
+        }
+    }
+
+    fn report_file(&self, shell: &Shell, written: io::Result<u64>) -> u8 {
+        let Some(path) = &self.out else { return 0 };
+        match written {
+            Ok(0) => {
+                self.say(shell, &format!("wrote {}", path.display()));
+                0
+            }
+            Ok(dropped) => {
+                shell.warning(format_args!("{} lacks {dropped} rows: the disk was too slow", path.display()));
+                0
+            }
+            Err(error) => {
+                shell.error(format_args!("cannot write `{}`: {error}", path.display()));
+                FAULTED
+            }
+        }
     }
 }
 
@@ -179,26 +236,8 @@ fn is_something_else(path: &Path) -> bool {
     read.is_ok() && !start.is_empty() && !Format::STARTS.iter().any(|known| start.starts_with(known))
 }
 
-fn report_file(shell: &Shell, path: Option<&Path>, written: io::Result<u64>) -> u8 {
-    let Some(path) = path else { return 0 };
-    match written {
-        Ok(0) => {
-            shell.say(&format!("wrote {}", path.display()));
-            0
-        }
-        Ok(dropped) => {
-            shell.warning(format_args!("{} lacks {dropped} rows: the disk was too slow", path.display()));
-            0
-        }
-        Err(error) => {
-            shell.error(format_args!("cannot write `{}`: {error}", path.display()));
-            FAULTED
-        }
-    }
-}
-
 /// A panic of a node or a device is told as a fault, with its name and its tick: not by the standard library as well.
-fn quietly<T>(work: impl FnOnce() -> T) -> T {
+pub(super) fn quietly<T>(work: impl FnOnce() -> T) -> T {
     let hook = std::panic::take_hook();
     std::panic::set_hook(Box::new(|_| {}));
     let result = std::panic::catch_unwind(std::panic::AssertUnwindSafe(work));

@@ -42,6 +42,11 @@ impl Shell {
         self.colour.is_on(&std::io::stdout())
     }
 
+    /// Whether what is drawn on standard error may have colours.
+    pub(super) fn has_colour_on_stderr(&self) -> bool {
+        self.colour.is_on(&std::io::stderr())
+    }
+
     /// Prints to standard output, and ends the line. A reader that has seen enough, `head` say, is no mistake of ours;
     /// a disk that is full is one of somebody's, and is told once.
     pub fn say(&self, text: &str) {

@@ -1,9 +1,11 @@
-//! What came out of a run: a line a port, and how long the nodes took.
+//! What came out of a run: its story, what the graph shows, and where asked for a line a port and a line a node.
 
 use std::fmt::Write;
 
 use super::course::Course;
+use super::prose::Look;
 use super::timeline::Timeline;
+use super::view::View;
 use crate::engine::{Counters, Engine, Outcome};
 use crate::record::Columns;
 use crate::signal::{Freshness, Shape};
@@ -49,14 +51,19 @@ pub(super) struct Summary {
     counts: Vec<Counts>,
     figures: Vec<Figures>,
     timeline: Timeline,
+    /// What the graph shows; none where the table of all ports takes its place.
+    view: Option<View>,
 }
 
 impl Summary {
-    pub(super) fn new(engine: &Engine) -> Self {
-        let columns = Columns::new(engine.ports());
+    /// A summary of what the graph shows, or of all ports.
+    pub(super) fn new(engine: &Engine, is_of_ports: bool) -> Self {
+        let ports = if is_of_ports { engine.ports() } else { &[] };
+        let columns = Columns::new(ports);
         Self {
+            view: (!is_of_ports).then(|| View::new(engine)),
             row: vec![0.0; columns.list.len()],
-            counts: vec![Counts::default(); engine.ports().len()],
+            counts: vec![Counts::default(); ports.len()],
             figures: vec![Figures::new(); columns.list.len()],
             columns,
             timeline: Timeline::new(engine),
@@ -73,19 +80,30 @@ impl Summary {
             }
         }
         self.timeline.add(engine);
+        self.view.iter_mut().for_each(|view| view.add(engine));
         self.columns.read(engine.bus(), &mut self.row);
         for (figures, value) in self.figures.iter_mut().zip(&self.row) {
             figures.add(*value);
         }
     }
 
-    /// The table of ports, the table of nodes and what else there is to say.
-    pub(super) fn render(&self, engine: &Engine, outcome: &Outcome) -> String {
-        let mut text = self.ports(engine);
-        text.push('\n');
-        text.push_str(&nodes(engine, outcome));
-        text.push('\n');
-        text.push_str(&self.timeline.render(engine, outcome.time));
+    /// What is shown while it runs, part by part.
+    pub(super) fn live(&self, page: Look) -> Vec<String> {
+        self.view.as_ref().map(|view| view.live(page)).unwrap_or_default()
+    }
+
+    /// The story and what is shown, or the tables of ports and of nodes and the story; then what else there is to say.
+    pub(super) fn render(&self, engine: &Engine, outcome: &Outcome, page: Look) -> String {
+        let story = Timeline::story(engine, outcome.time);
+        let parts = match &self.view {
+            Some(view) => [story, view.page(page), self.timeline.limits(outcome.time)],
+            None => [self.ports(engine), nodes(engine, outcome), story + &self.timeline.limits(outcome.time)],
+        };
+        let parts = parts.iter().map(|part| part.trim_end()).filter(|part| !part.is_empty());
+        let mut text = parts.collect::<Vec<_>>().join("\n\n");
+        if !text.is_empty() {
+            text.push('\n');
+        }
         for ((port, _), counters) in engine.ports().iter().zip(engine.counters()) {
             let counted = counted(counters);
             if !counted.is_empty() {
@@ -95,6 +113,9 @@ impl Summary {
         }
         if outcome.late > 0 {
             let _ = writeln!(text, "{} ticks began more than a period late", outcome.late);
+        }
+        if self.view.is_some() {
+            let _ = writeln!(text, "every port and the time of every node: --ports");
         }
         text
     }

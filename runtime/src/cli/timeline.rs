@@ -52,15 +52,13 @@ impl Timeline {
         }
     }
 
-    /// The modes, and what limited the motion; nothing of what the graph does not have.
-    pub(super) fn render(&self, engine: &Engine, end: i64) -> String {
-        let mut text = modes(&engine.changes(), end);
-        text.push_str(&halts(engine));
-        text.push_str(&self.limits(end));
-        text
+    /// The modes and the halts, one after the other; nothing of what the graph does not have.
+    pub(super) fn story(engine: &Engine, end: i64) -> String {
+        modes(&engine.changes(), end) + &halts(engine)
     }
 
-    fn limits(&self, end: i64) -> String {
+    /// What limited the motion.
+    pub(super) fn limits(&self, end: i64) -> String {
         if self.limits.is_empty() {
             return String::new();
         }

@@ -11,11 +11,11 @@ use super::station::{Aged, Station};
 use super::tick::Core;
 use super::timeline::Timeline;
 use super::trouble::WatchedWire;
-use super::{Deck, Edge, Engine, Logged, Timing};
+use super::{Deck, Edge, Engine, Logged, Timing, View};
 use crate::device::{Commands, Driver, Samples};
 use crate::graph::{
-    Age, Plan, PlannedCommand, PlannedDevice, PlannedNode, PlannedPort, PlannedReport, PlannedWire, Policy, Producer,
-    Source, Sources,
+    Age, Plan, PlannedCommand, PlannedDevice, PlannedNode, PlannedPort, PlannedReport, PlannedShow, PlannedView,
+    PlannedWire, Policy, Producer, Source, Sources,
 };
 use crate::node::{Bus, PortId, Tick};
 use crate::signal::{Mark, Shape, Stamp};
@@ -49,6 +49,7 @@ impl Engine {
         let place = |device: usize| plan.sources.locate(plan.devices[device].span.start);
         let roles = plan.roles.iter().map(|role| (role.name.clone(), place(role.device))).collect();
         let names = plan.nodes.iter().map(|node| (node.name.clone(), plan.sources.locate(node.span.start))).collect();
+        let view = view(plan.view, &ids, &ports);
         let limits = limits(&plan.nodes, &ports);
         let commands = plan.commands.iter().map(|wire| (wire.source, &wire.name, wire.age, &wire.span));
         let told = plan.reports.iter().map(|wire| (wire.source, &wire.name, wire.age, &wire.span));
@@ -85,6 +86,7 @@ impl Engine {
             timeline: Timeline::new(plan.clock, plan.period),
             ports,
             logged,
+            view,
             limits,
             names,
             roles,
@@ -106,6 +108,15 @@ fn logged(node: &PlannedNode, ids: &Ids, ports: &[(PlannedPort, PortId)]) -> Log
     let port = |id: PortId| ports.iter().find(|(_, known)| *known == id).expect("a wire comes from a port").clone();
     let due = ids[&Source { producer: Producer::Node(node.index), port: 0 }];
     Logged { node: node.name.clone(), due, inputs: sources.map(port).collect() }
+}
+
+fn view(view: PlannedView, ids: &Ids, ports: &[(PlannedPort, PortId)]) -> View {
+    let port = |PlannedShow { name, source }: PlannedShow| {
+        let id = ids[&source];
+        let (port, _) = ports.iter().find(|(_, known)| *known == id).expect("what is shown is a port");
+        (name, port.clone(), id)
+    };
+    View { ports: view.ports.into_iter().map(port).collect(), mark: view.mark.map(|mark| mark.map(|at| ids[&at])) }
 }
 
 /// The shares that the limiters tell.

@@ -40,6 +40,7 @@ pub struct Engine {
     timeline: Timeline,
     ports: Vec<(PlannedPort, PortId)>,
     logged: Vec<Logged>,
+    view: View,
     /// Name and place of each limit's share.
     limits: Vec<(String, PortId)>,
     /// Name and place of each station.
@@ -64,6 +65,15 @@ pub struct Engine {
     /// How late the next tick begins, if too late [ns].
     lateness: Option<i64>,
     sources: Sources,
+}
+
+/// What a run shows of the graph, as its section [graph] says.
+#[derive(Debug, Clone, Default)]
+pub struct View {
+    /// The ports, each with what the graph calls it.
+    pub ports: Vec<(String, PlannedPort, PortId)>,
+    /// Where the contact is in the first image: the ports of its x and of its y [m].
+    pub mark: Option<[PortId; 2]>,
 }
 
 /// A node that logs what comes in on its wires.
@@ -220,6 +230,12 @@ impl Engine {
     #[must_use]
     pub fn logged(&self) -> &[Logged] {
         &self.logged
+    }
+
+    /// What the graph wants to be shown.
+    #[must_use]
+    pub const fn view(&self) -> &View {
+        &self.view
     }
 
     /// Where each limit says what share of the motion it lets pass, from 0 to 1: its name, `node.limit`, and its port.

@@ -88,7 +88,7 @@ impl Builder<'_> {
         declared.chain(self.observed_roles()).collect()
     }
 
-    /// Roles that no wire comes from: whatever becomes of their samples, the run goes on as it would without them.
+    /// Roles that no wire comes from: however old their samples are, the run goes on as it would without them.
     fn observed_roles(&self) -> impl Iterator<Item = PlannedRole> {
         self.model.observed.iter().zip(&self.opened.observed).filter_map(|((key, _, role), bound)| {
             let bound = bound.as_ref()?;

@@ -8,6 +8,7 @@ use super::load::{Flat, Loader, Request};
 use super::order::{Wiring, order};
 use super::plan::{Clock, Plan, PlannedCommand, PlannedNode, PlannedReport};
 use super::policy::unknown_roles;
+use super::shown::Shown;
 use super::unread::unread;
 use super::wires::{CommandWire, Model};
 use super::{Sources, limits, modes, outline};
@@ -36,6 +37,7 @@ pub(crate) fn plan_in(mut loader: Loader, catalogue: &Catalogue, request: &Reque
     let opened = devices::open(&model, catalogue, flat.bench.as_ref(), &mut sources, &mut found);
     let wires = model.wires(&mut found);
     let commands = model.commands(&mut found);
+    let shown = Shown::new(&model, &mut found);
     let order = order(&model, &wires, &mut found);
     let mut frames = Frames::unify(&model, catalogue, &order, &wires, &commands, &mut found);
     let is_limited = limits::prove(&model, catalogue, &mut frames, &wires, &commands, &mut found);
@@ -48,6 +50,7 @@ pub(crate) fn plan_in(mut loader: Loader, catalogue: &Catalogue, request: &Reque
     let mut nodes: Vec<PlannedNode> = order.iter().filter_map(|node| builder.node(*node, &wires[*node])).collect();
     builder.found.extend(short_gap(&flat, period));
     builder.delayed(&wires);
+    shown.check_units(&builder.ports, &mut builder.found);
     let wiring = Wiring { order: &order, wires: &wires, commands: &commands };
     let modes = modes::plan(&mut builder, &mut nodes, &wiring);
     let (told, driven): (Vec<&CommandWire>, Vec<&CommandWire>) = commands.iter().partition(|wire| wire.is_report);
@@ -55,6 +58,7 @@ pub(crate) fn plan_in(mut loader: Loader, catalogue: &Catalogue, request: &Reque
     let reports: Vec<PlannedReport> = told.into_iter().filter_map(|wire| builder.report(wire)).collect();
     let policy = flat.policy.as_ref().and_then(|(_, policy)| policy.clone()).unwrap_or_default();
     let roles = builder.planned_roles(&policy);
+    let ports = std::mem::take(&mut builder.ports);
     let (found, sources) = builder.finish();
     let Some((clock, _)) = clock.filter(|_| found.is_empty()) else { return Err(Report::new(sources, found)) };
     say_what_is_there(&nodes, &opened, &sources);
@@ -69,7 +73,8 @@ pub(crate) fn plan_in(mut loader: Loader, catalogue: &Catalogue, request: &Reque
         max_gap,
     };
     let outline = parts.outline();
-    let warnings = unread(&model, &wires, &commands);
+    let warnings = unread(&model, &wires, &commands, shown.sources());
+    let view = shown.view(&model, &nodes, &ports);
     let reset_after = flat.table.as_ref().map_or(0, |table| (*table.reset_after_ms * 1e6) as i64);
     let period = ((period * 1e9).round() as i64).max(1);
     let (exports, facts) = (model.exports_by_name(), opened.facts(&model));
@@ -91,6 +96,7 @@ pub(crate) fn plan_in(mut loader: Loader, catalogue: &Catalogue, request: &Reque
         policy,
         exports,
         facts,
+        view,
     })
 }
 

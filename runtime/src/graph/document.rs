@@ -22,6 +22,10 @@ crate::params! { GraphTable:
     max_gap_ms: Option<Positive>,
     /// How long something must be absent before the state behind it is reset [ms].
     reset_after_ms: NonNegative = NonNegative(20.0),
+    /// Ports that a run shows: images as they were, and numbers over time.
+    show: Option<Vec<Word>>,
+    /// Where the contact is in the first image that is shown: ports of its x and of its y.
+    mark: Option<[Word; 2]>,
 }
 
 /// A block of a node or a device: its type, its wires, and what is left are its parameters.

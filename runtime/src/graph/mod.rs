@@ -2,7 +2,7 @@
 //!
 //! In the order of the work: `document` (what the sections hold), `load` (files, parts and `--set` become one flat
 //! graph), `wires` (where each comes from), `devices` (the bench is opened), `order`, `frames`, `units`, and `check`,
-//! which builds the nodes on the way to a `plan`. `unread` looks for loose ends, and `outline` says where all came from.
+//! which builds the nodes on the way to a `plan`. `unread` looks for loose ends, `shown` for what a run shows, and `outline` says where all came from.
 
 mod build;
 mod check;
@@ -16,6 +16,7 @@ mod order;
 mod outline;
 mod plan;
 mod policy;
+mod shown;
 mod sources;
 mod units;
 mod unread;
@@ -38,6 +39,7 @@ pub(crate) use plan::{
 pub use plan::{Plan, PlannedPort};
 pub use policy::Policy;
 pub(crate) use policy::{Age, PolicyTable};
+pub(crate) use shown::{PlannedShow, PlannedView};
 pub use sources::{BuiltinFile, SourceFile, Sources};
 pub(crate) use units::declares_a_unit;
 #[cfg(feature = "cli")]

@@ -4,6 +4,7 @@ use std::ops::Range;
 
 use super::modes::PlannedModes;
 use super::policy::{Age, Policy, PolicyTable};
+use super::shown::PlannedView;
 use super::{Outline, Sources};
 use crate::device::Driver;
 use crate::diagnostic::{Diagnostic, Report};
@@ -153,6 +154,8 @@ pub struct Plan {
     pub(crate) policy: PolicyTable,
     pub(crate) exports: Vec<(String, String)>,
     pub(crate) facts: Vec<(String, toml::Value)>,
+    /// What a run shows.
+    pub(crate) view: PlannedView,
 }
 
 impl Plan {

@@ -1,18 +1,24 @@
 //! Nodes whose work is lost: in a graph that drives a command, nothing follows from them that anything uses.
 //!
-//! A wire that was deleted by mistake leaves such a node behind. What is used is what a command or a report follows from, what a
-//! node without outputs reads or one that logs, and what a part exports: whether a task takes it is the task's business.
+//! A wire that was deleted by mistake leaves such a node behind. What is used is what a command or a report follows from,
+//! what a node without outputs reads or one that logs, what the graph shows, and what a part exports: whether a task takes
+//! it is the task's business.
 
 use std::collections::BTreeSet;
 
-use super::plan::Producer;
+use super::plan::{Producer, Source};
 use super::units::may_fit;
 use super::wires::{CommandWire, Model, Wire};
 use crate::diagnostic::{Code, Diagnostic};
 use crate::node::Need;
 
 /// What is to be looked at; nothing in a graph without commands, which is there to be recorded.
-pub(crate) fn unread(model: &Model<'_>, wires: &[Vec<Wire>], commands: &[CommandWire]) -> Vec<Diagnostic> {
+pub(crate) fn unread(
+    model: &Model<'_>,
+    wires: &[Vec<Wire>],
+    commands: &[CommandWire],
+    shown: impl Iterator<Item = Source>,
+) -> Vec<Diagnostic> {
     if commands.iter().all(|wire| wire.is_report) {
         return Vec::new();
     }
@@ -26,7 +32,8 @@ pub(crate) fn unread(model: &Model<'_>, wires: &[Vec<Wire>], commands: &[Command
     };
     let sinks = (0..wires.len()).filter(is_sink);
     let driving = commands.iter().map(|wire| wire.source.producer);
-    let used = driving.chain(model.exported()).chain(sinks.map(Producer::Node));
+    let used =
+        driving.chain(shown.map(|source| source.producer)).chain(model.exported()).chain(sinks.map(Producer::Node));
     let mut used = upstream(wires, used.filter_map(node_of).collect());
     let mut found = Vec::new();
     // Those that nothing reads come first; a circle has none, and is told by one of its nodes.

@@ -112,7 +112,12 @@ impl<'a> Reader<'a> {
     /// Every key that is left is one too many, and what was not given is missing, unless it was only misspelt.
     pub fn close(&mut self, table: OpenTable, known: &[&str]) {
         // One that is missing and one that is strange are one mistake.
-        let is_renamed = table.missing.len() == 1 && table.rest.entries.len() == 1;
+        let is_renamed = match (table.missing.as_slice(), table.rest.entries.as_slice()) {
+            ([(missing, _)], [(strange, _)]) => {
+                meant(&strange.name, known.iter().copied()).is_none_or(|m| m == *missing)
+            }
+            _ => false,
+        };
         let renamed = table.missing.first().filter(|_| is_renamed).map(|(name, _)| format!("did you mean `{name}`?"));
         for (name, expects) in table.missing {
             let is_misspelt = |(key, _): &(Key, Value)| meant(&key.name, known.iter().copied()) == Some(name);

@@ -40,15 +40,21 @@ impl Columns {
     pub fn new(ports: &[(PlannedPort, PortId)]) -> Self {
         let mut columns = Self::default();
         for (port, id) in ports {
-            let parts = columns_of(&port.shape);
-            let Some((part, suffixes)) = parts else { continue };
+            let Some((part, _)) = columns_of(&port.shape) else { continue };
             columns.ports.push((*id, part));
-            for (suffix, unit) in suffixes {
-                let name = if suffix.is_empty() { port.name.clone() } else { format!("{}.{suffix}", port.name) };
-                columns.list.push(Column { name, unit });
-            }
+            columns.list.extend(Self::of(port));
         }
         columns
+    }
+
+    /// The scalars of one port.
+    #[must_use]
+    pub fn of(port: &PlannedPort) -> Vec<Column> {
+        let named = |(suffix, unit): (String, Unit)| {
+            let name = if suffix.is_empty() { port.name.clone() } else { format!("{}.{suffix}", port.name) };
+            Column { name, unit }
+        };
+        columns_of(&port.shape).map_or_else(Vec::new, |(_, suffixes)| suffixes.into_iter().map(named).collect())
     }
 
     /// Number of columns of a port of that shape.

@@ -1,0 +1,217 @@
+//! What `verify` prints: one table for a person, or the same for a program.
+
+use serde::Serialize;
+
+use super::Verified;
+use crate::cli::json::Diagnosed;
+use crate::cli::summary::{number, table};
+use crate::scenario::judge::{Bound, Figure, Mark, Row};
+use crate::scenario::{Scenario, Trial};
+
+const HEADER: [&str; 10] =
+    ["scenario", "check", "figure", "unit", "median", "bound", "paper", "worst", "95 % of the median", ""];
+
+/// The table, what each scenario is, and how many rows are met.
+pub(super) fn text(all: &[Verified], has_colour: bool) -> String {
+    let mut rows = vec![HEADER.map(String::from)];
+    for verified in all {
+        let mut name = Some(verified.name());
+        if verified.loaded.is_err() {
+            rows.push(remark(name.take(), "does not load", has_colour));
+        }
+        let failed = verified.trials.iter().filter(|trial| trial.failure.is_some()).count();
+        if failed > 0 {
+            rows.push(remark(name.take(), &format!("{failed} of {} runs failed", verified.trials.len()), has_colour));
+        }
+        rows.extend(verified.rows.iter().map(|row| cells(name.take(), row, has_colour)));
+    }
+    let mut text = table(&rows, 4, 9);
+    text.push('\n');
+    for verified in all {
+        if let Ok(scenario) = &verified.loaded {
+            text.push_str(&format!("{}: {}\n", verified.name(), what_it_is(scenario)));
+        }
+    }
+    text.push_str(&format!("\n{}\n", summary(all)));
+    text
+}
+
+fn summary(all: &[Verified]) -> String {
+    let marks: Vec<Mark> = all.iter().flat_map(|verified| &verified.rows).map(Row::mark).collect();
+    let count = |mark: Mark| marks.iter().filter(|known| **known == mark).count();
+    let trials = || all.iter().flat_map(|verified| &verified.trials);
+    let failed = trials().filter(|trial| trial.failure.is_some()).count();
+    let unloaded = all.iter().filter(|verified| verified.loaded.is_err()).count();
+    let mut parts = vec![format!("{} met", count(Mark::Met)), format!("{} missed", count(Mark::Missed))];
+    parts.push(format!("{} told", count(Mark::Told)));
+    parts.push(format!("in {} runs", trials().count()));
+    parts.extend((failed > 0).then(|| format!("{failed} of which failed")));
+    parts.extend((unloaded > 0).then(|| format!("{unloaded} scenarios do not load")));
+    parts.join(", ")
+}
+
+/// The length, the seeds and what the devices state.
+fn what_it_is(scenario: &Scenario) -> String {
+    let runs = match scenario.seeds.len() {
+        0 => "one run".to_owned(),
+        1 => "one seed".to_owned(),
+        count => format!("{count} seeds"),
+    };
+    let facts = scenario.facts.iter().map(|(name, value)| format!(", {name} = {value}"));
+    format!("{runs} of {} s{}", scenario.for_s, facts.collect::<String>())
+}
+
+/// A line that is no figure.
+fn remark(name: Option<String>, what: &str, has_colour: bool) -> [String; 10] {
+    let mut cells: [String; 10] = Default::default();
+    (cells[0], cells[1]) = (name.unwrap_or_default(), what.to_owned());
+    cells[9] = coloured("FAILED", RED, has_colour);
+    cells
+}
+
+fn cells(name: Option<String>, row: &Row, has_colour: bool) -> [String; 10] {
+    let figure = |value: Option<f64>| value.map_or_else(|| nothing(row.figure).to_owned(), number);
+    let bound = match row.bound {
+        Bound::None => String::new(),
+        Bound::Settles => "each settles".to_owned(),
+        Bound::Median(bound) => format!("≤ {}", number(bound)),
+        Bound::AtMost(bound) => format!("each ≤ {}", number(bound)),
+        Bound::AtLeast(bound) => format!("each ≥ {}", number(bound)),
+    };
+    let missing = match row.missing() {
+        0 => String::new(),
+        count => format!(" ({count} of {})", row.values.len()),
+    };
+    let interval = row.interval().map_or_else(String::new, |(low, high)| {
+        let end = |value: f64| figure(Some(value).filter(|value| value.is_finite()));
+        format!("{} to {}", end(low), end(high))
+    });
+    let mark = match row.mark() {
+        Mark::Met => coloured("met", GREEN, has_colour),
+        Mark::Missed => coloured("MISSED", RED, has_colour),
+        Mark::Told => String::new(),
+    };
+    [
+        name.unwrap_or_default(),
+        row.check.clone(),
+        row.figure.name().to_owned(),
+        row.unit.clone(),
+        figure(row.median()),
+        bound,
+        row.paper.map_or_else(String::new, number),
+        format!("{}{missing}", figure(row.worst())),
+        interval,
+        mark,
+    ]
+}
+
+/// What is printed of a figure that could not be measured.
+const fn nothing(figure: Figure) -> &'static str {
+    match figure {
+        Figure::Response => "never",
+        _ => "-",
+    }
+}
+
+const RED: &str = "\x1b[1;31m";
+const GREEN: &str = "\x1b[32m";
+
+fn coloured(text: &str, colour: &str, has_colour: bool) -> String {
+    if has_colour { format!("{colour}{text}\x1b[0m") } else { text.to_owned() }
+}
+
+/// Everything, for a program.
+#[derive(Serialize)]
+pub(super) struct Json {
+    ok: bool,
+    scenarios: Vec<ScenarioJson>,
+}
+
+#[derive(Serialize)]
+struct ScenarioJson {
+    name: String,
+    file: String,
+    ok: bool,
+    diagnostics: Vec<Diagnosed>,
+    /// Length of a run [s].
+    for_s: Option<f64>,
+    /// What the devices state.
+    facts: serde_json::Map<String, serde_json::Value>,
+    runs: Vec<RunJson>,
+    rows: Vec<RowJson>,
+}
+
+#[derive(Serialize)]
+struct RunJson {
+    seed: Option<u64>,
+    time_s: f64,
+    failure: Option<String>,
+}
+
+#[derive(Serialize)]
+struct RowJson {
+    check: String,
+    of: String,
+    figure: &'static str,
+    unit: String,
+    /// Over the runs; null if it could not be measured.
+    median: Option<f64>,
+    worst: Option<f64>,
+    /// An interval for the median with at least 95 %; null at an end that could not be measured.
+    interval: Option<[Option<f64>; 2]>,
+    bound: Option<f64>,
+    /// What is held against the bound: `median`, `every` run, or nothing.
+    judged: Option<&'static str>,
+    paper: Option<f64>,
+    /// `met`, `missed`, or `told` where nothing is asked.
+    mark: &'static str,
+    /// In the order of the runs.
+    values: Vec<Option<f64>>,
+}
+
+pub(super) fn json(all: &[Verified]) -> Json {
+    Json { ok: all.iter().all(Verified::is_met), scenarios: all.iter().map(scenario_json).collect() }
+}
+
+fn scenario_json(verified: &Verified) -> ScenarioJson {
+    let scenario = verified.loaded.as_ref().ok();
+    let facts = scenario.into_iter().flat_map(|scenario| &scenario.facts);
+    let value = |value: &toml::Value| serde_json::to_value(value).unwrap_or_default();
+    let run = |trial: &Trial| RunJson { seed: trial.seed, time_s: trial.time, failure: trial.failure.clone() };
+    ScenarioJson {
+        name: verified.name(),
+        file: verified.path.display().to_string(),
+        ok: verified.is_met(),
+        diagnostics: verified.diagnostics(),
+        for_s: scenario.map(|scenario| scenario.for_s),
+        facts: facts.map(|(name, fact)| (name.clone(), value(fact))).collect(),
+        runs: verified.trials.iter().map(run).collect(),
+        rows: verified.rows.iter().map(row_json).collect(),
+    }
+}
+
+fn row_json(row: &Row) -> RowJson {
+    let finite = |value: f64| Some(value).filter(|value| value.is_finite());
+    RowJson {
+        check: row.check.clone(),
+        of: row.of.clone(),
+        figure: row.figure.name(),
+        unit: row.unit.clone(),
+        median: row.median(),
+        worst: row.worst(),
+        interval: row.interval().map(|(low, high)| [finite(low), finite(high)]),
+        bound: row.bound.number(),
+        judged: match row.bound {
+            Bound::None => None,
+            Bound::Median(_) => Some("median"),
+            Bound::Settles | Bound::AtMost(_) | Bound::AtLeast(_) => Some("every"),
+        },
+        paper: row.paper,
+        mark: match row.mark() {
+            Mark::Met => "met",
+            Mark::Missed => "missed",
+            Mark::Told => "told",
+        },
+        values: row.values.clone(),
+    }
+}

@@ -1,0 +1,278 @@
+//! Finds the ports, modes, facts and seeds that a scenario speaks of in the plan of its task on its bench.
+
+use std::path::Path;
+
+use super::document::{CheckBlock, CheckTable, Document, PaperTable, ScenarioTable};
+use super::judge::{Bound, Figure, Row};
+use super::{Check, Scenario, row};
+use crate::catalogue::Catalogue;
+use crate::diagnostic::{Code, Diagnostic, Report, closest, meant};
+use crate::graph::{Item, Plan, Request, Value};
+use crate::node::Word;
+use crate::record::{Column, Columns};
+use crate::signal::Kind;
+
+/// As long an end the steady state is taken from, unless a check says another [s].
+const STEADY: f64 = 10.0;
+
+/// The scenario, if everything that it speaks of is there.
+pub(super) fn look_up(
+    path: &Path,
+    document: &Document,
+    request: Request,
+    plan: &Plan,
+    catalogue: &Catalogue,
+    found: Vec<Diagnostic>,
+) -> Result<Scenario, Report> {
+    let mut lookup = Lookup { plan, found };
+    let (mut checks, mut rows) = (Vec::new(), Vec::new());
+    for block in &document.checks {
+        if let Some((check, its_rows)) = lookup.check(block) {
+            checks.push(check);
+            rows.extend(its_rows);
+        }
+    }
+    let scenario = document.scenario.as_ref().map(|table| {
+        let from = table.from.as_ref().and_then(|word| Some((word.text.clone(), lookup.flag(word)?)));
+        let never_lost = table.never_lost.as_ref().and_then(|word| lookup.flag(word));
+        lookup.modes(table);
+        lookup.real_time(table);
+        rows.extend(rows_of(table));
+        Scenario {
+            path: path.to_owned(),
+            for_s: *table.for_s,
+            seeds: table.seeds.as_ref().map(|seeds| seeds.list.clone()).unwrap_or_default(),
+            facts: table.tells.iter().filter_map(|word| lookup.fact(word)).collect(),
+            request,
+            seed_keys: lookup.seeds(table, catalogue),
+            from,
+            never_lost,
+            stays_in: table.stays_in.as_ref().map(|word| word.text.clone()),
+            ends_in: table.ends_in.as_ref().map(|word| word.text.clone()),
+            checks,
+            rows,
+        }
+    });
+    let found = lookup.found;
+    scenario.filter(|_| found.is_empty()).ok_or_else(|| Report::new(plan.sources().clone(), found))
+}
+
+/// What is asked of the run as a whole.
+fn rows_of(table: &ScenarioTable) -> impl Iterator<Item = Row> {
+    let rows = [
+        (&table.never_lost, "never_lost", Figure::Lost, Bound::AtMost(0.0)),
+        (&table.stays_in, "stays_in", Figure::Away, Bound::AtMost(0.0)),
+        (&table.ends_in, "ends_in", Figure::Ends, Bound::AtLeast(1.0)),
+    ];
+    let asked = rows.into_iter().filter_map(|(word, key, figure, bound)| Some((word.as_ref()?, key, figure, bound)));
+    asked.map(|(word, key, figure, bound)| row(key, &word.text, figure, "1", bound, None))
+}
+
+struct Lookup<'a> {
+    plan: &'a Plan,
+    found: Vec<Diagnostic>,
+}
+
+impl Lookup<'_> {
+    /// The column that a word means: as the record names it, or as the wires of the task do. The kind of its port.
+    fn column(&mut self, word: &Word) -> Option<(Column, Kind)> {
+        let alias = self.plan.exports().iter().find_map(|(export, port)| {
+            let rest = word.text.strip_prefix(export.as_str())?;
+            (rest.is_empty() || rest.starts_with('.')).then(|| format!("{port}{rest}"))
+        });
+        let name = alias.unwrap_or_else(|| word.text.clone());
+        for port in self.plan.ports() {
+            let columns = Columns::of(port);
+            if let Some(column) = columns.iter().find(|column| column.name == name) {
+                return Some((column.clone(), port.shape.kind()));
+            }
+            if port.name == name {
+                let kind = port.shape.kind().with_article();
+                let (message, help) = match columns.as_slice() {
+                    [] => (format!("`{}` is {kind}: there is no number in it to look at", word.text), None),
+                    parts => {
+                        let parts = parts.iter().map(|part| {
+                            format!("`{}{}`", word.text, part.name.strip_prefix(&port.name).unwrap_or_default())
+                        });
+                        let help = format!("look at one of {}", parts.collect::<Vec<_>>().join(", "));
+                        (format!("`{}` is {kind}: a check looks at one number", word.text), Some(help))
+                    }
+                };
+                let diagnostic = Diagnostic::new(Code::KindMismatch, word.span.clone(), message);
+                self.found.push(diagnostic.with_help(help));
+                return None;
+            }
+        }
+        let message = format!("there is no port `{}` in this task on this bench", word.text);
+        self.found.push(Diagnostic::new(Code::UnknownPort, word.span.clone(), message).help(self.nearest(&word.text)));
+        None
+    }
+
+    /// What a port that is not there may have been meant to be.
+    fn nearest(&self, text: &str) -> String {
+        let columns = self.plan.ports().flat_map(Columns::of).map(|column| column.name);
+        let all: Vec<String> = columns.chain(self.plan.exports().iter().map(|(export, _)| export.clone())).collect();
+        if let Some(best) = meant(text, all.iter().map(String::as_str)) {
+            return format!("did you mean `{best}`?");
+        }
+        let owner = text.split('.').next().unwrap_or_default();
+        let of_owner = all.iter().filter(|name| name.split('.').next() == Some(owner)).map(String::as_str);
+        let owners = || all.iter().filter_map(|name| name.split('.').next()).collect::<std::collections::BTreeSet<_>>();
+        match of_owner.clone().next() {
+            Some(_) => closest(text, of_owner, "ports"),
+            None => closest(owner, owners().into_iter(), "roles, nodes and parts"),
+        }
+    }
+
+    /// The column of a flag.
+    fn flag(&mut self, word: &Word) -> Option<String> {
+        let (column, kind) = self.column(word)?;
+        if kind != Kind::Flag {
+            let message = format!("`{}` is {}, but a flag is asked for here", word.text, kind.with_article());
+            self.found.push(Diagnostic::new(Code::KindMismatch, word.span.clone(), message));
+            return None;
+        }
+        Some(column.name)
+    }
+
+    fn check(&mut self, block: &CheckBlock) -> Option<(Check, Vec<Row>)> {
+        let table = block.table.as_ref()?;
+        let asked = asked(table);
+        let mut papers = papers(table.paper.as_ref());
+        papers.retain(|(_, value)| value.is_some());
+        for (figure, _) in papers.iter().filter(|(figure, _)| !asked.iter().any(|(asked, _)| asked == figure)) {
+            let message = format!("the check has no {} to set the paper's beside", figure.name());
+            let figures: Vec<_> = asked.iter().map(|(figure, _)| format!("`{}`", figure.name())).collect();
+            let help = format!("its figures are {}", figures.join(", "));
+            self.found.push(Diagnostic::new(Code::UnknownKey, block.place("paper"), message).help(help));
+        }
+        let (column, _) = self.column(&table.of)?;
+        let minus = match &table.minus {
+            Some(word) => Some(self.taken_off(word, &column)?),
+            None => None,
+        };
+        let (unit_name, unit) = match table.unit.as_ref().and_then(|unit| unit.0.iter().next()) {
+            Some((name, unit)) => (name.clone(), **unit),
+            None => (column.unit.to_string(), 1.0),
+        };
+        let rows = asked.iter().map(|(figure, bound)| {
+            let paper = papers.iter().find(|(of, _)| of == figure).and_then(|(_, value)| *value);
+            row(&block.key.name, &table.of.text, *figure, &unit_name, *bound, paper)
+        });
+        let check = Check {
+            column: column.name,
+            minus,
+            modulo: table.modulo.map(|period| *period),
+            unit,
+            settles: table.settles_to.zip(table.within.map(|within| *within)),
+            after: table.after_s.map(|after| *after),
+            steady: table.steady_s.map_or(STEADY, |steady| *steady),
+            figures: asked.iter().map(|(figure, _)| *figure).collect(),
+        };
+        Some((check, rows.collect()))
+    }
+
+    /// The column that is taken off another; it has its unit.
+    fn taken_off(&mut self, word: &Word, other: &Column) -> Option<String> {
+        let (column, _) = self.column(word)?;
+        if column.unit != other.unit {
+            let message = format!("`{}` is in {}, but `{}` is in {}", word.text, column.unit, other.name, other.unit);
+            self.found.push(Diagnostic::new(Code::UnitMismatch, word.span.clone(), message));
+            return None;
+        }
+        Some(column.name)
+    }
+
+    fn modes(&mut self, table: &ScenarioTable) {
+        let modes: Vec<&str> = self.plan.modes().collect();
+        let (ends_in, stays_in) = (table.ends_in.as_ref(), table.stays_in.as_ref());
+        let ends_in = ends_in.filter(|word| word.text != super::trial::DONE || modes.is_empty());
+        for word in ends_in.into_iter().chain(stays_in).filter(|word| !modes.contains(&word.text.as_str())) {
+            let message = format!("there is no mode `{}`", word.text);
+            let help = closest(&word.text, modes.iter().copied(), "modes");
+            self.found.push(Diagnostic::new(Code::UnknownMode, word.span.clone(), message).help(help));
+        }
+    }
+
+    fn fact(&mut self, word: &Word) -> Option<(String, toml::Value)> {
+        let settings = self.plan.outline().devices.iter().flat_map(|device| {
+            let named = |path: &str| format!("devices.{}.{path}", device.name);
+            device.settings.iter().filter_map(move |setting| Some((named(&setting.path), plain(&setting.value)?)))
+        });
+        let facts: Vec<_> = self.plan.facts().iter().cloned().chain(settings).collect();
+        let fact = facts.iter().find(|(name, _)| *name == word.text).cloned();
+        if fact.is_none() {
+            let message = format!("no device states `{}`, and none is set so", word.text);
+            let help = closest(&word.text, facts.iter().map(|(name, _)| name.as_str()), "facts");
+            self.found.push(Diagnostic::new(Code::UnknownFact, word.span.clone(), message).help(help));
+        }
+        fact
+    }
+
+    /// Where a seed is set. Seeds that nothing takes would all be one.
+    fn seeds(&mut self, table: &ScenarioTable, catalogue: &Catalogue) -> Vec<String> {
+        let has_seed = |kind: &str| {
+            let known = catalogue.devices().iter().find(|device| device.name() == kind);
+            known.is_some_and(|device| device.params().iter().any(|param| param.name == "seed"))
+        };
+        let devices = self.plan.outline().devices.iter().filter(|device| has_seed(&device.kind.text));
+        let keys: Vec<String> = devices.map(|device| format!("devices.{}.seed", device.name)).collect();
+        if let Some(seeds) = table.seeds.as_ref().filter(|_| keys.is_empty()) {
+            let message = "no device of this bench has a `seed`: every run would be the same";
+            let diagnostic = Diagnostic::new(Code::UnknownKey, seeds.span.clone(), message);
+            self.found.push(diagnostic.help("take `seeds` out, and it runs once"));
+        }
+        keys
+    }
+
+    fn real_time(&mut self, table: &ScenarioTable) {
+        if self.plan.is_live() {
+            let at = table.bench.as_ref().unwrap_or(&table.graph);
+            let message = "a device of this bench runs in real time, but a scenario in virtual time";
+            let help = "take a bench of simulated devices; `tactflow run --out` records a run in real time";
+            self.found.push(Diagnostic::new(Code::WrongRole, at.span.clone(), message).help(help));
+        }
+    }
+}
+
+/// A value that is one word or one number.
+fn plain(value: &Value) -> Option<toml::Value> {
+    Some(match &value.item {
+        Item::String(text) => text.as_str().into(),
+        Item::Integer(number) => (*number).into(),
+        Item::Float(number) => (*number).into(),
+        Item::Boolean(value) => (*value).into(),
+        Item::Datetime(_) | Item::Array(_) | Item::Table(_) => return None,
+    })
+}
+
+/// The figures of a check, with what is asked of them.
+fn asked(table: &CheckTable) -> Vec<(Figure, Bound)> {
+    let median = |bound: Option<f64>| bound.map_or(Bound::None, Bound::Median);
+    let positive = |bound: Option<crate::node::Positive>| median(bound.map(|bound| *bound));
+    let std = (Figure::Std, positive(table.std_below));
+    let mut asked = Vec::new();
+    let has_extremes = table.never_above.is_some() || table.never_below.is_some();
+    if table.settles_to.is_some() {
+        let response = table.response_below_s.map_or(Bound::Settles, |bound| Bound::Median(*bound));
+        asked.extend([(Figure::Response, response), (Figure::Error, positive(table.steady_state_error_below)), std]);
+    } else if !has_extremes || table.std_below.is_some() {
+        asked.extend([(Figure::Mean, Bound::None), std]);
+    }
+    asked.extend(table.never_above.map(|bound| (Figure::Max, Bound::AtMost(bound))));
+    asked.extend(table.never_below.map(|bound| (Figure::Min, Bound::AtLeast(bound))));
+    asked
+}
+
+/// What the paper reports of each figure.
+fn papers(paper: Option<&PaperTable>) -> Vec<(Figure, Option<f64>)> {
+    let Some(paper) = paper else { return Vec::new() };
+    vec![
+        (Figure::Response, paper.response_s),
+        (Figure::Error, paper.error),
+        (Figure::Mean, paper.mean),
+        (Figure::Std, paper.std),
+        (Figure::Max, paper.max),
+        (Figure::Min, paper.min),
+    ]
+}

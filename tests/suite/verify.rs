@@ -1,0 +1,310 @@
+//! `tactflow verify`: what is met, what is missed, what fails and what does not load, on a pad whose truth is known.
+
+use std::fs;
+use std::path::Path;
+
+use tactflow_runtime::scenario::judge::{Figure, Mark, Row};
+use tactflow_runtime::scenario::{Scenario, Trial};
+use tactflow_tests::{catalogue, workspace};
+
+use crate::cli::Running;
+use crate::tool::{Said, peer, say};
+
+const SLIDE: &str = "tests/scenarios/slide.toml";
+const MISSED: &str = "tests/scenarios/missed.toml";
+const FAULT: &str = "tests/scenarios/fault.toml";
+const MOCK: &str = "tests/scenarios/mock.toml";
+const NEVER: &str = "tests/scenarios/never.toml";
+
+/// The cells of the rows of the table: those that two blanks or more lie between.
+fn rows(text: &str) -> Vec<Vec<&str>> {
+    let lines = text.lines().take_while(|line| !line.is_empty());
+    lines.map(|line| line.split("  ").map(str::trim).filter(|cell| !cell.is_empty()).collect()).collect()
+}
+
+/// The row of a figure of a check.
+fn row<'t>(text: &'t str, check: &str, figure: &str) -> Vec<&'t str> {
+    let found = rows(text).into_iter().find(|row| row.windows(2).any(|pair| pair == [check, figure]));
+    found.unwrap_or_else(|| panic!("no row has `{figure}` of `{check}`:\n{text}"))
+}
+
+#[test]
+fn what_is_met_ends_with_0_and_prints_figure_bound_paper_and_mark() {
+    let Said { code, out, err } = say(&["verify", SLIDE]);
+    assert_eq!((code, err.as_str()), (0, ""), "{out}");
+    assert_eq!(row(&out, "x", "response")[..6], ["slide", "x", "response", "s", "0.48000", "≤ 0.52000"]);
+    assert_eq!(row(&out, "x", "response")[6], "0.90000", "the paper's");
+    assert!(rows(&out)[1..].iter().all(|row| *row.last().unwrap() == "met" || row.len() < 9), "{out}");
+    assert!(out.contains("slide: 6 seeds of 4 s, pad.noise = 0.002, devices.pad.tau_s = 0.25\n"), "{out}");
+    assert!(out.ends_with("\n11 met, 0 missed, 4 told, in 6 runs\n"), "{out}");
+}
+
+#[test]
+fn what_is_missed_ends_with_1_and_is_printed_all_the_same() {
+    let Said { code, out, err } = say(&["verify", MISSED]);
+    assert_eq!((code, err.as_str()), (1, ""));
+    let marks = [
+        ("x", "response", "MISSED"),
+        ("x", "error", "MISSED"),
+        ("reach", "max", "MISSED"),
+        ("reach", "min", "met"),
+        ("never_lost", "lost", "MISSED"),
+        ("stays_in", "away", "MISSED"),
+        ("ends_in", "ends", "MISSED"),
+    ];
+    for (check, figure, mark) in marks {
+        assert_eq!(row(&out, check, figure).last(), Some(&mark), "{figure} of {check}:\n{out}");
+    }
+    // The contact is there for 1.5 s of the 2.5 s after it came, a tick each 4 ms; the last of them is at 2.5 s.
+    assert_eq!(row(&out, "never_lost", "lost")[3], "1.004");
+    assert!(out.ends_with("\n1 met, 6 missed, 1 told, in 1 runs\n"), "{out}");
+}
+
+#[test]
+fn a_fault_is_a_row_and_the_others_run() {
+    let Said { code, out, err } = say(&["verify", FAULT, NEVER, MOCK]);
+    assert_eq!(code, 1);
+    let fault = "`pad` failed: its plug is out in tick 376 at 1.500 s (tests/scenarios/benches/unplugged.toml:4:10)";
+    let never = "error: never: `touch.present` was never set, so that no figure has a time 0";
+    let lines = [format!("error: fault, seed 3: device {fault}"), format!("error: fault, seed 7: device {fault}")];
+    assert_eq!(err.lines().collect::<Vec<_>>(), [&lines[0], &lines[1], never]);
+    let remarks: Vec<_> = rows(&out).into_iter().filter(|row| row.last() == Some(&"FAILED")).collect();
+    assert_eq!(remarks, [["fault", "2 of 2 runs failed", "FAILED"], ["never", "1 of 1 runs failed", "FAILED"]]);
+    assert_eq!(row(&out, "pressure", "max").last(), Some(&"met"), "{out}");
+}
+
+#[test]
+fn what_does_not_load_ends_with_2_and_the_others_run() {
+    let cases = [
+        ("tests/errors/scenarios/names.toml", "error[unknown-port]: there is no port `error.error.z`"),
+        ("tests/errors/scenarios/seeds.toml", "error[unknown-key]: no device of this bench has a `seed`"),
+        ("graphs/hybrid.toml", "error[wrong-file]: this is a graph, not a scenario"),
+        ("tests/nowhere.toml", "error[unreadable]: cannot read `tests/nowhere.toml`"),
+    ];
+    for (file, message) in cases {
+        let Said { code, out, err } = say(&["verify", file, MOCK]);
+        assert_eq!(code, 2, "{file}: {err}");
+        assert!(err.contains(message), "{file}: {err}");
+        assert!(out.contains("does not load") && row(&out, "pressure", "max").last() == Some(&"met"), "{file}: {out}");
+    }
+    let empty = tempfile::tempdir().unwrap();
+    let folder = empty.path().to_str().unwrap();
+    let Said { code, err, .. } = say(&["verify", folder]);
+    assert_eq!((code, err), (2, format!("error: there is no scenario in `{folder}`\n")));
+}
+
+#[test]
+fn the_json_is_json_and_does_not_depend_on_the_number_of_jobs() {
+    let folder = "tests/scenarios";
+    let said = say(&["verify", folder, "--json", "--jobs", "1"]);
+    for args in [["--json", "--jobs", "5"], ["--format", "json", "-j3"]] {
+        let other = say(&[&["verify", folder], &args[..]].concat());
+        assert_eq!((other.code, &other.out), (said.code, &said.out), "{args:?}");
+    }
+    assert_eq!(said.code, 1);
+    let file = tempfile::NamedTempFile::new().unwrap();
+    fs::write(file.path(), &said.out).unwrap();
+    let expected = "fault: not ok, 2 runs, 2 failed, told told\n\
+        missed: not ok, 1 runs, 0 failed, missed missed told missed met missed missed missed\n\
+        mock: ok, 1 runs, 0 failed, met told told met\n\
+        never: not ok, 1 runs, 1 failed, told told\n\
+        slide: ok, 6 runs, 0 failed, met met met met told told met met met met told told met met met\n";
+    assert_eq!(peer("verified.py", &[file.path().to_str().unwrap()]), expected);
+}
+
+#[test]
+fn seeds_can_be_overridden_and_each_run_recorded() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("records");
+    let said = say(&["verify", SLIDE, MOCK, "--seeds", "3", "--out", path.to_str().unwrap()]);
+    assert_eq!((said.code, said.err.as_str()), (0, ""), "{}", said.out);
+    let mut names: Vec<String> =
+        fs::read_dir(&path).unwrap().map(|entry| entry.unwrap().file_name().into_string().unwrap()).collect();
+    names.sort();
+    assert_eq!(names, ["mock.csv", "slide-1.csv", "slide-2.csv", "slide-3.csv"]);
+    let [first, second] = ["slide-1.csv", "slide-2.csv"].map(|name| fs::read_to_string(path.join(name)).unwrap());
+    assert!(first.contains("truth.x") && first != second, "another seed is other noise");
+    let alone = folder.path().join("alone.csv");
+    say(&["run", "graphs/hybrid.toml", "--for=4s", "--out", alone.to_str().unwrap()]);
+    assert!(fs::read(alone).unwrap() == fs::read(path.join("mock.csv")).unwrap(), "a run is a run");
+    assert_eq!(row(&said.out, "x", "response").len(), 9, "three seeds have no interval: {}", said.out);
+}
+
+/// The figure of a check in each run.
+fn values(scenario: &Scenario, trials: &[Trial], check: &str, figure: Figure) -> Vec<f64> {
+    let rows = scenario.rows(trials);
+    let row = rows.iter().find(|row| row.check == check && row.figure == figure).expect("it is asked");
+    row.values.iter().map(|value| value.expect("it is measured")).collect()
+}
+
+#[test]
+fn figures_of_the_truth_are_those_of_the_closed_form_whatever_the_seed() {
+    let scenario = Scenario::load(&catalogue(), &workspace().join(SLIDE)).unwrap_or_else(|report| {
+        panic!("{}", report.render(false));
+    });
+    let run = |seed| scenario.run(&catalogue(), seed, None, &|| false).expect("nobody interrupts it");
+    let trials: Vec<Trial> = scenario.runs().into_iter().map(run).collect();
+    // Ten samples of 2 exp(-t/tau), each 4 ms, have the mean of the last times a geometric sum.
+    let (tau, period) = (0.25, 0.004);
+    let sum: f64 = (0..10).map(|k| libm::exp(f64::from(k) * period / tau)).sum::<f64>() / 10.0;
+    let exact = tau * libm::log(2.0 * sum / 0.3);
+    for response in values(&scenario, &trials, "true_x", Figure::Response) {
+        assert!((0.0..period).contains(&(response - exact)), "{response}, not {exact}");
+    }
+    let measured = values(&scenario, &trials, "x", Figure::Error);
+    assert!(measured.iter().any(|error| *error != measured[0]), "a seed is noise: {measured:?}");
+    // White noise of 2 mN a tactel moves the centre of a contact of 3 N by some hundredths of a tactel.
+    assert!(values(&scenario, &trials, "noise", Figure::Std).iter().all(|std| (1e-3..1e-2).contains(std)));
+}
+
+/// A scenario of a text in a folder of its own; `TESTS` stands for the folder of the tests.
+fn written(files: &[(&str, &str)]) -> Result<Scenario, String> {
+    let folder = tempfile::tempdir().unwrap();
+    for (name, text) in files {
+        let text = text.replace("TESTS", workspace().join("tests").to_str().unwrap());
+        fs::write(folder.path().join(name), text).unwrap();
+    }
+    let (name, _) = files[0];
+    Scenario::load(&catalogue(), &folder.path().join(name)).map_err(|report| report.render(false))
+}
+
+#[test]
+fn a_value_that_is_held_is_no_sample_of_the_mean() {
+    // A tick each 2 ms, but a sample each 4 ms: ten of them are there after 36 ms, and no sooner.
+    let task = "graph = { rate_hz = 500, bench = 'TESTS/scenarios/benches/slide.toml' }\nroles.pad = 'tactile_pad'\n\
+        [parts.touch]\nfile = 'TESTS/../graphs/parts/touch.toml'\nin.image = 'pad.image'\n\
+        [nodes.error]\ntype = 'feature_error'\nin.x = 'touch.x'\nsetpoint.x = 0.0\n";
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("task.toml");
+    fs::write(&path, task.replace("TESTS", workspace().join("tests").to_str().unwrap())).unwrap();
+    let scenario = format!(
+        "[scenario]\ngraph = {path:?}\nfor_s = 2.0\nfrom = 'touch.present'\n\
+         [check.scalar]\nof = 'truth.force'\nsettles_to = 3.0\nwithin = 0.1\n\
+         [check.feature]\nof = 'error.error.x'\nsettles_to = 0.0\nwithin = 1.0\n"
+    );
+    let scenario = written(&[("held.toml", &scenario)]).unwrap();
+    let trial = scenario.run(&catalogue(), None, None, &|| false).unwrap();
+    for check in ["scalar", "feature"] {
+        let [response] = values(&scenario, std::slice::from_ref(&trial), check, Figure::Response)[..] else { panic!() };
+        assert!((response - 0.036).abs() < 1e-9, "{check}: {response}");
+    }
+}
+
+#[test]
+fn a_run_may_be_done_early_but_samples_may_not_end_early() {
+    let task = |modes: &str, pad: &str| {
+        format!(
+            "graph.clock = 'pad'\nroles.pad = 'tactile_pad'\nbind = {{ pad = 'pad', truth = 'pad' }}\n\
+             [devices.pad]\ntype = 'true_pad'\n{pad}\n\
+             [nodes.source]\ntype = 'tactile_source'\nin.image = 'pad.image'\n{modes}\n"
+        )
+    };
+    let run = |task: &str, asks: &str| {
+        let folder = tempfile::tempdir().unwrap();
+        let [graph, scenario] = ["task.toml", "scenario.toml"].map(|name| folder.path().join(name));
+        fs::write(&graph, task).unwrap();
+        let text = format!("[scenario]\ngraph = 'task.toml'\nfor_s = 2.0\n{asks}\n[check.x]\nof = 'truth.force'\n");
+        fs::write(&scenario, text).unwrap();
+        let loaded =
+            Scenario::load(&catalogue(), &scenario).unwrap_or_else(|report| panic!("{}", report.render(false)));
+        let trial = loaded.run(&catalogue(), None, None, &|| false).unwrap();
+        let marks: Vec<Mark> = loaded.rows(std::slice::from_ref(&trial)).iter().map(Row::mark).collect();
+        (trial, marks)
+    };
+    let modes = "[modes.feel]\ndone = { after_ms = 1000 }\n[modes.other]\ngo = { to = 'feel', after_ms = 10 }\n";
+    let with_modes = task(modes, "").replace("graph.clock = 'pad'", "graph = { clock = 'pad', start = 'other' }");
+    let (trial, marks) = run(&with_modes, "ends_in = 'done'\nstays_in = 'feel'");
+    assert_eq!((trial.failure, &marks[2..]), (None, &[Mark::Met; 2][..]));
+    assert!((trial.time - 1.012).abs() < 0.01, "{}", trial.time);
+    let only = with_modes.replace("to = 'feel', after_ms = 10", "to = 'feel', after_ms = 9000");
+    let (trial, marks) = run(&only, "ends_in = 'other'\nstays_in = 'feel'");
+    assert_eq!(
+        (trial.failure, &marks[2..]),
+        (None, &[Mark::Missed, Mark::Met][..]),
+        "a mode never reached, and the end"
+    );
+    // The last of two seconds of samples is a period before their end.
+    let (trial, _) = run(&task("", "for_s = 2.0"), "");
+    assert_eq!((trial.failure, (trial.time * 1e3).round()), (None, 1996.0));
+    let (trial, _) = run(&task("", "for_s = 1.9"), "");
+    assert_eq!(trial.failure.as_deref(), Some("the samples of a device end after 1.896 s"));
+    assert_eq!(trial.figures, [None, None]);
+}
+
+#[test]
+fn colours_are_for_those_who_ask() {
+    let [plain, asked] = ["never", "always"].map(|when| say(&["verify", MISSED, "--color", when]).out);
+    assert!(!plain.contains('\u{1b}'));
+    assert!(asked.contains("\u{1b}[1;31mMISSED\u{1b}[0m") && asked.contains("\u{1b}[32mmet\u{1b}[0m"));
+    let stripped = asked.replace("\u{1b}[1;31m", "").replace("\u{1b}[32m", "").replace("\u{1b}[0m", "");
+    assert_eq!(stripped, plain, "colours take no room");
+}
+
+#[test]
+fn what_cannot_be_a_scenario_is_told() {
+    let cases = [
+        ("[check.x]\nof = 'touch.x'\n", "error[missing-key]: the scenario has no section [scenario]"),
+        ("scenario = 3\n", "error[bad-value]: expected a table, found 3"),
+        ("check = 3\n[scenario]\n", "error[bad-value]: expected a table of checks, found 3"),
+        ("[scenario]\ngraph = 'x'\n[scenario]\n", "error[syntax]"),
+        (
+            "[scenario]\ngraph = 'live.toml'\nfor_s = 1.0\n[check.x]\nof = 'length.value'\n",
+            "error[wrong-role]: a device of this bench runs in real time, but a scenario in virtual time",
+        ),
+        (
+            "[scenario]\ngraph = 'TESTS/../graphs/hybrid.toml'\nbench = 'TESTS/scenarios/benches/slide.toml'\nfor_s = 1.0\n",
+            "error[unbound-role]: the bench binds role `arm` to no device",
+        ),
+        (
+            "[scenario]\ngraph = 'TESTS/scenarios/tasks/slide.toml'\nbench = 'no_device.toml'\nfor_s = 1.0\n",
+            "error[unknown-device]: the bench has no device `pda`",
+        ),
+        (
+            "[scenario]\ngraph = 'TESTS/scenarios/tasks/slide.toml'\nbench = 'live.toml'\nfor_s = 1.0\n",
+            "error[unbound-role]: the bench binds role `pad` to no device",
+        ),
+    ];
+    let live = "graph.rate_hz = 100\nroles.length = 'length'\nbind.length = 'length'\n\
+        [devices.length]\ntype = 'line_length'\naddress = '127.0.0.1:9'\n";
+    let no_device = "bind.pad = 'pda'\ndevices.pad.type = 'true_pad'\n";
+    for (text, message) in cases {
+        let files = [("scenario.toml", text), ("live.toml", live), ("no_device.toml", no_device)];
+        let said = written(&files).expect_err(text);
+        assert!(said.contains(message), "{text}: {said}");
+    }
+}
+
+#[test]
+fn check_knows_a_scenario_and_run_says_what_it_is() {
+    let good = say(&["check", SLIDE]);
+    let expected = format!("{SLIDE}: ok, a scenario of 6 runs, 4 s each; `verify` runs it\n");
+    assert_eq!((good.code, good.err.as_str(), good.out), (0, "", expected));
+    let bad = say(&["check", "tests/errors/scenarios/names.toml", "--format", "json"]);
+    assert!(bad.code == 2 && bad.out.contains("\"code\": \"unknown-mode\""), "{}", bad.out);
+    let set = say(&["check", SLIDE, "--set", "nodes.error.setpoint.x=1"]);
+    assert!(set.code == 2 && set.err.contains("is a scenario: it names its bench, and sets nothing"), "{}", set.err);
+    let run = say(&["run", SLIDE]);
+    assert!(run.code == 2 && run.err.contains("this is a scenario, not a graph"), "{}", run.err);
+    assert!(run.err.contains("help: `tactflow verify` runs it"), "{}", run.err);
+}
+
+#[test]
+fn ctrl_c_ends_it_cleanly_and_says_so() {
+    let folder = tempfile::tempdir().unwrap();
+    let endless = folder.path().join("endless.toml");
+    let tests = workspace().join("tests/scenarios/tasks/slide.toml");
+    let text = format!("[scenario]\ngraph = {tests:?}\nfor_s = 1e6\n[check.x]\nof = \"touch.x\"\nnever_above = 1.0\n");
+    fs::write(&endless, text).unwrap();
+    let [scenario, out] = [&endless, &folder.path().join("out")].map(|path| path.to_str().unwrap().to_owned());
+    let running = Running::start(&["verify", &scenario, "--out", &out], &Path::new(&out).join("endless.csv"));
+    running.signal("-INT");
+    let (_, said) = running.end();
+    assert_eq!((said.code, said.err.as_str()), (1, "error: interrupted: some runs are missing\n"));
+}
+
+#[test]
+fn the_page_shows_a_scenario_that_runs() {
+    let page = fs::read_to_string(workspace().join("docs/scenarios.md")).unwrap();
+    let shown = page.split("```toml\n").nth(1).and_then(|rest| rest.split("```").next()).unwrap();
+    assert_eq!(shown, fs::read_to_string(workspace().join(SLIDE)).unwrap());
+}
