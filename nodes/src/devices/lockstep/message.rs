@@ -284,5 +284,4 @@ fn list(numbers: &[f64]) -> String {
 }
 
 #[cfg(test)]
-#[path = "message_tests.rs"]
 mod tests;
