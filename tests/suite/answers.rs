@@ -88,7 +88,10 @@ fn a_description_says_everything_of_a_node() {
 fn a_description_says_what_a_kind_a_role_and_a_device_are() {
     let cases: [(&str, &[&str]); 3] = [
         ("twist", &["twist (kind)", "Taken by", "projector.twist twist, frame A", "Given by"]),
-        ("velocity_arm", &["velocity_arm (role)", "Filled by the devices: `mock_arm`, `sim_bench`, `lockstep`.", "Commands"]),
+        (
+            "velocity_arm",
+            &["velocity_arm (role)", "Filled by the devices: `mock_arm`, `sim_bench`, `lockstep`.", "Commands"],
+        ),
         ("mock_arm", &["mock_arm (device)", "Fills the roles: `velocity_arm`.", "Parameters"]),
     ];
     for (name, lines) in cases {

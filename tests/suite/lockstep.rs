@@ -186,7 +186,8 @@ fn the_graph_ends_with_a_ramp_and_says_why() {
     let (said, seen) = run("hybrid", "--scene none --seconds 9", &settings);
     assert_eq!(said.code, 0, "{}", said.err);
     assert_eq!((seen["end"].as_str(), number(&seen, "last_dq")), (Some("the time is over"), 0.0), "{seen}");
-    assert!(number(&seen, "step") <= 0.1 * 0.004 + 1e-9 && number(&seen, "commands") > 255.0, "{seen}");
+    // The command of the last tick is passed over, so the first step of the ramp may be two.
+    assert!(number(&seen, "step") <= 2.0 * 0.1 * 0.004 + 1e-9 && number(&seen, "commands") > 255.0, "{seen}");
     // A fault of the task: it has found nothing within its way.
     let (said, seen) = run("hybrid", "--scene none --seconds 9", &["--set", "modes.approach.fail.after_ms=500"]);
     assert_eq!((said.code, number(&seen, "last_dq")), (1, 0.0), "{seen}");
