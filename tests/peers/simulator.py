@@ -376,8 +376,10 @@ def main():
     args = parser.parse_args()
     world = World(args)
     with socket.create_server(("127.0.0.1", args.port)) as server:
+        server.settimeout(60.0)
         print(server.getsockname()[1], flush=True)
         connection, _ = server.accept()
+    connection.settimeout(60.0)
     with connection:
         link = Link(connection)
         seen = serve(link, args, world)

@@ -88,7 +88,10 @@ fn a_description_says_everything_of_a_node() {
 fn a_description_says_what_a_kind_a_role_and_a_device_are() {
     let cases: [(&str, &[&str]); 3] = [
         ("twist", &["twist (kind)", "Taken by", "projector.twist twist, frame A", "Given by"]),
-        ("velocity_arm", &["velocity_arm (role)", "Filled by the devices: `mock_arm`.", "Commands"]),
+        (
+            "velocity_arm",
+            &["velocity_arm (role)", "Filled by the devices: `mock_arm`, `sim_bench`, `lockstep`.", "Commands"],
+        ),
         ("mock_arm", &["mock_arm (device)", "Fills the roles: `velocity_arm`.", "Parameters"]),
     ];
     for (name, lines) in cases {
@@ -254,7 +257,7 @@ fn a_broken_graph_is_not_shown() {
 fn diagnostics_are_there_for_programs() {
     let said = json(&["check", HYBRID, "tests/errors/frame_mismatch.toml", "tests/errors/unread_node.toml"], 2);
     let lines = [
-        "graphs/hybrid.toml: ok True, 22 nodes, 0.004 s",
+        "graphs/hybrid.toml: ok True, 23 nodes, 0.004 s",
         "tests/errors/frame_mismatch.toml: ok False",
         "tests/errors/unread_node.toml: ok True, 17 nodes, 0.004 s",
     ];

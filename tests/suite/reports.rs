@@ -7,7 +7,8 @@ use tactflow_runtime::signal::{Mark, Pose, Signal};
 use tactflow_tests::workspace;
 
 fn engine(graph: &str) -> Engine {
-    let request = Request::file(workspace().join("graphs").join(graph));
+    let request =
+        Request::file(workspace().join("graphs").join(graph)).bench(workspace().join("graphs/benches/mock.toml"));
     Engine::new(plan(&catalogue(), &request).unwrap_or_else(|report| panic!("{}", report.render(false))))
 }
 

@@ -51,11 +51,7 @@ impl Engine {
         let names = plan.nodes.iter().map(|node| (node.name.clone(), plan.sources.locate(node.span.start))).collect();
         let view = view(plan.view, &ids, &ports);
         let limits = limits(&plan.nodes, &ports);
-        let commands = plan.commands.iter().map(|wire| (wire.source, &wire.name, wire.age, &wire.span));
-        let told = plan.reports.iter().map(|wire| (wire.source, &wire.name, wire.age, &wire.span));
-        let ends = commands.chain(told);
-        let mut watched: Vec<WatchedWire> =
-            ends.filter_map(|(source, name, age, span)| watched_end(name, age, span, ids[&source])).collect();
+        let mut watched = watched_ends(&plan.commands, &plan.reports, &ids);
         let slot = |command: PlannedCommand| CommandSlot::new(ids[&command.source], command);
         let slots = plan.commands.into_iter().map(slot).collect();
         let tell = |report: &PlannedReport| ReportSlot::new(ids[&report.source], report);
@@ -140,6 +136,13 @@ fn deck<'s>(device: PlannedDevice, report: impl Fn(usize) -> Option<&'s Shape>, 
         },
         failed: None,
     }
+}
+
+/// The commands and reports whose age does more than that they ramp to zero or fall silent.
+fn watched_ends(commands: &[PlannedCommand], reports: &[PlannedReport], ids: &Ids) -> Vec<WatchedWire> {
+    let commands = commands.iter().map(|wire| (wire.source, &wire.name, wire.age, &wire.span));
+    let ends = commands.chain(reports.iter().map(|wire| (wire.source, &wire.name, wire.age, &wire.span)));
+    ends.filter_map(|(source, name, age, span)| watched_end(name, age, span, ids[&source])).collect()
 }
 
 /// A command or a report whose age does more than that it ramps to zero or falls silent.

@@ -174,7 +174,10 @@ mod tests {
         let room = Joints::arena(&bus.arenas)[0].0.as_ptr();
         let mut tell = |wanted: Option<i64>, now: i64| {
             let mark = &mut bus.marks[source.mark as usize];
-            wanted.map_or_else(|| mark.lose(1), |nanos| mark.renew(1, Stamp { nanos, device: 0 }));
+            match wanted {
+                Some(nanos) => mark.renew(1, Stamp { nanos, device: 0 }),
+                None => mark.lose(1),
+            }
             Joints::arena_mut(&mut bus.arenas)[source.slot as usize].0.fill(now as f64);
             report.commit(&bus, &mut commands, &Tick { now, ..Tick::first() });
             let told = commands.report::<Joints>(1).map(|joints| (joints.0[1], joints.0.as_ptr()));

@@ -53,9 +53,7 @@ pub(crate) fn plan_in(mut loader: Loader, catalogue: &Catalogue, request: &Reque
     shown.check_units(&builder.ports, &mut builder.found);
     let wiring = Wiring { order: &order, wires: &wires, commands: &commands };
     let modes = modes::plan(&mut builder, &mut nodes, &wiring);
-    let (told, driven): (Vec<&CommandWire>, Vec<&CommandWire>) = commands.iter().partition(|wire| wire.is_report);
-    let planned: Vec<PlannedCommand> = driven.into_iter().filter_map(|wire| builder.command(wire)).collect();
-    let reports: Vec<PlannedReport> = told.into_iter().filter_map(|wire| builder.report(wire)).collect();
+    let (planned, reports) = ends(&mut builder, &commands);
     let policy = flat.policy.as_ref().and_then(|(_, policy)| policy.clone()).unwrap_or_default();
     let roles = builder.planned_roles(&policy);
     let ports = std::mem::take(&mut builder.ports);
@@ -98,6 +96,13 @@ pub(crate) fn plan_in(mut loader: Loader, catalogue: &Catalogue, request: &Reque
         facts,
         view,
     })
+}
+
+/// What the devices are told: commands, and reports.
+fn ends(builder: &mut Builder<'_>, wires: &[CommandWire]) -> (Vec<PlannedCommand>, Vec<PlannedReport>) {
+    let (reports, commands): (Vec<&CommandWire>, Vec<&CommandWire>) = wires.iter().partition(|wire| wire.is_report);
+    let commands = commands.into_iter().filter_map(|wire| builder.command(wire)).collect();
+    (commands, reports.into_iter().filter_map(|wire| builder.report(wire)).collect())
 }
 
 /// For those who run the tool with `-v`.

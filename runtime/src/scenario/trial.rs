@@ -242,6 +242,8 @@ mod tests {
         let figures = vec![Figure::Response, Figure::Error, Figure::Std];
         let check = |after, steady| Check {
             column: String::new(),
+            minus: None,
+            modulo: None,
             unit: 1.0,
             settles: Some((0.0, 0.3)),
             after,

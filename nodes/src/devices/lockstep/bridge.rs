@@ -64,7 +64,7 @@ impl Bridge {
             }
         }
         // A frame that is a little ahead is shown at once: the simulator's clock need not beat exactly.
-        if let Some((stamp, obs)) = self.pending.take_if(|(stamp, _)| *stamp <= now.saturating_add(self.period)) {
+        if let Some((stamp, obs)) = self.pending.take_if(|(stamp, _)| *stamp < now.saturating_add(self.period)) {
             self.show(stamp, &obs, samples);
         }
         Ok(())

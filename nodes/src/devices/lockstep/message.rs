@@ -211,8 +211,8 @@ fn mount(m: &[f64]) -> Result<Mount, String> {
         return Err("`T_es` is no pose: its last row is not 0, 0, 0, 1; it is row-major, flange to sensor".into());
     }
     let error = (rotation.transpose() * rotation - Matrix3::identity()).amax();
-    // Not `>`: a product that overflows is no rotation.
-    if !(error <= TOLERANCE) {
+    // A product that overflows is no rotation.
+    if error.is_nan() || error > TOLERANCE {
         return Err(format!(
             "`T_es` is no pose: its rotation is off by {error:.1e} from one that keeps lengths and angles"
         ));
@@ -284,5 +284,4 @@ fn list(numbers: &[f64]) -> String {
 }
 
 #[cfg(test)]
-#[path = "message_tests.rs"]
 mod tests;

@@ -130,7 +130,14 @@ fn arm(hello: &Hello, params: &Params) -> Result<Filled, Mistakes> {
             mistake.help(format!("give its file: `urdf = \"{}.urdf\"`; built in is {}", stem(&hello.urdf), models()))
         })?,
     };
-    let chain = load(&urdf, &hello.tip, &hello.mount)?;
+    let chain = load(&urdf, &hello.tip, &hello.mount).map_err(|mistakes| {
+        // The tip is the simulator's word, and stands in no file.
+        let of_hello = |mistake: Mistake| match mistake.at {
+            At::Param(_) => refusal(&params.address, mistake.message),
+            _ => vec![mistake],
+        };
+        mistakes.into_iter().flat_map(of_hello).collect::<Mistakes>()
+    })?;
     let model: Vec<&str> = chain.joints().iter().map(|joint| joint.name.as_str()).collect();
     if hello.joints != model {
         let why =
