@@ -62,7 +62,7 @@ pub fn ground_truth() -> RoleType {
             scalar("x", "Centre of pressure in the sensor's frame; absent without contact [m].", &["m"]),
             scalar("y", "Centre of pressure in the sensor's frame; absent without contact [m].", &["m"]),
             scalar("pressure", PRESSURE, &["N/tactel"]),
-            scalar("orientation", ORIENTATION, &["rad"]),
+            scalar("orientation", ORIENTATION, &["rad mod pi"]),
             scalar("area", "Area of the contact [m²].", &["m2"]),
             scalar("depth", "Greatest depth that the object is pressed in [m].", &["m"]),
             port("image", "The image without noise, spread and drift [N].", Kind::Image, &["N", "self"]),

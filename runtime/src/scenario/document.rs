@@ -32,8 +32,6 @@ crate::params! { CheckTable:
     of: Word,
     /// Port, or part of one, that is taken off it: the truth off what was measured, say.
     minus: Option<Word>,
-    /// Period of the number, which is brought to half of it on either side of 0: half a turn for the angle of a line [unit of the check].
-    modulo: Option<Positive>,
     /// What it settles to [unit of the check].
     settles_to: Option<f64>,
     /// How near that is near enough [unit of the check].

@@ -160,9 +160,9 @@ impl Lookup<'_> {
             row(&block.key.name, &table.of.text, *figure, &unit_name, *bound, paper)
         });
         let check = Check {
-            column: column.name,
             minus,
-            modulo: table.modulo.map(|period| *period),
+            period: column.unit.is_axial().then(|| std::f64::consts::PI / unit),
+            column: column.name,
             unit,
             settles: table.settles_to.zip(table.within.map(|within| *within)),
             after: table.after_s.map(|after| *after),

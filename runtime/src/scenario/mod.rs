@@ -53,8 +53,8 @@ struct Check {
     column: String,
     /// The number that is taken off.
     minus: Option<String>,
-    /// Period of the difference [unit of the check].
-    modulo: Option<f64>,
+    /// Half a turn, if it is the direction of a line [unit of the check].
+    period: Option<f64>,
     /// How much its unit is in the port's.
     unit: f64,
     /// What it settles to, and how near.

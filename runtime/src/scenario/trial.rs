@@ -168,7 +168,7 @@ impl<'s> Watch<'s> {
         let time = seconds(engine.now() - zero);
         for (((eye, minus), check), readings) in self.eyes.iter().zip(&self.scenario.checks).zip(&mut self.readings) {
             let off = minus.map_or(0.0, |minus| self.row[minus.column]);
-            let value = check.wrapped((self.row[eye.column] - off) / check.unit);
+            let value = check.nearest((self.row[eye.column] - off) / check.unit);
             readings.push(Reading { time, value, is_new: eye.is_new(engine) });
         }
     }
@@ -194,9 +194,10 @@ impl<'s> Watch<'s> {
 }
 
 impl Check {
-    /// A value within half a period on either side of 0, if it has one.
-    fn wrapped(&self, value: f64) -> f64 {
-        self.modulo.map_or(value, |period| value - period * (value / period).round())
+    /// A direction as it is nearest to where it settles, or to 0: lines know no half turns.
+    fn nearest(&self, value: f64) -> f64 {
+        let about = self.settles.map_or(0.0, |(target, _)| target);
+        self.period.map_or(value, |period| value - period * ((value - about) / period).round())
     }
 
     /// Its figures, of what was read from time 0 on.
@@ -243,7 +244,7 @@ mod tests {
         let check = |after, steady| Check {
             column: String::new(),
             minus: None,
-            modulo: None,
+            period: None,
             unit: 1.0,
             settles: Some((0.0, 0.3)),
             after,
