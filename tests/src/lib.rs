@@ -8,6 +8,7 @@ pub mod true_pad;
 use std::path::{Path, PathBuf};
 
 use tactflow_runtime::catalogue::Catalogue;
+use tactflow_runtime::graph::Request;
 
 /// The folder of the workspace.
 #[must_use]
@@ -19,6 +20,12 @@ pub fn workspace() -> &'static Path {
 #[must_use]
 pub fn shipped_graphs() -> Vec<PathBuf> {
     toml_files(&workspace().join("graphs"))
+}
+
+/// A task that ships, on the bench whose pad and arm do as they are told.
+#[must_use]
+pub fn on_the_mock_bench(task: &str) -> Request {
+    Request::file(workspace().join("graphs").join(task)).bench(workspace().join("graphs/benches/mock.toml"))
 }
 
 /// The TOML files of a folder, sorted by name.

@@ -11,6 +11,7 @@ use crate::tool::{Said, peer, said, say, tool};
 
 const PRESS: &str = "graphs/finger_press.toml";
 const HYBRID: &str = "graphs/hybrid.toml";
+const MOCK: &str = "--bench=graphs/benches/mock.toml";
 const BREAKS: &str = "tests/data/breaks.toml";
 const PROBE: &str = "tests/data/probe.toml";
 
@@ -31,7 +32,7 @@ fn what_goes_well_ends_with_0_and_says_nothing_on_stderr() {
         assert!(run.out.contains(text), "`{text}` is not in\n{}", run.out);
     }
     let check = say(&["check", PRESS, HYBRID]);
-    let expected = format!("{PRESS}: ok, 22 nodes, a tick each 100 ms\n{HYBRID}: ok, 22 nodes, a tick each 4 ms\n");
+    let expected = format!("{PRESS}: ok, 22 nodes, a tick each 100 ms\n{HYBRID}: ok, 24 nodes, a tick each 4 ms\n");
     assert_eq!((check.code, check.err.as_str(), check.out), (0, "", expected));
 }
 
@@ -40,7 +41,7 @@ fn a_run_that_faults_ends_with_1_and_names_node_port_and_tick() {
     let glitch = "devices.pad.glitch=[{ at_s = 0.1, for_s = 1.0, kind = 'nan' }]";
     let cases: [(&[&str], &str); 3] = [
         (
-            &["run", HYBRID, "--set", glitch],
+            &["run", HYBRID, MOCK, "--set", glitch],
             "`pad.image` is not a finite number in tick 26 at 0.100 s (graphs/benches/mock.toml:6:10)",
         ),
         (&["run", BREAKS], "`bad.value` is not a finite number in tick 10 at 0.036 s (tests/data/breaks.toml:13:8)"),
@@ -70,9 +71,9 @@ fn a_command_line_that_is_not_understood_ends_with_2() {
         (&["walk"], "unrecognized subcommand 'walk'"),
         (&["run"], "<GRAPH>"),
         (&["check"], "<GRAPHS>"),
-        (&["run", HYBRID, "--four", "1s"], "unexpected argument '--four'"),
-        (&["run", HYBRID, "--for", "1"], "give a time with its unit: 20s, 500ms, 2min, 1h"),
-        (&["run", HYBRID, "--for", "-1s"], "error:"),
+        (&["run", HYBRID, MOCK, "--four", "1s"], "unexpected argument '--four'"),
+        (&["run", HYBRID, MOCK, "--for", "1"], "give a time with its unit: 20s, 500ms, 2min, 1h"),
+        (&["run", HYBRID, MOCK, "--for", "-1s"], "error:"),
         (&["check", HYBRID, "--color", "pink"], "[possible values: auto, always, never]"),
     ];
     for (args, message) in cases {
@@ -90,9 +91,9 @@ fn a_file_that_does_not_load_or_cannot_be_made_ends_with_2() {
         (&["check", "nowhere.toml"], format!("error[unreadable]: cannot read `nowhere.toml`: {missing}")),
         (&["check", "graphs"], "error[unreadable]: cannot read `graphs`: Is a directory (os error 21)".into()),
         (&["run", HYBRID, "--bench", "nowhere.toml"], format!("cannot read `nowhere.toml`: {missing}")),
-        (&["run", HYBRID, "--out", "rows.xlsx"], "error: `rows.xlsx` is neither .csv nor .ndjson\n".into()),
+        (&["run", HYBRID, MOCK, "--out", "rows.xlsx"], "error: `rows.xlsx` is neither .csv nor .ndjson\n".into()),
         (
-            &["run", HYBRID, "--out", "nowhere/rows.csv"],
+            &["run", HYBRID, MOCK, "--out", "nowhere/rows.csv"],
             format!("error: cannot create `nowhere/rows.csv`: {missing}\n"),
         ),
     ];
@@ -115,7 +116,7 @@ fn one_broken_graph_among_several_is_shown_and_the_others_are_checked() {
 #[test]
 fn for_ends_a_run_in_the_graphs_time() {
     for (time, ticks) in [("100ms", 26), ("1s", 251), ("0.05min", 751)] {
-        let run = say(&["run", HYBRID, "--for", time]);
+        let run = say(&["run", HYBRID, MOCK, "--for", time]);
         let ending = run.out.lines().last().unwrap();
         assert_eq!(run.code, 0);
         assert!(ending.starts_with("the time is over") && ending.contains(&format!(" {ticks} ticks;")), "{ending}");
@@ -148,7 +149,7 @@ fn another_bench_is_another_pad() {
     let text = text.replace("rate_hz = 250", "rate_hz = 500").replace("../robots/lwr4p.urdf", urdf.to_str().unwrap());
     fs::write(&bench, text).unwrap();
     let run = say(&["run", HYBRID, "--bench", &bench, "--for", "1s"]);
-    assert!(run.out.starts_with(&format!("{HYBRID}: 22 nodes, a tick each 2 ms\n")), "{}", run.out);
+    assert!(run.out.starts_with(&format!("{HYBRID}: 24 nodes, a tick each 2 ms\n")), "{}", run.out);
 }
 
 /// The line of a port or of a part of one in the table of what came out.
@@ -200,7 +201,7 @@ fn a_mistake_in_set_points_into_set() {
         ("graph.clock=pda", "bad-clock", "1:13", "the clock `pda` is not a role"),
     ];
     for (assignment, code, place, message) in cases {
-        let Said { code: exit, err, .. } = say(&["check", HYBRID, "--set", assignment]);
+        let Said { code: exit, err, .. } = say(&["check", HYBRID, MOCK, "--set", assignment]);
         assert_eq!(exit, 2, "{assignment}");
         let title = format!("error[{code}]: {message}\n");
         let at = err.find(&title).unwrap_or_else(|| panic!("{assignment}: `{title}` is not in\n{err}"));
@@ -212,10 +213,11 @@ fn a_mistake_in_set_points_into_set() {
 
 #[test]
 fn rows_are_read_by_a_reader_that_is_not_ours_and_say_the_same_in_both_formats() {
-    for (graph, rows) in [(PRESS, "309 rows, 134 columns, "), (HYBRID, "1000 rows, 134 columns, ")] {
+    for (graph, rows) in [(PRESS, "309 rows, 134 columns, "), (HYBRID, "1000 rows, 147 columns, ")] {
         let [csv, ndjson] = ["rows.csv", "rows.ndjson"].map(|name| {
             let (_folder, path) = in_new_folder(name);
-            let run = say(&["run", graph, "--out", &path]);
+            let bench = if graph == HYBRID { &[MOCK][..] } else { &[] };
+            let run = say(&[&["run", graph, "--out", &path], bench].concat());
             assert_eq!((run.code, run.err.as_str()), (0, ""));
             assert_eq!(run.out.lines().last().unwrap(), format!("wrote {path}"));
             peer("rows.py", &[&path])
@@ -311,7 +313,7 @@ impl Running {
 fn ctrl_c_ends_an_endless_run_cleanly_and_soon() {
     for (pace, signal) in [(None, "-INT"), (Some("--realtime"), "-INT"), (Some("--realtime"), "-TERM")] {
         let (_folder, path) = in_new_folder("rows.csv");
-        let mut args = vec!["run", HYBRID, "--set=devices.pad.for_s=1e9", "--out", &path];
+        let mut args = vec!["run", HYBRID, MOCK, "--set=devices.pad.for_s=1e9", "--out", &path];
         args.extend(pace);
         let running = Running::start(&args, Path::new(&path));
         running.signal(signal);
@@ -346,7 +348,7 @@ fn help_names_every_option() {
 
 #[test]
 fn a_reader_that_has_seen_enough_is_no_mistake() {
-    let mut child = tool(&["run", HYBRID]).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+    let mut child = tool(&["run", HYBRID, MOCK]).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
     drop(child.stdout.take());
     let said = child.wait_with_output().unwrap();
     assert_eq!((said.status.code(), String::from_utf8_lossy(&said.stderr).as_ref()), (Some(0), ""));
@@ -368,7 +370,7 @@ fn what_cannot_be_printed_is_told_and_ends_with_1() {
 fn a_file_that_no_run_has_recorded_is_not_overwritten() {
     let (_folder, path) = in_new_folder("precious.csv");
     fs::write(&path, "DATA_TYPE MOVIE\n").unwrap();
-    let said = say(&["run", HYBRID, "--out", &path]);
+    let said = say(&["run", HYBRID, MOCK, "--out", &path]);
     assert_eq!(
         (said.code, said.err.contains("is no record of a run: it is not overwritten")),
         (2, true),
@@ -378,7 +380,7 @@ fn a_file_that_no_run_has_recorded_is_not_overwritten() {
     assert_eq!(fs::read_to_string(&path).unwrap(), "DATA_TYPE MOVIE\n");
     let (_folder, path) = in_new_folder("again.csv");
     for _ in 0..2 {
-        assert_eq!(say(&["run", HYBRID, "--for", "1s", "--out", &path]).code, 0, "a record may be made anew");
+        assert_eq!(say(&["run", HYBRID, MOCK, "--for", "1s", "--out", &path]).code, 0, "a record may be made anew");
     }
 }
 
@@ -401,7 +403,7 @@ fn the_readme_shows_what_the_tool_prints() {
 #[test]
 fn a_record_tells_the_mode_and_when_commands_are_held() {
     let (_folder, path) = in_new_folder("modes.csv");
-    say(&["run", HYBRID, "--for", "1s", "--send", "0.8s:stop", "--send", "0.9s:resume", "--out", &path]);
+    say(&["run", HYBRID, MOCK, "--for", "1s", "--send", "0.8s:stop", "--send", "0.9s:resume", "--out", &path]);
     let text = fs::read_to_string(path).unwrap();
     let rows: Vec<Vec<&str>> =
         text.lines().filter(|line| !line.starts_with('#')).map(|line| line.split(',').take(3).collect()).collect();

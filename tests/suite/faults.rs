@@ -6,13 +6,13 @@ use std::sync::{Arc, Mutex};
 use tactflow_runtime::device::{Commands, DeviceError, DeviceType, Driver, Opened, Samples, Stepped};
 use tactflow_runtime::engine::{End, Engine, RunOptions, run};
 use tactflow_runtime::fault::Cause;
-use tactflow_runtime::graph::{Request, plan};
+use tactflow_runtime::graph::plan;
 use tactflow_runtime::harness::GraphRig;
 use tactflow_runtime::node::{Mistakes, Node, Setup, Tick};
 use tactflow_runtime::node::{ParamSpec, Reader, Value};
 use tactflow_runtime::signal::Freshness;
 use tactflow_tests::nodes::length_by_hand;
-use tactflow_tests::{catalogue, workspace};
+use tactflow_tests::{catalogue, on_the_mock_bench};
 
 fn rig(how: &str) -> GraphRig {
     let text = format!(
@@ -120,7 +120,7 @@ fn a_device_that_panics_is_a_fault_of_the_device() {
 
 /// The hybrid task on the mock bench, whose pad gives a NaN in the middle of a press.
 fn hybrid_with_a_nan() -> Engine {
-    let request = Request::file(workspace().join("graphs/hybrid.toml"));
+    let request = on_the_mock_bench("hybrid.toml");
     let request = request.set("devices.pad.glitch=[{ at_s = 1.0, for_s = 0.1, kind = 'nan' }]");
     Engine::new(plan(&catalogue(), &request).unwrap_or_else(|report| panic!("{}", report.render(false))))
 }
@@ -208,7 +208,7 @@ impl DeviceType for SpyType {
 #[test]
 fn an_arm_is_told_to_stand_still_though_the_device_before_it_has_failed() {
     let told = Arc::new(Mutex::new(Vec::new()));
-    let request = Request::file(workspace().join("graphs/hybrid.toml"))
+    let request = on_the_mock_bench("hybrid.toml")
         .set("devices.arm.type='spy_arm'")
         .set("devices.pad.press=[{ from_s = 0.3, force = 3.0, at = [0.008, -0.004] }]")
         .set("devices.pad.glitch=[{ at_s = 0.8, for_s = 5, kind = 'unplug' }]");

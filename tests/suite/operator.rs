@@ -13,6 +13,7 @@ use tactflow_tests::nodes::length_by_hand;
 use crate::tool::{say, tool};
 
 const HYBRID: &str = "graphs/hybrid.toml";
+const MOCK: &str = "--bench=graphs/benches/mock.toml";
 
 #[test]
 fn the_last_of_several_words_counts() {
@@ -92,7 +93,7 @@ fn what_is_left_of_the_devices_plays_to_its_end() {
 /// Runs the hybrid task by the wall clock, with lines on the standard input and then its end.
 fn heard(lines: &str) -> (i32, String, Duration) {
     let begin = Instant::now();
-    let mut command: Command = tool(&["run", HYBRID, "--realtime", "--listen", "--for", "3s"]);
+    let mut command: Command = tool(&["run", HYBRID, MOCK, "--realtime", "--listen", "--for", "3s"]);
     let mut child = command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
     child.stdin.take().unwrap().write_all(lines.as_bytes()).unwrap();
     let output = child.wait_with_output().unwrap();
@@ -111,7 +112,7 @@ fn a_stop_after_which_the_standard_input_ends_ends_the_run() {
 
 #[test]
 fn a_stop_that_nobody_can_end_says_so_and_what_would() {
-    let stop = say(&["run", HYBRID, "--send", "0.2s:stop"]);
+    let stop = say(&["run", HYBRID, MOCK, "--send", "0.2s:stop"]);
     let expected = "error: the operator stopped it in tick 51 at 0.200 s; every command went to zero, and nobody was \
                     left to send `resume`: `--send 2s:resume` does, or a line with `--listen`\n";
     assert_eq!(stop.code, 1);
@@ -120,7 +121,7 @@ fn a_stop_that_nobody_can_end_says_so_and_what_would() {
 
 #[test]
 fn words_for_times_of_the_graph_give_the_same_run_twice() {
-    let args = ["run", HYBRID, "--for", "1s", "--send", "0.2s:stop", "--send", "0.5s:resume"];
+    let args = ["run", HYBRID, MOCK, "--for", "1s", "--send", "0.2s:stop", "--send", "0.5s:resume"];
     let [first, second] = [say(&args), say(&args)];
     assert_eq!(first.code, 0, "{}", first.err);
     assert!(first.out.contains("stopped for 0.300 s: the operator stopped it in tick 51 at 0.200 s"), "{}", first.out);
@@ -139,10 +140,10 @@ fn a_word_that_nothing_waits_for_is_told() {
     assert!(rig.engine.is_stopped());
     let why = "`back` is not heard while the commands wait for `resume`";
     assert_eq!(rig.engine.send("back"), Err(why.into()));
-    let refused = say(&["run", HYBRID, "--send", "1s:bck"]);
+    let refused = say(&["run", HYBRID, MOCK, "--send", "1s:bck"]);
     assert_eq!((refused.code, refused.out.as_str()), (2, ""));
     assert!(refused.err.contains("nothing waits for the word `bck`: words here: `resume`, `stop`"), "{}", refused.err);
-    let late = say(&["run", HYBRID, "--for", "1s", "--send", "9s:stop"]);
+    let late = say(&["run", HYBRID, MOCK, "--for", "1s", "--send", "9s:stop"]);
     assert_eq!(late.code, 0);
     assert!(late.err.contains("`stop` was not sent: the run ended before 9 s"), "{}", late.err);
 }

@@ -4,12 +4,12 @@
 use proptest::prelude::*;
 use tactflow_runtime::engine::{End, Engine, RunOptions, run};
 use tactflow_runtime::fault::Fault;
-use tactflow_runtime::graph::{Request, plan};
+use tactflow_runtime::graph::plan;
 use tactflow_runtime::harness::GraphRig;
 use tactflow_runtime::signal::{Features, Freshness};
 use tactflow_tests::nodes::length_by_hand;
 use tactflow_tests::saboteur::{How, Sabotage, sabotaged};
-use tactflow_tests::{catalogue, workspace};
+use tactflow_tests::{catalogue, on_the_mock_bench};
 
 /// A trouble from 0.8 s to 1.0 s, and what a fault says of it.
 #[derive(Debug, Clone, Copy)]
@@ -48,7 +48,7 @@ fn engine(case: Case, policy: &str) -> Engine {
 }
 
 fn engine_with(case: Case, policy: &str, set: &[&str]) -> Engine {
-    let mut request = Request::file(workspace().join("graphs/hybrid.toml"))
+    let mut request = on_the_mock_bench("hybrid.toml")
         .set("devices.pad.press=[{ from_s = 0.3, force = 3.0, at = [0.008, -0.004] }]")
         .set("devices.pad.for_s=9.0")
         .set(format!("policy.{}='{policy}'", case.key));

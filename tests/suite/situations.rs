@@ -17,7 +17,7 @@ use tactflow_runtime::graph::{Item, Plan, Request, plan};
 use tactflow_runtime::node::PortId;
 use tactflow_runtime::signal::{Signal, Twist};
 use tactflow_tests::saboteur::{How, Sabotage, sabotaged};
-use tactflow_tests::{catalogue, toml_files, workspace};
+use tactflow_tests::{catalogue, on_the_mock_bench, toml_files, workspace};
 
 /// What happens to which graph.
 #[derive(Debug, Deserialize)]
@@ -171,7 +171,7 @@ impl Watch {
 }
 
 fn graph(name: &str) -> Request {
-    Request::file(workspace().join(format!("graphs/{name}.toml")))
+    on_the_mock_bench(&format!("{name}.toml"))
 }
 
 fn check(path: &Path) {

@@ -92,6 +92,8 @@ pub struct SimBench {
     last: Option<i64>,
     /// Images that were taken and are not there yet, with their stamps.
     taken: VecDeque<(i64, Vec<f32>)>,
+    /// Room for images to come.
+    spare: Vec<Vec<f32>>,
     /// Number of images that were shown.
     shown: u64,
     /// Number of exchanges that brought time on.
@@ -268,14 +270,29 @@ impl SimBench {
             Object::new(thing, from, [scatter.uniform(-most, most), scatter.uniform(-most, most)])
         };
         let objects = params.objects.iter().map(place).collect::<Result<Vec<_>, _>>()?;
-        let contact = Contact::new(shape.clone(), params.foam.clone(), *params.points_apart);
+        let contact = Contact::new(shape.clone(), params.foam.clone(), *params.points_apart, objects.len());
         let imprint = Imprint::new(&shape, contact.fine(), *params.foam.spread);
-        let readout = Readout::new(shape.tactels(), params.electronics, params.seed);
+        let tactels = shape.tactels();
+        let readout = Readout::new(tactels, params.electronics, params.seed);
         let world = World::new(arm, objects, contact, imprint, shape, *params.step_s);
         let end = params.for_s.map_or(i64::MAX, |end| nanos(*end));
         let (latency, threshold) = (nanos(*params.latency_s), *params.threshold);
-        let taken = VecDeque::new();
-        Ok(Self { world, readout, joints, period, latency, end, last: None, taken, shown: 0, sequence: 0, threshold })
+        let frames = (latency / period) as usize + 2;
+        let (taken, spare) = (VecDeque::with_capacity(frames), vec![vec![0.0; tactels]; frames]);
+        Ok(Self {
+            world,
+            readout,
+            joints,
+            period,
+            latency,
+            end,
+            last: None,
+            taken,
+            spare,
+            shown: 0,
+            sequence: 0,
+            threshold,
+        })
     }
 
     /// Goes on to `now` [ns]; an image is taken at each beat on the way.
@@ -285,7 +302,11 @@ impl SimBench {
         while beat <= now {
             self.world.advance(beat as f64 * 1e-9, velocity);
             let forces = self.world.image();
-            let mut counts = vec![0.0; forces.len()];
+            let mut counts = match self.spare.pop() {
+                Some(room) => room,
+                // The oldest, which nobody has asked for in time, gives way.
+                None => self.taken.pop_front().expect("there is room for an image").1,
+            };
             self.readout.read(self.period as f64 * 1e-9, forces, &mut counts);
             self.taken.push_back((beat, counts));
             beat += self.period;
@@ -298,13 +319,11 @@ impl SimBench {
 
     /// Shows the newest image that is there by `now`.
     fn show(&mut self, now: i64, samples: &mut Samples) {
-        let mut newest = None;
         while self.taken.front().is_some_and(|(stamp, _)| stamp + self.latency <= now) {
-            newest = self.taken.pop_front();
+            let (stamp, counts) = self.taken.pop_front().expect("it was there");
             self.shown += 1;
-        }
-        if let Some((stamp, counts)) = newest {
             samples.write::<Image>(0, stamp, self.shown).cells_mut().copy_from_slice(&counts);
+            self.spare.push(counts);
         }
     }
 }

@@ -124,9 +124,9 @@ impl Touch {
 const NONE: u32 = u32::MAX;
 
 impl Contact {
-    /// A pad that touches nothing, felt at points that are `apart` at most [m].
+    /// A pad that touches nothing, felt at points that are `apart` at most [m], with room for so many objects.
     #[must_use]
-    pub fn new(shape: ImageShape, foam: Foam, apart: f64) -> Self {
+    pub fn new(shape: ImageShape, foam: Foam, apart: f64, objects: usize) -> Self {
         let side = shape.pitch[0].max(shape.pitch[1]);
         let fine = (side / apart - 1e-9).ceil().max(1.0) as usize;
         let area = shape.pitch[0] * shape.pitch[1];
@@ -136,13 +136,13 @@ impl Contact {
             fine,
             column: Column::new(&foam, area / points as f64),
             shear: *foam.shear * area / (0.005 * 0.005),
-            touching: Vec::new(),
+            touching: Vec::with_capacity(shape.tactels() * points),
             tactels: vec![Tactel::default(); shape.tactels()],
             slots: vec![NONE; shape.tactels() * points],
             xs: (0..shape.cols * fine).map(|point| shape.x(along(point))).collect(),
             ys: (0..shape.rows * fine).map(|point| shape.y(along(point))).collect(),
             near: Vec::with_capacity(shape.cols),
-            slides: Vec::new(),
+            slides: Vec::with_capacity(objects),
             wrench: Wrench::default(),
             shape,
             foam,

@@ -62,7 +62,7 @@ fn lossless() -> Foam {
 fn world(arm: Arm, foam: Foam, things: &[Thing], step: f64) -> World {
     let from = start(&arm);
     let objects = things.iter().map(|thing| Object::new(thing, from, [0.0; 2]).unwrap()).collect();
-    let contact = Contact::new(shape(), foam.clone(), 0.001);
+    let contact = Contact::new(shape(), foam.clone(), 0.001, 8);
     let imprint = Imprint::new(&shape(), contact.fine(), *foam.spread);
     World::new(arm, objects, contact, imprint, shape(), step)
 }
@@ -115,7 +115,7 @@ fn a_ball_leaves_a_disc_whose_area_grows_as_hertz_has_it() {
     for radius in [0.02, 0.04, 0.1] {
         for depth in [0.0005, 0.001, 0.002] {
             let object = object(&ball(radius, [0.0007, -0.0011, radius]));
-            let mut contact = Contact::new(shape(), lossless(), 0.001);
+            let mut contact = Contact::new(shape(), lossless(), 0.001, 8);
             contact.step(0.001, &pad(depth), &[object], &mut [Vec3::ZERO]);
             // a² = 2 R d - d², and the force is the foundation's modulus times the volume of the cap.
             let area = std::f64::consts::PI * (2.0 * radius * depth - depth * depth);
@@ -191,7 +191,7 @@ fn the_step_does_not_matter() {
 #[test]
 fn friction_stays_in_its_cone_sticks_and_slips() {
     let objects = [object(&thing(Look::Plane, [0.0, 0.0, 0.0]))];
-    let mut contact = Contact::new(shape(), Foam::USUAL, 0.001);
+    let mut contact = Contact::new(shape(), Foam::USUAL, 0.001, 8);
     let normal = 256.0 * 0.3;
     let mut slid = 0.0;
     let mut at_rest: f64 = 0.0;
@@ -222,7 +222,7 @@ fn a_load_at_the_rim_is_all_felt_and_one_in_the_middle_is_where_it_is() {
     let mut imprint = Imprint::new(&shape(), 5, 0.003);
     for (x, y) in [(0.0, 0.0), (0.0123, -0.0087), (0.038, 0.0), (-0.0385, 0.0385)] {
         let objects = [object(&ball(0.003, [x, y, 0.003]))];
-        let mut contact = Contact::new(shape(), Foam::USUAL, 0.001);
+        let mut contact = Contact::new(shape(), Foam::USUAL, 0.001, 8);
         contact.step(0.001, &pad(0.002), &objects, &mut [Vec3::ZERO]);
         imprint.take(contact.touching());
         let clean = imprint.forces();
