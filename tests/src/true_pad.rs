@@ -56,7 +56,13 @@ impl Device for TruePad {
             "image" => image.clone(),
             unit => ScalarShape::of(unit.parse().expect("it is a unit")).into(),
         });
-        let facts = vec![("threshold".into(), 0.015.into()), ("noise".into(), (*params.noise).into())];
+        let calibration = toml::Table::from_iter([("gain".to_owned(), 1.0.into())]);
+        let facts = vec![
+            ("threshold".into(), 0.015.into()),
+            ("pressure".into(), 0.1.into()),
+            ("calibration".into(), calibration.into()),
+            ("noise".into(), (*params.noise).into()),
+        ];
         let pad = Filled { role: "tactile_pad".into(), outputs: vec![image], commands: vec![], facts };
         let truth = Filled { role: "ground_truth".into(), outputs: truth.into(), commands: vec![], facts: vec![] };
         let random = params.seed;

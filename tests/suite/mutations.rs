@@ -209,7 +209,7 @@ fn difference(before: &str, after: &str) -> String {
 #[test]
 fn no_mutant_passes_silently() {
     const PRESS: [&str; 4] = ["finger_press.toml", "parts/touch.toml", "parts/move.toml", "benches/finger_press.toml"];
-    const HYBRID: [&str; 4] = ["hybrid.toml", "parts/touch.toml", "parts/move.toml", "benches/mock.toml"];
+    const HYBRID: [&str; 4] = ["hybrid.toml", "parts/touch.toml", "parts/move.toml", "benches/ball.toml"];
     let jobs = SEEDS.iter().flat_map(|seed| [(PRESS, *seed), (HYBRID, *seed)]);
     let results: Vec<_> = std::thread::scope(|scope| {
         let run = |(files, seed): ([&'static str; 4], u64)| {

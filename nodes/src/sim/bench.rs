@@ -66,7 +66,7 @@ params! {
     start: Vec<f64>,
     /// Stiffness of the joints [N m/rad].
     stiffness: Positive = Positive(200.0),
-    /// Damping of the joints, of critical damping.
+    /// Damping of the joints, of critical damping [1].
     damping_ratio: NonNegative = NonNegative(0.2),
     /// Inertia of each joint; those of an LWR's seven joints unless given [kg m²].
     inertia: Option<Vec<f64>>,

@@ -23,9 +23,9 @@ params! {
     shear: Positive = Positive(200.0),
     /// Standard deviation of the bell by which the foam spreads a load over its neighbours [m].
     spread: Positive = Positive(0.003),
-    /// Coefficient of friction at rest.
+    /// Coefficient of friction at rest [1].
     static_friction: NonNegative = NonNegative(0.4),
-    /// Coefficient of friction in motion.
+    /// Coefficient of friction in motion [1].
     sliding_friction: NonNegative = NonNegative(0.3),
 }
 

@@ -17,15 +17,15 @@ params! {
     range: Positive = Positive(3000.0),
     /// Force at which a tactel has answered by 63 % of that [N].
     squash: Positive = Positive(3.0),
-    /// Standard deviation of the logarithm of the tactels' sensitivity.
+    /// Standard deviation of the logarithm of the tactels' sensitivity [1].
     spread: NonNegative = NonNegative(0.22),
-    /// How much more is read at a force that falls than at one that rises, of the force.
+    /// How much more is read at a force that falls than at one that rises, of the force [1].
     hysteresis: Ratio = Ratio(0.06),
-    /// What the reading rises by under a load that stays, of the force.
+    /// What the reading rises by under a load that stays, of the force [1].
     creep: Ratio = Ratio(0.03),
     /// Time that creep takes [s].
     creep_s: Positive = Positive(15.0),
-    /// Standard deviation of the noise that all tactels have in common, of what is read.
+    /// Standard deviation of the noise that all tactels have in common, of what is read [1].
     common_noise: NonNegative = NonNegative(0.036),
     /// Standard deviation of each tactel's own noise [counts].
     own_noise: NonNegative = NonNegative(3.0),

@@ -9,7 +9,7 @@ use super::wires::Model;
 use super::{Item, Key, Sources, Value};
 use crate::catalogue::Catalogue;
 use crate::device::{Description, Filled};
-use crate::diagnostic::{Code, Diagnostic, closest};
+use crate::diagnostic::{Code, Diagnostic, closest, meant};
 use crate::node::{Mistake, Reader, Word};
 
 /// A role with the device that fills it.
@@ -99,7 +99,16 @@ impl Opener<'_> {
             let declared = model.flat.roles.iter().map(|(key, _)| key);
             declared.chain(model.observed.iter().map(|(key, ..)| *key)).any(|key| key.name == role.name)
         };
-        for (_, word) in bench.bind.iter().filter(|(role, _)| !is_used(role)) {
+        // A spare binding may be for another task, but what only scenarios read is no task's.
+        let read_by_scenarios =
+            || self.catalogue.roles().iter().filter(|role| role.is_observed).map(|role| role.observed_name());
+        for (role, word) in bench.bind.iter().filter(|(role, _)| !is_used(role)) {
+            let is_right = self.catalogue.roles().iter().any(|known| known.is_observed_as(&role.name));
+            if let Some(meant) = meant(&role.name, read_by_scenarios()).filter(|_| !is_right) {
+                let message = format!("`{}` binds nothing that a scenario could read", role.name);
+                let diagnostic = Diagnostic::new(Code::ObservedRole, role.span.clone(), message);
+                self.found.push(diagnostic.help(format!("did you mean `{meant}`?")));
+            }
             if !names().any(|name| name == word.text) {
                 self.found.push(no_device(word, bench));
             }

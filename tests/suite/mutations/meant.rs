@@ -131,6 +131,13 @@ fn may_be_left_out(root: &Table, path: &[String]) -> bool {
         ["parts", _, "set", _, ..] => true,
         // A mode is the graph with its own parameters laid over, as many as it likes.
         ["modes", _, "set", _, ..] => true,
+        // What a task tells a device, and what a bench gives to scenarios, nobody has to.
+        ["commands", role, report] => {
+            let kind = root["roles"][*role].as_str().unwrap_or("");
+            let role = catalogue().roles().iter().find(|known| known.name == kind).cloned();
+            role.is_some_and(|role| role.reports.iter().any(|port| port.name == *report))
+        }
+        ["bind", name] => catalogue().roles().iter().any(|role| role.is_observed_as(name)),
         ["nodes", node, "in", input] => spec(root, "nodes", node).is_some_and(|spec| {
             let input = spec.inputs.iter().find(|port| port.name == *input || port.need == Need::Many);
             matches!(input.map(|port| port.need), Some(Need::Many | Need::Optional | Need::Trigger))
