@@ -125,7 +125,14 @@ fn seeds_can_be_overridden_and_each_run_recorded() {
     let [first, second] = ["slide-1.csv", "slide-2.csv"].map(|name| fs::read_to_string(path.join(name)).unwrap());
     assert!(first.contains("truth.x") && first != second, "another seed is other noise");
     let alone = folder.path().join("alone.csv");
-    say(&["run", "graphs/hybrid.toml", "--bench=graphs/benches/mock.toml", "--for=4s", "--out", alone.to_str().unwrap()]);
+    say(&[
+        "run",
+        "graphs/hybrid.toml",
+        "--bench=graphs/benches/mock.toml",
+        "--for=4s",
+        "--out",
+        alone.to_str().unwrap(),
+    ]);
     assert!(fs::read(alone).unwrap() == fs::read(path.join("mock.csv")).unwrap(), "a run is a run");
     assert_eq!(row(&said.out, "x", "response").len(), 9, "three seeds have no interval: {}", said.out);
 }

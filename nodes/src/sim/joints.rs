@@ -116,12 +116,12 @@ impl Arm {
     /// The energy of motion and springs [J].
     #[cfg(test)]
     pub(super) fn energy(&self) -> f64 {
-        let places = self.position.iter().zip(&self.equilibrium).zip(&self.speed).zip(&self.strain);
-        let energy = |(joint, (((q, rest), speed), strain)): (&Joint, (((&f64, &f64), &f64), &f64))| {
-            let friction = joint.friction / GIVES_WAY * strain * strain;
-            (joint.inertia * speed * speed + joint.stiffness * (rest - q).powi(2) + friction) / 2.0
+        let energy = |i: usize| {
+            let (joint, off) = (&self.joints[i], self.equilibrium[i] - self.position[i]);
+            let friction = joint.friction / GIVES_WAY * self.strain[i] * self.strain[i];
+            (joint.inertia * self.speed[i] * self.speed[i] + joint.stiffness * off * off + friction) / 2.0
         };
-        self.joints.iter().zip(places).map(energy).sum()
+        (0..self.joints.len()).map(energy).sum()
     }
 }
 
