@@ -15,7 +15,7 @@ use crate::sim::readout::{Electronics, Readout};
 #[derive(Parser)]
 #[command(name = "press")]
 #[command(
-    after_help = "The bladder presses on all tactels alike, slowly up to the largest force and down again, after a second without a load.
+    after_help = "The bladder presses on all tactels alike, slowly up to the largest force and down again, after five seconds without a load.
 The log has the columns time [s], force [N] and what each tactel reads [raw], as `tactflow calibrate` takes it.
 
 Examples:
@@ -43,12 +43,10 @@ pub(super) struct Press {
 const SERIAL: &u64 = &Electronics::USUAL.serial;
 /// Frames per second of the log [1/s].
 const RATE: f64 = 50.0;
-/// Time before the first press, and between two [s].
-const REST: f64 = 1.0;
-/// Time of a press, up and down [s].
-const PRESS: f64 = 10.0;
-/// Number of presses.
-const PRESSES: u32 = 3;
+/// Time before the press, in which the zero is taken. There is none after it, as the foam creeps back [s].
+const REST: f64 = 5.0;
+/// Time of the press, up and down [s].
+const PRESS: f64 = 30.0;
 
 pub(super) fn run(args: Press, shell: &Shell) -> u8 {
     let done = may_replace(&args.out, "press log", |text| text.starts_with("time,force,t0_0"))
@@ -77,7 +75,7 @@ fn write(args: &Press) -> std::io::Result<usize> {
     let names = (0..rows).flat_map(|i| (0..cols).map(move |j| format!(",t{i}_{j}")));
     writeln!(file, "time,force{}", names.collect::<String>())?;
     let mut counts = vec![0.0; tactels];
-    let frames = ((REST + f64::from(PRESSES) * (PRESS + REST)) * RATE) as usize;
+    let frames = ((REST + PRESS) * RATE) as usize;
     let mut line = String::new();
     for frame in 0..frames {
         let time = frame as f64 / RATE;
@@ -97,7 +95,6 @@ fn write(args: &Press) -> std::io::Result<usize> {
 
 /// How far the bladder is blown up at a time [s], from 0 to 1.
 fn bladder(time: f64) -> f64 {
-    let in_cycle = time % (REST + PRESS) - REST;
-    let t = in_cycle / PRESS;
-    if in_cycle < 0.0 { 0.0 } else { 1.0 - (2.0 * t - 1.0).abs() }
+    let t = (time - REST) / PRESS;
+    if t < 0.0 { 0.0 } else { 1.0 - (2.0 * t - 1.0).abs() }
 }
