@@ -30,6 +30,7 @@ mod policies;
 mod recordings;
 mod reference;
 mod reports;
+mod sim;
 mod situations;
 mod tick;
 mod tidy;
