@@ -10,7 +10,7 @@ const MOCK: &str = "--bench=graphs/benches/mock.toml";
 #[test]
 fn the_points_are_those_of_the_rows_and_a_reader_that_is_not_ours_finds_them() {
     // The pad repeats some of its frames: a frame that is not new is no point.
-    let repeats = "--set=devices.pad.glitch=[{ at_s = 1.0, for_s = 0.2, kind = 'repeated' }]";
+    let repeats = "--set=devices.pad.glitch=[{ at_s = 1.0, for_s = 0.2, kind = 'repeat' }]";
     let cases: [(&str, &[&str], &str); 3] = [
         ("", &[], ""),
         ("ruler.pose=", &[], ""),
