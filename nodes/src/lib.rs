@@ -86,6 +86,8 @@ pub fn catalogue() -> Catalogue {
         .node::<servo::inverse_jacobian::InverseJacobian>()
         .node::<servo::projector::Projector>()
         .node::<servo::twist_source::TwistSource>()
+        .node::<servo::scan_guide::ScanGuide>()
+        .node::<servo::ridge_guide::RidgeGuide>()
         .node::<servo::twist_adder::TwistAdder>()
         .node::<servo::twist_of::TwistOf>()
         .node::<servo::edge_guard::EdgeGuard>()

@@ -16,7 +16,7 @@ const BREAKS: &str = "tests/data/breaks.toml";
 const PROBE: &str = "tests/data/probe.toml";
 
 /// A name in a folder of its own, for a file that the tool will make.
-fn in_new_folder(name: &str) -> (TempDir, String) {
+pub(crate) fn in_new_folder(name: &str) -> (TempDir, String) {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join(name).to_str().unwrap().to_owned();
     (folder, path)

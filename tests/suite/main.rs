@@ -26,6 +26,7 @@ mod mutations;
 mod observed;
 mod operator;
 mod oracles;
+mod points;
 mod policies;
 mod recordings;
 mod reference;

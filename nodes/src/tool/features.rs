@@ -99,6 +99,7 @@ pub(super) fn features(args: Features, shell: &Shell) -> u8 {
         send: vec![],
         listen: false,
         out: args.out,
+        points: None,
         print: Print::Ports,
     }
     .run(shell)

@@ -59,7 +59,7 @@ fn halved([cosine, sine]: [f64; 2]) -> Option<f64> {
 
 /// Numbers in [0, 1) that are the same in every run.
 #[cfg(test)]
-fn uniform(mut seed: u64) -> impl FnMut() -> f64 {
+pub(crate) fn uniform(mut seed: u64) -> impl FnMut() -> f64 {
     move || {
         seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         (seed >> 40) as f64 / 16_777_216.0

@@ -12,7 +12,7 @@ use super::{FAULTED, NOT_LOADED, OnArgs, Shell};
 use crate::engine::{self, End, Engine, Outcome, RunOptions};
 use crate::fault::Fault;
 use crate::graph::{Plan, Request, plan};
-use crate::record::{Format, Recorder};
+use crate::record::{Chosen, Format, Points, Recorder, Wanted};
 
 /// Run a graph and print what came out
 #[derive(clap::Parser)]
@@ -21,6 +21,7 @@ use crate::record::{Format, Recorder};
     after_help = "Examples:
   tactflow run graphs/finger_press.toml
   tactflow run graphs/finger_press.toml --for 5s --out press.csv
+  tactflow run graphs/explore.toml --points surface.ply
   tactflow run graphs/hybrid.toml --set nodes.pid.gains.x.kp=3 --set devices.pad.rate_hz=500
   tactflow run graphs/hybrid.toml --send 0.8s:stop --send 1.2s:resume
 
@@ -47,6 +48,9 @@ pub(super) struct Run {
     /// Write a row a tick and a column a scalar, as .csv or .ndjson
     #[arg(short, long, value_name = "FILE")]
     out: Option<PathBuf>,
+    /// Write the points where a pose has been as .ply: the pose that the graph reports, or [POSE[,PORT]…=]FILE
+    #[arg(long, value_name = "FILE")]
+    points: Option<Wanted>,
     /// Print a line for every port and the time of every node, instead of what the graph shows
     #[arg(long)]
     ports: bool,
@@ -57,13 +61,13 @@ pub(super) struct Run {
 
 pub(super) fn run(args: Run, shell: &Shell) -> u8 {
     let title = args.graph.display().to_string();
-    let Run { graph, on, duration, realtime, send, listen, out, ports, quiet } = args;
+    let Run { graph, on, duration, realtime, send, listen, out, points, ports, quiet } = args;
     let print = match (ports, quiet) {
         (true, _) => Print::Ports,
         (_, true) => Print::Nothing,
         _ => Print::Page,
     };
-    Job { request: on.request(graph), title, duration, realtime, send, listen, out, print }.run(shell)
+    Job { request: on.request(graph), title, duration, realtime, send, listen, out, points, print }.run(shell)
 }
 
 /// What a run prints.
@@ -93,6 +97,8 @@ pub struct Job {
     pub listen: bool,
     /// Where each tick is recorded, as .csv or .ndjson.
     pub out: Option<PathBuf>,
+    /// Which points are written, and where, as .ply.
+    pub points: Option<Wanted>,
     /// What is printed.
     pub print: Print,
 }
@@ -114,13 +120,20 @@ impl Job {
             shell.error("`--listen` needs a real clock: add `--realtime`, or send words with `--send 2s:resume`");
             return NOT_LOADED;
         }
+        let chosen = match self.points.as_ref().map(|wanted| wanted.choose(&plan)).transpose() {
+            Ok(chosen) => chosen,
+            Err(message) => {
+                shell.error(message);
+                return NOT_LOADED;
+            }
+        };
         let mut engine = Engine::new(plan);
         if let Some(why) = self.unheard(&engine) {
             shell.error(why);
             return NOT_LOADED;
         }
-        let mut recorder = match self.out.as_deref().map(|path| recorder(path, &engine, !is_real)).transpose() {
-            Ok(recorder) => recorder,
+        let mut files = match self.files(chosen.as_ref(), &engine, !is_real) {
+            Ok(files) => files,
             Err(message) => {
                 shell.error(message);
                 return NOT_LOADED;
@@ -140,14 +153,12 @@ impl Job {
                     progress.clear();
                     log.write(engine);
                 }
-                if let Some(recorder) = &mut recorder {
-                    recorder.record(engine);
-                }
+                files.record(engine);
                 progress.show(seconds(engine.now()), engine.ticks(), |page| summary.live(page));
             })
         });
         progress.clear();
-        let written = recorder.map_or(Ok(0), Recorder::finish);
+        let written = files.finish();
         let outcome = match outcome {
             Ok(outcome) => outcome,
             Err(error) => {
@@ -162,7 +173,7 @@ impl Job {
     }
 
     /// What went wrong or was not done, and the exit code.
-    fn close(&self, shell: &Shell, engine: &Engine, outcome: &Outcome, written: io::Result<u64>) -> u8 {
+    fn close(&self, shell: &Shell, engine: &Engine, outcome: &Outcome, written: Written) -> u8 {
         for (at, word) in self.send.iter().filter(|(at, _)| *at > seconds(outcome.time)) {
             shell.warning(format_args!("`{word}` was not sent: the run ended before {at} s"));
         }
@@ -172,13 +183,34 @@ impl Job {
         } else {
             0
         };
-        code.max(self.report_file(shell, written))
+        code.max(self.report_file(shell, written.rows)).max(self.report_points(shell, written.points))
     }
 
     /// Prints what is no mistake, where that is wanted.
     fn say(&self, shell: &Shell, text: &str) {
         if self.print != Print::Nothing {
             shell.say(text);
+        }
+    }
+
+    /// Creates what the run shall leave behind.
+    fn files(&self, chosen: Option<&Chosen>, engine: &Engine, may_wait: bool) -> Result<Files, String> {
+        let rows = self.out.as_deref().map(|path| recorder(path, engine, may_wait)).transpose()?;
+        let points = self.points.as_ref().zip(chosen).map(|(wanted, chosen)| points(&wanted.path, chosen, engine));
+        Ok(Files { rows, points: points.transpose()? })
+    }
+
+    fn report_points(&self, shell: &Shell, written: io::Result<usize>) -> u8 {
+        let Some(wanted) = &self.points else { return 0 };
+        match written {
+            Ok(count) => {
+                self.say(shell, &format!("wrote {}: {count} points", wanted.path.display()));
+                0
+            }
+            Err(error) => {
+                shell.error(format_args!("cannot write `{}`: {error}", wanted.path.display()));
+                FAULTED
+            }
         }
     }
 
@@ -198,6 +230,33 @@ impl Job {
                 FAULTED
             }
         }
+    }
+}
+
+/// What a run leaves behind while it goes on.
+struct Files {
+    rows: Option<Recorder>,
+    points: Option<Points>,
+}
+
+/// How that went: how many rows were dropped, and how many points there are.
+struct Written {
+    rows: io::Result<u64>,
+    points: io::Result<usize>,
+}
+
+impl Files {
+    fn record(&mut self, engine: &Engine) {
+        if let Some(rows) = &mut self.rows {
+            rows.record(engine);
+        }
+        if let Some(points) = &mut self.points {
+            points.record(engine);
+        }
+    }
+
+    fn finish(self) -> Written {
+        Written { rows: self.rows.map_or(Ok(0), Recorder::finish), points: self.points.map_or(Ok(0), Points::finish) }
     }
 }
 
@@ -221,19 +280,26 @@ impl Job {
 
 fn recorder(path: &Path, engine: &Engine, may_wait: bool) -> Result<Recorder, String> {
     let format = Format::of(path).ok_or_else(|| format!("`{}` is neither .csv nor .ndjson", path.display()))?;
-    if is_something_else(path) {
+    if is_something_else(path, &Format::STARTS) {
         return Err(format!("`{}` exists and is no record of a run: it is not overwritten", path.display()));
     }
     Recorder::create(path, format, engine, may_wait)
         .map_err(|error| format!("cannot create `{}`: {error}", path.display()))
 }
 
-/// Whether a file exists that no run has recorded: a recording that is being played, say.
-fn is_something_else(path: &Path) -> bool {
-    let mut start = String::new();
+fn points(path: &Path, chosen: &Chosen, engine: &Engine) -> Result<Points, String> {
+    if is_something_else(path, &[Points::START]) {
+        return Err(format!("`{}` exists and holds no points: it is not overwritten", path.display()));
+    }
+    Points::create(path, chosen, engine).map_err(|error| format!("cannot create `{}`: {error}", path.display()))
+}
+
+/// Whether a file exists that begins otherwise than what a run leaves behind: a recording that is being played, say.
+fn is_something_else(path: &Path, starts: &[&str]) -> bool {
+    let mut start = Vec::new();
     let read =
-        std::fs::File::open(path).and_then(|file| io::Read::read_to_string(&mut io::Read::take(file, 16), &mut start));
-    read.is_ok() && !start.is_empty() && !Format::STARTS.iter().any(|known| start.starts_with(known))
+        std::fs::File::open(path).and_then(|file| io::Read::read_to_end(&mut io::Read::take(file, 16), &mut start));
+    read.is_ok() && !start.is_empty() && !starts.iter().any(|known| start.starts_with(known.as_bytes()))
 }
 
 /// A panic of a node or a device is told as a fault, with its name and its tick: not by the standard library as well.

@@ -178,6 +178,25 @@ impl Plan {
         &self.exports
     }
 
+    /// The port of that name, as the record names it or as the wires of the task do.
+    #[must_use]
+    pub fn port(&self, word: &str) -> Option<&PlannedPort> {
+        let export = self.exports.iter().find(|(export, _)| export == word);
+        let name = export.map_or(word, |(_, port)| port.as_str());
+        self.ports().find(|port| port.name == name)
+    }
+
+    /// The ports that the graph reports to its devices.
+    pub fn reported(&self) -> impl Iterator<Item = &PlannedPort> {
+        self.reports.iter().filter_map(|report| {
+            let ports = match report.source.producer {
+                Producer::Role(role) => &self.roles.get(role)?.ports,
+                Producer::Node(index) => &self.nodes.iter().find(|node| node.index == index)?.ports,
+            };
+            ports.get(report.source.port)
+        })
+    }
+
     /// What the devices state of themselves: `role.fact`, and the value.
     #[must_use]
     pub fn facts(&self) -> &[(String, toml::Value)] {

@@ -1,0 +1,285 @@
+//! The guide on a sensor that does exactly as it is told, over surfaces with a shape in closed form.
+
+use nalgebra::{IsometryMatrix3, Rotation3, Translation3, Vector3};
+use proptest::prelude::*;
+use tactflow_runtime::harness::NodeRig;
+use tactflow_runtime::signal::{FlagShape, Freshness, Pose, PoseShape, ScalarShape, Shape, Unit};
+
+use super::*;
+
+const SCAN: &str = "speed_m_per_s = 0.02\nstrokes = 3\nstroke_m = 0.04\nstep_m = 0.01";
+/// Way in one sample at that speed [m].
+const GRAIN: f64 = 0.02 * 0.004;
+/// Half of the pad [m].
+const HALF_PAD: f64 = 0.04;
+
+/// A sensor on a plate that covers a rectangle of the base; the base lies as the sensor does at the start.
+struct World {
+    rig: NodeRig,
+    pose: IsometryMatrix3<f64>,
+    plate: [[f64; 2]; 2],
+    /// Where a wall stands, across the base's x.
+    wall: f64,
+    /// Radius of a cylinder along the base's y that the sensor rolls over, if it does.
+    radius: f64,
+    track: Vec<[f64; 2]>,
+    turns: Vec<[f64; 2]>,
+    last: [f64; 2],
+    is_done: bool,
+}
+
+impl World {
+    fn new(params: &str) -> Self {
+        let metre = || Shape::from(ScalarShape::of(Unit::METRE));
+        let wires = [("gate", FlagShape.into()), ("pose", PoseShape.into()), ("x", metre()), ("y", metre())];
+        let tilt = Rotation3::from_euler_angles(0.3, -0.2, 0.5);
+        Self {
+            rig: NodeRig::new::<ScanGuide>(params, &wires).unwrap(),
+            pose: IsometryMatrix3::from_parts(Translation3::new(0.4, 0.1, 0.3), tilt),
+            plate: [[-1.0, 1.0]; 2],
+            wall: f64::INFINITY,
+            radius: f64::INFINITY,
+            track: Vec::new(),
+            turns: Vec::new(),
+            last: [0.0; 2],
+            is_done: false,
+        }
+    }
+
+    /// Where the sensor is, seen from where it began.
+    fn place(&self) -> Vector3<f64> {
+        let start = Self::new(SCAN).pose;
+        start.inverse_transform_point(&self.pose.translation.vector.into()).coords
+    }
+
+    /// Where the middle of what the pad touches is, along one of its axes; none beside the plate.
+    fn contact(&self, axis: usize) -> Option<f64> {
+        let at = self.place()[axis];
+        let (from, to) = ((self.plate[axis][0] - at).max(-HALF_PAD), (self.plate[axis][1] - at).min(HALF_PAD));
+        (from < to).then_some((from + to) / 2.0)
+    }
+
+    /// One sample, and a step of `ms` of a sensor that goes at `share` of what it is told.
+    fn step(&mut self, ms: f64, share: f64) {
+        let contact = [self.contact(0), self.contact(1)];
+        self.rig.set("gate", contact.iter().all(Option::is_some));
+        self.rig.set("pose", Pose(self.pose));
+        for (name, place) in ["x", "y"].into_iter().zip(contact) {
+            match place {
+                Some(place) => self.rig.set(name, place),
+                None => self.rig.lose(name),
+            }
+        }
+        self.rig.step_ms(ms);
+        self.is_done = self.rig.get("done").copied().unwrap_or(false);
+        let [vx, vy, vz, wx, wy, wz] = self.rig.get::<Twist>("twist").map_or([0.0; 6], |twist| twist.0.into());
+        assert!([vz, wx, wy, wz] == [0.0; 4] && (vx == 0.0 || vy == 0.0));
+        let place = self.place();
+        if [vx.signum() * f64::from(vx != 0.0), vy.signum() * f64::from(vy != 0.0)] != self.last {
+            self.last = [vx, vy].map(|v: f64| if v == 0.0 { 0.0 } else { v.signum() });
+            self.turns.push([place.x, place.y]);
+        }
+        self.track.push([place.x, place.y]);
+        let mut go = [vx, vy].map(|v| share * v * ms * 1e-3);
+        if place.x + go[0] > self.wall {
+            go[0] = 0.0;
+        }
+        let turn = Rotation3::from_euler_angles(0.0, go[0] / self.radius, 0.0);
+        self.pose *= IsometryMatrix3::from_parts(Translation3::new(go[0], go[1], 0.0), turn);
+    }
+
+    /// Until it is done; the time that took [s].
+    fn run(&mut self) -> f64 {
+        for i in 0..50_000 {
+            self.step(4.0, 1.0);
+            if self.is_done {
+                return f64::from(i) * 0.004;
+            }
+        }
+        panic!("it is never done: {:?}", self.turns);
+    }
+
+    fn assert_turns(&self, expected: &[[f64; 2]], within: f64) {
+        assert_eq!(self.turns.len(), expected.len(), "{:?}", self.turns);
+        for (turn, expected) in self.turns.iter().zip(expected) {
+            let off = (turn[0] - expected[0]).abs().max((turn[1] - expected[1]).abs());
+            assert!(off <= within, "{:?}, not {expected:?}: {:?}", turn, self.turns);
+        }
+    }
+}
+
+/// Where the way turns, from its start to where it rests: stroke beside stroke, about the start.
+const ROWS: [[f64; 2]; 8] =
+    [[0.0, 0.0], [0.0, -0.01], [-0.02, -0.01], [0.02, -0.01], [0.02, 0.0], [-0.02, 0.0], [-0.02, 0.01], [0.02, 0.01]];
+
+#[test]
+fn it_goes_to_and_fro_about_where_it_began_and_says_when_it_is_done() {
+    let mut world = World::new(SCAN);
+    let time = world.run();
+    world.assert_turns(&ROWS, 2.0 * GRAIN);
+    let way = 0.01 + 0.02 + 3.0 * 0.04 + 2.0 * 0.01;
+    assert!((time - way / 0.02).abs() < 0.1, "{time}");
+    for _ in 0..5 {
+        world.step(4.0, 1.0);
+        assert!(world.is_done && world.rig.freshness("twist") != Freshness::New);
+    }
+}
+
+#[test]
+fn along_y_it_is_the_same_with_the_axes_exchanged() {
+    let mut world = World::new(&format!("{SCAN}\naxis = \"y\""));
+    world.run();
+    world.assert_turns(&ROWS.map(|[x, y]| [y, x]), 2.0 * GRAIN);
+}
+
+#[test]
+fn the_way_counts_and_not_the_time() {
+    // A sensor that lags, stands still for a while, and whose samples come as they will.
+    let mut world = World::new(SCAN);
+    for i in 0..30_000 {
+        let share = if (400..700).contains(&i) { 0.0 } else { 0.3 + 0.5 * f64::from(i % 5) / 4.0 };
+        world.step(if i % 7 == 0 { 9.0 } else { 3.0 }, share);
+        if world.is_done {
+            break;
+        }
+    }
+    world.assert_turns(&ROWS, 4.0 * GRAIN);
+}
+
+#[test]
+fn on_a_cylinder_it_is_the_way_over_the_surface() {
+    // The sensor's origin rolls along the arc, so the way along x is radius times angle.
+    let mut world = World { radius: 0.05, ..World::new("speed_m_per_s = 0.02\nstroke_m = 0.06\nstep_m = 0.01") };
+    world.run();
+    let start = World::new(SCAN).pose;
+    let turned = (start.rotation.inverse() * world.pose.rotation).scaled_axis();
+    assert!((turned.y * 0.05 - 0.03).abs() < 3.0 * GRAIN, "{turned}");
+}
+
+#[test]
+fn it_turns_at_the_edge_of_the_object_and_never_leaves_it() {
+    // The contact is 20 mm behind the middle when the pad is past the edge by 10 mm: (-40 - 0) / 2 = -20.
+    let mut world = World { plate: [[-0.03, 0.02], [-1.0, 1.0]], ..World::new(&SCAN.replace("0.04", "0.2")) };
+    world.run();
+    let (least, most) = world.track.iter().fold((0.0, 0.0), |(a, b): (f64, f64), at| (a.min(at[0]), b.max(at[0])));
+    // 40 ms pass before it is taken for an edge.
+    let late = 0.04 * 0.02 + 3.0 * GRAIN;
+    assert!((0.02..0.02 + late).contains(&most) && (-0.03 - late..-0.03).contains(&least), "{least} {most}");
+    let rows = world.turns.iter().map(|turn| (turn[1] * 1e3).round() as i64).collect::<std::collections::BTreeSet<_>>();
+    assert_eq!(rows.into_iter().collect::<Vec<_>>(), [-10, 0, 10]);
+}
+
+#[test]
+fn where_the_surface_ends_aside_the_scan_does() {
+    let mut world =
+        World { plate: [[-1.0, 1.0], [-0.1, 0.012]], ..World::new(&SCAN.replace("strokes = 3", "strokes = 9")) };
+    world.run();
+    let most = world.track.iter().fold(0.0, |most: f64, at| most.max(at[1]));
+    assert!((0.012..0.012 + 0.04 * 0.02 + 3.0 * GRAIN).contains(&most), "{most}");
+    assert_eq!(world.rig.get("progress"), Some(&1.0));
+}
+
+#[test]
+fn what_stands_in_the_way_ends_a_leg() {
+    let mut world = World { wall: 0.005, ..World::new(SCAN) };
+    world.run();
+    assert!(world.track.iter().all(|at| at[0] < 0.005 + 1e-9));
+    let rows = world.turns.iter().map(|turn| (turn[1] * 1e3).round() as i64).collect::<std::collections::BTreeSet<_>>();
+    assert_eq!(rows.into_iter().collect::<Vec<_>>(), [-10, 0, 10]);
+}
+
+#[test]
+fn one_image_with_another_contact_is_no_edge() {
+    let mut world = World::new(SCAN);
+    (0..100).for_each(|_| world.step(4.0, 1.0));
+    let before = world.turns.len();
+    for _ in 0..9 {
+        world.rig.set("gate", true);
+        world.rig.set("x", 0.03);
+        world.rig.set("y", 0.03);
+        world.rig.step_ms(4.0);
+    }
+    world.step(4.0, 1.0);
+    assert_eq!(world.turns.len(), before);
+}
+
+#[test]
+fn a_flicker_halts_it_and_a_loss_begins_anew() {
+    for (ms, goes_on) in [(12, true), (40, false)] {
+        let mut world = World::new(SCAN);
+        while world.rig.get::<f64>("progress").is_none_or(|progress| *progress < 0.4) {
+            world.step(4.0, 1.0);
+        }
+        for _ in 0..ms / 4 {
+            world.rig.set("gate", false);
+            world.rig.step_ms(4.0);
+            assert_eq!(world.rig.get::<Twist>("twist"), None, "no contact, no motion");
+        }
+        world.step(4.0, 1.0);
+        assert_eq!(*world.rig.get::<f64>("progress").unwrap() > 0.3, goes_on, "{ms} ms");
+        assert!(world.rig.get::<Twist>("twist").is_some(), "{ms} ms");
+    }
+}
+
+#[test]
+fn progress_rises_from_0_to_1() {
+    let mut world = World::new(SCAN);
+    let mut last = 0.0;
+    while !world.is_done {
+        world.step(4.0, 1.0);
+        let progress = *world.rig.get::<f64>("progress").unwrap();
+        assert!((last..=1.0).contains(&progress), "{progress} after {last}");
+        last = progress;
+    }
+    assert_eq!(last, 1.0);
+}
+
+#[test]
+fn the_motion_is_as_old_as_the_gate_and_a_speed_of_0_is_none() {
+    let mut world = World::new(SCAN);
+    world.step(4.0, 1.0);
+    assert_eq!(world.rig.mark("twist").stamp().nanos, 0);
+    world.rig.step_ms(4.0);
+    assert_eq!(world.rig.freshness("twist"), Freshness::Held, "a silent pad makes nothing new");
+    let mut still = World::new("stroke_m = 0.04\nstep_m = 0.01");
+    still.step(4.0, 1.0);
+    assert_eq!((still.rig.get::<Twist>("twist"), still.rig.get("done")), (None, Some(&false)));
+}
+
+#[test]
+fn another_axis_is_another_scan() {
+    let guide = |axis| ScanGuide { speed: 0.02, axis, strokes: 2, stroke: 0.04, step: 0.01, edge: 0.02 };
+    let (across, along) = (guide(Axis::X), guide(Axis::Y));
+    let done = Scan { leg: None, ..across.begin() };
+    assert_eq!(across.progress(&done), 1.0);
+    assert!(along.begin().leg.is_some() && along.begin().axis != done.axis);
+    assert_eq!(along.to_scan([1.0, 2.0]), [2.0, 1.0]);
+}
+
+#[test]
+fn what_is_refused() {
+    let wires = [("gate", FlagShape.into()), ("pose", PoseShape.into())];
+    for bad in ["step_m = 0.01", "stroke_m = 0.01", "axis = \"z\"\nstroke_m = 0.1\nstep_m = 0.1", "strokes = 0"] {
+        assert!(NodeRig::new::<ScanGuide>(bad, &wires).is_err(), "{bad}");
+    }
+}
+
+proptest! {
+    #[test]
+    fn every_row_is_swept_whole(strokes in 1..6usize, stroke in 0.01..0.1_f64, step in 0.002..0.02_f64, along_y: bool) {
+        let axis = if along_y { "y" } else { "x" };
+        let params = format!("speed_m_per_s = 0.05\nstrokes = {strokes}\nstroke_m = {stroke}\nstep_m = {step}\naxis = \"{axis}\"");
+        let mut world = World::new(&params);
+        world.run();
+        let side = usize::from(along_y);
+        for row in 0..strokes {
+            let v: f64 = (row as f64 - (strokes as f64 - 1.0) / 2.0) * step;
+            // Each step aside may overshoot by a sample.
+            let near = world.track.iter().filter(|at: &&[f64; 2]| (at[1 - side] - v).abs() < (row + 1) as f64 * 2.5e-4);
+            let (least, most) = near.fold((1.0, -1.0), |(a, b): (f64, f64), at| (a.min(at[side]), b.max(at[side])));
+            prop_assert!(least <= -stroke / 2.0 + 4e-4 && most >= stroke / 2.0 - 4e-4, "row {row}: {least} {most}");
+        }
+        let (least, most) = world.track.iter().fold((1.0, -1.0), |(a, b): (f64, f64), at| (a.min(at[side]), b.max(at[side])));
+        prop_assert!(least > -stroke / 2.0 - 4e-4 && most < stroke / 2.0 + 4e-4);
+    }
+}

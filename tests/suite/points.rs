@@ -1,0 +1,79 @@
+//! What `--points` writes, read by a reader that is not ours.
+
+use std::fs;
+
+use crate::cli::in_new_folder;
+use crate::tool::{Said, peer, say};
+
+const MOCK: &str = "--bench=graphs/benches/mock.toml";
+
+#[test]
+fn the_points_are_those_of_the_rows_and_a_reader_that_is_not_ours_finds_them() {
+    // The pad repeats some of its frames: a frame that is not new is no point.
+    let repeats = "--set=devices.pad.glitch=[{ at_s = 1.0, for_s = 0.2, kind = 'repeat' }]";
+    let cases: [(&str, &[&str], &str); 3] = [
+        ("", &[], ""),
+        ("ruler.pose=", &[], ""),
+        (
+            "ruler.pose,touch.pressure,touch.orientation=",
+            &["touch_pressure=touch.pressure.value", "touch_orientation=touch.orientation.value"],
+            " touch_pressure touch_orientation",
+        ),
+    ];
+    for (ports, beside, more) in cases {
+        let (_folder, ply) = in_new_folder("surface.ply");
+        let csv = ply.replace("surface.ply", "rows.csv");
+        let wanted = format!("--points={ports}{ply}");
+        let said = say(&["run", "graphs/hybrid.toml", MOCK, repeats, "--out", &csv, &wanted]);
+        assert_eq!((said.code, said.err.as_str()), (0, ""));
+        let args = [&[ply.as_str(), &csv, "ruler.point.pose"], beside].concat();
+        let read = peer("points.py", &args);
+        let count: u32 = read.split(' ').next().unwrap().parse().unwrap();
+        let rows: u32 = read.split(' ').nth(3).unwrap().parse().unwrap();
+        assert!(count > 500 && count + 40 < rows, "{read}");
+        assert_eq!(read, format!("{count} points of {rows} rows, x y z nx ny nz time{more}"));
+        assert_eq!(said.out.lines().last().unwrap(), format!("wrote {ply}: {count} points"));
+    }
+}
+
+#[test]
+fn a_run_without_a_contact_has_a_file_without_points() {
+    let (_folder, ply) = in_new_folder("surface.ply");
+    let said = say(&["run", "graphs/hybrid.toml", MOCK, "--for=100ms", "--points", &ply]);
+    assert_eq!(said.out.lines().last().unwrap(), format!("wrote {ply}: 0 points"));
+    let text = fs::read_to_string(&ply).unwrap();
+    assert!(
+        text.starts_with("ply\n") && text.contains("\nelement vertex 0\n") && text.ends_with("end_header\n"),
+        "{text}"
+    );
+    // A file of points may be written anew.
+    assert_eq!(say(&["run", "graphs/hybrid.toml", MOCK, "--for=100ms", "--points", &ply]).code, 0);
+}
+
+#[test]
+fn what_cannot_be_points_is_told_before_anything_runs() {
+    let (_folder, ply) = in_new_folder("surface.ply");
+    let cases = [
+        ("surface.obj", "graphs/hybrid.toml", "`surface.obj` is no .ply".to_owned()),
+        ("ruler.psoe=a.ply", "graphs/hybrid.toml", "the graph has no port `ruler.psoe`: ".to_owned()),
+        ("touch.x=a.ply", "graphs/hybrid.toml", "`touch.x` is a scalar, but a point is where a pose is".to_owned()),
+        (
+            "ruler.pose,touch.image=a.ply",
+            "graphs/hybrid.toml",
+            "`touch.image` is an image: it has no numbers".to_owned(),
+        ),
+        (
+            "a.ply",
+            "graphs/finger_press.toml",
+            "the graph does not report one pose: name a port, as --points".to_owned(),
+        ),
+        (&ply, "graphs/hybrid.toml", format!("`{ply}` exists and holds no points: it is not overwritten")),
+    ];
+    fs::write(&ply, [0x93, b'N', b'U', b'M']).unwrap();
+    for (wanted, graph, message) in cases {
+        let Said { code, err, .. } = say(&["run", graph, "--for=100ms", "--points", wanted]);
+        assert_eq!(code, 2, "{wanted}: {err}");
+        assert!(err.contains(&message), "{wanted}: {err}");
+    }
+    assert_eq!(fs::read(&ply).unwrap(), [0x93, b'N', b'U', b'M']);
+}
