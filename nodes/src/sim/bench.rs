@@ -191,8 +191,8 @@ fn check(params: &Params, shape: &ImageShape) -> Result<(), Mistakes> {
     if !(0.0001..=0.001).contains(&*params.points_apart) {
         mistakes.push(Mistake::param("points_apart", "the points of the pad are 0.0001 to 0.001 m apart"));
     }
-    if *params.step_s > 0.002 {
-        mistakes.push(Mistake::param("step_s", "the foam's motion needs steps of 0.002 s or less"));
+    if !(1e-6..=0.002).contains(&*params.step_s) {
+        mistakes.push(Mistake::param("step_s", "the foam's motion needs steps of 1e-6 to 0.002 s"));
     }
     if let Some(inertia) = &params.inertia {
         if inertia.len() != params.start.len() {
