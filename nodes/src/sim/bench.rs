@@ -164,6 +164,8 @@ objects = [
 
 /// The most tactels that a simulated pad has.
 const MOST: usize = 128 * 128;
+/// The most points at which a simulated pad is felt.
+const MOST_POINTS: f64 = 4e6;
 /// The most frames that an image may be late by.
 const LATEST: f64 = 1000.0;
 
@@ -172,6 +174,12 @@ fn check(params: &Params, shape: &ImageShape) -> Result<(), Mistakes> {
     if shape.tactels() > MOST {
         let message = format!("{} by {} tactels are more than {MOST}", shape.rows, shape.cols);
         mistakes.push(Mistake::param("rows", message));
+    }
+    let points = (*params.pitch / *params.points_apart).ceil().max(1.0).powi(2) * shape.tactels() as f64;
+    if points > MOST_POINTS {
+        let (apart, pitch) = (*params.points_apart, *params.pitch);
+        let message = format!("a tactel each {pitch} m, felt each {apart} m, asks for more than {MOST_POINTS} points");
+        mistakes.push(Mistake::param("pitch", message));
     }
     if *params.latency_s * *params.rate_hz > LATEST {
         mistakes.push(Mistake::param("latency_s", format!("an image may be late by {LATEST} frames at most")));
@@ -183,8 +191,8 @@ fn check(params: &Params, shape: &ImageShape) -> Result<(), Mistakes> {
     if !(0.0001..=0.001).contains(&*params.points_apart) {
         mistakes.push(Mistake::param("points_apart", "the points of the pad are 0.0001 to 0.001 m apart"));
     }
-    if *params.step_s > 0.002 {
-        mistakes.push(Mistake::param("step_s", "the foam's motion needs steps of 0.002 s or less"));
+    if !(1e-6..=0.002).contains(&*params.step_s) {
+        mistakes.push(Mistake::param("step_s", "the foam's motion needs steps of 1e-6 to 0.002 s"));
     }
     if let Some(inertia) = &params.inertia {
         if inertia.len() != params.start.len() {
