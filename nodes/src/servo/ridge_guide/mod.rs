@@ -51,6 +51,8 @@ outputs! {
     twist: Twist["A"],
     /// Whether the contact is a ridge.
     on_ridge: Flag,
+    /// How much the eccentricity rises over a leg up the slope, by the last two legs; to choose `least_rise` by [1].
+    rise: Scalar["1", "A"],
 }
 
 state! {
@@ -66,6 +68,8 @@ state! {
     stall: Stall,
     /// Direction along the ridge, while there is one.
     along: Option<[f64; 2]>,
+    /// The rise over a leg, by the last two.
+    rise: f64,
 }
 
 /// How it seeks, and what a ridge is.
@@ -144,6 +148,7 @@ leg_m = 0.015                       # three tactels
             leg: Leg::default(),
             stall: Stall::default(),
             along: None,
+            rise: 0.0,
         }
     }
 
@@ -152,6 +157,7 @@ leg_m = 0.015                       # three tactels
         if self.speed <= 0.0 {
             *state = self.state();
             out.on_ridge.set(narrow > self.bounds[0]);
+            out.rise.set(0.0);
             return;
         }
         let line = inputs.orientation.map(|angle| {
@@ -164,6 +170,7 @@ leg_m = 0.015                       # three tactels
         };
         out.twist.set(Twist([self.speed * direction[0], self.speed * direction[1], 0.0, 0.0, 0.0, 0.0].into()));
         out.on_ridge.set(state.along.is_some());
+        out.rise.set(state.rise);
     }
 }
 
@@ -211,7 +218,12 @@ impl RidgeGuide {
         let (one, two) = (turned(state.heading, 1.0), turned(state.heading, -1.0));
         let gradient = [first * one[0] + slope * two[0], first * one[1] + slope * two[1]];
         let steepness = dot(gradient, gradient).sqrt();
-        if steepness * self.leg >= self.least_rise && steepness > 0.0 && steepness.is_finite() {
+        let rise = steepness * self.leg;
+        if !rise.is_finite() {
+            return;
+        }
+        state.rise = rise;
+        if rise >= self.least_rise && steepness > 0.0 {
             state.heading = gradient.map(|part| part / steepness);
         }
     }

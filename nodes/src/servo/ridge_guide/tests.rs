@@ -284,5 +284,7 @@ proptest! {
         // After two legs of 125 samples each, the third is half a right angle to the left of the gradient.
         let off = courses[300] - (angle + PI / 4.0);
         prop_assert!((off - TAU * (off / TAU).round()).abs() < 1e-6, "{off}");
+        // 5 a metre over a leg of 1 cm.
+        prop_assert!((rig.get::<f64>("rise").unwrap() - 0.05).abs() < 1e-9);
     }
 }
