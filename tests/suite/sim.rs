@@ -101,6 +101,10 @@ fn settings_that_cannot_be_are_told_at_their_place() {
         ("points_apart=0.002", "the points of the pad are"),
         ("inertia=[1.0]", "`inertia` has 1 entries, but the arm has 7 joints"),
         ("foam.static_friction=0.1", "friction at rest is not less than in motion"),
+        ("foam.damping=1e4", "no foam that steps can follow"),
+        ("foam.spread=1e20", "foam spreads a load by 0.0002 to 0.05 m"),
+        ("stiffness=1e6", "moves too fast for steps of 0.002 s"),
+        ("friction=1000.0", "moves too fast for steps of 0.002 s"),
         ("calibration='nowhere.toml'", "nowhere.toml"),
         ("rows=8", "16"),
     ];

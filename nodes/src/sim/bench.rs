@@ -15,11 +15,11 @@ use tactflow_runtime::signal::{Image, ImageShape, Joint, Joints, JointsShape, Ki
 use super::contact::Contact;
 use super::foam::Foam;
 use super::imprint::Imprint;
-use super::joints::{Arm, Joint as SimJoint, pose3};
-use super::object::{Object, Thing};
+use super::joints::{Arm, GIVES_WAY, Joint as SimJoint, pose3};
+use super::object::{MOUNT_DAMPING, Object, Thing};
 use super::random::Random;
 use super::readout::{Electronics, Readout};
-use super::world::{World, start};
+use super::world::{World, is_resolved, start};
 use crate::arm::chain::Chain;
 use crate::arm::model::load;
 use crate::arm::mount::Mount;
@@ -185,6 +185,13 @@ fn check(params: &Params, shape: &ImageShape) -> Result<(), Mistakes> {
         mistakes.push(Mistake::param("latency_s", format!("an image may be late by {LATEST} frames at most")));
     }
     let foam = &params.foam;
+    if *foam.damping > 10.0 {
+        mistakes
+            .push(Mistake::param("foam.damping", "more than 10 N s/m under a tactel is no foam that steps can follow"));
+    }
+    if !(0.0002..=0.05).contains(&*foam.spread) {
+        mistakes.push(Mistake::param("foam.spread", "foam spreads a load by 0.0002 to 0.05 m"));
+    }
     if *foam.static_friction < *foam.sliding_friction {
         mistakes.push(Mistake::param("foam.static_friction", "friction at rest is not less than in motion"));
     }
@@ -210,6 +217,34 @@ fn check(params: &Params, shape: &ImageShape) -> Result<(), Mistakes> {
             tactflow_runtime::node::At::Node,
             message,
         ));
+    }
+    if mistakes.is_empty() { check_motion(params) } else { Err(mistakes) }
+}
+
+/// What moves faster than the steps can follow gains energy, and is nowhere in the end.
+fn check_motion(params: &Params) -> Result<(), Mistakes> {
+    let mut mistakes = Mistakes::new();
+    let dt = *params.step_s;
+    for thing in &params.objects {
+        let Some(mount) = thing.mount else { continue };
+        let rate = *mount / *thing.mass;
+        if !is_resolved(rate, 2.0 * MOUNT_DAMPING * rate.sqrt(), dt) {
+            let message =
+                format!("a mount of {} N/m under {} kg swings too fast for steps of {dt} s", *mount, *thing.mass);
+            mistakes.push(Mistake::param("objects", message));
+        }
+    }
+    let inertia = params.inertia.as_deref().unwrap_or(&INERTIA);
+    let least = inertia.iter().copied().fold(f64::INFINITY, f64::min);
+    let rate = *params.stiffness / least;
+    let parts = [
+        ("stiffness", rate, 0.0),
+        ("damping_ratio", 0.0, 2.0 * *params.damping_ratio * rate.sqrt()),
+        ("friction", *params.friction / GIVES_WAY / least, 0.0),
+    ];
+    for (name, _, _) in parts.iter().filter(|(_, stiffness, damping)| !is_resolved(*stiffness, *damping, dt)) {
+        let message = format!("a joint of {least} kg m² moves too fast for steps of {dt} s");
+        mistakes.push(Mistake::param(*name, message));
     }
     if mistakes.is_empty() { Ok(()) } else { Err(mistakes) }
 }
@@ -356,6 +391,9 @@ impl Stepped for SimBench {
             return Err(DeviceError(format!("the velocity commanded to joint `{name}` is not finite")));
         }
         self.advance(now, velocity);
+        if !self.world.is_sound() {
+            return Err(DeviceError("the simulation has run away: its parameters are too stiff for its steps".into()));
+        }
         self.sequence += 1;
         self.show(now, samples);
         let arm = &self.world.arm;

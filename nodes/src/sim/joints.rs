@@ -45,7 +45,7 @@ pub struct Arm {
 }
 
 /// How far friction is strained before it gives way [rad].
-const GIVES_WAY: f64 = 2e-4;
+pub(super) const GIVES_WAY: f64 = 2e-4;
 
 impl Arm {
     /// An arm at rest.

@@ -95,7 +95,7 @@ struct Step {
 }
 
 /// Damping of a mount, of the critical.
-const MOUNT_DAMPING: f64 = 0.5;
+pub(super) const MOUNT_DAMPING: f64 = 0.5;
 
 impl Object {
     /// An object seen from a sensor that starts at `start` in the base, moved aside by `offset` in the sensor's axes.
@@ -158,6 +158,12 @@ impl Object {
     #[must_use]
     pub fn velocity_at(&self, point: Vec3) -> Vec3 {
         self.velocity + self.spin().cross(point - self.pose.translation)
+    }
+
+    /// How far its mount has given way [m].
+    #[must_use]
+    pub const fn sag(&self) -> Vec3 {
+        self.sag
     }
 
     /// How it turns, in the base [rad/s].

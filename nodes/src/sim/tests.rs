@@ -10,7 +10,7 @@ use super::foam::Foam;
 use super::imprint::Imprint;
 use super::joints::{Arm, Joint};
 use super::object::{Look, Move, Object, Thing};
-use super::world::{World, start};
+use super::world::{World, is_resolved, start};
 use crate::arm::chain::{Chain, Motion as JointMotion, Segment};
 use crate::arm::model::load;
 use crate::arm::mount::Mount;
@@ -254,4 +254,20 @@ fn objects_are_moved_smoothly_by_their_script() {
     }
     let wanted = Vec3::new(0.03 * 1f64.cos(), 0.01 + 0.03 * 1f64.sin(), 0.06);
     assert!(last.distance(wanted) < 1e-12, "{last}");
+}
+
+#[test]
+fn what_the_steps_do_not_follow_is_told() {
+    // A damped spring comes to rest exactly if its steps are stable; none may be called resolved that does not.
+    for (stiffness, damping) in [(1e3, 10.0), (1e5, 0.0), (4e5, 100.0), (4e5, 400.0), (1.1e6, 0.0), (1e3, 1100.0)] {
+        let (mut place, mut speed, dt) = (1.0f64, 0.0, 0.002);
+        for _ in 0..10_000 {
+            speed -= (stiffness * place + damping * speed) * dt;
+            place += speed * dt;
+        }
+        let is_bounded = place.abs() < 10.0;
+        assert!(is_bounded || !is_resolved(stiffness, damping, dt), "{stiffness} {damping}");
+    }
+    assert!(is_resolved(7000.0, 20.0, 0.002), "the usual arm");
+    assert!(!is_resolved(1e7, 3000.0, 0.002), "10 g on 1e5 N/m");
 }

@@ -63,6 +63,13 @@ impl World {
         self.is_old = true;
     }
 
+    /// Whether everything is still somewhere.
+    #[must_use]
+    pub fn is_sound(&self) -> bool {
+        let is_near = |place: Vec3| place.is_finite() && place.length() < 1e3;
+        is_near(self.pad().pose.translation) && self.objects.iter().all(|object| is_near(object.sag()))
+    }
+
     /// Where the pad is and how it moves.
     #[must_use]
     pub fn pad(&self) -> Motion {
@@ -104,6 +111,13 @@ impl World {
         let objects: f64 = self.objects.iter().map(Object::energy).sum();
         self.arm.energy() + self.contact.energy(&self.objects) + objects
     }
+}
+
+/// Whether a spring and a damper are resolved by steps of `dt` [s]: `stiffness` [1/s²] and `damping` [1/s] are by the
+/// mass. A step of the speed first and the place then is stable while d²k + 2 d c < 4; what adds the foam is left half.
+#[must_use]
+pub fn is_resolved(stiffness: f64, damping: f64, dt: f64) -> bool {
+    dt * dt * stiffness + 2.0 * dt * damping <= 2.0
 }
 
 /// The pose that a sensor has in the base.

@@ -48,7 +48,15 @@ const REST: f64 = 5.0;
 /// Time of the press, up and down [s].
 const PRESS: f64 = 30.0;
 
+/// The most tactels that a simulated pad has.
+const MOST: usize = 128 * 128;
+
 pub(super) fn run(args: Press, shell: &Shell) -> u8 {
+    let [rows, cols] = args.size.map(NonZeroUsize::get);
+    if rows.saturating_mul(cols) > MOST {
+        shell.error(format_args!("a simulated pad has {MOST} tactels at most, not {rows} by {cols}"));
+        return NOT_LOADED;
+    }
     let done = may_replace(&args.out, "press log", |text| text.starts_with("time,force,t0_0"))
         .and_then(|()| write(&args).map_err(|error| format!("cannot write `{}`: {error}", args.out.display())));
     match done {
