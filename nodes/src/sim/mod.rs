@@ -23,4 +23,6 @@ pub mod truth;
 pub mod world;
 
 #[cfg(test)]
+mod testing;
+#[cfg(test)]
 mod tests;

@@ -83,36 +83,23 @@ pub fn measure(objects: &[Object], pad: Pose3, point: Vec3) -> Option<Measured> 
 
 #[cfg(test)]
 mod tests {
-    use tactflow_runtime::node::{NonNegative, Positive};
+    use tactflow_runtime::node::Positive;
 
     use super::*;
     use crate::sim::object::{Look, Thing};
+    use crate::sim::testing::{ball, thing};
 
-    fn object(shape: Look, at: [f64; 3]) -> Object {
-        let is_ball = shape == Look::Ball;
-        let thing = Thing {
-            shape,
-            at,
-            turn: [0.0; 3],
-            radius: Some(Positive(0.04)),
-            length: (!is_ball).then_some(Positive(0.1)),
-            size: None,
-            points: None,
-            stiffness: None,
-            mount: None,
-            mass: Positive(1.0),
-            scatter: NonNegative(0.0),
-            motion: vec![],
-        };
-        Object::new(&thing, Pose3::IDENTITY, [0.0; 2]).unwrap()
+    fn object(thing: &Thing) -> Object {
+        Object::new(thing, Pose3::IDENTITY, [0.0; 2]).unwrap()
     }
 
     #[test]
     fn points_are_measured_against_surface_and_line() {
-        let ball = [object(Look::Ball, [0.0, 0.0, 0.05])];
-        let measured = measure(&ball, Pose3::IDENTITY, Vec3::new(0.0, 0.0, 0.0085)).unwrap();
+        let round = [object(&ball(0.04, [0.0, 0.0, 0.05]))];
+        let measured = measure(&round, Pose3::IDENTITY, Vec3::new(0.0, 0.0, 0.0085)).unwrap();
         assert!((measured.distance - 0.0015).abs() < 1e-12 && measured.path.is_none(), "{measured:?}");
-        let pen = [object(Look::Pen, [0.0, 0.0, 0.05])];
+        let pen = Thing { length: Some(Positive(0.1)), shape: Look::Pen, ..ball(0.04, [0.0, 0.0, 0.05]) };
+        let pen = [object(&pen)];
         let measured = measure(&pen, Pose3::IDENTITY, Vec3::new(0.003, 0.02, 0.01)).unwrap();
         assert!((measured.path.unwrap() - 0.003).abs() < 1e-12, "{measured:?}");
         assert_eq!(measure(&[], Pose3::IDENTITY, Vec3::ZERO), None);
@@ -120,34 +107,16 @@ mod tests {
 
     #[test]
     fn what_is_near_a_report_is_covered() {
-        let ball = object(Look::Ball, [0.0, 0.0, 0.05]);
-        let mut survey = Survey::new(&ball, Pose3::IDENTITY).unwrap();
+        let round = object(&ball(0.04, [0.0, 0.0, 0.05]));
+        let mut survey = Survey::new(&round, Pose3::IDENTITY).unwrap();
         assert_eq!(survey.coverage(), 0.0);
-        survey.add(&ball, Vec3::new(0.0, 0.0, 0.01));
+        survey.add(&round, Vec3::new(0.0, 0.0, 0.01));
         // A disc of 1 cm of a cap of the ball that is seen under 60° at most, as a disc from the sensor.
         let wanted = (0.01 / (0.04 * 3f64.sqrt() / 2.0)).powi(2);
         assert!((survey.coverage() / wanted - 1.0).abs() < 0.3, "{} {wanted}", survey.coverage());
         let once = survey.coverage();
-        survey.add(&ball, Vec3::new(0.0, 0.0, 0.01));
+        survey.add(&round, Vec3::new(0.0, 0.0, 0.01));
         assert_eq!(survey.coverage(), once);
-        assert!(Survey::new(&object_plane(), Pose3::IDENTITY).is_none());
-    }
-
-    fn object_plane() -> Object {
-        let thing = Thing {
-            shape: Look::Plane,
-            at: [0.0; 3],
-            turn: [0.0; 3],
-            radius: None,
-            length: None,
-            size: None,
-            points: None,
-            stiffness: None,
-            mount: None,
-            mass: Positive(1.0),
-            scatter: NonNegative(0.0),
-            motion: vec![],
-        };
-        Object::new(&thing, Pose3::IDENTITY, [0.0; 2]).unwrap()
+        assert!(Survey::new(&object(&thing(Look::Plane, [0.0; 3])), Pose3::IDENTITY).is_none());
     }
 }

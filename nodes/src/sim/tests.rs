@@ -10,6 +10,7 @@ use super::foam::Foam;
 use super::imprint::Imprint;
 use super::joints::{Arm, Joint};
 use super::object::{Look, Move, Object, Thing};
+use super::testing::{ball, thing};
 use super::world::{World, is_resolved, start};
 use crate::arm::chain::{Chain, Motion as JointMotion, Segment};
 use crate::arm::model::load;
@@ -17,27 +18,6 @@ use crate::arm::mount::Mount;
 
 fn shape() -> ImageShape {
     ImageShape { rows: 16, cols: 16, pitch: [0.005; 2], unit: Unit::RAW }
-}
-
-fn thing(shape: Look, at: [f64; 3]) -> Thing {
-    Thing {
-        shape,
-        at,
-        turn: [0.0; 3],
-        radius: None,
-        length: None,
-        size: None,
-        points: None,
-        stiffness: None,
-        mount: None,
-        mass: Positive(1.0),
-        scatter: NonNegative(0.0),
-        motion: vec![],
-    }
-}
-
-fn ball(radius: f64, at: [f64; 3]) -> Thing {
-    Thing { radius: Some(Positive(radius)), ..thing(Look::Ball, at) }
 }
 
 fn object(thing: &Thing) -> Object {

@@ -38,7 +38,7 @@ params! {
     acceleration: Positive = Positive(10.0),
 }
 
-/// The device; what runs is a [`Bridge`].
+/// The device; what runs is a `Bridge`.
 pub struct Lockstep;
 
 impl Device for Lockstep {
