@@ -97,7 +97,7 @@ fn settings_that_cannot_be_are_told_at_their_place() {
         ("objects=[{ shape = 'cable', at = [0, 0, 0.1], radius = 0.003, points = [[0, 0, 0]] }]", "needs two points"),
         ("objects=[{ shape = 'box', at = [0, 0, 0.1], size = [1, 0, 1] }]", "a size is greater than 0"),
         ("objects=[{ shape = 'egg', at = [0, 0, 0.1] }]", "expected one of `plane`"),
-        ("step_s=0.01", "steps of 0.002 s or less"),
+        ("step_s=0.01", "steps of 1e-6 to 0.002 s"),
         ("points_apart=0.002", "the points of the pad are"),
         ("inertia=[1.0]", "`inertia` has 1 entries, but the arm has 7 joints"),
         ("foam.static_friction=0.1", "friction at rest is not less than in motion"),
