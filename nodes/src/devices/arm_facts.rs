@@ -26,7 +26,7 @@ pub(crate) fn check_start(joints: &[Joint], start: &[f64]) -> Result<(), Mistake
     if mistakes.is_empty() { Ok(()) } else { Err(mistakes) }
 }
 
-/// What `arm_state` wants to know. The path is absolute, since the graph that asks may stand in another folder.
+/// What `arm_state` wants to know.
 ///
 /// # Errors
 /// When the path of the model cannot be told.
@@ -35,15 +35,23 @@ pub(crate) fn facts(
     tip: &str,
     mount: &Mount,
 ) -> Result<Vec<(Cow<'static, str>, toml::Value)>, Mistakes> {
-    let path = match urdf.builtin {
-        Some(_) => urdf.path.clone(),
-        None => std::path::absolute(&urdf.path).map_err(|error| Mistake::unreadable(urdf, &error))?,
-    };
-    let Some(path) = path.to_str() else {
-        return Err(Mistake::param("urdf", "the path of the model is not UTF-8 text").into());
-    };
+    let path = fact_of("urdf", urdf)?;
     let list = |numbers: [f64; 3]| toml::Value::from(numbers.to_vec());
     let mount = [("xyz".into(), list(mount.xyz)), ("rpy".into(), list(mount.rpy))];
     let mount = toml::Value::Table(mount.into_iter().collect());
     Ok(vec![("urdf".into(), path.into()), ("tip".into(), tip.into()), ("mount".into(), mount)])
+}
+
+/// A file as a fact, for a graph that may stand in another folder: its absolute path; `param` is where it is named.
+///
+/// # Errors
+/// When the path cannot be told.
+pub(crate) fn fact_of(param: &str, file: &FilePath) -> Result<String, Mistakes> {
+    let path = match file.builtin {
+        Some(_) => file.path.clone(),
+        None => std::path::absolute(&file.path).map_err(|error| Mistake::unreadable(file, &error))?,
+    };
+    path.into_os_string()
+        .into_string()
+        .map_err(|_| Mistake::param(param, format!("the path of `{param}` is not UTF-8 text")).into())
 }

@@ -4,26 +4,28 @@
 //! exchanges the world goes on in steps of `step_s` at most, with the velocity that was commanded last. An image is
 //! taken at each beat of `rate_hz` and shown `latency_s` later, with the stamp of the moment it was taken.
 
+mod check;
+
 use std::borrow::Cow;
 use std::collections::VecDeque;
 
 use tactflow_runtime::device::{Commands, Description, Device, DeviceError, Driver, Filled, Opened, Samples, Stepped};
-use tactflow_runtime::node::{Count, FilePath, Mistake, Mistakes, NonNegative, Positive, Rate};
+use tactflow_runtime::node::{Count, FilePath, Mistakes, NonNegative, PortSpec, Positive, Rate};
 use tactflow_runtime::params;
 use tactflow_runtime::signal::{Image, ImageShape, Joint, Joints, JointsShape, Kind, Pose, Scalar, ScalarShape, Unit};
 
 use super::contact::Contact;
 use super::foam::Foam;
 use super::imprint::Imprint;
-use super::joints::{Arm, GIVES_WAY, Joint as SimJoint, pose3};
-use super::object::{MOUNT_DAMPING, Object, Thing};
+use super::joints::{Arm, Joint as SimJoint, pose3};
+use super::object::{Object, Thing};
 use super::random::Random;
 use super::readout::{Electronics, Readout};
-use super::world::{World, is_resolved, start};
+use super::world::{World, start};
 use crate::arm::chain::Chain;
 use crate::arm::model::load;
 use crate::arm::mount::Mount;
-use crate::devices::arm_facts::{check_start, facts};
+use crate::devices::arm_facts::{check_start, fact_of, facts};
 use crate::devices::{nanos, period_of};
 use crate::roles::ground_truth;
 
@@ -81,6 +83,9 @@ params! {
 /// Inertia of the joints of an LWR in a bent posture, rotors and all [kg m²].
 const INERTIA: [f64; 7] = [2.0, 2.0, 1.0, 0.8, 0.3, 0.25, 0.1];
 
+/// The most tactels that a simulated pad has.
+pub const MOST: usize = 128 * 128;
+
 /// The bench.
 pub struct SimBench {
     world: World,
@@ -99,6 +104,8 @@ pub struct SimBench {
     /// Number of exchanges that brought time on.
     sequence: u64,
     threshold: f64,
+    /// The outputs of the ground truth.
+    truth: Vec<PortSpec>,
 }
 
 impl Device for SimBench {
@@ -153,7 +160,7 @@ objects = [
         let joints: Vec<Joint> = chain.joints().iter().map(|joint| Joint { acceleration, ..joint.clone() }).collect();
         check_start(&joints, &params.start)?;
         let shape = ImageShape { rows: params.rows.0, cols: params.cols.0, pitch: [*params.pitch; 2], unit: Unit::RAW };
-        check(&params, &shape)?;
+        check::check(&params, &shape)?;
         let fills = vec![pad(&params, &shape)?, arm(&params, &joints)?, truth(&shape)];
         let period = period_of(params.rate_hz);
         let description = Description { fills, period: period as f64 * 1e-9 };
@@ -162,102 +169,10 @@ objects = [
     }
 }
 
-/// The most tactels that a simulated pad has.
-const MOST: usize = 128 * 128;
-/// The most points at which a simulated pad is felt.
-const MOST_POINTS: f64 = 4e6;
-/// The most frames that an image may be late by.
-const LATEST: f64 = 1000.0;
-
-fn check(params: &Params, shape: &ImageShape) -> Result<(), Mistakes> {
-    let mut mistakes = Mistakes::new();
-    if shape.tactels() > MOST {
-        let message = format!("{} by {} tactels are more than {MOST}", shape.rows, shape.cols);
-        mistakes.push(Mistake::param("rows", message));
-    }
-    let points = (*params.pitch / *params.points_apart).ceil().max(1.0).powi(2) * shape.tactels() as f64;
-    if points > MOST_POINTS {
-        let (apart, pitch) = (*params.points_apart, *params.pitch);
-        let message = format!("a tactel each {pitch} m, felt each {apart} m, asks for more than {MOST_POINTS} points");
-        mistakes.push(Mistake::param("pitch", message));
-    }
-    if *params.latency_s * *params.rate_hz > LATEST {
-        mistakes.push(Mistake::param("latency_s", format!("an image may be late by {LATEST} frames at most")));
-    }
-    let foam = &params.foam;
-    if *foam.damping > 10.0 {
-        mistakes
-            .push(Mistake::param("foam.damping", "more than 10 N s/m under a tactel is no foam that steps can follow"));
-    }
-    if !(0.0002..=0.05).contains(&*foam.spread) {
-        mistakes.push(Mistake::param("foam.spread", "foam spreads a load by 0.0002 to 0.05 m"));
-    }
-    if *foam.static_friction < *foam.sliding_friction {
-        mistakes.push(Mistake::param("foam.static_friction", "friction at rest is not less than in motion"));
-    }
-    if !(0.0001..=0.001).contains(&*params.points_apart) {
-        mistakes.push(Mistake::param("points_apart", "the points of the pad are 0.0001 to 0.001 m apart"));
-    }
-    if !(1e-6..=0.002).contains(&*params.step_s) {
-        mistakes.push(Mistake::param("step_s", "the foam's motion needs steps of 1e-6 to 0.002 s"));
-    }
-    if let Some(inertia) = &params.inertia {
-        if inertia.len() != params.start.len() {
-            let message =
-                format!("`inertia` has {} entries, but the arm has {} joints", inertia.len(), params.start.len());
-            mistakes.push(Mistake::param("inertia", message));
-        }
-        if inertia.iter().any(|inertia| !(0.01..=1e3).contains(inertia)) {
-            mistakes.push(Mistake::param("inertia", "an inertia is from 0.01 to 1000 kg m²"));
-        }
-    } else if params.start.len() != INERTIA.len() {
-        let message = format!("an arm of {} joints needs `inertia`", params.start.len());
-        mistakes.push(Mistake::new(
-            tactflow_runtime::diagnostic::Code::MissingKey,
-            tactflow_runtime::node::At::Node,
-            message,
-        ));
-    }
-    if mistakes.is_empty() { check_motion(params) } else { Err(mistakes) }
-}
-
-/// What moves faster than the steps can follow gains energy, and is nowhere in the end.
-fn check_motion(params: &Params) -> Result<(), Mistakes> {
-    let mut mistakes = Mistakes::new();
-    let dt = *params.step_s;
-    for thing in &params.objects {
-        let Some(mount) = thing.mount else { continue };
-        let rate = *mount / *thing.mass;
-        if !is_resolved(rate, 2.0 * MOUNT_DAMPING * rate.sqrt(), dt) {
-            let message =
-                format!("a mount of {} N/m under {} kg swings too fast for steps of {dt} s", *mount, *thing.mass);
-            mistakes.push(Mistake::param("objects", message));
-        }
-    }
-    let inertia = params.inertia.as_deref().unwrap_or(&INERTIA);
-    let least = inertia.iter().copied().fold(f64::INFINITY, f64::min);
-    let rate = *params.stiffness / least;
-    let parts = [
-        ("stiffness", rate, 0.0),
-        ("damping_ratio", 0.0, 2.0 * *params.damping_ratio * rate.sqrt()),
-        ("friction", *params.friction / GIVES_WAY / least, 0.0),
-    ];
-    for (name, _, _) in parts.iter().filter(|(_, stiffness, damping)| !is_resolved(*stiffness, *damping, dt)) {
-        let message = format!("a joint of {least} kg m² moves too fast for steps of {dt} s");
-        mistakes.push(Mistake::param(*name, message));
-    }
-    if mistakes.is_empty() { Ok(()) } else { Err(mistakes) }
-}
-
 fn pad(params: &Params, shape: &ImageShape) -> Result<Filled, Mistakes> {
     let mut calibration = toml::Table::new();
     if let Some(file) = &params.calibration {
-        let path = match file.builtin {
-            Some(_) => file.path.clone(),
-            None => std::path::absolute(&file.path).map_err(|error| Mistake::unreadable(file, &error))?,
-        };
-        let path = path.to_str().ok_or_else(|| Mistake::param("calibration", "the path is not UTF-8 text"))?;
-        calibration.insert("file".into(), path.into());
+        calibration.insert("file".into(), fact_of("calibration", file)?.into());
     }
     let facts: Vec<(Cow<'static, str>, toml::Value)> = vec![
         ("dead".into(), toml::Value::Array(vec![])),
@@ -282,8 +197,6 @@ fn arm(params: &Params, joints: &[Joint]) -> Result<Filled, Mistakes> {
 
 /// Number of the first port of the ground truth.
 const TRUTH: usize = 3;
-/// Which of its ports is the image.
-const IMAGE: usize = 9;
 
 fn truth(shape: &ImageShape) -> Filled {
     let role = ground_truth();
@@ -308,11 +221,12 @@ impl SimBench {
         let arm = Arm::new(chain, inertia.into_iter().map(joint).collect(), params.start);
         let from = start(&arm);
         let mut scatter = Random::new(params.seed, 3);
-        let place = |thing: &Thing| {
+        let place = |(i, thing): (usize, &Thing)| {
             let most = *thing.scatter;
-            Object::new(thing, from, [scatter.uniform(-most, most), scatter.uniform(-most, most)])
+            let offset = [scatter.uniform(-most, most), scatter.uniform(-most, most)];
+            Object::new(thing, from, offset).map_err(|message| check::object(i, message))
         };
-        let objects = params.objects.iter().map(place).collect::<Result<Vec<_>, _>>()?;
+        let objects = params.objects.iter().enumerate().map(place).collect::<Result<Vec<_>, _>>()?;
         let contact = Contact::new(shape.clone(), params.foam.clone(), *params.points_apart, objects.len());
         let imprint = Imprint::new(&shape, contact.fine(), *params.foam.spread);
         let tactels = shape.tactels();
@@ -335,6 +249,7 @@ impl SimBench {
             shown: 0,
             sequence: 0,
             threshold,
+            truth: ground_truth().outputs,
         })
     }
 
@@ -405,36 +320,37 @@ impl Stepped for SimBench {
 }
 
 impl SimBench {
-    /// Gives the ground truth, in the order of the role's outputs.
+    /// Gives the ground truth: each number under its name among the role's outputs, and the clean image.
     fn tell(&mut self, now: i64, report: Option<&Pose>, samples: &mut Samples) {
         let measured = report.and_then(|pose| self.world.measure(pose3(pose).translation));
         let truth = self.world.truth(self.threshold);
         let noise = truth.pressure.map(|pressure| self.readout.noise(pressure, truth.tactels));
-        let values = [
-            Some(truth.force),
-            Some(truth.tangential),
-            Some(truth.peak),
-            truth.middle.map(|[x, _]| x),
-            truth.middle.map(|[_, y]| y),
-            truth.pressure,
-            truth.orientation,
-            Some(truth.area),
-            Some(truth.depth),
-            None,
-            truth.tilt,
-            measured.and_then(|measured| measured.path),
-            measured.map(|measured| measured.distance),
-            self.world.coverage(),
-            noise.map(|[common, _]| common),
-            noise.map(|[_, own]| own),
-        ];
-        for (port, value) in values.into_iter().enumerate().filter(|(port, _)| *port != IMAGE) {
-            match value {
+        let value = |name: &str| match name {
+            "force" => Some(truth.force),
+            "tangential" => Some(truth.tangential),
+            "peak" => Some(truth.peak),
+            "x" => truth.middle.map(|[x, _]| x),
+            "y" => truth.middle.map(|[_, y]| y),
+            "pressure" => truth.pressure,
+            "orientation" => truth.orientation,
+            "area" => Some(truth.area),
+            "depth" => Some(truth.depth),
+            "tilt" => truth.tilt,
+            "path" => measured.and_then(|measured| measured.path),
+            "distance" => measured.map(|measured| measured.distance),
+            "coverage" => self.world.coverage(),
+            "common_noise" => noise.map(|[common, _]| common),
+            "own_noise" => noise.map(|[_, own]| own),
+            other => unreachable!("the role has an output `{other}` that the bench does not know"),
+        };
+        for (port, spec) in self.truth.iter().enumerate().filter(|(_, spec)| spec.kind == Kind::Scalar) {
+            match value(&spec.name) {
                 Some(value) => *samples.write::<Scalar>(TRUTH + port, now, self.sequence) = value,
                 None => samples.clear(TRUTH + port, now, self.sequence),
             }
         }
-        let cells = samples.write::<Image>(TRUTH + IMAGE, now, self.sequence).cells_mut();
+        let image = self.truth.iter().position(|spec| spec.kind == Kind::Image).expect("the role has an image");
+        let cells = samples.write::<Image>(TRUTH + image, now, self.sequence).cells_mut();
         cells.iter_mut().zip(self.world.image()).for_each(|(cell, force)| *cell = *force as f32);
     }
 }

@@ -13,7 +13,7 @@
 use parry3d_f64::math::{Mat3, Pose3, Vec3};
 use tactflow_runtime::signal::ImageShape;
 
-use super::foam::{Column, Foam};
+use super::foam::{self, Column, Foam};
 use super::object::Object;
 
 /// Speed over which friction falls from that at rest to that in motion [m/s].
@@ -113,14 +113,6 @@ struct Tactel {
     friction: [f64; 2],
 }
 
-impl Touch {
-    /// Normal of the object there, out of it, in the base.
-    #[must_use]
-    pub const fn normal(&self) -> Vec3 {
-        self.normal
-    }
-}
-
 const NONE: u32 = u32::MAX;
 
 impl Contact {
@@ -135,7 +127,7 @@ impl Contact {
         Self {
             fine,
             column: Column::new(&foam, area / points as f64),
-            shear: *foam.shear * area / (0.005 * 0.005),
+            shear: *foam.shear * area / foam::AREA,
             touching: Vec::with_capacity(shape.tactels() * points),
             tactels: vec![Tactel::default(); shape.tactels()],
             slots: vec![NONE; shape.tactels() * points],
@@ -262,8 +254,7 @@ impl Contact {
 
     /// The forces of the columns, in the pad's frame.
     fn press(&mut self, objects: &[Object], wrench: &mut Wrench, loads: &mut [Vec3]) {
-        // A point's part of a tactel is softer by as much as it is smaller.
-        let parts = (self.fine * self.fine) as f64 * (0.005 * 0.005) / (self.shape.pitch[0] * self.shape.pitch[1]);
+        let parts = self.parts();
         self.tactels.iter_mut().for_each(|tactel| tactel.normal = 0.0);
         for touch in &mut self.touching {
             let place = Vec3::new(self.xs[touch.point[1]], self.ys[touch.point[0]], -touch.depth);
@@ -278,6 +269,11 @@ impl Contact {
             tactel.normal += touch.force;
             tactel.object = touch.object;
         }
+    }
+
+    /// How many points make a tactel of 5 mm by 5 mm: under a point alone an object is softer by that.
+    fn parts(&self) -> f64 {
+        (self.fine * self.fine) as f64 * foam::AREA / (self.shape.pitch[0] * self.shape.pitch[1])
     }
 
     /// The forces of the bristles, in the pad's frame.
@@ -301,8 +297,7 @@ impl Contact {
     /// The energy that foam, objects and bristles store [J].
     #[cfg(test)]
     pub(super) fn energy(&self, objects: &[Object]) -> f64 {
-        let parts = (self.fine * self.fine) as f64;
-        let softness = |touch: &Touch| objects[touch.object].softness * parts;
+        let softness = |touch: &Touch| objects[touch.object].softness * self.parts();
         let columns: f64 = self.touching.iter().map(|touch| self.column.energy(touch.depth, softness(touch))).sum();
         let bristles = self.tactels.iter().map(|t| self.shear / 2.0 * (t.shear[0].powi(2) + t.shear[1].powi(2)));
         columns + bristles.sum::<f64>()

@@ -45,7 +45,7 @@ impl Foam {
 }
 
 /// Area of the tactel that the numbers of [`Foam`] are for [m²].
-const AREA: f64 = 0.005 * 0.005;
+pub(super) const AREA: f64 = 0.005 * 0.005;
 
 /// The foam under a patch of some area.
 #[derive(Debug, Clone, Copy)]

@@ -2,7 +2,7 @@
 
 use parry3d_f64::math::{Pose3, Rot3, Vec3};
 use parry3d_f64::shape::{Ball, Cuboid};
-use tactflow_runtime::node::{Mistake, NonNegative, Positive};
+use tactflow_runtime::node::{NonNegative, Positive};
 use tactflow_runtime::params;
 
 use super::shape::Shape;
@@ -102,11 +102,10 @@ impl Object {
     ///
     /// # Errors
     /// What is wrong with its measures.
-    pub fn new(thing: &Thing, start: Pose3, offset: [f64; 2]) -> Result<Self, Mistake> {
-        let shape = shape_of(thing).map_err(|message| Mistake::param("objects", message))?;
+    pub fn new(thing: &Thing, start: Pose3, offset: [f64; 2]) -> Result<Self, String> {
+        let shape = shape_of(thing)?;
         if let Some(step) = thing.motion.iter().find(|step| *step.to_s <= *step.from_s) {
-            let message = format!("a motion from {} s to {} s lasts no time", *step.from_s, *step.to_s);
-            return Err(Mistake::param("objects", message));
+            return Err(format!("a motion from {} s to {} s lasts no time", *step.from_s, *step.to_s));
         }
         let at = Vec3::from(thing.at) + Vec3::new(offset[0], offset[1], 0.0);
         let home = start * Pose3::from_parts(at, turned(thing.turn));

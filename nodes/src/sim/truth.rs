@@ -5,6 +5,7 @@ use tactflow_runtime::signal::ImageShape;
 
 use super::contact::{Contact, Motion};
 use super::object::Object;
+use crate::servo::axial::wrap_axial;
 
 /// The truth of a moment.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -81,16 +82,7 @@ fn orientation(pad: &Motion, objects: &[Object], shape: &ImageShape) -> Option<f
     let (at, along) = lines.min_by(|(a, _), (b, _)| a.length().total_cmp(&b.length()))?;
     let half = [shape.cols as f64 * shape.pitch[0] / 2.0, shape.rows as f64 * shape.pitch[1] / 2.0];
     let is_under = at.x.abs() < half[0] && at.y.abs() < half[1];
-    let angle = libm::atan2(along.y, along.x);
-    let half_turn = std::f64::consts::PI;
-    let axial = if angle <= -half_turn / 2.0 {
-        angle + half_turn
-    } else if angle > half_turn / 2.0 {
-        angle - half_turn
-    } else {
-        angle
-    };
-    (is_under && along.x * along.x + along.y * along.y > 1e-6).then_some(axial)
+    (is_under && along.x * along.x + along.y * along.y > 1e-6).then(|| wrap_axial(libm::atan2(along.y, along.x)))
 }
 
 fn tilt(contact: &Contact, force: f64) -> Option<f64> {

@@ -87,7 +87,7 @@ impl World {
     /// What is true now; tactels count from `threshold` [N].
     pub fn truth(&mut self, threshold: f64) -> Truth {
         self.image();
-        let pad = self.arm.motion();
+        let pad = self.pad();
         Truth::of(&pad, &self.contact, &self.objects, &self.shape, self.imprint.forces(), threshold)
     }
 
@@ -96,7 +96,7 @@ impl World {
         if let Some((object, survey)) = &mut self.survey {
             survey.add(&self.objects[*object], point);
         }
-        measure(&self.objects, self.arm.motion().pose, point)
+        measure(&self.objects, self.pad().pose, point)
     }
 
     /// Share of the surface that has been measured; none if the object has no end.

@@ -9,6 +9,7 @@ use tactflow_runtime::cli::clap::{self, Parser};
 use tactflow_runtime::cli::{NOT_LOADED, Shell};
 
 use super::{may_replace, pair, positive};
+use crate::sim::bench::MOST;
 use crate::sim::readout::{Electronics, Readout};
 
 /// Press the simulated pad with a bladder and write the log
@@ -47,9 +48,6 @@ const RATE: f64 = 50.0;
 const REST: f64 = 5.0;
 /// Time of the press, up and down [s].
 const PRESS: f64 = 30.0;
-
-/// The most tactels that a simulated pad has.
-const MOST: usize = 128 * 128;
 
 pub(super) fn run(args: Press, shell: &Shell) -> u8 {
     let [rows, cols] = args.size.map(NonZeroUsize::get);
