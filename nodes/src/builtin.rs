@@ -2,7 +2,7 @@
 //!
 //! They are what ships under `graphs/`, so that an example on any page runs in any folder.
 
-use tactflow_runtime::graph::BuiltinFile;
+use tactflow_runtime::source::BuiltinFile;
 
 /// Every file, by its name behind `builtin:`.
 pub const FILES: &[BuiltinFile] = &[

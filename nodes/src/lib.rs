@@ -46,8 +46,8 @@ mod tool;
 pub mod touch;
 
 use tactflow_runtime::catalogue::Catalogue;
-use tactflow_runtime::diagnostic::Code;
 use tactflow_runtime::node::{At, Mistake};
+use tactflow_runtime::source::Code;
 
 #[cfg(feature = "cli")]
 pub use tool::tool;

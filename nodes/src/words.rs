@@ -20,7 +20,7 @@ macro_rules! words {
             const EXPECTS: &'static str = concat!("one of `", $first, "`" $(, ", `", $other, "`")*);
 
             fn read(
-                value: &tactflow_runtime::node::Value,
+                value: &tactflow_runtime::source::Value,
                 reader: &mut tactflow_runtime::node::Reader<'_>,
             ) -> Option<Self> {
                 let word: String = tactflow_runtime::node::read_leaf(value, reader, Self::EXPECTS)?;

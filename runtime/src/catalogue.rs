@@ -1,14 +1,16 @@
 //! What a graph may be made of: a plain list of node types, device types and roles.
 
 use crate::device::{Device, DeviceType, RoleType, device_type};
-use crate::graph::{BuiltinFile, declares_a_unit};
-use crate::node::{Node, NodeType, of};
+use crate::node::{Node, NodeSpec, NodeType, declares_a_unit, of};
 use crate::signal::Kind;
+use crate::source::BuiltinFile;
 
 /// A list of node types, device types and roles. Several can be joined: somebody else's crate adds its own.
 #[derive(Default)]
 pub struct Catalogue {
     nodes: Vec<Box<dyn NodeType>>,
+    /// The declaration of each node type.
+    specs: Vec<NodeSpec>,
     /// Titles of groups, and with which node each starts.
     groups: Vec<(usize, &'static str)>,
     devices: Vec<Box<dyn DeviceType>>,
@@ -44,14 +46,14 @@ impl Catalogue {
     #[must_use]
     pub fn node_type(mut self, node: Box<dyn NodeType>) -> Self {
         let spec = node.spec();
-        let is_taken = self.nodes.iter().any(|other| other.spec().name == spec.name);
-        assert!(!is_taken, "two nodes are called `{}`", spec.name);
+        assert!(self.find_node(&spec.name).is_none(), "two nodes are called `{}`", spec.name);
         for port in spec.inputs.iter().chain(&spec.outputs) {
             assert!(declares_a_unit(port), "`{}.{}` declares the unit {:?}", spec.name, port.name, port.args.first());
         }
         let says_when = spec.outputs.first().is_some_and(|port| port.kind == Kind::Flag);
         assert!(!spec.logs || says_when, "the first output of `{}` is no flag that says when to log", spec.name);
         self.nodes.push(node);
+        self.specs.push(spec);
         self
     }
 
@@ -103,6 +105,29 @@ impl Catalogue {
         &self.nodes
     }
 
+    /// The declarations of the node types, in their order.
+    pub fn specs(&self) -> impl Iterator<Item = &NodeSpec> + Clone {
+        self.specs.iter()
+    }
+
+    /// Finds a node type by its name: its number and its declaration.
+    #[must_use]
+    pub fn find_node(&self, name: &str) -> Option<(usize, &NodeSpec)> {
+        self.specs.iter().enumerate().find(|(_, spec)| spec.name == name)
+    }
+
+    /// Finds a device type by its name.
+    #[must_use]
+    pub fn find_device(&self, name: &str) -> Option<&dyn DeviceType> {
+        self.devices.iter().find(|device| device.name() == name).map(|device| &**device)
+    }
+
+    /// Finds a role by its name.
+    #[must_use]
+    pub fn role_type(&self, name: &str) -> Option<&RoleType> {
+        self.roles.iter().find(|role| role.name == name)
+    }
+
     /// The groups of node types in reading order, each with its title; those of no group have an empty one.
     pub fn groups(&self) -> impl Iterator<Item = (&'static str, &[Box<dyn NodeType>])> {
         let first = self.groups.first().map_or(self.nodes.len(), |(at, _)| *at);
@@ -133,7 +158,8 @@ impl Catalogue {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::node::{Configured, NodeSpec, Reader, Value};
+    use crate::node::{Configured, NodeSpec, Reader};
+    use crate::source::Value;
 
     /// A node of which only the name matters.
     struct Named(&'static str);

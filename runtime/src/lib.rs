@@ -9,7 +9,7 @@ pub mod catalogue;
 #[cfg(feature = "cli")]
 pub mod cli;
 pub mod device;
-pub mod diagnostic;
+
 pub mod engine;
 pub mod fault;
 pub mod graph;
@@ -18,3 +18,4 @@ pub mod node;
 pub mod record;
 pub mod scenario;
 pub mod signal;
+pub mod source;

@@ -7,9 +7,10 @@ use tactflow_runtime::catalogue::Catalogue;
 use tactflow_runtime::device::{DeviceType, Opened};
 use tactflow_runtime::node::{
     AnyNode, Built, Bus, Components, Configured, Given, Mistakes, NodeSpec, NodeType, ParamSpec, PortId, Reader, Tick,
-    Value, Wires,
+    Wires,
 };
 use tactflow_runtime::signal::{Features, Image, Jacobian, Joints, Kind, Pose, Scalar, Signal, Twist};
+use tactflow_runtime::source::Value;
 
 /// How it goes wrong.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

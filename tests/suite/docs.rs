@@ -3,11 +3,11 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use tactflow_runtime::diagnostic::{Code, Report};
 use tactflow_runtime::engine::{self, Engine, RunOptions};
 use tactflow_runtime::graph::{Plan, Request, plan};
 use tactflow_runtime::record::{Format, Recorder};
 use tactflow_runtime::signal::Unit;
+use tactflow_runtime::source::{Code, Report};
 use tactflow_tests::{catalogue, workspace};
 
 fn page(name: &str) -> String {

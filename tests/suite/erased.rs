@@ -1,12 +1,12 @@
 //! The erased contract: a node that is known only at run time, from data, without the typed one.
 
-use tactflow_runtime::graph::Value;
 use tactflow_runtime::harness::GraphRig;
 use tactflow_runtime::node::{
     AnyNode, Built, Bus, Configured, Given, Mistake, Mistakes, Need, NodeSpec, NodeType, Param, PortId, PortSpec,
     Reader, Tick, Wires,
 };
 use tactflow_runtime::signal::{Freshness, Kind, Scalar, Shape, Signal};
+use tactflow_runtime::source::Value;
 use tactflow_tests::catalogue;
 use tactflow_tests::nodes::length_by_hand;
 

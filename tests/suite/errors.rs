@@ -7,9 +7,10 @@ use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use tactflow_runtime::diagnostic::{Code, Diagnostic, Report};
-use tactflow_runtime::graph::{Request, Sources, plan};
+use tactflow_runtime::graph::{Request, plan};
 use tactflow_runtime::scenario::Scenario;
+use tactflow_runtime::source::SourceMap;
+use tactflow_runtime::source::{Code, Diagnostic, Report};
 use tactflow_tests::{catalogue, toml_files};
 
 /// Relative to this crate, where tests run: messages show paths as they are given.
@@ -23,7 +24,7 @@ fn is_expectation(line: &str) -> bool {
 }
 
 /// What a diagnostic looks like under its line.
-fn comment(diagnostic: &Diagnostic, sources: &Sources) -> Vec<String> {
+fn comment(diagnostic: &Diagnostic, sources: &SourceMap) -> Vec<String> {
     let file = sources.file_at(diagnostic.span.start);
     let (_, column) = file.line_column(diagnostic.span.start);
     let local = file.local(&diagnostic.span);

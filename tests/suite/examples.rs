@@ -1,8 +1,8 @@
 //! The examples of the nodes: together they are a graph that loads and runs.
 
-use tactflow_runtime::diagnostic::Report;
 use tactflow_runtime::engine::Engine;
 use tactflow_runtime::graph::{Plan, Request, plan};
+use tactflow_runtime::source::Report;
 use tactflow_tests::examples::graph_of_all;
 
 fn load(text: String) -> Result<Plan, Report> {

@@ -9,8 +9,9 @@ use tactflow_runtime::fault::Cause;
 use tactflow_runtime::graph::plan;
 use tactflow_runtime::harness::GraphRig;
 use tactflow_runtime::node::{Mistakes, Node, Setup, Tick};
-use tactflow_runtime::node::{ParamSpec, Reader, Value};
+use tactflow_runtime::node::{ParamSpec, Reader};
 use tactflow_runtime::signal::Freshness;
+use tactflow_runtime::source::Value;
 use tactflow_tests::nodes::length_by_hand;
 use tactflow_tests::{catalogue, on_the_mock_bench};
 

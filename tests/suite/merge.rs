@@ -4,9 +4,9 @@
 
 use std::fs;
 
-use tactflow_runtime::diagnostic::Code;
 use tactflow_runtime::graph::{Request, plan};
 use tactflow_runtime::signal::{Pose, Scalar, Signal};
+use tactflow_runtime::source::Code;
 use tactflow_tests::catalogue;
 
 use crate::course::{loaded, shipped};
@@ -92,7 +92,7 @@ fn a_number_over_a_fact_replaces_it() {
 /// Code, place and message of everything that is wrong.
 fn mistakes(request: &Request) -> Vec<(&'static str, String, String)> {
     let Err(report) = plan(&catalogue(), request) else { panic!("it loads") };
-    let told = |diagnostic: &tactflow_runtime::diagnostic::Diagnostic| {
+    let told = |diagnostic: &tactflow_runtime::source::Diagnostic| {
         (diagnostic.code.name(), report.sources.locate(diagnostic.span.start), diagnostic.message.clone())
     };
     report.diagnostics.iter().map(told).collect()

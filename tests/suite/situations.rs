@@ -13,9 +13,10 @@ use std::path::{Path, PathBuf};
 use serde::Deserialize;
 use tactflow_runtime::engine::Engine;
 use tactflow_runtime::fault::Fault;
-use tactflow_runtime::graph::{Item, Plan, Request, plan};
+use tactflow_runtime::graph::{Plan, Request, plan};
 use tactflow_runtime::node::PortId;
 use tactflow_runtime::signal::{Signal, Twist};
+use tactflow_runtime::source::Item;
 use tactflow_tests::saboteur::{How, Sabotage, sabotaged};
 use tactflow_tests::{catalogue, on_the_mock_bench, toml_files, workspace};
 

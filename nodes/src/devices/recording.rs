@@ -8,10 +8,10 @@ use std::borrow::Cow;
 use std::sync::Arc;
 
 use tactflow_runtime::device::{Commands, Description, Device, DeviceError, Driver, Filled, Opened, Samples, Stepped};
-use tactflow_runtime::diagnostic::Code;
 use tactflow_runtime::node::{At, Count, FilePath, Mistake, Mistakes, NonNegative, Positive, Rate};
 use tactflow_runtime::params;
 use tactflow_runtime::signal::{Image, Unit};
+use tactflow_runtime::source::Code;
 
 use crate::recordings::{self, Hints, Recording, Refusal};
 

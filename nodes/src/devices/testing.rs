@@ -4,14 +4,14 @@ use std::path::Path;
 
 use tactflow_runtime::catalogue::Catalogue;
 use tactflow_runtime::device::{Commands, Description, Device, Driver, Filled, Opened, Samples, Stepped};
-use tactflow_runtime::graph::{Sources, parse_table};
 use tactflow_runtime::node::{Mistakes, Param, Reader};
+use tactflow_runtime::source::{SourceMap, parse_table};
 
 use crate::builtin;
 
 /// Opens a device with the parameters of a TOML text, as a bench file would.
 pub(crate) fn open<D: Device>(params: &str) -> Result<Opened, Mistakes> {
-    let mut sources = Sources::with_builtin(builtin::FILES);
+    let mut sources = SourceMap::with_builtin(builtin::FILES);
     let table = parse_table(sources.add_file(Path::new("bench.toml"), params)).expect("the test's TOML");
     let mut reader = Reader::new(&sources);
     let catalogue = Catalogue::new().device::<D>();
@@ -20,7 +20,7 @@ pub(crate) fn open<D: Device>(params: &str) -> Result<Opened, Mistakes> {
 
 /// Reads parameters that are known to be right.
 pub(crate) fn read<P: Param>(params: &str) -> P {
-    let mut sources = Sources::with_builtin(builtin::FILES);
+    let mut sources = SourceMap::with_builtin(builtin::FILES);
     let table = parse_table(sources.add_file(Path::new("bench.toml"), params)).expect("the test's TOML");
     P::read(&table, &mut Reader::new(&sources)).expect("the test's parameters")
 }

@@ -111,11 +111,11 @@ in.gate = "label.present"
 
 #[cfg(test)]
 mod tests {
-    use tactflow_runtime::diagnostic::Code;
     use tactflow_runtime::harness::NodeRig;
     use tactflow_runtime::signal::{
         FlagShape, Freshness, Scalar, ScalarShape, Shape, Signal, Stamp, Twist, TwistShape,
     };
+    use tactflow_runtime::source::Code;
 
     use super::*;
 

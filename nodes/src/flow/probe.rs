@@ -3,8 +3,8 @@
 //! A step never logs. This one only decides whether a line is due, by a flag; the tool writes the line after the tick,
 //! from what is on the wires then ([`Node::LOGS`]).
 
-use tactflow_runtime::diagnostic::Code;
 use tactflow_runtime::node::{At, Mistake, Mistakes, Node, NonNegative, Setup, Tick};
+use tactflow_runtime::source::Code;
 use tactflow_runtime::{inputs, outputs, params, state};
 
 params! {

@@ -16,11 +16,12 @@
 
 use std::f64::consts::TAU;
 
-use tactflow_runtime::diagnostic::Code;
 use tactflow_runtime::node::{
-    At, Mistake, Mistakes, Node, NonNegative, Param, Positive, Reader, Setup, Tick, Value, read_leaf,
+    At, Mistake, Mistakes, Node, NonNegative, Param, Positive, Reader, Setup, Tick, read_leaf,
 };
 use tactflow_runtime::signal::{ScalarShape, Unit};
+use tactflow_runtime::source::Code;
+use tactflow_runtime::source::Value;
 use tactflow_runtime::{inputs, outputs, params, state};
 
 /// The course of a signal.

@@ -15,9 +15,9 @@
 //! Invariants: no joint ever changes its velocity by more than a dt, nor exceeds its speed; one that starts within its
 //! range never leaves it, and the lead never grows past its bound by a command, while no tick takes longer than h.
 
-use tactflow_runtime::diagnostic::Code;
 use tactflow_runtime::node::{At, Limits, Mistake, Mistakes, Node, Positive, Ratio, Setup, Tick};
 use tactflow_runtime::signal::{Joint, JointsShape, ScalarShape, Stamp, Unit};
+use tactflow_runtime::source::Code;
 use tactflow_runtime::{inputs, outputs, params, state};
 
 use crate::arm::joint_limits::share;

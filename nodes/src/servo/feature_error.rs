@@ -3,9 +3,9 @@
 //! e = setpoint - measured for every feature alike: signs live only in the columns of `inverse_jacobian`. The error of
 //! a line's direction is wrapped into (-pi/2, pi/2]. Each component is as fresh and as old as its own input.
 
-use tactflow_runtime::diagnostic::Code;
 use tactflow_runtime::node::{At, Map, Mistake, Mistakes, Node, Setup, Tick};
 use tactflow_runtime::signal::{Feature, FeaturesShape, ScalarShape};
+use tactflow_runtime::source::Code;
 use tactflow_runtime::{inputs, outputs, params};
 
 use super::axial::wrap_axial;

@@ -93,10 +93,10 @@ columns.pressure = [  0,  0,  1,   0,   0,  0 ]   # [m per N per tactel]
 mod tests {
     use nalgebra::Vector3;
     use proptest::prelude::*;
-    use tactflow_runtime::diagnostic::Code;
     use tactflow_runtime::harness::NodeRig;
     use tactflow_runtime::node::At;
     use tactflow_runtime::signal::{Feature, Features, FeaturesShape, Stamp, Unit};
+    use tactflow_runtime::source::Code;
 
     use super::*;
 

@@ -70,9 +70,9 @@ select = [1, 1, 1, 0, 0, 0]         # place and pressure, no rolling
 mod tests {
     use proptest::array::uniform6;
     use proptest::prelude::*;
-    use tactflow_runtime::diagnostic::Code;
     use tactflow_runtime::harness::NodeRig;
     use tactflow_runtime::signal::{Twist, TwistShape};
+    use tactflow_runtime::source::Code;
 
     use super::*;
 

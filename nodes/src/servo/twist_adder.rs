@@ -3,8 +3,8 @@
 //! An absent twist is zero motion; the sum is absent when all are. It is taken in the order of the wires, and is as old
 //! as the oldest twist in it.
 
-use tactflow_runtime::diagnostic::Code;
 use tactflow_runtime::node::{At, Components, Mistake, Mistakes, Node, Setup, Tick};
+use tactflow_runtime::source::Code;
 use tactflow_runtime::{inputs, outputs, params};
 
 params! {}

@@ -3,9 +3,9 @@
 //! A component that is absent, or that nothing is wired to, is zero; the twist is absent when all are absent. It is as
 //! old as the oldest component in it.
 
-use tactflow_runtime::diagnostic::Code;
 use tactflow_runtime::node::{At, Mistake, Mistakes, Node, Setup, Tick};
 use tactflow_runtime::signal::Twist;
+use tactflow_runtime::source::Code;
 use tactflow_runtime::{inputs, outputs, params};
 
 params! {

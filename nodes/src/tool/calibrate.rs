@@ -5,9 +5,9 @@ use std::path::{Path, PathBuf};
 
 use tactflow_runtime::cli::clap::{self, Parser, ValueEnum};
 use tactflow_runtime::cli::{NOT_LOADED, Shell};
-use tactflow_runtime::diagnostic::{Code, Diagnostic, Report as Mistakes};
-use tactflow_runtime::graph::Sources;
 use tactflow_runtime::signal::Unit;
+use tactflow_runtime::source::SourceMap;
+use tactflow_runtime::source::{Code, Diagnostic, Report as Mistakes};
 
 use super::{may_replace, pair, positive};
 use crate::calibration::log::Log;
@@ -207,7 +207,7 @@ fn refused(refusal: Refusal, name: &str) -> Failure {
             format!("`{name}` is no recording of a known format; formats are {}", recordings::list()).into()
         }
         Refusal::Damaged { text, flaws } => {
-            let mut sources = Sources::default();
+            let mut sources = SourceMap::default();
             sources.add(name, text, "");
             let diagnostics = flaws.into_iter().map(|flaw| Diagnostic::new(Code::BadData, flaw.span, flaw.message));
             Failure::Places(Box::new(Mistakes::new(sources, diagnostics.collect())))

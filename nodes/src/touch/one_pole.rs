@@ -6,8 +6,8 @@
 
 use std::f64::consts::PI;
 
-use tactflow_runtime::diagnostic::Code;
 use tactflow_runtime::node::{At, Interval, Mistake, Mistakes, Node, Positive, Setup, Tick};
+use tactflow_runtime::source::Code;
 use tactflow_runtime::{inputs, outputs, params, state};
 
 use super::{doubled, halved};

@@ -3,9 +3,9 @@
 //! Regions are ordered by area, by force or by distance from a point, and the one of the given rank is taken; of two
 //! that are equal, the one that comes first in raster order. One such node a contact holds several contacts apart.
 
-use tactflow_runtime::diagnostic::Code;
 use tactflow_runtime::node::{At, Count, Mistake, Mistakes, Node, Setup, Tick};
 use tactflow_runtime::signal::{Grid, Region};
+use tactflow_runtime::source::Code;
 use tactflow_runtime::{inputs, outputs, params, state};
 
 use super::label::{away, middles, middles_of, paint};

@@ -7,9 +7,9 @@ use serde::Serialize;
 use super::describe::Format;
 use super::json::{Diagnosed, diagnosed};
 use super::{NOT_LOADED, OnArgs, Shell};
-use crate::diagnostic::Report;
 use crate::graph::{Plan, plan};
 use crate::scenario::Scenario;
+use crate::source::Report;
 
 /// Check graphs like a compiler would, without running them
 #[derive(clap::Parser)]

@@ -6,7 +6,7 @@ use super::entry::{Entries, Entry};
 use super::page::page;
 use super::prose::{Look, markdown};
 use super::{NOT_LOADED, Shell};
-use crate::diagnostic::meant;
+use crate::source::meant;
 
 /// Describe one of them in full, with a graph to paste
 #[derive(clap::Parser)]

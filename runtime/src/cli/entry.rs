@@ -7,8 +7,8 @@ use serde::Serialize;
 use super::example::{self, Asked};
 use crate::catalogue::Catalogue;
 use crate::device::{DeviceType, RoleType};
-use crate::graph::{frame_args, may_fit};
 use crate::node::{Need, NodeSpec, ParamSpec, PortSpec, Repeats};
+use crate::node::{frame_args, may_fit};
 use crate::record::recorded;
 use crate::signal::Kind;
 

@@ -7,9 +7,10 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use crate::catalogue::Catalogue;
-use crate::graph::{Item, Request, Sources, Table, Value, parse_table, plan};
+use crate::graph::{Request, plan};
 use crate::node::{Need, NodeSpec, PortSpec};
 use crate::signal::Kind;
+use crate::source::{Item, SourceMap, Table, Value, parse_table};
 
 /// What the example is of.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -148,7 +149,7 @@ fn pieces(catalogue: &Catalogue) -> Result<Vec<Piece>, String> {
 }
 
 fn piece(catalogue: &Catalogue, kind: &str, example: &str, is_device: bool) -> Result<Piece, String> {
-    let mut sources = Sources::default();
+    let mut sources = SourceMap::default();
     let parsed = parse_table(sources.add_file(Path::new("example"), example));
     let Ok(Value { item: Item::Table(root), .. }) = parsed else {
         return Err(format!("the example of `{kind}` is no TOML"));

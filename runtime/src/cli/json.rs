@@ -4,8 +4,8 @@ use std::ops::Range;
 
 use serde::Serialize;
 
-use crate::diagnostic::{Diagnostic, Report};
-use crate::graph::{Item, Sources, Value};
+use crate::source::{Diagnostic, Report};
+use crate::source::{Item, SourceMap, Value};
 
 /// A diagnostic with its place.
 #[derive(Debug, Serialize)]
@@ -56,7 +56,7 @@ pub(super) fn diagnosed(report: &Report) -> Vec<Diagnosed> {
 }
 
 /// Where a span stands.
-pub(super) fn place(sources: &Sources, span: &Range<usize>) -> Place {
+pub(super) fn place(sources: &SourceMap, span: &Range<usize>) -> Place {
     let file = sources.file_at(span.start);
     let (line, column) = file.line_column(span.start);
     let length = file.text[file.local(span)].chars().count();
@@ -83,7 +83,7 @@ mod tests {
 
     #[test]
     fn a_place_counts_characters() {
-        let mut sources = Sources::default();
+        let mut sources = SourceMap::default();
         sources.add_file(Path::new("a.toml"), "x = 1\n");
         let base = sources.add_file(Path::new("b.toml"), "y = 2\nµ = \"é\"\n").base;
         let expected = Place { file: "b.toml".into(), line: 2, column: 5, length: 3 };

@@ -8,7 +8,7 @@ use clap::ValueEnum;
 
 use super::NOT_LOADED;
 use crate::catalogue::Catalogue;
-use crate::diagnostic::Report;
+use crate::source::Report;
 
 /// What a command is run in.
 pub struct Shell {

@@ -10,11 +10,10 @@ use super::check::milliseconds;
 use super::describe::Format;
 use super::json::{Place, json, place};
 use super::{OnArgs, Shell};
-use crate::graph::{
-    Item, Key, NOWHERE, Origin, OutlinedBlock, OutlinedWire, Plan, PlannedPort, Setting, Sources, Value, plan,
-};
+use crate::graph::{NOWHERE, Origin, OutlinedBlock, OutlinedWire, Plan, PlannedPort, Setting, plan};
 use crate::node::Word;
 use crate::signal::Shape;
+use crate::source::{Item, Key, SourceMap, Value};
 
 /// Show a graph as it runs: every wire and value, and where it comes from
 #[derive(clap::Parser)]
@@ -104,15 +103,15 @@ fn from(wire: &OutlinedWire) -> String {
 }
 
 /// `file:line`.
-fn at(sources: &Sources, at: usize) -> String {
+fn at(sources: &SourceMap, at: usize) -> String {
     let file = sources.file_at(at);
     match file.name.as_str() {
-        Sources::COMMAND_LINE => Sources::COMMAND_LINE.to_owned(),
+        SourceMap::COMMAND_LINE => SourceMap::COMMAND_LINE.to_owned(),
         name => format!("{name}:{}", file.line_column(at).0),
     }
 }
 
-fn line(setting: &Setting, sources: &Sources) -> Line {
+fn line(setting: &Setting, sources: &SourceMap) -> Line {
     let origin = match &setting.origin {
         Origin::Written(span) => at(sources, span.start),
         Origin::Default => "default".to_owned(),
@@ -367,7 +366,7 @@ impl ShownPort {
     }
 }
 
-fn shown(setting: &Setting, sources: &Sources) -> ShownSetting {
+fn shown(setting: &Setting, sources: &SourceMap) -> ShownSetting {
     let (origin, fact, span) = match &setting.origin {
         Origin::Written(span) => ("written", None, Some(span)),
         Origin::Default => ("default", None, None),

@@ -12,8 +12,9 @@ use std::borrow::Cow;
 use std::fmt;
 use std::marker::PhantomData;
 
-use crate::node::{Mistakes, Param, ParamSpec, PortSpec, Reader, Value};
+use crate::node::{Mistakes, Param, ParamSpec, PortSpec, Reader};
 use crate::signal::Shape;
+use crate::source::Value;
 
 pub use exchange::{Commands, Samples};
 pub use live::{Link, Live};

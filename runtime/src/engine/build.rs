@@ -15,20 +15,21 @@ use super::{Deck, Edge, Engine, Logged, Timing, View};
 use crate::device::{Commands, Driver, Samples};
 use crate::graph::{
     Age, Plan, PlannedCommand, PlannedDevice, PlannedNode, PlannedPort, PlannedReport, PlannedShow, PlannedView,
-    PlannedWire, Policy, Producer, Source, Sources,
+    PlannedWire, Policy, PortRef, Producer,
 };
 use crate::node::{Bus, PortId, Tick};
 use crate::signal::{Mark, Shape, Stamp};
+use crate::source::SourceMap;
 
 /// Where every port is.
-type Ids = BTreeMap<Source, PortId>;
+type Ids = BTreeMap<PortRef, PortId>;
 
 impl Engine {
     /// Allocates everything that the plan needs; nothing allocates in a tick.
     #[must_use]
     pub fn new(plan: Plan) -> Self {
         let (mut bus, mut ids, mut ports, mut inlets) = (Bus::default(), Ids::new(), Vec::new(), Vec::new());
-        let mut add = |source: Source, planned: &PlannedPort| {
+        let mut add = |source: PortRef, planned: &PlannedPort| {
             let id = bus.add(&planned.shape);
             ids.insert(source, id);
             ports.push((planned.clone(), id));
@@ -36,13 +37,13 @@ impl Engine {
         };
         for (i, role) in plan.roles.iter().enumerate() {
             for (port, planned) in role.ports.iter().enumerate() {
-                let id = add(Source { producer: Producer::Role(i), port }, planned);
+                let id = add(PortRef { producer: Producer::Role(i), port }, planned);
                 inlets.push(Inlet::new(role, port, id));
             }
         }
         for node in &plan.nodes {
             for (port, planned) in node.ports.iter().enumerate() {
-                add(Source { producer: Producer::Node(node.index), port }, planned);
+                add(PortRef { producer: Producer::Node(node.index), port }, planned);
             }
         }
         let logged = plan.nodes.iter().filter(|node| node.is_logged).map(|node| logged(node, &ids, &ports)).collect();
@@ -102,7 +103,7 @@ impl Engine {
 fn logged(node: &PlannedNode, ids: &Ids, ports: &[(PlannedPort, PortId)]) -> Logged {
     let sources = node.inputs.iter().flat_map(|(_, wires)| wires).map(|wire| ids[&wire.source]);
     let port = |id: PortId| ports.iter().find(|(_, known)| *known == id).expect("a wire comes from a port").clone();
-    let due = ids[&Source { producer: Producer::Node(node.index), port: 0 }];
+    let due = ids[&PortRef { producer: Producer::Node(node.index), port: 0 }];
     Logged { node: node.name.clone(), due, inputs: sources.map(port).collect() }
 }
 
@@ -123,7 +124,7 @@ fn limits(nodes: &[PlannedNode], ports: &[(PlannedPort, PortId)]) -> Vec<(String
     shares.map(|(port, id)| (port.name.clone(), *id)).collect()
 }
 
-fn deck<'s>(device: PlannedDevice, report: impl Fn(usize) -> Option<&'s Shape>, sources: &Sources) -> Deck {
+fn deck<'s>(device: PlannedDevice, report: impl Fn(usize) -> Option<&'s Shape>, sources: &SourceMap) -> Deck {
     let commands = Commands::with_shapes(device.commands.iter());
     Deck {
         place: sources.locate(device.span.start),
@@ -171,6 +172,6 @@ fn station(node: PlannedNode, ids: &Ids, bus: &mut Bus, watched: &mut Vec<Watche
     };
     let inputs: Vec<_> =
         node.inputs.iter().map(|(need, wires)| (*need, wires.iter().map(&mut end).collect())).collect();
-    let outputs = (0..node.ports.len()).map(|port| ids[&Source { producer: Producer::Node(node.index), port }]);
+    let outputs = (0..node.ports.len()).map(|port| ids[&PortRef { producer: Producer::Node(node.index), port }]);
     Station::new(node.node, &inputs, outputs.collect(), node.is_every_tick).with_aged(aged)
 }

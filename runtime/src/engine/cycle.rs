@@ -7,9 +7,9 @@ use super::modes::{Modes, Verdict};
 use super::trouble::{Trouble, said};
 use super::{Edge, Engine};
 use crate::device::DeviceError;
-use crate::diagnostic::closest;
 use crate::fault::{Cause, Fault};
 use crate::graph::Policy;
+use crate::source::closest;
 
 impl Engine {
     /// Runs the tick at `now` [ns]: exchange with the devices, then latch, step and commit.

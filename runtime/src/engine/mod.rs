@@ -17,9 +17,10 @@ mod trouble;
 mod words;
 
 use crate::device::{Commands, Linked, Live, Samples, Stepped};
-use crate::graph::{PlannedPort, Policy, PolicyTable, Sources};
+use crate::graph::{PlannedPort, Policy, PolicyTable};
 use crate::node::{Bus, PortId};
 use crate::signal::Signal;
+use crate::source::SourceMap;
 use halt::Halts;
 use modes::Modes;
 use timeline::Timeline;
@@ -64,7 +65,7 @@ pub struct Engine {
     late: u64,
     /// How late the next tick begins, if too late [ns].
     lateness: Option<i64>,
-    sources: Sources,
+    sources: SourceMap,
 }
 
 /// What a run shows of the graph, as its section [graph] says.
@@ -274,7 +275,7 @@ impl Engine {
 
     /// The texts the graph was read from.
     #[must_use]
-    pub const fn sources(&self) -> &Sources {
+    pub const fn sources(&self) -> &SourceMap {
         &self.sources
     }
 

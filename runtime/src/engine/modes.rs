@@ -6,7 +6,7 @@
 
 use std::collections::BTreeMap;
 
-use crate::graph::{Condition, PlannedExit, PlannedModes, Sort, Source, Test};
+use crate::graph::{Condition, PlannedExit, PlannedModes, PortRef, Sort, Test};
 use crate::node::{Bus, PortId, Tick};
 use crate::signal::{Features, Flag, Freshness, Kind, Pose, Scalar, Signal};
 
@@ -104,12 +104,12 @@ struct Memory {
 }
 
 impl Modes {
-    pub(super) fn new(planned: PlannedModes, ports: &BTreeMap<Source, (PortId, Kind)>) -> Self {
+    pub(super) fn new(planned: PlannedModes, ports: &BTreeMap<PortRef, (PortId, Kind)>) -> Self {
         let mut changed: Vec<usize> =
             planned.modes.iter().flat_map(|mode| mode.configurations.iter().map(|(place, _)| *place)).collect();
         changed.sort_unstable();
         changed.dedup();
-        let place = |source: &Source, feature| {
+        let place = |source: &PortRef, feature| {
             let (id, kind) = ports[source];
             Look::Port(Place { id, kind, feature })
         };

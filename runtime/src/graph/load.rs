@@ -4,12 +4,9 @@ use std::collections::BTreeMap;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
-use super::document::{Bench, Block, Document, GraphTable, PartBlock, Sections};
-use super::modes::ModeBlock;
-use super::policy::{Age, PolicyTable};
-use super::{BuiltinFile, Item, Key, Sources, Table, Value, parse_table};
-use crate::diagnostic::{Code, Diagnostic, closest, meant};
-use crate::node::Word;
+use crate::graph::flat::{Entity, FlatGraph, FlatNode, Scope};
+use crate::graph::syntax::{Age, Bench, Document, PartBlock, Sections};
+use crate::source::{BuiltinFile, Code, Diagnostic, Item, Key, SourceMap, Table, Value, meant, parse_table};
 
 /// What to load.
 #[derive(Debug, Clone, Default)]
@@ -52,60 +49,10 @@ impl Request {
     }
 }
 
-/// A name in a scope.
-#[derive(Debug, Clone, Copy)]
-pub(crate) enum Entity {
-    Role(usize),
-    Node(usize),
-    Part(usize),
-}
-
-/// The names that a file's wires can use.
-#[derive(Debug, Default)]
-pub(crate) struct Scope {
-    pub(crate) names: BTreeMap<String, (Key, Entity)>,
-    pub(crate) exports: Vec<(Key, Word)>,
-    /// Inputs that the part declares.
-    pub(crate) declared: Vec<(Key, Word)>,
-    /// Wires into the part; they stand in the scope of its parent.
-    pub(crate) inputs: Vec<(Key, Word)>,
-    pub(crate) parent: Option<usize>,
-}
-
-/// A node in its scope, with its full name.
-#[derive(Debug)]
-pub(crate) struct FlatNode {
-    pub(crate) name: String,
-    pub(crate) scope: usize,
-    pub(crate) block: Block,
-}
-
-/// A graph without parts, and its bench.
-#[derive(Debug, Default)]
-pub(crate) struct Flat {
-    pub(crate) table: Option<GraphTable>,
-    /// The section [graph] as it is written.
-    pub(crate) settings: Option<Value>,
-    /// Where to show what is missing in the graph as a whole.
-    pub(crate) place: Range<usize>,
-    pub(crate) roles: Vec<(Key, Word)>,
-    pub(crate) nodes: Vec<FlatNode>,
-    pub(crate) scopes: Vec<Scope>,
-    pub(crate) commands: Vec<(Key, Key, Word)>,
-    /// The section [limits] and its place.
-    pub(crate) limits: Option<(Range<usize>, Table)>,
-    pub(crate) modes: Vec<ModeBlock>,
-    /// The section [policy], as it is written and as it reads.
-    pub(crate) policy: Option<(Value, Option<PolicyTable>)>,
-    pub(crate) bench: Option<Bench>,
-    /// Wires that may grow only so old, by the places of their sources.
-    pub(crate) ages: BTreeMap<usize, Age>,
-}
-
 /// Reads files and notes what is wrong with them.
 #[derive(Default)]
 pub(crate) struct Loader {
-    pub(crate) sources: Sources,
+    pub(crate) sources: SourceMap,
     pub(crate) diagnostics: Vec<Diagnostic>,
     ages: BTreeMap<usize, Age>,
     open_parts: Vec<PathBuf>,
@@ -121,12 +68,12 @@ const MOST_PARTS: usize = 4096;
 impl Loader {
     /// A loader that knows the files a catalogue brings along.
     pub(crate) fn new(builtin: &[BuiltinFile]) -> Self {
-        Self { sources: Sources::with_builtin(builtin), ..Self::default() }
+        Self { sources: SourceMap::with_builtin(builtin), ..Self::default() }
     }
 
     /// Reads everything that the request names.
-    pub(crate) fn load(&mut self, request: &Request) -> Flat {
-        let mut flat = Flat::default();
+    pub(crate) fn load(&mut self, request: &Request) -> FlatGraph {
+        let mut flat = FlatGraph::default();
         let root = match &request.text {
             Some(text) => self.parse(&request.graph, text.clone()),
             None => self.read(&request.graph, None),
@@ -177,7 +124,7 @@ impl Loader {
     }
 
     /// The bench that is asked for, the graph's own sections of one, or the one it names.
-    fn bench(&mut self, request: &Request, flat: &Flat, graph: &Table, set: Table) -> Option<Bench> {
+    fn bench(&mut self, request: &Request, flat: &FlatGraph, graph: &Table, set: Table) -> Option<Bench> {
         // A graph whose own section could not be read has been told so.
         let named = flat.table.as_ref()?.bench.as_ref();
         if let Some(text) = &request.bench_text {
@@ -232,7 +179,7 @@ impl Loader {
             Err((error, help)) => {
                 let message = format!("cannot read `{}`: {error}", path.display());
                 let span = from.unwrap_or_else(|| {
-                    let file = self.sources.add(Sources::COMMAND_LINE, path.display().to_string(), "");
+                    let file = self.sources.add(SourceMap::COMMAND_LINE, path.display().to_string(), "");
                     file.base..file.base + file.text.len()
                 });
                 self.diagnostics.push(Diagnostic::new(Code::Unreadable, span, message).with_help(help));
@@ -274,14 +221,14 @@ impl Loader {
         let is_line = !text.contains(['\n', '\r']);
         let quoted = text.split_once('=').filter(|_| is_line).map(|(key, value)| format!("{key}={value:?}"));
         for text in [Some(text.to_owned()), quoted].into_iter().flatten() {
-            let file = self.sources.add(Sources::COMMAND_LINE, text, "");
+            let file = self.sources.add(SourceMap::COMMAND_LINE, text, "");
             if let Ok(Value { item: Item::Table(table), .. }) = parse_table(file)
                 && is_one_assignment(&table, &file.text)
             {
                 return Some(table);
             }
         }
-        let file = self.sources.add(Sources::COMMAND_LINE, text, "");
+        let file = self.sources.add(SourceMap::COMMAND_LINE, text, "");
         let span = file.base..file.base + file.text.len();
         let diagnostic = Diagnostic::new(Code::Syntax, span, "this is not `key=value`");
         self.diagnostics.push(diagnostic.help("for example `--set nodes.pid.gains.x.kp=3`"));
@@ -289,7 +236,7 @@ impl Loader {
     }
 
     /// Puts the nodes and parts of a document into the graph.
-    fn flatten(&mut self, document: Document, prefix: &str, mut scope: Scope, flat: &mut Flat) -> usize {
+    fn flatten(&mut self, document: Document, prefix: &str, mut scope: Scope, flat: &mut FlatGraph) -> usize {
         let index = flat.scopes.len();
         flat.scopes.push(Scope::default());
         (scope.exports, scope.declared) = (document.exports, document.inputs);
@@ -321,7 +268,7 @@ impl Loader {
         scope.names.insert(key.name.clone(), (key.clone(), entity));
     }
 
-    fn part(&mut self, part: &PartBlock, prefix: &str, parent: usize, flat: &mut Flat) -> Option<usize> {
+    fn part(&mut self, part: &PartBlock, prefix: &str, parent: usize, flat: &mut FlatGraph) -> Option<usize> {
         let file = part.file.as_ref().filter(|_| !self.is_full)?;
         if self.open_parts.len() >= DEEPEST || flat.scopes.len() > MOST_PARTS {
             let message =
@@ -360,8 +307,11 @@ impl Loader {
                 () if parts.contains(&key.name) => &["parts", "set"],
                 () => {
                     let message = format!("the part has no node or part `{}`", key.name);
-                    let help = closest(&key.name, nodes.iter().chain(&parts).map(String::as_str), "nodes and parts");
-                    self.diagnostics.push(Diagnostic::new(Code::UnknownKey, key.span.clone(), message).help(help));
+                    self.diagnostics.push(Diagnostic::new(Code::UnknownKey, key.span.clone(), message).suggest(
+                        &key.name,
+                        nodes.iter().chain(&parts).map(String::as_str),
+                        "nodes and parts",
+                    ));
                     continue;
                 }
             };
@@ -373,8 +323,11 @@ impl Loader {
         for (key, _) in &part.wires {
             if !document.inputs.iter().any(|(input, _)| input.name == key.name) {
                 let message = format!("part `{}` has no input `{}`", part.key.name, key.name);
-                let help = closest(&key.name, document.inputs.iter().map(|(input, _)| input.name.as_str()), "inputs");
-                self.diagnostics.push(Diagnostic::new(Code::UnknownInput, key.span.clone(), message).help(help));
+                self.diagnostics.push(Diagnostic::new(Code::UnknownInput, key.span.clone(), message).suggest(
+                    &key.name,
+                    document.inputs.iter().map(|(input, _)| input.name.as_str()),
+                    "inputs",
+                ));
             }
         }
         let names = || document.inputs.iter().map(|(input, _)| input.name.as_str());

@@ -4,14 +4,12 @@
 use std::ops::Range;
 use std::path::Path;
 
-use super::devices::{self, Opened};
-use super::document::{Block, GraphTable};
-use super::modes::ModeBlock;
-use super::policy::{Policy, PolicyTable};
-use super::wires::{self, CommandWire, Model, Wire};
-use super::{Item, Key, Sources, Table, Value, parse_table};
-use crate::catalogue::Catalogue;
+use crate::graph::bench::Opened;
+use crate::graph::facts::fill_facts;
+use crate::graph::net::{Net, Origin as WireOrigin, Wire};
+use crate::graph::syntax::{Block, GraphTable, ModeBlock, Policy, PolicyTable};
 use crate::node::{FilePath, Param, ParamSpec, Repeats, Word};
+use crate::source::{Item, Key, SourceMap, Table, Value, parse_table};
 
 /// The place of a default in a list of tables: nobody wrote it.
 pub const NOWHERE: Range<usize> = 0..0;
@@ -112,22 +110,19 @@ pub enum Origin {
 
 /// What the outline of a graph without mistakes is made from.
 pub(crate) struct Parts<'a> {
-    pub(crate) catalogue: &'a Catalogue,
-    pub(crate) model: &'a Model<'a>,
+    pub(crate) net: &'a Net<'a>,
     pub(crate) opened: &'a Opened,
-    pub(crate) wires: &'a [Vec<Wire>],
-    pub(crate) commands: &'a [CommandWire],
-    pub(crate) sources: &'a Sources,
+    pub(crate) sources: &'a SourceMap,
     /// Greatest time between two samples that counts as one step [s].
     pub(crate) max_gap: f64,
 }
 
 impl Parts<'_> {
     pub(crate) fn outline(&self) -> Outline {
-        let flat = self.model.flat;
-        let commands = self.commands.iter().map(|wire| OutlinedWire {
-            name: self.model.taken_name(wire),
-            source: self.model.port_name(wire.source),
+        let flat = self.net.flat;
+        let commands = self.net.commands.iter().map(|wire| OutlinedWire {
+            name: self.net.taken_name(wire),
+            source: self.net.port_name(wire.source),
             age: age(&wire.origin),
             span: wire.origin.word.span.clone(),
         });
@@ -144,7 +139,7 @@ impl Parts<'_> {
 
     fn graph(&self) -> Vec<Setting> {
         let mut settings = Vec::new();
-        let given = self.model.flat.settings.as_ref().and_then(Value::as_table);
+        let given = self.net.flat.settings.as_ref().and_then(Value::as_table);
         self.table(given, &GraphTable::fields(), "", &mut settings);
         settings.retain(|setting| setting.path != "bench");
         if !settings.iter().any(|setting| setting.path == "max_gap_ms") {
@@ -157,15 +152,15 @@ impl Parts<'_> {
 
     fn policy(&self) -> Vec<Setting> {
         let mut settings = Vec::new();
-        let given = self.model.flat.policy.as_ref().and_then(|(section, _)| section.as_table());
+        let given = self.net.flat.policy.as_ref().and_then(|(section, _)| section.as_table());
         self.table(given, &PolicyTable::fields(), "", &mut settings);
         settings
     }
 
     fn roles(&self) -> Vec<OutlinedRole> {
-        let bind = self.model.flat.bench.iter().flat_map(|bench| &bench.bind);
+        let bind = self.net.flat.bench.iter().flat_map(|bench| &bench.bind);
         let device = |role: &str| bind.clone().find(|(key, _)| key.name == role).map(|(_, word)| word.clone());
-        let roles = self.model.flat.roles.iter();
+        let roles = self.net.flat.roles.iter();
         let role = |(key, kind): &(Key, Word)| {
             Some(OutlinedRole { name: key.name.clone(), kind: kind.clone(), device: device(&key.name)? })
         };
@@ -173,23 +168,23 @@ impl Parts<'_> {
     }
 
     fn node(&self, index: usize) -> Option<OutlinedBlock> {
-        let node = &self.model.flat.nodes[index];
-        let (_, spec) = self.model.nodes[index].as_ref()?;
+        let node = &self.net.flat.nodes[index];
+        let spec = self.net.spec(index)?;
         let wire = |wire: &Wire| OutlinedWire {
             name: wire.key.name.clone(),
-            source: self.model.port_name(wire.source),
+            source: self.net.port_name(wire.source),
             age: age(&wire.origin),
             span: wire.origin.word.span.clone(),
         };
-        let wires = self.wires[index].iter().map(wire).collect();
+        let wires = self.net.wires[index].iter().map(wire).collect();
         Some(OutlinedBlock { name: node.name.clone(), wires, ..self.block(&node.block, &spec.params)? })
     }
 
     fn device(&self, name: &str) -> Option<OutlinedBlock> {
-        let bench = self.model.flat.bench.as_ref()?;
+        let bench = self.net.flat.bench.as_ref()?;
         let block = bench.devices.iter().find(|device| device.key.name == name)?;
         let kind = block.kind.as_ref()?;
-        let known = self.catalogue.devices().iter().find(|device| device.name() == kind.text)?;
+        let known = self.net.catalogue.find_device(&kind.text)?;
         self.block(block, &known.params())
     }
 
@@ -250,11 +245,11 @@ impl Parts<'_> {
         let fact = value.as_table().filter(|table| table.is_fact());
         let word = fact.and_then(|table| table.get("from")).and_then(Value::as_str);
         let role = word.and_then(|word| {
-            self.model.flat.roles.iter().position(|(key, _)| word.starts_with(&format!("{}.", key.name)))
+            self.net.flat.roles.iter().position(|(key, _)| word.starts_with(&format!("{}.", key.name)))
         });
         let mut filled = value.clone();
         // The graph has no mistakes, so every fact is there.
-        devices::fill_facts(&mut filled, self.model, self.opened, &mut Vec::new());
+        fill_facts(&mut filled, self.net, self.opened, &mut Vec::new());
         let bound = role.and_then(|role| self.opened.roles[role].as_ref());
         let origin = match (word, bound) {
             (Some(word), Some(bound)) => {
@@ -276,7 +271,7 @@ impl Parts<'_> {
     }
 }
 
-fn age(wire: &wires::Origin) -> Option<(f64, Policy)> {
+fn age(wire: &WireOrigin) -> Option<(f64, Policy)> {
     wire.age.map(|age| (age.max_age as f64 * 1e-6, age.stale))
 }
 
@@ -322,7 +317,7 @@ fn complete(value: &mut Value, spec: &ParamSpec) {
 /// The default of a parameter as a value; none if nothing is set.
 fn default(spec: &ParamSpec) -> Option<Value> {
     let text = spec.default.as_ref()?;
-    let mut sources = Sources::default();
+    let mut sources = SourceMap::default();
     let parsed = parse_table(sources.add_file(Path::new("default"), format!("value = {text}")));
     let value = parsed.ok().and_then(|value| value.as_table()?.get("value").cloned());
     Some(value.unwrap_or_else(|| Value { span: NOWHERE, item: Item::String(text.clone()) }))

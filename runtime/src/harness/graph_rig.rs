@@ -6,12 +6,13 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use crate::catalogue::Catalogue;
 use crate::device::{Commands, Description, DeviceError, DeviceType, Driver, Filled, Opened, Samples, Stepped};
-use crate::diagnostic::Report;
 use crate::engine::Engine;
 use crate::fault::Fault;
-use crate::graph::{Request, Value, plan};
+use crate::graph::{Request, plan};
 use crate::node::{ParamSpec, PortId, Reader};
 use crate::signal::{Freshness, Shape, Signal};
+use crate::source::Report;
+use crate::source::Value;
 
 type Write = Box<dyn FnOnce(&mut Samples) + Send>;
 

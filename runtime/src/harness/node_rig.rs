@@ -3,9 +3,9 @@
 use std::path::Path;
 
 use crate::engine::Station;
-use crate::graph::{Sources, parse_table};
 use crate::node::{Bus, Components, Given, Mistakes, Need, Node, NodeSpec, PortId, Reader, Tick, of};
 use crate::signal::{Freshness, Mark, Shape, Signal, Stamp};
+use crate::source::{SourceMap, parse_table};
 
 /// A node with nothing around it, for its own tests. It steps as in a graph: when a trigger is new or lost.
 ///
@@ -31,7 +31,7 @@ impl NodeRig {
     /// # Panics
     /// If the text is not TOML, or a name is no input.
     pub fn new<N: Node>(params: &str, wires: &[(&str, Shape)]) -> Result<Self, Mistakes> {
-        let mut sources = Sources::default();
+        let mut sources = SourceMap::default();
         let file = sources.add_file(Path::new("test.toml"), params);
         let table = parse_table(file).unwrap_or_else(|errors| panic!("{errors:?}"));
         let mut reader = Reader::new(&sources);

@@ -9,9 +9,10 @@ use std::marker::PhantomData;
 
 use super::{
     Bus, Components, InputSet, Limits, Mistakes, Node, OutputSet, Param, ParamSpec, PortId, PortSpec, Reader, Setup,
-    Tick, Value, Wires,
+    Tick, Wires,
 };
 use crate::signal::Shape;
+use crate::source::Value;
 
 /// What is known of a node type without a graph.
 #[derive(Debug, Clone)]

@@ -42,7 +42,7 @@ macro_rules! params {
             }
 
             #[allow(unused_mut, unused_variables, reason = "a node may have no parameters")]
-            fn read(value: &$crate::node::Value, reader: &mut $crate::node::Reader<'_>) -> Option<Self> {
+            fn read(value: &$crate::source::Value, reader: &mut $crate::node::Reader<'_>) -> Option<Self> {
                 let mut table = reader.table(value)?;
                 $(let $field = reader.field::<$ty>(&mut table, stringify!($field), None$(.or(Some(|| $default)))?);)*
                 reader.close(table, &[$(stringify!($field)),*]);

@@ -5,7 +5,7 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use super::FilePath;
-use crate::diagnostic::Code;
+use crate::source::Code;
 
 /// The place of a mistake, in the words of the graph file.
 #[derive(Debug, Clone, PartialEq, Eq)]

@@ -21,16 +21,17 @@ mod macros;
 mod mistake;
 mod param_spec;
 mod params;
+mod pattern;
 mod ports;
 
 use crate::signal::Stamp;
 
-pub use crate::graph::Value;
 pub use erased::{AnyNode, Built, Configured, Given, NodeSpec, NodeType, of};
 pub use limits::{Components, Limits};
 pub use mistake::{At, Mistake, Mistakes};
 pub use param_spec::{ParamSpec, Repeats, Written, written_table};
 pub use params::{Bit, Count, FilePath, Map, NonNegative, Param, Positive, Rate, Ratio, Reader, Word, read_leaf};
+pub(crate) use pattern::{UnitPattern, declares_a_unit, frame_args, may_fit, unit_pattern};
 pub use ports::{Bus, In, InputSet, Many, Need, Out, OutputSet, PortId, PortSpec, View, Wires};
 
 /// A node: configuration in `self`, made at load; state apart, so that a mode is a second configuration.

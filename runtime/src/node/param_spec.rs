@@ -87,8 +87,9 @@ fn word(source: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::node::{Map, NonNegative, Reader, Value, Word};
+    use crate::node::{Map, NonNegative, Reader, Word};
     use crate::signal::Unit;
+    use crate::source::Value;
 
     /// A choice between words.
     #[derive(Debug, Clone)]

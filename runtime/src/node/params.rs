@@ -8,9 +8,9 @@ use std::path::PathBuf;
 use serde::de::DeserializeOwned;
 
 use super::{At, Mistake, Mistakes, ParamSpec, Repeats, Written};
-use crate::diagnostic::{Code, closest, meant};
-use crate::graph::{Item, Key, Sources, Table, Value};
 use crate::signal::Unit;
+use crate::source::{Code, closest, meant};
+use crate::source::{Item, Key, SourceMap, Table, Value};
 
 /// Something a graph file may set.
 pub trait Param: Sized {
@@ -49,7 +49,7 @@ pub trait Param: Sized {
 
 /// Collects the mistakes while parameters are read.
 pub struct Reader<'a> {
-    sources: &'a Sources,
+    sources: &'a SourceMap,
     /// What is wrong so far.
     pub mistakes: Mistakes,
 }
@@ -65,7 +65,7 @@ pub struct OpenTable {
 impl<'a> Reader<'a> {
     /// A reader of values that stand in `sources`.
     #[must_use]
-    pub const fn new(sources: &'a Sources) -> Self {
+    pub const fn new(sources: &'a SourceMap) -> Self {
         Self { sources, mistakes: Vec::new() }
     }
 

@@ -8,11 +8,11 @@ use ply_rs_bw::ply::{ElementDef, Encoding, Header, PropertyAccess, PropertyDef, 
 use ply_rs_bw::writer::Writer;
 
 use super::Columns;
-use crate::diagnostic::closest;
 use crate::engine::Engine;
 use crate::graph::{Plan, PlannedPort};
 use crate::node::PortId;
 use crate::signal::{Freshness, Kind, Pose, Signal};
+use crate::source::closest;
 
 /// Which points are written, and where.
 #[derive(Debug, Clone, PartialEq, Eq)]

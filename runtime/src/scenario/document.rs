@@ -2,9 +2,9 @@
 
 use std::ops::Range;
 
-use crate::diagnostic::{Code, Diagnostic};
-use crate::graph::{Item, Key, Sources, Table, Value};
 use crate::node::{At, FilePath, Map, Mistake, NonNegative, Param, Positive, Reader, Word};
+use crate::source::{Code, Diagnostic};
+use crate::source::{Item, Key, SourceMap, Table, Value};
 
 crate::params! { ScenarioTable:
     /// Task that runs.
@@ -123,7 +123,7 @@ pub(super) struct Document {
 
 impl Document {
     /// The task, and the bench if one is named: they are looked into whatever else is wrong with the section.
-    pub(super) fn files(&self, sources: &Sources) -> Vec<FilePath> {
+    pub(super) fn files(&self, sources: &SourceMap) -> Vec<FilePath> {
         // What is wrong with them has been told.
         let mut reader = Reader::new(sources);
         let mut file = |key: &str| FilePath::read(self.section.as_table()?.get(key)?, &mut reader);
@@ -140,7 +140,7 @@ pub(super) fn document(root: &Table, reader: &mut Reader<'_>) -> Document {
             "set" | "nodes" | "parts" | "devices" | "bind" => {
                 "a scenario patches neither the task nor the bench: write a bench, or a task, of its own".to_owned()
             }
-            name => crate::diagnostic::closest(name, ["scenario", "check"].into_iter(), "sections"),
+            name => crate::source::closest(name, ["scenario", "check"].into_iter(), "sections"),
         };
         reader.mistakes.push(Mistake::new(Code::UnknownKey, At::Span(key.span.clone()), message).help(help));
     }

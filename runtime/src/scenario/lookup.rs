@@ -6,11 +6,12 @@ use super::document::{CheckBlock, CheckTable, Document, PaperTable, ScenarioTabl
 use super::judge::{Bound, Figure, Row};
 use super::{Check, Scenario, row};
 use crate::catalogue::Catalogue;
-use crate::diagnostic::{Code, Diagnostic, Report, closest, meant};
-use crate::graph::{Item, Plan, Request, Value};
+use crate::graph::{Plan, Request};
 use crate::node::Word;
 use crate::record::{Column, Columns};
 use crate::signal::Kind;
+use crate::source::{Code, Diagnostic, Report, closest, meant};
+use crate::source::{Item, Value};
 
 /// As long an end the steady state is taken from, unless a check says another [s].
 const STEADY: f64 = 10.0;
@@ -189,8 +190,11 @@ impl Lookup<'_> {
         let ends_in = ends_in.filter(|word| word.text != super::trial::DONE || modes.is_empty());
         for word in ends_in.into_iter().chain(stays_in).filter(|word| !modes.contains(&word.text.as_str())) {
             let message = format!("there is no mode `{}`", word.text);
-            let help = closest(&word.text, modes.iter().copied(), "modes");
-            self.found.push(Diagnostic::new(Code::UnknownMode, word.span.clone(), message).help(help));
+            self.found.push(Diagnostic::new(Code::UnknownMode, word.span.clone(), message).suggest(
+                &word.text,
+                modes.iter().copied(),
+                "modes",
+            ));
         }
     }
 
@@ -203,8 +207,11 @@ impl Lookup<'_> {
         let fact = facts.iter().find(|(name, _)| *name == word.text).cloned();
         if fact.is_none() {
             let message = format!("no device states `{}`, and none is set so", word.text);
-            let help = closest(&word.text, facts.iter().map(|(name, _)| name.as_str()), "facts");
-            self.found.push(Diagnostic::new(Code::UnknownFact, word.span.clone(), message).help(help));
+            self.found.push(Diagnostic::new(Code::UnknownFact, word.span.clone(), message).suggest(
+                &word.text,
+                facts.iter().map(|(name, _)| name.as_str()),
+                "facts",
+            ));
         }
         fact
     }

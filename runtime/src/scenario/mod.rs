@@ -13,9 +13,9 @@ mod trial;
 use std::path::{Path, PathBuf};
 
 use crate::catalogue::Catalogue;
-use crate::diagnostic::{Code, Diagnostic, Report};
 use crate::graph::{Loader, Request, other_file, plan_in, spanned};
 use crate::node::{FilePath, Reader};
+use crate::source::{Code, Diagnostic, Report};
 use document::Document;
 use judge::{Bound, Row};
 
@@ -152,7 +152,7 @@ fn request(files: &[FilePath]) -> Option<Request> {
 }
 
 /// A scenario that asks nothing and tells nothing.
-fn nothing_asked(root: &crate::graph::Table, document: &Document) -> Option<Diagnostic> {
+fn nothing_asked(root: &crate::source::Table, document: &Document) -> Option<Diagnostic> {
     let (key, _) = root.entry("scenario")?;
     let table = document.scenario.as_ref()?;
     let asks = [&table.never_lost, &table.stays_in, &table.ends_in].iter().any(|word| word.is_some());

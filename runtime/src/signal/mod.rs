@@ -10,6 +10,7 @@ mod joints;
 mod kind;
 mod mask;
 mod regions;
+mod scalars;
 mod spatial;
 mod unit;
 

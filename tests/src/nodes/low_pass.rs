@@ -4,8 +4,8 @@
 //! dt is the time between two samples, so T means the same at 100 Hz and at 1 kHz. The first sample passes as it is.
 //! What has decayed to almost nothing is zero, as subnormal numbers are slow.
 
-use tactflow_runtime::diagnostic::Code;
 use tactflow_runtime::node::{At, Interval, Mistake, Mistakes, Node, Positive, Setup, Tick};
+use tactflow_runtime::source::Code;
 use tactflow_runtime::{inputs, outputs, params, state};
 
 params! {

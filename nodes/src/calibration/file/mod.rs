@@ -8,10 +8,10 @@ use std::collections::BTreeMap;
 use std::fmt::Write;
 use std::ops::Range;
 
-use tactflow_runtime::graph::{Item, Sources, Value, parse_table};
 use tactflow_runtime::node::{At, Count, Param, Reader, read_leaf};
 use tactflow_runtime::params;
 use tactflow_runtime::signal::Unit;
+use tactflow_runtime::source::{Item, SourceMap, Value, parse_table};
 
 use super::curve::KINDS;
 use super::{Calibration, Curve, Kind, Tactel};
@@ -125,7 +125,7 @@ params! {
 /// Whether a text is a calibration file, sound or not.
 #[must_use]
 pub fn is_calibration(text: &str) -> bool {
-    let mut sources = Sources::default();
+    let mut sources = SourceMap::default();
     let parsed = parse_table(sources.add("", text, ""));
     parsed.is_ok_and(|value| {
         value.as_table().and_then(|table| table.get("kind")).is_some_and(|kind| kind.as_str() == Some(KIND))
@@ -137,9 +137,9 @@ pub fn is_calibration(text: &str) -> bool {
 /// # Errors
 /// What is wrong with it, the first few mistakes at once.
 pub fn read(text: &str) -> Result<Calibration, Vec<Flaw>> {
-    let mut sources = Sources::default();
+    let mut sources = SourceMap::default();
     let root = parse_table(sources.add("", text, "")).map_err(|mistakes| {
-        let flaw = |mistake: tactflow_runtime::diagnostic::Diagnostic| flaw(&mistake.span, mistake.message.clone());
+        let flaw = |mistake: tactflow_runtime::source::Diagnostic| flaw(&mistake.span, mistake.message.clone());
         // After the first, the reader of TOML is lost: in a file that is none it is as wrong in each line.
         mistakes.into_iter().take(1).map(flaw).collect::<Vec<_>>()
     })?;

@@ -13,10 +13,10 @@ use std::borrow::Cow;
 use std::time::Duration;
 
 use tactflow_runtime::device::{Description, Device, Driver, Filled, Opened};
-use tactflow_runtime::diagnostic::Code;
 use tactflow_runtime::node::{At, FilePath, Mistake, Mistakes, Positive};
 use tactflow_runtime::params;
 use tactflow_runtime::signal::{ImageShape, Joint, JointsShape, Unit};
+use tactflow_runtime::source::Code;
 
 use super::arm_facts;
 use crate::arm::model::load;

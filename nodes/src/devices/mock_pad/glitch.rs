@@ -1,7 +1,8 @@
 //! How a scripted pad misbehaves.
 
-use tactflow_runtime::node::{NonNegative, Param, Positive, Reader, Value, read_leaf};
+use tactflow_runtime::node::{NonNegative, Param, Positive, Reader, read_leaf};
 use tactflow_runtime::params;
+use tactflow_runtime::source::Value;
 
 use crate::devices::nanos;
 

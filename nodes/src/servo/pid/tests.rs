@@ -3,10 +3,10 @@
 use std::f64::consts::PI;
 
 use proptest::prelude::*;
-use tactflow_runtime::diagnostic::Code;
 use tactflow_runtime::harness::NodeRig;
 use tactflow_runtime::node::At;
 use tactflow_runtime::signal::{Feature, Features, FeaturesShape, Shape, Stamp};
+use tactflow_runtime::source::Code;
 
 use super::*;
 

@@ -1,8 +1,8 @@
 //! Whether a simulated bench can be what its parameters say.
 
-use tactflow_runtime::diagnostic::Code;
 use tactflow_runtime::node::{At, Mistake, Mistakes};
 use tactflow_runtime::signal::ImageShape;
+use tactflow_runtime::source::Code;
 
 use super::{INERTIA, MOST, Params};
 use crate::sim::joints::GIVES_WAY;

@@ -11,12 +11,12 @@ mod tare;
 
 use std::str::FromStr;
 
-use tactflow_runtime::diagnostic::Code;
-use tactflow_runtime::graph::{Item, Value};
 use tactflow_runtime::node::{
     At, Count, FilePath, Mistake, Mistakes, Node, Param, Positive, Reader, Setup, Tick, Written,
 };
 use tactflow_runtime::signal::{ImageShape, Unit};
+use tactflow_runtime::source::Code;
+use tactflow_runtime::source::{Item, Value};
 use tactflow_runtime::{inputs, outputs, params, state};
 
 use crate::calibration::{Calibration, file};

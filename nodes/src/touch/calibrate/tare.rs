@@ -3,8 +3,8 @@
 //! Whether a frame shows a contact is known only after it has gone down the graph, so each frame of the window is judged
 //! when the next one comes, the last one too: the zero changes with the frame after the window.
 
-use tactflow_runtime::diagnostic::Code;
 use tactflow_runtime::node::{At, Mistake, Mistakes};
+use tactflow_runtime::source::Code;
 
 use super::lines::Lines;
 use super::{InputShapes, Inputs, Params, State};

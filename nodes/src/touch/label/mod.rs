@@ -12,8 +12,9 @@ mod nearest;
 
 use std::ops::Range;
 
-use tactflow_runtime::node::{Count, Mistake, Mistakes, Node, Param, Reader, Setup, Tick, Value, Written, read_leaf};
+use tactflow_runtime::node::{Count, Mistake, Mistakes, Node, Param, Reader, Setup, Tick, Written, read_leaf};
 use tactflow_runtime::signal::{Grid, Image, Mask, Region, RegionsShape, Run};
+use tactflow_runtime::source::Value;
 use tactflow_runtime::{inputs, outputs, params, state};
 
 use super::on_one_array;

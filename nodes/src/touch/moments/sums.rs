@@ -1,8 +1,8 @@
 //! Sums over a region, and the ellipse with its second moments: what all nodes that tell of a shape share.
 
-use tactflow_runtime::diagnostic::Code;
 use tactflow_runtime::node::{At, Mistake, Mistakes};
 use tactflow_runtime::signal::{Image, Mask};
+use tactflow_runtime::source::Code;
 
 words! {
     /// What a tactel of the region counts in its place and its shape.

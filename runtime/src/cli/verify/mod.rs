@@ -12,10 +12,10 @@ use super::json::{Diagnosed, diagnosed};
 use super::run::quietly;
 use super::{FAULTED, NOT_LOADED, Shell};
 use crate::catalogue::Catalogue;
-use crate::diagnostic::Report;
 use crate::engine::Interrupt;
 use crate::scenario::judge::{Mark, Row};
 use crate::scenario::{Scenario, Trial};
+use crate::source::Report;
 
 /// Run scenarios and hold what comes out against what they ask
 #[derive(clap::Parser)]

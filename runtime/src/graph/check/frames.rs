@@ -1,0 +1,205 @@
+//! Frames: unified over all wires, so that one adjoint serves every frame and a wrong one is a load error.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use crate::graph::flat::FlatNode;
+use crate::graph::net::{Net, Origin, Wire};
+use crate::graph::port::{PortRef, Producer};
+use crate::node::{NodeSpec, PortSpec, frame_args};
+use crate::signal::Kind;
+use crate::source::{Code, Diagnostic};
+
+/// Which frame every variable of every node stands for.
+#[derive(Debug, Default)]
+pub(crate) struct Frames {
+    variables: BTreeMap<(Producer, String), usize>,
+    parents: Vec<usize>,
+    known: Vec<Option<String>>,
+    /// Nodes with a wire in the wrong frame.
+    clashes: BTreeSet<usize>,
+}
+
+impl Frames {
+    /// Whether a wire of that node is in the wrong frame: it has been told, and the node cannot be built.
+    pub(crate) fn has_clash(&self, node: usize) -> bool {
+        self.clashes.contains(&node)
+    }
+
+    /// Unifies the frames of all wires; wires that tell most come first, so that a mistake shows where it is.
+    pub(crate) fn unify(net: &Net<'_>, found: &mut Vec<Diagnostic>) -> Self {
+        let mut frames = Self::default();
+        for &node in &net.order {
+            let mut wires: Vec<&Wire> = net.wires[node].iter().collect();
+            wires.sort_by_key(|wire| rank(net.port(wire.source).kind));
+            for wire in wires {
+                let consumer = format!("{}.{}", net.flat.nodes[node].name, wire.key.name);
+                let end = End { owner: Producer::Node(node), port: net.input(node, wire), name: consumer };
+                if let Some(clash) = frames.wire(net, wire.source, &wire.origin, &end) {
+                    frames.clashes.insert(node);
+                    found.push(clash);
+                }
+            }
+        }
+        for wire in &net.commands {
+            let end = End { owner: Producer::Role(wire.role), port: net.taken(wire), name: net.taken_name(wire) };
+            found.extend(frames.wire(net, wire.source, &wire.origin, &end));
+        }
+        frames
+    }
+
+    /// The frames of an output, where they are known.
+    pub(crate) fn of(&mut self, net: &Net<'_>, source: PortRef) -> Vec<Option<String>> {
+        self.known(net, source.producer, net.port(source))
+    }
+
+    fn wire(&mut self, net: &Net<'_>, source: PortRef, origin: &Origin, end: &End<'_>) -> Option<Diagnostic> {
+        let port = net.port(source);
+        let (has, takes) = (self.known(net, source.producer, port), self.known(net, end.owner, end.port));
+        let clash = has.iter().zip(&takes).any(|(a, b)| matches!((a, b), (Some(a), Some(b)) if a != b));
+        if clash {
+            let (from, kind) = (net.port_name(source), port.kind);
+            let message =
+                format!("`{from}` is {}, but `{}` takes {}", typed(kind, &has), end.name, typed(kind, &takes));
+            let help = self.converter(net, kind, &has, &takes, origin);
+            return Some(origin.mistake(Code::FrameMismatch, message).with_help(help));
+        }
+        for (a, b) in frame_args(port).iter().zip(frame_args(end.port)) {
+            let (a, b) = (self.variable(net, source.producer, a), self.variable(net, end.owner, b));
+            self.join(a, b);
+        }
+        None
+    }
+
+    /// A node that takes the one and gives the other, to be put between.
+    fn converter(
+        &mut self,
+        net: &Net<'_>,
+        kind: Kind,
+        has: &[Option<String>],
+        takes: &[Option<String>],
+        origin: &Origin,
+    ) -> Option<String> {
+        let (spec, input, pose) = net.catalogue.specs().find_map(|spec| {
+            let input = spec.inputs.iter().find(|input| input.kind == kind)?;
+            let output = spec.outputs.iter().find(|output| output.kind == kind)?;
+            let pose = spec.inputs.iter().find(|input| input.kind == Kind::Pose)?;
+            let is_converter = *pose.args == [input.args[0].clone(), output.args[0].clone()];
+            is_converter.then_some((spec, input, pose))
+        })?;
+        let wanted = [has.first()?.clone(), takes.first()?.clone()];
+        let article = if spec.name.starts_with(['a', 'e', 'i', 'o']) { "an" } else { "a" };
+        let name = &spec.name;
+        let Some(source) = self.find_pose(net, &wanted).and_then(|source| net.name_in(origin.scope, source)) else {
+            let [from, to] = wanted.map(|frame| frame.unwrap_or_else(|| "?".into()));
+            return Some(format!(
+                "put {article} `{name}` between them, with a pose of `{from}` in `{to}`: nothing here gives one yet"
+            ));
+        };
+        let (twist, from) = (&input.name, &origin.word.text);
+        Some(format!(
+            "put {article} `{name}` between them:\n[nodes.{name}]\ntype = \"{name}\"\nin.{twist} = \"{from}\"\nin.{} = \"{source}\"",
+            pose.name,
+        ))
+    }
+
+    fn find_pose(&mut self, net: &Net<'_>, wanted: &[Option<String>]) -> Option<PortRef> {
+        let nodes = (0..net.nodes.len()).map(Producer::Node);
+        let sources: Vec<PortRef> = nodes
+            .flat_map(|producer| {
+                let outputs = net.outputs(producer).unwrap_or_default().iter().enumerate();
+                let poses = outputs.filter(|(_, output)| output.kind == Kind::Pose);
+                poses.map(move |(port, _)| PortRef { producer, port }).collect::<Vec<_>>()
+            })
+            .collect();
+        sources.into_iter().find(|source| self.of(net, *source) == wanted)
+    }
+
+    fn known(&mut self, net: &Net<'_>, owner: Producer, port: &PortSpec) -> Vec<Option<String>> {
+        let args = frame_args(port).to_vec();
+        args.iter()
+            .map(|arg| {
+                let variable = self.variable(net, owner, arg);
+                let root = self.root(variable);
+                self.known[root].clone()
+            })
+            .collect()
+    }
+
+    fn variable(&mut self, net: &Net<'_>, owner: Producer, arg: &str) -> usize {
+        let key = (owner, arg.to_owned());
+        if let Some(variable) = self.variables.get(&key) {
+            return *variable;
+        }
+        let is_letter = arg.len() == 1 && arg.starts_with(|c: char| c.is_ascii_uppercase());
+        let known = match (arg, arg.strip_prefix('$'), owner) {
+            ("self", _, _) => Some(net.name(owner).to_owned()),
+            (_, Some(param), Producer::Node(node)) => {
+                let spec = net.spec(node).expect("only known nodes have ports");
+                frame_param(&net.flat.nodes[node], spec, param)
+            }
+            _ if is_letter => None,
+            _ => Some(arg.to_owned()),
+        };
+        let variable = self.parents.len();
+        self.parents.push(variable);
+        self.known.push(known);
+        self.variables.insert(key, variable);
+        variable
+    }
+
+    fn root(&self, mut variable: usize) -> usize {
+        while self.parents[variable] != variable {
+            variable = self.parents[variable];
+        }
+        variable
+    }
+
+    fn join(&mut self, a: usize, b: usize) {
+        let (a, b) = (self.root(a), self.root(b));
+        if a != b {
+            self.parents[b] = a;
+            self.known[a] = self.known[a].take().or(self.known[b].take());
+        }
+    }
+}
+
+/// The consumer's end of a wire.
+struct End<'a> {
+    owner: Producer,
+    port: &'a PortSpec,
+    name: String,
+}
+
+/// The frame that a parameter names, or its default.
+fn frame_param(node: &FlatNode, spec: &NodeSpec, param: &str) -> Option<String> {
+    let given = node.block.params.as_table().and_then(|table| table.get(param)).map(|value| value.as_str());
+    given
+        .unwrap_or_else(|| {
+            let default = spec.params.iter().find(|spec| spec.name == param)?.default.as_deref()?;
+            default.split('"').nth(1)
+        })
+        .map(str::to_owned)
+}
+
+/// Wires that pin frames down come before those that only pass them on.
+const fn rank(kind: Kind) -> u8 {
+    match kind {
+        Kind::Pose => 0,
+        Kind::Jacobian => 1,
+        Kind::Joints => 2,
+        Kind::Image | Kind::Mask | Kind::Regions => 3,
+        _ => 4,
+    }
+}
+
+/// A kind with its frames, for a person.
+fn typed(kind: Kind, frames: &[Option<String>]) -> String {
+    let name = |i: usize| frames.get(i).cloned().flatten().map_or("any frame".into(), |frame| format!("`{frame}`"));
+    let kind_name = kind.with_article();
+    match kind {
+        Kind::Pose => format!("{kind_name} of {} in {}", name(0), name(1)),
+        Kind::Jacobian => format!("{kind_name} of {} in {}", name(1), name(0)),
+        Kind::Joints => format!("{kind_name} of {}", name(0)),
+        _ => format!("{kind_name} in {}", name(0)),
+    }
+}

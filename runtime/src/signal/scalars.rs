@@ -1,0 +1,63 @@
+//! The scalars that a value of each kind consists of: the one place that takes every kind apart.
+
+use nalgebra::UnitQuaternion;
+
+use super::{Arenas, Features, Flag, Joints, Kind, Pose, Scalar, Shape, Signal, Twist, Unit};
+
+impl Shape {
+    /// Returns the scalars of a value of this shape: the suffix of each name (empty for a plain number) and its unit.
+    /// Images, masks, regions and Jacobians have none.
+    #[must_use]
+    pub fn scalars(&self) -> Vec<(String, Unit)> {
+        let named =
+            |names: &[&str], unit: Unit| names.iter().map(|name| ((*name).to_owned(), unit)).collect::<Vec<_>>();
+        match self {
+            Self::Scalar(shape) => named(&[""], shape.unit),
+            Self::Flag(_) => named(&[""], Unit::ONE),
+            Self::Features(shape) => {
+                shape.features.iter().map(|feature| (feature.name.clone(), feature.unit)).collect()
+            }
+            Self::Twist(_) => {
+                let linear = named(&["vx", "vy", "vz"], Unit::METRE.per_second());
+                [linear, named(&["wx", "wy", "wz"], Unit::RADIAN.per_second())].concat()
+            }
+            Self::Pose(_) => {
+                [named(&["x", "y", "z"], Unit::METRE), named(&["qx", "qy", "qz", "qw"], Unit::ONE)].concat()
+            }
+            Self::Joints(shape) => shape.joints.iter().map(|joint| (joint.name.clone(), shape.unit)).collect(),
+            Self::Image(_) | Self::Mask(_) | Self::Regions(_) | Self::Jacobian(_) => Vec::new(),
+        }
+    }
+}
+
+impl Arenas {
+    /// Reads the scalars of one value into the front of `row` and returns how many there are. Allocates nothing.
+    pub(crate) fn read_scalars(&self, kind: Kind, slot: u32, row: &mut [f64]) -> usize {
+        let slot = slot as usize;
+        match kind {
+            Kind::Scalar => write(row, [Scalar::arena(self)[slot]]),
+            Kind::Flag => write(row, [f64::from(u8::from(Flag::arena(self)[slot]))]),
+            Kind::Features => {
+                let features = Features::arena(self)[slot].components();
+                write(row, features.iter().map(|component| component.get().unwrap_or(f64::NAN)))
+            }
+            Kind::Twist => write(row, Twist::arena(self)[slot].0.iter().copied()),
+            Kind::Pose => {
+                let pose = Pose::arena(self)[slot].0;
+                let turn = UnitQuaternion::from_rotation_matrix(&pose.rotation).coords;
+                write(row, pose.translation.vector.iter().chain(turn.iter()).copied())
+            }
+            Kind::Joints => write(row, Joints::arena(self)[slot].0.iter().copied()),
+            Kind::Image | Kind::Mask | Kind::Regions | Kind::Jacobian => 0,
+        }
+    }
+}
+
+fn write(row: &mut [f64], values: impl IntoIterator<Item = f64>) -> usize {
+    let mut count = 0;
+    for (cell, value) in row.iter_mut().zip(values) {
+        *cell = value;
+        count += 1;
+    }
+    count
+}

@@ -1,0 +1,285 @@
+//! A tree of values that know their place among all sources: TOML as the graph needs it.
+
+use std::ops::Range;
+
+use serde::de::value::{MapDeserializer, SeqDeserializer};
+use serde::de::{self, IntoDeserializer, Visitor};
+use toml::de::{DeTable, DeValue};
+
+use crate::source::{Code, Diagnostic, SourceFile};
+
+/// A value of a graph file and its place.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Value {
+    /// Where it stands, among all sources: its origin, whatever is merged.
+    pub span: Range<usize>,
+    /// What it is.
+    pub item: Item,
+}
+
+/// What a value is.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Item {
+    /// A text.
+    String(String),
+    /// A whole number.
+    Integer(i64),
+    /// A number.
+    Float(f64),
+    /// True or false.
+    Boolean(bool),
+    /// A date, a time or both; no parameter takes one.
+    Datetime(String),
+    /// A list.
+    Array(Vec<Value>),
+    /// A table.
+    Table(Table),
+}
+
+/// A key and its place.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Key {
+    /// The key.
+    pub name: String,
+    /// Where it stands.
+    pub span: Range<usize>,
+}
+
+/// A table: its entries in the order of the file.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Table {
+    /// The entries.
+    pub entries: Vec<(Key, Value)>,
+}
+
+impl Table {
+    /// The value of a key.
+    #[must_use]
+    pub fn get(&self, name: &str) -> Option<&Value> {
+        self.entry(name).map(|(_, value)| value)
+    }
+
+    /// A key with its place, and its value.
+    #[must_use]
+    pub fn entry(&self, name: &str) -> Option<&(Key, Value)> {
+        self.entries.iter().find(|(key, _)| key.name == name)
+    }
+
+    /// Takes an entry out.
+    pub fn remove(&mut self, name: &str) -> Option<(Key, Value)> {
+        let at = self.entries.iter().position(|(key, _)| key.name == name)?;
+        Some(self.entries.remove(at))
+    }
+
+    /// Whether the table asks a device for a fact: `{ from = "pad.threshold" }` is one value and no table to merge with.
+    pub(crate) fn is_fact(&self) -> bool {
+        matches!(self.entries.as_slice(), [(key, value)] if key.name == "from" && value.as_str().is_some())
+    }
+
+    /// Lays another table over this one: tables merge, everything else replaces, nothing deletes. The one merge rule.
+    pub fn merge(&mut self, over: Self) {
+        for (key, value) in over.entries {
+            match self.entries.iter_mut().find(|(mine, _)| mine.name == key.name) {
+                None => self.entries.push((key, value)),
+                Some((mine, old)) => match (&mut old.item, value.item) {
+                    (Item::Table(old), Item::Table(new)) if !old.is_fact() && !new.is_fact() => old.merge(new),
+                    (item, new) => {
+                        *item = new;
+                        (old.span, mine.span) = (value.span, key.span);
+                    }
+                },
+            }
+        }
+    }
+}
+
+impl Value {
+    /// The table, if it is one.
+    #[must_use]
+    pub const fn as_table(&self) -> Option<&Table> {
+        match &self.item {
+            Item::Table(table) => Some(table),
+            _ => None,
+        }
+    }
+
+    /// The text, if it is one.
+    #[must_use]
+    pub fn as_str(&self) -> Option<&str> {
+        match &self.item {
+            Item::String(text) => Some(text),
+            _ => None,
+        }
+    }
+
+    /// What it is, for a message.
+    #[must_use]
+    pub fn described(&self) -> String {
+        match &self.item {
+            Item::String(text) => format!("the string \"{text}\""),
+            Item::Integer(number) => format!("{number}"),
+            Item::Float(number) => format!("{number}"),
+            Item::Boolean(value) => format!("{value}"),
+            Item::Datetime(text) => format!("the date {text}"),
+            Item::Array(items) => format!("a list of {}", items.len()),
+            Item::Table(_) => "a table".into(),
+        }
+    }
+
+    /// The same value from another place: a device's fact stands where the graph asks for it.
+    #[must_use]
+    pub fn from_toml(value: &toml::Value, span: &Range<usize>) -> Self {
+        let item = match value {
+            toml::Value::String(text) => Item::String(text.clone()),
+            toml::Value::Integer(number) => Item::Integer(*number),
+            toml::Value::Float(number) => Item::Float(*number),
+            toml::Value::Boolean(value) => Item::Boolean(*value),
+            toml::Value::Datetime(date) => Item::Datetime(date.to_string()),
+            toml::Value::Array(items) => Item::Array(items.iter().map(|item| Self::from_toml(item, span)).collect()),
+            toml::Value::Table(table) => {
+                let entry = |(name, value): (&String, &toml::Value)| {
+                    (Key { name: name.clone(), span: span.clone() }, Self::from_toml(value, span))
+                };
+                Item::Table(Table { entries: table.iter().map(entry).collect() })
+            }
+        };
+        Self { span: span.clone(), item }
+    }
+}
+
+/// Parses a text; every mistake of syntax at once.
+///
+/// # Errors
+/// Each place where the text is not TOML.
+pub fn parse_table(file: &SourceFile) -> Result<Value, Vec<Diagnostic>> {
+    let (table, errors) = DeTable::parse_recoverable(&file.text);
+    let at = |span: Range<usize>| span.start + file.base..span.end + file.base;
+    let mut mistakes = Vec::new();
+    for error in errors {
+        let message = error.message().lines().collect::<Vec<_>>().join("; ");
+        mistakes.push(Diagnostic::new(Code::Syntax, at(error.span().unwrap_or(0..0)), message));
+    }
+    let span = at(table.span());
+    let item = Item::Table(from_table(table.get_ref(), &at, &mut mistakes));
+    if mistakes.is_empty() { Ok(Value { span, item }) } else { Err(mistakes) }
+}
+
+fn from_table(table: &DeTable<'_>, at: &dyn Fn(Range<usize>) -> Range<usize>, mistakes: &mut Vec<Diagnostic>) -> Table {
+    let mut entries: Vec<(Key, Value)> = Vec::new();
+    for (key, value) in table {
+        let key = Key { name: key.get_ref().to_string(), span: at(key.span()) };
+        entries.push((key, from_value(value, at, mistakes)));
+    }
+    entries.sort_by_key(|(key, _)| key.span.start);
+    Table { entries }
+}
+
+fn from_value(
+    value: &toml::Spanned<DeValue<'_>>,
+    at: &dyn Fn(Range<usize>) -> Range<usize>,
+    mistakes: &mut Vec<Diagnostic>,
+) -> Value {
+    let span = at(value.span());
+    let item = match value.get_ref() {
+        DeValue::String(text) => Item::String(text.to_string()),
+        DeValue::Integer(number) => {
+            let read = i64::from_str_radix(number.as_str(), number.radix());
+            if read.is_err() {
+                mistakes.push(Diagnostic::new(Code::Syntax, span.clone(), format!("{number} does not fit in 64 bits")));
+            }
+            Item::Integer(read.unwrap_or_default())
+        }
+        DeValue::Float(number) => Item::Float(number.as_str().parse().unwrap_or(f64::NAN)),
+        DeValue::Boolean(value) => Item::Boolean(*value),
+        DeValue::Datetime(date) => Item::Datetime(date.to_string()),
+        DeValue::Array(items) => Item::Array(items.iter().map(|item| from_value(item, at, mistakes)).collect()),
+        DeValue::Table(table) => Item::Table(from_table(table, at, mistakes)),
+    };
+    Value { span, item }
+}
+
+impl<'de> IntoDeserializer<'de, de::value::Error> for &'de Value {
+    type Deserializer = Self;
+    fn into_deserializer(self) -> Self {
+        self
+    }
+}
+
+impl<'de> de::Deserializer<'de> for &'de Value {
+    type Error = de::value::Error;
+
+    fn deserialize_any<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, Self::Error> {
+        match &self.item {
+            Item::String(text) | Item::Datetime(text) => visitor.visit_borrowed_str(text),
+            Item::Integer(number) => visitor.visit_i64(*number),
+            Item::Float(number) => visitor.visit_f64(*number),
+            Item::Boolean(value) => visitor.visit_bool(*value),
+            Item::Array(items) => visitor.visit_seq(SeqDeserializer::new(items.iter())),
+            Item::Table(table) => {
+                let entries = table.entries.iter().map(|(key, value)| (key.name.as_str(), value));
+                visitor.visit_map(MapDeserializer::new(entries))
+            }
+        }
+    }
+
+    fn deserialize_option<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, Self::Error> {
+        visitor.visit_some(self)
+    }
+
+    fn deserialize_enum<V: Visitor<'de>>(
+        self,
+        name: &'static str,
+        variants: &'static [&'static str],
+        visitor: V,
+    ) -> Result<V::Value, Self::Error> {
+        match &self.item {
+            Item::String(text) => text.as_str().into_deserializer().deserialize_enum(name, variants, visitor),
+            _ => self.deserialize_any(visitor),
+        }
+    }
+
+    serde::forward_to_deserialize_any! {
+        bool i8 i16 i32 i64 i128 u8 u16 u32 u64 u128 f32 f64 char str string bytes byte_buf unit unit_struct
+        newtype_struct seq tuple tuple_struct map struct identifier ignored_any
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::*;
+    use crate::source::SourceMap;
+
+    fn parse(sources: &mut SourceMap, text: &str) -> Table {
+        let value = parse_table(sources.add_file(Path::new("x.toml"), text)).unwrap();
+        value.as_table().unwrap().clone()
+    }
+
+    #[test]
+    fn tables_merge_and_everything_else_replaces_with_its_own_place() {
+        let mut sources = SourceMap::default();
+        let mut base = parse(&mut sources, "[a]\nx = 1\ny = [1, 2, 3]\n[a.b]\nz = 'old'");
+        base.merge(parse(&mut sources, "a.y = [9]\na.b.z = 'new'\na.w = true"));
+        let a = base.get("a").unwrap().as_table().unwrap();
+        assert_eq!(a.get("x").unwrap().item, Item::Integer(1));
+        let Item::Array(y) = &a.get("y").unwrap().item else { panic!("a list") };
+        assert_eq!(y.len(), 1);
+        let z = a.get("b").unwrap().as_table().unwrap().get("z").unwrap();
+        assert_eq!((z.as_str(), sources.locate(z.span.start).as_str()), (Some("new"), "x.toml:2:9"));
+        assert_eq!(sources.locate(a.get("x").unwrap().span.start), "x.toml:2:5");
+    }
+
+    #[test]
+    fn every_mistake_of_syntax_shows_at_its_place() {
+        let mut sources = SourceMap::default();
+        sources.add_file(Path::new("first.toml"), "ok = 1");
+        let file = sources.add_file(Path::new("x.toml"), "a = \nb = 1\nc = = 2\n").clone();
+        let mistakes = parse_table(&file).unwrap_err();
+        let places: Vec<String> = mistakes.iter().map(|m| sources.locate(m.span.start)).collect();
+        assert!(
+            places.iter().any(|p| p.starts_with("x.toml:1")) && places.iter().any(|p| p.starts_with("x.toml:3")),
+            "{places:?}"
+        );
+    }
+}
