@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use crate::engine::Station;
+use crate::engine::NodeRunner;
 use crate::node::{Bus, Components, Given, Mistakes, Need, Node, NodeSpec, PortId, Reader, Tick, of};
 use crate::signal::{Freshness, Mark, Shape, Signal, Stamp};
 use crate::source::{SourceMap, parse_table};
@@ -11,7 +11,7 @@ use crate::source::{SourceMap, parse_table};
 ///
 /// Every tick is 1 ms after the last unless said otherwise; an input that is set is a new sample of that moment.
 pub struct NodeRig {
-    station: Station,
+    runner: NodeRunner,
     spec: NodeSpec,
     bus: Bus,
     inputs: Vec<(String, PortId)>,
@@ -57,8 +57,8 @@ impl NodeRig {
         }
         let built = configured.build(Given { inputs: given, period: 0.001 })?;
         let outputs: Vec<PortId> = built.outputs.iter().map(|shape| bus.add(shape)).collect();
-        let station = Station::new(built.node, &wired, outputs.clone(), N::EVERY_TICK);
-        Ok(Self { station, spec, bus, inputs, outputs, shapes: built.outputs, tick: Tick::first() })
+        let runner = NodeRunner::new(built.node, &wired, outputs.clone(), N::EVERY_TICK);
+        Ok(Self { runner, spec, bus, inputs, outputs, shapes: built.outputs, tick: Tick::first() })
     }
 
     fn input(&self, name: &str) -> PortId {
@@ -73,7 +73,7 @@ impl NodeRig {
 
     /// Tells the node which components of its outputs anything reads, as a mode does.
     pub fn want(&mut self, wanted: &[Components]) {
-        self.station.want(wanted);
+        self.runner.want(wanted);
     }
 
     /// A new sample of this moment on an input.
@@ -109,7 +109,7 @@ impl NodeRig {
 
     /// Runs the tick, then lets `ms` milliseconds pass.
     pub fn step_ms(&mut self, ms: f64) {
-        self.station.visit(&mut self.tick, &mut self.bus);
+        self.runner.visit(&mut self.tick, &mut self.bus);
         let nanos = (ms * 1e6) as i64;
         self.tick =
             Tick { index: self.tick.index + 1, now: self.tick.now + nanos, dt: nanos as f64 * 1e-9, ..self.tick };

@@ -3,9 +3,9 @@
 
 use std::collections::BTreeMap;
 
-use crate::graph::build::Builder;
-use crate::graph::build::conditions::{Lookup, exits};
-use crate::graph::build::demand::wanted;
+use super::conditions::{Lookup, exits};
+use super::demand::wanted;
+use super::nodes::Builder;
 use crate::graph::check::motion::{Movers, ended, ungated};
 use crate::graph::check::overlap::overlaps;
 use crate::graph::check::reachability::{start, unreachable};

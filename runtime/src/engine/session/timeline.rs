@@ -7,7 +7,7 @@ const PATIENCE: i64 = 3;
 
 /// The times of the ticks, in virtual time or real.
 #[derive(Debug, Clone)]
-pub(super) struct Timeline {
+pub(crate) struct Timeline {
     clock: Clock,
     period: i64,
     last: Option<i64>,
@@ -16,25 +16,25 @@ pub(super) struct Timeline {
 }
 
 impl Timeline {
-    pub(super) const fn new(clock: Clock, period: i64) -> Self {
+    pub(crate) const fn new(clock: Clock, period: i64) -> Self {
         Self { clock, period, last: None, is_on_timer: false }
     }
 
-    pub(super) const fn period(&self) -> i64 {
+    pub(crate) const fn period(&self) -> i64 {
         self.period
     }
 
-    pub(super) fn is_clock(&self, device: usize) -> bool {
+    pub(crate) fn is_clock(&self, device: usize) -> bool {
         self.clock == Clock::Device(device)
     }
 
     /// Whether a timer stands in for the clock device.
-    pub(super) const fn is_on_timer(&self) -> bool {
+    pub(crate) const fn is_on_timer(&self) -> bool {
         self.is_on_timer
     }
 
     /// Latest time of the next tick: when a sample of the clock device is given up [ns].
-    pub(super) fn deadline(&self) -> i64 {
+    pub(crate) fn deadline(&self) -> i64 {
         let patience = if self.is_on_timer || self.clock == Clock::Rate { 1 } else { PATIENCE };
         match (self.last, self.clock) {
             (Some(last), _) => last + patience * self.period,
@@ -44,13 +44,13 @@ impl Timeline {
     }
 
     /// Time of the next tick, given that of the clock device's next sample [ns].
-    pub(super) fn next(&self, sample: Option<i64>) -> i64 {
+    pub(crate) fn next(&self, sample: Option<i64>) -> i64 {
         let next = sample.map_or(self.deadline(), |sample| sample.min(self.deadline()));
         self.last.map_or(next, |last| next.max(last + 1))
     }
 
     /// There was a tick at `now`; whether the clock device sampled since the last.
-    pub(super) fn ticked(&mut self, now: i64, has_sampled: bool) {
+    pub(crate) fn ticked(&mut self, now: i64, has_sampled: bool) {
         self.is_on_timer = self.clock != Clock::Rate && !has_sampled;
         self.last = Some(now);
     }

@@ -5,7 +5,7 @@ use std::io::{BufRead, BufReader, Read};
 use std::sync::mpsc::{Receiver, TryRecvError, channel};
 
 /// Where words come from.
-pub(super) struct Words {
+pub(crate) struct Words {
     /// When [ns], and which; in the order of the times.
     planned: VecDeque<(i64, String)>,
     heard: Option<Receiver<String>>,
@@ -13,7 +13,7 @@ pub(super) struct Words {
 
 impl Words {
     /// Words for times of the graph [s], and, if asked, the lines of the standard input.
-    pub(super) fn new(planned: &[(f64, String)], listens: bool) -> Self {
+    pub(crate) fn new(planned: &[(f64, String)], listens: bool) -> Self {
         let mut planned: Vec<(i64, String)> =
             planned.iter().map(|(seconds, word)| ((seconds * 1e9) as i64, word.clone())).collect();
         planned.sort_by_key(|(at, _)| *at);
@@ -21,7 +21,7 @@ impl Words {
     }
 
     /// The next word that is due at `now` [ns].
-    pub(super) fn next(&mut self, now: i64) -> Option<String> {
+    pub(crate) fn next(&mut self, now: i64) -> Option<String> {
         let heard = self.heard.as_ref().map(Receiver::try_recv);
         if heard == Some(Err(TryRecvError::Disconnected)) {
             self.heard = None;
@@ -30,7 +30,7 @@ impl Words {
     }
 
     /// Whether another word can come.
-    pub(super) fn may_come(&self) -> bool {
+    pub(crate) fn may_come(&self) -> bool {
         self.heard.is_some() || !self.planned.is_empty()
     }
 }

@@ -3,7 +3,7 @@
 use crate::node::{AnyNode, Bus, Components, Need, PortId, Tick, Wires};
 use crate::signal::Stamp;
 
-/// What a station looks at before it steps its node, beside the required triggers.
+/// What a runner looks at before it steps its node, beside the required triggers.
 #[derive(Debug, Clone, Copy)]
 struct Watch {
     mark: u32,
@@ -37,7 +37,7 @@ pub(crate) struct Aged {
 
 impl Aged {
     /// Whether what is there is too old at `now` [ns].
-    pub(super) fn is_stale(&self, bus: &Bus, now: i64) -> bool {
+    pub(crate) fn is_stale(&self, bus: &Bus, now: i64) -> bool {
         let mark = &bus.marks[self.from as usize];
         mark.is_present() && mark.stamp().age(now) > self.max_age
     }
@@ -54,7 +54,7 @@ impl Aged {
 }
 
 /// A node with its wires, its ports and what it watches.
-pub(crate) struct Station {
+pub(crate) struct NodeRunner {
     node: Box<dyn AnyNode>,
     wires: Wires,
     outputs: Box<[PortId]>,
@@ -78,7 +78,7 @@ enum Absence {
     Broken(i64),
 }
 
-impl Station {
+impl NodeRunner {
     /// A node whose inputs are wired to ports that exist: for each input its need and its ports.
     pub(crate) fn new(
         node: Box<dyn AnyNode>,
@@ -106,7 +106,7 @@ impl Station {
     }
 
     /// The same with wires that may grow only so old.
-    pub(super) fn with_aged(self, aged: Vec<Aged>) -> Self {
+    pub(crate) fn with_aged(self, aged: Vec<Aged>) -> Self {
         Self { aged: aged.into(), ..self }
     }
 
@@ -117,7 +117,7 @@ impl Station {
 
     /// Goes on with another configuration of the node; its state stays. It steps with what it has, and does not wait for
     /// the next sample: a slow sensor must not keep the motion of the mode before.
-    pub(super) fn switch(&mut self, configuration: usize) {
+    pub(crate) fn switch(&mut self, configuration: usize) {
         self.is_switched |= self.node.switch(configuration);
     }
 
@@ -170,17 +170,17 @@ impl Station {
     }
 
     /// The node panicked: from now on it is not stepped until it is reset.
-    pub(super) const fn break_down(&mut self, now: i64) {
+    pub(crate) const fn break_down(&mut self, now: i64) {
         self.absence = Absence::Broken(now);
     }
 
     /// Whether the node waits for its reset after a panic.
-    pub(super) fn is_broken(&self) -> bool {
+    pub(crate) fn is_broken(&self) -> bool {
         matches!(self.absence, Absence::Broken(_))
     }
 
     /// Makes the state fresh.
-    pub(super) fn reset(&mut self) {
+    pub(crate) fn reset(&mut self) {
         self.node.reset();
     }
 

@@ -30,7 +30,7 @@ pub struct Change {
 
 /// What follows from the conditions of a tick.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Verdict {
+pub(crate) enum Verdict {
     Stay,
     /// Another mode has begun.
     Switched,
@@ -41,7 +41,7 @@ pub(super) enum Verdict {
 }
 
 /// The modes of a running graph.
-pub(super) struct Modes {
+pub(crate) struct Modes {
     modes: Vec<Mode>,
     now: usize,
     /// When the present mode began [ns]; not yet before the first tick.
@@ -66,7 +66,7 @@ enum Why {
 struct Mode {
     name: String,
     exits: Vec<Exit>,
-    /// For each station that any mode changes: its place, and the configuration it has in this mode.
+    /// For each runner that any mode changes: its place, and the configuration it has in this mode.
     configurations: Vec<(usize, usize)>,
 }
 
@@ -85,9 +85,9 @@ enum Look {
 
 /// A port, or a feature of it, on the bus.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Place {
-    pub(super) id: PortId,
-    pub(super) kind: Kind,
+pub(crate) struct Place {
+    pub(crate) id: PortId,
+    pub(crate) kind: Kind,
     feature: Option<usize>,
 }
 
@@ -104,7 +104,7 @@ struct Memory {
 }
 
 impl Modes {
-    pub(super) fn new(planned: PlannedModes, ports: &BTreeMap<PortRef, (PortId, Kind)>) -> Self {
+    pub(crate) fn new(planned: PlannedModes, ports: &BTreeMap<PortRef, (PortId, Kind)>) -> Self {
         let mut changed: Vec<usize> =
             planned.modes.iter().flat_map(|mode| mode.configurations.iter().map(|(place, _)| *place)).collect();
         changed.sort_unstable();
@@ -139,18 +139,18 @@ impl Modes {
         }
     }
 
-    /// The configurations of the present mode, by the places of the stations.
-    pub(super) fn configurations(&self) -> &[(usize, usize)] {
+    /// The configurations of the present mode, by the places of the runners.
+    pub(crate) fn configurations(&self) -> &[(usize, usize)] {
         &self.modes[self.now].configurations
     }
 
     /// Begins at the start again: after a stop nothing is known of what the robot touches.
-    pub(super) fn restart(&mut self, tick: &Tick) {
+    pub(crate) fn restart(&mut self, tick: &Tick) {
         self.enter(self.start, Why::Resumed, tick);
     }
 
     /// Looks at the conditions with what the tick has left on the bus, and a word that was sent.
-    pub(super) fn decide(&mut self, bus: &Bus, tick: &Tick, sent: Option<&str>) -> Verdict {
+    pub(crate) fn decide(&mut self, bus: &Bus, tick: &Tick, sent: Option<&str>) -> Verdict {
         if self.entered.is_none() {
             self.enter(self.now, Why::Start, tick);
         }
@@ -185,7 +185,7 @@ impl Modes {
     }
 
     /// The words that any mode waits for.
-    pub(super) fn words(&self) -> impl Iterator<Item = &str> {
+    pub(crate) fn words(&self) -> impl Iterator<Item = &str> {
         let exits = self.modes.iter().flat_map(|mode| &mode.exits);
         exits.filter_map(|exit| match &exit.planned.condition {
             Condition::Sent(word) => Some(word.as_str()),
@@ -194,23 +194,23 @@ impl Modes {
     }
 
     /// Name of the present mode.
-    pub(super) fn name(&self) -> &str {
+    pub(crate) fn name(&self) -> &str {
         &self.modes[self.now].name
     }
 
     /// Number of the present mode, in the order of the file.
-    pub(super) const fn number(&self) -> usize {
+    pub(crate) const fn number(&self) -> usize {
         self.now
     }
 
     /// The exit that was taken last: its words and its place.
-    pub(super) fn taken(&self) -> (&str, usize) {
+    pub(crate) fn taken(&self) -> (&str, usize) {
         let exit = &self.modes[self.now].exits[self.taken].planned;
         (&exit.text, exit.span.start)
     }
 
     /// Every change so far, the start first.
-    pub(super) fn changes(&self) -> impl Iterator<Item = Change> {
+    pub(crate) fn changes(&self) -> impl Iterator<Item = Change> {
         self.changes.iter().map(|(time, tick, mode, why)| Change {
             time: *time,
             tick: *tick,

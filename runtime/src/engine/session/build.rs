@@ -3,16 +3,12 @@
 use std::collections::BTreeMap;
 use std::ops::Range;
 
-use super::command::{CommandSlot, ReportSlot};
+use super::engine::{Engine, Logged, View};
 use super::halt::Halts;
-use super::inlet::Inlet;
-use super::modes::Modes;
-use super::station::{Aged, Station};
-use super::tick::Core;
 use super::timeline::Timeline;
 use super::trouble::WatchedWire;
-use super::{Deck, Edge, Engine, Logged, Timing, View};
 use crate::device::{Commands, Driver, Samples};
+use crate::engine::core::{Aged, CommandSlot, Core, DeviceSlot, Inlet, Link, Modes, NodeRunner, ReportSlot, Timing};
 use crate::graph::{
     Age, Plan, PlannedCommand, PlannedDevice, PlannedNode, PlannedPort, PlannedReport, PlannedShow, PlannedView,
     PlannedWire, Policy, PortRef, Producer,
@@ -62,12 +58,13 @@ impl Engine {
             planned.map(|planned| &planned.shape)
         };
         let devices = plan.devices.into_iter().enumerate();
-        let decks = devices.map(|(i, device)| deck(device, |report| shape((i, report)), &plan.sources)).collect();
-        let stations = plan.nodes.into_iter().map(|node| station(node, &ids, &mut bus, &mut watched));
-        let stations: Vec<Station> = stations.collect();
+        let devices =
+            devices.map(|(i, device)| device_slot(device, |report| shape((i, report)), &plan.sources)).collect();
+        let runners = plan.nodes.into_iter().map(|node| runner(node, &ids, &mut bus, &mut watched));
+        let runners: Vec<NodeRunner> = runners.collect();
         let (max_gap, reset_after) = (plan.max_gap, plan.reset_after);
         let tick = Tick { index: 0, now: 0, dt: 0.0, stamp: Stamp::TIMELESS, max_gap, reset_after, is_halted: false };
-        let (timing, mut core) = (Timing::new(stations.len()), Core::new(bus, stations, inlets, (slots, told), tick));
+        let (timing, mut core) = (Timing::new(runners.len()), Core::new(bus, runners, inlets, (slots, told), tick));
         let kind = |id: PortId| ports.iter().find(|(_, known)| *known == id).map(|(port, _)| port.shape.kind());
         let modes = plan.modes.map(|modes| {
             let kinds = ids.iter().map(|(source, id)| (*source, (*id, kind(*id).expect("a port has a kind"))));
@@ -79,7 +76,7 @@ impl Engine {
             core,
             modes,
             is_done: false,
-            decks,
+            devices,
             timeline: Timeline::new(plan.clock, plan.period),
             ports,
             logged,
@@ -124,16 +121,20 @@ fn limits(nodes: &[PlannedNode], ports: &[(PlannedPort, PortId)]) -> Vec<(String
     shares.map(|(port, id)| (port.name.clone(), *id)).collect()
 }
 
-fn deck<'s>(device: PlannedDevice, report: impl Fn(usize) -> Option<&'s Shape>, sources: &SourceMap) -> Deck {
+fn device_slot<'s>(
+    device: PlannedDevice,
+    report: impl Fn(usize) -> Option<&'s Shape>,
+    sources: &SourceMap,
+) -> DeviceSlot {
     let commands = Commands::with_shapes(device.commands.iter());
-    Deck {
+    DeviceSlot {
         place: sources.locate(device.span.start),
         name: device.name,
         samples: Samples::with_shapes(device.outputs.iter()),
         commands: (0..device.reports).fold(commands, |commands, i| commands.with_report(report(i))),
-        edge: match device.driver {
-            Driver::Stepped(driver) => Edge::Stepped(driver),
-            Driver::Live(driver) => Edge::Idle(driver),
+        link: match device.driver {
+            Driver::Stepped(driver) => Link::Stepped(driver),
+            Driver::Live(driver) => Link::Idle(driver),
         },
         failed: None,
     }
@@ -156,7 +157,7 @@ fn watched_end(name: &[String; 2], age: Age, span: &Range<usize>, id: PortId) ->
 }
 
 /// A node in its place. A wire that may grow only so old has a mark of its own, and shares the value.
-fn station(node: PlannedNode, ids: &Ids, bus: &mut Bus, watched: &mut Vec<WatchedWire>) -> Station {
+fn runner(node: PlannedNode, ids: &Ids, bus: &mut Bus, watched: &mut Vec<WatchedWire>) -> NodeRunner {
     let mut aged = Vec::new();
     let mut end = |wire: &PlannedWire| {
         let id = ids[&wire.source];
@@ -173,5 +174,5 @@ fn station(node: PlannedNode, ids: &Ids, bus: &mut Bus, watched: &mut Vec<Watche
     let inputs: Vec<_> =
         node.inputs.iter().map(|(need, wires)| (*need, wires.iter().map(&mut end).collect())).collect();
     let outputs = (0..node.ports.len()).map(|port| ids[&PortRef { producer: Producer::Node(node.index), port }]);
-    Station::new(node.node, &inputs, outputs.collect(), node.is_every_tick).with_aged(aged)
+    NodeRunner::new(node.node, &inputs, outputs.collect(), node.is_every_tick).with_aged(aged)
 }

@@ -3,11 +3,12 @@
 
 use std::time::Instant;
 
-use super::{End, Engine, Outcome};
+use super::engine::Engine;
+use super::outcome::{End, Outcome};
 use crate::fault::Fault;
 
 /// What paces a run, and what comes in between two ticks.
-pub(super) trait Pace {
+pub(crate) trait Pace {
     /// Whether the operator wants the end.
     fn is_interrupted(&self) -> bool;
 
@@ -20,7 +21,7 @@ pub(super) trait Pace {
 }
 
 /// Ticks until `until` [ns], or until something ends it before. `observe` is called after every tick.
-pub(super) fn drive(engine: &mut Engine, until: i64, pace: &mut impl Pace, observe: &mut dyn FnMut(&Engine)) -> End {
+pub(crate) fn drive(engine: &mut Engine, until: i64, pace: &mut impl Pace, observe: &mut dyn FnMut(&Engine)) -> End {
     loop {
         if pace.is_interrupted() {
             return End::Interrupted;
@@ -46,11 +47,11 @@ pub(super) fn drive(engine: &mut Engine, until: i64, pace: &mut impl Pace, obser
 
 /// The reason of a halt that nothing can end any more: a stop when no word can come, or, in a run without an end, the
 /// loss of a device. Such a run would go on for ever.
-pub(super) fn hopeless(engine: &Engine, may_hear: bool, is_endless: bool) -> Option<Fault> {
+pub(crate) fn hopeless(engine: &Engine, may_hear: bool, is_endless: bool) -> Option<Fault> {
     let waits = engine.is_stopped() && !may_hear;
-    let has_lost = || engine.decks.iter().any(|deck| deck.failed.is_some());
+    let has_lost = || engine.devices.iter().any(|device| device.failed.is_some());
     let is_lost = is_endless && has_lost() && !engine.has_end();
-    let is_still = || engine.decks.iter().all(|deck| deck.commands.are_zero());
+    let is_still = || engine.devices.iter().all(|device| device.commands.are_zero());
     let last = engine.halts().last().filter(|_| (waits || is_lost) && is_still())?;
     Some(last.fault.clone())
 }

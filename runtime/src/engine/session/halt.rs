@@ -30,52 +30,52 @@ enum State {
 }
 
 /// The machine, and all that it went through.
-pub(super) struct Halts {
+pub(crate) struct Halts {
     state: State,
     list: Vec<Halt>,
     /// Halts that are not in the list any more.
-    pub(super) more: u64,
+    pub(crate) more: u64,
     /// Whether the operator has asked to go on.
     resumes: bool,
 }
 
 impl Halts {
-    pub(super) const fn new() -> Self {
+    pub(crate) const fn new() -> Self {
         Self { state: State::Running, list: Vec::new(), more: 0, resumes: false }
     }
 
     /// Whether commands go to zero.
-    pub(super) fn is_halted(&self) -> bool {
+    pub(crate) fn is_halted(&self) -> bool {
         self.state != State::Running
     }
 
     /// Whether only the operator lets them go on.
-    pub(super) fn is_stopped(&self) -> bool {
+    pub(crate) fn is_stopped(&self) -> bool {
         self.state == State::Stopped
     }
 
     /// The operator lets the commands go on.
-    pub(super) const fn resume(&mut self) {
+    pub(crate) const fn resume(&mut self) {
         self.resumes = true;
     }
 
     /// The operator wants a stop: what was said before of going on holds no more.
-    pub(super) const fn stop(&mut self) {
+    pub(crate) const fn stop(&mut self) {
         self.resumes = false;
     }
 
     /// Everything so far.
-    pub(super) fn list(&self) -> &[Halt] {
+    pub(crate) fn list(&self) -> &[Halt] {
         &self.list
     }
 
     /// Whether a trouble with that policy halts anew, or makes wait for the operator what would have gone on by itself.
-    pub(super) fn is_news(&self, policy: Policy) -> bool {
+    pub(crate) fn is_news(&self, policy: Policy) -> bool {
         self.state == State::Running || self.state == State::Held && policy == Policy::Stop
     }
 
     /// Halts because of a trouble that [is news](Self::is_news).
-    pub(super) fn trouble(&mut self, policy: Policy, fault: Fault) {
+    pub(crate) fn trouble(&mut self, policy: Policy, fault: Fault) {
         self.end(fault.time);
         tracing::warn!("{fault}: every command goes to zero");
         if self.list.len() < MOST {
@@ -87,7 +87,7 @@ impl Halts {
     }
 
     /// The tick at `now` had a trouble or not: whether the commands go on from a stop, and so from the start.
-    pub(super) fn settle(&mut self, has_trouble: bool, now: i64) -> bool {
+    pub(crate) fn settle(&mut self, has_trouble: bool, now: i64) -> bool {
         let resumes = std::mem::take(&mut self.resumes);
         let was = self.state;
         match (was, has_trouble) {

@@ -3,44 +3,44 @@
 
 use std::time::{Duration, Instant};
 
-use super::Deck;
 use super::command::{CommandSlot, ReportSlot};
 use super::inlet::Inlet;
-use super::station::Station;
+use super::runner::NodeRunner;
+use super::slot::DeviceSlot;
 use crate::graph::Policy;
 use crate::node::{Bus, Tick};
 
 /// Everything a tick touches.
-pub(super) struct Core {
-    pub(super) bus: Bus,
-    pub(super) inlets: Vec<Inlet>,
-    pub(super) tick: Tick,
-    stations: Vec<Station>,
+pub(crate) struct Core {
+    pub(crate) bus: Bus,
+    pub(crate) inlets: Vec<Inlet>,
+    pub(crate) tick: Tick,
+    runners: Vec<NodeRunner>,
     slots: Vec<CommandSlot>,
     told: Vec<ReportSlot>,
-    /// The station that steps: what a panic is blamed on.
+    /// The runner that steps: what a panic is blamed on.
     current: usize,
 }
 
 impl Core {
-    pub(super) fn new(
+    pub(crate) fn new(
         bus: Bus,
-        stations: Vec<Station>,
+        runners: Vec<NodeRunner>,
         inlets: Vec<Inlet>,
         (slots, told): (Vec<CommandSlot>, Vec<ReportSlot>),
         tick: Tick,
     ) -> Self {
-        Self { bus, inlets, tick, stations, slots, told, current: 0 }
+        Self { bus, inlets, tick, runners, slots, told, current: 0 }
     }
 
     /// Moves on to the tick at `now`.
-    pub(super) fn begin(&mut self, now: i64) {
+    pub(crate) fn begin(&mut self, now: i64) {
         let dt = if self.tick.index == 0 { 0.0 } else { (now - self.tick.now) as f64 * 1e-9 };
         self.tick = Tick { index: self.tick.index + 1, now, dt, ..self.tick };
     }
 
     /// Steps the nodes, each at most once. Whether all values are finite.
-    pub(super) fn run(&mut self, timing: &mut Timing) -> bool {
+    pub(crate) fn run(&mut self, timing: &mut Timing) -> bool {
         if timing.is_due(self.tick.index) {
             self.step_timed(timing);
         } else {
@@ -50,31 +50,31 @@ impl Core {
     }
 
     /// A tick without what guards and measures it: latch, step, commit.
-    pub(super) fn run_bare(&mut self, decks: &mut [Deck]) {
-        self.latch(decks);
+    pub(crate) fn run_bare(&mut self, devices: &mut [DeviceSlot]) {
+        self.latch(devices);
         self.step();
-        self.commit(decks, false);
+        self.commit(devices, false);
     }
 
     /// Takes the newest samples over.
-    pub(super) fn latch(&mut self, decks: &mut [Deck]) {
+    pub(crate) fn latch(&mut self, devices: &mut [DeviceSlot]) {
         for inlet in &mut self.inlets {
-            inlet.latch(&mut decks[inlet.device].samples, &mut self.bus, self.tick.index, self.tick.now);
+            inlet.latch(&mut devices[inlet.device].samples, &mut self.bus, self.tick.index, self.tick.now);
         }
     }
 
     fn step(&mut self) {
-        for (i, station) in self.stations.iter_mut().enumerate() {
+        for (i, runner) in self.runners.iter_mut().enumerate() {
             self.current = i;
-            station.visit(&mut self.tick, &mut self.bus);
+            runner.visit(&mut self.tick, &mut self.bus);
         }
     }
 
     fn step_timed(&mut self, timing: &mut Timing) {
         let mut before = Instant::now();
-        for (i, station) in self.stations.iter_mut().enumerate() {
+        for (i, runner) in self.runners.iter_mut().enumerate() {
             self.current = i;
-            station.visit(&mut self.tick, &mut self.bus);
+            runner.visit(&mut self.tick, &mut self.bus);
             let after = Instant::now();
             timing.nodes[i].add(after - before);
             before = after;
@@ -83,57 +83,57 @@ impl Core {
     }
 
     /// The sample that is too old now and whose policy is the strictest.
-    pub(super) fn stale(&self) -> Option<(Policy, usize)> {
+    pub(crate) fn stale(&self) -> Option<(Policy, usize)> {
         let stale = self.inlets.iter().enumerate().filter(|(_, inlet)| inlet.is_stale(self.tick.now));
         stale.map(|(i, inlet)| (inlet.stale, i)).max_by_key(|(policy, _)| *policy)
     }
 
     /// Hands over the commands, or lets them go to zero; and what is reported.
-    pub(super) fn commit(&mut self, decks: &mut [Deck], is_halted: bool) {
+    pub(crate) fn commit(&mut self, devices: &mut [DeviceSlot], is_halted: bool) {
         for slot in &mut self.slots {
-            slot.commit(&self.bus, &mut decks[slot.device].commands, &self.tick, is_halted);
+            slot.commit(&self.bus, &mut devices[slot.device].commands, &self.tick, is_halted);
         }
         for report in &self.told {
-            report.commit(&self.bus, &mut decks[report.device].commands, &self.tick);
+            report.commit(&self.bus, &mut devices[report.device].commands, &self.tick);
         }
     }
 
     /// Ramps every command one step of `dt` [s] toward zero; whether all are zero. The nodes rest, so nothing is reported.
-    pub(super) fn ramp(&mut self, decks: &mut [Deck], dt: f64) -> bool {
-        decks.iter_mut().for_each(|deck| deck.commands.fall_silent());
-        self.slots.iter_mut().fold(true, |still, slot| slot.ramp(&mut decks[slot.device].commands, dt) & still)
+    pub(crate) fn ramp(&mut self, devices: &mut [DeviceSlot], dt: f64) -> bool {
+        devices.iter_mut().for_each(|device| device.commands.fall_silent());
+        self.slots.iter_mut().fold(true, |still, slot| slot.ramp(&mut devices[slot.device].commands, dt) & still)
     }
 
     /// Makes what the devices last gave count as new once more.
-    pub(super) fn refresh(&mut self, decks: &mut [Deck]) {
+    pub(crate) fn refresh(&mut self, devices: &mut [DeviceSlot]) {
         for inlet in &mut self.inlets {
-            inlet.refresh(&mut decks[inlet.device].samples, &mut self.bus, self.tick.now);
+            inlet.refresh(&mut devices[inlet.device].samples, &mut self.bus, self.tick.now);
         }
     }
 
-    /// Gives stations the configurations of another mode: by their places, the number of each.
-    pub(super) fn switch(&mut self, configurations: &[(usize, usize)]) {
+    /// Gives runners the configurations of another mode: by their places, the number of each.
+    pub(crate) fn switch(&mut self, configurations: &[(usize, usize)]) {
         for (place, configuration) in configurations {
-            self.stations[*place].switch(*configuration);
+            self.runners[*place].switch(*configuration);
         }
     }
 
-    /// Makes the states of a station and of all that come after it fresh.
-    pub(super) fn reset_from(&mut self, station: usize) {
-        self.stations[station..].iter_mut().for_each(Station::reset);
+    /// Makes the states of a runner and of all that come after it fresh.
+    pub(crate) fn reset_from(&mut self, runner: usize) {
+        self.runners[runner..].iter_mut().for_each(NodeRunner::reset);
     }
 
-    /// The station that stepped last panicked: it waits for its reset.
-    pub(super) fn break_down(&mut self) {
-        self.stations[self.current].break_down(self.tick.now);
+    /// The runner that stepped last panicked: it waits for its reset.
+    pub(crate) fn break_down(&mut self) {
+        self.runners[self.current].break_down(self.tick.now);
     }
 
-    /// The first station that waits for its reset after a panic.
-    pub(super) fn broken(&self) -> Option<usize> {
-        self.stations.iter().position(Station::is_broken)
+    /// The first runner that waits for its reset after a panic.
+    pub(crate) fn broken(&self) -> Option<usize> {
+        self.runners.iter().position(NodeRunner::is_broken)
     }
 
-    pub(super) const fn current(&self) -> usize {
+    pub(crate) const fn current(&self) -> usize {
         self.current
     }
 }
@@ -168,7 +168,7 @@ impl Timing {
     /// One tick of as many is timed.
     const EVERY: u64 = 64;
 
-    pub(super) fn new(nodes: usize) -> Self {
+    pub(crate) fn new(nodes: usize) -> Self {
         Self { nodes: vec![NodeTime::default(); nodes], ticks: 0, every: Self::EVERY }
     }
 

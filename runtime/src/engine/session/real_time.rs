@@ -1,74 +1,22 @@
 //! The edge to real time: pacing, live devices, the operator's Ctrl-C; and the end of every run, which is a ramp to zero.
 
+use std::io;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::time::{Duration, Instant};
-use std::{fmt, io};
 
 use tokio::runtime::{Builder, Runtime};
 use tokio::sync::watch;
 use tokio::task::JoinSet;
 
 use super::drive::{Pace, drive, hopeless};
-use super::words::Words;
-use super::{Edge, Engine};
+use super::engine::Engine;
+use super::operator::Words;
+use super::outcome::{Outcome, RunOptions};
+use super::signals::interrupts;
+use super::trouble::panic_message;
 use crate::device::{DeviceError, link};
+use crate::engine::core::Link;
 use crate::fault::Fault;
-
-/// How to run.
-#[derive(Debug, Clone, Default)]
-pub struct RunOptions {
-    /// How long at most, in the graph's clock [s].
-    pub duration: Option<f64>,
-    /// Whether virtual time is paced by the wall clock; live devices always are.
-    pub is_realtime: bool,
-    /// Words that are sent from outside: when, in the graph's time [s], and which. `stop` halts all commands, `resume`
-    /// lets them go on, others are for the modes.
-    pub sends: Vec<(f64, String)>,
-    /// Whether words come in over the standard input, one a line.
-    pub listens: bool,
-}
-
-/// Why a run ended.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub enum End {
-    /// A device has no more samples.
-    Finished,
-    /// The time is over.
-    Duration,
-    /// A mode says that the task is done.
-    Done,
-    /// The operator wanted it.
-    Interrupted,
-    /// Something went wrong.
-    Fault(Box<Fault>),
-}
-
-impl fmt::Display for End {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Finished => f.write_str("a device has no more samples"),
-            Self::Duration => f.write_str("the time is over"),
-            Self::Done => f.write_str("the task is done"),
-            Self::Interrupted => f.write_str("the operator ended it"),
-            Self::Fault(fault) => fault.fmt(f),
-        }
-    }
-}
-
-/// How a run went.
-#[derive(Debug, Clone)]
-pub struct Outcome {
-    /// Why it ended.
-    pub end: End,
-    /// Time of the last tick in the graph's clock, the ramp to zero aside [ns].
-    pub time: i64,
-    /// Number of ticks, the ramp to zero aside.
-    pub ticks: u64,
-    /// Time it took.
-    pub wall: Duration,
-    /// Ticks that began more than a period late; counted with a real clock only.
-    pub late: u64,
-}
 
 /// Runs until a device ends, the time is over, the operator interrupts or something goes wrong; then the commands ramp
 /// to zero. `observe` is called after every tick.
@@ -107,15 +55,15 @@ impl<'a> Shell<'a> {
     fn start(engine: &mut Engine, options: &RunOptions, runtime: &'a Runtime) -> io::Result<Self> {
         let epoch = Instant::now();
         let (mut drivers, mut tasks) = (JoinSet::new(), Vec::new());
-        for (i, deck) in engine.decks.iter_mut().enumerate() {
-            let edge = std::mem::replace(&mut deck.edge, Edge::Gone);
-            deck.edge = match edge {
-                Edge::Idle(driver) => {
-                    tracing::info!("device `{}` starts", deck.name);
-                    let (theirs, ours) = link(&deck.samples, &deck.commands, epoch);
+        for (i, device) in engine.devices.iter_mut().enumerate() {
+            let edge = std::mem::replace(&mut device.link, Link::Gone);
+            device.link = match edge {
+                Link::Idle(driver) => {
+                    tracing::info!("device `{}` starts", device.name);
+                    let (theirs, ours) = link(&device.samples, &device.commands, epoch);
                     let task = drivers.spawn_on(driver.run(theirs), runtime.handle());
                     tasks.push((task.id(), i));
-                    Edge::Live(ours)
+                    Link::Live(ours)
                 }
                 other => other,
             };
@@ -172,8 +120,8 @@ impl Shell<'_> {
     /// Waits for the next sample of a live clock, or until `next` [ns]; the time of the tick, and how late it is [ns].
     fn wait(&self, engine: &Engine, next: i64) -> (i64, i64) {
         let due = self.epoch + Duration::from_nanos(next.max(0) as u64);
-        let sampled = engine.decks.iter().enumerate().find_map(|(i, deck)| match &deck.edge {
-            Edge::Live(linked) if engine.timeline.is_clock(i) => Some(linked.sampled.clone()),
+        let sampled = engine.devices.iter().enumerate().find_map(|(i, device)| match &device.link {
+            Link::Live(linked) if engine.timeline.is_clock(i) => Some(linked.sampled.clone()),
             _ => None,
         });
         let has_live_clock = sampled.is_some();
@@ -226,8 +174,8 @@ impl Shell<'_> {
             // A driver reads the zero before it hears that it may end.
             std::thread::sleep(LAST_WORD);
         }
-        for deck in &engine.decks {
-            if let Edge::Live(linked) = &deck.edge {
+        for device in &engine.devices {
+            if let Link::Live(linked) = &device.link {
                 linked.stop.send_replace(true);
             }
         }
@@ -239,7 +187,7 @@ impl Shell<'_> {
 
 fn panic_of(error: tokio::task::JoinError) -> String {
     match error.try_into_panic() {
-        Ok(panic) => format!("it panicked: {}", super::trouble::said(&*panic)),
+        Ok(panic) => format!("it panicked: {}", panic_message(&*panic)),
         Err(error) => error.to_string(),
     }
 }
@@ -249,91 +197,4 @@ async fn sleep_until(due: Instant) {
     const COARSE: Duration = Duration::from_millis(2);
     tokio::time::sleep_until((due - COARSE.min(due.saturating_duration_since(Instant::now()))).into()).await;
     std::thread::sleep(due.saturating_duration_since(Instant::now()));
-}
-
-/// The operator's wish to end what runs, for those who run without [`run`]: from here on Ctrl-C and SIGTERM are caught. A
-/// second one ends the process at once.
-pub struct Interrupt {
-    /// What listens for them lives in it.
-    _runtime: Runtime,
-    interrupted: watch::Receiver<bool>,
-}
-
-impl Interrupt {
-    /// Catches them.
-    ///
-    /// # Errors
-    /// If the operating system gives no runtime for signals.
-    pub fn catch() -> io::Result<Self> {
-        let runtime = Builder::new_multi_thread().worker_threads(1).enable_all().build()?;
-        let interrupted = runtime.block_on(async { interrupts() })?;
-        Ok(Self { _runtime: runtime, interrupted })
-    }
-
-    /// Whether the operator wants the end.
-    #[must_use]
-    pub fn is_requested(&self) -> bool {
-        *self.interrupted.borrow()
-    }
-}
-
-/// Becomes true at the first Ctrl-C or SIGTERM; a second one ends the process at once.
-///
-/// They are caught from here on, and not only once the task has begun: on a busy machine that may take a while.
-fn interrupts() -> io::Result<watch::Receiver<bool>> {
-    const INTERRUPTED: i32 = 130;
-    let (sender, receiver) = watch::channel(false);
-    let mut signals = Signals::catch()?;
-    tokio::spawn(async move {
-        while signals.next().await.is_ok() {
-            if sender.send_replace(true) {
-                std::process::exit(INTERRUPTED);
-            }
-        }
-    });
-    Ok(receiver)
-}
-
-#[cfg(unix)]
-struct Signals {
-    interrupt: tokio::signal::unix::Signal,
-    terminate: tokio::signal::unix::Signal,
-    /// The terminal is gone.
-    hangup: tokio::signal::unix::Signal,
-}
-
-#[cfg(unix)]
-impl Signals {
-    fn catch() -> io::Result<Self> {
-        use tokio::signal::unix::{SignalKind, signal};
-        Ok(Self {
-            interrupt: signal(SignalKind::interrupt())?,
-            terminate: signal(SignalKind::terminate())?,
-            hangup: signal(SignalKind::hangup())?,
-        })
-    }
-
-    async fn next(&mut self) -> io::Result<()> {
-        tokio::select! {
-            _ = self.interrupt.recv() => {}
-            _ = self.terminate.recv() => {}
-            _ = self.hangup.recv() => {}
-        }
-        Ok(())
-    }
-}
-
-#[cfg(not(unix))]
-struct Signals;
-
-#[cfg(not(unix))]
-#[expect(clippy::unnecessary_wraps, reason = "the same form as on unix")]
-impl Signals {
-    fn catch() -> io::Result<Self> {
-        Ok(Self)
-    }
-
-    async fn next(&mut self) -> io::Result<()> {
-        tokio::signal::ctrl_c().await
-    }
 }

@@ -25,9 +25,9 @@ pub struct Counters {
 }
 
 /// A role's port and the device's port behind it.
-pub(super) struct Inlet {
-    pub(super) device: usize,
-    pub(super) counters: Counters,
+pub(crate) struct Inlet {
+    pub(crate) device: usize,
+    pub(crate) counters: Counters,
     kind: Kind,
     port: usize,
     id: PortId,
@@ -37,7 +37,7 @@ pub(super) struct Inlet {
     max_age: i64,
     period: i64,
     /// What it does when it is older.
-    pub(super) stale: Policy,
+    pub(crate) stale: Policy,
     /// Sequence number of the last sample that came, whatever became of it.
     seen: Option<u64>,
     /// Stamp and sequence number of the last sample that was new.
@@ -45,7 +45,7 @@ pub(super) struct Inlet {
 }
 
 impl Inlet {
-    pub(super) fn new(role: &PlannedRole, port: usize, id: PortId) -> Self {
+    pub(crate) fn new(role: &PlannedRole, port: usize, id: PortId) -> Self {
         Self {
             device: role.device,
             counters: Counters::default(),
@@ -62,13 +62,13 @@ impl Inlet {
     }
 
     /// Whether a sample that has not been taken over yet is finite: an image is checked once, here at the edge.
-    pub(super) fn is_finite(&self, samples: &Samples) -> bool {
+    pub(crate) fn is_finite(&self, samples: &Samples) -> bool {
         let sample = samples.ports[self.port];
         sample.writes == self.writes || sample.is_absent || samples.arenas.is_finite(self.kind, sample.slot)
     }
 
     /// Takes the newest sample over, if there is one. The buffers are exchanged, not copied.
-    pub(super) fn latch(&mut self, samples: &mut Samples, bus: &mut Bus, tick: u64, now: i64) {
+    pub(crate) fn latch(&mut self, samples: &mut Samples, bus: &mut Bus, tick: u64, now: i64) {
         let sample = samples.ports[self.port];
         if sample.writes == self.writes {
             return;
@@ -99,19 +99,19 @@ impl Inlet {
     }
 
     /// Drops a sample that is not finite.
-    pub(super) fn reject(&mut self, samples: &Samples) {
+    pub(crate) fn reject(&mut self, samples: &Samples) {
         let sample = samples.ports[self.port];
         (self.writes, self.seen) = (sample.writes, Some(sample.sequence));
         self.counters.not_finite += 1;
     }
 
     /// Whether there was a sample, and the newest is too old at `now` [ns]; what is only counted is not asked.
-    pub(super) fn is_stale(&self, now: i64) -> bool {
+    pub(crate) fn is_stale(&self, now: i64) -> bool {
         self.stale != Policy::Count && self.age(now).is_some_and(|age| age > self.max_age)
     }
 
     /// Age of the newest sample at `now`, if there is one, and how old it may be [ns].
-    pub(super) fn ages(&self, now: i64) -> (i64, i64) {
+    pub(crate) fn ages(&self, now: i64) -> (i64, i64) {
         (self.age(now).unwrap_or(0), self.max_age)
     }
 
@@ -120,7 +120,7 @@ impl Inlet {
     }
 
     /// Hands the value back as if the device had sampled it again at `now`.
-    pub(super) fn refresh(&mut self, samples: &mut Samples, bus: &mut Bus, now: i64) {
+    pub(crate) fn refresh(&mut self, samples: &mut Samples, bus: &mut Bus, now: i64) {
         let sample = &mut samples.ports[self.port];
         bus.arenas.swap(self.kind, self.id.slot, &mut samples.arenas, sample.slot);
         (sample.stamp, sample.sequence) = (now, sample.sequence + 1);

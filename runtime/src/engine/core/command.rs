@@ -10,8 +10,8 @@ use crate::node::{Bus, PortId, Tick};
 use crate::signal::{Joints, Signal};
 
 /// One command port of a device.
-pub(super) struct CommandSlot {
-    pub(super) device: usize,
+pub(crate) struct CommandSlot {
+    pub(crate) device: usize,
     source: PortId,
     command: usize,
     /// How old the command may be [ns].
@@ -23,14 +23,14 @@ pub(super) struct CommandSlot {
 }
 
 impl CommandSlot {
-    pub(super) fn new(source: PortId, planned: PlannedCommand) -> Self {
+    pub(crate) fn new(source: PortId, planned: PlannedCommand) -> Self {
         let PlannedCommand { device, command, age, accelerations, .. } = planned;
         Self { device, source, command, max_age: age.max_age, accelerations: accelerations.into(), follows: false }
     }
 
     /// Takes over what the graph commands; goes on toward zero if it commands nothing, or nothing that is fresh, or if all
     /// is halted.
-    pub(super) fn commit(&mut self, bus: &Bus, commands: &mut Commands, tick: &Tick, is_halted: bool) {
+    pub(crate) fn commit(&mut self, bus: &Bus, commands: &mut Commands, tick: &Tick, is_halted: bool) {
         let (mark, dt) = (&bus.marks[self.source.mark as usize], tick.dt);
         if is_halted || !mark.is_present() || mark.stamp().age(tick.now) > self.max_age {
             self.ramp(commands, dt);
@@ -46,7 +46,7 @@ impl CommandSlot {
     }
 
     /// One step of `dt` [s] toward zero; whether the command is zero.
-    pub(super) fn ramp(&mut self, commands: &mut Commands, dt: f64) -> bool {
+    pub(crate) fn ramp(&mut self, commands: &mut Commands, dt: f64) -> bool {
         self.follows = false;
         approach(&mut commands.values[self.command], |_| 0.0, &self.accelerations, dt)
     }
@@ -54,8 +54,8 @@ impl CommandSlot {
 
 /// One report to a device: what the graph tells it, as it is and while it is fresh. It moves nothing, so it goes on while
 /// commands are held.
-pub(super) struct ReportSlot {
-    pub(super) device: usize,
+pub(crate) struct ReportSlot {
+    pub(crate) device: usize,
     source: PortId,
     report: usize,
     /// How old the report may be [ns].
@@ -63,12 +63,12 @@ pub(super) struct ReportSlot {
 }
 
 impl ReportSlot {
-    pub(super) const fn new(source: PortId, planned: &PlannedReport) -> Self {
+    pub(crate) const fn new(source: PortId, planned: &PlannedReport) -> Self {
         Self { device: planned.device, source, report: planned.report, max_age: planned.age.max_age }
     }
 
     /// Takes over what the graph reports, or that it reports nothing.
-    pub(super) fn commit(&self, bus: &Bus, commands: &mut Commands, tick: &Tick) {
+    pub(crate) fn commit(&self, bus: &Bus, commands: &mut Commands, tick: &Tick) {
         let mark = &bus.marks[self.source.mark as usize];
         let is_there = mark.is_present() && mark.stamp().age(tick.now) <= self.max_age;
         commands.take_report(self.report, &bus.arenas, is_there.then_some(self.source.slot));

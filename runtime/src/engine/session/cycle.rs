@@ -3,10 +3,11 @@
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
-use super::modes::{Modes, Verdict};
-use super::trouble::{Trouble, said};
-use super::{Edge, Engine};
+use super::blame::owner;
+use super::engine::Engine;
+use super::trouble::{Trouble, panic_message};
 use crate::device::DeviceError;
+use crate::engine::core::{Link, Modes, Verdict};
 use crate::fault::{Cause, Fault};
 use crate::graph::Policy;
 use crate::source::closest;
@@ -30,24 +31,24 @@ impl Engine {
         let due = self.clock_sample().is_some_and(|sample| sample <= now);
         self.core.begin(now);
         if let Some(by) = self.lateness.take() {
-            self.meet(self.policy.deadline, Trouble::Late(by))?;
+            self.raise(self.policy.deadline, Trouble::Late(by))?;
         }
         let has_sampled = self.exchange_with_devices(now) || due;
-        for i in 0..self.decks.len() {
-            if self.decks[i].failed.is_some() {
-                self.meet(self.policy.device.0, Trouble::Device(i))?;
+        for i in 0..self.devices.len() {
+            if self.devices[i].failed.is_some() {
+                self.raise(self.policy.device.0, Trouble::Device(i))?;
             }
         }
         self.timeline.ticked(now, has_sampled);
         if self.timeline.is_on_timer() {
-            self.meet(self.policy.clock, Trouble::Clock)?;
+            self.raise(self.policy.clock, Trouble::Clock)?;
         }
         for i in 0..self.core.inlets.len() {
-            let (inlet, decks) = (&mut self.core.inlets[i], &self.decks);
-            let samples = &decks[inlet.device].samples;
+            let (inlet, devices) = (&mut self.core.inlets[i], &self.devices);
+            let samples = &devices[inlet.device].samples;
             if !inlet.is_finite(samples) {
                 inlet.reject(samples);
-                self.meet(self.policy.not_finite.0, Trouble::NotFinite(i))?;
+                self.raise(self.policy.not_finite.0, Trouble::NotFinite(i))?;
             }
         }
         Ok(())
@@ -59,35 +60,35 @@ impl Engine {
     /// # Errors
     /// The reason of a fault; nothing was commanded in this tick.
     pub fn step(&mut self) -> Result<(), Fault> {
-        self.core.latch(&mut self.decks);
+        self.core.latch(&mut self.devices);
         if let Some((policy, inlet)) = self.core.stale() {
-            self.meet(policy, Trouble::Stale(inlet))?;
+            self.raise(policy, Trouble::Stale(inlet))?;
         }
         match catch_unwind(AssertUnwindSafe(|| self.core.run(&mut self.timing))) {
             Ok(true) => {}
             Ok(false) => self.not_finite()?,
-            Err(panic) => self.panicked(said(&*panic))?,
+            Err(panic) => self.panicked(panic_message(&*panic))?,
         }
         for i in 0..self.watched.len() {
             let wire = &self.watched[i];
             if wire.aged.is_stale(&self.core.bus, self.core.tick.now) {
-                self.meet(wire.stale, Trouble::StaleWire(i))?;
+                self.raise(wire.stale, Trouble::StaleWire(i))?;
             }
         }
-        if let Some(station) = self.core.broken() {
-            self.meet(self.policy.panic.0, Trouble::Panicked(station))?;
+        if let Some(runner) = self.core.broken() {
+            self.raise(self.policy.panic.0, Trouble::Panicked(runner))?;
         }
         self.settle();
         self.core.tick.is_halted = self.halts.is_halted();
-        self.core.commit(&mut self.decks, self.halts.is_halted());
+        self.core.commit(&mut self.devices, self.halts.is_halted());
         self.decide()
     }
 
     /// Notes a trouble of this tick; the strictest is what counts.
-    fn meet(&mut self, policy: Policy, trouble: Trouble) -> Result<(), Fault> {
+    fn raise(&mut self, policy: Policy, trouble: Trouble) -> Result<(), Fault> {
         match policy {
             Policy::Count => {}
-            Policy::Fault => return Err(self.tell(trouble)),
+            Policy::Fault => return Err(self.describe(trouble)),
             Policy::Hold | Policy::Stop => {
                 let is_stricter = self.trouble.is_none_or(|(known, _)| policy > known);
                 self.trouble = if is_stricter { Some((policy, trouble)) } else { self.trouble };
@@ -102,7 +103,7 @@ impl Engine {
         if let Some((policy, trouble)) = trouble
             && self.halts.is_news(policy)
         {
-            let fault = self.tell(trouble);
+            let fault = self.describe(trouble);
             self.halts.trouble(policy, fault);
         }
         let resumes = self.halts.settle(trouble.is_some(), self.core.tick.now);
@@ -168,16 +169,16 @@ impl Engine {
     pub fn wind_down(&mut self) -> bool {
         let now = self.core.tick.now + self.timeline.period();
         self.core.begin(now);
-        let is_still = self.core.ramp(&mut self.decks, self.timeline.period() as f64 * 1e-9);
+        let is_still = self.core.ramp(&mut self.devices, self.timeline.period() as f64 * 1e-9);
         // A device that fails now has had its zero or will time out by itself; the reason of the stop stays the first.
         self.exchange_with_devices(now);
         is_still
     }
 
     /// Tells the devices that the run is over, and why.
-    pub(super) fn finish(&mut self, reason: &str) {
-        for deck in &mut self.decks {
-            if let Edge::Stepped(driver) = &mut deck.edge {
+    pub(crate) fn finish(&mut self, reason: &str) {
+        for device in &mut self.devices {
+            if let Link::Stepped(driver) = &mut device.link {
                 // A device that panics at its end has had its zero; the reason of the end stays the first.
                 let _ = catch_unwind(AssertUnwindSafe(|| driver.finish(reason)));
             }
@@ -186,8 +187,8 @@ impl Engine {
 
     /// Time of a stepped clock device's next sample.
     fn clock_sample(&self) -> Option<i64> {
-        self.decks.iter().enumerate().find_map(|(i, deck)| match &deck.edge {
-            Edge::Stepped(driver) if self.timeline.is_clock(i) => driver.next(),
+        self.devices.iter().enumerate().find_map(|(i, device)| match &device.link {
+            Link::Stepped(driver) if self.timeline.is_clock(i) => driver.next(),
             _ => None,
         })
     }
@@ -196,32 +197,32 @@ impl Engine {
     /// live clock device has sampled.
     fn exchange_with_devices(&mut self, now: i64) -> bool {
         let mut has_sampled = false;
-        for i in 0..self.decks.len() {
-            let deck = &mut self.decks[i];
-            match &mut deck.edge {
-                Edge::Stepped(driver) => {
-                    let exchange = || driver.exchange(now, &deck.commands, &mut deck.samples);
+        for i in 0..self.devices.len() {
+            let device = &mut self.devices[i];
+            match &mut device.link {
+                Link::Stepped(driver) => {
+                    let exchange = || driver.exchange(now, &device.commands, &mut device.samples);
                     let result = catch_unwind(AssertUnwindSafe(exchange));
-                    let result =
-                        result.unwrap_or_else(|panic| Err(DeviceError(format!("it panicked: {}", said(&*panic)))));
+                    let result = result
+                        .unwrap_or_else(|panic| Err(DeviceError(format!("it panicked: {}", panic_message(&*panic)))));
                     if let Err(DeviceError(why)) = result {
                         self.lose_device(i, why);
                     }
                 }
-                Edge::Live(linked) => {
-                    let is_newer = linked.exchange(&deck.commands, &mut deck.samples);
+                Link::Live(linked) => {
+                    let is_newer = linked.exchange(&device.commands, &mut device.samples);
                     has_sampled |= is_newer && self.timeline.is_clock(i);
                 }
-                Edge::Idle(_) | Edge::Gone => {}
+                Link::Idle(_) | Link::Gone => {}
             }
         }
         has_sampled
     }
 
     /// A device has failed: it is not touched again.
-    pub(super) fn lose_device(&mut self, device: usize, why: String) {
-        let deck = &mut self.decks[device];
-        (deck.edge, deck.failed) = (Edge::Gone, Some(why));
+    pub(crate) fn lose_device(&mut self, device: usize, why: String) {
+        let device = &mut self.devices[device];
+        (device.link, device.failed) = (Link::Gone, Some(why));
     }
 
     /// A value is not finite: if the run goes on, what the node gave is taken back, and with it all that may follow.
@@ -234,10 +235,10 @@ impl Engine {
             !bus.arenas.is_finite(planned.shape.kind(), id.slot)
         };
         let port = (0..self.ports.len()).find(is_bad).expect("one of them is not finite");
-        self.meet(self.policy.not_finite.0, Trouble::NotFiniteAt(port))?;
-        let station = self.station_of(port);
-        self.take_back(station);
-        self.core.reset_from(station);
+        self.raise(self.policy.not_finite.0, Trouble::NotFiniteAt(port))?;
+        let runner = self.station_of(port);
+        self.invalidate_from(runner);
+        self.core.reset_from(runner);
         Ok(())
     }
 
@@ -245,18 +246,18 @@ impl Engine {
     #[cold]
     fn panicked(&mut self, why: String) -> Result<(), Fault> {
         self.panic = why;
-        self.meet(self.policy.panic.0, Trouble::Panicked(self.core.current()))?;
+        self.raise(self.policy.panic.0, Trouble::Panicked(self.core.current()))?;
         self.core.break_down();
-        self.take_back(self.core.current());
+        self.invalidate_from(self.core.current());
         Ok(())
     }
 
-    /// Makes the outputs of a station and of all that come after it absent. A node that panicked may have lost its
+    /// Makes the outputs of a runner and of all that come after it absent. A node that panicked may have lost its
     /// buffers, so they are made anew.
-    fn take_back(&mut self, station: usize) {
+    fn invalidate_from(&mut self, runner: usize) {
         // The first that has any: a node may be without outputs, and those after it were not stepped all the same.
         let first = |name: &String| self.ports.iter().position(|(port, _)| owner(&port.name) == name);
-        let from = self.names[station..].iter().find_map(|(name, _)| first(name));
+        let from = self.names[runner..].iter().find_map(|(name, _)| first(name));
         for (port, id) in &self.ports[from.unwrap_or(self.ports.len())..] {
             self.core.bus.marks[id.mark as usize].lose(self.core.tick.index);
             self.core.bus.arenas.renew(id.slot, &port.shape);
@@ -267,9 +268,4 @@ impl Engine {
         let name = owner(&self.ports[port].0.name);
         self.names.iter().position(|(known, _)| known == name).unwrap_or(0)
     }
-}
-
-/// Name of the node or the role that a port belongs to.
-pub(super) fn owner(port: &str) -> &str {
-    port.rsplit_once('.').expect("a port's name has two parts").0
 }

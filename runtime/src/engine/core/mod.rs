@@ -1,0 +1,18 @@
+//! What runs inside a tick. Nothing here allocates, waits or calls the operating system.
+
+mod command;
+mod inlet;
+mod modes;
+mod runner;
+mod slot;
+mod tick;
+
+pub(crate) use command::{CommandSlot, ReportSlot};
+pub use inlet::Counters;
+pub(crate) use inlet::Inlet;
+pub use modes::Change;
+pub(crate) use modes::{Modes, Verdict};
+pub(crate) use runner::{Aged, NodeRunner};
+pub(crate) use slot::{DeviceSlot, Link};
+pub(crate) use tick::Core;
+pub use tick::Timing;

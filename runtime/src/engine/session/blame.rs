@@ -1,0 +1,60 @@
+//! A trouble as a fault: node, port, tick, cause and place.
+
+use super::engine::Engine;
+use super::trouble::{Trouble, WatchedWire};
+use crate::fault::{Cause, Fault, StaleWire};
+
+impl Engine {
+    /// Describes a trouble as a fault.
+    #[cold]
+    pub(crate) fn describe(&self, trouble: Trouble) -> Fault {
+        match trouble {
+            Trouble::Stale(inlet) => {
+                let (age, max_age) = self.core.inlets[inlet].ages(self.core.tick.now);
+                self.of_port(inlet, Cause::Stale { age, max_age })
+            }
+            Trouble::StaleWire(wire) => {
+                let WatchedWire { aged, node, port, span, .. } = &self.watched[wire];
+                let age = self.core.bus.marks[aged.from as usize].stamp().age(self.core.tick.now);
+                let from = self.ports.iter().find(|(_, id)| id.mark == aged.from).map_or("", |(port, _)| &port.name);
+                let wire = StaleWire { from: from.to_owned(), age, max_age: aged.max_age };
+                self.fault(node, port.clone(), Cause::StaleWire(wire.into()), self.sources.locate(span.start))
+            }
+            // The ports of the roles come first, an inlet each.
+            Trouble::NotFinite(port) | Trouble::NotFiniteAt(port) => self.of_port(port, Cause::NotFinite),
+            Trouble::Panicked(runner) => {
+                let (node, place) = &self.names[runner];
+                self.fault(node, None, Cause::Panicked(self.panic.clone()), place.clone())
+            }
+            Trouble::Device(device) => {
+                let device = &self.devices[device];
+                let why = device.failed.clone().unwrap_or_default();
+                self.fault(&device.name, None, Cause::Device(why), device.place.clone())
+            }
+            Trouble::Clock => {
+                let clock = (0..self.devices.len()).find(|device| self.timeline.is_clock(*device));
+                let (name, place) = clock.map_or(("", ""), |i| (&self.devices[i].name, &self.devices[i].place));
+                self.fault(name, None, Cause::SilentClock, place.to_owned())
+            }
+            Trouble::Late(by) => self.fault("", None, Cause::Late { by }, String::new()),
+            Trouble::Operator => self.fault("", None, Cause::Operator, String::new()),
+        }
+    }
+
+    fn of_port(&self, port: usize, cause: Cause) -> Fault {
+        let name = &self.ports[port].0.name;
+        let node = owner(name);
+        let mut owners = self.names.iter().chain(&self.roles);
+        let place = owners.find(|(known, _)| known == node).map(|(_, place)| place.clone()).unwrap_or_default();
+        self.fault(node, Some(name[node.len() + 1..].to_owned()), cause, place)
+    }
+
+    pub(crate) fn fault(&self, node: &str, port: Option<String>, cause: Cause, place: String) -> Fault {
+        Fault { node: node.into(), port, tick: self.core.tick.index, time: self.core.tick.now, cause, place }
+    }
+}
+
+/// Name of the node or the role that a port belongs to.
+pub(crate) fn owner(port: &str) -> &str {
+    port.rsplit_once('.').expect("a port's name has two parts").0
+}

@@ -1,0 +1,21 @@
+//! What stands around a tick: the exchange with devices, faults and halts, pacing, real time and the operator.
+
+mod blame;
+mod build;
+mod cycle;
+mod drive;
+mod engine;
+mod halt;
+mod operator;
+mod outcome;
+mod real_time;
+mod signals;
+mod timeline;
+mod trouble;
+
+pub use drive::run_virtual;
+pub use engine::{Engine, Logged, View};
+pub use halt::Halt;
+pub use outcome::{End, Outcome, RunOptions};
+pub use real_time::run;
+pub use signals::Interrupt;
