@@ -4,7 +4,7 @@ use std::path::Path;
 
 use tactflow_nodes::recordings::{self, Hints, Recording};
 use tactflow_runtime::engine::Engine;
-use tactflow_runtime::graph::{Request, plan};
+use tactflow_runtime::graph::{Request, compile};
 use tactflow_runtime::signal::{Joints, Signal};
 use tactflow_tests::{catalogue, workspace};
 
@@ -34,7 +34,7 @@ fn joints(engine: &Engine, name: &str) -> [f64; 7] {
 impl Pair {
     pub(crate) fn new() -> Self {
         let graphs = workspace().join("graphs");
-        let plan = plan(&catalogue(), &Request::file(graphs.join("finger_press.toml")));
+        let plan = compile(&catalogue(), &Request::file(graphs.join("finger_press.toml")));
         let engine = Engine::new(plan.unwrap_or_else(|report| panic!("{}", report.render(false))));
         let file = read(&graphs.join("recordings/pressuRe/iscan_test.csv"));
         let movie = recordings::read(&file, "iscan_test.csv", &Hints::default()).expect("the recording is sound");

@@ -4,7 +4,7 @@ use std::fs;
 use std::path::Path;
 
 use tactflow_nodes::calibration::{Calibration, file};
-use tactflow_runtime::graph::{Request, plan};
+use tactflow_runtime::graph::{Request, compile};
 use tactflow_runtime::harness::{GraphRig, Source};
 use tactflow_runtime::signal::{Freshness, Image, ImageShape, Unit};
 use tactflow_tests::{catalogue, workspace};
@@ -208,7 +208,7 @@ fn the_page_says_what_is_so() {
     assert!((tactel.curve.force(1460.0 - tactel.offset) - 1.364).abs() < 5e-4);
     let folder = folder(&[("pad.toml", &block("toml")), ("log.csv", &block("csv")), ("press.csv", &log())]);
     let request = Request { text: Some(block("toml graph")), ..Request::file(folder.path().join("graph.toml")) };
-    plan(&catalogue(), &request).unwrap_or_else(|report| panic!("{}", report.render(false)));
+    compile(&catalogue(), &request).unwrap_or_else(|report| panic!("{}", report.render(false)));
     // The few rows that are shown are read: they are only too few.
     let said = calibrate(folder.path(), &["log.csv"]);
     assert!(said.code == 2 && said.err.contains("only 1 of its frames are unloaded"), "{}", said.err);

@@ -2,7 +2,7 @@
 
 use tactflow_runtime::catalogue::Catalogue;
 use tactflow_runtime::cli::example;
-use tactflow_runtime::graph::{Request, plan};
+use tactflow_runtime::graph::{Request, compile};
 use tactflow_runtime::node::ParamSpec;
 use tactflow_tests::catalogue;
 
@@ -93,7 +93,7 @@ fn runs_anywhere(catalogue: &Catalogue, text: &str, set: Option<&str>) -> Result
     let folder = tempfile::tempdir().unwrap();
     let request = Request { text: Some(text.to_owned()), ..Request::file(folder.path().join("try.toml")) };
     let request = set.map_or(request.clone(), |set| request.set(set));
-    let plan = plan(catalogue, &request).map_err(|report| report.render(false))?;
+    let plan = compile(catalogue, &request).map_err(|report| report.render(false))?;
     plan.warnings().map_or(Ok(()), |warnings| Err(warnings.render(false)))
 }
 

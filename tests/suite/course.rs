@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use tactflow_runtime::engine::Engine;
 use tactflow_runtime::fault::Fault;
-use tactflow_runtime::graph::{Plan, Request, plan};
+use tactflow_runtime::graph::{Compiled, Request, compile};
 use tactflow_runtime::record::Columns;
 use tactflow_runtime::signal::Signal;
 use tactflow_tests::{catalogue, on_the_mock_bench, workspace};
@@ -19,8 +19,8 @@ pub(crate) fn shipped(name: &str) -> Request {
 }
 
 /// The plan of a graph that loads.
-pub(crate) fn loaded(request: &Request) -> Plan {
-    plan(&catalogue(), request).unwrap_or_else(|report| panic!("{}", report.render(false)))
+pub(crate) fn loaded(request: &Request) -> Compiled {
+    compile(&catalogue(), request).unwrap_or_else(|report| panic!("{}", report.render(false)))
 }
 
 /// What a run left behind.
@@ -35,7 +35,7 @@ pub(crate) struct Course {
 }
 
 /// Runs until a device ends, something goes wrong or there were `most` ticks.
-pub(crate) fn course(plan: Plan, most: usize) -> Course {
+pub(crate) fn course(plan: Compiled, most: usize) -> Course {
     let mut engine = Engine::new(plan);
     let columns = Columns::new(engine.ports());
     let mut bits = vec![Vec::new(); columns.list.len()];

@@ -4,7 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use tactflow_runtime::engine::{self, Engine, RunOptions};
-use tactflow_runtime::graph::{Plan, Request, plan};
+use tactflow_runtime::graph::{Compiled, Request, compile};
 use tactflow_runtime::record::{Format, Recorder};
 use tactflow_runtime::signal::Unit;
 use tactflow_runtime::source::{Code, Report};
@@ -48,8 +48,8 @@ fn first_cells(page: &str, header: &str) -> Vec<String> {
 }
 
 /// Checks a text as if it were that graph file.
-fn check(graph: &Path, text: String) -> Result<Plan, Report> {
-    plan(&catalogue(), &Request { text: Some(text), ..Request::file(graph) })
+fn check(graph: &Path, text: String) -> Result<Compiled, Report> {
+    compile(&catalogue(), &Request { text: Some(text), ..Request::file(graph) })
 }
 
 /// Relative to this crate, where tests run: messages show paths as they are given.
@@ -145,7 +145,7 @@ fn every_set_of_the_reference_loads() {
             assert_eq!(option[0], "--set");
             request = request.set(option[1]);
         }
-        plan(&catalogue(), &request).unwrap_or_else(|report| panic!("{}", report.render(false)));
+        compile(&catalogue(), &request).unwrap_or_else(|report| panic!("{}", report.render(false)));
     }
 }
 
@@ -154,7 +154,7 @@ fn recordings_are_as_shown() {
     let page = page("graph-files.md");
     let (folder, ..) = world(&page, "recordings");
     for (format, name, fence) in [(Format::Csv, "push.csv", "csv"), (Format::Ndjson, "push.ndjson", "json")] {
-        let plan = plan(&catalogue(), &Request::file(folder.join("push.toml")));
+        let plan = compile(&catalogue(), &Request::file(folder.join("push.toml")));
         let mut engine = Engine::new(plan.unwrap_or_else(|report| panic!("{}", report.render(false))));
         let path = folder.join(name);
         let mut recorder = Recorder::create(&path, format, &engine, true).unwrap();

@@ -7,7 +7,7 @@ use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use tactflow_runtime::graph::{Request, plan};
+use tactflow_runtime::graph::{Request, compile};
 use tactflow_runtime::scenario::Scenario;
 use tactflow_runtime::source::SourceMap;
 use tactflow_runtime::source::{Code, Diagnostic, Report};
@@ -76,7 +76,7 @@ fn report(path: &Path) -> Report {
         let loaded = Scenario::load(&catalogue(), path);
         return loaded.err().unwrap_or_else(|| panic!("{} loads", path.display()));
     }
-    match plan(&catalogue(), &Request::file(path)) {
+    match compile(&catalogue(), &Request::file(path)) {
         Ok(plan) => plan.warnings().unwrap_or_else(|| panic!("{} loads, and nothing is said", path.display())),
         Err(report) => report,
     }

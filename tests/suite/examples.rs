@@ -1,12 +1,12 @@
 //! The examples of the nodes: together they are a graph that loads and runs.
 
 use tactflow_runtime::engine::Engine;
-use tactflow_runtime::graph::{Plan, Request, plan};
+use tactflow_runtime::graph::{Compiled, Request, compile};
 use tactflow_runtime::source::Report;
 use tactflow_tests::examples::graph_of_all;
 
-fn load(text: String) -> Result<Plan, Report> {
-    plan(&tactflow_nodes::catalogue(), &Request::text(text))
+fn load(text: String) -> Result<Compiled, Report> {
+    compile(&tactflow_nodes::catalogue(), &Request::text(text))
 }
 
 #[test]

@@ -6,7 +6,7 @@ use std::sync::{Arc, Mutex};
 use tactflow_runtime::device::{Commands, DeviceError, DeviceType, Driver, Opened, Samples, Stepped};
 use tactflow_runtime::engine::{End, Engine, RunOptions, run};
 use tactflow_runtime::fault::Cause;
-use tactflow_runtime::graph::plan;
+use tactflow_runtime::graph::compile;
 use tactflow_runtime::harness::GraphRig;
 use tactflow_runtime::node::{Mistakes, Node, Setup, Tick};
 use tactflow_runtime::node::{ParamSpec, Reader};
@@ -123,7 +123,7 @@ fn a_device_that_panics_is_a_fault_of_the_device() {
 fn hybrid_with_a_nan() -> Engine {
     let request = on_the_mock_bench("hybrid.toml");
     let request = request.set("devices.pad.glitch=[{ at_s = 1.0, for_s = 0.1, kind = 'nan' }]");
-    Engine::new(plan(&catalogue(), &request).unwrap_or_else(|report| panic!("{}", report.render(false))))
+    Engine::new(compile(&catalogue(), &request).unwrap_or_else(|report| panic!("{}", report.render(false))))
 }
 
 #[test]
@@ -214,7 +214,7 @@ fn an_arm_is_told_to_stand_still_though_the_device_before_it_has_failed() {
         .set("devices.pad.press=[{ from_s = 0.3, force = 3.0, at = [0.008, -0.004] }]")
         .set("devices.pad.glitch=[{ at_s = 0.8, for_s = 5, kind = 'unplug' }]");
     let catalogue = catalogue().device_type(Box::new(SpyType { told: Arc::clone(&told) }));
-    let plan = plan(&catalogue, &request).unwrap_or_else(|report| panic!("{}", report.render(false)));
+    let plan = compile(&catalogue, &request).unwrap_or_else(|report| panic!("{}", report.render(false)));
     let outcome = run(&mut Engine::new(plan), &RunOptions::default(), &mut |_| {}).unwrap();
     assert!(matches!(outcome.end, End::Fault(_)), "{:?}", outcome.end);
     let told = told.lock().unwrap();

@@ -10,7 +10,7 @@ use tactflow_nodes::limits::bumpless::Bumpless;
 use tactflow_nodes::limits::contact_limit::ContactLimit;
 use tactflow_nodes::limits::twist_limit::TwistLimit;
 use tactflow_nodes::limits::workspace_limit::WorkspaceLimit;
-use tactflow_runtime::graph::{Request, plan};
+use tactflow_runtime::graph::{Request, compile};
 use tactflow_runtime::harness::NodeRig;
 use tactflow_runtime::node::{Limits, Node};
 use tactflow_runtime::signal::{Image, ImageShape, Kind, Pose, PoseShape, Shape, Twist, TwistShape, Unit};
@@ -25,7 +25,7 @@ fn table(path: &Path) -> Table {
 
 /// Why a graph with its parts and benches in that folder does not load.
 fn refused(folder: &TempDir, graph: &str) -> Option<Report> {
-    plan(&catalogue(), &Request::file(folder.path().join(graph))).err()
+    compile(&catalogue(), &Request::file(folder.path().join(graph))).err()
 }
 
 /// Everything that ships, in a folder of its own.

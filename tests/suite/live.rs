@@ -6,7 +6,7 @@ use std::process::{Child, Command, Stdio};
 use tactflow_runtime::device::{Description, Device, DeviceError, Driver, Filled, Link, Live, Opened};
 use tactflow_runtime::engine::{self, End, Engine, RunOptions};
 use tactflow_runtime::fault::Cause;
-use tactflow_runtime::graph::{Request, plan};
+use tactflow_runtime::graph::{Request, compile};
 use tactflow_runtime::node::Mistakes;
 use tactflow_runtime::signal::{Scalar, ScalarShape, Signal, Unit};
 use tactflow_tests::{catalogue, workspace};
@@ -54,7 +54,7 @@ fn engine(peer: &Peer, graph: &str) -> Engine {
         peer.port
     );
     let request = Request { bench_text: Some(bench), ..Request::text(graph) };
-    let plan = plan(&catalogue(), &request).unwrap_or_else(|report| panic!("{}", report.render(false)));
+    let plan = compile(&catalogue(), &request).unwrap_or_else(|report| panic!("{}", report.render(false)));
     assert!(plan.is_live());
     Engine::new(plan)
 }
@@ -116,7 +116,7 @@ fn a_driver_that_panics_is_a_fault_of_its_device() {
     let request =
         Request { bench_text: Some("devices.b.type = 'brittle'\nbind.a = 'b'".into()), ..Request::text(GRAPH) };
     let plan =
-        plan(&catalogue().device::<Brittle>(), &request).unwrap_or_else(|report| panic!("{}", report.render(false)));
+        compile(&catalogue().device::<Brittle>(), &request).unwrap_or_else(|report| panic!("{}", report.render(false)));
     let outcome = engine::run(&mut Engine::new(plan), &RunOptions::default(), &mut |_| {}).unwrap();
     let End::Fault(fault) = outcome.end else { panic!("{:?}", outcome.end) };
     assert_eq!((fault.node.as_str(), fault.cause), ("b", Cause::Device("it panicked: brittle".into())));

@@ -17,6 +17,7 @@ mod faults;
 mod features;
 mod flow;
 mod freshness;
+mod layers;
 mod limits;
 mod live;
 mod lockstep;

@@ -4,7 +4,7 @@
 
 use std::fs;
 
-use tactflow_runtime::graph::{Request, plan};
+use tactflow_runtime::graph::{Request, compile};
 use tactflow_runtime::signal::{Pose, Scalar, Signal};
 use tactflow_runtime::source::Code;
 use tactflow_tests::catalogue;
@@ -91,7 +91,7 @@ fn a_number_over_a_fact_replaces_it() {
 
 /// Code, place and message of everything that is wrong.
 fn mistakes(request: &Request) -> Vec<(&'static str, String, String)> {
-    let Err(report) = plan(&catalogue(), request) else { panic!("it loads") };
+    let Err(report) = compile(&catalogue(), request) else { panic!("it loads") };
     let told = |diagnostic: &tactflow_runtime::source::Diagnostic| {
         (diagnostic.code.name(), report.sources.locate(diagnostic.span.start), diagnostic.message.clone())
     };
@@ -167,7 +167,7 @@ fn a_fact_over_a_table_replaces_it() {
 #[test]
 fn what_is_no_single_assignment_is_no_set() {
     for text in ["", "# nothing", "[nodes.pid]", "nodes.pid.gains.x.kp", "graph.max_gap_ms=1\ngraph.clock='arm'"] {
-        let report = plan(&catalogue(), &shipped("hybrid.toml").set(text)).err();
+        let report = compile(&catalogue(), &shipped("hybrid.toml").set(text)).err();
         let text = report.unwrap_or_else(|| panic!("{text:?} passes")).render(false);
         assert!(text.contains("this is not `key=value`"), "{text}");
     }
@@ -183,7 +183,7 @@ fn a_mistake_in_a_part_that_is_used_twice_is_told_once() {
     let graph = folder.path().join("graph.toml");
     fs::write(&graph, format!("graph.clock = \"pad\"\nroles.pad = \"tactile_pad\"\n{}", parts.concat())).unwrap();
     let request = Request { bench_text: Some(BENCH.into()), ..Request::file(&graph) };
-    let report = plan(&catalogue(), &request).err().unwrap();
+    let report = compile(&catalogue(), &request).err().unwrap();
     let unknown = report.diagnostics.iter().filter(|found| found.code == Code::UnknownKey).count();
     assert_eq!(unknown, 1, "{}", report.render(false));
 }
@@ -199,6 +199,6 @@ fn parts_that_multiply_are_stopped() {
     let graph = folder.path().join("graph.toml");
     fs::write(&graph, "graph.rate_hz = 100\n[parts.p]\nfile = \"p0.toml\"\n").unwrap();
     let request = Request { bench_text: Some(String::new()), ..Request::file(&graph) };
-    let report = plan(&catalogue(), &request).err().unwrap();
+    let report = compile(&catalogue(), &request).err().unwrap();
     assert_eq!(report.diagnostics[0].code, Code::EndlessPart, "{}", report.render(false));
 }

@@ -13,7 +13,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-use tactflow_runtime::graph::{Request, plan};
+use tactflow_runtime::graph::{Request, compile};
 use tactflow_tests::{catalogue, workspace};
 
 use crate::course::{Course, course};
@@ -133,7 +133,7 @@ enum Fate {
 /// What becomes of the graph `name` in the folder, given what it was before.
 fn fate(copy: &Copy, name: &str, original: &Course, before: &str, after: &str) -> Fate {
     let start = Instant::now();
-    let plan = match plan(&catalogue(), &Request::file(copy.path(name))) {
+    let plan = match compile(&catalogue(), &Request::file(copy.path(name))) {
         Ok(plan) => plan,
         Err(report) => {
             assert!(!report.diagnostics.is_empty(), "it does not load and says nothing");

@@ -1,7 +1,7 @@
 //! Roles that only a scenario and the recorder may read, and samples that say that there is nothing.
 
 use tactflow_runtime::engine::{self, Engine, RunOptions};
-use tactflow_runtime::graph::{Request, plan};
+use tactflow_runtime::graph::{Request, compile};
 use tactflow_runtime::harness::{GraphRig, Source};
 use tactflow_runtime::record::Columns;
 use tactflow_runtime::signal::{Freshness, Image, ImageShape, ScalarShape, Unit};
@@ -18,7 +18,7 @@ const TASK: &str = r#"
 fn engine(bench: &str) -> Engine {
     let bench = format!("[devices.pad]\ntype = \"true_pad\"\nfrom_s = 0.02\nto_s = 0.04\n[bind]\n{bench}");
     let request = Request { bench_text: Some(bench), ..Request::text(TASK) };
-    Engine::new(plan(&catalogue(), &request).unwrap_or_else(|report| panic!("{}", report.render(false))))
+    Engine::new(compile(&catalogue(), &request).unwrap_or_else(|report| panic!("{}", report.render(false))))
 }
 
 /// Names of the columns of a role.

@@ -5,7 +5,7 @@ use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
 use tactflow_runtime::engine::{End, Engine, RunOptions, run};
-use tactflow_runtime::graph::{Request, plan};
+use tactflow_runtime::graph::{Request, compile};
 use tactflow_runtime::harness::GraphRig;
 use tactflow_tests::catalogue;
 use tactflow_tests::nodes::length_by_hand;
@@ -82,7 +82,7 @@ glitch = [{ at_s = 0.1, for_s = 1.0, kind = 'unplug' }]
 #[test]
 fn what_is_left_of_the_devices_plays_to_its_end() {
     let request = Request::text(PADS);
-    let plan = plan(&catalogue(), &request).unwrap_or_else(|report| panic!("{}", report.render(false)));
+    let plan = compile(&catalogue(), &request).unwrap_or_else(|report| panic!("{}", report.render(false)));
     let mut engine = Engine::new(plan);
     let outcome = run(&mut engine, &RunOptions::default(), &mut |_| {}).unwrap();
     assert_eq!(outcome.end, End::Finished);

@@ -4,7 +4,7 @@
 use proptest::prelude::*;
 use tactflow_runtime::engine::{End, Engine, RunOptions, run};
 use tactflow_runtime::fault::Fault;
-use tactflow_runtime::graph::plan;
+use tactflow_runtime::graph::compile;
 use tactflow_runtime::harness::GraphRig;
 use tactflow_runtime::signal::{Features, Freshness};
 use tactflow_tests::nodes::length_by_hand;
@@ -60,7 +60,7 @@ fn engine_with(case: Case, policy: &str, set: &[&str]) -> Engine {
         Some((target, how)) => sabotaged(&Sabotage { target: target.into(), how, from: 200, to: 250 }),
         None => catalogue(),
     };
-    Engine::new(plan(&catalogue, &request).unwrap_or_else(|report| panic!("{}", report.render(false))))
+    Engine::new(compile(&catalogue, &request).unwrap_or_else(|report| panic!("{}", report.render(false))))
 }
 
 /// Runs to `until` [s]; whether the arm moves then.

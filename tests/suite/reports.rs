@@ -2,14 +2,14 @@
 
 use tactflow_nodes::catalogue;
 use tactflow_runtime::engine::{self, Engine, RunOptions};
-use tactflow_runtime::graph::{Request, plan};
+use tactflow_runtime::graph::{Request, compile};
 use tactflow_runtime::signal::{Mark, Pose, Signal};
 use tactflow_tests::workspace;
 
 fn engine(graph: &str) -> Engine {
     let request =
         Request::file(workspace().join("graphs").join(graph)).bench(workspace().join("graphs/benches/mock.toml"));
-    Engine::new(plan(&catalogue(), &request).unwrap_or_else(|report| panic!("{}", report.render(false))))
+    Engine::new(compile(&catalogue(), &request).unwrap_or_else(|report| panic!("{}", report.render(false))))
 }
 
 /// What the ruler gives.

@@ -3,7 +3,7 @@
 use std::fs;
 
 use tactflow_runtime::engine::Engine;
-use tactflow_runtime::graph::{Request, plan};
+use tactflow_runtime::graph::{Request, compile};
 use tactflow_tests::{catalogue, workspace};
 
 use crate::tool::say;
@@ -14,7 +14,7 @@ fn hybrid() -> Request {
 
 /// Runs for some time; what `column` says in each tick, NaN where it is absent.
 fn course(request: &Request, seconds: f64, names: &[&str]) -> Vec<Vec<f64>> {
-    let plan = plan(&catalogue(), request).unwrap_or_else(|report| panic!("{}", report.render(false)));
+    let plan = compile(&catalogue(), request).unwrap_or_else(|report| panic!("{}", report.render(false)));
     let mut engine = Engine::new(plan);
     let columns = tactflow_runtime::record::Columns::new(engine.ports());
     let at = |name: &&str| columns.list.iter().position(|column| column.name == **name).expect("the column");
@@ -109,7 +109,7 @@ fn settings_that_cannot_be_are_told_at_their_place() {
         ("rows=8", "16"),
     ];
     for (set, message) in cases {
-        let report = plan(&catalogue(), &hybrid().set(format!("devices.bench.{set}"))).err();
+        let report = compile(&catalogue(), &hybrid().set(format!("devices.bench.{set}"))).err();
         let text = report.unwrap_or_else(|| panic!("{set} loads")).render(false);
         assert!(text.contains(message), "{set}: {text}");
     }

@@ -13,7 +13,7 @@ use std::path::{Path, PathBuf};
 use serde::Deserialize;
 use tactflow_runtime::engine::Engine;
 use tactflow_runtime::fault::Fault;
-use tactflow_runtime::graph::{Plan, Request, plan};
+use tactflow_runtime::graph::{Compiled, Request, compile};
 use tactflow_runtime::node::PortId;
 use tactflow_runtime::signal::{Signal, Twist};
 use tactflow_runtime::source::Item;
@@ -62,7 +62,7 @@ struct Watch {
     csv: String,
 }
 
-fn number_of(plan: &Plan, kind: &str, path: &str) -> f64 {
+fn number_of(plan: &Compiled, kind: &str, path: &str) -> f64 {
     let node = plan.outline().nodes.iter().find(|node| node.kind.text == kind).unwrap();
     let setting = node.settings.iter().find(|setting| setting.path == path).unwrap();
     match setting.value.item {
@@ -73,7 +73,7 @@ fn number_of(plan: &Plan, kind: &str, path: &str) -> f64 {
 }
 
 impl Watch {
-    fn new(plan: Plan) -> Self {
+    fn new(plan: Compiled) -> Self {
         let name = |kind: &str| plan.outline().nodes.iter().find(|node| node.kind.text == kind).unwrap().name.clone();
         let (before, behind) = (format!("{}.twist", name("bumpless")), format!("{}.twist", name("acceleration_limit")));
         let allowed = Accelerations {
@@ -180,7 +180,7 @@ fn check(path: &Path) {
     let situation: Situation = toml::from_str(&fs::read_to_string(path).unwrap())
         .unwrap_or_else(|error| panic!("{}: {error}", path.display()));
     let request = situation.set.iter().fold(graph(&situation.graph), Request::set);
-    let plan = plan(&catalogue(), &request).unwrap_or_else(|report| panic!("{what}: {}", report.render(false)));
+    let plan = compile(&catalogue(), &request).unwrap_or_else(|report| panic!("{what}: {}", report.render(false)));
     let mut watch = Watch::new(plan);
     let fault = watch.run((situation.for_s * 1e9) as i64, &situation.send, what);
     let said = fault.map_or_else(String::new, |fault| fault.to_string());
@@ -224,7 +224,7 @@ fn sabotage(target: &str, how: How, to: u64, set: &[&str]) -> (Watch, Option<Fau
     let from = if target == "twist_source" { 20 } else { 250 };
     let sabotage = Sabotage { target: target.into(), how, from, to };
     let request = set.iter().copied().fold(graph("explore"), Request::set);
-    let plan = plan(&sabotaged(&sabotage), &request).unwrap_or_else(|report| panic!("{}", report.render(false)));
+    let plan = compile(&sabotaged(&sabotage), &request).unwrap_or_else(|report| panic!("{}", report.render(false)));
     let mut watch = Watch::new(plan);
     let fault = watch.run(1_900_000_000, &[], &format!("{target} {how:?}"));
     (watch, fault)
@@ -232,7 +232,7 @@ fn sabotage(target: &str, how: How, to: u64, set: &[&str]) -> (Watch, Option<Fau
 
 /// The node types of a graph that ships, in the order in which they step, and the names of their nodes.
 fn types() -> Vec<(String, Vec<String>)> {
-    let plan = plan(&catalogue(), &graph("explore")).unwrap_or_else(|report| panic!("{}", report.render(false)));
+    let plan = compile(&catalogue(), &graph("explore")).unwrap_or_else(|report| panic!("{}", report.render(false)));
     let mut types: Vec<(String, Vec<String>)> = Vec::new();
     for name in plan.order() {
         let kind = &plan.outline().nodes.iter().find(|node| node.name == name).unwrap().kind.text;

@@ -1,7 +1,7 @@
 //! What a tick does not do: allocate, or call the operating system.
 
 use tactflow_runtime::engine::Engine;
-use tactflow_runtime::graph::{Request, plan};
+use tactflow_runtime::graph::{Request, compile};
 use tactflow_tests::examples::graph_of_all;
 use tactflow_tests::{catalogue, shipped_graphs};
 
@@ -12,7 +12,7 @@ fn graphs() -> Vec<(String, Request)> {
 }
 
 fn engine(request: &Request) -> Engine {
-    let plan = plan(&catalogue(), request);
+    let plan = compile(&catalogue(), request);
     Engine::new(plan.unwrap_or_else(|report| panic!("{}", report.render(false))))
 }
 

@@ -1,7 +1,7 @@
 //! The examples of the touch nodes load together, and no rule of any of them allocates.
 
 use tactflow_runtime::engine::Engine;
-use tactflow_runtime::graph::{Request, plan};
+use tactflow_runtime::graph::{Request, compile};
 use tactflow_runtime::signal::Scalar;
 use tactflow_tests::catalogue;
 
@@ -100,7 +100,7 @@ fn graph() -> String {
 #[test]
 fn the_examples_load_together_and_no_touch_node_allocates_in_a_tick() {
     let request = Request { text: Some(graph()), ..Request::file("examples.toml") };
-    let plan = plan(&catalogue(), &request).unwrap_or_else(|report| panic!("{}", report.render(false)));
+    let plan = compile(&catalogue(), &request).unwrap_or_else(|report| panic!("{}", report.render(false)));
     let mut engine = Engine::new(plan);
     let outputs = ["median.value", "one_pole.value", "smooth.value", "axis.value", "middle.value", "cut.value"]
         .into_iter()

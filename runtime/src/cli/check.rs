@@ -7,7 +7,7 @@ use serde::Serialize;
 use super::describe::Format;
 use super::json::{Diagnosed, diagnosed};
 use super::{NOT_LOADED, OnArgs, Shell};
-use crate::graph::{Plan, plan};
+use crate::graph::{Compiled, compile};
 use crate::scenario::Scenario;
 use crate::source::Report;
 
@@ -43,7 +43,7 @@ pub(super) fn check(args: Check, shell: &Shell) -> u8 {
             checked.extend(checked_as);
             continue;
         }
-        let result = plan(shell.catalogue(), &args.on.request(graph.clone()));
+        let result = compile(shell.catalogue(), &args.on.request(graph.clone()));
         let (report, figures) = match &result {
             Ok(plan) => (plan.warnings(), Some(Figures::of(plan))),
             Err(report) => (Some(report.clone()), None),
@@ -124,7 +124,7 @@ struct Figures {
 }
 
 impl Figures {
-    fn of(plan: &Plan) -> Self {
+    fn of(plan: &Compiled) -> Self {
         Self {
             nodes: plan.order().count(),
             ports: plan.ports().count(),

@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use crate::catalogue::Catalogue;
-use crate::graph::{Request, plan};
+use crate::graph::{Request, compile};
 use crate::node::{Need, NodeSpec, PortSpec};
 use crate::signal::Kind;
 use crate::source::{Item, SourceMap, Table, Value, parse_table};
@@ -103,7 +103,7 @@ fn is_unread(chosen: &[&Piece], asked: &Piece) -> bool {
 
 /// Whether a graph loads and there is nothing to be said of it.
 fn is_clean(catalogue: &Catalogue, text: &str) -> bool {
-    let plan = plan(catalogue, &Request::text(text));
+    let plan = compile(catalogue, &Request::text(text));
     plan.is_ok_and(|plan| plan.warnings().is_none())
 }
 

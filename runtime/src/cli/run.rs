@@ -11,7 +11,7 @@ use super::summary::Summary;
 use super::{FAULTED, NOT_LOADED, OnArgs, Shell};
 use crate::engine::{self, End, Engine, Outcome, RunOptions};
 use crate::fault::Fault;
-use crate::graph::{Plan, Request, plan};
+use crate::graph::{Compiled, Request, compile};
 use crate::record::{Chosen, Format, Points, Recorder, Wanted};
 
 /// Run a graph and print what came out
@@ -107,13 +107,13 @@ impl Job {
     /// Runs it and prints what came out; gives the exit code.
     #[must_use]
     pub fn run(&self, shell: &Shell) -> u8 {
-        match plan(shell.catalogue(), &self.request) {
+        match compile(shell.catalogue(), &self.request) {
             Ok(plan) => self.go(plan, shell),
             Err(report) => shell.complain(&report),
         }
     }
 
-    fn go(&self, plan: Plan, shell: &Shell) -> u8 {
+    fn go(&self, plan: Compiled, shell: &Shell) -> u8 {
         plan.warnings().iter().for_each(|report| shell.show(report));
         let is_real = self.realtime || plan.is_live();
         if self.listen && !is_real {

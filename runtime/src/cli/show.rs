@@ -10,7 +10,7 @@ use super::check::milliseconds;
 use super::describe::Format;
 use super::json::{Place, json, place};
 use super::{OnArgs, Shell};
-use crate::graph::{NOWHERE, Origin, OutlinedBlock, OutlinedWire, Plan, PlannedPort, Setting, plan};
+use crate::graph::{Compiled, NOWHERE, Origin, OutlinedBlock, OutlinedWire, PlannedPort, Setting, compile};
 use crate::node::Word;
 use crate::signal::Shape;
 use crate::source::{Item, Key, SourceMap, Value};
@@ -34,7 +34,7 @@ pub(super) struct Show {
 }
 
 pub(super) fn show(args: Show, shell: &Shell) -> u8 {
-    let plan = match plan(shell.catalogue(), &args.on.request(args.graph.clone())) {
+    let plan = match compile(shell.catalogue(), &args.on.request(args.graph.clone())) {
         Ok(plan) => plan,
         Err(report) => return shell.complain(&report),
     };
@@ -55,11 +55,11 @@ pub(super) fn show(args: Show, shell: &Shell) -> u8 {
 }
 
 /// Nodes in the order in which they step.
-fn stepped(plan: &Plan) -> impl Iterator<Item = &OutlinedBlock> {
+fn stepped(plan: &Compiled) -> impl Iterator<Item = &OutlinedBlock> {
     plan.order().filter_map(|name| plan.outline().nodes.iter().find(|node| node.name == name))
 }
 
-fn text(plan: &Plan, has_colour: bool) -> String {
+fn text(plan: &Compiled, has_colour: bool) -> String {
     let (outline, sources) = (plan.outline(), plan.sources());
     let mut page = Page { text: String::new(), has_colour };
     let word = |name: &str, word: &Word| Line::new(name, &word.text, at(sources, word.span.start));
@@ -317,7 +317,7 @@ struct ShownPort {
 }
 
 impl Shown {
-    fn of(plan: &Plan) -> Self {
+    fn of(plan: &Compiled) -> Self {
         let (outline, sources) = (plan.outline(), plan.sources());
         let wire = |wire: &OutlinedWire| ShownWire {
             name: wire.name.clone(),

@@ -8,7 +8,8 @@ use crate::graph::check::limits;
 use crate::graph::check::policy::unknown_roles;
 use crate::graph::check::shown::Shown;
 use crate::graph::check::unused::unused;
-use crate::graph::flat::FlatGraph;
+use crate::graph::compiled::Compiled;
+use crate::graph::load::FlatGraph;
 use crate::graph::load::{Loader, Request};
 use crate::graph::net::{CommandWire, Net};
 use crate::graph::plan::{Clock, Plan, PlannedCommand, PlannedNode, PlannedReport};
@@ -20,12 +21,12 @@ use crate::source::{Code, Diagnostic, Report, SourceMap};
 ///
 /// # Errors
 /// Every mistake of its files at once.
-pub fn plan(catalogue: &Catalogue, request: &Request) -> Result<Plan, Report> {
-    plan_in(Loader::new(catalogue.builtin_files()), catalogue, request)
+pub fn compile(catalogue: &Catalogue, request: &Request) -> Result<Compiled, Report> {
+    compile_in(Loader::new(catalogue.builtin_files()), catalogue, request)
 }
 
 /// The same, with what is read put behind what the loader has read already.
-pub(crate) fn plan_in(mut loader: Loader, catalogue: &Catalogue, request: &Request) -> Result<Plan, Report> {
+pub(crate) fn compile_in(mut loader: Loader, catalogue: &Catalogue, request: &Request) -> Result<Compiled, Report> {
     let flat = loader.load(request);
     let Loader { mut sources, diagnostics: mut found, .. } = loader;
     let has_unread =
@@ -66,25 +67,8 @@ pub(crate) fn plan_in(mut loader: Loader, catalogue: &Catalogue, request: &Reque
     let period = ((period * 1e9).round() as i64).max(1);
     let (exports, facts) = (net.exports_by_name(), opened.facts(&net));
     let (devices, commands) = (opened.devices, planned);
-    Ok(Plan {
-        roles,
-        devices,
-        nodes,
-        commands,
-        reports,
-        clock,
-        period,
-        max_gap,
-        reset_after,
-        sources,
-        warnings,
-        outline,
-        modes,
-        policy,
-        exports,
-        facts,
-        view,
-    })
+    let plan = Plan { roles, devices, nodes, commands, reports, clock, period, max_gap, reset_after, modes, policy };
+    Ok(Compiled { plan, view, sources, warnings, outline, exports, facts })
 }
 
 /// What the devices are told: commands, and reports.

@@ -9,26 +9,23 @@ mod bench;
 mod build;
 mod check;
 mod compile;
-mod facts;
-mod flat;
+mod compiled;
 mod load;
 mod net;
 mod outline;
 mod plan;
-mod port;
 mod syntax;
 
-pub use compile::plan;
-pub(crate) use compile::plan_in;
+pub use compile::compile;
+pub(crate) use compile::compile_in;
+pub use compiled::Compiled;
 pub use load::Request;
 pub(crate) use load::{Loader, other_file};
 pub use outline::{NOWHERE, Origin, Outline, OutlinedBlock, OutlinedMode, OutlinedRole, OutlinedWire, Setting};
-pub use plan::Plan;
+pub use plan::PlannedPort;
 pub(crate) use plan::{
     Clock, Condition, PlannedCommand, PlannedDevice, PlannedExit, PlannedModes, PlannedNode, PlannedReport,
-    PlannedRole, PlannedShow, PlannedView, PlannedWire, Test,
+    PlannedRole, PlannedShow, PlannedView, PlannedWire, PortRef, Producer, Test,
 };
-pub use port::PlannedPort;
-pub(crate) use port::{PortRef, Producer};
 pub use syntax::Policy;
 pub(crate) use syntax::{Age, PolicyTable, Sort, spanned};

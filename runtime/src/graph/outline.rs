@@ -5,7 +5,7 @@ use std::ops::Range;
 use std::path::Path;
 
 use crate::graph::bench::Opened;
-use crate::graph::facts::fill_facts;
+use crate::graph::bench::fill_facts;
 use crate::graph::net::{Net, Origin as WireOrigin, Wire};
 use crate::graph::syntax::{Block, GraphTable, ModeBlock, Policy, PolicyTable};
 use crate::node::{FilePath, Param, ParamSpec, Repeats, Word};

@@ -8,7 +8,7 @@ use crate::catalogue::Catalogue;
 use crate::device::{Commands, Description, DeviceError, DeviceType, Driver, Filled, Opened, Samples, Stepped};
 use crate::engine::Engine;
 use crate::fault::Fault;
-use crate::graph::{Request, plan};
+use crate::graph::{Request, compile};
 use crate::node::{ParamSpec, PortId, Reader};
 use crate::signal::{Freshness, Shape, Signal};
 use crate::source::Report;
@@ -57,7 +57,7 @@ impl GraphRig {
             catalogue = catalogue.device_type(Box::new(ByHand { source, queue }));
         }
         let request = Request { bench_text: Some(bench), ..Request::text(graph) };
-        Ok(Self { engine: Engine::new(plan(&catalogue, &request)?), queues })
+        Ok(Self { engine: Engine::new(compile(&catalogue, &request)?), queues })
     }
 
     /// Feeds the next sample of a role's `port`-th output, taken at `ms`.

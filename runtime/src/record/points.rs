@@ -9,7 +9,7 @@ use ply_rs_bw::writer::Writer;
 
 use super::Columns;
 use crate::engine::Engine;
-use crate::graph::{Plan, PlannedPort};
+use crate::graph::{Compiled, PlannedPort};
 use crate::node::PortId;
 use crate::signal::{Freshness, Kind, Pose, Signal};
 use crate::source::closest;
@@ -51,7 +51,7 @@ impl Wanted {
     ///
     /// # Errors
     /// Which of them is not there, or of a kind that cannot be written.
-    pub fn choose(&self, plan: &Plan) -> Result<Chosen, String> {
+    pub fn choose(&self, plan: &Compiled) -> Result<Chosen, String> {
         let Some((first, rest)) = self.ports.split_first() else {
             let mut poses = plan.reported().filter(|port| port.shape.kind() == Kind::Pose);
             let found = poses.next().filter(|_| poses.next().is_none()).cloned();
@@ -74,7 +74,7 @@ impl Wanted {
     }
 }
 
-fn look_up(plan: &Plan, word: &str) -> Result<PlannedPort, String> {
+fn look_up(plan: &Compiled, word: &str) -> Result<PlannedPort, String> {
     plan.port(word).cloned().ok_or_else(|| {
         let names = plan.exports().iter().map(|(export, _)| export.as_str());
         let names = names.chain(plan.ports().map(|port| port.name.as_str()));

@@ -4,9 +4,9 @@ use std::path::Path;
 
 use super::document::{CheckBlock, CheckTable, Document, PaperTable, ScenarioTable};
 use super::judge::{Bound, Figure, Row};
-use super::{Check, Scenario, row};
+use super::model::{Check, Scenario, row};
 use crate::catalogue::Catalogue;
-use crate::graph::{Plan, Request};
+use crate::graph::{Compiled, Request};
 use crate::node::Word;
 use crate::record::{Column, Columns};
 use crate::signal::Kind;
@@ -21,7 +21,7 @@ pub(super) fn look_up(
     path: &Path,
     document: &Document,
     request: Request,
-    plan: &Plan,
+    plan: &Compiled,
     catalogue: &Catalogue,
     found: Vec<Diagnostic>,
 ) -> Result<Scenario, Report> {
@@ -70,7 +70,7 @@ fn rows_of(table: &ScenarioTable) -> impl Iterator<Item = Row> {
 }
 
 struct Lookup<'a> {
-    plan: &'a Plan,
+    plan: &'a Compiled,
     found: Vec<Diagnostic>,
 }
 

@@ -2,12 +2,12 @@
 
 use std::path::Path;
 
-use super::judge::Figure;
+use super::judge::{Figure, Row};
 use super::measure::{self, Reading, since};
-use super::{Check, Scenario};
+use super::model::{Check, Scenario};
 use crate::catalogue::Catalogue;
 use crate::engine::{End, Engine, run_virtual};
-use crate::graph::{Request, plan};
+use crate::graph::{Request, compile};
 use crate::node::PortId;
 use crate::record::{Columns, Format, Recorder};
 use crate::signal::{Features, Freshness, Shape, Signal};
@@ -29,6 +29,16 @@ pub struct Trial {
 }
 
 impl Scenario {
+    /// Every figure over all runs, in the order of the file.
+    #[must_use]
+    pub fn rows(&self, trials: &[Trial]) -> Vec<Row> {
+        let mut rows = self.rows.clone();
+        for (i, row) in rows.iter_mut().enumerate() {
+            row.values = trials.iter().map(|trial| trial.figures[i]).collect();
+        }
+        rows
+    }
+
     /// Runs it with one seed, and records each tick in a file if there is one. None if it was interrupted.
     #[must_use]
     pub fn run(
@@ -41,7 +51,7 @@ impl Scenario {
         let failed = |time: f64, why: String| {
             Some(Trial { seed, time, failure: Some(why), figures: vec![None; self.rows.len()] })
         };
-        let mut engine = match plan(catalogue, &self.seeded(seed)) {
+        let mut engine = match compile(catalogue, &self.seeded(seed)) {
             Ok(plan) => Engine::new(plan),
             Err(report) => {
                 let first = report.diagnostics.first().map(|first| first.message.clone());

@@ -167,7 +167,7 @@ motor = \"m\"
 type = \"still_motor\"
 ";
     assert_eq!(example(&world(), "still_motor").as_deref(), Ok(expected));
-    assert!(plan(&world(), &Request::text(expected)).is_ok_and(|plan| plan.warnings().is_none()));
+    assert!(compile(&world(), &Request::text(expected)).is_ok_and(|plan| plan.warnings().is_none()));
 }
 
 #[test]
@@ -175,7 +175,7 @@ fn a_node_that_nobody_reads_is_put_into_the_wire_it_reads() {
     let text = example(&world(), "bound").unwrap();
     assert!(text.contains("motor.velocity = \"bound.velocity\""), "{text}");
     assert!(text.contains("# ==== bound ====\n[nodes.bound]\ntype = \"bound\"\nin.velocity = \"follow.velocity\""));
-    assert!(plan(&world(), &Request::text(text)).is_ok_and(|plan| plan.warnings().is_none()));
+    assert!(compile(&world(), &Request::text(text)).is_ok_and(|plan| plan.warnings().is_none()));
     let other = example(&world(), "follow").unwrap();
     assert!(other.contains("motor.velocity = \"follow.velocity\"") && !other.contains("bound"), "{other}");
 }

@@ -10,7 +10,7 @@ use super::trouble::WatchedWire;
 use crate::device::{Commands, Driver, Samples};
 use crate::engine::core::{Aged, CommandSlot, Core, DeviceSlot, Inlet, Link, Modes, NodeRunner, ReportSlot, Timing};
 use crate::graph::{
-    Age, Plan, PlannedCommand, PlannedDevice, PlannedNode, PlannedPort, PlannedReport, PlannedShow, PlannedView,
+    Age, Compiled, PlannedCommand, PlannedDevice, PlannedNode, PlannedPort, PlannedReport, PlannedShow, PlannedView,
     PlannedWire, Policy, PortRef, Producer,
 };
 use crate::node::{Bus, PortId, Tick};
@@ -23,7 +23,8 @@ type Ids = BTreeMap<PortRef, PortId>;
 impl Engine {
     /// Allocates everything that the plan needs; nothing allocates in a tick.
     #[must_use]
-    pub fn new(plan: Plan) -> Self {
+    pub fn new(compiled: Compiled) -> Self {
+        let Compiled { plan, view: shown, sources, .. } = compiled;
         let (mut bus, mut ids, mut ports, mut inlets) = (Bus::default(), Ids::new(), Vec::new(), Vec::new());
         let mut add = |source: PortRef, planned: &PlannedPort| {
             let id = bus.add(&planned.shape);
@@ -43,10 +44,10 @@ impl Engine {
             }
         }
         let logged = plan.nodes.iter().filter(|node| node.is_logged).map(|node| logged(node, &ids, &ports)).collect();
-        let place = |device: usize| plan.sources.locate(plan.devices[device].span.start);
+        let place = |device: usize| sources.locate(plan.devices[device].span.start);
         let roles = plan.roles.iter().map(|role| (role.name.clone(), place(role.device))).collect();
-        let names = plan.nodes.iter().map(|node| (node.name.clone(), plan.sources.locate(node.span.start))).collect();
-        let view = view(plan.view, &ids, &ports);
+        let names = plan.nodes.iter().map(|node| (node.name.clone(), sources.locate(node.span.start))).collect();
+        let view = view(shown, &ids, &ports);
         let limits = limits(&plan.nodes, &ports);
         let mut watched = watched_ends(&plan.commands, &plan.reports, &ids);
         let slot = |command: PlannedCommand| CommandSlot::new(ids[&command.source], command);
@@ -58,8 +59,7 @@ impl Engine {
             planned.map(|planned| &planned.shape)
         };
         let devices = plan.devices.into_iter().enumerate();
-        let devices =
-            devices.map(|(i, device)| device_slot(device, |report| shape((i, report)), &plan.sources)).collect();
+        let devices = devices.map(|(i, device)| device_slot(device, |report| shape((i, report)), &sources)).collect();
         let runners = plan.nodes.into_iter().map(|node| runner(node, &ids, &mut bus, &mut watched));
         let runners: Vec<NodeRunner> = runners.collect();
         let (max_gap, reset_after) = (plan.max_gap, plan.reset_after);
@@ -92,7 +92,7 @@ impl Engine {
             sent: None,
             late: 0,
             lateness: None,
-            sources: plan.sources,
+            sources,
         }
     }
 }

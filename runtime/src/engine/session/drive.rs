@@ -60,7 +60,7 @@ pub(crate) fn hopeless(engine: &Engine, may_hear: bool, is_endless: bool) -> Opt
 /// word is heard and no thread is started, so that many can run side by side. Then the commands ramp to zero.
 ///
 /// # Panics
-/// If a device runs in real time: [`Plan::is_live`](crate::graph::Plan::is_live) tells.
+/// If a device runs in real time: [`Compiled::is_live`](crate::graph::Compiled::is_live) tells.
 pub fn run_virtual(
     engine: &mut Engine,
     duration: f64,

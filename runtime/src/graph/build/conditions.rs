@@ -5,7 +5,7 @@ use std::ops::Range;
 
 use crate::graph::net::Net;
 use crate::graph::plan::{Condition, PlannedExit, Test, Watched};
-use crate::graph::port::{PlannedPort, PortRef};
+use crate::graph::plan::{PlannedPort, PortRef};
 use crate::graph::syntax::{Exit, Is, ModeBlock, Sort};
 use crate::node::Word;
 use crate::signal::{Kind, Shape};

@@ -2,7 +2,7 @@
 //! read by nobody, and what a controller would gather for it would be gathered in vain.
 
 use crate::graph::net::{Net, Wire};
-use crate::graph::port::Producer;
+use crate::graph::plan::Producer;
 use crate::node::{AnyNode, Components, Need};
 
 /// Of each node what of its outputs is read, given the nodes as they are set. Of one that no wire reads all is: somebody

@@ -2,13 +2,13 @@
 
 use std::collections::BTreeMap;
 
+use crate::graph::bench::fill_facts;
 use crate::graph::bench::{BoundRole, Opened, place};
 use crate::graph::check::frames::Frames;
 use crate::graph::check::units::{Clash, Units};
-use crate::graph::facts::fill_facts;
 use crate::graph::net::{CommandWire, Net, Origin};
 use crate::graph::plan::{PlannedCommand, PlannedNode, PlannedReport, PlannedRole, PlannedWire};
-use crate::graph::port::{PlannedPort, PortRef, Producer};
+use crate::graph::plan::{PlannedPort, PortRef, Producer};
 use crate::graph::syntax::{Age, Policy, PolicyTable};
 use crate::node::{Built, Configured, Given, Need, NodeSpec, PortSpec, Reader, frame_args};
 use crate::signal::{FlagShape, Kind, Shape};

@@ -2,9 +2,9 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use crate::graph::flat::FlatNode;
+use crate::graph::load::FlatNode;
 use crate::graph::net::{Net, Origin, Wire};
-use crate::graph::port::{PortRef, Producer};
+use crate::graph::plan::{PortRef, Producer};
 use crate::node::{NodeSpec, PortSpec, frame_args};
 use crate::signal::Kind;
 use crate::source::{Code, Diagnostic};

@@ -7,9 +7,9 @@ use std::collections::BTreeSet;
 use std::ops::Range;
 
 use crate::graph::check::frames::Frames;
-use crate::graph::flat::FlatGraph;
+use crate::graph::load::FlatGraph;
 use crate::graph::net::{CommandWire, Net};
-use crate::graph::port::{PortRef, Producer};
+use crate::graph::plan::{PortRef, Producer};
 use crate::graph::syntax::LIMITS;
 use crate::node::{NodeSpec, ParamSpec, Word};
 use crate::signal::Kind;

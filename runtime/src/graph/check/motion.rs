@@ -6,8 +6,8 @@
 use std::collections::BTreeSet;
 
 use crate::graph::net::{Net, Wire};
+use crate::graph::plan::Producer;
 use crate::graph::plan::{Condition, PlannedExit, PlannedMode};
-use crate::graph::port::Producer;
 use crate::graph::syntax::{ModeBlock, Sort};
 use crate::node::Need;
 use crate::signal::Kind;

@@ -5,7 +5,7 @@ use std::ops::Range;
 
 use crate::graph::net::Net;
 use crate::graph::plan::{PlannedNode, PlannedShow, PlannedView};
-use crate::graph::port::{PlannedPort, PortRef, Producer};
+use crate::graph::plan::{PlannedPort, PortRef, Producer};
 use crate::node::Word;
 use crate::signal::{Kind, Unit};
 use crate::source::{Code, Diagnostic};

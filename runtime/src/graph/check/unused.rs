@@ -5,7 +5,7 @@
 //! it is the task's business.
 
 use crate::graph::net::Net;
-use crate::graph::port::{PortRef, Producer};
+use crate::graph::plan::{PortRef, Producer};
 use crate::node::{Need, may_fit};
 use crate::source::{Code, Diagnostic};
 

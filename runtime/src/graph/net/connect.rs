@@ -2,8 +2,8 @@
 
 use super::{CommandWire, Net, Origin, Wire};
 use crate::device::RoleType;
-use crate::graph::flat::Scope;
-use crate::graph::port::{PortRef, Producer};
+use crate::graph::load::Scope;
+use crate::graph::plan::{PortRef, Producer};
 use crate::node::{Need, NodeSpec, Word};
 use crate::signal::Kind;
 use crate::source::{Code, Diagnostic, Key, meant};

@@ -3,7 +3,7 @@
 use super::Net;
 use crate::catalogue::Catalogue;
 use crate::device::RoleType;
-use crate::graph::flat::FlatGraph;
+use crate::graph::load::FlatGraph;
 use crate::node::Word;
 use crate::source::{Code, Diagnostic, Key};
 

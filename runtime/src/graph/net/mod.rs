@@ -10,8 +10,8 @@ use std::collections::BTreeSet;
 
 use crate::catalogue::Catalogue;
 use crate::device::RoleType;
-use crate::graph::flat::FlatGraph;
-use crate::graph::port::{PortRef, Producer};
+use crate::graph::load::FlatGraph;
+use crate::graph::plan::{PortRef, Producer};
 use crate::node::{NodeSpec, PortSpec, Word};
 use crate::source::{Diagnostic, Key};
 

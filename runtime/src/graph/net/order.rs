@@ -1,7 +1,7 @@
 //! The order in which the nodes step, or the cycle that forbids one.
 
 use super::{Net, Wire};
-use crate::graph::port::Producer;
+use crate::graph::plan::Producer;
 use crate::node::Need;
 use crate::source::{Code, Diagnostic};
 

@@ -1,8 +1,8 @@
 //! Names of ports: from `node.port` in a scope to the port, and back.
 
 use super::Net;
-use crate::graph::flat::{Entity, Scope};
-use crate::graph::port::{PortRef, Producer};
+use crate::graph::load::{Entity, Scope};
+use crate::graph::plan::{PortRef, Producer};
 use crate::node::{PortSpec, Word};
 use crate::source::{Code, Diagnostic, closest};
 

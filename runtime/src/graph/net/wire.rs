@@ -1,6 +1,6 @@
 //! Wires that lead somewhere, and where each is written.
 
-use crate::graph::port::PortRef;
+use crate::graph::plan::PortRef;
 use crate::graph::syntax::Age;
 use crate::node::Word;
 use crate::source::{Code, Diagnostic, Key};

@@ -1,19 +1,19 @@
 //! What a check hands to the engine: everything looked up, built and in order.
 
 mod modes;
+mod port;
 mod view;
 
 use std::ops::Range;
 
 use crate::device::Driver;
-use crate::graph::outline::Outline;
-use crate::graph::port::{PlannedPort, PortRef, Producer};
 use crate::graph::syntax::{Age, Policy, PolicyTable};
 use crate::node::{AnyNode, Need};
 use crate::signal::Shape;
-use crate::source::{Diagnostic, Report, SourceMap};
 
 pub(crate) use modes::{Condition, PlannedExit, PlannedMode, PlannedModes, Test, Watched};
+pub use port::PlannedPort;
+pub(crate) use port::{PortRef, Producer};
 pub(crate) use view::{PlannedShow, PlannedView};
 
 /// A role and the device that fills it.
@@ -111,7 +111,7 @@ pub(crate) enum Clock {
 }
 
 /// A graph that is checked and built: it cannot fail to wire.
-pub struct Plan {
+pub(crate) struct Plan {
     pub(crate) roles: Vec<PlannedRole>,
     pub(crate) devices: Vec<PlannedDevice>,
     /// In the order in which they step.
@@ -125,98 +125,6 @@ pub struct Plan {
     pub(crate) max_gap: f64,
     /// How long something must be absent before the state behind it is reset [ns].
     pub(crate) reset_after: i64,
-    pub(crate) sources: SourceMap,
-    pub(crate) warnings: Vec<Diagnostic>,
-    pub(crate) outline: Outline,
     pub(crate) modes: Option<PlannedModes>,
     pub(crate) policy: PolicyTable,
-    pub(crate) exports: Vec<(String, String)>,
-    pub(crate) facts: Vec<(String, toml::Value)>,
-    /// What a run shows.
-    pub(crate) view: PlannedView,
-}
-
-impl Plan {
-    /// What may not be as it was meant, though the graph loads; none if there is nothing.
-    #[must_use]
-    pub fn warnings(&self) -> Option<Report> {
-        let report = || Report::new(self.sources.clone(), self.warnings.clone());
-        (!self.warnings.is_empty()).then(report)
-    }
-
-    /// Every port of the graph: those of the roles, then those of the nodes in the order in which they step.
-    pub fn ports(&self) -> impl Iterator<Item = &PlannedPort> {
-        let roles = self.roles.iter().flat_map(|role| &role.ports);
-        roles.chain(self.nodes.iter().flat_map(|node| &node.ports))
-    }
-
-    /// What the parts of the graph export, as its wires name it, and the port behind each.
-    #[must_use]
-    pub fn exports(&self) -> &[(String, String)] {
-        &self.exports
-    }
-
-    /// The port of that name, as the record names it or as the wires of the task do.
-    #[must_use]
-    pub fn port(&self, word: &str) -> Option<&PlannedPort> {
-        let export = self.exports.iter().find(|(export, _)| export == word);
-        let name = export.map_or(word, |(_, port)| port.as_str());
-        self.ports().find(|port| port.name == name)
-    }
-
-    /// The ports that the graph reports to its devices.
-    pub fn reported(&self) -> impl Iterator<Item = &PlannedPort> {
-        self.reports.iter().filter_map(|report| {
-            let ports = match report.source.producer {
-                Producer::Role(role) => &self.roles.get(role)?.ports,
-                Producer::Node(index) => &self.nodes.iter().find(|node| node.index == index)?.ports,
-            };
-            ports.get(report.source.port)
-        })
-    }
-
-    /// What the devices state of themselves: `role.fact`, and the value.
-    #[must_use]
-    pub fn facts(&self) -> &[(String, toml::Value)] {
-        &self.facts
-    }
-
-    /// The names of the modes, in the order of the file.
-    pub fn modes(&self) -> impl Iterator<Item = &str> {
-        self.modes.iter().flat_map(|modes| &modes.modes).map(|mode| mode.name.as_str())
-    }
-
-    /// The graph as it runs, with where each value comes from.
-    #[must_use]
-    pub const fn outline(&self) -> &Outline {
-        &self.outline
-    }
-
-    /// The outputs of a node.
-    pub fn outputs(&self, node: &str) -> impl Iterator<Item = &PlannedPort> {
-        self.nodes.iter().filter(move |planned| planned.name == node).flat_map(|planned| &planned.ports)
-    }
-
-    /// The names of the nodes in the order in which they step.
-    pub fn order(&self) -> impl Iterator<Item = &str> {
-        self.nodes.iter().map(|node| node.name.as_str())
-    }
-
-    /// Whether any device runs on its own, so that only real time will do.
-    #[must_use]
-    pub fn is_live(&self) -> bool {
-        self.devices.iter().any(|device| matches!(device.driver, Driver::Live(_)))
-    }
-
-    /// Nominal time between two ticks [s].
-    #[must_use]
-    pub fn period(&self) -> f64 {
-        self.period as f64 * 1e-9
-    }
-
-    /// The texts the graph was read from.
-    #[must_use]
-    pub const fn sources(&self) -> &SourceMap {
-        &self.sources
-    }
 }

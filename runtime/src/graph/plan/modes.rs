@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use crate::graph::port::PortRef;
+use super::port::PortRef;
 use crate::graph::syntax::Sort;
 
 /// The modes of a graph.

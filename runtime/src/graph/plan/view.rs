@@ -1,6 +1,6 @@
 //! What a run shows of its ports.
 
-use crate::graph::port::PortRef;
+use super::port::PortRef;
 
 /// What is shown of a run.
 #[derive(Debug, Clone, Default)]

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use crate::graph::bench::Opened;
+use super::open::Opened;
 use crate::graph::net::Net;
 use crate::graph::syntax::LIMITS;
 use crate::node::Word;

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
-use crate::graph::flat::{Entity, FlatGraph, FlatNode, Scope};
+use super::flat::{Entity, FlatGraph, FlatNode, Scope};
 use crate::graph::syntax::{Age, Bench, Document, PartBlock, Sections};
 use crate::source::{BuiltinFile, Code, Diagnostic, Item, Key, SourceMap, Table, Value, meant, parse_table};
 

@@ -1,0 +1,70 @@
+//! From a scenario file to a scenario that is checked with its task and its bench.
+
+use std::path::Path;
+
+use super::document::{Document, document};
+use super::lookup::look_up;
+use super::model::Scenario;
+use crate::catalogue::Catalogue;
+use crate::graph::{Loader, Request, compile_in, other_file, spanned};
+use crate::node::{FilePath, Reader};
+use crate::source::{Code, Diagnostic, Report, Table};
+
+impl Scenario {
+    /// Reads a scenario and checks it with its task and its bench.
+    ///
+    /// # Errors
+    /// Every mistake of all its files at once.
+    pub fn load(catalogue: &Catalogue, path: &Path) -> Result<Self, Report> {
+        let mut loader = Loader::new(catalogue.builtin_files());
+        let root = loader.read(path, None);
+        let mut found = std::mem::take(&mut loader.diagnostics);
+        let Some((root, place)) = root else { return Err(Report::new(loader.sources, found)) };
+        if root.get("scenario").is_none() {
+            let what = other_file(&root, "scenario");
+            let (code, message) = match what {
+                Some(what) => (Code::WrongFile, format!("this is {what}, not a scenario")),
+                None => (Code::MissingKey, "the scenario has no section [scenario]".to_owned()),
+            };
+            let help = "add [scenario] with `graph = \"task.toml\"`, `bench = \"bench.toml\"` and `for_s = 20.0`";
+            let help = what.is_none().then(|| help.to_owned());
+            found.push(Diagnostic::new(code, place, message).with_help(help));
+            return Err(Report::new(loader.sources, found));
+        }
+        let mut reader = Reader::new(&loader.sources);
+        let document = document(&root, &mut reader);
+        found.extend(reader.mistakes.into_iter().map(spanned));
+        let for_s = document.scenario.as_ref().map(|scenario| *scenario.for_s);
+        found.extend(document.checks.iter().flat_map(|check| check.mistakes(for_s)));
+        found.extend(nothing_asked(&root, &document));
+        let files = document.files(&loader.sources);
+        let unread: Vec<Diagnostic> = files.iter().filter_map(|file| Some(spanned(file.bytes().err()?))).collect();
+        let Some(request) = request(&files).filter(|_| unread.is_empty()) else {
+            found.extend(unread);
+            return Err(Report::new(loader.sources, found));
+        };
+        match compile_in(loader, catalogue, &request) {
+            Ok(plan) => look_up(path, &document, request, &plan, catalogue, found),
+            Err(report) => {
+                found.extend(report.diagnostics);
+                Err(Report::new(report.sources, found))
+            }
+        }
+    }
+}
+
+/// The task on its bench, if there is a task.
+fn request(files: &[FilePath]) -> Option<Request> {
+    let (graph, bench) = (files.first()?, files.get(1));
+    Some(Request { bench: bench.map(|bench| bench.path.clone()), ..Request::file(&graph.path) })
+}
+
+/// A scenario that asks nothing and tells nothing.
+fn nothing_asked(root: &Table, document: &Document) -> Option<Diagnostic> {
+    let (key, _) = root.entry("scenario")?;
+    let table = document.scenario.as_ref()?;
+    let asks = [&table.never_lost, &table.stays_in, &table.ends_in].iter().any(|word| word.is_some());
+    let is_idle = root.get("check").is_none() && !asks;
+    let help = "add a check: [check.force], of = \"touch.force\", settles_to = 1.0, within = 0.1";
+    is_idle.then(|| Diagnostic::new(Code::MissingKey, key.span.clone(), "the scenario checks nothing").help(help))
+}
