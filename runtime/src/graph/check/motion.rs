@@ -89,7 +89,7 @@ fn senses(net: &Net<'_>, producer: Producer) -> bool {
         || upstream.iter().any(|node| net.wires[*node].iter().any(|wire| is_sensor(wire.source.producer)))
 }
 
-/// Tells of motion that nothing ends: in a mode, or in a graph without modes.
+/// Reports motion that nothing ends: in a mode, or in a graph without modes.
 pub(crate) fn ungated(net: &Net<'_>, movers: &[usize], mode: Option<&ModeBlock>, found: &mut Vec<Diagnostic>) {
     if movers.is_empty() {
         return;
@@ -101,15 +101,25 @@ pub(crate) fn ungated(net: &Net<'_>, movers: &[usize], mode: Option<&ModeBlock>,
         let message = format!("in mode `{mode}` the arm is moved without a gate, and nothing ends it: by {names}");
         let bound = "add a bound, as `fail = { after_ms = 10000, after_travel_mm = 60 }`, or `on_lost` of a signal of \
                      the sensor";
-        let diagnostic = Diagnostic::new(Code::UngatedMotion, block.key.span.clone(), message);
+        let gate = movers.iter().find_map(|node| gate(net, *node)).map(|gate| format!(", or wire `{gate}` of {names}"));
         let cycle = "a `go` counts if it leads to a mode that stands still, or ends in one";
-        found.push(diagnostic.help(format!("{bound}, or wire `in.gate` of {names}; {cycle}")));
+        let diagnostic = Diagnostic::new(Code::UngatedMotion, block.key.span.clone(), message);
+        found.push(diagnostic.help(format!("{bound}{}; {cycle}", gate.unwrap_or_default())));
         return;
     }
     for node in movers {
         let (name, key) = (name(node), &net.flat.nodes[*node].block.key);
         let message = format!("{name} moves the arm without a gate, and nothing ends it");
-        let help = format!("wire `in.gate` of {name}, or let it move only in a mode that ends");
+        let gate = gate(net, *node).map(|gate| format!("wire `{gate}` of {name}, or ")).unwrap_or_default();
+        let help = format!("{gate}let it move only in a mode that ends");
         found.push(Diagnostic::new(Code::UngatedMotion, key.span.clone(), message).help(help));
     }
+}
+
+/// The input of a node that can gate it: a flag that nothing is wired to.
+fn gate(net: &Net<'_>, node: usize) -> Option<String> {
+    let inputs = net.spec(node)?.inputs.iter().enumerate();
+    let is_open = |input: usize| net.wires[node].iter().all(|wire| wire.input != input);
+    let mut flags = inputs.filter(|(input, port)| port.kind == Kind::Flag && is_open(*input));
+    flags.next().map(|(_, port)| format!("in.{}", port.name))
 }
