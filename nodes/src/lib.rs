@@ -37,6 +37,8 @@ pub mod calibration;
 pub mod devices;
 pub mod flow;
 pub mod limits;
+pub mod motion;
+pub mod random;
 pub mod recordings;
 pub mod roles;
 pub mod servo;

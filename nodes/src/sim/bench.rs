@@ -19,7 +19,6 @@ use super::foam::Foam;
 use super::imprint::Imprint;
 use super::joints::{Arm, Joint as SimJoint, pose3};
 use super::object::{Object, Thing};
-use super::random::Random;
 use super::readout::{Electronics, Readout};
 use super::world::{World, start};
 use crate::arm::chain::Chain;
@@ -27,6 +26,7 @@ use crate::arm::model::load;
 use crate::arm::mount::Mount;
 use crate::devices::arm_facts::{check_start, fact_of, facts};
 use crate::devices::{nanos, period_of};
+use crate::random::Random;
 use crate::roles::ground_truth;
 
 params! {

@@ -15,7 +15,6 @@ pub mod foam;
 pub mod imprint;
 pub mod joints;
 pub mod object;
-pub mod random;
 pub mod readout;
 pub mod shape;
 pub mod survey;

@@ -7,7 +7,7 @@
 use tactflow_runtime::node::{NonNegative, Positive, Ratio};
 use tactflow_runtime::params;
 
-use super::random::Random;
+use crate::random::Random;
 
 params! {
     Electronics:

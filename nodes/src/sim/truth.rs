@@ -5,7 +5,7 @@ use tactflow_runtime::signal::ImageShape;
 
 use super::contact::{Contact, Motion};
 use super::object::Object;
-use crate::servo::axial::wrap_axial;
+use crate::motion::axis::wrap_axial;
 
 /// The truth of a moment.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
