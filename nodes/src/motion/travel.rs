@@ -1,49 +1,51 @@
-//! The way that a sensor goes: for guidance that counts metres and not seconds.
+//! The distance that a sensor has moved, for guidance that counts metres and not seconds.
 
 use nalgebra::Vector3;
 use tactflow_runtime::node::Tick;
 use tactflow_runtime::signal::Pose;
 
-/// Adds up nothing by itself: tells each step of a sensor along the sensor's own axes.
+/// Measures the steps of a sensor along the sensor's own axes. It does not add them up.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Odometer {
     last: Option<Vector3<f64>>,
 }
 
 impl Odometer {
-    /// The step since the last pose along the sensor's x and y: R' (p - p_last), zero for the first [m].
+    /// Returns the step since the last pose along the sensor's x and y, R' (p - p_last) [m]; zero for the first pose and
+    /// for a step that is not finite.
     pub fn step(&mut self, pose: &Pose) -> [f64; 2] {
-        let place = pose.0.translation.vector;
-        let moved = self.last.replace(place).map_or_else(Vector3::zeros, |last| place - last);
+        let position = pose.0.translation.vector;
+        let moved = self.last.replace(position).map_or_else(Vector3::zeros, |last| position - last);
         let step = pose.0.rotation.inverse_transform_vector(&moved);
         if step.iter().all(|part| part.is_finite()) { [step.x, step.y] } else { [0.0; 2] }
     }
 }
 
-/// Notices that a way gets no longer: something stands in it, or a limit holds.
+/// Detects that a sensor no longer makes progress, because an obstacle or a limit stops it.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Stall {
-    /// How long the way was when it last grew [m].
+    /// Distance at the last progress [m].
     best: f64,
-    /// When that was [ns].
+    /// Time of the last progress [ns].
     since: Option<i64>,
 }
 
-/// A way stands still if for this long [ns] ...
-const PATIENCE: i64 = 2_000_000_000;
-/// ... it has not grown by this share of what the speed promises for that time.
-const SHARE: f64 = 0.2;
+/// Time within which a sensor must make progress [ns].
+const STALL_NS: i64 = 2_000_000_000;
+/// Progress that it must make in that time, as a fraction of the distance at full speed [1].
+const MIN_PROGRESS: f64 = 0.2;
 
 impl Stall {
-    /// Whether the `way` of a sensor that is told to go at `speed` stands still [m, m/s]. Time in which the runtime
-    /// holds all commands does not count.
-    pub fn is_stuck(&mut self, way: f64, speed: f64, tick: &Tick) -> bool {
+    /// Returns whether the `distance` [m] of a sensor that is commanded to move at `speed` [m/s] has stopped growing.
+    ///
+    /// Time in which the runtime holds all commands does not count.
+    pub fn is_stuck(&mut self, distance: f64, speed: f64, tick: &Tick) -> bool {
         let since = *self.since.get_or_insert(tick.now);
-        if tick.is_halted || way > self.best + SHARE * speed * PATIENCE as f64 * 1e-9 {
-            (self.best, self.since) = (way.max(self.best), Some(tick.now));
+        if tick.is_halted || distance > self.best + MIN_PROGRESS * speed * STALL_NS as f64 * 1e-9 {
+            (self.best, self.since) = (distance.max(self.best), Some(tick.now));
             return false;
         }
-        tick.now - since >= PATIENCE
+        tick.now - since >= STALL_NS
     }
 }
 
@@ -64,38 +66,38 @@ mod tests {
         let quarter = std::f64::consts::FRAC_PI_2;
         let cases = [
             (pose(0.5, 0.1, 0.0), [0.0, 0.0], "the first"),
-            (pose(0.52, 0.07, 0.0), [0.02, -0.03], "as the base"),
+            (pose(0.52, 0.07, 0.0), [0.02, -0.03], "along the axes of the base"),
             (pose(0.53, 0.07, quarter), [0.0, -0.01], "turned"),
-            (pose(0.53, 0.07, 0.0), [0.0, 0.0], "a turn is no way"),
+            (pose(0.53, 0.07, 0.0), [0.0, 0.0], "a rotation moves no distance"),
         ];
         for (pose, expected, what) in cases {
             let step = odometer.step(&pose);
             assert!(step.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-12), "{what}: {step:?}");
         }
         odometer.step(&pose(1e308, 0.0, 0.7));
-        assert_eq!(odometer.step(&pose(-1e308, 0.0, 0.7)), [0.0, 0.0], "what is out of all bounds is no step");
+        assert_eq!(odometer.step(&pose(-1e308, 0.0, 0.7)), [0.0, 0.0], "a step that is not finite counts as none");
     }
 
-    /// When a sensor that goes at a share of its speed is found to be stuck, within 10 s [s].
-    fn stuck_after(share: impl Fn(f64) -> f64, is_halted: bool) -> Option<f64> {
-        let (mut stall, mut way) = (Stall::default(), 0.0);
+    /// Returns when a sensor that moves at a fraction of its speed is found to be stuck, within 10 s [s].
+    fn stuck_after(fraction: impl Fn(f64) -> f64, is_halted: bool) -> Option<f64> {
+        let (mut stall, mut distance) = (Stall::default(), 0.0);
         (0..2500).find_map(|i| {
             let time = f64::from(i) * 0.004;
-            way += share(time) * 0.01 * 0.004;
+            distance += fraction(time) * 0.01 * 0.004;
             let tick = Tick { now: i64::from(i) * 4_000_000, is_halted, ..Tick::first() };
-            stall.is_stuck(way, 0.01, &tick).then_some(time)
+            stall.is_stuck(distance, 0.01, &tick).then_some(time)
         })
     }
 
     #[test]
-    fn what_goes_slowly_is_not_stuck() {
+    fn a_slow_sensor_is_not_stuck() {
         assert_eq!(stuck_after(|_| 1.0, false), None);
         assert_eq!(stuck_after(|_| 0.25, false), None);
         assert_eq!(stuck_after(|_| 0.0, false), Some(2.0));
-        assert_eq!(stuck_after(|_| 0.0, true), None, "commands are held");
+        assert_eq!(stuck_after(|_| 0.0, true), None, "time with held commands does not count");
         let stops = stuck_after(|time| if time < 5.0 { 1.0 } else { 0.0 }, false).unwrap();
         assert!((6.6..7.01).contains(&stops), "{stops}");
-        let to_and_fro = stuck_after(|time| libm::sin(40.0 * time), false).unwrap();
-        assert!(to_and_fro < 2.5, "trembling is no way: {to_and_fro}");
+        let back_and_forth = stuck_after(|time| libm::sin(40.0 * time), false).unwrap();
+        assert!(back_and_forth < 2.5, "an oscillation is no progress: {back_and_forth}");
     }
 }
