@@ -17,9 +17,10 @@ use tactflow_runtime::signal::{Image, ImageShape, Joint, Joints, JointsShape, Ki
 use super::contact::Contact;
 use super::foam::Foam;
 use super::imprint::Imprint;
-use super::joints::{JointDynamics, SimArm, pose3};
+use super::joints::{JointDynamics, SimArm};
 use super::object::{Object, ObjectParams};
 use super::readout::{Electronics, Readout};
+use super::shape::pose3;
 use super::world::{World, start};
 use crate::arm::chain::Chain;
 use crate::arm::model::load;

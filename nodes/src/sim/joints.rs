@@ -11,10 +11,11 @@
 //! joint inertias, Coriolis forces, elasticity of the gears and delay of the bus.
 
 use nalgebra::Vector6;
-use parry3d_f64::math::{Pose3, Rot3, Vec3};
+use parry3d_f64::math::Vec3;
 use tactflow_runtime::signal::{Pose, Twist};
 
 use super::contact::{BodyMotion, Wrench};
+use super::shape::pose3;
 use crate::arm::chain::Chain;
 
 /// Dynamic properties of a joint.
@@ -123,12 +124,4 @@ impl SimArm {
         };
         (0..self.joints.len()).map(energy).sum()
     }
-}
-
-/// Converts a pose of the runtime to one of the geometry library.
-#[must_use]
-pub fn pose3(pose: &Pose) -> Pose3 {
-    let quaternion = nalgebra::UnitQuaternion::from_rotation_matrix(&pose.0.rotation);
-    let rotation = Rot3::from_xyzw(quaternion.i, quaternion.j, quaternion.k, quaternion.w);
-    Pose3::from_parts(Vec3::from(<[f64; 3]>::from(pose.0.translation.vector)), rotation)
 }

@@ -4,8 +4,10 @@ use parry3d_f64::math::{Pose3, Rot3, Vec3};
 use parry3d_f64::shape::{Ball, Cuboid};
 use tactflow_runtime::node::{NonNegative, Positive};
 use tactflow_runtime::params;
+use tactflow_runtime::signal::Pose;
 
-use super::shape::Geometry;
+use super::shape::{Geometry, pose3};
+use crate::arm::mount::pose_of;
 
 words! {
     /// Shape of an object.
@@ -112,7 +114,7 @@ impl Object {
             ));
         }
         let at = Vec3::from(params.at) + Vec3::new(offset[0], offset[1], 0.0);
-        let home = start * Pose3::from_parts(at, rotation_of(params.turn));
+        let home = start * Pose3::from_parts(at, pose3(&Pose(pose_of([0.0; 3], params.turn))).rotation);
         let step = |step: &ScriptedMove| ScriptStep {
             from: *step.from_s,
             to: *step.to_s,
@@ -188,13 +190,6 @@ impl Object {
 /// Returns a value that goes from 0 to 1 for t from 0 to 1 without a jump of its slope, and the slope.
 fn ease(t: f64) -> (f64, f64) {
     if (0.0..1.0).contains(&t) { (t * t * (3.0 - 2.0 * t), 6.0 * t * (1.0 - t)) } else { (f64::from(t >= 1.0), 0.0) }
-}
-
-/// Returns the rotation with these roll, pitch and yaw [rad].
-fn rotation_of(rpy: [f64; 3]) -> Rot3 {
-    let pose = crate::arm::mount::pose_of([0.0; 3], rpy);
-    let quaternion = nalgebra::UnitQuaternion::from_rotation_matrix(&pose.rotation);
-    Rot3::from_xyzw(quaternion.i, quaternion.j, quaternion.k, quaternion.w)
 }
 
 fn shape_of(params: &ObjectParams) -> Result<Geometry, String> {

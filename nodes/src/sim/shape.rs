@@ -3,9 +3,10 @@
 //! An ellipsoid is a unit ball in scaled space: a ray in unscaled space hits it after the same time, and normals scale
 //! inversely. A cable is a chain of capsules along a spline.
 
-use parry3d_f64::math::{Pose3, Vec3};
+use parry3d_f64::math::{Pose3, Rot3, Vec3};
 use parry3d_f64::query::{PointQuery, PointQueryWithLocation, Ray, RayCast};
 use parry3d_f64::shape::{Ball, Capsule, Compound, Cuboid, HalfSpace, Polyline, SharedShape, TriMesh};
+use tactflow_runtime::signal::Pose;
 
 /// The geometry of an object, in its own frame [m].
 pub enum Geometry {
@@ -196,6 +197,14 @@ fn smooth(points: &[[f64; 3]]) -> Vec<Vec3> {
         }
     }
     curve
+}
+
+/// Converts a pose of the runtime to one of the geometry library.
+#[must_use]
+pub fn pose3(pose: &Pose) -> Pose3 {
+    let quaternion = nalgebra::UnitQuaternion::from_rotation_matrix(&pose.0.rotation);
+    let rotation = Rot3::from_xyzw(quaternion.i, quaternion.j, quaternion.k, quaternion.w);
+    Pose3::from_parts(Vec3::from(<[f64; 3]>::from(pose.0.translation.vector)), rotation)
 }
 
 #[cfg(test)]

@@ -7,6 +7,7 @@ use super::contact::{BodyMotion, Contact};
 use super::imprint::Imprint;
 use super::joints::SimArm;
 use super::object::Object;
+use super::shape::pose3;
 use super::survey::{Measured, Survey, measure};
 use super::truth::Truth;
 
@@ -125,5 +126,5 @@ pub fn is_resolved(stiffness: f64, damping: f64, dt: f64) -> bool {
 /// Returns the pose of the sensor of an arm in the base.
 #[must_use]
 pub fn start(arm: &SimArm) -> Pose3 {
-    super::joints::pose3(&arm.pose)
+    pose3(&arm.pose)
 }
