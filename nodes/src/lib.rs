@@ -1,8 +1,9 @@
 //! The catalogue of tactflow: one node per file, the devices, and the roles they fill.
 //!
 //! [`touch`] turns a tactile image into features, [`servo`] turns features into a twist of the sensor, [`arm`] turns
-//! the twist into joint velocities, which [`limits`] keep within bounds; [`flow`] opens, chooses, delays, makes and shows signals of any sort; [`devices`]
-//! are the edge.
+//! the twist into joint velocities, which [`limits`] keep within bounds; [`motion`] is the maths that they share.
+//! [`flow`] gates, switches, delays, generates and shows signals of any kind. [`devices`] exchange samples and commands
+//! with the outside.
 //!
 //! A graph runs from Rust on sources that a test feeds, in virtual time:
 //!
@@ -37,6 +38,8 @@ pub mod calibration;
 pub mod devices;
 pub mod flow;
 pub mod limits;
+pub mod motion;
+pub mod random;
 pub mod recordings;
 pub mod roles;
 pub mod servo;

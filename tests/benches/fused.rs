@@ -8,9 +8,11 @@ use std::path::Path;
 
 use tactflow_nodes::arm::chain::Chain;
 use tactflow_nodes::arm::{damped, joint_limits, model, mount::Mount, null_space};
-use tactflow_nodes::limits::{acceleration_limit, bumpless, contact_limit, joint_limit, share::share, workspace_limit};
-use tactflow_nodes::servo::{adjoint::adjoint, axial::wrap_axial, integral::integrate};
-use tactflow_nodes::touch::{axis, binarize::binarize, label, moments, tactile_source::sum_and_peak};
+use tactflow_nodes::limits::{bumpless, contact_limit, joint_limit, workspace_limit};
+use tactflow_nodes::motion::axis::{half_angle, wrap_axial};
+use tactflow_nodes::motion::bounds::{approach_twist, scale_twist};
+use tactflow_nodes::servo::{adjoint::adjoint, integral::integrate};
+use tactflow_nodes::touch::{binarize::binarize, label, moments, tactile_source::sum_and_peak};
 use tactflow_runtime::node::{FilePath, Tick};
 use tactflow_runtime::signal::{Grid, Image, ImageShape, Joint, Mask, Pose, Regions, Signal, Twist};
 
@@ -172,7 +174,7 @@ impl Fused {
         let (dt, [last, offset]) = (tick.dt.min(tick.max_gap), &mut self.smooth);
         let half = [0.5 * 1.0 * dt, 0.5 * 10.0 * dt];
         let mut target = wanted.unwrap_or_default();
-        target.0 *= share(&target, 0.05, 0.8);
+        target.0 *= scale_twist(&target, 0.05, 0.8);
         let mut twist = bumpless::smooth(&target, last, offset, half);
         let is_there = wanted.is_some() || *offset != Twist::default();
         if is_there {
@@ -182,11 +184,11 @@ impl Fused {
             let (velocity, place) = (pose.0.rotation * twist.linear(), pose.0.translation.vector);
             let corners = [[-0.8, -0.4, 0.1], [-0.3, 0.4, 0.7]];
             twist.0 *= workspace_limit::share(&velocity, &place, corners, 1.0, 2.0 * tick.max_gap);
-            twist.0 *= share(&twist, 0.05, 0.8);
+            twist.0 *= scale_twist(&twist, 0.05, 0.8);
         } else {
             twist = Twist::default();
         }
-        acceleration_limit::approach(&mut self.reached, &twist, dt, 10.0 * dt);
+        approach_twist(&mut self.reached, &twist, dt, 10.0 * dt);
         (is_there || self.reached != Twist::default()).then_some(self.reached)
     }
 
@@ -222,9 +224,9 @@ impl Fused {
         let has_axis = ellipse.anisotropy() >= 0.1;
         let mut errors = [0.0 - x, 0.0 - y, 40.0 - pressure, 0.0];
         if has_axis {
-            let (sine, cosine) = libm::sincos(2.0 * axis(ellipse.sine, ellipse.cosine));
+            let (sine, cosine) = libm::sincos(2.0 * half_angle(ellipse.sine, ellipse.cosine));
             let [cosine, sine] = self.axes.mean([cosine, sine]);
-            errors[3] = wrap_axial(0.0 - axis(sine, cosine));
+            errors[3] = wrap_axial(0.0 - half_angle(sine, cosine));
         }
         let mut twist = Twist::default();
         for (i, (error, law)) in errors.into_iter().zip(&self.laws).enumerate().take(3 + usize::from(has_axis)) {

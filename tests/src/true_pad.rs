@@ -3,6 +3,7 @@
 //! From `from_s` on the contact lies at `at · exp(-(t - from_s) / tau_s)` on the x axis, so that what a scenario measures
 //! of it is known in closed form. The image has white noise of the seed, the truth has none.
 
+use tactflow_nodes::random::Random;
 use tactflow_runtime::device::{Commands, Description, Device, DeviceError, Driver, Filled, Opened, Samples, Stepped};
 use tactflow_runtime::node::{Mistakes, NonNegative, Positive};
 use tactflow_runtime::params;
@@ -31,7 +32,7 @@ params! {
 #[derive(Debug)]
 pub struct TruePad {
     params: Params,
-    random: u64,
+    random: Random,
     next: i64,
 }
 
@@ -65,7 +66,7 @@ impl Device for TruePad {
         ];
         let pad = Filled { role: "tactile_pad".into(), outputs: vec![image], commands: vec![], facts };
         let truth = Filled { role: "ground_truth".into(), outputs: truth.into(), commands: vec![], facts: vec![] };
-        let random = params.seed;
+        let random = Random::new(params.seed, 0);
         Ok(Opened {
             description: Description { fills: vec![pad, truth], period: PERIOD as f64 * 1e-9 },
             driver: Driver::Stepped(Box::new(Self { params, random, next: 0 })),
@@ -79,20 +80,6 @@ impl TruePad {
         let since = time - *self.params.from_s;
         let is_let_go = self.params.to_s.is_some_and(|to| time >= *to);
         (since >= 0.0 && !is_let_go).then(|| self.params.at * libm::exp(-since / *self.params.tau_s))
-    }
-
-    /// A number from 0 to 1 (splitmix64).
-    fn uniform(&mut self) -> f64 {
-        self.random = self.random.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.random;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
-    }
-
-    /// Twelve uniform numbers less six have a variance of one.
-    fn normal(&mut self) -> f64 {
-        (0..12).map(|_| self.uniform()).sum::<f64>() - 6.0
     }
 }
 
@@ -127,7 +114,8 @@ impl Stepped for TruePad {
         }
         let contact = self.contact(time);
         let image = contact.map_or_else(|| vec![0.0; SIDE * SIDE], clean);
-        let noisy: Vec<f32> = image.iter().map(|cell| cell + (*self.params.noise * self.normal()) as f32).collect();
+        let noisy: Vec<f32> =
+            image.iter().map(|cell| cell + (*self.params.noise * self.random.normal()) as f32).collect();
         samples.write::<Image>(0, stamp, sequence).cells_mut().copy_from_slice(&noisy);
         samples.write::<Image>(10, stamp, sequence).cells_mut().copy_from_slice(&image);
         *samples.write::<Scalar>(1, stamp, sequence) = if contact.is_some() { FORCE } else { 0.0 };

@@ -13,6 +13,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
+use tactflow_nodes::random::Random;
 use tactflow_runtime::graph::{Request, compile};
 use tactflow_tests::{catalogue, workspace};
 
@@ -47,24 +48,11 @@ const OPERATIONS: [Operation; 6] = [
     Operation::DuplicateLine,
 ];
 
-/// A generator of numbers (splitmix64), so that a seed means the same everywhere.
-struct Dice(u64);
-
-impl Dice {
-    fn below(&mut self, count: usize) -> usize {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((z ^ (z >> 31)) % count as u64) as usize
-    }
-}
-
 /// A text with one token mutated; none if that changes nothing.
-fn mutate(text: &str, tokens: &[Token], operation: Operation, dice: &mut Dice) -> Option<String> {
-    let token = &tokens[dice.below(tokens.len())];
+fn mutate(text: &str, tokens: &[Token], operation: Operation, random: &mut Random) -> Option<String> {
+    let token = &tokens[random.below(tokens.len())];
     let mut chars: Vec<char> = text[token.span.clone()].chars().collect();
-    let at = dice.below(chars.len());
+    let at = random.below(chars.len());
     match operation {
         Operation::Delete => drop(chars.remove(at)),
         Operation::Double => chars.insert(at, chars[at]),
@@ -72,7 +60,7 @@ fn mutate(text: &str, tokens: &[Token], operation: Operation, dice: &mut Dice) -
             let next = (at + 1).min(chars.len() - 1);
             chars.swap(at, next);
         }
-        Operation::Replace => chars = text[tokens[dice.below(tokens.len())].span.clone()].chars().collect(),
+        Operation::Replace => chars = text[tokens[random.below(tokens.len())].span.clone()].chars().collect(),
         Operation::DeleteLine | Operation::DuplicateLine => {
             let start = text[..token.span.start].rfind('\n').map_or(0, |end| end + 1);
             let end = text[token.span.end..].find('\n').map_or(text.len(), |end| token.span.end + end + 1);
@@ -161,7 +149,7 @@ fn fate(copy: &Copy, name: &str, original: &Course, before: &str, after: &str) -
 fn mutants(name: &str, files: &[&str], seed: u64, counts: &mut BTreeMap<Fate, usize>) -> Vec<String> {
     let copy = Copy::new();
     let original = course(crate::course::loaded(&Request::file(copy.path(name))), TICKS);
-    let mut dice = Dice(seed);
+    let mut random = Random::new(seed, 0);
     let mut silent = Vec::new();
     let texts: Vec<(PathBuf, String, Vec<Token>)> = files
         .iter()
@@ -174,7 +162,7 @@ fn mutants(name: &str, files: &[&str], seed: u64, counts: &mut BTreeMap<Fate, us
     let total: usize = texts.iter().map(|(.., tokens)| tokens.len()).sum();
     for _ in 0..MUTANTS {
         // A file is as likely as it has tokens.
-        let mut at = dice.below(total);
+        let mut at = random.below(total);
         let (path, text, tokens) = texts
             .iter()
             .find(|(.., tokens)| {
@@ -184,8 +172,8 @@ fn mutants(name: &str, files: &[&str], seed: u64, counts: &mut BTreeMap<Fate, us
                 }
             })
             .unwrap();
-        let operation = OPERATIONS[dice.below(OPERATIONS.len())];
-        let Some(mutant) = mutate(text, tokens, operation, &mut dice) else { continue };
+        let operation = OPERATIONS[random.below(OPERATIONS.len())];
+        let Some(mutant) = mutate(text, tokens, operation, &mut random) else { continue };
         fs::write(path, &mutant).unwrap();
         let told =
             || format!("{name}, seed {seed}, {operation:?} in {}:\n{}", path.display(), difference(text, &mutant));

@@ -6,10 +6,11 @@ mod samples;
 
 use std::hint::black_box;
 
+use tactflow_nodes::random::Random;
 use tactflow_nodes::recordings::{FORMATS, Hints, Recording, Refusal, read};
 use tactflow_tests::workspace;
 
-use hostile::Random;
+use hostile::Hostile;
 use samples::{Sample, samples};
 
 /// What reading may take beside ten times the file: what is looked at first, decoded.
@@ -64,10 +65,10 @@ fn every_format_has_a_sample_and_reads_it() {
 #[test]
 fn a_thousand_hostile_files_of_each_format_are_sound_or_refused_for_a_reason() {
     for Sample { name, bytes, unpacked, hints, .. } in samples(3) {
-        let mut random = Random(2026);
+        let mut hostile = Hostile(Random::new(2026, 0));
         let mut refused = 0;
         for _ in 0..1000 {
-            let bytes = random.hostile(&bytes);
+            let bytes = hostile.make(&bytes);
             refused += usize::from(check(&bytes, unpacked, name, &hints).is_some());
         }
         assert!((300..=1000).contains(&refused), "{name}: {refused} of 1000 were refused");

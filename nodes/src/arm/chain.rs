@@ -1,12 +1,12 @@
 //! A serial chain of joints: forward kinematics and the spatial Jacobian in one pass.
 //!
-//! T(q) = F_1 M_1(q_1) … F_n M_n(q_n) F_tip, with fixed transforms F and one joint's motion M each. Column i of the
-//! spatial Jacobian is the twist, at the base's origin, that unit speed of joint i gives: `[p x w; w]` for a revolute
-//! joint with axis w through p, `[w; 0]` for a prismatic one, both in the base's frame (Lynch and Park, *Modern
-//! Robotics*, section 5.1.1). It does not depend on what comes after the joint, so neither on the mount.
+//! T(q) = F_1 M_1(q_1) … F_n M_n(q_n) F_tip, with fixed transforms F and the motion M of each joint. Column i of the spatial
+//! Jacobian is the twist at the origin of the base for unit speed of joint i: `[p x w; w]` for a revolute joint with axis w
+//! through p, and `[w; 0]` for a prismatic joint, both in the frame of the base (Lynch and Park, *Modern Robotics*, section
+//! 5.1.1). It does not depend on the links after the joint, nor on the mount.
 //!
-//! Numerics: an axis that is not one of its frame's own is made its z by two turns folded into the fixed transforms, so
-//! a revolute joint turns two columns of a matrix and nothing else; fixed turns that are the identity are left out.
+//! Numerics: a joint axis that is not an axis of its frame is rotated onto z, and the rotation is folded into the fixed
+//! transforms. So a revolute joint changes two columns of a matrix only. Fixed rotations that are the identity are skipped.
 
 use nalgebra::{IsometryMatrix3, Matrix3, Rotation3, Translation3, Vector3};
 use tactflow_runtime::signal::{Joint, Pose, Twist};
@@ -15,38 +15,38 @@ use tactflow_runtime::signal::{Joint, Pose, Twist};
 #[derive(Debug, Clone)]
 pub struct Chain {
     joints: Vec<Joint>,
-    links: Box<[Link]>,
+    links: Box<[PreparedSegment]>,
     tip: IsometryMatrix3<f64>,
 }
 
-/// How a joint moves.
+/// The kind of a joint.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Motion {
-    /// Turns about its axis.
+pub enum JointKind {
+    /// The joint rotates about its axis.
     Revolute,
-    /// Slides along its axis.
+    /// The joint slides along its axis.
     Prismatic,
 }
 
-/// A joint with the fixed transform before it.
+/// A joint and the fixed transform before it.
 #[derive(Debug, Clone)]
-pub struct Segment {
-    /// From the frame after the last joint to this joint's.
+pub struct ChainSegment {
+    /// Transform from the frame after the previous joint to the frame of this joint.
     pub fixed: IsometryMatrix3<f64>,
-    /// Unit vector of the axis in the joint's frame.
+    /// Unit vector of the axis in the frame of the joint.
     pub axis: Vector3<f64>,
-    /// How it moves.
-    pub motion: Motion,
-    /// Its name and its limits.
+    /// Kind of the joint.
+    pub motion: JointKind,
+    /// Name and limits of the joint.
     pub joint: Joint,
 }
 
-/// A segment as the pass wants it.
+/// A segment in the form that [`Chain::forward`] needs.
 #[derive(Debug, Clone)]
-struct Link {
+struct PreparedSegment {
     offset: [f64; 3],
     turn: Option<[[f64; 3]; 3]>,
-    motion: Motion,
+    motion: JointKind,
     axis: Axis,
     sign: f64,
 }
@@ -61,9 +61,9 @@ enum Axis {
 type Columns = [[f64; 3]; 3];
 
 impl Chain {
-    /// A chain of these segments, with a fixed transform from the last joint to the sensor.
+    /// Returns the chain of these segments, with the fixed transform `tip` from the last joint to the sensor.
     #[must_use]
-    pub fn new(segments: Vec<Segment>, tip: IsometryMatrix3<f64>) -> Self {
+    pub fn new(segments: Vec<ChainSegment>, tip: IsometryMatrix3<f64>) -> Self {
         let mut folded = Rotation3::identity();
         let mut links = Vec::new();
         let mut joints = Vec::new();
@@ -73,52 +73,53 @@ impl Chain {
             let turn = folded.inverse() * segment.fixed.rotation * aligned;
             folded = aligned;
             let turn = (turn != Rotation3::identity()).then(|| (*turn.matrix()).into());
-            links.push(Link { offset: offset.into(), turn, motion: segment.motion, axis, sign });
+            links.push(PreparedSegment { offset: offset.into(), turn, motion: segment.motion, axis, sign });
             joints.push(segment.joint);
         }
         let back = IsometryMatrix3::from_parts(Translation3::identity(), folded.inverse());
         Self { joints, links: links.into(), tip: back * tip }
     }
 
-    /// The joints from the base to the tip.
+    /// Returns the joints from the base to the tip.
     #[must_use]
     pub fn joints(&self) -> &[Joint] {
         &self.joints
     }
 
-    /// Pose of the sensor in the base, and the spatial Jacobian's columns, at joint positions `q` [rad, or m].
+    /// Returns the pose of the sensor in the base at joint positions `q` [rad; m for a prismatic joint], and writes the
+    /// columns of the spatial Jacobian.
     ///
     /// # Panics
-    /// If `q` or `columns` has not one entry a joint.
+    /// If `q` or `columns` does not have one entry per joint.
     pub fn forward(&self, q: &[f64], columns: &mut [Twist]) -> Pose {
-        assert_eq!((q.len(), columns.len()), (self.links.len(), self.links.len()), "one entry a joint");
+        assert_eq!((q.len(), columns.len()), (self.links.len(), self.links.len()), "one entry per joint");
         let mut turn: Columns = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
-        let mut place = [0.0; 3];
+        let mut position = [0.0; 3];
         for ((link, q), column) in self.links.iter().zip(q).zip(columns) {
-            place = plus(place, times(&turn, link.offset));
+            position = plus(position, times(&turn, link.offset));
             if let Some(fixed) = &link.turn {
                 turn = [times(&turn, fixed[0]), times(&turn, fixed[1]), times(&turn, fixed[2])];
             }
             let axis = scaled(turn[link.axis as usize], link.sign);
             match link.motion {
-                Motion::Revolute => {
-                    let v = cross(place, axis);
+                JointKind::Revolute => {
+                    let v = cross(position, axis);
                     column.0 = [v[0], v[1], v[2], axis[0], axis[1], axis[2]].into();
                     let (sin, cos) = libm::sincos(*q);
                     turn = turned(turn, link.axis, link.sign * sin, cos);
                 }
-                Motion::Prismatic => {
+                JointKind::Prismatic => {
                     column.0 = [axis[0], axis[1], axis[2], 0.0, 0.0, 0.0].into();
-                    place = plus(place, scaled(axis, *q));
+                    position = plus(position, scaled(axis, *q));
                 }
             }
         }
         let rotation = Rotation3::from_matrix_unchecked(Matrix3::from(turn));
-        Pose(IsometryMatrix3::from_parts(Translation3::from(place), rotation) * self.tip)
+        Pose(IsometryMatrix3::from_parts(Translation3::from(position), rotation) * self.tip)
     }
 }
 
-/// The axis of the frame that `axis` lies on, its sign and the identity; or z and a turn that takes z to `axis`.
+/// Returns the frame axis that `axis` lies on, its sign and the identity; or z, 1 and a rotation that takes z to `axis`.
 fn own_axis(axis: &Vector3<f64>) -> (Axis, f64, Rotation3<f64>) {
     let own = match [axis.x != 0.0, axis.y != 0.0, axis.z != 0.0] {
         [true, false, false] => Some((Axis::X, axis.x)),
@@ -129,7 +130,7 @@ fn own_axis(axis: &Vector3<f64>) -> (Axis, f64, Rotation3<f64>) {
     if let Some((own, along)) = own {
         return (own, along.signum(), Rotation3::identity());
     }
-    // The unit vector furthest from the axis gives the best conditioned right angle.
+    // The frame axis furthest from `axis` gives the best conditioned cross product.
     let away = if axis.x.abs() <= axis.y.abs().min(axis.z.abs()) {
         Vector3::x()
     } else if axis.y.abs() <= axis.z.abs() {
@@ -166,7 +167,7 @@ fn times(m: &Columns, v: [f64; 3]) -> [f64; 3] {
     out
 }
 
-/// `m` followed by a turn about one of its own axes.
+/// Returns `m` rotated about one of its own axes.
 #[inline]
 fn turned([x, y, z]: Columns, axis: Axis, sin: f64, cos: f64) -> Columns {
     let mix = |a: [f64; 3], b: [f64; 3]| (plus(scaled(a, cos), scaled(b, sin)), plus(scaled(b, cos), scaled(a, -sin)));
@@ -193,21 +194,21 @@ mod tests {
 
     use super::*;
 
-    fn segment(xyz: [f64; 3], rpy: [f64; 3], axis: [f64; 3], motion: Motion) -> Segment {
+    fn segment(xyz: [f64; 3], rpy: [f64; 3], axis: [f64; 3], motion: JointKind) -> ChainSegment {
         let fixed = super::super::mount::pose_of(xyz, rpy);
-        Segment { fixed, axis: Vector3::from(axis).normalize(), motion, joint: Joint::default() }
+        ChainSegment { fixed, axis: Vector3::from(axis).normalize(), motion, joint: Joint::default() }
     }
 
-    /// T(q) by textbook products of nalgebra's transforms.
-    fn product(segments: &[Segment], tip: &IsometryMatrix3<f64>, q: &[f64]) -> IsometryMatrix3<f64> {
+    /// Returns T(q) as the product of the transforms of nalgebra.
+    fn product(segments: &[ChainSegment], tip: &IsometryMatrix3<f64>, q: &[f64]) -> IsometryMatrix3<f64> {
         let mut pose = IsometryMatrix3::identity();
         for (segment, q) in segments.iter().zip(q) {
             let moved = match segment.motion {
-                Motion::Revolute => {
+                JointKind::Revolute => {
                     let turn = Rotation3::from_axis_angle(&Unit::new_unchecked(segment.axis), *q);
                     IsometryMatrix3::from_parts(Translation3::identity(), turn)
                 }
-                Motion::Prismatic => {
+                JointKind::Prismatic => {
                     IsometryMatrix3::from_parts(Translation3::from(segment.axis * *q), Rotation3::identity())
                 }
             };
@@ -216,7 +217,7 @@ mod tests {
         pose * tip
     }
 
-    /// The spatial twist of (dT/dq_i) T^-1, by central differences.
+    /// Returns the spatial twist of (dT/dq_i) T^-1 by central differences.
     fn difference(chain: &Chain, q: &[f64], i: usize) -> Twist {
         const STEP: f64 = 1e-6;
         let mut columns = vec![Twist::default(); q.len()];
@@ -231,19 +232,19 @@ mod tests {
         Twist::new(linear, Vector3::new(twist[(2, 1)], twist[(0, 2)], twist[(1, 0)]))
     }
 
-    fn any_segment() -> impl Strategy<Value = Segment> {
+    fn any_segment() -> impl Strategy<Value = ChainSegment> {
         let three = || prop::array::uniform3(-1.0..1.0f64);
         let axes = vec![[1.0, 0.0, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, 0.0, -3.0]];
         let skew = three().prop_filter("an axis", |axis| Vector3::from(*axis).norm() > 0.1);
         let turn = prop_oneof![Just([0.0; 3]), three()];
-        let motion = prop_oneof![3 => Just(Motion::Revolute), 1 => Just(Motion::Prismatic)];
+        let motion = prop_oneof![3 => Just(JointKind::Revolute), 1 => Just(JointKind::Prismatic)];
         (three(), turn, prop_oneof![prop::sample::select(axes), skew], motion)
             .prop_map(|(xyz, rpy, axis, motion)| segment(xyz, rpy, axis, motion))
     }
 
     proptest! {
         #[test]
-        fn any_chain_agrees_with_the_textbook(
+        fn any_chain_agrees_with_the_product_of_transforms(
             segments in prop::collection::vec(any_segment(), 1..9),
             q in prop::array::uniform8(-3.0..3.0f64),
             tip in prop::array::uniform6(-1.0..1.0f64),
@@ -272,10 +273,10 @@ mod tests {
     }
 
     #[test]
-    #[should_panic(expected = "one entry a joint")]
-    fn too_few_positions_are_our_bug() {
+    #[should_panic(expected = "one entry per joint")]
+    fn too_few_positions_panic() {
         let chain =
-            Chain::new(vec![segment([0.0; 3], [0.0; 3], [1.0, 0.0, 0.0], Motion::Revolute)], Default::default());
+            Chain::new(vec![segment([0.0; 3], [0.0; 3], [1.0, 0.0, 0.0], JointKind::Revolute)], Default::default());
         chain.forward(&[], &mut [Twist::default()]);
     }
 }

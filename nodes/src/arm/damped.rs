@@ -1,20 +1,20 @@
-//! A damped inverse of a Jacobian that damps only what is near-singular, by one Cholesky factorisation of 6x6.
+//! A damped inverse of a Jacobian that damps only near-singular directions, by one 6x6 Cholesky factorisation.
 //!
-//! With A = J J^T and one length eps for the damping,
-//! x = J^T (A + eps² I) (A² + eps² A + eps⁴ I)^-1 t: each singular value s acts as
-//! s (s² + eps²) / (s⁴ + eps² s² + eps⁴). That is 1/s up to eps⁴/s⁴ far above eps (0.4 % at s = 0.2 and eps = 0.05,
-//! where plain damping s / (s² + eps²) costs 6 %), it falls to s/eps² at s = 0, and it is smooth in between: no
-//! threshold, no switch, no decomposition.
+//! With A = J J^T and a damping eps, x = J^T (A + eps² I) (A² + eps² A + eps⁴ I)^-1 t. Each singular value s is inverted to
+//! s (s² + eps²) / (s⁴ + eps² s² + eps⁴). Far above eps this is 1/s up to eps⁴/s⁴: at s = 0.2 and eps = 0.05 the error is
+//! 0.4 %, where plain damping s / (s² + eps²) costs 6 %. It falls to s/eps² near s = 0 and is smooth in between. It needs no
+//! threshold, no switch and no singular value decomposition.
 //!
-//! Numerics: the matrix that is factorised squares A, so its condition is that of J to the fourth power; eps⁴ below it
-//! keeps it positive definite to rounding as long as eps is not below [`LEAST`].
+//! Numerics: the factorised matrix squares A, so its condition number is that of J to the fourth power. The term eps⁴
+//! keeps it positive definite in double precision if eps is at least [`MIN_DAMPING`].
 
-/// Least damping that 64 bits carry.
-pub const LEAST: f64 = 1e-3;
+/// Smallest damping for which double precision is enough.
+pub const MIN_DAMPING: f64 = 1e-3;
 
 type Matrix = [[f64; 6]; 6];
 
-/// Writes the joint velocities whose twist is `twist`, damped by `damping`, for a Jacobian of those columns.
+/// Writes to `out` the joint velocities [rad/s] that produce `twist` [m/s, rad/s], damped by `damping`, for a Jacobian with
+/// these columns.
 pub fn solve(columns: &[[f64; 6]], twist: &[f64; 6], damping: f64, out: &mut [f64]) {
     let gram = gram(columns);
     let square = damping * damping;
@@ -40,7 +40,7 @@ pub fn solve(columns: &[[f64; 6]], twist: &[f64; 6], damping: f64, out: &mut [f6
     }
 }
 
-/// J J^T, a row at a time so that a row stays in registers.
+/// Returns J J^T, computed row by row so that a row stays in registers.
 #[inline]
 fn gram(columns: &[[f64; 6]]) -> Matrix {
     let mut gram = [[0.0; 6]; 6];
@@ -71,13 +71,14 @@ fn times(a: &Matrix, b: &Matrix) -> Matrix {
     out
 }
 
-/// Solves M x = b for a symmetric M whose pivots are known to be at least `least`, but for rounding: Cholesky without
-/// roots, M = L D L^T, as six roots cost more than the rest.
+/// Solves M x = b for a symmetric M whose pivots are at least `min_pivot` in exact arithmetic.
+///
+/// It uses M = L D L^T, without square roots: six of them would cost more than the rest.
 #[inline]
-fn cholesky_solve(mut m: Matrix, mut b: [f64; 6], least: f64) -> [f64; 6] {
+fn cholesky_solve(mut m: Matrix, mut b: [f64; 6], min_pivot: f64) -> [f64; 6] {
     let mut inverse = [0.0; 6];
     for k in 0..6 {
-        inverse[k] = 1.0 / m[k][k].max(least);
+        inverse[k] = 1.0 / m[k][k].max(min_pivot);
         let pivots = m[k];
         for i in k + 1..6 {
             let factor = pivots[i] * inverse[k];
@@ -108,8 +109,8 @@ mod tests {
 
     use super::*;
 
-    /// The closed form, singular value by singular value: with l = s² an eigenvalue of J^T J it is
-    /// (l + eps²) / (l² + eps² l + eps⁴) on J^T t. (nalgebra's own SVD is off by percents on some singular matrices.)
+    /// Returns the closed form: with l = s² an eigenvalue of J^T J, it applies (l + eps²) / (l² + eps² l + eps⁴) to J^T t.
+    /// (The SVD of nalgebra is off by percents on some singular matrices.)
     fn by_eigenvalues(columns: &[[f64; 6]], twist: &[f64; 6], damping: f64) -> DVector<f64> {
         let jacobian = DMatrix::from_fn(6, columns.len(), |i, j| columns[j][i]);
         let eigen = (jacobian.transpose() * &jacobian).symmetric_eigen();
@@ -119,7 +120,7 @@ mod tests {
         &eigen.eigenvectors * (eigen.eigenvectors.transpose() * pulled).component_mul(&gain)
     }
 
-    /// Columns of which some are sums of others, so that the Jacobian is exactly singular.
+    /// Columns of which some are the negative of others, so that the Jacobian is exactly singular.
     fn any_columns() -> impl Strategy<Value = Vec<[f64; 6]>> {
         let columns = prop::collection::vec(prop::array::uniform6(-1.0..1.0f64), 1..10);
         (columns, 0..4usize).prop_map(|(mut columns, repeats)| {
@@ -132,33 +133,33 @@ mod tests {
 
     proptest! {
         #[test]
-        fn it_is_the_closed_form_on_every_singular_value(
+        fn the_result_is_the_closed_form(
             columns in any_columns(), twist in prop::array::uniform6(-1.0..1.0f64), damping in 0.01..0.3f64,
         ) {
             let mut got = vec![0.0; columns.len()];
             solve(&columns, &twist, damping, &mut got);
             let wanted = by_eigenvalues(&columns, &twist, damping);
             let off = (DVector::from_vec(got) - &wanted).norm();
-            // What rounding costs at the condition of the matrix that is factorised: 1e-10 for an arm at the default.
+            // The rounding error at the condition number of the factorised matrix: 1e-10 for an arm at the default.
             let largest: f64 = columns.iter().flatten().map(|x| x * x).sum();
             let condition = 1.0 + (largest / (damping * damping)).powi(2);
             prop_assert!(off <= 4.0 * f64::EPSILON * condition * (1.0 + wanted.norm()), "off by {}", off);
         }
 
         #[test]
-        fn the_least_damping_is_still_bounded(
+        fn the_smallest_damping_is_still_bounded(
             columns in any_columns(), twist in prop::array::uniform6(-1.0..1.0f64),
         ) {
             let mut got = vec![0.0; columns.len()];
-            solve(&columns, &twist, LEAST, &mut got);
-            // 2/3 / eps is the maximum over s of the closed form, at s = eps; the rest is rounding.
-            let bound = 0.67 * Vector6::from(twist).norm() / LEAST;
+            solve(&columns, &twist, MIN_DAMPING, &mut got);
+            // The maximum of the closed form over s is 2/3 / eps, at s = eps; the rest is rounding.
+            let bound = 0.67 * Vector6::from(twist).norm() / MIN_DAMPING;
             prop_assert!(DVector::from_vec(got).norm() <= bound);
         }
     }
 
     #[test]
-    fn far_above_the_damping_it_costs_less_than_half_a_percent() {
+    fn far_above_the_damping_the_error_is_below_half_a_percent() {
         let columns: Vec<[f64; 6]> = (0..6).map(|i| std::array::from_fn(|j| if i == j { 0.2 } else { 0.0 })).collect();
         let mut got = [0.0; 6];
         solve(&columns, &[1.0; 6], 0.05, &mut got);
@@ -166,7 +167,7 @@ mod tests {
     }
 
     #[test]
-    fn nothing_comes_of_a_jacobian_of_zeros() {
+    fn a_zero_jacobian_gives_zero_velocities() {
         let mut got = [1.0; 7];
         solve(&[[0.0; 6]; 7], &[1.0; 6], 0.05, &mut got);
         assert_eq!(got, [0.0; 7]);

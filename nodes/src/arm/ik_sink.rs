@@ -155,8 +155,8 @@ fn check(params: &Params, joints: &JointsShape, columns: &JointsShape, period: f
         let message = format!("the Jacobian is of {:?}, but the joints are {:?}", names(columns), names(joints));
         mistakes.push(Mistake::input("jacobian", message).help("take both from one `arm_state`"));
     }
-    if *params.damping < damped::LEAST {
-        let message = format!("`damping` of less than {} drowns in rounding", damped::LEAST);
+    if *params.damping < damped::MIN_DAMPING {
+        let message = format!("`damping` of less than {} drowns in rounding", damped::MIN_DAMPING);
         mistakes.push(Mistake::param("damping", message));
     }
     let most = most_gain(period);

@@ -1,9 +1,9 @@
-//! A chain from a robot's model: the part of a URDF between its root link and a named tip link.
+//! Reads a kinematic chain from a robot model: the part of a URDF between its root link and a named tip link.
 //!
-//! Revolute, continuous and prismatic joints move; fixed ones are merged into their neighbours; anything else is
-//! refused. The base is the root link. A joint that the URDF does not bound (continuous, or an omitted limit of
-//! URDF 1.2) is bounded at ±[`UNBOUNDED`], so that no arithmetic on limits meets an infinity; a joint without a
-//! speed limit is refused, because a sink cannot limit it.
+//! Revolute, continuous and prismatic joints move. Fixed joints are merged into their neighbours. Other joints are errors.
+//! The base is the root link. A joint without position limits (continuous, or an omitted limit of URDF 1.2) gets the
+//! limits ±[`UNBOUNDED`], so that computations with limits stay finite. A joint without a speed limit is an error, because
+//! its velocity could not be limited.
 
 use std::collections::BTreeMap;
 
@@ -12,37 +12,37 @@ use tactflow_runtime::node::{FilePath, Mistake, Mistakes};
 use tactflow_runtime::signal::Joint;
 use urdf_rs::JointType;
 
-use super::chain::{Chain, Motion, Segment};
+use super::chain::{Chain, ChainSegment, JointKind};
 use super::mount::{Mount, pose_of};
 
-/// Position limit of a joint that has none [rad, or m].
+/// Position limit of a joint without one [rad; m for a prismatic joint].
 pub const UNBOUNDED: f64 = 1e9;
 
-/// What is wrong with a model.
+/// An error in a robot model.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Flaw {
-    /// What is wrong.
+pub struct ModelError {
+    /// Description of the error.
     pub message: String,
-    /// Where.
-    pub at: Place,
+    /// Place of the error.
+    pub at: ModelPlace,
 }
 
-/// The place of a flaw.
+/// The place of an error in a robot model.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub enum Place {
+pub enum ModelPlace {
     /// The model as a whole.
     Model,
     /// The joint or link of that name.
     Name(String),
-    /// The name of the tip, which is not the model's.
+    /// The name of the tip, which the graph gives and not the model.
     Tip,
 }
 
-/// Reads the chain from the root of a URDF file to the sensor on its link `tip`, for a node or a device with
+/// Reads the chain from the root of a URDF file to the sensor on its link `tip`, for a node or a device with the
 /// parameters `urdf`, `tip` and `mount`.
 ///
 /// # Errors
-/// What is wrong with the file, at its place, or with the tip.
+/// If the file cannot be read or is not a serial chain up to `tip`. The mistake marks the place in the file.
 pub fn load(urdf: &FilePath, tip: &str, mount: &Mount) -> Result<Chain, Mistakes> {
     let bytes = urdf.bytes()?;
     let text = str::from_utf8(&bytes).map_err(|error| {
@@ -50,23 +50,23 @@ pub fn load(urdf: &FilePath, tip: &str, mount: &Mount) -> Result<Chain, Mistakes
         let at = error.valid_up_to();
         Mistake::data(urdf, &*text, at..at + 3, "this is not UTF-8 text")
     })?;
-    chain_of(text, tip, mount).map_err(|flaw| {
-        let mistake = match flaw.at {
-            Place::Tip => Mistake::param("tip", flaw.message),
-            Place::Model => Mistake::data(urdf, text, 0..0, flaw.message),
-            Place::Name(name) => Mistake::data(urdf, text, find(text, &name), flaw.message),
+    chain_of(text, tip, mount).map_err(|error| {
+        let mistake = match error.at {
+            ModelPlace::Tip => Mistake::param("tip", error.message),
+            ModelPlace::Model => Mistake::data(urdf, text, 0..0, error.message),
+            ModelPlace::Name(name) => Mistake::data(urdf, text, find(text, &name), error.message),
         };
         mistake.into()
     })
 }
 
-/// The chain from the root of a URDF to the sensor on its link `tip`.
+/// Returns the chain from the root of a URDF text to the sensor on its link `tip`.
 ///
 /// # Errors
-/// What is wrong with the model or the tip.
-pub fn chain_of(text: &str, tip: &str, mount: &Mount) -> Result<Chain, Flaw> {
+/// If the text is not a URDF, or not a serial chain up to `tip`.
+pub fn chain_of(text: &str, tip: &str, mount: &Mount) -> Result<Chain, ModelError> {
     let robot = urdf_rs::read_from_string(text)
-        .map_err(|error| flaw(Place::Model, format!("not a URDF: {}", one_line(&error.to_string()))))?;
+        .map_err(|error| model_error(ModelPlace::Model, format!("not a URDF: {}", one_line(&error.to_string()))))?;
     let mut segments = Vec::new();
     let mut fixed = IsometryMatrix3::identity();
     for joint in path_to(&robot, tip)? {
@@ -75,41 +75,47 @@ pub fn chain_of(text: &str, tip: &str, mount: &Mount) -> Result<Chain, Flaw> {
             continue;
         }
         let segment = segment_of(joint, fixed)?;
-        if segments.iter().any(|other: &Segment| other.joint.name == joint.name) {
-            return Err(flaw(named(joint), format!("two joints are called `{}`", joint.name)));
+        if segments.iter().any(|other: &ChainSegment| other.joint.name == joint.name) {
+            return Err(model_error(named(joint), format!("two joints have the name `{}`", joint.name)));
         }
         segments.push(segment);
         fixed = IsometryMatrix3::identity();
     }
     if segments.is_empty() {
-        return Err(flaw(Place::Tip, format!("no joint moves between the root and `{tip}`")));
+        return Err(model_error(ModelPlace::Tip, format!("no joint moves between the root and `{tip}`")));
     }
     Ok(Chain::new(segments, fixed * mount.pose()))
 }
 
-/// The joints from the root to the link `tip`.
-fn path_to<'r>(robot: &'r urdf_rs::Robot, tip: &str) -> Result<Vec<&'r urdf_rs::Joint>, Flaw> {
+/// Returns the joints from the root to the link `tip`.
+fn path_to<'r>(robot: &'r urdf_rs::Robot, tip: &str) -> Result<Vec<&'r urdf_rs::Joint>, ModelError> {
     let is_link = |name: &str| robot.links.iter().any(|link| link.name == name);
     if !is_link(tip) {
         let links: Vec<String> = robot.links.iter().map(|link| format!("`{}`", link.name)).collect();
-        return Err(flaw(Place::Tip, format!("the model has no link `{tip}`; it has {}", links.join(", "))));
+        return Err(model_error(
+            ModelPlace::Tip,
+            format!("the model has no link `{tip}`; it has {}", links.join(", ")),
+        ));
     }
     let mut above = BTreeMap::new();
     for joint in &robot.joints {
         if let Some(link) = [&joint.parent.link, &joint.child.link].into_iter().find(|link| !is_link(link)) {
-            let message = format!("joint `{}` holds on to link `{link}`, which the model does not have", joint.name);
-            return Err(flaw(named(joint), message));
+            let message = format!("joint `{}` refers to link `{link}`, which the model does not have", joint.name);
+            return Err(model_error(named(joint), message));
         }
         if above.insert(joint.child.link.as_str(), joint).is_some() {
-            let message = format!("link `{}` hangs on two joints", joint.child.link);
-            return Err(flaw(Place::Name(joint.child.link.clone()), message));
+            let message = format!("link `{}` is the child of two joints", joint.child.link);
+            return Err(model_error(ModelPlace::Name(joint.child.link.clone()), message));
         }
     }
     let mut path = Vec::new();
     let mut link = tip;
     while let Some(joint) = above.get(link) {
         if path.len() == robot.joints.len() {
-            return Err(flaw(Place::Name(link.into()), format!("the joints above link `{tip}` run in a circle")));
+            return Err(model_error(
+                ModelPlace::Name(link.into()),
+                format!("the joints above link `{tip}` form a cycle"),
+            ));
         }
         path.push(*joint);
         link = &joint.parent.link;
@@ -118,21 +124,21 @@ fn path_to<'r>(robot: &'r urdf_rs::Robot, tip: &str) -> Result<Vec<&'r urdf_rs::
     Ok(path)
 }
 
-fn segment_of(joint: &urdf_rs::Joint, fixed: IsometryMatrix3<f64>) -> Result<Segment, Flaw> {
-    let bad = |what: &str| Err(flaw(named(joint), format!("joint `{}` {what}", joint.name)));
+fn segment_of(joint: &urdf_rs::Joint, fixed: IsometryMatrix3<f64>) -> Result<ChainSegment, ModelError> {
+    let bad = |what: &str| Err(model_error(named(joint), format!("joint `{}` {what}", joint.name)));
     let motion = match joint.joint_type {
-        JointType::Revolute | JointType::Continuous => Motion::Revolute,
-        JointType::Prismatic => Motion::Prismatic,
+        JointType::Revolute | JointType::Continuous => JointKind::Revolute,
+        JointType::Prismatic => JointKind::Prismatic,
         JointType::Floating => {
-            return bad("is floating, and a serial chain is made of revolute, continuous, prismatic and fixed joints");
+            return bad("is floating, but a serial chain has only revolute, continuous, prismatic and fixed joints");
         }
         JointType::Planar => {
-            return bad("is planar, and a serial chain is made of revolute, continuous, prismatic and fixed joints");
+            return bad("is planar, but a serial chain has only revolute, continuous, prismatic and fixed joints");
         }
-        _ => return bad("is of a type that a serial chain cannot have"),
+        _ => return bad("has a type that is not supported"),
     };
     if joint.mimic.is_some() {
-        return bad("mimics another joint, which a serial chain cannot");
+        return bad("mimics another joint, which is not supported");
     }
     let axis = Vector3::from(joint.axis.xyz.0);
     if !(axis.norm() > 1e-6 && axis.norm().is_finite()) {
@@ -150,30 +156,30 @@ fn segment_of(joint: &urdf_rs::Joint, fixed: IsometryMatrix3<f64>) -> Result<Seg
         return bad("has no speed limit: `<limit>` needs a `velocity` greater than 0");
     }
     let joint = Joint { name: joint.name.clone(), lower, upper, speed: limit.velocity, ..Joint::default() };
-    Ok(Segment { fixed, axis: axis.normalize(), motion, joint })
+    Ok(ChainSegment { fixed, axis: axis.normalize(), motion, joint })
 }
 
-fn origin_of(joint: &urdf_rs::Joint) -> Result<IsometryMatrix3<f64>, Flaw> {
+fn origin_of(joint: &urdf_rs::Joint) -> Result<IsometryMatrix3<f64>, ModelError> {
     let (xyz, rpy) = (joint.origin.xyz.0, joint.origin.rpy.0);
     if xyz.iter().chain(&rpy).any(|number| !number.is_finite()) {
-        return Err(flaw(named(joint), format!("the origin of joint `{}` is not finite", joint.name)));
+        return Err(model_error(named(joint), format!("the origin of joint `{}` is not finite", joint.name)));
     }
     Ok(pose_of(xyz, rpy))
 }
 
-fn flaw(at: Place, message: String) -> Flaw {
-    Flaw { message, at }
+fn model_error(at: ModelPlace, message: String) -> ModelError {
+    ModelError { message, at }
 }
 
-fn named(joint: &urdf_rs::Joint) -> Place {
-    Place::Name(joint.name.clone())
+fn named(joint: &urdf_rs::Joint) -> ModelPlace {
+    ModelPlace::Name(joint.name.clone())
 }
 
 fn one_line(text: &str) -> String {
     text.split_whitespace().collect::<Vec<_>>().join(" ")
 }
 
-/// Where `name` is declared in the text.
+/// Returns where `name` is declared in the text; an empty range at the start if it is not found.
 fn find(text: &str, name: &str) -> std::ops::Range<usize> {
     let declared = [format!("name=\"{name}\""), format!("name='{name}'")];
     let at = declared.iter().find_map(|declared| Some(text.find(declared)? + "name=\"".len()));
@@ -194,7 +200,7 @@ mod tests {
     }
 
     #[test]
-    fn the_lwr_stretched_out_is_as_tall_as_its_links() {
+    fn the_stretched_lwr_is_as_tall_as_the_sum_of_its_links() {
         let chain = load(&file(LWR), "lwr_7_link", &Mount::NONE).unwrap();
         let mut columns = [Twist::default(); 7];
         let place = chain.forward(&[0.0; 7], &mut columns).0.translation.vector;
@@ -221,7 +227,7 @@ mod tests {
     </robot>"#;
 
     #[test]
-    fn slides_and_fixed_joints_and_a_mount() {
+    fn prismatic_and_fixed_joints_and_a_mount() {
         let mount = Mount { xyz: [0.1, 0.0, 0.0], rpy: [0.0; 3] };
         let chain = chain_of(GANTRY, "hand", &mount).unwrap();
         let mut columns = [Twist::default(); 2];
@@ -235,80 +241,63 @@ mod tests {
     }
 
     #[test]
-    fn bad_models_say_what_is_wrong_and_where() {
+    fn every_bad_model_gives_its_message_and_place() {
+        let joint = |name: &str| ModelPlace::Name(name.into());
         let edits = [
-            ("<robot", "<bot", "hand", Place::Model, "not a URDF: "),
-            ("velocity=\"0.2\"", "", "hand", Place::Model, "not a URDF: "),
-            ("2 0 0", "2 0", "hand", Place::Model, "not a URDF: "),
+            ("<robot", "<bot", "hand", ModelPlace::Model, "not a URDF: "),
+            ("velocity=\"0.2\"", "", "hand", ModelPlace::Model, "not a URDF: "),
+            ("2 0 0", "2 0", "hand", ModelPlace::Model, "not a URDF: "),
             (
                 "",
                 "",
                 "claw",
-                Place::Tip,
+                ModelPlace::Tip,
                 "the model has no link `claw`; it has `root`, `post`, `sled`, `hand`, `spare`",
             ),
-            ("", "", "spare", Place::Tip, "no joint moves between the root and `spare`"),
-            ("", "", "post", Place::Tip, "no joint moves between the root and `post`"),
-            ("prismatic", "planar", "hand", Place::Name("slide".into()), "joint `slide` is planar"),
-            ("continuous", "floating", "hand", Place::Name("spin".into()), "joint `spin` is floating"),
-            ("2 0 0", "0 0 0", "hand", Place::Name("slide".into()), "joint `slide` has no axis"),
-            ("0.5", "0", "hand", Place::Name("slide".into()), "joint `slide` has no range"),
-            ("0.5", "nan", "hand", Place::Name("slide".into()), "joint `slide` has no range"),
-            ("0.2", "0", "hand", Place::Name("slide".into()), "joint `slide` has no speed limit"),
-            ("0.2", "inf", "hand", Place::Name("slide".into()), "joint `slide` has no speed limit"),
-            (
-                "<limit effort=\"1\" velocity=\"3\"/>",
-                "",
-                "hand",
-                Place::Name("spin".into()),
-                "joint `spin` has no speed limit",
-            ),
-            (
-                "0 0 1\" rpy",
-                "0 0 inf\" rpy",
-                "hand",
-                Place::Name("up".into()),
-                "the origin of joint `up` is not finite",
-            ),
+            ("", "", "spare", ModelPlace::Tip, "no joint moves between the root and `spare`"),
+            ("", "", "post", ModelPlace::Tip, "no joint moves between the root and `post`"),
+            ("prismatic", "planar", "hand", joint("slide"), "joint `slide` is planar"),
+            ("continuous", "floating", "hand", joint("spin"), "joint `spin` is floating"),
+            ("2 0 0", "0 0 0", "hand", joint("slide"), "joint `slide` has no axis"),
+            ("0.5", "0", "hand", joint("slide"), "joint `slide` has no range"),
+            ("0.5", "nan", "hand", joint("slide"), "joint `slide` has no range"),
+            ("0.2", "0", "hand", joint("slide"), "joint `slide` has no speed limit"),
+            ("0.2", "inf", "hand", joint("slide"), "joint `slide` has no speed limit"),
+            ("<limit effort=\"1\" velocity=\"3\"/>", "", "hand", joint("spin"), "joint `spin` has no speed limit"),
+            ("0 0 1\" rpy", "0 0 inf\" rpy", "hand", joint("up"), "the origin of joint `up` is not finite"),
             (
                 "link=\"post\"/><child link=\"sled\"",
                 "link=\"pole\"/><child link=\"sled\"",
                 "hand",
-                Place::Name("slide".into()),
-                "joint `slide` holds on to link `pole`",
+                joint("slide"),
+                "joint `slide` refers to link `pole`",
             ),
             (
                 "child link=\"post\"",
                 "child link=\"hand\"",
                 "hand",
-                Place::Name("hand".into()),
-                "link `hand` hangs on two joints",
+                joint("hand"),
+                "link `hand` is the child of two joints",
             ),
             (
                 "parent link=\"root\"",
                 "parent link=\"hand\"",
                 "hand",
-                Place::Name("hand".into()),
-                "the joints above link `hand` run in a circle",
+                joint("hand"),
+                "the joints above link `hand` form a cycle",
             ),
-            ("name=\"spin\"", "name=\"slide\"", "hand", Place::Name("slide".into()), "two joints are called `slide`"),
-            (
-                "<axis xyz=\"0 0 1\"/>",
-                "<mimic joint=\"slide\"/>",
-                "hand",
-                Place::Name("spin".into()),
-                "joint `spin` mimics",
-            ),
+            ("name=\"spin\"", "name=\"slide\"", "hand", joint("slide"), "two joints have the name `slide`"),
+            ("<axis xyz=\"0 0 1\"/>", "<mimic joint=\"slide\"/>", "hand", joint("spin"), "joint `spin` mimics"),
         ];
         for (from, to, tip, at, message) in edits {
             assert!(GANTRY.contains(from));
-            let flaw = chain_of(&GANTRY.replacen(from, to, 1), tip, &Mount::NONE).expect_err(message);
-            assert!(flaw.message.starts_with(message) && flaw.at == at, "{from} -> {to}: {flaw:?}");
+            let error = chain_of(&GANTRY.replacen(from, to, 1), tip, &Mount::NONE).expect_err(message);
+            assert!(error.message.starts_with(message) && error.at == at, "{from} -> {to}: {error:?}");
         }
     }
 
     #[test]
-    fn a_flaw_is_shown_where_the_joint_is_declared() {
+    fn an_error_marks_the_declaration_of_the_joint() {
         assert_eq!(&GANTRY[find(GANTRY, "slide")], "slide");
         let missing = load(&file("nowhere.urdf"), "hand", &Mount::NONE).unwrap_err();
         assert!(missing[0].at == At::Span(3..7) && missing[0].message.starts_with("cannot read `nowhere.urdf`"));

@@ -1,28 +1,28 @@
-//! Where the sensor sits on an arm's tip.
+//! The pose of the sensor on the tip of an arm.
 
 use nalgebra::{IsometryMatrix3, Matrix3, Rotation3, Translation3};
 use tactflow_runtime::params;
 
 params! {
     Mount:
-    /// Origin of the sensor's frame in the tip's [m].
+    /// Origin of the sensor's frame in the frame of the tip [m].
     xyz: [f64; 3] = [0.0; 3],
-    /// Roll, pitch and yaw of the sensor's frame in the tip's: Rz(yaw) Ry(pitch) Rx(roll), as in a URDF [rad].
+    /// Roll, pitch and yaw of the sensor's frame in the frame of the tip: Rz(yaw) Ry(pitch) Rx(roll), as in a URDF [rad].
     rpy: [f64; 3] = [0.0; 3],
 }
 
 impl Mount {
-    /// The sensor's frame is the tip's.
+    /// The sensor's frame is the frame of the tip.
     pub const NONE: Self = Self { xyz: [0.0; 3], rpy: [0.0; 3] };
 
-    /// Pose of the sensor in the tip's frame.
+    /// Returns the pose of the sensor in the frame of the tip.
     #[must_use]
     pub fn pose(&self) -> IsometryMatrix3<f64> {
         pose_of(self.xyz, self.rpy)
     }
 }
 
-/// A pose from its translation [m] and from roll, pitch and yaw [rad]: Rz(yaw) Ry(pitch) Rx(roll).
+/// Returns the pose with a translation [m] and with roll, pitch and yaw [rad]: Rz(yaw) Ry(pitch) Rx(roll).
 pub(crate) fn pose_of(xyz: [f64; 3], [roll, pitch, yaw]: [f64; 3]) -> IsometryMatrix3<f64> {
     let ((sr, cr), (sp, cp), (sy, cy)) = (libm::sincos(roll), libm::sincos(pitch), libm::sincos(yaw));
     #[rustfmt::skip]
@@ -43,7 +43,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn roll_pitch_yaw_are_turns_about_the_fixed_axes(roll in -3.2..3.2, pitch in -3.2..3.2, yaw in -3.2..3.2) {
+        fn roll_pitch_and_yaw_are_rotations_about_fixed_axes(roll in -3.2..3.2, pitch in -3.2..3.2, yaw in -3.2..3.2) {
             let turn = |axis, angle| Rotation3::from_axis_angle(&axis, angle);
             let wanted = turn(Vector3::z_axis(), yaw) * turn(Vector3::y_axis(), pitch) * turn(Vector3::x_axis(), roll);
             let got = pose_of([1.0, 2.0, 3.0], [roll, pitch, yaw]);

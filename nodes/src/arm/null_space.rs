@@ -1,16 +1,16 @@
-//! The exact null space of a 6xn Jacobian, n > 6: the joint motion that leaves the sensor still.
+//! The exact null space of a 6xn Jacobian, n > 6: joint motion that does not move the sensor.
 //!
-//! J^T = Q R by Householder reflections, so the last n - 6 columns of Q span directions with J Q_2 = 0, whatever the
-//! rank of J. The projector Q_2 Q_2^T is applied as reflections and never formed. A damped projector would leak
-//! posture into the task; this one does not, to rounding.
+//! J^T = Q R is computed by Householder reflections. The last n - 6 columns of Q, Q_2, satisfy J Q_2 = 0 for any rank of
+//! J. The projector Q_2 Q_2^T is applied as reflections and never formed. Unlike a damped projector, it moves the sensor
+//! only by rounding errors.
 
-/// Room for the work on one joint: the six entries of its row of J^T, its motion, and what makes it a whole number of
-/// vector lanes.
+/// Working memory for one joint: the six entries of its row of J^T, its motion, and padding to whole vector lanes.
 pub type Row = [f64; 8];
 
-/// Takes out of `motion` whatever moves the sensor. `rows` is room to work in, an entry a joint.
+/// Removes from `motion` [rad/s] the part that moves the sensor.
 ///
-/// With 6 joints or fewer nothing is left.
+/// `columns` are the columns of the Jacobian, and `rows` is working memory; both have one entry per joint. With 6 joints
+/// or fewer the result is zero.
 pub fn project(columns: &[[f64; 6]], rows: &mut [Row], motion: &mut [f64]) {
     if columns.len() <= 6 {
         motion.fill(0.0);
@@ -29,8 +29,8 @@ pub fn project(columns: &[[f64; 6]], rows: &mut [Row], motion: &mut [f64]) {
     }
 }
 
-/// Step `k` of the factorisation, on the rows from `k` on: reflects all columns after column `k`, leaves the reflector
-/// v in column `k` and gives its scale 2/(v^T v).
+/// Makes step `k` of the factorisation, on the rows from `k` on: reflects all columns after column `k` and stores the
+/// reflector v in column `k`. Returns its scale 2/(v^T v).
 #[inline]
 fn eliminate(rows: &mut [Row], k: usize) -> f64 {
     let mut along = [0.0; 8];
@@ -50,7 +50,7 @@ fn eliminate(rows: &mut [Row], k: usize) -> f64 {
     for j in 0..8 {
         along[j] = scale * (along[j] + added * first[j]);
     }
-    // The columns before hold their reflectors.
+    // The columns before `k` hold their own reflectors.
     along[..k].fill(0.0);
     rows[0][k] += added;
     for row in rows {
@@ -87,7 +87,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn it_leaves_the_sensor_still_and_is_the_projector(
+        fn the_projected_motion_does_not_move_the_sensor(
             columns in prop::collection::vec(prop::array::uniform6(-1.0..1.0f64), 7..10),
             motion in prop::array::uniform9(-1.0..1.0f64),
             is_singular in any::<bool>(),
@@ -113,7 +113,7 @@ mod tests {
     }
 
     #[test]
-    fn a_jacobian_of_zeros_and_an_arm_without_a_null_space() {
+    fn a_zero_jacobian_and_an_arm_without_a_null_space() {
         let still = projected(&[[0.0; 6]; 8], &[1.0; 8]);
         assert_eq!(still.as_slice(), [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 1.0]);
         assert_eq!(projected(&[[0.5; 6]; 6], &[1.0; 6]), DVector::zeros(6));

@@ -3,28 +3,13 @@
 use tactflow_runtime::signal::Unit;
 
 use super::log::Log;
+use crate::random::Random;
 
 /// The largest force on a tactel [N].
 pub(super) const MOST: f64 = 5.0;
 
 /// The largest reading of 12 bits.
 const TOP: f64 = 4095.0;
-
-/// Numbers that are the same in every run.
-pub(super) struct Random(u64);
-
-impl Random {
-    /// A number in [0, 1).
-    pub(super) fn uniform(&mut self) -> f64 {
-        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (self.0 >> 40) as f64 / 16_777_216.0
-    }
-
-    /// A number of the normal distribution: the sum of twelve uniform ones has its first three moments.
-    pub(super) fn normal(&mut self) -> f64 {
-        (0..12).map(|_| self.uniform()).sum::<f64>() - 6.0
-    }
-}
 
 /// One tactel as it really is: offset + a f / (f + b).
 #[derive(Debug, Clone, Copy)]
@@ -74,12 +59,12 @@ pub(super) struct Pad {
 impl Pad {
     /// A pad whose gains are spread by a quarter and whose offsets are 5 to 10 % of the range; some tactels are dead.
     pub(super) fn new(rows: usize, cols: usize, dead: &[usize], seed: u64) -> Self {
-        let mut random = Random(seed);
+        let mut random = Random::new(seed, 0);
         let truth = |i: usize| {
             // More would leave the 12 bits; that has a test of its own.
             let a = (3400.0 * libm::exp(0.25 * random.normal())).min(5400.0);
             let b = 3.0 * libm::exp(0.15 * random.normal());
-            let offset = TOP * (0.05 + 0.05 * random.uniform());
+            let offset = TOP * (0.05 + 0.05 * random.uniform(0.0, 1.0));
             Truth { offset, a, b, is_dead: dead.contains(&i) }
         };
         let truths = (0..rows * cols).map(truth).collect();

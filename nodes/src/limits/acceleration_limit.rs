@@ -8,7 +8,7 @@ use tactflow_runtime::node::{Limits, Mistakes, Node, Positive, Setup, Tick};
 use tactflow_runtime::signal::{ScalarShape, Stamp, Twist, Unit};
 use tactflow_runtime::{inputs, outputs, params, state};
 
-use super::share::{countable, share};
+use crate::motion::bounds::{approach_twist, countable};
 
 params! {
     /// Greatest change of the linear velocity [m/s²].
@@ -86,18 +86,10 @@ angular_rad_per_s2 = 10.0
         let wanted = inputs.twist.filter(|twist| is_fresh(twist.stamp()));
         let target = wanted.map_or_else(Twist::default, |twist| countable(&twist));
         let dt = tick.dt.min(tick.max_gap);
-        let share = approach(&mut state.reached, &target, self.linear * dt, self.angular * dt);
+        let share = approach_twist(&mut state.reached, &target, self.linear * dt, self.angular * dt);
         if wanted.is_some() || state.reached != Twist::default() {
             out.twist.set(state.reached);
             out.acceleration.set(share);
         }
     }
-}
-
-/// Moves `reached` toward `target` on a straight line, by at most so much [m/s, rad/s]; the share of the way that it went.
-pub fn approach(reached: &mut Twist, target: &Twist, linear: f64, angular: f64) -> f64 {
-    let change = Twist(target.0 - reached.0);
-    let share = share(&change, linear, angular);
-    *reached = if share < 1.0 { Twist(reached.0 + change.0 * share) } else { *target };
-    share
 }

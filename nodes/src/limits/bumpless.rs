@@ -10,7 +10,7 @@ use tactflow_runtime::node::{Limits, Mistakes, Node, Positive, Setup, Tick};
 use tactflow_runtime::signal::{ScalarShape, Twist, Unit};
 use tactflow_runtime::{inputs, outputs, params, state};
 
-use super::share::{countable, share, times};
+use crate::motion::bounds::{countable, scale_twist, twist_ratio};
 
 params! {
     /// Greatest change of the linear velocity [m/s²].
@@ -100,14 +100,15 @@ angular_rad_per_s2 = 10.0
         // What the runtime holds at zero starts from zero when it may go on.
         let twist = inputs.twist.filter(|_| !tick.is_halted);
         let mut wanted = twist.map_or_else(Twist::default, |twist| countable(&twist));
-        let pace = share(&wanted, self.speeds[0], self.speeds[1]);
+        let pace = scale_twist(&wanted, self.speeds[0], self.speeds[1]);
         wanted.0 *= pace;
         let smooth = smooth(&wanted, &mut state.last, &mut state.offset, [linear, angular]);
         if twist.is_none() && state.offset == Twist::default() {
             return;
         }
         out.twist.set(smooth);
-        let (own, left) = (times(&wanted, self.linear, self.angular), times(&state.offset, self.linear, self.angular));
+        let (own, left) =
+            (twist_ratio(&wanted, self.linear, self.angular), twist_ratio(&state.offset, self.linear, self.angular));
         out.bumpless.set(pace * if left > 0.0 { own / (own + left) } else { 1.0 });
     }
 }
@@ -116,10 +117,10 @@ angular_rad_per_s2 = 10.0
 /// rad/s] each.
 pub fn smooth(wanted: &Twist, last: &mut Twist, offset: &mut Twist, [linear, angular]: [f64; 2]) -> Twist {
     let change = Twist(wanted.0 - last.0);
-    let passes = share(&change, linear, angular);
+    let passes = scale_twist(&change, linear, angular);
     *last = *wanted;
     offset.0 -= change.0 * (1.0 - passes);
-    let fades = share(offset, linear, angular);
+    let fades = scale_twist(offset, linear, angular);
     if fades < 1.0 {
         offset.0 -= offset.0 * fades;
     } else {

@@ -12,7 +12,7 @@ use tactflow_runtime::node::{Limits, Mistake, Mistakes, Node, Positive, Ratio, S
 use tactflow_runtime::signal::{Image, ImageShape, ScalarShape, Stamp, Twist, Unit};
 use tactflow_runtime::{inputs, outputs, params, state};
 
-use super::share::countable;
+use crate::motion::bounds::countable;
 
 params! {
     /// Ceiling of the whole image's sum [unit of the image].

@@ -16,11 +16,13 @@
 //! range never leaves it, and the lead never grows past its bound by a command, while no tick takes longer than h.
 
 use tactflow_runtime::node::{At, Limits, Mistake, Mistakes, Node, Positive, Ratio, Setup, Tick};
+use tactflow_runtime::signal::line::{scale_to, step_toward};
 use tactflow_runtime::signal::{Joint, JointsShape, ScalarShape, Stamp, Unit};
 use tactflow_runtime::source::Code;
 use tactflow_runtime::{inputs, outputs, params, state};
 
-use crate::arm::joint_limits::share;
+use crate::motion::bounds::scale_into;
+use crate::motion::braking::stopping_speed;
 
 params! {
     /// Greatest acceleration of every joint; what the arm states holds where that is less [rad/s²; m/s² if prismatic].
@@ -194,9 +196,9 @@ impl State {
         let mut shares = [1.0; 4];
         self.target.fill(0.0);
         if let Some(wanted) = wanted {
-            shares[0] = share(wanted, rooms().map(|room| room.lead));
-            shares[1] = share(wanted, rooms().map(|room| room.position));
-            shares[2] = share(wanted, rooms().map(|room| room.speed));
+            shares[0] = scale_into(wanted, rooms().map(|room| room.lead));
+            shares[1] = scale_into(wanted, rooms().map(|room| room.position));
+            shares[2] = scale_into(wanted, rooms().map(|room| room.speed));
             let share = shares[0].min(shares[1]).min(shares[2]);
             for ((target, wanted), room) in self.target.iter_mut().zip(wanted).zip(&self.room) {
                 let (least, greatest) = room.all();
@@ -220,7 +222,8 @@ impl Room {
 /// What a joint may do that was last told to go with `last`, if no tick takes longer than `gap` [s].
 fn room(joint: &Joint, q: f64, equilibrium: f64, lead: f64, last: f64, gap: f64) -> Room {
     let both = |down: f64, up: f64| {
-        let toward = |distance: f64, last: f64| stopping(distance - last.max(0.0) * gap, joint.acceleration, 2.0 * gap);
+        let toward =
+            |distance: f64, last: f64| stopping_speed(distance - last.max(0.0) * gap, joint.acceleration, 2.0 * gap);
         (-toward(down, -last), toward(up, last))
     };
     let ahead = equilibrium - q;
@@ -231,29 +234,16 @@ fn room(joint: &Joint, q: f64, equilibrium: f64, lead: f64, last: f64, gap: f64)
     }
 }
 
-/// Greatest speed from which a joint stops within `distance`, when it goes on for `delay` [s] before it brakes.
-fn stopping(distance: f64, acceleration: f64, delay: f64) -> f64 {
-    if distance > 0.0 && distance.is_finite() {
-        // The root of v τ + v²/(2a) = d, in the form in which nothing cancels.
-        return 2.0 * distance / (delay + (delay * delay + 2.0 * distance / acceleration).sqrt());
-    }
-    // At an infinite distance any speed will do; at what is no number none.
-    if distance > 0.0 { f64::INFINITY } else { 0.0 }
-}
-
 /// Moves `last` toward `target`, on a straight line but for the joints that have to brake by themselves. Gives the
 /// share of the way that it went.
 fn follow(joints: &[Joint], dt: f64, target: &[f64], room: &[Room], last: &mut [f64]) -> f64 {
     let mut share = 1.0f64;
     for ((joint, target), last) in joints.iter().zip(target).zip(&*last) {
-        let (change, most) = ((target - last).abs(), joint.acceleration * dt);
-        if change > most {
-            share = share.min(most / change);
-        }
+        share = share.min(scale_to((target - last).abs(), joint.acceleration * dt));
     }
     for (((joint, target), room), last) in joints.iter().zip(target).zip(room).zip(last) {
         let most = joint.acceleration * dt;
-        let next = if share < 1.0 { *last + share * (target - *last) } else { *target };
+        let next = step_toward(*last, *target, share);
         let (least, greatest) = room.all();
         *last = next.clamp(least, greatest).clamp(*last - most, *last + most);
     }

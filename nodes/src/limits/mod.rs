@@ -5,7 +5,6 @@ pub mod acceleration_limit;
 pub mod bumpless;
 pub mod contact_limit;
 pub mod joint_limit;
-pub mod share;
 pub mod twist_limit;
 pub mod workspace_limit;
 

@@ -7,7 +7,7 @@ use tactflow_runtime::node::{Limits, Mistakes, Node, Positive, Setup, Tick};
 use tactflow_runtime::signal::{ScalarShape, Twist, Unit};
 use tactflow_runtime::{inputs, outputs, params};
 
-use super::share::share;
+use crate::motion::bounds::scale_twist;
 
 params! {
     /// Greatest speed of the sensor's origin [m/s].
@@ -62,7 +62,7 @@ angular_rad_per_s = 0.8
     fn state(&self) {}
 
     fn step(&self, _: &Tick, inputs: Inputs<'_>, out: &mut Outputs, (): &mut ()) {
-        let share = share(&inputs.twist, self.linear, self.angular);
+        let share = scale_twist(&inputs.twist, self.linear, self.angular);
         out.twist.set(Twist(inputs.twist.0 * share));
         out.speed.set(share);
     }

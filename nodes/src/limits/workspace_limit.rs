@@ -9,7 +9,8 @@ use tactflow_runtime::node::{Limits, Mistake, Mistakes, Node, Positive, Setup, T
 use tactflow_runtime::signal::{ScalarShape, Twist, Unit};
 use tactflow_runtime::{inputs, outputs, params};
 
-use super::share::countable;
+use crate::motion::bounds::{countable, scale_within};
+use crate::motion::braking::stopping_speed;
 
 params! {
     /// The corner of the box with the least coordinates, `[x, y, z]` in the base [m].
@@ -43,9 +44,6 @@ pub struct WorkspaceLimit {
     deceleration: f64,
     max_age: i64,
 }
-
-/// Share of the speed below which the way toward a face does not count: rounding alone would freeze a motion along it.
-const NEGLIGIBLE: f64 = 1e-9;
 
 impl Node for WorkspaceLimit {
     type Params = Params;
@@ -115,25 +113,10 @@ pub fn share(
     deceleration: f64,
     delay: f64,
 ) -> f64 {
-    let speed = velocity.norm();
-    let mut share = 1.0_f64;
-    for axis in 0..3 {
+    let toward = |axis: usize| {
         let v = velocity[axis];
         let distance = if v > 0.0 { max[axis] - place[axis] } else { place[axis] - min[axis] };
-        let allowed = stoppable(distance, deceleration, delay);
-        if v.abs() > allowed && v.abs() > NEGLIGIBLE * speed {
-            share = share.min(allowed / v.abs());
-        }
-    }
-    share
-}
-
-/// Greatest speed from which a stop within `distance` is possible, `delay` [s] later, with that deceleration.
-fn stoppable(distance: f64, deceleration: f64, delay: f64) -> f64 {
-    if distance <= 0.0 {
-        return 0.0;
-    }
-    let lost = deceleration * delay;
-    // The root without the difference of two large numbers.
-    2.0 * deceleration * distance / (lost + (lost * lost + 2.0 * deceleration * distance).sqrt())
+        (v.abs(), stopping_speed(distance, deceleration, delay))
+    };
+    scale_within(velocity.norm(), (0..3).map(toward))
 }

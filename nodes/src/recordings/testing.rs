@@ -3,36 +3,25 @@
 use std::io::Write;
 
 use super::{Hints, Recording, Refusal, read};
+use crate::random::Random;
 
-/// The 64-bit splitmix generator (Steele et al. 2014), so that every run damages the same.
-pub(super) struct Random(pub(super) u64);
-
-impl Random {
-    pub(super) fn below(&mut self, below: usize) -> usize {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mixed = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        let mixed = (mixed ^ (mixed >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((mixed ^ (mixed >> 31)) % below as u64) as usize
-    }
-
-    /// Cuts, swaps, flips, inserts and repeats a few bytes.
-    fn damage(&mut self, bytes: &mut Vec<u8>) {
-        for _ in 0..=self.below(3) {
-            if bytes.is_empty() {
-                return;
-            }
-            let (a, b) = (self.below(bytes.len()), self.below(bytes.len()));
-            let (from, to) = (a.min(b), a.max(b).min(a.min(b) + 40));
-            match self.below(8) {
-                0 => bytes.truncate(a),
-                1 => bytes.swap(a, b),
-                2 => bytes[a] ^= 1 << self.below(8),
-                3 => bytes[a] = self.below(256) as u8,
-                4 => drop(bytes.drain(from..to)),
-                5 => drop(bytes.splice(a..a, b"99999999999".iter().copied())),
-                6 => drop(bytes.splice(b..b, bytes[from..to].to_vec())),
-                _ => bytes.insert(a, b"9-.,;B\n\r\t@e \""[self.below(13)]),
-            }
+/// Cuts, swaps, flips, inserts or repeats a few bytes.
+fn damage(random: &mut Random, bytes: &mut Vec<u8>) {
+    for _ in 0..=random.below(3) {
+        if bytes.is_empty() {
+            return;
+        }
+        let (a, b) = (random.below(bytes.len()), random.below(bytes.len()));
+        let (from, to) = (a.min(b), a.max(b).min(a.min(b) + 40));
+        match random.below(8) {
+            0 => bytes.truncate(a),
+            1 => bytes.swap(a, b),
+            2 => bytes[a] ^= 1 << random.below(8),
+            3 => bytes[a] = random.below(256) as u8,
+            4 => drop(bytes.drain(from..to)),
+            5 => drop(bytes.splice(a..a, b"99999999999".iter().copied())),
+            6 => drop(bytes.splice(b..b, bytes[from..to].to_vec())),
+            _ => bytes.insert(a, b"9-.,;B\n\r\t@e \""[random.below(13)]),
         }
     }
 }
@@ -75,11 +64,11 @@ pub(super) fn check_damages(good: &str, name: &str, hints: &Hints, cases: &[(&st
 
 /// Damages good files at random: each is then read soundly or refused at a place. How many of them are refused.
 pub(super) fn count_refused(good: &[&[u8]], name: &str, hints: &Hints, rounds: usize) -> usize {
-    let mut random = Random(2013);
+    let mut random = Random::new(2013, 0);
     let mut refused = 0;
     for round in 0..rounds {
         let mut bytes = good[round % good.len()].to_vec();
-        random.damage(&mut bytes);
+        damage(&mut random, &mut bytes);
         refused += usize::from(!complaints(read(&bytes, name, hints)).is_empty());
     }
     refused

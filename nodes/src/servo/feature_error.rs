@@ -8,7 +8,7 @@ use tactflow_runtime::signal::{Feature, FeaturesShape, ScalarShape};
 use tactflow_runtime::source::Code;
 use tactflow_runtime::{inputs, outputs, params};
 
-use super::axial::wrap_axial;
+use crate::motion::axis::wrap_axial;
 
 params! {
     /// Target of each feature [the feature's unit].

@@ -1,10 +1,10 @@
-//! The integral's part of a control: how far it may grow.
+//! The integral part of a controller, with anti-windup.
 
-/// The integral after it has grown by `growth`, within `bound` either way, all in units of the control.
+/// Returns the integral after it has grown by `growth`, within ±`bound`. All arguments are in the unit of the control.
 ///
-/// The control is the sum of the integral and `others`, and is cut at `limit` either way (infinite for none). Outwards
-/// the integral goes no further than to the limit, and not at all past it: what it gathered there would have to be
-/// worked off before the control comes back. Inwards it is free. What is subnormal becomes zero.
+/// The control is the sum of the integral and `others`, and is clamped to ±`limit` (infinite for no limit). Away from
+/// zero, the integral grows only until the control reaches the limit: whatever it gathered beyond would have to be
+/// unwound before the control leaves the limit. Toward zero it is free. A subnormal result becomes zero.
 ///
 /// ```
 /// use tactflow_nodes::servo::integral::integrate;
@@ -21,11 +21,11 @@ pub fn integrate(integral: f64, growth: f64, bound: f64, others: f64, limit: f64
     } else {
         (integral + growth).max((-limit - others).min(integral))
     };
-    snap(grown.clamp(-bound, bound))
+    flush_subnormal(grown.clamp(-bound, bound))
 }
 
-/// Zero for what is subnormal: arithmetic with such numbers is slow.
-fn snap(value: f64) -> f64 {
+/// Returns zero for a subnormal number, as arithmetic with such numbers is slow.
+fn flush_subnormal(value: f64) -> f64 {
     if value.abs() < f64::MIN_POSITIVE { 0.0 } else { value }
 }
 
@@ -37,7 +37,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn it_grows_no_further_than_to_the_limit(
+        fn it_grows_only_up_to_the_limit(
             integral in -3.0_f64..3.0, growth in -1.0_f64..1.0, others in -3.0_f64..3.0, limit in 0.1_f64..3.0,
         ) {
             let next = integrate(integral, growth, 10.0, others, limit);
@@ -51,7 +51,7 @@ mod tests {
         }
 
         #[test]
-        fn without_a_limit_only_the_bound_holds_it(
+        fn without_a_limit_only_the_bound_clamps_it(
             integral in -0.5_f64..0.5, growth in -1.0_f64..1.0, others in -3.0_f64..3.0,
         ) {
             let next = integrate(integral, growth, 0.5, others, f64::INFINITY);
@@ -60,8 +60,11 @@ mod tests {
     }
 
     #[test]
-    fn what_is_subnormal_becomes_zero() {
-        assert_eq!([f64::MIN_POSITIVE, -1.0, 1e-310, -1e-310].map(snap), [f64::MIN_POSITIVE, -1.0, 0.0, 0.0]);
+    fn a_subnormal_integral_becomes_zero() {
+        assert_eq!(
+            [f64::MIN_POSITIVE, -1.0, 1e-310, -1e-310].map(flush_subnormal),
+            [f64::MIN_POSITIVE, -1.0, 0.0, 0.0]
+        );
         assert_eq!(integrate(1e-310, 1e-310, 1.0, 0.0, f64::INFINITY), 0.0);
     }
 }

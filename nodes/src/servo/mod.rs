@@ -1,7 +1,6 @@
 //! From features to a twist of the sensor (paper section IV).
 
 pub mod adjoint;
-pub mod axial;
 pub mod edge_guard;
 pub mod feature_error;
 pub mod integral;
@@ -13,4 +12,3 @@ pub mod scan_guide;
 pub mod twist_adder;
 pub mod twist_of;
 pub mod twist_source;
-pub mod way;

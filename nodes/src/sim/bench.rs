@@ -1,8 +1,8 @@
-//! `sim_bench`: the simulated bench as a device: a pad, an arm and what they touch.
+//! `sim_bench`: the simulated bench as a device: a pad, an arm and objects.
 //!
-//! It is stepped: it lives in virtual time, and the same commands and the same seed give the same bits. Between two
-//! exchanges the world goes on in steps of `step_s` at most, with the velocity that was commanded last. An image is
-//! taken at each beat of `rate_hz` and shown `latency_s` later, with the stamp of the moment it was taken.
+//! It is a stepped device in virtual time: the same commands and the same seed give the same bits. Between two exchanges
+//! the world advances in steps of at most `step_s`, at the velocity that was commanded last. An image is taken at the rate
+//! `rate_hz`. It is available `latency_s` later, with the stamp of the time when it was taken.
 
 mod check;
 
@@ -17,74 +17,75 @@ use tactflow_runtime::signal::{Image, ImageShape, Joint, Joints, JointsShape, Ki
 use super::contact::Contact;
 use super::foam::Foam;
 use super::imprint::Imprint;
-use super::joints::{Arm, Joint as SimJoint, pose3};
-use super::object::{Object, Thing};
-use super::random::Random;
+use super::joints::{JointDynamics, SimArm};
+use super::object::{Object, ObjectParams};
 use super::readout::{Electronics, Readout};
+use super::shape::pose3;
 use super::world::{World, start};
 use crate::arm::chain::Chain;
 use crate::arm::model::load;
 use crate::arm::mount::Mount;
 use crate::devices::arm_facts::{check_start, fact_of, facts};
 use crate::devices::{nanos, period_of};
+use crate::random::Random;
 use crate::roles::ground_truth;
 
 params! {
-    /// Seed of the noise and of where the objects are scattered.
+    /// Seed of the noise and of the random offsets of the objects.
     seed: u64 = 1,
-    /// How long it runs; for ever unless given [s].
+    /// Duration of the run; unlimited if not given [s].
     for_s: Option<Positive>,
-    /// What there is to touch.
-    objects: Vec<Thing> = vec![],
+    /// Objects to touch.
+    objects: Vec<ObjectParams> = vec![],
     /// Number of rows of the pad.
     rows: Count = Count(16),
     /// Number of columns of the pad.
     cols: Count = Count(16),
-    /// Distance between the centres of two neighbours, along x and along y [m].
+    /// Distance between the centres of neighbouring tactels, along x and along y [m].
     pitch: Positive = Positive(0.005),
     /// Frames per second [1/s].
     rate_hz: Rate = Rate(250.0),
-    /// Time from when an image is taken until it is there [s].
+    /// Time from taking an image until it is available [s].
     latency_s: NonNegative = NonNegative(0.004),
-    /// The pad's calibration, which `calibrate` takes from it.
+    /// Calibration file of the pad, stated as a fact for `calibrate`.
     calibration: Option<FilePath>,
-    /// What it states as its noise threshold [N].
+    /// Noise threshold that the pad states as a fact [N].
     threshold: NonNegative = NonNegative(0.015),
-    /// What it states as the unit of pressure, the p = 1 of the paper [N per tactel].
+    /// Unit of pressure that the pad states as a fact: p = 1 in the paper [N per tactel].
     pressure: Positive = Positive(0.1),
-    /// What the foam is like.
-    foam: Foam = Foam::USUAL,
-    /// Distance of the points at which the pad is felt; a fine probe needs finer ones than a ball [m].
+    /// Properties of the foam.
+    foam: Foam = Foam::DEFAULT,
+    /// Largest distance between simulated points of the pad; a thin probe needs a smaller one than a ball [m].
     points_apart: Positive = Positive(0.001),
-    /// What the electronics are like.
-    electronics: Electronics = Electronics::USUAL,
-    /// The arm's model.
+    /// Properties of the electronics.
+    electronics: Electronics = Electronics::DEFAULT,
+    /// Model of the arm.
     urdf: FilePath,
     /// Link that carries the sensor.
     tip: String,
     /// Pose of the sensor on that link.
     mount: Mount = Mount::NONE,
-    /// Joint positions at the start, one a joint [rad].
+    /// Joint positions at the start, one per joint [rad].
     start: Vec<f64>,
     /// Stiffness of the joints [N m/rad].
     stiffness: Positive = Positive(200.0),
-    /// Damping of the joints, of critical damping [1].
+    /// Damping of the joints as a fraction of the critical one [1].
     damping_ratio: NonNegative = NonNegative(0.2),
-    /// Inertia of each joint; those of an LWR's seven joints unless given [kg m²].
+    /// Inertia of each joint; that of the seven joints of an LWR if not given [kg m²].
     inertia: Option<Vec<f64>>,
     /// Dry friction of the joints [N m].
     friction: NonNegative = NonNegative(0.1),
-    /// What it states as the greatest acceleration of each joint [rad/s²].
+    /// Largest acceleration that the arm states for each joint [rad/s²].
     acceleration: Positive = Positive(10.0),
     /// Longest step of the simulation [s].
     step_s: Positive = Positive(0.002),
 }
 
-/// Inertia of the joints of an LWR in a bent posture, rotors and all [kg m²].
+/// Inertia of the joints of an LWR in a bent posture, with rotors [kg m²].
 const INERTIA: [f64; 7] = [2.0, 2.0, 1.0, 0.8, 0.3, 0.25, 0.1];
 
-/// The most tactels that a simulated pad has.
-pub const MOST: usize = 128 * 128;
+/// Largest number of tactels of a simulated pad.
+pub const MAX_TACTELS: usize = 128 * 128;
 
 /// The bench.
 pub struct SimBench {
@@ -95,13 +96,13 @@ pub struct SimBench {
     latency: i64,
     end: i64,
     last: Option<i64>,
-    /// Images that were taken and are not there yet, with their stamps.
+    /// Images that are taken but not yet available, with their stamps.
     taken: VecDeque<(i64, Vec<f32>)>,
-    /// Room for images to come.
+    /// Buffers for further images.
     spare: Vec<Vec<f32>>,
-    /// Number of images that were shown.
+    /// Number of images that were handed over.
     shown: u64,
-    /// Number of exchanges that brought time on.
+    /// Number of exchanges that advanced the time.
     sequence: u64,
     threshold: f64,
     /// The outputs of the ground truth.
@@ -112,24 +113,25 @@ impl Device for SimBench {
     type Params = Params;
 
     const NAME: &'static str = "sim_bench";
-    const SUMMARY: &'static str = "a simulated bench: a pad of foam on an arm in joint impedance, and objects to touch";
+    const SUMMARY: &'static str =
+        "a simulated bench: a foam pad on an arm in joint impedance control, and objects to touch";
     const DOC: &'static str = "\
-The bench closes the loop without hardware: what the arm is told moves the pad, and what the pad touches gives the image \
-and pushes the arm back.\n\n\
-The pad is an elastic foundation of foam on a rigid plate, felt at points no more than 1 mm apart, each a spring that \
-stiffens, in series with the object's own stiffness. The foam spreads a load over its neighbours, and friction sticks and \
-slips at every tactel. Each tactel has its own squashed curve, hysteresis, creep and noise, and reads 12 bits: the image \
-is in raw counts, and `calibration` names the file that makes forces of them.\n\n\
-The arm is as in the paper: every joint a spring and a damper toward a posture that the commanded velocity moves, so the \
-pad yields and tilts under a load.\n\n\
-Objects stand where they are seen from the sensor at the start, z ahead of it: `at = [0.01, 0, 0.05]` is 1 cm to the \
-sensor's x and 5 cm before it. They are fixed, stand on a `mount` that gives way, or move as their `motion` says.\n\n\
-It lives in virtual time, and the same commands and seed give the same bits; with `--realtime` it is paced by the clock. \
-The pad states the facts `dead`, `threshold`, `pressure` and `calibration`, and of its noise `common_noise`, the \
-standard deviation that all tactels share, as a part of what they read, and `own_noise`, each tactel's own [raw]. The arm \
-states `urdf`, `tip` and `mount`. As `ground_truth` it gives what no sensor knows, to scenarios and records only.\n\n\
-Left out: gravity and the coupling of the joints, objects that turn, columns of foam that push each other, wear and \
-temperature.";
+The bench closes the loop without hardware: commands move the arm and its pad, and contact gives an image and pushes the \
+arm back.\n\n\
+The pad is an elastic foundation of foam on a rigid plate, simulated at points at most 1 mm apart. Each point is a \
+stiffening spring in series with the stiffness of the object. The foam spreads a load over several tactels, and friction \
+sticks and slips at every tactel. Each tactel has its own saturating curve, hysteresis, creep and noise, and reads 12 bits: \
+the image is in raw counts, and `calibration` names the file that converts them to forces.\n\n\
+The arm is that of the paper. Every joint is a spring and a damper toward a posture that moves at the commanded velocity, \
+so the pad yields and tilts under a load.\n\n\
+Objects are placed relative to the sensor at the start, whose z points out of the pad: `at = [0.01, 0, 0.05]` is 1 cm \
+along the sensor's x and 5 cm in front of it. They are fixed, stand on a compliant `mount`, or follow their `motion`.\n\n\
+It runs in virtual time, and the same commands and seed give the same bits; with `--realtime` it is paced by the clock. The \
+pad states the facts `dead`, `threshold`, `pressure` and `calibration`, and the standard deviations of its noise: \
+`common_noise`, which all tactels share, as a fraction of the reading, and `own_noise` of each tactel [raw]. The arm states \
+`urdf`, `tip` and `mount`. In the role `ground_truth` it provides true values to scenarios and recordings only.\n\n\
+Not simulated: gravity, coupling of the joints, rotation of objects under load, interaction between columns of foam, wear \
+and temperature.";
     const EXAMPLE: &'static str = r#"
 [roles]
 pad = "tactile_pad"
@@ -195,7 +197,7 @@ fn arm(params: &Params, joints: &[Joint]) -> Result<Filled, Mistakes> {
     })
 }
 
-/// Number of the first port of the ground truth.
+/// Index of the first port of the ground truth.
 const TRUTH: usize = 3;
 
 fn truth(shape: &ImageShape) -> Filled {
@@ -212,19 +214,19 @@ fn truth(shape: &ImageShape) -> Filled {
 impl SimBench {
     fn new(params: Params, chain: Chain, joints: Vec<Joint>, shape: ImageShape, period: i64) -> Result<Self, Mistakes> {
         let inertia = params.inertia.unwrap_or_else(|| INERTIA.to_vec());
-        let joint = |inertia: f64| SimJoint {
+        let joint = |inertia: f64| JointDynamics {
             stiffness: *params.stiffness,
             damping_ratio: *params.damping_ratio,
             inertia,
             friction: *params.friction,
         };
-        let arm = Arm::new(chain, inertia.into_iter().map(joint).collect(), params.start);
+        let arm = SimArm::new(chain, inertia.into_iter().map(joint).collect(), params.start);
         let from = start(&arm);
         let mut scatter = Random::new(params.seed, 3);
-        let place = |(i, thing): (usize, &Thing)| {
-            let most = *thing.scatter;
-            let offset = [scatter.uniform(-most, most), scatter.uniform(-most, most)];
-            Object::new(thing, from, offset).map_err(|message| check::object(i, message))
+        let place = |(i, object): (usize, &ObjectParams)| {
+            let max_offset = *object.scatter;
+            let offset = [0, 1].map(|_| scatter.uniform(-max_offset, max_offset));
+            Object::new(object, from, offset).map_err(|message| check::object(i, message))
         };
         let objects = params.objects.iter().enumerate().map(place).collect::<Result<Vec<_>, _>>()?;
         let contact = Contact::new(shape.clone(), params.foam.clone(), *params.points_apart, objects.len());
@@ -253,7 +255,7 @@ impl SimBench {
         })
     }
 
-    /// Goes on to `now` [ns]; an image is taken at each beat on the way.
+    /// Advances to `now` [ns] and takes the images that are due until then.
     fn advance(&mut self, now: i64, velocity: &[f64]) {
         let begin = self.last.unwrap_or(-1);
         let mut beat = (begin.div_euclid(self.period) + 1) * self.period;
@@ -262,8 +264,8 @@ impl SimBench {
             let forces = self.world.image();
             let mut counts = match self.spare.pop() {
                 Some(room) => room,
-                // The oldest, which nobody has asked for in time, gives way.
-                None => self.taken.pop_front().expect("there is room for an image").1,
+                // No buffer is free, so the oldest image, which was never read, is dropped.
+                None => self.taken.pop_front().expect("all buffers are in `taken`").1,
             };
             self.readout.read(self.period as f64 * 1e-9, forces, &mut counts);
             self.taken.push_back((beat, counts));
@@ -275,10 +277,10 @@ impl SimBench {
         self.last = Some(now);
     }
 
-    /// Shows the newest image that is there by `now`.
+    /// Hands over the images that are available at `now` [ns].
     fn show(&mut self, now: i64, samples: &mut Samples) {
         while self.taken.front().is_some_and(|(stamp, _)| stamp + self.latency <= now) {
-            let (stamp, counts) = self.taken.pop_front().expect("it was there");
+            let (stamp, counts) = self.taken.pop_front().expect("the front was just checked");
             self.shown += 1;
             samples.write::<Image>(0, stamp, self.shown).cells_mut().copy_from_slice(&counts);
             self.spare.push(counts);
@@ -307,21 +309,21 @@ impl Stepped for SimBench {
         }
         self.advance(now, velocity);
         if !self.world.is_sound() {
-            return Err(DeviceError("the simulation has run away: its parameters are too stiff for its steps".into()));
+            return Err(DeviceError("the simulation diverged: make `step_s` smaller or the bench less stiff".into()));
         }
         self.sequence += 1;
         self.show(now, samples);
         let arm = &self.world.arm;
         samples.write::<Joints>(1, now, self.sequence).0.copy_from_slice(&arm.position);
         samples.write::<Joints>(2, now, self.sequence).0.copy_from_slice(&arm.equilibrium);
-        self.tell(now, commands.report::<Pose>(0), samples);
+        self.write_truth(now, commands.report::<Pose>(0), samples);
         Ok(())
     }
 }
 
 impl SimBench {
-    /// Gives the ground truth: each number under its name among the role's outputs, and the clean image.
-    fn tell(&mut self, now: i64, report: Option<&Pose>, samples: &mut Samples) {
+    /// Writes the ground truth: each scalar to the output of the role with its name, and the noise-free image.
+    fn write_truth(&mut self, now: i64, report: Option<&Pose>, samples: &mut Samples) {
         let measured = report.and_then(|pose| self.world.measure(pose3(pose).translation));
         let truth = self.world.truth(self.threshold);
         let noise = truth.pressure.map(|pressure| self.readout.noise(pressure, truth.tactels));

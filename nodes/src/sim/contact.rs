@@ -1,14 +1,14 @@
-//! The foam against the objects: how deep each point of the pad is pressed in, and what that does to the pad.
+//! Contact between the foam and the objects: the indentation of each point of the pad, and the resulting forces.
 //!
-//! Every tactel of 5 mm has 5 by 5 points or more, no more than 1 mm apart, each the end of a column of foam. The depth of a
-//! column is found by a ray through it, from the plate outward. Its force f acts along the pad's z; the object's
-//! surface, of normal n, is without friction at such a point, so the pad feels f n / |n_z|: the gradient of the energy of
-//! the columns, and no more work comes out than went in.
+//! A tactel of 5 mm has at least 5 by 5 points, at most 1 mm apart, and each point is the end of a column of foam. The depth
+//! of a column is found by casting a ray through it, from the plate outward. Its force f acts along the pad's z. The
+//! surface of the object, with normal n, is frictionless at such a point, so the force on the pad is f n / |n_z|. This is the
+//! gradient of the energy of the columns, so the contact does not create energy.
 //!
-//! Friction acts at each tactel as a bristle: the foam shears until the friction gives way, mu N, with mu falling from
-//! rest to motion over a millimetre a second (Stribeck). That is stick and slip.
+//! Friction acts at each tactel as a bristle: the foam shears until the friction force reaches mu N. The coefficient mu
+//! falls from its static to its sliding value over 1 mm/s (Stribeck), which gives stick and slip.
 //!
-//! What is far from every object is culled, by blocks of 4 by 4 tactels, then by tactels.
+//! Blocks of 4 by 4 tactels, and then single tactels, that are far from every object are skipped.
 
 use parry3d_f64::math::{Mat3, Pose3, Vec3};
 use tactflow_runtime::signal::ImageShape;
@@ -16,59 +16,59 @@ use tactflow_runtime::signal::ImageShape;
 use super::foam::{self, Column, Foam};
 use super::object::Object;
 
-/// Speed over which friction falls from that at rest to that in motion [m/s].
-const STRIBECK: f64 = 0.001;
-/// Tactels along a block.
-const BLOCK: usize = 4;
-/// Least part of a normal that faces the pad: columns do not see what is steeper.
-const STEEPEST: f64 = 0.1;
+/// Speed over which friction falls from its static to its sliding value [m/s].
+const STRIBECK_SPEED: f64 = 0.001;
+/// Number of tactels along a side of a block.
+const BLOCK_TACTELS: usize = 4;
+/// Smallest component of a normal toward the pad that is used; a steeper surface counts as this steep [1].
+const MIN_FACING: f64 = 0.1;
 
-/// Where the pad is and how it moves, in the base.
+/// Pose and velocity of a body in the base.
 #[derive(Debug, Clone, Copy)]
-pub struct Motion {
-    /// Pose of the sensor's frame.
+pub struct BodyMotion {
+    /// Pose of its frame.
     pub pose: Pose3,
     /// Velocity of its origin [m/s].
     pub linear: Vec3,
-    /// [rad/s]
+    /// Angular velocity [rad/s].
     pub angular: Vec3,
 }
 
-/// What acts on a body: a force, and a moment about some point.
+/// A force on a body, and a moment about a point that the user states.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Wrench {
-    /// [N]
+    /// Force [N].
     pub force: Vec3,
-    /// [N m]
+    /// Moment [N m].
     pub moment: Vec3,
 }
 
-/// The pad's foam in contact.
+/// The foam of the pad in contact with objects.
 pub struct Contact {
     shape: ImageShape,
-    /// Points along a side of a tactel.
+    /// Number of points along a side of a tactel.
     fine: usize,
     foam: Foam,
     column: Column,
-    /// Stiffness against shear of a tactel [N/m].
+    /// Shear stiffness of a tactel [N/m].
     shear: f64,
-    /// The points of all tactels that touch something, in a fixed order.
+    /// The points that touch an object, in raster order.
     touching: Vec<Touch>,
-    tactels: Vec<Tactel>,
-    /// Places of the points along x and along y [m].
+    tactels: Vec<Bristle>,
+    /// Coordinates of the points along x and along y [m].
     xs: Vec<f64>,
     ys: Vec<f64>,
-    /// Which of `touching` each point is.
+    /// Index of each point in `touching`.
     slots: Vec<u32>,
-    /// Tactels of a row that may touch an object.
+    /// Tactels of the current row that may touch an object.
     near: Vec<usize>,
-    /// How each object moves over the pad.
+    /// Motion of each object relative to the pad.
     slides: Vec<Slide>,
-    /// What acts on the pad at its origin, in the base.
+    /// Wrench on the pad about its origin, in the base.
     wrench: Wrench,
 }
 
-/// A point that touches something.
+/// A point of the pad that touches an object.
 #[derive(Debug, Clone, Copy)]
 pub struct Touch {
     /// Row and column of the point in the grid of points.
@@ -77,13 +77,13 @@ pub struct Touch {
     pub force: f64,
     /// Indentation [m].
     pub depth: f64,
-    /// Normal of the object there, out of it, in the pad's frame.
+    /// Outward normal of the object at the point, in the pad's frame.
     pub normal: Vec3,
     object: usize,
     tactel: usize,
 }
 
-/// How an object moves over the pad: the velocity of its point at the pad's origin, and its turn, in the pad's frame.
+/// Motion of an object relative to the pad, in the pad's frame: linear at the pad's origin, and angular.
 #[derive(Debug, Clone, Copy)]
 struct Slide {
     linear: Vec3,
@@ -91,7 +91,7 @@ struct Slide {
 }
 
 impl Slide {
-    fn of(object: &Object, pad: &Motion) -> Self {
+    fn of(object: &Object, pad: &BodyMotion) -> Self {
         let local = |v: Vec3| pad.pose.inverse_transform_vector(v);
         let linear = object.velocity_at(pad.pose.translation) - pad.linear;
         Self { linear: local(linear), angular: local(object.spin() - pad.angular) }
@@ -102,9 +102,9 @@ impl Slide {
     }
 }
 
-/// A tactel's friction.
+/// The friction at a tactel.
 #[derive(Debug, Clone, Copy, Default)]
-struct Tactel {
+struct Bristle {
     normal: f64,
     object: usize,
     /// Shear of the foam along the pad's x and y [m].
@@ -113,10 +113,11 @@ struct Tactel {
     friction: [f64; 2],
 }
 
-const NONE: u32 = u32::MAX;
+/// Marks a point that touches nothing.
+const NO_SLOT: u32 = u32::MAX;
 
 impl Contact {
-    /// A pad that touches nothing, felt at points that are `apart` at most [m], with room for so many objects.
+    /// Returns a pad that touches nothing, with points at most `apart` [m] apart and with room for `objects` objects.
     #[must_use]
     pub fn new(shape: ImageShape, foam: Foam, apart: f64, objects: usize) -> Self {
         let side = shape.pitch[0].max(shape.pitch[1]);
@@ -127,10 +128,10 @@ impl Contact {
         Self {
             fine,
             column: Column::new(&foam, area / points as f64),
-            shear: *foam.shear * area / foam::AREA,
+            shear: *foam.shear * area / foam::REFERENCE_AREA,
             touching: Vec::with_capacity(shape.tactels() * points),
-            tactels: vec![Tactel::default(); shape.tactels()],
-            slots: vec![NONE; shape.tactels() * points],
+            tactels: vec![Bristle::default(); shape.tactels()],
+            slots: vec![NO_SLOT; shape.tactels() * points],
             xs: (0..shape.cols * fine).map(|point| shape.x(along(point))).collect(),
             ys: (0..shape.rows * fine).map(|point| shape.y(along(point))).collect(),
             near: Vec::with_capacity(shape.cols),
@@ -141,53 +142,53 @@ impl Contact {
         }
     }
 
-    /// Points along a side of a tactel.
+    /// Returns the number of points along a side of a tactel.
     #[must_use]
     pub const fn fine(&self) -> usize {
         self.fine
     }
 
-    /// The points that touch something.
+    /// Returns the points that touch an object, in raster order.
     #[must_use]
     pub fn touching(&self) -> &[Touch] {
         &self.touching
     }
 
-    /// What acts on the pad at its origin, in the base, as of the last step.
+    /// Returns the wrench on the pad about its origin, in the base, as of the last step.
     #[must_use]
     pub const fn wrench(&self) -> Wrench {
         self.wrench
     }
 
-    /// Force of friction on the pad, along its x and y, as of the last step [N].
+    /// Returns the friction force on the pad along its x and y, as of the last step [N].
     #[must_use]
     pub fn friction(&self) -> [f64; 2] {
         self.tactels.iter().fold([0.0; 2], |sum, tactel| [sum[0] + tactel.friction[0], sum[1] + tactel.friction[1]])
     }
 
-    /// Force along the pad's z, positive when it is pressed, as of the last step [N].
+    /// Returns the force along the pad's z, positive when the pad is pressed, as of the last step [N].
     #[must_use]
     pub fn normal(&self) -> f64 {
         self.touching.iter().map(|touch| touch.force).sum()
     }
 
-    /// Place of a point in the pad's plane, by its row and column in the grid of points [m].
+    /// Returns the position of a point in the plane of the pad, from its row and column in the grid of points [m].
     #[must_use]
     pub fn place(&self, point: [usize; 2]) -> [f64; 2] {
         [self.xs[point[1]], self.ys[point[0]]]
     }
 
-    /// Goes on by `dt` [s]. `loads` gets the force on each object, in the base [N].
-    pub fn step(&mut self, dt: f64, pad: &Motion, objects: &[Object], loads: &mut [Vec3]) {
+    /// Advances by `dt` [s]. Writes to `loads` the force on each object, in the base [N].
+    pub fn step(&mut self, dt: f64, pad: &BodyMotion, objects: &[Object], loads: &mut [Vec3]) {
         for touch in self.touching.drain(..) {
-            self.slots[touch.point[0] * self.xs.len() + touch.point[1]] = NONE;
+            self.slots[touch.point[0] * self.xs.len() + touch.point[1]] = NO_SLOT;
         }
         self.slides.clear();
         self.slides.extend(objects.iter().map(|object| Slide::of(object, pad)));
         for (index, object) in objects.iter().enumerate() {
             self.find(pad, index, object);
         }
-        // Each object's points come row after row; the sums want them all so.
+        // The points are in raster order per object, and the sums need raster order over all objects.
         if !self.touching.is_sorted_by_key(|touch| touch.point) {
             self.touching.sort_unstable_by_key(|touch| touch.point);
         }
@@ -195,14 +196,14 @@ impl Contact {
         let mut wrench = Wrench::default();
         self.press(objects, &mut wrench, loads);
         self.rub(dt, &mut wrench, loads);
-        // From the pad's frame to the base's.
+        // From the frame of the pad to the base.
         let turn = pad.pose.rotation;
         self.wrench = Wrench { force: turn * wrench.force, moment: turn * wrench.moment };
         loads.iter_mut().for_each(|load| *load = turn * *load);
     }
 
-    /// Finds the points that an object touches.
-    fn find(&mut self, pad: &Motion, index: usize, object: &Object) {
+    /// Finds the points that touch an object.
+    fn find(&mut self, pad: &BodyMotion, index: usize, object: &Object) {
         let thickness = *self.foam.thickness;
         let local = |v: Vec3| object.pose.rotation.inverse() * (pad.pose.rotation * v);
         let ray = Rays {
@@ -212,9 +213,9 @@ impl Contact {
             thickness,
         };
         let (rows, cols) = (self.shape.rows, self.shape.cols);
-        for first in (0..rows).step_by(BLOCK) {
-            let last = (first + BLOCK).min(rows);
-            let blocks = (0..cols).step_by(BLOCK).map(|j| (j, (j + BLOCK).min(cols)));
+        for first in (0..rows).step_by(BLOCK_TACTELS) {
+            let last = (first + BLOCK_TACTELS).min(rows);
+            let blocks = (0..cols).step_by(BLOCK_TACTELS).map(|j| (j, (j + BLOCK_TACTELS).min(cols)));
             let is_near = |(j, end): &(usize, usize)| !ray.is_clear(object, &self.shape, [first, *j], [last, *end]);
             let columns =
                 blocks.filter(is_near).fold(0..0, |all, (j, end)| if all.is_empty() { j..end } else { all.start..end });
@@ -227,7 +228,7 @@ impl Contact {
         }
     }
 
-    /// Finds the points of a row of tactels that an object touches, among those that are near.
+    /// Finds the points of a row of tactels that touch an object, among the tactels that are near it.
     fn find_in_row(&mut self, row: usize, ray: &Rays, index: usize, object: &Object) {
         let (fine, width) = (self.fine, self.xs.len());
         for y in row * fine..(row + 1) * fine {
@@ -241,7 +242,7 @@ impl Contact {
                     let normal = ray.to_pad * hit.normal;
                     let touch = Touch { point: [y, x], force: 0.0, depth, normal, object: index, tactel };
                     let slot = &mut self.slots[y * width + x];
-                    if *slot == NONE {
+                    if *slot == NO_SLOT {
                         *slot = self.touching.len() as u32;
                         self.touching.push(touch);
                     } else if self.touching[*slot as usize].depth < depth {
@@ -252,13 +253,13 @@ impl Contact {
         }
     }
 
-    /// The forces of the columns, in the pad's frame.
+    /// Adds the forces of the columns, in the pad's frame.
     fn press(&mut self, objects: &[Object], wrench: &mut Wrench, loads: &mut [Vec3]) {
         let parts = self.parts();
         self.tactels.iter_mut().for_each(|tactel| tactel.normal = 0.0);
         for touch in &mut self.touching {
             let place = Vec3::new(self.xs[touch.point[1]], self.ys[touch.point[0]], -touch.depth);
-            let facing = (-touch.normal.z).max(STEEPEST);
+            let facing = (-touch.normal.z).max(MIN_FACING);
             let rate = touch.normal.dot(self.slides[touch.object].at(place)) / facing;
             touch.force = self.column.force(touch.depth, rate, objects[touch.object].softness * parts);
             let push = touch.normal * (touch.force / facing);
@@ -273,10 +274,10 @@ impl Contact {
 
     /// How many points make a tactel of 5 mm by 5 mm: under a point alone an object is softer by that.
     fn parts(&self) -> f64 {
-        (self.fine * self.fine) as f64 * foam::AREA / (self.shape.pitch[0] * self.shape.pitch[1])
+        (self.fine * self.fine) as f64 * foam::REFERENCE_AREA / (self.shape.pitch[0] * self.shape.pitch[1])
     }
 
-    /// The forces of the bristles, in the pad's frame.
+    /// Adds the forces of the bristles, in the pad's frame.
     fn rub(&mut self, dt: f64, wrench: &mut Wrench, loads: &mut [Vec3]) {
         let cols = self.shape.cols;
         for (index, tactel) in self.tactels.iter_mut().enumerate() {
@@ -294,7 +295,7 @@ impl Contact {
         }
     }
 
-    /// The energy that foam, objects and bristles store [J].
+    /// Returns the energy that foam, objects and bristles store [J].
     #[cfg(test)]
     pub(super) fn energy(&self, objects: &[Object]) -> f64 {
         let softness = |touch: &Touch| objects[touch.object].softness * self.parts();
@@ -304,30 +305,30 @@ impl Contact {
     }
 }
 
-impl Tactel {
-    /// Shears the foam with `velocity` of the pad over the object, until the friction gives way.
+impl Bristle {
+    /// Shears the foam by the `velocity` of the pad relative to the object [m/s], up to the friction limit.
     fn rub(&mut self, dt: f64, velocity: [f64; 2], stiffness: f64, foam: &Foam) {
-        let speed = norm(velocity) / STRIBECK;
+        let speed = norm(velocity) / STRIBECK_SPEED;
         let (still, sliding) = (*foam.static_friction, *foam.sliding_friction);
-        let most = (sliding + (still - sliding) / (1.0 + speed * speed)) * self.normal;
+        let max_force = (sliding + (still - sliding) / (1.0 + speed * speed)) * self.normal;
         self.shear = [self.shear[0] + velocity[0] * dt, self.shear[1] + velocity[1] * dt];
         let force = stiffness * norm(self.shear);
-        if force > most {
-            let share = most / force;
-            self.shear = [self.shear[0] * share, self.shear[1] * share];
+        if force > max_force {
+            let scale = max_force / force;
+            self.shear = [self.shear[0] * scale, self.shear[1] * scale];
         }
         self.friction = [-stiffness * self.shear[0], -stiffness * self.shear[1]];
     }
 }
 
-/// The rays of all columns, in the frame of an object.
+/// The rays through all columns, in the frame of an object.
 struct Rays {
-    /// Of the column in the pad's middle, at the plate.
+    /// Origin of the ray in the middle of the pad, at the plate.
     origin: Vec3,
-    /// The pad's.
+    /// Axes of the pad.
     axes: [Vec3; 3],
     thickness: f64,
-    /// From the object's frame to the pad's.
+    /// Rotation from the frame of the object to the frame of the pad.
     to_pad: Mat3,
 }
 
@@ -336,7 +337,7 @@ impl Rays {
         self.origin + self.axes[0] * x + self.axes[1] * y
     }
 
-    /// Whether an object is clear of all columns of the tactels from `first` to before `last`.
+    /// Returns whether an object is clear of all columns of the tactels from `first` to before `last`, as row and column.
     fn is_clear(&self, object: &Object, shape: &ImageShape, first: [usize; 2], last: [usize; 2]) -> bool {
         let middle = |axis: usize| (first[axis] + last[axis] - 1) as f64 / 2.0;
         let centre = self.from(shape.x(middle(1)), shape.y(middle(0))) + self.axes[2] * (self.thickness / 2.0);

@@ -1,37 +1,37 @@
-//! What the foam is made of, and the laws of one column of it.
+//! The material of the foam, and the force law of one column of it.
 //!
-//! The foam is an elastic foundation: columns that stand side by side on a rigid plate and do not know of each other.
-//! A column that is pressed in by c bears p(c) = k c, and k3 (c - c0)³ more past c0. An object that gives way is a spring
-//! in series: of an indentation d the column takes c, so that d = c + p(c) / k_object.
+//! The foam is an elastic foundation: independent columns side by side on a rigid plate. A column compressed by c bears
+//! p(c) = k c, plus k3 (c - c0)³ above c0. A compliant object is a spring in series: of an indentation d the column takes c
+//! with d = c + p(c) / k_object.
 
 use tactflow_runtime::node::{NonNegative, Positive};
 use tactflow_runtime::params;
 
 params! {
     Foam:
-    /// Stiffness of the foam under one tactel of 5 mm by 5 mm; others go by their area [N/m].
+    /// Stiffness of the foam under a tactel of 5 mm by 5 mm; it scales with the area of a tactel [N/m].
     stiffness: Positive = Positive(300.0),
-    /// Indentation from which on it stiffens [m].
+    /// Compression above which the foam stiffens [m].
     stiffens_from: Positive = Positive(0.0025),
-    /// How much: the cubic part of the stiffness [N/m³ for a tactel of 5 mm by 5 mm].
+    /// Cubic part of the stiffness [N/m³ for a tactel of 5 mm by 5 mm].
     stiffening: NonNegative = NonNegative(9.6e7),
-    /// Thickness; what is pressed deeper meets the plate [m].
+    /// Thickness of the foam; behind it is the rigid plate [m].
     thickness: Positive = Positive(0.008),
-    /// Damping of the foam under one such tactel [N s/m].
+    /// Damping of the foam under a tactel of 5 mm by 5 mm [N s/m].
     damping: NonNegative = NonNegative(1.5),
-    /// Stiffness against shear of the foam under one such tactel [N/m].
+    /// Shear stiffness of the foam under a tactel of 5 mm by 5 mm [N/m].
     shear: Positive = Positive(200.0),
-    /// Standard deviation of the bell by which the foam spreads a load over its neighbours [m].
+    /// Standard deviation of the Gaussian with which the foam spreads a load [m].
     spread: Positive = Positive(0.003),
-    /// Coefficient of friction at rest [1].
+    /// Coefficient of static friction [1].
     static_friction: NonNegative = NonNegative(0.4),
-    /// Coefficient of friction in motion [1].
+    /// Coefficient of sliding friction [1].
     sliding_friction: NonNegative = NonNegative(0.3),
 }
 
 impl Foam {
-    /// The pad of the paper, as far as is known.
-    pub const USUAL: Self = Self {
+    /// The pad of the paper, as far as its properties are known.
+    pub const DEFAULT: Self = Self {
         stiffness: Positive(300.0),
         stiffens_from: Positive(0.0025),
         stiffening: NonNegative(9.6e7),
@@ -44,10 +44,10 @@ impl Foam {
     };
 }
 
-/// Area of the tactel that the numbers of [`Foam`] are for [m²].
-pub(super) const AREA: f64 = 0.005 * 0.005;
+/// Area of the tactel that the values of [`Foam`] refer to [m²].
+pub(super) const REFERENCE_AREA: f64 = 0.005 * 0.005;
 
-/// The foam under a patch of some area.
+/// A column of foam under a patch of the pad.
 #[derive(Debug, Clone, Copy)]
 pub struct Column {
     /// [N/m]
@@ -60,34 +60,36 @@ pub struct Column {
 }
 
 impl Column {
-    /// The foam under `area` [m²].
+    /// Returns the column under an `area` [m²].
     #[must_use]
     pub fn new(foam: &Foam, area: f64) -> Self {
-        let share = area / AREA;
+        let scale = area / REFERENCE_AREA;
         Self {
-            k: *foam.stiffness * share,
-            k3: *foam.stiffening * share,
+            k: *foam.stiffness * scale,
+            k3: *foam.stiffening * scale,
             from: *foam.stiffens_from,
-            damping: *foam.damping * share,
+            damping: *foam.damping * scale,
         }
     }
 
-    /// What the foam bears when it is pressed in by `c` [m], and how fast that rises [N, N/m].
+    /// Returns the force at a compression of `c` [m], and its slope [N, N/m].
     fn load(&self, c: f64) -> (f64, f64) {
         let beyond = (c - self.from).max(0.0);
         (self.k * c + self.k3 * beyond * beyond * beyond, self.k + 3.0 * self.k3 * beyond * beyond)
     }
 
-    /// The force at an indentation `depth` [m] that grows at `rate` [m/s], of an object that gives way by `softness`
-    /// [m/N]. It never pulls.
+    /// Returns the force [N] at an indentation `depth` [m] that grows at `rate` [m/s], for an object of compliance `softness`
+    /// [m/N]. It is never negative: the foam does not pull.
     #[must_use]
     pub fn force(&self, depth: f64, rate: f64, softness: f64) -> f64 {
         let (elastic, _) = self.load(self.compression(depth, softness));
         (elastic + self.damping * rate).max(0.0)
     }
 
-    /// What of an indentation the foam takes [m]. Newton's steps on a convex function from below fall onto its root
-    /// from above after the first, so a few are exact.
+    /// Returns the compression of the foam at an indentation `depth` [m].
+    ///
+    /// The function is convex and the first guess is below its root, so Newton's method converges from above after one
+    /// step, and six steps are exact.
     fn compression(&self, depth: f64, softness: f64) -> f64 {
         if softness == 0.0 {
             return depth;
@@ -103,7 +105,7 @@ impl Column {
         c
     }
 
-    /// The energy that foam and object store at an indentation [J].
+    /// Returns the energy that foam and object store at an indentation [J].
     #[cfg(test)]
     pub(super) fn energy(&self, depth: f64, softness: f64) -> f64 {
         let c = self.compression(depth, softness);
@@ -118,25 +120,25 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_column_is_a_spring_that_stiffens() {
-        let column = Column::new(&Foam::USUAL, 0.005 * 0.005);
+    fn a_column_is_a_stiffening_spring() {
+        let column = Column::new(&Foam::DEFAULT, 0.005 * 0.005);
         let cases = [(0.001, 0.3), (0.0025, 0.75), (0.005, 1.5 + 9.6e7 * 0.0025f64.powi(3))];
         for (depth, force) in cases {
             assert!((column.force(depth, 0.0, 0.0) - force).abs() < 1e-12, "{depth}");
         }
         assert!((column.force(0.001, 0.01, 0.0) - 0.315).abs() < 1e-12, "damped");
-        assert_eq!(column.force(0.001, -1.0, 0.0), 0.0, "it never pulls");
-        let quarter = Column::new(&Foam::USUAL, 0.0025 * 0.0025);
+        assert_eq!(column.force(0.001, -1.0, 0.0), 0.0, "the foam does not pull");
+        let quarter = Column::new(&Foam::DEFAULT, 0.0025 * 0.0025);
         assert!((quarter.force(0.004, 0.0, 0.0) * 4.0 - column.force(0.004, 0.0, 0.0)).abs() < 1e-12);
     }
 
     #[test]
-    fn an_object_in_series_takes_its_part() {
-        let column = Column::new(&Foam::USUAL, 0.005 * 0.005);
+    fn a_compliant_object_is_a_spring_in_series() {
+        let column = Column::new(&Foam::DEFAULT, 0.005 * 0.005);
         for stiffness in [50.0, 300.0, 1e4, 1e7] {
             for depth in [1e-4, 1e-3, 3e-3, 6e-3, 8e-3] {
                 let force = column.force(depth, 0.0, 1.0 / stiffness);
-                // Both springs bear the same.
+                // Both springs bear the same force.
                 let foam = depth - force / stiffness;
                 let load = 300.0 * foam + 9.6e7 * (foam - 0.0025f64).max(0.0).powi(3);
                 assert!((load - force).abs() < 1e-9 * force.max(1.0), "{stiffness} {depth}: {load} {force}");

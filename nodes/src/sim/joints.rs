@@ -1,56 +1,57 @@
-//! The arm: joints in impedance mode, as the paper's KUKA LWR (stiffness 200, damping 0.2).
+//! The arm: joints in impedance control, as the KUKA LWR of the paper (stiffness 200, damping 0.2).
 //!
-//! Each joint is an inertia on a spring and a damper toward the equilibrium posture, which the commanded velocity moves:
+//! Each joint is an inertia with a spring and a damper toward the equilibrium posture, which moves at the commanded velocity:
 //!
 //! ```text
 //! I q'' = K (q_eq - q) - 2 zeta sqrt(K I) q' - friction + J^T w
 //! ```
 //!
-//! with J the spatial Jacobian and w the wrench on the pad about the base's origin. Damping is a ratio. Friction is a
-//! bristle that gives way at the friction's torque. Left out: gravity (the controller takes it up), the coupling of the
-//! joints' inertias, Coriolis forces, the elasticity of the gears and the delay of the bus.
+//! with J the spatial Jacobian and w the wrench on the pad about the origin of the base. Damping is a ratio. Friction is a
+//! bristle that slips at the friction torque. Not simulated: gravity (the controller compensates it), coupling of the
+//! joint inertias, Coriolis forces, elasticity of the gears and delay of the bus.
 
 use nalgebra::Vector6;
-use parry3d_f64::math::{Pose3, Rot3, Vec3};
+use parry3d_f64::math::Vec3;
 use tactflow_runtime::signal::{Pose, Twist};
 
-use super::contact::{Motion, Wrench};
+use super::contact::{BodyMotion, Wrench};
+use super::shape::pose3;
 use crate::arm::chain::Chain;
 
-/// What a joint is like.
+/// Dynamic properties of a joint.
 #[derive(Debug, Clone, Copy)]
-pub struct Joint {
-    /// [N m/rad]
+pub struct JointDynamics {
+    /// Stiffness [N m/rad].
     pub stiffness: f64,
-    /// Of critical damping.
+    /// Damping as a fraction of the critical one [1].
     pub damping_ratio: f64,
-    /// [kg m²]
+    /// Inertia [kg m²].
     pub inertia: f64,
-    /// [N m]
+    /// Torque of dry friction [N m].
     pub friction: f64,
 }
 
-/// The arm's joints and where they are.
-pub struct Arm {
+/// The simulated arm: joints with their state.
+pub struct SimArm {
     chain: Chain,
-    joints: Vec<Joint>,
+    joints: Vec<JointDynamics>,
     columns: Vec<Twist>,
     pub(super) position: Vec<f64>,
     pub(super) equilibrium: Vec<f64>,
     speed: Vec<f64>,
-    /// How far each joint's friction is strained [rad].
+    /// Strain of the friction bristle of each joint [rad].
     strain: Vec<f64>,
     /// Pose of the sensor in the base.
     pub(super) pose: Pose,
 }
 
-/// How far friction is strained before it gives way [rad].
-pub(super) const GIVES_WAY: f64 = 2e-4;
+/// Strain at which friction slips [rad].
+pub(super) const MAX_STRAIN: f64 = 2e-4;
 
-impl Arm {
-    /// An arm at rest.
+impl SimArm {
+    /// Returns an arm at rest at the joint positions `start` [rad].
     #[must_use]
-    pub fn new(chain: Chain, joints: Vec<Joint>, start: Vec<f64>) -> Self {
+    pub fn new(chain: Chain, joints: Vec<JointDynamics>, start: Vec<f64>) -> Self {
         let mut columns = vec![Twist::default(); start.len()];
         let pose = chain.forward(&start, &mut columns);
         let zeros = vec![0.0; start.len()];
@@ -66,18 +67,18 @@ impl Arm {
         }
     }
 
-    /// Where the sensor is and how it moves.
+    /// Returns pose and velocity of the sensor in the base.
     #[must_use]
-    pub fn motion(&self) -> Motion {
+    pub fn motion(&self) -> BodyMotion {
         let twist: Vector6<f64> = self.columns.iter().zip(&self.speed).map(|(column, speed)| column.0 * *speed).sum();
         let pose = pose3(&self.pose);
         let angular = Vec3::new(twist[3], twist[4], twist[5]);
-        // From the twist at the base's origin to the velocity of the sensor's.
+        // The twist is at the origin of the base, and the velocity is that of the origin of the sensor.
         let linear = Vec3::new(twist[0], twist[1], twist[2]) + angular.cross(pose.translation);
-        Motion { pose, linear, angular }
+        BodyMotion { pose, linear, angular }
     }
 
-    /// Goes on by `dt` [s] with the equilibrium moving at `velocity` [rad/s], under a wrench about the sensor's origin.
+    /// Advances by `dt` [s] with the equilibrium moving at `velocity` [rad/s], under a wrench about the origin of the sensor.
     pub fn step(&mut self, dt: f64, velocity: &[f64], wrench: &Wrench) {
         let place = Vec3::from(<[f64; 3]>::from(self.pose.0.translation.vector));
         let moment = wrench.moment + place.cross(wrench.force);
@@ -88,10 +89,10 @@ impl Arm {
             let contact = self.columns[i].0.dot(&about_base);
             let spring = joint.stiffness * (self.equilibrium[i] - self.position[i]);
             let damping = 2.0 * joint.damping_ratio * (joint.stiffness * joint.inertia).sqrt();
-            self.strain[i] = (self.strain[i] + self.speed[i] * dt).clamp(-GIVES_WAY, GIVES_WAY);
-            let friction = joint.friction * self.strain[i] / GIVES_WAY;
+            self.strain[i] = (self.strain[i] + self.speed[i] * dt).clamp(-MAX_STRAIN, MAX_STRAIN);
+            let friction = joint.friction * self.strain[i] / MAX_STRAIN;
             let torque = spring - damping * self.speed[i] - friction + contact;
-            // Speed first, then place: what is at rest stays at rest, and a spring gains no energy.
+            // Semi-implicit Euler, speed before position: a spring gains no energy.
             self.speed[i] += torque / joint.inertia * dt;
             let limits = &self.chain.joints()[i];
             let next = self.position[i] + self.speed[i] * dt;
@@ -103,7 +104,7 @@ impl Arm {
         self.pose = self.chain.forward(&self.position, &mut self.columns);
     }
 
-    /// The least joint velocities that move the sensor along a straight line in the base [rad/s].
+    /// Returns the smallest joint velocities that move the sensor without rotation at `velocity` in the base [rad/s].
     #[cfg(test)]
     pub(super) fn moves(&self, velocity: nalgebra::Vector3<f64>) -> Vec<f64> {
         let columns: Vec<Vector6<f64>> = self.columns.iter().map(|column| column.0).collect();
@@ -113,22 +114,14 @@ impl Arm {
         (jacobian.transpose() * solved).as_slice().to_vec()
     }
 
-    /// The energy of motion and springs [J].
+    /// Returns the kinetic energy plus that of the springs [J].
     #[cfg(test)]
     pub(super) fn energy(&self) -> f64 {
         let energy = |i: usize| {
             let (joint, off) = (&self.joints[i], self.equilibrium[i] - self.position[i]);
-            let friction = joint.friction / GIVES_WAY * self.strain[i] * self.strain[i];
+            let friction = joint.friction / MAX_STRAIN * self.strain[i] * self.strain[i];
             (joint.inertia * self.speed[i] * self.speed[i] + joint.stiffness * off * off + friction) / 2.0
         };
         (0..self.joints.len()).map(energy).sum()
     }
-}
-
-/// A pose of the runtime as one of the geometry.
-#[must_use]
-pub fn pose3(pose: &Pose) -> Pose3 {
-    let quaternion = nalgebra::UnitQuaternion::from_rotation_matrix(&pose.0.rotation);
-    let rotation = Rot3::from_xyzw(quaternion.i, quaternion.j, quaternion.k, quaternion.w);
-    Pose3::from_parts(Vec3::from(<[f64; 3]>::from(pose.0.translation.vector)), rotation)
 }

@@ -1,13 +1,17 @@
-//! A simulated bench: a pad of foam on an arm in joint impedance, and objects to touch.
+//! A simulated bench: a foam pad on an arm in joint impedance control, and objects to touch.
 //!
-//! [`shape`] and [`object`] are what is touched; [`foam`], [`contact`] and [`imprint`] are how the pad feels it; [`readout`]
-//! is what the electronics make of that; [`joints`] is the arm. [`world`] steps them together, [`truth`] and [`survey`] are what
-//! only a simulation knows, and [`bench`] is the device.
+//! | module | what it simulates |
+//! |---|---|
+//! | [`shape`], [`object`] | the objects |
+//! | [`foam`], [`contact`], [`imprint`] | the pad: forces on each tactel |
+//! | [`readout`] | the electronics: counts from forces |
+//! | [`joints`] | the arm |
+//! | [`world`] | all of them, stepped together |
+//! | [`truth`], [`survey`] | quantities that only a simulation knows |
+//! | [`bench`] | the device |
 //!
-//! What is left out: the foam's columns do not know of each other (no bulging, no shear waves, no compression of the
-//! neighbours beyond the spread of the reading); objects are rigid bodies on springs that do not turn; the arm's joints
-//! are inertias that do not couple, without gravity, Coriolis forces and the elasticity of gears; nothing wears,
-//! sticks or gets warm.
+//! Not simulated: interaction between columns of foam (bulging, shear waves); rotation of objects under load; gravity,
+//! Coriolis forces, coupling of the joints and elasticity of the gears; wear, adhesion and temperature.
 
 pub mod bench;
 pub mod contact;
@@ -15,7 +19,6 @@ pub mod foam;
 pub mod imprint;
 pub mod joints;
 pub mod object;
-pub mod random;
 pub mod readout;
 pub mod shape;
 pub mod survey;

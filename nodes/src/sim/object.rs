@@ -1,22 +1,24 @@
-//! Objects: a shape with a place, a stiffness, a mount that gives way, and a script of how it is moved.
+//! Objects: a shape with a pose, a stiffness, a compliant mount and a script of motions.
 
 use parry3d_f64::math::{Pose3, Rot3, Vec3};
 use parry3d_f64::shape::{Ball, Cuboid};
 use tactflow_runtime::node::{NonNegative, Positive};
 use tactflow_runtime::params;
+use tactflow_runtime::signal::Pose;
 
-use super::shape::Shape;
+use super::shape::{Geometry, pose3};
+use crate::arm::mount::pose_of;
 
 words! {
-    /// What an object looks like.
-    Look {
-        /// A flat surface that has no end.
+    /// Shape of an object.
+    ShapeKind {
+        /// An infinite plane.
         Plane = "plane",
         /// A ball.
         Ball = "ball",
         /// A box with edges.
         Box = "box",
-        /// A cylinder with round ends, along its y.
+        /// A cylinder with round ends along its y.
         Pen = "pen",
         /// An ellipsoid.
         Ellipsoid = "ellipsoid",
@@ -26,90 +28,94 @@ words! {
 }
 
 params! {
-    Thing:
-    /// What it looks like: `plane`, `ball`, `box`, `pen`, `ellipsoid` or `cable`.
-    shape: Look,
-    /// Where its middle is, seen from where the sensor starts, in the sensor's axes; of a plane, where it begins [m].
+    ObjectParams:
+    /// Shape: `plane`, `ball`, `box`, `pen`, `ellipsoid` or `cable`.
+    shape: ShapeKind,
+    /// Position of its centre relative to the sensor at the start, in the sensor's axes; for a plane, a point on it [m].
     at: [f64; 3],
-    /// Its roll, pitch and yaw in the sensor's axes at the start [rad].
+    /// Roll, pitch and yaw in the sensor's axes at the start [rad].
     turn: [f64; 3] = [0.0; 3],
     /// Radius of a ball, a pen or a cable [m].
     radius: Option<Positive>,
     /// Length of a pen between the centres of its ends [m].
     length: Option<Positive>,
-    /// Edges of a box, or axes of an ellipsoid, from end to end [m].
+    /// Edge lengths of a box, or full axes of an ellipsoid [m].
     size: Option<[f64; 3]>,
-    /// Points that a cable goes through, in its own frame [m].
+    /// Points that a cable passes through, in its own frame [m].
     points: Option<Vec<[f64; 3]>>,
-    /// Stiffness of its surface under a tactel of 5 mm by 5 mm; rigid unless given [N/m].
+    /// Stiffness of its surface under a tactel of 5 mm by 5 mm; rigid if not given [N/m].
     stiffness: Option<Positive>,
-    /// Stiffness of the mount that it stands on, in every direction; fixed unless given [N/m].
+    /// Stiffness of its mount in every direction; fixed if not given [N/m].
     mount: Option<Positive>,
-    /// Its mass, which counts if it stands on a mount; the mount's damping is half of the critical [kg].
+    /// Mass, used with a `mount`; the damping of the mount is half of the critical one [kg].
     mass: Positive = Positive(1.0),
-    /// How far its place is off at most, along the sensor's x and y, by the seed [m].
+    /// Largest random offset of its position along the sensor's x and y; it depends on the seed [m].
     scatter: NonNegative = NonNegative(0.0),
-    /// How it is moved.
-    motion: Vec<Move> = vec![],
+    /// Motions over time.
+    motion: Vec<ScriptedMove> = vec![],
 }
 
 params! {
-    Move:
-    /// When it begins [s].
+    ScriptedMove:
+    /// Start of the motion [s].
     from_s: NonNegative,
-    /// When it ends [s].
+    /// End of the motion [s].
     to_s: NonNegative,
-    /// By how much, in the sensor's axes at the start [m].
+    /// Displacement in the sensor's axes at the start [m].
     by: [f64; 3] = [0.0; 3],
-    /// By how much it is turned about its middle, about the sensor's z at the start [rad].
+    /// Rotation about its centre and the sensor's z at the start [rad].
     turn: f64 = 0.0,
 }
 
 /// An object in the base.
 pub struct Object {
-    pub(super) shape: Shape,
-    /// How much its surface gives way under a tactel of 5 mm by 5 mm [m/N].
+    pub(super) shape: Geometry,
+    /// Compliance of its surface under a tactel of 5 mm by 5 mm [m/N].
     pub(super) softness: f64,
     home: Pose3,
-    script: Vec<Step>,
-    /// What it is turned about, in the base.
+    script: Vec<ScriptStep>,
+    /// Axis of its rotation, in the base.
     axis: Vec3,
-    /// Stiffness of the mount [N/m], and the mass on it [kg].
+    /// Stiffness of the mount [N/m] and mass on it [kg].
     mount: Option<(f64, f64)>,
-    /// How far the mount has given way [m].
+    /// Deflection of the mount [m].
     sag: Vec3,
     sag_speed: Vec3,
     pub(super) pose: Pose3,
     velocity: Vec3,
-    /// [rad/s]
+    /// Angular velocity about `axis` [rad/s].
     spin: f64,
 }
 
-/// A step of the script.
-struct Step {
+/// A motion of the script.
+struct ScriptStep {
     from: f64,
     to: f64,
-    /// In the base.
+    /// Displacement in the base [m].
     by: Vec3,
     turn: f64,
 }
 
-/// Damping of a mount, of the critical.
+/// Damping of a mount as a fraction of the critical one [1].
 pub(super) const MOUNT_DAMPING: f64 = 0.5;
 
 impl Object {
-    /// An object seen from a sensor that starts at `start` in the base, moved aside by `offset` in the sensor's axes.
+    /// Returns an object placed relative to a sensor that starts at `start` in the base, shifted by `offset` [m] along the
+    /// sensor's x and y.
     ///
     /// # Errors
-    /// What is wrong with its measures.
-    pub fn new(thing: &Thing, start: Pose3, offset: [f64; 2]) -> Result<Self, String> {
-        let shape = shape_of(thing)?;
-        if let Some(step) = thing.motion.iter().find(|step| *step.to_s <= *step.from_s) {
-            return Err(format!("a motion from {} s to {} s lasts no time", *step.from_s, *step.to_s));
+    /// If a parameter of the shape is missing, not used or not positive, or if a motion has no duration.
+    pub fn new(params: &ObjectParams, start: Pose3, offset: [f64; 2]) -> Result<Self, String> {
+        let shape = shape_of(params)?;
+        if let Some(step) = params.motion.iter().find(|step| *step.to_s <= *step.from_s) {
+            return Err(format!(
+                "a motion must end after it starts, but this one is from {} s to {} s",
+                *step.from_s, *step.to_s
+            ));
         }
-        let at = Vec3::from(thing.at) + Vec3::new(offset[0], offset[1], 0.0);
-        let home = start * Pose3::from_parts(at, turned(thing.turn));
-        let step = |step: &Move| Step {
+        let at = Vec3::from(params.at) + Vec3::new(offset[0], offset[1], 0.0);
+        let home = start * Pose3::from_parts(at, pose3(&Pose(pose_of([0.0; 3], params.turn))).rotation);
+        let step = |step: &ScriptedMove| ScriptStep {
             from: *step.from_s,
             to: *step.to_s,
             by: start.rotation * Vec3::from(step.by),
@@ -117,11 +123,11 @@ impl Object {
         };
         Ok(Self {
             shape,
-            softness: thing.stiffness.map_or(0.0, |stiffness| 1.0 / *stiffness),
+            softness: params.stiffness.map_or(0.0, |stiffness| 1.0 / *stiffness),
             home,
-            script: thing.motion.iter().map(step).collect(),
+            script: params.motion.iter().map(step).collect(),
             axis: start.rotation * Vec3::Z,
-            mount: thing.mount.map(|stiffness| (*stiffness, *thing.mass)),
+            mount: params.mount.map(|stiffness| (*stiffness, *params.mass)),
             sag: Vec3::ZERO,
             sag_speed: Vec3::ZERO,
             pose: home,
@@ -130,48 +136,48 @@ impl Object {
         })
     }
 
-    /// Goes on by `dt` to `time` [s] under the force of the pad [N].
+    /// Advances by `dt` [s] to `time` [s] under the `force` of the pad [N].
     pub fn step(&mut self, time: f64, dt: f64, force: Vec3) {
         if let Some((stiffness, mass)) = self.mount {
             let damping = 2.0 * MOUNT_DAMPING * (stiffness * mass).sqrt();
             self.sag_speed += (force - self.sag * stiffness - self.sag_speed * damping) / mass * dt;
             self.sag += self.sag_speed * dt;
         }
-        let (mut place, mut velocity) = (self.home.translation + self.sag, self.sag_speed);
-        let (mut turn, mut spin) = (0.0, 0.0);
+        let (mut position, mut velocity) = (self.home.translation + self.sag, self.sag_speed);
+        let (mut angle, mut spin) = (0.0, 0.0);
         for step in &self.script {
             let span = step.to - step.from;
-            let (share, rate) = eased((time - step.from) / span);
-            place += step.by * share;
+            let (part, rate) = ease((time - step.from) / span);
+            position += step.by * part;
             velocity += step.by * (rate / span);
-            turn += step.turn * share;
+            angle += step.turn * part;
             spin += step.turn * rate / span;
         }
-        let (sin, cos) = libm::sincos(turn / 2.0);
+        let (sin, cos) = libm::sincos(angle / 2.0);
         let turned = Rot3::from_xyzw(self.axis.x * sin, self.axis.y * sin, self.axis.z * sin, cos);
-        self.pose = Pose3::from_parts(place, turned * self.home.rotation);
+        self.pose = Pose3::from_parts(position, turned * self.home.rotation);
         (self.velocity, self.spin) = (velocity, spin);
     }
 
-    /// How fast it moves at a point in the base [m/s].
+    /// Returns its velocity at a point in the base [m/s].
     #[must_use]
     pub fn velocity_at(&self, point: Vec3) -> Vec3 {
         self.velocity + self.spin().cross(point - self.pose.translation)
     }
 
-    /// How far its mount has given way [m].
+    /// Returns the deflection of its mount [m].
     #[must_use]
     pub const fn sag(&self) -> Vec3 {
         self.sag
     }
 
-    /// How it turns, in the base [rad/s].
+    /// Returns its angular velocity in the base [rad/s].
     #[must_use]
     pub fn spin(&self) -> Vec3 {
         self.axis * self.spin
     }
 
-    /// The energy of the mount and of the mass on it [J].
+    /// Returns the energy of the mount and of the mass on it [J].
     #[cfg(test)]
     pub(super) fn energy(&self) -> f64 {
         let energy = |(stiffness, mass): (f64, f64)| {
@@ -181,56 +187,55 @@ impl Object {
     }
 }
 
-/// From 0 to 1 without a jump of speed; and its rate.
-fn eased(t: f64) -> (f64, f64) {
+/// Returns a value that goes from 0 to 1 for t from 0 to 1 without a jump of its slope, and the slope.
+fn ease(t: f64) -> (f64, f64) {
     if (0.0..1.0).contains(&t) { (t * t * (3.0 - 2.0 * t), 6.0 * t * (1.0 - t)) } else { (f64::from(t >= 1.0), 0.0) }
 }
 
-/// A rotation from roll, pitch and yaw.
-fn turned(rpy: [f64; 3]) -> Rot3 {
-    let pose = crate::arm::mount::pose_of([0.0; 3], rpy);
-    let quaternion = nalgebra::UnitQuaternion::from_rotation_matrix(&pose.rotation);
-    Rot3::from_xyzw(quaternion.i, quaternion.j, quaternion.k, quaternion.w)
-}
-
-fn shape_of(thing: &Thing) -> Result<Shape, String> {
-    let look = thing.shape;
-    let given = |name: &str| format!("a {look} needs `{name}`");
-    let radius = || thing.radius.map(|radius| *radius).ok_or_else(|| given("radius"));
+fn shape_of(params: &ObjectParams) -> Result<Geometry, String> {
+    let kind = params.shape;
+    let given = |name: &str| format!("a {kind} needs `{name}`");
+    let radius = || params.radius.map(|radius| *radius).ok_or_else(|| given("radius"));
     let size = || {
-        let size = thing.size.ok_or_else(|| given("size"))?;
+        let size = params.size.ok_or_else(|| given("size"))?;
         let is_good = size.iter().all(|size| *size > 0.0 && size.is_finite());
-        if is_good { Ok(size.map(|size| size / 2.0)) } else { Err("a size is greater than 0".to_owned()) }
+        if is_good {
+            Ok(size.map(|size| size / 2.0))
+        } else {
+            Err("each entry of `size` must be greater than 0".to_owned())
+        }
     };
-    let wanted: &[&str] = match look {
-        Look::Plane => &[],
-        Look::Ball => &["radius"],
-        Look::Box | Look::Ellipsoid => &["size"],
-        Look::Pen => &["radius", "length"],
-        Look::Cable => &["radius", "points"],
+    let used: &[&str] = match kind {
+        ShapeKind::Plane => &[],
+        ShapeKind::Ball => &["radius"],
+        ShapeKind::Box | ShapeKind::Ellipsoid => &["size"],
+        ShapeKind::Pen => &["radius", "length"],
+        ShapeKind::Cable => &["radius", "points"],
     };
     let has = [
-        ("radius", thing.radius.is_some()),
-        ("length", thing.length.is_some()),
-        ("size", thing.size.is_some()),
-        ("points", thing.points.is_some()),
+        ("radius", params.radius.is_some()),
+        ("length", params.length.is_some()),
+        ("size", params.size.is_some()),
+        ("points", params.points.is_some()),
     ];
-    if let Some((name, _)) = has.iter().find(|(name, is)| *is && !wanted.contains(name)) {
-        return Err(format!("a {look} has no `{name}`"));
+    if let Some((name, _)) = has.iter().find(|(name, is)| *is && !used.contains(name)) {
+        return Err(format!("a {kind} has no `{name}`"));
     }
-    Ok(match look {
-        Look::Plane => Shape::plane(),
-        Look::Ball => Shape::Ball(Ball::new(radius()?)),
-        Look::Box => Shape::Box(Cuboid::new(Vec3::from(size()?))),
-        Look::Ellipsoid => Shape::ellipsoid(size()?),
-        Look::Pen => Shape::pen(radius()?, *thing.length.ok_or_else(|| given("length"))?),
-        Look::Cable => {
-            let points = thing.points.as_ref().ok_or_else(|| given("points"))?;
+    Ok(match kind {
+        ShapeKind::Plane => Geometry::plane(),
+        ShapeKind::Ball => Geometry::Ball(Ball::new(radius()?)),
+        ShapeKind::Box => Geometry::Box(Cuboid::new(Vec3::from(size()?))),
+        ShapeKind::Ellipsoid => Geometry::ellipsoid(size()?),
+        ShapeKind::Pen => Geometry::pen(radius()?, *params.length.ok_or_else(|| given("length"))?),
+        ShapeKind::Cable => {
+            let points = params.points.as_ref().ok_or_else(|| given("points"))?;
             let is_far = |pair: &[[f64; 3]]| Vec3::from(pair[0]).distance(Vec3::from(pair[1])) > 1e-4;
             if points.len() < 2 || !points.windows(2).all(is_far) {
-                return Err("a cable needs two points or more, each 0.1 mm or more from the one before".to_owned());
+                return Err(
+                    "`points` of a cable must be two or more, each at least 0.1 mm from the one before".to_owned()
+                );
             }
-            Shape::cable(radius()?, points)
+            Geometry::cable(radius()?, points)
         }
     })
 }

@@ -1,39 +1,40 @@
-//! What the electronics make of the force on each tactel: a squashed, spread, hysteretic, creeping, noisy 12 bit count.
+//! The electronics: 12 bit counts from the force on each tactel, with saturation, variation between tactels, hysteresis,
+//! creep and noise.
 //!
-//! A tactel reads offset + a (1 - exp(-u / b)) counts, with a and b spread over the pad. u is its force, with hysteresis
-//! (more is read while the force falls) and creep (it reads ever more under a load that stays). The noise of a frame
-//! has a share that all tactels have in common, as a factor, and one of each tactel's own.
+//! A tactel reads offset + a (1 - exp(-u / b)) counts, where a and b vary over the pad. u is the force with hysteresis (the
+//! reading is higher while the force falls) and creep (the reading rises under a constant load). The noise of a frame is
+//! a factor that all tactels share, plus independent noise of each tactel.
 
 use tactflow_runtime::node::{NonNegative, Positive, Ratio};
 use tactflow_runtime::params;
 
-use super::random::Random;
+use crate::random::Random;
 
 params! {
     Electronics:
-    /// Which piece of hardware it is: the seed of its offsets and curves.
+    /// Serial number of the hardware: the seed of the offsets and curves of its tactels.
     serial: u64 = 1,
-    /// Greatest answer of a tactel [counts].
+    /// Range of a tactel above its offset [counts].
     range: Positive = Positive(3000.0),
-    /// Force at which a tactel has answered by 63 % of that [N].
+    /// Force at which a tactel reads 63 % of its range [N].
     squash: Positive = Positive(3.0),
     /// Standard deviation of the logarithm of the tactels' sensitivity [1].
     spread: NonNegative = NonNegative(0.22),
-    /// How much more is read at a force that falls than at one that rises, of the force [1].
+    /// Difference of the reading between falling and rising force, as a fraction of the force [1].
     hysteresis: Ratio = Ratio(0.06),
-    /// What the reading rises by under a load that stays, of the force [1].
+    /// Rise of the reading under a constant load, as a fraction of the force [1].
     creep: Ratio = Ratio(0.03),
-    /// Time that creep takes [s].
+    /// Time constant of the creep [s].
     creep_s: Positive = Positive(15.0),
-    /// Standard deviation of the noise that all tactels have in common, of what is read [1].
+    /// Standard deviation of the noise that all tactels share, as a fraction of the reading [1].
     common_noise: NonNegative = NonNegative(0.036),
-    /// Standard deviation of each tactel's own noise [counts].
+    /// Standard deviation of the independent noise of each tactel [counts].
     own_noise: NonNegative = NonNegative(3.0),
 }
 
 impl Electronics {
-    /// The pad of the paper, as far as is known.
-    pub const USUAL: Self = Self {
+    /// The pad of the paper, as far as its properties are known.
+    pub const DEFAULT: Self = Self {
         serial: 1,
         range: Positive(3000.0),
         squash: Positive(3.0),
@@ -46,88 +47,88 @@ impl Electronics {
     };
 }
 
-/// The largest count of 12 bits.
-const TOP: f64 = 4095.0;
-/// Change of the force over which hysteresis changes sides [N].
-const TURN: f64 = 0.15;
+/// Largest count of 12 bits.
+const MAX_COUNT: f64 = 4095.0;
+/// Change of the force over which the hysteresis switches its branch [N].
+const HYSTERESIS_FORCE: f64 = 0.15;
 
-/// The electronics with the state of every tactel.
+/// The electronics, with the state of every tactel.
 pub struct Readout {
-    tactels: Vec<Tactel>,
+    tactels: Vec<TactelState>,
     electronics: Electronics,
     noise: Random,
 }
 
 #[derive(Debug, Clone)]
-struct Tactel {
+struct TactelState {
     offset: f64,
-    /// Greatest answer [counts].
+    /// Range above the offset [counts].
     range: f64,
-    /// [N]
+    /// Force at 63 % of the range [N].
     squash: f64,
     force: f64,
-    /// Side of the hysteresis, from -1 (the force falls) to 1 (it rises).
-    side: f64,
-    /// Force that creep has got used to [N].
+    /// Branch of the hysteresis, from -1 (falling force) to 1 (rising force).
+    branch: f64,
+    /// Low-passed force that drives the creep [N].
     crept: f64,
 }
 
 impl Readout {
-    /// A pad of so many tactels; `seed` is that of the noise.
+    /// Returns the electronics of a pad with a number of `tactels`; `seed` is the seed of the noise.
     #[must_use]
     pub fn new(tactels: usize, electronics: Electronics, seed: u64) -> Self {
         let mut random = Random::new(electronics.serial, 1);
         let tactel = |_| {
             let sensitivity = libm::exp(random.normal() * *electronics.spread);
             let width = libm::exp(random.normal() * *electronics.spread / 4.0);
-            Tactel {
+            TactelState {
                 offset: random.uniform(0.05, 0.10) * *electronics.range,
-                range: (*electronics.range * sensitivity * width).min(0.88 * TOP),
+                range: (*electronics.range * sensitivity * width).min(0.88 * MAX_COUNT),
                 squash: *electronics.squash * width,
                 force: 0.0,
-                side: 0.0,
+                branch: 0.0,
                 crept: 0.0,
             }
         };
         Self { tactels: (0..tactels).map(tactel).collect(), electronics, noise: Random::new(seed, 2) }
     }
 
-    /// Reads a frame, `dt` [s] after the last, of these forces [N].
+    /// Reads a frame of these forces [N], `dt` [s] after the last frame, into `counts`.
     pub fn read(&mut self, dt: f64, forces: &[f64], counts: &mut [f32]) {
         let electronics = &self.electronics;
         let common = 1.0 + *electronics.common_noise * self.noise.normal();
         let creep = 1.0 - libm::exp(-dt / *electronics.creep_s);
         for ((tactel, force), count) in self.tactels.iter_mut().zip(forces).zip(counts) {
             let felt = tactel.feel(*force, creep, electronics);
-            let answer = if felt > 0.0 { tactel.range * (1.0 - libm::exp(-felt / tactel.squash)) } else { 0.0 };
+            let reading = if felt > 0.0 { tactel.range * (1.0 - libm::exp(-felt / tactel.squash)) } else { 0.0 };
             let noise = *electronics.own_noise * self.noise.normal();
-            *count = (tactel.offset + answer * common + noise).round().clamp(0.0, TOP) as f32;
+            *count = (tactel.offset + reading * common + noise).round().clamp(0.0, MAX_COUNT) as f32;
         }
     }
 }
 
 impl Readout {
-    /// Standard deviation that both shares of the noise, the common one and the tactels' own, give the mean force of
-    /// `tactels` tactels, of `pressure` on average [N per tactel].
+    /// Returns the standard deviations that the common and the independent noise give to the mean force of `tactels`
+    /// tactels, at a mean force of `pressure` [N per tactel].
     #[must_use]
     pub fn noise(&self, pressure: f64, tactels: usize) -> [f64; 2] {
         let electronics = &self.electronics;
-        // The slope of the curve that is neither more nor less sensitive than others.
+        // The slope of the curve of a tactel of average sensitivity.
         let slope = *electronics.range / *electronics.squash * libm::exp(-pressure / *electronics.squash);
         [*electronics.common_noise * pressure, *electronics.own_noise / slope / (tactels as f64).sqrt()]
     }
 }
 
-impl Tactel {
+impl TactelState {
     fn feel(&mut self, force: f64, creep: f64, electronics: &Electronics) -> f64 {
         let change = force - self.force;
         if change != 0.0 {
             let toward = change.signum();
-            self.side = toward + (self.side - toward) * libm::exp(-change.abs() / TURN);
+            self.branch = toward + (self.branch - toward) * libm::exp(-change.abs() / HYSTERESIS_FORCE);
             self.force = force;
         }
         self.crept += (force - self.crept) * creep;
-        force * (1.0 - 0.5 * *electronics.hysteresis * self.side) + *electronics.creep * self.crept
+        force * (1.0 - 0.5 * *electronics.hysteresis * self.branch) + *electronics.creep * self.crept
     }
 }
 
@@ -142,7 +143,7 @@ mod tests {
             creep: Ratio(0.0),
             common_noise: NonNegative(0.0),
             own_noise: NonNegative(0.0),
-            ..Electronics::USUAL
+            ..Electronics::DEFAULT
         };
         change(&mut electronics);
         Readout::new(1, electronics, 1)
@@ -155,7 +156,7 @@ mod tests {
     }
 
     #[test]
-    fn the_curve_is_squashed() {
+    fn the_curve_saturates() {
         let mut readout = one(|_| {});
         let offset = read(&mut readout, 0.004, 0.0);
         assert!((149.0..=301.0).contains(&offset), "{offset}");
@@ -163,11 +164,11 @@ mod tests {
             let wanted = 3000.0 * (1.0 - (-force / 3.0f64).exp());
             assert!((read(&mut readout, 0.004, force) - offset - wanted).abs() <= 1.0, "{force}");
         }
-        assert_eq!(read(&mut readout, 0.004, f64::MAX), offset + 3000.0, "and ends");
+        assert_eq!(read(&mut readout, 0.004, f64::MAX), offset + 3000.0, "the reading saturates");
     }
 
     #[test]
-    fn more_is_read_on_the_way_back_and_under_a_load_that_stays() {
+    fn hysteresis_and_creep_raise_the_reading() {
         let mut readout = one(|e| e.hysteresis = Ratio(0.1));
         for step in 0..=100 {
             read(&mut readout, 0.004, 0.02 * f64::from(step));
@@ -187,9 +188,9 @@ mod tests {
     }
 
     #[test]
-    fn the_noise_has_both_shares() {
+    fn the_noise_has_a_common_and_an_independent_part() {
         let electronics =
-            Electronics { spread: NonNegative(0.0), hysteresis: Ratio(0.0), creep: Ratio(0.0), ..Electronics::USUAL };
+            Electronics { spread: NonNegative(0.0), hysteresis: Ratio(0.0), creep: Ratio(0.0), ..Electronics::DEFAULT };
         let mut readout = Readout::new(256, electronics, 3);
         let frames: Vec<Vec<f32>> = (0..2000)
             .map(|_| {
@@ -210,9 +211,9 @@ mod tests {
     }
 
     #[test]
-    fn a_serial_number_is_a_pad() {
+    fn the_serial_number_determines_the_offsets() {
         let counts = |serial, seed| {
-            let electronics = Electronics { serial, own_noise: NonNegative(0.0), ..Electronics::USUAL };
+            let electronics = Electronics { serial, own_noise: NonNegative(0.0), ..Electronics::DEFAULT };
             let mut counts = vec![0.0; 16];
             Readout::new(16, electronics, seed).read(0.004, &[0.0; 16], &mut counts);
             counts

@@ -1,32 +1,33 @@
-//! The shapes of objects, in their own frames. Every query is one of `parry3d`'s.
+//! Geometry of objects, in their own frames. Every query is answered by `parry3d`.
 //!
-//! An ellipsoid is a unit ball whose space is stretched: a ray that is stretched back hits the ball after the same time,
-//! and normals stretch the other way. A cable is a chain of capsules along a spline.
+//! An ellipsoid is a unit ball in scaled space: a ray in unscaled space hits it after the same time, and normals scale
+//! inversely. A cable is a chain of capsules along a spline.
 
-use parry3d_f64::math::{Pose3, Vec3};
+use parry3d_f64::math::{Pose3, Rot3, Vec3};
 use parry3d_f64::query::{PointQuery, PointQueryWithLocation, Ray, RayCast};
 use parry3d_f64::shape::{Ball, Capsule, Compound, Cuboid, HalfSpace, Polyline, SharedShape, TriMesh};
+use tactflow_runtime::signal::Pose;
 
-/// What an object looks like, in its own frame [m].
-pub enum Shape {
-    /// Everything behind the plane z = 0; the sensor touches it along its z.
+/// The geometry of an object, in its own frame [m].
+pub enum Geometry {
+    /// The half space z >= 0; the sensor touches it along its z.
     Plane(HalfSpace),
-    /// A ball about the origin.
+    /// A ball centred at the origin.
     Ball(Ball),
-    /// A box about the origin, its faces across the axes.
+    /// A box centred at the origin, with edges along the axes.
     Box(Cuboid),
-    /// A cylinder with round ends along y about the origin.
+    /// A cylinder with round ends along y, centred at the origin.
     Pen(Capsule),
-    /// An ellipsoid about the origin.
+    /// An ellipsoid centred at the origin.
     Ellipsoid(Ellipsoid),
-    /// A round cable on the origin's plane.
+    /// A round cable.
     Cable(Cable),
 }
 
-/// An ellipsoid by its half axes.
+/// An ellipsoid with its half axes.
 pub struct Ellipsoid {
     axes: Vec3,
-    /// For distances, which do not stretch.
+    /// For distances, which cannot be computed in unscaled space.
     mesh: TriMesh,
 }
 
@@ -37,42 +38,42 @@ pub struct Cable {
     radius: f64,
 }
 
-/// Where a ray meets an object.
+/// The point where a ray hits an object.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Hit {
-    /// Along the ray, in lengths of its direction.
+    /// Distance along the ray, in lengths of its direction.
     pub time: f64,
-    /// Out of the object, of unit length.
+    /// Outward unit normal of the object.
     pub normal: Vec3,
 }
 
-/// The line that an object follows: an axis, an edge, a course.
+/// The line of an object: the axis of a pen, an edge of a box, the course of a cable.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Line {
-    /// Its point that is nearest.
+    /// Nearest point of the line.
     pub at: Vec3,
-    /// Its direction there, of unit length; either way along it.
+    /// Unit vector along the line at that point, in either direction.
     pub along: Vec3,
 }
 
-impl Shape {
-    /// A half space whose surface faces against z.
+impl Geometry {
+    /// Returns a half space whose outward normal is -z.
     #[must_use]
     pub fn plane() -> Self {
         Self::Plane(HalfSpace::new(-Vec3::Z))
     }
 
-    /// A cylinder of that length between the centres of its round ends.
+    /// Returns a cylinder with round ends, with a `length` between the centres of its ends [m].
     #[must_use]
     pub fn pen(radius: f64, length: f64) -> Self {
         let half = Vec3::new(0.0, length / 2.0, 0.0);
         Self::Pen(Capsule::new(-half, half, radius))
     }
 
-    /// An ellipsoid of these half axes.
+    /// Returns an ellipsoid with these half axes [m].
     #[must_use]
     pub fn ellipsoid(axes: [f64; 3]) -> Self {
-        // 96 x 48 facets: off by 0.03 mm on half axes of 0.1 m.
+        // 96 x 48 facets: the error is 0.03 mm for half axes of 0.1 m.
         let (points, faces) = Ball::new(1.0).to_trimesh(96, 48);
         let axes = Vec3::from(axes);
         let points = points.into_iter().map(|point| point * axes).collect();
@@ -80,7 +81,7 @@ impl Shape {
         Self::Ellipsoid(Ellipsoid { axes, mesh })
     }
 
-    /// A cable along a smooth curve through `points`.
+    /// Returns a cable along a smooth curve through `points` [m].
     #[must_use]
     pub fn cable(radius: f64, points: &[[f64; 3]]) -> Self {
         let points = smooth(points);
@@ -89,31 +90,31 @@ impl Shape {
         Self::Cable(Cable { capsules, line: Polyline::new(points, None), radius })
     }
 
-    /// Where a ray from outside first meets it, up to `most` lengths of its direction.
+    /// Returns the first hit of a ray from outside, within `max_time` lengths of its direction.
     #[must_use]
-    pub fn cast(&self, origin: Vec3, direction: Vec3, most: f64) -> Option<Hit> {
+    pub fn cast(&self, origin: Vec3, direction: Vec3, max_time: f64) -> Option<Hit> {
         let ray = Ray::new(origin, direction);
         let hit = match self {
-            Self::Plane(shape) => shape.cast_local_ray_and_get_normal(&ray, most, true),
-            Self::Ball(shape) => shape.cast_local_ray_and_get_normal(&ray, most, true),
-            Self::Box(shape) => shape.cast_local_ray_and_get_normal(&ray, most, true),
-            Self::Pen(shape) => shape.cast_local_ray_and_get_normal(&ray, most, true),
-            Self::Cable(cable) => cable.capsules.cast_local_ray_and_get_normal(&ray, most, true),
+            Self::Plane(shape) => shape.cast_local_ray_and_get_normal(&ray, max_time, true),
+            Self::Ball(shape) => shape.cast_local_ray_and_get_normal(&ray, max_time, true),
+            Self::Box(shape) => shape.cast_local_ray_and_get_normal(&ray, max_time, true),
+            Self::Pen(shape) => shape.cast_local_ray_and_get_normal(&ray, max_time, true),
+            Self::Cable(cable) => cable.capsules.cast_local_ray_and_get_normal(&ray, max_time, true),
             Self::Ellipsoid(Ellipsoid { axes, .. }) => {
                 let ray = Ray::new(origin / *axes, direction / *axes);
-                Ball::new(1.0).cast_local_ray_and_get_normal(&ray, most, true)
+                Ball::new(1.0).cast_local_ray_and_get_normal(&ray, max_time, true)
             }
         }?;
         let normal = match self {
             Self::Ellipsoid(Ellipsoid { axes, .. }) => (hit.normal / *axes).normalize_or_zero(),
             _ => hit.normal,
         };
-        // A ray that begins inside has no normal: it has run all the way.
+        // A ray that starts inside has no normal.
         let normal = if hit.time_of_impact > 0.0 { normal } else { -direction.normalize_or_zero() };
         Some(Hit { time: hit.time_of_impact, normal })
     }
 
-    /// How far a point is from it at least; 0 inside.
+    /// Returns a lower bound of the distance from a point to the object [m]; 0 inside.
     #[must_use]
     pub fn clearance(&self, point: Vec3) -> f64 {
         match self {
@@ -128,7 +129,7 @@ impl Shape {
         }
     }
 
-    /// How far a point is from the surface, on either side.
+    /// Returns the distance from a point to the surface, on either side [m].
     #[must_use]
     pub fn distance(&self, point: Vec3) -> f64 {
         match self {
@@ -141,7 +142,7 @@ impl Shape {
         }
     }
 
-    /// The line it follows, where it is nearest to a point; none if it has none.
+    /// Returns the line of the object nearest to a point, or `None` if the object has no line.
     #[must_use]
     pub fn line(&self, point: Vec3) -> Option<Line> {
         match self {
@@ -160,7 +161,7 @@ impl Shape {
     }
 }
 
-/// The edge of a box that is nearest to a point.
+/// Returns the edge of a box nearest to a point.
 fn edge(half: Vec3, point: Vec3) -> Line {
     let edges = (0..3).flat_map(|axis| (0..4).map(move |corner| (axis, corner)));
     let lines = edges.map(|(axis, corner)| {
@@ -176,9 +177,9 @@ fn edge(half: Vec3, point: Vec3) -> Line {
     lines.min_by(|a, b| a.at.distance(point).total_cmp(&b.at.distance(point))).expect("a box has edges")
 }
 
-/// A curve through the points with continuous directions (Catmull and Rom), in short pieces.
+/// Returns a polyline along the Catmull-Rom spline through `points`.
 fn smooth(points: &[[f64; 3]]) -> Vec<Vec3> {
-    /// Pieces between two points.
+    /// Segments of the polyline between two points.
     const PIECES: usize = 8;
     let points: Vec<Vec3> = points.iter().copied().map(Vec3::from).collect();
     let last = points.len() - 1;
@@ -198,6 +199,14 @@ fn smooth(points: &[[f64; 3]]) -> Vec<Vec3> {
     curve
 }
 
+/// Converts a pose of the runtime to one of the geometry library.
+#[must_use]
+pub fn pose3(pose: &Pose) -> Pose3 {
+    let quaternion = nalgebra::UnitQuaternion::from_rotation_matrix(&pose.0.rotation);
+    let rotation = Rot3::from_xyzw(quaternion.i, quaternion.j, quaternion.k, quaternion.w);
+    Pose3::from_parts(Vec3::from(<[f64; 3]>::from(pose.0.translation.vector)), rotation)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -207,13 +216,13 @@ mod tests {
     }
 
     #[test]
-    fn rays_along_z_meet_each_shape_where_its_equation_says() {
-        let cable = Shape::cable(0.003, &[[0.0, -0.1, 0.0], [0.0, 0.0, 0.0], [0.0, 0.1, 0.0]]);
+    fn rays_along_z_hit_each_shape_as_its_equation_predicts() {
+        let cable = Geometry::cable(0.003, &[[0.0, -0.1, 0.0], [0.0, 0.0, 0.0], [0.0, 0.1, 0.0]]);
         let cases = [
-            (Shape::plane(), v(0.01, 0.02, -0.05), 0.05, v(0.0, 0.0, -1.0)),
-            (Shape::Ball(Ball::new(0.05)), v(0.03, 0.0, -0.1), 0.06, v(0.6, 0.0, -0.8)),
-            (Shape::Box(Cuboid::new(v(0.1, 0.1, 0.02))), v(0.05, -0.05, -0.05), 0.03, v(0.0, 0.0, -1.0)),
-            (Shape::pen(0.005, 0.1), v(0.003, 0.02, -0.05), 0.046, v(0.6, 0.0, -0.8)),
+            (Geometry::plane(), v(0.01, 0.02, -0.05), 0.05, v(0.0, 0.0, -1.0)),
+            (Geometry::Ball(Ball::new(0.05)), v(0.03, 0.0, -0.1), 0.06, v(0.6, 0.0, -0.8)),
+            (Geometry::Box(Cuboid::new(v(0.1, 0.1, 0.02))), v(0.05, -0.05, -0.05), 0.03, v(0.0, 0.0, -1.0)),
+            (Geometry::pen(0.005, 0.1), v(0.003, 0.02, -0.05), 0.046, v(0.6, 0.0, -0.8)),
             (cable, v(0.0018, 0.02, -0.05), 0.0476, v(0.6, 0.0, -0.8)),
         ];
         for (shape, origin, time, normal) in cases {
@@ -221,14 +230,14 @@ mod tests {
             assert!((hit.time - time).abs() < 1e-9, "{hit:?}");
             assert!(hit.normal.distance(normal) < 1e-6, "{hit:?}");
             assert_eq!(shape.cast(origin, -Vec3::Z, 1.0), None);
-            assert_eq!(shape.cast(origin, Vec3::Z, 0.9 * time), None, "not that far");
+            assert_eq!(shape.cast(origin, Vec3::Z, 0.9 * time), None, "beyond the range of the ray");
         }
     }
 
     #[test]
-    fn an_ellipsoid_is_hit_on_its_surface_along_its_gradient() {
+    fn a_ray_hits_an_ellipsoid_on_its_surface_with_its_gradient_as_normal() {
         let axes = [0.08, 0.05, 0.03];
-        let shape = Shape::ellipsoid(axes);
+        let shape = Geometry::ellipsoid(axes);
         for (x, y) in [(0.0, 0.0), (0.03, 0.01), (-0.05, 0.02), (0.0, -0.04)] {
             let z = -axes[2] * (1.0 - (x / axes[0]).powi(2) - (y / axes[1]).powi(2)).sqrt();
             let hit = shape.cast(v(x, y, -0.1), Vec3::Z, 1.0).unwrap();
@@ -241,14 +250,14 @@ mod tests {
     }
 
     #[test]
-    fn clearance_never_says_more_than_there_is() {
+    fn clearance_is_a_lower_bound_of_the_distance() {
         let shapes = [
-            Shape::plane(),
-            Shape::Ball(Ball::new(0.05)),
-            Shape::Box(Cuboid::new(v(0.1, 0.1, 0.02))),
-            Shape::pen(0.005, 0.1),
-            Shape::ellipsoid([0.08, 0.05, 0.03]),
-            Shape::cable(0.003, &[[0.0, -0.1, 0.0], [0.02, 0.0, 0.0], [0.0, 0.1, 0.0]]),
+            Geometry::plane(),
+            Geometry::Ball(Ball::new(0.05)),
+            Geometry::Box(Cuboid::new(v(0.1, 0.1, 0.02))),
+            Geometry::pen(0.005, 0.1),
+            Geometry::ellipsoid([0.08, 0.05, 0.03]),
+            Geometry::cable(0.003, &[[0.0, -0.1, 0.0], [0.02, 0.0, 0.0], [0.0, 0.1, 0.0]]),
         ];
         for shape in &shapes {
             for i in 0..1000 {
@@ -260,19 +269,19 @@ mod tests {
     }
 
     #[test]
-    fn lines_are_followed() {
-        let pen = Shape::pen(0.005, 0.1);
+    fn pens_boxes_and_cables_have_lines() {
+        let pen = Geometry::pen(0.005, 0.1);
         let line = pen.line(v(0.01, 0.02, -0.01)).unwrap();
         assert!(line.at.distance(v(0.0, 0.02, 0.0)) < 1e-12 && line.along == Vec3::Y, "{line:?}");
-        let block = Shape::Box(Cuboid::new(v(0.1, 0.1, 0.02)));
+        let block = Geometry::Box(Cuboid::new(v(0.1, 0.1, 0.02)));
         let line = block.line(v(0.08, 0.03, -0.03)).unwrap();
         assert_eq!((line.at, line.along), (v(0.1, 0.03, -0.02), Vec3::Y));
         let circle: Vec<[f64; 3]> =
             (0..=20).map(|i| f64::from(i) * 0.05).map(|a| [0.2 * a.sin(), -0.2 * a.cos(), 0.0]).collect();
-        let cable = Shape::cable(0.003, &circle);
+        let cable = Geometry::cable(0.003, &circle);
         let line = cable.line(v(0.1, -0.15, 0.01)).unwrap();
         assert!((line.at.length() - 0.2).abs() < 2e-5, "{line:?}");
         assert!(line.along.dot(line.at.normalize()).abs() < 0.01, "{line:?}");
-        assert_eq!(Shape::plane().line(Vec3::ZERO), None);
+        assert_eq!(Geometry::plane().line(Vec3::ZERO), None);
     }
 }

@@ -1,12 +1,12 @@
-//! Objects for the tests of the simulation.
+//! Objects for tests of the simulation.
 
 use tactflow_runtime::node::{NonNegative, Positive};
 
-use super::object::{Look, Thing};
+use super::object::{ObjectParams, ShapeKind};
 
-/// A rigid, fixed object without a size.
-pub(super) fn thing(shape: Look, at: [f64; 3]) -> Thing {
-    Thing {
+/// Returns a rigid, fixed object without a size.
+pub(super) fn thing(shape: ShapeKind, at: [f64; 3]) -> ObjectParams {
+    ObjectParams {
         shape,
         at,
         turn: [0.0; 3],
@@ -22,7 +22,7 @@ pub(super) fn thing(shape: Look, at: [f64; 3]) -> Thing {
     }
 }
 
-/// A rigid ball.
-pub(super) fn ball(radius: f64, at: [f64; 3]) -> Thing {
-    Thing { radius: Some(Positive(radius)), ..thing(Look::Ball, at) }
+/// Returns a rigid, fixed ball.
+pub(super) fn ball(radius: f64, at: [f64; 3]) -> ObjectParams {
+    ObjectParams { radius: Some(Positive(radius)), ..thing(ShapeKind::Ball, at) }
 }

@@ -5,14 +5,14 @@ use parry3d_f64::math::{Pose3, Vec3};
 use tactflow_runtime::node::{NonNegative, Positive};
 use tactflow_runtime::signal::{ImageShape, Joint as Limits, Unit};
 
-use super::contact::{Contact, Motion};
+use super::contact::{BodyMotion, Contact};
 use super::foam::Foam;
 use super::imprint::Imprint;
-use super::joints::{Arm, Joint};
-use super::object::{Look, Move, Object, Thing};
+use super::joints::{JointDynamics, SimArm};
+use super::object::{Object, ObjectParams, ScriptedMove, ShapeKind};
 use super::testing::{ball, thing};
 use super::world::{World, is_resolved, start};
-use crate::arm::chain::{Chain, Motion as JointMotion, Segment};
+use crate::arm::chain::{Chain, ChainSegment, JointKind};
 use crate::arm::model::load;
 use crate::arm::mount::Mount;
 
@@ -20,26 +20,26 @@ fn shape() -> ImageShape {
     ImageShape { rows: 16, cols: 16, pitch: [0.005; 2], unit: Unit::RAW }
 }
 
-fn object(thing: &Thing) -> Object {
+fn object(thing: &ObjectParams) -> Object {
     Object::new(thing, Pose3::IDENTITY, [0.0; 2]).unwrap()
 }
 
-/// A pad at rest in the base, moved along its z.
-fn pad(z: f64) -> Motion {
-    Motion { pose: Pose3::from_translation(Vec3::new(0.0, 0.0, z)), linear: Vec3::ZERO, angular: Vec3::ZERO }
+/// Returns a pad at rest in the base, moved along its z.
+fn pad(z: f64) -> BodyMotion {
+    BodyMotion { pose: Pose3::from_translation(Vec3::new(0.0, 0.0, z)), linear: Vec3::ZERO, angular: Vec3::ZERO }
 }
 
-/// Foam that loses nothing.
+/// Returns foam without losses.
 fn lossless() -> Foam {
     Foam {
         damping: NonNegative(0.0),
         static_friction: NonNegative(0.0),
         sliding_friction: NonNegative(0.0),
-        ..Foam::USUAL
+        ..Foam::DEFAULT
     }
 }
 
-fn world(arm: Arm, foam: Foam, things: &[Thing], step: f64) -> World {
+fn world(arm: SimArm, foam: Foam, things: &[ObjectParams], step: f64) -> World {
     let from = start(&arm);
     let objects = things.iter().map(|thing| Object::new(thing, from, [0.0; 2]).unwrap()).collect();
     let contact = Contact::new(shape(), foam.clone(), 0.001, 8);
@@ -47,38 +47,42 @@ fn world(arm: Arm, foam: Foam, things: &[Thing], step: f64) -> World {
     World::new(arm, objects, contact, imprint, shape(), step)
 }
 
-/// A slide along the pad's z.
-fn slide(joint: Joint) -> Arm {
+/// Returns a prismatic joint along the pad's z.
+fn slide(joint: JointDynamics) -> SimArm {
     let limits = Limits { lower: -1.0, upper: 1.0, ..Limits::default() };
-    let motion = JointMotion::Prismatic;
-    let segment = Segment { fixed: IsometryMatrix3::identity(), axis: Vector3::z(), motion, joint: limits };
-    Arm::new(Chain::new(vec![segment], IsometryMatrix3::identity()), vec![joint], vec![0.0])
+    let motion = JointKind::Prismatic;
+    let segment = ChainSegment { fixed: IsometryMatrix3::identity(), axis: Vector3::z(), motion, joint: limits };
+    SimArm::new(Chain::new(vec![segment], IsometryMatrix3::identity()), vec![joint], vec![0.0])
 }
 
-/// The paper's arm.
-fn lwr(damping_ratio: f64, friction: f64) -> Arm {
+/// Returns the arm of the paper.
+fn lwr(damping_ratio: f64, friction: f64) -> SimArm {
     let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../graphs/robots/lwr4p.urdf");
     let urdf = tactflow_runtime::node::FilePath { path: path.into(), span: 0..0, builtin: None };
     let chain = load(&urdf, "lwr_7_link", &Mount { xyz: [0.0, 0.0, 0.03], rpy: [0.0; 3] }).unwrap();
     let inertia = [2.0, 2.0, 1.0, 0.8, 0.3, 0.25, 0.1];
-    let joint = |inertia: f64| Joint { stiffness: 200.0, damping_ratio, inertia, friction };
-    Arm::new(chain, inertia.map(joint).into(), vec![0.0, 0.5, 0.0, -1.3, 0.0, 1.3, 0.0])
+    let joint = |inertia: f64| JointDynamics { stiffness: 200.0, damping_ratio, inertia, friction };
+    SimArm::new(chain, inertia.map(joint).into(), vec![0.0, 0.5, 0.0, -1.3, 0.0, 1.3, 0.0])
 }
 
 #[test]
-fn at_rest_the_slide_and_the_foam_balance() {
-    let joint = Joint { stiffness: 5000.0, damping_ratio: 1.0, inertia: 2.0, friction: 0.0 };
-    let soft = |stiffness: f64| Thing { stiffness: Some(Positive(stiffness)), ..thing(Look::Plane, [0.0, 0.0, 0.002]) };
-    let mounted = |mount: f64| Thing { mount: Some(Positive(mount)), ..thing(Look::Plane, [0.0, 0.0, 0.002]) };
+fn at_rest_the_prismatic_joint_and_the_foam_balance() {
+    let joint = JointDynamics { stiffness: 5000.0, damping_ratio: 1.0, inertia: 2.0, friction: 0.0 };
+    let soft = |stiffness: f64| ObjectParams {
+        stiffness: Some(Positive(stiffness)),
+        ..thing(ShapeKind::Plane, [0.0, 0.0, 0.002])
+    };
+    let mounted =
+        |mount: f64| ObjectParams { mount: Some(Positive(mount)), ..thing(ShapeKind::Plane, [0.0, 0.0, 0.002]) };
     // Stiffness of the foam of 256 tactels, alone or with a spring in series.
     let foam = 256.0 * 300.0;
     let cases = [
-        (thing(Look::Plane, [0.0, 0.0, 0.002]), foam),
+        (thing(ShapeKind::Plane, [0.0, 0.0, 0.002]), foam),
         (soft(100.0), 256.0 / (1.0 / 300.0 + 1.0 / 100.0)),
         (mounted(2e4), 1.0 / (1.0 / foam + 1.0 / 2e4)),
     ];
     for (plane, stiffness) in cases {
-        let mut world = world(slide(joint), Foam::USUAL, &[plane], 0.001);
+        let mut world = world(slide(joint), Foam::DEFAULT, &[plane], 0.001);
         world.advance(1.0, &[0.01]);
         world.advance(4.0, &[0.0]);
         // K (0.01 - z) = k (z - 0.002)
@@ -86,12 +90,12 @@ fn at_rest_the_slide_and_the_foam_balance() {
         let force = world.truth(0.015).force;
         assert!((force - wanted).abs() < 1e-3 * wanted, "{force} N, not {wanted} N");
         let clean: f64 = world.image().iter().sum();
-        assert!((clean - force).abs() < 1e-9, "the image shares out all of it: {clean}");
+        assert!((clean - force).abs() < 1e-9, "the image has the whole force: {clean}");
     }
 }
 
 #[test]
-fn a_ball_leaves_a_disc_whose_area_grows_as_hertz_has_it() {
+fn the_contact_of_a_ball_has_the_area_and_force_of_the_closed_form() {
     for radius in [0.02, 0.04, 0.1] {
         for depth in [0.0005, 0.001, 0.002] {
             let object = object(&ball(radius, [0.0007, -0.0011, radius]));
@@ -112,44 +116,45 @@ fn a_ball_leaves_a_disc_whose_area_grows_as_hertz_has_it() {
 
 #[test]
 fn energy_does_not_grow() {
-    let undamped = Joint { stiffness: 500.0, damping_ratio: 0.0, inertia: 2.0, friction: 0.0 };
-    let ellipsoid = Thing { size: Some([0.12, 0.08, 0.06]), ..thing(Look::Ellipsoid, [0.01, 0.015, 0.035]) };
-    let tilted = Thing { turn: [0.3, -0.2, 0.5], ..ellipsoid };
-    let soft = Thing { stiffness: Some(Positive(150.0)), ..ball(0.04, [0.0, 0.0, 0.043]) };
+    let undamped = JointDynamics { stiffness: 500.0, damping_ratio: 0.0, inertia: 2.0, friction: 0.0 };
+    let ellipsoid =
+        ObjectParams { size: Some([0.12, 0.08, 0.06]), ..thing(ShapeKind::Ellipsoid, [0.01, 0.015, 0.035]) };
+    let tilted = ObjectParams { turn: [0.3, -0.2, 0.5], ..ellipsoid };
+    let soft = ObjectParams { stiffness: Some(Positive(150.0)), ..ball(0.04, [0.0, 0.0, 0.043]) };
     let cases = [
         (slide(undamped), lossless(), soft.clone(), true),
-        (slide(undamped), Foam::USUAL, soft, false),
+        (slide(undamped), Foam::DEFAULT, soft, false),
         (lwr(0.0, 0.0), lossless(), tilted.clone(), true),
-        (lwr(0.2, 0.1), Foam::USUAL, tilted, false),
+        (lwr(0.2, 0.1), Foam::DEFAULT, tilted, false),
     ];
     for (case, (arm, foam, thing, is_lossless)) in cases.into_iter().enumerate() {
         let mut world = world(arm, foam, &[thing], 0.00025);
-        // Tensed like a bow, and let go.
+        // The springs of the joints are loaded, then released.
         for (q, by) in world.arm.equilibrium.iter_mut().zip([0.02, 0.03, 0.02, -0.03, 0.02, 0.03, 0.1]) {
             *q += by;
         }
         let first = world.energy();
-        let (mut most, mut least, mut touched) = (first, first, false);
+        let (mut max, mut min, mut touched) = (first, first, false);
         let still = vec![0.0; world.arm.position.len()];
         for step in 1..=4000 {
             world.advance(f64::from(step) * 0.00025, &still);
-            most = most.max(world.energy());
-            least = least.min(world.energy());
+            max = max.max(world.energy());
+            min = min.min(world.energy());
             touched |= world.contact.normal() > 1.0;
         }
         assert!(touched, "case {case} touches");
-        assert!(most < 1.01 * first, "case {case}: from {first} J to {most} J");
-        assert_eq!(least > 0.98 * first, is_lossless, "case {case}: from {first} J to {least} J");
+        assert!(max < 1.01 * first, "case {case}: from {first} J to {max} J");
+        assert_eq!(min > 0.98 * first, is_lossless, "case {case}: from {first} J to {min} J");
     }
 }
 
 #[test]
-fn the_step_does_not_matter() {
+fn the_result_does_not_depend_on_the_step() {
     let run = |step: f64| {
-        let mut world = world(lwr(0.2, 0.1), Foam::USUAL, &[ball(0.04, [0.01, -0.005, 0.042])], step);
+        let mut world = world(lwr(0.2, 0.1), Foam::DEFAULT, &[ball(0.04, [0.01, -0.005, 0.042])], step);
         let mut forces = Vec::new();
         for beat in 1..=500 {
-            // Down, then aside.
+            // Down, then sideways.
             let wanted = if beat < 200 { [0.0, 0.0, -0.02] } else { [0.005, 0.01, 0.0] };
             let velocity = world.arm.moves(wanted.into());
             world.advance(f64::from(beat) * 0.004, &velocity);
@@ -169,15 +174,15 @@ fn the_step_does_not_matter() {
 }
 
 #[test]
-fn friction_stays_in_its_cone_sticks_and_slips() {
-    let objects = [object(&thing(Look::Plane, [0.0, 0.0, 0.0]))];
-    let mut contact = Contact::new(shape(), Foam::USUAL, 0.001, 8);
+fn friction_stays_in_its_cone_and_sticks_and_slips() {
+    let objects = [object(&thing(ShapeKind::Plane, [0.0, 0.0, 0.0]))];
+    let mut contact = Contact::new(shape(), Foam::DEFAULT, 0.001, 8);
     let normal = 256.0 * 0.3;
     let mut slid = 0.0;
     let mut at_rest: f64 = 0.0;
     for step in 0..4000 {
         let speed = if step < 2000 { 2e-4 } else { 0.02 };
-        let moving = Motion { linear: Vec3::new(0.6, 0.8, 0.0) * speed, ..pad(0.001) };
+        let moving = BodyMotion { linear: Vec3::new(0.6, 0.8, 0.0) * speed, ..pad(0.001) };
         contact.step(0.001, &moving, &objects, &mut [Vec3::ZERO]);
         slid += speed * 0.001;
         let [x, y] = contact.friction();
@@ -198,11 +203,11 @@ fn friction_stays_in_its_cone_sticks_and_slips() {
 }
 
 #[test]
-fn a_load_at_the_rim_is_all_felt_and_one_in_the_middle_is_where_it_is() {
+fn the_imprint_keeps_the_sum_and_the_centre_of_a_load() {
     let mut imprint = Imprint::new(&shape(), 5, 0.003);
     for (x, y) in [(0.0, 0.0), (0.0123, -0.0087), (0.038, 0.0), (-0.0385, 0.0385)] {
         let objects = [object(&ball(0.003, [x, y, 0.003]))];
-        let mut contact = Contact::new(shape(), Foam::USUAL, 0.001, 8);
+        let mut contact = Contact::new(shape(), Foam::DEFAULT, 0.001, 8);
         contact.step(0.001, &pad(0.002), &objects, &mut [Vec3::ZERO]);
         imprint.take(contact.touching());
         let clean = imprint.forces();
@@ -217,18 +222,18 @@ fn a_load_at_the_rim_is_all_felt_and_one_in_the_middle_is_where_it_is() {
 }
 
 #[test]
-fn objects_are_moved_smoothly_by_their_script() {
+fn objects_move_smoothly_along_their_script() {
     let (from_s, to_s) = (NonNegative(1.0), NonNegative(2.0));
-    let motion = vec![Move { from_s, to_s, by: [0.0, 0.01, 0.0], turn: 1.0 }];
-    let mut object = object(&Thing { motion, ..ball(0.04, [0.0, 0.0, 0.05]) });
-    // A point of the object, in its frame.
+    let motion = vec![ScriptedMove { from_s, to_s, by: [0.0, 0.01, 0.0], turn: 1.0 }];
+    let mut object = object(&ObjectParams { motion, ..ball(0.04, [0.0, 0.0, 0.05]) });
+    // A point of the object, in its own frame.
     let mark = Vec3::new(0.03, 0.0, 0.01);
     let mut last = object.pose.transform_point(mark);
     for step in 1..=3000 {
         object.step(f64::from(step) * 0.001, 0.001, Vec3::ZERO);
         let now = object.pose.transform_point(mark);
         let velocity = object.velocity_at(now);
-        assert!(velocity.distance((now - last) / 0.001) < 5e-4, "its velocity is that of its place");
+        assert!(velocity.distance((now - last) / 0.001) < 5e-4, "its velocity is the derivative of its position");
         assert!(velocity.length() <= 1.5 * (0.01 + 0.03) + 1e-9);
         last = now;
     }
@@ -237,8 +242,8 @@ fn objects_are_moved_smoothly_by_their_script() {
 }
 
 #[test]
-fn what_the_steps_do_not_follow_is_told() {
-    // A damped spring comes to rest exactly if its steps are stable; none may be called resolved that does not.
+fn unresolved_springs_are_found() {
+    // A damped spring comes to rest exactly if its steps are stable. An unstable one must not count as resolved.
     for (stiffness, damping) in [(1e3, 10.0), (1e5, 0.0), (4e5, 100.0), (4e5, 400.0), (1.1e6, 0.0), (1e3, 1100.0)] {
         let (mut place, mut speed, dt) = (1.0f64, 0.0, 0.002);
         for _ in 0..10_000 {

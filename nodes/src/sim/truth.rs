@@ -1,42 +1,42 @@
-//! What a simulation knows and no sensor does: for scenarios and for records.
+//! Quantities that a simulation knows and a sensor does not, for scenarios and recordings.
 
 use parry3d_f64::math::Vec3;
 use tactflow_runtime::signal::ImageShape;
 
-use super::contact::{Contact, Motion};
+use super::contact::{BodyMotion, Contact};
 use super::object::Object;
-use crate::servo::axial::wrap_axial;
+use crate::motion::axis::wrap_axial;
 
-/// The truth of a moment.
+/// The ground truth at one time.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Truth {
     /// Force along the pad's z, positive when it is pressed [N].
     pub force: f64,
-    /// Friction in the pad's plane [N].
+    /// Friction force in the plane of the pad [N].
     pub tangential: f64,
-    /// Greatest force on a tactel of the clean image [N].
+    /// Largest force on a tactel of the noise-free image [N].
     pub peak: f64,
-    /// Where the force acts [m]; none without contact.
+    /// Centre of pressure [m]; `None` without contact.
     pub middle: Option<[f64; 2]>,
-    /// Mean force of the tactels above the threshold [N per tactel]; none without contact.
+    /// Mean force on the tactels above the threshold [N per tactel]; `None` without contact.
     pub pressure: Option<f64>,
     /// Number of those tactels.
     pub tactels: usize,
-    /// Angle of the object's line from the pad's x toward its y [rad]; none if it has none near the pad.
+    /// Angle of the object's line from the pad's x toward its y [rad]; `None` if there is no line under the pad.
     pub orientation: Option<f64>,
-    /// Area of foam that is pressed in [m²].
+    /// Area of compressed foam [m²].
     pub area: f64,
-    /// Greatest indentation [m].
+    /// Largest indentation [m].
     pub depth: f64,
-    /// Angle between the pad's z and the inward normal of the object where it is touched [rad]; none without contact.
+    /// Angle between the pad's z and the inward normal of the object at the contact [rad]; `None` without contact.
     pub tilt: Option<f64>,
 }
 
 impl Truth {
-    /// Of a pad whose clean image is `clean` [N].
+    /// Returns the truth for a pad whose noise-free image is `clean` [N]; tactels count above `threshold` [N].
     #[must_use]
     pub fn of(
-        pad: &Motion,
+        pad: &BodyMotion,
         contact: &Contact,
         objects: &[Object],
         shape: &ImageShape,
@@ -71,8 +71,8 @@ fn middle(contact: &Contact, force: f64) -> Option<[f64; 2]> {
     (force > 0.0).then(|| [sum[0] / force, sum[1] / force])
 }
 
-/// The angle of the nearest line that passes under the pad.
-fn orientation(pad: &Motion, objects: &[Object], shape: &ImageShape) -> Option<f64> {
+/// Returns the angle of the nearest line that passes under the pad [rad].
+fn orientation(pad: &BodyMotion, objects: &[Object], shape: &ImageShape) -> Option<f64> {
     let place = pad.pose.translation;
     let lines = objects.iter().filter_map(|object| {
         let line = object.shape.line(object.pose.inverse_transform_point(place))?;

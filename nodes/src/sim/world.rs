@@ -1,55 +1,56 @@
-//! The simulated bench as physics: an arm that carries a pad, and objects, stepped together.
+//! The physics of the simulated bench: an arm with a pad, and objects, stepped together.
 
 use parry3d_f64::math::{Pose3, Vec3};
 use tactflow_runtime::signal::ImageShape;
 
-use super::contact::{Contact, Motion};
+use super::contact::{BodyMotion, Contact};
 use super::imprint::Imprint;
-use super::joints::Arm;
+use super::joints::SimArm;
 use super::object::Object;
+use super::shape::pose3;
 use super::survey::{Measured, Survey, measure};
 use super::truth::Truth;
 
-/// Everything that has mass, gives way or is touched.
+/// The arm, the pad and the objects.
 pub struct World {
-    pub(super) arm: Arm,
+    pub(super) arm: SimArm,
     pub(super) objects: Vec<Object>,
     pub(super) contact: Contact,
     imprint: Imprint,
     shape: ImageShape,
     /// Force on each object [N].
     loads: Vec<Vec3>,
-    /// [s]
+    /// Simulated time [s].
     time: f64,
     /// Longest step [s].
-    longest: f64,
-    /// What has been measured of the first object that has an end.
+    max_step: f64,
+    /// Index and survey of the first object that is not infinite.
     survey: Option<(usize, Survey)>,
-    /// Whether the imprint is of an earlier time.
-    is_old: bool,
+    /// Whether the imprint is older than the contact.
+    is_stale: bool,
 }
 
 impl World {
-    /// A world at time 0, with steps of at most `longest` [s].
+    /// Returns a world at time 0, with steps of at most `max_step` [s].
     #[must_use]
     pub fn new(
-        arm: Arm,
+        arm: SimArm,
         objects: Vec<Object>,
         contact: Contact,
         imprint: Imprint,
         shape: ImageShape,
-        longest: f64,
+        max_step: f64,
     ) -> Self {
         let loads = vec![Vec3::ZERO; objects.len()];
         let from = start(&arm);
         let surveys = objects.iter().enumerate().filter_map(|(i, object)| Some((i, Survey::new(object, from)?)));
         let survey = surveys.take(1).next();
-        Self { survey, arm, objects, contact, imprint, shape, loads, time: 0.0, longest, is_old: true }
+        Self { survey, arm, objects, contact, imprint, shape, loads, time: 0.0, max_step, is_stale: true }
     }
 
-    /// Goes on to `time` [s] with the joints' equilibrium moving at `velocity` [rad/s].
+    /// Advances to `time` [s], with the equilibrium of the joints moving at `velocity` [rad/s].
     pub fn advance(&mut self, time: f64, velocity: &[f64]) {
-        let steps = ((time - self.time) / self.longest - 1e-9).ceil().max(1.0);
+        let steps = ((time - self.time) / self.max_step - 1e-9).ceil().max(1.0);
         let (begin, dt) = (self.time, (time - self.time) / steps);
         for step in 1..=steps as u64 {
             let now = begin + dt * step as f64;
@@ -60,38 +61,38 @@ impl World {
             self.arm.step(dt, velocity, &self.contact.wrench());
         }
         self.time = time;
-        self.is_old = true;
+        self.is_stale = true;
     }
 
-    /// Whether everything is still somewhere.
+    /// Returns whether all positions are finite and plausible, so that the simulation is stable.
     #[must_use]
     pub fn is_sound(&self) -> bool {
         let is_near = |place: Vec3| place.is_finite() && place.length() < 1e3;
         is_near(self.pad().pose.translation) && self.objects.iter().all(|object| is_near(object.sag()))
     }
 
-    /// Where the pad is and how it moves.
+    /// Returns pose and velocity of the pad.
     #[must_use]
-    pub fn pad(&self) -> Motion {
+    pub fn pad(&self) -> BodyMotion {
         self.arm.motion()
     }
 
-    /// The clean image [N].
+    /// Returns the noise-free image [N].
     pub fn image(&mut self) -> &[f64] {
-        if std::mem::take(&mut self.is_old) {
+        if std::mem::take(&mut self.is_stale) {
             self.imprint.take(self.contact.touching());
         }
         self.imprint.forces()
     }
 
-    /// What is true now; tactels count from `threshold` [N].
+    /// Returns the ground truth now; tactels count above `threshold` [N].
     pub fn truth(&mut self, threshold: f64) -> Truth {
         self.image();
         let pad = self.pad();
         Truth::of(&pad, &self.contact, &self.objects, &self.shape, self.imprint.forces(), threshold)
     }
 
-    /// What a point in the base that the graph has measured is worth; it counts for the coverage.
+    /// Returns the errors of a `point` in the base that the graph reports, and counts it for the coverage.
     pub fn measure(&mut self, point: Vec3) -> Option<Measured> {
         if let Some((object, survey)) = &mut self.survey {
             survey.add(&self.objects[*object], point);
@@ -99,13 +100,13 @@ impl World {
         measure(&self.objects, self.pad().pose, point)
     }
 
-    /// Share of the surface that has been measured; none if the object has no end.
+    /// Returns the fraction of the surface that has been touched, or `None` if every object is infinite.
     #[must_use]
     pub fn coverage(&self) -> Option<f64> {
         self.survey.as_ref().map(|(_, survey)| survey.coverage())
     }
 
-    /// The energy that is stored in motion, springs, foam and friction [J].
+    /// Returns the energy that is stored in motion, springs, foam and friction [J].
     #[cfg(test)]
     pub(super) fn energy(&self) -> f64 {
         let objects: f64 = self.objects.iter().map(Object::energy).sum();
@@ -113,15 +114,17 @@ impl World {
     }
 }
 
-/// Whether a spring and a damper are resolved by steps of `dt` [s]: `stiffness` [1/s²] and `damping` [1/s] are by the
-/// mass. A step of the speed first and the place then is stable while d²k + 2 d c < 4; what adds the foam is left half.
+/// Returns whether steps of `dt` [s] resolve a spring and a damper; `stiffness` [1/s²] and `damping` [1/s] are divided by
+/// the mass.
+///
+/// Semi-implicit Euler is stable for dt² k + 2 dt c < 4. Half of that is left for the foam.
 #[must_use]
 pub fn is_resolved(stiffness: f64, damping: f64, dt: f64) -> bool {
     dt * dt * stiffness + 2.0 * dt * damping <= 2.0
 }
 
-/// The pose that a sensor has in the base.
+/// Returns the pose of the sensor of an arm in the base.
 #[must_use]
-pub fn start(arm: &Arm) -> Pose3 {
-    super::joints::pose3(&arm.pose)
+pub fn start(arm: &SimArm) -> Pose3 {
+    pose3(&arm.pose)
 }

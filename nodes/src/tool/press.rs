@@ -9,7 +9,7 @@ use tactflow_runtime::cli::clap::{self, Parser};
 use tactflow_runtime::cli::{NOT_LOADED, Shell};
 
 use super::{may_replace, pair, positive};
-use crate::sim::bench::MOST;
+use crate::sim::bench::MAX_TACTELS;
 use crate::sim::readout::{Electronics, Readout};
 
 /// Press the simulated pad with a bladder and write the log
@@ -41,7 +41,7 @@ pub(super) struct Press {
     most: f64,
 }
 
-const SERIAL: &u64 = &Electronics::USUAL.serial;
+const SERIAL: &u64 = &Electronics::DEFAULT.serial;
 /// Frames per second of the log [1/s].
 const RATE: f64 = 50.0;
 /// Time before the press, in which the zero is taken. There is none after it, as the foam creeps back [s].
@@ -51,8 +51,8 @@ const PRESS: f64 = 30.0;
 
 pub(super) fn run(args: Press, shell: &Shell) -> u8 {
     let [rows, cols] = args.size.map(NonZeroUsize::get);
-    if rows.saturating_mul(cols) > MOST {
-        shell.error(format_args!("a simulated pad has {MOST} tactels at most, not {rows} by {cols}"));
+    if rows.saturating_mul(cols) > MAX_TACTELS {
+        shell.error(format_args!("a simulated pad has {MAX_TACTELS} tactels at most, not {rows} by {cols}"));
         return NOT_LOADED;
     }
     let done = may_replace(&args.out, "press log", |text| text.starts_with("time,force,t0_0"))
@@ -76,7 +76,7 @@ fn shown(path: &Path) -> String {
 fn write(args: &Press) -> std::io::Result<usize> {
     let [rows, cols] = args.size.map(NonZeroUsize::get);
     let tactels = rows * cols;
-    let mut readout = Readout::new(tactels, Electronics { serial: args.serial, ..Electronics::USUAL }, args.serial);
+    let mut readout = Readout::new(tactels, Electronics { serial: args.serial, ..Electronics::DEFAULT }, args.serial);
     let mut file = BufWriter::new(std::fs::File::create(&args.out)?);
     let names = (0..rows).flat_map(|i| (0..cols).map(move |j| format!(",t{i}_{j}")));
     writeln!(file, "time,force{}", names.collect::<String>())?;

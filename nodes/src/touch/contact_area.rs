@@ -185,8 +185,8 @@ mod tests {
     use tactflow_runtime::signal::{Grid, Scalar, Shape, Unit};
 
     use super::super::binarize::binarize;
-    use super::super::uniform;
     use super::*;
+    use crate::random::Random;
 
     const PITCH: [f64; 2] = [0.005, 0.004];
     const TACTEL: f64 = PITCH[0] * PITCH[1];
@@ -276,10 +276,10 @@ mod tests {
         ];
         for (sx, sy, threshold, most, part) in cases {
             let exact = PI * sx * sy * 2.0 * libm::log(1.0 / threshold);
-            let mut uniform = uniform(2);
+            let mut random = Random::new(2, 0);
             let mut squares = [0.0; 2];
             for _ in 0..300 {
-                let (x, y) = (7.0 + uniform(), 7.0 + uniform());
+                let (x, y) = (7.0 + random.uniform(0.0, 1.0), 7.0 + random.uniform(0.0, 1.0));
                 let (area, interpolated) = areas(16, 16, threshold, |i, j| {
                     let (u, v) = ((j as f64 - x) / sx, (i as f64 - y) / sy);
                     libm::exp(-0.5 * (u * u + v * v))

@@ -83,8 +83,8 @@ mod tests {
     use tactflow_runtime::signal::{Grid, Image, Mask, Scalar, Unit};
 
     use super::super::moments::Moments;
-    use super::super::uniform;
     use super::*;
+    use crate::random::Random;
 
     fn rig<N: Node>(params: &str) -> Result<NodeRig, Mistakes> {
         let image = ImageShape { rows: 20, cols: 24, pitch: [0.005, 0.004], unit: Unit::NEWTON };
@@ -139,9 +139,9 @@ mod tests {
 
     #[test]
     fn it_is_what_the_anisotropy_says_with_any_weight() {
-        let mut uniform = uniform(9);
+        let mut random = Random::new(9, 0);
         for round in 0..60 {
-            let cells: Vec<f64> = (0..480).map(|_| uniform() - 0.7).collect();
+            let cells: Vec<f64> = (0..480).map(|_| random.uniform(0.0, 1.0) - 0.7).collect();
             for weight in ["", "weight = \"area\"", "weight = \"excess\"\nthreshold = 0.1"] {
                 let value = |i: usize, j: usize| cells[i * 24 + j];
                 let found = show(&mut rig::<Eccentricity>(weight).unwrap(), &value, "eccentricity").unwrap();

@@ -16,7 +16,8 @@ use tactflow_runtime::signal::{Image, ImageShape, Mask};
 use tactflow_runtime::{inputs, outputs, params, state};
 
 use super::moments::{Weighing, Weight};
-use super::{axis, on_one_array};
+use super::on_one_array;
+use crate::motion::axis::half_angle;
 
 params! {
     /// Number of directions that are tried, evenly over half a turn: at least 8 [1].
@@ -156,7 +157,7 @@ min_strength = 0.3                  # below this it is no line [1]
         if strength > 0.0 && strength >= self.min_strength {
             let (sine, cosine) = libm::sincos((best as f64 + shift) * PI / scores.len() as f64);
             let (offset, _) = self.vote(tactels, (sine, cosine), votes);
-            out.orientation.set(axis(2.0 * sine * cosine, cosine * cosine - sine * sine));
+            out.orientation.set(half_angle(2.0 * sine * cosine, cosine * cosine - sine * sine));
             let side = if cosine > 0.0 { 1.0 } else { -1.0 };
             out.offset.set(side * (offset + centre[1] * cosine - centre[0] * sine));
         }
@@ -237,8 +238,8 @@ mod tests {
     use tactflow_runtime::node::At;
     use tactflow_runtime::signal::{Grid, Scalar, Shape, Unit};
 
-    use super::super::uniform;
     use super::*;
+    use crate::random::Random;
 
     fn wires(rows: usize, cols: usize, pitch: [f64; 2]) -> [(&'static str, Shape); 2] {
         let image = ImageShape { rows, cols, pitch, unit: Unit::NEWTON };
@@ -310,8 +311,8 @@ mod tests {
 
     #[test]
     fn a_shift_by_a_tactel_changes_the_offset_only() {
-        let mut uniform = uniform(4);
-        let values: Vec<f64> = (0..256).map(|_| uniform()).collect();
+        let mut random = Random::new(4, 0);
+        let values: Vec<f64> = (0..256).map(|_| random.uniform(0.0, 1.0)).collect();
         let at = |di: f64, dj: f64| {
             run("min_strength = 0", [0.005, 0.004], |x, y| {
                 let (x, y) = (x - dj, y - di);

@@ -8,7 +8,7 @@ use std::cmp::Ordering;
 use tactflow_runtime::node::{Count, Mistake, Mistakes, Node, Setup, Tick};
 use tactflow_runtime::{inputs, outputs, params, state};
 
-use crate::servo::axial::wrap_axial;
+use crate::motion::axis::wrap_axial;
 
 params! {
     /// Number of samples; of fewer, as long as there are fewer; at most 255 [samples].

@@ -10,7 +10,7 @@ use tactflow_runtime::node::{At, Interval, Mistake, Mistakes, Node, Positive, Se
 use tactflow_runtime::source::Code;
 use tactflow_runtime::{inputs, outputs, params, state};
 
-use super::{doubled, halved};
+use crate::motion::axis::{doubled, halved};
 
 params! {
     /// Time in which 63 % of a step have passed through, T; this or `cutoff_hz` [ms].

@@ -8,7 +8,8 @@ use tactflow_runtime::signal::ImageShape;
 use tactflow_runtime::{inputs, outputs, params};
 
 use super::moments::{Weighing, Weight, ellipse};
-use super::{axis, on_one_array};
+use super::on_one_array;
+use crate::motion::axis::half_angle;
 
 params! {
     /// Below this anisotropy, from 0 (round) to 1 (a line), there is no orientation [1].
@@ -84,7 +85,7 @@ in.region = "label.region"
             out.minor.set(minor);
             let anisotropy = ellipse.anisotropy();
             if anisotropy > 0.0 && anisotropy >= self.min_anisotropy {
-                out.orientation.set(axis(ellipse.sine, ellipse.cosine));
+                out.orientation.set(half_angle(ellipse.sine, ellipse.cosine));
             }
         }
     }

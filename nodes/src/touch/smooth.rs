@@ -10,7 +10,7 @@ use tactflow_runtime::node::{Count, Mistake, Mistakes, Node, Positive, Setup, Ti
 use tactflow_runtime::signal::Stamp;
 use tactflow_runtime::{inputs, outputs, params, state};
 
-use super::{doubled, halved};
+use crate::motion::axis::{doubled, halved};
 
 params! {
     /// Number of samples in the mean, and of fewer, as long as there are fewer; 10 if no window is given [samples].

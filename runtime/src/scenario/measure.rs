@@ -164,19 +164,17 @@ mod tests {
     }
 
     #[test]
-    fn the_deviation_of_a_sine_and_of_white_noise_is_known() {
+    fn the_deviation_of_a_sine_and_of_a_uniform_distribution_is_known() {
         // Whole periods of a sine of amplitude a have a standard deviation of a / sqrt(2).
         let sine = course(10.0, |time| 3.0 + 0.5 * (std::f64::consts::TAU * time).sin());
         assert!((std(&sine[1..]).unwrap() - 0.5 / 2f64.sqrt()).abs() < 1e-3);
         assert!((mean(&sine[1..]).unwrap() - 3.0).abs() < 1e-12);
-        // Uniform noise from a linear congruence: 1 / sqrt(12).
-        let mut state = 1u64;
-        let mut noise = course(40.0, |_| 0.0);
-        for reading in &mut noise {
-            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-            reading.value = (state >> 11) as f64 / (1u64 << 53) as f64;
+        // Multiples of the golden ratio modulo 1 are uniformly distributed: 1 / sqrt(12).
+        let mut uniform = course(40.0, |_| 0.0);
+        for (i, reading) in uniform.iter_mut().enumerate() {
+            reading.value = (i as f64 * 0.618_033_988_749_895).fract();
         }
-        assert!((std(&noise).unwrap() - (1.0f64 / 12.0).sqrt()).abs() < 5e-3);
+        assert!((std(&uniform).unwrap() - (1.0f64 / 12.0).sqrt()).abs() < 1e-3);
     }
 
     proptest! {

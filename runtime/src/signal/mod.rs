@@ -8,6 +8,7 @@ mod freshness;
 mod image;
 mod joints;
 mod kind;
+pub mod line;
 mod mask;
 mod regions;
 mod scalars;

@@ -5,6 +5,7 @@
 use std::f64::consts::PI;
 
 use libm::erf;
+use tactflow_nodes::random::Random;
 use tactflow_nodes::touch::binarize::binarize;
 use tactflow_nodes::touch::hough::Hough;
 use tactflow_nodes::touch::label::{contact, number, paint, trace};
@@ -15,25 +16,6 @@ use tactflow_runtime::signal::{Grid, Image, ImageShape, Mask, Regions, Scalar, U
 
 const SIZE: usize = 16;
 const PITCH: f64 = 0.005;
-
-/// Numbers in [0, 1), the same in every run.
-struct Dice(u64);
-
-impl Dice {
-    fn uniform(&mut self) -> f64 {
-        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (self.0 >> 40) as f64 / 16_777_216.0
-    }
-
-    fn between(&mut self, least: f64, most: f64) -> f64 {
-        least + (most - least) * self.uniform()
-    }
-
-    /// Almost Gaussian, of deviation 1.
-    fn gauss(&mut self) -> f64 {
-        (0..12).map(|_| self.uniform()).sum::<f64>() - 6.0
-    }
-}
 
 /// A bar: length and width, direction and place [m, rad].
 #[derive(Debug, Clone, Copy)]
@@ -63,7 +45,7 @@ impl Bar {
         inside(0.5 * self.length, along) * inside(0.5 * self.width, across)
     }
 
-    fn image(&self, noise: f64, dice: &mut Dice) -> Image {
+    fn image(&self, noise: f64, random: &mut Random) -> Image {
         let mut image = Image::zeros(SIZE, SIZE);
         for (at, cell) in image.cells_mut().iter_mut().enumerate() {
             let corner = |k: usize| (k as f64 - SIZE as f64 / 2.0) * PITCH;
@@ -75,7 +57,7 @@ impl Bar {
             *cell = (sum / (POINTS * POINTS) as f64) as f32;
         }
         for cell in image.cells_mut() {
-            *cell += (noise * dice.gauss()) as f32;
+            *cell += (noise * random.normal()) as f32;
         }
         image
     }
@@ -118,16 +100,16 @@ fn root_mean_square(errors: &[f64]) -> f64 {
 
 /// A bar at every half degree, of a length and a width between bounds [tactels], with 2 % noise; and its image.
 fn bars(length: [f64; 2], width: [f64; 2]) -> Vec<(Bar, Image)> {
-    let mut dice = Dice(7);
+    let mut random = Random::new(7, 0);
     let bar = |k: u32| {
         let bar = Bar {
-            length: dice.between(length[0], length[1]) * PITCH,
-            width: dice.between(width[0], width[1]) * PITCH,
-            angle: (0.5 * (f64::from(k) + dice.uniform()) - 90.0).to_radians(),
-            x: dice.between(-0.5, 0.5) * PITCH,
-            y: dice.between(-0.5, 0.5) * PITCH,
+            length: random.uniform(length[0], length[1]) * PITCH,
+            width: random.uniform(width[0], width[1]) * PITCH,
+            angle: (0.5 * (f64::from(k) + random.uniform(0.0, 1.0)) - 90.0).to_radians(),
+            x: random.uniform(-0.5, 0.5) * PITCH,
+            y: random.uniform(-0.5, 0.5) * PITCH,
         };
-        let image = bar.image(0.02, &mut dice);
+        let image = bar.image(0.02, &mut random);
         (bar, image)
     };
     (0..360).map(bar).collect()
@@ -209,7 +191,7 @@ fn the_greatest_vote_is_the_diagonal_of_a_bar() {
 
 #[test]
 fn a_line_with_a_gap_and_a_print_beside_it_is_for_the_hough_transform() {
-    let mut dice = Dice(5);
+    let mut random = Random::new(5, 0);
     let (mut hough, mut moments) = (rig::<Hough>(""), rig::<Moments>(""));
     let mut errors = [Vec::new(), Vec::new()];
     for k in 0..90 {
@@ -225,7 +207,7 @@ fn a_line_with_a_gap_and_a_print_beside_it_is_for_the_hough_transform() {
         let parts = [at(-3.8, 0.0, 5.0), at(3.8, 0.0, 5.0), at(2.0, 4.5, 1.5)];
         let mut image = Image::zeros(SIZE, SIZE);
         for part in parts {
-            let part = part.image(0.01, &mut dice);
+            let part = part.image(0.01, &mut random);
             image.cells_mut().iter_mut().zip(part.cells()).for_each(|(sum, cell)| *sum += cell);
         }
         // All tactels of the mask, not only those of the largest region.
@@ -247,15 +229,15 @@ fn the_centre_of_gravity_is_where_the_print_is() {
         let thresholds = ["", "weight = \"excess\"\nthreshold = 0.1", "weight = \"area\""];
         let mut errors = [0.0; 3];
         for (params, error) in thresholds.into_iter().zip(&mut errors) {
-            let (mut dice, mut rig) = (Dice(9), rig::<Moments>(params));
+            let (mut random, mut rig) = (Random::new(9, 0), rig::<Moments>(params));
             let mut off = Vec::new();
             for _ in 0..300 {
-                let [x, y] = [0, 1].map(|_| dice.between(-1.5, 1.5) * PITCH);
-                let bar = Bar { length: size, width: size, angle: dice.uniform(), x, y };
-                let mut image = bar.image(0.0, &mut dice);
+                let [x, y] = [0, 1].map(|_| random.uniform(-1.5, 1.5) * PITCH);
+                let bar = Bar { length: size, width: size, angle: random.uniform(0.0, 1.0), x, y };
+                let mut image = bar.image(0.0, &mut random);
                 let greatest = image.cells().iter().copied().fold(0.0, f32::max);
                 image.cells_mut().iter_mut().for_each(|cell| *cell /= greatest);
-                image.cells_mut().iter_mut().for_each(|cell| *cell += (0.02 * dice.gauss()) as f32);
+                image.cells_mut().iter_mut().for_each(|cell| *cell += (0.02 * random.normal()) as f32);
                 let found = show(&mut rig, &image, &region(&image, 0.1), ["x", "y"]).map(Option::unwrap);
                 off.extend([1e3 * (found[0] - x), 1e3 * (found[1] - y)]);
             }

@@ -3,6 +3,7 @@
 use std::io::Read;
 
 use flate2::read::{DeflateDecoder, MultiGzDecoder};
+use tactflow_nodes::random::Random;
 
 /// How much comes out of what is packed, up to where it is damaged.
 pub(super) fn inflated(bytes: &[u8]) -> usize {
@@ -21,18 +22,15 @@ pub(super) fn inflated(bytes: &[u8]) -> usize {
     size
 }
 
-/// The 64-bit splitmix generator (Steele et al. 2014).
-pub(super) struct Random(pub(super) u64);
+/// A source of hostile files.
+pub(super) struct Hostile(pub(super) Random);
 
 const NUMBERS: [&str; 12] =
     ["99999999999999999999", "4294967296", "1e308", "-1e308", "1e-320", "NaN", "inf", "-1", "0", "65536", "", "1,5"];
 
-impl Random {
-    pub(super) fn below(&mut self, below: usize) -> usize {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mixed = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        let mixed = (mixed ^ (mixed >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((mixed ^ (mixed >> 31)) % below.max(1) as u64) as usize
+impl Hostile {
+    fn below(&mut self, count: usize) -> usize {
+        self.0.below(count.max(1))
     }
 
     fn range(&mut self, len: usize) -> std::ops::Range<usize> {
@@ -41,7 +39,7 @@ impl Random {
     }
 
     /// A good file made bad, in one to three ways.
-    pub(super) fn hostile(&mut self, good: &[u8]) -> Vec<u8> {
+    pub(super) fn make(&mut self, good: &[u8]) -> Vec<u8> {
         let mut bytes = good.to_vec();
         for _ in 0..=self.below(3) {
             bytes = match self.below(4) {

@@ -13,8 +13,8 @@ use tactflow_runtime::node::{Components, Interval, Map, Mistakes, Node, Positive
 use tactflow_runtime::signal::{Freshness, Unit};
 use tactflow_runtime::{inputs, outputs, params, state};
 
-use super::axial::wrap_axial;
 use super::integral::integrate;
+use crate::motion::axis::wrap_axial;
 
 params! { Gains:
     /// Proportional gain [1/s].

@@ -20,7 +20,7 @@ use tactflow_runtime::node::{Mistake, Mistakes, Node, NonNegative, Positive, Rat
 use tactflow_runtime::signal::{Pose, Twist};
 use tactflow_runtime::{inputs, outputs, params, state};
 
-use super::way::{Odometer, Stall};
+use crate::motion::travel::{Odometer, Stall};
 
 params! {
     /// How fast; at 0 there is no motion, and what was found is forgotten [m/s].

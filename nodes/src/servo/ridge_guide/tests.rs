@@ -7,9 +7,9 @@ use proptest::prelude::*;
 use tactflow_runtime::harness::NodeRig;
 use tactflow_runtime::signal::{Freshness, PoseShape, ScalarShape, Unit};
 
-use super::super::axial::wrap_axial;
 use super::*;
-use crate::touch::uniform;
+use crate::motion::axis::wrap_axial;
+use crate::random::Random;
 
 /// A ridge: how far off a place is from it, to its left, and its direction there.
 type Ridge = fn([f64; 2]) -> (f64, f64);
@@ -38,7 +38,7 @@ struct World {
     /// The sensor's yaw.
     yaw: f64,
     noise: f64,
-    random: Box<dyn FnMut() -> f64>,
+    random: Random,
     is_on: bool,
     /// Direction of the motion in the base.
     course: f64,
@@ -54,11 +54,7 @@ impl World {
         let wires =
             [("eccentricity", one()), ("orientation", ScalarShape::of(Unit::AXIAL).into()), ("pose", PoseShape.into())];
         let rig = NodeRig::new::<RidgeGuide>(params, &wires).unwrap();
-        Self { rig, ridge, at, yaw, noise, random: Box::new(uniform(11)), is_on: false, course: f64::NAN }
-    }
-
-    fn gauss(&mut self) -> f64 {
-        (0..12).map(|_| (self.random)()).sum::<f64>() - 6.0
+        Self { rig, ridge, at, yaw, noise, random: Random::new(11, 0), is_on: false, course: f64::NAN }
     }
 
     /// What the pad feels: the nearer the ridge, the narrower.
@@ -69,8 +65,8 @@ impl World {
 
     fn step(&mut self) {
         let (off, angle) = (self.ridge)(self.at);
-        let narrow = (self.eccentricity() + self.noise * self.gauss()).clamp(0.0, 1.0);
-        let shown = wrap_axial(angle - self.yaw + 0.5 * self.noise * self.gauss());
+        let narrow = (self.eccentricity() + self.noise * self.random.normal()).clamp(0.0, 1.0);
+        let shown = wrap_axial(angle - self.yaw + 0.5 * self.noise * self.random.normal());
         let turn = Rotation3::from_euler_angles(0.0, 0.0, self.yaw);
         let pose = IsometryMatrix3::from_parts(Translation3::new(self.at[0], self.at[1], 0.2), turn);
         self.rig.set("eccentricity", narrow);

@@ -17,7 +17,7 @@ use tactflow_runtime::node::{Count, Mistakes, Node, NonNegative, Positive, Setup
 use tactflow_runtime::signal::Twist;
 use tactflow_runtime::{inputs, outputs, params, state};
 
-use super::way::{Odometer, Stall};
+use crate::motion::travel::{Odometer, Stall};
 
 words! {
     /// An axis of the sensor.

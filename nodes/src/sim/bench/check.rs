@@ -1,54 +1,54 @@
-//! Whether a simulated bench can be what its parameters say.
+//! Checks of the parameters of a simulated bench.
 
 use tactflow_runtime::node::{At, Mistake, Mistakes};
 use tactflow_runtime::signal::ImageShape;
 use tactflow_runtime::source::Code;
 
-use super::{INERTIA, MOST, Params};
-use crate::sim::joints::GIVES_WAY;
+use super::{INERTIA, MAX_TACTELS, Params};
+use crate::sim::joints::MAX_STRAIN;
 use crate::sim::object::MOUNT_DAMPING;
 use crate::sim::world::is_resolved;
 
-/// The most points at which a simulated pad is felt.
-const MOST_POINTS: f64 = 4e6;
-/// The most frames that an image may be late by.
-const LATEST: f64 = 1000.0;
+/// Largest number of points of a simulated pad.
+const MAX_POINTS: f64 = 4e6;
+/// Largest latency of an image [frames].
+const MAX_LATENCY_FRAMES: f64 = 1000.0;
 
-/// Whether such a bench can be simulated.
+/// Checks that a bench with these parameters can be simulated.
 ///
 /// # Errors
-/// What is wrong with its parameters.
+/// All parameters that are outside of what the simulation supports.
 pub(super) fn check(params: &Params, shape: &ImageShape) -> Result<(), Mistakes> {
     let mut mistakes = Mistakes::new();
-    if shape.tactels() > MOST {
-        let message = format!("{} by {} tactels are more than {MOST}", shape.rows, shape.cols);
+    if shape.tactels() > MAX_TACTELS {
+        let message =
+            format!("{} by {} tactels are more than the {MAX_TACTELS} that can be simulated", shape.rows, shape.cols);
         mistakes.push(Mistake::param("rows", message));
     }
     let points = (*params.pitch / *params.points_apart).ceil().max(1.0).powi(2) * shape.tactels() as f64;
-    if points > MOST_POINTS {
+    if points > MAX_POINTS {
         let (apart, pitch) = (*params.points_apart, *params.pitch);
-        let message = format!("a tactel each {pitch} m, felt each {apart} m, asks for more than {MOST_POINTS} points");
+        let message = format!("a pitch of {pitch} m with points {apart} m apart needs more than {MAX_POINTS} points");
         mistakes.push(Mistake::param("pitch", message));
     }
-    if *params.latency_s * *params.rate_hz > LATEST {
-        mistakes.push(Mistake::param("latency_s", format!("an image may be late by {LATEST} frames at most")));
+    if *params.latency_s * *params.rate_hz > MAX_LATENCY_FRAMES {
+        mistakes.push(Mistake::param("latency_s", format!("the latency must be at most {MAX_LATENCY_FRAMES} frames")));
     }
     let foam = &params.foam;
     if *foam.damping > 10.0 {
-        mistakes
-            .push(Mistake::param("foam.damping", "more than 10 N s/m under a tactel is no foam that steps can follow"));
+        mistakes.push(Mistake::param("foam.damping", "the damping under a tactel must be at most 10 N s/m"));
     }
     if !(0.0002..=0.05).contains(&*foam.spread) {
-        mistakes.push(Mistake::param("foam.spread", "foam spreads a load by 0.0002 to 0.05 m"));
+        mistakes.push(Mistake::param("foam.spread", "the spread must be from 0.0002 to 0.05 m"));
     }
     if *foam.static_friction < *foam.sliding_friction {
-        mistakes.push(Mistake::param("foam.static_friction", "friction at rest is not less than in motion"));
+        mistakes.push(Mistake::param("foam.static_friction", "static friction must not be less than sliding friction"));
     }
     if !(0.0001..=0.001).contains(&*params.points_apart) {
-        mistakes.push(Mistake::param("points_apart", "the points of the pad are 0.0001 to 0.001 m apart"));
+        mistakes.push(Mistake::param("points_apart", "points must be from 0.0001 to 0.001 m apart"));
     }
     if !(1e-6..=0.002).contains(&*params.step_s) {
-        mistakes.push(Mistake::param("step_s", "the foam's motion needs steps of 1e-6 to 0.002 s"));
+        mistakes.push(Mistake::param("step_s", "the step must be from 1e-6 to 0.002 s"));
     }
     if let Some(inertia) = &params.inertia {
         if inertia.len() != params.start.len() {
@@ -57,7 +57,7 @@ pub(super) fn check(params: &Params, shape: &ImageShape) -> Result<(), Mistakes>
             mistakes.push(Mistake::param("inertia", message));
         }
         if inertia.iter().any(|inertia| !(0.01..=1e3).contains(inertia)) {
-            mistakes.push(Mistake::param("inertia", "an inertia is from 0.01 to 1000 kg m²"));
+            mistakes.push(Mistake::param("inertia", "each inertia must be from 0.01 to 1000 kg m²"));
         }
     } else if params.start.len() != INERTIA.len() {
         let message = format!("an arm of {} joints needs `inertia`", params.start.len());
@@ -66,7 +66,7 @@ pub(super) fn check(params: &Params, shape: &ImageShape) -> Result<(), Mistakes>
     if mistakes.is_empty() { check_motion(params) } else { Err(mistakes) }
 }
 
-/// What moves faster than the steps can follow gains energy, and is nowhere in the end.
+/// Checks that every spring is slow enough for the steps: a faster one gains energy, and the simulation diverges.
 fn check_motion(params: &Params) -> Result<(), Mistakes> {
     let mut mistakes = Mistakes::new();
     let dt = *params.step_s;
@@ -75,26 +75,26 @@ fn check_motion(params: &Params) -> Result<(), Mistakes> {
         let rate = *mount / *thing.mass;
         if !is_resolved(rate, 2.0 * MOUNT_DAMPING * rate.sqrt(), dt) {
             let message =
-                format!("a mount of {} N/m under {} kg swings too fast for steps of {dt} s", *mount, *thing.mass);
+                format!("a mount of {} N/m under {} kg oscillates too fast for steps of {dt} s", *mount, *thing.mass);
             mistakes.push(object(i, message));
         }
     }
     let inertia = params.inertia.as_deref().unwrap_or(&INERTIA);
-    let least = inertia.iter().copied().fold(f64::INFINITY, f64::min);
-    let rate = *params.stiffness / least;
+    let min_inertia = inertia.iter().copied().fold(f64::INFINITY, f64::min);
+    let rate = *params.stiffness / min_inertia;
     let parts = [
         ("stiffness", rate, 0.0),
         ("damping_ratio", 0.0, 2.0 * *params.damping_ratio * rate.sqrt()),
-        ("friction", *params.friction / GIVES_WAY / least, 0.0),
+        ("friction", *params.friction / MAX_STRAIN / min_inertia, 0.0),
     ];
     for (name, _, _) in parts.iter().filter(|(_, stiffness, damping)| !is_resolved(*stiffness, *damping, dt)) {
-        let message = format!("a joint of {least} kg m² moves too fast for steps of {dt} s");
+        let message = format!("a joint of {min_inertia} kg m² moves too fast for steps of {dt} s");
         mistakes.push(Mistake::param(*name, message));
     }
     if mistakes.is_empty() { Ok(()) } else { Err(mistakes) }
 }
 
-/// What is wrong with an object; a place within a list has no span, so it is told by its number.
+/// Returns the mistake of an object. An entry of a list has no span of its own, so the message names its number.
 pub(super) fn object(index: usize, message: impl std::fmt::Display) -> Mistake {
     Mistake::param("objects", format!("object {}: {message}", index + 1))
 }

@@ -5,8 +5,8 @@ use tactflow_runtime::harness::{GraphRig, NodeRig, Source};
 use tactflow_runtime::node::At;
 use tactflow_runtime::signal::{Image, ImageShape, Mask, Unit};
 
-use super::super::uniform;
 use super::*;
+use crate::random::Random;
 
 fn rig(params: &str, rows: usize, cols: usize) -> Result<NodeRig, Mistakes> {
     let shape = ImageShape { rows, cols, pitch: [0.005; 2], unit: Unit::NEWTON };
@@ -93,12 +93,12 @@ fn hysteresis_takes_the_flicker_out_of_a_contact() {
     // A cone whose rim passes through the threshold, with 2 % noise: how often |R| changes in 500 frames.
     let flicker = |params: &str| {
         let mut rig = rig(params, 16, 16).unwrap();
-        let mut uniform = uniform(5);
+        let mut random = Random::new(5, 0);
         let areas: Vec<usize> = (0..500)
             .map(|_| {
                 let cells: Vec<f32> = (0..256)
                     .map(|at: usize| {
-                        let noise = (0..12).map(|_| uniform()).sum::<f64>() - 6.0;
+                        let noise = random.normal();
                         let away = ((at / 16) as f64 - 7.3).hypot((at % 16) as f64 - 7.6);
                         ((1.0 - away / 8.0).max(0.0) + 0.02 * noise) as f32
                     })

@@ -4,8 +4,8 @@ use tactflow_runtime::harness::NodeRig;
 use tactflow_runtime::node::At;
 use tactflow_runtime::signal::{Flag, ImageShape, Regions};
 
-use super::super::uniform;
 use super::*;
+use crate::random::Random;
 
 fn rig(params: &str, rows: usize, cols: usize) -> Result<NodeRig, Mistakes> {
     let image = ImageShape { rows, cols, pitch: [0.005, 0.004], ..ImageShape::default() };
@@ -148,16 +148,11 @@ fn drawn(regions: &Regions, region: usize, rows: usize, cols: usize) -> Mask {
 }
 
 /// Shows a random mask of whole values to the rig and compares everything with the flood fill.
-fn compare(
-    rig: &mut NodeRig,
-    (rows, cols, neighbours): (usize, usize, u64),
-    mut uniform: impl FnMut() -> f64,
-    percent: u32,
-) {
+fn compare(rig: &mut NodeRig, (rows, cols, neighbours): (usize, usize, u64), random: &mut Random, percent: u32) {
     let (mut image, mut mask) = (Image::zeros(rows, cols), Mask::empty(rows, cols));
     for at in 0..rows * cols {
-        image.cells_mut()[at] = (uniform() * 4096.0).floor() as f32;
-        if uniform() * 100.0 < f64::from(percent) {
+        image.cells_mut()[at] = (random.uniform(0.0, 1.0) * 4096.0).floor() as f32;
+        if random.uniform(0.0, 1.0) * 100.0 < f64::from(percent) {
             mask.insert(at / cols, at % cols);
         }
     }
@@ -176,7 +171,7 @@ fn compare(
 
 #[test]
 fn regions_agree_with_a_flood_fill() {
-    let mut uniform = uniform(1);
+    let mut random = Random::new(1, 0);
     let sizes = [
         (1, 1),
         (1, 2),
@@ -202,7 +197,7 @@ fn regions_agree_with_a_flood_fill() {
             let params = format!("neighbours = {neighbours}\nmin_area = 2\nmin_force = 5000");
             let mut rig = rig(&params, rows, cols).unwrap();
             for round in 0..95 {
-                compare(&mut rig, (rows, cols, neighbours), &mut uniform, 5 + round % 19 * 5);
+                compare(&mut rig, (rows, cols, neighbours), &mut random, 5 + round % 19 * 5);
             }
         }
     }
@@ -290,20 +285,22 @@ fn the_place_of_a_contact_outlives_a_flicker_but_no_lasting_loss() {
 fn the_nearest_is_that_of_a_naive_tracker_on_random_films() {
     const PITCH: [f64; 2] = [0.005, 0.004];
     let shape = ImageShape { rows: 16, cols: 20, pitch: PITCH, ..ImageShape::default() };
-    let mut uniform = uniform(11);
+    let mut random = Random::new(11, 0);
     let (mut ties, mut kept, mut frames) = (0, 0, 0);
     for _ in 0..60 {
         let wires = [("mask", Grid::from(&shape).into()), ("image", shape.clone().into())];
         let mut rig = NodeRig::new::<Label>("choose = \"nearest\"\nmin_area = 4", &wires).unwrap();
-        let mut discs = [0, 1].map(|_| ([uniform() * 20.0, uniform() * 16.0], 0.8 + 2.5 * uniform()));
+        let mut discs = [0, 1].map(|_| {
+            ([random.uniform(0.0, 1.0) * 20.0, random.uniform(0.0, 1.0) * 16.0], 0.8 + 2.5 * random.uniform(0.0, 1.0))
+        });
         let (mut last, mut lost) = (None::<[f64; 2]>, 0);
         for _ in 0..80 {
             for ([x, y], radius) in &mut discs {
-                *x = (*x + 1.6 * (uniform() - 0.5)).clamp(0.0, 19.0);
-                *y = (*y + 1.6 * (uniform() - 0.5)).clamp(0.0, 15.0);
-                *radius = (*radius + uniform() - 0.5).clamp(0.8, 3.5);
+                *x = (*x + 1.6 * (random.uniform(0.0, 1.0) - 0.5)).clamp(0.0, 19.0);
+                *y = (*y + 1.6 * (random.uniform(0.0, 1.0) - 0.5)).clamp(0.0, 15.0);
+                *radius = (*radius + random.uniform(0.0, 1.0) - 0.5).clamp(0.8, 3.5);
             }
-            let shown = if uniform() < 0.15 { 0 } else { 2 };
+            let shown = if random.uniform(0.0, 1.0) < 0.15 { 0 } else { 2 };
             let (image, mask) = frame(&discs[..shown]);
             rig.set("image", image.clone());
             rig.set("mask", mask.clone());

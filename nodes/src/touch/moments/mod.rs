@@ -16,7 +16,8 @@ use tactflow_runtime::node::{Mistakes, Node, Ratio, Setup, Tick};
 use tactflow_runtime::signal::ImageShape;
 use tactflow_runtime::{inputs, outputs, params};
 
-use super::{axis, on_one_array};
+use super::on_one_array;
+use crate::motion::axis::half_angle;
 
 pub use sums::{Ellipse, Sums, Weighing, Weight, add_up, ellipse};
 
@@ -133,7 +134,7 @@ threshold = 0.010                   # as the `release` of the `binarize` [N]
             let anisotropy = ellipse.anisotropy();
             out.anisotropy.set(anisotropy);
             if anisotropy > 0.0 && anisotropy >= self.min_anisotropy {
-                out.orientation.set(axis(ellipse.sine, ellipse.cosine));
+                out.orientation.set(half_angle(ellipse.sine, ellipse.cosine));
             }
         }
     }

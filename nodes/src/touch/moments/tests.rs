@@ -8,8 +8,8 @@ use tactflow_runtime::harness::NodeRig;
 use tactflow_runtime::node::At;
 use tactflow_runtime::signal::{Grid, Image, Mask, Scalar, Unit};
 
-use super::super::uniform;
 use super::*;
+use crate::random::Random;
 
 const PITCH: [f64; 2] = [0.005, 0.004];
 
@@ -102,9 +102,9 @@ fn the_least_anisotropy_is_enough() {
 
 #[test]
 fn a_line_is_as_anisotropic_as_can_be() {
-    let mut uniform = uniform(3);
+    let mut random = Random::new(3, 0);
     for round in 0..200 {
-        let values: Vec<f64> = (0..16).map(|_| 0.1 + uniform()).collect();
+        let values: Vec<f64> = (0..16).map(|_| 0.1 + random.uniform(0.0, 1.0)).collect();
         let mut rig = rig("min_anisotropy = 0.999999", 16, 16, PITCH);
         show(&mut rig, &render(16, 16, |i, j| if i == j { values[i] } else { 0.0 }), 0.0);
         let anisotropy = get(&rig, "anisotropy").unwrap();
@@ -151,11 +151,11 @@ fn bar(degrees: f64, length_mm: f64, pitch: [f64; 2]) -> Image {
 
 /// Root of the mean squared error over all angles [degrees].
 fn angle_error(length_mm: f64, pitch: [f64; 2], threshold: f32, noise: f64) -> f64 {
-    let mut uniform = uniform(7);
+    let mut random = Random::new(7, 0);
     let squares = (-89..=90).map(|degrees| {
         let mut image = bar(f64::from(degrees), length_mm, pitch);
         for cell in image.cells_mut() {
-            let gauss = (0..12).map(|_| uniform()).sum::<f64>() - 6.0;
+            let gauss = random.normal();
             *cell += (noise * gauss) as f32;
         }
         let mut rig = rig("", image.rows(), image.cols(), pitch);

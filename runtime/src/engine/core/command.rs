@@ -7,6 +7,7 @@
 use crate::device::Commands;
 use crate::graph::{PlannedCommand, PlannedReport};
 use crate::node::{Bus, PortId, Tick};
+use crate::signal::line::{scale_to, step_toward};
 use crate::signal::{Joints, Signal};
 
 /// One command port of a device.
@@ -75,21 +76,18 @@ impl ReportSlot {
     }
 }
 
-/// Moves `values` toward `wanted` on a straight line, no joint by more than its acceleration allows; whether they are
-/// there.
+/// Moves `values` toward `wanted` on a straight line, no joint by more than its acceleration allows in `dt` [s]. Returns
+/// whether they have arrived.
 fn approach(values: &mut [f64], wanted: impl Fn(usize) -> f64, accelerations: &[f64], dt: f64) -> bool {
-    let mut share = 1.0_f64;
+    let mut scale = 1.0_f64;
     for (i, (value, acceleration)) in values.iter().zip(accelerations).enumerate() {
-        let (change, most) = ((wanted(i) - value).abs(), acceleration * dt);
-        // Without a bound on the acceleration `most` may be no number, and is no bound.
-        if change > most {
-            share = share.min(most / change);
-        }
+        // An unbounded acceleration in no time is not a number, and `min` skips it.
+        scale = scale.min(scale_to((wanted(i) - value).abs(), acceleration * dt));
     }
     for (i, value) in values.iter_mut().enumerate() {
-        *value = if share < 1.0 { *value + (wanted(i) - *value) * share } else { wanted(i) };
+        *value = step_toward(*value, wanted(i), scale);
     }
-    share >= 1.0
+    scale >= 1.0
 }
 
 #[cfg(test)]

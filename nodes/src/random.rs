@@ -1,6 +1,14 @@
-//! Random numbers that are the same in every run: splitmix64 (Steele, Lea and Flood 2014) and Marsaglia's polar method.
+//! Seeded random numbers that are the same in every run and on every machine.
 
-/// A generator.
+/// A generator of random numbers: splitmix64 (Steele, Lea and Flood 2014), and Marsaglia's polar method for normal ones.
+///
+/// ```
+/// use tactflow_nodes::random::Random;
+///
+/// let (mut first, mut second) = (Random::new(7, 0), Random::new(7, 0));
+/// assert_eq!(first.uniform(-1.0, 1.0), second.uniform(-1.0, 1.0));
+/// assert!(first.below(6) < 6);
+/// ```
 #[derive(Debug, Clone)]
 pub struct Random {
     state: u64,
@@ -9,7 +17,7 @@ pub struct Random {
 }
 
 impl Random {
-    /// The `stream`-th generator of a seed; streams do not know of each other.
+    /// Returns the generator number `stream` of a seed. Streams of one seed are independent.
     #[must_use]
     pub fn new(seed: u64, stream: u64) -> Self {
         let mut random = Self { state: seed ^ stream.wrapping_mul(0xD1B5_4A32_D192_ED03), spare: None };
@@ -27,12 +35,21 @@ impl Random {
         z ^ (z >> 31)
     }
 
-    /// Evenly from `low` to `high`.
+    /// Returns a number from `low` to below `high`, uniformly distributed.
     pub fn uniform(&mut self, low: f64, high: f64) -> f64 {
         low + (high - low) * ((self.next() >> 11) as f64 / (1u64 << 53) as f64)
     }
 
-    /// Normal, of mean 0 and standard deviation 1.
+    /// Returns a whole number from 0 to below `count`, uniformly distributed.
+    ///
+    /// # Panics
+    /// If `count` is 0.
+    pub fn below(&mut self, count: usize) -> usize {
+        assert!(count > 0, "no number is below 0");
+        (self.next() % count as u64) as usize
+    }
+
+    /// Returns a normally distributed number of mean 0 and standard deviation 1.
     pub fn normal(&mut self) -> f64 {
         if let Some(spare) = self.spare.take() {
             return spare;
@@ -65,6 +82,13 @@ mod tests {
         let uniform: Vec<f64> = (0..n).map(|_| random.uniform(2.0, 4.0)).collect();
         let mean = uniform.iter().sum::<f64>() / f64::from(n);
         assert!(uniform.iter().all(|x| (2.0..4.0).contains(x)) && (mean - 3.0).abs() < 0.01, "{mean}");
+    }
+
+    #[test]
+    fn every_number_below_the_count_comes_equally_often() {
+        let (mut random, mut counts) = (Random::new(3, 0), [0_u32; 7]);
+        (0..70_000).for_each(|_| counts[random.below(7)] += 1);
+        assert!(counts.iter().all(|count| count.abs_diff(10_000) < 400), "{counts:?}");
     }
 
     #[test]
