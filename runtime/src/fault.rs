@@ -11,6 +11,8 @@ pub enum Cause {
     Panicked(String),
     /// A device failed.
     Device(String),
+    /// A device has no value for a port at present, and says why.
+    Lost(String),
     /// The newest sample of a role is too old.
     Stale {
         /// How old it is [ns].
@@ -81,6 +83,7 @@ impl fmt::Display for Fault {
             Cause::Late { by } => write!(f, "a tick began {:.1} ms late", ms(*by))?,
             Cause::Operator => write!(f, "the operator stopped it")?,
             Cause::Mode(why) => write!(f, "mode `{name}` failed: {why}")?,
+            Cause::Lost(why) => write!(f, "`{name}` is lost: {why}")?,
             Cause::Device(message) => write!(f, "device `{name}` failed: {message}")?,
         }
         write!(f, " in tick {} at {:.3} s", self.tick, self.time as f64 * 1e-9)?;

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use tactflow_nodes::calibration::{Calibration, file};
 use tactflow_runtime::graph::{Request, compile};
-use tactflow_runtime::harness::{GraphRig, Source};
+use tactflow_runtime::harness::{FedRole, GraphRig};
 use tactflow_runtime::signal::{Freshness, Image, ImageShape, Unit};
 use tactflow_tests::{catalogue, workspace};
 use tempfile::TempDir;
@@ -239,7 +239,7 @@ fn rig(folder: &TempDir) -> GraphRig {
     let text = format!("{head}{}", &tail[tail.find("[nodes.source]").unwrap()..]);
     let text = text.replace("\"pad.toml\"", &format!("'{}'", folder.path().join("pad.toml").display()));
     let shape = ImageShape { rows: 2, cols: 2, pitch: [0.005; 2], unit: Unit::RAW };
-    let pad = Source { role: "pad", kind: "tactile_pad", period: 0.004, outputs: vec![shape.into()], commands: vec![] };
+    let pad = FedRole::new("pad", "tactile_pad", 4.0).output("image", shape);
     GraphRig::new(catalogue(), &text, vec![pad]).unwrap_or_else(|report| panic!("{}", report.render(false)))
 }
 
@@ -250,7 +250,7 @@ fn a_tare_through_the_loop_uses_each_frame_once_and_allocates_nothing() {
     for ms in 0..60 {
         if ms % 4 == 0 {
             // The zero of the first tactel has drifted from 210 to 230, which is 0.015 N.
-            rig.feed("pad", 0, f64::from(ms), Image::from_cells(2, &[230.0, 305.0, 250.0, 9.0]));
+            rig.feed("pad.image", f64::from(ms), Image::from_cells(2, &[230.0, 305.0, 250.0, 9.0]));
         }
         let now = i64::from(ms) * 1_000_000;
         rig.engine.exchange(now).unwrap();

@@ -88,7 +88,7 @@ fn rig(params: &str) -> Result<GraphRig, String> {
 #[test]
 fn a_node_made_of_data_runs_like_any_other() {
     let mut rig = rig("scale = 10.0").unwrap();
-    rig.feed("a", 0, 0.0, 3.0);
+    rig.feed("a.value", 0.0, 3.0);
     rig.tick(0.0).unwrap();
     assert_eq!((rig.get::<Scalar>("p.y"), rig.freshness("p.y")), (Some(&190.0), Freshness::New));
     rig.tick(10.0).unwrap();

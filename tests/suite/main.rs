@@ -9,6 +9,7 @@ mod cli;
 mod complete;
 mod course;
 mod determinism;
+mod devices;
 mod docs;
 mod erased;
 mod errors;

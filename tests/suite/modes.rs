@@ -25,7 +25,7 @@ fn course(modes: &str, samples: &[Option<f64>]) -> String {
     for (i, sample) in samples.iter().enumerate() {
         let ms = 10.0 * i as f64;
         if let Some(value) = sample {
-            rig.feed("a", 0, ms, *value);
+            rig.feed("a.value", ms, *value);
         }
         rig.tick(ms).unwrap();
         course.push(rig.engine.mode().unwrap().chars().next().unwrap());
@@ -88,7 +88,7 @@ fn what_is_set_holds_in_its_mode_alone_and_state_goes_on() {
     let mut seen = Vec::new();
     for (i, value) in [1.0, 3.0, 3.0, 5.0, 5.0].into_iter().enumerate() {
         let ms = 10.0 * i as f64;
-        rig.feed("a", 0, ms, value);
+        rig.feed("a.value", ms, value);
         rig.tick(ms).unwrap();
         seen.push((*rig.get::<f64>("plus.value").unwrap(), *rig.get::<f64>("count.steps").unwrap()));
     }
@@ -154,7 +154,7 @@ fn a_failure_names_the_mode_its_reason_and_its_line() {
 #[test]
 fn a_switch_acts_at_once_and_does_not_wait_for_the_next_sample() {
     let mut rig = good("[modes.one]\nset.plus.by = 10.0\ngo = { to = 'two', after_ms = 20 }\n[modes.two]");
-    rig.feed("a", 0, 0.0, 1.0);
+    rig.feed("a.value", 0.0, 1.0);
     let mut seen = Vec::new();
     for i in 0..5 {
         rig.tick(10.0 * f64::from(i)).unwrap();

@@ -35,7 +35,7 @@ fn the_last_of_several_words_counts() {
                 if tick == 1 {
                     words.iter().for_each(|word| rig.send(word));
                 }
-                rig.feed("a", 0, f64::from(tick) * 10.0, 1.0);
+                rig.feed("a.value", f64::from(tick) * 10.0, 1.0);
                 rig.tick(f64::from(tick) * 10.0).unwrap();
             }
             assert_eq!(rig.engine.is_stopped(), is_stopped, "{words:?} after {before:?}");
@@ -49,7 +49,7 @@ fn a_stop_is_told_from_its_beginning_to_its_end() {
     let mut rig = GraphRig::new(catalogue(), text, vec![length_by_hand("a")]).unwrap();
     for (ms, word) in [(0.0, None), (10.0, Some("stop")), (20.0, None), (30.0, Some("resume")), (40.0, None)] {
         word.into_iter().for_each(|word| rig.send(word));
-        rig.feed("a", 0, ms, 1.0);
+        rig.feed("a.value", ms, 1.0);
         rig.tick(ms).unwrap();
     }
     let halts: Vec<(String, Option<i64>)> =

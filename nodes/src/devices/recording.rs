@@ -7,7 +7,7 @@
 use std::borrow::Cow;
 use std::sync::Arc;
 
-use tactflow_runtime::device::{Commands, Description, Device, DeviceError, Driver, Filled, Opened, Samples, Stepped};
+use tactflow_runtime::device::{Commands, Description, Device, DeviceError, Driver, Opened, Output, Samples, Stepped};
 use tactflow_runtime::node::{At, Count, FilePath, Mistake, Mistakes, NonNegative, Positive, Rate};
 use tactflow_runtime::params;
 use tactflow_runtime::signal::{Image, Unit};
@@ -39,6 +39,7 @@ params! {
 /// A recording that is being shown.
 #[derive(Debug)]
 pub struct Player {
+    image: Output<Image>,
     recording: Recording,
     next: usize,
 }
@@ -85,14 +86,11 @@ file = "builtin:finger_press.csv"   # a finger on a Tekscan I-Scan: 28 by 28 sen
         let bytes = file.bytes()?;
         let recording = recordings::read(&bytes, &file.path.to_string_lossy(), &hints)
             .map_err(|refusal| mistakes(refusal, file, &bytes))?;
-        let filled = Filled {
-            role: "tactile_pad".into(),
-            outputs: vec![recording.shape.clone().into()],
-            commands: vec![],
-            facts: facts(&recording, &params),
-        };
-        let description = Description { fills: vec![filled], period: recording.period };
-        Ok(Opened { description, driver: Driver::Stepped(Box::new(Self { recording, next: 0 })) })
+        let mut description = Description::every(recording.period);
+        let mut pad = description.fills("tactile_pad");
+        pad.facts(facts(&recording, &params));
+        let image = pad.output("image", recording.shape.clone());
+        Ok(Opened { description, driver: Driver::Stepped(Box::new(Self { image, recording, next: 0 })) })
     }
 }
 
@@ -159,7 +157,7 @@ impl Stepped for Player {
             self.next += due;
             let newest = self.next - 1;
             let frame = self.recording.frames[newest];
-            self.recording.show(newest, samples.write::<Image>(0, frame.time, frame.number).cells_mut());
+            self.recording.show(newest, samples.write(self.image, frame.time, frame.number).cells_mut());
         }
         Ok(())
     }
@@ -201,13 +199,13 @@ mod tests {
     #[test]
     fn frames_are_served_once_and_the_newest_wins() {
         let mut bench = Bench::new(open::<Player>(&format!("file = '{PATH}'")).unwrap());
-        let Shape::Image(shape) = &bench.fill().outputs[0] else { panic!("an image") };
+        let Some(Shape::Image(shape)) = bench.description.shape("image") else { panic!("an image") };
         assert_eq!((shape.rows, shape.cols), (28, 28));
         assert_eq!(bench.fact("threshold"), Some(&3.0.into()));
         assert_eq!(bench.fact("frames"), Some(&309.into()));
         assert_eq!(bench.fact("dead").unwrap()[1], vec![0, 1].into());
         let force = |bench: &mut Bench| {
-            let image: &mut Image = bench.samples.write(0, 0, 0);
+            let image = bench.image();
             let sum: f32 = image.cells().iter().sum();
             image.cells_mut().fill(f32::NAN);
             sum
@@ -229,11 +227,11 @@ mod tests {
     fn a_packed_recording_plays_as_it_is() {
         let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../graphs/recordings/pawlabeling/dog1_sel_1.zip");
         let mut bench = Bench::new(open::<Player>(&format!("file = '{path}'")).unwrap());
-        let Shape::Image(shape) = &bench.fill().outputs[0] else { panic!("an image") };
+        let Some(Shape::Image(shape)) = bench.description.shape("image") else { panic!("an image") };
         assert_eq!((shape.rows, shape.cols), (256, 63));
         assert_eq!(bench.fact("format"), Some(&"footscan".into()));
         bench.exchange(0);
-        let image: &mut Image = bench.samples.write(0, 0, 0);
+        let image = bench.image();
         let load: f32 = image.cells().iter().sum();
         assert!((load - 11.9).abs() < 1e-3, "{load} N");
     }

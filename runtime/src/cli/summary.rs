@@ -111,6 +111,10 @@ impl Summary {
                 let _ = writeln!(text, "samples of `{}`: {counted}", port.name);
             }
         }
+        for (device, counts) in engine.counts().filter(|(_, counts)| !counts.is_empty()) {
+            let counts: Vec<String> = counts.iter().map(|(what, count)| format!("{count} {what}")).collect();
+            let _ = writeln!(text, "device `{device}`: {}", counts.join(", "));
+        }
         if outcome.late > 0 {
             let _ = writeln!(text, "{} ticks began more than a period late", outcome.late);
         }

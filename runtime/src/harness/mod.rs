@@ -1,7 +1,9 @@
 //! Graphs and nodes in tests, on mock sources and a virtual clock.
 
+mod fed;
 mod graph_rig;
 mod node_rig;
 
-pub use graph_rig::{GraphRig, Source};
+pub use fed::FedRole;
+pub use graph_rig::GraphRig;
 pub use node_rig::NodeRig;

@@ -79,6 +79,31 @@ impl Features {
         Self { components: vec![Component::default(); count].into() }
     }
 
+    /// Writes a sample of a device: a value for each feature, or `None` where there is none. The graph stamps it when it
+    /// arrives, so a device needs no number of a tick.
+    pub fn fill(&mut self, values: &[Option<f64>]) {
+        if values.len() != self.components.len() {
+            // The inlet names the device and both numbers.
+            *self = Self::absent(values.len());
+        }
+        for (component, value) in self.components.iter_mut().zip(values) {
+            let mark = Mark::new(0, Stamp::TIMELESS, value.is_some());
+            *component = Component { value: value.unwrap_or_default(), mark };
+        }
+    }
+
+    /// Becomes the successor of `previous`: what is there is new in `tick`, and what is not there any more is lost.
+    pub(super) fn follow(&mut self, previous: &Self, tick: u64, stamp: Stamp) {
+        for (component, previous) in self.components.iter_mut().zip(&previous.components) {
+            if component.mark.is_present() {
+                component.mark.renew(tick, stamp);
+            } else {
+                component.mark = previous.mark;
+                component.mark.lose(tick);
+            }
+        }
+    }
+
     /// The components.
     #[must_use]
     pub fn components(&self) -> &[Component] {

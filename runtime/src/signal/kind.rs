@@ -4,7 +4,7 @@ use std::fmt;
 
 use super::{
     Features, FeaturesShape, Grid, Image, ImageShape, Jacobian, Joints, JointsShape, Mark, Mask, Pose, PoseShape,
-    Regions, RegionsShape, Twist, TwistShape, Unit, all_finite,
+    Regions, RegionsShape, Stamp, Twist, TwistShape, Unit, all_finite,
 };
 
 /// A single number.
@@ -58,6 +58,19 @@ pub trait Signal: Default + Clone + Send + 'static {
     /// Whether every number in it is finite; what is absent counts as finite.
     fn is_finite(&self) -> bool;
 
+    /// Rows and columns, or the number of elements; zeros for a kind without a size.
+    fn size(&self) -> [usize; 2] {
+        [0, 0]
+    }
+
+    /// The [`size`](Self::size) of the values of a shape.
+    fn size_of(_shape: &Self::Shape) -> [usize; 2] {
+        [0, 0]
+    }
+
+    /// Becomes the successor of `previous` as a sample that arrives in `tick`.
+    fn arrive(&mut self, _previous: &Self, _tick: u64, _stamp: Stamp) {}
+
     /// The mark of the value after a step that wrote it, given the mark that follows from the step.
     fn mark(&self, from_step: Mark, _tick: u64) -> Mark {
         from_step
@@ -107,6 +120,11 @@ macro_rules! kinds {
                 match self { $(Self::$kind => $name),* }
             }
 
+            /// The shape of which nothing is known.
+            pub(crate) fn default_shape(self) -> Shape {
+                match self { $(Self::$kind => $shape::default().into()),* }
+            }
+
             /// What it is, in one line.
             #[must_use]
             pub const fn summary(self) -> &'static str {
@@ -136,6 +154,11 @@ macro_rules! kinds {
             pub const fn kind(&self) -> Kind {
                 match self { $(Self::$kind(_) => Kind::$kind),* }
             }
+
+            /// Rows and columns, or the number of elements; zeros for a kind without a size.
+            pub(crate) fn size(&self) -> [usize; 2] {
+                match self { $(Self::$kind(shape) => <$kind as Signal>::size_of(shape)),* }
+            }
         }
 
         /// The values of a graph, kind by kind.
@@ -162,6 +185,28 @@ macro_rules! kinds {
             pub fn swap(&mut self, kind: Kind, slot: u32, other: &mut Self, other_slot: u32) {
                 match kind { $(Kind::$kind =>
                     std::mem::swap(&mut self.$arena[slot as usize], &mut other.$arena[other_slot as usize])),* }
+            }
+
+            /// Takes over a sample of `kind` that arrives in `tick`, by exchanging the buffers. Returns its mark.
+            pub(crate) fn receive(
+                &mut self, kind: Kind, slot: u32, samples: &mut Self, sample: u32, tick: u64, stamp: Stamp,
+            ) -> Mark {
+                match kind { $(Kind::$kind => {
+                    let (value, sample) = (&mut self.$arena[slot as usize], &mut samples.$arena[sample as usize]);
+                    sample.arrive(value, tick, stamp);
+                    std::mem::swap(value, sample);
+                    Signal::mark(value, Mark::new(tick, stamp, true), tick)
+                })* }
+            }
+
+            /// Makes a value of `kind` absent, component by component where it has any.
+            pub(crate) fn lose(&mut self, kind: Kind, slot: u32, tick: u64) {
+                match kind { $(Kind::$kind => Signal::lose(&mut self.$arena[slot as usize], tick)),* }
+            }
+
+            /// Size of a value of `kind`.
+            pub(crate) fn size(&self, kind: Kind, slot: u32) -> [usize; 2] {
+                match kind { $(Kind::$kind => self.$arena[slot as usize].size()),* }
             }
 
             /// Copies a value of `kind` to a slot of another arena that has its shape.
@@ -227,6 +272,9 @@ kinds! {
         "The names are known at load: they come from the graph file, where wires or tables name them. Each component can be \
         absent while the others are there; the vector is there if any component is. The vector belongs to one frame." {
         fn allocate(shape: &FeaturesShape) -> Self { Self::absent(shape.features.len()) }
+        fn size(&self) -> [usize; 2] { [self.components().len(), 0] }
+        fn size_of(shape: &FeaturesShape) -> [usize; 2] { [shape.features.len(), 0] }
+        fn arrive(&mut self, previous: &Self, tick: u64, stamp: Stamp) { self.follow(previous, tick, stamp); }
         fn copy_to(&self, slot: &mut Self) { slot.copy_from(self); }
         fn is_finite(&self) -> bool { Self::is_finite(self) }
         fn mark(&self, _: Mark, tick: u64) -> Mark { Self::mark(self, tick) }
@@ -237,12 +285,16 @@ kinds! {
         "All tactels have one unit. Its shape is rows, columns and the pitch along x and y [m]: column j runs along the \
         sensor's x, row i along its y, and z points out of the pad toward the object. It belongs to the frame of its pad." {
         fn allocate(shape: &ImageShape) -> Self { Self::zeros(shape.rows, shape.cols) }
+        fn size(&self) -> [usize; 2] { [self.rows(), self.cols()] }
+        fn size_of(shape: &ImageShape) -> [usize; 2] { [shape.rows, shape.cols] }
         fn copy_to(&self, slot: &mut Self) { slot.copy_from(self); }
         fn is_finite(&self) -> bool { Self::is_finite(self) }
     }
     Mask MaskShape masks "mask" "mask": "a yes or no for each tactel of a pad",
         "Its shape is the rows and columns of the array it lies on, and it belongs to the frame of its pad." {
         fn allocate(grid: &MaskShape) -> Self { Self::empty(grid.rows, grid.cols) }
+        fn size(&self) -> [usize; 2] { [self.rows(), self.cols()] }
+        fn size_of(grid: &MaskShape) -> [usize; 2] { [grid.rows, grid.cols] }
         fn copy_to(&self, slot: &mut Self) { slot.copy_from(self); }
         fn is_finite(&self) -> bool { true }
     }
@@ -273,12 +325,16 @@ kinds! {
     Joints JointsShape joints "joints" "joint vector": "a number for each joint of an arm, from the base to the tip",
         "All have one unit: rad for positions, rad/s for velocities. Its shape is the list of joints with their limits." {
         fn allocate(shape: &JointsShape) -> Self { Self::zeros(shape.joints.len()) }
+        fn size(&self) -> [usize; 2] { [self.0.len(), 0] }
+        fn size_of(shape: &JointsShape) -> [usize; 2] { [shape.joints.len(), 0] }
         fn copy_to(&self, slot: &mut Self) { slot.0.clone_from(&self.0); }
         fn is_finite(&self) -> bool { all_finite(&self.0) }
     }
     Jacobian JacobianShape jacobians "jacobian" "Jacobian": "the twist that unit speed of each joint gives",
         "A column for each joint, at the origin of the frame it is given in." {
         fn allocate(shape: &JacobianShape) -> Self { Self::zeros(shape.0.joints.len()) }
+        fn size(&self) -> [usize; 2] { [self.0.len(), 0] }
+        fn size_of(shape: &JacobianShape) -> [usize; 2] { [shape.0.joints.len(), 0] }
         fn copy_to(&self, slot: &mut Self) { slot.0.clone_from(&self.0); }
         fn is_finite(&self) -> bool { self.0.iter().all(|column| all_finite(column.0.as_slice())) }
     }
@@ -289,6 +345,15 @@ impl Kind {
     #[must_use]
     pub const fn has_unit(self) -> bool {
         matches!(self, Self::Scalar | Self::Features | Self::Image | Self::Regions | Self::Joints)
+    }
+
+    /// A size in words: `16 by 16 tactels`, `7 joints`.
+    pub(crate) fn size_in_words(self, [first, second]: [usize; 2]) -> String {
+        match self {
+            Self::Features => format!("{first} features"),
+            Self::Joints | Self::Jacobian => format!("{first} joints"),
+            _ => format!("{first} by {second} tactels"),
+        }
     }
 
     /// The kind with its article, for messages.

@@ -4,9 +4,9 @@
 use std::borrow::Cow;
 
 use super::*;
-use crate::device::{Commands, Description, Device, DeviceError, Driver, Filled, Opened, RoleType, Samples, Stepped};
+use crate::device::{Commands, Description, Device, DeviceError, Driver, Opened, RoleType, Samples, Stepped};
 use crate::node::{Mistakes, Need, Node, PortSpec, Setup, Tick};
-use crate::signal::{Joint, JointsShape, Kind, Unit};
+use crate::signal::{Joint, Joints, JointsShape, Kind, Unit};
 
 /// Follows its position.
 mod follow {
@@ -106,9 +106,10 @@ type = "still_motor"
     fn open(_: Params) -> Result<Opened, Mistakes> {
         let joint = Joint { name: "a".into(), lower: -1.0, upper: 1.0, speed: 1.0, acceleration: 10.0 };
         let shape = JointsShape { joints: vec![joint], unit: Unit::RADIAN };
-        let commands = vec![shape.in_unit(Unit::RADIAN.per_second()).into()];
-        let filled = Filled { role: "motor".into(), outputs: vec![shape.into()], commands, facts: vec![] };
-        let description = Description { fills: vec![filled], period: 0.004 };
+        let mut description = Description::every(0.004);
+        let mut motor = description.fills("motor");
+        motor.command("velocity", shape.in_unit(Unit::RADIAN.per_second()));
+        motor.output::<Joints>("position", shape);
         Ok(Opened { description, driver: Driver::Stepped(Box::new(Self)) })
     }
 }

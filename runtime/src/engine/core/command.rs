@@ -95,6 +95,7 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
+    use crate::device::Description;
     use crate::signal::{JointsShape, Stamp};
 
     /// A slot for two joints, and the bus its command comes over.
@@ -109,8 +110,10 @@ mod tests {
             accelerations: accelerations.into(),
             follows: false,
         };
+        let mut description = Description::every(1.0);
         let joints = JointsShape { joints: vec![Default::default(); 2], ..Default::default() };
-        (slot, bus, Commands::with_shapes([&joints.into()].into_iter()))
+        description.fills("arm").command("velocity", joints);
+        (slot, bus, Commands::of(&description))
     }
 
     fn drive(bus: &mut Bus, slot: &CommandSlot, wanted: Option<[f64; 2]>) {
@@ -131,14 +134,14 @@ mod tests {
         let mut last = 2.0;
         for step in 1..=10 {
             let is_still = slot.ramp(&mut commands, 0.01);
-            let now = commands.joints(0)[0];
+            let now = commands.values[0][0];
             assert!((last - now - 0.2).abs() < 1e-12, "step {step}: {last} to {now}");
-            assert!((commands.joints(0)[1] + now / 2.0).abs() < 1e-12, "the direction stays");
+            assert!((commands.values[0][1] + now / 2.0).abs() < 1e-12, "the direction stays");
             assert!(!is_still || step >= 10);
             last = now;
         }
         assert!(slot.ramp(&mut commands, 0.01));
-        assert_eq!(commands.joints(0), [0.0, 0.0]);
+        assert_eq!(&*commands.values[0], [0.0, 0.0]);
     }
 
     #[test]
@@ -146,9 +149,9 @@ mod tests {
         let (mut slot, mut bus, mut commands) = slot([f64::INFINITY; 2]);
         drive(&mut bus, &slot, Some([3.0, 4.0]));
         slot.commit(&bus, &mut commands, &Tick::first(), false);
-        assert_eq!(commands.joints(0), [3.0, 4.0]);
+        assert_eq!(&*commands.values[0], [3.0, 4.0]);
         slot.commit(&bus, &mut commands, &Tick::first(), true);
-        assert_eq!(commands.joints(0), [0.0, 0.0]);
+        assert_eq!(&*commands.values[0], [0.0, 0.0]);
     }
 
     #[test]
@@ -158,7 +161,7 @@ mod tests {
         bus.marks[slot.source.mark as usize].renew(1, Stamp { nanos: 0, device: 0 });
         for (now, expected) in [(100, [3.0, 4.0]), (101, [0.0, 0.0])] {
             slot.commit(&bus, &mut commands, &Tick { now, ..Tick::first() }, false);
-            assert_eq!(commands.joints(0), expected, "{now} ns");
+            assert_eq!(&*commands.values[0], expected, "{now} ns");
         }
     }
 
@@ -168,7 +171,11 @@ mod tests {
             (Bus::default(), JointsShape { joints: vec![Default::default(); 2], ..Default::default() });
         let source = bus.add(&shape.clone().into());
         let report = ReportSlot { device: 0, source, report: 1, max_age: 100 };
-        let mut commands = Commands::default().with_report(None).with_report(Some(&shape.into()));
+        let mut description = Description::every(1.0);
+        let mut arm = description.fills("arm");
+        let (other, joints) = (arm.report::<bool>("is_there"), arm.report::<Joints>("joints"));
+        let shape = shape.into();
+        let mut commands = Commands::with_reports(&description, |report| (report == 1).then_some(&shape));
         let room = Joints::arena(&bus.arenas)[0].0.as_ptr();
         let mut tell = |wanted: Option<i64>, now: i64| {
             let mark = &mut bus.marks[source.mark as usize];
@@ -178,8 +185,8 @@ mod tests {
             }
             Joints::arena_mut(&mut bus.arenas)[source.slot as usize].0.fill(now as f64);
             report.commit(&bus, &mut commands, &Tick { now, ..Tick::first() });
-            let told = commands.report::<Joints>(1).map(|joints| (joints.0[1], joints.0.as_ptr()));
-            assert!(commands.report::<Joints>(0).is_none() && commands.report::<bool>(1).is_none());
+            let told = commands.report(joints).map(|joints| (joints.0[1], joints.0.as_ptr()));
+            assert!(commands.report(other).is_none());
             assert!(told.is_none_or(|(_, place)| place != room));
             told
         };
@@ -189,7 +196,7 @@ mod tests {
         assert_eq!(tell(Some(50), 101), Some((101.0, first.1)));
         assert_eq!(tell(None, 102), None, "absent");
         commands.fall_silent();
-        assert!(commands.report::<Joints>(1).is_none());
+        assert!(commands.report(joints).is_none());
     }
 
     proptest! {
@@ -208,7 +215,7 @@ mod tests {
                 }
                 drive(&mut bus, &slot, wanted.map(|_| given));
                 slot.commit(&bus, &mut commands, &Tick { dt, ..Tick::first() }, is_halted);
-                let now: [f64; 2] = commands.joints(0).try_into().unwrap();
+                let now: [f64; 2] = (*commands.values[0]).try_into().unwrap();
                 for i in 0..2 {
                     prop_assert!((now[i] - last[i]).abs() <= accelerations[i] * dt + 1e-12);
                     let is_driven = wanted.is_some() && !is_halted;

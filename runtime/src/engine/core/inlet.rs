@@ -1,6 +1,6 @@
 //! Where a device's samples come into the graph: each counts as new once, and none goes back in time.
 
-use crate::device::Samples;
+use crate::device::{Sample, Samples, State};
 use crate::graph::{PlannedRole, Policy};
 use crate::node::{Bus, PortId};
 use crate::signal::{Kind, Stamp};
@@ -29,6 +29,7 @@ pub(crate) struct Inlet {
     pub(crate) device: usize,
     pub(crate) counters: Counters,
     kind: Kind,
+    size: [usize; 2],
     port: usize,
     id: PortId,
     /// Writes of the device that were seen.
@@ -40,17 +41,22 @@ pub(crate) struct Inlet {
     pub(crate) stale: Policy,
     /// Sequence number of the last sample that came, whatever became of it.
     seen: Option<u64>,
-    /// Stamp and sequence number of the last sample that was new.
-    last: Option<(i64, u64)>,
+    /// Stamp of the last sample that was new, and its sequence number, if the port was not lost since.
+    last: Option<(i64, Option<u64>)>,
+    is_lost: bool,
+    /// Whether the run goes on without it.
+    is_observed: bool,
 }
 
 impl Inlet {
     pub(crate) fn new(role: &PlannedRole, port: usize, id: PortId) -> Self {
+        let shape = &role.ports[port].shape;
         Self {
             device: role.device,
             counters: Counters::default(),
-            kind: role.ports[port].shape.kind(),
-            port: role.first_port + port,
+            kind: shape.kind(),
+            size: shape.size(),
+            port: role.numbers[port],
             max_age: role.max_age,
             period: role.period,
             stale: role.stale,
@@ -58,18 +64,47 @@ impl Inlet {
             writes: 0,
             seen: None,
             last: None,
+            is_lost: false,
+            is_observed: role.is_observed,
         }
     }
 
-    /// Whether a sample that has not been taken over yet is finite: an image is checked once, here at the edge.
+    /// Whether the device has a sample that was not taken over yet.
+    fn sample<'s>(&self, samples: &'s Samples) -> Option<&'s Sample> {
+        Some(&samples.ports[self.port]).filter(|sample| sample.writes != self.writes && sample.state == State::Value)
+    }
+
+    /// Returns the size of a sample that was not taken over yet, if the device has stated another, and that one.
+    pub(crate) fn misfit(&self, samples: &Samples) -> Option<[[usize; 2]; 2]> {
+        let size = samples.arenas.size(self.kind, self.sample(samples)?.slot);
+        (size != self.size).then_some([size, self.size])
+    }
+
+    /// Whether a sample that was not taken over yet is finite: an image is checked once, here at the edge.
     pub(crate) fn is_finite(&self, samples: &Samples) -> bool {
-        let sample = samples.ports[self.port];
-        sample.writes == self.writes || sample.is_absent || samples.arenas.is_finite(self.kind, sample.slot)
+        self.sample(samples).is_none_or(|sample| samples.arenas.is_finite(self.kind, sample.slot))
+    }
+
+    /// Returns why the device has lost the port, if the run does not go on without it.
+    pub(crate) fn lost<'s>(&self, samples: &'s Samples) -> Option<&'s str> {
+        match &samples.ports[self.port].state {
+            State::Lost(why) if !self.is_observed => Some(why),
+            _ => None,
+        }
     }
 
     /// Takes the newest sample over, if there is one. The buffers are exchanged, not copied.
     pub(crate) fn latch(&mut self, samples: &mut Samples, bus: &mut Bus, tick: u64, now: i64) {
-        let sample = samples.ports[self.port];
+        let Samples { arenas, ports, .. } = samples;
+        let sample = &ports[self.port];
+        self.is_lost = matches!(sample.state, State::Lost(_));
+        if self.is_lost {
+            // What comes when it is back may count from 1 again.
+            (self.writes, self.seen) = (sample.writes, None);
+            self.last = self.last.map(|(stamp, _)| (stamp, None));
+            self.lose(bus, tick);
+            return;
+        }
         if sample.writes == self.writes {
             return;
         }
@@ -77,37 +112,42 @@ impl Inlet {
         let missing =
             self.seen.replace(sample.sequence).map_or(0, |seen| sample.sequence.saturating_sub(seen.saturating_add(1)));
         match self.last {
-            Some((_, sequence)) if sequence == sample.sequence => self.counters.repeated += 1,
+            Some((_, Some(sequence))) if sequence == sample.sequence => self.counters.repeated += 1,
             Some((stamp, _)) if sample.stamp == stamp => self.counters.repeated += 1,
             Some((stamp, _)) if sample.stamp < stamp => self.counters.went_back += 1,
             // Taken over, it would look fresh for as long as it lies ahead, and keep all that come after it out.
             _ if sample.stamp - now > self.period => self.counters.ahead += 1,
             _ => {
-                self.last = Some((sample.stamp, sample.sequence));
+                self.last = Some((sample.stamp, Some(sample.sequence)));
                 self.counters.new += 1;
                 self.counters.gaps += missing;
                 self.counters.late += u64::from(now - sample.stamp > self.period);
-                let mark = &mut bus.marks[self.id.mark as usize];
-                if sample.is_absent {
-                    mark.lose(tick);
+                if sample.state == State::Absent {
+                    self.lose(bus, tick);
                 } else {
-                    bus.arenas.swap(self.kind, self.id.slot, &mut samples.arenas, sample.slot);
-                    mark.renew(tick, Stamp { nanos: sample.stamp, device: self.device as u16 });
+                    let stamp = Stamp { nanos: sample.stamp, device: self.device as u16 };
+                    let mark = bus.arenas.receive(self.kind, self.id.slot, arenas, sample.slot, tick, stamp);
+                    bus.marks[self.id.mark as usize] = mark;
                 }
             }
         }
     }
 
+    fn lose(&self, bus: &mut Bus, tick: u64) {
+        bus.arenas.lose(self.kind, self.id.slot, tick);
+        bus.marks[self.id.mark as usize].lose(tick);
+    }
+
     /// Drops a sample that is not finite.
     pub(crate) fn reject(&mut self, samples: &Samples) {
-        let sample = samples.ports[self.port];
+        let sample = &samples.ports[self.port];
         (self.writes, self.seen) = (sample.writes, Some(sample.sequence));
         self.counters.not_finite += 1;
     }
 
-    /// Whether there was a sample, and the newest is too old at `now` [ns]; what is only counted is not asked.
+    /// Whether there was a sample, and the newest is too old at `now` [ns]; what is only counted or lost is not asked.
     pub(crate) fn is_stale(&self, now: i64) -> bool {
-        self.stale != Policy::Count && self.age(now).is_some_and(|age| age > self.max_age)
+        !self.is_lost && self.stale != Policy::Count && self.age(now).is_some_and(|age| age > self.max_age)
     }
 
     /// Age of the newest sample at `now`, if there is one, and how old it may be [ns].

@@ -56,10 +56,13 @@ impl Core {
         self.commit(devices, false);
     }
 
-    /// Takes the newest samples over.
+    /// Takes over the newest samples of the devices that have not failed.
     pub(crate) fn latch(&mut self, devices: &mut [DeviceSlot]) {
         for inlet in &mut self.inlets {
-            inlet.latch(&mut devices[inlet.device].samples, &mut self.bus, self.tick.index, self.tick.now);
+            let device = &mut devices[inlet.device];
+            if device.failed.is_none() {
+                inlet.latch(&mut device.samples, &mut self.bus, self.tick.index, self.tick.now);
+            }
         }
     }
 

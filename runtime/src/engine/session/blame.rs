@@ -31,6 +31,11 @@ impl Engine {
                 let why = device.failed.clone().unwrap_or_default();
                 self.fault(&device.name, None, Cause::Device(why), device.place.clone())
             }
+            Trouble::Lost(inlet) => {
+                let samples = &self.devices[self.core.inlets[inlet].device].samples;
+                let why = self.core.inlets[inlet].lost(samples).unwrap_or_default();
+                self.of_port(inlet, Cause::Lost(why.to_owned()))
+            }
             Trouble::Clock => {
                 let clock = (0..self.devices.len()).find(|device| self.timeline.is_clock(*device));
                 let (name, place) = clock.map_or(("", ""), |i| (&self.devices[i].name, &self.devices[i].place));

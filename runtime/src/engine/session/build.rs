@@ -24,7 +24,7 @@ impl Engine {
     /// Allocates everything that the plan needs; nothing allocates in a tick.
     #[must_use]
     pub fn new(compiled: Compiled) -> Self {
-        let Compiled { plan, view: shown, sources, .. } = compiled;
+        let Compiled { plan, view: shown, sources, exports, .. } = compiled;
         let (mut bus, mut ids, mut ports, mut inlets) = (Bus::default(), Ids::new(), Vec::new(), Vec::new());
         let mut add = |source: PortRef, planned: &PlannedPort| {
             let id = bus.add(&planned.shape);
@@ -54,6 +54,8 @@ impl Engine {
         let slots = plan.commands.into_iter().map(slot).collect();
         let tell = |report: &PlannedReport| ReportSlot::new(ids[&report.source], report);
         let told = plan.reports.iter().map(tell).collect();
+        let name = |planned: &PlannedReport| (planned.name.join("."), planned.device, planned.report);
+        let reported = plan.reports.iter().map(name).collect();
         let shape = |(device, report): (usize, usize)| {
             let planned = plan.reports.iter().find(|planned| (planned.device, planned.report) == (device, report));
             planned.map(|planned| &planned.shape)
@@ -84,6 +86,8 @@ impl Engine {
             limits,
             names,
             roles,
+            reported,
+            exports,
             policy: plan.policy,
             halts: Halts::new(),
             trouble: None,
@@ -126,12 +130,11 @@ fn device_slot<'s>(
     report: impl Fn(usize) -> Option<&'s Shape>,
     sources: &SourceMap,
 ) -> DeviceSlot {
-    let commands = Commands::with_shapes(device.commands.iter());
     DeviceSlot {
         place: sources.locate(device.span.start),
         name: device.name,
-        samples: Samples::with_shapes(device.outputs.iter()),
-        commands: (0..device.reports).fold(commands, |commands, i| commands.with_report(report(i))),
+        samples: Samples::of(&device.description),
+        commands: Commands::with_reports(&device.description, report),
         link: match device.driver {
             Driver::Stepped(driver) => Link::Stepped(driver),
             Driver::Live(driver) => Link::Idle(driver),

@@ -34,6 +34,7 @@ impl Engine {
             self.raise(self.policy.deadline, Trouble::Late(by))?;
         }
         let has_sampled = self.exchange_with_devices(now) || due;
+        self.check_sizes();
         for i in 0..self.devices.len() {
             if self.devices[i].failed.is_some() {
                 self.raise(self.policy.device.0, Trouble::Device(i))?;
@@ -44,9 +45,15 @@ impl Engine {
             self.raise(self.policy.clock, Trouble::Clock)?;
         }
         for i in 0..self.core.inlets.len() {
-            let (inlet, devices) = (&mut self.core.inlets[i], &self.devices);
-            let samples = &devices[inlet.device].samples;
-            if !inlet.is_finite(samples) {
+            let inlet = &mut self.core.inlets[i];
+            let device = &self.devices[inlet.device];
+            let samples = &device.samples;
+            if device.failed.is_some() {
+                continue;
+            }
+            if inlet.lost(samples).is_some() {
+                self.raise(self.policy.device.0, Trouble::Lost(i))?;
+            } else if !inlet.is_finite(samples) {
                 inlet.reject(samples);
                 self.raise(self.policy.not_finite.0, Trouble::NotFinite(i))?;
             }
@@ -217,6 +224,20 @@ impl Engine {
             }
         }
         has_sampled
+    }
+
+    /// A device that gives a value of another size than it has stated fails.
+    fn check_sizes(&mut self) {
+        for i in 0..self.core.inlets.len() {
+            let inlet = &self.core.inlets[i];
+            let device = &self.devices[inlet.device];
+            if let Some(sizes) = inlet.misfit(&device.samples).filter(|_| device.failed.is_none()) {
+                let port = &self.ports[i].0;
+                let [size, stated] = sizes.map(|size| port.shape.kind().size_in_words(size));
+                let why = format!("`{}` has {size}, but the device stated {stated}", port.name);
+                self.lose_device(inlet.device, why);
+            }
+        }
     }
 
     /// A device has failed: it is not touched again.

@@ -3,11 +3,12 @@
 use super::halt::{Halt, Halts};
 use super::timeline::Timeline;
 use super::trouble::{Trouble, WatchedWire};
+use crate::device::Report;
 use crate::engine::core::{Change, Core, Counters, DeviceSlot, Link, Modes, Timing};
 use crate::graph::{PlannedPort, Policy, PolicyTable};
 use crate::node::{Bus, PortId};
-use crate::signal::Signal;
-use crate::source::SourceMap;
+use crate::signal::{Mark, Signal};
+use crate::source::{SourceMap, closest};
 
 /// A graph that runs.
 pub struct Engine {
@@ -23,6 +24,10 @@ pub struct Engine {
     pub(super) names: Vec<(String, String)>,
     /// Name of each role, and the place of the device behind it.
     pub(super) roles: Vec<(String, String)>,
+    /// Each report that is wired, with its device and its number there.
+    pub(super) reported: Vec<(String, usize, usize)>,
+    /// What the parts export, and the port behind each.
+    pub(super) exports: Vec<(String, String)>,
     pub(super) timing: Timing,
     pub(super) modes: Option<Modes>,
     pub(super) is_done: bool,
@@ -222,10 +227,57 @@ impl Engine {
         Some(device.commands.values.iter().flat_map(|values| values.iter().copied()).collect())
     }
 
-    /// What a device is told on its report port `port`; none if nothing is.
+    /// Returns what the graph reports to a device on `role.report`, or `None` while that is absent or not wired.
     #[must_use]
-    pub fn report<T: Signal>(&self, device: &str, port: usize) -> Option<&T> {
-        self.devices.iter().find(|slot| slot.name == device)?.commands.report(port)
+    pub fn report<T: Signal>(&self, name: &str) -> Option<&T> {
+        let (_, device, report) = self.reported.iter().find(|(known, ..)| known == name)?;
+        self.devices[*device].commands.report(Report::at(*report))
+    }
+
+    /// The devices, each with what it has counted; see [`Samples::count`].
+    pub fn counts(&self) -> impl Iterator<Item = (&str, &[(&'static str, u64)])> {
+        self.devices.iter().map(|slot| (slot.name.as_str(), slot.samples.counts.as_slice()))
+    }
+
+    /// Returns the place of a port, by its name in a record or in the wires of the task.
+    #[must_use]
+    pub fn port(&self, name: &str) -> Option<&(PlannedPort, PortId)> {
+        let export = self.exports.iter().find(|(export, _)| export == name);
+        let name = export.map_or(name, |(_, port)| port.as_str());
+        self.ports.iter().find(|(port, _)| port.name == name)
+    }
+
+    /// Returns the value of a port as the last tick left it, or `None` while it is absent: `get::<Scalar>("truth.force")`.
+    ///
+    /// # Panics
+    /// If there is no port of that name and kind.
+    #[must_use]
+    pub fn get<T: Signal>(&self, name: &str) -> Option<&T> {
+        let (port, id) = self.known(name);
+        assert_eq!(port.shape.kind(), T::KIND, "kind of port `{name}`");
+        self.read(*id)
+    }
+
+    /// Returns the mark of a port, as the last tick left it.
+    ///
+    /// # Panics
+    /// If there is no port of that name.
+    #[must_use]
+    pub fn mark(&self, name: &str) -> Mark {
+        self.core.bus.marks[self.known(name).1.mark as usize]
+    }
+
+    /// Returns the value of a port that was looked up before; see [`port`](Self::port).
+    pub(crate) fn read<T: Signal>(&self, id: PortId) -> Option<&T> {
+        let Bus { marks, arenas } = &self.core.bus;
+        marks[id.mark as usize].is_present().then(|| &T::arena(arenas)[id.slot as usize])
+    }
+
+    fn known(&self, name: &str) -> &(PlannedPort, PortId) {
+        self.port(name).unwrap_or_else(|| {
+            let names = self.ports.iter().map(|(port, _)| port.name.as_str());
+            panic!("there is no port `{name}`: {}", closest(name, names, "ports"))
+        })
     }
 
     /// The texts the graph was read from.

@@ -31,6 +31,8 @@ pub(crate) enum Trouble {
     Panicked(usize),
     /// A device has failed.
     Device(usize),
+    /// The device of an inlet has lost its port.
+    Lost(usize),
     /// The clock device is silent.
     Clock,
     /// The tick began so late [ns].

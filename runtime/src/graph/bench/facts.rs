@@ -50,7 +50,7 @@ fn fact(word: &Word, span: &Range<usize>, net: &Net<'_>, opened: &Opened) -> Res
     };
     // A device that could not be opened has had its say.
     let Some(bound) = &opened.roles[index] else { return Ok(None) };
-    let facts = &bound.filled.facts;
+    let facts = &bound.facts;
     match facts.iter().find(|(fact, _)| fact == name) {
         Some((_, value)) => Ok(Some(Value::from_toml(value, span))),
         None => {

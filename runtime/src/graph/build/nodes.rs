@@ -62,7 +62,7 @@ impl Builder<'_> {
 
     fn roles(&mut self) {
         for (i, bound) in self.opened.roles.iter().enumerate() {
-            for (port, shape) in bound.iter().flat_map(|bound| &bound.filled.outputs).enumerate() {
+            for (port, (_, shape)) in bound.iter().flat_map(|bound| &bound.outputs).enumerate() {
                 self.port(PortRef { producer: Producer::Role(i), port }, shape.clone());
             }
         }
@@ -72,12 +72,12 @@ impl Builder<'_> {
         let role = |(i, bound): (usize, &Option<BoundRole>)| {
             let bound = bound.as_ref()?;
             let source = |port| PortRef { producer: Producer::Role(i), port };
-            let ports = (0..bound.filled.outputs.len()).map(|port| self.ports[&source(port)].clone()).collect();
+            let ports = (0..bound.outputs.len()).map(|port| self.ports[&source(port)].clone()).collect();
             let name = self.net.flat.roles[i].0.name.clone();
             let period = self.opened.periods[bound.device];
             let (max_age, stale) = policy.of(&name, period);
-            let (device, first_port, period) = (bound.device, bound.first_output, (period * 1e9) as i64);
-            Some(PlannedRole { name, device, first_port, ports, max_age, stale, period })
+            let (device, numbers, period) = (bound.device, numbers(bound), (period * 1e9) as i64);
+            Some(PlannedRole { name, device, numbers, ports, max_age, stale, is_observed: false, period })
         };
         let declared = self.opened.roles.iter().enumerate().filter_map(role);
         declared.chain(self.observed_roles()).collect()
@@ -87,7 +87,7 @@ impl Builder<'_> {
     fn observed_roles(&self) -> impl Iterator<Item = PlannedRole> {
         self.net.observed.iter().zip(&self.opened.observed).filter_map(|((key, _, role), bound)| {
             let bound = bound.as_ref()?;
-            let port = |(spec, shape): (&PortSpec, &Shape)| PlannedPort {
+            let port = |(spec, (_, shape)): (&PortSpec, &(usize, Shape))| PlannedPort {
                 name: format!("{}.{}", key.name, spec.name),
                 shape: shape.clone(),
                 frames: frame_args(spec).iter().map(|_| Some(key.name.clone())).collect(),
@@ -95,10 +95,11 @@ impl Builder<'_> {
             Some(PlannedRole {
                 name: key.name.clone(),
                 device: bound.device,
-                first_port: bound.first_output,
-                ports: role.outputs.iter().zip(&bound.filled.outputs).map(port).collect(),
+                numbers: numbers(bound),
+                ports: role.outputs.iter().zip(&bound.outputs).map(port).collect(),
                 max_age: i64::MAX,
                 stale: Policy::Count,
+                is_observed: true,
                 period: (self.opened.periods[bound.device] * 1e9) as i64,
             })
         })
@@ -250,7 +251,7 @@ impl Builder<'_> {
     pub(crate) fn command(&mut self, wire: &CommandWire) -> Option<PlannedCommand> {
         let bound = self.opened.roles[wire.role].as_ref()?;
         let port = self.taken(wire)?;
-        let (spec, takes) = (self.net.taken(wire), &bound.filled.commands[wire.command]);
+        let (spec, (command, takes)) = (self.net.taken(wire), &bound.commands[wire.command]);
         let (has, wants) = (joint_names(&port.shape), joint_names(takes));
         if has != wants {
             let consumer = self.net.taken_name(wire);
@@ -262,7 +263,7 @@ impl Builder<'_> {
         Some(PlannedCommand {
             source: wire.source,
             device: bound.device,
-            command: bound.first_command + wire.command,
+            command: *command,
             name: [self.net.flat.roles[wire.role].0.name.clone(), spec.name.to_string()],
             age: self.age(wire),
             span: wire.origin.word.span.clone(),
@@ -276,7 +277,7 @@ impl Builder<'_> {
             source: wire.source,
             shape: self.taken(wire)?.shape,
             device: bound.device,
-            report: bound.first_report + wire.command,
+            report: bound.reports[wire.command].0,
             name: [self.net.flat.roles[wire.role].0.name.clone(), self.net.taken(wire).name.to_string()],
             age: self.age(wire),
             span: wire.origin.word.span.clone(),
@@ -300,6 +301,11 @@ impl Builder<'_> {
     fn age(&self, wire: &CommandWire) -> Age {
         wire.origin.age.unwrap_or(Age { max_age: (5e9 * self.period) as i64, stale: Policy::Hold })
     }
+}
+
+/// Numbers of a role's outputs among those of its device.
+fn numbers(bound: &BoundRole) -> Vec<usize> {
+    bound.outputs.iter().map(|(number, _)| *number).collect()
 }
 
 /// Greatest acceleration of each joint [rad/s²].

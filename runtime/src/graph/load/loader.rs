@@ -148,6 +148,9 @@ impl Loader {
         let (path, span) = match (&request.bench, named) {
             (Some(path), _) => (path.clone(), None),
             (None, Some(file)) => (file.path.clone(), Some(file.span.clone())),
+            (None, None) if set.get("devices").is_some() => {
+                return Some(self.sections(|sections| sections.bench(&set)));
+            }
             (None, None) => {
                 let diagnostic =
                     Diagnostic::new(Code::MissingKey, flat.place.clone(), "the graph names no bench to run on");

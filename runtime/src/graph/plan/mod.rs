@@ -6,7 +6,7 @@ mod view;
 
 use std::ops::Range;
 
-use crate::device::Driver;
+use crate::device::{Description, Driver};
 use crate::graph::syntax::{Age, Policy, PolicyTable};
 use crate::node::{AnyNode, Need};
 use crate::signal::Shape;
@@ -21,12 +21,14 @@ pub(crate) struct PlannedRole {
     pub(crate) name: String,
     /// Index of the device.
     pub(crate) device: usize,
-    /// Number of the role's first output among the device's.
-    pub(crate) first_port: usize,
+    /// Number of each of the role's outputs among those of the device.
+    pub(crate) numbers: Vec<usize>,
     pub(crate) ports: Vec<PlannedPort>,
     /// How old the newest sample may be [ns], and what it does when it is older.
     pub(crate) max_age: i64,
     pub(crate) stale: Policy,
+    /// Whether only a scenario and the recorder read it, so that a run goes on without it.
+    pub(crate) is_observed: bool,
     /// Nominal time between two samples of the device [ns].
     pub(crate) period: i64,
 }
@@ -35,10 +37,7 @@ pub(crate) struct PlannedRole {
 pub(crate) struct PlannedDevice {
     pub(crate) name: String,
     pub(crate) driver: Driver,
-    pub(crate) outputs: Vec<Shape>,
-    pub(crate) commands: Vec<Shape>,
-    /// How many things it can be told.
-    pub(crate) reports: usize,
+    pub(crate) description: Description,
     /// Where its name stands in the bench.
     pub(crate) span: Range<usize>,
 }
