@@ -48,6 +48,7 @@ pub mod touch;
 use tactflow_runtime::catalogue::Catalogue;
 use tactflow_runtime::diagnostic::Code;
 use tactflow_runtime::node::{At, Mistake};
+use tactflow_runtime::signal::{Scalar, Twist};
 
 #[cfg(feature = "cli")]
 pub use tool::tool;
@@ -105,8 +106,8 @@ pub fn catalogue() -> Catalogue {
         .node::<arm::ik_sink::IkSink>()
         .group("flow: what waits, chooses, generates and shows")
         .node::<flow::contact_debounce::ContactDebounce>()
-        .node::<flow::gate::Gate>()
-        .node::<flow::gate::TwistGate>()
+        .node::<flow::gate::Gate<Scalar>>()
+        .node::<flow::gate::Gate<Twist>>()
         .node::<flow::switch::Switch>()
         .node::<flow::switch::TwistSwitch>()
         .node::<flow::delay::Delay>()

@@ -3,7 +3,6 @@
 use super::plan::Producer;
 use super::wires::{CommandWire, Model, Wire};
 use crate::diagnostic::{Code, Diagnostic};
-use crate::node::Need;
 
 /// Who reads what, and in which order all step.
 #[derive(Clone, Copy)]
@@ -56,9 +55,8 @@ fn delayed_roles(model: &Model<'_>, wires: &[Vec<Wire>]) -> Vec<Diagnostic> {
     let mut mistakes = Vec::new();
     for (node, wires) in wires.iter().enumerate() {
         let Some((_, spec)) = &model.nodes[node] else { continue };
-        let from_role = |wire: &&Wire| {
-            spec.inputs[wire.input].need == Need::Delayed && matches!(wire.source.producer, Producer::Role(_))
-        };
+        let from_role =
+            |wire: &&Wire| spec.inputs[wire.input].need.is_delayed && matches!(wire.source.producer, Producer::Role(_));
         for wire in wires.iter().filter(from_role) {
             let (name, key) = (&model.flat.nodes[node].name, &wire.key.name);
             let message = format!("`{name}.{key}` reads what the last tick left, which a role does not keep");
@@ -74,7 +72,7 @@ fn edges(model: &Model<'_>, wires: &[Vec<Wire>]) -> Vec<Edge> {
         for (i, wire) in wires.iter().enumerate() {
             let Producer::Node(producer) = wire.source.producer else { continue };
             let (_, spec) = model.nodes[consumer].as_ref().expect("only known nodes have wires");
-            let is_delayed = spec.inputs[wire.input].need == Need::Delayed;
+            let is_delayed = spec.inputs[wire.input].need.is_delayed;
             let (first, then) = if is_delayed { (consumer, producer) } else { (producer, consumer) };
             edges.push(Edge { first, then, wire: (consumer, i), is_delayed });
         }

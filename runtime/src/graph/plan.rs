@@ -83,7 +83,7 @@ pub(crate) struct PlannedNode {
     pub(crate) inputs: Vec<(Need, Vec<PlannedWire>)>,
     pub(crate) ports: Vec<PlannedPort>,
     pub(crate) is_every_tick: bool,
-    /// Whether the tool logs its inputs; see [`Node::LOGS`](crate::node::Node::LOGS).
+    /// Whether the tool logs its inputs; see [`Describe::LOGS`](crate::node::Describe::LOGS).
     pub(crate) is_logged: bool,
     /// The limits it holds; each has an output of that name.
     pub(crate) holds: &'static [&'static str],

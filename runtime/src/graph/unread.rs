@@ -10,7 +10,6 @@ use super::plan::{Producer, Source};
 use super::units::may_fit;
 use super::wires::{CommandWire, Model, Wire};
 use crate::diagnostic::{Code, Diagnostic};
-use crate::node::Need;
 
 /// What is to be looked at; nothing in a graph without commands, which is there to be recorded.
 pub(crate) fn unread(
@@ -69,14 +68,15 @@ fn open_input(model: &Model<'_>, wires: &[Vec<Wire>], node: usize) -> Option<Str
     let beside = (0..flat.len()).filter(|other| flat[*other].scope == flat[node].scope && !above.contains(other));
     let mut inputs = beside.flat_map(|other| {
         let spec = model.nodes[other].as_ref().map(|(_, spec)| spec);
-        let open = spec.into_iter().flat_map(|spec| spec.inputs.iter().enumerate()).filter(move |(index, input)| {
-            input.need == Need::Many || wires[other].iter().all(|wire| wire.input != *index)
-        });
+        let open = spec
+            .into_iter()
+            .flat_map(|spec| spec.inputs.iter().enumerate())
+            .filter(move |(index, input)| input.need.is_many || wires[other].iter().all(|wire| wire.input != *index));
         open.map(move |(_, input)| (other, input))
     });
     inputs.find_map(|(other, input)| {
         let output = outputs.iter().find(|output| may_fit(output, input))?;
-        let name = if input.need == Need::Many { "NAME" } else { &*input.name };
+        let name = if input.need.is_many { "NAME" } else { &*input.name };
         let (from, to) = (&flat[node].block.key.name, &flat[other].block.key.name);
         Some(format!("`in.{name} = \"{from}.{}\"` to `{to}`", output.name))
     })

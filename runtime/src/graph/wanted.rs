@@ -4,7 +4,7 @@
 use super::order::Wiring;
 use super::plan::Producer;
 use super::wires::{Model, Wire};
-use crate::node::{AnyNode, Components, Need};
+use crate::node::{AnyNode, Components};
 
 /// Of each node what of its outputs is read, given the nodes as they are set. Of one that no wire reads all is: somebody
 /// looks at the record.
@@ -28,7 +28,7 @@ pub(crate) fn wanted<'n>(
         }
     }
     let is_delayed = |node: usize, wire: &Wire| {
-        model.nodes[node].as_ref().is_some_and(|(_, spec)| spec.inputs[wire.input].need == Need::Delayed)
+        model.nodes[node].as_ref().is_some_and(|(_, spec)| spec.inputs[wire.input].need.is_delayed)
     };
     // Who reads what the last tick left steps before the one it reads: that is taken as read as a whole.
     for (node, wires) in wires.iter().enumerate() {

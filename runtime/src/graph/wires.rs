@@ -7,7 +7,7 @@ use super::policy::Age;
 use crate::catalogue::Catalogue;
 use crate::device::RoleType;
 use crate::diagnostic::{Code, Diagnostic, closest, meant};
-use crate::node::{Need, NodeSpec, PortSpec, Word};
+use crate::node::{NodeSpec, PortSpec, Word};
 
 /// A wire that goes somewhere.
 #[derive(Debug, Clone)]
@@ -184,8 +184,8 @@ impl<'a> Model<'a> {
             found.push(*diagnostic);
             None
         });
-        let named = spec.inputs.iter().position(|input| input.need != Need::Many && input.name == key.name);
-        let Some(input) = named.or_else(|| spec.inputs.iter().position(|input| input.need == Need::Many)) else {
+        let named = spec.inputs.iter().position(|input| !input.need.is_many && input.name == key.name);
+        let Some(input) = named.or_else(|| spec.inputs.iter().position(|input| input.need.is_many)) else {
             let message = format!("`{}` has no input `{}`", spec.name, key.name);
             let help = closest(&key.name, spec.inputs.iter().map(|input| &*input.name), "inputs");
             found.push(Diagnostic::new(Code::UnknownInput, key.span.clone(), message).help(help));
@@ -252,7 +252,7 @@ impl<'a> Model<'a> {
     fn missing(&self, node: usize, spec: &NodeSpec, found: &mut Vec<Diagnostic>) {
         let block = &self.flat.nodes[node].block;
         let names = || spec.inputs.iter().map(|input| &*input.name);
-        for input in spec.inputs.iter().filter(|input| matches!(input.need, Need::Required | Need::Sampled)) {
+        for input in spec.inputs.iter().filter(|input| input.need.must_be_wired) {
             let is_meant =
                 |key: &Key| !names().any(|name| name == key.name) && meant(&key.name, names()) == Some(&input.name);
             let mut wired = block.wires.iter().map(|(key, _)| key).chain(&block.unread);

@@ -10,7 +10,6 @@ use super::super::plan::Producer;
 use super::super::wires::{Model, Wire};
 use super::{Condition, ModeBlock, PlannedExit, PlannedMode, Sort};
 use crate::diagnostic::{Code, Diagnostic};
-use crate::node::Need;
 use crate::signal::Kind;
 
 /// What of a graph can move by itself.
@@ -41,7 +40,7 @@ impl<'a> Movers<'a> {
         let (mut movers, mut moved) = (Vec::new(), BTreeSet::new());
         for &node in self.order {
             let Some((_, spec)) = &self.model.nodes[node] else { continue };
-            let wires = || self.wires[node].iter().filter(|wire| spec.inputs[wire.input].need != Need::Delayed);
+            let wires = || self.wires[node].iter().filter(|wire| !spec.inputs[wire.input].need.is_delayed);
             let is_sampled = |wire: &Wire| node_of(wire.source.producer).is_none_or(|source| sampled.contains(&source));
             if wires().any(is_sampled) {
                 sampled.insert(node);
