@@ -50,6 +50,7 @@ pub mod touch;
 
 use tactflow_runtime::catalogue::Catalogue;
 use tactflow_runtime::node::{At, Mistake};
+use tactflow_runtime::signal::{Scalar, Twist};
 use tactflow_runtime::source::Code;
 
 #[cfg(feature = "cli")]
@@ -108,8 +109,8 @@ pub fn catalogue() -> Catalogue {
         .node::<arm::ik_sink::IkSink>()
         .group("flow: what waits, chooses, generates and shows")
         .node::<flow::contact_debounce::ContactDebounce>()
-        .node::<flow::gate::Gate>()
-        .node::<flow::gate::TwistGate>()
+        .node::<flow::gate::Gate<Scalar>>()
+        .node::<flow::gate::Gate<Twist>>()
         .node::<flow::switch::Switch>()
         .node::<flow::switch::TwistSwitch>()
         .node::<flow::delay::Delay>()

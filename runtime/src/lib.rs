@@ -5,6 +5,9 @@
 //! [`diagnostic`] (what load says) and [`fault`] (what a run says), [`engine`] (the tick), [`device`] (the edge),
 //! [`record`], [`scenario`] (what must come out of a run), [`harness`], and `cli` (the command line as a library function, behind the feature `cli`).
 
+// The derives name this crate from outside; they work inside it too.
+extern crate self as tactflow_runtime;
+
 pub mod catalogue;
 #[cfg(feature = "cli")]
 pub mod cli;

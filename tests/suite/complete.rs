@@ -66,7 +66,7 @@ fn params(specs: &[ParamSpec], path: &str, note: &mut impl FnMut(bool, String)) 
         let name = format!("{path}{}", spec.name);
         note(spec.doc.trim().is_empty(), format!("a doc of parameter `{name}`"));
         let is_number = spec.takes.contains("a number") || spec.takes.contains("a rate");
-        note(is_number && spec.fields.is_empty() && spec.unit().is_none(), format!("a unit of parameter `{name}`"));
+        note(is_number && spec.fields.is_empty() && spec.unit.is_none(), format!("a unit of parameter `{name}`"));
         params(&spec.fields, &format!("{name}."), note);
     }
 }

@@ -163,7 +163,7 @@ fn a_device_that_states_other_ports_than_its_role_does_not_load() {
 fn sized() -> RoleType {
     let port = |name: &'static str, kind, args: &[&'static str]| {
         let args = args.iter().map(|arg| Cow::Borrowed(*arg)).collect();
-        PortSpec { name: name.into(), doc: "".into(), kind, args, need: Need::Required }
+        PortSpec { name: name.into(), doc: "".into(), kind, args, need: Need::REQUIRED }
     };
     RoleType {
         name: "sized".into(),

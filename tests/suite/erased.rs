@@ -2,8 +2,8 @@
 
 use tactflow_runtime::harness::GraphRig;
 use tactflow_runtime::node::{
-    AnyNode, Built, Bus, Configured, Given, Mistake, Mistakes, Need, NodeSpec, NodeType, Param, PortId, PortSpec,
-    Reader, Tick, Wires,
+    AnyNode, Built, Bus, Configured, Declared, Given, Mistake, Mistakes, Need, NodeSpec, NodeType, Param, PortId,
+    PortSpec, Reader, Tick, Wires,
 };
 use tactflow_runtime::signal::{Freshness, Kind, Scalar, Shape, Signal};
 use tactflow_runtime::source::Value;
@@ -25,7 +25,7 @@ impl NodeType for Polynomial {
             doc: "A length.".into(),
             kind: Kind::Scalar,
             args: vec!["m".into()].into(),
-            need: Need::Required,
+            need: Need::REQUIRED,
         };
         NodeSpec {
             name: self.name.clone().into(),
@@ -43,7 +43,7 @@ impl NodeType for Polynomial {
 
     fn configure(&self, table: &Value, reader: &mut Reader<'_>) -> Option<Box<dyn Configured>> {
         let mut open = reader.table(table)?;
-        let scale = reader.field::<f64>(&mut open, "scale", Some(|| 1.0));
+        let scale = reader.field::<f64>(&mut open, &Declared::new("scale"), Some(|| 1.0));
         reader.close(open, &["scale"]);
         let coefficients = self.coefficients.iter().map(|c| c * scale.unwrap_or(1.0)).collect();
         Some(Box::new(Self { coefficients, ..self.clone() }))

@@ -60,14 +60,16 @@ fn a_sample_that_is_not_finite_is_a_fault_of_its_role() {
 /// A node that gives nothing, and panics in the third tick.
 struct Mute;
 
+impl tactflow_runtime::node::Describe for Mute {
+    const NAME: &'static str = "mute";
+    const SUMMARY: &'static str = "gives nothing, and panics once";
+}
+
 impl Node for Mute {
     type Params = mute::Params;
     type Inputs<'a> = mute::Inputs<'a>;
     type Outputs = mute::Outputs;
     type State = ();
-
-    const NAME: &'static str = "mute";
-    const SUMMARY: &'static str = "gives nothing, and panics once";
 
     fn new(_: mute::Params, _: &mut Setup<Self>) -> Result<Self, Mistakes> {
         Ok(Self)

@@ -43,12 +43,7 @@ pub struct ArmState {
     chain: Chain,
 }
 
-impl Node for ArmState {
-    type Params = Params;
-    type Inputs<'a> = Inputs<'a>;
-    type Outputs = Outputs;
-    type State = ();
-
+impl tactflow_runtime::node::Describe for ArmState {
     const NAME: &'static str = "arm_state";
     const SUMMARY: &'static str = "where the sensor is and how the joints move it: forward kinematics and Jacobian";
     const DOC: &'static str = "T_gs = T_ge T_es, the paper's section IV: the chain from the model's root to `tip`, \
@@ -68,6 +63,13 @@ urdf = { from = "arm.urdf" }
 tip = { from = "arm.tip" }
 mount = { from = "arm.mount" }
 "#;
+}
+
+impl Node for ArmState {
+    type Params = Params;
+    type Inputs<'a> = Inputs<'a>;
+    type Outputs = Outputs;
+    type State = ();
 
     fn new(params: Params, setup: &mut Setup<Self>) -> Result<Self, Mistakes> {
         let chain = load(&params.urdf, &params.tip, &params.mount)?;

@@ -41,12 +41,7 @@ pub struct ContactPoint {
     height: f64,
 }
 
-impl Node for ContactPoint {
-    type Params = Params;
-    type Inputs<'a> = Inputs<'a>;
-    type Outputs = Outputs;
-    type State = ();
-
+impl tactflow_runtime::node::Describe for ContactPoint {
     const NAME: &'static str = "contact_point";
     const SUMMARY: &'static str = "measures where the contact is in the base: the robot as a ruler";
     const DOC: &'static str = "The point (x, y, `height`) of the sensor in the base, p = T_gs (x, y, height), with \
@@ -66,6 +61,13 @@ in.y = "moments.y"
 in.pose = "state.sensor_pose"
 height = -0.001                     # the foam gives way by about that [m]
 "#;
+}
+
+impl Node for ContactPoint {
+    type Params = Params;
+    type Inputs<'a> = Inputs<'a>;
+    type Outputs = Outputs;
+    type State = ();
 
     fn new(params: Params, _: &mut Setup<Self>) -> Result<Self, Mistakes> {
         Ok(Self { height: params.height })

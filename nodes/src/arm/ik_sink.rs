@@ -61,12 +61,7 @@ pub struct IkSink {
     limit_gain: f64,
 }
 
-impl Node for IkSink {
-    type Params = Params;
-    type Inputs<'a> = Inputs<'a>;
-    type Outputs = Outputs;
-    type State = State;
-
+impl tactflow_runtime::node::Describe for IkSink {
     const NAME: &'static str = "ik_sink";
     const SUMMARY: &'static str = "moves the arm: joint velocities for a twist, within the arm's limits";
     const DOC: &'static str = "Resolved motion rate control, as in the paper's section IV. Twist and Jacobian are \
@@ -88,6 +83,14 @@ in.jacobian = "state.jacobian"
 in.joints = "state.joints"
 posture = [0.0, 0.5, 0.0, -1.3, 0.0, 1.3, 0.0]   # [rad]
 "#;
+}
+
+impl Node for IkSink {
+    type Params = Params;
+    type Inputs<'a> = Inputs<'a>;
+    type Outputs = Outputs;
+    type State = State;
+
     const LIMITS: Limits = Limits::passed("twist");
 
     fn new(params: Params, setup: &mut Setup<Self>) -> Result<Self, Mistakes> {

@@ -26,12 +26,7 @@ outputs! {
 /// A change of frame has nothing to set.
 pub struct Adjoint;
 
-impl Node for Adjoint {
-    type Params = Params;
-    type Inputs<'a> = Inputs<'a>;
-    type Outputs = Outputs;
-    type State = ();
-
+impl tactflow_runtime::node::Describe for Adjoint {
     const NAME: &'static str = "adjoint";
     const SUMMARY: &'static str = "expresses a motion in another frame, the sensor's in the base's";
     const DOC: &'static str = "V_B = Ad_T V_A with T = (R, p) the pose of A in B and Ad_T = [R, p^ R; 0, R]: the \
@@ -47,6 +42,14 @@ type = "adjoint"
 in.twist = "acceleration_limit.twist"
 in.pose = "state.sensor_pose"
 "#;
+}
+
+impl Node for Adjoint {
+    type Params = Params;
+    type Inputs<'a> = Inputs<'a>;
+    type Outputs = Outputs;
+    type State = ();
+
     const LIMITS: Limits = Limits::passed("twist");
 
     fn new(_: Params, _: &mut Setup<Self>) -> Result<Self, Mistakes> {

@@ -38,12 +38,7 @@ struct Target {
     is_axial: bool,
 }
 
-impl Node for FeatureError {
-    type Params = Params;
-    type Inputs<'a> = Inputs<'a>;
-    type Outputs = Outputs;
-    type State = ();
-
+impl tactflow_runtime::node::Describe for FeatureError {
     const NAME: &'static str = "feature_error";
     const SUMMARY: &'static str = "sets the targets of a task: setpoint minus measurement, for every feature";
     const DOC: &'static str = "The vector Δf of the paper's eq. 3: e = setpoint - measured, for every feature that \
@@ -62,6 +57,13 @@ in.y = "moments.y"
 in.pressure = "smooth.value"
 setpoint = { x = 0.0, y = 0.0, pressure = 0.1 }   # [m, m, N per tactel]
 "#;
+}
+
+impl Node for FeatureError {
+    type Params = Params;
+    type Inputs<'a> = Inputs<'a>;
+    type Outputs = Outputs;
+    type State = ();
 
     fn new(params: Params, setup: &mut Setup<Self>) -> Result<Self, Mistakes> {
         let wires = &setup.inputs.feature;

@@ -38,12 +38,7 @@ pub struct InverseJacobian {
     columns: Box<[Twist]>,
 }
 
-impl Node for InverseJacobian {
-    type Params = Params;
-    type Inputs<'a> = Inputs<'a>;
-    type Outputs = Outputs;
-    type State = ();
-
+impl tactflow_runtime::node::Describe for InverseJacobian {
     const NAME: &'static str = "inverse_jacobian";
     const SUMMARY: &'static str = "turns the control of each feature into a motion of the sensor";
     const DOC: &'static str = "The twist is the sum over the features of column times control: the matrix J_s^-1 \
@@ -64,6 +59,13 @@ columns.x        = [ -1,  0,  0,   0, -20,  0 ]   # [1, rad per m]
 columns.y        = [  0, -1,  0,  20,   0,  0 ]
 columns.pressure = [  0,  0,  1,   0,   0,  0 ]   # [m per N per tactel]
 "#;
+}
+
+impl Node for InverseJacobian {
+    type Params = Params;
+    type Inputs<'a> = Inputs<'a>;
+    type Outputs = Outputs;
+    type State = ();
 
     fn new(params: Params, setup: &mut Setup<Self>) -> Result<Self, Mistakes> {
         let names = setup.inputs.control.features.iter().map(|feature| feature.name.as_str());

@@ -25,12 +25,7 @@ pub struct Projector {
     passes: [bool; 6],
 }
 
-impl Node for Projector {
-    type Params = Params;
-    type Inputs<'a> = Inputs<'a>;
-    type Outputs = Outputs;
-    type State = ();
-
+impl tactflow_runtime::node::Describe for Projector {
     const NAME: &'static str = "projector";
     const SUMMARY: &'static str = "selects which components of a motion are used, and so what a task controls";
     const DOC: &'static str = "The matrix P of the paper's eq. 3: a diagonal of ones and zeros over `[vx, vy, vz, \
@@ -47,6 +42,13 @@ type = "projector"
 in.twist = "jacobian.twist"
 select = [1, 1, 1, 0, 0, 0]         # place and pressure, no rolling
 "#;
+}
+
+impl Node for Projector {
+    type Params = Params;
+    type Inputs<'a> = Inputs<'a>;
+    type Outputs = Outputs;
+    type State = ();
 
     fn new(params: Params, _: &mut Setup<Self>) -> Result<Self, Mistakes> {
         Ok(Self { passes: params.select.map(|entry| *entry == 1) })

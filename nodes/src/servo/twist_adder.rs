@@ -22,12 +22,7 @@ outputs! {
 /// A sum has nothing to set.
 pub struct TwistAdder;
 
-impl Node for TwistAdder {
-    type Params = Params;
-    type Inputs<'a> = Inputs<'a>;
-    type Outputs = Outputs;
-    type State = ();
-
+impl tactflow_runtime::node::Describe for TwistAdder {
     const NAME: &'static str = "twist_adder";
     const SUMMARY: &'static str = "adds motions of one frame, such as servoing and guidance";
     const DOC: &'static str = "The sum of all twists that are wired, each under a name of your choice: the \
@@ -41,6 +36,13 @@ type = "twist_adder"
 in.touch = "projector.twist"
 in.guide = "guide.twist"
 "#;
+}
+
+impl Node for TwistAdder {
+    type Params = Params;
+    type Inputs<'a> = Inputs<'a>;
+    type Outputs = Outputs;
+    type State = ();
 
     fn new(_: Params, setup: &mut Setup<Self>) -> Result<Self, Mistakes> {
         if setup.inputs.twist.is_empty() {

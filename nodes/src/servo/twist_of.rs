@@ -36,12 +36,7 @@ outputs! {
 /// What is put together has nothing to set.
 pub struct TwistOf;
 
-impl Node for TwistOf {
-    type Params = Params;
-    type Inputs<'a> = Inputs<'a>;
-    type Outputs = Outputs;
-    type State = ();
-
+impl tactflow_runtime::node::Describe for TwistOf {
     const NAME: &'static str = "twist_of";
     const SUMMARY: &'static str = "puts a motion together from scalars, such as a test signal on one axis";
     const DOC: &'static str = "Each wire is one component of the twist; what is not wired is zero. With a \
@@ -56,6 +51,13 @@ type = "twist_of"
 in.vz = "signal_generator.value"
 frame = "pad"
 "#;
+}
+
+impl Node for TwistOf {
+    type Params = Params;
+    type Inputs<'a> = Inputs<'a>;
+    type Outputs = Outputs;
+    type State = ();
 
     fn new(_: Params, setup: &mut Setup<Self>) -> Result<Self, Mistakes> {
         let InputShapes { vx, vy, vz, wx, wy, wz, .. } = &setup.inputs;

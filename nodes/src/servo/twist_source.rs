@@ -31,12 +31,7 @@ pub struct TwistSource {
     is_gated: bool,
 }
 
-impl Node for TwistSource {
-    type Params = Params;
-    type Inputs<'a> = Inputs<'a>;
-    type Outputs = Outputs;
-    type State = ();
-
+impl tactflow_runtime::node::Describe for TwistSource {
     const NAME: &'static str = "twist_source";
     const SUMMARY: &'static str = "a constant motion, to approach an object or to guide along it";
     const DOC: &'static str = "Gives one twist in every tick: the external motion V_ext of the paper's Fig. 6, \
@@ -54,6 +49,13 @@ in.gate = "label.present"
 twist = [0, 0.01, 0, 0, 0, 0]       # [m/s, rad/s]
 "#;
     const EVERY_TICK: bool = true;
+}
+
+impl Node for TwistSource {
+    type Params = Params;
+    type Inputs<'a> = Inputs<'a>;
+    type Outputs = Outputs;
+    type State = ();
 
     fn new(params: Params, setup: &mut Setup<Self>) -> Result<Self, Mistakes> {
         setup.is_still = params.twist == [0.0; 6];

@@ -40,12 +40,7 @@ pub struct ContactArea {
     threshold: Option<f64>,
 }
 
-impl Node for ContactArea {
-    type Params = Params;
-    type Inputs<'a> = Inputs<'a>;
-    type Outputs = Outputs;
-    type State = ();
-
+impl tactflow_runtime::node::Describe for ContactArea {
     const NAME: &'static str = "contact_area";
     const SUMMARY: &'static str = "measures the area of a contact in square metres";
     const DOC: &'static str = "`area` is the number of tactels of the region times the area of one, the pitch along x \
@@ -66,6 +61,13 @@ in.image = "calibrate.image"
 in.region = "label.region"
 threshold = 0.010                   # as the `release` of the `binarize` [N]
 "#;
+}
+
+impl Node for ContactArea {
+    type Params = Params;
+    type Inputs<'a> = Inputs<'a>;
+    type Outputs = Outputs;
+    type State = ();
 
     fn new(params: Params, setup: &mut Setup<Self>) -> Result<Self, Mistakes> {
         let shape = setup.inputs.image.clone();

@@ -34,12 +34,7 @@ pub struct Eccentricity {
     weighing: Weighing,
 }
 
-impl Node for Eccentricity {
-    type Params = Params;
-    type Inputs<'a> = Inputs<'a>;
-    type Outputs = Outputs;
-    type State = ();
-
+impl tactflow_runtime::node::Describe for Eccentricity {
     const NAME: &'static str = "eccentricity";
     const SUMMARY: &'static str = "tells a round contact from a long one: the eccentricity of its ellipse";
     const DOC: &'static str = "The ellipse with the same second central moments as the region has the half axes a and \
@@ -55,6 +50,13 @@ type = "eccentricity"
 in.image = "calibrate.image"
 in.region = "label.region"
 "#;
+}
+
+impl Node for Eccentricity {
+    type Params = Params;
+    type Inputs<'a> = Inputs<'a>;
+    type Outputs = Outputs;
+    type State = ();
 
     fn new(params: Params, setup: &mut Setup<Self>) -> Result<Self, Mistakes> {
         let shape = setup.inputs.image.clone();

@@ -71,15 +71,9 @@ pub struct Hough {
     weighing: Weighing,
 }
 
-impl Node for Hough {
-    type Params = Params;
-    type Inputs<'a> = Inputs<'a>;
-    type Outputs = Outputs;
-    type State = State;
-
+impl tactflow_runtime::node::Describe for Hough {
     const NAME: &'static str = "hough";
     const SUMMARY: &'static str = "finds the line through a contact by the Hough transform: direction and offset";
-
     const DOC: &'static str = "Every tactel votes for all lines through it: for a direction a, for the offset \
         r = y cos a - x sin a (Duda and Hart 1972; paper section III and Fig. 4). The votes count the tactel's `weight` as in \
         `moments`, and are shared between the two nearest offsets. Taking the greatest single vote, as a plain \
@@ -103,6 +97,13 @@ in.image = "calibrate.image"
 in.region = "label.region"
 min_strength = 0.3                  # below this it is no line [1]
 "#;
+}
+
+impl Node for Hough {
+    type Params = Params;
+    type Inputs<'a> = Inputs<'a>;
+    type Outputs = Outputs;
+    type State = State;
 
     fn new(params: Params, setup: &mut Setup<Self>) -> Result<Self, Mistakes> {
         let shape = setup.inputs.image.clone();

@@ -45,12 +45,7 @@ pub struct Median {
     is_axial: bool,
 }
 
-impl Node for Median {
-    type Params = Params;
-    type Inputs<'a> = Inputs<'a>;
-    type Outputs = Outputs;
-    type State = State;
-
+impl tactflow_runtime::node::Describe for Median {
     const NAME: &'static str = "median";
     const SUMMARY: &'static str = "takes single wrong samples out of a feature: the median of the newest";
     const DOC: &'static str = "The middle one of the last `window` samples in order of size; of an even number, the mean of \
@@ -69,6 +64,13 @@ type = "median"
 in.value = "moments.pressure"
 window = 5                          # two wrong samples leave no trace [samples]
 "#;
+}
+
+impl Node for Median {
+    type Params = Params;
+    type Inputs<'a> = Inputs<'a>;
+    type Outputs = Outputs;
+    type State = State;
 
     fn new(params: Params, setup: &mut Setup<Self>) -> Result<Self, Mistakes> {
         let window = *params.window;

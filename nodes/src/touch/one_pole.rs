@@ -46,12 +46,7 @@ pub struct OnePole {
     is_axial: bool,
 }
 
-impl Node for OnePole {
-    type Params = Params;
-    type Inputs<'a> = Inputs<'a>;
-    type Outputs = Outputs;
-    type State = State;
-
+impl tactflow_runtime::node::Describe for OnePole {
     const NAME: &'static str = "one_pole";
     const SUMMARY: &'static str = "smooths a feature with a low-pass filter of the first order";
     const DOC: &'static str = "T dy/dt = x - y, solved exactly from sample to sample: y += (1 - exp(-dt / T)) (x - y), with dt \
@@ -71,6 +66,13 @@ type = "one_pole"
 in.value = "moments.orientation"
 time_constant_ms = 20               # [ms]
 "#;
+}
+
+impl Node for OnePole {
+    type Params = Params;
+    type Inputs<'a> = Inputs<'a>;
+    type Outputs = Outputs;
+    type State = State;
 
     fn new(params: Params, setup: &mut Setup<Self>) -> Result<Self, Mistakes> {
         let is_axial = setup.inputs.value.unit.is_axial();
@@ -94,10 +96,11 @@ time_constant_ms = 20               # [ms]
     }
 
     fn step(&self, tick: &Tick, inputs: Inputs<'_>, out: &mut Outputs, state: &mut State) {
-        let dt = state.interval.step(inputs.value.stamp(), tick);
+        let dt = state.interval.step(&inputs.value, tick);
         let next = if self.is_axial { doubled(*inputs.value) } else { [*inputs.value, 0.0] };
-        let value = match state.last {
-            Some([a, b]) => {
+        // After a gap, or from another device, it starts afresh.
+        let value = match state.last.zip(dt) {
+            Some(([a, b], dt)) => {
                 // With a time of next to nothing, no time at all would be none of it and all of it.
                 let share = if dt > 0.0 { -libm::expm1(-dt / self.time) } else { 0.0 };
                 [toward(a, next[0], share), toward(b, next[1], share)]

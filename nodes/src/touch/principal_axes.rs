@@ -43,12 +43,7 @@ pub struct PrincipalAxes {
     min_anisotropy: f64,
 }
 
-impl Node for PrincipalAxes {
-    type Params = Params;
-    type Inputs<'a> = Inputs<'a>;
-    type Outputs = Outputs;
-    type State = ();
-
+impl tactflow_runtime::node::Describe for PrincipalAxes {
     const NAME: &'static str = "principal_axes";
     const SUMMARY: &'static str = "measures how long and how wide a contact is, and along which line it lies";
     const DOC: &'static str = "The second central moments of a region make a 2 by 2 covariance in square metres. `major` \
@@ -66,6 +61,13 @@ type = "principal_axes"
 in.image = "calibrate.image"
 in.region = "label.region"
 "#;
+}
+
+impl Node for PrincipalAxes {
+    type Params = Params;
+    type Inputs<'a> = Inputs<'a>;
+    type Outputs = Outputs;
+    type State = ();
 
     fn new(params: Params, setup: &mut Setup<Self>) -> Result<Self, Mistakes> {
         let shape = setup.inputs.image.clone();

@@ -67,12 +67,7 @@ enum Order {
     Distance([f64; 2]),
 }
 
-impl Node for SelectRegion {
-    type Params = Params;
-    type Inputs<'a> = Inputs<'a>;
-    type Outputs = Outputs;
-    type State = State;
-
+impl tactflow_runtime::node::Describe for SelectRegion {
     const NAME: &'static str = "select_region";
     const SUMMARY: &'static str = "takes one of several contacts: the n-th largest, strongest, or nearest to a point";
     const DOC: &'static str = "`label` lists all regions of a mask; this takes one of them, for `moments` and the \
@@ -94,6 +89,13 @@ by = "distance"                     # the first one counted from `point`
 point = [0.02, 0.0]                 # [m]
 min_area = 4                        # [tactels]
 "#;
+}
+
+impl Node for SelectRegion {
+    type Params = Params;
+    type Inputs<'a> = Inputs<'a>;
+    type Outputs = Outputs;
+    type State = State;
 
     fn new(params: Params, setup: &mut Setup<Self>) -> Result<Self, Mistakes> {
         let order = match (params.by, params.point) {

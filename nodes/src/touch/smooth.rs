@@ -56,12 +56,7 @@ pub struct Smooth {
     is_axial: bool,
 }
 
-impl Node for Smooth {
-    type Params = Params;
-    type Inputs<'a> = Inputs<'a>;
-    type Outputs = Outputs;
-    type State = State;
-
+impl tactflow_runtime::node::Describe for Smooth {
     const NAME: &'static str = "smooth";
     const SUMMARY: &'static str = "smooths a feature: the mean over the newest samples, or over a time";
     const DOC: &'static str = "The mean of the last samples (a moving average), as the paper takes it of force and orientation over ten \
@@ -85,6 +80,13 @@ type = "smooth"
 in.value = "moments.pressure"
 window_ms = 40                      # ten frames at 250 Hz [ms]
 "#;
+}
+
+impl Node for Smooth {
+    type Params = Params;
+    type Inputs<'a> = Inputs<'a>;
+    type Outputs = Outputs;
+    type State = State;
 
     fn new(params: Params, setup: &mut Setup<Self>) -> Result<Self, Mistakes> {
         let is_axial = setup.inputs.value.unit.is_axial();

@@ -39,12 +39,7 @@ pub struct TactileSource {
     order: Option<Box<[u32]>>,
 }
 
-impl Node for TactileSource {
-    type Params = Params;
-    type Inputs<'a> = Inputs<'a>;
-    type Outputs = Outputs;
-    type State = ();
-
+impl tactflow_runtime::node::Describe for TactileSource {
     const NAME: &'static str = "tactile_source";
     const SUMMARY: &'static str = "takes a pad's image into the sensor's frame, with its sum and its peak";
     const DOC: &'static str = "The first node behind a pad. Everything after it counts rows along the sensor's +y and \
@@ -61,6 +56,13 @@ type = "tactile_source"
 in.image = "pad.image"
 flip_y = false                      # set it where the device's first row is the one toward +y
 "#;
+}
+
+impl Node for TactileSource {
+    type Params = Params;
+    type Inputs<'a> = Inputs<'a>;
+    type Outputs = Outputs;
+    type State = ();
 
     fn new(params: Params, setup: &mut Setup<Self>) -> Result<Self, Mistakes> {
         let image = &setup.inputs.image;

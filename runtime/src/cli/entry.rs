@@ -93,7 +93,7 @@ pub(super) struct Port {
 pub(super) struct Param {
     pub(super) name: &'static str,
     pub(super) takes: String,
-    pub(super) unit: Option<&'static str>,
+    pub(super) unit: Option<String>,
     /// As a graph file would say it.
     pub(super) default: Option<String>,
     pub(super) is_required: bool,
@@ -302,12 +302,20 @@ fn declared(port: &PortSpec) -> Port {
 /// What an input needs, in words.
 const fn need(need: Need) -> &'static str {
     match need {
-        Need::Required => "required, wakes the node",
-        Need::Sampled => "required, only its loss wakes the node",
-        Need::Trigger => "optional, wakes the node",
-        Need::Optional => "optional, only its loss wakes the node",
-        Need::Many => "any number, each named in the graph; each wakes the node",
-        Need::Delayed => "optional, as the last tick left it; wakes the node only if no other input does",
+        Need { is_many: true, is_trigger: true, .. } => "any number, each named in the graph; each wakes the node",
+        Need { is_many: true, .. } => "any number, each named in the graph; only the loss of one wakes the node",
+        Need { is_delayed: true, must_be_wired: false, .. } => {
+            "optional, as the last tick left it; wakes the node only if no other input does"
+        }
+        Need { is_delayed: true, .. } => "as the last tick left it; wakes the node only if no other input does",
+        Need { must_be_wired: true, must_be_present: true, is_trigger: true, .. } => "required, wakes the node",
+        Need { must_be_wired: true, must_be_present: true, .. } => "required, only its loss wakes the node",
+        Need { must_be_wired: true, is_trigger: true, .. } => "required but may be absent, wakes the node",
+        Need { must_be_wired: true, .. } => "required but may be absent, only its loss wakes the node",
+        Need { must_be_present: true, is_trigger: true, .. } => "optional, required if wired, wakes the node",
+        Need { must_be_present: true, .. } => "optional, required if wired, only its loss wakes the node",
+        Need { is_trigger: true, .. } => "optional, wakes the node",
+        Need { .. } => "optional, only its loss wakes the node",
     }
 }
 
@@ -315,11 +323,11 @@ fn param(spec: &ParamSpec) -> Param {
     Param {
         name: spec.name,
         takes: spec.takes.clone(),
-        unit: spec.unit(),
+        unit: spec.unit.clone(),
         default: spec.default.clone(),
         is_required: !spec.is_optional,
         is_live: spec.is_live,
-        doc: spec.doc.trim().lines().map(str::trim).collect::<Vec<_>>().join(" "),
+        doc: spec.doc_with_unit(),
         then: match spec.repeats {
             Repeats::Once => ".",
             Repeats::PerName => ".NAME.",

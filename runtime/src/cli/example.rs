@@ -8,7 +8,7 @@ use std::path::Path;
 
 use crate::catalogue::Catalogue;
 use crate::graph::{Request, compile};
-use crate::node::{Need, NodeSpec, PortSpec};
+use crate::node::{NodeSpec, PortSpec};
 use crate::signal::Kind;
 use crate::source::{Item, SourceMap, Table, Value, parse_table};
 
@@ -120,7 +120,7 @@ fn put_between(catalogue: &Catalogue, chosen: &[&Piece], asked: &Piece) -> Optio
 /// The asked node with one that logs behind it: what only measures is there to be looked at.
 fn watched(catalogue: &Catalogue, chosen: &[&Piece], asked: &Piece) -> Option<String> {
     let specs: Vec<NodeSpec> = catalogue.nodes().iter().map(|node| node.spec()).collect();
-    let takes = |port: &PortSpec| port.need == Need::Many && port.kind == Kind::Scalar;
+    let takes = |port: &PortSpec| port.need.is_many && port.kind == Kind::Scalar;
     let logs = specs.iter().find(|spec| spec.logs && spec.inputs.iter().any(takes))?;
     let spec = specs.iter().find(|spec| spec.name == asked.kind)?;
     let name = asked.names.first()?;

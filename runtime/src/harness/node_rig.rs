@@ -46,8 +46,8 @@ impl NodeRig {
         let mut wired: Vec<(Need, Vec<PortId>)> = spec.inputs.iter().map(|input| (input.need, Vec::new())).collect();
         let mut inputs = Vec::new();
         for (name, shape) in wires {
-            let named = spec.inputs.iter().position(|input| input.name == *name && input.need != Need::Many);
-            let i = named.or_else(|| spec.inputs.iter().position(|input| input.need == Need::Many));
+            let named = spec.inputs.iter().position(|input| input.name == *name && !input.need.is_many);
+            let i = named.or_else(|| spec.inputs.iter().position(|input| input.need.is_many));
             let i = i.unwrap_or_else(|| panic!("`{}` has no input `{name}`", N::NAME));
             assert_eq!(shape.kind(), spec.inputs[i].kind, "input `{name}`");
             let port = bus.add(shape);

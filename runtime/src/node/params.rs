@@ -7,7 +7,7 @@ use std::path::PathBuf;
 
 use serde::de::DeserializeOwned;
 
-use super::{At, Mistake, Mistakes, ParamSpec, Repeats, Written};
+use super::{At, Bounds, Declared, Mistake, Mistakes, ParamSpec, Repeats, Written};
 use crate::signal::Unit;
 use crate::source::{Code, closest, meant};
 use crate::source::{Item, Key, SourceMap, Table, Value};
@@ -18,14 +18,18 @@ pub trait Param: Sized {
     const EXPECTS: &'static str;
     /// How often the fields are there.
     const REPEATS: Repeats = Repeats::Once;
+    /// Whether it is a number, or made of numbers, so that it takes a range.
+    const IS_NUMBER: bool = false;
+    /// The words it takes, each with its meaning, if it is one of a few.
+    const WORDS: &'static [(&'static str, &'static str)] = &[];
 
     /// Reads it; a mistake goes to the reader.
     fn read(value: &Value, reader: &mut Reader<'_>) -> Option<Self>;
 
-    /// What it takes in full, for the reference: `a list, each a number`.
+    /// What it takes in full, for the reference: `a list, each a number greater than 0`.
     #[must_use]
-    fn takes() -> String {
-        Self::EXPECTS.into()
+    fn takes(bounds: Option<&Bounds>) -> String {
+        bounds.map_or_else(|| Self::EXPECTS.into(), |bounds| bounds.describe(Self::EXPECTS))
     }
 
     /// The fields of a table.
@@ -50,6 +54,8 @@ pub trait Param: Sized {
 /// Collects the mistakes while parameters are read.
 pub struct Reader<'a> {
     sources: &'a SourceMap,
+    /// Range of the numbers of the field that is being read.
+    bounds: Option<Bounds>,
     /// What is wrong so far.
     pub mistakes: Mistakes,
 }
@@ -59,14 +65,14 @@ pub struct OpenTable {
     rest: Table,
     span: Range<usize>,
     /// Fields that must be given and are not.
-    missing: Vec<(&'static str, &'static str)>,
+    missing: Vec<(&'static str, String)>,
 }
 
 impl<'a> Reader<'a> {
     /// A reader of values that stand in `sources`.
     #[must_use]
     pub const fn new(sources: &'a SourceMap) -> Self {
-        Self { sources, mistakes: Vec::new() }
+        Self { sources, bounds: None, mistakes: Vec::new() }
     }
 
     /// Says that the value at `span` will not do.
@@ -96,17 +102,51 @@ impl<'a> Reader<'a> {
     pub fn field<T: Param>(
         &mut self,
         table: &mut OpenTable,
-        name: &'static str,
+        declared: &Declared,
         default: Option<fn() -> T>,
     ) -> Option<T> {
+        let Declared { name, bounds, .. } = *declared;
         if let Some((_, value)) = table.rest.remove(name) {
-            return T::read(&value, self);
+            let outer = std::mem::replace(&mut self.bounds, bounds);
+            let read = T::read(&value, self);
+            self.bounds = outer;
+            return read;
         }
         let default = default.map(|default| default()).or_else(T::when_missing);
         if default.is_none() {
-            table.missing.push((name, T::EXPECTS));
+            // Of a list it says no more than that it is one.
+            let is_whole = T::takes(None) == T::EXPECTS;
+            let expects = if is_whole { T::takes(bounds.as_ref()) } else { T::EXPECTS.into() };
+            table.missing.push((name, expects));
         }
         default
+    }
+
+    /// Reads one of the words of `T` and returns its index.
+    pub fn word<T: Param>(&mut self, value: &Value) -> Option<usize> {
+        let text: String = read_leaf(value, self, T::EXPECTS)?;
+        let found = T::WORDS.iter().position(|(word, _)| *word == text);
+        if found.is_none() {
+            self.wrong_type(value, T::EXPECTS);
+        }
+        found
+    }
+
+    /// Reads a number; it is a mistake if it is not in the range of the field.
+    fn number<T: DeserializeOwned + Copy>(
+        &mut self,
+        value: &Value,
+        expects: &str,
+        number: impl Fn(T) -> f64,
+    ) -> Option<T> {
+        let Some(bounds) = self.bounds else { return read_leaf(value, self, expects) };
+        let expects = bounds.describe(expects);
+        let read: T = read_leaf(value, self, &expects)?;
+        if !bounds.contains(number(read)) {
+            self.wrong_type(value, &expects);
+            return None;
+        }
+        Some(read)
     }
 
     /// Every key that is left is one too many, and what was not given is missing, unless it was only misspelt.
@@ -169,13 +209,37 @@ macro_rules! leaves {
     )*};
 }
 
-leaves!(bool: "true or false", String: "a string", u64: "a whole number, 0 or more", usize: "a whole number, 0 or more");
+leaves!(bool: "true or false", String: "a string");
+
+macro_rules! whole_numbers {
+    ($($type:ty),*) => {$(
+        impl Param for $type {
+            const EXPECTS: &'static str = "a whole number, 0 or more";
+            const IS_NUMBER: bool = true;
+            fn read(value: &Value, reader: &mut Reader<'_>) -> Option<Self> {
+                let expects = if reader.bounds.is_some() { WHOLE_NUMBER } else { Self::EXPECTS };
+                reader.number(value, expects, |number| number as f64)
+            }
+            fn takes(bounds: Option<&Bounds>) -> String {
+                bounds.map_or_else(|| Self::EXPECTS.into(), |bounds| bounds.describe(WHOLE_NUMBER))
+            }
+            fn written(&self) -> Option<Written> {
+                Written::try_from(self).ok()
+            }
+        }
+    )*};
+}
+
+const WHOLE_NUMBER: &str = "a whole number";
+
+whole_numbers!(u64, usize);
 
 impl Param for f64 {
     const EXPECTS: &'static str = "a number";
+    const IS_NUMBER: bool = true;
 
     fn read(value: &Value, reader: &mut Reader<'_>) -> Option<Self> {
-        let number: Self = read_leaf(value, reader, Self::EXPECTS)?;
+        let number: Self = reader.number(value, Self::EXPECTS, |number| number)?;
         if !number.is_finite() {
             reader.bad(value.span.clone(), "expected a finite number");
             return None;
@@ -232,6 +296,38 @@ ranges! {
     Count(usize): "a whole number from 1 to 1000000", |n| (1..=1_000_000).contains(&n);
 }
 
+/// A parameter and where it stands, for a mistake that is found later.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Spanned<T> {
+    /// What it is.
+    pub value: T,
+    /// Where it stands.
+    pub span: Range<usize>,
+}
+
+impl<T: Param> Param for Spanned<T> {
+    const EXPECTS: &'static str = T::EXPECTS;
+    const REPEATS: Repeats = T::REPEATS;
+    const IS_NUMBER: bool = T::IS_NUMBER;
+    const WORDS: &'static [(&'static str, &'static str)] = T::WORDS;
+
+    fn read(value: &Value, reader: &mut Reader<'_>) -> Option<Self> {
+        Some(Self { value: T::read(value, reader)?, span: value.span.clone() })
+    }
+
+    fn takes(bounds: Option<&Bounds>) -> String {
+        T::takes(bounds)
+    }
+
+    fn fields() -> Vec<ParamSpec> {
+        T::fields()
+    }
+
+    fn written(&self) -> Option<Written> {
+        self.value.written()
+    }
+}
+
 /// A name and where it stands.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Word {
@@ -250,6 +346,17 @@ impl Param for Word {
 
     fn written(&self) -> Option<Written> {
         self.text.written()
+    }
+}
+
+/// No parameters.
+impl Param for () {
+    const EXPECTS: &'static str = "a table";
+
+    fn read(value: &Value, reader: &mut Reader<'_>) -> Option<Self> {
+        let table = reader.table(value)?;
+        reader.close(table, &[]);
+        Some(())
     }
 }
 
@@ -312,13 +419,15 @@ impl Param for FilePath {
 impl<T: Param> Param for Option<T> {
     const EXPECTS: &'static str = T::EXPECTS;
     const REPEATS: Repeats = T::REPEATS;
+    const IS_NUMBER: bool = T::IS_NUMBER;
+    const WORDS: &'static [(&'static str, &'static str)] = T::WORDS;
 
     fn read(value: &Value, reader: &mut Reader<'_>) -> Option<Self> {
         T::read(value, reader).map(Some)
     }
 
-    fn takes() -> String {
-        T::takes()
+    fn takes(bounds: Option<&Bounds>) -> String {
+        T::takes(bounds)
     }
 
     fn fields() -> Vec<ParamSpec> {
@@ -337,6 +446,8 @@ impl<T: Param> Param for Option<T> {
 impl<T: Param> Param for Vec<T> {
     const EXPECTS: &'static str = "a list";
     const REPEATS: Repeats = Repeats::PerEntry;
+    const IS_NUMBER: bool = T::IS_NUMBER;
+    const WORDS: &'static [(&'static str, &'static str)] = T::WORDS;
 
     fn read(value: &Value, reader: &mut Reader<'_>) -> Option<Self> {
         let Item::Array(items) = &value.item else {
@@ -347,8 +458,8 @@ impl<T: Param> Param for Vec<T> {
         read.into_iter().collect()
     }
 
-    fn takes() -> String {
-        format!("a list, each {}", T::takes())
+    fn takes(bounds: Option<&Bounds>) -> String {
+        format!("a list, each {}", T::takes(bounds))
     }
 
     fn fields() -> Vec<ParamSpec> {
@@ -369,6 +480,8 @@ impl<T: Param, const N: usize> Param for [T; N] {
         _ => "a list of the right length",
     };
     const REPEATS: Repeats = Repeats::PerEntry;
+    const IS_NUMBER: bool = T::IS_NUMBER;
+    const WORDS: &'static [(&'static str, &'static str)] = T::WORDS;
 
     fn read(value: &Value, reader: &mut Reader<'_>) -> Option<Self> {
         match &value.item {
@@ -380,8 +493,8 @@ impl<T: Param, const N: usize> Param for [T; N] {
         }
     }
 
-    fn takes() -> String {
-        format!("a list of {N}, each {}", T::takes())
+    fn takes(bounds: Option<&Bounds>) -> String {
+        format!("a list of {N}, each {}", T::takes(bounds))
     }
 
     fn fields() -> Vec<ParamSpec> {
@@ -400,6 +513,8 @@ pub struct Map<T>(pub BTreeMap<String, T>);
 impl<T: Param> Param for Map<T> {
     const EXPECTS: &'static str = "a table with an entry for each name";
     const REPEATS: Repeats = Repeats::PerName;
+    const IS_NUMBER: bool = T::IS_NUMBER;
+    const WORDS: &'static [(&'static str, &'static str)] = T::WORDS;
 
     fn read(value: &Value, reader: &mut Reader<'_>) -> Option<Self> {
         let Item::Table(table) = &value.item else {
@@ -411,8 +526,8 @@ impl<T: Param> Param for Map<T> {
         entries.into_iter().collect::<Option<_>>().map(Self)
     }
 
-    fn takes() -> String {
-        format!("a table, for each name {}", T::takes())
+    fn takes(bounds: Option<&Bounds>) -> String {
+        format!("a table, for each name {}", T::takes(bounds))
     }
 
     fn fields() -> Vec<ParamSpec> {

@@ -4,24 +4,30 @@ use std::borrow::Cow;
 use std::ops::Deref;
 
 use super::Tick;
-use crate::signal::{Arenas, Freshness, Kind, Mark, Shape, Signal, Stamp};
+use crate::signal::{Arenas, Features, Freshness, Kind, Mark, Scalar, Settable, Shape, Signal, Stamp};
 
-/// When an input wakes its node, and what its absence does; see the table in [`node`](super).
+/// What an input needs, and when it wakes its node; see the table in [`node`](super).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Need {
-    /// Required, and a trigger.
-    Required,
-    /// Required, but only its loss wakes.
-    Sampled,
-    /// Optional, and a trigger.
-    Trigger,
-    /// Optional; only its loss wakes.
-    Optional,
-    /// Any number of them, each named in the graph, optional and a trigger.
-    Many,
-    /// Read as the last tick left it; optional, and a trigger one tick late where the node has no other. Its shape is
-    /// not known when the node is made, but for a flag's, which says no more than that there is a wire.
-    Delayed,
+pub struct Need {
+    /// Whether the graph must wire it.
+    pub must_be_wired: bool,
+    /// Whether the node steps only while its value is present, if it is wired; otherwise the outputs are absent.
+    pub must_be_present: bool,
+    /// Whether a new value wakes the node. The loss of a value always does.
+    pub is_trigger: bool,
+    /// Whether it is any number of wires, each named in the graph.
+    pub is_many: bool,
+    /// Whether it is read as the last tick left it. It wakes the node, one tick late, only if no other input does. Its
+    /// shape is not known when the node is made, except that of a flag: `Some` if it is wired.
+    pub is_delayed: bool,
+}
+
+impl Need {
+    /// An input that must be wired and present, and wakes the node.
+    pub const REQUIRED: Self =
+        Self { must_be_wired: true, must_be_present: true, is_trigger: true, is_many: false, is_delayed: false };
+    /// An input that need neither be wired nor present, and wakes the node.
+    pub const OPTIONAL: Self = Self { must_be_wired: false, must_be_present: false, ..Self::REQUIRED };
 }
 
 /// What is known of a port without a graph.
@@ -37,6 +43,51 @@ pub struct PortSpec {
     pub args: Cow<'static, [Cow<'static, str>]>,
     /// When it wakes; of no meaning for an output.
     pub need: Need,
+}
+
+impl PortSpec {
+    /// The description of a port of signal `T`, with its arguments by name. Arguments that its kind does not take are
+    /// left out, and so are frames from the first `"_"` on.
+    #[must_use]
+    pub fn of<T: Signal>(
+        name: &'static str,
+        doc: &'static str,
+        arguments: &[(&str, &'static str)],
+        need: Need,
+    ) -> Self {
+        let value = |argument: &&str| arguments.iter().find(|(name, _)| name == argument).map(|(_, value)| *value);
+        let is_said = |argument: &&str| *argument == "unit" || value(argument) != Some("_");
+        let arguments = T::KIND.arguments().iter().take_while(|argument| is_said(argument));
+        let args = arguments.filter_map(|argument| value(&argument)).map(Cow::Borrowed).collect();
+        Self { name: name.into(), doc: doc.into(), kind: T::KIND, args, need }
+    }
+}
+
+/// The letters that the inputs of a node bind; for the derives.
+#[doc(hidden)]
+#[derive(Debug, Clone, Copy)]
+pub struct Letters {
+    units: &'static str,
+    frames: &'static str,
+}
+
+impl Letters {
+    /// The letters of the units and of the frames.
+    #[must_use]
+    pub const fn of(units: &'static str, frames: &'static str) -> Self {
+        Self { units, frames }
+    }
+
+    /// Whether an input binds a letter.
+    #[must_use]
+    pub const fn binds(&self, is_unit: bool, letter: char) -> bool {
+        let letters = if is_unit { self.units } else { self.frames }.as_bytes();
+        let mut i = 0;
+        while i < letters.len() && letters[i] != letter as u8 {
+            i += 1;
+        }
+        i < letters.len()
+    }
 }
 
 /// Where a port's value and mark are.
@@ -83,7 +134,7 @@ impl Wires {
     pub fn new(inputs: &[(Need, Vec<PortId>)]) -> Self {
         let mut many = Vec::new();
         let single = inputs.iter().map(|(need, ports)| match need {
-            Need::Many => {
+            need if need.is_many => {
                 let start = many.len() as u32;
                 many.extend_from_slice(ports);
                 PortId { slot: start, mark: ports.len() as u32 }
@@ -145,6 +196,39 @@ impl<T> Deref for In<'_, T> {
     type Target = T;
     fn deref(&self) -> &T {
         self.value
+    }
+}
+
+/// The components of a feature vector, each with a freshness of its own.
+impl<'a> In<'a, Features> {
+    /// Number of components.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.value.components().len()
+    }
+
+    /// Whether there is no component.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// Returns component `i`, if it is present.
+    #[must_use]
+    pub fn get(&self, i: usize) -> Option<In<'a, Scalar>> {
+        let (value, mark) = self.value.components()[i].parts();
+        mark.is_present().then(|| In::new(value, mark, self.tick))
+    }
+
+    /// Returns the freshness of component `i`.
+    #[must_use]
+    pub fn freshness(&self, i: usize) -> Freshness {
+        self.value.components()[i].freshness(self.tick)
+    }
+
+    /// Returns the components in order.
+    pub fn iter(&self) -> impl Iterator<Item = Option<In<'a, Scalar>>> {
+        (0..self.len()).map(|i| self.get(i))
     }
 }
 
@@ -278,10 +362,37 @@ enum Done {
     Written,
 }
 
-impl<T: Signal> Out<T> {
+impl<T: Settable> Out<T> {
     /// Writes the value.
     pub fn set(&mut self, value: T) {
         *self.write() = value;
+    }
+}
+
+impl Out<Features> {
+    /// Sets component `i`, with the stamp of the step: the oldest among the inputs that wake the node.
+    pub fn set(&mut self, i: usize, value: f64) {
+        let (tick, stamp) = self.value.now();
+        self.write().set(i, value, tick, stamp);
+    }
+
+    /// Sets component `i`, with the stamp of the input that it is computed from.
+    pub fn set_from<T>(&mut self, i: usize, value: f64, input: &In<'_, T>) {
+        let (tick, _) = self.value.now();
+        self.write().set(i, value, tick, input.stamp());
+    }
+
+    /// Makes component `i` absent. A component that is neither set nor lost stays as it is.
+    pub fn lose(&mut self, i: usize) {
+        let (tick, _) = self.value.now();
+        self.write().lose(i, tick);
+    }
+}
+
+impl<T: Signal> Out<T> {
+    /// Writes a copy of `value`, in place.
+    pub fn copy_from(&mut self, value: &T) {
+        value.copy_to(self.write());
     }
 
     /// The value, to be written whole and in place.
@@ -299,8 +410,9 @@ impl<T: Signal> Out<T> {
     /// Takes the buffer from the bus for one step.
     #[doc(hidden)]
     #[inline(always)]
-    pub fn take(bus: &mut Bus, port: PortId) -> Self {
-        Self { value: T::take(&mut T::arena_mut(&mut bus.arenas)[port.slot as usize]), done: Done::Nothing }
+    pub fn take(bus: &mut Bus, port: PortId, tick: &Tick) -> Self {
+        let slot = &mut T::arena_mut(&mut bus.arenas)[port.slot as usize];
+        Self { value: T::take(slot, tick.index, tick.stamp), done: Done::Nothing }
     }
 
     /// Puts the buffer back and marks what the step did.
@@ -322,7 +434,7 @@ impl<T: Signal> Out<T> {
 
     /// Makes the port absent.
     #[doc(hidden)]
-    pub fn lose(bus: &mut Bus, port: PortId, tick: u64) {
+    pub fn lose_port(bus: &mut Bus, port: PortId, tick: u64) {
         bus.marks[port.mark as usize].lose(tick);
         T::arena_mut(&mut bus.arenas)[port.slot as usize].lose(tick);
     }
@@ -338,23 +450,55 @@ pub trait OutputSet: Sized {
     /// The shapes as the node set them, in the order of the declaration.
     fn into_shapes(shapes: Self::Shapes) -> Vec<Shape>;
     /// Takes all buffers from the bus for one step.
-    fn take(bus: &mut Bus, ports: &[PortId]) -> Self;
+    fn take(bus: &mut Bus, ports: &[PortId], tick: &Tick) -> Self;
     /// Puts all buffers back and marks what the step did.
     fn put(self, bus: &mut Bus, ports: &[PortId], tick: &Tick);
     /// Makes all outputs absent.
     fn lose(bus: &mut Bus, ports: &[PortId], tick: u64);
 }
 
+/// A node without inputs.
+impl InputSet<'_> for () {
+    type Shapes = ();
+
+    fn specs() -> Vec<PortSpec> {
+        Vec::new()
+    }
+
+    fn shapes(_: Vec<Vec<(String, Shape)>>) {}
+
+    fn fetch(_: &Bus, _: &Wires, _: u64) {}
+}
+
+/// A node without outputs.
+impl OutputSet for () {
+    type Shapes = ();
+
+    fn specs() -> Vec<PortSpec> {
+        Vec::new()
+    }
+
+    fn into_shapes((): ()) -> Vec<Shape> {
+        Vec::new()
+    }
+
+    fn take(_: &mut Bus, _: &[PortId], _: &Tick) {}
+
+    fn put(self, _: &mut Bus, _: &[PortId], _: &Tick) {}
+
+    fn lose(_: &mut Bus, _: &[PortId], _: u64) {}
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::signal::{Joints, JointsShape, Scalar, ScalarShape};
+    use crate::signal::{Joints, JointsShape, Scalar, ScalarShape, Settable};
 
     /// A port of a bus of its own that a first step has written.
-    fn written<T: Signal>(shape: T::Shape, value: T) -> (Bus, PortId) {
+    fn written<T: Settable>(shape: T::Shape, value: T) -> (Bus, PortId) {
         let mut bus = Bus::default();
         let port = bus.add(&shape.into());
-        let mut out = Out::<T>::take(&mut bus, port);
+        let mut out = Out::<T>::take(&mut bus, port, &Tick::first());
         out.set(value);
         out.put(&mut bus, port, &Tick::first());
         (bus, port)
@@ -362,7 +506,7 @@ mod tests {
 
     fn second(step: impl FnOnce(&mut Out<Scalar>)) -> (Freshness, Scalar) {
         let (mut bus, port) = written(ScalarShape::default(), 1.5);
-        let mut out = Out::take(&mut bus, port);
+        let mut out = Out::take(&mut bus, port, &Tick { index: 2, ..Tick::first() });
         step(&mut out);
         out.put(&mut bus, port, &Tick { index: 2, ..Tick::first() });
         (bus.marks[port.mark as usize].freshness(2), Scalar::arena(&bus.arenas)[port.slot as usize])
@@ -378,7 +522,7 @@ mod tests {
     #[test]
     fn a_buffer_that_is_kept_comes_back_into_its_slot() {
         let (mut bus, port) = written(JointsShape::default(), Joints([1.0, 2.0].into()));
-        let mut out = Out::<Joints>::take(&mut bus, port);
+        let mut out = Out::<Joints>::take(&mut bus, port, &Tick::first());
         out.keep();
         out.put(&mut bus, port, &Tick { index: 2, ..Tick::first() });
         assert_eq!(Joints::arena(&bus.arenas)[port.slot as usize], Joints([1.0, 2.0].into()));
@@ -389,7 +533,7 @@ mod tests {
     fn what_is_absent_stays_so_when_it_is_kept() {
         let mut bus = Bus::default();
         let port = bus.add(&ScalarShape::default().into());
-        let mut out = Out::<Scalar>::take(&mut bus, port);
+        let mut out = Out::<Scalar>::take(&mut bus, port, &Tick::first());
         out.keep();
         out.put(&mut bus, port, &Tick::first());
         assert_eq!(bus.marks[port.mark as usize].freshness(1), Freshness::Absent);

@@ -42,6 +42,11 @@ pub struct Component {
 }
 
 impl Component {
+    /// The value, of no meaning while it is absent, and its mark.
+    pub(crate) const fn parts(&self) -> (&f64, &Mark) {
+        (&self.value, &self.mark)
+    }
+
     /// The value, if there is one.
     #[must_use]
     pub fn get(&self) -> Option<f64> {
@@ -62,9 +67,17 @@ impl Component {
 }
 
 /// Named features. What a step neither sets nor loses stays as it is, and is held.
-#[derive(Debug, Clone, PartialEq, Default)]
+#[derive(Debug, Clone, Default)]
 pub struct Features {
     components: Box<[Component]>,
+    /// Tick and stamp of the step that has the buffer.
+    now: (u64, Stamp),
+}
+
+impl PartialEq for Features {
+    fn eq(&self, other: &Self) -> bool {
+        self.components == other.components
+    }
 }
 
 impl Features {
@@ -76,7 +89,17 @@ impl Features {
     /// As many absent components as there are features.
     #[must_use]
     pub fn absent(count: usize) -> Self {
-        Self { components: vec![Component::default(); count].into() }
+        Self { components: vec![Component::default(); count].into(), now: Default::default() }
+    }
+
+    /// The same for a step in `tick` with that stamp.
+    pub(crate) fn at(self, tick: u64, stamp: Stamp) -> Self {
+        Self { now: (tick, stamp), ..self }
+    }
+
+    /// Tick and stamp of the step that has the buffer.
+    pub(crate) const fn now(&self) -> (u64, Stamp) {
+        self.now
     }
 
     /// Writes a sample of a device: a value for each feature, or `None` where there is none. The graph stamps it when it

@@ -45,6 +45,12 @@ impl Stamp {
     }
 }
 
+impl Default for Stamp {
+    fn default() -> Self {
+        Self::TIMELESS
+    }
+}
+
 /// What the runtime knows about a value beside the value: when it changed, from which sample, and whether it is there.
 ///
 /// Freshness is derived from the tick of the last change, so nothing has to be touched in a tick that changes nothing.

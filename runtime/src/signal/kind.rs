@@ -2,6 +2,7 @@
 
 use std::fmt;
 
+use super::unit::is_same;
 use super::{
     Features, FeaturesShape, Grid, Image, ImageShape, Jacobian, Joints, JointsShape, Mark, Mask, Pose, PoseShape,
     Regions, RegionsShape, Stamp, Twist, TwistShape, Unit, all_finite,
@@ -76,8 +77,8 @@ pub trait Signal: Default + Clone + Send + 'static {
         from_step
     }
 
-    /// Takes the buffer out of its slot for one step. What [stays](Self::STAYS) starts afresh.
-    fn take(slot: &mut Self) -> Self {
+    /// Takes the buffer out of its slot for a step in `tick` with that stamp. What [stays](Self::STAYS) starts afresh.
+    fn take(slot: &mut Self, _tick: u64, _stamp: Stamp) -> Self {
         std::mem::take(slot)
     }
 
@@ -102,6 +103,15 @@ pub trait Signal: Default + Clone + Send + 'static {
     /// The values of this kind, to be written.
     fn arena_mut(arenas: &mut Arenas) -> &mut Vec<Self>;
 }
+
+/// A signal whose value a step sets at once: every kind but [`Features`], whose components are set one by one.
+pub trait Settable: Signal {}
+
+macro_rules! settable {
+    ($($kind:ident)*) => { $(impl Settable for $kind {})* };
+}
+
+settable! { Scalar Flag Image Mask Regions Twist Pose Joints Jacobian }
 
 macro_rules! kinds {
     ($($kind:ident $shape:ident $arena:ident $name:literal $word:literal: $summary:literal, $doc:literal
@@ -257,14 +267,14 @@ kinds! {
     Scalar ScalarShape scalars "scalar" "scalar": "a number with a unit",
         "It belongs to a frame. Its unit is known at load." {
         fn allocate(_: &ScalarShape) -> Self { 0.0 }
-        fn take(_: &mut Self) -> Self { 0.0 }
+        fn take(_: &mut Self, _: u64, _: Stamp) -> Self { 0.0 }
         const STAYS: bool = true;
         fn is_finite(&self) -> bool { all_finite(&[*self]) }
     }
     Flag FlagShape flags "flag" "flag": "a yes or no",
         "It has no unit. Gates and conditions are flags." {
         fn allocate(_: &FlagShape) -> Self { false }
-        fn take(_: &mut Self) -> Self { false }
+        fn take(_: &mut Self, _: u64, _: Stamp) -> Self { false }
         const STAYS: bool = true;
         fn is_finite(&self) -> bool { true }
     }
@@ -279,6 +289,7 @@ kinds! {
         fn is_finite(&self) -> bool { Self::is_finite(self) }
         fn mark(&self, _: Mark, tick: u64) -> Mark { Self::mark(self, tick) }
         fn lose(&mut self, tick: u64) { self.lose_all(tick); }
+        fn take(slot: &mut Self, tick: u64, stamp: Stamp) -> Self { std::mem::take(slot).at(tick, stamp) }
         const KEEPS: bool = true;
     }
     Image ImageShape images "image" "image": "a number for each tactel of a pad, row after row",
@@ -309,14 +320,14 @@ kinds! {
         "The order is `[v, omega]`, in m/s and rad/s. A twist in a sensor's frame is that of the sensor's origin along the \
         sensor's axes; one in `base` is spatial, at the base's origin (paper eq. 4)." {
         fn allocate(_: &TwistShape) -> Self { Self::default() }
-        fn take(_: &mut Self) -> Self { Self::default() }
+        fn take(_: &mut Self, _: u64, _: Stamp) -> Self { Self::default() }
         const STAYS: bool = true;
         fn is_finite(&self) -> bool { all_finite(self.0.as_slice()) }
     }
     Pose PoseShape poses "pose" "pose": "where one frame is in another",
         "A rotation and a translation [m] that take points of the first frame to the second." {
         fn allocate(_: &PoseShape) -> Self { Self::default() }
-        fn take(_: &mut Self) -> Self { Self::default() }
+        fn take(_: &mut Self, _: u64, _: Stamp) -> Self { Self::default() }
         const STAYS: bool = true;
         fn is_finite(&self) -> bool {
             all_finite(self.0.translation.vector.as_slice()) && all_finite(self.0.rotation.matrix().as_slice())
@@ -341,10 +352,34 @@ kinds! {
 }
 
 impl Kind {
+    /// The arguments of a port of this kind, in order: `unit`, then its frames.
+    #[must_use]
+    pub const fn arguments(self) -> &'static [&'static str] {
+        match self {
+            Self::Scalar | Self::Features | Self::Image | Self::Regions => &["unit", "frame"],
+            Self::Flag => &[],
+            Self::Mask | Self::Twist => &["frame"],
+            Self::Pose => &["frame", "reference"],
+            Self::Joints => &["unit", "robot"],
+            Self::Jacobian => &["frame", "robot"],
+        }
+    }
+
+    /// Whether a port of this kind takes that argument.
+    #[must_use]
+    pub const fn takes(self, argument: &str) -> bool {
+        let arguments = self.arguments();
+        let mut i = 0;
+        while i < arguments.len() && !is_same(arguments[i].as_bytes(), argument.as_bytes()) {
+            i += 1;
+        }
+        i < arguments.len()
+    }
+
     /// Whether a port of this kind names a unit before its frame.
     #[must_use]
     pub const fn has_unit(self) -> bool {
-        matches!(self, Self::Scalar | Self::Features | Self::Image | Self::Regions | Self::Joints)
+        self.takes("unit")
     }
 
     /// A size in words: `16 by 16 tactels`, `7 joints`.

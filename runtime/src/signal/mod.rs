@@ -19,7 +19,7 @@ pub use features::{Component, Feature, Features, FeaturesShape};
 pub use freshness::{Freshness, Mark, Stamp};
 pub use image::{Image, ImageShape};
 pub use joints::{Jacobian, Joint, Joints, JointsShape};
-pub use kind::{Arenas, Flag, FlagShape, JacobianShape, Kind, MaskShape, Scalar, ScalarShape, Shape, Signal};
+pub use kind::{Arenas, Flag, FlagShape, JacobianShape, Kind, MaskShape, Scalar, ScalarShape, Settable, Shape, Signal};
 pub use mask::{Grid, Mask};
 pub use regions::{Region, Regions, RegionsShape, Run};
 pub use spatial::{Pose, PoseShape, Twist, TwistShape};

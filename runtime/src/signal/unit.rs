@@ -118,16 +118,98 @@ impl FromStr for Unit {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        let (rest, per_second) = match text.rsplit_once("/s") {
-            Some((rest, "")) => (rest, 1),
-            Some((rest, "2")) => (rest, 2),
+        Self::parse(text.as_bytes()).ok_or_else(|| format!("`{text}` is not a unit; units are {}", Self::list()))
+    }
+}
+
+/// What declarations may name as a unit: constant functions, so that the derives refuse anything else at compile time.
+impl Unit {
+    const fn parse(text: &[u8]) -> Option<Self> {
+        let (rest, per_second) = match text {
+            [rest @ .., b'/', b's'] => (rest, 1),
+            [rest @ .., b'/', b's', b'2'] => (rest, 2),
             _ => (text, 0),
         };
-        let (rest, per_tactel) = rest.strip_suffix("/tactel").map_or((rest, false), |rest| (rest, true));
-        let base = NAMES.iter().find(|(_, name)| *name == rest).map(|(base, _)| *base);
-        let base = base.ok_or_else(|| format!("`{text}` is not a unit; units are {}", Self::list()))?;
-        Ok(Self { base, per_tactel, per_second })
+        let (rest, per_tactel) = match rest {
+            [rest @ .., b'/', b't', b'a', b'c', b't', b'e', b'l'] => (rest, true),
+            _ => (rest, false),
+        };
+        let mut i = 0;
+        while i < NAMES.len() {
+            if is_same(NAMES[i].1.as_bytes(), rest) {
+                return Some(Self { base: NAMES[i].0, per_tactel, per_second });
+            }
+            i += 1;
+        }
+        None
     }
+
+    /// Whether a port may declare it: a unit, `_`, `_/s`, or a capital letter, by itself or divided.
+    #[must_use]
+    pub const fn is_port_unit(text: &str) -> bool {
+        let is_variable = match text.as_bytes() {
+            b"_" | b"_/s" => true,
+            [b'A'..=b'Z', rest @ ..] => matches!(rest, b"" | b"/tactel" | b"/s" | b"/tactel/s"),
+            _ => false,
+        };
+        is_variable || Self::parse(text.as_bytes()).is_some()
+    }
+
+    /// Whether a parameter may declare it: products and quotients of [`PARAM_UNITS`](Self::PARAM_UNITS) and capital
+    /// letters, such as `N s/m` or `U/s2`, several as `m/s, rad/s`, or `$` with the name of a parameter.
+    #[must_use]
+    pub const fn is_param_unit(text: &str) -> bool {
+        let text = text.as_bytes();
+        if let [b'$', b'a'..=b'z', ..] = text {
+            return true;
+        }
+        let (mut start, mut i) = (0, 0);
+        while i <= text.len() {
+            if i == text.len() || matches!(text[i], b'/' | b' ' | b',') {
+                // A comma stands before a space.
+                let is_gap = i == start && i > 0 && text[i - 1] == b',' && i < text.len() && text[i] == b' ';
+                let (_, rest) = text.split_at(start);
+                let (atom, _) = rest.split_at(i - start);
+                if !is_gap && !is_atom(atom) {
+                    return false;
+                }
+                start = i + 1;
+            }
+            i += 1;
+        }
+        true
+    }
+
+    /// The units that the unit of a parameter is made of, beside the capital letters that inputs bind.
+    pub const PARAM_UNITS: [&str; 18] = [
+        "1", "m", "mm", "rad", "deg", "s", "ms", "ns", "Hz", "N", "kPa", "kg", "J", "raw", "tactel", "sample", "byte",
+        "%",
+    ];
+}
+
+/// Whether it is a unit of a parameter or a letter, to the power of one, two or three.
+const fn is_atom(text: &[u8]) -> bool {
+    let text = match text {
+        [base @ .., b'2' | b'3'] if !base.is_empty() => base,
+        _ => text,
+    };
+    let mut i = 0;
+    while i < Unit::PARAM_UNITS.len() {
+        if is_same(Unit::PARAM_UNITS[i].as_bytes(), text) {
+            return true;
+        }
+        i += 1;
+    }
+    matches!(text, [b'A'..=b'Z'])
+}
+
+/// Whether two texts are equal.
+pub(super) const fn is_same(a: &[u8], b: &[u8]) -> bool {
+    let mut i = 0;
+    while i < a.len() && i < b.len() && a[i] == b[i] {
+        i += 1;
+    }
+    i == a.len() && i == b.len()
 }
 
 #[cfg(test)]
@@ -145,6 +227,22 @@ mod tests {
             }
         }
         assert!("Nm".parse::<Unit>().is_err());
+    }
+
+    #[test]
+    fn what_declarations_may_name() {
+        for text in ["N", "m/s", "_", "_/s", "U", "U/tactel", "E/s", "rad mod pi"] {
+            assert!(Unit::is_port_unit(text), "{text}");
+        }
+        for text in ["", "UV", "U/m", "_/s2", "newton", "m/s3", "u"] {
+            assert!(!Unit::is_port_unit(text), "{text}");
+        }
+        for text in ["1", "m/s2", "N s/m", "m/s, rad/s", "U/s", "V/U", "kg m2", "$unit", "%"] {
+            assert!(Unit::is_param_unit(text), "{text}");
+        }
+        for text in ["", "newton", "m/", "/s", "m,rad", "m,, rad", "$", "m//s", "2", "m/s²"] {
+            assert!(!Unit::is_param_unit(text), "{text}");
+        }
     }
 
     #[test]

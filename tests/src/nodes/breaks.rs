@@ -26,14 +26,16 @@ pub struct Breaks {
     panics: bool,
 }
 
+impl tactflow_runtime::node::Describe for Breaks {
+    const NAME: &'static str = "breaks";
+    const SUMMARY: &'static str = "breaks in some tick";
+}
+
 impl Node for Breaks {
     type Params = Params;
     type Inputs<'a> = Inputs<'a>;
     type Outputs = Outputs;
     type State = ();
-
-    const NAME: &'static str = "breaks";
-    const SUMMARY: &'static str = "breaks in some tick";
 
     fn new(params: Params, _: &mut Setup<Self>) -> Result<Self, Mistakes> {
         match params.how.as_str() {

@@ -29,14 +29,16 @@ state! {
 /// Nothing to configure.
 pub struct Count;
 
+impl tactflow_runtime::node::Describe for Count {
+    const NAME: &'static str = "count";
+    const SUMMARY: &'static str = "counts its steps";
+}
+
 impl Node for Count {
     type Params = Params;
     type Inputs<'a> = Inputs<'a>;
     type Outputs = Outputs;
     type State = State;
-
-    const NAME: &'static str = "count";
-    const SUMMARY: &'static str = "counts its steps";
 
     fn new(_: Params, _: &mut Setup<Self>) -> Result<Self, Mistakes> {
         Ok(Self)
@@ -48,7 +50,7 @@ impl Node for Count {
 
     fn step(&self, tick: &Tick, inputs: Inputs<'_>, out: &mut Outputs, state: &mut State) {
         state.steps += 1.0;
-        state.time += state.interval.step(inputs.value.stamp(), tick);
+        state.time += state.interval.step(&inputs.value, tick).unwrap_or(0.0);
         out.steps.set(state.steps);
         out.time.set(state.time);
     }

@@ -35,12 +35,7 @@ pub struct LowPass {
     time: f64,
 }
 
-impl Node for LowPass {
-    type Params = Params;
-    type Inputs<'a> = Inputs<'a>;
-    type Outputs = Outputs;
-    type State = State;
-
+impl tactflow_runtime::node::Describe for LowPass {
     const NAME: &'static str = "low_pass";
     const SUMMARY: &'static str = "a low-pass filter of the first order";
     const DOC: &'static str = "T dy/dt = x - y, one implicit Euler step a sample: it never overshoots, however late a \
@@ -52,6 +47,13 @@ type = "low_pass"
 in.value = "moments.pressure"
 time = 0.05                         # [s]
 "#;
+}
+
+impl Node for LowPass {
+    type Params = Params;
+    type Inputs<'a> = Inputs<'a>;
+    type Outputs = Outputs;
+    type State = State;
 
     fn new(params: Params, setup: &mut Setup<Self>) -> Result<Self, Mistakes> {
         if setup.inputs.value.unit.is_axial() {
@@ -67,9 +69,8 @@ time = 0.05                         # [s]
     }
 
     fn step(&self, tick: &Tick, inputs: Inputs<'_>, out: &mut Outputs, state: &mut State) {
-        let dt = state.interval.step(inputs.value.stamp(), tick);
-        let value = match state.last {
-            Some(last) => toward(last, *inputs.value, dt / (self.time + dt)),
+        let value = match state.last.zip(state.interval.step(&inputs.value, tick)) {
+            Some((last, dt)) => toward(last, *inputs.value, dt / (self.time + dt)),
             None => *inputs.value,
         };
         state.last = Some(value);

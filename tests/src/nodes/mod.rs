@@ -34,7 +34,7 @@ pub fn catalogue() -> Catalogue {
 fn length() -> RoleType {
     let args = vec!["m".into(), "self".into()].into();
     let value =
-        PortSpec { name: "value".into(), doc: "A length.".into(), kind: Kind::Scalar, args, need: Need::Required };
+        PortSpec { name: "value".into(), doc: "A length.".into(), kind: Kind::Scalar, args, need: Need::REQUIRED };
     RoleType {
         name: "length".into(),
         summary: "a length".into(),

@@ -23,12 +23,7 @@ pub struct Plus {
     by: f64,
 }
 
-impl Node for Plus {
-    type Params = Params;
-    type Inputs<'a> = Inputs<'a>;
-    type Outputs = Outputs;
-    type State = ();
-
+impl tactflow_runtime::node::Describe for Plus {
     const NAME: &'static str = "plus";
     const SUMMARY: &'static str = "adds a constant";
     const DOC: &'static str = "y = x + `by`. It is there to measure what a node costs.";
@@ -38,6 +33,13 @@ type = "plus"
 in.value = "length.value"
 by = 0.5                            # [m]
 "#;
+}
+
+impl Node for Plus {
+    type Params = Params;
+    type Inputs<'a> = Inputs<'a>;
+    type Outputs = Outputs;
+    type State = ();
 
     fn new(params: Params, _: &mut Setup<Self>) -> Result<Self, Mistakes> {
         Ok(Self { by: params.by })

@@ -23,12 +23,7 @@ pub struct UnitDelay {
     initial: f64,
 }
 
-impl Node for UnitDelay {
-    type Params = Params;
-    type Inputs<'a> = Inputs<'a>;
-    type Outputs = Outputs;
-    type State = ();
-
+impl tactflow_runtime::node::Describe for UnitDelay {
     const NAME: &'static str = "unit_delay";
     const SUMMARY: &'static str = "what its input was one tick ago";
     const DOC: &'static str = "It closes a loop: what reads it may be what it reads.";
@@ -39,6 +34,13 @@ type = "unit_delay"
 in.value = "plus.value"
 "#;
     const EVERY_TICK: bool = true;
+}
+
+impl Node for UnitDelay {
+    type Params = Params;
+    type Inputs<'a> = Inputs<'a>;
+    type Outputs = Outputs;
+    type State = ();
 
     fn new(params: Params, _: &mut Setup<Self>) -> Result<Self, Mistakes> {
         Ok(Self { initial: params.initial })

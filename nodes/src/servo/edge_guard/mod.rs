@@ -67,12 +67,7 @@ struct Fence {
     ramp: f64,
 }
 
-impl Node for EdgeGuard {
-    type Params = Params;
-    type Inputs<'a> = Inputs<'a>;
-    type Outputs = Outputs;
-    type State = State;
-
+impl tactflow_runtime::node::Describe for EdgeGuard {
     const NAME: &'static str = "edge_guard";
     const SUMMARY: &'static str = "keeps the finger off the pad's rim: near it only motion inward passes whole";
     const DOC: &'static str = "A contact that slides off the pad is lost, and one that is cut off by the rim has a \
@@ -101,6 +96,13 @@ in.image = "calibrate.image"
 margin_tactels = 2.0                # tactels 2 to 13 of 16
 ramp_tactels = 1.0
 "#;
+}
+
+impl Node for EdgeGuard {
+    type Params = Params;
+    type Inputs<'a> = Inputs<'a>;
+    type Outputs = Outputs;
+    type State = State;
 
     fn new(params: Params, setup: &mut Setup<Self>) -> Result<Self, Mistakes> {
         let shape = &setup.inputs.image;
@@ -108,7 +110,12 @@ ramp_tactels = 1.0
         for (input, is_wired) in [("x", setup.inputs.x.is_some()), ("y", setup.inputs.y.is_some())] {
             if !is_wired {
                 // It may be absent, but a guard that never knows of a contact is a wire that was forgotten.
-                mistakes.push(crate::unwired(Self::NAME, input, "a scalar", &format!("moments.{input}")));
+                mistakes.push(crate::unwired(
+                    <Self as tactflow_runtime::node::Describe>::NAME,
+                    input,
+                    "a scalar",
+                    &format!("moments.{input}"),
+                ));
             }
         }
         let (margin, ramp) = (*params.margin_tactels, *params.ramp_tactels);

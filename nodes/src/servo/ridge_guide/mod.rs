@@ -81,12 +81,7 @@ pub struct RidgeGuide {
     bounds: [f64; 2],
 }
 
-impl Node for RidgeGuide {
-    type Params = Params;
-    type Inputs<'a> = Inputs<'a>;
-    type Outputs = Outputs;
-    type State = State;
-
+impl tactflow_runtime::node::Describe for RidgeGuide {
     const NAME: &'static str = "ridge_guide";
     const SUMMARY: &'static str = "guides a sensor toward where the contact gets narrower, and then along the ridge";
     const DOC: &'static str = "The step that the paper's conclusion announces: guidance that is computed from touch. \
@@ -116,11 +111,23 @@ in.pose = "state.sensor_pose"
 speed_m_per_s = 0.01
 leg_m = 0.015                       # three tactels
 "#;
+}
+
+impl Node for RidgeGuide {
+    type Params = Params;
+    type Inputs<'a> = Inputs<'a>;
+    type Outputs = Outputs;
+    type State = State;
 
     fn new(params: Params, setup: &mut Setup<Self>) -> Result<Self, Mistakes> {
         let mut mistakes = Mistakes::new();
         if setup.inputs.orientation.is_none() {
-            mistakes.push(crate::unwired(Self::NAME, "orientation", "a scalar", "moments.orientation"));
+            mistakes.push(crate::unwired(
+                <Self as tactflow_runtime::node::Describe>::NAME,
+                "orientation",
+                "a scalar",
+                "moments.orientation",
+            ));
         }
         let (on, off) = (*params.on_above, *params.off_below);
         if off >= on {

@@ -111,12 +111,7 @@ pub struct ScanGuide {
     edge: f64,
 }
 
-impl Node for ScanGuide {
-    type Params = Params;
-    type Inputs<'a> = Inputs<'a>;
-    type Outputs = Outputs;
-    type State = State;
-
+impl tactflow_runtime::node::Describe for ScanGuide {
     const NAME: &'static str = "scan_guide";
     const SUMMARY: &'static str = "guides a sensor to and fro over a surface, stroke beside stroke";
     const DOC: &'static str = "The guidance of the paper's section V-E: while the servoing keeps the contact, V_ext slides \
@@ -148,6 +143,13 @@ strokes = 5
 stroke_m = 0.06
 step_m = 0.01
 "#;
+}
+
+impl Node for ScanGuide {
+    type Params = Params;
+    type Inputs<'a> = Inputs<'a>;
+    type Outputs = Outputs;
+    type State = State;
 
     fn new(params: Params, setup: &mut Setup<Self>) -> Result<Self, Mistakes> {
         setup.outputs.progress.range = [0.0, 1.0];

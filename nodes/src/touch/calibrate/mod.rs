@@ -117,12 +117,7 @@ pub struct Calibrate {
     rules: Option<Rules>,
 }
 
-impl Node for Calibrate {
-    type Params = Params;
-    type Inputs<'a> = Inputs<'a>;
-    type Outputs = Outputs;
-    type State = State;
-
+impl tactflow_runtime::node::Describe for Calibrate {
     const NAME: &'static str = "calibrate";
     const SUMMARY: &'static str =
         "turns what each tactel reads into a force, by a line or by the curves of a calibration file";
@@ -154,6 +149,13 @@ gain = 1.0                          # [N per N]
 in.present = "label.present"
 tare_at_start = true                # the first 50 frames are the zero, if nothing touches the pad
 "#;
+}
+
+impl Node for Calibrate {
+    type Params = Params;
+    type Inputs<'a> = Inputs<'a>;
+    type Outputs = Outputs;
+    type State = State;
 
     fn new(params: Params, setup: &mut Setup<Self>) -> Result<Self, Mistakes> {
         let mut mistakes = Mistakes::new();

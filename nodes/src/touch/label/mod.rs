@@ -108,12 +108,7 @@ pub struct Label {
     grid: Grid,
 }
 
-impl Node for Label {
-    type Params = Params;
-    type Inputs<'a> = Inputs<'a>;
-    type Outputs = Outputs;
-    type State = State;
-
+impl tactflow_runtime::node::Describe for Label {
     const NAME: &'static str = "label";
     const SUMMARY: &'static str = "finds the connected regions of a mask, and the one that is the contact";
     const DOC: &'static str = "Tactels of the mask that are neighbours make a region (connected components, paper \
@@ -139,6 +134,13 @@ in.mask = "binarize.mask"
 min_area = 4                        # [tactels]
 min_force = 0.1                     # [N]
 "#;
+}
+
+impl Node for Label {
+    type Params = Params;
+    type Inputs<'a> = Inputs<'a>;
+    type Outputs = Outputs;
+    type State = State;
 
     fn new(params: Params, setup: &mut Setup<Self>) -> Result<Self, Mistakes> {
         let (image, mask) = (&setup.inputs.image, &setup.inputs.mask);

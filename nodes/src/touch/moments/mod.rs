@@ -65,12 +65,7 @@ pub struct Moments {
     min_anisotropy: f64,
 }
 
-impl Node for Moments {
-    type Params = Params;
-    type Inputs<'a> = Inputs<'a>;
-    type Outputs = Outputs;
-    type State = ();
-
+impl tactflow_runtime::node::Describe for Moments {
     const NAME: &'static str = "moments";
     const SUMMARY: &'static str = "measures a contact: force, pressure, centre of gravity and orientation";
     const DOC: &'static str = "The features of the paper's section III, from the tactels of a region R with the values \
@@ -102,6 +97,13 @@ in.region = "label.region"
 weight = "excess"                   # without the step at the edge of the mask
 threshold = 0.010                   # as the `release` of the `binarize` [N]
 "#;
+}
+
+impl Node for Moments {
+    type Params = Params;
+    type Inputs<'a> = Inputs<'a>;
+    type Outputs = Outputs;
+    type State = ();
 
     fn new(params: Params, setup: &mut Setup<Self>) -> Result<Self, Mistakes> {
         let shape = setup.inputs.image.clone();

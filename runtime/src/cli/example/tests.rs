@@ -24,11 +24,7 @@ mod follow {
 
     pub struct Follow;
 
-    impl Node for Follow {
-        type Params = Params;
-        type Inputs<'a> = Inputs<'a>;
-        type Outputs = Outputs;
-        type State = ();
+    impl tactflow_runtime::node::Describe for Follow {
         const NAME: &'static str = "follow";
         const SUMMARY: &'static str = "";
         const EXAMPLE: &'static str = r#"
@@ -36,6 +32,13 @@ mod follow {
 type = "follow"                     # it is all there is
 in.position = "motor.position"
 "#;
+    }
+
+    impl Node for Follow {
+        type Params = Params;
+        type Inputs<'a> = Inputs<'a>;
+        type Outputs = Outputs;
+        type State = ();
 
         fn new(_: Params, setup: &mut Setup<Self>) -> Result<Self, Mistakes> {
             setup.outputs.velocity = setup.inputs.position.in_unit(Unit::RADIAN.per_second());
@@ -62,14 +65,17 @@ mod bound {
 
     pub struct Bound;
 
+    impl tactflow_runtime::node::Describe for Bound {
+        const NAME: &'static str = "bound";
+        const SUMMARY: &'static str = "";
+        const EXAMPLE: &'static str = "[nodes.bound]\ntype = \"bound\"\nin.velocity = \"follow.velocity\"\n";
+    }
+
     impl Node for Bound {
         type Params = Params;
         type Inputs<'a> = Inputs<'a>;
         type Outputs = Outputs;
         type State = ();
-        const NAME: &'static str = "bound";
-        const SUMMARY: &'static str = "";
-        const EXAMPLE: &'static str = "[nodes.bound]\ntype = \"bound\"\nin.velocity = \"follow.velocity\"\n";
 
         fn new(_: Params, setup: &mut Setup<Self>) -> Result<Self, Mistakes> {
             setup.outputs.velocity = setup.inputs.velocity.clone();
@@ -129,7 +135,7 @@ fn world() -> Catalogue {
         doc: "".into(),
         kind: Kind::Joints,
         args: vec![Cow::Borrowed(unit), "self".into()].into(),
-        need: Need::Required,
+        need: Need::REQUIRED,
     };
     let (outputs, commands) = (vec![port("position", "rad")], vec![port("velocity", "rad/s")]);
     let role = RoleType {

@@ -15,12 +15,7 @@ struct Watch {
 impl Watch {
     /// How an input declared with `need` watches the port with that mark.
     fn new(need: Need, mark: u32) -> Self {
-        Self {
-            mark,
-            lag: u64::from(need == Need::Delayed),
-            is_trigger: matches!(need, Need::Trigger | Need::Many | Need::Delayed),
-            is_required: need == Need::Sampled,
-        }
+        Self { mark, lag: u64::from(need.is_delayed), is_trigger: need.is_trigger, is_required: need.must_be_present }
     }
 }
 
@@ -89,9 +84,10 @@ impl NodeRunner {
         let all = || inputs.iter().flat_map(|(need, ports)| ports.iter().map(|port| (*need, port.mark)));
         // A delayed input closes a loop: there it would wake the node with what the node itself has made, and hold its
         // stamp back for ever. So it wakes only a node that nothing else wakes.
-        let is_woken = all().any(|(need, _)| matches!(need, Need::Required | Need::Trigger | Need::Many));
-        let (required, others) = (all().filter(|(need, _)| *need == Need::Required), all());
-        let others = others.filter(|(need, _)| *need != Need::Required && !(is_woken && *need == Need::Delayed));
+        let is_woken = all().any(|(need, _)| need.is_trigger && !need.is_delayed);
+        let is_required = |need: &Need| need.must_be_present && need.is_trigger;
+        let (required, others) = (all().filter(|(need, _)| is_required(need)), all());
+        let others = others.filter(|(need, _)| !is_required(need) && !(is_woken && need.is_delayed));
         Self {
             node,
             wires: Wires::new(inputs),

@@ -3,7 +3,7 @@
 
 use crate::graph::net::{Net, Wire};
 use crate::graph::plan::Producer;
-use crate::node::{AnyNode, Components, Need};
+use crate::node::{AnyNode, Components};
 
 /// Of each node what of its outputs is read, given the nodes as they are set. Of one that no wire reads all is: somebody
 /// looks at the record.
@@ -16,7 +16,7 @@ pub(crate) fn wanted<'n>(net: &Net<'_>, built: &dyn Fn(usize) -> Option<&'n dyn 
             wanted[node][command.source.port] = Components::ALL;
         }
     }
-    let is_delayed = |node: usize, wire: &Wire| net.input(node, wire).need == Need::Delayed;
+    let is_delayed = |node: usize, wire: &Wire| net.input(node, wire).need.is_delayed;
     // Who reads what the last tick left steps before the one it reads: that is taken as read as a whole.
     for (node, wires) in net.wires.iter().enumerate() {
         for wire in wires.iter().filter(|wire| is_delayed(node, wire)) {

@@ -121,7 +121,7 @@ impl Builder<'_> {
                 age: wire.origin.age,
                 span: wire.origin.word.span.clone(),
             });
-            if input.need == Need::Delayed {
+            if input.need.is_delayed {
                 // What it brings is made later, so its shape is not known yet; of a flag there is nothing to know.
                 if input.kind == Kind::Flag {
                     given.inputs[wire.input].push((wire.key.name.clone(), FlagShape.into()));
@@ -139,9 +139,7 @@ impl Builder<'_> {
             }
             given.inputs[wire.input].push((wire.key.name.clone(), port.shape.clone()));
         }
-        let missing = |(need, ports): &(Need, Vec<PlannedWire>)| {
-            matches!(need, Need::Required | Need::Sampled) && ports.is_empty()
-        };
+        let missing = |(need, ports): &(Need, Vec<PlannedWire>)| need.must_be_wired && ports.is_empty();
         if !is_whole || inputs.iter().any(missing) || self.frames.has_clash(index) {
             return None;
         }
@@ -237,7 +235,7 @@ impl Builder<'_> {
         let net = self.net;
         for (index, wires) in net.wires.iter().enumerate() {
             let Some(spec) = self.net.spec(index) else { continue };
-            for wire in wires.iter().filter(|wire| spec.inputs[wire.input].need == Need::Delayed) {
+            for wire in wires.iter().filter(|wire| spec.inputs[wire.input].need.is_delayed) {
                 let Some(port) = self.ports.get(&wire.source) else { continue };
                 let consumer = format!("{}.{}", self.net.flat.nodes[index].name, wire.key.name);
                 let units = self.units.entry(index).or_default();

@@ -83,7 +83,7 @@ fn other_unit(asked: &Asked<'_>) -> Option<Diagnostic> {
     ];
     let (_, says) = UNITS.iter().find(|(end, _)| asked.key.ends_with(end))?;
     let spec = asked.spec?;
-    let takes = spec.unit()?.split(';').next()?.trim();
+    let takes = spec.unit.as_deref()?.split(';').next()?.trim();
     let is_known = UNITS.iter().any(|(_, unit)| *unit == takes);
     let message = format!("`{}` is in {says}, but `{}` takes {takes}", asked.key, spec.name);
     (is_known && takes != *says).then(|| Diagnostic::new(Code::UnitMismatch, asked.span.clone(), message))
@@ -258,10 +258,7 @@ fn between(
         return (format!("put a `{name}` on the way of the motion"), None);
     };
     let article = if name.starts_with(['a', 'e', 'i', 'o', 'u']) { "an" } else { "a" };
-    let needs = limiter
-        .inputs
-        .iter()
-        .filter(|input| matches!(input.need, crate::node::Need::Required | crate::node::Need::Sampled));
+    let needs = limiter.inputs.iter().filter(|input| input.need.must_be_wired);
     let mut block = format!(
         "put {article} `{name}` between `{0}` and `{taker}`:\n[nodes.{name}]\ntype = \"{name}\"\nin.{through} = \"{0}\"",
         word.text
@@ -270,7 +267,7 @@ fn between(
         block.push_str(&format!("\nin.{} = \"…\"", input.name));
     }
     for param in limiter.params.iter().filter(|param| !param.is_optional) {
-        let unit = param.unit().map(|unit| format!("   # [{unit}]")).unwrap_or_default();
+        let unit = param.unit.as_ref().map(|unit| format!("   # [{unit}]")).unwrap_or_default();
         block.push_str(&format!("\n{} = …{unit}", param.name));
     }
     (block, Some(word.span.clone()))

@@ -9,7 +9,6 @@ use crate::graph::net::{Net, Wire};
 use crate::graph::plan::Producer;
 use crate::graph::plan::{Condition, PlannedExit, PlannedMode};
 use crate::graph::syntax::{ModeBlock, Sort};
-use crate::node::Need;
 use crate::signal::Kind;
 use crate::source::{Code, Diagnostic};
 
@@ -33,7 +32,7 @@ impl<'a> Movers<'a> {
         let (mut movers, mut moved) = (Vec::new(), BTreeSet::new());
         for &node in &self.net.order {
             let Some(spec) = self.net.spec(node) else { continue };
-            let wires = || self.net.wires[node].iter().filter(|wire| spec.inputs[wire.input].need != Need::Delayed);
+            let wires = || self.net.wires[node].iter().filter(|wire| !spec.inputs[wire.input].need.is_delayed);
             let is_sampled = |wire: &Wire| wire.source.producer.node().is_none_or(|source| sampled.contains(&source));
             if wires().any(is_sampled) {
                 sampled.insert(node);

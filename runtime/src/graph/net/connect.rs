@@ -4,7 +4,7 @@ use super::{CommandWire, Net, Origin, Wire};
 use crate::device::RoleType;
 use crate::graph::load::Scope;
 use crate::graph::plan::{PortRef, Producer};
-use crate::node::{Need, NodeSpec, Word};
+use crate::node::{NodeSpec, Word};
 use crate::signal::Kind;
 use crate::source::{Code, Diagnostic, Key, meant};
 
@@ -38,8 +38,8 @@ impl Net<'_> {
             found.push(*diagnostic);
             None
         });
-        let named = spec.inputs.iter().position(|input| input.need != Need::Many && input.name == key.name);
-        let Some(input) = named.or_else(|| spec.inputs.iter().position(|input| input.need == Need::Many)) else {
+        let named = spec.inputs.iter().position(|input| !input.need.is_many && input.name == key.name);
+        let Some(input) = named.or_else(|| spec.inputs.iter().position(|input| input.need.is_many)) else {
             let message = format!("`{}` has no input `{}`", spec.name, key.name);
             found.push(Diagnostic::new(Code::UnknownInput, key.span.clone(), message).suggest(
                 &key.name,
@@ -89,7 +89,7 @@ impl Net<'_> {
     fn missing(&self, node: usize, spec: &NodeSpec, found: &mut Vec<Diagnostic>) {
         let block = &self.flat.nodes[node].block;
         let names = || spec.inputs.iter().map(|input| &*input.name);
-        for input in spec.inputs.iter().filter(|input| matches!(input.need, Need::Required | Need::Sampled)) {
+        for input in spec.inputs.iter().filter(|input| input.need.must_be_wired) {
             let is_meant =
                 |key: &Key| !names().any(|name| name == key.name) && meant(&key.name, names()) == Some(&input.name);
             let mut wired = block.wires.iter().map(|(key, _)| key).chain(&block.unread);

@@ -2,7 +2,6 @@
 
 use super::{Net, Wire};
 use crate::graph::plan::Producer;
-use crate::node::Need;
 use crate::source::{Code, Diagnostic};
 
 /// A wire between two nodes that says which one steps first.
@@ -49,9 +48,8 @@ impl Net<'_> {
 fn delayed_roles(net: &Net<'_>) -> Vec<Diagnostic> {
     let mut mistakes = Vec::new();
     for (node, wires) in net.wires.iter().enumerate() {
-        let from_role = |wire: &&Wire| {
-            net.input(node, wire).need == Need::Delayed && matches!(wire.source.producer, Producer::Role(_))
-        };
+        let from_role =
+            |wire: &&Wire| net.input(node, wire).need.is_delayed && matches!(wire.source.producer, Producer::Role(_));
         for wire in wires.iter().filter(from_role) {
             let (name, key) = (&net.flat.nodes[node].name, &wire.key.name);
             let message = format!("`{name}.{key}` reads what the last tick left, which a role does not keep");
@@ -66,7 +64,7 @@ fn edges(net: &Net<'_>) -> Vec<Edge> {
     for (consumer, wires) in net.wires.iter().enumerate() {
         for (i, wire) in wires.iter().enumerate() {
             let Producer::Node(producer) = wire.source.producer else { continue };
-            let is_delayed = net.input(consumer, wire).need == Need::Delayed;
+            let is_delayed = net.input(consumer, wire).need.is_delayed;
             let (first, then) = if is_delayed { (consumer, producer) } else { (producer, consumer) };
             edges.push(Edge { first, then, wire: (consumer, i), is_delayed });
         }
