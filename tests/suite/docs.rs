@@ -292,7 +292,8 @@ fn every_link_of_the_pages_leads_somewhere() {
     let docs = workspace().join("docs");
     let folders = [docs.clone(), docs.join("decisions"), docs.join("reference")];
     let files = folders.into_iter().flat_map(|folder| fs::read_dir(folder).unwrap()).map(|entry| entry.unwrap().path());
-    let pages = files.filter(|path| path.extension().is_some_and(|extension| extension == "md"));
+    let pages = files.chain([workspace().join("README.md"), workspace().join("CHANGELOG.md")]);
+    let pages = pages.filter(|path| path.extension().is_some_and(|extension| extension == "md"));
     let mut links = 0;
     for page in pages {
         let text = fs::read_to_string(&page).unwrap();
