@@ -6,7 +6,7 @@ use tactflow_runtime::signal::{Image, ImageShape};
 use super::log::Log;
 use super::report::{Report, Settings, State, calibrate};
 use super::samples::Load;
-use super::testing::{MOST, Pad};
+use super::testing::{MAX_FORCE_N, Pad};
 use super::*;
 use crate::touch::calibrate::Calibrate;
 
@@ -131,8 +131,8 @@ fn dead_tactels_bear_a_part_of_the_load_if_that_is_said() {
     let log = pad.uniform(2, 100);
     let settings = Settings { bearing: Some(16), ..settings(Load::Uniform, None) };
     let report = calibrate(std::slice::from_ref(&log), &settings).unwrap();
-    assert!((report.most - MOST * 12.0 / 16.0).abs() < 0.01, "{}", report.most);
-    assert!((made(log, Load::Uniform, None).most - MOST).abs() < 0.01);
+    assert!((report.most - MAX_FORCE_N * 12.0 / 16.0).abs() < 0.01, "{}", report.most);
+    assert!((made(log, Load::Uniform, None).most - MAX_FORCE_N).abs() < 0.01);
 }
 
 #[test]
@@ -230,7 +230,7 @@ fn nothing_to_calibrate_is_said_with_a_way_out() {
     let log = Log { force: log.force.iter().enumerate().map(|(i, _)| if i < 50 { 0.0 } else { 3.0 }).collect(), ..log };
     for (load, way_out) in [(Load::Probe, "or is the load uniform?"), (Load::Uniform, "or of a probe on one tactel")] {
         let message = calibrate(std::slice::from_ref(&log), &settings(load, None)).unwrap_err();
-        assert!(message.contains("4 tactels never answer") && message.contains(way_out), "{message}");
+        assert!(message.contains("4 tactels do not respond") && message.contains(way_out), "{message}");
     }
     assert_eq!(calibrate(&[], &settings(Load::Probe, None)).unwrap_err(), "there is no log");
 }
@@ -241,7 +241,7 @@ fn the_simplest_curve_that_is_good_enough_is_taken() {
     assert_eq!(made(pad.uniform(2, 200), Load::Uniform, None).kind(), Kind::Rational);
     // So little squashed that a line will do: less than the noise.
     for truth in &mut pad.truths {
-        (truth.a, truth.b) = (2000.0 * 4000.0 / MOST, 4000.0);
+        (truth.a, truth.b) = (2000.0 * 4000.0 / MAX_FORCE_N, 4000.0);
     }
     assert_eq!(made(pad.uniform(2, 200), Load::Uniform, None).kind(), Kind::Linear);
     // A knee that no squashed curve has.
@@ -268,7 +268,7 @@ fn the_report_says_what_was_found_in_units() {
         "hysteresis   median 1",
         " % of the range of the reading",
         " raw, unloaded",
-        "dead         1 never answer: [1, 3]",
+        "dead         1 do not respond: [1, 3]",
         "saturated    ",
         "the worst tactels, rational curve",
         "force [N]     range [raw]   RMS [N]   RMS [%]   hysteresis [%]",

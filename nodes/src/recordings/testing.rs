@@ -1,10 +1,10 @@
-//! What the tests of the formats share.
+//! Helpers of the format tests.
 
 use std::io::Write;
 
 use super::{Hints, Recording, Refusal, read};
 
-/// The 64-bit splitmix generator (Steele et al. 2014), so that every run damages the same.
+/// The 64-bit splitmix generator (Steele et al. 2014): the same damage in every run.
 pub(super) struct Random(pub(super) u64);
 
 impl Random {
@@ -37,7 +37,7 @@ impl Random {
     }
 }
 
-/// What is wrong, each with its line; a line of 0 is no place in the text.
+/// Returns each complaint with its line; 0 for a complaint without a place.
 pub(super) fn complaints(read: Result<Recording, Refusal>) -> Vec<(usize, String)> {
     match read {
         Ok(recording) => {
@@ -63,7 +63,7 @@ pub(super) fn complaints(read: Result<Recording, Refusal>) -> Vec<(usize, String
     }
 }
 
-/// Checks a table of damages: in `good`, `from` becomes `to` once, and what is then wrong, with its line.
+/// Checks a table of damages: each replaces `from` by `to` once in `good`, and has one complaint at a line.
 pub(super) fn check_damages(good: &str, name: &str, hints: &Hints, cases: &[(&str, &str, usize, &str)]) {
     assert_eq!(complaints(read(good.as_bytes(), name, hints)), [], "it is good");
     for (from, to, line, message) in cases {
@@ -73,7 +73,7 @@ pub(super) fn check_damages(good: &str, name: &str, hints: &Hints, cases: &[(&st
     }
 }
 
-/// Damages good files at random: each is then read soundly or refused at a place. How many of them are refused.
+/// Damages good files at random and returns how many are refused. Each other one must give a sound recording.
 pub(super) fn count_refused(good: &[&[u8]], name: &str, hints: &Hints, rounds: usize) -> usize {
     let mut random = Random(2013);
     let mut refused = 0;
@@ -85,7 +85,7 @@ pub(super) fn count_refused(good: &[&[u8]], name: &str, hints: &Hints, rounds: u
     refused
 }
 
-/// A zip archive of those members, stored (0) or deflated (8).
+/// Returns a zip archive of the members, stored (0) or deflated (8).
 pub(super) fn zipped(method: u16, members: &[(&str, &[u8])]) -> Vec<u8> {
     let (mut archive, mut directory) = (Vec::new(), Vec::new());
     for (name, bytes) in members {

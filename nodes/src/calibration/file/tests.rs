@@ -102,8 +102,8 @@ fn a_file_written_by_hand_is_read_in_any_order() {
 #[test]
 fn every_mistake_stands_at_its_place() {
     let cases = [
-        (GOOD, "kind = \"calibration\"", "kind = \"bench\"", "\"bench\"", "this is no calibration file"),
-        (GOOD, "kind = \"calibration\"\n", "", "", "this is no calibration file"),
+        (GOOD, "kind = \"calibration\"", "kind = \"bench\"", "\"bench\"", "this is not a calibration file"),
+        (GOOD, "kind = \"calibration\"\n", "", "", "this is not a calibration file"),
         (GOOD, "version = 1", "version = 2", "2", "this tool reads version 1 of the format, not 2"),
         (GOOD, "\"rational\"", "\"cubic\"", "\"cubic\"", "expected `linear`, `rational` or `piecewise`"),
         (GOOD, "\"rational\"", "\"linear\"", "squash", "`squash` is not a parameter here"),
@@ -118,7 +118,7 @@ fn every_mistake_stands_at_its_place() {
         (GOOD, "at = [1, 0]", "at = [1, 1]", "[1, 1]", "tactel [1, 1] is given twice"),
         (GOOD, "at = [1, 0]", "at = [0, 1]", "[0, 1]", "tactel [0, 1] is given twice"),
         (GOOD, "gain = 0.02", "gain = 0", "0", "a `gain` of 0 measures nothing"),
-        (GOOD, "gain = 0.02", "gain = 1e99", "1e99", "too large: images are of 32-bit floats"),
+        (GOOD, "gain = 0.02", "gain = 1e99", "1e99", "too large: images have 32-bit floats"),
         (GOOD, "gain = 0.02", "gain = nan", "nan", "expected a finite number"),
         (GOOD, "gain = 0.02", "gain = \"x\"", "\"x\"", "expected a number"),
         (GOOD, "gain = 0.02, ", "", "{ at = [1, 1]", "`gain` is missing: expected a number"),
@@ -127,7 +127,13 @@ fn every_mistake_stands_at_its_place() {
         (GOOD, "offset = -3", "offset = 1e50", "1e50", "too large"),
         (KNOTS, "[0, 0]", "[0, 1]", "[0, 1]", "tactel [0, 1] is not on an array of 1 by 1"),
         (KNOTS, "[0.5, 1.5, 4]", "[0.5, 1.5]", "[0.5, 1.5]", "3 readings, but 2 forces"),
-        (KNOTS, "[0.5, 1.5, 4]", "[0.5, 0.4, 4]", "[0.5, 0.4, 4]", "`forces` never fall, but 0.4 comes after 0.5"),
+        (
+            KNOTS,
+            "[0.5, 1.5, 4]",
+            "[0.5, 0.4, 4]",
+            "[0.5, 0.4, 4]",
+            "`forces` must not decrease, but 0.4 comes after 0.5",
+        ),
         (KNOTS, "[10, 20, 30]", "[10, 10, 30]", "[10, 10, 30]", "`readings` go on in one direction from 0"),
         (KNOTS, "[10, 20, 30]", "[10, 20, 1e40]", "[10, 20, 1e40]", "too large"),
     ];
@@ -149,7 +155,7 @@ fn what_is_no_toml_says_so_and_many_mistakes_are_cut_short() {
     assert!(is_calibration("kind = \"calibration\"\nversion = 9"), "a later one is one too");
     let line = "  { at = [0, 0], offset = 10, gain = 0, squash = 0, most = 1 },\n";
     let text = GOOD.replacen("tactels = [\n", &format!("tactels = [\n{}", line.repeat(50)), 1);
-    assert_eq!(read(&text).unwrap_err().len(), MOST_FLAWS);
+    assert_eq!(read(&text).unwrap_err().len(), MAX_FLAWS);
 }
 
 /// The node keeps as many segments for every tactel as the one with the most has: one long line must not blow them up.

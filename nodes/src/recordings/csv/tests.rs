@@ -64,7 +64,7 @@ fn the_same_written_otherwise_reads_the_same() {
     assert_eq!(read(text.as_bytes(), "", &other).as_ref(), Ok(&good));
     assert_eq!(
         complaints(read(text.as_bytes(), "", &hints()))[0].1,
-        "the file does not say how many rows and columns it has"
+        "the file does not give its number of rows and columns"
     );
 }
 
@@ -113,53 +113,53 @@ fn a_tactel_that_is_nan_throughout_does_not_exist() {
     let recording = read(text.as_bytes(), "", &sized(2, 2)).unwrap();
     assert_eq!((&*recording.dead, &*recording.cells), (&[1][..], &[1.0, 0.0, 3.0, 4.0, 5.0, 0.0, 7.0, 8.0][..]));
     let got = complaints(read(text.replace("nan", "6").as_bytes(), "", &sized(2, 2)));
-    assert_eq!(got, [(2, "this cell is a number, but in the first frame it was none".into())]);
+    assert_eq!(got, [(2, "this cell is a number, but it is NaN in the first frame".into())]);
     let got = complaints(read(text.replace('7', "nan").as_bytes(), "", &sized(2, 2)));
-    assert_eq!(got, [(2, "this cell is no number, but in the first frame it was one".into())]);
+    assert_eq!(got, [(2, "this cell is NaN, but it is a number in the first frame".into())]);
 }
 
 #[test]
 fn what_is_wrong_is_said_where_it_is() {
     let cases = [
         ("5,6,7,8", "5,6,7,eight", 4, "this cell is not a number: `eight`"),
-        ("5,6,7,8", "5,6,7", 4, "frame 2 has 5 columns, but should have 6"),
-        ("5,6,7,8", "5,6,7,8,9", 4, "frame 2 has 7 columns, but should have 6"),
-        ("5,6,7,8", "5,,7,8", 4, "this cell is no number, but in the first frame it was one"),
+        ("5,6,7,8", "5,6,7", 4, "frame 2 has 5 columns, not 6"),
+        ("5,6,7,8", "5,6,7,8,9", 4, "frame 2 has 7 columns, not 6"),
+        ("5,6,7,8", "5,,7,8", 4, "this cell is NaN, but it is a number in the first frame"),
         ("5,6,7,8", "5,6,7,1e300", 4, "this cell is too large"),
         ("0.75", "0.25", 4, "the time goes back"),
         ("1.0,", "0.6,", 5, "the time goes back"),
-        ("2.5", "nan", 4, "a force is a number"),
-        ("force", "time", 2, "`time` is here twice"),
-        ("time", "time_fortnights", 2, "a time is in `s`, `ms`, `us` or `ns`"),
-        ("force", "force_kn", 2, "a force beside the pad is in `N`"),
-        ("r1c1", "r1c0", 2, "the names go up to 2 rows by 2 columns, but are 4 but"),
-        ("r1c1", "r1", 2, "`r1` says no row and column, as other names do"),
-        ("r1c1", "r2c1", 2, "the names go up to 3 rows by 2 columns, but are 4"),
-        ("r0c0,r0c1,", "r5c0,r5c1,", 2, "the names go up to 5 rows by 2 columns, but are 4"),
+        ("2.5", "nan", 4, "a force must be a number"),
+        ("force", "time", 2, "`time` appears twice"),
+        ("time", "time_fortnights", 2, "the unit of a time must be `s`, `ms`, `us` or `ns`"),
+        ("force", "force_kn", 2, "the unit of `force` must be `N`"),
+        ("r1c1", "r1c0", 2, "the names reach 2 rows by 2 columns, but there are 4 names but"),
+        ("r1c1", "r1", 2, "`r1` has no row and column, but other names do"),
+        ("r1c1", "r2c1", 2, "the names reach 3 rows by 2 columns, but there are 4 names"),
+        ("r0c0,r0c1,", "r5c0,r5c1,", 2, "the names reach 5 rows by 2 columns, but there are 4 names"),
     ];
     let cases: Vec<_> = cases.into_iter().filter(|case| !case.3.ends_with(" but")).collect();
     check_damages(&named(), "", &hints(), &cases);
     let twice = named().replace("r1c1", "r1c0");
-    assert_eq!(complaints(read(twice.as_bytes(), "", &hints())), [(2, "row 1 and column 0 are named twice".into())]);
+    assert_eq!(complaints(read(twice.as_bytes(), "", &hints())), [(2, "row 1 and column 0 appear twice".into())]);
 
     let blocks = "1,2,3\n4,5,6\n\n7,8,9\n10,11,12\n\n0,0,0\n0,0,0\n";
     let unsized_ = Hints { rate_hz: Some(100.0), ..hints() };
     let cases = [
-        ("\n0,0,0\n0", "0,0,0\n0", 6, "frame 2 goes on after its 2 rows"),
+        ("\n0,0,0\n0", "0,0,0\n0", 6, "frame 2 has more than 2 rows"),
         ("\n10,11,12\n\n0,0,0\n0,0,0\n", "", 4, "frame 2 ends after 1 of its 2 rows: the file is cut off"),
-        ("10,11,12", "10,11", 5, "row 2 of frame 2 has 2 cells, but should have 3"),
+        ("10,11,12", "10,11", 5, "row 2 of frame 2 has 2 cells, not 3"),
         ("7,8,9\n", "7,8,9\n\n", 5, "frame 2 ends after 1 of its 2 rows"),
     ];
     check_damages(blocks, "", &unsized_, &cases);
     let got = complaints(read(blocks.as_bytes(), "", &sized(4, 4)));
-    assert_eq!(got[0].1, "the first row has 3 numbers: that is neither a frame of 4 by 4 tactels nor a row of it");
+    assert_eq!(got[0].1, "the first row has 3 numbers: this is neither a frame of 4 by 4 tactels nor a row of one");
 }
 
 #[test]
 fn what_the_file_does_not_say_is_asked_for() {
     let bare = named().replace("time,", "").replace("0.5,1", "1").replace("0.75,2", "2").replace("1.0,3", "3");
-    let all = "the file does not say the unit of its values, or the pitch of its tactels, or how fast its frames came";
-    for (hints, message) in [(Hints::default(), all), (hints(), "the file does not say how fast its frames came")] {
+    let all = "the file does not give the unit of its values, or the pitch of its tactels, or its frame rate";
+    for (hints, message) in [(Hints::default(), all), (hints(), "the file does not give its frame rate")] {
         assert_eq!(complaints(read(bare.as_bytes(), "", &hints)), [(0, message.into())]);
     }
     let hints = Hints { rate_hz: Some(50.0), ..hints() };

@@ -114,26 +114,26 @@ fn what_is_wrong_with_an_array_is_said() {
         npy("<f8", false, "(2, 2, 3)", &floats(&values))
     };
     let cases: [(Vec<u8>, &str); 14] = [
-        (arange()[..200].to_vec(), "its header says [2, 2, 3] elements of 8 bytes, but 72 bytes come after it"),
-        ([arange(), vec![0]].concat(), "its header says [2, 2, 3] elements of 8 bytes, but 97 bytes come after it"),
+        (arange()[..200].to_vec(), "its header has [2, 2, 3] elements of 8 bytes, but 72 bytes come after it"),
+        ([arange(), vec![0]].concat(), "its header has [2, 2, 3] elements of 8 bytes, but 97 bytes come after it"),
         (arange()[..40].to_vec(), "the header of the array is cut off"),
         (
             npy("<f8", false, "(99999999999, 99999999999, 9)", body),
-            "its header says [99999999999, 99999999999, 9] elements of 8 bytes, but 96 bytes come after it",
+            "its header has [99999999999, 99999999999, 9] elements of 8 bytes, but 96 bytes come after it",
         ),
-        (npy("<c16", false, "(2, 3, 1)", body), "elements `'<c16'` are not read: save plain numbers"),
-        (npy("<f8", false, "(12,)", body), "an array [12] is no [frames, rows, columns]"),
-        (npy("<f8", false, "(2, 2, x)", body), "the shape of the array cannot be read"),
+        (npy("<c16", false, "(2, 3, 1)", body), "elements of type `'<c16'` are not supported: save plain numbers"),
+        (npy("<f8", false, "(12,)", body), "expected an array [frames, rows, columns], found [12]"),
+        (npy("<f8", false, "(2, 2, x)", body), "`shape` of the array is not a list of sizes"),
         (npy("<f8", false, "(0, 2, 3)", &[]), "the array has no frame"),
-        (npy("<f8", false, "(2, 0, 3)", &[]), "an array has at least one row and one column"),
-        (npy("|u1", false, "(24, 2, 2)", body), "frames of 4 bytes are too small to be read"),
-        (npy("<f8", false, "(2, 6)", body), "the file does not say how many rows and columns it has"),
-        (nan(7), "frame 1, row 0, column 1: this cell is no number, but in the first frame it was one: `NaN`"),
+        (npy("<f8", false, "(2, 0, 3)", &[]), "an array needs at least one row and one column"),
+        (npy("|u1", false, "(24, 2, 2)", body), "frames of 4 bytes are too small"),
+        (npy("<f8", false, "(2, 6)", body), "the file does not give its number of rows and columns"),
+        (nan(7), "frame 1, row 0, column 1: this cell is NaN, but it is a number in the first frame: `NaN`"),
         (
             npy("<f8", false, "(2, 2, 3)", &floats(&[1e300; 12])),
             "frame 0, row 0, column 0: this cell is too large: `1e300`",
         ),
-        (npy("|S8", false, "(2, 2, 3)", body), "the elements of the array are no numbers"),
+        (npy("|S8", false, "(2, 2, 3)", body), "the elements of the array are not numbers"),
     ];
     for (bytes, message) in cases {
         let got = complaints(read(&bytes, "a.npy", &hints()));
@@ -150,20 +150,20 @@ fn what_is_wrong_with_an_archive_of_arrays_is_said() {
     };
     let cases = [
         (with("time.npy", &[1.0]), "`time` has 1 numbers, but there are 2 frames"),
-        (with("time.npy", &[1.0, 0.5]), "`time`: 0.5 s of frame 1 is not from 0 to 1e9 s after the first"),
+        (with("time.npy", &[1.0, 0.5]), "`time`: frame 1 at 0.5 s is not from 0 to 1e9 s after the first"),
         (with("force.npy", &[1.0, f64::NAN]), "`force`: `NaN` is not finite"),
-        (with("pitch_mm.npy", &[1.0, 0.0]), "`pitch_mm`: a pitch is one or two numbers greater than 0"),
-        (with("rate_hz.npy", &[0.0]), "`rate_hz`: this is a single number greater than 0"),
-        (with("unit.npy", &[1.0]), "`unit`: a unit is a single text"),
-        (with("rate_hz.npy", &[50.0]), "the file says otherwise: 50 frames a second"),
+        (with("pitch_mm.npy", &[1.0, 0.0]), "`pitch_mm`: expected one or two numbers greater than 0"),
+        (with("rate_hz.npy", &[0.0]), "`rate_hz`: expected a single number greater than 0"),
+        (with("unit.npy", &[1.0]), "`unit`: expected a single text"),
+        (with("rate_hz.npy", &[50.0]), "the file has another value: 50 frames a second"),
         (
             zipped(0, &[("a.npy", &*images), ("b.npy", &*images)]),
-            "no array is called `images`, and several of the others have three axes",
+            "no array is called `images`, and more than one of the others has three axes",
         ),
         (zipped(0, &[("images.npy", &images[..100])]), "the header of the array is cut off"),
         (
             with("time.npy", &[0.0, 0.01])[..500].to_vec(),
-            "the archive is damaged: it has no directory, as if its end were missing",
+            "the archive is damaged: it has no directory: its end may be missing",
         ),
     ];
     for (bytes, message) in cases {
