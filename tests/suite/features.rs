@@ -56,7 +56,7 @@ fn the_graph_behind_it_checks_from_any_folder() {
 fn what_is_wrong_is_told_once_with_a_way_out() {
     let cases: [(&[&str], &str); 9] = [
         (&["features", "nowhere.csv"], "cannot read `nowhere.csv`: No such file"),
-        (&["features", "Cargo.toml"], "`Cargo.toml` is no recording of a known format: it begins with `[workspace]`"),
+        (&["features", "Cargo.toml"], "`Cargo.toml` has an unknown format: it begins with `[workspace]`"),
         (&["features", PRESS, "--pitch-mm", "5"], "expected two numbers, as 5x5"),
         (&["features", PRESS, "--pitch-mm", "0x5"], "expected two numbers greater than 0"),
         (&["features", PRESS, "--rate-hz", "0"], "`0` is not a number greater than 0"),

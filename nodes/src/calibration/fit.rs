@@ -352,7 +352,7 @@ mod tests {
 
         #[test]
         fn pooled_neighbours_are_the_nearest_that_rise(numbers in prop::collection::vec(-5.0..5.0f64, 1..12)) {
-            // The closed form: the greatest of the least means of all stretches that begin and end around each.
+            // The closed form: the maximum over starts of the minimum over ends of the mean of each range around a number.
             let mean = |from: usize, to: usize| numbers[from..=to].iter().sum::<f64>() / (to + 1 - from) as f64;
             for (i, number) in rising(&numbers).into_iter().enumerate() {
                 let least = |from: usize| (i..numbers.len()).map(|to| mean(from, to)).fold(f64::INFINITY, f64::min);

@@ -141,8 +141,8 @@ mod tests {
             (&[0.0], "u"),
         ];
         for (force, expected) in cases {
-            let said: String = log(force).is_loading(0.3).iter().map(|up| if *up { 'u' } else { 'd' }).collect();
-            assert_eq!(said, expected, "{force:?}");
+            let shown: String = log(force).is_loading(0.3).iter().map(|up| if *up { 'u' } else { 'd' }).collect();
+            assert_eq!(shown, expected, "{force:?}");
         }
     }
 
@@ -150,8 +150,8 @@ mod tests {
     fn a_log_that_cannot_be_used_says_why() {
         assert_eq!(log(&[0.0, 0.0, 0.0, 1.0, 5.0, 0.0]).check(), Ok(()));
         let cases = [
-            (log(&[0.0; 9]), "its force goes from 0 N to 0 N"),
-            (log(&[0.0, 0.0, 0.0, -5.0]), "its force goes from -5 N to 0 N"),
+            (log(&[0.0; 9]), "its force is from 0 N to 0 N"),
+            (log(&[0.0, 0.0, 0.0, -5.0]), "its force is from -5 N to 0 N"),
             (log(&[0.0, 0.0, f64::NAN]), "the force of frame 3 is not a finite number"),
             (log(&[0.0, 0.0, 1.0]), "only 2 of its frames are unloaded (below 1 % of 1 N)"),
         ];

@@ -200,8 +200,8 @@ impl<'l> Samples<'l> {
         let live: Vec<usize> = (0..responses.len()).filter(|i| !self.answers[*i].is_dead).collect();
         let size = |i: &usize| responses[*i].abs();
         let part = |i: &usize| size(i) / self.answers[*i].response;
-        let greatest = |of: &dyn Fn(&usize) -> f64| live.iter().map(of).fold(0.0, f64::max);
-        let (most, best) = (greatest(&size), greatest(&part));
+        let maximum = |of: &dyn Fn(&usize) -> f64| live.iter().map(of).fold(0.0, f64::max);
+        let (most, best) = (maximum(&size), maximum(&part));
         let pressed = live.iter().filter(|i| size(i) >= MIN_PRESSED * most && part(i) >= MIN_ALIKE * best).count();
         pressed > 1 && 2 * pressed > live.len()
     }
@@ -226,10 +226,10 @@ impl<'l> Samples<'l> {
 
     /// Marks the dead tactels.
     fn mark_dead(&mut self, dead_below: Option<f64>) {
-        let greatest = self.answers.iter().fold(0.0, |greatest: f64, answer| greatest.max(answer.response));
+        let maximum = self.answers.iter().fold(0.0, |maximum: f64, answer| maximum.max(answer.response));
         for answer in &mut self.answers {
-            let least = dead_below.unwrap_or_else(|| (MIN_LIVE_RESPONSE * greatest).max(4.0 * answer.noise));
-            answer.is_dead = answer.response <= 0.0 || answer.response < least;
+            let minimum = dead_below.unwrap_or_else(|| (MIN_LIVE_RESPONSE * maximum).max(4.0 * answer.noise));
+            answer.is_dead = answer.response <= 0.0 || answer.response < minimum;
         }
         for i in self.logs.iter().flat_map(|log| &log.absent) {
             self.answers[*i].is_dead = true;

@@ -216,7 +216,7 @@ mod tests {
     }
 
     #[test]
-    fn the_same_written_otherwise_reads_the_same() {
+    fn equivalent_notations_give_the_same_recording() {
         let hints = Hints { rate_hz: Some(1000.0 / 7.94), ..Hints::default() };
         let good = read(GOOD.as_bytes(), "", &hints).unwrap();
         let body = |text: &str| text.replace("\r\n", "\n");
@@ -246,7 +246,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_wrong_is_said_where_it_is() {
+    fn a_mistake_has_its_line_and_message() {
         let good = GOOD.replace("\r\n", "\n");
         let cases = [
             ("Frame 0", "Fram 0", 2, "this row of cells comes before the line of its frame"),
@@ -280,7 +280,7 @@ mod tests {
     }
 
     #[test]
-    fn damage_is_refused_or_read_soundly() {
+    fn a_damaged_file_is_refused_or_gives_a_sound_recording() {
         let refused = count_refused(&[GOOD.as_bytes()], "", &Hints::default(), 2000);
         assert!((1000..2000).contains(&refused), "{refused}");
     }

@@ -456,7 +456,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_wrong_is_said_where_it_is() {
+    fn a_mistake_has_its_line_and_message() {
         let cases = [
             ("mmHg,,\n,", "stones,,\n,", 3, "the unit `stones` is unknown"),
             ("FRAME,1466", "FRAME,1464", 39, "frame 1464 comes after frame 1464"),
@@ -476,7 +476,7 @@ mod tests {
     }
 
     #[test]
-    fn damage_is_refused_or_read_soundly() {
+    fn a_damaged_file_is_refused_or_gives_a_sound_recording() {
         for (good, hints) in [(PAIR, left()), (MAT, Hints::default())] {
             let refused = count_refused(&[good.as_bytes()], "", &hints, 1000);
             assert!((300..1000).contains(&refused), "{refused}");

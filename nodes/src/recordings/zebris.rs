@@ -350,7 +350,7 @@ y2\t0.00\t0.00\t0.00
     }
 
     #[test]
-    fn the_same_written_otherwise_reads_the_same() {
+    fn equivalent_notations_give_the_same_recording() {
         let good = read(GOOD.as_bytes(), "", &Hints::default()).unwrap();
         let latin = |text: &str| text.chars().map(|c| c as u8).collect::<Vec<u8>>();
         let wide = |text: &str| text.encode_utf16().flat_map(u16::to_le_bytes).collect::<Vec<u8>>();
@@ -376,7 +376,7 @@ y2\t0.00\t0.00\t0.00
     }
 
     #[test]
-    fn what_is_wrong_is_said_where_it_is() {
+    fn a_mistake_has_its_line_and_message() {
         let cases = [
             ("Lines\t2", "Lines\t0", 20, "`Lines` must be at least 1"),
             ("Lines\t2", "Lines\t99999", 20, "an array of 99999 by 3 has more than 262144 cells"),
@@ -407,7 +407,7 @@ y2\t0.00\t0.00\t0.00
     }
 
     #[test]
-    fn damage_is_refused_or_read_soundly() {
+    fn a_damaged_file_is_refused_or_gives_a_sound_recording() {
         let refused = count_refused(&[GOOD.as_bytes()], "", &Hints::default(), 2000);
         assert!((1000..2000).contains(&refused), "{refused}");
     }

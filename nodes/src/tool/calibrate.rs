@@ -123,8 +123,8 @@ fn make(args: &Calibrate, shell: &Shell) -> Result<(), Failure> {
         return Err("`--bearing` needs `--load uniform`: the force of a probe is on one tactel".to_owned().into());
     }
     // Before the long calculation.
-    args.out.as_deref().map_or(Ok(()), |path| may_replace(path, "calibration file", file::is_calibration))?;
-    args.svg.as_deref().map_or(Ok(()), |path| may_replace(path, "SVG picture", |text| text.contains("<svg")))?;
+    args.out.as_deref().map_or(Ok(()), |path| may_replace(path, "a calibration file", file::is_calibration))?;
+    args.svg.as_deref().map_or(Ok(()), |path| may_replace(path, "an SVG picture", |text| text.contains("<svg")))?;
     let logs = args.logs.iter().map(|path| read(path, args)).collect::<Result<Vec<Log>, Failure>>()?;
     for (path, log) in args.logs.iter().zip(&logs) {
         let (first, describe) = (&logs[0], |log: &Log| format!("{} x {} tactels in {}", log.rows, log.cols, log.unit));

@@ -57,7 +57,7 @@ pub(super) fn run(args: Press, shell: &Shell) -> u8 {
         shell.error(format_args!("a simulated pad has at most {MAX_TACTELS} tactels, not {rows} by {cols}"));
         return NOT_LOADED;
     }
-    let done = may_replace(&args.out, "press log", |text| text.starts_with("time,force,t0_0"))
+    let done = may_replace(&args.out, "a log of `press`", |text| text.starts_with("time,force,t0_0"))
         .and_then(|()| write(&args).map_err(|error| format!("cannot write `{}`: {error}", args.out.display())));
     match done {
         Ok(frames) => {

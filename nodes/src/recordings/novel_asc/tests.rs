@@ -1,4 +1,4 @@
-//! novel's text against files written here from a known pressure, with the forces as the oracle, and damaged copies.
+//! Tests of novel's text: files of a known pressure with the forces as the oracle, and damaged copies.
 
 use std::fmt::Write as _;
 
@@ -54,7 +54,7 @@ fn parse(text: &str) -> Result<Recording, Refusal> {
 }
 
 #[test]
-fn a_small_mat_in_any_dress() {
+fn a_small_mat_in_every_notation() {
     let recording = parse(SMALL).unwrap();
     let ImageShape { rows, cols, pitch, unit } = recording.shape.clone();
     assert_eq!((rows, cols, pitch, unit.to_string().as_str()), (2, 3, [0.005, 0.01], "kPa"));
@@ -135,7 +135,7 @@ fn large(pressures: &[(usize, f64)]) -> String {
 }
 
 #[test]
-fn a_large_mat_lies_as_its_corners_say() {
+fn the_corners_give_the_layout_of_a_large_mat() {
     let recording = parse(&large(&[(0, 10.0), (1, 13.333), (29, 55.0), (811, 11.667)])).unwrap();
     assert_eq!((recording.shape.rows, recording.shape.cols, recording.dead.len()), (29, 28, 0));
     assert!((recording.shape.pitch[0] - 0.00528).abs() < 1e-9 && (recording.shape.pitch[1] - 0.01028).abs() < 1e-9);
@@ -177,7 +177,7 @@ fn an_insole_is_refused_with_a_reason() {
 }
 
 #[test]
-fn damaged_files_say_what_and_where() {
+fn a_damaged_file_has_its_line_and_message() {
     let cases: &[(&str, &str, usize, &str)] = &[
         ("0.04000", "0", 3, "`time per frame [secs]:` must be greater than 0"),
         ("0.04000", "x", 3, "`time per frame [secs]:` is not a number: `x`"),
@@ -211,14 +211,14 @@ fn damaged_files_say_what_and_where() {
     assert_eq!(complaints(parse(&moved)), [(36, "two sensors have the same place".into())]);
     let end = SMALL.find("\nx[c]").unwrap();
     for cut in 0..end {
-        // Of the last number, 2.0000, nothing is missing from its first digit on.
+        // The last number, 2.0000, has the same value from its first digit on.
         let is_number = cut + 6 > end;
         assert!(is_number || !complaints(parse(&SMALL[..cut])).is_empty(), "cut after {cut} bytes");
     }
 }
 
 #[test]
-fn no_damage_makes_it_panic() {
+fn no_damage_causes_a_panic() {
     let large = large(&[(0, 10.0), (400, 20.0)]);
     let refused = count_refused(&[SMALL.as_bytes(), large.as_bytes()], "mat.asc", &Hints::default(), 4000);
     assert!(refused > 1500, "{refused} of 4000 were seen to be damaged");

@@ -1,4 +1,4 @@
-//! novel's listing against the shipped recording, whose forces are the oracle, and damaged copies of a small one.
+//! Tests of novel's listing: the shipped recording with its forces as the oracle, and damaged copies of a small one.
 
 use super::*;
 use crate::recordings::testing::{check_damages, complaints, count_refused};
@@ -48,7 +48,7 @@ fn parse(text: &str) -> Result<Recording, Refusal> {
     read(text.as_bytes(), &Hints::default())
 }
 
-/// The shipped recording as the text that it is.
+/// Returns the text of the shipped recording.
 fn emed() -> String {
     let (bytes, _) = crate::recordings::archive::unpack(EMED, "emed_test.zip", &Hints::default()).unwrap().unwrap();
     text::decode(&bytes).into_owned()
@@ -95,7 +95,7 @@ fn the_whole_recording_agrees_with_its_own_forces() {
 }
 
 #[test]
-fn a_small_listing_in_any_dress() {
+fn a_small_listing_in_every_notation() {
     let recording = parse(SMALL).unwrap();
     let mut image = [f32::NAN; 20];
     recording.show(0, &mut image);
@@ -103,7 +103,7 @@ fn a_small_listing_in_any_dress() {
     assert_eq!(image, *first.as_flattened(), "five rows of four");
     recording.show(1, &mut image);
     assert_eq!((image[1], image.iter().sum::<f32>()), (40.0, 40.0));
-    assert_eq!(recording.frames.len(), 2, "a mean over time is no picture");
+    assert_eq!(recording.frames.len(), 2, "a mean over time is not a picture");
     let latin: Vec<u8> = SMALL.chars().map(|c| c as u8).collect();
     let same = [
         latin,
@@ -143,7 +143,7 @@ fn a_small_listing_in_any_dress() {
 }
 
 #[test]
-fn the_forces_tell_newtons_per_square_centimetre() {
+fn the_forces_show_newtons_per_square_centimetre() {
     let forces = [("\t0.25\n", "\t2.50\n"), ("\t0.63\n", "\t6.25\n"), ("\t0.06\n", "\t0.63\n")];
     let more = [
         ("0.38\t0.56\t0.94", "3.75\t5.63\t9.38"),
@@ -157,7 +157,7 @@ fn the_forces_tell_newtons_per_square_centimetre() {
 }
 
 #[test]
-fn another_measurement_goes_on_where_the_last_one_ended() {
+fn a_second_measurement_continues_the_count() {
     let again = SMALL.replace("Page 1", "Page 4").replace("Page 2", "Page 5").replace("Page 3", "Page 6");
     let recording = parse(&format!("{SMALL}{again}")).unwrap();
     let frames: Vec<_> = recording.frames.iter().map(|frame| (frame.number, frame.time / 1_000_000)).collect();
@@ -165,7 +165,7 @@ fn another_measurement_goes_on_where_the_last_one_ended() {
 }
 
 #[test]
-fn damaged_files_say_what_and_where() {
+fn a_damaged_file_has_its_line_and_message() {
     let cases: &[(&str, &str, usize, &str)] = &[
         ("Matrix: 4x5", "Matrix: 2x5", 11, "column 3 is outside the array of 5 rows and 2 columns"),
         ("Matrix: 4x5", "Matrix: 4 by 5", 4, "expected `columns x rows` after `Matrix:`, found `4 by 5`"),
@@ -214,14 +214,14 @@ fn damaged_files_say_what_and_where() {
     let whole = SMALL.find("\u{c}\n\n\t\t\t\tPage 3").unwrap();
     let ends: Vec<usize> = SMALL.match_indices("\u{c}").map(|(at, _)| at).collect();
     for cut in (0..whole).filter(|cut| SMALL.is_char_boundary(*cut)) {
-        // From the last digit of a page on no cell is missing, and a listing does not say how many pages it has.
+        // After the last digit of a page no cell is missing, and a listing does not give its number of pages.
         let is_end = ends.iter().any(|end| (end - 4..=end + 7).contains(&cut));
         assert!(is_end || !flaws(&SMALL[..cut]).is_empty(), "cut after {cut} bytes");
     }
 }
 
 #[test]
-fn no_damage_makes_it_panic() {
+fn no_damage_causes_a_panic() {
     let text = emed();
     let three = text.find("\t\t\t\tPage 4").unwrap();
     let part: Vec<u8> = text[..three].trim_end().chars().map(|c| c as u8).collect();

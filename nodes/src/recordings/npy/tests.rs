@@ -1,4 +1,4 @@
-//! Arrays byte by byte, as numpy 2 writes them.
+//! Tests of arrays, byte by byte as numpy 2 writes them.
 
 use proptest::prelude::*;
 use tactflow_runtime::signal::{Base, Unit};
@@ -6,7 +6,7 @@ use tactflow_runtime::signal::{Base, Unit};
 use super::super::testing::{complaints, count_refused, zipped};
 use super::super::{Hints, Refusal, read};
 
-/// An `.npy` of version 1 with that header and those bytes; as numpy does, the header ends at a multiple of 64.
+/// Returns an `.npy` of version 1. As in numpy, the header ends at a multiple of 64 bytes.
 pub(in super::super) fn npy(element: &str, is_fortran: bool, shape: &str, data: &[u8]) -> Vec<u8> {
     let order = if is_fortran { "True" } else { "False" };
     let mut header = format!("{{'descr': '{element}', 'fortran_order': {order}, 'shape': {shape}, }}");
@@ -53,7 +53,7 @@ fn an_array_of_any_type_and_order_is_the_same_recording() {
     assert_eq!(good.cells, (0..12).map(|i| i as f32).collect::<Vec<_>>());
     assert_eq!(good.frames[1].time, 10_000_000);
     let each = |bytes: Encode| (0..12).flat_map(bytes).collect::<Vec<u8>>();
-    // The first axis fastest: frame, row and column of place p are p % 2, p / 2 % 2 and p / 4.
+    // The first axis runs fastest: frame, row and column of position p are p % 2, p / 2 % 2 and p / 4.
     let fortran =
         |bytes: Encode| (0..12).flat_map(|p: u8| bytes(6 * (p % 2) + 3 * (p / 2 % 2) + p / 4)).collect::<Vec<u8>>();
     let cases: [(&str, Encode); 12] = [
@@ -67,7 +67,7 @@ fn an_array_of_any_type_and_order_is_the_same_recording() {
         ("<i4", |v| i32::from(v).to_le_bytes().into()),
         (">u4", |v| u32::from(v).to_be_bytes().into()),
         ("<i8", |v| i64::from(v).to_le_bytes().into()),
-        // The halves of 0 to 11: an exponent of 15 stands for 1.
+        // Halves from 0 to 11: an exponent of 15 is a factor of 1.
         ("<f2", |v| match v {
             0 => vec![0, 0],
             _ => ((15 + v.ilog2() as u16) << 10 | (u16::from(v) << (10 - v.ilog2())) & 1023).to_le_bytes().into(),
@@ -92,7 +92,7 @@ fn small_integers_keep_their_sign() {
 }
 
 #[test]
-fn an_archive_says_what_an_array_cannot() {
+fn an_archive_gives_unit_pitch_and_times() {
     for method in [0, 8] {
         let recording = read(&archive(method), "a.npz", &Hints::default()).unwrap();
         assert_eq!((recording.format, recording.shape.unit), ("npz", Unit::of(Base::Kilopascal)));
@@ -106,7 +106,7 @@ fn an_archive_says_what_an_array_cannot() {
 }
 
 #[test]
-fn what_is_wrong_with_an_array_is_said() {
+fn a_mistake_in_an_array_has_its_message() {
     let body = &arange()[128..].to_vec();
     let nan = |at: usize| {
         let mut values: Vec<f64> = (0..12).map(f64::from).collect();
@@ -142,7 +142,7 @@ fn what_is_wrong_with_an_array_is_said() {
 }
 
 #[test]
-fn what_is_wrong_with_an_archive_of_arrays_is_said() {
+fn a_mistake_in_an_archive_of_arrays_has_its_message() {
     let images = arange();
     let with = |name: &str, values: &[f64]| {
         let shape = format!("({},)", values.len());
@@ -172,14 +172,14 @@ fn what_is_wrong_with_an_archive_of_arrays_is_said() {
 }
 
 #[test]
-fn a_nan_throughout_is_no_tactel() {
+fn a_cell_that_is_always_nan_is_dead() {
     let values = [f64::NAN, 1.0, 2.0, f64::NAN, 4.0, 5.0];
     let recording = read(&npy("<f8", false, "(2, 1, 3)", &floats(&values)), "", &hints()).unwrap();
     assert_eq!((&*recording.dead, &*recording.cells), (&[0][..], &[0.0, 1.0, 2.0, 0.0, 4.0, 5.0][..]));
 }
 
 #[test]
-fn damage_is_refused_or_read_soundly() {
+fn a_damaged_file_is_refused_or_gives_a_sound_recording() {
     let (plain, packed) = (arange(), archive(8));
     let refused = count_refused(&[&plain, &packed], "", &hints(), 4000);
     assert!((1000..4000).contains(&refused), "{refused}");
@@ -187,9 +187,9 @@ fn damage_is_refused_or_read_soundly() {
 }
 
 proptest! {
-    /// All halves against the definition of IEEE 754, in powers of two.
+    /// Compares all halves with the definition of IEEE 754.
     #[test]
-    fn a_half_is_what_the_standard_says(bits: u16) {
+    fn a_half_has_its_ieee_value(bits: u16) {
         let value = super::array::half(bits);
         let (exponent, fraction) = (i32::from(bits >> 10 & 31), f64::from(bits & 1023) / 1024.0);
         let two = |power: i32| libm::pow(2.0, power.into());

@@ -141,7 +141,7 @@ impl<'t> Keys<'t> {
         }
         let (unit, factor) = unit?;
         let shape = ImageShape { rows, cols, pitch: [x?, y?], unit };
-        // The sensor's own filter counts, whatever the values were turned into.
+        // The threshold of the sensor's own filter is in raw counts.
         let threshold = threshold.filter(|_| unit == Unit::RAW);
         Some(Header { shape, factor, start_frame, end_frame, threshold, period, mark })
     }

@@ -1,4 +1,4 @@
-//! The format of Tekscan against the shipped recording and damaged copies of it.
+//! Tests of Tekscan's format: the shipped recording and damaged copies of it.
 
 use super::*;
 use crate::recordings::testing::{check_damages, complaints, count_refused};
@@ -55,7 +55,7 @@ fn the_whole_recording_agrees_with_its_own_sums() {
 }
 
 #[test]
-fn a_small_movie_in_any_dress() {
+fn a_small_movie_in_every_notation() {
     let movie = parse(SMALL).unwrap();
     assert_eq!(movie.cells, [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 0.0, 0.0, 0.0, 0.0, 0.0, 7.0]);
     let frames: Vec<_> = movie.frames.iter().map(|frame| (frame.number, frame.time, frame.start)).collect();
@@ -104,7 +104,7 @@ fn a_small_movie_in_any_dress() {
 }
 
 #[test]
-fn an_insole_that_only_numbers_its_frames() {
+fn an_insole_with_numbers_but_no_times() {
     let text = SMALL.replace(", 0,, 12/2/2019 6:21:52.34PM,,,Raw Sum=,,15", "");
     let text = text.replace(", 0.1,, 12/2/2019 6:21:52.44PM,,,Raw Sum=,,7", "").replace("UNITS raw", "UNITS KPa");
     let movie = parse(&text.replace("FRAME 0.1", "FRAME 0.032")).unwrap();
@@ -129,7 +129,7 @@ fn pressures_become_kpa_and_forces_newtons() {
 }
 
 #[test]
-fn hints_fill_gaps_and_contradict_nothing() {
+fn hints_fill_gaps_and_must_agree() {
     let unsaid = SMALL.replace("UNITS raw\n", "").replace("COL_SPACING 4 millimeters\n", "");
     let hints = Hints { unit: Some(Unit::RAW), pitch: Some([0.004, 0.0127]), ..Hints::default() };
     assert_eq!(read(unsaid.as_bytes(), &hints), parse(SMALL));
@@ -145,7 +145,7 @@ fn hints_fill_gaps_and_contradict_nothing() {
 }
 
 #[test]
-fn damaged_files_say_what_and_where() {
+fn a_damaged_file_has_its_line_and_message() {
     let huge = "9".repeat(30);
     let cases: &[(&str, &str, usize, &str)] = &[
         ("ROWS 2\n", "", 10, "the header has no `ROWS`"),
@@ -219,7 +219,7 @@ fn damaged_files_say_what_and_where() {
 }
 
 #[test]
-fn no_damage_makes_it_panic() {
+fn no_damage_causes_a_panic() {
     let start = FINGER.find("\nFrame 4,").unwrap();
     let movie = format!("{}@@\n", &FINGER[..start]).replace("END_FRAME 309", "END_FRAME 3");
     assert_eq!(parse(&movie).unwrap().frames.len(), 3);
