@@ -40,7 +40,7 @@ fn the_shipped_calibration_is_what_the_tool_makes_of_the_pads_press_log() {
     // What is something else is not replaced.
     fs::write(path("notes.csv"), "mine").unwrap();
     let refused = say(&["press", "-o", &path("notes.csv")]);
-    assert!(refused.code == 2 && refused.err.contains("is no press log"), "{}", refused.err);
+    assert!(refused.code == 2 && refused.err.contains("is not a log of `press`"), "{}", refused.err);
 }
 
 #[test]

@@ -1,23 +1,23 @@
-//! The curves of all tactels as a picture, like Fig. 1 of the paper: the reference force over the reading.
+//! Draws the curves of all tactels, like Fig. 1 of the paper: the reference force over the reading.
 //!
-//! SVG, written by hand: a few lines and words need no crate. The colours are of middle brightness and there is no
-//! background, so that it reads on light and dark pages alike.
+//! The SVG is written directly: a few lines and words need no library (docs/decisions/018). The colours have a medium
+//! brightness and there is no background, so the picture is readable on light and on dark pages.
 
 use std::fmt::Write;
 
 use super::report::{Report, State};
 
-/// Size of the picture and of the frame in it.
+/// Size of the picture, and corners of the frame in it [px].
 const SIZE: [f64; 2] = [720.0, 480.0];
 const FRAME: [[f64; 2]; 2] = [[64.0, 36.0], [704.0, 424.0]];
 
-/// The most tactels that are drawn; of more, every second, third, …
-const MOST_DRAWN: usize = 1024;
+/// Maximum number of tactels that are drawn; of more, every second, third, …
+const MAX_DRAWN: usize = 1024;
 
-/// Points of the mean.
+/// Number of points of the mean curve.
 const POINTS: usize = 48;
 
-/// A linear scale along one axis: what lies at the ends of the frame.
+/// A linear scale along one axis: the values at the ends of the frame.
 #[derive(Debug, Clone, Copy)]
 struct Scale {
     from: f64,
@@ -31,7 +31,7 @@ impl Scale {
         low + (value - self.from) / (self.to - self.from) * (high - low)
     }
 
-    /// Round numbers, four to nine of them.
+    /// Returns four to nine round numbers.
     fn ticks(&self) -> Vec<f64> {
         let raw = (self.to - self.from) / 5.0;
         let power = (-12..12).map(|k| libm::pow(10.0, f64::from(k))).take_while(|power| *power <= raw).last();
@@ -42,19 +42,19 @@ impl Scale {
     }
 }
 
-/// The picture of a calibration: each tactel's branches thin, the mean of the fitted curves thick.
+/// Returns the picture of a calibration: each tactel's branches thin, the mean of the fitted curves thick.
 #[must_use]
 pub fn svg(report: &Report) -> String {
     let calibration = &report.calibration;
     let good: Vec<usize> = (0..report.findings.len()).filter(|i| report.findings[*i].state == State::Good).collect();
     let branches: Vec<Vec<[f64; 2]>> =
-        good.iter().step_by(good.len().div_ceil(MOST_DRAWN).max(1)).flat_map(|i| lines(report, *i)).collect();
+        good.iter().step_by(good.len().div_ceil(MAX_DRAWN).max(1)).flat_map(|i| lines(report, *i)).collect();
     let mean = mean(report, &good);
     let readings = branches.iter().flatten().chain(&mean).map(|point| point[0]);
-    let (least, most) = readings.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| (a.min(x), b.max(x)));
-    // From zero, unless that would press all curves to one side.
-    let from = if least > 0.0 && least < 0.5 * most { 0.0 } else { least };
-    let x = Scale { from, to: (from + 1.02 * (most - from)).max(from + 1e-9), pixels: [FRAME[0][0], FRAME[1][0]] };
+    let (min, max) = readings.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| (a.min(x), b.max(x)));
+    // From zero, unless all curves would be on one side.
+    let from = if min > 0.0 && min < 0.5 * max { 0.0 } else { min };
+    let x = Scale { from, to: (from + 1.02 * (max - from)).max(from + 1e-9), pixels: [FRAME[0][0], FRAME[1][0]] };
     let y = Scale { from: 0.0, to: 1.04 * report.most, pixels: [FRAME[1][1], FRAME[0][1]] };
     let mut svg = format!(
         "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {} {}\" font-family=\"sans-serif\" font-size=\"13\">\n\
@@ -78,7 +78,7 @@ pub fn svg(report: &Report) -> String {
     svg
 }
 
-/// What a tactel read under which force: force rising, then falling.
+/// Returns the branches of a tactel: force rising, then falling.
 fn lines(report: &Report, i: usize) -> Vec<Vec<[f64; 2]>> {
     let (finding, tactel) = (&report.findings[i], &report.calibration.tactels[i]);
     let (Some(points), Some(tactel)) = (&finding.points, tactel) else { return Vec::new() };
@@ -87,7 +87,7 @@ fn lines(report: &Report, i: usize) -> Vec<Vec<[f64; 2]>> {
     points.branches().map(|branch| branch.into_iter().map(place).collect()).into()
 }
 
-/// The mean over all tactels of what the fitted curves say of their readings, force by force.
+/// Returns the mean over all tactels of the readings on the fitted curves, force by force.
 fn mean(report: &Report, good: &[usize]) -> Vec<[f64; 2]> {
     let mut mean = Vec::new();
     for k in 0..=POINTS {
@@ -96,7 +96,7 @@ fn mean(report: &Report, good: &[usize]) -> Vec<[f64; 2]> {
         for i in good {
             let (finding, tactel) = (&report.findings[*i], &report.calibration.tactels[*i]);
             let (Some(points), Some(tactel)) = (&finding.points, tactel) else { continue };
-            // A mean of some would jump where one of the others ends.
+            // A mean over a few tactels would jump where one of the curves ends.
             if force <= 1.01 * points.most {
                 sum +=
                     f64::from(tactel.offset) + f64::from(finding.sign) * tactel.curve.reading(force.min(points.most));
@@ -138,7 +138,7 @@ fn axes(svg: &mut String, x: Scale, y: Scale, along: &str, up: &str) {
     put(svg, format_args!("<text {turn} fill=\"#888888\">{up}</text>"));
 }
 
-/// A number without the dust of binary fractions.
+/// Formats a number without the rounding errors of binary fractions.
 fn number(value: f64) -> String {
     format!("{}", (value * 1e6).round() / 1e6 + 0.0)
 }
@@ -148,7 +148,7 @@ fn text(svg: &mut String, [x, y]: [f64; 2], anchor: &str, words: &str) {
 }
 
 fn put(svg: &mut String, line: std::fmt::Arguments<'_>) {
-    writeln!(svg, "{line}").expect("a string takes all");
+    writeln!(svg, "{line}").expect("writing to a string cannot fail");
 }
 
 #[cfg(test)]

@@ -99,8 +99,8 @@ fn hints(params: &Params) -> Result<Hints, Mistakes> {
         && !recordings::FORMATS.iter().any(|known| known.name == format)
     {
         let names: Vec<String> = recordings::FORMATS.iter().map(|format| format!("`{}`", format.name)).collect();
-        let mistake = Mistake::param("format", format!("`{format}` is no format that can be read here"));
-        return Err(mistake.help(format!("formats are {}", names.join(", "))).into());
+        let mistake = Mistake::param("format", format!("unknown format `{format}`"));
+        return Err(mistake.help(format!("known formats are {}", names.join(", "))).into());
     }
     Ok(Hints {
         assumed: None,
@@ -122,7 +122,7 @@ fn mistakes(refusal: Refusal, file: &FilePath, bytes: &[u8]) -> Mistakes {
             let line = head.text.lines().map(str::trim).find(|line| !line.is_empty());
             let begins = line.map(|line| format!("it begins with `{}`", recordings::text::shortened(line)));
             let begins = begins.unwrap_or_else(|| "it is empty".into());
-            let message = format!("`{name}` is no recording of a known format: {begins}");
+            let message = format!("`{name}` has an unknown format: {begins}");
             here(message).help(recordings::list()).into()
         }
         Refusal::Damaged { text, flaws } => {

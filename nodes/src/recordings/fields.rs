@@ -1,8 +1,8 @@
-//! Rows of a table whose fields may be in quotes.
+//! Rows of a table with optionally quoted fields.
 
 use super::text::Piece;
 
-/// The fields of a line, without the blanks and quotes around them.
+/// The fields of a line, without surrounding blanks and quotes.
 #[derive(Debug, Clone)]
 pub(super) struct Fields<'t> {
     rest: Option<Piece<'t>>,
@@ -10,7 +10,7 @@ pub(super) struct Fields<'t> {
 }
 
 impl<'t> Fields<'t> {
-    /// Parts a line.
+    /// Splits a line at a separator.
     pub(super) const fn new(line: Piece<'t>, separator: char) -> Self {
         Self { rest: Some(line), separator }
     }
@@ -41,7 +41,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn fields_are_parted_as_the_line_is() {
+    fn a_line_is_split_into_fields() {
         let cases: [(&str, char, &[&str]); 9] = [
             ("1,2,3", ',', &["1", "2", "3"]),
             ("1;2,5;3;", ';', &["1", "2,5", "3", ""]),

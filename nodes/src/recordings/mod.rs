@@ -1,8 +1,8 @@
-//! Files of tactile and pressure sensors, read: bytes in, a [`Recording`] or a [`Refusal`] out.
+//! Readers for files of tactile and pressure sensors: bytes in, a [`Recording`] or a [`Refusal`] out.
 //!
-//! A format is one file here and one line in [`FORMATS`]. Nothing in this module opens a file or knows a device. What a
-//! file does not say, [`Hints`] may; where both say something, they must agree. Nothing is allocated from a number in
-//! a header before the file is seen to hold as much, and nothing is mended silently.
+//! A format is one file here and one line in [`FORMATS`]. Nothing in this module opens a file or knows a device.
+//! [`Hints`] give what a file does not; where both give a value, they must agree. Memory follows the bytes that are in
+//! the file, never a number in a header. No mistake is repaired silently.
 
 mod archive;
 mod csv;
@@ -28,7 +28,7 @@ use tactflow_runtime::signal::ImageShape;
 pub use hints::{Assumed, Hints};
 pub use text::Flaw;
 
-/// Every format that is read: one line each, those that are sure of themselves first.
+/// All formats, those with the strictest recognition first.
 pub const FORMATS: &[Format] = &[
     npy::NPY,
     npy::NPZ,
@@ -41,47 +41,47 @@ pub const FORMATS: &[Format] = &[
     csv::FORMAT,
 ];
 
-/// The most cells of an array of which a file holds only windows.
-pub const MOST_CELLS: usize = 1 << 18;
+/// Maximum number of cells of an array.
+pub const MAX_CELLS: usize = 1 << 18;
 
-/// How much of a file [`recognise`] looks at.
-pub const HEAD: usize = 1 << 16;
+/// Number of bytes at the start of a file that [`recognise`] looks at.
+pub const HEAD_BYTES: usize = 1 << 16;
 
-/// A way to write a recording down.
+/// A file format of recordings.
 #[derive(Debug)]
 pub struct Format {
-    /// What a bench file calls it.
+    /// Name in a bench file.
     pub name: &'static str,
-    /// What people call it, with the endings of its files.
+    /// Title with the usual file endings.
     pub title: &'static str,
-    /// Whether a file that begins so is one.
+    /// Whether a file with this beginning has the format.
     pub recognises: fn(&Head<'_>) -> bool,
-    /// Reads the whole of it.
+    /// Reads a whole file.
     pub read: fn(&[u8], &Hints) -> Result<Recording, Refusal>,
 }
 
-/// How a file begins.
+/// The beginning of a file.
 #[derive(Debug)]
 pub struct Head<'b> {
-    /// Its first bytes, at most [`HEAD`].
+    /// The first bytes, at most [`HEAD_BYTES`].
     pub bytes: &'b [u8],
-    /// The same as text; what is cut off at the end may be garbled.
+    /// The same bytes as text; the last character may be garbled.
     pub text: String,
-    /// The ending of its name in lower case, without the dot; empty if there is none.
+    /// The ending of the file's name in lower case, without the dot; empty if there is none.
     pub ending: String,
 }
 
 impl<'b> Head<'b> {
-    /// How a file of that name begins.
+    /// Returns the beginning of the file `name`.
     #[must_use]
     pub fn new(bytes: &'b [u8], name: &str) -> Self {
-        let bytes = &bytes[..bytes.len().min(HEAD)];
+        let bytes = &bytes[..bytes.len().min(HEAD_BYTES)];
         let ending = name.rsplit_once('.').map_or_else(String::new, |(_, ending)| ending.to_lowercase());
         Self { bytes, text: text::decode(bytes).into_owned(), ending }
     }
 }
 
-/// A recording: what a pad gave, frame by frame.
+/// A recording of a pad, frame by frame.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Recording {
     /// Name of its format.
@@ -94,55 +94,55 @@ pub struct Recording {
     pub cells: Vec<f32>,
     /// Index in the whole array of each cell that does not exist, in order.
     pub dead: Vec<usize>,
-    /// Greatest value that the sensor's own filter takes for noise, in the unit of the cells.
+    /// Maximum value that the sensor's own filter treats as noise, in the unit of the cells.
     pub threshold: Option<f64>,
     /// Nominal time between two frames [s].
     pub period: f64,
-    /// Force that was measured beside the pad, one a frame [N].
+    /// Force that another sensor measured, one value a frame [N].
     pub force: Option<Vec<f64>>,
 }
 
-/// One frame.
+/// One frame of a recording.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Frame {
-    /// Its number in the file.
+    /// Number in the file.
     pub number: u64,
-    /// Its time from the start of the recording [ns].
+    /// Time from the start of the recording [ns].
     pub time: i64,
-    /// The part of the array that the file holds; there is nothing outside.
+    /// The part of the array that the file holds; all cells outside are 0.
     pub window: Window,
-    /// Index of its first cell among the cells of the recording.
+    /// Index of the first cell among the cells of the recording.
     pub start: usize,
 }
 
 /// A rectangle of an array.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Window {
-    /// Its first row.
+    /// First row.
     pub top: u32,
-    /// Its first column.
+    /// First column.
     pub left: u32,
-    /// Number of its rows.
+    /// Number of rows.
     pub rows: u32,
-    /// Number of its columns.
+    /// Number of columns.
     pub cols: u32,
 }
 
 impl Window {
-    /// All of an array, whose sides fit into 32 bits as the file holds as much.
+    /// Returns the window of a whole array. Its sides fit into 32 bits because the file holds its cells.
     #[must_use]
     pub fn whole(rows: usize, cols: usize) -> Self {
         let side = |count: usize| u32::try_from(count).expect("a side is not longer than its file");
         Self { top: 0, left: 0, rows: side(rows), cols: side(cols) }
     }
 
-    /// Number of its cells.
+    /// Returns the number of cells.
     #[must_use]
     pub const fn len(&self) -> usize {
         self.rows as usize * self.cols as usize
     }
 
-    /// Whether it has no cells.
+    /// Whether there are no cells.
     #[must_use]
     pub const fn is_empty(&self) -> bool {
         self.len() == 0
@@ -150,10 +150,10 @@ impl Window {
 }
 
 impl Recording {
-    /// Writes frame `index` to the cells of an image of the whole array: zero outside its window.
+    /// Writes frame `index` to the cells of an image of the whole array, with zeros outside its window.
     ///
     /// # Panics
-    /// If there is no such frame, or the image is not as large as the array.
+    /// If there is no such frame, or the image is smaller than the array.
     pub fn show(&self, index: usize, image: &mut [f32]) {
         let Frame { window, start, .. } = self.frames[index];
         image.fill(0.0);
@@ -164,7 +164,7 @@ impl Recording {
         }
     }
 
-    /// Whether every frame and every dead cell lies where the rest says: what all readers promise.
+    /// Whether frames, cells, dead cells and times are consistent. Every reader guarantees this.
     #[must_use]
     pub fn is_sound(&self) -> bool {
         let ImageShape { rows, cols, pitch, .. } = self.shape;
@@ -189,59 +189,60 @@ impl Recording {
     }
 }
 
-/// Why a file is not read.
+/// Why a file is refused.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Refusal {
-    /// No format knows it.
+    /// No format recognises it.
     Stranger,
-    /// A text is not as its format wants it.
+    /// A text does not follow its format.
     Damaged {
         /// The text, decoded.
         text: String,
         /// What is wrong, and where.
         flaws: Vec<Flaw>,
     },
-    /// What is no text is not as its format wants it.
+    /// A file that is not text does not follow its format.
     Broken {
         /// What is wrong.
         message: String,
-        /// What to do, if that is known.
+        /// What to do instead, if that is known.
         help: Option<String>,
     },
-    /// The file does not say something, and no hint does.
+    /// Neither the file nor a hint gives a property.
     Silent {
-        /// What it does not say.
+        /// What is missing.
         message: String,
-        /// What to write into the bench.
+        /// What to write in the bench.
         help: String,
     },
     /// A hint contradicts the file.
     Contradicted {
         /// Name of the hint.
         hint: &'static str,
-        /// What the file says.
+        /// The value of the file.
         message: String,
     },
 }
 
 impl Refusal {
-    /// Something that is no text is wrong.
+    /// Returns a refusal of a file that is not text.
     pub fn broken(message: impl Into<String>) -> Self {
         Self::Broken { message: message.into(), help: None }
     }
 }
 
-/// The format of a file that begins so.
+/// Returns the format of a file with this beginning.
 #[must_use]
 pub fn recognise(head: &Head<'_>) -> Option<&'static Format> {
     FORMATS.iter().find(|format| (format.recognises)(head))
 }
 
-/// Reads a file, or the one in an archive, in the format that a hint names or that it is recognised by. Its name matters
-/// only for its ending.
+/// Reads a file, or the file in an archive.
+///
+/// A hint names the format; without one the content decides. Only the ending of `name` matters.
 ///
 /// # Errors
-/// Why it cannot be read.
+/// Why it is refused.
 pub fn read(bytes: &[u8], name: &str, hints: &Hints) -> Result<Recording, Refusal> {
     match archive::unpack(bytes, name, hints)? {
         Some((unpacked, name)) => read_plain(&unpacked, &name, hints),
@@ -257,9 +258,9 @@ fn read_plain(bytes: &[u8], name: &str, hints: &Hints) -> Result<Recording, Refu
     format.map_or(Err(Refusal::Stranger), |format| (format.read)(bytes, hints))
 }
 
-/// Every format by name, for messages.
+/// Returns all formats by name, for messages.
 #[must_use]
 pub fn list() -> String {
     let lines = FORMATS.iter().map(|format| format!("\n  `{}`: {}", format.name, format.title));
-    format!("these are read, also in a `.zip` or `.gz`:{}", lines.collect::<String>())
+    format!("known formats, also in a `.zip` or `.gz`:{}", lines.collect::<String>())
 }

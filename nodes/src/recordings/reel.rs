@@ -1,21 +1,21 @@
-//! Frames of one size that are being read, cell by cell.
+//! Collects frames of one size, cell by cell.
 
-use super::{Frame, MOST_CELLS, Window};
+use super::{Frame, MAX_CELLS, Window};
 
-/// The frames so far.
+/// The frames that were read so far.
 #[derive(Debug, Default)]
 pub(super) struct Reel {
-    /// The frames that are whole.
+    /// The complete frames.
     pub(super) frames: Vec<Frame>,
-    /// The cells, those of the frame that is being read too.
+    /// The cells, including those of the incomplete frame.
     pub(super) cells: Vec<f32>,
     /// Index in a frame of the cells that do not exist.
     pub(super) dead: Vec<usize>,
 }
 
 impl Reel {
-    /// Takes the next cell; `index` is its place in the frame. What is no number in the first frame does not exist, and
-    /// then it is none in any.
+    /// Adds the next cell; `index` is its index in the frame. A cell that is NaN in the first frame does not exist, and
+    /// must be NaN in every frame.
     pub(super) fn cell(&mut self, index: usize, value: f64) -> Result<(), &'static str> {
         if self.frames.is_empty() {
             if value.is_nan() {
@@ -23,9 +23,9 @@ impl Reel {
             }
         } else if value.is_nan() != self.dead.binary_search(&index).is_ok() {
             return Err(if value.is_nan() {
-                "this cell is no number, but in the first frame it was one"
+                "this cell is NaN, but it is a number in the first frame"
             } else {
-                "this cell is a number, but in the first frame it was none"
+                "this cell is a number, but it is NaN in the first frame"
             });
         }
         let cell = if value.is_nan() { 0.0 } else { value as f32 };
@@ -40,11 +40,11 @@ impl Reel {
     pub(super) fn frame(&mut self, number: u64, time: i64, rows: usize, cols: usize) {
         let window = Window::whole(rows, cols);
         let start = self.frames.len() * window.len();
-        debug_assert_eq!(self.cells.len(), start + window.len(), "a frame is whole when it ends");
+        debug_assert_eq!(self.cells.len(), start + window.len(), "a frame has all its cells when it ends");
         self.frames.push(Frame { number, time, window, start });
     }
 
-    /// Mean time between two frames [s], if there are times.
+    /// Returns the mean time between two frames [s], or `None` without times.
     pub(super) fn mean_step(&self) -> Option<f64> {
         match &*self.frames {
             [first, .., last] if last.time > first.time => {
@@ -54,13 +54,13 @@ impl Reel {
         }
     }
 
-    /// Counts the time from the first frame.
+    /// Shifts the times so that the first frame is at 0.
     pub(super) fn start_at_zero(&mut self) {
         let start = self.frames.first().map_or(0, |first| first.time);
         self.frames.iter_mut().for_each(|frame| frame.time -= start);
     }
 
-    /// Takes times from a rate where the file has none.
+    /// Sets the times from the period [s], for a file without times.
     pub(super) fn tick(&mut self, period: f64) {
         for (i, frame) in self.frames.iter_mut().enumerate() {
             frame.time = (i as f64 * period * 1e9).round() as i64;
@@ -68,11 +68,11 @@ impl Reel {
     }
 }
 
-/// Refuses an array that is too large.
+/// Refuses an empty array and one with more than [`MAX_CELLS`] cells.
 pub(super) fn bounded(rows: usize, cols: usize) -> Result<(), String> {
     match rows.checked_mul(cols) {
-        Some(0) => Err("an array has at least one row and one column".into()),
-        Some(1..=MOST_CELLS) => Ok(()),
-        _ => Err(format!("an array of {rows} by {cols} is more than the {MOST_CELLS} cells that are read")),
+        Some(0) => Err("an array needs at least one row and one column".into()),
+        Some(1..=MAX_CELLS) => Ok(()),
+        _ => Err(format!("an array of {rows} by {cols} has more than {MAX_CELLS} cells")),
     }
 }

@@ -1,4 +1,4 @@
-//! What all formats that are text have in common: decoding, lines, pieces that know their place, numbers.
+//! What the text formats share: decoding, lines, pieces with their place, numbers.
 
 use std::borrow::Cow;
 use std::ops::Range;
@@ -8,18 +8,18 @@ use super::{Hints, Recording, Refusal};
 /// What is wrong with a text, and where.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Flaw {
-    /// The place.
+    /// Byte range in the text.
     pub span: Range<usize>,
     /// What is wrong.
     pub message: String,
 }
 
-/// A flaw at a piece.
+/// Returns a flaw at a piece.
 pub(super) fn flaw<T>(at: &Piece<'_>, message: impl Into<String>) -> Result<T, Flaw> {
     Err(Flaw { span: at.span(), message: message.into() })
 }
 
-/// Why a text is not read: what is wrong with it, or something about hints.
+/// Why a text is refused: mistakes in it, or a refusal that is not about its text.
 #[derive(Debug)]
 pub(super) enum Wrong {
     Flaws(Vec<Flaw>),
@@ -44,7 +44,7 @@ impl From<Refusal> for Wrong {
     }
 }
 
-/// Reads bytes as text with a reader of text.
+/// Decodes bytes and parses the text.
 pub(super) fn read(
     bytes: &[u8],
     hints: &Hints,
@@ -57,8 +57,10 @@ pub(super) fn read(
     })
 }
 
-/// Bytes as text: UTF-8 or UTF-16 by their mark, UTF-16 by its zeros, UTF-8 where it is that, and else Latin-1, which
-/// everything is. Marks are left out.
+/// Decodes bytes as text.
+///
+/// A byte order mark selects UTF-8 or UTF-16, and is left out. Without one, zero bytes show UTF-16, valid UTF-8 is read
+/// as such, and all else as Latin-1.
 #[must_use]
 pub fn decode(bytes: &[u8]) -> Cow<'_, str> {
     match bytes {
@@ -84,7 +86,7 @@ fn wide(bytes: &[u8], unit: impl Fn([u8; 2]) -> u16) -> Cow<'_, str> {
     Cow::Owned(char::decode_utf16(units).map(|unit| unit.unwrap_or(char::REPLACEMENT_CHARACTER)).collect())
 }
 
-/// A piece of the text that knows its place.
+/// A slice of the text with its byte offset.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Piece<'t> {
     pub(super) text: &'t str,
@@ -92,43 +94,43 @@ pub(super) struct Piece<'t> {
 }
 
 impl<'t> Piece<'t> {
-    /// The place.
+    /// Returns its byte range.
     pub(super) fn span(&self) -> Range<usize> {
         self.start..self.start + self.text.len()
     }
 
-    /// The part of this piece that `text` is: a slice of its text.
+    /// Returns the piece for `text`, which is a slice of this piece's text.
     pub(super) fn part(&self, text: &'t str) -> Self {
         Self { text, start: text.as_ptr() as usize - self.text.as_ptr() as usize + self.start }
     }
 
-    /// Without the blanks around it.
+    /// Returns the piece without surrounding blanks.
     pub(super) fn trimmed(self) -> Self {
         self.part(self.text.trim())
     }
 
-    /// The parts between blanks.
+    /// Returns the words.
     pub(super) fn words(self) -> impl Iterator<Item = Self> + Clone {
         self.text.split_whitespace().map(move |text| self.part(text))
     }
 
-    /// What comes after `prefix`, in whatever case that is written, if the piece begins with it.
+    /// Returns the piece after `prefix`, or `None` if it does not start with it; the case does not matter.
     pub(super) fn after(self, prefix: &str) -> Option<Self> {
         let head = self.text.get(..prefix.len())?;
         head.eq_ignore_ascii_case(prefix).then(|| self.part(&self.text[prefix.len()..]))
     }
 
-    /// Without a quote before it.
+    /// Returns the piece without a quote at its start.
     pub(super) fn part_after_quote(self) -> Self {
         self.part(self.text.trim_start_matches('"')).trimmed()
     }
 
-    /// A finite number that may have a comma before its decimals.
+    /// Parses a finite number, with a decimal point or a decimal comma.
     pub(super) fn decimal(self, what: &str) -> Result<f64, Flaw> {
         Notation { separator: None, has_decimal_comma: true }.number(self, what)
     }
 
-    /// A finite number.
+    /// Parses a finite number.
     pub(super) fn number(self, what: &str) -> Result<f64, Flaw> {
         match self.text.parse::<f64>() {
             Ok(number) if number.is_finite() => Ok(number),
@@ -137,7 +139,7 @@ impl<'t> Piece<'t> {
         }
     }
 
-    /// A whole number.
+    /// Parses a whole number.
     pub(super) fn count(self, what: &str) -> Result<u64, Flaw> {
         self.text.parse().or_else(|_| flaw(&self, format!("{what} is not a whole number: `{}`", shortened(self.text))))
     }
@@ -155,7 +157,7 @@ impl<'t> Lines<'t> {
         Self { text, next: 0 }
     }
 
-    /// The place just past the last character.
+    /// Returns the empty piece after the last character.
     pub(super) fn end(&self) -> Piece<'t> {
         let text = self.text.trim_end();
         Piece { text: &text[text.len()..], start: text.len() }
@@ -185,14 +187,14 @@ impl<'t> Iterator for Lines<'t> {
 /// How a text writes the numbers of a row.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Notation {
-    /// What stands between two numbers; nothing if blanks do.
+    /// Separator of two numbers; `None` for blanks.
     pub(super) separator: Option<char>,
-    /// Whether a comma may stand before the decimals: no comma stands between two numbers.
+    /// Whether a comma is a decimal comma: then it does not separate numbers.
     pub(super) has_decimal_comma: bool,
 }
 
 impl Notation {
-    /// What a row of numbers shows: `;`, a tab, a comma or blanks. A comma beside another separator is a decimal one.
+    /// Detects the notation of a row: `;`, a tab, a comma or blanks. A comma next to another separator is decimal.
     pub(super) fn of(row: &str) -> Self {
         let row = row.trim();
         let separator = match row {
@@ -204,7 +206,7 @@ impl Notation {
         Self { separator, has_decimal_comma: separator != Some(',') }
     }
 
-    /// The fields of a row, trimmed. Separators at the end of a row are not followed by a field.
+    /// Returns the trimmed fields of a row. A separator at the end of the row is ignored.
     pub(super) fn fields<'t>(self, row: Piece<'t>) -> impl Iterator<Item = Piece<'t>> + Clone {
         let row = row.trimmed();
         let separator = self.separator;
@@ -215,7 +217,7 @@ impl Notation {
         parts.filter(move |part| separator.is_some() || !part.text.is_empty())
     }
 
-    /// A finite number.
+    /// Parses a finite number.
     pub(super) fn number(self, piece: Piece<'_>, what: &str) -> Result<f64, Flaw> {
         if !self.has_decimal_comma || !piece.text.contains(',') {
             return piece.number(what);
@@ -229,7 +231,7 @@ impl Notation {
     }
 }
 
-/// Whether every comma of a row of blanks and numbers stands within a number, as in `0,5 1,25`.
+/// Whether every comma of a row of numbers between blanks is decimal, as in `0,5 1,25`.
 fn is_decimal_comma_between_blanks(row: &str) -> bool {
     let mut words = row.split_whitespace().peekable();
     let is_decimal = |word: &str| {
@@ -240,7 +242,7 @@ fn is_decimal_comma_between_blanks(row: &str) -> bool {
     words.next().is_some() && words.peek().is_some() && row.split_whitespace().all(is_decimal)
 }
 
-/// A text that a message can hold.
+/// Shortens a text for a message: at most 40 characters, none of them a control character.
 #[must_use]
 pub fn shortened(text: &str) -> String {
     let clean = |c: char| if c.is_control() { ' ' } else { c };

@@ -1,8 +1,8 @@
-//! Names of units as the vendors write them, and what they are in ours.
+//! Names of units as the vendors write them.
 
 use tactflow_runtime::signal::{Base, Unit};
 
-/// A name of a unit, in lower case, and what one of it is in the unit that we use.
+/// A name of a unit in lower case, and its factor to the unit of the table.
 type Name = (&'static str, f64);
 
 /// Pressures [kPa].
@@ -77,33 +77,33 @@ const LENGTHS: &[Name] = &[
     ("inches", 0.0254),
 ];
 
-/// Standard gravity [m/s²], and so the force of a kilogram [N].
+/// Standard gravity [m/s²], which is also the weight of a kilogram [N].
 const GRAVITY: f64 = 9.80665;
-/// The force of a pound [N].
+/// Weight of a pound [N].
 const POUND: f64 = 4.448_221_615_260_5;
 /// A pound per square inch [kPa].
 const PSI: f64 = POUND / (25.4 * 25.4) * 1e3;
 /// A millimetre of mercury [kPa].
 const TORR: f64 = 101.325 / 760.0;
 
-/// The names that a message lists.
+/// Units that a message lists.
 pub(super) const KNOWN: &str = "`raw`, pressures (`kPa`, `N/cm2`, `PSI`, `mmHg`, …) and forces (`N`, `lbs`, `kg`, …)";
 
 fn find(names: &[Name], name: &str) -> Option<f64> {
     names.iter().find(|(known, _)| *known == name).map(|(_, factor)| *factor)
 }
 
-/// The unit that we use for what is named so, and what one of those is in it.
+/// Returns the unit that stands for a vendor's name, and the factor to it.
 pub(super) fn unit(name: &str) -> Option<(Unit, f64)> {
-    let is_dress = |c: char| c.is_whitespace() || "[]()^\"".contains(c);
-    let name: String = name.to_lowercase().replace('²', "2").chars().filter(|c| !is_dress(*c)).collect();
+    let is_ignored = |c: char| c.is_whitespace() || "[]()^\"".contains(c);
+    let name: String = name.to_lowercase().replace('²', "2").chars().filter(|c| !is_ignored(*c)).collect();
     let pressure = find(PRESSURES, &name).map(|factor| (Unit::of(Base::Kilopascal), factor));
     let force = || find(FORCES, &name).map(|factor| (Unit::NEWTON, factor));
     let count = || find(COUNTS, &name).map(|factor| (Unit::RAW, factor));
     pressure.or_else(force).or_else(count)
 }
 
-/// What one of a length is in metres.
+/// Returns the factor from a unit of length to metres.
 pub(super) fn metres(name: &str) -> Option<f64> {
     find(LENGTHS, &name.trim().to_lowercase())
 }
@@ -113,8 +113,8 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_unit_is_what_physics_says() {
-        // Each against the same pressure or force by another way.
+    fn a_unit_has_its_physical_value() {
+        // Each value is calculated in another way than the table.
         let cases = [
             ("PSI", "kPa", 6.894_757),
             ("mmHg", "kPa", 0.133_322_4),

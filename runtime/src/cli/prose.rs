@@ -1,13 +1,15 @@
-//! Pages of text: made of a few sorts of blocks, shown on a terminal or as Markdown.
+//! Pages of text: a list of blocks, rendered for a terminal or as Markdown.
 
+use std::borrow::Cow;
 use std::fmt::Write;
 
 use clap::builder::styling::{AnsiColor, Style};
+use textwrap::{Options, WordSplitter};
 
-/// A piece of a page.
+/// A part of a page.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) enum Block {
-    /// What the page is about, and what sort of thing that is.
+    /// Name of the thing that the page describes, and its category.
     Title(String, &'static str),
     /// Markdown.
     Prose(String),
@@ -17,24 +19,24 @@ pub(super) enum Block {
     Code(String),
 }
 
-/// A name and what there is to say of it.
+/// An entry of a list: a name and its description.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Item {
     pub(super) name: String,
-    /// What it is, in a few words.
+    /// Summary in a few words.
     pub(super) what: String,
-    /// What it means, and more of that sort: a paragraph each.
+    /// Further paragraphs.
     pub(super) more: Vec<String>,
 }
 
-/// As wide as a page gets.
-const WIDEST: usize = 100;
-/// On what is narrower nothing is drawn.
-const NARROWEST: usize = 40;
-/// As wide as the column of names gets.
-const WIDEST_NAME: usize = 24;
+/// Maximum width of a page [columns].
+const MAX_WIDTH: usize = 100;
+/// Minimum width of a page [columns]: on a narrower terminal nothing is drawn.
+const MIN_WIDTH: usize = 40;
+/// Maximum width of the column of names [columns].
+const MAX_NAME_WIDTH: usize = 24;
 
-/// How a page is shown on a terminal.
+/// How a page is rendered on a terminal.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Look {
     pub(super) width: usize,
@@ -42,18 +44,18 @@ pub(super) struct Look {
 }
 
 impl Look {
-    /// As the terminal is, if there is one.
+    /// Returns a look of the width of the terminal, or of the maximum width if there is no terminal.
     pub(super) fn new(has_colour: bool) -> Self {
-        let width = terminal_size::terminal_size().map_or(WIDEST, |(width, _)| usize::from(width.0));
-        Self { width: width.clamp(NARROWEST, WIDEST), has_colour }
+        let width = terminal_size::terminal_size().map_or(MAX_WIDTH, |(width, _)| usize::from(width.0));
+        Self { width: width.clamp(MIN_WIDTH, MAX_WIDTH), has_colour }
     }
 
-    /// On a terminal of that width, if it is wide enough.
+    /// Returns a look of that width, or `None` if it is too narrow.
     pub(super) fn of_width(width: usize, has_colour: bool) -> Option<Self> {
-        (width >= NARROWEST).then_some(Self { width: width.min(WIDEST), has_colour })
+        (width >= MIN_WIDTH).then_some(Self { width: width.min(MAX_WIDTH), has_colour })
     }
 
-    /// The blocks as text.
+    /// Renders the blocks as text.
     pub(super) fn render(self, blocks: &[Block]) -> String {
         let mut text = String::new();
         let mut is_close = true;
@@ -83,31 +85,31 @@ impl Look {
         self.styled(Style::new().bold(), text)
     }
 
-    /// Paragraphs are wrapped; lists, tables and code stay as they are.
+    /// Wraps paragraphs; lists, tables and code stay unchanged.
     fn prose(self, prose: &str) -> String {
         let is_kept = |text: &str| text.lines().any(|line| line.starts_with(['|', '-', '*', '`', ' ']));
         let paragraphs = prose.trim().split("\n\n").map(|paragraph| match is_kept(paragraph) {
             true => format!("{}\n", paragraph.trim_end()),
-            false => wrapped(paragraph, self.width, 0).join("\n") + "\n",
+            false => wrap(paragraph, self.width, 0).join("\n") + "\n",
         });
         paragraphs.collect::<Vec<_>>().join("\n")
     }
 
     fn items(self, items: &[Item]) -> String {
-        let widest = items.iter().map(|item| item.name.chars().count()).filter(|width| *width <= WIDEST_NAME).max();
-        let column = 2 + widest.unwrap_or(WIDEST_NAME) + 2;
+        let widest = items.iter().map(|item| item.name.chars().count()).filter(|width| *width <= MAX_NAME_WIDTH).max();
+        let column = 2 + widest.unwrap_or(MAX_NAME_WIDTH) + 2;
         let mut text = String::new();
         for item in items {
             let used = 2 + item.name.chars().count();
             text.push_str("  ");
             text.push_str(&self.styled(AnsiColor::Cyan.on_default(), &item.name));
-            let mut lines = wrapped(&item.what, self.width, column).into_iter();
+            let mut lines = wrap(&item.what, self.width, column).into_iter();
             if used + 2 <= column {
                 text.push_str(&" ".repeat(column - used));
                 text.push_str(lines.next().unwrap_or_default().trim_start());
             }
             text.push('\n');
-            let more = item.more.iter().flat_map(|more| wrapped(more, self.width, column));
+            let more = item.more.iter().flat_map(|more| wrap(more, self.width, column));
             for line in lines.chain(more) {
                 text.push_str(&line);
                 text.push('\n');
@@ -117,29 +119,18 @@ impl Look {
     }
 }
 
-/// Lines of at most `width` characters, each behind `indent` spaces.
-fn wrapped(text: &str, width: usize, indent: usize) -> Vec<String> {
-    let pad = " ".repeat(indent);
-    let mut lines: Vec<String> = Vec::new();
-    let mut length = usize::MAX;
-    for word in text.split_whitespace() {
-        let count = word.chars().count();
-        match lines.last_mut() {
-            Some(line) if length + 1 + count <= width => {
-                line.push(' ');
-                line.push_str(word);
-                length += 1 + count;
-            }
-            _ => {
-                lines.push(format!("{pad}{word}"));
-                length = indent + count;
-            }
-        }
+/// Wraps a text into lines of at most `width` columns, each indented by `indent` spaces. A longer word has its own line.
+fn wrap(text: &str, width: usize, indent: usize) -> Vec<String> {
+    let (text, pad) = (text.split_whitespace().collect::<Vec<_>>().join(" "), " ".repeat(indent));
+    if text.is_empty() {
+        return Vec::new();
     }
-    lines
+    let options = Options::new(width).initial_indent(&pad).subsequent_indent(&pad).break_words(false);
+    let options = options.word_splitter(WordSplitter::NoHyphenation);
+    textwrap::wrap(&text, options).into_iter().map(Cow::into_owned).collect()
 }
 
-/// The blocks as Markdown, with headings that start at `level`.
+/// Renders the blocks as Markdown, with headings that start at `level`.
 pub(super) fn markdown(blocks: &[Block], level: usize) -> String {
     let mut text = String::new();
     for block in blocks {
@@ -157,9 +148,9 @@ pub(super) fn markdown(blocks: &[Block], level: usize) -> String {
 fn list(items: &[Item]) -> String {
     let mut text = String::new();
     for Item { name, what, more } in items {
-        let said: Vec<&str> =
+        let texts: Vec<&str> =
             [what].into_iter().chain(more).map(|text| text.trim()).filter(|text| !text.is_empty()).collect();
-        let _ = writeln!(text, "- **`{name}`**: {}", said.join("<br>\n  "));
+        let _ = writeln!(text, "- **`{name}`**: {}", texts.join("<br>\n  "));
     }
     text
 }
@@ -182,7 +173,7 @@ mod tests {
     }
 
     #[test]
-    fn a_page_is_wrapped_and_in_line() {
+    fn a_page_is_wrapped_and_aligned() {
         let text = Look { width: 40, has_colour: false }.render(&page());
         let expected = "\
 pid (node)

@@ -5,7 +5,6 @@
 //! counts from the simulator's own clock. `docs/lockstep.md` has the protocol.
 
 mod bridge;
-mod json;
 mod message;
 mod socket;
 
