@@ -211,7 +211,7 @@ fn a_uniform_load_is_not_taken_for_a_probe() {
         assert!(message.starts_with("most tactels answer to most presses alike"), "{message}");
     }
     // A probe on one tactel only, and foam that passes a part of it on to all that answer.
-    let mut pad = Pad::new(3, 3, &[], 5);
+    let mut pad = Pad::new(3, 3, &[], 6);
     let mut log = pad.probe(1, 60, 0.15);
     let (frames, tactels) = (130 * 5, log.tactels());
     log.force[..frames - 130].fill(0.0);
