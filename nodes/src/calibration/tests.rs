@@ -211,7 +211,7 @@ fn a_uniform_load_is_not_accepted_as_a_probe() {
         assert!(message.starts_with("most tactels respond alike to most presses"), "{message}");
     }
     // A probe on one tactel, with foam that transmits a part of the force to its neighbours.
-    let mut pad = Pad::new(3, 3, &[], 5);
+    let mut pad = Pad::new(3, 3, &[], 6);
     let mut log = pad.probe(1, 60, 0.15);
     let (frames, tactels) = (130 * 5, log.tactels());
     log.force[..frames - 130].fill(0.0);

@@ -79,9 +79,11 @@ fn other_value(path: &[String], old: &Value, new: &Value) -> Option<Meant> {
     match (names.as_slice(), old, new) {
         (["graph", "clock"], ..) => Some(Meant::Clock),
         (["nodes", _, "type"], ..) => Some(Meant::Type),
-        (["nodes" | "parts", _, "in", _] | ["exports", _] | ["commands", _, _], Value::String(_), Value::String(_)) => {
-            Some(Meant::Wire)
-        }
+        (
+            ["nodes" | "parts", _, "in", _] | ["exports", _] | ["commands", _, _] | ["modes", _, "on_lost", "of"],
+            Value::String(_),
+            Value::String(_),
+        ) => Some(Meant::Wire),
         _ if differ_in_one_number(old, new) => Some(Meant::Number),
         _ => None,
     }
