@@ -64,18 +64,32 @@ fn shipped(name: &str) -> PathBuf {
     Path::new("../graphs").join(name)
 }
 
+/// The Rust blocks of a page, put together, are the file.
+fn is_built_line_by_line(page: &str, path: &str) {
+    let (shown, real) = (blocks(page, "rust").concat(), file(path));
+    for (i, (shown, real)) in shown.lines().zip(real.lines()).enumerate() {
+        assert_eq!(shown, real, "line {} of {path}", i + 1);
+    }
+    assert_eq!(shown, real);
+}
+
 #[test]
 fn the_walkthrough_shows_the_node_as_it_is() {
     let page = page("writing-a-node.md");
-    let shown = blocks(&page, "rust").concat();
-    let real = file("tests/src/nodes/low_pass.rs");
-    for (i, (shown, real)) in shown.lines().zip(real.lines()).enumerate() {
-        assert_eq!(shown, real, "line {} of the file", i + 1);
-    }
-    assert_eq!(shown, real);
+    is_built_line_by_line(&page, "tests/src/nodes/low_pass.rs");
     let [line] = &blocks(&page, "rust catalogue")[..] else { panic!("one line") };
     assert!(file("tests/src/nodes/mod.rs").contains(line.as_str()), "{line}");
     assert_eq!(blocks(&page, "rust main"), [file("tests/src/main.rs")]);
+}
+
+#[test]
+fn the_walkthrough_shows_the_device_as_it_is_and_its_graph_loads() {
+    let page = page("writing-a-device.md");
+    is_built_line_by_line(&page, "tests/src/devices/udp_pad.rs");
+    let [line] = &blocks(&page, "rust catalogue")[..] else { panic!("one line") };
+    assert!(file("tests/src/devices/mod.rs").contains(line.trim()), "{line}");
+    let [graph] = &blocks(&page, "toml")[..] else { panic!("one graph") };
+    check(&shipped("page.toml"), graph.clone()).unwrap_or_else(|report| panic!("{}", report.render(false)));
 }
 
 #[test]

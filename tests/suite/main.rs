@@ -39,5 +39,6 @@ mod tick;
 mod tidy;
 mod tool;
 mod touch;
+mod udp_pad;
 mod verify;
 mod view;

@@ -69,16 +69,19 @@ impl Link {
         self.commands.read()
     }
 
-    /// Waits for the next commands.
-    pub async fn commanded(&self) {
-        self.commanded.notified().await;
+    /// Waits for the next commands. The future does not borrow the link.
+    pub fn commanded(&self) -> impl Future<Output = ()> + Send + use<> {
+        let commanded = Arc::clone(&self.commanded);
+        async move { commanded.notified().await }
     }
 
-    /// Waits for the end of the run.
-    pub async fn stopped(&self) {
+    /// Waits for the end of the run. The future does not borrow the link.
+    pub fn stopped(&self) -> impl Future<Output = ()> + Send + use<> {
         let mut stop = self.stop.clone();
-        // An error means that the graph's end is gone, which is an end too.
-        let _ = stop.wait_for(|stop| *stop).await;
+        async move {
+            // An error means that the graph's end is gone, which is an end too.
+            let _ = stop.wait_for(|stop| *stop).await;
+        }
     }
 }
 
@@ -109,12 +112,15 @@ pub(crate) fn link(samples: &Samples, commands: &Commands, epoch: Instant) -> (L
 }
 
 impl Linked {
-    /// Hands over the commands and takes the newest samples. Buffers rotate; nothing is copied but the commands. Returns
-    /// whether the device has sampled.
-    pub(crate) fn exchange(&mut self, commands: &Commands, samples: &mut Samples) -> bool {
+    /// Hands over the commands.
+    pub(crate) fn send(&mut self, commands: &Commands) {
         self.commands.input_buffer_mut().copy_from(commands);
         self.commands.publish();
         self.commanded.notify_one();
+    }
+
+    /// Takes the newest samples. Buffers rotate; nothing is copied. Returns whether the device has sampled.
+    pub(crate) fn receive(&mut self, samples: &mut Samples) -> bool {
         let before = samples.writes;
         if self.samples.update() {
             std::mem::swap(samples, self.samples.output_buffer_mut());

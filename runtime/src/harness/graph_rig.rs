@@ -111,7 +111,11 @@ impl GraphRig {
     fn queue(&mut self, port: &str, ms: f64, sequence: u64, write: impl FnOnce(&mut Samples, usize) + Send + 'static) {
         let (fed, output) = self.output(port);
         fed.outputs[output].1 = sequence;
-        push(fed, ms, Box::new(move |samples| Ok(write(samples, output))));
+        let event = move |samples: &mut Samples| {
+            write(samples, output);
+            Ok(())
+        };
+        push(fed, ms, Box::new(event));
     }
 
     fn next_of(&mut self, port: &str) -> u64 {

@@ -2,8 +2,10 @@
 
 mod fed;
 mod graph_rig;
+mod link_rig;
 mod node_rig;
 
 pub use fed::FedRole;
 pub use graph_rig::GraphRig;
+pub use link_rig::LinkRig;
 pub use node_rig::NodeRig;

@@ -14,7 +14,7 @@ use crate::graph::{
     PlannedWire, Policy, PortRef, Producer,
 };
 use crate::node::{Bus, PortId, Tick};
-use crate::signal::{Mark, Shape, Stamp};
+use crate::signal::{Mark, Stamp};
 use crate::source::SourceMap;
 
 /// Where every port is.
@@ -54,14 +54,9 @@ impl Engine {
         let slots = plan.commands.into_iter().map(slot).collect();
         let tell = |report: &PlannedReport| ReportSlot::new(ids[&report.source], report);
         let told = plan.reports.iter().map(tell).collect();
-        let name = |planned: &PlannedReport| (planned.name.join("."), planned.device, planned.report);
-        let reported = plan.reports.iter().map(name).collect();
-        let shape = |(device, report): (usize, usize)| {
-            let planned = plan.reports.iter().find(|planned| (planned.device, planned.report) == (device, report));
-            planned.map(|planned| &planned.shape)
-        };
+        let reported = reported(&plan.reports);
         let devices = plan.devices.into_iter().enumerate();
-        let devices = devices.map(|(i, device)| device_slot(device, |report| shape((i, report)), &sources)).collect();
+        let devices = devices.map(|(i, device)| device_slot(i, device, &plan.reports, &sources)).collect();
         let runners = plan.nodes.into_iter().map(|node| runner(node, &ids, &mut bus, &mut watched));
         let runners: Vec<NodeRunner> = runners.collect();
         let (max_gap, reset_after) = (plan.max_gap, plan.reset_after);
@@ -125,16 +120,21 @@ fn limits(nodes: &[PlannedNode], ports: &[(PlannedPort, PortId)]) -> Vec<(String
     shares.map(|(port, id)| (port.name.clone(), *id)).collect()
 }
 
-fn device_slot<'s>(
-    device: PlannedDevice,
-    report: impl Fn(usize) -> Option<&'s Shape>,
-    sources: &SourceMap,
-) -> DeviceSlot {
+/// Each report that is wired, with its device and its number there.
+fn reported(reports: &[PlannedReport]) -> Vec<(String, usize, usize)> {
+    reports.iter().map(|planned| (planned.name.join("."), planned.device, planned.report)).collect()
+}
+
+fn device_slot(i: usize, device: PlannedDevice, reports: &[PlannedReport], sources: &SourceMap) -> DeviceSlot {
+    let wired = |report: usize| {
+        let planned = reports.iter().find(|planned| (planned.device, planned.report) == (i, report));
+        planned.map(|planned| &planned.shape)
+    };
     DeviceSlot {
         place: sources.locate(device.span.start),
         name: device.name,
         samples: Samples::of(&device.description),
-        commands: Commands::with_reports(&device.description, report),
+        commands: Commands::with_reports(&device.description, wired),
         link: match device.driver {
             Driver::Stepped(driver) => Link::Stepped(driver),
             Driver::Live(driver) => Link::Idle(driver),

@@ -40,6 +40,13 @@ impl Engine {
                 self.raise(self.policy.device.0, Trouble::Device(i))?;
             }
         }
+        for i in 0..self.core.inlets.len() {
+            let inlet = &self.core.inlets[i];
+            let device = &self.devices[inlet.device];
+            if device.failed.is_none() && inlet.lost(&device.samples).is_some() {
+                self.raise(self.policy.device.0, Trouble::Lost(i))?;
+            }
+        }
         self.timeline.ticked(now, has_sampled);
         if self.timeline.is_on_timer() {
             self.raise(self.policy.clock, Trouble::Clock)?;
@@ -47,14 +54,8 @@ impl Engine {
         for i in 0..self.core.inlets.len() {
             let inlet = &mut self.core.inlets[i];
             let device = &self.devices[inlet.device];
-            let samples = &device.samples;
-            if device.failed.is_some() {
-                continue;
-            }
-            if inlet.lost(samples).is_some() {
-                self.raise(self.policy.device.0, Trouble::Lost(i))?;
-            } else if !inlet.is_finite(samples) {
-                inlet.reject(samples);
+            if device.failed.is_none() && !inlet.is_finite(&device.samples) {
+                inlet.reject(&device.samples);
                 self.raise(self.policy.not_finite.0, Trouble::NotFinite(i))?;
             }
         }
@@ -108,7 +109,7 @@ impl Engine {
     fn settle(&mut self) {
         let trouble = self.trouble.take();
         if let Some((policy, trouble)) = trouble
-            && self.halts.is_news(policy)
+            && (self.halts.is_news(policy) || self.explains_halt(trouble))
         {
             let fault = self.describe(trouble);
             self.halts.trouble(policy, fault);
@@ -118,6 +119,15 @@ impl Engine {
             modes.restart(&self.core.tick);
             self.core.switch(modes.configurations());
         }
+    }
+
+    /// Whether a device now says why its samples stay away, while the commands are held only because they do.
+    fn explains_halt(&self, trouble: Trouble) -> bool {
+        let last = self.halts.list().last().filter(|halt| halt.until.is_none());
+        let is_silence = last.is_some_and(|halt| {
+            halt.policy == Policy::Hold && matches!(halt.fault.cause, Cause::SilentClock | Cause::Stale { .. })
+        });
+        is_silence && matches!(trouble, Trouble::Device(_) | Trouble::Lost(_))
     }
 
     /// A word from outside: `stop` and `resume`, in any case, halt the commands and let them go on; others are for the
@@ -217,7 +227,8 @@ impl Engine {
                     }
                 }
                 Link::Live(linked) => {
-                    let is_newer = linked.exchange(&device.commands, &mut device.samples);
+                    linked.send(&device.commands);
+                    let is_newer = linked.receive(&mut device.samples);
                     has_sampled |= is_newer && self.timeline.is_clock(i);
                 }
                 Link::Idle(_) | Link::Gone => {}
