@@ -80,7 +80,7 @@ impl Units {
         if let Shape::Features(features) = shape {
             let slow = features.features.iter().find(|feature| feature.unit.per_second == 0);
             return match (pattern(port), slow) {
-                (Some(Pattern::AnyRate), Some(feature)) => {
+                (Some(Pattern::AnyRate | Pattern::Variable { per_second: true, .. }), Some(feature)) => {
                     let has = format!("has `{}` in `{}`", feature.name, feature.unit);
                     Err(Clash { has, takes: "features per second".into() })
                 }
