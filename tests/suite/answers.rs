@@ -66,16 +66,16 @@ fn a_description_says_everything_of_a_node() {
         "pid (node)",
         "A PID controller on every feature, for force and position control.",
         "Steps when an input that wakes it is new or lost.",
-        "  in.error  features, any unit, frame A; required, wakes the node",
-        "  control  features, any unit per second, frame A",
+        "  in.error  features, unit E, frame A; required, wakes the node",
+        "  control  features, unit E/s, frame A",
         "  gains.NAME.kp      a number; default 0.0",
         "                     Proportional gain [1/s].",
     ];
     assert_lines(&text.out, &lines);
     assert!(text.out.contains("`feature_error.error`"), "{}", text.out);
     let lines = [
-        "input error | features | _ | A | required, wakes the node",
-        "output control | features | _/s | A | None",
+        "input error | features | E | A | required, wakes the node",
+        "output control | features | E/s | A | None",
         "param gains | a table, for each name a table | None | required",
         "param gains.kp | a number | 1/s | 0.0",
     ];

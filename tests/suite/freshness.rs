@@ -84,13 +84,13 @@ fn a_slow_source_is_a_slower_rate() {
 }
 
 #[test]
-fn time_between_samples_is_capped() {
+fn a_gap_longer_than_max_gap_is_no_time_between_samples() {
     let mut rig = rig(&["a"], COUNT);
-    for ms in [0.0, 1000.0] {
+    for (ms, time) in [(0.0, 0.0), (50.0, 0.05), (1000.0, 0.05), (1050.0, 0.1)] {
         rig.feed("a.value", ms, 1.0);
         rig.tick(ms).unwrap();
+        assert_eq!(number(&rig, "count.time"), Some(time), "{ms} ms; the graph's max_gap is five periods");
     }
-    assert_eq!(number(&rig, "count.time"), Some(0.05), "five periods");
 }
 
 /// `value` is absent whenever contact is: a label without a region.

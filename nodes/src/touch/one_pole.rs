@@ -216,7 +216,7 @@ mod tests {
     }
 
     #[test]
-    fn another_device_moves_it_by_nothing_and_a_gap_by_the_greatest_at_most() {
+    fn it_starts_afresh_after_a_gap_and_with_another_device() {
         let mut rig = built("time_constant_ms = 100", Unit::NEWTON).unwrap();
         let at = |rig: &mut NodeRig, ms: i64, device: u16, value: f64| {
             rig.edit("value", Stamp { nanos: ms * 1_000_000, device }, |old: &mut Scalar| *old = value);
@@ -224,10 +224,11 @@ mod tests {
             *rig.get::<Scalar>("value").unwrap()
         };
         assert_eq!(at(&mut rig, 0, 0, 0.0), 0.0);
-        let gap = at(&mut rig, 5000, 0, 1.0);
-        assert!((gap - 1.0 + libm::exp(-1.0)).abs() < 1e-12, "100 ms of 5 s: {gap}");
-        assert_eq!(at(&mut rig, 5001, 1, 9.0), gap);
-        assert!(at(&mut rig, 5002, 1, 9.0) > gap);
+        let longest = at(&mut rig, 100, 0, 1.0);
+        assert!((longest - 1.0 + libm::exp(-1.0)).abs() < 1e-12, "100 ms are no gap: {longest}");
+        assert_eq!(at(&mut rig, 5000, 0, 2.0), 2.0, "a gap");
+        assert_eq!(at(&mut rig, 5001, 1, 9.0), 9.0, "another device");
+        assert!(at(&mut rig, 5002, 1, 0.0) > 8.0);
     }
 
     #[test]

@@ -1,43 +1,66 @@
 //! The node contract: plain data in, plain data out.
 //!
-//! A node is one file with four blocks, [`params!`](crate::params), [`inputs!`](crate::inputs),
-//! [`outputs!`](crate::outputs) and [`state!`](crate::state), and one `impl` [`Node`]. Names, types, units and docs
-//! come from those blocks and feed the check, its messages and the reference. `docs/writing-a-node.md` builds one.
+//! A node is one file: a struct with its documentation, the structs of its parameters, inputs, outputs and state, and one
+//! `impl` [`Node`]. `docs/writing-a-node.md` builds one.
 //!
-//! How an input is declared says when it wakes the node and what its absence does:
+//! | Derive | implements | reads |
+//! |---|---|---|
+//! | `#[derive(Describe)]` | [`Describe`](trait@Describe) | the doc comment, `#[describe(name = "…", every_tick, logs)]` |
+//! | `#[derive(Param)]` | [`Param`](trait@Param) for a table or a word | `#[param(unit = "…", range = …, above = …, default = …, live)]` |
+//! | `#[derive(Inputs)]` | [`InputSet`] | `#[port(unit = "…", frame = "…", …)]` |
+//! | `#[derive(Outputs)]` | [`OutputSet`] | the same |
+//! | `#[derive(State)]` | [`Clone`], field by field, so that a reset does not allocate | |
 //!
-//! | declared | seen in `step` | wakes the node when | when it is absent |
+//! The type of an input and its attribute say what it needs. Each fact is independent: whether it must be wired
+//! (`optional`), whether it must be present while the node steps (`Option`), and whether a new value wakes the node
+//! (`sampled`).
+//!
+//! | field | attribute | wakes the node when | when it is absent |
 //! |---|---|---|---|
-//! | `T` | `In<T>` | new or lost | the outputs are absent |
-//! | `Sampled<T>` | `In<T>` | lost | the outputs are absent |
-//! | `Trigger<T>` | `Option<In<T>>` | new or lost | `None` |
-//! | `Option<T>` | `Option<In<T>>` | lost | `None` |
-//! | `Many<T>` | `Many<T>`, each named in the graph | any is new or lost | that one is `None` |
-//! | `Delayed<T>` | `Option<In<T>>` as the last tick left it | it was new or lost then, where no other input wakes it | `None` |
+//! | `In<'a, T>` | | new or lost | the outputs are absent |
+//! | `In<'a, T>` | `sampled` | lost | the outputs are absent |
+//! | `Option<In<'a, T>>` | | new or lost | `None` |
+//! | `Option<In<'a, T>>` | `sampled` | lost | `None` |
+//! | `Option<In<'a, T>>` | `optional` | new or lost | `None`; it need not be wired |
+//! | `Option<In<'a, T>>` | `optional, sampled` | lost | `None`; it need not be wired |
+//! | `Option<In<'a, T>>` | `present_if_wired` | new or lost | the outputs are absent; `None` if it is not wired |
+//! | `Option<In<'a, T>>` | `delayed` | new or lost one tick ago, if no other input wakes it | `None`; it is read as the last tick left it |
+//! | `Many<'a, T>` | | any is new or lost | `None` for that wire; any number of wires, each named in the graph |
+//!
+//! A port names what its kind has, and `"_"` where there is nothing to name: `unit` and `frame` (`Scalar`, `Features`,
+//! `Image`, `Regions`), `frame` (`Mask`, `Twist`), `frame` and `reference` (`Pose`), `unit` and `robot` (`Joints`), `frame`
+//! and `robot` (`Jacobian`), nothing (`Flag`). A capital letter is a variable: what it stands for is known when the graph
+//! is loaded, and it is the same for all ports of the node. `"$name"` is the frame or unit that the parameter `name` names.
 
 mod bounds;
+mod bus;
 mod erased;
+mod inputs;
 mod limits;
 mod macros;
 mod mistake;
+mod outputs;
 mod param_spec;
 mod params;
 mod pattern;
 mod ports;
+mod reader;
 mod time;
 
 use crate::signal::Stamp;
 
 pub use bounds::Bounds;
+pub use bus::{Bus, PortId, Wires};
 pub use erased::{AnyNode, Built, Configured, Given, NodeSpec, NodeType, of};
+pub use inputs::{In, InputSet, Many, View};
 pub use limits::{Components, Limits};
 pub use mistake::{At, Mistake, Mistakes};
+pub use outputs::{Out, OutputSet};
 pub use param_spec::{Declared, ParamSpec, Repeats, Written, written_table};
-pub use params::{
-    Bit, Count, FilePath, Map, NonNegative, Param, Positive, Rate, Ratio, Reader, Spanned, Word, read_leaf,
-};
+pub use params::{Bit, Count, FilePath, Map, NonNegative, Param, Positive, Rate, Ratio, Spanned, Word};
 pub(crate) use pattern::{UnitPattern, declares_a_unit, frame_args, may_fit, unit_pattern};
-pub use ports::{Bus, In, InputSet, Letters, Many, Need, Out, OutputSet, PortId, PortSpec, View, Wires};
+pub use ports::{Letters, Need, PortSpec};
+pub use reader::{Reader, read_leaf};
 pub use tactflow_derive::{Describe, Inputs, Outputs, Param, State};
 pub use time::{Absence, Interval};
 

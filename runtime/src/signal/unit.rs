@@ -166,8 +166,10 @@ impl Unit {
         let (mut start, mut i) = (0, 0);
         while i <= text.len() {
             if i == text.len() || matches!(text[i], b'/' | b' ' | b',') {
-                // A comma stands before a space.
                 let is_gap = i == start && i > 0 && text[i - 1] == b',' && i < text.len() && text[i] == b' ';
+                if i < text.len() && text[i] == b',' && (i + 1 == text.len() || text[i + 1] != b' ') {
+                    return false;
+                }
                 let (_, rest) = text.split_at(start);
                 let (atom, _) = rest.split_at(i - start);
                 if !is_gap && !is_atom(atom) {

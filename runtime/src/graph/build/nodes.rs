@@ -220,13 +220,15 @@ impl Builder<'_> {
 
     /// How to make rates for an input that takes nothing else: a node that takes any unit and gives it per second.
     fn rate_maker(&self, input: &PortSpec) -> Option<String> {
-        let has =
-            |port: &PortSpec, unit: &str| port.kind == input.kind && port.args.first().is_some_and(|arg| arg == unit);
-        let mut specs = self.net.catalogue.specs();
+        let unit = |port: &PortSpec| port.args.first().filter(|_| port.kind == input.kind).cloned();
+        unit(input)?.strip_suffix("/s").filter(|of| *of == "_" || of.starts_with(|c: char| c.is_ascii_uppercase()))?;
+        let takes =
+            |spec: &NodeSpec, of: &str| spec.inputs.iter().any(|port| unit(port).is_some_and(|unit| unit == of));
         let makes = |spec: &NodeSpec| {
-            spec.inputs.iter().any(|port| has(port, "_")) && spec.outputs.iter().any(|port| has(port, "_/s"))
+            let mut units = spec.outputs.iter().filter_map(unit);
+            units.any(|unit| unit.strip_suffix("/s").is_some_and(|of| takes(spec, of)))
         };
-        let maker = specs.find(|spec| makes(spec)).filter(|_| has(input, "_/s"))?;
+        let maker = self.net.catalogue.specs().find(|spec| makes(spec))?;
         Some(format!("put a `{}` between them", maker.name))
     }
 

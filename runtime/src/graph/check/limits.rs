@@ -57,7 +57,7 @@ fn missing(flat: &FlatGraph, asked: &[Asked<'_>], found: &mut Vec<Diagnostic>) {
         asked.iter().filter(|asked| !is_given(&asked.key) && told.insert(asked.key.as_str())).collect();
     let Some(first) = missing.first() else { return };
     let lines = missing.iter().map(|asked| {
-        let doc = asked.spec.and_then(|spec| spec.doc.lines().next()).unwrap_or_default().trim();
+        let doc = asked.spec.map(ParamSpec::doc_with_unit).unwrap_or_default();
         format!("\n{} = …   # {}", asked.key, doc.trim_end_matches('.'))
     });
     let names: Vec<String> = missing.iter().map(|asked| format!("`{}`", asked.key)).collect();

@@ -26,7 +26,7 @@ impl Units {
         if let Shape::Features(features) = shape {
             let slow = features.features.iter().find(|feature| feature.unit.per_second == 0);
             return match (unit_pattern(port), slow) {
-                (Some(UnitPattern::AnyRate), Some(feature)) => {
+                (Some(UnitPattern::AnyRate | UnitPattern::Variable { per_second: true, .. }), Some(feature)) => {
                     let has = format!("has `{}` in `{}`", feature.name, feature.unit);
                     Err(Clash { has, takes: "features per second".into() })
                 }
