@@ -7,9 +7,11 @@ use std::io::Read;
 
 use flate2::bufread::MultiGzDecoder;
 
-use super::text::shortened;
-use super::zip::{self, Archive, File, MAX_UNPACKED_BYTES};
-use super::{HEAD_BYTES, Head, Hints, Refusal, list, npy, recognise};
+use super::common::text::shortened;
+use super::common::zip::{self, Archive, File, MAX_UNPACKED_BYTES};
+use super::common::{HEAD_BYTES, Head, Hints, Refusal};
+use super::formats::{list, recognise};
+use super::npy;
 
 const GZIP: &[u8] = b"\x1f\x8b\x08";
 

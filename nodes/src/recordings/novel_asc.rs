@@ -12,8 +12,8 @@ mod layout;
 
 use tactflow_runtime::signal::{ImageShape, Unit};
 
-use super::text::{self, Flaw, Lines, Notation, Piece, Wrong, flaw, shortened};
-use super::{Format, Frame, Head, Hints, Recording, Refusal, Window, units};
+use crate::recordings::common::text::{self, Lines, Notation, Piece, Wrong, flaw, shortened};
+use crate::recordings::common::{Flaw, Format, Frame, Head, Hints, Recording, Refusal, Window, units};
 use layout::{Corners, Layout};
 
 pub(super) const FORMAT: Format = Format { name: "novel-asc", title: "novel pliance text (.asc)", recognises, read };

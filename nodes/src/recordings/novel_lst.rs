@@ -12,8 +12,8 @@ mod header;
 
 use tactflow_runtime::signal::{Base, ImageShape, Unit};
 
-use super::text::{self, Flaw, Lines, Piece, Wrong, flaw, shortened};
-use super::{Format, Frame, Head, Hints, MAX_CELLS, Recording, Refusal, Window};
+use crate::recordings::common::text::{self, Lines, Piece, Wrong, flaw, shortened};
+use crate::recordings::common::{Flaw, Format, Frame, Head, Hints, MAX_CELLS, Recording, Refusal, Window};
 use header::{Grid, Header, Page, digit, label};
 
 pub(super) const FORMAT: Format =

@@ -10,10 +10,10 @@
 
 use tactflow_runtime::signal::{ImageShape, Unit};
 
-use super::fields::Fields;
-use super::reel::{Reel, bounded};
-use super::text::{self, Flaw, Lines, Piece, Wrong, flaw, shortened};
-use super::{Format, Head, Hints, Recording, Refusal, units};
+use crate::recordings::common::fields::Fields;
+use crate::recordings::common::reel::{Reel, bounded};
+use crate::recordings::common::text::{self, Lines, Piece, Wrong, flaw, shortened};
+use crate::recordings::common::{Flaw, Format, Head, Hints, Recording, Refusal, units};
 
 pub(super) const FORMAT: Format = Format {
     name: "xsensor",

@@ -7,9 +7,9 @@
 
 use tactflow_runtime::signal::{ImageShape, Unit};
 
-use super::reel::{Reel, bounded};
-use super::text::{self, Flaw, Lines, Notation, Piece, Wrong, flaw, shortened};
-use super::{Format, Head, Hints, Recording, units};
+use crate::recordings::common::reel::{Reel, bounded};
+use crate::recordings::common::text::{self, Lines, Notation, Piece, Wrong, flaw, shortened};
+use crate::recordings::common::{Flaw, Format, Head, Hints, Recording, units};
 
 pub(super) const FORMAT: Format = Format {
     name: "zebris",

@@ -9,7 +9,7 @@ use tactflow_runtime::signal::Unit;
 use tactflow_runtime::source::SourceMap;
 use tactflow_runtime::source::{Code, Diagnostic, Report as Mistakes};
 
-use super::{may_replace, pair, positive};
+use super::arguments::{may_replace, pair, positive};
 use crate::calibration::log::Log;
 use crate::calibration::report::{Report, Settings, State, calibrate};
 use crate::calibration::samples::Load;

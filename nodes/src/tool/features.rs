@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use tactflow_runtime::cli::{Job, Print, Shell, clap, duration};
 use tactflow_runtime::graph::Request;
 
-use super::{pair, positive};
+use super::arguments::{pair, positive};
 use crate::recordings::{self, Hints, Recording};
 
 /// Extract the features of the contact in a recording: position, force, line direction

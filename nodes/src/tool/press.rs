@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use tactflow_runtime::cli::clap::{self, Parser};
 use tactflow_runtime::cli::{NOT_LOADED, Shell};
 
-use super::{may_replace, pair, positive};
+use super::arguments::{may_replace, pair, positive};
 use crate::sim::bench::MAX_TACTELS;
 use crate::sim::readout::{Electronics, Readout};
 

@@ -1,7 +1,7 @@
 //! The columns of a CSV file: by their names, or tactels in order.
 
-use super::super::text::{Flaw, Notation, Piece, Wrong, flaw, shortened};
-use super::super::{Hints, MAX_CELLS};
+use crate::recordings::common::text::{Notation, Piece, Wrong, flaw, shortened};
+use crate::recordings::common::{Flaw, Hints, MAX_CELLS};
 
 /// The columns of a file with a frame a row.
 #[derive(Debug)]

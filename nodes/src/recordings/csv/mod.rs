@@ -18,9 +18,9 @@ mod tests;
 use tactflow_runtime::signal::ImageShape;
 
 use self::columns::{Columns, Role, names_of, unquoted};
-use super::reel::{Reel, bounded};
-use super::text::{self, Flaw, Lines, Notation, Piece, Wrong, flaw};
-use super::{Format, Head, Hints, Recording, Refusal};
+use crate::recordings::common::reel::{Reel, bounded};
+use crate::recordings::common::text::{self, Lines, Notation, Piece, Wrong, flaw};
+use crate::recordings::common::{Flaw, Format, Head, Hints, Recording, Refusal};
 
 pub(super) const FORMAT: Format = Format {
     name: "csv",

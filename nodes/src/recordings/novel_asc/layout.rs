@@ -1,7 +1,7 @@
 //! The places of the sensors of a mat.
 
-use crate::recordings::text::{Flaw, Piece, flaw};
-use crate::recordings::{MAX_CELLS, units};
+use crate::recordings::common::text::{Piece, flaw};
+use crate::recordings::common::{Flaw, MAX_CELLS, units};
 
 /// The corners of the sensors that were read so far.
 #[derive(Debug)]

@@ -1,7 +1,7 @@
 //! The header of a page, and the line of column numbers that ends it.
 
-use crate::recordings::text::{Flaw, Notation, Piece, flaw, shortened};
-use crate::recordings::units;
+use crate::recordings::common::text::{Notation, Piece, flaw, shortened};
+use crate::recordings::common::{Flaw, units};
 
 /// Properties of the array; the first header counts.
 #[derive(Debug, Default)]

@@ -1,6 +1,6 @@
 //! An array in a file of numpy: `\x93NUMPY`, a version, a header in Python's notation, the elements.
 
-use super::super::text::shortened;
+use crate::recordings::common::text::shortened;
 
 /// First bytes of an array.
 pub(crate) const MAGIC: &[u8] = b"\x93NUMPY";

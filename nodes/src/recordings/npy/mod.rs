@@ -16,10 +16,10 @@ mod tests;
 use tactflow_runtime::signal::ImageShape;
 
 use self::array::{Array, named};
-use super::reel::{Reel, bounded};
-use super::text::shortened;
-use super::zip::{self, Archive, File, MAX_UNPACKED_BYTES};
-use super::{Format, Frame, HEAD_BYTES, Hints, Recording, Refusal, units};
+use crate::recordings::common::reel::{Reel, bounded};
+use crate::recordings::common::text::shortened;
+use crate::recordings::common::zip::{self, Archive, File, MAX_UNPACKED_BYTES};
+use crate::recordings::common::{Format, Frame, HEAD_BYTES, Hints, Recording, Refusal, units};
 
 pub(super) const NPY: Format = Format {
     name: "npy",

@@ -4,9 +4,9 @@ use std::ops::Range;
 
 use tactflow_runtime::signal::{ImageShape, Unit};
 
-use crate::recordings::Hints;
-use crate::recordings::text::{Flaw, Lines, Piece, flaw, shortened};
-use crate::recordings::units;
+use crate::recordings::common::text::{Lines, Piece, flaw, shortened};
+use crate::recordings::common::units;
+use crate::recordings::common::{Flaw, Hints};
 
 /// The properties of the header that are used.
 #[derive(Debug, Clone, PartialEq)]

@@ -9,8 +9,8 @@ mod header;
 
 use tactflow_runtime::signal::{ImageShape, Unit};
 
-use super::text::{self, Flaw, Lines, Notation, Piece, Wrong, flaw, shortened};
-use super::{Format, Frame, Head, Hints, Recording, Refusal, Window};
+use crate::recordings::common::text::{self, Lines, Notation, Piece, Wrong, flaw, shortened};
+use crate::recordings::common::{Flaw, Format, Frame, Head, Hints, Recording, Refusal, Window};
 use header::Header;
 
 pub(super) const FORMAT: Format =

@@ -87,14 +87,14 @@ const PSI: f64 = POUND / (25.4 * 25.4) * 1e3;
 const TORR: f64 = 101.325 / 760.0;
 
 /// Units that a message lists.
-pub(super) const KNOWN: &str = "`raw`, pressures (`kPa`, `N/cm2`, `PSI`, `mmHg`, …) and forces (`N`, `lbs`, `kg`, …)";
+pub(crate) const KNOWN: &str = "`raw`, pressures (`kPa`, `N/cm2`, `PSI`, `mmHg`, …) and forces (`N`, `lbs`, `kg`, …)";
 
 fn find(names: &[Name], name: &str) -> Option<f64> {
     names.iter().find(|(known, _)| *known == name).map(|(_, factor)| *factor)
 }
 
 /// Returns the unit that stands for a vendor's name, and the factor to it.
-pub(super) fn unit(name: &str) -> Option<(Unit, f64)> {
+pub(crate) fn unit(name: &str) -> Option<(Unit, f64)> {
     let is_ignored = |c: char| c.is_whitespace() || "[]()^\"".contains(c);
     let name: String = name.to_lowercase().replace('²', "2").chars().filter(|c| !is_ignored(*c)).collect();
     let pressure = find(PRESSURES, &name).map(|factor| (Unit::of(Base::Kilopascal), factor));
@@ -104,7 +104,7 @@ pub(super) fn unit(name: &str) -> Option<(Unit, f64)> {
 }
 
 /// Returns the factor from a unit of length to metres.
-pub(super) fn metres(name: &str) -> Option<f64> {
+pub(crate) fn metres(name: &str) -> Option<f64> {
     find(LENGTHS, &name.trim().to_lowercase())
 }
 

@@ -8,35 +8,35 @@ use std::io::Read;
 use flate2::read::DeflateDecoder;
 use rawzip::{CompressionMethod, ZipArchive, ZipFileHeaderRecord, ZipSliceArchive};
 
-use super::Refusal;
+use super::refusal::Refusal;
 
 /// Maximum size of an unpacked file [bytes].
-pub(super) const MAX_UNPACKED_BYTES: u64 = 512 << 20;
+pub(crate) const MAX_UNPACKED_BYTES: u64 = 512 << 20;
 
 /// First bytes of a zip archive.
-pub(super) const MAGIC: &[u8] = b"PK\x03\x04";
+pub(crate) const MAGIC: &[u8] = b"PK\x03\x04";
 
 /// First bytes of a zip archive without a file.
-pub(super) const EMPTY: &[u8] = b"PK\x05\x06";
+pub(crate) const EMPTY: &[u8] = b"PK\x05\x06";
 
 /// A zip archive in memory.
-pub(super) struct Archive<'z>(ZipSliceArchive<&'z [u8]>);
+pub(crate) struct Archive<'z>(ZipSliceArchive<&'z [u8]>);
 
 /// One file of an archive, as the directory describes it.
-pub(super) type File<'a> = ZipFileHeaderRecord<'a>;
+pub(crate) type File<'a> = ZipFileHeaderRecord<'a>;
 
 impl<'z> Archive<'z> {
     /// Finds the directory at the end of the archive.
     ///
     /// # Errors
     /// If there is none.
-    pub(super) fn new(bytes: &'z [u8]) -> Result<Self, Refusal> {
+    pub(crate) fn new(bytes: &'z [u8]) -> Result<Self, Refusal> {
         let archive = ZipArchive::from_slice(bytes);
         archive.map(Self).map_err(|_| damaged("it has no directory: its end may be missing"))
     }
 
     /// Returns the files in the order of the directory.
-    pub(super) fn files(&self) -> impl Iterator<Item = Result<File<'_>, Refusal>> {
+    pub(crate) fn files(&self) -> impl Iterator<Item = Result<File<'_>, Refusal>> {
         self.0.entries().map(|file| file.map_err(|_| damaged("its directory cannot be read")))
     }
 
@@ -44,7 +44,7 @@ impl<'z> Archive<'z> {
     ///
     /// # Errors
     /// If the file has a password, is packed in another way, or is not in the archive.
-    pub(super) fn open(&self, file: &File<'_>) -> Result<Box<dyn Read + '_>, Refusal> {
+    pub(crate) fn open(&self, file: &File<'_>) -> Result<Box<dyn Read + '_>, Refusal> {
         let name = name(file);
         if file.flags().is_encrypted() {
             return Err(Refusal::broken(format!("`{name}` in the archive is protected by a password")));
@@ -64,19 +64,19 @@ impl<'z> Archive<'z> {
 }
 
 /// Returns the path of a file in its archive.
-pub(super) fn name(file: &File<'_>) -> String {
+pub(crate) fn name(file: &File<'_>) -> String {
     String::from_utf8_lossy(file.file_path().as_bytes()).into_owned()
 }
 
 /// Whether a user has put the file there: not a folder, and not a file that an operating system adds.
-pub(super) fn is_of_user(file: &File<'_>) -> bool {
+pub(crate) fn is_of_user(file: &File<'_>) -> bool {
     let path = file.file_path().as_bytes();
     let last = path.rsplit(|byte| *byte == b'/').next().unwrap_or(b"");
     !(last.is_empty() || last.starts_with(b".") || path.starts_with(b"__MACOSX/") || last == b"Thumbs.db")
 }
 
 /// Returns the name of the first file from the first bytes of an archive, or `None` if they are not those of one.
-pub(super) fn first_name(head: &[u8]) -> Option<&[u8]> {
+pub(crate) fn first_name(head: &[u8]) -> Option<&[u8]> {
     let header = head.strip_prefix(MAGIC)?;
     let length = u16::from_le_bytes([*header.get(22)?, *header.get(23)?]);
     head.get(30..30 + usize::from(length))
@@ -86,7 +86,7 @@ pub(super) fn first_name(head: &[u8]) -> Option<&[u8]> {
 ///
 /// # Errors
 /// If the file is damaged.
-pub(super) fn read(source: &mut dyn Read, name: &str, limit: u64, out: &mut Vec<u8>) -> Result<bool, Refusal> {
+pub(crate) fn read(source: &mut dyn Read, name: &str, limit: u64, out: &mut Vec<u8>) -> Result<bool, Refusal> {
     let count = source.take(limit).read_to_end(out).map_err(|error| {
         let error = error.to_string().to_lowercase();
         damaged(&format!("`{name}` cannot be unpacked: {error}"))

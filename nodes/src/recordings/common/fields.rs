@@ -4,14 +4,14 @@ use super::text::Piece;
 
 /// The fields of a line, without surrounding blanks and quotes.
 #[derive(Debug, Clone)]
-pub(super) struct Fields<'t> {
+pub(crate) struct Fields<'t> {
     rest: Option<Piece<'t>>,
     separator: char,
 }
 
 impl<'t> Fields<'t> {
     /// Splits a line at a separator.
-    pub(super) const fn new(line: Piece<'t>, separator: char) -> Self {
+    pub(crate) const fn new(line: Piece<'t>, separator: char) -> Self {
         Self { rest: Some(line), separator }
     }
 }

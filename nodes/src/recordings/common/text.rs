@@ -3,25 +3,18 @@
 use std::borrow::Cow;
 use std::ops::Range;
 
-use super::{Hints, Recording, Refusal};
-
-/// What is wrong with a text, and where.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Flaw {
-    /// Byte range in the text.
-    pub span: Range<usize>,
-    /// What is wrong.
-    pub message: String,
-}
+use super::hints::Hints;
+use super::recording::Recording;
+use super::refusal::{Flaw, Refusal};
 
 /// Returns a flaw at a piece.
-pub(super) fn flaw<T>(at: &Piece<'_>, message: impl Into<String>) -> Result<T, Flaw> {
+pub(crate) fn flaw<T>(at: &Piece<'_>, message: impl Into<String>) -> Result<T, Flaw> {
     Err(Flaw { span: at.span(), message: message.into() })
 }
 
 /// Why a text is refused: mistakes in it, or a refusal that is not about its text.
 #[derive(Debug)]
-pub(super) enum Wrong {
+pub(crate) enum Wrong {
     Flaws(Vec<Flaw>),
     Refusal(Refusal),
 }
@@ -45,7 +38,7 @@ impl From<Refusal> for Wrong {
 }
 
 /// Decodes bytes and parses the text.
-pub(super) fn read(
+pub(crate) fn read(
     bytes: &[u8],
     hints: &Hints,
     parse: impl FnOnce(&str, &Hints) -> Result<Recording, Wrong>,
@@ -88,50 +81,50 @@ fn wide(bytes: &[u8], unit: impl Fn([u8; 2]) -> u16) -> Cow<'_, str> {
 
 /// A slice of the text with its byte offset.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Piece<'t> {
-    pub(super) text: &'t str,
-    pub(super) start: usize,
+pub(crate) struct Piece<'t> {
+    pub(crate) text: &'t str,
+    pub(crate) start: usize,
 }
 
 impl<'t> Piece<'t> {
     /// Returns its byte range.
-    pub(super) fn span(&self) -> Range<usize> {
+    pub(crate) fn span(&self) -> Range<usize> {
         self.start..self.start + self.text.len()
     }
 
     /// Returns the piece for `text`, which is a slice of this piece's text.
-    pub(super) fn part(&self, text: &'t str) -> Self {
+    pub(crate) fn part(&self, text: &'t str) -> Self {
         Self { text, start: text.as_ptr() as usize - self.text.as_ptr() as usize + self.start }
     }
 
     /// Returns the piece without surrounding blanks.
-    pub(super) fn trimmed(self) -> Self {
+    pub(crate) fn trimmed(self) -> Self {
         self.part(self.text.trim())
     }
 
     /// Returns the words.
-    pub(super) fn words(self) -> impl Iterator<Item = Self> + Clone {
+    pub(crate) fn words(self) -> impl Iterator<Item = Self> + Clone {
         self.text.split_whitespace().map(move |text| self.part(text))
     }
 
     /// Returns the piece after `prefix`, or `None` if it does not start with it; the case does not matter.
-    pub(super) fn after(self, prefix: &str) -> Option<Self> {
+    pub(crate) fn after(self, prefix: &str) -> Option<Self> {
         let head = self.text.get(..prefix.len())?;
         head.eq_ignore_ascii_case(prefix).then(|| self.part(&self.text[prefix.len()..]))
     }
 
     /// Returns the piece without a quote at its start.
-    pub(super) fn part_after_quote(self) -> Self {
+    pub(crate) fn part_after_quote(self) -> Self {
         self.part(self.text.trim_start_matches('"')).trimmed()
     }
 
     /// Parses a finite number, with a decimal point or a decimal comma.
-    pub(super) fn decimal(self, what: &str) -> Result<f64, Flaw> {
+    pub(crate) fn decimal(self, what: &str) -> Result<f64, Flaw> {
         Notation { separator: None, has_decimal_comma: true }.number(self, what)
     }
 
     /// Parses a finite number.
-    pub(super) fn number(self, what: &str) -> Result<f64, Flaw> {
+    pub(crate) fn number(self, what: &str) -> Result<f64, Flaw> {
         match self.text.parse::<f64>() {
             Ok(number) if number.is_finite() => Ok(number),
             Ok(_) => flaw(&self, format!("{what} is not finite: `{}`", shortened(self.text))),
@@ -140,30 +133,30 @@ impl<'t> Piece<'t> {
     }
 
     /// Parses a whole number.
-    pub(super) fn count(self, what: &str) -> Result<u64, Flaw> {
+    pub(crate) fn count(self, what: &str) -> Result<u64, Flaw> {
         self.text.parse().or_else(|_| flaw(&self, format!("{what} is not a whole number: `{}`", shortened(self.text))))
     }
 }
 
 /// The lines of a text, without their ends.
 #[derive(Debug, Clone)]
-pub(super) struct Lines<'t> {
+pub(crate) struct Lines<'t> {
     text: &'t str,
     next: usize,
 }
 
 impl<'t> Lines<'t> {
-    pub(super) const fn new(text: &'t str) -> Self {
+    pub(crate) const fn new(text: &'t str) -> Self {
         Self { text, next: 0 }
     }
 
     /// Returns the empty piece after the last character.
-    pub(super) fn end(&self) -> Piece<'t> {
+    pub(crate) fn end(&self) -> Piece<'t> {
         let text = self.text.trim_end();
         Piece { text: &text[text.len()..], start: text.len() }
     }
 
-    pub(super) fn is_at_end(&self) -> bool {
+    pub(crate) fn is_at_end(&self) -> bool {
         self.next >= self.text.len()
     }
 }
@@ -186,16 +179,16 @@ impl<'t> Iterator for Lines<'t> {
 
 /// How a text writes the numbers of a row.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Notation {
+pub(crate) struct Notation {
     /// Separator of two numbers; `None` for blanks.
-    pub(super) separator: Option<char>,
+    pub(crate) separator: Option<char>,
     /// Whether a comma is a decimal comma: then it does not separate numbers.
-    pub(super) has_decimal_comma: bool,
+    pub(crate) has_decimal_comma: bool,
 }
 
 impl Notation {
     /// Detects the notation of a row: `;`, a tab, a comma or blanks. A comma next to another separator is decimal.
-    pub(super) fn of(row: &str) -> Self {
+    pub(crate) fn of(row: &str) -> Self {
         let row = row.trim();
         let separator = match row {
             row if row.contains(';') => Some(';'),
@@ -207,7 +200,7 @@ impl Notation {
     }
 
     /// Returns the trimmed fields of a row. A separator at the end of the row is ignored.
-    pub(super) fn fields<'t>(self, row: Piece<'t>) -> impl Iterator<Item = Piece<'t>> + Clone {
+    pub(crate) fn fields<'t>(self, row: Piece<'t>) -> impl Iterator<Item = Piece<'t>> + Clone {
         let row = row.trimmed();
         let separator = self.separator;
         let text = separator
@@ -218,7 +211,7 @@ impl Notation {
     }
 
     /// Parses a finite number.
-    pub(super) fn number(self, piece: Piece<'_>, what: &str) -> Result<f64, Flaw> {
+    pub(crate) fn number(self, piece: Piece<'_>, what: &str) -> Result<f64, Flaw> {
         if !self.has_decimal_comma || !piece.text.contains(',') {
             return piece.number(what);
         }

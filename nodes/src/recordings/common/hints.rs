@@ -2,7 +2,7 @@
 
 use tactflow_runtime::signal::Unit;
 
-use super::Refusal;
+use super::refusal::Refusal;
 
 /// Properties of a recording from outside the file. Where the file has them too, both must agree.
 #[derive(Debug, Clone, PartialEq, Default)]
