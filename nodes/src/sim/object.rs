@@ -199,7 +199,7 @@ fn shape_of(params: &ObjectParams) -> Result<Geometry, String> {
     let size = || {
         let size = params.size.ok_or_else(|| given("size"))?;
         let is_good = size.iter().all(|size| *size > 0.0 && size.is_finite());
-        if is_good { Ok(size.map(|size| size / 2.0)) } else { Err("each `size` must be greater than 0".into()) }
+        if is_good { Ok(size.map(|size| size / 2.0)) } else { Err("each `size` must be greater than 0".to_owned()) }
     };
     let used: &[&str] = match kind {
         ShapeKind::Plane => &[],
