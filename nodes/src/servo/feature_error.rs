@@ -1,3 +1,5 @@
+//! Each component keeps the stamp of its own input, so that `pid` measures the time between the samples of a feature.
+
 use tactflow_runtime::node::{
     At, Describe, Inputs, Many, Map, Mistake, Mistakes, Node, Out, Outputs, Param, Setup, Tick,
 };

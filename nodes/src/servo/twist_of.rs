@@ -1,3 +1,5 @@
+//! All inputs are optional; a node without a wire is a mistake.
+
 use tactflow_runtime::node::{At, Describe, In, Inputs, Mistake, Mistakes, Node, Out, Outputs, Param, Setup, Tick};
 use tactflow_runtime::signal::{Scalar, Twist};
 use tactflow_runtime::source::Code;
