@@ -25,7 +25,7 @@ use super::{damped, joint_limits, null_space};
 /// `posture_gain`. The speed and position limits of the model are kept: a command that is too fast is slowed down as a
 /// whole and keeps its direction.
 ///
-/// One joint at its limit stops the whole motion that needs it. `share` is the fraction of the twist that remains, 1 far
+/// One joint at its limit stops the motion that needs it. `share` is the fraction of the twist that remains, 1 far
 /// from every limit. Without a twist the velocity is absent. This node does not smooth the beginning and the end of a
 /// motion, and does not stop old commands: put a `joint_limit` between it and the arm.
 ///

@@ -32,7 +32,7 @@ impl Scene {
         [ball.x, ball.y]
     }
 
-    /// Moves the pad; whatever holds the force holds the ball on it.
+    /// Moves the pad; the ball stays in contact.
     fn step(&mut self, twist: &Twist, dt: f64) {
         let turn = Rotation3::new(twist.angular() * dt);
         self.pad *= IsometryMatrix3::from_parts(Translation3::from(twist.linear() * dt), turn);

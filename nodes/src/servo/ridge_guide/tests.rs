@@ -1,4 +1,4 @@
-//! The guide in fields of eccentricity with a known ridge, on a sensor that does as it is told.
+//! The guide in fields of eccentricity with a known ridge, on a sensor that follows every command exactly.
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 

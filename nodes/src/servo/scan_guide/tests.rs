@@ -1,4 +1,4 @@
-//! The guide on a sensor that does exactly as it is told, over surfaces with a shape in closed form.
+//! The guide on a sensor that follows every command exactly, over surfaces with a shape in closed form.
 
 use nalgebra::{IsometryMatrix3, Rotation3, Translation3, Vector3};
 use proptest::prelude::*;
@@ -59,7 +59,7 @@ impl World {
         (from < to).then_some((from + to) / 2.0)
     }
 
-    /// One sample, and a step of `ms` of a sensor that goes at `share` of what it is told.
+    /// One sample, and a step of `ms` of a sensor that moves at a fraction `share` of the commanded speed.
     fn step(&mut self, ms: f64, share: f64) {
         let contact = [self.contact(0), self.contact(1)];
         self.rig.set("gate", contact.iter().all(Option::is_some));
