@@ -156,7 +156,8 @@ impl Unit {
     }
 
     /// Whether a parameter may declare it: products and quotients of [`PARAM_UNITS`](Self::PARAM_UNITS) and capital
-    /// letters, such as `N s/m` or `U/s2`, several as `m/s, rad/s`, or `$` with the name of a parameter.
+    /// letters, such as `N s/m` or `U/s2`, several as `m/s, rad/s`, or `$` with the name of a parameter. `_` is the unit
+    /// of the component that an entry of a table is for.
     #[must_use]
     pub const fn is_param_unit(text: &str) -> bool {
         let text = text.as_bytes();
@@ -202,7 +203,7 @@ const fn is_atom(text: &[u8]) -> bool {
         }
         i += 1;
     }
-    matches!(text, [b'A'..=b'Z'])
+    matches!(text, [b'A'..=b'Z' | b'_'])
 }
 
 /// Whether two texts are equal.
@@ -239,7 +240,7 @@ mod tests {
         for text in ["", "UV", "U/m", "_/s2", "newton", "m/s3", "u"] {
             assert!(!Unit::is_port_unit(text), "{text}");
         }
-        for text in ["1", "m/s2", "N s/m", "m/s, rad/s", "U/s", "V/U", "kg m2", "$unit", "%"] {
+        for text in ["1", "m/s2", "N s/m", "m/s, rad/s", "U/s", "V/U", "kg m2", "$unit", "%", "_", "m/_, rad/_"] {
             assert!(Unit::is_param_unit(text), "{text}");
         }
         for text in ["", "newton", "m/", "/s", "m,rad", "m,, rad", "$", "m//s", "2", "m/s²"] {
