@@ -211,7 +211,9 @@ mod tests {
     }
 
     /// A node whose declaration is as wrong as `spec` makes it.
-    struct Wrong(fn(&mut NodeSpec));
+    struct Wrong(Change);
+
+    type Change = fn(&mut NodeSpec);
 
     impl NodeType for Wrong {
         fn spec(&self) -> NodeSpec {
@@ -240,7 +242,7 @@ mod tests {
             ParamSpec::of::<f64>(&declared, Some(default))
         };
         assert_eq!(bounded(|| 1.0).fault, None);
-        let cases: [(fn(&mut NodeSpec), &str); 9] = [
+        let cases: [(Change, &str); 9] = [
             (
                 |spec| spec.outputs[0].args = vec!["newton".into()].into(),
                 "`wrong.x` declares the unit Some(\"newton\")",
