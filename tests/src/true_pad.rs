@@ -65,11 +65,13 @@ const TRUTH: [(&str, &str); 15] = [
     ("own_noise", "N/tactel"),
 ];
 
-impl Device for TruePad {
-    type Params = Params;
-
+impl tactflow_runtime::node::Describe for TruePad {
     const NAME: &'static str = "true_pad";
     const SUMMARY: &'static str = "a pad that is pressed, and that knows the truth of it";
+}
+
+impl Device for TruePad {
+    type Params = Params;
 
     fn open(params: Params) -> Result<Opened, Mistakes> {
         let shape = ImageShape { rows: SIDE, cols: SIDE, pitch: [PITCH; 2], unit: Unit::NEWTON };

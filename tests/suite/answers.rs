@@ -81,7 +81,7 @@ fn a_description_says_everything_of_a_node() {
     ];
     assert_lines(&json(&["describe", "pid"], 0), &lines);
     let markdown = say(&["describe", "pid", "--format", "markdown"]).out;
-    assert!(markdown.contains("## Inputs\n\n- **`in.error`**: features, any unit, frame A; required"), "{markdown}");
+    assert!(markdown.contains("## Inputs\n\n- **`in.error`**: features, unit E, frame A; required"), "{markdown}");
 }
 
 #[test]

@@ -92,10 +92,13 @@ impl Live for Brittle {
     }
 }
 
-impl Device for Brittle {
-    type Params = Empty;
+impl tactflow_runtime::node::Describe for Brittle {
     const NAME: &'static str = "brittle";
     const SUMMARY: &'static str = "a driver that panics";
+}
+
+impl Device for Brittle {
+    type Params = Empty;
 
     fn open(_: Empty) -> Result<Opened, Mistakes> {
         let mut description = Description::every(0.01);

@@ -64,9 +64,7 @@ struct Ports {
     velocity: Command,
 }
 
-impl Device for MockArm {
-    type Params = Params;
-
+impl tactflow_runtime::node::Describe for MockArm {
     const NAME: &'static str = "mock_arm";
     const SUMMARY: &'static str = "an arm without dynamics that does exactly as it is told";
     const DOC: &'static str = "It integrates the commanded joint velocity exactly: that is its `equilibrium`. Its \
@@ -93,6 +91,10 @@ tip = "lwr_7_link"
 mount = { xyz = [0.0, 0.0, 0.03] }   # of the sensor on the tip [m]
 start = [0.0, 0.5, 0.0, -1.3, 0.0, 1.3, 0.0]   # [rad]
 "#;
+}
+
+impl Device for MockArm {
+    type Params = Params;
 
     fn open(params: Params) -> Result<Opened, Mistakes> {
         let chain = load(&params.urdf, &params.tip, &params.mount)?;

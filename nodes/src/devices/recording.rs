@@ -44,9 +44,7 @@ pub struct Player {
     next: usize,
 }
 
-impl Device for Player {
-    type Params = Params;
-
+impl tactflow_runtime::node::Describe for Player {
     const NAME: &'static str = "recording";
     const SUMMARY: &'static str =
         "plays a recorded file of a tactile or pressure sensor (Tekscan, novel, XSENSOR, CSV, …) as a pad";
@@ -79,6 +77,10 @@ pad = "pad"
 type = "recording"
 file = "builtin:finger_press.csv"   # a finger on a Tekscan I-Scan: 28 by 28 sensels, 1.27 mm apart, raw, 10 Hz
 "#;
+}
+
+impl Device for Player {
+    type Params = Params;
 
     fn open(params: Params) -> Result<Opened, Mistakes> {
         let file = &params.file;
@@ -192,7 +194,11 @@ mod tests {
     #[test]
     fn the_doc_names_every_format() {
         for format in recordings::FORMATS {
-            assert!(Player::DOC.contains(&format!("`{}`", format.name)), "{}", format.name);
+            assert!(
+                <Player as tactflow_runtime::node::Describe>::DOC.contains(&format!("`{}`", format.name)),
+                "{}",
+                format.name
+            );
         }
     }
 

@@ -110,9 +110,7 @@ pub struct SimBench {
     threshold: f64,
 }
 
-impl Device for SimBench {
-    type Params = Params;
-
+impl tactflow_runtime::node::Describe for SimBench {
     const NAME: &'static str = "sim_bench";
     const SUMMARY: &'static str =
         "a simulated bench: a foam pad on an arm in joint impedance control, and objects to touch";
@@ -156,6 +154,10 @@ objects = [
     { shape = "ball", radius = 0.04, at = [0.01, -0.005, 0.041] },   # 1 mm before the pad [m]
 ]
 "#;
+}
+
+impl Device for SimBench {
+    type Params = Params;
 
     fn open(params: Params) -> Result<Opened, Mistakes> {
         let chain = load(&params.urdf, &params.tip, &params.mount)?;

@@ -35,10 +35,14 @@ pub(crate) fn derive(input: &DeriveInput) -> TokenStream {
             faults.add(name, format!("`{}` stands here twice", name.value()));
         }
     }
+    for Name { name, .. } in names.iter().filter(|_| !page.blocks.is_empty()) {
+        if !page.blocks.iter().any(|block| is_example_of(block, &name.value())) {
+            faults.add(name, format!("no `toml` block of the doc comment has `type = \"{}\"`", name.value()));
+        }
+    }
     let body = page.body(|block| names.iter().any(|name| is_example_of(block, &name.name.value())));
     let implementations: TokenStream = names.iter().map(|name| implementation(name, &page, &body, input)).collect();
-    let faults = faults.into_tokens();
-    quote! { #faults #implementations }
+    faults.with(implementations)
 }
 
 fn name(attribute: &Attribute, input: &DeriveInput, faults: &mut Faults) -> Option<Name> {

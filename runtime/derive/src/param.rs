@@ -30,8 +30,7 @@ pub(crate) fn derive(input: &DeriveInput) -> TokenStream {
         Data::Enum(data) => words(input, data, &mut faults),
         _ => table(input, &mut faults),
     };
-    let faults = faults.into_tokens();
-    quote! { #faults #implementation }
+    faults.with(implementation)
 }
 
 fn table(input: &DeriveInput, faults: &mut Faults) -> TokenStream {
@@ -40,9 +39,19 @@ fn table(input: &DeriveInput, faults: &mut Faults) -> TokenStream {
     let (ident, (generics, arguments, bounds)) = (&input.ident, input.generics.split_for_impl());
     let idents: Vec<&Ident> = parameters.iter().map(|parameter| &parameter.name).collect();
     let names: Vec<String> = idents.iter().map(|ident| ident.to_string()).collect();
-    let types: Vec<_> = parameters.iter().map(|parameter| &parameter.field.ty).collect();
-    let declared: Vec<TokenStream> = parameters.iter().map(declared).collect();
-    let defaults: Vec<TokenStream> = parameters.iter().map(default).collect();
+    let specs = parameters.iter().map(|parameter| {
+        let (ty, declared, default) = (&parameter.field.ty, declared(parameter), default(parameter));
+        quote_spanned!(ty.span()=> ::tactflow_runtime::node::ParamSpec::of::<#ty>(&#declared, #default))
+    });
+    let reads = parameters.iter().map(|parameter| {
+        let (ty, name) = (&parameter.field.ty, &parameter.name);
+        let (declared, default) = (declared(parameter), default(parameter));
+        quote_spanned!(ty.span()=> let #name = reader.field::<#ty>(&mut table, &#declared, #default);)
+    });
+    let written = parameters.iter().map(|parameter| {
+        let (ty, ident, name) = (&parameter.field.ty, &parameter.name, parameter.name.to_string());
+        quote_spanned!(ty.span()=> (#name, <#ty as ::tactflow_runtime::node::Param>::written(&self.#ident)))
+    });
     let checks: TokenStream = parameters.iter().map(|parameter| checks(parameter, input)).collect();
     quote! {
         #checks
@@ -52,13 +61,11 @@ fn table(input: &DeriveInput, faults: &mut Faults) -> TokenStream {
             const EXPECTS: &'static str = "a table";
 
             fn fields() -> ::std::vec::Vec<::tactflow_runtime::node::ParamSpec> {
-                ::std::vec![#(::tactflow_runtime::node::ParamSpec::of::<#types>(&#declared, #defaults)),*]
+                ::std::vec![#(#specs),*]
             }
 
             fn written(&self) -> ::core::option::Option<::tactflow_runtime::node::Written> {
-                ::tactflow_runtime::node::written_table([
-                    #((#names, ::tactflow_runtime::node::Param::written(&self.#idents))),*
-                ])
+                ::tactflow_runtime::node::written_table([#(#written),*])
             }
 
             fn read(
@@ -66,7 +73,7 @@ fn table(input: &DeriveInput, faults: &mut Faults) -> TokenStream {
                 reader: &mut ::tactflow_runtime::node::Reader<'_>,
             ) -> ::core::option::Option<Self> {
                 let mut table = reader.table(value)?;
-                #(let #idents = reader.field::<#types>(&mut table, &#declared, #defaults);)*
+                #(#reads)*
                 reader.close(table, &[#(#names),*]);
                 ::core::option::Option::Some(Self { #(#idents: #idents?),* })
             }
@@ -169,11 +176,11 @@ fn checks(parameter: &Parameter, input: &DeriveInput) -> TokenStream {
 /// An enum without data: one of a few words.
 fn words(input: &DeriveInput, data: &DataEnum, faults: &mut Faults) -> TokenStream {
     if data.variants.is_empty() {
-        faults.add(&input.ident, "a parameter that is a word needs a word to be");
+        faults.fatal(&input.ident, "a parameter that is a word needs a word to be");
     }
     let mut word = |variant: &Variant| {
         if !variant.fields.is_empty() {
-            faults.add(&variant.fields, "a word of a graph file carries no data");
+            faults.fatal(&variant.fields, "a word of a graph file carries no data");
         }
         let doc = text(&variant.attrs);
         if doc.is_empty() {

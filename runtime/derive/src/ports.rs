@@ -56,15 +56,19 @@ pub(crate) fn inputs(input: &DeriveInput) -> TokenStream {
     let (_, arguments, _) = input.generics.split_for_impl();
     let plain = without_lifetimes(&input.generics);
     let (_, shape_arguments, _) = plain.split_for_impl();
-    let (shapes_name, names) = (beside(name, "Shapes"), names(&ports));
+    let shapes_name = beside(name, "Shapes");
     let specs = ports.iter().map(spec);
-    let views: Vec<_> = ports.iter().map(|port| view(port, &lifetime)).collect();
-    let wires = 0..ports.len();
-    let ticks = ports.iter().map(|port| if port.is_delayed { quote!(tick.wrapping_sub(1)) } else { quote!(tick) });
+    let shapes_of = ports.iter().map(|port| {
+        let (name, view) = (&port.name, view(port, &lifetime));
+        quote_spanned!(port.signal.span()=> #name: #view::shape(wires.next().unwrap_or_default()))
+    });
+    let fetched = ports.iter().enumerate().map(|(i, port)| {
+        let (name, view) = (&port.name, view(port, &lifetime));
+        let tick = if port.is_delayed { quote!(tick.wrapping_sub(1)) } else { quote!(tick) };
+        quote_spanned!(port.signal.span()=> #name: #view::fetch(bus, wires, #i, #tick))
+    });
     let (letters, checks) = (letters(input, &ports), checks(&ports));
-    let faults = faults.into_tokens();
-    quote! {
-        #faults
+    faults.with(quote! {
         #checks
         #shapes
         #letters
@@ -81,11 +85,7 @@ pub(crate) fn inputs(input: &DeriveInput) -> TokenStream {
                 wires: ::std::vec::Vec<::std::vec::Vec<(::std::string::String, ::tactflow_runtime::signal::Shape)>>,
             ) -> Self::Shapes {
                 let mut wires = wires.into_iter();
-                #shapes_name {
-                    #(#names: <#views as ::tactflow_runtime::node::View<#lifetime>>::shape(
-                        wires.next().unwrap_or_default(),
-                    )),*
-                }
+                #shapes_name { #(#shapes_of),* }
             }
 
             #[inline]
@@ -94,12 +94,10 @@ pub(crate) fn inputs(input: &DeriveInput) -> TokenStream {
                 wires: &#lifetime ::tactflow_runtime::node::Wires,
                 tick: u64,
             ) -> Self {
-                Self {
-                    #(#names: <#views as ::tactflow_runtime::node::View<#lifetime>>::fetch(bus, wires, #wires, #ticks)),*
-                }
+                Self { #(#fetched),* }
             }
         }
-    }
+    })
 }
 
 pub(crate) fn outputs(input: &DeriveInput) -> TokenStream {
@@ -108,12 +106,21 @@ pub(crate) fn outputs(input: &DeriveInput) -> TokenStream {
     let (name, shapes, shapes_name) = (&input.ident, shapes(input, &ports), beside(&input.ident, "Shapes"));
     let (head, arguments, bounds) = input.generics.split_for_impl();
     let (names, specs) = (names(&ports), ports.iter().map(spec));
-    let signals: Vec<_> = ports.iter().map(|port| &port.signal).collect();
-    let slots: Vec<_> = (0..ports.len()).collect();
+    let each = |step: fn(&Ident, &Type, usize, Span) -> TokenStream| -> Vec<TokenStream> {
+        let numbered = ports.iter().enumerate();
+        numbered.map(|(i, port)| step(&port.name, &port.signal, i, port.signal.span())).collect()
+    };
+    let taken = each(
+        |name, signal, i, span| quote_spanned!(span=> #name: ::tactflow_runtime::node::Out::<#signal>::take(bus, ports[#i], tick)),
+    );
+    let put = each(
+        |name, signal, i, span| quote_spanned!(span=> ::tactflow_runtime::node::Out::<#signal>::put(self.#name, bus, ports[#i], tick);),
+    );
+    let lost = each(
+        |_, signal, i, span| quote_spanned!(span=> ::tactflow_runtime::node::Out::<#signal>::lose_port(bus, ports[#i], tick);),
+    );
     let (bound, checks) = (bound(&ports), checks(&ports));
-    let faults = faults.into_tokens();
-    quote! {
-        #faults
+    faults.with(quote! {
         #checks
         #bound
         #shapes
@@ -136,7 +143,7 @@ pub(crate) fn outputs(input: &DeriveInput) -> TokenStream {
                 ports: &[::tactflow_runtime::node::PortId],
                 tick: &::tactflow_runtime::node::Tick,
             ) -> Self {
-                Self { #(#names: ::tactflow_runtime::node::Out::take(bus, ports[#slots], tick)),* }
+                Self { #(#taken),* }
             }
 
             #[inline]
@@ -146,7 +153,7 @@ pub(crate) fn outputs(input: &DeriveInput) -> TokenStream {
                 ports: &[::tactflow_runtime::node::PortId],
                 tick: &::tactflow_runtime::node::Tick,
             ) {
-                #(self.#names.put(bus, ports[#slots], tick);)*
+                #(#put)*
             }
 
             fn lose(
@@ -154,10 +161,10 @@ pub(crate) fn outputs(input: &DeriveInput) -> TokenStream {
                 ports: &[::tactflow_runtime::node::PortId],
                 tick: u64,
             ) {
-                #(::tactflow_runtime::node::Out::<#signals>::lose_port(bus, ports[#slots], tick);)*
+                #(#lost)*
             }
         }
-    }
+    })
 }
 
 fn names(ports: &[Port]) -> Vec<&Ident> {
@@ -188,7 +195,7 @@ fn port(field: Field, is_input: bool, type_parameters: &[&Ident], faults: &mut F
         ["optional", "present_if_wired", "sampled", "delayed"].map(|word| flag(word, &mut words, faults));
     let Some((form, signal)) = form(&field.ty).filter(|(form, _)| (*form == Form::Out) != is_input) else {
         let expected = if is_input { INPUT_FORMS } else { "an output is `Out<T>`, where `T` is a signal" };
-        faults.add(&field.ty, expected);
+        faults.fatal(&field.ty, expected);
         return None;
     };
     combination(form, [&optional, &present_if_wired, &sampled, &delayed], faults);
@@ -291,14 +298,17 @@ fn mentions(code: &TokenStream, names: &[&Ident]) -> bool {
     })
 }
 
-/// The type that the contract sees the port as.
+/// The view of an input, for a call of one of its functions.
 fn view(port: &Port, lifetime: &Lifetime) -> TokenStream {
-    let signal = &port.signal;
-    match port.form {
-        Form::In | Form::Out => quote!(::tactflow_runtime::node::In<#lifetime, #signal>),
-        Form::OptionIn => quote!(::core::option::Option<::tactflow_runtime::node::In<#lifetime, #signal>>),
-        Form::Many => quote!(::tactflow_runtime::node::Many<#lifetime, #signal>),
-    }
+    let (signal, span) = (&port.signal, port.signal.span());
+    let view = match port.form {
+        Form::In | Form::Out => quote_spanned!(span=> ::tactflow_runtime::node::In<#lifetime, #signal>),
+        Form::OptionIn => {
+            quote_spanned!(span=> ::core::option::Option<::tactflow_runtime::node::In<#lifetime, #signal>>)
+        }
+        Form::Many => quote_spanned!(span=> ::tactflow_runtime::node::Many<#lifetime, #signal>),
+    };
+    quote_spanned!(span=> <#view as ::tactflow_runtime::node::View<#lifetime>>)
 }
 
 /// The declaration as data.
@@ -321,7 +331,8 @@ fn spec(port: &Port) -> TokenStream {
             }
         },
     };
-    quote!(::tactflow_runtime::node::PortSpec::of::<#signal>(#name, #doc, &[#(#arguments),*], #need))
+    quote_spanned!(signal.span()=>
+        ::tactflow_runtime::node::PortSpec::of::<#signal>(#name, #doc, &[#(#arguments),*], #need))
 }
 
 fn without_lifetimes(generics: &Generics) -> Generics {
@@ -336,7 +347,7 @@ fn shapes(input: &DeriveInput, ports: &[Port]) -> TokenStream {
     let (doc, bounds) = (format!("Shapes of the ports of `{}`.", input.ident), &generics.where_clause);
     let fields = ports.iter().map(|port| {
         let (name, vis, doc, signal) = (&port.name, &port.field.vis, text(&port.field.attrs), &port.signal);
-        let shape = quote!(<#signal as ::tactflow_runtime::signal::Signal>::Shape);
+        let shape = quote_spanned!(signal.span()=> <#signal as ::tactflow_runtime::signal::Signal>::Shape);
         let shape = match port.form {
             Form::In | Form::Out => shape,
             Form::OptionIn => quote!(::core::option::Option<#shape>),

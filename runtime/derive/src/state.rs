@@ -11,9 +11,7 @@ pub(crate) fn derive(input: &DeriveInput) -> TokenStream {
     let fields = faults.fields(input, "a node's state");
     let names: Vec<_> = fields.iter().filter_map(|field| field.ident.as_ref()).collect();
     let (name, (generics, arguments, bounds)) = (&input.ident, input.generics.split_for_impl());
-    let faults = faults.into_tokens();
-    quote! {
-        #faults
+    faults.with(quote! {
         #[automatically_derived]
         impl #generics ::core::clone::Clone for #name #arguments #bounds {
             fn clone(&self) -> Self {
@@ -24,5 +22,5 @@ pub(crate) fn derive(input: &DeriveInput) -> TokenStream {
                 #(::core::clone::Clone::clone_from(&mut self.#names, &from.#names);)*
             }
         }
-    }
+    })
 }

@@ -94,6 +94,13 @@ pub(super) struct Param {
     pub(super) name: &'static str,
     pub(super) takes: String,
     pub(super) unit: Option<String>,
+    /// Lower and upper end of the range; absent where there is none.
+    pub(super) range: Option<[Option<f64>; 2]>,
+    /// Whether the lower end itself is out of range.
+    pub(super) is_open: bool,
+    /// The words it takes, each with its meaning.
+    #[serde(skip_serializing_if = "<[_]>::is_empty")]
+    pub(super) words: &'static [(&'static str, &'static str)],
     /// As a graph file would say it.
     pub(super) default: Option<String>,
     pub(super) is_required: bool,
@@ -324,6 +331,9 @@ fn param(spec: &ParamSpec) -> Param {
         name: spec.name,
         takes: spec.takes.clone(),
         unit: spec.unit.clone(),
+        range: spec.bounds.map(|bounds| [bounds.min, bounds.max].map(|end| Some(end).filter(|end| end.is_finite()))),
+        is_open: spec.bounds.is_some_and(|bounds| bounds.is_open),
+        words: spec.words,
         default: spec.default.clone(),
         is_required: !spec.is_optional,
         is_live: spec.is_live,

@@ -125,7 +125,9 @@ fn params(specs: &[Param], path: &str, items: &mut Vec<Item>) {
         };
         let live = if param.is_live { "; live" } else { "" };
         let what = format!("{}; {default}{live}", param.takes);
-        items.push(Item { name: name.clone(), what, more: vec![param.doc.clone()] });
+        let words = param.words.iter().map(|(word, doc)| format!("`{word}`: {doc}"));
+        let more = [param.doc.clone()].into_iter().chain(words).collect();
+        items.push(Item { name: name.clone(), what, more });
         params(&param.fields, &format!("{name}{}", param.then), items);
     }
 }

@@ -14,7 +14,7 @@ use std::borrow::Cow;
 use std::fmt;
 use std::marker::PhantomData;
 
-use crate::node::{Mistakes, Param, ParamSpec, PortSpec, Reader};
+use crate::node::{Describe, Mistakes, Param, ParamSpec, PortSpec, Reader};
 use crate::source::Value;
 
 pub(crate) use description::StatedPort;
@@ -111,20 +111,10 @@ pub struct Opened {
     pub driver: Driver,
 }
 
-/// A device type.
-pub trait Device: Sized + 'static {
+/// A device type. Its example plugs it into a graph: `[roles]`, `[commands]`, `[bind]` and `[devices.…]`.
+pub trait Device: Describe + Sized + 'static {
     /// What a bench file may set.
     type Params: Param;
-
-    /// Its `type` in a bench file.
-    const NAME: &'static str;
-    /// What it is, in one line.
-    const SUMMARY: &'static str;
-
-    /// What else there is to know, for the reference. Markdown.
-    const DOC: &'static str = "";
-    /// What plugs it into a graph, to paste: `[roles]`, `[commands]`, `[bind]` and `[devices.…]`.
-    const EXAMPLE: &'static str = "";
 
     /// Opens the device. A live one does not connect yet: it connects when it runs.
     ///

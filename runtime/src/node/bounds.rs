@@ -27,8 +27,8 @@ impl Bounds {
     /// Whether no finite number is in range.
     #[must_use]
     pub const fn is_empty(&self) -> bool {
-        // Not `min > max`: a bound that is no number leaves nothing either.
-        !(self.min <= self.max) || (self.is_open && self.min == self.max)
+        let is_nan = self.min.is_nan() || self.max.is_nan();
+        is_nan || self.min > self.max || (self.is_open && self.min == self.max)
     }
 
     /// Whether `number` is finite and in range.

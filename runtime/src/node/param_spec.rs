@@ -1,6 +1,7 @@
 //! What is known of a parameter without a graph: for the reference, and for whoever shows a graph with its defaults.
 
-use super::{Bounds, Param};
+use super::{Bounds, Param, Reader};
+use crate::source::{SourceMap, Value};
 
 /// A parameter as a graph file would say it.
 pub type Written = toml::Value;
@@ -38,6 +39,8 @@ pub struct ParamSpec {
     pub fields: Vec<ParamSpec>,
     /// Whether it may change while the graph runs: a mode can set it.
     pub is_live: bool,
+    /// Why a graph file could not give the default; the catalogue refuses such a node.
+    pub fault: Option<String>,
 }
 
 /// How often the fields of a nested table are there.
@@ -79,18 +82,21 @@ impl ParamSpec {
     #[must_use]
     pub fn of<T: Param>(declared: &Declared, default: Option<fn() -> T>) -> Self {
         let Declared { name, doc, unit, bounds, is_live } = *declared;
+        let written = default.and_then(|value| value().written());
         Self {
             name,
             doc: doc.into(),
-            unit: unit.map(|unit| unit.replace("2", "²").replace('3', "³")),
+            unit: unit
+                .map(|unit| if unit.starts_with('$') { unit.into() } else { unit.replace('2', "²").replace('3', "³") }),
             bounds,
             words: T::WORDS,
             takes: T::takes(bounds.as_ref()),
-            default: default.and_then(|value| Some(value().written()?.to_string())),
+            default: written.as_ref().map(Written::to_string),
             is_optional: default.is_some() || T::when_missing().is_some(),
             repeats: T::REPEATS,
             fields: T::fields(),
             is_live,
+            fault: written.and_then(|written| fault::<T>(&written, bounds)),
         }
     }
 
@@ -116,6 +122,16 @@ impl ParamSpec {
             None => doc,
         }
     }
+}
+
+/// What the reader says of a default.
+fn fault<T: Param>(written: &Written, bounds: Option<Bounds>) -> Option<String> {
+    let mut sources = SourceMap::default();
+    sources.add("default", "", "");
+    let mut reader = Reader::new(&sources);
+    reader.bounds = bounds;
+    T::read(&Value::from_toml(written, &(0..0)), &mut reader);
+    reader.mistakes.into_iter().next().map(|mistake| mistake.message)
 }
 
 /// A default that cannot say itself what a graph file would say: `Choose::LastSeen` is the word `"last_seen"`.

@@ -11,6 +11,10 @@ use crate::source::{Code, closest, meant};
 use crate::source::{Item, Key, Value};
 
 /// Something a graph file may set.
+#[diagnostic::on_unimplemented(
+    message = "`{Self}` is not a type of a parameter",
+    note = "a struct or an enum of yours becomes one with `#[derive(Param)]`"
+)]
 pub trait Param: Sized {
     /// What it takes, for a person: `a number`.
     const EXPECTS: &'static str;

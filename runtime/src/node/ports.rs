@@ -56,7 +56,7 @@ impl PortSpec {
         let value = |argument: &&str| arguments.iter().find(|(name, _)| name == argument).map(|(_, value)| *value);
         let is_said = |argument: &&str| *argument == "unit" || value(argument) != Some("_");
         let arguments = T::KIND.arguments().iter().take_while(|argument| is_said(argument));
-        let args = arguments.filter_map(|argument| value(&argument)).map(Cow::Borrowed).collect();
+        let args = arguments.filter_map(value).map(Cow::Borrowed).collect();
         Self { name: name.into(), doc: doc.into(), kind: T::KIND, args, need }
     }
 }

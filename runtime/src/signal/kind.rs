@@ -47,6 +47,10 @@ impl ScalarShape {
 pub struct FlagShape;
 
 /// A value that travels on a wire: one type a kind.
+#[diagnostic::on_unimplemented(
+    message = "`{Self}` is not a signal",
+    note = "signals are `Scalar`, `Flag`, `Features`, `Image`, `Mask`, `Regions`, `Twist`, `Pose`, `Joints` and `Jacobian`"
+)]
 pub trait Signal: Default + Clone + Send + 'static {
     /// Which kind.
     const KIND: Kind;

@@ -9,30 +9,32 @@ use std::time::{Duration, Instant};
 
 use async_trait::async_trait;
 use tactflow_runtime::device::{Description, Device, DeviceError, Driver, Link, Live, Opened, Output};
-use tactflow_runtime::node::{Count, Mistakes, NonNegative, Positive, Rate};
-use tactflow_runtime::params;
+use tactflow_runtime::node::{Describe, Mistakes, Param};
 use tactflow_runtime::signal::{Image, ImageShape, Unit};
 use tokio::net::UdpSocket;
 use tokio::time::timeout;
 
-params! {
-    /// Where the pad listens, as `host:port`.
-    address: String,
-    /// Number of rows.
-    rows: Count = Count(16),
-    /// Number of columns.
-    cols: Count = Count(16),
-    /// Distance between the centres of two neighbours, along x and along y [m].
-    pitch: Positive = Positive(0.005),
-    /// Frames per second [1/s].
-    rate_hz: Rate = Rate(100.0),
-    /// How long no frame may come before the pad is lost [s].
-    silence_s: Positive = Positive(0.2),
-    /// Force on a tactel that is above its noise [N].
-    threshold: NonNegative = NonNegative(0.015),
-}
-
-/// The driver of a pad.
+/// A tactile pad that streams its frames as UDP datagrams.
+///
+/// The device sends `hello` to `address`. The pad answers with frames: a number (`u64`) and one `f32` per tactel in N, row
+/// after row, all little-endian.
+///
+/// When no frame comes for `silence_s`, the pad is lost and the device connects again. It counts `bad frames` and
+/// `reconnects`. It states the facts `threshold` and `calibration`.
+///
+/// ```toml
+/// [roles]
+/// pad = "tactile_pad"
+///
+/// [bind]
+/// pad = "skin"
+///
+/// [devices.skin]
+/// type = "udp_pad"
+/// address = "192.168.0.7:5005"
+/// ```
+#[derive(Describe)]
+#[describe(name = "udp_pad")]
 pub struct UdpPad {
     image: Output<Image>,
     address: String,
@@ -41,36 +43,43 @@ pub struct UdpPad {
     frame: Vec<f32>,
 }
 
+/// Parameters of `udp_pad`.
+#[derive(Debug, Clone, Param)]
+pub struct Params {
+    /// Where the pad listens, as `host:port`.
+    address: String,
+    /// Number of rows.
+    #[param(range = 1..=1_000_000, default = 16)]
+    rows: usize,
+    /// Number of columns.
+    #[param(range = 1..=1_000_000, default = 16)]
+    cols: usize,
+    /// Distance between the centres of two neighbours, along x and along y.
+    #[param(unit = "m", above = 0.0, default = 0.005)]
+    pitch: f64,
+    /// Frames per second.
+    #[param(unit = "Hz", range = 0.001..=1e6, default = 100.0)]
+    rate_hz: f64,
+    /// Time without a frame after which the pad is lost.
+    #[param(unit = "s", above = 0.0, default = 0.2)]
+    silence_s: f64,
+    /// Force on a tactel that is above its noise.
+    #[param(unit = "N", range = 0.0.., default = 0.015)]
+    threshold: f64,
+}
+
 impl Device for UdpPad {
     type Params = Params;
 
-    const NAME: &'static str = "udp_pad";
-    const SUMMARY: &'static str = "a tactile pad that streams its frames as UDP datagrams";
-    const DOC: &'static str = "The device sends `hello` to `address`. The pad answers with frames: a number (`u64`) and \
-        one `f32` per tactel in N, row after row, all little-endian.\n\n\
-        When no frame comes for `silence_s`, the pad is lost and the device connects again. It counts `bad frames` and \
-        `reconnects`. It states the facts `threshold` and `calibration`.";
-    const EXAMPLE: &'static str = r#"
-[roles]
-pad = "tactile_pad"
-
-[bind]
-pad = "skin"
-
-[devices.skin]
-type = "udp_pad"
-address = "192.168.0.7:5005"
-"#;
-
     fn open(params: Params) -> Result<Opened, Mistakes> {
-        let (rows, cols) = (params.rows.0, params.cols.0);
-        let shape = ImageShape { rows, cols, pitch: [*params.pitch; 2], unit: Unit::NEWTON };
-        let mut description = Description::every(1.0 / *params.rate_hz);
+        let (rows, cols) = (params.rows, params.cols);
+        let shape = ImageShape { rows, cols, pitch: [params.pitch; 2], unit: Unit::NEWTON };
+        let mut description = Description::every(1.0 / params.rate_hz);
         let mut pad = description.fills("tactile_pad");
         let image = pad.output("image", shape);
-        pad.fact("threshold", *params.threshold);
+        pad.fact("threshold", params.threshold);
         pad.fact("calibration", toml::Table::from_iter([("gain".to_owned(), 1.0.into())]));
-        let silence = Duration::from_secs_f64(*params.silence_s);
+        let silence = Duration::from_secs_f64(params.silence_s);
         let driver = Self { image, address: params.address, silence, frame: vec![0.0; rows * cols] };
         Ok(Opened { description, driver: Driver::Live(Box::new(driver)) })
     }

@@ -21,9 +21,7 @@ pub struct LineLength {
     value: Output<Scalar>,
 }
 
-impl Device for LineLength {
-    type Params = Params;
-
+impl tactflow_runtime::node::Describe for LineLength {
     const NAME: &'static str = "line_length";
     const SUMMARY: &'static str = "a number a line from a TCP connection";
     const DOC: &'static str = "Each line is a length in metres. It runs in real time.";
@@ -38,6 +36,10 @@ length = "ruler"
 type = "line_length"
 address = "127.0.0.1:4000"
 "#;
+}
+
+impl Device for LineLength {
+    type Params = Params;
 
     fn open(params: Params) -> Result<Opened, Mistakes> {
         let mut description = Description::every(0.01);

@@ -40,9 +40,7 @@ params! {
 /// The device; what runs is a `Bridge`.
 pub struct Lockstep;
 
-impl Device for Lockstep {
-    type Params = Params;
-
+impl tactflow_runtime::node::Describe for Lockstep {
     const NAME: &'static str = "lockstep";
     const SUMMARY: &'static str =
         "a pad and an arm in another program: any simulator that speaks the lockstep protocol";
@@ -75,6 +73,10 @@ arm = "bench"
 type = "lockstep"
 address = "127.0.0.1:7777"
 "#;
+}
+
+impl Device for Lockstep {
+    type Params = Params;
 
     fn open(params: Params) -> Result<Opened, Mistakes> {
         let at = |why: String| refusal(&params.address, why);

@@ -68,9 +68,7 @@ struct Due {
     is_nan: bool,
 }
 
-impl Device for MockPad {
-    type Params = Params;
-
+impl tactflow_runtime::node::Describe for MockPad {
     const NAME: &'static str = "mock_pad";
     const SUMMARY: &'static str =
         "a simulated pad that is pressed by points and bars, and misbehaves, as its bench says";
@@ -96,6 +94,10 @@ press = [
     { from_s = 0.5, to_s = 3.5, at = [-0.010, 0.005], speed = [0.004, 0.0], force = 4.0 },   # [s, s, m, m/s, N]
 ]
 "#;
+}
+
+impl Device for MockPad {
+    type Params = Params;
 
     fn open(params: Params) -> Result<Opened, Mistakes> {
         let mut mistakes = Mistakes::new();

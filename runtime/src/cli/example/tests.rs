@@ -91,8 +91,7 @@ crate::params! {}
 /// A motor that stands still.
 struct Motor;
 
-impl Device for Motor {
-    type Params = Params;
+impl tactflow_runtime::node::Describe for Motor {
     const NAME: &'static str = "still_motor";
     const SUMMARY: &'static str = "";
     const EXAMPLE: &'static str = r#"
@@ -108,6 +107,10 @@ motor = "m"
 [devices.m]
 type = "still_motor"
 "#;
+}
+
+impl Device for Motor {
+    type Params = Params;
 
     fn open(_: Params) -> Result<Opened, Mistakes> {
         let joint = Joint { name: "a".into(), lower: -1.0, upper: 1.0, speed: 1.0, acceleration: 10.0 };

@@ -87,7 +87,7 @@ impl NodeRunner {
         let is_woken = all().any(|(need, _)| need.is_trigger && !need.is_delayed);
         let is_required = |need: &Need| need.must_be_present && need.is_trigger;
         let (required, others) = (all().filter(|(need, _)| is_required(need)), all());
-        let others = others.filter(|(need, _)| !is_required(need) && !(is_woken && need.is_delayed));
+        let others = others.filter(|(need, _)| !(is_required(need) || is_woken && need.is_delayed));
         Self {
             node,
             wires: Wires::new(inputs),
