@@ -37,7 +37,7 @@ fn a_list_finds_a_node_by_what_it_is_for() {
         "Nodes, servo: from features to a twist of the sensor",
         "  pid               a PID controller on every feature, for force and position control",
         "  tactile_pad   an array of tactels that gives an image",
-        "  pose      where one frame is in another",
+        "  pose      the position and orientation of one frame in another",
     ];
     assert_lines(&all.out, &lines);
     assert!(all.out.lines().all(|line| line.chars().count() <= 100), "{}", all.out);

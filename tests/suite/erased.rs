@@ -5,7 +5,7 @@ use tactflow_runtime::node::{
     AnyNode, Built, Bus, Configured, Declared, Given, Mistake, Mistakes, Need, NodeSpec, NodeType, Param, PortId,
     PortSpec, Reader, Tick, Wires,
 };
-use tactflow_runtime::signal::{Freshness, Kind, Scalar, Shape, Signal};
+use tactflow_runtime::signal::{Freshness, Kind, Scalar, Shape};
 use tactflow_runtime::source::Value;
 use tactflow_tests::catalogue;
 use tactflow_tests::nodes::length_by_hand;
@@ -63,14 +63,14 @@ impl Configured for Polynomial {
 impl AnyNode for Polynomial {
     fn step(&mut self, tick: &Tick, bus: &mut Bus, wires: &Wires, outputs: &[PortId]) {
         let from = wires.port(0).expect("`x` is required");
-        let x = Scalar::arena(&bus.arenas)[from.slot as usize];
+        let x = *bus.slot::<Scalar>(from);
         let y = self.coefficients.iter().rev().fold(0.0, |sum, c| sum * x + c);
-        Scalar::arena_mut(&mut bus.arenas)[outputs[0].slot as usize] = y;
-        bus.marks[outputs[0].mark as usize].renew(tick.index, tick.stamp);
+        *bus.slot_mut::<Scalar>(outputs[0]) = y;
+        bus.mark_mut(outputs[0]).renew(tick.index, tick.stamp);
     }
 
     fn lose(&mut self, tick: u64, bus: &mut Bus, outputs: &[PortId]) {
-        bus.marks[outputs[0].mark as usize].lose(tick);
+        bus.mark_mut(outputs[0]).lose(tick);
     }
 
     fn reset(&mut self) {}

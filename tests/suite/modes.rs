@@ -94,7 +94,7 @@ fn what_is_set_holds_in_its_mode_alone_and_state_goes_on() {
     }
     assert_eq!(seen, [(11.0, 1.0), (13.0, 2.0), (3.0, 3.0), (5.0, 4.0), (25.0, 5.0)]);
     let changes = rig.engine.changes();
-    let told: Vec<_> = changes.iter().map(|c| (c.time / 1_000_000, c.mode.as_str(), c.why.as_str())).collect();
+    let told: Vec<_> = changes.iter().map(|c| (c.time / 1_000_000, c.mode.as_str(), c.reason.as_str())).collect();
     let expected = [(0, "one", ""), (10, "two", "`a.value` is above 2"), (30, "three", "`a.value` is above 4")];
     assert_eq!(told, expected);
 }
@@ -120,7 +120,7 @@ fn in_one_tick_the_sorts_have_their_order() {
             Err(fault) if matches!(fault.cause, Cause::Mode(_)) => "fail",
             Ok(()) if rig.engine.is_done() => "done",
             Ok(()) if rig.engine.mode() == Some("two") => {
-                if rig.engine.changes()[1].why.contains("lost") {
+                if rig.engine.changes()[1].reason.contains("lost") {
                     "on_lost"
                 } else {
                     "go"

@@ -285,7 +285,7 @@ fn an_old_wire_can_stop_or_end_the_run() {
     rig.tick(0.0).unwrap();
     let fault = rig.tick(20.0).unwrap_err();
     let expected =
-        "`a.value` is 20.0 ms old for `count`, and may be 15.0 ms old in tick 2 at 0.020 s (graph.toml:10:21)";
+        "`a.value` is 20.0 ms old at `count`, but the maximum is 15.0 ms in tick 2 at 0.020 s (graph.toml:10:21)";
     assert_eq!(fault.to_string(), expected);
     let mut rig = wire("{ from = \"a.value\", max_age_ms = 15, stale = \"stop\" }");
     rig.feed("a.value", 0.0, 1.0);
@@ -343,7 +343,8 @@ fn an_old_command_ramps_and_does_what_its_wire_says() {
         assert_eq!((engine.is_stopped(), engine.halts().len()), (is_stopped, usize::from(is_stopped)), "{stale}");
     }
     let fault = moves(&mut commanded("fault"), 2.0).unwrap_err();
-    let says = "`move.joints.velocity` is 8.0 ms old for `arm.velocity`, and may be 6.0 ms old in tick 202 at 0.804 s";
+    let says =
+        "`move.joints.velocity` is 8.0 ms old at `arm.velocity`, but the maximum is 6.0 ms in tick 202 at 0.804 s";
     assert!(fault.to_string().starts_with(says), "{fault}");
 }
 

@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::Path;
 
-use tactflow_runtime::scenario::judge::{Figure, Mark, Row};
+use tactflow_runtime::scenario::judge::{Figure, Row, Verdict};
 use tactflow_runtime::scenario::{Scenario, Trial};
 use tactflow_tests::{catalogue, workspace};
 
@@ -65,7 +65,7 @@ fn a_fault_is_a_row_and_the_others_run() {
     let Said { code, out, err } = say(&["verify", FAULT, NEVER, MOCK]);
     assert_eq!(code, 1);
     let fault = "`pad` failed: its plug is out in tick 376 at 1.500 s (tests/scenarios/benches/unplugged.toml:4:10)";
-    let never = "error: never: `touch.present` was never set, so that no figure has a time 0";
+    let never = "error: never: `touch.present` was never set, so the figures have no time 0";
     let lines = [format!("error: fault, seed 3: device {fault}"), format!("error: fault, seed 7: device {fault}")];
     assert_eq!(err.lines().collect::<Vec<_>>(), [&lines[0], &lines[1], never]);
     let remarks: Vec<_> = rows(&out).into_iter().filter(|row| row.last() == Some(&"FAILED")).collect();
@@ -215,19 +215,19 @@ fn a_run_may_be_done_early_but_samples_may_not_end_early() {
         let loaded =
             Scenario::load(&catalogue(), &scenario).unwrap_or_else(|report| panic!("{}", report.render(false)));
         let trial = loaded.run(&catalogue(), None, None, &|| false).unwrap();
-        let marks: Vec<Mark> = loaded.rows(std::slice::from_ref(&trial)).iter().map(Row::mark).collect();
+        let marks: Vec<Verdict> = loaded.rows(std::slice::from_ref(&trial)).iter().map(Row::verdict).collect();
         (trial, marks)
     };
     let modes = "[modes.feel]\ndone = { after_ms = 1000 }\n[modes.other]\ngo = { to = 'feel', after_ms = 10 }\n";
     let with_modes = task(modes, "").replace("graph.clock = 'pad'", "graph = { clock = 'pad', start = 'other' }");
     let (trial, marks) = run(&with_modes, "ends_in = 'done'\nstays_in = 'feel'");
-    assert_eq!((trial.failure, &marks[2..]), (None, &[Mark::Met; 2][..]));
+    assert_eq!((trial.failure, &marks[2..]), (None, &[Verdict::Passed; 2][..]));
     assert!((trial.time - 1.012).abs() < 0.01, "{}", trial.time);
     let only = with_modes.replace("to = 'feel', after_ms = 10", "to = 'feel', after_ms = 9000");
     let (trial, marks) = run(&only, "ends_in = 'other'\nstays_in = 'feel'");
     assert_eq!(
         (trial.failure, &marks[2..]),
-        (None, &[Mark::Missed, Mark::Met][..]),
+        (None, &[Verdict::Failed, Verdict::Passed][..]),
         "a mode never reached, and the end"
     );
     // The last of two seconds of samples is a period before their end.
@@ -256,7 +256,7 @@ fn what_cannot_be_a_scenario_is_told() {
         ("[scenario]\ngraph = 'x'\n[scenario]\n", "error[syntax]"),
         (
             "[scenario]\ngraph = 'live.toml'\nfor_s = 1.0\n[check.x]\nof = 'length.value'\n",
-            "error[wrong-role]: a device of this bench runs in real time, but a scenario in virtual time",
+            "error[wrong-role]: a device of this bench runs in real time, but scenarios run in virtual time",
         ),
         (
             "[scenario]\ngraph = 'TESTS/../graphs/hybrid.toml'\nbench = 'TESTS/scenarios/benches/slide.toml'\nfor_s = 1.0\n",

@@ -6,7 +6,7 @@ use super::summary::number;
 use crate::engine::{Engine, Logged};
 use crate::node::PortId;
 use crate::record::{Column, Columns};
-use crate::signal::{Flag, Freshness, Signal, Unit};
+use crate::signal::{Flag, Freshness, Unit};
 
 /// The target of these lines; the tool shows it without a switch.
 pub(super) const TARGET: &str = "probe";
@@ -52,8 +52,8 @@ impl Log {
 impl Entry {
     fn is_due(&self, engine: &Engine) -> bool {
         let bus = engine.bus();
-        let is_new = bus.marks[self.due.mark as usize].freshness(engine.ticks()) == Freshness::New;
-        is_new && Flag::arena(&bus.arenas)[self.due.slot as usize]
+        let is_new = bus.mark(self.due).freshness(engine.ticks()) == Freshness::New;
+        is_new && *bus.slot::<Flag>(self.due)
     }
 }
 

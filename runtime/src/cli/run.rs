@@ -12,7 +12,7 @@ use super::{FAULTED, NOT_LOADED, OnArgs, Shell};
 use crate::engine::{self, End, Engine, Outcome, RunOptions};
 use crate::fault::Fault;
 use crate::graph::{Compiled, Request, compile};
-use crate::record::{Chosen, Format, Points, Recorder, Wanted};
+use crate::record::{Format, PointPorts, PointRecorder, PointsRequest, Recorder};
 
 /// Run a graph and print what came out
 #[derive(clap::Parser)]
@@ -50,7 +50,7 @@ pub(super) struct Run {
     out: Option<PathBuf>,
     /// Write the points where a pose has been as .ply: the pose that the graph reports, or [POSE[,PORT]…=]FILE
     #[arg(long, value_name = "FILE")]
-    points: Option<Wanted>,
+    points: Option<PointsRequest>,
     /// Print a line for every port and the time of every node, instead of what the graph shows
     #[arg(long)]
     ports: bool,
@@ -98,7 +98,7 @@ pub struct Job {
     /// Where each tick is recorded, as .csv or .ndjson.
     pub out: Option<PathBuf>,
     /// Which points are written, and where, as .ply.
-    pub points: Option<Wanted>,
+    pub points: Option<PointsRequest>,
     /// What is printed.
     pub print: Print,
 }
@@ -120,7 +120,7 @@ impl Job {
             shell.error("`--listen` needs a real clock: add `--realtime`, or send words with `--send 2s:resume`");
             return NOT_LOADED;
         }
-        let chosen = match self.points.as_ref().map(|wanted| wanted.choose(&plan)).transpose() {
+        let chosen = match self.points.as_ref().map(|wanted| wanted.resolve(&plan)).transpose() {
             Ok(chosen) => chosen,
             Err(message) => {
                 shell.error(message);
@@ -194,7 +194,7 @@ impl Job {
     }
 
     /// Creates what the run shall leave behind.
-    fn files(&self, chosen: Option<&Chosen>, engine: &Engine, may_wait: bool) -> Result<Files, String> {
+    fn files(&self, chosen: Option<&PointPorts>, engine: &Engine, may_wait: bool) -> Result<Files, String> {
         let rows = self.out.as_deref().map(|path| recorder(path, engine, may_wait)).transpose()?;
         let points = self.points.as_ref().zip(chosen).map(|(wanted, chosen)| points(&wanted.path, chosen, engine));
         Ok(Files { rows, points: points.transpose()? })
@@ -236,7 +236,7 @@ impl Job {
 /// What a run leaves behind while it goes on.
 struct Files {
     rows: Option<Recorder>,
-    points: Option<Points>,
+    points: Option<PointRecorder>,
 }
 
 /// How that went: how many rows were dropped, and how many points there are.
@@ -256,7 +256,10 @@ impl Files {
     }
 
     fn finish(self) -> Written {
-        Written { rows: self.rows.map_or(Ok(0), Recorder::finish), points: self.points.map_or(Ok(0), Points::finish) }
+        Written {
+            rows: self.rows.map_or(Ok(0), Recorder::finish),
+            points: self.points.map_or(Ok(0), PointRecorder::finish),
+        }
     }
 }
 
@@ -280,18 +283,18 @@ impl Job {
 
 fn recorder(path: &Path, engine: &Engine, may_wait: bool) -> Result<Recorder, String> {
     let format = Format::of(path).ok_or_else(|| format!("`{}` is neither .csv nor .ndjson", path.display()))?;
-    if is_something_else(path, &Format::STARTS) {
+    if is_something_else(path, &Format::FILE_STARTS) {
         return Err(format!("`{}` exists and is no record of a run: it is not overwritten", path.display()));
     }
     Recorder::create(path, format, engine, may_wait)
         .map_err(|error| format!("cannot create `{}`: {error}", path.display()))
 }
 
-fn points(path: &Path, chosen: &Chosen, engine: &Engine) -> Result<Points, String> {
-    if is_something_else(path, &[Points::START]) {
+fn points(path: &Path, chosen: &PointPorts, engine: &Engine) -> Result<PointRecorder, String> {
+    if is_something_else(path, &[PointRecorder::FILE_START]) {
         return Err(format!("`{}` exists and holds no points: it is not overwritten", path.display()));
     }
-    Points::create(path, chosen, engine).map_err(|error| format!("cannot create `{}`: {error}", path.display()))
+    PointRecorder::create(path, chosen, engine).map_err(|error| format!("cannot create `{}`: {error}", path.display()))
 }
 
 /// Whether a file exists that begins otherwise than what a run leaves behind: a recording that is being played, say.

@@ -73,7 +73,7 @@ impl Summary {
     /// Takes in the tick that the engine has just run.
     pub(super) fn add(&mut self, engine: &Engine) {
         for ((_, id), counts) in engine.ports().iter().zip(&mut self.counts) {
-            match engine.bus().marks[id.mark as usize].freshness(engine.ticks()) {
+            match engine.bus().mark(*id).freshness(engine.ticks()) {
                 Freshness::New => counts.new += 1,
                 Freshness::Held => counts.held += 1,
                 Freshness::Lost | Freshness::Absent => counts.absent += 1,

@@ -3,10 +3,10 @@
 use std::fmt::Write;
 
 use super::summary::{number, table};
-use crate::engine::{Change, Engine};
+use crate::engine::{Engine, ModeChange};
 use crate::graph::Policy;
 use crate::node::PortId;
-use crate::signal::{Scalar, Signal};
+use crate::signal::Scalar;
 
 /// As many changes of mode are shown from the start, and from the end.
 const SHOWN: usize = 20;
@@ -40,10 +40,7 @@ impl Timeline {
         self.last = Some(engine.now());
         let bus = engine.bus();
         for limit in &mut self.limits {
-            if !bus.marks[limit.id.mark as usize].is_present() {
-                continue;
-            }
-            let share = Scalar::arena(&bus.arenas)[limit.id.slot as usize];
+            let Some(&share) = bus.get::<Scalar>(limit.id) else { continue };
             // Rounding is no limit.
             if share < 1.0 - 1e-6 {
                 limit.time += dt;
@@ -76,7 +73,7 @@ impl Timeline {
     }
 }
 
-fn modes(changes: &[Change], end: i64) -> String {
+fn modes(changes: &[ModeChange], end: i64) -> String {
     let mut text = String::new();
     if changes.is_empty() {
         return text;
@@ -85,7 +82,7 @@ fn modes(changes: &[Change], end: i64) -> String {
     let mut rows = vec![["mode", "from", "for", "because"].map(String::from)];
     for (change, end) in changes.iter().zip(ends) {
         let seconds = |nanos: i64| format!("{:.3} s", nanos as f64 * 1e-9);
-        rows.push([change.mode.clone(), seconds(change.time), seconds(end - change.time), change.why.clone()]);
+        rows.push([change.mode.clone(), seconds(change.time), seconds(end - change.time), change.reason.clone()]);
     }
     let left_out = rows.len().saturating_sub(2 * SHOWN + 1);
     if left_out > 0 {
@@ -110,7 +107,7 @@ fn halts(engine: &Engine) -> String {
         // Writing to a string cannot fail.
         let _ = writeln!(text, "{what} {lasted}: {}", halt.fault);
     }
-    let more = engine.halts().len().saturating_sub(SHOWN) as u64 + engine.more_halts();
+    let more = engine.halts().len().saturating_sub(SHOWN) as u64 + engine.unlisted_halts();
     if more > 0 {
         let _ = writeln!(text, "held or stopped {more} more times");
     }
@@ -124,8 +121,8 @@ fn halts(engine: &Engine) -> String {
 mod tests {
     use super::*;
 
-    fn change(ms: i64, mode: &str, why: &str) -> Change {
-        Change { time: ms * 1_000_000, tick: 0, mode: mode.into(), why: why.into() }
+    fn change(ms: i64, mode: &str, why: &str) -> ModeChange {
+        ModeChange { time: ms * 1_000_000, tick: 0, mode: mode.into(), reason: why.into() }
     }
 
     #[test]
@@ -140,7 +137,7 @@ mod tests {
 
     #[test]
     fn of_very_many_changes_the_first_and_the_last_are_shown() {
-        let changes: Vec<Change> = (0..1000).map(|i| change(i, &format!("m{i}"), "")).collect();
+        let changes: Vec<ModeChange> = (0..1000).map(|i| change(i, &format!("m{i}"), "")).collect();
         let text = modes(&changes, 1_000_000_000);
         assert_eq!(text.lines().count(), 2 * SHOWN + 3);
         assert!(text.contains("\nm19 ") && text.contains("(960 more)") && text.contains("\nm980 "), "{text}");

@@ -10,7 +10,7 @@ use super::summary::number;
 use crate::engine::Engine;
 use crate::node::{Bus, PortId};
 use crate::record::{Column, Columns};
-use crate::signal::{Freshness, Image, ImageShape, Scalar, Shape, Signal};
+use crate::signal::{Freshness, Image, ImageShape, Scalar, Shape};
 
 /// Points of a curve, at the most: at least two to a character where the page is as wide as it gets.
 const ROOM: usize = 256;
@@ -73,9 +73,9 @@ struct Film {
 impl View {
     pub(super) fn new(engine: &Engine) -> Self {
         let (mut films, mut plots, mut drawn) = (Vec::new(), Vec::new(), Vec::new());
-        for (name, port, id) in &engine.view().ports {
+        for (name, port, id) in &engine.display().ports {
             if let Shape::Image(shape) = &port.shape {
-                let mark = engine.view().mark.filter(|_| films.is_empty());
+                let mark = engine.display().contact.filter(|_| films.is_empty());
                 films.push(Film::new(name.clone(), *id, shape.clone(), mark));
             } else {
                 plots.push(Plot { name: name.clone(), port: port.name.clone(), count: Columns::width(&port.shape) });
@@ -184,7 +184,7 @@ impl Film {
     fn add(&mut self, engine: &Engine) {
         let bus = engine.bus();
         let mark = self.mark.and_then(|mark| place(bus, mark));
-        match bus.marks[self.id.mark as usize].freshness(engine.ticks()) {
+        match bus.mark(self.id).freshness(engine.ticks()) {
             Freshness::New => {}
             Freshness::Held => return,
             Freshness::Lost | Freshness::Absent => {
@@ -192,7 +192,7 @@ impl Film {
                 return;
             }
         }
-        let cells = Image::arena(&bus.arenas)[self.id.slot as usize].cells();
+        let cells = bus.slot::<Image>(self.id).cells();
         let sum = cells.iter().filter(|value| value.is_finite()).map(|value| f64::from(*value)).sum();
         let (time, is_touched) = (engine.now(), mark.is_some() || self.mark.is_none());
         let keep = |frame: &mut Option<Frame>| {
@@ -297,6 +297,6 @@ fn row(texts: impl Iterator<Item = (usize, String)>, width: usize) -> String {
 
 /// Where the contact is, if there is one [m].
 fn place(bus: &Bus, mark: [PortId; 2]) -> Option<[f64; 2]> {
-    let is_there = mark.iter().all(|id| bus.marks[id.mark as usize].is_present());
-    is_there.then(|| mark.map(|id| Scalar::arena(&bus.arenas)[id.slot as usize]))
+    let [x, y] = mark.map(|id| bus.get::<Scalar>(id).copied());
+    Some([x?, y?])
 }

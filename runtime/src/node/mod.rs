@@ -34,6 +34,7 @@
 
 mod bounds;
 mod bus;
+mod bus_access;
 mod erased;
 mod inputs;
 mod limits;
@@ -51,6 +52,7 @@ use crate::signal::Stamp;
 
 pub use bounds::Bounds;
 pub use bus::{Bus, PortId, Wires};
+pub use bus_access::ScalarId;
 pub use erased::{AnyNode, Built, Configured, Given, NodeSpec, NodeType, of};
 pub use inputs::{In, InputSet, Many, View};
 pub use limits::{Components, Limits};

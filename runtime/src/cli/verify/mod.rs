@@ -13,7 +13,7 @@ use super::run::quietly;
 use super::{FAULTED, NOT_LOADED, Shell};
 use crate::catalogue::Catalogue;
 use crate::engine::Interrupt;
-use crate::scenario::judge::{Mark, Row};
+use crate::scenario::judge::{Row, Verdict};
 use crate::scenario::{Scenario, Trial};
 use crate::source::Report;
 
@@ -106,7 +106,7 @@ impl Verified {
     fn is_met(&self) -> bool {
         let is_whole = self.loaded.as_ref().is_ok_and(|scenario| scenario.runs().len() == self.trials.len());
         let has_failed = self.trials.iter().any(|trial| trial.failure.is_some());
-        is_whole && !has_failed && self.rows.iter().all(|row| row.mark() != Mark::Missed)
+        is_whole && !has_failed && self.rows.iter().all(|row| row.verdict() != Verdict::Failed)
     }
 
     fn diagnostics(&self) -> Vec<Diagnosed> {

@@ -5,7 +5,7 @@ use serde::Serialize;
 use super::Verified;
 use crate::cli::json::Diagnosed;
 use crate::cli::summary::{number, table};
-use crate::scenario::judge::{Bound, Figure, Mark, Row};
+use crate::scenario::judge::{Bound, Figure, Row, Verdict};
 use crate::scenario::{Scenario, Trial};
 
 const HEADER: [&str; 10] =
@@ -37,13 +37,13 @@ pub(super) fn text(all: &[Verified], has_colour: bool) -> String {
 }
 
 fn summary(all: &[Verified]) -> String {
-    let marks: Vec<Mark> = all.iter().flat_map(|verified| &verified.rows).map(Row::mark).collect();
-    let count = |mark: Mark| marks.iter().filter(|known| **known == mark).count();
+    let marks: Vec<Verdict> = all.iter().flat_map(|verified| &verified.rows).map(Row::verdict).collect();
+    let count = |mark: Verdict| marks.iter().filter(|known| **known == mark).count();
     let trials = || all.iter().flat_map(|verified| &verified.trials);
     let failed = trials().filter(|trial| trial.failure.is_some()).count();
     let unloaded = all.iter().filter(|verified| verified.loaded.is_err()).count();
-    let mut parts = vec![format!("{} met", count(Mark::Met)), format!("{} missed", count(Mark::Missed))];
-    parts.push(format!("{} told", count(Mark::Told)));
+    let mut parts = vec![format!("{} met", count(Verdict::Passed)), format!("{} missed", count(Verdict::Failed))];
+    parts.push(format!("{} told", count(Verdict::Informational)));
     parts.push(format!("in {} runs", trials().count()));
     parts.extend((failed > 0).then(|| format!("{failed} of which failed")));
     parts.extend((unloaded > 0).then(|| format!("{unloaded} scenarios do not load")));
@@ -86,10 +86,10 @@ fn cells(name: Option<String>, row: &Row, has_colour: bool) -> [String; 10] {
         let end = |value: f64| figure(Some(value).filter(|value| value.is_finite()));
         format!("{} to {}", end(low), end(high))
     });
-    let mark = match row.mark() {
-        Mark::Met => coloured("met", GREEN, has_colour),
-        Mark::Missed => coloured("MISSED", RED, has_colour),
-        Mark::Told => String::new(),
+    let mark = match row.verdict() {
+        Verdict::Passed => coloured("met", GREEN, has_colour),
+        Verdict::Failed => coloured("MISSED", RED, has_colour),
+        Verdict::Informational => String::new(),
     };
     [
         name.unwrap_or_default(),
@@ -207,10 +207,10 @@ fn row_json(row: &Row) -> RowJson {
             Bound::Settles | Bound::AtMost(_) | Bound::AtLeast(_) => Some("every"),
         },
         paper: row.paper,
-        mark: match row.mark() {
-            Mark::Met => "met",
-            Mark::Missed => "missed",
-            Mark::Told => "told",
+        mark: match row.verdict() {
+            Verdict::Passed => "met",
+            Verdict::Failed => "missed",
+            Verdict::Informational => "told",
         },
         values: row.values.clone(),
     }
