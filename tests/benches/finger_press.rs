@@ -5,7 +5,7 @@ use std::path::Path;
 use tactflow_nodes::recordings::{self, Hints, Recording};
 use tactflow_runtime::engine::Engine;
 use tactflow_runtime::graph::{Request, compile};
-use tactflow_runtime::signal::{Joints, Signal};
+use tactflow_runtime::signal::Joints;
 use tactflow_tests::{catalogue, workspace};
 
 use crate::fused::Fused;

@@ -35,6 +35,7 @@ mod reference;
 mod reports;
 mod sim;
 mod situations;
+mod svg;
 mod tick;
 mod tidy;
 mod tool;

@@ -18,7 +18,7 @@ fn good(modes: &str) -> GraphRig {
     rig(modes).unwrap_or_else(|report| panic!("{report}"))
 }
 
-/// The mode after a tick each 10 ms, with a sample in those that have a value.
+/// The mode after one tick every 10 ms, with a sample in those that have a value.
 fn course(modes: &str, samples: &[Option<f64>]) -> String {
     let mut rig = good(modes);
     let mut course = String::new();

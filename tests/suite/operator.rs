@@ -113,8 +113,8 @@ fn a_stop_after_which_the_standard_input_ends_ends_the_run() {
 #[test]
 fn a_stop_that_nobody_can_end_says_so_and_what_would() {
     let stop = say(&["run", HYBRID, MOCK, "--send", "0.2s:stop"]);
-    let expected = "error: the operator sent `stop` in tick 51 at 0.200 s; every command went to zero, and nobody was \
-                    left to send `resume`: `--send 2s:resume` does, or a line with `--listen`\n";
+    let expected = "error: the operator sent `stop` in tick 51 at 0.200 s; every command went to zero, and nothing \
+                    could send `resume`: use `--send 2s:resume`, or type it with `--listen`\n";
     assert_eq!(stop.code, 1);
     assert!(stop.err.ends_with(expected), "{}", stop.err);
 }
@@ -142,7 +142,11 @@ fn a_word_that_nothing_waits_for_is_told() {
     assert_eq!(rig.engine.send("back"), Err(why.into()));
     let refused = say(&["run", HYBRID, MOCK, "--send", "1s:bck"]);
     assert_eq!((refused.code, refused.out.as_str()), (2, ""));
-    assert!(refused.err.contains("nothing waits for the word `bck`: words here: `resume`, `stop`"), "{}", refused.err);
+    assert!(
+        refused.err.contains("error: unknown word `bck`\nhelp: this graph accepts `resume`, `stop`"),
+        "{}",
+        refused.err
+    );
     let late = say(&["run", HYBRID, MOCK, "--for", "1s", "--send", "9s:stop"]);
     assert_eq!(late.code, 0);
     assert!(late.err.contains("`stop` was not sent: the run ended before 9 s"), "{}", late.err);

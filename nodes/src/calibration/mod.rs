@@ -8,6 +8,7 @@ pub mod curve;
 pub mod file;
 pub mod fit;
 pub mod log;
+#[cfg(feature = "cli")]
 pub mod plot;
 pub mod report;
 pub mod samples;

@@ -285,6 +285,7 @@ fn the_report_has_results_with_units() {
     assert!(text.contains("hysteresis   not measured") && text.lines().last().unwrap().ends_with(" -"), "{text}");
 }
 
+#[cfg(feature = "cli")]
 #[test]
 fn the_picture_has_every_tactel_and_the_mean_in_its_frame() {
     let mut pad = Pad::new(3, 4, &[7], 14);

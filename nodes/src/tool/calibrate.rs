@@ -114,7 +114,7 @@ pub(super) fn run(args: Calibrate, shell: &Shell) -> u8 {
             shell.error(message);
             NOT_LOADED
         }
-        Err(Failure::Report(report)) => shell.complain(&report),
+        Err(Failure::Report(report)) => shell.reject(&report),
     }
 }
 

@@ -100,6 +100,7 @@ pub(super) fn features(args: Features, shell: &Shell) -> u8 {
         listen: false,
         out: args.out,
         points: None,
+        svg: None,
         print: Print::Ports,
     }
     .run(shell)

@@ -59,7 +59,7 @@ pub(crate) fn compile_in(mut loader: Loader, catalogue: &Catalogue, request: &Re
     let Some((clock, _)) = clock.filter(|_| found.is_empty()) else { return Err(Report::new(sources, found)) };
     say_what_is_there(&nodes, &opened, &sources);
     let max_gap = max_gap(flat.table.as_ref(), period);
-    let parts = outline::Parts { net: &net, opened: &opened, sources: &sources, max_gap };
+    let parts = outline::Parts { net: &net, opened: &opened, sources: &sources, nodes: &nodes, period, max_gap };
     let outline = parts.outline();
     let warnings = unused(&net, shown.sources());
     let view = shown.view(&net, &nodes, &ports);

@@ -1,138 +1,178 @@
-//! A graph as it runs: flat, with every value that was laid over another, every default and every fact, and where each
-//! of them comes from. For a person who asks.
+//! A graph as it runs, for `show`: parts are expanded, and every value has its origin in a file, a default or a fact.
 
 use std::ops::Range;
 use std::path::Path;
 
+use serde::Serialize;
+
 use crate::graph::bench::Opened;
 use crate::graph::bench::fill_facts;
-use crate::graph::net::{Net, Origin as WireOrigin, Wire};
-use crate::graph::syntax::{Block, GraphTable, ModeBlock, Policy, PolicyTable};
+use crate::graph::net::{CommandWire, Net, Origin as WireOrigin, Wire};
+use crate::graph::plan::{PlannedNode, PlannedPort, PortRef};
+use crate::graph::syntax::{Block, GraphTable, ModeBlock, PolicyTable};
 use crate::node::{FilePath, Param, ParamSpec, Repeats, Word};
-use crate::source::{Item, Key, SourceMap, Table, Value, parse_table};
+use crate::source::{Item, Key, Location, SourceMap, Table, Value, parse_table};
 
-/// The place of a default in a list of tables: nobody wrote it.
+/// The span of a default inside a list of tables, which stands in no file.
 pub const NOWHERE: Range<usize> = 0..0;
 
 /// A graph as it runs.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone, Default, Serialize)]
 pub struct Outline {
-    /// Section `[graph]`, but for the bench, which is in the other sections.
+    /// Nominal time between two ticks [s].
+    pub period_s: f64,
+    /// Section `[graph]`, without the bench.
+    #[serde(rename = "graph")]
     pub settings: Vec<Setting>,
-    /// The roles: name, type, and the device that fills it.
+    /// The roles, with their types and devices.
     pub roles: Vec<OutlinedRole>,
-    /// What drives each command and what is reported: `role.command`.
+    /// The wires to the commands and the reports of roles: `role.command`.
     pub commands: Vec<OutlinedWire>,
-    /// Section `[policy]`: what each trouble does.
+    /// Section `[policy]`.
     pub policy: Vec<Setting>,
-    /// The modes: each with what it sets and what ends it.
+    /// The modes.
     pub modes: Vec<OutlinedMode>,
-    /// The nodes, in the order of the files.
+    /// The nodes, in the order in which they step.
     pub nodes: Vec<OutlinedBlock>,
-    /// The devices that are used.
+    /// The devices that fill the roles.
     pub devices: Vec<OutlinedBlock>,
 }
 
+/// A word of a graph file.
+#[derive(Debug, Clone, Serialize)]
+pub struct OutlinedWord {
+    /// The word.
+    pub text: String,
+    /// Its location.
+    pub place: Location,
+}
+
 /// A role and its device.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Serialize)]
 pub struct OutlinedRole {
     /// Its name.
     pub name: String,
-    /// Its type, and where that stands.
-    pub kind: Word,
-    /// The device that fills it, and where that stands.
-    pub device: Word,
+    /// Its type.
+    #[serde(rename = "type")]
+    pub kind: OutlinedWord,
+    /// The device that fills it.
+    pub device: OutlinedWord,
 }
 
 /// A mode.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Serialize)]
 pub struct OutlinedMode {
     /// Its name.
     pub name: String,
-    /// `set.…` for each value that it sets, and its exits as they are written.
+    /// `set.…` for each value that it sets, and its exits.
     pub settings: Vec<Setting>,
 }
 
 /// A wire.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Serialize)]
 pub struct OutlinedWire {
-    /// Name of the input, or of the command.
+    /// Name of the input or the command.
     pub name: String,
-    /// The port it comes from: `node.port`, through all parts.
+    /// The port that it comes from: `node.port`.
     pub source: String,
-    /// How old what comes over it may be [ms], and what is done when it is older; if it says that.
-    pub age: Option<(f64, Policy)>,
-    /// Where that was written.
-    pub span: Range<usize>,
+    /// Maximum age of its value [ms], if it has one.
+    pub max_age_ms: Option<f64>,
+    /// Policy for an older value, if it has a maximum age.
+    pub stale: Option<&'static str>,
+    /// Where the wire is written.
+    pub place: Location,
 }
 
 /// A node or a device.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Serialize)]
 pub struct OutlinedBlock {
     /// Its full name.
     pub name: String,
-    /// Where its name stands.
-    pub span: Range<usize>,
-    /// Its type, and where that stands.
-    pub kind: Word,
-    /// Its wires.
+    /// Where its name is written.
+    pub place: Location,
+    /// Its type.
+    #[serde(rename = "type")]
+    pub kind: OutlinedWord,
+    /// The wires to its inputs.
+    #[serde(rename = "inputs")]
     pub wires: Vec<OutlinedWire>,
     /// Its parameters, in the order of the declaration.
+    #[serde(rename = "params")]
     pub settings: Vec<Setting>,
+    /// The outputs of a node.
+    pub outputs: Vec<OutlinedPort>,
 }
 
-/// A value that something is set to.
-#[derive(Debug, Clone)]
+/// An output of a node.
+#[derive(Debug, Clone, Serialize)]
+pub struct OutlinedPort {
+    /// Its name: `node.port`.
+    pub name: String,
+    /// Its kind.
+    pub kind: &'static str,
+    /// Its unit, if all its values have the same.
+    pub unit: Option<String>,
+    /// Its frames, where they are known.
+    pub frames: Vec<Option<String>>,
+}
+
+/// A value of a section or a block.
+#[derive(Debug, Clone, Serialize)]
 pub struct Setting {
     /// Dotted path in its block.
     pub path: String,
     /// The value.
     pub value: Value,
     /// Where it comes from.
+    #[serde(flatten)]
     pub origin: Origin,
 }
 
 /// Where a value comes from.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+#[serde(tag = "origin", rename_all = "lowercase")]
 pub enum Origin {
-    /// It was written there.
-    Written(Range<usize>),
-    /// Nobody wrote it.
+    /// A file or the command line.
+    Written {
+        /// Where the value is written.
+        place: Location,
+    },
+    /// The declaration of the parameter.
     Default,
-    /// A device states it.
+    /// A fact of a device.
     Fact {
-        /// `role.fact`
+        /// The fact: `role.fact`.
         fact: String,
-        /// Where the device's name stands.
-        device: Range<usize>,
+        /// Where the name of the device is written.
+        place: Location,
     },
 }
 
-/// What the outline of a graph without mistakes is made from.
+/// What the outline of a valid graph is made from.
 pub(crate) struct Parts<'a> {
     pub(crate) net: &'a Net<'a>,
     pub(crate) opened: &'a Opened,
     pub(crate) sources: &'a SourceMap,
-    /// Greatest time between two samples that counts as one step [s].
+    /// The nodes, in the order in which they step.
+    pub(crate) nodes: &'a [PlannedNode],
+    /// Nominal time between two ticks [s].
+    pub(crate) period: f64,
+    /// Longest time between two samples that counts as one step [s].
     pub(crate) max_gap: f64,
 }
 
 impl Parts<'_> {
     pub(crate) fn outline(&self) -> Outline {
         let flat = self.net.flat;
-        let commands = self.net.commands.iter().map(|wire| OutlinedWire {
-            name: self.net.taken_name(wire),
-            source: self.net.port_name(wire.source),
-            age: age(&wire.origin),
-            span: wire.origin.word.span.clone(),
-        });
+        let command = |wire: &CommandWire| self.wire(self.net.taken_name(wire), wire.source, &wire.origin);
         Outline {
+            period_s: self.period,
             settings: self.graph(),
             roles: self.roles(),
-            commands: commands.collect(),
+            commands: self.net.commands.iter().map(command).collect(),
             policy: self.policy(),
-            modes: flat.modes.iter().map(mode).collect(),
-            nodes: (0..flat.nodes.len()).filter_map(|node| self.node(node)).collect(),
+            modes: flat.modes.iter().map(|mode| self.mode(mode)).collect(),
+            nodes: self.nodes.iter().filter_map(|node| self.node(node)).collect(),
             devices: self.opened.devices.iter().filter_map(|device| self.device(&device.name)).collect(),
         }
     }
@@ -162,22 +202,33 @@ impl Parts<'_> {
         let device = |role: &str| bind.clone().find(|(key, _)| key.name == role).map(|(_, word)| word.clone());
         let roles = self.net.flat.roles.iter();
         let role = |(key, kind): &(Key, Word)| {
-            Some(OutlinedRole { name: key.name.clone(), kind: kind.clone(), device: device(&key.name)? })
+            let device = self.word(&device(&key.name)?);
+            Some(OutlinedRole { name: key.name.clone(), kind: self.word(kind), device })
         };
         roles.filter_map(role).collect()
     }
 
-    fn node(&self, index: usize) -> Option<OutlinedBlock> {
-        let node = &self.net.flat.nodes[index];
-        let spec = self.net.spec(index)?;
-        let wire = |wire: &Wire| OutlinedWire {
-            name: wire.key.name.clone(),
-            source: self.net.port_name(wire.source),
-            age: age(&wire.origin),
-            span: wire.origin.word.span.clone(),
-        };
-        let wires = self.net.wires[index].iter().map(wire).collect();
-        Some(OutlinedBlock { name: node.name.clone(), wires, ..self.block(&node.block, &spec.params)? })
+    fn node(&self, planned: &PlannedNode) -> Option<OutlinedBlock> {
+        let node = &self.net.flat.nodes[planned.index];
+        let spec = self.net.spec(planned.index)?;
+        let wire = |wire: &Wire| self.wire(wire.key.name.clone(), wire.source, &wire.origin);
+        let wires = self.net.wires[planned.index].iter().map(wire).collect();
+        let outputs = planned.ports.iter().map(OutlinedPort::of).collect();
+        Some(OutlinedBlock { name: node.name.clone(), wires, outputs, ..self.block(&node.block, &spec.params)? })
+    }
+
+    fn wire(&self, name: String, source: PortRef, origin: &WireOrigin) -> OutlinedWire {
+        OutlinedWire {
+            name,
+            source: self.net.port_name(source),
+            max_age_ms: origin.age.map(|age| age.max_age as f64 * 1e-6),
+            stale: origin.age.map(|age| age.stale.word()),
+            place: self.sources.location(&origin.word.span),
+        }
+    }
+
+    fn word(&self, word: &Word) -> OutlinedWord {
+        OutlinedWord { text: word.text.clone(), place: self.sources.location(&word.span) }
     }
 
     fn device(&self, name: &str) -> Option<OutlinedBlock> {
@@ -193,10 +244,11 @@ impl Parts<'_> {
         self.table(block.params.as_table(), specs, "", &mut settings);
         Some(OutlinedBlock {
             name: block.key.name.clone(),
-            span: block.key.span.clone(),
-            kind: block.kind.clone()?,
+            place: self.sources.location(&block.key.span),
+            kind: self.word(block.kind.as_ref()?),
             wires: Vec::new(),
             settings,
+            outputs: Vec::new(),
         })
     }
 
@@ -253,50 +305,58 @@ impl Parts<'_> {
         let bound = role.and_then(|role| self.opened.roles[role].as_ref());
         let origin = match (word, bound) {
             (Some(word), Some(bound)) => {
-                Origin::Fact { fact: word.to_owned(), device: self.opened.devices[bound.device].span.clone() }
+                let device = &self.opened.devices[bound.device];
+                Origin::Fact { fact: word.to_owned(), place: self.sources.location(&device.span) }
             }
-            // A number of [limits] stands where that says it.
-            _ => Origin::Written(filled.span.clone()),
+            // A value from [limits] keeps its place there.
+            _ => Origin::Written { place: self.sources.location(&filled.span) },
         };
         Setting { path, value: filled, origin }
     }
 
     /// The path of a file, which stands relative to the file it is written in, as seen from the working folder.
     fn resolve(&self, setting: &mut Setting, spec: &ParamSpec) {
-        if let (Origin::Written(span), Item::String(text)) = (&setting.origin, &mut setting.value.item)
+        if let (Origin::Written { .. }, Item::String(text)) = (&setting.origin, &mut setting.value.item)
             && spec.takes == FilePath::EXPECTS
         {
-            *text = self.sources.path(text, span.start).display().to_string();
+            *text = self.sources.path(text, setting.value.span.start).display().to_string();
         }
     }
-}
 
-fn age(wire: &WireOrigin) -> Option<(f64, Policy)> {
-    wire.age.map(|age| (age.max_age as f64 * 1e-6, age.stale))
-}
-
-fn mode(block: &ModeBlock) -> OutlinedMode {
-    let mut settings = Vec::new();
-    for (key, value) in &block.table.entries {
-        match value.as_table().filter(|_| key.name == "set") {
-            Some(_) => leaves(value, "set", 4, &mut settings),
-            None => leaves(value, &key.name, 0, &mut settings),
-        }
-    }
-    OutlinedMode { name: block.key.name.clone(), settings }
-}
-
-/// What is written in a table, so many tables deep at most.
-fn leaves(value: &Value, path: &str, depth: usize, settings: &mut Vec<Setting>) {
-    match value.as_table().filter(|table| depth > 0 && !table.is_fact()) {
-        Some(table) => {
-            for (key, value) in &table.entries {
-                leaves(value, &format!("{path}.{}", key.name), depth - 1, settings);
+    fn mode(&self, block: &ModeBlock) -> OutlinedMode {
+        let mut settings = Vec::new();
+        for (key, value) in &block.table.entries {
+            match value.as_table().filter(|_| key.name == "set") {
+                Some(_) => self.leaves(value, "set", 4, &mut settings),
+                None => self.leaves(value, &key.name, 0, &mut settings),
             }
         }
-        None => {
-            let origin = Origin::Written(value.span.clone());
-            settings.push(Setting { path: path.to_owned(), value: value.clone(), origin });
+        OutlinedMode { name: block.key.name.clone(), settings }
+    }
+
+    /// Collects the values in nested tables, down to `depth` levels.
+    fn leaves(&self, value: &Value, path: &str, depth: usize, settings: &mut Vec<Setting>) {
+        match value.as_table().filter(|table| depth > 0 && !table.is_fact()) {
+            Some(table) => {
+                for (key, value) in &table.entries {
+                    self.leaves(value, &format!("{path}.{}", key.name), depth - 1, settings);
+                }
+            }
+            None => {
+                let origin = Origin::Written { place: self.sources.location(&value.span) };
+                settings.push(Setting { path: path.to_owned(), value: value.clone(), origin });
+            }
+        }
+    }
+}
+
+impl OutlinedPort {
+    fn of(port: &PlannedPort) -> Self {
+        Self {
+            name: port.name.clone(),
+            kind: port.shape.kind().name(),
+            unit: port.shape.unit().map(|unit| unit.to_string()),
+            frames: port.frames.clone(),
         }
     }
 }

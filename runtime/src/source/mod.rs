@@ -8,6 +8,6 @@ mod suggest;
 mod value;
 
 pub use diagnostic::{Code, Diagnostic, Report, Severity};
-pub use map::{BuiltinFile, SourceFile, SourceMap};
+pub use map::{BuiltinFile, Location, SourceFile, SourceMap};
 pub use suggest::{closest, meant};
 pub use value::{Item, Key, Table, Value, parse_table};

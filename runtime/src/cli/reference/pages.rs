@@ -1,25 +1,25 @@
-//! The reference of a catalogue as pages of Markdown: what `describe` says of everything, to be kept under version
-//! control.
+//! The reference of a catalogue as pages of Markdown, to be kept under version control.
 
 use std::fmt::Write;
 
-use super::entry::{Entries, Entry, Sort};
+use super::entry::{Category, Entries, Entry};
 use super::page::page;
-use super::prose::markdown;
 use crate::catalogue::Catalogue;
+use crate::cli::text::prose::markdown;
 
-/// The pages, each with the name of its file: an index, a page for each group of nodes, and one for each other sort.
+/// Returns the pages, each with the name of its file: an index, a page for each group of nodes, and one for each other
+/// category.
 ///
-/// A test compares them with the files, so that they are never out of date: `tests/suite/reference.rs` shows it.
+/// A test can compare the pages with the files, so that they are never out of date; `tests/suite/reference.rs` does.
 #[must_use]
 pub fn reference(catalogue: &Catalogue) -> Vec<(String, String)> {
     let mut entries = Entries::new(catalogue).all();
-    entries.retain(|entry| entry.sort != Sort::File);
-    let mut index = "# Reference\n\nEverything a graph may be made of. These pages are generated from the catalogue; \
-                     `tactflow describe NAME` says the same, and puts a whole graph around it.\n"
+    entries.retain(|entry| entry.category != Category::File);
+    let mut index = "# Reference\n\nEverything that a graph can use. These pages are generated from the catalogue; \
+                     `tactflow describe NAME` prints the same documentation and an example graph.\n"
         .to_owned();
     let mut pages = Vec::new();
-    for group in entries.chunk_by(|a, b| (a.sort, a.group) == (b.sort, b.group)) {
+    for group in entries.chunk_by(|a, b| (a.category, a.group) == (b.category, b.group)) {
         let (file, title) = (file(&group[0]), title(&group[0]));
         // Writing to a string cannot fail.
         let _ = writeln!(index, "\n## [{title}]({file})\n");
@@ -34,17 +34,17 @@ pub fn reference(catalogue: &Catalogue) -> Vec<(String, String)> {
     pages
 }
 
-/// The file of a group: what its title starts with, or the sort.
+/// Returns the file of a group, named after the first word of its title or its category.
 fn file(first: &Entry) -> String {
     let (word, rest) = first.group.split_once(':').unwrap_or(("", ""));
     let has_word = !rest.is_empty() && word.chars().all(|c| c.is_ascii_alphanumeric());
-    if has_word { format!("{word}.md") } else { format!("{}s.md", first.sort.name()) }
+    if has_word { format!("{word}.md") } else { format!("{}s.md", first.category.name()) }
 }
 
 fn title(first: &Entry) -> String {
     match first.group {
         "" => {
-            let name = first.sort.name();
+            let name = first.category.name();
             format!("{}{}s", name[..1].to_uppercase(), &name[1..])
         }
         group => format!("{}{}", group[..1].to_uppercase(), &group[1..]),

@@ -191,14 +191,14 @@ fn a_node_that_nobody_reads_is_put_into_the_wire_it_reads() {
 }
 
 #[test]
-fn what_is_missing_is_named() {
+fn a_missing_example_is_named() {
     let bound = Catalogue::new().node::<bound::Bound>();
-    assert_eq!(example(&bound, "bound"), Err("no example brings the `follow` that `bound` needs".into()));
+    assert_eq!(example(&bound, "bound"), Err("no example has the `follow` that `bound` needs".into()));
     assert_eq!(example(&bound, "follow"), Err("`follow` has no example".into()));
 }
 
 #[test]
-fn a_text_falls_into_its_sections_and_keeps_its_comments() {
+fn a_text_is_split_into_sections_and_keeps_its_comments() {
     let text = "\n# What a task asks.\n[roles]\narm = \"x\"   # the arm\n\n[bind]\narm = \"a\"\n\n# The one.\n[devices.a]\n\
                 type = \"t\"\nlist = [\n[1, 2],\n]\n[[devices.a.press]]\nforce = 3.0\n# end\n";
     let sections = sections(text);

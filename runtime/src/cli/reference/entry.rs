@@ -1,10 +1,10 @@
-//! What the catalogue says of one thing: the page of `describe`, as data. Its JSON is this, and its text is made of it.
+//! The documentation of the catalogue as data: the JSON of `describe`, from which its text is made.
 
 use std::borrow::Cow;
 
 use serde::Serialize;
 
-use super::example::{self, Asked};
+use super::example::{self, Target};
 use crate::catalogue::Catalogue;
 use crate::device::{DeviceType, RoleType};
 use crate::node::{Need, NodeSpec, ParamSpec, PortSpec, Repeats};
@@ -12,10 +12,10 @@ use crate::node::{frame_args, may_fit};
 use crate::record::recorded;
 use crate::signal::Kind;
 
-/// What sort of thing it is, in the order of the lists.
+/// The categories, in the order of the lists.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "lowercase")]
-pub(super) enum Sort {
+pub(crate) enum Category {
     Node,
     Device,
     Role,
@@ -23,10 +23,12 @@ pub(super) enum Sort {
     File,
 }
 
-impl Sort {
-    pub(super) const ALL: [Self; 5] = [Self::Node, Self::Device, Self::Role, Self::Kind, Self::File];
+impl Category {
+    /// All categories.
+    pub(crate) const ALL: [Self; 5] = [Self::Node, Self::Device, Self::Role, Self::Kind, Self::File];
 
-    pub(super) const fn name(self) -> &'static str {
+    /// Returns its name.
+    pub(crate) const fn name(self) -> &'static str {
         match self {
             Self::Node => "node",
             Self::Device => "device",
@@ -37,130 +39,130 @@ impl Sort {
     }
 }
 
-/// One thing of the catalogue.
+/// One entry of the catalogue.
 #[derive(Debug, Clone, Serialize)]
-pub(super) struct Entry {
-    pub(super) sort: Sort,
-    pub(super) name: String,
-    pub(super) summary: String,
-    /// Title of its group.
+pub(crate) struct Entry {
+    pub(crate) category: Category,
+    pub(crate) name: String,
+    pub(crate) summary: String,
+    /// Title of the group it belongs to.
     #[serde(skip_serializing_if = "str::is_empty")]
-    pub(super) group: &'static str,
-    pub(super) doc: String,
+    pub(crate) group: &'static str,
+    pub(crate) doc: String,
     /// When a node steps.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub(super) steps: Option<&'static str>,
-    pub(super) inputs: Vec<Port>,
-    pub(super) outputs: Vec<Port>,
-    /// What a role takes.
-    pub(super) commands: Vec<Port>,
-    /// What a role may be told without moving.
-    pub(super) reports: Vec<Port>,
-    pub(super) params: Vec<Param>,
-    /// Roles that a device fills, or devices that fill a role, as far as the examples tell.
-    pub(super) fits: Vec<String>,
-    /// Limits that a node holds, or that a role's commands must have crossed.
-    pub(super) limits: Vec<String>,
+    pub(crate) steps: Option<&'static str>,
+    pub(crate) inputs: Vec<PortEntry>,
+    pub(crate) outputs: Vec<PortEntry>,
+    /// Commands of a role.
+    pub(crate) commands: Vec<PortEntry>,
+    /// Ports of a role that take information without moving anything.
+    pub(crate) reports: Vec<PortEntry>,
+    pub(crate) params: Vec<ParamEntry>,
+    /// Roles that a device fills, or devices that fill a role, according to the examples.
+    pub(crate) fits: Vec<String>,
+    /// Limits that a node enforces, or that the commands of a role must cross.
+    pub(crate) limits: Vec<String>,
     /// How a kind is recorded.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub(super) recorded: Option<&'static str>,
-    /// Its own block of a graph file.
+    pub(crate) recorded: Option<&'static str>,
+    /// Its own block of the example graph, or the text of a built-in file.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub(super) block: Option<String>,
-    /// A whole graph around it.
+    pub(crate) block: Option<String>,
+    /// A complete example graph.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub(super) example: Option<String>,
+    pub(crate) example: Option<String>,
 }
 
-/// A port, with its declaration in words.
+/// A port as it is declared.
 #[derive(Debug, Clone, Serialize)]
-pub(super) struct Port {
-    pub(super) name: String,
-    pub(super) kind: &'static str,
+pub(crate) struct PortEntry {
+    pub(crate) name: String,
+    pub(crate) kind: &'static str,
     /// Unit as declared; a capital letter is a variable of the node.
-    pub(super) unit: Option<String>,
-    pub(super) frames: Vec<String>,
-    /// What its absence does, and whether it wakes the node.
+    pub(crate) unit: Option<String>,
+    pub(crate) frames: Vec<String>,
+    /// Whether it must be wired, and whether it wakes the node.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub(super) need: Option<&'static str>,
-    pub(super) doc: String,
-    /// Ports at the other end of a wire that fits.
-    pub(super) fits: Vec<String>,
+    pub(crate) need: Option<&'static str>,
+    pub(crate) doc: String,
+    /// Ports that a wire can connect it to.
+    pub(crate) fits: Vec<String>,
 }
 
 /// A parameter.
 #[derive(Debug, Clone, Serialize)]
-pub(super) struct Param {
-    pub(super) name: &'static str,
-    pub(super) takes: String,
-    pub(super) unit: Option<String>,
-    /// Lower and upper end of the range; absent where there is none.
-    pub(super) range: Option<[Option<f64>; 2]>,
+pub(crate) struct ParamEntry {
+    pub(crate) name: &'static str,
+    pub(crate) takes: String,
+    pub(crate) unit: Option<String>,
+    /// Lower and upper end of the range; `None` where there is none.
+    pub(crate) range: Option<[Option<f64>; 2]>,
     /// Whether the lower end itself is out of range.
-    pub(super) is_open: bool,
-    /// The words it takes, each with its meaning.
+    pub(crate) is_open: bool,
+    /// The words that it accepts, each with its meaning.
     #[serde(skip_serializing_if = "<[_]>::is_empty")]
-    pub(super) words: &'static [(&'static str, &'static str)],
-    /// As a graph file would say it.
-    pub(super) default: Option<String>,
-    pub(super) is_required: bool,
+    pub(crate) words: &'static [(&'static str, &'static str)],
+    /// Default value as TOML.
+    pub(crate) default: Option<String>,
+    pub(crate) is_required: bool,
     /// Whether a mode can set it.
-    pub(super) is_live: bool,
-    pub(super) doc: String,
-    /// How the path of a field goes on after the parameter's name.
+    pub(crate) is_live: bool,
+    pub(crate) doc: String,
+    /// Text between the name of the parameter and the name of a field in a path.
     #[serde(skip)]
-    pub(super) then: &'static str,
-    pub(super) fields: Vec<Param>,
+    pub(crate) separator: &'static str,
+    pub(crate) fields: Vec<ParamEntry>,
 }
 
-/// Everything in the catalogue, in its order.
-pub(super) struct Entries<'a> {
+/// Access to the entries of a catalogue, in its order.
+pub(crate) struct Entries<'a> {
     catalogue: &'a Catalogue,
     nodes: Vec<(&'static str, NodeSpec)>,
 }
 
 impl<'a> Entries<'a> {
-    pub(super) fn new(catalogue: &'a Catalogue) -> Self {
+    pub(crate) fn new(catalogue: &'a Catalogue) -> Self {
         let groups = catalogue.groups();
         let nodes = groups.flat_map(|(title, nodes)| nodes.iter().map(move |node| (title, node.spec()))).collect();
         Self { catalogue, nodes }
     }
 
-    /// All of one sort, without their examples.
-    pub(super) fn of(&self, sort: Sort) -> Vec<Entry> {
-        match sort {
-            Sort::Node => self.nodes.iter().map(|(group, spec)| self.node(group, spec)).collect(),
-            Sort::Device => self.catalogue.devices().iter().map(|device| self.device(&**device)).collect(),
-            Sort::Role => self.catalogue.roles().iter().map(|role| self.role(role)).collect(),
-            Sort::Kind => Kind::ALL.iter().map(|kind| self.kind(*kind)).collect(),
-            Sort::File => self.catalogue.builtin_files().iter().map(|(name, bytes)| file(name, bytes)).collect(),
+    /// Returns the entries of one category, without example graphs.
+    pub(crate) fn of(&self, category: Category) -> Vec<Entry> {
+        match category {
+            Category::Node => self.nodes.iter().map(|(group, spec)| self.node(group, spec)).collect(),
+            Category::Device => self.catalogue.devices().iter().map(|device| self.device(&**device)).collect(),
+            Category::Role => self.catalogue.roles().iter().map(|role| self.role(role)).collect(),
+            Category::Kind => Kind::ALL.iter().map(|kind| self.kind(*kind)).collect(),
+            Category::File => self.catalogue.builtin_files().iter().map(|(name, bytes)| file(name, bytes)).collect(),
         }
     }
 
-    /// Everything, without the examples.
-    pub(super) fn all(&self) -> Vec<Entry> {
-        Sort::ALL.into_iter().flat_map(|sort| self.of(sort)).collect()
+    /// Returns all entries, without example graphs.
+    pub(crate) fn all(&self) -> Vec<Entry> {
+        Category::ALL.into_iter().flat_map(|category| self.of(category)).collect()
     }
 
-    /// The same with a whole graph around it, or with the reason why there is none.
-    pub(super) fn with_example(&self, entry: Entry) -> (Entry, Option<String>) {
-        let asked = match entry.sort {
-            Sort::Node => Asked::Node(&entry.name),
-            Sort::Device => Asked::Device(&entry.name),
-            Sort::Role => match entry.fits.first() {
-                Some(device) => Asked::Device(device),
+    /// Adds the example graph to an entry, or returns the reason why there is none.
+    pub(crate) fn with_example(&self, entry: Entry) -> (Entry, Option<String>) {
+        let target = match entry.category {
+            Category::Node => Target::Node(&entry.name),
+            Category::Device => Target::Device(&entry.name),
+            Category::Role => match entry.fits.first() {
+                Some(device) => Target::Device(device),
                 None => return (entry, None),
             },
-            Sort::Kind | Sort::File => return (entry, None),
+            Category::Kind | Category::File => return (entry, None),
         };
-        match example::compose(self.catalogue, asked) {
+        match example::compose(self.catalogue, target) {
             Ok(example) => (Entry { example: Some(example), ..entry }, None),
             Err(why) => (entry, Some(why)),
         }
     }
 
     fn node(&self, group: &'static str, spec: &NodeSpec) -> Entry {
-        let inputs = spec.inputs.iter().map(|port| Port { need: Some(need(port.need)), ..self.input(port) });
+        let inputs = spec.inputs.iter().map(|port| PortEntry { need: Some(need(port.need)), ..self.input(port) });
         Entry {
             group,
             limits: spec.limits.holds.iter().map(ToString::to_string).collect(),
@@ -169,7 +171,7 @@ impl<'a> Entries<'a> {
             outputs: spec.outputs.iter().map(|port| self.output(port)).collect(),
             params: spec.params.iter().map(param).collect(),
             block: example::block(&spec.example).map(str::to_owned),
-            ..entry(Sort::Node, &spec.name, &spec.summary, &spec.doc)
+            ..entry(Category::Node, &spec.name, &spec.summary, &spec.doc)
         }
     }
 
@@ -179,11 +181,11 @@ impl<'a> Entries<'a> {
             params: device.params().iter().map(param).collect(),
             fits: self.roles_of(device),
             block: example::block(&example).map(str::to_owned),
-            ..entry(Sort::Device, &device.name(), &device.summary(), &device.doc())
+            ..entry(Category::Device, &device.name(), &device.summary(), &device.doc())
         }
     }
 
-    /// The roles that the example of a device binds it to.
+    /// Returns the roles that the example of a device binds it to.
     fn roles_of(&self, device: &dyn DeviceType) -> Vec<String> {
         let example: toml::Table = device.example().parse().unwrap_or_default();
         let roles = example.get("roles").and_then(toml::Value::as_table);
@@ -211,16 +213,17 @@ impl<'a> Entries<'a> {
             reports: role.reports.iter().map(|port| self.input(port)).collect(),
             fits: fills.map(|device| device.name().into_owned()).collect(),
             limits: role.limits.iter().map(ToString::to_string).collect(),
-            ..entry(Sort::Role, &role.name, &role.summary, &doc)
+            ..entry(Category::Role, &role.name, &role.summary, &doc)
         }
     }
 
-    /// A kind, with the ports that give it and those that take it.
+    /// Describes a kind, with the ports that produce it and those that take it.
     fn kind(&self, kind: Kind) -> Entry {
-        let named = |owner: &str, port: &PortSpec, of: Port| Port { name: format!("{owner}.{}", port.name), ..of };
+        let named =
+            |owner: &str, port: &PortSpec, of: PortEntry| PortEntry { name: format!("{owner}.{}", port.name), ..of };
         let is_meant = |port: &&PortSpec| port.kind == kind;
         let mut entry =
-            Entry { recorded: Some(recorded(kind)), ..entry(Sort::Kind, kind.name(), kind.summary(), kind.doc()) };
+            Entry { recorded: Some(recorded(kind)), ..entry(Category::Kind, kind.name(), kind.summary(), kind.doc()) };
         for role in self.catalogue.roles() {
             let outputs = role.outputs.iter().filter(is_meant);
             entry.outputs.extend(outputs.map(|port| named(&role.name, port, self.output(port))));
@@ -236,35 +239,36 @@ impl<'a> Entries<'a> {
         entry
     }
 
-    /// A port that something reads, and where its wire can come from.
-    fn input(&self, port: &PortSpec) -> Port {
+    /// Describes an input, with the outputs that its wire can come from.
+    fn input(&self, port: &PortSpec) -> PortEntry {
         let readable = self.catalogue.roles().iter().filter(|role| !role.is_observed);
         let roles = readable.map(|role| (&role.name, &role.outputs));
         let nodes = self.nodes.iter().map(|(_, spec)| (&spec.name, &spec.outputs));
         let all = roles.chain(nodes).flat_map(|(owner, ports)| ports.iter().map(move |port| (owner, port)));
-        Port { fits: best_first(port, all.filter(|(_, output)| may_fit(output, port))), ..declared(port) }
+        PortEntry { fits: best_first(port, all.filter(|(_, output)| may_fit(output, port))), ..declared(port) }
     }
 
-    /// A port that something writes, and where a wire from it can go.
-    fn output(&self, port: &PortSpec) -> Port {
+    /// Describes an output, with the inputs that a wire from it can lead to.
+    fn output(&self, port: &PortSpec) -> PortEntry {
         let roles = self.catalogue.roles().iter().map(|role| (&role.name, &role.commands));
         let nodes = self.nodes.iter().map(|(_, spec)| (&spec.name, &spec.inputs));
-        let told = self.catalogue.roles().iter().map(|role| (&role.name, &role.reports));
-        let all = nodes.chain(roles).chain(told).flat_map(|(owner, ports)| ports.iter().map(move |port| (owner, port)));
-        Port { fits: best_first(port, all.filter(|(_, input)| may_fit(port, input))), ..declared(port) }
+        let reports = self.catalogue.roles().iter().map(|role| (&role.name, &role.reports));
+        let all =
+            nodes.chain(roles).chain(reports).flat_map(|(owner, ports)| ports.iter().map(move |port| (owner, port)));
+        PortEntry { fits: best_first(port, all.filter(|(_, input)| may_fit(port, input))), ..declared(port) }
     }
 }
 
-/// Names of the ports at the other end: those that declare the same unit before those that may have it.
+/// Returns the names of ports that fit `port`; ports that declare the same unit come first.
 fn best_first<'p>(port: &PortSpec, others: impl Iterator<Item = (&'p Cow<'static, str>, &'p PortSpec)>) -> Vec<String> {
     let mut others: Vec<_> = others.collect();
     others.sort_by_key(|(_, other)| port.kind.has_unit() && other.args.first() != port.args.first());
     others.into_iter().map(|(owner, other)| format!("{owner}.{}", other.name)).collect()
 }
 
-fn entry(sort: Sort, name: &str, summary: &str, doc: &str) -> Entry {
+fn entry(category: Category, name: &str, summary: &str, doc: &str) -> Entry {
     Entry {
-        sort,
+        category,
         name: name.to_owned(),
         summary: summary.to_owned(),
         group: "",
@@ -284,18 +288,18 @@ fn entry(sort: Sort, name: &str, summary: &str, doc: &str) -> Entry {
 }
 
 fn file(name: &str, bytes: &[u8]) -> Entry {
-    // A file of ours starts with a comment that says what it is.
+    // The first line of a built-in file is a comment with its summary.
     let first = bytes.split(|byte| *byte == b'\n').next().and_then(|line| std::str::from_utf8(line).ok());
-    let said = first.and_then(|line| line.strip_prefix("# ")).map(|line| line.trim_end_matches('.').to_owned());
+    let comment = first.and_then(|line| line.strip_prefix("# ")).map(|line| line.trim_end_matches('.').to_owned());
     let size = format!("{} kB", bytes.len().div_ceil(1000));
-    let summary = said.map_or_else(|| size.clone(), |said| format!("{said} ({size})"));
-    // What takes a part wants to see what goes in, what comes out and what can be set.
+    let summary = comment.map_or_else(|| size.clone(), |comment| format!("{comment} ({size})"));
+    // The text of a part shows its inputs, its exports and its parameters.
     let text = std::str::from_utf8(bytes).ok().filter(|_| name.ends_with(".toml"));
-    Entry { block: text.map(str::to_owned), ..entry(Sort::File, &format!("builtin:{name}"), &summary, "") }
+    Entry { block: text.map(str::to_owned), ..entry(Category::File, &format!("builtin:{name}"), &summary, "") }
 }
 
-fn declared(port: &PortSpec) -> Port {
-    Port {
+fn declared(port: &PortSpec) -> PortEntry {
+    PortEntry {
         name: port.name.to_string(),
         kind: port.kind.name(),
         unit: port.args.first().filter(|_| port.kind.has_unit()).map(|unit| unit.to_string()),
@@ -306,28 +310,28 @@ fn declared(port: &PortSpec) -> Port {
     }
 }
 
-/// What an input needs, in words.
+/// Describes what an input needs.
 const fn need(need: Need) -> &'static str {
     match need {
-        Need { is_many: true, is_trigger: true, .. } => "any number, each named in the graph; each wakes the node",
-        Need { is_many: true, .. } => "any number, each named in the graph; only the loss of one wakes the node",
+        Need { is_many: true, is_trigger: true, .. } => "any number of inputs, named in the graph; each wakes the node",
+        Need { is_many: true, .. } => "any number of inputs, named in the graph; each wakes the node when it is lost",
         Need { is_delayed: true, must_be_wired: false, .. } => {
-            "optional, as the last tick left it; wakes the node only if no other input does"
+            "optional, the value of the previous tick; wakes the node only if no other input does"
         }
-        Need { is_delayed: true, .. } => "as the last tick left it; wakes the node only if no other input does",
+        Need { is_delayed: true, .. } => "the value of the previous tick; wakes the node only if no other input does",
         Need { must_be_wired: true, must_be_present: true, is_trigger: true, .. } => "required, wakes the node",
-        Need { must_be_wired: true, must_be_present: true, .. } => "required, only its loss wakes the node",
-        Need { must_be_wired: true, is_trigger: true, .. } => "required but may be absent, wakes the node",
-        Need { must_be_wired: true, .. } => "required but may be absent, only its loss wakes the node",
-        Need { must_be_present: true, is_trigger: true, .. } => "optional, required if wired, wakes the node",
-        Need { must_be_present: true, .. } => "optional, required if wired, only its loss wakes the node",
+        Need { must_be_wired: true, must_be_present: true, .. } => "required, wakes the node only when it is lost",
+        Need { must_be_wired: true, is_trigger: true, .. } => "must be wired, may be absent, wakes the node",
+        Need { must_be_wired: true, .. } => "must be wired, may be absent, wakes the node only when it is lost",
+        Need { must_be_present: true, is_trigger: true, .. } => "optional, must be present if wired, wakes the node",
+        Need { must_be_present: true, .. } => "optional, must be present if wired, wakes the node only when it is lost",
         Need { is_trigger: true, .. } => "optional, wakes the node",
-        Need { .. } => "optional, only its loss wakes the node",
+        Need { .. } => "optional, wakes the node only when it is lost",
     }
 }
 
-fn param(spec: &ParamSpec) -> Param {
-    Param {
+fn param(spec: &ParamSpec) -> ParamEntry {
+    ParamEntry {
         name: spec.name,
         takes: spec.takes.clone(),
         unit: spec.unit.clone(),
@@ -338,7 +342,7 @@ fn param(spec: &ParamSpec) -> Param {
         is_required: !spec.is_optional,
         is_live: spec.is_live,
         doc: spec.doc_with_unit(),
-        then: match spec.repeats {
+        separator: match spec.repeats {
             Repeats::Once => ".",
             Repeats::PerName => ".NAME.",
             Repeats::PerEntry => "[].",

@@ -1,31 +1,32 @@
-//! A curve over time in dots: two beside each other and four one above the other in a character.
+//! Charts in Braille characters, each of which has two columns of four dots.
 
 use std::fmt::Write;
 
-use super::course::Point;
-use super::summary::number;
+use super::number::{is_flat, number};
+use super::series::Bin;
 
-/// As wide as the numbers at the axis get.
-pub(super) const LABELS: usize = 10;
-/// Rows of dots in a line.
-const DOTS: usize = 4;
-/// The bits of a character's dots in Unicode: row by row, left and right.
-const BITS: [[u32; 2]; DOTS] = [[0x01, 0x08], [0x02, 0x10], [0x04, 0x20], [0x40, 0x80]];
+/// Width of the numbers at the axis [characters].
+pub(crate) const LABEL_WIDTH: usize = 10;
+/// Rows of dots in a line of text.
+const DOTS_PER_LINE: usize = 4;
+/// Bits of the dots of a Braille character: row by row, left and right.
+const BITS: [[u32; 2]; DOTS_PER_LINE] = [[0x01, 0x08], [0x02, 0x10], [0x04, 0x20], [0x40, 0x80]];
+/// The Braille character without dots.
 const BLANK: u32 = 0x2800;
 
-/// What an axis spans.
+/// The range of values along an axis.
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct Range {
-    low: f64,
-    high: f64,
+pub(crate) struct AxisRange {
+    pub(crate) low: f64,
+    pub(crate) high: f64,
 }
 
-impl Range {
-    /// From the least to the greatest; zero is in it where it is near. None if there is no value.
-    fn of(points: &[Point]) -> Option<Self> {
-        let there = points.iter().filter(|point| point.is_there());
-        let (low, high) = there
-            .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), point| (low.min(point.low), high.max(point.high)));
+impl AxisRange {
+    /// Returns the range of the values in the bins, extended to zero if zero is near, or `None` without a value.
+    pub(crate) fn of<'b>(bins: impl IntoIterator<Item = &'b Bin>) -> Option<Self> {
+        let present = bins.into_iter().filter(|bin| bin.is_present());
+        let (low, high) =
+            present.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), bin| (low.min(bin.low), high.max(bin.high)));
         if low > high {
             return None;
         }
@@ -35,15 +36,13 @@ impl Range {
         Some(Self { low, high })
     }
 
-    /// Whether what differs, differs by rounding alone.
     fn is_flat(self) -> bool {
-        // Halves, so that no difference is infinite.
-        0.5 * self.high - 0.5 * self.low <= 1e-12 + 1e-9 * self.high.abs().max(self.low.abs())
+        is_flat(self.low, self.high)
     }
 
-    /// Row of dots of a value, counted from above.
+    /// Returns the row of dots of a value, counted from the top.
     fn row(self, value: f64, rows: usize) -> usize {
-        let last = (rows * DOTS - 1) as f64;
+        let last = (rows * DOTS_PER_LINE - 1) as f64;
         if self.is_flat() {
             return (last / 2.0) as usize;
         }
@@ -51,9 +50,9 @@ impl Range {
         (depth * last).round().clamp(0.0, last) as usize
     }
 
-    /// The values that are written at the axis, with the lines they stand on.
+    /// Returns the values that are printed at the axis, each with its line of text.
     fn labels(self, rows: usize) -> Vec<(usize, f64)> {
-        let line = |value: f64| self.row(value, rows) / DOTS;
+        let line = |value: f64| self.row(value, rows) / DOTS_PER_LINE;
         if self.is_flat() {
             return vec![(line(self.high), self.high)];
         }
@@ -66,26 +65,28 @@ impl Range {
     }
 }
 
-/// The lines of a curve with its axis on the left, `width` characters wide in all. Each column shows everything from the
-/// least to the greatest value of its time; a gap is where there was none. A dotted line is at zero.
-pub(super) fn chart(points: &[Point], width: usize, rows: usize) -> Vec<String> {
-    let cols = width.saturating_sub(LABELS + 2).max(1);
-    let Some(range) = Range::of(points) else {
-        let mut lines = vec![format!("{:LABELS$} │", ""); rows];
+/// Draws a curve with its axis on the left, `width` characters wide in total.
+///
+/// Each column of dots spans the minimum and the maximum of its time, and is empty where the value was absent. A dotted
+/// line marks zero.
+pub(crate) fn chart(bins: &[Bin], width: usize, rows: usize) -> Vec<String> {
+    let cols = width.saturating_sub(LABEL_WIDTH + 2).max(1);
+    let Some(range) = AxisRange::of(bins) else {
+        let mut lines = vec![format!("{:LABEL_WIDTH$} │", ""); rows];
         lines[rows / 2].push_str("absent");
         return lines;
     };
     let mut bits = vec![0_u32; cols * rows];
-    let mut dot = |x: usize, y: usize| bits[y / DOTS * cols + x / 2] |= BITS[y % DOTS][x % 2];
+    let mut dot = |x: usize, y: usize| bits[y / DOTS_PER_LINE * cols + x / 2] |= BITS[y % DOTS_PER_LINE][x % 2];
     if range.low < 0.0 && range.high > 0.0 && !range.is_flat() {
         (0..2 * cols).step_by(4).for_each(|x| dot(x, range.row(0.0, rows)));
     }
     let mut last: Option<(usize, usize)> = None;
     for x in 0..2 * cols {
-        let part = column(points, x, 2 * cols);
+        let part = column(bins, x, 2 * cols);
         let span = part.map(|(low, high)| (range.row(high, rows), range.row(low, rows)));
         if let Some((mut top, mut bottom)) = span {
-            // Joined to the column before.
+            // Connect to the previous column.
             if let Some((above, below)) = last {
                 top = top.min(below);
                 bottom = bottom.max(above);
@@ -102,25 +103,25 @@ pub(super) fn chart(points: &[Point], width: usize, rows: usize) -> Vec<String> 
             .iter()
             .map(|bits| if *bits == 0 { ' ' } else { char::from_u32(BLANK + bits).unwrap_or(' ') })
             .collect();
-        format!("{:>LABELS$} {tick}{}", label.unwrap_or_default(), dots.trim_end())
+        format!("{:>LABEL_WIDTH$} {tick}{}", label.unwrap_or_default(), dots.trim_end())
     };
     bits.chunks(cols).enumerate().map(line).collect()
 }
 
-/// The least and the greatest of the points in column `x` of `count`.
-fn column(points: &[Point], x: usize, count: usize) -> Option<(f64, f64)> {
-    let first = x * points.len() / count;
-    let end = ((x + 1) * points.len() / count).max(first + 1);
-    let there = points[first..end].iter().filter(|point| point.is_there());
-    there.map(|point| (point.low, point.high)).reduce(|(low, high), (l, h)| (low.min(l), high.max(h)))
+/// Returns the minimum and the maximum of the bins in column `x` of `count`.
+fn column(bins: &[Bin], x: usize, count: usize) -> Option<(f64, f64)> {
+    let first = x * bins.len() / count;
+    let end = ((x + 1) * bins.len() / count).max(first + 1);
+    let present = bins[first..end].iter().filter(|bin| bin.is_present());
+    present.map(|bin| (bin.low, bin.high)).reduce(|(low, high), (l, h)| (low.min(l), high.max(h)))
 }
 
-/// The axis of time below charts of that width, from one time to another [s].
-pub(super) fn time_axis(width: usize, from: f64, to: f64) -> String {
-    let cols = width.saturating_sub(LABELS + 2).max(1);
+/// Draws the time axis below charts of that width, between two times [s].
+pub(crate) fn time_axis(width: usize, from: f64, to: f64) -> String {
+    let cols = width.saturating_sub(LABEL_WIDTH + 2).max(1);
     let label = |time: f64| format!("{time:.3} s");
     let (start, middle, end) = (label(from), label(0.5 * (from + to)), label(to));
-    let mut text = format!("{:LABELS$} └{}\n{:LABELS$}  {start}", "", "─".repeat(cols), "");
+    let mut text = format!("{:LABEL_WIDTH$} └{}\n{:LABEL_WIDTH$}  {start}", "", "─".repeat(cols), "");
     let lengths = [&start, &middle, &end].map(|text| text.chars().count());
     let rest = cols.saturating_sub(lengths.iter().sum());
     // Writing to a string cannot fail.
@@ -134,22 +135,22 @@ pub(super) fn time_axis(width: usize, from: f64, to: f64) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::super::course::Course;
+    use super::super::series::Series;
     use super::*;
 
     fn drawn(values: &[f64], cols: usize, rows: usize) -> Vec<String> {
-        let mut course = Course::with_room(256);
-        values.iter().for_each(|value| course.add(*value));
-        chart(course.points(), cols + LABELS + 2, rows)
+        let mut series = Series::with_capacity(256);
+        values.iter().for_each(|value| series.add(*value));
+        chart(series.bins(), cols + LABEL_WIDTH + 2, rows)
     }
 
-    /// The dots of a chart: in each column the rows that are set, counted from above.
+    /// Returns the rows of dots that are set in each column, counted from the top.
     fn dots(lines: &[String], cols: usize) -> Vec<Vec<usize>> {
         let of = |x: usize| {
-            let rows = 0..lines.len() * DOTS;
+            let rows = 0..lines.len() * DOTS_PER_LINE;
             let is_set = |y: &usize| {
-                let char = lines[y / DOTS].chars().nth(LABELS + 2 + x / 2).unwrap_or(' ');
-                (char as u32).wrapping_sub(BLANK) & BITS[y % DOTS][x % 2] != 0 && char != ' '
+                let char = lines[y / DOTS_PER_LINE].chars().nth(LABEL_WIDTH + 2 + x / 2).unwrap_or(' ');
+                (char as u32).wrapping_sub(BLANK) & BITS[y % DOTS_PER_LINE][x % 2] != 0 && char != ' '
             };
             rows.filter(is_set).collect()
         };
@@ -182,7 +183,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_flat_absent_or_not_finite_has_a_chart_too() {
+    fn flat_absent_and_infinite_values_are_drawn() {
         let flat = drawn(&[3.0; 8], 4, 3);
         assert_eq!(flat, ["           │", "     3.000 ┤⠒⠒⠒⠒", "           │"]);
         assert_eq!(drawn(&[0.0; 8], 2, 1), ["         0 ┤⠒⠒"]);
@@ -197,20 +198,20 @@ mod tests {
     }
 
     #[test]
-    fn the_greatest_numbers_there_are_fit_as_well() {
+    fn the_largest_numbers_fit() {
         let lines = drawn(&[f64::MIN, f64::MAX, 0.0, f64::MAX], 2, 3);
-        // The least value is at the bottom, and the line at zero in the middle.
+        // The minimum is at the bottom, and the line at zero in the middle.
         assert_eq!(dots(&lines, 2)[0], [6, 11]);
         assert!(lines[0].contains("1.80e308 ┤") && lines[2].contains("-1.80e308 ┤"), "{lines:?}");
     }
 
     #[test]
-    fn zero_is_in_the_axis_where_it_is_near_and_has_a_line_where_it_is_crossed() {
+    fn the_axis_extends_to_zero_if_it_is_near_and_marks_it_if_it_is_crossed() {
         let range = |low: f64, high: f64| {
-            Range::of(&{
-                let mut course = Course::new();
-                [low, high].into_iter().for_each(|value| course.add(value));
-                course.points().to_vec()
+            AxisRange::of(&{
+                let mut series = Series::new();
+                [low, high].into_iter().for_each(|value| series.add(value));
+                series.bins().to_vec()
             })
             .map(|range| (range.low, range.high))
         };
@@ -230,7 +231,7 @@ mod tests {
     }
 
     #[test]
-    fn the_axis_of_time_is_as_wide_as_the_chart() {
+    fn the_time_axis_is_as_wide_as_the_chart() {
         for width in [30, 40, 62, 100] {
             let text = time_axis(width, 0.0, 3.996);
             let widths: Vec<usize> = text.lines().map(|line| line.chars().count()).collect();

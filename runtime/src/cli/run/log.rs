@@ -1,55 +1,56 @@
-//! What the nodes that log have to say: written after the tick, since a step neither formats nor writes.
+//! The log lines of nodes that log their inputs. They are written after the tick, since a step does no output.
 
 use tracing::Level;
 
-use super::summary::number;
+use crate::cli::text::number::{number, seconds};
 use crate::engine::{Engine, Logged};
 use crate::node::PortId;
 use crate::record::{Column, Columns};
 use crate::signal::{Flag, Freshness, Unit};
 
-/// The target of these lines; the tool shows it without a switch.
-pub(super) const TARGET: &str = "probe";
+/// Target of these lines, which the tool prints without `-v`.
+pub(crate) const TARGET: &str = "log";
 
-/// The nodes of a graph that log, and room to read their inputs into.
-pub(super) struct Log {
-    nodes: Vec<Entry>,
+/// The nodes of a graph that log their inputs.
+pub(crate) struct NodeLog {
+    nodes: Vec<LoggedNode>,
 }
 
-struct Entry {
-    node: String,
+struct LoggedNode {
+    name: String,
+    /// The flag that asks for a line.
     due: PortId,
     columns: Columns,
     row: Vec<f64>,
 }
 
-impl Log {
-    pub(super) fn new(engine: &Engine) -> Self {
-        let entry = |logged: &Logged| {
+impl NodeLog {
+    pub(crate) fn new(engine: &Engine) -> Self {
+        let node = |logged: &Logged| {
             let columns = Columns::new(&logged.inputs);
             let row = vec![0.0; columns.list.len()];
-            Entry { node: logged.node.clone(), due: logged.due, columns, row }
+            LoggedNode { name: logged.node.clone(), due: logged.due, columns, row }
         };
-        Self { nodes: engine.logged().iter().map(entry).collect() }
+        Self { nodes: engine.logged().iter().map(node).collect() }
     }
 
-    /// Whether a node said so in the tick that the engine has just run, and somebody listens.
-    pub(super) fn is_due(&self, engine: &Engine) -> bool {
-        self.nodes.iter().any(|entry| entry.is_due(engine)) && tracing::enabled!(target: TARGET, Level::INFO)
+    /// Whether any node asked for a line in the last tick of the engine, and lines are printed.
+    pub(crate) fn is_due(&self, engine: &Engine) -> bool {
+        self.nodes.iter().any(|node| node.is_due(engine)) && tracing::enabled!(target: TARGET, Level::INFO)
     }
 
-    /// Writes a line for each node that said so in the tick that the engine has just run.
-    pub(super) fn write(&mut self, engine: &Engine) {
-        let seconds = engine.now() as f64 * 1e-9;
-        for entry in self.nodes.iter_mut().filter(|entry| entry.is_due(engine)) {
-            entry.columns.read(engine.bus(), &mut entry.row);
-            let values = line(&entry.columns.list, &entry.row);
-            tracing::info!(target: TARGET, "at {seconds:.3} s: {}: {values}", entry.node);
+    /// Writes a line for each node that asked for one in the last tick of the engine.
+    pub(crate) fn write(&mut self, engine: &Engine) {
+        let time = seconds(engine.now());
+        for node in self.nodes.iter_mut().filter(|node| node.is_due(engine)) {
+            node.columns.read(engine.bus(), &mut node.row);
+            let values = line(&node.columns.list, &node.row);
+            tracing::info!(target: TARGET, "at {time:.3} s: {}: {values}", node.name);
         }
     }
 }
 
-impl Entry {
+impl LoggedNode {
     fn is_due(&self, engine: &Engine) -> bool {
         let bus = engine.bus();
         let is_new = bus.mark(self.due).freshness(engine.ticks()) == Freshness::New;
@@ -57,11 +58,11 @@ impl Entry {
     }
 }
 
-/// Every value with its name and its unit.
+/// Writes each value with its name and its unit.
 fn line(columns: &[Column], row: &[f64]) -> String {
     let show = |(column, value): (&Column, &f64)| match value {
         value if value.is_nan() => format!("{} is absent", column.name),
-        // A flag or a code has no decimals.
+        // Flags and codes have no decimals.
         value if column.unit == Unit::ONE && value.fract() == 0.0 => format!("{} = {value}", column.name),
         value if column.unit == Unit::ONE => format!("{} = {}", column.name, number(*value)),
         value => format!("{} = {} {}", column.name, number(*value), column.unit),
