@@ -6,7 +6,7 @@ mod answers;
 mod bad_data;
 mod calibrate;
 mod cli;
-mod complete;
+
 mod course;
 mod determinism;
 mod devices;
@@ -20,6 +20,7 @@ mod flow;
 mod freshness;
 mod layers;
 mod limits;
+mod lint;
 mod live;
 mod lockstep;
 mod merge;
