@@ -220,16 +220,17 @@ impl Fused {
         let pressure = self.pressures.mean([sums.force / sums.area, 0.0])[0];
         let (j, i) = (sums.x / sums.force, sums.y / sums.force);
         let (x, y) = (self.shape.x(sums.first[1] + j), self.shape.y(sums.first[0] + i));
-        let ellipse = moments::ellipse(&sums, self.shape.pitch);
-        let has_axis = ellipse.anisotropy() >= 0.1;
+        let orientation = moments::ellipse(&sums, self.shape.pitch).orientation(0.1);
         let mut errors = [0.0 - x, 0.0 - y, 40.0 - pressure, 0.0];
-        if has_axis {
-            let (sine, cosine) = libm::sincos(2.0 * half_angle(ellipse.sine, ellipse.cosine));
+        if let Some(angle) = orientation {
+            let (sine, cosine) = libm::sincos(2.0 * angle);
             let [cosine, sine] = self.axes.mean([cosine, sine]);
             errors[3] = wrap_axial(0.0 - half_angle(sine, cosine));
         }
         let mut twist = Twist::default();
-        for (i, (error, law)) in errors.into_iter().zip(&self.laws).enumerate().take(3 + usize::from(has_axis)) {
+        for (i, (error, law)) in
+            errors.into_iter().zip(&self.laws).enumerate().take(3 + usize::from(orientation.is_some()))
+        {
             let change = error - self.errors[i];
             let slope = if dt > 0.0 { (if i == 3 { wrap_axial(change) } else { change }) / dt } else { 0.0 };
             let others = law.kp * error + law.kd * slope;
@@ -243,6 +244,6 @@ impl Fused {
         }
         (twist.0[3], twist.0[4]) = (0.0, 0.0);
         twist.0[1] += 0.005;
-        (twist, has_axis)
+        (twist, orientation.is_some())
     }
 }

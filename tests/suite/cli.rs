@@ -5,6 +5,7 @@ use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
+use tactflow_runtime::graph::{Request, compile};
 use tempfile::TempDir;
 
 use crate::tool::{Said, peer, said, say, tool};
@@ -396,19 +397,20 @@ fn a_file_that_no_run_has_recorded_is_not_overwritten() {
 }
 
 #[test]
-fn the_readme_shows_what_the_tool_prints() {
+fn the_readme_shows_a_graph_that_loads_and_what_the_tool_prints() {
     let readme = fs::read_to_string(tactflow_tests::workspace().join("README.md")).unwrap();
-    let blocks: Vec<&str> = readme.split("```text\n").skip(1).map(|rest| rest.split("```").next().unwrap()).collect();
-    let [run, mistake] = blocks.as_slice() else { panic!("the README shows {} outputs", blocks.len()) };
-    let out = say(&["run", HYBRID]).out;
-    for line in run.lines() {
-        assert!(out.lines().any(|printed| printed == line), "`{line}` is not printed");
-    }
+    assert!(readme.lines().count() <= 150, "the README is a shop window");
+    let block = |fence: &str| {
+        let (_, rest) = readme.split_once(&format!("```{fence}\n")).unwrap();
+        rest.split("```").next().unwrap().to_owned()
+    };
     let err = say(&["check", "tests/errors/frame_mismatch.toml"]).err;
-    assert!(err.starts_with(mistake.trim_end()), "{err}");
-    let graph = readme.split("```toml\n").nth(1).and_then(|rest| rest.split("```").next()).unwrap();
-    let shipped = fs::read_to_string(tactflow_tests::workspace().join(HYBRID)).unwrap();
-    assert!(shipped.ends_with(graph), "the README's graph is not {HYBRID}");
+    assert!(err.starts_with(block("text").trim_end()), "{err}");
+    let graph = tactflow_tests::workspace().join("graphs/readme.toml");
+    let request = Request { text: Some(block("toml")), ..Request::file(graph) };
+    let compiled = compile(&tactflow_nodes::catalogue(), &request);
+    let compiled = compiled.unwrap_or_else(|report| panic!("{}", report.render(false)));
+    assert!(compiled.warnings().is_none());
 }
 
 #[test]
