@@ -179,7 +179,7 @@ fn bad_settings() {
         ("rate_hz = 1e9", "expected a rate from 0.001"),
         (
             "glitch = [{ at_s = 0, for_s = 1, kind = 'sulk' }]",
-            "expected `repeat`, `freeze`, `silence`, `nan`, `back` or `unplug`, found",
+            "expected one of `repeat`, `freeze`, `silence`, `nan`, `back`, `unplug`, found",
         ),
         ("glitch = [{ at_s = -1, for_s = 1, kind = 'nan' }]", "expected a number, 0 or more"),
     ];
