@@ -183,7 +183,7 @@ impl Fused {
             contact_limit::bar(&mut twist, load.place, load.peak / 240.0, 0.5, 0.05);
             let (velocity, place) = (pose.0.rotation * twist.linear(), pose.0.translation.vector);
             let corners = [[-0.8, -0.4, 0.1], [-0.3, 0.4, 0.7]];
-            twist.0 *= workspace_limit::share(&velocity, &place, corners, 1.0, 2.0 * tick.max_gap);
+            twist.0 *= workspace_limit::scale(&velocity, &place, corners, 1.0, 2.0 * tick.max_gap);
             twist.0 *= scale_twist(&twist, 0.05, 0.8);
         } else {
             twist = Twist::default();

@@ -5,27 +5,36 @@
 
 use tactflow_nodes::random::Random;
 use tactflow_runtime::device::{Commands, Description, Device, DeviceError, Driver, Opened, Output, Samples, Stepped};
-use tactflow_runtime::node::{Mistakes, NonNegative, Positive};
-use tactflow_runtime::params;
+use tactflow_runtime::node::{Mistakes, Param};
 use tactflow_runtime::signal::{Image, ImageShape, Scalar, ScalarShape, Unit};
 
-params! {
+/// Parameters of `true_pad`.
+#[derive(Debug, Clone, Param)]
+pub struct Params {
     /// Seed of the noise.
-    seed: u64 = 1,
-    /// Standard deviation of a tactel [N].
-    noise: NonNegative = NonNegative(0.0),
-    /// When it is touched [s].
-    from_s: NonNegative = NonNegative(0.5),
-    /// When it is let go; never unless given [s].
-    to_s: Option<Positive>,
-    /// Where it is touched [m].
-    at: f64 = 0.01,
-    /// How long the contact takes for all but 1/e of its way to the middle [s].
-    tau_s: Positive = Positive(0.25),
-    /// When the plug is pulled; never unless given [s].
-    unplug_s: Option<Positive>,
-    /// When the samples end; never unless given [s].
-    for_s: Option<Positive>,
+    #[param(default = 1)]
+    seed: u64,
+    /// Standard deviation of a tactel.
+    #[param(unit = "N", range = 0.0.., default = 0.0)]
+    noise: f64,
+    /// When it is touched.
+    #[param(unit = "s", range = 0.0.., default = 0.5)]
+    from_s: f64,
+    /// When it is let go; never unless given.
+    #[param(unit = "s", above = 0.0)]
+    to_s: Option<f64>,
+    /// Where it is touched.
+    #[param(unit = "m", default = 0.01)]
+    at: f64,
+    /// How long the contact takes for all but 1/e of its way to the middle.
+    #[param(unit = "s", above = 0.0, default = 0.25)]
+    tau_s: f64,
+    /// When the plug is pulled; never unless given.
+    #[param(unit = "s", above = 0.0)]
+    unplug_s: Option<f64>,
+    /// When the samples end; never unless given.
+    #[param(unit = "s", above = 0.0)]
+    for_s: Option<f64>,
 }
 
 /// The pad and how far it is.
@@ -81,7 +90,7 @@ impl Device for TruePad {
         pad.fact("threshold", 0.015);
         pad.fact("pressure", 0.1);
         pad.fact("calibration", calibration);
-        pad.fact("noise", *params.noise);
+        pad.fact("noise", params.noise);
         let image = pad.output("image", shape.clone());
         let mut truth = description.fills("ground_truth");
         let clean = truth.output("image", shape);
@@ -98,9 +107,9 @@ impl Device for TruePad {
 impl TruePad {
     /// Where the contact is at `time` [s], if there is one [m].
     fn contact(&self, time: f64) -> Option<f64> {
-        let since = time - *self.params.from_s;
-        let is_let_go = self.params.to_s.is_some_and(|to| time >= *to);
-        (since >= 0.0 && !is_let_go).then(|| self.params.at * libm::exp(-since / *self.params.tau_s))
+        let since = time - self.params.from_s;
+        let is_let_go = self.params.to_s.is_some_and(|to| time >= to);
+        (since >= 0.0 && !is_let_go).then(|| self.params.at * libm::exp(-since / self.params.tau_s))
     }
 }
 
@@ -119,7 +128,7 @@ fn clean(x: f64) -> Vec<f32> {
 
 impl Stepped for TruePad {
     fn next(&self) -> Option<i64> {
-        let is_over = self.params.for_s.is_some_and(|end| self.next as f64 * 1e-9 >= *end);
+        let is_over = self.params.for_s.is_some_and(|end| self.next as f64 * 1e-9 >= end);
         (!is_over).then_some(self.next)
     }
 
@@ -130,13 +139,13 @@ impl Stepped for TruePad {
         let (stamp, sequence) = (self.next, (self.next / PERIOD) as u64 + 1);
         self.next += PERIOD;
         let time = stamp as f64 * 1e-9;
-        if self.params.unplug_s.is_some_and(|at| time >= *at) {
+        if self.params.unplug_s.is_some_and(|at| time >= at) {
             return Err(DeviceError("its plug is out".into()));
         }
         let contact = self.contact(time);
         let image = contact.map_or_else(|| vec![0.0; SIDE * SIDE], clean);
         let noisy: Vec<f32> =
-            image.iter().map(|cell| cell + (*self.params.noise * self.random.normal()) as f32).collect();
+            image.iter().map(|cell| cell + (self.params.noise * self.random.normal()) as f32).collect();
         samples.write(self.image, stamp, sequence).cells_mut().copy_from_slice(&noisy);
         samples.write(self.clean, stamp, sequence).cells_mut().copy_from_slice(&image);
         for (name, port) in &self.truth {

@@ -337,7 +337,7 @@ fn what_cannot_be() {
     let contact = "force = 1.0\npeak = 2.0\napproach_m_per_s = 0.1";
     let wires: [(&str, Shape); 2] = [("twist", TwistShape.into()), ("image", pad().into())];
     let mistakes = NodeRig::new::<ContactLimit>(contact, &wires).err().unwrap();
-    assert_eq!(mistakes[0].message, "no tactel reaches a `peak` that is greater than the `force` of all");
+    assert_eq!(mistakes[0].message, "`peak` is greater than `force`, which a single tactel cannot reach");
     let empty = BOX.replace("0.1, 0.1, 0.1]\nd", "0.1, -0.2, 0.1]\nd");
     let wires: [(&str, Shape); 2] = [("twist", TwistShape.into()), ("pose", PoseShape.into())];
     let mistakes = NodeRig::new::<WorkspaceLimit>(&empty, &wires).err().unwrap();

@@ -9,8 +9,7 @@
 use tactflow_runtime::device::{
     Command, Commands, Description, Device, DeviceError, Driver, Opened, Output, Samples, Stepped,
 };
-use tactflow_runtime::node::{FilePath, Mistake, Mistakes, NonNegative, Positive, Rate};
-use tactflow_runtime::params;
+use tactflow_runtime::node::{FilePath, Mistake, Mistakes, Param};
 use tactflow_runtime::signal::{Joint, Joints, JointsShape, Unit};
 
 use super::arm_facts::{check_start, facts};
@@ -18,29 +17,39 @@ use super::{nanos, period_of};
 use crate::arm::model::load;
 use crate::arm::mount::Mount;
 
-params! {
+/// Parameters of `mock_arm`.
+#[derive(Debug, Clone, Param)]
+pub struct Params {
     /// The arm's model.
     urdf: FilePath,
     /// Link that carries the sensor.
     tip: String,
     /// Pose of the sensor on that link.
-    mount: Mount = Mount::NONE,
-    /// Joint positions at the start, one a joint [rad; m for a prismatic joint].
+    #[param(default = Mount::NONE)]
+    mount: Mount,
+    /// Position of each joint at the start; in m for a prismatic joint.
+    #[param(unit = "rad")]
     start: Vec<f64>,
-    /// Samples of the positions per second [1/s].
-    rate_hz: Rate = Rate(250.0),
-    /// What it states as the greatest acceleration of each joint; it does as it is told [rad/s²; m/s² if prismatic].
-    acceleration: Positive = Positive(10.0),
-    /// When somebody holds the arm.
-    hold: Vec<Hold> = vec![],
+    /// Samples per second.
+    #[param(unit = "1/s", range = 0.001..=1e6, default = 250.0)]
+    rate_hz: f64,
+    /// Maximum acceleration that the arm states for each joint, in m/s² for a prismatic joint; it does not keep to it.
+    #[param(unit = "rad/s2", above = 0.0, default = 10.0)]
+    acceleration: f64,
+    /// Times in which the arm is held in place.
+    #[param(default = vec![])]
+    hold: Vec<Hold>,
 }
 
-params! {
-    Hold:
-    /// When it is seized [s].
-    from_s: NonNegative,
-    /// When it is let go [s].
-    to_s: NonNegative,
+/// A time in which the arm is held in place.
+#[derive(Debug, Clone, Param)]
+struct Hold {
+    /// Begin.
+    #[param(unit = "s", range = 0.0..)]
+    from_s: f64,
+    /// End.
+    #[param(unit = "s", range = 0.0..)]
+    to_s: f64,
 }
 
 /// The arm's joints and where they are.
@@ -99,7 +108,7 @@ impl Device for MockArm {
     fn open(params: Params) -> Result<Opened, Mistakes> {
         let chain = load(&params.urdf, &params.tip, &params.mount)?;
         let period = period_of(params.rate_hz);
-        let acceleration = *params.acceleration;
+        let acceleration = params.acceleration;
         let joints: Vec<Joint> = chain.joints().iter().map(|joint| Joint { acceleration, ..joint.clone() }).collect();
         check_start(&joints, &params.start)?;
         check_holds(&params.hold)?;
@@ -144,7 +153,7 @@ impl MockArm {
             return Ok(false);
         }
         let dt = (now - self.last.unwrap_or(now)) as f64 * 1e-9;
-        let is_held = self.holds.iter().any(|hold| (nanos(*hold.from_s)..nanos(*hold.to_s)).contains(&now));
+        let is_held = self.holds.iter().any(|hold| (nanos(hold.from_s)..nanos(hold.to_s)).contains(&now));
         let places = self.equilibrium.iter_mut().zip(&mut self.position);
         for (((equilibrium, q), v), joint) in places.zip(velocity).zip(&self.joints) {
             if !v.is_finite() {
@@ -161,8 +170,8 @@ impl MockArm {
 }
 
 fn check_holds(holds: &[Hold]) -> Result<(), Mistakes> {
-    let backward = holds.iter().filter(|hold| *hold.to_s <= *hold.from_s);
-    let message = |hold: &Hold| format!("a hold from {} s to {} s lasts no time", *hold.from_s, *hold.to_s);
+    let backward = holds.iter().filter(|hold| hold.to_s <= hold.from_s);
+    let message = |hold: &Hold| format!("a hold from {} s to {} s lasts no time", hold.from_s, hold.to_s);
     let mistakes: Mistakes = backward.map(|hold| Mistake::param("hold", message(hold))).collect();
     if mistakes.is_empty() { Ok(()) } else { Err(mistakes) }
 }
@@ -286,10 +295,10 @@ mod tests {
                 "start = [0, 0, 0, 0, 0, 0, 0]\nhold = [{ from_s = 2, to_s = 1 }]",
                 "a hold from 2 s to 1 s lasts no time",
             ),
-            ("start = [0, 0, 0, 0, 0, 0, 0]\nrate_hz = 1e7", "expected a rate from 0.001 to 1000000, found 10000000"),
+            ("start = [0, 0, 0, 0, 0, 0, 0]\nrate_hz = 1e7", "expected a number from 0.001 to 1000000, found 10000000"),
             (
                 "start = [0, 0, 0, 0, 0, 0, 0]\nrate_hz = 1e-9",
-                "expected a rate from 0.001 to 1000000, found 0.000000001",
+                "expected a number from 0.001 to 1000000, found 0.000000001",
             ),
         ];
         for (params, message) in cases {

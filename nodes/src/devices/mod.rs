@@ -9,11 +9,9 @@ pub mod recording;
 #[cfg(test)]
 pub(crate) mod testing;
 
-use tactflow_runtime::node::Rate;
-
 /// Time between two samples of a device with a parameter `rate_hz` [ns].
-pub(crate) fn period_of(rate_hz: Rate) -> i64 {
-    (1e9 / *rate_hz).round() as i64
+pub(crate) fn period_of(rate_hz: f64) -> i64 {
+    (1e9 / rate_hz).round() as i64
 }
 
 /// Seconds as nanoseconds; what does not fit is for ever.

@@ -8,32 +8,38 @@ use std::borrow::Cow;
 use std::sync::Arc;
 
 use tactflow_runtime::device::{Commands, Description, Device, DeviceError, Driver, Opened, Output, Samples, Stepped};
-use tactflow_runtime::node::{At, Count, FilePath, Mistake, Mistakes, NonNegative, Positive, Rate};
-use tactflow_runtime::params;
+use tactflow_runtime::node::{At, FilePath, Mistake, Mistakes, Param};
 use tactflow_runtime::signal::{Image, Unit};
 use tactflow_runtime::source::Code;
 
 use crate::recordings::{self, Hints, Recording, Refusal};
 
-params! {
+/// Parameters of `recording`.
+#[derive(Debug, Clone, Param)]
+pub struct Params {
     /// The recording.
     file: FilePath,
-    /// Name of its format; recognised unless given.
+    /// Name of the format; recognised if not given.
     format: Option<String>,
-    /// Unit of the values, where the file does not say it.
+    /// Unit of the values, if the file does not state it.
     unit: Option<Unit>,
-    /// Distance between the centres of two neighbours along x and along y, where the file does not say it [mm].
-    pitch_mm: Option<[Positive; 2]>,
-    /// Frames per second, where the file does not say it [1/s].
-    rate_hz: Option<Rate>,
-    /// Number of rows and of columns, where the file does not say it.
-    size: Option<[Count; 2]>,
-    /// Name of the pad to play, where the file has several.
+    /// Distance between the centres of neighbouring tactels along x and along y, if the file does not state it.
+    #[param(unit = "mm", above = 0.0)]
+    pitch_mm: Option<[f64; 2]>,
+    /// Frames per second, if the file does not state it.
+    #[param(unit = "1/s", range = 0.001..=1e6)]
+    rate_hz: Option<f64>,
+    /// Numbers of rows and columns, if the file does not state them.
+    #[param(range = 1..=1_000_000)]
+    size: Option<[usize; 2]>,
+    /// Name of the pad to play, if the file has several.
     pad: Option<String>,
-    /// What it states as the noise threshold, where the file does not say it or says it for other tasks [unit of a tactel].
-    threshold: Option<NonNegative>,
-    /// What it states as the unit of pressure, the p = 1 of the paper; not stated unless given [unit of a tactel per tactel].
-    pressure: Option<Positive>,
+    /// Noise threshold that the pad states as a fact, in place of the one in the file.
+    #[param(unit = "$unit", range = 0.0..)]
+    threshold: Option<f64>,
+    /// Unit of pressure that the pad states as a fact, per tactel: p = 1 in the paper.
+    #[param(unit = "$unit", above = 0.0)]
+    pressure: Option<f64>,
 }
 
 /// A recording that is being shown.
@@ -108,9 +114,9 @@ fn hints(params: &Params) -> Result<Hints, Mistakes> {
         assumed: None,
         format: params.format.clone(),
         unit: params.unit,
-        pitch: params.pitch_mm.map(|pitch| pitch.map(|mm| *mm * 1e-3)),
-        rate_hz: params.rate_hz.map(|rate| *rate),
-        size: params.size.map(|size| size.map(|count| count.0)),
+        pitch: params.pitch_mm.map(|pitch| pitch.map(|mm| mm * 1e-3)),
+        rate_hz: params.rate_hz,
+        size: params.size,
         pad: params.pad.clone(),
     })
 }
@@ -175,10 +181,10 @@ fn facts(recording: &Recording, params: &Params) -> Vec<(Cow<'static, str>, toml
         ("frames".into(), (recording.frames.len() as i64).into()),
         ("format".into(), recording.format.into()),
     ];
-    if let Some(threshold) = params.threshold.map(|threshold| *threshold).or(recording.threshold) {
+    if let Some(threshold) = params.threshold.or(recording.threshold) {
         facts.push(("threshold".into(), threshold.into()));
     }
-    facts.extend(params.pressure.map(|pressure| ("pressure".into(), (*pressure).into())));
+    facts.extend(params.pressure.map(|pressure| ("pressure".into(), pressure.into())));
     facts
 }
 

@@ -1,7 +1,6 @@
-//! `contact_debounce`: a contact counts once it has lasted for some samples, and is over once it has been away for some.
+//! `contact_debounce`: the state follows from the newest `samples` flags.
 //!
-//! The state follows from the newest `samples` flags, oldest first; with five of them this is the debouncer of the
-//! authors' later code:
+//! With five samples, written oldest first, it is the debouncer of the authors' later code:
 //!
 //! | flags | state | code |
 //! |---|---|---|
@@ -11,78 +10,89 @@
 //! | 11100 | leaving | 3 |
 //! | any other | uncertain | 4 |
 //!
-//! Before there are as many samples, those that are missing count as no contact. A held flag is no sample.
+//! Samples that are still missing at the start count as no contact. A held flag is not a sample.
 
-use tactflow_runtime::node::{Count, Mistake, Mistakes, Node, Setup, Tick};
-use tactflow_runtime::{inputs, outputs, params, state};
+use tactflow_runtime::node::{Describe, In, Inputs, Mistakes, Node, Out, Outputs, Param, Setup, State, Tick};
+use tactflow_runtime::signal::{Flag, Scalar};
 
-params! {
-    /// How many of the newest samples are looked at, 64 at most [1].
-    samples: Count = Count(5),
+/// Removes flicker from a contact: the contact begins once it has lasted for some samples.
+///
+/// The node looks at the newest `samples` flags. `present` is set once all of them have a contact, and cleared once none
+/// has one: a contact of a few frames does not count, and a gap of a few frames changes nothing. This delays the contact
+/// by `samples - 1` frames, 16 ms with five samples at 250 Hz.
+///
+/// `state` has more detail, as in the authors' later code: 0 none, 1 initial (contact in the newer half), 2 stable (in all),
+/// 3 leaving (in the older half), 4 uncertain (anything else). With five samples the newer half is the newest three, and
+/// the older half is the oldest three.
+///
+/// Use it where flicker must not act: for the end of an approach, a gate of guidance, a switch of tasks. Each new flag
+/// counts once; a held flag does not count again. While the flag is absent the outputs are absent, and after the graph's
+/// `reset_after_ms` the node starts again without a contact.
+///
+/// ```toml
+/// [nodes.contact_debounce]
+/// type = "contact_debounce"
+/// in.present = "label.present"
+/// samples = 5                         # 20 ms at 250 Hz
+/// ```
+#[derive(Describe)]
+#[describe(name = "contact_debounce")]
+pub struct ContactDebounce {
+    /// Number of samples, from 1 to 64.
+    samples: u32,
 }
 
-inputs! {
+/// Parameters of `contact_debounce`.
+#[derive(Debug, Clone, Param)]
+pub struct Params {
+    /// Number of samples that must agree.
+    #[param(unit = "1", range = 1..=64, default = 5)]
+    samples: u64,
+}
+
+/// What `contact_debounce` reads.
+#[derive(Inputs)]
+pub struct Inputs<'a> {
     /// Whether there is a contact in the newest sample.
-    present: Flag,
+    present: In<'a, Flag>,
 }
 
-outputs! {
-    /// Whether there is a contact: from `stable` on, until `none`.
-    present: Flag,
-    /// The state: 0 none, 1 initial, 2 stable, 3 leaving, 4 uncertain [1].
-    state: Scalar["1"],
+/// What `contact_debounce` writes.
+#[derive(Outputs)]
+pub struct Outputs {
+    /// Whether there is a contact: from `stable` until `none`.
+    present: Out<Flag>,
+    /// The state: 0 none, 1 initial, 2 stable, 3 leaving, 4 uncertain.
+    #[port(unit = "1", frame = "_")]
+    state: Out<Scalar>,
     /// Whether every sample has a contact.
-    stable: Flag,
-    /// Whether the samples are neither all alike nor a contact that begins or ends.
-    uncertain: Flag,
+    stable: Out<Flag>,
+    /// Whether the samples are neither all equal nor a contact that begins or ends.
+    uncertain: Out<Flag>,
 }
 
-state! {
+/// What `contact_debounce` remembers.
+#[derive(State)]
+pub struct State {
     /// The newest samples, the newest in the lowest bit.
     history: u64,
     /// Whether there is a contact.
     is_present: bool,
 }
 
-/// What the newest samples say.
+/// The state of a contact.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Phase {
-    /// No contact in any.
+    /// No sample has a contact.
     None,
-    /// Contact in the newer ones only.
+    /// The newer half of the samples has a contact.
     Initial,
-    /// Contact in all.
+    /// All samples have a contact.
     Stable,
-    /// Contact in the older ones only.
+    /// The older half of the samples has a contact.
     Leaving,
     /// Anything else.
     Uncertain,
-}
-
-/// How many samples are looked at.
-pub struct ContactDebounce {
-    samples: u32,
-}
-
-impl tactflow_runtime::node::Describe for ContactDebounce {
-    const NAME: &'static str = "contact_debounce";
-    const SUMMARY: &'static str =
-        "makes a contact that does not flicker: it counts once it has lasted for some samples";
-    const DOC: &'static str = "Looks at the newest `samples` flags, five unless given. `present` is set once all \
-        of them have a contact and cleared once none has, so a contact of a few frames never counts and a gap of a \
-        few frames changes nothing. The price is a delay of `samples - 1` frames, 16 ms at 250 Hz.\n\n\
-        `state` says more, as in the authors' later code: 0 none, 1 initial (the newer half), 2 stable (all), 3 \
-        leaving (the older half), 4 uncertain (anything else). With five samples the newer half is the newest \
-        three, and the older half is the oldest three.\n\n\
-        Use it for what must not react to flicker: the end of an approach, a gate of guidance, a switch of tasks. \
-        Each new flag counts once; one that is held does not count again. An image that stays away makes the \
-        outputs absent, and after the graph's `reset_after_ms` it starts afresh with no contact.";
-    const EXAMPLE: &'static str = r#"
-[nodes.contact_debounce]
-type = "contact_debounce"
-in.present = "label.present"
-samples = 5                         # 20 ms at 250 Hz
-"#;
 }
 
 impl Node for ContactDebounce {
@@ -92,10 +102,7 @@ impl Node for ContactDebounce {
     type State = State;
 
     fn new(params: Params, _: &mut Setup<Self>) -> Result<Self, Mistakes> {
-        match u32::try_from(*params.samples) {
-            Ok(samples) if samples <= u64::BITS => Ok(Self { samples }),
-            _ => Err(Mistake::param("samples", format!("`samples` is {} at most", u64::BITS)).into()),
-        }
+        Ok(Self { samples: params.samples as u32 })
     }
 
     fn state(&self) -> State {
@@ -117,7 +124,7 @@ impl Node for ContactDebounce {
     }
 }
 
-/// What the newest `samples` of a history say, 1 to 64 of them, the newest in the lowest bit.
+/// Returns the state for the newest `samples` of a history, from 1 to 64; the newest sample is the lowest bit.
 #[must_use]
 pub fn phase(history: u64, samples: u32) -> Phase {
     let ones = |count: u32| u64::MAX.checked_shr(u64::BITS - count).unwrap_or(0);
@@ -144,8 +151,8 @@ mod tests {
         NodeRig::new::<ContactDebounce>(params, &[("present", FlagShape.into())])
     }
 
-    /// What comes out of the flags, each a new sample: present, state, stable and uncertain of the last.
-    fn show(rig: &mut NodeRig, flags: &str) -> (bool, f64, bool, bool) {
+    /// Sets each flag as a new sample. Returns `present`, `state`, `stable` and `uncertain` after the last one.
+    fn feed(rig: &mut NodeRig, flags: &str) -> (bool, f64, bool, bool) {
         for flag in flags.chars() {
             rig.set("present", flag == '1');
             rig.step();
@@ -166,17 +173,17 @@ mod tests {
     }
 
     #[test]
-    fn all_32_histories_of_five_are_the_authors() {
+    fn all_32_histories_of_five_samples_match_the_authors_rules() {
         for history in 0..32_u64 {
             let flags: [bool; 5] = std::array::from_fn(|i| history >> (4 - i) & 1 == 1);
             assert_eq!(phase(history, 5) as u8, authors(flags), "{history:05b}");
-            // What came before is of no account.
+            // Older samples do not matter.
             assert_eq!(phase(history | 0b1011 << 5, 5) as u8, authors(flags), "{history:05b}");
         }
     }
 
     #[test]
-    fn a_contact_comes_flickers_and_goes() {
+    fn a_contact_that_flickers_begins_and_ends_once() {
         let mut rig = rig("").unwrap();
         let steps = [
             ("0", (false, 0.0, false, false)),
@@ -193,30 +200,30 @@ mod tests {
             ("1111", (false, 4.0, false, true)),
         ];
         for (i, (flags, expected)) in steps.into_iter().enumerate() {
-            assert_eq!(show(&mut rig, flags), expected, "step {i}: {flags}");
+            assert_eq!(feed(&mut rig, flags), expected, "step {i}: {flags}");
         }
     }
 
     #[test]
-    fn a_held_flag_is_no_sample() {
+    fn a_held_flag_is_not_a_sample() {
         let mut rig = rig("").unwrap();
-        assert_eq!(show(&mut rig, "1111"), (false, 4.0, false, true));
+        assert_eq!(feed(&mut rig, "1111"), (false, 4.0, false, true));
         for _ in 0..9 {
             rig.step();
             assert_eq!((rig.freshness("present"), rig.get::<Flag>("stable")), (Freshness::Held, Some(&false)));
         }
-        assert_eq!(show(&mut rig, "1"), (true, 2.0, true, false));
+        assert_eq!(feed(&mut rig, "1"), (true, 2.0, true, false));
     }
 
     #[test]
-    fn only_a_lasting_absence_forgets() {
+    fn only_a_long_absence_resets() {
         let mut rig = rig("").unwrap();
         for (ms, expected) in [(10.0, (true, 2.0, true, false)), (25.0, (false, 4.0, false, true))] {
-            assert_eq!(show(&mut rig, "11111"), (true, 2.0, true, false));
+            assert_eq!(feed(&mut rig, "11111"), (true, 2.0, true, false));
             rig.lose("present");
             rig.step_ms(ms);
             assert_eq!(rig.get::<Flag>("present"), None);
-            assert_eq!(show(&mut rig, "1"), expected, "{ms} ms");
+            assert_eq!(feed(&mut rig, "1"), expected, "{ms} ms");
         }
     }
 
@@ -230,13 +237,13 @@ mod tests {
             for flag in flags {
                 run = if run.0 == flag { (flag, run.1 + 1) } else { (flag, 1) };
                 expected = if run.1 >= samples { flag } else { expected };
-                prop_assert_eq!(show(&mut rig, if flag { "1" } else { "0" }).0, expected);
+                prop_assert_eq!(feed(&mut rig, if flag { "1" } else { "0" }).0, expected);
             }
         }
     }
 
     #[test]
-    fn how_many_samples_there_may_be() {
+    fn samples_are_from_1_to_64() {
         for (samples, is_good) in [("1", true), ("64", true), ("65", false), ("0", false), ("5000000000", false)] {
             assert_eq!(rig(&format!("samples = {samples}")).is_ok(), is_good, "{samples}");
         }

@@ -1,150 +1,156 @@
-//! `delay` and `twist_delay`: what their input was one tick ago. With one of them in it, a loop is allowed.
+//! `delay` and `twist_delay`: one implementation for both kinds.
 //!
-//! The input is read as the last tick left it, so the node steps before the one it reads from. What was new then is new
-//! now, and what was held is held; the stamp is that of the sample. While there was nothing, `initial` comes instead.
+//! The input is read as the last tick left it, so the node steps before the node that it reads from. What was new then is
+//! new now, and what was held is held.
 
-use tactflow_runtime::node::{Mistakes, Node, Setup, Tick};
-use tactflow_runtime::signal::{ScalarShape, Twist, Unit};
-use tactflow_runtime::{inputs, outputs, params, state};
+use tactflow_runtime::node::{Describe, In, Inputs, Mistakes, Node, Out, Outputs, Param, Setup, State, Tick};
+use tactflow_runtime::signal::{Scalar, ScalarShape, Settable, Signal, Twist, TwistShape, Unit};
 
-macro_rules! delay {
-    ($(#[$meta:meta])* $Name:ident in $module:ident: $name:literal, $port:ident: $Kind:ident[$($arg:literal),*],
-     params { $($params:tt)* }, $make:expr, $prepare:expr, $summary:literal, $doc:literal, $example:literal) => {
-        pub use $module::$Name;
-
-        mod $module {
-            use super::*;
-
-            params! { $($params)* }
-
-            inputs! {
-                /// What is delayed [any unit].
-                $port: Delayed<$Kind[$($arg),*]>,
-            }
-
-            outputs! {
-                /// What it was one tick ago [unit of what comes in].
-                $port: $Kind[$($arg),*],
-            }
-
-            state! {
-                /// What came out in the last step.
-                shown: Shown,
-            }
-
-            $(#[$meta])*
-            pub struct $Name {
-                initial: Option<tactflow_runtime::signal::$Kind>,
-            }
-
-            impl tactflow_runtime::node::Describe for $Name {
-                const NAME: &'static str = $name;
-                const SUMMARY: &'static str = $summary;
-                const DOC: &'static str = $doc;
-                const EXAMPLE: &'static str = $example;
-                const EVERY_TICK: bool = true;
-            }
-
-            impl Node for $Name {
-                type Params = Params;
-                type Inputs<'a> = Inputs<'a>;
-                type Outputs = Outputs;
-                type State = State;
-
-                fn new(params: Params, setup: &mut Setup<Self>) -> Result<Self, Mistakes> {
-                    let prepare: fn(&Params, &mut OutputShapes) = $prepare;
-                    prepare(&params, &mut setup.outputs);
-                    Ok(Self { initial: params.initial.map($make) })
-                }
-
-                fn state(&self) -> State {
-                    State { shown: Shown::Nothing }
-                }
-
-                fn step(&self, _: &Tick, inputs: Inputs<'_>, out: &mut Outputs, state: &mut State) {
-                    let (next, value, is_new) = match (inputs.$port, self.initial) {
-                        (Some(value), _) => (Shown::Input, *value, value.is_new()),
-                        (None, Some(initial)) => (Shown::Initial, initial, false),
-                        (None, None) => {
-                            state.shown = Shown::Nothing;
-                            return;
-                        }
-                    };
-                    if is_new || state.shown != next {
-                        out.$port.set(value);
-                    } else {
-                        out.$port.keep();
-                    }
-                    state.shown = next;
-                }
-            }
-        }
-    };
+/// Delays a signal by one tick, so that a loop is allowed.
+///
+/// A cycle of wires is an error, because no node of it could step first. A delay breaks the cycle: its output is its
+/// input as it was one tick ago. A `delay` states its unit, because its input is not known yet when the graph is built; a
+/// wire in another unit is an error.
+///
+/// What was new one tick ago is new now and keeps its stamp; what was held is held. While the input is absent the output
+/// is `initial`, or absent if `initial` is not given. A loop that needs its own last value starts only with `initial`,
+/// and starts with it again after each absence. An absent twist is zero motion. An `initial` that moves is generated
+/// motion: it goes on without any contact.
+///
+/// The delay is one tick and not one sample: 4 ms in a graph of 250 Hz, whatever the rate of the input. A port of a role
+/// cannot be delayed: its sample is present before any node steps.
+///
+/// ```toml
+/// [nodes.delay]
+/// type = "delay"
+/// in.value = "smooth.value"
+/// unit = "N/tactel"
+/// initial = 0.0                       # [N/tactel]
+/// ```
+///
+/// ```toml
+/// [nodes.twist_delay]
+/// type = "twist_delay"
+/// in.value = "sum.twist"
+/// ```
+#[derive(Describe)]
+#[describe(name = "delay", of = "Delay<Scalar>", every_tick)]
+#[describe(name = "twist_delay", of = "Delay<Twist>", every_tick)]
+pub struct Delay<T> {
+    initial: Option<T>,
 }
 
-/// What a delay shows.
+/// A kind of signal that can be delayed.
+pub trait Delayable: Settable + Copy {
+    /// Parameters of the delay.
+    type Params: Param;
+
+    /// Returns the shape of the output, and its value while the input is absent.
+    fn configure(params: Self::Params) -> (<Self as Signal>::Shape, Option<Self>);
+}
+
+/// Parameters of `delay`.
+#[derive(Debug, Clone, Param)]
+pub struct ScalarParams {
+    /// Unit of the input.
+    unit: Unit,
+    /// Output while the input is absent; without it the output is absent too.
+    #[param(unit = "$unit")]
+    initial: Option<f64>,
+}
+
+/// Parameters of `twist_delay`.
+#[derive(Debug, Clone, Param)]
+pub struct TwistParams {
+    /// Output while the input is absent, `[vx, vy, vz, wx, wy, wz]`; without it the output is absent too.
+    #[param(unit = "m/s, rad/s")]
+    initial: Option<[f64; 6]>,
+}
+
+/// What a delay reads.
+#[derive(Inputs)]
+pub struct Inputs<'a, T: Signal> {
+    /// The signal to delay.
+    #[port(unit = "U", frame = "A", optional, delayed)]
+    value: Option<In<'a, T>>,
+}
+
+/// What a delay writes.
+#[derive(Outputs)]
+pub struct Outputs<T: Signal> {
+    /// The input one tick ago.
+    #[port(unit = "U", frame = "A")]
+    value: Out<T>,
+}
+
+/// What a delay remembers.
+#[derive(State)]
+pub struct State {
+    /// Where the output of the last step came from, if it was present.
+    last: Option<Origin>,
+}
+
+/// Where the output of a step comes from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Shown {
-    Nothing,
+enum Origin {
     Initial,
     Input,
 }
 
-delay! {
-    /// What it gives while there is nothing.
-    Delay in scalar: "delay", value: Scalar["U", "A"],
-    params {
-        /// Unit of what is delayed.
-        unit: Unit,
-        /// What it gives while there is nothing; without it, nothing [`unit`].
-        initial: Option<f64>,
-    },
-    |initial| initial,
-    |params, outputs| outputs.value = ScalarShape::of(params.unit),
-    "what a scalar was one tick ago, so that a loop is allowed",
-    "A wire that goes round in a circle does not load, as no node of it could step first. A delay breaks the circle: it \
-    gives what its input was one tick ago. Its unit must be said, since the input is not known yet when the graph is \
-    put together; a wire in another unit is a mistake.\n\n\
-    What was new a tick ago is new now, with the stamp it had; what was held is held. While the input is absent the \
-    output is `initial`, or absent if that is not given. A loop that needs its own last value never starts without \
-    `initial`, and starts again with it after each absence.\n\n\
-    It delays by a tick, not by a sample: in a graph of 250 Hz by 4 ms, whatever the rate of the input. A port of a role \
-    cannot be delayed: its sample is there before any node steps.",
-    r#"
-[nodes.delay]
-type = "delay"
-in.value = "smooth.value"
-unit = "N/tactel"
-initial = 0.0                       # [N per tactel]
-"#
+impl Delayable for Scalar {
+    type Params = ScalarParams;
+
+    fn configure(params: ScalarParams) -> (ScalarShape, Option<Self>) {
+        (ScalarShape::of(params.unit), params.initial)
+    }
 }
 
-delay! {
-    /// What it gives while there is nothing.
-    TwistDelay in twist: "twist_delay", twist: Twist["A"],
-    params {
-        /// What it gives while there is nothing, `[vx, vy, vz, wx, wy, wz]`; without it, nothing [m/s, rad/s].
-        initial: Option<[f64; 6]>,
-    },
-    |initial| Twist(initial.into()),
-    |_, _| {},
-    "what a motion was one tick ago, so that a loop is allowed",
-    "Gives the twist that was commanded one tick ago, for whatever looks back at it: a wire that goes round in a circle \
-    does not load, unless it runs through a delay.\n\n\
-    What was new a tick ago is new now, with the stamp it had; what was held is held. While the input is absent the \
-    output is `initial`, or absent if that is not given, which is zero motion. An `initial` that moves is generated \
-    motion: it goes on without any contact.",
-    r#"
-[nodes.twist_delay]
-type = "twist_delay"
-in.twist = "sum.twist"
-"#
+impl Delayable for Twist {
+    type Params = TwistParams;
+
+    fn configure(params: TwistParams) -> (TwistShape, Option<Self>) {
+        (TwistShape, params.initial.map(|initial| Self(initial.into())))
+    }
+}
+
+impl<T: Delayable> Node for Delay<T>
+where
+    Self: Describe,
+{
+    type Params = T::Params;
+    type Inputs<'a> = Inputs<'a, T>;
+    type Outputs = Outputs<T>;
+    type State = State;
+
+    fn new(params: T::Params, setup: &mut Setup<Self>) -> Result<Self, Mistakes> {
+        let (shape, initial) = T::configure(params);
+        setup.outputs.value = shape;
+        Ok(Self { initial })
+    }
+
+    fn state(&self) -> State {
+        State { last: None }
+    }
+
+    fn step(&self, _: &Tick, inputs: Inputs<'_, T>, out: &mut Outputs<T>, state: &mut State) {
+        let next = match (inputs.value, self.initial) {
+            (Some(value), _) => Some((Origin::Input, *value, value.is_new())),
+            (None, Some(initial)) => Some((Origin::Initial, initial, false)),
+            (None, None) => None,
+        };
+        let last = std::mem::replace(&mut state.last, next.map(|(origin, ..)| origin));
+        match next {
+            Some((origin, value, is_new)) if is_new || last != Some(origin) => out.value.set(value),
+            Some(_) => out.value.keep(),
+            None => {}
+        }
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use tactflow_runtime::harness::NodeRig;
-    use tactflow_runtime::signal::{Freshness, Scalar, Shape, Signal, Stamp, TwistShape};
+    use tactflow_runtime::signal::{Freshness, Shape, Stamp};
 
     use super::*;
 
@@ -152,44 +158,39 @@ mod tests {
         Twist([speed, 0.0, 0.0, 0.0, 0.0, 0.0].into())
     }
 
-    /// What comes in: `Some(None)` is a loss.
-    type Comes = Option<Option<f64>>;
+    /// What happens at the input in a tick: a value, a loss (`Some(None)`), or nothing.
+    type Event = Option<Option<f64>>;
 
-    /// Without and with an initial value of 9: freshness and value of each tick.
-    fn table<N: Node, T: Signal + PartialEq + std::fmt::Debug>(
-        port: &str,
-        shape: &Shape,
-        params: [&str; 2],
-        make: fn(f64) -> T,
-    ) {
+    /// Freshness and value of each tick, without and with an initial value of 9.
+    fn table<N: Node, T: Signal + PartialEq + std::fmt::Debug>(shape: &Shape, params: [&str; 2], make: fn(f64) -> T) {
         use Freshness::{Absent, Held, Lost, New};
         type Out = (Freshness, Option<f64>);
-        let steps: [(&str, Comes, Out, Out); 9] = [
+        let steps: [(&str, Event, Out, Out); 9] = [
             ("nothing yet", None, (Absent, None), (New, Some(9.0))),
-            ("comes", Some(Some(1.0)), (Absent, None), (Held, Some(9.0))),
-            ("comes out, the next comes", Some(Some(2.0)), (New, Some(1.0)), (New, Some(1.0))),
-            ("so does that", None, (New, Some(2.0)), (New, Some(2.0))),
-            ("held, and goes", Some(None), (Held, Some(2.0)), (Held, Some(2.0))),
-            ("lost a tick later", None, (Lost, None), (New, Some(9.0))),
-            ("away", None, (Absent, None), (Held, Some(9.0))),
-            ("comes back", Some(Some(3.0)), (Absent, None), (Held, Some(9.0))),
-            ("comes out", None, (New, Some(3.0)), (New, Some(3.0))),
+            ("the first value arrives", Some(Some(1.0)), (Absent, None), (Held, Some(9.0))),
+            ("the first value passes, the second arrives", Some(Some(2.0)), (New, Some(1.0)), (New, Some(1.0))),
+            ("the second value passes", None, (New, Some(2.0)), (New, Some(2.0))),
+            ("held; the input is lost", Some(None), (Held, Some(2.0)), (Held, Some(2.0))),
+            ("lost one tick later", None, (Lost, None), (New, Some(9.0))),
+            ("absent", None, (Absent, None), (Held, Some(9.0))),
+            ("the third value arrives", Some(Some(3.0)), (Absent, None), (Held, Some(9.0))),
+            ("the third value passes", None, (New, Some(3.0)), (New, Some(3.0))),
         ];
         for (i, params) in params.into_iter().enumerate() {
-            let mut rig = NodeRig::new::<N>(params, &[(port, shape.clone())]).unwrap();
-            // As in a graph: the node steps first, and what it reads from is written after it.
-            for (what, comes, without, with) in &steps {
+            let mut rig = NodeRig::new::<N>(params, &[("value", shape.clone())]).unwrap();
+            // As in a graph: the node steps before its input is written.
+            for (what, event, without, with) in &steps {
                 rig.step();
                 rig.tick.index -= 1;
-                match comes {
-                    Some(Some(value)) => rig.set(port, make(*value)),
-                    Some(None) => rig.lose(port),
+                match event {
+                    Some(Some(value)) => rig.set("value", make(*value)),
+                    Some(None) => rig.lose("value"),
                     None => {}
                 }
                 rig.tick.index += 1;
                 let (freshness, value) = if i == 0 { *without } else { *with };
                 assert_eq!(
-                    (rig.freshness(port), rig.get::<T>(port).cloned()),
+                    (rig.freshness("value"), rig.get::<T>("value").cloned()),
                     (freshness, value.map(make)),
                     "{what}, {params}"
                 );
@@ -198,17 +199,18 @@ mod tests {
     }
 
     #[test]
-    fn what_comes_out_when() {
+    fn the_output_is_the_input_of_the_last_tick() {
         let shape = ScalarShape::of(Unit::NEWTON).into();
-        table::<Delay, Scalar>("value", &shape, ["unit = 'N'", "unit = 'N'\ninitial = 9.0"], |value| value);
+        table::<Delay<Scalar>, Scalar>(&shape, ["unit = 'N'", "unit = 'N'\ninitial = 9.0"], |value| value);
         let twist = ["", "initial = [9, 0, 0, 0, 0, 0]"];
-        table::<TwistDelay, Twist>("twist", &TwistShape.into(), twist, along_x);
+        table::<Delay<Twist>, Twist>(&TwistShape.into(), twist, along_x);
     }
 
     #[test]
-    fn what_is_delayed_is_as_old_as_its_sample_and_what_is_made_up_is_of_no_age() {
+    fn a_delayed_value_keeps_its_stamp_and_the_initial_one_is_timeless() {
         let shape = ScalarShape::of(Unit::NEWTON);
-        let mut rig = NodeRig::new::<Delay>("unit = 'N'\ninitial = 0.0", &[("value", shape.clone().into())]).unwrap();
+        let mut rig =
+            NodeRig::new::<Delay<Scalar>>("unit = 'N'\ninitial = 0.0", &[("value", shape.clone().into())]).unwrap();
         assert_eq!(rig.shape("value"), &shape.into());
         rig.step();
         assert!(rig.mark("value").stamp().is_timeless());

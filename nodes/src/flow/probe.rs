@@ -1,70 +1,88 @@
-//! `probe`: shows what is on some wires while the graph runs.
-//!
-//! A step never logs. This one only decides whether a line is due, by a flag; the tool writes the line after the tick,
-//! from what is on the wires then ([`Node::LOGS`]).
+//! `probe`: a step never logs. It only decides whether a line is due and sets a flag; the tool writes the line after the
+//! tick, from the values on the wires at that time ([`Node::LOGS`]).
 
-use tactflow_runtime::node::{At, Mistake, Mistakes, Node, NonNegative, Setup, Tick};
+use tactflow_runtime::node::{
+    At, Describe, In, Inputs, Many, Mistake, Mistakes, Node, Out, Outputs, Param, Setup, State, Tick,
+};
+use tactflow_runtime::signal::{Features, Flag, Joints, Pose, Scalar, Twist};
 use tactflow_runtime::source::Code;
-use tactflow_runtime::{inputs, outputs, params, state};
 
-params! {
-    /// Least time between two lines; with 0 there is one for everything new [ms].
-    every_ms: NonNegative = NonNegative(0.0),
-}
-
-inputs! {
-    /// Scalars, each under a name of your choice [any unit].
-    value: Many<Scalar["_"]>,
-    /// A flag.
-    flag: Trigger<Flag>,
-    /// A feature vector [any units].
-    features: Trigger<Features["_"]>,
-    /// A twist [m/s, rad/s].
-    twist: Trigger<Twist>,
-    /// A joint vector [any unit].
-    joints: Trigger<Joints["_"]>,
-    /// A pose [m].
-    pose: Trigger<Pose>,
-}
-
-outputs! {
-    /// Whether a line is due.
-    due: Flag,
-}
-
-state! {
-    /// When a line was due last [ns].
-    last: Option<i64>,
-}
-
-/// How often it shows something.
+/// Prints the values of wires while the graph runs.
+///
+/// Wire the signals to show by kind (`in.flag`, `in.features`, `in.twist`, `in.joints`, `in.pose`), and any number of
+/// scalars under names of your choice. `run` then prints lines to standard error with the time, the node's name, and every
+/// value with its port and its unit:
+///
+/// ```text
+/// INFO probe: at 0.512 s: watch: moments.force = 1.500 N, moments.x is absent
+/// ```
+///
+/// A line is due when a wire has a new value or loses its value, but not before `every_ms` have passed since the last
+/// line. A change before that time appears in the next line that is due, or not at all if no other change follows. The
+/// node does not print within the tick: it sets a flag, and the tool prints after the tick, so a probe delays no command.
+/// `RUST_LOG=warn` turns the lines off; `--out` records every tick instead.
+///
+/// Without `every_ms` a graph that runs faster than real time prints thousands of lines per second.
+///
+/// ```toml
+/// [nodes.probe]
+/// type = "probe"
+/// in.force = "moments.force"
+/// in.flag = "label.present"
+/// in.twist = "sum.twist"
+/// every_ms = 100                      # at most ten lines per second
+/// ```
+#[derive(Describe)]
+#[describe(name = "probe", logs)]
 pub struct Probe {
+    /// Minimum time between two lines [ns].
     every: i64,
 }
 
-impl tactflow_runtime::node::Describe for Probe {
-    const NAME: &'static str = "probe";
-    const SUMMARY: &'static str = "prints what is on a wire while the graph runs";
-    const DOC: &'static str = "Wire to it what you want to see, by kind (`in.flag`, `in.features`, `in.twist`, \
-        `in.joints`, `in.pose`), and any number of scalars under names of your choice. `run` then prints a line on \
-        standard error with the time, the node's name, and every value with its port and its unit:\n\n\
-        ```text\n\
-        INFO probe: at 0.512 s: watch: moments.force = 1.500 N, moments.x is absent\n\
-        ```\n\n\
-        A line is due when anything on the wires is new or gets lost, and no sooner than `every_ms` after the last \
-        one. What comes sooner shows with the next line that is due, and not at all if nothing comes after it. Nothing \
-        is printed from within the tick: the node raises a flag, and the tool writes after the tick, \
-        so a probe delays no command. `RUST_LOG=warn` turns it off, `--out` records every tick instead.\n\n\
-        Without `every_ms` a graph that runs faster than real time prints thousands of lines a second.";
-    const EXAMPLE: &'static str = r#"
-[nodes.probe]
-type = "probe"
-in.force = "moments.force"
-in.flag = "label.present"
-in.twist = "sum.twist"
-every_ms = 100                      # ten lines a second at most
-"#;
-    const LOGS: bool = true;
+/// Parameters of `probe`.
+#[derive(Debug, Clone, Param)]
+pub struct Params {
+    /// Minimum time between two lines; with 0 every change prints a line.
+    #[param(unit = "ms", range = 0.0.., default = 0.0)]
+    every_ms: f64,
+}
+
+/// What `probe` reads.
+#[derive(Inputs)]
+#[expect(dead_code, reason = "the tool reads the values on the wires after the tick")]
+pub struct Inputs<'a> {
+    /// Scalars, each under a name of your choice.
+    #[port(unit = "_", frame = "_")]
+    value: Many<'a, Scalar>,
+    /// A flag.
+    #[port(optional)]
+    flag: Option<In<'a, Flag>>,
+    /// A feature vector.
+    #[port(unit = "_", frame = "_", optional)]
+    features: Option<In<'a, Features>>,
+    /// A twist.
+    #[port(frame = "_", optional)]
+    twist: Option<In<'a, Twist>>,
+    /// A joint vector.
+    #[port(unit = "_", robot = "_", optional)]
+    joints: Option<In<'a, Joints>>,
+    /// A pose.
+    #[port(frame = "_", reference = "_", optional)]
+    pose: Option<In<'a, Pose>>,
+}
+
+/// What `probe` writes.
+#[derive(Outputs)]
+pub struct Outputs {
+    /// Whether a line is due.
+    due: Out<Flag>,
+}
+
+/// What `probe` remembers.
+#[derive(State)]
+pub struct State {
+    /// Time of the last line [ns].
+    last: Option<i64>,
 }
 
 impl Node for Probe {
@@ -74,13 +92,14 @@ impl Node for Probe {
     type State = State;
 
     fn new(params: Params, setup: &mut Setup<Self>) -> Result<Self, Mistakes> {
-        let InputShapes { value, flag, features, twist, joints, pose, .. } = &setup.inputs;
+        let InputsShapes { value, flag, features, twist, joints, pose } = &setup.inputs;
         let others = [flag.is_some(), features.is_some(), twist.is_some(), joints.is_some(), pose.is_some()];
         if value.is_empty() && !others.contains(&true) {
-            let mistake = Mistake::new(Code::MissingInput, At::Node, "nothing is wired, so there is nothing to show");
-            return Err(mistake.help("wire what you want to see: `in.force = \"moments.force\"`").into());
+            let mistake =
+                Mistake::new(Code::MissingInput, At::Node, "nothing is wired to it, so it has nothing to show");
+            return Err(mistake.help("wire a signal to it: `in.force = \"moments.force\"`").into());
         }
-        Ok(Self { every: (*params.every_ms * 1e6) as i64 })
+        Ok(Self { every: (params.every_ms * 1e6) as i64 })
     }
 
     fn state(&self) -> State {
@@ -110,7 +129,7 @@ mod tests {
     }
 
     #[test]
-    fn a_line_is_due_for_everything_new_and_for_every_loss() {
+    fn a_line_is_due_for_every_new_value_and_every_loss() {
         let scalar = || Shape::from(ScalarShape::default());
         let wires = [
             ("force", scalar()),
@@ -134,15 +153,15 @@ mod tests {
             rig.step();
             assert_eq!((rig.freshness("due"), rig.get::<Flag>("due")), (Freshness::New, Some(&true)), "{wire}");
             rig.step();
-            assert_eq!(rig.freshness("due"), Freshness::Held, "{wire}: nothing happened");
+            assert_eq!(rig.freshness("due"), Freshness::Held, "{wire}: no change");
             rig.lose(wire);
             rig.step();
-            assert_eq!((rig.freshness("due"), rig.get::<Flag>("due")), (Freshness::New, Some(&true)), "{wire} went");
+            assert_eq!((rig.freshness("due"), rig.get::<Flag>("due")), (Freshness::New, Some(&true)), "{wire} is lost");
         }
     }
 
     #[test]
-    fn lines_keep_their_distance() {
+    fn lines_have_a_minimum_interval() {
         let mut rig = rig("every_ms = 10", &[("force", ScalarShape::default().into())]).unwrap();
         let due: Vec<u32> = (0..35)
             .filter(|_| {
@@ -155,7 +174,7 @@ mod tests {
     }
 
     #[test]
-    fn nothing_to_show_is_a_mistake() {
+    fn a_probe_without_a_wire_is_an_error() {
         assert_eq!(rig("", &[]).err().unwrap()[0].code, Code::MissingInput);
         assert!(rig("every_ms = -1", &[("force", ScalarShape::default().into())]).is_err());
     }

@@ -1,136 +1,133 @@
-//! `signal_generator`: a step, a ramp, a sine or a chirp over time, to find out how something answers.
+//! `signal_generator`: a step, a ramp, a sine or a chirp over time, for identification.
 //!
-//! With t the time since `start`, and T the duration:
+//! With t the time since `start`, T the duration and A the amplitude:
 //!
 //! ```text
 //! step   offset + A                        for 0 <= t < T
-//! ramp   offset + A t / T                  and A from T on
+//! ramp   offset + A t / T                  and offset + A from T on
 //! sine   offset + A sin(2 pi f t)          for 0 <= t < T
 //! chirp  offset + A sin(2 pi (f t + (f_end - f) t^2 / (2 T)))
 //! ```
 //!
-//! and the offset alone before and after. The phase of a chirp is the integral of its frequency, which goes from f to
-//! f_end in a straight line; f t with a frequency that grows would sweep twice as far. Phases are counted in turns and
-//! cut to one turn before the sine, so a long run loses nothing. Time is that of the tick: a late tick shows the value of
-//! its own time.
+//! Before and after, the value is the offset. The phase of a chirp is the integral of its frequency, which goes linearly
+//! from f to f_end; f(t) t would sweep twice as far. Phases are computed in turns and reduced to one turn before the sine,
+//! so a long run loses no precision. Time is that of the tick: a late tick has the value of its own time.
 
 use std::f64::consts::TAU;
 
 use tactflow_runtime::node::{
-    At, Mistake, Mistakes, Node, NonNegative, Param, Positive, Reader, Setup, Tick, read_leaf,
+    At, Describe, In, Inputs, Mistake, Mistakes, Node, Out, Outputs, Param, Setup, State, Tick,
 };
-use tactflow_runtime::signal::{ScalarShape, Unit};
+use tactflow_runtime::signal::{Flag, Scalar, ScalarShape, Unit};
 use tactflow_runtime::source::Code;
-use tactflow_runtime::source::Value;
-use tactflow_runtime::{inputs, outputs, params, state};
 
-/// The course of a signal.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Form {
-    /// There at once.
-    Step,
-    /// In a straight line.
-    Ramp,
-    /// One frequency.
-    Sine,
-    /// One frequency after the other.
-    Chirp,
-}
-
-const FORMS: [(&str, Form); 4] =
-    [("step", Form::Step), ("ramp", Form::Ramp), ("sine", Form::Sine), ("chirp", Form::Chirp)];
-
-impl Param for Form {
-    const EXPECTS: &'static str = "`step`, `ramp`, `sine` or `chirp`";
-
-    fn read(value: &Value, reader: &mut Reader<'_>) -> Option<Self> {
-        let name: String = read_leaf(value, reader, Self::EXPECTS)?;
-        let found = FORMS.iter().find(|(form, _)| *form == name).map(|(_, form)| *form);
-        if found.is_none() {
-            reader.wrong_type(value, Self::EXPECTS);
-        }
-        found
-    }
-}
-
-params! {
-    /// What it looks like: `step`, `ramp`, `sine` or `chirp`.
-    form: Form,
-    /// Unit of the signal.
-    unit: Unit,
-    /// Frame of the signal, if it has one; what it is wired to decides when this is not said.
-    frame: Option<String>,
-    /// Height of a step, end of a ramp, peak of a sine or a chirp, all over the offset [`unit`].
-    live amplitude: f64 = 1.0,
-    /// What it is before and after, and what the rest is added to [`unit`].
-    live offset: f64 = 0.0,
-    /// When it starts: the graph's time, or the time since the gate opened [s].
-    start: NonNegative = NonNegative(0.0),
-    /// How long it lasts; for ever unless given. A ramp and a chirp need it [s].
-    duration: Option<Positive>,
-    /// Frequency of a sine, and the one that a chirp starts with [Hz].
-    frequency: Option<Positive>,
-    /// Frequency that a chirp ends with [Hz].
-    end_frequency: Option<Positive>,
-}
-
-inputs! {
-    /// What must be set for the signal to go on, from its start each time; without this wire it always does.
-    gate: Trigger<Flag>,
-}
-
-outputs! {
-    /// The signal; absent while the gate is shut [`unit`].
-    value: Scalar["_", "$frame"],
-}
-
-state! {
-    /// When the gate opened, if it is open [ns].
-    opened: Option<i64>,
-}
-
-/// The signal.
+/// Generates a test signal: a step, a ramp, a sine or a chirp.
+///
+/// The output is a known scalar, so the response to it identifies the system behind it: `step` shows rise times and
+/// delays, `ramp` creep and thresholds, `sine` gain and phase at one frequency, and `chirp` those of a whole band. Wire it
+/// to a component of `twist_of` to move one axis, or to `feature_error` to move the reference of a controller.
+///
+/// With t the time since `start`, T = `duration` and A = `amplitude`: a step is A, a ramp is A t / T and then A, a sine is
+/// A sin(2 pi f t), a chirp is A sin(2 pi (f t + (f_end - f) t^2 / (2 T))). `offset` is added to all of them, and is the
+/// value before the start and, except for a ramp, after the end. The phase of a chirp is the integral of its frequency, so
+/// the chirp ends at `end_frequency`.
+///
+/// There is a new value in each tick, for the time of the tick. Without a gate the time is that of the graph. With a gate
+/// it is the time since the gate opened, and the output is absent while the gate is not set or is absent. A gate that
+/// flickers restarts the signal: wire `contact_debounce.present`.
+///
+/// Generated motion is timeless: when a sensor falls silent, only a gate stops it. A frequency above half of the graph's
+/// rate is refused, because sampling would turn it into another one.
+///
+/// ```toml
+/// [nodes.signal_generator]            # in and out with a rising frequency, during a contact
+/// type = "signal_generator"
+/// in.gate = "label.present"
+/// form = "chirp"
+/// unit = "m/s"
+/// amplitude = 0.005                   # [m/s]
+/// frequency = 0.2                     # [Hz]
+/// end_frequency = 10.0                # [Hz]
+/// duration = 20.0                     # [s]
+/// ```
+#[derive(Describe)]
+#[describe(name = "signal_generator", every_tick)]
 pub struct SignalGenerator {
     form: Form,
     amplitude: f64,
     offset: f64,
-    /// When it starts [ns].
+    /// Start [ns].
     start: i64,
-    /// How long it lasts [s]; infinite for ever.
+    /// Duration [s]; infinite if not given.
     duration: f64,
-    /// Turns per second at its start and at its end [Hz].
+    /// Frequencies at the start and at the end [Hz].
     frequencies: [f64; 2],
     is_gated: bool,
 }
 
-impl tactflow_runtime::node::Describe for SignalGenerator {
-    const NAME: &'static str = "signal_generator";
-    const SUMMARY: &'static str = "a test signal for identification: a step, a ramp, a sine or a chirp";
-    const DOC: &'static str = "Gives a scalar that is known at every moment, so that the answer to it tells what \
-        lies between: `step` for rise times and delays, `ramp` for creep and thresholds, `sine` for gain and phase \
-        at one frequency, `chirp` for a whole band. Wire it to a component of `twist_of` to move one axis, or to \
-        `feature_error` to lead a controller.\n\n\
-        With t the time since `start` and T = `duration`: a step is A, a ramp A t / T and then A, a sine A sin(2 \
-        pi f t), a chirp A sin(2 pi (f t + (f_end - f) t^2 / (2 T))). All stand on `offset`, which is what there \
-        is before the start and, but for a ramp, after the end. A chirp's phase is the integral of its frequency, \
-        so it does end at `end_frequency`.\n\n\
-        It makes a new value in each tick, at the time of the tick. Without a gate time is the graph's. With one \
-        it counts from the moment the gate opens, and while the gate is shut or absent there is no value; a gate \
-        that flickers starts the signal again, so take `contact_debounce.present`.\n\n\
-        Generated motion is timeless: nothing but a gate stops it when a sensor falls silent. A frequency above \
-        half of the graph's rate is refused, as it would come out as another one.";
-    const EXAMPLE: &'static str = r#"
-[nodes.signal_generator]            # in and out, faster and faster, while there is a contact
-type = "signal_generator"
-in.gate = "label.present"
-form = "chirp"
-unit = "m/s"
-amplitude = 0.005                   # [m/s]
-frequency = 0.2                     # [Hz]
-end_frequency = 10.0                # [Hz]
-duration = 20.0                     # [s]
-"#;
-    const EVERY_TICK: bool = true;
+/// Parameters of `signal_generator`.
+#[derive(Debug, Clone, Param)]
+pub struct Params {
+    /// Form of the signal.
+    form: Form,
+    /// Unit of the signal.
+    unit: Unit,
+    /// Frame of the signal; if not given, the inputs that read it decide.
+    frame: Option<String>,
+    /// Height of a step, end of a ramp, or peak of a sine or a chirp, relative to the offset.
+    #[param(unit = "$unit", default = 1.0, live)]
+    amplitude: f64,
+    /// Offset that is added to the signal; the value before the start and after the end.
+    #[param(unit = "$unit", default = 0.0, live)]
+    offset: f64,
+    /// Start: the time of the graph, or the time since the gate opened.
+    #[param(unit = "s", range = 0.0.., default = 0.0)]
+    start: f64,
+    /// Duration; unlimited if not given. A ramp and a chirp need it.
+    #[param(unit = "s", above = 0.0)]
+    duration: Option<f64>,
+    /// Frequency of a sine, or of a chirp at its start.
+    #[param(unit = "Hz", above = 0.0)]
+    frequency: Option<f64>,
+    /// Frequency of a chirp at its end.
+    #[param(unit = "Hz", above = 0.0)]
+    end_frequency: Option<f64>,
+}
+
+/// The form of a signal.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Param)]
+pub enum Form {
+    /// A jump at the start.
+    Step,
+    /// A straight line.
+    Ramp,
+    /// A sine of one frequency.
+    Sine,
+    /// A sine whose frequency changes linearly.
+    Chirp,
+}
+
+/// What `signal_generator` reads.
+#[derive(Inputs)]
+pub struct Inputs<'a> {
+    /// The signal runs while this is set, and starts again each time; without a wire it always runs.
+    #[port(optional)]
+    gate: Option<In<'a, Flag>>,
+}
+
+/// What `signal_generator` writes.
+#[derive(Outputs)]
+pub struct Outputs {
+    /// The signal; absent while the gate is not set or is absent.
+    #[port(unit = "_", frame = "$frame")]
+    value: Out<Scalar>,
+}
+
+/// What `signal_generator` remembers.
+#[derive(State)]
+pub struct State {
+    /// Time at which the gate opened, if it is open [ns].
+    opened: Option<i64>,
 }
 
 impl Node for SignalGenerator {
@@ -146,14 +143,14 @@ impl Node for SignalGenerator {
         }
         setup.is_still = params.amplitude == 0.0 && params.offset == 0.0;
         setup.outputs.value = ScalarShape::of(params.unit);
-        let first = params.frequency.map_or(0.0, |frequency| *frequency);
+        let first = params.frequency.unwrap_or(0.0);
         Ok(Self {
             form: params.form,
             amplitude: params.amplitude,
             offset: params.offset,
-            start: (*params.start * 1e9) as i64,
-            duration: params.duration.map_or(f64::INFINITY, |duration| *duration),
-            frequencies: [first, params.end_frequency.map_or(first, |frequency| *frequency)],
+            start: (params.start * 1e9) as i64,
+            duration: params.duration.unwrap_or(f64::INFINITY),
+            frequencies: [first, params.end_frequency.unwrap_or(first)],
             is_gated: setup.inputs.gate.is_some(),
         })
     }
@@ -177,7 +174,7 @@ impl Node for SignalGenerator {
 }
 
 impl SignalGenerator {
-    /// The signal `time` [s] after its start.
+    /// Returns the signal `time` [s] after its start.
     fn at(&self, time: f64) -> f64 {
         let is_over = time >= self.duration;
         let part = match self.form {
@@ -194,36 +191,36 @@ impl SignalGenerator {
     }
 }
 
-/// How many turns there were after `time` [s], with a frequency that goes from the first to the last in a straight line
-/// over `duration` [s].
+/// Returns the phase after `time` [s] in turns, for a frequency that goes linearly from `first` to `last` [Hz] in
+/// `duration` [s].
 fn turns([first, last]: [f64; 2], duration: f64, time: f64) -> f64 {
     (first + (last - first) * (0.5 * time / duration)) * time
 }
 
-/// What a form needs and has not, and what it has and does not need.
+/// Returns a mistake for each parameter that the form needs but lacks, or has but does not use.
 fn check(params: &Params, period: f64) -> Mistakes {
-    let form = FORMS.iter().find(|(_, form)| *form == params.form).map_or("", |(name, _)| name);
+    let (form, _) = Form::WORDS[params.form as usize];
     let waves = matches!(params.form, Form::Sine | Form::Chirp);
     let ends = matches!(params.form, Form::Ramp | Form::Chirp);
     let is_chirp = params.form == Form::Chirp;
     let table = [
-        // Name, whether it is given, whether it is needed, whether it is of no use.
+        // Name, and whether it is given, needed, unused.
         ("duration", params.duration.is_some(), ends, false),
         ("frequency", params.frequency.is_some(), waves, !waves),
         ("end_frequency", params.end_frequency.is_some(), is_chirp, !is_chirp),
     ];
     let mut mistakes = Mistakes::new();
-    for (name, is_given, is_needed, is_useless) in table {
+    for (name, is_given, is_needed, is_unused) in table {
         if is_needed && !is_given {
             mistakes.push(Mistake::new(Code::MissingKey, At::Node, format!("`{name}` is missing: a {form} needs it")));
-        } else if is_given && is_useless {
+        } else if is_given && is_unused {
             mistakes.push(Mistake::key(name, format!("a {form} has no `{name}`")));
         }
     }
-    let most = 0.5 / period;
+    let max = 0.5 / period;
     for (name, frequency) in [("frequency", params.frequency), ("end_frequency", params.end_frequency)] {
-        if frequency.is_some_and(|frequency| *frequency > most) && mistakes.is_empty() {
-            let message = format!("`{name}` is above half of the graph's rate: {most} Hz at most");
+        if frequency.is_some_and(|frequency| frequency > max) && mistakes.is_empty() {
+            let message = format!("`{name}` is above half of the graph's rate: the maximum is {max} Hz");
             mistakes.push(Mistake::param(name, message));
         }
     }
@@ -251,7 +248,7 @@ mod tests {
     }
 
     #[test]
-    fn every_form_before_while_and_after() {
+    fn every_form_before_during_and_after_the_signal() {
         let step = "form = 'step'\namplitude = 2.0\noffset = 1.0\nstart = 0.5\nduration = 1.0";
         let ramp = "form = 'ramp'\namplitude = -2.0\noffset = 1.0\nstart = 0.5\nduration = 1.0";
         let sine = "form = 'sine'\namplitude = 2.0\nfrequency = 1.0\nstart = 0.5\nduration = 1.5";
@@ -273,7 +270,7 @@ mod tests {
             (sine, 2.0, 0.0),
             (endless, 1.0, 1.0),
             (endless, 3.0, -1.0),
-            // Five weeks later it is still on the beat.
+            // Five weeks later the phase is still exact.
             (endless, 3_024_001.0, 1.0),
         ];
         for (params, time, expected) in cases {
@@ -281,8 +278,8 @@ mod tests {
         }
     }
 
-    /// Turns of a chirp by the trapezoidal rule over its frequency, which is exact for a straight line but for rounding.
-    fn summed([first, last]: [f64; 2], duration: f64, time: f64) -> f64 {
+    /// Phase of a chirp by the trapezoidal rule over its frequency, which is exact for a straight line except for rounding.
+    fn integrated([first, last]: [f64; 2], duration: f64, time: f64) -> f64 {
         let count = 2000;
         let frequency = |t: f64| first + (last - first) * t / duration;
         let step = time / f64::from(count);
@@ -298,12 +295,12 @@ mod tests {
             let params = format!(
                 "form = 'chirp'\nfrequency = {first:?}\nend_frequency = {last:?}\nduration = {duration:?}"
             );
-            let expected = (TAU * summed([first, last], duration, time)).sin();
+            let expected = (TAU * integrated([first, last], duration, time)).sin();
             prop_assert!((at(&params, time) - expected).abs() < 1e-7);
         }
 
         #[test]
-        fn it_stays_between_its_peaks(time in -1.0..100.0_f64, offset in -1.0..1.0_f64) {
+        fn the_signal_stays_between_its_peaks(time in -1.0..100.0_f64, offset in -1.0..1.0_f64) {
             let signal = SignalGenerator {
                 form: Form::Chirp, amplitude: 2.0, offset, start: 0, duration: 50.0,
                 frequencies: [1.0, 7.0], is_gated: false,
@@ -313,16 +310,16 @@ mod tests {
     }
 
     #[test]
-    fn the_frequency_at_the_end_of_a_chirp_is_the_one_that_was_asked_for() {
+    fn a_chirp_ends_at_its_end_frequency() {
         let slope = (turns([2.0, 8.0], 4.0, 4.0) - turns([2.0, 8.0], 4.0, 4.0 - 1e-6)) / 1e-6;
         assert!((slope - 8.0).abs() < 1e-5, "{slope}");
     }
 
     #[test]
-    fn a_gate_starts_it_and_ends_it() {
+    fn a_gate_starts_and_ends_the_signal() {
         let params = "unit = 'N'\nform = 'ramp'\nduration = 0.01\nstart = 0.002";
         let mut rig = NodeRig::new::<SignalGenerator>(params, &[("gate", FlagShape.into())]).unwrap();
-        let mut show = |gate: Option<Option<bool>>| {
+        let mut step = |gate: Option<Option<bool>>| {
             match gate {
                 Some(Some(gate)) => rig.set("gate", gate),
                 Some(None) => rig.lose("gate"),
@@ -333,23 +330,23 @@ mod tests {
         };
         let steps = [
             ("no gate yet", None, Freshness::Absent, None),
-            ("it opens", Some(Some(true)), Freshness::New, Some(0.0)),
-            ("a held gate is open", None, Freshness::New, Some(2.0)),
-            ("and goes on", None, Freshness::New, Some(6.0)),
-            ("it shuts", Some(Some(false)), Freshness::Lost, None),
+            ("the gate opens", Some(Some(true)), Freshness::New, Some(0.0)),
+            ("a held gate stays open", None, Freshness::New, Some(2.0)),
+            ("the signal goes on", None, Freshness::New, Some(6.0)),
+            ("the gate shuts", Some(Some(false)), Freshness::Lost, None),
             ("shut", None, Freshness::Absent, None),
-            ("from the start", Some(Some(true)), Freshness::New, Some(0.0)),
-            ("on", None, Freshness::New, Some(2.0)),
-            ("the gate goes", Some(None), Freshness::Lost, None),
-            ("from the start again", Some(Some(true)), Freshness::New, Some(0.0)),
+            ("the signal starts again", Some(Some(true)), Freshness::New, Some(0.0)),
+            ("it goes on", None, Freshness::New, Some(2.0)),
+            ("the gate is lost", Some(None), Freshness::Lost, None),
+            ("it starts again after the loss", Some(Some(true)), Freshness::New, Some(0.0)),
         ];
         for (what, gate, freshness, value) in steps {
-            assert_eq!(show(gate), (freshness, value), "{what}");
+            assert_eq!(step(gate), (freshness, value), "{what}");
         }
     }
 
     #[test]
-    fn without_a_gate_it_is_new_and_timeless_in_every_tick() {
+    fn without_a_gate_the_value_is_new_and_timeless_in_every_tick() {
         let mut rig = rig("form = 'step'").unwrap();
         assert_eq!(rig.shape("value"), &ScalarShape::of(Unit::METRE.per_second()).into());
         for _ in 0..3 {
@@ -360,15 +357,18 @@ mod tests {
     }
 
     #[test]
-    fn what_a_form_needs_and_what_it_has_no_use_for() {
+    fn missing_and_unused_parameters_are_errors() {
         let cases: [(&str, &[&str]); 8] = [
-            ("form = 'square'", &["expected `step`, `ramp`, `sine` or `chirp`, found the string \"square\""]),
+            ("form = 'square'", &["expected one of `step`, `ramp`, `sine`, `chirp`, found the string \"square\""]),
             ("form = 'ramp'", &["`duration` is missing: a ramp needs it"]),
             ("form = 'sine'", &["`frequency` is missing: a sine needs it"]),
             ("form = 'chirp'\nduration = 1.0\nfrequency = 1.0", &["`end_frequency` is missing: a chirp needs it"]),
             ("form = 'step'\nfrequency = 1.0", &["a step has no `frequency`"]),
             ("form = 'sine'\nfrequency = 1.0\nend_frequency = 2.0", &["a sine has no `end_frequency`"]),
-            ("form = 'sine'\nfrequency = 501.0", &["`frequency` is above half of the graph's rate: 500 Hz at most"]),
+            (
+                "form = 'sine'\nfrequency = 501.0",
+                &["`frequency` is above half of the graph's rate: the maximum is 500 Hz"],
+            ),
             ("form = 'step'\nstart = -1.0", &["expected a number, 0 or more, found -1"]),
         ];
         for (params, expected) in cases {

@@ -1,123 +1,99 @@
-//! `switch` and `twist_switch`: one of two inputs, as a flag says.
+//! `switch` and `twist_switch`: one implementation for both kinds.
 //!
-//! While `select` is set it is `on`, while it is not it is `off`, and without it there is nothing. If the one that is
-//! selected is absent, so is the output: the other does not stand in for it.
+//! The state holds the selection of the last step, so that the output is new when the selection changes.
 
-use tactflow_runtime::node::{Mistakes, Node, Setup, Tick};
-use tactflow_runtime::{inputs, outputs, params, state};
+use std::marker::PhantomData;
 
-use crate::unwired;
+use tactflow_runtime::node::{Describe, In, Inputs, Mistakes, Node, Out, Outputs, Setup, State, Tick};
+use tactflow_runtime::signal::{Flag, Scalar, Signal, Twist};
 
-macro_rules! switch {
-    ($(#[$meta:meta])* $Name:ident in $module:ident: $name:literal, $port:ident: $Kind:ident[$($arg:literal),*],
-     $article:literal, $summary:literal, $doc:literal, $example:literal) => {
-        pub use $module::$Name;
+/// Selects one of two signals by a flag.
+///
+/// `on` passes while `select` is set, and `off` while it is not. Without `select`, or while the selected input is absent,
+/// the output is absent: the other input never replaces it. An absent twist is zero motion. Both inputs have the same
+/// unit and the same frame.
+///
+/// The output is new when the selected input is new, and when the selection changes. It is as old as the oldest of the
+/// three inputs: when the device behind the unselected input falls silent, the output becomes old too.
+///
+/// The value jumps when the selection changes: a derivative behind the switch sees the jump, and the limiters of the arm
+/// smooth it. A flag that flickers makes the output flicker: wire `contact_debounce.present`.
+///
+/// ```toml
+/// [nodes.switch]                      # the mean while there is a contact, the newest sample otherwise
+/// type = "switch"
+/// in.on = "smooth.value"
+/// in.off = "moments.pressure"
+/// in.select = "label.present"
+/// ```
+///
+/// ```toml
+/// [nodes.twist_switch]                # servo on a contact, search without one
+/// type = "twist_switch"
+/// in.on = "projector.twist"
+/// in.off = "twist_of.twist"
+/// in.select = "label.present"
+/// ```
+#[derive(Describe)]
+#[describe(name = "switch", of = "Switch<Scalar>")]
+#[describe(name = "twist_switch", of = "Switch<Twist>")]
+pub struct Switch<T>(PhantomData<T>);
 
-        mod $module {
-            use super::*;
+/// What a switch reads.
+#[derive(Inputs)]
+pub struct Inputs<'a, T: Signal> {
+    /// Passes while `select` is set.
+    #[port(unit = "U", frame = "A")]
+    on: Option<In<'a, T>>,
+    /// Passes while `select` is not set.
+    #[port(unit = "U", frame = "A")]
+    off: Option<In<'a, T>>,
+    /// Selects `on` while it is set, and `off` while it is not.
+    select: Option<In<'a, Flag>>,
+}
 
-            params! {}
+/// What a switch writes.
+#[derive(Outputs)]
+pub struct Outputs<T: Signal> {
+    /// The selected input; absent while that input or `select` is absent.
+    #[port(unit = "U", frame = "A")]
+    value: Out<T>,
+}
 
-            inputs! {
-                /// What passes while `select` is set [any unit].
-                on: Trigger<$Kind[$($arg),*]>,
-                /// What passes while `select` is not set [unit of `on`].
-                off: Trigger<$Kind[$($arg),*]>,
-                /// Which of the two passes.
-                select: Trigger<Flag>,
-            }
+/// What a switch remembers.
+#[derive(State)]
+pub struct State {
+    /// The selection of the last step, if its input was present.
+    last: Option<bool>,
+}
 
-            outputs! {
-                /// The one that is selected; absent while that one or `select` is absent [unit of `on`].
-                $port: $Kind[$($arg),*],
-            }
+impl<T: Signal> Node for Switch<T>
+where
+    Self: Describe,
+{
+    type Params = ();
+    type Inputs<'a> = Inputs<'a, T>;
+    type Outputs = Outputs<T>;
+    type State = State;
 
-            state! {
-                /// Which of the two came out in the last step, if any did.
-                shown: Option<bool>,
-            }
+    fn new((): (), _: &mut Setup<Self>) -> Result<Self, Mistakes> {
+        Ok(Self(PhantomData))
+    }
 
-            $(#[$meta])*
-            pub struct $Name;
+    fn state(&self) -> State {
+        State { last: None }
+    }
 
-            impl tactflow_runtime::node::Describe for $Name {
-                const NAME: &'static str = $name;
-                const SUMMARY: &'static str = $summary;
-                const DOC: &'static str = $doc;
-                const EXAMPLE: &'static str = $example;
-            }
-
-            impl Node for $Name {
-                type Params = Params;
-                type Inputs<'a> = Inputs<'a>;
-                type Outputs = Outputs;
-                type State = State;
-
-                fn new(_: Params, setup: &mut Setup<Self>) -> Result<Self, Mistakes> {
-                    let inputs = &setup.inputs;
-                    let wired = [
-                        ("on", $article, inputs.on.is_some()),
-                        ("off", $article, inputs.off.is_some()),
-                        ("select", "a flag", inputs.select.is_some()),
-                    ];
-                    let missing = wired.into_iter().filter(|(.., is_wired)| !is_wired);
-                    let mistakes: Mistakes =
-                        missing.map(|(input, kind, _)| unwired(<Self as tactflow_runtime::node::Describe>::NAME, input, kind, "node.port")).collect();
-                    if mistakes.is_empty() { Ok(Self) } else { Err(mistakes) }
-                }
-
-                fn state(&self) -> State {
-                    State { shown: None }
-                }
-
-                fn step(&self, _: &Tick, inputs: Inputs<'_>, out: &mut Outputs, state: &mut State) {
-                    let select = inputs.select.map(|select| *select);
-                    let chosen = select.and_then(|is_on| if is_on { inputs.on } else { inputs.off });
-                    let shown = std::mem::replace(&mut state.shown, select.filter(|_| chosen.is_some()));
-                    match chosen {
-                        Some(chosen) if chosen.is_new() || shown != select => out.$port.set(*chosen),
-                        Some(_) => out.$port.keep(),
-                        None => {}
-                    }
-                }
-            }
+    fn step(&self, _: &Tick, inputs: Inputs<'_, T>, out: &mut Outputs<T>, state: &mut State) {
+        let select = inputs.select.map(|select| *select);
+        let selected = select.and_then(|is_on| if is_on { inputs.on } else { inputs.off });
+        let last = std::mem::replace(&mut state.last, select.filter(|_| selected.is_some()));
+        match selected {
+            Some(selected) if selected.is_new() || last != select => out.value.copy_from(&selected),
+            Some(_) => out.value.keep(),
+            None => {}
         }
-    };
-}
-
-switch! {
-    /// A switch between two scalars; it has nothing to set.
-    Switch in scalar: "switch", value: Scalar["U", "A"], "a scalar",
-    "chooses between two scalars by a flag",
-    "`on` passes while `select` is set, `off` while it is not. Without `select`, or if the chosen one is absent, there is \
-    nothing: the other never stands in for it. Both have one unit.\n\n\
-    The output is new when the chosen one is, and when the choice changes. It is as old as the oldest of the three, the \
-    one that is not chosen too: if that comes from a device that falls silent, the output grows old.\n\n\
-    The value jumps at a change. Behind it, a derivative sees that jump.",
-    r#"
-[nodes.switch]                      # the newest sample until the contact is sure, the mean from then on
-type = "switch"
-in.on = "smooth.value"
-in.off = "moments.pressure"
-in.select = "label.present"
-"#
-}
-
-switch! {
-    /// A switch between two twists; it has nothing to set.
-    TwistSwitch in twist: "twist_switch", twist: Twist["A"], "a twist",
-    "chooses between two motions by a flag",
-    "`on` passes while `select` is set, `off` while it is not. Without `select`, or if the chosen one is absent, the \
-    output is absent, which is zero motion: the other never stands in for it. Both are in one frame.\n\n\
-    The output is as old as the oldest of the three, the one that is not chosen too. The motion jumps at a change; the \
-    limits of the arm hold all the same. A flag that flickers makes the motion flicker: take `contact_debounce.present`.",
-    r#"
-[nodes.twist_switch]                # servo on a contact, search without one
-type = "twist_switch"
-in.on = "projector.twist"
-in.off = "twist_of.twist"
-in.select = "label.present"
-"#
+    }
 }
 
 #[cfg(test)]
@@ -131,61 +107,58 @@ mod tests {
         Twist([speed, 0.0, 0.0, 0.0, 0.0, 0.0].into())
     }
 
-    /// What comes in on a wire in a tick: `Some(None)` is a loss.
-    type Comes<T> = Option<Option<T>>;
+    /// What happens at an input in a tick: a value, a loss (`Some(None)`), or nothing.
+    type Event<T> = Option<Option<T>>;
 
-    fn bring<T: Signal>(rig: &mut NodeRig, wire: &str, comes: Comes<T>) {
-        match comes {
+    fn apply<T: Signal>(rig: &mut NodeRig, wire: &str, event: Event<T>) {
+        match event {
             Some(Some(value)) => rig.set(wire, value),
             Some(None) => rig.lose(wire),
             None => {}
         }
     }
 
-    /// What comes in on `on`, `off` and `select`, and freshness and value of what comes out.
-    type Step = (&'static str, Comes<f64>, Comes<f64>, Comes<bool>, (Freshness, Option<f64>));
+    /// Events at `on`, `off` and `select`, then freshness and value of the output.
+    type Step = (&'static str, Event<f64>, Event<f64>, Event<bool>, (Freshness, Option<f64>));
 
-    fn table<N: Node, T: Signal + PartialEq + std::fmt::Debug>(port: &str, shape: &Shape, make: fn(f64) -> T) {
-        const GONE: Option<Option<f64>> = Some(None);
+    fn table<N: Node, T: Signal + PartialEq + std::fmt::Debug>(shape: &Shape, make: fn(f64) -> T) {
+        const LOST: Event<f64> = Some(None);
         let new = |value: f64| Some(Some(value));
-        let say = |flag: bool| Some(Some(flag));
+        let flag = |flag: bool| Some(Some(flag));
         let steps: [Step; 14] = [
-            ("no choice yet", new(1.0), new(-1.0), None, (Freshness::Absent, None)),
-            ("on, which is held", None, None, say(true), (Freshness::New, Some(1.0))),
-            ("nothing happens", None, None, None, (Freshness::Held, Some(1.0))),
-            ("the same choice once more", None, None, say(true), (Freshness::Held, Some(1.0))),
-            ("only the other is new", None, new(-2.0), None, (Freshness::Held, Some(1.0))),
-            ("on is new", new(2.0), None, None, (Freshness::New, Some(2.0))),
-            ("off, which is held", None, None, say(false), (Freshness::New, Some(-2.0))),
-            ("only the other goes", GONE, None, None, (Freshness::Held, Some(-2.0))),
-            ("on, which is not there", None, None, say(true), (Freshness::Lost, None)),
-            ("on comes", new(3.0), None, None, (Freshness::New, Some(3.0))),
-            ("the choice goes", None, None, Some(None), (Freshness::Lost, None)),
-            ("and comes back", None, None, say(true), (Freshness::New, Some(3.0))),
-            ("on goes", GONE, None, None, (Freshness::Lost, None)),
-            ("off stands in only when it is chosen", None, new(-4.0), say(false), (Freshness::New, Some(-4.0))),
+            ("no selection yet", new(1.0), new(-1.0), None, (Freshness::Absent, None)),
+            ("`on`, which is held", None, None, flag(true), (Freshness::New, Some(1.0))),
+            ("no event", None, None, None, (Freshness::Held, Some(1.0))),
+            ("the same selection once more", None, None, flag(true), (Freshness::Held, Some(1.0))),
+            ("only `off` is new", None, new(-2.0), None, (Freshness::Held, Some(1.0))),
+            ("`on` is new", new(2.0), None, None, (Freshness::New, Some(2.0))),
+            ("`off`, which is held", None, None, flag(false), (Freshness::New, Some(-2.0))),
+            ("only `on` is lost", LOST, None, None, (Freshness::Held, Some(-2.0))),
+            ("`on`, which is absent", None, None, flag(true), (Freshness::Lost, None)),
+            ("`on` is present", new(3.0), None, None, (Freshness::New, Some(3.0))),
+            ("the selection is lost", None, None, Some(None), (Freshness::Lost, None)),
+            ("and is present again", None, None, flag(true), (Freshness::New, Some(3.0))),
+            ("`on` is lost", LOST, None, None, (Freshness::Lost, None)),
+            ("`off`", None, new(-4.0), flag(false), (Freshness::New, Some(-4.0))),
         ];
         let wires = [("on", shape.clone()), ("off", shape.clone()), ("select", FlagShape.into())];
         let mut rig = NodeRig::new::<N>("", &wires).unwrap();
         for (what, on, off, select, (freshness, expected)) in steps {
-            bring(&mut rig, "on", on.map(|on| on.map(make)));
-            bring(&mut rig, "off", off.map(|off| off.map(make)));
-            bring(&mut rig, "select", select);
+            apply(&mut rig, "on", on.map(|on| on.map(make)));
+            apply(&mut rig, "off", off.map(|off| off.map(make)));
+            apply(&mut rig, "select", select);
             rig.step();
-            assert_eq!((rig.freshness(port), rig.get::<T>(port).cloned()), (freshness, expected.map(make)), "{what}");
+            assert_eq!(
+                (rig.freshness("value"), rig.get::<T>("value").cloned()),
+                (freshness, expected.map(make)),
+                "{what}"
+            );
         }
     }
 
     #[test]
-    fn what_comes_out_when() {
-        table::<Switch, Scalar>("value", &ScalarShape::of(Unit::NEWTON).into(), |value| value);
-        table::<TwistSwitch, Twist>("twist", &TwistShape.into(), along_x);
-    }
-
-    #[test]
-    fn what_is_not_wired_shows_at_once() {
-        let mistakes = NodeRig::new::<TwistSwitch>("", &[("on", TwistShape.into())]).err().unwrap();
-        let messages: Vec<&str> = mistakes.iter().map(|mistake| mistake.message.as_str()).collect();
-        assert_eq!(messages, ["`twist_switch` needs `in.off`, a twist", "`twist_switch` needs `in.select`, a flag"]);
+    fn the_selected_input_passes() {
+        table::<Switch<Scalar>, Scalar>(&ScalarShape::of(Unit::NEWTON).into(), |value| value);
+        table::<Switch<Twist>, Twist>(&TwistShape.into(), along_x);
     }
 }

@@ -1,75 +1,88 @@
-//! `bumpless`: takes up the jumps of a motion before any limiter: bumpless transfer.
+//! `bumpless`: out = in + offset.
 //!
-//! out = in + offset. What the input changes from one tick to the next is passed on as far as half of the accelerations
-//! allows; the rest goes into the offset with the opposite sign, and the offset fades along a straight line at the other
-//! half. So the output never changes by more than the accelerations allow, whatever the input does, and it is the input,
-//! to the last bit and without lag, as soon as the offset is gone. Each change keeps its direction: one factor for all
-//! six components.
+//! A change of the input from one tick to the next passes as far as half of the accelerations allows. The rest goes into
+//! the offset with the opposite sign, and the offset goes to zero on a straight line with the other half. So the output
+//! never changes by more than the accelerations allow, whatever the input does. Once the offset is zero, the output is
+//! the input, to the last bit and without lag. One factor scales all six components of each change.
 
-use tactflow_runtime::node::{Limits, Mistakes, Node, Positive, Setup, Tick};
-use tactflow_runtime::signal::{ScalarShape, Twist, Unit};
-use tactflow_runtime::{inputs, outputs, params, state};
+use tactflow_runtime::node::{Describe, In, Inputs, Limits, Mistakes, Node, Out, Outputs, Param, Setup, State, Tick};
+use tactflow_runtime::signal::{Scalar, Twist};
 
+use super::fraction;
 use crate::motion::bounds::{countable, scale_twist, twist_ratio};
 
-params! {
-    /// Greatest change of the linear velocity [m/s²].
-    linear_m_per_s2: Positive,
-    /// Greatest change of the angular velocity [rad/s²].
-    angular_rad_per_s2: Positive,
-    /// What is wanted faster than this counts as so fast: otherwise a motion that ends has to come down from a speed that
-    /// nobody ever went; none unless given [m/s].
-    linear_m_per_s: Option<Positive>,
-    /// The same for the rotation [rad/s].
-    angular_rad_per_s: Option<Positive>,
-}
-
-inputs! {
-    /// The motion that is wanted; absent is none [m/s, rad/s].
-    twist: Trigger<Twist["A"]>,
-}
-
-outputs! {
-    /// The same without jumps [m/s, rad/s].
-    twist: Twist["A"],
-    /// How much of what is wanted is in the output, beside what is left of a jump [1].
-    bumpless: Scalar["1"],
-}
-
-state! {
-    /// The input of the last tick [m/s, rad/s].
-    last: Twist,
-    /// What is left of the jumps [m/s, rad/s].
-    offset: Twist,
-}
-
-/// The accelerations and the speeds.
+/// Removes the jumps of a motion: a switch of modes, a contact found or lost (bumpless transfer).
+///
+/// The wanted motion jumps when a mode begins and when a contact is found or lost. The part of a change that exceeds half
+/// of the accelerations becomes an offset, which goes to zero with the other half. So the output is smooth before it
+/// reaches a limiter, and it is exactly the input, without lag, as soon as the offset is zero.
+///
+/// A wanted motion that is faster than `linear_m_per_s` or `angular_rad_per_s` is scaled down to these speeds first. A
+/// controller can ask for a hundred times the speed of the arm, and when its contact is lost the output would have to come
+/// down from there. Use the speeds of the `twist_limit` behind it.
+///
+/// While the motion is absent the output goes on until it is zero, and is absent then. The node comes after the sum of all
+/// motions and before the limiters.
+///
+/// ```toml
+/// [nodes.bumpless]
+/// type = "bumpless"
+/// in.twist = "sum.twist"
+/// linear_m_per_s2 = 1.0
+/// angular_rad_per_s2 = 10.0
+/// ```
+#[derive(Describe)]
+#[describe(name = "bumpless", every_tick)]
 pub struct Bumpless {
     linear: f64,
     angular: f64,
+    /// Maximum linear and angular speed of the input [m/s, rad/s].
     speeds: [f64; 2],
 }
 
-impl tactflow_runtime::node::Describe for Bumpless {
-    const NAME: &'static str = "bumpless";
-    const SUMMARY: &'static str = "takes up every jump of a motion: a switch of mode, a contact found or lost";
-    const DOC: &'static str = "Bumpless transfer. A mode that begins, a contact that is found and one that is lost make \
-        the wanted motion jump. What a change exceeds half of the accelerations by becomes an offset, which fades at \
-        the other half; so the output is smooth before any limiter sees it, and it is exactly the input, without lag, \
-        as soon as the offset is gone.\n\n\
-        What is wanted faster than `linear_m_per_s` and `angular_rad_per_s` counts as so fast, in the same direction: a \
-        controller may want a hundred times what the arm may do, and when its contact is lost the motion would have \
-        to come down from there. Give it the speeds of the `twist_limit` behind it.\n\n\
-        An absent motion is none: the output goes on until it has come to rest, and is absent then. It stands behind \
-        the sum of all motions and before the limiters, which it knows nothing of.";
-    const EXAMPLE: &'static str = r#"
-[nodes.bumpless]
-type = "bumpless"
-in.twist = "sum.twist"
-linear_m_per_s2 = 1.0
-angular_rad_per_s2 = 10.0
-"#;
-    const EVERY_TICK: bool = true;
+/// Parameters of `bumpless`.
+#[derive(Debug, Clone, Param)]
+pub struct Params {
+    /// Maximum linear acceleration.
+    #[param(unit = "m/s2", above = 0.0)]
+    linear_m_per_s2: f64,
+    /// Maximum angular acceleration.
+    #[param(unit = "rad/s2", above = 0.0)]
+    angular_rad_per_s2: f64,
+    /// Linear speed to which the wanted motion is scaled down; unlimited if not given.
+    #[param(unit = "m/s", above = 0.0)]
+    linear_m_per_s: Option<f64>,
+    /// Angular speed to which the wanted motion is scaled down; unlimited if not given.
+    #[param(unit = "rad/s", above = 0.0)]
+    angular_rad_per_s: Option<f64>,
+}
+
+/// What `bumpless` reads.
+#[derive(Inputs)]
+pub struct Inputs<'a> {
+    /// The wanted motion; zero while it is absent.
+    #[port(frame = "A")]
+    twist: Option<In<'a, Twist>>,
+}
+
+/// What `bumpless` writes.
+#[derive(Outputs)]
+pub struct Outputs {
+    /// The same motion without jumps.
+    #[port(frame = "A")]
+    twist: Out<Twist>,
+    /// Fraction of the wanted motion in the output; the rest is the offset that remains of a jump.
+    #[port(unit = "1", frame = "_")]
+    bumpless: Out<Scalar>,
+}
+
+/// What `bumpless` remembers.
+#[derive(State)]
+pub struct State {
+    /// The input of the last tick [m/s, rad/s].
+    last: Twist,
+    /// Offset that remains of the jumps [m/s, rad/s].
+    offset: Twist,
 }
 
 impl Node for Bumpless {
@@ -85,18 +98,9 @@ impl Node for Bumpless {
     };
 
     fn new(params: Params, setup: &mut Setup<Self>) -> Result<Self, Mistakes> {
-        if setup.inputs.twist.is_none() {
-            return Err(crate::unwired(
-                <Self as tactflow_runtime::node::Describe>::NAME,
-                "twist",
-                "a twist",
-                "sum.twist",
-            )
-            .into());
-        }
-        setup.outputs.bumpless = ScalarShape::of(Unit::ONE).within(0.0, 1.0);
-        let speeds = [params.linear_m_per_s, params.angular_rad_per_s].map(|speed| speed.map_or(f64::INFINITY, |s| *s));
-        Ok(Self { linear: *params.linear_m_per_s2, angular: *params.angular_rad_per_s2, speeds })
+        setup.outputs.bumpless = fraction();
+        let speeds = [params.linear_m_per_s, params.angular_rad_per_s].map(|speed| speed.unwrap_or(f64::INFINITY));
+        Ok(Self { linear: params.linear_m_per_s2, angular: params.angular_rad_per_s2, speeds })
     }
 
     fn state(&self) -> State {
@@ -106,7 +110,7 @@ impl Node for Bumpless {
     fn step(&self, tick: &Tick, inputs: Inputs<'_>, out: &mut Outputs, state: &mut State) {
         let dt = tick.dt.min(tick.max_gap);
         let (linear, angular) = (0.5 * self.linear * dt, 0.5 * self.angular * dt);
-        // What the runtime holds at zero starts from zero when it may go on.
+        // While the runtime holds all commands the motion counts as absent, so it starts from zero afterwards.
         let twist = inputs.twist.filter(|_| !tick.is_halted);
         let mut wanted = twist.map_or_else(Twist::default, |twist| countable(&twist));
         let pace = scale_twist(&wanted, self.speeds[0], self.speeds[1]);
@@ -116,14 +120,14 @@ impl Node for Bumpless {
             return;
         }
         out.twist.set(smooth);
-        let (own, left) =
-            (twist_ratio(&wanted, self.linear, self.angular), twist_ratio(&state.offset, self.linear, self.angular));
-        out.bumpless.set(pace * if left > 0.0 { own / (own + left) } else { 1.0 });
+        let [own, rest] = [&wanted, &state.offset].map(|twist| twist_ratio(twist, self.linear, self.angular));
+        out.bumpless.set(pace * if rest > 0.0 { own / (own + rest) } else { 1.0 });
     }
 }
 
-/// The motion without its jump, given the motion and the offset of the last tick, which change by at most `half` [m/s,
-/// rad/s] each.
+/// Returns the motion without its jump, and updates the motion `last` and the `offset` of the last tick.
+///
+/// The passing part of the change and the change of the offset are at most `linear` [m/s] and `angular` [rad/s] each.
 pub fn smooth(wanted: &Twist, last: &mut Twist, offset: &mut Twist, [linear, angular]: [f64; 2]) -> Twist {
     let change = Twist(wanted.0 - last.0);
     let passes = scale_twist(&change, linear, angular);
@@ -157,10 +161,10 @@ mod tests {
     }
 
     #[test]
-    fn a_jump_fades_and_then_the_output_is_the_input() {
+    fn after_a_jump_the_output_converges_to_the_input() {
         let mut rig = rig();
         let mut steps = 0;
-        // Half of 1 m/s² passes at once, the other half fades: 0.02 m/s take 20 ticks of 1 ms.
+        // Half of 1 m/s² passes, and the offset goes to zero with the other half: 0.02 m/s take 20 ticks of 1 ms.
         while rig.get::<Twist>("twist") != Some(&along_x(0.02)) {
             rig.set("twist", along_x(0.02));
             rig.step();
@@ -173,7 +177,7 @@ mod tests {
         rig.step();
         let left = rig.get::<Twist>("twist").unwrap().0[0];
         assert!((0.019..0.02).contains(&left), "{left}");
-        assert_eq!(rig.get::<Scalar>("bumpless"), Some(&0.0), "nothing of that is wanted any more");
+        assert_eq!(rig.get::<Scalar>("bumpless"), Some(&0.0), "the whole output is offset");
         for _ in 0..50 {
             rig.step();
         }
@@ -181,7 +185,7 @@ mod tests {
     }
 
     #[test]
-    fn a_motion_that_ends_comes_down_from_the_speed_that_was_gone() {
+    fn a_motion_that_ends_slows_down_from_the_limited_speed() {
         let params = format!("{ACCELERATIONS}\nlinear_m_per_s = 0.05\nangular_rad_per_s = 0.8");
         let mut rig = NodeRig::new::<Bumpless>(&params, &[("twist", TwistShape.into())]).unwrap();
         for _ in 0..200 {
@@ -190,13 +194,13 @@ mod tests {
         }
         assert!((rig.get::<Twist>("twist").unwrap().0[0] - 0.05).abs() < 1e-12);
         rig.lose("twist");
-        // 0.05 m/s at half of 1 m/s² are 100 ms.
+        // 0.05 m/s at half of 1 m/s² take 100 ms.
         (0..101).for_each(|_| rig.step());
         assert_eq!(rig.get::<Twist>("twist"), None);
     }
 
     #[test]
-    fn what_is_smooth_passes_without_lag() {
+    fn a_smooth_motion_passes_without_lag() {
         let mut rig = rig();
         for i in 0..100 {
             // At most 0.4 m/s².
@@ -209,7 +213,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn it_never_jumps_and_always_arrives(
+        fn the_output_never_jumps_and_always_reaches_the_input(
             inputs in prop::collection::vec(prop::option::of(prop::array::uniform6(-2.0..2.0f64)), 1..40),
             ms in prop::collection::vec(0.1..30.0f64, 40),
         ) {

@@ -1,5 +1,7 @@
-//! Limiters: what every motion crosses on its way to an arm. Each holds a limit and says what share of the motion it
-//! lets pass; the check proves that none is missing.
+//! Limiters: every motion passes through them on its way to an arm.
+//!
+//! Each limiter holds one kind of limit and reports the fraction of the motion that passes. The check of a graph proves
+//! that none is missing.
 
 pub mod acceleration_limit;
 pub mod bumpless;
@@ -10,3 +12,19 @@ pub mod workspace_limit;
 
 #[cfg(test)]
 mod tests;
+
+use tactflow_runtime::signal::{ScalarShape, Unit};
+
+/// Maximum age of an input in periods of the graph, if the parameter `max_age_ms` is not given.
+const DEFAULT_MAX_AGE_PERIODS: f64 = 5.0;
+
+/// Returns the maximum age of an input [ns], from the parameter `max_age_ms` and the period of the graph [s].
+fn max_age(max_age_ms: Option<f64>, period: f64) -> i64 {
+    let seconds = max_age_ms.map_or(DEFAULT_MAX_AGE_PERIODS * period, |age| age * 1e-3);
+    (seconds * 1e9) as i64
+}
+
+/// Returns the shape of the fraction of a motion that a limiter lets pass.
+fn fraction() -> ScalarShape {
+    ScalarShape::of(Unit::ONE).within(0.0, 1.0)
+}

@@ -1,5 +1,5 @@
-//! Limiters of a twist where it matters most: motions of any size, images that change while a motion is held, motions
-//! that grow old, and a sensor that runs at the side of its box.
+//! Limiters of a twist: motions of any size, images that change while a motion is held, motions that become too old, and
+//! a sensor that moves toward a face of its box.
 
 use nalgebra::IsometryMatrix3;
 use tactflow_runtime::harness::NodeRig;
@@ -40,7 +40,7 @@ fn get(rig: &NodeRig) -> Option<Twist> {
 }
 
 #[test]
-fn a_finite_motion_of_any_size_gives_a_finite_one() {
+fn a_finite_motion_of_any_size_stays_finite() {
     let mut limiters = [
         (rig::<Bumpless>(ACCELERATIONS), "bumpless"),
         (rig::<ContactLimit>(CEILINGS), "force"),
@@ -61,14 +61,14 @@ fn a_finite_motion_of_any_size_gives_a_finite_one() {
                 let out = get(rig).unwrap();
                 assert!(out.0.iter().all(|v| v.is_finite()), "`{limit}` of {size:e}: {out:?}");
                 let share = *rig.get::<Scalar>(limit).unwrap();
-                assert!((0.0..=1.0).contains(&share), "`{limit}` of {size:e} says {share}");
+                assert!((0.0..=1.0).contains(&share), "`{limit}` of {size:e} is {share}");
             }
         }
     }
 }
 
 #[test]
-fn a_face_bars_the_way_to_a_motion_of_any_size() {
+fn a_face_stops_a_motion_of_any_size() {
     let mut rig = rig::<WorkspaceLimit>(BOX);
     for size in [1e-3, 1.0, 1e150, 1e200, f64::MAX] {
         for along in [0.0, 1.0] {
@@ -82,20 +82,20 @@ fn a_face_bars_the_way_to_a_motion_of_any_size() {
 }
 
 #[test]
-fn what_presses_counts_as_soon_as_it_is_seen_though_the_motion_is_held() {
+fn a_new_image_acts_while_the_motion_is_held() {
     let mut rig = rig::<ContactLimit>(CEILINGS);
     let into = twist([0.0, 0.0, 0.1, 0.0, 0.0, 0.0]);
     rig.set("image", Image::from_cells(2, &[0.0; 4]));
     rig.set("twist", into);
     rig.step();
-    assert_eq!(get(&rig), Some(into), "nothing presses");
+    assert_eq!(get(&rig), Some(into), "no contact");
     rig.set("image", Image::from_cells(2, &[5.0; 4]));
     rig.step();
-    assert_eq!(get(&rig), Some(Twist::default()), "the motion is the same, and the pad is at its ceiling");
+    assert_eq!(get(&rig), Some(Twist::default()), "the motion is the same, but the pad is at its ceiling");
 }
 
 #[test]
-fn an_image_of_no_age_counts_too() {
+fn a_timeless_image_acts_too() {
     let mut rig = rig::<ContactLimit>(CEILINGS);
     for (cell, passes) in [(5.0, 0.0), (0.0, 0.1), (5.0, 0.0)] {
         rig.edit("image", Stamp::TIMELESS, |image: &mut Image| *image = Image::from_cells(2, &[cell; 4]));
@@ -106,8 +106,8 @@ fn an_image_of_no_age_counts_too() {
 }
 
 #[test]
-fn nothing_that_presses_limits_nothing() {
-    // At a share of 0 the way in is slowed down from the first touch on, and not before.
+fn without_a_contact_the_motion_passes() {
+    // With `begin = 0` the approach is slowed down from the first contact on, and not before.
     let mut rig = rig::<ContactLimit>(&format!("{CEILINGS}\nbegin = 0"));
     let into = twist([0.0, 0.0, 0.5, 0.0, 0.0, 0.0]);
     for (cell, passes) in [(0.0, 0.5), (-3.0, 0.5), (0.025, 0.2 * 0.99), (2.5, 0.0)] {
@@ -119,9 +119,9 @@ fn nothing_that_presses_limits_nothing() {
 }
 
 #[test]
-fn the_way_in_is_slowed_down_in_a_straight_line_from_begin_to_the_ceiling() {
+fn the_approach_slows_down_linearly_from_begin_to_the_ceiling() {
     let mut rig = rig::<ContactLimit>(&format!("{CEILINGS}\nbegin = 0.8"));
-    // Times the ceiling of the sum, and what is left of a way in of 0.5 m/s; 0.2 m/s are allowed at 0.8.
+    // Load as a multiple of the ceiling, and the rest of an approach of 0.5 m/s; 0.2 m/s are allowed at 0.8.
     let cases = [(0.79, 0.5), (0.8, 0.2), (0.9, 0.1), (0.95, 0.05), (1.0, 0.0), (3.0, 0.0)];
     for (times, passes) in cases {
         // Spread over the pad, so that no tactel is near its own ceiling of 4 until the last case.
@@ -131,12 +131,12 @@ fn the_way_in_is_slowed_down_in_a_straight_line_from_begin_to_the_ceiling() {
         let out = get(&rig).unwrap();
         assert!((out.0[2] - passes).abs() < 1e-6, "{times} of the ceiling: {out:?}");
         assert!((rig.get::<Scalar>("force").unwrap() - passes / 0.5).abs() < 1e-6);
-        assert_eq!((out.0[0], out.0[5]), (0.3, 0.2), "the rest goes on");
+        assert_eq!((out.0[0], out.0[5]), (0.3, 0.2), "the other components stay");
     }
 }
 
 #[test]
-fn an_old_image_or_pose_is_no_motion() {
+fn with_an_old_image_or_pose_the_output_is_absent() {
     let along = twist([0.01, 0.0, 0.0, 0.0, 0.0, 0.0]);
     let mut blind = rig::<ContactLimit>(&format!("{CEILINGS}\nmax_age_ms = 3"));
     let mut lost = rig::<WorkspaceLimit>(&format!("{BOX}\nmax_age_ms = 3"));
@@ -145,7 +145,7 @@ fn an_old_image_or_pose_is_no_motion() {
     for ms in 0..8 {
         let expected = (ms <= 3).then_some(along);
         for rig in [&mut blind, &mut lost] {
-            // The motion comes once and is held: it must not need a new one to be stopped.
+            // The motion is set once and is then held: the node must stop it without a new one.
             if ms == 0 {
                 rig.set("twist", along);
             }
@@ -156,7 +156,7 @@ fn an_old_image_or_pose_is_no_motion() {
 }
 
 #[test]
-fn a_motion_that_is_gone_or_old_fades_in_a_straight_line_and_is_absent_then() {
+fn a_lost_or_old_motion_goes_to_zero_on_a_straight_line_and_is_absent_then() {
     let wanted = twist([0.02, 0.0, 0.0, 0.0, 0.0, 0.0]);
     for is_lost in [true, false] {
         let mut rig = rig::<AccelerationLimit>(&format!("{ACCELERATIONS}\nmax_age_ms = 3"));
@@ -177,7 +177,7 @@ fn a_motion_that_is_gone_or_old_fades_in_a_straight_line_and_is_absent_then() {
             rig.step();
             let left = get(&rig).unwrap().0[0];
             assert!((left - (0.02 - 1e-3 * f64::from(ms))).abs() < 1e-12, "{left} after {ms} ms");
-            // What comes of an old motion is no younger than it.
+            // The rest of an old motion keeps its stamp.
             assert_eq!(rig.mark("twist").stamp().is_timeless(), is_lost);
         }
         (0..2).for_each(|_| rig.step());
@@ -186,7 +186,7 @@ fn a_motion_that_is_gone_or_old_fades_in_a_straight_line_and_is_absent_then() {
 }
 
 #[test]
-fn no_time_is_no_change_and_a_long_gap_counts_as_the_longest() {
+fn a_tick_without_time_changes_nothing_and_a_long_gap_counts_as_max_gap() {
     let mut rig = rig::<AccelerationLimit>(ACCELERATIONS);
     let (far, cases) = (twist([5.0, 0.0, 0.0, 0.0, 0.0, 0.0]), [(0.0, 0.0), (0.0, 0.0), (40.0, 0.0), (900.0, 0.04)]);
     for (ms, reached) in cases.into_iter().chain([(0.0, 0.14)]) {
@@ -196,16 +196,16 @@ fn no_time_is_no_change_and_a_long_gap_counts_as_the_longest() {
     }
 }
 
-/// How far past a face of its box a sensor gets that goes straight at it and turns to and fro as fast as it may: the
-/// acceleration limit keeps the direction of a change, so that the turning holds back the braking.
+/// Returns how far a sensor passes a face of its box when it moves straight toward it and turns to and fro at full speed:
+/// the acceleration limit keeps the direction of a change, so the turning delays the braking.
 fn past(gap: f64, turning: f64, flip: usize, margin: f64) -> f64 {
     let accelerations = format!("linear_m_per_s2 = 1.0\nangular_rad_per_s2 = {turning}");
     let (mut near, mut slow) = (rig::<WorkspaceLimit>(BOX), rig::<TwistLimit>(SPEEDS));
     let mut smooth = rig::<AccelerationLimit>(&accelerations);
-    let (mut x, mut told, mut worst) = (0.05, Twist::default(), f64::NEG_INFINITY);
+    let (mut x, mut command, mut worst) = (0.05, Twist::default(), f64::NEG_INFINITY);
     for tick in 0..1000 {
         let sign = if (tick / flip).is_multiple_of(2) { 1.0 } else { -1.0 };
-        // Toward the face until it is near; then along it, so that nothing scales the turning down.
+        // Toward the face until it is near; then only turning, so that no limit scales the turning down.
         let ahead = if 0.1 - x > margin { 0.05 } else { 0.0 };
         near.tick.max_gap = gap;
         near.set("pose", at(x, 0.0, 0.0));
@@ -215,23 +215,23 @@ fn past(gap: f64, turning: f64, flip: usize, margin: f64) -> f64 {
         slow.step_ms(4.0);
         smooth.set("twist", get(&slow).unwrap());
         smooth.step_ms(4.0);
-        // The sensor does as it is told a tick later.
-        x += told.linear().x * 0.004;
-        told = get(&smooth).unwrap();
+        // The sensor follows the command one tick later.
+        x += command.linear().x * 0.004;
+        command = get(&smooth).unwrap();
         worst = f64::max(worst, x - 0.1);
     }
     worst
 }
 
 #[test]
-fn turning_to_and_fro_holds_back_the_braking_by_no_more_than_is_said() {
-    // Turns that are reversed in 0.16 s and in 0.8 s: speed times that time, and the worst that was found.
+fn turning_delays_the_braking_by_no_more_than_documented() {
+    // Turns that are reversed in 0.16 s and in 0.8 s: speed times that time, and the worst case found.
     for (gap, turning, found) in [(0.1, 10.0, 1e-6), (0.02, 10.0, 0.0023), (0.02, 2.0, 0.018)] {
         let bound = 0.05 * (2.0 * 0.8 / turning) + 0.05 * 0.008;
         let flips = [1, 3, 10, 20, 30, 40, 80];
         let tries = flips.iter().flat_map(|flip| (0..15).map(move |mm| (*flip, f64::from(mm) * 1e-3)));
         let worst = tries.map(|(flip, margin)| past(gap, turning, flip, margin)).fold(f64::NEG_INFINITY, f64::max);
-        assert!(worst <= bound, "{worst} m past the face, with {turning} rad/s²");
-        assert!(worst < found, "{worst} m past the face, with {turning} rad/s² and a gap of {gap} s");
+        assert!(worst <= bound, "{worst} m beyond the face, with {turning} rad/s²");
+        assert!(worst < found, "{worst} m beyond the face, with {turning} rad/s² and a gap of {gap} s");
     }
 }

@@ -12,8 +12,7 @@ use std::collections::VecDeque;
 use tactflow_runtime::device::{
     Command, Commands, Description, Device, DeviceError, Driver, Opened, Output, Report, Samples, Stepped,
 };
-use tactflow_runtime::node::{Count, FilePath, Mistakes, NonNegative, PortSpec, Positive, Rate};
-use tactflow_runtime::params;
+use tactflow_runtime::node::{FilePath, Mistakes, Param, PortSpec};
 use tactflow_runtime::signal::{Image, ImageShape, Joint, Joints, JointsShape, Kind, Pose, Scalar, ScalarShape, Unit};
 
 use super::contact::Contact;
@@ -32,55 +31,78 @@ use crate::devices::{nanos, period_of};
 use crate::random::Random;
 use crate::roles::ground_truth;
 
-params! {
+/// Parameters of `sim_bench`.
+#[derive(Debug, Clone, Param)]
+pub struct Params {
     /// Seed of the noise and of the random offsets of the objects.
-    seed: u64 = 1,
-    /// Duration of the run; unlimited if not given [s].
-    for_s: Option<Positive>,
+    #[param(default = 1)]
+    seed: u64,
+    /// Duration of the run; unlimited if not given.
+    #[param(unit = "s", above = 0.0)]
+    for_s: Option<f64>,
     /// Objects to touch.
-    objects: Vec<ObjectParams> = vec![],
+    #[param(default = vec![])]
+    objects: Vec<ObjectParams>,
     /// Number of rows of the pad.
-    rows: Count = Count(16),
+    #[param(range = 1..=1_000_000, default = 16)]
+    rows: usize,
     /// Number of columns of the pad.
-    cols: Count = Count(16),
-    /// Distance between the centres of neighbouring tactels, along x and along y [m].
-    pitch: Positive = Positive(0.005),
-    /// Frames per second [1/s].
-    rate_hz: Rate = Rate(250.0),
-    /// Time from taking an image until it is available [s].
-    latency_s: NonNegative = NonNegative(0.004),
+    #[param(range = 1..=1_000_000, default = 16)]
+    cols: usize,
+    /// Distance between the centres of neighbouring tactels, along x and along y.
+    #[param(unit = "m", above = 0.0, default = 0.005)]
+    pitch: f64,
+    /// Frames per second.
+    #[param(unit = "1/s", range = 0.001..=1e6, default = 250.0)]
+    rate_hz: f64,
+    /// Time from taking an image until it is available.
+    #[param(unit = "s", range = 0.0.., default = 0.004)]
+    latency_s: f64,
     /// Calibration file of the pad, stated as a fact for `calibrate`.
     calibration: Option<FilePath>,
-    /// Noise threshold that the pad states as a fact [N].
-    threshold: NonNegative = NonNegative(0.015),
-    /// Unit of pressure that the pad states as a fact: p = 1 in the paper [N per tactel].
-    pressure: Positive = Positive(0.1),
+    /// Noise threshold that the pad states as a fact.
+    #[param(unit = "N", range = 0.0.., default = 0.015)]
+    threshold: f64,
+    /// Unit of pressure that the pad states as a fact: p = 1 in the paper.
+    #[param(unit = "N/tactel", above = 0.0, default = 0.1)]
+    pressure: f64,
     /// Properties of the foam.
-    foam: Foam = Foam::DEFAULT,
-    /// Largest distance between simulated points of the pad; a thin probe needs a smaller one than a ball [m].
-    points_apart: Positive = Positive(0.001),
+    #[param(default = Foam::DEFAULT)]
+    foam: Foam,
+    /// Largest distance between simulated points of the pad; a thin probe needs a smaller one than a ball.
+    #[param(unit = "m", above = 0.0, default = 0.001)]
+    points_apart: f64,
     /// Properties of the electronics.
-    electronics: Electronics = Electronics::DEFAULT,
+    #[param(default = Electronics::DEFAULT)]
+    electronics: Electronics,
     /// Model of the arm.
     urdf: FilePath,
     /// Link that carries the sensor.
     tip: String,
     /// Pose of the sensor on that link.
-    mount: Mount = Mount::NONE,
-    /// Joint positions at the start, one per joint [rad].
+    #[param(default = Mount::NONE)]
+    mount: Mount,
+    /// Joint positions at the start, one per joint.
+    #[param(unit = "rad")]
     start: Vec<f64>,
-    /// Stiffness of the joints [N m/rad].
-    stiffness: Positive = Positive(200.0),
-    /// Damping of the joints as a fraction of the critical one [1].
-    damping_ratio: NonNegative = NonNegative(0.2),
-    /// Inertia of each joint; that of the seven joints of an LWR if not given [kg m²].
+    /// Stiffness of the joints.
+    #[param(unit = "N m/rad", above = 0.0, default = 200.0)]
+    stiffness: f64,
+    /// Damping of the joints as a fraction of the critical one.
+    #[param(unit = "1", range = 0.0.., default = 0.2)]
+    damping_ratio: f64,
+    /// Inertia of each joint; that of the seven joints of an LWR if not given.
+    #[param(unit = "kg m2")]
     inertia: Option<Vec<f64>>,
-    /// Dry friction of the joints [N m].
-    friction: NonNegative = NonNegative(0.1),
-    /// Largest acceleration that the arm states for each joint [rad/s²].
-    acceleration: Positive = Positive(10.0),
-    /// Longest step of the simulation [s].
-    step_s: Positive = Positive(0.002),
+    /// Dry friction of the joints.
+    #[param(unit = "N m", range = 0.0.., default = 0.1)]
+    friction: f64,
+    /// Largest acceleration that the arm states for each joint.
+    #[param(unit = "rad/s2", above = 0.0, default = 10.0)]
+    acceleration: f64,
+    /// Longest step of the simulation.
+    #[param(unit = "s", above = 0.0, default = 0.002)]
+    step_s: f64,
 }
 
 /// Inertia of the joints of an LWR in a bent posture, with rotors [kg m²].
@@ -161,10 +183,10 @@ impl Device for SimBench {
 
     fn open(params: Params) -> Result<Opened, Mistakes> {
         let chain = load(&params.urdf, &params.tip, &params.mount)?;
-        let acceleration = *params.acceleration;
+        let acceleration = params.acceleration;
         let joints: Vec<Joint> = chain.joints().iter().map(|joint| Joint { acceleration, ..joint.clone() }).collect();
         check_start(&joints, &params.start)?;
-        let shape = ImageShape { rows: params.rows.0, cols: params.cols.0, pitch: [*params.pitch; 2], unit: Unit::RAW };
+        let shape = ImageShape { rows: params.rows, cols: params.cols, pitch: [params.pitch; 2], unit: Unit::RAW };
         check::check(&params, &shape)?;
         let period = period_of(params.rate_hz);
         let mut description = Description::every(period as f64 * 1e-9);
@@ -223,11 +245,11 @@ fn pad_facts(params: &Params) -> Result<Vec<(Cow<'static, str>, toml::Value)>, M
     }
     Ok(vec![
         ("dead".into(), toml::Value::Array(vec![])),
-        ("threshold".into(), (*params.threshold).into()),
-        ("pressure".into(), (*params.pressure).into()),
+        ("threshold".into(), params.threshold.into()),
+        ("pressure".into(), params.pressure.into()),
         ("calibration".into(), calibration.into()),
-        ("common_noise".into(), (*params.electronics.common_noise).into()),
-        ("own_noise".into(), (*params.electronics.own_noise).into()),
+        ("common_noise".into(), params.electronics.common_noise.into()),
+        ("own_noise".into(), params.electronics.own_noise.into()),
     ])
 }
 
@@ -242,27 +264,27 @@ impl SimBench {
     ) -> Result<Self, Mistakes> {
         let inertia = params.inertia.unwrap_or_else(|| INERTIA.to_vec());
         let joint = |inertia: f64| JointDynamics {
-            stiffness: *params.stiffness,
-            damping_ratio: *params.damping_ratio,
+            stiffness: params.stiffness,
+            damping_ratio: params.damping_ratio,
             inertia,
-            friction: *params.friction,
+            friction: params.friction,
         };
         let arm = SimArm::new(chain, inertia.into_iter().map(joint).collect(), params.start);
         let from = start(&arm);
         let mut scatter = Random::new(params.seed, 3);
         let place = |(i, object): (usize, &ObjectParams)| {
-            let max_offset = *object.scatter;
+            let max_offset = object.scatter;
             let offset = [0, 1].map(|_| scatter.uniform(-max_offset, max_offset));
             Object::new(object, from, offset).map_err(|message| check::object(i, message))
         };
         let objects = params.objects.iter().enumerate().map(place).collect::<Result<Vec<_>, _>>()?;
-        let contact = Contact::new(shape.clone(), params.foam.clone(), *params.points_apart, objects.len());
-        let imprint = Imprint::new(&shape, contact.fine(), *params.foam.spread);
+        let contact = Contact::new(shape.clone(), params.foam.clone(), params.points_apart, objects.len());
+        let imprint = Imprint::new(&shape, contact.fine(), params.foam.spread);
         let tactels = shape.tactels();
         let readout = Readout::new(tactels, params.electronics, params.seed);
-        let world = World::new(arm, objects, contact, imprint, shape, *params.step_s);
-        let end = params.for_s.map_or(i64::MAX, |end| nanos(*end));
-        let (latency, threshold) = (nanos(*params.latency_s), *params.threshold);
+        let world = World::new(arm, objects, contact, imprint, shape, params.step_s);
+        let end = params.for_s.map_or(i64::MAX, |end| nanos(end));
+        let (latency, threshold) = (nanos(params.latency_s), params.threshold);
         let frames = (latency / period) as usize + 2;
         let (taken, spare) = (VecDeque::with_capacity(frames), vec![vec![0.0; tactels]; frames]);
         Ok(Self {

@@ -128,7 +128,7 @@ impl Contact {
         Self {
             fine,
             column: Column::new(&foam, area / points as f64),
-            shear: *foam.shear * area / foam::REFERENCE_AREA,
+            shear: foam.shear * area / foam::REFERENCE_AREA,
             touching: Vec::with_capacity(shape.tactels() * points),
             tactels: vec![Bristle::default(); shape.tactels()],
             slots: vec![NO_SLOT; shape.tactels() * points],
@@ -204,7 +204,7 @@ impl Contact {
 
     /// Finds the points that touch an object.
     fn find(&mut self, pad: &BodyMotion, index: usize, object: &Object) {
-        let thickness = *self.foam.thickness;
+        let thickness = self.foam.thickness;
         let local = |v: Vec3| object.pose.rotation.inverse() * (pad.pose.rotation * v);
         let ray = Rays {
             to_pad: Mat3::from_quat(pad.pose.rotation.inverse() * object.pose.rotation),
@@ -309,7 +309,7 @@ impl Bristle {
     /// Shears the foam by the `velocity` of the pad relative to the object [m/s], up to the friction limit.
     fn rub(&mut self, dt: f64, velocity: [f64; 2], stiffness: f64, foam: &Foam) {
         let speed = norm(velocity) / STRIBECK_SPEED;
-        let (still, sliding) = (*foam.static_friction, *foam.sliding_friction);
+        let (still, sliding) = (foam.static_friction, foam.sliding_friction);
         let max_force = (sliding + (still - sliding) / (1.0 + speed * speed)) * self.normal;
         self.shear = [self.shear[0] + velocity[0] * dt, self.shear[1] + velocity[1] * dt];
         let force = stiffness * norm(self.shear);

@@ -4,43 +4,52 @@
 //! p(c) = k c, plus k3 (c - c0)³ above c0. A compliant object is a spring in series: of an indentation d the column takes c
 //! with d = c + p(c) / k_object.
 
-use tactflow_runtime::node::{NonNegative, Positive};
-use tactflow_runtime::params;
+use tactflow_runtime::node::Param;
 
-params! {
-    Foam:
-    /// Stiffness of the foam under a tactel of 5 mm by 5 mm; it scales with the area of a tactel [N/m].
-    stiffness: Positive = Positive(300.0),
-    /// Compression above which the foam stiffens [m].
-    stiffens_from: Positive = Positive(0.0025),
-    /// Cubic part of the stiffness [N/m³ for a tactel of 5 mm by 5 mm].
-    stiffening: NonNegative = NonNegative(9.6e7),
-    /// Thickness of the foam; behind it is the rigid plate [m].
-    thickness: Positive = Positive(0.008),
-    /// Damping of the foam under a tactel of 5 mm by 5 mm [N s/m].
-    damping: NonNegative = NonNegative(1.5),
-    /// Shear stiffness of the foam under a tactel of 5 mm by 5 mm [N/m].
-    shear: Positive = Positive(200.0),
-    /// Standard deviation of the Gaussian with which the foam spreads a load [m].
-    spread: Positive = Positive(0.003),
-    /// Coefficient of static friction [1].
-    static_friction: NonNegative = NonNegative(0.4),
-    /// Coefficient of sliding friction [1].
-    sliding_friction: NonNegative = NonNegative(0.3),
+/// Properties of the foam.
+#[derive(Debug, Clone, Param)]
+pub struct Foam {
+    /// Stiffness of the foam under a tactel of 5 mm by 5 mm; it scales with the area of a tactel.
+    #[param(unit = "N/m", above = 0.0, default = 300.0)]
+    pub(crate) stiffness: f64,
+    /// Compression above which the foam stiffens.
+    #[param(unit = "m", above = 0.0, default = 0.0025)]
+    pub(crate) stiffens_from: f64,
+    /// Cubic part of the stiffness under a tactel of 5 mm by 5 mm.
+    #[param(unit = "N/m3", range = 0.0.., default = 9.6e7)]
+    pub(crate) stiffening: f64,
+    /// Thickness of the foam; behind it is the rigid plate.
+    #[param(unit = "m", above = 0.0, default = 0.008)]
+    pub(crate) thickness: f64,
+    /// Damping of the foam under a tactel of 5 mm by 5 mm.
+    #[param(unit = "N s/m", range = 0.0.., default = 1.5)]
+    pub(crate) damping: f64,
+    /// Shear stiffness of the foam under a tactel of 5 mm by 5 mm.
+    #[param(unit = "N/m", above = 0.0, default = 200.0)]
+    pub(crate) shear: f64,
+    /// Standard deviation of the Gaussian with which the foam spreads a load.
+    #[param(unit = "m", above = 0.0, default = 0.003)]
+    pub(crate) spread: f64,
+    /// Coefficient of static friction.
+    #[param(unit = "1", range = 0.0.., default = 0.4)]
+    pub(crate) static_friction: f64,
+    /// Coefficient of sliding friction.
+    #[param(unit = "1", range = 0.0.., default = 0.3)]
+    pub(crate) sliding_friction: f64,
 }
 
 impl Foam {
     /// The pad of the paper, as far as its properties are known.
     pub const DEFAULT: Self = Self {
-        stiffness: Positive(300.0),
-        stiffens_from: Positive(0.0025),
-        stiffening: NonNegative(9.6e7),
-        thickness: Positive(0.008),
-        damping: NonNegative(1.5),
-        shear: Positive(200.0),
-        spread: Positive(0.003),
-        static_friction: NonNegative(0.4),
-        sliding_friction: NonNegative(0.3),
+        stiffness: 300.0,
+        stiffens_from: 0.0025,
+        stiffening: 9.6e7,
+        thickness: 0.008,
+        damping: 1.5,
+        shear: 200.0,
+        spread: 0.003,
+        static_friction: 0.4,
+        sliding_friction: 0.3,
     };
 }
 
@@ -65,10 +74,10 @@ impl Column {
     pub fn new(foam: &Foam, area: f64) -> Self {
         let scale = area / REFERENCE_AREA;
         Self {
-            k: *foam.stiffness * scale,
-            k3: *foam.stiffening * scale,
-            from: *foam.stiffens_from,
-            damping: *foam.damping * scale,
+            k: foam.stiffness * scale,
+            k3: foam.stiffening * scale,
+            from: foam.stiffens_from,
+            damping: foam.damping * scale,
         }
     }
 

@@ -2,69 +2,84 @@
 
 use parry3d_f64::math::{Pose3, Rot3, Vec3};
 use parry3d_f64::shape::{Ball, Cuboid};
-use tactflow_runtime::node::{NonNegative, Positive};
-use tactflow_runtime::params;
+use tactflow_runtime::node::Param;
 use tactflow_runtime::signal::Pose;
 
 use super::shape::{Geometry, pose3};
 use crate::arm::mount::pose_of;
 
-words! {
-    /// Shape of an object.
-    ShapeKind {
-        /// An infinite plane.
-        Plane = "plane",
-        /// A ball.
-        Ball = "ball",
-        /// A box with edges.
-        Box = "box",
-        /// A cylinder with round ends along its y.
-        Pen = "pen",
-        /// An ellipsoid.
-        Ellipsoid = "ellipsoid",
-        /// A round cable along a smooth curve.
-        Cable = "cable",
-    }
+/// Shape of an object.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Param)]
+pub enum ShapeKind {
+    /// An infinite plane.
+    Plane,
+    /// A ball.
+    Ball,
+    /// A box with edges.
+    Box,
+    /// A cylinder with round ends along its y.
+    Pen,
+    /// An ellipsoid.
+    Ellipsoid,
+    /// A round cable along a smooth curve.
+    Cable,
 }
 
-params! {
-    ObjectParams:
-    /// Shape: `plane`, `ball`, `box`, `pen`, `ellipsoid` or `cable`.
-    shape: ShapeKind,
-    /// Position of its centre relative to the sensor at the start, in the sensor's axes; for a plane, a point on it [m].
-    at: [f64; 3],
-    /// Roll, pitch and yaw in the sensor's axes at the start [rad].
-    turn: [f64; 3] = [0.0; 3],
-    /// Radius of a ball, a pen or a cable [m].
-    radius: Option<Positive>,
-    /// Length of a pen between the centres of its ends [m].
-    length: Option<Positive>,
-    /// Edge lengths of a box, or full axes of an ellipsoid [m].
-    size: Option<[f64; 3]>,
-    /// Points that a cable passes through, in its own frame [m].
-    points: Option<Vec<[f64; 3]>>,
-    /// Stiffness of its surface under a tactel of 5 mm by 5 mm; rigid if not given [N/m].
-    stiffness: Option<Positive>,
-    /// Stiffness of its mount in every direction; fixed if not given [N/m].
-    mount: Option<Positive>,
-    /// Mass, used with a `mount`; the damping of the mount is half of the critical one [kg].
-    mass: Positive = Positive(1.0),
-    /// Largest random offset of its position along the sensor's x and y; it depends on the seed [m].
-    scatter: NonNegative = NonNegative(0.0),
+/// Parameters of an object.
+#[derive(Debug, Clone, Param)]
+pub struct ObjectParams {
+    /// Shape.
+    pub(crate) shape: ShapeKind,
+    /// Position of its centre relative to the sensor at the start, in the sensor's axes; for a plane, a point on it.
+    #[param(unit = "m")]
+    pub(crate) at: [f64; 3],
+    /// Roll, pitch and yaw in the sensor's axes at the start.
+    #[param(unit = "rad", default = [0.0; 3])]
+    pub(crate) turn: [f64; 3],
+    /// Radius of a ball, a pen or a cable.
+    #[param(unit = "m", above = 0.0)]
+    pub(crate) radius: Option<f64>,
+    /// Length of a pen between the centres of its ends.
+    #[param(unit = "m", above = 0.0)]
+    pub(crate) length: Option<f64>,
+    /// Edge lengths of a box, or full axes of an ellipsoid.
+    #[param(unit = "m")]
+    pub(crate) size: Option<[f64; 3]>,
+    /// Points that a cable passes through, in its own frame.
+    #[param(unit = "m")]
+    pub(crate) points: Option<Vec<[f64; 3]>>,
+    /// Stiffness of its surface under a tactel of 5 mm by 5 mm; rigid if not given.
+    #[param(unit = "N/m", above = 0.0)]
+    pub(crate) stiffness: Option<f64>,
+    /// Stiffness of its mount in every direction; fixed if not given.
+    #[param(unit = "N/m", above = 0.0)]
+    pub(crate) mount: Option<f64>,
+    /// Mass, used with a `mount`; the damping of the mount is half of the critical one.
+    #[param(unit = "kg", above = 0.0, default = 1.0)]
+    pub(crate) mass: f64,
+    /// Largest random offset of its position along the sensor's x and y; it depends on the seed.
+    #[param(unit = "m", range = 0.0.., default = 0.0)]
+    pub(crate) scatter: f64,
     /// Motions over time.
-    motion: Vec<ScriptedMove> = vec![],
+    #[param(default = vec![])]
+    pub(crate) motion: Vec<ScriptedMove>,
 }
 
-params! {
-    ScriptedMove:
-    /// Start of the motion [s].
-    from_s: NonNegative,
-    /// End of the motion [s].
-    to_s: NonNegative,
-    /// Displacement in the sensor's axes at the start [m].
-    by: [f64; 3] = [0.0; 3],
-    /// Rotation about its centre and the sensor's z at the start [rad].
-    turn: f64 = 0.0,
+/// A motion of an object over time.
+#[derive(Debug, Clone, Param)]
+pub struct ScriptedMove {
+    /// Start of the motion.
+    #[param(unit = "s", range = 0.0..)]
+    pub(crate) from_s: f64,
+    /// End of the motion.
+    #[param(unit = "s", range = 0.0..)]
+    pub(crate) to_s: f64,
+    /// Displacement in the sensor's axes at the start.
+    #[param(unit = "m", default = [0.0; 3])]
+    pub(crate) by: [f64; 3],
+    /// Rotation about its centre and the sensor's z at the start.
+    #[param(unit = "rad", default = 0.0)]
+    pub(crate) turn: f64,
 }
 
 /// An object in the base.
@@ -107,27 +122,24 @@ impl Object {
     /// If a parameter of the shape is missing, not used or not positive, or if a motion has no duration.
     pub fn new(params: &ObjectParams, start: Pose3, offset: [f64; 2]) -> Result<Self, String> {
         let shape = shape_of(params)?;
-        if let Some(step) = params.motion.iter().find(|step| *step.to_s <= *step.from_s) {
-            return Err(format!(
-                "a motion must end after it starts, not go from {} s to {} s",
-                *step.from_s, *step.to_s
-            ));
+        if let Some(step) = params.motion.iter().find(|step| step.to_s <= step.from_s) {
+            return Err(format!("a motion must end after it starts, not go from {} s to {} s", step.from_s, step.to_s));
         }
         let at = Vec3::from(params.at) + Vec3::new(offset[0], offset[1], 0.0);
         let home = start * Pose3::from_parts(at, pose3(&Pose(pose_of([0.0; 3], params.turn))).rotation);
         let step = |step: &ScriptedMove| ScriptStep {
-            from: *step.from_s,
-            to: *step.to_s,
+            from: step.from_s,
+            to: step.to_s,
             by: start.rotation * Vec3::from(step.by),
             turn: step.turn,
         };
         Ok(Self {
             shape,
-            softness: params.stiffness.map_or(0.0, |stiffness| 1.0 / *stiffness),
+            softness: params.stiffness.map_or(0.0, |stiffness| 1.0 / stiffness),
             home,
             script: params.motion.iter().map(step).collect(),
             axis: start.rotation * Vec3::Z,
-            mount: params.mount.map(|stiffness| (*stiffness, *params.mass)),
+            mount: params.mount.map(|stiffness| (stiffness, params.mass)),
             sag: Vec3::ZERO,
             sag_speed: Vec3::ZERO,
             pose: home,
@@ -194,8 +206,9 @@ fn ease(t: f64) -> (f64, f64) {
 
 fn shape_of(params: &ObjectParams) -> Result<Geometry, String> {
     let kind = params.shape;
-    let given = |name: &str| format!("a {kind} needs `{name}`");
-    let radius = || params.radius.map(|radius| *radius).ok_or_else(|| given("radius"));
+    let (word, _) = ShapeKind::WORDS[kind as usize];
+    let given = |name: &str| format!("a {word} needs `{name}`");
+    let radius = || params.radius.ok_or_else(|| given("radius"));
     let size = || {
         let size = params.size.ok_or_else(|| given("size"))?;
         let is_good = size.iter().all(|size| *size > 0.0 && size.is_finite());
@@ -215,14 +228,14 @@ fn shape_of(params: &ObjectParams) -> Result<Geometry, String> {
         ("points", params.points.is_some()),
     ];
     if let Some((name, _)) = has.iter().find(|(name, is)| *is && !used.contains(name)) {
-        return Err(format!("a {kind} has no `{name}`"));
+        return Err(format!("a {word} has no `{name}`"));
     }
     Ok(match kind {
         ShapeKind::Plane => Geometry::plane(),
         ShapeKind::Ball => Geometry::Ball(Ball::new(radius()?)),
         ShapeKind::Box => Geometry::Box(Cuboid::new(Vec3::from(size()?))),
         ShapeKind::Ellipsoid => Geometry::ellipsoid(size()?),
-        ShapeKind::Pen => Geometry::pen(radius()?, *params.length.ok_or_else(|| given("length"))?),
+        ShapeKind::Pen => Geometry::pen(radius()?, params.length.ok_or_else(|| given("length"))?),
         ShapeKind::Cable => {
             let points = params.points.as_ref().ok_or_else(|| given("points"))?;
             let is_far = |pair: &[[f64; 3]]| Vec3::from(pair[0]).distance(Vec3::from(pair[1])) > 1e-4;

@@ -5,45 +5,54 @@
 //! reading is higher while the force falls) and creep (the reading rises under a constant load). The noise of a frame is
 //! a factor that all tactels share, plus independent noise of each tactel.
 
-use tactflow_runtime::node::{NonNegative, Positive, Ratio};
-use tactflow_runtime::params;
+use tactflow_runtime::node::Param;
 
 use crate::random::Random;
 
-params! {
-    Electronics:
+/// Properties of the electronics.
+#[derive(Debug, Clone, Param)]
+pub struct Electronics {
     /// Serial number of the hardware: the seed of the offsets and curves of its tactels.
-    serial: u64 = 1,
-    /// Range of a tactel above its offset [counts].
-    range: Positive = Positive(3000.0),
-    /// Force at which a tactel reads 63 % of its range [N].
-    squash: Positive = Positive(3.0),
-    /// Standard deviation of the logarithm of the tactels' sensitivity [1].
-    spread: NonNegative = NonNegative(0.22),
-    /// Difference of the reading between falling and rising force, as a fraction of the force [1].
-    hysteresis: Ratio = Ratio(0.06),
-    /// Rise of the reading under a constant load, as a fraction of the force [1].
-    creep: Ratio = Ratio(0.03),
-    /// Time constant of the creep [s].
-    creep_s: Positive = Positive(15.0),
-    /// Standard deviation of the noise that all tactels share, as a fraction of the reading [1].
-    common_noise: NonNegative = NonNegative(0.036),
-    /// Standard deviation of the independent noise of each tactel [counts].
-    own_noise: NonNegative = NonNegative(3.0),
+    #[param(default = 1)]
+    pub(crate) serial: u64,
+    /// Range of a tactel above its offset.
+    #[param(unit = "raw", above = 0.0, default = 3000.0)]
+    pub(crate) range: f64,
+    /// Force at which a tactel reads 63 % of its range.
+    #[param(unit = "N", above = 0.0, default = 3.0)]
+    pub(crate) squash: f64,
+    /// Standard deviation of the logarithm of the tactels' sensitivity.
+    #[param(unit = "1", range = 0.0.., default = 0.22)]
+    pub(crate) spread: f64,
+    /// Difference of the reading between falling and rising force, as a fraction of the force.
+    #[param(unit = "1", range = 0.0..=1.0, default = 0.06)]
+    pub(crate) hysteresis: f64,
+    /// Rise of the reading under a constant load, as a fraction of the force.
+    #[param(unit = "1", range = 0.0..=1.0, default = 0.03)]
+    pub(crate) creep: f64,
+    /// Time constant of the creep.
+    #[param(unit = "s", above = 0.0, default = 15.0)]
+    pub(crate) creep_s: f64,
+    /// Standard deviation of the noise that all tactels share, as a fraction of the reading.
+    #[param(unit = "1", range = 0.0.., default = 0.036)]
+    pub(crate) common_noise: f64,
+    /// Standard deviation of the independent noise of each tactel.
+    #[param(unit = "raw", range = 0.0.., default = 3.0)]
+    pub(crate) own_noise: f64,
 }
 
 impl Electronics {
     /// The pad of the paper, as far as its properties are known.
     pub const DEFAULT: Self = Self {
         serial: 1,
-        range: Positive(3000.0),
-        squash: Positive(3.0),
-        spread: NonNegative(0.22),
-        hysteresis: Ratio(0.06),
-        creep: Ratio(0.03),
-        creep_s: Positive(15.0),
-        common_noise: NonNegative(0.036),
-        own_noise: NonNegative(3.0),
+        range: 3000.0,
+        squash: 3.0,
+        spread: 0.22,
+        hysteresis: 0.06,
+        creep: 0.03,
+        creep_s: 15.0,
+        common_noise: 0.036,
+        own_noise: 3.0,
     };
 }
 
@@ -79,12 +88,12 @@ impl Readout {
     pub fn new(tactels: usize, electronics: Electronics, seed: u64) -> Self {
         let mut random = Random::new(electronics.serial, 1);
         let tactel = |_| {
-            let sensitivity = libm::exp(random.normal() * *electronics.spread);
-            let width = libm::exp(random.normal() * *electronics.spread / 4.0);
+            let sensitivity = libm::exp(random.normal() * electronics.spread);
+            let width = libm::exp(random.normal() * electronics.spread / 4.0);
             TactelState {
-                offset: random.uniform(0.05, 0.10) * *electronics.range,
-                range: (*electronics.range * sensitivity * width).min(0.88 * MAX_COUNT),
-                squash: *electronics.squash * width,
+                offset: random.uniform(0.05, 0.10) * electronics.range,
+                range: (electronics.range * sensitivity * width).min(0.88 * MAX_COUNT),
+                squash: electronics.squash * width,
                 force: 0.0,
                 branch: 0.0,
                 crept: 0.0,
@@ -96,12 +105,12 @@ impl Readout {
     /// Reads a frame of these forces [N], `dt` [s] after the last frame, into `counts`.
     pub fn read(&mut self, dt: f64, forces: &[f64], counts: &mut [f32]) {
         let electronics = &self.electronics;
-        let common = 1.0 + *electronics.common_noise * self.noise.normal();
-        let creep = 1.0 - libm::exp(-dt / *electronics.creep_s);
+        let common = 1.0 + electronics.common_noise * self.noise.normal();
+        let creep = 1.0 - libm::exp(-dt / electronics.creep_s);
         for ((tactel, force), count) in self.tactels.iter_mut().zip(forces).zip(counts) {
             let felt = tactel.feel(*force, creep, electronics);
             let reading = if felt > 0.0 { tactel.range * (1.0 - libm::exp(-felt / tactel.squash)) } else { 0.0 };
-            let noise = *electronics.own_noise * self.noise.normal();
+            let noise = electronics.own_noise * self.noise.normal();
             *count = (tactel.offset + reading * common + noise).round().clamp(0.0, MAX_COUNT) as f32;
         }
     }
@@ -114,8 +123,8 @@ impl Readout {
     pub fn noise(&self, pressure: f64, tactels: usize) -> [f64; 2] {
         let electronics = &self.electronics;
         // The slope of the curve of a tactel of average sensitivity.
-        let slope = *electronics.range / *electronics.squash * libm::exp(-pressure / *electronics.squash);
-        [*electronics.common_noise * pressure, *electronics.own_noise / slope / (tactels as f64).sqrt()]
+        let slope = electronics.range / electronics.squash * libm::exp(-pressure / electronics.squash);
+        [electronics.common_noise * pressure, electronics.own_noise / slope / (tactels as f64).sqrt()]
     }
 }
 
@@ -128,7 +137,7 @@ impl TactelState {
             self.force = force;
         }
         self.crept += (force - self.crept) * creep;
-        force * (1.0 - 0.5 * *electronics.hysteresis * self.branch) + *electronics.creep * self.crept
+        force * (1.0 - 0.5 * electronics.hysteresis * self.branch) + electronics.creep * self.crept
     }
 }
 
@@ -138,11 +147,11 @@ mod tests {
 
     fn one(change: impl FnOnce(&mut Electronics)) -> Readout {
         let mut electronics = Electronics {
-            spread: NonNegative(0.0),
-            hysteresis: Ratio(0.0),
-            creep: Ratio(0.0),
-            common_noise: NonNegative(0.0),
-            own_noise: NonNegative(0.0),
+            spread: 0.0,
+            hysteresis: 0.0,
+            creep: 0.0,
+            common_noise: 0.0,
+            own_noise: 0.0,
             ..Electronics::DEFAULT
         };
         change(&mut electronics);
@@ -169,11 +178,11 @@ mod tests {
 
     #[test]
     fn hysteresis_and_creep_raise_the_reading() {
-        let mut readout = one(|e| e.hysteresis = Ratio(0.1));
+        let mut readout = one(|e| e.hysteresis = 0.1);
         for step in 0..=100 {
             read(&mut readout, 0.004, 0.02 * f64::from(step));
         }
-        let up = one(|e| e.hysteresis = Ratio(0.1));
+        let up = one(|e| e.hysteresis = 0.1);
         let up = (0..=50).fold((up, 0.0), |(mut r, _), step| {
             let value = read(&mut r, 0.004, 0.02 * f64::from(step));
             (r, value)
@@ -181,7 +190,7 @@ mod tests {
         let down = (50..100).rev().map(|step| read(&mut readout, 0.004, 0.02 * f64::from(step))).last().unwrap();
         let slope = 1000.0 * (-1.0f64 / 3.0).exp();
         assert!(((down - up.1) / slope - 0.1).abs() < 0.003, "10 % of 1 N: {}", (down - up.1) / slope);
-        let mut readout = one(|e| e.creep = Ratio(0.05));
+        let mut readout = one(|e| e.creep = 0.05);
         let first = read(&mut readout, 0.004, 1.0);
         let last = (0..4000).map(|_| read(&mut readout, 0.02, 1.0)).last().unwrap();
         assert!(((last - first) / slope - 0.05).abs() < 0.003, "{}", (last - first) / slope);
@@ -189,8 +198,7 @@ mod tests {
 
     #[test]
     fn the_noise_has_a_common_and_an_independent_part() {
-        let electronics =
-            Electronics { spread: NonNegative(0.0), hysteresis: Ratio(0.0), creep: Ratio(0.0), ..Electronics::DEFAULT };
+        let electronics = Electronics { spread: 0.0, hysteresis: 0.0, creep: 0.0, ..Electronics::DEFAULT };
         let mut readout = Readout::new(256, electronics, 3);
         let frames: Vec<Vec<f32>> = (0..2000)
             .map(|_| {
@@ -213,7 +221,7 @@ mod tests {
     #[test]
     fn the_serial_number_determines_the_offsets() {
         let counts = |serial, seed| {
-            let electronics = Electronics { serial, own_noise: NonNegative(0.0), ..Electronics::DEFAULT };
+            let electronics = Electronics { serial, own_noise: 0.0, ..Electronics::DEFAULT };
             let mut counts = vec![0.0; 16];
             Readout::new(16, electronics, seed).read(0.004, &[0.0; 16], &mut counts);
             counts

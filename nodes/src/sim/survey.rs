@@ -83,7 +83,6 @@ pub fn measure(objects: &[Object], pad: Pose3, point: Vec3) -> Option<Measured> 
 
 #[cfg(test)]
 mod tests {
-    use tactflow_runtime::node::Positive;
 
     use super::*;
     use crate::sim::object::{ObjectParams, ShapeKind};
@@ -98,7 +97,7 @@ mod tests {
         let round = [object(&ball(0.04, [0.0, 0.0, 0.05]))];
         let measured = measure(&round, Pose3::IDENTITY, Vec3::new(0.0, 0.0, 0.0085)).unwrap();
         assert!((measured.distance - 0.0015).abs() < 1e-12 && measured.path.is_none(), "{measured:?}");
-        let pen = ObjectParams { length: Some(Positive(0.1)), shape: ShapeKind::Pen, ..ball(0.04, [0.0, 0.0, 0.05]) };
+        let pen = ObjectParams { length: Some(0.1), shape: ShapeKind::Pen, ..ball(0.04, [0.0, 0.0, 0.05]) };
         let pen = [object(&pen)];
         let measured = measure(&pen, Pose3::IDENTITY, Vec3::new(0.003, 0.02, 0.01)).unwrap();
         assert!((measured.path.unwrap() - 0.003).abs() < 1e-12, "{measured:?}");

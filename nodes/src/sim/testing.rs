@@ -1,7 +1,5 @@
 //! Objects for tests of the simulation.
 
-use tactflow_runtime::node::{NonNegative, Positive};
-
 use super::object::{ObjectParams, ShapeKind};
 
 /// Returns a rigid, fixed object without a size.
@@ -16,13 +14,13 @@ pub(super) fn thing(shape: ShapeKind, at: [f64; 3]) -> ObjectParams {
         points: None,
         stiffness: None,
         mount: None,
-        mass: Positive(1.0),
-        scatter: NonNegative(0.0),
+        mass: 1.0,
+        scatter: 0.0,
         motion: vec![],
     }
 }
 
 /// Returns a rigid, fixed ball.
 pub(super) fn ball(radius: f64, at: [f64; 3]) -> ObjectParams {
-    ObjectParams { radius: Some(Positive(radius)), ..thing(ShapeKind::Ball, at) }
+    ObjectParams { radius: Some(radius), ..thing(ShapeKind::Ball, at) }
 }

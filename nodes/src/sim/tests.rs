@@ -2,7 +2,6 @@
 
 use nalgebra::{IsometryMatrix3, Vector3};
 use parry3d_f64::math::{Pose3, Vec3};
-use tactflow_runtime::node::{NonNegative, Positive};
 use tactflow_runtime::signal::{ImageShape, Joint as Limits, Unit};
 
 use super::contact::{BodyMotion, Contact};
@@ -31,19 +30,14 @@ fn pad(z: f64) -> BodyMotion {
 
 /// Returns foam without losses.
 fn lossless() -> Foam {
-    Foam {
-        damping: NonNegative(0.0),
-        static_friction: NonNegative(0.0),
-        sliding_friction: NonNegative(0.0),
-        ..Foam::DEFAULT
-    }
+    Foam { damping: 0.0, static_friction: 0.0, sliding_friction: 0.0, ..Foam::DEFAULT }
 }
 
 fn world(arm: SimArm, foam: Foam, things: &[ObjectParams], step: f64) -> World {
     let from = start(&arm);
     let objects = things.iter().map(|thing| Object::new(thing, from, [0.0; 2]).unwrap()).collect();
     let contact = Contact::new(shape(), foam.clone(), 0.001, 8);
-    let imprint = Imprint::new(&shape(), contact.fine(), *foam.spread);
+    let imprint = Imprint::new(&shape(), contact.fine(), foam.spread);
     World::new(arm, objects, contact, imprint, shape(), step)
 }
 
@@ -68,12 +62,9 @@ fn lwr(damping_ratio: f64, friction: f64) -> SimArm {
 #[test]
 fn at_rest_the_prismatic_joint_and_the_foam_balance() {
     let joint = JointDynamics { stiffness: 5000.0, damping_ratio: 1.0, inertia: 2.0, friction: 0.0 };
-    let soft = |stiffness: f64| ObjectParams {
-        stiffness: Some(Positive(stiffness)),
-        ..thing(ShapeKind::Plane, [0.0, 0.0, 0.002])
-    };
-    let mounted =
-        |mount: f64| ObjectParams { mount: Some(Positive(mount)), ..thing(ShapeKind::Plane, [0.0, 0.0, 0.002]) };
+    let soft =
+        |stiffness: f64| ObjectParams { stiffness: Some(stiffness), ..thing(ShapeKind::Plane, [0.0, 0.0, 0.002]) };
+    let mounted = |mount: f64| ObjectParams { mount: Some(mount), ..thing(ShapeKind::Plane, [0.0, 0.0, 0.002]) };
     // Stiffness of the foam of 256 tactels, alone or with a spring in series.
     let foam = 256.0 * 300.0;
     let cases = [
@@ -120,7 +111,7 @@ fn energy_does_not_grow() {
     let ellipsoid =
         ObjectParams { size: Some([0.12, 0.08, 0.06]), ..thing(ShapeKind::Ellipsoid, [0.01, 0.015, 0.035]) };
     let tilted = ObjectParams { turn: [0.3, -0.2, 0.5], ..ellipsoid };
-    let soft = ObjectParams { stiffness: Some(Positive(150.0)), ..ball(0.04, [0.0, 0.0, 0.043]) };
+    let soft = ObjectParams { stiffness: Some(150.0), ..ball(0.04, [0.0, 0.0, 0.043]) };
     let cases = [
         (slide(undamped), lossless(), soft.clone(), true),
         (slide(undamped), Foam::DEFAULT, soft, false),
@@ -223,7 +214,7 @@ fn the_imprint_keeps_the_sum_and_the_centre_of_a_load() {
 
 #[test]
 fn objects_move_smoothly_along_their_script() {
-    let (from_s, to_s) = (NonNegative(1.0), NonNegative(2.0));
+    let (from_s, to_s) = (1.0, 2.0);
     let motion = vec![ScriptedMove { from_s, to_s, by: [0.0, 0.01, 0.0], turn: 1.0 }];
     let mut object = object(&ObjectParams { motion, ..ball(0.04, [0.0, 0.0, 0.05]) });
     // A point of the object, in its own frame.

@@ -8,8 +8,7 @@ use std::collections::BTreeMap;
 use std::fmt::Write;
 use std::ops::Range;
 
-use tactflow_runtime::node::{At, Count, Param, Reader, read_leaf};
-use tactflow_runtime::params;
+use tactflow_runtime::node::{At, Param, Reader, read_leaf};
 use tactflow_runtime::signal::Unit;
 use tactflow_runtime::source::{Item, SourceMap, Value, parse_table};
 
@@ -64,8 +63,9 @@ impl Param for Kind {
     }
 }
 
-params! {
-    Header:
+/// The keys of a calibration file.
+#[derive(Debug, Clone, Param)]
+struct Header {
     /// `calibration`.
     kind: String,
     /// Version of the format.
@@ -73,21 +73,25 @@ params! {
     /// Kind of the curves.
     curve: Kind,
     /// Number of rows.
-    rows: Count,
+    #[param(range = 1..=1_000_000)]
+    rows: usize,
     /// Number of columns.
-    cols: Count,
+    #[param(range = 1..=1_000_000)]
+    cols: usize,
     /// Unit of the readings.
     reading: Unit,
     /// Unit of the forces.
     unit: Unit,
     /// Tactels that give no force, as `[row, column]` from 0.
-    dead: Vec<Later> = Vec::new(),
+    #[param(default = Vec::new())]
+    dead: Vec<Later>,
     /// The other tactels.
     tactels: Vec<Later>,
 }
 
-params! {
-    LinearLine:
+/// A tactel with a linear curve.
+#[derive(Debug, Clone, Param)]
+struct LinearLine {
     /// Row and column, from 0.
     at: [usize; 2],
     /// Unloaded reading [reading].
@@ -96,8 +100,9 @@ params! {
     gain: f64,
 }
 
-params! {
-    RationalLine:
+/// A tactel with a rational curve.
+#[derive(Debug, Clone, Param)]
+struct RationalLine {
     /// Row and column, from 0.
     at: [usize; 2],
     /// Unloaded reading [reading].
@@ -110,8 +115,9 @@ params! {
     most: f64,
 }
 
-params! {
-    PiecewiseLine:
+/// A tactel with a piecewise linear curve.
+#[derive(Debug, Clone, Param)]
+struct PiecewiseLine {
     /// Row and column, from 0.
     at: [usize; 2],
     /// Unloaded reading [reading].
@@ -191,7 +197,7 @@ impl File<'_> {
             return None;
         }
         let header = Header::read(root, &mut self.reader)?;
-        let (rows, cols) = (header.rows.0, header.cols.0);
+        let (rows, cols) = (header.rows, header.cols);
         let mut tactels = BTreeMap::new();
         for Later(value) in &header.dead {
             let at = <[usize; 2]>::read(value, &mut self.reader);

@@ -12,8 +12,7 @@ use std::borrow::Cow;
 use std::time::Duration;
 
 use tactflow_runtime::device::{Description, Device, Driver, Opened};
-use tactflow_runtime::node::{At, FilePath, Mistake, Mistakes, Positive};
-use tactflow_runtime::params;
+use tactflow_runtime::node::{At, FilePath, Mistake, Mistakes, Param};
 use tactflow_runtime::signal::{ImageShape, Joint, JointsShape, Unit};
 use tactflow_runtime::source::Code;
 
@@ -24,17 +23,23 @@ use bridge::{Bridge, Ports};
 use message::{Hello, Sizes};
 use socket::Socket;
 
-params! {
-    /// Where the simulator listens, as `host:port`.
-    address: String = "127.0.0.1:7777".into(),
-    /// How long to try to connect [s].
-    connect_s: Positive = Positive(5.0),
-    /// How long the simulator may be silent when it is its turn [s].
-    reply_s: Positive = Positive(5.0),
-    /// The arm's model; that which the simulator names unless given.
+/// Parameters of `lockstep`.
+#[derive(Debug, Clone, Param)]
+pub struct Params {
+    /// Address of the simulator, `host:port`.
+    #[param(default = "127.0.0.1:7777")]
+    address: String,
+    /// Maximum time to connect.
+    #[param(unit = "s", above = 0.0, default = 5.0)]
+    connect_s: f64,
+    /// Maximum time to wait for a message of the simulator.
+    #[param(unit = "s", above = 0.0, default = 5.0)]
+    reply_s: f64,
+    /// Model of the arm; the one that the simulator names if not given.
     urdf: Option<FilePath>,
-    /// Greatest acceleration of each joint, of which the protocol says nothing [rad/s²].
-    acceleration: Positive = Positive(10.0),
+    /// Maximum acceleration of each joint; it is not part of the protocol.
+    #[param(unit = "rad/s2", above = 0.0, default = 10.0)]
+    acceleration: f64,
 }
 
 /// The device; what runs is a `Bridge`.
@@ -89,7 +94,7 @@ impl Device for Lockstep {
         let line = socket.line().map_err(|why| at(format!("no hello: {why}")))?;
         let hello = message::hello(&line).map_err(|why| at(format!("hello (line 1): {why}")))?;
         let shape = ImageShape { rows: hello.rows, cols: hello.cols, pitch: [hello.pitch; 2], unit: Unit::RAW };
-        let joints = joints(&hello, *params.acceleration);
+        let joints = joints(&hello, params.acceleration);
         let mut description = Description::every((hello.dt * 1e9).round() * 1e-9);
         let mut pad = description.fills("tactile_pad");
         pad.facts(pad_facts(&hello));
@@ -104,7 +109,7 @@ impl Device for Lockstep {
             contact: arm.report("contact"),
         };
         let sizes = Sizes { joints: hello.joints.len(), rows: hello.rows, cols: hello.cols };
-        let bridge = Bridge::new(ports, socket, params.address, sizes, &hello, *params.acceleration);
+        let bridge = Bridge::new(ports, socket, params.address, sizes, &hello, params.acceleration);
         Ok(Opened { description, driver: Driver::Stepped(Box::new(bridge)) })
     }
 }

@@ -1,74 +1,53 @@
-//! How a scripted pad misbehaves.
+//! Faults of a scripted pad.
 
-use tactflow_runtime::node::{NonNegative, Param, Positive, Reader, read_leaf};
-use tactflow_runtime::params;
-use tactflow_runtime::source::Value;
+use tactflow_runtime::node::Param;
 
 use crate::devices::nanos;
 
-/// A way to misbehave.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+/// A kind of fault.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Param)]
 pub enum Trouble {
-    /// The last frame comes again and again, under its old sequence number.
+    /// The last frame is repeated with its old sequence number.
     Repeat,
-    /// The last frame comes again and again, under new sequence numbers and stamps: a stuck sensor.
+    /// The last frame is repeated with new sequence numbers and stamps: a stuck sensor.
     Freeze,
-    /// No frame comes.
+    /// There is no frame.
     Silence,
-    /// One cell is not a number.
+    /// One tactel is not a number.
     Nan,
-    /// The stamps lie before those that were.
+    /// The stamps go back in time.
     Back,
-    /// The device fails, and a plug that was out does not come back by itself.
+    /// The device fails, and does not recover.
     Unplug,
 }
 
-const TROUBLES: [(&str, Trouble); 6] = [
-    ("repeat", Trouble::Repeat),
-    ("freeze", Trouble::Freeze),
-    ("silence", Trouble::Silence),
-    ("nan", Trouble::Nan),
-    ("back", Trouble::Back),
-    ("unplug", Trouble::Unplug),
-];
-
-impl Param for Trouble {
-    const EXPECTS: &'static str = "`repeat`, `freeze`, `silence`, `nan`, `back` or `unplug`";
-
-    fn read(value: &Value, reader: &mut Reader<'_>) -> Option<Self> {
-        let name: String = read_leaf(value, reader, Self::EXPECTS)?;
-        let found = TROUBLES.iter().find(|(trouble, _)| *trouble == name).map(|(_, trouble)| *trouble);
-        if found.is_none() {
-            reader.wrong_type(value, Self::EXPECTS);
-        }
-        found
-    }
-}
-
-params! {
-    Glitch:
-    /// When it begins [s].
-    at_s: NonNegative,
-    /// How long it lasts [s].
-    for_s: Positive,
-    /// What goes wrong.
-    kind: Trouble,
+/// A fault that lasts for a while.
+#[derive(Debug, Clone, Param)]
+pub struct Glitch {
+    /// Begin.
+    #[param(unit = "s", range = 0.0..)]
+    pub(crate) at_s: f64,
+    /// Duration.
+    #[param(unit = "s", above = 0.0)]
+    pub(crate) for_s: f64,
+    /// Kind of the fault.
+    pub(crate) kind: Trouble,
 }
 
 impl Glitch {
-    /// When it begins [ns].
+    /// Returns the begin [ns].
     #[must_use]
     pub fn start(&self) -> i64 {
-        nanos(*self.at_s)
+        nanos(self.at_s)
     }
 
-    /// When it is over [ns].
+    /// Returns the end [ns].
     #[must_use]
     pub fn end(&self) -> i64 {
-        self.start().saturating_add(nanos(*self.for_s))
+        self.start().saturating_add(nanos(self.for_s))
     }
 
-    /// Whether it is on at `time` [ns].
+    /// Returns whether the fault is active at `time` [ns].
     #[must_use]
     pub fn holds_at(&self, time: i64) -> bool {
         (self.start()..self.end()).contains(&time)

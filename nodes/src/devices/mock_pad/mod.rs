@@ -10,8 +10,7 @@ mod press;
 use std::borrow::Cow;
 
 use tactflow_runtime::device::{Commands, Description, Device, DeviceError, Driver, Opened, Output, Samples, Stepped};
-use tactflow_runtime::node::{Count, Mistake, Mistakes, NonNegative, Positive, Rate};
-use tactflow_runtime::params;
+use tactflow_runtime::node::{Mistake, Mistakes, Param};
 use tactflow_runtime::signal::{Image, ImageShape, Unit};
 
 use super::{nanos, period_of};
@@ -19,31 +18,43 @@ use super::{nanos, period_of};
 pub use glitch::{Glitch, Trouble};
 pub use press::Press;
 
-params! {
+/// Parameters of `mock_pad`.
+#[derive(Debug, Clone, Param)]
+pub struct Params {
     /// Number of rows.
-    rows: Count = Count(16),
+    #[param(range = 1..=1_000_000, default = 16)]
+    rows: usize,
     /// Number of columns.
-    cols: Count = Count(16),
-    /// Distance between the centres of two neighbours, along x and along y [m].
-    pitch: Positive = Positive(0.005),
+    #[param(range = 1..=1_000_000, default = 16)]
+    cols: usize,
+    /// Distance between the centres of neighbouring tactels, along x and along y.
+    #[param(unit = "m", above = 0.0, default = 0.005)]
+    pitch: f64,
     /// Unit of a tactel's value.
-    unit: Unit = Unit::NEWTON,
-    /// Frames per second [1/s].
-    rate_hz: Rate = Rate(250.0),
-    /// How long there are frames; for ever unless given [s].
-    for_s: Option<Positive>,
-    /// What presses on it.
-    press: Vec<Press> = vec![],
-    /// When it misbehaves, and how.
-    glitch: Vec<Glitch> = vec![],
-    /// What it states as its noise threshold [unit of a tactel].
-    threshold: NonNegative = NonNegative(0.015),
-    /// What it states as the unit of pressure, the p = 1 of the paper [unit of a tactel per tactel].
-    pressure: Positive = Positive(0.1),
+    #[param(default = Unit::NEWTON)]
+    unit: Unit,
+    /// Frames per second.
+    #[param(unit = "1/s", range = 0.001..=1e6, default = 250.0)]
+    rate_hz: f64,
+    /// Duration of the frames; unlimited if not given.
+    #[param(unit = "s", above = 0.0)]
+    for_s: Option<f64>,
+    /// Presses on the pad.
+    #[param(default = vec![])]
+    press: Vec<Press>,
+    /// Faults of the pad.
+    #[param(default = vec![])]
+    glitch: Vec<Glitch>,
+    /// Noise threshold that the pad states as a fact.
+    #[param(unit = "$unit", range = 0.0.., default = 0.015)]
+    threshold: f64,
+    /// Unit of pressure that the pad states as a fact, per tactel: p = 1 in the paper.
+    #[param(unit = "$unit", above = 0.0, default = 0.1)]
+    pressure: f64,
 }
 
-/// The most tactels that a pad has.
-const MOST: usize = 1 << 22;
+/// Maximum number of tactels of a pad.
+const MAX_TACTELS: usize = 1 << 22;
 
 /// The script and how far it has got.
 #[derive(Debug)]
@@ -101,18 +112,17 @@ impl Device for MockPad {
 
     fn open(params: Params) -> Result<Opened, Mistakes> {
         let mut mistakes = Mistakes::new();
-        if params.rows.0 * params.cols.0 > MOST {
-            let message = format!("{} by {} tactels are more than {MOST}", params.rows.0, params.cols.0);
+        if params.rows * params.cols > MAX_TACTELS {
+            let message = format!("{} by {} tactels are more than {MAX_TACTELS}", params.rows, params.cols);
             mistakes.push(Mistake::param("rows", message));
         }
-        let wrong = params.press.iter().filter_map(|press| press.mistake(*params.pitch));
+        let wrong = params.press.iter().filter_map(|press| press.mistake(params.pitch));
         mistakes.extend(wrong.map(|message| Mistake::param("press", message)));
         let period = period_of(params.rate_hz);
         if !mistakes.is_empty() {
             return Err(mistakes);
         }
-        let shape =
-            ImageShape { rows: params.rows.0, cols: params.cols.0, pitch: [*params.pitch; 2], unit: params.unit };
+        let shape = ImageShape { rows: params.rows, cols: params.cols, pitch: [params.pitch; 2], unit: params.unit };
         let mut description = Description::every(period as f64 * 1e-9);
         let mut pad = description.fills("tactile_pad");
         pad.facts(facts(&params));
@@ -127,15 +137,15 @@ fn facts(params: &Params) -> Vec<(Cow<'static, str>, toml::Value)> {
     let calibration = toml::Table::from_iter([("gain".to_owned(), 1.0.into())]);
     vec![
         ("dead".into(), toml::Value::Array(vec![])),
-        ("threshold".into(), (*params.threshold).into()),
-        ("pressure".into(), (*params.pressure).into()),
+        ("threshold".into(), params.threshold.into()),
+        ("pressure".into(), params.pressure.into()),
         ("calibration".into(), calibration.into()),
     ]
 }
 
 impl MockPad {
     fn new(image: Output<Image>, shape: ImageShape, period: i64, params: Params) -> Self {
-        let end = params.for_s.map_or(i64::MAX, |end| nanos(*end));
+        let end = params.for_s.map_or(i64::MAX, |end| nanos(end));
         let frames = end / period + i64::from(end % period != 0);
         let mut pad = Self {
             image,

@@ -176,10 +176,10 @@ fn bad_settings() {
         ("rows = 100000\ncols = 100000", "100000 by 100000 tactels are more than"),
         ("press = [{ radius = 0.001 }]", "a bump of radius 0.001 m falls between tactels that are 0.005 m apart"),
         ("press = [{ radius = 9 }]", "a bump of 18 m is wider than 256 tactels"),
-        ("rate_hz = 1e9", "expected a rate from 0.001"),
+        ("rate_hz = 1e9", "expected a number from 0.001"),
         (
             "glitch = [{ at_s = 0, for_s = 1, kind = 'sulk' }]",
-            "expected `repeat`, `freeze`, `silence`, `nan`, `back` or `unplug`, found",
+            "expected one of `repeat`, `freeze`, `silence`, `nan`, `back`, `unplug`, found",
         ),
         ("glitch = [{ at_s = -1, for_s = 1, kind = 'nan' }]", "expected a number, 0 or more"),
     ];

@@ -1,4 +1,4 @@
-//! `joint_limit` against an arm that integrates exactly, at once or a tick late, and that somebody may hold.
+//! `joint_limit` with an arm that integrates exactly, at once or one tick late, and that can be held.
 
 use proptest::prelude::*;
 use tactflow_runtime::harness::NodeRig;
@@ -46,16 +46,16 @@ fn velocity(rig: &NodeRig) -> Option<Vec<f64>> {
     rig.get::<Joints>("velocity").map(|velocity| velocity.0.to_vec())
 }
 
-/// What somebody wants, for a while.
+/// The wanted velocities of some ticks.
 #[derive(Debug, Clone)]
 struct Phase {
-    /// No velocity at all comes; or one that is too old.
+    /// The velocity is absent, or too old.
     is_absent: bool,
     is_old: bool,
-    /// Somebody holds the arm, if it is a compliant one.
+    /// The arm is held in place.
     is_held: bool,
     wanted: [f64; 3],
-    /// The ticks take these times in turn [ms].
+    /// Durations of the ticks, in turn [ms].
     ticks: [f64; 3],
     count: usize,
 }
@@ -76,7 +76,7 @@ fn phase() -> impl Strategy<Value = Phase> {
     )
 }
 
-/// An arm of three joints whose commands act `late` ticks after they came.
+/// An arm of three joints; with `late` a command acts one tick after it arrives.
 struct Plant {
     position: [f64; 3],
     equilibrium: [f64; 3],
@@ -98,7 +98,7 @@ impl Plant {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(300))]
     #[test]
-    fn nothing_random_makes_it_cross_a_limit(
+    fn no_random_input_makes_it_cross_a_limit(
         start in prop::array::uniform3(-1.0..0.8f64),
         accelerations in prop::array::uniform3(0.5..20.0f64),
         lead_rad in 0.01..0.5f64,
@@ -140,7 +140,7 @@ proptest! {
     }
 
     #[test]
-    fn far_from_everything_the_direction_stays(
+    fn far_from_every_limit_the_direction_stays(
         wanted in prop::array::uniform3(-9.0..9.0f64), ticks in 1..400usize,
     ) {
         let mut rig = rig("lead_rad = 9.0", &[1.0, 5.0, 9.0]);
@@ -158,25 +158,25 @@ proptest! {
 }
 
 #[test]
-fn what_a_joint_may_do() {
+fn the_allowed_velocities_of_a_joint() {
     let joint = Joint { name: String::new(), lower: -1.0, upper: 1.0, speed: 2.0, acceleration: 5.0 };
     // With τ = 0.2 s and 5 rad/s² a stop from 1 rad/s takes 0.3 rad.
     let cases = [
         ((0.0, 0.0, 0.0), 9.0, (-2.0, 2.0), "in the middle: its speed"),
         ((0.7, 0.7, 0.0), 9.0, (-2.0, 1.0), "toward the upper end"),
-        ((0.6, 0.6, 1.0), 9.0, (-2.0, 1.0), "what the last command may still travel is taken off"),
-        ((0.7, 0.7, -1.0), 9.0, (-2.0, 1.0), "but not when it leads away"),
+        ((0.6, 0.6, 1.0), 9.0, (-2.0, 1.0), "the distance that the last command may still travel is subtracted"),
+        ((0.7, 0.7, -1.0), 9.0, (-2.0, 1.0), "but not when it moves away"),
         ((0.5, 0.7, 0.0), 9.0, (-2.0, 1.0), "an equilibrium ahead has less room"),
         ((-0.7, -0.7, 0.0), 9.0, (-1.0, 2.0), "toward the lower end"),
-        ((1.2, 1.2, 0.0), 9.0, (-2.0, 0.0), "past its end it may only move back"),
-        ((1.0, -1.0, 0.0), 9.0, (0.0, 0.0), "and not at all where both are at an end"),
-        ((-0.2, 0.0, 0.0), 0.5, (-1.828427125, 1.0), "the lead has a bound"),
-        ((0.2, 0.0, 0.0), 0.5, (-1.0, 1.828427125), "the other way around"),
-        ((0.0, 0.6, 0.0), 0.5, (-2.0, 0.0), "past it it may only shrink"),
+        ((1.2, 1.2, 0.0), 9.0, (-2.0, 0.0), "beyond its end it can only move back"),
+        ((1.0, -1.0, 0.0), 9.0, (0.0, 0.0), "and not at all when both are at an end"),
+        ((-0.2, 0.0, 0.0), 0.5, (-1.828427125, 1.0), "toward the bound of the lead"),
+        ((0.2, 0.0, 0.0), 0.5, (-1.0, 1.828427125), "and in the other direction"),
+        ((0.0, 0.6, 0.0), 0.5, (-2.0, 0.0), "beyond its bound the lead can only shrink"),
     ];
-    for ((q, equilibrium, last), lead, (least, greatest), what) in cases {
+    for ((q, equilibrium, last), lead, (min, max), what) in cases {
         let got = room(&joint, q, equilibrium, lead, last, 0.1).all();
-        assert!((got.0 - least).abs() < 1e-9 && (got.1 - greatest).abs() < 1e-9, "{what}: {got:?}");
+        assert!((got.0 - min).abs() < 1e-9 && (got.1 - max).abs() < 1e-9, "{what}: {got:?}");
     }
     let endless = Joint { lower: f64::NEG_INFINITY, upper: f64::INFINITY, ..joint };
     assert_eq!(room(&endless, 1e300, -1e300, 1e308, 0.0, 0.1).all(), (-2.0, 2.0));
@@ -185,7 +185,7 @@ fn what_a_joint_may_do() {
 #[test]
 fn a_joint_without_room_to_brake_with_the_others_brakes_by_itself() {
     let shape = arm(&[0.5, 10.0]).joints;
-    let free = |joint: &Joint| Interval::from((-joint.speed, joint.speed));
+    let free = |joint: &Joint| Range::from((-joint.speed, joint.speed));
     let rooms = [0, 1].map(|i| Room { speed: free(&shape[i]), position: free(&shape[i]), lead: free(&shape[i]) });
     let mut last = [1.0, 1.0];
     let share = follow(&shape, 0.01, &[0.0, 0.0], &rooms, &mut last);
@@ -201,7 +201,7 @@ fn a_joint_without_room_to_brake_with_the_others_brakes_by_itself() {
 }
 
 #[test]
-fn nothing_fresh_ramps_to_zero_and_is_absent_then() {
+fn without_fresh_inputs_the_output_ramps_to_zero_and_is_absent_then() {
     type Spoil = fn(&mut NodeRig, Stamp);
     let spoils: [(&str, Spoil); 4] = [
         ("the velocity is lost", |rig, _| rig.lose("velocity")),
@@ -220,7 +220,7 @@ fn nothing_fresh_ramps_to_zero_and_is_absent_then() {
             rig.step();
         }
         assert_eq!(velocity(&rig).unwrap(), [0.1, -0.05], "{what}");
-        // At 10 rad/s² the faster joint takes ten ticks of a millisecond, and the other comes along.
+        // At 10 rad/s² the faster joint takes ten ticks of a millisecond, and the other keeps the direction.
         for tick in 1..=13 {
             fresh(&mut rig);
             let old = Stamp { nanos: rig.tick.now - 6 * MS, device: 0 };
@@ -228,7 +228,7 @@ fn nothing_fresh_ramps_to_zero_and_is_absent_then() {
             rig.step();
             let left = (1.0 - 0.1 * f64::from(tick)).max(0.0);
             let given = velocity(&rig);
-            // Rounding may leave the end of the ramp to the tick after.
+            // Rounding may move the end of the ramp to the next tick.
             assert_eq!(given.is_none(), tick > 11 || (tick == 11 && given.is_none()), "{what}, tick {tick}");
             let given = given.unwrap_or(vec![0.0; 2]);
             assert!((given[0] - 0.1 * left).abs() < 1e-12, "{what}, tick {tick}: {given:?}");
@@ -236,12 +236,12 @@ fn nothing_fresh_ramps_to_zero_and_is_absent_then() {
         }
         fresh(&mut rig);
         rig.step();
-        assert!((velocity(&rig).unwrap()[0] - 0.01).abs() < 1e-12, "{what}: it resumes, no faster than it may");
+        assert!((velocity(&rig).unwrap()[0] - 0.01).abs() < 1e-12, "{what}: it resumes within its acceleration");
     }
 }
 
 #[test]
-fn without_the_arm_there_is_no_command_at_once() {
+fn without_the_arm_the_command_is_absent_at_once() {
     let mut rig = rig("lead_rad = 0.5", &[10.0]);
     for _ in 0..3 {
         place(&mut rig, &[0.0], &[0.0]);
@@ -254,9 +254,9 @@ fn without_the_arm_there_is_no_command_at_once() {
 }
 
 #[test]
-fn the_shares_say_what_limits() {
+fn the_fractions_show_which_limit_acts() {
     let share = |rig: &NodeRig, name: &str| *rig.get::<f64>(name).unwrap();
-    // (position, equilibrium, wanted), then the shares by lead, position and speed.
+    // (position, equilibrium, wanted), then the fractions of the lead, the position and the speed.
     let cases = [
         ((0.0, 0.0, 1.0), [1.0, 1.0, 1.0], "nothing"),
         ((0.0, 0.0, 2.5), [1.0, 1.0, 0.6], "speed"),
@@ -281,7 +281,7 @@ fn the_shares_say_what_limits() {
 }
 
 #[test]
-fn a_share_of_the_speed_and_the_narrowest_of_what_is_said() {
+fn the_narrowest_of_all_stated_limits_applies() {
     let JointsShape { joints, .. } = arm(&[10.0]);
     let model = Joint { lower: -0.5, upper: 2.0, speed: 1.0, acceleration: f64::INFINITY, ..joints[0].clone() };
     let velocity = JointsShape { joints: vec![model], unit: Unit::RADIAN.per_second() };
@@ -299,8 +299,7 @@ fn bad_settings() {
     let unknown = wires(&arm(&[f64::INFINITY]));
     let other = wires(&arm(&[10.0, 10.0]))[1].clone();
     let cases = [
-        ("lead_rad = 0.1", &unknown[..], At::Node, "the arm states no greatest acceleration of joint `j0`"),
-        ("lead_rad = 0.1", &known[1..], At::Node, "`joint_limit` needs `in.velocity`, joint velocities"),
+        ("lead_rad = 0.1", &unknown[..], At::Node, "the arm states no maximum acceleration of joint `j0`"),
         (
             "lead_rad = 0.1",
             &[known[0].clone(), other, known[2].clone()],

@@ -25,29 +25,29 @@ pub(super) fn check(params: &Params, shape: &ImageShape) -> Result<(), Mistakes>
             format!("{} by {} tactels are more than the {MAX_TACTELS} that can be simulated", shape.rows, shape.cols);
         mistakes.push(Mistake::param("rows", message));
     }
-    let points = (*params.pitch / *params.points_apart).ceil().max(1.0).powi(2) * shape.tactels() as f64;
+    let points = (params.pitch / params.points_apart).ceil().max(1.0).powi(2) * shape.tactels() as f64;
     if points > MAX_POINTS {
-        let (apart, pitch) = (*params.points_apart, *params.pitch);
+        let (apart, pitch) = (params.points_apart, params.pitch);
         let message = format!("a pitch of {pitch} m with points {apart} m apart needs more than {MAX_POINTS} points");
         mistakes.push(Mistake::param("pitch", message));
     }
-    if *params.latency_s * *params.rate_hz > MAX_LATENCY_FRAMES {
+    if params.latency_s * params.rate_hz > MAX_LATENCY_FRAMES {
         mistakes.push(Mistake::param("latency_s", format!("the latency must be at most {MAX_LATENCY_FRAMES} frames")));
     }
     let foam = &params.foam;
-    if *foam.damping > 10.0 {
+    if foam.damping > 10.0 {
         mistakes.push(Mistake::param("foam.damping", "the damping under a tactel must be at most 10 N s/m"));
     }
-    if !(0.0002..=0.05).contains(&*foam.spread) {
+    if !(0.0002..=0.05).contains(&foam.spread) {
         mistakes.push(Mistake::param("foam.spread", "the spread must be from 0.0002 to 0.05 m"));
     }
-    if *foam.static_friction < *foam.sliding_friction {
+    if foam.static_friction < foam.sliding_friction {
         mistakes.push(Mistake::param("foam.static_friction", "static friction must not be less than sliding friction"));
     }
-    if !(0.0001..=0.001).contains(&*params.points_apart) {
+    if !(0.0001..=0.001).contains(&params.points_apart) {
         mistakes.push(Mistake::param("points_apart", "points must be from 0.0001 to 0.001 m apart"));
     }
-    if !(1e-6..=0.002).contains(&*params.step_s) {
+    if !(1e-6..=0.002).contains(&params.step_s) {
         mistakes.push(Mistake::param("step_s", "the step must be from 1e-6 to 0.002 s"));
     }
     if let Some(inertia) = &params.inertia {
@@ -69,23 +69,23 @@ pub(super) fn check(params: &Params, shape: &ImageShape) -> Result<(), Mistakes>
 /// Checks that every spring is slow enough for the steps: a faster one gains energy, and the simulation diverges.
 fn check_motion(params: &Params) -> Result<(), Mistakes> {
     let mut mistakes = Mistakes::new();
-    let dt = *params.step_s;
+    let dt = params.step_s;
     for (i, thing) in params.objects.iter().enumerate() {
         let Some(mount) = thing.mount else { continue };
-        let rate = *mount / *thing.mass;
+        let rate = mount / thing.mass;
         if !is_resolved(rate, 2.0 * MOUNT_DAMPING * rate.sqrt(), dt) {
             let message =
-                format!("a mount of {} N/m under {} kg oscillates too fast for steps of {dt} s", *mount, *thing.mass);
+                format!("a mount of {} N/m under {} kg oscillates too fast for steps of {dt} s", mount, thing.mass);
             mistakes.push(object(i, message));
         }
     }
     let inertia = params.inertia.as_deref().unwrap_or(&INERTIA);
     let min_inertia = inertia.iter().copied().fold(f64::INFINITY, f64::min);
-    let rate = *params.stiffness / min_inertia;
+    let rate = params.stiffness / min_inertia;
     let parts = [
         ("stiffness", rate, 0.0),
-        ("damping_ratio", 0.0, 2.0 * *params.damping_ratio * rate.sqrt()),
-        ("friction", *params.friction / MAX_STRAIN / min_inertia, 0.0),
+        ("damping_ratio", 0.0, 2.0 * params.damping_ratio * rate.sqrt()),
+        ("friction", params.friction / MAX_STRAIN / min_inertia, 0.0),
     ];
     for (name, _, _) in parts.iter().filter(|(_, stiffness, damping)| !is_resolved(*stiffness, *damping, dt)) {
         let message = format!("a joint of {min_inertia} kg m² moves too fast for steps of {dt} s");
