@@ -70,14 +70,14 @@ impl<'p> CurveParams<'p> {
 
     /// Returns the curves for an image.
     pub(super) fn curves(&self, image: &ImageShape) -> Result<Curves, Mistakes> {
-        let Some(path) = self.file else { return self.from_numbers(image) };
+        let Some(path) = self.file else { return self.read_numbers(image) };
         let numbers = [("offset", self.offset.is_some()), ("gain", self.gain.is_some()), ("unit", self.unit.is_some())];
         let excluded = numbers.into_iter().filter(|(_, is_set)| *is_set).map(|(name, _)| {
             let mistake = Mistake::key(self.at(name), format!("`{name}` and `file` exclude each other"));
             mistake.help(format!("the file has its own: leave out `{name}`, or `file`"))
         });
         let mut mistakes: Mistakes = excluded.collect();
-        let curves = self.from_file(path, image).map_err(|others| mistakes.extend(others)).ok();
+        let curves = self.read_file(path, image).map_err(|others| mistakes.extend(others)).ok();
         curves.filter(|_| mistakes.is_empty()).ok_or(mistakes)
     }
 
@@ -86,7 +86,7 @@ impl<'p> CurveParams<'p> {
     }
 
     /// Returns straight lines.
-    fn from_numbers(&self, image: &ImageShape) -> Result<Curves, Mistakes> {
+    fn read_numbers(&self, image: &ImageShape) -> Result<Curves, Mistakes> {
         let mut mistakes = Mistakes::new();
         let offset = spread(&self.at("offset"), self.offset.unwrap_or(&PerTactel::All(0.0)), image, &mut mistakes);
         let gain = spread(&self.at("gain"), self.gain.unwrap_or(&PerTactel::All(1.0)), image, &mut mistakes);
@@ -97,7 +97,7 @@ impl<'p> CurveParams<'p> {
     }
 
     /// Returns the curves of a calibration file.
-    fn from_file(&self, path: &FilePath, image: &ImageShape) -> Result<Curves, Mistakes> {
+    fn read_file(&self, path: &FilePath, image: &ImageShape) -> Result<Curves, Mistakes> {
         let bytes = path.bytes()?;
         let text = String::from_utf8_lossy(&bytes);
         let calibration = file::read(&text).map_err(|flaws| {

@@ -63,6 +63,7 @@ pub struct Params {
     #[param(unit = "U")]
     offset: Option<PerTactel>,
     /// Slope of the line, in units of the output per unit of the input: a number for all, or a list of rows; 1 without it.
+    #[param(unit = "1")]
     gain: Option<PerTactel>,
     /// Unit of the calibrated image; without it, the unit of the input.
     unit: Option<String>,
@@ -92,6 +93,7 @@ struct DeviceParams {
     #[param(unit = "U")]
     offset: Option<PerTactel>,
     /// Slope of the line, in units of the output per unit of the input: a number for all, or a list of rows; 1 without it.
+    #[param(unit = "1")]
     gain: Option<PerTactel>,
     /// Unit of the calibrated image; without it, the unit of the input.
     unit: Option<String>,

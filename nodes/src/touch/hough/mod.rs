@@ -143,12 +143,12 @@ impl Node for Hough {
         for (score, direction) in scores.iter_mut().zip(&self.directions) {
             *score = self.vote(tactels, *direction, votes).1;
         }
-        let least = scores.iter().copied().fold(f64::INFINITY, f64::min);
+        let lowest = scores.iter().copied().fold(f64::INFINITY, f64::min);
         let (best, shift) = peak(scores);
         if scores[best] <= 0.0 {
             return;
         }
-        let strength = 1.0 - least / scores[best];
+        let strength = 1.0 - lowest / scores[best];
         out.strength.set(strength);
         if strength > 0.0 && strength >= self.min_strength {
             let (sine, cosine) = libm::sincos((best as f64 + shift) * PI / scores.len() as f64);

@@ -12,11 +12,11 @@ pub fn nearest(
     min_area: usize,
     min_force: f64,
 ) -> Option<usize> {
-    let (mut nearest, mut least) = (None, f64::INFINITY);
+    let (mut nearest, mut smallest) = (None, f64::INFINITY);
     for (i, (region, centroid)) in regions.iter().zip(centroids).enumerate() {
         let distance = distance_squared(*centroid, position);
-        if distance < least && region.area as usize >= min_area && region.force >= min_force {
-            (nearest, least) = (Some(i), distance);
+        if distance < smallest && region.area as usize >= min_area && region.force >= min_force {
+            (nearest, smallest) = (Some(i), distance);
         }
     }
     nearest

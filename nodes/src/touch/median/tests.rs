@@ -4,7 +4,6 @@ use std::f64::consts::{FRAC_PI_2, PI};
 
 use proptest::prelude::*;
 use tactflow_runtime::harness::NodeRig;
-use tactflow_runtime::node::At;
 use tactflow_runtime::signal::{Freshness, ScalarShape, Unit};
 
 use super::*;
@@ -80,10 +79,7 @@ fn a_held_value_counts_once_and_the_window_survives_flicker() {
 #[test]
 fn empty_and_too_long_windows_are_refused() {
     let long = built("window = 256", Unit::NEWTON).err().unwrap();
-    assert_eq!(
-        (&long[0].at, long[0].message.as_str()),
-        (&At::Param("window".into()), "expected a whole number from 1 to 255, found the integer 256")
-    );
+    assert_eq!(long[0].message, "expected a whole number from 1 to 255, found 256");
     assert!(built("window = 0", Unit::NEWTON).is_err() && built("window = 255", Unit::NEWTON).is_ok());
 }
 
