@@ -29,9 +29,6 @@
 //! # Ok::<(), tactflow_runtime::fault::Fault>(())
 //! ```
 
-#[macro_use]
-mod words;
-
 pub mod arm;
 pub mod builtin;
 pub mod calibration;
@@ -49,9 +46,7 @@ mod tool;
 pub mod touch;
 
 use tactflow_runtime::catalogue::Catalogue;
-use tactflow_runtime::node::{At, Mistake};
 use tactflow_runtime::signal::{Scalar, Twist};
-use tactflow_runtime::source::Code;
 
 #[cfg(feature = "cli")]
 pub use tool::tool;
@@ -117,10 +112,4 @@ pub fn catalogue() -> Catalogue {
         .node::<flow::delay::Delay<Twist>>()
         .node::<flow::signal_generator::SignalGenerator>()
         .node::<flow::probe::Probe>()
-}
-
-/// An input that may be absent, but is of no use when nothing is wired to it.
-fn unwired(node: &str, input: &str, kind: &str, example: &str) -> Mistake {
-    let message = format!("`{node}` needs `in.{input}`, {kind}");
-    Mistake::new(Code::MissingInput, At::Node, message).help(format!("add `in.{input} = \"{example}\"`"))
 }

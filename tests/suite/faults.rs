@@ -8,9 +8,8 @@ use tactflow_runtime::engine::{End, Engine, RunOptions, run};
 use tactflow_runtime::fault::Cause;
 use tactflow_runtime::graph::compile;
 use tactflow_runtime::harness::GraphRig;
-use tactflow_runtime::node::{Mistakes, Node, Setup, Tick};
-use tactflow_runtime::node::{ParamSpec, Reader};
-use tactflow_runtime::signal::Freshness;
+use tactflow_runtime::node::{Describe, In, Inputs, Mistakes, Node, ParamSpec, Reader, Setup, Tick};
+use tactflow_runtime::signal::{Freshness, Scalar};
 use tactflow_runtime::source::Value;
 use tactflow_tests::nodes::length_by_hand;
 use tactflow_tests::{catalogue, on_the_mock_bench};
@@ -57,40 +56,41 @@ fn a_sample_that_is_not_finite_is_a_fault_of_its_role() {
     assert_eq!((fault.node.as_str(), fault.port.as_deref(), fault.tick), ("a", Some("value"), 1));
 }
 
-/// A node that gives nothing, and panics in the third tick.
+/// Has no outputs, and panics in the third tick.
+///
+/// ```toml
+/// [nodes.mute]
+/// type = "mute"
+/// in.value = "ruler.value"
+/// ```
+#[derive(Describe)]
+#[describe(name = "mute")]
 struct Mute;
 
-impl tactflow_runtime::node::Describe for Mute {
-    const NAME: &'static str = "mute";
-    const SUMMARY: &'static str = "gives nothing, and panics once";
+/// What `mute` reads.
+#[derive(Inputs)]
+struct MuteInputs<'a> {
+    /// A length.
+    #[port(unit = "m", frame = "_")]
+    #[expect(dead_code, reason = "the node only panics")]
+    value: In<'a, Scalar>,
 }
 
 impl Node for Mute {
-    type Params = mute::Params;
-    type Inputs<'a> = mute::Inputs<'a>;
-    type Outputs = mute::Outputs;
+    type Params = ();
+    type Inputs<'a> = MuteInputs<'a>;
+    type Outputs = ();
     type State = ();
 
-    fn new(_: mute::Params, _: &mut Setup<Self>) -> Result<Self, Mistakes> {
+    fn new((): (), _: &mut Setup<Self>) -> Result<Self, Mistakes> {
         Ok(Self)
     }
 
     fn state(&self) {}
 
-    fn step(&self, tick: &Tick, _: mute::Inputs<'_>, _: &mut mute::Outputs, (): &mut ()) {
+    fn step(&self, tick: &Tick, _: MuteInputs<'_>, (): &mut (), (): &mut ()) {
         assert!(tick.index != 3, "as told");
     }
-}
-
-mod mute {
-    use tactflow_runtime::{inputs, outputs, params};
-
-    params! {}
-    inputs! {
-        /// What it looks at.
-        value: Scalar["m"],
-    }
-    outputs! {}
 }
 
 #[test]

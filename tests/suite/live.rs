@@ -98,16 +98,14 @@ impl tactflow_runtime::node::Describe for Brittle {
 }
 
 impl Device for Brittle {
-    type Params = Empty;
+    type Params = ();
 
-    fn open(_: Empty) -> Result<Opened, Mistakes> {
+    fn open((): ()) -> Result<Opened, Mistakes> {
         let mut description = Description::every(0.01);
         description.fills("length").output::<Scalar>("value", ScalarShape::of(Unit::METRE));
         Ok(Opened { description, driver: Driver::Live(Box::new(Self)) })
     }
 }
-
-tactflow_runtime::params! { Empty: }
 
 #[test]
 fn a_driver_that_panics_is_a_fault_of_its_device() {

@@ -1,14 +1,17 @@
 //! The pose of the sensor on the tip of an arm.
 
 use nalgebra::{IsometryMatrix3, Matrix3, Rotation3, Translation3};
-use tactflow_runtime::params;
+use tactflow_runtime::node::Param;
 
-params! {
-    Mount:
-    /// Origin of the sensor's frame in the frame of the tip [m].
-    xyz: [f64; 3] = [0.0; 3],
-    /// Roll, pitch and yaw of the sensor's frame in the frame of the tip: Rz(yaw) Ry(pitch) Rx(roll), as in a URDF [rad].
-    rpy: [f64; 3] = [0.0; 3],
+/// Where the sensor's frame is in the frame of the tip.
+#[derive(Debug, Clone, Param)]
+pub struct Mount {
+    /// Origin of the sensor's frame in the frame of the tip.
+    #[param(unit = "m", default = [0.0; 3])]
+    pub xyz: [f64; 3],
+    /// Roll, pitch and yaw of the sensor's frame in the frame of the tip: Rz(yaw) Ry(pitch) Rx(roll), as in a URDF.
+    #[param(unit = "rad", default = [0.0; 3])]
+    pub rpy: [f64; 3],
 }
 
 impl Mount {

@@ -4,38 +4,38 @@ use std::time::Instant;
 
 use async_trait::async_trait;
 use tactflow_runtime::device::{Description, Device, DeviceError, Driver, Link, Live, Opened, Output};
-use tactflow_runtime::node::Mistakes;
-use tactflow_runtime::params;
+use tactflow_runtime::node::{Describe, Mistakes, Param};
 use tactflow_runtime::signal::{Scalar, ScalarShape, Unit};
 use tokio::io::{AsyncBufReadExt, BufReader};
 use tokio::net::TcpStream;
 
-params! {
-    /// Where the numbers come from.
+/// Parameters of `line_length`.
+#[derive(Debug, Clone, Param)]
+pub struct Params {
+    /// Address of the peer that sends the numbers.
     address: String,
 }
 
-/// The connection that will be made.
+/// A length from a TCP connection, one number a line.
+///
+/// Each line is a length in metres. It runs in real time.
+///
+/// ```toml
+/// [roles]
+/// length = "length"
+///
+/// [bind]
+/// length = "ruler"
+///
+/// [devices.ruler]
+/// type = "line_length"
+/// address = "127.0.0.1:4000"
+/// ```
+#[derive(Describe)]
+#[describe(name = "line_length")]
 pub struct LineLength {
     address: String,
     value: Output<Scalar>,
-}
-
-impl tactflow_runtime::node::Describe for LineLength {
-    const NAME: &'static str = "line_length";
-    const SUMMARY: &'static str = "a number a line from a TCP connection";
-    const DOC: &'static str = "Each line is a length in metres. It runs in real time.";
-    const EXAMPLE: &'static str = r#"
-[roles]
-length = "length"
-
-[bind]
-length = "ruler"
-
-[devices.ruler]
-type = "line_length"
-address = "127.0.0.1:4000"
-"#;
 }
 
 impl Device for LineLength {

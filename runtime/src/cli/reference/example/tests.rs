@@ -1,46 +1,49 @@
 //! Examples of a world of one motor and two nodes.
-#![allow(unreachable_pub, dead_code, reason = "what the macros declare is public, and these nodes never step")]
-
 use std::borrow::Cow;
 
 use super::*;
 use crate::device::{Commands, Description, Device, DeviceError, Driver, Opened, RoleType, Samples, Stepped};
-use crate::node::{Mistakes, Need, Node, PortSpec, Setup, Tick};
+use crate::node::{Describe, In, Inputs, Mistakes, Need, Node, Out, Outputs, PortSpec, Setup, Tick};
 use crate::signal::{Joint, Joints, JointsShape, Kind, Unit};
 
-/// Follows its position.
 mod follow {
     use super::*;
 
-    crate::inputs! {
-        /// Where it is.
-        position: Joints["rad", "A"],
-    }
-    crate::outputs! {
-        /// Where it goes.
-        velocity: Joints["rad/s", "A"],
-    }
-    crate::params! {}
+    /// Follows its position.
+    ///
+    /// ```toml
+    /// [nodes.follow]
+    /// type = "follow"                     # it is all there is
+    /// in.position = "motor.position"
+    /// ```
+    #[derive(Describe)]
+    #[describe(name = "follow")]
+    pub(super) struct Follow;
 
-    pub struct Follow;
+    /// What it reads.
+    #[derive(Inputs)]
+    pub(super) struct Inputs<'a> {
+        /// The position.
+        #[port(unit = "rad", robot = "A")]
+        #[expect(dead_code, reason = "the node never steps")]
+        position: In<'a, Joints>,
+    }
 
-    impl tactflow_runtime::node::Describe for Follow {
-        const NAME: &'static str = "follow";
-        const SUMMARY: &'static str = "";
-        const EXAMPLE: &'static str = r#"
-[nodes.follow]
-type = "follow"                     # it is all there is
-in.position = "motor.position"
-"#;
+    /// What it writes.
+    #[derive(Outputs)]
+    pub(super) struct Outputs {
+        /// The velocity.
+        #[port(unit = "rad/s", robot = "A")]
+        velocity: Out<Joints>,
     }
 
     impl Node for Follow {
-        type Params = Params;
+        type Params = ();
         type Inputs<'a> = Inputs<'a>;
         type Outputs = Outputs;
         type State = ();
 
-        fn new(_: Params, setup: &mut Setup<Self>) -> Result<Self, Mistakes> {
+        fn new((): (), setup: &mut Setup<Self>) -> Result<Self, Mistakes> {
             setup.outputs.velocity = setup.inputs.position.in_unit(Unit::RADIAN.per_second());
             Ok(Self)
         }
@@ -49,35 +52,44 @@ in.position = "motor.position"
     }
 }
 
-/// Bounds a velocity.
 mod bound {
     use super::*;
 
-    crate::inputs! {
+    /// Bounds a velocity.
+    ///
+    /// ```toml
+    /// [nodes.bound]
+    /// type = "bound"
+    /// in.velocity = "follow.velocity"
+    /// ```
+    #[derive(Describe)]
+    #[describe(name = "bound")]
+    pub(super) struct Bound;
+
+    /// What it reads.
+    #[derive(Inputs)]
+    pub(super) struct Inputs<'a> {
         /// Any velocity.
-        velocity: Joints["rad/s", "A"],
+        #[port(unit = "rad/s", robot = "A")]
+        #[expect(dead_code, reason = "the node never steps")]
+        velocity: In<'a, Joints>,
     }
-    crate::outputs! {
-        /// The same, bounded.
-        velocity: Joints["rad/s", "A"],
-    }
-    crate::params! {}
 
-    pub struct Bound;
-
-    impl tactflow_runtime::node::Describe for Bound {
-        const NAME: &'static str = "bound";
-        const SUMMARY: &'static str = "";
-        const EXAMPLE: &'static str = "[nodes.bound]\ntype = \"bound\"\nin.velocity = \"follow.velocity\"\n";
+    /// What it writes.
+    #[derive(Outputs)]
+    pub(super) struct Outputs {
+        /// The same velocity, bounded.
+        #[port(unit = "rad/s", robot = "A")]
+        velocity: Out<Joints>,
     }
 
     impl Node for Bound {
-        type Params = Params;
+        type Params = ();
         type Inputs<'a> = Inputs<'a>;
         type Outputs = Outputs;
         type State = ();
 
-        fn new(_: Params, setup: &mut Setup<Self>) -> Result<Self, Mistakes> {
+        fn new((): (), setup: &mut Setup<Self>) -> Result<Self, Mistakes> {
             setup.outputs.velocity = setup.inputs.velocity.clone();
             Ok(Self)
         }
@@ -85,8 +97,6 @@ mod bound {
         fn step(&self, _: &Tick, _: Inputs<'_>, _: &mut Outputs, (): &mut ()) {}
     }
 }
-
-crate::params! {}
 
 /// A motor that stands still.
 struct Motor;
@@ -110,9 +120,9 @@ type = "still_motor"
 }
 
 impl Device for Motor {
-    type Params = Params;
+    type Params = ();
 
-    fn open(_: Params) -> Result<Opened, Mistakes> {
+    fn open((): ()) -> Result<Opened, Mistakes> {
         let joint = Joint { name: "a".into(), lower: -1.0, upper: 1.0, speed: 1.0, acceleration: 10.0 };
         let shape = JointsShape { joints: vec![joint], unit: Unit::RADIAN };
         let mut description = Description::every(0.004);
