@@ -96,11 +96,11 @@ pub(crate) struct ParamEntry {
     pub(crate) name: &'static str,
     pub(crate) takes: String,
     pub(crate) unit: Option<String>,
-    /// Lower and upper end of the range; `None` where there is none.
+    /// Lower and upper end of the range; an end is null if it has no bound.
     pub(crate) range: Option<[Option<f64>; 2]>,
-    /// Whether the lower end itself is out of range.
+    /// Whether the lower end is outside the range.
     pub(crate) is_open: bool,
-    /// The words that it accepts, each with its meaning.
+    /// Accepted words, each with its meaning.
     #[serde(skip_serializing_if = "<[_]>::is_empty")]
     pub(crate) words: &'static [(&'static str, &'static str)],
     /// Default value as TOML.

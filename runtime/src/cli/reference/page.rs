@@ -128,7 +128,9 @@ fn add_params(specs: &[ParamEntry], path: &str, items: &mut Vec<Definition>) {
         };
         let live = if param.is_live { "; live" } else { "" };
         let summary = format!("{}; {default}{live}", param.takes);
-        items.push(Definition { name: name.clone(), summary, details: vec![param.doc.clone()] });
+        let words = param.words.iter().map(|(word, doc)| format!("`{word}`: {doc}"));
+        let details = [param.doc.clone()].into_iter().chain(words).collect();
+        items.push(Definition { name: name.clone(), summary, details });
         add_params(&param.fields, &format!("{name}{}", param.separator), items);
     }
 }
