@@ -31,7 +31,7 @@ pub(crate) fn derive(input: &DeriveInput) -> TokenStream {
         faults.add(&input.ident, "`#[describe(name = \"…\")]` is missing: the `type` in a graph file");
     }
     for (i, Name { name, .. }) in names.iter().enumerate() {
-        if names[..i].iter().any(|other| other.name == *name) {
+        if names[..i].iter().any(|other| other.name.value() == name.value()) {
             faults.add(name, format!("`{}` stands here twice", name.value()));
         }
     }
