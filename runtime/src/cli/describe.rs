@@ -6,7 +6,7 @@ use super::entry::{Entries, Entry};
 use super::page::page;
 use super::prose::{Look, markdown};
 use super::{NOT_LOADED, Shell};
-use crate::source::meant;
+use crate::source::suggest_name;
 
 /// Describe one of them in full, with a graph to paste
 #[derive(clap::Parser)]
@@ -87,7 +87,7 @@ fn example(shell: &Shell, found: &[Entry], missing: Vec<Option<String>>) -> u8 {
 
 /// What is meant, or where to look.
 fn unknown(name: &str, all: &[Entry]) -> String {
-    let help = match meant(name, all.iter().map(|entry| entry.name.as_str())) {
+    let help = match suggest_name(name, all.iter().map(|entry| entry.name.as_str())) {
         Some(best) => format!("did you mean `{best}`?"),
         None => format!("`tactflow list` shows what there is, and `tactflow list {name}` where the word occurs"),
     };

@@ -273,7 +273,7 @@ impl Job {
         let known: std::collections::BTreeSet<&str> = engine.words().collect();
         Some(format!(
             "nothing waits for the word `{word}`: {}",
-            crate::source::closest(word, known.into_iter(), "words")
+            crate::source::suggestion(word, known.into_iter(), "words")
         ))
     }
 }

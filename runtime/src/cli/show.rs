@@ -10,7 +10,7 @@ use super::check::milliseconds;
 use super::describe::Format;
 use super::json::{Place, json, place};
 use super::{OnArgs, Shell};
-use crate::graph::{Compiled, NOWHERE, Origin, OutlinedBlock, OutlinedWire, PlannedPort, Setting, compile};
+use crate::graph::{Compiled, NO_SPAN, Origin, OutlinedBlock, OutlinedWire, PlannedPort, Setting, compile};
 use crate::node::Word;
 use crate::signal::Shape;
 use crate::source::{Item, Key, SourceMap, Value};
@@ -169,7 +169,7 @@ fn tall(value: &Value) -> Option<String> {
             .as_table()
             .into_iter()
             .flat_map(|table| &table.entries)
-            .filter(|(key, _)| key.span == NOWHERE)
+            .filter(|(key, _)| key.span == NO_SPAN)
             .map(|(key, _)| key.name.as_str())
             .collect();
         if let Some(line) = lines.last_mut().filter(|_| !defaults.is_empty()) {

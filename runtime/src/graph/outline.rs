@@ -1,35 +1,34 @@
-//! A graph as it runs: flat, with every value that was laid over another, every default and every fact, and where each
-//! of them comes from. For a person who asks.
+//! The outline of a graph: the flat graph with all overrides, defaults and facts, and the origin of each value.
 
 use std::ops::Range;
 use std::path::Path;
 
-use crate::graph::bench::Opened;
+use crate::graph::bench::OpenedBench;
 use crate::graph::bench::fill_facts;
-use crate::graph::net::{Net, Origin as WireOrigin, Wire};
+use crate::graph::net::{Net, Wire, WireOrigin};
 use crate::graph::syntax::{Block, GraphTable, ModeBlock, Policy, PolicyTable};
 use crate::node::{FilePath, Param, ParamSpec, Repeats, Word};
-use crate::source::{Item, Key, SourceMap, Table, Value, parse_table};
+use crate::source::{Diagnostics, Item, Key, SourceMap, Table, Value, parse_table};
 
-/// The place of a default in a list of tables: nobody wrote it.
-pub const NOWHERE: Range<usize> = 0..0;
+/// The span of a default in a list of tables, which was not written anywhere.
+pub const NO_SPAN: Range<usize> = 0..0;
 
-/// A graph as it runs.
+/// The outline of a graph.
 #[derive(Debug, Clone, Default)]
 pub struct Outline {
-    /// Section `[graph]`, but for the bench, which is in the other sections.
+    /// Section `[graph]` without the bench, which is in the other sections.
     pub settings: Vec<Setting>,
-    /// The roles: name, type, and the device that fills it.
+    /// The roles: name, type and device.
     pub roles: Vec<OutlinedRole>,
-    /// What drives each command and what is reported: `role.command`.
+    /// The wires of commands and reports, named `role.command`.
     pub commands: Vec<OutlinedWire>,
-    /// Section `[policy]`: what each trouble does.
+    /// Section `[policy]`: the reaction to each trouble.
     pub policy: Vec<Setting>,
-    /// The modes: each with what it sets and what ends it.
+    /// The modes with their settings and exits.
     pub modes: Vec<OutlinedMode>,
-    /// The nodes, in the order of the files.
+    /// The nodes in file order.
     pub nodes: Vec<OutlinedBlock>,
-    /// The devices that are used.
+    /// The devices that the roles use.
     pub devices: Vec<OutlinedBlock>,
 }
 
@@ -38,9 +37,9 @@ pub struct Outline {
 pub struct OutlinedRole {
     /// Its name.
     pub name: String,
-    /// Its type, and where that stands.
+    /// Its type, with its span.
     pub kind: Word,
-    /// The device that fills it, and where that stands.
+    /// The device bound to it, with its span.
     pub device: Word,
 }
 
@@ -49,20 +48,20 @@ pub struct OutlinedRole {
 pub struct OutlinedMode {
     /// Its name.
     pub name: String,
-    /// `set.…` for each value that it sets, and its exits as they are written.
+    /// `set.…` for each value that it sets, and its exits as written.
     pub settings: Vec<Setting>,
 }
 
 /// A wire.
 #[derive(Debug, Clone)]
 pub struct OutlinedWire {
-    /// Name of the input, or of the command.
+    /// Name of the input or of the command.
     pub name: String,
-    /// The port it comes from: `node.port`, through all parts.
+    /// Full name of its source: `node.port`.
     pub source: String,
-    /// How old what comes over it may be [ms], and what is done when it is older; if it says that.
+    /// Maximum age of its values [ms] and the reaction to older ones, if it has a limit.
     pub age: Option<(f64, Policy)>,
-    /// Where that was written.
+    /// Where the source was written.
     pub span: Range<usize>,
 }
 
@@ -71,9 +70,9 @@ pub struct OutlinedWire {
 pub struct OutlinedBlock {
     /// Its full name.
     pub name: String,
-    /// Where its name stands.
+    /// Span of its name.
     pub span: Range<usize>,
-    /// Its type, and where that stands.
+    /// Its type, with its span.
     pub kind: Word,
     /// Its wires.
     pub wires: Vec<OutlinedWire>,
@@ -81,47 +80,47 @@ pub struct OutlinedBlock {
     pub settings: Vec<Setting>,
 }
 
-/// A value that something is set to.
+/// A parameter with its value.
 #[derive(Debug, Clone)]
 pub struct Setting {
     /// Dotted path in its block.
     pub path: String,
     /// The value.
     pub value: Value,
-    /// Where it comes from.
+    /// The origin of the value.
     pub origin: Origin,
 }
 
-/// Where a value comes from.
+/// The origin of a value.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Origin {
-    /// It was written there.
+    /// A file or the command line, at this span.
     Written(Range<usize>),
-    /// Nobody wrote it.
+    /// The default of the parameter.
     Default,
-    /// A device states it.
+    /// A fact of a device.
     Fact {
         /// `role.fact`
         fact: String,
-        /// Where the device's name stands.
+        /// Span of the name of the device.
         device: Range<usize>,
     },
 }
 
-/// What the outline of a graph without mistakes is made from.
-pub(crate) struct Parts<'a> {
+/// Builds the outline of a graph without mistakes.
+pub(crate) struct OutlineBuilder<'a> {
     pub(crate) net: &'a Net<'a>,
-    pub(crate) opened: &'a Opened,
+    pub(crate) opened: &'a OpenedBench,
     pub(crate) sources: &'a SourceMap,
-    /// Greatest time between two samples that counts as one step [s].
+    /// Maximum time step between two samples [s].
     pub(crate) max_gap: f64,
 }
 
-impl Parts<'_> {
-    pub(crate) fn outline(&self) -> Outline {
+impl OutlineBuilder<'_> {
+    pub(crate) fn build(&self) -> Outline {
         let flat = self.net.flat;
         let commands = self.net.commands.iter().map(|wire| OutlinedWire {
-            name: self.net.taken_name(wire),
+            name: self.net.command_name(wire),
             source: self.net.port_name(wire.source),
             age: age(&wire.origin),
             span: wire.origin.word.span.clone(),
@@ -131,7 +130,7 @@ impl Parts<'_> {
             roles: self.roles(),
             commands: commands.collect(),
             policy: self.policy(),
-            modes: flat.modes.iter().map(mode).collect(),
+            modes: flat.modes.iter().map(outline_mode).collect(),
             nodes: (0..flat.nodes.len()).filter_map(|node| self.node(node)).collect(),
             devices: self.opened.devices.iter().filter_map(|device| self.device(&device.name)).collect(),
         }
@@ -143,8 +142,8 @@ impl Parts<'_> {
         self.table(given, &GraphTable::fields(), "", &mut settings);
         settings.retain(|setting| setting.path != "bench");
         if !settings.iter().any(|setting| setting.path == "max_gap_ms") {
-            // A whole number of microseconds, so that no digits are there by chance.
-            let gap = Value { span: NOWHERE, item: Item::Float((self.max_gap * 1e6).round() * 1e-3) };
+            // Rounded to microseconds, to hide the digits of floating-point errors.
+            let gap = Value { span: NO_SPAN, item: Item::Float((self.max_gap * 1e6).round() * 1e-3) };
             settings.push(Setting { path: "max_gap_ms".into(), value: gap, origin: Origin::Default });
         }
         settings
@@ -200,7 +199,7 @@ impl Parts<'_> {
         })
     }
 
-    /// The settings of a table: what is given, and the defaults of what is not.
+    /// Adds the settings of a table: the given values, and the defaults of the others.
     fn table(&self, given: Option<&Table>, specs: &[ParamSpec], path: &str, settings: &mut Vec<Setting>) {
         for spec in specs {
             let path = format!("{path}{}", spec.name);
@@ -210,7 +209,7 @@ impl Parts<'_> {
             }
         }
         let is_declared = |name: &str| specs.iter().any(|spec| spec.name == name);
-        // A node that is known only at run time may take more than it declares.
+        // A node type that is known only at run time may accept more than it declares.
         for (key, value) in given.iter().flat_map(|table| &table.entries).filter(|(key, _)| !is_declared(&key.name)) {
             settings.push(self.setting(value, format!("{path}{}", key.name)));
         }
@@ -233,14 +232,14 @@ impl Parts<'_> {
             }
             _ => {
                 let mut setting = self.setting(value, path);
-                self.resolve(&mut setting, spec);
-                complete(&mut setting.value, spec);
+                self.resolve_path(&mut setting, spec);
+                add_defaults(&mut setting.value, spec);
                 settings.push(setting);
             }
         }
     }
 
-    /// A value as it was written, or the fact that it asks for.
+    /// Returns a value as written, or the fact that it refers to.
     fn setting(&self, value: &Value, path: String) -> Setting {
         let fact = value.as_table().filter(|table| table.is_fact());
         let word = fact.and_then(|table| table.get("from")).and_then(Value::as_str);
@@ -249,20 +248,20 @@ impl Parts<'_> {
         });
         let mut filled = value.clone();
         // The graph has no mistakes, so every fact is there.
-        fill_facts(&mut filled, self.net, self.opened, &mut Vec::new());
+        fill_facts(&mut filled, self.net, self.opened, &mut Diagnostics::new());
         let bound = role.and_then(|role| self.opened.roles[role].as_ref());
         let origin = match (word, bound) {
             (Some(word), Some(bound)) => {
                 Origin::Fact { fact: word.to_owned(), device: self.opened.devices[bound.device].span.clone() }
             }
-            // A number of [limits] stands where that says it.
+            // A value of [limits] keeps its span in that section.
             _ => Origin::Written(filled.span.clone()),
         };
         Setting { path, value: filled, origin }
     }
 
-    /// The path of a file, which stands relative to the file it is written in, as seen from the working folder.
-    fn resolve(&self, setting: &mut Setting, spec: &ParamSpec) {
+    /// Makes the path of a file relative to the working folder.
+    fn resolve_path(&self, setting: &mut Setting, spec: &ParamSpec) {
         if let (Origin::Written(span), Item::String(text)) = (&setting.origin, &mut setting.value.item)
             && spec.takes == FilePath::EXPECTS
         {
@@ -275,23 +274,23 @@ fn age(wire: &WireOrigin) -> Option<(f64, Policy)> {
     wire.age.map(|age| (age.max_age as f64 * 1e-6, age.stale))
 }
 
-fn mode(block: &ModeBlock) -> OutlinedMode {
+fn outline_mode(block: &ModeBlock) -> OutlinedMode {
     let mut settings = Vec::new();
     for (key, value) in &block.table.entries {
         match value.as_table().filter(|_| key.name == "set") {
-            Some(_) => leaves(value, "set", 4, &mut settings),
-            None => leaves(value, &key.name, 0, &mut settings),
+            Some(_) => add_leaves(value, "set", 4, &mut settings),
+            None => add_leaves(value, &key.name, 0, &mut settings),
         }
     }
     OutlinedMode { name: block.key.name.clone(), settings }
 }
 
-/// What is written in a table, so many tables deep at most.
-fn leaves(value: &Value, path: &str, depth: usize, settings: &mut Vec<Setting>) {
+/// Adds the values of a table, descending at most `depth` tables.
+fn add_leaves(value: &Value, path: &str, depth: usize, settings: &mut Vec<Setting>) {
     match value.as_table().filter(|table| depth > 0 && !table.is_fact()) {
         Some(table) => {
             for (key, value) in &table.entries {
-                leaves(value, &format!("{path}.{}", key.name), depth - 1, settings);
+                add_leaves(value, &format!("{path}.{}", key.name), depth - 1, settings);
             }
         }
         None => {
@@ -301,24 +300,24 @@ fn leaves(value: &Value, path: &str, depth: usize, settings: &mut Vec<Setting>) 
     }
 }
 
-/// Fills the defaults into the tables of a list.
-fn complete(value: &mut Value, spec: &ParamSpec) {
+/// Adds the defaults to the tables of a list.
+fn add_defaults(value: &mut Value, spec: &ParamSpec) {
     let Item::Array(items) = &mut value.item else { return };
     for item in items {
         let Item::Table(table) = &mut item.item else { continue };
         for field in &spec.fields {
             let default = default(field).filter(|_| table.get(field.name).is_none());
-            let key = Key { name: field.name.to_owned(), span: NOWHERE };
-            table.entries.extend(default.map(|value| (key, Value { span: NOWHERE, ..value })));
+            let key = Key { name: field.name.to_owned(), span: NO_SPAN };
+            table.entries.extend(default.map(|value| (key, Value { span: NO_SPAN, ..value })));
         }
     }
 }
 
-/// The default of a parameter as a value; none if nothing is set.
+/// Returns the default of a parameter as a value, or `None` if it has none.
 fn default(spec: &ParamSpec) -> Option<Value> {
     let text = spec.default.as_ref()?;
     let mut sources = SourceMap::default();
     let parsed = parse_table(sources.add_file(Path::new("default"), format!("value = {text}")));
     let value = parsed.ok().and_then(|value| value.as_table()?.get("value").cloned());
-    Some(value.unwrap_or_else(|| Value { span: NOWHERE, item: Item::String(text.clone()) }))
+    Some(value.unwrap_or_else(|| Value { span: NO_SPAN, item: Item::String(text.clone()) }))
 }

@@ -9,7 +9,7 @@ use serde::de::DeserializeOwned;
 
 use super::{At, Mistake, Mistakes, ParamSpec, Repeats, Written};
 use crate::signal::Unit;
-use crate::source::{Code, closest, meant};
+use crate::source::{Code, suggest_name, suggestion};
 use crate::source::{Item, Key, SourceMap, Table, Value};
 
 /// Something a graph file may set.
@@ -114,13 +114,13 @@ impl<'a> Reader<'a> {
         // One that is missing and one that is strange are one mistake.
         let is_renamed = match (table.missing.as_slice(), table.rest.entries.as_slice()) {
             ([(missing, _)], [(strange, _)]) => {
-                meant(&strange.name, known.iter().copied()).is_none_or(|m| m == *missing)
+                suggest_name(&strange.name, known.iter().copied()).is_none_or(|m| m == *missing)
             }
             _ => false,
         };
         let renamed = table.missing.first().filter(|_| is_renamed).map(|(name, _)| format!("did you mean `{name}`?"));
         for (name, expects) in table.missing {
-            let is_misspelt = |(key, _): &(Key, Value)| meant(&key.name, known.iter().copied()) == Some(name);
+            let is_misspelt = |(key, _): &(Key, Value)| suggest_name(&key.name, known.iter().copied()) == Some(name);
             if !is_renamed && !table.rest.entries.iter().any(is_misspelt) {
                 let message = format!("`{name}` is missing: expected {expects}");
                 self.mistakes.push(Mistake::new(Code::MissingKey, At::Span(table.span.clone()), message));
@@ -128,7 +128,7 @@ impl<'a> Reader<'a> {
         }
         for (key, _) in table.rest.entries {
             let message = format!("`{}` is not a parameter here", key.name);
-            let help = renamed.clone().unwrap_or_else(|| closest(&key.name, known.iter().copied(), "parameters"));
+            let help = renamed.clone().unwrap_or_else(|| suggestion(&key.name, known.iter().copied(), "parameters"));
             self.mistakes.push(Mistake::new(Code::UnknownKey, At::Span(key.span), message).help(help));
         }
     }
@@ -440,12 +440,12 @@ impl<T> Map<T> {
         for key in self.0.keys() {
             if !names.clone().any(|name| name == key) {
                 let help = renamed.map(|name| format!("did you mean `{name}`?"));
-                let help = help.unwrap_or_else(|| closest(key, names.clone(), "features"));
+                let help = help.unwrap_or_else(|| suggestion(key, names.clone(), "features"));
                 mistakes
                     .push(Mistake::key(format!("{param}.{key}"), format!("no feature is called `{key}`")).help(help));
             }
         }
-        let is_misspelt = |name: &str| self.0.keys().any(|key| meant(key, names.clone()) == Some(name));
+        let is_misspelt = |name: &str| self.0.keys().any(|key| suggest_name(key, names.clone()) == Some(name));
         let is_told = |name: &str| renamed == Some(name) || is_misspelt(name);
         for name in names.clone().filter(|name| !self.0.contains_key(*name) && !is_told(name)) {
             let message = format!("`{param}` has no entry for feature `{name}`");

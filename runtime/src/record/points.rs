@@ -12,7 +12,7 @@ use crate::engine::Engine;
 use crate::graph::{Compiled, PlannedPort};
 use crate::node::PortId;
 use crate::signal::{Freshness, Kind, Pose, Signal};
-use crate::source::closest;
+use crate::source::suggestion;
 
 /// Which points are written, and where.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -78,7 +78,7 @@ fn look_up(plan: &Compiled, word: &str) -> Result<PlannedPort, String> {
     plan.port(word).cloned().ok_or_else(|| {
         let names = plan.exports().iter().map(|(export, _)| export.as_str());
         let names = names.chain(plan.ports().map(|port| port.name.as_str()));
-        format!("the graph has no port `{word}`: {}", closest(word, names, "ports"))
+        format!("the graph has no port `{word}`: {}", suggestion(word, names, "ports"))
     })
 }
 

@@ -140,7 +140,7 @@ pub(super) fn document(root: &Table, reader: &mut Reader<'_>) -> Document {
             "set" | "nodes" | "parts" | "devices" | "bind" => {
                 "a scenario patches neither the task nor the bench: write a bench, or a task, of its own".to_owned()
             }
-            name => crate::source::closest(name, ["scenario", "check"].into_iter(), "sections"),
+            name => crate::source::suggestion(name, ["scenario", "check"].into_iter(), "sections"),
         };
         reader.mistakes.push(Mistake::new(Code::UnknownKey, At::Span(key.span.clone()), message).help(help));
     }

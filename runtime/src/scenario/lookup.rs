@@ -10,7 +10,7 @@ use crate::graph::{Compiled, Request};
 use crate::node::Word;
 use crate::record::{Column, Columns};
 use crate::signal::Kind;
-use crate::source::{Code, Diagnostic, Report, closest, meant};
+use crate::source::{Code, Diagnostic, Report, suggest_name, suggestion};
 use crate::source::{Item, Value};
 
 /// As long an end the steady state is taken from, unless a check says another [s].
@@ -113,15 +113,15 @@ impl Lookup<'_> {
     fn nearest(&self, text: &str) -> String {
         let columns = self.plan.ports().flat_map(Columns::of).map(|column| column.name);
         let all: Vec<String> = columns.chain(self.plan.exports().iter().map(|(export, _)| export.clone())).collect();
-        if let Some(best) = meant(text, all.iter().map(String::as_str)) {
+        if let Some(best) = suggest_name(text, all.iter().map(String::as_str)) {
             return format!("did you mean `{best}`?");
         }
         let owner = text.split('.').next().unwrap_or_default();
         let of_owner = all.iter().filter(|name| name.split('.').next() == Some(owner)).map(String::as_str);
         let owners = || all.iter().filter_map(|name| name.split('.').next()).collect::<std::collections::BTreeSet<_>>();
         match of_owner.clone().next() {
-            Some(_) => closest(text, of_owner, "ports"),
-            None => closest(owner, owners().into_iter(), "roles, nodes and parts"),
+            Some(_) => suggestion(text, of_owner, "ports"),
+            None => suggestion(owner, owners().into_iter(), "roles, nodes and parts"),
         }
     }
 

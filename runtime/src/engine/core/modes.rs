@@ -6,7 +6,7 @@
 
 use std::collections::BTreeMap;
 
-use crate::graph::{Condition, PlannedExit, PlannedModes, PortRef, Sort, Test};
+use crate::graph::{Condition, ExitKind, PlannedExit, PlannedModes, PortRef, Test};
 use crate::node::{Bus, PortId, Tick};
 use crate::signal::{Features, Flag, Freshness, Kind, Pose, Scalar, Signal};
 
@@ -126,7 +126,7 @@ impl Modes {
                 .into_iter()
                 .map(|planned| Exit { look: look(&planned), planned, memory: Memory::default() })
                 .collect();
-            exits.sort_by_key(|exit| (exit.planned.sort, std::cmp::Reverse(exit.planned.priority)));
+            exits.sort_by_key(|exit| (exit.planned.kind, std::cmp::Reverse(exit.planned.priority)));
             Mode { name: mode.name, exits, configurations }
         });
         Self {
@@ -165,10 +165,10 @@ impl Modes {
         let Some(chosen) = chosen else { return Verdict::Stay };
         let exit = &self.modes[self.now].exits[chosen].planned;
         self.taken = chosen;
-        match (exit.sort, exit.to) {
-            (Sort::Fail, _) => Verdict::Failed,
-            (Sort::Done, _) | (_, None) => Verdict::Done,
-            (Sort::OnLost | Sort::Go, Some(to)) => {
+        match (exit.kind, exit.to) {
+            (ExitKind::Fail, _) => Verdict::Failed,
+            (ExitKind::Done, _) | (_, None) => Verdict::Done,
+            (ExitKind::OnLost | ExitKind::Go, Some(to)) => {
                 self.enter(to, Why::Exit(self.now, chosen), tick);
                 Verdict::Switched
             }
@@ -287,9 +287,9 @@ impl Memory {
             // What is held is neither here nor there: it is waited for the next sample.
             _ if !seen.is_new => return false,
             (Test::Flag(wanted), Some(value)) => (value != 0.0) == wanted,
-            (Test::Between { least, greatest, hysteresis }, Some(value)) => {
+            (Test::Between { min, max, hysteresis }, Some(value)) => {
                 let by = if self.since.is_some() { hysteresis } else { 0.0 };
-                value > least - by && value < greatest + by
+                value > min - by && value < max + by
             }
             (Test::Flag(_) | Test::Between { .. }, None) => false,
         };

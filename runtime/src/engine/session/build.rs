@@ -10,8 +10,8 @@ use super::trouble::WatchedWire;
 use crate::device::{Commands, Driver, Samples};
 use crate::engine::core::{Aged, CommandSlot, Core, DeviceSlot, Inlet, Link, Modes, NodeRunner, ReportSlot, Timing};
 use crate::graph::{
-    Age, Compiled, PlannedCommand, PlannedDevice, PlannedNode, PlannedPort, PlannedReport, PlannedShow, PlannedView,
-    PlannedWire, Policy, PortRef, Producer,
+    AgeLimit, Compiled, PlannedCommand, PlannedDevice, PlannedNode, PlannedPort, PlannedReport, PlannedShow,
+    PlannedView, PlannedWire, Policy, PortRef, Producer,
 };
 use crate::node::{Bus, PortId, Tick};
 use crate::signal::{Mark, Shape, Stamp};
@@ -148,8 +148,8 @@ fn watched_ends(commands: &[PlannedCommand], reports: &[PlannedReport], ids: &Id
 }
 
 /// A command or a report whose age does more than that it ramps to zero or falls silent.
-fn watched_end(name: &[String; 2], age: Age, span: &Range<usize>, id: PortId) -> Option<WatchedWire> {
-    let (Age { max_age, stale }, [role, name]) = (age, name.clone());
+fn watched_end(name: &[String; 2], age: AgeLimit, span: &Range<usize>, id: PortId) -> Option<WatchedWire> {
+    let (AgeLimit { max_age, stale }, [role, name]) = (age, name.clone());
     // Its slot looks at the mark itself.
     let aged = Aged { from: id.mark, to: id.mark, max_age };
     let watched = WatchedWire { aged, stale, node: role, port: Some(name), span: span.clone() };
@@ -161,7 +161,7 @@ fn runner(node: PlannedNode, ids: &Ids, bus: &mut Bus, watched: &mut Vec<Watched
     let mut aged = Vec::new();
     let mut end = |wire: &PlannedWire| {
         let id = ids[&wire.source];
-        let Some(Age { max_age, stale }) = wire.age else { return id };
+        let Some(AgeLimit { max_age, stale }) = wire.age else { return id };
         bus.marks.push(Mark::default());
         let to = bus.marks.len() as u32 - 1;
         aged.push(Aged { from: id.mark, to, max_age });

@@ -10,7 +10,7 @@ use crate::device::DeviceError;
 use crate::engine::core::{Link, Modes, Verdict};
 use crate::fault::{Cause, Fault};
 use crate::graph::Policy;
-use crate::source::closest;
+use crate::source::suggestion;
 
 impl Engine {
     /// Runs the tick at `now` [ns]: exchange with the devices, then latch, step and commit.
@@ -126,7 +126,7 @@ impl Engine {
             self.halts.resume();
         } else if !self.words().any(|known| known == word) {
             let known = self.words().collect::<std::collections::BTreeSet<_>>();
-            return Err(format!("nothing waits for `{word}`: {}", closest(word, known.into_iter(), "words")));
+            return Err(format!("nothing waits for `{word}`: {}", suggestion(word, known.into_iter(), "words")));
         } else if self.halts.is_stopped() {
             return Err(format!("`{word}` is not heard while the commands wait for `resume`"));
         } else {
