@@ -46,6 +46,15 @@ impl Compiled {
         self.ports().find(|port| port.name == name)
     }
 
+    /// Finds the port at the start of a dotted name, and returns it with the rest of the name.
+    ///
+    /// The rest is empty, or it starts with a dot and names a part of the value, for example `.x`.
+    #[must_use]
+    pub fn port_prefix<'n>(&self, name: &'n str) -> Option<(&PlannedPort, &'n str)> {
+        let ends = std::iter::once(name.len()).chain(name.rmatch_indices('.').map(|(at, _)| at));
+        ends.into_iter().find_map(|end| Some((self.port(&name[..end])?, &name[end..])))
+    }
+
     /// Returns the ports that the graph reports to its devices.
     pub fn reported(&self) -> impl Iterator<Item = &PlannedPort> {
         self.plan.reports.iter().filter_map(|report| {

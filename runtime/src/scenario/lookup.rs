@@ -1,5 +1,6 @@
 //! Finds the ports, modes, facts and seeds that a scenario speaks of in the plan of its task on its bench.
 
+use std::collections::BTreeSet;
 use std::path::Path;
 
 use super::document::{CheckBlock, CheckTable, Document, PaperTable, ScenarioTable};
@@ -10,7 +11,7 @@ use crate::graph::{Compiled, Request};
 use crate::node::Word;
 use crate::record::{Column, Columns};
 use crate::signal::Kind;
-use crate::source::{Code, Diagnostic, Report, suggest_name, suggestion};
+use crate::source::{Code, Diagnostic, Report, suggest_name};
 use crate::source::{Item, Value};
 
 /// As long an end the steady state is taken from, unless a check says another [s].
@@ -75,54 +76,44 @@ struct Lookup<'a> {
 }
 
 impl Lookup<'_> {
-    /// The column that a word means: as the record names it, or as the wires of the task do. The kind of its port.
+    /// Finds the column that a word names, as in a recording or in a wire of the task, and the kind of its port.
     fn column(&mut self, word: &Word) -> Option<(Column, Kind)> {
-        let alias = self.plan.exports().iter().find_map(|(export, port)| {
-            let rest = word.text.strip_prefix(export.as_str())?;
-            (rest.is_empty() || rest.starts_with('.')).then(|| format!("{port}{rest}"))
-        });
-        let name = alias.unwrap_or_else(|| word.text.clone());
-        for port in self.plan.ports() {
-            let columns = Columns::of(port);
-            if let Some(column) = columns.iter().find(|column| column.name == name) {
-                return Some((column.clone(), port.shape.kind()));
-            }
-            if port.name == name {
-                let kind = port.shape.kind().with_article();
-                let (message, help) = match columns.as_slice() {
-                    [] => (format!("`{}` is {kind}: there is no number in it to look at", word.text), None),
-                    parts => {
-                        let parts = parts.iter().map(|part| {
-                            format!("`{}{}`", word.text, part.name.strip_prefix(&port.name).unwrap_or_default())
-                        });
-                        let help = format!("look at one of {}", parts.collect::<Vec<_>>().join(", "));
-                        (format!("`{}` is {kind}: a check looks at one number", word.text), Some(help))
-                    }
-                };
-                let diagnostic = Diagnostic::new(Code::KindMismatch, word.span.clone(), message);
-                self.found.push(diagnostic.with_help(help));
-                return None;
-            }
+        let (port, rest) = self.plan.port_prefix(&word.text).or_else(|| self.unknown_port(word))?;
+        let (columns, kind) = (Columns::of(port), port.shape.kind());
+        let column = columns.iter().find(|column| column.name.strip_prefix(&port.name) == Some(rest));
+        if let Some(column) = column {
+            return Some((column.clone(), kind));
         }
-        let message = format!("there is no port `{}` in this task on this bench", word.text);
-        self.found.push(Diagnostic::new(Code::UnknownPort, word.span.clone(), message).help(self.nearest(&word.text)));
+        if !rest.is_empty() {
+            self.unknown_port(word)?;
+        }
+        let parts = columns.iter().map(|part| part.name.strip_prefix(&port.name).unwrap_or_default());
+        let parts: Vec<String> = parts.map(|part| format!("`{}{part}`", word.text)).collect();
+        let what = if parts.is_empty() { "there is no number in it to look at" } else { "a check looks at one number" };
+        let message = format!("`{}` is {}: {what}", word.text, kind.with_article());
+        let help = (!parts.is_empty()).then(|| format!("look at one of {}", parts.join(", ")));
+        self.found.push(Diagnostic::new(Code::KindMismatch, word.span.clone(), message).with_help(help));
         None
     }
 
-    /// What a port that is not there may have been meant to be.
-    fn nearest(&self, text: &str) -> String {
+    /// Reports a port that does not exist.
+    fn unknown_port<T>(&mut self, word: &Word) -> Option<T> {
+        let message = format!("there is no port `{}` in this task on this bench", word.text);
         let columns = self.plan.ports().flat_map(Columns::of).map(|column| column.name);
         let all: Vec<String> = columns.chain(self.plan.exports().iter().map(|(export, _)| export.clone())).collect();
-        if let Some(best) = suggest_name(text, all.iter().map(String::as_str)) {
-            return format!("did you mean `{best}`?");
-        }
-        let owner = text.split('.').next().unwrap_or_default();
-        let of_owner = all.iter().filter(|name| name.split('.').next() == Some(owner)).map(String::as_str);
-        let owners = || all.iter().filter_map(|name| name.split('.').next()).collect::<std::collections::BTreeSet<_>>();
-        match of_owner.clone().next() {
-            Some(_) => suggestion(text, of_owner, "ports"),
-            None => suggestion(owner, owners().into_iter(), "roles, nodes and parts"),
-        }
+        let owner = word.text.split('.').next().unwrap_or_default();
+        let owner_of = |name: &&String| name.split('.').next() == Some(owner);
+        let is_near = suggest_name(&word.text, all.iter().map(String::as_str)).is_some();
+        let diagnostic = Diagnostic::new(Code::UnknownPort, word.span.clone(), message);
+        self.found.push(if is_near || all.iter().any(|name| owner_of(&name)) {
+            // A close name of another owner is a better suggestion than a list.
+            let known = all.iter().filter(|name| is_near || owner_of(name)).map(String::as_str);
+            diagnostic.suggest(&word.text, known, "ports")
+        } else {
+            let owners: BTreeSet<&str> = all.iter().filter_map(|name| name.split('.').next()).collect();
+            diagnostic.suggest(owner, owners.into_iter(), "roles, nodes and parts")
+        });
+        None
     }
 
     /// The column of a flag.

@@ -153,7 +153,7 @@ impl Opener<'_> {
             let by = fitting.next().and_then(|i| self.taken.iter().find(|(d, filled, _)| (*d, *filled) == (device, i)));
             let message = match by {
                 Some((_, _, by)) => format!("device `{}` already fills the role `{by}`", word.text),
-                None => format!("device `{}` cannot fill the role `{}`, a `{}`", word.text, key.name, kind.text),
+                None => format!("device `{}` cannot fill the role `{}` of type `{}`", word.text, key.name, kind.text),
             };
             let roles: Vec<_> = description.fills.iter().map(|filled| format!("`{}`", filled.role)).collect();
             let help = match by {

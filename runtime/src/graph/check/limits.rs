@@ -76,7 +76,8 @@ fn unlimited(
     let consumer = format!("{}.{}", net.name(Producer::Role(command.role)), role.commands[command.command].name);
     let names = missing.iter().map(|limit| format!("`{limit}`")).collect::<Vec<_>>().join(", ");
     let source = net.port_name(command.source);
-    let message = format!("`{source}` drives `{consumer}` without the required limits {names}");
+    let plural = if missing.len() == 1 { "" } else { "s" };
+    let message = format!("`{source}` drives `{consumer}` without the required limit{plural} {names}");
     if let Some(part) = suggest_part(net, command, missing).filter(|_| lost.is_empty()) {
         return command.origin.diagnostic(Code::UnlimitedCommand, message).help(part);
     }
