@@ -278,7 +278,7 @@ fn a_warning_fails_nothing_unless_it_is_asked_to() {
     let graph = "tests/errors/unused_node.toml";
     let told = say(&["check", graph]);
     assert_eq!((told.code, told.out.as_str()), (0, "tests/errors/unused_node.toml: ok, 17 nodes, a tick each 4 ms\n"));
-    assert!(told.err.starts_with("warning[unused-node]: nothing reads any output of `label`\n"), "{}", told.err);
+    assert!(told.err.starts_with("warning[unused-node]: no output of `label` is used\n"), "{}", told.err);
     assert!(told.err.ends_with("\n3 warnings\n"), "{}", told.err);
     let denied = say(&["check", "--deny-warnings", graph]);
     assert_eq!((denied.code, denied.out.as_str(), denied.err), (2, "", told.err.clone()));
@@ -296,8 +296,8 @@ fn a_deleted_wire_leaves_a_node_that_nobody_reads() {
     fs::write(&path, text.replace("\"benches/", "\"../benches/")).unwrap();
     let said = say(&["check", path.to_str().unwrap()]);
     assert_eq!(said.code, 0, "{}", said.err);
-    assert!(said.err.contains("nothing reads any output of `guide`"), "{}", said.err);
-    assert!(said.err.contains("help: add `in.NAME = \"guide.twist\"` to `sum`, or take it out"), "{}", said.err);
+    assert!(said.err.contains("no output of `guide` is used"), "{}", said.err);
+    assert!(said.err.contains("help: add `in.NAME = \"guide.twist\"` to `sum`, or remove `guide`"), "{}", said.err);
 }
 
 #[test]

@@ -192,7 +192,7 @@ fn a_mistake_in_set_points_into_set() {
             "nodes.touch.label.min_area=3",
             "unknown-key",
             "1:7",
-            "`touch` is a part: its nodes are set through `parts.touch.set`",
+            "`touch` is a part: set its nodes through `parts.touch.set`",
         ),
         ("devices.pad.rows=-1", "bad-value", "1:18", "expected a whole number from 1 to 1000000, found -1"),
         ("devices.pad.row=4", "unknown-key", "1:13", "`row` is not a parameter here"),

@@ -260,7 +260,7 @@ fn what_cannot_be_a_scenario_is_told() {
         ),
         (
             "[scenario]\ngraph = 'TESTS/../graphs/hybrid.toml'\nbench = 'TESTS/scenarios/benches/slide.toml'\nfor_s = 1.0\n",
-            "error[unbound-role]: the bench binds role `arm` to no device",
+            "error[unbound-role]: the bench does not bind the role `arm`",
         ),
         (
             "[scenario]\ngraph = 'TESTS/scenarios/tasks/slide.toml'\nbench = 'no_device.toml'\nfor_s = 1.0\n",
@@ -268,7 +268,7 @@ fn what_cannot_be_a_scenario_is_told() {
         ),
         (
             "[scenario]\ngraph = 'TESTS/scenarios/tasks/slide.toml'\nbench = 'live.toml'\nfor_s = 1.0\n",
-            "error[unbound-role]: the bench binds role `pad` to no device",
+            "error[unbound-role]: the bench does not bind the role `pad`",
         ),
     ];
     let live = "graph.rate_hz = 100\nroles.length = 'length'\nbind.length = 'length'\n\
