@@ -186,7 +186,7 @@ fn a_mistake_in_set_points_into_set() {
         ("nodes.pid.gains.x.kp=abc", "bad-value", "1:22", "expected a number, found the string \"abc\""),
         ("nodes.pid.gainss.x.kp=3", "unknown-key", "1:11", "`gainss` is not a parameter here"),
         ("nodes.pidd.gains.x.kp=3", "missing-key", "1:7", "`pidd` has no `type`"),
-        ("node.pid.gains.x.kp=3", "unknown-key", "1:1", "`node` means nothing here"),
+        ("node.pid.gains.x.kp=3", "unknown-key", "1:1", "unknown key `node`"),
         ("parts.touch.set.labl.min_area=3", "unknown-key", "1:17", "the part has no node or part `labl`"),
         (
             "nodes.touch.label.min_area=3",

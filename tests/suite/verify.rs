@@ -292,7 +292,7 @@ fn check_knows_a_scenario_and_run_says_what_it_is() {
     assert!(set.code == 2 && set.err.contains("is a scenario: it names its bench, and sets nothing"), "{}", set.err);
     let run = say(&["run", SLIDE]);
     assert!(run.code == 2 && run.err.contains("this is a scenario, not a graph"), "{}", run.err);
-    assert!(run.err.contains("help: `tactflow verify` runs it"), "{}", run.err);
+    assert!(run.err.contains("help: run it with `tactflow verify`"), "{}", run.err);
 }
 
 #[test]

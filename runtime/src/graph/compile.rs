@@ -28,7 +28,7 @@ pub(crate) fn compile_in(mut loader: Loader, catalogue: &Catalogue, request: &Re
         .iter()
         .any(|d| matches!(d.code, Code::Syntax | Code::Unreadable | Code::EndlessPart | Code::WrongFile));
     if is_unreadable {
-        // The checks would report everything that an unread file declares as missing.
+        // The checks would report everything that a missing file declares as missing.
         return Err(Report::new(sources, diagnostics));
     }
     let net = Net::new(&flat, catalogue, &mut diagnostics);

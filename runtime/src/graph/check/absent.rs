@@ -9,7 +9,7 @@ use crate::source::{Code, Diagnostic, Diagnostics};
 
 /// Reports each condition on a port that is absent because nothing reads it in its mode.
 ///
-/// `demand` holds the components that each mode reads. `freezes` says which nodes make unread components absent.
+/// `demand` holds the components that each mode reads. `freezes` holds which nodes make unused components absent.
 pub(crate) fn check(
     net: &Net<'_>,
     modes: &[PlannedMode],

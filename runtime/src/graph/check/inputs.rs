@@ -14,7 +14,7 @@ pub(crate) fn check(net: &Net<'_>, diagnostics: &mut Diagnostics) {
             let is_misspelt = |key: &Key| {
                 !names().any(|name| name == key.name) && suggest_name(&key.name, names()) == Some(&input.name)
             };
-            let mut wired = node.block.wires.iter().map(|(key, _)| key).chain(&node.block.unread);
+            let mut wired = node.block.wires.iter().map(|(key, _)| key).chain(&node.block.invalid);
             if !wired.any(|key| key.name == input.name || is_misspelt(key)) {
                 let (key, name) = (&node.block.key, &input.name);
                 let message = format!("`{}` needs a wire to `in.{name}`, {}", key.name, input.kind.with_article());

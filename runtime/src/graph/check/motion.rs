@@ -15,7 +15,7 @@ use crate::source::{Code, Diagnostic, Diagnostics};
 
 /// Reports generated motion that nothing ends, in a mode or in a graph without modes.
 ///
-/// `still` says for each mode which nodes generate no motion. A graph without modes counts as one mode.
+/// `still` holds for each mode which nodes generate no motion. A graph without modes counts as one mode.
 pub(crate) fn check(net: &Net<'_>, modes: &[PlannedMode], still: &[Vec<bool>], diagnostics: &mut Diagnostics) {
     let commands = net.commands.iter().filter(|wire| !wire.is_report);
     let driving = net.upstream(commands.filter_map(|wire| wire.source.producer.node()));

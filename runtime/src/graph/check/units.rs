@@ -41,11 +41,11 @@ impl Units {
             Some(UnitPattern::Known(takes)) if takes == unit => return Ok(()),
             Some(UnitPattern::Known(takes)) => format!("`{takes}`"),
             Some(UnitPattern::Variable { name: letter, .. }) => {
-                let (takes, by) = self.known.entry(letter).or_insert_with(|| (unit, name.to_owned()));
+                let (takes, by) = self.known.entry(letter).or_insert_with(|| (unit, format!("`{name}`")));
                 if *takes == unit {
                     return Ok(());
                 }
-                format!("`{takes}`, the unit of `{by}`")
+                format!("`{takes}`, the unit of {by}")
             }
         };
         Err(UnitMismatch { has: format!("is in `{unit}`"), takes })
@@ -62,7 +62,7 @@ impl Units {
                     let unit = if per_tactel { unit.per_tactel() } else { *unit };
                     shape.set_unit(if per_second { unit.per_second() } else { unit });
                 } else if let Some(unit) = shape.unit().filter(|_| !per_tactel && !per_second) {
-                    self.known.insert(letter, (unit, name.to_owned()));
+                    self.known.insert(letter, (unit, format!("the output `{name}`")));
                 }
             }
             None | Some(UnitPattern::Any | UnitPattern::AnyRate) => {}
@@ -103,6 +103,6 @@ mod tests {
         }
         units.give(&port("W"), "n.y", &mut scalar("kPa"));
         let clash = units.take(&port("W"), "n.c", &scalar("N")).unwrap_err();
-        assert_eq!(clash.takes, "`kPa`, the unit of `n.y`", "a delayed input");
+        assert_eq!(clash.takes, "`kPa`, the unit of the output `n.y`", "a delayed input");
     }
 }

@@ -332,7 +332,7 @@ impl Loader {
             let is_misspelt = |key: &Key| {
                 !names().any(|name| name == key.name) && suggest_name(&key.name, names()) == Some(&input.name)
             };
-            let mut wired = part.wires.iter().map(|(key, _)| key).chain(&part.unread);
+            let mut wired = part.wires.iter().map(|(key, _)| key).chain(&part.invalid);
             if !wired.any(|key| key.name == input.name || is_misspelt(key)) {
                 let message = format!("part `{}` needs a wire to `in.{}`: {}", part.key.name, input.name, doc.text);
                 let diagnostic = Diagnostic::new(Code::MissingInput, part.key.span.clone(), message);

@@ -48,7 +48,7 @@ impl Param for Policy {
     }
 }
 
-/// Periods after which a value is too old, unless the graph says otherwise.
+/// Periods after which a value is too old, unless the graph sets another limit.
 const DEFAULT_MAX_AGE_PERIODS: f64 = 5.0;
 
 /// Returns the default maximum age of values that arrive every `period` [s], in seconds.

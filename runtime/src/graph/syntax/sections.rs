@@ -34,7 +34,7 @@ pub(crate) struct Block {
     pub(crate) kind: Option<Word>,
     pub(crate) wires: Vec<(Key, Word)>,
     /// Inputs whose wire is invalid and has its own diagnostic.
-    pub(crate) unread: Vec<Key>,
+    pub(crate) invalid: Vec<Key>,
     pub(crate) params: Value,
 }
 
@@ -45,7 +45,7 @@ pub(crate) struct PartBlock {
     pub(crate) file: Option<FilePath>,
     pub(crate) wires: Vec<(Key, Word)>,
     /// Inputs whose wire is invalid and has its own diagnostic.
-    pub(crate) unread: Vec<Key>,
+    pub(crate) invalid: Vec<Key>,
     pub(crate) set: Table,
 }
 
@@ -177,8 +177,8 @@ impl<'a> Sections<'a> {
     }
 
     fn node(&mut self, key: Key, mut table: Table, names: &[String]) -> Block {
-        let (wires, unread) = self.wires(&mut table);
-        Block { wires, unread, ..self.block(key, table, names) }
+        let (wires, invalid) = self.wires(&mut table);
+        Block { wires, invalid, ..self.block(key, table, names) }
     }
 
     fn block(&mut self, key: Key, mut table: Table, names: &[String]) -> Block {
@@ -196,11 +196,11 @@ impl<'a> Sections<'a> {
         };
         // A missing parameter is reported at the name of the block.
         let params = Value { span: key.span.clone(), item: Item::Table(table) };
-        Block { key, kind, wires: Vec::new(), unread: Vec::new(), params }
+        Block { key, kind, wires: Vec::new(), invalid: Vec::new(), params }
     }
 
     fn part_block(&mut self, key: Key, mut table: Table) -> PartBlock {
-        let (wires, unread) = self.wires(&mut table);
+        let (wires, invalid) = self.wires(&mut table);
         let set = table.remove("set").map(|(_, value)| value);
         let set = self.table(set.as_ref());
         let file = match table.remove("file") {
@@ -213,13 +213,13 @@ impl<'a> Sections<'a> {
             }
         };
         self.check_keys(&table, &["file", "in", "set"]);
-        PartBlock { key, file, wires, unread, set }
+        PartBlock { key, file, wires, invalid, set }
     }
 
     /// Reads the table `in` of a block: the valid wires, and the keys of the invalid ones.
     fn wires(&mut self, table: &mut Table) -> (Vec<(Key, Word)>, Vec<Key>) {
         let wires = table.remove("in").map(|(_, value)| value);
-        let (mut wires, unread) = self.wire_words(wires.as_ref());
+        let (mut wires, invalid) = self.wire_words(wires.as_ref());
         wires.retain(|(key, _)| {
             if key.name == "from" {
                 let diagnostic = Diagnostic::new(Code::BadName, key.span.clone(), "a wire cannot be named `from`");
@@ -228,7 +228,7 @@ impl<'a> Sections<'a> {
             }
             key.name != "from" && self.check_name(key)
         });
-        (wires, unread)
+        (wires, invalid)
     }
 
     /// Reports each key that is not one of `keys`.
@@ -261,16 +261,16 @@ impl<'a> Sections<'a> {
     ///
     /// Returns the valid wires, and the keys of the invalid ones.
     fn wire_words(&mut self, value: Option<&Value>) -> (Vec<(Key, Word)>, Vec<Key>) {
-        let (mut wires, mut unread) = (Vec::new(), Vec::new());
+        let (mut wires, mut invalid) = (Vec::new(), Vec::new());
         for (key, value) in self.table(value).entries {
             let from =
                 if value.as_table().is_some() { self.aged_wire(&value) } else { Word::read(&value, &mut self.reader) };
             match from {
                 Some(from) => wires.push((key, from)),
-                None => unread.push(key),
+                None => invalid.push(key),
             }
         }
-        (wires, unread)
+        (wires, invalid)
     }
 
     /// Reads a wire with an age limit.
