@@ -8,7 +8,7 @@
 //! A graph runs from Rust on sources that a test feeds, in virtual time:
 //!
 //! ```
-//! use tactflow_runtime::harness::{GraphRig, Source};
+//! use tactflow_runtime::harness::{FedRole, GraphRig};
 //! use tactflow_runtime::signal::{Image, ImageShape, Unit};
 //!
 //! let graph = r#"
@@ -19,11 +19,11 @@
 //!     in.image = "pad.image"
 //! "#;
 //! let shape = ImageShape { rows: 2, cols: 2, pitch: [0.005; 2], unit: Unit::NEWTON };
-//! let pad = Source { role: "pad", kind: "tactile_pad", period: 0.004, outputs: vec![shape.into()], commands: vec![] };
+//! let pad = FedRole::new("pad", "tactile_pad", 4.0).output("image", shape);
 //! let mut rig = GraphRig::new(tactflow_nodes::catalogue(), graph, vec![pad])
 //!     .unwrap_or_else(|report| panic!("{}", report.render(false)));
 //!
-//! rig.feed("pad", 0, 0.0, Image::from_cells(2, &[0.5, 0.0, 0.0, 1.5]));
+//! rig.feed("pad.image", 0.0, Image::from_cells(2, &[0.5, 0.0, 0.0, 1.5]));
 //! rig.tick(0.0)?;
 //! assert_eq!(rig.get("source.sum"), Some(&2.0));
 //! # Ok::<(), tactflow_runtime::fault::Fault>(())
@@ -50,6 +50,7 @@ pub mod touch;
 
 use tactflow_runtime::catalogue::Catalogue;
 use tactflow_runtime::node::{At, Mistake};
+use tactflow_runtime::signal::{Scalar, Twist};
 use tactflow_runtime::source::Code;
 
 #[cfg(feature = "cli")]
@@ -108,8 +109,8 @@ pub fn catalogue() -> Catalogue {
         .node::<arm::ik_sink::IkSink>()
         .group("flow: what waits, chooses, generates and shows")
         .node::<flow::contact_debounce::ContactDebounce>()
-        .node::<flow::gate::Gate>()
-        .node::<flow::gate::TwistGate>()
+        .node::<flow::gate::Gate<Scalar>>()
+        .node::<flow::gate::Gate<Twist>>()
         .node::<flow::switch::Switch>()
         .node::<flow::switch::TwistSwitch>()
         .node::<flow::delay::Delay>()

@@ -8,7 +8,7 @@ use tactflow_runtime::signal::Kind;
 
 fn port(name: &'static str, doc: &'static str, kind: Kind, args: &'static [&'static str]) -> PortSpec {
     let args = args.iter().map(|arg| Cow::Borrowed(*arg)).collect();
-    PortSpec { name: name.into(), doc: doc.into(), kind, args, need: Need::Required }
+    PortSpec { name: name.into(), doc: doc.into(), kind, args, need: Need::REQUIRED }
 }
 
 /// An array of tactels.

@@ -1,13 +1,18 @@
 //! What a graph may be made of: a plain list of node types, device types and roles.
 
+mod checks;
+
+use std::collections::BTreeMap;
+
 use crate::device::{Device, DeviceType, RoleType, device_type};
-use crate::node::{Node, NodeSpec, NodeType, declares_a_unit, of};
-use crate::signal::Kind;
+use crate::node::{Node, NodeSpec, NodeType, of};
 use crate::source::BuiltinFile;
 
 /// A list of node types, device types and roles. Several can be joined: somebody else's crate adds its own.
 #[derive(Default)]
 pub struct Catalogue {
+    /// What each name is of.
+    names: BTreeMap<String, &'static str>,
     nodes: Vec<Box<dyn NodeType>>,
     /// The declaration of each node type.
     specs: Vec<NodeSpec>,
@@ -41,20 +46,24 @@ impl Catalogue {
     /// With one more node that is known only at run time.
     ///
     /// # Panics
-    /// If there is a node of that name already, if a port declares a unit that is neither one nor a variable, or if a
-    /// node logs and has no flag to say when.
+    /// If something has that name already, or if the declaration is wrong: a unit, a default that is not in its own range, an
+    /// example that is not of this type or names what the node does not have, or a node that logs without a flag to say
+    /// when.
     #[must_use]
     pub fn node_type(mut self, node: Box<dyn NodeType>) -> Self {
         let spec = node.spec();
-        assert!(self.find_node(&spec.name).is_none(), "two nodes are called `{}`", spec.name);
-        for port in spec.inputs.iter().chain(&spec.outputs) {
-            assert!(declares_a_unit(port), "`{}.{}` declares the unit {:?}", spec.name, port.name, port.args.first());
-        }
-        let says_when = spec.outputs.first().is_some_and(|port| port.kind == Kind::Flag);
-        assert!(!spec.logs || says_when, "the first output of `{}` is no flag that says when to log", spec.name);
+        self.claim(&spec.name, "node");
+        checks::node(&spec);
         self.nodes.push(node);
         self.specs.push(spec);
         self
+    }
+
+    /// Takes a name, which describes one thing only.
+    fn claim(&mut self, name: &str, what: &'static str) {
+        if let Some(other) = self.names.insert(name.to_owned(), what) {
+            panic!("a {other} and a {what} are both called `{name}`");
+        }
     }
 
     /// With one more device.
@@ -64,15 +73,24 @@ impl Catalogue {
     }
 
     /// With one more device that is known only at run time.
+    ///
+    /// # Panics
+    /// As [`node_type`](Self::node_type).
     #[must_use]
     pub fn device_type(mut self, device: Box<dyn DeviceType>) -> Self {
+        self.claim(&device.name(), "device");
+        checks::device(&device.name(), &device.params(), &device.example());
         self.devices.push(device);
         self
     }
 
     /// With one more role.
+    ///
+    /// # Panics
+    /// If something has that name already.
     #[must_use]
     pub fn role(mut self, role: RoleType) -> Self {
+        self.claim(&role.name, "role");
         self.roles.push(role);
         self
     }
@@ -93,8 +111,8 @@ impl Catalogue {
         self.groups.extend(start.filter(|_| other.groups.first().is_none_or(|(at, _)| *at > 0)));
         self.groups.extend(other.groups.iter().map(|(at, title)| (before + at, *title)));
         self = other.nodes.into_iter().fold(self, Self::node_type);
-        self.devices.extend(other.devices);
-        self.roles.extend(other.roles);
+        self = other.devices.into_iter().fold(self, Self::device_type);
+        self = other.roles.into_iter().fold(self, Self::role);
         self.files.extend(other.files);
         self
     }
@@ -158,7 +176,8 @@ impl Catalogue {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::node::{Configured, NodeSpec, Reader};
+    use crate::node::{Bounds, Configured, Declared, Need, ParamSpec, PortSpec, Reader};
+    use crate::signal::Scalar;
     use crate::source::Value;
 
     /// A node of which only the name matters.
@@ -189,6 +208,98 @@ mod tests {
 
     fn named(catalogue: Catalogue, name: &'static str) -> Catalogue {
         catalogue.node_type(Box::new(Named(name)))
+    }
+
+    /// A node whose declaration is as wrong as `spec` makes it.
+    struct Wrong(Change);
+
+    type Change = fn(&mut NodeSpec);
+
+    impl NodeType for Wrong {
+        fn spec(&self) -> NodeSpec {
+            let mut spec = Named("wrong").spec();
+            let port = PortSpec::of::<Scalar>("x", "", &[("unit", "U"), ("frame", "A")], Need::REQUIRED);
+            (spec.inputs, spec.outputs) = (vec![port.clone()], vec![port]);
+            (self.0)(&mut spec);
+            spec
+        }
+
+        fn configure(&self, _: &Value, _: &mut Reader<'_>) -> Option<Box<dyn Configured>> {
+            None
+        }
+    }
+
+    /// What the panic says that `make` ends in.
+    fn panic_message(make: impl FnOnce() -> Catalogue + std::panic::UnwindSafe) -> String {
+        let panic = std::panic::catch_unwind(make).err().expect("it panics");
+        panic.downcast_ref::<String>().cloned().expect("a message with names in it")
+    }
+
+    #[test]
+    fn a_wrong_declaration_is_one_message_that_names_the_node_and_the_field() {
+        let bounded = |default: fn() -> f64| {
+            let declared = Declared { bounds: Some(Bounds::above(0.0)), ..Declared::new("gain") };
+            ParamSpec::of::<f64>(&declared, Some(default))
+        };
+        assert_eq!(bounded(|| 1.0).fault, None);
+        let cases: [(Change, &str); 9] = [
+            (
+                |spec| spec.outputs[0].args = vec!["newton".into()].into(),
+                "`wrong.x` declares the unit Some(\"newton\")",
+            ),
+            (|spec| spec.inputs.push(spec.inputs[0].clone()), "two inputs of `wrong` are called `x`"),
+            (|spec| spec.logs = true, "the first output of `wrong` is no flag that says when to log"),
+            (
+                |spec| spec.outputs[0].args = vec!["U".into(), "$frame".into()].into(),
+                "`wrong.x` names the parameter `frame`, which `wrong` does not have",
+            ),
+            (
+                |spec| {
+                    let declared = Declared { bounds: Some(Bounds::above(0.0)), ..Declared::new("gain") };
+                    spec.params.push(ParamSpec::of::<f64>(&declared, Some(|| -1.0)));
+                },
+                "the default of parameter `gain` of `wrong` is refused: expected a number greater than 0, found -1",
+            ),
+            (
+                |spec| spec.example = "[nodes.a]\ntype = \"other\"".into(),
+                "the example of `wrong` has no block in `[nodes]` with `type = \"wrong\"`",
+            ),
+            (
+                |spec| spec.example = "[nodes.a]\ntype = \"wrong\"\nin.x = \"b.c\"\ngian = 1".into(),
+                "the example of `wrong` sets `gian`, which is no parameter of it",
+            ),
+            (
+                |spec| spec.example = "[nodes.a]\ntype = \"wrong\"\nin.y = \"b.c\"".into(),
+                "the example of `wrong` wires `in.y`, which it does not have",
+            ),
+            (|spec| spec.example = "[nodes.a]\ntype = \"wrong\"".into(), "the example of `wrong` does not wire `in.x`"),
+        ];
+        for (change, expected) in cases {
+            assert_eq!(panic_message(move || Catalogue::new().node_type(Box::new(Wrong(change)))), expected);
+        }
+        let text = panic_message(|| Catalogue::new().node_type(Box::new(Wrong(|spec| spec.example = "[nodes".into()))));
+        assert!(text.starts_with("the example of `wrong` is no TOML: "), "{text}");
+    }
+
+    #[test]
+    fn a_name_describes_one_thing_only() {
+        let twice = |make: fn() -> Catalogue| panic_message(make);
+        assert_eq!(twice(|| named(named(Catalogue::new(), "a"), "a")), "a node and a node are both called `a`");
+        let role = || RoleType {
+            name: "a".into(),
+            summary: "".into(),
+            outputs: vec![],
+            commands: vec![],
+            reports: vec![],
+            limits: vec![],
+            is_observed: false,
+        };
+        assert_eq!(
+            panic_message(|| named(Catalogue::new().role(role()), "a")),
+            "a role and a node are both called `a`"
+        );
+        let join = || Catalogue::new().role(role()).join(Catalogue::new().role(role()));
+        assert_eq!(panic_message(join), "a role and a role are both called `a`");
     }
 
     #[test]

@@ -1,63 +1,65 @@
-//! What a run says when it went wrong: which node, which port, in which tick, and why.
+//! Faults: the node, the port, the tick and the cause of what went wrong in a run.
 
 use std::fmt;
 
-/// Why a run ended in a fault.
+/// The cause of a fault.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Cause {
-    /// A value that is not finite was written.
+    /// A value is not finite.
     NotFinite,
-    /// A node panicked.
+    /// A node panicked, with this message.
     Panicked(String),
-    /// A device failed.
+    /// A device failed, with this message.
     Device(String),
+    /// A device has reported a port as lost, for this reason.
+    Lost(String),
     /// The newest sample of a role is too old.
     Stale {
-        /// How old it is [ns].
+        /// Age of the sample [ns].
         age: i64,
-        /// How old it may be [ns].
+        /// Maximum age [ns].
         max_age: i64,
     },
-    /// What comes to a node over a wire is too old.
+    /// The value of a wire is too old for its node, command or report.
     StaleWire(Box<StaleWire>),
-    /// The clock device is silent.
+    /// The clock device sends no samples.
     SilentClock,
     /// A tick began too late.
     Late {
-        /// By how much [ns].
+        /// Delay of the tick [ns].
         by: i64,
     },
-    /// The operator wanted it.
+    /// The operator sent `stop`.
     Operator,
-    /// A mode came to what it calls a failure.
+    /// A `fail` condition of a mode holds: its text.
     Mode(String),
 }
 
-/// What came over a wire that may grow only so old.
+/// A value that is older than its wire allows.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct StaleWire {
-    /// The port it comes from.
+    /// The source port.
     pub from: String,
-    /// How old it is [ns].
+    /// Age of the value [ns].
     pub age: i64,
-    /// How old it may be [ns].
+    /// Maximum age [ns].
     pub max_age: i64,
 }
 
-/// A controlled stop with its reason.
+/// A fault of a run: what went wrong, where and when.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Fault {
-    /// The node, the role or the device.
+    /// Name of the node, the role, the device or the mode.
     pub node: String,
-    /// The port, where it was one.
+    /// Name of the port, if the fault is at a port.
     pub port: Option<String>,
     /// Number of the tick.
     pub tick: u64,
     /// Time of the tick in the graph's clock [ns].
     pub time: i64,
-    /// Why.
+    /// The cause.
     pub cause: Cause,
-    /// `file:line:column` of what is at fault.
+    /// Source location of the node, device, wire or condition as `file:line:column`; empty if there is none.
     pub place: String,
 }
 
@@ -71,16 +73,17 @@ impl fmt::Display for Fault {
             Cause::NotFinite => write!(f, "`{name}` is not a finite number")?,
             Cause::Panicked(message) => write!(f, "node `{name}` panicked: {message}")?,
             Cause::Stale { age, max_age } => {
-                write!(f, "`{name}` is {:.1} ms old, and may be {:.1} ms old", ms(*age), ms(*max_age))?;
+                write!(f, "`{name}` is {:.1} ms old, but the maximum is {:.1} ms", ms(*age), ms(*max_age))?;
             }
             Cause::StaleWire(wire) => {
                 let StaleWire { from, age, max_age } = &**wire;
-                write!(f, "`{from}` is {:.1} ms old for `{name}`, and may be {:.1} ms old", ms(*age), ms(*max_age))?;
+                write!(f, "`{from}` is {:.1} ms old at `{name}`, but the maximum is {:.1} ms", ms(*age), ms(*max_age))?;
             }
             Cause::SilentClock => write!(f, "the clock device `{name}` is silent")?,
             Cause::Late { by } => write!(f, "a tick began {:.1} ms late", ms(*by))?,
-            Cause::Operator => write!(f, "the operator stopped it")?,
+            Cause::Operator => write!(f, "the operator sent `stop`")?,
             Cause::Mode(why) => write!(f, "mode `{name}` failed: {why}")?,
+            Cause::Lost(why) => write!(f, "`{name}` is lost: {why}")?,
             Cause::Device(message) => write!(f, "device `{name}` failed: {message}")?,
         }
         write!(f, " in tick {} at {:.3} s", self.tick, self.time as f64 * 1e-9)?;

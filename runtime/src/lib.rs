@@ -1,9 +1,19 @@
-//! tactflow's runtime: what a tactile-servoing graph is, how it is checked, and how it runs.
+//! The runtime of tactflow: loads, checks and runs the dataflow graphs of tactile servoing.
 //!
-//! It knows no node, no sensor and no robot: those stand in a [`Catalogue`](catalogue::Catalogue). In reading order:
-//! [`signal`] (what travels on a wire), [`node`] (the contract), [`graph`] (text in, plan or all mistakes out),
-//! [`diagnostic`] (what load says) and [`fault`] (what a run says), [`engine`] (the tick), [`device`] (the edge),
-//! [`record`], [`scenario`] (what must come out of a run), [`harness`], and `cli` (the command line as a library function, behind the feature `cli`).
+//! The runtime contains no node, sensor or robot; they are registered in a [`Catalogue`](catalogue::Catalogue). Modules in
+//! reading order:
+//!
+//! - [`signal`]: the kinds of values on wires, their shapes, units and freshness
+//! - [`node`]: the contract of nodes
+//! - [`source`] and [`graph`]: graph files, compiled to a plan or to diagnostics for every mistake
+//! - [`engine`]: the tick and the run around it; [`fault`]: what ends or halts a run
+//! - [`device`]: the contract of devices
+//! - [`record`]: recordings of runs; [`scenario`]: checks on the results of runs
+//! - [`harness`]: test rigs for nodes and graphs
+//! - `cli`: the command line as a library, behind the feature `cli`
+
+// The derives name this crate from outside; they work inside it too.
+extern crate self as tactflow_runtime;
 
 pub mod catalogue;
 #[cfg(feature = "cli")]

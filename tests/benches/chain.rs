@@ -16,7 +16,7 @@ pub(crate) fn chain(count: usize) -> GraphRig {
     }
     let mut rig = GraphRig::new(catalogue(), &text, vec![length_by_hand("a")])
         .unwrap_or_else(|report| panic!("{}", report.render(false)));
-    rig.feed("a", 0, 0.0, 1.0);
+    rig.feed("a.value", 0.0, 1.0);
     rig.tick(0.0).expect("a chain cannot fail");
     rig
 }

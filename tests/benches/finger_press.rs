@@ -5,7 +5,7 @@ use std::path::Path;
 use tactflow_nodes::recordings::{self, Hints, Recording};
 use tactflow_runtime::engine::Engine;
 use tactflow_runtime::graph::{Request, compile};
-use tactflow_runtime::signal::{Joints, Signal};
+use tactflow_runtime::signal::Joints;
 use tactflow_tests::{catalogue, workspace};
 
 use crate::fused::Fused;
@@ -28,7 +28,7 @@ fn read(path: &Path) -> Vec<u8> {
 
 fn joints(engine: &Engine, name: &str) -> [f64; 7] {
     let (_, id) = engine.ports().iter().find(|(port, _)| port.name == name).expect("the graph has that port");
-    Joints::arena(&engine.bus().arenas)[id.slot as usize].0[..].try_into().expect("seven joints")
+    engine.bus().slot::<Joints>(*id).0[..].try_into().expect("seven joints")
 }
 
 impl Pair {

@@ -35,8 +35,8 @@ def check(graphs):
 
 def listed(entries):
     for entry in entries:
-        assert entry["name"] and entry["summary"] and set(entry) == {"sort", "name", "summary", "group"}, entry
-    print(" ".join(f"{entry['sort']}:{entry['name']}" for entry in entries))
+        assert entry["name"] and entry["summary"] and set(entry) == {"category", "name", "summary", "group"}, entry
+    print(" ".join(f"{entry['category']}:{entry['name']}" for entry in entries))
 
 
 def params(entries, path=""):
@@ -49,7 +49,7 @@ def params(entries, path=""):
 
 def described(entries):
     for entry in entries:
-        print(f"{entry['sort']} {entry['name']}: {entry['summary']}")
+        print(f"{entry['category']} {entry['name']}: {entry['summary']}")
         for sort in ("inputs", "outputs", "commands"):
             for port in entry[sort]:
                 frames = " in ".join(port["frames"])
@@ -64,10 +64,10 @@ def settings(entries):
     for setting in entries:
         origin = setting["origin"]
         assert origin in ("written", "default", "fact"), setting
-        assert (setting["place"] is None) == (origin == "default"), setting
-        assert (setting["fact"] is None) == (origin != "fact"), setting
+        assert ("place" in setting) == (origin != "default"), setting
+        assert ("fact" in setting) == (origin == "fact"), setting
         where = "" if origin == "default" else " " + place(setting["place"])
-        fact = f" {setting['fact']}" if setting["fact"] else ""
+        fact = f" {setting['fact']}" if origin == "fact" else ""
         print(f"{setting['path']} = {json.dumps(setting['value'])} {origin}{fact}{where}")
 
 
@@ -75,7 +75,8 @@ def shown(graph):
     print("[policy]")
     settings(graph["policy"])
     for node in graph["nodes"] + graph["devices"]:
-        print(f"[{node['name']}] {node['type']}")
+        assert place(node["type"]["place"])
+        print(f"[{node['name']}] {node['type']['text']}")
         for wire in node["inputs"]:
             assert (wire["max_age_ms"] is None) == (wire["stale"] is None), wire
             age = f" {wire['max_age_ms']} ms {wire['stale']}" if wire["stale"] else ""

@@ -18,6 +18,6 @@ for scenario in said["scenarios"]:
     marks = " ".join(row["mark"] for row in scenario["rows"])
     for row in scenario["rows"]:
         assert len(row["values"]) == len(runs), row
-        assert (row["judged"] is None) == (row["mark"] == "told"), row
+        assert (row["judged"] is None) == (row["mark"] == "informational"), row
     print(f"{scenario['name']}: {ok}, {len(runs)} runs, {failed} failed, {marks}")
 assert said["ok"] == all(scenario["ok"] for scenario in said["scenarios"])

@@ -1,5 +1,6 @@
 //! What the tests share: where things are, and small nodes that make one sentence of the semantics visible.
 
+pub mod devices;
 pub mod examples;
 pub mod nodes;
 pub mod saboteur;
@@ -44,5 +45,5 @@ pub fn toml_files(folder: &Path) -> Vec<PathBuf> {
 /// Everything that ships, and the nodes of the tests.
 #[must_use]
 pub fn catalogue() -> Catalogue {
-    tactflow_nodes::catalogue().join(nodes::catalogue())
+    tactflow_nodes::catalogue().join(nodes::catalogue()).join(devices::catalogue())
 }

@@ -119,7 +119,7 @@ impl AnyNode for Saboteur {
         assert!(!(is_due && self.sabotage.how == How::Panic), "sabotage");
         self.sound.step(tick, bus, wires, outputs);
         if is_due {
-            let there = self.kinds.iter().zip(outputs).filter(|(_, id)| bus.marks[id.mark as usize].is_present());
+            let there = self.kinds.iter().zip(outputs).filter(|(_, id)| bus.mark(**id).is_present());
             let there: Vec<(Kind, PortId)> = there.map(|(kind, id)| (*kind, *id)).collect();
             there.into_iter().any(|(kind, id)| spoil(bus, kind, id, tick));
         }

@@ -4,10 +4,10 @@
 //! of it is known in closed form. The image has white noise of the seed, the truth has none.
 
 use tactflow_nodes::random::Random;
-use tactflow_runtime::device::{Commands, Description, Device, DeviceError, Driver, Filled, Opened, Samples, Stepped};
+use tactflow_runtime::device::{Commands, Description, Device, DeviceError, Driver, Opened, Output, Samples, Stepped};
 use tactflow_runtime::node::{Mistakes, NonNegative, Positive};
 use tactflow_runtime::params;
-use tactflow_runtime::signal::{Image, ImageShape, Scalar, ScalarShape, Shape, Unit};
+use tactflow_runtime::signal::{Image, ImageShape, Scalar, ScalarShape, Unit};
 
 params! {
     /// Seed of the noise.
@@ -32,6 +32,10 @@ params! {
 #[derive(Debug)]
 pub struct TruePad {
     params: Params,
+    image: Output<Image>,
+    /// Each number of the truth with its name.
+    truth: Vec<(&'static str, Output<Scalar>)>,
+    clean: Output<Image>,
     random: Random,
     next: i64,
 }
@@ -42,35 +46,52 @@ const PITCH: f64 = 0.005;
 const FORCE: f64 = 3.0;
 const RADIUS: f64 = 0.012;
 
-/// Units of the truth's scalars, in the order of the role; the image stands between.
-const TRUTH: [&str; 14] = ["N", "N", "N", "m", "m", "N/tactel", "rad", "m2", "m", "image", "rad", "m", "m", "1"];
+/// Names and units of the truth's scalars.
+const TRUTH: [(&str, &str); 15] = [
+    ("force", "N"),
+    ("tangential", "N"),
+    ("peak", "N"),
+    ("x", "m"),
+    ("y", "m"),
+    ("pressure", "N/tactel"),
+    ("orientation", "rad mod pi"),
+    ("area", "m2"),
+    ("depth", "m"),
+    ("tilt", "rad"),
+    ("path", "m"),
+    ("distance", "m"),
+    ("coverage", "1"),
+    ("common_noise", "N/tactel"),
+    ("own_noise", "N/tactel"),
+];
+
+impl tactflow_runtime::node::Describe for TruePad {
+    const NAME: &'static str = "true_pad";
+    const SUMMARY: &'static str = "a pad that is pressed, and that knows the truth of it";
+}
 
 impl Device for TruePad {
     type Params = Params;
 
-    const NAME: &'static str = "true_pad";
-    const SUMMARY: &'static str = "a pad that is pressed, and that knows the truth of it";
-
     fn open(params: Params) -> Result<Opened, Mistakes> {
-        let image: Shape = ImageShape { rows: SIDE, cols: SIDE, pitch: [PITCH; 2], unit: Unit::NEWTON }.into();
-        let truth = TRUTH.map(|unit| match unit {
-            "image" => image.clone(),
-            unit => ScalarShape::of(unit.parse().expect("it is a unit")).into(),
-        });
+        let shape = ImageShape { rows: SIDE, cols: SIDE, pitch: [PITCH; 2], unit: Unit::NEWTON };
         let calibration = toml::Table::from_iter([("gain".to_owned(), 1.0.into())]);
-        let facts = vec![
-            ("threshold".into(), 0.015.into()),
-            ("pressure".into(), 0.1.into()),
-            ("calibration".into(), calibration.into()),
-            ("noise".into(), (*params.noise).into()),
-        ];
-        let pad = Filled { role: "tactile_pad".into(), outputs: vec![image], commands: vec![], facts };
-        let truth = Filled { role: "ground_truth".into(), outputs: truth.into(), commands: vec![], facts: vec![] };
+        let mut description = Description::every(PERIOD as f64 * 1e-9);
+        let mut pad = description.fills("tactile_pad");
+        pad.fact("threshold", 0.015);
+        pad.fact("pressure", 0.1);
+        pad.fact("calibration", calibration);
+        pad.fact("noise", *params.noise);
+        let image = pad.output("image", shape.clone());
+        let mut truth = description.fills("ground_truth");
+        let clean = truth.output("image", shape);
+        let number = |(name, unit): (&'static str, &str)| {
+            (name, truth.output(name, ScalarShape::of(unit.parse().expect("it is a unit"))))
+        };
+        let truth = TRUTH.map(number).into();
         let random = Random::new(params.seed, 0);
-        Ok(Opened {
-            description: Description { fills: vec![pad, truth], period: PERIOD as f64 * 1e-9 },
-            driver: Driver::Stepped(Box::new(Self { params, random, next: 0 })),
-        })
+        let pad = Self { params, image, truth, clean, random, next: 0 };
+        Ok(Opened { description, driver: Driver::Stepped(Box::new(pad)) })
     }
 }
 
@@ -116,17 +137,19 @@ impl Stepped for TruePad {
         let image = contact.map_or_else(|| vec![0.0; SIDE * SIDE], clean);
         let noisy: Vec<f32> =
             image.iter().map(|cell| cell + (*self.params.noise * self.random.normal()) as f32).collect();
-        samples.write::<Image>(0, stamp, sequence).cells_mut().copy_from_slice(&noisy);
-        samples.write::<Image>(10, stamp, sequence).cells_mut().copy_from_slice(&image);
-        *samples.write::<Scalar>(1, stamp, sequence) = if contact.is_some() { FORCE } else { 0.0 };
-        for (port, value) in [(4, contact), (5, contact.map(|_| 0.0))] {
+        samples.write(self.image, stamp, sequence).cells_mut().copy_from_slice(&noisy);
+        samples.write(self.clean, stamp, sequence).cells_mut().copy_from_slice(&image);
+        for (name, port) in &self.truth {
+            let value = match *name {
+                "force" => Some(if contact.is_some() { FORCE } else { 0.0 }),
+                "x" => contact,
+                "y" => contact.map(|_| 0.0),
+                _ => None,
+            };
             match value {
-                Some(value) => *samples.write::<Scalar>(port, stamp, sequence) = value,
-                None => samples.clear(port, stamp, sequence),
+                Some(value) => *samples.write(*port, stamp, sequence) = value,
+                None => samples.clear(*port, stamp, sequence),
             }
-        }
-        for port in (1..=TRUTH.len()).filter(|port| ![1, 4, 5, 10].contains(port)) {
-            samples.clear(port, stamp, sequence);
         }
         Ok(())
     }

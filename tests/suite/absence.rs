@@ -1,6 +1,6 @@
 //! What absence does on the way from a pad to a twist, one test a sentence.
 
-use tactflow_runtime::harness::{GraphRig, Source};
+use tactflow_runtime::harness::{FedRole, GraphRig};
 use tactflow_runtime::signal::{Features, Flag, Freshness, Image, ImageShape, Scalar, Twist, Unit};
 use tactflow_tests::catalogue;
 use tactflow_tests::nodes::length_by_hand;
@@ -27,8 +27,8 @@ fn rig(lengths: &[&'static str], nodes: &str) -> GraphRig {
     let declared: String = lengths.iter().map(|role| format!("{role} = \"length\"\n")).collect();
     let text = format!("[graph]\nclock = \"pad\"\n[roles]\npad = \"tactile_pad\"\n{declared}{TOUCH}{nodes}");
     let shape = ImageShape { rows: 8, cols: COLS, pitch: [0.005; 2], unit: Unit::NEWTON };
-    let pad = Source { role: "pad", kind: "tactile_pad", period: 0.01, outputs: vec![shape.into()], commands: vec![] };
-    let sources = std::iter::once(pad).chain(lengths.iter().map(|role| length_by_hand(role))).collect();
+    let pad = FedRole::new("pad", "tactile_pad", 10.0).output("image", shape);
+    let sources = std::iter::once(pad).chain(lengths.iter().map(|role| length_by_hand(role)));
     GraphRig::new(catalogue(), &text, sources).unwrap_or_else(|report| panic!("{}", report.render(false)))
 }
 
@@ -41,7 +41,7 @@ fn press(tactels: &[(usize, usize)]) -> Image {
 
 /// The pad shows `image` at `ms`, and the graph ticks.
 fn show(rig: &mut GraphRig, ms: f64, image: Image) {
-    rig.feed("pad", 0, ms, image);
+    rig.feed("pad.image", ms, image);
     rig.tick(ms).unwrap();
 }
 
@@ -106,7 +106,7 @@ in.sampled = \"a.value\"
 in.trigger = \"moments.x\"
 ";
     let mut rig = rig(&["a"], nodes);
-    rig.feed("a", 0, 0.0, 1.0);
+    rig.feed("a.value", 0.0, 1.0);
     show(&mut rig, 0.0, press(&SQUARE));
     assert_eq!((rig.get("pair.steps"), rig.get("pair.there")), (Some(&1.0), Some(&1.0)));
     show(&mut rig, 10.0, press(&[]));

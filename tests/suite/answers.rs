@@ -37,7 +37,7 @@ fn a_list_finds_a_node_by_what_it_is_for() {
         "Nodes, servo: from features to a twist of the sensor",
         "  pid               a PID controller on every feature, for force and position control",
         "  tactile_pad   an array of tactels that gives an image",
-        "  pose      where one frame is in another",
+        "  pose      the position and orientation of one frame in another",
     ];
     assert_lines(&all.out, &lines);
     assert!(all.out.lines().all(|line| line.chars().count() <= 100), "{}", all.out);
@@ -54,7 +54,7 @@ fn a_list_finds_a_node_by_what_it_is_for() {
     }
     assert_eq!(json(&["list", "nodes", "unicorn"], 2), "\n");
     let nothing = say(&["list", "nodes", "unicorn"]);
-    let message = "error: nothing in the catalogue speaks of `nodes unicorn`\n";
+    let message = "error: nothing in the catalogue matches `nodes unicorn`\n";
     assert_eq!((nothing.code, nothing.out.as_str(), nothing.err.as_str()), (2, "", message));
 }
 
@@ -66,28 +66,28 @@ fn a_description_says_everything_of_a_node() {
         "pid (node)",
         "A PID controller on every feature, for force and position control.",
         "Steps when an input that wakes it is new or lost.",
-        "  in.error  features, any unit, frame A; required, wakes the node",
-        "  control  features, any unit per second, frame A",
+        "  in.error  features, unit E, frame A; required, wakes the node",
+        "  control  features, unit E/s, frame A",
         "  gains.NAME.kp      a number; default 0.0",
         "                     Proportional gain [1/s].",
     ];
     assert_lines(&text.out, &lines);
     assert!(text.out.contains("`feature_error.error`"), "{}", text.out);
     let lines = [
-        "input error | features | _ | A | required, wakes the node",
-        "output control | features | _/s | A | None",
+        "input error | features | E | A | required, wakes the node",
+        "output control | features | E/s | A | None",
         "param gains | a table, for each name a table | None | required",
         "param gains.kp | a number | 1/s | 0.0",
     ];
     assert_lines(&json(&["describe", "pid"], 0), &lines);
     let markdown = say(&["describe", "pid", "--format", "markdown"]).out;
-    assert!(markdown.contains("## Inputs\n\n- **`in.error`**: features, any unit, frame A; required"), "{markdown}");
+    assert!(markdown.contains("## Inputs\n\n- **`in.error`**: features, unit E, frame A; required"), "{markdown}");
 }
 
 #[test]
 fn a_description_says_what_a_kind_a_role_and_a_device_are() {
     let cases: [(&str, &[&str]); 3] = [
-        ("twist", &["twist (kind)", "Taken by", "projector.twist twist, frame A", "Given by"]),
+        ("twist", &["twist (kind)", "Taken by", "projector.twist twist, frame A", "Produced by"]),
         (
             "velocity_arm",
             &["velocity_arm (role)", "Filled by the devices: `mock_arm`, `sim_bench`, `lockstep`.", "Commands"],
@@ -111,13 +111,13 @@ fn a_name_that_is_misspelt_is_guessed() {
         (["describe", "twst"], "help: did you mean `twist`?"),
         (
             ["describe", "zzzzzz"],
-            "help: `tactflow list` shows what there is, and `tactflow list zzzzzz` where the word occurs",
+            "help: `tactflow list` prints all names, and `tactflow list zzzzzz` those whose documentation has that word",
         ),
     ];
     for (args, help) in cases {
         let said = say(&args);
         assert_eq!((said.code, said.out.as_str()), (2, ""), "{args:?}");
-        let first = format!("error: there is no node, device, role, kind or file `{}`", args[1]);
+        let first = format!("error: unknown node, device, role, kind or file `{}`", args[1]);
         assert_eq!(said.err, format!("{first}\n{help}\n"));
     }
 }
@@ -156,7 +156,7 @@ address = \"127.0.0.1:4000\"
     let folder = TempDir::new().unwrap();
     fs::write(folder.path().join("try.toml"), graph.out).unwrap();
     let checked = said(tool(&["check", "try.toml"]).current_dir(folder.path()));
-    assert_eq!((checked.code, checked.out.as_str()), (0, "try.toml: ok, 2 nodes, a tick each 10 ms\n"));
+    assert_eq!((checked.code, checked.out.as_str()), (0, "try.toml: ok, 2 nodes, one tick every 10 ms\n"));
     // A device comes with what reads it, and a role with the first device that fills it.
     let of_device = say(&["describe", "line_length", "--example"]).out;
     assert!(
@@ -174,7 +174,7 @@ fn a_graph_is_shown_with_where_everything_comes_from() {
     let text = say(&TASK);
     assert_eq!((text.code, text.err.as_str()), (0, ""));
     let lines = [
-        "# tests/data/shown/task.toml as it runs: 7 nodes, a tick each 4 ms",
+        "# tests/data/shown/task.toml as it runs: 7 nodes, one tick every 4 ms",
         "max_gap_ms = 30        # tests/data/shown/task.toml:5",
         "reset_after_ms = 20.0  # default",
         "[nodes.outer.inner.binarize]",
@@ -182,13 +182,13 @@ fn a_graph_is_shown_with_where_everything_comes_from() {
         "in.image = \"pad.image\"  # tests/data/shown/task.toml:12",
         "threshold = 0.03        # fact pad.threshold (tests/data/shown/bench.toml:4)",
         "in.mask = \"outer.inner.binarize.mask\"  # tests/data/shown/inner.toml:15",
-        "# gives mask: mask, 16 x 16, in pad",
+        "# output mask: mask, 16 x 16, in pad",
         "min_area = 6                           # tests/data/shown/task.toml:13",
         "setpoint.force = 1.0                    # tests/data/shown/task.toml:26",
         "gains.force.kp = 2.0      # tests/data/shown/task.toml:31",
         "gains.force.ki = 0.5      # command line",
         "gains.force.kd = 0.0      # default",
-        "# gives control: features force [N/s], in pad",
+        "# output control: features force [N/s], in pad",
         "pad = \"skin\"  # tests/data/shown/bench.toml:2",
         "[devices.skin]",
         "rate_hz = 250.0    # default",
@@ -277,7 +277,10 @@ fn diagnostics_are_there_for_programs() {
 fn a_warning_fails_nothing_unless_it_is_asked_to() {
     let graph = "tests/errors/unused_node.toml";
     let told = say(&["check", graph]);
-    assert_eq!((told.code, told.out.as_str()), (0, "tests/errors/unused_node.toml: ok, 17 nodes, a tick each 4 ms\n"));
+    assert_eq!(
+        (told.code, told.out.as_str()),
+        (0, "tests/errors/unused_node.toml: ok, 17 nodes, one tick every 4 ms\n")
+    );
     assert!(told.err.starts_with("warning[unused-node]: no output of `label` is used\n"), "{}", told.err);
     assert!(told.err.ends_with("\n3 warnings\n"), "{}", told.err);
     let denied = say(&["check", "--deny-warnings", graph]);

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use tactflow_nodes::calibration::{Calibration, file};
 use tactflow_runtime::graph::{Request, compile};
-use tactflow_runtime::harness::{GraphRig, Source};
+use tactflow_runtime::harness::{FedRole, GraphRig};
 use tactflow_runtime::signal::{Freshness, Image, ImageShape, Unit};
 use tactflow_tests::{catalogue, workspace};
 use tempfile::TempDir;
@@ -75,7 +75,8 @@ fn a_log_becomes_a_report_a_file_and_a_picture() {
     let path = folder.path();
     let only = calibrate(path, &["press.csv"]);
     assert_eq!((only.code, only.err.as_str()), (0, ""));
-    for part in ["3 of 2 x 2 tactels calibrated, readings in raw", "* rational", "dead         1 never answer: [1, 1]"]
+    for part in
+        ["3 of 2 x 2 tactels calibrated, readings in raw", "* rational", "dead         1 do not respond: [1, 1]"]
     {
         assert!(only.out.contains(part), "no {part:?} in\n{}", only.out);
     }
@@ -146,17 +147,17 @@ fn what_cannot_be_used_is_refused_with_exit_code_2() {
         (&["press.csv", "wide.csv"], "error: `wide.csv` has 1 x 4 tactels in raw, but `press.csv` has 2 x 2"),
         (
             &["press.csv", "-o", "notes.txt"],
-            "error: `notes.txt` is there and is no calibration file: it is not replaced",
+            "error: `notes.txt` exists and is not a calibration file: it is not replaced",
         ),
-        (&["press.csv", "-o", "press.csv"], "error: `press.csv` is there and is no calibration file"),
-        (&["press.csv", "--svg", "notes.txt"], "error: `notes.txt` is there and is no SVG picture"),
+        (&["press.csv", "-o", "press.csv"], "error: `press.csv` exists and is not a calibration file"),
+        (&["press.csv", "--svg", "notes.txt"], "error: `notes.txt` exists and is not an SVG picture"),
         (
             &["press.csv", "--load", "uniform", "-o", "new.toml"],
-            "error: no tactel can be calibrated: 1 tactels never answer",
+            "error: no tactel can be calibrated: 1 tactels do not respond",
         ),
-        (&["late.csv", "-o", "new.toml"], "% of the range, so nothing is written"),
-        (&["bladder.csv", "-o", "new.toml"], "most tactels answer to most presses alike"),
-        (&["press.csv", "--bearing", "4"], "error: `--bearing` means nothing without `--load uniform`"),
+        (&["late.csv", "-o", "new.toml"], "% of the range, so no file is written"),
+        (&["bladder.csv", "-o", "new.toml"], "most tactels respond alike to most presses"),
+        (&["press.csv", "--bearing", "4"], "error: `--bearing` needs `--load uniform`"),
         (&["press.csv", "--curve", "cubic"], "invalid value 'cubic'"),
         (&["press.csv", "--dead-below", "0"], "`0` is not a number greater than 0"),
     ];
@@ -224,7 +225,7 @@ fn a_mistake_in_the_file_is_shown_in_the_file_and_where_the_graph_names_it() {
     let folder = folder(&[("pad.toml", &damaged), ("graph.toml", &block("toml graph"))]);
     let said = said(tool(&["check", "graph.toml"]).current_dir(folder.path()));
     assert_eq!(said.code, 2);
-    for part in ["error[bad-data]: a `gain` of 0 measures nothing", "pad.toml:12:41", "graph.toml:23:8"] {
+    for part in ["error[bad-data]: a `gain` of 0 gives no force", "pad.toml:12:41", "graph.toml:23:8"] {
         assert!(said.err.contains(part), "no {part:?} in\n{}", said.err);
     }
 }
@@ -239,7 +240,7 @@ fn rig(folder: &TempDir) -> GraphRig {
     let text = format!("{head}{}", &tail[tail.find("[nodes.source]").unwrap()..]);
     let text = text.replace("\"pad.toml\"", &format!("'{}'", folder.path().join("pad.toml").display()));
     let shape = ImageShape { rows: 2, cols: 2, pitch: [0.005; 2], unit: Unit::RAW };
-    let pad = Source { role: "pad", kind: "tactile_pad", period: 0.004, outputs: vec![shape.into()], commands: vec![] };
+    let pad = FedRole::new("pad", "tactile_pad", 4.0).output("image", shape);
     GraphRig::new(catalogue(), &text, vec![pad]).unwrap_or_else(|report| panic!("{}", report.render(false)))
 }
 
@@ -250,7 +251,7 @@ fn a_tare_through_the_loop_uses_each_frame_once_and_allocates_nothing() {
     for ms in 0..60 {
         if ms % 4 == 0 {
             // The zero of the first tactel has drifted from 210 to 230, which is 0.015 N.
-            rig.feed("pad", 0, f64::from(ms), Image::from_cells(2, &[230.0, 305.0, 250.0, 9.0]));
+            rig.feed("pad.image", f64::from(ms), Image::from_cells(2, &[230.0, 305.0, 250.0, 9.0]));
         }
         let now = i64::from(ms) * 1_000_000;
         rig.engine.exchange(now).unwrap();

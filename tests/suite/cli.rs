@@ -27,12 +27,13 @@ fn what_goes_well_ends_with_0_and_says_nothing_on_stderr() {
     let run = say(&["run", PRESS]);
     assert_eq!((run.code, run.err.as_str()), (0, ""));
     for text in
-        ["22 nodes, a tick each 100 ms", "touch.image: 28x28 tactels", "no more samples after 31.1", "309 ticks"]
+        ["22 nodes, one tick every 100 ms", "touch.image: 28x28 tactels", "no more samples after 31.1", "309 ticks"]
     {
         assert!(run.out.contains(text), "`{text}` is not in\n{}", run.out);
     }
     let check = say(&["check", PRESS, HYBRID]);
-    let expected = format!("{PRESS}: ok, 22 nodes, a tick each 100 ms\n{HYBRID}: ok, 24 nodes, a tick each 4 ms\n");
+    let expected =
+        format!("{PRESS}: ok, 22 nodes, one tick every 100 ms\n{HYBRID}: ok, 24 nodes, one tick every 4 ms\n");
     assert_eq!((check.code, check.err.as_str(), check.out), (0, "", expected));
 }
 
@@ -86,7 +87,7 @@ fn a_command_line_that_is_not_understood_ends_with_2() {
 #[test]
 fn a_file_that_does_not_load_or_cannot_be_made_ends_with_2() {
     let missing = "No such file or directory (os error 2)";
-    let cases: [(&[&str], String); 6] = [
+    let cases: [(&[&str], String); 9] = [
         (&["run", "tests/errors/loop.toml"], "error[loop]".into()),
         (&["check", "nowhere.toml"], format!("error[unreadable]: cannot read `nowhere.toml`: {missing}")),
         (&["check", "graphs"], "error[unreadable]: cannot read `graphs`: Is a directory (os error 21)".into()),
@@ -95,6 +96,15 @@ fn a_file_that_does_not_load_or_cannot_be_made_ends_with_2() {
         (
             &["run", HYBRID, MOCK, "--out", "nowhere/rows.csv"],
             format!("error: cannot create `nowhere/rows.csv`: {missing}\n"),
+        ),
+        (&["run", HYBRID, MOCK, "--svg", "run.png"], "error: `run.png` is not .svg\n".into()),
+        (
+            &["run", HYBRID, MOCK, "--svg", "nowhere/run.svg"],
+            format!("error: cannot create `nowhere/run.svg`: {missing}\n"),
+        ),
+        (
+            &["run", HYBRID, MOCK, "--svg", "run.svg", "--set=graph.show=[]"],
+            "error: `--svg` draws the ports that the graph shows: add `show = [\"node.port\"]` under [graph]\n".into(),
         ),
     ];
     for (args, message) in cases {
@@ -126,7 +136,7 @@ fn for_ends_a_run_in_the_graphs_time() {
 #[test]
 fn a_probe_is_heard_without_a_switch_and_can_be_silenced() {
     let run = say(&["run", PROBE]);
-    let lines: Vec<&str> = run.err.lines().filter_map(|line| Some(line.split_once("INFO probe: ")?.1)).collect();
+    let lines: Vec<&str> = run.err.lines().filter_map(|line| Some(line.split_once("INFO log: ")?.1)).collect();
     assert_eq!((run.code, lines.len(), run.err.lines().count()), (0, 10, 10), "{}", run.err);
     let nothing = "moments.x is absent, moments.force is absent, label.present = 0";
     assert_eq!(lines[0], format!("at 0.000 s: watch: {nothing}"));
@@ -149,7 +159,7 @@ fn another_bench_is_another_pad() {
     let text = text.replace("rate_hz = 250", "rate_hz = 500").replace("../robots/lwr4p.urdf", urdf.to_str().unwrap());
     fs::write(&bench, text).unwrap();
     let run = say(&["run", HYBRID, "--bench", &bench, "--for", "1s"]);
-    assert!(run.out.starts_with(&format!("{HYBRID}: 24 nodes, a tick each 2 ms\n")), "{}", run.out);
+    assert!(run.out.starts_with(&format!("{HYBRID}: 24 nodes, one tick every 2 ms\n")), "{}", run.out);
 }
 
 /// The line of a port or of a part of one in the table of what came out.
@@ -330,9 +340,10 @@ fn ctrl_c_ends_an_endless_run_cleanly_and_soon() {
 #[test]
 fn help_names_every_option() {
     let shared = ["--bench <FILE>", "--set <KEY=VALUE>", "--color <WHEN>", "--verbose", "--help"];
-    let run = ["<GRAPH>", "--for <TIME>", "--realtime", "--out <FILE>", "--ports", "--quiet", "Examples:"];
+    let run =
+        ["<GRAPH>", "--for <TIME>", "--realtime", "--out <FILE>", "--svg <FILE>", "--ports", "--quiet", "Examples:"];
     let texts: [(&[&str], &[&str]); 3] = [
-        (&["--help"], &["run ", "check ", "--color <WHEN>", "--version", "Exit codes: 0 all went well; 1 "]),
+        (&["--help"], &["run ", "check ", "--color <WHEN>", "--version", "Exit codes: 0 success; 1 a run"]),
         (&["run", "--help"], &run),
         (&["check", "--help"], &["<GRAPHS>..."]),
     ];
@@ -372,7 +383,7 @@ fn a_file_that_no_run_has_recorded_is_not_overwritten() {
     fs::write(&path, "DATA_TYPE MOVIE\n").unwrap();
     let said = say(&["run", HYBRID, MOCK, "--out", &path]);
     assert_eq!(
-        (said.code, said.err.contains("is no record of a run: it is not overwritten")),
+        (said.code, said.err.contains("is not a recording of a run: it is not overwritten")),
         (2, true),
         "{}",
         said.err

@@ -70,6 +70,5 @@ pub(crate) fn get<'e, T: Signal>(engine: &'e Engine, port: &str) -> Option<&'e T
     let found = engine.ports().iter().find(|(planned, _)| planned.name == port);
     let (planned, id) = found.unwrap_or_else(|| panic!("there is no port `{port}`"));
     assert_eq!(planned.shape.kind(), T::KIND, "`{port}`");
-    let bus = engine.bus();
-    bus.marks[id.mark as usize].is_present().then(|| &T::arena(&bus.arenas)[id.slot as usize])
+    engine.bus().get(*id)
 }

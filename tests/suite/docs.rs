@@ -1,4 +1,4 @@
-//! The pages of docs/ say what is so: their code is the code, their graphs load, their tables are complete.
+//! The pages of docs/ are true: their code is the code, their graphs load, their commands run, their tables are complete.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -10,12 +10,19 @@ use tactflow_runtime::signal::Unit;
 use tactflow_runtime::source::{Code, Report};
 use tactflow_tests::{catalogue, workspace};
 
+use crate::tool::say;
+
 fn page(name: &str) -> String {
     fs::read_to_string(workspace().join("docs").join(name)).unwrap()
 }
 
 fn file(path: &str) -> String {
     fs::read_to_string(workspace().join(path)).unwrap()
+}
+
+/// The pages about graphs, one after the other: their files belong to one folder.
+fn reference() -> String {
+    ["composing-a-task.md", "graph-files.md", "recordings.md", "command-line.md"].map(page).concat()
 }
 
 /// The blocks of a page that are fenced with exactly `fence`.
@@ -57,26 +64,44 @@ fn shipped(name: &str) -> PathBuf {
     Path::new("../graphs").join(name)
 }
 
+/// The Rust blocks of a page, put together, are the file.
+fn is_built_line_by_line(page: &str, path: &str) {
+    let (shown, real) = (blocks(page, "rust").concat(), file(path));
+    for (i, (shown, real)) in shown.lines().zip(real.lines()).enumerate() {
+        assert_eq!(shown, real, "line {} of {path}", i + 1);
+    }
+    assert_eq!(shown, real);
+}
+
 #[test]
 fn the_walkthrough_shows_the_node_as_it_is() {
     let page = page("writing-a-node.md");
-    let shown = blocks(&page, "rust").concat();
-    let real = file("tests/src/nodes/low_pass.rs");
-    for (i, (shown, real)) in shown.lines().zip(real.lines()).enumerate() {
-        assert_eq!(shown, real, "line {} of the file", i + 1);
-    }
-    assert_eq!(shown, real);
+    is_built_line_by_line(&page, "tests/src/nodes/low_pass.rs");
     let [line] = &blocks(&page, "rust catalogue")[..] else { panic!("one line") };
     assert!(file("tests/src/nodes/mod.rs").contains(line.as_str()), "{line}");
     assert_eq!(blocks(&page, "rust main"), [file("tests/src/main.rs")]);
 }
 
 #[test]
+fn the_walkthrough_shows_the_device_as_it_is_and_its_graph_loads() {
+    let page = page("writing-a-device.md");
+    is_built_line_by_line(&page, "tests/src/devices/udp_pad.rs");
+    let [line] = &blocks(&page, "rust catalogue")[..] else { panic!("one line") };
+    assert!(file("tests/src/devices/mod.rs").contains(line.trim()), "{line}");
+    let [graph] = &blocks(&page, "toml")[..] else { panic!("one graph") };
+    check(&shipped("page.toml"), graph.clone()).unwrap_or_else(|report| panic!("{}", report.render(false)));
+}
+
+#[test]
 fn the_walkthrough_lists_the_forms_of_inputs_as_the_contract_does() {
     let node = file("runtime/src/node/mod.rs");
-    let contract: String =
-        node.lines().filter_map(|line| line.strip_prefix("//! |")).map(|row| format!("|{row}\n")).collect();
-    assert!(contract.contains("Sampled") && page("writing-a-node.md").contains(&contract), "{contract}");
+    let contract: String = node
+        .lines()
+        .filter_map(|line| line.strip_prefix("//! |"))
+        .skip_while(|row| !row.starts_with(" field"))
+        .map(|row| format!("|{row}\n"))
+        .collect();
+    assert!(contract.contains("sampled") && page("writing-a-node.md").contains(&contract), "{contract}");
 }
 
 #[test]
@@ -112,14 +137,12 @@ fn world(page: &str, name: &str) -> (PathBuf, Vec<PathBuf>, Vec<(PathBuf, String
             }
         }
     }
-    fs::create_dir_all(folder.join("robots")).unwrap();
-    fs::copy(workspace().join("graphs/robots/lwr4p.urdf"), folder.join("robots/lwr4p.urdf")).unwrap();
     (folder, files, added)
 }
 
 #[test]
 fn every_graph_of_the_reference_loads() {
-    let (_, files, added) = world(&page("graph-files.md"), "reference");
+    let (_, files, added) = world(&reference(), "reference");
     let graphs: Vec<String> = files.iter().map(|path| fs::read_to_string(path).unwrap()).collect();
     let tasks = files.into_iter().zip(graphs).filter(|(_, text)| text.contains("[graph]"));
     let tasks: Vec<(PathBuf, String)> = tasks.collect();
@@ -135,7 +158,7 @@ fn every_graph_of_the_reference_loads() {
 
 #[test]
 fn every_set_of_the_reference_loads() {
-    let page = page("graph-files.md");
+    let page = reference();
     let (folder, ..) = world(&page, "set");
     for line in blocks(&page, "sh").concat().lines() {
         let words: Vec<&str> = line.split_whitespace().collect();
@@ -151,7 +174,7 @@ fn every_set_of_the_reference_loads() {
 
 #[test]
 fn recordings_are_as_shown() {
-    let page = page("graph-files.md");
+    let page = reference();
     let (folder, ..) = world(&page, "recordings");
     for (format, name, fence) in [(Format::Csv, "push.csv", "csv"), (Format::Ndjson, "push.ndjson", "json")] {
         let plan = compile(&catalogue(), &Request::file(folder.join("push.toml")));
@@ -167,7 +190,7 @@ fn recordings_are_as_shown() {
 
 #[test]
 fn the_reference_lists_every_code_and_every_unit() {
-    let page = page("graph-files.md");
+    let page = reference();
     let codes: Vec<&str> = Code::ALL.iter().map(|code| code.name()).collect();
     assert_eq!(first_cells(&page, "| code | meaning |"), codes);
     let units = first_cells(&page, "| unit | of |");
@@ -177,7 +200,7 @@ fn the_reference_lists_every_code_and_every_unit() {
 
 #[test]
 fn the_reference_lists_every_format_of_a_recording() {
-    let listed = first_cells(&page("graph-files.md"), "| `format` |").join(" ");
+    let listed = first_cells(&reference(), "| `format` |").join(" ");
     let listed: Vec<&str> = listed.split([' ', ',', '`']).filter(|name| !name.is_empty()).collect();
     let mut formats: Vec<&str> = tactflow_nodes::recordings::FORMATS.iter().map(|format| format.name).collect();
     formats.sort_unstable();
@@ -188,12 +211,49 @@ fn the_reference_lists_every_format_of_a_recording() {
 
 #[test]
 fn the_reference_lists_every_role_and_every_device() {
-    let page = page("graph-files.md");
+    let page = reference();
     let catalogue = tactflow_nodes::catalogue();
     let roles: Vec<&str> = catalogue.roles().iter().map(|role| &*role.name).collect();
     assert_eq!(first_cells(&page, "| role type | gives | takes |"), roles);
     for device in catalogue.devices() {
         assert!(page.contains(&format!("`{}`", device.name())), "{}", device.name());
+    }
+}
+
+/// The commands of a page's `console` blocks, each with the `text` block that follows it directly, if any.
+fn sessions(page: &str) -> Vec<(Vec<String>, String)> {
+    let (mut sessions, mut fence): (Vec<(Vec<String>, String)>, Option<&str>) = (Vec::new(), None);
+    for line in page.lines() {
+        match (fence, line.strip_prefix("```")) {
+            (None, Some(info)) => fence = Some(info),
+            (Some(_), Some(_)) => fence = None,
+            (Some("console"), None) => {
+                let args = line.strip_prefix("$ cargo run --release -- ").expect("a command of the tool");
+                sessions.push((args.split_whitespace().map(str::to_owned).collect(), String::new()));
+            }
+            (Some("text"), None) => {
+                let (_, shown) = sessions.last_mut().expect("output stands behind its command");
+                shown.push_str(line);
+                shown.push('\n');
+            }
+            _ => {}
+        }
+    }
+    sessions
+}
+
+#[test]
+fn the_commands_of_getting_started_print_what_is_shown() {
+    let sessions = sessions(&page("getting-started.md"));
+    assert!(sessions.iter().filter(|(_, shown)| !shown.is_empty()).count() >= 3);
+    for (args, shown) in sessions {
+        let printed = say(&args.iter().map(String::as_str).collect::<Vec<_>>());
+        let is_refused = shown.starts_with("error");
+        assert_eq!(printed.code, if is_refused { 2 } else { 0 }, "{args:?}: {}", printed.err);
+        let mut lines = if is_refused { printed.err.lines() } else { printed.out.lines() };
+        for line in shown.lines() {
+            assert!(lines.any(|printed| printed == line), "{args:?} does not print `{line}` there");
+        }
     }
 }
 
@@ -235,21 +295,30 @@ fn every_invariant_names_tests_that_exist() {
     }
 }
 
+/// The anchors of the headings of a page.
+fn anchors(page: &Path) -> Vec<String> {
+    let text = fs::read_to_string(page).unwrap();
+    let headings = text.lines().filter(|line| line.starts_with('#')).map(|line| line.trim_start_matches('#').trim());
+    let is_kept = |letter: &char| letter.is_alphanumeric() || "- _".contains(*letter);
+    headings
+        .map(|heading| heading.to_lowercase().chars().filter(is_kept).collect::<String>().replace(' ', "-"))
+        .collect()
+}
+
 #[test]
 fn every_link_of_the_pages_leads_somewhere() {
     let docs = workspace().join("docs");
-    let decisions = fs::read_dir(docs.join("decisions")).unwrap().map(|entry| entry.unwrap().path());
-    let reference = fs::read_dir(docs.join("reference")).unwrap().map(|entry| entry.unwrap().path());
-    let mut pages: Vec<PathBuf> = decisions.chain(reference).collect();
-    pages.extend(
-        ["ARCHITECTURE.md", "calibration.md", "graph-files.md", "scenarios.md", "writing-a-node.md"]
-            .map(|name| docs.join(name)),
-    );
+    let folders = [docs.clone(), docs.join("decisions"), docs.join("reference")];
+    let files = folders.into_iter().flat_map(|folder| fs::read_dir(folder).unwrap()).map(|entry| entry.unwrap().path());
+    let pages = files.chain([workspace().join("README.md"), workspace().join("CHANGELOG.md")]);
+    let pages = pages.filter(|path| path.extension().is_some_and(|extension| extension == "md"));
     let mut links = 0;
     for page in pages {
         let text = fs::read_to_string(&page).unwrap();
         for target in text.split("](").skip(1).filter_map(|rest| rest.split(')').next()) {
-            let is_there = page.parent().unwrap().join(target.split('#').next().unwrap()).exists();
+            let (path, anchor) = target.split_once('#').unwrap_or((target, ""));
+            let path = if path.is_empty() { page.clone() } else { page.parent().unwrap().join(path) };
+            let is_there = path.exists() && (anchor.is_empty() || anchors(&path).contains(&anchor.to_owned()));
             assert!(is_there || target.contains("://"), "{}: {target}", page.display());
             links += 1;
         }

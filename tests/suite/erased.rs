@@ -2,10 +2,10 @@
 
 use tactflow_runtime::harness::GraphRig;
 use tactflow_runtime::node::{
-    AnyNode, Built, Bus, Configured, Given, Mistake, Mistakes, Need, NodeSpec, NodeType, Param, PortId, PortSpec,
-    Reader, Tick, Wires,
+    AnyNode, Built, Bus, Configured, Declared, Given, Mistake, Mistakes, Need, NodeSpec, NodeType, Param, PortId,
+    PortSpec, Reader, Tick, Wires,
 };
-use tactflow_runtime::signal::{Freshness, Kind, Scalar, Shape, Signal};
+use tactflow_runtime::signal::{Freshness, Kind, Scalar, Shape};
 use tactflow_runtime::source::Value;
 use tactflow_tests::catalogue;
 use tactflow_tests::nodes::length_by_hand;
@@ -25,7 +25,7 @@ impl NodeType for Polynomial {
             doc: "A length.".into(),
             kind: Kind::Scalar,
             args: vec!["m".into()].into(),
-            need: Need::Required,
+            need: Need::REQUIRED,
         };
         NodeSpec {
             name: self.name.clone().into(),
@@ -43,7 +43,7 @@ impl NodeType for Polynomial {
 
     fn configure(&self, table: &Value, reader: &mut Reader<'_>) -> Option<Box<dyn Configured>> {
         let mut open = reader.table(table)?;
-        let scale = reader.field::<f64>(&mut open, "scale", Some(|| 1.0));
+        let scale = reader.field::<f64>(&mut open, &Declared::new("scale"), Some(|| 1.0));
         reader.close(open, &["scale"]);
         let coefficients = self.coefficients.iter().map(|c| c * scale.unwrap_or(1.0)).collect();
         Some(Box::new(Self { coefficients, ..self.clone() }))
@@ -63,14 +63,14 @@ impl Configured for Polynomial {
 impl AnyNode for Polynomial {
     fn step(&mut self, tick: &Tick, bus: &mut Bus, wires: &Wires, outputs: &[PortId]) {
         let from = wires.port(0).expect("`x` is required");
-        let x = Scalar::arena(&bus.arenas)[from.slot as usize];
+        let x = *bus.slot::<Scalar>(from);
         let y = self.coefficients.iter().rev().fold(0.0, |sum, c| sum * x + c);
-        Scalar::arena_mut(&mut bus.arenas)[outputs[0].slot as usize] = y;
-        bus.marks[outputs[0].mark as usize].renew(tick.index, tick.stamp);
+        *bus.slot_mut::<Scalar>(outputs[0]) = y;
+        bus.mark_mut(outputs[0]).renew(tick.index, tick.stamp);
     }
 
     fn lose(&mut self, tick: u64, bus: &mut Bus, outputs: &[PortId]) {
-        bus.marks[outputs[0].mark as usize].lose(tick);
+        bus.mark_mut(outputs[0]).lose(tick);
     }
 
     fn reset(&mut self) {}
@@ -88,7 +88,7 @@ fn rig(params: &str) -> Result<GraphRig, String> {
 #[test]
 fn a_node_made_of_data_runs_like_any_other() {
     let mut rig = rig("scale = 10.0").unwrap();
-    rig.feed("a", 0, 0.0, 3.0);
+    rig.feed("a.value", 0.0, 3.0);
     rig.tick(0.0).unwrap();
     assert_eq!((rig.get::<Scalar>("p.y"), rig.freshness("p.y")), (Some(&190.0), Freshness::New));
     rig.tick(10.0).unwrap();

@@ -3,7 +3,7 @@
 use std::borrow::Cow;
 use std::sync::{Arc, Mutex};
 
-use tactflow_runtime::device::{Commands, DeviceError, DeviceType, Driver, Opened, Samples, Stepped};
+use tactflow_runtime::device::{Command, Commands, DeviceError, DeviceType, Driver, Opened, Samples, Stepped};
 use tactflow_runtime::engine::{End, Engine, RunOptions, run};
 use tactflow_runtime::fault::Cause;
 use tactflow_runtime::graph::compile;
@@ -28,10 +28,10 @@ fn fault(how: &str) -> tactflow_runtime::fault::Fault {
     let mut rig = rig(how);
     for i in 0..2 {
         let ms = f64::from(i) * 10.0;
-        rig.feed("a", 0, ms, 1.0);
+        rig.feed("a.value", ms, 1.0);
         rig.tick(ms).unwrap();
     }
-    rig.feed("a", 0, 20.0, 1.0);
+    rig.feed("a.value", 20.0, 1.0);
     rig.tick(20.0).unwrap_err()
 }
 
@@ -52,7 +52,7 @@ fn a_panic_is_a_fault_of_the_node_that_panicked() {
 #[test]
 fn a_sample_that_is_not_finite_is_a_fault_of_its_role() {
     let mut rig = rig("nan");
-    rig.feed("a", 0, 0.0, f64::NAN);
+    rig.feed("a.value", 0.0, f64::NAN);
     let fault = rig.tick(0.0).unwrap_err();
     assert_eq!((fault.node.as_str(), fault.port.as_deref(), fault.tick), ("a", Some("value"), 1));
 }
@@ -60,14 +60,16 @@ fn a_sample_that_is_not_finite_is_a_fault_of_its_role() {
 /// A node that gives nothing, and panics in the third tick.
 struct Mute;
 
+impl tactflow_runtime::node::Describe for Mute {
+    const NAME: &'static str = "mute";
+    const SUMMARY: &'static str = "gives nothing, and panics once";
+}
+
 impl Node for Mute {
     type Params = mute::Params;
     type Inputs<'a> = mute::Inputs<'a>;
     type Outputs = mute::Outputs;
     type State = ();
-
-    const NAME: &'static str = "mute";
-    const SUMMARY: &'static str = "gives nothing, and panics once";
 
     fn new(_: mute::Params, _: &mut Setup<Self>) -> Result<Self, Mistakes> {
         Ok(Self)
@@ -102,7 +104,7 @@ fn what_comes_after_a_panic_is_absent_also_behind_a_node_that_gives_nothing() {
     let mut seen = Vec::new();
     for tick in 0..5 {
         let ms = f64::from(tick) * 10.0;
-        rig.feed("a", 0, ms, 1.0);
+        rig.feed("a.value", ms, 1.0);
         rig.tick(ms).unwrap();
         seen.push([rig.freshness("first.steps"), rig.freshness("second.steps")]);
     }
@@ -113,7 +115,7 @@ fn what_comes_after_a_panic_is_absent_also_behind_a_node_that_gives_nothing() {
 #[test]
 fn a_device_that_panics_is_a_fault_of_the_device() {
     let mut rig = rig("nan");
-    rig.feed("a", 0, 0.0, true);
+    rig.feed("a.value", 0.0, true);
     let fault = rig.tick(0.0).unwrap_err();
     assert_eq!(fault.node, "a");
     assert!(matches!(&fault.cause, Cause::Device(message) if message.starts_with("it panicked")), "{fault}");
@@ -165,6 +167,7 @@ fn a_run_that_faults_leaves_the_arm_still() {
 /// An arm that notes what it is told.
 struct Spy {
     arm: Box<dyn Stepped>,
+    velocity: Command,
     told: Arc<Mutex<Vec<f64>>>,
 }
 
@@ -174,7 +177,8 @@ impl Stepped for Spy {
     }
 
     fn exchange(&mut self, now: i64, commands: &Commands, samples: &mut Samples) -> Result<(), DeviceError> {
-        let fastest = commands.joints(0).iter().fold(0.0, |fastest: f64, velocity| fastest.max(velocity.abs()));
+        let fastest =
+            commands.joints(self.velocity).iter().fold(0.0, |fastest: f64, velocity| fastest.max(velocity.abs()));
         self.told.lock().unwrap().push(fastest);
         self.arm.exchange(now, commands, samples)
     }
@@ -201,7 +205,8 @@ impl DeviceType for SpyType {
         let nodes = tactflow_nodes::catalogue();
         let arm = nodes.devices().iter().find(|device| device.name() == "mock_arm")?.open(table, reader)?;
         let Driver::Stepped(arm_) = arm.driver else { return None };
-        let spy = Spy { arm: arm_, told: Arc::clone(&self.told) };
+        let velocity = arm.description.command("velocity")?;
+        let spy = Spy { arm: arm_, velocity, told: Arc::clone(&self.told) };
         Some(Opened { description: arm.description, driver: Driver::Stepped(Box::new(spy)) })
     }
 }

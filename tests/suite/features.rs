@@ -15,7 +15,7 @@ fn a_recording_becomes_a_table_a_row_a_frame() {
     assert_eq!((said.code, said.err.as_str()), (0, ""));
     let [read, contact] = [0, 1].map(|line| said.out.lines().nth(line).unwrap());
     assert!(read.contains("28 by 28 tactels of 1.27 by 1.27 mm, 309 frames in 31.10 s, in raw"), "{read}");
-    assert!(contact.ends_with("at least 4 tactels above 3.0000 raw (as the file says)"), "{contact}");
+    assert!(contact.ends_with("at least 4 tactels above 3.0000 raw (from the file)"), "{contact}");
     assert!(peer("rows.py", &[path]).starts_with("309 rows, "));
     let table = fs::read_to_string(path).unwrap();
     let mut rows = table.lines().filter(|line| !line.starts_with('#'));
@@ -56,12 +56,12 @@ fn the_graph_behind_it_checks_from_any_folder() {
 fn what_is_wrong_is_told_once_with_a_way_out() {
     let cases: [(&[&str], &str); 9] = [
         (&["features", "nowhere.csv"], "cannot read `nowhere.csv`: No such file"),
-        (&["features", "Cargo.toml"], "`Cargo.toml` is no recording of a known format: it begins with `[workspace]`"),
+        (&["features", "Cargo.toml"], "`Cargo.toml` has an unknown format: it begins with `[workspace]`"),
         (&["features", PRESS, "--pitch-mm", "5"], "expected two numbers, as 5x5"),
         (&["features", PRESS, "--pitch-mm", "0x5"], "expected two numbers greater than 0"),
         (&["features", PRESS, "--rate-hz", "0"], "`0` is not a number greater than 0"),
         (&["features", PRESS, "--for", "-1s"], "`-1` is not a number greater than 0"),
-        (&["features", PRESS, "--pitch-mm", "5,5"], "the file says otherwise: [1.27, 1.27] mm"),
+        (&["features", PRESS, "--pitch-mm", "5,5"], "the file has another value: [1.27, 1.27] mm"),
         (&["features", PRESS, "--unit", "pounds"], "`pounds` is not a unit"),
         (&["features", PRESS, "--threshold", "nan"], "expected a number"),
     ];

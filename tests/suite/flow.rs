@@ -33,7 +33,7 @@ fn a_loop_through_a_delay_starts_with_its_initial_value_and_never_without() {
         let mut rig = rig(more);
         for (i, expected) in sums.into_iter().enumerate() {
             let ms = 10.0 * i as f64;
-            rig.feed("a", 0, ms, (i + 1) as f64);
+            rig.feed("a.value", ms, (i + 1) as f64);
             rig.tick(ms).unwrap();
             assert_eq!(rig.get::<Scalar>("sum.sum").copied(), expected, "{more} at {ms} ms");
         }
@@ -43,7 +43,7 @@ fn a_loop_through_a_delay_starts_with_its_initial_value_and_never_without() {
 #[test]
 fn what_goes_round_is_as_old_as_the_sample_that_started_it() {
     let mut rig = rig("initial = 0.0");
-    rig.feed("a", 0, 0.0, 1.0);
+    rig.feed("a.value", 0.0, 1.0);
     rig.tick(0.0).unwrap();
     assert_eq!((rig.freshness("last.value"), rig.age_ms("last.value")), (Freshness::New, 0.0), "made up");
     rig.tick(10.0).unwrap();

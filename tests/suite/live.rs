@@ -3,12 +3,12 @@
 use std::io::{BufRead, BufReader};
 use std::process::{Child, Command, Stdio};
 
-use tactflow_runtime::device::{Description, Device, DeviceError, Driver, Filled, Link, Live, Opened};
+use tactflow_runtime::device::{Description, Device, DeviceError, Driver, Link, Live, Opened};
 use tactflow_runtime::engine::{self, End, Engine, RunOptions};
 use tactflow_runtime::fault::Cause;
 use tactflow_runtime::graph::{Request, compile};
 use tactflow_runtime::node::Mistakes;
-use tactflow_runtime::signal::{Scalar, ScalarShape, Signal, Unit};
+use tactflow_runtime::signal::{Scalar, ScalarShape, Unit};
 use tactflow_tests::{catalogue, workspace};
 
 const GRAPH: &str = "
@@ -62,13 +62,11 @@ fn engine(peer: &Peer, graph: &str) -> Engine {
 /// Runs the graph on a peer; how it ended, and the steps and the ages [ms] of `count` after each tick.
 fn run(peer: &Peer, duration: f64) -> (End, Vec<f64>, Vec<f64>) {
     let mut engine = engine(peer, GRAPH);
-    let id = engine.ports().iter().find(|(port, _)| port.name == "count.steps").unwrap().1;
     let (mut steps, mut ages) = (Vec::new(), Vec::new());
     let options = RunOptions { duration: Some(duration), is_realtime: true, ..RunOptions::default() };
     let outcome = engine::run(&mut engine, &options, &mut |engine| {
-        let mark = engine.bus().marks[id.mark as usize];
-        steps.push(Scalar::arena(&engine.bus().arenas)[id.slot as usize]);
-        ages.push(mark.stamp().age(engine.now()) as f64 * 1e-6);
+        steps.push(engine.get("count.steps").copied().unwrap_or(0.0));
+        ages.push(engine.mark("count.steps").stamp().age(engine.now()) as f64 * 1e-6);
     });
     (outcome.unwrap().end, steps, ages)
 }
@@ -94,18 +92,18 @@ impl Live for Brittle {
     }
 }
 
-impl Device for Brittle {
-    type Params = Empty;
+impl tactflow_runtime::node::Describe for Brittle {
     const NAME: &'static str = "brittle";
     const SUMMARY: &'static str = "a driver that panics";
+}
+
+impl Device for Brittle {
+    type Params = Empty;
 
     fn open(_: Empty) -> Result<Opened, Mistakes> {
-        let outputs = vec![ScalarShape::of(Unit::METRE).into()];
-        let filled = Filled { role: "length".into(), outputs, commands: vec![], facts: vec![] };
-        Ok(Opened {
-            description: Description { fills: vec![filled], period: 0.01 },
-            driver: Driver::Live(Box::new(Self)),
-        })
+        let mut description = Description::every(0.01);
+        description.fills("length").output::<Scalar>("value", ScalarShape::of(Unit::METRE));
+        Ok(Opened { description, driver: Driver::Live(Box::new(Self)) })
     }
 }
 

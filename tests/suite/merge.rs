@@ -5,7 +5,7 @@
 use std::fs;
 
 use tactflow_runtime::graph::{Request, compile};
-use tactflow_runtime::signal::{Pose, Scalar, Signal};
+use tactflow_runtime::signal::{Pose, Scalar};
 use tactflow_runtime::source::Code;
 use tactflow_tests::catalogue;
 
@@ -33,7 +33,7 @@ fn values<const N: usize>(request: &Request, ports: [&str; N]) -> [f64; N] {
     ports.map(|port| {
         let found = engine.ports().iter().find(|(planned, _)| planned.name == port);
         let (_, id) = found.unwrap_or_else(|| panic!("there is no port `{port}`"));
-        Scalar::arena(&engine.bus().arenas)[id.slot as usize]
+        *engine.bus().slot::<Scalar>(*id)
     })
 }
 
@@ -158,7 +158,7 @@ fn a_fact_over_a_table_replaces_it() {
         let mut engine = Engine::new(loaded(&request));
         engine.tick(0).unwrap();
         let (_, id) = engine.ports().iter().find(|(port, _)| port.name == "move.state.sensor_pose").unwrap();
-        Pose::arena(&engine.bus().arenas)[id.slot as usize].0.translation.z
+        engine.bus().slot::<Pose>(*id).0.translation.z
     });
     assert!(heights[0] - heights[1] > 0.1, "the longer mount points down: {heights:?}");
     assert_eq!(heights[0], heights[2]);

@@ -18,14 +18,14 @@ fn good(modes: &str) -> GraphRig {
     rig(modes).unwrap_or_else(|report| panic!("{report}"))
 }
 
-/// The mode after a tick each 10 ms, with a sample in those that have a value.
+/// The mode after one tick every 10 ms, with a sample in those that have a value.
 fn course(modes: &str, samples: &[Option<f64>]) -> String {
     let mut rig = good(modes);
     let mut course = String::new();
     for (i, sample) in samples.iter().enumerate() {
         let ms = 10.0 * i as f64;
         if let Some(value) = sample {
-            rig.feed("a", 0, ms, *value);
+            rig.feed("a.value", ms, *value);
         }
         rig.tick(ms).unwrap();
         course.push(rig.engine.mode().unwrap().chars().next().unwrap());
@@ -88,13 +88,13 @@ fn what_is_set_holds_in_its_mode_alone_and_state_goes_on() {
     let mut seen = Vec::new();
     for (i, value) in [1.0, 3.0, 3.0, 5.0, 5.0].into_iter().enumerate() {
         let ms = 10.0 * i as f64;
-        rig.feed("a", 0, ms, value);
+        rig.feed("a.value", ms, value);
         rig.tick(ms).unwrap();
         seen.push((*rig.get::<f64>("plus.value").unwrap(), *rig.get::<f64>("count.steps").unwrap()));
     }
     assert_eq!(seen, [(11.0, 1.0), (13.0, 2.0), (3.0, 3.0), (5.0, 4.0), (25.0, 5.0)]);
     let changes = rig.engine.changes();
-    let told: Vec<_> = changes.iter().map(|c| (c.time / 1_000_000, c.mode.as_str(), c.why.as_str())).collect();
+    let told: Vec<_> = changes.iter().map(|c| (c.time / 1_000_000, c.mode.as_str(), c.reason.as_str())).collect();
     let expected = [(0, "one", ""), (10, "two", "`a.value` is above 2"), (30, "three", "`a.value` is above 4")];
     assert_eq!(told, expected);
 }
@@ -120,7 +120,7 @@ fn in_one_tick_the_sorts_have_their_order() {
             Err(fault) if matches!(fault.cause, Cause::Mode(_)) => "fail",
             Ok(()) if rig.engine.is_done() => "done",
             Ok(()) if rig.engine.mode() == Some("two") => {
-                if rig.engine.changes()[1].why.contains("lost") {
+                if rig.engine.changes()[1].reason.contains("lost") {
                     "on_lost"
                 } else {
                     "go"
@@ -154,7 +154,7 @@ fn a_failure_names_the_mode_its_reason_and_its_line() {
 #[test]
 fn a_switch_acts_at_once_and_does_not_wait_for_the_next_sample() {
     let mut rig = good("[modes.one]\nset.plus.by = 10.0\ngo = { to = 'two', after_ms = 20 }\n[modes.two]");
-    rig.feed("a", 0, 0.0, 1.0);
+    rig.feed("a.value", 0.0, 1.0);
     let mut seen = Vec::new();
     for i in 0..5 {
         rig.tick(10.0 * f64::from(i)).unwrap();

@@ -2,9 +2,9 @@
 
 use tactflow_runtime::engine::{self, Engine, RunOptions};
 use tactflow_runtime::graph::{Request, compile};
-use tactflow_runtime::harness::{GraphRig, Source};
+use tactflow_runtime::harness::{FedRole, GraphRig};
 use tactflow_runtime::record::Columns;
-use tactflow_runtime::signal::{Freshness, Image, ImageShape, ScalarShape, Unit};
+use tactflow_runtime::signal::{Freshness, Image, ImageShape, Unit};
 use tactflow_tests::catalogue;
 
 const TASK: &str = r#"
@@ -43,6 +43,8 @@ fn what_the_bench_binds_and_no_task_declares_is_recorded() {
         "path",
         "distance",
         "coverage",
+        "common_noise",
+        "own_noise",
     ];
     for name in ["truth", "ground_truth"] {
         let engine = engine(&format!("pad = \"pad\"\n{name} = \"pad\""));
@@ -55,11 +57,10 @@ fn what_the_bench_binds_and_no_task_declares_is_recorded() {
 #[test]
 fn a_port_that_is_cleared_is_lost_once_and_then_absent_until_it_is_written() {
     let mut engine = engine("pad = \"pad\"\ntruth = \"pad\"");
-    let id = engine.ports().iter().find(|(port, _)| port.name == "truth.x").expect("it is bound").1;
     let mut course = Vec::new();
     let options = RunOptions { duration: Some(0.05), ..RunOptions::default() };
     engine::run(&mut engine, &options, &mut |engine| {
-        course.push(engine.bus().marks[id.mark as usize].freshness(engine.ticks()));
+        course.push(engine.mark("truth.x").freshness(engine.ticks()));
     })
     .unwrap();
     use Freshness::{Absent, Lost, New};
@@ -70,15 +71,13 @@ fn a_port_that_is_cleared_is_lost_once_and_then_absent_until_it_is_written() {
 #[test]
 fn a_run_goes_on_without_the_truth() {
     let shape = ImageShape { rows: 2, cols: 2, pitch: [0.005; 2], unit: Unit::NEWTON };
-    let pad = Source { role: "pad", kind: "tactile_pad", period: 0.004, outputs: vec![shape.into()], commands: vec![] };
-    let newton = ScalarShape::of(Unit::NEWTON);
-    let truth =
-        Source { role: "truth", kind: "ground_truth", period: 0.004, outputs: vec![newton.into()], commands: vec![] };
+    let pad = FedRole::new("pad", "tactile_pad", 4.0).output("image", shape.clone());
+    let truth = FedRole::new("truth", "ground_truth", 4.0).output("image", shape);
     let mut rig = GraphRig::new(catalogue(), TASK, vec![pad, truth]).unwrap_or_else(|r| panic!("{}", r.render(false)));
-    rig.feed("truth", 0, 0.0, 1.0);
+    rig.feed("truth.force", 0.0, 1.0);
     for tick in 0..50 {
         let ms = 4.0 * f64::from(tick);
-        rig.feed("pad", 0, ms, Image::from_cells(2, &[0.5, 0.0, 0.0, 1.5]));
+        rig.feed("pad.image", ms, Image::from_cells(2, &[0.5, 0.0, 0.0, 1.5]));
         rig.tick(ms).unwrap();
     }
     assert_eq!((rig.get("truth.force"), rig.get("source.sum")), (Some(&1.0), Some(&2.0)));

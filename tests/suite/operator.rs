@@ -35,7 +35,7 @@ fn the_last_of_several_words_counts() {
                 if tick == 1 {
                     words.iter().for_each(|word| rig.send(word));
                 }
-                rig.feed("a", 0, f64::from(tick) * 10.0, 1.0);
+                rig.feed("a.value", f64::from(tick) * 10.0, 1.0);
                 rig.tick(f64::from(tick) * 10.0).unwrap();
             }
             assert_eq!(rig.engine.is_stopped(), is_stopped, "{words:?} after {before:?}");
@@ -49,12 +49,12 @@ fn a_stop_is_told_from_its_beginning_to_its_end() {
     let mut rig = GraphRig::new(catalogue(), text, vec![length_by_hand("a")]).unwrap();
     for (ms, word) in [(0.0, None), (10.0, Some("stop")), (20.0, None), (30.0, Some("resume")), (40.0, None)] {
         word.into_iter().for_each(|word| rig.send(word));
-        rig.feed("a", 0, ms, 1.0);
+        rig.feed("a.value", ms, 1.0);
         rig.tick(ms).unwrap();
     }
     let halts: Vec<(String, Option<i64>)> =
         rig.engine.halts().iter().map(|halt| (halt.fault.to_string(), halt.until)).collect();
-    assert_eq!(halts, [("the operator stopped it in tick 2 at 0.010 s".to_owned(), Some(30_000_000))]);
+    assert_eq!(halts, [("the operator sent `stop` in tick 2 at 0.010 s".to_owned(), Some(30_000_000))]);
 }
 
 /// Two pads that end after half a second; one of them is unplugged at 0.1 s.
@@ -104,7 +104,7 @@ fn heard(lines: &str) -> (i32, String, Duration) {
 #[test]
 fn a_stop_after_which_the_standard_input_ends_ends_the_run() {
     let (code, err, took) = heard("stop\n");
-    assert!(code == 1 && err.contains("error: the operator stopped it"), "{code}: {err}");
+    assert!(code == 1 && err.contains("error: the operator sent `stop`"), "{code}: {err}");
     assert!(took < Duration::from_secs(3), "{took:?}");
     let (code, err, _) = heard("stop\nresume\n");
     assert_eq!(code, 0, "{err}");
@@ -113,8 +113,8 @@ fn a_stop_after_which_the_standard_input_ends_ends_the_run() {
 #[test]
 fn a_stop_that_nobody_can_end_says_so_and_what_would() {
     let stop = say(&["run", HYBRID, MOCK, "--send", "0.2s:stop"]);
-    let expected = "error: the operator stopped it in tick 51 at 0.200 s; every command went to zero, and nobody was \
-                    left to send `resume`: `--send 2s:resume` does, or a line with `--listen`\n";
+    let expected = "error: the operator sent `stop` in tick 51 at 0.200 s; every command went to zero, and nothing \
+                    could send `resume`: use `--send 2s:resume`, or type it with `--listen`\n";
     assert_eq!(stop.code, 1);
     assert!(stop.err.ends_with(expected), "{}", stop.err);
 }
@@ -124,7 +124,7 @@ fn words_for_times_of_the_graph_give_the_same_run_twice() {
     let args = ["run", HYBRID, MOCK, "--for", "1s", "--send", "0.2s:stop", "--send", "0.5s:resume"];
     let [first, second] = [say(&args), say(&args)];
     assert_eq!(first.code, 0, "{}", first.err);
-    assert!(first.out.contains("stopped for 0.300 s: the operator stopped it in tick 51 at 0.200 s"), "{}", first.out);
+    assert!(first.out.contains("stopped for 0.300 s: the operator sent `stop` in tick 51 at 0.200 s"), "{}", first.out);
     let halt = |text: &str| text.lines().find(|line| line.starts_with("stopped for")).unwrap().to_owned();
     assert_eq!(halt(&first.out), halt(&second.out));
 }
@@ -134,15 +134,19 @@ fn a_word_that_nothing_waits_for_is_told() {
     let text = "[graph]\nclock = \"a\"\nstart = \"one\"\n[roles]\na = \"length\"\n[modes.one]\n\
                 go = { to = \"two\", on = \"back\" }\n[modes.two]\n";
     let mut rig = GraphRig::new(catalogue(), text, vec![length_by_hand("a")]).unwrap();
-    assert_eq!(rig.engine.send("bakc"), Err("nothing waits for `bakc`: did you mean `back`?".into()));
+    assert_eq!(rig.engine.send("bakc"), Err("no mode has a condition on `bakc`: did you mean `back`?".into()));
     assert_eq!(rig.engine.send("STOP"), Ok(()), "in any case");
     rig.tick(0.0).unwrap();
     assert!(rig.engine.is_stopped());
-    let why = "`back` is not heard while the commands wait for `resume`";
+    let why = "`back` has no effect while the commands wait for `resume`";
     assert_eq!(rig.engine.send("back"), Err(why.into()));
     let refused = say(&["run", HYBRID, MOCK, "--send", "1s:bck"]);
     assert_eq!((refused.code, refused.out.as_str()), (2, ""));
-    assert!(refused.err.contains("nothing waits for the word `bck`: words here: `resume`, `stop`"), "{}", refused.err);
+    assert!(
+        refused.err.contains("error: unknown word `bck`\nhelp: this graph accepts `resume`, `stop`"),
+        "{}",
+        refused.err
+    );
     let late = say(&["run", HYBRID, MOCK, "--for", "1s", "--send", "9s:stop"]);
     assert_eq!(late.code, 0);
     assert!(late.err.contains("`stop` was not sent: the run ended before 9 s"), "{}", late.err);

@@ -54,20 +54,24 @@ fn a_run_without_a_contact_has_a_file_without_points() {
 fn what_cannot_be_points_is_told_before_anything_runs() {
     let (_folder, ply) = in_new_folder("surface.ply");
     let cases = [
-        ("surface.obj", "graphs/hybrid.toml", "`surface.obj` is no .ply".to_owned()),
+        ("surface.obj", "graphs/hybrid.toml", "`surface.obj` is not a .ply file".to_owned()),
         ("ruler.psoe=a.ply", "graphs/hybrid.toml", "the graph has no port `ruler.psoe`: ".to_owned()),
-        ("touch.x=a.ply", "graphs/hybrid.toml", "`touch.x` is a scalar, but a point is where a pose is".to_owned()),
+        (
+            "touch.x=a.ply",
+            "graphs/hybrid.toml",
+            "`touch.x` is a scalar, but the first port of `--points` must be a pose".to_owned(),
+        ),
         (
             "ruler.pose,touch.image=a.ply",
             "graphs/hybrid.toml",
-            "`touch.image` is an image: it has no numbers".to_owned(),
+            "`touch.image` is an image, which has no numbers".to_owned(),
         ),
         (
             "a.ply",
             "graphs/finger_press.toml",
-            "the graph does not report one pose: name a port, as --points".to_owned(),
+            "the graph does not report exactly one pose: name a port, as in `--points".to_owned(),
         ),
-        (&ply, "graphs/hybrid.toml", format!("`{ply}` exists and holds no points: it is not overwritten")),
+        (&ply, "graphs/hybrid.toml", format!("`{ply}` exists and is not a file of points: it is not overwritten")),
     ];
     fs::write(&ply, [0x93, b'N', b'U', b'M']).unwrap();
     for (wanted, graph, message) in cases {

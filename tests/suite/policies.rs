@@ -125,7 +125,7 @@ fn a_tick_that_begins_late_is_told_with_its_own_number() {
         let mut rig = lengths(&format!("deadline = \"{policy}\""));
         let mut fault = None;
         for (i, ms) in [0.0, 10.0, 35.0, 40.0].into_iter().enumerate() {
-            rig.feed("a", 0, ms, 1.0);
+            rig.feed("a.value", ms, 1.0);
             if i == 2 {
                 rig.engine.begin_late(15_000_000);
             }
@@ -160,7 +160,7 @@ fn each_role_has_its_own_age_and_policy() {
             for tick in 0..10 {
                 let ms = f64::from(tick) * 10.0;
                 for role in ["a", "b"].into_iter().filter(|role| tick == 0 || *role != silent) {
-                    rig.feed(role, 0, ms, 1.0);
+                    rig.feed(&format!("{role}.value"), ms, 1.0);
                 }
                 rig.tick(ms).unwrap();
                 if !rig.engine.halts().is_empty() {
@@ -178,7 +178,7 @@ fn what_was_never_there_is_not_old() {
     let mut rig = lengths("stale = \"fault\"");
     for tick in 0..20 {
         let ms = f64::from(tick) * 10.0;
-        rig.feed("a", 0, ms, 1.0);
+        rig.feed("a.value", ms, 1.0);
         rig.tick(ms).unwrap();
     }
 }
@@ -199,7 +199,7 @@ fn each_port_counts_what_came_in() {
         (90.0, 90.0, 7, 1.0),
     ];
     for (at, stamp, sequence, value) in samples {
-        rig.feed_as("a", 0, at, stamp, sequence, value);
+        rig.feed_as("a.value", at, stamp, sequence, value);
         rig.tick(at).unwrap();
     }
     let found = rig.engine.counters().next().unwrap();
@@ -222,7 +222,7 @@ fn a_wire_may_grow_only_so_old() {
     for (ms, is_new) in [(0, true), (10, true), (20, false), (30, false), (40, false), (50, true), (60, false)] {
         let ms = f64::from(ms);
         if is_new {
-            rig.feed("a", 0, ms, 1.0);
+            rig.feed("a.value", ms, 1.0);
         }
         rig.tick(ms).unwrap();
         seen.push(rig.freshness("count.steps"));
@@ -266,7 +266,7 @@ fn a_wire_through_parts_is_as_old_as_the_strictest_on_its_way_allows() {
         );
         let mut rig = GraphRig::new(catalogue(), &text, vec![length_by_hand("a")])
             .unwrap_or_else(|report| panic!("{}", report.render(false)));
-        rig.feed("a", 0, 0.0, 1.0);
+        rig.feed("a.value", 0.0, 1.0);
         let mut found = f64::INFINITY;
         for ms in [0.0, 10.0, 20.0, 30.0, 40.0, 50.0] {
             rig.tick(ms).unwrap();
@@ -281,14 +281,14 @@ fn a_wire_through_parts_is_as_old_as_the_strictest_on_its_way_allows() {
 #[test]
 fn an_old_wire_can_stop_or_end_the_run() {
     let mut rig = wire("{ from = \"a.value\", max_age_ms = 15, stale = \"fault\" }");
-    rig.feed("a", 0, 0.0, 1.0);
+    rig.feed("a.value", 0.0, 1.0);
     rig.tick(0.0).unwrap();
     let fault = rig.tick(20.0).unwrap_err();
     let expected =
-        "`a.value` is 20.0 ms old for `count`, and may be 15.0 ms old in tick 2 at 0.020 s (graph.toml:10:21)";
+        "`a.value` is 20.0 ms old at `count`, but the maximum is 15.0 ms in tick 2 at 0.020 s (graph.toml:10:21)";
     assert_eq!(fault.to_string(), expected);
     let mut rig = wire("{ from = \"a.value\", max_age_ms = 15, stale = \"stop\" }");
-    rig.feed("a", 0, 0.0, 1.0);
+    rig.feed("a.value", 0.0, 1.0);
     rig.tick(0.0).unwrap();
     rig.tick(20.0).unwrap();
     assert!(rig.engine.is_stopped());
@@ -307,9 +307,9 @@ fn an_old_feature_takes_the_others_with_it_only_on_their_common_wire() {
             .unwrap_or_else(|report| panic!("{}", report.render(false)));
         for tick in 0..6 {
             let ms = f64::from(tick) * 10.0;
-            rig.feed("a", 0, ms, 1.0);
+            rig.feed("a.value", ms, 1.0);
             if tick == 0 {
-                rig.feed("b", 0, ms, 1.0);
+                rig.feed("b.value", ms, 1.0);
             }
             rig.tick(ms).unwrap();
         }
@@ -343,7 +343,8 @@ fn an_old_command_ramps_and_does_what_its_wire_says() {
         assert_eq!((engine.is_stopped(), engine.halts().len()), (is_stopped, usize::from(is_stopped)), "{stale}");
     }
     let fault = moves(&mut commanded("fault"), 2.0).unwrap_err();
-    let says = "`move.joints.velocity` is 8.0 ms old for `arm.velocity`, and may be 6.0 ms old in tick 202 at 0.804 s";
+    let says =
+        "`move.joints.velocity` is 8.0 ms old at `arm.velocity`, but the maximum is 6.0 ms in tick 202 at 0.804 s";
     assert!(fault.to_string().starts_with(says), "{fault}");
 }
 
@@ -448,13 +449,13 @@ proptest! {
                     let stamp = if let Comes::Delayed(_, late) = comes { ms - late } else { ms };
                     sequence += 1;
                     last = Some((stamp, value));
-                    messy.feed_as("a", 0, ms, stamp, sequence, value);
+                    messy.feed_as("a.value", ms, stamp, sequence, value);
                     // Here it comes when it was taken.
-                    clean.feed_as("a", 0, stamp, stamp, sequence, value);
+                    clean.feed_as("a.value", stamp, stamp, sequence, value);
                     clean.tick(stamp).unwrap();
                 }
-                (Comes::Again, Some((stamp, value))) => messy.feed_as("a", 0, ms, stamp, sequence, value),
-                (Comes::Older, Some((stamp, _))) => messy.feed_as("a", 0, ms, stamp - 1.0, sequence + 1000, 9.0),
+                (Comes::Again, Some((stamp, value))) => messy.feed_as("a.value", ms, stamp, sequence, value),
+                (Comes::Older, Some((stamp, _))) => messy.feed_as("a.value", ms, stamp - 1.0, sequence + 1000, 9.0),
                 (Comes::Again | Comes::Older, None) | (Comes::Nothing, _) => {}
             }
             messy.tick(ms).unwrap();

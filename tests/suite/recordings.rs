@@ -141,13 +141,13 @@ fn what_unpacks_to_far_too_much_stays_packed() {
         assert!(bytes.len() < 100_000);
         let size = if is_known { member.len() } else { 0 };
         let said = check(&bytes, size, "bomb.zip", &Hints::default()).unwrap();
-        assert_eq!(said.contains("no recording of a known format"), !is_known, "{said}");
+        assert_eq!(said.contains("has an unknown format"), !is_known, "{said}");
         // The directory promises less than comes out.
         let mut liar = bytes.clone();
         let directory = liar.windows(4).rposition(|four| four == b"PK\x01\x02").unwrap();
         liar[directory + 24..directory + 28].copy_from_slice(&100_u32.to_le_bytes());
         let said = check(&liar, size, "liar.zip", &Hints::default()).unwrap();
-        assert!(!is_known || said.contains("does not unpack to what was packed"), "{said}");
+        assert!(!is_known || said.contains("invalid size: expected 100"), "{said}");
     }
 }
 

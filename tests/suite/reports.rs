@@ -3,19 +3,13 @@
 use tactflow_nodes::catalogue;
 use tactflow_runtime::engine::{self, Engine, RunOptions};
 use tactflow_runtime::graph::{Request, compile};
-use tactflow_runtime::signal::{Mark, Pose, Signal};
+use tactflow_runtime::signal::Pose;
 use tactflow_tests::workspace;
 
 fn engine(graph: &str) -> Engine {
     let request =
         Request::file(workspace().join("graphs").join(graph)).bench(workspace().join("graphs/benches/mock.toml"));
     Engine::new(compile(&catalogue(), &request).unwrap_or_else(|report| panic!("{}", report.render(false))))
-}
-
-/// What the ruler gives.
-fn point(engine: &Engine) -> (Mark, Pose) {
-    let (_, id) = engine.ports().iter().find(|(port, _)| port.name == "ruler.point.pose").unwrap();
-    (engine.bus().marks[id.mark as usize], Pose::arena(&engine.bus().arenas)[id.slot as usize])
 }
 
 #[test]
@@ -27,15 +21,14 @@ fn a_device_is_told_what_the_wire_brings_while_it_is_there_and_also_while_comman
             engine.send("stop").unwrap();
         }
         engine.tick(now).unwrap();
-        let (mark, pose) = point(&engine);
-        let expected = mark.is_present().then_some(&pose);
-        assert_eq!(engine.report::<Pose>("arm", 0), expected, "tick {}", engine.ticks());
+        let expected = engine.get::<Pose>("ruler.point.pose");
+        assert_eq!(engine.report::<Pose>("arm.contact"), expected, "tick {}", engine.ticks());
         told += u32::from(expected.is_some());
         silent += u32::from(expected.is_none());
         held += u32::from(expected.is_some() && engine.is_halted());
     }
     assert!(told > 300 && silent > 100 && held > 300, "{told} {silent} {held}");
-    assert_eq!(engine.report::<Pose>("arm", 1), None, "there is no such report");
+    assert_eq!(engine.report::<Pose>("arm.nothing"), None, "there is no such report");
 }
 
 #[test]
@@ -43,6 +36,7 @@ fn after_the_last_tick_nothing_is_reported_any_more() {
     let mut engine = engine("hybrid.toml");
     let options = RunOptions { duration: Some(1.0), ..RunOptions::default() };
     let mut was_told = false;
-    engine::run(&mut engine, &options, &mut |engine| was_told = engine.report::<Pose>("arm", 0).is_some()).unwrap();
-    assert!(was_told && engine.report::<Pose>("arm", 0).is_none());
+    engine::run(&mut engine, &options, &mut |engine| was_told = engine.report::<Pose>("arm.contact").is_some())
+        .unwrap();
+    assert!(was_told && engine.report::<Pose>("arm.contact").is_none());
 }

@@ -40,7 +40,7 @@ fn the_shipped_calibration_is_what_the_tool_makes_of_the_pads_press_log() {
     // What is something else is not replaced.
     fs::write(path("notes.csv"), "mine").unwrap();
     let refused = say(&["press", "-o", &path("notes.csv")]);
-    assert!(refused.code == 2 && refused.err.contains("is no press log"), "{}", refused.err);
+    assert!(refused.code == 2 && refused.err.contains("is not a log of `press`"), "{}", refused.err);
 }
 
 #[test]
@@ -98,10 +98,7 @@ fn settings_that_cannot_be_are_told_at_their_place() {
             "objects=[{ shape = 'cable', at = [0, 0, 0.1], radius = 0.003, points = [[0, 0, 0]] }]",
             "must be two or more",
         ),
-        (
-            "objects=[{ shape = 'box', at = [0, 0, 0.1], size = [1, 0, 1] }]",
-            "each entry of `size` must be greater than 0",
-        ),
+        ("objects=[{ shape = 'box', at = [0, 0, 0.1], size = [1, 0, 1] }]", "each `size` must be greater than 0"),
         ("objects=[{ shape = 'egg', at = [0, 0, 0.1] }]", "expected one of `plane`"),
         ("step_s=0.01", "the step must be from 1e-6 to 0.002 s"),
         ("points_apart=0.002", "points must be from"),

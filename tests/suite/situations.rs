@@ -15,7 +15,7 @@ use tactflow_runtime::engine::Engine;
 use tactflow_runtime::fault::Fault;
 use tactflow_runtime::graph::{Compiled, Request, compile};
 use tactflow_runtime::node::PortId;
-use tactflow_runtime::signal::{Signal, Twist};
+use tactflow_runtime::signal::Twist;
 use tactflow_runtime::source::Item;
 use tactflow_tests::saboteur::{How, Sabotage, sabotaged};
 use tactflow_tests::{catalogue, on_the_mock_bench, toml_files, workspace};
@@ -90,9 +90,7 @@ impl Watch {
 
     /// A twist on the bus; nothing is zero motion.
     fn twist(&self, id: PortId) -> Twist {
-        let bus = self.engine.bus();
-        let is_there = bus.marks[id.mark as usize].is_present();
-        if is_there { Twist::arena(&bus.arenas)[id.slot as usize] } else { Twist::default() }
+        self.engine.bus().get::<Twist>(id).copied().unwrap_or_default()
     }
 
     /// Compares with the tick before, `dt` [s] ago, and writes a row now and then.

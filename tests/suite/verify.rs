@@ -1,9 +1,9 @@
-//! `tactflow verify`: what is met, what is missed, what fails and what does not load, on a pad whose truth is known.
+//! `tactflow verify`: checks that pass and fail, runs that fail and files that do not load, on a pad whose truth is known.
 
 use std::fs;
 use std::path::Path;
 
-use tactflow_runtime::scenario::judge::{Figure, Mark, Row};
+use tactflow_runtime::scenario::judge::{Figure, Row, Verdict};
 use tactflow_runtime::scenario::{Scenario, Trial};
 use tactflow_tests::{catalogue, workspace};
 
@@ -34,9 +34,9 @@ fn what_is_met_ends_with_0_and_prints_figure_bound_paper_and_mark() {
     assert_eq!((code, err.as_str()), (0, ""), "{out}");
     assert_eq!(row(&out, "x", "response")[..6], ["slide", "x", "response", "s", "0.48000", "≤ 0.52000"]);
     assert_eq!(row(&out, "x", "response")[6], "0.90000", "the paper's");
-    assert!(rows(&out)[1..].iter().all(|row| *row.last().unwrap() == "met" || row.len() < 9), "{out}");
+    assert!(rows(&out)[1..].iter().all(|row| *row.last().unwrap() == "passed" || row.len() < 9), "{out}");
     assert!(out.contains("slide: 6 seeds of 4 s, pad.noise = 0.002, devices.pad.tau_s = 0.25\n"), "{out}");
-    assert!(out.ends_with("\n11 met, 0 missed, 4 told, in 6 runs\n"), "{out}");
+    assert!(out.ends_with("\n11 passed, 0 failed, 4 informational, in 6 runs\n"), "{out}");
 }
 
 #[test]
@@ -44,20 +44,20 @@ fn what_is_missed_ends_with_1_and_is_printed_all_the_same() {
     let Said { code, out, err } = say(&["verify", MISSED]);
     assert_eq!((code, err.as_str()), (1, ""));
     let marks = [
-        ("x", "response", "MISSED"),
-        ("x", "error", "MISSED"),
-        ("reach", "max", "MISSED"),
-        ("reach", "min", "met"),
-        ("never_lost", "lost", "MISSED"),
-        ("stays_in", "away", "MISSED"),
-        ("ends_in", "ends", "MISSED"),
+        ("x", "response", "FAILED"),
+        ("x", "error", "FAILED"),
+        ("reach", "max", "FAILED"),
+        ("reach", "min", "passed"),
+        ("never_lost", "lost", "FAILED"),
+        ("stays_in", "away", "FAILED"),
+        ("ends_in", "ends", "FAILED"),
     ];
     for (check, figure, mark) in marks {
         assert_eq!(row(&out, check, figure).last(), Some(&mark), "{figure} of {check}:\n{out}");
     }
-    // The contact is there for 1.5 s of the 2.5 s after it came, a tick each 4 ms; the last of them is at 2.5 s.
+    // The contact is there for 1.5 s of the 2.5 s after it came, one tick every 4 ms; the last of them is at 2.5 s.
     assert_eq!(row(&out, "never_lost", "lost")[3], "1.004");
-    assert!(out.ends_with("\n1 met, 6 missed, 1 told, in 1 runs\n"), "{out}");
+    assert!(out.ends_with("\n1 passed, 6 failed, 1 informational, in 1 run\n"), "{out}");
 }
 
 #[test]
@@ -65,12 +65,15 @@ fn a_fault_is_a_row_and_the_others_run() {
     let Said { code, out, err } = say(&["verify", FAULT, NEVER, MOCK]);
     assert_eq!(code, 1);
     let fault = "`pad` failed: its plug is out in tick 376 at 1.500 s (tests/scenarios/benches/unplugged.toml:4:10)";
-    let never = "error: never: `touch.present` was never set, so that no figure has a time 0";
+    let never = "error: never: `touch.present` was never set, so the figures have no time 0";
     let lines = [format!("error: fault, seed 3: device {fault}"), format!("error: fault, seed 7: device {fault}")];
     assert_eq!(err.lines().collect::<Vec<_>>(), [&lines[0], &lines[1], never]);
     let remarks: Vec<_> = rows(&out).into_iter().filter(|row| row.last() == Some(&"FAILED")).collect();
-    assert_eq!(remarks, [["fault", "2 of 2 runs failed", "FAILED"], ["never", "1 of 1 runs failed", "FAILED"]]);
-    assert_eq!(row(&out, "pressure", "max").last(), Some(&"met"), "{out}");
+    assert_eq!(
+        remarks,
+        [["fault", "2 of 2 runs ended in an error", "FAILED"], ["never", "1 of 1 runs ended in an error", "FAILED"]]
+    );
+    assert_eq!(row(&out, "pressure", "max").last(), Some(&"passed"), "{out}");
 }
 
 #[test]
@@ -85,12 +88,15 @@ fn what_does_not_load_ends_with_2_and_the_others_run() {
         let Said { code, out, err } = say(&["verify", file, MOCK]);
         assert_eq!(code, 2, "{file}: {err}");
         assert!(err.contains(message), "{file}: {err}");
-        assert!(out.contains("does not load") && row(&out, "pressure", "max").last() == Some(&"met"), "{file}: {out}");
+        assert!(
+            out.contains("does not load") && row(&out, "pressure", "max").last() == Some(&"passed"),
+            "{file}: {out}"
+        );
     }
     let empty = tempfile::tempdir().unwrap();
     let folder = empty.path().to_str().unwrap();
     let Said { code, err, .. } = say(&["verify", folder]);
-    assert_eq!((code, err), (2, format!("error: there is no scenario in `{folder}`\n")));
+    assert_eq!((code, err), (2, format!("error: no scenario in folder `{folder}`\n")));
 }
 
 #[test]
@@ -104,11 +110,12 @@ fn the_json_is_json_and_does_not_depend_on_the_number_of_jobs() {
     assert_eq!(said.code, 1);
     let file = tempfile::NamedTempFile::new().unwrap();
     fs::write(file.path(), &said.out).unwrap();
-    let expected = "fault: not ok, 2 runs, 2 failed, told told\n\
-        missed: not ok, 1 runs, 0 failed, missed missed told missed met missed missed missed\n\
-        mock: ok, 1 runs, 0 failed, met told told met\n\
-        never: not ok, 1 runs, 1 failed, told told\n\
-        slide: ok, 6 runs, 0 failed, met met met met told told met met met met told told met met met\n";
+    let expected = "fault: not ok, 2 runs, 2 failed, informational informational\n\
+        missed: not ok, 1 runs, 0 failed, failed failed informational failed passed failed failed failed\n\
+        mock: ok, 1 runs, 0 failed, passed informational informational passed\n\
+        never: not ok, 1 runs, 1 failed, informational informational\n\
+        slide: ok, 6 runs, 0 failed, passed passed passed passed informational informational passed passed passed passed informational \
+         informational passed passed passed\n";
     assert_eq!(peer("verified.py", &[file.path().to_str().unwrap()]), expected);
 }
 
@@ -215,19 +222,19 @@ fn a_run_may_be_done_early_but_samples_may_not_end_early() {
         let loaded =
             Scenario::load(&catalogue(), &scenario).unwrap_or_else(|report| panic!("{}", report.render(false)));
         let trial = loaded.run(&catalogue(), None, None, &|| false).unwrap();
-        let marks: Vec<Mark> = loaded.rows(std::slice::from_ref(&trial)).iter().map(Row::mark).collect();
+        let marks: Vec<Verdict> = loaded.rows(std::slice::from_ref(&trial)).iter().map(Row::verdict).collect();
         (trial, marks)
     };
     let modes = "[modes.feel]\ndone = { after_ms = 1000 }\n[modes.other]\ngo = { to = 'feel', after_ms = 10 }\n";
     let with_modes = task(modes, "").replace("graph.clock = 'pad'", "graph = { clock = 'pad', start = 'other' }");
     let (trial, marks) = run(&with_modes, "ends_in = 'done'\nstays_in = 'feel'");
-    assert_eq!((trial.failure, &marks[2..]), (None, &[Mark::Met; 2][..]));
+    assert_eq!((trial.failure, &marks[2..]), (None, &[Verdict::Passed; 2][..]));
     assert!((trial.time - 1.012).abs() < 0.01, "{}", trial.time);
     let only = with_modes.replace("to = 'feel', after_ms = 10", "to = 'feel', after_ms = 9000");
     let (trial, marks) = run(&only, "ends_in = 'other'\nstays_in = 'feel'");
     assert_eq!(
         (trial.failure, &marks[2..]),
-        (None, &[Mark::Missed, Mark::Met][..]),
+        (None, &[Verdict::Failed, Verdict::Passed][..]),
         "a mode never reached, and the end"
     );
     // The last of two seconds of samples is a period before their end.
@@ -242,7 +249,7 @@ fn a_run_may_be_done_early_but_samples_may_not_end_early() {
 fn colours_are_for_those_who_ask() {
     let [plain, asked] = ["never", "always"].map(|when| say(&["verify", MISSED, "--color", when]).out);
     assert!(!plain.contains('\u{1b}'));
-    assert!(asked.contains("\u{1b}[1;31mMISSED\u{1b}[0m") && asked.contains("\u{1b}[32mmet\u{1b}[0m"));
+    assert!(asked.contains("\u{1b}[1;31mFAILED\u{1b}[0m") && asked.contains("\u{1b}[32mpassed\u{1b}[0m"));
     let stripped = asked.replace("\u{1b}[1;31m", "").replace("\u{1b}[32m", "").replace("\u{1b}[0m", "");
     assert_eq!(stripped, plain, "colours take no room");
 }
@@ -256,7 +263,7 @@ fn what_cannot_be_a_scenario_is_told() {
         ("[scenario]\ngraph = 'x'\n[scenario]\n", "error[syntax]"),
         (
             "[scenario]\ngraph = 'live.toml'\nfor_s = 1.0\n[check.x]\nof = 'length.value'\n",
-            "error[wrong-role]: a device of this bench runs in real time, but a scenario in virtual time",
+            "error[wrong-role]: a device of this bench runs in real time, but scenarios run in virtual time",
         ),
         (
             "[scenario]\ngraph = 'TESTS/../graphs/hybrid.toml'\nbench = 'TESTS/scenarios/benches/slide.toml'\nfor_s = 1.0\n",
@@ -284,12 +291,16 @@ fn what_cannot_be_a_scenario_is_told() {
 #[test]
 fn check_knows_a_scenario_and_run_says_what_it_is() {
     let good = say(&["check", SLIDE]);
-    let expected = format!("{SLIDE}: ok, a scenario of 6 runs, 4 s each; `verify` runs it\n");
+    let expected = format!("{SLIDE}: ok, a scenario of 6 runs, 4 s each; run it with `tactflow verify`\n");
     assert_eq!((good.code, good.err.as_str(), good.out), (0, "", expected));
     let bad = say(&["check", "tests/errors/scenarios/names.toml", "--format", "json"]);
     assert!(bad.code == 2 && bad.out.contains("\"code\": \"unknown-mode\""), "{}", bad.out);
     let set = say(&["check", SLIDE, "--set", "nodes.error.setpoint.x=1"]);
-    assert!(set.code == 2 && set.err.contains("is a scenario: it names its bench, and sets nothing"), "{}", set.err);
+    assert!(
+        set.code == 2 && set.err.contains("is a scenario, which names its own bench: remove `--bench` and `--set`"),
+        "{}",
+        set.err
+    );
     let run = say(&["run", SLIDE]);
     assert!(run.code == 2 && run.err.contains("this is a scenario, not a graph"), "{}", run.err);
     assert!(run.err.contains("help: run it with `tactflow verify`"), "{}", run.err);

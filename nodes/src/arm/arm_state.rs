@@ -1,46 +1,78 @@
-//! `arm_state`: forward kinematics (paper section IV, T_gs = T_ge T_es) and the spatial Jacobian, once for everybody.
-//!
-//! The paper's ruler and eq. 4 take the pose, `ik_sink` takes all three outputs. The Jacobian's columns are twists at
-//! the base's origin, which is what eq. 4's Ad(T_gs) gives; the textbook's "geometric" Jacobian at the tip is another.
+//! Jacobian and pose come from one pass over the chain, see [`Chain`].
 
-use tactflow_runtime::node::{FilePath, Mistake, Mistakes, Node, Setup, Tick};
-use tactflow_runtime::signal::{JacobianShape, JointsShape, PoseShape, Unit};
-use tactflow_runtime::{inputs, outputs, params};
+use tactflow_runtime::node::{
+    Describe, FilePath, In, Inputs, Mistake, Mistakes, Node, Out, Outputs, Param, Setup, Tick,
+};
+use tactflow_runtime::signal::{Jacobian, JacobianShape, Joints, JointsShape, Pose, PoseShape, Unit};
 
 use super::chain::Chain;
 use super::model::load;
 use super::mount::Mount;
 
-params! {
-    /// The arm's model.
+/// Computes where the sensor is and how the joints move it: forward kinematics and Jacobian.
+///
+/// The pose is T_gs = T_ge T_es (section IV of the paper): the chain from the root of the model to `tip`, then the
+/// `mount` of the sensor on it. `adjoint` and `contact_point` take the pose, and `ik_sink` takes all three outputs, so
+/// the kinematics are computed once.
+///
+/// The Jacobian is spatial: its columns are twists at the origin of the base, as the output of `adjoint` is. It is not
+/// the "geometric" Jacobian of textbooks, which is taken at the tip.
+///
+/// Model, tip and mount are facts of the arm's device. A graph that takes them from there fits any arm. The pose is that
+/// of the frame of the role `sensor`. The wire must have the joints of the model, in its order.
+///
+/// ```toml
+/// [nodes.state]
+/// type = "arm_state"
+/// in.position = "arm.position"
+/// sensor = "pad"
+/// urdf = { from = "arm.urdf" }
+/// tip = { from = "arm.tip" }
+/// mount = { from = "arm.mount" }
+/// ```
+#[derive(Describe)]
+#[describe(name = "arm_state")]
+pub struct ArmState {
+    chain: Chain,
+}
+
+/// Parameters of `arm_state`.
+#[derive(Debug, Clone, Param)]
+pub struct Params {
+    /// Model of the arm.
     urdf: FilePath,
     /// Link that carries the sensor.
     tip: String,
     /// Pose of the sensor on that link.
-    mount: Mount = Mount::NONE,
-    /// Role whose frame is the sensor's.
+    #[param(default = Mount::NONE)]
+    mount: Mount,
+    /// Role of the sensor; names the frame of the pose.
     sensor: String,
-    /// Name of the frame of the model's root.
-    base: String = "base".into(),
+    /// Name of the frame at the root of the model.
+    #[param(default = "base")]
+    base: String,
 }
 
-inputs! {
-    /// Measured joint positions [rad; m for a prismatic joint].
-    position: Joints["rad", "R"],
+/// What `arm_state` reads.
+#[derive(Inputs)]
+pub struct Inputs<'a> {
+    /// Measured joint positions; those of prismatic joints are in m.
+    #[port(unit = "rad", robot = "R")]
+    position: In<'a, Joints>,
 }
 
-outputs! {
-    /// The same positions, with the names and limits of the model [rad; m for a prismatic joint].
-    joints: Joints["rad", "R"],
+/// What `arm_state` writes.
+#[derive(Outputs)]
+pub struct Outputs {
+    /// The same positions, with the names and limits of the model's joints.
+    #[port(unit = "rad", robot = "R")]
+    joints: Out<Joints>,
     /// Pose of the sensor in the base.
-    sensor_pose: Pose["$sensor", "$base"],
-    /// Spatial Jacobian of the sensor in the base [m/s, rad/s per rad/s].
-    jacobian: Jacobian["$base", "R"],
-}
-
-/// The arm's kinematics.
-pub struct ArmState {
-    chain: Chain,
+    #[port(frame = "$sensor", reference = "$base")]
+    sensor_pose: Out<Pose>,
+    /// Spatial Jacobian of the sensor in the base.
+    #[port(frame = "$base", robot = "R")]
+    jacobian: Out<Jacobian>,
 }
 
 impl Node for ArmState {
@@ -49,30 +81,10 @@ impl Node for ArmState {
     type Outputs = Outputs;
     type State = ();
 
-    const NAME: &'static str = "arm_state";
-    const SUMMARY: &'static str = "where the sensor is and how the joints move it: forward kinematics and Jacobian";
-    const DOC: &'static str = "T_gs = T_ge T_es, the paper's section IV: the chain from the model's root to `tip`, \
-        and the `mount` of the sensor on it. It is worked out once here for everybody: `adjoint` and \
-        `contact_point` take the pose, `ik_sink` takes all three outputs.\n\n\
-        The Jacobian is spatial: its columns are twists at the base's origin, and meet what `adjoint` gives. The \
-        textbook's \"geometric\" Jacobian at the tip is another.\n\n\
-        Model, tip and mount are facts of the arm's device, so a graph takes them from there and fits any arm. \
-        `sensor` is the role whose frame the pose is of. The joints of the wire have to be the model's, in its \
-        order.";
-    const EXAMPLE: &'static str = r#"
-[nodes.state]
-type = "arm_state"
-in.position = "arm.position"
-sensor = "pad"
-urdf = { from = "arm.urdf" }
-tip = { from = "arm.tip" }
-mount = { from = "arm.mount" }
-"#;
-
     fn new(params: Params, setup: &mut Setup<Self>) -> Result<Self, Mistakes> {
         let chain = load(&params.urdf, &params.tip, &params.mount)?;
         let joints = JointsShape { joints: chain.joints().to_vec(), unit: Unit::RADIAN };
-        same_joints(&names(&setup.inputs.position), &names(&joints))?;
+        check_joints(&names(&setup.inputs.position), &names(&joints))?;
         setup.outputs.sensor_pose = PoseShape;
         setup.outputs.jacobian = JacobianShape(joints.clone());
         setup.outputs.joints = joints;
@@ -93,8 +105,8 @@ fn names(shape: &JointsShape) -> Vec<&str> {
     shape.joints.iter().map(|joint| joint.name.as_str()).collect()
 }
 
-/// It is a mistake at `position` if the wire's joints are not the model's.
-fn same_joints(wire: &[&str], model: &[&str]) -> Result<(), Mistakes> {
+/// Checks that the joints of the wire are those of the model. The mistake marks `position`.
+fn check_joints(wire: &[&str], model: &[&str]) -> Result<(), Mistakes> {
     let message = match wire.iter().zip(model).find(|(wire, model)| wire != model) {
         _ if wire.len() != model.len() => {
             format!("the wire has {} joints, but the model has {} up to the tip", wire.len(), model.len())
@@ -128,7 +140,7 @@ mod tests {
     }
 
     #[test]
-    fn the_pose_is_the_mounted_sensors_and_the_joints_carry_the_models_limits() {
+    fn the_pose_includes_the_mount_and_the_joints_have_the_limits_of_the_model() {
         let mut rig = rig("tip = 'lwr_7_link'\nmount = { xyz = [0, 0, 0.1215] }", &NAMES).unwrap();
         rig.set("position", Joints::zeros(7));
         rig.step();
@@ -144,7 +156,7 @@ mod tests {
     }
 
     #[test]
-    fn wires_that_are_not_the_models() {
+    fn joints_other_than_those_of_the_model_are_a_mistake() {
         let mut swapped = NAMES;
         swapped.swap(0, 1);
         let cases: [(&[&str], &str); 3] = [

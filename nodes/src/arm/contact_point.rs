@@ -1,44 +1,76 @@
-//! `contact_point`: where the contact is in the base: the robot as a ruler (paper section IV).
-//!
-//! p_B = T_gs (x, y, height) with T_gs the pose of the sensor in the base. The pad's surface is the plane z = 0 of the
-//! sensor. A point comes with each new contact, at the pose of that moment; a pose that moves on under a contact that is
-//! held makes no point.
+//! The pose is sampled: a pose that changes while the contact is held makes no point.
 
 use nalgebra::{IsometryMatrix3, Translation3};
-use tactflow_runtime::node::{Mistakes, Node, Setup, Tick};
-use tactflow_runtime::signal::Pose;
-use tactflow_runtime::{inputs, outputs, params};
+use tactflow_runtime::node::{Describe, In, Inputs, Mistakes, Node, Out, Outputs, Param, Setup, Tick};
+use tactflow_runtime::signal::{Pose, Scalar};
 
-params! {
-    /// Height of the contact over the pad's plane, along the sensor's z; below 0 where the foam gives way [m].
-    height: f64 = 0.0,
-    /// Name of the frame that has its origin in the contact and the axes of the sensor.
-    frame: String = "contact".into(),
-}
-
-inputs! {
-    /// Centre of the contact along the sensor's x from the pad's middle [m].
-    x: Scalar["m", "A"],
-    /// Centre of the contact along the sensor's y from the pad's middle [m].
-    y: Scalar["m", "A"],
-    /// Pose of the sensor in the base [m].
-    pose: Sampled<Pose["A", "B"]>,
-}
-
-outputs! {
-    /// The contact's x in the base [m].
-    x: Scalar["m", "B"],
-    /// The contact's y in the base [m].
-    y: Scalar["m", "B"],
-    /// The contact's z in the base [m].
-    z: Scalar["m", "B"],
-    /// The contact's place with the sensor's orientation, in the base [m].
-    pose: Pose["$frame", "B"],
-}
-
-/// How high the contact is.
+/// Measures where the contact is in the base, with the robot as a ruler.
+///
+/// p = T_gs (x, y, height), where T_gs is the pose of the sensor from `arm_state`. The surface of the pad is the plane
+/// z = 0 of the sensor. Section IV of the paper measures objects by touch in this way. Use `x`, `y` and `z` for
+/// recordings and plots, and `pose`, the same point with the axes of the sensor, for nodes that take a pose.
+///
+/// Each new contact makes a point, which is as old as the contact. Without a contact the outputs are absent. An arm that
+/// moves between two images makes no point.
+///
+/// The accuracy is that of the kinematics, the mount and the time between image and pose: at 0.05 m/s, a pose that is
+/// 4 ms too new is 0.2 mm off. Foam under pressure lies below the plane of the pad: set `height`.
+///
+/// ```toml
+/// [nodes.contact_point]
+/// type = "contact_point"
+/// in.x = "moments.x"
+/// in.y = "moments.y"
+/// in.pose = "state.sensor_pose"
+/// height = -0.001                     # the foam is compressed by about 1 mm [m]
+/// ```
+#[derive(Describe)]
+#[describe(name = "contact_point")]
 pub struct ContactPoint {
+    /// Above the plane of the pad [m].
     height: f64,
+}
+
+/// Parameters of `contact_point`.
+#[derive(Debug, Clone, Param)]
+pub struct Params {
+    /// Height of the contact above the plane of the pad, along the sensor's z; negative if the foam is compressed.
+    #[param(unit = "m", default = 0.0)]
+    height: f64,
+    /// Name of the frame with its origin at the contact and the axes of the sensor.
+    #[param(default = "contact")]
+    frame: String,
+}
+
+/// What `contact_point` reads.
+#[derive(Inputs)]
+pub struct Inputs<'a> {
+    /// Centre of the contact along the sensor's x, from the middle of the pad.
+    #[port(unit = "m", frame = "A")]
+    x: In<'a, Scalar>,
+    /// Centre of the contact along the sensor's y, from the middle of the pad.
+    #[port(unit = "m", frame = "A")]
+    y: In<'a, Scalar>,
+    /// Pose of the sensor in the base.
+    #[port(frame = "A", reference = "B", sampled)]
+    pose: In<'a, Pose>,
+}
+
+/// What `contact_point` writes.
+#[derive(Outputs)]
+pub struct Outputs {
+    /// The contact's x in the base.
+    #[port(unit = "m", frame = "B")]
+    x: Out<Scalar>,
+    /// The contact's y in the base.
+    #[port(unit = "m", frame = "B")]
+    y: Out<Scalar>,
+    /// The contact's z in the base.
+    #[port(unit = "m", frame = "B")]
+    z: Out<Scalar>,
+    /// Position of the contact with the orientation of the sensor, in the base.
+    #[port(frame = "$frame", reference = "B")]
+    pose: Out<Pose>,
 }
 
 impl Node for ContactPoint {
@@ -46,26 +78,6 @@ impl Node for ContactPoint {
     type Inputs<'a> = Inputs<'a>;
     type Outputs = Outputs;
     type State = ();
-
-    const NAME: &'static str = "contact_point";
-    const SUMMARY: &'static str = "measures where the contact is in the base: the robot as a ruler";
-    const DOC: &'static str = "The point (x, y, `height`) of the sensor in the base, p = T_gs (x, y, height), with \
-        the pose T_gs from `arm_state`: the paper's section IV uses it to measure objects by touch. `x`, `y` and \
-        `z` are for recording and plots; `pose` is the same point with the sensor's axes, for nodes that take a \
-        pose.\n\n\
-        A point comes with each new contact and is as old as it; without a contact there is none. An arm that \
-        moves between two images makes no point of its own.\n\n\
-        The point is as good as the arm's kinematics, the mount and the time between image and pose: at 0.05 m/s a \
-        pose that is 4 ms too new is 0.2 mm off. Foam that is pressed in lies below the pad's plane: give \
-        `height`.";
-    const EXAMPLE: &'static str = r#"
-[nodes.contact_point]
-type = "contact_point"
-in.x = "moments.x"
-in.y = "moments.y"
-in.pose = "state.sensor_pose"
-height = -0.001                     # the foam gives way by about that [m]
-"#;
 
     fn new(params: Params, _: &mut Setup<Self>) -> Result<Self, Mistakes> {
         Ok(Self { height: params.height })
@@ -114,7 +126,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn it_is_the_product_of_4_by_4_matrices(
+        fn the_point_is_the_product_of_4_by_4_matrices(
             at in prop::array::uniform3(-0.1..0.1_f64), angles in prop::array::uniform3(-3.0..3.0_f64),
             place in prop::array::uniform3(-1.0..1.0_f64),
         ) {
@@ -136,7 +148,7 @@ mod tests {
     }
 
     #[test]
-    fn a_point_comes_with_each_new_contact_and_is_as_old() {
+    fn each_new_contact_makes_a_point_that_is_as_old() {
         let mut rig = rig("");
         let at = |z: f64| Pose(IsometryMatrix3::translation(0.5, 0.0, z));
         rig.set("pose", at(0.3));
@@ -153,7 +165,7 @@ mod tests {
         rig.set("x", 0.0);
         rig.step();
         assert_eq!(point(&rig), Some([0.5, -0.02, 0.5]));
-        assert_eq!(rig.mark("pose").stamp().nanos, 1_000_000, "as old as the older of x and y, whatever the pose is");
+        assert_eq!(rig.mark("pose").stamp().nanos, 1_000_000, "as old as the older of x and y, for any pose");
         rig.lose("y");
         rig.step();
         assert_eq!((rig.freshness("x"), rig.freshness("pose")), (Freshness::Lost, Freshness::Lost));

@@ -1,64 +1,110 @@
-//! `ik_sink`: joint velocities for a twist of the sensor (paper section IV), within the arm's limits.
+//! Each step has four parts:
 //!
-//! 1. Twist and Jacobian are moved from the base's origin to the sensor's, along its axes (Ad of the inverse pose,
-//!    eq. 4): damping is not frame-invariant, so it is done where metres and radians mean what the task means.
-//! 2. [`damped::solve`]: a damped inverse that damps only what is near-singular.
-//! 3. [`null_space::project`]: motion toward a posture that leaves the sensor exactly still, if one is given.
+//! 1. Twist and Jacobian are moved from the origin of the base to that of the sensor, along its axes (Ad of the inverse
+//!    pose, eq. 4). Damping depends on the frame, so it is done in the frame of the task.
+//! 2. [`damped::solve`]: an inverse that damps only near-singular directions.
+//! 3. [`null_space::project`]: motion toward the posture, if there is one, that leaves the sensor exactly still.
 //! 4. [`joint_limits`]: speed and position limits that keep the direction; the posture gets what the task leaves.
 //!
-//! It is a map and remembers nothing: no twist, no velocity. What becomes of a motion that ends is the limiters'.
+//! The state is scratch memory alone: each output depends only on the inputs of its step.
 
-use tactflow_runtime::node::{Limits, Mistake, Mistakes, Node, NonNegative, Positive, Setup, Tick};
-use tactflow_runtime::signal::{Joint, JointsShape, Pose, ScalarShape, Twist, Unit};
-use tactflow_runtime::{inputs, outputs, params, state};
+use tactflow_runtime::node::{
+    Describe, In, Inputs, Limits, Mistake, Mistakes, Node, Out, Outputs, Param, Setup, State, Tick,
+};
+use tactflow_runtime::signal::{Jacobian, Joint, Joints, JointsShape, Pose, Scalar, ScalarShape, Twist, Unit};
 
 use super::{damped, joint_limits, null_space};
 
-params! {
-    /// Singular values below this are damped [1, and m].
-    damping: Positive = Positive(0.05),
-    /// Posture that the arm drifts to where the sensor's motion leaves it free, one entry a joint [rad].
-    live posture: Option<Vec<f64>>,
-    /// How fast it drifts there [1/s].
-    live posture_gain: NonNegative = NonNegative(0.5),
-    /// Greatest speed toward a position limit, per distance to it; 5, or half the graph's rate if that is less [1/s].
-    limit_gain: Option<Positive>,
-}
-
-inputs! {
-    /// Spatial twist of the sensor in the base [m/s, rad/s].
-    twist: Twist["B"],
-    /// Pose of the sensor in the base.
-    sensor_pose: Pose["S", "B"],
-    /// Spatial Jacobian of the sensor in the base [m/s, rad/s per rad/s].
-    jacobian: Jacobian["B", "R"],
-    /// Joint positions with their limits [rad; m for a prismatic joint].
-    joints: Joints["rad", "R"],
-}
-
-outputs! {
-    /// Joint velocities [rad/s; m/s for a prismatic joint].
-    velocity: Joints["rad/s", "R"],
-    /// How much of the wanted twist's motion the joints' limits leave; the posture's is not counted [1].
-    share: Scalar["1"],
-}
-
-state! {
-    /// The Jacobian's columns at the sensor.
-    columns: Vec<[f64; 6]>,
-    /// Room to work in for the null space.
-    rows: Vec<null_space::Row>,
-    /// Motion toward the posture [rad/s].
-    drift: Vec<f64>,
-}
-
-/// The sink's settings and the arm's limits.
+/// Moves the arm: computes joint velocities for a twist, within the limits of the arm.
+///
+/// Resolved motion rate control, as in section IV of the paper. Twist and Jacobian are moved to the origin of the sensor,
+/// where the task is defined. A damped inverse damps only the directions whose singular value is below `damping`, so the
+/// arm follows the twist exactly when it is far from a singularity.
+///
+/// An arm with more than six joints can move its elbow while the sensor stays still. It drifts toward `posture`, at
+/// `posture_gain`. The speed and position limits of the model are kept: a command that is too fast is slowed down as a
+/// whole and keeps its direction.
+///
+/// One joint at its limit stops the motion that needs it. `share` is the fraction of the twist that remains, 1 far
+/// from every limit. Without a twist the velocity is absent. This node does not smooth the beginning and the end of a
+/// motion, and does not stop old commands: put a `joint_limit` between it and the arm.
+///
+/// ```toml
+/// [nodes.ik]
+/// type = "ik_sink"
+/// in.twist = "to_base.twist"
+/// in.sensor_pose = "state.sensor_pose"
+/// in.jacobian = "state.jacobian"
+/// in.joints = "state.joints"
+/// posture = [0.0, 0.5, 0.0, -1.3, 0.0, 1.3, 0.0]   # [rad]
+/// ```
+#[derive(Describe)]
+#[describe(name = "ik_sink")]
 pub struct IkSink {
+    /// With their limits.
     joints: Vec<Joint>,
     damping: f64,
     posture: Option<Vec<f64>>,
     posture_gain: f64,
     limit_gain: f64,
+}
+
+/// Parameters of `ik_sink`.
+#[derive(Debug, Clone, Param)]
+pub struct Params {
+    /// Singular values below this are damped.
+    #[param(unit = "1, m", above = 0.0, default = 0.05)]
+    damping: f64,
+    /// Posture that the arm drifts to where the motion of the sensor leaves it free, one entry for each joint; in m for
+    /// a prismatic joint.
+    #[param(unit = "rad", live)]
+    posture: Option<Vec<f64>>,
+    /// Speed of the drift for each unit of distance.
+    #[param(unit = "1/s", range = 0.0.., default = 0.5, live)]
+    posture_gain: f64,
+    /// Maximum speed toward a position limit for each unit of distance to it. The default is 5, or half the rate of the
+    /// graph if that is less.
+    #[param(unit = "1/s", above = 0.0)]
+    limit_gain: Option<f64>,
+}
+
+/// What `ik_sink` reads.
+#[derive(Inputs)]
+pub struct Inputs<'a> {
+    /// Spatial twist of the sensor in the base.
+    #[port(frame = "B")]
+    twist: In<'a, Twist>,
+    /// Pose of the sensor in the base.
+    #[port(frame = "S", reference = "B")]
+    sensor_pose: In<'a, Pose>,
+    /// Spatial Jacobian of the sensor in the base.
+    #[port(frame = "B", robot = "R")]
+    jacobian: In<'a, Jacobian>,
+    /// Joint positions with their limits; those of prismatic joints are in m.
+    #[port(unit = "rad", robot = "R")]
+    joints: In<'a, Joints>,
+}
+
+/// What `ik_sink` writes.
+#[derive(Outputs)]
+pub struct Outputs {
+    /// Joint velocities; those of prismatic joints are in m/s.
+    #[port(unit = "rad/s", robot = "R")]
+    velocity: Out<Joints>,
+    /// Fraction of the twist that the joint limits leave. The drift toward the posture does not count.
+    #[port(unit = "1", frame = "_")]
+    share: Out<Scalar>,
+}
+
+/// What `ik_sink` remembers.
+#[derive(State)]
+pub struct State {
+    /// The Jacobian's columns at the sensor.
+    columns: Vec<[f64; 6]>,
+    /// Scratch memory of the null space.
+    rows: Vec<null_space::Row>,
+    /// Motion toward the posture [rad/s].
+    drift: Vec<f64>,
 }
 
 impl Node for IkSink {
@@ -67,27 +113,6 @@ impl Node for IkSink {
     type Outputs = Outputs;
     type State = State;
 
-    const NAME: &'static str = "ik_sink";
-    const SUMMARY: &'static str = "moves the arm: joint velocities for a twist, within the arm's limits";
-    const DOC: &'static str = "Resolved motion rate control, as in the paper's section IV. Twist and Jacobian are \
-        moved to the sensor's origin, where metres and radians mean what the task means; a damped inverse damps \
-        only the directions whose singular value is below `damping`, so far from a singularity the twist is met \
-        exactly.\n\n\
-        An arm with more than six joints is free to choose its elbow: `posture` says where it drifts, at \
-        `posture_gain`, along motions that leave the sensor still. Speed and position limits of the model are \
-        kept: a command that is too fast is slowed down as a whole and keeps its direction.\n\n\
-        One joint at its limit stops the whole motion that needs it: `share` says how much of the twist's motion is \
-        left, 1 far from every limit. Without a twist there is no velocity. How a motion begins and ends, and that \
-        nothing old goes on, is up to the limiters: a `joint_limit` has to come between it and the arm.";
-    const EXAMPLE: &'static str = r#"
-[nodes.ik]
-type = "ik_sink"
-in.twist = "to_base.twist"
-in.sensor_pose = "state.sensor_pose"
-in.jacobian = "state.jacobian"
-in.joints = "state.joints"
-posture = [0.0, 0.5, 0.0, -1.3, 0.0, 1.3, 0.0]   # [rad]
-"#;
     const LIMITS: Limits = Limits::passed("twist");
 
     fn new(params: Params, setup: &mut Setup<Self>) -> Result<Self, Mistakes> {
@@ -100,10 +125,10 @@ posture = [0.0, 0.5, 0.0, -1.3, 0.0, 1.3, 0.0]   # [rad]
         setup.outputs.share = ScalarShape::of(Unit::ONE).within(0.0, 1.0);
         Ok(Self {
             joints: shape.joints.clone(),
-            damping: *params.damping,
+            damping: params.damping,
             posture: params.posture,
-            posture_gain: *params.posture_gain,
-            limit_gain: params.limit_gain.map_or(most_gain(setup.period).min(5.0), |gain| *gain),
+            posture_gain: params.posture_gain,
+            limit_gain: params.limit_gain.unwrap_or(max_limit_gain(setup.period).min(5.0)),
         })
     }
 
@@ -132,7 +157,7 @@ posture = [0.0, 0.5, 0.0, -1.3, 0.0, 1.3, 0.0]   # [rad]
     }
 }
 
-/// A spatial twist in the base as the twist of the sensor's origin along the sensor's axes: Ad(T^-1).
+/// Moves a spatial twist in the base to the origin of the sensor, along the axes of the sensor: Ad(T^-1).
 #[inline]
 fn at_sensor(Pose(pose): &Pose, twist: &Twist) -> [f64; 6] {
     let (p, r) = (&pose.translation.vector, pose.rotation.matrix());
@@ -143,26 +168,27 @@ fn at_sensor(Pose(pose): &Pose, twist: &Twist) -> [f64; 6] {
     [turned(v, 0), turned(v, 1), turned(v, 2), turned(w, 0), turned(w, 1), turned(w, 2)]
 }
 
-/// Greatest gain toward a limit that leaves a margin of one tick's delay [1/s].
-fn most_gain(period: f64) -> f64 {
+/// Returns the largest gain toward a limit with which a delay of one tick cannot cross it [1/s].
+fn max_limit_gain(period: f64) -> f64 {
     0.5 / period
 }
 
+/// Checks the parameters against the arm and the period of the graph [s].
 fn check(params: &Params, joints: &JointsShape, columns: &JointsShape, period: f64) -> Mistakes {
     let mut mistakes = Mistakes::new();
     let names = |shape: &JointsShape| shape.joints.iter().map(|joint| joint.name.clone()).collect::<Vec<_>>();
     if names(joints) != names(columns) {
-        let message = format!("the Jacobian is of {:?}, but the joints are {:?}", names(columns), names(joints));
+        let message = format!("the Jacobian has the joints {:?}, but `joints` has {:?}", names(columns), names(joints));
         mistakes.push(Mistake::input("jacobian", message).help("take both from one `arm_state`"));
     }
-    if *params.damping < damped::MIN_DAMPING {
-        let message = format!("`damping` of less than {} drowns in rounding", damped::MIN_DAMPING);
+    if params.damping < damped::MIN_DAMPING {
+        let message = format!("`damping` is less than {}: rounding errors are then larger", damped::MIN_DAMPING);
         mistakes.push(Mistake::param("damping", message));
     }
-    let most = most_gain(period);
-    if params.limit_gain.is_some_and(|gain| *gain > most) {
-        let message = format!("a joint could cross its limit: `limit_gain` is more than {most} 1/s");
-        mistakes.push(Mistake::param("limit_gain", message).help("half the rate of the graph is the most"));
+    let max = max_limit_gain(period);
+    if params.limit_gain.is_some_and(|gain| gain > max) {
+        let message = format!("a joint could cross its limit: `limit_gain` is more than {max} 1/s");
+        mistakes.push(Mistake::param("limit_gain", message).help("the maximum is half the rate of the graph"));
     }
     let Some(posture) = &params.posture else { return mistakes };
     let count = joints.joints.len();

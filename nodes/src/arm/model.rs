@@ -66,7 +66,7 @@ pub fn load(urdf: &FilePath, tip: &str, mount: &Mount) -> Result<Chain, Mistakes
 /// If the text is not a URDF, or not a serial chain up to `tip`.
 pub fn chain_of(text: &str, tip: &str, mount: &Mount) -> Result<Chain, ModelError> {
     let robot = urdf_rs::read_from_string(text)
-        .map_err(|error| model_error(ModelPlace::Model, format!("not a URDF: {}", one_line(&error.to_string()))))?;
+        .map_err(|error| error_at(ModelPlace::Model, format!("not a URDF: {}", one_line(&error.to_string()))))?;
     let mut segments = Vec::new();
     let mut fixed = IsometryMatrix3::identity();
     for joint in path_to(&robot, tip)? {
@@ -76,13 +76,13 @@ pub fn chain_of(text: &str, tip: &str, mount: &Mount) -> Result<Chain, ModelErro
         }
         let segment = segment_of(joint, fixed)?;
         if segments.iter().any(|other: &ChainSegment| other.joint.name == joint.name) {
-            return Err(model_error(named(joint), format!("two joints have the name `{}`", joint.name)));
+            return Err(error_at(named(joint), format!("two joints have the name `{}`", joint.name)));
         }
         segments.push(segment);
         fixed = IsometryMatrix3::identity();
     }
     if segments.is_empty() {
-        return Err(model_error(ModelPlace::Tip, format!("no joint moves between the root and `{tip}`")));
+        return Err(error_at(ModelPlace::Tip, format!("no joint moves between the root and `{tip}`")));
     }
     Ok(Chain::new(segments, fixed * mount.pose()))
 }
@@ -92,30 +92,24 @@ fn path_to<'r>(robot: &'r urdf_rs::Robot, tip: &str) -> Result<Vec<&'r urdf_rs::
     let is_link = |name: &str| robot.links.iter().any(|link| link.name == name);
     if !is_link(tip) {
         let links: Vec<String> = robot.links.iter().map(|link| format!("`{}`", link.name)).collect();
-        return Err(model_error(
-            ModelPlace::Tip,
-            format!("the model has no link `{tip}`; it has {}", links.join(", ")),
-        ));
+        return Err(error_at(ModelPlace::Tip, format!("the model has no link `{tip}`; it has {}", links.join(", "))));
     }
     let mut above = BTreeMap::new();
     for joint in &robot.joints {
         if let Some(link) = [&joint.parent.link, &joint.child.link].into_iter().find(|link| !is_link(link)) {
             let message = format!("joint `{}` refers to link `{link}`, which the model does not have", joint.name);
-            return Err(model_error(named(joint), message));
+            return Err(error_at(named(joint), message));
         }
         if above.insert(joint.child.link.as_str(), joint).is_some() {
             let message = format!("link `{}` is the child of two joints", joint.child.link);
-            return Err(model_error(ModelPlace::Name(joint.child.link.clone()), message));
+            return Err(error_at(ModelPlace::Name(joint.child.link.clone()), message));
         }
     }
     let mut path = Vec::new();
     let mut link = tip;
     while let Some(joint) = above.get(link) {
         if path.len() == robot.joints.len() {
-            return Err(model_error(
-                ModelPlace::Name(link.into()),
-                format!("the joints above link `{tip}` form a cycle"),
-            ));
+            return Err(error_at(ModelPlace::Name(link.into()), format!("the joints above link `{tip}` form a cycle")));
         }
         path.push(*joint);
         link = &joint.parent.link;
@@ -125,7 +119,7 @@ fn path_to<'r>(robot: &'r urdf_rs::Robot, tip: &str) -> Result<Vec<&'r urdf_rs::
 }
 
 fn segment_of(joint: &urdf_rs::Joint, fixed: IsometryMatrix3<f64>) -> Result<ChainSegment, ModelError> {
-    let bad = |what: &str| Err(model_error(named(joint), format!("joint `{}` {what}", joint.name)));
+    let bad = |what: &str| Err(error_at(named(joint), format!("joint `{}` {what}", joint.name)));
     let motion = match joint.joint_type {
         JointType::Revolute | JointType::Continuous => JointKind::Revolute,
         JointType::Prismatic => JointKind::Prismatic,
@@ -162,12 +156,12 @@ fn segment_of(joint: &urdf_rs::Joint, fixed: IsometryMatrix3<f64>) -> Result<Cha
 fn origin_of(joint: &urdf_rs::Joint) -> Result<IsometryMatrix3<f64>, ModelError> {
     let (xyz, rpy) = (joint.origin.xyz.0, joint.origin.rpy.0);
     if xyz.iter().chain(&rpy).any(|number| !number.is_finite()) {
-        return Err(model_error(named(joint), format!("the origin of joint `{}` is not finite", joint.name)));
+        return Err(error_at(named(joint), format!("the origin of joint `{}` is not finite", joint.name)));
     }
     Ok(pose_of(xyz, rpy))
 }
 
-fn model_error(at: ModelPlace, message: String) -> ModelError {
+fn error_at(at: ModelPlace, message: String) -> ModelError {
     ModelError { message, at }
 }
 

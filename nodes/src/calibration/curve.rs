@@ -1,12 +1,12 @@
-//! The curve of one tactel, from what it reads to a force: the inverse of its characteristic (paper section III, fig. 1).
+//! The curve of one tactel, from its reading to a force: the inverse of its characteristic (paper section III, fig. 1).
 //!
-//! Every curve starts at the unloaded reading, the offset, and is a function of what is read beyond it, s = reading -
-//! offset. All arithmetic is in 32-bit floats, as an image is, and in the order that the node `calibrate` has too, so a
-//! curve that was fitted, one that was read from a file and one that runs in a graph give the same bits.
+//! Every curve starts at the unloaded reading, the offset, and is a function of s = reading - offset. All arithmetic uses
+//! 32-bit floats, like images, in the same order as the node `calibrate`. So a fitted curve, one from a file and one in a
+//! graph give the same bits.
 
 use std::fmt;
 
-/// The sorts of curves.
+/// The kinds of curves.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Kind {
     /// f = gain s.
@@ -17,11 +17,11 @@ pub enum Kind {
     Piecewise,
 }
 
-/// Every sort, the simplest first.
+/// All kinds, the simplest first.
 pub const KINDS: [Kind; 3] = [Kind::Linear, Kind::Rational, Kind::Piecewise];
 
 impl Kind {
-    /// Its name in a file and on the command line.
+    /// Returns the name in a file and on the command line.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
@@ -38,40 +38,40 @@ impl fmt::Display for Kind {
     }
 }
 
-/// One tactel: its zero and its curve.
+/// The calibration of one tactel: its zero and its curve.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Tactel {
-    /// What it reads unloaded [unit of the reading].
+    /// Unloaded reading [unit of the reading].
     pub offset: f32,
-    /// From what it reads beyond that to a force.
+    /// Curve from the reading beyond the offset to a force.
     pub curve: Curve,
 }
 
-/// From what a tactel reads beyond its zero, s, to a force.
+/// A curve from s, the reading beyond the offset, to a force.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Curve {
-    /// A straight line that has no end: f = gain s, below zero too.
+    /// A straight line without an end: f = gain s, also below zero.
     Linear {
-        /// Its slope [force per reading].
+        /// Slope [force per reading].
         gain: f32,
     },
-    /// The squashed curve of piezo-resistive foam, s = f / (gain + squash f) up to a force, inverted.
+    /// The inverse of s = f / (gain + squash f) up to a force: the saturating curve of piezo-resistive foam.
     Rational {
         /// Slope at the zero [force per reading].
         gain: f32,
-        /// One over the s that no force reaches, of the sign of the gain; 0 is a straight line [1 per reading].
+        /// One over the asymptote of s, with the sign of the gain; 0 is a straight line [1 per reading].
         squash: f32,
-        /// The largest force, where the curve ends.
+        /// Maximum force, where the curve ends.
         most: f32,
     },
-    /// Straight lines from the zero through knots, the last of which is the end.
+    /// Straight lines from zero through knots; the curve ends at the last knot.
     Piecewise {
-        /// Each knot's s and force: both go on and on, away from zero.
+        /// s and force of each knot; both move away from zero.
         knots: Vec<[f32; 2]>,
     },
 }
 
-/// `s`, but not below `low` nor above `high`; comparisons and no `min` or `max`, so that no zero changes its sign.
+/// Limits `s` to `low..=high` by comparisons. `min` and `max` could change the sign of a zero.
 #[inline(always)]
 #[must_use]
 pub fn clamp(s: f32, low: f32, high: f32) -> f32 {
@@ -79,28 +79,28 @@ pub fn clamp(s: f32, low: f32, high: f32) -> f32 {
     if s < high { s } else { high }
 }
 
-/// The squashed curve inverted, for s that is not past its end.
+/// Returns the force of a rational curve for an s up to its end.
 #[inline(always)]
 #[must_use]
 pub fn rational(s: f32, gain: f32, squash: f32) -> f32 {
     gain * s / (1.0 - squash * s)
 }
 
-/// A straight line between two knots: what it adds to the force.
+/// A straight line between two knots, as its contribution to the force.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Segment {
-    /// The lower s of the two.
+    /// Lower s of the two knots.
     pub low: f32,
-    /// The higher s of the two.
+    /// Higher s of the two knots.
     pub high: f32,
-    /// The s of the first of the two.
+    /// s of the first knot.
     pub start: f32,
     /// Slope [force per reading].
     pub slope: f32,
 }
 
 impl Segment {
-    /// What it adds to the force at `s`.
+    /// Returns the contribution to the force at `s`.
     #[inline(always)]
     #[must_use]
     pub fn force(self, s: f32) -> f32 {
@@ -109,7 +109,7 @@ impl Segment {
 }
 
 impl Curve {
-    /// Its sort.
+    /// Returns the kind.
     #[must_use]
     pub const fn kind(&self) -> Kind {
         match self {
@@ -119,14 +119,14 @@ impl Curve {
         }
     }
 
-    /// The s at which the squashed curve ends, from its lower to its higher one.
+    /// Returns the range of s of a rational curve, lower end first.
     #[must_use]
     pub fn ends(gain: f32, squash: f32, most: f32) -> [f32; 2] {
         let end = most / (gain + squash * most);
         if end > 0.0 { [0.0, end] } else { [end, 0.0] }
     }
 
-    /// The segments between knots.
+    /// Returns the segments between knots.
     pub fn segments(knots: &[[f32; 2]]) -> impl Iterator<Item = Segment> {
         let starts = std::iter::once([0.0, 0.0]).chain(knots.iter().copied());
         starts.zip(knots).map(|([s, f], [to, force])| {
@@ -135,7 +135,7 @@ impl Curve {
         })
     }
 
-    /// The force at `s`. Only a straight line goes below zero, and only it has no end.
+    /// Returns the force at `s`. Only a linear curve has negative forces and no end.
     #[must_use]
     pub fn force(&self, s: f32) -> f32 {
         match self {
@@ -148,7 +148,7 @@ impl Curve {
         }
     }
 
-    /// How far from zero s is under a force, up to the largest: the characteristic itself, for a picture.
+    /// Returns |s| under a force up to the maximum: the characteristic itself, for a plot.
     #[must_use]
     pub fn reading(&self, force: f64) -> f64 {
         match self {
@@ -168,7 +168,7 @@ impl Curve {
         }
     }
 
-    /// The largest force, if the curve has an end.
+    /// Returns the maximum force, or `None` for a curve without an end.
     #[must_use]
     pub fn most(&self) -> Option<f32> {
         match self {
@@ -178,26 +178,28 @@ impl Curve {
         }
     }
 
-    /// What makes the curve useless, if anything does: the name of the number to blame, and what is wrong with it.
+    /// Returns what makes the curve unusable: the name of the number and the mistake. `None` if the curve is good.
     #[must_use]
     pub fn flaw(&self) -> Option<(&'static str, String)> {
         match self {
             Self::Linear { gain } | Self::Rational { gain, .. } if *gain == 0.0 => {
-                Some(("gain", "a `gain` of 0 measures nothing; list the tactel under `dead`".into()))
+                Some(("gain", "a `gain` of 0 gives no force; list the tactel under `dead`".into()))
             }
             Self::Linear { .. } => None,
             Self::Rational { gain, squash, most } => {
                 if *most <= 0.0 {
-                    return Some(("most", "`most` is the largest force, so it is greater than 0".into()));
+                    return Some(("most", "`most`, the maximum force, must be greater than 0".into()));
                 }
                 if squash * gain < 0.0 {
-                    return Some(("squash", "`squash` has the sign of `gain`, or the curve is not squashed".into()));
+                    return Some(("squash", "`squash` must have the sign of `gain`".into()));
                 }
-                // At its end the curve must be what it says, or the numbers are too extreme for 32 bits.
+                // At its end the curve must reach `most`. Otherwise the numbers are too extreme for 32 bits.
                 let [low, high] = Self::ends(*gain, *squash, *most);
                 let end = rational(low + high, *gain, *squash);
                 let is_off = (end - most).abs() > 0.01 * most || !end.is_finite();
-                is_off.then(|| ("squash", "the curve is so flat at its end that no reading tells a force".into()))
+                is_off.then(|| {
+                    ("squash", "the curve is too flat at its end: a reading does not determine a force".into())
+                })
             }
             Self::Piecewise { knots } => flaw_of_knots(knots),
         }
@@ -206,25 +208,25 @@ impl Curve {
 
 fn flaw_of_knots(knots: &[[f32; 2]]) -> Option<(&'static str, String)> {
     let Some([first, _]) = knots.first() else {
-        return Some(("readings", "there is no knot; list the tactel under `dead`".into()));
+        return Some(("readings", "the curve has no knot; list the tactel under `dead`".into()));
     };
     let sign = if *first < 0.0 { -1.0 } else { 1.0 };
     let mut last = [0.0, 0.0];
     for [s, force] in knots {
         if (s - last[0]) * sign <= 0.0 {
-            let message = format!("`readings` go on in one direction from 0, but {s} comes after {}", last[0]);
+            let message = format!("`readings` must move away from 0 in one direction, but {s} comes after {}", last[0]);
             return Some(("readings", message));
         }
         if force - last[1] < 0.0 {
-            return Some(("forces", format!("`forces` never fall, but {force} comes after {}", last[1])));
+            return Some(("forces", format!("`forces` must not decrease, but {force} comes after {}", last[1])));
         }
         last = [*s, *force];
     }
     if last[1] <= 0.0 {
-        return Some(("forces", "the last force is greater than 0".into()));
+        return Some(("forces", "the last force must be greater than 0".into()));
     }
     let is_steep = Curve::segments(knots).any(|segment| !segment.slope.is_finite());
-    is_steep.then(|| ("readings", "two knots are too near to each other".into()))
+    is_steep.then(|| ("readings", "two knots are too close to each other".into()))
 }
 
 #[cfg(test)]

@@ -1,12 +1,12 @@
-//! Curves through the samples of one tactel: robust, deterministic and monotone.
+//! Fits curves to the samples of one tactel: robust, deterministic and monotone.
 //!
-//! Samples of each branch, force rising and force falling, are gathered in bins of force, narrow where the curve is
-//! steep; each bin gives one point, the median of its forces and of its readings, which keep their order. So a long
-//! dwell does not outweigh a press, stray readings do not count, and both branches weigh the same: a curve runs through
-//! the middle of the hysteresis. All fits go through the zero, so an unloaded tactel gives no force.
+//! The samples of each branch, force rising and force falling, are sorted into bins of force, which are narrow where the
+//! curve is steep. Each bin gives one point: the median of its forces and of its readings. So a long dwell does not
+//! outweigh a press, outliers do not count, and both branches have the same weight: a curve runs through the middle of the
+//! hysteresis. All fits pass through zero, so an unloaded tactel gives no force.
 //!
-//! The squashed curve and the knots are fitted to the readings, s over f, as the noise is there, by least squares with
-//! Huber's weights; the straight line to the forces, where it is wrong anyway.
+//! The rational curve and the knots are fitted to the readings, s over f, because the noise is in the readings: by least
+//! squares with Huber's weights. The straight line is fitted to the forces, because its model error is larger than the noise.
 
 use super::Curve;
 use super::samples::{Sample, median};
@@ -14,19 +14,21 @@ use super::samples::{Sample, median};
 /// Number of bins of a branch.
 const BINS: usize = 24;
 
-/// Number of segments of a piecewise curve, at most.
-const SEGMENTS: usize = 8;
+/// Maximum number of segments of a piecewise curve.
+const MAX_SEGMENTS: usize = 8;
 
-/// Samples from which on a bin counts fully.
-const FULL: f64 = 8.0;
+/// Number of samples from which a bin has full weight.
+const FULL_WEIGHT_SAMPLES: f64 = 8.0;
 
-/// Least samples with a force, and least points, of a tactel that a curve is fitted to.
-const LEAST: (usize, usize) = (20, 5);
+/// Minimum number of loaded samples of a tactel.
+const MIN_SAMPLES: usize = 20;
+/// Minimum number of points of a tactel.
+const MIN_POINTS: usize = 5;
 
-/// What a point must read beyond the knot before, as a part of the range, for both to be told apart.
-const LEAST_STEP: f64 = 0.002;
+/// Minimum step of the reading from knot to knot, as a fraction of the range.
+const MIN_STEP: f64 = 0.002;
 
-/// A bin: scaled so that the largest force and the reading there are about 1.
+/// The point of a bin, scaled so that the maximum force and its reading are about 1.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Point {
     x: f64,
@@ -36,25 +38,25 @@ struct Point {
     is_loading: bool,
 }
 
-/// The points of a tactel, and what 1 stands for.
+/// The points of a tactel with their scale.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Points {
     points: Vec<Point>,
-    /// The largest force [N].
+    /// Maximum force [N].
     pub most: f64,
-    /// The reading beyond the zero at the largest forces [reading].
+    /// Reading beyond the offset at the largest forces [reading].
     pub range: f64,
     /// The forward curve: knots of x and y, from (0, 0).
     middle: Vec<[f64; 2]>,
 }
 
 impl Points {
-    /// Gathers samples; none if they are too few for a curve. A force of up to `nothing` [N] is none.
+    /// Sorts samples into points, or returns `None` if they are too few. A force up to `unloaded` [N] counts as no load.
     #[must_use]
-    pub fn new(samples: &[Sample], nothing: f64) -> Option<Self> {
+    pub fn new(samples: &[Sample], unloaded: f64) -> Option<Self> {
         let most = samples.iter().fold(0.0, |most: f64, sample| most.max(sample.force));
-        let loaded = samples.iter().filter(|sample| sample.force > nothing).count();
-        if most <= 0.0 || loaded < LEAST.0 {
+        let loaded = samples.iter().filter(|sample| sample.force > unloaded).count();
+        if most <= 0.0 || loaded < MIN_SAMPLES {
             return None;
         }
         let mut bins: Vec<[Vec<f64>; 2]> = vec![Default::default(); 2 * BINS];
@@ -68,11 +70,11 @@ impl Points {
         let mut points = Vec::new();
         for (i, [forces, readings]) in bins.iter_mut().enumerate().filter(|(_, [forces, _])| !forces.is_empty()) {
             let count = forces.len();
-            let weight = (count as f64 / FULL).min(1.0);
+            let weight = (count as f64 / FULL_WEIGHT_SAMPLES).min(1.0);
             points.push(Point { x: median(forces) / most, y: median(readings), weight, count, is_loading: i % 2 == 1 });
         }
         let range = points.iter().filter(|point| point.x > 0.8).fold(0.0, |range: f64, point| range.max(point.y));
-        if range <= 0.0 || points.len() < LEAST.1 {
+        if range <= 0.0 || points.len() < MIN_POINTS {
             return None;
         }
         points.iter_mut().for_each(|point| point.y /= range);
@@ -81,7 +83,7 @@ impl Points {
         (points.middle.len() > 1).then_some(points)
     }
 
-    /// The straight line with the least error of the force, for readings that rise with it (`sign` 1) or fall (-1).
+    /// Fits the straight line with the smallest error of the force; `sign` is 1 if readings rise with the force, else -1.
     #[must_use]
     pub fn linear(&self, sign: f32) -> Curve {
         let sum = |g: fn(&Point) -> f64| self.points.iter().map(|point| point.weight * g(point)).sum::<f64>();
@@ -89,12 +91,12 @@ impl Points {
         Curve::Linear { gain: (slope * self.most / self.range) as f32 * sign }
     }
 
-    /// The squashed curve y = x / (g + q x).
+    /// Fits the rational curve y = x / (g + q x).
     #[must_use]
     pub fn rational(&self, sign: f32) -> Curve {
         let mut curve = self.first_guess();
         for _ in 0..5 {
-            let residuals: Vec<f64> = self.points.iter().map(|point| point.y - squashed(curve, point.x)).collect();
+            let residuals: Vec<f64> = self.points.iter().map(|point| point.y - rational_at(curve, point.x)).collect();
             curve = self.descend(curve, &self.weights(&residuals));
         }
         let [g, q] = curve;
@@ -105,7 +107,7 @@ impl Points {
         }
     }
 
-    /// The weights of the points, less for those that are far off.
+    /// Returns the weights of the points, smaller for outliers.
     fn weights(&self, residuals: &[f64]) -> Vec<f64> {
         let mut sizes: Vec<f64> = residuals.iter().map(|residual| residual.abs()).collect();
         let bound = (1.5 * 1.4826 * median(&mut sizes)).max(1e-6);
@@ -113,7 +115,7 @@ impl Points {
         self.points.iter().zip(residuals).map(|(point, residual)| point.weight * huber(residual)).collect()
     }
 
-    /// A squashed curve from x / y = g + q x, which is linear.
+    /// Returns a first rational curve from x / y = g + q x, which is linear.
     fn first_guess(&self) -> [f64; 2] {
         let mut sums = [0.0; 5];
         for point in self.points.iter().filter(|point| point.y > 0.05 && point.x > 0.0) {
@@ -129,20 +131,20 @@ impl Points {
         inside([(wz * wxx - wzx * wx) / determinant, (w * wzx - wx * wz) / determinant])
     }
 
-    /// Levenberg and Marquardt's descent of the weighted squares, from `curve` on.
+    /// Minimises the weighted squares from `curve` by the Levenberg-Marquardt method.
     fn descend(&self, mut curve: [f64; 2], weights: &[f64]) -> [f64; 2] {
         let cost = |curve: [f64; 2]| -> f64 {
-            let residual = |p: &Point| p.y - squashed(curve, p.x);
+            let residual = |p: &Point| p.y - rational_at(curve, p.x);
             self.points.iter().zip(weights).map(|(p, w)| w * residual(p) * residual(p)).sum()
         };
         let mut damping = 1e-3;
         let mut last = cost(curve);
         for _ in 0..40 {
             let [g, q] = curve;
-            // Of the weighted normal equations: the matrix [a b; b d] and the right side [e f].
+            // The weighted normal equations: matrix [a b; b d], right side [e f].
             let (mut a, mut b, mut d, mut e, mut f) = (0.0, 0.0, 0.0, 0.0, 0.0);
             for (p, w) in self.points.iter().zip(weights) {
-                let m = squashed(curve, p.x);
+                let m = rational_at(curve, p.x);
                 let (dg, dq, r) = (-m / (g + q * p.x.max(0.0)), -m * m, p.y - m);
                 a += w * dg * dg;
                 b += w * dg * dq;
@@ -166,14 +168,14 @@ impl Points {
         curve
     }
 
-    /// Straight lines between knots.
+    /// Fits straight lines between knots.
     #[must_use]
     pub fn piecewise(&self, sign: f32) -> Curve {
         let knots = self.middle[1..].iter().map(|[x, y]| [(y * self.range) as f32 * sign, (x * self.most) as f32]);
         Curve::Piecewise { knots: knots.collect() }
     }
 
-    /// The knots of the forward curve: least squares, then made to rise, from (0, 0).
+    /// Returns the knots of the forward curve from (0, 0): least squares, then made monotone.
     fn knots(&self) -> Vec<[f64; 2]> {
         let places = self.places();
         let mut weights: Vec<f64> = self.points.iter().map(|point| point.weight).collect();
@@ -187,22 +189,22 @@ impl Points {
         }
         let mut knots = vec![[0.0, 0.0]];
         for (x, y) in places.iter().zip(rising(&heights)).skip(1) {
-            if y > knots.last().map_or(0.0, |last| last[1]) + LEAST_STEP {
+            if y > knots.last().map_or(0.0, |last| last[1]) + MIN_STEP {
                 knots.push([*x, y]);
             }
         }
         knots
     }
 
-    /// Where the knots are: at squares, but only so close that points lie between any two.
+    /// Returns the x of the knots: at squares, with at least two points between neighbours.
     fn places(&self) -> Vec<f64> {
         let between = |from: f64, to: f64| self.points.iter().filter(|p| p.x > from && p.x <= to).count();
         let mut places = vec![0.0];
-        for k in 1..=SEGMENTS {
-            let (last, x) = (places[places.len() - 1], (k as f64 / SEGMENTS as f64).powi(2));
+        for k in 1..=MAX_SEGMENTS {
+            let (last, x) = (places[places.len() - 1], (k as f64 / MAX_SEGMENTS as f64).powi(2));
             if between(last, x) >= 2 {
                 places.push(x);
-            } else if k == SEGMENTS {
+            } else if k == MAX_SEGMENTS {
                 if places.len() > 1 {
                     places.pop();
                 }
@@ -212,7 +214,7 @@ impl Points {
         places
     }
 
-    /// The heights at the places with the least weighted squares, the first of them 0: a tridiagonal system.
+    /// Returns the y of the knots with the smallest weighted squares, the first of them 0: a tridiagonal system.
     fn heights(&self, places: &[f64], weights: &[f64]) -> Vec<f64> {
         let count = places.len();
         let (mut diagonal, mut above, mut right) = (vec![1e-9; count], vec![0.0; count], vec![0.0; count]);
@@ -226,7 +228,7 @@ impl Points {
             right[k - 1] += w * (1.0 - t) * p.y;
             right[k] += w * t * p.y;
         }
-        // The first is known to be 0, so it falls out of the others' equations.
+        // The first is 0, so it drops out of the other equations.
         for k in 2..count {
             let by = above[k - 1] / diagonal[k - 1];
             diagonal[k] -= by * above[k - 1];
@@ -240,7 +242,7 @@ impl Points {
         heights
     }
 
-    /// Greatest distance of the two branches, as a part of the range of the reading; none if there is but one branch.
+    /// Returns the maximum distance of the two branches as a fraction of the range, or `None` for a single branch.
     #[must_use]
     pub fn hysteresis(&self) -> Option<f64> {
         let beyond = |is_loading: bool| -> Vec<[f64; 2]> {
@@ -256,13 +258,13 @@ impl Points {
         Some(distances.fold(0.0, f64::max))
     }
 
-    /// What is read beyond the zero under a force, on the middle of the two branches [reading].
+    /// Returns the reading beyond the offset under a force, in the middle of the two branches [reading].
     #[must_use]
     pub fn reading(&self, force: f64) -> f64 {
         between(&self.middle, force / self.most) * self.range
     }
 
-    /// The branches as (force, reading beyond the zero), for a picture: rising, then falling.
+    /// Returns the branches as (force, reading beyond the offset) for a plot: rising, then falling.
     #[must_use]
     pub fn branches(&self) -> [Vec<[f64; 2]>; 2] {
         [true, false].map(|is_loading| {
@@ -272,18 +274,18 @@ impl Points {
     }
 }
 
-/// The nearest squashed curve: g and q are not negative, and g is not quite zero.
+/// Returns the nearest valid curve: g > 0 and q ≥ 0.
 fn inside([g, q]: [f64; 2]) -> [f64; 2] {
     [g.max(1e-3), q.max(0.0)]
 }
 
-/// The squashed curve's height at `x`; below zero there is none.
-fn squashed([g, q]: [f64; 2], x: f64) -> f64 {
+/// Returns y of the rational curve at `x`, and 0 below 0.
+fn rational_at([g, q]: [f64; 2], x: f64) -> f64 {
     let x = x.max(0.0);
     x / (g + q * x)
 }
 
-/// Height at `x` of straight lines through points whose x rise; level beyond the ends.
+/// Interpolates points with increasing x at `x`; constant beyond the ends.
 fn between(points: &[[f64; 2]], x: f64) -> f64 {
     let after = points.partition_point(|point| point[0] < x);
     match (after.checked_sub(1).and_then(|before| points.get(before)), points.get(after)) {
@@ -293,7 +295,7 @@ fn between(points: &[[f64; 2]], x: f64) -> f64 {
     }
 }
 
-/// The nearest numbers that never fall: neighbours that do are pooled.
+/// Returns the nearest monotone numbers: decreasing neighbours are pooled.
 fn rising(numbers: &[f64]) -> Vec<f64> {
     let mut pools: Vec<(f64, usize)> = Vec::new();
     for number in numbers {
@@ -350,7 +352,7 @@ mod tests {
 
         #[test]
         fn pooled_neighbours_are_the_nearest_that_rise(numbers in prop::collection::vec(-5.0..5.0f64, 1..12)) {
-            // The closed form: the greatest of the least means of all stretches that begin and end around each.
+            // The closed form: the maximum over starts of the minimum over ends of the mean of each range around a number.
             let mean = |from: usize, to: usize| numbers[from..=to].iter().sum::<f64>() / (to + 1 - from) as f64;
             for (i, number) in rising(&numbers).into_iter().enumerate() {
                 let least = |from: usize| (i..numbers.len()).map(|to| mean(from, to)).fold(f64::INFINITY, f64::min);
@@ -385,7 +387,7 @@ mod tests {
         let Curve::Linear { gain } = points.linear(-1.0) else { panic!("a line") };
         assert!((gain + 1.0 / 120.0).abs() < 1e-7, "{gain}");
         let Curve::Piecewise { knots } = points.piecewise(-1.0) else { panic!("knots") };
-        assert_eq!(knots.len(), SEGMENTS);
+        assert_eq!(knots.len(), MAX_SEGMENTS);
         for [s, force] in knots {
             assert!((s + 120.0 * force).abs() < 0.01, "{s} for {force} N");
         }

@@ -1,4 +1,4 @@
-//! What a calibration is made from: frames of a pad, each with the force that was measured beside it.
+//! The log that a calibration is made from: frames of a pad, each with a reference force.
 
 use tactflow_runtime::signal::Unit;
 
@@ -11,30 +11,30 @@ pub struct Log {
     pub rows: usize,
     /// Number of columns.
     pub cols: usize,
-    /// Unit of what the sensor reads.
+    /// Unit of the readings.
     pub unit: Unit,
     /// Reference force of each frame [N].
     pub force: Vec<f64>,
-    /// The readings of all frames, one frame after the other, row after row.
+    /// Readings of all frames, frame by frame and row by row.
     pub cells: Vec<f32>,
-    /// Index of each tactel that does not exist.
+    /// Indices of the tactels that do not exist.
     pub absent: Vec<usize>,
 }
 
-/// What part of the largest force counts as nothing: a frame below it is unloaded.
-pub const NOTHING: f64 = 0.01;
+/// Maximum force of an unloaded frame, as a fraction of the maximum force.
+pub const MAX_UNLOADED: f64 = 0.01;
 
-/// The fewest unloaded frames from which a zero is taken.
-const FEWEST_UNLOADED: usize = 3;
+/// Minimum number of unloaded frames for the zero of a tactel.
+const MIN_UNLOADED_FRAMES: usize = 3;
 
 impl Log {
-    /// The log that a recording is.
+    /// Makes a log from a recording.
     ///
     /// # Errors
-    /// What it lacks.
+    /// What is missing.
     pub fn new(recording: &Recording) -> Result<Self, String> {
         let Some(force) = recording.force.clone() else {
-            return Err("it has no reference force: a column (or array) `force` [N], one value a frame".into());
+            return Err("it has no reference force: add a column (or array) `force` [N] with one value a frame".into());
         };
         let shape = &recording.shape;
         let mut cells = vec![0.0; shape.tactels() * recording.frames.len()];
@@ -47,62 +47,61 @@ impl Log {
         Ok(log)
     }
 
-    /// Whether it can be used.
+    /// Checks whether it can be used.
     ///
     /// # Errors
-    /// What it lacks.
+    /// What is missing.
     pub fn check(&self) -> Result<(), String> {
         if let Some(i) = self.force.iter().position(|force| !force.is_finite()) {
             return Err(format!("the force of frame {} is not a finite number", i + 1));
         }
-        let (most, least) =
-            self.force.iter().fold((0.0, 0.0), |(most, least), force| (force.max(most), force.min(least)));
-        if most <= 0.0 || -least > 0.5 * most {
-            let range = format!("from {least} N to {most} N");
-            return Err(format!("its force goes {range}: it counts as positive what presses on the pad"));
+        let (max, min) = self.force.iter().fold((0.0, 0.0), |(max, min), force| (force.max(max), force.min(min)));
+        if max <= 0.0 || -min > 0.5 * max {
+            let range = format!("from {min} N to {max} N");
+            return Err(format!("its force is {range}: a force that presses on the pad must be positive"));
         }
-        let unloaded = (0..self.frames()).filter(|i| self.is_unloaded(*i, most)).count();
-        if unloaded < FEWEST_UNLOADED {
-            let percent = 100.0 * NOTHING;
+        let unloaded = (0..self.frames()).filter(|i| self.is_unloaded(*i, max)).count();
+        if unloaded < MIN_UNLOADED_FRAMES {
+            let percent = 100.0 * MAX_UNLOADED;
             return Err(format!(
-                "only {unloaded} of its frames are unloaded (below {percent} % of {most} N): the zero of each tactel is \
-                 taken there, so record a second before the first press"
+                "only {unloaded} of its frames are unloaded (below {percent} % of {max} N): they give the zero of each \
+                 tactel, so record a second before the first press"
             ));
         }
         Ok(())
     }
 
-    /// Number of tactels.
+    /// Returns the number of tactels.
     #[must_use]
     pub const fn tactels(&self) -> usize {
         self.rows * self.cols
     }
 
-    /// Number of frames.
+    /// Returns the number of frames.
     #[must_use]
     pub const fn frames(&self) -> usize {
         self.force.len()
     }
 
-    /// The largest force [N].
+    /// Returns the maximum force [N].
     #[must_use]
     pub fn most(&self) -> f64 {
         self.force.iter().fold(0.0, |most: f64, force| most.max(*force))
     }
 
-    /// Whether frame `i` is unloaded, in a log whose largest force is `most` [N].
+    /// Whether frame `i` is unloaded; `most` is the maximum force of all logs [N].
     #[must_use]
     pub fn is_unloaded(&self, i: usize, most: f64) -> bool {
-        self.force[i] < NOTHING * most
+        self.force[i] < MAX_UNLOADED * most
     }
 
-    /// What a tactel reads in a frame.
+    /// Returns the reading of a tactel in a frame.
     #[must_use]
     pub fn reading(&self, frame: usize, tactel: usize) -> f32 {
         self.cells[frame * self.tactels() + tactel]
     }
 
-    /// Whether each frame belongs to a rise of the force or to a fall. A change of less than `step` [N] turns nothing.
+    /// Returns for each frame whether the force rises. A reversal of less than `step` [N] is ignored.
     #[must_use]
     pub fn is_loading(&self, step: f64) -> Vec<bool> {
         let mut is_loading = vec![true; self.frames()];
@@ -113,7 +112,7 @@ impl Log {
             if onward >= 0.0 {
                 turn = i;
             } else if onward < -step {
-                // It turned at the last extreme.
+                // The force turned at the last extreme.
                 is_rising = !is_rising;
                 is_loading[turn + 1..i].fill(is_rising);
                 turn = i;
@@ -142,8 +141,8 @@ mod tests {
             (&[0.0], "u"),
         ];
         for (force, expected) in cases {
-            let said: String = log(force).is_loading(0.3).iter().map(|up| if *up { 'u' } else { 'd' }).collect();
-            assert_eq!(said, expected, "{force:?}");
+            let shown: String = log(force).is_loading(0.3).iter().map(|up| if *up { 'u' } else { 'd' }).collect();
+            assert_eq!(shown, expected, "{force:?}");
         }
     }
 
@@ -151,8 +150,8 @@ mod tests {
     fn a_log_that_cannot_be_used_says_why() {
         assert_eq!(log(&[0.0, 0.0, 0.0, 1.0, 5.0, 0.0]).check(), Ok(()));
         let cases = [
-            (log(&[0.0; 9]), "its force goes from 0 N to 0 N"),
-            (log(&[0.0, 0.0, 0.0, -5.0]), "its force goes from -5 N to 0 N"),
+            (log(&[0.0; 9]), "its force is from 0 N to 0 N"),
+            (log(&[0.0, 0.0, 0.0, -5.0]), "its force is from -5 N to 0 N"),
             (log(&[0.0, 0.0, f64::NAN]), "the force of frame 3 is not a finite number"),
             (log(&[0.0, 0.0, 1.0]), "only 2 of its frames are unloaded (below 1 % of 1 N)"),
         ];

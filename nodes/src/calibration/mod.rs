@@ -1,13 +1,14 @@
 //! Calibration of a pad: from a log of presses with a reference force to a curve for each tactel.
 //!
-//! [`log`] is what is read, [`samples`] says which tactel bore which force, [`fit`] finds its [`curve`], [`file`] writes
-//! and reads them, [`report`] says how good they are and [`plot`] draws them, as Fig. 1 of the paper does. Nothing of
-//! this runs in a graph: there the node `calibrate` takes the file.
+//! [`log`] is the input, [`samples`] finds which tactel bore which force, [`fit`] fits its [`curve`], [`file`] writes and
+//! reads the curves, [`report`] measures how good they are and [`plot`] draws them, as Fig. 1 of the paper does. None of
+//! this runs in a graph: there the node `calibrate` reads the file.
 
 pub mod curve;
 pub mod file;
 pub mod fit;
 pub mod log;
+#[cfg(feature = "cli")]
 pub mod plot;
 pub mod report;
 pub mod samples;
@@ -19,17 +20,17 @@ pub use curve::{Curve, Kind, Tactel};
 /// The curves of all tactels of an array.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Calibration {
-    /// Sort of all curves.
+    /// Kind of all curves.
     pub kind: Kind,
     /// Number of rows.
     pub rows: usize,
     /// Number of columns.
     pub cols: usize,
-    /// Unit of what the sensor reads.
+    /// Unit of the readings.
     pub reading: Unit,
-    /// Unit of what comes out.
+    /// Unit of the forces.
     pub unit: Unit,
-    /// The tactels, row after row; none where one is dead.
+    /// The tactels row by row; `None` for a dead one.
     pub tactels: Vec<Option<Tactel>>,
 }
 

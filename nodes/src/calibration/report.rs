@@ -1,4 +1,4 @@
-//! From logs to a calibration, and how good it is.
+//! Makes a calibration from logs, and reports how good it is.
 
 use std::fmt::Write;
 
@@ -6,20 +6,20 @@ use tactflow_runtime::signal::Unit;
 
 use super::curve::KINDS;
 use super::fit::Points;
-use super::log::{Log, NOTHING};
+use super::log::{Log, MAX_UNLOADED};
 use super::samples::{Load, Sample, Samples};
 use super::{Calibration, Curve, Kind, Tactel};
 
-/// How a calibration is made.
+/// Settings of a calibration.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Settings {
     /// How the pad was loaded.
     pub load: Load,
-    /// Sort of the curves; the simplest that is good enough unless it is given.
+    /// Kind of the curves; `None` for the simplest that is good enough.
     pub curve: Option<Kind>,
-    /// Least response of a live tactel; a part of the greatest unless it is given [reading].
+    /// Minimum response of a live tactel; `None` for a fraction of the maximum [reading].
     pub dead_below: Option<f64>,
-    /// How many tactels share a uniform load; the live ones unless it is given.
+    /// Number of tactels that share a uniform load; `None` for the live ones.
     pub bearing: Option<usize>,
 }
 
@@ -28,64 +28,66 @@ pub struct Settings {
 pub enum State {
     /// It has a curve.
     Good,
-    /// It never answers.
+    /// It does not respond.
     Dead,
-    /// There are too few samples of it.
+    /// It has too few samples.
     Few,
-    /// Its samples give no curve that rises.
+    /// No rising curve fits its samples.
     Unfit,
 }
 
-/// What is known of one tactel.
+/// The result for one tactel.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Finding {
-    /// Whether it can be used.
+    /// Checks whether it can be used.
     pub state: State,
-    /// Number of its samples under a force.
+    /// Number of loaded samples.
     pub samples: usize,
-    /// Whether it stays at its largest reading while the force goes on; those samples do not count.
+    /// Whether it stays at its extreme reading while the force increases. Those samples are not used.
     pub is_saturated: bool,
-    /// 1 if what it reads rises with the force, -1 if it falls.
+    /// 1 if the reading rises with the force, -1 if it falls.
     pub sign: f32,
-    /// Standard deviation of what it reads unloaded [reading].
+    /// Standard deviation of the unloaded reading [reading].
     pub noise: f64,
-    /// Residual of each sort of curve under a force, root mean square [N].
+    /// Residual of each kind of curve over the loaded samples, root mean square [N].
     pub rms: [f64; 3],
-    /// Greatest distance of its branches, as a part of the range; none if there is but one branch.
+    /// Maximum distance of the branches as a fraction of the range; `None` for a single branch.
     pub hysteresis: Option<f64>,
-    /// Its points, if there are enough.
+    /// Its points; `None` if there are too few.
     pub points: Option<Points>,
 }
 
-/// A calibration, and how good it is.
+/// A calibration with its quality.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Report {
     /// The curves.
     pub calibration: Calibration,
-    /// What is known of each tactel, row after row.
+    /// The result for each tactel, row by row.
     pub findings: Vec<Finding>,
-    /// Residual of each sort of curve over all samples, root mean square [N].
+    /// Residual of each kind of curve over all samples, root mean square [N].
     pub rms: [f64; 3],
-    /// The largest force on one tactel [N].
+    /// Maximum force on one tactel [N].
     pub most: f64,
 }
 
-/// A sort of curve is good enough if no other has a residual that is less than this part of its own.
+/// A kind of curve is good enough if no other has a residual below this fraction of its own.
 const GOOD_ENOUGH: f64 = 0.9;
 
-/// Samples at the largest reading that are a saturation, if their forces differ by that part of the largest force.
-const SATURATED: (usize, f64) = (5, 0.05);
+/// Minimum number of samples at the extreme reading for a saturation.
+const MIN_SATURATED_SAMPLES: usize = 5;
+/// Minimum range of force of these samples, as a fraction of the maximum force.
+const MIN_SATURATED_RANGE: f64 = 0.05;
 
 /// Makes a calibration from logs of one array.
 ///
 /// # Errors
-/// When there is nothing that could be calibrated.
+/// If no tactel can be calibrated.
 pub fn calibrate(logs: &[Log], settings: &Settings) -> Result<Report, String> {
     let first = logs.first().ok_or("there is no log")?;
     let samples = Samples::new(logs, settings.load, settings.dead_below, settings.bearing);
     if samples.is_shared {
-        let message = "most tactels answer to most presses alike, so the force is not on one tactel at a time: if the \
-                       load is on all of them, say `--load uniform`";
+        let message = "most tactels respond alike to most presses, so the force is not on one tactel at a time: for a \
+                       load on all of them, add `--load uniform`";
         return Err(message.into());
     }
     let ceilings = ceilings(logs);
@@ -103,7 +105,7 @@ pub fn calibrate(logs: &[Log], settings: &Settings) -> Result<Report, String> {
         curves.push(fitted);
     }
     if count == 0 {
-        return Err(nothing(&findings, settings));
+        return Err(no_tactel(&findings, settings));
     }
     let rms = squares.map(|sum| (sum / count as f64).sqrt());
     let best = rms.iter().fold(f64::INFINITY, |best, rms| best.min(*rms));
@@ -119,7 +121,7 @@ pub fn calibrate(logs: &[Log], settings: &Settings) -> Result<Report, String> {
     Ok(Report { calibration, findings, rms, most: samples.most * samples.share })
 }
 
-/// Fits all sorts of curves to one tactel.
+/// Fits all kinds of curves to one tactel.
 fn examine(samples: &Samples<'_>, i: usize, [lowest, highest]: [f32; 2]) -> (Finding, Option<[Curve; 3]>) {
     let answer = &samples.answers[i];
     let mut finding = Finding {
@@ -135,19 +137,19 @@ fn examine(samples: &Samples<'_>, i: usize, [lowest, highest]: [f32; 2]) -> (Fin
     if answer.is_dead {
         return (finding, None);
     }
-    let (most, nothing) = (samples.most * samples.share, NOTHING * samples.most * samples.share);
+    let (most, unloaded) = (samples.most * samples.share, MAX_UNLOADED * samples.most * samples.share);
     let mut own = samples.of(i);
     let end = if answer.sign > 0.0 { highest } else { lowest };
     let forces = own.iter().filter(|(_, reading)| *reading == end).map(|(sample, _)| sample.force);
     let (low, high) =
         forces.clone().fold((f64::INFINITY, 0.0), |(a, b), force| (f64::min(a, force), f64::max(b, force)));
-    finding.is_saturated = forces.count() >= SATURATED.0 && high - low > SATURATED.1 * most;
+    finding.is_saturated = forces.count() >= MIN_SATURATED_SAMPLES && high - low > MIN_SATURATED_RANGE * most;
     if finding.is_saturated {
         own.retain(|(_, reading)| *reading != end);
     }
     let own: Vec<Sample> = own.into_iter().map(|(sample, _)| sample).collect();
-    finding.samples = own.iter().filter(|sample| sample.force > nothing).count();
-    let Some(points) = Points::new(&own, nothing) else {
+    finding.samples = own.iter().filter(|sample| sample.force > unloaded).count();
+    let Some(points) = Points::new(&own, unloaded) else {
         finding.state = State::Few;
         return (finding, None);
     };
@@ -160,7 +162,7 @@ fn examine(samples: &Samples<'_>, i: usize, [lowest, highest]: [f32; 2]) -> (Fin
     for (rms, curve) in finding.rms.iter_mut().zip(&curves) {
         let error = |sample: &Sample| f64::from(curve.force(sample.s as f32 * answer.sign)) - sample.force;
         let squares: f64 =
-            own.iter().filter(|sample| sample.force > nothing).map(|sample| error(sample) * error(sample)).sum();
+            own.iter().filter(|sample| sample.force > unloaded).map(|sample| error(sample) * error(sample)).sum();
         *rms = (squares / finding.samples as f64).sqrt();
     }
     finding.hysteresis = points.hysteresis();
@@ -168,38 +170,38 @@ fn examine(samples: &Samples<'_>, i: usize, [lowest, highest]: [f32; 2]) -> (Fin
     (finding, Some(curves))
 }
 
-/// The lowest and the highest reading of all.
+/// Returns the minimum and the maximum of all readings.
 fn ceilings(logs: &[Log]) -> [f32; 2] {
     let cells = logs.iter().flat_map(|log| &log.cells);
     cells.fold([f32::INFINITY, f32::NEG_INFINITY], |[low, high], cell| [low.min(*cell), high.max(*cell)])
 }
 
-fn nothing(findings: &[Finding], settings: &Settings) -> String {
+fn no_tactel(findings: &[Finding], settings: &Settings) -> String {
     let count = |state| findings.iter().filter(|finding| finding.state == state).count();
     let (dead, few, unfit) = (count(State::Dead), count(State::Few), count(State::Unfit));
-    let what = format!("{dead} tactels never answer, {few} have too few samples, {unfit} give no rising curve");
-    let way_out = match settings.load {
+    let what = format!("{dead} tactels do not respond, {few} have too few samples, {unfit} have no rising curve");
+    let question = match settings.load {
         Load::Probe => "is the log of a probe on one tactel at a time, or is the load uniform?",
         Load::Uniform => "is the log of a uniform load, or of a probe on one tactel at a time?",
     };
-    format!("no tactel can be calibrated: {what}; {way_out}")
+    format!("no tactel can be calibrated: {what}; {question}")
 }
 
 impl Report {
-    /// The sort of the curves.
+    /// Returns the kind of the curves.
     #[must_use]
     pub const fn kind(&self) -> Kind {
         self.calibration.kind
     }
 
-    /// The median over the tactels of the residual as a part of the largest force.
+    /// Returns the median over the tactels of the residual, as a fraction of the maximum force.
     #[must_use]
     pub fn typical_residual(&self) -> f64 {
         let good = self.findings.iter().filter(|finding| finding.state == State::Good);
         middle(&sorted(good.map(|finding| finding.part(self.kind() as usize))))
     }
 
-    /// The tactels in a state, as `[row, column]`.
+    /// Returns the tactels in a state, as `[row, column]`.
     #[must_use]
     pub fn in_state(&self, state: State) -> Vec<[usize; 2]> {
         self.places(|finding| finding.state == state)
@@ -210,7 +212,7 @@ impl Report {
         (0..self.findings.len()).filter(|i| is_meant(&self.findings[*i])).map(|i| [i / cols, i % cols]).collect()
     }
 
-    /// The report for a person; with a line for `each` tactel, or only for the worst.
+    /// Returns the report as text, with a line for `each` tactel or only for the worst.
     #[must_use]
     pub fn text(&self, each: bool) -> String {
         let Calibration { rows, cols, reading, .. } = &self.calibration;
@@ -241,11 +243,11 @@ impl Report {
         let hysteresis = sorted(good.iter().filter_map(|finding| finding.hysteresis));
         let noise = sorted(good.iter().map(|finding| finding.noise));
         match hysteresis.is_empty() {
-            true => line(&mut text, format_args!("hysteresis   not measured: the force never rises and falls again")),
+            true => line(&mut text, format_args!("hysteresis   not measured: the force does not rise and fall")),
             false => line(
                 &mut text,
                 format_args!(
-                    "hysteresis   median {}, greatest {} of the range of the reading",
+                    "hysteresis   median {}, maximum {} of the range of the reading",
                     percent(middle(&hysteresis)),
                     percent(last(&hysteresis))
                 ),
@@ -254,20 +256,20 @@ impl Report {
         line(
             &mut text,
             format_args!(
-                "noise        median {:.2} {reading}, greatest {:.2} {reading}, unloaded",
+                "noise        median {:.2} {reading}, maximum {:.2} {reading}, unloaded",
                 middle(&noise),
                 last(&noise)
             ),
         );
         let groups = [
-            ("dead", "never answer", self.in_state(State::Dead)),
+            ("dead", "do not respond", self.in_state(State::Dead)),
             (
                 "saturated",
-                "stay at the largest reading; calibrated below it",
+                "stay at the extreme reading; calibrated below it",
                 self.places(|finding| finding.is_saturated),
             ),
             ("too few", "have too few samples; left out", self.in_state(State::Few)),
-            ("unfit", "give no rising curve; left out", self.in_state(State::Unfit)),
+            ("unfit", "have no rising curve; left out", self.in_state(State::Unfit)),
         ];
         for (name, what, places) in groups {
             line(&mut text, format_args!("{name:<12} {}", listed(&places, what)));
@@ -282,7 +284,7 @@ impl Report {
         let mut order: Vec<usize> = (0..self.findings.len()).filter(good).collect();
         if !each {
             order.sort_by(|a, b| self.findings[*b].rms[k].total_cmp(&self.findings[*a].rms[k]));
-            order.truncate(WORST);
+            order.truncate(WORST_SHOWN);
         }
         let title = if each { "every tactel" } else { "the worst tactels" };
         let reading = self.calibration.reading;
@@ -315,18 +317,18 @@ impl Report {
     }
 }
 
-/// How many of the worst tactels are shown.
-const WORST: usize = 5;
+/// Number of the worst tactels that are shown.
+const WORST_SHOWN: usize = 5;
 
 impl Finding {
-    /// Residual of a sort of curve as a part of the largest force.
+    /// Returns the residual of a kind of curve as a fraction of the maximum force.
     fn part(&self, k: usize) -> f64 {
         self.points.as_ref().map_or(0.0, |points| self.rms[k] / points.most)
     }
 }
 
 fn line(text: &mut String, line: std::fmt::Arguments<'_>) {
-    writeln!(text, "{line}").expect("a string takes all");
+    writeln!(text, "{line}").expect("writing to a string cannot fail");
 }
 
 fn sorted(numbers: impl Iterator<Item = f64>) -> Vec<f64> {
@@ -351,15 +353,15 @@ fn percent(part: f64) -> String {
     format!("{:.1} %", 100.0 * part)
 }
 
-/// A few places and how many there are.
+/// Lists the first places and the number of all.
 fn listed(places: &[[usize; 2]], what: &str) -> String {
-    const SHOWN: usize = 8;
+    const MAX_SHOWN: usize = 8;
     if places.is_empty() {
         return "none".into();
     }
-    let mut list: Vec<String> = places.iter().take(SHOWN).map(|[i, j]| format!("[{i}, {j}]")).collect();
-    if places.len() > SHOWN {
-        list.push(format!("and {} more", places.len() - SHOWN));
+    let mut list: Vec<String> = places.iter().take(MAX_SHOWN).map(|[i, j]| format!("[{i}, {j}]")).collect();
+    if places.len() > MAX_SHOWN {
+        list.push(format!("and {} more", places.len() - MAX_SHOWN));
     }
     format!("{} {what}: {}", places.len(), list.join(", "))
 }

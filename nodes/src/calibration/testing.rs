@@ -1,17 +1,17 @@
-//! A pad whose curves are known: squashed, spread, hysteretic, noisy, of 12 bits, with dead tactels. And its logs.
+//! A pad with known curves and its logs: saturating, spread, hysteretic, noisy, of 12 bits, with dead tactels.
 
 use tactflow_runtime::signal::Unit;
 
 use super::log::Log;
 use crate::random::Random;
 
-/// The largest force on a tactel [N].
-pub(super) const MOST: f64 = 5.0;
+/// Maximum force on a tactel [N].
+pub(super) const MAX_FORCE_N: f64 = 5.0;
 
-/// The largest reading of 12 bits.
-const TOP: f64 = 4095.0;
+/// Maximum reading of 12 bits.
+const MAX_COUNTS: f64 = 4095.0;
 
-/// One tactel as it really is: offset + a f / (f + b).
+/// The true characteristic of one tactel: offset + a f / (f + b).
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Truth {
     pub(super) offset: f64,
@@ -21,23 +21,23 @@ pub(super) struct Truth {
 }
 
 impl Truth {
-    /// What it reads, without noise and steps, in the middle of its branches.
+    /// Returns the reading in the middle of the branches, without noise and quantisation.
     pub(super) fn middle(&self, force: f64) -> f64 {
         let force = force.max(0.0);
         self.offset + if self.is_dead { 0.0 } else { self.a * force / (force + self.b) }
     }
 
-    /// The same on one of its branches.
+    /// Returns the reading on one of the branches.
     fn branch(&self, force: f64, is_loading: bool, hysteresis: f64) -> f64 {
-        let x = (force / MOST).clamp(0.0, 1.0);
-        let range = self.middle(MOST) - self.offset;
+        let x = (force / MAX_FORCE_N).clamp(0.0, 1.0);
+        let range = self.middle(MAX_FORCE_N) - self.offset;
         let side = if is_loading { -0.5 } else { 0.5 };
         self.middle(force) + side * hysteresis * range * 4.0 * x * (1.0 - x)
     }
 
-    /// The force of a reading, exactly, up to the largest one: what no calibration can beat.
+    /// Returns the exact force of a reading, up to the maximum: the best possible calibration.
     pub(super) fn force(&self, reading: f64) -> f64 {
-        let s = (reading - self.offset).clamp(0.0, self.middle(MOST) - self.offset);
+        let s = (reading - self.offset).clamp(0.0, self.middle(MAX_FORCE_N) - self.offset);
         self.b * s / (self.a - s)
     }
 }
@@ -50,35 +50,35 @@ pub(super) struct Pad {
     pub(super) random: Random,
     /// Standard deviation of the noise [counts].
     pub(super) noise: f64,
-    /// Greatest distance of the two branches, as a part of the range.
+    /// Maximum distance of the two branches, as a fraction of the range.
     pub(super) hysteresis: f64,
-    /// Whether readings fall from the top instead of rising from zero.
+    /// Whether readings fall from the maximum instead of rising from zero.
     pub(super) is_falling: bool,
 }
 
 impl Pad {
-    /// A pad whose gains are spread by a quarter and whose offsets are 5 to 10 % of the range; some tactels are dead.
+    /// Makes a pad with gains spread by a quarter, offsets of 5 to 10 % of the range, and dead tactels.
     pub(super) fn new(rows: usize, cols: usize, dead: &[usize], seed: u64) -> Self {
         let mut random = Random::new(seed, 0);
         let truth = |i: usize| {
-            // More would leave the 12 bits; that has a test of its own.
+            // A larger gain would exceed 12 bits, which has its own test.
             let a = (3400.0 * libm::exp(0.25 * random.normal())).min(5400.0);
             let b = 3.0 * libm::exp(0.15 * random.normal());
-            let offset = TOP * (0.05 + 0.05 * random.uniform(0.0, 1.0));
+            let offset = MAX_COUNTS * (0.05 + 0.05 * random.uniform(0.0, 1.0));
             Truth { offset, a, b, is_dead: dead.contains(&i) }
         };
         let truths = (0..rows * cols).map(truth).collect();
         Self { rows, cols, truths, random, noise: 4.0, hysteresis: 0.1, is_falling: false }
     }
 
-    /// A frame: the force on each tactel, and whether it rises.
+    /// Adds a frame with a force on each tactel.
     fn frame(&mut self, log: &mut Log, reference: f64, is_loading: bool, force: impl Fn(usize) -> f64) {
         // The strain gauge of the paper's bench is good to 2.5 mN.
         log.force.push(reference + 0.00125 * self.random.normal());
         for i in 0..self.truths.len() {
             let reading = self.truths[i].branch(force(i), is_loading, self.hysteresis);
-            let counts = (reading + self.noise * self.random.normal()).round().clamp(0.0, TOP);
-            log.cells.push((if self.is_falling { TOP - counts } else { counts }) as f32);
+            let counts = (reading + self.noise * self.random.normal()).round().clamp(0.0, MAX_COUNTS);
+            log.cells.push((if self.is_falling { MAX_COUNTS - counts } else { counts }) as f32);
         }
     }
 
@@ -101,7 +101,7 @@ impl Pad {
         log
     }
 
-    /// A probe that presses one tactel after the other; a neighbour feels a part of it, `coupling`.
+    /// Returns the log of a probe that presses one tactel after the other; neighbours get the fraction `coupling`.
     pub(super) fn probe(&mut self, cycles: usize, half: usize, coupling: f64) -> Log {
         let (cols, mut log) = (self.cols, self.log());
         for pressed in 0..self.truths.len() {
@@ -118,9 +118,9 @@ impl Pad {
     }
 }
 
-/// The forces of a press, up and down.
+/// Returns the forces of a press, up and down.
 fn cycle(half: usize) -> impl Iterator<Item = (f64, bool)> {
-    let up = (1..=half).map(move |k| (MOST * k as f64 / half as f64, true));
-    let down = (0..half).rev().map(move |k| (MOST * k as f64 / half as f64, false));
+    let up = (1..=half).map(move |k| (MAX_FORCE_N * k as f64 / half as f64, true));
+    let down = (0..half).rev().map(move |k| (MAX_FORCE_N * k as f64 / half as f64, false));
     up.chain(down)
 }

@@ -1,4 +1,4 @@
-//! A pad whose curves are known is logged, calibrated, written to a file, and read by the node.
+//! Tests with a pad of known curves: logged, calibrated, written to a file, and read by the node.
 
 use tactflow_runtime::harness::NodeRig;
 use tactflow_runtime::signal::{Image, ImageShape};
@@ -6,7 +6,7 @@ use tactflow_runtime::signal::{Image, ImageShape};
 use super::log::Log;
 use super::report::{Report, Settings, State, calibrate};
 use super::samples::Load;
-use super::testing::{MOST, Pad};
+use super::testing::{MAX_FORCE_N, Pad};
 use super::*;
 use crate::touch::calibrate::Calibrate;
 
@@ -20,7 +20,7 @@ fn made(log: Log, load: Load, curve: Option<Kind>) -> Report {
     calibrate(&[log], &settings(load, curve)).unwrap()
 }
 
-/// The node with a calibration as a file.
+/// Returns the node with a calibration file.
 fn node(calibration: &Calibration, name: &str) -> NodeRig {
     let path = std::env::temp_dir().join(format!("tactflow-round-trip-{}-{name}.toml", std::process::id()));
     std::fs::write(&path, file::write(calibration, "a test")).unwrap();
@@ -31,7 +31,7 @@ fn node(calibration: &Calibration, name: &str) -> NodeRig {
     rig.unwrap()
 }
 
-/// Errors of the node's forces against the truth in a log of a uniform load [N]: overall, and of the worst tactel.
+/// Returns the errors of the node's forces in a log of a uniform load [N]: overall, and of the worst tactel.
 fn errors(pad: &Pad, log: &Log, rig: &mut NodeRig) -> (f64, f64) {
     let live = pad.truths.iter().filter(|truth| !truth.is_dead).count() as f64;
     let mut squares = vec![0.0; log.tactels()];
@@ -47,7 +47,7 @@ fn errors(pad: &Pad, log: &Log, rig: &mut NodeRig) -> (f64, f64) {
     (overall, squares.iter().fold(0.0_f64, |worst, square| worst.max(square.sqrt())))
 }
 
-/// The same of the exact inverse of each tactel's middle curve: hysteresis, noise and steps alone.
+/// Returns the errors of the exact inverse of each tactel's middle curve: only hysteresis, noise and quantisation.
 fn least(pad: &Pad, log: &Log) -> f64 {
     let live: Vec<usize> = (0..log.tactels()).filter(|i| !pad.truths[*i].is_dead).collect();
     let mut sum = 0.0;
@@ -61,8 +61,8 @@ fn least(pad: &Pad, log: &Log) -> f64 {
 }
 
 #[test]
-fn a_known_pad_comes_back_through_file_and_node() {
-    // Per load: the pad's own hysteresis, and what may be left overall and at the worst tactel [N of 5 N].
+fn a_known_pad_is_recovered_through_file_and_node() {
+    // Load, hysteresis of the pad, maximum error overall and of the worst tactel [N of 5 N].
     let cases = [
         (Load::Uniform, 0.1, 0.26, 0.35, 2.0),
         (Load::Probe, 0.1, 0.26, 0.35, 2.0),
@@ -94,7 +94,7 @@ fn hysteresis_and_dead_tactels_are_found() {
         [(Load::Uniform, 0.05, 1), (Load::Uniform, 0.2, 2), (Load::Probe, 0.1, 3), (Load::Probe, 0.15, 4)]
     {
         let mut pad = Pad { hysteresis, ..Pad::new(8, 8, &DEAD, seed) };
-        // One is stuck at the largest reading, one at nothing.
+        // One is stuck at the maximum reading, one at zero.
         (pad.truths[17].offset, pad.truths[40].offset) = (4095.0, 0.0);
         let log = if load == Load::Uniform { pad.uniform(3, 200) } else { pad.probe(3, 80, 0.25) };
         let report = made(log, load, None);
@@ -110,7 +110,7 @@ fn hysteresis_and_dead_tactels_are_found() {
 }
 
 #[test]
-fn a_dead_tactel_is_one_that_answers_by_less_than_is_said() {
+fn a_tactel_below_the_minimum_response_is_dead() {
     let mut pad = Pad::new(2, 4, &[], 5);
     pad.truths[6].a *= 0.1;
     let log = pad.uniform(2, 100);
@@ -120,23 +120,23 @@ fn a_dead_tactel_is_one_that_answers_by_less_than_is_said() {
     };
     assert_eq!(dead(None), Vec::<[usize; 2]>::new());
     assert_eq!(dead(Some(500.0)), [[1, 2]]);
-    // A cell that the recording says is none is dead, whatever it reads.
+    // A cell that the recording marks as absent is dead, whatever its reading.
     let absent = Log { absent: vec![0], ..log.clone() };
     assert_eq!(made(absent, Load::Uniform, None).in_state(State::Dead), [[0, 0]]);
 }
 
 #[test]
-fn dead_tactels_bear_a_part_of_the_load_if_that_is_said() {
+fn dead_tactels_can_share_the_load() {
     let mut pad = Pad { hysteresis: 0.0, ..Pad::new(4, 4, &[0, 1, 2, 3], 6) };
     let log = pad.uniform(2, 100);
     let settings = Settings { bearing: Some(16), ..settings(Load::Uniform, None) };
     let report = calibrate(std::slice::from_ref(&log), &settings).unwrap();
-    assert!((report.most - MOST * 12.0 / 16.0).abs() < 0.01, "{}", report.most);
-    assert!((made(log, Load::Uniform, None).most - MOST).abs() < 0.01);
+    assert!((report.most - MAX_FORCE_N * 12.0 / 16.0).abs() < 0.01, "{}", report.most);
+    assert!((made(log, Load::Uniform, None).most - MAX_FORCE_N).abs() < 0.01);
 }
 
 #[test]
-fn a_sensor_that_falls_under_a_force_is_calibrated_too() {
+fn a_sensor_with_falling_readings_is_calibrated() {
     let mut pad = Pad { hysteresis: 0.0, is_falling: true, ..Pad::new(4, 4, &[5], 8) };
     let log = pad.uniform(3, 150);
     let fresh = pad.uniform(1, 100);
@@ -149,9 +149,9 @@ fn a_sensor_that_falls_under_a_force_is_calibrated_too() {
 }
 
 #[test]
-fn a_saturated_tactel_is_calibrated_below_its_end() {
+fn a_saturated_tactel_is_calibrated_below_saturation() {
     let mut pad = Pad { hysteresis: 0.0, ..Pad::new(2, 3, &[], 9) };
-    // It reaches 4095 counts at about 2.2 N.
+    // It saturates at 4095 counts, at about 2.2 N.
     (pad.truths[4].a, pad.truths[4].b, pad.truths[4].offset) = (9000.0, 3.0, 300.0);
     let report = made(pad.uniform(2, 250), Load::Uniform, Some(Kind::Rational));
     let saturated: Vec<bool> = report.findings.iter().map(|finding| finding.is_saturated).collect();
@@ -171,7 +171,7 @@ fn a_falling_sensor_saturates_at_its_lowest_reading_and_a_dwell_is_no_saturation
     assert_eq!(report.findings.iter().position(|finding| finding.is_saturated), Some(4));
     assert_eq!(report.findings.iter().filter(|finding| finding.is_saturated).count(), 1);
 
-    // Without noise, a force that is held gives the largest reading again and again.
+    // Without noise, a constant force repeats the maximum reading.
     let mut pad = Pad { hysteresis: 0.0, noise: 0.0, ..Pad::new(1, 2, &[], 9) };
     let mut log = pad.uniform(1, 100);
     let (top, tactels) = (50 + 99, log.tactels());
@@ -185,17 +185,17 @@ fn a_falling_sensor_saturates_at_its_lowest_reading_and_a_dwell_is_no_saturation
 }
 
 #[test]
-fn tactels_that_the_probe_did_not_reach_are_left_out() {
+fn tactels_that_were_not_pressed_are_left_out() {
     let mut pad = Pad::new(4, 4, &[], 10);
     let whole = pad.probe(1, 60, 0.2);
-    // 10 unloaded frames and 120 of the press for each tactel: the first six and a bit.
+    // Each tactel has 10 unloaded frames and 120 of its press: the log covers the first six tactels.
     let frames = 6 * 130 + 40;
     let log =
         Log { force: whole.force[..frames].to_vec(), cells: whole.cells[..frames * 16].to_vec(), ..whole.clone() };
     let report = made(log, Load::Probe, None);
     let good: Vec<usize> = (0..16).filter(|i| report.calibration.tactels[*i].is_some()).collect();
     assert!(good.starts_with(&[0, 1, 2, 3, 4, 5]) && good.len() <= 7, "{good:?}");
-    // Two logs together are as good as one.
+    // Two logs together are equivalent to one.
     let rest =
         Log { force: whole.force[6 * 130..].to_vec(), cells: whole.cells[6 * 130 * 16..].to_vec(), ..whole.clone() };
     let first = Log { force: whole.force[..6 * 130].to_vec(), cells: whole.cells[..6 * 130 * 16].to_vec(), ..whole };
@@ -204,14 +204,14 @@ fn tactels_that_the_probe_did_not_reach_are_left_out() {
 }
 
 #[test]
-fn a_uniform_load_is_not_taken_for_a_probe() {
+fn a_uniform_load_is_not_accepted_as_a_probe() {
     for (rows, cols, dead) in [(4, 4, &[][..]), (1, 2, &[]), (3, 5, &[0, 7])] {
         let log = Pad::new(rows, cols, dead, 5).uniform(3, 60);
         let message = calibrate(std::slice::from_ref(&log), &settings(Load::Probe, None)).unwrap_err();
-        assert!(message.starts_with("most tactels answer to most presses alike"), "{message}");
+        assert!(message.starts_with("most tactels respond alike to most presses"), "{message}");
     }
-    // A probe on one tactel only, and foam that passes a part of it on to all that answer.
-    let mut pad = Pad::new(3, 3, &[], 5);
+    // A probe on one tactel, with foam that transmits a part of the force to its neighbours.
+    let mut pad = Pad::new(3, 3, &[], 6);
     let mut log = pad.probe(1, 60, 0.15);
     let (frames, tactels) = (130 * 5, log.tactels());
     log.force[..frames - 130].fill(0.0);
@@ -224,27 +224,27 @@ fn a_uniform_load_is_not_taken_for_a_probe() {
 }
 
 #[test]
-fn nothing_to_calibrate_is_said_with_a_way_out() {
+fn a_log_without_a_live_tactel_is_refused_with_help() {
     let mut pad = Pad::new(2, 2, &[0, 1, 2, 3], 11);
     let log = pad.uniform(1, 50);
     let log = Log { force: log.force.iter().enumerate().map(|(i, _)| if i < 50 { 0.0 } else { 3.0 }).collect(), ..log };
     for (load, way_out) in [(Load::Probe, "or is the load uniform?"), (Load::Uniform, "or of a probe on one tactel")] {
         let message = calibrate(std::slice::from_ref(&log), &settings(load, None)).unwrap_err();
-        assert!(message.contains("4 tactels never answer") && message.contains(way_out), "{message}");
+        assert!(message.contains("4 tactels do not respond") && message.contains(way_out), "{message}");
     }
     assert_eq!(calibrate(&[], &settings(Load::Probe, None)).unwrap_err(), "there is no log");
 }
 
 #[test]
-fn the_simplest_curve_that_is_good_enough_is_taken() {
+fn the_simplest_curve_that_is_good_enough_is_chosen() {
     let mut pad = Pad { hysteresis: 0.0, ..Pad::new(2, 3, &[], 12) };
     assert_eq!(made(pad.uniform(2, 200), Load::Uniform, None).kind(), Kind::Rational);
-    // So little squashed that a line will do: less than the noise.
+    // Saturation below the noise: a line is good enough.
     for truth in &mut pad.truths {
-        (truth.a, truth.b) = (2000.0 * 4000.0 / MOST, 4000.0);
+        (truth.a, truth.b) = (2000.0 * 4000.0 / MAX_FORCE_N, 4000.0);
     }
     assert_eq!(made(pad.uniform(2, 200), Load::Uniform, None).kind(), Kind::Linear);
-    // A knee that no squashed curve has.
+    // A knee that no rational curve fits.
     let knee = |force: f64| if force < 2.0 { 200.0 * force } else { 400.0 + 800.0 * (force - 2.0) };
     let mut log = pad.uniform(2, 200);
     for (i, cells) in log.cells.chunks_exact_mut(6).enumerate() {
@@ -257,7 +257,7 @@ fn the_simplest_curve_that_is_good_enough_is_taken() {
 }
 
 #[test]
-fn the_report_says_what_was_found_in_units() {
+fn the_report_has_results_with_units() {
     let mut pad = Pad::new(4, 4, &[7], 13);
     let report = made(pad.uniform(2, 100), Load::Uniform, None);
     let text = report.text(false);
@@ -268,7 +268,7 @@ fn the_report_says_what_was_found_in_units() {
         "hysteresis   median 1",
         " % of the range of the reading",
         " raw, unloaded",
-        "dead         1 never answer: [1, 3]",
+        "dead         1 do not respond: [1, 3]",
         "saturated    ",
         "the worst tactels, rational curve",
         "force [N]     range [raw]   RMS [N]   RMS [%]   hysteresis [%]",
@@ -285,6 +285,7 @@ fn the_report_says_what_was_found_in_units() {
     assert!(text.contains("hysteresis   not measured") && text.lines().last().unwrap().ends_with(" -"), "{text}");
 }
 
+#[cfg(feature = "cli")]
 #[test]
 fn the_picture_has_every_tactel_and_the_mean_in_its_frame() {
     let mut pad = Pad::new(3, 4, &[7], 14);

@@ -6,7 +6,9 @@
 //! that is the windup that a bound on the lead is for. It is kinematic: it leaves out inertia, friction, stiffness,
 //! delay and noise, so what works on it need not work on an arm.
 
-use tactflow_runtime::device::{Commands, Description, Device, DeviceError, Driver, Filled, Opened, Samples, Stepped};
+use tactflow_runtime::device::{
+    Command, Commands, Description, Device, DeviceError, Driver, Opened, Output, Samples, Stepped,
+};
 use tactflow_runtime::node::{FilePath, Mistake, Mistakes, NonNegative, Positive, Rate};
 use tactflow_runtime::params;
 use tactflow_runtime::signal::{Joint, Joints, JointsShape, Unit};
@@ -44,6 +46,7 @@ params! {
 /// The arm's joints and where they are.
 #[derive(Debug)]
 pub struct MockArm {
+    ports: Ports,
     joints: Vec<Joint>,
     position: Vec<f64>,
     /// What the commands add up to.
@@ -54,9 +57,14 @@ pub struct MockArm {
     sequence: u64,
 }
 
-impl Device for MockArm {
-    type Params = Params;
+#[derive(Debug, Clone, Copy)]
+struct Ports {
+    position: Output<Joints>,
+    equilibrium: Output<Joints>,
+    velocity: Command,
+}
 
+impl tactflow_runtime::node::Describe for MockArm {
     const NAME: &'static str = "mock_arm";
     const SUMMARY: &'static str = "an arm without dynamics that does exactly as it is told";
     const DOC: &'static str = "It integrates the commanded joint velocity exactly: that is its `equilibrium`. Its \
@@ -83,6 +91,10 @@ tip = "lwr_7_link"
 mount = { xyz = [0.0, 0.0, 0.03] }   # of the sensor on the tip [m]
 start = [0.0, 0.5, 0.0, -1.3, 0.0, 1.3, 0.0]   # [rad]
 "#;
+}
+
+impl Device for MockArm {
+    type Params = Params;
 
     fn open(params: Params) -> Result<Opened, Mistakes> {
         let chain = load(&params.urdf, &params.tip, &params.mount)?;
@@ -92,14 +104,15 @@ start = [0.0, 0.5, 0.0, -1.3, 0.0, 1.3, 0.0]   # [rad]
         check_start(&joints, &params.start)?;
         check_holds(&params.hold)?;
         let shape = JointsShape { joints: joints.clone(), unit: Unit::RADIAN };
-        let filled = Filled {
-            role: "velocity_arm".into(),
-            outputs: vec![shape.clone().into(), shape.clone().into()],
-            commands: vec![shape.in_unit(Unit::RADIAN.per_second()).into()],
-            facts: facts(&params.urdf, &params.tip, &params.mount)?,
+        let mut description = Description::every(period as f64 * 1e-9);
+        let mut arm = description.fills("velocity_arm");
+        arm.facts(facts(&params.urdf, &params.tip, &params.mount)?);
+        let ports = Ports {
+            position: arm.output("position", shape.clone()),
+            equilibrium: arm.output("equilibrium", shape.clone()),
+            velocity: arm.command("velocity", shape.in_unit(Unit::RADIAN.per_second())),
         };
-        let arm = Self::new(joints, params.start, params.hold, period);
-        let description = Description { fills: vec![filled], period: period as f64 * 1e-9 };
+        let arm = Self::new(ports, joints, params.start, params.hold, period);
         Ok(Opened { description, driver: Driver::Stepped(Box::new(arm)) })
     }
 }
@@ -111,18 +124,18 @@ impl Stepped for MockArm {
 
     fn exchange(&mut self, now: i64, commands: &Commands, samples: &mut Samples) -> Result<(), DeviceError> {
         let is_due = self.next().is_none_or(|next| next <= now);
-        if self.advance(now, commands.joints(0))? && is_due {
+        if self.advance(now, commands.joints(self.ports.velocity))? && is_due {
             self.sequence += 1;
-            samples.write::<Joints>(0, now, self.sequence).0.copy_from_slice(&self.position);
-            samples.write::<Joints>(1, now, self.sequence).0.copy_from_slice(&self.equilibrium);
+            samples.write(self.ports.position, now, self.sequence).0.copy_from_slice(&self.position);
+            samples.write(self.ports.equilibrium, now, self.sequence).0.copy_from_slice(&self.equilibrium);
         }
         Ok(())
     }
 }
 
 impl MockArm {
-    fn new(joints: Vec<Joint>, start: Vec<f64>, holds: Vec<Hold>, period: i64) -> Self {
-        Self { joints, equilibrium: start.clone(), position: start, holds, period, last: None, sequence: 0 }
+    fn new(ports: Ports, joints: Vec<Joint>, start: Vec<f64>, holds: Vec<Hold>, period: i64) -> Self {
+        Self { ports, joints, equilibrium: start.clone(), position: start, holds, period, last: None, sequence: 0 }
     }
 
     /// Moves with `velocity` from the last exchange to `now`; whether time went on, so that there is a new sample.
@@ -175,8 +188,8 @@ mod tests {
     fn it_samples_at_its_rate_and_says_what_it_is() {
         let mut bench = arm("start = [0, 0.5, 0, -1, 0, 1, 0]\nmount = { xyz = [0, 0, 0.05] }").unwrap();
         assert_eq!(bench.description.period, 0.004);
-        for shape in bench.fill().outputs.iter().chain(&bench.fill().commands) {
-            let Shape::Joints(shape) = shape else { panic!("joints") };
+        for port in ["position", "equilibrium", "velocity"] {
+            let Some(Shape::Joints(shape)) = bench.description.shape(port) else { panic!("joints") };
             assert!(shape.joints.iter().all(|joint| joint.acceleration == 10.0));
         }
         for now in [0, 4_000_000, 8_000_000] {
@@ -194,7 +207,14 @@ mod tests {
     fn two_joints(holds: &str) -> MockArm {
         let joint = |name: &str| Joint { name: name.into(), lower: -1.0, upper: 1.0, speed: 1.0, acceleration: 10.0 };
         let params: Params = read(&format!("urdf = 'none'\ntip = ''\nstart = []\nhold = {holds}"));
-        MockArm::new(vec![joint("a"), joint("b")], vec![0.0, 0.5], params.hold, 4_000_000)
+        let mut description = Description::every(0.004);
+        let mut arm = description.fills("velocity_arm");
+        let ports = Ports {
+            position: arm.output("position", JointsShape::default()),
+            equilibrium: arm.output("equilibrium", JointsShape::default()),
+            velocity: arm.command("velocity", JointsShape::default()),
+        };
+        MockArm::new(ports, vec![joint("a"), joint("b")], vec![0.0, 0.5], params.hold, 4_000_000)
     }
 
     #[test]

@@ -7,7 +7,7 @@
 use std::borrow::Cow;
 use std::sync::Arc;
 
-use tactflow_runtime::device::{Commands, Description, Device, DeviceError, Driver, Filled, Opened, Samples, Stepped};
+use tactflow_runtime::device::{Commands, Description, Device, DeviceError, Driver, Opened, Output, Samples, Stepped};
 use tactflow_runtime::node::{At, Count, FilePath, Mistake, Mistakes, NonNegative, Positive, Rate};
 use tactflow_runtime::params;
 use tactflow_runtime::signal::{Image, Unit};
@@ -39,13 +39,12 @@ params! {
 /// A recording that is being shown.
 #[derive(Debug)]
 pub struct Player {
+    image: Output<Image>,
     recording: Recording,
     next: usize,
 }
 
-impl Device for Player {
-    type Params = Params;
-
+impl tactflow_runtime::node::Describe for Player {
     const NAME: &'static str = "recording";
     const SUMMARY: &'static str =
         "plays a recorded file of a tactile or pressure sensor (Tekscan, novel, XSENSOR, CSV, …) as a pad";
@@ -78,6 +77,10 @@ pad = "pad"
 type = "recording"
 file = "builtin:finger_press.csv"   # a finger on a Tekscan I-Scan: 28 by 28 sensels, 1.27 mm apart, raw, 10 Hz
 "#;
+}
+
+impl Device for Player {
+    type Params = Params;
 
     fn open(params: Params) -> Result<Opened, Mistakes> {
         let file = &params.file;
@@ -85,14 +88,11 @@ file = "builtin:finger_press.csv"   # a finger on a Tekscan I-Scan: 28 by 28 sen
         let bytes = file.bytes()?;
         let recording = recordings::read(&bytes, &file.path.to_string_lossy(), &hints)
             .map_err(|refusal| mistakes(refusal, file, &bytes))?;
-        let filled = Filled {
-            role: "tactile_pad".into(),
-            outputs: vec![recording.shape.clone().into()],
-            commands: vec![],
-            facts: facts(&recording, &params),
-        };
-        let description = Description { fills: vec![filled], period: recording.period };
-        Ok(Opened { description, driver: Driver::Stepped(Box::new(Self { recording, next: 0 })) })
+        let mut description = Description::every(recording.period);
+        let mut pad = description.fills("tactile_pad");
+        pad.facts(facts(&recording, &params));
+        let image = pad.output("image", recording.shape.clone());
+        Ok(Opened { description, driver: Driver::Stepped(Box::new(Self { image, recording, next: 0 })) })
     }
 }
 
@@ -101,8 +101,8 @@ fn hints(params: &Params) -> Result<Hints, Mistakes> {
         && !recordings::FORMATS.iter().any(|known| known.name == format)
     {
         let names: Vec<String> = recordings::FORMATS.iter().map(|format| format!("`{}`", format.name)).collect();
-        let mistake = Mistake::param("format", format!("`{format}` is no format that can be read here"));
-        return Err(mistake.help(format!("formats are {}", names.join(", "))).into());
+        let mistake = Mistake::param("format", format!("unknown format `{format}`"));
+        return Err(mistake.help(format!("known formats are {}", names.join(", "))).into());
     }
     Ok(Hints {
         assumed: None,
@@ -124,7 +124,7 @@ fn mistakes(refusal: Refusal, file: &FilePath, bytes: &[u8]) -> Mistakes {
             let line = head.text.lines().map(str::trim).find(|line| !line.is_empty());
             let begins = line.map(|line| format!("it begins with `{}`", recordings::text::shortened(line)));
             let begins = begins.unwrap_or_else(|| "it is empty".into());
-            let message = format!("`{name}` is no recording of a known format: {begins}");
+            let message = format!("`{name}` has an unknown format: {begins}");
             here(message).help(recordings::list()).into()
         }
         Refusal::Damaged { text, flaws } => {
@@ -159,7 +159,7 @@ impl Stepped for Player {
             self.next += due;
             let newest = self.next - 1;
             let frame = self.recording.frames[newest];
-            self.recording.show(newest, samples.write::<Image>(0, frame.time, frame.number).cells_mut());
+            self.recording.show(newest, samples.write(self.image, frame.time, frame.number).cells_mut());
         }
         Ok(())
     }
@@ -194,20 +194,24 @@ mod tests {
     #[test]
     fn the_doc_names_every_format() {
         for format in recordings::FORMATS {
-            assert!(Player::DOC.contains(&format!("`{}`", format.name)), "{}", format.name);
+            assert!(
+                <Player as tactflow_runtime::node::Describe>::DOC.contains(&format!("`{}`", format.name)),
+                "{}",
+                format.name
+            );
         }
     }
 
     #[test]
     fn frames_are_served_once_and_the_newest_wins() {
         let mut bench = Bench::new(open::<Player>(&format!("file = '{PATH}'")).unwrap());
-        let Shape::Image(shape) = &bench.fill().outputs[0] else { panic!("an image") };
+        let Some(Shape::Image(shape)) = bench.description.shape("image") else { panic!("an image") };
         assert_eq!((shape.rows, shape.cols), (28, 28));
         assert_eq!(bench.fact("threshold"), Some(&3.0.into()));
         assert_eq!(bench.fact("frames"), Some(&309.into()));
         assert_eq!(bench.fact("dead").unwrap()[1], vec![0, 1].into());
         let force = |bench: &mut Bench| {
-            let image: &mut Image = bench.samples.write(0, 0, 0);
+            let image = bench.image();
             let sum: f32 = image.cells().iter().sum();
             image.cells_mut().fill(f32::NAN);
             sum
@@ -229,11 +233,11 @@ mod tests {
     fn a_packed_recording_plays_as_it_is() {
         let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../graphs/recordings/pawlabeling/dog1_sel_1.zip");
         let mut bench = Bench::new(open::<Player>(&format!("file = '{path}'")).unwrap());
-        let Shape::Image(shape) = &bench.fill().outputs[0] else { panic!("an image") };
+        let Some(Shape::Image(shape)) = bench.description.shape("image") else { panic!("an image") };
         assert_eq!((shape.rows, shape.cols), (256, 63));
         assert_eq!(bench.fact("format"), Some(&"footscan".into()));
         bench.exchange(0);
-        let image: &mut Image = bench.samples.write(0, 0, 0);
+        let image = bench.image();
         let load: f32 = image.cells().iter().sum();
         assert!((load - 11.9).abs() < 1e-3, "{load} N");
     }

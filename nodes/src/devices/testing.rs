@@ -3,8 +3,9 @@
 use std::path::Path;
 
 use tactflow_runtime::catalogue::Catalogue;
-use tactflow_runtime::device::{Commands, Description, Device, Driver, Filled, Opened, Samples, Stepped};
+use tactflow_runtime::device::{Commands, Description, Device, Driver, Opened, Samples, Stepped};
 use tactflow_runtime::node::{Mistakes, Param, Reader};
+use tactflow_runtime::signal::Image;
 use tactflow_runtime::source::{SourceMap, parse_table};
 
 use crate::builtin;
@@ -36,17 +37,17 @@ pub(crate) struct Bench {
 impl Bench {
     pub(crate) fn new(opened: Opened) -> Self {
         let Opened { description, driver: Driver::Stepped(device) } = opened else { panic!("a stepped device") };
-        let samples = Samples::with_shapes(description.fills.iter().flat_map(|fill| &fill.outputs));
-        let commands = Commands::with_shapes(description.fills.iter().flat_map(|fill| &fill.commands));
+        let (samples, commands) = (Samples::of(&description), Commands::of(&description));
         Self { description, device, samples, commands }
     }
 
-    pub(crate) fn fill(&self) -> &Filled {
-        &self.description.fills[0]
+    pub(crate) fn fact(&self, name: &str) -> Option<&toml::Value> {
+        self.description.fact(name)
     }
 
-    pub(crate) fn fact(&self, name: &str) -> Option<&toml::Value> {
-        self.fill().facts.iter().find(|(fact, _)| fact == name).map(|(_, value)| value)
+    /// The image as the device left it, to be read or spoilt.
+    pub(crate) fn image(&mut self) -> &mut Image {
+        self.samples.write(self.description.output("image").expect("the device has an image"), 0, 0)
     }
 
     pub(crate) fn exchange(&mut self, now: i64) {

@@ -64,12 +64,7 @@ pub struct ContactDebounce {
     samples: u32,
 }
 
-impl Node for ContactDebounce {
-    type Params = Params;
-    type Inputs<'a> = Inputs<'a>;
-    type Outputs = Outputs;
-    type State = State;
-
+impl tactflow_runtime::node::Describe for ContactDebounce {
     const NAME: &'static str = "contact_debounce";
     const SUMMARY: &'static str =
         "makes a contact that does not flicker: it counts once it has lasted for some samples";
@@ -88,6 +83,13 @@ type = "contact_debounce"
 in.present = "label.present"
 samples = 5                         # 20 ms at 250 Hz
 "#;
+}
+
+impl Node for ContactDebounce {
+    type Params = Params;
+    type Inputs<'a> = Inputs<'a>;
+    type Outputs = Outputs;
+    type State = State;
 
     fn new(params: Params, _: &mut Setup<Self>) -> Result<Self, Mistakes> {
         match u32::try_from(*params.samples) {

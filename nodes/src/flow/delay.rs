@@ -37,17 +37,19 @@ macro_rules! delay {
                 initial: Option<tactflow_runtime::signal::$Kind>,
             }
 
-            impl Node for $Name {
-                type Params = Params;
-                type Inputs<'a> = Inputs<'a>;
-                type Outputs = Outputs;
-                type State = State;
-
+            impl tactflow_runtime::node::Describe for $Name {
                 const NAME: &'static str = $name;
                 const SUMMARY: &'static str = $summary;
                 const DOC: &'static str = $doc;
                 const EXAMPLE: &'static str = $example;
                 const EVERY_TICK: bool = true;
+            }
+
+            impl Node for $Name {
+                type Params = Params;
+                type Inputs<'a> = Inputs<'a>;
+                type Outputs = Outputs;
+                type State = State;
 
                 fn new(params: Params, setup: &mut Setup<Self>) -> Result<Self, Mistakes> {
                     let prepare: fn(&Params, &mut OutputShapes) = $prepare;

@@ -1,112 +1,97 @@
-//! `gate` and `twist_gate`: what comes in passes while a flag is set; otherwise there is nothing.
+//! `gate` and `twist_gate`: one implementation for both kinds.
 //!
-//! Shut, or without a flag, the output is absent, and an absent twist is zero motion. What passes is new when it came in
-//! new, and when the gate opens on something held: that keeps its stamp, so no time passes from one to the other.
+//! The output is new when the input is new, and when the gate opens on a held value. A held value keeps its stamp, so no
+//! time passes from one to the other.
 
-use tactflow_runtime::node::{Mistakes, Node, Setup, Tick};
-use tactflow_runtime::{inputs, outputs, params, state};
+use std::marker::PhantomData;
 
-use crate::unwired;
+use tactflow_runtime::node::{Describe, In, Inputs, Mistakes, Node, Out, Outputs, Setup, State, Tick};
+use tactflow_runtime::signal::{Flag, Scalar, Signal, Twist};
 
-macro_rules! gate {
-    ($(#[$meta:meta])* $Name:ident in $module:ident: $name:literal, $port:ident: $Kind:ident[$($arg:literal),*],
-     $summary:literal, $doc:literal, $example:literal) => {
-        pub use $module::$Name;
+/// Lets a signal pass only while a flag is set.
+///
+/// `value` passes while `gate` is set. While the gate is not set or is absent, the output is absent, as if the sensor had
+/// no value: the nodes behind it reset, fade or wait as they do when a contact is lost. An absent twist is zero motion: a
+/// `twist_adder` leaves it out, and the limiters bring the arm to rest.
+///
+/// While the gate is open, the output counts as new only when the input is new, however often the flag is. When the gate
+/// opens on a held value, that value passes at once and keeps its stamp: an integral does not take it twice, but a
+/// `smooth` or a `median` behind a gate that shuts and opens on one sample does. For a gate that does not flicker wire
+/// `contact_debounce.present`.
+///
+/// Generated motion does not end with the contact by itself; a `twist_gate` on `label.present` ends it. `twist_source`
+/// has such a gate built in. The output is as old as the value or the flag, whichever is older.
+///
+/// ```toml
+/// [nodes.gate]
+/// type = "gate"
+/// in.value = "moments.force"
+/// in.gate = "label.present"
+/// ```
+///
+/// ```toml
+/// [nodes.twist_gate]
+/// type = "twist_gate"
+/// in.value = "projector.twist"
+/// in.gate = "label.present"
+/// ```
+#[derive(Describe)]
+#[describe(name = "gate", of = "Gate<Scalar>")]
+#[describe(name = "twist_gate", of = "Gate<Twist>")]
+pub struct Gate<T>(PhantomData<T>);
 
-        mod $module {
-            use super::*;
+/// What a gate reads.
+#[derive(Inputs)]
+pub struct Inputs<'a, T: Signal> {
+    /// Passes while the gate is open.
+    #[port(unit = "U", frame = "A")]
+    value: In<'a, T>,
+    /// The gate is open while this is present and set.
+    gate: Option<In<'a, Flag>>,
+}
 
-            params! {}
+/// What a gate writes.
+#[derive(Outputs)]
+pub struct Outputs<T: Signal> {
+    /// The same value while the gate is open; absent while it is shut.
+    #[port(unit = "U", frame = "A")]
+    value: Out<T>,
+}
 
-            inputs! {
-                /// What passes while the gate is open [any unit].
-                $port: $Kind[$($arg),*],
-                /// The gate is open while this is there and set.
-                gate: Trigger<Flag>,
-            }
+/// What a gate remembers.
+#[derive(State)]
+pub struct State {
+    /// Whether it was open in the last step.
+    was_open: bool,
+}
 
-            outputs! {
-                /// The same while the gate is open; absent while it is shut [unit of what comes in].
-                $port: $Kind[$($arg),*],
-            }
+impl<T: Signal> Node for Gate<T>
+where
+    Self: Describe,
+{
+    type Params = ();
+    type Inputs<'a> = Inputs<'a, T>;
+    type Outputs = Outputs<T>;
+    type State = State;
 
-            state! {
-                /// Whether it was open in the last step.
-                was_open: bool,
-            }
+    fn new((): (), setup: &mut Setup<Self>) -> Result<Self, Mistakes> {
+        setup.outputs.value = setup.inputs.value.clone();
+        Ok(Self(PhantomData))
+    }
 
-            $(#[$meta])*
-            pub struct $Name;
+    fn state(&self) -> State {
+        State { was_open: false }
+    }
 
-            impl Node for $Name {
-                type Params = Params;
-                type Inputs<'a> = Inputs<'a>;
-                type Outputs = Outputs;
-                type State = State;
-
-                const NAME: &'static str = $name;
-                const SUMMARY: &'static str = $summary;
-                const DOC: &'static str = $doc;
-                const EXAMPLE: &'static str = $example;
-
-                fn new(_: Params, setup: &mut Setup<Self>) -> Result<Self, Mistakes> {
-                    match setup.inputs.gate {
-                        Some(_) => Ok(Self),
-                        // It may be absent, but a gate that can never open is a wire that was forgotten.
-                        None => Err(unwired(Self::NAME, "gate", "a flag", "label.present").into()),
-                    }
-                }
-
-                fn state(&self) -> State {
-                    State { was_open: false }
-                }
-
-                fn step(&self, _: &Tick, inputs: Inputs<'_>, out: &mut Outputs, state: &mut State) {
-                    let is_open = inputs.gate.is_some_and(|gate| *gate);
-                    let was_open = std::mem::replace(&mut state.was_open, is_open);
-                    if is_open && (inputs.$port.is_new() || !was_open) {
-                        out.$port.set(*inputs.$port);
-                    } else if is_open {
-                        out.$port.keep();
-                    }
-                }
-            }
+    fn step(&self, _: &Tick, inputs: Inputs<'_, T>, out: &mut Outputs<T>, state: &mut State) {
+        let is_open = inputs.gate.is_some_and(|gate| *gate);
+        let was_open = std::mem::replace(&mut state.was_open, is_open);
+        if is_open && (inputs.value.is_new() || !was_open) {
+            out.value.copy_from(&inputs.value);
+        } else if is_open {
+            out.value.keep();
         }
-    };
-}
-
-gate! {
-    /// A gate for scalars; it has nothing to set.
-    Gate in scalar: "gate", value: Scalar["U", "A"],
-    "lets a scalar pass only while a flag is set",
-    "`value` passes while `gate` is set. While it is not, or is absent, there is no value, as if the sensor had none: \
-    what comes after resets, fades or waits as it does when a contact is lost.\n\n\
-    While the gate is open, what passes counts as new only when it came in new, however often the flag comes. When the \
-    gate opens on a value that is held, that passes at once, with the stamp it had: an integral takes nothing of it \
-    twice, but a `smooth` or a `median` behind a gate that shuts and opens on one sample does. For a gate that does not \
-    flicker wire `contact_debounce.present`.",
-    r#"
-[nodes.gate]
-type = "gate"
-in.value = "moments.force"
-in.gate = "label.present"
-"#
-}
-
-gate! {
-    /// A gate for twists; it has nothing to set.
-    TwistGate in twist: "twist_gate", twist: Twist["A"],
-    "lets a motion pass only while a flag is set; otherwise there is none",
-    "`twist` passes while `gate` is set. While it is not, or is absent, the twist is absent, which is zero motion: a \
-    `twist_adder` leaves it out, and the limiters bring the arm to rest.\n\n\
-    Generated motion does not end with the contact by itself; a gate on `label.present` ends it. `twist_source` has such \
-    a gate built in. What passes is as old as the twist or the flag, whichever is older.",
-    r#"
-[nodes.twist_gate]
-type = "twist_gate"
-in.twist = "projector.twist"
-in.gate = "label.present"
-"#
+    }
 }
 
 #[cfg(test)]
@@ -115,7 +100,6 @@ mod tests {
     use tactflow_runtime::signal::{
         FlagShape, Freshness, Scalar, ScalarShape, Shape, Signal, Stamp, Twist, TwistShape,
     };
-    use tactflow_runtime::source::Code;
 
     use super::*;
 
@@ -177,27 +161,18 @@ mod tests {
 
     #[test]
     fn what_comes_out_when() {
-        table::<Gate, Scalar>("value", ScalarShape::default().into(), |value| value);
-        table::<TwistGate, Twist>("twist", TwistShape.into(), along_x);
+        table::<Gate<Scalar>, Scalar>("value", ScalarShape::default().into(), |value| value);
+        table::<Gate<Twist>, Twist>("value", TwistShape.into(), along_x);
     }
 
     #[test]
     fn what_passes_keeps_its_age() {
         let wires = [("value", ScalarShape::default().into()), ("gate", FlagShape.into())];
-        let mut rig = NodeRig::new::<Gate>("", &wires).unwrap();
+        let mut rig = NodeRig::new::<Gate<Scalar>>("", &wires).unwrap();
         rig.set("value", 1.0);
         rig.step_ms(7.0);
         rig.set("gate", true);
         rig.step();
         assert_eq!(rig.mark("value").stamp(), Stamp { nanos: 0, device: 0 });
-    }
-
-    #[test]
-    fn a_gate_that_nothing_opens_is_a_mistake() {
-        let mistakes = NodeRig::new::<Gate>("", &[("value", ScalarShape::default().into())]).err().unwrap();
-        assert_eq!(
-            (mistakes[0].code, mistakes[0].message.as_str()),
-            (Code::MissingInput, "`gate` needs `in.gate`, a flag")
-        );
     }
 }

@@ -42,12 +42,7 @@ pub struct Probe {
     every: i64,
 }
 
-impl Node for Probe {
-    type Params = Params;
-    type Inputs<'a> = Inputs<'a>;
-    type Outputs = Outputs;
-    type State = State;
-
+impl tactflow_runtime::node::Describe for Probe {
     const NAME: &'static str = "probe";
     const SUMMARY: &'static str = "prints what is on a wire while the graph runs";
     const DOC: &'static str = "Wire to it what you want to see, by kind (`in.flag`, `in.features`, `in.twist`, \
@@ -70,6 +65,13 @@ in.twist = "sum.twist"
 every_ms = 100                      # ten lines a second at most
 "#;
     const LOGS: bool = true;
+}
+
+impl Node for Probe {
+    type Params = Params;
+    type Inputs<'a> = Inputs<'a>;
+    type Outputs = Outputs;
+    type State = State;
 
     fn new(params: Params, setup: &mut Setup<Self>) -> Result<Self, Mistakes> {
         let InputShapes { value, flag, features, twist, joints, pose, .. } = &setup.inputs;

@@ -103,12 +103,7 @@ pub struct SignalGenerator {
     is_gated: bool,
 }
 
-impl Node for SignalGenerator {
-    type Params = Params;
-    type Inputs<'a> = Inputs<'a>;
-    type Outputs = Outputs;
-    type State = State;
-
+impl tactflow_runtime::node::Describe for SignalGenerator {
     const NAME: &'static str = "signal_generator";
     const SUMMARY: &'static str = "a test signal for identification: a step, a ramp, a sine or a chirp";
     const DOC: &'static str = "Gives a scalar that is known at every moment, so that the answer to it tells what \
@@ -136,6 +131,13 @@ end_frequency = 10.0                # [Hz]
 duration = 20.0                     # [s]
 "#;
     const EVERY_TICK: bool = true;
+}
+
+impl Node for SignalGenerator {
+    type Params = Params;
+    type Inputs<'a> = Inputs<'a>;
+    type Outputs = Outputs;
+    type State = State;
 
     fn new(params: Params, setup: &mut Setup<Self>) -> Result<Self, Mistakes> {
         let mistakes = check(&params, setup.period);

@@ -40,16 +40,18 @@ macro_rules! switch {
             $(#[$meta])*
             pub struct $Name;
 
+            impl tactflow_runtime::node::Describe for $Name {
+                const NAME: &'static str = $name;
+                const SUMMARY: &'static str = $summary;
+                const DOC: &'static str = $doc;
+                const EXAMPLE: &'static str = $example;
+            }
+
             impl Node for $Name {
                 type Params = Params;
                 type Inputs<'a> = Inputs<'a>;
                 type Outputs = Outputs;
                 type State = State;
-
-                const NAME: &'static str = $name;
-                const SUMMARY: &'static str = $summary;
-                const DOC: &'static str = $doc;
-                const EXAMPLE: &'static str = $example;
 
                 fn new(_: Params, setup: &mut Setup<Self>) -> Result<Self, Mistakes> {
                     let inputs = &setup.inputs;
@@ -60,7 +62,7 @@ macro_rules! switch {
                     ];
                     let missing = wired.into_iter().filter(|(.., is_wired)| !is_wired);
                     let mistakes: Mistakes =
-                        missing.map(|(input, kind, _)| unwired(Self::NAME, input, kind, "node.port")).collect();
+                        missing.map(|(input, kind, _)| unwired(<Self as tactflow_runtime::node::Describe>::NAME, input, kind, "node.port")).collect();
                     if mistakes.is_empty() { Ok(Self) } else { Err(mistakes) }
                 }
 

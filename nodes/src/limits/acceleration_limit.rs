@@ -43,12 +43,7 @@ pub struct AccelerationLimit {
     max_age: i64,
 }
 
-impl Node for AccelerationLimit {
-    type Params = Params;
-    type Inputs<'a> = Inputs<'a>;
-    type Outputs = Outputs;
-    type State = State;
-
+impl tactflow_runtime::node::Describe for AccelerationLimit {
     const NAME: &'static str = "acceleration_limit";
     const SUMMARY: &'static str = "limits the acceleration of the sensor, and brings it to rest when nothing comes";
     const DOC: &'static str = "The motion follows what is wanted on a straight line, as fast as both accelerations \
@@ -65,11 +60,25 @@ linear_m_per_s2 = 1.0
 angular_rad_per_s2 = 10.0
 "#;
     const EVERY_TICK: bool = true;
+}
+
+impl Node for AccelerationLimit {
+    type Params = Params;
+    type Inputs<'a> = Inputs<'a>;
+    type Outputs = Outputs;
+    type State = State;
+
     const LIMITS: Limits = Limits { through: Some("twist"), holds: &["acceleration"], breaks: &[] };
 
     fn new(params: Params, setup: &mut Setup<Self>) -> Result<Self, Mistakes> {
         if setup.inputs.twist.is_none() {
-            return Err(crate::unwired(Self::NAME, "twist", "a twist", "twist_limit.twist").into());
+            return Err(crate::unwired(
+                <Self as tactflow_runtime::node::Describe>::NAME,
+                "twist",
+                "a twist",
+                "twist_limit.twist",
+            )
+            .into());
         }
         setup.outputs.acceleration = ScalarShape::of(Unit::ONE).within(0.0, 1.0);
         let max_age = params.max_age_ms.map_or(5.0 * setup.period, |age| *age * 1e-3);

@@ -50,12 +50,7 @@ pub struct Bumpless {
     speeds: [f64; 2],
 }
 
-impl Node for Bumpless {
-    type Params = Params;
-    type Inputs<'a> = Inputs<'a>;
-    type Outputs = Outputs;
-    type State = State;
-
+impl tactflow_runtime::node::Describe for Bumpless {
     const NAME: &'static str = "bumpless";
     const SUMMARY: &'static str = "takes up every jump of a motion: a switch of mode, a contact found or lost";
     const DOC: &'static str = "Bumpless transfer. A mode that begins, a contact that is found and one that is lost make \
@@ -75,6 +70,14 @@ linear_m_per_s2 = 1.0
 angular_rad_per_s2 = 10.0
 "#;
     const EVERY_TICK: bool = true;
+}
+
+impl Node for Bumpless {
+    type Params = Params;
+    type Inputs<'a> = Inputs<'a>;
+    type Outputs = Outputs;
+    type State = State;
+
     const LIMITS: Limits = Limits {
         through: Some("twist"),
         holds: &["bumpless"],
@@ -83,7 +86,13 @@ angular_rad_per_s2 = 10.0
 
     fn new(params: Params, setup: &mut Setup<Self>) -> Result<Self, Mistakes> {
         if setup.inputs.twist.is_none() {
-            return Err(crate::unwired(Self::NAME, "twist", "a twist", "sum.twist").into());
+            return Err(crate::unwired(
+                <Self as tactflow_runtime::node::Describe>::NAME,
+                "twist",
+                "a twist",
+                "sum.twist",
+            )
+            .into());
         }
         setup.outputs.bumpless = ScalarShape::of(Unit::ONE).within(0.0, 1.0);
         let speeds = [params.linear_m_per_s, params.angular_rad_per_s].map(|speed| speed.map_or(f64::INFINITY, |s| *s));

@@ -73,12 +73,7 @@ pub struct ContactLimit {
     max_age: i64,
 }
 
-impl Node for ContactLimit {
-    type Params = Params;
-    type Inputs<'a> = Inputs<'a>;
-    type Outputs = Outputs;
-    type State = State;
-
+impl tactflow_runtime::node::Describe for ContactLimit {
     const NAME: &'static str = "contact_limit";
     const SUMMARY: &'static str = "bars the way into an object when the force or a single tactel is at its ceiling";
     const DOC: &'static str = "Two ceilings: `force` on the sum of the whole image and `peak` on its highest tactel. From \
@@ -99,8 +94,16 @@ force = 15.0                        # [N]
 peak = 3.0                          # [N]
 approach_m_per_s = 0.05
 "#;
-    // The image and its age move on while a motion is held.
     const EVERY_TICK: bool = true;
+}
+
+impl Node for ContactLimit {
+    type Params = Params;
+    type Inputs<'a> = Inputs<'a>;
+    type Outputs = Outputs;
+    type State = State;
+
+    // The image and its age move on while a motion is held.
     const LIMITS: Limits =
         Limits { through: Some("twist"), holds: &["force", "peak"], breaks: &["workspace", "speed", "acceleration"] };
 

@@ -84,12 +84,7 @@ pub struct JointLimit {
     max_age: i64,
 }
 
-impl Node for JointLimit {
-    type Params = Params;
-    type Inputs<'a> = Inputs<'a>;
-    type Outputs = Outputs;
-    type State = State;
-
+impl tactflow_runtime::node::Describe for JointLimit {
     const NAME: &'static str = "joint_limit";
     const SUMMARY: &'static str = "keeps joint velocities within ranges, speeds, accelerations and the lead of an arm";
     const DOC: &'static str = "The last node before an arm. Near the end of its range a joint goes only as fast as it \
@@ -118,6 +113,14 @@ acceleration = 5.0                  # [rad/s²]
 lead_rad = 0.1
 "#;
     const EVERY_TICK: bool = true;
+}
+
+impl Node for JointLimit {
+    type Params = Params;
+    type Inputs<'a> = Inputs<'a>;
+    type Outputs = Outputs;
+    type State = State;
+
     const LIMITS: Limits = Limits {
         through: Some("velocity"),
         holds: &["lead", "joint_position", "joint_speed", "joint_acceleration"],
@@ -126,7 +129,13 @@ lead_rad = 0.1
 
     fn new(params: Params, setup: &mut Setup<Self>) -> Result<Self, Mistakes> {
         let Some(velocity) = &setup.inputs.velocity else {
-            return Err(crate::unwired(Self::NAME, "velocity", "joint velocities", "ik.velocity").into());
+            return Err(crate::unwired(
+                <Self as tactflow_runtime::node::Describe>::NAME,
+                "velocity",
+                "joint velocities",
+                "ik.velocity",
+            )
+            .into());
         };
         let joints = joints(&params, velocity, &setup.inputs.position, &setup.inputs.equilibrium)?;
         setup.outputs.velocity = JointsShape { joints: joints.clone(), unit: Unit::RADIAN.per_second() };

@@ -34,12 +34,7 @@ pub struct TwistLimit {
     angular: f64,
 }
 
-impl Node for TwistLimit {
-    type Params = Params;
-    type Inputs<'a> = Inputs<'a>;
-    type Outputs = Outputs;
-    type State = ();
-
+impl tactflow_runtime::node::Describe for TwistLimit {
     const NAME: &'static str = "twist_limit";
     const SUMMARY: &'static str = "limits the speed of the sensor and keeps the direction of its motion";
     const DOC: &'static str = "The whole twist is scaled by one factor until its linear and its angular part are within \
@@ -52,6 +47,14 @@ in.twist = "workspace_limit.twist"
 linear_m_per_s = 0.05
 angular_rad_per_s = 0.8
 "#;
+}
+
+impl Node for TwistLimit {
+    type Params = Params;
+    type Inputs<'a> = Inputs<'a>;
+    type Outputs = Outputs;
+    type State = ();
+
     const LIMITS: Limits = Limits { through: Some("twist"), holds: &["speed"], breaks: &["acceleration"] };
 
     fn new(params: Params, setup: &mut Setup<Self>) -> Result<Self, Mistakes> {

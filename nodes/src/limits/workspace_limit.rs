@@ -45,12 +45,7 @@ pub struct WorkspaceLimit {
     max_age: i64,
 }
 
-impl Node for WorkspaceLimit {
-    type Params = Params;
-    type Inputs<'a> = Inputs<'a>;
-    type Outputs = Outputs;
-    type State = ();
-
+impl tactflow_runtime::node::Describe for WorkspaceLimit {
     const NAME: &'static str = "workspace_limit";
     const SUMMARY: &'static str = "keeps the sensor in a box of the workspace, with room to brake";
     const DOC: &'static str = "The sensor's origin stays between the corners `min_m` and `max_m` of a box in the base. \
@@ -73,8 +68,16 @@ min_m = [-0.8, -0.4, 0.1]
 max_m = [-0.3, 0.4, 0.7]
 deceleration_m_per_s2 = 0.5
 "#;
-    // The pose and its age move on while a motion is held.
     const EVERY_TICK: bool = true;
+}
+
+impl Node for WorkspaceLimit {
+    type Params = Params;
+    type Inputs<'a> = Inputs<'a>;
+    type Outputs = Outputs;
+    type State = ();
+
+    // The pose and its age move on while a motion is held.
     const LIMITS: Limits = Limits { through: Some("twist"), holds: &["workspace"], breaks: &["acceleration"] };
 
     fn new(params: Params, setup: &mut Setup<Self>) -> Result<Self, Mistakes> {

@@ -1,101 +1,86 @@
 //! Recordings in a zip archive or behind gzip: the file inside is unpacked and read as if it stood alone.
 //!
-//! A file is looked at after its first 64 KiB: if no format knows it, the rest stays packed, and so do most bombs. What
-//! is more than 512 MiB when unpacked is refused. An `.npz` is a zip archive too, but one with a format of its own.
+//! The first 64 KiB are unpacked first. If no format recognises them, the rest stays packed, and so do most zip bombs.
+//! A file of more than 512 MiB when unpacked is refused. An `.npz` is a zip archive too, but a format of its own.
 
 use std::io::Read;
 
 use flate2::bufread::MultiGzDecoder;
 
-use super::text::shortened;
-use super::zip::{self, LARGEST, Member};
-use super::{HEAD, Head, Hints, Refusal, list, npy, recognise};
+use super::common::text::shortened;
+use super::common::zip::{self, Archive, File, MAX_UNPACKED_BYTES};
+use super::common::{HEAD_BYTES, Head, Hints, Refusal};
+use super::formats::{list, recognise};
+use super::npy;
 
 const GZIP: &[u8] = b"\x1f\x8b\x08";
 
-/// How many members a message lists.
-const LISTED: usize = 8;
+/// Maximum number of files that a message lists.
+const MAX_LISTED: usize = 8;
 
-/// Unpacks the file in an archive, with its name; nothing if the bytes are no archive.
+/// Unpacks the file in an archive and returns it with its name, or `None` if the bytes are not an archive.
 ///
 /// # Errors
-/// When the archive is damaged, or does not hold one recording.
+/// If the archive is damaged, or does not hold exactly one recording.
 pub(super) fn unpack(bytes: &[u8], name: &str, hints: &Hints) -> Result<Option<(Vec<u8>, String)>, Refusal> {
     if bytes.starts_with(GZIP) {
         let name = name.strip_suffix(".gz").unwrap_or(name).to_owned();
-        return gunzip(bytes, &name, hints).map(|unpacked| Some((unpacked, name)));
+        let unpacked = unpack_recognised(&mut MultiGzDecoder::new(bytes), &name, hints)?;
+        return Ok(Some((unpacked, name)));
     }
     if !bytes.starts_with(zip::MAGIC) && !bytes.starts_with(zip::EMPTY) || npy::is_npz(bytes) {
         return Ok(None);
     }
-    let member = only_member(bytes)?;
-    let name = member.name();
-    let mut unpacked = Vec::new();
-    let mut source = member.open(bytes).map_err(Refusal::broken)?;
-    fill(&mut unpacked, &name, hints, |limit, out| source.read(limit, out))?;
-    source.verify(unpacked.len() as u64).map_err(Refusal::broken)?;
+    let archive = Archive::new(bytes)?;
+    let file = only_file(&archive)?;
+    let name = zip::name(&file);
+    let unpacked = unpack_recognised(&mut *archive.open(&file)?, &name, hints)?;
     Ok(Some((unpacked, name)))
 }
 
-fn only_member(bytes: &[u8]) -> Result<Member<'_>, Refusal> {
+fn only_file<'a>(archive: &'a Archive<'_>) -> Result<File<'a>, Refusal> {
     let mut files = Vec::new();
     let mut count = 0;
-    for member in zip::members(bytes).map_err(Refusal::broken)? {
-        let member = member.map_err(Refusal::broken)?;
-        if member.is_file() {
+    for file in archive.files() {
+        let file = file?;
+        if zip::is_of_user(&file) {
             count += 1;
-            if files.len() < LISTED {
-                files.push(member);
+            if files.len() < MAX_LISTED {
+                files.push(file);
             }
         }
     }
-    if let (1, [member]) = (count, &*files) {
-        return Ok(*member);
+    if count == 1 {
+        return Ok(files.swap_remove(0));
     }
-    let names: Vec<String> = files.iter().map(|member| format!("`{}`", shortened(&member.name()))).collect();
+    let names: Vec<String> = files.iter().map(|file| format!("`{}`", shortened(&zip::name(file)))).collect();
     let more = if count > names.len() { format!(" and {} more", count - names.len()) } else { String::new() };
     let message = match count {
-        0 => "the archive holds no file".to_owned(),
-        _ => format!("the archive holds {count} files: {}{more}", names.join(", ")),
+        0 => "the archive has no file in it".to_owned(),
+        _ => format!("the archive has {count} files in it: {}{more}", names.join(", ")),
     };
-    Err(Refusal::Broken { message, help: Some("pack the recording alone, or name a file that is not packed".into()) })
+    Err(Refusal::Broken { message, help: Some("pack the recording alone, or name the unpacked file".into()) })
 }
 
-fn gunzip(bytes: &[u8], name: &str, hints: &Hints) -> Result<Vec<u8>, Refusal> {
-    let mut unpacked = Vec::new();
-    let mut source = MultiGzDecoder::new(bytes);
-    fill(&mut unpacked, name, hints, |limit, out| {
-        let before = out.len();
-        let read = source.by_ref().take(limit).read_to_end(out);
-        read.map_err(|error| format!("the archive is damaged: it cannot be unpacked: {error}"))?;
-        Ok(((out.len() - before) as u64) < limit)
-    })?;
-    Ok(unpacked)
-}
-
-/// Unpacks the beginning, and the rest if a format knows that.
-fn fill(
-    out: &mut Vec<u8>,
-    name: &str,
-    hints: &Hints,
-    mut read: impl FnMut(u64, &mut Vec<u8>) -> Result<bool, String>,
-) -> Result<(), Refusal> {
-    let is_all = read(HEAD as u64, out).map_err(Refusal::broken)?;
-    if [GZIP, zip::MAGIC].iter().any(|magic| out.starts_with(magic)) && !npy::is_npz(out) {
-        return Err(Refusal::broken(format!("`{}` is an archive in an archive", shortened(name))));
+/// Unpacks the first bytes, and the rest if a format recognises them.
+fn unpack_recognised(source: &mut dyn Read, name: &str, hints: &Hints) -> Result<Vec<u8>, Refusal> {
+    let mut out = Vec::new();
+    let shown = shortened(name);
+    let is_all = zip::read(source, &shown, HEAD_BYTES as u64, &mut out)?;
+    if [GZIP, zip::MAGIC].iter().any(|magic| out.starts_with(magic)) && !npy::is_npz(&out) {
+        return Err(Refusal::broken(format!("`{shown}` is an archive inside an archive")));
     }
-    let head = Head::new(out, name);
+    let head = Head::new(&out, name);
     if hints.format.is_none() && recognise(&head).is_none() {
-        let begin = shortened(head.text.trim().lines().next().unwrap_or(""));
-        let name = shortened(name);
-        let message = format!("`{name}` in the archive is no recording of a known format: it begins with `{begin}`");
-        return Err(Refusal::Broken { message, help: Some(format!("formats are {}", list())) });
+        let first = shortened(head.text.trim().lines().next().unwrap_or(""));
+        let message = format!("`{shown}` in the archive has an unknown format: it begins with `{first}`");
+        return Err(Refusal::Broken { message, help: Some(list()) });
     }
-    if !is_all && !read(LARGEST - HEAD as u64, out).map_err(Refusal::broken)? {
-        let message = format!("`{}` is more than {} MiB when unpacked", shortened(name), LARGEST >> 20);
-        return Err(Refusal::Broken { message, help: Some("unpack it, and name the file itself".into()) });
+    if !is_all && !zip::read(source, &shown, MAX_UNPACKED_BYTES - HEAD_BYTES as u64, &mut out)? {
+        let message = format!("`{shown}` is more than {} MiB when unpacked", MAX_UNPACKED_BYTES >> 20);
+        return Err(Refusal::Broken { message, help: Some("unpack it, and name the unpacked file".into()) });
     }
-    Ok(())
+    Ok(out)
 }
 
 #[cfg(test)]
@@ -120,7 +105,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_packed_reads_as_if_it_were_not() {
+    fn a_packed_file_reads_like_the_unpacked_one() {
         let litter: &[(&str, &[u8])] =
             &[("__MACOSX/._plate", b"x"), ("folder/", b""), ("folder/plate", PLATE), ("folder/.DS_Store", b"y")];
         let hints = Hints { format: Some("footscan".into()), ..Hints::default() };
@@ -134,7 +119,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_wrong_is_said() {
+    fn a_message_says_what_is_wrong() {
         let good = zipped(8, &[("plate", PLATE)]);
         let edited = |at: usize, byte: u8| {
             let mut bytes = good.clone();
@@ -145,39 +130,42 @@ mod tests {
         let many: Vec<(String, Vec<u8>)> = (0..10).map(|i| (format!("{i}.txt"), PLATE.to_vec())).collect();
         let many: Vec<(&str, &[u8])> = many.iter().map(|(name, bytes)| (&**name, &**bytes)).collect();
         let cases = [
-            (zipped(8, &many[..2]), "the archive holds 2 files: `0.txt`, `1.txt`"),
+            (zipped(8, &many[..2]), "the archive has 2 files in it: `0.txt`, `1.txt`"),
             (
                 zipped(8, &many),
-                "the archive holds 10 files: `0.txt`, `1.txt`, `2.txt`, `3.txt`, `4.txt`, `5.txt`, `6.txt`, `7.txt` and 2 more",
+                "the archive has 10 files in it: `0.txt`, `1.txt`, `2.txt`, `3.txt`, `4.txt`, `5.txt`, `6.txt`, `7.txt` and 2 more",
             ),
-            (zipped(8, &[]), "the archive holds no file"),
-            (zipped(8, &[("folder/", b"")]), "the archive holds no file"),
-            (zipped(8, &[("plate.zip", &good)]), "`plate.zip` is an archive in an archive"),
+            (zipped(8, &[]), "the archive has no file in it"),
+            (zipped(8, &[("folder/", b"")]), "the archive has no file in it"),
+            (zipped(8, &[("plate.zip", &good)]), "`plate.zip` is an archive inside an archive"),
             (
                 zipped(8, &[("README", b"hello\nworld")]),
-                "`README` in the archive is no recording of a known format: it begins with `hello`",
+                "`README` in the archive has an unknown format: it begins with `hello`",
             ),
-            (
-                good[..good.len() - 30].to_vec(),
-                "the archive is damaged: it has no directory, as if its end were missing",
-            ),
+            (good[..good.len() - 30].to_vec(), "the archive is damaged: it has no directory: its end may be missing"),
             (edited(directory + 8, 1), "`plate` in the archive is protected by a password"),
             (edited(directory + 10, 12), "`plate` in the archive is packed by method 12: only `deflate` is read"),
-            (edited(directory + 16, 0), "the archive is damaged: `plate` does not unpack to what was packed"),
-            (edited(directory + 24, 3), "the archive is damaged: `plate` does not unpack to what was packed"),
+            (
+                edited(directory + 16, 0),
+                "the archive is damaged: `plate` cannot be unpacked: invalid checksum: expected 0x76f7c500, got 0x76f7c5d1",
+            ),
+            (
+                edited(directory + 24, 3),
+                "the archive is damaged: `plate` cannot be unpacked: invalid size: expected 3, got 32",
+            ),
             (edited(directory + 42, 9), "the archive is damaged: `plate` is not where its directory says"),
-            (edited(directory, 9), "the archive is damaged: its directory is cut off"),
+            (edited(directory, 9), "the archive is damaged: its directory cannot be read"),
         ];
         for (bytes, message) in cases {
             assert_eq!(complaints(read(&bytes, "", &Hints::default())), [(0, message.into())]);
         }
         let cut = gzipped(PLATE);
         let got = complaints(read(&cut[..cut.len() - 9], "", &Hints::default()));
-        assert!(got[0].1.starts_with("the archive is damaged: it cannot be unpacked"), "{got:?}");
+        assert!(got[0].1.starts_with("the archive is damaged: `` cannot be unpacked"), "{got:?}");
     }
 
     #[test]
-    fn damage_is_refused_or_read_soundly() {
+    fn a_damaged_archive_is_refused_or_read_soundly() {
         let good = [zipped(0, &[("plate", PLATE)]), zipped(8, &[("plate", PLATE)]), gzipped(PLATE)];
         let refused = count_refused(&[&good[0], &good[1], &good[2]], "", &Hints::default(), 3000);
         assert!((1000..3000).contains(&refused), "{refused}");

@@ -1,16 +1,15 @@
 //! `footscan`: the text export of an RSscan plate ("Entire Plate Roll Off", often named `.xls` though it is text).
 //!
-//! A frame is a line `Frame 12 (95.24 ms)` and a line of cells for each row; blank lines are between the frames, and
-//! what stands before the first frame is passed over. The file says neither unit nor pitch. The cells are forces: the
-//! sum of a frame is the load [N]. The plates of 0.5, 1 and 2 m are 64 sensors wide, with 5.08 mm across the plate,
-//! which is along a row of the file, and 7.62 mm along the plate, from row to row; that is taken for whatever is no
-//! wider than 64 columns, unless the bench says otherwise.
+//! A frame is a line `Frame 12 (95.24 ms)` and a line of cells for each row. Blank lines separate the frames, and text
+//! before the first frame is ignored. The file gives neither unit nor pitch. The cells are forces: the sum of a frame is
+//! the load [N]. The plates of 0.5, 1 and 2 m are 64 sensors wide. Their pitch is 5.08 mm across the plate, which is
+//! along a row of the file, and 7.62 mm along it, from row to row. It is the default for up to 64 columns.
 
 use tactflow_runtime::signal::{ImageShape, Unit};
 
-use super::reel::{Reel, bounded};
-use super::text::{self, Flaw, Lines, Notation, Piece, Wrong, flaw};
-use super::{Format, Head, Hints, Recording};
+use crate::recordings::common::reel::{Reel, bounded};
+use crate::recordings::common::text::{self, Lines, Notation, Piece, Wrong, flaw};
+use crate::recordings::common::{Flaw, Format, Head, Hints, Recording};
 
 pub(super) const FORMAT: Format = Format {
     name: "footscan",
@@ -22,10 +21,10 @@ pub(super) const FORMAT: Format = Format {
 /// Distance of the plates' sensors along a row and from row to row [m].
 const PITCH: [f64; 2] = [0.005_08, 0.007_62];
 
-/// Greatest number of columns of those plates.
-const WIDEST: usize = 64;
+/// Maximum number of columns of those plates.
+const MAX_COLS: usize = 64;
 
-/// A frame's line and a row of numbers after it.
+/// Recognises the line of a frame with a row of numbers after it.
 fn recognises(head: &Head<'_>) -> bool {
     let mut lines = Lines::new(&head.text);
     let has_frame = lines.any(|line| matches!(frame_line(line.trimmed()), Some(Ok(_))));
@@ -36,14 +35,14 @@ fn recognises(head: &Head<'_>) -> bool {
     has_frame && lines.find(|line| !line.text.trim().is_empty()).is_some_and(is_row)
 }
 
-/// What a frame's line says.
+/// The content of the line of a frame.
 struct FrameLine<'t> {
     number: u64,
-    /// Its time [ns], and where that stands.
+    /// Time [ns], and its place.
     time: Option<(i64, Piece<'t>)>,
 }
 
-/// `Frame 12 (95.24 ms)`, if the line is such a one.
+/// Parses `Frame 12 (95.24 ms)`, or returns `None` for another line.
 fn frame_line(line: Piece<'_>) -> Option<Result<FrameLine<'_>, Flaw>> {
     let rest = line.after("frame").or_else(|| line.after("bild"))?;
     let (number, time) = rest.text.split_once('(').map_or((rest.text, None), |(number, time)| (number, Some(time)));
@@ -56,10 +55,10 @@ fn frame_line(line: Piece<'_>) -> Option<Result<FrameLine<'_>, Flaw>> {
     })
 }
 
-/// `95.24 ms)`.
+/// Parses `95.24 ms)`.
 fn stamp(text: Piece<'_>) -> Result<(i64, Piece<'_>), Flaw> {
     let Some((inside, "")) = text.text.split_once(')') else {
-        return flaw(&text, "a frame's time ends with `)`, and so does its line");
+        return flaw(&text, "expected `)` after the frame's time, at the end of the line");
     };
     let inside = text.part(inside).trimmed();
     let end = inside.text.find(char::is_alphabetic).unwrap_or(inside.text.len());
@@ -67,7 +66,7 @@ fn stamp(text: Piece<'_>) -> Result<(i64, Piece<'_>), Flaw> {
     let nanoseconds = match &*inside.text[end..].to_ascii_lowercase() {
         "ms" => number * 1e6,
         "s" | "sec" => number * 1e9,
-        _ => return flaw(&inside, "a frame's time is in `ms` or `s`"),
+        _ => return flaw(&inside, "the unit of a frame's time must be `ms` or `s`"),
     };
     if (0.0..1e18).contains(&nanoseconds) {
         Ok((nanoseconds.round() as i64, inside))
@@ -89,7 +88,7 @@ fn parse(text: &str, hints: &Hints) -> Result<Recording, Wrong> {
     };
     hints.size(Some([rows, cols]))?;
     let unit = hints.unit.unwrap_or(Unit::NEWTON);
-    let pitch = (cols <= WIDEST && hints.pitch.is_none()).then_some(PITCH);
+    let pitch = (cols <= MAX_COLS && hints.pitch.is_none()).then_some(PITCH);
     let (unit, pitch, period) = hints.complete(Some(unit), pitch, reel.mean_step())?;
     if has_times {
         reel.start_at_zero();
@@ -101,7 +100,7 @@ fn parse(text: &str, hints: &Hints) -> Result<Recording, Wrong> {
     Ok(Recording { format: FORMAT.name, shape, frames, cells, dead, threshold: None, period, force: None })
 }
 
-/// Passes over what stands before the first frame, if that is no row of cells.
+/// Skips the text before the first frame, which must not be a row of cells.
 fn first_frame<'t>(lines: &mut Lines<'t>) -> Result<Option<Piece<'t>>, Flaw> {
     for line in lines.map(Piece::trimmed) {
         if frame_line(line).is_some() {
@@ -110,7 +109,7 @@ fn first_frame<'t>(lines: &mut Lines<'t>) -> Result<Option<Piece<'t>>, Flaw> {
         let notation = Notation::of(line.text);
         let mut cells = notation.fields(line);
         if cells.clone().nth(1).is_some() && cells.all(|cell| notation.number(cell, "").is_ok()) {
-            return flaw(&line, "a row of cells stands before the line of its frame");
+            return flaw(&line, "this row of cells comes before the line of its frame");
         }
     }
     Ok(None)
@@ -120,14 +119,14 @@ struct Reader {
     reel: Reel,
     /// Rows and columns of the first frame.
     size: Option<(usize, usize)>,
-    /// Whether the frames say their times.
+    /// Whether the frames have times.
     has_times: bool,
 }
 
 impl Reader {
-    /// Reads a frame whose line is `line`; gives the line of the next, if there is one.
+    /// Reads the frame with the line `line`, and returns the line of the next frame.
     fn frame<'t>(&mut self, line: Piece<'t>, lines: &mut Lines<'t>) -> Result<Option<Piece<'t>>, Flaw> {
-        let FrameLine { number, time } = frame_line(line).expect("it was asked before")?;
+        let FrameLine { number, time } = frame_line(line).expect("the caller has checked the line")?;
         let last = self.reel.frames.last();
         if let Some(last) = last
             && last.number.checked_add(1) != Some(number)
@@ -135,7 +134,7 @@ impl Reader {
             return flaw(&line, format!("frame {number} comes after frame {}", last.number));
         }
         if last.is_some() && self.has_times != time.is_some() {
-            return flaw(&line, "some frames have a time, and some have none");
+            return flaw(&line, "some frames have a time and some do not");
         }
         self.has_times = time.is_some();
         if let (Some(last), Some((time, at))) = (last, time)
@@ -149,7 +148,7 @@ impl Reader {
         Ok(next)
     }
 
-    /// Reads the rows of a frame, up to the next frame's line or the end.
+    /// Reads the rows of a frame, up to the line of the next frame or the end of the file.
     fn rows<'t>(&mut self, frame: u64, lines: &mut Lines<'t>) -> Result<Option<Piece<'t>>, Flaw> {
         let mut rows = 0;
         let mut next = None;
@@ -168,7 +167,7 @@ impl Reader {
         let end = next.unwrap_or_else(|| lines.end());
         match self.size {
             Some((wanted, _)) if !self.reel.frames.is_empty() && rows != wanted => {
-                flaw(&end, format!("frame {frame} ends after {rows} rows, but those before it have {wanted}"))
+                flaw(&end, format!("frame {frame} ends after {rows} rows, but the earlier frames have {wanted}"))
             }
             Some((_, cols)) => {
                 self.size = Some((rows, cols));
@@ -217,7 +216,7 @@ mod tests {
     }
 
     #[test]
-    fn the_same_written_otherwise_reads_the_same() {
+    fn equivalent_notations_give_the_same_recording() {
         let hints = Hints { rate_hz: Some(1000.0 / 7.94), ..Hints::default() };
         let good = read(GOOD.as_bytes(), "", &hints).unwrap();
         let body = |text: &str| text.replace("\r\n", "\n");
@@ -247,19 +246,19 @@ mod tests {
     }
 
     #[test]
-    fn what_is_wrong_is_said_where_it_is() {
+    fn a_mistake_has_its_line_and_message() {
         let good = GOOD.replace("\r\n", "\n");
         let cases = [
-            ("Frame 0", "Fram 0", 2, "a row of cells stands before the line of its frame"),
+            ("Frame 0", "Fram 0", 2, "this row of cells comes before the line of its frame"),
             ("Frame 1", "Frame 3", 5, "frame 3 comes after frame 0"),
             ("7.94", "-7.94", 5, "the frame's time is not from 0 to 1e9 s"),
             ("0.00 ms", "8.00 ms", 5, "the time goes back"),
-            ("7.94 ms)", "7.94 ms", 5, "a frame's time ends with `)`, and so does its line"),
-            ("7.94 ms", "7.94 h", 5, "a frame's time is in `ms` or `s`"),
-            (" (7.94 ms)", "", 5, "some frames have a time, and some have none"),
+            ("7.94 ms)", "7.94 ms", 5, "expected `)` after the frame's time, at the end of the line"),
+            ("7.94 ms", "7.94 h", 5, "the unit of a frame's time must be `ms` or `s`"),
+            (" (7.94 ms)", "", 5, "some frames have a time and some do not"),
             ("0.4\t1.4\t11.5", "0.4\t1.4", 7, "row 2 of frame 1 has 2 cells, but the first has 3"),
-            ("0.4\t1.4\t11.5\n", "", 6, "frame 1 ends after 1 rows, but those before it have 2"),
-            ("0.0\t1.1\t2.5\n", "", 6, "frame 1 ends after 2 rows, but those before it have 1"),
+            ("0.4\t1.4\t11.5\n", "", 6, "frame 1 ends after 1 rows, but the earlier frames have 2"),
+            ("0.0\t1.1\t2.5\n", "", 6, "frame 1 ends after 2 rows, but the earlier frames have 1"),
             ("11.5", "eleven", 7, "this cell is not a number: `eleven`"),
             ("11.5", "1e39", 7, "this cell is too large"),
         ];
@@ -275,13 +274,13 @@ mod tests {
         let row = vec!["1.0"; 65].join("\t");
         let text = format!("Frame 0 (0 ms)\n{row}\n\nFrame 1 (8 ms)\n{row}\n");
         let refusal = read(text.as_bytes(), "", &Hints::default());
-        assert_eq!(complaints(refusal), [(0, "the file does not say the pitch of its tactels".into())]);
+        assert_eq!(complaints(refusal), [(0, "the file does not give the pitch of its tactels".into())]);
         let hints = Hints { pitch: Some([0.001, 0.002]), ..Hints::default() };
         assert_eq!(read(text.as_bytes(), "", &hints).unwrap().shape.pitch, [0.001, 0.002]);
     }
 
     #[test]
-    fn damage_is_refused_or_read_soundly() {
+    fn a_damaged_file_is_refused_or_gives_a_sound_recording() {
         let refused = count_refused(&[GOOD.as_bytes()], "", &Hints::default(), 2000);
         assert!((1000..2000).contains(&refused), "{refused}");
     }

@@ -1,19 +1,19 @@
 //! The text of novel's pliance and pedar: a line of numbers for each moment, a column for each sensor.
 //!
-//! A few lines of head, a line `time[secs]` with the numbers of the sensors, the pressures, a mean and a maximum over
-//! time (`MVP`, `MPP`), the total force and its centre at each moment, and the corners of the sensors. The corners say
-//! where each sensor is: row 0 is at the lowest y, column 0 at the lowest x, so x and y are those of the file. Places
-//! without a sensor are dead cells. A mat without corners needs a `size`, and is then read row after row.
+//! A file has a header, a line `time[secs]` with the numbers of the sensors, the pressures, a mean and a maximum over
+//! time (`MVP`, `MPP`), the total force and its centre at each moment, and the corners of the sensors. The corners give
+//! the place of each sensor: row 0 is at the lowest y, column 0 at the lowest x, so x and y are those of the file. Places
+//! without a sensor are dead cells. A mat without corners needs a `size`, and is read row by row.
 //!
-//! The forces are checked against the pressures, within the rounding of what is printed. An insole of pedar is
-//! refused: its sensors follow the sole and have no rows and columns.
+//! The forces are checked against the pressures, within the rounding of the file. An insole of pedar is refused: its
+//! sensors follow the sole and have no rows and columns.
 
 mod layout;
 
 use tactflow_runtime::signal::{ImageShape, Unit};
 
-use super::text::{self, Flaw, Lines, Notation, Piece, Wrong, flaw, shortened};
-use super::{Format, Frame, Head, Hints, Recording, Refusal, Window, units};
+use crate::recordings::common::text::{self, Lines, Notation, Piece, Wrong, flaw, shortened};
+use crate::recordings::common::{Flaw, Format, Frame, Head, Hints, Recording, Refusal, Window, units};
 use layout::{Corners, Layout};
 
 pub(super) const FORMAT: Format = Format { name: "novel-asc", title: "novel pliance text (.asc)", recognises, read };
@@ -32,20 +32,20 @@ struct Reader<'t> {
     notation: Notation,
     /// Nominal time between two moments [s].
     period: Option<f64>,
-    /// Unit of the pressures, and what one of the file's is in it.
+    /// Unit of the pressures, and the factor from the file's unit to it.
     unit: Option<(Unit, f64)>,
-    /// Whether the forces are those of a part of the sensors.
+    /// Whether the forces are those of only some sensors.
     has_masks: bool,
     /// Numbers of the sensors.
     labels: Vec<u64>,
-    /// What one of the file's times is in seconds.
+    /// Factor from the file's times to seconds.
     second: f64,
     /// Times of the moments [s].
     times: Vec<f64>,
     /// Pressures, moment after moment.
     cells: Vec<f32>,
     corners: Corners,
-    /// Total force at a time [s, N], and where it stands.
+    /// Total force at a time [s, N], and its place.
     forces: Vec<(f64, f64, Piece<'t>)>,
 }
 
@@ -73,7 +73,7 @@ fn parse(text: &str, hints: &Hints) -> Result<Recording, Wrong> {
 }
 
 impl<'t> Reader<'t> {
-    /// Reads the head up to and with the line of the sensors, which it gives.
+    /// Reads the header, and returns the line of the sensors that ends it.
     fn head(&mut self) -> Result<Piece<'t>, Wrong> {
         for line in self.lines.by_ref() {
             let line = line.trimmed();
@@ -95,12 +95,12 @@ impl<'t> Reader<'t> {
             if let Some(value) = find(line, "pressure values in") {
                 let unit = units::unit(value.text).ok_or_else(|| Flaw {
                     span: value.span(),
-                    message: format!("the unit `{}` is not known here", shortened(value.text)),
+                    message: format!("the unit `{}` is unknown", shortened(value.text)),
                 })?;
                 self.unit = Some(unit);
             }
         }
-        Err(Flaw { span: self.lines.end().span(), message: "there is no line `time[secs]` with the sensors".into() }
+        Err(Flaw { span: self.lines.end().span(), message: "the line `time[secs]` with the sensors is missing".into() }
             .into())
     }
 
@@ -110,7 +110,7 @@ impl<'t> Reader<'t> {
         self.second = if line.after("time[ms]").is_some() { 1e-3 } else { 1.0 };
         for field in self.notation.fields(line).skip(1) {
             if field.text.contains('[') {
-                let message = "the file holds forces over time and not the pressures of the sensors";
+                let message = "the file has forces over time, but not the pressures of the sensors";
                 return Err(Flaw { span: field.span(), message: message.into() }.into());
             }
             self.labels.push(field.count("the number of this sensor")?);
@@ -119,18 +119,20 @@ impl<'t> Reader<'t> {
         sorted.sort_unstable();
         let is_twice = sorted.windows(2).any(|pair| pair[0] == pair[1]);
         match self.labels.len() {
-            0 => Err(Flaw { span: line.span(), message: "there are no sensors in this line".into() }.into()),
-            // Both feet count to 99.
+            0 => Err(Flaw { span: line.span(), message: "this line has no sensors".into() }.into()),
+            // The sensors of each foot count from 1 to 99.
             198 if is_twice => Err(insole()),
-            _ if is_twice => Err(Flaw { span: line.span(), message: "a sensor has two columns".into() }.into()),
+            _ if is_twice => {
+                Err(Flaw { span: line.span(), message: "a sensor appears twice in this line".into() }.into())
+            }
             _ => Ok(()),
         }
     }
 
-    /// Reads the pressures, and gives the line behind them.
+    /// Reads the pressures, and returns the line after them.
     fn pressures(&mut self, bytes: usize) -> Result<Option<Piece<'t>>, Flaw> {
         let sensors = self.labels.len();
-        // A number takes a character and what ends it.
+        // A number takes at least one character and one separator.
         let most = bytes / (2 * sensors + 2);
         self.cells.reserve_exact((self.lines.clone().take(most).count() * sensors).min(bytes / 2));
         while let Some(line) = self.lines.next() {
@@ -145,15 +147,15 @@ impl<'t> Reader<'t> {
             }
             let seconds = self.notation.number(time, "this time")? * self.second;
             if self.times.last().is_some_and(|last| *last >= seconds) {
-                return flaw(&time, "the time does not go on");
+                return flaw(&time, "the time does not increase");
             }
             if !(0.0..1e9).contains(&seconds) {
-                return flaw(&time, format!("this is no number of seconds from 0 to 1e9: `{}`", shortened(time.text)));
+                return flaw(&time, format!("the time is not from 0 to 1e9 s: `{}`", shortened(time.text)));
             }
             let found = fields.clone().count();
             if found != sensors {
                 let cut = if self.lines.is_at_end() { ": the file ends in the middle of it" } else { "" };
-                return flaw(&line, format!("there are {found} pressures of {sensors} sensors{cut}"));
+                return flaw(&line, format!("this line has {found} pressures, but there are {sensors} sensors{cut}"));
             }
             for field in fields {
                 let factor = self.unit.map_or(1.0, |(_, factor)| factor);
@@ -168,7 +170,7 @@ impl<'t> Reader<'t> {
         Ok(None)
     }
 
-    /// Reads what begins with a line, and gives the line behind it.
+    /// Reads the block that begins with a line, and returns the line after it.
     fn block(&mut self, line: Piece<'t>) -> Result<Option<Piece<'t>>, Flaw> {
         let first = line.words().next().map_or("", |first| first.text);
         if first.starts_with("time[") {
@@ -179,14 +181,15 @@ impl<'t> Reader<'t> {
         } else if first == "sensor" {
             let labels: Vec<u64> = numbers(line, |field| field.count("the number of this sensor"))?;
             if labels != self.labels {
-                return flaw(&line, "these are not the sensors that have pressures");
+                return flaw(&line, "these sensors are not those of the pressures");
             }
             self.corners.is_begun = true;
         } else if first.starts_with("x[") || first.starts_with("y[") || first == "area" {
             let places = numbers(line, |field| field.decimal("this figure"))?;
             if places.len() != self.labels.len() {
                 let cut = if self.lines.is_at_end() { ": the file ends in the middle of it" } else { "" };
-                let message = format!("there are {} numbers of {} sensors{cut}", places.len(), self.labels.len());
+                let message =
+                    format!("this line has {} numbers, but there are {} sensors{cut}", places.len(), self.labels.len());
                 return flaw(&line, message);
             }
             // `x[0]` to `x[3]` are corners, `x[c]` is the centre.
@@ -201,10 +204,10 @@ impl<'t> Reader<'t> {
         self.lines.by_ref().map(Piece::trimmed).find(|line| !line.text.is_empty())
     }
 
-    /// Reads the total forces, and gives the line behind them.
+    /// Reads the total forces, and returns the line after them.
     fn total_forces(&mut self, head: Piece<'t>) -> Result<Option<Piece<'t>>, Flaw> {
         if !head.text.contains("force") {
-            return flaw(&head, "a second block of pressures is not read here");
+            return flaw(&head, "a second block of pressures is not supported");
         }
         while let Some(line) = self.next_line() {
             if !line.text.starts_with(|c: char| c.is_ascii_digit()) {
@@ -214,7 +217,7 @@ impl<'t> Reader<'t> {
             let time = words.next().unwrap_or(line).decimal("this time")? * self.second;
             match words.next() {
                 Some(force) => self.forces.push((time, force.decimal("this force")?, force)),
-                None => return flaw(&line, "there is no force at this time"),
+                None => return flaw(&line, "the force at this time is missing"),
             }
         }
         Ok(None)
@@ -222,7 +225,7 @@ impl<'t> Reader<'t> {
 
     fn finish(self, hints: &Hints) -> Result<Recording, Wrong> {
         if self.times.is_empty() {
-            return Err(Flaw { span: self.lines.end().span(), message: "there are no pressures".into() }.into());
+            return Err(Flaw { span: self.lines.end().span(), message: "the file has no pressures".into() }.into());
         }
         let unit = hints.unit(self.unit.map(|(unit, _)| unit))?;
         let period = hints.period(self.period.or_else(|| mean_step(&self.times)))?;
@@ -260,7 +263,7 @@ impl<'t> Reader<'t> {
 
     /// Checks each total force against the pressures at its time.
     fn check_forces(&self, layout: &Layout) -> Result<(), Flaw> {
-        // Printed with three decimals, and places with four.
+        // Forces have three decimals in the file, and places have four.
         const ROUNDING: f64 = 5e-4;
         let area = layout.pitch[0] * layout.pitch[1];
         let sensors = self.labels.len();
@@ -275,7 +278,7 @@ impl<'t> Reader<'t> {
             let rounding = ROUNDING + sensors as f64 * ROUNDING * 1e3 * area + 2e-3 * force.abs();
             if (made - force).abs() > 1.01 * rounding {
                 let made = (made * 1e4).round() / 1e4;
-                return flaw(at, format!("the total force is {force} N, but the pressures make {made} N"));
+                return flaw(at, format!("the total force is {force} N, but the pressures sum to {made} N"));
             }
         }
         Ok(())
@@ -283,8 +286,8 @@ impl<'t> Reader<'t> {
 }
 
 fn insole() -> Wrong {
-    let message = "an insole of pedar has no rows and columns: its sensors follow the sole and differ in size";
-    let help = "play the recording of a mat; or write what you need of the insole as a plain table";
+    let message = "an insole of pedar has no rows and columns: its sensors follow the sole and have different sizes";
+    let help = "use the recording of a mat, or write the sensors that you need to a plain table";
     Refusal::Broken { message: message.into(), help: Some(help.into()) }.into()
 }
 
@@ -295,7 +298,7 @@ fn mean_step(times: &[f64]) -> Option<f64> {
     }
 }
 
-/// What comes behind a key anywhere in a line, up to the next blanks.
+/// Returns the word after a key anywhere in a line.
 fn find<'t>(line: Piece<'t>, key: &str) -> Option<Piece<'t>> {
     let at = line.text.find(key)?;
     line.part(&line.text[at + key.len()..]).words().next()
@@ -303,10 +306,10 @@ fn find<'t>(line: Piece<'t>, key: &str) -> Option<Piece<'t>> {
 
 fn positive(at: Piece<'_>, key: &str) -> Result<f64, Flaw> {
     let number = at.decimal(key)?;
-    if number > 0.0 { Ok(number) } else { flaw(&at, format!("{key} is greater than 0")) }
+    if number > 0.0 { Ok(number) } else { flaw(&at, format!("{key} must be greater than 0")) }
 }
 
-/// The numbers behind the first word of a line.
+/// Returns the numbers after the first word of a line.
 fn numbers<'t, T>(line: Piece<'t>, read: impl Fn(Piece<'t>) -> Result<T, Flaw>) -> Result<Vec<T>, Flaw> {
     line.words().skip(1).map(read).collect()
 }

@@ -1,19 +1,19 @@
-//! The listing of novel's emed and pliance: a page for each picture, cropped to where there was any load.
+//! The listing of novel's emed and pliance: a page for each picture, cropped to the loaded part of the array.
 //!
-//! A page has a header, a line of column numbers, a line for each row that begins with its number, and, where the
-//! forces were listed too, a last column and a last row `Force`: sum times sensor area [N]. Numbers count from 1 in
-//! the whole array, `Matrix: columns x rows`. Pages of a mean or a maximum over time (`MVP`, `MPP`) are no pictures.
-//! Pressures are in kPa, as novel writes them, or in N/cm² where the forces say so.
+//! A page has a header, a line of column numbers and a line for each row that begins with its number. Where forces are
+//! listed too, it has a last column and a last row `Force`: sum times sensor area [N]. Rows and columns count from 1 in
+//! the whole array, `Matrix: columns x rows`. Pages of a mean or a maximum over time (`MVP`, `MPP`) are not pictures.
+//! Pressures are in kPa, or in N/cm² where the forces show it.
 //!
-//! The forces are checked against the cells, within the rounding of what is printed. They also show that a page is
-//! whole; without them the form feed at its end does. That no page is missing shows in the numbers of the pages.
+//! The forces are checked against the cells, within the rounding of the file. They also show that a page is complete;
+//! without them the form feed at its end does. The numbers of the pages show that none is missing.
 
 mod header;
 
 use tactflow_runtime::signal::{Base, ImageShape, Unit};
 
-use super::text::{self, Flaw, Lines, Piece, Wrong, flaw, shortened};
-use super::{Format, Frame, Head, Hints, MOST_CELLS, Recording, Refusal, Window};
+use crate::recordings::common::text::{self, Lines, Piece, Wrong, flaw, shortened};
+use crate::recordings::common::{Flaw, Format, Frame, Head, Hints, MAX_CELLS, Recording, Refusal, Window};
 use header::{Grid, Header, Page, digit, label};
 
 pub(super) const FORMAT: Format =
@@ -28,15 +28,15 @@ fn read(bytes: &[u8], hints: &Hints) -> Result<Recording, Refusal> {
     text::read(bytes, hints, parse)
 }
 
-/// A place in the array, and where the listing names it.
+/// A row or column of the array, and its place in the text.
 type Reach<'t> = Option<(u64, Piece<'t>)>;
 
 struct Reader<'t> {
     lines: Lines<'t>,
     header: Header,
-    /// What one of the file's unit is in kPa, once the forces have said it.
+    /// Factor from the file's unit to kPa, once the forces have shown it.
     factor: Option<f64>,
-    /// What the last digit of a cell counts.
+    /// Value of the last digit of a cell.
     cell_digit: f64,
     page: Option<u64>,
     /// Pictures of the measurements before this one.
@@ -49,13 +49,13 @@ struct Reader<'t> {
     reach: [Reach<'t>; 2],
 }
 
-/// A force that the listing gives beside its cells.
+/// A force in the listing, for a row, a column or a page of cells.
 struct Force<'t> {
-    /// Where it stands.
+    /// Place in the text.
     figure: Piece<'t>,
-    /// Of what it is.
+    /// Row, column or page.
     what: &'static str,
-    /// Sum and number of the cells, in the file's unit.
+    /// Sum of the cells, in the file's unit.
     sum: f64,
     count: usize,
 }
@@ -69,7 +69,7 @@ fn parse(text: &str, hints: &Hints) -> Result<Recording, Wrong> {
         page: None,
         before: 0,
         has_feeds: false,
-        // A page takes two dozen characters at least.
+        // A page has at least 24 characters.
         frames: Vec::with_capacity(text.matches("Pict").count().min(text.len() / 24)),
         cells: Vec::new(),
         reach: [None, None],
@@ -79,13 +79,13 @@ fn parse(text: &str, hints: &Hints) -> Result<Recording, Wrong> {
 }
 
 impl<'t> Reader<'t> {
-    /// Reads a page; whether there was one.
+    /// Reads a page, and returns whether there was one.
     fn page(&mut self) -> Result<bool, Flaw> {
         let mut page = Page::default();
         let grid = loop {
             let Some(line) = self.lines.next() else {
                 return if page.is_begun {
-                    flaw(&self.lines.end(), "the file ends in the head of a page: it is truncated")
+                    flaw(&self.lines.end(), "the file ends in the header of a page: it is truncated")
                 } else {
                     Ok(false)
                 };
@@ -121,13 +121,17 @@ impl<'t> Reader<'t> {
         Ok(())
     }
 
-    /// The number of a page's picture, if it is one: counted on where another measurement begins.
+    /// Returns the number of a page's picture, or `None` for a summary. It keeps counting across measurements.
     fn picture(&mut self, page: &Page<'t>, grid: &Grid<'t>) -> Result<Option<u64>, Flaw> {
         let Some((number, at)) = page.picture else {
-            return if page.is_summary { Ok(None) } else { flaw(&grid.columns[0].1, "this page has no `Pict-No.:`") };
+            return if page.is_summary {
+                Ok(None)
+            } else {
+                flaw(&grid.columns[0].1, "`Pict-No.:` is missing on this page")
+            };
         };
         if number > 1_000_000_000 {
-            return flaw(&at, format!("there is no picture {number}"));
+            return flaw(&at, format!("the number of a picture must be at most 1000000000, not {number}"));
         }
         let Some(last) = self.frames.last() else { return Ok(Some(number)) };
         if number == self.frames[0].number {
@@ -138,7 +142,7 @@ impl<'t> Reader<'t> {
         Ok(Some(number + self.before))
     }
 
-    /// Reads the rows of a page, and gives its place in the array.
+    /// Reads the rows of a page, and returns its window in the array.
     fn rows(&mut self, grid: &Grid<'t>) -> Result<Window, Flaw> {
         let cols = grid.columns.len();
         let start = self.cells.len();
@@ -167,7 +171,7 @@ impl<'t> Reader<'t> {
         }
         let (first, last) = (first.zip(last)).ok_or_else(|| {
             let at = self.lines.end();
-            Flaw { span: at.span(), message: "a page without rows".into() }
+            Flaw { span: at.span(), message: "this page has no rows".into() }
         })?;
         Ok(self.window(grid, first, last))
     }
@@ -182,7 +186,7 @@ impl<'t> Reader<'t> {
         Window { top: index(first.0), left: index(left), rows, cols }
     }
 
-    /// Reads one row, and gives its number.
+    /// Reads one row, and returns its number.
     fn row(&mut self, grid: &Grid<'t>, line: Piece<'t>, last: Reach<'t>) -> Result<(u64, Piece<'t>), Flaw> {
         let mut fields = grid.notation.fields(line);
         let at = fields.next().expect("the line is not empty");
@@ -195,7 +199,10 @@ impl<'t> Reader<'t> {
         let (found, wanted) = (fields.clone().count(), grid.columns.len() + usize::from(grid.has_force));
         if found != wanted {
             let cut = if self.lines.is_at_end() { ": the file ends in the middle of it" } else { "" };
-            return flaw(&line, format!("row {label} has {found} numbers, but the head of its page {wanted}{cut}"));
+            return flaw(
+                &line,
+                format!("row {label} has {found} numbers, but the header of its page has {wanted}{cut}"),
+            );
         }
         let mut sum = 0.0;
         for cell in fields.by_ref().take(grid.columns.len()) {
@@ -216,13 +223,16 @@ impl<'t> Reader<'t> {
         Ok((label, at))
     }
 
-    /// Checks the last row of a page, the forces of its columns and of all.
+    /// Checks the last row of a page: the forces of its columns and of the page.
     fn forces(&mut self, grid: &Grid<'t>, line: Piece<'t>, start: usize) -> Result<(), Flaw> {
         let cols = grid.columns.len();
         let fields = grid.notation.fields(line).skip(1);
         let found = fields.clone().count();
         if found != cols + 1 && (grid.has_force || found != cols) {
-            return flaw(&line, format!("the row `Force` has {found} numbers, but the head of its page {}", cols + 1));
+            return flaw(
+                &line,
+                format!("the row `Force` has {found} numbers, but the header of its page has {}", cols + 1),
+            );
         }
         let count = (self.cells.len() - start) / cols;
         let sum = |column: usize| -> f64 {
@@ -237,10 +247,10 @@ impl<'t> Reader<'t> {
         Ok(())
     }
 
-    /// Checks a force against its cells, within their rounding. The first that is not zero shows the unit of the cells.
+    /// Checks a force against its cells, within their rounding. The first nonzero force shows the unit of the cells.
     fn check(&mut self, grid: &Grid<'t>, force: &Force<'t>) -> Result<(), Flaw> {
         let Force { figure, what, sum, count } = *force;
-        let said = match figure.text {
+        let listed = match figure.text {
             "" | "-" => 0.0,
             _ => grid.notation.number(figure, "the force")?,
         };
@@ -249,7 +259,7 @@ impl<'t> Reader<'t> {
         let newtons = |factor: f64| sum * factor * 1e3 * area;
         let agrees = |factor: f64| {
             let rounding = digit(figure.text) + self.cell_digit * count as f64 * factor * 1e3 * area;
-            (newtons(factor) - said).abs() <= 0.505 * rounding + slack * said.abs()
+            (newtons(factor) - listed).abs() <= 0.505 * rounding + slack * listed.abs()
         };
         match self.factor {
             None if agrees(KILOPASCAL) && agrees(NEWTON_PER_CM2) => return Ok(()),
@@ -261,12 +271,12 @@ impl<'t> Reader<'t> {
             return Ok(());
         }
         let made = (newtons(factor) * 1e4).round() / 1e4;
-        flaw(&figure, format!("the force of this {what} is {said} N, but its cells make {made} N"))
+        flaw(&figure, format!("the force of this {what} is {listed} N, but its cells sum to {made} N"))
     }
 
     fn finish(mut self, hints: &Hints) -> Result<Recording, Wrong> {
         if self.frames.is_empty() {
-            return Err(Flaw { span: self.lines.end().span(), message: "the listing has no picture".into() }.into());
+            return Err(Flaw { span: self.lines.end().span(), message: "the file has no picture".into() }.into());
         }
         let [rows, cols] = self.size(hints)?;
         let period = hints.period(self.header.period)?;
@@ -283,16 +293,16 @@ impl<'t> Reader<'t> {
         Ok(Recording { format: FORMAT.name, shape, frames, cells, dead: vec![], threshold: None, period, force: None })
     }
 
-    /// Number of rows and of columns of the whole array.
+    /// Returns the number of rows and of columns of the whole array.
     fn size(&self, hints: &Hints) -> Result<[usize; 2], Wrong> {
         let reach = self.reach.map(|reach| reach.expect("a picture has rows and columns"));
         let holds = |size: &[usize; 2]| (0..2).all(|k| reach[k].0 <= size[k] as u64);
-        // `columns x rows`; some programs write it the other way round.
-        let said = self.header.matrix.map(|[cols, rows]| {
+        // The file has `columns x rows`; some programs write `rows x columns`.
+        let matrix = self.header.matrix.map(|[cols, rows]| {
             let turned = [cols, rows];
             if !holds(&[rows, cols]) && holds(&turned) { turned } else { [rows, cols] }
         });
-        let size = hints.size(said)?;
+        let size = hints.size(matrix)?;
         if !holds(&size) {
             let worst = usize::from(reach[0].0 <= size[0] as u64);
             let (label, at) = reach[worst];
@@ -300,15 +310,15 @@ impl<'t> Reader<'t> {
             let message = format!("{name} {label} is outside the array of {} rows and {} columns", size[0], size[1]);
             return Err(Flaw { span: at.span(), message }.into());
         }
-        if size[0].checked_mul(size[1]).is_none_or(|cells| cells > MOST_CELLS) {
-            let message = format!("an array of {} by {} cells is more than {MOST_CELLS}", size[0], size[1]);
+        if size[0].checked_mul(size[1]).is_none_or(|cells| cells > MAX_CELLS) {
+            let message = format!("an array of {} by {} has more than {MAX_CELLS} cells", size[0], size[1]);
             return Err(Refusal::broken(message).into());
         }
         Ok(size)
     }
 }
 
-/// What one of a unit is in kPa.
+/// Factors from the units of a listing to kPa.
 const KILOPASCAL: f64 = 1.0;
 const NEWTON_PER_CM2: f64 = 10.0;
 

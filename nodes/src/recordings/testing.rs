@@ -1,4 +1,4 @@
-//! What the tests of the formats share.
+//! Helpers of the format tests.
 
 use std::io::Write;
 
@@ -26,7 +26,7 @@ fn damage(random: &mut Random, bytes: &mut Vec<u8>) {
     }
 }
 
-/// What is wrong, each with its line; a line of 0 is no place in the text.
+/// Returns each complaint with its line; 0 for a complaint without a place.
 pub(super) fn complaints(read: Result<Recording, Refusal>) -> Vec<(usize, String)> {
     match read {
         Ok(recording) => {
@@ -52,7 +52,7 @@ pub(super) fn complaints(read: Result<Recording, Refusal>) -> Vec<(usize, String
     }
 }
 
-/// Checks a table of damages: in `good`, `from` becomes `to` once, and what is then wrong, with its line.
+/// Checks a table of damages: each replaces `from` by `to` once in `good`, and has one complaint at a line.
 pub(super) fn check_damages(good: &str, name: &str, hints: &Hints, cases: &[(&str, &str, usize, &str)]) {
     assert_eq!(complaints(read(good.as_bytes(), name, hints)), [], "it is good");
     for (from, to, line, message) in cases {
@@ -62,7 +62,7 @@ pub(super) fn check_damages(good: &str, name: &str, hints: &Hints, cases: &[(&st
     }
 }
 
-/// Damages good files at random: each is then read soundly or refused at a place. How many of them are refused.
+/// Damages good files at random and returns how many are refused. Each other one must give a sound recording.
 pub(super) fn count_refused(good: &[&[u8]], name: &str, hints: &Hints, rounds: usize) -> usize {
     let mut random = Random::new(2013, 0);
     let mut refused = 0;
@@ -74,7 +74,7 @@ pub(super) fn count_refused(good: &[&[u8]], name: &str, hints: &Hints, rounds: u
     refused
 }
 
-/// A zip archive of those members, stored (0) or deflated (8).
+/// Returns a zip archive of the members, stored (0) or deflated (8).
 pub(super) fn zipped(method: u16, members: &[(&str, &[u8])]) -> Vec<u8> {
     let (mut archive, mut directory) = (Vec::new(), Vec::new());
     for (name, bytes) in members {

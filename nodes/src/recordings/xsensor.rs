@@ -1,19 +1,19 @@
 //! `xsensor`: the CSV export of XSENSOR's software (X3, Pro, Foresight).
 //!
-//! Lines of a key and a value, with a colon after the key in some versions: `Units` and `Threshold` at the top, then for
-//! each frame `FRAME`, `Date`, `Time`, and for each pad `SENSOR`, `Rows`, `Columns`, `Sensel Width (cm)`, `Sensel
+//! A line has a key and a value, with a colon after the key in some versions: `Units` and `Threshold` at the top, then
+//! for each frame `FRAME`, `Date`, `Time`, and for each pad `SENSOR`, `Rows`, `Columns`, `Sensel Width (cm)`, `Sensel
 //! Height (cm)`, figures, and `SENSELS` with a line of cells for each row. Blank lines and lines of commas may be
-//! anywhere; numbers may be in quotes, with a comma as their point. Groups of sensels (`GROUP`) are parts of the pads
-//! and are passed over. Pressures become kPa. Times are those of the day.
+//! anywhere. Numbers may be in quotes, with a decimal comma. Groups of sensels (`GROUP`) repeat parts of the pads and are
+//! ignored. Pressures become kPa. Times are times of the day.
 //!
-//! A file may have several pads, as the two insoles of a pair: the bench says which with `pad`. None is taken silently.
+//! A file may have several pads, as the two insoles of a pair: the bench selects one with `pad`. There is no default.
 
 use tactflow_runtime::signal::{ImageShape, Unit};
 
-use super::fields::Fields;
-use super::reel::{Reel, bounded};
-use super::text::{self, Flaw, Lines, Piece, Wrong, flaw, shortened};
-use super::{Format, Head, Hints, Recording, Refusal, units};
+use crate::recordings::common::fields::Fields;
+use crate::recordings::common::reel::{Reel, bounded};
+use crate::recordings::common::text::{self, Lines, Piece, Wrong, flaw, shortened};
+use crate::recordings::common::{Flaw, Format, Head, Hints, Recording, Refusal, units};
 
 pub(super) const FORMAT: Format = Format {
     name: "xsensor",
@@ -22,24 +22,25 @@ pub(super) const FORMAT: Format = Format {
     read: |bytes, hints| text::read(bytes, hints, parse),
 };
 
-/// A day [ns], and the longest time that a recording may take.
-const DAY: i64 = 86_400_000_000_000;
-const LONGEST: i64 = 400 * DAY;
+/// Length of a day [ns].
+const DAY_NS: i64 = 86_400_000_000_000;
+/// Maximum length of a recording [ns].
+const MAX_LENGTH_NS: i64 = 400 * DAY_NS;
 
-/// How many pads a message lists.
-const LISTED: usize = 32;
+/// Maximum number of pads that a message lists.
+const MAX_LISTED: usize = 32;
 
 fn recognises(head: &Head<'_>) -> bool {
     let has = |wanted: &str| Lines::new(&head.text).any(|line| Entry::of(line, separator(line.text)).is(wanted));
     has("sensels") && has("columns") && (has("rows") || has("units"))
 }
 
-/// What parts the fields of a line of a key.
+/// Returns the separator of a line with a key.
 fn separator(line: &str) -> char {
     line.chars().find(|c| matches!(c, ',' | ';' | '\t')).unwrap_or(',')
 }
 
-/// A line's first field, and the next that is not empty.
+/// The first field of a line, and the next field that is not empty.
 struct Entry<'t> {
     key: Piece<'t>,
     value: Piece<'t>,
@@ -59,7 +60,7 @@ impl<'t> Entry<'t> {
         self.key.text.eq_ignore_ascii_case(key)
     }
 
-    /// What is in brackets after the key, if that begins so: `Sensel Width (cm)`.
+    /// Returns the unit in brackets after the key, as in `Sensel Width (cm)`.
     fn unit_after(&self, key: &str) -> Option<&'t str> {
         let rest = self.key.after(key)?.text.trim();
         Some(rest.trim_start_matches('(').trim_end_matches(')'))
@@ -89,7 +90,7 @@ fn parse(text: &str, hints: &Hints) -> Result<Recording, Wrong> {
     hints.size(Some([rows, cols]))?;
     let (unit, factor) = unit.unzip();
     let pitch = pitch[0].zip(pitch[1]).map(|(x, y)| [x, y]);
-    // Stamps of whole seconds say when the frames came only to the second.
+    // Stamps of whole seconds are too coarse for the times of the frames.
     let has_times = reel.frames.is_sorted_by(|a, b| a.time < b.time);
     let (unit, pitch, period) = hints.complete(unit, pitch, reel.mean_step().filter(|_| has_times))?;
     if has_times {
@@ -103,14 +104,14 @@ fn parse(text: &str, hints: &Hints) -> Result<Recording, Wrong> {
     Ok(Recording { format: FORMAT.name, shape, frames, cells, dead, threshold, period, force: None })
 }
 
-/// The pad that the bench wants, or the only one of the first frame; none if the file does not name its only pad.
+/// Returns the pad that the bench selects, or the only pad of the first frame; `None` if the file does not name it.
 fn choose<'t>(text: &'t str, hints: &Hints) -> Result<Option<&'t str>, Refusal> {
     let mut frames = 0;
     let mut names: Vec<&str> = Vec::new();
     for line in Lines::new(text) {
         let entry = Entry::of(line, separator(line.text));
         frames += usize::from(entry.is("frame"));
-        if frames > 1 || names.len() == LISTED {
+        if frames > 1 || names.len() == MAX_LISTED {
             break;
         }
         if entry.is("sensor") && !names.contains(&entry.value.text) {
@@ -123,22 +124,22 @@ fn choose<'t>(text: &'t str, hints: &Hints) -> Result<Option<&'t str>, Refusal> 
         (None, [only]) => Ok(Some(only)),
         (None, _) => Err(Refusal::Silent {
             message: format!("the file has {} pads: {}", names.len(), list()),
-            help: format!("give the bench's device the one to play, as `pad = \"{}\"`", shortened(names[0])),
+            help: format!("select one in the bench's device, as `pad = \"{}\"`", shortened(names[0])),
         }),
         (Some(wanted), names) => match names.iter().find(|name| *name == wanted) {
             Some(name) => Ok(Some(name)),
             None if names.is_empty() => {
-                Err(Refusal::Contradicted { hint: "pad", message: "the file names no pads".into() })
+                Err(Refusal::Contradicted { hint: "pad", message: "the file has no names of pads".into() })
             }
             None => Err(Refusal::Contradicted { hint: "pad", message: format!("the file has the pads {}", list()) }),
         },
     }
 }
 
-/// What the lines are about.
+/// The part of a frame that the lines describe.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Part {
-    /// The pad that is played, or all of them.
+    /// The selected pad, or the whole frame.
     Pad,
     /// Another pad, or a group of sensels.
     Other,
@@ -146,7 +147,7 @@ enum Part {
 
 struct Reader<'t> {
     lines: Lines<'t>,
-    /// The pad that is played.
+    /// The selected pad.
     pad: Option<&'t str>,
     reel: Reel,
     unit: Option<(Unit, f64)>,
@@ -156,13 +157,13 @@ struct Reader<'t> {
     /// The frame that is being read.
     frame: Option<Begun<'t>>,
     part: Part,
-    /// Whether the frames say their times.
+    /// Whether the frames have times.
     has_times: bool,
-    /// Midnights since the first frame [ns].
+    /// Time of the midnights since the first frame [ns].
     day: i64,
 }
 
-/// A frame whose cells may still be to come.
+/// A frame that is not complete.
 #[derive(Clone, Copy)]
 struct Begun<'t> {
     number: u64,
@@ -194,13 +195,12 @@ impl<'t> Reader<'t> {
         self.end(self.lines.end())
     }
 
-    /// What is said of the whole file, of a frame or of a pad.
+    /// Reads a property of the file, of a frame or of a pad.
     fn figure(&mut self, entry: &Entry<'t>) -> Result<(), Flaw> {
         let value = entry.value;
         if entry.is("units") {
             let known = units::unit(value.text).ok_or(());
-            let known =
-                known.or_else(|()| flaw(&value, format!("the unit `{}` is not known here", shortened(value.text))))?;
+            let known = known.or_else(|()| flaw(&value, format!("the unit `{}` is unknown", shortened(value.text))))?;
             if self.unit.is_some_and(|unit| unit != known) {
                 return flaw(&value, "the unit changes");
             }
@@ -214,12 +214,12 @@ impl<'t> Reader<'t> {
         } else if let Some(unit) = entry.unit_after("sensel height") {
             self.pitch[1] = Some(length(entry, unit, self.pitch[1])?);
         } else if entry.key.text.parse::<f64>().is_ok() {
-            return flaw(&entry.key, "a row of cells is here, but the frame is whole, or `SENSELS` is missing");
+            return flaw(&entry.key, "unexpected row of cells: the frame is complete, or `SENSELS` is missing");
         }
         Ok(())
     }
 
-    /// Begins the next frame.
+    /// Starts the next frame.
     fn begin(&mut self, at: Piece<'t>) -> Result<(), Flaw> {
         self.end(at)?;
         let number = at.count("the frame's number")?;
@@ -233,7 +233,7 @@ impl<'t> Reader<'t> {
         Ok(())
     }
 
-    /// Ends the frame that was begun, if there is one.
+    /// Ends the current frame, if there is one.
     fn end(&mut self, at: Piece<'t>) -> Result<(), Flaw> {
         let Some(Begun { number, at: begin, time, has_cells }) = self.frame.take() else { return Ok(()) };
         let Some([rows, cols]) = self.size.filter(|_| has_cells) else {
@@ -241,25 +241,25 @@ impl<'t> Reader<'t> {
             return flaw(&at, format!("frame {number} ends without the `SENSELS`{of}"));
         };
         if !self.reel.frames.is_empty() && self.has_times != time.is_some() {
-            return flaw(&begin, "some frames have a `Time`, and some have none");
+            return flaw(&begin, "some frames have a `Time` and some do not");
         }
         self.has_times = time.is_some();
         self.reel.frame(number, time.unwrap_or(0), rows, cols);
         Ok(())
     }
 
-    /// The time of a frame, which goes on past midnight.
+    /// Sets the time of a frame, which keeps counting after midnight.
     fn stamp(&mut self, value: Piece<'t>) -> Result<(), Flaw> {
         let Some(frame) = &mut self.frame else { return Ok(()) };
         let mut time = time_of_day(value)? + self.day;
         if let Some(last) = self.reel.frames.last()
             && last.time > time
         {
-            if last.time - time < DAY / 2 || self.day >= LONGEST {
+            if last.time - time < DAY_NS / 2 || self.day >= MAX_LENGTH_NS {
                 return flaw(&value, "the time goes back");
             }
-            self.day += DAY;
-            time += DAY;
+            self.day += DAY_NS;
+            time += DAY_NS;
         }
         frame.time = Some(time);
         Ok(())
@@ -268,17 +268,19 @@ impl<'t> Reader<'t> {
     /// Reads the rows of cells.
     fn sensels(&mut self, sides: [Option<usize>; 2], at: Piece<'t>) -> Result<(), Flaw> {
         let [Some(rows), Some(cols)] = sides else {
-            return flaw(&at, "`SENSELS` stands before its `Rows` and `Columns`");
+            return flaw(&at, "`SENSELS` comes before its `Rows` and `Columns`");
         };
         if self.size.is_some_and(|size| size != [rows, cols]) {
-            return flaw(&at, format!("a pad of {rows} rows by {cols} columns is here: its size changes"));
+            return flaw(&at, format!("the size of the pad changes to {rows} rows by {cols} columns"));
         }
         bounded(rows, cols).or_else(|message| flaw(&at, message))?;
         self.size = Some([rows, cols]);
         let factor = self.unit.map_or(1.0, |(_, factor)| factor);
         match &mut self.frame {
-            None => return flaw(&at, "`SENSELS` stands before its `FRAME`"),
-            Some(frame) if frame.has_cells => return flaw(&at, format!("frame {} has its cells twice", frame.number)),
+            None => return flaw(&at, "`SENSELS` comes before its `FRAME`"),
+            Some(frame) if frame.has_cells => {
+                return flaw(&at, format!("frame {} has two blocks of cells", frame.number));
+            }
             Some(frame) => frame.has_cells = true,
         }
         for row in 0..rows {
@@ -294,19 +296,19 @@ impl<'t> Reader<'t> {
         for col in 0..cols {
             let cell = fields.next().filter(|cell| !cell.text.is_empty());
             let Some(cell) = cell else {
-                return flaw(&line, format!("row {} has {col} cells, but `Columns` promises {cols}", row + 1));
+                return flaw(&line, format!("row {} has {col} cells, but `Columns` is {cols}", row + 1));
             };
             let value = cell.decimal("this cell")? * factor;
             self.reel.cell(row * cols + col, value).or_else(|message| flaw(&cell, message))?;
         }
         match fields.find(|field| !field.text.is_empty()) {
-            Some(field) => flaw(&field, format!("row {} goes on after its {cols} cells", row + 1)),
+            Some(field) => flaw(&field, format!("row {} has more than {cols} cells", row + 1)),
             None => Ok(()),
         }
     }
 }
 
-/// What parts the cells of a row: what stands beside a quote, or else a tab, `;` or `,`.
+/// Returns the separator of a row of cells: the one next to a quote, or else a tab, `;` or `,`.
 fn separator_of_cells(line: &str) -> char {
     let mut pieces = line.split('"');
     let (before, after) = (pieces.next().unwrap_or(""), pieces.nth(1).unwrap_or(""));
@@ -320,25 +322,25 @@ fn side(entry: &Entry<'_>) -> Result<usize, Flaw> {
     let what = format!("`{}`", shortened(entry.key.text));
     match usize::try_from(entry.value.count(&what)?) {
         Ok(side @ 1..) => Ok(side),
-        _ => flaw(&entry.value, format!("{what} is at least 1")),
+        _ => flaw(&entry.value, format!("{what} must be at least 1")),
     }
 }
 
-/// A length [m] that does not change.
+/// Parses a length [m], which must be the same in the whole file.
 fn length(entry: &Entry<'_>, unit: &str, before: Option<f64>) -> Result<f64, Flaw> {
     let what = format!("`{}`", shortened(entry.key.text));
     let number = entry.value.decimal(&what)?;
     let Some(metres) = units::metres(unit) else {
-        return flaw(&entry.key, format!("{what} is in a unit that is not known here"));
+        return flaw(&entry.key, format!("the unit of {what} is unknown"));
     };
     match number * metres {
-        length if length <= 0.0 => flaw(&entry.value, format!("{what} is greater than 0")),
+        length if length <= 0.0 => flaw(&entry.value, format!("{what} must be greater than 0")),
         length if before.is_some_and(|before| before != length) => flaw(&entry.value, format!("{what} changes")),
         length => Ok(length),
     }
 }
 
-/// `08:21:17.982`, `8:21:17 PM` or plain seconds, in nanoseconds.
+/// Parses `08:21:17.982`, `8:21:17 PM` or plain seconds, and returns nanoseconds.
 fn time_of_day(value: Piece<'_>) -> Result<i64, Flaw> {
     let lower = value.text.to_ascii_lowercase();
     let (clock, noon) = match (lower.strip_suffix("pm"), lower.strip_suffix("am")) {
@@ -362,7 +364,7 @@ fn time_of_day(value: Piece<'_>) -> Result<i64, Flaw> {
     };
     match whole {
         Some((whole, seconds)) => Ok(whole * 1_000_000_000 + (seconds * 1e9).round() as i64),
-        None => flaw(&value, format!("a time is `08:21:17.982`, not `{}`", shortened(value.text))),
+        None => flaw(&value, format!("expected a time as `08:21:17.982`, found `{}`", shortened(value.text))),
     }
 }
 
@@ -448,33 +450,33 @@ mod tests {
     fn stamps_that_stand_still_need_a_rate() {
         let still = MAT.replace("00:00:00,000", "23:59:59,950");
         let got = complaints(read(still.as_bytes(), "", &Hints::default()));
-        assert_eq!(got, [(0, "the file does not say how fast its frames came".into())]);
+        assert_eq!(got, [(0, "the file does not give its frame rate".into())]);
         let hints = Hints { rate_hz: Some(50.0), ..Hints::default() };
         assert_eq!(read(still.as_bytes(), "", &hints).unwrap().frames[1].time, 20_000_000);
     }
 
     #[test]
-    fn what_is_wrong_is_said_where_it_is() {
+    fn a_mistake_has_its_line_and_message() {
         let cases = [
-            ("mmHg,,\n,", "stones,,\n,", 3, "the unit `stones` is not known here"),
+            ("mmHg,,\n,", "stones,,\n,", 3, "the unit `stones` is unknown"),
             ("FRAME,1466", "FRAME,1464", 39, "frame 1464 comes after frame 1464"),
-            ("Rows,2", "Rows,0", 13, "`Rows` is at least 1"),
-            ("Columns,3", "Columns,4", 21, "row 1 has 3 cells, but `Columns` promises 4"),
-            ("Columns,3", "Columns,2", 21, "row 1 goes on after its 2 cells"),
-            ("Rows,2", "Rows,1", 23, "a row of cells is here, but the frame is whole, or `SENSELS` is missing"),
-            ("Rows,2", "Rows,999999", 19, "an array of 999999 by 3 is more than the 262144 cells that are read"),
-            ("(cm),0.86", "(ft),0.86", 15, "`Sensel Width (ft)` is in a unit that is not known here"),
+            ("Rows,2", "Rows,0", 13, "`Rows` must be at least 1"),
+            ("Columns,3", "Columns,4", 21, "row 1 has 3 cells, but `Columns` is 4"),
+            ("Columns,3", "Columns,2", 21, "row 1 has more than 2 cells"),
+            ("Rows,2", "Rows,1", 23, "unexpected row of cells: the frame is complete, or `SENSELS` is missing"),
+            ("Rows,2", "Rows,999999", 19, "an array of 999999 by 3 has more than 262144 cells"),
+            ("(cm),0.86", "(ft),0.86", 15, "the unit of `Sensel Width (ft)` is unknown"),
             ("100.5,0,\n", "x,0,\n", 21, "this cell is not a number: `x`"),
             ("SENSELS,,,\n0,0,0,\n0,0,7.5,\n", "", 51, "frame 1466 ends without the `SENSELS` of `LF S0073`"),
             ("08:21:18.008", "08:21:16.008", 40, "the time goes back"),
-            ("08:21:18.008", "later", 40, "a time is `08:21:17.982`, not `later`"),
-            ("Time, 08:21:18.008,,\n", "", 39, "some frames have a `Time`, and some have none"),
+            ("08:21:18.008", "later", 40, "expected a time as `08:21:17.982`, found `later`"),
+            ("Time, 08:21:18.008,,\n", "", 39, "some frames have a `Time` and some do not"),
         ];
         check_damages(PAIR, "", &left(), &cases);
     }
 
     #[test]
-    fn damage_is_refused_or_read_soundly() {
+    fn a_damaged_file_is_refused_or_gives_a_sound_recording() {
         for (good, hints) in [(PAIR, left()), (MAT, Hints::default())] {
             let refused = count_refused(&[good.as_bytes()], "", &hints, 1000);
             assert!((300..1000).contains(&refused), "{refused}");

@@ -1,15 +1,15 @@
 //! `zebris`: the raw data of a Zebris plate or treadmill as text (`RawDataGaitAnalysis`).
 //!
-//! A header with a table of forces, `Platform {` with the size, the cells' width and height and their unit, and then
-//! frames: `Frame 1 {`, `Time, ms`, a line of column names `x1`, `x2`, …, a line `y1`, `y2`, … of cells for each row,
-//! `}`. x runs along the plate, so a row is a line along it. Pressures in N/cm² and the like become kPa. The forces of
-//! the left and the right foot in the table are sums of these cells and no measurement beside them.
+//! A file has a header with a table of forces, `Platform {` with the size, the cells' width and height and their unit,
+//! and then frames: `Frame 1 {`, `Time, ms`, a line of column names `x1`, `x2`, …, a line `y1`, `y2`, … of cells for each
+//! row, `}`. x runs along the plate, so a row is a line along it. Pressures become kPa. The table's forces of the left
+//! and the right foot are sums of these cells, not a separate measurement.
 
 use tactflow_runtime::signal::{ImageShape, Unit};
 
-use super::reel::{Reel, bounded};
-use super::text::{self, Flaw, Lines, Notation, Piece, Wrong, flaw, shortened};
-use super::{Format, Head, Hints, Recording, units};
+use crate::recordings::common::reel::{Reel, bounded};
+use crate::recordings::common::text::{self, Lines, Notation, Piece, Wrong, flaw, shortened};
+use crate::recordings::common::{Flaw, Format, Head, Hints, Recording, units};
 
 pub(super) const FORMAT: Format = Format {
     name: "zebris",
@@ -30,7 +30,7 @@ const FREQUENCY: &[&str] = &["frequency", "frequenz"];
 const TIME: &[&str] = &["time", "zeit"];
 
 fn recognises(head: &Head<'_>) -> bool {
-    // The table of forces comes first, and may fill all that is looked at.
+    // The table of forces comes first, and may fill all of the head.
     let has = |words: &[&str]| Lines::new(&head.text).any(|line| is_one_of(line.text.trim(), words));
     has(PLATFORM) || has(&["exercises\t{", "exercises {"]) && head.text.to_lowercase().contains("butterfly.")
 }
@@ -39,7 +39,7 @@ fn is_one_of(text: &str, names: &[&str]) -> bool {
     text.len() < 64 && names.contains(&&*text.to_lowercase())
 }
 
-/// `Cell width,mm   8.47`: what is said of what, and in which unit.
+/// A property with its unit, as `Cell width,mm   8.47`.
 struct Entry<'t> {
     name: Piece<'t>,
     unit: &'t str,
@@ -47,13 +47,13 @@ struct Entry<'t> {
 }
 
 fn entry(line: Piece<'_>) -> Entry<'_> {
-    let parted = line.text.split_once(['\t', ';']).or_else(|| line.text.rsplit_once(','));
-    let (key, value) = parted.unwrap_or((line.text, &line.text[line.text.len()..]));
+    let split = line.text.split_once(['\t', ';']).or_else(|| line.text.rsplit_once(','));
+    let (key, value) = split.unwrap_or((line.text, &line.text[line.text.len()..]));
     let (name, unit) = key.split_once(',').unwrap_or((key, ""));
     Entry { name: line.part(name).trimmed(), unit: unit.trim(), value: line.part(value).trimmed() }
 }
 
-/// What the file says of the plate.
+/// Properties of the plate.
 #[derive(Default)]
 struct Platform<'t> {
     cols: Option<(usize, Piece<'t>)>,
@@ -73,12 +73,12 @@ impl<'t> Platform<'t> {
         let length = || {
             positive(value, &what).and_then(|number| match units::metres(unit) {
                 Some(metres) => Ok(number * metres),
-                None => flaw(&line, format!("{what} is in a unit that is not known here: `{}`", shortened(unit))),
+                None => flaw(&line, format!("the unit of {what} is unknown:  `{}`", shortened(unit))),
             })
         };
         let count = || match usize::try_from(value.count(&what)?) {
             Ok(count @ 1..) => Ok((count, value)),
-            _ => flaw(&value, format!("{what} is at least 1")),
+            _ => flaw(&value, format!("{what} must be at least 1")),
         };
         match () {
             () if is(COLUMNS) => self.cols = Some(count()?),
@@ -89,7 +89,7 @@ impl<'t> Platform<'t> {
             () if is(FREQUENCY) => self.rate = Some(positive(value, &what)?),
             () if is(UNITS) => match units::unit(value.text) {
                 Some(unit) => self.unit = Some(unit),
-                None => return flaw(&value, format!("the unit `{}` is not known here", shortened(value.text))),
+                None => return flaw(&value, format!("the unit `{}` is unknown", shortened(value.text))),
             },
             () => {}
         }
@@ -98,8 +98,8 @@ impl<'t> Platform<'t> {
 
     /// Rows and columns.
     fn size(&self, end: Piece<'_>) -> Result<(usize, usize), Flaw> {
-        let Some((rows, at)) = self.rows else { return flaw(&end, "`Platform` has no `Lines`") };
-        let Some((cols, _)) = self.cols else { return flaw(&end, "`Platform` has no `Columns`") };
+        let Some((rows, at)) = self.rows else { return flaw(&end, "`Lines` is missing in `Platform`") };
+        let Some((cols, _)) = self.cols else { return flaw(&end, "`Columns` is missing in `Platform`") };
         bounded(rows, cols).or_else(|message| flaw(&at, message))?;
         Ok((rows, cols))
     }
@@ -107,7 +107,7 @@ impl<'t> Platform<'t> {
 
 fn positive(value: Piece<'_>, what: &str) -> Result<f64, Flaw> {
     let number = value.decimal(what)?;
-    if number > 0.0 { Ok(number) } else { flaw(&value, format!("{what} is greater than 0")) }
+    if number > 0.0 { Ok(number) } else { flaw(&value, format!("{what} must be greater than 0")) }
 }
 
 fn parse(text: &str, hints: &Hints) -> Result<Recording, Wrong> {
@@ -127,7 +127,7 @@ fn parse(text: &str, hints: &Hints) -> Result<Recording, Wrong> {
         && count != reel.frames.len() as u64
     {
         let found = reel.frames.len();
-        let message = format!("`Frame count` promises {count} frames, but the file has {found}");
+        let message = format!("`Frame count` is {count}, but the file has {found} frames");
         let at = if (found as u64) < count { lines.end() } else { at };
         return flaw(&at, message).map_err(Wrong::from);
     }
@@ -141,7 +141,7 @@ fn parse(text: &str, hints: &Hints) -> Result<Recording, Wrong> {
     Ok(Recording { format: FORMAT.name, shape, frames, cells, dead, threshold: None, period, force: None })
 }
 
-/// Reads up to the line of the first frame.
+/// Reads the header up to the line of the first frame, which is returned too.
 fn platform<'t>(lines: &mut Lines<'t>) -> Result<(Platform<'t>, Piece<'t>), Vec<Flaw>> {
     let mut platform = Platform::default();
     let mut flaws = Vec::new();
@@ -163,7 +163,7 @@ fn platform<'t>(lines: &mut Lines<'t>) -> Result<(Platform<'t>, Piece<'t>), Vec<
     Err(flaws)
 }
 
-/// The number in `Frame 12 {`, if the line is such a one.
+/// Returns the number in `Frame 12 {`, or `None` for another line.
 fn frame_number(line: Piece<'_>) -> Option<Piece<'_>> {
     let rest = line.after("frame ").or_else(|| line.after("bild "))?;
     rest.text.strip_suffix('{').map(|number| rest.part(number).trimmed())
@@ -173,15 +173,15 @@ struct Reader<'t> {
     reel: Reel,
     rows: usize,
     cols: usize,
-    /// From the file's unit to ours.
+    /// Factor from the file's unit to that of the cells.
     factor: f64,
     lines: Lines<'t>,
 }
 
 impl<'t> Reader<'t> {
-    /// Reads the frame whose first line is `line`, with its `}`.
+    /// Reads the frame with the first line `line`, up to its `}`.
     fn frame(&mut self, line: Piece<'t>) -> Result<(), Flaw> {
-        let at = frame_number(line).expect("it was asked before");
+        let at = frame_number(line).expect("the caller has checked the line");
         let number = at.count("the frame's number")?;
         let last = self.reel.frames.last().copied();
         if let Some(last) = last
@@ -198,19 +198,19 @@ impl<'t> Reader<'t> {
         }
         let end = self.line();
         if end.text != "}" {
-            return flaw(&end, format!("frame {number} goes on after its {} rows: no `}}` is here", self.rows));
+            return flaw(&end, format!("expected `}}` after the {} rows of frame {number}", self.rows));
         }
         self.reel.frame(number, time, self.rows, self.cols);
         Ok(())
     }
 
-    /// The next line that is not blank; the end if there is none.
+    /// Returns the next line that is not blank, or the end of the file.
     fn line(&mut self) -> Piece<'t> {
         let line = self.lines.by_ref().map(Piece::trimmed).find(|line| !line.text.is_empty());
         line.unwrap_or_else(|| self.lines.end())
     }
 
-    /// Reads what stands before the rows, up to the columns' names: the time [ns].
+    /// Reads the lines before the rows, up to the names of the columns, and returns the time [ns].
     fn head(&mut self, frame: u64) -> Result<(i64, Piece<'t>), Flaw> {
         let mut found = None;
         loop {
@@ -220,7 +220,7 @@ impl<'t> Reader<'t> {
             if names.clone().next().is_some_and(|name| name.eq_ignore_ascii_case("x1")) {
                 let names = names.count();
                 if names != self.cols {
-                    let message = format!("frame {frame} names {names} columns, but `Columns` promises {}", self.cols);
+                    let message = format!("frame {frame} has {names} names of columns, but `Columns` is {}", self.cols);
                     return flaw(&line, message);
                 }
                 return found.map_or_else(|| flaw(&line, format!("frame {frame} has no `Time`")), Ok);
@@ -254,10 +254,10 @@ impl<'t> Reader<'t> {
             return Ok(());
         }
         let found = if found > cols { "more".to_owned() } else { found.to_string() };
-        flaw(&line, format!("row `y{}` of frame {frame} has {found} cells, but `Columns` promises {cols}", row + 1))
+        flaw(&line, format!("row `y{}` of frame {frame} has {found} cells, but `Columns` is {cols}", row + 1))
     }
 
-    /// The line of the next frame, if there is one.
+    /// Returns the line of the next frame, or `None` at the end of the file.
     fn next_frame(&mut self) -> Result<Option<Piece<'t>>, Flaw> {
         loop {
             let line = self.line();
@@ -350,7 +350,7 @@ y2\t0.00\t0.00\t0.00
     }
 
     #[test]
-    fn the_same_written_otherwise_reads_the_same() {
+    fn equivalent_notations_give_the_same_recording() {
         let good = read(GOOD.as_bytes(), "", &Hints::default()).unwrap();
         let latin = |text: &str| text.chars().map(|c| c as u8).collect::<Vec<u8>>();
         let wide = |text: &str| text.encode_utf16().flat_map(u16::to_le_bytes).collect::<Vec<u8>>();
@@ -376,38 +376,38 @@ y2\t0.00\t0.00\t0.00
     }
 
     #[test]
-    fn what_is_wrong_is_said_where_it_is() {
+    fn a_mistake_has_its_line_and_message() {
         let cases = [
-            ("Lines\t2", "Lines\t0", 20, "`Lines` is at least 1"),
-            ("Lines\t2", "Lines\t99999", 20, "an array of 99999 by 3 is more than the 262144 cells that are read"),
-            ("Columns\t3\n", "", 26, "`Platform` has no `Columns`"),
-            ("8.47", "-1", 21, "`Cell width` is greater than 0"),
-            ("width,mm", "width,ells", 21, "`Cell width` is in a unit that is not known here: `ells`"),
-            ("N/cm^2", "stone", 23, "the unit `stone` is not known here"),
-            ("Frame count\t2", "Frame count\t3", 44, "`Frame count` promises 3 frames, but the file has 2"),
-            ("Frame count\t2", "Frame count\t1", 24, "`Frame count` promises 1 frames, but the file has 2"),
+            ("Lines\t2", "Lines\t0", 20, "`Lines` must be at least 1"),
+            ("Lines\t2", "Lines\t99999", 20, "an array of 99999 by 3 has more than 262144 cells"),
+            ("Columns\t3\n", "", 26, "`Columns` is missing in `Platform`"),
+            ("8.47", "-1", 21, "`Cell width` must be greater than 0"),
+            ("width,mm", "width,ells", 21, "the unit of `Cell width` is unknown:  `ells`"),
+            ("N/cm^2", "stone", 23, "the unit `stone` is unknown"),
+            ("Frame count\t2", "Frame count\t3", 44, "`Frame count` is 3, but the file has 2 frames"),
+            ("Frame count\t2", "Frame count\t1", 24, "`Frame count` is 1, but the file has 2 frames"),
             ("Frame 2", "Frame 4", 36, "frame 4 comes after frame 1"),
             ("Time, ms\t10.00\n", "", 40, "frame 2 has no `Time`"),
             ("Time, ms\t0.00", "Time, ms\t20.00", 38, "the time goes back"),
-            ("x1\tx2\tx3", "x1\tx2", 32, "frame 1 names 2 columns, but `Columns` promises 3"),
+            ("x1\tx2\tx3", "x1\tx2", 32, "frame 1 has 2 names of columns, but `Columns` is 3"),
             ("y2\t0.25\t34.50\t0.00\n", "", 34, "expected row `y2` of frame 1"),
-            ("34.50\t0.00", "34.50", 34, "row `y2` of frame 1 has 2 cells, but `Columns` promises 3"),
-            ("34.50", "34.50\t1", 34, "row `y2` of frame 1 has more cells, but `Columns` promises 3"),
+            ("34.50\t0.00", "34.50", 34, "row `y2` of frame 1 has 2 cells, but `Columns` is 3"),
+            ("34.50", "34.50\t1", 34, "row `y2` of frame 1 has more cells, but `Columns` is 3"),
             ("34.50", "NaN", 34, "this cell is not finite: `NaN`"),
-            ("}\nFrame 2", "y3\nFrame 2", 35, "frame 1 goes on after its 2 rows: no `}` is here"),
+            ("}\nFrame 2", "y3\nFrame 2", 35, "expected `}` after the 2 rows of frame 1"),
             ("}\nFrame 2", "}\nFrames\nFrame 2", 36, "expected a frame, found `Frames`"),
             (
                 "y1\t0.00\t1.50\t0.00\ny2\t0.00\t0.00\t0.00\n}\n",
                 "y1\t0.00",
                 42,
-                "row `y1` of frame 2 has 1 cells, but `Columns` promises 3",
+                "row `y1` of frame 2 has 1 cells, but `Columns` is 3",
             ),
         ];
         check_damages(GOOD, "", &Hints::default(), &cases);
     }
 
     #[test]
-    fn damage_is_refused_or_read_soundly() {
+    fn a_damaged_file_is_refused_or_gives_a_sound_recording() {
         let refused = count_refused(&[GOOD.as_bytes()], "", &Hints::default(), 2000);
         assert!((1000..2000).contains(&refused), "{refused}");
     }

@@ -1,55 +1,60 @@
-//! `adjoint`: expresses a twist in another frame (paper eq. 4).
-//!
-//! V_B = Ad_T V_A with T = (R, p) the pose of A in B, Ad_T = [R, p^ R; 0, R] and V = [v; omega]. When B is the base the
-//! result is the spatial twist: v is the velocity of that point of the body which passes through the base's origin, so
-//! it meets the spatial Jacobian, and not the one whose rows are taken at the tip.
+//! The twist of a body depends on the point at which it is taken: in the base it is the spatial twist, which matches the
+//! spatial Jacobian and not the Jacobian whose rows are taken at the tip.
 
 use nalgebra::Vector3;
-use tactflow_runtime::node::{Limits, Mistakes, Node, Setup, Tick};
+use tactflow_runtime::node::{Describe, In, Inputs, Limits, Mistakes, Node, Out, Outputs, Setup, Tick};
 use tactflow_runtime::signal::{Pose, Twist};
-use tactflow_runtime::{inputs, outputs, params};
 
-params! {}
-
-inputs! {
-    /// A twist in A: of A's origin, along A's axes [m/s, rad/s].
-    twist: Twist["A"],
-    /// Pose of A in B [m].
-    pose: Pose["A", "B"],
-}
-
-outputs! {
-    /// The same motion in B: at B's origin, along B's axes [m/s, rad/s].
-    twist: Twist["B"],
-}
-
-/// A change of frame has nothing to set.
+/// Expresses a motion in another frame, such as the sensor's motion in the base.
+///
+/// V_B = Ad_T V_A (eq. 4 of the paper), where T = (R, p) is the pose of A in B, Ad_T = [R, p^ R; 0, R] and
+/// V = [v; omega]. Put it between nodes that compute in the frame of the sensor and an arm that moves in the base.
+///
+/// A twist in the base is spatial: its linear part is the velocity of the point of the body that passes through the
+/// origin of the base, not the velocity of the sensor. A slow roll of a sensor that is 0.7 m away looks fast there. Limit
+/// and plot motions in the frame of the sensor, and wire the result only to nodes that take a spatial twist, such as
+/// `ik_sink`.
+///
+/// Both inputs must be present. The output is as old as the older of them.
+///
+/// ```toml
+/// [nodes.to_base]
+/// type = "adjoint"
+/// in.twist = "acceleration_limit.twist"
+/// in.pose = "state.sensor_pose"
+/// ```
+#[derive(Describe)]
+#[describe(name = "adjoint")]
 pub struct Adjoint;
 
+/// What `adjoint` reads.
+#[derive(Inputs)]
+pub struct Inputs<'a> {
+    /// Twist in A: at the origin of A, along the axes of A.
+    #[port(frame = "A")]
+    twist: In<'a, Twist>,
+    /// Pose of A in B.
+    #[port(frame = "A", reference = "B")]
+    pose: In<'a, Pose>,
+}
+
+/// What `adjoint` writes.
+#[derive(Outputs)]
+pub struct Outputs {
+    /// The same motion in B: at the origin of B, along the axes of B.
+    #[port(frame = "B")]
+    twist: Out<Twist>,
+}
+
 impl Node for Adjoint {
-    type Params = Params;
+    type Params = ();
     type Inputs<'a> = Inputs<'a>;
     type Outputs = Outputs;
     type State = ();
 
-    const NAME: &'static str = "adjoint";
-    const SUMMARY: &'static str = "expresses a motion in another frame, the sensor's in the base's";
-    const DOC: &'static str = "V_B = Ad_T V_A with T = (R, p) the pose of A in B and Ad_T = [R, p^ R; 0, R]: the \
-        paper's eq. 4. It stands between what is said in the sensor's frame and an arm that moves in the base's.\n\n\
-        A twist in the base is spatial: its linear part is the velocity of that point of the body which passes \
-        through the base's origin, and not that of the sensor. A slow roll of a sensor that is 0.7 m away looks \
-        fast there. So limit and plot motions in the sensor's frame, and give the result only to what takes a \
-        spatial twist, such as `ik_sink`.\n\n\
-        Both inputs are needed; the result is as old as the older of them.";
-    const EXAMPLE: &'static str = r#"
-[nodes.to_base]
-type = "adjoint"
-in.twist = "acceleration_limit.twist"
-in.pose = "state.sensor_pose"
-"#;
     const LIMITS: Limits = Limits::passed("twist");
 
-    fn new(_: Params, _: &mut Setup<Self>) -> Result<Self, Mistakes> {
+    fn new((): (), _: &mut Setup<Self>) -> Result<Self, Mistakes> {
         Ok(Self)
     }
 
@@ -60,14 +65,14 @@ in.pose = "state.sensor_pose"
     }
 }
 
-/// The twist in B of a motion that is `twist` in A, with `pose` that of A in B (eq. 4).
+/// Returns the twist in B of a motion whose twist in A is `twist`, where `pose` is the pose of A in B (eq. 4).
 ///
 /// ```
 /// use nalgebra::{IsometryMatrix3, Vector3};
 /// use tactflow_nodes::servo::adjoint::adjoint;
 /// use tactflow_runtime::signal::{Pose, Twist};
 ///
-/// // A pure roll of the sensor looks fast at the base's origin.
+/// // A pure roll of the sensor looks fast at the origin of the base.
 /// let pose = Pose(IsometryMatrix3::translation(0.6, 0.0, 0.3));
 /// let roll = Twist::new(Vector3::zeros(), Vector3::new(0.0, 0.3, 0.0));
 /// assert!((adjoint(&pose, &roll).linear().norm() - 0.20).abs() < 0.005);
@@ -112,7 +117,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn it_is_the_matrix_of_eq_4(pose in a_pose(), twist in a_twist()) {
+        fn the_adjoint_is_the_matrix_of_eq_4(pose in a_pose(), twist in a_twist()) {
             let rotation = pose.0.rotation.matrix();
             let mut matrix = Matrix6::zeros();
             matrix.fixed_view_mut::<3, 3>(0, 0).copy_from(rotation);
@@ -122,19 +127,19 @@ mod tests {
         }
 
         #[test]
-        fn it_composes(first in a_pose(), second in a_pose(), twist in a_twist()) {
+        fn adjoints_compose(first in a_pose(), second in a_pose(), twist in a_twist()) {
             let at_once = adjoint(&Pose(first.0 * second.0), &twist);
             prop_assert!((at_once.0 - adjoint(&first, &adjoint(&second, &twist)).0).amax() < 1e-13);
         }
 
         #[test]
-        fn that_of_the_inverse_is_the_inverse(pose in a_pose(), twist in a_twist()) {
+        fn the_adjoint_of_the_inverse_pose_is_the_inverse(pose in a_pose(), twist in a_twist()) {
             let there_and_back = adjoint(&Pose(pose.0.inverse()), &adjoint(&pose, &twist));
             prop_assert!((there_and_back.0 - twist.0).amax() < 1e-13);
         }
 
         #[test]
-        fn it_takes_a_motion_from_one_frame_to_the_other(pose in a_pose(), twist in a_twist()) {
+        fn the_result_is_the_same_motion_in_the_other_frame(pose in a_pose(), twist in a_twist()) {
             let moved = pose.0.to_homogeneous() * hat(&twist).exp() * pose.0.inverse().to_homogeneous();
             prop_assert!((hat(&adjoint(&pose, &twist)).exp() - moved).amax() < 1e-12);
         }
@@ -150,7 +155,7 @@ mod tests {
     }
 
     #[test]
-    fn in_the_base_it_is_the_velocity_of_the_point_at_the_bases_origin() {
+    fn in_the_base_it_is_the_velocity_of_the_point_at_its_origin() {
         let h = 1e-5;
         for t in [0.0, 0.7, 2.9] {
             let (pose, twist) = helix(t);
@@ -163,7 +168,7 @@ mod tests {
     }
 
     #[test]
-    fn it_follows_the_twist_and_the_pose_and_is_as_old_as_the_older() {
+    fn the_result_follows_both_inputs_and_is_as_old_as_the_older() {
         let wires = [("twist", TwistShape.into()), ("pose", PoseShape.into())];
         let mut rig = NodeRig::new::<Adjoint>("", &wires).unwrap();
         rig.set("twist", Twist::new(Vector3::x(), Vector3::zeros()));

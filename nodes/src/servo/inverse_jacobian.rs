@@ -1,41 +1,63 @@
-//! `inverse_jacobian`: maps the control of each feature to a twist of the sensor (paper eq. 5, the matrix J_s^-1).
+//! The columns are parameters because conventions of signs differ between sensors.
 //!
-//! The twist is the sum of column times control over the features that are there, in their order. e = setpoint -
-//! measured for every feature, so every sign lives in the columns, and they are data because conventions differ between
-//! sensors. With z out of the pad toward the object, a right-handed frame and alpha counted from +x toward +y:
-//!
-//! ```toml
-//! #                    vx  vy  vz   wx   wy  wz
-//! columns.x        = [ -1,  0,  0,   0, -20,  0 ]
-//! columns.y        = [  0, -1,  0,  20,   0,  0 ]
-//! columns.pressure = [  0,  0,  1,   0,   0,  0 ]
-//! columns.alpha    = [  0,  0,  0,   0,   0, -1 ]
-//! ```
-//!
-//! The rolling rows (wx of y, wy of x) need opposite signs: with equal ones, as eq. 5 prints them, the contact is lost.
+//! The rolling entries (wx of y, wy of x) need opposite signs. With equal signs, as eq. 5 of the paper prints them, the
+//! contact is lost.
 
-use tactflow_runtime::node::{Components, Map, Mistakes, Node, Setup, Tick};
-use tactflow_runtime::signal::Twist;
-use tactflow_runtime::{inputs, outputs, params};
+use tactflow_runtime::node::{Components, Describe, In, Inputs, Map, Mistakes, Node, Out, Outputs, Param, Setup, Tick};
+use tactflow_runtime::signal::{Features, Twist};
 
-params! {
-    /// Column of each feature, `[vx, vy, vz, wx, wy, wz]` [m per feature unit, rad per feature unit].
-    live columns: Map<[f64; 6]>,
-}
-
-inputs! {
-    /// Control of each feature [the feature's unit per second].
-    control: Features["_/s", "A"],
-}
-
-outputs! {
-    /// Twist that reduces the errors [m/s, rad/s].
-    twist: Twist["A"],
-}
-
-/// The columns of the inverse Jacobian, in the order of the features.
+/// Turns the control of each feature into a motion of the sensor.
+///
+/// The twist is the sum of column times control over the features, in their order: the matrix J_s^-1 of eq. 5 of the
+/// paper, with one column for each feature. All signs of a task are in these columns. The columns of the example are
+/// right for z out of the pad toward the object, a right-handed frame, an angle alpha from +x toward +y and
+/// e = setpoint - measured. The column of alpha is then `[0, 0, 0, 0, 0, -1]`.
+///
+/// The first two columns slide the pad and also roll it, by 20 rad for each metre; with 1 instead of 20 it hardly rolls.
+/// The rolling entries (wy of x, wx of y) have opposite signs. With equal signs, as the paper prints them, the contact
+/// is lost. A wrong sign makes the error grow at once, so test the signs of a new sensor one at a time, and delete the
+/// other components with a `projector`.
+///
+/// A feature that is absent contributes nothing. A `projector` behind this node selects the components that are used.
+///
+/// ```toml
+/// [nodes.jacobian]
+/// type = "inverse_jacobian"
+/// in.control = "pid.control"
+/// #                    vx  vy  vz   wx   wy  wz
+/// columns.x        = [ -1,  0,  0,   0, -20,  0 ]   # [1, rad per m]
+/// columns.y        = [  0, -1,  0,  20,   0,  0 ]
+/// columns.pressure = [  0,  0,  1,   0,   0,  0 ]   # [m per N per tactel]
+/// ```
+#[derive(Describe)]
+#[describe(name = "inverse_jacobian")]
 pub struct InverseJacobian {
+    /// One for each feature, in their order.
     columns: Box<[Twist]>,
+}
+
+/// Parameters of `inverse_jacobian`.
+#[derive(Debug, Clone, Param)]
+pub struct Params {
+    /// Column of each feature, `[vx, vy, vz, wx, wy, wz]`, for one unit of the feature.
+    #[param(unit = "m/_, rad/_", live)]
+    columns: Map<[f64; 6]>,
+}
+
+/// What `inverse_jacobian` reads.
+#[derive(Inputs)]
+pub struct Inputs<'a> {
+    /// Control of each feature.
+    #[port(unit = "_/s", frame = "A")]
+    control: In<'a, Features>,
+}
+
+/// What `inverse_jacobian` writes.
+#[derive(Outputs)]
+pub struct Outputs {
+    /// Twist that reduces the errors.
+    #[port(frame = "A")]
+    twist: Out<Twist>,
 }
 
 impl Node for InverseJacobian {
@@ -43,27 +65,6 @@ impl Node for InverseJacobian {
     type Inputs<'a> = Inputs<'a>;
     type Outputs = Outputs;
     type State = ();
-
-    const NAME: &'static str = "inverse_jacobian";
-    const SUMMARY: &'static str = "turns the control of each feature into a motion of the sensor";
-    const DOC: &'static str = "The twist is the sum over the features of column times control: the matrix J_s^-1 \
-        of the paper's eq. 5, a column a feature. The columns are the only place where signs live. With z out of \
-        the pad toward the object, a right-handed frame and e = setpoint - measured, those of the example are \
-        right.\n\n\
-        The first two columns slide the pad and roll it as well, by 20 rad for each metre of slide: with 1 instead \
-        of 20 it hardly rolls. The rolling entries (wy of x, wx of y) have opposite signs; with equal ones, as the \
-        paper prints them, the contact is lost. A wrong sign runs away at once, so try a new sensor's signs one at \
-        a time, with the others projected out.\n\n\
-        A feature that is absent contributes nothing. Which components are used in the end is said by `projector`.";
-    const EXAMPLE: &'static str = r#"
-[nodes.jacobian]
-type = "inverse_jacobian"
-in.control = "pid.control"
-#                    vx  vy  vz   wx   wy  wz
-columns.x        = [ -1,  0,  0,   0, -20,  0 ]   # [1, rad per m]
-columns.y        = [  0, -1,  0,  20,   0,  0 ]
-columns.pressure = [  0,  0,  1,   0,   0,  0 ]   # [m per N per tactel]
-"#;
 
     fn new(params: Params, setup: &mut Setup<Self>) -> Result<Self, Mistakes> {
         let names = setup.inputs.control.features.iter().map(|feature| feature.name.as_str());
@@ -74,15 +75,15 @@ columns.pressure = [  0,  0,  1,   0,   0,  0 ]   # [m per N per tactel]
     fn state(&self) {}
 
     fn uses(&self, wanted: &[Components]) -> Vec<Components> {
-        let gives = |column: &Twist| (0..6).any(|i| column.0[i] != 0.0 && wanted[0].has(i));
-        vec![Components::of(self.columns.len(), |i| gives(&self.columns[i]))]
+        let is_used = |column: &Twist| (0..6).any(|i| column.0[i] != 0.0 && wanted[0].has(i));
+        vec![Components::of(self.columns.len(), |i| is_used(&self.columns[i]))]
     }
 
     fn step(&self, _: &Tick, inputs: Inputs<'_>, out: &mut Outputs, (): &mut ()) {
         let mut sum = Twist::default();
-        for (column, control) in self.columns.iter().zip(inputs.control.components()) {
-            if let Some(control) = control.get() {
-                sum.0 += column.0 * control;
+        for (column, control) in self.columns.iter().zip(inputs.control.iter()) {
+            if let Some(control) = control {
+                sum.0 += column.0 * *control;
             }
         }
         out.twist.set(sum);
@@ -127,7 +128,7 @@ mod tests {
     }
 
     #[test]
-    fn the_sum_is_over_the_features_that_are_there() {
+    fn the_sum_is_over_the_features_that_are_present() {
         let cases: [([Option<f64>; 4], [f64; 6]); 6] = [
             ([Some(1.0), None, None, None], [-1.0, 0.0, 0.0, 0.0, -20.0, 0.0]),
             ([None, Some(1.0), None, None], [0.0, -1.0, 0.0, 20.0, 0.0, 0.0]),
@@ -146,7 +147,7 @@ mod tests {
     }
 
     #[test]
-    fn a_feature_is_used_if_its_column_gives_what_is_wanted() {
+    fn a_feature_is_used_if_its_column_has_a_wanted_component() {
         let columns = [[-1.0, 0.0, 0.0, 0.0, -20.0, 0.0], [0.0, 0.0, 1.0, 0.0, 0.0, 0.0]];
         let jacobian = InverseJacobian { columns: columns.map(|column| Twist(column.into())).into() };
         // vx, vy, vz, wx, wy, wz; of the features x and pressure.

@@ -1,28 +1,56 @@
-//! `projector`: selects the components of a twist (paper eq. 3, the matrix P).
-//!
 //! P is diagonal with ones and zeros, so a component either passes unchanged or is exactly zero: P P = P.
 
-use tactflow_runtime::node::{Bit, Components, Mistakes, Node, Setup, Tick};
-use tactflow_runtime::{inputs, outputs, params};
+use tactflow_runtime::node::{Components, Describe, In, Inputs, Mistakes, Node, Out, Outputs, Param, Setup, Tick};
+use tactflow_runtime::signal::Twist;
 
-params! {
-    /// Diagonal of P, `[vx, vy, vz, wx, wy, wz]`: 1 passes a component, 0 deletes it [1].
-    live select: [Bit; 6],
-}
-
-inputs! {
-    /// Any twist [m/s, rad/s].
-    twist: Twist["A"],
-}
-
-outputs! {
-    /// The selected components [m/s, rad/s].
-    twist: Twist["A"],
-}
-
-/// The projector's diagonal.
+/// Selects the components of a motion that a task controls.
+///
+/// The matrix P of eq. 3 of the paper: a diagonal of ones and zeros over `[vx, vy, vz, wx, wy, wz]`. A component whose
+/// entry is 1 passes unchanged; a component whose entry is 0 becomes exactly zero.
+///
+/// P mostly defines the task: `[1, 1, 0, 0, 0, 0]` holds the place of the contact and `[0, 0, 1, 0, 0, 0]` its pressure.
+/// The fourth and the fifth entry let the pad roll, and the last one follows the direction of an edge.
+///
+/// A component that is deleted here is free for guidance, which a `twist_adder` adds behind the projector. Along a line
+/// that is longer than the pad, the centre of gravity carries no information: set that entry of P to 0.
+///
+/// If nothing of a feature passes, `pid` freezes that feature: its integral stays at zero, and it starts afresh in a
+/// mode that selects it.
+///
+/// ```toml
+/// [nodes.projector]
+/// type = "projector"
+/// in.twist = "jacobian.twist"
+/// select = [1, 1, 1, 0, 0, 0]         # place and pressure, no rolling
+/// ```
+#[derive(Describe)]
+#[describe(name = "projector")]
 pub struct Projector {
     passes: [bool; 6],
+}
+
+/// Parameters of `projector`.
+#[derive(Debug, Clone, Param)]
+pub struct Params {
+    /// Diagonal of P, `[vx, vy, vz, wx, wy, wz]`: 1 passes a component, 0 deletes it.
+    #[param(unit = "1", range = 0..=1, live)]
+    select: [u64; 6],
+}
+
+/// What `projector` reads.
+#[derive(Inputs)]
+pub struct Inputs<'a> {
+    /// Any twist.
+    #[port(frame = "A")]
+    twist: In<'a, Twist>,
+}
+
+/// What `projector` writes.
+#[derive(Outputs)]
+pub struct Outputs {
+    /// The selected components.
+    #[port(frame = "A")]
+    twist: Out<Twist>,
 }
 
 impl Node for Projector {
@@ -31,25 +59,8 @@ impl Node for Projector {
     type Outputs = Outputs;
     type State = ();
 
-    const NAME: &'static str = "projector";
-    const SUMMARY: &'static str = "selects which components of a motion are used, and so what a task controls";
-    const DOC: &'static str = "The matrix P of the paper's eq. 3: a diagonal of ones and zeros over `[vx, vy, vz, \
-        wx, wy, wz]`. What is 1 passes unchanged, what is 0 is exactly zero.\n\n\
-        A task is mostly its P: `[1, 1, 0, 0, 0, 0]` holds the contact's place, `[0, 0, 1, 0, 0, 0]` its pressure, \
-        fourth and fifth entry let the pad roll, and the last one follows the direction of an edge.\n\n\
-        A component that is deleted here is free for guidance, which a `twist_adder` adds behind it. Along a line \
-        that is longer than the pad the centre of gravity measures nothing: set that entry of P to 0.\n\n\
-        A feature of which nothing passes is frozen in `pid`: it gathers nothing, and starts afresh in a mode that \
-        selects it again.";
-    const EXAMPLE: &'static str = r#"
-[nodes.projector]
-type = "projector"
-in.twist = "jacobian.twist"
-select = [1, 1, 1, 0, 0, 0]         # place and pressure, no rolling
-"#;
-
     fn new(params: Params, _: &mut Setup<Self>) -> Result<Self, Mistakes> {
-        Ok(Self { passes: params.select.map(|entry| *entry == 1) })
+        Ok(Self { passes: params.select.map(|entry| entry == 1) })
     }
 
     fn state(&self) {}
@@ -81,7 +92,7 @@ mod tests {
     }
 
     #[test]
-    fn what_it_deletes_it_does_not_use() {
+    fn a_deleted_component_is_not_used() {
         let passes = [true, false, true, false, false, true];
         let projector = Projector { passes };
         assert_eq!(projector.uses(&[Components::ALL]), [Components::of(6, |i| passes[i])]);
@@ -98,7 +109,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn to_project_twice_is_to_project_once(select in uniform6(0..=1_u8), twist in uniform6(-9.0..9.0)) {
+        fn projecting_twice_equals_projecting_once(select in uniform6(0..=1_u8), twist in uniform6(-9.0..9.0)) {
             let select = format!("select = {select:?}");
             let (mut first, mut second) = (rig(&select).unwrap(), rig(&select).unwrap());
             first.set("twist", Twist(twist.into()));
@@ -111,7 +122,7 @@ mod tests {
     }
 
     #[test]
-    fn a_deleted_component_is_zero_whatever_it_was() {
+    fn a_deleted_component_is_zero_for_any_input() {
         let mut rig = rig("select = [1, 0, 0, 0, 0, 0]").unwrap();
         rig.set("twist", Twist([1.0, -2.0, f64::MAX, f64::INFINITY, f64::NAN, -0.0].into()));
         rig.step();
@@ -120,7 +131,7 @@ mod tests {
     }
 
     #[test]
-    fn bad_diagonals() {
+    fn a_bad_diagonal_is_a_mistake() {
         let cases = [
             ("select = [1, 0, 2, 0, 0, 1]", Code::BadValue),
             ("select = [1, 1]", Code::BadValue),

@@ -1,48 +1,53 @@
-//! `twist_adder`: superimposes twists of one frame (paper section IV: the servoing and the external motion).
-//!
-//! An absent twist is zero motion; the sum is absent when all are. It is taken in the order of the wires, and is as old
-//! as the oldest twist in it.
+//! The order of summation is the order of the wires, so every run gives the same bits.
 
-use tactflow_runtime::node::{At, Components, Mistake, Mistakes, Node, Setup, Tick};
+use tactflow_runtime::node::{
+    At, Components, Describe, Inputs, Many, Mistake, Mistakes, Node, Out, Outputs, Setup, Tick,
+};
+use tactflow_runtime::signal::Twist;
 use tactflow_runtime::source::Code;
-use tactflow_runtime::{inputs, outputs, params};
 
-params! {}
-
-inputs! {
-    /// What is added [m/s, rad/s].
-    twist: Many<Twist["A"]>,
-}
-
-outputs! {
-    /// Sum of the twists that are there [m/s, rad/s].
-    twist: Twist["A"],
-}
-
-/// A sum has nothing to set.
+/// Adds motions of one frame, such as servoing and guidance.
+///
+/// The output is the sum of all twists that are wired, each under a name of your choice: the superposition of section IV
+/// of the paper. All twists must be in the same frame. A wire in another frame is an error, and its message names the
+/// `adjoint` to put between.
+///
+/// An absent twist counts as zero motion. The sum is absent when all twists are absent, and it is as old as the oldest
+/// twist in it.
+///
+/// ```toml
+/// [nodes.sum]
+/// type = "twist_adder"
+/// in.touch = "projector.twist"
+/// in.guide = "guide.twist"
+/// ```
+#[derive(Describe)]
+#[describe(name = "twist_adder")]
 pub struct TwistAdder;
 
+/// What `twist_adder` reads.
+#[derive(Inputs)]
+pub struct Inputs<'a> {
+    /// The twists to add.
+    #[port(frame = "A")]
+    twist: Many<'a, Twist>,
+}
+
+/// What `twist_adder` writes.
+#[derive(Outputs)]
+pub struct Outputs {
+    /// Sum of the twists that are present.
+    #[port(frame = "A")]
+    twist: Out<Twist>,
+}
+
 impl Node for TwistAdder {
-    type Params = Params;
+    type Params = ();
     type Inputs<'a> = Inputs<'a>;
     type Outputs = Outputs;
     type State = ();
 
-    const NAME: &'static str = "twist_adder";
-    const SUMMARY: &'static str = "adds motions of one frame, such as servoing and guidance";
-    const DOC: &'static str = "The sum of all twists that are wired, each under a name of your choice: the \
-        superposition of the paper's section IV. All are in one frame; a wire in another frame does not load, and \
-        the message says which `adjoint` to put between.\n\n\
-        An absent twist is zero motion, and the sum is absent when all are. It is taken in the order of the wires, \
-        so it is the same to the last bit in every run, and it is as old as the oldest twist in it.";
-    const EXAMPLE: &'static str = r#"
-[nodes.sum]
-type = "twist_adder"
-in.touch = "projector.twist"
-in.guide = "guide.twist"
-"#;
-
-    fn new(_: Params, setup: &mut Setup<Self>) -> Result<Self, Mistakes> {
+    fn new((): (), setup: &mut Setup<Self>) -> Result<Self, Mistakes> {
         if setup.inputs.twist.is_empty() {
             let mistake = Mistake::new(Code::MissingInput, At::Node, "no twist is wired");
             return Err(mistake.help("wire each under a name of your choice: `in.servo = \"projector.twist\"`").into());
@@ -85,7 +90,7 @@ mod tests {
     }
 
     #[test]
-    fn the_sum_is_over_what_is_there() {
+    fn the_sum_is_over_the_twists_that_are_present() {
         let cases: [([Option<f64>; 3], Option<f64>); 6] = [
             ([None, None, None], None),
             ([Some(1.0), None, None], Some(1.0)),
@@ -108,7 +113,7 @@ mod tests {
     }
 
     #[test]
-    fn it_adds_in_the_order_of_the_wires() {
+    fn the_order_of_summation_is_the_order_of_the_wires() {
         let mut rig = rig(&["z", "m", "a"]).unwrap();
         let (z, m, a) = (1e16, 1.0, -1e16);
         for (name, speed) in [("a", a), ("m", m), ("z", z)] {
@@ -116,11 +121,11 @@ mod tests {
         }
         rig.step();
         assert_eq!(rig.get::<Twist>("twist").unwrap().0[0], (z + m) + a);
-        assert_ne!((z + m) + a, (z + a) + m, "the case tells two orders apart");
+        assert_ne!((z + m) + a, (z + a) + m, "the two orders differ in this case");
     }
 
     #[test]
-    fn it_is_as_old_as_the_oldest_and_generated_motion_is_of_no_age() {
+    fn the_sum_is_as_old_as_the_oldest_twist_and_generated_motion_has_no_age() {
         let mut rig = rig(&["servo", "guide"]).unwrap();
         rig.edit("guide", Stamp::TIMELESS, |twist: &mut Twist| *twist = along_x(1.0));
         rig.step();
@@ -133,7 +138,7 @@ mod tests {
     }
 
     #[test]
-    fn nothing_to_add_is_a_mistake() {
+    fn no_wired_twist_is_a_mistake() {
         let mistakes = rig(&[]).err().unwrap();
         assert_eq!((mistakes.len(), mistakes[0].code, &mistakes[0].at), (1, Code::MissingInput, &At::Node));
     }

@@ -1,40 +1,66 @@
-//! `twist_of`: a twist from scalars, one for each component that is wired.
-//!
-//! A component that is absent, or that nothing is wired to, is zero; the twist is absent when all are absent. It is as
-//! old as the oldest component in it.
+//! All inputs are optional; a node without a wire is a mistake.
 
-use tactflow_runtime::node::{At, Mistake, Mistakes, Node, Setup, Tick};
-use tactflow_runtime::signal::Twist;
+use tactflow_runtime::node::{At, Describe, In, Inputs, Mistake, Mistakes, Node, Out, Outputs, Param, Setup, Tick};
+use tactflow_runtime::signal::{Scalar, Twist};
 use tactflow_runtime::source::Code;
-use tactflow_runtime::{inputs, outputs, params};
 
-params! {
-    /// Frame of the twist; what it is wired to decides when this is not said.
+/// Composes a motion from scalars, such as a test signal on one axis.
+///
+/// Each input is one component of the twist; a component that is not wired is zero. A `signal_generator` on one input
+/// moves one axis alone, to identify an arm or a contact: a chirp on vz against the pressure, a step on wx against the
+/// place of the contact.
+///
+/// A component that is absent counts as zero. When all wired components are absent, the twist is absent, which means zero
+/// motion. The twist is as old as the oldest component in it. The linear part is in m/s, the angular part in rad/s.
+/// `frame` is the role of the sensor (`"pad"`) or `"base"`; leave it out if a wire defines it.
+///
+/// ```toml
+/// [nodes.twist_of]                    # the test signal along the pad's normal
+/// type = "twist_of"
+/// in.vz = "signal_generator.value"
+/// frame = "pad"
+/// ```
+#[derive(Describe)]
+#[describe(name = "twist_of")]
+pub struct TwistOf;
+
+/// Parameters of `twist_of`.
+#[derive(Debug, Clone, Param)]
+pub struct Params {
+    /// Frame of the twist. Without it, the frame follows from the wires.
     frame: Option<String>,
 }
 
-inputs! {
-    /// Speed along x [m/s].
-    vx: Trigger<Scalar["m/s", "$frame"]>,
-    /// Speed along y [m/s].
-    vy: Trigger<Scalar["m/s", "$frame"]>,
-    /// Speed along z [m/s].
-    vz: Trigger<Scalar["m/s", "$frame"]>,
-    /// Angular speed about x [rad/s].
-    wx: Trigger<Scalar["rad/s", "$frame"]>,
-    /// Angular speed about y [rad/s].
-    wy: Trigger<Scalar["rad/s", "$frame"]>,
-    /// Angular speed about z [rad/s].
-    wz: Trigger<Scalar["rad/s", "$frame"]>,
+/// What `twist_of` reads.
+#[derive(Inputs)]
+pub struct Inputs<'a> {
+    /// Speed along x.
+    #[port(unit = "m/s", frame = "$frame", optional)]
+    vx: Option<In<'a, Scalar>>,
+    /// Speed along y.
+    #[port(unit = "m/s", frame = "$frame", optional)]
+    vy: Option<In<'a, Scalar>>,
+    /// Speed along z.
+    #[port(unit = "m/s", frame = "$frame", optional)]
+    vz: Option<In<'a, Scalar>>,
+    /// Angular speed about x.
+    #[port(unit = "rad/s", frame = "$frame", optional)]
+    wx: Option<In<'a, Scalar>>,
+    /// Angular speed about y.
+    #[port(unit = "rad/s", frame = "$frame", optional)]
+    wy: Option<In<'a, Scalar>>,
+    /// Angular speed about z.
+    #[port(unit = "rad/s", frame = "$frame", optional)]
+    wz: Option<In<'a, Scalar>>,
 }
 
-outputs! {
-    /// The twist [m/s, rad/s].
-    twist: Twist["$frame"],
+/// What `twist_of` writes.
+#[derive(Outputs)]
+pub struct Outputs {
+    /// The twist.
+    #[port(frame = "$frame")]
+    twist: Out<Twist>,
 }
-
-/// What is put together has nothing to set.
-pub struct TwistOf;
 
 impl Node for TwistOf {
     type Params = Params;
@@ -42,23 +68,8 @@ impl Node for TwistOf {
     type Outputs = Outputs;
     type State = ();
 
-    const NAME: &'static str = "twist_of";
-    const SUMMARY: &'static str = "puts a motion together from scalars, such as a test signal on one axis";
-    const DOC: &'static str = "Each wire is one component of the twist; what is not wired is zero. With a \
-        `signal_generator` on one wire it moves one axis alone, which is what the identification of an arm or of a \
-        contact takes: a chirp on vz against the pressure, a step on wx against the place of the contact.\n\n\
-        A component that is absent counts as zero, and when all that are wired are absent the twist is absent: \
-        zero motion. The units are checked: m/s for the linear part, rad/s for the angular part. `frame` is the \
-        sensor's role (`\"pad\"`) or `\"base\"`; it need not be said where a wire tells it.";
-    const EXAMPLE: &'static str = r#"
-[nodes.twist_of]                    # the test signal along the pad's normal
-type = "twist_of"
-in.vz = "signal_generator.value"
-frame = "pad"
-"#;
-
     fn new(_: Params, setup: &mut Setup<Self>) -> Result<Self, Mistakes> {
-        let InputShapes { vx, vy, vz, wx, wy, wz, .. } = &setup.inputs;
+        let InputsShapes { vx, vy, vz, wx, wy, wz, .. } = &setup.inputs;
         if [vx, vy, vz, wx, wy, wz].iter().all(|wire| wire.is_none()) {
             let mistake = Mistake::new(Code::MissingInput, At::Node, "no component is wired");
             return Err(mistake.help("wire one of vx, vy, vz, wx, wy and wz: `in.vz = \"node.port\"`").into());
@@ -93,7 +104,7 @@ mod tests {
     }
 
     #[test]
-    fn each_wire_is_its_component_and_what_is_absent_is_zero() {
+    fn each_input_is_one_component_and_an_absent_one_is_zero() {
         let mut rig = rig(&NAMES).unwrap();
         for (i, name) in NAMES.iter().enumerate() {
             rig.set(name, 1.0);
@@ -113,7 +124,7 @@ mod tests {
     }
 
     #[test]
-    fn it_is_as_old_as_its_oldest_component() {
+    fn the_twist_is_as_old_as_its_oldest_component() {
         let mut rig = rig(&["vz", "wx"]).unwrap();
         rig.edit("vz", Stamp::TIMELESS, |vz: &mut f64| *vz = 0.1);
         rig.step();
@@ -127,7 +138,7 @@ mod tests {
     }
 
     #[test]
-    fn nothing_to_put_together_is_a_mistake() {
+    fn no_wired_component_is_a_mistake() {
         let mistakes = rig(&[]).err().unwrap();
         assert_eq!((mistakes.len(), mistakes[0].code, &mistakes[0].at), (1, Code::MissingInput, &At::Node));
     }

@@ -1,34 +1,58 @@
-//! `twist_source`: a constant twist, for guidance: the external motion that is superimposed on the servoing (paper Fig. 6).
-//!
-//! Generated motion does not vanish with the contact by itself. It is timeless, so no sink's `max_age_ms` ever stops
-//! it, unless a gate is wired: then it is as old as the gate, and absent unless the gate is there and set.
+//! Without a gate the twist has no time, so the `max_age_ms` of a sink never stops it.
 
-use tactflow_runtime::node::{Mistakes, Node, Setup, Tick};
-use tactflow_runtime::signal::Twist;
-use tactflow_runtime::{inputs, outputs, params};
+use tactflow_runtime::node::{Describe, In, Inputs, Mistakes, Node, Out, Outputs, Param, Setup, Tick};
+use tactflow_runtime::signal::{Flag, Twist};
 
-params! {
-    /// The twist, `[vx, vy, vz, wx, wy, wz]`; with zeros alone there is none [m/s, rad/s].
-    live twist: [f64; 6],
-    /// Frame of the twist; what it is wired to decides when this is not said.
-    frame: Option<String>,
-}
-
-inputs! {
-    /// What must be set for the motion to go on; without this wire it always does.
-    gate: Trigger<Flag>,
-}
-
-outputs! {
-    /// The twist [m/s, rad/s].
-    twist: Twist["$frame"],
-}
-
-/// The twist, and whether it waits for a gate.
+/// A constant motion, to approach an object or to guide along it.
+///
+/// It writes the same twist in every tick: the external motion V_ext of Fig. 6 of the paper, which a `twist_adder` adds
+/// to the servoing. Use it to approach along +z, to slide along an edge, or to roll.
+///
+/// Wire `in.gate`: the motion then continues only while that flag is present and set, and is as old as the flag. It ends
+/// with the contact, and when the pad stops sending images. Without a gate the motion never ends by itself, so a mode in
+/// which it moves the arm must have a condition that ends it. Set the twist to zeros in modes that do not need it.
+///
+/// The twist is in the frame of the input that it is wired to, usually the frame of the sensor. Guidance along a
+/// component that the projector controls works against the controller: set that entry of P to 0.
+///
+/// ```toml
+/// [nodes.guide]                       # along the pad's y, while there is a contact
+/// type = "twist_source"
+/// in.gate = "label.present"
+/// twist = [0, 0.01, 0, 0, 0, 0]       # [m/s, rad/s]
+/// ```
+#[derive(Describe)]
+#[describe(name = "twist_source", every_tick)]
 pub struct TwistSource {
     twist: Twist,
     is_still: bool,
     is_gated: bool,
+}
+
+/// Parameters of `twist_source`.
+#[derive(Debug, Clone, Param)]
+pub struct Params {
+    /// The twist, `[vx, vy, vz, wx, wy, wz]`. With zeros alone the output is absent.
+    #[param(unit = "m/s, rad/s", live)]
+    twist: [f64; 6],
+    /// Frame of the twist. Without it, the frame follows from the wires.
+    frame: Option<String>,
+}
+
+/// What `twist_source` reads.
+#[derive(Inputs)]
+pub struct Inputs<'a> {
+    /// The motion continues while this is present and set. Without this wire it always continues.
+    #[port(optional)]
+    gate: Option<In<'a, Flag>>,
+}
+
+/// What `twist_source` writes.
+#[derive(Outputs)]
+pub struct Outputs {
+    /// The twist.
+    #[port(frame = "$frame")]
+    twist: Out<Twist>,
 }
 
 impl Node for TwistSource {
@@ -36,24 +60,6 @@ impl Node for TwistSource {
     type Inputs<'a> = Inputs<'a>;
     type Outputs = Outputs;
     type State = ();
-
-    const NAME: &'static str = "twist_source";
-    const SUMMARY: &'static str = "a constant motion, to approach an object or to guide along it";
-    const DOC: &'static str = "Gives one twist in every tick: the external motion V_ext of the paper's Fig. 6, \
-        which a `twist_adder` superimposes on the servoing. Take it to approach along +z, to slide along an edge, \
-        or to roll.\n\n\
-        Wire `in.gate`: the motion goes on only while that flag is there and set, and is as old as the flag, so it \
-        ends with the contact and when the pad falls silent. Without a gate it never ends by itself: a mode in which \
-        it moves the arm has to say what ends it. A twist of zeros is no motion, for the modes it has no part in.\n\n\
-        The twist is in the frame that it is wired to, mostly the sensor's. Guidance along a component that the \
-        projector controls works against the controller: delete that entry of P.";
-    const EXAMPLE: &'static str = r#"
-[nodes.guide]                       # along the pad's y, while there is a contact
-type = "twist_source"
-in.gate = "label.present"
-twist = [0, 0.01, 0, 0, 0, 0]       # [m/s, rad/s]
-"#;
-    const EVERY_TICK: bool = true;
 
     fn new(params: Params, setup: &mut Setup<Self>) -> Result<Self, Mistakes> {
         setup.is_still = params.twist == [0.0; 6];
@@ -64,10 +70,7 @@ twist = [0, 0.01, 0, 0, 0, 0]       # [m/s, rad/s]
     fn state(&self) {}
 
     fn step(&self, _: &Tick, inputs: Inputs<'_>, out: &mut Outputs, (): &mut ()) {
-        if self.is_still {
-            return;
-        }
-        if !self.is_gated || inputs.gate.is_some_and(|gate| *gate) {
+        if !self.is_still && (!self.is_gated || inputs.gate.is_some_and(|gate| *gate)) {
             out.twist.set(self.twist);
         }
     }
@@ -83,7 +86,7 @@ mod tests {
     const GUIDE: &str = "twist = [0, 0.02, 0, 0, 0, 0.1]\nframe = \"pad\"";
 
     #[test]
-    fn without_a_gate_it_is_new_and_timeless_in_every_tick() {
+    fn without_a_gate_the_twist_is_new_and_timeless_in_every_tick() {
         let mut rig = NodeRig::new::<TwistSource>(GUIDE, &[]).unwrap();
         for _ in 0..3 {
             rig.step();
@@ -94,7 +97,7 @@ mod tests {
     }
 
     #[test]
-    fn with_a_gate_it_moves_only_while_that_is_set_and_is_as_old() {
+    fn with_a_gate_the_twist_is_present_only_while_it_is_set_and_is_as_old() {
         let mut rig = NodeRig::new::<TwistSource>(GUIDE, &[("gate", FlagShape.into())]).unwrap();
         let cases: [(&str, Option<bool>, Freshness); 7] = [
             ("never there", None, Freshness::Absent),
@@ -120,7 +123,7 @@ mod tests {
     }
 
     #[test]
-    fn a_held_gate_keeps_the_motion_but_lets_it_grow_old() {
+    fn a_held_gate_keeps_the_twist_and_its_age_grows() {
         let mut rig = NodeRig::new::<TwistSource>(GUIDE, &[("gate", FlagShape.into())]).unwrap();
         rig.set("gate", true);
         for _ in 0..3 {
@@ -130,7 +133,7 @@ mod tests {
     }
 
     #[test]
-    fn bad_twists() {
+    fn a_bad_twist_is_a_mistake() {
         for bad in
             ["", "twist = [0, 0, 0]", "twist = [0, 0, 0, 0, 0, inf]", "twist = 1", "twist = [0,0,0,0,0,0]\nframe = 1"]
         {

@@ -9,7 +9,9 @@ mod check;
 use std::borrow::Cow;
 use std::collections::VecDeque;
 
-use tactflow_runtime::device::{Commands, Description, Device, DeviceError, Driver, Filled, Opened, Samples, Stepped};
+use tactflow_runtime::device::{
+    Command, Commands, Description, Device, DeviceError, Driver, Opened, Output, Report, Samples, Stepped,
+};
 use tactflow_runtime::node::{Count, FilePath, Mistakes, NonNegative, PortSpec, Positive, Rate};
 use tactflow_runtime::params;
 use tactflow_runtime::signal::{Image, ImageShape, Joint, Joints, JointsShape, Kind, Pose, Scalar, ScalarShape, Unit};
@@ -89,6 +91,7 @@ pub const MAX_TACTELS: usize = 128 * 128;
 
 /// The bench.
 pub struct SimBench {
+    ports: Ports,
     world: World,
     readout: Readout,
     joints: Vec<Joint>,
@@ -105,13 +108,9 @@ pub struct SimBench {
     /// Number of exchanges that advanced the time.
     sequence: u64,
     threshold: f64,
-    /// The outputs of the ground truth.
-    truth: Vec<PortSpec>,
 }
 
-impl Device for SimBench {
-    type Params = Params;
-
+impl tactflow_runtime::node::Describe for SimBench {
     const NAME: &'static str = "sim_bench";
     const SUMMARY: &'static str =
         "a simulated bench: a foam pad on an arm in joint impedance control, and objects to touch";
@@ -155,6 +154,10 @@ objects = [
     { shape = "ball", radius = 0.04, at = [0.01, -0.005, 0.041] },   # 1 mm before the pad [m]
 ]
 "#;
+}
+
+impl Device for SimBench {
+    type Params = Params;
 
     fn open(params: Params) -> Result<Opened, Mistakes> {
         let chain = load(&params.urdf, &params.tip, &params.mount)?;
@@ -163,56 +166,80 @@ objects = [
         check_start(&joints, &params.start)?;
         let shape = ImageShape { rows: params.rows.0, cols: params.cols.0, pitch: [*params.pitch; 2], unit: Unit::RAW };
         check::check(&params, &shape)?;
-        let fills = vec![pad(&params, &shape)?, arm(&params, &joints)?, truth(&shape)];
         let period = period_of(params.rate_hz);
-        let description = Description { fills, period: period as f64 * 1e-9 };
-        let bench = Self::new(params, chain, joints, shape, period)?;
+        let mut description = Description::every(period as f64 * 1e-9);
+        let ports = Ports::describe(&mut description, &params, &shape, &joints)?;
+        let bench = Self::new(ports, params, chain, joints, shape, period)?;
         Ok(Opened { description, driver: Driver::Stepped(Box::new(bench)) })
     }
 }
 
-fn pad(params: &Params, shape: &ImageShape) -> Result<Filled, Mistakes> {
+/// The ports of the pad, the arm and the ground truth.
+struct Ports {
+    image: Output<Image>,
+    position: Output<Joints>,
+    equilibrium: Output<Joints>,
+    velocity: Command,
+    contact: Report<Pose>,
+    /// Each number of the truth, with its name in the role.
+    truth: Vec<(Cow<'static, str>, Output<Scalar>)>,
+    clean_image: Output<Image>,
+}
+
+impl Ports {
+    fn describe(
+        description: &mut Description,
+        params: &Params,
+        shape: &ImageShape,
+        joints: &[Joint],
+    ) -> Result<Self, Mistakes> {
+        let mut pad = description.fills("tactile_pad");
+        pad.facts(pad_facts(params)?);
+        let image = pad.output("image", shape.clone());
+        let joints = JointsShape { joints: joints.to_vec(), unit: Unit::RADIAN };
+        let mut arm = description.fills("velocity_arm");
+        arm.facts(facts(&params.urdf, &params.tip, &params.mount)?);
+        let (position, equilibrium) =
+            (arm.output("position", joints.clone()), arm.output("equilibrium", joints.clone()));
+        let velocity = arm.command("velocity", joints.in_unit(Unit::RADIAN.per_second()));
+        let contact = arm.report("contact");
+        let role = ground_truth();
+        let mut truth = description.fills(role.name);
+        let clean_image = truth.output("image", ImageShape { unit: Unit::NEWTON, ..shape.clone() });
+        let numbers = role.outputs.into_iter().filter(|port| port.kind == Kind::Scalar);
+        let number = |port: PortSpec| {
+            let unit = port.args[0].parse().expect("the role's units are units");
+            (port.name.clone(), truth.output(port.name, ScalarShape::of(unit)))
+        };
+        let truth = numbers.map(number).collect();
+        Ok(Self { image, position, equilibrium, velocity, contact, truth, clean_image })
+    }
+}
+
+fn pad_facts(params: &Params) -> Result<Vec<(Cow<'static, str>, toml::Value)>, Mistakes> {
     let mut calibration = toml::Table::new();
     if let Some(file) = &params.calibration {
         calibration.insert("file".into(), fact_of("calibration", file)?.into());
     }
-    let facts: Vec<(Cow<'static, str>, toml::Value)> = vec![
+    Ok(vec![
         ("dead".into(), toml::Value::Array(vec![])),
         ("threshold".into(), (*params.threshold).into()),
         ("pressure".into(), (*params.pressure).into()),
         ("calibration".into(), calibration.into()),
         ("common_noise".into(), (*params.electronics.common_noise).into()),
         ("own_noise".into(), (*params.electronics.own_noise).into()),
-    ];
-    Ok(Filled { role: "tactile_pad".into(), outputs: vec![shape.clone().into()], commands: vec![], facts })
-}
-
-fn arm(params: &Params, joints: &[Joint]) -> Result<Filled, Mistakes> {
-    let shape = JointsShape { joints: joints.to_vec(), unit: Unit::RADIAN };
-    Ok(Filled {
-        role: "velocity_arm".into(),
-        outputs: vec![shape.clone().into(), shape.clone().into()],
-        commands: vec![shape.in_unit(Unit::RADIAN.per_second()).into()],
-        facts: facts(&params.urdf, &params.tip, &params.mount)?,
-    })
-}
-
-/// Index of the first port of the ground truth.
-const TRUTH: usize = 3;
-
-fn truth(shape: &ImageShape) -> Filled {
-    let role = ground_truth();
-    let outputs = role.outputs.iter().map(|port| match port.args.first() {
-        Some(unit) if port.kind == Kind::Scalar => {
-            ScalarShape::of(unit.parse().expect("the role's units are units")).into()
-        }
-        _ => ImageShape { unit: Unit::NEWTON, ..shape.clone() }.into(),
-    });
-    Filled { outputs: outputs.collect(), commands: vec![], facts: vec![], role: role.name.clone() }
+    ])
 }
 
 impl SimBench {
-    fn new(params: Params, chain: Chain, joints: Vec<Joint>, shape: ImageShape, period: i64) -> Result<Self, Mistakes> {
+    fn new(
+        ports: Ports,
+        params: Params,
+        chain: Chain,
+        joints: Vec<Joint>,
+        shape: ImageShape,
+        period: i64,
+    ) -> Result<Self, Mistakes> {
         let inertia = params.inertia.unwrap_or_else(|| INERTIA.to_vec());
         let joint = |inertia: f64| JointDynamics {
             stiffness: *params.stiffness,
@@ -239,6 +266,7 @@ impl SimBench {
         let frames = (latency / period) as usize + 2;
         let (taken, spare) = (VecDeque::with_capacity(frames), vec![vec![0.0; tactels]; frames]);
         Ok(Self {
+            ports,
             world,
             readout,
             joints,
@@ -251,7 +279,6 @@ impl SimBench {
             shown: 0,
             sequence: 0,
             threshold,
-            truth: ground_truth().outputs,
         })
     }
 
@@ -282,7 +309,7 @@ impl SimBench {
         while self.taken.front().is_some_and(|(stamp, _)| stamp + self.latency <= now) {
             let (stamp, counts) = self.taken.pop_front().expect("the front was just checked");
             self.shown += 1;
-            samples.write::<Image>(0, stamp, self.shown).cells_mut().copy_from_slice(&counts);
+            samples.write(self.ports.image, stamp, self.shown).cells_mut().copy_from_slice(&counts);
             self.spare.push(counts);
         }
     }
@@ -302,7 +329,7 @@ impl Stepped for SimBench {
         if self.last.is_some_and(|last| now <= last) {
             return Ok(());
         }
-        let velocity = commands.joints(0);
+        let velocity = commands.joints(self.ports.velocity);
         if let Some(i) = velocity.iter().position(|v| !v.is_finite()) {
             let name = &self.joints[i].name;
             return Err(DeviceError(format!("the velocity commanded to joint `{name}` is not finite")));
@@ -314,9 +341,9 @@ impl Stepped for SimBench {
         self.sequence += 1;
         self.show(now, samples);
         let arm = &self.world.arm;
-        samples.write::<Joints>(1, now, self.sequence).0.copy_from_slice(&arm.position);
-        samples.write::<Joints>(2, now, self.sequence).0.copy_from_slice(&arm.equilibrium);
-        self.write_truth(now, commands.report::<Pose>(0), samples);
+        samples.write(self.ports.position, now, self.sequence).0.copy_from_slice(&arm.position);
+        samples.write(self.ports.equilibrium, now, self.sequence).0.copy_from_slice(&arm.equilibrium);
+        self.write_truth(now, commands.report(self.ports.contact), samples);
         Ok(())
     }
 }
@@ -345,14 +372,13 @@ impl SimBench {
             "own_noise" => noise.map(|[_, own]| own),
             other => unreachable!("the role has an output `{other}` that the bench does not know"),
         };
-        for (port, spec) in self.truth.iter().enumerate().filter(|(_, spec)| spec.kind == Kind::Scalar) {
-            match value(&spec.name) {
-                Some(value) => *samples.write::<Scalar>(TRUTH + port, now, self.sequence) = value,
-                None => samples.clear(TRUTH + port, now, self.sequence),
+        for (name, port) in &self.ports.truth {
+            match value(name) {
+                Some(value) => *samples.write(*port, now, self.sequence) = value,
+                None => samples.clear(*port, now, self.sequence),
             }
         }
-        let image = self.truth.iter().position(|spec| spec.kind == Kind::Image).expect("the role has an image");
-        let cells = samples.write::<Image>(TRUTH + image, now, self.sequence).cells_mut();
+        let cells = samples.write(self.ports.clean_image, now, self.sequence).cells_mut();
         cells.iter_mut().zip(self.world.image()).for_each(|(cell, force)| *cell = *force as f32);
     }
 }

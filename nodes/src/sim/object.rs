@@ -109,7 +109,7 @@ impl Object {
         let shape = shape_of(params)?;
         if let Some(step) = params.motion.iter().find(|step| *step.to_s <= *step.from_s) {
             return Err(format!(
-                "a motion must end after it starts, but this one is from {} s to {} s",
+                "a motion must end after it starts, not go from {} s to {} s",
                 *step.from_s, *step.to_s
             ));
         }
@@ -199,11 +199,7 @@ fn shape_of(params: &ObjectParams) -> Result<Geometry, String> {
     let size = || {
         let size = params.size.ok_or_else(|| given("size"))?;
         let is_good = size.iter().all(|size| *size > 0.0 && size.is_finite());
-        if is_good {
-            Ok(size.map(|size| size / 2.0))
-        } else {
-            Err("each entry of `size` must be greater than 0".to_owned())
-        }
+        if is_good { Ok(size.map(|size| size / 2.0)) } else { Err("each `size` must be greater than 0".to_owned()) }
     };
     let used: &[&str] = match kind {
         ShapeKind::Plane => &[],

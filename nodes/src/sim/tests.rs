@@ -163,12 +163,12 @@ fn the_result_does_not_depend_on_the_step() {
         forces
     };
     let fine = run(0.00025);
-    let greatest = fine.iter().fold(0.0, |most: f64, truth| most.max(truth.force));
-    assert!(greatest > 2.0, "it presses: {greatest} N");
+    let max_force = fine.iter().fold(0.0, |most: f64, truth| most.max(truth.force));
+    assert!(max_force > 2.0, "it presses: {max_force} N");
     for step in [0.002, 0.001] {
         for (truth, exact) in run(step).iter().zip(&fine) {
-            assert!((truth.force - exact.force).abs() < 0.02 * greatest, "{step}: {truth:?} {exact:?}");
-            assert!((truth.tangential - exact.tangential).abs() < 0.03 * greatest, "{step}: {truth:?} {exact:?}");
+            assert!((truth.force - exact.force).abs() < 0.02 * max_force, "{step}: {truth:?} {exact:?}");
+            assert!((truth.tangential - exact.tangential).abs() < 0.03 * max_force, "{step}: {truth:?} {exact:?}");
         }
     }
 }

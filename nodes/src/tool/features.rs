@@ -1,6 +1,6 @@
-//! `features`: the touch part over any recording, and the features of the contact as a table.
+//! `tactflow features`: runs the touch part on a recording and writes the features of the contact as a table.
 //!
-//! It is a graph like any other, made from the command line: `--graph` prints it, to go on with.
+//! It makes an ordinary graph from the command line; `--graph` prints it as a starting point.
 
 use std::fmt::Write;
 use std::num::NonZeroU32;
@@ -9,14 +9,14 @@ use std::path::{Path, PathBuf};
 use tactflow_runtime::cli::{Job, Print, Shell, clap, duration};
 use tactflow_runtime::graph::Request;
 
-use super::{pair, positive};
+use super::arguments::{pair, positive};
 use crate::recordings::{self, Hints, Recording};
 
-/// The features of the contact in a recording: where it is, how strong, along which line
+/// Extract the features of the contact in a recording: position, force, line direction
 #[derive(clap::Parser)]
 #[command(
     name = "features",
-    after_help = "Every format of the device `recording` is read; `tactflow describe recording` lists them.
+    after_help = "Reads every format of the device `recording`; `tactflow describe recording` lists them.
 
 Examples:
   tactflow features press.csv -o features.csv
@@ -25,59 +25,59 @@ Examples:
   tactflow features press.csv --graph > press.toml"
 )]
 pub(super) struct Features {
-    /// The recording, also zipped
+    /// Recording, optionally in a .zip or .gz
     recording: PathBuf,
-    /// Write a row a frame, as .csv or .ndjson
+    /// Write one row a frame, as .csv or .ndjson
     #[arg(short, long, value_name = "FILE")]
     out: Option<PathBuf>,
-    /// Print the graph that finds the features, and run nothing
+    /// Print the graph and do not run it
     #[arg(long, conflicts_with = "out")]
     graph: bool,
-    /// A tactel is touched above this [unit of the recording]; the file's own, or 5 % of its greatest value
+    /// Threshold of a touched tactel [unit of the recording]; by default that of the file, or 5 % of its maximum
     #[arg(long, value_name = "VALUE", allow_hyphen_values = true, value_parser = finite)]
     threshold: Option<f64>,
-    /// Least area of a contact [tactels]
+    /// Minimum area of a contact [tactels]
     #[arg(long, value_name = "TACTELS", default_value_t = 4, value_parser = clap::value_parser!(u32).range(1..))]
     min_area: u32,
-    /// Least sum over a contact [unit of the recording]
+    /// Minimum sum over a contact [unit of the recording]
     #[arg(long, value_name = "VALUE", default_value_t = 0.0, value_parser = finite)]
     min_force: f64,
-    /// Number of frames that pressure and orientation are averaged over
+    /// Number of frames for the averages of pressure and orientation
     #[arg(long, value_name = "FRAMES", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..))]
     window: u32,
     #[command(flatten)]
     hints: HintArgs,
-    /// Stop after this time of the recording: 20s, 500ms, 2min
+    /// Stop after this time in the recording: 20s, 500ms, 2min
     #[arg(long = "for", value_name = "TIME", value_parser = duration, allow_hyphen_values = true)]
     duration: Option<f64>,
 }
 
-/// What the file may leave open.
+/// Properties that the file may not give.
 #[derive(clap::Args)]
 struct HintArgs {
-    /// Name of the format, if it is not recognised
+    /// Name of the format, if the file is not recognised
     #[arg(long, value_name = "NAME")]
     format: Option<String>,
-    /// Unit of the values, where the file does not say it: raw, N, kPa
+    /// Unit of the values, if the file does not give it: raw, N, kPa
     #[arg(long, value_name = "UNIT")]
     unit: Option<String>,
-    /// Distance of neighbours along x and y [mm], where the file does not say it: 5x5
+    /// Distance of neighbours along x and y [mm], if the file does not give it: 5x5
     #[arg(long, value_name = "XxY", value_parser = lengths)]
     pitch_mm: Option<[f64; 2]>,
-    /// Frames per second, where the file does not say it
+    /// Frames per second, if the file does not give it
     #[arg(long, value_name = "HZ", value_parser = positive)]
     rate_hz: Option<f64>,
-    /// Number of rows and columns, where the file does not say it: 16x16
+    /// Number of rows and columns, if the file does not give it: 16x16
     #[arg(long, value_name = "ROWSxCOLS", value_parser = pair::<NonZeroU32>)]
     size: Option<[NonZeroU32; 2]>,
 }
 
-/// What counts as touched where a file does not say it: this part of its greatest value.
-const PART_OF_PEAK: f64 = 0.05;
+/// Default threshold of a touched tactel, as a fraction of the maximum value of the recording.
+const DEFAULT_THRESHOLD: f64 = 0.05;
 
 pub(super) fn features(args: Features, shell: &Shell) -> u8 {
-    // What is wrong with the recording is told when the graph is checked: once, and at its place.
-    let (headline, threshold) = match args.look() {
+    // The check of the graph reports what is wrong with the recording, once and at its place.
+    let (headline, threshold) = match args.inspect() {
         Some((headline, threshold)) => (Some(headline), threshold),
         None => (None, Threshold::given(0.0)),
     };
@@ -100,12 +100,13 @@ pub(super) fn features(args: Features, shell: &Shell) -> u8 {
         listen: false,
         out: args.out,
         points: None,
+        svg: None,
         print: Print::Ports,
     }
     .run(shell)
 }
 
-/// A threshold, and where it is from.
+/// A threshold and its origin.
 struct Threshold {
     value: f64,
     from: String,
@@ -113,13 +114,13 @@ struct Threshold {
 
 impl Threshold {
     fn given(value: f64) -> Self {
-        Self { value, from: "as given".into() }
+        Self { value, from: "from --threshold".into() }
     }
 }
 
 impl Features {
-    /// What there is to say of the recording, and what counts as touched in it. It is not kept: the graph reads it anew.
-    fn look(&self) -> Option<(String, Threshold)> {
+    /// Returns the summary of the recording and the threshold. The recording is dropped: the graph reads it again.
+    fn inspect(&self) -> Option<(String, Threshold)> {
         let bytes = std::fs::read(&self.recording).ok()?;
         let recording = self.hints.read(&bytes, &self.recording)?;
         let threshold = self.threshold(&recording);
@@ -131,15 +132,15 @@ impl Features {
             return Threshold::given(value);
         }
         if let Some(value) = recording.threshold {
-            return Threshold { value, from: "as the file says".into() };
+            return Threshold { value, from: "from the file".into() };
         }
         let peak = recording.cells.iter().fold(0.0_f32, |peak, cell| peak.max(*cell));
-        let value = f64::from(peak) * PART_OF_PEAK;
-        let from = format!("{} % of the greatest value; --threshold sets another", PART_OF_PEAK * 100.0);
+        let value = f64::from(peak) * DEFAULT_THRESHOLD;
+        let from = format!("{} % of the maximum value; set another with --threshold", DEFAULT_THRESHOLD * 100.0);
         Threshold { value, from }
     }
 
-    /// What was read, and what counts as a contact.
+    /// Returns the summary: the recording, and the definition of a contact.
     fn headline(&self, recording: &Recording, threshold: &Threshold) -> String {
         let shape = &recording.shape;
         let [x, y] = shape.pitch.map(|pitch| (pitch * 1e6).round() * 1e-3);
@@ -160,7 +161,7 @@ impl Features {
         )
     }
 
-    /// The graph, without what the command line says of the recording.
+    /// Returns the graph, without the settings of the recording from the command line.
     fn graph_text(&self, threshold: &Threshold) -> String {
         let Self { min_area, min_force, window, .. } = self;
         let mut text = format!(
@@ -190,7 +191,7 @@ type = "recording"
         );
         if self.graph {
             for setting in self.settings() {
-                let setting = setting.strip_prefix(DEVICE).expect("they are all the device's");
+                let setting = setting.strip_prefix(DEVICE).expect("all settings are those of the device");
                 // Writing to a string cannot fail.
                 let _ = writeln!(text, "{setting}");
             }
@@ -198,11 +199,11 @@ type = "recording"
         text
     }
 
-    /// What the command line says of the recording, as `--set` would: there its mistakes are shown.
+    /// Returns the settings of the recording from the command line, as those of `--set`, so that mistakes appear there.
     fn settings(&self) -> Vec<String> {
         let HintArgs { format, unit, pitch_mm, rate_hz, size } = &self.hints;
         let word = |text: &str| toml::Value::from(text).to_string();
-        // A graph that is printed may be put anywhere.
+        // A printed graph may be stored in any folder.
         let path = if self.graph { std::path::absolute(&self.recording).ok() } else { None };
         let path = path.as_ref().unwrap_or(&self.recording).to_string_lossy();
         let mut settings = vec![format!("{DEVICE}file = {}", word(&path))];
@@ -218,7 +219,7 @@ type = "recording"
 const DEVICE: &str = "devices.recording.";
 
 impl HintArgs {
-    /// The recording, if there is nothing wrong with it.
+    /// Returns the recording, or `None` if it has mistakes.
     fn read(&self, bytes: &[u8], path: &Path) -> Option<Recording> {
         let hints = Hints {
             format: self.format.clone(),
@@ -232,7 +233,7 @@ impl HintArgs {
     }
 }
 
-/// Two lengths that are some.
+/// Parses two lengths greater than 0: a parser for arguments.
 fn lengths(text: &str) -> Result<[f64; 2], String> {
     let two = pair::<f64>(text)?;
     if two.iter().all(|length| *length > 0.0 && length.is_finite()) {

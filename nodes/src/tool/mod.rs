@@ -1,43 +1,18 @@
-//! The commands that know sensors; the runtime's own know none.
+//! The commands that know sensors. The commands of the runtime know none.
 
+mod arguments;
 mod calibrate;
 mod features;
 mod press;
 
-use std::path::Path;
-use std::str::FromStr;
-
 use tactflow_runtime::catalogue::Catalogue;
 use tactflow_runtime::cli::{Tool, derived};
 
-/// The whole tool, on a catalogue that has this crate's in it.
+/// Returns the tool with all commands, for a catalogue that includes that of this crate.
 #[must_use]
 pub fn tool(catalogue: Catalogue) -> Tool {
     Tool::new(catalogue)
         .command(derived(features::features))
         .command(derived(calibrate::run))
         .command(derived(press::run))
-}
-
-/// Two of a kind, as 5x5 or 5,5: a parser for arguments.
-fn pair<T: FromStr>(text: &str) -> Result<[T; 2], String> {
-    let two = text.split_once(['x', ',']).ok_or("expected two numbers, as 5x5")?;
-    let read = |text: &str| text.trim().parse().map_err(|_| format!("`{text}` is no number that can stand here"));
-    Ok([read(two.0)?, read(two.1)?])
-}
-
-/// A number greater than 0: a parser for arguments.
-fn positive(text: &str) -> Result<f64, String> {
-    let number = text.parse().ok().filter(|number: &f64| *number > 0.0 && number.is_finite());
-    number.ok_or_else(|| format!("`{text}` is not a number greater than 0"))
-}
-
-/// Refuses to replace what is something else.
-fn may_replace(path: &Path, what: &str, is_one: impl Fn(&str) -> bool) -> Result<(), String> {
-    match std::fs::read(path) {
-        Ok(bytes) if str::from_utf8(&bytes).is_ok_and(is_one) => Ok(()),
-        Ok(_) => Err(format!("`{}` is there and is no {what}: it is not replaced", path.display())),
-        Err(error) if error.kind() == std::io::ErrorKind::NotFound => Ok(()),
-        Err(error) => Err(format!("cannot write `{}`: {error}", path.display())),
-    }
 }

@@ -1,4 +1,4 @@
-//! `tactflow press`: the simulated pad under a bladder, as the log that a calibration is made from.
+//! `tactflow press`: presses the simulated pad with a bladder and writes the log for a calibration.
 
 use std::fmt::Write as _;
 use std::io::{BufWriter, Write as _};
@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use tactflow_runtime::cli::clap::{self, Parser};
 use tactflow_runtime::cli::{NOT_LOADED, Shell};
 
-use super::{may_replace, pair, positive};
+use super::arguments::{may_replace, pair, positive};
 use crate::sim::bench::MAX_TACTELS;
 use crate::sim::readout::{Electronics, Readout};
 
@@ -16,50 +16,50 @@ use crate::sim::readout::{Electronics, Readout};
 #[derive(Parser)]
 #[command(name = "press")]
 #[command(
-    after_help = "The bladder presses on all tactels alike, slowly up to the largest force and down again, after five seconds without a load.
-The log has the columns time [s], force [N] and what each tactel reads [raw], as `tactflow calibrate` takes it.
+    after_help = "After five seconds without a load, the bladder presses on all tactels equally, slowly up to the maximum force and down again.
+The log has the columns time [s], force [N] and the reading of each tactel [raw]; `tactflow calibrate` reads it.
 
 Examples:
   tactflow press -o press.csv
   tactflow calibrate press.csv --load uniform -o pad.toml
   tactflow run graphs/hybrid.toml --set devices.bench.calibration=pad.toml
 
-Exit codes: 0 all went well; 2 the log cannot be written."
+Exit codes: 0 success; 2 the log cannot be written."
 )]
 pub(super) struct Press {
-    /// Write the log; one that is there is replaced, any other file is not
+    /// Write the log; replaces a log of this command, but no other file
     #[arg(short, long, value_name = "FILE")]
     out: PathBuf,
-    /// Which pad: the `electronics.serial` of a `sim_bench`
+    /// Serial number of the pad: `electronics.serial` of a `sim_bench`
     #[arg(long, default_value_t = *SERIAL)]
     serial: u64,
     /// Rows and columns of the pad
     #[arg(long, value_name = "ROWSxCOLS", value_parser = pair::<NonZeroUsize>, default_value = "16x16")]
     size: [NonZeroUsize; 2],
-    /// Largest force on a tactel [N]
+    /// Maximum force on a tactel [N]
     #[arg(long, value_name = "NEWTONS", value_parser = positive, default_value = "3")]
     most: f64,
 }
 
 const SERIAL: &u64 = &Electronics::DEFAULT.serial;
 /// Frames per second of the log [1/s].
-const RATE: f64 = 50.0;
-/// Time before the press, in which the zero is taken. There is none after it, as the foam creeps back [s].
-const REST: f64 = 5.0;
+const RATE_HZ: f64 = 50.0;
+/// Time before the press, for the zero. There is no rest after the press, because the foam recovers slowly [s].
+const REST_S: f64 = 5.0;
 /// Time of the press, up and down [s].
-const PRESS: f64 = 30.0;
+const PRESS_S: f64 = 30.0;
 
 pub(super) fn run(args: Press, shell: &Shell) -> u8 {
     let [rows, cols] = args.size.map(NonZeroUsize::get);
     if rows.saturating_mul(cols) > MAX_TACTELS {
-        shell.error(format_args!("a simulated pad has {MAX_TACTELS} tactels at most, not {rows} by {cols}"));
+        shell.error(format_args!("a simulated pad has at most {MAX_TACTELS} tactels, not {rows} by {cols}"));
         return NOT_LOADED;
     }
-    let done = may_replace(&args.out, "press log", |text| text.starts_with("time,force,t0_0"))
+    let done = may_replace(&args.out, "a log of `press`", |text| text.starts_with("time,force,t0_0"))
         .and_then(|()| write(&args).map_err(|error| format!("cannot write `{}`: {error}", args.out.display())));
     match done {
         Ok(frames) => {
-            shell.say(&format!("wrote {}: {frames} frames at {RATE} Hz", shown(&args.out)));
+            shell.say(&format!("wrote {}: {frames} frames at {RATE_HZ} Hz", shown(&args.out)));
             0
         }
         Err(message) => {
@@ -81,12 +81,12 @@ fn write(args: &Press) -> std::io::Result<usize> {
     let names = (0..rows).flat_map(|i| (0..cols).map(move |j| format!(",t{i}_{j}")));
     writeln!(file, "time,force{}", names.collect::<String>())?;
     let mut counts = vec![0.0; tactels];
-    let frames = ((REST + PRESS) * RATE) as usize;
+    let frames = ((REST_S + PRESS_S) * RATE_HZ) as usize;
     let mut line = String::new();
     for frame in 0..frames {
-        let time = frame as f64 / RATE;
+        let time = frame as f64 / RATE_HZ;
         let each = args.most * bladder(time);
-        readout.read(1.0 / RATE, &vec![each; tactels], &mut counts);
+        readout.read(1.0 / RATE_HZ, &vec![each; tactels], &mut counts);
         line.clear();
         // Writing to a string cannot fail.
         let _ = write!(line, "{time:.2},{:.6}", each * tactels as f64);
@@ -99,8 +99,8 @@ fn write(args: &Press) -> std::io::Result<usize> {
     Ok(frames)
 }
 
-/// How far the bladder is blown up at a time [s], from 0 to 1.
+/// Returns the pressure of the bladder at a time [s], from 0 to 1.
 fn bladder(time: f64) -> f64 {
-    let t = (time - REST) / PRESS;
+    let t = (time - REST_S) / PRESS_S;
     if t < 0.0 { 0.0 } else { 1.0 - (2.0 * t - 1.0).abs() }
 }

@@ -1,37 +1,53 @@
-//! `eccentricity`: how long a contact is: sqrt(1 - b² / a²) of the ellipse with the same second moments.
-//!
-//! a² and b² are the greatest and the least variance of the region's tactels, counted as points, each with its weight.
+//! `eccentricity`: sqrt(1 - b² / a²) of the ellipse with the same second central moments as the contact.
 
-use tactflow_runtime::node::{Mistakes, Node, Setup, Tick};
-use tactflow_runtime::signal::ImageShape;
-use tactflow_runtime::{inputs, outputs, params};
+use tactflow_runtime::node::{Describe, Mistakes, Node, Out, Outputs, Param, Setup, Tick};
+use tactflow_runtime::signal::{ImageShape, Scalar};
 
-use super::moments::{Weighing, Weight, ellipse};
-use super::on_one_array;
+use super::moments::{Inputs, Weighing, Weight, ellipse, image_shape};
 
-params! {
-    /// What a tactel counts: its "force", its "excess" above `threshold`, or the same as all others ("area").
-    weight: Weight = Weight::Force,
-    /// Where the excess begins, for `weight = "excess"`: that of the `binarize` [unit of the image].
-    threshold: Option<f64>,
-}
-
-inputs! {
-    /// The image that forces are taken from.
-    image: Image["U", "A"],
-    /// The tactels of the contact, R.
-    region: Mask["A"],
-}
-
-outputs! {
-    /// From 0 for a circle to 1 for a line [1]; absent for a region without extent, a single tactel say.
-    eccentricity: Scalar["1", "A"],
-}
-
-/// The array, and the weight.
+/// Distinguishes a round contact from a long one: the eccentricity of its ellipse.
+///
+/// The ellipse with the same second central moments as the region has the half axes a and b, up to a common factor. The
+/// output is sqrt(1 - b² / a²): 0 for a circle or a square, 0.87 for twice as long as wide, 0.98 for five times, 1 for a
+/// single row of tactels.
+///
+/// It grows steeply for shapes that are almost round. The `anisotropy` A of `moments` is flat there and contains the same
+/// information: the eccentricity is sqrt(2 A / (1 + A)), so an anisotropy of 0.05 is an eccentricity of 0.31.
+/// `principal_axes` measures a and b in metres.
+///
+/// Tactels count as points, each with its `weight` as in `moments`. A region without extent, such as a single tactel, has
+/// no eccentricity: the output is absent.
+///
+/// ```toml
+/// [nodes.eccentricity]
+/// type = "eccentricity"
+/// in.image = "calibrate.image"
+/// in.region = "label.region"
+/// ```
+#[derive(Describe)]
+#[describe(name = "eccentricity")]
 pub struct Eccentricity {
     shape: ImageShape,
     weighing: Weighing,
+}
+
+/// Parameters of `eccentricity`.
+#[derive(Debug, Clone, Param)]
+pub struct Params {
+    /// Weight of each tactel: its value, its excess over `threshold`, or 1.
+    #[param(default = Weight::Force)]
+    weight: Weight,
+    /// Zero of the excess, for `weight = "excess"`: the threshold of `binarize`, or its `release` if it has one.
+    #[param(unit = "U")]
+    threshold: Option<f64>,
+}
+
+/// What `eccentricity` writes.
+#[derive(Outputs)]
+pub struct Outputs {
+    /// From 0 for a circle to 1 for a line; absent for a region without extent, such as a single tactel.
+    #[port(unit = "1", frame = "A")]
+    eccentricity: Out<Scalar>,
 }
 
 impl Node for Eccentricity {
@@ -40,26 +56,9 @@ impl Node for Eccentricity {
     type Outputs = Outputs;
     type State = ();
 
-    const NAME: &'static str = "eccentricity";
-    const SUMMARY: &'static str = "tells a round contact from a long one: the eccentricity of its ellipse";
-    const DOC: &'static str = "The ellipse with the same second central moments as the region has the half axes a and \
-        b, up to a common factor; this is sqrt(1 - b² / a²): 0 for a circle or a square, 0.87 when it is twice as long \
-        as wide, 0.98 at five times, 1 for a single row of tactels.\n\n\
-        It grows steeply where shapes are almost round. The `anisotropy` of `moments`, A, is flat there and says the \
-        same: the eccentricity is sqrt(2 A / (1 + A)), so 0.05 is 0.31. `principal_axes` gives a and b in metres.\n\n\
-        Tactels count as points, each with its `weight` as in `moments`. A region without extent, a single tactel, has \
-        none: the output is absent.";
-    const EXAMPLE: &'static str = r#"
-[nodes.eccentricity]
-type = "eccentricity"
-in.image = "calibrate.image"
-in.region = "label.region"
-"#;
-
     fn new(params: Params, setup: &mut Setup<Self>) -> Result<Self, Mistakes> {
-        let shape = setup.inputs.image.clone();
-        on_one_array(&shape, "region", &setup.inputs.region)?;
         setup.outputs.eccentricity.range = [0.0, 1.0];
+        let shape = image_shape(&setup.inputs)?;
         Ok(Self { shape, weighing: Weighing::new(params.weight, params.threshold)? })
     }
 
@@ -80,7 +79,7 @@ in.region = "label.region"
 mod tests {
     use tactflow_runtime::harness::NodeRig;
     use tactflow_runtime::node::At;
-    use tactflow_runtime::signal::{Grid, Image, Mask, Scalar, Unit};
+    use tactflow_runtime::signal::{Grid, Image, Mask, Unit};
 
     use super::super::moments::Moments;
     use super::*;
@@ -91,7 +90,7 @@ mod tests {
         NodeRig::new::<N>(params, &[("region", Grid::from(&image).into()), ("image", image.into())])
     }
 
-    /// Shows an image, what is above zero as the region, and reads an output.
+    /// Shows an image whose region is the tactels above zero, and returns an output.
     fn show(rig: &mut NodeRig, value: &dyn Fn(usize, usize) -> f64, output: &str) -> Option<f64> {
         let (mut image, mut region) = (Image::zeros(20, 24), Mask::empty(20, 24));
         for (i, j) in (0..20).flat_map(|i| (0..24).map(move |j| (i, j))).filter(|(i, j)| value(*i, *j) > 0.0) {
@@ -138,7 +137,7 @@ mod tests {
     }
 
     #[test]
-    fn it_is_what_the_anisotropy_says_with_any_weight() {
+    fn it_follows_from_the_anisotropy_with_any_weight() {
         let mut random = Random::new(9, 0);
         for round in 0..60 {
             let cells: Vec<f64> = (0..480).map(|_| random.uniform(0.0, 1.0) - 0.7).collect();
@@ -152,8 +151,8 @@ mod tests {
     }
 
     #[test]
-    fn tactels_below_zero_that_leave_no_spread_leave_no_shape() {
-        // A strong middle between two that pull: the sum is positive, the variance along x is not.
+    fn without_a_positive_variance_it_is_absent() {
+        // A strong tactel between two negative ones: the sum is positive, the variance along x is not.
         let (mut image, mut region) = (Image::zeros(20, 24), Mask::empty(20, 24));
         for (i, j, value) in [(2, 5, 0.3), (3, 4, -1.0), (3, 5, 9.0), (3, 6, -1.0), (4, 5, 0.3)] {
             image.cells_mut()[i * 24 + j] = value;
@@ -167,7 +166,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_refused() {
+    fn wrong_weights_are_refused() {
         let cases = [
             ("weight = \"excess\"", At::Param("weight".into())),
             ("threshold = 0.1", At::Key("threshold".into())),

@@ -1,46 +1,64 @@
 //! `principal_axes`: length, width and direction of a contact, from the second central moments of its tactels (paper
-//! section III takes the direction of the long one).
-//!
-//! The lengths are standard deviations in metres: of tactels as points, each with its weight.
+//! section III uses the direction of the long axis).
 
-use tactflow_runtime::node::{Mistakes, Node, Ratio, Setup, Tick};
-use tactflow_runtime::signal::ImageShape;
-use tactflow_runtime::{inputs, outputs, params};
+use tactflow_runtime::node::{Describe, Mistakes, Node, Out, Outputs, Param, Setup, Tick};
+use tactflow_runtime::signal::{ImageShape, Scalar};
 
-use super::moments::{Weighing, Weight, ellipse};
-use super::on_one_array;
-use crate::motion::axis::half_angle;
+use super::moments::{Inputs, Weighing, Weight, ellipse, image_shape};
 
-params! {
-    /// Below this anisotropy, from 0 (round) to 1 (a line), there is no orientation [1].
-    min_anisotropy: Ratio = Ratio(0.1),
-    /// What a tactel counts: its "force", its "excess" above `threshold`, or the same as all others ("area").
-    weight: Weight = Weight::Force,
-    /// Where the excess begins, for `weight = "excess"`: that of the `binarize` [unit of the image].
-    threshold: Option<f64>,
-}
-
-inputs! {
-    /// The image that forces are taken from.
-    image: Image["U", "A"],
-    /// The tactels of the contact, R.
-    region: Mask["A"],
-}
-
-outputs! {
-    /// Standard deviation along the long axis [m].
-    major: Scalar["m", "A"],
-    /// Standard deviation along the short axis [m].
-    minor: Scalar["m", "A"],
-    /// Direction of the long axis from +x toward +y, in (-pi/2, pi/2] [rad]; absent if the contact is round.
-    orientation: Scalar["rad mod pi", "A"],
-}
-
-/// The array, the weight, and when a contact has an orientation.
+/// Measures the length, the width and the direction of a contact.
+///
+/// The second central moments of a region are a 2 by 2 covariance in square metres. `major` and `minor` are the square
+/// roots of its eigenvalues, the standard deviations along the long and the short axis; `orientation` is the direction of
+/// the long axis, as in `moments`.
+///
+/// A uniform bar of length L has a standard deviation of L / sqrt(12), a uniform disc of radius r has r / 2 along every
+/// axis. Tactels count as points, so a single row has a width of 0, and a bar of n tactels has a standard deviation of
+/// sqrt((n² - 1) / 12) times the pitch.
+///
+/// The outputs are absent without a region, and when the sum of the weights is not positive. A contact whose anisotropy
+/// (major² - minor²) / (major² + minor²) is below `min_anisotropy` has no orientation. `weight` is as in `moments`.
+///
+/// ```toml
+/// [nodes.principal_axes]
+/// type = "principal_axes"
+/// in.image = "calibrate.image"
+/// in.region = "label.region"
+/// ```
+#[derive(Describe)]
+#[describe(name = "principal_axes")]
 pub struct PrincipalAxes {
     shape: ImageShape,
     weighing: Weighing,
     min_anisotropy: f64,
+}
+
+/// Parameters of `principal_axes`.
+#[derive(Debug, Clone, Param)]
+pub struct Params {
+    /// Smallest anisotropy, from 0 (round) to 1 (a line), at which a contact has an orientation.
+    #[param(unit = "1", range = 0.0..=1.0, default = 0.1)]
+    min_anisotropy: f64,
+    /// Weight of each tactel: its value, its excess over `threshold`, or 1.
+    #[param(default = Weight::Force)]
+    weight: Weight,
+    /// Zero of the excess, for `weight = "excess"`: the threshold of `binarize`, or its `release` if it has one.
+    #[param(unit = "U")]
+    threshold: Option<f64>,
+}
+
+/// What `principal_axes` writes.
+#[derive(Outputs)]
+pub struct Outputs {
+    /// Standard deviation along the long axis.
+    #[port(unit = "m", frame = "A")]
+    major: Out<Scalar>,
+    /// Standard deviation along the short axis.
+    #[port(unit = "m", frame = "A")]
+    minor: Out<Scalar>,
+    /// Direction of the long axis from +x toward +y, in (-pi/2, pi/2]; absent if the contact is round.
+    #[port(unit = "rad mod pi", frame = "A")]
+    orientation: Out<Scalar>,
 }
 
 impl Node for PrincipalAxes {
@@ -49,29 +67,10 @@ impl Node for PrincipalAxes {
     type Outputs = Outputs;
     type State = ();
 
-    const NAME: &'static str = "principal_axes";
-    const SUMMARY: &'static str = "measures how long and how wide a contact is, and along which line it lies";
-    const DOC: &'static str = "The second central moments of a region make a 2 by 2 covariance in square metres. `major` \
-        and `minor` are the square roots of its eigenvalues, the standard deviations along the long and the short \
-        axis; `orientation` is the direction of the long one, the same as that of `moments`.\n\n\
-        An even bar of length L has a standard deviation of L / sqrt(12), an even disc of radius r one of r / 2 along \
-        every axis. Tactels count as points, so a single row has no width; a bar of n tactels shows \
-        sqrt((n² - 1) / 12) times the pitch.\n\n\
-        The outputs are absent without a region, and when the sum of the weights is not positive. A contact whose \
-        anisotropy (major² - minor²) / (major² + minor²) is below `min_anisotropy` has no orientation. \
-        `weight` is as in `moments`.";
-    const EXAMPLE: &'static str = r#"
-[nodes.principal_axes]
-type = "principal_axes"
-in.image = "calibrate.image"
-in.region = "label.region"
-"#;
-
     fn new(params: Params, setup: &mut Setup<Self>) -> Result<Self, Mistakes> {
-        let shape = setup.inputs.image.clone();
-        on_one_array(&shape, "region", &setup.inputs.region)?;
+        let shape = image_shape(&setup.inputs)?;
         let weighing = Weighing::new(params.weight, params.threshold)?;
-        Ok(Self { shape, weighing, min_anisotropy: *params.min_anisotropy })
+        Ok(Self { shape, weighing, min_anisotropy: params.min_anisotropy })
     }
 
     fn state(&self) {}
@@ -83,9 +82,8 @@ in.region = "label.region"
             let [major, minor] = ellipse.variances().map(f64::sqrt);
             out.major.set(major);
             out.minor.set(minor);
-            let anisotropy = ellipse.anisotropy();
-            if anisotropy > 0.0 && anisotropy >= self.min_anisotropy {
-                out.orientation.set(half_angle(ellipse.sine, ellipse.cosine));
+            if let Some(orientation) = ellipse.orientation(self.min_anisotropy) {
+                out.orientation.set(orientation);
             }
         }
     }
@@ -98,14 +96,14 @@ mod tests {
     use nalgebra::{Matrix2, Vector2};
     use proptest::prelude::*;
     use tactflow_runtime::harness::NodeRig;
-    use tactflow_runtime::signal::{Grid, Image, Mask, Scalar, Unit};
+    use tactflow_runtime::signal::{Grid, Image, Mask, Unit};
 
     use super::super::binarize::binarize;
     use super::*;
 
     const PITCH: [f64; 2] = [0.005, 0.004];
 
-    /// The three outputs for an image whose region is what is above the threshold.
+    /// Returns the three outputs for an image whose region is the tactels above the threshold.
     fn run(params: &str, image: &Image, threshold: f32) -> [Option<f64>; 3] {
         let shape = ImageShape { rows: image.rows(), cols: image.cols(), pitch: PITCH, unit: Unit::NEWTON };
         let wires = [("region", Grid::from(&shape).into()), ("image", shape.into())];
@@ -119,7 +117,7 @@ mod tests {
     }
 
     #[test]
-    fn patches_in_closed_form() {
+    fn rectangles_in_closed_form() {
         // rows, columns, and whether it has an orientation, of a patch on 16 by 16
         for (rows, cols, angle) in [
             (1, 1, None),
@@ -145,7 +143,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn they_are_the_eigenvalues_of_the_covariance(
+        fn the_axes_are_those_of_the_covariance(
             cells in prop::collection::vec(0..4096u16, 63), threshold in 0..3500u16,
             weight in prop::sample::select(vec!["force", "excess", "area"]),
         ) {

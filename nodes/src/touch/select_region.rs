@@ -1,58 +1,38 @@
 //! `select_region`: one of the regions that `label` has found, by its rank.
-//!
-//! Regions are ordered by area, by force or by distance from a point, and the one of the given rank is taken; of two
-//! that are equal, the one that comes first in raster order. One such node a contact holds several contacts apart.
 
-use tactflow_runtime::node::{At, Count, Mistake, Mistakes, Node, Setup, Tick};
-use tactflow_runtime::signal::{Grid, Region};
+use tactflow_runtime::node::{
+    At, Describe, In, Inputs, Mistake, Mistakes, Node, Out, Outputs, Param, Setup, State, Tick,
+};
+use tactflow_runtime::signal::{Flag, Grid, Mask, Region, Regions};
 use tactflow_runtime::source::Code;
-use tactflow_runtime::{inputs, outputs, params, state};
 
-use super::label::{away, middles, middles_of, paint};
+use super::label::{centroid_buffer, centroids, distance_squared, paint};
 
-words! {
-    /// What regions are ordered by.
-    By {
-        /// The largest comes first.
-        Area = "area",
-        /// The strongest comes first.
-        Force = "force",
-        /// The nearest comes first.
-        Distance = "distance",
-    }
-}
-
-params! {
-    /// What comes first: by "area" the largest, by "force" the strongest, by "distance" the nearest to `point`.
-    by: By = By::Area,
-    /// Which one to take: 1 is the first, 2 the second.
-    rank: Count = Count(1),
-    /// The place that distances are counted from, `[x, y]` from the pad's middle, for `by = "distance"` [m].
-    point: Option<[f64; 2]>,
-    /// Least area of a region to be counted at all [tactels].
-    min_area: Count = Count(1),
-    /// Least sum over a region to be counted at all [unit of the image].
-    min_force: f64 = 0.0,
-}
-
-inputs! {
-    /// All regions, as `label` lists them.
-    regions: Regions["U", "A"],
-}
-
-outputs! {
-    /// The region of that rank; absent when there are fewer.
-    region: Mask["A"],
-    /// Whether there is one.
-    present: Flag,
-}
-
-state! {
-    /// Room for the middle of each region.
-    middles: Vec<[f64; 2]>,
-}
-
-/// The order, and which one is taken.
+/// Selects one of several contacts: the n-th largest, strongest, or nearest to a point.
+///
+/// `label` lists all regions of a mask. This node selects one of them, for `moments` and the other nodes that measure a
+/// region. With one `select_region` for each contact, all on one `label`, each contact has its own features.
+///
+/// Regions with less than `min_area` tactels or less than `min_force` are left out. The others are ordered by area (the
+/// largest first), by force (the strongest first) or by the distance of their centroid, the mean position of their tactels,
+/// from `point` (the nearest first). Equal regions are ordered row by row. The node selects the region of that `rank`. If
+/// there is none, `region` is absent and `present` is not set.
+///
+/// The node has no memory: two contacts of about the same area swap their ranks from frame to frame. If the contacts stay
+/// in their places, `by = "distance"` separates them while all of them are present; when one is lifted, another one is the
+/// nearest to its `point`. To require a second contact, use `present` of a `select_region` with `rank = 2`. To follow a
+/// single contact, use `choose = "nearest"` of `label`.
+///
+/// ```toml
+/// [nodes.select_region]
+/// type = "select_region"
+/// in.regions = "label.regions"
+/// by = "distance"                     # the nearest to `point`
+/// point = [0.02, 0.0]                 # [m]
+/// min_area = 4                        # [tactels]
+/// ```
+#[derive(Describe)]
+#[describe(name = "select_region")]
 pub struct SelectRegion {
     order: Order,
     rank: usize,
@@ -61,6 +41,63 @@ pub struct SelectRegion {
     grid: Grid,
 }
 
+/// Parameters of `select_region`.
+#[derive(Debug, Clone, Param)]
+pub struct Params {
+    /// Order of the regions.
+    #[param(default = By::Area)]
+    by: By,
+    /// Rank of the selected region: 1 is the first, 2 the second.
+    #[param(range = 1..=1_000_000, default = 1)]
+    rank: usize,
+    /// Position `[x, y]` from the middle of the pad, for `by = "distance"`.
+    #[param(unit = "m")]
+    point: Option<[f64; 2]>,
+    /// Smallest area of a region that counts.
+    #[param(unit = "tactel", range = 1..=1_000_000, default = 1)]
+    min_area: usize,
+    /// Smallest force of a region that counts, the sum over its tactels.
+    #[param(unit = "U", default = 0.0)]
+    min_force: f64,
+}
+
+/// Order of the regions.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Param)]
+enum By {
+    /// The largest first.
+    Area,
+    /// The strongest first.
+    Force,
+    /// The nearest to `point` first.
+    Distance,
+}
+
+/// What `select_region` reads.
+#[derive(Inputs)]
+pub struct Inputs<'a> {
+    /// All regions, as `label` lists them.
+    #[port(unit = "U", frame = "A")]
+    regions: In<'a, Regions>,
+}
+
+/// What `select_region` writes.
+#[derive(Outputs)]
+pub struct Outputs {
+    /// The region of the rank; absent if there are fewer.
+    #[port(frame = "A")]
+    region: Out<Mask>,
+    /// Whether there is a region of the rank.
+    present: Out<Flag>,
+}
+
+/// What `select_region` remembers: a buffer of a step.
+#[derive(State)]
+pub struct State {
+    /// Centroid of each region [m].
+    centroids: Vec<[f64; 2]>,
+}
+
+/// Order of the regions, with what it needs.
 enum Order {
     Area,
     Force,
@@ -73,50 +110,29 @@ impl Node for SelectRegion {
     type Outputs = Outputs;
     type State = State;
 
-    const NAME: &'static str = "select_region";
-    const SUMMARY: &'static str = "takes one of several contacts: the n-th largest, strongest, or nearest to a point";
-    const DOC: &'static str = "`label` lists all regions of a mask; this takes one of them, for `moments` and the \
-        others that want a region. One such node a contact, all on one `label`, gives each its own features.\n\n\
-        Regions with less than `min_area` tactels or less than `min_force` are not counted. The others are ordered by \
-        area (the largest first), by force (the strongest first) or by the distance of their middle, the mean place \
-        of their tactels, from `point` (the nearest first), and the one of that `rank` is taken. A tie goes to the \
-        region that comes first, row by row.\n\n\
-        Without a region of that rank, `region` is absent and `present` is not set.\n\n\
-        There is no memory in it: two contacts of about the same area change their ranks from frame to frame. \
-        Where contacts stay in their places, `by = \"distance\"` keeps them apart while all of them are there: when \
-        one is lifted, the nearest to its `point` is another one. A second contact that must be there is that of \
-        `rank = 2`. A single contact is followed by `choose = \"nearest\"` of `label`.";
-    const EXAMPLE: &'static str = r#"
-[nodes.select_region]
-type = "select_region"
-in.regions = "label.regions"
-by = "distance"                     # the first one counted from `point`
-point = [0.02, 0.0]                 # [m]
-min_area = 4                        # [tactels]
-"#;
-
     fn new(params: Params, setup: &mut Setup<Self>) -> Result<Self, Mistakes> {
         let order = match (params.by, params.point) {
             (By::Area, None) => Order::Area,
             (By::Force, None) => Order::Force,
             (By::Distance, Some(point)) => Order::Distance(point),
             (By::Distance, None) => {
-                let message = "`by = \"distance\"` needs a `point` that distances are counted from";
+                let message = "`by = \"distance\"` needs a `point`";
                 let mistake = Mistake::new(Code::MissingKey, At::Param("by".into()), message);
-                return Err(mistake.help("give `point = [x, y]`, from the pad's middle [m]").into());
+                return Err(mistake.help("write `point = [x, y]`, in metres from the middle of the pad").into());
             }
             (By::Area | By::Force, Some(_)) => {
-                let mistake = Mistake::key("point", "`point` means nothing without `by = \"distance\"`");
-                return Err(mistake.help("say `by = \"distance\"`, or leave it out").into());
+                let mistake = Mistake::key("point", "`point` has no effect without `by = \"distance\"`");
+                return Err(mistake.help("write `by = \"distance\"`, or leave `point` out").into());
             }
         };
         let grid = setup.inputs.regions.grid.clone();
         setup.outputs.region = grid.clone();
-        Ok(Self { order, rank: *params.rank, min_area: *params.min_area, min_force: params.min_force, grid })
+        let Params { rank, min_area, min_force, .. } = params;
+        Ok(Self { order, rank, min_area, min_force, grid })
     }
 
     fn state(&self) -> State {
-        State { middles: middles_of(&self.grid) }
+        State { centroids: centroid_buffer(&self.grid) }
     }
 
     fn step(&self, _: &Tick, inputs: Inputs<'_>, out: &mut Outputs, state: &mut State) {
@@ -125,8 +141,8 @@ min_area = 4                        # [tactels]
             Order::Area => self.choose(list, |i| -f64::from(list[i].area)),
             Order::Force => self.choose(list, |i| -list[i].force),
             Order::Distance(point) => {
-                let middles = middles(&self.grid, runs, list, &mut state.middles);
-                self.choose(list, |i| away(middles[i], point))
+                let centroids = centroids(&self.grid, runs, list, &mut state.centroids);
+                self.choose(list, |i| distance_squared(centroids[i], point))
             }
         };
         out.present.set(chosen.is_some());
@@ -137,16 +153,16 @@ min_area = 4                        # [tactels]
 }
 
 impl SelectRegion {
-    /// The region of the rank when those with the least key come first.
+    /// Returns the region of the rank in ascending order of the key, where equals keep their order.
     fn choose(&self, list: &[Region], key: impl Fn(usize) -> f64) -> Option<usize> {
         let counts = |region: &Region| region.area as usize >= self.min_area && region.force >= self.min_force;
         let mut last: Option<(f64, usize)> = None;
         for _ in 0..self.rank {
             let mut first: Option<(f64, usize)> = None;
             for i in (0..list.len()).filter(|i| counts(&list[*i])) {
-                let place = (key(i), i);
-                if last.is_none_or(|last| place > last) && first.is_none_or(|first| place < first) {
-                    first = Some(place);
+                let candidate = (key(i), i);
+                if last.is_none_or(|last| candidate > last) && first.is_none_or(|first| candidate < first) {
+                    first = Some(candidate);
                 }
             }
             last = Some(first?);
@@ -159,7 +175,7 @@ impl SelectRegion {
 mod tests {
     use proptest::prelude::*;
     use tactflow_runtime::harness::NodeRig;
-    use tactflow_runtime::signal::{Flag, Mask, Regions, RegionsShape, Run, Unit};
+    use tactflow_runtime::signal::{RegionsShape, Run, Unit};
 
     use super::*;
 
@@ -183,14 +199,14 @@ mod tests {
         region
     }
 
-    /// First column and number of tactels of a mask.
+    /// Returns the first column and the number of tactels of a mask.
     fn extent(mask: &Mask) -> (u16, u16) {
         assert_eq!(mask.row(1)[0].count_ones() as usize, mask.count());
         (mask.row(1)[0].trailing_zeros() as u16, mask.count() as u16)
     }
 
     #[test]
-    fn the_region_of_a_rank_is_taken() {
+    fn it_selects_the_region_of_the_rank() {
         // columns 0..2, 4..8, 10..12, 20..23
         let four = [(0, 2, 5.0), (4, 4, 1.0), (10, 2, 9.0), (20, 3, 5.0)];
         let cases = [
@@ -220,7 +236,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_refused() {
+    fn wrong_parameters_are_refused() {
         let cases = [
             ("by = \"distance\"", At::Param("by".into())),
             ("point = [0.0, 0.0]", At::Key("point".into())),
@@ -236,7 +252,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn ranks_are_those_of_a_stable_sort(
+        fn the_order_is_that_of_a_stable_sort(
             areas in prop::collection::vec((1..4u16, 0..5u8), 0..6),
             rank in 1..8usize,
             by in 0..3usize,
@@ -245,14 +261,14 @@ mod tests {
             // Four columns for each, so that no two touch.
             let regions: Vec<(u16, u16, f64)> =
                 areas.iter().enumerate().map(|(i, (area, force))| (4 * i as u16, *area, f64::from(*force))).collect();
-            let middle = |(start, area, _): &(u16, u16, f64)| {
+            let centroid = |(start, area, _): &(u16, u16, f64)| {
                 (f64::from(*start) + (f64::from(*area) - 1.0) / 2.0 - 11.5) * 0.005
             };
             let mut sorted = regions.clone();
             match by {
                 0 => sorted.sort_by_key(|region| std::cmp::Reverse(region.1)),
                 1 => sorted.sort_by(|a, b| b.2.total_cmp(&a.2)),
-                _ => sorted.sort_by(|a, b| (middle(a) - x).abs().total_cmp(&(middle(b) - x).abs())),
+                _ => sorted.sort_by(|a, b| (centroid(a) - x).abs().total_cmp(&(centroid(b) - x).abs())),
             }
             let by = ["by = \"area\"".into(), "by = \"force\"".into(), format!("by = \"distance\"\npoint = [{x:?}, 0.0]")][by].clone();
             let found = show(&mut rig(&format!("rank = {rank}\n{by}")).unwrap(), &regions);

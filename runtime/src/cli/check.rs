@@ -1,17 +1,18 @@
-//! `check`: graphs are checked and built, and nothing runs.
+//! `check`: checks and builds graphs without running them.
 
 use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 
-use super::describe::Format;
-use super::json::{Diagnosed, diagnosed};
-use super::{NOT_LOADED, OnArgs, Shell};
+use super::shell::command::{GraphArgs, OutputFormat};
+use super::shell::json::{DiagnosticJson, diagnosed};
+use super::shell::{NOT_LOADED, Shell};
+use super::text::number::milliseconds;
 use crate::graph::{Compiled, compile};
 use crate::scenario::Scenario;
 use crate::source::Report;
 
-/// Check graphs like a compiler would, without running them
+/// Check graphs and scenarios without running them, and report every mistake
 #[derive(clap::Parser)]
 #[command(
     name = "check",
@@ -19,33 +20,33 @@ use crate::source::Report;
   tactflow check graphs/*.toml
   tactflow check graphs/hybrid.toml --bench benches/lab.toml --deny-warnings"
 )]
-pub(super) struct Check {
-    /// The graph files, and scenarios
+pub(crate) struct CheckArgs {
+    /// Graph files and scenario files
     #[arg(required = true)]
     graphs: Vec<PathBuf>,
     #[command(flatten)]
-    on: OnArgs,
-    /// Fail on warnings too
+    graph_args: GraphArgs,
+    /// Treat warnings as errors
     #[arg(long)]
     deny_warnings: bool,
-    /// How to print it
-    #[arg(long, value_enum, default_value_t = Format::Text, value_name = "FORMAT")]
-    format: Format,
+    /// Output format
+    #[arg(long, value_enum, default_value_t = OutputFormat::Text, value_name = "FORMAT")]
+    format: OutputFormat,
 }
 
-pub(super) fn check(args: Check, shell: &Shell) -> u8 {
+pub(crate) fn check(args: CheckArgs, shell: &Shell) -> u8 {
     let mut code = 0;
-    let mut checked = Vec::new();
+    let mut results = Vec::new();
     for graph in &args.graphs {
         if is_scenario(graph) {
-            let (scenario, checked_as) = scenario(graph, &args, shell);
-            code = code.max(scenario);
-            checked.extend(checked_as);
+            let (scenario_code, result) = check_scenario(graph, &args, shell);
+            code = code.max(scenario_code);
+            results.extend(result);
             continue;
         }
-        let result = compile(shell.catalogue(), &args.on.request(graph.clone()));
+        let result = compile(shell.catalogue(), &args.graph_args.request(graph.clone()));
         let (report, figures) = match &result {
-            Ok(plan) => (plan.warnings(), Some(Figures::of(plan))),
+            Ok(plan) => (plan.warnings(), Some(PlanJson::of(plan))),
             Err(report) => (Some(report.clone()), None),
         };
         let is_good = figures.is_some() && (report.is_none() || !args.deny_warnings);
@@ -53,66 +54,75 @@ pub(super) fn check(args: Check, shell: &Shell) -> u8 {
             code = NOT_LOADED;
         }
         match args.format {
-            Format::Json => checked.push(Checked::of(graph, is_good, report.as_ref(), figures)),
-            Format::Text => {
+            OutputFormat::Json => results.push(CheckJson::of(graph, is_good, report.as_ref(), figures)),
+            OutputFormat::Text => {
                 report.iter().for_each(|report| shell.show(report));
                 if let Some(figures) = figures.filter(|_| is_good) {
                     let tick = milliseconds(figures.period_s);
-                    shell.say(&format!("{}: ok, {} nodes, a tick each {tick}", graph.display(), figures.nodes));
+                    shell.say(&format!("{}: ok, {} nodes, one tick every {tick}", graph.display(), figures.nodes));
                 }
             }
         }
     }
-    if args.format == Format::Json {
-        shell.say_json(&checked);
+    if args.format == OutputFormat::Json {
+        shell.say_json(&results);
     }
     code
 }
 
-/// Whether a file is a scenario; what cannot be read is told of as a graph.
+/// Whether a file is a scenario. A file that cannot be read is reported as a graph.
 fn is_scenario(path: &Path) -> bool {
     std::fs::read_to_string(path).is_ok_and(|text| Scenario::is_one(&text))
 }
 
-/// Checks a scenario with its task and its bench: the exit code, and what the JSON says.
-fn scenario(path: &Path, args: &Check, shell: &Shell) -> (u8, Option<Checked>) {
-    if args.on.bench.is_some() || !args.on.set.is_empty() {
-        shell.error(format_args!("`{}` is a scenario: it names its bench, and sets nothing", path.display()));
+/// Checks a scenario with its graph and its bench. Returns the exit code and the result as JSON.
+fn check_scenario(path: &Path, args: &CheckArgs, shell: &Shell) -> (u8, Option<CheckJson>) {
+    if args.graph_args.bench.is_some() || !args.graph_args.set.is_empty() {
+        shell.error(format_args!(
+            "`{}` is a scenario, which names its own bench: remove `--bench` and `--set`",
+            path.display()
+        ));
         return (NOT_LOADED, None);
     }
     let loaded = Scenario::load(shell.catalogue(), path);
     let code = if loaded.is_ok() { 0 } else { NOT_LOADED };
     match (&loaded, args.format) {
-        (_, Format::Json) => return (code, Some(Checked::of(path, loaded.is_ok(), loaded.as_ref().err(), None))),
-        (Ok(scenario), Format::Text) => {
+        (_, OutputFormat::Json) => {
+            return (code, Some(CheckJson::of(path, loaded.is_ok(), loaded.as_ref().err(), None)));
+        }
+        (Ok(scenario), OutputFormat::Text) => {
             let (runs, length) = (scenario.runs().len(), scenario.for_s);
             let runs = if runs == 1 { "1 run".to_owned() } else { format!("{runs} runs") };
-            shell.say(&format!("{}: ok, a scenario of {runs}, {length} s each; `verify` runs it", path.display()));
+            shell.say(&format!(
+                "{}: ok, a scenario of {runs}, {length} s each; run it with `tactflow verify`",
+                path.display()
+            ));
         }
-        (Err(report), Format::Text) => shell.show(report),
+        (Err(report), OutputFormat::Text) => shell.show(report),
     }
     (code, None)
 }
 
-/// What the JSON says of one graph.
+/// The result of one file as JSON.
 #[derive(Serialize)]
-struct Checked {
+struct CheckJson {
     graph: String,
     ok: bool,
-    diagnostics: Vec<Diagnosed>,
-    /// Of a graph that loads.
-    figures: Option<Figures>,
+    diagnostics: Vec<DiagnosticJson>,
+    /// Figures of a graph that loads.
+    figures: Option<PlanJson>,
 }
 
-impl Checked {
-    fn of(graph: &Path, ok: bool, report: Option<&Report>, figures: Option<Figures>) -> Self {
+impl CheckJson {
+    fn of(graph: &Path, ok: bool, report: Option<&Report>, figures: Option<PlanJson>) -> Self {
         let diagnostics = report.map(diagnosed).unwrap_or_default();
         Self { graph: graph.display().to_string(), ok, diagnostics, figures }
     }
 }
 
+/// Figures of a plan as JSON.
 #[derive(Serialize)]
-struct Figures {
+struct PlanJson {
     nodes: usize,
     ports: usize,
     /// Nominal time between two ticks [s].
@@ -123,7 +133,7 @@ struct Figures {
     order: Vec<String>,
 }
 
-impl Figures {
+impl PlanJson {
     fn of(plan: &Compiled) -> Self {
         Self {
             nodes: plan.order().count(),
@@ -133,9 +143,4 @@ impl Figures {
             order: plan.order().map(str::to_owned).collect(),
         }
     }
-}
-
-/// A time for a person [s].
-pub(super) fn milliseconds(seconds: f64) -> String {
-    format!("{} ms", (seconds * 1e6).round() * 1e-3)
 }

@@ -1,11 +1,11 @@
-//! `completions`: what a shell wants to know to complete the tool's arguments.
+//! `completions`: scripts that complete the arguments of the tool in a shell.
 
 use clap::builder::{PossibleValue, PossibleValuesParser};
 
-use super::Shell;
-use super::entry::Entries;
+use super::reference::entry::Entries;
+use super::shell::Shell;
 
-/// Print the completions for a shell
+/// Print the completion script of a shell
 #[derive(clap::Parser)]
 #[command(
     name = "completions",
@@ -14,15 +14,15 @@ use super::entry::Entries;
   tactflow completions zsh > ~/.zfunc/_tactflow
   tactflow completions fish > ~/.config/fish/completions/tactflow.fish"
 )]
-pub(super) struct Completions {
-    /// The shell
+pub(crate) struct CompletionsArgs {
+    /// Shell that completes the arguments
     #[arg(value_enum)]
     shell: clap_complete::Shell,
 }
 
-pub(super) fn completions(args: Completions, shell: &Shell) -> u8 {
+pub(crate) fn completions(args: CompletionsArgs, shell: &Shell) -> u8 {
     let mut text = Vec::new();
-    // What `describe` takes is known here; there it is looked up, so that a name that is wrong gets an answer.
+    // `describe` itself looks the name up, so that it can suggest a similar one.
     let all = Entries::new(shell.catalogue()).all();
     let names = PossibleValuesParser::new(all.into_iter().map(|entry| PossibleValue::new(entry.name)));
     let arguments = shell.arguments().clone();

@@ -1,4 +1,4 @@
-//! The command line, as a library function: a node crate gets the whole tool from a five-line `main`.
+//! The command line as a library: a crate with its own nodes gets the whole tool from a `main` of one line.
 //!
 //! ```no_run
 //! use tactflow_runtime::catalogue::Catalogue;
@@ -9,146 +9,64 @@
 //! }
 //! ```
 //!
-//! Every command is a [`Subcommand`], those that are always there too. A crate adds its own with [`Tool::command`], and
-//! [`derived`] makes one from arguments that clap derives.
-#![allow(clippy::print_stderr, reason = "this is where the tool speaks")]
+//! Every command is a [`Subcommand`]. A crate adds its own with [`Tool::command`]; [`derived`] makes a command from
+//! arguments that clap derives.
 
-mod chart;
 mod check;
 mod completions;
-mod course;
-mod describe;
-mod entry;
-mod example;
-mod json;
-mod list;
-mod log;
-mod page;
-mod picture;
-mod progress;
-mod prose;
 mod reference;
 mod run;
 mod shell;
 mod show;
-mod summary;
-mod timeline;
+mod still;
+mod text;
 mod verify;
 mod view;
 
-use std::marker::PhantomData;
-use std::path::PathBuf;
 use std::process::ExitCode;
 
-use clap::{Args, CommandFactory, FromArgMatches, Parser};
+use clap::{CommandFactory, FromArgMatches, Parser};
 use tracing_subscriber::EnvFilter;
 
 use crate::catalogue::Catalogue;
-use crate::graph::Request;
 
-/// The parser of arguments, for commands of one's own.
-pub use clap;
-pub use example::example;
-pub use reference::reference;
-pub use run::{Job, Print, duration};
+use reference::{describe, list};
 use shell::Colour;
-pub use shell::Shell;
 
-/// Exit code of what went wrong while it ran.
-pub const FAULTED: u8 = 1;
-/// Exit code of a file that does not load, and of a command line that is not understood.
-pub const NOT_LOADED: u8 = 2;
-
-/// A command of the tool.
-pub trait Subcommand {
-    /// Its name, its arguments and its help.
-    fn command(&self) -> clap::Command;
-
-    /// Does it; the result is the exit code.
-    fn run(&self, matches: &clap::ArgMatches, shell: &Shell) -> u8;
-}
-
-/// The command whose name and arguments are those of `A`.
-///
-/// ```
-/// use tactflow_runtime::cli::{Shell, clap, derived};
-///
-/// /// Greet somebody
-/// #[derive(clap::Parser)]
-/// #[command(name = "greet")]
-/// struct Greet {
-///     /// Whom
-///     name: String,
-/// }
-///
-/// let greet = derived(|greet: Greet, shell: &Shell| {
-///     shell.say(&format!("hello {}", greet.name));
-///     0
-/// });
-/// assert_eq!(greet.command().get_name(), "greet");
-/// ```
-pub fn derived<A: Parser + 'static>(run: impl Fn(A, &Shell) -> u8 + 'static) -> Box<dyn Subcommand> {
-    Box::new(Derived { run, arguments: PhantomData })
-}
-
-struct Derived<A, F> {
-    run: F,
-    arguments: PhantomData<A>,
-}
-
-impl<A: CommandFactory + FromArgMatches, F: Fn(A, &Shell) -> u8> Subcommand for Derived<A, F> {
-    fn command(&self) -> clap::Command {
-        A::command()
-    }
-
-    fn run(&self, matches: &clap::ArgMatches, shell: &Shell) -> u8 {
-        let arguments = A::from_arg_matches(matches).expect("they were parsed as the command declares them");
-        (self.run)(arguments, shell)
-    }
-}
+/// The parser of arguments, for the commands of other crates.
+pub use clap;
+pub use reference::example::example;
+pub use reference::pages::reference;
+pub use run::{Job, Print, duration};
+pub use shell::command::{Subcommand, derived};
+pub use shell::{FAULTED, NOT_LOADED, Shell};
+pub use text::svg;
 
 /// Tactile servoing from graph files.
 #[derive(Parser)]
 #[command(name = "tactflow", version, max_term_width = 100)]
 #[command(subcommand_required = true, arg_required_else_help = true)]
 #[command(
-    after_help = "Exit codes: 0 all went well; 1 the run ended in a fault, or a scenario is not met; 2 a file does not load, or the \
-                       command line is not understood."
+    after_help = "Exit codes: 0 success; 1 a run ended in a fault, or a scenario failed; 2 a file does not load, or the command \
+                       line is invalid."
 )]
 struct Cli {
-    /// When to use colours; `auto` means on a terminal, unless NO_COLOR is set
+    /// When to use colours; `auto` uses them on a terminal, unless NO_COLOR is set
     #[arg(long, global = true, value_enum, default_value_t = Colour::Auto, value_name = "WHEN")]
     color: Colour,
-    /// Say more; twice: much more (RUST_LOG chooses finer)
+    /// Print more messages; -vv prints the most (RUST_LOG selects by module)
     #[arg(short, long, global = true, action = clap::ArgAction::Count)]
     verbose: u8,
 }
 
-/// Which graph on which bench, with what laid over them.
-#[derive(Args)]
-struct OnArgs {
-    /// Bench to run on instead of the graph's own
-    #[arg(long, value_name = "FILE")]
-    bench: Option<PathBuf>,
-    /// Lay a value over those of the graph and its bench, for example nodes.pid.gains.x.kp=3; may be repeated
-    #[arg(long, value_name = "KEY=VALUE")]
-    set: Vec<String>,
-}
-
-impl OnArgs {
-    fn request(&self, graph: PathBuf) -> Request {
-        Request { graph, bench: self.bench.clone(), set: self.set.clone(), ..Request::default() }
-    }
-}
-
-/// The tool: a catalogue and commands.
+/// The tool: a catalogue and its commands.
 pub struct Tool {
     catalogue: Catalogue,
     commands: Vec<Box<dyn Subcommand>>,
 }
 
 impl Tool {
-    /// The tool with the commands that need nothing but a catalogue.
+    /// Creates the tool with the commands that work for every catalogue.
     #[must_use]
     pub fn new(catalogue: Catalogue) -> Self {
         Self {
@@ -165,10 +83,10 @@ impl Tool {
         }
     }
 
-    /// With one more command.
+    /// Adds a command.
     ///
     /// # Panics
-    /// If there is a command of that name already.
+    /// If a command has that name already.
     #[must_use]
     pub fn command(mut self, command: Box<dyn Subcommand>) -> Self {
         let name = command.command().get_name().to_owned();
@@ -185,33 +103,33 @@ impl Tool {
             Ok(matches) => matches,
             Err(error) => {
                 let code = if error.use_stderr() { NOT_LOADED } else { 0 };
-                // Nothing is left to say where even that cannot be printed.
+                // An error that cannot be printed cannot be reported either.
                 let _ = error.print();
                 return code.into();
             }
         };
-        let cli = Cli::from_arg_matches(&matches).expect("they were parsed as they are declared");
-        log(&cli);
+        let cli = Cli::from_arg_matches(&matches).expect("the matches come from these arguments");
+        init_logging(&cli);
         let arguments = self.arguments();
         let shell = Shell::new(self.catalogue, cli.color, arguments);
-        let (name, matches) = matches.subcommand().expect("one is required");
+        let (name, matches) = matches.subcommand().expect("clap requires a subcommand");
         let command = self.commands.iter().find(|command| command.command().get_name() == name);
-        match command.expect("clap knows no others").run(matches, &shell) {
+        match command.expect("clap accepts only these commands").run(matches, &shell) {
             0 if shell.is_cut() => FAULTED.into(),
             code => code.into(),
         }
     }
 
-    /// All arguments, with those of every command.
+    /// Returns the arguments of the tool, including those of all commands.
     fn arguments(&self) -> clap::Command {
         Cli::command().subcommands(self.commands.iter().map(|command| command.command()))
     }
 }
 
-fn log(cli: &Cli) {
+fn init_logging(cli: &Cli) {
     let level = ["warn", "info", "debug"][usize::from(cli.verbose.min(2))];
-    // What the graph asks to see is seen without a switch.
-    let level = format!("{level},{}=info", log::TARGET);
+    // Nodes that log are printed without `-v`.
+    let level = format!("{level},{}=info", run::log::TARGET);
     let filter = EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new(level));
     let is_coloured = cli.color.is_on(&std::io::stderr());
     tracing_subscriber::fmt().with_env_filter(filter).with_ansi(is_coloured).with_writer(std::io::stderr).init();
@@ -222,13 +140,13 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_arguments_are_sound() {
+    fn the_arguments_are_valid() {
         Tool::new(Catalogue::new()).arguments().debug_assert();
     }
 
     #[test]
     #[should_panic(expected = "two commands are called `run`")]
-    fn a_command_is_there_once() {
+    fn a_command_can_be_added_only_once() {
         let _ = Tool::new(Catalogue::new()).command(derived(run::run));
     }
 }

@@ -1,21 +1,20 @@
-//! `show`: a graph as it runs, flat, with every value and where it comes from.
+//! `show`: a graph as it runs, with the origin of every value.
 
 use std::fmt::Write;
 use std::path::PathBuf;
 
 use clap::builder::styling::Style;
-use serde::Serialize;
 
-use super::check::milliseconds;
-use super::describe::Format;
-use super::json::{Place, json, place};
-use super::{OnArgs, Shell};
-use crate::graph::{Compiled, NO_SPAN, Origin, OutlinedBlock, OutlinedWire, PlannedPort, Setting, compile};
-use crate::node::Word;
+use super::shell::Shell;
+use super::shell::command::{GraphArgs, OutputFormat};
+use super::text::number::milliseconds;
+use crate::graph::{
+    Compiled, NO_SPAN, Origin, OutlinedBlock, OutlinedWire, OutlinedWord, PlannedPort, Setting, compile,
+};
 use crate::signal::Shape;
-use crate::source::{Item, Key, SourceMap, Value};
+use crate::source::{Item, Key, Location, SourceMap, Value};
 
-/// Show a graph as it runs: every wire and value, and where it comes from
+/// Print a graph as it runs: every wire and every value, each with the file and line it comes from
 #[derive(clap::Parser)]
 #[command(
     name = "show",
@@ -23,27 +22,27 @@ use crate::source::{Item, Key, SourceMap, Value};
   tactflow show graphs/hybrid.toml
   tactflow show graphs/hybrid.toml --set nodes.pid.gains.x.kp=3 --format json"
 )]
-pub(super) struct Show {
+pub(crate) struct ShowArgs {
     /// The graph file
     graph: PathBuf,
     #[command(flatten)]
-    on: OnArgs,
-    /// How to print it
-    #[arg(long, value_enum, default_value_t = Format::Text, value_name = "FORMAT")]
-    format: Format,
+    graph_args: GraphArgs,
+    /// Output format
+    #[arg(long, value_enum, default_value_t = OutputFormat::Text, value_name = "FORMAT")]
+    format: OutputFormat,
 }
 
-pub(super) fn show(args: Show, shell: &Shell) -> u8 {
-    let plan = match compile(shell.catalogue(), &args.on.request(args.graph.clone())) {
+pub(crate) fn show(args: ShowArgs, shell: &Shell) -> u8 {
+    let plan = match compile(shell.catalogue(), &args.graph_args.request(args.graph.clone())) {
         Ok(plan) => plan,
-        Err(report) => return shell.complain(&report),
+        Err(report) => return shell.reject(&report),
     };
     plan.warnings().iter().for_each(|report| shell.show(report));
     match args.format {
-        Format::Json => shell.say_json(&Shown::of(&plan)),
-        Format::Text => {
+        OutputFormat::Json => shell.say_json(plan.outline()),
+        OutputFormat::Text => {
             let title = format!(
-                "# {} as it runs: {} nodes, a tick each {}\n",
+                "# {} as it runs: {} nodes, one tick every {}\n",
                 args.graph.display(),
                 plan.order().count(),
                 milliseconds(plan.period())
@@ -54,20 +53,18 @@ pub(super) fn show(args: Show, shell: &Shell) -> u8 {
     0
 }
 
-/// Nodes in the order in which they step.
-fn stepped(plan: &Compiled) -> impl Iterator<Item = &OutlinedBlock> {
-    plan.order().filter_map(|name| plan.outline().nodes.iter().find(|node| node.name == name))
-}
-
 fn text(plan: &Compiled, has_colour: bool) -> String {
-    let (outline, sources) = (plan.outline(), plan.sources());
-    let mut page = Page { text: String::new(), has_colour };
-    let word = |name: &str, word: &Word| Line::new(name, &word.text, at(sources, word.span.start));
+    let outline = plan.outline();
+    let mut page = TomlPage { text: String::new(), has_colour };
+    let word = |name: &str, word: &OutlinedWord| {
+        let text = format!("{name} = {}", toml::Value::from(word.text.as_str()));
+        Assignment { text, origin: at(&word.place), below: String::new() }
+    };
     let wire = |prefix: &str, wire: &OutlinedWire| {
         let text = format!("{prefix}{} = {}", wire.name, from(wire));
-        Line { text, origin: at(sources, wire.span.start), below: String::new() }
+        Assignment { text, origin: at(&wire.place), below: String::new() }
     };
-    let settings = |settings: &[Setting]| settings.iter().map(|setting| line(setting, sources)).collect::<Vec<_>>();
+    let settings = |settings: &[Setting]| settings.iter().map(assignment).collect::<Vec<_>>();
     let block = |block: &OutlinedBlock| {
         let mut lines = vec![word("type", &block.kind)];
         lines.extend(block.wires.iter().map(|one| wire("in.", one)));
@@ -82,9 +79,9 @@ fn text(plan: &Compiled, has_colour: bool) -> String {
     for mode in &outline.modes {
         page.section(&format!("modes.{}", mode.name), &settings(&mode.settings), &[]);
     }
-    for node in stepped(plan) {
-        let gives: Vec<String> = plan.outputs(&node.name).map(|port| format!("# {}", carried(port))).collect();
-        page.section(&format!("nodes.{}", node.name), &block(node), &gives);
+    for node in &outline.nodes {
+        let outputs: Vec<String> = plan.outputs(&node.name).map(|port| format!("# {}", carried(port))).collect();
+        page.section(&format!("nodes.{}", node.name), &block(node), &outputs);
     }
     page.section("bind", &roles.iter().map(|role| word(&role.name, &role.device)).collect::<Vec<_>>(), &[]);
     for device in &outline.devices {
@@ -93,36 +90,35 @@ fn text(plan: &Compiled, has_colour: bool) -> String {
     page.text
 }
 
-/// Where a wire comes from, and how old what comes over it may be, as TOML.
+/// Writes a wire as TOML: its port, and its maximum age if it has one.
 fn from(wire: &OutlinedWire) -> String {
     let source = toml::Value::from(wire.source.as_str());
-    match wire.age {
-        Some((ms, stale)) => format!("{{ from = {source}, max_age_ms = {ms}, stale = \"{}\" }}", stale.word()),
+    match wire.max_age_ms.zip(wire.stale) {
+        Some((ms, stale)) => format!("{{ from = {source}, max_age_ms = {ms}, stale = \"{stale}\" }}"),
         None => source.to_string(),
     }
 }
 
-/// `file:line`.
-fn at(sources: &SourceMap, at: usize) -> String {
-    let file = sources.file_at(at);
-    match file.name.as_str() {
+/// Writes a location as `file:line`.
+fn at(place: &Location) -> String {
+    match place.file.as_str() {
         SourceMap::COMMAND_LINE => SourceMap::COMMAND_LINE.to_owned(),
-        name => format!("{name}:{}", file.line_column(at).0),
+        file => format!("{file}:{}", place.line),
     }
 }
 
-fn line(setting: &Setting, sources: &SourceMap) -> Line {
+fn assignment(setting: &Setting) -> Assignment {
     let origin = match &setting.origin {
-        Origin::Written(span) => at(sources, span.start),
+        Origin::Written { place } => at(place),
         Origin::Default => "default".to_owned(),
-        Origin::Fact { fact, device } => format!("fact {fact} ({})", at(sources, device.start)),
+        Origin::Fact { fact, place } => format!("fact {fact} ({})", at(place)),
     };
     let (path, tall) = (path(&setting.path), tall(&setting.value));
     let text = if tall.is_some() { "[".to_owned() } else { written(&setting.value) };
-    Line { text: format!("{path} = {text}"), origin, below: tall.map(|lines| lines + "\n]").unwrap_or_default() }
+    Assignment { text: format!("{path} = {text}"), origin, below: tall.map(|lines| lines + "\n]").unwrap_or_default() }
 }
 
-/// A dotted key, quoted where it must be.
+/// Writes a dotted key as TOML, with quotes where they are needed.
 fn path(path: &str) -> String {
     let is_bare =
         |name: &str| !name.is_empty() && name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_' || c == '-');
@@ -130,7 +126,7 @@ fn path(path: &str) -> String {
     path.split('.').map(quoted).collect::<Vec<_>>().join(".")
 }
 
-/// A value as TOML, in one line.
+/// Writes a value as TOML in one line.
 fn written(value: &Value) -> String {
     let all = |items: Vec<String>| items.join(", ");
     match &value.item {
@@ -147,7 +143,9 @@ fn written(value: &Value) -> String {
     }
 }
 
-/// A list that is too long for a line: a table a line, with what is default in it, or as many values as fit.
+/// Writes a list that is too long for one line, or returns `None` for any other value.
+///
+/// Each table has its own line, with the names of its defaults. Other values share lines.
 fn tall(value: &Value) -> Option<String> {
     const WIDTH: usize = 96;
     let Item::Array(items) = &value.item else { return None };
@@ -158,7 +156,7 @@ fn tall(value: &Value) -> Option<String> {
     let mut lines = vec![String::new()];
     for item in items {
         let text = format!("{},", written(item));
-        let line = lines.last_mut().expect("there is one from the start");
+        let line = lines.last_mut().expect("`lines` starts with one line");
         if line.is_empty() || is_tables || line.len() + text.len() + 1 > WIDTH {
             lines.push(format!("  {text}"));
         } else {
@@ -179,7 +177,7 @@ fn tall(value: &Value) -> Option<String> {
     Some(lines.join("\n"))
 }
 
-/// What a port carries in this graph.
+/// Describes the signal of an output in this graph.
 fn carried(port: &PlannedPort) -> String {
     let name = port.name.rsplit_once('.').map_or(port.name.as_str(), |(_, name)| name);
     let unit = port.shape.unit().map(|unit| format!(" [{unit}]")).unwrap_or_default();
@@ -198,34 +196,29 @@ fn carried(port: &PlannedPort) -> String {
     };
     let frames: Vec<&str> = port.frames.iter().flatten().map(String::as_str).collect();
     let frames = if frames.is_empty() { String::new() } else { format!(", in {}", frames.join(" in ")) };
-    format!("gives {name}: {}{unit}{shape}{frames}", port.shape.kind().name())
+    format!("output {name}: {}{unit}{shape}{frames}", port.shape.kind().name())
 }
 
-/// An assignment.
-struct Line {
+/// A key and a value, with their origin.
+struct Assignment {
     text: String,
     origin: String,
-    /// The rest of what does not fit in a line.
+    /// Further lines of a long value.
     below: String,
 }
 
-impl Line {
-    fn new(name: &str, text: &str, origin: String) -> Self {
-        Self { text: format!("{name} = {}", toml::Value::from(text)), origin, below: String::new() }
-    }
-}
-
-struct Page {
+/// A page of TOML with the origin of each value in a comment.
+struct TomlPage {
     text: String,
     has_colour: bool,
 }
 
-impl Page {
-    /// As far right as comments are put in line.
-    const FARTHEST: usize = 60;
+impl TomlPage {
+    /// Longer lines do not move the column of comments [characters].
+    const MAX_COLUMN: usize = 60;
 
-    /// A section with its assignments, each with its origin, and comments below.
-    fn section(&mut self, name: &str, lines: &[Line], notes: &[String]) {
+    /// Adds a section with its assignments and their origins, and comments below. A section without any is left out.
+    fn section(&mut self, name: &str, lines: &[Assignment], notes: &[String]) {
         if lines.is_empty() {
             return;
         }
@@ -233,8 +226,8 @@ impl Page {
             true => (Style::new().bold(), Style::new().dimmed()),
             false => (Style::new(), Style::new()),
         };
-        let width = |line: &Line| line.text.chars().count();
-        let widths = lines.iter().map(width).filter(|width| *width <= Self::FARTHEST);
+        let width = |line: &Assignment| line.text.chars().count();
+        let widths = lines.iter().map(width).filter(|width| *width <= Self::MAX_COLUMN);
         let column = widths.max().unwrap_or(0);
         // Writing to a string cannot fail.
         let _ = writeln!(self.text, "\n{bold}[{name}]{bold:#}");
@@ -246,132 +239,4 @@ impl Page {
             let _ = writeln!(self.text, "{dim}{note}{dim:#}");
         }
     }
-}
-
-/// The JSON of a graph as it runs.
-#[derive(Serialize)]
-struct Shown {
-    period_s: f64,
-    graph: Vec<ShownSetting>,
-    roles: Vec<ShownRole>,
-    commands: Vec<ShownWire>,
-    policy: Vec<ShownSetting>,
-    modes: Vec<ShownMode>,
-    nodes: Vec<ShownBlock>,
-    devices: Vec<ShownBlock>,
-}
-
-#[derive(Serialize)]
-struct ShownRole {
-    name: String,
-    r#type: String,
-    device: String,
-}
-
-#[derive(Serialize)]
-struct ShownMode {
-    name: String,
-    /// `set.…` for each value that it sets, and its exits.
-    settings: Vec<ShownSetting>,
-}
-
-#[derive(Serialize)]
-struct ShownBlock {
-    name: String,
-    r#type: String,
-    place: Place,
-    inputs: Vec<ShownWire>,
-    params: Vec<ShownSetting>,
-    outputs: Vec<ShownPort>,
-}
-
-#[derive(Serialize)]
-struct ShownWire {
-    name: String,
-    source: String,
-    /// How old what comes over it may be, and what is done when it is older; null if it does not say that.
-    max_age_ms: Option<f64>,
-    stale: Option<&'static str>,
-    place: Place,
-}
-
-#[derive(Serialize)]
-struct ShownSetting {
-    path: String,
-    value: serde_json::Value,
-    /// `written`, `default` or `fact`.
-    origin: &'static str,
-    /// The fact: `role.fact`.
-    fact: Option<String>,
-    /// Where it is written, or where the device stands that states it.
-    place: Option<Place>,
-}
-
-#[derive(Serialize)]
-struct ShownPort {
-    name: String,
-    kind: &'static str,
-    /// Of a kind that has one for the whole.
-    unit: Option<String>,
-    frames: Vec<Option<String>>,
-}
-
-impl Shown {
-    fn of(plan: &Compiled) -> Self {
-        let (outline, sources) = (plan.outline(), plan.sources());
-        let wire = |wire: &OutlinedWire| ShownWire {
-            name: wire.name.clone(),
-            source: wire.source.clone(),
-            max_age_ms: wire.age.map(|(ms, _)| ms),
-            stale: wire.age.map(|(_, stale)| stale.word()),
-            place: place(sources, &wire.span),
-        };
-        let settings = |settings: &[Setting]| settings.iter().map(|setting| shown(setting, sources)).collect();
-        let block = |block: &OutlinedBlock| ShownBlock {
-            name: block.name.clone(),
-            r#type: block.kind.text.clone(),
-            place: place(sources, &block.span),
-            inputs: block.wires.iter().map(wire).collect(),
-            params: settings(&block.settings),
-            outputs: plan.outputs(&block.name).map(ShownPort::of).collect(),
-        };
-        let modes = outline.modes.iter();
-        let modes = modes.map(|mode| ShownMode { name: mode.name.clone(), settings: settings(&mode.settings) });
-        let roles = outline.roles.iter().map(|role| ShownRole {
-            name: role.name.clone(),
-            r#type: role.kind.text.clone(),
-            device: role.device.text.clone(),
-        });
-        Self {
-            period_s: plan.period(),
-            graph: settings(&outline.settings),
-            roles: roles.collect(),
-            commands: outline.commands.iter().map(wire).collect(),
-            policy: settings(&outline.policy),
-            modes: modes.collect(),
-            nodes: stepped(plan).map(block).collect(),
-            devices: outline.devices.iter().map(|device| ShownBlock { outputs: Vec::new(), ..block(device) }).collect(),
-        }
-    }
-}
-
-impl ShownPort {
-    fn of(port: &PlannedPort) -> Self {
-        Self {
-            name: port.name.clone(),
-            kind: port.shape.kind().name(),
-            unit: port.shape.unit().map(|unit| unit.to_string()),
-            frames: port.frames.clone(),
-        }
-    }
-}
-
-fn shown(setting: &Setting, sources: &SourceMap) -> ShownSetting {
-    let (origin, fact, span) = match &setting.origin {
-        Origin::Written(span) => ("written", None, Some(span)),
-        Origin::Default => ("default", None, None),
-        Origin::Fact { fact, device } => ("fact", Some(fact.clone()), Some(device)),
-    };
-    let place = span.map(|span| place(sources, span));
-    ShownSetting { path: setting.path.clone(), value: json(&setting.value), origin, fact, place }
 }

@@ -1,15 +1,21 @@
-//! What a device and a graph hand each other.
+//! What a device and a graph exchange: samples one way, commands and reports the other.
 
+use std::borrow::Cow;
+
+use super::{Command, Description, Output, Report};
 use crate::signal::{Arenas, Kind, Shape, Signal};
 
-/// The newest sample of each port of a device.
+/// The newest sample of each output of a device, and what the device has counted.
 #[derive(Debug, Clone, Default)]
 pub struct Samples {
     pub(crate) arenas: Arenas,
     pub(crate) ports: Vec<Sample>,
+    /// How often any port was written.
+    pub(crate) writes: u64,
+    pub(crate) counts: Vec<(&'static str, u64)>,
 }
 
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 pub(crate) struct Sample {
     pub(crate) kind: Kind,
     pub(crate) slot: u32,
@@ -19,40 +25,88 @@ pub(crate) struct Sample {
     pub(crate) sequence: u64,
     /// How often the device has written the port.
     pub(crate) writes: u64,
-    /// Whether the last write says that there is no value.
-    pub(crate) is_absent: bool,
+    pub(crate) state: State,
+}
+
+/// What the last write of a port left there.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) enum State {
+    Value,
+    Absent,
+    /// There is no value until the port is written again, and why.
+    Lost(Cow<'static, str>),
 }
 
 impl Samples {
-    /// Room for a value of each shape.
+    /// Room for a sample of each output of a device.
     #[must_use]
-    pub fn with_shapes<'s>(shapes: impl Iterator<Item = &'s Shape>) -> Self {
+    pub fn of(description: &Description) -> Self {
         let mut samples = Self::default();
-        for shape in shapes {
-            let slot = samples.arenas.add(shape);
-            samples.ports.push(Sample { kind: shape.kind(), slot, stamp: 0, sequence: 0, writes: 0, is_absent: false });
+        for port in &description.outputs {
+            let (kind, slot) = (port.shape.kind(), samples.arenas.add(&port.shape));
+            samples.ports.push(Sample { kind, slot, stamp: 0, sequence: 0, writes: 0, state: State::Absent });
         }
         samples
     }
 
-    /// The value of port `port`, to be written whole: a sample taken at `stamp` [ns], the `sequence`-th of its device.
+    /// Returns the value of a port, to be written in full: a sample taken at `stamp` [ns], the `sequence`-th of its port.
+    ///
+    /// The graph counts gaps in the sequence, and a number that it has seen is a repeated sample.
     ///
     /// # Panics
-    /// If the port is not of that kind.
-    pub fn write<T: Signal>(&mut self, port: usize, stamp: i64, sequence: u64) -> &mut T {
-        let sample = &mut self.ports[port];
-        assert_eq!(sample.kind, T::KIND, "port {port} of the device");
-        (sample.stamp, sample.sequence, sample.is_absent) = (stamp, sequence, false);
-        sample.writes += 1;
-        &mut T::arena_mut(&mut self.arenas)[sample.slot as usize]
+    /// If the port belongs to another device.
+    pub fn write<T: Signal>(&mut self, port: Output<T>, stamp: i64, sequence: u64) -> &mut T {
+        let sample = self.renew(port.port, stamp, sequence, State::Value);
+        assert_eq!(sample.kind, T::KIND, "output {} of the device", port.port);
+        let slot = sample.slot as usize;
+        &mut T::arena_mut(&mut self.arenas)[slot]
     }
 
-    /// Says that port `port` has no value in the sample taken at `stamp` [ns], the `sequence`-th of its device: what the
-    /// port gave before is absent from then on, until it is written again.
-    pub fn clear(&mut self, port: usize, stamp: i64, sequence: u64) {
+    /// Writes that a port has no value in the sample taken at `stamp` [ns]. It stays absent until it is written again.
+    ///
+    /// This is normal, as a position without contact; for a fault of the device, see [`lost`](Self::lost).
+    pub fn clear<T: Signal>(&mut self, port: Output<T>, stamp: i64, sequence: u64) {
+        self.renew(port.port, stamp, sequence, State::Absent);
+    }
+
+    /// Makes a port absent until it is written again, because something is wrong: `why` completes "`pad.image` is lost:".
+    ///
+    /// As long as the port is lost, the graph's policy `device` applies: it holds the commands, stops them or ends the run.
+    pub fn lost<T: Signal>(&mut self, port: Output<T>, why: impl Into<Cow<'static, str>>) {
+        self.ports[port.port].state = State::Lost(why.into());
+    }
+
+    /// Counts something for the summary of the run, as a plural noun: `"bad frames"`.
+    pub fn count(&mut self, what: &'static str) {
+        match self.counts.iter_mut().find(|(known, _)| *known == what) {
+            Some((_, count)) => *count += 1,
+            None => self.counts.push((what, 1)),
+        }
+    }
+
+    /// Returns the value of a port that is there, for tests of a device.
+    #[must_use]
+    pub fn get<T: Signal>(&self, port: Output<T>) -> Option<&T> {
+        let sample = &self.ports[port.port];
+        (sample.state == State::Value).then(|| &T::arena(&self.arenas)[sample.slot as usize])
+    }
+
+    fn renew(&mut self, port: usize, stamp: i64, sequence: u64, state: State) -> &mut Sample {
         let sample = &mut self.ports[port];
-        (sample.stamp, sample.sequence, sample.is_absent) = (stamp, sequence, true);
+        (sample.stamp, sample.sequence, sample.state) = (stamp, sequence, state);
         sample.writes += 1;
+        self.writes += 1;
+        sample
+    }
+
+    /// Copies the samples of the same device, in place.
+    pub(crate) fn copy_from(&mut self, other: &Self) {
+        for Sample { kind, slot, .. } in &other.ports {
+            other.arenas.copy(*kind, *slot, &mut self.arenas, *slot);
+        }
+        self.ports.clone_from(&other.ports);
+        self.counts.clone_from(&other.counts);
+        self.writes = other.writes;
     }
 }
 
@@ -61,93 +115,94 @@ impl Samples {
 pub struct Commands {
     pub(crate) values: Vec<Box<[f64]>>,
     arenas: Arenas,
-    reports: Vec<Option<Report>>,
+    reports: Vec<ReportSlot>,
 }
 
-/// What a wire reports; none where there is no wire.
+/// What a wire reports.
 #[derive(Debug, Clone, Copy)]
-struct Report {
+struct ReportSlot {
     kind: Kind,
     slot: u32,
     is_present: bool,
 }
 
 impl Commands {
-    /// Room for a command of each shape, all zero.
-    ///
-    /// # Panics
-    /// If one is not a joint vector.
+    /// Room for each command of a device, all zero, and for each of its reports, all absent.
     #[must_use]
-    pub fn with_shapes<'s>(shapes: impl Iterator<Item = &'s Shape>) -> Self {
+    pub fn of(description: &Description) -> Self {
+        Self::with_reports(description, |_| None)
+    }
+
+    /// Room for the commands and the reports of a device; `wired` is the shape of what is wired to a report.
+    pub(crate) fn with_reports<'s>(description: &Description, wired: impl Fn(usize) -> Option<&'s Shape>) -> Self {
         let zeros = |shape: &Shape| match shape {
             Shape::Joints(shape) => vec![0.0; shape.joints.len()].into(),
-            other => panic!("a command cannot be {}", other.kind().with_article()),
+            other => unreachable!("a command is a joint vector, and not {}", other.kind().with_article()),
         };
-        Self { values: shapes.map(zeros).collect(), ..Self::default() }
+        let mut arenas = Arenas::default();
+        let room = |(i, port): (usize, &super::StatedPort)| ReportSlot {
+            kind: port.shape.kind(),
+            slot: arenas.add(wired(i).unwrap_or(&port.shape)),
+            is_present: false,
+        };
+        let reports = description.reports.iter().enumerate().map(room).collect();
+        Self { values: description.commands.iter().map(|port| zeros(&port.shape)).collect(), reports, arenas }
     }
 
-    /// With room for one more report, of a shape that a wire gives; without one it stays absent.
+    /// Returns the command of a port, one value per joint.
     #[must_use]
-    pub fn with_report(mut self, shape: Option<&Shape>) -> Self {
-        let room = |shape: &Shape| Report { kind: shape.kind(), slot: self.arenas.add(shape), is_present: false };
-        let report = shape.map(room);
-        self.reports.push(report);
-        self
+    pub fn joints(&self, port: Command) -> &[f64] {
+        &self.values[port.0]
     }
 
-    /// What is reported to report port `port`: none while it is absent, or if nothing is wired to it. The reports of a
-    /// device are numbered through all the roles that it fills.
-    #[must_use]
-    pub fn report<T: Signal>(&self, port: usize) -> Option<&T> {
-        let report = (*self.reports.get(port)?)?;
-        let is_there = report.is_present && report.kind == T::KIND;
-        is_there.then(|| &T::arena(&self.arenas)[report.slot as usize])
-    }
-
-    /// Reports a value to port `port`, as a graph does.
+    /// Commands values to a port, as a graph does.
     ///
     /// # Panics
-    /// If nothing of that kind is reported there.
-    pub fn tell<T: Signal>(&mut self, port: usize, value: &T) {
-        let report = self.reports[port].as_mut().expect("a report that is told has room");
-        assert_eq!(report.kind, T::KIND, "report {port} of the device");
+    /// If there is not one value per joint.
+    pub fn command(&mut self, port: Command, values: &[f64]) {
+        self.values[port.0].copy_from_slice(values);
+    }
+
+    /// Returns what is reported to a port, or `None` while it is absent or nothing is wired to it.
+    #[must_use]
+    pub fn report<T: Signal>(&self, port: Report<T>) -> Option<&T> {
+        let report = self.reports[port.port];
+        report.is_present.then(|| &T::arena(&self.arenas)[report.slot as usize])
+    }
+
+    /// Reports a value to a port, as a graph does.
+    pub fn tell<T: Signal>(&mut self, port: Report<T>, value: &T) {
+        let report = &mut self.reports[port.port];
         report.is_present = true;
         value.copy_to(&mut T::arena_mut(&mut self.arenas)[report.slot as usize]);
     }
 
     /// Takes over what is reported to port `port` from a slot of `arenas`, or that it is absent.
     pub(crate) fn take_report(&mut self, port: usize, arenas: &Arenas, slot: Option<u32>) {
-        let Some(report) = &mut self.reports[port] else { return };
+        let report = &mut self.reports[port];
         report.is_present = slot.is_some();
         if let Some(slot) = slot {
             arenas.copy(report.kind, slot, &mut self.arenas, report.slot);
         }
     }
 
-    /// Reports nothing any more.
+    /// Makes every report absent.
     pub(crate) fn fall_silent(&mut self) {
-        self.reports.iter_mut().flatten().for_each(|report| report.is_present = false);
+        self.reports.iter_mut().for_each(|report| report.is_present = false);
     }
 
-    /// Takes over commands and reports of the same shapes, in place.
+    /// Copies commands and reports of the same device, in place.
     pub(crate) fn copy_from(&mut self, other: &Self) {
         for (slot, values) in self.values.iter_mut().zip(&other.values) {
             slot.copy_from_slice(values);
         }
         for (port, report) in other.reports.iter().enumerate() {
-            let there = report.filter(|report| report.is_present);
-            self.take_report(port, &other.arenas, there.map(|report| report.slot));
+            self.take_report(port, &other.arenas, report.is_present.then_some(report.slot));
         }
     }
 
     /// Whether nothing is commanded.
     pub(crate) fn are_zero(&self) -> bool {
         self.values.iter().flatten().all(|value| *value == 0.0)
-    }
-
-    /// The command of port `port`, one value a joint.
-    #[must_use]
-    pub fn joints(&self, port: usize) -> &[f64] {
-        &self.values[port]
     }
 }

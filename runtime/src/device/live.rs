@@ -1,13 +1,15 @@
 //! Live devices: an async driver on one side, preallocated latest-value slots, and the tick on the other side.
 
+use std::borrow::Cow;
 use std::sync::Arc;
 use std::time::Instant;
 
 use async_trait::async_trait;
 use tokio::sync::{Notify, watch};
-use triple_buffer::{Input, Output, TripleBuffer};
+use triple_buffer::TripleBuffer;
 
-use super::{Commands, DeviceError, Samples};
+use super::{Commands, DeviceError, Output, Samples};
+use crate::signal::Signal;
 
 /// A device that runs on its own, in real time.
 ///
@@ -25,8 +27,8 @@ pub trait Live: Send {
 /// A live device's end of the link to the graph.
 pub struct Link {
     staging: Samples,
-    samples: Input<Samples>,
-    commands: Output<Commands>,
+    samples: triple_buffer::Input<Samples>,
+    commands: triple_buffer::Output<Commands>,
     sampled: Arc<Notify>,
     commanded: Arc<Notify>,
     stop: watch::Receiver<bool>,
@@ -40,12 +42,26 @@ impl Link {
         at.saturating_duration_since(self.epoch).as_nanos() as i64
     }
 
-    /// Writes samples and publishes them; the graph sees the newest.
+    /// Writes samples and publishes them; the graph sees the newest of each port.
     pub fn publish(&mut self, write: impl FnOnce(&mut Samples)) {
-        write(&mut self.staging);
-        self.samples.input_buffer_mut().clone_from(&self.staging);
-        self.samples.publish();
+        self.hand_over(write);
         self.sampled.notify_one();
+    }
+
+    /// Makes a port absent until it is written again; see [`Samples::lost`]. The driver goes on, to reconnect for example.
+    pub fn lost<T: Signal>(&mut self, port: Output<T>, why: impl Into<Cow<'static, str>>) {
+        self.hand_over(|samples| samples.lost(port, why));
+    }
+
+    /// Counts something for the summary of the run, as a plural noun: `"bad frames"`.
+    pub fn count(&mut self, what: &'static str) {
+        self.hand_over(|samples| samples.count(what));
+    }
+
+    fn hand_over(&mut self, write: impl FnOnce(&mut Samples)) {
+        write(&mut self.staging);
+        self.samples.input_buffer_mut().copy_from(&self.staging);
+        self.samples.publish();
     }
 
     /// The newest commands.
@@ -53,23 +69,26 @@ impl Link {
         self.commands.read()
     }
 
-    /// Waits for the next commands.
-    pub async fn commanded(&self) {
-        self.commanded.notified().await;
+    /// Waits for the next commands. The future does not borrow the link.
+    pub fn commanded(&self) -> impl Future<Output = ()> + Send + use<> {
+        let commanded = Arc::clone(&self.commanded);
+        async move { commanded.notified().await }
     }
 
-    /// Waits for the end of the run.
-    pub async fn stopped(&self) {
+    /// Waits for the end of the run. The future does not borrow the link.
+    pub fn stopped(&self) -> impl Future<Output = ()> + Send + use<> {
         let mut stop = self.stop.clone();
-        // An error means that the graph's end is gone, which is an end too.
-        let _ = stop.wait_for(|stop| *stop).await;
+        async move {
+            // An error means that the graph's end is gone, which is an end too.
+            let _ = stop.wait_for(|stop| *stop).await;
+        }
     }
 }
 
 /// The graph's end of the link to a live device.
 pub(crate) struct Linked {
-    pub(crate) samples: Output<Samples>,
-    pub(crate) commands: Input<Commands>,
+    pub(crate) samples: triple_buffer::Output<Samples>,
+    pub(crate) commands: triple_buffer::Input<Commands>,
     pub(crate) sampled: Arc<Notify>,
     pub(crate) commanded: Arc<Notify>,
     pub(crate) stop: watch::Sender<bool>,
@@ -93,16 +112,19 @@ pub(crate) fn link(samples: &Samples, commands: &Commands, epoch: Instant) -> (L
 }
 
 impl Linked {
-    /// Hands over the commands and takes the newest samples, if there are any. Buffers rotate; nothing is copied but
-    /// the commands. Whether there were any.
-    pub(crate) fn exchange(&mut self, commands: &Commands, samples: &mut Samples) -> bool {
+    /// Hands over the commands.
+    pub(crate) fn send(&mut self, commands: &Commands) {
         self.commands.input_buffer_mut().copy_from(commands);
         self.commands.publish();
         self.commanded.notify_one();
-        let is_newer = self.samples.update();
-        if is_newer {
+    }
+
+    /// Takes the newest samples. Buffers rotate; nothing is copied. Returns whether the device has sampled.
+    pub(crate) fn receive(&mut self, samples: &mut Samples) -> bool {
+        let before = samples.writes;
+        if self.samples.update() {
             std::mem::swap(samples, self.samples.output_buffer_mut());
         }
-        is_newer
+        samples.writes != before
     }
 }

@@ -5,18 +5,22 @@
 //! is an async driver that fills a latest-value slot, so that a slow disk or network makes a sample old, never a tick
 //! late.
 
+mod description;
 mod exchange;
 mod live;
+mod misfits;
 
 use std::borrow::Cow;
 use std::fmt;
 use std::marker::PhantomData;
 
-use crate::node::{Mistakes, Param, ParamSpec, PortSpec, Reader};
-use crate::signal::Shape;
+use crate::node::{Describe, Mistakes, Param, ParamSpec, PortSpec, Reader};
 use crate::source::Value;
 
+pub(crate) use description::StatedPort;
+pub use description::{Command, Description, Fill, Output, Report};
 pub use exchange::{Commands, Samples};
+pub(crate) use exchange::{Sample, State};
 pub use live::{Link, Live};
 pub(crate) use live::{Linked, link};
 
@@ -53,28 +57,6 @@ impl RoleType {
     pub fn observed_name(&self) -> &str {
         self.name.rsplit('_').next().unwrap_or(&self.name)
     }
-}
-
-/// How a device fills one role.
-#[derive(Debug, Clone)]
-pub struct Filled {
-    /// The role's type.
-    pub role: Cow<'static, str>,
-    /// Shape of each of the role's outputs.
-    pub outputs: Vec<Shape>,
-    /// Shape of each of the role's commands.
-    pub commands: Vec<Shape>,
-    /// What a graph file may take from the device: `threshold = { from = "pad.threshold" }`.
-    pub facts: Vec<(Cow<'static, str>, toml::Value)>,
-}
-
-/// What a device says of itself before it runs.
-#[derive(Debug, Clone)]
-pub struct Description {
-    /// The roles it can fill. Its ports are numbered through all of them, in this order.
-    pub fills: Vec<Filled>,
-    /// Nominal time between two samples [s].
-    pub period: f64,
 }
 
 /// What went wrong with a device while it ran.
@@ -129,20 +111,10 @@ pub struct Opened {
     pub driver: Driver,
 }
 
-/// A device type.
-pub trait Device: Sized + 'static {
+/// A device type. Its example plugs it into a graph: `[roles]`, `[commands]`, `[bind]` and `[devices.…]`.
+pub trait Device: Describe + Sized + 'static {
     /// What a bench file may set.
     type Params: Param;
-
-    /// Its `type` in a bench file.
-    const NAME: &'static str;
-    /// What it is, in one line.
-    const SUMMARY: &'static str;
-
-    /// What else there is to know, for the reference. Markdown.
-    const DOC: &'static str = "";
-    /// What plugs it into a graph, to paste: `[roles]`, `[commands]`, `[bind]` and `[devices.…]`.
-    const EXAMPLE: &'static str = "";
 
     /// Opens the device. A live one does not connect yet: it connects when it runs.
     ///

@@ -1,12 +1,11 @@
-//! How a plan runs. [`Engine`] holds everything that a tick touches.
+//! Runs a compiled graph. [`Engine`] holds everything that a tick uses.
 //!
-//! `core` is what runs inside a tick: latch, step, commit, and the conditions of modes. It names no lock, no clock and no
-//! tokio. `session` is what stands around a tick: the exchange with devices, faults and halts, pacing, real time and
-//! the operator.
+//! `core` runs inside a tick: latch, step, commit, and the conditions of modes. It uses no lock and no tokio. `session`
+//! runs around the tick: the exchange with devices, faults and halts, pacing, real time and the operator.
 
 mod core;
 mod session;
 
 pub(crate) use self::core::NodeRunner;
-pub use self::core::{Change, Counters, Timing};
-pub use session::{End, Engine, Halt, Interrupt, Logged, Outcome, RunOptions, View, run, run_virtual};
+pub use self::core::{Counters, ModeChange, Timing};
+pub use session::{Display, End, Engine, Halt, Interrupt, Logged, Outcome, RunOptions, run, run_virtual};

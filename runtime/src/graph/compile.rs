@@ -60,7 +60,8 @@ pub(crate) fn compile_in(mut loader: Loader, catalogue: &Catalogue, request: &Re
     };
     log_plan(&nodes, &opened, &sources);
     let max_gap = max_gap(flat.table.as_ref(), period);
-    let outline = OutlineBuilder { net: &net, opened: &opened, sources: &sources, max_gap }.build();
+    let outline = OutlineBuilder { net: &net, opened: &opened, sources: &sources, nodes: &nodes, period, max_gap };
+    let outline = outline.build();
     let mut warnings = Diagnostics::new();
     check::unused::check(&net, view.sources(), &mut warnings);
     let view = view.plan(&net, &nodes, &ports);

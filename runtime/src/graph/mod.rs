@@ -21,7 +21,10 @@ pub(crate) use compile::compile_in;
 pub use compiled::Compiled;
 pub use load::Request;
 pub(crate) use load::{Loader, wrong_file_type};
-pub use outline::{NO_SPAN, Origin, Outline, OutlinedBlock, OutlinedMode, OutlinedRole, OutlinedWire, Setting};
+pub use outline::{
+    NO_SPAN, Origin, Outline, OutlinedBlock, OutlinedMode, OutlinedPort, OutlinedRole, OutlinedWire, OutlinedWord,
+    Setting,
+};
 pub use plan::PlannedPort;
 pub(crate) use plan::{
     Clock, Condition, PlannedCommand, PlannedDevice, PlannedExit, PlannedModes, PlannedNode, PlannedReport,

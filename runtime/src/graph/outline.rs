@@ -1,109 +1,150 @@
-//! The outline of a graph: the flat graph with all overrides, defaults and facts, and the origin of each value.
+//! The outline of a graph, for `show`: parts are expanded, and every value has its origin in a file, a default or a fact.
 
 use std::ops::Range;
 use std::path::Path;
 
+use serde::Serialize;
+
 use crate::graph::bench::OpenedBench;
 use crate::graph::bench::fill_facts;
-use crate::graph::net::{Net, Wire, WireOrigin};
-use crate::graph::syntax::{Block, GraphTable, ModeBlock, Policy, PolicyTable};
+use crate::graph::net::{CommandWire, Net, Wire, WireOrigin};
+use crate::graph::plan::{PlannedNode, PlannedPort, PortRef};
+use crate::graph::syntax::{Block, GraphTable, ModeBlock, PolicyTable};
 use crate::node::{FilePath, Param, ParamSpec, Repeats, Word};
-use crate::source::{Diagnostics, Item, Key, SourceMap, Table, Value, parse_table};
+use crate::source::{Diagnostics, Item, Key, Location, SourceMap, Table, Value, parse_table};
 
-/// The span of a default in a list of tables, which was not written anywhere.
+/// The span of a default inside a list of tables, which was not written anywhere.
 pub const NO_SPAN: Range<usize> = 0..0;
 
-/// The outline of a graph.
-#[derive(Debug, Clone, Default)]
+/// A graph as it runs.
+#[derive(Debug, Clone, Default, Serialize)]
 pub struct Outline {
-    /// Section `[graph]` without the bench, which is in the other sections.
+    /// Nominal time between two ticks [s].
+    pub period_s: f64,
+    /// Section `[graph]`, without the bench.
+    #[serde(rename = "graph")]
     pub settings: Vec<Setting>,
-    /// The roles: name, type and device.
+    /// The roles, with their types and devices.
     pub roles: Vec<OutlinedRole>,
-    /// The wires of commands and reports, named `role.command`.
+    /// The wires to the commands and the reports of roles: `role.command`.
     pub commands: Vec<OutlinedWire>,
-    /// Section `[policy]`: the reaction to each trouble.
+    /// Section `[policy]`.
     pub policy: Vec<Setting>,
-    /// The modes with their settings and exits.
+    /// The modes.
     pub modes: Vec<OutlinedMode>,
-    /// The nodes in file order.
+    /// The nodes, in the order in which they step.
     pub nodes: Vec<OutlinedBlock>,
-    /// The devices that the roles use.
+    /// The devices that fill the roles.
     pub devices: Vec<OutlinedBlock>,
 }
 
+/// A word of a graph file.
+#[derive(Debug, Clone, Serialize)]
+pub struct OutlinedWord {
+    /// The word.
+    pub text: String,
+    /// Its location.
+    pub place: Location,
+}
+
 /// A role and its device.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Serialize)]
 pub struct OutlinedRole {
     /// Its name.
     pub name: String,
-    /// Its type, with its span.
-    pub kind: Word,
-    /// The device bound to it, with its span.
-    pub device: Word,
+    /// Its type.
+    #[serde(rename = "type")]
+    pub kind: OutlinedWord,
+    /// The device that fills it.
+    pub device: OutlinedWord,
 }
 
 /// A mode.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Serialize)]
 pub struct OutlinedMode {
     /// Its name.
     pub name: String,
-    /// `set.…` for each value that it sets, and its exits as written.
+    /// `set.…` for each value that it sets, and its exits.
     pub settings: Vec<Setting>,
 }
 
 /// A wire.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Serialize)]
 pub struct OutlinedWire {
-    /// Name of the input or of the command.
+    /// Name of the input or the command.
     pub name: String,
-    /// Full name of its source: `node.port`.
+    /// The port that it comes from: `node.port`.
     pub source: String,
-    /// Maximum age of its values [ms] and the reaction to older ones, if it has a limit.
-    pub age: Option<(f64, Policy)>,
-    /// Where the source was written.
-    pub span: Range<usize>,
+    /// Maximum age of its value [ms], if it has one.
+    pub max_age_ms: Option<f64>,
+    /// Policy for an older value, if it has a maximum age.
+    pub stale: Option<&'static str>,
+    /// Where the wire is written.
+    pub place: Location,
 }
 
 /// A node or a device.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Serialize)]
 pub struct OutlinedBlock {
     /// Its full name.
     pub name: String,
-    /// Span of its name.
-    pub span: Range<usize>,
-    /// Its type, with its span.
-    pub kind: Word,
-    /// Its wires.
+    /// Where its name is written.
+    pub place: Location,
+    /// Its type.
+    #[serde(rename = "type")]
+    pub kind: OutlinedWord,
+    /// The wires to its inputs.
+    #[serde(rename = "inputs")]
     pub wires: Vec<OutlinedWire>,
     /// Its parameters, in the order of the declaration.
+    #[serde(rename = "params")]
     pub settings: Vec<Setting>,
+    /// The outputs of a node.
+    pub outputs: Vec<OutlinedPort>,
 }
 
-/// A parameter with its value.
-#[derive(Debug, Clone)]
+/// An output of a node.
+#[derive(Debug, Clone, Serialize)]
+pub struct OutlinedPort {
+    /// Its name: `node.port`.
+    pub name: String,
+    /// Its kind.
+    pub kind: &'static str,
+    /// Its unit, if all its values have the same.
+    pub unit: Option<String>,
+    /// Its frames, where they are known.
+    pub frames: Vec<Option<String>>,
+}
+
+/// A value of a section or a block.
+#[derive(Debug, Clone, Serialize)]
 pub struct Setting {
     /// Dotted path in its block.
     pub path: String,
     /// The value.
     pub value: Value,
-    /// The origin of the value.
+    /// Where it comes from.
+    #[serde(flatten)]
     pub origin: Origin,
 }
 
-/// The origin of a value.
-#[derive(Debug, Clone, PartialEq, Eq)]
+/// Where a value comes from.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+#[serde(tag = "origin", rename_all = "lowercase")]
 pub enum Origin {
-    /// A file or the command line, at this span.
-    Written(Range<usize>),
-    /// The default of the parameter.
+    /// A file or the command line.
+    Written {
+        /// Where the value is written.
+        place: Location,
+    },
+    /// The declaration of the parameter.
     Default,
     /// A fact of a device.
     Fact {
-        /// `role.fact`
+        /// The fact: `role.fact`.
         fact: String,
-        /// Span of the name of the device.
-        device: Range<usize>,
+        /// Where the name of the device is written.
+        place: Location,
     },
 }
 
@@ -112,26 +153,26 @@ pub(crate) struct OutlineBuilder<'a> {
     pub(crate) net: &'a Net<'a>,
     pub(crate) opened: &'a OpenedBench,
     pub(crate) sources: &'a SourceMap,
-    /// Maximum time step between two samples [s].
+    /// The nodes, in the order in which they step.
+    pub(crate) nodes: &'a [PlannedNode],
+    /// Nominal time between two ticks [s].
+    pub(crate) period: f64,
+    /// Longest time between two samples that counts as one step [s].
     pub(crate) max_gap: f64,
 }
 
 impl OutlineBuilder<'_> {
     pub(crate) fn build(&self) -> Outline {
         let flat = self.net.flat;
-        let commands = self.net.commands.iter().map(|wire| OutlinedWire {
-            name: self.net.command_name(wire),
-            source: self.net.port_name(wire.source),
-            age: age(&wire.origin),
-            span: wire.origin.word.span.clone(),
-        });
+        let command = |wire: &CommandWire| self.wire(self.net.command_name(wire), wire.source, &wire.origin);
         Outline {
+            period_s: self.period,
             settings: self.graph(),
             roles: self.roles(),
-            commands: commands.collect(),
+            commands: self.net.commands.iter().map(command).collect(),
             policy: self.policy(),
-            modes: flat.modes.iter().map(outline_mode).collect(),
-            nodes: (0..flat.nodes.len()).filter_map(|node| self.node(node)).collect(),
+            modes: flat.modes.iter().map(|mode| self.mode(mode)).collect(),
+            nodes: self.nodes.iter().filter_map(|node| self.node(node)).collect(),
             devices: self.opened.devices.iter().filter_map(|device| self.device(&device.name)).collect(),
         }
     }
@@ -142,7 +183,7 @@ impl OutlineBuilder<'_> {
         self.table(given, &GraphTable::fields(), "", &mut settings);
         settings.retain(|setting| setting.path != "bench");
         if !settings.iter().any(|setting| setting.path == "max_gap_ms") {
-            // Rounded to microseconds, to hide the digits of floating-point errors.
+            // A whole number of microseconds, so that no digits are there by chance.
             let gap = Value { span: NO_SPAN, item: Item::Float((self.max_gap * 1e6).round() * 1e-3) };
             settings.push(Setting { path: "max_gap_ms".into(), value: gap, origin: Origin::Default });
         }
@@ -161,22 +202,33 @@ impl OutlineBuilder<'_> {
         let device = |role: &str| bind.clone().find(|(key, _)| key.name == role).map(|(_, word)| word.clone());
         let roles = self.net.flat.roles.iter();
         let role = |(key, kind): &(Key, Word)| {
-            Some(OutlinedRole { name: key.name.clone(), kind: kind.clone(), device: device(&key.name)? })
+            let device = self.word(&device(&key.name)?);
+            Some(OutlinedRole { name: key.name.clone(), kind: self.word(kind), device })
         };
         roles.filter_map(role).collect()
     }
 
-    fn node(&self, index: usize) -> Option<OutlinedBlock> {
-        let node = &self.net.flat.nodes[index];
-        let spec = self.net.spec(index)?;
-        let wire = |wire: &Wire| OutlinedWire {
-            name: wire.key.name.clone(),
-            source: self.net.port_name(wire.source),
-            age: age(&wire.origin),
-            span: wire.origin.word.span.clone(),
-        };
-        let wires = self.net.wires[index].iter().map(wire).collect();
-        Some(OutlinedBlock { name: node.name.clone(), wires, ..self.block(&node.block, &spec.params)? })
+    fn node(&self, planned: &PlannedNode) -> Option<OutlinedBlock> {
+        let node = &self.net.flat.nodes[planned.index];
+        let spec = self.net.spec(planned.index)?;
+        let wire = |wire: &Wire| self.wire(wire.key.name.clone(), wire.source, &wire.origin);
+        let wires = self.net.wires[planned.index].iter().map(wire).collect();
+        let outputs = planned.ports.iter().map(OutlinedPort::of).collect();
+        Some(OutlinedBlock { name: node.name.clone(), wires, outputs, ..self.block(&node.block, &spec.params)? })
+    }
+
+    fn wire(&self, name: String, source: PortRef, origin: &WireOrigin) -> OutlinedWire {
+        OutlinedWire {
+            name,
+            source: self.net.port_name(source),
+            max_age_ms: origin.age.map(|age| age.max_age as f64 * 1e-6),
+            stale: origin.age.map(|age| age.stale.word()),
+            place: self.sources.location(&origin.word.span),
+        }
+    }
+
+    fn word(&self, word: &Word) -> OutlinedWord {
+        OutlinedWord { text: word.text.clone(), place: self.sources.location(&word.span) }
     }
 
     fn device(&self, name: &str) -> Option<OutlinedBlock> {
@@ -192,14 +244,15 @@ impl OutlineBuilder<'_> {
         self.table(block.params.as_table(), specs, "", &mut settings);
         Some(OutlinedBlock {
             name: block.key.name.clone(),
-            span: block.key.span.clone(),
-            kind: block.kind.clone()?,
+            place: self.sources.location(&block.key.span),
+            kind: self.word(block.kind.as_ref()?),
             wires: Vec::new(),
             settings,
+            outputs: Vec::new(),
         })
     }
 
-    /// Adds the settings of a table: the given values, and the defaults of the others.
+    /// The settings of a table: what is given, and the defaults of what is not.
     fn table(&self, given: Option<&Table>, specs: &[ParamSpec], path: &str, settings: &mut Vec<Setting>) {
         for spec in specs {
             let path = format!("{path}{}", spec.name);
@@ -209,7 +262,7 @@ impl OutlineBuilder<'_> {
             }
         }
         let is_declared = |name: &str| specs.iter().any(|spec| spec.name == name);
-        // A node type that is known only at run time may accept more than it declares.
+        // A node that is known only at run time may take more than it declares.
         for (key, value) in given.iter().flat_map(|table| &table.entries).filter(|(key, _)| !is_declared(&key.name)) {
             settings.push(self.setting(value, format!("{path}{}", key.name)));
         }
@@ -232,14 +285,14 @@ impl OutlineBuilder<'_> {
             }
             _ => {
                 let mut setting = self.setting(value, path);
-                self.resolve_path(&mut setting, spec);
-                add_defaults(&mut setting.value, spec);
+                self.resolve(&mut setting, spec);
+                complete(&mut setting.value, spec);
                 settings.push(setting);
             }
         }
     }
 
-    /// Returns a value as written, or the fact that it refers to.
+    /// A value as it was written, or the fact that it asks for.
     fn setting(&self, value: &Value, path: String) -> Setting {
         let fact = value.as_table().filter(|table| table.is_fact());
         let word = fact.and_then(|table| table.get("from")).and_then(Value::as_str);
@@ -252,56 +305,64 @@ impl OutlineBuilder<'_> {
         let bound = role.and_then(|role| self.opened.roles[role].as_ref());
         let origin = match (word, bound) {
             (Some(word), Some(bound)) => {
-                Origin::Fact { fact: word.to_owned(), device: self.opened.devices[bound.device].span.clone() }
+                let device = &self.opened.devices[bound.device];
+                Origin::Fact { fact: word.to_owned(), place: self.sources.location(&device.span) }
             }
-            // A value of [limits] keeps its span in that section.
-            _ => Origin::Written(filled.span.clone()),
+            // A value from [limits] keeps its place there.
+            _ => Origin::Written { place: self.sources.location(&filled.span) },
         };
         Setting { path, value: filled, origin }
     }
 
-    /// Makes the path of a file relative to the working folder.
-    fn resolve_path(&self, setting: &mut Setting, spec: &ParamSpec) {
-        if let (Origin::Written(span), Item::String(text)) = (&setting.origin, &mut setting.value.item)
+    /// The path of a file, which stands relative to the file it is written in, as seen from the working folder.
+    fn resolve(&self, setting: &mut Setting, spec: &ParamSpec) {
+        if let (Origin::Written { .. }, Item::String(text)) = (&setting.origin, &mut setting.value.item)
             && spec.takes == FilePath::EXPECTS
         {
-            *text = self.sources.path(text, span.start).display().to_string();
+            *text = self.sources.path(text, setting.value.span.start).display().to_string();
         }
     }
-}
 
-fn age(wire: &WireOrigin) -> Option<(f64, Policy)> {
-    wire.age.map(|age| (age.max_age as f64 * 1e-6, age.stale))
-}
-
-fn outline_mode(block: &ModeBlock) -> OutlinedMode {
-    let mut settings = Vec::new();
-    for (key, value) in &block.table.entries {
-        match value.as_table().filter(|_| key.name == "set") {
-            Some(_) => add_leaves(value, "set", 4, &mut settings),
-            None => add_leaves(value, &key.name, 0, &mut settings),
-        }
-    }
-    OutlinedMode { name: block.key.name.clone(), settings }
-}
-
-/// Adds the values of a table, descending at most `depth` tables.
-fn add_leaves(value: &Value, path: &str, depth: usize, settings: &mut Vec<Setting>) {
-    match value.as_table().filter(|table| depth > 0 && !table.is_fact()) {
-        Some(table) => {
-            for (key, value) in &table.entries {
-                add_leaves(value, &format!("{path}.{}", key.name), depth - 1, settings);
+    fn mode(&self, block: &ModeBlock) -> OutlinedMode {
+        let mut settings = Vec::new();
+        for (key, value) in &block.table.entries {
+            match value.as_table().filter(|_| key.name == "set") {
+                Some(_) => self.leaves(value, "set", 4, &mut settings),
+                None => self.leaves(value, &key.name, 0, &mut settings),
             }
         }
-        None => {
-            let origin = Origin::Written(value.span.clone());
-            settings.push(Setting { path: path.to_owned(), value: value.clone(), origin });
+        OutlinedMode { name: block.key.name.clone(), settings }
+    }
+
+    /// Collects the values in nested tables, down to `depth` levels.
+    fn leaves(&self, value: &Value, path: &str, depth: usize, settings: &mut Vec<Setting>) {
+        match value.as_table().filter(|table| depth > 0 && !table.is_fact()) {
+            Some(table) => {
+                for (key, value) in &table.entries {
+                    self.leaves(value, &format!("{path}.{}", key.name), depth - 1, settings);
+                }
+            }
+            None => {
+                let origin = Origin::Written { place: self.sources.location(&value.span) };
+                settings.push(Setting { path: path.to_owned(), value: value.clone(), origin });
+            }
         }
     }
 }
 
-/// Adds the defaults to the tables of a list.
-fn add_defaults(value: &mut Value, spec: &ParamSpec) {
+impl OutlinedPort {
+    fn of(port: &PlannedPort) -> Self {
+        Self {
+            name: port.name.clone(),
+            kind: port.shape.kind().name(),
+            unit: port.shape.unit().map(|unit| unit.to_string()),
+            frames: port.frames.clone(),
+        }
+    }
+}
+
+/// Fills the defaults into the tables of a list.
+fn complete(value: &mut Value, spec: &ParamSpec) {
     let Item::Array(items) = &mut value.item else { return };
     for item in items {
         let Item::Table(table) = &mut item.item else { continue };
@@ -313,7 +374,7 @@ fn add_defaults(value: &mut Value, spec: &ParamSpec) {
     }
 }
 
-/// Returns the default of a parameter as a value, or `None` if it has none.
+/// The default of a parameter as a value; none if nothing is set.
 fn default(spec: &ParamSpec) -> Option<Value> {
     let text = spec.default.as_ref()?;
     let mut sources = SourceMap::default();

@@ -1,96 +1,144 @@
-//! A whole graph on a table, fed by hand.
+//! A whole graph in a test, fed by hand.
 
-use std::borrow::Cow;
-use std::collections::VecDeque;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, PoisonError};
 
+use super::fed::{Event, FedDevice, FedRole, Queue};
 use crate::catalogue::Catalogue;
-use crate::device::{Commands, Description, DeviceError, DeviceType, Driver, Filled, Opened, Samples, Stepped};
+use crate::device::{DeviceError, Output, Samples};
 use crate::engine::Engine;
 use crate::fault::Fault;
 use crate::graph::{Request, compile};
-use crate::node::{ParamSpec, PortId, Reader};
-use crate::signal::{Freshness, Shape, Signal};
-use crate::source::Report;
-use crate::source::Value;
+use crate::signal::{Freshness, Signal};
+use crate::source::{Report, suggestion};
 
-type Write = Box<dyn FnOnce(&mut Samples) + Send>;
-
-/// What a test has fed and a device has not given yet: the time, and how to write it.
-type Queue = Arc<Mutex<VecDeque<(i64, Write)>>>;
-
-/// A role filled by hand.
-pub struct Source {
-    /// Name of the role in the graph.
-    pub role: &'static str,
-    /// Type of the role.
-    pub kind: &'static str,
-    /// Nominal time between two samples [s].
-    pub period: f64,
-    /// Shapes of the role's outputs.
-    pub outputs: Vec<Shape>,
-    /// Shapes of the role's commands.
-    pub commands: Vec<Shape>,
-}
-
-/// A graph whose roles are fed by the test, in virtual time.
+/// A graph in virtual time, some or all of whose roles the test feeds. Ports are named as in the graph: `pad.image`.
 ///
 /// A sample that is fed is latched in the first tick at its time or later.
 pub struct GraphRig {
-    /// The engine, for everything the rig has no word for.
+    /// The engine, for everything that the rig has no method for.
     pub engine: Engine,
-    queues: Vec<(&'static str, Queue, u64)>,
+    fed: Vec<Fed>,
+}
+
+/// A fed role: its name, its outputs, each with the sequence number of its last sample, and what is to come.
+struct Fed {
+    role: String,
+    outputs: Vec<(String, u64)>,
+    queue: Queue,
 }
 
 impl GraphRig {
-    /// The graph of a TOML text, with its roles filled by hand.
+    /// Builds the graph of a TOML text, with roles that the test feeds.
     ///
     /// # Errors
     /// Everything that is wrong with the graph.
-    pub fn new(catalogue: Catalogue, graph: &str, sources: Vec<Source>) -> Result<Self, Report> {
-        let (mut catalogue, mut bench, mut queues) = (catalogue, String::new(), Vec::new());
-        for source in sources {
-            let queue = Queue::default();
-            let role = source.role;
-            bench.push_str(&format!("devices.{role}.type = \"by_hand_{role}\"\nbind.{role} = \"{role}\"\n"));
-            queues.push((role, Arc::clone(&queue), 0));
-            catalogue = catalogue.device_type(Box::new(ByHand { source, queue }));
-        }
-        let request = Request { bench_text: Some(bench), ..Request::text(graph) };
-        Ok(Self { engine: Engine::new(compile(&catalogue, &request)?), queues })
+    pub fn new(catalogue: Catalogue, graph: &str, fed: impl IntoIterator<Item = FedRole>) -> Result<Self, Report> {
+        Self::open(catalogue, Request::text(graph), fed)
     }
 
-    /// Feeds the next sample of a role's `port`-th output, taken at `ms`.
+    /// Builds a graph on its bench, such as `Request::file("graphs/hybrid.toml")`. The roles in `fed` take the place of
+    /// those that the bench fills; the others keep their devices.
+    ///
+    /// # Errors
+    /// Everything that is wrong with the graph.
+    pub fn open(
+        catalogue: Catalogue,
+        request: Request,
+        fed: impl IntoIterator<Item = FedRole>,
+    ) -> Result<Self, Report> {
+        let (mut catalogue, mut request, mut rigged) = (catalogue, request, Vec::new());
+        for mut role in fed {
+            role.complete(&catalogue);
+            let (name, queue) = (role.name.clone(), Queue::default());
+            request = request
+                .set(format!("devices.{name}.type = \"{}\"", role.device_type()))
+                .set(format!("bind.{name} = \"{name}\""));
+            let outputs = role.outputs.iter().map(|(output, _)| (output.clone(), 0)).collect();
+            rigged.push(Fed { role: name, outputs, queue: Arc::clone(&queue) });
+            catalogue = catalogue.device_type(Box::new(FedDevice { role, queue }));
+        }
+        Ok(Self { engine: Engine::new(compile(&catalogue, &request)?), fed: rigged })
+    }
+
+    /// Feeds the next sample of a port, taken at `ms`.
     ///
     /// # Panics
-    /// If there is no such role.
-    pub fn feed<T: Signal + Sync>(&mut self, role: &str, port: usize, ms: f64, value: T) {
-        let (_, _, sequence) = self.queue(role);
-        let next = *sequence + 1;
-        self.feed_as(role, port, ms, ms, next, value);
+    /// If no fed role has that port.
+    pub fn feed<T: Signal + Sync>(&mut self, port: &str, ms: f64, value: T) {
+        let sequence = self.next_of(port);
+        self.feed_as(port, ms, ms, sequence, value);
     }
 
     /// Feeds a sample at `at_ms` that says it was taken at `stamp_ms`, as the `sequence`-th.
     ///
     /// # Panics
-    /// If there is no such role.
-    pub fn feed_as<T: Signal + Sync>(
-        &mut self,
-        role: &str,
-        port: usize,
-        at_ms: f64,
-        stamp_ms: f64,
-        sequence: u64,
-        value: T,
-    ) {
-        let (_, queue, last) = self.queue(role);
-        *last = sequence;
-        let write: Write = Box::new(move |samples| *samples.write(port, nanos(stamp_ms), sequence) = value);
-        queue.lock().unwrap_or_else(PoisonError::into_inner).push_back((nanos(at_ms), write));
+    /// If no fed role has that port.
+    pub fn feed_as<T: Signal + Sync>(&mut self, port: &str, at_ms: f64, stamp_ms: f64, sequence: u64, value: T) {
+        self.queue(port, at_ms, sequence, move |samples, port| {
+            *samples.write(Output::at(port), nanos(stamp_ms), sequence) = value;
+        });
     }
 
-    fn queue(&mut self, role: &str) -> &mut (&'static str, Queue, u64) {
-        self.queues.iter_mut().find(|(name, ..)| *name == role).unwrap_or_else(|| panic!("no role is called `{role}`"))
+    /// Feeds a sample taken at `ms` that says that a port has no value.
+    ///
+    /// # Panics
+    /// If no fed role has that port.
+    pub fn feed_absent(&mut self, port: &str, ms: f64) {
+        let sequence = self.next_of(port);
+        self.queue(port, ms, sequence, move |samples, port| {
+            samples.clear(Output::<f64>::at(port), nanos(ms), sequence);
+        });
+    }
+
+    /// Makes a port lost at `ms`, until it is fed again; see [`Samples::lost`].
+    ///
+    /// # Panics
+    /// If no fed role has that port.
+    pub fn lose(&mut self, port: &str, ms: f64, why: &'static str) {
+        let sequence = self.next_of(port) - 1;
+        self.queue(port, ms, sequence, move |samples, port| samples.lost(Output::<f64>::at(port), why));
+    }
+
+    /// Makes the device behind a fed role fail at `ms`.
+    ///
+    /// # Panics
+    /// If no such role is fed.
+    pub fn fail_device(&mut self, role: &str, ms: f64, why: &str) {
+        let why = why.to_owned();
+        push(self.role(role), ms, Box::new(move |_| Err(DeviceError(why))));
+    }
+
+    fn queue(&mut self, port: &str, ms: f64, sequence: u64, write: impl FnOnce(&mut Samples, usize) + Send + 'static) {
+        let (fed, output) = self.output(port);
+        fed.outputs[output].1 = sequence;
+        let event = move |samples: &mut Samples| {
+            write(samples, output);
+            Ok(())
+        };
+        push(fed, ms, Box::new(event));
+    }
+
+    fn next_of(&mut self, port: &str) -> u64 {
+        let (fed, output) = self.output(port);
+        fed.outputs[output].1 + 1
+    }
+
+    fn role(&mut self, role: &str) -> &mut Fed {
+        let roles: Vec<String> = self.fed.iter().map(|fed| fed.role.clone()).collect();
+        self.fed.iter_mut().find(|fed| fed.role == role).unwrap_or_else(|| {
+            panic!("no role `{role}` is fed: {}", suggestion(role, roles.iter().map(String::as_str), "fed roles"))
+        })
+    }
+
+    fn output(&mut self, port: &str) -> (&mut Fed, usize) {
+        let (role, name) = port.split_once('.').unwrap_or((port, ""));
+        let fed = self.role(role);
+        let found = fed.outputs.iter().position(|(output, _)| output == name);
+        let output = found.unwrap_or_else(|| {
+            let names = fed.outputs.iter().map(|(output, _)| output.as_str());
+            panic!("role `{role}` has no output `{name}`: {}", suggestion(name, names, "outputs"))
+        });
+        (fed, output)
     }
 
     /// Runs the tick at `ms`.
@@ -101,98 +149,58 @@ impl GraphRig {
         self.engine.tick(nanos(ms))
     }
 
+    /// Runs all ticks of the next `ms` milliseconds, each when the graph's clock says so.
+    ///
+    /// # Errors
+    /// The reason of a fault.
+    pub fn run_for(&mut self, ms: f64) -> Result<(), Fault> {
+        let end = self.engine.now() + nanos(ms);
+        while let Some(next) = self.engine.next().filter(|next| *next <= end) {
+            self.engine.tick(next)?;
+        }
+        Ok(())
+    }
+
     /// Sends a word from outside; it is there in the next tick.
+    ///
+    /// # Panics
+    /// If nothing waits for the word.
     pub fn send(&mut self, word: &str) {
         self.engine.send(word).unwrap_or_else(|why| panic!("{why}"));
     }
 
-    fn port(&self, name: &str) -> PortId {
-        let found = self.engine.ports().iter().find(|(port, _)| port.name == name);
-        found.unwrap_or_else(|| panic!("there is no port `{name}`")).1
-    }
-
-    /// Freshness of a port in the last tick.
+    /// Returns the freshness of a port in the last tick.
     ///
     /// # Panics
     /// If there is no such port.
     #[must_use]
     pub fn freshness(&self, port: &str) -> Freshness {
-        self.engine.bus().marks[self.port(port).mark as usize].freshness(self.engine.ticks())
+        self.engine.mark(port).freshness(self.engine.ticks())
     }
 
-    /// What is on a port; `None` if it is absent.
+    /// Returns what is on a port, or `None` if it is absent.
     ///
     /// # Panics
-    /// If there is no such port of that kind.
+    /// If there is no port of that name and kind.
     #[must_use]
     pub fn get<T: Signal>(&self, port: &str) -> Option<&T> {
-        let (planned, id) = self.engine.ports().iter().find(|(planned, _)| planned.name == port)?;
-        assert_eq!(planned.shape.kind(), T::KIND, "port `{port}`");
-        let bus = self.engine.bus();
-        bus.marks[id.mark as usize].is_present().then(|| &T::arena(&bus.arenas)[id.slot as usize])
+        self.engine.get(port)
     }
 
-    /// Age of what is on a port [ms]; zero for generated motion.
+    /// Returns the age of what is on a port [ms]; zero for generated motion.
     ///
     /// # Panics
     /// If there is no such port.
     #[must_use]
     pub fn age_ms(&self, port: &str) -> f64 {
-        let mark = &self.engine.bus().marks[self.port(port).mark as usize];
-        mark.stamp().age(self.engine.now()) as f64 * 1e-6
+        self.engine.mark(port).stamp().age(self.engine.now()) as f64 * 1e-6
     }
+}
+
+fn push(fed: &Fed, ms: f64, event: Event) {
+    fed.queue.lock().unwrap_or_else(PoisonError::into_inner).push_back((nanos(ms), event));
 }
 
 fn nanos(ms: f64) -> i64 {
     (ms * 1e6).round() as i64
-}
-
-struct ByHand {
-    source: Source,
-    queue: Queue,
-}
-
-impl DeviceType for ByHand {
-    fn name(&self) -> Cow<'static, str> {
-        format!("by_hand_{}", self.source.role).into()
-    }
-
-    fn summary(&self) -> Cow<'static, str> {
-        "a role fed by a test".into()
-    }
-
-    fn params(&self) -> Vec<ParamSpec> {
-        Vec::new()
-    }
-
-    fn open(&self, _: &Value, _: &mut Reader<'_>) -> Option<Opened> {
-        let filled = Filled {
-            role: self.source.kind.into(),
-            outputs: self.source.outputs.clone(),
-            commands: self.source.commands.clone(),
-            facts: Vec::new(),
-        };
-        Some(Opened {
-            description: Description { fills: vec![filled], period: self.source.period },
-            driver: Driver::Stepped(Box::new(Hand(Arc::clone(&self.queue)))),
-        })
-    }
-}
-
-struct Hand(Queue);
-
-impl Stepped for Hand {
-    /// What was fed next; a test that feeds nothing is a device that is silent, not one that has ended.
-    fn next(&self) -> Option<i64> {
-        let queue = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        Some(queue.front().map_or(i64::MAX, |(at, _)| *at))
-    }
-
-    fn exchange(&mut self, now: i64, _: &Commands, samples: &mut Samples) -> Result<(), DeviceError> {
-        let mut queue = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        while let Some((_, write)) = queue.pop_front_if(|(at, _)| *at <= now) {
-            write(samples);
-        }
-        Ok(())
-    }
 }

@@ -46,8 +46,8 @@ impl NodeRig {
         let mut wired: Vec<(Need, Vec<PortId>)> = spec.inputs.iter().map(|input| (input.need, Vec::new())).collect();
         let mut inputs = Vec::new();
         for (name, shape) in wires {
-            let named = spec.inputs.iter().position(|input| input.name == *name && input.need != Need::Many);
-            let i = named.or_else(|| spec.inputs.iter().position(|input| input.need == Need::Many));
+            let named = spec.inputs.iter().position(|input| input.name == *name && !input.need.is_many);
+            let i = named.or_else(|| spec.inputs.iter().position(|input| input.need.is_many));
             let i = i.unwrap_or_else(|| panic!("`{}` has no input `{name}`", N::NAME));
             assert_eq!(shape.kind(), spec.inputs[i].kind, "input `{name}`");
             let port = bus.add(shape);
@@ -91,11 +91,9 @@ impl NodeRig {
     /// If there is no such wire.
     pub fn edit<T: Signal>(&mut self, input: &str, stamp: Stamp, change: impl FnOnce(&mut T)) {
         let port = self.input(input);
-        let value = &mut T::arena_mut(&mut self.bus.arenas)[port.slot as usize];
-        change(value);
-        let mark = &mut self.bus.marks[port.mark as usize];
-        mark.renew(self.tick.index, stamp);
-        *mark = value.mark(*mark, self.tick.index);
+        change(self.bus.slot_mut(port));
+        self.bus.mark_mut(port).renew(self.tick.index, stamp);
+        *self.bus.mark_mut(port) = self.bus.slot::<T>(port).mark(*self.bus.mark(port), self.tick.index);
     }
 
     /// The input goes away.
@@ -104,7 +102,7 @@ impl NodeRig {
     /// If there is no such wire.
     pub fn lose(&mut self, input: &str) {
         let port = self.input(input);
-        self.bus.marks[port.mark as usize].lose(self.tick.index);
+        self.bus.mark_mut(port).lose(self.tick.index);
     }
 
     /// Runs the tick, then lets `ms` milliseconds pass.
@@ -129,7 +127,7 @@ impl NodeRig {
         let i = self.output(output);
         assert_eq!(self.shapes[i].kind(), T::KIND, "output `{output}`");
         let port = self.outputs[i];
-        self.mark(output).is_present().then(|| &T::arena(&self.bus.arenas)[port.slot as usize])
+        self.bus.get(port)
     }
 
     /// Mark of an output.
@@ -138,7 +136,7 @@ impl NodeRig {
     /// If there is no such output.
     #[must_use]
     pub fn mark(&self, output: &str) -> Mark {
-        self.bus.marks[self.outputs[self.output(output)].mark as usize]
+        *self.bus.mark(self.outputs[self.output(output)])
     }
 
     /// Freshness of an output in the tick of the last step.

@@ -33,7 +33,7 @@ pub struct NodeSpec {
     pub outputs: Vec<PortSpec>,
     /// Whether it steps in every tick.
     pub every_tick: bool,
-    /// Whether the tool logs what came in on its wires; see [`Node::LOGS`].
+    /// Whether the tool logs what came in on its wires; see [`Describe::LOGS`](super::Describe::LOGS).
     pub logs: bool,
     /// What holds of the motion it gives.
     pub limits: Limits,
@@ -169,7 +169,7 @@ struct Configuration<N: Node> {
 
 impl<N: Node> AnyNode for Cell<N> {
     fn step(&mut self, tick: &Tick, bus: &mut Bus, wires: &Wires, outputs: &[PortId]) {
-        let mut out = N::Outputs::take(bus, outputs);
+        let mut out = N::Outputs::take(bus, outputs, tick);
         let inputs = N::Inputs::fetch(bus, wires, tick.index);
         self.active.node.step(tick, inputs, &mut out, &mut self.state);
         out.put(bus, outputs, tick);

@@ -32,9 +32,11 @@ macro_rules! params {
             const EXPECTS: &'static str = "a table";
 
             fn fields() -> Vec<$crate::node::ParamSpec> {
-                vec![$($crate::node::ParamSpec::of::<$ty>(
-                    stringify!($field), concat!($($doc, "\n"),*), None$(.or(Some(|| $default)))?,
-                    stringify!($($default)?), $is_live)),*]
+                vec![$($crate::node::ParamSpec::from_macro::<$ty>(
+                    &$crate::node::Declared {
+                        name: stringify!($field), doc: concat!($($doc, "\n"),*), unit: None, bounds: None, is_live: $is_live,
+                    },
+                    None$(.or(Some((|| $default) as fn() -> $ty)))?, stringify!($($default)?))),*]
             }
 
             fn written(&self) -> Option<$crate::node::Written> {
@@ -44,7 +46,10 @@ macro_rules! params {
             #[allow(unused_mut, unused_variables, reason = "a node may have no parameters")]
             fn read(value: &$crate::source::Value, reader: &mut $crate::node::Reader<'_>) -> Option<Self> {
                 let mut table = reader.table(value)?;
-                $(let $field = reader.field::<$ty>(&mut table, stringify!($field), None$(.or(Some(|| $default)))?);)*
+                $(let $field = reader.field::<$ty>(
+                    &mut table,
+                    &$crate::node::Declared::new(stringify!($field)),
+                    None$(.or(Some((|| $default) as fn() -> $ty)))?);)*
                 reader.close(table, &[$(stringify!($field)),*]);
                 Some(Self { $($field: $field?),* })
             }
@@ -96,6 +101,12 @@ macro_rules! state {
 /// ```
 #[macro_export]
 macro_rules! inputs {
+    (@need Required) => { $crate::node::Need::REQUIRED };
+    (@need Sampled) => { $crate::node::Need { is_trigger: false, ..$crate::node::Need::REQUIRED } };
+    (@need Trigger) => { $crate::node::Need::OPTIONAL };
+    (@need Optional) => { $crate::node::Need { is_trigger: false, ..$crate::node::Need::OPTIONAL } };
+    (@need Many) => { $crate::node::Need { is_many: true, ..$crate::node::Need::OPTIONAL } };
+    (@need Delayed) => { $crate::node::Need { is_delayed: true, ..$crate::node::Need::OPTIONAL } };
     (@list [$($done:tt)*]) => { $crate::inputs! { @emit $($done)* } };
     (@list [$($done:tt)*] $(#[doc = $doc:literal])* $name:ident: Sampled<$kind:ident $([$($arg:literal),*])?> $(, $($rest:tt)*)?) => {
         $crate::inputs! { @list [$($done)* { [$($doc)*] $name $kind [$($($arg)*)?] Sampled ($crate::node::In<'a, $crate::signal::$kind>) }] $($($rest)*)? }
@@ -139,7 +150,7 @@ macro_rules! inputs {
                     doc: concat!($($doc, "\n"),*).into(),
                     kind: $crate::signal::Kind::$kind,
                     args: vec![$(std::borrow::Cow::Borrowed($arg)),*].into(),
-                    need: $crate::node::Need::$need,
+                    need: $crate::inputs! { @need $need },
                 }),*]
             }
 
@@ -157,7 +168,7 @@ macro_rules! inputs {
             fn fetch(bus: &'a $crate::node::Bus, wires: &'a $crate::node::Wires, tick: u64) -> Self {
                 let mut i = 0;
                 $(
-                    let lag = u64::from(matches!($crate::node::Need::$need, $crate::node::Need::Delayed));
+                    let lag = u64::from($crate::inputs! { @need $need }.is_delayed);
                     let $name = <$view as $crate::node::View<'a>>::fetch(bus, wires, i, tick.wrapping_sub(lag));
                     i += 1;
                 )*
@@ -196,7 +207,7 @@ macro_rules! outputs {
                     doc: concat!($($doc, "\n"),*).into(),
                     kind: $crate::signal::Kind::$kind,
                     args: vec![$($(std::borrow::Cow::Borrowed($arg)),*)?].into(),
-                    need: $crate::node::Need::Required,
+                    need: $crate::node::Need::REQUIRED,
                 }),*]
             }
 
@@ -206,9 +217,9 @@ macro_rules! outputs {
 
             #[allow(unused_variables, unused_mut, reason = "a node may have no outputs")]
             #[inline]
-            fn take(bus: &mut $crate::node::Bus, ports: &[$crate::node::PortId]) -> Self {
+            fn take(bus: &mut $crate::node::Bus, ports: &[$crate::node::PortId], tick: &$crate::node::Tick) -> Self {
                 let mut ports = ports.iter();
-                Self { $($name: $crate::node::Out::take(bus, *ports.next().expect("a port for each output"))),* }
+                Self { $($name: $crate::node::Out::take(bus, *ports.next().expect("a port for each output"), tick)),* }
             }
 
             #[allow(unused_variables, unused_mut, reason = "a node may have no outputs")]
@@ -221,7 +232,7 @@ macro_rules! outputs {
             #[allow(unused_variables, unused_mut, reason = "a node may have no outputs")]
             fn lose(bus: &mut $crate::node::Bus, ports: &[$crate::node::PortId], tick: u64) {
                 let mut ports = ports.iter();
-                $($crate::node::Out::<$crate::signal::$kind>::lose(bus, *ports.next().expect("a port for each output"), tick);)*
+                $($crate::node::Out::<$crate::signal::$kind>::lose_port(bus, *ports.next().expect("a port for each output"), tick);)*
             }
         }
     };

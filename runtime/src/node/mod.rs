@@ -1,41 +1,91 @@
 //! The node contract: plain data in, plain data out.
 //!
-//! A node is one file with four blocks, [`params!`](crate::params), [`inputs!`](crate::inputs),
-//! [`outputs!`](crate::outputs) and [`state!`](crate::state), and one `impl` [`Node`]. Names, types, units and docs
-//! come from those blocks and feed the check, its messages and the reference. `docs/writing-a-node.md` builds one.
+//! A node is one file: a struct with its documentation, the structs of its parameters, inputs, outputs and state, and one
+//! `impl` [`Node`]. `docs/writing-a-node.md` builds one.
 //!
-//! How an input is declared says when it wakes the node and what its absence does:
+//! | Derive | implements | reads |
+//! |---|---|---|
+//! | `#[derive(Describe)]` | [`Describe`](trait@Describe) | the doc comment, `#[describe(name = "…", every_tick, logs)]` |
+//! | `#[derive(Param)]` | [`Param`](trait@Param) for a table or a word | `#[param(unit = "…", range = …, above = …, default = …, live)]` |
+//! | `#[derive(Inputs)]` | [`InputSet`] | `#[port(unit = "…", frame = "…", …)]` |
+//! | `#[derive(Outputs)]` | [`OutputSet`] | the same |
+//! | `#[derive(State)]` | [`Clone`], field by field, so that a reset does not allocate | |
 //!
-//! | declared | seen in `step` | wakes the node when | when it is absent |
+//! The type of an input and its attribute say what it needs. Each fact is independent: whether it must be wired
+//! (`optional`), whether it must be present while the node steps (`Option`), and whether a new value wakes the node
+//! (`sampled`).
+//!
+//! | field | attribute | wakes the node when | when it is absent |
 //! |---|---|---|---|
-//! | `T` | `In<T>` | new or lost | the outputs are absent |
-//! | `Sampled<T>` | `In<T>` | lost | the outputs are absent |
-//! | `Trigger<T>` | `Option<In<T>>` | new or lost | `None` |
-//! | `Option<T>` | `Option<In<T>>` | lost | `None` |
-//! | `Many<T>` | `Many<T>`, each named in the graph | any is new or lost | that one is `None` |
-//! | `Delayed<T>` | `Option<In<T>>` as the last tick left it | it was new or lost then, where no other input wakes it | `None` |
+//! | `In<'a, T>` | | new or lost | the outputs are absent |
+//! | `In<'a, T>` | `sampled` | lost | the outputs are absent |
+//! | `Option<In<'a, T>>` | | new or lost | `None` |
+//! | `Option<In<'a, T>>` | `sampled` | lost | `None` |
+//! | `Option<In<'a, T>>` | `optional` | new or lost | `None`; it need not be wired |
+//! | `Option<In<'a, T>>` | `optional, sampled` | lost | `None`; it need not be wired |
+//! | `Option<In<'a, T>>` | `present_if_wired` | new or lost | the outputs are absent; `None` if it is not wired |
+//! | `Option<In<'a, T>>` | `delayed` | new or lost one tick ago, if no other input wakes it | `None`; it is read as the last tick left it |
+//! | `Many<'a, T>` | | any is new or lost | `None` for that wire; any number of wires, each named in the graph |
+//!
+//! A port names what its kind has, and `"_"` where there is nothing to name: `unit` and `frame` (`Scalar`, `Features`,
+//! `Image`, `Regions`), `frame` (`Mask`, `Twist`), `frame` and `reference` (`Pose`), `unit` and `robot` (`Joints`), `frame`
+//! and `robot` (`Jacobian`), nothing (`Flag`). A capital letter is a variable: what it stands for is known when the graph
+//! is loaded, and it is the same for all ports of the node. `"$name"` is the frame or unit that the parameter `name` names.
 
+mod bounds;
+mod bus;
+mod bus_access;
 mod erased;
+mod inputs;
 mod limits;
 mod macros;
 mod mistake;
+mod outputs;
 mod param_spec;
 mod params;
 mod pattern;
 mod ports;
+mod reader;
+mod time;
 
 use crate::signal::Stamp;
 
+pub use bounds::Bounds;
+pub use bus::{Bus, PortId, Wires};
+pub use bus_access::ScalarId;
 pub use erased::{AnyNode, Built, Configured, Given, NodeSpec, NodeType, of};
+pub use inputs::{In, InputSet, Many, View};
 pub use limits::{Components, Limits};
 pub use mistake::{At, Mistake, Mistakes};
-pub use param_spec::{ParamSpec, Repeats, Written, written_table};
-pub use params::{Bit, Count, FilePath, Map, NonNegative, Param, Positive, Rate, Ratio, Reader, Word, read_leaf};
+pub use outputs::{Out, OutputSet};
+pub use param_spec::{Declared, ParamSpec, Repeats, Written, written_table};
+pub use params::{Bit, Count, FilePath, Map, NonNegative, Param, Positive, Rate, Ratio, Spanned, Word};
 pub(crate) use pattern::{UnitPattern, declares_a_unit, frame_args, may_fit, unit_pattern};
-pub use ports::{Bus, In, InputSet, Many, Need, Out, OutputSet, PortId, PortSpec, View, Wires};
+pub use ports::{Letters, Need, PortSpec};
+pub use reader::{Reader, read_leaf};
+pub use tactflow_derive::{Describe, Inputs, Outputs, Param, State};
+pub use time::{Absence, Interval};
+
+/// The name and the documentation of a node or a device. `#[derive(Describe)]` takes them from the doc comment.
+pub trait Describe {
+    /// The `type` in a graph file.
+    const NAME: &'static str;
+    /// What it does, in one line.
+    const SUMMARY: &'static str;
+    /// How it does it, for the reference: the equation and its source, when to use it, what to look out for. Markdown.
+    const DOC: &'static str = "";
+    /// A block `[nodes.…]` to paste, or what plugs a device into a graph. Its wires may name the blocks of other nodes'
+    /// examples and the roles of devices' examples: `describe` builds a graph from all of them, which loads.
+    const EXAMPLE: &'static str = "";
+    /// Whether a node steps in every tick, and not only when a trigger is new or lost: sinks and generators.
+    const EVERY_TICK: bool = false;
+    /// Whether the tool logs the inputs of a node after each tick in which its first output, a flag, is new and set. A
+    /// step never logs: it decides, and the edge writes.
+    const LOGS: bool = false;
+}
 
 /// A node: configuration in `self`, made at load; state apart, so that a mode is a second configuration.
-pub trait Node: Sized + Send + 'static {
+pub trait Node: Describe + Sized + Send + 'static {
     /// What the graph file may set.
     type Params: Param;
     /// What the node reads.
@@ -45,20 +95,6 @@ pub trait Node: Sized + Send + 'static {
     /// What the node remembers from one step to the next; `()` if nothing.
     type State: Clone + Send + 'static;
 
-    /// Its `type` in a graph file.
-    const NAME: &'static str;
-    /// What it does, in one line.
-    const SUMMARY: &'static str;
-    /// How it does it, for the reference: the equation and its source, when to use it, what to look out for. Markdown.
-    const DOC: &'static str = "";
-    /// A block `[nodes.…]` to paste. Its wires may name the blocks of other nodes' examples and the roles of devices'
-    /// examples: `describe` puts all of them together to a graph that loads.
-    const EXAMPLE: &'static str = "";
-    /// Whether it steps in every tick, and not only when a trigger is new or lost: sinks and generators.
-    const EVERY_TICK: bool = false;
-    /// Whether the tool logs what came in on the wires, after each tick in which the first output, a flag, is new and
-    /// set. A step never logs: it decides, and the edge writes.
-    const LOGS: bool = false;
     /// What holds of the motion it gives.
     const LIMITS: Limits = Limits::NONE;
 
@@ -134,60 +170,5 @@ impl Tick {
             reset_after: 20_000_000,
             is_halted: false,
         }
-    }
-}
-
-/// The time between two samples of one device, for whatever integrates or differentiates: part of a node's state.
-///
-/// A sum of the steps is the time between the first and the last sample, however the ticks fell.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Interval {
-    last: Stamp,
-}
-
-impl Default for Interval {
-    fn default() -> Self {
-        Self { last: Self::NEVER }
-    }
-}
-
-impl Interval {
-    /// The stamp of no device.
-    const NEVER: Stamp = Stamp { nanos: 0, device: u16::MAX - 1 };
-
-    /// Time since the last new sample [s]: zero for the first, or when another device took it; at most the greatest
-    /// gap. Only to be called with something new.
-    pub fn step(&mut self, stamp: Stamp, tick: &Tick) -> f64 {
-        let stamp = if stamp.is_timeless() { Stamp { nanos: tick.now, ..stamp } } else { stamp };
-        let last = std::mem::replace(&mut self.last, stamp);
-        let nanos = if last.device == stamp.device { (stamp.nanos - last.nanos).max(0) } else { 0 };
-        (nanos as f64 * 1e-9).min(tick.max_gap)
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn an_interval_is_between_two_samples_of_one_device() {
-        let tick = Tick { now: 50_000_000, ..Tick::first() };
-        let stamp = |ms: i64, device| Stamp { nanos: ms * 1_000_000, device };
-        let mut interval = Interval::default();
-        let cases = [
-            (stamp(0, 1), 0.0, "the first"),
-            (stamp(4, 1), 0.004, "the next"),
-            (stamp(4, 1), 0.0, "the same once more"),
-            (stamp(2, 1), 0.0, "one that goes back"),
-            (stamp(900, 1), 0.1, "after a gap"),
-            (stamp(904, 2), 0.0, "another device"),
-            (Stamp::TIMELESS, 0.0, "generated, first"),
-            (Stamp::TIMELESS, 0.0, "generated, in the same tick"),
-        ];
-        for (stamp, dt, what) in cases {
-            assert!((interval.step(stamp, &tick) - dt).abs() < 1e-12, "{what}");
-        }
-        let later = Tick { now: 60_000_000, ..tick };
-        assert!((interval.step(Stamp::TIMELESS, &later) - 0.01).abs() < 1e-12);
     }
 }

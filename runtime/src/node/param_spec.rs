@@ -1,6 +1,7 @@
 //! What is known of a parameter without a graph: for the reference, and for whoever shows a graph with its defaults.
 
-use super::Param;
+use super::{Bounds, Param, Reader};
+use crate::source::{SourceMap, Value};
 
 /// A parameter as a graph file would say it.
 pub type Written = toml::Value;
@@ -18,8 +19,14 @@ pub fn written_table<const N: usize>(fields: [(&str, Option<Written>); N]) -> Op
 pub struct ParamSpec {
     /// Name in the graph file.
     pub name: &'static str,
-    /// Meaning, with the unit in brackets.
-    pub doc: &'static str,
+    /// Meaning.
+    pub doc: String,
+    /// Unit as declared; a capital letter is the unit that an input binds, `$name` the parameter `name`.
+    pub unit: Option<String>,
+    /// Range of the number, or of each number in it.
+    pub bounds: Option<Bounds>,
+    /// The words it takes, each with its meaning, if it is one of a few.
+    pub words: &'static [(&'static str, &'static str)],
     /// What it takes, for a person.
     pub takes: String,
     /// Default as a graph file would say it; none if it must be given, or is nothing at all when it is left out.
@@ -32,6 +39,8 @@ pub struct ParamSpec {
     pub fields: Vec<ParamSpec>,
     /// Whether it may change while the graph runs: a mode can set it.
     pub is_live: bool,
+    /// Why a graph file could not give the default; the catalogue refuses such a node.
+    pub fault: Option<String>,
 }
 
 /// How often the fields of a nested table are there.
@@ -45,27 +54,84 @@ pub enum Repeats {
     PerEntry,
 }
 
-impl ParamSpec {
-    /// The description of a field of type `T`; `source` is its default as written in the node's file.
+/// What an author declares of a parameter, beside its type and its default.
+#[derive(Debug, Clone, Copy)]
+pub struct Declared {
+    /// Name in the graph file.
+    pub name: &'static str,
+    /// Meaning.
+    pub doc: &'static str,
+    /// Unit.
+    pub unit: Option<&'static str>,
+    /// Range.
+    pub bounds: Option<Bounds>,
+    /// Whether a mode can set it.
+    pub is_live: bool,
+}
+
+impl Declared {
+    /// A parameter of which only the name is declared.
     #[must_use]
-    pub fn of<T: Param>(
-        name: &'static str,
-        doc: &'static str,
-        default: Option<fn() -> T>,
-        source: &'static str,
-        is_live: bool,
-    ) -> Self {
-        let is_optional = default.is_some() || T::when_missing().is_some();
-        let default = default.map(|value| value().written().map_or_else(|| word(source), |value| value.to_string()));
-        Self { name, doc, takes: T::takes(), default, is_optional, repeats: T::REPEATS, fields: T::fields(), is_live }
+    pub const fn new(name: &'static str) -> Self {
+        Self { name, doc: "", unit: None, bounds: None, is_live: false }
+    }
+}
+
+impl ParamSpec {
+    /// The description of a field of type `T`.
+    #[must_use]
+    pub fn of<T: Param>(declared: &Declared, default: Option<fn() -> T>) -> Self {
+        let Declared { name, doc, unit, bounds, is_live } = *declared;
+        let written = default.and_then(|value| value().written());
+        Self {
+            name,
+            doc: doc.into(),
+            unit: unit
+                .map(|unit| if unit.starts_with('$') { unit.into() } else { unit.replace('2', "²").replace('3', "³") }),
+            bounds,
+            words: T::WORDS,
+            takes: T::takes(bounds.as_ref()),
+            default: written.as_ref().map(Written::to_string),
+            is_optional: default.is_some() || T::when_missing().is_some(),
+            repeats: T::REPEATS,
+            fields: T::fields(),
+            is_live,
+            fault: written.and_then(|written| fault::<T>(&written, bounds)),
+        }
     }
 
-    /// The unit: what its doc ends with in brackets.
+    /// The same for a field that `params!` declares: its unit ends the doc, and `source` is its default as written.
     #[must_use]
-    pub fn unit(&self) -> Option<&'static str> {
-        let doc = self.doc.trim_end().trim_end_matches('.');
-        Some(doc.strip_suffix(']')?.rsplit_once('[')?.1)
+    pub fn from_macro<T: Param>(declared: &Declared, default: Option<fn() -> T>, source: &'static str) -> Self {
+        let text = declared.doc.trim_end().trim_end_matches('.');
+        let (doc, unit) = match text.strip_suffix(']').and_then(|doc| doc.rsplit_once('[')) {
+            Some((doc, unit)) => (format!("{}.", doc.trim_end()), Some(unit.to_owned())),
+            None => (declared.doc.to_owned(), None),
+        };
+        let spec = Self::of(declared, default);
+        let default = spec.default.or_else(|| default.map(|_| word(source)));
+        Self { doc, unit, default, ..spec }
     }
+
+    /// Its meaning with its unit, in one line.
+    #[must_use]
+    pub fn doc_with_unit(&self) -> String {
+        let doc = self.doc.split_whitespace().collect::<Vec<_>>().join(" ");
+        match &self.unit {
+            Some(unit) => format!("{} [{unit}].", doc.trim_end_matches('.')),
+            None => doc,
+        }
+    }
+}
+
+/// What the reader says of a default.
+fn fault<T: Param>(written: &Written, bounds: Option<Bounds>) -> Option<String> {
+    let mut sources = SourceMap::default();
+    sources.add("default", "", "");
+    let mut reader = Reader::new(&sources);
+    reader.bounds = bounds;
+    T::read(&Value::from_toml(written, &(0..0)), &mut reader);
+    reader.mistakes.into_iter().next().map(|mistake| mistake.message)
 }
 
 /// A default that cannot say itself what a graph file would say: `Choose::LastSeen` is the word `"last_seen"`.
@@ -87,7 +153,7 @@ fn word(source: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::node::{Map, NonNegative, Reader, Word};
+    use crate::node::{Map, NonNegative, Reader, Spanned};
     use crate::signal::Unit;
     use crate::source::Value;
 
@@ -112,7 +178,7 @@ mod tests {
         /// Place [m].
         xyz: [f64; 3] = [0.0; 3],
         /// A name.
-        of: Option<Word>,
+        of: Option<Spanned<String>>,
     }
 
     crate::params! {
@@ -161,7 +227,8 @@ mod tests {
 
     #[test]
     fn the_unit_stands_at_the_end_of_the_doc() {
-        let units: Vec<_> = Params::fields().iter().map(ParamSpec::unit).collect();
+        let specs = Params::fields();
+        let units: Vec<_> = specs.iter().map(|spec| spec.unit.as_deref()).collect();
         assert_eq!(units[..3], [Some("N"), Some("ms"), None]);
         assert_eq!(units[8], Some("rad/s"));
     }

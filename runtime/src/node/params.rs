@@ -5,27 +5,33 @@ use std::collections::BTreeMap;
 use std::ops::{Deref, Range};
 use std::path::PathBuf;
 
-use serde::de::DeserializeOwned;
-
-use super::{At, Mistake, Mistakes, ParamSpec, Repeats, Written};
+use super::{At, Bounds, Mistake, Mistakes, ParamSpec, Reader, Repeats, Written, read_leaf};
 use crate::signal::Unit;
 use crate::source::{Code, suggest_name, suggestion};
-use crate::source::{Item, Key, SourceMap, Table, Value};
+use crate::source::{Item, Key, Value};
 
 /// Something a graph file may set.
+#[diagnostic::on_unimplemented(
+    message = "`{Self}` is not a type of a parameter",
+    note = "a struct or an enum of yours becomes one with `#[derive(Param)]`"
+)]
 pub trait Param: Sized {
     /// What it takes, for a person: `a number`.
     const EXPECTS: &'static str;
     /// How often the fields are there.
     const REPEATS: Repeats = Repeats::Once;
+    /// Whether it is a number, or made of numbers, so that it takes a range.
+    const IS_NUMBER: bool = false;
+    /// The words it takes, each with its meaning, if it is one of a few.
+    const WORDS: &'static [(&'static str, &'static str)] = &[];
 
     /// Reads it; a mistake goes to the reader.
     fn read(value: &Value, reader: &mut Reader<'_>) -> Option<Self>;
 
-    /// What it takes in full, for the reference: `a list, each a number`.
+    /// What it takes in full, for the reference: `a list, each a number greater than 0`.
     #[must_use]
-    fn takes() -> String {
-        Self::EXPECTS.into()
+    fn takes(bounds: Option<&Bounds>) -> String {
+        bounds.map_or_else(|| Self::EXPECTS.into(), |bounds| bounds.describe(Self::EXPECTS))
     }
 
     /// The fields of a table.
@@ -47,114 +53,6 @@ pub trait Param: Sized {
     }
 }
 
-/// Collects the mistakes while parameters are read.
-pub struct Reader<'a> {
-    sources: &'a SourceMap,
-    /// What is wrong so far.
-    pub mistakes: Mistakes,
-}
-
-/// A table that is being read: what is left of it, and its place.
-pub struct OpenTable {
-    rest: Table,
-    span: Range<usize>,
-    /// Fields that must be given and are not.
-    missing: Vec<(&'static str, &'static str)>,
-}
-
-impl<'a> Reader<'a> {
-    /// A reader of values that stand in `sources`.
-    #[must_use]
-    pub const fn new(sources: &'a SourceMap) -> Self {
-        Self { sources, mistakes: Vec::new() }
-    }
-
-    /// Says that the value at `span` will not do.
-    pub fn bad(&mut self, span: Range<usize>, message: impl Into<String>) {
-        self.mistakes.push(Mistake::new(Code::BadValue, At::Span(span), message));
-    }
-
-    /// Says that `value` is not what is expected.
-    pub fn wrong_type(&mut self, value: &Value, expected: &str) {
-        self.bad(value.span.clone(), format!("expected {expected}, found {}", value.described()));
-    }
-
-    /// Opens a table.
-    pub fn table(&mut self, value: &Value) -> Option<OpenTable> {
-        match &value.item {
-            Item::Table(table) => {
-                Some(OpenTable { rest: table.clone(), span: value.span.clone(), missing: Vec::new() })
-            }
-            _ => {
-                self.wrong_type(value, "a table");
-                None
-            }
-        }
-    }
-
-    /// Reads one field of a table; `None` stands for a mistake that is noted.
-    pub fn field<T: Param>(
-        &mut self,
-        table: &mut OpenTable,
-        name: &'static str,
-        default: Option<fn() -> T>,
-    ) -> Option<T> {
-        if let Some((_, value)) = table.rest.remove(name) {
-            return T::read(&value, self);
-        }
-        let default = default.map(|default| default()).or_else(T::when_missing);
-        if default.is_none() {
-            table.missing.push((name, T::EXPECTS));
-        }
-        default
-    }
-
-    /// Every key that is left is one too many, and what was not given is missing, unless it was only misspelt.
-    pub fn close(&mut self, table: OpenTable, known: &[&str]) {
-        // One that is missing and one that is strange are one mistake.
-        let is_renamed = match (table.missing.as_slice(), table.rest.entries.as_slice()) {
-            ([(missing, _)], [(strange, _)]) => {
-                suggest_name(&strange.name, known.iter().copied()).is_none_or(|m| m == *missing)
-            }
-            _ => false,
-        };
-        let renamed = table.missing.first().filter(|_| is_renamed).map(|(name, _)| format!("did you mean `{name}`?"));
-        for (name, expects) in table.missing {
-            let is_misspelt = |(key, _): &(Key, Value)| suggest_name(&key.name, known.iter().copied()) == Some(name);
-            if !is_renamed && !table.rest.entries.iter().any(is_misspelt) {
-                let message = format!("`{name}` is missing: expected {expects}");
-                self.mistakes.push(Mistake::new(Code::MissingKey, At::Span(table.span.clone()), message));
-            }
-        }
-        for (key, _) in table.rest.entries {
-            let message = format!("`{}` is not a parameter here", key.name);
-            let help = renamed.clone().unwrap_or_else(|| suggestion(&key.name, known.iter().copied(), "parameters"));
-            self.mistakes.push(Mistake::new(Code::UnknownKey, At::Span(key.span), message).help(help));
-        }
-    }
-
-    /// A file as it is named at `span`: relative to the folder of the file it stands in, or built in.
-    pub fn file(&mut self, text: &str, span: Range<usize>) -> Option<FilePath> {
-        let path = self.sources.path(text, span.start);
-        match self.sources.builtin(&path) {
-            Ok(builtin) => Some(FilePath { path, span, builtin }),
-            Err((message, help)) => {
-                self.mistakes.push(Mistake::new(Code::Unreadable, At::Span(span), message).help(help));
-                None
-            }
-        }
-    }
-}
-
-/// Reads a value whose type serde knows: what most leaves need.
-pub fn read_leaf<T: DeserializeOwned>(value: &Value, reader: &mut Reader<'_>, expects: &str) -> Option<T> {
-    let read = T::deserialize(value);
-    if read.is_err() {
-        reader.wrong_type(value, expects);
-    }
-    read.ok()
-}
-
 macro_rules! leaves {
     ($($type:ty: $expects:literal),*) => {$(
         impl Param for $type {
@@ -169,13 +67,37 @@ macro_rules! leaves {
     )*};
 }
 
-leaves!(bool: "true or false", String: "a string", u64: "a whole number, 0 or more", usize: "a whole number, 0 or more");
+leaves!(bool: "true or false", String: "a string");
+
+macro_rules! whole_numbers {
+    ($($type:ty),*) => {$(
+        impl Param for $type {
+            const EXPECTS: &'static str = "a whole number, 0 or more";
+            const IS_NUMBER: bool = true;
+            fn read(value: &Value, reader: &mut Reader<'_>) -> Option<Self> {
+                let expects = if reader.bounds.is_some() { WHOLE_NUMBER } else { Self::EXPECTS };
+                reader.number(value, expects, |number| number as f64)
+            }
+            fn takes(bounds: Option<&Bounds>) -> String {
+                bounds.map_or_else(|| Self::EXPECTS.into(), |bounds| bounds.describe(WHOLE_NUMBER))
+            }
+            fn written(&self) -> Option<Written> {
+                Written::try_from(self).ok()
+            }
+        }
+    )*};
+}
+
+const WHOLE_NUMBER: &str = "a whole number";
+
+whole_numbers!(u64, usize);
 
 impl Param for f64 {
     const EXPECTS: &'static str = "a number";
+    const IS_NUMBER: bool = true;
 
     fn read(value: &Value, reader: &mut Reader<'_>) -> Option<Self> {
-        let number: Self = read_leaf(value, reader, Self::EXPECTS)?;
+        let number: Self = reader.number(value, Self::EXPECTS, |number| number)?;
         if !number.is_finite() {
             reader.bad(value.span.clone(), "expected a finite number");
             return None;
@@ -232,6 +154,38 @@ ranges! {
     Count(usize): "a whole number from 1 to 1000000", |n| (1..=1_000_000).contains(&n);
 }
 
+/// A parameter and where it stands, for a mistake that is found later.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Spanned<T> {
+    /// What it is.
+    pub value: T,
+    /// Where it stands.
+    pub span: Range<usize>,
+}
+
+impl<T: Param> Param for Spanned<T> {
+    const EXPECTS: &'static str = T::EXPECTS;
+    const REPEATS: Repeats = T::REPEATS;
+    const IS_NUMBER: bool = T::IS_NUMBER;
+    const WORDS: &'static [(&'static str, &'static str)] = T::WORDS;
+
+    fn read(value: &Value, reader: &mut Reader<'_>) -> Option<Self> {
+        Some(Self { value: T::read(value, reader)?, span: value.span.clone() })
+    }
+
+    fn takes(bounds: Option<&Bounds>) -> String {
+        T::takes(bounds)
+    }
+
+    fn fields() -> Vec<ParamSpec> {
+        T::fields()
+    }
+
+    fn written(&self) -> Option<Written> {
+        self.value.written()
+    }
+}
+
 /// A name and where it stands.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Word {
@@ -250,6 +204,17 @@ impl Param for Word {
 
     fn written(&self) -> Option<Written> {
         self.text.written()
+    }
+}
+
+/// No parameters.
+impl Param for () {
+    const EXPECTS: &'static str = "a table";
+
+    fn read(value: &Value, reader: &mut Reader<'_>) -> Option<Self> {
+        let table = reader.table(value)?;
+        reader.close(table, &[]);
+        Some(())
     }
 }
 
@@ -312,13 +277,15 @@ impl Param for FilePath {
 impl<T: Param> Param for Option<T> {
     const EXPECTS: &'static str = T::EXPECTS;
     const REPEATS: Repeats = T::REPEATS;
+    const IS_NUMBER: bool = T::IS_NUMBER;
+    const WORDS: &'static [(&'static str, &'static str)] = T::WORDS;
 
     fn read(value: &Value, reader: &mut Reader<'_>) -> Option<Self> {
         T::read(value, reader).map(Some)
     }
 
-    fn takes() -> String {
-        T::takes()
+    fn takes(bounds: Option<&Bounds>) -> String {
+        T::takes(bounds)
     }
 
     fn fields() -> Vec<ParamSpec> {
@@ -337,6 +304,8 @@ impl<T: Param> Param for Option<T> {
 impl<T: Param> Param for Vec<T> {
     const EXPECTS: &'static str = "a list";
     const REPEATS: Repeats = Repeats::PerEntry;
+    const IS_NUMBER: bool = T::IS_NUMBER;
+    const WORDS: &'static [(&'static str, &'static str)] = T::WORDS;
 
     fn read(value: &Value, reader: &mut Reader<'_>) -> Option<Self> {
         let Item::Array(items) = &value.item else {
@@ -347,8 +316,8 @@ impl<T: Param> Param for Vec<T> {
         read.into_iter().collect()
     }
 
-    fn takes() -> String {
-        format!("a list, each {}", T::takes())
+    fn takes(bounds: Option<&Bounds>) -> String {
+        format!("a list, each {}", T::takes(bounds))
     }
 
     fn fields() -> Vec<ParamSpec> {
@@ -369,6 +338,8 @@ impl<T: Param, const N: usize> Param for [T; N] {
         _ => "a list of the right length",
     };
     const REPEATS: Repeats = Repeats::PerEntry;
+    const IS_NUMBER: bool = T::IS_NUMBER;
+    const WORDS: &'static [(&'static str, &'static str)] = T::WORDS;
 
     fn read(value: &Value, reader: &mut Reader<'_>) -> Option<Self> {
         match &value.item {
@@ -380,8 +351,8 @@ impl<T: Param, const N: usize> Param for [T; N] {
         }
     }
 
-    fn takes() -> String {
-        format!("a list of {N}, each {}", T::takes())
+    fn takes(bounds: Option<&Bounds>) -> String {
+        format!("a list of {N}, each {}", T::takes(bounds))
     }
 
     fn fields() -> Vec<ParamSpec> {
@@ -400,6 +371,8 @@ pub struct Map<T>(pub BTreeMap<String, T>);
 impl<T: Param> Param for Map<T> {
     const EXPECTS: &'static str = "a table with an entry for each name";
     const REPEATS: Repeats = Repeats::PerName;
+    const IS_NUMBER: bool = T::IS_NUMBER;
+    const WORDS: &'static [(&'static str, &'static str)] = T::WORDS;
 
     fn read(value: &Value, reader: &mut Reader<'_>) -> Option<Self> {
         let Item::Table(table) = &value.item else {
@@ -411,8 +384,8 @@ impl<T: Param> Param for Map<T> {
         entries.into_iter().collect::<Option<_>>().map(Self)
     }
 
-    fn takes() -> String {
-        format!("a table, for each name {}", T::takes())
+    fn takes(bounds: Option<&Bounds>) -> String {
+        format!("a table, for each name {}", T::takes(bounds))
     }
 
     fn fields() -> Vec<ParamSpec> {

@@ -71,7 +71,7 @@ mod tests {
 
     fn port(unit: &'static str) -> PortSpec {
         let args = vec![unit.into()].into();
-        PortSpec { name: "x".into(), doc: "".into(), kind: Kind::Scalar, args, need: Need::Required }
+        PortSpec { name: "x".into(), doc: "".into(), kind: Kind::Scalar, args, need: Need::REQUIRED }
     }
 
     #[test]

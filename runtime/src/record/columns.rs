@@ -1,28 +1,28 @@
-//! The columns of a record: the scalars of a graph's ports, by name.
+//! The columns of a recording: the scalars of a graph's ports, by name.
 
 use crate::graph::PlannedPort;
-use crate::node::{Bus, PortId};
+use crate::node::{Bus, PortId, ScalarId};
 use crate::signal::{Kind, Shape, Unit};
 
-/// One scalar of a port.
+/// The name and unit of one scalar.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Column {
-    /// `node.port`, or `node.port.x` for a part of one.
+    /// `node.port`, or `node.port.x` for a component.
     pub name: String,
-    /// Its unit.
+    /// Unit of the values.
     pub unit: Unit,
 }
 
-/// The scalars of some ports, port after port.
+/// The scalars of several ports, port by port.
 #[derive(Debug, Clone, Default)]
 pub struct Columns {
-    /// The scalars.
+    /// The columns.
     pub list: Vec<Column>,
     ports: Vec<(PortId, Kind)>,
 }
 
 impl Columns {
-    /// Lists the scalars of `ports`. Images, masks, regions and Jacobians have none.
+    /// Returns the columns of `ports`. Images, masks, regions and Jacobians have none.
     #[must_use]
     pub fn new(ports: &[(PlannedPort, PortId)]) -> Self {
         let mut columns = Self::default();
@@ -33,7 +33,7 @@ impl Columns {
         columns
     }
 
-    /// Lists the scalars of one port.
+    /// Returns the columns of one port.
     #[must_use]
     pub fn of(port: &PlannedPort) -> Vec<Column> {
         let named = |(suffix, unit): (String, Unit)| {
@@ -41,6 +41,15 @@ impl Columns {
             Column { name, unit }
         };
         port.shape.scalars().into_iter().map(named).collect()
+    }
+
+    /// Finds the scalar with that column name among the scalars of `ports`.
+    #[must_use]
+    pub fn find(ports: &[(PlannedPort, PortId)], name: &str) -> Option<ScalarId> {
+        ports.iter().find_map(|(port, id)| {
+            let index = Self::of(port).iter().position(|column| column.name == name)?;
+            Some(ScalarId { port: *id, kind: port.shape.kind(), index })
+        })
     }
 
     /// Returns the number of columns of a port of that shape.
@@ -56,19 +65,18 @@ impl Columns {
     pub fn read(&self, bus: &Bus, row: &mut [f64]) {
         let mut rest = row;
         for (id, kind) in &self.ports {
-            let is_present = bus.marks[id.mark as usize].is_present();
-            let width = bus.arenas.read_scalars(*kind, id.slot, rest);
-            let (mine, others) = rest.split_at_mut(width);
-            if !is_present {
-                mine.fill(f64::NAN);
+            let width = bus.arenas.read_scalars(*kind, id.slot, 0, rest);
+            let (values, others) = rest.split_at_mut(width);
+            if !bus.mark(*id).is_present() {
+                values.fill(f64::NAN);
             }
             rest = others;
         }
-        assert!(rest.is_empty(), "a row is as long as the list of columns");
+        assert!(rest.is_empty(), "a row must be as long as the list of columns");
     }
 }
 
-/// Returns how a port of that kind is recorded, for the reference.
+/// Describes how a port of that kind is recorded, for the reference.
 #[must_use]
 pub const fn recorded(kind: Kind) -> &'static str {
     match kind {
@@ -91,7 +99,7 @@ mod tests {
     };
 
     #[test]
-    fn what_is_said_to_be_recorded_has_columns_and_nothing_else_has() {
+    fn the_description_of_a_kind_matches_its_columns() {
         let shapes: [Shape; 10] = [
             ScalarShape::default().into(),
             FlagShape.into(),
@@ -106,12 +114,12 @@ mod tests {
         ];
         assert!(Kind::ALL.iter().all(|kind| shapes.iter().any(|shape| shape.kind() == *kind)));
         for shape in shapes {
-            let said = recorded(shape.kind());
+            let description = recorded(shape.kind());
             let columns = shape.scalars();
-            assert_eq!(said == "not at all", columns.is_empty(), "{}", shape.kind());
+            assert_eq!(description == "not at all", columns.is_empty(), "{}", shape.kind());
             let graph_named = matches!(shape.kind(), Kind::Features | Kind::Joints);
             for (name, _) in columns.iter().filter(|(name, _)| !name.is_empty() && !graph_named) {
-                assert!(said.contains(&format!("`{name}`")), "{}: {name}", shape.kind());
+                assert!(description.contains(&format!("`{name}`")), "{}: {name}", shape.kind());
             }
         }
     }

@@ -1,4 +1,4 @@
-//! What a run leaves behind: a row a tick, a column a scalar; and the points of a surface.
+//! Recordings of runs: one row per tick with one column per scalar, and the points of a surface.
 
 mod columns;
 #[cfg(feature = "cli")]
@@ -8,6 +8,6 @@ mod writer;
 
 pub use columns::{Column, Columns, recorded};
 #[cfg(feature = "cli")]
-pub use points::{Chosen, Points, Wanted};
+pub use points::{PointPorts, PointRecorder, PointsRequest};
 pub use recorder::Recorder;
 pub use writer::Format;

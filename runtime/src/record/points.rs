@@ -1,4 +1,4 @@
-//! Points of a surface: each new value of a pose is a vertex of a PLY file.
+//! Records the points of a surface: each new value of a pose becomes a vertex of a PLY file.
 
 use std::fs::File;
 use std::io::{self, BufWriter, Write};
@@ -11,26 +11,28 @@ use super::Columns;
 use crate::engine::Engine;
 use crate::graph::{Compiled, PlannedPort};
 use crate::node::PortId;
-use crate::signal::{Freshness, Kind, Pose, Signal};
+use crate::signal::{Freshness, Kind, Pose};
 use crate::source::suggestion;
 
-/// Which points are written, and where.
+/// The value of the option `--points`: the ports to record and the file.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Wanted {
-    /// The pose, and what else is written of each point; empty for the pose that the graph reports.
+pub struct PointsRequest {
+    /// The pose and the ports with extra values; empty for the pose that the graph reports.
     ports: Vec<String>,
     /// The file.
     pub path: PathBuf,
 }
 
-impl std::str::FromStr for Wanted {
+impl std::str::FromStr for PointsRequest {
     type Err = String;
 
-    /// `surface.ply`, `ruler.pose=surface.ply`, or `ruler.pose,touch.pressure=surface.ply`.
+    /// Parses `surface.ply`, `ruler.pose=surface.ply`, or `ruler.pose,touch.pressure=surface.ply`.
     fn from_str(text: &str) -> Result<Self, String> {
         let (ports, path) = text.split_once('=').map_or((None, text), |(ports, path)| (Some(ports), path));
         if Path::new(path).extension().is_none_or(|extension| extension != "ply") {
-            return Err(format!("`{path}` is no .ply: give a file, or ports and a file, as ruler.pose=surface.ply"));
+            return Err(format!(
+                "`{path}` is not a .ply file: write `surface.ply`, or ports and a file as in `ruler.pose=surface.ply`"
+            ));
         }
         let ports: Vec<String> =
             ports.iter().flat_map(|ports| ports.split(',')).map(|port| port.trim().into()).collect();
@@ -38,86 +40,88 @@ impl std::str::FromStr for Wanted {
     }
 }
 
-/// The ports of points in a graph.
+/// The ports of a [`PointsRequest`], resolved in a graph.
 #[derive(Debug, Clone)]
-pub struct Chosen {
+pub struct PointPorts {
     pose: PlannedPort,
-    /// As the command line calls them.
-    beside: Vec<(String, PlannedPort)>,
+    /// Ports with extra values, each with its name on the command line.
+    extra: Vec<(String, PlannedPort)>,
 }
 
-impl Wanted {
-    /// Looks the ports up.
+impl PointsRequest {
+    /// Resolves the ports in a graph.
     ///
     /// # Errors
-    /// Which of them is not there, or of a kind that cannot be written.
-    pub fn choose(&self, plan: &Compiled) -> Result<Chosen, String> {
+    /// Returns a message that names the port that does not exist or whose kind cannot be written.
+    pub fn resolve(&self, plan: &Compiled) -> Result<PointPorts, String> {
         let Some((first, rest)) = self.ports.split_first() else {
             let mut poses = plan.reported().filter(|port| port.shape.kind() == Kind::Pose);
             let found = poses.next().filter(|_| poses.next().is_none()).cloned();
-            let pose =
-                found.ok_or("the graph does not report one pose: name a port, as --points ruler.pose=surface.ply")?;
-            return Ok(Chosen { pose, beside: Vec::new() });
+            let pose = found.ok_or(
+                "the graph does not report exactly one pose: name a port, as in `--points ruler.pose=surface.ply`",
+            )?;
+            return Ok(PointPorts { pose, extra: Vec::new() });
         };
         let pose = look_up(plan, first)?;
         if pose.shape.kind() != Kind::Pose {
-            return Err(format!("`{first}` is {}, but a point is where a pose is", pose.shape.kind().with_article()));
+            let kind = pose.shape.kind().with_article();
+            return Err(format!("`{first}` is {kind}, but the first port of `--points` must be a pose"));
         }
-        let beside = rest.iter().map(|word| {
-            let port = look_up(plan, word)?;
+        let extra = rest.iter().map(|name| {
+            let port = look_up(plan, name)?;
             if Columns::width(&port.shape) == 0 {
-                return Err(format!("`{word}` is {}: it has no numbers to write", port.shape.kind().with_article()));
+                return Err(format!("`{name}` is {}, which has no numbers to write", port.shape.kind().with_article()));
             }
-            Ok((word.clone(), port))
+            Ok((name.clone(), port))
         });
-        Ok(Chosen { pose, beside: beside.collect::<Result<_, _>>()? })
+        Ok(PointPorts { pose, extra: extra.collect::<Result<_, _>>()? })
     }
 }
 
-fn look_up(plan: &Compiled, word: &str) -> Result<PlannedPort, String> {
-    plan.port(word).cloned().ok_or_else(|| {
+fn look_up(plan: &Compiled, name: &str) -> Result<PlannedPort, String> {
+    plan.port(name).cloned().ok_or_else(|| {
         let names = plan.exports().iter().map(|(export, _)| export.as_str());
         let names = names.chain(plan.ports().map(|port| port.name.as_str()));
-        format!("the graph has no port `{word}`: {}", suggestion(word, names, "ports"))
+        format!("the graph has no port `{name}`: {}", suggestion(name, names, "ports"))
     })
 }
 
-/// What stands in every point, whatever is beside it: place, direction out of the surface, time.
-const OWN: [&str; 7] = ["x", "y", "z", "nx", "ny", "nz", "time"];
+/// Columns of every point: position, direction out of the surface, time.
+const POINT_COLUMNS: [&str; 7] = ["x", "y", "z", "nx", "ny", "nz", "time"];
 
-/// Gathers the points of a run in memory, so that no tick waits for a disk: 56 bytes a point.
-pub struct Points {
+/// Collects the points of a run in memory, 56 bytes each, and writes them at the end, so no tick waits for the disk.
+pub struct PointRecorder {
     file: File,
     pose: PortId,
-    beside: Columns,
+    extra: Columns,
     names: Vec<String>,
     comments: Vec<String>,
     values: Vec<f64>,
 }
 
-impl Points {
-    /// How a file of points begins.
-    pub const START: &'static str = "ply\n";
+impl PointRecorder {
+    /// The first bytes of a PLY file.
+    pub const FILE_START: &'static str = "ply\n";
 
     /// Creates the file.
     ///
     /// # Errors
-    /// If it cannot be created.
+    /// If the file cannot be created.
     ///
     /// # Panics
-    /// If the ports are those of another graph.
-    pub fn create(path: &Path, chosen: &Chosen, engine: &Engine) -> io::Result<Self> {
+    /// If the ports belong to another graph.
+    pub fn create(path: &Path, ports: &PointPorts, engine: &Engine) -> io::Result<Self> {
         let id_of = |port: &PlannedPort| {
             let found = engine.ports().iter().find(|(other, _)| other.name == port.name);
-            found.expect("the engine runs the plan that the port was found in").1
+            found.expect("the ports were resolved in the graph of this engine").1
         };
-        let frame = chosen.pose.frames.get(1).and_then(Option::as_deref).unwrap_or("its frame");
-        let mut names: Vec<String> = OWN.map(str::to_owned).into();
+        let frame = ports.pose.frames.get(1).and_then(Option::as_deref).unwrap_or("its frame");
+        let mut names: Vec<String> = POINT_COLUMNS.map(str::to_owned).into();
         let mut comments = vec![
-            format!("tactflow: x y z is where {} is in {frame} [m], a point for each new value", chosen.pose.name),
+            format!("tactflow: x y z is the position of {} in {frame} [m], one point per new value", ports.pose.name),
             "nx ny nz points out of the surface, against the sensor's z; time is in [s]".into(),
         ];
-        for (word, port) in &chosen.beside {
+        for (word, port) in &ports.extra {
             for column in Columns::of(port) {
                 let part = column.name.strip_prefix(port.name.as_str()).unwrap_or_default();
                 let name = format!("{word}{part}").replace('.', "_");
@@ -125,30 +129,30 @@ impl Points {
                 names.push(name);
             }
         }
-        let ports: Vec<(PlannedPort, PortId)> =
-            chosen.beside.iter().map(|(_, port)| (port.clone(), id_of(port))).collect();
-        let (pose, beside) = (id_of(&chosen.pose), Columns::new(&ports));
-        Ok(Self { file: File::create(path)?, pose, beside, names, comments, values: Vec::with_capacity(1 << 16) })
+        let extra: Vec<(PlannedPort, PortId)> =
+            ports.extra.iter().map(|(_, port)| (port.clone(), id_of(port))).collect();
+        let (pose, extra) = (id_of(&ports.pose), Columns::new(&extra));
+        Ok(Self { file: File::create(path)?, pose, extra, names, comments, values: Vec::with_capacity(1 << 16) })
     }
 
-    /// Takes the point of the tick that the engine has just run, if there is a new one.
+    /// Records the point of the last tick, if the pose is new.
     pub fn record(&mut self, engine: &Engine) {
         let bus = engine.bus();
-        if bus.marks[self.pose.mark as usize].freshness(engine.ticks()) != Freshness::New {
+        if bus.mark(self.pose).freshness(engine.ticks()) != Freshness::New {
             return;
         }
-        let pose = Pose::arena(&bus.arenas)[self.pose.slot as usize].0;
+        let pose = bus.slot::<Pose>(self.pose).0;
         let (at, z) = (pose.translation.vector, pose.rotation.matrix().column(2).into_owned());
         self.values.extend([at.x, at.y, at.z, -z.x, -z.y, -z.z, engine.now() as f64 * 1e-9]);
         let from = self.values.len();
-        self.values.resize(from + self.beside.list.len(), f64::NAN);
-        self.beside.read(bus, &mut self.values[from..]);
+        self.values.resize(from + self.extra.list.len(), f64::NAN);
+        self.extra.read(bus, &mut self.values[from..]);
     }
 
-    /// Writes the points and closes the file; how many there are.
+    /// Writes the points, closes the file and returns the number of points.
     ///
     /// # Errors
-    /// If anything could not be written.
+    /// If the file cannot be written.
     pub fn finish(self) -> io::Result<usize> {
         let count = self.values.len() / self.names.len();
         let double = |name: &String| PropertyDef::new(name.clone(), PropertyType::Scalar(ScalarType::Double));
@@ -168,7 +172,7 @@ impl Points {
     }
 }
 
-/// One point, as the writer asks for it.
+/// One point, in the form that the PLY writer reads.
 struct Vertex<'a> {
     names: &'a [String],
     values: &'a [f64],
@@ -189,7 +193,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_wanted_is_ports_and_a_file() {
+    fn a_request_is_ports_and_a_file() {
         let cases: [(&str, &[&str], &str); 4] = [
             ("surface.ply", &[], "surface.ply"),
             ("ruler.pose=a/b.ply", &["ruler.pose"], "a/b.ply"),
@@ -197,11 +201,16 @@ mod tests {
             ("ruler.pose=a=b.ply", &["ruler.pose"], "a=b.ply"),
         ];
         for (text, ports, path) in cases {
-            let wanted: Wanted = text.parse().unwrap_or_else(|error| panic!("{text}: {error}"));
-            assert_eq!((wanted.ports, wanted.path), (ports.iter().map(|&p| p.into()).collect(), path.into()), "{text}");
+            let request: PointsRequest = text.parse().unwrap_or_else(|error| panic!("{text}: {error}"));
+            assert_eq!(
+                (request.ports, request.path),
+                (ports.iter().map(|&p| p.into()).collect(), path.into()),
+                "{text}"
+            );
         }
         for text in ["", "surface", "surface.csv", "ruler.pose=", "ruler.pose=surface.obj", "surface.ply=ruler.pose"] {
-            assert!(text.parse::<Wanted>().is_err(), "{text}");
+            let error = text.parse::<PointsRequest>().unwrap_err();
+            assert!(error.contains("is not a .ply file"), "{text}: {error}");
         }
     }
 }

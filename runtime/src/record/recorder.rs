@@ -1,4 +1,4 @@
-//! From the tick to a file: raw rows go into a ring, another thread drains it.
+//! Records rows to a file. The tick writes them to a ring buffer, and a second thread formats and writes them.
 
 use std::fs::File;
 use std::io::{self, BufWriter, Write};
@@ -12,27 +12,29 @@ use super::{Column, Columns, Format};
 use crate::engine::Engine;
 use crate::signal::Unit;
 
-/// Rows that fit in the ring at least.
-const ROOM: usize = 4096;
-/// How long the other side sleeps when there is nothing to do.
-const NAP: Duration = Duration::from_millis(1);
+/// Capacity of the ring buffer [rows].
+const RING_ROWS: usize = 4096;
+/// Interval at which one side of the ring checks for work or for space.
+const POLL_INTERVAL: Duration = Duration::from_millis(1);
 
-/// Records every scalar of a graph, a row a tick.
+/// Records every scalar of a graph, one row per tick.
 pub struct Recorder {
     columns: Columns,
     row: Vec<f64>,
-    /// Number of columns that come from no port.
+    /// Number of columns that belong to no port.
     own: usize,
     ring: Producer<f64>,
     thread: JoinHandle<io::Result<()>>,
-    /// Whether a full ring makes the tick wait; with a real clock a row is dropped instead.
+    /// Whether the tick waits when the ring is full. Otherwise the row is dropped.
     may_wait: bool,
     dropped: u64,
 }
 
 impl Recorder {
-    /// Creates the file and starts to record. A recorder that may wait loses nothing; one that may not drops rows when
-    /// the disk is too slow, and counts them.
+    /// Creates the file and starts the writing thread.
+    ///
+    /// With `may_wait`, a tick waits when the disk is too slow, and no row is lost. Without it, for runs in real time, the
+    /// row is dropped and counted.
     ///
     /// # Errors
     /// If the file cannot be created.
@@ -43,14 +45,14 @@ impl Recorder {
         let mut out = BufWriter::new(File::create(path)?);
         format.header(&list, &mut out)?;
         let width = list.len() + 1;
-        let (ring, drain) = RingBuffer::new(width * ROOM);
+        let (ring, drain) = RingBuffer::new(width * RING_ROWS);
         let thread = std::thread::spawn(move || write_rows(drain, format, &list, out));
         Ok(Self { row: vec![0.0; width], own: own.len(), columns, ring, thread, may_wait, dropped: 0 })
     }
 
-    /// Records the tick that the engine has just run.
+    /// Records the last tick.
     pub fn record(&mut self, engine: &Engine) {
-        // A time in nanoseconds is exact in the bits of a float, if not in its value.
+        // The ring holds floats. Storing the bits keeps the time in nanoseconds exact; its value would be rounded.
         self.row[0] = f64::from_bits(engine.now() as u64);
         let (own, ports) = self.row[1..].split_at_mut(self.own);
         if let [mode, halted] = own {
@@ -63,9 +65,9 @@ impl Recorder {
                 self.dropped += 1;
                 return;
             }
-            std::thread::sleep(NAP);
+            std::thread::sleep(POLL_INTERVAL);
         }
-        let mut chunk = self.ring.write_chunk(self.row.len()).expect("there is room for a row");
+        let mut chunk = self.ring.write_chunk(self.row.len()).expect("the loop above waited for space");
         let (first, second) = chunk.as_mut_slices();
         let (head, tail) = self.row.split_at(first.len());
         first.copy_from_slice(head);
@@ -73,10 +75,10 @@ impl Recorder {
         chunk.commit_all();
     }
 
-    /// Writes what is left and closes the file; the number of rows that were dropped.
+    /// Writes the remaining rows, closes the file and returns the number of dropped rows.
     ///
     /// # Errors
-    /// If anything could not be written.
+    /// If the file could not be written.
     pub fn finish(self) -> io::Result<u64> {
         drop(self.ring);
         self.thread.join().map_err(|_| io::Error::other("the recorder's thread panicked"))??;
@@ -84,8 +86,8 @@ impl Recorder {
     }
 }
 
-/// Of a graph with modes: which one the next tick is in, counted from 0 in the order of the file, and whether the commands
-/// are held.
+/// Returns the columns that belong to no port. A graph with modes has two: the number of the next tick's mode, from 0 in the
+/// order of the file, and whether the commands are halted.
 fn own_columns(engine: &Engine) -> Vec<Column> {
     let names = if engine.mode().is_some() { &["mode", "halted"][..] } else { &[] };
     names.iter().map(|name| Column { name: (*name).to_owned(), unit: Unit::ONE }).collect()
@@ -94,7 +96,7 @@ fn own_columns(engine: &Engine) -> Vec<Column> {
 fn write_rows(mut ring: Consumer<f64>, format: Format, columns: &[Column], mut out: impl Write) -> io::Result<()> {
     let mut row = vec![0.0; columns.len() + 1];
     loop {
-        // Asked before the ring is found empty: what came before the end is still written.
+        // Checked before the ring is drained, so rows written before the end are not lost.
         let is_over = ring.is_abandoned();
         while let Ok(chunk) = ring.read_chunk(row.len()) {
             for (cell, value) in row.iter_mut().zip(chunk) {
@@ -105,6 +107,6 @@ fn write_rows(mut ring: Consumer<f64>, format: Format, columns: &[Column], mut o
         if is_over {
             return out.flush();
         }
-        std::thread::sleep(NAP);
+        std::thread::sleep(POLL_INTERVAL);
     }
 }

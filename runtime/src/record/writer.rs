@@ -1,4 +1,4 @@
-//! Rows as text.
+//! Writes rows as CSV or NDJSON.
 
 use std::io::{self, Write};
 use std::path::Path;
@@ -8,20 +8,20 @@ use serde::ser::SerializeMap;
 
 use super::Column;
 
-/// A format of rows.
+/// The format of a recording.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Format {
-    /// Comma-separated values; units stand in comments before the header.
+    /// Comma-separated values. Comments before the header list the units.
     Csv,
-    /// One JSON object a line; the first tells the units.
+    /// One JSON object per line. The first line lists the units.
     Ndjson,
 }
 
 impl Format {
-    /// How the files of each format begin.
-    pub const STARTS: [&'static str; 2] = ["# time [s]", "{\"units\":"];
+    /// The first bytes of a file in each format.
+    pub const FILE_STARTS: [&'static str; 2] = ["# time [s]", "{\"units\":"];
 
-    /// The format that a file's name asks for.
+    /// Returns the format for a file name, by its extension.
     #[must_use]
     pub fn of(path: &Path) -> Option<Self> {
         match path.extension()?.to_str()? {
@@ -31,7 +31,7 @@ impl Format {
         }
     }
 
-    /// Writes what stands before the rows.
+    /// Writes the lines before the rows.
     pub(super) fn header(self, columns: &[Column], out: &mut impl Write) -> io::Result<()> {
         match self {
             Self::Csv => {
@@ -53,7 +53,7 @@ impl Format {
         }
     }
 
-    /// Writes one row: the time [ns] and a value a column, NaN where there is none.
+    /// Writes one row: the time [ns] and one value per column. NaN stands for an absent value.
     pub(super) fn row(self, columns: &[Column], time: i64, row: &[f64], out: &mut impl Write) -> io::Result<()> {
         let seconds = time as f64 * 1e-9;
         match self {

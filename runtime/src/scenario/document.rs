@@ -1,4 +1,4 @@
-//! What a scenario file holds, and what is wrong with it before anything is looked up.
+//! The sections of a scenario file, and the checks that need no task.
 
 use std::ops::Range;
 
@@ -7,52 +7,52 @@ use crate::source::{Code, Diagnostic};
 use crate::source::{Item, Key, SourceMap, Table, Value};
 
 crate::params! { ScenarioTable:
-    /// Task that runs.
+    /// Task to run.
     graph: FilePath,
-    /// Bench that it runs on; the task's own unless given.
+    /// Bench to run it on; by default the task's own.
     bench: Option<FilePath>,
-    /// How many seeds, from 1 on, or a list of them; each is set as the `seed` of every device that has one.
+    /// Number of seeds, from 1 on, or a list of seeds. Each run sets its seed as the `seed` of every device that has one.
     seeds: Option<Seeds>,
-    /// Length of a run [s].
+    /// Duration of a run [s].
     for_s: Positive,
-    /// Flag that is set for the first time at time 0 of all figures; the start of the run unless given.
+    /// Flag that defines time 0 of all figures: when it is first set. By default, time 0 is the start of the run.
     from: Option<Word>,
-    /// Flag that is there and set from time 0 to the end.
+    /// Flag that must be set from time 0 to the end.
     never_lost: Option<Word>,
-    /// Mode that is reached and not left any more.
+    /// Mode that must be reached and never left again.
     stays_in: Option<Word>,
-    /// Mode in which the run ends, or `done` if a mode says that it is.
+    /// Mode in which the run must end, or `done` if it must end with a `done` condition.
     ends_in: Option<Word>,
-    /// Facts of devices, as `role.fact`, and what they are set to, as `devices.NAME.key`, to print beside the figures.
-    tells: Vec<Word> = vec![],
+    /// Values to print beside the figures: facts of devices as `role.fact`, and parameters as `devices.NAME.key`.
+    facts: Vec<Word> = vec![],
 }
 
 crate::params! { CheckTable:
-    /// Port, or part of one, as the record names it or as the task's wires do.
+    /// Port or component to check, by its name in a recording or in the task's wires.
     of: Word,
-    /// Port, or part of one, that is taken off it: the truth off what was measured, say.
+    /// Port or component to subtract from it, for example the true value from the measured one.
     minus: Option<Word>,
-    /// What it settles to [unit of the check].
+    /// Value that it must settle to [unit of the check].
     settles_to: Option<f64>,
-    /// How near that is near enough [unit of the check].
+    /// Half width of the band around `settles_to` [unit of the check].
     within: Option<Positive>,
-    /// Bound on the response [s].
+    /// Maximum response time [s].
     response_below_s: Option<Positive>,
-    /// Bound on the steady-state error [unit of the check].
+    /// Maximum steady-state error [unit of the check].
     steady_state_error_below: Option<Positive>,
-    /// Length of the end that the steady state is taken from; 10 unless given [s].
+    /// Length of the steady state at the end of the run; 10 by default [s].
     steady_s: Option<Positive>,
-    /// Bound on the standard deviation [unit of the check].
+    /// Maximum standard deviation [unit of the check].
     std_below: Option<Positive>,
-    /// What it never exceeds [unit of the check].
+    /// Value that it must never exceed [unit of the check].
     never_above: Option<f64>,
-    /// What it never falls below [unit of the check].
+    /// Value that it must never fall below [unit of the check].
     never_below: Option<f64>,
-    /// From when on it is looked at; the response and the steady state have their own times [s].
+    /// Time from which it is checked [s]. The response and the steady state have their own times.
     after_s: Option<NonNegative>,
-    /// Unit of all numbers of the check: its name, and how much it is in the port's unit.
+    /// Unit of all numbers of the check: its name, and its size in the unit of the port.
     unit: Option<Map<Positive>>,
-    /// What the paper reports, to print beside the figures [unit of the check].
+    /// Values from the paper to print beside the figures [unit of the check].
     paper: Option<PaperTable>,
 }
 
@@ -65,28 +65,27 @@ crate::params! { PaperTable:
     mean: Option<f64>,
     /// Standard deviation [unit of the check].
     std: Option<f64>,
-    /// Greatest value [unit of the check].
+    /// Maximum [unit of the check].
     max: Option<f64>,
-    /// Least value [unit of the check].
+    /// Minimum [unit of the check].
     min: Option<f64>,
 }
 
-/// The seeds, and where they stand.
+/// The seeds and their position in the source.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Seeds {
     pub(super) list: Vec<u64>,
     pub(super) span: Range<usize>,
 }
 
-/// As many seeds a scenario has at most.
-const MOST: i64 = 10_000;
+const MAX_SEEDS: i64 = 10_000;
 
 impl Param for Seeds {
     const EXPECTS: &'static str = "a number of seeds from 1 to 10000, or a list of whole numbers, each once";
 
     fn read(value: &Value, reader: &mut Reader<'_>) -> Option<Self> {
         let list = match &value.item {
-            Item::Integer(count) if (1..=MOST).contains(count) => Some((1..=*count as u64).collect::<Vec<_>>()),
+            Item::Integer(count) if (1..=MAX_SEEDS).contains(count) => Some((1..=*count as u64).collect::<Vec<_>>()),
             Item::Array(items) if !items.is_empty() => {
                 let seeds = items.iter().map(|item| match item.item {
                     Item::Integer(seed) => u64::try_from(seed).ok(),
@@ -104,27 +103,27 @@ impl Param for Seeds {
     }
 }
 
-/// A check as it is written.
+/// A section [check.NAME].
 pub(super) struct CheckBlock {
     pub(super) key: Key,
     pub(super) value: Value,
-    /// Nothing, if it has mistakes that are told.
+    /// The keys of the section, or `None` if a mistake in them has been reported.
     pub(super) table: Option<CheckTable>,
 }
 
 /// A scenario file.
 pub(super) struct Document {
-    /// The section [scenario] as it is written.
+    /// The section [scenario] as written.
     section: Value,
-    /// Nothing, if it has mistakes that are told.
+    /// The keys of the section, or `None` if a mistake in them has been reported.
     pub(super) scenario: Option<ScenarioTable>,
     pub(super) checks: Vec<CheckBlock>,
 }
 
 impl Document {
-    /// The task, and the bench if one is named: they are looked into whatever else is wrong with the section.
+    /// Returns the task, and the bench if one is given, even if other keys of the section have mistakes.
     pub(super) fn files(&self, sources: &SourceMap) -> Vec<FilePath> {
-        // What is wrong with them has been told.
+        // Mistakes in these two keys have been reported when the section was read.
         let mut reader = Reader::new(sources);
         let mut file = |key: &str| FilePath::read(self.section.as_table()?.get(key)?, &mut reader);
         let (graph, bench) = (file("graph"), file("bench"));
@@ -132,19 +131,19 @@ impl Document {
     }
 }
 
-/// Reads the sections of a scenario file.
+/// Reads the sections of a scenario file. Mistakes go to the reader.
 pub(super) fn document(root: &Table, reader: &mut Reader<'_>) -> Document {
     for (key, _) in root.entries.iter().filter(|(key, _)| !["scenario", "check"].contains(&key.name.as_str())) {
-        let message = format!("`{}` means nothing here", key.name);
+        let message = format!("a scenario has no section `{}`", key.name);
         let help = match key.name.as_str() {
             "set" | "nodes" | "parts" | "devices" | "bind" => {
-                "a scenario patches neither the task nor the bench: write a bench, or a task, of its own".to_owned()
+                "a scenario cannot change its task or bench: write another task or bench for it".to_owned()
             }
             name => crate::source::suggestion(name, ["scenario", "check"].into_iter(), "sections"),
         };
         reader.mistakes.push(Mistake::new(Code::UnknownKey, At::Span(key.span.clone()), message).help(help));
     }
-    // What is missing is shown at the section's name.
+    // Diagnostics of missing keys point to the name of the section.
     let section = root.entry("scenario").map(|(key, value)| match value.item {
         Item::Table(_) => Value { span: key.span.clone(), ..value.clone() },
         _ => value.clone(),
@@ -172,18 +171,18 @@ fn check(key: &Key, value: &Value, reader: &mut Reader<'_>) -> CheckBlock {
 }
 
 impl CheckBlock {
-    /// Place of a key of the check.
-    pub(super) fn place(&self, key: &str) -> Range<usize> {
+    /// Returns the span of a key of the check, or of the check's name if the key is missing.
+    pub(super) fn span(&self, key: &str) -> Range<usize> {
         let entry = self.value.as_table().and_then(|table| table.entry(key));
         entry.map_or(self.value.span.clone(), |(key, _)| key.span.clone())
     }
 
-    /// What its keys ask for that cannot be.
+    /// Returns a diagnostic for each key that contradicts the others or needs another one.
     pub(super) fn mistakes(&self, for_s: Option<f64>) -> Vec<Diagnostic> {
         let Some(table) = &self.table else { return Vec::new() };
         let mut found = Vec::new();
         let mut wrong = |code: Code, key: &str, message: String, help: &str| {
-            found.push(Diagnostic::new(code, self.place(key), message).help(help));
+            found.push(Diagnostic::new(code, self.span(key), message).help(help));
         };
         let (target, within) = (table.settles_to, table.within);
         let needs_target = [
@@ -193,27 +192,28 @@ impl CheckBlock {
             ("steady_s", table.steady_s.is_some()),
         ];
         for (key, _) in needs_target.into_iter().filter(|(_, is_given)| *is_given && target.is_none()) {
-            let help = "add `settles_to`: what the port shall come to";
+            let help = "add `settles_to`: the value that the port must reach";
             wrong(Code::MissingKey, key, format!("`{key}` needs `settles_to`"), help);
         }
         if target.is_some() && within.is_none() {
-            let help = "add `within`: how near it has to come, and to stay";
+            let help = "add `within`: the largest error that counts as settled";
             wrong(Code::MissingKey, "settles_to", "`settles_to` needs `within`".into(), help);
         }
         if let (Some(above), Some(below)) = (table.never_above, table.never_below)
             && below > above
         {
-            let message = format!("nothing is at least {below} and at most {above}");
-            wrong(Code::BadValue, "never_below", message, "exchange the two");
+            let message = format!("no value is at least {below} and at most {above}");
+            wrong(Code::BadValue, "never_below", message, "exchange `never_above` and `never_below`");
         }
         if let (Some(after), Some(for_s)) = (table.after_s, for_s)
             && *after >= for_s
         {
-            let message = format!("the run is over after {for_s} s: nothing is left after {} s", *after);
-            wrong(Code::BadValue, "after_s", message, "look from an earlier time on, or run longer");
+            let message = format!("the run ends after {for_s} s, so there is nothing to check after {} s", *after);
+            wrong(Code::BadValue, "after_s", message, "write an earlier time, or a larger `for_s`");
         }
         if table.unit.as_ref().is_some_and(|unit| unit.0.len() != 1) {
-            wrong(Code::BadValue, "unit", "a check has one unit".into(), "for example `unit = { tactel = 0.005 }`");
+            let message = "a check has exactly one unit".into();
+            wrong(Code::BadValue, "unit", message, "write one name and its size, as in `unit = { tactel = 0.005 }`");
         }
         found
     }

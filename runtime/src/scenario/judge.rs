@@ -1,30 +1,30 @@
-//! What many runs say together: the median, the worst, an interval, and whether that will do.
+//! Combines the figures of many runs: the median, the worst, a confidence interval, and whether the bound is met.
 
-/// What is measured.
+/// A figure of a check.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Figure {
-    /// When it has settled [s].
+    /// Time at which the value has settled [s].
     Response,
-    /// How far the steady state is from what it shall settle to.
+    /// Distance between the steady state and the target.
     Error,
-    /// Its mean.
+    /// Mean.
     Mean,
-    /// Its standard deviation.
+    /// Standard deviation.
     Std,
-    /// Its greatest value.
+    /// Maximum.
     Max,
-    /// Its least value.
+    /// Minimum.
     Min,
-    /// How long a flag is lost [s].
+    /// Total time in which a flag is absent or not set [s].
     Lost,
-    /// How long the run is out of a mode that it had reached [s].
+    /// Total time outside a mode after it was reached [s].
     Away,
-    /// Whether the run ends as it should: 1 or 0.
+    /// Whether the run ends in the expected mode: 1 or 0.
     Ends,
 }
 
 impl Figure {
-    /// Its name.
+    /// Returns the name of the figure in tables.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
@@ -40,35 +40,35 @@ impl Figure {
         }
     }
 
-    /// Whether it is a time.
+    /// Whether the figure is a time.
     #[must_use]
     pub const fn is_time(self) -> bool {
         matches!(self, Self::Response | Self::Lost | Self::Away)
     }
 
-    /// Whether less is worse.
+    /// Whether a larger value is better.
     const fn is_better_high(self) -> bool {
         matches!(self, Self::Min | Self::Ends)
     }
 }
 
-/// What is asked of a figure.
+/// The bound on a figure.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Bound {
-    /// Nothing: it is told.
+    /// No bound: the figure is informational.
     None,
-    /// That it is there in every run: it settles.
+    /// The value settles in every run.
     Settles,
-    /// That the median over the runs is at most so much.
+    /// The median over the runs is at most this.
     Median(f64),
-    /// That it is at most so much in every run.
+    /// The figure is at most this in every run.
     AtMost(f64),
-    /// That it is at least so much in every run.
+    /// The figure is at least this in every run.
     AtLeast(f64),
 }
 
 impl Bound {
-    /// The number, if there is one.
+    /// Returns the number of the bound, if it has one.
     #[must_use]
     pub const fn number(self) -> Option<f64> {
         match self {
@@ -78,15 +78,15 @@ impl Bound {
     }
 }
 
-/// What becomes of a row.
+/// The verdict on a row.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Mark {
-    /// It is as asked.
-    Met,
-    /// It is not.
-    Missed,
-    /// Nothing was asked.
-    Told,
+pub enum Verdict {
+    /// The figure is within its bound.
+    Passed,
+    /// The figure is outside its bound, or could not be measured.
+    Failed,
+    /// The figure has no bound.
+    Informational,
 }
 
 /// One figure of a scenario over all runs.
@@ -94,22 +94,22 @@ pub enum Mark {
 pub struct Row {
     /// Name of the check.
     pub check: String,
-    /// The port, or the mode.
+    /// The port or the mode that is checked.
     pub of: String,
-    /// What is measured.
+    /// The figure.
     pub figure: Figure,
-    /// Its unit.
+    /// Unit of the figure.
     pub unit: String,
-    /// What is asked.
+    /// The bound.
     pub bound: Bound,
-    /// What the paper reports.
+    /// The value from the paper, if it reports one.
     pub paper: Option<f64>,
-    /// The figure in each run, in the order of the seeds; none where it could not be measured.
+    /// The figure of each run, in the order of the seeds; `None` if it could not be measured.
     pub values: Vec<Option<f64>>,
 }
 
 impl Row {
-    /// The values from good to bad; what could not be measured is as bad as can be.
+    /// Returns the values from best to worst. A value that could not be measured is the worst.
     fn sorted(&self) -> Vec<f64> {
         let sign = if self.figure.is_better_high() { -1.0 } else { 1.0 };
         let mut values: Vec<f64> = self.values.iter().map(|v| v.map_or(f64::INFINITY, |v| sign * v)).collect();
@@ -117,7 +117,7 @@ impl Row {
         values.iter().map(|value| sign * value).collect()
     }
 
-    /// Median over the runs; none if it lies among those that could not be measured.
+    /// Returns the median over the runs, or `None` if it falls among the runs that could not be measured.
     #[must_use]
     pub fn median(&self) -> Option<f64> {
         let sorted = self.sorted();
@@ -125,21 +125,22 @@ impl Row {
         Some((low + high) / 2.0).filter(|median| median.is_finite())
     }
 
-    /// The worst of all runs; none if it could not be measured in one of them.
+    /// Returns the worst value of all runs, or `None` if one of them could not be measured.
     #[must_use]
     pub fn worst(&self) -> Option<f64> {
         self.sorted().last().copied().filter(|worst| worst.is_finite())
     }
 
-    /// How many runs it could not be measured in.
+    /// Returns the number of runs in which the figure could not be measured.
     #[must_use]
     pub fn missing(&self) -> usize {
         self.values.iter().filter(|value| value.is_none()).count()
     }
 
-    /// An interval, the lesser number first, in which the median of all seeds there are lies with at least 95 %, whatever
-    /// the distribution: between two order statistics. An end that could not be measured is infinite; with fewer than six
-    /// runs there is no such interval.
+    /// Returns a confidence interval of at least 95 % for the median over all possible seeds, the smaller number first.
+    ///
+    /// The interval lies between two order statistics, so it holds for every distribution. An end that could not be
+    /// measured is infinite. Returns `None` for fewer than six runs.
     #[must_use]
     pub fn interval(&self) -> Option<(f64, f64)> {
         let sorted = self.sorted();
@@ -148,30 +149,30 @@ impl Row {
         Some((good.min(bad), good.max(bad)))
     }
 
-    /// Whether it is as asked.
+    /// Compares the figure with its bound.
     #[must_use]
-    pub fn mark(&self) -> Mark {
+    pub fn verdict(&self) -> Verdict {
         let every = |holds: &dyn Fn(f64) -> bool| self.values.iter().all(|value| value.is_some_and(holds));
-        let is_met = match self.bound {
-            Bound::None => return Mark::Told,
+        let has_passed = match self.bound {
+            Bound::None => return Verdict::Informational,
             Bound::Settles => every(&|_| true),
             Bound::Median(bound) => self.median().is_some_and(|median| median <= bound),
             Bound::AtMost(bound) => every(&|value| value <= bound),
             Bound::AtLeast(bound) => every(&|value| value >= bound),
         };
-        if is_met && !self.values.is_empty() { Mark::Met } else { Mark::Missed }
+        if has_passed && !self.values.is_empty() { Verdict::Passed } else { Verdict::Failed }
     }
 }
 
-/// As many order statistics may be left out at each end of `count` so that the interval between the next two still holds
-/// the median with at least 95 %: each lies below it with one half.
+/// Returns how many order statistics can be skipped at each end of `count` so that the interval between the next two still
+/// contains the median with at least 95 %. Each sample lies below the median with a probability of one half.
 fn skipped(count: usize) -> Option<usize> {
-    /// Above this the binomial is as good as normal, and its least terms are no numbers any more.
-    const MANY: usize = 1000;
-    if count > MANY {
+    /// Above this count, the normal approximation replaces the binomial distribution, whose smallest terms underflow.
+    const MAX_BINOMIAL_COUNT: usize = 1000;
+    if count > MAX_BINOMIAL_COUNT {
         return Some(((count as f64 - 2.0 * (count as f64).sqrt()) / 2.0) as usize - 1);
     }
-    // Probability that exactly k of them lie below the median, summed from below.
+    // `exactly` is the probability that exactly k samples lie below the median.
     let mut exactly = 0.5f64.powi(count as i32);
     let (mut below, mut skipped) = (0.0, None);
     for k in 0..count / 2 {
@@ -215,8 +216,8 @@ mod tests {
     }
 
     #[test]
-    fn the_interval_holds_the_median_often_enough_and_no_shorter_one_does() {
-        // From tables of the sign test: with ten samples, the second and the ninth.
+    fn the_interval_is_the_shortest_that_contains_the_median_with_95_percent() {
+        // From tables of the sign test: with ten samples, the interval lies between the second and the ninth.
         let cases = [
             (1, None),
             (5, None),
@@ -238,27 +239,27 @@ mod tests {
     }
 
     #[test]
-    fn what_is_met_and_what_is_missed() {
+    fn a_figure_passes_within_its_bound_and_fails_outside_it() {
         use Bound::{AtLeast, AtMost, Median, None, Settles};
         use Figure::{Max, Min, Response, Std};
-        use Mark::{Met, Missed, Told};
+        use Verdict::{Failed, Informational, Passed};
         const NEVER: f64 = f64::NAN;
-        let cases: [(Figure, Bound, &[f64], Mark); 12] = [
-            (Std, None, &[NEVER], Told),
-            (Std, Median(2.0), &[1.0, 2.0, 9.0], Met),
-            (Std, Median(1.9), &[1.0, 2.0, 9.0], Missed),
-            (Response, Median(1.0), &[0.5, 0.5, NEVER], Met),
-            (Response, Median(1.0), &[0.5, NEVER, NEVER], Missed),
-            (Response, Settles, &[0.5, 9.0], Met),
-            (Response, Settles, &[0.5, NEVER], Missed),
-            (Max, AtMost(1.0), &[0.5, 1.0], Met),
-            (Max, AtMost(1.0), &[0.5, 1.1], Missed),
-            (Min, AtLeast(1.0), &[1.0, 1.0], Met),
-            (Min, AtLeast(1.0), &[1.0, NEVER], Missed),
-            (Std, Median(1.0), &[], Missed),
+        let cases: [(Figure, Bound, &[f64], Verdict); 12] = [
+            (Std, None, &[NEVER], Informational),
+            (Std, Median(2.0), &[1.0, 2.0, 9.0], Passed),
+            (Std, Median(1.9), &[1.0, 2.0, 9.0], Failed),
+            (Response, Median(1.0), &[0.5, 0.5, NEVER], Passed),
+            (Response, Median(1.0), &[0.5, NEVER, NEVER], Failed),
+            (Response, Settles, &[0.5, 9.0], Passed),
+            (Response, Settles, &[0.5, NEVER], Failed),
+            (Max, AtMost(1.0), &[0.5, 1.0], Passed),
+            (Max, AtMost(1.0), &[0.5, 1.1], Failed),
+            (Min, AtLeast(1.0), &[1.0, 1.0], Passed),
+            (Min, AtLeast(1.0), &[1.0, NEVER], Failed),
+            (Std, Median(1.0), &[], Failed),
         ];
-        for (figure, bound, values, mark) in cases {
-            assert_eq!(row(figure, bound, values).mark(), mark, "{figure:?} {bound:?} {values:?}");
+        for (figure, bound, values, verdict) in cases {
+            assert_eq!(row(figure, bound, values).verdict(), verdict, "{figure:?} {bound:?} {values:?}");
         }
     }
 }

@@ -1,4 +1,4 @@
-//! From a scenario file to a scenario that is checked with its task and its bench.
+//! Loads a scenario file and checks it with its task and its bench.
 
 use std::path::Path;
 
@@ -11,10 +11,10 @@ use crate::node::{FilePath, Reader};
 use crate::source::{Code, Diagnostic, Report, Table};
 
 impl Scenario {
-    /// Reads a scenario and checks it with its task and its bench.
+    /// Loads a scenario and checks it with its task and its bench.
     ///
     /// # Errors
-    /// Every mistake of all its files at once.
+    /// Returns a diagnostic for every mistake in all files.
     pub fn load(catalogue: &Catalogue, path: &Path) -> Result<Self, Report> {
         let mut loader = Loader::new(catalogue.builtin_files());
         let root = loader.read(path, None);
@@ -36,12 +36,12 @@ impl Scenario {
         found.extend(reader.mistakes.into_iter().map(into_diagnostic));
         let for_s = document.scenario.as_ref().map(|scenario| *scenario.for_s);
         found.extend(document.checks.iter().flat_map(|check| check.mistakes(for_s)));
-        found.extend(nothing_asked(&root, &document));
+        found.extend(without_checks(&root, &document));
         let files = document.files(&loader.sources);
-        let unread: Vec<Diagnostic> =
+        let unreadable: Vec<Diagnostic> =
             files.iter().filter_map(|file| Some(into_diagnostic(file.bytes().err()?))).collect();
-        let Some(request) = request(&files).filter(|_| unread.is_empty()) else {
-            found.extend(unread);
+        let Some(request) = request(&files).filter(|_| unreadable.is_empty()) else {
+            found.extend(unreadable);
             return Err(Report::new(loader.sources, found));
         };
         match compile_in(loader, catalogue, &request) {
@@ -54,18 +54,18 @@ impl Scenario {
     }
 }
 
-/// The task on its bench, if there is a task.
+/// Returns the request for the task on its bench, if the scenario names a task.
 fn request(files: &[FilePath]) -> Option<Request> {
     let (graph, bench) = (files.first()?, files.get(1));
     Some(Request { bench: bench.map(|bench| bench.path.clone()), ..Request::file(&graph.path) })
 }
 
-/// A scenario that asks nothing and tells nothing.
-fn nothing_asked(root: &Table, document: &Document) -> Option<Diagnostic> {
+/// Returns a diagnostic for a scenario that checks nothing.
+fn without_checks(root: &Table, document: &Document) -> Option<Diagnostic> {
     let (key, _) = root.entry("scenario")?;
     let table = document.scenario.as_ref()?;
-    let asks = [&table.never_lost, &table.stays_in, &table.ends_in].iter().any(|word| word.is_some());
-    let is_idle = root.get("check").is_none() && !asks;
+    let has_run_checks = [&table.never_lost, &table.stays_in, &table.ends_in].iter().any(|word| word.is_some());
+    let is_empty = root.get("check").is_none() && !has_run_checks;
     let help = "add a check: [check.force], of = \"touch.force\", settles_to = 1.0, within = 0.1";
-    is_idle.then(|| Diagnostic::new(Code::MissingKey, key.span.clone(), "the scenario checks nothing").help(help))
+    is_empty.then(|| Diagnostic::new(Code::MissingKey, key.span.clone(), "the scenario checks nothing").help(help))
 }

@@ -1,4 +1,4 @@
-//! Finds the ports, modes, facts and seeds that a scenario speaks of in the plan of its task on its bench.
+//! Resolves the ports, modes, facts and seeds of a scenario in the plan of its task on its bench.
 
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -14,10 +14,10 @@ use crate::signal::Kind;
 use crate::source::{Code, Diagnostic, Report, suggest_name};
 use crate::source::{Item, Value};
 
-/// As long an end the steady state is taken from, unless a check says another [s].
-const STEADY: f64 = 10.0;
+/// Default length of the steady state at the end of a run [s].
+const DEFAULT_STEADY_S: f64 = 10.0;
 
-/// The scenario, if everything that it speaks of is there.
+/// Resolves every name of the scenario, or returns a diagnostic for each that does not exist.
 pub(super) fn look_up(
     path: &Path,
     document: &Document,
@@ -44,7 +44,7 @@ pub(super) fn look_up(
             path: path.to_owned(),
             for_s: *table.for_s,
             seeds: table.seeds.as_ref().map(|seeds| seeds.list.clone()).unwrap_or_default(),
-            facts: table.tells.iter().filter_map(|word| lookup.fact(word)).collect(),
+            facts: table.facts.iter().filter_map(|word| lookup.fact(word)).collect(),
             request,
             seed_keys: lookup.seeds(table, catalogue),
             from,
@@ -59,15 +59,15 @@ pub(super) fn look_up(
     scenario.filter(|_| found.is_empty()).ok_or_else(|| Report::new(plan.sources().clone(), found))
 }
 
-/// What is asked of the run as a whole.
+/// Returns the rows of the checks on the run as a whole.
 fn rows_of(table: &ScenarioTable) -> impl Iterator<Item = Row> {
     let rows = [
         (&table.never_lost, "never_lost", Figure::Lost, Bound::AtMost(0.0)),
         (&table.stays_in, "stays_in", Figure::Away, Bound::AtMost(0.0)),
         (&table.ends_in, "ends_in", Figure::Ends, Bound::AtLeast(1.0)),
     ];
-    let asked = rows.into_iter().filter_map(|(word, key, figure, bound)| Some((word.as_ref()?, key, figure, bound)));
-    asked.map(|(word, key, figure, bound)| row(key, &word.text, figure, "1", bound, None))
+    let given = rows.into_iter().filter_map(|(word, key, figure, bound)| Some((word.as_ref()?, key, figure, bound)));
+    given.map(|(word, key, figure, bound)| row(key, &word.text, figure, "1", bound, None))
 }
 
 struct Lookup<'a> {
@@ -76,7 +76,7 @@ struct Lookup<'a> {
 }
 
 impl Lookup<'_> {
-    /// Finds the column that a word names, as in a recording or in a wire of the task, and the kind of its port.
+    /// Finds a column by its name in a recording or in the wires of the task. Returns it with the kind of its port.
     fn column(&mut self, word: &Word) -> Option<(Column, Kind)> {
         let (port, rest) = self.plan.port_prefix(&word.text).or_else(|| self.unknown_port(word))?;
         let (columns, kind) = (Columns::of(port), port.shape.kind());
@@ -89,38 +89,37 @@ impl Lookup<'_> {
         }
         let parts = columns.iter().map(|part| part.name.strip_prefix(&port.name).unwrap_or_default());
         let parts: Vec<String> = parts.map(|part| format!("`{}{part}`", word.text)).collect();
-        let what = if parts.is_empty() { "there is no number in it to look at" } else { "a check looks at one number" };
-        let message = format!("`{}` is {}: {what}", word.text, kind.with_article());
-        let help = (!parts.is_empty()).then(|| format!("look at one of {}", parts.join(", ")));
+        let what = if parts.is_empty() { "which has no number to check" } else { "but a check needs one number" };
+        let message = format!("`{}` is {}, {what}", word.text, kind.with_article());
+        let help = (!parts.is_empty()).then(|| format!("write one of {}", parts.join(", ")));
         self.found.push(Diagnostic::new(Code::KindMismatch, word.span.clone(), message).with_help(help));
         None
     }
 
-    /// Reports a port that does not exist.
+    /// Reports a port that does not exist, with the closest name, the ports of its owner, or the owners.
     fn unknown_port<T>(&mut self, word: &Word) -> Option<T> {
         let message = format!("there is no port `{}` in this task on this bench", word.text);
+        let diagnostic = Diagnostic::new(Code::UnknownPort, word.span.clone(), message);
         let columns = self.plan.ports().flat_map(Columns::of).map(|column| column.name);
         let all: Vec<String> = columns.chain(self.plan.exports().iter().map(|(export, _)| export.clone())).collect();
-        let owner = word.text.split('.').next().unwrap_or_default();
-        let owner_of = |name: &&String| name.split('.').next() == Some(owner);
-        let is_near = suggest_name(&word.text, all.iter().map(String::as_str)).is_some();
-        let diagnostic = Diagnostic::new(Code::UnknownPort, word.span.clone(), message);
-        self.found.push(if is_near || all.iter().any(|name| owner_of(&name)) {
-            // A close name of another owner is a better suggestion than a list.
-            let known = all.iter().filter(|name| is_near || owner_of(name)).map(String::as_str);
-            diagnostic.suggest(&word.text, known, "ports")
+        let owner_of = |name: &'_ str| name.split('.').next().unwrap_or_default().to_owned();
+        let owner = owner_of(&word.text);
+        let is_close = suggest_name(&word.text, all.iter().map(String::as_str)).is_some();
+        let ports = all.iter().map(String::as_str).filter(|name| is_close || owner_of(name) == owner);
+        self.found.push(if ports.clone().next().is_some() {
+            diagnostic.suggest(&word.text, ports, "ports")
         } else {
-            let owners: BTreeSet<&str> = all.iter().filter_map(|name| name.split('.').next()).collect();
-            diagnostic.suggest(owner, owners.into_iter(), "roles, nodes and parts")
+            let owners: BTreeSet<String> = all.iter().map(|name| owner_of(name)).collect();
+            diagnostic.suggest(&owner, owners.iter().map(String::as_str), "roles, nodes and parts")
         });
         None
     }
 
-    /// The column of a flag.
+    /// Finds the column of a flag.
     fn flag(&mut self, word: &Word) -> Option<String> {
         let (column, kind) = self.column(word)?;
         if kind != Kind::Flag {
-            let message = format!("`{}` is {}, but a flag is asked for here", word.text, kind.with_article());
+            let message = format!("`{}` is {}, but this key needs a flag", word.text, kind.with_article());
             self.found.push(Diagnostic::new(Code::KindMismatch, word.span.clone(), message));
             return None;
         }
@@ -129,25 +128,25 @@ impl Lookup<'_> {
 
     fn check(&mut self, block: &CheckBlock) -> Option<(Check, Vec<Row>)> {
         let table = block.table.as_ref()?;
-        let asked = asked(table);
+        let figures = figures(table);
         let mut papers = papers(table.paper.as_ref());
         papers.retain(|(_, value)| value.is_some());
-        for (figure, _) in papers.iter().filter(|(figure, _)| !asked.iter().any(|(asked, _)| asked == figure)) {
-            let message = format!("the check has no {} to set the paper's beside", figure.name());
-            let figures: Vec<_> = asked.iter().map(|(figure, _)| format!("`{}`", figure.name())).collect();
-            let help = format!("its figures are {}", figures.join(", "));
-            self.found.push(Diagnostic::new(Code::UnknownKey, block.place("paper"), message).help(help));
+        for (paper, _) in papers.iter().filter(|(paper, _)| !figures.iter().any(|(figure, _)| figure == paper)) {
+            let message = format!("the check has no figure `{}` to compare with the paper's", paper.name());
+            let names: Vec<_> = figures.iter().map(|(figure, _)| format!("`{}`", figure.name())).collect();
+            let help = format!("its figures are {}", names.join(", "));
+            self.found.push(Diagnostic::new(Code::UnknownKey, block.span("paper"), message).help(help));
         }
         let (column, _) = self.column(&table.of)?;
         let minus = match &table.minus {
-            Some(word) => Some(self.taken_off(word, &column)?),
+            Some(word) => Some(self.subtrahend(word, &column)?),
             None => None,
         };
         let (unit_name, unit) = match table.unit.as_ref().and_then(|unit| unit.0.iter().next()) {
             Some((name, unit)) => (name.clone(), **unit),
             None => (column.unit.to_string(), 1.0),
         };
-        let rows = asked.iter().map(|(figure, bound)| {
+        let rows = figures.iter().map(|(figure, bound)| {
             let paper = papers.iter().find(|(of, _)| of == figure).and_then(|(_, value)| *value);
             row(&block.key.name, &table.of.text, *figure, &unit_name, *bound, paper)
         });
@@ -158,14 +157,14 @@ impl Lookup<'_> {
             unit,
             settles: table.settles_to.zip(table.within.map(|within| *within)),
             after: table.after_s.map(|after| *after),
-            steady: table.steady_s.map_or(STEADY, |steady| *steady),
-            figures: asked.iter().map(|(figure, _)| *figure).collect(),
+            steady: table.steady_s.map_or(DEFAULT_STEADY_S, |steady| *steady),
+            figures: figures.iter().map(|(figure, _)| *figure).collect(),
         };
         Some((check, rows.collect()))
     }
 
-    /// The column that is taken off another; it has its unit.
-    fn taken_off(&mut self, word: &Word, other: &Column) -> Option<String> {
+    /// Finds the column to subtract from another. Both must have the same unit.
+    fn subtrahend(&mut self, word: &Word, other: &Column) -> Option<String> {
         let (column, _) = self.column(word)?;
         if column.unit != other.unit {
             let message = format!("`{}` is in {}, but `{}` is in {}", word.text, column.unit, other.name, other.unit);
@@ -175,6 +174,7 @@ impl Lookup<'_> {
         Some(column.name)
     }
 
+    /// Checks that the modes exist.
     fn modes(&mut self, table: &ScenarioTable) {
         let modes: Vec<&str> = self.plan.modes().collect();
         let (ends_in, stays_in) = (table.ends_in.as_ref(), table.stays_in.as_ref());
@@ -189,6 +189,7 @@ impl Lookup<'_> {
         }
     }
 
+    /// Finds a fact of a device or one of its parameters.
     fn fact(&mut self, word: &Word) -> Option<(String, toml::Value)> {
         let settings = self.plan.outline().devices.iter().flat_map(|device| {
             let named = |path: &str| format!("devices.{}.{path}", device.name);
@@ -197,7 +198,7 @@ impl Lookup<'_> {
         let facts: Vec<_> = self.plan.facts().iter().cloned().chain(settings).collect();
         let fact = facts.iter().find(|(name, _)| *name == word.text).cloned();
         if fact.is_none() {
-            let message = format!("no device states `{}`, and none is set so", word.text);
+            let message = format!("no device states the fact or has the parameter `{}`", word.text);
             self.found.push(Diagnostic::new(Code::UnknownFact, word.span.clone(), message).suggest(
                 &word.text,
                 facts.iter().map(|(name, _)| name.as_str()),
@@ -207,7 +208,7 @@ impl Lookup<'_> {
         fact
     }
 
-    /// Where a seed is set. Seeds that nothing takes would all be one.
+    /// Returns the keys that set the seed. Without such a key, every seed would give the same run.
     fn seeds(&mut self, table: &ScenarioTable, catalogue: &Catalogue) -> Vec<String> {
         let has_seed = |kind: &str| {
             let known = catalogue.devices().iter().find(|device| device.name() == kind);
@@ -216,24 +217,25 @@ impl Lookup<'_> {
         let devices = self.plan.outline().devices.iter().filter(|device| has_seed(&device.kind.text));
         let keys: Vec<String> = devices.map(|device| format!("devices.{}.seed", device.name)).collect();
         if let Some(seeds) = table.seeds.as_ref().filter(|_| keys.is_empty()) {
-            let message = "no device of this bench has a `seed`: every run would be the same";
+            let message = "no device of this bench has a `seed`, so every run would be the same";
             let diagnostic = Diagnostic::new(Code::UnknownKey, seeds.span.clone(), message);
-            self.found.push(diagnostic.help("take `seeds` out, and it runs once"));
+            self.found.push(diagnostic.help("remove `seeds` to run the scenario once"));
         }
         keys
     }
 
+    /// Rejects a bench with live devices.
     fn real_time(&mut self, table: &ScenarioTable) {
         if self.plan.is_live() {
             let at = table.bench.as_ref().unwrap_or(&table.graph);
-            let message = "a device of this bench runs in real time, but a scenario in virtual time";
-            let help = "take a bench of simulated devices; `tactflow run --out` records a run in real time";
+            let message = "a device of this bench runs in real time, but scenarios run in virtual time";
+            let help = "use a bench of simulated devices; to record a run in real time, use `tactflow run --out`";
             self.found.push(Diagnostic::new(Code::WrongRole, at.span.clone(), message).help(help));
         }
     }
 }
 
-/// A value that is one word or one number.
+/// Returns a value that is a string, a number or a boolean.
 fn plain(value: &Value) -> Option<toml::Value> {
     Some(match &value.item {
         Item::String(text) => text.as_str().into(),
@@ -244,25 +246,25 @@ fn plain(value: &Value) -> Option<toml::Value> {
     })
 }
 
-/// The figures of a check, with what is asked of them.
-fn asked(table: &CheckTable) -> Vec<(Figure, Bound)> {
+/// Returns the figures of a check with their bounds.
+fn figures(table: &CheckTable) -> Vec<(Figure, Bound)> {
     let median = |bound: Option<f64>| bound.map_or(Bound::None, Bound::Median);
     let positive = |bound: Option<crate::node::Positive>| median(bound.map(|bound| *bound));
     let std = (Figure::Std, positive(table.std_below));
-    let mut asked = Vec::new();
+    let mut figures = Vec::new();
     let has_extremes = table.never_above.is_some() || table.never_below.is_some();
     if table.settles_to.is_some() {
         let response = table.response_below_s.map_or(Bound::Settles, |bound| Bound::Median(*bound));
-        asked.extend([(Figure::Response, response), (Figure::Error, positive(table.steady_state_error_below)), std]);
+        figures.extend([(Figure::Response, response), (Figure::Error, positive(table.steady_state_error_below)), std]);
     } else if !has_extremes || table.std_below.is_some() {
-        asked.extend([(Figure::Mean, Bound::None), std]);
+        figures.extend([(Figure::Mean, Bound::None), std]);
     }
-    asked.extend(table.never_above.map(|bound| (Figure::Max, Bound::AtMost(bound))));
-    asked.extend(table.never_below.map(|bound| (Figure::Min, Bound::AtLeast(bound))));
-    asked
+    figures.extend(table.never_above.map(|bound| (Figure::Max, Bound::AtMost(bound))));
+    figures.extend(table.never_below.map(|bound| (Figure::Min, Bound::AtLeast(bound))));
+    figures
 }
 
-/// What the paper reports of each figure.
+/// Returns the paper's value of each figure.
 fn papers(paper: Option<&PaperTable>) -> Vec<(Figure, Option<f64>)> {
     let Some(paper) = paper else { return Vec::new() };
     vec![

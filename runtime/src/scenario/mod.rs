@@ -1,8 +1,8 @@
-//! Scenarios: a task on a bench, with seeds and a duration, and what must come out of it.
+//! Scenarios: a task on a bench with seeds, a duration and checks on the results.
 //!
-//! `document` says what the file holds, `load` checks it, `lookup` finds the ports that it names, `trial` runs it with
-//! one seed, [`measure`] says what a figure is, and [`judge`] combines many runs. A scenario patches neither its task nor
-//! its bench: it only sets the seed.
+//! `document` reads the file, `load` checks it, and `lookup` resolves the ports that it names. `trial` runs it with one
+//! seed, [`measure`] computes the figures of a run, and [`judge`] combines the figures of all runs. A scenario cannot
+//! change its task or its bench; it only sets the seed.
 
 mod document;
 pub mod judge;

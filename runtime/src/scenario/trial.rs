@@ -8,28 +8,28 @@ use super::model::{Check, Scenario};
 use crate::catalogue::Catalogue;
 use crate::engine::{End, Engine, run_virtual};
 use crate::graph::{Request, compile};
-use crate::node::PortId;
+use crate::node::ScalarId;
 use crate::record::{Columns, Format, Recorder};
-use crate::signal::{Features, Freshness, Shape, Signal};
+use crate::signal::Freshness;
 
-/// What a scenario calls the end that a mode says the task has come to.
+/// The value of `ends_in` for a run that ends with a `done` condition.
 pub(super) const DONE: &str = "done";
 
-/// How a run went.
+/// The result of one run.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Trial {
-    /// Its seed, if it has one.
+    /// The seed, if the scenario has seeds.
     pub seed: Option<u64>,
-    /// How long it was [s].
+    /// Duration of the run [s].
     pub time: f64,
-    /// Why it is of no use, if it is: a fault, say.
+    /// Why the run cannot be measured, for example a fault.
     pub failure: Option<String>,
-    /// Every figure, in the order of the scenario's rows; none where it could not be measured.
+    /// Every figure, in the order of the scenario's rows; `None` if it could not be measured.
     pub figures: Vec<Option<f64>>,
 }
 
 impl Scenario {
-    /// Every figure over all runs, in the order of the file.
+    /// Returns every figure over all runs, in the order of the file.
     #[must_use]
     pub fn rows(&self, trials: &[Trial]) -> Vec<Row> {
         let mut rows = self.rows.clone();
@@ -39,7 +39,8 @@ impl Scenario {
         rows
     }
 
-    /// Runs it with one seed, and records each tick in a file if there is one. None if it was interrupted.
+    /// Runs the scenario with one seed, and records every tick to the file `record`, if it is given. Returns `None` if the
+    /// run was interrupted.
     #[must_use]
     pub fn run(
         &self,
@@ -48,8 +49,8 @@ impl Scenario {
         record: Option<&Path>,
         is_interrupted: &dyn Fn() -> bool,
     ) -> Option<Trial> {
-        let failed = |time: f64, why: String| {
-            Some(Trial { seed, time, failure: Some(why), figures: vec![None; self.rows.len()] })
+        let failed = |time: f64, failure: String| {
+            Some(Trial { seed, time, failure: Some(failure), figures: vec![None; self.rows.len()] })
         };
         let mut engine = match compile(catalogue, &self.seeded(seed)) {
             Ok(plan) => Engine::new(plan),
@@ -61,11 +62,11 @@ impl Scenario {
         let recorder = record.map(|path| Recorder::create(path, Format::Csv, &engine, true)).transpose();
         let mut recorder = match recorder {
             Ok(recorder) => recorder,
-            Err(error) => return failed(0.0, format!("the record cannot be made: {error}")),
+            Err(error) => return failed(0.0, format!("the recording cannot be created: {error}")),
         };
-        let mut watch = Watch::new(self, &engine);
+        let mut observer = Observer::new(self, &engine);
         let outcome = run_virtual(&mut engine, self.for_s, is_interrupted, &mut |engine| {
-            watch.look(engine);
+            observer.observe(engine);
             if let Some(recorder) = &mut recorder {
                 recorder.record(engine);
             }
@@ -76,13 +77,13 @@ impl Scenario {
         let failure = match (&outcome.end, &written) {
             (End::Interrupted, _) => return None,
             (End::Fault(fault), _) => Some(fault.to_string()),
-            (_, Err(error)) => Some(format!("the record cannot be written: {error}")),
+            (_, Err(error)) => Some(format!("the recording cannot be written: {error}")),
             (End::Finished, _) if is_short => Some(format!("the samples of a device end after {time:.3} s")),
-            _ => watch.failure(),
+            _ => observer.failure(),
         };
         match failure {
-            Some(why) => failed(time, why),
-            None => Some(Trial { seed, time, failure, figures: watch.figures(&engine, outcome.end == End::Done) }),
+            Some(failure) => failed(time, failure),
+            None => Some(Trial { seed, time, failure, figures: observer.figures(&engine, outcome.end == End::Done) }),
         }
     }
 
@@ -96,100 +97,68 @@ fn seconds(nanos: i64) -> f64 {
     nanos as f64 * 1e-9
 }
 
-/// Where a column is read, and how it is known to be new.
-#[derive(Debug, Clone, Copy)]
-struct Eye {
-    column: usize,
-    port: PortId,
-    /// Of a feature vector, which: each has a freshness of its own.
-    component: Option<usize>,
-}
-
-impl Eye {
-    fn new(engine: &Engine, columns: &Columns, name: &str) -> Self {
-        let column = columns.list.iter().position(|column| column.name == name).expect("it was looked up");
-        let has_it = |port: &crate::graph::PlannedPort| Columns::of(port).iter().position(|known| known.name == name);
-        let found = engine.ports().iter().find_map(|(port, id)| Some((port, *id, has_it(port)?)));
-        let (port, id, part) = found.expect("a column is of a port");
-        Self { column, port: id, component: matches!(port.shape, Shape::Features(_)).then_some(part) }
-    }
-
-    fn is_new(&self, engine: &Engine) -> bool {
-        let (bus, tick) = (engine.bus(), engine.ticks());
-        let freshness = match self.component {
-            Some(component) => {
-                Features::arena(&bus.arenas)[self.port.slot as usize].components()[component].freshness(tick)
-            }
-            None => bus.marks[self.port.mark as usize].freshness(tick),
-        };
-        freshness == Freshness::New
-    }
-}
-
-/// Looks at every tick of a run.
-struct Watch<'s> {
+/// Collects the readings of every check during a run.
+struct Observer<'s> {
     scenario: &'s Scenario,
-    columns: Columns,
-    row: Vec<f64>,
-    from: Option<Eye>,
-    never_lost: Option<Eye>,
-    eyes: Vec<(Eye, Option<Eye>)>,
+    from: Option<ScalarId>,
+    never_lost: Option<ScalarId>,
+    /// The value of each check, and the value to subtract.
+    values: Vec<(ScalarId, Option<ScalarId>)>,
     /// Time 0 of all figures in the graph's clock [ns].
     zero: Option<i64>,
     readings: Vec<Vec<Reading>>,
-    /// Ticks in which the flag that is never lost is so, and those out of the mode that is not left.
+    /// Number of ticks in which the flag `never_lost` is not set.
     lost: u64,
+    /// Number of ticks outside the mode `stays_in` after it was reached.
     away: u64,
     has_reached: bool,
 }
 
-impl<'s> Watch<'s> {
+impl<'s> Observer<'s> {
     fn new(scenario: &'s Scenario, engine: &Engine) -> Self {
-        let columns = Columns::new(engine.ports());
-        let eye = |name: &String| Eye::new(engine, &columns, name);
+        let find = |name: &String| Columns::find(engine.ports(), name).expect("the lookup found every column");
+        let values = scenario.checks.iter().map(|check| (find(&check.column), check.minus.as_ref().map(find)));
         Self {
             scenario,
-            row: vec![0.0; columns.list.len()],
-            from: scenario.from.as_ref().map(|(_, column)| eye(column)),
-            never_lost: scenario.never_lost.as_ref().map(eye),
-            eyes: scenario.checks.iter().map(|check| (eye(&check.column), check.minus.as_ref().map(eye))).collect(),
+            from: scenario.from.as_ref().map(|(_, column)| find(column)),
+            never_lost: scenario.never_lost.as_ref().map(find),
+            values: values.collect(),
             zero: None,
             readings: vec![Vec::new(); scenario.checks.len()],
             lost: 0,
             away: 0,
             has_reached: false,
-            columns,
         }
     }
 
-    fn look(&mut self, engine: &Engine) {
-        self.columns.read(engine.bus(), &mut self.row);
+    fn observe(&mut self, engine: &Engine) {
+        let (bus, tick) = (engine.bus(), engine.ticks());
         if let Some(mode) = &self.scenario.stays_in {
             let is_in = engine.mode() == Some(mode);
             self.has_reached |= is_in;
             self.away += u64::from(self.has_reached && !is_in);
         }
-        let is_set = |eye: Option<Eye>| eye.is_none_or(|eye| self.row[eye.column] == 1.0);
+        let is_set = |flag: Option<ScalarId>| flag.is_none_or(|flag| bus.scalar(flag) == Some(1.0));
         if self.zero.is_none() && is_set(self.from) {
             self.zero = Some(engine.now());
         }
         let Some(zero) = self.zero else { return };
         self.lost += u64::from(!is_set(self.never_lost));
         let time = seconds(engine.now() - zero);
-        for (((eye, minus), check), readings) in self.eyes.iter().zip(&self.scenario.checks).zip(&mut self.readings) {
-            let off = minus.map_or(0.0, |minus| self.row[minus.column]);
-            let value = check.nearest((self.row[eye.column] - off) / check.unit);
-            readings.push(Reading { time, value, is_new: eye.is_new(engine) });
+        let read = |scalar: ScalarId| bus.scalar(scalar).unwrap_or(f64::NAN);
+        for (((of, minus), check), readings) in self.values.iter().zip(&self.scenario.checks).zip(&mut self.readings) {
+            let value = check.nearest((read(*of) - minus.map_or(0.0, read)) / check.unit);
+            readings.push(Reading { time, value, is_new: bus.scalar_freshness(*of, tick) == Freshness::New });
         }
     }
 
-    /// Why there is nothing to measure.
+    /// Returns why nothing can be measured, if that is so.
     fn failure(&self) -> Option<String> {
         let (flag, _) = self.scenario.from.as_ref()?;
-        self.zero.is_none().then(|| format!("`{flag}` was never set, so that no figure has a time 0"))
+        self.zero.is_none().then(|| format!("`{flag}` was never set, so the figures have no time 0"))
     }
 
-    /// Every figure, in the order of the scenario's rows.
+    /// Returns every figure, in the order of the scenario's rows.
     fn figures(&self, engine: &Engine, is_done: bool) -> Vec<Option<f64>> {
         let period = seconds(engine.period());
         let checks = self.scenario.checks.iter().zip(&self.readings);
@@ -204,27 +173,27 @@ impl<'s> Watch<'s> {
 }
 
 impl Check {
-    /// A direction as it is nearest to where it settles, or to 0: lines know no half turns.
+    /// Shifts the direction of a line by half turns, so that it is nearest to the target of the check, or to 0.
     fn nearest(&self, value: f64) -> f64 {
         let about = self.settles.map_or(0.0, |(target, _)| target);
         self.period.map_or(value, |period| value - period * ((value - about) / period).round())
     }
 
-    /// Its figures, of what was read from time 0 on.
+    /// Returns the figures of the readings from time 0 on.
     fn figures(&self, readings: &[Reading]) -> Vec<Option<f64>> {
         let response = self.settles.and_then(|(target, within)| measure::response(readings, target, within));
         let end = readings.last().map_or(0.0, |last| last.time);
         let steady = since(readings, (end - self.steady).max(response.unwrap_or(0.0)));
         let after = since(readings, self.after.unwrap_or(0.0));
-        // What has not settled has no deviation from where it settles, unless the check says from when on it counts.
+        // A value that has not settled has no deviation around its target, unless the check sets `after_s`.
         let from = self.after.or(response).or(self.settles.is_none().then_some(0.0));
         let figure = |figure: &Figure| match figure {
             Figure::Response => response,
             Figure::Error => measure::mean(steady).zip(self.settles).map(|(mean, (target, _))| (mean - target).abs()),
             Figure::Mean => measure::mean(after),
             Figure::Std => measure::std(since(readings, from?)),
-            Figure::Max => measure::greatest(after),
-            Figure::Min => measure::least(after),
+            Figure::Max => measure::max(after),
+            Figure::Min => measure::min(after),
             Figure::Lost | Figure::Away | Figure::Ends => None,
         };
         self.figures.iter().map(figure).collect()
@@ -241,7 +210,7 @@ mod tests {
         (0..=1000).map(|tick| Reading { time: at(tick), value: 2.0 * (-at(tick) / 0.5).exp(), is_new: true }).collect()
     }
 
-    /// Mean and variance of the decay from `from` on, as integrals.
+    /// Mean and variance of the decay from time `from` on, as integrals.
     fn expected(from: f64) -> (f64, f64) {
         let (length, start, end) = (4.0 - from, (-from / 0.5).exp(), (-4.0f64 / 0.5).exp());
         let mean = 2.0 * 0.5 * (start - end) / length;
@@ -249,7 +218,7 @@ mod tests {
     }
 
     #[test]
-    fn a_short_steady_state_begins_with_the_response_and_a_deviation_when_it_is_told_to() {
+    fn the_steady_state_begins_after_the_response_and_the_deviation_at_after_s() {
         let figures = vec![Figure::Response, Figure::Error, Figure::Std];
         let check = |after, steady| Check {
             column: String::new(),
@@ -263,7 +232,7 @@ mod tests {
         };
         let response = check(None, 10.0).figures(&decay())[0].unwrap();
         assert!((response - 0.967).abs() < 0.005, "{response}");
-        // When it is looked at, how long its end is, and from when on the error and the deviation are taken.
+        // `after_s`, `steady_s`, and the times from which the error and the deviation are measured.
         let cases = [
             (None, 10.0, response, response),
             (None, 2.0, 2.0, response),

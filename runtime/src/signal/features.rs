@@ -1,19 +1,19 @@
-//! A vector of named features, each with a unit and a freshness of its own.
+//! Vectors of named features. Each feature has its own unit and freshness.
 
 use super::all_finite;
 use super::freshness::{Freshness, Mark, Stamp};
 use super::unit::Unit;
 
-/// One feature, as known at load.
+/// The name and unit of one feature.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Feature {
-    /// Its name in the graph file.
+    /// Name in the graph file.
     pub name: String,
-    /// Its unit.
+    /// Unit of the value.
     pub unit: Unit,
 }
 
-/// What is known of a feature vector at load.
+/// The shape of a feature vector.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct FeaturesShape {
     /// The features, in the order of the components.
@@ -21,12 +21,12 @@ pub struct FeaturesShape {
 }
 
 impl FeaturesShape {
-    /// Names of the features, in order.
+    /// Returns the names of the features, in order.
     pub fn names(&self) -> impl Iterator<Item = &str> + Clone {
         self.features.iter().map(|feature| feature.name.as_str())
     }
 
-    /// The same features with another unit each.
+    /// Returns the same features with the unit of each replaced.
     #[must_use]
     pub fn map_units(&self, unit: impl Fn(Unit) -> Unit) -> Self {
         let map = |feature: &Feature| Feature { name: feature.name.clone(), unit: unit(feature.unit) };
@@ -42,69 +42,117 @@ pub struct Component {
 }
 
 impl Component {
-    /// The value, if there is one.
+    /// Returns the value, which is undefined while it is absent, and its mark.
+    pub(crate) const fn parts(&self) -> (&f64, &Mark) {
+        (&self.value, &self.mark)
+    }
+
+    /// Returns the value, or `None` while it is absent.
     #[must_use]
     pub fn get(&self) -> Option<f64> {
         self.mark.is_present().then_some(self.value)
     }
 
-    /// Freshness as seen in `tick`.
+    /// Returns the freshness in `tick`.
     #[must_use]
     pub const fn freshness(&self, tick: u64) -> Freshness {
         self.mark.freshness(tick)
     }
 
-    /// Stamp of the value.
+    /// Returns the stamp of the value.
     #[must_use]
     pub const fn stamp(&self) -> Stamp {
         self.mark.stamp()
     }
 }
 
-/// Named features. What a step neither sets nor loses stays as it is, and is held.
-#[derive(Debug, Clone, PartialEq, Default)]
+/// A feature vector. A component that a step neither sets nor loses keeps its value and is held.
+#[derive(Debug, Clone, Default)]
 pub struct Features {
     components: Box<[Component]>,
+    /// Tick and stamp of the step that writes the vector.
+    now: (u64, Stamp),
+}
+
+impl PartialEq for Features {
+    fn eq(&self, other: &Self) -> bool {
+        self.components == other.components
+    }
 }
 
 impl Features {
-    /// Takes over a value of the same shape, in place.
+    /// Copies a value of the same shape, in place.
     pub(crate) fn copy_from(&mut self, other: &Self) {
         self.components.clone_from(&other.components);
     }
 
-    /// As many absent components as there are features.
+    /// Creates `count` absent components.
     #[must_use]
     pub fn absent(count: usize) -> Self {
-        Self { components: vec![Component::default(); count].into() }
+        Self { components: vec![Component::default(); count].into(), now: Default::default() }
     }
 
-    /// The components.
+    /// Sets the tick and the stamp of the step that writes the vector.
+    pub(crate) fn at(self, tick: u64, stamp: Stamp) -> Self {
+        Self { now: (tick, stamp), ..self }
+    }
+
+    /// Returns the tick and the stamp of the step that writes the vector.
+    pub(crate) const fn now(&self) -> (u64, Stamp) {
+        self.now
+    }
+
+    /// Writes a sample of a device: one value per feature, `None` if it is absent. The inlet stamps the components when the
+    /// sample arrives, so a device needs no tick number.
+    pub fn fill(&mut self, values: &[Option<f64>]) {
+        if values.len() != self.components.len() {
+            // The inlet finds the wrong size and reports the device.
+            *self = Self::absent(values.len());
+        }
+        for (component, value) in self.components.iter_mut().zip(values) {
+            let mark = Mark::new(0, Stamp::TIMELESS, value.is_some());
+            *component = Component { value: value.unwrap_or_default(), mark };
+        }
+    }
+
+    /// Replaces `previous` in `tick`: present components are new, and components that are no longer present are lost.
+    pub(super) fn follow(&mut self, previous: &Self, tick: u64, stamp: Stamp) {
+        for (component, previous) in self.components.iter_mut().zip(&previous.components) {
+            if component.mark.is_present() {
+                component.mark.renew(tick, stamp);
+            } else {
+                component.mark = previous.mark;
+                component.mark.lose(tick);
+            }
+        }
+    }
+
+    /// Returns the components.
     #[must_use]
     pub fn components(&self) -> &[Component] {
         &self.components
     }
 
-    /// Component `i` is new in `tick`.
+    /// Sets component `i`, which is new in `tick`.
     pub fn set(&mut self, i: usize, value: f64, tick: u64, stamp: Stamp) {
         let component = &mut self.components[i];
         component.value = value;
         component.mark.renew(tick, stamp);
     }
 
-    /// Component `i` goes away in `tick`.
+    /// Makes component `i` absent from `tick` on.
     pub fn lose(&mut self, i: usize, tick: u64) {
         self.components[i].mark.lose(tick);
     }
 
-    /// Every component goes away in `tick`.
+    /// Makes every component absent from `tick` on.
     pub fn lose_all(&mut self, tick: u64) {
         for component in &mut self.components {
             component.mark.lose(tick);
         }
     }
 
-    /// Mark of the whole vector: there if any component is, changed if any changed, as old as the oldest.
+    /// Returns the mark of the whole vector: present if any component is, changed if any changed, as old as the oldest.
     pub(crate) fn mark(&self, tick: u64) -> Mark {
         let (mut any, mut changed, mut stamp) = (false, false, Stamp::TIMELESS);
         for Component { mark, .. } in &self.components {
@@ -125,7 +173,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_whole_is_as_fresh_as_its_newest_and_as_old_as_its_oldest_component() {
+    fn the_vector_is_as_fresh_as_its_newest_and_as_old_as_its_oldest_component() {
         let stamp = |nanos| Stamp { nanos, device: 0 };
         let mut features = Features::absent(2);
         assert_eq!(features.mark(1).freshness(1), Freshness::Absent);

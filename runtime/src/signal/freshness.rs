@@ -1,57 +1,63 @@
-//! Freshness of a value: absent, lost, held or new; and the stamp of the sample it came from.
+//! The freshness of a value (absent, lost, held or new) and the stamp of the sample that it was computed from.
 
-/// What a value is in the present tick.
+/// Freshness of a value in a tick.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Freshness {
-    /// There is no value, and there was none in the tick before.
+    /// There is no value, and there was none in the previous tick.
     Absent,
-    /// The value went away in this tick. A loss triggers, like something new.
+    /// The value became absent in this tick. A loss triggers the reading nodes, like a new value.
     Lost,
-    /// There is a value, but it was made in an earlier tick.
+    /// The value was written in an earlier tick.
     Held,
-    /// The value was made in this tick.
+    /// The value was written in this tick.
     New,
 }
 
-/// When the sample was taken that a value came from, in the graph's clock, and which device took it.
+/// The time and the device of the sample that a value was computed from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Stamp {
-    /// Time of the sample [ns].
+    /// Time of the sample in the graph's clock [ns].
     pub nanos: i64,
-    /// Device that took it; times of different devices are never subtracted.
+    /// Number of the device. Times of different devices are never subtracted.
     pub device: u16,
 }
 
 impl Stamp {
-    /// The stamp of generated motion: it never grows old.
+    /// The stamp of a value without a sample, such as a generated motion. Its age is always zero.
     pub const TIMELESS: Self = Self { nanos: i64::MAX, device: u16::MAX };
 
-    /// Whether the value came from no sample at all.
+    /// Whether the value was computed from no sample.
     #[must_use]
     pub const fn is_timeless(self) -> bool {
         self.nanos == i64::MAX
     }
 
-    /// The older of two stamps.
+    /// Returns the older of two stamps.
     #[must_use]
     pub const fn oldest(self, other: Self) -> Self {
         if other.nanos < self.nanos { other } else { self }
     }
 
-    /// Age at `now` [ns]; zero for what is timeless.
+    /// Returns the age at `now` [ns]; zero for a timeless stamp.
     #[must_use]
     pub const fn age(self, now: i64) -> i64 {
         if self.is_timeless() { 0 } else { now.saturating_sub(self.nanos) }
     }
 }
 
-/// What the runtime knows about a value beside the value: when it changed, from which sample, and whether it is there.
+impl Default for Stamp {
+    fn default() -> Self {
+        Self::TIMELESS
+    }
+}
+
+/// The state of a value: the tick of its last change, its stamp, and whether it is present.
 ///
-/// Freshness is derived from the tick of the last change, so nothing has to be touched in a tick that changes nothing.
+/// The freshness follows from the tick of the last change, so a mark needs no update in a tick that changes nothing.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Mark {
     changed: u64,
-    // The stamp's two halves lie apart, so that a mark is three words and not four.
+    // The two fields of the stamp are stored separately: a mark then takes 24 bytes instead of 32.
     nanos: i64,
     device: u16,
     present: bool,
@@ -68,7 +74,7 @@ impl Mark {
         Self { changed, nanos, device, present }
     }
 
-    /// Freshness as seen in `tick`.
+    /// Returns the freshness in `tick`.
     #[must_use]
     pub const fn freshness(&self, tick: u64) -> Freshness {
         match (self.present, self.changed == tick) {
@@ -85,24 +91,24 @@ impl Mark {
         self.changed == tick
     }
 
-    /// Whether there is a value.
+    /// Whether the value is present.
     #[must_use]
     pub const fn is_present(&self) -> bool {
         self.present
     }
 
-    /// Stamp of the value; what it last was when there is none.
+    /// Returns the stamp of the value, or the last one if the value is absent.
     #[must_use]
     pub const fn stamp(&self) -> Stamp {
         Stamp { nanos: self.nanos, device: self.device }
     }
 
-    /// The value is new in `tick`.
+    /// Makes the value new in `tick`.
     pub const fn renew(&mut self, tick: u64, stamp: Stamp) {
         *self = Self::new(tick, stamp, true);
     }
 
-    /// The value goes away in `tick`; nothing happens if there was none.
+    /// Makes the value absent from `tick` on. Does nothing if it is absent already.
     pub const fn lose(&mut self, tick: u64) {
         if self.present {
             self.changed = tick;
@@ -120,7 +126,7 @@ mod tests {
         let mut mark = Mark::default();
         assert_eq!(mark.freshness(1), Freshness::Absent);
         mark.lose(1);
-        assert_eq!(mark.freshness(1), Freshness::Absent, "what never was cannot be lost");
+        assert_eq!(mark.freshness(1), Freshness::Absent, "a value that was never present cannot be lost");
         mark.renew(2, Stamp::TIMELESS);
         assert_eq!((mark.freshness(2), mark.freshness(3)), (Freshness::New, Freshness::Held));
         mark.lose(4);
@@ -128,7 +134,7 @@ mod tests {
     }
 
     #[test]
-    fn generated_motion_is_timeless_and_takes_any_other_stamp() {
+    fn every_stamp_is_older_than_a_timeless_one() {
         let sample = Stamp { nanos: 7, device: 1 };
         assert_eq!(Stamp::TIMELESS.oldest(sample), sample);
         assert_eq!(sample.oldest(Stamp::TIMELESS), sample);

@@ -1,20 +1,20 @@
-//! Joint vectors and the Jacobian over them.
+//! Joint vectors and Jacobians.
 
 use super::spatial::Twist;
 use super::unit::Unit;
 
-/// One joint of an arm, as known at load.
+/// The name and limits of one joint.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Joint {
-    /// Its name, as in the robot's model.
+    /// Name in the robot's model.
     pub name: String,
-    /// Least position [rad].
+    /// Minimum position [rad].
     pub lower: f64,
-    /// Greatest position [rad].
+    /// Maximum position [rad].
     pub upper: f64,
-    /// Greatest speed [rad/s].
+    /// Maximum speed [rad/s].
     pub speed: f64,
-    /// Greatest acceleration [rad/s²]; infinite if nothing is known of it.
+    /// Maximum acceleration [rad/s²]; infinite if it is unknown.
     pub acceleration: f64,
 }
 
@@ -24,41 +24,41 @@ impl Default for Joint {
     }
 }
 
-/// What is known of a joint vector, or of a Jacobian's columns, at load.
+/// The shape of a joint vector, or of the columns of a Jacobian.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct JointsShape {
     /// The joints from the base to the tip.
     pub joints: Vec<Joint>,
-    /// Unit of each value; of no meaning for a Jacobian.
+    /// Unit of each value; unused for a Jacobian.
     pub unit: Unit,
 }
 
 impl JointsShape {
-    /// The same joints in another unit.
+    /// Returns the same joints with another unit.
     #[must_use]
     pub fn in_unit(&self, unit: Unit) -> Self {
         Self { joints: self.joints.clone(), unit }
     }
 }
 
-/// One value a joint, from the base to the tip.
+/// A joint vector: one value per joint, from the base to the tip.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Joints(pub Box<[f64]>);
 
 impl Joints {
-    /// `count` zeros.
+    /// Creates a vector of `count` zeros.
     #[must_use]
     pub fn zeros(count: usize) -> Self {
         Self(vec![0.0; count].into())
     }
 }
 
-/// The columns of a Jacobian: the twist that unit speed of each joint gives.
+/// A Jacobian. Each column is the twist at unit speed of one joint.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Jacobian(pub Box<[Twist]>);
 
 impl Jacobian {
-    /// `count` columns of zeros.
+    /// Creates a Jacobian with `count` columns of zeros.
     #[must_use]
     pub fn zeros(count: usize) -> Self {
         Self(vec![Twist::default(); count].into())

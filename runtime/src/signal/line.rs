@@ -1,8 +1,8 @@
-//! Steps on a straight line: the direction of a motion is kept, and its length is limited.
+//! Steps on a straight line: they limit the length of a motion and keep its direction.
 
 /// Returns the largest factor up to 1 that brings `size` within `bound`; both are in the same unit and not negative.
 ///
-/// A bound that is not a number gives a factor that is not a number, which [`f64::min`] skips.
+/// If `bound` is NaN, the factor is NaN, which [`f64::min`] ignores.
 ///
 /// ```
 /// use tactflow_runtime::signal::line::scale_to;
@@ -16,7 +16,7 @@ pub fn scale_to(size: f64, bound: f64) -> f64 {
     if size <= bound { 1.0 } else { bound / size }
 }
 
-/// Returns the point that lies `scale` of the way on the straight line between two numbers; exactly `to` from 1 on.
+/// Returns the number at the share `scale` of the way between two numbers; exactly `to` if `scale` is at least 1.
 ///
 /// ```
 /// use tactflow_runtime::signal::line::step_toward;

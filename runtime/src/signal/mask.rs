@@ -1,15 +1,15 @@
-//! A binary image, one bit a tactel.
+//! Binary images with one bit per tactel.
 
 use super::image::ImageShape;
 
-/// Size and pitch of an array of tactels: what is left of an image without its unit.
+/// The size and pitch of an array of tactels.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Grid {
     /// Number of rows.
     pub rows: usize,
     /// Number of columns.
     pub cols: usize,
-    /// Distance between the centres of two neighbours along x and along y [m].
+    /// Distance between the centres of neighbouring tactels along x and along y [m].
     pub pitch: [f64; 2],
 }
 
@@ -28,49 +28,49 @@ pub struct Mask {
 }
 
 impl Mask {
-    /// Takes over a value of the same shape, in place.
+    /// Copies a value of the same shape, in place.
     pub(crate) fn copy_from(&mut self, other: &Self) {
         self.words.clone_from(&other.words);
         (self.cols, self.stride) = (other.cols, other.stride);
     }
 
-    /// The empty set of an array of `rows` by `cols`.
+    /// Creates the empty set of an array of `rows` by `cols`.
     #[must_use]
     pub fn empty(rows: usize, cols: usize) -> Self {
         let stride = cols.div_ceil(64);
         Self { words: vec![0; rows * stride].into(), cols, stride }
     }
 
-    /// Number of columns.
+    /// Returns the number of columns.
     #[must_use]
     pub const fn cols(&self) -> usize {
         self.cols
     }
 
-    /// Number of rows.
+    /// Returns the number of rows.
     #[must_use]
     pub fn rows(&self) -> usize {
         self.words.len().checked_div(self.stride).unwrap_or(0)
     }
 
-    /// Words of 64 tactels in each row.
+    /// Returns the number of 64-bit words per row.
     #[must_use]
     pub const fn stride(&self) -> usize {
         self.stride
     }
 
-    /// All words, row after row.
+    /// Returns all words, row by row.
     #[must_use]
     pub fn words(&self) -> &[u64] {
         &self.words
     }
 
-    /// All words, to be written; bits past the last column stay zero.
+    /// Returns all words for writing. Bits past the last column must stay zero.
     pub fn words_mut(&mut self) -> &mut [u64] {
         &mut self.words
     }
 
-    /// The words of row `i`.
+    /// Returns the words of row `i`.
     #[must_use]
     pub fn row(&self, i: usize) -> &[u64] {
         &self.words[i * self.stride..(i + 1) * self.stride]
@@ -82,18 +82,18 @@ impl Mask {
         j < self.cols && self.row(i)[j / 64] >> (j % 64) & 1 == 1
     }
 
-    /// Puts tactel (i, j) in the set.
+    /// Adds tactel (i, j) to the set.
     pub fn insert(&mut self, i: usize, j: usize) {
         debug_assert!(j < self.cols, "column {j} of {}", self.cols);
         self.words[i * self.stride + j / 64] |= 1 << (j % 64);
     }
 
-    /// Takes every tactel out.
+    /// Removes every tactel.
     pub fn clear(&mut self) {
         self.words.fill(0);
     }
 
-    /// Number of tactels in the set.
+    /// Returns the number of tactels in the set.
     #[must_use]
     pub fn count(&self) -> usize {
         self.words.iter().map(|word| word.count_ones() as usize).sum()

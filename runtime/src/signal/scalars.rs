@@ -1,11 +1,11 @@
-//! The scalars that a value of each kind consists of: the one place that takes every kind apart.
+//! The scalars in a value of each kind. This is the only file that lists the components of every kind.
 
 use nalgebra::UnitQuaternion;
 
 use super::{Arenas, Features, Flag, Joints, Kind, Pose, Scalar, Shape, Signal, Twist, Unit};
 
 impl Shape {
-    /// Returns the scalars of a value of this shape: the suffix of each name (empty for a plain number) and its unit.
+    /// Returns the scalars of a value of this shape: the suffix of each name (empty for a scalar or a flag) and its unit.
     /// Images, masks, regions and Jacobians have none.
     #[must_use]
     pub fn scalars(&self) -> Vec<(String, Unit)> {
@@ -31,31 +31,34 @@ impl Shape {
 }
 
 impl Arenas {
-    /// Reads the scalars of one value into the front of `row` and returns how many there are. Allocates nothing.
-    pub(crate) fn read_scalars(&self, kind: Kind, slot: u32, row: &mut [f64]) -> usize {
+    /// Reads the scalars of one value, from index `first` on, into the front of `row`. Returns the number of scalars read.
+    /// An absent feature is NaN. Allocates nothing.
+    #[inline]
+    pub(crate) fn read_scalars(&self, kind: Kind, slot: u32, first: usize, row: &mut [f64]) -> usize {
         let slot = slot as usize;
         match kind {
-            Kind::Scalar => write(row, [Scalar::arena(self)[slot]]),
-            Kind::Flag => write(row, [f64::from(u8::from(Flag::arena(self)[slot]))]),
+            Kind::Scalar => write(row, first, [Scalar::arena(self)[slot]]),
+            Kind::Flag => write(row, first, [f64::from(u8::from(Flag::arena(self)[slot]))]),
             Kind::Features => {
                 let features = Features::arena(self)[slot].components();
-                write(row, features.iter().map(|component| component.get().unwrap_or(f64::NAN)))
+                write(row, first, features.iter().map(|component| component.get().unwrap_or(f64::NAN)))
             }
-            Kind::Twist => write(row, Twist::arena(self)[slot].0.iter().copied()),
+            Kind::Twist => write(row, first, Twist::arena(self)[slot].0.iter().copied()),
             Kind::Pose => {
                 let pose = Pose::arena(self)[slot].0;
-                let turn = UnitQuaternion::from_rotation_matrix(&pose.rotation).coords;
-                write(row, pose.translation.vector.iter().chain(turn.iter()).copied())
+                let quaternion = UnitQuaternion::from_rotation_matrix(&pose.rotation).coords;
+                write(row, first, pose.translation.vector.iter().chain(quaternion.iter()).copied())
             }
-            Kind::Joints => write(row, Joints::arena(self)[slot].0.iter().copied()),
+            Kind::Joints => write(row, first, Joints::arena(self)[slot].0.iter().copied()),
             Kind::Image | Kind::Mask | Kind::Regions | Kind::Jacobian => 0,
         }
     }
 }
 
-fn write(row: &mut [f64], values: impl IntoIterator<Item = f64>) -> usize {
+#[inline]
+fn write(row: &mut [f64], first: usize, values: impl IntoIterator<Item = f64>) -> usize {
     let mut count = 0;
-    for (cell, value) in row.iter_mut().zip(values) {
+    for (cell, value) in row.iter_mut().zip(values.into_iter().skip(first)) {
         *cell = value;
         count += 1;
     }

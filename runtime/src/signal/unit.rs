@@ -1,9 +1,9 @@
-//! Units of a wire: a closed list, known at load.
+//! Units of wires, a closed list. Every unit is known at load.
 
 use std::fmt;
 use std::str::FromStr;
 
-/// What is counted.
+/// The base of a unit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum Base {
     /// A pure number.
@@ -15,13 +15,13 @@ pub enum Base {
     SquareMetre,
     /// Radian.
     Radian,
-    /// Radian of an axis without a direction: 0 and pi are the same line.
+    /// Radian of an undirected line: 0 and pi are the same line.
     Axial,
     /// Newton.
     Newton,
     /// Kilopascal.
     Kilopascal,
-    /// What the sensor's converter counts, before any calibration.
+    /// Counts of the sensor's converter, before any calibration.
     Raw,
     /// Number of tactels.
     Tactel,
@@ -39,12 +39,12 @@ const NAMES: [(Base, &str); 9] = [
     (Base::Tactel, "tactel"),
 ];
 
-/// A unit: what is counted, per tactel or not, and how often divided by seconds.
+/// A unit: a base, optionally per tactel and per a power of seconds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub struct Unit {
-    /// What is counted.
+    /// The base.
     pub base: Base,
-    /// Whether it is a mean over the tactels of a region.
+    /// Whether the value is a mean over the tactels of a region.
     pub per_tactel: bool,
     /// Power of `1/s`.
     pub per_second: u8,
@@ -59,39 +59,39 @@ impl Unit {
     pub const SQUARE_METRE: Self = Self::of(Base::SquareMetre);
     /// Radian.
     pub const RADIAN: Self = Self::of(Base::Radian);
-    /// Radian of a line's direction, modulo pi.
+    /// Direction of a line in radians, modulo pi.
     pub const AXIAL: Self = Self::of(Base::Axial);
     /// Newton.
     pub const NEWTON: Self = Self::of(Base::Newton);
     /// Counts of the converter.
     pub const RAW: Self = Self::of(Base::Raw);
 
-    /// The unit of a base.
+    /// Creates a plain unit of a base.
     #[must_use]
     pub const fn of(base: Base) -> Self {
         Self { base, per_tactel: false, per_second: 0 }
     }
 
-    /// This unit per second; the rate of an axial angle is a plain rad/s.
+    /// Returns this unit per second. The rate of an axial angle is in rad/s.
     #[must_use]
     pub const fn per_second(self) -> Self {
         let base = if matches!(self.base, Base::Axial) { Base::Radian } else { self.base };
         Self { base, per_second: self.per_second + 1, ..self }
     }
 
-    /// This unit per tactel.
+    /// Returns this unit per tactel.
     #[must_use]
     pub const fn per_tactel(self) -> Self {
         Self { per_tactel: true, ..self }
     }
 
-    /// Whether 0 and pi mean the same, so that differences are wrapped into (-pi/2, pi/2].
+    /// Whether the unit is an axial angle. Then 0 and pi are equal, and differences are wrapped into (-pi/2, pi/2].
     #[must_use]
     pub const fn is_axial(self) -> bool {
         matches!(self.base, Base::Axial) && self.per_second == 0
     }
 
-    /// Every unit a graph file may name, for messages.
+    /// Lists every unit that a graph file may name, for messages.
     #[must_use]
     pub fn list() -> String {
         let names: Vec<String> = NAMES.iter().map(|(_, name)| format!("`{name}`")).collect();
@@ -118,16 +118,101 @@ impl FromStr for Unit {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        let (rest, per_second) = match text.rsplit_once("/s") {
-            Some((rest, "")) => (rest, 1),
-            Some((rest, "2")) => (rest, 2),
+        Self::parse(text.as_bytes()).ok_or_else(|| format!("`{text}` is not a unit; units are {}", Self::list()))
+    }
+}
+
+/// Checks of the units in declarations. They are `const`, so that the derives reject a wrong unit at compile time.
+impl Unit {
+    const fn parse(text: &[u8]) -> Option<Self> {
+        let (rest, per_second) = match text {
+            [rest @ .., b'/', b's'] => (rest, 1),
+            [rest @ .., b'/', b's', b'2'] => (rest, 2),
             _ => (text, 0),
         };
-        let (rest, per_tactel) = rest.strip_suffix("/tactel").map_or((rest, false), |rest| (rest, true));
-        let base = NAMES.iter().find(|(_, name)| *name == rest).map(|(base, _)| *base);
-        let base = base.ok_or_else(|| format!("`{text}` is not a unit; units are {}", Self::list()))?;
-        Ok(Self { base, per_tactel, per_second })
+        let (rest, per_tactel) = match rest {
+            [rest @ .., b'/', b't', b'a', b'c', b't', b'e', b'l'] => (rest, true),
+            _ => (rest, false),
+        };
+        let mut i = 0;
+        while i < NAMES.len() {
+            if is_same(NAMES[i].1.as_bytes(), rest) {
+                return Some(Self { base: NAMES[i].0, per_tactel, per_second });
+            }
+            i += 1;
+        }
+        None
     }
+
+    /// Whether a port may declare the unit: a unit, `_`, `_/s`, or a capital letter, alone or divided.
+    #[must_use]
+    pub const fn is_port_unit(text: &str) -> bool {
+        let is_variable = match text.as_bytes() {
+            b"_" | b"_/s" => true,
+            [b'A'..=b'Z', rest @ ..] => matches!(rest, b"" | b"/tactel" | b"/s" | b"/tactel/s"),
+            _ => false,
+        };
+        is_variable || Self::parse(text.as_bytes()).is_some()
+    }
+
+    /// Whether a parameter may declare the unit: products and quotients of [`PARAM_UNITS`](Self::PARAM_UNITS) and capital
+    /// letters, such as `N s/m` or `U/s2`, a list such as `m/s, rad/s`, or `$` with the name of a parameter. `_` is the
+    /// unit of the component that an entry of a table is for.
+    #[must_use]
+    pub const fn is_param_unit(text: &str) -> bool {
+        let text = text.as_bytes();
+        if let [b'$', b'a'..=b'z', ..] = text {
+            return true;
+        }
+        let (mut start, mut i) = (0, 0);
+        while i <= text.len() {
+            if i == text.len() || matches!(text[i], b'/' | b' ' | b',') {
+                let is_gap = i == start && i > 0 && text[i - 1] == b',' && i < text.len() && text[i] == b' ';
+                if i < text.len() && text[i] == b',' && (i + 1 == text.len() || text[i + 1] != b' ') {
+                    return false;
+                }
+                let (_, rest) = text.split_at(start);
+                let (atom, _) = rest.split_at(i - start);
+                if !is_gap && !is_atom(atom) {
+                    return false;
+                }
+                start = i + 1;
+            }
+            i += 1;
+        }
+        true
+    }
+
+    /// The factors in the unit of a parameter, besides the capital letters that inputs bind.
+    pub const PARAM_UNITS: [&str; 18] = [
+        "1", "m", "mm", "rad", "deg", "s", "ms", "ns", "Hz", "N", "kPa", "kg", "J", "raw", "tactel", "sample", "byte",
+        "%",
+    ];
+}
+
+/// Whether a text is a unit of a parameter or a letter, to the power of one, two or three.
+const fn is_atom(text: &[u8]) -> bool {
+    let text = match text {
+        [base @ .., b'2' | b'3'] if !base.is_empty() => base,
+        _ => text,
+    };
+    let mut i = 0;
+    while i < Unit::PARAM_UNITS.len() {
+        if is_same(Unit::PARAM_UNITS[i].as_bytes(), text) {
+            return true;
+        }
+        i += 1;
+    }
+    matches!(text, [b'A'..=b'Z' | b'_'])
+}
+
+/// Whether two texts are equal.
+pub(super) const fn is_same(a: &[u8], b: &[u8]) -> bool {
+    let mut i = 0;
+    while i < a.len() && i < b.len() && a[i] == b[i] {
+        i += 1;
+    }
+    i == a.len() && i == b.len()
 }
 
 #[cfg(test)]
@@ -135,7 +220,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_unit_reads_back_as_written() {
+    fn every_unit_parses_to_itself() {
         for (base, _) in NAMES {
             for per_tactel in [false, true] {
                 for per_second in 0..3 {
@@ -145,6 +230,22 @@ mod tests {
             }
         }
         assert!("Nm".parse::<Unit>().is_err());
+    }
+
+    #[test]
+    fn declarations_accept_only_known_units() {
+        for text in ["N", "m/s", "_", "_/s", "U", "U/tactel", "E/s", "rad mod pi"] {
+            assert!(Unit::is_port_unit(text), "{text}");
+        }
+        for text in ["", "UV", "U/m", "_/s2", "newton", "m/s3", "u"] {
+            assert!(!Unit::is_port_unit(text), "{text}");
+        }
+        for text in ["1", "m/s2", "N s/m", "m/s, rad/s", "U/s", "V/U", "kg m2", "$unit", "%", "_", "m/_, rad/_"] {
+            assert!(Unit::is_param_unit(text), "{text}");
+        }
+        for text in ["", "newton", "m/", "/s", "m,rad", "m,, rad", "$", "m//s", "2", "m/s²"] {
+            assert!(!Unit::is_param_unit(text), "{text}");
+        }
     }
 
     #[test]

@@ -3,6 +3,8 @@
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
+use serde::Serialize;
+
 use crate::source::suggestion;
 
 /// One source text.
@@ -35,6 +37,19 @@ impl SourceFile {
         let column = before.rsplit('\n').next().unwrap_or("").chars().count() + 1;
         (line, column)
     }
+}
+
+/// A range of text, as a program or a person refers to it.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Location {
+    /// The file, or [`SourceMap::COMMAND_LINE`].
+    pub file: String,
+    /// Line, from 1.
+    pub line: usize,
+    /// Column, from 1 [characters].
+    pub column: usize,
+    /// Length [characters].
+    pub length: usize,
 }
 
 /// A file built into a catalogue: its name after `builtin:`, and its bytes.
@@ -116,6 +131,15 @@ impl SourceMap {
         &self.file_at(at).folder
     }
 
+    /// Returns the location of a span.
+    #[must_use]
+    pub fn location(&self, span: &Range<usize>) -> Location {
+        let file = self.file_at(span.start);
+        let (line, column) = file.line_column(span.start);
+        let length = file.text[file.local(span)].chars().count();
+        Location { file: file.name.clone(), line, column, length }
+    }
+
     /// Formats an offset as `file:line:column`.
     #[must_use]
     pub fn locate(&self, at: usize) -> String {
@@ -142,6 +166,15 @@ mod tests {
         );
         assert_eq!(sources.path("b.csv", base), Path::new("a/b.csv"));
         assert_eq!(sources.path("builtin:b.csv", base), Path::new("builtin:b.csv"));
+    }
+
+    #[test]
+    fn a_location_counts_characters() {
+        let mut sources = SourceMap::default();
+        sources.add_file(Path::new("a.toml"), "x = 1\n");
+        let base = sources.add_file(Path::new("b.toml"), "y = 2\nµ = \"é\"\n").base;
+        let expected = Location { file: "b.toml".into(), line: 2, column: 5, length: 3 };
+        assert_eq!(sources.location(&(base + 11..base + 15)), expected);
     }
 
     #[test]

@@ -8,6 +8,6 @@ mod suggest;
 mod value;
 
 pub use diagnostic::{Code, Diagnostic, Diagnostics, Report, Severity};
-pub use map::{BuiltinFile, SourceFile, SourceMap};
+pub use map::{BuiltinFile, Location, SourceFile, SourceMap};
 pub use suggest::{suggest_name, suggestion};
 pub use value::{Item, Key, Table, Value, parse_table};

@@ -4,6 +4,7 @@ use std::ops::Range;
 
 use serde::de::value::{MapDeserializer, SeqDeserializer};
 use serde::de::{self, IntoDeserializer, Visitor};
+use serde::{Serialize, Serializer};
 use toml::de::{DeTable, DeValue};
 
 use crate::source::{Code, Diagnostic, Diagnostics, SourceFile};
@@ -50,6 +51,19 @@ pub struct Key {
 pub struct Table {
     /// The entries.
     pub entries: Vec<(Key, Value)>,
+}
+
+impl Serialize for Value {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        match &self.item {
+            Item::String(text) | Item::Datetime(text) => serializer.serialize_str(text),
+            Item::Integer(number) => serializer.serialize_i64(*number),
+            Item::Float(number) => serializer.serialize_f64(*number),
+            Item::Boolean(value) => serializer.serialize_bool(*value),
+            Item::Array(items) => serializer.collect_seq(items),
+            Item::Table(table) => serializer.collect_map(table.entries.iter().map(|(key, value)| (&key.name, value))),
+        }
+    }
 }
 
 impl Table {

@@ -1,29 +1,39 @@
 //! `breaks`: passes a value on until it breaks, in one of the ways a node can.
 
-use tactflow_runtime::node::{Mistake, Mistakes, Node, Setup, Tick};
-use tactflow_runtime::{inputs, outputs, params};
+use tactflow_runtime::node::{Describe, In, Inputs, Mistake, Mistakes, Node, Out, Outputs, Param, Setup, Tick};
+use tactflow_runtime::signal::Scalar;
 
-params! {
+/// Breaks in some tick.
+#[derive(Describe)]
+#[describe(name = "breaks")]
+pub struct Breaks {
+    tick: u64,
+    panics: bool,
+}
+
+/// Parameters of `breaks`.
+#[derive(Debug, Clone, Param)]
+pub struct Params {
     /// How: `nan` or `panic`.
     how: String,
     /// In which tick.
     tick: u64,
 }
 
-inputs! {
+/// What `breaks` reads.
+#[derive(Inputs)]
+pub struct Inputs<'a> {
     /// What it passes on.
-    value: Scalar["U"],
+    #[port(unit = "U", frame = "_")]
+    value: In<'a, Scalar>,
 }
 
-outputs! {
+/// What `breaks` writes.
+#[derive(Outputs)]
+pub struct Outputs {
     /// What it passed on.
-    value: Scalar["U"],
-}
-
-/// When and how it breaks.
-pub struct Breaks {
-    tick: u64,
-    panics: bool,
+    #[port(unit = "U", frame = "_")]
+    value: Out<Scalar>,
 }
 
 impl Node for Breaks {
@@ -31,9 +41,6 @@ impl Node for Breaks {
     type Inputs<'a> = Inputs<'a>;
     type Outputs = Outputs;
     type State = ();
-
-    const NAME: &'static str = "breaks";
-    const SUMMARY: &'static str = "breaks in some tick";
 
     fn new(params: Params, _: &mut Setup<Self>) -> Result<Self, Mistakes> {
         match params.how.as_str() {

@@ -1,23 +1,35 @@
 //! `count`: how often it stepped since its state was fresh, and the time between its samples.
 
-use tactflow_runtime::node::{Interval, Mistakes, Node, Setup, Tick};
-use tactflow_runtime::{inputs, outputs, params, state};
+use tactflow_runtime::node::{Describe, In, Inputs, Interval, Mistakes, Node, Out, Outputs, Setup, State, Tick};
+use tactflow_runtime::signal::Scalar;
 
-params! {}
+/// Counts its steps.
+#[derive(Describe)]
+#[describe(name = "count")]
+pub struct Count;
 
-inputs! {
+/// What `count` reads.
+#[derive(Inputs)]
+pub struct Inputs<'a> {
     /// What it counts.
-    value: Scalar["U"],
+    #[port(unit = "U", frame = "_")]
+    value: In<'a, Scalar>,
 }
 
-outputs! {
+/// What `count` writes.
+#[derive(Outputs)]
+pub struct Outputs {
     /// Steps since the state was fresh.
-    steps: Scalar["1"],
-    /// Sum of the times between the samples [s].
-    time: Scalar["1"],
+    #[port(unit = "1", frame = "_")]
+    steps: Out<Scalar>,
+    /// Sum of the times between the samples.
+    #[port(unit = "1", frame = "_")]
+    time: Out<Scalar>,
 }
 
-state! {
+/// What `count` remembers.
+#[derive(State)]
+pub struct State {
     /// Steps so far.
     steps: f64,
     /// Time so far [s].
@@ -26,19 +38,13 @@ state! {
     interval: Interval,
 }
 
-/// Nothing to configure.
-pub struct Count;
-
 impl Node for Count {
-    type Params = Params;
+    type Params = ();
     type Inputs<'a> = Inputs<'a>;
     type Outputs = Outputs;
     type State = State;
 
-    const NAME: &'static str = "count";
-    const SUMMARY: &'static str = "counts its steps";
-
-    fn new(_: Params, _: &mut Setup<Self>) -> Result<Self, Mistakes> {
+    fn new((): (), _: &mut Setup<Self>) -> Result<Self, Mistakes> {
         Ok(Self)
     }
 
@@ -48,7 +54,7 @@ impl Node for Count {
 
     fn step(&self, tick: &Tick, inputs: Inputs<'_>, out: &mut Outputs, state: &mut State) {
         state.steps += 1.0;
-        state.time += state.interval.step(inputs.value.stamp(), tick);
+        state.time += state.interval.step(&inputs.value, tick).unwrap_or(0.0);
         out.steps.set(state.steps);
         out.time.set(state.time);
     }

@@ -3,7 +3,7 @@
 use std::time::Instant;
 
 use async_trait::async_trait;
-use tactflow_runtime::device::{Description, Device, DeviceError, Driver, Filled, Link, Live, Opened};
+use tactflow_runtime::device::{Description, Device, DeviceError, Driver, Link, Live, Opened, Output};
 use tactflow_runtime::node::Mistakes;
 use tactflow_runtime::params;
 use tactflow_runtime::signal::{Scalar, ScalarShape, Unit};
@@ -18,11 +18,10 @@ params! {
 /// The connection that will be made.
 pub struct LineLength {
     address: String,
+    value: Output<Scalar>,
 }
 
-impl Device for LineLength {
-    type Params = Params;
-
+impl tactflow_runtime::node::Describe for LineLength {
     const NAME: &'static str = "line_length";
     const SUMMARY: &'static str = "a number a line from a TCP connection";
     const DOC: &'static str = "Each line is a length in metres. It runs in real time.";
@@ -37,12 +36,15 @@ length = "ruler"
 type = "line_length"
 address = "127.0.0.1:4000"
 "#;
+}
+
+impl Device for LineLength {
+    type Params = Params;
 
     fn open(params: Params) -> Result<Opened, Mistakes> {
-        let outputs = vec![ScalarShape::of(Unit::METRE).into()];
-        let filled = Filled { role: "length".into(), outputs, commands: vec![], facts: vec![] };
-        let description = Description { fills: vec![filled], period: 0.01 };
-        Ok(Opened { description, driver: Driver::Live(Box::new(Self { address: params.address })) })
+        let mut description = Description::every(0.01);
+        let value = description.fills("length").output("value", ScalarShape::of(Unit::METRE));
+        Ok(Opened { description, driver: Driver::Live(Box::new(Self { address: params.address, value })) })
     }
 }
 
@@ -62,7 +64,7 @@ impl Live for LineLength {
             let number: f64 = line.parse().map_err(|_| DeviceError(format!("`{line}` is not a number")))?;
             let stamp = link.stamp(Instant::now());
             sequence += 1;
-            link.publish(|samples| *samples.write::<Scalar>(0, stamp, sequence) = number);
+            link.publish(|samples| *samples.write(self.value, stamp, sequence) = number);
         }
     }
 }

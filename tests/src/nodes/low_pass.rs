@@ -4,35 +4,62 @@
 //! dt is the time between two samples, so T means the same at 100 Hz and at 1 kHz. The first sample passes as it is.
 //! What has decayed to almost nothing is zero, as subnormal numbers are slow.
 
-use tactflow_runtime::node::{At, Interval, Mistake, Mistakes, Node, Positive, Setup, Tick};
+use tactflow_runtime::node::{
+    At, Describe, In, Inputs, Interval, Mistake, Mistakes, Node, Out, Outputs, Param, Setup, State, Tick,
+};
+use tactflow_runtime::signal::Scalar;
 use tactflow_runtime::source::Code;
-use tactflow_runtime::{inputs, outputs, params, state};
 
-params! {
-    /// Time in which 63 % of a step have passed through, T [s].
-    time: Positive = Positive(0.02),
+/// A low-pass filter of the first order.
+///
+/// T dy/dt = x - y, one implicit Euler step a sample: it never overshoots, however late a sample comes, and T means the
+/// same at any rate. The first sample passes as it is.
+///
+/// It refuses the direction of a line, which has no plain mean: take a `smooth` for that.
+///
+/// ```toml
+/// [nodes.low_pass]
+/// type = "low_pass"
+/// in.value = "moments.pressure"
+/// time = 0.05                         # [s]
+/// ```
+#[derive(Describe)]
+#[describe(name = "low_pass")]
+pub struct LowPass {
+    time: f64,
 }
 
-inputs! {
+/// Parameters of `low_pass`.
+#[derive(Debug, Clone, Param)]
+pub struct Params {
+    /// Time in which 63 % of a step have passed through, T.
+    #[param(unit = "s", above = 0.0, default = 0.02)]
+    time: f64,
+}
+
+/// What `low_pass` reads.
+#[derive(Inputs)]
+pub struct Inputs<'a> {
     /// Any feature that has no axis.
-    value: Scalar["U", "A"],
+    #[port(unit = "U", frame = "A")]
+    value: In<'a, Scalar>,
 }
 
-outputs! {
+/// What `low_pass` writes.
+#[derive(Outputs)]
+pub struct Outputs {
     /// The same, smoothed.
-    value: Scalar["U", "A"],
+    #[port(unit = "U", frame = "A")]
+    value: Out<Scalar>,
 }
 
-state! {
+/// What `low_pass` remembers.
+#[derive(State)]
+pub struct State {
     /// What came out last; nothing yet after a reset.
     last: Option<f64>,
     /// Since the last sample.
     interval: Interval,
-}
-
-/// The filter's time.
-pub struct LowPass {
-    time: f64,
 }
 
 impl Node for LowPass {
@@ -41,25 +68,13 @@ impl Node for LowPass {
     type Outputs = Outputs;
     type State = State;
 
-    const NAME: &'static str = "low_pass";
-    const SUMMARY: &'static str = "a low-pass filter of the first order";
-    const DOC: &'static str = "T dy/dt = x - y, one implicit Euler step a sample: it never overshoots, however late a \
-        sample comes, and T means the same at any rate. The first sample passes as it is.\n\n\
-        It refuses the direction of a line, which has no plain mean: take a `smooth` for that.";
-    const EXAMPLE: &'static str = r#"
-[nodes.low_pass]
-type = "low_pass"
-in.value = "moments.pressure"
-time = 0.05                         # [s]
-"#;
-
     fn new(params: Params, setup: &mut Setup<Self>) -> Result<Self, Mistakes> {
         if setup.inputs.value.unit.is_axial() {
             let place = At::Input("value".into());
             let mistake = Mistake::new(Code::UnitMismatch, place, "the direction of a line has no plain mean");
             return Err(mistake.help("take a `smooth`: it takes the mean of axes").into());
         }
-        Ok(Self { time: *params.time })
+        Ok(Self { time: params.time })
     }
 
     fn state(&self) -> State {
@@ -67,9 +82,8 @@ time = 0.05                         # [s]
     }
 
     fn step(&self, tick: &Tick, inputs: Inputs<'_>, out: &mut Outputs, state: &mut State) {
-        let dt = state.interval.step(inputs.value.stamp(), tick);
-        let value = match state.last {
-            Some(last) => toward(last, *inputs.value, dt / (self.time + dt)),
+        let value = match state.last.zip(state.interval.step(&inputs.value, tick)) {
+            Some((last, dt)) => toward(last, *inputs.value, dt / (self.time + dt)),
             None => *inputs.value,
         };
         state.last = Some(value);

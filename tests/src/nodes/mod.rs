@@ -10,9 +10,9 @@ pub mod unit_delay;
 
 use tactflow_runtime::catalogue::Catalogue;
 use tactflow_runtime::device::RoleType;
-use tactflow_runtime::harness::Source;
+use tactflow_runtime::harness::FedRole;
 use tactflow_runtime::node::{Need, PortSpec};
-use tactflow_runtime::signal::{Kind, ScalarShape, Unit};
+use tactflow_runtime::signal::Kind;
 
 /// The nodes and the role.
 #[must_use]
@@ -34,7 +34,7 @@ pub fn catalogue() -> Catalogue {
 fn length() -> RoleType {
     let args = vec!["m".into(), "self".into()].into();
     let value =
-        PortSpec { name: "value".into(), doc: "A length.".into(), kind: Kind::Scalar, args, need: Need::Required };
+        PortSpec { name: "value".into(), doc: "A length.".into(), kind: Kind::Scalar, args, need: Need::REQUIRED };
     RoleType {
         name: "length".into(),
         summary: "a length".into(),
@@ -48,7 +48,6 @@ fn length() -> RoleType {
 
 /// The role `role` as a length that a test feeds, every 10 ms nominally.
 #[must_use]
-pub fn length_by_hand(role: &'static str) -> Source {
-    let outputs = vec![ScalarShape::of(Unit::METRE).into()];
-    Source { role, kind: "length", period: 0.01, outputs, commands: vec![] }
+pub fn length_by_hand(role: &str) -> FedRole {
+    FedRole::new(role, "length", 10.0)
 }

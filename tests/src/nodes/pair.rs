@@ -1,48 +1,58 @@
-//! `pair`: one input of each sort; says what it saw.
+//! `pair`: one input of each form; its outputs count what it saw.
 
-use tactflow_runtime::node::{Mistakes, Node, Setup, Tick};
-use tactflow_runtime::{inputs, outputs, params, state};
+use tactflow_runtime::node::{Describe, In, Inputs, Mistakes, Node, Out, Outputs, Setup, State, Tick};
+use tactflow_runtime::signal::Scalar;
 
-params! {}
+/// Adds what is present.
+#[derive(Describe)]
+#[describe(name = "pair")]
+pub struct Pair;
 
-inputs! {
+/// What `pair` reads.
+#[derive(Inputs)]
+pub struct Inputs<'a> {
     /// Required, and a trigger.
-    required: Scalar["_"],
-    /// Required, but only its loss wakes.
-    sampled: Sampled<Scalar["_"]>,
+    #[port(unit = "_", frame = "_")]
+    required: In<'a, Scalar>,
+    /// Required, but only its loss wakes the node.
+    #[port(unit = "_", frame = "_", sampled)]
+    sampled: In<'a, Scalar>,
     /// Optional, and a trigger.
-    trigger: Trigger<Scalar["_"]>,
-    /// Optional; only its loss wakes.
-    optional: Option<Scalar["_"]>,
+    #[port(unit = "_", frame = "_", optional)]
+    trigger: Option<In<'a, Scalar>>,
+    /// Optional; only its loss wakes the node.
+    #[port(unit = "_", frame = "_", optional, sampled)]
+    optional: Option<In<'a, Scalar>>,
 }
 
-outputs! {
+/// What `pair` writes.
+#[derive(Outputs)]
+pub struct Outputs {
     /// Steps so far.
-    steps: Scalar["1"],
-    /// The sum of what is there.
-    sum: Scalar["m"],
-    /// How many of the optional ones are there.
-    there: Scalar["1"],
+    #[port(unit = "1", frame = "_")]
+    steps: Out<Scalar>,
+    /// Sum of the inputs that are present.
+    #[port(unit = "m", frame = "_")]
+    sum: Out<Scalar>,
+    /// Number of optional inputs that are present.
+    #[port(unit = "1", frame = "_")]
+    there: Out<Scalar>,
 }
 
-state! {
+/// What `pair` remembers.
+#[derive(State)]
+pub struct State {
     /// Steps so far.
     steps: f64,
 }
 
-/// Nothing to configure.
-pub struct Pair;
-
 impl Node for Pair {
-    type Params = Params;
+    type Params = ();
     type Inputs<'a> = Inputs<'a>;
     type Outputs = Outputs;
     type State = State;
 
-    const NAME: &'static str = "pair";
-    const SUMMARY: &'static str = "adds what is there";
-
-    fn new(_: Params, _: &mut Setup<Self>) -> Result<Self, Mistakes> {
+    fn new((): (), _: &mut Setup<Self>) -> Result<Self, Mistakes> {
         Ok(Self)
     }
 

@@ -1,26 +1,46 @@
 //! `unit_delay`: what its input was one tick ago, in metres.
 
-use tactflow_runtime::node::{Mistakes, Node, Setup, Tick};
-use tactflow_runtime::{inputs, outputs, params};
+use tactflow_runtime::node::{Describe, In, Inputs, Mistakes, Node, Out, Outputs, Param, Setup, Tick};
+use tactflow_runtime::signal::Scalar;
 
-params! {
-    /// What it gives before there was anything [m].
-    initial: f64 = 0.0,
-}
-
-inputs! {
-    /// What is delayed.
-    value: Delayed<Scalar["m"]>,
-}
-
-outputs! {
-    /// What it was a tick ago.
-    value: Scalar["m"],
-}
-
-/// The value before there was any.
+/// What its input was one tick ago.
+///
+/// It closes a loop: what reads it may be what it reads.
+///
+/// ```toml
+/// # What was added a tick ago.
+/// [nodes.unit_delay]
+/// type = "unit_delay"
+/// in.value = "plus.value"
+/// ```
+#[derive(Describe)]
+#[describe(name = "unit_delay", every_tick)]
 pub struct UnitDelay {
     initial: f64,
+}
+
+/// Parameters of `unit_delay`.
+#[derive(Debug, Clone, Param)]
+pub struct Params {
+    /// What it gives before there was anything.
+    #[param(unit = "m", default = 0.0)]
+    initial: f64,
+}
+
+/// What `unit_delay` reads.
+#[derive(Inputs)]
+pub struct Inputs<'a> {
+    /// What is delayed.
+    #[port(unit = "m", frame = "_", optional, delayed)]
+    value: Option<In<'a, Scalar>>,
+}
+
+/// What `unit_delay` writes.
+#[derive(Outputs)]
+pub struct Outputs {
+    /// What it was a tick ago.
+    #[port(unit = "m", frame = "_")]
+    value: Out<Scalar>,
 }
 
 impl Node for UnitDelay {
@@ -28,17 +48,6 @@ impl Node for UnitDelay {
     type Inputs<'a> = Inputs<'a>;
     type Outputs = Outputs;
     type State = ();
-
-    const NAME: &'static str = "unit_delay";
-    const SUMMARY: &'static str = "what its input was one tick ago";
-    const DOC: &'static str = "It closes a loop: what reads it may be what it reads.";
-    const EXAMPLE: &'static str = r#"
-# What was added a tick ago.
-[nodes.unit_delay]
-type = "unit_delay"
-in.value = "plus.value"
-"#;
-    const EVERY_TICK: bool = true;
 
     fn new(params: Params, _: &mut Setup<Self>) -> Result<Self, Mistakes> {
         Ok(Self { initial: params.initial })

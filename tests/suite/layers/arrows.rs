@@ -12,7 +12,7 @@ use syn::{Attribute, Item, ItemMod, ItemUse, UseTree, Visibility};
 type Segments = Vec<String>;
 
 /// Arrows between the files of a crate: from a file to those it takes something from.
-pub type Arrows = BTreeMap<PathBuf, BTreeSet<PathBuf>>;
+pub(super) type Arrows = BTreeMap<PathBuf, BTreeSet<PathBuf>>;
 
 /// One module in a file of its own.
 #[derive(Default)]
@@ -27,13 +27,13 @@ struct Module {
 }
 
 /// The modules of a crate by their paths.
-pub struct Crate {
+pub(super) struct Crate {
     modules: BTreeMap<Segments, Module>,
 }
 
 impl Crate {
     /// Reads every file under the folder of a crate's `lib.rs`, its tests left out.
-    pub fn read(root: &Path) -> Self {
+    pub(super) fn read(root: &Path) -> Self {
         let mut modules = BTreeMap::new();
         read_folder(root, root, &mut modules);
         assert!(!modules.is_empty(), "{} has no modules", root.display());
@@ -41,7 +41,7 @@ impl Crate {
     }
 
     /// The arrows between the files. What a module re-exports draws none.
-    pub fn arrows(&self) -> Arrows {
+    pub(super) fn arrows(&self) -> Arrows {
         let mut arrows = Arrows::new();
         for (path, module) in &self.modules {
             let private = module.uses.iter().filter(|(.., is_reexport)| !is_reexport).map(|(_, target, _)| target);

@@ -3,7 +3,7 @@
 mod arrows;
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use arrows::{Arrows, Crate};
 use tactflow_tests::workspace;

@@ -3,7 +3,7 @@
 
 use std::collections::BTreeMap;
 
-use tactflow_runtime::node::{Need, NodeSpec, ParamSpec};
+use tactflow_runtime::node::{NodeSpec, ParamSpec};
 use tactflow_tests::catalogue;
 use toml::{Table, Value};
 
@@ -79,9 +79,11 @@ fn other_value(path: &[String], old: &Value, new: &Value) -> Option<Meant> {
     match (names.as_slice(), old, new) {
         (["graph", "clock"], ..) => Some(Meant::Clock),
         (["nodes", _, "type"], ..) => Some(Meant::Type),
-        (["nodes" | "parts", _, "in", _] | ["exports", _] | ["commands", _, _], Value::String(_), Value::String(_)) => {
-            Some(Meant::Wire)
-        }
+        (
+            ["nodes" | "parts", _, "in", _] | ["exports", _] | ["commands", _, _] | ["modes", _, "on_lost", "of"],
+            Value::String(_),
+            Value::String(_),
+        ) => Some(Meant::Wire),
         _ if differ_in_one_number(old, new) => Some(Meant::Number),
         _ => None,
     }
@@ -139,8 +141,8 @@ fn may_be_left_out(root: &Table, path: &[String]) -> bool {
         }
         ["bind", name] => catalogue().roles().iter().any(|role| role.is_observed_as(name)),
         ["nodes", node, "in", input] => spec(root, "nodes", node).is_some_and(|spec| {
-            let input = spec.inputs.iter().find(|port| port.name == *input || port.need == Need::Many);
-            matches!(input.map(|port| port.need), Some(Need::Many | Need::Optional | Need::Trigger))
+            let input = spec.inputs.iter().find(|port| port.name == *input || port.need.is_many);
+            input.is_some_and(|port| !port.need.must_be_wired && !port.need.is_delayed)
         }),
         ["nodes", node, param @ ..] => spec(root, "nodes", node).is_some_and(|spec| is_optional(&spec.params, param)),
         ["devices", device, param @ ..] => {

@@ -200,7 +200,7 @@ fn gzipped(bytes: &[u8]) -> Vec<u8> {
     packed.finish().unwrap()
 }
 
-/// A zip archive of those members, stored (0) or deflated (8).
+/// Returns a zip archive of the members, stored (0) or deflated (8).
 pub(super) fn zipped(method: u16, members: &[(&str, &[u8])]) -> Vec<u8> {
     let (mut archive, mut directory) = (Vec::new(), Vec::new());
     for (name, bytes) in members {

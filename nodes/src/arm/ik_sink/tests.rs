@@ -57,7 +57,7 @@ fn spatial(pose: &Pose, twist: [f64; 6]) -> Twist {
 
 proptest! {
     #[test]
-    fn far_from_everything_the_sensor_moves_as_wanted(twist in prop::array::uniform6(-0.05..0.05f64)) {
+    fn far_from_limits_and_singularities_the_sensor_follows_the_twist(twist in prop::array::uniform6(-0.05..0.05f64)) {
         let (chain, mut rig) = (lwr(), rig("").unwrap());
         let columns = set_arm(&mut rig, &chain, &BENT);
         let wanted = spatial(&chain.forward(&BENT, &mut columns.clone()), twist);
@@ -68,7 +68,7 @@ proptest! {
     }
 
     #[test]
-    fn a_twist_too_fast_is_slowed_down_but_not_turned(twist in prop::array::uniform6(-3.0..3.0f64)) {
+    fn a_twist_that_is_too_fast_is_slowed_down_and_keeps_its_direction(twist in prop::array::uniform6(-3.0..3.0f64)) {
         let (chain, mut slow, mut fast) = (lwr(), rig("").unwrap(), rig("").unwrap());
         let columns = set_arm(&mut slow, &chain, &BENT);
         set_arm(&mut fast, &chain, &BENT);
@@ -83,7 +83,7 @@ proptest! {
     }
 
     #[test]
-    fn posture_never_moves_the_sensor(
+    fn the_drift_to_the_posture_never_moves_the_sensor(
         q in prop::array::uniform7(-1.9..1.9f64), twist in prop::array::uniform6(-0.02..0.02f64),
     ) {
         let chain = lwr();
@@ -103,7 +103,7 @@ proptest! {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(16))]
     #[test]
-    fn limits_hold_for_as_long_as_anything_random_pushes(
+    fn the_limits_hold_under_random_twists(
         twists in prop::collection::vec(prop::array::uniform6(-2.0..2.0f64), 20),
         posture in prop::array::uniform7(-2.0..2.0f64),
     ) {
@@ -127,7 +127,7 @@ proptest! {
 }
 
 #[test]
-fn an_arm_that_is_free_drifts_to_its_posture() {
+fn a_free_arm_drifts_to_its_posture() {
     let (chain, mut rig) = (lwr(), rig("posture = [0.2, 0.6, 0.6, -1.2, 0.3, 0.9, 0]\nposture_gain = 2").unwrap());
     let mut q = BENT;
     let start = chain.forward(&q, &mut [Twist::default(); 7]);
@@ -162,7 +162,7 @@ fn without_a_twist_there_is_no_velocity() {
 }
 
 #[test]
-fn a_joint_at_its_limit_stops_the_task_and_the_share_says_so() {
+fn a_joint_at_its_limit_stops_the_task_and_lowers_the_share() {
     let (chain, push) = (lwr(), [0.0, 0.0, 0.05, 0.0, 0.0, 0.0]);
     let share = |q: &[f64; 7], scale: f64| {
         let mut rig = rig("").unwrap();
@@ -194,7 +194,7 @@ fn a_joint_at_its_limit_stops_the_task_and_the_share_says_so() {
 }
 
 #[test]
-fn what_is_no_number_is_no_panic() {
+fn an_input_that_is_nan_does_not_panic() {
     type Spoil = fn(&mut NodeRig, Stamp);
     let spoils: [Spoil; 4] = [
         |rig, now| rig.edit("twist", now, |twist: &mut Twist| twist.0[0] = f64::NAN),
@@ -213,9 +213,13 @@ fn what_is_no_number_is_no_panic() {
 }
 
 #[test]
-fn bad_settings() {
+fn a_bad_parameter_is_a_mistake() {
     let cases = [
-        ("damping = 0.0005", At::Param("damping".into()), "`damping` of less than 0.001 drowns in rounding"),
+        (
+            "damping = 0.0005",
+            At::Param("damping".into()),
+            "`damping` is less than 0.001: rounding errors are then larger",
+        ),
         (
             "limit_gain = 501",
             At::Param("limit_gain".into()),

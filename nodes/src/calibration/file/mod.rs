@@ -1,8 +1,8 @@
-//! A calibration as a file: TOML, one line a tactel, for people to read and to compare.
+//! A calibration as a TOML file with one line a tactel, easy to read and to compare.
 //!
-//! Numbers are written with as many digits as 32 bits need, so what is read is what was written, bit for bit. Every
-//! tactel stands in the file, with a curve or as dead. A mistake knows its place in the text, and nothing is allocated
-//! from the size that the file claims before its tactels are counted.
+//! Numbers have enough digits for 32 bits, so a file that is written and read again gives the same bits. Every tactel is
+//! in the file, with a curve or as dead. A mistake has its place in the text. No memory is allocated from the size in the
+//! header before the tactels are counted.
 
 use std::collections::BTreeMap;
 use std::fmt::Write;
@@ -16,30 +16,30 @@ use tactflow_runtime::source::{Item, SourceMap, Value, parse_table};
 use super::curve::KINDS;
 use super::{Calibration, Curve, Kind, Tactel};
 
-/// What is wrong with a file, and where.
+/// A mistake in a file, with its place.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Flaw {
-    /// The place.
+    /// Byte range in the text.
     pub span: Range<usize>,
     /// What is wrong.
     pub message: String,
-    /// What to do.
+    /// What to do instead.
     pub help: Option<String>,
 }
 
-/// The most flaws that are told of one file.
-const MOST_FLAWS: usize = 8;
+/// Maximum number of flaws that are reported for one file.
+const MAX_FLAWS: usize = 8;
 
-/// The most knots of a curve. The node has room for as many for every tactel as the one with the most has.
-const MOST_KNOTS: usize = 64;
+/// Maximum number of knots of a curve. The node reserves the same number of knots for every tactel.
+const MAX_KNOTS: usize = 64;
 
-/// The version of the format that is written, and the only one that is read.
+/// Version of the format.
 const VERSION: u64 = 1;
 
-/// What `kind` says in a calibration file.
+/// Value of `kind` in a calibration file.
 const KIND: &str = "calibration";
 
-/// A value that is read later.
+/// A value that is parsed later.
 #[derive(Debug, Clone)]
 struct Later(Value);
 
@@ -66,23 +66,23 @@ impl Param for Kind {
 
 params! {
     Header:
-    /// That it is a calibration.
+    /// `calibration`.
     kind: String,
     /// Version of the format.
     version: u64,
-    /// Sort of the curves.
+    /// Kind of the curves.
     curve: Kind,
     /// Number of rows.
     rows: Count,
     /// Number of columns.
     cols: Count,
-    /// Unit of what the sensor reads.
+    /// Unit of the readings.
     reading: Unit,
-    /// Unit of what comes out.
+    /// Unit of the forces.
     unit: Unit,
-    /// Tactels that measure nothing, as `[row, column]` from 0.
+    /// Tactels that give no force, as `[row, column]` from 0.
     dead: Vec<Later> = Vec::new(),
-    /// The others.
+    /// The other tactels.
     tactels: Vec<Later>,
 }
 
@@ -90,7 +90,7 @@ params! {
     LinearLine:
     /// Row and column, from 0.
     at: [usize; 2],
-    /// What it reads unloaded [reading].
+    /// Unloaded reading [reading].
     offset: f64,
     /// Slope [unit per reading].
     gain: f64,
@@ -100,13 +100,13 @@ params! {
     RationalLine:
     /// Row and column, from 0.
     at: [usize; 2],
-    /// What it reads unloaded [reading].
+    /// Unloaded reading [reading].
     offset: f64,
     /// Slope at the zero [unit per reading].
     gain: f64,
-    /// One over the reading beyond the offset that no force reaches [1 per reading].
+    /// One over the asymptote of the reading beyond the offset [1 per reading].
     squash: f64,
-    /// Largest force that was calibrated [unit].
+    /// Maximum calibrated force [unit].
     most: f64,
 }
 
@@ -114,7 +114,7 @@ params! {
     PiecewiseLine:
     /// Row and column, from 0.
     at: [usize; 2],
-    /// What it reads unloaded [reading].
+    /// Unloaded reading [reading].
     offset: f64,
     /// Readings beyond the offset, at the knots [reading].
     readings: Vec<f64>,
@@ -122,7 +122,7 @@ params! {
     forces: Vec<f64>,
 }
 
-/// Whether a text is a calibration file, sound or not.
+/// Whether a text is a calibration file, with or without mistakes.
 #[must_use]
 pub fn is_calibration(text: &str) -> bool {
     let mut sources = SourceMap::default();
@@ -135,16 +135,16 @@ pub fn is_calibration(text: &str) -> bool {
 /// Reads a calibration file.
 ///
 /// # Errors
-/// What is wrong with it, the first few mistakes at once.
+/// The first mistakes in it.
 pub fn read(text: &str) -> Result<Calibration, Vec<Flaw>> {
     let mut sources = SourceMap::default();
     let root = parse_table(sources.add("", text, "")).map_err(|mistakes| {
         let flaw = |mistake: tactflow_runtime::source::Diagnostic| flaw(&mistake.span, mistake.message.clone());
-        // After the first, the reader of TOML is lost: in a file that is none it is as wrong in each line.
+        // Later mistakes follow from the first: a file that is not TOML has one on every line.
         mistakes.into_iter().take(1).map(flaw).collect::<Vec<_>>()
     })?;
     let mut file = File { reader: Reader::new(&sources), flaws: Vec::new() };
-    let calibration = file.whole(&root);
+    let calibration = file.calibration(&root);
     let mut flaws = file.flaws;
     flaws.extend(file.reader.mistakes.into_iter().map(|mistake| Flaw {
         span: if let At::Span(span) = mistake.at { span } else { root.span.clone() },
@@ -152,7 +152,7 @@ pub fn read(text: &str) -> Result<Calibration, Vec<Flaw>> {
         help: mistake.help,
     }));
     flaws.sort_by_key(|flaw| flaw.span.start);
-    flaws.truncate(MOST_FLAWS);
+    flaws.truncate(MAX_FLAWS);
     match calibration {
         Some(calibration) if flaws.is_empty() => Ok(calibration),
         _ => Err(flaws),
@@ -163,30 +163,30 @@ fn flaw(span: &Range<usize>, message: impl Into<String>) -> Flaw {
     Flaw { span: span.clone(), message: message.into(), help: None }
 }
 
-/// Where the value of `key` stands in a table, or the table itself.
+/// Returns the place of the value of `key` in a table, or that of the table.
 fn place(table: &Value, key: &str) -> Range<usize> {
     table.as_table().and_then(|table| table.get(key)).unwrap_or(table).span.clone()
 }
 
-/// A file that is being read.
+/// The reader of a file.
 struct File<'s> {
     reader: Reader<'s>,
     flaws: Vec<Flaw>,
 }
 
 impl File<'_> {
-    fn whole(&mut self, root: &Value) -> Option<Calibration> {
+    fn calibration(&mut self, root: &Value) -> Option<Calibration> {
         let table = root.as_table()?;
         let is_kind = |value: &Value| value.as_str() == Some(KIND);
         if !table.get("kind").is_some_and(is_kind) {
-            let help =
-                format!("a calibration file says `kind = \"{KIND}\"`; `tactflow calibrate` makes one from a log");
-            let flaw = flaw(&table.get("kind").map_or(0..0, |kind| kind.span.clone()), "this is no calibration file");
+            let help = format!("a calibration file has `kind = \"{KIND}\"`; `tactflow calibrate` makes one from a log");
+            let flaw =
+                flaw(&table.get("kind").map_or(0..0, |kind| kind.span.clone()), "this is not a calibration file");
             self.flaws.push(Flaw { help: Some(help), ..flaw });
             return None;
         }
         if let Some((_, version)) = table.entry("version").filter(|(_, value)| value.item != Item::Integer(1)) {
-            let message = format!("this tool reads version {VERSION} of the format, not {}", version.described());
+            let message = format!("unsupported version {}: this tool reads version {VERSION}", version.described());
             self.flaws.push(flaw(&version.span, message));
             return None;
         }
@@ -201,9 +201,9 @@ impl File<'_> {
             let (at, tactel) = self.tactel(header.curve, value).unzip();
             self.put(&mut tactels, [rows, cols], at, &place(value, "at"), tactel);
         }
-        let is_whole = self.reader.mistakes.is_empty() && self.flaws.is_empty();
-        if is_whole && tactels.len() < rows * cols {
-            let missing = (0..).find(|i| !tactels.contains_key(i)).expect("fewer than all are there");
+        let is_sound = self.reader.mistakes.is_empty() && self.flaws.is_empty();
+        if is_sound && tactels.len() < rows * cols {
+            let missing = (0..).find(|i| !tactels.contains_key(i)).expect("some tactel is missing");
             let message = format!("tactel [{}, {}] is missing", missing / cols, missing % cols);
             let rest = rows * cols - tactels.len() - 1;
             let message = if rest > 0 { format!("{message}, and {rest} more") } else { message };
@@ -216,7 +216,7 @@ impl File<'_> {
         Some(Calibration { kind, rows, cols, reading, unit, tactels })
     }
 
-    /// Puts a tactel into its place, which must be on the array and still free.
+    /// Stores a tactel at its place, which must be on the array and free.
     fn put(
         &mut self,
         tactels: &mut BTreeMap<usize, Option<Tactel>>,
@@ -231,7 +231,7 @@ impl File<'_> {
             let help = Some("rows and columns count from 0".to_owned());
             self.flaws.push(Flaw { help, ..flaw(span, message) });
         } else if tactels.insert(i * cols + j, tactel).is_some() {
-            self.flaws.push(flaw(span, format!("tactel [{i}, {j}] is given twice")));
+            self.flaws.push(flaw(span, format!("tactel [{i}, {j}] appears twice")));
         }
     }
 
@@ -254,8 +254,8 @@ impl File<'_> {
                     self.flaws.push(flaw(&place(value, "forces"), message));
                     return None;
                 }
-                if line.readings.len() > MOST_KNOTS {
-                    let message = format!("{} knots, but a curve has {MOST_KNOTS} at most", line.readings.len());
+                if line.readings.len() > MAX_KNOTS {
+                    let message = format!("{} knots, but the maximum is {MAX_KNOTS}", line.readings.len());
                     self.flaws.push(flaw(&place(value, "readings"), message));
                     return None;
                 }
@@ -271,7 +271,7 @@ impl File<'_> {
     }
 }
 
-/// A number that is more than 32 bits hold.
+/// Returns a number that is too large for 32 bits, with a message.
 fn too_large(tactel: &Tactel) -> Option<(&'static str, String)> {
     let mut numbers = vec![("offset", tactel.offset)];
     match &tactel.curve {
@@ -284,10 +284,10 @@ fn too_large(tactel: &Tactel) -> Option<(&'static str, String)> {
         }
     }
     let (key, _) = numbers.into_iter().find(|(_, number)| !number.is_finite())?;
-    Some((key, "too large: images are of 32-bit floats".into()))
+    Some((key, "too large: images have 32-bit floats".into()))
 }
 
-/// A calibration as the text of a file, with `origin` told in its first lines.
+/// Returns the text of a file; its first lines are `origin`, as comments.
 #[must_use]
 pub fn write(calibration: &Calibration, origin: &str) -> String {
     let Calibration { kind, rows, cols, reading, unit, tactels } = calibration;
@@ -309,7 +309,7 @@ pub fn write(calibration: &Calibration, origin: &str) -> String {
         (0..tactels.len()).filter(|i| tactels[*i].is_none()).map(|i| format!("[{}, {}]", i / cols, i % cols)).collect();
     let head = format!(
         "# {formula}.\nkind = \"{KIND}\"\nversion = {VERSION}\ncurve = \"{kind}\"\nrows = {rows}\ncols = {cols}\n\
-         reading = \"{reading}\"\nunit = \"{unit}\"\n\n# They measure nothing and are 0, as [row, column] from 0.\n\
+         reading = \"{reading}\"\nunit = \"{unit}\"\n\n# These give a force of 0, as [row, column] from 0.\n\
          dead = [{}]\n\n# At [row, column] from 0: {units}.\ntactels = [\n",
         dead.join(", ")
     );
@@ -325,7 +325,7 @@ pub fn write(calibration: &Calibration, origin: &str) -> String {
             }
         };
         let at = format!("[{}, {}]", i / cols, i % cols);
-        writeln!(text, "  {{ at = {at}, offset = {offset:?}, {line} }},").expect("a string takes all");
+        writeln!(text, "  {{ at = {at}, offset = {offset:?}, {line} }},").expect("writing to a string cannot fail");
     }
     text.push_str("]\n");
     text

@@ -1,4 +1,4 @@
-//! Calibration files: written and read back, and damaged.
+//! Tests of calibration files: written, read again, and damaged.
 
 use proptest::prelude::*;
 
@@ -10,7 +10,7 @@ fn read_back(calibration: &Calibration) -> Calibration {
     read(&text).unwrap_or_else(|flaws| panic!("{flaws:?}\n{text}"))
 }
 
-/// A finite number of 32 bits, of any size.
+/// Generates finite numbers of 32 bits.
 fn number() -> impl Strategy<Value = f32> {
     any::<u32>().prop_map(f32::from_bits).prop_filter("finite", |number| number.is_finite())
 }
@@ -59,7 +59,7 @@ proptest! {
     #[test]
     fn what_is_written_is_read_bit_for_bit(calibration in calibration()) {
         let back = read_back(&calibration);
-        // Two floats that differ only in a zero's sign would be equal; their text is not.
+        // 0 and -0 are equal as floats, but different as text.
         prop_assert_eq!(format!("{:?}", &back), format!("{:?}", &calibration));
     }
 }
@@ -100,11 +100,11 @@ fn a_file_written_by_hand_is_read_in_any_order() {
 }
 
 #[test]
-fn every_mistake_stands_at_its_place() {
+fn every_mistake_has_its_place() {
     let cases = [
-        (GOOD, "kind = \"calibration\"", "kind = \"bench\"", "\"bench\"", "this is no calibration file"),
-        (GOOD, "kind = \"calibration\"\n", "", "", "this is no calibration file"),
-        (GOOD, "version = 1", "version = 2", "2", "this tool reads version 1 of the format, not 2"),
+        (GOOD, "kind = \"calibration\"", "kind = \"bench\"", "\"bench\"", "this is not a calibration file"),
+        (GOOD, "kind = \"calibration\"\n", "", "", "this is not a calibration file"),
+        (GOOD, "version = 1", "version = 2", "2", "unsupported version 2: this tool reads version 1"),
         (GOOD, "\"rational\"", "\"cubic\"", "\"cubic\"", "expected `linear`, `rational` or `piecewise`"),
         (GOOD, "\"rational\"", "\"linear\"", "squash", "`squash` is not a parameter here"),
         (GOOD, "rows = 2", "rows = 0", "0", "expected a whole number from 1"),
@@ -113,22 +113,28 @@ fn every_mistake_stands_at_its_place() {
         (GOOD, "rows = 2", "rows = 1000000", "[\n  {", "tactel [2, 0] is missing, and 1999995 more"),
         (GOOD, "\"raw\"", "\"counts\"", "\"counts\"", "`counts` is not a unit"),
         (GOOD, "[[0, 1]]", "[]", "[\n  {", "tactel [0, 1] is missing"),
-        (GOOD, "[[0, 1]]", "[[0, 1], [0, 1]]", "[0, 1]", "tactel [0, 1] is given twice"),
+        (GOOD, "[[0, 1]]", "[[0, 1], [0, 1]]", "[0, 1]", "tactel [0, 1] appears twice"),
         (GOOD, "[[0, 1]]", "[[0, 1], [1]]", "[1]", "expected a list of 2"),
-        (GOOD, "at = [1, 0]", "at = [1, 1]", "[1, 1]", "tactel [1, 1] is given twice"),
-        (GOOD, "at = [1, 0]", "at = [0, 1]", "[0, 1]", "tactel [0, 1] is given twice"),
-        (GOOD, "gain = 0.02", "gain = 0", "0", "a `gain` of 0 measures nothing"),
-        (GOOD, "gain = 0.02", "gain = 1e99", "1e99", "too large: images are of 32-bit floats"),
+        (GOOD, "at = [1, 0]", "at = [1, 1]", "[1, 1]", "tactel [1, 1] appears twice"),
+        (GOOD, "at = [1, 0]", "at = [0, 1]", "[0, 1]", "tactel [0, 1] appears twice"),
+        (GOOD, "gain = 0.02", "gain = 0", "0", "a `gain` of 0 gives no force"),
+        (GOOD, "gain = 0.02", "gain = 1e99", "1e99", "too large: images have 32-bit floats"),
         (GOOD, "gain = 0.02", "gain = nan", "nan", "expected a finite number"),
         (GOOD, "gain = 0.02", "gain = \"x\"", "\"x\"", "expected a number"),
         (GOOD, "gain = 0.02, ", "", "{ at = [1, 1]", "`gain` is missing: expected a number"),
-        (GOOD, "squash = 0.001", "squash = -1", "-1", "`squash` has the sign of `gain`"),
-        (GOOD, "most = 5", "most = -5", "-5", "`most` is the largest force"),
+        (GOOD, "squash = 0.001", "squash = -1", "-1", "`squash` must have the sign of `gain`"),
+        (GOOD, "most = 5", "most = -5", "-5", "`most`, the maximum force, must be greater than 0"),
         (GOOD, "offset = -3", "offset = 1e50", "1e50", "too large"),
         (KNOTS, "[0, 0]", "[0, 1]", "[0, 1]", "tactel [0, 1] is not on an array of 1 by 1"),
         (KNOTS, "[0.5, 1.5, 4]", "[0.5, 1.5]", "[0.5, 1.5]", "3 readings, but 2 forces"),
-        (KNOTS, "[0.5, 1.5, 4]", "[0.5, 0.4, 4]", "[0.5, 0.4, 4]", "`forces` never fall, but 0.4 comes after 0.5"),
-        (KNOTS, "[10, 20, 30]", "[10, 10, 30]", "[10, 10, 30]", "`readings` go on in one direction from 0"),
+        (
+            KNOTS,
+            "[0.5, 1.5, 4]",
+            "[0.5, 0.4, 4]",
+            "[0.5, 0.4, 4]",
+            "`forces` must not decrease, but 0.4 comes after 0.5",
+        ),
+        (KNOTS, "[10, 20, 30]", "[10, 10, 30]", "[10, 10, 30]", "`readings` must move away from 0 in one direction"),
         (KNOTS, "[10, 20, 30]", "[10, 20, 1e40]", "[10, 20, 1e40]", "too large"),
     ];
     for (good, from, to, marked, message) in cases {
@@ -143,29 +149,29 @@ fn every_mistake_stands_at_its_place() {
 }
 
 #[test]
-fn what_is_no_toml_says_so_and_many_mistakes_are_cut_short() {
+fn text_that_is_not_toml_is_refused_and_long_lists_are_cut() {
     assert!(read("rows = = 2").is_err() && !is_calibration("rows = = 2"));
     assert!(!is_calibration("kind = 1") && !is_calibration(""));
     assert!(is_calibration("kind = \"calibration\"\nversion = 9"), "a later one is one too");
     let line = "  { at = [0, 0], offset = 10, gain = 0, squash = 0, most = 1 },\n";
     let text = GOOD.replacen("tactels = [\n", &format!("tactels = [\n{}", line.repeat(50)), 1);
-    assert_eq!(read(&text).unwrap_err().len(), MOST_FLAWS);
+    assert_eq!(read(&text).unwrap_err().len(), MAX_FLAWS);
 }
 
-/// The node keeps as many segments for every tactel as the one with the most has: one long line must not blow them up.
+/// The node reserves the same number of segments for every tactel: one long line must not multiply the memory.
 #[test]
-fn a_curve_has_so_many_knots_at_most() {
+fn a_curve_has_a_maximum_number_of_knots() {
     let with = |count: usize| {
         let list = (1..=count).map(|k| k.to_string()).collect::<Vec<_>>().join(", ");
         read(&KNOTS.replace("10, 20, 30", &list).replace("0.5, 1.5, 4", &list))
     };
     assert!(with(64).is_ok());
     let flaws = with(65).unwrap_err();
-    assert_eq!((flaws.len(), flaws[0].message.as_str()), (1, "65 knots, but a curve has 64 at most"));
+    assert_eq!((flaws.len(), flaws[0].message.as_str()), (1, "65 knots, but the maximum is 64"));
 }
 
 #[test]
-fn a_file_that_is_no_toml_is_told_once() {
+fn a_file_that_is_not_toml_has_one_mistake() {
     let log = "time,force,t0_0\n0.0,0.1,200\n0.1,0.2,300\n";
     assert_eq!(read(log).unwrap_err().len(), 1);
 }

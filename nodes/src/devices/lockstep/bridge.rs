@@ -2,14 +2,24 @@
 
 use std::time::{Duration, Instant};
 
-use tactflow_runtime::device::{Commands, DeviceError, Samples, Stepped};
+use tactflow_runtime::device::{Command, Commands, DeviceError, Output, Report, Samples, Stepped};
 use tactflow_runtime::signal::{Image, Joints, Pose};
 
 use super::message::{self, Hello, Message, Obs, Sizes};
 use super::socket::Socket;
 
+/// The ports of the pad and the arm.
+pub(super) struct Ports {
+    pub(super) image: Output<Image>,
+    pub(super) position: Output<Joints>,
+    pub(super) equilibrium: Output<Joints>,
+    pub(super) velocity: Command,
+    pub(super) contact: Report<Pose>,
+}
+
 /// A simulator that is being run with.
 pub(super) struct Bridge {
+    ports: Ports,
     socket: Socket,
     address: String,
     sizes: Sizes,
@@ -34,8 +44,16 @@ pub(super) struct Bridge {
 }
 
 impl Bridge {
-    pub(super) fn new(socket: Socket, address: String, sizes: Sizes, hello: &Hello, acceleration: f64) -> Self {
+    pub(super) fn new(
+        ports: Ports,
+        socket: Socket,
+        address: String,
+        sizes: Sizes,
+        hello: &Hello,
+        acceleration: f64,
+    ) -> Self {
         Self {
+            ports,
             socket,
             address,
             sizes,
@@ -56,8 +74,8 @@ impl Bridge {
     fn turn(&mut self, now: i64, commands: &Commands, samples: &mut Samples) -> Result<(), String> {
         if self.pending.is_none() {
             if let Some(seq) = self.open.take() {
-                let est = commands.report::<Pose>(0).map(|pose| pose.0.translation.vector.into());
-                self.answer(seq, commands.joints(0), est)?;
+                let est = commands.report(self.ports.contact).map(|pose| pose.0.translation.vector.into());
+                self.answer(seq, commands.joints(self.ports.velocity), est)?;
             }
             if !self.is_over {
                 self.pending = self.next_frame()?;
@@ -126,10 +144,10 @@ impl Bridge {
     }
 
     fn show(&mut self, stamp: i64, obs: &Obs, samples: &mut Samples) {
-        let cells = samples.write::<Image>(0, stamp, obs.seq).cells_mut();
+        let cells = samples.write(self.ports.image, stamp, obs.seq).cells_mut();
         cells.iter_mut().zip(&obs.img).for_each(|(cell, counts)| *cell = *counts as f32);
-        samples.write::<Joints>(1, stamp, obs.seq).0.copy_from_slice(&obs.q);
-        samples.write::<Joints>(2, stamp, obs.seq).0.copy_from_slice(&obs.q_eq);
+        samples.write(self.ports.position, stamp, obs.seq).0.copy_from_slice(&obs.q);
+        samples.write(self.ports.equilibrium, stamp, obs.seq).0.copy_from_slice(&obs.q_eq);
         (self.shown, self.open) = (Some(stamp), Some(obs.seq));
     }
 

@@ -1,60 +1,104 @@
-//! The messages of the bridge: what a simulator says, checked field by field, and what it is told.
+//! The messages of the bridge: those of a simulator are read and checked, those to it are written.
+//!
+//! JSON has no `NaN` and no infinity, so every number that is read is finite. An error names the field and the element,
+//! as `img[7]`, and where the text is wrong, the byte.
 
 use nalgebra::{Matrix3, Vector3};
+use serde::de::Error as _;
+use serde::{Deserialize, Deserializer, Serialize};
 
-use super::json::{Json, object, quoted};
 use crate::arm::mount::Mount;
 
-/// The version of the protocol that is spoken here.
+/// Version of the protocol.
 const PROTO: f64 = 1.0;
-/// The most tactels that fit into a line.
-const MOST: f64 = 500_000.0;
-/// How far the rotation of `T_es` may be from one: simulators print few digits.
-const TOLERANCE: f64 = 1e-4;
+/// Maximum number of tactels that fit into a line.
+const MAX_TACTELS: usize = 500_000;
+/// Maximum error of the rotation of `T_es`: simulators print few digits.
+const MAX_ROTATION_ERROR: f64 = 1e-4;
+/// Maximum integer that every writer of JSON writes exactly.
+const MAX_INTEGER: f64 = 9_007_199_254_740_991.0;
 
 /// The first message of a simulator.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Deserialize)]
+#[serde(expecting = "a JSON object")]
 pub(super) struct Hello {
+    #[serde(rename = "type")]
+    _type: HelloType,
+    #[serde(rename = "proto", deserialize_with = "version")]
+    _proto: f64,
+    #[serde(rename = "task")]
+    _task: String,
     /// Time between two frames [s].
+    #[serde(deserialize_with = "positive")]
     pub(super) dt: f64,
     /// Whether the simulator waits for each command.
+    #[serde(rename = "lockstep")]
     pub(super) is_lockstep: bool,
+    #[serde(deserialize_with = "names")]
     pub(super) joints: Vec<String>,
-    /// Least and greatest positions [rad], and greatest speeds [rad/s].
+    /// Minimum positions [rad].
     pub(super) q_min: Vec<f64>,
+    /// Maximum positions [rad].
     pub(super) q_max: Vec<f64>,
+    /// Maximum speeds [rad/s].
     pub(super) dq_max: Vec<f64>,
     pub(super) urdf: String,
     pub(super) tip: String,
     /// Pose of the sensor on the tip.
+    #[serde(rename = "T_es", deserialize_with = "mount")]
     pub(super) mount: Mount,
+    #[serde(deserialize_with = "size")]
     pub(super) rows: usize,
+    #[serde(deserialize_with = "size")]
     pub(super) cols: usize,
+    /// Distance between the centres of two tactels [m].
+    #[serde(deserialize_with = "positive")]
     pub(super) pitch: f64,
+    #[serde(deserialize_with = "positive")]
     pub(super) counts_per_unit: f64,
+    #[serde(deserialize_with = "positive")]
     pub(super) newton_per_unit: f64,
+    #[serde(deserialize_with = "not_negative")]
     pub(super) threshold_units: f64,
 }
 
+#[derive(Debug, Clone, Deserialize)]
+#[serde(rename_all = "lowercase")]
+enum HelloType {
+    Hello,
+}
+
 /// A frame.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(expecting = "a JSON object")]
 pub(super) struct Obs {
+    #[serde(rename = "type")]
+    _type: FrameType,
+    #[serde(deserialize_with = "number_of_frame")]
     pub(super) seq: u64,
     /// Time of the simulator [s].
     pub(super) t: f64,
     pub(super) q: Vec<f64>,
+    dq: Vec<f64>,
     pub(super) q_eq: Vec<f64>,
     pub(super) img: Vec<f64>,
 }
 
-/// What a simulator says after its hello.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(rename_all = "lowercase")]
+enum FrameType {
+    Obs,
+    End,
+}
+
+/// A message of a simulator after its hello.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum Message {
     Obs(Obs),
     End,
 }
 
-/// The sizes that a frame has to have.
+/// The sizes that a frame must have.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Sizes {
     pub(super) joints: usize,
@@ -62,169 +106,181 @@ pub(super) struct Sizes {
     pub(super) cols: usize,
 }
 
-/// The fields of a message.
-struct Fields(Vec<(String, Json)>);
-
-impl Fields {
-    fn get(&self, name: &str) -> Result<&Json, String> {
-        let field = self.0.iter().find(|(known, _)| known == name);
-        field.map(|(_, value)| value).ok_or_else(|| format!("`{name}` is missing"))
-    }
-
-    fn number(&self, name: &str) -> Result<f64, String> {
-        match self.get(name)? {
-            Json::Number(number) if number.is_finite() => Ok(*number),
-            Json::Number(number) => Err(format!("`{name}` is {number}, and not finite")),
-            other => Err(format!("`{name}` is {}, and not a number", other.described())),
-        }
-    }
-
-    /// A number greater than 0.
-    fn positive(&self, name: &str) -> Result<f64, String> {
-        let number = self.number(name)?;
-        if number > 0.0 { Ok(number) } else { Err(format!("`{name}` is {number}, and has to be greater than 0")) }
-    }
-
-    /// A whole number from `least` to `most`.
-    fn whole(&self, name: &str, least: f64, most: f64) -> Result<u64, String> {
-        let number = self.number(name)?;
-        let is_good = number.fract() == 0.0 && (least..=most).contains(&number);
-        if is_good {
-            Ok(number as u64)
-        } else {
-            Err(format!("`{name}` is {number}, and not a whole number from {least}"))
-        }
-    }
-
-    fn flag(&self, name: &str) -> Result<bool, String> {
-        match self.get(name)? {
-            Json::Flag(flag) => Ok(*flag),
-            other => Err(format!("`{name}` is {}, and neither true nor false", other.described())),
-        }
-    }
-
-    fn text(&self, name: &str) -> Result<&str, String> {
-        match self.get(name)? {
-            Json::Text(text) => Ok(text),
-            other => Err(format!("`{name}` is {}, and not a text", other.described())),
-        }
-    }
-
-    fn list(&self, name: &str) -> Result<&[Json], String> {
-        match self.get(name)? {
-            Json::List(items) => Ok(items),
-            other => Err(format!("`{name}` is {}, and not a list", other.described())),
-        }
-    }
-
-    /// A list of finite numbers, as long as `has` says, which is `count`.
-    fn numbers(&self, name: &str, count: usize, has: impl Fn() -> String) -> Result<Vec<f64>, String> {
-        let items = self.list(name)?;
-        if items.len() != count {
-            return Err(format!("`{name}` has {} numbers, but {}", items.len(), has()));
-        }
-        let number = |(i, item): (usize, &Json)| match item {
-            Json::Number(number) if number.is_finite() => Ok(*number),
-            Json::Number(number) => Err(format!("number {} of `{name}` is {number}, and not finite", i + 1)),
-            other => Err(format!("entry {} of `{name}` is {}, and not a number", i + 1, other.described())),
-        };
-        items.iter().enumerate().map(number).collect()
-    }
-}
-
 /// Reads a hello.
 ///
 /// # Errors
 /// What is wrong, with its field.
 pub(super) fn hello(line: &str) -> Result<Hello, String> {
-    let fields = Fields(object(line)?);
-    match fields.text("type")? {
-        "hello" => {}
-        other => return Err(format!("the first message is of type `{other}`, and not a hello")),
+    let hello: Hello = parse(line)?;
+    let Hello { joints, q_min, q_max, dq_max, rows, cols, .. } = &hello;
+    for (name, numbers) in [("q_min", q_min), ("q_max", q_max), ("dq_max", dq_max)] {
+        check_length(name, numbers, joints.len(), || format!("there are {} `joints`", joints.len()))?;
     }
-    let proto = fields.number("proto")?;
-    if proto != PROTO {
-        return Err(format!("`proto` is {proto}, but the protocol that is spoken here is {PROTO}"));
-    }
-    fields.text("task")?;
-    let joints = names(fields.list("joints")?)?;
-    let per_joint = |name: &str| fields.numbers(name, joints.len(), || format!("there are {} `joints`", joints.len()));
-    let (q_min, q_max, dq_max) = (per_joint("q_min")?, per_joint("q_max")?, per_joint("dq_max")?);
     for (i, name) in joints.iter().enumerate() {
-        if q_min[i] >= q_max[i] {
-            return Err(format!(
-                "`q_min` of joint `{name}` is {}, and not less than its `q_max` of {}",
-                q_min[i], q_max[i]
-            ));
+        let (lower, upper, speed) = (q_min[i], q_max[i], dq_max[i]);
+        if lower >= upper {
+            return Err(format!("`q_min` of joint `{name}` is {lower}, which is not less than its `q_max` of {upper}"));
         }
-        if dq_max[i] <= 0.0 {
-            return Err(format!("`dq_max` of joint `{name}` is {}, and has to be greater than 0", dq_max[i]));
+        if speed <= 0.0 {
+            return Err(format!("`dq_max` of joint `{name}` is {speed}, which is not greater than 0"));
         }
     }
-    let threshold_units = fields.number("threshold_units")?;
-    if threshold_units < 0.0 {
-        return Err(format!("`threshold_units` is {threshold_units}, and cannot be less than 0"));
+    if rows * cols > MAX_TACTELS {
+        let message = format!("`rows` and `cols` make {rows}x{cols} tactels, but a line has room for {MAX_TACTELS}");
+        return Err(message);
     }
-    let (rows, cols) = (fields.whole("rows", 1.0, MOST)?, fields.whole("cols", 1.0, MOST)?);
-    if rows * cols > MOST as u64 {
-        return Err(format!(
-            "`rows` and `cols` make {rows}x{cols} tactels, and more than {MOST} do not fit into a line"
-        ));
+    Ok(hello)
+}
+
+/// Reads a message after the hello.
+///
+/// # Errors
+/// What is wrong, with its field and, where the line is JSON, with the number of the frame.
+pub(super) fn message(line: &str, sizes: Sizes) -> Result<Message, String> {
+    #[derive(Deserialize)]
+    struct Head {
+        r#type: FrameType,
     }
-    Ok(Hello {
-        dt: fields.positive("dt")?,
-        is_lockstep: fields.flag("lockstep")?,
-        q_min,
-        q_max,
-        dq_max,
-        urdf: fields.text("urdf")?.to_owned(),
-        tip: fields.text("tip")?.to_owned(),
-        mount: mount(&fields.numbers("T_es", 16, || "a 4x4 matrix has 16".into())?)?,
-        rows: rows as usize,
-        cols: cols as usize,
-        pitch: fields.positive("pitch")?,
-        counts_per_unit: fields.positive("counts_per_unit")?,
-        newton_per_unit: fields.positive("newton_per_unit")?,
-        threshold_units,
-        joints,
+    if parse(line).is_ok_and(|head: Head| head.r#type == FrameType::End) {
+        return Ok(Message::End);
+    }
+    let obs = parse(line).and_then(|obs| check_sizes(obs, sizes));
+    obs.map(Message::Obs).map_err(|why| match seq_of(line) {
+        Some(seq) => format!("obs {seq}: {why}"),
+        None => why,
     })
 }
 
-fn names(list: &[Json]) -> Result<Vec<String>, String> {
-    let mut names: Vec<String> = Vec::new();
-    for (i, item) in list.iter().enumerate() {
-        let Json::Text(name) = item else {
-            return Err(format!("entry {} of `joints` is {}, and not a name", i + 1, item.described()));
-        };
-        if name.is_empty() || names.contains(name) {
-            return Err(format!("entry {} of `joints` is `{name}`: each joint needs a name of its own", i + 1));
-        }
-        names.push(name.clone());
+fn check_sizes(obs: Obs, Sizes { joints, rows, cols }: Sizes) -> Result<Obs, String> {
+    for (name, numbers) in [("q", &obs.q), ("dq", &obs.dq), ("q_eq", &obs.q_eq)] {
+        check_length(name, numbers, joints, || format!("the arm has {joints} joints"))?;
     }
-    if names.is_empty() { Err("`joints` names none".into()) } else { Ok(names) }
+    check_length("img", &obs.img, rows * cols, || format!("the pad has {rows}x{cols} = {}", rows * cols))?;
+    match obs.img.iter().position(|counts| !(*counts as f32).is_finite()) {
+        Some(i) => Err(format!("`img[{i}]` is {:e}, which is too large", obs.img[i])),
+        None => Ok(obs),
+    }
 }
 
-/// The place of the sensor from a matrix, row after row.
-fn mount(m: &[f64]) -> Result<Mount, String> {
+fn check_length(name: &str, numbers: &[f64], count: usize, reason: impl Fn() -> String) -> Result<(), String> {
+    if numbers.len() == count {
+        return Ok(());
+    }
+    Err(format!("`{name}` has {} numbers, but {}", numbers.len(), reason()))
+}
+
+/// Returns the number of a frame, or `None` if the line is not JSON or has none.
+pub(super) fn seq_of(line: &str) -> Option<u64> {
+    #[derive(Deserialize)]
+    struct Seq {
+        #[serde(deserialize_with = "number_of_frame")]
+        seq: u64,
+    }
+    parse(line).map(|Seq { seq }| seq).ok()
+}
+
+/// Reads a line of JSON.
+///
+/// # Errors
+/// What is wrong, with the field where it is.
+fn parse<'l, T: Deserialize<'l>>(line: &'l str) -> Result<T, String> {
+    let mut json = serde_json::Deserializer::from_str(line);
+    let value = serde_path_to_error::deserialize(&mut json).map_err(|error| {
+        let (path, why) = (error.path().to_string(), describe(line, error.inner()));
+        if path == "." { why } else { format!("`{path}`: {why}") }
+    })?;
+    json.end().map(|()| value).map_err(|error| describe(line, &error))
+}
+
+/// Describes an error with the text it is about, instead of line and column.
+fn describe(line: &str, error: &serde_json::Error) -> String {
+    const MAX_SHOWN: usize = 12;
+    let text = error.to_string();
+    let what = text.split(" at line ").next().unwrap_or_default();
+    if !error.is_syntax() {
+        return what.replace("EOF while", "the line ends while");
+    }
+    let (before, after) = line.as_bytes().split_at(error.column().saturating_sub(1).min(line.len()));
+    let is_end = |byte: &u8| b" \t,:[]{}".contains(byte);
+    let start = before.iter().rposition(is_end).map_or(0, |end| end + 1);
+    let length = after.iter().position(is_end).unwrap_or(after.len()).max(1);
+    let token = String::from_utf8_lossy(&line.as_bytes()[start..line.len().min(before.len() + length)]);
+    let token: String = token.chars().take(MAX_SHOWN).collect();
+    format!("{what} at byte {}, found `{}`", start + 1, token.replace(char::is_control, "?"))
+}
+
+/// Reads a value that a check turns into another, or refuses.
+fn checked<'de, D: Deserializer<'de>, T: Deserialize<'de>, U>(
+    from: D,
+    check: impl FnOnce(T) -> Result<U, String>,
+) -> Result<U, D::Error> {
+    T::deserialize(from).and_then(|value| check(value).map_err(D::Error::custom))
+}
+
+/// Reads a number for which a condition holds.
+fn number<'de, D: Deserializer<'de>>(from: D, what: &str, holds: impl FnOnce(f64) -> bool) -> Result<f64, D::Error> {
+    checked(from, |number| if holds(number) { Ok(number) } else { Err(format!("{number} is not {what}")) })
+}
+
+fn version<'de, D: Deserializer<'de>>(from: D) -> Result<f64, D::Error> {
+    number(from, &format!("the version that the bridge speaks, {PROTO}"), |proto| proto == PROTO)
+}
+
+fn positive<'de, D: Deserializer<'de>>(from: D) -> Result<f64, D::Error> {
+    number(from, "greater than 0", |number| number > 0.0)
+}
+
+fn not_negative<'de, D: Deserializer<'de>>(from: D) -> Result<f64, D::Error> {
+    number(from, "0 or greater", |number| number >= 0.0)
+}
+
+/// Integers and floats are both numbers: `17.0` is a whole number too.
+fn size<'de, D: Deserializer<'de>>(from: D) -> Result<usize, D::Error> {
+    let is_size = |number: f64| number.fract() == 0.0 && (1.0..=MAX_TACTELS as f64).contains(&number);
+    number(from, &format!("a whole number from 1 to {MAX_TACTELS}"), is_size).map(|number| number as usize)
+}
+
+fn number_of_frame<'de, D: Deserializer<'de>>(from: D) -> Result<u64, D::Error> {
+    let is_number = |number: f64| number.fract() == 0.0 && (0.0..=MAX_INTEGER).contains(&number);
+    number(from, "a whole number from 0", is_number).map(|number| number as u64)
+}
+
+fn names<'de, D: Deserializer<'de>>(from: D) -> Result<Vec<String>, D::Error> {
+    checked(from, |names: Vec<String>| {
+        let is_taken = |(i, name): &(usize, &String)| name.is_empty() || names[..*i].contains(name);
+        match names.iter().enumerate().find(is_taken) {
+            Some((i, name)) => Err(format!("element {i} is `{name}`, but each joint needs its own name")),
+            None if names.is_empty() => Err("there is no name in the list".into()),
+            None => Ok(names),
+        }
+    })
+}
+
+/// Reads the pose of the sensor from a 4x4 matrix, row after row.
+fn mount<'de, D: Deserializer<'de>>(from: D) -> Result<Mount, D::Error> {
+    checked(from, |matrix: [f64; 16]| mount_of(&matrix))
+}
+
+fn mount_of(m: &[f64; 16]) -> Result<Mount, String> {
     let rotation = Matrix3::new(m[0], m[1], m[2], m[4], m[5], m[6], m[8], m[9], m[10]);
-    if (0..4).any(|i| (m[12 + i] - [0.0, 0.0, 0.0, 1.0][i]).abs() > TOLERANCE) {
-        return Err("`T_es` is no pose: its last row is not 0, 0, 0, 1; it is row-major, flange to sensor".into());
+    if (0..4).any(|i| (m[12 + i] - [0.0, 0.0, 0.0, 1.0][i]).abs() > MAX_ROTATION_ERROR) {
+        return Err("this is not a pose: its last row is not 0, 0, 0, 1; it is row-major, flange to sensor".into());
     }
     let error = (rotation.transpose() * rotation - Matrix3::identity()).amax();
-    // A product that overflows is no rotation.
-    if error.is_nan() || error > TOLERANCE {
-        return Err(format!(
-            "`T_es` is no pose: its rotation is off by {error:.1e} from one that keeps lengths and angles"
-        ));
+    // A product that overflows is not a rotation.
+    if error.is_nan() || error > MAX_ROTATION_ERROR {
+        return Err(format!("this is not a pose: its rotation matrix is off by {error:.1e} from an orthonormal one"));
     }
     if rotation.determinant() < 0.0 {
-        return Err("`T_es` is no pose: its rotation mirrors, and its axes have to be right-handed".into());
+        return Err("this is not a pose: its rotation mirrors, but the axes must be right-handed".into());
     }
     Ok(Mount { xyz: [m[3], m[7], m[11]], rpy: rpy(&rotation) })
 }
 
-/// Roll, pitch and yaw of a rotation, Rz(yaw) Ry(pitch) Rx(roll) [rad]. Roll and pitch are read after the yaw is taken
-/// out, so that they make up for it where it is of no meaning, at a pitch of a quarter turn and near it.
+/// Returns roll, pitch and yaw of a rotation, Rz(yaw) Ry(pitch) Rx(roll) [rad].
+///
+/// Roll and pitch are read after the yaw is removed. So they are exact also where the yaw is arbitrary: at and near a
+/// pitch of a quarter turn.
 fn rpy(rotation: &Matrix3<f64>) -> [f64; 3] {
     let r = |i, j| rotation[(i, j)];
     let yaw = libm::atan2(r(1, 0), r(0, 0));
@@ -234,53 +290,28 @@ fn rpy(rotation: &Matrix3<f64>) -> [f64; 3] {
     [libm::atan2(across[2], across[1]), libm::atan2(-r(2, 0), across[0]), yaw]
 }
 
-/// Reads what comes after the hello.
-///
-/// # Errors
-/// What is wrong, with its field and the frame's number where that is known.
-pub(super) fn message(line: &str, sizes: Sizes) -> Result<Message, String> {
-    let fields = Fields(object(line)?);
-    match fields.text("type")? {
-        "obs" => {}
-        "end" => return Ok(Message::End),
-        other => return Err(format!("a message is of type `{other}`, and neither `obs` nor `end`")),
-    }
-    /// The greatest whole number that every writer of JSON can write.
-    const LAST: f64 = 9_007_199_254_740_991.0;
-    let seq = fields.whole("seq", 0.0, LAST)?;
-    obs(&fields, seq, sizes).map(Message::Obs).map_err(|why| format!("obs {seq}: {why}"))
+/// A message to the simulator.
+#[derive(Serialize)]
+#[serde(tag = "type", rename_all = "lowercase")]
+enum Reply<'a> {
+    Cmd { seq: u64, dq: &'a [f64], est: Option<[f64; 3]> },
+    End { reason: &'a str },
 }
 
-fn obs(fields: &Fields, seq: u64, Sizes { joints, rows, cols }: Sizes) -> Result<Obs, String> {
-    let per_joint = |name: &str| fields.numbers(name, joints, || format!("the arm has {joints} joints"));
-    let t = fields.number("t")?;
-    let (q, _, q_eq) = (per_joint("q")?, per_joint("dq")?, per_joint("q_eq")?);
-    let img = fields.numbers("img", rows * cols, || format!("the pad has {rows}x{cols} = {}", rows * cols))?;
-    match img.iter().position(|counts| !(*counts as f32).is_finite()) {
-        Some(i) => Err(format!("number {} of `img` is {:e}, and too large", i + 1, img[i])),
-        None => Ok(Obs { seq, t, q, q_eq, img }),
+impl Reply<'_> {
+    fn line(&self) -> String {
+        serde_json::to_string(self).expect("numbers and text can always be written") + "\n"
     }
 }
 
-/// The number of a frame, if it can be read at all; an end has none.
-pub(super) fn seq_of(line: &str) -> Option<u64> {
-    let fields = Fields(object(line).ok()?);
-    fields.whole("seq", 0.0, 2.0f64.powi(53)).ok()
-}
-
-/// A command, as a line.
+/// Returns a command as a line: joint speeds [rad/s], and where the task finds the contact [m].
 pub(super) fn cmd(seq: u64, dq: &[f64], est: Option<[f64; 3]>) -> String {
-    let est = est.map_or_else(|| "null".to_owned(), |est| list(&est));
-    format!("{{\"type\":\"cmd\",\"seq\":{seq},\"dq\":{},\"est\":{est}}}\n", list(dq))
+    Reply::Cmd { seq, dq, est }.line()
 }
 
-/// The end, as a line.
+/// Returns the end of a run as a line.
 pub(super) fn end(reason: &str) -> String {
-    format!("{{\"type\":\"end\",\"reason\":{}}}\n", quoted(reason))
-}
-
-fn list(numbers: &[f64]) -> String {
-    format!("[{}]", numbers.iter().map(|number| format!("{number:?}")).collect::<Vec<_>>().join(","))
+    Reply::End { reason }.line()
 }
 
 #[cfg(test)]

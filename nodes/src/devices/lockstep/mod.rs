@@ -5,14 +5,13 @@
 //! counts from the simulator's own clock. `docs/lockstep.md` has the protocol.
 
 mod bridge;
-mod json;
 mod message;
 mod socket;
 
 use std::borrow::Cow;
 use std::time::Duration;
 
-use tactflow_runtime::device::{Description, Device, Driver, Filled, Opened};
+use tactflow_runtime::device::{Description, Device, Driver, Opened};
 use tactflow_runtime::node::{At, FilePath, Mistake, Mistakes, Positive};
 use tactflow_runtime::params;
 use tactflow_runtime::signal::{ImageShape, Joint, JointsShape, Unit};
@@ -21,7 +20,7 @@ use tactflow_runtime::source::Code;
 use super::arm_facts;
 use crate::arm::model::load;
 use crate::builtin;
-use bridge::Bridge;
+use bridge::{Bridge, Ports};
 use message::{Hello, Sizes};
 use socket::Socket;
 
@@ -41,9 +40,7 @@ params! {
 /// The device; what runs is a `Bridge`.
 pub struct Lockstep;
 
-impl Device for Lockstep {
-    type Params = Params;
-
+impl tactflow_runtime::node::Describe for Lockstep {
     const NAME: &'static str = "lockstep";
     const SUMMARY: &'static str =
         "a pad and an arm in another program: any simulator that speaks the lockstep protocol";
@@ -76,6 +73,10 @@ arm = "bench"
 type = "lockstep"
 address = "127.0.0.1:7777"
 "#;
+}
+
+impl Device for Lockstep {
+    type Params = Params;
 
     fn open(params: Params) -> Result<Opened, Mistakes> {
         let at = |why: String| refusal(&params.address, why);
@@ -87,11 +88,23 @@ address = "127.0.0.1:7777"
         })?;
         let line = socket.line().map_err(|why| at(format!("no hello: {why}")))?;
         let hello = message::hello(&line).map_err(|why| at(format!("hello (line 1): {why}")))?;
-        let fills = vec![pad(&hello), arm(&hello, &params)?];
-        let period = (hello.dt * 1e9).round();
+        let shape = ImageShape { rows: hello.rows, cols: hello.cols, pitch: [hello.pitch; 2], unit: Unit::RAW };
+        let joints = joints(&hello, *params.acceleration);
+        let mut description = Description::every((hello.dt * 1e9).round() * 1e-9);
+        let mut pad = description.fills("tactile_pad");
+        pad.facts(pad_facts(&hello));
+        let image = pad.output("image", shape);
+        let mut arm = description.fills("velocity_arm");
+        arm.facts(model_facts(&hello, &params)?);
+        let ports = Ports {
+            image,
+            position: arm.output("position", joints.clone()),
+            equilibrium: arm.output("equilibrium", joints.clone()),
+            velocity: arm.command("velocity", joints.in_unit(Unit::RADIAN.per_second())),
+            contact: arm.report("contact"),
+        };
         let sizes = Sizes { joints: hello.joints.len(), rows: hello.rows, cols: hello.cols };
-        let bridge = Bridge::new(socket, params.address, sizes, &hello, *params.acceleration);
-        let description = Description { fills, period: period * 1e-9 };
+        let bridge = Bridge::new(ports, socket, params.address, sizes, &hello, *params.acceleration);
         Ok(Opened { description, driver: Driver::Stepped(Box::new(bridge)) })
     }
 }
@@ -103,22 +116,32 @@ fn refusal(address: &str, why: String) -> Mistakes {
 
 type Facts = Vec<(Cow<'static, str>, toml::Value)>;
 
-fn pad(hello: &Hello) -> Filled {
-    let shape = ImageShape { rows: hello.rows, cols: hello.cols, pitch: [hello.pitch; 2], unit: Unit::RAW };
+fn pad_facts(hello: &Hello) -> Facts {
     let calibration: toml::Table =
         [("gain".to_owned(), (hello.newton_per_unit / hello.counts_per_unit).into()), ("unit".to_owned(), "N".into())]
             .into_iter()
             .collect();
-    let facts: Facts = vec![
+    vec![
         ("dead".into(), toml::Value::Array(vec![])),
         ("threshold".into(), (hello.threshold_units * hello.newton_per_unit).into()),
         ("pressure".into(), hello.newton_per_unit.into()),
         ("calibration".into(), calibration.into()),
-    ];
-    Filled { role: "tactile_pad".into(), outputs: vec![shape.into()], commands: vec![], facts }
+    ]
 }
 
-fn arm(hello: &Hello, params: &Params) -> Result<Filled, Mistakes> {
+fn joints(hello: &Hello, acceleration: f64) -> JointsShape {
+    let joint = |(i, name): (usize, &String)| Joint {
+        name: name.clone(),
+        lower: hello.q_min[i],
+        upper: hello.q_max[i],
+        speed: hello.dq_max[i],
+        acceleration,
+    };
+    JointsShape { joints: hello.joints.iter().enumerate().map(joint).collect(), unit: Unit::RADIAN }
+}
+
+/// What the arm states, if its model has the joints of the simulator.
+fn model_facts(hello: &Hello, params: &Params) -> Result<Facts, Mistakes> {
     let urdf = match &params.urdf {
         Some(file) => file.clone(),
         None => model(&hello.urdf).ok_or_else(|| {
@@ -144,20 +167,7 @@ fn arm(hello: &Hello, params: &Params) -> Result<Filled, Mistakes> {
             format!("its `joints` are {:?}, but those of the model up to `{}` are {model:?}", hello.joints, hello.tip);
         return Err(refusal(&params.address, why));
     }
-    let joint = |(i, name): (usize, &String)| Joint {
-        name: name.clone(),
-        lower: hello.q_min[i],
-        upper: hello.q_max[i],
-        speed: hello.dq_max[i],
-        acceleration: *params.acceleration,
-    };
-    let shape = JointsShape { joints: hello.joints.iter().enumerate().map(joint).collect(), unit: Unit::RADIAN };
-    Ok(Filled {
-        role: "velocity_arm".into(),
-        outputs: vec![shape.clone().into(), shape.clone().into()],
-        commands: vec![shape.in_unit(Unit::RADIAN.per_second()).into()],
-        facts: arm_facts::facts(&urdf, &hello.tip, &hello.mount)?,
-    })
+    arm_facts::facts(&urdf, &hello.tip, &hello.mount)
 }
 
 /// The name of a model without folders and ending.

@@ -9,7 +9,7 @@ mod press;
 
 use std::borrow::Cow;
 
-use tactflow_runtime::device::{Commands, Description, Device, DeviceError, Driver, Filled, Opened, Samples, Stepped};
+use tactflow_runtime::device::{Commands, Description, Device, DeviceError, Driver, Opened, Output, Samples, Stepped};
 use tactflow_runtime::node::{Count, Mistake, Mistakes, NonNegative, Positive, Rate};
 use tactflow_runtime::params;
 use tactflow_runtime::signal::{Image, ImageShape, Unit};
@@ -48,6 +48,7 @@ const MOST: usize = 1 << 22;
 /// The script and how far it has got.
 #[derive(Debug)]
 pub struct MockPad {
+    image: Output<Image>,
     shape: ImageShape,
     presses: Vec<Press>,
     glitches: Vec<Glitch>,
@@ -67,9 +68,7 @@ struct Due {
     is_nan: bool,
 }
 
-impl Device for MockPad {
-    type Params = Params;
-
+impl tactflow_runtime::node::Describe for MockPad {
     const NAME: &'static str = "mock_pad";
     const SUMMARY: &'static str =
         "a simulated pad that is pressed by points and bars, and misbehaves, as its bench says";
@@ -95,6 +94,10 @@ press = [
     { from_s = 0.5, to_s = 3.5, at = [-0.010, 0.005], speed = [0.004, 0.0], force = 4.0 },   # [s, s, m, m/s, N]
 ]
 "#;
+}
+
+impl Device for MockPad {
+    type Params = Params;
 
     fn open(params: Params) -> Result<Opened, Mistakes> {
         let mut mistakes = Mistakes::new();
@@ -110,11 +113,11 @@ press = [
         }
         let shape =
             ImageShape { rows: params.rows.0, cols: params.cols.0, pitch: [*params.pitch; 2], unit: params.unit };
-        let facts = facts(&params);
-        let outputs = vec![shape.clone().into()];
-        let filled = Filled { role: "tactile_pad".into(), outputs, commands: vec![], facts };
-        let description = Description { fills: vec![filled], period: period as f64 * 1e-9 };
-        let pad = Self::new(shape, period, params);
+        let mut description = Description::every(period as f64 * 1e-9);
+        let mut pad = description.fills("tactile_pad");
+        pad.facts(facts(&params));
+        let image = pad.output("image", shape.clone());
+        let pad = Self::new(image, shape, period, params);
         Ok(Opened { description, driver: Driver::Stepped(Box::new(pad)) })
     }
 }
@@ -131,11 +134,19 @@ fn facts(params: &Params) -> Vec<(Cow<'static, str>, toml::Value)> {
 }
 
 impl MockPad {
-    fn new(shape: ImageShape, period: i64, params: Params) -> Self {
+    fn new(image: Output<Image>, shape: ImageShape, period: i64, params: Params) -> Self {
         let end = params.for_s.map_or(i64::MAX, |end| nanos(*end));
         let frames = end / period + i64::from(end % period != 0);
-        let mut pad =
-            Self { shape, presses: params.press, glitches: params.glitch, period, frames, next: 0, served: None };
+        let mut pad = Self {
+            image,
+            shape,
+            presses: params.press,
+            glitches: params.glitch,
+            period,
+            frames,
+            next: 0,
+            served: None,
+        };
         pad.next = pad.after_silence(0);
         pad
     }
@@ -220,7 +231,7 @@ impl Stepped for MockPad {
             return Err(DeviceError("its plug is out".into()));
         }
         if let Some(due) = self.due(now) {
-            self.render(due, samples.write::<Image>(0, due.stamp, due.sequence).cells_mut());
+            self.render(due, samples.write(self.image, due.stamp, due.sequence).cells_mut());
         }
         Ok(())
     }

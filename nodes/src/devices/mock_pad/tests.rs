@@ -9,18 +9,18 @@ use crate::devices::testing::{Bench, open, read};
 const MS: i64 = 1_000_000;
 
 fn pad(params: &str) -> MockPad {
-    let Shape::Image(shape) = Bench::new(open::<MockPad>(params).unwrap()).fill().outputs[0].clone() else {
-        panic!("an image")
-    };
+    let bench = Bench::new(open::<MockPad>(params).unwrap());
+    let Some(Shape::Image(shape)) = bench.description.shape("image") else { panic!("an image") };
     let params: Params = read(params);
-    MockPad::new(shape, period_of(params.rate_hz), params)
+    let image = bench.description.output("image").unwrap();
+    MockPad::new(image, shape.clone(), period_of(params.rate_hz), params)
 }
 
 fn image(params: &str, ms: i64) -> (ImageShape, Vec<f32>) {
     let mut bench = Bench::new(open::<MockPad>(params).unwrap());
     bench.exchange(ms * MS);
-    let Shape::Image(shape) = bench.fill().outputs[0].clone() else { panic!("an image") };
-    let cells = bench.samples.write::<Image>(0, 0, 0).cells().to_vec();
+    let Shape::Image(shape) = bench.description.shape("image").unwrap().clone() else { panic!("an image") };
+    let cells = bench.image().cells().to_vec();
     (shape, cells)
 }
 
@@ -127,7 +127,7 @@ fn glitches() {
     }
     let mut bench = Bench::new(open::<MockPad>(&script("nan")).unwrap());
     bench.exchange(8 * MS);
-    assert!(!bench.samples.write::<Image>(0, 0, 0).is_finite());
+    assert!(!bench.image().is_finite());
 }
 
 #[test]
@@ -137,7 +137,7 @@ fn a_frozen_pad_shows_one_image_under_new_stamps() {
     let cells = [0, 4, 8, 12, 16].map(|ms| {
         bench.exchange(ms * MS);
         // What was written stays until the next exchange.
-        bench.samples.write::<Image>(0, 0, 0).cells().to_vec()
+        bench.image().cells().to_vec()
     });
     let same: Vec<bool> = cells.windows(2).map(|pair| pair[0] == pair[1]).collect();
     assert_eq!(same, [false, true, true, false]);

@@ -1,7 +1,7 @@
-//! What the columns of a CSV file are: by their names, or one tactel after the other.
+//! The columns of a CSV file: by their names, or tactels in order.
 
-use super::super::text::{Flaw, Notation, Piece, Wrong, flaw, shortened};
-use super::super::{Hints, MOST_CELLS};
+use crate::recordings::common::text::{Notation, Piece, Wrong, flaw, shortened};
+use crate::recordings::common::{Flaw, Hints, MAX_CELLS};
 
 /// The columns of a file with a frame a row.
 #[derive(Debug)]
@@ -10,26 +10,26 @@ pub(super) struct Columns {
     pub(super) size: (usize, usize),
     /// Number of columns of the file.
     pub(super) count: usize,
-    /// Unit of the time [s].
+    /// Factor from the file's times to seconds.
     pub(super) second: f64,
-    /// What each is; without names, each is a tactel.
+    /// Role of each column; `None` without names, when each column is a tactel.
     named: Option<Vec<Place>>,
 }
 
-/// What a column is.
+/// The role of a column.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Role {
-    /// The tactel with that index in a frame.
+    /// The tactel with this index in a frame.
     Tactel(usize),
     /// The time.
     Time,
-    /// A force measured beside the pad.
+    /// A force that another sensor measured.
     Force,
     /// A number that is not used.
     Passed,
 }
 
-/// A role in little room: the row and the column of a tactel, or one of three marks.
+/// A compact role: the row and the column of a tactel, or one of three marks.
 type Place = (u32, u32);
 
 const TIME: Place = (u32::MAX, 0);
@@ -37,17 +37,17 @@ const FORCE: Place = (u32::MAX, 1);
 const PASSED: Place = (u32::MAX, 2);
 
 impl Columns {
-    /// One tactel after the other.
+    /// Returns columns that are tactels row by row.
     pub(super) const fn plain(rows: usize, cols: usize) -> Self {
         Self { size: (rows, cols), count: rows * cols, second: 1.0, named: None }
     }
 
-    /// As a row of names says, and the bench for tactels whose names do not say where they are.
+    /// Reads a row of names. For tactels whose names have no row and column, the bench gives the size.
     pub(super) fn named(names: Piece<'_>, hints: &Hints) -> Result<Self, Wrong> {
         let notation = names_of(names);
         let count = notation.fields(names).count();
-        if count > MOST_CELLS {
-            let message = format!("{count} columns are more than the {MOST_CELLS} that are read");
+        if count > MAX_CELLS {
+            let message = format!("{count} columns are more than the maximum of {MAX_CELLS}");
             return flaw(&names, message).map_err(Wrong::from);
         }
         let mut columns = Self { size: (0, 0), count, second: 1.0, named: None };
@@ -56,15 +56,15 @@ impl Columns {
         for name in notation.fields(names).map(unquoted) {
             let place = match columns.mark(name)? {
                 Some(mark) if mark != PASSED && places.contains(&mark) => {
-                    return flaw(&name, format!("`{}` is here twice", shortened(name.text))).map_err(Wrong::from);
+                    return flaw(&name, format!("`{}` appears twice", shortened(name.text))).map_err(Wrong::from);
                 }
                 Some(mark) => mark,
                 None => {
                     let place = place(name.text);
                     if *have_places.get_or_insert(place.is_some()) != place.is_some() {
-                        let message = format!("`{}` says no row and column, as other names do", shortened(name.text));
+                        let message = format!("`{}` has no row and column, but other names do", shortened(name.text));
                         let message =
-                            if place.is_none() { message } else { "only some names say a row and a column".into() };
+                            if place.is_none() { message } else { "only some names have a row and a column".into() };
                         return flaw(&name, message).map_err(Wrong::from);
                     }
                     place.unwrap_or((0, 0))
@@ -84,7 +84,7 @@ impl Columns {
         Ok(columns)
     }
 
-    /// What the column of that number is.
+    /// Returns the role of a column, by its index.
     pub(super) fn role(&self, column: usize) -> Option<Role> {
         match &self.named {
             None => (column < self.count).then_some(Role::Tactel(column)),
@@ -97,7 +97,7 @@ impl Columns {
         }
     }
 
-    /// The mark of a column that is no tactel.
+    /// Returns the mark of a column that is not a tactel.
     fn mark(&mut self, name: Piece<'_>) -> Result<Option<Place>, Flaw> {
         let lower = if name.text.len() > 40 { String::new() } else { name.text.to_lowercase() };
         let (base, unit) = match lower.split_once(['[', '(']) {
@@ -107,7 +107,7 @@ impl Columns {
         match base {
             "time" | "t" | "timestamp" | "zeit" => {}
             "force" if matches!(unit, "" | "n") => return Ok(Some(FORCE)),
-            "force" => return flaw(&name, "a force beside the pad is in `N`"),
+            "force" => return flaw(&name, "the unit of `force` must be `N`"),
             "frame" | "index" if unit.is_empty() => return Ok(Some(PASSED)),
             "" if name.text.is_empty() => return Ok(Some(PASSED)),
             _ => return Ok(None),
@@ -119,13 +119,13 @@ impl Columns {
             "ns" => 1e-9,
             // `t_0` is a tactel.
             _ if base == "t" => return Ok(None),
-            _ => return flaw(&name, "a time is in `s`, `ms`, `us` or `ns`"),
+            _ => return flaw(&name, "the unit of a time must be `s`, `ms`, `us` or `ns`"),
         };
         Ok(Some(TIME))
     }
 }
 
-/// What parts a row of names.
+/// Returns the notation of a row of names.
 pub(super) fn names_of(names: Piece<'_>) -> Notation {
     let separator = ['\t', ';', ','].into_iter().find(|separator| names.text.contains(*separator));
     Notation { separator, has_decimal_comma: false }
@@ -135,7 +135,7 @@ pub(super) fn unquoted(name: Piece<'_>) -> Piece<'_> {
     name.part(name.text.trim_matches(['"', '\''])).trimmed()
 }
 
-/// The row and the column in a name like `t0_3`, `r0c3` or `x3y0`: one with just two numbers.
+/// Returns the row and the column in a name such as `t0_3`, `r0c3` or `x3y0`: one with exactly two numbers.
 fn place(name: &str) -> Option<Place> {
     if name.len() > 40 {
         return None;
@@ -148,31 +148,31 @@ fn place(name: &str) -> Option<Place> {
     (numbers.next().is_none() && place.0 < u32::MAX).then_some(place)
 }
 
-/// Counts the places from 0: each of the array must be there once. Its size.
+/// Shifts the places to count from 0, and returns the size of the array. Each tactel must appear once.
 fn settle(places: &mut [Place]) -> Result<(usize, usize), String> {
     let tactels = || places.iter().filter(|place| place.0 != u32::MAX);
     let range = |of: fn(&Place) -> u32| (tactels().map(of).min().unwrap_or(0), tactels().map(of).max().unwrap_or(0));
     let ((top, bottom), (left, right)) = (range(|place| place.0), range(|place| place.1));
     if top > 1 || left > 1 {
-        return Err("the names of the tactels count rows and columns from 0 or from 1".into());
+        return Err("the names of the tactels must count rows and columns from 0 or from 1".into());
     }
     let size = ((bottom - top) as usize + 1, (right - left) as usize + 1);
     let found = tactels().count();
     if size.0.checked_mul(size.1) != Some(found) {
-        return Err(format!("the names go up to {} rows by {} columns, but are {found}", size.0, size.1));
+        return Err(format!("the names reach {} rows by {} columns, but there are {found} names", size.0, size.1));
     }
     let mut is_there = vec![false; found];
     for place in places.iter_mut().filter(|place| place.0 != u32::MAX) {
         *place = (place.0 - top, place.1 - left);
         let index = place.0 as usize * size.1 + place.1 as usize;
         if std::mem::replace(&mut is_there[index], true) {
-            return Err(format!("row {} and column {} are named twice", place.0 + top, place.1 + left));
+            return Err(format!("row {} and column {} appear twice", place.0 + top, place.1 + left));
         }
     }
     Ok(size)
 }
 
-/// Takes the tactels row after row. The size of the array.
+/// Numbers the tactels row by row, and returns the size of the array.
 fn in_order(places: &mut [Place], names: Piece<'_>, hints: &Hints) -> Result<(usize, usize), Wrong> {
     let [rows, cols] = hints.size(None)?;
     let found = places.iter().filter(|place| place.0 != u32::MAX).count();
@@ -190,7 +190,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_name_says_a_row_and_a_column() {
+    fn a_name_has_a_row_and_a_column() {
         let cases = [
             ("t0_3", Some((0, 3))),
             ("r12c7", Some((12, 7))),

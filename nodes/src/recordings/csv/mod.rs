@@ -1,14 +1,14 @@
 //! `csv`: plain text, as any script writes it.
 //!
-//! Two ways to write frames down. **A frame a row**: the tactels row after row, parted by `,`, `;`, tabs or blanks,
-//! under an optional first row of names. Names with two numbers, as `t0_3` or `r0c3`, say each tactel's row and column;
-//! otherwise the bench gives `size`. Columns named `time` (seconds, or as in `time_ms`), `force` (a force measured
-//! beside the pad [N]) and `frame` may be among them. **A frame a block**: a line for each row of tactels, and a blank
-//! line between two frames; with the bench's `size` the blank lines may be missing.
+//! There are two layouts. **A frame a row**: the tactels row by row, separated by `,`, `;`, tabs or blanks, under an
+//! optional first row of names. Names with two numbers, as `t0_3` or `r0c3`, give each tactel's row and column; otherwise
+//! the bench gives `size`. There may also be the columns `time` (seconds, or as in `time_ms`), `force` (a force that
+//! another sensor measured [N]) and `frame`. **A frame a block**: a line for each row of tactels, and a blank line
+//! between two frames; with the bench's `size` the blank lines may be missing.
 //!
-//! Lines that begin with `#` are comments. Beside `;`, tabs and blanks a comma is a decimal one. A tactel that is `nan`
-//! or an empty cell in the first frame does not exist, and then it is so in all. Unit and pitch are the bench's to say,
-//! and the rate where there is no time.
+//! Lines that begin with `#` are comments. Where `;`, tabs or blanks separate numbers, a comma is a decimal comma. A
+//! tactel that is `nan` or an empty cell in the first frame does not exist, and must be so in every frame. The bench gives
+//! unit and pitch, and the rate where there is no time.
 
 mod columns;
 
@@ -18,9 +18,9 @@ mod tests;
 use tactflow_runtime::signal::ImageShape;
 
 use self::columns::{Columns, Role, names_of, unquoted};
-use super::reel::{Reel, bounded};
-use super::text::{self, Flaw, Lines, Notation, Piece, Wrong, flaw};
-use super::{Format, Head, Hints, Recording, Refusal};
+use crate::recordings::common::reel::{Reel, bounded};
+use crate::recordings::common::text::{self, Lines, Notation, Piece, Wrong, flaw};
+use crate::recordings::common::{Flaw, Format, Head, Hints, Recording, Refusal};
 
 pub(super) const FORMAT: Format = Format {
     name: "csv",
@@ -29,12 +29,12 @@ pub(super) const FORMAT: Format = Format {
     read: |bytes, hints| text::read(bytes, hints, parse),
 };
 
-/// Least number of tactels.
-const LEAST: usize = 3;
+/// Minimum number of tactels.
+const MIN_TACTELS: usize = 3;
 
-/// Rows of at least two numbers, the first of them perhaps under a row of names of the same length.
+/// Recognises rows of at least two numbers, under an optional row of as many names.
 fn recognises(head: &Head<'_>) -> bool {
-    let is_cut = head.bytes.len() == super::HEAD;
+    let is_cut = head.bytes.len() == super::HEAD_BYTES;
     let mut lines = Lines::new(&head.text);
     let mut next = || {
         let line = lines.by_ref().find(|line| is_content(line))?;
@@ -49,7 +49,7 @@ fn recognises(head: &Head<'_>) -> bool {
             width(below, second) > 1 && (is_named || is_row_of_numbers(first.text) && is_row_of_numbers(second.text))
         }
         (Some((first, true)), None) => is_row_of_numbers(first.text) && width(Notation::of(first.text), first) > 1,
-        // The first row or the second is longer than what is looked at.
+        // The first or the second row is longer than the head.
         (Some((first, is_whole)), _) => {
             let is_table = ["csv", "tsv", "txt"].contains(&&*head.ending) && width(names_of(first), first) > 1;
             let end = if is_whole { Some(first.text.len()) } else { first.text.rfind([',', ';', '\t', ' ']) };
@@ -59,7 +59,7 @@ fn recognises(head: &Head<'_>) -> bool {
     }
 }
 
-/// Whether there is anything on a line but a comment.
+/// Whether a line has more than a comment.
 fn is_content(line: &Piece<'_>) -> bool {
     let text = line.text.trim_start();
     !text.is_empty() && !text.starts_with('#')
@@ -71,14 +71,14 @@ fn is_row_of_numbers(line: &str) -> bool {
     cells.peek().is_some() && cells.all(|cell| number(notation, cell, "").is_ok())
 }
 
-/// Whether more than half of a row are numbers: what is wrong with the others is told at their place.
+/// Whether more than half of a row are numbers: the reader then complains about the others at their place.
 fn is_mostly_numbers(line: Piece<'_>) -> bool {
     let notation = Notation::of(line.text);
     let are_numbers = || notation.fields(line).map(|cell| number(notation, cell, "").is_ok());
     2 * are_numbers().filter(|is_number| *is_number).count() > are_numbers().count()
 }
 
-/// A number, perhaps in quotes; or NaN by its name, or as a cell with nothing in it.
+/// Parses a number, optionally in quotes; `nan` and an empty cell are NaN.
 fn number(notation: Notation, cell: Piece<'_>, what: &str) -> Result<f64, Flaw> {
     let cell = unquoted(cell);
     let is_missing = cell.text.is_empty() || cell.text.eq_ignore_ascii_case("nan");
@@ -97,22 +97,22 @@ fn parse(text: &str, hints: &Hints) -> Result<Recording, Wrong> {
     };
     let (rows, cols) = layout.size();
     bounded(rows, cols).or_else(|message| flaw(&first, message))?;
-    if rows * cols < LEAST {
-        return flaw(&first, format!("an image has at least {LEAST} tactels")).map_err(Wrong::from);
+    if rows * cols < MIN_TACTELS {
+        return flaw(&first, format!("an image needs at least {MIN_TACTELS} tactels")).map_err(Wrong::from);
     }
     let mut reader = Reader { reel: Reel::default(), time: vec![], force: vec![] };
     reader.reserve(lines.clone(), rows * cols);
     match &layout {
         Layout::Rows(columns) => reader.rows(lines, names, columns)?,
-        Layout::Blocks { rows, cols, are_parted } => reader.blocks(lines, *rows, *cols, *are_parted)?,
+        Layout::Blocks { rows, cols, are_separated } => reader.blocks(lines, *rows, *cols, *are_separated)?,
     }
     let Reader { mut reel, time, force } = reader;
     if reel.frames.is_empty() {
-        return flaw(&Lines::new(text).end(), "there are names, but no frame").map_err(Wrong::from);
+        return flaw(&Lines::new(text).end(), "the file has names, but no frame").map_err(Wrong::from);
     }
     reel.frames.iter_mut().zip(&time).for_each(|(frame, time)| frame.time = *time);
-    let said = reel.mean_step().filter(|_| !time.is_empty());
-    let (unit, pitch, period) = hints.complete(None, None, said)?;
+    let found = reel.mean_step().filter(|_| !time.is_empty());
+    let (unit, pitch, period) = hints.complete(None, None, found)?;
     let shape = ImageShape { rows, cols, unit, pitch };
     if time.is_empty() {
         reel.tick(period);
@@ -122,12 +122,12 @@ fn parse(text: &str, hints: &Hints) -> Result<Recording, Wrong> {
     Ok(Recording { format: FORMAT.name, shape, frames, cells, dead, threshold: None, period, force })
 }
 
-/// How frames stand in the file.
+/// The layout of the frames in the file.
 enum Layout {
     /// A frame a row.
     Rows(Columns),
-    /// A frame a block of rows; whether a blank line must be between two.
-    Blocks { rows: usize, cols: usize, are_parted: bool },
+    /// A frame a block of rows.
+    Blocks { rows: usize, cols: usize, are_separated: bool },
 }
 
 impl Layout {
@@ -139,16 +139,16 @@ impl Layout {
     }
 }
 
-/// How the frames of a file without names stand, by the bench's size or by the blank lines.
+/// Returns the layout of a file without names, from the bench's size or from the blank lines.
 fn layout(first: Piece<'_>, lines: Lines<'_>, hints: &Hints) -> Result<Layout, Wrong> {
     let width = Notation::of(first.text).fields(first).count();
     if let Some([rows, cols]) = hints.size {
         return match () {
             () if rows.checked_mul(cols) == Some(width) => Ok(Layout::Rows(Columns::plain(rows, cols))),
-            () if cols == width => Ok(Layout::Blocks { rows, cols, are_parted: false }),
+            () if cols == width => Ok(Layout::Blocks { rows, cols, are_separated: false }),
             () => {
                 let message = format!(
-                    "the first row has {width} numbers: that is neither a frame of {rows} by {cols} tactels nor a row of it"
+                    "the first row has {width} numbers: this is neither a frame of {rows} by {cols} tactels nor a row of one"
                 );
                 flaw(&first, message).map_err(Wrong::from)
             }
@@ -158,13 +158,13 @@ fn layout(first: Piece<'_>, lines: Lines<'_>, hints: &Hints) -> Result<Layout, W
     let mut lines = lines.filter(|line| !is_comment(line)).skip_while(|line| line.text.trim().is_empty());
     let rows = lines.by_ref().take_while(|line| !line.text.trim().is_empty()).count();
     if rows > 1 && lines.any(|line| !line.text.trim().is_empty()) {
-        return Ok(Layout::Blocks { rows, cols: width, are_parted: true });
+        return Ok(Layout::Blocks { rows, cols: width, are_separated: true });
     }
     let refusal = hints.size(None).map(|_| ()).expect_err("there was no size");
     Err(match refusal {
         Refusal::Silent { message, help } => Refusal::Silent {
             message,
-            help: format!("{help}, or name the columns by row and column in a first row, as `t0_0,t0_1`"),
+            help: format!("{help}, or add a first row with names of rows and columns, as `t0_0,t0_1`"),
         },
         other => other,
     }
@@ -173,21 +173,21 @@ fn layout(first: Piece<'_>, lines: Lines<'_>, hints: &Hints) -> Result<Layout, W
 
 struct Reader {
     reel: Reel,
-    /// Times from the first frame [ns], if there are any.
+    /// Times from the first frame [ns]; empty if the file has none.
     time: Vec<i64>,
-    /// Forces beside the pad [N], if there are any.
+    /// Forces of another sensor [N]; empty if the file has none.
     force: Vec<f64>,
 }
 
 impl Reader {
-    /// Makes room for what the file can hold, and for no more.
+    /// Reserves memory for the frames that the file can hold at most.
     fn reserve(&mut self, lines: Lines<'_>, tactels: usize) {
         let (mut count, mut bytes) = (0, 0);
         for line in lines.filter(is_content) {
             count += 1;
             bytes += line.text.len() + 1;
         }
-        // A number takes a character and what ends it.
+        // A number takes at least one character and one separator.
         let frames = count.min(bytes / (2 * tactels) + 1);
         self.reel.frames.reserve_exact(frames);
         self.reel.cells.reserve_exact(frames * tactels);
@@ -211,12 +211,12 @@ impl Reader {
                     Some(Role::Passed) => {}
                     Some(Role::Force) if value.is_finite() => self.force.push(value),
                     Some(Role::Time) => self.time.push(self.since(&mut start, value * columns.second, cell)?),
-                    Some(Role::Force) => return flaw(&cell, "a force is a number"),
+                    Some(Role::Force) => return flaw(&cell, "a force must be a number"),
                 }
             }
             if found != columns.count {
                 let number = self.reel.frames.len() + 1;
-                let message = format!("frame {number} has {found} columns, but should have {}", columns.count);
+                let message = format!("frame {number} has {found} columns, not {}", columns.count);
                 return flaw(&line, message);
             }
             for (index, value) in frame.iter().enumerate() {
@@ -229,21 +229,21 @@ impl Reader {
         Ok(())
     }
 
-    /// A time as nanoseconds from the first.
+    /// Returns a time since the first [ns].
     fn since(&self, start: &mut Option<f64>, seconds: f64, at: Piece<'_>) -> Result<i64, Flaw> {
         let since = seconds - *start.get_or_insert(seconds);
         if since < 0.0 {
             return flaw(&at, "the time goes back");
         }
         if !(0.0..1e9).contains(&since) {
-            return flaw(&at, "a time is a number, and no more than 1e9 s after that of the first frame");
+            return flaw(&at, "a time must be a number, at most 1e9 s after the first frame");
         }
         let time = (since * 1e9).round() as i64;
         if self.time.last().is_some_and(|last| *last > time) { flaw(&at, "the time goes back") } else { Ok(time) }
     }
 
     /// Reads a frame a block.
-    fn blocks(&mut self, mut lines: Lines<'_>, rows: usize, cols: usize, are_parted: bool) -> Result<(), Flaw> {
+    fn blocks(&mut self, mut lines: Lines<'_>, rows: usize, cols: usize, are_separated: bool) -> Result<(), Flaw> {
         let mut row = 0;
         let mut was_blank = true;
         for line in lines.by_ref() {
@@ -258,8 +258,8 @@ impl Reader {
             if !is_content(&line) {
                 continue;
             }
-            if are_parted && row == 0 && !was_blank {
-                return flaw(&line, format!("frame {} goes on after its {rows} rows", number - 1));
+            if are_separated && row == 0 && !was_blank {
+                return flaw(&line, format!("frame {} has more than {rows} rows", number - 1));
             }
             was_blank = false;
             self.row(line, row, cols)?;
@@ -284,7 +284,7 @@ impl Reader {
         let found = notation.fields(line).count();
         if found != cols {
             let number = self.reel.frames.len() + 1;
-            return flaw(&line, format!("row {} of frame {number} has {found} cells, but should have {cols}", row + 1));
+            return flaw(&line, format!("row {} of frame {number} has {found} cells, not {cols}", row + 1));
         }
         for (col, cell) in notation.fields(line).enumerate() {
             let value = number(notation, cell, "this cell")?;

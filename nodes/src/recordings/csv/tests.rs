@@ -1,4 +1,4 @@
-//! Plain CSV: two layouts, names, and what is wrong where.
+//! Tests of plain CSV: both layouts, names, and mistakes with their places.
 
 use tactflow_runtime::signal::Unit;
 
@@ -22,7 +22,7 @@ fn named() -> String {
 }
 
 #[test]
-fn names_say_where_a_column_belongs() {
+fn names_give_the_roles_of_columns() {
     let recording = read(named().as_bytes(), "press.csv", &hints()).unwrap();
     assert_eq!(recording.shape, ImageShape { rows: 2, cols: 2, pitch: [0.004, 0.005], unit: Unit::RAW });
     assert_eq!(recording.cells, [1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0, 10.0, 11.0, 12.0]);
@@ -32,7 +32,7 @@ fn names_say_where_a_column_belongs() {
 }
 
 #[test]
-fn the_same_written_otherwise_reads_the_same() {
+fn equivalent_notations_give_the_same_recording() {
     let good = read(named().as_bytes(), "", &hints()).unwrap();
     let cases = [
         named().replace(',', ";").replace('.', ","),
@@ -46,14 +46,14 @@ fn the_same_written_otherwise_reads_the_same() {
         named().replace("r0c0,r0c1,r1c0,r1c1", "t1_1,t1_2,t2_1,t2_2"),
         named().replace("r0c0,r0c1,r1c0,r1c1", "x0y0,x1y0,x0y1,x1y1"),
         named().replace("0.5,1.25,1,2,3,4", "\n# the first\n 0.5, 1.25, 1, 2, 3, 4\n"),
-        // Every cell in quotes, as careful writers have it.
+        // Every cell in quotes.
         named()
             .replace(',', "\",\"")
             .replace('\n', "\"\n\"")
             .replacen("# a press\"", "# a press", 1)
             .trim_end_matches('"')
             .into(),
-        // The columns in another order, and the index that a data frame of pandas writes.
+        // The columns in another order, with the index column of a pandas data frame.
         ",r1c1,r1c0,time,r0c1,r0c0,force\n0,4,3,0.5,2,1,1.25\n1,8,7,0.75,6,5,2.5\n2,12,11,1.0,10,9,3.5\n".into(),
     ];
     for text in cases {
@@ -64,28 +64,28 @@ fn the_same_written_otherwise_reads_the_same() {
     assert_eq!(read(text.as_bytes(), "", &other).as_ref(), Ok(&good));
     assert_eq!(
         complaints(read(text.as_bytes(), "", &hints()))[0].1,
-        "the file does not say how many rows and columns it has"
+        "the file does not give its number of rows and columns"
     );
 }
 
 #[test]
-fn a_cell_with_nothing_in_it_is_a_tactel_that_does_not_exist() {
+fn an_empty_cell_is_a_tactel_that_does_not_exist() {
     let text = "time,r0c0,r0c1,r1c0,r1c1\n0,1,,3,4\n0.1,5,,7,8\n";
     let recording = read(text.as_bytes(), "pad.csv", &hints()).unwrap();
     assert_eq!((recording.dead, recording.cells), (vec![1], vec![1.0, 0.0, 3.0, 4.0, 5.0, 0.0, 7.0, 8.0]));
 }
 
 #[test]
-fn a_table_with_a_column_of_words_is_told_where_it_stands() {
+fn a_column_of_words_is_refused_at_its_place() {
     let text = "time,r0c0,r0c1,r1c0,r1c1\n2026-11-21,1,2,3,4\n2026-11-22,5,6,7,8\n";
-    let told = complaints(read(text.as_bytes(), "pad.csv", &hints()));
-    assert_eq!(told, [(2, "this cell is not a number: `2026-11-21`".to_owned())]);
+    let got = complaints(read(text.as_bytes(), "pad.csv", &hints()));
+    assert_eq!(got, [(2, "this cell is not a number: `2026-11-21`".to_owned())]);
     let words = "name,age,town\nAda,36,London\n";
     assert_eq!(read(words.as_bytes(), "people.csv", &hints()), Err(Refusal::Stranger));
 }
 
 #[test]
-fn frames_are_rows_or_blocks_as_the_size_or_the_blank_lines_say() {
+fn size_or_blank_lines_select_rows_or_blocks() {
     let cells = [1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0, 10.0, 11.0, 12.0];
     let unsized_ = Hints { rate_hz: Some(100.0), ..hints() };
     let cases = [
@@ -113,53 +113,53 @@ fn a_tactel_that_is_nan_throughout_does_not_exist() {
     let recording = read(text.as_bytes(), "", &sized(2, 2)).unwrap();
     assert_eq!((&*recording.dead, &*recording.cells), (&[1][..], &[1.0, 0.0, 3.0, 4.0, 5.0, 0.0, 7.0, 8.0][..]));
     let got = complaints(read(text.replace("nan", "6").as_bytes(), "", &sized(2, 2)));
-    assert_eq!(got, [(2, "this cell is a number, but in the first frame it was none".into())]);
+    assert_eq!(got, [(2, "this cell is a number, but it is NaN in the first frame".into())]);
     let got = complaints(read(text.replace('7', "nan").as_bytes(), "", &sized(2, 2)));
-    assert_eq!(got, [(2, "this cell is no number, but in the first frame it was one".into())]);
+    assert_eq!(got, [(2, "this cell is NaN, but it is a number in the first frame".into())]);
 }
 
 #[test]
-fn what_is_wrong_is_said_where_it_is() {
+fn a_mistake_has_its_line_and_message() {
     let cases = [
         ("5,6,7,8", "5,6,7,eight", 4, "this cell is not a number: `eight`"),
-        ("5,6,7,8", "5,6,7", 4, "frame 2 has 5 columns, but should have 6"),
-        ("5,6,7,8", "5,6,7,8,9", 4, "frame 2 has 7 columns, but should have 6"),
-        ("5,6,7,8", "5,,7,8", 4, "this cell is no number, but in the first frame it was one"),
+        ("5,6,7,8", "5,6,7", 4, "frame 2 has 5 columns, not 6"),
+        ("5,6,7,8", "5,6,7,8,9", 4, "frame 2 has 7 columns, not 6"),
+        ("5,6,7,8", "5,,7,8", 4, "this cell is NaN, but it is a number in the first frame"),
         ("5,6,7,8", "5,6,7,1e300", 4, "this cell is too large"),
         ("0.75", "0.25", 4, "the time goes back"),
         ("1.0,", "0.6,", 5, "the time goes back"),
-        ("2.5", "nan", 4, "a force is a number"),
-        ("force", "time", 2, "`time` is here twice"),
-        ("time", "time_fortnights", 2, "a time is in `s`, `ms`, `us` or `ns`"),
-        ("force", "force_kn", 2, "a force beside the pad is in `N`"),
-        ("r1c1", "r1c0", 2, "the names go up to 2 rows by 2 columns, but are 4 but"),
-        ("r1c1", "r1", 2, "`r1` says no row and column, as other names do"),
-        ("r1c1", "r2c1", 2, "the names go up to 3 rows by 2 columns, but are 4"),
-        ("r0c0,r0c1,", "r5c0,r5c1,", 2, "the names go up to 5 rows by 2 columns, but are 4"),
+        ("2.5", "nan", 4, "a force must be a number"),
+        ("force", "time", 2, "`time` appears twice"),
+        ("time", "time_fortnights", 2, "the unit of a time must be `s`, `ms`, `us` or `ns`"),
+        ("force", "force_kn", 2, "the unit of `force` must be `N`"),
+        ("r1c1", "r1c0", 2, "the names reach 2 rows by 2 columns, but there are 4 names but"),
+        ("r1c1", "r1", 2, "`r1` has no row and column, but other names do"),
+        ("r1c1", "r2c1", 2, "the names reach 3 rows by 2 columns, but there are 4 names"),
+        ("r0c0,r0c1,", "r5c0,r5c1,", 2, "the names reach 5 rows by 2 columns, but there are 4 names"),
     ];
     let cases: Vec<_> = cases.into_iter().filter(|case| !case.3.ends_with(" but")).collect();
     check_damages(&named(), "", &hints(), &cases);
     let twice = named().replace("r1c1", "r1c0");
-    assert_eq!(complaints(read(twice.as_bytes(), "", &hints())), [(2, "row 1 and column 0 are named twice".into())]);
+    assert_eq!(complaints(read(twice.as_bytes(), "", &hints())), [(2, "row 1 and column 0 appear twice".into())]);
 
     let blocks = "1,2,3\n4,5,6\n\n7,8,9\n10,11,12\n\n0,0,0\n0,0,0\n";
     let unsized_ = Hints { rate_hz: Some(100.0), ..hints() };
     let cases = [
-        ("\n0,0,0\n0", "0,0,0\n0", 6, "frame 2 goes on after its 2 rows"),
+        ("\n0,0,0\n0", "0,0,0\n0", 6, "frame 2 has more than 2 rows"),
         ("\n10,11,12\n\n0,0,0\n0,0,0\n", "", 4, "frame 2 ends after 1 of its 2 rows: the file is cut off"),
-        ("10,11,12", "10,11", 5, "row 2 of frame 2 has 2 cells, but should have 3"),
+        ("10,11,12", "10,11", 5, "row 2 of frame 2 has 2 cells, not 3"),
         ("7,8,9\n", "7,8,9\n\n", 5, "frame 2 ends after 1 of its 2 rows"),
     ];
     check_damages(blocks, "", &unsized_, &cases);
     let got = complaints(read(blocks.as_bytes(), "", &sized(4, 4)));
-    assert_eq!(got[0].1, "the first row has 3 numbers: that is neither a frame of 4 by 4 tactels nor a row of it");
+    assert_eq!(got[0].1, "the first row has 3 numbers: this is neither a frame of 4 by 4 tactels nor a row of one");
 }
 
 #[test]
-fn what_the_file_does_not_say_is_asked_for() {
+fn a_missing_property_is_named() {
     let bare = named().replace("time,", "").replace("0.5,1", "1").replace("0.75,2", "2").replace("1.0,3", "3");
-    let all = "the file does not say the unit of its values, or the pitch of its tactels, or how fast its frames came";
-    for (hints, message) in [(Hints::default(), all), (hints(), "the file does not say how fast its frames came")] {
+    let all = "the file does not give the unit of its values, or the pitch of its tactels, or its frame rate";
+    for (hints, message) in [(Hints::default(), all), (hints(), "the file does not give its frame rate")] {
         assert_eq!(complaints(read(bare.as_bytes(), "", &hints)), [(0, message.into())]);
     }
     let hints = Hints { rate_hz: Some(50.0), ..hints() };
@@ -168,7 +168,7 @@ fn what_the_file_does_not_say_is_asked_for() {
 }
 
 #[test]
-fn other_texts_are_no_csv() {
+fn other_texts_are_not_csv() {
     let others = [
         "",
         "hello",
@@ -186,7 +186,7 @@ fn other_texts_are_no_csv() {
 }
 
 #[test]
-fn a_first_row_longer_than_what_is_looked_at_is_still_recognised() {
+fn a_first_row_longer_than_the_head_is_recognised() {
     let names: Vec<String> = (0..16_384).map(|i| format!("t{}_{}", i / 128, i % 128)).collect();
     let row = vec!["0"; 16_384].join(",");
     let text = format!("{}\n{row}\n{row}\n", names.join(","));
@@ -198,7 +198,7 @@ fn a_first_row_longer_than_what_is_looked_at_is_still_recognised() {
 }
 
 #[test]
-fn damage_is_refused_or_read_soundly() {
+fn a_damaged_file_is_refused_or_gives_a_sound_recording() {
     let refused = count_refused(&[named().as_bytes()], "", &hints(), 2000);
     assert!((1000..2000).contains(&refused), "{refused}");
     let refused = count_refused(&[b"1,2,3\n4,5,6\n\n7,8,9\n10,11,12\n"], "", &sized(2, 3), 2000);

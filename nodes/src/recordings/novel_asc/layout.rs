@@ -1,18 +1,18 @@
-//! Where the sensors of a mat are.
+//! The places of the sensors of a mat.
 
-use crate::recordings::text::{Flaw, Piece, flaw};
-use crate::recordings::{MOST_CELLS, units};
+use crate::recordings::common::text::{Piece, flaw};
+use crate::recordings::common::{Flaw, MAX_CELLS, units};
 
-/// The corners of the sensors, as they come.
+/// The corners of the sensors that were read so far.
 #[derive(Debug)]
 pub(super) struct Corners {
-    /// Whether the file begins to say where its sensors are.
+    /// Whether the file has a block of corners.
     pub(super) is_begun: bool,
-    /// What one of the file's unit is in metres.
+    /// Factor from the file's unit to metres.
     metres: f64,
-    /// Lines of x and of y so far.
+    /// Number of lines of x and of y so far.
     lines: [usize; 2],
-    /// Least and greatest x and y of each sensor.
+    /// Minimum and maximum x and y of each sensor.
     bounds: [Vec<[f64; 2]>; 2],
 }
 
@@ -22,7 +22,7 @@ impl Default for Corners {
     }
 }
 
-/// A rectangle of cells, and which of them each sensor is.
+/// A rectangle of cells, and the cell of each sensor.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Layout {
     pub(super) rows: usize,
@@ -33,33 +33,33 @@ pub(super) struct Layout {
     cells: Vec<usize>,
 }
 
-/// How far a sensor may be off its place in the grid, and off the size of the others, in sizes.
-const PLAY: f64 = 0.1;
+/// Maximum distance of a sensor from its place in the grid, and of its size from the mean, as a fraction of the size.
+const MAX_MISFIT: f64 = 0.1;
 
 impl Corners {
-    /// `corner[cm]`.
+    /// Reads the unit in `corner[cm]`.
     pub(super) fn unit(&mut self, line: Piece<'_>) -> Result<(), Flaw> {
         let inside = line.text.split_once('[').and_then(|(_, rest)| rest.split_once(']')).map(|(inside, _)| inside);
         match units::metres(inside.unwrap_or("cm")) {
             Some(metres) => self.metres = metres,
-            None => return flaw(&line, "the corners are in `cm` or `mm`"),
+            None => return flaw(&line, "the unit of the corners must be `cm` or `mm`"),
         }
         self.is_begun = true;
         Ok(())
     }
 
-    /// A line of x (0) or of y (1).
+    /// Adds a line of x (0) or of y (1).
     pub(super) fn add(&mut self, axis: usize, places: &[f64]) {
         self.lines[axis] += 1;
         let bounds = &mut self.bounds[axis];
         bounds.resize(places.len(), [f64::INFINITY, f64::NEG_INFINITY]);
-        for ([least, greatest], place) in bounds.iter_mut().zip(places) {
-            *least = least.min(*place);
-            *greatest = greatest.max(*place);
+        for ([min, max], place) in bounds.iter_mut().zip(places) {
+            *min = min.min(*place);
+            *max = max.max(*place);
         }
     }
 
-    /// The rectangle that the sensors lie in.
+    /// Returns the rectangle that contains the sensors.
     pub(super) fn layout(&self, sensors: usize) -> Result<Layout, String> {
         if self.lines != [4, 4] {
             let [x, y] = self.lines;
@@ -70,51 +70,54 @@ impl Corners {
         let mut indices = [vec![], vec![]];
         for axis in 0..2 {
             let bounds = &self.bounds[axis];
-            let size = bounds.iter().map(|[least, greatest]| greatest - least).sum::<f64>() / sensors as f64;
+            let size = bounds.iter().map(|[min, max]| max - min).sum::<f64>() / sensors as f64;
             let start = bounds.iter().map(|bound| bound[0]).fold(f64::INFINITY, f64::min);
             if !(size.is_finite() && size > 0.0) {
                 return Err("the sensors have no size".into());
             }
-            let mut greatest = 0;
+            let mut last = 0;
             for [from, to] in bounds {
                 let place = (from - start) / size;
-                if (to - from - size).abs() > PLAY * size || (place - place.round()).abs() > PLAY || place > 1e6 {
-                    return Err("the sensors lie in no rows and columns of one size".into());
+                if (to - from - size).abs() > MAX_MISFIT * size
+                    || (place - place.round()).abs() > MAX_MISFIT
+                    || place > 1e6
+                {
+                    return Err("the sensors do not form rows and columns of one size".into());
                 }
                 indices[axis].push(place.round() as usize);
-                greatest = greatest.max(place.round() as usize);
+                last = last.max(place.round() as usize);
             }
-            (pitch[axis], counts[axis]) = (size * self.metres, greatest + 1);
+            (pitch[axis], counts[axis]) = (size * self.metres, last + 1);
         }
         let [cols, rows] = counts;
         Self::check(rows, cols, sensors)?;
         let cells: Vec<usize> = indices[1].iter().zip(&indices[0]).map(|(row, col)| row * cols + col).collect();
         let mut is_taken = vec![false; rows * cols];
         if cells.iter().any(|cell| std::mem::replace(&mut is_taken[*cell], true)) {
-            return Err("two sensors lie at one place".into());
+            return Err("two sensors have the same place".into());
         }
         Ok(Layout { rows, cols, pitch, cells })
     }
 
-    /// A grid is no larger than its sensors make it: a round mat fills more than half of it.
+    /// Refuses a grid that is much larger than its sensors: even a round mat fills more than half of it.
     fn check(rows: usize, cols: usize, sensors: usize) -> Result<(), String> {
         match rows.checked_mul(cols) {
-            Some(cells) if cells <= MOST_CELLS && cells <= 2 * sensors + 16 => Ok(()),
+            Some(cells) if cells <= MAX_CELLS && cells <= 2 * sensors + 16 => Ok(()),
             _ => Err(format!("{sensors} sensors do not fill {rows} rows by {cols} columns")),
         }
     }
 }
 
 impl Layout {
-    /// Sensors row after row.
+    /// Returns the layout of sensors row by row.
     pub(super) fn rows([rows, cols]: [usize; 2], pitch: [f64; 2], sensors: usize) -> Result<Self, String> {
         if rows.checked_mul(cols) != Some(sensors) {
-            return Err(format!("the file has {sensors} sensors, which are not {rows} rows by {cols} columns"));
+            return Err(format!("the file has {sensors} sensors, not those of {rows} rows by {cols} columns"));
         }
         Ok(Self { rows, cols, pitch, cells: (0..sensors).collect() })
     }
 
-    /// Brings the values of all sensors into place, moment after moment.
+    /// Moves the values of all sensors to their cells, moment by moment.
     pub(super) fn place(&self, values: &[f32]) -> Vec<f32> {
         let tactels = self.rows * self.cols;
         let mut placed = vec![0.0; values.len() / self.cells.len() * tactels];
@@ -126,7 +129,7 @@ impl Layout {
         placed
     }
 
-    /// Cells without a sensor.
+    /// Returns the cells without a sensor.
     pub(super) fn dead(&self) -> Vec<usize> {
         let mut has_sensor = vec![false; self.rows * self.cols];
         self.cells.iter().for_each(|cell| has_sensor[*cell] = true);

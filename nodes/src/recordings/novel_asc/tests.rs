@@ -1,4 +1,4 @@
-//! novel's text against files written here from a known pressure, with the forces as the oracle, and damaged copies.
+//! Tests of novel's text: files of a known pressure with the forces as the oracle, and damaged copies.
 
 use std::fmt::Write as _;
 
@@ -54,7 +54,7 @@ fn parse(text: &str) -> Result<Recording, Refusal> {
 }
 
 #[test]
-fn a_small_mat_in_any_dress() {
+fn a_small_mat_in_every_notation() {
     let recording = parse(SMALL).unwrap();
     let ImageShape { rows, cols, pitch, unit } = recording.shape.clone();
     assert_eq!((rows, cols, pitch, unit.to_string().as_str()), (2, 3, [0.005, 0.01], "kPa"));
@@ -135,7 +135,7 @@ fn large(pressures: &[(usize, f64)]) -> String {
 }
 
 #[test]
-fn a_large_mat_lies_as_its_corners_say() {
+fn the_corners_give_the_layout_of_a_large_mat() {
     let recording = parse(&large(&[(0, 10.0), (1, 13.333), (29, 55.0), (811, 11.667)])).unwrap();
     assert_eq!((recording.shape.rows, recording.shape.cols, recording.dead.len()), (29, 28, 0));
     assert!((recording.shape.pitch[0] - 0.00528).abs() < 1e-9 && (recording.shape.pitch[1] - 0.01028).abs() < 1e-9);
@@ -152,11 +152,11 @@ fn a_mat_without_corners_needs_its_size() {
         .replace("0.000\n", "0.000   6.000\n")
         .replace("5.000\n", "5.000 0\n");
     let text = text.split("        MVP").next().unwrap();
-    assert_eq!(complaints(parse(text)), [(0, "the file does not say how many rows and columns it has".into())]);
+    assert_eq!(complaints(parse(text)), [(0, "the file does not give its number of rows and columns".into())]);
     let hints = Hints { size: Some([2, 3]), pitch: Some([0.01; 2]), ..Hints::default() };
     assert_eq!(read_hinted(text, &hints).unwrap().cells[6..12], [1.0, 2.0, 3.0, 4.0, 5.0, 0.0]);
     let wrong = Hints { size: Some([2, 4]), ..hints };
-    let message = "the file has 6 sensors, which are not 2 rows by 4 columns";
+    let message = "the file has 6 sensors, not those of 2 rows by 4 columns";
     assert_eq!(complaints(read_hinted(text, &wrong)), [(0, message.into())]);
 }
 
@@ -164,7 +164,7 @@ fn a_mat_without_corners_needs_its_size() {
 fn an_insole_is_refused_with_a_reason() {
     let twice: String = (1..=198).map(|k| format!("\t{:>7}", (k - 1) % 99 + 1)).collect();
     let head = &SMALL[..SMALL.find("electrical").unwrap()];
-    let message = "an insole of pedar has no rows and columns: its sensors follow the sole and differ in size";
+    let message = "an insole of pedar has no rows and columns: its sensors follow the sole and have different sizes";
     for text in [
         format!("{head}mask definition: \nleft insole: 1,2,3,\nright insole: 1,2,3,\n\ntime[secs]\t1\t2\t1\t2\n"),
         format!("{head}time[secs]    {twice}\t\n"),
@@ -172,32 +172,32 @@ fn an_insole_is_refused_with_a_reason() {
         assert_eq!(complaints(parse(&text)), [(0, message.into())]);
     }
     let forces = format!("{head}time[secs]    force[N]   x[mm]\n");
-    let message = "the file holds forces over time and not the pressures of the sensors";
+    let message = "the file has forces over time, but not the pressures of the sensors";
     assert_eq!(complaints(parse(&forces)), [(7, message.into())]);
 }
 
 #[test]
-fn damaged_files_say_what_and_where() {
+fn a_damaged_file_has_its_line_and_message() {
     let cases: &[(&str, &str, usize, &str)] = &[
-        ("0.04000", "0", 3, "`time per frame [secs]:` is greater than 0"),
+        ("0.04000", "0", 3, "`time per frame [secs]:` must be greater than 0"),
         ("0.04000", "x", 3, "`time per frame [secs]:` is not a number: `x`"),
-        ("kPa", "stone", 4, "the unit `stone` is not known here"),
-        ("pressure values in kPa", "", 0, "the file does not say the unit of its values"),
-        ("       4       5\n", "       4       4\n", 8, "a sensor has two columns"),
+        ("kPa", "stone", 4, "the unit `stone` is unknown"),
+        ("pressure values in kPa", "", 0, "the file does not give the unit of its values"),
+        ("       4       5\n", "       4       4\n", 8, "a sensor appears twice in this line"),
         ("       4       5\n", "       4       x\n", 8, "the number of this sensor is not a whole number: `x`"),
-        ("time[secs]       1", "secs 1", 16, "the file holds forces over time and not the pressures of the sensors"),
-        ("5.84000   1.000", "5.80000   1.000", 10, "the time does not go on"),
-        ("5.80000   0", "1e30   0", 9, "this is no number of seconds from 0 to 1e9: `1e30`"),
-        ("  4.000   5.000", "  4.000", 10, "there are 4 pressures of 5 sensors"),
+        ("time[secs]       1", "secs 1", 16, "the file has forces over time, but not the pressures of the sensors"),
+        ("5.84000   1.000", "5.80000   1.000", 10, "the time does not increase"),
+        ("5.80000   0", "1e30   0", 9, "the time is not from 0 to 1e9 s: `1e30`"),
+        ("  4.000   5.000", "  4.000", 10, "this line has 4 pressures, but there are 5 sensors"),
         ("  4.000   5.000", "  4.000   B", 10, "this pressure is not a number: `B`"),
         ("  4.000   5.000", "  4.000   1e39", 10, "this pressure is too large: `1e39`"),
-        ("  4.000   5.000", "  4.000   5.100", 20, "the total force is 0.75 N, but the pressures make 0.755 N"),
-        ("5.84000    0.750   0.817   1.100", "5.84000", 20, "there is no force at this time"),
-        ("sensor        1", "sensor        9", 24, "these are not the sensors that have pressures"),
-        ("corner[cm]", "corner[ft]", 25, "the corners are in `cm` or `mm`"),
-        ("x[1]   0.0000   0.0000", "x[1]   0.0000", 28, "there are 4 numbers of 5 sensors"),
+        ("  4.000   5.000", "  4.000   5.100", 20, "the total force is 0.75 N, but the pressures sum to 0.755 N"),
+        ("5.84000    0.750   0.817   1.100", "5.84000", 20, "the force at this time is missing"),
+        ("sensor        1", "sensor        9", 24, "these sensors are not those of the pressures"),
+        ("corner[cm]", "corner[ft]", 25, "the unit of the corners must be `cm` or `mm`"),
+        ("x[1]   0.0000   0.0000", "x[1]   0.0000", 28, "this line has 4 numbers, but there are 5 sensors"),
         ("x[1]   0.0000", "x[1]   0.0x00", 28, "this figure is not a number: `0.0x00`"),
-        ("x[1]   0.0000", "x[1]   -1.000", 36, "the sensors lie in no rows and columns of one size"),
+        ("x[1]   0.0000", "x[1]   -1.000", 36, "the sensors do not form rows and columns of one size"),
         (
             "x[1]   0.0000",
             "z[1]   0.0000",
@@ -208,17 +208,17 @@ fn damaged_files_say_what_and_where() {
     check_damages(SMALL, "mat.asc", &Hints::default(), cases);
     let moved = SMALL.replace("1.0000\ny[0]", "0.5000\ny[0]").replace("1.0000\ny[1]", "0.5000\ny[1]");
     let moved = moved.replace("1.5000\n", "1.0000\n");
-    assert_eq!(complaints(parse(&moved)), [(36, "two sensors lie at one place".into())]);
+    assert_eq!(complaints(parse(&moved)), [(36, "two sensors have the same place".into())]);
     let end = SMALL.find("\nx[c]").unwrap();
     for cut in 0..end {
-        // Of the last number, 2.0000, nothing is missing from its first digit on.
+        // The last number, 2.0000, has the same value from its first digit on.
         let is_number = cut + 6 > end;
         assert!(is_number || !complaints(parse(&SMALL[..cut])).is_empty(), "cut after {cut} bytes");
     }
 }
 
 #[test]
-fn no_damage_makes_it_panic() {
+fn no_damage_causes_a_panic() {
     let large = large(&[(0, 10.0), (400, 20.0)]);
     let refused = count_refused(&[SMALL.as_bytes(), large.as_bytes()], "mat.asc", &Hints::default(), 4000);
     assert!(refused > 1500, "{refused} of 4000 were seen to be damaged");

@@ -1,4 +1,4 @@
-//! novel's listing against the shipped recording, whose forces are the oracle, and damaged copies of a small one.
+//! Tests of novel's listing: the shipped recording with its forces as the oracle, and damaged copies of a small one.
 
 use super::*;
 use crate::recordings::testing::{check_damages, complaints, count_refused};
@@ -48,7 +48,7 @@ fn parse(text: &str) -> Result<Recording, Refusal> {
     read(text.as_bytes(), &Hints::default())
 }
 
-/// The shipped recording as the text that it is.
+/// Returns the text of the shipped recording.
 fn emed() -> String {
     let (bytes, _) = crate::recordings::archive::unpack(EMED, "emed_test.zip", &Hints::default()).unwrap().unwrap();
     text::decode(&bytes).into_owned()
@@ -95,7 +95,7 @@ fn the_whole_recording_agrees_with_its_own_forces() {
 }
 
 #[test]
-fn a_small_listing_in_any_dress() {
+fn a_small_listing_in_every_notation() {
     let recording = parse(SMALL).unwrap();
     let mut image = [f32::NAN; 20];
     recording.show(0, &mut image);
@@ -103,7 +103,7 @@ fn a_small_listing_in_any_dress() {
     assert_eq!(image, *first.as_flattened(), "five rows of four");
     recording.show(1, &mut image);
     assert_eq!((image[1], image.iter().sum::<f32>()), (40.0, 40.0));
-    assert_eq!(recording.frames.len(), 2, "a mean over time is no picture");
+    assert_eq!(recording.frames.len(), 2, "a mean over time is not a picture");
     let latin: Vec<u8> = SMALL.chars().map(|c| c as u8).collect();
     let same = [
         latin,
@@ -143,7 +143,7 @@ fn a_small_listing_in_any_dress() {
 }
 
 #[test]
-fn the_forces_tell_newtons_per_square_centimetre() {
+fn the_forces_show_newtons_per_square_centimetre() {
     let forces = [("\t0.25\n", "\t2.50\n"), ("\t0.63\n", "\t6.25\n"), ("\t0.06\n", "\t0.63\n")];
     let more = [
         ("0.38\t0.56\t0.94", "3.75\t5.63\t9.38"),
@@ -157,7 +157,7 @@ fn the_forces_tell_newtons_per_square_centimetre() {
 }
 
 #[test]
-fn another_measurement_goes_on_where_the_last_one_ended() {
+fn a_second_measurement_continues_the_count() {
     let again = SMALL.replace("Page 1", "Page 4").replace("Page 2", "Page 5").replace("Page 3", "Page 6");
     let recording = parse(&format!("{SMALL}{again}")).unwrap();
     let frames: Vec<_> = recording.frames.iter().map(|frame| (frame.number, frame.time / 1_000_000)).collect();
@@ -165,48 +165,63 @@ fn another_measurement_goes_on_where_the_last_one_ended() {
 }
 
 #[test]
-fn damaged_files_say_what_and_where() {
+fn a_damaged_file_has_its_line_and_message() {
     let cases: &[(&str, &str, usize, &str)] = &[
         ("Matrix: 4x5", "Matrix: 2x5", 11, "column 3 is outside the array of 5 rows and 2 columns"),
-        ("Matrix: 4x5", "Matrix: 4 by 5", 4, "`Matrix:` is no `columns x rows`: `4 by 5`"),
-        ("Matrix: 4x5", "Matrix: 0x5", 4, "there is no column 0"),
-        ("Matrix: 4x5", "Matrix: 90000x90000", 0, "an array of 90000 by 90000 cells is more than 262144"),
-        ("10.0 ms", "10.0 h", 5, "`Time/picture:` is in `ms` or `s`, not `h`"),
-        ("10.0 ms", "0 ms", 5, "`Time/picture:` is greater than 0"),
-        ("10.0 ms", "9e9", 5, "`Time/picture:` is in `ms` or `s`, not `e9`"),
-        ("0.500x0.500 cm", "0.500x0.500 feet", 7, "`Sensor size:` is in `cm` or `mm`, not `0.500x0.500 feet`"),
-        ("Time/picture:10.0 ms", "", 0, "the file does not say how fast its frames came"),
+        ("Matrix: 4x5", "Matrix: 4 by 5", 4, "expected `columns x rows` after `Matrix:`, found `4 by 5`"),
+        ("Matrix: 4x5", "Matrix: 0x5", 4, "the number of this column must be from 1 to 100000, not 0"),
+        ("Matrix: 4x5", "Matrix: 90000x90000", 0, "an array of 90000 by 90000 has more than 262144 cells"),
+        ("10.0 ms", "10.0 h", 5, "the unit of `Time/picture:` must be `ms` or `s`, not `h`"),
+        ("10.0 ms", "0 ms", 5, "`Time/picture:` must be greater than 0"),
+        ("10.0 ms", "9e9", 5, "the unit of `Time/picture:` must be `ms` or `s`, not `e9`"),
+        (
+            "0.500x0.500 cm",
+            "0.500x0.500 feet",
+            7,
+            "the unit of `Sensor size:` must be `cm` or `mm`, not `0.500x0.500 feet`",
+        ),
+        ("Time/picture:10.0 ms", "", 0, "the file does not give its frame rate"),
         ("Page 2", "Page 3", 18, "page 3 comes after page 1"),
         ("Page 2", "Page two", 18, "the number of this page is not a whole number: `two`"),
         ("Pict-No.: 2 ", "Pict-No.: 0 ", 21, "picture 0 comes after picture 1"),
-        ("Pict-No.: 2 ", "Pict-No.: 99999999999 ", 21, "there is no picture 99999999999"),
-        ("Pict-No.: 2 ", "", 23, "this page has no `Pict-No.:`"),
+        (
+            "Pict-No.: 2 ",
+            "Pict-No.: 99999999999 ",
+            21,
+            "the number of a picture must be at most 1000000000, not 99999999999",
+        ),
+        ("Pict-No.: 2 ", "", 23, "`Pict-No.:` is missing on this page"),
         ("\t2\t3\tForce", "\t2\t4\tForce", 11, "column 4 comes after column 2"),
-        ("\t2\t3\tForce", "\t0\t1\tForce", 11, "there is no column 0"),
+        ("\t2\t3\tForce", "\t0\t1\tForce", 11, "the number of this column must be from 1 to 100000, not 0"),
         ("4\t5.00\t20.00", "5\t5.00\t20.00", 13, "row 5 comes after row 3"),
         ("4\t5.00\t20.00", "x\t5.00\t20.00", 13, "the number of this row is not a whole number: `x`"),
-        ("5.00\t20.00\t0.63", "5.00\t20.00", 13, "row 4 has 2 numbers, but the head of its page 3"),
+        ("5.00\t20.00\t0.63", "5.00\t20.00", 13, "row 4 has 2 numbers, but the header of its page has 3"),
         ("5.00\t20.00", "5.00\t2o.00", 13, "this cell is not a number: `2o.00`"),
         ("5.00\t20.00", "5.00\tinf", 13, "this cell is not finite: `inf`"),
         ("5.00\t20.00", "5.00\t1e38", 13, "this cell is too large: `1e38`"),
-        ("5.00\t20.00", "5.00\t23.00", 13, "the force of this row is 0.63 N, but its cells make 0.7 N"),
-        ("0.38\t0.56\t0.94", "0.38\t0.66\t0.94", 15, "the force of this column is 0.66 N, but its cells make 0.5625 N"),
-        ("0.38\t0.56\t0.94", "0.38\t0.56\t0.84", 15, "the force of this page is 0.84 N, but its cells make 0.9375 N"),
-        ("0.38\t0.56\t0.94", "0.38\t0.56", 15, "the row `Force` has 2 numbers, but the head of its page 3"),
+        ("5.00\t20.00", "5.00\t23.00", 13, "the force of this row is 0.63 N, but its cells sum to 0.7 N"),
+        (
+            "0.38\t0.56\t0.94",
+            "0.38\t0.66\t0.94",
+            15,
+            "the force of this column is 0.66 N, but its cells sum to 0.5625 N",
+        ),
+        ("0.38\t0.56\t0.94", "0.38\t0.56\t0.84", 15, "the force of this page is 0.84 N, but its cells sum to 0.9375 N"),
+        ("0.38\t0.56\t0.94", "0.38\t0.56", 15, "the row `Force` has 2 numbers, but the header of its page has 3"),
         ("Force\t0.38\t0.56\t0.94\n", "", 15, "the page ends after 3 rows: it is truncated"),
     ];
     check_damages(SMALL, "emed.lst", &Hints::default(), cases);
     let whole = SMALL.find("\u{c}\n\n\t\t\t\tPage 3").unwrap();
     let ends: Vec<usize> = SMALL.match_indices("\u{c}").map(|(at, _)| at).collect();
     for cut in (0..whole).filter(|cut| SMALL.is_char_boundary(*cut)) {
-        // From the last digit of a page on no cell is missing, and a listing does not say how many pages it has.
+        // After the last digit of a page no cell is missing, and a listing does not give its number of pages.
         let is_end = ends.iter().any(|end| (end - 4..=end + 7).contains(&cut));
         assert!(is_end || !flaws(&SMALL[..cut]).is_empty(), "cut after {cut} bytes");
     }
 }
 
 #[test]
-fn no_damage_makes_it_panic() {
+fn no_damage_causes_a_panic() {
     let text = emed();
     let three = text.find("\t\t\t\tPage 4").unwrap();
     let part: Vec<u8> = text[..three].trim_end().chars().map(|c| c as u8).collect();

@@ -1,17 +1,17 @@
-//! An array as numpy saves it: `\x93NUMPY`, a version, a header in Python's notation, the elements.
+//! An array in a file of numpy: `\x93NUMPY`, a version, a header in Python's notation, the elements.
 
-use super::super::text::shortened;
+use crate::recordings::common::text::shortened;
 
-/// How an array begins.
+/// First bytes of an array.
 pub(crate) const MAGIC: &[u8] = b"\x93NUMPY";
 
-/// An array whose elements are still in the file.
+/// An array that borrows its elements from the file.
 #[derive(Debug, Clone)]
 pub(super) struct Array<'a> {
-    /// Number of elements along each axis.
+    /// Numbers of elements along the axes.
     pub(super) shape: Vec<usize>,
     kind: Kind,
-    /// Whether the first axis is the one that runs fastest.
+    /// Whether the first axis runs fastest.
     is_fortran: bool,
     is_big: bool,
     /// Bytes of an element.
@@ -30,7 +30,7 @@ enum Kind {
 }
 
 impl<'a> Array<'a> {
-    /// Reads a file of one array; the file must hold just as many bytes as its header says.
+    /// Reads a file of one array. Its length must be exactly that of its header and elements.
     pub(super) fn read(file: &'a [u8]) -> Result<Self, String> {
         let array = Self::begin(file)?;
         let wanted = array.shape.iter().try_fold(array.width, |size, axis| size.checked_mul(*axis));
@@ -38,20 +38,23 @@ impl<'a> Array<'a> {
             return Ok(array);
         }
         let (shape, width, found) = (named(&array.shape), array.width, array.bytes.len());
-        Err(format!("its header says {shape} elements of {width} bytes, but {found} bytes come after it"))
+        Err(format!("its header has {shape} elements of {width} bytes, but {found} bytes come after it"))
     }
 
-    /// Reads the header of a file that may be cut off after it.
+    /// Reads the header; the elements may be cut off.
     pub(super) fn begin(file: &'a [u8]) -> Result<Self, String> {
         let (header, bytes) = split(file).ok_or("the header of the array is cut off")?;
-        let header = str::from_utf8(header).map_err(|_| "the header of the array is no text")?;
+        let header = str::from_utf8(header).map_err(|_| "the header of the array is not text")?;
         let value = |key: &str| value(header, key).ok_or_else(|| format!("the header of the array has no `{key}`"));
         let (is_big, kind, width) = element(value("descr")?)?;
         let is_fortran = match value("fortran_order")?.split([',', '}']).next().unwrap_or("").trim() {
             "True" => true,
             "False" => false,
             other => {
-                return Err(format!("`fortran_order` of the array is `True` or `False`, not `{}`", shortened(other)));
+                return Err(format!(
+                    "`fortran_order` of the array must be `True` or `False`, not `{}`",
+                    shortened(other)
+                ));
             }
         };
         let shape = shape(value("shape")?)?;
@@ -63,19 +66,19 @@ impl<'a> Array<'a> {
         !matches!(self.kind, Kind::Bytes | Kind::Text)
     }
 
-    /// Number of elements.
+    /// Returns the number of elements.
     pub(super) fn len(&self) -> usize {
         self.shape.iter().product()
     }
 
-    /// Where an element is among all, by its index along each axis.
+    /// Returns the position of an element in the file, from its index along each axis.
     pub(super) fn place(&self, index: &[usize]) -> usize {
         let step = |place: usize, (index, axis): (&usize, &usize)| place * axis + index;
         let axes = index.iter().zip(&self.shape);
         if self.is_fortran { axes.rev().fold(0, step) } else { axes.fold(0, step) }
     }
 
-    /// The number at a place.
+    /// Returns the number at a position.
     pub(super) fn number(&self, place: usize) -> f64 {
         let bytes = &self.bytes[place * self.width..][..self.width];
         let bits = bytes.iter().enumerate().fold(0, |bits, (i, byte)| {
@@ -92,12 +95,12 @@ impl<'a> Array<'a> {
         }
     }
 
-    /// All numbers, if it has one axis or none.
+    /// Returns all numbers, or `None` if there are more axes than one or no numbers.
     pub(super) fn numbers(&self) -> Option<impl ExactSizeIterator<Item = f64> + Clone + '_> {
         (self.is_number() && self.shape.len() <= 1).then(|| (0..self.len()).map(|place| self.number(place)))
     }
 
-    /// The text, if it is a single one.
+    /// Returns the text, or `None` if it is not a single text.
     pub(super) fn text(&self) -> Option<String> {
         let step = match self.kind {
             Kind::Text => 4,
@@ -117,7 +120,7 @@ impl<'a> Array<'a> {
     }
 }
 
-/// The header and what comes after it.
+/// Splits a file after its header, into the header and the elements.
 fn split(file: &[u8]) -> Option<(&[u8], &[u8])> {
     let rest = file.strip_prefix(MAGIC)?;
     let (version, rest) = rest.split_first_chunk::<2>()?;
@@ -131,22 +134,26 @@ fn split(file: &[u8]) -> Option<(&[u8], &[u8])> {
     rest.split_at_checked(size)
 }
 
-/// What stands behind `'key':`.
+/// Returns the text after `'key':`.
 fn value<'h>(header: &'h str, key: &str) -> Option<&'h str> {
     let (_, rest) = header.split_once(&format!("'{key}'")).or_else(|| header.split_once(&format!("\"{key}\"")))?;
     Some(rest.trim_start().strip_prefix(':')?.trim_start())
 }
 
-/// `'<f8'`: byte order, kind and size.
+/// Parses `'<f8'`: byte order, kind and size.
 fn element(text: &str) -> Result<(bool, Kind, usize), String> {
-    // A list of fields ends with the list, a name with its quote.
+    // A list of fields ends at `]`, a name at its quote.
     let end = match text.chars().next() {
         Some(quote @ ('\'' | '"')) => text[1..].find(quote).map(|at| at + 2),
         Some('[') => text.find(']').map(|at| at + 1),
         _ => None,
     };
-    let strange =
-        || format!("elements `{}` are not read: save plain numbers", shortened(&text[..end.unwrap_or(text.len())]));
+    let strange = || {
+        format!(
+            "elements of type `{}` are not supported: save plain numbers",
+            shortened(&text[..end.unwrap_or(text.len())])
+        )
+    };
     let quote = text.chars().next().filter(|quote| matches!(quote, '\'' | '"')).ok_or_else(strange)?;
     let name = text[1..].split(quote).next().unwrap_or("");
     let (order, name) = match name.split_at_checked(1) {
@@ -167,9 +174,9 @@ fn element(text: &str) -> Result<(bool, Kind, usize), String> {
     Ok((order == ">" || order == "=" && cfg!(target_endian = "big"), kind, width))
 }
 
-/// `(309, 28, 28)`.
+/// Parses `(309, 28, 28)`.
 fn shape(text: &str) -> Result<Vec<usize>, String> {
-    let strange = || "the shape of the array cannot be read".to_owned();
+    let strange = || "`shape` of the array is not a list of sizes".to_owned();
     let (axes, _) = text.strip_prefix('(').and_then(|text| text.split_once(')')).ok_or_else(strange)?;
     let axes: Vec<&str> = axes.split(',').map(str::trim).filter(|axis| !axis.is_empty()).take(33).collect();
     if axes.len() > 32 {
@@ -178,18 +185,18 @@ fn shape(text: &str) -> Result<Vec<usize>, String> {
     axes.into_iter().map(|axis| axis.trim_end_matches('L').parse().map_err(|_| strange())).collect()
 }
 
-/// `[309, 28, 28]`.
+/// Formats a shape as `[309, 28, 28]`.
 pub(super) fn named(shape: &[usize]) -> String {
     let axes: Vec<String> = shape.iter().map(ToString::to_string).collect();
     format!("[{}]", axes.join(", "))
 }
 
-/// A number of 16 bits (IEEE 754 binary16).
+/// Converts a number of 16 bits (IEEE 754 binary16).
 pub(super) fn half(bits: u16) -> f64 {
-    const LEAST: f64 = 1.0 / 16_777_216.0;
+    const MIN_SUBNORMAL: f64 = 1.0 / 16_777_216.0;
     let (sign, exponent, fraction) = (u64::from(bits >> 15) << 63, u64::from(bits >> 10 & 31), u64::from(bits & 1023));
     let magnitude = match exponent {
-        0 => return if sign == 0 { fraction as f64 * LEAST } else { -(fraction as f64) * LEAST },
+        0 => return if sign == 0 { fraction as f64 * MIN_SUBNORMAL } else { -(fraction as f64) * MIN_SUBNORMAL },
         31 => 0x7ff,
         _ => exponent + 1023 - 15,
     };

@@ -1,12 +1,12 @@
 //! `npy` and `npz`: arrays of numpy.
 //!
-//! An `.npy` is an array `[frames, rows, columns]` of integers or floats; one of `[frames, tactels]` needs the bench's
-//! `size`. Row i runs along the pad's y, column j along its x. A tactel that is NaN in the first frame does not exist,
-//! and then it is NaN in all. Unit, pitch and rate are the bench's to say.
+//! An `.npy` is an array `[frames, rows, columns]` of integers or floats. One of `[frames, tactels]` needs the bench's
+//! `size`. Rows run along the pad's x, with row i at the i-th y. A tactel that is NaN in the first frame does not exist,
+//! and must be NaN in every frame. The bench gives unit, pitch and rate.
 //!
-//! An `.npz` may say them itself. It holds the array as `images`, or as the only one with three axes, and may hold
+//! An `.npz` may give them itself. The images are the array `images`, or the only array with three axes. It may also hold
 //! `time` [s] and `force` [N] (one number a frame), `rate_hz` [1/s], `pitch_mm` [mm] or `pitch` [m] (one number, or
-//! that along x and that along y) and `unit` (a text, as `np.array("N")`). Others are passed over.
+//! one along x and one along y) and `unit` (a text, as `np.array("N")`). Other arrays are ignored.
 
 mod array;
 
@@ -16,10 +16,10 @@ mod tests;
 use tactflow_runtime::signal::ImageShape;
 
 use self::array::{Array, named};
-use super::reel::{Reel, bounded};
-use super::text::shortened;
-use super::zip::{self, LARGEST, Member};
-use super::{Format, Frame, HEAD, Hints, Recording, Refusal, units};
+use crate::recordings::common::reel::{Reel, bounded};
+use crate::recordings::common::text::shortened;
+use crate::recordings::common::zip::{self, Archive, File, MAX_UNPACKED_BYTES};
+use crate::recordings::common::{Format, Frame, HEAD_BYTES, Hints, Recording, Refusal, units};
 
 pub(super) const NPY: Format = Format {
     name: "npy",
@@ -35,85 +35,84 @@ pub(super) const NPZ: Format = Format {
     read: read_npz,
 };
 
-/// Whether a zip archive's first member is an array.
+/// Whether the first file of a zip archive is an array.
 pub(super) fn is_npz(head: &[u8]) -> bool {
     zip::first_name(head).is_some_and(|name| name.ends_with(b".npy"))
 }
 
-/// What stands beside the images.
+/// The arrays of an `.npz` other than the images.
 #[derive(Default)]
 struct Beside {
     time: Option<Vec<f64>>,
     force: Option<Vec<f64>>,
     rate_hz: Option<f64>,
     pitch: Option<[f64; 2]>,
-    /// Unit as the file names it.
+    /// Name of the unit in the file.
     unit: Option<String>,
 }
 
 fn read_npz(bytes: &[u8], hints: &Hints) -> Result<Recording, Refusal> {
+    let archive = Archive::new(bytes)?;
     let mut beside = Beside::default();
-    let mut images: Option<Member<'_>> = None;
+    let mut images = None;
     let mut cubes = Vec::new();
-    for member in zip::members(bytes).map_err(Refusal::broken)? {
-        let member = member.map_err(Refusal::broken)?;
-        let name = member.name();
+    for file in archive.files() {
+        let file = file?;
+        let name = zip::name(&file);
         match name.strip_suffix(".npy") {
-            Some("images") => images = Some(member),
+            Some("images") => images = Some(file),
             Some(key @ ("time" | "force" | "rate_hz" | "pitch_mm" | "pitch" | "unit")) => {
-                let file = unpack(&member, bytes)?;
-                let known = Array::read(&file).and_then(|array| beside.take(key, &array));
-                known.map_err(|message| Refusal::broken(format!("`{key}`: {message}")))?;
+                let bytes = unpack(&archive, &file)?;
+                let taken = Array::read(&bytes).and_then(|array| beside.take(key, &array));
+                taken.map_err(|message| Refusal::broken(format!("`{key}`: {message}")))?;
             }
-            Some(_) if cubes.len() < 2 && has_three_axes(&member, bytes)? => cubes.push(member),
+            Some(_) if cubes.len() < 2 && has_three_axes(&archive, &file)? => cubes.push(file),
             _ => {}
         }
     }
-    let images = match (images.as_ref(), &*cubes) {
-        (Some(images), _) | (None, [images]) => *images,
+    let images = match (&images, &*cubes) {
+        (Some(images), _) | (None, [images]) => images,
         (None, others) => {
-            let count = if others.is_empty() { "none" } else { "several" };
+            let count = if others.is_empty() { "none" } else { "more than one" };
             return Err(Refusal::Broken {
-                message: format!("no array is called `images`, and {count} of the others have three axes"),
+                message: format!("no array is called `images`, and {count} of the others has three axes"),
                 help: Some("save the frames as `images`, with the axes [frames, rows, columns]".into()),
             });
         }
     };
-    recording(NPZ.name, &unpack(&images, bytes)?, &beside, hints)
+    recording(NPZ.name, &unpack(&archive, images)?, &beside, hints)
 }
 
-fn unpack(member: &Member<'_>, archive: &[u8]) -> Result<Vec<u8>, Refusal> {
-    let mut out = Vec::new();
-    let mut source = member.open(archive).map_err(Refusal::broken)?;
-    if !source.read(HEAD as u64, &mut out).map_err(Refusal::broken)? {
-        Array::begin(&out).map_err(|message| Refusal::broken(format!("`{}`: {message}", member.name())))?;
-        if !source.read(LARGEST, &mut out).map_err(Refusal::broken)? {
-            return Err(Refusal::broken(format!("`{}` is more than {} MiB", member.name(), LARGEST >> 20)));
+fn unpack(archive: &Archive<'_>, file: &File<'_>) -> Result<Vec<u8>, Refusal> {
+    let (mut out, mut source, name) = (Vec::new(), archive.open(file)?, zip::name(file));
+    if !zip::read(&mut *source, &name, HEAD_BYTES as u64, &mut out)? {
+        Array::begin(&out).map_err(|message| Refusal::broken(format!("`{name}`: {message}")))?;
+        if !zip::read(&mut *source, &name, MAX_UNPACKED_BYTES, &mut out)? {
+            return Err(Refusal::broken(format!("`{name}` is more than {} MiB", MAX_UNPACKED_BYTES >> 20)));
         }
     }
-    source.verify(out.len() as u64).map_err(Refusal::broken)?;
     Ok(out)
 }
 
-fn has_three_axes(member: &Member<'_>, archive: &[u8]) -> Result<bool, Refusal> {
+fn has_three_axes(archive: &Archive<'_>, file: &File<'_>) -> Result<bool, Refusal> {
     let mut head = Vec::new();
-    member.open(archive).and_then(|mut source| source.read(4096, &mut head)).map_err(Refusal::broken)?;
+    zip::read(&mut *archive.open(file)?, &zip::name(file), 4096, &mut head)?;
     Ok(Array::begin(&head).is_ok_and(|array| array.shape.len() == 3))
 }
 
 impl Beside {
     fn take(&mut self, key: &str, array: &Array<'_>) -> Result<(), String> {
         if key == "unit" {
-            self.unit = Some(array.text().ok_or("a unit is a single text")?);
+            self.unit = Some(array.text().ok_or("expected a single text")?);
             return Ok(());
         }
-        let numbers = array.numbers().ok_or("this has one axis at most, and numbers")?;
+        let numbers = array.numbers().ok_or("expected numbers along at most one axis")?;
         if let Some(wrong) = numbers.clone().find(|number| !number.is_finite()) {
             return Err(format!("`{wrong}` is not finite"));
         }
         let one = || match (numbers.clone().next(), numbers.len()) {
             (Some(number), 1) if number > 0.0 => Ok(number),
-            _ => Err("this is a single number greater than 0".to_owned()),
+            _ => Err("expected a single number greater than 0".to_owned()),
         };
         match key {
             "time" => self.time = Some(numbers.collect()),
@@ -125,7 +124,7 @@ impl Beside {
                 self.pitch = Some(match *pitch {
                     [both] if both > 0.0 => [both; 2],
                     [x, y] if x > 0.0 && y > 0.0 => [x, y],
-                    _ => return Err("a pitch is one or two numbers greater than 0".into()),
+                    _ => return Err("expected one or two numbers greater than 0".into()),
                 });
             }
         }
@@ -141,8 +140,7 @@ fn recording(format: &'static str, file: &[u8], beside: &Beside, hints: &Hints) 
             return Err(Refusal::broken(format!("`{name}` has {found} numbers, but there are {count} frames")));
         }
     }
-    let known =
-        |name: &String| units::unit(name).ok_or_else(|| format!("`unit`: `{}` is not known here", shortened(name)));
+    let known = |name: &String| units::unit(name).ok_or_else(|| format!("`unit`: `{}` is unknown", shortened(name)));
     let (unit, factor) = beside.unit.as_ref().map(known).transpose().map_err(Refusal::broken)?.unzip();
     let mut reel = Reel::default();
     reel.frames.reserve_exact(count);
@@ -151,8 +149,8 @@ fn recording(format: &'static str, file: &[u8], beside: &Beside, hints: &Hints) 
     if let Some(time) = &beside.time {
         stamp(&mut reel.frames, time).map_err(Refusal::broken)?;
     }
-    let said = reel.mean_step().or(beside.rate_hz.map(|rate| 1.0 / rate));
-    let (unit, pitch, period) = hints.complete(unit, beside.pitch, said)?;
+    let found = reel.mean_step().or(beside.rate_hz.map(|rate| 1.0 / rate));
+    let (unit, pitch, period) = hints.complete(unit, beside.pitch, found)?;
     if beside.time.is_none() {
         reel.tick(period);
     }
@@ -161,10 +159,10 @@ fn recording(format: &'static str, file: &[u8], beside: &Beside, hints: &Hints) 
     Ok(Recording { format, shape, frames, cells, dead, threshold: None, period, force })
 }
 
-/// Frames, rows and columns.
+/// Returns the number of frames, rows and columns.
 fn axes(array: &Array<'_>, hints: &Hints) -> Result<[usize; 3], Refusal> {
     if !array.is_number() {
-        return Err(Refusal::broken("the elements of the array are no numbers"));
+        return Err(Refusal::broken("the elements of the array are not numbers"));
     }
     let [count, rows, cols] = match *array.shape {
         [count, rows, cols] => {
@@ -175,13 +173,13 @@ fn axes(array: &Array<'_>, hints: &Hints) -> Result<[usize; 3], Refusal> {
             let [rows, cols] = hints.size(None)?;
             if rows.checked_mul(cols) != Some(tactels) {
                 let message =
-                    format!("a row of the array has {tactels} numbers, which are not {rows} by {cols} tactels");
+                    format!("a row of the array has {tactels} numbers, not those of {rows} by {cols} tactels");
                 return Err(Refusal::Contradicted { hint: "size", message });
             }
             [count, rows, cols]
         }
         _ => {
-            let message = format!("an array {} is no [frames, rows, columns]", named(&array.shape));
+            let message = format!("expected an array [frames, rows, columns], found {}", named(&array.shape));
             return Err(Refusal::broken(message));
         }
     };
@@ -189,11 +187,11 @@ fn axes(array: &Array<'_>, hints: &Hints) -> Result<[usize; 3], Refusal> {
     if count == 0 {
         return Err(Refusal::broken("the array has no frame"));
     }
-    // What a frame takes here must not be many times what it takes in the file.
+    // A frame in memory must not be many times larger than in the file.
     let bytes = rows * cols * array.width;
     if size_of::<Frame>() + 4 * rows * cols > 9 * bytes {
-        let help = Some("save the array with wider numbers, as `float64`".into());
-        return Err(Refusal::Broken { message: format!("frames of {bytes} bytes are too small to be read"), help });
+        let help = Some("save the array with larger numbers, as `float64`".into());
+        return Err(Refusal::Broken { message: format!("frames of {bytes} bytes are too small"), help });
     }
     Ok([count, rows, cols])
 }
@@ -213,18 +211,18 @@ fn fill(reel: &mut Reel, array: &Array<'_>, [count, rows, cols]: [usize; 3], fac
     Ok(())
 }
 
-/// Gives the frames their times, counted from the first [s].
+/// Sets the times of the frames, counted from the first.
 fn stamp(frames: &mut [Frame], time: &[f64]) -> Result<(), String> {
     let start = time.first().copied().unwrap_or(0.0);
     let mut last = 0;
     for (i, (frame, time)) in frames.iter_mut().zip(time).enumerate() {
         let since = time - start;
         if !(0.0..1e9).contains(&since) {
-            return Err(format!("`time`: {time} s of frame {i} is not from 0 to 1e9 s after the first"));
+            return Err(format!("`time`: frame {i} at {time} s is not from 0 to 1e9 s after the first"));
         }
         frame.time = (since * 1e9).round() as i64;
         if frame.time < last {
-            return Err(format!("`time`: it goes back at frame {i}"));
+            return Err(format!("`time`: the time goes back at frame {i}"));
         }
         last = frame.time;
     }

@@ -1,4 +1,4 @@
-//! Arrays byte by byte, as numpy 2 writes them.
+//! Tests of arrays, byte by byte as numpy 2 writes them.
 
 use proptest::prelude::*;
 use tactflow_runtime::signal::{Base, Unit};
@@ -6,7 +6,7 @@ use tactflow_runtime::signal::{Base, Unit};
 use super::super::testing::{complaints, count_refused, zipped};
 use super::super::{Hints, Refusal, read};
 
-/// An `.npy` of version 1 with that header and those bytes; as numpy does, the header ends at a multiple of 64.
+/// Returns an `.npy` of version 1. As in numpy, the header ends at a multiple of 64 bytes.
 pub(in super::super) fn npy(element: &str, is_fortran: bool, shape: &str, data: &[u8]) -> Vec<u8> {
     let order = if is_fortran { "True" } else { "False" };
     let mut header = format!("{{'descr': '{element}', 'fortran_order': {order}, 'shape': {shape}, }}");
@@ -53,7 +53,7 @@ fn an_array_of_any_type_and_order_is_the_same_recording() {
     assert_eq!(good.cells, (0..12).map(|i| i as f32).collect::<Vec<_>>());
     assert_eq!(good.frames[1].time, 10_000_000);
     let each = |bytes: Encode| (0..12).flat_map(bytes).collect::<Vec<u8>>();
-    // The first axis fastest: frame, row and column of place p are p % 2, p / 2 % 2 and p / 4.
+    // The first axis runs fastest: frame, row and column of position p are p % 2, p / 2 % 2 and p / 4.
     let fortran =
         |bytes: Encode| (0..12).flat_map(|p: u8| bytes(6 * (p % 2) + 3 * (p / 2 % 2) + p / 4)).collect::<Vec<u8>>();
     let cases: [(&str, Encode); 12] = [
@@ -67,7 +67,7 @@ fn an_array_of_any_type_and_order_is_the_same_recording() {
         ("<i4", |v| i32::from(v).to_le_bytes().into()),
         (">u4", |v| u32::from(v).to_be_bytes().into()),
         ("<i8", |v| i64::from(v).to_le_bytes().into()),
-        // The halves of 0 to 11: an exponent of 15 stands for 1.
+        // Halves from 0 to 11: an exponent of 15 is a factor of 1.
         ("<f2", |v| match v {
             0 => vec![0, 0],
             _ => ((15 + v.ilog2() as u16) << 10 | (u16::from(v) << (10 - v.ilog2())) & 1023).to_le_bytes().into(),
@@ -92,7 +92,7 @@ fn small_integers_keep_their_sign() {
 }
 
 #[test]
-fn an_archive_says_what_an_array_cannot() {
+fn an_archive_gives_unit_pitch_and_times() {
     for method in [0, 8] {
         let recording = read(&archive(method), "a.npz", &Hints::default()).unwrap();
         assert_eq!((recording.format, recording.shape.unit), ("npz", Unit::of(Base::Kilopascal)));
@@ -106,7 +106,7 @@ fn an_archive_says_what_an_array_cannot() {
 }
 
 #[test]
-fn what_is_wrong_with_an_array_is_said() {
+fn a_mistake_in_an_array_has_its_message() {
     let body = &arange()[128..].to_vec();
     let nan = |at: usize| {
         let mut values: Vec<f64> = (0..12).map(f64::from).collect();
@@ -114,26 +114,26 @@ fn what_is_wrong_with_an_array_is_said() {
         npy("<f8", false, "(2, 2, 3)", &floats(&values))
     };
     let cases: [(Vec<u8>, &str); 14] = [
-        (arange()[..200].to_vec(), "its header says [2, 2, 3] elements of 8 bytes, but 72 bytes come after it"),
-        ([arange(), vec![0]].concat(), "its header says [2, 2, 3] elements of 8 bytes, but 97 bytes come after it"),
+        (arange()[..200].to_vec(), "its header has [2, 2, 3] elements of 8 bytes, but 72 bytes come after it"),
+        ([arange(), vec![0]].concat(), "its header has [2, 2, 3] elements of 8 bytes, but 97 bytes come after it"),
         (arange()[..40].to_vec(), "the header of the array is cut off"),
         (
             npy("<f8", false, "(99999999999, 99999999999, 9)", body),
-            "its header says [99999999999, 99999999999, 9] elements of 8 bytes, but 96 bytes come after it",
+            "its header has [99999999999, 99999999999, 9] elements of 8 bytes, but 96 bytes come after it",
         ),
-        (npy("<c16", false, "(2, 3, 1)", body), "elements `'<c16'` are not read: save plain numbers"),
-        (npy("<f8", false, "(12,)", body), "an array [12] is no [frames, rows, columns]"),
-        (npy("<f8", false, "(2, 2, x)", body), "the shape of the array cannot be read"),
+        (npy("<c16", false, "(2, 3, 1)", body), "elements of type `'<c16'` are not supported: save plain numbers"),
+        (npy("<f8", false, "(12,)", body), "expected an array [frames, rows, columns], found [12]"),
+        (npy("<f8", false, "(2, 2, x)", body), "`shape` of the array is not a list of sizes"),
         (npy("<f8", false, "(0, 2, 3)", &[]), "the array has no frame"),
-        (npy("<f8", false, "(2, 0, 3)", &[]), "an array has at least one row and one column"),
-        (npy("|u1", false, "(24, 2, 2)", body), "frames of 4 bytes are too small to be read"),
-        (npy("<f8", false, "(2, 6)", body), "the file does not say how many rows and columns it has"),
-        (nan(7), "frame 1, row 0, column 1: this cell is no number, but in the first frame it was one: `NaN`"),
+        (npy("<f8", false, "(2, 0, 3)", &[]), "an array needs at least one row and one column"),
+        (npy("|u1", false, "(24, 2, 2)", body), "frames of 4 bytes are too small"),
+        (npy("<f8", false, "(2, 6)", body), "the file does not give its number of rows and columns"),
+        (nan(7), "frame 1, row 0, column 1: this cell is NaN, but it is a number in the first frame: `NaN`"),
         (
             npy("<f8", false, "(2, 2, 3)", &floats(&[1e300; 12])),
             "frame 0, row 0, column 0: this cell is too large: `1e300`",
         ),
-        (npy("|S8", false, "(2, 2, 3)", body), "the elements of the array are no numbers"),
+        (npy("|S8", false, "(2, 2, 3)", body), "the elements of the array are not numbers"),
     ];
     for (bytes, message) in cases {
         let got = complaints(read(&bytes, "a.npy", &hints()));
@@ -142,7 +142,7 @@ fn what_is_wrong_with_an_array_is_said() {
 }
 
 #[test]
-fn what_is_wrong_with_an_archive_of_arrays_is_said() {
+fn a_mistake_in_an_archive_of_arrays_has_its_message() {
     let images = arange();
     let with = |name: &str, values: &[f64]| {
         let shape = format!("({},)", values.len());
@@ -150,20 +150,20 @@ fn what_is_wrong_with_an_archive_of_arrays_is_said() {
     };
     let cases = [
         (with("time.npy", &[1.0]), "`time` has 1 numbers, but there are 2 frames"),
-        (with("time.npy", &[1.0, 0.5]), "`time`: 0.5 s of frame 1 is not from 0 to 1e9 s after the first"),
+        (with("time.npy", &[1.0, 0.5]), "`time`: frame 1 at 0.5 s is not from 0 to 1e9 s after the first"),
         (with("force.npy", &[1.0, f64::NAN]), "`force`: `NaN` is not finite"),
-        (with("pitch_mm.npy", &[1.0, 0.0]), "`pitch_mm`: a pitch is one or two numbers greater than 0"),
-        (with("rate_hz.npy", &[0.0]), "`rate_hz`: this is a single number greater than 0"),
-        (with("unit.npy", &[1.0]), "`unit`: a unit is a single text"),
-        (with("rate_hz.npy", &[50.0]), "the file says otherwise: 50 frames a second"),
+        (with("pitch_mm.npy", &[1.0, 0.0]), "`pitch_mm`: expected one or two numbers greater than 0"),
+        (with("rate_hz.npy", &[0.0]), "`rate_hz`: expected a single number greater than 0"),
+        (with("unit.npy", &[1.0]), "`unit`: expected a single text"),
+        (with("rate_hz.npy", &[50.0]), "the file has another value: 50 frames a second"),
         (
             zipped(0, &[("a.npy", &*images), ("b.npy", &*images)]),
-            "no array is called `images`, and several of the others have three axes",
+            "no array is called `images`, and more than one of the others has three axes",
         ),
         (zipped(0, &[("images.npy", &images[..100])]), "the header of the array is cut off"),
         (
             with("time.npy", &[0.0, 0.01])[..500].to_vec(),
-            "the archive is damaged: it has no directory, as if its end were missing",
+            "the archive is damaged: it has no directory: its end may be missing",
         ),
     ];
     for (bytes, message) in cases {
@@ -172,14 +172,14 @@ fn what_is_wrong_with_an_archive_of_arrays_is_said() {
 }
 
 #[test]
-fn a_nan_throughout_is_no_tactel() {
+fn a_cell_that_is_always_nan_is_dead() {
     let values = [f64::NAN, 1.0, 2.0, f64::NAN, 4.0, 5.0];
     let recording = read(&npy("<f8", false, "(2, 1, 3)", &floats(&values)), "", &hints()).unwrap();
     assert_eq!((&*recording.dead, &*recording.cells), (&[0][..], &[0.0, 1.0, 2.0, 0.0, 4.0, 5.0][..]));
 }
 
 #[test]
-fn damage_is_refused_or_read_soundly() {
+fn a_damaged_file_is_refused_or_gives_a_sound_recording() {
     let (plain, packed) = (arange(), archive(8));
     let refused = count_refused(&[&plain, &packed], "", &hints(), 4000);
     assert!((1000..4000).contains(&refused), "{refused}");
@@ -187,9 +187,9 @@ fn damage_is_refused_or_read_soundly() {
 }
 
 proptest! {
-    /// All halves against the definition of IEEE 754, in powers of two.
+    /// Compares all halves with the definition of IEEE 754.
     #[test]
-    fn a_half_is_what_the_standard_says(bits: u16) {
+    fn a_half_has_its_ieee_value(bits: u16) {
         let value = super::array::half(bits);
         let (exponent, fraction) = (i32::from(bits >> 10 & 31), f64::from(bits & 1023) / 1024.0);
         let two = |power: i32| libm::pow(2.0, power.into());

@@ -4,20 +4,20 @@ use std::ops::Range;
 
 use tactflow_runtime::signal::{ImageShape, Unit};
 
-use crate::recordings::Hints;
-use crate::recordings::text::{Flaw, Lines, Piece, flaw, shortened};
-use crate::recordings::units;
+use crate::recordings::common::text::{Lines, Piece, flaw, shortened};
+use crate::recordings::common::units;
+use crate::recordings::common::{Flaw, Hints};
 
-/// What the header says that matters.
+/// The properties of the header that are used.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Header<'t> {
     /// Size, pitch and unit of the frames.
     pub(super) shape: ImageShape,
-    /// What one of the file's unit is in ours.
+    /// Factor from the file's unit to that of the cells.
     pub(super) factor: f64,
     /// Number of the first frame.
     pub(super) start_frame: Option<u64>,
-    /// Number of the last frame, and where that stands.
+    /// Number of the last frame, and its place.
     pub(super) end_frame: Option<(u64, Range<usize>)>,
     /// Noise threshold [raw].
     pub(super) threshold: Option<f64>,
@@ -27,7 +27,7 @@ pub(super) struct Header<'t> {
     pub(super) mark: &'t str,
 }
 
-/// The keys that matter.
+/// The keys that are read.
 const KEYS: [&str; 13] = [
     "DATA_TYPE",
     "ROWS",
@@ -44,10 +44,10 @@ const KEYS: [&str; 13] = [
     "MICRO_SECOND",
 ];
 
-/// The shortest time between two frames that is one [µs]: anything below is a flag.
-const SHORTEST: f64 = 50.0;
+/// Minimum of `MICRO_SECOND` that is a time between two frames [µs]: a smaller value is a flag.
+const MIN_PERIOD_US: f64 = 50.0;
 
-/// Reads the header, up to and with its line `ASCII_DATA @@`, of a file of `bytes` bytes.
+/// Reads the header up to its line `ASCII_DATA @@`, in a file of `bytes` bytes.
 pub(super) fn read<'t>(lines: &mut Lines<'t>, bytes: usize, hints: &Hints) -> Result<Header<'t>, Vec<Flaw>> {
     let mut keys = Keys { keys: Vec::new(), flaws: Vec::new(), end: Piece { text: "", start: 0 } };
     let header = keys.collect(lines).and_then(|mark| keys.header(mark, bytes, hints));
@@ -57,10 +57,10 @@ pub(super) fn read<'t>(lines: &mut Lines<'t>, bytes: usize, hints: &Hints) -> Re
     }
 }
 
-/// A line without what a spreadsheet adds: quotes around it, separators behind it.
+/// Removes what a spreadsheet adds to a line: quotes around it, separators after it.
 pub(super) fn bare(line: Piece<'_>) -> Piece<'_> {
-    let is_dress = |c: char| c.is_whitespace() || ",;\"".contains(c);
-    line.part(line.text.trim_end_matches(is_dress)).trimmed().part_after_quote()
+    let is_added = |c: char| c.is_whitespace() || ",;\"".contains(c);
+    line.part(line.text.trim_end_matches(is_added)).trimmed().part_after_quote()
 }
 
 struct Keys<'t> {
@@ -70,7 +70,7 @@ struct Keys<'t> {
 }
 
 impl<'t> Keys<'t> {
-    /// Collects the lines of the header; the mark that ends the movie, if the header has an end.
+    /// Collects the lines of the header, and returns the mark that ends the movie.
     fn collect(&mut self, lines: &mut Lines<'t>) -> Option<&'t str> {
         let mut is_comment = false;
         for line in lines {
@@ -96,7 +96,7 @@ impl<'t> Keys<'t> {
                 None => is_comment |= key == "COMMENTS",
             }
         }
-        self.flaws.push(Flaw { span: self.end.span(), message: "the header has no `ASCII_DATA @@` at its end".into() });
+        self.flaws.push(Flaw { span: self.end.span(), message: "the header has no last line `ASCII_DATA @@`".into() });
         None
     }
 
@@ -141,19 +141,19 @@ impl<'t> Keys<'t> {
         }
         let (unit, factor) = unit?;
         let shape = ImageShape { rows, cols, pitch: [x?, y?], unit };
-        // The sensor's own filter counts, whatever the values were turned into.
+        // The threshold of the sensor's own filter is in raw counts.
         let threshold = threshold.filter(|_| unit == Unit::RAW);
         Some(Header { shape, factor, start_frame, end_frame, threshold, period, mark })
     }
 
-    /// The time between two frames [s], however the header says it.
+    /// Returns the time between two frames [s], from any of its keys.
     fn period(&mut self) -> Option<f64> {
         let none_is_zero = |number: f64| Some(number).filter(|number| *number > 0.0);
         let mut time = |key| self.optional(key, |value| not_negative(value, key)).and_then(none_is_zero);
         let seconds = time("SECONDS_PER_FRAME");
         let milliseconds = time("MILLISECONDS_PER_FRAME").map(|ms| ms / 1e3);
         let rate = time("FRAMES_PER_SECOND").map(|rate| 1.0 / rate);
-        let microseconds = time("MICRO_SECOND").filter(|us| *us >= SHORTEST).map(|us| us / 1e6);
+        let microseconds = time("MICRO_SECOND").filter(|us| *us >= MIN_PERIOD_US).map(|us| us / 1e6);
         let period = seconds.or(milliseconds).or(rate).or(microseconds);
         period.filter(|period| period.is_finite() && *period > 0.0)
     }
@@ -163,7 +163,7 @@ impl<'t> Keys<'t> {
         read(value).map_err(|flaw| self.flaws.push(flaw)).ok()
     }
 
-    /// What a key says; what is known from elsewhere if there is none.
+    /// Returns the value of a key, or the known value if the header has no such key.
     fn required<T>(
         &mut self,
         key: &str,
@@ -184,19 +184,19 @@ impl<'t> Keys<'t> {
 fn size(value: Piece<'_>, key: &str) -> Result<usize, Flaw> {
     match usize::try_from(value.count(&format!("`{key}`"))?) {
         Ok(size) if size > 0 => Ok(size),
-        _ => flaw(&value, format!("`{key}` is at least 1")),
+        _ => flaw(&value, format!("`{key}` must be at least 1")),
     }
 }
 
 fn not_negative(value: Piece<'_>, key: &str) -> Result<f64, Flaw> {
     let number = value.words().next().unwrap_or(value).decimal(&format!("`{key}`"))?;
-    if number >= 0.0 { Ok(number) } else { flaw(&value, format!("`{key}` is greater than 0")) }
+    if number >= 0.0 { Ok(number) } else { flaw(&value, format!("`{key}` must be greater than 0")) }
 }
 
-/// `0.127 centimeters` in metres.
+/// Parses `0.127 centimeters` to metres.
 fn length(value: Piece<'_>, key: &str) -> Result<f64, Flaw> {
     let is_number = |c: char| c.is_ascii_digit() || ".,+-".contains(c);
-    // `5.08e-3 meters` is in two words, `4mm` need not be.
+    // `5.08e-3 meters` has two words, `4mm` has one.
     let split = value.text.split_once(char::is_whitespace);
     let (number, name) = split.unwrap_or_else(|| {
         let name = value.text.trim_start_matches(is_number);
@@ -205,15 +205,15 @@ fn length(value: Piece<'_>, key: &str) -> Result<f64, Flaw> {
     let number = not_negative(value.part(number), key)?;
     match units::metres(name) {
         Some(metres) if number > 0.0 && (number * metres).is_finite() => Ok(number * metres),
-        Some(_) => flaw(&value, format!("`{key}` is greater than 0")),
+        Some(_) => flaw(&value, format!("`{key}` must be greater than 0")),
         None => {
             let name = shortened(name.trim());
-            flaw(&value, format!("`{key}` is in `centimeters`, `millimeters` or `inches`, not `{name}`"))
+            flaw(&value, format!("the unit of `{key}` must be `centimeters`, `millimeters` or `inches`, not `{name}`"))
         }
     }
 }
 
 fn unit(value: Piece<'_>) -> Result<(Unit, f64), Flaw> {
-    let unknown = || format!("the unit `{}` is not known here; known are {}", shortened(value.text), units::KNOWN);
+    let unknown = || format!("the unit `{}` is unknown; known are {}", shortened(value.text), units::KNOWN);
     units::unit(value.text).ok_or_else(|| Flaw { span: value.span(), message: unknown() })
 }

@@ -1,17 +1,16 @@
 //! The text of a Tekscan ASCII movie: a header of `KEY value` lines up to `ASCII_DATA @@`, then frames, then `@@`.
 //!
 //! I-Scan, F-Scan and CONFORMat write it, as `.csv` and as `.asf`. A frame is a line `Frame 3`, with or without more
-//! (`Frame 3, 0.2,, 12/2/2019 6:21:52.54PM,,,Raw Sum=,,308`), and a line of cells for each row; `B` is a cell where
-//! there is no sensel. Pressures become kPa, forces become N. Anything else is refused at its place: a recording that
-//! was cut or edited by hand must not pass as data. The header names the mark that ends the movie, so a file without
-//! that mark is cut off.
+//! (`Frame 3, 0.2,, 12/2/2019 6:21:52.54PM,,,Raw Sum=,,308`), and a line of cells for each row; `B` is a cell without a
+//! sensel. Pressures become kPa, forces become N. All other text is refused at its place, so that a recording that was cut
+//! or edited by hand does not pass as data. The header gives the mark that ends the movie: a file without it is cut off.
 
 mod header;
 
 use tactflow_runtime::signal::{ImageShape, Unit};
 
-use super::text::{self, Flaw, Lines, Notation, Piece, Wrong, flaw, shortened};
-use super::{Format, Frame, Head, Hints, Recording, Refusal, Window};
+use crate::recordings::common::text::{self, Lines, Notation, Piece, Wrong, flaw, shortened};
+use crate::recordings::common::{Flaw, Format, Frame, Head, Hints, Recording, Refusal, Window};
 use header::Header;
 
 pub(super) const FORMAT: Format =
@@ -26,12 +25,12 @@ fn read(bytes: &[u8], hints: &Hints) -> Result<Recording, Refusal> {
     text::read(bytes, hints, parse)
 }
 
-/// Reads a movie: everything that is wrong with its header, or the first thing that is wrong with its frames.
+/// Reads a movie. Errors are all mistakes in the header, or the first mistake in the frames.
 fn parse(text: &str, hints: &Hints) -> Result<Recording, Wrong> {
     let mut lines = Lines::new(text);
     let header = header::read(&mut lines, text.len(), hints)?;
     let tactels = header.shape.tactels();
-    // Both counts are of what is there.
+    // Both are counts of what the file has, not of what its header says.
     let frames = text.matches("Frame").count().min(text.len() / (2 * tactels));
     let mut reader = Reader {
         header: &header,
@@ -52,14 +51,14 @@ fn parse(text: &str, hints: &Hints) -> Result<Recording, Wrong> {
     Ok(Recording { format: FORMAT.name, shape, frames, cells, dead, threshold, period, force: None })
 }
 
-/// Gives the frames their times and says the nominal time between two of them [s].
+/// Sets the times of the frames, and returns the nominal time between two frames [s].
 ///
-/// Times that the file rounds until two are one are no times: then the frames come at the nominal rate.
+/// Times that are rounded until two are equal are ignored: then the frames come at the nominal rate.
 fn set_times(frames: &mut [Frame], times: &[i64], period: Option<f64>, hints: &Hints) -> Result<f64, Refusal> {
-    let is_alone = frames.len() == 1;
+    let is_single = frames.len() == 1;
     let mean = match times {
         [first, .., last] if last > first => Some((last - first) as f64 * 1e-9 / (times.len() - 1) as f64),
-        _ => hints.rate_hz.map(|rate| 1.0 / rate).or(is_alone.then_some(1.0)),
+        _ => hints.rate_hz.map(|rate| 1.0 / rate).or(is_single.then_some(1.0)),
     };
     let period = hints.period(period.or(mean))?;
     let are_times = times.len() == frames.len() && times.is_sorted_by(|a, b| a < b);
@@ -72,9 +71,9 @@ fn set_times(frames: &mut [Frame], times: &[i64], period: Option<f64>, hints: &H
 struct Reader<'h> {
     header: &'h Header<'h>,
     notation: Option<Notation>,
-    /// Where the number of the first frame stands.
+    /// Place of the number of the first frame.
     first: Option<std::ops::Range<usize>>,
-    /// The times that the file gives the frames [ns]; none if it gives the first none.
+    /// Times of the frames [ns]; empty if the first frame has none.
     times: Vec<i64>,
     frames: Vec<Frame>,
     cells: Vec<f32>,
@@ -96,31 +95,31 @@ impl Reader<'_> {
         flaw(&lines.end(), format!("the file ends{after} without `@@`: it is truncated"))
     }
 
-    /// The `@@`: nothing may be missing before it, and nothing may come after it.
+    /// Checks the end at `@@`: no frame may be missing before it, and no text may come after it.
     fn end(&self, at: Piece<'_>, lines: &mut Lines<'_>) -> Result<(), Flaw> {
         let (Some(first), Some(last)) = (self.frames.first(), self.frames.last()) else {
-            return flaw(&at, "the movie has no frame");
+            return flaw(&at, "the file has no frame");
         };
         let Header { start_frame, end_frame, .. } = self.header;
-        // A part of a movie may be numbered anew.
+        // A part of a movie may have new numbers.
         let end = end_frame.as_ref().map(|(end, _)| *end);
         let count = self.frames.len() as u64;
-        let is_whole = start_frame.zip(end).is_some_and(|(start, end)| end.checked_sub(start) == Some(count - 1));
+        let is_complete = start_frame.zip(end).is_some_and(|(start, end)| end.checked_sub(start) == Some(count - 1));
         match (start_frame, end_frame) {
-            _ if is_whole => {}
+            _ if is_complete => {}
             (Some(start), _) if *start != first.number => {
-                let message = format!("the first frame is {}, but `START_FRAME` says otherwise", first.number);
-                let span = self.first.clone().expect("it was noted with the first frame");
+                let message = format!("the first frame is {}, but `START_FRAME` is {start}", first.number);
+                let span = self.first.clone().expect("the first frame has set it");
                 return Err(Flaw { span, message });
             }
             (_, Some((end, span))) if last.number != *end => {
-                let message = format!("`END_FRAME` promises {end} frames, but the last is frame {}", last.number);
+                let message = format!("`END_FRAME` is {end}, but the last frame is {}", last.number);
                 return Err(Flaw { span: span.clone(), message });
             }
             _ => {}
         }
         match lines.map(header::bare).find(|line| !line.text.is_empty()) {
-            Some(line) => flaw(&line, "something comes after the movie's end, `@@`"),
+            Some(line) => flaw(&line, "unexpected text after `@@`, the end of the movie"),
             None => Ok(()),
         }
     }
@@ -141,9 +140,9 @@ impl Reader<'_> {
             total += self.row(number, row, lines)?;
         }
         match sum {
-            // A sum of averages is rounded to a count.
+            // The sum of averages is rounded to a count.
             Some((wanted, at)) if self.header.shape.unit == Unit::RAW && (total - wanted).abs() > 0.5 => {
-                let message = format!("`Raw Sum` says {wanted}, but the cells of frame {number} sum to {total}");
+                let message = format!("`Raw Sum` is {wanted}, but the cells of frame {number} sum to {total}");
                 return flaw(&at, message);
             }
             _ => {}
@@ -153,7 +152,7 @@ impl Reader<'_> {
         Ok(())
     }
 
-    /// Notes the time of the next frame. The first frame decides whether they have times.
+    /// Adds the time of the next frame. The first frame decides whether the frames have times.
     fn time(&mut self, field: Option<Piece<'_>>) -> Result<(), Flaw> {
         let is_first = self.frames.is_empty();
         let Some(field) = field.filter(|field| !is_first || field.decimal("").is_ok()) else { return Ok(()) };
@@ -163,7 +162,7 @@ impl Reader<'_> {
         let seconds = field.decimal("the frame's time")?;
         if !(0.0..1e9).contains(&seconds) {
             let text = shortened(field.text);
-            return flaw(&field, format!("the frame's time is no number of seconds from 0 to 1e9: `{text}`"));
+            return flaw(&field, format!("the frame's time is not from 0 to 1e9 s: `{text}`"));
         }
         let time = (seconds * 1e9).round() as i64;
         if self.times.last().is_some_and(|last| *last > time) {
@@ -173,7 +172,7 @@ impl Reader<'_> {
         Ok(())
     }
 
-    /// Reads one row of cells and gives its sum.
+    /// Reads one row of cells, and returns its sum.
     fn row(&mut self, frame: u64, row: usize, lines: &mut Lines<'_>) -> Result<f64, Flaw> {
         let ImageShape { rows, cols, .. } = self.header.shape;
         let line = lines.next().map_or_else(|| lines.end(), Piece::trimmed);
@@ -184,8 +183,7 @@ impl Reader<'_> {
         let found = notation.fields(line).count();
         if found != cols {
             let cut = if lines.is_at_end() { ": the file ends in the middle of it" } else { "" };
-            let message =
-                format!("row {} of frame {frame} has {found} cells, but `COLS` promises {cols}{cut}", row + 1);
+            let message = format!("row {} of frame {frame} has {found} cells, but `COLS` is {cols}{cut}", row + 1);
             return flaw(&line, message);
         }
         let mut sum = 0.0;
@@ -205,9 +203,9 @@ impl Reader<'_> {
             }
         } else if is_dead != self.dead.binary_search(&index).is_ok() {
             let message = if is_dead {
-                "there was a sensel here in the first frame"
+                "this cell is `B`, but it has a sensel in the first frame"
             } else {
-                "there was no sensel here in the first frame"
+                "this cell has a sensel, but it is `B` in the first frame"
             };
             return flaw(&cell, message);
         }
@@ -227,20 +225,20 @@ fn is_frame_line(line: Piece<'_>) -> bool {
     line.part_after_quote().after("Frame").is_some()
 }
 
-/// What the line before a frame says.
+/// The content of the line of a frame.
 struct Line<'t> {
     number: u64,
-    /// Where the number stands.
+    /// Place of the number.
     at: Piece<'t>,
-    /// What stands where the time would.
+    /// The field of the time, which may hold something else.
     time: Option<Piece<'t>>,
-    /// The sum of all cells [raw], and where it stands.
+    /// The sum of all cells [raw], and its place.
     sum: Option<(f64, Piece<'t>)>,
 }
 
-/// `Frame 3`, `Frame 3, 0.2,, …,,,Raw Sum=,,308`: its number, its time and its sum, if there are such.
+/// Parses `Frame 3` or `Frame 3, 0.2,, …,,,Raw Sum=,,308`.
 fn frame_line(line: Piece<'_>) -> Result<Line<'_>, Flaw> {
-    let rest = line.part_after_quote().after("Frame").expect("it is such a line");
+    let rest = line.part_after_quote().after("Frame").expect("the caller has checked the line");
     let rest = rest.part(rest.text.trim_start_matches([':', '#', '=', ' ', '\t']));
     let mut fields = Notation::of(rest.text).fields(rest);
     let at = fields.next().unwrap_or(rest);

@@ -1,4 +1,4 @@
-//! The format of Tekscan against the shipped recording and damaged copies of it.
+//! Tests of Tekscan's format: the shipped recording and damaged copies of it.
 
 use super::*;
 use crate::recordings::testing::{check_damages, complaints, count_refused};
@@ -51,11 +51,11 @@ fn the_whole_recording_agrees_with_its_own_sums() {
     // Two rows and columns of the map at each border have no sensel, and two of each in its middle.
     assert_eq!(movie.dead.len(), 28 * 28 - 22 * 22);
     let one_more = FINGER.replacen("B,B,5,0,0", "B,B,6,0,0", 1);
-    assert_eq!(flaws(one_more.as_bytes()), [(28, "`Raw Sum` says 310, but the cells of frame 1 sum to 311".into())]);
+    assert_eq!(flaws(one_more.as_bytes()), [(28, "`Raw Sum` is 310, but the cells of frame 1 sum to 311".into())]);
 }
 
 #[test]
-fn a_small_movie_in_any_dress() {
+fn a_small_movie_in_every_notation() {
     let movie = parse(SMALL).unwrap();
     assert_eq!(movie.cells, [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 0.0, 0.0, 0.0, 0.0, 0.0, 7.0]);
     let frames: Vec<_> = movie.frames.iter().map(|frame| (frame.number, frame.time, frame.start)).collect();
@@ -104,14 +104,14 @@ fn a_small_movie_in_any_dress() {
 }
 
 #[test]
-fn an_insole_that_only_numbers_its_frames() {
+fn an_insole_with_numbers_but_no_times() {
     let text = SMALL.replace(", 0,, 12/2/2019 6:21:52.34PM,,,Raw Sum=,,15", "");
     let text = text.replace(", 0.1,, 12/2/2019 6:21:52.44PM,,,Raw Sum=,,7", "").replace("UNITS raw", "UNITS KPa");
     let movie = parse(&text.replace("FRAME 0.1", "FRAME 0.032")).unwrap();
     assert_eq!((movie.frames[1].time, movie.period), (32_000_000, 0.032));
     assert_eq!(movie.threshold, None, "the filter counts and knows no kPa");
     let silent = text.replace("SECONDS_PER_FRAME 0.1\n", "");
-    assert_eq!(flaws(silent.as_bytes()), [(0, "the file does not say how fast its frames came".into())]);
+    assert_eq!(flaws(silent.as_bytes()), [(0, "the file does not give its frame rate".into())]);
     let hinted = read(silent.as_bytes(), &Hints { rate_hz: Some(50.0), ..Hints::default() }).unwrap();
     assert_eq!((hinted.frames[1].time, hinted.period), (20_000_000, 0.02));
 }
@@ -129,15 +129,15 @@ fn pressures_become_kpa_and_forces_newtons() {
 }
 
 #[test]
-fn hints_fill_gaps_and_contradict_nothing() {
+fn hints_fill_gaps_and_must_agree() {
     let unsaid = SMALL.replace("UNITS raw\n", "").replace("COL_SPACING 4 millimeters\n", "");
     let hints = Hints { unit: Some(Unit::RAW), pitch: Some([0.004, 0.0127]), ..Hints::default() };
     assert_eq!(read(unsaid.as_bytes(), &hints), parse(SMALL));
     let cases = [
-        (Hints { unit: Some(Unit::NEWTON), ..Hints::default() }, "the file says otherwise: raw"),
-        (Hints { pitch: Some([0.004, 0.004]), ..Hints::default() }, "the file says otherwise: [4, 12.7] mm"),
-        (Hints { rate_hz: Some(50.0), ..Hints::default() }, "the file says otherwise: 10 frames a second"),
-        (Hints { size: Some([3, 2]), ..Hints::default() }, "the file says otherwise: 2 rows by 3 columns"),
+        (Hints { unit: Some(Unit::NEWTON), ..Hints::default() }, "the file has another value: raw"),
+        (Hints { pitch: Some([0.004, 0.004]), ..Hints::default() }, "the file has another value: [4, 12.7] mm"),
+        (Hints { rate_hz: Some(50.0), ..Hints::default() }, "the file has another value: 10 frames a second"),
+        (Hints { size: Some([3, 2]), ..Hints::default() }, "the file has another value: 2 rows by 3 columns"),
     ];
     for (hints, message) in cases {
         assert_eq!(complaints(read(SMALL.as_bytes(), &hints)), [(0, message.into())]);
@@ -145,7 +145,7 @@ fn hints_fill_gaps_and_contradict_nothing() {
 }
 
 #[test]
-fn damaged_files_say_what_and_where() {
+fn a_damaged_file_has_its_line_and_message() {
     let huge = "9".repeat(30);
     let cases: &[(&str, &str, usize, &str)] = &[
         ("ROWS 2\n", "", 10, "the header has no `ROWS`"),
@@ -153,7 +153,7 @@ fn damaged_files_say_what_and_where() {
         ("COL_SPACING 4 millimeters\n", "", 10, "the header has no `COL_SPACING`"),
         ("MOVIE", "FRAME", 1, "the file is a `FRAME`, not a `MOVIE`"),
         ("ROWS 2", "ROWS two", 2, "`ROWS` is not a whole number: `two`"),
-        ("ROWS 2", "ROWS 0", 2, "`ROWS` is at least 1"),
+        ("ROWS 2", "ROWS 0", 2, "`ROWS` must be at least 1"),
         ("ROWS 2", "ROWS -2", 2, "`ROWS` is not a whole number: `-2`"),
         ("ROWS 2", "ROWS 4000000000", 2, "a frame of 4000000000 by 3 cells is more than the file holds"),
         (
@@ -164,49 +164,49 @@ fn damaged_files_say_what_and_where() {
         ),
         ("COLS 3", &format!("COLS {huge}"), 3, &format!("`COLS` is not a whole number: `{huge}`")),
         ("COLS 3", "COLS 3\nROWS 3", 4, "`ROWS` is given twice"),
-        ("0.5 inches", "0.5 feet", 4, "`ROW_SPACING` is in `centimeters`, `millimeters` or `inches`, not `feet`"),
-        ("4 millimeters", "0 millimeters", 5, "`COL_SPACING` is greater than 0"),
+        (
+            "0.5 inches",
+            "0.5 feet",
+            4,
+            "the unit of `ROW_SPACING` must be `centimeters`, `millimeters` or `inches`, not `feet`",
+        ),
+        ("4 millimeters", "0 millimeters", 5, "`COL_SPACING` must be greater than 0"),
         ("THRESHOLD 3", "THRESHOLD none", 6, "`NOISE_THRESHOLD` is not a number: `none`"),
-        ("FRAME 0.1", "FRAME -0.1", 7, "`SECONDS_PER_FRAME` is greater than 0"),
-        ("START_FRAME 1", "START_FRAME 5", 13, "the first frame is 1, but `START_FRAME` says otherwise"),
-        ("END_FRAME 2", "END_FRAME 3", 9, "`END_FRAME` promises 3 frames, but the last is frame 2"),
+        ("FRAME 0.1", "FRAME -0.1", 7, "`SECONDS_PER_FRAME` must be greater than 0"),
+        ("START_FRAME 1", "START_FRAME 5", 13, "the first frame is 1, but `START_FRAME` is 5"),
+        ("END_FRAME 2", "END_FRAME 3", 9, "`END_FRAME` is 3, but the last frame is 2"),
         (
             "UNITS raw",
             "UNITS stone",
             10,
-            "the unit `stone` is not known here; known are `raw`, pressures (`kPa`, `N/cm2`, `PSI`, `mmHg`, …) and \
+            "the unit `stone` is unknown; known are `raw`, pressures (`kPa`, `N/cm2`, `PSI`, `mmHg`, …) and \
              forces (`N`, `lbs`, `kg`, …)",
         ),
-        ("ASCII_DATA @@\n", "", 12, "the header has no `ASCII_DATA @@` at its end"),
+        ("ASCII_DATA @@\n", "", 12, "the header has no last line `ASCII_DATA @@`"),
         ("Frame 1,", "Frame one,", 13, "the frame's number is not a whole number: `one`"),
         (" 0.1,,", " ,,", 17, "the frame's time is not a number: ``"),
-        (" 0.1,,", " 1e30,,", 17, "the frame's time is no number of seconds from 0 to 1e9: `1e30`"),
+        (" 0.1,,", " 1e30,,", 17, "the frame's time is not from 0 to 1e9 s: `1e30`"),
         ("1, 0,,", "1, 0.2,,", 17, "the time goes back"),
         ("Frame 2,", "Frame 3,", 17, "frame 3 comes after frame 1"),
         ("=,,15", "=,,", 13, "`Raw Sum=` has no number: the line is cut off"),
-        ("=,,15", "=,,16", 13, "`Raw Sum` says 16, but the cells of frame 1 sum to 15"),
+        ("=,,15", "=,,16", 13, "`Raw Sum` is 16, but the cells of frame 1 sum to 15"),
         ("3,4,5", "3,4.,x", 15, "this cell is not a number: `x`"),
         ("3,4,5", "3,NaN,5", 15, "this cell is not finite: `NaN`"),
         ("3,4,5", "3,-inf,5", 15, "this cell is not finite: `-inf`"),
         ("3,4,5", "3,1e39,5", 15, "this cell is too large: `1e39`"),
-        ("3,4,5", "3,4", 15, "row 2 of frame 1 has 2 cells, but `COLS` promises 3"),
-        ("3,4,5", "3,4,5,6", 15, "row 2 of frame 1 has 4 cells, but `COLS` promises 3"),
+        ("3,4,5", "3,4", 15, "row 2 of frame 1 has 2 cells, but `COLS` is 3"),
+        ("3,4,5", "3,4,5,6", 15, "row 2 of frame 1 has 4 cells, but `COLS` is 3"),
         ("3,4,5\n", "", 15, "frame 1 ends after 1 of its 2 rows"),
         ("3,4,5\n\n", "", 15, "frame 1 ends after 1 of its 2 rows"),
         ("0,0,7\n", "", 19, "frame 2 ends after 1 of its 2 rows"),
-        (
-            "0,0,7\n@@\n",
-            "0,0",
-            19,
-            "row 2 of frame 2 has 2 cells, but `COLS` promises 3: the file ends in the middle of it",
-        ),
+        ("0,0,7\n@@\n", "0,0", 19, "row 2 of frame 2 has 2 cells, but `COLS` is 3: the file ends in the middle of it"),
         ("0,0,7\n@@\n", "", 18, "frame 2 ends after 1 of its 2 rows"),
         ("0,0,7\n@@\n", "0,0,7\n", 19, "the file ends after frame 2 without `@@`: it is truncated"),
-        ("B,0,0", "0,0,0", 18, "there was no sensel here in the first frame"),
-        ("B,0,0", "B,B,0", 18, "there was a sensel here in the first frame"),
+        ("B,0,0", "0,0,0", 18, "this cell has a sensel, but it is `B` in the first frame"),
+        ("B,0,0", "B,B,0", 18, "this cell is `B`, but it has a sensel in the first frame"),
         ("\nFrame 2", "\nhello\nFrame 2", 17, "expected a frame or `@@`, found `hello`"),
-        ("@@\n\nFrame 1", "@@\n@@\nFrame 1", 12, "the movie has no frame"),
-        ("7\n@@\n", "7\n@@\nmore", 21, "something comes after the movie's end, `@@`"),
+        ("@@\n\nFrame 1", "@@\n@@\nFrame 1", 12, "the file has no frame"),
+        ("7\n@@\n", "7\n@@\nmore", 21, "unexpected text after `@@`, the end of the movie"),
     ];
     check_damages(SMALL, "movie.csv", &Hints::default(), cases);
     assert_eq!(flaws(b""), [(0, "stranger".into())]);
@@ -219,7 +219,7 @@ fn damaged_files_say_what_and_where() {
 }
 
 #[test]
-fn no_damage_makes_it_panic() {
+fn no_damage_causes_a_panic() {
     let start = FINGER.find("\nFrame 4,").unwrap();
     let movie = format!("{}@@\n", &FINGER[..start]).replace("END_FRAME 309", "END_FRAME 3");
     assert_eq!(parse(&movie).unwrap().frames.len(), 3);

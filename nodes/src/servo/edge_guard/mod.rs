@@ -1,69 +1,113 @@
-//! `edge_guard`: keeps the finger off the pad's rim: near it, only motion that brings the contact inward passes whole.
-//!
-//! A contact at p = (x, y, 0) of an object that rests moves over the pad with dp/dt = -(v + omega x p), so
+//! A contact at p = (x, y, 0) of an object at rest moves over the pad with dp/dt = -(v + omega x p):
 //!
 //! ```text
 //! dx/dt = -vx + wz y        dy/dt = -vy - wz x
 //! ```
 //!
-//! What of this goes toward the rim is taken away by a correction of vx and vy alone; it is all of it from the margin
-//! on, and a share that grows linearly over a ramp before it. A turn wz goes on: the sensor then turns about the contact
-//! and no more about its own middle. Rolling over an object of radius R adds -R wy to dx/dt and R wx to dy/dt; R is
-//! unknown, but not its sign, so wx and wy are scaled by themselves when they roll toward the rim.
+//! The outward part is removed by a correction of vx and vy alone: all of it from the margin on, and a fraction that
+//! grows linearly over the ramp before the margin. A turn wz continues, but about the contact instead of the middle of
+//! the pad. Rolling over an object of radius R adds -R wy to dx/dt and R wx to dy/dt. R is unknown but its sign is not,
+//! so wx and wy are scaled when they roll toward the rim.
 //!
-//! Invariant: the twist is a continuous function of the contact and of what comes in, and what goes inward passes
-//! unchanged, bit for bit.
+//! Invariants: the output is a continuous function of the contact and the input, and inward motion passes unchanged, bit
+//! for bit.
 
-use tactflow_runtime::node::{Mistake, Mistakes, Node, NonNegative, Positive, Setup, Tick};
-use tactflow_runtime::signal::Twist;
-use tactflow_runtime::{inputs, outputs, params, state};
+use tactflow_runtime::node::{
+    Absence, Describe, In, Inputs, Mistake, Mistakes, Node, Out, Outputs, Param, Setup, State, Tick,
+};
+use tactflow_runtime::signal::{Flag, Image, Scalar, Twist};
 
-params! {
-    /// How far from the centres of the outermost tactels the contact stays [tactel].
-    margin_tactels: NonNegative = NonNegative(2.0),
-    /// Width of the zone before the margin in which motion toward the rim fades out [tactel].
-    ramp_tactels: Positive = Positive(1.0),
-}
-
-inputs! {
-    /// What is about to be commanded, in the sensor's frame [m/s, rad/s].
-    twist: Twist["A"],
-    /// Centre of the contact along the sensor's x from the pad's middle [m].
-    x: Trigger<Scalar["m", "A"]>,
-    /// Centre of the contact along the sensor's y from the pad's middle [m].
-    y: Trigger<Scalar["m", "A"]>,
-    /// Any image of the pad: its size and pitch count, not its values.
-    image: Sampled<Image["_", "A"]>,
-}
-
-outputs! {
-    /// The same without what would carry the contact further toward the rim [m/s, rad/s].
-    twist: Twist["A"],
-    /// Whether motion toward the rim is held back: set when half of it is, until none is.
-    at_rim: Flag,
-}
-
-state! {
-    /// Where the contact is, or was a moment ago [m].
-    contact: Option<[f64; 2]>,
-    /// When it went away, if it did [ns].
-    lost_at: Option<i64>,
-    /// Whether it is at the rim.
-    at_rim: bool,
-}
-
-/// How far the contact may go.
+/// Keeps the contact away from the rim of the pad: near the rim, only inward motion passes unchanged.
+///
+/// A contact that slides off the pad is lost, and the rim cuts off a part of a contact, whose centre of gravity is then
+/// wrong. Near the rim this node removes the motion that carries the contact further out. It is the edge guard of the
+/// authors' later code, which kept the centre of gravity within tactels 2 to 13 of 16.
+///
+/// The contact of an object at rest moves over the pad with dx/dt = -vx + wz y and dy/dt = -vy - wz x. In the middle of
+/// the pad all outward motion passes, from `margin_tactels` on none. Over `ramp_tactels` before the margin the fraction
+/// falls linearly, so the output does not chatter. Only vx and vy are corrected: a turn about z continues, about the
+/// contact. Outward rolling (wy < 0 at the +x side, wx > 0 at the +y side, and the opposite signs at the opposite sides)
+/// is scaled by the same fraction. Inward motion, vz and wz pass unchanged.
+///
+/// Put it behind the `twist_adder` and directly before the `adjoint`, so that it guards guidance as well. The output is
+/// as old as the contact or the twist, whichever is older.
+///
+/// Without a contact every motion passes, so that the sensor can approach an object. The last contact is remembered for
+/// the graph's `reset_after_ms`, so flicker does not open the guard. The guard depends on geometry alone, so it works
+/// with any signs in the columns of `inverse_jacobian`. An object that moves by itself can still leave the pad.
+///
+/// ```toml
+/// [nodes.edge_guard]
+/// type = "edge_guard"
+/// in.twist = "sum.twist"
+/// in.x = "moments.x"
+/// in.y = "moments.y"
+/// in.image = "calibrate.image"
+/// margin_tactels = 2.0                # tactels 2 to 13 of 16
+/// ramp_tactels = 1.0
+/// ```
+#[derive(Describe)]
+#[describe(name = "edge_guard")]
 pub struct EdgeGuard {
     x: Fence,
     y: Fence,
 }
 
-/// How far the contact may go along one axis.
+/// Parameters of `edge_guard`.
+#[derive(Debug, Clone, Param)]
+pub struct Params {
+    /// Distance that the contact keeps from the centres of the outermost tactels.
+    #[param(unit = "tactel", range = 0.0.., default = 2.0)]
+    margin_tactels: f64,
+    /// Width of the zone before the margin in which outward motion fades out.
+    #[param(unit = "tactel", above = 0.0, default = 1.0)]
+    ramp_tactels: f64,
+}
+
+/// What `edge_guard` reads.
+#[derive(Inputs)]
+pub struct Inputs<'a> {
+    /// The motion to guard, in the frame of the sensor.
+    #[port(frame = "A")]
+    twist: In<'a, Twist>,
+    /// Centre of the contact along the sensor's x, from the middle of the pad.
+    #[port(unit = "m", frame = "A")]
+    x: Option<In<'a, Scalar>>,
+    /// Centre of the contact along the sensor's y, from the middle of the pad.
+    #[port(unit = "m", frame = "A")]
+    y: Option<In<'a, Scalar>>,
+    /// Any image of the pad, for its size and pitch.
+    #[port(unit = "_", frame = "A", sampled)]
+    #[expect(dead_code, reason = "only its shape is used")]
+    image: In<'a, Image>,
+}
+
+/// What `edge_guard` writes.
+#[derive(Outputs)]
+pub struct Outputs {
+    /// The same motion without the part that carries the contact toward the rim.
+    #[port(frame = "A")]
+    twist: Out<Twist>,
+    /// Whether outward motion is held back: set when half of it is, cleared when none is.
+    at_rim: Out<Flag>,
+}
+
+/// What `edge_guard` remembers.
+#[derive(State)]
+pub struct State {
+    /// Last position of the contact, until it has been absent for long [m].
+    contact: Option<[f64; 2]>,
+    absence: Absence,
+    /// The last output.
+    at_rim: bool,
+}
+
+/// The limits of the contact along one axis.
 #[derive(Debug, Clone, Copy)]
 struct Fence {
-    /// Furthest from the middle [m].
+    /// Largest distance from the middle [m].
     margin: f64,
-    /// Width of the zone before [m].
+    /// Width of the zone before it [m].
     ramp: f64,
 }
 
@@ -73,55 +117,20 @@ impl Node for EdgeGuard {
     type Outputs = Outputs;
     type State = State;
 
-    const NAME: &'static str = "edge_guard";
-    const SUMMARY: &'static str = "keeps the finger off the pad's rim: near it only motion inward passes whole";
-    const DOC: &'static str = "A contact that slides off the pad is lost, and one that is cut off by the rim has a \
-        wrong centre of gravity. So near the rim this node takes away what would carry the contact further out. It \
-        is the edge guard of the authors' later code, which held the centre of gravity within tactels 2 to 13 of \
-        16.\n\n\
-        The contact of an object that rests moves with dx/dt = -vx + wz y and dy/dt = -vy - wz x over the pad. Of \
-        what goes outward, all passes in the middle and nothing from `margin_tactels` on; over `ramp_tactels` \
-        before it the share falls linearly, so nothing chatters at a border. Only vx and vy are corrected: a turn \
-        about z goes on, but about the contact. Rolling outward (wy < 0 at the +x side, wx > 0 at the +y side, and \
-        the other way round) is scaled by the same share. Motion inward, vz and wz pass unchanged.\n\n\
-        Put it last before the `adjoint`, behind the `twist_adder`, so that guidance is guarded as well. The \
-        output is as old as the contact or the twist, whichever is older: a pad that falls silent lets the sink \
-        fade.\n\n\
-        Without a contact everything passes: there is nothing to keep, and an approach must get through. A contact \
-        that flickers is remembered for the graph's `reset_after_ms`. A sign convention other than that of \
-        `inverse_jacobian`'s example needs no change here, as only the geometry counts. An object that moves by \
-        itself can still leave the pad.";
-    const EXAMPLE: &'static str = r#"
-[nodes.edge_guard]
-type = "edge_guard"
-in.twist = "sum.twist"
-in.x = "moments.x"
-in.y = "moments.y"
-in.image = "calibrate.image"
-margin_tactels = 2.0                # tactels 2 to 13 of 16
-ramp_tactels = 1.0
-"#;
-
     fn new(params: Params, setup: &mut Setup<Self>) -> Result<Self, Mistakes> {
         let shape = &setup.inputs.image;
         let mut mistakes = Mistakes::new();
-        for (input, is_wired) in [("x", setup.inputs.x.is_some()), ("y", setup.inputs.y.is_some())] {
-            if !is_wired {
-                // It may be absent, but a guard that never knows of a contact is a wire that was forgotten.
-                mistakes.push(crate::unwired(Self::NAME, input, "a scalar", &format!("moments.{input}")));
-            }
-        }
-        let (margin, ramp) = (*params.margin_tactels, *params.ramp_tactels);
+        let (margin, ramp) = (params.margin_tactels, params.ramp_tactels);
         let half = (shape.rows.min(shape.cols).max(1) as f64 - 1.0) / 2.0;
         let (rows, cols) = (shape.rows, shape.cols);
         if half <= 0.0 {
-            let message = format!("{rows} by {cols} tactels have no middle: a contact on them is always at the rim");
-            mistakes.push(Mistake::input("image", message).help("leave the `edge_guard` out"));
+            let message = format!("a pad of {rows} by {cols} tactels has no middle: every contact on it is at the rim");
+            mistakes.push(Mistake::input("image", message).help("remove the `edge_guard`"));
         } else if margin + ramp > half {
             let message = format!(
-                "a margin of {margin} and a ramp of {ramp} tactels leave no middle of {rows} by {cols} tactels"
+                "a margin of {margin} and a ramp of {ramp} tactels leave no middle on a pad of {rows} by {cols} tactels"
             );
-            let help = format!("`margin_tactels` and `ramp_tactels` together may be {half} here");
+            let help = format!("`margin_tactels` and `ramp_tactels` may add up to at most {half} here");
             mistakes.push(Mistake::param("margin_tactels", message).help(help));
         }
         if !mistakes.is_empty() {
@@ -135,11 +144,15 @@ ramp_tactels = 1.0
     }
 
     fn state(&self) -> State {
-        State { contact: None, lost_at: None, at_rim: false }
+        State { contact: None, absence: Absence::default(), at_rim: false }
     }
 
     fn step(&self, tick: &Tick, inputs: Inputs<'_>, out: &mut Outputs, state: &mut State) {
-        state.see(inputs.x.zip(inputs.y).map(|(x, y)| [*x, *y]), tick);
+        let contact = inputs.x.zip(inputs.y).map(|(x, y)| [*x, *y]);
+        let is_forgotten = state.absence.is_long(contact.is_some(), tick);
+        if contact.is_some() || is_forgotten {
+            state.contact = contact;
+        }
         let share = match state.contact {
             Some([x, y]) => {
                 out.twist.set(guarded(&inputs.twist, [x, y], self.x, self.y));
@@ -155,32 +168,21 @@ ramp_tactels = 1.0
     }
 }
 
-impl State {
-    /// Takes over where the contact is; what flickers is still there.
-    fn see(&mut self, contact: Option<[f64; 2]>, tick: &Tick) {
-        if contact.is_some() {
-            (self.contact, self.lost_at) = (contact, None);
-        } else if tick.now - *self.lost_at.get_or_insert(tick.now) >= tick.reset_after {
-            self.contact = None;
-        }
-    }
-}
-
 impl Fence {
-    /// How much passes of a motion of the contact from `place` in the direction of `speed`: 1 in the middle, 0 from the
-    /// margin on.
+    /// Returns the fraction of a motion from `place` [m] in the direction of `speed` that passes: 1 in the middle, 0 from
+    /// the margin on.
     fn share(self, place: f64, speed: f64) -> f64 {
         let room = if speed > 0.0 { self.margin - place } else { self.margin + place };
         (room / self.ramp).clamp(0.0, 1.0)
     }
 
-    /// How much of `speed` does not pass.
+    /// Returns the part of `speed` that does not pass.
     fn excess(self, place: f64, speed: f64) -> f64 {
         (1.0 - self.share(place, speed)) * speed
     }
 }
 
-/// The twist without what carries a contact at (x, y) toward the rim.
+/// Returns the twist without the part that carries a contact at (x, y) [m] toward the rim.
 fn guarded(twist: &Twist, [x, y]: [f64; 2], along_x: Fence, along_y: Fence) -> Twist {
     let [vx, vy, vz, wx, wy, wz] = twist.0.into();
     Twist(

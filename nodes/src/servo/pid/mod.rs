@@ -9,45 +9,97 @@
 //! A held component stays as it is. An absent one contributes nothing and resets only itself, and only when it has been
 //! away for long: a frame of flicker does not wipe an integral.
 
-use tactflow_runtime::node::{Components, Interval, Map, Mistakes, Node, Positive, Setup, Tick};
-use tactflow_runtime::signal::{Freshness, Unit};
-use tactflow_runtime::{inputs, outputs, params, state};
+use tactflow_runtime::node::{
+    Absence, Components, Describe, In, Inputs, Interval, Map, Mistakes, Node, Out, Outputs, Param, Setup, State, Tick,
+};
+use tactflow_runtime::signal::{Features, Freshness, Unit};
 
 use super::integral::integrate;
 use crate::motion::axis::wrap_axial;
 
-params! { Gains:
-    /// Proportional gain [1/s].
-    kp: f64 = 0.0,
-    /// Integral gain [1/s²].
-    ki: f64 = 0.0,
-    /// Derivative gain [1].
-    kd: f64 = 0.0,
-    /// Integrates only while the error is at most this; always when not given [the feature's unit].
-    within: Option<Positive>,
-    /// Bound on the integral's part of the control [the feature's unit per second].
-    bound: Positive = Positive(1.0),
-    /// Bound on the whole control; none when not given [the feature's unit per second].
-    limit: Option<Positive>,
+/// A PID controller on every feature, for force and position control.
+///
+/// u = kp e + I + kd de/dt, where I is the sum of ki e dt: eq. 3 of the paper, for each feature by itself. Time is the
+/// time between the stamps of the samples, so a gain means the same at 100 Hz and at 1 kHz. The paper sums without time:
+/// its K_I is ki times the period, and its K_D is kd over the period.
+///
+/// kp in 1/s is how fast an error is reduced: 2.0 takes half a second. Under velocity control soft foam integrates
+/// already, so ki is for creep and for objects that move. The integral grows only while the error is `within`, never
+/// exceeds `bound`, and does not grow outward while the control is at its `limit`.
+///
+/// A repeated sample is neither integrated nor differentiated, and neither is the first one after a gap longer than the
+/// graph's `max_gap_ms`. A feature that is absent contributes nothing; its integral survives flicker and is reset when the
+/// feature is absent for the graph's `reset_after_ms`. kd amplifies noise: smooth the feature first, or leave it 0.
+///
+/// A feature that nothing uses, because a projector deletes everything it contributes, is frozen: its control is absent,
+/// and it starts afresh in a mode that selects it.
+///
+/// ```toml
+/// [nodes.pid]
+/// type = "pid"
+/// in.error = "error.error"
+/// gains.x = { kp = 2.0 }              # [1/s]
+/// gains.y = { kp = 2.0 }
+/// gains.pressure = { kp = 0.2, ki = 0.06, within = 0.02 }   # integrates only near the target
+/// ```
+#[derive(Describe)]
+#[describe(name = "pid")]
+pub struct Pid {
+    /// The control law of each feature.
+    laws: Box<[Law]>,
 }
 
-params! {
+/// Parameters of `pid`.
+#[derive(Debug, Clone, Param)]
+pub struct Params {
     /// Gains of each feature.
-    live gains: Map<Gains>,
+    #[param(live)]
+    gains: Map<Gains>,
 }
 
-inputs! {
-    /// Error of each feature [any unit].
-    error: Features["_", "A"],
+/// Gains of one feature.
+#[derive(Debug, Clone, Param)]
+struct Gains {
+    /// Proportional gain.
+    #[param(unit = "1/s", default = 0.0)]
+    kp: f64,
+    /// Integral gain.
+    #[param(unit = "1/s2", default = 0.0)]
+    ki: f64,
+    /// Derivative gain.
+    #[param(unit = "1", default = 0.0)]
+    kd: f64,
+    /// Largest error at which the integral grows; without it, it always grows.
+    #[param(unit = "E", above = 0.0)]
+    within: Option<f64>,
+    /// Bound on the integral's part of the control.
+    #[param(unit = "E/s", above = 0.0, default = 1.0)]
+    bound: f64,
+    /// Bound on the whole control; none without it.
+    #[param(unit = "E/s", above = 0.0)]
+    limit: Option<f64>,
 }
 
-outputs! {
-    /// Control of each feature [the feature's unit per second].
-    control: Features["_/s", "A"],
+/// What `pid` reads.
+#[derive(Inputs)]
+pub struct Inputs<'a> {
+    /// Error of each feature.
+    #[port(unit = "E", frame = "A")]
+    error: In<'a, Features>,
 }
 
-state! {
-    /// What is remembered of each feature.
+/// What `pid` writes.
+#[derive(Outputs)]
+pub struct Outputs {
+    /// Control of each feature.
+    #[port(unit = "E/s", frame = "A")]
+    control: Out<Features>,
+}
+
+/// What `pid` remembers.
+#[derive(State)]
+pub struct State {
+    /// For each feature.
     memories: Vec<Memory>,
     /// Time of the last step [ns].
     stepped: i64,
@@ -56,18 +108,12 @@ state! {
 /// What is remembered of one feature.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Memory {
-    /// The integral's part of the control [the feature's unit per second].
+    /// The integral's part of the control, in the feature's unit per second.
     integral: f64,
-    /// Error of the last sample [the feature's unit].
+    /// Error of the last sample, in the feature's unit.
     error: f64,
     interval: Interval,
-    /// When it went away, if it did [ns].
-    lost_at: Option<i64>,
-}
-
-/// The control law of each feature.
-pub struct Pid {
-    laws: Box<[Law]>,
+    absence: Absence,
 }
 
 struct Law {
@@ -87,28 +133,6 @@ impl Node for Pid {
     type Inputs<'a> = Inputs<'a>;
     type Outputs = Outputs;
     type State = State;
-
-    const NAME: &'static str = "pid";
-    const SUMMARY: &'static str = "a PID controller on every feature, for force and position control";
-    const DOC: &'static str = "u = kp e + I + kd de/dt with I the sum of ki e dt: the paper's eq. 3, each feature \
-        by itself. Time is that between the stamps of the samples, so a gain means the same at 100 Hz and at 1 \
-        kHz. The paper sums without time: its K_I is ki times the period, its K_D is kd over the period.\n\n\
-        kp in 1/s says how fast an error is worked off: 2.0 takes half a second. Under velocity control soft foam \
-        integrates already, so ki is there for creep and for objects that move. It gathers only while the error is \
-        `within`, never grows beyond `bound`, and does not grow outward while the control is at its `limit`.\n\n\
-        A repeated sample is neither integrated nor differentiated. A feature that is absent contributes nothing; \
-        its integral is kept through flicker, and forgotten when it stays away for the graph's `reset_after_ms`. \
-        kd amplifies noise: smooth the feature first, or leave it 0.\n\n\
-        A feature that nothing uses, since a projector deletes all that it gives, is frozen: its control is absent, \
-        and it starts afresh in a mode that selects it.";
-    const EXAMPLE: &'static str = r#"
-[nodes.pid]
-type = "pid"
-in.error = "error.error"
-gains.x = { kp = 2.0 }              # [1/s]
-gains.y = { kp = 2.0 }
-gains.pressure = { kp = 0.2, ki = 0.06, within = 0.02 }   # integrates only near the target
-"#;
 
     fn new(params: Params, setup: &mut Setup<Self>) -> Result<Self, Mistakes> {
         let shape = &setup.inputs.error;
@@ -134,26 +158,26 @@ gains.pressure = { kp = 0.2, ki = 0.06, within = 0.02 }   # integrates only near
     }
 
     fn step(&self, tick: &Tick, inputs: Inputs<'_>, out: &mut Outputs, state: &mut State) {
-        let control = out.control.write();
-        let parts = self.laws.iter().zip(&mut state.memories).zip(inputs.error.components());
-        for (i, ((law, memory), component)) in parts.enumerate() {
+        for (i, (law, memory)) in self.laws.iter().zip(&mut state.memories).enumerate() {
             if !law.is_wanted {
-                control.lose(i, tick.index);
+                out.control.lose(i);
                 *memory = Memory::default();
                 continue;
             }
-            match (component.freshness(tick.index), component.get()) {
-                (Freshness::New, Some(error)) => {
-                    memory.came_back(tick);
-                    let dt = memory.interval.step(component.stamp(), tick);
-                    control.set(i, law.control(error, dt, tick.max_gap, memory), tick.index, component.stamp());
+            match inputs.error.get(i) {
+                Some(error) if error.is_new() => {
+                    if memory.absence.end(tick) {
+                        *memory = Memory::default();
+                    }
+                    let dt = memory.interval.step(&error, tick);
+                    out.control.set_from(i, law.control(*error, dt, memory), &error);
                 }
-                (_, Some(_)) => {}
-                (freshness, None) => {
-                    // Absent without having been seen to go: all went at once, and the node was not stepped then.
-                    let went = if freshness == Freshness::Lost { tick.now } else { state.stepped };
-                    memory.lost_at.get_or_insert(went);
-                    control.lose(i, tick.index);
+                Some(_) => {}
+                None => {
+                    // Absent without a loss: all features were lost at once, and the node was not stepped then.
+                    let is_lost = inputs.error.freshness(i) == Freshness::Lost;
+                    memory.absence.begin(if is_lost { tick.now } else { state.stepped });
+                    out.control.lose(i);
                 }
             }
         }
@@ -161,39 +185,27 @@ gains.pressure = { kp = 0.2, ki = 0.06, within = 0.02 }   # integrates only near
     }
 }
 
-impl Memory {
-    /// Decides, now that the feature is there, whether it was away for so long that it starts afresh.
-    fn came_back(&mut self, tick: &Tick) {
-        if let Some(lost_at) = self.lost_at {
-            self.lost_at = None;
-            if tick.now - lost_at >= tick.reset_after {
-                *self = Self::default();
-            }
-        }
-    }
-}
-
 impl Law {
     fn new(gains: &Gains, unit: Unit) -> Self {
-        let or_none = |bound: Option<Positive>| bound.map_or(f64::INFINITY, |bound| *bound);
         Self {
             kp: gains.kp,
             ki: gains.ki,
             kd: gains.kd,
-            within: or_none(gains.within),
-            bound: *gains.bound,
-            limit: or_none(gains.limit),
+            within: gains.within.unwrap_or(f64::INFINITY),
+            bound: gains.bound,
+            limit: gains.limit.unwrap_or(f64::INFINITY),
             is_axial: unit.is_axial(),
             is_wanted: true,
         }
     }
 
-    /// The control for an error that came `dt` [s] after the last one. What came after a gap tells no slope: its time
-    /// is cut at `max_gap` [s], and the error would seem to have jumped.
-    fn control(&self, error: f64, dt: f64, max_gap: f64, memory: &mut Memory) -> f64 {
+    /// The control for an error that comes `dt` [s] after the last one. Without a time there is neither a slope nor
+    /// growth of the integral.
+    fn control(&self, error: f64, dt: Option<f64>, memory: &mut Memory) -> f64 {
         let change = error - memory.error;
         let change = if self.is_axial { wrap_axial(change) } else { change };
-        let slope = if dt > 0.0 && dt < max_gap { change / dt } else { 0.0 };
+        let dt = dt.unwrap_or(0.0);
+        let slope = if dt > 0.0 { change / dt } else { 0.0 };
         let others = self.kp * error + self.kd * slope;
         let growth = if error.abs() <= self.within { self.ki * error * dt } else { 0.0 };
         memory.integral = integrate(memory.integral, growth, self.bound, others, self.limit);

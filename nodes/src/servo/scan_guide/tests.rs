@@ -1,4 +1,4 @@
-//! The guide on a sensor that does exactly as it is told, over surfaces with a shape in closed form.
+//! The guide on a sensor that follows every command exactly, over surfaces with a shape in closed form.
 
 use nalgebra::{IsometryMatrix3, Rotation3, Translation3, Vector3};
 use proptest::prelude::*;
@@ -59,7 +59,7 @@ impl World {
         (from < to).then_some((from + to) / 2.0)
     }
 
-    /// One sample, and a step of `ms` of a sensor that goes at `share` of what it is told.
+    /// One sample, and a step of `ms` of a sensor that moves at a fraction `share` of the commanded speed.
     fn step(&mut self, ms: f64, share: f64) {
         let contact = [self.contact(0), self.contact(1)];
         self.rig.set("gate", contact.iter().all(Option::is_some));
@@ -113,7 +113,7 @@ const ROWS: [[f64; 2]; 8] =
     [[0.0, 0.0], [0.0, -0.01], [-0.02, -0.01], [0.02, -0.01], [0.02, 0.0], [-0.02, 0.0], [-0.02, 0.01], [0.02, 0.01]];
 
 #[test]
-fn it_goes_to_and_fro_about_where_it_began_and_says_when_it_is_done() {
+fn the_scan_is_centred_on_its_start_and_ends_with_done() {
     let mut world = World::new(SCAN);
     let time = world.run();
     world.assert_turns(&ROWS, 2.0 * GRAIN);
@@ -126,14 +126,14 @@ fn it_goes_to_and_fro_about_where_it_began_and_says_when_it_is_done() {
 }
 
 #[test]
-fn along_y_it_is_the_same_with_the_axes_exchanged() {
+fn along_y_the_scan_is_the_same_with_the_axes_exchanged() {
     let mut world = World::new(&format!("{SCAN}\naxis = \"y\""));
     world.run();
     world.assert_turns(&ROWS.map(|[x, y]| [y, x]), 2.0 * GRAIN);
 }
 
 #[test]
-fn the_way_counts_and_not_the_time() {
+fn the_distance_counts_and_not_the_time() {
     // A sensor that lags, stands still for a while, and whose samples come as they will.
     let mut world = World::new(SCAN);
     for i in 0..30_000 {
@@ -147,7 +147,7 @@ fn the_way_counts_and_not_the_time() {
 }
 
 #[test]
-fn on_a_cylinder_it_is_the_way_over_the_surface() {
+fn on_a_cylinder_the_distance_is_along_the_surface() {
     // The sensor's origin rolls along the arc, so the way along x is radius times angle.
     let mut world = World { radius: 0.05, ..World::new("speed_m_per_s = 0.02\nstroke_m = 0.06\nstep_m = 0.01") };
     world.run();
@@ -157,7 +157,7 @@ fn on_a_cylinder_it_is_the_way_over_the_surface() {
 }
 
 #[test]
-fn it_turns_at_the_edge_of_the_object_and_never_leaves_it() {
+fn the_scan_turns_at_the_edge_of_the_object_and_never_leaves_it() {
     // The contact is 20 mm behind the middle when the pad is past the edge by 10 mm: (-40 - 0) / 2 = -20.
     let mut world = World { plate: [[-0.03, 0.02], [-1.0, 1.0]], ..World::new(&SCAN.replace("0.04", "0.2")) };
     world.run();
@@ -170,7 +170,7 @@ fn it_turns_at_the_edge_of_the_object_and_never_leaves_it() {
 }
 
 #[test]
-fn where_the_surface_ends_aside_the_scan_does() {
+fn the_scan_ends_where_a_step_across_leaves_the_surface() {
     let mut world =
         World { plate: [[-1.0, 1.0], [-0.1, 0.012]], ..World::new(&SCAN.replace("strokes = 3", "strokes = 9")) };
     world.run();
@@ -180,7 +180,7 @@ fn where_the_surface_ends_aside_the_scan_does() {
 }
 
 #[test]
-fn what_stands_in_the_way_ends_a_leg() {
+fn an_obstacle_ends_a_leg() {
     let mut world = World { wall: 0.005, ..World::new(SCAN) };
     world.run();
     assert!(world.track.iter().all(|at| at[0] < 0.005 + 1e-9));
@@ -189,7 +189,7 @@ fn what_stands_in_the_way_ends_a_leg() {
 }
 
 #[test]
-fn one_image_with_another_contact_is_no_edge() {
+fn one_image_with_another_contact_is_not_an_edge() {
     let mut world = World::new(SCAN);
     (0..100).for_each(|_| world.step(4.0, 1.0));
     let before = world.turns.len();
@@ -204,7 +204,7 @@ fn one_image_with_another_contact_is_no_edge() {
 }
 
 #[test]
-fn a_flicker_halts_it_and_a_loss_begins_anew() {
+fn flicker_pauses_the_scan_and_a_loss_restarts_it() {
     for (ms, goes_on) in [(12, true), (40, false)] {
         let mut world = World::new(SCAN);
         while world.rig.get::<f64>("progress").is_none_or(|progress| *progress < 0.4) {
@@ -235,7 +235,7 @@ fn progress_rises_from_0_to_1() {
 }
 
 #[test]
-fn the_motion_is_as_old_as_the_gate_and_a_speed_of_0_is_none() {
+fn the_motion_is_as_old_as_the_gate_and_absent_at_a_speed_of_0() {
     let mut world = World::new(SCAN);
     world.step(4.0, 1.0);
     assert_eq!(world.rig.mark("twist").stamp().nanos, 0);
@@ -247,7 +247,7 @@ fn the_motion_is_as_old_as_the_gate_and_a_speed_of_0_is_none() {
 }
 
 #[test]
-fn another_axis_is_another_scan() {
+fn another_axis_begins_another_scan() {
     let guide = |axis| ScanGuide { speed: 0.02, axis, strokes: 2, stroke: 0.04, step: 0.01, edge: 0.02 };
     let (across, along) = (guide(Axis::X), guide(Axis::Y));
     let done = Scan { leg: None, ..across.begin() };
@@ -257,7 +257,7 @@ fn another_axis_is_another_scan() {
 }
 
 #[test]
-fn what_is_refused() {
+fn a_bad_parameter_is_a_mistake() {
     let wires = [("gate", FlagShape.into()), ("pose", PoseShape.into())];
     for bad in ["step_m = 0.01", "stroke_m = 0.01", "axis = \"z\"\nstroke_m = 0.1\nstep_m = 0.1", "strokes = 0"] {
         assert!(NodeRig::new::<ScanGuide>(bad, &wires).is_err(), "{bad}");
@@ -266,7 +266,7 @@ fn what_is_refused() {
 
 proptest! {
     #[test]
-    fn every_row_is_swept_whole(strokes in 1..6usize, stroke in 0.01..0.1_f64, step in 0.002..0.02_f64, along_y: bool) {
+    fn every_row_is_swept_from_end_to_end(strokes in 1..6usize, stroke in 0.01..0.1_f64, step in 0.002..0.02_f64, along_y: bool) {
         let axis = if along_y { "y" } else { "x" };
         let params = format!("speed_m_per_s = 0.05\nstrokes = {strokes}\nstroke_m = {stroke}\nstep_m = {step}\naxis = \"{axis}\"");
         let mut world = World::new(&params);

@@ -6,46 +6,92 @@
 
 mod otsu;
 
-use tactflow_runtime::node::{Mistake, Mistakes, Node, Setup, Tick};
-use tactflow_runtime::signal::Mask;
-use tactflow_runtime::{inputs, outputs, params, state};
+use tactflow_runtime::node::{Describe, In, Inputs, Mistake, Mistakes, Node, Out, Outputs, Param, Setup, State, Tick};
+use tactflow_runtime::signal::{Image, Mask};
 use wide::f32x8;
 
 pub use otsu::otsu;
 
-words! {
+/// Finds the tactels above a threshold: fixed, with hysteresis, or computed from the image.
+///
+/// A tactel belongs to the mask if its value is strictly greater than `threshold` (section III of the paper).
+///
+/// **Two thresholds.** At the edge of a contact a tactel near the threshold comes and goes with the noise, so |R| flickers
+/// and p = f / |R| (eq. 2) jumps with it. Give `release`, lower than `threshold`: a tactel enters above `threshold` and
+/// stays while it is above `release`. The node remembers the last mask and forgets it when the image is absent for
+/// `reset_after_ms`. A gap of four times the noise of a tactel reduces the changes of |R| at the rim of a still contact
+/// from 9 frames in 10 to 1 in 7.
+///
+/// **A threshold from the image.** `method = "otsu"` splits the values of each image into the two classes whose means are
+/// farthest apart (greatest variance between them, N. Otsu 1979), in 256 steps from the smallest to the largest tactel. It
+/// is for pads without a calibration, and for contacts that stand out clearly. `threshold` is then the lowest threshold
+/// that it chooses, so that noise on an empty pad is no contact: an image without a tactel above `threshold` gives an
+/// empty mask, and one whose tactels are all equal is compared with `threshold` alone. Otsu's method cuts off the weak rim
+/// of a contact, and its threshold follows the strength of the contact: |R| and p mean less than with a fixed threshold.
+///
+/// `release` and `method = "otsu"` exclude each other: a threshold that moves from image to image has no second one below
+/// it.
+///
+/// ```toml
+/// [nodes.binarize]
+/// type = "binarize"
+/// in.image = "calibrate.image"
+/// threshold = 0.015                   # a tactel enters above this [N]
+/// release = 0.010                     # and stays above this [N]
+/// ```
+#[derive(Describe)]
+#[describe(name = "binarize")]
+pub struct Binarize {
+    rule: Rule,
+    /// Size of the memory.
+    words: usize,
+}
+
+/// Parameters of `binarize`.
+#[derive(Debug, Clone, Param)]
+pub struct Params {
+    /// A tactel belongs to the mask if it is greater than this, compared as 32-bit floats; with `method = "otsu"` the
+    /// lowest threshold that is computed from an image.
+    #[param(unit = "U", live)]
+    threshold: f64,
+    /// A tactel of the mask stays in it while it is greater than this, which is lower than `threshold`; without it there
+    /// is only one threshold.
+    #[param(unit = "U", live)]
+    release: Option<f64>,
     /// Where the threshold comes from.
-    Method {
-        /// It is `threshold`.
-        Fixed = "fixed",
-        /// The image's own, by Otsu's method.
-        Otsu = "otsu",
-    }
+    #[param(default = Method::Fixed)]
+    method: Method,
 }
 
-params! {
-    /// A tactel belongs to the mask if it is greater than this, compared at the image's 32 bits; with
-    /// `method = "otsu"` the least that the image's own threshold may be [unit of the image].
-    live threshold: f64,
-    /// A tactel that is in the mask stays in it while it is greater than this, which is lower than `threshold`;
-    /// not given, there is only the one threshold [unit of the image].
-    live release: Option<f64>,
-    /// Where the threshold comes from: "fixed" takes `threshold` as it is, "otsu" the image's own.
-    method: Method = Method::Fixed,
+/// Where the threshold comes from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Param)]
+enum Method {
+    /// `threshold` as given.
+    Fixed,
+    /// Computed from each image, by Otsu's method.
+    Otsu,
 }
 
-inputs! {
+/// What `binarize` reads.
+#[derive(Inputs)]
+pub struct Inputs<'a> {
     /// The image.
-    image: Image["U", "A"],
+    #[port(unit = "U", frame = "A")]
+    image: In<'a, Image>,
 }
 
-outputs! {
+/// What `binarize` writes.
+#[derive(Outputs)]
+pub struct Outputs {
     /// The tactels above the threshold.
-    mask: Mask["A"],
+    #[port(frame = "A")]
+    mask: Out<Mask>,
 }
 
-state! {
-    /// The words of the last mask; of use only to `release`, which a mode may add.
+/// What `binarize` remembers.
+#[derive(State)]
+pub struct State {
+    /// The words of the last mask, for `release`, which a mode may add.
     last: Vec<u64>,
 }
 
@@ -60,43 +106,11 @@ enum Rule {
     Otsu { least: f32 },
 }
 
-/// The rule, and the size of its memory.
-pub struct Binarize {
-    rule: Rule,
-    words: usize,
-}
-
 impl Node for Binarize {
     type Params = Params;
     type Inputs<'a> = Inputs<'a>;
     type Outputs = Outputs;
     type State = State;
-
-    const NAME: &'static str = "binarize";
-    const SUMMARY: &'static str = "finds the tactels above a threshold: fixed, with hysteresis, or the image's own";
-    const DOC: &'static str = "A tactel belongs to the mask if its value is strictly greater than `threshold` (paper \
-        section III). The threshold itself is not above it.\n\n\
-        **Two thresholds.** At the edge of a contact a tactel near the threshold comes and goes with the noise, so that \
-        |R| flickers and p = f / |R| (eq. 2) jumps with it. Give `release`, lower than `threshold`: a tactel enters above \
-        `threshold` and stays while it is above `release`. It remembers the last mask; the memory is lost when the \
-        image has been away for `reset_after_ms`. A gap of four times a tactel's noise takes \
-        the changes of |R| at the rim of a still contact from 9 frames in 10 to 1 in 7.\n\n\
-        **The image's own threshold.** `method = \"otsu\"` splits the values of each image into the two classes whose \
-        means are farthest apart (greatest variance between them, N. Otsu 1979), over 256 steps from the least to \
-        the greatest tactel. It is for pads without a calibration, and for contacts that stand out clearly. \
-        `threshold` is then the least that it may become, so that noise on an empty pad is no contact: an image \
-        without a tactel above `threshold` gives an empty mask, and one whose tactels are all equal is compared with \
-        `threshold` alone. It cuts off the weak rim of a contact, and follows the strength of the contact: \
-        |R| and p mean less than with a fixed threshold.\n\n\
-        `release` and `method = \"otsu\"` exclude each other: a threshold that moves from image to image has no second \
-        one below it.";
-    const EXAMPLE: &'static str = r#"
-[nodes.binarize]
-type = "binarize"
-in.image = "calibrate.image"
-threshold = 0.015                   # a tactel enters above this [N]
-release = 0.010                     # and stays above this [N]
-"#;
 
     fn new(params: Params, setup: &mut Setup<Self>) -> Result<Self, Mistakes> {
         setup.outputs.mask = (&setup.inputs.image).into();

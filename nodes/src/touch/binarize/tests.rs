@@ -1,7 +1,7 @@
 //! `binarize` tactel by tactel, against naive references.
 
 use proptest::prelude::*;
-use tactflow_runtime::harness::{GraphRig, NodeRig, Source};
+use tactflow_runtime::harness::{FedRole, GraphRig, NodeRig};
 use tactflow_runtime::node::At;
 use tactflow_runtime::signal::{Image, ImageShape, Mask, Unit};
 
@@ -218,7 +218,7 @@ fn a_mode_that_adds_a_release_goes_on_from_the_mask_before_it() {
         go = { to = "one", after_ms = 20 }
     "#;
     let shape = ImageShape { rows: 1, cols: 3, pitch: [0.005; 2], unit: Unit::NEWTON };
-    let pad = Source { role: "pad", kind: "tactile_pad", period: 0.01, outputs: vec![shape.into()], commands: vec![] };
+    let pad = FedRole::new("pad", "tactile_pad", 10.0).output("image", shape);
     let mut rig = GraphRig::new(crate::catalogue(), graph, vec![pad]).unwrap_or_else(|r| panic!("{}", r.render(false)));
     // The first tactel is left between both thresholds, the second enters late, the third enters once and goes.
     let frames = [
@@ -233,7 +233,7 @@ fn a_mode_that_adds_a_release_goes_on_from_the_mask_before_it() {
     ];
     for (i, (cells, mode, words)) in frames.into_iter().enumerate() {
         let ms = 10.0 * i as f64;
-        rig.feed("pad", 0, ms, Image::from_cells(3, &cells));
+        rig.feed("pad.image", ms, Image::from_cells(3, &cells));
         let before = rig.engine.mode().map(str::to_owned);
         rig.tick(ms).unwrap();
         assert_eq!(rig.get::<Mask>("binarize.mask").unwrap().words(), [words], "{i}, in {before:?}");

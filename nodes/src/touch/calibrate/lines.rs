@@ -3,24 +3,24 @@
 use crate::calibration::curve::{Segment, clamp, rational};
 use crate::calibration::{Calibration, Curve, Kind, Tactel};
 
-/// The curves of all tactels beyond their zeros; all of one sort. A dead tactel's is 0 everywhere.
+/// The curves of all tactels, all of one kind. The curve of a dead tactel is 0 everywhere.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum Lines {
     /// Slopes.
     Linear(Vec<f32>),
-    /// Squashed curves with their ends.
+    /// Rational curves with their ends.
     Rational { gain: Vec<f32>, squash: Vec<f32>, low: Vec<f32>, high: Vec<f32> },
-    /// The first segments of all tactels, then the second ones; an empty one adds nothing.
+    /// The first segments of all tactels, then the second ones; an empty segment adds 0.
     Piecewise(Vec<Vec<Segment>>),
 }
 
 impl Lines {
-    /// Straight lines of these slopes.
+    /// Returns straight lines with these slopes.
     pub(super) const fn linear(gain: Vec<f32>) -> Self {
         Self::Linear(gain)
     }
 
-    /// The zeros and the curves of a calibration.
+    /// Returns the zeros and the curves of a calibration.
     pub(super) fn new(calibration: &Calibration) -> (Vec<f32>, Self) {
         let count = calibration.tactels.len();
         let mut lines = match calibration.kind {
@@ -30,11 +30,11 @@ impl Lines {
                 Self::Rational { gain: zeros(), squash: zeros(), low: zeros(), high: zeros() }
             }
             Kind::Piecewise => {
-                let most = calibration.tactels.iter().flatten().map(|tactel| match &tactel.curve {
+                let knots = calibration.tactels.iter().flatten().map(|tactel| match &tactel.curve {
                     Curve::Piecewise { knots } => knots.len(),
                     Curve::Linear { .. } | Curve::Rational { .. } => 0,
                 });
-                Self::Piecewise(vec![vec![Segment::default(); count]; most.max().unwrap_or(0)])
+                Self::Piecewise(vec![vec![Segment::default(); count]; knots.max().unwrap_or(0)])
             }
         };
         let mut offset = vec![0.0; count];
@@ -59,12 +59,12 @@ impl Lines {
                     segments[k][i] = segment;
                 }
             }
-            _ => unreachable!("all curves of a calibration are of its sort"),
+            _ => unreachable!("all curves of a calibration are of its kind"),
         }
     }
 
-    /// Makes tactel `i` 0 everywhere.
-    pub(super) fn kill(&mut self, i: usize) {
+    /// Sets the curve of tactel `i` to 0.
+    pub(super) fn disable(&mut self, i: usize) {
         match self {
             Self::Linear(gain) => gain[i] = 0.0,
             Self::Rational { gain, squash, low, high } => {
@@ -74,7 +74,7 @@ impl Lines {
         }
     }
 
-    /// Whether tactel `i` measures nothing.
+    /// Returns whether the curve of tactel `i` is 0.
     pub(super) fn is_dead(&self, i: usize) -> bool {
         match self {
             Self::Linear(gain) | Self::Rational { gain, .. } => gain[i] == 0.0,
@@ -82,7 +82,7 @@ impl Lines {
         }
     }
 
-    /// The forces of all tactels.
+    /// Computes the forces of all tactels.
     pub(super) fn apply(&self, cells: &[f32], offset: &[f32], forces: &mut [f32]) {
         match self {
             Self::Linear(gain) => {

@@ -3,11 +3,11 @@
 use std::sync::Arc;
 
 use tactflow_runtime::harness::NodeRig;
-use tactflow_runtime::node::At;
-use tactflow_runtime::signal::{FlagShape, Freshness, Image, Shape};
+use tactflow_runtime::node::{At, Mistake};
+use tactflow_runtime::signal::{FlagShape, Freshness, Shape, Unit};
 
 use super::*;
-use crate::calibration::{Curve, Kind, Tactel};
+use crate::calibration::{Calibration, Curve, Kind, Tactel, file};
 
 fn rig(params: &str) -> Result<NodeRig, Mistakes> {
     let shape = ImageShape { rows: 2, cols: 3, pitch: [0.005, 0.004], unit: Unit::RAW };
@@ -25,7 +25,7 @@ fn a_line_per_tactel() {
         ("offset = 10\ngain = [[1, 2, 3], [4, 5, 6]]", [0.0, 20.0, 60.0, 120.0, 200.0, 300.0]),
         ("dead = [[0, 1], [1, 2]]", [10.0, 0.0, 30.0, 40.0, 50.0, 0.0]),
         ("device = { offset = 10, gain = 2 }", [0.0, 20.0, 40.0, 60.0, 80.0, 100.0]),
-        // What the graph says takes the place of all that the device states, but for what is dead.
+        // The graph replaces all four parameters of the device, but not its dead tactels.
         ("device = { offset = 10, gain = 2, file = \"none.toml\" }\ngain = 3", [30.0, 60.0, 90.0, 120.0, 150.0, 180.0]),
         ("device = { dead = [[0, 0]] }\ndead = [[1, 2]]", [0.0, 20.0, 30.0, 40.0, 50.0, 0.0]),
         ("device = { dead = [[0, 0]] }\noffset = 10", [0.0, 10.0, 20.0, 30.0, 40.0, 50.0]),
@@ -40,7 +40,7 @@ fn a_line_per_tactel() {
 }
 
 #[test]
-fn a_mistake_of_the_device_shows_where_it_is_asked() {
+fn a_mistake_of_the_device_is_marked_at_device() {
     let cases = [
         ("device = { gain = [[1, 2, 3]] }", "device.gain", "`device.gain` has 1 rows, but the image has 2"),
         ("device = { dead = [[2, 0]] }", "device.dead", "tactel [2, 0] is not on an array of 2 by 3"),
@@ -56,7 +56,7 @@ fn a_mistake_of_the_device_shows_where_it_is_asked() {
 }
 
 #[test]
-fn the_unit_is_the_inputs_unless_it_is_named() {
+fn the_unit_is_that_of_the_input_unless_it_is_set() {
     for (params, unit) in [("", Unit::RAW), ("unit = \"N\"", Unit::NEWTON), ("unit = \"1\"", Unit::ONE)] {
         let expected = ImageShape { rows: 2, cols: 3, pitch: [0.005, 0.004], unit };
         assert_eq!(rig(params).unwrap().shape("image"), &Shape::from(expected), "{params}");
@@ -64,7 +64,7 @@ fn the_unit_is_the_inputs_unless_it_is_named() {
 }
 
 #[test]
-fn every_mistake_stands_at_its_parameter() {
+fn every_mistake_is_marked_at_its_parameter() {
     let cases = [
         ("offset = [[1, 2, 3]]", "offset", "`offset` has 1 rows, but the image has 2"),
         ("gain = [[1, 2, 3], [4, 5]]", "gain", "row 1 of `gain` has 2 numbers, but the image has 3 columns"),
@@ -123,7 +123,7 @@ fn calibration(kind: Kind) -> Calibration {
 }
 
 #[test]
-fn a_file_gives_the_bits_of_its_curves() {
+fn the_forces_have_the_bits_of_the_curves_in_the_file() {
     for kind in [Kind::Linear, Kind::Rational, Kind::Piecewise] {
         let calibration = calibration(kind);
         let text = file::write(&calibration, "a test");
@@ -146,7 +146,7 @@ fn a_file_gives_the_bits_of_its_curves() {
 }
 
 #[test]
-fn a_mistake_in_the_file_shows_in_the_file_and_one_about_it_where_it_is_named() {
+fn a_mistake_in_the_file_is_marked_in_the_file_and_a_wrong_file_in_the_graph() {
     let good = file::write(&calibration(Kind::Rational), "a test");
     let data = |name: &str, from: &str, to: &str, marked: &str| {
         assert!(good.contains(from), "{from}");
@@ -191,7 +191,7 @@ fn tared(params: &str, wires: &[&str]) -> Result<NodeRig, Mistakes> {
     NodeRig::new::<Calibrate>(params, &shapes)
 }
 
-/// A frame of a pad of three tactels that read `value` and a bit more, and what the first is calibrated to.
+/// Shows a frame with three different readings from `value` on, and returns the calibrated first tactel.
 fn frame(rig: &mut NodeRig, value: f32) -> f32 {
     rig.set("image", Image::from_cells(3, &[value, value + 1.0, value + 2.0]));
     rig.step();
@@ -224,11 +224,11 @@ fn the_mean_of_the_window_becomes_the_zero_of_each_tactel() {
     rig.step_ms(30.0);
     rig.step();
     rig.set("tare", false);
-    assert_eq!(frame(&mut rig, 20.0), 20.0, "a lasting absence goes back to what was calibrated");
+    assert_eq!(frame(&mut rig, 20.0), 20.0, "a long absence restores the calibrated zero");
 }
 
 #[test]
-fn a_contact_at_any_time_of_the_window_ends_the_attempt() {
+fn a_contact_at_any_time_of_the_window_cancels_the_tare() {
     // Frames are numbered from that of the command, which is 1; `present` after a frame is what the next step sees.
     for touched in 0..8 {
         let mut rig = tared(WINDOW, &["tare", "present"]).unwrap();
@@ -244,10 +244,10 @@ fn a_contact_at_any_time_of_the_window_ends_the_attempt() {
 }
 
 #[test]
-fn what_is_not_known_is_no_unloaded_pad() {
+fn a_tare_waits_until_the_pad_is_known_to_be_unloaded() {
     let mut rig = tared(WINDOW, &["tare", "present"]).unwrap();
     rig.set("tare", true);
-    (0..9).for_each(|_| assert_eq!(frame(&mut rig, 14.0), 8.0, "nobody has said that nothing touches it"));
+    (0..9).for_each(|_| assert_eq!(frame(&mut rig, 14.0), 8.0, "it is unknown whether something touches the pad"));
     rig.set("present", false);
     (0..4).for_each(|_| assert_eq!(frame(&mut rig, 14.0), 8.0, "the command has waited"));
     assert_eq!(frame(&mut rig, 14.0), 0.0);
@@ -276,7 +276,7 @@ fn a_held_frame_counts_once() {
 }
 
 #[test]
-fn one_tactel_beyond_the_bound_keeps_the_zeros_of_all() {
+fn one_tactel_beyond_the_bound_keeps_all_zeros() {
     for (bound, force) in [("4.9", 8.0), ("5.1", 0.0)] {
         // The second tactel reads 15: five more than calibrated. The third, which reads 16, is dead.
         let mut rig = tared(&format!("{WINDOW}\ntare_bound = {bound}"), &["tare"]).unwrap();
@@ -302,7 +302,7 @@ fn the_first_frames_are_the_zero_if_nothing_touches_the_pad() {
 }
 
 #[test]
-fn a_tare_that_nothing_guards_is_refused() {
+fn a_tare_without_a_check_is_refused() {
     let cases = [
         ("", vec!["tare"], At::Input("tare".into())),
         ("tare_at_start = true", vec![], At::Param("tare_at_start".into())),
@@ -314,14 +314,14 @@ fn a_tare_that_nothing_guards_is_refused() {
         let watched: Vec<&str> = wires.iter().copied().chain(["present"]).collect();
         assert!(tared(params, &watched).is_ok());
     }
-    assert!(tared("", &["present"]).is_ok(), "what is not used does no harm");
+    assert!(tared("", &["present"]).is_ok(), "without a tare `in.present` has no effect");
     for wrong in ["tare_window = 0", "tare_bound = 0", "tare_at_start = 1"] {
         assert!(tared(wrong, &["present"]).is_err(), "{wrong}");
     }
 }
 
 #[test]
-fn a_command_that_went_away_between_two_frames_is_another_when_it_comes_back() {
+fn a_command_that_returns_between_two_frames_is_a_new_one() {
     let mut rig = tared(WINDOW, &["tare", "present"]).unwrap();
     rig.set("present", false);
     rig.set("tare", true);
@@ -331,18 +331,18 @@ fn a_command_that_went_away_between_two_frames_is_another_when_it_comes_back() {
     rig.lose("tare");
     rig.step();
     rig.set("tare", true);
-    (0..4).for_each(|_| assert_eq!(frame(&mut rig, 14.0), 8.0, "the window begins anew"));
-    assert_eq!(frame(&mut rig, 14.0), 0.0, "and knows nothing of the frames before");
+    (0..4).for_each(|_| assert_eq!(frame(&mut rig, 14.0), 8.0, "the window starts again"));
+    assert_eq!(frame(&mut rig, 14.0), 0.0, "without the frames before");
 }
 
 #[test]
-fn a_command_that_goes_away_makes_no_image() {
+fn the_loss_of_the_command_makes_no_new_image() {
     let mut rig = tared(WINDOW, &["tare", "present"]).unwrap();
     rig.set("tare", false);
     assert_eq!(frame(&mut rig, 12.0), 4.0);
     rig.lose("tare");
     rig.step();
-    assert_eq!(rig.freshness("image"), Freshness::Held, "no frame came, so none goes on");
+    assert_eq!(rig.freshness("image"), Freshness::Held, "there was no frame");
     assert_eq!(frame(&mut rig, 13.0), 6.0);
     assert_eq!(rig.freshness("image"), Freshness::New);
 }

@@ -1,78 +1,83 @@
-//! `label`: the connected regions of a mask, and the one that is the contact (paper section III, after its ref. 21).
-//!
-//! The contact is the largest region by area that is large and strong enough, or the one of these that is nearest to
-//! where the contact was; of two that are equal, the one met first in raster order. A noisy empty pad has a "region" in
-//! almost every frame, so absence needs a least area and force.
-//!
-//! A row is a few words of bits. Adding the lowest set bit carries through the lowest run of ones, which cuts a run out
-//! in four operations; runs that touch in neighbouring rows are joined by union-find. A parent is never after its
-//! child, so one pass in raster order numbers the regions, and the links live in the field that the numbers then take.
+//! `label`: the connected regions of a mask, and the region that is the contact (paper section III, after its ref. 21).
 
-mod nearest;
+mod centroids;
+mod runs;
 
-use std::ops::Range;
-
-use tactflow_runtime::node::{Count, Mistake, Mistakes, Node, Param, Reader, Setup, Tick, Written, read_leaf};
-use tactflow_runtime::signal::{Grid, Image, Mask, Region, RegionsShape, Run};
+use tactflow_runtime::node::{
+    Absence, Describe, In, Inputs, Mistake, Mistakes, Node, Out, Outputs, Param, Reader, Setup, State, Tick, Written,
+    read_leaf,
+};
+use tactflow_runtime::signal::{Flag, Grid, Image, Mask, Region, Regions, RegionsShape, Run};
 use tactflow_runtime::source::Value;
-use tactflow_runtime::{inputs, outputs, params, state};
 
-use super::on_one_array;
+use super::check_same_array;
 
-pub use nearest::{away, middles, middles_of, nearest};
+pub use centroids::{centroid_buffer, centroids, distance_squared, nearest};
+pub use runs::{number, paint, trace};
 
-words! {
-    /// Which region is the contact.
-    Choose {
-        /// The largest.
-        Largest = "largest",
-        /// The nearest to the last contact; the largest if there was none.
-        Nearest = "nearest",
-    }
+/// Finds the connected regions of a mask, and the region that is the contact.
+///
+/// Neighbouring tactels of the mask form a region (connected components, paper section III). The contact R is the largest
+/// region; `regions` lists all of them, for `select_region`. Of two equal regions the one that comes first, row by row, is
+/// the contact.
+///
+/// **Absence.** A noisy pad has a region in almost every frame, even if nothing touches it: in 99.96 % of the frames with
+/// white noise of 0.08 and a threshold of 0.15 units. So a contact has at least `min_area` tactels and at least
+/// `min_force`. Without a contact, `region` is absent, `present` is not set, and all features of the contact are absent. On
+/// such an empty pad a region of six tactels occurs once in 4000 frames.
+///
+/// **Two contacts.** With `choose = "largest"` the contact is chosen in each frame: a second, larger touch takes over at
+/// once, and two of the same size alternate. With `choose = "nearest"` the contact is the region whose centroid (the mean
+/// position of its tactels) is nearest to that of the last contact, however large the others are. The first contact is the
+/// largest region, and so is the one after an absence of `reset_after_ms`; a shorter absence keeps the position. If the
+/// contact is lifted while another region is present, that region is the contact from the next frame on. To track several
+/// contacts, use one `select_region` for each.
+///
+/// **Neighbours.** With 8, two tactels with a common corner are in one region; with 4 they are not. On a recording with
+/// several contacts the numbers of regions differ in 39 % of the frames.
+///
+/// ```toml
+/// [nodes.label]
+/// type = "label"
+/// in.image = "calibrate.image"
+/// in.mask = "binarize.mask"
+/// min_area = 4                        # [tactels]
+/// min_force = 0.1                     # [N]
+/// ```
+#[derive(Describe)]
+#[describe(name = "label")]
+pub struct Label {
+    /// How many columns beyond its ends a run touches runs of the next row.
+    reach: u32,
+    min_area: usize,
+    min_force: f64,
+    choose: Choose,
+    grid: Grid,
 }
 
-params! {
-    /// How many neighbours a tactel has: 4 (edges) or 8 (corners too).
-    neighbours: Neighbours = Neighbours::Eight,
-    /// Least area of a contact [tactels].
-    live min_area: Count = Count(1),
-    /// Least sum over a contact [unit of the image].
-    live min_force: f64 = 0.0,
-    /// Which of those regions is the contact: the "largest", or the "nearest" to where the contact was last.
-    choose: Choose = Choose::Largest,
-}
-
-inputs! {
-    /// The image that forces are summed from.
-    image: Image["U", "A"],
-    /// The tactels that may be in contact.
-    mask: Mask["A"],
-}
-
-outputs! {
-    /// The contact R: a region with at least the least area and force; absent when there is none.
-    region: Mask["A"],
-    /// All regions of the mask, in the order of their first tactels, with their sums [unit of the image].
-    regions: Regions["U", "A"],
-    /// Whether there is a contact.
-    present: Flag,
-}
-
-state! {
-    /// Middle of the last contact [m]; none before the first, and after one that was lost for long.
-    last: Option<[f64; 2]>,
-    /// When there was a contact no more [ns].
-    lost_at: Option<i64>,
-    /// Room for the middle of each region.
-    middles: Vec<[f64; 2]>,
+/// Parameters of `label`.
+#[derive(Debug, Clone, Param)]
+pub struct Params {
+    /// Number of neighbours of a tactel: 4 (common edges) or 8 (also common corners).
+    #[param(default = Neighbours::Eight)]
+    neighbours: Neighbours,
+    /// Smallest area of a contact.
+    #[param(unit = "tactel", range = 1..=1_000_000, default = 1, live)]
+    min_area: usize,
+    /// Smallest force of a contact, the sum over its tactels.
+    #[param(unit = "U", default = 0.0, live)]
+    min_force: f64,
+    /// Which of the regions with `min_area` and `min_force` is the contact.
+    #[param(default = Choose::Largest)]
+    choose: Choose,
 }
 
 /// Which tactels are neighbours.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Neighbours {
+enum Neighbours {
     /// Those with a common edge.
     Four,
-    /// Those with a common corner too.
+    /// Those with a common edge or corner.
     Eight,
 }
 
@@ -98,14 +103,48 @@ impl Param for Neighbours {
     }
 }
 
-/// What makes tactels neighbours, and a region a contact.
-pub struct Label {
-    /// How many columns past its ends a run touches runs of the next row.
-    reach: u32,
-    min_area: usize,
-    min_force: f64,
-    choose: Choose,
-    grid: Grid,
+/// Which region is the contact.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Param)]
+enum Choose {
+    /// The largest.
+    Largest,
+    /// The nearest to the last contact; the largest if there was none.
+    Nearest,
+}
+
+/// What `label` reads.
+#[derive(Inputs)]
+pub struct Inputs<'a> {
+    /// The image with the values of the tactels.
+    #[port(unit = "U", frame = "A")]
+    image: In<'a, Image>,
+    /// The tactels that may be in contact.
+    #[port(frame = "A")]
+    mask: In<'a, Mask>,
+}
+
+/// What `label` writes.
+#[derive(Outputs)]
+pub struct Outputs {
+    /// The tactels of the contact, R; absent if there is no contact.
+    #[port(frame = "A")]
+    region: Out<Mask>,
+    /// All regions of the mask, in the order of their first tactels, with their areas and forces.
+    #[port(unit = "U", frame = "A")]
+    regions: Out<Regions>,
+    /// Whether there is a contact.
+    present: Out<Flag>,
+}
+
+/// What `label` remembers.
+#[derive(State)]
+pub struct State {
+    /// Centroid of the last contact [m].
+    last: Option<[f64; 2]>,
+    /// Absence of the contact.
+    absence: Absence,
+    /// Buffer for the centroid of each region.
+    centroids: Vec<[f64; 2]>,
 }
 
 impl Node for Label {
@@ -114,66 +153,33 @@ impl Node for Label {
     type Outputs = Outputs;
     type State = State;
 
-    const NAME: &'static str = "label";
-    const SUMMARY: &'static str = "finds the connected regions of a mask, and the one that is the contact";
-    const DOC: &'static str = "Tactels of the mask that are neighbours make a region (connected components, paper \
-        section III). The contact R is the largest one; `regions` lists all of them, for `select_region`.\n\n\
-        **Absence.** A noisy pad has a region in almost every frame, even when nothing touches it: 99.96 % at white noise \
-        of 0.08 and a threshold of 0.15 units. So a contact has at least `min_area` tactels and at least `min_force`; \
-        without one, `region` is absent, `present` is not set, and all features of the contact are absent. Six tactels \
-        are found on such an empty pad once in 4000 frames.\n\n\
-        **Two contacts.** With `choose = \"largest\"` the contact is chosen anew in each frame; a second, larger touch \
-        takes it over at once, and two of one size take turns. With `choose = \"nearest\"` the contact is the region \
-        whose middle (the mean place of its tactels) is nearest to that of the last contact, however large the others \
-        are. It is the largest when there was no contact, or when there has been none for `reset_after_ms`; a shorter \
-        gap keeps the place. When the contact is lifted while another region is there, that one is the contact from the \
-        next frame on: to hold several contacts apart, take a `select_region` for each.\n\n\
-        **Neighbours.** With 8, two tactels that touch at a corner are one region, with 4 they are two: on a real \
-        recording with several contacts the counts differ in 39 % of the frames. A tie goes to the region that comes \
-        first, row by row.";
-    const EXAMPLE: &'static str = r#"
-[nodes.label]
-type = "label"
-in.image = "calibrate.image"
-in.mask = "binarize.mask"
-min_area = 4                        # [tactels]
-min_force = 0.1                     # [N]
-"#;
-
     fn new(params: Params, setup: &mut Setup<Self>) -> Result<Self, Mistakes> {
         let (image, mask) = (&setup.inputs.image, &setup.inputs.mask);
-        on_one_array(image, "mask", mask)?;
-        if !is_countable(mask) {
-            let message =
-                format!("an array of {} by {} can have more than 65535 runs of tactels", mask.rows, mask.cols);
-            return Err(Mistake::input("mask", message).help("label a part of it").into());
+        check_same_array(image, "mask", mask)?;
+        if !runs::is_countable(mask) {
+            let message = format!("an array of {} by {} can have more than 65535 runs", mask.rows, mask.cols);
+            return Err(Mistake::input("mask", message).help("use a smaller array").into());
         }
-        let reach = match params.neighbours {
-            Neighbours::Four => 0,
-            Neighbours::Eight => 1,
-        };
-        setup.outputs.region = mask.clone();
-        setup.outputs.regions = RegionsShape { grid: mask.clone(), unit: image.unit };
-        Ok(Self {
-            reach,
-            min_area: *params.min_area,
-            min_force: params.min_force,
-            choose: params.choose,
-            grid: mask.clone(),
-        })
+        let reach = u32::from(params.neighbours == Neighbours::Eight);
+        let Params { min_area, min_force, choose, .. } = params;
+        let grid = mask.clone();
+        setup.outputs.regions = RegionsShape { grid: grid.clone(), unit: image.unit };
+        setup.outputs.region = grid.clone();
+        Ok(Self { reach, min_area, min_force, choose, grid })
     }
 
     fn state(&self) -> State {
-        State { last: None, lost_at: None, middles: middles_of(&self.grid) }
+        State { last: None, absence: Absence::default(), centroids: centroid_buffer(&self.grid) }
     }
 
     fn step(&self, tick: &Tick, inputs: Inputs<'_>, out: &mut Outputs, state: &mut State) {
         let (runs, regions) = out.regions.write().parts_mut();
         trace(&inputs.mask, self.reach, runs);
         number(&inputs.image, runs, regions);
+        let largest = contact(regions, self.min_area, self.min_force);
         let contact = match self.choose {
-            Choose::Largest => contact(regions, self.min_area, self.min_force),
-            Choose::Nearest => self.nearest(tick, runs, regions, state),
+            Choose::Largest => largest,
+            Choose::Nearest => self.track(largest, tick, runs, regions, state),
         };
         out.present.set(contact.is_some());
         if let Some(contact) = contact {
@@ -183,112 +189,31 @@ min_force = 0.1                     # [N]
 }
 
 impl Label {
-    /// The contact next to the last one.
-    fn nearest(&self, tick: &Tick, runs: &[Run], regions: &[Region], state: &mut State) -> Option<usize> {
-        if state.lost_at.is_some_and(|lost_at| tick.now - lost_at >= tick.reset_after) {
+    /// Returns the region that is nearest to the last contact, or `largest` if there was none.
+    fn track(
+        &self,
+        largest: Option<usize>,
+        tick: &Tick,
+        runs: &[Run],
+        regions: &[Region],
+        state: &mut State,
+    ) -> Option<usize> {
+        let Some(largest) = largest else {
+            state.absence.begin(tick.now);
+            return None;
+        };
+        if state.absence.end(tick) {
             state.last = None;
         }
-        let middles = middles(&self.grid, runs, regions, &mut state.middles);
-        let contact = match state.last {
-            None => contact(regions, self.min_area, self.min_force),
-            Some(last) => nearest(regions, middles, last, self.min_area, self.min_force),
-        };
-        match contact {
-            Some(contact) => (state.last, state.lost_at) = (Some(middles[contact]), None),
-            None => state.lost_at = state.lost_at.or(Some(tick.now)),
-        }
-        contact
+        let centroids = centroids(&self.grid, runs, regions, &mut state.centroids);
+        let nearest = state.last.and_then(|last| nearest(regions, centroids, last, self.min_area, self.min_force));
+        let contact = nearest.unwrap_or(largest);
+        state.last = Some(centroids[contact]);
+        Some(contact)
     }
 }
 
-/// Whether every run and every region of the array has a number of 16 bits.
-fn is_countable(grid: &Grid) -> bool {
-    grid.rows.max(grid.cols) <= 65535 && grid.rows * grid.cols.div_ceil(2) <= 65535
-}
-
-/// Lists the runs in raster order. Until [`number`], the `region` of each is its parent among the runs: itself, or one
-/// before it.
-pub fn trace(mask: &Mask, reach: u32, runs: &mut Vec<Run>) {
-    runs.clear();
-    let mut above = 0..0;
-    for i in 0..mask.rows() {
-        let first = runs.len();
-        cut(mask.row(i), i as u16, runs);
-        if !above.is_empty() {
-            join(runs, above, first, reach);
-        }
-        above = first..runs.len();
-    }
-}
-
-/// Cuts a row into runs.
-fn cut(words: &[u64], row: u16, runs: &mut Vec<Run>) {
-    for (k, word) in words.iter().enumerate() {
-        let mut rest = *word;
-        while rest != 0 {
-            let low = rest & rest.wrapping_neg();
-            let run = rest & !rest.wrapping_add(low);
-            let start = (64 * k as u32 + low.trailing_zeros()) as u16;
-            let end = start + run.count_ones() as u16;
-            rest ^= run;
-            match runs.last_mut() {
-                // It goes on over the border of two words.
-                Some(last) if k > 0 && last.row == row && last.end == start => last.end = end,
-                _ => runs.push(Run { row, start, end, region: runs.len() as u16 }),
-            }
-        }
-    }
-}
-
-/// Joins the runs from `first` on with those of the row above that they touch.
-fn join(runs: &mut [Run], above: Range<usize>, first: usize, reach: u32) {
-    let mut left = above.start;
-    for id in first..runs.len() {
-        let (start, end) = (u32::from(runs[id].start), u32::from(runs[id].end));
-        while left < above.end && u32::from(runs[left].end) + reach <= start {
-            left += 1;
-        }
-        let mut other = left;
-        while other < above.end && u32::from(runs[other].start) < end + reach {
-            let (a, b) = (root(runs, other), root(runs, id));
-            runs[a.max(b)].region = a.min(b) as u16;
-            other += 1;
-        }
-    }
-}
-
-/// The first run of a run's tree; halves the way there.
-fn root(runs: &mut [Run], mut id: usize) -> usize {
-    loop {
-        let parent = usize::from(runs[id].region);
-        if parent == id {
-            return id;
-        }
-        let grandparent = runs[parent].region;
-        runs[id].region = grandparent;
-        id = usize::from(grandparent);
-    }
-}
-
-/// Numbers the regions in the order of their first runs, and adds up their areas and forces in raster order.
-pub fn number(image: &Image, runs: &mut [Run], regions: &mut Vec<Region>) {
-    regions.clear();
-    for id in 0..runs.len() {
-        let Run { row, start, end, region: parent } = runs[id];
-        if usize::from(parent) == id {
-            runs[id].region = regions.len() as u16;
-            regions.push(Region::default());
-        } else {
-            runs[id].region = runs[usize::from(parent)].region;
-        }
-        let values = &image.row(row.into())[usize::from(start)..usize::from(end)];
-        let region = &mut regions[usize::from(runs[id].region)];
-        region.area += u32::from(end - start);
-        region.force += values.iter().fold(0.0, |sum, value| sum + f64::from(*value));
-    }
-}
-
-/// The first of the largest regions that are large and strong enough.
+/// Returns the largest region with at least `min_area` tactels and `min_force`, the first one of equals.
 #[must_use]
 pub fn contact(regions: &[Region], min_area: usize, min_force: f64) -> Option<usize> {
     let mut largest = None;
@@ -299,21 +224,6 @@ pub fn contact(regions: &[Region], min_area: usize, min_force: f64) -> Option<us
         }
     }
     largest
-}
-
-/// Makes the mask the tactels of one region.
-pub fn paint(runs: &[Run], region: usize, mask: &mut Mask) {
-    mask.clear();
-    let stride = mask.stride();
-    let words = mask.words_mut();
-    for run in runs.iter().filter(|run| usize::from(run.region) == region) {
-        let (start, end) = (usize::from(run.start), usize::from(run.end));
-        let first = usize::from(run.row) * stride;
-        let touched = &mut words[first + start / 64..first + end.div_ceil(64)];
-        for (word, at) in touched.iter_mut().zip((start / 64 * 64..).step_by(64)) {
-            *word |= (u64::MAX << start.saturating_sub(at)) & (u64::MAX >> (at + 64).saturating_sub(end));
-        }
-    }
 }
 
 #[cfg(test)]

@@ -1,8 +1,8 @@
-//! `label` against pictures, a flood fill, and a naive tracker.
+//! `label` against pictures, a flood fill, and a simple tracker.
 
 use tactflow_runtime::harness::NodeRig;
 use tactflow_runtime::node::At;
-use tactflow_runtime::signal::{Flag, ImageShape, Regions};
+use tactflow_runtime::signal::ImageShape;
 
 use super::*;
 use crate::random::Random;
@@ -30,7 +30,7 @@ fn picture(rows: &[&str]) -> (Image, Mask) {
 }
 
 #[test]
-fn the_contact_is_the_first_of_the_largest_that_are_enough() {
+fn the_contact_is_the_first_of_the_largest_regions_with_the_smallest_area_and_force() {
     let two = ["11..1", "..1.1", "....9"];
     let ring = ["1111", "1..1", "1.11", "1..."];
     type Rows<'a> = &'a [&'a str];
@@ -62,7 +62,7 @@ fn the_contact_is_the_first_of_the_largest_that_are_enough() {
 }
 
 #[test]
-fn a_run_goes_on_over_the_border_of_two_words_but_not_into_the_next_row() {
+fn a_run_crosses_the_border_of_two_words_but_not_the_end_of_a_row() {
     // the tactels of two rows of 130, and how many runs they make
     let cases: [(&[(usize, usize)], usize); 4] =
         [(&[(0, 63), (1, 64)], 2), (&[(0, 63), (0, 64)], 1), (&[(0, 127), (1, 128)], 2), (&[(0, 127), (0, 129)], 2)];
@@ -77,7 +77,7 @@ fn a_run_goes_on_over_the_border_of_two_words_but_not_into_the_next_row() {
 }
 
 #[test]
-fn what_is_refused() {
+fn wrong_parameters_and_arrays_are_refused() {
     for bad in [
         "choose = \"smallest\"",
         "choose = 1",
@@ -104,7 +104,7 @@ fn what_is_refused() {
     assert_eq!(mistakes[0].message, "`mask` is 5 by 4 tactels, but `image` is 4 by 5");
 }
 
-/// The oracle: a flood fill from each tactel in raster order, tactel by tactel.
+/// Returns the regions by a flood fill from each tactel in raster order.
 fn flood(image: &Image, mask: &Mask, neighbours: u64) -> Vec<(Mask, Region)> {
     let (rows, cols) = (mask.rows(), mask.cols());
     let mut seen = vec![false; rows * cols];
@@ -135,7 +135,7 @@ fn flood(image: &Image, mask: &Mask, neighbours: u64) -> Vec<(Mask, Region)> {
     found
 }
 
-/// The tactels of region `region`, from the runs; checks that no tactel is in two runs.
+/// Returns the tactels of a region from its runs, and checks that no tactel is in two runs.
 fn drawn(regions: &Regions, region: usize, rows: usize, cols: usize) -> Mask {
     let mut mask = Mask::empty(rows, cols);
     for run in regions.runs().iter().filter(|run| usize::from(run.region) == region) {
@@ -147,7 +147,7 @@ fn drawn(regions: &Regions, region: usize, rows: usize, cols: usize) -> Mask {
     mask
 }
 
-/// Shows a random mask of whole values to the rig and compares everything with the flood fill.
+/// Compares all outputs for a random mask and whole values with the flood fill.
 fn compare(rig: &mut NodeRig, (rows, cols, neighbours): (usize, usize, u64), random: &mut Random, percent: u32) {
     let (mut image, mut mask) = (Image::zeros(rows, cols), Mask::empty(rows, cols));
     for at in 0..rows * cols {
@@ -163,8 +163,8 @@ fn compare(rig: &mut NodeRig, (rows, cols, neighbours): (usize, usize, u64), ran
     for (i, (tactels, _)) in expected.iter().enumerate() {
         assert_eq!(&drawn(regions, i, rows, cols), tactels, "region {i} of {mask:?}");
     }
-    let enough = expected.iter().filter(|(_, region)| region.area >= 2 && region.force >= 5000.0);
-    let largest = enough.rev().max_by_key(|(_, region)| region.area).map(|(tactels, _)| tactels);
+    let candidates = expected.iter().filter(|(_, region)| region.area >= 2 && region.force >= 5000.0);
+    let largest = candidates.rev().max_by_key(|(_, region)| region.area).map(|(tactels, _)| tactels);
     assert_eq!(rig.get::<Mask>("region"), largest, "{mask:?}");
     assert_eq!(rig.get::<Flag>("present"), Some(&largest.is_some()));
 }
@@ -216,13 +216,13 @@ fn frame(discs: &[([f64; 2], f64)]) -> (Image, Mask) {
     (image, mask)
 }
 
-/// Where the contact is [tactels], by its mean place.
+/// Returns the centroid of the contact [tactels].
 fn contact_at(rig: &NodeRig) -> Option<[f64; 2]> {
-    rig.get::<Mask>("region").map(|region| mean_place(region, [1.0, 1.0]))
+    rig.get::<Mask>("region").map(|region| centroid(region, [1.0, 1.0]))
 }
 
-/// Mean of column and row of a mask, times the pitch.
-fn mean_place(mask: &Mask, pitch: [f64; 2]) -> [f64; 2] {
+/// Returns the mean column and row of a mask, times the pitch.
+fn centroid(mask: &Mask, pitch: [f64; 2]) -> [f64; 2] {
     let tactels = (0..mask.rows()).flat_map(|i| (0..mask.cols()).map(move |j| (i, j)));
     let tactels: Vec<(usize, usize)> = tactels.filter(|(i, j)| mask.contains(*i, *j)).collect();
     let mean = |of: fn(&(usize, usize)) -> usize| tactels.iter().map(of).sum::<usize>() as f64 / tactels.len() as f64;
@@ -230,7 +230,7 @@ fn mean_place(mask: &Mask, pitch: [f64; 2]) -> [f64; 2] {
 }
 
 #[test]
-fn a_second_larger_touch_steals_the_contact_only_if_it_may() {
+fn a_larger_second_touch_takes_over_unless_the_nearest_is_chosen() {
     let (small, large) = (([4.0, 4.0], 1.0), ([14.0, 10.0], 3.0));
     for (params, stays) in [("", false), ("choose = \"largest\"", false), ("choose = \"nearest\"", true)] {
         let mut rig = rig(params, 16, 20).unwrap();
@@ -241,13 +241,13 @@ fn a_second_larger_touch_steals_the_contact_only_if_it_may() {
         };
         assert_eq!(show(&[small]), Some([4.0, 4.0]), "{params}");
         assert_eq!(show(&[small, large]), Some(if stays { [4.0, 4.0] } else { [14.0, 10.0] }), "{params}");
-        assert_eq!(show(&[large]), Some([14.0, 10.0]), "{params}: what is left is the contact");
-        assert_eq!(show(&[small, large]), Some([14.0, 10.0]), "{params}: and stays it");
+        assert_eq!(show(&[large]), Some([14.0, 10.0]), "{params}: the remaining region is the contact");
+        assert_eq!(show(&[small, large]), Some([14.0, 10.0]), "{params}: the contact stays");
     }
 }
 
 #[test]
-fn the_place_of_a_contact_outlives_a_flicker_but_no_lasting_loss() {
+fn the_position_of_a_contact_survives_flicker_but_not_a_long_absence() {
     let (small, large) = (([4.0, 4.0], 1.0), ([14.0, 10.0], 3.0));
     for (frames_without, expected) in [(1, [4.0, 4.0]), (4, [4.0, 4.0]), (5, [14.0, 10.0]), (20, [14.0, 10.0])] {
         let mut rig = rig("choose = \"nearest\"\nmin_area = 2", 16, 20).unwrap();
@@ -260,7 +260,7 @@ fn the_place_of_a_contact_outlives_a_flicker_but_no_lasting_loss() {
         };
         show(&[small]);
         for _ in 0..frames_without {
-            assert_eq!(show(&[([9.0, 9.0], 0.5)]), None, "a speck is no contact");
+            assert_eq!(show(&[([9.0, 9.0], 0.5)]), None, "a single tactel is not a contact");
         }
         assert_eq!(show(&[small, large]), Some(expected), "after {frames_without} frames of 4 ms");
     }
@@ -282,7 +282,7 @@ fn the_place_of_a_contact_outlives_a_flicker_but_no_lasting_loss() {
 }
 
 #[test]
-fn the_nearest_is_that_of_a_naive_tracker_on_random_films() {
+fn the_nearest_region_agrees_with_a_simple_tracker_on_random_films() {
     const PITCH: [f64; 2] = [0.005, 0.004];
     let shape = ImageShape { rows: 16, cols: 20, pitch: PITCH, ..ImageShape::default() };
     let mut random = Random::new(11, 0);
@@ -310,14 +310,14 @@ fn the_nearest_is_that_of_a_naive_tracker_on_random_films() {
             }
             let regions: Vec<(Mask, Region)> =
                 flood(&image, &mask, 8).into_iter().filter(|(_, region)| region.area >= 4).collect();
-            let away = |(mask, _): &(Mask, Region)| {
-                let ([x, y], [a, b]) = (mean_place(mask, PITCH), last.unwrap_or_default());
+            let distance = |(mask, _): &(Mask, Region)| {
+                let ([x, y], [a, b]) = (centroid(mask, PITCH), last.unwrap_or_default());
                 (x - a).hypot(y - b)
             };
             let largest = regions.iter().rev().max_by_key(|(_, region)| region.area);
-            let nearest = regions.iter().min_by(|a, b| away(a).total_cmp(&away(b)));
+            let nearest = regions.iter().min_by(|a, b| distance(a).total_cmp(&distance(b)));
             let expected = if last.is_some() { nearest } else { largest };
-            if regions.len() == 2 && (away(&regions[0]) - away(&regions[1])).abs() < 1e-9 {
+            if regions.len() == 2 && (distance(&regions[0]) - distance(&regions[1])).abs() < 1e-9 {
                 ties += 1;
                 break;
             }
@@ -326,7 +326,7 @@ fn the_nearest_is_that_of_a_naive_tracker_on_random_films() {
             kept += usize::from(expected.zip(largest).is_some_and(|(a, b)| a.0 != b.0));
             frames += 1;
             match expected {
-                Some((mask, _)) => (last, lost) = (Some(mean_place(mask, PITCH)), 0),
+                Some((mask, _)) => (last, lost) = (Some(centroid(mask, PITCH)), 0),
                 None => lost += 1,
             }
         }

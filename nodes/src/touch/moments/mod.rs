@@ -1,68 +1,111 @@
-//! `moments`: force, pressure, centre of gravity and orientation of a contact (paper eqs. 1 and 2, and section III).
+//! `moments`: force, pressure, centroid and orientation of a contact (paper eqs. 1 and 2, and section III).
 //!
-//! f is the sum over the region R, c its centre of gravity (eq. 1), p = f / |R| (eq. 2). The orientation is that of the
-//! principal axis of the second central moments in metres, counted from the sensor's +x toward +y. A round or square
-//! patch has none: below a least anisotropy it is absent.
-//!
-//! c and the second moments are weighted by the force; by what the force has above the threshold, which takes out the
-//! step at the edge of the mask; or not at all. f and p are those of eqs. 1 and 2 with any weight.
-//!
-//! Moments are counted about the region's first tactel in whole tactels, so that what has no extent is exactly zero and
-//! not a rounding error with a direction.
+//! Positions are counted in whole tactels from the first tactel of the region, so that the moments of a region without
+//! extent are exactly 0, and not a rounding error with a direction.
 
 mod sums;
 
-use tactflow_runtime::node::{Mistakes, Node, Ratio, Setup, Tick};
-use tactflow_runtime::signal::ImageShape;
-use tactflow_runtime::{inputs, outputs, params};
+use tactflow_runtime::node::{Describe, In, Inputs, Mistakes, Node, Out, Outputs, Param, Setup, Tick};
+use tactflow_runtime::signal::{Image, ImageShape, Mask, Scalar};
 
-use super::on_one_array;
-use crate::motion::axis::half_angle;
+use super::check_same_array;
 
 pub use sums::{Ellipse, Sums, Weighing, Weight, add_up, ellipse};
 
-params! {
-    /// Below this anisotropy, from 0 (round) to 1 (a line), there is no orientation [1].
-    min_anisotropy: Ratio = Ratio(0.1),
-    /// What a tactel counts in place and shape: its "force", its "excess" above `threshold`, or the same as all others
-    /// ("area").
-    weight: Weight = Weight::Force,
-    /// Where the excess begins, for `weight = "excess"`: that of the `binarize` [unit of the image].
-    threshold: Option<f64>,
-}
-
-inputs! {
-    /// The image that forces are taken from.
-    image: Image["U", "A"],
-    /// The tactels of the contact, R.
-    region: Mask["A"],
-}
-
-outputs! {
-    /// Sum over the region, f (eq. 1) [unit of the image].
-    force: Scalar["U", "A"],
-    /// Mean over the region, p = f / |R| (eq. 2) [unit of the image per tactel]; absent for a region of nothing.
-    pressure: Scalar["U/tactel", "A"],
-    /// Centre of gravity along the sensor's x from the pad's middle (eq. 1) [m]; absent if the weights' sum is not
-    /// positive.
-    x: Scalar["m", "A"],
-    /// Centre of gravity along the sensor's y from the pad's middle (eq. 1) [m]; absent if the weights' sum is not
-    /// positive.
-    y: Scalar["m", "A"],
-    /// Number of tactels of the region, |R| [tactel].
-    area: Scalar["tactel", "A"],
-    /// Direction of the region's long axis from +x toward +y, in (-pi/2, pi/2] [rad]; absent if it has none.
-    orientation: Scalar["rad mod pi", "A"],
-    /// From 0 (round) to 1 (a line): difference of the principal second moments over their sum [1]; absent if the
-    /// weights' sum is not positive.
-    anisotropy: Scalar["1", "A"],
-}
-
-/// The array, the weight, and when a contact has an orientation.
+/// Measures a contact: force, pressure, centre of gravity and orientation.
+///
+/// The features of the paper's section III, computed from the values f_ij of the tactels of a region R, at the positions
+/// c_ij:
+///
+/// - `force` f = Σ f_ij (eq. 1), `area` |R|, `pressure` p = f / |R| (eq. 2);
+/// - `x`, `y`: the centre of gravity c = Σ f_ij c_ij / f (eq. 1), in metres from the middle of the pad. With a pitch of
+///   5 mm its error is about 0.5 mm (Fig. 2), as the foam spreads a contact over several tactels;
+/// - `orientation`: the long axis of the ellipse with the same second moments, from the sensor's +x toward +y, modulo pi;
+/// - `anisotropy`: from 0 for a round patch to 1 for a line.
+///
+/// **Absence.** A round or square patch has no orientation: below `min_anisotropy` it is absent, and servoing on the
+/// other features continues. All outputs are absent without a region.
+///
+/// **Weights.** The paper weights position and shape by the force. A tactel at the edge of the mask then enters with the
+/// whole threshold at once, which is visible as an error of the angle. `weight = "excess"` uses f_ij - `threshold`, or 0
+/// where that is negative, so a tactel enters with 0. On bars of 8 to 14 by 2 to 3 tactels with 2 % noise the error of
+/// the angle is 0.20° instead of 0.33°, on short bars of 6 to 8 tactels 0.46° instead of 0.73°, and the error of the
+/// centre of a print of 2 mm is 0.11 mm instead of 0.17 mm. Set `threshold` to the threshold of `binarize`, or to its
+/// `release` if it has one. `weight = "area"` weights every tactel by 1: it measures the shape of the mask alone, for a
+/// pad whose values are unreliable. The weight applies to `x`, `y`, `orientation` and `anisotropy`, so the axis goes
+/// through the point (`x`, `y`); `force`, `pressure` and `area` do not depend on it.
+///
+/// **Pressure** varies less than the force: force and area grow together, and the mean is never below the threshold (or
+/// `release`) of `binarize`.
+///
+/// ```toml
+/// [nodes.moments]
+/// type = "moments"
+/// in.image = "calibrate.image"
+/// in.region = "label.region"
+/// weight = "excess"                   # a tactel at the edge of the mask enters with 0
+/// threshold = 0.010                   # the `release` of `binarize` [N]
+/// ```
+#[derive(Describe)]
+#[describe(name = "moments")]
 pub struct Moments {
     shape: ImageShape,
     weighing: Weighing,
     min_anisotropy: f64,
+}
+
+/// Parameters of `moments`.
+#[derive(Debug, Clone, Param)]
+pub struct Params {
+    /// Smallest anisotropy, from 0 (round) to 1 (a line), at which a contact has an orientation.
+    #[param(unit = "1", range = 0.0..=1.0, default = 0.1)]
+    min_anisotropy: f64,
+    /// Weight of each tactel: its value, its excess over `threshold`, or 1.
+    #[param(default = Weight::Force)]
+    weight: Weight,
+    /// Zero of the excess, for `weight = "excess"`: the threshold of `binarize`, or its `release` if it has one.
+    #[param(unit = "U")]
+    threshold: Option<f64>,
+}
+
+/// What a node that measures a contact reads.
+#[derive(Inputs)]
+pub struct Inputs<'a> {
+    /// The image with the values of the tactels.
+    #[port(unit = "U", frame = "A")]
+    pub(super) image: In<'a, Image>,
+    /// The tactels of the contact, R.
+    #[port(frame = "A")]
+    pub(super) region: In<'a, Mask>,
+}
+
+/// What `moments` writes.
+#[derive(Outputs)]
+pub struct Outputs {
+    /// Sum over the region, f (eq. 1).
+    #[port(unit = "U", frame = "A")]
+    force: Out<Scalar>,
+    /// Mean over the region, p = f / |R| (eq. 2); absent if the region is empty.
+    #[port(unit = "U/tactel", frame = "A")]
+    pressure: Out<Scalar>,
+    /// Centre of gravity along the sensor's x from the middle of the pad (eq. 1); absent if the sum of the weights is not
+    /// positive.
+    #[port(unit = "m", frame = "A")]
+    x: Out<Scalar>,
+    /// Centre of gravity along the sensor's y from the middle of the pad (eq. 1); absent if the sum of the weights is not
+    /// positive.
+    #[port(unit = "m", frame = "A")]
+    y: Out<Scalar>,
+    /// Number of tactels of the region, |R|.
+    #[port(unit = "tactel", frame = "A")]
+    area: Out<Scalar>,
+    /// Direction of the region's long axis from +x toward +y, in (-pi/2, pi/2]; absent if the region is round.
+    #[port(unit = "rad mod pi", frame = "A")]
+    orientation: Out<Scalar>,
+    /// Difference of the principal second moments over their sum, from 0 (round) to 1 (a line); absent if the sum of the
+    /// weights is not positive.
+    #[port(unit = "1", frame = "A")]
+    anisotropy: Out<Scalar>,
 }
 
 impl Node for Moments {
@@ -71,46 +114,13 @@ impl Node for Moments {
     type Outputs = Outputs;
     type State = ();
 
-    const NAME: &'static str = "moments";
-    const SUMMARY: &'static str = "measures a contact: force, pressure, centre of gravity and orientation";
-    const DOC: &'static str = "The features of the paper's section III, from the tactels of a region R with the values \
-        f_ij at the places c_ij:\n\n\
-        - `force` f = Σ f_ij (eq. 1), `area` |R|, `pressure` p = f / |R| (eq. 2);\n\
-        - `x`, `y`: the centre of gravity c = Σ f_ij c_ij / f (eq. 1), in metres from the pad's middle. On a pitch of \
-        5 mm it is good to about 0.5 mm (Fig. 2), as the foam spreads a contact over several tactels;\n\
-        - `orientation`: the long axis of the ellipse with the same second moments, from the sensor's +x toward +y, \
-        modulo pi;\n\
-        - `anisotropy`: from 0 for a round patch to 1 for a line.\n\n\
-        **Absence.** A round or a square patch has no orientation: below `min_anisotropy` it is absent, and servoing on \
-        the other features goes on. All outputs are absent without a region.\n\n\
-        **Weights.** The paper weights place and shape by the force. A tactel at the edge of the mask then enters \
-        with the whole of the threshold at once, which shows as an error of the angle. `weight = \"excess\"` takes \
-        f_ij - `threshold` (nothing, where that is negative), so that a tactel enters with nothing: on \
-        bars of 8 to 14 by 2 to 3 tactels with 2 % noise the angle's error is 0.20° instead of 0.33°, on short ones of 6 \
-        to 8 tactels 0.46° instead of 0.73°, and the centre of a print of 2 mm is off by 0.11 mm instead of 0.17 mm. It \
-        holds for `x`, `y`, `orientation` and `anisotropy` alike, so that the axis goes through the point that is told. Give it \
-        the threshold of the `binarize`, its `release` if it has one. `weight = \"area\"` takes every tactel as 1: \
-        the shape of the mask alone, for a pad whose values are not to be trusted. `force`, `pressure` and `area` do \
-        not depend on it.\n\n\
-        **Pressure** says less than it seems: force and area grow together, and it cannot be below the threshold (or \
-        `release`) of the `binarize`.";
-    const EXAMPLE: &'static str = r#"
-[nodes.moments]
-type = "moments"
-in.image = "calibrate.image"
-in.region = "label.region"
-weight = "excess"                   # without the step at the edge of the mask
-threshold = 0.010                   # as the `release` of the `binarize` [N]
-"#;
-
     fn new(params: Params, setup: &mut Setup<Self>) -> Result<Self, Mistakes> {
-        let shape = setup.inputs.image.clone();
-        on_one_array(&shape, "region", &setup.inputs.region)?;
+        let shape = image_shape(&setup.inputs)?;
         let weighing = Weighing::new(params.weight, params.threshold)?;
         let (x, y) = (shape.x(shape.cols as f64 - 1.0), shape.y(shape.rows as f64 - 1.0));
         (setup.outputs.x.range, setup.outputs.y.range) = ([-x, x], [-y, y]);
         setup.outputs.area.range = [0.0, shape.tactels() as f64];
-        Ok(Self { shape, weighing, min_anisotropy: *params.min_anisotropy })
+        Ok(Self { shape, weighing, min_anisotropy: params.min_anisotropy })
     }
 
     fn state(&self) {}
@@ -131,13 +141,18 @@ threshold = 0.010                   # as the `release` of the `binarize` [N]
             out.x.set(self.shape.x(sums.first[1] + j));
             out.y.set(self.shape.y(sums.first[0] + i));
             let ellipse = ellipse(&sums, self.shape.pitch);
-            let anisotropy = ellipse.anisotropy();
-            out.anisotropy.set(anisotropy);
-            if anisotropy > 0.0 && anisotropy >= self.min_anisotropy {
-                out.orientation.set(half_angle(ellipse.sine, ellipse.cosine));
+            out.anisotropy.set(ellipse.anisotropy());
+            if let Some(orientation) = ellipse.orientation(self.min_anisotropy) {
+                out.orientation.set(orientation);
             }
         }
     }
+}
+
+/// Returns the shape of the image, if the region is on the same array.
+pub(super) fn image_shape(inputs: &InputsShapes) -> Result<ImageShape, Mistakes> {
+    check_same_array(&inputs.image, "region", &inputs.region)?;
+    Ok(inputs.image.clone())
 }
 
 #[cfg(test)]

@@ -1,19 +1,20 @@
-//! Sums over a region, and the ellipse with its second moments: what all nodes that tell of a shape share.
+//! Sums over a region, and the ellipse with its second moments: shared by all nodes that measure a contact.
 
-use tactflow_runtime::node::{At, Mistake, Mistakes};
+use tactflow_runtime::node::{At, Mistake, Mistakes, Param};
 use tactflow_runtime::signal::{Image, Mask};
 use tactflow_runtime::source::Code;
 
-words! {
-    /// What a tactel of the region counts in its place and its shape.
-    Weight {
-        /// Its value.
-        Force = "force",
-        /// What its value has above a threshold.
-        Excess = "excess",
-        /// The same as every other.
-        Area = "area",
-    }
+use crate::motion::axis::half_angle;
+
+/// Weight of a tactel in the position and the shape of its region.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Param)]
+pub enum Weight {
+    /// Its value.
+    Force,
+    /// Its value minus a threshold.
+    Excess,
+    /// 1.
+    Area,
 }
 
 /// A weight with its threshold.
@@ -21,35 +22,35 @@ words! {
 pub enum Weighing {
     /// The value.
     Force,
-    /// What the value has above this threshold, and nothing below it.
+    /// The value minus this threshold, and 0 below it.
     Excess(f64),
-    /// The same for every tactel.
+    /// 1.
     Area,
 }
 
 impl Weighing {
-    /// The weight that the parameters `weight` and `threshold` ask for.
+    /// Returns the weight that the parameters `weight` and `threshold` select.
     ///
     /// # Errors
-    /// If a threshold is missing, or is given where it means nothing.
+    /// If the threshold is missing, or has no effect.
     pub fn new(weight: Weight, threshold: Option<f64>) -> Result<Self, Mistakes> {
         match (weight, threshold) {
             (Weight::Force, None) => Ok(Self::Force),
             (Weight::Area, None) => Ok(Self::Area),
             (Weight::Excess, Some(threshold)) => Ok(Self::Excess(threshold)),
             (Weight::Excess, None) => {
-                let message = "`weight = \"excess\"` needs the `threshold` that it counts from";
+                let message = "`weight = \"excess\"` needs a `threshold`";
                 let mistake = Mistake::new(Code::MissingKey, At::Param("weight".into()), message);
-                Err(mistake.help("give that of the `binarize`: its `release`, if it has one").into())
+                Err(mistake.help("write the `threshold` of `binarize`, or its `release` if it has one").into())
             }
             (Weight::Force | Weight::Area, Some(_)) => {
-                let mistake = Mistake::key("threshold", "`threshold` means nothing without `weight = \"excess\"`");
-                Err(mistake.help("say `weight = \"excess\"`, or leave it out").into())
+                let mistake = Mistake::key("threshold", "`threshold` has no effect without `weight = \"excess\"`");
+                Err(mistake.help("write `weight = \"excess\"`, or leave `threshold` out").into())
             }
         }
     }
 
-    /// The weight of a tactel.
+    /// Returns the weight of a tactel of this value.
     #[must_use]
     pub fn weight(self, value: f64) -> f64 {
         match self {
@@ -59,7 +60,7 @@ impl Weighing {
         }
     }
 
-    /// One pass over the tactels of a region, in raster order.
+    /// Returns the sums over a region, in one pass in raster order.
     #[must_use]
     pub fn add_up(self, image: &Image, region: &Mask) -> Sums {
         match self {
@@ -69,14 +70,14 @@ impl Weighing {
     }
 }
 
-/// Sums over a region, places counted in tactels from its first tactel in raster order.
+/// Sums over a region, with positions in tactels from its first tactel in raster order.
 #[derive(Debug, Default)]
 pub struct Sums {
-    /// Row and column of that first tactel.
+    /// Row and column of the first tactel.
     pub first: [f64; 2],
     /// Number of tactels.
     pub area: f64,
-    /// Sum of their weights: of their values, unless another weight was asked for.
+    /// Sum of the weights; the force, if the weight is the value.
     pub force: f64,
     /// Sum of weight times column.
     pub x: f64,
@@ -87,13 +88,13 @@ pub struct Sums {
     yy: f64,
 }
 
-/// One pass over the tactels of a region, in raster order, each weighted by its value.
+/// Returns the sums over a region with each tactel weighted by its value, in one pass in raster order.
 #[must_use]
 pub fn add_up(image: &Image, region: &Mask) -> Sums {
     add_up_by(image, region, |value| value)
 }
 
-/// The same with another weight, made of the value.
+/// Returns the sums over a region with each tactel weighted by a function of its value.
 #[inline]
 fn add_up_by(image: &Image, region: &Mask, weight: impl Fn(f64) -> f64) -> Sums {
     let mut sums = Sums::default();
@@ -128,16 +129,17 @@ fn add_up_by(image: &Image, region: &Mask, weight: impl Fn(f64) -> f64) -> Sums 
     sums
 }
 
-/// Second central moments: their sum, and the double of the axis they give, as a sine and a cosine times its strength.
+/// The second central moments of a region [m²].
+///
+/// The sine and the cosine are those of the doubled angle of the long axis, times the difference of the two variances.
 pub struct Ellipse {
+    /// Sum of the variances.
     spread: f64,
-    /// Sine of the doubled axis, times its strength.
-    pub sine: f64,
-    /// Cosine of the doubled axis, times its strength.
-    pub cosine: f64,
+    sine: f64,
+    cosine: f64,
 }
 
-/// The ellipse with the second central moments of a region whose weights have a positive sum.
+/// Returns the ellipse with the second central moments of a region whose weights have a positive sum; `pitch` is in metres.
 #[must_use]
 pub fn ellipse(sums: &Sums, pitch: [f64; 2]) -> Ellipse {
     let (x, y) = (sums.x / sums.force, sums.y / sums.force);
@@ -148,7 +150,9 @@ pub fn ellipse(sums: &Sums, pitch: [f64; 2]) -> Ellipse {
 }
 
 impl Ellipse {
-    /// From 0 to 1; zero without extent, and where tactels below zero leave no positive spread.
+    /// Returns the difference of the two variances over their sum, from 0 (round) to 1 (a line).
+    ///
+    /// It is 0 if the region has no extent, or if negative tactels make the sum negative.
     #[must_use]
     pub fn anisotropy(&self) -> f64 {
         if self.spread > 0.0 {
@@ -158,8 +162,17 @@ impl Ellipse {
         }
     }
 
-    /// Variance along the long and along the short axis [m²]; zero without extent, and where tactels below zero leave no
-    /// positive spread.
+    /// Returns the angle of the long axis from +x toward +y, in (-pi/2, pi/2] [rad], or `None` if the anisotropy is 0 or
+    /// less than `min_anisotropy`.
+    #[must_use]
+    pub fn orientation(&self, min_anisotropy: f64) -> Option<f64> {
+        let anisotropy = self.anisotropy();
+        (anisotropy > 0.0 && anisotropy >= min_anisotropy).then(|| half_angle(self.sine, self.cosine))
+    }
+
+    /// Returns the variances along the long and the short axis [m²].
+    ///
+    /// Both are 0 if the region has no extent, or if negative tactels make their sum negative.
     #[must_use]
     pub fn variances(&self) -> [f64; 2] {
         if self.spread <= 0.0 {

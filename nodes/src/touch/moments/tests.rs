@@ -6,7 +6,7 @@ use nalgebra::{Matrix2, Vector2};
 use proptest::prelude::*;
 use tactflow_runtime::harness::NodeRig;
 use tactflow_runtime::node::At;
-use tactflow_runtime::signal::{Grid, Image, Mask, Scalar, Unit};
+use tactflow_runtime::signal::{Grid, Unit};
 
 use super::*;
 use crate::random::Random;
@@ -67,7 +67,7 @@ fn rectangles_in_closed_form() {
 }
 
 #[test]
-fn what_has_no_answer_is_absent() {
+fn an_undefined_feature_is_absent() {
     let disc = |i: usize, j: usize| f64::from(u8::from((i as f64 - 7.5).hypot(j as f64 - 7.5) < 5.0));
     let cases: [(&str, Image, f32, [bool; 4]); 8] = [
         ("nothing", render(16, 16, |_, _| 0.0), 0.0, [false, false, false, false]),
@@ -90,7 +90,7 @@ fn what_has_no_answer_is_absent() {
 }
 
 #[test]
-fn the_least_anisotropy_is_enough() {
+fn an_orientation_needs_the_smallest_anisotropy() {
     // 2 by 3: (8 - 3) / (8 + 3)
     for (params, has_axis) in [("min_anisotropy = 0.4545", true), ("min_anisotropy = 0.4546", false)] {
         let mut rig = rig(params, 2, 3, [0.005; 2]);
@@ -101,7 +101,7 @@ fn the_least_anisotropy_is_enough() {
 }
 
 #[test]
-fn a_line_is_as_anisotropic_as_can_be() {
+fn the_anisotropy_of_a_line_is_one() {
     let mut random = Random::new(3, 0);
     for round in 0..200 {
         let values: Vec<f64> = (0..16).map(|_| 0.1 + random.uniform(0.0, 1.0)).collect();
@@ -185,7 +185,7 @@ fn the_orientation_of_a_bar_is_its_angle() {
 }
 
 #[test]
-fn a_weight_changes_place_and_shape_but_neither_force_nor_pressure() {
+fn a_weight_changes_position_and_shape_but_neither_force_nor_pressure() {
     // A row of 1, 2 and 6 above a threshold of 0.5: the weighted mean column, and anisotropy 1.
     let image = render(4, 8, |i, j| if i == 2 { [0.0, 0.5, 1.0, 2.0, 6.0, 0.0, 0.0, 0.0][j] } else { 0.0 });
     let cases = [
@@ -206,11 +206,11 @@ fn a_weight_changes_place_and_shape_but_neither_force_nor_pressure() {
     let mut rig = rig("weight = \"excess\"\nthreshold = 7", 4, 8, PITCH);
     show(&mut rig, &image, 0.5);
     let found = ["force", "pressure", "x", "y", "anisotropy", "orientation"].map(|output| get(&rig, output).is_some());
-    assert_eq!(found, [true, true, false, false, false, false], "nothing is above it");
+    assert_eq!(found, [true, true, false, false, false, false], "no tactel is above the threshold");
 }
 
 #[test]
-fn a_tactel_enters_with_nothing_when_the_excess_counts() {
+fn with_the_excess_as_weight_a_tactel_enters_without_a_jump() {
     // The last tactel of a row passes the threshold: how far the centre jumps.
     let jump = |params: &str| {
         let at = |last: f64| {
@@ -224,7 +224,7 @@ fn a_tactel_enters_with_nothing_when_the_excess_counts() {
 }
 
 #[test]
-fn what_is_refused() {
+fn wrong_parameters_and_shapes_are_refused() {
     let image = ImageShape { rows: 4, cols: 5, pitch: PITCH, unit: Unit::NEWTON };
     let grid = Grid::from(&image);
     let weights = ["weight = \"excess\"", "threshold = 0.1", "weight = \"area\"\nthreshold = 0.1", "weight = 1"];
@@ -267,10 +267,10 @@ proptest! {
         let spread = region().fold(Matrix2::zeros(), |sum, (value, at)| sum + (at - centre) * (at - centre).transpose() * value);
         let eigen = spread.symmetric_eigen();
         let long = eigen.eigenvalues.imax();
-        let (most, least) = (eigen.eigenvalues[long], eigen.eigenvalues[1 - long]);
+        let (major, minor) = (eigen.eigenvalues[long], eigen.eigenvalues[1 - long]);
         prop_assume!(region().count() > 1);
         let anisotropy = get(&rig, "anisotropy").unwrap();
-        prop_assert!((anisotropy - (most - least) / (most + least)).abs() < 1e-9);
+        prop_assert!((anisotropy - (major - minor) / (major + minor)).abs() < 1e-9);
         prop_assume!(anisotropy > 1e-3);
         let angle = get(&rig, "orientation").unwrap();
         prop_assert!(angle > -FRAC_PI_2 && angle <= FRAC_PI_2);

@@ -1,18 +1,19 @@
-//! What `verify` prints: one table for a person, or the same for a program.
+//! The output of `verify`, as a table or as JSON.
 
 use serde::Serialize;
 
-use super::Verified;
-use crate::cli::json::Diagnosed;
-use crate::cli::summary::{number, table};
-use crate::scenario::judge::{Bound, Figure, Mark, Row};
+use super::verified::Verified;
+use crate::cli::shell::json::DiagnosticJson;
+use crate::cli::text::number::number;
+use crate::cli::text::table::table;
+use crate::scenario::judge::{Bound, Figure, Row, Verdict};
 use crate::scenario::{Scenario, Trial};
 
 const HEADER: [&str; 10] =
-    ["scenario", "check", "figure", "unit", "median", "bound", "paper", "worst", "95 % of the median", ""];
+    ["scenario", "check", "figure", "unit", "median of runs", "bound", "paper", "worst", "95 % of the median", ""];
 
-/// The table, what each scenario is, and how many rows are met.
-pub(super) fn text(all: &[Verified], has_colour: bool) -> String {
+/// Writes the table, a description of each scenario, and the number of checks that passed.
+pub(crate) fn text(all: &[Verified], has_colour: bool) -> String {
     let mut rows = vec![HEADER.map(String::from)];
     for verified in all {
         let mut name = Some(verified.name());
@@ -21,7 +22,11 @@ pub(super) fn text(all: &[Verified], has_colour: bool) -> String {
         }
         let failed = verified.trials.iter().filter(|trial| trial.failure.is_some()).count();
         if failed > 0 {
-            rows.push(remark(name.take(), &format!("{failed} of {} runs failed", verified.trials.len()), has_colour));
+            rows.push(remark(
+                name.take(),
+                &format!("{failed} of {} runs ended in an error", verified.trials.len()),
+                has_colour,
+            ));
         }
         rows.extend(verified.rows.iter().map(|row| cells(name.take(), row, has_colour)));
     }
@@ -29,7 +34,7 @@ pub(super) fn text(all: &[Verified], has_colour: bool) -> String {
     text.push('\n');
     for verified in all {
         if let Ok(scenario) = &verified.loaded {
-            text.push_str(&format!("{}: {}\n", verified.name(), what_it_is(scenario)));
+            text.push_str(&format!("{}: {}\n", verified.name(), describe(scenario)));
         }
     }
     text.push_str(&format!("\n{}\n", summary(all)));
@@ -37,21 +42,26 @@ pub(super) fn text(all: &[Verified], has_colour: bool) -> String {
 }
 
 fn summary(all: &[Verified]) -> String {
-    let marks: Vec<Mark> = all.iter().flat_map(|verified| &verified.rows).map(Row::mark).collect();
-    let count = |mark: Mark| marks.iter().filter(|known| **known == mark).count();
+    let marks: Vec<Verdict> = all.iter().flat_map(|verified| &verified.rows).map(Row::verdict).collect();
+    let count = |mark: Verdict| marks.iter().filter(|known| **known == mark).count();
     let trials = || all.iter().flat_map(|verified| &verified.trials);
     let failed = trials().filter(|trial| trial.failure.is_some()).count();
     let unloaded = all.iter().filter(|verified| verified.loaded.is_err()).count();
-    let mut parts = vec![format!("{} met", count(Mark::Met)), format!("{} missed", count(Mark::Missed))];
-    parts.push(format!("{} told", count(Mark::Told)));
-    parts.push(format!("in {} runs", trials().count()));
-    parts.extend((failed > 0).then(|| format!("{failed} of which failed")));
-    parts.extend((unloaded > 0).then(|| format!("{unloaded} scenarios do not load")));
+    let mut parts = vec![format!("{} passed", count(Verdict::Passed)), format!("{} failed", count(Verdict::Failed))];
+    parts.push(format!("{} informational", count(Verdict::Informational)));
+    let ended = if failed == 0 { String::new() } else { format!(" ({failed} ended in an error)") };
+    parts.push(format!("in {}{ended}", plural(trials().count(), "run")));
+    parts.extend((unloaded > 0).then(|| format!("{} not loaded", plural(unloaded, "scenario"))));
     parts.join(", ")
 }
 
-/// The length, the seeds and what the devices state.
-fn what_it_is(scenario: &Scenario) -> String {
+/// Formats a count with its noun.
+fn plural(count: usize, noun: &str) -> String {
+    format!("{count} {noun}{}", if count == 1 { "" } else { "s" })
+}
+
+/// Describes the seeds and the length of a scenario, and the facts of its devices.
+fn describe(scenario: &Scenario) -> String {
     let runs = match scenario.seeds.len() {
         0 => "one run".to_owned(),
         1 => "one seed".to_owned(),
@@ -61,7 +71,7 @@ fn what_it_is(scenario: &Scenario) -> String {
     format!("{runs} of {} s{}", scenario.for_s, facts.collect::<String>())
 }
 
-/// A line that is no figure.
+/// Returns a row that says why there are no figures.
 fn remark(name: Option<String>, what: &str, has_colour: bool) -> [String; 10] {
     let mut cells: [String; 10] = Default::default();
     (cells[0], cells[1]) = (name.unwrap_or_default(), what.to_owned());
@@ -69,8 +79,9 @@ fn remark(name: Option<String>, what: &str, has_colour: bool) -> [String; 10] {
     cells
 }
 
+/// Returns the row of a figure.
 fn cells(name: Option<String>, row: &Row, has_colour: bool) -> [String; 10] {
-    let figure = |value: Option<f64>| value.map_or_else(|| nothing(row.figure).to_owned(), number);
+    let figure = |value: Option<f64>| value.map_or_else(|| not_measured(row.figure).to_owned(), number);
     let bound = match row.bound {
         Bound::None => String::new(),
         Bound::Settles => "each settles".to_owned(),
@@ -86,10 +97,10 @@ fn cells(name: Option<String>, row: &Row, has_colour: bool) -> [String; 10] {
         let end = |value: f64| figure(Some(value).filter(|value| value.is_finite()));
         format!("{} to {}", end(low), end(high))
     });
-    let mark = match row.mark() {
-        Mark::Met => coloured("met", GREEN, has_colour),
-        Mark::Missed => coloured("MISSED", RED, has_colour),
-        Mark::Told => String::new(),
+    let mark = match row.verdict() {
+        Verdict::Passed => coloured("passed", GREEN, has_colour),
+        Verdict::Failed => coloured("FAILED", RED, has_colour),
+        Verdict::Informational => String::new(),
     };
     [
         name.unwrap_or_default(),
@@ -105,8 +116,8 @@ fn cells(name: Option<String>, row: &Row, has_colour: bool) -> [String; 10] {
     ]
 }
 
-/// What is printed of a figure that could not be measured.
-const fn nothing(figure: Figure) -> &'static str {
+/// Returns the text of a figure that could not be measured.
+const fn not_measured(figure: Figure) -> &'static str {
     match figure {
         Figure::Response => "never",
         _ => "-",
@@ -120,9 +131,9 @@ fn coloured(text: &str, colour: &str, has_colour: bool) -> String {
     if has_colour { format!("{colour}{text}\x1b[0m") } else { text.to_owned() }
 }
 
-/// Everything, for a program.
+/// The results as JSON.
 #[derive(Serialize)]
-pub(super) struct Json {
+pub(crate) struct VerifyJson {
     ok: bool,
     scenarios: Vec<ScenarioJson>,
 }
@@ -132,10 +143,10 @@ struct ScenarioJson {
     name: String,
     file: String,
     ok: bool,
-    diagnostics: Vec<Diagnosed>,
+    diagnostics: Vec<DiagnosticJson>,
     /// Length of a run [s].
     for_s: Option<f64>,
-    /// What the devices state.
+    /// Facts of the devices.
     facts: serde_json::Map<String, serde_json::Value>,
     runs: Vec<RunJson>,
     rows: Vec<RowJson>,
@@ -148,29 +159,39 @@ struct RunJson {
     failure: Option<String>,
 }
 
+/// What a bound applies to.
+#[derive(Serialize)]
+#[serde(rename_all = "lowercase")]
+enum Judged {
+    /// The median of the runs.
+    Median,
+    /// Every run.
+    Every,
+}
+
 #[derive(Serialize)]
 struct RowJson {
     check: String,
     of: String,
     figure: &'static str,
     unit: String,
-    /// Over the runs; null if it could not be measured.
+    /// Over the runs; null if not measured.
     median: Option<f64>,
     worst: Option<f64>,
-    /// An interval for the median with at least 95 %; null at an end that could not be measured.
+    /// Confidence interval of the median, at least 95 %; an end is null if not measured.
     interval: Option<[Option<f64>; 2]>,
     bound: Option<f64>,
-    /// What is held against the bound: `median`, `every` run, or nothing.
-    judged: Option<&'static str>,
+    /// What the bound applies to, or null without a bound.
+    judged: Option<Judged>,
     paper: Option<f64>,
-    /// `met`, `missed`, or `told` where nothing is asked.
+    /// `passed`, `failed`, or `informational` without a bound.
     mark: &'static str,
     /// In the order of the runs.
     values: Vec<Option<f64>>,
 }
 
-pub(super) fn json(all: &[Verified]) -> Json {
-    Json { ok: all.iter().all(Verified::is_met), scenarios: all.iter().map(scenario_json).collect() }
+pub(crate) fn json(all: &[Verified]) -> VerifyJson {
+    VerifyJson { ok: all.iter().all(Verified::has_passed), scenarios: all.iter().map(scenario_json).collect() }
 }
 
 fn scenario_json(verified: &Verified) -> ScenarioJson {
@@ -181,7 +202,7 @@ fn scenario_json(verified: &Verified) -> ScenarioJson {
     ScenarioJson {
         name: verified.name(),
         file: verified.path.display().to_string(),
-        ok: verified.is_met(),
+        ok: verified.has_passed(),
         diagnostics: verified.diagnostics(),
         for_s: scenario.map(|scenario| scenario.for_s),
         facts: facts.map(|(name, fact)| (name.clone(), value(fact))).collect(),
@@ -203,14 +224,14 @@ fn row_json(row: &Row) -> RowJson {
         bound: row.bound.number(),
         judged: match row.bound {
             Bound::None => None,
-            Bound::Median(_) => Some("median"),
-            Bound::Settles | Bound::AtMost(_) | Bound::AtLeast(_) => Some("every"),
+            Bound::Median(_) => Some(Judged::Median),
+            Bound::Settles | Bound::AtMost(_) | Bound::AtLeast(_) => Some(Judged::Every),
         },
         paper: row.paper,
-        mark: match row.mark() {
-            Mark::Met => "met",
-            Mark::Missed => "missed",
-            Mark::Told => "told",
+        mark: match row.verdict() {
+            Verdict::Passed => "passed",
+            Verdict::Failed => "failed",
+            Verdict::Informational => "informational",
         },
         values: row.values.clone(),
     }

@@ -1,25 +1,25 @@
-//! The runtime's own hand on a device's command: what the graph commands, or the way to zero, never the last velocity.
+//! The last stage before a device: follows the graph's command or ramps to zero. It never holds the last velocity.
 //!
-//! It follows the graph's command exactly. When nothing drives it any more, or while commands are halted, it goes to zero
-//! in a straight line, as fast as the joints' accelerations allow; and when it may follow again, it catches up by the
-//! same accelerations before it follows.
+//! A command follows the graph exactly. While the graph's command is absent or too old, or commands are halted, it ramps
+//! to zero on a straight line, as fast as the joint accelerations allow. When the graph's command returns, it approaches
+//! that command with the same accelerations before it follows again.
 
 use crate::device::Commands;
 use crate::graph::{PlannedCommand, PlannedReport};
 use crate::node::{Bus, PortId, Tick};
+use crate::signal::Joints;
 use crate::signal::line::{scale_to, step_toward};
-use crate::signal::{Joints, Signal};
 
 /// One command port of a device.
 pub(crate) struct CommandSlot {
     pub(crate) device: usize,
     source: PortId,
     command: usize,
-    /// How old the command may be [ns].
+    /// Maximum age of the graph's command [ns].
     max_age: i64,
-    /// Greatest acceleration of each joint [rad/s²]; infinite where nothing bounds it.
+    /// Maximum acceleration of each joint [rad/s²]; infinite if it has no limit.
     accelerations: Box<[f64]>,
-    /// Whether it has caught up with what the graph commands.
+    /// Whether it has reached the graph's command.
     follows: bool,
 }
 
@@ -29,37 +29,35 @@ impl CommandSlot {
         Self { device, source, command, max_age: age.max_age, accelerations: accelerations.into(), follows: false }
     }
 
-    /// Takes over what the graph commands; goes on toward zero if it commands nothing, or nothing that is fresh, or if all
-    /// is halted.
+    /// Takes over the graph's command, or ramps toward zero if that is absent, too old or halted.
     pub(crate) fn commit(&mut self, bus: &Bus, commands: &mut Commands, tick: &Tick, is_halted: bool) {
-        let (mark, dt) = (&bus.marks[self.source.mark as usize], tick.dt);
+        let (mark, dt) = (bus.mark(self.source), tick.dt);
         if is_halted || !mark.is_present() || mark.stamp().age(tick.now) > self.max_age {
             self.ramp(commands, dt);
             return;
         }
-        let Joints(wanted) = &Joints::arena(&bus.arenas)[self.source.slot as usize];
+        let Joints(target) = bus.slot(self.source);
         let values = &mut commands.values[self.command];
         if self.follows {
-            values.copy_from_slice(wanted);
+            values.copy_from_slice(target);
         } else {
-            self.follows = approach(values, |i| wanted[i], &self.accelerations, dt);
+            self.follows = approach(values, |i| target[i], &self.accelerations, dt);
         }
     }
 
-    /// One step of `dt` [s] toward zero; whether the command is zero.
+    /// Ramps toward zero for `dt` [s]. Returns whether the command is zero.
     pub(crate) fn ramp(&mut self, commands: &mut Commands, dt: f64) -> bool {
         self.follows = false;
         approach(&mut commands.values[self.command], |_| 0.0, &self.accelerations, dt)
     }
 }
 
-/// One report to a device: what the graph tells it, as it is and while it is fresh. It moves nothing, so it goes on while
-/// commands are held.
+/// One report port of a device. A report moves nothing, so it is sent while commands are halted too.
 pub(crate) struct ReportSlot {
     pub(crate) device: usize,
     source: PortId,
     report: usize,
-    /// How old the report may be [ns].
+    /// Maximum age of the report [ns].
     max_age: i64,
 }
 
@@ -68,24 +66,24 @@ impl ReportSlot {
         Self { device: planned.device, source, report: planned.report, max_age: planned.age.max_age }
     }
 
-    /// Takes over what the graph reports, or that it reports nothing.
+    /// Copies the report, or makes it absent if it is absent or too old.
     pub(crate) fn commit(&self, bus: &Bus, commands: &mut Commands, tick: &Tick) {
-        let mark = &bus.marks[self.source.mark as usize];
-        let is_there = mark.is_present() && mark.stamp().age(tick.now) <= self.max_age;
-        commands.take_report(self.report, &bus.arenas, is_there.then_some(self.source.slot));
+        let mark = bus.mark(self.source);
+        let is_fresh = mark.is_present() && mark.stamp().age(tick.now) <= self.max_age;
+        commands.take_report(self.report, &bus.arenas, is_fresh.then_some(self.source.slot));
     }
 }
 
-/// Moves `values` toward `wanted` on a straight line, no joint by more than its acceleration allows in `dt` [s]. Returns
-/// whether they have arrived.
-fn approach(values: &mut [f64], wanted: impl Fn(usize) -> f64, accelerations: &[f64], dt: f64) -> bool {
+/// Moves `values` toward `target` on a straight line, each joint by no more than its acceleration allows in `dt` [s].
+/// Returns whether they have reached it.
+fn approach(values: &mut [f64], target: impl Fn(usize) -> f64, accelerations: &[f64], dt: f64) -> bool {
     let mut scale = 1.0_f64;
     for (i, (value, acceleration)) in values.iter().zip(accelerations).enumerate() {
-        // An unbounded acceleration in no time is not a number, and `min` skips it.
-        scale = scale.min(scale_to((wanted(i) - value).abs(), acceleration * dt));
+        // An infinite acceleration times a `dt` of zero is NaN, which `min` ignores.
+        scale = scale.min(scale_to((target(i) - value).abs(), acceleration * dt));
     }
     for (i, value) in values.iter_mut().enumerate() {
-        *value = step_toward(*value, wanted(i), scale);
+        *value = step_toward(*value, target(i), scale);
     }
     scale >= 1.0
 }
@@ -95,9 +93,10 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
+    use crate::device::Description;
     use crate::signal::{JointsShape, Stamp};
 
-    /// A slot for two joints, and the bus its command comes over.
+    /// A slot for two joints, and the bus that carries its command.
     fn slot(accelerations: [f64; 2]) -> (CommandSlot, Bus, Commands) {
         let mut bus = Bus::default();
         let source = bus.add(&JointsShape { joints: vec![Default::default(); 2], ..Default::default() }.into());
@@ -109,18 +108,19 @@ mod tests {
             accelerations: accelerations.into(),
             follows: false,
         };
+        let mut description = Description::every(1.0);
         let joints = JointsShape { joints: vec![Default::default(); 2], ..Default::default() };
-        (slot, bus, Commands::with_shapes([&joints.into()].into_iter()))
+        description.fills("arm").command("velocity", joints);
+        (slot, bus, Commands::of(&description))
     }
 
-    fn drive(bus: &mut Bus, slot: &CommandSlot, wanted: Option<[f64; 2]>) {
-        let mark = &mut bus.marks[slot.source.mark as usize];
-        match wanted {
-            Some(wanted) => {
-                mark.renew(1, Stamp::TIMELESS);
-                Joints::arena_mut(&mut bus.arenas)[slot.source.slot as usize].0.copy_from_slice(&wanted);
+    fn drive(bus: &mut Bus, slot: &CommandSlot, target: Option<[f64; 2]>) {
+        match target {
+            Some(target) => {
+                bus.mark_mut(slot.source).renew(1, Stamp::TIMELESS);
+                bus.slot_mut::<Joints>(slot.source).0.copy_from_slice(&target);
             }
-            None => mark.lose(1),
+            None => bus.mark_mut(slot.source).lose(1),
         }
     }
 
@@ -131,87 +131,90 @@ mod tests {
         let mut last = 2.0;
         for step in 1..=10 {
             let is_still = slot.ramp(&mut commands, 0.01);
-            let now = commands.joints(0)[0];
+            let now = commands.values[0][0];
             assert!((last - now - 0.2).abs() < 1e-12, "step {step}: {last} to {now}");
-            assert!((commands.joints(0)[1] + now / 2.0).abs() < 1e-12, "the direction stays");
+            assert!((commands.values[0][1] + now / 2.0).abs() < 1e-12, "the direction stays");
             assert!(!is_still || step >= 10);
             last = now;
         }
         assert!(slot.ramp(&mut commands, 0.01));
-        assert_eq!(commands.joints(0), [0.0, 0.0]);
+        assert_eq!(&*commands.values[0], [0.0, 0.0]);
     }
 
     #[test]
-    fn without_a_bound_on_the_acceleration_it_is_there_at_once() {
+    fn without_an_acceleration_limit_the_command_follows_at_once() {
         let (mut slot, mut bus, mut commands) = slot([f64::INFINITY; 2]);
         drive(&mut bus, &slot, Some([3.0, 4.0]));
         slot.commit(&bus, &mut commands, &Tick::first(), false);
-        assert_eq!(commands.joints(0), [3.0, 4.0]);
+        assert_eq!(&*commands.values[0], [3.0, 4.0]);
         slot.commit(&bus, &mut commands, &Tick::first(), true);
-        assert_eq!(commands.joints(0), [0.0, 0.0]);
+        assert_eq!(&*commands.values[0], [0.0, 0.0]);
     }
 
     #[test]
-    fn what_is_too_old_is_not_followed() {
+    fn a_command_that_is_too_old_is_not_followed() {
         let (mut slot, mut bus, mut commands) = slot([f64::INFINITY; 2]);
         drive(&mut bus, &slot, Some([3.0, 4.0]));
-        bus.marks[slot.source.mark as usize].renew(1, Stamp { nanos: 0, device: 0 });
+        bus.mark_mut(slot.source).renew(1, Stamp { nanos: 0, device: 0 });
         for (now, expected) in [(100, [3.0, 4.0]), (101, [0.0, 0.0])] {
             slot.commit(&bus, &mut commands, &Tick { now, ..Tick::first() }, false);
-            assert_eq!(commands.joints(0), expected, "{now} ns");
+            assert_eq!(&*commands.values[0], expected, "{now} ns");
         }
     }
 
     #[test]
-    fn a_report_is_what_is_there_and_fresh_and_needs_no_new_room() {
+    fn a_report_is_copied_in_place_while_it_is_present_and_fresh() {
         let (mut bus, shape) =
             (Bus::default(), JointsShape { joints: vec![Default::default(); 2], ..Default::default() });
         let source = bus.add(&shape.clone().into());
         let report = ReportSlot { device: 0, source, report: 1, max_age: 100 };
-        let mut commands = Commands::default().with_report(None).with_report(Some(&shape.into()));
-        let room = Joints::arena(&bus.arenas)[0].0.as_ptr();
-        let mut tell = |wanted: Option<i64>, now: i64| {
-            let mark = &mut bus.marks[source.mark as usize];
-            match wanted {
-                Some(nanos) => mark.renew(1, Stamp { nanos, device: 0 }),
-                None => mark.lose(1),
+        let mut description = Description::every(1.0);
+        let mut arm = description.fills("arm");
+        let (other, joints) = (arm.report::<bool>("is_there"), arm.report::<Joints>("joints"));
+        let shape = shape.into();
+        let mut commands = Commands::with_reports(&description, |report| (report == 1).then_some(&shape));
+        let buffer = bus.slot::<Joints>(source).0.as_ptr();
+        let mut commit = |stamp: Option<i64>, now: i64| {
+            match stamp {
+                Some(nanos) => bus.mark_mut(source).renew(1, Stamp { nanos, device: 0 }),
+                None => bus.mark_mut(source).lose(1),
             }
-            Joints::arena_mut(&mut bus.arenas)[source.slot as usize].0.fill(now as f64);
+            bus.slot_mut::<Joints>(source).0.fill(now as f64);
             report.commit(&bus, &mut commands, &Tick { now, ..Tick::first() });
-            let told = commands.report::<Joints>(1).map(|joints| (joints.0[1], joints.0.as_ptr()));
-            assert!(commands.report::<Joints>(0).is_none() && commands.report::<bool>(1).is_none());
-            assert!(told.is_none_or(|(_, place)| place != room));
-            told
+            let reported = commands.report(joints).map(|joints| (joints.0[1], joints.0.as_ptr()));
+            assert!(commands.report(other).is_none());
+            assert!(reported.is_none_or(|(_, copy)| copy != buffer));
+            reported
         };
-        let first = tell(Some(0), 0).unwrap();
-        assert_eq!(tell(Some(0), 100), Some((100.0, first.1)), "in the same place");
-        assert_eq!(tell(Some(0), 101), None, "too old");
-        assert_eq!(tell(Some(50), 101), Some((101.0, first.1)));
-        assert_eq!(tell(None, 102), None, "absent");
+        let first = commit(Some(0), 0).unwrap();
+        assert_eq!(commit(Some(0), 100), Some((100.0, first.1)), "in the same buffer");
+        assert_eq!(commit(Some(0), 101), None, "too old");
+        assert_eq!(commit(Some(50), 101), Some((101.0, first.1)));
+        assert_eq!(commit(None, 102), None, "absent");
         commands.fall_silent();
-        assert!(commands.report::<Joints>(1).is_none());
+        assert!(commands.report(joints).is_none());
     }
 
     proptest! {
         #[test]
-        fn it_never_steps_and_never_holds_what_nothing_drives(
-            what in prop::collection::vec((prop::option::of(prop::array::uniform2(-1.0..1.0f64)), any::<bool>()), 1..60),
+        fn a_command_never_jumps_and_an_undriven_one_always_slows_down(
+            ticks in prop::collection::vec((prop::option::of(prop::array::uniform2(-1.0..1.0f64)), any::<bool>()), 1..60),
             dt in 0.0..0.02f64,
         ) {
             let accelerations = [5.0, 2.0];
             let (mut slot, mut bus, mut commands) = slot(accelerations);
-            // A command that changes as it may, as a limiter gives it.
-            let (mut given, mut last) = ([0.0; 2], [0.0; 2]);
-            for (wanted, is_halted) in what {
-                if let Some(wanted) = wanted {
-                    approach(&mut given, |i| wanted[i], &accelerations, dt);
+            // The graph's command respects the accelerations, like the output of a limiter.
+            let (mut limited, mut last) = ([0.0; 2], [0.0; 2]);
+            for (target, is_halted) in ticks {
+                if let Some(target) = target {
+                    approach(&mut limited, |i| target[i], &accelerations, dt);
                 }
-                drive(&mut bus, &slot, wanted.map(|_| given));
+                drive(&mut bus, &slot, target.map(|_| limited));
                 slot.commit(&bus, &mut commands, &Tick { dt, ..Tick::first() }, is_halted);
-                let now: [f64; 2] = commands.joints(0).try_into().unwrap();
+                let now: [f64; 2] = (*commands.values[0]).try_into().unwrap();
                 for i in 0..2 {
                     prop_assert!((now[i] - last[i]).abs() <= accelerations[i] * dt + 1e-12);
-                    let is_driven = wanted.is_some() && !is_halted;
+                    let is_driven = target.is_some() && !is_halted;
                     prop_assert!(is_driven || now[i].abs() < last[i].abs() || now[i] == 0.0 || dt == 0.0);
                 }
                 last = now;

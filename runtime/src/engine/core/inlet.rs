@@ -1,56 +1,65 @@
-//! Where a device's samples come into the graph: each counts as new once, and none goes back in time.
+//! Inlets take the samples of devices into the graph. Each sample is new once, and time never goes back.
 
-use crate::device::Samples;
+use crate::device::{Sample, Samples, State};
 use crate::graph::{PlannedRole, Policy};
 use crate::node::{Bus, PortId};
 use crate::signal::{Kind, Stamp};
 
-/// What came in on a port.
+/// Counts of the samples of a role's port.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Counters {
     /// Samples that were new.
     pub new: u64,
-    /// Samples that were there already: the same sequence number or the same stamp.
+    /// Samples with the sequence number or the stamp of the one before.
     pub repeated: u64,
-    /// Sequence numbers that never came.
+    /// Sequence numbers that are missing.
     pub gaps: u64,
-    /// Samples that were older than a period of their device when they came in.
+    /// Samples that were older than one period of their device when they arrived.
     pub late: u64,
-    /// Samples that were dropped because they are older than the last.
+    /// Samples dropped because they are older than the last one.
     pub went_back: u64,
-    /// Samples that were dropped because their stamp lies more than a period ahead of the graph's clock.
+    /// Samples dropped because their stamp is more than one period ahead of the graph's clock.
     pub ahead: u64,
-    /// Samples that were dropped because they are not finite.
+    /// Samples dropped because a value is not finite.
     pub not_finite: u64,
 }
 
-/// A role's port and the device's port behind it.
+/// Connects a device's port to a role's port on the bus.
 pub(crate) struct Inlet {
     pub(crate) device: usize,
     pub(crate) counters: Counters,
     kind: Kind,
+    /// Size of a value, from the shape of the port.
+    size: [usize; 2],
     port: usize,
     id: PortId,
-    /// Writes of the device that were seen.
+    /// Write count of the device's port at the last latch.
     writes: u64,
-    /// How old the newest sample may be, and a period of its device [ns].
+    /// Maximum age of the newest sample [ns].
     max_age: i64,
+    /// Period of the device [ns].
     period: i64,
-    /// What it does when it is older.
+    /// Policy for a sample that is older than `max_age`.
     pub(crate) stale: Policy,
-    /// Sequence number of the last sample that came, whatever became of it.
+    /// Sequence number of the last sample, taken over or dropped.
     seen: Option<u64>,
-    /// Stamp and sequence number of the last sample that was new.
-    last: Option<(i64, u64)>,
+    /// Stamp of the last sample that was taken over, and its sequence number unless the port was lost since.
+    last: Option<(i64, Option<u64>)>,
+    /// Whether the device has reported the port as lost.
+    is_lost: bool,
+    /// Whether the loss of the port is not a trouble, as for the ground truth.
+    is_observed: bool,
 }
 
 impl Inlet {
     pub(crate) fn new(role: &PlannedRole, port: usize, id: PortId) -> Self {
+        let shape = &role.ports[port].shape;
         Self {
             device: role.device,
             counters: Counters::default(),
-            kind: role.ports[port].shape.kind(),
-            port: role.first_port + port,
+            kind: shape.kind(),
+            size: shape.size(),
+            port: role.numbers[port],
             max_age: role.age.max_age,
             period: role.period,
             stale: role.age.stale,
@@ -58,18 +67,47 @@ impl Inlet {
             writes: 0,
             seen: None,
             last: None,
+            is_lost: false,
+            is_observed: role.is_observed,
         }
     }
 
-    /// Whether a sample that has not been taken over yet is finite: an image is checked once, here at the edge.
-    pub(crate) fn is_finite(&self, samples: &Samples) -> bool {
-        let sample = samples.ports[self.port];
-        sample.writes == self.writes || sample.is_absent || samples.arenas.is_finite(self.kind, sample.slot)
+    /// Returns the pending sample: one with a value that has not been latched yet.
+    fn sample<'s>(&self, samples: &'s Samples) -> Option<&'s Sample> {
+        Some(&samples.ports[self.port]).filter(|sample| sample.writes != self.writes && sample.state == State::Value)
     }
 
-    /// Takes the newest sample over, if there is one. The buffers are exchanged, not copied.
+    /// Returns the size of the pending sample and the size that the device has stated, if they differ.
+    pub(crate) fn misfit(&self, samples: &Samples) -> Option<[[usize; 2]; 2]> {
+        let size = samples.arenas.size(self.kind, self.sample(samples)?.slot);
+        (size != self.size).then_some([size, self.size])
+    }
+
+    /// Whether the pending sample is finite, if there is one. Images are checked only here, once per sample.
+    pub(crate) fn is_finite(&self, samples: &Samples) -> bool {
+        self.sample(samples).is_none_or(|sample| samples.arenas.is_finite(self.kind, sample.slot))
+    }
+
+    /// Returns why the device has lost the port, if that is a trouble.
+    pub(crate) fn lost<'s>(&self, samples: &'s Samples) -> Option<&'s str> {
+        match &samples.ports[self.port].state {
+            State::Lost(why) if !self.is_observed => Some(why),
+            _ => None,
+        }
+    }
+
+    /// Latches the pending sample, if there is one. Swaps the buffers instead of copying.
     pub(crate) fn latch(&mut self, samples: &mut Samples, bus: &mut Bus, tick: u64, now: i64) {
-        let sample = samples.ports[self.port];
+        let Samples { arenas, ports, .. } = samples;
+        let sample = &ports[self.port];
+        self.is_lost = matches!(sample.state, State::Lost(_));
+        if self.is_lost {
+            // After a reconnection, the device may number its samples from 1 again.
+            (self.writes, self.seen) = (sample.writes, None);
+            self.last = self.last.map(|(stamp, _)| (stamp, None));
+            self.lose(bus, tick);
+            return;
+        }
         if sample.writes == self.writes {
             return;
         }
@@ -77,40 +115,46 @@ impl Inlet {
         let missing =
             self.seen.replace(sample.sequence).map_or(0, |seen| sample.sequence.saturating_sub(seen.saturating_add(1)));
         match self.last {
-            Some((_, sequence)) if sequence == sample.sequence => self.counters.repeated += 1,
+            Some((_, Some(sequence))) if sequence == sample.sequence => self.counters.repeated += 1,
             Some((stamp, _)) if sample.stamp == stamp => self.counters.repeated += 1,
             Some((stamp, _)) if sample.stamp < stamp => self.counters.went_back += 1,
-            // Taken over, it would look fresh for as long as it lies ahead, and keep all that come after it out.
+            // A stamp in the future would look fresh until its time comes, and later samples would be dropped as older.
             _ if sample.stamp - now > self.period => self.counters.ahead += 1,
             _ => {
-                self.last = Some((sample.stamp, sample.sequence));
+                self.last = Some((sample.stamp, Some(sample.sequence)));
                 self.counters.new += 1;
                 self.counters.gaps += missing;
                 self.counters.late += u64::from(now - sample.stamp > self.period);
-                let mark = &mut bus.marks[self.id.mark as usize];
-                if sample.is_absent {
-                    mark.lose(tick);
+                if sample.state == State::Absent {
+                    self.lose(bus, tick);
                 } else {
-                    bus.arenas.swap(self.kind, self.id.slot, &mut samples.arenas, sample.slot);
-                    mark.renew(tick, Stamp { nanos: sample.stamp, device: self.device as u16 });
+                    let stamp = Stamp { nanos: sample.stamp, device: self.device as u16 };
+                    let mark = bus.arenas.receive(self.kind, self.id.slot, arenas, sample.slot, tick, stamp);
+                    *bus.mark_mut(self.id) = mark;
                 }
             }
         }
     }
 
-    /// Drops a sample that is not finite.
+    fn lose(&self, bus: &mut Bus, tick: u64) {
+        bus.arenas.lose(self.kind, self.id.slot, tick);
+        bus.mark_mut(self.id).lose(tick);
+    }
+
+    /// Drops a pending sample that is not finite.
     pub(crate) fn reject(&mut self, samples: &Samples) {
-        let sample = samples.ports[self.port];
+        let sample = &samples.ports[self.port];
         (self.writes, self.seen) = (sample.writes, Some(sample.sequence));
         self.counters.not_finite += 1;
     }
 
-    /// Whether there was a sample, and the newest is too old at `now` [ns]; what is only counted is not asked.
+    /// Whether the newest sample is too old at `now` [ns]. Always `false` before the first sample, while the port is lost,
+    /// and under the policy `count`.
     pub(crate) fn is_stale(&self, now: i64) -> bool {
-        self.stale != Policy::Count && self.age(now).is_some_and(|age| age > self.max_age)
+        !self.is_lost && self.stale != Policy::Count && self.age(now).is_some_and(|age| age > self.max_age)
     }
 
-    /// Age of the newest sample at `now`, if there is one, and how old it may be [ns].
+    /// Returns the age of the newest sample at `now`, 0 if there is none, and its maximum age [ns].
     pub(crate) fn ages(&self, now: i64) -> (i64, i64) {
         (self.age(now).unwrap_or(0), self.max_age)
     }
@@ -119,7 +163,7 @@ impl Inlet {
         self.last.map(|(stamp, _)| now - stamp)
     }
 
-    /// Hands the value back as if the device had sampled it again at `now`.
+    /// Makes the current value a pending sample of the device with the stamp `now` [ns].
     pub(crate) fn refresh(&mut self, samples: &mut Samples, bus: &mut Bus, now: i64) {
         let sample = &mut samples.ports[self.port];
         bus.arenas.swap(self.kind, self.id.slot, &mut samples.arenas, sample.slot);

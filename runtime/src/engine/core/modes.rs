@@ -1,190 +1,186 @@
-//! The mode machine: looks at the conditions of the present mode after each tick, and says where to go.
+//! The mode machine: evaluates the conditions of the current mode after each tick and takes the exit that holds.
 //!
-//! A condition on a value is looked at when the value is new, and lasts from new sample to new sample: a sensor that has
-//! stopped decides nothing. In one tick the sorts of exits come in their order, `fail` first; among `go` the greater
-//! priority. What else could hold at once does not load.
+//! A condition on a value is evaluated only when the value is new, and `for_ms` is measured between new samples, so a
+//! sensor that has stopped triggers no change. When several exits hold in one tick, `fail` comes first, then
+//! `on_lost`, `done` and `go`; among `go`, the higher priority wins. Exits that could still tie are rejected at load.
 
 use std::collections::BTreeMap;
 
 use crate::graph::{Condition, ExitKind, PlannedExit, PlannedModes, PortRef, Test};
-use crate::node::{Bus, PortId, Tick};
-use crate::signal::{Features, Flag, Freshness, Kind, Pose, Scalar, Signal};
+use crate::node::{Bus, PortId, ScalarId, Tick};
+use crate::signal::{Freshness, Kind, Pose};
 
-/// Steps of a way that count: what is less is noise of the joints' positions [m].
-const LEAST_STEP: f64 = 1e-4;
-/// As many changes of mode are remembered.
-const MOST_CHANGES: usize = 10_000;
+/// Shortest step that counts as travel [m]. Shorter steps are noise of the joint positions.
+const MIN_STEP_M: f64 = 1e-4;
+/// Number of mode changes that are kept for the summary.
+const MAX_CHANGES: usize = 10_000;
 
 /// A change of mode.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Change {
-    /// Time of the tick after which it was [ns].
+pub struct ModeChange {
+    /// Time of the tick that ended the previous mode [ns].
     pub time: i64,
     /// Number of that tick.
     pub tick: u64,
     /// Name of the mode that begins.
     pub mode: String,
-    /// What ended the one before, in words; empty for the start.
-    pub why: String,
+    /// The condition that ended the previous mode; empty for the first mode of the run.
+    pub reason: String,
 }
 
-/// What follows from the conditions of a tick.
+/// The result of evaluating the conditions after a tick.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Verdict {
+pub(crate) enum Transition {
+    /// The mode stays.
     Stay,
     /// Another mode has begun.
     Switched,
-    /// The graph says that it is done.
+    /// A `done` condition holds.
     Done,
-    /// The graph says that it failed.
+    /// A `fail` condition holds.
     Failed,
 }
 
 /// The modes of a running graph.
-pub(crate) struct Modes {
+pub(crate) struct ModeMachine {
     modes: Vec<Mode>,
-    now: usize,
-    /// When the present mode began [ns]; not yet before the first tick.
+    current: usize,
+    /// Time at which the current mode began [ns]; `None` before the first tick.
     entered: Option<i64>,
-    /// The exit that was taken last.
+    /// Index of the exit that was taken last.
     taken: usize,
-    /// Time, tick, mode that began and why.
-    changes: Vec<(i64, u64, usize, Why)>,
+    /// Time, tick, new mode and reason of each change.
+    changes: Vec<(i64, u64, usize, ChangeReason)>,
     start: usize,
 }
 
 /// Why a mode began.
 #[derive(Debug, Clone, Copy)]
-enum Why {
+enum ChangeReason {
+    /// The run began.
     Start,
-    /// The operator let the commands go on after a stop.
+    /// The operator resumed after a stop.
     Resumed,
-    /// An exit of a mode.
+    /// The exit with the second index, of the mode with the first, was taken.
     Exit(usize, usize),
 }
 
 struct Mode {
     name: String,
     exits: Vec<Exit>,
-    /// For each runner that any mode changes: its place, and the configuration it has in this mode.
+    /// For each runner that any mode changes: its index, and the configuration it has in this mode.
     configurations: Vec<(usize, usize)>,
 }
 
 struct Exit {
     planned: PlannedExit,
-    look: Look,
-    memory: Memory,
+    /// What the condition reads; `None` for conditions on time or on the operator.
+    input: Option<ConditionInput>,
+    state: ConditionState,
 }
 
-/// Where an exit looks.
+/// The port that a condition reads.
 #[derive(Debug, Clone, Copy)]
-enum Look {
-    Nowhere,
-    Port(Place),
+enum ConditionInput {
+    /// A port whose number is not read, such as a pose or a whole feature vector.
+    Port(PortId),
+    /// A scalar, a flag or one feature.
+    Scalar(ScalarId),
 }
 
-/// A port, or a feature of it, on the bus.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Place {
-    pub(crate) id: PortId,
-    pub(crate) kind: Kind,
-    feature: Option<usize>,
-}
-
-/// What an exit remembers of the mode so far.
+/// What a condition has observed since its mode began.
 #[derive(Debug, Clone, Copy, Default)]
-struct Memory {
-    /// Since when it holds [ns].
+struct ConditionState {
+    /// Time since which it holds [ns].
     since: Option<i64>,
-    /// When the signal last said yes [ns].
-    said_yes: Option<i64>,
-    /// Where the way was measured last [m], and how long it is [m].
+    /// Time of the last sample that was true [ns].
+    last_true: Option<i64>,
+    /// Position at the last counted step [m].
     anchor: Option<[f64; 3]>,
-    way: f64,
+    /// Distance travelled in the mode [m].
+    travelled: f64,
 }
 
-impl Modes {
+impl ModeMachine {
     pub(crate) fn new(planned: PlannedModes, ports: &BTreeMap<PortRef, (PortId, Kind)>) -> Self {
         let mut changed: Vec<usize> =
-            planned.modes.iter().flat_map(|mode| mode.configurations.iter().map(|(place, _)| *place)).collect();
+            planned.modes.iter().flat_map(|mode| mode.configurations.iter().map(|(runner, _)| *runner)).collect();
         changed.sort_unstable();
         changed.dedup();
-        let place = |source: &PortRef, feature| {
-            let (id, kind) = ports[source];
-            Look::Port(Place { id, kind, feature })
-        };
-        let look = |exit: &PlannedExit| match &exit.condition {
-            Condition::Port(watched, _) | Condition::Lost(watched, _) => place(&watched.source, watched.feature),
-            Condition::Travel(source, _) => place(source, None),
-            Condition::Elapsed(_) | Condition::Sent(_) => Look::Nowhere,
+        let input = |exit: &PlannedExit| match &exit.condition {
+            Condition::Port(watched, _) | Condition::Lost(watched, _) => {
+                Some(ConditionInput::new(ports[&watched.source], watched.feature))
+            }
+            Condition::Travel(source, _) => Some(ConditionInput::Port(ports[source].0)),
+            Condition::Elapsed(_) | Condition::Sent(_) => None,
         };
         let modes = planned.modes.into_iter().map(|mode| {
-            let own = |place: usize| mode.configurations.iter().find(|(own, _)| *own == place).map_or(0, |(_, n)| *n);
-            let configurations = changed.iter().map(|place| (*place, own(*place))).collect();
+            let own = |runner: usize| mode.configurations.iter().find(|(own, _)| *own == runner).map_or(0, |(_, n)| *n);
+            let configurations = changed.iter().map(|runner| (*runner, own(*runner))).collect();
             let mut exits: Vec<Exit> = mode
                 .exits
                 .into_iter()
-                .map(|planned| Exit { look: look(&planned), planned, memory: Memory::default() })
+                .map(|planned| Exit { input: input(&planned), planned, state: ConditionState::default() })
                 .collect();
             exits.sort_by_key(|exit| (exit.planned.kind, std::cmp::Reverse(exit.planned.priority)));
             Mode { name: mode.name, exits, configurations }
         });
         Self {
             modes: modes.collect(),
-            now: planned.start,
+            current: planned.start,
             entered: None,
             taken: 0,
-            changes: Vec::with_capacity(MOST_CHANGES),
+            changes: Vec::with_capacity(MAX_CHANGES),
             start: planned.start,
         }
     }
 
-    /// The configurations of the present mode, by the places of the runners.
+    /// Returns the configurations of the current mode: the index of each runner and the number of its configuration.
     pub(crate) fn configurations(&self) -> &[(usize, usize)] {
-        &self.modes[self.now].configurations
+        &self.modes[self.current].configurations
     }
 
-    /// Begins at the start again: after a stop nothing is known of what the robot touches.
+    /// Returns to the start mode. After a stop, the contact may have changed, so no condition keeps its state.
     pub(crate) fn restart(&mut self, tick: &Tick) {
-        self.enter(self.start, Why::Resumed, tick);
+        self.enter(self.start, ChangeReason::Resumed, tick);
     }
 
-    /// Looks at the conditions with what the tick has left on the bus, and a word that was sent.
-    pub(crate) fn decide(&mut self, bus: &Bus, tick: &Tick, sent: Option<&str>) -> Verdict {
+    /// Evaluates the conditions on the values of the tick and on the operator word `sent`.
+    pub(crate) fn decide(&mut self, bus: &Bus, tick: &Tick, sent: Option<&str>) -> Transition {
         if self.entered.is_none() {
-            self.enter(self.now, Why::Start, tick);
+            self.enter(self.current, ChangeReason::Start, tick);
         }
         let entered = self.entered.unwrap_or(tick.now);
-        let mut chosen = None;
-        // All are looked at, so that each of them knows since when it holds.
-        for (i, exit) in self.modes[self.now].exits.iter_mut().enumerate() {
-            if exit.holds(bus, tick, entered, sent) && chosen.is_none() {
-                chosen = Some(i);
+        let mut first = None;
+        // Every condition is evaluated, since each keeps the time since which it holds.
+        for (i, exit) in self.modes[self.current].exits.iter_mut().enumerate() {
+            if exit.holds(bus, tick, entered, sent) && first.is_none() {
+                first = Some(i);
             }
         }
-        let Some(chosen) = chosen else { return Verdict::Stay };
-        let exit = &self.modes[self.now].exits[chosen].planned;
-        self.taken = chosen;
+        let Some(taken) = first else { return Transition::Stay };
+        let exit = &self.modes[self.current].exits[taken].planned;
+        self.taken = taken;
         match (exit.kind, exit.to) {
-            (ExitKind::Fail, _) => Verdict::Failed,
-            (ExitKind::Done, _) | (_, None) => Verdict::Done,
+            (ExitKind::Fail, _) => Transition::Failed,
+            (ExitKind::Done, _) | (_, None) => Transition::Done,
             (ExitKind::OnLost | ExitKind::Go, Some(to)) => {
-                self.enter(to, Why::Exit(self.now, chosen), tick);
-                Verdict::Switched
+                self.enter(to, ChangeReason::Exit(self.current, taken), tick);
+                Transition::Switched
             }
         }
     }
 
-    fn enter(&mut self, mode: usize, why: Why, tick: &Tick) {
-        self.now = mode;
+    fn enter(&mut self, mode: usize, reason: ChangeReason, tick: &Tick) {
+        self.current = mode;
         self.entered = Some(tick.now);
-        self.modes[mode].exits.iter_mut().for_each(|exit| exit.memory = Memory::default());
-        if self.changes.len() < MOST_CHANGES {
-            self.changes.push((tick.now, tick.index, mode, why));
+        self.modes[mode].exits.iter_mut().for_each(|exit| exit.state = ConditionState::default());
+        if self.changes.len() < MAX_CHANGES {
+            self.changes.push((tick.now, tick.index, mode, reason));
         }
     }
 
-    /// The words that any mode waits for.
+    /// Returns the operator words that appear in the conditions of any mode.
     pub(crate) fn words(&self) -> impl Iterator<Item = &str> {
         let exits = self.modes.iter().flat_map(|mode| &mode.exits);
         exits.filter_map(|exit| match &exit.planned.condition {
@@ -193,110 +189,114 @@ impl Modes {
         })
     }
 
-    /// Name of the present mode.
+    /// Returns the name of the current mode.
     pub(crate) fn name(&self) -> &str {
-        &self.modes[self.now].name
+        &self.modes[self.current].name
     }
 
-    /// Number of the present mode, in the order of the file.
+    /// Returns the number of the current mode, from 0 in the order of the file.
     pub(crate) const fn number(&self) -> usize {
-        self.now
+        self.current
     }
 
-    /// The exit that was taken last: its words and its place.
+    /// Returns the condition of the exit that was taken last, and its position in the source.
     pub(crate) fn taken(&self) -> (&str, usize) {
-        let exit = &self.modes[self.now].exits[self.taken].planned;
+        let exit = &self.modes[self.current].exits[self.taken].planned;
         (&exit.text, exit.span.start)
     }
 
-    /// Every change so far, the start first.
-    pub(crate) fn changes(&self) -> impl Iterator<Item = Change> {
-        self.changes.iter().map(|(time, tick, mode, why)| Change {
+    /// Returns the mode changes, the start first; at most [`MAX_CHANGES`].
+    pub(crate) fn changes(&self) -> impl Iterator<Item = ModeChange> {
+        self.changes.iter().map(|(time, tick, mode, reason)| ModeChange {
             time: *time,
             tick: *tick,
             mode: self.modes[*mode].name.clone(),
-            why: match *why {
-                Why::Start => String::new(),
-                Why::Resumed => "the operator let it go on".into(),
-                Why::Exit(mode, exit) => self.modes[mode].exits[exit].planned.text.clone(),
+            reason: match *reason {
+                ChangeReason::Start => String::new(),
+                ChangeReason::Resumed => "the operator resumed".into(),
+                ChangeReason::Exit(mode, exit) => self.modes[mode].exits[exit].planned.text.clone(),
             },
         })
     }
 }
 
 impl Exit {
-    /// Whether it holds, and has lasted.
+    /// Whether the condition holds, and has held for long enough.
     fn holds(&mut self, bus: &Bus, tick: &Tick, entered: i64, sent: Option<&str>) -> bool {
-        match (&self.planned.condition, self.look) {
+        match (&self.planned.condition, self.input) {
             (Condition::Elapsed(time), _) => tick.now - entered >= *time,
             (Condition::Sent(word), _) => sent == Some(word),
-            (Condition::Travel(_, greatest), Look::Port(place)) => self.memory.travel(bus, tick, place.id) > *greatest,
-            (Condition::Lost(_, after), Look::Port(place)) => {
-                let says_yes = seen(bus, tick, place)
-                    .is_some_and(|seen| seen.is_new && (place.kind != Kind::Flag || seen.value != Some(0.0)));
-                if says_yes {
-                    self.memory.said_yes = Some(tick.now);
+            (Condition::Travel(_, max), Some(ConditionInput::Port(pose))) => {
+                self.state.travelled(bus, tick, pose) > *max
+            }
+            (Condition::Lost(_, after), Some(input)) => {
+                let is_true = input.freshness(bus, tick) == Freshness::New && !input.is_false_flag(bus);
+                if is_true {
+                    self.state.last_true = Some(tick.now);
                 }
-                !says_yes && tick.now - self.memory.said_yes.unwrap_or(entered) >= *after
+                !is_true && tick.now - self.state.last_true.unwrap_or(entered) >= *after
             }
-            (Condition::Port(_, test), Look::Port(place)) => {
-                let seen = seen(bus, tick, place);
-                self.memory.test(*test, seen, tick.now) && self.memory.has_lasted(tick.now, self.planned.lasts)
+            (Condition::Port(_, test), Some(input)) => {
+                self.state.test(*test, input, bus, tick) && self.state.has_lasted(tick.now, self.planned.lasts)
             }
-            (_, Look::Nowhere) => false,
+            _ => false,
         }
     }
 }
 
-/// What is seen of a port in a tick, if it is there.
-#[derive(Debug, Clone, Copy)]
-struct Seen {
-    is_new: bool,
-    /// The number, or 1 and 0 for a flag.
-    value: Option<f64>,
-}
-
-fn seen(bus: &Bus, tick: &Tick, Place { id, kind, feature }: Place) -> Option<Seen> {
-    let slot = id.slot as usize;
-    if let Some(feature) = feature {
-        let component = Features::arena(&bus.arenas)[slot].components()[feature];
-        let is_new = component.freshness(tick.index) == Freshness::New;
-        return component.get().map(|value| Seen { is_new, value: Some(value) });
+impl ConditionInput {
+    const fn new((port, kind): (PortId, Kind), feature: Option<usize>) -> Self {
+        match (kind, feature) {
+            (Kind::Scalar | Kind::Flag, _) => Self::Scalar(ScalarId { port, kind, index: 0 }),
+            (_, Some(index)) => Self::Scalar(ScalarId { port, kind, index }),
+            (_, None) => Self::Port(port),
+        }
     }
-    let mark = &bus.marks[id.mark as usize];
-    let value = match kind {
-        Kind::Scalar => Some(Scalar::arena(&bus.arenas)[slot]),
-        Kind::Flag => Some(f64::from(u8::from(Flag::arena(&bus.arenas)[slot]))),
-        _ => None,
-    };
-    mark.is_present().then(|| Seen { is_new: mark.changed_in(tick.index), value })
+
+    fn freshness(self, bus: &Bus, tick: &Tick) -> Freshness {
+        match self {
+            Self::Port(port) => bus.mark(port).freshness(tick.index),
+            Self::Scalar(scalar) => bus.scalar_freshness(scalar, tick.index),
+        }
+    }
+
+    /// Returns the number, 1 or 0 for a flag; `None` if it is absent or not a number.
+    fn value(self, bus: &Bus) -> Option<f64> {
+        match self {
+            Self::Port(_) => None,
+            Self::Scalar(scalar) => bus.scalar(scalar),
+        }
+    }
+
+    fn is_false_flag(self, bus: &Bus) -> bool {
+        matches!(self, Self::Scalar(ScalarId { kind: Kind::Flag, .. })) && self.value(bus) == Some(0.0)
+    }
 }
 
-impl Memory {
-    /// Whether what is asked is so; since when is remembered.
-    fn test(&mut self, test: Test, seen: Option<Seen>, now: i64) -> bool {
-        let Some(seen) = seen else {
-            let is_absent = test == Test::Absent;
-            self.since = if is_absent { self.since.or(Some(now)) } else { None };
-            return is_absent;
+impl ConditionState {
+    /// Whether the test holds in this tick. Updates the time since which it holds.
+    fn test(&mut self, test: Test, input: ConditionInput, bus: &Bus, tick: &Tick) -> bool {
+        let (is_present, is_new) = match input.freshness(bus, tick) {
+            Freshness::Absent | Freshness::Lost => (false, false),
+            Freshness::Held => (true, false),
+            Freshness::New => (true, true),
         };
-        let holds = match (test, seen.value) {
-            (Test::New, _) => seen.is_new,
-            (Test::Absent, _) => false,
-            (Test::Present, _) => seen.is_new,
-            // What is held is neither here nor there: it is waited for the next sample.
-            _ if !seen.is_new => return false,
-            (Test::Flag(wanted), Some(value)) => (value != 0.0) == wanted,
-            (Test::Between { min, max, hysteresis }, Some(value)) => {
+        let holds = match test {
+            Test::Absent => !is_present,
+            _ if !is_present => false,
+            Test::New | Test::Present => is_new,
+            // A held value neither starts nor ends the condition: the next sample decides.
+            _ if !is_new => return false,
+            Test::Flag(expected) => input.value(bus).is_some_and(|value| (value != 0.0) == expected),
+            Test::Between { min, max, hysteresis } => {
                 let by = if self.since.is_some() { hysteresis } else { 0.0 };
-                value > min - by && value < max + by
+                input.value(bus).is_some_and(|value| value > min - by && value < max + by)
             }
-            (Test::Flag(_) | Test::Between { .. }, None) => false,
         };
-        match (holds, seen.is_new) {
-            (true, _) => self.since = self.since.or(Some(now)),
-            (false, true) => self.since = None,
-            (false, false) => {}
+        if holds {
+            self.since = self.since.or(Some(tick.now));
+        } else if is_new || !is_present {
+            self.since = None;
         }
         holds
     }
@@ -305,21 +305,20 @@ impl Memory {
         self.since.is_some_and(|since| now - since >= lasts)
     }
 
-    /// The way of a pose's origin [m].
-    fn travel(&mut self, bus: &Bus, tick: &Tick, id: PortId) -> f64 {
-        let mark = &bus.marks[id.mark as usize];
-        if mark.freshness(tick.index) != Freshness::New {
-            return self.way;
+    /// Returns the distance that the origin of a pose has travelled in the mode [m].
+    fn travelled(&mut self, bus: &Bus, tick: &Tick, pose: PortId) -> f64 {
+        if bus.mark(pose).freshness(tick.index) != Freshness::New {
+            return self.travelled;
         }
-        let place: [f64; 3] = Pose::arena(&bus.arenas)[id.slot as usize].0.translation.vector.into();
+        let position: [f64; 3] = bus.slot::<Pose>(pose).0.translation.vector.into();
         let Some(anchor) = self.anchor else {
-            self.anchor = Some(place);
-            return self.way;
+            self.anchor = Some(position);
+            return self.travelled;
         };
-        let step = anchor.iter().zip(place).map(|(a, b)| (b - a) * (b - a)).sum::<f64>().sqrt();
-        if step >= LEAST_STEP {
-            (self.anchor, self.way) = (Some(place), self.way + step);
+        let step = anchor.iter().zip(position).map(|(a, b)| (b - a) * (b - a)).sum::<f64>().sqrt();
+        if step >= MIN_STEP_M {
+            (self.anchor, self.travelled) = (Some(position), self.travelled + step);
         }
-        self.way
+        self.travelled
     }
 }

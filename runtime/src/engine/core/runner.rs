@@ -1,48 +1,43 @@
-//! One node in its place: when it steps, what its absence does, and when its state is reset.
+//! Runs one node: decides when it steps, when its outputs are absent and when its state is reset.
 
 use crate::node::{AnyNode, Bus, Components, Need, PortId, Tick, Wires};
 use crate::signal::Stamp;
 
-/// What a runner looks at before it steps its node, beside the required triggers.
+/// An input other than a required trigger, which the runner checks before each step.
 #[derive(Debug, Clone, Copy)]
-struct Watch {
+struct InputWatch {
     mark: u32,
     lag: u64,
     is_trigger: bool,
     is_required: bool,
 }
 
-impl Watch {
-    /// How an input declared with `need` watches the port with that mark.
+impl InputWatch {
+    /// Watches the port with that mark for an input declared with `need`.
     fn new(need: Need, mark: u32) -> Self {
-        Self {
-            mark,
-            lag: u64::from(need == Need::Delayed),
-            is_trigger: matches!(need, Need::Trigger | Need::Many | Need::Delayed),
-            is_required: need == Need::Sampled,
-        }
+        Self { mark, lag: u64::from(need.is_delayed), is_trigger: need.is_trigger, is_required: need.must_be_present }
     }
 }
 
-/// A wire that may grow only so old: past that, its node does without.
+/// A wire with a maximum age: an older value is absent for its node.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Aged {
-    /// Mark of the port that it comes from.
+pub(crate) struct AgedWire {
+    /// Mark of the source port.
     pub(crate) from: u32,
-    /// Mark that its node sees instead.
+    /// Mark that the node sees instead.
     pub(crate) to: u32,
-    /// How old it may be [ns].
+    /// Maximum age [ns].
     pub(crate) max_age: i64,
 }
 
-impl Aged {
-    /// Whether what is there is too old at `now` [ns].
+impl AgedWire {
+    /// Whether the value is present and too old at `now` [ns].
     pub(crate) fn is_stale(&self, bus: &Bus, now: i64) -> bool {
         let mark = &bus.marks[self.from as usize];
         mark.is_present() && mark.stamp().age(now) > self.max_age
     }
 
-    /// Passes the mark on, or lets the value go.
+    /// Copies the source's mark, or makes the value absent for the node if it is too old.
     fn pass(&self, bus: &mut Bus, tick: &Tick) {
         let from = bus.marks[self.from as usize];
         if from.is_present() && !self.is_stale(bus, tick.now) {
@@ -53,33 +48,36 @@ impl Aged {
     }
 }
 
-/// A node with its wires, its ports and what it watches.
+/// A node with its wires and output ports.
 pub(crate) struct NodeRunner {
     node: Box<dyn AnyNode>,
     wires: Wires,
     outputs: Box<[PortId]>,
-    /// Marks of the required triggers: what most inputs are, so they have a loop of their own.
+    /// Marks of the required triggers. Most inputs are required triggers, so they have their own, faster loop.
     required: Box<[u32]>,
-    others: Box<[Watch]>,
-    aged: Box<[Aged]>,
+    others: Box<[InputWatch]>,
+    aged: Box<[AgedWire]>,
     is_every_tick: bool,
-    /// Whether the node has another configuration, and has not stepped with it yet.
+    /// Whether the configuration has changed since the last step.
     is_switched: bool,
-    absence: Absence,
+    state: RunState,
 }
 
-/// Whether something required is absent, and since when.
+/// Whether the node can step.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Absence {
-    Nothing,
-    Since(i64),
+enum RunState {
+    /// Every required input is present.
+    Ready,
+    /// A required input is absent since that time [ns].
+    Starved(i64),
+    /// A required input is absent, and the node has been reset.
     Reset,
-    /// The node panicked at that time: it is not stepped before it is reset.
-    Broken(i64),
+    /// The node panicked at that time [ns]. It does not step before its reset.
+    Panicked(i64),
 }
 
 impl NodeRunner {
-    /// A node whose inputs are wired to ports that exist: for each input its need and its ports.
+    /// Creates a runner. `inputs` lists the need and the source ports of each input.
     pub(crate) fn new(
         node: Box<dyn AnyNode>,
         inputs: &[(Need, Vec<PortId>)],
@@ -87,42 +85,43 @@ impl NodeRunner {
         is_every_tick: bool,
     ) -> Self {
         let all = || inputs.iter().flat_map(|(need, ports)| ports.iter().map(|port| (*need, port.mark)));
-        // A delayed input closes a loop: there it would wake the node with what the node itself has made, and hold its
-        // stamp back for ever. So it wakes only a node that nothing else wakes.
-        let is_woken = all().any(|(need, _)| matches!(need, Need::Required | Need::Trigger | Need::Many));
-        let (required, others) = (all().filter(|(need, _)| *need == Need::Required), all());
-        let others = others.filter(|(need, _)| *need != Need::Required && !(is_woken && *need == Need::Delayed));
+        // A delayed input closes a loop. As a trigger it would wake the node with the node's own output and pass on the
+        // old stamp in every round. So it is a trigger only for a node that has no other.
+        let is_woken = all().any(|(need, _)| need.is_trigger && !need.is_delayed);
+        let is_required = |need: &Need| need.must_be_present && need.is_trigger;
+        let (required, others) = (all().filter(|(need, _)| is_required(need)), all());
+        let others = others.filter(|(need, _)| !(is_required(need) || is_woken && need.is_delayed));
         Self {
             node,
             wires: Wires::new(inputs),
             outputs: outputs.into(),
             required: required.map(|(_, mark)| mark).collect(),
-            others: others.map(|(need, mark)| Watch::new(need, mark)).collect(),
+            others: others.map(|(need, mark)| InputWatch::new(need, mark)).collect(),
             aged: Box::default(),
             is_every_tick,
             is_switched: false,
-            absence: Absence::Nothing,
+            state: RunState::Ready,
         }
     }
 
-    /// The same with wires that may grow only so old.
-    pub(crate) fn with_aged(self, aged: Vec<Aged>) -> Self {
+    /// Adds the wires that have a maximum age.
+    pub(crate) fn with_aged(self, aged: Vec<AgedWire>) -> Self {
         Self { aged: aged.into(), ..self }
     }
 
-    /// Tells the node which components of its outputs anything reads.
-    pub(crate) fn want(&mut self, wanted: &[Components]) {
-        self.node.want(wanted);
+    /// Sets the output components that any node reads; the node may skip the others.
+    pub(crate) fn want(&mut self, used: &[Components]) {
+        self.node.want(used);
     }
 
-    /// Goes on with another configuration of the node; its state stays. It steps with what it has, and does not wait for
-    /// the next sample: a slow sensor must not keep the motion of the mode before.
+    /// Switches to another configuration of the node and keeps its state. The node steps in the next tick even without a
+    /// new sample: with a slow sensor, the motion of the previous mode would go on otherwise.
     pub(crate) fn switch(&mut self, configuration: usize) {
         self.is_switched |= self.node.switch(configuration);
     }
 
-    /// Steps the node if a trigger is new or lost, and makes its outputs absent if something required is. The tick's
-    /// stamp becomes the oldest of the triggers'.
+    /// Steps the node if a trigger is new or lost, or makes its outputs absent if a required input is. Sets the tick's
+    /// stamp to the oldest stamp of the triggers.
     pub(crate) fn visit(&mut self, tick: &mut Tick, bus: &mut Bus) {
         for aged in &self.aged {
             aged.pass(bus, tick);
@@ -144,9 +143,9 @@ impl NodeRunner {
             }
         }
         if is_missing {
-            self.starve(tick, bus);
+            self.lose_outputs(tick, bus);
         } else {
-            if self.absence != Absence::Nothing && !self.come_back(tick) {
+            if self.state != RunState::Ready && !self.recover(tick) {
                 return;
             }
             if is_woken {
@@ -156,47 +155,51 @@ impl NodeRunner {
         }
     }
 
-    /// Ends an absence, if it may end. A slow graph may not have ticked while it lasted, so whether it was long is asked
-    /// here too.
+    /// Makes the node ready again; returns `false` if it still waits for its reset after a panic.
+    ///
+    /// Resets a node whose input was absent for at least `reset_after`. This is checked here too because a slow graph may
+    /// not have ticked during the absence.
     #[cold]
-    fn come_back(&mut self, tick: &Tick) -> bool {
-        match self.absence {
-            Absence::Since(since) | Absence::Broken(since) if tick.now - since >= tick.reset_after => self.node.reset(),
-            Absence::Broken(_) => return false,
-            Absence::Nothing | Absence::Since(_) | Absence::Reset => {}
+    fn recover(&mut self, tick: &Tick) -> bool {
+        match self.state {
+            RunState::Starved(since) | RunState::Panicked(since) if tick.now - since >= tick.reset_after => {
+                self.node.reset();
+            }
+            RunState::Panicked(_) => return false,
+            RunState::Ready | RunState::Starved(_) | RunState::Reset => {}
         }
-        self.absence = Absence::Nothing;
+        self.state = RunState::Ready;
         true
     }
 
-    /// The node panicked: from now on it is not stepped until it is reset.
-    pub(crate) const fn break_down(&mut self, now: i64) {
-        self.absence = Absence::Broken(now);
+    /// Notes that the node panicked at `now` [ns]. It does not step before its reset.
+    pub(crate) const fn set_panicked(&mut self, now: i64) {
+        self.state = RunState::Panicked(now);
     }
 
     /// Whether the node waits for its reset after a panic.
-    pub(crate) fn is_broken(&self) -> bool {
-        matches!(self.absence, Absence::Broken(_))
+    pub(crate) fn has_panicked(&self) -> bool {
+        matches!(self.state, RunState::Panicked(_))
     }
 
-    /// Makes the state fresh.
+    /// Resets the state of the node.
     pub(crate) fn reset(&mut self) {
         self.node.reset();
     }
 
-    /// Makes the outputs absent; resets the state once, when that has lasted.
+    /// Makes the outputs absent. Resets the node once, when a required input has been absent for `reset_after`.
     #[cold]
-    fn starve(&mut self, tick: &Tick, bus: &mut Bus) {
-        match self.absence {
-            Absence::Nothing => {
+    fn lose_outputs(&mut self, tick: &Tick, bus: &mut Bus) {
+        match self.state {
+            RunState::Ready => {
                 self.node.lose(tick.index, bus, &self.outputs);
-                self.absence = Absence::Since(tick.now);
+                self.state = RunState::Starved(tick.now);
             }
-            Absence::Since(since) | Absence::Broken(since) if tick.now - since >= tick.reset_after => {
+            RunState::Starved(since) | RunState::Panicked(since) if tick.now - since >= tick.reset_after => {
                 self.node.reset();
-                self.absence = Absence::Reset;
+                self.state = RunState::Reset;
             }
-            Absence::Since(_) | Absence::Reset | Absence::Broken(_) => {}
+            RunState::Starved(_) | RunState::Reset | RunState::Panicked(_) => {}
         }
     }
 }

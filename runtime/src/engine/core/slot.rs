@@ -1,24 +1,26 @@
-//! A device in its place: what it is handed, what it hands over, and how it is linked.
+//! A device in the engine: its samples, its commands and its link.
 
 use crate::device::{Commands, Linked, Live, Samples, Stepped};
 
-/// A device with what it is handed and what it hands over.
+/// A device with its exchange buffers.
 pub(crate) struct DeviceSlot {
     pub(crate) name: String,
     pub(crate) place: String,
     pub(crate) samples: Samples,
     pub(crate) commands: Commands,
     pub(crate) link: Link,
-    /// Why it failed, if it did.
+    /// Why the device failed, if it has.
     pub(crate) failed: Option<String>,
 }
 
 /// How a device is linked to the engine.
 pub(crate) enum Link {
+    /// A device that the engine steps.
     Stepped(Box<dyn Stepped>),
     /// A live device that has not been started yet.
     Idle(Box<dyn Live>),
+    /// A live device that runs on its own.
     Live(Linked),
-    /// A device that failed: it is not touched again.
+    /// A device that has failed. The engine does not call it again.
     Gone,
 }

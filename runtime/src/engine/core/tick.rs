@@ -1,5 +1,5 @@
-//! The tick: latch, step, commit. One thread, a fixed order, no queue, no lock, no allocation, no `async`; and no clock
-//! but the one that times the nodes in a few of the ticks.
+//! The tick: latch, step, commit. It runs on one thread in a fixed order, without queues, locks, allocation or `async`.
+//! It reads the clock only in the few ticks that time the nodes.
 
 use std::time::{Duration, Instant};
 
@@ -16,9 +16,9 @@ pub(crate) struct Core {
     pub(crate) inlets: Vec<Inlet>,
     pub(crate) tick: Tick,
     runners: Vec<NodeRunner>,
-    slots: Vec<CommandSlot>,
-    told: Vec<ReportSlot>,
-    /// The runner that steps: what a panic is blamed on.
+    commands: Vec<CommandSlot>,
+    reports: Vec<ReportSlot>,
+    /// Index of the runner that is stepping. A panic is attributed to it.
     current: usize,
 }
 
@@ -27,19 +27,19 @@ impl Core {
         bus: Bus,
         runners: Vec<NodeRunner>,
         inlets: Vec<Inlet>,
-        (slots, told): (Vec<CommandSlot>, Vec<ReportSlot>),
+        (commands, reports): (Vec<CommandSlot>, Vec<ReportSlot>),
         tick: Tick,
     ) -> Self {
-        Self { bus, inlets, tick, runners, slots, told, current: 0 }
+        Self { bus, inlets, tick, runners, commands, reports, current: 0 }
     }
 
-    /// Moves on to the tick at `now`.
+    /// Starts the tick at `now` [ns].
     pub(crate) fn begin(&mut self, now: i64) {
         let dt = if self.tick.index == 0 { 0.0 } else { (now - self.tick.now) as f64 * 1e-9 };
         self.tick = Tick { index: self.tick.index + 1, now, dt, ..self.tick };
     }
 
-    /// Steps the nodes, each at most once. Whether all values are finite.
+    /// Steps the nodes, each at most once. Returns whether all values are finite.
     pub(crate) fn run(&mut self, timing: &mut Timing) -> bool {
         if timing.is_due(self.tick.index) {
             self.step_timed(timing);
@@ -49,17 +49,20 @@ impl Core {
         self.bus.arenas.are_finite()
     }
 
-    /// A tick without what guards and measures it: latch, step, commit.
+    /// Runs latch, step and commit without the finite check and the timing.
     pub(crate) fn run_bare(&mut self, devices: &mut [DeviceSlot]) {
         self.latch(devices);
         self.step();
         self.commit(devices, false);
     }
 
-    /// Takes the newest samples over.
+    /// Latches the newest samples of the devices that have not failed.
     pub(crate) fn latch(&mut self, devices: &mut [DeviceSlot]) {
         for inlet in &mut self.inlets {
-            inlet.latch(&mut devices[inlet.device].samples, &mut self.bus, self.tick.index, self.tick.now);
+            let device = &mut devices[inlet.device];
+            if device.failed.is_none() {
+                inlet.latch(&mut device.samples, &mut self.bus, self.tick.index, self.tick.now);
+            }
         }
     }
 
@@ -82,68 +85,70 @@ impl Core {
         timing.ticks += 1;
     }
 
-    /// The sample that is too old now and whose policy is the strictest.
+    /// Returns the inlet whose sample is too old, with its policy; the one with the strictest policy if there are several.
     pub(crate) fn stale(&self) -> Option<(Policy, usize)> {
         let stale = self.inlets.iter().enumerate().filter(|(_, inlet)| inlet.is_stale(self.tick.now));
         stale.map(|(i, inlet)| (inlet.stale, i)).max_by_key(|(policy, _)| *policy)
     }
 
-    /// Hands over the commands, or lets them go to zero; and what is reported.
+    /// Commits the commands, which ramp to zero during a halt, and the reports.
     pub(crate) fn commit(&mut self, devices: &mut [DeviceSlot], is_halted: bool) {
-        for slot in &mut self.slots {
-            slot.commit(&self.bus, &mut devices[slot.device].commands, &self.tick, is_halted);
+        for command in &mut self.commands {
+            command.commit(&self.bus, &mut devices[command.device].commands, &self.tick, is_halted);
         }
-        for report in &self.told {
+        for report in &self.reports {
             report.commit(&self.bus, &mut devices[report.device].commands, &self.tick);
         }
     }
 
-    /// Ramps every command one step of `dt` [s] toward zero; whether all are zero. The nodes rest, so nothing is reported.
+    /// Ramps every command toward zero for `dt` [s]. Returns whether all are zero. Reports are absent, since no node steps.
     pub(crate) fn ramp(&mut self, devices: &mut [DeviceSlot], dt: f64) -> bool {
         devices.iter_mut().for_each(|device| device.commands.fall_silent());
-        self.slots.iter_mut().fold(true, |still, slot| slot.ramp(&mut devices[slot.device].commands, dt) & still)
+        let commands = self.commands.iter_mut();
+        commands.fold(true, |still, command| command.ramp(&mut devices[command.device].commands, dt) & still)
     }
 
-    /// Makes what the devices last gave count as new once more.
+    /// Makes the current value of every inlet a pending sample; see [`Inlet::refresh`].
     pub(crate) fn refresh(&mut self, devices: &mut [DeviceSlot]) {
         for inlet in &mut self.inlets {
             inlet.refresh(&mut devices[inlet.device].samples, &mut self.bus, self.tick.now);
         }
     }
 
-    /// Gives runners the configurations of another mode: by their places, the number of each.
+    /// Switches the configurations of runners: the index of each runner and the number of its configuration.
     pub(crate) fn switch(&mut self, configurations: &[(usize, usize)]) {
-        for (place, configuration) in configurations {
-            self.runners[*place].switch(*configuration);
+        for (runner, configuration) in configurations {
+            self.runners[*runner].switch(*configuration);
         }
     }
 
-    /// Makes the states of a runner and of all that come after it fresh.
+    /// Resets the runner with that index and all that step after it.
     pub(crate) fn reset_from(&mut self, runner: usize) {
         self.runners[runner..].iter_mut().for_each(NodeRunner::reset);
     }
 
-    /// The runner that stepped last panicked: it waits for its reset.
-    pub(crate) fn break_down(&mut self) {
-        self.runners[self.current].break_down(self.tick.now);
+    /// Notes that the runner that stepped last has panicked.
+    pub(crate) fn set_panicked(&mut self) {
+        self.runners[self.current].set_panicked(self.tick.now);
     }
 
-    /// The first runner that waits for its reset after a panic.
-    pub(crate) fn broken(&self) -> Option<usize> {
-        self.runners.iter().position(NodeRunner::is_broken)
+    /// Returns the first runner that waits for its reset after a panic.
+    pub(crate) fn panicked(&self) -> Option<usize> {
+        self.runners.iter().position(NodeRunner::has_panicked)
     }
 
+    /// Returns the index of the runner that stepped last.
     pub(crate) const fn current(&self) -> usize {
         self.current
     }
 }
 
-/// How long one node took.
+/// Step time of one node.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct NodeTime {
-    /// Sum over the ticks that were timed.
+    /// Sum over the timed ticks.
     pub total: Duration,
-    /// Longest of them.
+    /// Longest time in one tick.
     pub longest: Duration,
 }
 
@@ -154,22 +159,22 @@ impl NodeTime {
     }
 }
 
-/// How long the nodes took, in a few of the ticks: a stamp at every node of every tick would cost more than the nodes.
+/// Step times of the nodes. Only one tick in 64 is timed, because reading the clock costs more than most nodes.
 #[derive(Debug, Clone)]
 pub struct Timing {
-    /// Each node, in the order in which they step.
+    /// The nodes, in the order in which they step.
     pub nodes: Vec<NodeTime>,
-    /// How many ticks were timed.
+    /// Number of timed ticks.
     pub ticks: u64,
     every: u64,
 }
 
 impl Timing {
-    /// One tick of as many is timed.
-    const EVERY: u64 = 64;
+    /// Interval between timed ticks [ticks].
+    const INTERVAL_TICKS: u64 = 64;
 
     pub(crate) fn new(nodes: usize) -> Self {
-        Self { nodes: vec![NodeTime::default(); nodes], ticks: 0, every: Self::EVERY }
+        Self { nodes: vec![NodeTime::default(); nodes], ticks: 0, every: Self::INTERVAL_TICKS }
     }
 
     const fn is_due(&self, tick: u64) -> bool {

@@ -1,17 +1,17 @@
-//! A trouble as a fault: node, port, tick, cause and place.
+//! Describes a trouble as a fault with its node, port, tick, cause and source location.
 
 use super::engine::Engine;
 use super::trouble::{Trouble, WatchedWire};
 use crate::fault::{Cause, Fault, StaleWire};
 
 impl Engine {
-    /// Describes a trouble as a fault.
+    /// Returns the fault that a trouble of this tick causes.
     #[cold]
     pub(crate) fn describe(&self, trouble: Trouble) -> Fault {
         match trouble {
             Trouble::Stale(inlet) => {
                 let (age, max_age) = self.core.inlets[inlet].ages(self.core.tick.now);
-                self.of_port(inlet, Cause::Stale { age, max_age })
+                self.port_fault(inlet, Cause::Stale { age, max_age })
             }
             Trouble::StaleWire(wire) => {
                 let WatchedWire { aged, node, port, span, .. } = &self.watched[wire];
@@ -20,8 +20,8 @@ impl Engine {
                 let wire = StaleWire { from: from.to_owned(), age, max_age: aged.max_age };
                 self.fault(node, port.clone(), Cause::StaleWire(wire.into()), self.sources.locate(span.start))
             }
-            // The ports of the roles come first, an inlet each.
-            Trouble::NotFinite(port) | Trouble::NotFiniteAt(port) => self.of_port(port, Cause::NotFinite),
+            // The role ports come first in `ports`, one per inlet, so the index of an inlet is that of its port.
+            Trouble::NotFinite(port) | Trouble::NotFiniteAt(port) => self.port_fault(port, Cause::NotFinite),
             Trouble::Panicked(runner) => {
                 let (node, place) = &self.names[runner];
                 self.fault(node, None, Cause::Panicked(self.panic.clone()), place.clone())
@@ -31,8 +31,13 @@ impl Engine {
                 let why = device.failed.clone().unwrap_or_default();
                 self.fault(&device.name, None, Cause::Device(why), device.place.clone())
             }
+            Trouble::Lost(inlet) => {
+                let samples = &self.devices[self.core.inlets[inlet].device].samples;
+                let why = self.core.inlets[inlet].lost(samples).unwrap_or_default();
+                self.port_fault(inlet, Cause::Lost(why.to_owned()))
+            }
             Trouble::Clock => {
-                let clock = (0..self.devices.len()).find(|device| self.timeline.is_clock(*device));
+                let clock = (0..self.devices.len()).find(|device| self.schedule.is_clock(*device));
                 let (name, place) = clock.map_or(("", ""), |i| (&self.devices[i].name, &self.devices[i].place));
                 self.fault(name, None, Cause::SilentClock, place.to_owned())
             }
@@ -41,7 +46,7 @@ impl Engine {
         }
     }
 
-    fn of_port(&self, port: usize, cause: Cause) -> Fault {
+    fn port_fault(&self, port: usize, cause: Cause) -> Fault {
         let name = &self.ports[port].0.name;
         let node = owner(name);
         let mut owners = self.names.iter().chain(&self.roles);
@@ -54,7 +59,7 @@ impl Engine {
     }
 }
 
-/// Name of the node or the role that a port belongs to.
+/// Returns the name of the node or role that a port belongs to.
 pub(crate) fn owner(port: &str) -> &str {
-    port.rsplit_once('.').expect("a port's name has two parts").0
+    port.rsplit_once('.').expect("a port's name contains its owner's").0
 }

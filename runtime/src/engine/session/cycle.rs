@@ -1,5 +1,4 @@
-//! The course of a tick from the outside in: exchange with the devices, latch, step, commit, and what each trouble on the
-//! way does.
+//! One cycle of the engine: exchange with the devices, latch, step, commit, and the handling of each trouble.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
@@ -7,7 +6,7 @@ use super::blame::owner;
 use super::engine::Engine;
 use super::trouble::{Trouble, panic_message};
 use crate::device::DeviceError;
-use crate::engine::core::{Link, Modes, Verdict};
+use crate::engine::core::{Link, ModeMachine, Transition};
 use crate::fault::{Cause, Fault};
 use crate::graph::Policy;
 use crate::source::suggestion;
@@ -16,17 +15,17 @@ impl Engine {
     /// Runs the tick at `now` [ns]: exchange with the devices, then latch, step and commit.
     ///
     /// # Errors
-    /// The reason of a fault; nothing was commanded in this tick.
+    /// Returns the fault that ends the run. The commands of this tick are not committed.
     pub fn tick(&mut self, now: i64) -> Result<(), Fault> {
         self.exchange(now)?;
         self.step()
     }
 
-    /// The first half of a tick at `now` [ns]: hands the commands of the last tick to the devices and takes what they
-    /// have sampled since.
+    /// Runs the first half of the tick at `now` [ns]: sends the commands of the last tick to the devices and receives
+    /// their new samples.
     ///
     /// # Errors
-    /// If a device fails or gives what is not finite, and the policy of that is a fault.
+    /// Returns a fault if a device fails or sends a value that is not finite, and the policy for that is `fault`.
     pub fn exchange(&mut self, now: i64) -> Result<(), Fault> {
         let due = self.clock_sample().is_some_and(|sample| sample <= now);
         self.core.begin(now);
@@ -34,31 +33,39 @@ impl Engine {
             self.raise(self.policy.deadline, Trouble::Late(by))?;
         }
         let has_sampled = self.exchange_with_devices(now) || due;
+        self.check_sizes();
         for i in 0..self.devices.len() {
             if self.devices[i].failed.is_some() {
                 self.raise(self.policy.device.0, Trouble::Device(i))?;
             }
         }
-        self.timeline.ticked(now, has_sampled);
-        if self.timeline.is_on_timer() {
+        for i in 0..self.core.inlets.len() {
+            let inlet = &self.core.inlets[i];
+            let device = &self.devices[inlet.device];
+            if device.failed.is_none() && inlet.lost(&device.samples).is_some() {
+                self.raise(self.policy.device.0, Trouble::Lost(i))?;
+            }
+        }
+        self.schedule.ticked(now, has_sampled);
+        if self.schedule.is_on_timer() {
             self.raise(self.policy.clock, Trouble::Clock)?;
         }
         for i in 0..self.core.inlets.len() {
-            let (inlet, devices) = (&mut self.core.inlets[i], &self.devices);
-            let samples = &devices[inlet.device].samples;
-            if !inlet.is_finite(samples) {
-                inlet.reject(samples);
+            let inlet = &mut self.core.inlets[i];
+            let device = &self.devices[inlet.device];
+            if device.failed.is_none() && !inlet.is_finite(&device.samples) {
+                inlet.reject(&device.samples);
                 self.raise(self.policy.not_finite.0, Trouble::NotFinite(i))?;
             }
         }
         Ok(())
     }
 
-    /// The second half of a tick: latch, step, commit. It neither allocates nor calls the operating system, but when
-    /// something goes wrong.
+    /// Runs the second half of the tick: latch, step, commit. Without a trouble it neither allocates nor calls the
+    /// operating system.
     ///
     /// # Errors
-    /// The reason of a fault; nothing was commanded in this tick.
+    /// Returns the fault that ends the run. The commands of this tick are not committed.
     pub fn step(&mut self) -> Result<(), Fault> {
         self.core.latch(&mut self.devices);
         if let Some((policy, inlet)) = self.core.stale() {
@@ -66,8 +73,8 @@ impl Engine {
         }
         match catch_unwind(AssertUnwindSafe(|| self.core.run(&mut self.timing))) {
             Ok(true) => {}
-            Ok(false) => self.not_finite()?,
-            Err(panic) => self.panicked(panic_message(&*panic))?,
+            Ok(false) => self.on_not_finite()?,
+            Err(panic) => self.on_panic(panic_message(&*panic))?,
         }
         for i in 0..self.watched.len() {
             let wire = &self.watched[i];
@@ -75,16 +82,16 @@ impl Engine {
                 self.raise(wire.stale, Trouble::StaleWire(i))?;
             }
         }
-        if let Some(runner) = self.core.broken() {
+        if let Some(runner) = self.core.panicked() {
             self.raise(self.policy.panic.0, Trouble::Panicked(runner))?;
         }
-        self.settle();
+        self.update_halt();
         self.core.tick.is_halted = self.halts.is_halted();
         self.core.commit(&mut self.devices, self.halts.is_halted());
         self.decide()
     }
 
-    /// Notes a trouble of this tick; the strictest is what counts.
+    /// Raises a trouble of this tick. Of several, the one with the strictest policy is kept.
     fn raise(&mut self, policy: Policy, trouble: Trouble) -> Result<(), Fault> {
         match policy {
             Policy::Count => {}
@@ -97,65 +104,76 @@ impl Engine {
         Ok(())
     }
 
-    /// Halts because of the trouble of this tick, or goes on if there is none.
-    fn settle(&mut self) {
+    /// Starts a halt if this tick had a trouble, or ends it if the trouble is over.
+    fn update_halt(&mut self) {
         let trouble = self.trouble.take();
         if let Some((policy, trouble)) = trouble
-            && self.halts.is_news(policy)
+            && (self.halts.is_escalated_by(policy) || self.explains_halt(trouble))
         {
             let fault = self.describe(trouble);
-            self.halts.trouble(policy, fault);
+            self.halts.halt(policy, fault);
         }
-        let resumes = self.halts.settle(trouble.is_some(), self.core.tick.now);
+        let resumes = self.halts.update(trouble.is_some(), self.core.tick.now);
         if let Some(modes) = self.modes.as_mut().filter(|_| resumes) {
             modes.restart(&self.core.tick);
             self.core.switch(modes.configurations());
         }
     }
 
-    /// A word from outside: `stop` and `resume`, in any case, halt the commands and let them go on; others are for the
-    /// modes. One that no mode waits for changes nothing, and while the operator is waited for modes hear none.
+    /// Whether a device has reported why its samples are missing, while the commands are held only for missing samples.
+    fn explains_halt(&self, trouble: Trouble) -> bool {
+        let last = self.halts.list().last().filter(|halt| halt.until.is_none());
+        let is_silence = last.is_some_and(|halt| {
+            halt.policy == Policy::Hold && matches!(halt.fault.cause, Cause::SilentClock | Cause::Stale { .. })
+        });
+        is_silence && matches!(trouble, Trouble::Device(_) | Trouble::Lost(_))
+    }
+
+    /// Sends an operator word. `stop` halts the commands and `resume` ends the halt, in upper or lower case; other words
+    /// go to the modes.
     ///
     /// # Errors
-    /// Why nobody hears it.
+    /// Returns a message if no mode has a condition on the word, or if the commands wait for `resume`.
     pub fn send(&mut self, word: &str) -> Result<(), String> {
         if word.eq_ignore_ascii_case("stop") {
-            self.halts.stop();
+            self.halts.cancel_resume();
             self.trouble = Some((Policy::Stop, Trouble::Operator));
         } else if word.eq_ignore_ascii_case("resume") {
             self.halts.resume();
         } else if !self.words().any(|known| known == word) {
             let known = self.words().collect::<std::collections::BTreeSet<_>>();
-            return Err(format!("nothing waits for `{word}`: {}", suggestion(word, known.into_iter(), "words")));
+            return Err(format!(
+                "no mode has a condition on `{word}`: {}",
+                suggestion(word, known.into_iter(), "words")
+            ));
         } else if self.halts.is_stopped() {
-            return Err(format!("`{word}` is not heard while the commands wait for `resume`"));
+            return Err(format!("`{word}` has no effect while the commands wait for `resume`"));
         } else {
             self.sent = Some(word.to_owned());
         }
         Ok(())
     }
 
-    /// The words that something waits for.
+    /// Returns the operator words that the graph accepts.
     pub fn words(&self) -> impl Iterator<Item = &str> {
-        ["stop", "resume"].into_iter().chain(self.modes.iter().flat_map(Modes::words))
+        ["stop", "resume"].into_iter().chain(self.modes.iter().flat_map(ModeMachine::words))
     }
 
-    /// The next tick begins `by` [ns] too late, by a real clock.
+    /// Notes that the next tick begins `by` [ns] too late in real time.
     pub fn begin_late(&mut self, by: i64) {
         self.late += 1;
         self.lateness = Some(by);
     }
 
-    /// The boundary between two ticks: another mode, if the conditions of the present one say so. While the operator is
-    /// waited for, modes wait too.
+    /// Evaluates the conditions of the current mode after a tick. While the commands wait for `resume`, the mode stays.
     fn decide(&mut self) -> Result<(), Fault> {
         let sent = self.sent.take();
         let Some(modes) = self.modes.as_mut().filter(|_| !self.halts.is_stopped()) else { return Ok(()) };
         match modes.decide(&self.core.bus, &self.core.tick, sent.as_deref()) {
-            Verdict::Stay => {}
-            Verdict::Switched => self.core.switch(modes.configurations()),
-            Verdict::Done => self.is_done = true,
-            Verdict::Failed => {
+            Transition::Stay => {}
+            Transition::Switched => self.core.switch(modes.configurations()),
+            Transition::Done => self.is_done = true,
+            Transition::Failed => {
                 let ((why, place), name) = (modes.taken(), modes.name().to_owned());
                 let (why, place) = (Cause::Mode(why.to_owned()), self.sources.locate(place));
                 return Err(self.fault(&name, None, why, place));
@@ -164,37 +182,38 @@ impl Engine {
         Ok(())
     }
 
-    /// One period of the end of a run: the commands go one step further down to zero, and the devices are told.
-    /// Whether they are zero.
+    /// Ramps the commands toward zero for one period and sends them to the devices. Returns whether they are zero.
+    ///
+    /// A run ends by calling this until it returns `true`, and once more so that the devices receive the zero.
     pub fn wind_down(&mut self) -> bool {
-        let now = self.core.tick.now + self.timeline.period();
+        let now = self.core.tick.now + self.schedule.period();
         self.core.begin(now);
-        let is_still = self.core.ramp(&mut self.devices, self.timeline.period() as f64 * 1e-9);
-        // A device that fails now has had its zero or will time out by itself; the reason of the stop stays the first.
+        let is_still = self.core.ramp(&mut self.devices, self.schedule.period() as f64 * 1e-9);
+        // A device that fails now does not change why the run ended: it stops by its own timeout.
         self.exchange_with_devices(now);
         is_still
     }
 
-    /// Tells the devices that the run is over, and why.
+    /// Notifies the stepped devices that the run is over, and why.
     pub(crate) fn finish(&mut self, reason: &str) {
         for device in &mut self.devices {
             if let Link::Stepped(driver) = &mut device.link {
-                // A device that panics at its end has had its zero; the reason of the end stays the first.
+                // A panic here does not change why the run ended: the device has received its zero command.
                 let _ = catch_unwind(AssertUnwindSafe(|| driver.finish(reason)));
             }
         }
     }
 
-    /// Time of a stepped clock device's next sample.
+    /// Returns the time of the next sample of a stepped clock device [ns].
     fn clock_sample(&self) -> Option<i64> {
         self.devices.iter().enumerate().find_map(|(i, device)| match &device.link {
-            Link::Stepped(driver) if self.timeline.is_clock(i) => driver.next(),
+            Link::Stepped(driver) if self.schedule.is_clock(i) => driver.next(),
             _ => None,
         })
     }
 
-    /// Hands every device its commands and takes its samples: one that fails keeps no other from its command. Whether a
-    /// live clock device has sampled.
+    /// Sends every device its commands and receives its samples. A device that fails does not keep the others from their
+    /// commands. Returns whether a live clock device has sampled.
     fn exchange_with_devices(&mut self, now: i64) -> bool {
         let mut has_sampled = false;
         for i in 0..self.devices.len() {
@@ -210,8 +229,9 @@ impl Engine {
                     }
                 }
                 Link::Live(linked) => {
-                    let is_newer = linked.exchange(&device.commands, &mut device.samples);
-                    has_sampled |= is_newer && self.timeline.is_clock(i);
+                    linked.send(&device.commands);
+                    let is_newer = linked.receive(&mut device.samples);
+                    has_sampled |= is_newer && self.schedule.is_clock(i);
                 }
                 Link::Idle(_) | Link::Gone => {}
             }
@@ -219,52 +239,69 @@ impl Engine {
         has_sampled
     }
 
-    /// A device has failed: it is not touched again.
+    /// Marks every device as failed that sends a value of another size than it has stated.
+    fn check_sizes(&mut self) {
+        for i in 0..self.core.inlets.len() {
+            let inlet = &self.core.inlets[i];
+            let device = &self.devices[inlet.device];
+            if let Some(sizes) = inlet.misfit(&device.samples).filter(|_| device.failed.is_none()) {
+                let port = &self.ports[i].0;
+                let [size, stated] = sizes.map(|size| port.shape.kind().size_in_words(size));
+                let why = format!("`{}` has {size}, but the device stated {stated}", port.name);
+                self.lose_device(inlet.device, why);
+            }
+        }
+    }
+
+    /// Marks a device as failed. The engine does not call it again.
     pub(crate) fn lose_device(&mut self, device: usize, why: String) {
         let device = &mut self.devices[device];
         (device.link, device.failed) = (Link::Gone, Some(why));
     }
 
-    /// A value is not finite: if the run goes on, what the node gave is taken back, and with it all that may follow.
+    /// Handles a value that is not finite. Under every policy but `fault`, the outputs of the node and of all nodes after
+    /// it become absent, and those nodes are reset.
     #[cold]
-    fn not_finite(&mut self) -> Result<(), Fault> {
-        // Ports stand in the order in which they are written, so the first that is not finite made the others so.
+    fn on_not_finite(&mut self) -> Result<(), Fault> {
+        // Ports are in the order in which nodes write them, so the first that is not finite is the cause of the others.
         let bus = &self.core.bus;
         let is_bad = |port: &usize| {
             let (planned, id) = &self.ports[*port];
             !bus.arenas.is_finite(planned.shape.kind(), id.slot)
         };
-        let port = (0..self.ports.len()).find(is_bad).expect("one of them is not finite");
+        let port = (0..self.ports.len()).find(is_bad).expect("the finite check failed on some port");
         self.raise(self.policy.not_finite.0, Trouble::NotFiniteAt(port))?;
-        let runner = self.station_of(port);
+        let runner = self.runner_of(port);
         self.invalidate_from(runner);
         self.core.reset_from(runner);
         Ok(())
     }
 
-    /// A node has panicked: if the run goes on, it waits for its reset, and what was not stepped in this tick is absent.
+    /// Handles the panic of a node. Under every policy but `fault`, the node waits for its reset, and its outputs and those
+    /// of all nodes after it become absent.
     #[cold]
-    fn panicked(&mut self, why: String) -> Result<(), Fault> {
-        self.panic = why;
+    fn on_panic(&mut self, message: String) -> Result<(), Fault> {
+        self.panic = message;
         self.raise(self.policy.panic.0, Trouble::Panicked(self.core.current()))?;
-        self.core.break_down();
+        self.core.set_panicked();
         self.invalidate_from(self.core.current());
         Ok(())
     }
 
-    /// Makes the outputs of a runner and of all that come after it absent. A node that panicked may have lost its
-    /// buffers, so they are made anew.
+    /// Makes the outputs of a runner and of all that step after it absent. Allocates their buffers again, because a node
+    /// that panics may lose its buffers.
     fn invalidate_from(&mut self, runner: usize) {
-        // The first that has any: a node may be without outputs, and those after it were not stepped all the same.
+        // A node may have no outputs; then the ports of the next node that has some come first.
         let first = |name: &String| self.ports.iter().position(|(port, _)| owner(&port.name) == name);
         let from = self.names[runner..].iter().find_map(|(name, _)| first(name));
         for (port, id) in &self.ports[from.unwrap_or(self.ports.len())..] {
-            self.core.bus.marks[id.mark as usize].lose(self.core.tick.index);
+            self.core.bus.mark_mut(*id).lose(self.core.tick.index);
             self.core.bus.arenas.renew(id.slot, &port.shape);
         }
     }
 
-    fn station_of(&self, port: usize) -> usize {
+    /// Returns the index of the runner that writes a port.
+    fn runner_of(&self, port: usize) -> usize {
         let name = owner(&self.ports[port].0.name);
         self.names.iter().position(|(known, _)| known == name).unwrap_or(0)
     }

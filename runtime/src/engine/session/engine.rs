@@ -1,248 +1,293 @@
-//! The engine: everything that a tick touches, and what can be asked of it.
+//! The engine: the state of a running graph and its accessors.
 
-use super::halt::{Halt, Halts};
-use super::timeline::Timeline;
+use super::halt::{Halt, HaltMachine};
+use super::schedule::TickSchedule;
 use super::trouble::{Trouble, WatchedWire};
-use crate::engine::core::{Change, Core, Counters, DeviceSlot, Link, Modes, Timing};
+use crate::device::Report;
+use crate::engine::core::{Core, Counters, DeviceSlot, Link, ModeChange, ModeMachine, Timing};
 use crate::graph::{PlannedPort, Policy, PolicyTable};
 use crate::node::{Bus, PortId};
-use crate::signal::Signal;
-use crate::source::SourceMap;
+use crate::signal::{Mark, Signal};
+use crate::source::{SourceMap, suggestion};
 
-/// A graph that runs.
+/// A running graph.
 pub struct Engine {
     pub(super) core: Core,
     pub(super) devices: Vec<DeviceSlot>,
-    pub(super) timeline: Timeline,
+    pub(super) schedule: TickSchedule,
     pub(super) ports: Vec<(PlannedPort, PortId)>,
     pub(super) logged: Vec<Logged>,
-    pub(super) view: View,
-    /// Name and place of each limit's share.
+    pub(super) display: Display,
+    /// Name and port of the scale that each limit reports.
     pub(super) limits: Vec<(String, PortId)>,
-    /// Name and place of each runner.
+    /// Name and source location of each runner's node.
     pub(super) names: Vec<(String, String)>,
-    /// Name of each role, and the place of the device behind it.
+    /// Name of each role, and the source location of its device.
     pub(super) roles: Vec<(String, String)>,
+    /// Name `role.report` of each wired report, the index of its device, and its number there.
+    pub(super) reported: Vec<(String, usize, usize)>,
+    /// Name of each export of a part, and the port behind it.
+    pub(super) exports: Vec<(String, String)>,
     pub(super) timing: Timing,
-    pub(super) modes: Option<Modes>,
+    pub(super) modes: Option<ModeMachine>,
     pub(super) is_done: bool,
     pub(super) policy: PolicyTable,
-    pub(super) halts: Halts,
-    /// Wires whose age does more than that their node goes without.
+    pub(super) halts: HaltMachine,
+    /// Wires whose policy stops the commands or ends the run when their value is too old.
     pub(super) watched: Vec<WatchedWire>,
-    /// What went wrong in this tick, and what it does; the strictest.
+    /// The trouble of this tick with the strictest policy.
     pub(super) trouble: Option<(Policy, Trouble)>,
-    /// What the last panic had to say.
+    /// Message of the last panic of a node.
     pub(super) panic: String,
-    /// A word from outside that no mode has seen yet.
+    /// An operator word that the modes have not processed yet.
     pub(super) sent: Option<String>,
     /// Ticks that began too late.
     pub(super) late: u64,
-    /// How late the next tick begins, if too late [ns].
+    /// How late the next tick begins, if it is too late [ns].
     pub(super) lateness: Option<i64>,
     pub(super) sources: SourceMap,
 }
 
-/// What a run shows of the graph, as its section [graph] says.
+/// The ports that a run displays, from the keys `show` and `mark` of the section [graph].
 #[derive(Debug, Clone, Default)]
-pub struct View {
-    /// The ports, each with what the graph calls it.
+pub struct Display {
+    /// The ports, each with its name in the graph file.
     pub ports: Vec<(String, PlannedPort, PortId)>,
-    /// Where the contact is in the first image: the ports of its x and of its y [m].
-    pub mark: Option<[PortId; 2]>,
+    /// The ports of the contact's x and y in the first image [m].
+    pub contact: Option<[PortId; 2]>,
 }
 
-/// A node that logs what comes in on its wires.
+/// A node whose inputs are logged.
 #[derive(Debug, Clone)]
 pub struct Logged {
     /// Name of the node.
     pub node: String,
-    /// The flag that says when.
+    /// The flag that is set in the ticks that are logged.
     pub due: PortId,
-    /// What its wires come from, in the order of its inputs.
+    /// The sources of its wires, in the order of its inputs.
     pub inputs: Vec<(PlannedPort, PortId)>,
 }
 
 impl Engine {
-    /// Time of the next tick in virtual time [ns]; `None` when a device has ended.
+    /// Returns the time of the next tick in virtual time [ns], or `None` when a device has no more samples.
     #[must_use]
     pub fn next(&self) -> Option<i64> {
         let mut clock = None;
         for (i, device) in self.devices.iter().enumerate() {
             if let Link::Stepped(driver) = &device.link {
                 let next = driver.next()?;
-                if self.timeline.is_clock(i) {
+                if self.schedule.is_clock(i) {
                     clock = Some(next);
                 }
             }
         }
-        Some(self.timeline.next(clock))
+        Some(self.schedule.next(clock))
     }
 
-    /// Whether a mode says that the task is done.
+    /// Whether a `done` condition of a mode holds.
     #[must_use]
     pub const fn is_done(&self) -> bool {
         self.is_done
     }
 
-    /// Name of the mode that the next tick is in; none in a graph without modes.
+    /// Returns the name of the mode of the next tick, or `None` in a graph without modes.
     #[must_use]
     pub fn mode(&self) -> Option<&str> {
-        self.modes.as_ref().map(Modes::name)
+        self.modes.as_ref().map(ModeMachine::name)
     }
 
-    /// Number of that mode, from 0 in the order of the file.
+    /// Returns the number of the mode of the next tick, from 0 in the order of the file.
     #[must_use]
     pub fn mode_number(&self) -> Option<usize> {
-        self.modes.as_ref().map(Modes::number)
+        self.modes.as_ref().map(ModeMachine::number)
     }
 
-    /// Whether every command is held at zero, or on its way there.
+    /// Whether every command is zero or ramps to zero because of a halt.
     #[must_use]
     pub fn is_halted(&self) -> bool {
         self.halts.is_halted()
     }
 
-    /// The modes so far, each with when it began and why, the start first.
+    /// Returns the mode changes so far, the start mode first.
     #[must_use]
-    pub fn changes(&self) -> Vec<Change> {
-        self.modes.iter().flat_map(Modes::changes).collect()
+    pub fn changes(&self) -> Vec<ModeChange> {
+        self.modes.iter().flat_map(ModeMachine::changes).collect()
     }
 
-    /// Every time in which the commands were held, with its reason, up to a thousand.
+    /// Returns the halts so far, at most 1000.
     #[must_use]
     pub fn halts(&self) -> &[Halt] {
         self.halts.list()
     }
 
-    /// Times in which the commands were held that are not in [that list](Self::halts).
+    /// Returns the number of halts beyond those that [`halts`](Self::halts) lists.
     #[must_use]
-    pub const fn more_halts(&self) -> u64 {
-        self.halts.more
+    pub const fn unlisted_halts(&self) -> u64 {
+        self.halts.unlisted
     }
 
-    /// Whether the commands wait for the operator.
+    /// Whether the commands wait for the operator to resume.
     #[must_use]
     pub fn is_stopped(&self) -> bool {
         self.halts.is_stopped()
     }
 
-    /// Ticks that began too late.
+    /// Returns the number of ticks that began too late.
     #[must_use]
     pub const fn late(&self) -> u64 {
         self.late
     }
 
-    /// Time of the last sample that the clock device will give, if it knows [ns].
+    /// Returns the time of the clock device's last sample, if the device knows it [ns].
     #[must_use]
     pub fn end(&self) -> Option<i64> {
         self.devices.iter().enumerate().find_map(|(i, device)| match &device.link {
-            Link::Stepped(driver) if self.timeline.is_clock(i) => driver.end(),
+            Link::Stepped(driver) if self.schedule.is_clock(i) => driver.end(),
             _ => None,
         })
     }
 
-    /// Whether a device runs on its own, in real time.
+    /// Whether a device runs in real time.
     pub(super) fn is_live(&self) -> bool {
         self.devices.iter().any(|device| matches!(device.link, Link::Idle(_) | Link::Live(_)))
     }
 
-    /// Whether a device that is left knows of an end of its samples.
+    /// Whether the samples of a stepped device end at a known time.
     pub(super) fn has_end(&self) -> bool {
         self.devices.iter().any(|device| matches!(&device.link, Link::Stepped(driver) if driver.end().is_some()))
     }
 
-    /// Number of the last tick.
+    /// Returns the number of the last tick.
     #[must_use]
     pub const fn ticks(&self) -> u64 {
         self.core.tick.index
     }
 
-    /// Time of the last tick in the graph's clock [ns].
+    /// Returns the time of the last tick in the graph's clock [ns].
     #[must_use]
     pub const fn now(&self) -> i64 {
         self.core.tick.now
     }
 
-    /// Nominal time between two ticks [ns].
+    /// Returns the nominal time between two ticks [ns].
     #[must_use]
     pub const fn period(&self) -> i64 {
-        self.timeline.period()
+        self.schedule.period()
     }
 
-    /// Every value, as the last tick left it.
+    /// Returns the bus, with the values after the last tick.
     #[must_use]
     pub const fn bus(&self) -> &Bus {
         &self.core.bus
     }
 
-    /// Every port, those of the roles first, and where its value is.
+    /// Returns every port with its place on the bus, the ports of the roles first.
     #[must_use]
     pub fn ports(&self) -> &[(PlannedPort, PortId)] {
         &self.ports
     }
 
-    /// The nodes that log, in the order in which they step.
+    /// Returns the nodes whose inputs are logged, in the order in which they step.
     #[must_use]
     pub fn logged(&self) -> &[Logged] {
         &self.logged
     }
 
-    /// What the graph wants to be shown.
+    /// Returns the ports that the graph asks to display.
     #[must_use]
-    pub const fn view(&self) -> &View {
-        &self.view
+    pub const fn display(&self) -> &Display {
+        &self.display
     }
 
-    /// Where each limit says what share of the motion it lets pass, from 0 to 1: its name, `node.limit`, and its port.
+    /// Returns the name `node.limit` of each limit, and the port on which it reports the scale of the motion, from 0 to 1.
     pub fn limits(&self) -> impl Iterator<Item = (&str, PortId)> {
         self.limits.iter().map(|(name, id)| (name.as_str(), *id))
     }
 
-    /// The names of the nodes in the order in which they step.
+    /// Returns the names of the nodes in the order in which they step.
     pub fn order(&self) -> impl Iterator<Item = &str> {
         self.names.iter().map(|(name, _)| name.as_str())
     }
 
-    /// What came in on each role's ports, in the order of [`ports`](Self::ports).
+    /// Returns the sample counts of each role's ports, in the order of [`ports`](Self::ports).
     pub fn counters(&self) -> impl Iterator<Item = &Counters> {
         self.core.inlets.iter().map(|inlet| &inlet.counters)
     }
 
-    /// How long the nodes took.
+    /// Returns the step times of the nodes.
     #[must_use]
     pub const fn timing(&self) -> &Timing {
         &self.timing
     }
 
-    /// The command that a device holds: those of its ports, end to end.
+    /// Returns the current command of a device, with the values of all its command ports one after the other.
     #[must_use]
     pub fn commands(&self, device: &str) -> Option<Vec<f64>> {
         let device = self.devices.iter().find(|slot| slot.name == device)?;
         Some(device.commands.values.iter().flat_map(|values| values.iter().copied()).collect())
     }
 
-    /// What a device is told on its report port `port`; none if nothing is.
+    /// Returns what the graph reports to a device on `role.report`, or `None` while that is absent or not wired.
     #[must_use]
-    pub fn report<T: Signal>(&self, device: &str, port: usize) -> Option<&T> {
-        self.devices.iter().find(|slot| slot.name == device)?.commands.report(port)
+    pub fn report<T: Signal>(&self, name: &str) -> Option<&T> {
+        let (_, device, report) = self.reported.iter().find(|(known, ..)| known == name)?;
+        self.devices[*device].commands.report(Report::at(*report))
     }
 
-    /// The texts the graph was read from.
+    /// Returns the name of each device with its counts; see [`Samples::count`].
+    pub fn counts(&self) -> impl Iterator<Item = (&str, &[(&'static str, u64)])> {
+        self.devices.iter().map(|slot| (slot.name.as_str(), slot.samples.counts.as_slice()))
+    }
+
+    /// Finds a port by its name in a recording or in the wires of the task.
+    #[must_use]
+    pub fn port(&self, name: &str) -> Option<&(PlannedPort, PortId)> {
+        let export = self.exports.iter().find(|(export, _)| export == name);
+        let name = export.map_or(name, |(_, port)| port.as_str());
+        self.ports.iter().find(|(port, _)| port.name == name)
+    }
+
+    /// Returns the value of a port after the last tick, or `None` while it is absent: `get::<Scalar>("truth.force")`.
+    ///
+    /// # Panics
+    /// If there is no port with that name and kind.
+    #[must_use]
+    pub fn get<T: Signal>(&self, name: &str) -> Option<&T> {
+        let (port, id) = self.known(name);
+        assert_eq!(port.shape.kind(), T::KIND, "kind of port `{name}`");
+        self.core.bus.get(*id)
+    }
+
+    /// Returns the mark of a port after the last tick.
+    ///
+    /// # Panics
+    /// If there is no port with that name.
+    #[must_use]
+    pub fn mark(&self, name: &str) -> Mark {
+        *self.core.bus.mark(self.known(name).1)
+    }
+
+    fn known(&self, name: &str) -> &(PlannedPort, PortId) {
+        self.port(name).unwrap_or_else(|| {
+            let names = self.ports.iter().map(|(port, _)| port.name.as_str());
+            panic!("there is no port `{name}`: {}", suggestion(name, names, "ports"))
+        })
+    }
+
+    /// Returns the sources of the graph.
     #[must_use]
     pub const fn sources(&self) -> &SourceMap {
         &self.sources
     }
 
-    /// Makes what the devices have last given count as sampled anew a period later: for measurements of a tick.
+    /// Presents the last samples of the devices as new ones, one period later. For benchmarks.
     pub fn refresh(&mut self) {
-        let now = self.core.tick.now + self.timeline.period();
+        let now = self.core.tick.now + self.schedule.period();
         self.core.begin(now);
         self.core.refresh(&mut self.devices);
     }
 
-    /// Latch, step and commit without what guards and measures them: no finite check, no timing, nothing that catches a
-    /// panic. For measurements.
+    /// Runs latch, step and commit without the finite check, the timing and the catching of panics. For benchmarks.
     pub fn step_bare(&mut self) {
         self.core.run_bare(&mut self.devices);
     }

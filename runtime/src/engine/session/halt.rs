@@ -1,106 +1,108 @@
-//! Why commands are held: a small machine that each trouble of a tick is told to. While it halts, nodes go on stepping, so
-//! that the trouble can be seen to be over, but every command ramps to zero and stays there.
+//! The halt machine: holds the commands at zero while something is wrong.
+//!
+//! During a halt the nodes keep stepping, so the engine sees when the trouble is over. Every command ramps to zero and
+//! stays there.
 
 use crate::fault::Fault;
 use crate::graph::Policy;
 
-/// A time in which the commands were held.
+/// A period in which the commands were held at zero.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Halt {
-    /// What began it.
+    /// The fault that started it.
     pub fault: Fault,
-    /// What was done about it.
+    /// The policy for that fault: hold or stop.
     pub policy: Policy,
-    /// When it was over [ns]; not yet, if none.
+    /// Time at which it ended [ns]; `None` while it lasts.
     pub until: Option<i64>,
 }
 
-/// As many halts are remembered.
-const MOST: usize = 1000;
+/// Number of halts that are kept for the summary.
+const MAX_HALTS: usize = 1000;
 
-/// What the commands do.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum State {
-    /// They follow the graph.
+    /// The commands follow the graph.
     Running,
-    /// They are zero until the trouble is over.
+    /// The commands are zero until the trouble is over.
     Held,
-    /// They are zero until the operator lets them go on.
+    /// The commands are zero until the operator resumes.
     Stopped,
 }
 
-/// The machine, and all that it went through.
-pub(crate) struct Halts {
+/// The state of the halt machine and the list of halts.
+pub(crate) struct HaltMachine {
     state: State,
     list: Vec<Halt>,
-    /// Halts that are not in the list any more.
-    pub(crate) more: u64,
-    /// Whether the operator has asked to go on.
+    /// Number of halts beyond [`MAX_HALTS`].
+    pub(crate) unlisted: u64,
+    /// Whether the operator has asked to resume.
     resumes: bool,
 }
 
-impl Halts {
+impl HaltMachine {
     pub(crate) const fn new() -> Self {
-        Self { state: State::Running, list: Vec::new(), more: 0, resumes: false }
+        Self { state: State::Running, list: Vec::new(), unlisted: 0, resumes: false }
     }
 
-    /// Whether commands go to zero.
+    /// Whether the commands are zero or ramp to zero.
     pub(crate) fn is_halted(&self) -> bool {
         self.state != State::Running
     }
 
-    /// Whether only the operator lets them go on.
+    /// Whether the commands wait for the operator to resume.
     pub(crate) fn is_stopped(&self) -> bool {
         self.state == State::Stopped
     }
 
-    /// The operator lets the commands go on.
+    /// Notes that the operator wants to resume.
     pub(crate) const fn resume(&mut self) {
         self.resumes = true;
     }
 
-    /// The operator wants a stop: what was said before of going on holds no more.
-    pub(crate) const fn stop(&mut self) {
+    /// Cancels a pending resume: the operator wants a stop.
+    pub(crate) const fn cancel_resume(&mut self) {
         self.resumes = false;
     }
 
-    /// Everything so far.
+    /// Returns the halts so far, at most [`MAX_HALTS`].
     pub(crate) fn list(&self) -> &[Halt] {
         &self.list
     }
 
-    /// Whether a trouble with that policy halts anew, or makes wait for the operator what would have gone on by itself.
-    pub(crate) fn is_news(&self, policy: Policy) -> bool {
+    /// Whether a trouble with that policy starts a halt or turns a hold into a stop.
+    pub(crate) fn is_escalated_by(&self, policy: Policy) -> bool {
         self.state == State::Running || self.state == State::Held && policy == Policy::Stop
     }
 
-    /// Halts because of a trouble that [is news](Self::is_news).
-    pub(crate) fn trouble(&mut self, policy: Policy, fault: Fault) {
+    /// Starts a halt. Call it only if the policy [escalates](Self::is_escalated_by) the state.
+    pub(crate) fn halt(&mut self, policy: Policy, fault: Fault) {
         self.end(fault.time);
-        tracing::warn!("{fault}: every command goes to zero");
-        if self.list.len() < MOST {
+        tracing::warn!("{fault}: every command ramps to zero");
+        if self.list.len() < MAX_HALTS {
             self.list.push(Halt { fault, policy, until: None });
         } else {
-            self.more += 1;
+            self.unlisted += 1;
         }
         self.state = if policy == Policy::Stop { State::Stopped } else { State::Held };
     }
 
-    /// The tick at `now` had a trouble or not: whether the commands go on from a stop, and so from the start.
-    pub(crate) fn settle(&mut self, has_trouble: bool, now: i64) -> bool {
+    /// Ends the halt if it can end after the tick at `now` [ns]. Returns whether the operator has resumed from a stop, so
+    /// that the modes must restart.
+    pub(crate) fn update(&mut self, has_trouble: bool, now: i64) -> bool {
         let resumes = std::mem::take(&mut self.resumes);
-        let was = self.state;
-        match (was, has_trouble) {
+        let previous = self.state;
+        match (previous, has_trouble) {
             (State::Held, false) => self.state = State::Running,
             (State::Stopped, false) if resumes => self.state = State::Running,
-            // It goes on by itself as soon as the trouble is over.
+            // The trouble is not over yet, so the stop becomes a hold.
             (State::Stopped, true) if resumes => self.state = State::Held,
             _ => return false,
         }
         if self.state == State::Running {
             self.end(now);
         }
-        was == State::Stopped
+        previous == State::Stopped
     }
 
     fn end(&mut self, now: i64) {
@@ -121,28 +123,28 @@ mod tests {
     }
 
     #[test]
-    fn a_hold_ends_with_its_trouble_and_a_stop_with_the_operators_word() {
-        // Policy of the trouble in a tick, whether the operator says to go on, and whether commands are halted after.
+    fn a_hold_ends_with_its_trouble_and_a_stop_when_the_operator_resumes() {
+        // Policy of the trouble in a tick, whether the operator resumes, and whether the commands are halted afterwards.
         let (hold, stop) = (Some(Policy::Hold), Some(Policy::Stop));
         let cases: [&[(Option<Policy>, bool, bool)]; 6] = [
             &[(hold, false, true), (hold, false, true), (None, false, false)],
             &[(stop, false, true), (None, false, true), (None, true, false)],
             &[(hold, false, true), (stop, false, true), (None, false, true), (None, true, false)],
             &[(stop, false, true), (stop, true, true), (None, false, false)],
-            // What stops anew after the word is a new stop.
+            // A stop after the resume is a new stop.
             &[(stop, false, true), (stop, true, true), (stop, false, true), (None, false, true), (None, true, false)],
             &[(stop, false, true), (hold, false, true), (None, false, true), (None, true, false), (None, false, false)],
         ];
         for case in cases {
-            let mut halts = Halts::new();
+            let mut halts = HaltMachine::new();
             for (i, (trouble, resumes, is_halted)) in case.iter().enumerate() {
-                if let Some(policy) = trouble.filter(|policy| halts.is_news(*policy)) {
-                    halts.trouble(policy, fault());
+                if let Some(policy) = trouble.filter(|policy| halts.is_escalated_by(*policy)) {
+                    halts.halt(policy, fault());
                 }
                 if *resumes {
                     halts.resume();
                 }
-                halts.settle(trouble.is_some(), 10);
+                halts.update(trouble.is_some(), 10);
                 assert_eq!(halts.is_halted(), *is_halted, "step {i} of {case:?}");
             }
             assert!(halts.list().iter().all(|halt| halt.until.is_some()));

@@ -1,4 +1,4 @@
-//! What stands around a tick: the exchange with devices, faults and halts, pacing, real time and the operator.
+//! Runs around the tick: the exchange with devices, faults and halts, pacing, real time and the operator.
 
 mod blame;
 mod build;
@@ -9,12 +9,12 @@ mod halt;
 mod operator;
 mod outcome;
 mod real_time;
+mod schedule;
 mod signals;
-mod timeline;
 mod trouble;
 
 pub use drive::run_virtual;
-pub use engine::{Engine, Logged, View};
+pub use engine::{Display, Engine, Logged};
 pub use halt::Halt;
 pub use outcome::{End, Outcome, RunOptions};
 pub use real_time::run;

@@ -1,42 +1,43 @@
-//! Words from outside: those that were given beforehand for a time of the graph, and those that come in while it runs.
+//! Operator words: those scheduled before the run, and those typed on the standard input during it.
 
 use std::collections::VecDeque;
 use std::io::{BufRead, BufReader, Read};
 use std::sync::mpsc::{Receiver, TryRecvError, channel};
 
-/// Where words come from.
-pub(crate) struct Words {
-    /// When [ns], and which; in the order of the times.
-    planned: VecDeque<(i64, String)>,
-    heard: Option<Receiver<String>>,
+/// The words that the operator sends to a run.
+pub(crate) struct OperatorInput {
+    /// Time [ns] and word, in order of time.
+    scheduled: VecDeque<(i64, String)>,
+    /// Lines of the standard input; `None` if it is not read or has ended.
+    lines: Option<Receiver<String>>,
 }
 
-impl Words {
-    /// Words for times of the graph [s], and, if asked, the lines of the standard input.
-    pub(crate) fn new(planned: &[(f64, String)], listens: bool) -> Self {
-        let mut planned: Vec<(i64, String)> =
-            planned.iter().map(|(seconds, word)| ((seconds * 1e9) as i64, word.clone())).collect();
-        planned.sort_by_key(|(at, _)| *at);
-        Self { planned: planned.into(), heard: listens.then(|| listen(std::io::stdin())) }
+impl OperatorInput {
+    /// Takes words scheduled in the graph's time [s] and, if `reads_stdin`, the lines of the standard input.
+    pub(crate) fn new(scheduled: &[(f64, String)], reads_stdin: bool) -> Self {
+        let mut scheduled: Vec<(i64, String)> =
+            scheduled.iter().map(|(seconds, word)| ((seconds * 1e9) as i64, word.clone())).collect();
+        scheduled.sort_by_key(|(at, _)| *at);
+        Self { scheduled: scheduled.into(), lines: reads_stdin.then(|| read_lines(std::io::stdin())) }
     }
 
-    /// The next word that is due at `now` [ns].
+    /// Returns the next word that is due at `now` [ns].
     pub(crate) fn next(&mut self, now: i64) -> Option<String> {
-        let heard = self.heard.as_ref().map(Receiver::try_recv);
-        if heard == Some(Err(TryRecvError::Disconnected)) {
-            self.heard = None;
+        let line = self.lines.as_ref().map(Receiver::try_recv);
+        if line == Some(Err(TryRecvError::Disconnected)) {
+            self.lines = None;
         }
-        heard.and_then(Result::ok).or_else(|| self.planned.pop_front_if(|(at, _)| *at <= now).map(|(_, word)| word))
+        line.and_then(Result::ok).or_else(|| self.scheduled.pop_front_if(|(at, _)| *at <= now).map(|(_, word)| word))
     }
 
-    /// Whether another word can come.
-    pub(crate) fn may_come(&self) -> bool {
-        self.heard.is_some() || !self.planned.is_empty()
+    /// Whether another word can still arrive.
+    pub(crate) fn is_open(&self) -> bool {
+        self.lines.is_some() || !self.scheduled.is_empty()
     }
 }
 
-/// The lines of an input, read by a thread that ends with it, or with the process.
-fn listen(input: impl Read + Send + 'static) -> Receiver<String> {
+/// Reads the lines of an input on a thread, which ends with the input or with the process.
+fn read_lines(input: impl Read + Send + 'static) -> Receiver<String> {
     let (sender, receiver) = channel();
     std::thread::spawn(move || {
         for line in BufReader::new(input).lines().map_while(Result::ok) {
@@ -54,21 +55,22 @@ mod tests {
     use super::*;
 
     #[test]
-    fn words_come_in_the_order_of_their_times() {
-        let mut words = Words::new(&[(0.2, "b".into()), (0.1, "a".into())], false);
-        assert_eq!(words.next(99_999_999), None);
-        assert_eq!(words.next(250_000_000).as_deref(), Some("a"));
-        assert_eq!(words.next(250_000_000).as_deref(), Some("b"));
-        assert!(words.next(i64::MAX).is_none() && !words.may_come());
+    fn scheduled_words_are_sent_in_order_of_time() {
+        let mut input = OperatorInput::new(&[(0.2, "b".into()), (0.1, "a".into())], false);
+        assert_eq!(input.next(99_999_999), None);
+        assert_eq!(input.next(250_000_000).as_deref(), Some("a"));
+        assert_eq!(input.next(250_000_000).as_deref(), Some("b"));
+        assert!(input.next(i64::MAX).is_none() && !input.is_open());
     }
 
     #[test]
-    fn an_input_that_has_ended_gives_no_more_words() {
-        let mut words = Words { planned: VecDeque::new(), heard: Some(listen(&b"  stop \n\nresume"[..])) };
-        let mut heard = Vec::new();
-        while words.may_come() {
-            heard.extend(words.next(0));
+    fn the_input_closes_after_its_last_line() {
+        let lines = read_lines(&b"  stop \n\nresume"[..]);
+        let mut input = OperatorInput { scheduled: VecDeque::new(), lines: Some(lines) };
+        let mut words = Vec::new();
+        while input.is_open() {
+            words.extend(input.next(0));
         }
-        assert_eq!(heard, ["stop", "resume"]);
+        assert_eq!(words, ["stop", "resume"]);
     }
 }

@@ -1,21 +1,21 @@
-//! What a run is asked for, and how it ends.
+//! The options of a run and its outcome.
 
 use std::fmt;
 use std::time::Duration;
 
 use crate::fault::Fault;
 
-/// How to run.
+/// Options of a run.
 #[derive(Debug, Clone, Default)]
 pub struct RunOptions {
-    /// How long at most, in the graph's clock [s].
+    /// Maximum duration in the graph's time [s].
     pub duration: Option<f64>,
-    /// Whether virtual time is paced by the wall clock; live devices always are.
+    /// Whether the wall clock paces virtual time. A run with live devices is always paced.
     pub is_realtime: bool,
-    /// Words that are sent from outside: when, in the graph's time [s], and which. `stop` halts all commands, `resume`
-    /// lets them go on, others are for the modes.
+    /// Operator words, each with its time in the graph [s]. `stop` halts all commands, `resume` ends the halt, other words
+    /// go to the modes.
     pub sends: Vec<(f64, String)>,
-    /// Whether words come in over the standard input, one a line.
+    /// Whether to read operator words from the standard input, one per line.
     pub listens: bool,
 }
 
@@ -24,13 +24,13 @@ pub struct RunOptions {
 pub enum End {
     /// A device has no more samples.
     Finished,
-    /// The time is over.
+    /// The maximum duration is reached.
     Duration,
-    /// A mode says that the task is done.
+    /// A `done` condition of a mode holds.
     Done,
-    /// The operator wanted it.
+    /// The operator interrupted it.
     Interrupted,
-    /// Something went wrong.
+    /// A fault ended it.
     Fault(Box<Fault>),
 }
 
@@ -40,23 +40,23 @@ impl fmt::Display for End {
             Self::Finished => f.write_str("a device has no more samples"),
             Self::Duration => f.write_str("the time is over"),
             Self::Done => f.write_str("the task is done"),
-            Self::Interrupted => f.write_str("the operator ended it"),
+            Self::Interrupted => f.write_str("the operator interrupted the run"),
             Self::Fault(fault) => fault.fmt(f),
         }
     }
 }
 
-/// How a run went.
+/// The outcome of a run.
 #[derive(Debug, Clone)]
 pub struct Outcome {
     /// Why it ended.
     pub end: End,
-    /// Time of the last tick in the graph's clock, the ramp to zero aside [ns].
+    /// Time of the last tick in the graph's clock, without the ramp to zero [ns].
     pub time: i64,
-    /// Number of ticks, the ramp to zero aside.
+    /// Number of ticks, without the ramp to zero.
     pub ticks: u64,
-    /// Time it took.
+    /// Wall-clock time of the run.
     pub wall: Duration,
-    /// Ticks that began more than a period late; counted with a real clock only.
+    /// Ticks that began more than a period late. Counted only in real time.
     pub late: u64,
 }

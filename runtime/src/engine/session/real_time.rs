@@ -1,4 +1,4 @@
-//! The edge to real time: pacing, live devices, the operator's Ctrl-C; and the end of every run, which is a ramp to zero.
+//! Runs a graph in real time: pacing, live devices, operator input, Ctrl-C, and the ramp to zero at the end.
 
 use std::io;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
@@ -8,9 +8,9 @@ use tokio::runtime::{Builder, Runtime};
 use tokio::sync::watch;
 use tokio::task::JoinSet;
 
-use super::drive::{Pace, drive, hopeless};
+use super::drive::{Pacer, drive, permanent_halt};
 use super::engine::Engine;
-use super::operator::Words;
+use super::operator::OperatorInput;
 use super::outcome::{Outcome, RunOptions};
 use super::signals::interrupts;
 use super::trouble::panic_message;
@@ -18,46 +18,45 @@ use crate::device::{DeviceError, link};
 use crate::engine::core::Link;
 use crate::fault::Fault;
 
-/// Runs until a device ends, the time is over, the operator interrupts or something goes wrong; then the commands ramp
-/// to zero. `observe` is called after every tick.
+/// Runs until a device ends, the time is over, the task is done, the operator interrupts or a fault occurs; then the
+/// commands ramp to zero. Calls `observe` after every tick.
 ///
 /// # Errors
-/// If the operating system gives no runtime for live devices and signals.
+/// If the tokio runtime or the signal handlers cannot be set up.
 pub fn run(engine: &mut Engine, options: &RunOptions, observe: &mut dyn FnMut(&Engine)) -> io::Result<Outcome> {
     let runtime = Builder::new_multi_thread().worker_threads(1).enable_all().build()?;
-    let mut shell = Shell::start(engine, options, &runtime)?;
-    // Whatever unwinds through here, the arm is brought to rest first.
-    let end = catch_unwind(AssertUnwindSafe(|| drive(engine, shell.until, &mut shell, observe)));
+    let mut pacer = RealTimePacer::start(engine, options, &runtime)?;
+    // After a panic, for example in `observe`, the arm must come to rest before the unwinding goes on.
+    let end = catch_unwind(AssertUnwindSafe(|| drive(engine, pacer.until, &mut pacer, observe)));
     let (time, ticks) = (engine.now(), engine.ticks());
-    shell.stop(engine);
+    pacer.stop(engine);
     engine.finish(&end.as_ref().map_or_else(|_| "a panic".to_owned(), ToString::to_string));
     let end = end.unwrap_or_else(|panic| resume_unwind(panic));
-    Ok(Outcome { end, time, ticks, wall: shell.epoch.elapsed(), late: engine.late() })
+    Ok(Outcome { end, time, ticks, wall: pacer.epoch.elapsed(), late: engine.late() })
 }
 
-struct Shell<'a> {
+struct RealTimePacer<'a> {
     runtime: &'a Runtime,
     epoch: Instant,
     is_real: bool,
-    /// Whether any device runs on its own.
+    /// Whether any device is live.
     is_live: bool,
-    /// Last time of a tick [ns].
+    /// Latest time of a tick [ns].
     until: i64,
     interrupted: watch::Receiver<bool>,
     drivers: JoinSet<Result<(), DeviceError>>,
-    /// Which device each driver is of.
+    /// Index of the device that each driver task belongs to.
     tasks: Vec<(tokio::task::Id, usize)>,
-    words: Words,
+    input: OperatorInput,
     is_on_timer: bool,
 }
 
-impl<'a> Shell<'a> {
+impl<'a> RealTimePacer<'a> {
     fn start(engine: &mut Engine, options: &RunOptions, runtime: &'a Runtime) -> io::Result<Self> {
         let epoch = Instant::now();
         let (mut drivers, mut tasks) = (JoinSet::new(), Vec::new());
         for (i, device) in engine.devices.iter_mut().enumerate() {
-            let edge = std::mem::replace(&mut device.link, Link::Gone);
-            device.link = match edge {
+            device.link = match std::mem::replace(&mut device.link, Link::Gone) {
                 Link::Idle(driver) => {
                     tracing::info!("device `{}` starts", device.name);
                     let (theirs, ours) = link(&device.samples, &device.commands, epoch);
@@ -72,12 +71,12 @@ impl<'a> Shell<'a> {
         let is_real = options.is_realtime || is_live;
         let until = options.duration.map_or(i64::MAX, |seconds| (seconds * 1e9) as i64);
         let interrupted = runtime.block_on(async { interrupts() })?;
-        let words = Words::new(&options.sends, options.listens);
-        Ok(Self { runtime, epoch, is_real, is_live, until, interrupted, drivers, tasks, words, is_on_timer: false })
+        let input = OperatorInput::new(&options.sends, options.listens);
+        Ok(Self { runtime, epoch, is_real, is_live, until, interrupted, drivers, tasks, input, is_on_timer: false })
     }
 }
 
-impl Pace for Shell<'_> {
+impl Pacer for RealTimePacer<'_> {
     fn is_interrupted(&self) -> bool {
         *self.interrupted.borrow()
     }
@@ -87,10 +86,10 @@ impl Pace for Shell<'_> {
         if *self.interrupted.borrow() {
             return Ok(false);
         }
-        self.failed_driver(engine);
-        while let Some(word) = self.words.next(now) {
-            if let Err(why) = engine.send(&word) {
-                tracing::warn!("{why}");
+        self.collect_ended_drivers(engine);
+        while let Some(word) = self.input.next(now) {
+            if let Err(message) = engine.send(&word) {
+                tracing::warn!("{message}");
             }
         }
         if late > engine.period() {
@@ -100,28 +99,29 @@ impl Pace for Shell<'_> {
     }
 
     fn after(&mut self, engine: &Engine) -> Option<Fault> {
-        self.watch_clock(engine);
-        hopeless(engine, self.words.may_come(), !self.is_real && self.until == i64::MAX)
+        self.log_clock(engine);
+        permanent_halt(engine, self.input.is_open(), !self.is_real && self.until == i64::MAX)
     }
 }
 
-impl Shell<'_> {
-    /// Tells when a timer takes the clock device's place, and when the device is back.
-    fn watch_clock(&mut self, engine: &Engine) {
+impl RealTimePacer<'_> {
+    /// Logs when a timer replaces the clock device, and when the device is back.
+    fn log_clock(&mut self, engine: &Engine) {
         let seconds = engine.now() as f64 * 1e-9;
-        match (self.is_on_timer, engine.timeline.is_on_timer()) {
-            (false, true) => tracing::warn!("at {seconds:.3} s: the clock device is silent, a timer takes its place"),
+        match (self.is_on_timer, engine.schedule.is_on_timer()) {
+            (false, true) => tracing::warn!("at {seconds:.3} s: the clock device is silent; a timer replaces it"),
             (true, false) => tracing::info!("at {seconds:.3} s: the clock device is back"),
             _ => {}
         }
-        self.is_on_timer = engine.timeline.is_on_timer();
+        self.is_on_timer = engine.schedule.is_on_timer();
     }
 
-    /// Waits for the next sample of a live clock, or until `next` [ns]; the time of the tick, and how late it is [ns].
+    /// Waits for the next sample of a live clock device, or until `next` [ns]. Returns the time of the tick and its delay
+    /// after `next` [ns].
     fn wait(&self, engine: &Engine, next: i64) -> (i64, i64) {
         let due = self.epoch + Duration::from_nanos(next.max(0) as u64);
         let sampled = engine.devices.iter().enumerate().find_map(|(i, device)| match &device.link {
-            Link::Live(linked) if engine.timeline.is_clock(i) => Some(linked.sampled.clone()),
+            Link::Live(linked) if engine.schedule.is_clock(i) => Some(linked.sampled.clone()),
             _ => None,
         });
         let has_live_clock = sampled.is_some();
@@ -140,30 +140,31 @@ impl Shell<'_> {
             }
         });
         let now = self.epoch.elapsed().as_nanos() as i64;
-        // Stepped devices live in virtual time: a late tick is still the tick of its time. A live one would get all ticks
-        // that were missed at once.
+        // With stepped devices alone, a late tick keeps its nominal time. With live devices it takes the current time;
+        // otherwise every missed tick would follow at once.
         (if has_live_clock || self.is_live { now } else { next.max(engine.now()) }, now - next)
     }
 
-    /// Live devices that have ended with an error, or that have ended at all, are lost.
-    fn failed_driver(&mut self, engine: &mut Engine) {
+    /// Marks every live device as failed whose driver has ended, with or without an error.
+    fn collect_ended_drivers(&mut self, engine: &mut Engine) {
         while let Some(ended) = self.drivers.try_join_next_with_id() {
             let (task, message) = match ended {
                 Ok((task, Ok(()))) => (task, "it ended before the run did".to_owned()),
                 Ok((task, Err(error))) => (task, error.0),
-                Err(error) => (error.id(), panic_of(error)),
+                Err(error) => (error.id(), describe_join_error(error)),
             };
-            let (_, device) = self.tasks.iter().find(|(id, _)| *id == task).expect("every driver is of a device");
+            let (_, device) =
+                self.tasks.iter().find(|(id, _)| *id == task).expect("every task was started for a device");
             engine.lose_device(*device, message);
         }
     }
 
-    /// Ramps every command to zero, in real time where the run was, and lets the drivers end.
+    /// Ramps every command to zero, in real time if the run was, and stops the drivers.
     fn stop(&mut self, engine: &mut Engine) {
-        /// How long a driver may take to end.
-        const GRACE: Duration = Duration::from_secs(1);
-        /// How long a driver has for its last command.
-        const LAST_WORD: Duration = Duration::from_millis(50);
+        /// Time that the drivers have to end.
+        const STOP_TIMEOUT: Duration = Duration::from_secs(1);
+        /// Time that a driver has to read its last command.
+        const LAST_COMMAND_DELAY: Duration = Duration::from_millis(50);
         while !engine.wind_down() {
             if self.is_real {
                 std::thread::sleep(Duration::from_nanos(engine.period() as u64));
@@ -171,8 +172,8 @@ impl Shell<'_> {
         }
         engine.wind_down();
         if self.is_live {
-            // A driver reads the zero before it hears that it may end.
-            std::thread::sleep(LAST_WORD);
+            // A driver must read the zero command before it is asked to end.
+            std::thread::sleep(LAST_COMMAND_DELAY);
         }
         for device in &engine.devices {
             if let Link::Live(linked) = &device.link {
@@ -180,19 +181,19 @@ impl Shell<'_> {
             }
         }
         let drivers = std::mem::take(&mut self.drivers);
-        // What has not ended by then ends with the runtime.
-        let _ = self.runtime.block_on(async { tokio::time::timeout(GRACE, drivers.join_all()).await });
+        // Dropping the tokio runtime ends the drivers that are still running.
+        let _ = self.runtime.block_on(async { tokio::time::timeout(STOP_TIMEOUT, drivers.join_all()).await });
     }
 }
 
-fn panic_of(error: tokio::task::JoinError) -> String {
+fn describe_join_error(error: tokio::task::JoinError) -> String {
     match error.try_into_panic() {
         Ok(panic) => format!("it panicked: {}", panic_message(&*panic)),
         Err(error) => error.to_string(),
     }
 }
 
-/// Timers are good to a millisecond; the rest of the way is slept by the thread itself.
+/// Sleeps until `due`. A tokio timer is accurate to about a millisecond, so the thread sleeps for the last two.
 async fn sleep_until(due: Instant) {
     const COARSE: Duration = Duration::from_millis(2);
     tokio::time::sleep_until((due - COARSE.min(due.saturating_duration_since(Instant::now()))).into()).await;

@@ -1,47 +1,46 @@
-//! Ctrl-C and the other signals that end a run.
+//! Ctrl-C and the other operating-system signals that end a run.
 
 use std::io;
 
 use tokio::runtime::{Builder, Runtime};
 use tokio::sync::watch;
 
-/// The operator's wish to end what runs, for those who run without [`run`]: from here on Ctrl-C and SIGTERM are caught. A
-/// second one ends the process at once.
+/// Catches Ctrl-C and SIGTERM for callers that do not use [`run`](super::run). A second signal ends the process at once.
 pub struct Interrupt {
-    /// What listens for them lives in it.
+    /// Keeps the listening task alive.
     _runtime: Runtime,
     interrupted: watch::Receiver<bool>,
 }
 
 impl Interrupt {
-    /// Catches them.
+    /// Starts to catch the signals.
     ///
     /// # Errors
-    /// If the operating system gives no runtime for signals.
+    /// If the signal handlers or the tokio runtime cannot be set up.
     pub fn catch() -> io::Result<Self> {
         let runtime = Builder::new_multi_thread().worker_threads(1).enable_all().build()?;
         let interrupted = runtime.block_on(async { interrupts() })?;
         Ok(Self { _runtime: runtime, interrupted })
     }
 
-    /// Whether the operator wants the end.
+    /// Whether the operator has asked to end the run.
     #[must_use]
     pub fn is_requested(&self) -> bool {
         *self.interrupted.borrow()
     }
 }
 
-/// Becomes true at the first Ctrl-C or SIGTERM; a second one ends the process at once.
+/// Returns a flag that becomes true at the first Ctrl-C or SIGTERM. A second signal ends the process at once.
 ///
-/// They are caught from here on, and not only once the task has begun: on a busy machine that may take a while.
+/// The handlers are installed before this returns: on a busy machine the spawned task may start later.
 pub(crate) fn interrupts() -> io::Result<watch::Receiver<bool>> {
-    const INTERRUPTED: i32 = 130;
+    const EXIT_INTERRUPTED: i32 = 130;
     let (sender, receiver) = watch::channel(false);
     let mut signals = Signals::catch()?;
     tokio::spawn(async move {
         while signals.next().await.is_ok() {
             if sender.send_replace(true) {
-                std::process::exit(INTERRUPTED);
+                std::process::exit(EXIT_INTERRUPTED);
             }
         }
     });
@@ -52,7 +51,7 @@ pub(crate) fn interrupts() -> io::Result<watch::Receiver<bool>> {
 struct Signals {
     interrupt: tokio::signal::unix::Signal,
     terminate: tokio::signal::unix::Signal,
-    /// The terminal is gone.
+    /// The terminal has closed.
     hangup: tokio::signal::unix::Signal,
 }
 

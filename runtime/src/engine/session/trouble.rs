@@ -1,45 +1,49 @@
-//! What can go wrong in a tick.
+//! The troubles that a tick can have.
 
 use std::ops::Range;
 
-use crate::engine::core::Aged;
+use crate::engine::core::AgedWire;
 use crate::graph::Policy;
 
-/// A wire whose age does more than that its node goes without.
+/// A wire whose policy stops the commands or ends the run when its value is too old.
 pub(crate) struct WatchedWire {
-    pub(crate) aged: Aged,
+    pub(crate) aged: AgedWire,
+    /// Policy for a value that is too old.
     pub(crate) stale: Policy,
-    /// The node it comes to; or the role, with the command.
+    /// The receiving node, or the role of a command or report.
     pub(crate) node: String,
+    /// The command or report; `None` for a node.
     pub(crate) port: Option<String>,
-    /// Where it is written.
+    /// Position of the wire in the source.
     pub(crate) span: Range<usize>,
 }
 
-/// A trouble of a tick, in numbers: it is put into words only when it has to be told.
+/// A trouble of a tick, as indices: only a trouble that halts or ends the run is described as a fault.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Trouble {
     /// The newest sample of an inlet is too old.
     Stale(usize),
-    /// What came over a watched wire is too old.
+    /// The value of a watched wire is too old.
     StaleWire(usize),
     /// A sample of an inlet is not finite.
     NotFinite(usize),
-    /// A port is not finite.
+    /// The value of a port is not finite.
     NotFiniteAt(usize),
-    /// A runner panicked, or waits for its reset.
+    /// A node panicked, or waits for its reset.
     Panicked(usize),
     /// A device has failed.
     Device(usize),
-    /// The clock device is silent.
+    /// The device has reported the port of an inlet as lost.
+    Lost(usize),
+    /// The clock device sends no samples.
     Clock,
-    /// The tick began so late [ns].
+    /// The tick began late, by this time [ns].
     Late(i64),
-    /// The operator wanted it.
+    /// The operator sent `stop`.
     Operator,
 }
 
-/// The message of a panic.
+/// Returns the message of a panic.
 pub(crate) fn panic_message(panic: &(dyn std::any::Any + Send)) -> String {
     let text = panic.downcast_ref::<&str>().map(|text| (*text).to_owned());
     text.or_else(|| panic.downcast_ref::<String>().cloned()).unwrap_or_else(|| "no message".into())

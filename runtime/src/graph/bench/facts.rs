@@ -63,7 +63,7 @@ fn find_fact(
     };
     // A device that could not be opened has its own diagnostic.
     let Some(bound) = &opened.roles[index] else { return Ok(None) };
-    let facts = &bound.filled.facts;
+    let facts = &bound.facts;
     match facts.iter().find(|(fact, _)| fact == name) {
         Some((_, value)) => Ok(Some(Value::from_toml(value, span))),
         None => {

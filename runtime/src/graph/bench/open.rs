@@ -1,27 +1,26 @@
 //! Opens the devices to which the roles of a graph are bound.
 
+use std::borrow::Cow;
 use std::ops::Range;
 
 use crate::catalogue::Catalogue;
-use crate::device::{Description, Filled};
+use crate::device::{Description, StatedPort};
 use crate::graph::net::Net;
 use crate::graph::plan::PlannedDevice;
-use crate::graph::syntax::Bench;
-use crate::node::{Mistake, Reader, Word};
+use crate::graph::syntax::{Bench, Block};
+use crate::node::{Mistake, PortSpec, Reader, Word};
+use crate::signal::Shape;
 use crate::source::{Code, Diagnostic, Diagnostics, Key, SourceMap, Value, suggest_name};
 
-/// A role that is bound to a device.
+/// A role that is bound to a device. Ports are in the order of the role, each with its index in the device.
 #[derive(Debug, Clone)]
 pub(crate) struct BoundRole {
     /// Index among the opened devices.
     pub(crate) device: usize,
-    pub(crate) filled: Filled,
-    /// Index of the first output of the role among those of the device.
-    pub(crate) first_output: usize,
-    /// Index of the first command of the role among those of the device.
-    pub(crate) first_command: usize,
-    /// Index of the first report of the role among those of the device.
-    pub(crate) first_report: usize,
+    pub(crate) outputs: Vec<(usize, Shape)>,
+    pub(crate) commands: Vec<(usize, Shape)>,
+    pub(crate) reports: Vec<(usize, Shape)>,
+    pub(crate) facts: Vec<(Cow<'static, str>, toml::Value)>,
 }
 
 /// The opened devices, and the device of each role.
@@ -40,8 +39,7 @@ impl OpenedBench {
     pub(crate) fn facts(&self, net: &Net<'_>) -> Vec<(String, toml::Value)> {
         let observed = net.observed.iter().map(|(key, ..)| *key).zip(&self.observed);
         let roles = net.flat.roles.iter().map(|(key, _)| key).zip(&self.roles).chain(observed);
-        let facts =
-            roles.flat_map(|(key, bound)| bound.iter().flat_map(|bound| &bound.filled.facts).map(move |f| (key, f)));
+        let facts = roles.flat_map(|(key, bound)| bound.iter().flat_map(|bound| &bound.facts).map(move |f| (key, f)));
         facts.map(|(key, (fact, value))| (format!("{}.{fact}", key.name), value.clone())).collect()
     }
 }
@@ -164,19 +162,19 @@ impl Opener<'_> {
             return None;
         };
         self.taken.push((device, fills, key.name.clone()));
-        let before = &description.fills[..fills];
+        let role = self.catalogue.roles().iter().find(|role| role.name == kind.text)?;
+        let number = |stated: &[StatedPort], declared: &[PortSpec]| {
+            let port = |spec: &PortSpec| stated.iter().position(|port| port.fill == fills && port.name == spec.name);
+            let port = |spec: &PortSpec| port(spec).map(|port| (port, stated[port].shape.clone()));
+            declared.iter().filter_map(port).collect()
+        };
         Some(BoundRole {
             device,
-            first_output: before.iter().map(|filled| filled.outputs.len()).sum(),
-            first_command: before.iter().map(|filled| filled.commands.len()).sum(),
-            first_report: before.iter().map(|filled| self.report_count(filled)).sum(),
-            filled: description.fills[fills].clone(),
+            outputs: number(&description.outputs, &role.outputs),
+            commands: number(&description.commands, &role.commands),
+            reports: number(&description.reports, &role.reports),
+            facts: description.fills[fills].facts.clone(),
         })
-    }
-
-    /// Returns the number of reports of a role.
-    fn report_count(&self, filled: &Filled) -> usize {
-        self.catalogue.roles().iter().find(|role| role.name == filled.role).map_or(0, |role| role.reports.len())
     }
 
     fn device(&mut self, bench: &Bench, word: &Word) -> Option<(usize, Description)> {
@@ -199,28 +197,40 @@ impl Opener<'_> {
         let opened = device.open(&block.params, &mut reader);
         let mistakes = reader.mistakes;
         place_mistakes(mistakes, &block.params, &[], self.sources, self.diagnostics);
-        let opened = opened?;
-        let period = opened.description.period;
+        let crate::device::Opened { mut description, driver } = opened?;
+        let period = description.period;
         if !PERIOD_RANGE_S.contains(&period) {
             let message = format!("device `{}` has a sample period of {period:e} s", word.text);
             let help = format!("the period must be from {:e} to {:e} s", PERIOD_RANGE_S.start(), PERIOD_RANGE_S.end());
             self.diagnostics.push(Diagnostic::new(Code::BadClock, block.key.span.clone(), message).help(help));
             return None;
         }
-        let all = |ports: fn(&Filled) -> &Vec<crate::signal::Shape>| {
-            opened.description.fills.iter().flat_map(|filled| ports(filled).clone()).collect()
-        };
-        let reports = opened.description.fills.iter().map(|filled| self.report_count(filled)).sum();
-        self.opened.devices.push(PlannedDevice {
-            name: word.text.clone(),
-            outputs: all(|filled| &filled.outputs),
-            commands: all(|filled| &filled.commands),
-            reports,
-            driver: opened.driver,
-            span: block.key.span.clone(),
-        });
-        self.opened.periods.push(opened.description.period);
-        Some((self.opened.devices.len() - 1, opened.description))
+        if !self.check_ports(&mut description, block) {
+            return None;
+        }
+        let (name, span) = (word.text.clone(), block.key.span.clone());
+        self.opened.devices.push(PlannedDevice { name, driver, description: description.clone(), span });
+        self.opened.periods.push(period);
+        Some((self.opened.devices.len() - 1, description))
+    }
+
+    /// Reports where the ports of a device differ from those of its roles, and adds the reports that it does not read.
+    fn check_ports(&mut self, description: &mut Description, block: &Block) -> bool {
+        let before = self.diagnostics.len();
+        for fill in 0..description.fills.len() {
+            let name = description.fills[fill].role.clone();
+            let Some(role) = self.catalogue.roles().iter().find(|role| role.name == name) else { continue };
+            let misfits = description.misfits(fill, role);
+            if !misfits.is_empty() {
+                let device = &block.key.name;
+                let message = format!("device `{device}` does not match the role `{name}`: {}", misfits.join("; "));
+                let kind = block.kind.as_ref().map_or("", |kind| &kind.text);
+                let help = format!("the mistake is in the device type `{kind}`, not in this file");
+                self.diagnostics.push(Diagnostic::new(Code::WrongRole, block.key.span.clone(), message).help(help));
+            }
+            description.add_reports(fill, role);
+        }
+        self.diagnostics.len() == before
     }
 }
 

@@ -4,7 +4,7 @@
 
 use crate::graph::net::{Net, Wire};
 use crate::graph::plan::Producer;
-use crate::node::{AnyNode, Components, Need};
+use crate::node::{AnyNode, Components};
 
 /// The components that are read of each output of each node.
 pub(crate) type Demand = Vec<Vec<Components>>;
@@ -21,7 +21,7 @@ pub(crate) fn find_demand<'n>(net: &Net<'_>, built: &dyn Fn(usize) -> Option<&'n
             demand[node][command.source.port] = Components::ALL;
         }
     }
-    let is_delayed = |node: usize, wire: &Wire| net.input(node, wire).need == Need::Delayed;
+    let is_delayed = |node: usize, wire: &Wire| net.input(node, wire).need.is_delayed;
     // A node with a delayed input steps before its source, so this pass reaches it too late: it counts as reading all.
     for (node, wires) in net.wires.iter().enumerate() {
         for wire in wires.iter().filter(|wire| is_delayed(node, wire)) {

@@ -62,7 +62,7 @@ impl Builder<'_> {
 
     fn add_roles(&mut self) {
         for (i, bound) in self.opened.roles.iter().enumerate() {
-            for (port, shape) in bound.iter().flat_map(|bound| &bound.filled.outputs).enumerate() {
+            for (port, (_, shape)) in bound.iter().flat_map(|bound| &bound.outputs).enumerate() {
                 self.add_port(PortRef { producer: Producer::Role(i), port }, shape.clone());
             }
         }
@@ -73,12 +73,12 @@ impl Builder<'_> {
         let role = |(i, bound): (usize, &Option<BoundRole>)| {
             let bound = bound.as_ref()?;
             let source = |port| PortRef { producer: Producer::Role(i), port };
-            let ports = (0..bound.filled.outputs.len()).map(|port| self.ports[&source(port)].clone()).collect();
+            let ports = (0..bound.outputs.len()).map(|port| self.ports[&source(port)].clone()).collect();
             let name = self.net.flat.roles[i].0.name.clone();
             let period = self.opened.periods[bound.device];
             let age = policy.age_limit(&name, period);
-            let (device, first_port, period) = (bound.device, bound.first_output, (period * 1e9) as i64);
-            Some(PlannedRole { name, device, first_port, ports, age, period })
+            let (device, numbers, period) = (bound.device, numbers(bound), (period * 1e9) as i64);
+            Some(PlannedRole { name, device, numbers, ports, age, is_observed: false, period })
         };
         let declared = self.opened.roles.iter().enumerate().filter_map(role);
         declared.chain(self.plan_observed_roles()).collect()
@@ -88,7 +88,7 @@ impl Builder<'_> {
     fn plan_observed_roles(&self) -> impl Iterator<Item = PlannedRole> {
         self.net.observed.iter().zip(&self.opened.observed).filter_map(|((key, _, role), bound)| {
             let bound = bound.as_ref()?;
-            let port = |(spec, shape): (&PortSpec, &Shape)| PlannedPort {
+            let port = |(spec, (_, shape)): (&PortSpec, &(usize, Shape))| PlannedPort {
                 name: format!("{}.{}", key.name, spec.name),
                 shape: shape.clone(),
                 frames: frame_args(spec).iter().map(|_| Some(key.name.clone())).collect(),
@@ -96,9 +96,10 @@ impl Builder<'_> {
             Some(PlannedRole {
                 name: key.name.clone(),
                 device: bound.device,
-                first_port: bound.first_output,
-                ports: role.outputs.iter().zip(&bound.filled.outputs).map(port).collect(),
+                numbers: numbers(bound),
+                ports: role.outputs.iter().zip(&bound.outputs).map(port).collect(),
                 age: AgeLimit { max_age: i64::MAX, stale: Policy::Count },
+                is_observed: true,
                 period: (self.opened.periods[bound.device] * 1e9) as i64,
             })
         })
@@ -121,7 +122,7 @@ impl Builder<'_> {
                 age: wire.origin.age,
                 span: wire.origin.word.span.clone(),
             });
-            if input.need == Need::Delayed {
+            if input.need.is_delayed {
                 // The source of a delayed input is built later, so only the shape of a flag is known.
                 if input.kind == Kind::Flag {
                     given.inputs[wire.input].push((wire.key.name.clone(), FlagShape.into()));
@@ -141,9 +142,7 @@ impl Builder<'_> {
             }
             given.inputs[wire.input].push((wire.key.name.clone(), port.shape.clone()));
         }
-        let missing = |(need, ports): &(Need, Vec<PlannedWire>)| {
-            matches!(need, Need::Required | Need::Sampled) && ports.is_empty()
-        };
+        let missing = |(need, ports): &(Need, Vec<PlannedWire>)| need.must_be_wired && ports.is_empty();
         if !is_complete || inputs.iter().any(missing) || self.frames.has_clash(index) {
             return None;
         }
@@ -226,13 +225,15 @@ impl Builder<'_> {
 
     /// Suggests a node that converts any unit into that unit per second, for an input that takes only rates.
     fn suggest_rate_node(&self, input: &PortSpec) -> Option<String> {
-        let has =
-            |port: &PortSpec, unit: &str| port.kind == input.kind && port.args.first().is_some_and(|arg| arg == unit);
-        let mut specs = self.net.catalogue.specs();
+        let unit = |port: &PortSpec| port.args.first().filter(|_| port.kind == input.kind).cloned();
+        unit(input)?.strip_suffix("/s").filter(|of| *of == "_" || of.starts_with(|c: char| c.is_ascii_uppercase()))?;
+        let takes =
+            |spec: &NodeSpec, of: &str| spec.inputs.iter().any(|port| unit(port).is_some_and(|unit| unit == of));
         let makes = |spec: &NodeSpec| {
-            spec.inputs.iter().any(|port| has(port, "_")) && spec.outputs.iter().any(|port| has(port, "_/s"))
+            let mut units = spec.outputs.iter().filter_map(unit);
+            units.any(|unit| unit.strip_suffix("/s").is_some_and(|of| takes(spec, of)))
         };
-        let maker = specs.find(|spec| makes(spec)).filter(|_| has(input, "_/s"))?;
+        let maker = self.net.catalogue.specs().find(|spec| makes(spec))?;
         Some(format!("insert a `{}` between them", maker.name))
     }
 
@@ -241,7 +242,7 @@ impl Builder<'_> {
         let net = self.net;
         for (index, wires) in net.wires.iter().enumerate() {
             let Some(spec) = self.net.spec(index) else { continue };
-            for wire in wires.iter().filter(|wire| spec.inputs[wire.input].need == Need::Delayed) {
+            for wire in wires.iter().filter(|wire| spec.inputs[wire.input].need.is_delayed) {
                 let Some(port) = self.ports.get(&wire.source) else { continue };
                 let consumer = format!("{}.{}", self.net.flat.nodes[index].name, wire.key.name);
                 let units = self.units.entry(index).or_default();
@@ -256,7 +257,7 @@ impl Builder<'_> {
     pub(crate) fn command(&mut self, wire: &CommandWire) -> Option<PlannedCommand> {
         let bound = self.opened.roles[wire.role].as_ref()?;
         let port = self.command_source(wire)?;
-        let (spec, takes) = (self.net.command_port(wire), &bound.filled.commands[wire.command]);
+        let (spec, (command, takes)) = (self.net.command_port(wire), &bound.commands[wire.command]);
         let (has, wants) = (joint_names(&port.shape), joint_names(takes));
         if has != wants {
             let consumer = self.net.command_name(wire);
@@ -268,7 +269,7 @@ impl Builder<'_> {
         Some(PlannedCommand {
             source: wire.source,
             device: bound.device,
-            command: bound.first_command + wire.command,
+            command: *command,
             name: [self.net.flat.roles[wire.role].0.name.clone(), spec.name.to_string()],
             age: self.age_limit(wire),
             span: wire.origin.word.span.clone(),
@@ -283,7 +284,7 @@ impl Builder<'_> {
             source: wire.source,
             shape: self.command_source(wire)?.shape,
             device: bound.device,
-            report: bound.first_report + wire.command,
+            report: bound.reports[wire.command].0,
             name: [self.net.flat.roles[wire.role].0.name.clone(), self.net.command_port(wire).name.to_string()],
             age: self.age_limit(wire),
             span: wire.origin.word.span.clone(),
@@ -307,6 +308,11 @@ impl Builder<'_> {
     fn age_limit(&self, wire: &CommandWire) -> AgeLimit {
         wire.origin.age.unwrap_or(AgeLimit { max_age: default_max_age_ns(self.period), stale: Policy::Hold })
     }
+}
+
+/// Returns the index of each output of a role among those of its device.
+fn numbers(bound: &BoundRole) -> Vec<usize> {
+    bound.outputs.iter().map(|(number, _)| *number).collect()
 }
 
 /// Returns the maximum acceleration of each joint [rad/s²].

@@ -2,7 +2,6 @@
 
 use crate::graph::net::{Net, Wire};
 use crate::graph::plan::Producer;
-use crate::node::Need;
 use crate::source::{Code, Diagnostics};
 
 /// Reports each delayed input that reads from a role.
@@ -10,9 +9,8 @@ use crate::source::{Code, Diagnostics};
 /// A role is updated before every node, so its value of the previous tick is gone when a node steps.
 pub(crate) fn check(net: &Net<'_>, diagnostics: &mut Diagnostics) {
     for (node, wires) in net.wires.iter().enumerate() {
-        let is_wrong = |wire: &&Wire| {
-            net.input(node, wire).need == Need::Delayed && matches!(wire.source.producer, Producer::Role(_))
-        };
+        let is_wrong =
+            |wire: &&Wire| net.input(node, wire).need.is_delayed && matches!(wire.source.producer, Producer::Role(_));
         for wire in wires.iter().filter(is_wrong) {
             let (name, key) = (&net.flat.nodes[node].name, &wire.key.name);
             let message = format!("`{name}.{key}` reads the value of the previous tick, which a role does not keep");

@@ -1,7 +1,6 @@
 //! Checks that every required input has a wire.
 
 use crate::graph::net::Net;
-use crate::node::Need;
 use crate::source::{Code, Diagnostic, Diagnostics, Key, suggest_name};
 
 /// Reports each required input without a wire.
@@ -9,7 +8,7 @@ pub(crate) fn check(net: &Net<'_>, diagnostics: &mut Diagnostics) {
     for (i, node) in net.flat.nodes.iter().enumerate() {
         let Some(spec) = net.spec(i) else { continue };
         let names = || spec.inputs.iter().map(|input| &*input.name);
-        for input in spec.inputs.iter().filter(|input| matches!(input.need, Need::Required | Need::Sampled)) {
+        for input in spec.inputs.iter().filter(|input| input.need.must_be_wired) {
             // A misspelt input has its own diagnostic.
             let is_misspelt = |key: &Key| {
                 !names().any(|name| name == key.name) && suggest_name(&key.name, names()) == Some(&input.name)

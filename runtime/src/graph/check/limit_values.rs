@@ -54,7 +54,7 @@ fn missing(flat: &FlatGraph, refs: &[LimitRef<'_>]) -> Option<Diagnostic> {
         refs.iter().filter(|limit| !is_given(&limit.key) && seen.insert(limit.key.as_str())).collect();
     let first = missing.first()?;
     let lines = missing.iter().map(|limit| {
-        let doc = limit.spec.and_then(|spec| spec.doc.lines().next()).unwrap_or_default().trim();
+        let doc = limit.spec.map(ParamSpec::doc_with_unit).unwrap_or_default();
         format!("\n{} = …   # {}", limit.key, doc.trim_end_matches('.'))
     });
     let names: Vec<String> = missing.iter().map(|limit| format!("`{}`", limit.key)).collect();
@@ -79,7 +79,7 @@ fn unit_mismatch(limit: &LimitRef<'_>) -> Option<Diagnostic> {
     ];
     let (_, has) = UNITS.iter().find(|(end, _)| limit.key.ends_with(end))?;
     let spec = limit.spec?;
-    let takes = spec.unit()?.split(';').next()?.trim();
+    let takes = spec.unit.as_deref()?.split(';').next()?.trim();
     let is_known = UNITS.iter().any(|(_, unit)| *unit == takes);
     let message = format!("`{}` is in {has}, but `{}` takes {takes}", limit.key, spec.name);
     (is_known && takes != *has).then(|| Diagnostic::new(Code::UnitMismatch, limit.span.clone(), message))

@@ -9,7 +9,7 @@ use std::ops::Range;
 use crate::graph::check::frames::Frames;
 use crate::graph::net::{CommandWire, Net};
 use crate::graph::plan::{PortRef, Producer};
-use crate::node::{Need, NodeSpec, Word};
+use crate::node::{NodeSpec, Word};
 use crate::signal::Kind;
 use crate::source::{Code, Diagnostic, Diagnostics};
 
@@ -164,7 +164,7 @@ fn suggest_limiter(
         return (format!("insert a `{name}` on the path of the motion"), None);
     };
     let article = if name.starts_with(['a', 'e', 'i', 'o', 'u']) { "an" } else { "a" };
-    let needs = limiter.inputs.iter().filter(|input| matches!(input.need, Need::Required | Need::Sampled));
+    let needs = limiter.inputs.iter().filter(|input| input.need.must_be_wired);
     let mut block = format!(
         "insert {article} `{name}` between `{0}` and `{taker}`:\n[nodes.{name}]\ntype = \"{name}\"\nin.{through} = \"{0}\"",
         word.text
@@ -173,7 +173,7 @@ fn suggest_limiter(
         block.push_str(&format!("\nin.{} = \"…\"", input.name));
     }
     for param in limiter.params.iter().filter(|param| !param.is_optional) {
-        let unit = param.unit().map(|unit| format!("   # [{unit}]")).unwrap_or_default();
+        let unit = param.unit.as_ref().map(|unit| format!("   # [{unit}]")).unwrap_or_default();
         block.push_str(&format!("\n{} = …{unit}", param.name));
     }
     (block, Some(word.span.clone()))

@@ -9,7 +9,6 @@ use crate::graph::net::{Net, Wire};
 use crate::graph::plan::Producer;
 use crate::graph::plan::{Condition, PlannedExit, PlannedMode};
 use crate::graph::syntax::{ExitKind, ModeBlock};
-use crate::node::Need;
 use crate::signal::Kind;
 use crate::source::{Code, Diagnostic, Diagnostics};
 
@@ -39,7 +38,7 @@ fn find_generators(net: &Net<'_>, driving: &BTreeSet<usize>, is_still: &[bool]) 
     let (mut generators, mut moved) = (Vec::new(), BTreeSet::new());
     for &node in &net.order {
         let Some(spec) = net.spec(node) else { continue };
-        let wires = || net.wires[node].iter().filter(|wire| spec.inputs[wire.input].need != Need::Delayed);
+        let wires = || net.wires[node].iter().filter(|wire| !spec.inputs[wire.input].need.is_delayed);
         let is_sampled = |wire: &Wire| wire.source.producer.node().is_none_or(|source| sampled.contains(&source));
         if wires().any(is_sampled) {
             sampled.insert(node);

@@ -26,7 +26,7 @@ impl Units {
         if let Shape::Features(features) = shape {
             let not_rate = features.features.iter().find(|feature| feature.unit.per_second == 0);
             return match (unit_pattern(port), not_rate) {
-                (Some(UnitPattern::AnyRate), Some(feature)) => {
+                (Some(UnitPattern::AnyRate | UnitPattern::Variable { per_second: true, .. }), Some(feature)) => {
                     let has = format!("has `{}` in `{}`", feature.name, feature.unit);
                     Err(UnitMismatch { has, takes: "features per second".into() })
                 }
@@ -78,7 +78,7 @@ mod tests {
 
     fn port(unit: &'static str) -> PortSpec {
         let args = vec![unit.into()].into();
-        PortSpec { name: "x".into(), doc: "".into(), kind: Kind::Scalar, args, need: Need::Required }
+        PortSpec { name: "x".into(), doc: "".into(), kind: Kind::Scalar, args, need: Need::REQUIRED }
     }
 
     fn scalar(unit: &str) -> Shape {

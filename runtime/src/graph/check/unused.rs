@@ -5,7 +5,7 @@
 
 use crate::graph::net::Net;
 use crate::graph::plan::{PortRef, Producer};
-use crate::node::{Need, may_fit};
+use crate::node::may_fit;
 use crate::source::{Code, Diagnostic, Diagnostics};
 
 /// Reports unused nodes. A graph without commands has none, since its outputs are recorded.
@@ -51,13 +51,13 @@ fn suggest_wire(net: &Net<'_>, node: usize) -> Option<String> {
     let beside = (0..flat.len()).filter(|other| flat[*other].scope == flat[node].scope && !upstream.contains(other));
     let mut inputs = beside.flat_map(|other| {
         let open = net.spec(other).into_iter().flat_map(|spec| spec.inputs.iter().enumerate()).filter(
-            move |(index, input)| input.need == Need::Many || net.wires[other].iter().all(|wire| wire.input != *index),
+            move |(index, input)| input.need.is_many || net.wires[other].iter().all(|wire| wire.input != *index),
         );
         open.map(move |(_, input)| (other, input))
     });
     inputs.find_map(|(other, input)| {
         let output = outputs.iter().find(|output| may_fit(output, input))?;
-        let name = if input.need == Need::Many { "NAME" } else { &*input.name };
+        let name = if input.need.is_many { "NAME" } else { &*input.name };
         let (from, to) = (&flat[node].block.key.name, &flat[other].block.key.name);
         Some(format!("`in.{name} = \"{from}.{}\"` to `{to}`", output.name))
     })

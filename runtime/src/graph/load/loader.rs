@@ -150,6 +150,9 @@ impl Loader {
         let (path, span) = match (&request.bench, named) {
             (Some(path), _) => (path.clone(), None),
             (None, Some(file)) => (file.path.clone(), Some(file.span.clone())),
+            (None, None) if set.get("devices").is_some() => {
+                return Some(self.sections(|sections| sections.bench(&set)));
+            }
             (None, None) => {
                 let diagnostic = Diagnostic::new(Code::MissingKey, flat.place.clone(), "the graph has no bench");
                 let help = "add `bench = \"benches/….toml\"` under [graph], pass `--bench`, or add [bind] and [devices] \

@@ -3,7 +3,7 @@
 use super::{CommandWire, Net, Wire, WireOrigin};
 use crate::device::RoleType;
 use crate::graph::plan::{PortRef, Producer};
-use crate::node::{Need, NodeSpec, Word};
+use crate::node::{NodeSpec, Word};
 use crate::signal::Kind;
 use crate::source::{Code, Diagnostic, Diagnostics, Key};
 
@@ -27,8 +27,8 @@ impl Net<'_> {
     ) -> Option<Wire> {
         let scope = self.flat.nodes[node].scope;
         let source = self.resolve_or_report(scope, word, diagnostics);
-        let named = spec.inputs.iter().position(|input| input.need != Need::Many && input.name == key.name);
-        let Some(input) = named.or_else(|| spec.inputs.iter().position(|input| input.need == Need::Many)) else {
+        let named = spec.inputs.iter().position(|input| !input.need.is_many && input.name == key.name);
+        let Some(input) = named.or_else(|| spec.inputs.iter().position(|input| input.need.is_many)) else {
             let message = format!("`{}` has no input `{}`", spec.name, key.name);
             let known = spec.inputs.iter().map(|input| &*input.name);
             let diagnostic = Diagnostic::new(Code::UnknownInput, key.span.clone(), message);

@@ -2,7 +2,6 @@
 
 use super::Net;
 use crate::graph::plan::Producer;
-use crate::node::Need;
 use crate::source::{Code, Diagnostic, Diagnostics};
 
 /// A wire between two nodes, which determines which one steps first.
@@ -48,7 +47,7 @@ fn edges(net: &Net<'_>) -> Vec<Edge> {
     for (consumer, wires) in net.wires.iter().enumerate() {
         for (i, wire) in wires.iter().enumerate() {
             let Producer::Node(producer) = wire.source.producer else { continue };
-            let is_delayed = net.input(consumer, wire).need == Need::Delayed;
+            let is_delayed = net.input(consumer, wire).need.is_delayed;
             let (first, then) = if is_delayed { (consumer, producer) } else { (producer, consumer) };
             edges.push(Edge { first, then, wire: (consumer, i), is_delayed });
         }

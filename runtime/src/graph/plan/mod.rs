@@ -6,7 +6,7 @@ mod view;
 
 use std::ops::Range;
 
-use crate::device::Driver;
+use crate::device::{Description, Driver};
 use crate::graph::syntax::{AgeLimit, PolicyTable};
 use crate::node::{AnyNode, Need};
 use crate::signal::Shape;
@@ -21,11 +21,13 @@ pub(crate) struct PlannedRole {
     pub(crate) name: String,
     /// Index of the device.
     pub(crate) device: usize,
-    /// Index of the first output of the role among those of the device.
-    pub(crate) first_port: usize,
+    /// Index of each output of the role among those of the device.
+    pub(crate) numbers: Vec<usize>,
     pub(crate) ports: Vec<PlannedPort>,
     /// Maximum age of the newest sample, and the reaction to an older one.
     pub(crate) age: AgeLimit,
+    /// Whether the role is for scenarios and recordings only, so that a run continues without it.
+    pub(crate) is_observed: bool,
     /// Nominal sample period of the device [ns].
     pub(crate) period: i64,
 }
@@ -34,10 +36,7 @@ pub(crate) struct PlannedRole {
 pub(crate) struct PlannedDevice {
     pub(crate) name: String,
     pub(crate) driver: Driver,
-    pub(crate) outputs: Vec<Shape>,
-    pub(crate) commands: Vec<Shape>,
-    /// Number of its reports.
-    pub(crate) reports: usize,
+    pub(crate) description: Description,
     /// Span of its name in the bench.
     pub(crate) span: Range<usize>,
 }

@@ -1,4 +1,4 @@
-//! The messages against tables: what is good, and what each mistake is told as.
+//! Tables of good messages and of mistakes with their texts.
 
 use proptest::prelude::*;
 
@@ -23,45 +23,48 @@ fn a_hello_is_read_and_an_unknown_key_is_ignored() {
     assert_eq!((hello.mount.xyz, hello.mount.rpy), ([0.1, 0.2, 0.03], [0.0; 3]));
 }
 
+/// The keys of a line of JSON.
+fn keys(line: &str) -> Vec<String> {
+    let fields: serde_json::Map<String, serde_json::Value> = serde_json::from_str(line).unwrap();
+    fields.into_iter().map(|(name, _)| name).collect()
+}
+
 #[test]
-fn every_key_of_the_hello_and_of_a_frame_is_missed_by_its_name() {
-    let keys = |line: &str| object(line).unwrap().into_iter().map(|(name, _)| name).collect::<Vec<_>>();
+fn a_missing_key_is_named() {
     for key in keys(HELLO).into_iter().filter(|key| key != "colour") {
         let line = HELLO.replace(&format!("\"{key}\":"), &format!("\"no_{key}\":"));
-        assert_eq!(hello(&line).unwrap_err(), format!("`{key}` is missing"));
+        assert_eq!(hello(&line).unwrap_err(), format!("missing field `{key}`"));
     }
     for key in keys(OBS).into_iter().filter(|key| key != "more") {
         let why = message(&OBS.replace(&format!("\"{key}\":"), &format!("\"no_{key}\":")), SIZES).unwrap_err();
-        assert!(why.ends_with(&format!("`{key}` is missing")), "{why}");
+        assert!(why.ends_with(&format!("missing field `{key}`")), "{why}");
     }
 }
 
 #[test]
-fn what_is_wrong_with_a_hello() {
+fn a_mistake_in_a_hello_names_its_field() {
     let cases = [
-        ("\"proto\":1", "\"proto\":2", "`proto` is 2, but the protocol that is spoken here is 1"),
-        ("\"hello\"", "\"obs\"", "the first message is of type `obs`, and not a hello"),
-        ("0.004", "0", "`dt` is 0, and has to be greater than 0"),
-        ("0.004", "NaN", "`dt` is NaN, and not finite"),
-        ("\"lockstep\":true", "\"lockstep\":1", "`lockstep` is a number, and neither true nor false"),
-        ("[\"a\",\"b\"]", "[\"a\",7]", "entry 2 of `joints` is a number, and not a name"),
-        ("[\"a\",\"b\"]", "[\"a\",\"a\"]", "entry 2 of `joints` is `a`: each joint needs a name of its own"),
+        ("\"proto\":1", "\"proto\":2", "`proto`: 2 is not the version that the bridge speaks, 1"),
+        ("\"hello\"", "\"obs\"", "`type`: unknown variant `obs`, expected `hello`"),
+        ("0.004", "0", "`dt`: 0 is not greater than 0"),
+        ("0.004", "NaN", "`dt`: expected value at byte 32, found `NaN`"),
+        ("\"lockstep\":true", "\"lockstep\":1", "`lockstep`: invalid type: integer `1`, expected a boolean"),
+        ("[\"a\",\"b\"]", "[\"a\",7]", "`joints[1]`: invalid type: integer `7`, expected a string"),
+        ("[\"a\",\"b\"]", "[\"a\",\"a\"]", "`joints`: element 1 is `a`, but each joint needs its own name"),
+        ("[\"a\",\"b\"]", "[]", "`joints`: there is no name in the list"),
         ("[-1,-2.5]", "[-1]", "`q_min` has 1 numbers, but there are 2 `joints`"),
-        ("[1,2]", "[1,-2.5]", "`q_min` of joint `b` is -2.5, and not less than its `q_max` of -2.5"),
-        ("[3,4]", "[3,0]", "`dq_max` of joint `b` is 0, and has to be greater than 0"),
-        ("[3,4]", "[3,null]", "entry 2 of `dq_max` is null, and not a number"),
-        ("\"rows\":2", "\"rows\":2.5", "`rows` is 2.5, and not a whole number from 1"),
-        (
-            "\"rows\":2",
-            "\"rows\":400000",
-            "`rows` and `cols` make 400000x3 tactels, and more than 500000 do not fit into a line",
-        ),
-        ("0,0,0,1]", "0,0,0]", "`T_es` has 15 numbers, but a 4x4 matrix has 16"),
-        ("0,0,0,1]", "0,0,1,1]", "`T_es` is no pose: its last row"),
-        ("[1,0,0,0.1", "[2,0,0,0.1", "`T_es` is no pose: its rotation is off by 3.0e0"),
-        ("[1,0,0,0.1", "[-1,0,0,0.1", "`T_es` is no pose: its rotation mirrors"),
-        ("0.15", "-1", "`threshold_units` is -1, and cannot be less than 0"),
-        ("\"urdf\":\"lwr4p\"", "\"urdf\":null", "`urdf` is null, and not a text"),
+        ("[1,2]", "[1,-2.5]", "`q_min` of joint `b` is -2.5, which is not less than its `q_max` of -2.5"),
+        ("[3,4]", "[3,0]", "`dq_max` of joint `b` is 0, which is not greater than 0"),
+        ("[3,4]", "[3,null]", "`dq_max[1]`: invalid type: null, expected f64"),
+        ("[3,4]", "[3,4],\"dq_max\":[3,4]", "duplicate field `dq_max`"),
+        ("\"rows\":2", "\"rows\":2.5", "`rows`: 2.5 is not a whole number from 1 to 500000"),
+        ("\"rows\":2", "\"rows\":400000", "`rows` and `cols` make 400000x3 tactels, but a line has room for 500000"),
+        ("0,0,0,1]", "0,0,0]", "`T_es`: invalid length 15, expected an array of length 16"),
+        ("0,0,0,1]", "0,0,1,1]", "`T_es`: this is not a pose: its last row"),
+        ("[1,0,0,0.1", "[2,0,0,0.1", "`T_es`: this is not a pose: its rotation matrix is off by 3.0e0"),
+        ("[1,0,0,0.1", "[-1,0,0,0.1", "`T_es`: this is not a pose: its rotation mirrors"),
+        ("0.15", "-1", "`threshold_units`: -1 is not 0 or greater"),
+        ("\"urdf\":\"lwr4p\"", "\"urdf\":null", "`urdf`: invalid type: null, expected a string"),
     ];
     for (from, to, message) in cases {
         assert!(HELLO.contains(from), "{from}");
@@ -71,7 +74,7 @@ fn what_is_wrong_with_a_hello() {
 }
 
 #[test]
-fn a_frame_is_read_and_what_is_wrong_with_one_names_its_number_and_field() {
+fn a_mistake_in_a_frame_names_its_field() {
     let Ok(Message::Obs(obs)) = message(OBS, SIZES) else { panic!("a frame") };
     assert_eq!((obs.seq, obs.t, &*obs.q, &*obs.q_eq), (17, 0.068, &[0.1, 2.0][..], &[0.2, 2.0][..]));
     assert_eq!(obs.img, [0.0, 1.0, 2.0, 3.5, 4.0, 5.0]);
@@ -79,18 +82,19 @@ fn a_frame_is_read_and_what_is_wrong_with_one_names_its_number_and_field() {
     assert_eq!(message("{\"type\":\"end\",\"reason\":1}", SIZES), Ok(Message::End));
     let cases = [
         ("3.5,4,5]", "3.5,4]", "obs 17: `img` has 5 numbers, but the pad has 2x3 = 6"),
-        ("3.5", "NaN", "obs 17: number 4 of `img` is NaN, and not finite"),
-        ("3.5", "-Infinity", "obs 17: number 4 of `img` is -inf, and not finite"),
-        ("3.5", "1e39", "obs 17: number 4 of `img` is 1e39, and too large"),
-        ("3.5", "\"3.5\"", "obs 17: entry 4 of `img` is a text, and not a number"),
+        ("3.5", "NaN", "`img[3]`: expected value at byte 87, found `NaN`"),
+        ("3.5", "-Infinity", "`img[3]`: invalid number at byte 87, found `-Infinity`"),
+        ("3.5", "1e999", "obs 17: `img[3]`: number out of range at byte 87, found `1e999`"),
+        ("3.5", "1e39", "obs 17: `img[3]` is 1e39, which is too large"),
+        ("3.5", "\"3.5\"", "obs 17: `img[3]`: invalid type: string \"3.5\", expected f64"),
         ("[0.1,2]", "[0.1,2,3]", "obs 17: `q` has 3 numbers, but the arm has 2 joints"),
-        ("[0,0.0]", "[0,nan]", "obs 17: number 2 of `dq` is NaN, and not finite"),
-        ("[0.2,2]", "{}", "obs 17: `q_eq` is an object, and not a list"),
-        ("0.068", "null", "obs 17: `t` is null, and not a number"),
-        ("17", "-1", "`seq` is -1, and not a whole number from 0"),
-        ("17", "1.5", "`seq` is 1.5, and not a whole number from 0"),
-        ("\"obs\"", "\"cmd\"", "a message is of type `cmd`, and neither `obs` nor `end`"),
-        ("3.5", "3;5", "`img`: expected `,` or `]`"),
+        ("[0,0.0]", "[0,nan]", "`dq[1]`: expected ident at byte 54, found `nan`"),
+        ("[0.2,2]", "{}", "obs 17: `q_eq`: invalid type: map, expected a sequence"),
+        ("0.068", "null", "obs 17: `t`: invalid type: null, expected f64"),
+        ("17", "-1", "`seq`: -1 is not a whole number from 0"),
+        ("17", "1.5", "`seq`: 1.5 is not a whole number from 0"),
+        ("\"obs\"", "\"cmd\"", "obs 17: `type`: unknown variant `cmd`, expected `obs` or `end`"),
+        ("3.5", "3;5", "`img`: expected `,` or `]` at byte 87, found `3;5`"),
     ];
     for (from, to, wanted) in cases {
         let why = message(&OBS.replacen(from, to, 1), SIZES).unwrap_err();
@@ -99,15 +103,35 @@ fn a_frame_is_read_and_what_is_wrong_with_one_names_its_number_and_field() {
 }
 
 #[test]
-fn what_is_said_is_json_and_keeps_every_bit() {
+fn a_line_that_is_not_json_is_described() {
+    let deep = format!("{{\"a\":{}1{}}}", "[".repeat(900_000), "]".repeat(9));
+    let cases = [
+        ("", "the line ends while parsing a value"),
+        ("ready when you are", "expected value at byte 1, found `ready`"),
+        ("220 mail", "invalid type: integer `220`, expected a JSON object"),
+        ("{\"q\":[1,2", "`q`: the line ends while parsing a list"),
+        ("{\"q\":[1 2]}", "`q`: expected `,` or `]` at byte 9, found `2`"),
+        ("{\"seq\":zero}", "`seq`: expected value at byte 8, found `zero`"),
+        ("{\"q\"=1}", "expected `:` at byte 2, found `\"q\"=1`"),
+        ("{q:1}", "key must be a string at byte 2, found `q`"),
+        (&deep, "`a`: expected `,` or `]` at byte 900016, found `}`"),
+    ];
+    for (line, wanted) in cases {
+        let why = message(line, SIZES).unwrap_err();
+        assert!(why.ends_with(wanted), "{}: {why}", &line[..line.len().min(40)]);
+    }
+}
+
+#[test]
+fn a_reply_is_json_and_keeps_every_bit() {
     let dq = [0.1 + 0.2, -1e-300, 0.0, 1e22];
     let line = cmd(3, &dq, Some([0.5, -0.25, 1e-7]));
-    let fields = Fields(object(&line).unwrap());
-    assert_eq!(fields.numbers("dq", 4, String::new), Ok(dq.to_vec()));
-    assert_eq!(fields.numbers("est", 3, String::new), Ok(vec![0.5, -0.25, 1e-7]));
-    assert_eq!((fields.text("type"), fields.whole("seq", 0.0, 9.0)), (Ok("cmd"), Ok(3)));
-    assert!(line.ends_with("}\n") && cmd(3, &dq, None).contains("\"est\":null"));
-    assert_eq!(Fields(object(&end("a \"b\"\n")).unwrap()).text("reason"), Ok("a \"b\"\n"));
+    assert!(line.ends_with("}\n") && line.starts_with("{\"type\":\"cmd\",\"seq\":3,"), "{line}");
+    let fields: serde_json::Value = serde_json::from_str(&line).unwrap();
+    assert_eq!(serde_json::from_value::<[f64; 4]>(fields["dq"].clone()).unwrap(), dq);
+    assert_eq!(serde_json::from_value::<[f64; 3]>(fields["est"].clone()).unwrap(), [0.5, -0.25, 1e-7]);
+    assert!(cmd(3, &dq, None).contains("\"est\":null"));
+    assert_eq!(end("a \"b\"\n"), "{\"type\":\"end\",\"reason\":\"a \\\"b\\\"\\n\"}\n");
 }
 
 proptest! {
@@ -120,11 +144,11 @@ proptest! {
         noise in prop::array::uniform9(-1e-7..1e-7_f64),
     ) {
         let matrix = pose_of(xyz, [roll, pitch, yaw]).to_homogeneous();
-        let mut numbers: Vec<f64> = matrix.transpose().iter().copied().collect();
+        let mut numbers: [f64; 16] = matrix.transpose().as_slice().try_into().unwrap();
         for (k, noise) in noise.into_iter().enumerate() {
             numbers[k / 3 * 4 + k % 3] += noise;
         }
-        let read = mount(&numbers).unwrap();
+        let read = mount_of(&numbers).unwrap();
         prop_assert!((read.pose().to_homogeneous() - matrix).amax() < 1e-6, "{read:?}");
     }
 }

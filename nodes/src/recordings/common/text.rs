@@ -1,0 +1,247 @@
+//! What the text formats share: decoding, lines, pieces with their place, numbers.
+
+use std::borrow::Cow;
+use std::ops::Range;
+
+use super::hints::Hints;
+use super::recording::Recording;
+use super::refusal::{Flaw, Refusal};
+
+/// Returns a flaw at a piece.
+pub(crate) fn flaw<T>(at: &Piece<'_>, message: impl Into<String>) -> Result<T, Flaw> {
+    Err(Flaw { span: at.span(), message: message.into() })
+}
+
+/// Why a text is refused: mistakes in it, or a refusal that is not about its text.
+#[derive(Debug)]
+pub(crate) enum Wrong {
+    Flaws(Vec<Flaw>),
+    Refusal(Refusal),
+}
+
+impl From<Flaw> for Wrong {
+    fn from(flaw: Flaw) -> Self {
+        Self::Flaws(vec![flaw])
+    }
+}
+
+impl From<Vec<Flaw>> for Wrong {
+    fn from(flaws: Vec<Flaw>) -> Self {
+        Self::Flaws(flaws)
+    }
+}
+
+impl From<Refusal> for Wrong {
+    fn from(refusal: Refusal) -> Self {
+        Self::Refusal(refusal)
+    }
+}
+
+/// Decodes bytes and parses the text.
+pub(crate) fn read(
+    bytes: &[u8],
+    hints: &Hints,
+    parse: impl FnOnce(&str, &Hints) -> Result<Recording, Wrong>,
+) -> Result<Recording, Refusal> {
+    let text = decode(bytes);
+    parse(&text, hints).map_err(|wrong| match wrong {
+        Wrong::Flaws(flaws) => Refusal::Damaged { text: text.into_owned(), flaws },
+        Wrong::Refusal(refusal) => refusal,
+    })
+}
+
+/// Decodes bytes as text.
+///
+/// A byte order mark selects UTF-8 or UTF-16, and is left out. Without one, zero bytes show UTF-16, valid UTF-8 is read
+/// as such, and all else as Latin-1.
+#[must_use]
+pub fn decode(bytes: &[u8]) -> Cow<'_, str> {
+    match bytes {
+        [0xef, 0xbb, 0xbf, rest @ ..] => narrow(rest),
+        [0xff, 0xfe, rest @ ..] => wide(rest, u16::from_le_bytes),
+        [0xfe, 0xff, rest @ ..] => wide(rest, u16::from_be_bytes),
+        // The first characters of a header are ASCII.
+        [1..=255, 0, 1..=255, 0, ..] => wide(bytes, u16::from_le_bytes),
+        [0, 1..=255, 0, 1..=255, ..] => wide(bytes, u16::from_be_bytes),
+        _ => narrow(bytes),
+    }
+}
+
+fn narrow(bytes: &[u8]) -> Cow<'_, str> {
+    match str::from_utf8(bytes) {
+        Ok(text) => Cow::Borrowed(text),
+        Err(_) => Cow::Owned(bytes.iter().map(|byte| char::from(*byte)).collect()),
+    }
+}
+
+fn wide(bytes: &[u8], unit: impl Fn([u8; 2]) -> u16) -> Cow<'_, str> {
+    let units = bytes.as_chunks().0.iter().map(|pair| unit(*pair));
+    Cow::Owned(char::decode_utf16(units).map(|unit| unit.unwrap_or(char::REPLACEMENT_CHARACTER)).collect())
+}
+
+/// A slice of the text with its byte offset.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Piece<'t> {
+    pub(crate) text: &'t str,
+    pub(crate) start: usize,
+}
+
+impl<'t> Piece<'t> {
+    /// Returns its byte range.
+    pub(crate) fn span(&self) -> Range<usize> {
+        self.start..self.start + self.text.len()
+    }
+
+    /// Returns the piece for `text`, which is a slice of this piece's text.
+    pub(crate) fn part(&self, text: &'t str) -> Self {
+        Self { text, start: text.as_ptr() as usize - self.text.as_ptr() as usize + self.start }
+    }
+
+    /// Returns the piece without surrounding blanks.
+    pub(crate) fn trimmed(self) -> Self {
+        self.part(self.text.trim())
+    }
+
+    /// Returns the words.
+    pub(crate) fn words(self) -> impl Iterator<Item = Self> + Clone {
+        self.text.split_whitespace().map(move |text| self.part(text))
+    }
+
+    /// Returns the piece after `prefix`, or `None` if it does not start with it; the case does not matter.
+    pub(crate) fn after(self, prefix: &str) -> Option<Self> {
+        let head = self.text.get(..prefix.len())?;
+        head.eq_ignore_ascii_case(prefix).then(|| self.part(&self.text[prefix.len()..]))
+    }
+
+    /// Returns the piece without a quote at its start.
+    pub(crate) fn part_after_quote(self) -> Self {
+        self.part(self.text.trim_start_matches('"')).trimmed()
+    }
+
+    /// Parses a finite number, with a decimal point or a decimal comma.
+    pub(crate) fn decimal(self, what: &str) -> Result<f64, Flaw> {
+        Notation { separator: None, has_decimal_comma: true }.number(self, what)
+    }
+
+    /// Parses a finite number.
+    pub(crate) fn number(self, what: &str) -> Result<f64, Flaw> {
+        match self.text.parse::<f64>() {
+            Ok(number) if number.is_finite() => Ok(number),
+            Ok(_) => flaw(&self, format!("{what} is not finite: `{}`", shortened(self.text))),
+            Err(_) => flaw(&self, format!("{what} is not a number: `{}`", shortened(self.text))),
+        }
+    }
+
+    /// Parses a whole number.
+    pub(crate) fn count(self, what: &str) -> Result<u64, Flaw> {
+        self.text.parse().or_else(|_| flaw(&self, format!("{what} is not a whole number: `{}`", shortened(self.text))))
+    }
+}
+
+/// The lines of a text, without their ends.
+#[derive(Debug, Clone)]
+pub(crate) struct Lines<'t> {
+    text: &'t str,
+    next: usize,
+}
+
+impl<'t> Lines<'t> {
+    pub(crate) const fn new(text: &'t str) -> Self {
+        Self { text, next: 0 }
+    }
+
+    /// Returns the empty piece after the last character.
+    pub(crate) fn end(&self) -> Piece<'t> {
+        let text = self.text.trim_end();
+        Piece { text: &text[text.len()..], start: text.len() }
+    }
+
+    pub(crate) fn is_at_end(&self) -> bool {
+        self.next >= self.text.len()
+    }
+}
+
+impl<'t> Iterator for Lines<'t> {
+    type Item = Piece<'t>;
+
+    fn next(&mut self) -> Option<Piece<'t>> {
+        let rest = &self.text[self.next..];
+        if rest.is_empty() {
+            return None;
+        }
+        let start = self.next;
+        let line = rest.find(['\n', '\r']).map_or(rest, |end| &rest[..end]);
+        let end = if rest[line.len()..].starts_with("\r\n") { 2 } else { 1 };
+        self.next = (start + line.len() + end).min(self.text.len());
+        Some(Piece { text: line, start })
+    }
+}
+
+/// How a text writes the numbers of a row.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Notation {
+    /// Separator of two numbers; `None` for blanks.
+    pub(crate) separator: Option<char>,
+    /// Whether a comma is a decimal comma: then it does not separate numbers.
+    pub(crate) has_decimal_comma: bool,
+}
+
+impl Notation {
+    /// Detects the notation of a row: `;`, a tab, a comma or blanks. A comma next to another separator is decimal.
+    pub(crate) fn of(row: &str) -> Self {
+        let row = row.trim();
+        let separator = match row {
+            row if row.contains(';') => Some(';'),
+            row if row.contains('\t') => Some('\t'),
+            row if row.contains(',') && !is_decimal_comma_between_blanks(row) => Some(','),
+            _ => None,
+        };
+        Self { separator, has_decimal_comma: separator != Some(',') }
+    }
+
+    /// Returns the trimmed fields of a row. A separator at the end of the row is ignored.
+    pub(crate) fn fields<'t>(self, row: Piece<'t>) -> impl Iterator<Item = Piece<'t>> + Clone {
+        let row = row.trimmed();
+        let separator = self.separator;
+        let text = separator
+            .map_or(row.text, |separator| row.text.trim_end_matches(|c: char| c == separator || c.is_whitespace()));
+        let is_gap = move |c: char| separator.map_or(c.is_whitespace(), |separator| c == separator);
+        let parts = row.part(text).text.split(is_gap).map(move |text| row.part(text).trimmed());
+        parts.filter(move |part| separator.is_some() || !part.text.is_empty())
+    }
+
+    /// Parses a finite number.
+    pub(crate) fn number(self, piece: Piece<'_>, what: &str) -> Result<f64, Flaw> {
+        if !self.has_decimal_comma || !piece.text.contains(',') {
+            return piece.number(what);
+        }
+        if let Ok(number) = piece.text.replacen(',', ".", 1).parse::<f64>()
+            && number.is_finite()
+        {
+            return Ok(number);
+        }
+        piece.number(what)
+    }
+}
+
+/// Whether every comma of a row of numbers between blanks is decimal, as in `0,5 1,25`.
+fn is_decimal_comma_between_blanks(row: &str) -> bool {
+    let mut words = row.split_whitespace().peekable();
+    let is_decimal = |word: &str| {
+        word.split_once(',').is_none_or(|(whole, part)| {
+            !part.is_empty() && !part.contains(',') && !whole.contains('.') && !part.contains('.')
+        })
+    };
+    words.next().is_some() && words.peek().is_some() && row.split_whitespace().all(is_decimal)
+}
+
+/// Shortens a text for a message: at most 40 characters, none of them a control character.
+#[must_use]
+pub fn shortened(text: &str) -> String {
+    let clean = |c: char| if c.is_control() { ' ' } else { c };
+    let mut short: String = text.chars().take(40).map(clean).collect();
+    if text.chars().nth(40).is_some() {
+        short.push('…');
+    }
+    short
+}

@@ -1,0 +1,26 @@
+//! Reads a file of any format, or the file in an archive.
+
+use super::archive;
+use super::common::{Head, Hints, Recording, Refusal};
+use super::formats::{FORMATS, recognise};
+
+/// Reads a file, or the file in an archive.
+///
+/// A hint names the format; without one the content decides. Only the ending of `name` matters.
+///
+/// # Errors
+/// Why it is refused.
+pub fn read(bytes: &[u8], name: &str, hints: &Hints) -> Result<Recording, Refusal> {
+    match archive::unpack(bytes, name, hints)? {
+        Some((unpacked, name)) => read_plain(&unpacked, &name, hints),
+        None => read_plain(bytes, name, hints),
+    }
+}
+
+fn read_plain(bytes: &[u8], name: &str, hints: &Hints) -> Result<Recording, Refusal> {
+    let format = match &hints.format {
+        Some(name) => FORMATS.iter().find(|format| format.name == name),
+        None => recognise(&Head::new(bytes, name)),
+    };
+    format.map_or(Err(Refusal::Stranger), |format| (format.read)(bytes, hints))
+}

@@ -1,0 +1,139 @@
+//! `one_pole`: a first-order low-pass filter, T dy/dt = x - y.
+
+use std::f64::consts::PI;
+
+use tactflow_runtime::node::{
+    At, Describe, In, Inputs, Interval, Mistake, Mistakes, Node, Out, Outputs, Param, Setup, State, Tick,
+};
+use tactflow_runtime::signal::Scalar;
+use tactflow_runtime::source::Code;
+
+use crate::motion::axis::{doubled, halved};
+
+/// Smooths a feature with a first-order low-pass filter.
+///
+/// T dy/dt = x - y, solved exactly from sample to sample: y += (1 - exp(-dt / T)) (x - y), where dt is the time between the
+/// stamps of the samples. So T means the same at 100 Hz and at 1 kHz, and for irregular samples. Set T as
+/// `time_constant_ms`, or as `cutoff_hz`, 1 / (2 pi T): 40 ms are 4 Hz.
+///
+/// The filter is also called an exponential moving average. It lags a ramp by T, and leaves dt / (2 T) of the variance of
+/// white noise, as much as a `smooth` with a window of 2 T. Unlike `smooth` it needs no window, and old samples never lose
+/// all influence.
+///
+/// The first sample passes unchanged. The filter starts afresh after a gap longer than the graph's `max_gap_ms`, and when
+/// another device takes the sample: that sample also passes unchanged.
+///
+/// **Axes.** The direction of a line (`rad mod pi`) is filtered as (cos 2a, sin 2a), since 89° and -89° are neighbours.
+/// Small turns between two samples are filtered like any value; a turn by 90° passes through a point without a direction,
+/// where the output is absent.
+///
+/// If the feature is absent, the output is absent. The state survives flicker and is reset when the feature is absent for
+/// the graph's `reset_after_ms`.
+///
+/// ```toml
+/// [nodes.one_pole]
+/// type = "one_pole"
+/// in.value = "moments.orientation"
+/// time_constant_ms = 20               # [ms]
+/// ```
+#[derive(Describe)]
+#[describe(name = "one_pole")]
+pub struct OnePole {
+    /// Time constant T [s].
+    time: f64,
+    is_axial: bool,
+}
+
+/// Parameters of `one_pole`.
+#[derive(Debug, Clone, Param)]
+pub struct Params {
+    /// Time constant T, in which 63 % of a step pass; this or `cutoff_hz`.
+    #[param(unit = "ms", above = 0.0)]
+    time_constant_ms: Option<f64>,
+    /// Frequency 1 / (2 pi T), above which less than 71 % of an amplitude pass; this or `time_constant_ms`.
+    #[param(unit = "Hz", above = 0.0)]
+    cutoff_hz: Option<f64>,
+}
+
+/// What `one_pole` reads.
+#[derive(Inputs)]
+pub struct Inputs<'a> {
+    /// Any feature.
+    #[port(unit = "U", frame = "A")]
+    value: In<'a, Scalar>,
+}
+
+/// What `one_pole` writes.
+#[derive(Outputs)]
+pub struct Outputs {
+    /// The filtered feature; absent for axes that cancel each other.
+    #[port(unit = "U", frame = "A")]
+    value: Out<Scalar>,
+}
+
+/// What `one_pole` remembers.
+#[derive(State)]
+pub struct State {
+    /// The last output: the mean cosine and sine of the doubled angle of an axis, else the value and 0.
+    last: Option<[f64; 2]>,
+    interval: Interval,
+}
+
+/// Smaller magnitudes become 0: far below any measurement, and far above the subnormal numbers, which are slow.
+const MIN_VALUE: f64 = 1e-200;
+
+impl Node for OnePole {
+    type Params = Params;
+    type Inputs<'a> = Inputs<'a>;
+    type Outputs = Outputs;
+    type State = State;
+
+    fn new(params: Params, setup: &mut Setup<Self>) -> Result<Self, Mistakes> {
+        let is_axial = setup.inputs.value.unit.is_axial();
+        setup.outputs.value.range = setup.inputs.value.range;
+        match (params.time_constant_ms, params.cutoff_hz) {
+            (Some(ms), None) => Ok(Self { time: ms * 1e-3, is_axial }),
+            (None, Some(hz)) => Ok(Self { time: 0.5 / (PI * hz), is_axial }),
+            (None, None) => {
+                let message = "`one_pole` needs `time_constant_ms` or `cutoff_hz`";
+                let mistake = Mistake::new(Code::MissingKey, At::Node, message);
+                Err(mistake.help("add one of the two, such as `time_constant_ms = 20`").into())
+            }
+            (Some(_), Some(_)) => {
+                let mistake = Mistake::key("cutoff_hz", "`time_constant_ms` and `cutoff_hz` exclude each other");
+                Err(mistake.help("leave out one of the two: a cutoff of 1 Hz is a time constant of 159 ms").into())
+            }
+        }
+    }
+
+    fn state(&self) -> State {
+        State { last: None, interval: Interval::default() }
+    }
+
+    fn step(&self, tick: &Tick, inputs: Inputs<'_>, out: &mut Outputs, state: &mut State) {
+        let dt = state.interval.step(&inputs.value, tick);
+        let next = if self.is_axial { doubled(*inputs.value) } else { [*inputs.value, 0.0] };
+        let value = match state.last.zip(dt) {
+            Some(([a, b], dt)) => {
+                // A time constant that underflows to 0 would make 0 / 0 of a dt of 0.
+                let share = if dt > 0.0 { -libm::expm1(-dt / self.time) } else { 0.0 };
+                [toward(a, next[0], share), toward(b, next[1], share)]
+            }
+            None => next,
+        };
+        state.last = Some(value);
+        if let Some(value) = if self.is_axial { halved(value) } else { Some(value[0]) } {
+            out.value.set(value);
+        }
+    }
+}
+
+/// Returns the value at the fraction `share` of the way from `last` to `next`.
+fn toward(last: f64, next: f64, share: f64) -> f64 {
+    let difference = next - last;
+    let value = if difference.is_finite() { last + share * difference } else { last * (1.0 - share) + next * share };
+    if value.abs() < MIN_VALUE { 0.0 } else { value }
+}
+
+#[cfg(test)]
+mod tests;

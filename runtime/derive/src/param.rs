@@ -1,0 +1,215 @@
+//! `#[derive(Param)]`.
+
+use proc_macro2::TokenStream;
+use quote::{quote, quote_spanned};
+use syn::spanned::Spanned;
+use syn::{Data, DataEnum, DeriveInput, Expr, ExprLit, ExprRange, Field, Ident, Lit, LitStr, RangeLimits, Variant};
+
+use crate::attributes::{Words, snake_case};
+use crate::docs::text;
+use crate::fault::Faults;
+use crate::ports::{bound_letter, is_unit_letter};
+
+const KNOWN: &[&str] = &["unit", "range", "above", "default", "live"];
+
+/// One field of a table of parameters.
+struct Parameter {
+    field: Field,
+    name: Ident,
+    unit: Option<LitStr>,
+    bounds: Option<TokenStream>,
+    /// What stands in the attribute for the bounds: where a mistake is marked.
+    bounds_at: Option<Expr>,
+    default: Option<Expr>,
+    is_live: bool,
+}
+
+pub(crate) fn derive(input: &DeriveInput) -> TokenStream {
+    let mut faults = Faults::default();
+    let implementation = match &input.data {
+        Data::Enum(data) => words(input, data, &mut faults),
+        _ => table(input, &mut faults),
+    };
+    faults.with(implementation)
+}
+
+fn table(input: &DeriveInput, faults: &mut Faults) -> TokenStream {
+    let fields = faults.fields(input, "a table of parameters");
+    let parameters: Vec<Parameter> = fields.into_iter().filter_map(|field| parameter(field, faults)).collect();
+    let (ident, (generics, arguments, bounds)) = (&input.ident, input.generics.split_for_impl());
+    let idents: Vec<&Ident> = parameters.iter().map(|parameter| &parameter.name).collect();
+    let names: Vec<String> = idents.iter().map(|ident| ident.to_string()).collect();
+    let specs = parameters.iter().map(|parameter| {
+        let (ty, declared, default) = (&parameter.field.ty, declared(parameter), default(parameter));
+        quote_spanned!(ty.span()=> ::tactflow_runtime::node::ParamSpec::of::<#ty>(&#declared, #default))
+    });
+    let reads = parameters.iter().map(|parameter| {
+        let (ty, name) = (&parameter.field.ty, &parameter.name);
+        let (declared, default) = (declared(parameter), default(parameter));
+        quote_spanned!(ty.span()=> let #name = reader.field::<#ty>(&mut table, &#declared, #default);)
+    });
+    let written = parameters.iter().map(|parameter| {
+        let (ty, ident, name) = (&parameter.field.ty, &parameter.name, parameter.name.to_string());
+        quote_spanned!(ty.span()=> (#name, <#ty as ::tactflow_runtime::node::Param>::written(&self.#ident)))
+    });
+    let checks: TokenStream = parameters.iter().map(|parameter| checks(parameter, input)).collect();
+    quote! {
+        #checks
+
+        #[automatically_derived]
+        impl #generics ::tactflow_runtime::node::Param for #ident #arguments #bounds {
+            const EXPECTS: &'static str = "a table";
+
+            fn fields() -> ::std::vec::Vec<::tactflow_runtime::node::ParamSpec> {
+                ::std::vec![#(#specs),*]
+            }
+
+            fn written(&self) -> ::core::option::Option<::tactflow_runtime::node::Written> {
+                ::tactflow_runtime::node::written_table([#(#written),*])
+            }
+
+            fn read(
+                value: &::tactflow_runtime::source::Value,
+                reader: &mut ::tactflow_runtime::node::Reader<'_>,
+            ) -> ::core::option::Option<Self> {
+                let mut table = reader.table(value)?;
+                #(#reads)*
+                reader.close(table, &[#(#names),*]);
+                ::core::option::Option::Some(Self { #(#idents: #idents?),* })
+            }
+        }
+    }
+}
+
+fn parameter(field: Field, faults: &mut Faults) -> Option<Parameter> {
+    let name = field.ident.clone()?;
+    if text(&field.attrs).is_empty() {
+        faults.add(&name, format!("`{name}` needs a doc comment: what it means"));
+    }
+    let mut words = Words::new(&field.attrs, "param", KNOWN, faults);
+    let (unit, is_live) = (words.text("unit", faults), words.flag("live", faults).is_some());
+    let (range, above) = (words.value("range", faults), words.value("above", faults));
+    let default = words.value("default", faults).map(|(_, value)| value);
+    if let (Some(_), Some((above, _))) = (&range, &above) {
+        faults.add(above, "`range` and `above` exclude each other");
+    }
+    let bounds = match (&range, &above) {
+        (Some((_, range)), _) => between(range, faults),
+        (None, Some((_, above))) => Some(quote!(::tactflow_runtime::node::Bounds::above((#above) as f64))),
+        (None, None) => None,
+    };
+    let bounds_at = range.or(above).map(|(_, value)| value);
+    Some(Parameter { field, name, unit, bounds, bounds_at, default, is_live })
+}
+
+/// The bounds that a range such as `0.0..=1.0` or `0.0..` says.
+fn between(range: &Expr, faults: &mut Faults) -> Option<TokenStream> {
+    let message = "a range is `a..=b`, `a..` or `..=b`; `above = a` leaves its end out";
+    let Expr::Range(ExprRange { start, end, limits, .. }) = range else {
+        faults.add(range, message);
+        return None;
+    };
+    if (start.is_none() && end.is_none()) || (end.is_some() && !matches!(limits, RangeLimits::Closed(_))) {
+        faults.add(range, message);
+        return None;
+    }
+    let start = start.as_ref().map_or(quote!(f64::NEG_INFINITY), |start| quote!((#start) as f64));
+    let end = end.as_ref().map_or(quote!(f64::INFINITY), |end| quote!((#end) as f64));
+    Some(quote!(::tactflow_runtime::node::Bounds::between(#start, #end)))
+}
+
+/// What is declared of a parameter beside its type and its default.
+fn declared(parameter: &Parameter) -> TokenStream {
+    let (name, doc, is_live) = (parameter.name.to_string(), text(&parameter.field.attrs), parameter.is_live);
+    let unit = option(parameter.unit.as_ref().map(|unit| quote!(#unit)));
+    let bounds = option(parameter.bounds.clone());
+    quote! {
+        ::tactflow_runtime::node::Declared { name: #name, doc: #doc, unit: #unit, bounds: #bounds, is_live: #is_live }
+    }
+}
+
+fn option(value: Option<TokenStream>) -> TokenStream {
+    value.map_or(quote!(::core::option::Option::None), |value| quote!(::core::option::Option::Some(#value)))
+}
+
+/// The default as a function, if there is one.
+fn default(parameter: &Parameter) -> TokenStream {
+    let ty = &parameter.field.ty;
+    option(parameter.default.as_ref().map(|default| {
+        let is_text = matches!(default, Expr::Lit(ExprLit { lit: Lit::Str(_), .. }));
+        let value = if is_text { quote!(::core::convert::Into::into(#default)) } else { quote!(#default) };
+        quote_spanned!(default.span()=> (|| -> #ty { #value }) as fn() -> #ty)
+    }))
+}
+
+/// Checks what needs the type, the list of units or the inputs.
+fn checks(parameter: &Parameter, input: &DeriveInput) -> TokenStream {
+    let (ty, name) = (&parameter.field.ty, &parameter.name);
+    let is_concrete = input.generics.type_params().next().is_none();
+    let bounds = parameter.bounds_at.as_ref().filter(|_| is_concrete).zip(parameter.bounds.as_ref());
+    let bounds = bounds.map(|(at, bounds)| {
+        let message = format!("`{name}` is not a number, so it has no range");
+        quote_spanned! {at.span()=>
+            const _: () = ::core::assert!(<#ty as ::tactflow_runtime::node::Param>::IS_NUMBER, #message);
+            const _: () = ::core::assert!(!#bounds.is_empty(), "no number is in this range");
+        }
+    });
+    let unit = parameter.unit.as_ref().map(|unit| {
+        let text = unit.value();
+        let message = format!(
+            "`{text}` is not a unit of a parameter: `m/s2`, `N s/m`, a capital letter that an input binds, `$` with the \
+             name of a parameter, or several as `m/s, rad/s`"
+        );
+        let atoms = text.split(['/', ' ', ',']).filter(|atom| is_unit_letter(atom));
+        let letters = atoms.filter_map(|atom| atom.chars().next()).map(|letter| {
+            bound_letter(true, letter, unit.span(), &format!("no input binds the unit letter `{letter}`"))
+        });
+        let letters: TokenStream = letters.collect();
+        quote_spanned! {unit.span()=>
+            const _: () = ::core::assert!(::tactflow_runtime::signal::Unit::is_param_unit(#unit), #message);
+            #letters
+        }
+    });
+    quote! { #bounds #unit }
+}
+
+/// An enum without data: one of a few words.
+fn words(input: &DeriveInput, data: &DataEnum, faults: &mut Faults) -> TokenStream {
+    if data.variants.is_empty() {
+        faults.fatal(&input.ident, "a parameter that is a word needs a word to be");
+    }
+    let mut word = |variant: &Variant| {
+        if !variant.fields.is_empty() {
+            faults.fatal(&variant.fields, "a word of a graph file carries no data");
+        }
+        let doc = text(&variant.attrs);
+        if doc.is_empty() {
+            faults.add(&variant.ident, format!("`{}` needs a doc comment: what it means", variant.ident));
+        }
+        (snake_case(&variant.ident.to_string()), doc)
+    };
+    let (words, docs): (Vec<String>, Vec<String>) = data.variants.iter().map(&mut word).unzip();
+    let quoted: Vec<String> = words.iter().map(|word| format!("`{word}`")).collect();
+    let expects = format!("one of {}", quoted.join(", "));
+    let (ident, variants) = (&input.ident, data.variants.iter().map(|variant| &variant.ident));
+    let variants: Vec<_> = variants.collect();
+    quote! {
+        #[automatically_derived]
+        impl ::tactflow_runtime::node::Param for #ident {
+            const EXPECTS: &'static str = #expects;
+            const WORDS: &'static [(&'static str, &'static str)] = &[#((#words, #docs)),*];
+
+            fn written(&self) -> ::core::option::Option<::tactflow_runtime::node::Written> {
+                let word = match self { #(Self::#variants => #words),* };
+                ::core::option::Option::Some(::core::convert::Into::into(word))
+            }
+
+            fn read(
+                value: &::tactflow_runtime::source::Value,
+                reader: &mut ::tactflow_runtime::node::Reader<'_>,
+            ) -> ::core::option::Option<Self> {
+                [#(Self::#variants),*].into_iter().nth(reader.word::<Self>(value)?)
+            }
+        }
+    }
+}

@@ -1,0 +1,255 @@
+//! Example graphs for one node or device, composed from the examples of the catalogue.
+//!
+//! The example of a node is one block. Its wires name blocks in the examples of other nodes and roles in the examples of
+//! devices, so the blocks that a node needs are found by following its wires. The text of each block stays as written,
+//! including its comments.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use crate::catalogue::Catalogue;
+use crate::graph::{Request, compile};
+use crate::node::{NodeSpec, PortSpec};
+use crate::signal::Kind;
+use crate::source::{Item, SourceMap, Table, Value, parse_table};
+
+/// The subject of an example graph.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Target<'a> {
+    /// A node type.
+    Node(&'a str),
+    /// A device type.
+    Device(&'a str),
+}
+
+/// The parsed example of one node or device.
+struct ExamplePart {
+    /// Its type.
+    kind: String,
+    is_device: bool,
+    /// Names by which wires refer to it: blocks of nodes, or roles.
+    names: Vec<String>,
+    /// Those of its roles that take no commands.
+    sensors: Vec<String>,
+    /// Names that it refers to.
+    needs: Vec<String>,
+    /// Ports that its wires come from.
+    wires: Vec<String>,
+    /// Its text by section: `[roles]`, `[commands]` and `[bind]`, and its own blocks under an empty name.
+    sections: BTreeMap<&'static str, String>,
+}
+
+/// Sections to which several devices add lines.
+const SHARED: [&str; 3] = ["roles", "commands", "bind"];
+
+/// Composes an example graph for a node or a device.
+///
+/// # Errors
+/// If an example is missing or is not TOML.
+pub fn example(catalogue: &Catalogue, name: &str) -> Result<String, String> {
+    let is_node = catalogue.nodes().iter().any(|node| node.spec().name == name);
+    compose(catalogue, if is_node { Target::Node(name) } else { Target::Device(name) })
+}
+
+/// Composes the example graph.
+///
+/// # Errors
+/// If an example is missing or is not TOML.
+pub(crate) fn compose(catalogue: &Catalogue, target: Target<'_>) -> Result<String, String> {
+    let parts = parts(catalogue)?;
+    let is_target = |part: &ExamplePart| match target {
+        Target::Node(name) => !part.is_device && part.kind == name,
+        Target::Device(name) => part.is_device && part.kind == name,
+    };
+    let (Target::Node(name) | Target::Device(name)) = target;
+    let start = parts.iter().position(is_target).ok_or_else(|| format!("`{name}` has no example"))?;
+    let mut chosen = vec![start];
+    if parts[start].is_device {
+        // A sensor alone does nothing, so the first node that reads it is added.
+        let reads =
+            |part: &ExamplePart| !part.is_device && part.needs.iter().any(|need| parts[start].names.contains(need));
+        chosen.extend(parts.iter().position(reads));
+    }
+    let mut at = 0;
+    while let Some(part) = chosen.get(at).map(|index| &parts[*index]) {
+        at += 1;
+        for need in &part.needs {
+            if chosen.iter().any(|index| parts[*index].names.contains(need)) {
+                continue;
+            }
+            // Only one device may fill a role.
+            let is_taken = |name: &String| chosen.iter().any(|index| parts[*index].names.contains(name));
+            let is_free = |part: &ExamplePart| !part.names.iter().any(is_taken);
+            let provider = parts.iter().position(|part| part.names.contains(need) && is_free(part));
+            let provider = provider.ok_or_else(|| format!("no example has the `{need}` that `{}` needs", part.kind))?;
+            chosen.push(provider);
+        }
+    }
+    chosen.sort_unstable();
+    let chosen: Vec<&ExamplePart> = chosen.iter().map(|index| &parts[*index]).collect();
+    let target = &parts[start];
+    if target.is_device || !is_unused(&chosen, target) {
+        return Ok(text(&chosen, target, None));
+    }
+    let used = insert_into_wire(catalogue, &chosen, target).or_else(|| append_log(catalogue, &chosen, target));
+    Ok(used.unwrap_or_else(|| text(&chosen, target, None)))
+}
+
+/// Whether the graph drives a command and nothing reads the target.
+fn is_unused(chosen: &[&ExamplePart], target: &ExamplePart) -> bool {
+    let is_read = chosen.iter().any(|part| part.needs.iter().any(|need| target.names.contains(need)));
+    !is_read && chosen.iter().any(|part| part.sections.contains_key("commands"))
+}
+
+/// Whether a graph loads without a warning.
+fn is_clean(catalogue: &Catalogue, text: &str) -> bool {
+    let plan = compile(catalogue, &Request::text(text));
+    plan.is_ok_and(|plan| plan.warnings().is_none())
+}
+
+/// Inserts the target into one of the wires that it reads, so that the readers of the wire read its output instead.
+/// Returns the first such graph that loads without a warning.
+fn insert_into_wire(catalogue: &Catalogue, chosen: &[&ExamplePart], target: &ExamplePart) -> Option<String> {
+    let spec = catalogue.nodes().iter().map(|node| node.spec()).find(|spec| spec.name == target.kind)?;
+    let outputs =
+        || target.names.iter().flat_map(|name| spec.outputs.iter().map(move |port| format!("{name}.{}", port.name)));
+    let wires = target.wires.iter().flat_map(|wire| outputs().map(move |output| (wire.clone(), output)));
+    wires.map(|(from, to)| text(chosen, target, Some((&from, &to)))).find(|text| is_clean(catalogue, text))
+}
+
+/// Adds a node that logs the scalar outputs of the target. Returns the graph if it loads without a warning.
+fn append_log(catalogue: &Catalogue, chosen: &[&ExamplePart], target: &ExamplePart) -> Option<String> {
+    let specs: Vec<NodeSpec> = catalogue.nodes().iter().map(|node| node.spec()).collect();
+    let takes = |port: &PortSpec| port.need.is_many && port.kind == Kind::Scalar;
+    let logs = specs.iter().find(|spec| spec.logs && spec.inputs.iter().any(takes))?;
+    let spec = specs.iter().find(|spec| spec.name == target.kind)?;
+    let name = target.names.first()?;
+    let scalars = spec.outputs.iter().filter(|port| port.kind == Kind::Scalar);
+    let wires: Vec<String> = scalars.map(|port| format!("in.{0} = \"{name}.{0}\"\n", port.name)).collect();
+    let graph = text(chosen, target, None);
+    let graph = format!("{graph}\n[nodes.seen]\ntype = \"{}\"\n{}", logs.name, wires.concat());
+    Some(graph).filter(|text| is_clean(catalogue, text))
+}
+
+/// Returns the block of a node or a device as written, or `None` without an example.
+pub(crate) fn block(example: &str) -> Option<&str> {
+    Some(example.trim()).filter(|text| !text.is_empty())
+}
+
+fn parts(catalogue: &Catalogue) -> Result<Vec<ExamplePart>, String> {
+    let mut parts = Vec::new();
+    let nodes = catalogue.nodes().iter().map(|node| node.spec()).map(|spec| (spec.name, spec.example, false));
+    let devices = catalogue.devices().iter().map(|device| (device.name(), device.example(), true));
+    for (kind, example, is_device) in nodes.chain(devices) {
+        if !example.trim().is_empty() {
+            parts.push(part(catalogue, &kind, &example, is_device)?);
+        }
+    }
+    Ok(parts)
+}
+
+fn part(catalogue: &Catalogue, kind: &str, example: &str, is_device: bool) -> Result<ExamplePart, String> {
+    let mut sources = SourceMap::default();
+    let parsed = parse_table(sources.add_file(Path::new("example"), example));
+    let Ok(Value { item: Item::Table(root), .. }) = parsed else {
+        return Err(format!("the example of `{kind}` is not TOML"));
+    };
+    let table = |name: &str| root.get(name).and_then(Value::as_table).cloned().unwrap_or_default();
+    let keys = |table: &Table| table.entries.iter().map(|(key, _)| key.name.clone()).collect();
+    let (nodes, roles) = (table("nodes"), table("roles"));
+    let is_sensor = |kind: &str| catalogue.roles().iter().any(|role| role.name == kind && role.commands.is_empty());
+    let sensors = roles.entries.iter().filter(|(_, kind)| kind.as_str().is_some_and(is_sensor));
+    let sensors = sensors.map(|(key, _)| key.name.clone()).collect();
+    let (mut needs, mut wires) = (Vec::new(), Vec::new());
+    for (_, node) in &nodes.entries {
+        let inputs = node.as_table().and_then(|node| node.get("in")).and_then(Value::as_table);
+        wires.extend(inputs.into_iter().flat_map(strings));
+        collect_facts(node, &mut needs);
+    }
+    table("commands")
+        .entries
+        .iter()
+        .filter_map(|(_, wires)| wires.as_table())
+        .for_each(|drive| wires.extend(strings(drive)));
+    needs.extend(wires.iter().filter_map(|wire| Some(wire.split_once('.')?.0.to_owned())));
+    let names = keys(if is_device { &roles } else { &nodes });
+    Ok(ExamplePart { kind: kind.to_owned(), is_device, names, sensors, needs, wires, sections: sections(example) })
+}
+
+/// Returns the strings in a table.
+fn strings(table: &Table) -> impl Iterator<Item = String> {
+    table.entries.iter().filter_map(|(_, word)| word.as_str().map(str::to_owned))
+}
+
+/// Collects the roles whose facts a value refers to.
+fn collect_facts(value: &Value, needs: &mut Vec<String>) {
+    match &value.item {
+        Item::Table(table) if table.is_fact() => {
+            needs.extend(strings(table).filter_map(|fact| Some(fact.split_once('.')?.0.to_owned())));
+        }
+        Item::Table(table) => table.entries.iter().for_each(|(_, inner)| collect_facts(inner, needs)),
+        Item::Array(items) => items.iter().for_each(|inner| collect_facts(inner, needs)),
+        _ => {}
+    }
+}
+
+/// Splits a text into sections. A comment above a header belongs to the header.
+fn sections(example: &str) -> BTreeMap<&'static str, String> {
+    let mut sections: BTreeMap<&'static str, String> = BTreeMap::new();
+    let (mut section, mut comments) = ("", String::new());
+    for line in example.trim().lines() {
+        if line.starts_with('#') {
+            comments.push_str(line);
+            comments.push('\n');
+            continue;
+        }
+        let header = line.strip_prefix('[').and_then(|rest| rest.split(']').next());
+        let shared = header.and_then(|header| SHARED.into_iter().find(|shared| *shared == header));
+        let is_block = header.is_some_and(|header| header.starts_with("nodes.") || header.starts_with("devices."));
+        section = if is_block { "" } else { shared.unwrap_or(section) };
+        let text = sections.entry(section).or_default();
+        text.push_str(&std::mem::take(&mut comments));
+        if shared.is_none() {
+            text.push_str(line);
+            text.push('\n');
+        }
+    }
+    sections.entry(section).or_default().push_str(&comments);
+    sections
+}
+
+/// Writes the graph. `swap` replaces one port by another everywhere but in the target.
+fn text(chosen: &[&ExamplePart], target: &ExamplePart, swap: Option<(&str, &str)>) -> String {
+    let swapped = |text: String| match swap {
+        Some((from, to)) => text.replace(&format!("\"{from}\""), &format!("\"{to}\"")),
+        None => text,
+    };
+    let devices = || chosen.iter().filter(|part| part.is_device);
+    let clock = devices().flat_map(|device| &device.sensors).chain(devices().flat_map(|device| &device.names)).next();
+    let clock = clock.map_or_else(|| "rate_hz = 250".to_owned(), |role| format!("clock = \"{role}\""));
+    let shared = |name: &str| {
+        let lines: String =
+            devices().filter_map(|device| device.sections.get(name)).map(|text| trimmed(text)).collect();
+        (!lines.is_empty()).then(|| swapped(format!("[{name}]\n{lines}")))
+    };
+    let block = |part: &&ExamplePart| {
+        let text = trimmed(part.sections.get("").map_or("", String::as_str));
+        if std::ptr::eq(*part, target) { format!("# ==== {} ====\n{text}", part.kind) } else { swapped(text) }
+    };
+    let nodes = chosen.iter().filter(|part| !part.is_device).map(block);
+    let head = [Some(format!("[graph]\n{clock}\n")), shared("roles"), shared("commands")];
+    let tail = shared("bind").into_iter().chain(devices().map(block));
+    let all: Vec<String> = head.into_iter().flatten().chain(nodes).chain(tail).collect();
+    all.join("\n")
+}
+
+/// Removes empty lines at both ends.
+fn trimmed(text: &str) -> String {
+    match text.trim_matches('\n') {
+        "" => String::new(),
+        text => format!("{text}\n"),
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,93 @@
+//! `list`: all entries of the catalogue, one line each.
+
+use super::entry::{Category, Entries, Entry};
+use crate::cli::shell::command::OutputFormat;
+use crate::cli::shell::{NOT_LOADED, Shell};
+use crate::cli::text::prose::{Definition, Element, PageStyle};
+
+/// List nodes, devices, roles, signal kinds and built-in files
+#[derive(clap::Parser)]
+#[command(
+    name = "list",
+    after_help = "Examples:
+  tactflow list                  everything
+  tactflow list nodes            only the nodes
+  tactflow list nodes edge       the nodes whose name, summary or documentation contains `edge`"
+)]
+pub(crate) struct ListArgs {
+    /// A category (nodes, devices, roles, kinds or files), and words that must all occur
+    #[arg(value_name = "WORD")]
+    words: Vec<String>,
+    /// Output format
+    #[arg(long, value_enum, default_value_t = OutputFormat::Text, value_name = "FORMAT")]
+    format: OutputFormat,
+}
+
+pub(crate) fn list(args: ListArgs, shell: &Shell) -> u8 {
+    let (categories, words): (Vec<_>, Vec<_>) =
+        args.words.iter().map(|word| (category(word), word)).partition(|(s, _)| s.is_some());
+    let categories: Vec<Category> = categories.into_iter().filter_map(|(category, _)| category).collect();
+    let words: Vec<String> = words.into_iter().map(|(_, word)| word.to_lowercase()).collect();
+    let entries = Entries::new(shell.catalogue());
+    let mut found: Vec<Entry> = entries.all();
+    found.retain(|entry| {
+        let text = format!("{} {} {}", entry.name, entry.summary, entry.doc).to_lowercase();
+        (categories.is_empty() || categories.contains(&entry.category))
+            && words.iter().all(|word| text.contains(word.as_str()))
+    });
+    if args.format == OutputFormat::Json {
+        shell.say_json(&found.iter().map(EntryJson::of).collect::<Vec<_>>());
+    } else if found.is_empty() {
+        shell.error(format_args!("nothing in the catalogue matches `{}`", args.words.join(" ")));
+    } else {
+        shell.say(&PageStyle::new(shell.has_colour()).render(&elements(&found)));
+    }
+    if found.is_empty() { NOT_LOADED } else { 0 }
+}
+
+/// An entry of the list as JSON.
+#[derive(serde::Serialize)]
+struct EntryJson<'a> {
+    category: Category,
+    name: &'a str,
+    summary: &'a str,
+    group: &'a str,
+}
+
+impl<'a> EntryJson<'a> {
+    fn of(entry: &'a Entry) -> Self {
+        Self { category: entry.category, name: &entry.name, summary: &entry.summary, group: entry.group }
+    }
+}
+
+fn category(word: &str) -> Option<Category> {
+    Category::ALL
+        .into_iter()
+        .find(|category| word == category.name() || word.strip_suffix('s') == Some(category.name()))
+}
+
+/// Puts the entries of each group below the title of the group.
+fn elements(entries: &[Entry]) -> Vec<Element> {
+    let mut elements = Vec::new();
+    for group in entries.chunk_by(|a, b| (a.category, a.group) == (b.category, b.group)) {
+        let item = |entry: &Entry| Definition {
+            name: entry.name.clone(),
+            summary: entry.summary.clone(),
+            details: Vec::new(),
+        };
+        elements.push(Element::Heading(title(&group[0])));
+        elements.push(Element::Definitions(group.iter().map(item).collect()));
+    }
+    elements
+}
+
+fn title(first: &Entry) -> String {
+    match (first.category, first.group) {
+        (Category::Node, "") => "Nodes".to_owned(),
+        (Category::Node, group) => format!("Nodes, {group}"),
+        (Category::Device, _) => "Devices: a bench binds roles to them".to_owned(),
+        (Category::Role, _) => "Roles: the sensors and robots that a task needs".to_owned(),
+        (Category::Kind, _) => "Kinds: the signals on wires".to_owned(),
+        (Category::File, _) => "Built-in files: usable wherever a graph names a file".to_owned(),
+    }
+}

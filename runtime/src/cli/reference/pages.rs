@@ -1,0 +1,52 @@
+//! The reference of a catalogue as pages of Markdown, to be kept under version control.
+
+use std::fmt::Write;
+
+use super::entry::{Category, Entries, Entry};
+use super::page::page;
+use crate::catalogue::Catalogue;
+use crate::cli::text::prose::markdown;
+
+/// Returns the pages, each with the name of its file: an index, a page for each group of nodes, and one for each other
+/// category.
+///
+/// A test can compare the pages with the files, so that they are never out of date; `tests/suite/reference.rs` does.
+#[must_use]
+pub fn reference(catalogue: &Catalogue) -> Vec<(String, String)> {
+    let mut entries = Entries::new(catalogue).all();
+    entries.retain(|entry| entry.category != Category::File);
+    let mut index = "# Reference\n\nEverything that a graph can use. These pages are generated from the catalogue; \
+                     `tactflow describe NAME` prints the same documentation and an example graph.\n"
+        .to_owned();
+    let mut pages = Vec::new();
+    for group in entries.chunk_by(|a, b| (a.category, a.group) == (b.category, b.group)) {
+        let (file, title) = (file(&group[0]), title(&group[0]));
+        // Writing to a string cannot fail.
+        let _ = writeln!(index, "\n## [{title}]({file})\n");
+        let mut text = format!("# {title}\n\n[All pages](README.md)\n\n");
+        for entry in group {
+            let _ = writeln!(index, "- [`{name}`]({file}#{name}): {}", entry.summary, name = entry.name);
+            text.push_str(&markdown(&page(entry, false), 2));
+        }
+        pages.push((file, text.trim_end().to_owned() + "\n"));
+    }
+    pages.insert(0, ("README.md".to_owned(), index));
+    pages
+}
+
+/// Returns the file of a group, named after the first word of its title or its category.
+fn file(first: &Entry) -> String {
+    let (word, rest) = first.group.split_once(':').unwrap_or(("", ""));
+    let has_word = !rest.is_empty() && word.chars().all(|c| c.is_ascii_alphanumeric());
+    if has_word { format!("{word}.md") } else { format!("{}s.md", first.category.name()) }
+}
+
+fn title(first: &Entry) -> String {
+    match first.group {
+        "" => {
+            let name = first.category.name();
+            format!("{}{}s", name[..1].to_uppercase(), &name[1..])
+        }
+        group => format!("{}{}", group[..1].to_uppercase(), &group[1..]),
+    }
+}

@@ -1,0 +1,147 @@
+//! What happened in a run: modes, halts, and limits that reduced the motion.
+
+use std::fmt::Write;
+
+use crate::cli::text::number::{number, seconds};
+use crate::cli::text::table::table;
+use crate::engine::{Engine, ModeChange};
+use crate::graph::Policy;
+use crate::node::PortId;
+use crate::signal::Scalar;
+
+/// Maximum number of mode changes that are listed from the start, and from the end; also of halts.
+const MAX_LISTED: usize = 20;
+
+/// How much one limit reduced the motion.
+struct LimitUse {
+    /// `node.limit`.
+    name: String,
+    id: PortId,
+    /// Time during which it reduced the motion [s].
+    time: f64,
+    /// Smallest factor by which it scaled the motion [1].
+    smallest_scale: f64,
+}
+
+/// Watches the limits tick by tick.
+pub(crate) struct LimitWatch {
+    limits: Vec<LimitUse>,
+    last: Option<i64>,
+}
+
+impl LimitWatch {
+    pub(crate) fn new(engine: &Engine) -> Self {
+        let limit = |(name, id): (&str, PortId)| LimitUse { name: name.to_owned(), id, time: 0.0, smallest_scale: 1.0 };
+        Self { limits: engine.limits().map(limit).collect(), last: None }
+    }
+
+    /// Adds the last tick of the engine.
+    pub(crate) fn add(&mut self, engine: &Engine) {
+        let dt = seconds(self.last.map_or(0, |last| engine.now() - last));
+        self.last = Some(engine.now());
+        let bus = engine.bus();
+        for limit in &mut self.limits {
+            let Some(&scale) = bus.get::<Scalar>(limit.id) else { continue };
+            // A difference by rounding is no limit.
+            if scale < 1.0 - 1e-6 {
+                limit.time += dt;
+                limit.smallest_scale = limit.smallest_scale.min(scale);
+            }
+        }
+    }
+
+    /// Writes the table of the limits that reduced the motion.
+    pub(crate) fn table(&self, end: i64) -> String {
+        if self.limits.is_empty() {
+            return String::new();
+        }
+        let active: Vec<&LimitUse> = self.limits.iter().filter(|limit| limit.time > 0.0).collect();
+        if active.is_empty() {
+            return "no limit reduced the motion\n".into();
+        }
+        let duration = seconds(end).max(1e-9);
+        let mut rows = vec![["limited by", "for", "of the run", "smallest scale"].map(String::from)];
+        for limit in active {
+            let share = format!("{:.1} %", 100.0 * limit.time / duration);
+            rows.push([limit.name.clone(), format!("{:.3} s", limit.time), share, number(limit.smallest_scale)]);
+        }
+        table(&rows, 1, usize::MAX)
+    }
+}
+
+/// Writes the modes and the halts, one after the other, and leaves out what the graph does not have.
+pub(crate) fn events(engine: &Engine, end: i64) -> String {
+    modes(&engine.changes(), end) + &halts(engine)
+}
+
+/// Writes the table of the modes.
+fn modes(changes: &[ModeChange], end: i64) -> String {
+    let mut text = String::new();
+    if changes.is_empty() {
+        return text;
+    }
+    let ends = changes.iter().skip(1).map(|change| change.time).chain([end]);
+    let mut rows = vec![["mode", "from", "for", "reason"].map(String::from)];
+    for (change, end) in changes.iter().zip(ends) {
+        let time = |nanos: i64| format!("{:.3} s", seconds(nanos));
+        rows.push([change.mode.clone(), time(change.time), time(end - change.time), change.reason.clone()]);
+    }
+    let omitted = rows.len().saturating_sub(2 * MAX_LISTED + 1);
+    if omitted > 0 {
+        rows.drain(MAX_LISTED + 1..=MAX_LISTED + omitted);
+        rows.insert(MAX_LISTED + 1, [format!("({omitted} more)"), String::new(), String::new(), String::new()]);
+    }
+    // Writing to a string cannot fail.
+    let _ = write!(text, "{}", table(&rows, 1, 3));
+    text.push('\n');
+    text
+}
+
+/// Lists the halts of the commands, each with its fault.
+fn halts(engine: &Engine) -> String {
+    let mut text = String::new();
+    for halt in engine.halts().iter().take(MAX_LISTED) {
+        let what = if halt.policy == Policy::Stop { "stopped" } else { "held" };
+        let duration = match halt.until {
+            Some(until) => format!("for {:.3} s", seconds(until - halt.fault.time)),
+            None => "until the end".to_owned(),
+        };
+        // Writing to a string cannot fail.
+        let _ = writeln!(text, "{what} {duration}: {}", halt.fault);
+    }
+    let more = engine.halts().len().saturating_sub(MAX_LISTED) as u64 + engine.unlisted_halts();
+    if more > 0 {
+        let _ = writeln!(text, "held or stopped {more} more times");
+    }
+    if !text.is_empty() {
+        text.push('\n');
+    }
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn change(ms: i64, mode: &str, why: &str) -> ModeChange {
+        ModeChange { time: ms * 1_000_000, tick: 0, mode: mode.into(), reason: why.into() }
+    }
+
+    #[test]
+    fn each_mode_has_a_time_and_a_reason() {
+        let changes = [change(0, "wait", ""), change(512, "servo", "`touch.present` is set")];
+        let expected = "mode      from      for  reason\n\
+                        wait   0.000 s  0.512 s\n\
+                        servo  0.512 s  1.488 s  `touch.present` is set\n\n";
+        assert_eq!(modes(&changes, 2_000_000_000), expected);
+        assert_eq!(modes(&[], 5), "");
+    }
+
+    #[test]
+    fn many_changes_are_listed_from_both_ends() {
+        let changes: Vec<ModeChange> = (0..1000).map(|i| change(i, &format!("m{i}"), "")).collect();
+        let text = modes(&changes, 1_000_000_000);
+        assert_eq!(text.lines().count(), 2 * MAX_LISTED + 3);
+        assert!(text.contains("\nm19 ") && text.contains("(960 more)") && text.contains("\nm980 "), "{text}");
+    }
+}

@@ -1,0 +1,237 @@
+//! `run`: runs a graph, prints a summary and writes recordings.
+
+mod events;
+mod files;
+pub(super) mod log;
+mod ports;
+mod progress;
+mod summary;
+mod time;
+
+use std::path::PathBuf;
+
+use files::{OutputFiles, Outputs};
+use log::NodeLog;
+use progress::Progress;
+use summary::Summary;
+
+use super::shell::command::GraphArgs;
+use super::shell::panics::without_panic_messages;
+use super::shell::{FAULTED, Shell, unknown};
+use super::text::number::{milliseconds, seconds};
+use super::text::prose::PageStyle;
+use crate::engine::{self, End, Engine, Outcome, RunOptions};
+use crate::fault::Fault;
+use crate::graph::{Compiled, Request, compile};
+use crate::record::PointsRequest;
+
+pub use time::duration;
+
+/// Run a graph and print a summary
+#[derive(clap::Parser)]
+#[command(
+    name = "run",
+    after_help = "Examples:
+  tactflow run graphs/finger_press.toml
+  tactflow run graphs/finger_press.toml --for 5s --out press.csv
+  tactflow run graphs/hybrid.toml --svg hybrid.svg
+  tactflow run graphs/explore.toml --points surface.ply
+  tactflow run graphs/hybrid.toml --set nodes.pid.gains.x.kp=3 --set devices.pad.rate_hz=500
+  tactflow run graphs/hybrid.toml --send 0.8s:stop --send 1.2s:resume
+
+Words: `stop` ramps every command to zero and holds it there, and `resume` releases it.
+A mode of the graph can wait for any other word with `on = \"word\"`."
+)]
+pub(crate) struct RunArgs {
+    /// Graph file
+    graph: PathBuf,
+    #[command(flatten)]
+    graph_args: GraphArgs,
+    /// Stop after this time of the graph: 20s, 500ms, 2min
+    #[arg(long = "for", value_name = "TIME", value_parser = duration, allow_hyphen_values = true)]
+    duration: Option<f64>,
+    /// Run in real time; without it, virtual time runs as fast as possible
+    #[arg(long)]
+    realtime: bool,
+    /// Send a word at a time of the graph, for example 2s:resume; may be repeated
+    #[arg(long, value_name = "TIME:WORD", value_parser = time::word)]
+    send: Vec<(f64, String)>,
+    /// Read words from standard input during the run, one per line; requires real time
+    #[arg(long)]
+    listen: bool,
+    /// Record all ports in a .csv or .ndjson file: one row per tick, one column per number
+    #[arg(short, long, value_name = "FILE")]
+    out: Option<PathBuf>,
+    /// Write the points that a pose visits to a .ply file: the pose that the graph reports, or [POSE[,PORT]…=]FILE
+    #[arg(long, value_name = "FILE")]
+    points: Option<PointsRequest>,
+    /// Draw the strongest image and the curves that the graph shows to an .svg file
+    #[arg(long, value_name = "FILE")]
+    svg: Option<PathBuf>,
+    /// Print all ports and the time of each node instead of what the graph shows
+    #[arg(long)]
+    ports: bool,
+    /// Print neither progress nor summary, only warnings and errors
+    #[arg(short, long, conflicts_with = "ports")]
+    quiet: bool,
+}
+
+pub(crate) fn run(args: RunArgs, shell: &Shell) -> u8 {
+    let title = args.graph.display().to_string();
+    let RunArgs { graph, graph_args, duration, realtime, send, listen, out, points, svg, ports, quiet } = args;
+    let print = match (ports, quiet) {
+        (true, _) => Print::Ports,
+        (_, true) => Print::Nothing,
+        _ => Print::Page,
+    };
+    let request = graph_args.request(graph);
+    Job { request, title, duration, realtime, send, listen, out, points, svg, print }.run(shell)
+}
+
+/// What a run prints.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Print {
+    /// The ports that the graph shows.
+    Page,
+    /// All ports and all nodes.
+    Ports,
+    /// Only warnings and errors.
+    Nothing,
+}
+
+/// A run of a graph from the command line.
+pub struct Job {
+    /// The graph.
+    pub request: Request,
+    /// The title in the output.
+    pub title: String,
+    /// Maximum duration in the time of the graph [s].
+    pub duration: Option<f64>,
+    /// Whether the run is in real time.
+    pub realtime: bool,
+    /// Words to send, each with its time in the graph [s].
+    pub send: Vec<(f64, String)>,
+    /// Whether words are read from standard input.
+    pub listen: bool,
+    /// File for the recording, .csv or .ndjson.
+    pub out: Option<PathBuf>,
+    /// File for the points of a pose, .ply.
+    pub points: Option<PointsRequest>,
+    /// File for the still picture, .svg.
+    pub svg: Option<PathBuf>,
+    /// What is printed.
+    pub print: Print,
+}
+
+impl Job {
+    /// Runs the graph, prints the summary and returns the exit code.
+    #[must_use]
+    pub fn run(&self, shell: &Shell) -> u8 {
+        match compile(shell.catalogue(), &self.request) {
+            Ok(plan) => self.run_plan(plan, shell).unwrap_or_else(|message| shell.refuse(message)),
+            Err(report) => shell.reject(&report),
+        }
+    }
+
+    /// Runs a plan and returns the exit code.
+    ///
+    /// # Errors
+    /// If the arguments do not fit the graph, before the run starts.
+    fn run_plan(&self, plan: Compiled, shell: &Shell) -> Result<u8, String> {
+        plan.warnings().iter().for_each(|report| shell.show(report));
+        let is_real = self.realtime || plan.is_live();
+        if self.listen && !is_real {
+            return Err("`--listen` requires real time: add `--realtime`, or send words with `--send 2s:resume`".into());
+        }
+        let chosen = self.points.as_ref().map(|wanted| wanted.resolve(&plan)).transpose()?;
+        let mut engine = Engine::new(plan);
+        self.check_words(&engine)?;
+        let outputs = Outputs { out: &self.out, points: &self.points, svg: &self.svg, title: &self.title };
+        let mut files = OutputFiles::create(outputs, chosen.as_ref(), &engine, !is_real)?;
+        let period = milliseconds(seconds(engine.period()));
+        self.say(shell, &format!("{}: {} nodes, one tick every {period}", self.title, engine.order().count()));
+        let mut summary = Summary::new(&engine, self.print == Print::Ports);
+        let mut log = NodeLog::new(&engine);
+        let (end, is_quiet) = (self.duration.or_else(|| engine.end().map(seconds)), self.print == Print::Nothing);
+        let mut progress = Progress::new(end, is_quiet, shell.has_colour_on_stderr());
+        let (sends, listens) = (self.send.clone(), self.listen);
+        let options = RunOptions { duration: self.duration, is_realtime: self.realtime, sends, listens };
+        let outcome = without_panic_messages(|| {
+            engine::run(&mut engine, &options, &mut |engine| {
+                summary.add(engine);
+                if log.is_due(engine) {
+                    progress.clear();
+                    log.write(engine);
+                }
+                files.add(engine);
+                progress.show(seconds(engine.now()), engine.ticks(), |style| summary.live(style));
+            })
+        });
+        progress.clear();
+        if let Ok(outcome) = &outcome {
+            let style = PageStyle::new(shell.has_colour());
+            self.say(shell, &format!("\n{}", summary.render(&engine, outcome, style).trim_end()));
+            self.say(shell, &ending(outcome));
+        }
+        let code = self.report_end(shell, &engine, outcome);
+        Ok(code.max(files.finish(shell, &engine, |text| self.say(shell, text))))
+    }
+
+    /// Reports words that were not sent and the fault that ended the run; returns the exit code.
+    fn report_end(&self, shell: &Shell, engine: &Engine, outcome: std::io::Result<Outcome>) -> u8 {
+        let outcome = match outcome {
+            Ok(outcome) => outcome,
+            Err(error) => {
+                shell.error(format_args!("cannot run: {error}"));
+                return FAULTED;
+            }
+        };
+        for (at, word) in self.send.iter().filter(|(at, _)| *at > seconds(outcome.time)) {
+            shell.warning(format_args!("`{word}` was not sent: the run ended before {at} s"));
+        }
+        let End::Fault(fault) = &outcome.end else { return 0 };
+        shell.error(format_args!("{fault}; every command went to zero{}", endless_stop(engine, fault)));
+        FAULTED
+    }
+
+    /// Prints a line unless the run is quiet.
+    fn say(&self, shell: &Shell, text: &str) {
+        if self.print != Print::Nothing {
+            shell.say(text);
+        }
+    }
+
+    /// Checks that the graph or the runtime knows every word that is sent.
+    fn check_words(&self, engine: &Engine) -> Result<(), String> {
+        let is_own = |word: &str| ["stop", "resume"].iter().any(|own| word.eq_ignore_ascii_case(own));
+        let is_unknown = |word: &str| !is_own(word) && engine.words().all(|known| known != word);
+        let Some((_, word)) = self.send.iter().find(|(_, word)| is_unknown(word)) else { return Ok(()) };
+        let known: std::collections::BTreeSet<String> = engine.words().map(|word| format!("`{word}`")).collect();
+        let known = known.into_iter().collect::<Vec<_>>().join(", ");
+        Err(unknown("word", word, engine.words(), &format!("this graph accepts {known}")))
+    }
+}
+
+/// Explains a fault that is a stop without any source of the word `resume`.
+fn endless_stop(engine: &Engine, fault: &Fault) -> &'static str {
+    let is_the_stop = engine.halts().last().is_some_and(|halt| halt.fault == *fault);
+    if engine.is_stopped() && is_the_stop {
+        ", and nothing could send `resume`: use `--send 2s:resume`, or type it with `--listen`"
+    } else {
+        ""
+    }
+}
+
+/// Describes how a run ended, and its speed.
+fn ending(outcome: &Outcome) -> String {
+    let reason = match outcome.end {
+        End::Finished => "a device has no more samples",
+        End::Done => "the graph is done",
+        End::Duration => "the time is over",
+        End::Interrupted => "interrupted",
+        End::Fault(_) => "a fault",
+    };
+    let (time, wall) = (seconds(outcome.time), outcome.wall.as_secs_f64());
+    let speed = time / wall.max(1e-9);
+    format!("{reason} after {time:.3} s and {} ticks; the run took {wall:.3} s, {speed:.0}x real time", outcome.ticks)
+}

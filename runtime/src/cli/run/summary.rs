@@ -1,0 +1,97 @@
+//! What a run prints at its end: modes and halts, the ports that the graph shows or all ports, and limits.
+
+use std::fmt::Write;
+
+use super::events::{LimitWatch, events};
+use super::ports::{PortTable, node_times};
+use crate::cli::text::prose::PageStyle;
+use crate::cli::view::RunView;
+use crate::engine::{Counters, Engine, Outcome};
+
+/// Collects the summary tick by tick.
+pub(crate) struct Summary {
+    limits: LimitWatch,
+    body: Body,
+}
+
+/// The main part of a summary.
+enum Body {
+    /// The ports that the graph shows.
+    View(Box<RunView>),
+    /// All ports.
+    Ports(PortTable),
+}
+
+impl Summary {
+    /// Creates a summary of all ports, or of those that the graph shows.
+    pub(crate) fn new(engine: &Engine, has_all_ports: bool) -> Self {
+        let body = match has_all_ports {
+            true => Body::Ports(PortTable::new(engine)),
+            false => Body::View(Box::new(RunView::new(engine))),
+        };
+        Self { limits: LimitWatch::new(engine), body }
+    }
+
+    /// Adds the last tick of the engine.
+    pub(crate) fn add(&mut self, engine: &Engine) {
+        self.limits.add(engine);
+        match &mut self.body {
+            Body::View(view) => view.add(engine),
+            Body::Ports(ports) => ports.add(engine),
+        }
+    }
+
+    /// Returns the parts of the view that is drawn during the run.
+    pub(crate) fn live(&self, style: PageStyle) -> Vec<String> {
+        match &self.body {
+            Body::View(view) => view.live(style),
+            Body::Ports(_) => Vec::new(),
+        }
+    }
+
+    /// Writes the summary.
+    pub(crate) fn render(&self, engine: &Engine, outcome: &Outcome, style: PageStyle) -> String {
+        let (events, limits) = (events(engine, outcome.time), self.limits.table(outcome.time));
+        let parts = match &self.body {
+            Body::View(view) => [events, view.page(style), limits],
+            Body::Ports(ports) => [ports.render(engine), node_times(engine, outcome), events + &limits],
+        };
+        let parts = parts.iter().map(|part| part.trim_end()).filter(|part| !part.is_empty());
+        let mut text = parts.collect::<Vec<_>>().join("\n\n");
+        if !text.is_empty() {
+            text.push('\n');
+        }
+        // Writing to a string cannot fail.
+        for ((port, _), counters) in engine.ports().iter().zip(engine.counters()) {
+            let irregular = irregular_samples(counters);
+            if !irregular.is_empty() {
+                let _ = writeln!(text, "samples of `{}`: {irregular}", port.name);
+            }
+        }
+        for (device, counts) in engine.counts().filter(|(_, counts)| !counts.is_empty()) {
+            let counts: Vec<String> = counts.iter().map(|(what, count)| format!("{count} {what}")).collect();
+            let _ = writeln!(text, "device `{device}`: {}", counts.join(", "));
+        }
+        if outcome.late > 0 {
+            let _ = writeln!(text, "{} ticks started more than one period late", outcome.late);
+        }
+        if let Body::View(_) = self.body {
+            let _ = writeln!(text, "for all ports and the time of each node: --ports");
+        }
+        text
+    }
+}
+
+/// Describes the irregular samples of a port.
+fn irregular_samples(counters: &Counters) -> String {
+    let counts = [
+        (counters.repeated, "repeated"),
+        (counters.gaps, "missing in the sequence"),
+        (counters.late, "more than one period late"),
+        (counters.went_back, "dropped because their stamp is older than the last"),
+        (counters.ahead, "dropped because their stamp is in the future"),
+        (counters.not_finite, "dropped because they are not finite"),
+    ];
+    let counts = counts.into_iter().filter(|(count, _)| *count > 0);
+    counts.map(|(count, what)| format!("{count} {what}")).collect::<Vec<_>>().join(", ")
+}

@@ -1,0 +1,161 @@
+//! A small writer of SVG: lines, text and axes that are readable on light and on dark pages.
+
+use std::fmt::{Display, Write};
+
+/// Colour of axes and text: of middle brightness, since a picture has no background of its own.
+const INK: &str = "#888888";
+
+/// An SVG document under construction.
+#[derive(Debug, Clone)]
+pub struct Svg {
+    text: String,
+}
+
+impl Svg {
+    /// How a document begins.
+    pub const START: &str = "<svg ";
+
+    /// Starts a document of that width and height [px].
+    #[must_use]
+    pub fn new([width, height]: [f64; 2], title: &str) -> Self {
+        let mut svg = Self { text: String::new() };
+        svg.put(format_args!(
+            "{}xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {width} {height}\" font-family=\"sans-serif\" \
+             font-size=\"13\">",
+            Self::START
+        ));
+        svg.put(format_args!("<title>{}</title>", escaped(title)));
+        svg
+    }
+
+    /// Adds an element as it is written.
+    pub fn put(&mut self, element: impl Display) {
+        writeln!(self.text, "{element}").expect("writing to a string cannot fail");
+    }
+
+    /// Adds a group with those attributes, and what `content` adds to it.
+    pub fn group(&mut self, attributes: &str, content: impl FnOnce(&mut Self)) {
+        self.put(format_args!("<g {attributes}>"));
+        content(self);
+        self.put("</g>");
+    }
+
+    /// Adds a line of text; `anchor` is the end of the text at that point: `start`, `middle` or `end`.
+    pub fn text(&mut self, [x, y]: [f64; 2], anchor: &str, text: &str) {
+        let text = escaped(text);
+        self.put(format_args!("<text x=\"{x:.1}\" y=\"{y:.1}\" text-anchor=\"{anchor}\" fill=\"{INK}\">{text}</text>"));
+    }
+
+    /// Adds a line through those points [px].
+    pub fn polyline(&mut self, points: impl IntoIterator<Item = [f64; 2]>) {
+        let points: Vec<String> = points.into_iter().map(|[x, y]| format!("{x:.1},{y:.1}")).collect();
+        self.put(format_args!("<polyline points=\"{}\"/>", points.join(" ")));
+    }
+
+    /// Adds two axes with ticks, numbers, grid lines and titles. Without a title, the x axis has no numbers either.
+    pub fn axes(&mut self, x: Axis, y: Axis, [x_title, y_title]: [Option<&str>; 2]) {
+        let ([left, right], [bottom, top]) = (x.pixels, y.pixels);
+        self.group(&format!("stroke=\"{INK}\" fill=\"none\""), |svg| {
+            svg.put(format_args!("<path d=\"M{left} {top}V{bottom}H{right}\"/>"));
+            x.ticks().iter().for_each(|tick| svg.put(format_args!("<path d=\"M{:.1} {bottom}v5\"/>", x.at(*tick))));
+            for at in y.ticks().iter().map(|tick| y.at(*tick)) {
+                svg.put(format_args!("<path d=\"M{left} {at:.1}h-5\"/>"));
+                svg.put(format_args!("<path stroke-opacity=\"0.25\" d=\"M{left} {at:.1}H{right}\"/>"));
+            }
+        });
+        y.ticks().iter().for_each(|tick| self.text([left - 9.0, y.at(*tick) + 4.5], "end", &number(*tick)));
+        if let Some(title) = x_title {
+            x.ticks().iter().for_each(|tick| self.text([x.at(*tick), bottom + 19.0], "middle", &number(*tick)));
+            self.text([0.5 * (left + right), bottom + 42.0], "middle", title);
+        }
+        let turn = format!("translate({:.1} {:.1}) rotate(-90)", left - 46.0, 0.5 * (top + bottom));
+        let title = escaped(y_title.unwrap_or_default());
+        self.put(format_args!("<text text-anchor=\"middle\" transform=\"{turn}\" fill=\"{INK}\">{title}</text>"));
+    }
+
+    /// Ends the document.
+    #[must_use]
+    pub fn finish(self) -> String {
+        self.text + "</svg>\n"
+    }
+}
+
+/// A linear axis.
+#[derive(Debug, Clone, Copy)]
+pub struct Axis {
+    /// Value at the start.
+    pub from: f64,
+    /// Value at the end.
+    pub to: f64,
+    /// Position of both ends [px].
+    pub pixels: [f64; 2],
+}
+
+impl Axis {
+    /// Returns the position of a value [px].
+    #[must_use]
+    pub fn at(&self, value: f64) -> f64 {
+        let [start, end] = self.pixels;
+        start + (value - self.from) / (self.to - self.from) * (end - start)
+    }
+
+    /// Returns four to eleven round numbers along the axis, or fewer if it is shorter than 200 px.
+    #[must_use]
+    pub fn ticks(&self) -> Vec<f64> {
+        let length = (self.pixels[1] - self.pixels[0]).abs();
+        let raw = (self.to - self.from) / if length < 200.0 { 2.0 } else { 5.0 };
+        // Parsed, since a product of tens is not exact.
+        let powers = (-12..12).filter_map(|k| format!("1e{k}").parse().ok());
+        let power: f64 = powers.take_while(|power| *power <= raw).last().unwrap_or(raw);
+        let step = [5.0, 2.0, 1.0].into_iter().map(|by| by * power).find(|step| *step <= raw).unwrap_or(power);
+        let first = (self.from / step).ceil() as i64;
+        (first..).map(|k| k as f64 * step).take_while(|tick| *tick <= self.to + 1e-9 * step).collect()
+    }
+}
+
+/// Formats a number without the rounding errors of binary fractions.
+fn number(value: f64) -> String {
+    format!("{}", (value * 1e9).round() / 1e9 + 0.0)
+}
+
+/// Escapes the characters that have a meaning in XML.
+#[must_use]
+pub fn escaped(text: &str) -> String {
+    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ticks_are_round_and_not_too_many() {
+        for (from, to, first, step) in [
+            (0.0, 5.2, 0.0, 1.0),
+            (0.0, 4095.0, 0.0, 500.0),
+            (-3.0, 0.9, -3.0, 0.5),
+            (310.0, 340.0, 310.0, 5.0),
+            (0.0, 1e-5, 0.0, 2e-6),
+        ] {
+            let ticks = Axis { from, to, pixels: [0.0, 400.0] }.ticks();
+            assert!((4..=11).contains(&ticks.len()), "{from}..{to}: {ticks:?}");
+            assert!((ticks[0] - first).abs() < 1e-9 && (ticks[1] - ticks[0] - step).abs() < 1e-9 * step, "{ticks:?}");
+            let few = Axis { from, to, pixels: [100.0, 0.0] }.ticks();
+            assert!((1..=5).contains(&few.len()), "{from}..{to}: {few:?}");
+        }
+    }
+
+    #[test]
+    fn an_axis_ends_where_its_pixels_end() {
+        let axis = Axis { from: 10.0, to: 30.0, pixels: [424.0, 24.0] };
+        assert_eq!([axis.at(10.0), axis.at(20.0), axis.at(30.0)], [424.0, 224.0, 24.0]);
+    }
+
+    #[test]
+    fn text_is_escaped() {
+        let mut svg = Svg::new([1.0, 1.0], "a<b & \"c\"");
+        svg.text([0.0, 0.0], "start", "x > y");
+        let text = svg.finish();
+        assert!(text.contains("<title>a&lt;b &amp; &quot;c&quot;</title>") && text.contains(">x &gt; y<"), "{text}");
+    }
+}

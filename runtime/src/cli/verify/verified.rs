@@ -1,0 +1,34 @@
+//! A scenario and its results.
+
+use std::path::PathBuf;
+
+use crate::cli::shell::json::{DiagnosticJson, diagnosed};
+use crate::scenario::judge::{Row, Verdict};
+use crate::scenario::{Scenario, Trial};
+use crate::source::Report;
+
+/// A scenario and its results.
+pub(crate) struct Verified {
+    pub(crate) path: PathBuf,
+    pub(crate) loaded: Result<Scenario, Report>,
+    /// The completed runs, in the order of the seeds.
+    pub(crate) trials: Vec<Trial>,
+    pub(crate) rows: Vec<Row>,
+}
+
+impl Verified {
+    pub(crate) fn name(&self) -> String {
+        self.path.file_stem().unwrap_or(self.path.as_os_str()).to_string_lossy().into_owned()
+    }
+
+    /// Whether the scenario loads, no run failed and no check failed.
+    pub(crate) fn has_passed(&self) -> bool {
+        let is_complete = self.loaded.as_ref().is_ok_and(|scenario| scenario.runs().len() == self.trials.len());
+        let has_failed = self.trials.iter().any(|trial| trial.failure.is_some());
+        is_complete && !has_failed && self.rows.iter().all(|row| row.verdict() != Verdict::Failed)
+    }
+
+    pub(crate) fn diagnostics(&self) -> Vec<DiagnosticJson> {
+        self.loaded.as_ref().err().map(diagnosed).unwrap_or_default()
+    }
+}

@@ -1,0 +1,174 @@
+//! The ports that a graph shows: images, and curves over time.
+
+pub(super) mod images;
+
+use std::fmt::Write;
+
+use crate::cli::text::chart::{chart, time_axis};
+use crate::cli::text::number::{number, seconds};
+use crate::cli::text::prose::{PageStyle, break_at_semicolons};
+use crate::cli::text::series::{Bin, Series};
+use crate::engine::Engine;
+use crate::record::{Column, Columns};
+use crate::signal::{Shape, Unit};
+use images::{ImageHistory, MIN_WIDE_PAGE};
+
+/// Maximum number of bins of a curve on the terminal: two for each character of the widest page.
+const MAX_BINS: usize = 256;
+/// Share of the run at its end for which mean and deviation are printed [1].
+const TAIL: f64 = 0.2;
+/// Width of the title and the numbers beside a curve [characters].
+const PANEL_WIDTH: usize = 27;
+
+/// Keeps the values of the ports that a graph shows, in bounded memory.
+pub(crate) struct RunView {
+    pub(crate) images: Vec<ImageHistory>,
+    /// Names of the ports that have curves, as the graph file calls them.
+    pub(crate) plotted: Vec<String>,
+    columns: Columns,
+    row: Vec<f64>,
+    pub(crate) curves: Vec<Curve>,
+    /// Times of the ticks [s], in the same bins as the curves.
+    pub(crate) times: Series,
+}
+
+/// A column of a port over time.
+pub(crate) struct Curve {
+    /// Name of the column; it begins with the name of the port only if several ports have curves.
+    pub(crate) name: String,
+    /// Full name of the column, as in a recording.
+    pub(crate) column: String,
+    pub(crate) unit: Unit,
+    pub(crate) series: Series,
+}
+
+impl RunView {
+    /// Creates a view for the terminal.
+    pub(crate) fn new(engine: &Engine) -> Self {
+        Self::with_bins(engine, MAX_BINS)
+    }
+
+    /// Creates a view whose curves have at most `bins` bins.
+    pub(crate) fn with_bins(engine: &Engine, bins: usize) -> Self {
+        let mut images: Vec<ImageHistory> = Vec::new();
+        let (mut plotted, mut ports) = (Vec::new(), Vec::new());
+        for (name, port, id) in &engine.display().ports {
+            if let Shape::Image(shape) = &port.shape {
+                let mark = engine.display().contact.filter(|_| images.is_empty());
+                images.push(ImageHistory::new(name.clone(), *id, shape.clone(), mark));
+            } else {
+                plotted.push(name.clone());
+                ports.push((port.clone(), *id));
+            }
+        }
+        let columns = Columns::new(&ports);
+        let owners = plotted.iter().zip(&ports);
+        let owners = owners.flat_map(|(name, (port, _))| vec![(name, &port.name); Columns::width(&port.shape)]);
+        let curve = |(column, (name, port)): (&Column, (&String, &String))| Curve {
+            name: column_name(column, name, port, plotted.len() == 1),
+            column: column.name.clone(),
+            unit: column.unit,
+            series: Series::with_capacity(bins),
+        };
+        let curves = columns.list.iter().zip(owners).map(curve).collect();
+        let (row, times) = (vec![f64::NAN; columns.list.len()], Series::with_capacity(bins));
+        Self { images, plotted, columns, row, curves, times }
+    }
+
+    /// Adds the last tick of the engine.
+    pub(crate) fn add(&mut self, engine: &Engine) {
+        self.times.add(seconds(engine.now()));
+        self.columns.read(engine.bus(), &mut self.row);
+        for (curve, value) in self.curves.iter_mut().zip(&self.row) {
+            curve.series.add(*value);
+        }
+        for image in &mut self.images {
+            image.add(engine);
+        }
+    }
+
+    /// Returns the times of the first and the last tick [s].
+    pub(crate) fn span(&self) -> Option<[f64; 2]> {
+        Some([self.times.bins().first()?.low, self.times.bins().last()?.high])
+    }
+
+    /// Draws the images at three moments, and the curves of the whole run.
+    pub(crate) fn page(&self, style: PageStyle) -> String {
+        let images = self.images.iter().map(|image| image.page(style));
+        images.chain(self.draw_curves(style, 6)).collect::<Vec<_>>().join("\n")
+    }
+
+    /// Draws the first image at present, and then low curves; the most important part comes first.
+    pub(crate) fn live(&self, style: PageStyle) -> Vec<String> {
+        let image = self.images.first().map(|image| image.now(style));
+        image.into_iter().chain(self.draw_curves(style, 3)).collect()
+    }
+
+    /// Draws the curves, at most `max_height` lines high, above a time axis.
+    fn draw_curves(&self, style: PageStyle, max_height: usize) -> Option<String> {
+        let [first, last] = self.span().filter(|_| !self.curves.is_empty())?;
+        let height = match self.curves.len() {
+            1 => 6,
+            2 => 5,
+            3 => 4,
+            _ => 3,
+        };
+        let is_narrow = style.width < MIN_WIDE_PAGE;
+        let panel = if is_narrow { 0 } else { PANEL_WIDTH };
+        let width = style.width - panel;
+        let tail = (last - first) * TAIL;
+        let title = format!("{} over time; mean ± deviation of the last {tail:.3} s", self.plotted.join(", "));
+        let mut text = break_at_semicolons(&title, style.width) + "\n";
+        for (Curve { name, unit, series, .. }, value) in self.curves.iter().zip(&self.row) {
+            let lines = chart(series.bins(), width, height.min(max_height));
+            let values = final_values(*value, &series.tail(TAIL));
+            text.push_str(&captioned(&format!("{name} [{unit}]"), &values, &lines, is_narrow));
+        }
+        for line in time_axis(width, first, last).lines() {
+            // Writing to a string cannot fail.
+            let _ = writeln!(text, "{:panel$}{line}", "");
+        }
+        Some(text)
+    }
+}
+
+/// Names a column of a port, which the graph calls `name`; shorter if no other port has curves.
+fn column_name(column: &Column, name: &str, port: &str, is_alone: bool) -> String {
+    match column.name.strip_prefix(port).unwrap_or_default().trim_start_matches('.') {
+        "" => name.to_owned(),
+        part if is_alone => part.to_owned(),
+        part => format!("{name}.{part}"),
+    }
+}
+
+/// Describes the last value, and mean and deviation at the end.
+fn final_values(last: f64, tail: &Bin) -> [String; 2] {
+    let last = if last.is_nan() { "absent at the end".to_owned() } else { format!("last {}", number(last)) };
+    let mean = match tail.is_present() {
+        true => format!("mean {} ± {}", number(tail.mean), number(tail.deviation())),
+        false => String::new(),
+    };
+    [last, mean]
+}
+
+/// Puts the title and the numbers on the left of a curve, or above it on a narrow page.
+fn captioned(title: &str, values: &[String; 2], lines: &[String], is_narrow: bool) -> String {
+    if is_narrow {
+        let mut words: Vec<&str> = vec![title];
+        words.extend(values.iter().map(String::as_str).filter(|text| !text.is_empty()));
+        return format!("{}\n{}\n", words.join("\n  "), lines.join("\n"));
+    }
+    let mut text = String::new();
+    // A long title has a line of its own.
+    let (above, title) = if title.chars().count() < PANEL_WIDTH { ("", title) } else { (title, "") };
+    if !above.is_empty() {
+        text = format!("{above}\n");
+    }
+    let panel = [title, &format!("  {}", values[0]), &format!("  {}", values[1])].map(str::trim_end).map(str::to_owned);
+    for (i, line) in lines.iter().enumerate() {
+        let left = panel.get(i).map_or("", String::as_str);
+        // Writing to a string cannot fail.
+        let _ = writeln!(text, "{}", format!("{left:PANEL_WIDTH$}{line}").trim_end());
+    }
+    text
+}

@@ -1,0 +1,205 @@
+//! What a device states before it runs: the roles it fills, and its ports in each, by name.
+
+use std::borrow::Cow;
+use std::marker::PhantomData;
+
+use super::RoleType;
+use crate::signal::{JointsShape, Kind, Shape, Signal};
+
+/// A name that is written in the source or made at load.
+type Name = Cow<'static, str>;
+
+/// What a device states of itself before it runs.
+///
+/// The ports of a role are stated by name. Each statement returns a handle, with which the device reads and writes the
+/// port while it runs; so two ports cannot be mixed up, and no name is looked up in a tick. The loader compares what is
+/// stated with the [`RoleType`](super::RoleType) and reports every difference.
+///
+/// ```
+/// use tactflow_runtime::device::Description;
+/// use tactflow_runtime::signal::{Image, ImageShape, Unit};
+///
+/// let shape = ImageShape { rows: 16, cols: 16, pitch: [0.005; 2], unit: Unit::NEWTON };
+/// let mut description = Description::every(0.004);
+/// let mut pad = description.fills("tactile_pad");
+/// let image = pad.output::<Image>("image", shape);
+/// pad.fact("threshold", 0.015);
+/// # let _ = image;
+/// ```
+#[derive(Debug, Clone)]
+pub struct Description {
+    /// Nominal time between two samples [s].
+    pub period: f64,
+    pub(crate) fills: Vec<Filled>,
+    pub(crate) outputs: Vec<StatedPort>,
+    pub(crate) commands: Vec<StatedPort>,
+    pub(crate) reports: Vec<StatedPort>,
+}
+
+/// A role that a device can fill, and the facts that go with it.
+#[derive(Debug, Clone)]
+pub(crate) struct Filled {
+    pub(crate) role: Name,
+    pub(crate) facts: Vec<(Name, toml::Value)>,
+}
+
+/// A port that a device states.
+#[derive(Debug, Clone)]
+pub(crate) struct StatedPort {
+    /// Index of the role among those that the device fills.
+    pub(crate) fill: usize,
+    pub(crate) name: Name,
+    /// Its shape; of a report only the kind is known.
+    pub(crate) shape: Shape,
+}
+
+impl Description {
+    /// A device that samples every `period` [s] and fills no role yet.
+    #[must_use]
+    pub const fn every(period: f64) -> Self {
+        Self { period, fills: Vec::new(), outputs: Vec::new(), commands: Vec::new(), reports: Vec::new() }
+    }
+
+    /// Adds a role that the device can fill. A device that has two pads adds `tactile_pad` twice.
+    pub fn fills(&mut self, role: impl Into<Name>) -> Fill<'_> {
+        self.fills.push(Filled { role: role.into(), facts: Vec::new() });
+        let index = self.fills.len() - 1;
+        Fill { description: self, index }
+    }
+
+    /// The roles that the device can fill, in the order in which they were added.
+    pub fn roles(&self) -> impl Iterator<Item = &str> {
+        self.fills.iter().map(|fill| &*fill.role)
+    }
+
+    /// Adds the reports of a role that the device does not read, so that each has its number.
+    pub(crate) fn add_reports(&mut self, fill: usize, role: &RoleType) {
+        for spec in &role.reports {
+            let is_stated = |port: &StatedPort| port.fill == fill && port.name == spec.name;
+            if !self.reports.iter().any(is_stated) {
+                let shape = spec.kind.default_shape();
+                self.reports.push(StatedPort { fill, name: spec.name.clone(), shape });
+            }
+        }
+    }
+
+    /// Returns the first output of that name and kind.
+    #[must_use]
+    pub fn output<T: Signal>(&self, name: &str) -> Option<Output<T>> {
+        find(&self.outputs, name, T::KIND).map(Output::at)
+    }
+
+    /// Returns the first command of that name.
+    #[must_use]
+    pub fn command(&self, name: &str) -> Option<Command> {
+        find(&self.commands, name, Kind::Joints).map(Command)
+    }
+
+    /// Returns the first report of that name and kind.
+    #[must_use]
+    pub fn report<T: Signal>(&self, name: &str) -> Option<Report<T>> {
+        find(&self.reports, name, T::KIND).map(Report::at)
+    }
+
+    /// Returns the shape of the first output or command of that name.
+    #[must_use]
+    pub fn shape(&self, name: &str) -> Option<&Shape> {
+        self.outputs.iter().chain(&self.commands).find(|port| port.name == name).map(|port| &port.shape)
+    }
+
+    /// Returns the first fact of that name.
+    #[must_use]
+    pub fn fact(&self, name: &str) -> Option<&toml::Value> {
+        let facts = self.fills.iter().flat_map(|fill| &fill.facts);
+        facts.into_iter().find(|(fact, _)| fact == name).map(|(_, value)| value)
+    }
+}
+
+fn find(ports: &[StatedPort], name: &str, kind: Kind) -> Option<usize> {
+    ports.iter().position(|port| port.name == name && port.shape.kind() == kind)
+}
+
+/// A role that is being described; see [`Description`].
+pub struct Fill<'d> {
+    description: &'d mut Description,
+    index: usize,
+}
+
+impl Fill<'_> {
+    /// States an output of the role, with its shape.
+    pub fn output<T: Signal>(&mut self, name: impl Into<Name>, shape: T::Shape) -> Output<T> {
+        Output::at(self.add(|description| &mut description.outputs, name, shape.into()))
+    }
+
+    /// States a command of the role, with the joints that it moves.
+    pub fn command(&mut self, name: impl Into<Name>, shape: JointsShape) -> Command {
+        Command(self.add(|description| &mut description.commands, name, shape.into()))
+    }
+
+    /// States a report of the role that the device reads. A device need not read the reports of its roles.
+    pub fn report<T: Signal>(&mut self, name: impl Into<Name>) -> Report<T> {
+        Report::at(self.add(|description| &mut description.reports, name, T::Shape::default().into()))
+    }
+
+    /// States a fact, which a graph file may use: `threshold = { from = "pad.threshold" }`.
+    pub fn fact(&mut self, name: impl Into<Name>, value: impl Into<toml::Value>) {
+        self.description.fills[self.index].facts.push((name.into(), value.into()));
+    }
+
+    /// States several facts.
+    pub fn facts(&mut self, facts: impl IntoIterator<Item = (Name, toml::Value)>) {
+        self.description.fills[self.index].facts.extend(facts);
+    }
+
+    /// States an output of a kind that is known only at run time.
+    pub(crate) fn output_of(&mut self, name: impl Into<Name>, shape: Shape) {
+        self.add(|description| &mut description.outputs, name, shape);
+    }
+
+    fn add(
+        &mut self,
+        list: fn(&mut Description) -> &mut Vec<StatedPort>,
+        name: impl Into<Name>,
+        shape: Shape,
+    ) -> usize {
+        let ports = list(self.description);
+        ports.push(StatedPort { fill: self.index, name: name.into(), shape });
+        ports.len() - 1
+    }
+}
+
+/// A command port of a device.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Command(pub(crate) usize);
+
+macro_rules! handles {
+    ($($(#[$doc:meta])* $name:ident)*) => { $(
+        $(#[$doc])*
+        #[derive(Debug)]
+        pub struct $name<T> {
+            pub(crate) port: usize,
+            kind: PhantomData<fn() -> T>,
+        }
+
+        impl<T> $name<T> {
+            pub(crate) const fn at(port: usize) -> Self {
+                Self { port, kind: PhantomData }
+            }
+        }
+
+        impl<T> Clone for $name<T> {
+            fn clone(&self) -> Self {
+                *self
+            }
+        }
+
+        impl<T> Copy for $name<T> {}
+    )* };
+}
+
+handles! {
+    /// An output port of a device: what it writes as a sample.
+    Output
+    /// A report port of a device: what the task reports to it.
+    Report
+}

@@ -1,0 +1,88 @@
+//! The times of the ticks.
+
+use crate::graph::Clock;
+
+/// Periods without a sample of the clock device after which a timer takes its place.
+const MAX_MISSED_PERIODS: i64 = 3;
+
+/// Computes the time of the next tick, in virtual or real time.
+#[derive(Debug, Clone)]
+pub(crate) struct TickSchedule {
+    clock: Clock,
+    /// Nominal time between two ticks [ns].
+    period: i64,
+    /// Time of the last tick [ns].
+    last: Option<i64>,
+    is_on_timer: bool,
+}
+
+impl TickSchedule {
+    pub(crate) const fn new(clock: Clock, period: i64) -> Self {
+        Self { clock, period, last: None, is_on_timer: false }
+    }
+
+    pub(crate) const fn period(&self) -> i64 {
+        self.period
+    }
+
+    /// Whether the device with that index is the clock.
+    pub(crate) fn is_clock(&self, device: usize) -> bool {
+        self.clock == Clock::Device(device)
+    }
+
+    /// Whether a timer replaces the clock device.
+    pub(crate) const fn is_on_timer(&self) -> bool {
+        self.is_on_timer
+    }
+
+    /// Returns the latest time of the next tick [ns]. After it, the schedule no longer waits for the clock device.
+    pub(crate) fn deadline(&self) -> i64 {
+        let periods = if self.is_on_timer || self.clock == Clock::Rate { 1 } else { MAX_MISSED_PERIODS };
+        match (self.last, self.clock) {
+            (Some(last), _) => last + periods * self.period,
+            (None, Clock::Rate) => 0,
+            (None, Clock::Device(_)) => periods * self.period,
+        }
+    }
+
+    /// Returns the time of the next tick, given the time of the clock device's next sample [ns].
+    pub(crate) fn next(&self, sample: Option<i64>) -> i64 {
+        let next = sample.map_or(self.deadline(), |sample| sample.min(self.deadline()));
+        self.last.map_or(next, |last| next.max(last + 1))
+    }
+
+    /// Records a tick at `now` [ns]. `has_sampled`: whether the clock device has sampled since the last tick.
+    pub(crate) fn ticked(&mut self, now: i64, has_sampled: bool) {
+        self.is_on_timer = self.clock != Clock::Rate && !has_sampled;
+        self.last = Some(now);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_clock_device_that_misses_three_periods_is_replaced_by_a_timer_until_it_is_back() {
+        let mut schedule = TickSchedule::new(Clock::Device(0), 10);
+        let mut samples = [0, 10, 20, 100, 110].into_iter().peekable();
+        let mut ticks = Vec::new();
+        while let Some(&sample) = samples.peek() {
+            let now = schedule.next(Some(sample));
+            ticks.push(now);
+            schedule.ticked(now, sample <= now);
+            samples.next_if(|sample| *sample <= now);
+        }
+        assert_eq!(ticks, [0, 10, 20, 50, 60, 70, 80, 90, 100, 110]);
+    }
+
+    #[test]
+    fn a_rate_ticks_from_zero() {
+        let mut schedule = TickSchedule::new(Clock::Rate, 4);
+        for expected in [0, 4, 8] {
+            let now = schedule.next(None);
+            assert_eq!(now, expected);
+            schedule.ticked(now, false);
+        }
+    }
+}

@@ -1,0 +1,151 @@
+//! A live driver in a test, without a graph.
+
+use std::path::Path;
+use std::time::{Duration, Instant};
+
+use tokio::runtime::{Builder, Runtime};
+use tokio::task::JoinHandle;
+
+use crate::device::{
+    Commands, Description, Device, DeviceError, Driver, Linked, Opened, Output, Samples, State, device_type, link,
+};
+use crate::node::{Mistakes, Reader};
+use crate::signal::Signal;
+use crate::source::{SourceMap, parse_table};
+
+/// A live device that runs on a tokio runtime of its own, in real time. The test takes the place of the graph: it waits
+/// for samples, sends commands and stops the device. Ports are named without their role: `value`.
+pub struct LinkRig {
+    description: Description,
+    linked: Linked,
+    samples: Samples,
+    commands: Commands,
+    /// For each output, how many of its samples [`next`](Self::next) has returned.
+    seen: Vec<u64>,
+    driver: JoinHandle<Result<(), DeviceError>>,
+    runtime: Runtime,
+}
+
+impl LinkRig {
+    /// Opens a device with the parameters of a TOML text and starts it.
+    ///
+    /// # Errors
+    /// What is wrong with the parameters.
+    ///
+    /// # Panics
+    /// If the text is not TOML, or if the device is not live.
+    pub fn start<D: Device>(params: &str) -> Result<Self, Mistakes> {
+        let mut sources = SourceMap::default();
+        let table = parse_table(sources.add_file(Path::new("test.toml"), params));
+        let table = table.unwrap_or_else(|errors| panic!("{errors:?}"));
+        let mut reader = Reader::new(&sources);
+        let opened = device_type::<D>().open(&table, &mut reader);
+        let Some(Opened { description, driver }) = opened.filter(|_| reader.mistakes.is_empty()) else {
+            return Err(reader.mistakes);
+        };
+        let Driver::Live(driver) = driver else { panic!("`{}` is a stepped device", D::NAME) };
+        let runtime = Builder::new_multi_thread().worker_threads(1).enable_all().build();
+        let runtime = runtime.expect("the operating system gives a thread");
+        let (samples, commands) = (Samples::of(&description), Commands::of(&description));
+        let (theirs, linked) = link(&samples, &commands, Instant::now());
+        let driver = runtime.spawn(driver.run(theirs));
+        let seen = vec![0; samples.ports.len()];
+        Ok(Self { description, linked, samples, commands, seen, driver, runtime })
+    }
+
+    /// Waits for the next sample of a port. Returns `None` if none comes within `timeout`.
+    ///
+    /// # Panics
+    /// If the device has no such output of that kind.
+    pub fn next<T: Signal>(&mut self, port: &str, timeout: Duration) -> Option<&T> {
+        let output = self.output::<T>(port);
+        let seen = self.seen[output.port];
+        let is_there = self.wait_until(timeout, |rig| rig.samples.ports[output.port].writes > seen);
+        self.seen[output.port] = self.samples.ports[output.port].writes;
+        if is_there { self.samples.get(output) } else { None }
+    }
+
+    /// Waits until `is_so`, for `timeout` at most. Returns whether it is.
+    pub fn wait_until(&mut self, timeout: Duration, is_so: impl Fn(&Self) -> bool) -> bool {
+        let end = Instant::now() + timeout;
+        loop {
+            self.linked.receive(&mut self.samples);
+            if is_so(self) {
+                return true;
+            }
+            if Instant::now() >= end {
+                return false;
+            }
+            std::thread::sleep(Duration::from_millis(1));
+        }
+    }
+
+    /// Returns the newest value of a port, or `None` while it is absent or lost.
+    ///
+    /// # Panics
+    /// If the device has no such output of that kind.
+    #[must_use]
+    pub fn get<T: Signal>(&self, port: &str) -> Option<&T> {
+        self.samples.get(self.output::<T>(port))
+    }
+
+    /// Returns why a port is lost, or `None` if it is not.
+    ///
+    /// # Panics
+    /// If the device has no such output.
+    #[must_use]
+    pub fn lost(&self, port: &str) -> Option<&str> {
+        let index = self.description.outputs.iter().position(|output| output.name == port);
+        let index = index.unwrap_or_else(|| panic!("the device has no output `{port}`"));
+        match &self.samples.ports[index].state {
+            State::Lost(why) => Some(why),
+            State::Value | State::Absent => None,
+        }
+    }
+
+    /// Returns how often the device has counted something; see [`Samples::count`].
+    #[must_use]
+    pub fn count(&self, what: &str) -> u64 {
+        self.samples.counts.iter().find(|(known, _)| *known == what).map_or(0, |(_, count)| *count)
+    }
+
+    /// Sends a command, one value per joint.
+    ///
+    /// # Panics
+    /// If the device has no such command, or another number of joints.
+    pub fn command(&mut self, port: &str, values: &[f64]) {
+        let command = self.description.command(port).unwrap_or_else(|| panic!("the device has no command `{port}`"));
+        self.commands.command(command, values);
+        self.linked.send(&self.commands);
+    }
+
+    /// Reports a value to the device.
+    ///
+    /// # Panics
+    /// If the device reads no such report of that kind.
+    pub fn report<T: Signal>(&mut self, port: &str, value: &T) {
+        let report = self.description.report::<T>(port);
+        let report = report.unwrap_or_else(|| panic!("the device reads no report `{port}` of that kind"));
+        self.commands.tell(report, value);
+        self.linked.send(&self.commands);
+    }
+
+    /// Stops the device and waits until it has ended, for a second at most.
+    ///
+    /// # Errors
+    /// Why the device failed, panicked, or did not end.
+    pub fn stop(self) -> Result<(), DeviceError> {
+        const GRACE: Duration = Duration::from_secs(1);
+        self.linked.stop.send_replace(true);
+        match self.runtime.block_on(async { tokio::time::timeout(GRACE, self.driver).await }) {
+            Ok(Ok(ended)) => ended,
+            Ok(Err(error)) => Err(DeviceError(error.to_string())),
+            Err(_) => Err(DeviceError(format!("it does not end within {GRACE:?} of its stop"))),
+        }
+    }
+
+    fn output<T: Signal>(&self, port: &str) -> Output<T> {
+        let output = self.description.output(port);
+        output.unwrap_or_else(|| panic!("the device has no output `{port}` of the kind {}", T::KIND))
+    }
+}
