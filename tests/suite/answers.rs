@@ -255,15 +255,15 @@ fn a_broken_graph_is_not_shown() {
 
 #[test]
 fn diagnostics_are_there_for_programs() {
-    let said = json(&["check", HYBRID, "tests/errors/frame_mismatch.toml", "tests/errors/unread_node.toml"], 2);
+    let said = json(&["check", HYBRID, "tests/errors/frame_mismatch.toml", "tests/errors/unused_node.toml"], 2);
     let lines = [
         "graphs/hybrid.toml: ok True, 24 nodes, 0.004 s",
         "tests/errors/frame_mismatch.toml: ok False",
-        "tests/errors/unread_node.toml: ok True, 17 nodes, 0.004 s",
+        "tests/errors/unused_node.toml: ok True, 17 nodes, 0.004 s",
     ];
     assert_lines(&said, &lines);
     assert!(said.contains("error[frame-mismatch] tests/errors/frame_mismatch.toml:"), "{said}");
-    assert!(said.contains("warning[unread-node] tests/errors/unread_node.toml:"), "{said}");
+    assert!(said.contains("warning[unused-node] tests/errors/unused_node.toml:"), "{said}");
     let part = json(&["check", "tests/errors/loop.toml"], 2);
     assert!(part.contains("error[loop] "), "{part}");
     let missing = json(&["check", "no/such.toml"], 2);
@@ -275,13 +275,13 @@ fn diagnostics_are_there_for_programs() {
 
 #[test]
 fn a_warning_fails_nothing_unless_it_is_asked_to() {
-    let graph = "tests/errors/unread_node.toml";
+    let graph = "tests/errors/unused_node.toml";
     let told = say(&["check", graph]);
     assert_eq!(
         (told.code, told.out.as_str()),
-        (0, "tests/errors/unread_node.toml: ok, 17 nodes, one tick every 4 ms\n")
+        (0, "tests/errors/unused_node.toml: ok, 17 nodes, one tick every 4 ms\n")
     );
-    assert!(told.err.starts_with("warning[unread-node]: nothing reads any output of `label`\n"), "{}", told.err);
+    assert!(told.err.starts_with("warning[unused-node]: no output of `label` is used\n"), "{}", told.err);
     assert!(told.err.ends_with("\n3 warnings\n"), "{}", told.err);
     let denied = say(&["check", "--deny-warnings", graph]);
     assert_eq!((denied.code, denied.out.as_str(), denied.err), (2, "", told.err.clone()));
@@ -299,8 +299,8 @@ fn a_deleted_wire_leaves_a_node_that_nobody_reads() {
     fs::write(&path, text.replace("\"benches/", "\"../benches/")).unwrap();
     let said = say(&["check", path.to_str().unwrap()]);
     assert_eq!(said.code, 0, "{}", said.err);
-    assert!(said.err.contains("nothing reads any output of `guide`"), "{}", said.err);
-    assert!(said.err.contains("help: add `in.NAME = \"guide.twist\"` to `sum`, or take it out"), "{}", said.err);
+    assert!(said.err.contains("no output of `guide` is used"), "{}", said.err);
+    assert!(said.err.contains("help: add `in.NAME = \"guide.twist\"` to `sum`, or remove `guide`"), "{}", said.err);
 }
 
 #[test]

@@ -47,7 +47,9 @@ fn what_is_delayed_has_the_unit_that_was_declared() {
     let report = load(text).err().expect("a pressure is no kPa here");
     let said = report.render(false);
     assert!(
-        said.contains("`smooth.value` is in `N/tactel`, but `delay.value` takes `kPa` like `delay.value`"),
+        said.contains(
+            "`smooth.value` is in `N/tactel`, but `delay.value` takes `kPa`, the unit of the output `delay.value`"
+        ),
         "{said}"
     );
     assert_eq!(report.diagnostics.len(), 1, "{said}");

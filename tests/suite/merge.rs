@@ -119,7 +119,7 @@ fn a_mistake_shows_where_the_value_stands_that_is_in_force() {
             &[],
             "unknown-fact",
             "graph.toml:14:24",
-            "the device behind `pad` states no `thresh`",
+            "the device of role `pad` has no fact `thresh`",
         ),
         ("set.inner.three.by = 1.0", &[], "unknown-key", "graph.toml:14:11", "the part has no node or part `three`"),
     ];

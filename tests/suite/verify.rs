@@ -267,7 +267,7 @@ fn what_cannot_be_a_scenario_is_told() {
         ),
         (
             "[scenario]\ngraph = 'TESTS/../graphs/hybrid.toml'\nbench = 'TESTS/scenarios/benches/slide.toml'\nfor_s = 1.0\n",
-            "error[unbound-role]: the bench binds role `arm` to no device",
+            "error[unbound-role]: the bench does not bind the role `arm`",
         ),
         (
             "[scenario]\ngraph = 'TESTS/scenarios/tasks/slide.toml'\nbench = 'no_device.toml'\nfor_s = 1.0\n",
@@ -275,7 +275,7 @@ fn what_cannot_be_a_scenario_is_told() {
         ),
         (
             "[scenario]\ngraph = 'TESTS/scenarios/tasks/slide.toml'\nbench = 'live.toml'\nfor_s = 1.0\n",
-            "error[unbound-role]: the bench binds role `pad` to no device",
+            "error[unbound-role]: the bench does not bind the role `pad`",
         ),
     ];
     let live = "graph.rate_hz = 100\nroles.length = 'length'\nbind.length = 'length'\n\
@@ -303,7 +303,7 @@ fn check_knows_a_scenario_and_run_says_what_it_is() {
     );
     let run = say(&["run", SLIDE]);
     assert!(run.code == 2 && run.err.contains("this is a scenario, not a graph"), "{}", run.err);
-    assert!(run.err.contains("help: `tactflow verify` runs it"), "{}", run.err);
+    assert!(run.err.contains("help: run it with `tactflow verify`"), "{}", run.err);
 }
 
 #[test]

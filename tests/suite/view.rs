@@ -128,7 +128,7 @@ fn what_only_the_page_shows_is_not_lost() {
     let extra = ["--set=nodes.extra.type=smooth", "--set=nodes.extra.in.value=touch.x", "--deny-warnings"];
     let check = |more: &[&str]| say(&[&["check", HYBRID], &extra[..], more].concat());
     let lost = check(&[]);
-    assert!(lost.code == 2 && lost.err.contains("nothing reads any output of `extra`"), "{}", lost.err);
+    assert!(lost.code == 2 && lost.err.contains("no output of `extra` is used"), "{}", lost.err);
     assert_eq!(check(&["--set=graph.show=['extra.value']"]).err, "");
 }
 

@@ -9,7 +9,7 @@ use super::shell::Shell;
 use super::shell::command::{GraphArgs, OutputFormat};
 use super::text::number::milliseconds;
 use crate::graph::{
-    Compiled, NOWHERE, Origin, OutlinedBlock, OutlinedWire, OutlinedWord, PlannedPort, Setting, compile,
+    Compiled, NO_SPAN, Origin, OutlinedBlock, OutlinedWire, OutlinedWord, PlannedPort, Setting, compile,
 };
 use crate::signal::Shape;
 use crate::source::{Item, Key, Location, SourceMap, Value};
@@ -167,7 +167,7 @@ fn tall(value: &Value) -> Option<String> {
             .as_table()
             .into_iter()
             .flat_map(|table| &table.entries)
-            .filter(|(key, _)| key.span == NOWHERE)
+            .filter(|(key, _)| key.span == NO_SPAN)
             .map(|(key, _)| key.name.as_str())
             .collect();
         if let Some(line) = lines.last_mut().filter(|_| !defaults.is_empty()) {

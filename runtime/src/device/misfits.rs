@@ -2,7 +2,7 @@
 
 use super::{Description, RoleType, StatedPort};
 use crate::node::{PortSpec, UnitPattern, unit_pattern};
-use crate::source::closest;
+use crate::source::suggestion;
 
 impl Description {
     /// Returns every difference between what the device states of one of its roles and what the role declares.
@@ -30,7 +30,7 @@ fn misfits(sort: &str, stated: &[StatedPort], fill: usize, declared: &[PortSpec]
 /// Returns what is wrong with one port.
 fn misfit(sort: &str, port: &StatedPort, declared: &[PortSpec]) -> Option<String> {
     let Some(spec) = declared.iter().find(|spec| spec.name == port.name) else {
-        let help = closest(&port.name, declared.iter().map(|spec| &*spec.name), &format!("{sort}s"));
+        let help = suggestion(&port.name, declared.iter().map(|spec| &*spec.name), &format!("{sort}s"));
         return Some(format!("is unknown ({help})"));
     };
     let kind = port.shape.kind();

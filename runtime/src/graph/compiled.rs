@@ -1,15 +1,15 @@
-//! A graph that is checked and built: the plan, what a run shows, and what can be asked of it.
+//! The compiled graph: its plan, its view and its outline.
 
 use crate::device::Driver;
 use crate::graph::outline::Outline;
 use crate::graph::plan::{Plan, PlannedPort, PlannedView, Producer};
 use crate::source::{Diagnostic, Report, SourceMap};
 
-/// A graph that is checked and built, with everything that is known of it.
+/// A graph that was checked and built.
 pub struct Compiled {
-    /// What the tick needs.
+    /// What the engine needs.
     pub(crate) plan: Plan,
-    /// What a run shows.
+    /// The ports that a run shows.
     pub(crate) view: PlannedView,
     pub(crate) sources: SourceMap,
     pub(crate) warnings: Vec<Diagnostic>,
@@ -19,34 +19,43 @@ pub struct Compiled {
 }
 
 impl Compiled {
-    /// What may not be as it was meant, though the graph loads; none if there is nothing.
+    /// Returns the warnings, or `None` if there are none.
     #[must_use]
     pub fn warnings(&self) -> Option<Report> {
         let report = || Report::new(self.sources.clone(), self.warnings.clone());
         (!self.warnings.is_empty()).then(report)
     }
 
-    /// Every port of the graph: those of the roles, then those of the nodes in the order in which they step.
+    /// Returns all ports: those of the roles, then those of the nodes in step order.
     pub fn ports(&self) -> impl Iterator<Item = &PlannedPort> {
         let roles = self.plan.roles.iter().flat_map(|role| &role.ports);
         roles.chain(self.plan.nodes.iter().flat_map(|node| &node.ports))
     }
 
-    /// What the parts of the graph export, as its wires name it, and the port behind each.
+    /// Returns the exports of the parts, each with the full name of the port behind it.
     #[must_use]
     pub fn exports(&self) -> &[(String, String)] {
         &self.exports
     }
 
-    /// The port of that name, as the record names it or as the wires of the task do.
+    /// Returns the port with a full name, as in a recording, or with the name of an export, as in a wire.
     #[must_use]
-    pub fn port(&self, word: &str) -> Option<&PlannedPort> {
-        let export = self.exports.iter().find(|(export, _)| export == word);
-        let name = export.map_or(word, |(_, port)| port.as_str());
+    pub fn port(&self, name: &str) -> Option<&PlannedPort> {
+        let export = self.exports.iter().find(|(export, _)| export == name);
+        let name = export.map_or(name, |(_, port)| port.as_str());
         self.ports().find(|port| port.name == name)
     }
 
-    /// The ports that the graph reports to its devices.
+    /// Finds the port at the start of a dotted name, and returns it with the rest of the name.
+    ///
+    /// The rest is empty, or it starts with a dot and names a part of the value, for example `.x`.
+    #[must_use]
+    pub fn port_prefix<'n>(&self, name: &'n str) -> Option<(&PlannedPort, &'n str)> {
+        let ends = std::iter::once(name.len()).chain(name.rmatch_indices('.').map(|(at, _)| at));
+        ends.into_iter().find_map(|end| Some((self.port(&name[..end])?, &name[end..])))
+    }
+
+    /// Returns the ports that the graph reports to its devices.
     pub fn reported(&self) -> impl Iterator<Item = &PlannedPort> {
         self.plan.reports.iter().filter_map(|report| {
             let ports = match report.source.producer {
@@ -57,46 +66,46 @@ impl Compiled {
         })
     }
 
-    /// What the devices state of themselves: `role.fact`, and the value.
+    /// Returns the facts of the devices: `role.fact` and the value.
     #[must_use]
     pub fn facts(&self) -> &[(String, toml::Value)] {
         &self.facts
     }
 
-    /// The names of the modes, in the order of the file.
+    /// Returns the names of the modes in file order.
     pub fn modes(&self) -> impl Iterator<Item = &str> {
         self.plan.modes.iter().flat_map(|modes| &modes.modes).map(|mode| mode.name.as_str())
     }
 
-    /// The graph as it runs, with where each value comes from.
+    /// Returns the outline: the graph as it runs, with the origin of each value.
     #[must_use]
     pub const fn outline(&self) -> &Outline {
         &self.outline
     }
 
-    /// The outputs of a node.
+    /// Returns the outputs of a node.
     pub fn outputs(&self, node: &str) -> impl Iterator<Item = &PlannedPort> {
         self.plan.nodes.iter().filter(move |planned| planned.name == node).flat_map(|planned| &planned.ports)
     }
 
-    /// The names of the nodes in the order in which they step.
+    /// Returns the names of the nodes in step order.
     pub fn order(&self) -> impl Iterator<Item = &str> {
         self.plan.nodes.iter().map(|node| node.name.as_str())
     }
 
-    /// Whether any device runs on its own, so that only real time will do.
+    /// Returns whether a device is live, so that the graph runs only in real time.
     #[must_use]
     pub fn is_live(&self) -> bool {
         self.plan.devices.iter().any(|device| matches!(device.driver, Driver::Live(_)))
     }
 
-    /// Nominal time between two ticks [s].
+    /// Returns the nominal time between two ticks [s].
     #[must_use]
     pub fn period(&self) -> f64 {
         self.plan.period as f64 * 1e-9
     }
 
-    /// The texts the graph was read from.
+    /// Returns the source texts of the graph.
     #[must_use]
     pub const fn sources(&self) -> &SourceMap {
         &self.sources

@@ -1,9 +1,9 @@
-//! A graph: text in, plan or all mistakes out. Pure, but for the files it reads.
+//! Graphs: from text to a plan, or to all diagnostics. The only side effect is reading files.
 //!
-//! From the ground up, each importing only what stands before it: `port` (names for ports), `syntax` (text to
-//! sections), `flat` and `load` (files, parts and `--set` become one flat graph), `net` (declarations, wires, order),
-//! `bench` and `facts` (devices are opened), `plan` (what the engine needs), `check` (one check per file), `build`
-//! (nodes, modes), `outline` (a graph as it runs) and `compile`, which calls them in order.
+//! The modules in order; each imports only earlier ones: `syntax` (text to sections), `load` (files, parts and `--set`
+//! to one flat graph), `plan` (what the engine needs), `net` (declarations, wires, step order), `bench` (opens devices),
+//! `check` (one check per file), `build` (nodes and modes), `outline` (the graph with the origin of each value) and
+//! `compile`, which calls them in order.
 
 mod bench;
 mod build;
@@ -20,9 +20,9 @@ pub use compile::compile;
 pub(crate) use compile::compile_in;
 pub use compiled::Compiled;
 pub use load::Request;
-pub(crate) use load::{Loader, other_file};
+pub(crate) use load::{Loader, wrong_file_type};
 pub use outline::{
-    NOWHERE, Origin, Outline, OutlinedBlock, OutlinedMode, OutlinedPort, OutlinedRole, OutlinedWire, OutlinedWord,
+    NO_SPAN, Origin, Outline, OutlinedBlock, OutlinedMode, OutlinedPort, OutlinedRole, OutlinedWire, OutlinedWord,
     Setting,
 };
 pub use plan::PlannedPort;
@@ -31,4 +31,4 @@ pub(crate) use plan::{
     PlannedRole, PlannedShow, PlannedView, PlannedWire, PortRef, Producer, Test,
 };
 pub use syntax::Policy;
-pub(crate) use syntax::{Age, PolicyTable, Sort, spanned};
+pub(crate) use syntax::{AgeLimit, ExitKind, PolicyTable, into_diagnostic};

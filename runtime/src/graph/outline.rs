@@ -1,20 +1,20 @@
-//! A graph as it runs, for `show`: parts are expanded, and every value has its origin in a file, a default or a fact.
+//! The outline of a graph, for `show`: parts are expanded, and every value has its origin in a file, a default or a fact.
 
 use std::ops::Range;
 use std::path::Path;
 
 use serde::Serialize;
 
-use crate::graph::bench::Opened;
+use crate::graph::bench::OpenedBench;
 use crate::graph::bench::fill_facts;
-use crate::graph::net::{CommandWire, Net, Origin as WireOrigin, Wire};
+use crate::graph::net::{CommandWire, Net, Wire, WireOrigin};
 use crate::graph::plan::{PlannedNode, PlannedPort, PortRef};
 use crate::graph::syntax::{Block, GraphTable, ModeBlock, PolicyTable};
 use crate::node::{FilePath, Param, ParamSpec, Repeats, Word};
-use crate::source::{Item, Key, Location, SourceMap, Table, Value, parse_table};
+use crate::source::{Diagnostics, Item, Key, Location, SourceMap, Table, Value, parse_table};
 
-/// The span of a default inside a list of tables, which stands in no file.
-pub const NOWHERE: Range<usize> = 0..0;
+/// The span of a default inside a list of tables, which was not written anywhere.
+pub const NO_SPAN: Range<usize> = 0..0;
 
 /// A graph as it runs.
 #[derive(Debug, Clone, Default, Serialize)]
@@ -148,10 +148,10 @@ pub enum Origin {
     },
 }
 
-/// What the outline of a valid graph is made from.
-pub(crate) struct Parts<'a> {
+/// Builds the outline of a graph without mistakes.
+pub(crate) struct OutlineBuilder<'a> {
     pub(crate) net: &'a Net<'a>,
-    pub(crate) opened: &'a Opened,
+    pub(crate) opened: &'a OpenedBench,
     pub(crate) sources: &'a SourceMap,
     /// The nodes, in the order in which they step.
     pub(crate) nodes: &'a [PlannedNode],
@@ -161,10 +161,10 @@ pub(crate) struct Parts<'a> {
     pub(crate) max_gap: f64,
 }
 
-impl Parts<'_> {
-    pub(crate) fn outline(&self) -> Outline {
+impl OutlineBuilder<'_> {
+    pub(crate) fn build(&self) -> Outline {
         let flat = self.net.flat;
-        let command = |wire: &CommandWire| self.wire(self.net.taken_name(wire), wire.source, &wire.origin);
+        let command = |wire: &CommandWire| self.wire(self.net.command_name(wire), wire.source, &wire.origin);
         Outline {
             period_s: self.period,
             settings: self.graph(),
@@ -184,7 +184,7 @@ impl Parts<'_> {
         settings.retain(|setting| setting.path != "bench");
         if !settings.iter().any(|setting| setting.path == "max_gap_ms") {
             // A whole number of microseconds, so that no digits are there by chance.
-            let gap = Value { span: NOWHERE, item: Item::Float((self.max_gap * 1e6).round() * 1e-3) };
+            let gap = Value { span: NO_SPAN, item: Item::Float((self.max_gap * 1e6).round() * 1e-3) };
             settings.push(Setting { path: "max_gap_ms".into(), value: gap, origin: Origin::Default });
         }
         settings
@@ -301,7 +301,7 @@ impl Parts<'_> {
         });
         let mut filled = value.clone();
         // The graph has no mistakes, so every fact is there.
-        fill_facts(&mut filled, self.net, self.opened, &mut Vec::new());
+        fill_facts(&mut filled, self.net, self.opened, &mut Diagnostics::new());
         let bound = role.and_then(|role| self.opened.roles[role].as_ref());
         let origin = match (word, bound) {
             (Some(word), Some(bound)) => {
@@ -368,8 +368,8 @@ fn complete(value: &mut Value, spec: &ParamSpec) {
         let Item::Table(table) = &mut item.item else { continue };
         for field in &spec.fields {
             let default = default(field).filter(|_| table.get(field.name).is_none());
-            let key = Key { name: field.name.to_owned(), span: NOWHERE };
-            table.entries.extend(default.map(|value| (key, Value { span: NOWHERE, ..value })));
+            let key = Key { name: field.name.to_owned(), span: NO_SPAN };
+            table.entries.extend(default.map(|value| (key, Value { span: NO_SPAN, ..value })));
         }
     }
 }
@@ -380,5 +380,5 @@ fn default(spec: &ParamSpec) -> Option<Value> {
     let mut sources = SourceMap::default();
     let parsed = parse_table(sources.add_file(Path::new("default"), format!("value = {text}")));
     let value = parsed.ok().and_then(|value| value.as_table()?.get("value").cloned());
-    Some(value.unwrap_or_else(|| Value { span: NOWHERE, item: Item::String(text.clone()) }))
+    Some(value.unwrap_or_else(|| Value { span: NO_SPAN, item: Item::String(text.clone()) }))
 }

@@ -9,7 +9,7 @@ use crate::engine::Engine;
 use crate::fault::Fault;
 use crate::graph::{Request, compile};
 use crate::signal::{Freshness, Signal};
-use crate::source::{Report, closest};
+use crate::source::{Report, suggestion};
 
 /// A graph in virtual time, some or all of whose roles the test feeds. Ports are named as in the graph: `pad.image`.
 ///
@@ -126,7 +126,7 @@ impl GraphRig {
     fn role(&mut self, role: &str) -> &mut Fed {
         let roles: Vec<String> = self.fed.iter().map(|fed| fed.role.clone()).collect();
         self.fed.iter_mut().find(|fed| fed.role == role).unwrap_or_else(|| {
-            panic!("no role `{role}` is fed: {}", closest(role, roles.iter().map(String::as_str), "fed roles"))
+            panic!("no role `{role}` is fed: {}", suggestion(role, roles.iter().map(String::as_str), "fed roles"))
         })
     }
 
@@ -136,7 +136,7 @@ impl GraphRig {
         let found = fed.outputs.iter().position(|(output, _)| output == name);
         let output = found.unwrap_or_else(|| {
             let names = fed.outputs.iter().map(|(output, _)| output.as_str());
-            panic!("role `{role}` has no output `{name}`: {}", closest(name, names, "outputs"))
+            panic!("role `{role}` has no output `{name}`: {}", suggestion(name, names, "outputs"))
         });
         (fed, output)
     }

@@ -7,7 +7,7 @@ use std::path::PathBuf;
 
 use super::{At, Bounds, Mistake, Mistakes, ParamSpec, Reader, Repeats, Written, read_leaf};
 use crate::signal::Unit;
-use crate::source::{Code, closest, meant};
+use crate::source::{Code, suggest_name, suggestion};
 use crate::source::{Item, Key, Value};
 
 /// Something a graph file may set.
@@ -413,12 +413,12 @@ impl<T> Map<T> {
         for key in self.0.keys() {
             if !names.clone().any(|name| name == key) {
                 let help = renamed.map(|name| format!("did you mean `{name}`?"));
-                let help = help.unwrap_or_else(|| closest(key, names.clone(), "features"));
+                let help = help.unwrap_or_else(|| suggestion(key, names.clone(), "features"));
                 mistakes
                     .push(Mistake::key(format!("{param}.{key}"), format!("no feature is called `{key}`")).help(help));
             }
         }
-        let is_misspelt = |name: &str| self.0.keys().any(|key| meant(key, names.clone()) == Some(name));
+        let is_misspelt = |name: &str| self.0.keys().any(|key| suggest_name(key, names.clone()) == Some(name));
         let is_told = |name: &str| renamed == Some(name) || is_misspelt(name);
         for name in names.clone().filter(|name| !self.0.contains_key(*name) && !is_told(name)) {
             let message = format!("`{param}` has no entry for feature `{name}`");

@@ -5,7 +5,7 @@ use std::ops::Range;
 use serde::de::DeserializeOwned;
 
 use super::{At, Bounds, Declared, FilePath, Mistake, Mistakes, Param};
-use crate::source::{Code, closest, meant};
+use crate::source::{Code, suggest_name, suggestion};
 use crate::source::{Item, Key, SourceMap, Table, Value};
 
 /// Collects the mistakes while parameters are read.
@@ -111,13 +111,13 @@ impl<'a> Reader<'a> {
         // One that is missing and one that is strange are one mistake.
         let is_renamed = match (table.missing.as_slice(), table.rest.entries.as_slice()) {
             ([(missing, _)], [(strange, _)]) => {
-                meant(&strange.name, known.iter().copied()).is_none_or(|m| m == *missing)
+                suggest_name(&strange.name, known.iter().copied()).is_none_or(|m| m == *missing)
             }
             _ => false,
         };
         let renamed = table.missing.first().filter(|_| is_renamed).map(|(name, _)| format!("did you mean `{name}`?"));
         for (name, expects) in table.missing {
-            let is_misspelt = |(key, _): &(Key, Value)| meant(&key.name, known.iter().copied()) == Some(name);
+            let is_misspelt = |(key, _): &(Key, Value)| suggest_name(&key.name, known.iter().copied()) == Some(name);
             if !is_renamed && !table.rest.entries.iter().any(is_misspelt) {
                 let message = format!("`{name}` is missing: expected {expects}");
                 self.mistakes.push(Mistake::new(Code::MissingKey, At::Span(table.span.clone()), message));
@@ -125,7 +125,7 @@ impl<'a> Reader<'a> {
         }
         for (key, _) in table.rest.entries {
             let message = format!("`{}` is not a parameter here", key.name);
-            let help = renamed.clone().unwrap_or_else(|| closest(&key.name, known.iter().copied(), "parameters"));
+            let help = renamed.clone().unwrap_or_else(|| suggestion(&key.name, known.iter().copied(), "parameters"));
             self.mistakes.push(Mistake::new(Code::UnknownKey, At::Span(key.span), message).help(help));
         }
     }

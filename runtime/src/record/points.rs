@@ -12,7 +12,7 @@ use crate::engine::Engine;
 use crate::graph::{Compiled, PlannedPort};
 use crate::node::PortId;
 use crate::signal::{Freshness, Kind, Pose};
-use crate::source::closest;
+use crate::source::suggestion;
 
 /// The value of the option `--points`: the ports to record and the file.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -82,7 +82,7 @@ fn look_up(plan: &Compiled, name: &str) -> Result<PlannedPort, String> {
     plan.port(name).cloned().ok_or_else(|| {
         let names = plan.exports().iter().map(|(export, _)| export.as_str());
         let names = names.chain(plan.ports().map(|port| port.name.as_str()));
-        format!("the graph has no port `{name}`: {}", closest(name, names, "ports"))
+        format!("the graph has no port `{name}`: {}", suggestion(name, names, "ports"))
     })
 }
 

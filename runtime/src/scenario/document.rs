@@ -139,7 +139,7 @@ pub(super) fn document(root: &Table, reader: &mut Reader<'_>) -> Document {
             "set" | "nodes" | "parts" | "devices" | "bind" => {
                 "a scenario cannot change its task or bench: write another task or bench for it".to_owned()
             }
-            name => crate::source::closest(name, ["scenario", "check"].into_iter(), "sections"),
+            name => crate::source::suggestion(name, ["scenario", "check"].into_iter(), "sections"),
         };
         reader.mistakes.push(Mistake::new(Code::UnknownKey, At::Span(key.span.clone()), message).help(help));
     }

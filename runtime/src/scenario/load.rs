@@ -6,7 +6,7 @@ use super::document::{Document, document};
 use super::lookup::look_up;
 use super::model::Scenario;
 use crate::catalogue::Catalogue;
-use crate::graph::{Loader, Request, compile_in, other_file, spanned};
+use crate::graph::{Loader, Request, compile_in, into_diagnostic, wrong_file_type};
 use crate::node::{FilePath, Reader};
 use crate::source::{Code, Diagnostic, Report, Table};
 
@@ -21,7 +21,7 @@ impl Scenario {
         let mut found = std::mem::take(&mut loader.diagnostics);
         let Some((root, place)) = root else { return Err(Report::new(loader.sources, found)) };
         if root.get("scenario").is_none() {
-            let what = other_file(&root, "scenario");
+            let what = wrong_file_type(&root, "scenario");
             let (code, message) = match what {
                 Some(what) => (Code::WrongFile, format!("this is {what}, not a scenario")),
                 None => (Code::MissingKey, "the scenario has no section [scenario]".to_owned()),
@@ -33,12 +33,13 @@ impl Scenario {
         }
         let mut reader = Reader::new(&loader.sources);
         let document = document(&root, &mut reader);
-        found.extend(reader.mistakes.into_iter().map(spanned));
+        found.extend(reader.mistakes.into_iter().map(into_diagnostic));
         let for_s = document.scenario.as_ref().map(|scenario| *scenario.for_s);
         found.extend(document.checks.iter().flat_map(|check| check.mistakes(for_s)));
         found.extend(without_checks(&root, &document));
         let files = document.files(&loader.sources);
-        let unreadable: Vec<Diagnostic> = files.iter().filter_map(|file| Some(spanned(file.bytes().err()?))).collect();
+        let unreadable: Vec<Diagnostic> =
+            files.iter().filter_map(|file| Some(into_diagnostic(file.bytes().err()?))).collect();
         let Some(request) = request(&files).filter(|_| unreadable.is_empty()) else {
             found.extend(unreadable);
             return Err(Report::new(loader.sources, found));

@@ -1,5 +1,6 @@
 //! Resolves the ports, modes, facts and seeds of a scenario in the plan of its task on its bench.
 
+use std::collections::BTreeSet;
 use std::path::Path;
 
 use super::document::{CheckBlock, CheckTable, Document, PaperTable, ScenarioTable};
@@ -10,7 +11,7 @@ use crate::graph::{Compiled, Request};
 use crate::node::Word;
 use crate::record::{Column, Columns};
 use crate::signal::Kind;
-use crate::source::{Code, Diagnostic, Report, closest, meant};
+use crate::source::{Code, Diagnostic, Report, suggest_name};
 use crate::source::{Item, Value};
 
 /// Default length of the steady state at the end of a run [s].
@@ -77,52 +78,41 @@ struct Lookup<'a> {
 impl Lookup<'_> {
     /// Finds a column by its name in a recording or in the wires of the task. Returns it with the kind of its port.
     fn column(&mut self, word: &Word) -> Option<(Column, Kind)> {
-        let alias = self.plan.exports().iter().find_map(|(export, port)| {
-            let rest = word.text.strip_prefix(export.as_str())?;
-            (rest.is_empty() || rest.starts_with('.')).then(|| format!("{port}{rest}"))
-        });
-        let name = alias.unwrap_or_else(|| word.text.clone());
-        for port in self.plan.ports() {
-            let columns = Columns::of(port);
-            if let Some(column) = columns.iter().find(|column| column.name == name) {
-                return Some((column.clone(), port.shape.kind()));
-            }
-            if port.name == name {
-                let kind = port.shape.kind().with_article();
-                let (message, help) = match columns.as_slice() {
-                    [] => (format!("`{}` is {kind}, which has no number to check", word.text), None),
-                    parts => {
-                        let parts = parts.iter().map(|part| {
-                            format!("`{}{}`", word.text, part.name.strip_prefix(&port.name).unwrap_or_default())
-                        });
-                        let help = format!("write one of {}", parts.collect::<Vec<_>>().join(", "));
-                        (format!("`{}` is {kind}, but a check needs one number", word.text), Some(help))
-                    }
-                };
-                let diagnostic = Diagnostic::new(Code::KindMismatch, word.span.clone(), message);
-                self.found.push(diagnostic.with_help(help));
-                return None;
-            }
+        let (port, rest) = self.plan.port_prefix(&word.text).or_else(|| self.unknown_port(word))?;
+        let (columns, kind) = (Columns::of(port), port.shape.kind());
+        let column = columns.iter().find(|column| column.name.strip_prefix(&port.name) == Some(rest));
+        if let Some(column) = column {
+            return Some((column.clone(), kind));
         }
-        let message = format!("there is no port `{}` in this task on this bench", word.text);
-        self.found.push(Diagnostic::new(Code::UnknownPort, word.span.clone(), message).help(self.nearest(&word.text)));
+        if !rest.is_empty() {
+            self.unknown_port(word)?;
+        }
+        let parts = columns.iter().map(|part| part.name.strip_prefix(&port.name).unwrap_or_default());
+        let parts: Vec<String> = parts.map(|part| format!("`{}{part}`", word.text)).collect();
+        let what = if parts.is_empty() { "which has no number to check" } else { "but a check needs one number" };
+        let message = format!("`{}` is {}, {what}", word.text, kind.with_article());
+        let help = (!parts.is_empty()).then(|| format!("write one of {}", parts.join(", ")));
+        self.found.push(Diagnostic::new(Code::KindMismatch, word.span.clone(), message).with_help(help));
         None
     }
 
-    /// Suggests a port for a name that does not exist.
-    fn nearest(&self, text: &str) -> String {
+    /// Reports a port that does not exist, with the closest name, the ports of its owner, or the owners.
+    fn unknown_port<T>(&mut self, word: &Word) -> Option<T> {
+        let message = format!("there is no port `{}` in this task on this bench", word.text);
+        let diagnostic = Diagnostic::new(Code::UnknownPort, word.span.clone(), message);
         let columns = self.plan.ports().flat_map(Columns::of).map(|column| column.name);
         let all: Vec<String> = columns.chain(self.plan.exports().iter().map(|(export, _)| export.clone())).collect();
-        if let Some(best) = meant(text, all.iter().map(String::as_str)) {
-            return format!("did you mean `{best}`?");
-        }
-        let owner = text.split('.').next().unwrap_or_default();
-        let of_owner = all.iter().filter(|name| name.split('.').next() == Some(owner)).map(String::as_str);
-        let owners = || all.iter().filter_map(|name| name.split('.').next()).collect::<std::collections::BTreeSet<_>>();
-        match of_owner.clone().next() {
-            Some(_) => closest(text, of_owner, "ports"),
-            None => closest(owner, owners().into_iter(), "roles, nodes and parts"),
-        }
+        let owner_of = |name: &'_ str| name.split('.').next().unwrap_or_default().to_owned();
+        let owner = owner_of(&word.text);
+        let is_close = suggest_name(&word.text, all.iter().map(String::as_str)).is_some();
+        let ports = all.iter().map(String::as_str).filter(|name| is_close || owner_of(name) == owner);
+        self.found.push(if ports.clone().next().is_some() {
+            diagnostic.suggest(&word.text, ports, "ports")
+        } else {
+            let owners: BTreeSet<String> = all.iter().map(|name| owner_of(name)).collect();
+            diagnostic.suggest(&owner, owners.iter().map(String::as_str), "roles, nodes and parts")
+        });
+        None
     }
 
     /// Finds the column of a flag.

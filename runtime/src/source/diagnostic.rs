@@ -1,4 +1,4 @@
-//! What is wrong with a graph file: the place, the mistake and a way out.
+//! Diagnostics: what is wrong in a graph file, where, and how to fix it.
 
 use std::fmt;
 use std::ops::Range;
@@ -6,11 +6,11 @@ use std::ops::Range;
 use annotate_snippets::{AnnotationKind, Group, Level, Renderer, Snippet};
 
 use super::map::{SourceFile, SourceMap};
-use super::suggest::closest;
+use super::suggest::suggestion;
 
 macro_rules! codes {
     ($($(#[doc = $doc:literal])* $Code:ident $name:literal),* $(,)?) => {
-        /// The sorts of mistakes a graph file can have.
+        /// The kind of a diagnostic.
         #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
         pub enum Code { $($(#[doc = $doc])* $Code),* }
 
@@ -18,7 +18,7 @@ macro_rules! codes {
             /// Every code.
             pub const ALL: &'static [Self] = &[$(Self::$Code),*];
 
-            /// Its name, as shown in brackets.
+            /// Returns the name shown in brackets.
             #[must_use]
             pub const fn name(self) -> &'static str {
                 match self { $(Self::$Code => $name),* }
@@ -32,89 +32,89 @@ codes! {
     Syntax "syntax",
     /// A file cannot be read.
     Unreadable "unreadable",
-    /// A file of data is not what it should be.
+    /// A data file has invalid content.
     BadData "bad-data",
-    /// A part or a bench where a graph is wanted, or the like.
+    /// A file of another type than expected, such as a part in place of a graph.
     WrongFile "wrong-file",
-    /// A key that means nothing here.
+    /// A key that is not allowed here.
     UnknownKey "unknown-key",
-    /// A key that must be there is not.
+    /// A required key is missing.
     MissingKey "missing-key",
-    /// A value of the wrong type or out of its range.
+    /// A value of the wrong type or out of range.
     BadValue "bad-value",
-    /// A name that cannot be one.
+    /// An invalid name.
     BadName "bad-name",
-    /// Two things with one name.
+    /// A name that is used twice.
     DuplicateName "duplicate-name",
-    /// A type that no catalogue lists.
+    /// A type that is not in the catalogue.
     UnknownType "unknown-type",
     /// A wire from a port that does not exist.
     UnknownPort "unknown-port",
     /// A wire to an input that does not exist.
     UnknownInput "unknown-input",
-    /// An input that needs a wire and has none.
+    /// A required input without a wire.
     MissingInput "missing-input",
-    /// A wire between two kinds.
+    /// A wire between ports of different kinds.
     KindMismatch "kind-mismatch",
-    /// A wire between two units.
+    /// A wire between ports of different units.
     UnitMismatch "unit-mismatch",
-    /// A wire between two frames.
+    /// A wire between ports in different frames.
     FrameMismatch "frame-mismatch",
-    /// A wire between two sizes.
+    /// A wire between ports of different sizes.
     ShapeMismatch "shape-mismatch",
-    /// Wires that run in a circle.
+    /// Wires that form a cycle.
     Loop "loop",
     /// A part that contains itself.
     EndlessPart "endless-part",
-    /// A fact that no device states.
+    /// A fact that the device does not provide.
     UnknownFact "unknown-fact",
-    /// A role that the bench binds to no device.
+    /// A role that the bench does not bind to a device.
     UnboundRole "unbound-role",
     /// A device that cannot fill the role it is bound to.
     WrongRole "wrong-role",
-    /// A task that reads what only a scenario and the recorder may read.
+    /// A task that reads a role reserved for scenarios and recordings.
     ObservedRole "observed-role",
-    /// A device that the bench does not have.
+    /// A device that the bench does not define.
     UnknownDevice "unknown-device",
-    /// A command of a device that nothing drives.
+    /// A command without a wire.
     UndrivenCommand "undriven-command",
-    /// A command that has not crossed every limit that its device asks for.
+    /// A command whose path lacks a limit that its role requires.
     UnlimitedCommand "unlimited-command",
-    /// A limit that a node asks for and [limits] does not say.
+    /// A value that a node reads from [limits] and that is missing there.
     MissingLimit "missing-limit",
-    /// A mode that is not there.
+    /// A mode that does not exist.
     UnknownMode "unknown-mode",
-    /// A mode that no way leads to.
+    /// A mode that cannot be reached from the start mode.
     UnreachableMode "unreachable-mode",
-    /// A way out of a mode that does not say what it waits for, or says too much.
+    /// An exit of a mode with no condition, or with contradictory keys.
     BadCondition "bad-condition",
-    /// Two ways out of a mode that can hold at once.
+    /// Two exits of a mode that can hold at once.
     OverlappingConditions "overlapping-conditions",
-    /// A bound that what it bounds never crosses, or always has.
+    /// A bound that is always true or never true within the range of its port.
     BoundOutOfRange "bound-out-of-range",
-    /// A port that is absent in a mode that looks at it.
+    /// A condition on a port that is absent in its mode.
     AbsentPort "absent-port",
     /// A parameter that a mode cannot set.
     NotLive "not-live",
-    /// Motion that starts by itself and that nothing ends.
+    /// Generated motion without a gate and without an end.
     UngatedMotion "ungated-motion",
-    /// A graph without a clock, or with one that cannot tick.
+    /// A graph without a clock, or with an invalid one.
     BadClock "bad-clock",
-    /// A node from which nothing follows that anything uses.
-    UnreadNode "unread-node",
+    /// A node whose outputs are not used.
+    UnusedNode "unused-node",
 }
 
-/// How bad it is.
+/// The severity of a diagnostic.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Severity {
     /// The graph does not load.
     Error,
-    /// The graph loads, but may not be what was meant.
+    /// The graph loads, but probably contains a mistake.
     Warning,
 }
 
 impl Severity {
-    /// Its name, as shown before the code.
+    /// Returns the name shown before the code.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
@@ -125,11 +125,11 @@ impl Severity {
 }
 
 impl Code {
-    /// How bad a mistake of this sort is.
+    /// Returns the severity of this code.
     #[must_use]
     pub const fn severity(self) -> Severity {
         match self {
-            Self::UnreadNode => Severity::Warning,
+            Self::UnusedNode => Severity::Warning,
             _ => Severity::Error,
         }
     }
@@ -141,47 +141,49 @@ impl fmt::Display for Code {
     }
 }
 
-/// One mistake of a graph, or something to be looked at.
+/// One error or warning about a graph file.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Diagnostic {
-    /// What sort of mistake.
+    /// The kind of diagnostic.
     pub code: Code,
     /// What is wrong: lower case, no full stop, names in backticks.
     pub message: String,
-    /// The smallest token that is wrong, in [`SourceMap`].
+    /// The smallest wrong token, as a range of the [`SourceMap`].
     pub span: Range<usize>,
-    /// Other places that matter, each with what it has to do with it.
+    /// Related places, each with a label.
     pub notes: Vec<(Range<usize>, String)>,
-    /// What to do.
+    /// How to fix it.
     pub help: Option<String>,
 }
 
 impl Diagnostic {
-    /// A mistake at a place.
+    /// Creates a diagnostic without notes and help.
     pub fn new(code: Code, span: Range<usize>, message: impl Into<String>) -> Self {
         Self { code, message: message.into(), span, notes: Vec::new(), help: None }
     }
 
-    /// The same with a way out.
+    /// Sets the help text.
     #[must_use]
     pub fn help(mut self, help: impl Into<String>) -> Self {
         self.help = Some(help.into());
         self
     }
 
-    /// The same with a suggestion for the misspelt `name`: the one of `known` that is near, or all of them.
+    /// Sets the help for an unknown `name`: the closest of the `known` names, or all of them.
+    ///
+    /// `what` names the known things in the plural, for example "roles".
     #[must_use]
     pub fn suggest<'n>(self, name: &str, known: impl Iterator<Item = &'n str>, what: &str) -> Self {
-        self.help(closest(name, known, what))
+        self.help(suggestion(name, known, what))
     }
 
-    /// The same with a way out, if there is one.
+    /// Sets or clears the help text.
     #[must_use]
     pub(crate) fn with_help(self, help: Option<String>) -> Self {
         Self { help, ..self }
     }
 
-    /// The same with another place that matters.
+    /// Adds a related place with a label.
     #[must_use]
     pub fn note(mut self, span: Range<usize>, text: impl Into<String>) -> Self {
         self.notes.push((span, text.into()));
@@ -189,25 +191,28 @@ impl Diagnostic {
     }
 }
 
-/// Everything that is wrong with a graph, with the texts it stands in.
+/// A list of diagnostics, in the order in which they were found.
+pub type Diagnostics = Vec<Diagnostic>;
+
+/// All diagnostics of a graph, with the texts they refer to.
 #[derive(Debug, Clone)]
 pub struct Report {
     /// The files that were read.
     pub sources: SourceMap,
-    /// What is wrong, in the order of the places.
-    pub diagnostics: Vec<Diagnostic>,
+    /// The diagnostics in the order of their places.
+    pub diagnostics: Diagnostics,
 }
 
 impl Report {
-    /// The mistakes in the order of their places, each once.
+    /// Sorts the diagnostics by place and removes duplicates.
     #[must_use]
-    pub fn new(sources: SourceMap, mut diagnostics: Vec<Diagnostic>) -> Self {
+    pub fn new(sources: SourceMap, mut diagnostics: Diagnostics) -> Self {
         diagnostics.sort_by(|a, b| (a.span.start, a.span.end, &a.message).cmp(&(b.span.start, b.span.end, &b.message)));
         diagnostics.dedup();
         Self { sources, diagnostics }
     }
 
-    /// The text for a person, with or without colours.
+    /// Formats all diagnostics for a terminal, with or without colours.
     #[must_use]
     pub fn render(&self, has_colour: bool) -> String {
         let renderer = if has_colour { Renderer::styled() } else { Renderer::plain() };
@@ -228,12 +233,12 @@ impl Report {
 
     fn render_one(&self, diagnostic: &Diagnostic, renderer: &Renderer) -> String {
         let main = self.sources.file_at(diagnostic.span.start);
-        let place = AnnotationKind::Primary.span(shown(main, &diagnostic.span));
+        let place = AnnotationKind::Primary.span(marked(main, &diagnostic.span));
         let mut snippet = Snippet::source(&main.text).path(&main.name).annotation(place);
         let mut others: Vec<Group<'_>> = Vec::new();
         for (span, label) in &diagnostic.notes {
             let file = self.sources.file_at(span.start);
-            let place = AnnotationKind::Context.span(shown(file, span));
+            let place = AnnotationKind::Context.span(marked(file, span));
             if std::ptr::eq(file, main) {
                 snippet = snippet.annotation(place.label(label));
             } else {
@@ -255,9 +260,9 @@ impl Report {
     }
 }
 
-/// As much of a place as is marked: nobody reads a million carets.
-fn shown(file: &SourceFile, span: &Range<usize>) -> Range<usize> {
-    const MOST: usize = 200;
+/// Returns the part of a span that is underlined, so that a huge value does not print a million carets.
+fn marked(file: &SourceFile, span: &Range<usize>) -> Range<usize> {
+    const MAX_MARKED_BYTES: usize = 200;
     let local = file.local(span);
-    local.start..local.end.min(file.text.floor_char_boundary(local.start + MOST))
+    local.start..local.end.min(file.text.floor_char_boundary(local.start + MAX_MARKED_BYTES))
 }

@@ -1,33 +1,35 @@
-//! The texts a graph is made from, laid end to end, so that a place in any of them is one plain range.
+//! The source map: all texts of a graph laid end to end, so that one byte range identifies a place in any of them.
 
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 
-use crate::source::closest;
+use crate::source::suggestion;
 
-/// One text.
+/// One source text.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct SourceFile {
-    /// Path as the user would write it, or [`SourceMap::COMMAND_LINE`].
+    /// Path as the user writes it, or [`SourceMap::COMMAND_LINE`].
     pub name: String,
     /// The text.
     pub text: String,
-    /// Where its first byte stands in the whole.
+    /// Offset of its first byte in the source map.
     pub base: usize,
     folder: PathBuf,
 }
 
 impl SourceFile {
-    /// A range of the whole as a range of this text.
+    /// Converts a range of the source map into a range of this text.
     #[must_use]
     pub fn local(&self, span: &Range<usize>) -> Range<usize> {
         let clamp = |at: usize| at.saturating_sub(self.base).min(self.text.len());
         clamp(span.start)..clamp(span.end)
     }
 
-    /// Line and column of a place of the whole, both from 1; the column counts characters.
+    /// Returns the line and the column of an offset in the source map.
+    ///
+    /// Both count from 1; the column counts characters.
     #[must_use]
     pub fn line_column(&self, at: usize) -> (usize, usize) {
         let before = &self.text[..self.text.floor_char_boundary(self.local(&(at..at)).start)];
@@ -50,13 +52,13 @@ pub struct Location {
     pub length: usize,
 }
 
-/// A file that a catalogue brings along: its name behind `builtin:`, and its bytes.
+/// A file built into a catalogue: its name after `builtin:`, and its bytes.
 pub type BuiltinFile = (&'static str, &'static [u8]);
 
-/// What the path of a file starts with that a catalogue brings along, and no disk.
+/// Prefix of the path of a file that is built into a catalogue.
 const BUILTIN: &str = "builtin:";
 
-/// All texts a graph was read from: files, and what the command line sets.
+/// All texts of a graph: its files and the assignments of the command line.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct SourceMap {
     files: Vec<SourceFile>,
@@ -64,46 +66,47 @@ pub struct SourceMap {
 }
 
 impl SourceMap {
-    /// Name of the texts that the command line gives.
+    /// Name of texts from the command line.
     pub const COMMAND_LINE: &str = "command line";
 
-    /// No text yet, and files that `builtin:NAME` stands for.
+    /// Creates an empty source map with the given built-in files.
     #[must_use]
     pub fn with_builtin(files: &[BuiltinFile]) -> Self {
         Self { files: Vec::new(), builtin: files.to_vec() }
     }
 
-    /// The bytes of `builtin:NAME`; none for a path on the disk.
+    /// Returns the bytes of `builtin:NAME`, or `None` if the path is not a built-in one.
     ///
     /// # Errors
-    /// What is wrong and a way out, when nothing of that name is built in.
+    /// A message and a help text, if no built-in file has that name.
     pub fn builtin(&self, path: &Path) -> Result<Option<&'static [u8]>, (String, String)> {
         let Some(name) = path.to_str().and_then(|path| path.strip_prefix(BUILTIN)) else { return Ok(None) };
         match self.builtin.iter().find(|(other, _)| *other == name) {
             Some((_, bytes)) => Ok(Some(bytes)),
             None => {
-                let help = closest(name, self.builtin.iter().map(|(name, _)| *name), "built-in files");
-                Err((format!("no file `{name}` is built in"), help))
+                let help = suggestion(name, self.builtin.iter().map(|(name, _)| *name), "built-in files");
+                Err((format!("there is no built-in file `{name}`"), help))
             }
         }
     }
 
-    /// A path as it is written at `at`: relative to the folder of the file it stands in.
+    /// Resolves a path written at offset `at`, relative to the folder of the file that contains it.
     #[must_use]
     pub fn path(&self, text: &str, at: usize) -> PathBuf {
         if text.starts_with(BUILTIN) { PathBuf::from(text) } else { self.folder(at).join(text) }
     }
 
-    /// Adds a text; paths in it are relative to `folder`.
+    /// Adds a text whose paths are relative to `folder`.
     pub fn add(&mut self, name: impl Into<String>, text: impl Into<String>, folder: impl Into<PathBuf>) -> &SourceFile {
-        // One byte lies between two files, so that the place just past the end of one is not in the next.
+        // Files are one byte apart: the offset just past the end of one file is not in the next.
         let base = self.files.last().map_or(0, |last| last.base + last.text.len() + 1);
         self.files.push(SourceFile { name: name.into(), text: text.into(), base, folder: folder.into() });
         self.files.last().expect("it was just pushed")
     }
 
-    /// Adds a file of text; paths in it are relative to its folder. The same file twice has one place, so that a
-    /// mistake in a part that is used twice is told once.
+    /// Adds a file whose paths are relative to its own folder.
+    ///
+    /// The same file is stored once, so a mistake in a part that is used twice is reported once.
     pub fn add_file(&mut self, path: &Path, text: impl Into<String>) -> &SourceFile {
         let (name, text) = (path.display().to_string(), text.into());
         if let Some(at) = self.files.iter().position(|file| file.name == name && file.text == text) {
@@ -112,17 +115,17 @@ impl SourceMap {
         self.add(name, text, path.parent().unwrap_or(Path::new("")))
     }
 
-    /// The text that the place `at` is in.
+    /// Returns the text that contains the offset `at`.
     ///
     /// # Panics
-    /// If there is no text at all.
+    /// If the source map is empty.
     #[must_use]
     pub fn file_at(&self, at: usize) -> &SourceFile {
         let after = self.files.partition_point(|file| file.base <= at);
         &self.files[after.saturating_sub(1)]
     }
 
-    /// The folder that paths at `at` are relative to.
+    /// Returns the folder to which paths written at `at` are relative.
     #[must_use]
     pub fn folder(&self, at: usize) -> &Path {
         &self.file_at(at).folder
@@ -137,7 +140,7 @@ impl SourceMap {
         Location { file: file.name.clone(), line, column, length }
     }
 
-    /// `file:line:column` of a place.
+    /// Formats an offset as `file:line:column`.
     #[must_use]
     pub fn locate(&self, at: usize) -> String {
         let file = self.file_at(at);
@@ -157,7 +160,10 @@ mod tests {
         assert_eq!(sources.builtin(Path::new("arm.urdf")), Ok(None));
         assert_eq!(sources.builtin(Path::new("builtin:arm.urdf")), Ok(Some(b"<robot/>".as_slice())));
         let (message, help) = sources.builtin(Path::new("builtin:arm.udrf")).unwrap_err();
-        assert_eq!((message.as_str(), help.as_str()), ("no file `arm.udrf` is built in", "did you mean `arm.urdf`?"));
+        assert_eq!(
+            (message.as_str(), help.as_str()),
+            ("there is no built-in file `arm.udrf`", "did you mean `arm.urdf`?")
+        );
         assert_eq!(sources.path("b.csv", base), Path::new("a/b.csv"));
         assert_eq!(sources.path("builtin:b.csv", base), Path::new("builtin:b.csv"));
     }

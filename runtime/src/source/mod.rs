@@ -1,13 +1,13 @@
-//! Texts, the values in them, and what is wrong with them.
+//! Source texts, the TOML values in them, and diagnostics.
 //!
-//! The ground floor: it knows TOML, places and messages, and nothing of graphs or nodes.
+//! This is the lowest layer: it has no notion of graphs, nodes or devices.
 
 mod diagnostic;
 mod map;
 mod suggest;
 mod value;
 
-pub use diagnostic::{Code, Diagnostic, Report, Severity};
+pub use diagnostic::{Code, Diagnostic, Diagnostics, Report, Severity};
 pub use map::{BuiltinFile, Location, SourceFile, SourceMap};
-pub use suggest::{closest, meant};
+pub use suggest::{suggest_name, suggestion};
 pub use value::{Item, Key, Table, Value, parse_table};

@@ -1,4 +1,4 @@
-//! A tree of values that know their place among all sources: TOML as the graph needs it.
+//! A tree of TOML values, each with its span in the source map.
 
 use std::ops::Range;
 
@@ -7,46 +7,46 @@ use serde::de::{self, IntoDeserializer, Visitor};
 use serde::{Serialize, Serializer};
 use toml::de::{DeTable, DeValue};
 
-use crate::source::{Code, Diagnostic, SourceFile};
+use crate::source::{Code, Diagnostic, Diagnostics, SourceFile};
 
-/// A value of a graph file and its place.
+/// A value of a graph file with its span.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Value {
-    /// Where it stands, among all sources: its origin, whatever is merged.
+    /// Where the value was written; merging keeps it.
     pub span: Range<usize>,
-    /// What it is.
+    /// The value itself.
     pub item: Item,
 }
 
-/// What a value is.
+/// The content of a value.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Item {
-    /// A text.
+    /// A string.
     String(String),
-    /// A whole number.
+    /// An integer.
     Integer(i64),
-    /// A number.
+    /// A floating-point number.
     Float(f64),
-    /// True or false.
+    /// A boolean.
     Boolean(bool),
-    /// A date, a time or both; no parameter takes one.
+    /// A date, a time or both. No parameter accepts one.
     Datetime(String),
-    /// A list.
+    /// An array.
     Array(Vec<Value>),
     /// A table.
     Table(Table),
 }
 
-/// A key and its place.
+/// A key with its span.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Key {
-    /// The key.
+    /// The text of the key.
     pub name: String,
-    /// Where it stands.
+    /// Where the key was written.
     pub span: Range<usize>,
 }
 
-/// A table: its entries in the order of the file.
+/// A table whose entries keep the order of the file.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Table {
     /// The entries.
@@ -67,30 +67,32 @@ impl Serialize for Value {
 }
 
 impl Table {
-    /// The value of a key.
+    /// Returns the value of a key.
     #[must_use]
     pub fn get(&self, name: &str) -> Option<&Value> {
         self.entry(name).map(|(_, value)| value)
     }
 
-    /// A key with its place, and its value.
+    /// Returns the entry of a key: the key with its span, and the value.
     #[must_use]
     pub fn entry(&self, name: &str) -> Option<&(Key, Value)> {
         self.entries.iter().find(|(key, _)| key.name == name)
     }
 
-    /// Takes an entry out.
+    /// Removes and returns the entry of a key.
     pub fn remove(&mut self, name: &str) -> Option<(Key, Value)> {
         let at = self.entries.iter().position(|(key, _)| key.name == name)?;
         Some(self.entries.remove(at))
     }
 
-    /// Whether the table asks a device for a fact: `{ from = "pad.threshold" }` is one value and no table to merge with.
+    /// Returns whether the table refers to a fact, as `{ from = "pad.threshold" }` does.
+    ///
+    /// Such a table is one value: it is replaced as a whole, not merged.
     pub(crate) fn is_fact(&self) -> bool {
         matches!(self.entries.as_slice(), [(key, value)] if key.name == "from" && value.as_str().is_some())
     }
 
-    /// Lays another table over this one: tables merge, everything else replaces, nothing deletes. The one merge rule.
+    /// Merges another table over this one: tables merge recursively, other values replace, nothing is deleted.
     pub fn merge(&mut self, over: Self) {
         for (key, value) in over.entries {
             match self.entries.iter_mut().find(|(mine, _)| mine.name == key.name) {
@@ -108,7 +110,7 @@ impl Table {
 }
 
 impl Value {
-    /// The table, if it is one.
+    /// Returns the table, or `None` for other values.
     #[must_use]
     pub const fn as_table(&self) -> Option<&Table> {
         match &self.item {
@@ -117,7 +119,7 @@ impl Value {
         }
     }
 
-    /// The text, if it is one.
+    /// Returns the string, or `None` for other values.
     #[must_use]
     pub fn as_str(&self) -> Option<&str> {
         match &self.item {
@@ -126,7 +128,7 @@ impl Value {
         }
     }
 
-    /// What it is, for a message.
+    /// Describes the value for a message, for example `the string "x"`.
     #[must_use]
     pub fn described(&self) -> String {
         match &self.item {
@@ -140,7 +142,7 @@ impl Value {
         }
     }
 
-    /// The same value from another place: a device's fact stands where the graph asks for it.
+    /// Converts a fact of a device, with the span of the place in the graph that refers to it.
     #[must_use]
     pub fn from_toml(value: &toml::Value, span: &Range<usize>) -> Self {
         let item = match value {
@@ -161,11 +163,11 @@ impl Value {
     }
 }
 
-/// Parses a text; every mistake of syntax at once.
+/// Parses a text as TOML.
 ///
 /// # Errors
-/// Each place where the text is not TOML.
-pub fn parse_table(file: &SourceFile) -> Result<Value, Vec<Diagnostic>> {
+/// One diagnostic for each syntax error.
+pub fn parse_table(file: &SourceFile) -> Result<Value, Diagnostics> {
     let (table, errors) = DeTable::parse_recoverable(&file.text);
     let at = |span: Range<usize>| span.start + file.base..span.end + file.base;
     let mut mistakes = Vec::new();
@@ -178,7 +180,7 @@ pub fn parse_table(file: &SourceFile) -> Result<Value, Vec<Diagnostic>> {
     if mistakes.is_empty() { Ok(Value { span, item }) } else { Err(mistakes) }
 }
 
-fn from_table(table: &DeTable<'_>, at: &dyn Fn(Range<usize>) -> Range<usize>, mistakes: &mut Vec<Diagnostic>) -> Table {
+fn from_table(table: &DeTable<'_>, at: &dyn Fn(Range<usize>) -> Range<usize>, mistakes: &mut Diagnostics) -> Table {
     let mut entries: Vec<(Key, Value)> = Vec::new();
     for (key, value) in table {
         let key = Key { name: key.get_ref().to_string(), span: at(key.span()) };
@@ -191,7 +193,7 @@ fn from_table(table: &DeTable<'_>, at: &dyn Fn(Range<usize>) -> Range<usize>, mi
 fn from_value(
     value: &toml::Spanned<DeValue<'_>>,
     at: &dyn Fn(Range<usize>) -> Range<usize>,
-    mistakes: &mut Vec<Diagnostic>,
+    mistakes: &mut Diagnostics,
 ) -> Value {
     let span = at(value.span());
     let item = match value.get_ref() {

@@ -12,7 +12,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use clap::ValueEnum;
 
 use crate::catalogue::Catalogue;
-use crate::source::{Report, meant};
+use crate::source::{Report, suggest_name};
 
 /// Exit code of a run that ended in a fault, and of a scenario that failed.
 pub const FAULTED: u8 = 1;
@@ -126,6 +126,6 @@ impl Colour {
 
 /// Describes a name that is not known: the message, and below it the most similar name or another way out.
 pub(crate) fn unknown<'n>(what: &str, name: &str, known: impl Iterator<Item = &'n str>, otherwise: &str) -> String {
-    let help = meant(name, known).map_or_else(|| otherwise.to_owned(), |best| format!("did you mean `{best}`?"));
+    let help = suggest_name(name, known).map_or_else(|| otherwise.to_owned(), |best| format!("did you mean `{best}`?"));
     format!("unknown {what} `{name}`\nhelp: {help}")
 }

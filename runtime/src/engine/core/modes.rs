@@ -6,7 +6,7 @@
 
 use std::collections::BTreeMap;
 
-use crate::graph::{Condition, PlannedExit, PlannedModes, PortRef, Sort, Test};
+use crate::graph::{Condition, ExitKind, PlannedExit, PlannedModes, PortRef, Test};
 use crate::node::{Bus, PortId, ScalarId, Tick};
 use crate::signal::{Freshness, Kind, Pose};
 
@@ -122,7 +122,7 @@ impl ModeMachine {
                 .into_iter()
                 .map(|planned| Exit { input: input(&planned), planned, state: ConditionState::default() })
                 .collect();
-            exits.sort_by_key(|exit| (exit.planned.sort, std::cmp::Reverse(exit.planned.priority)));
+            exits.sort_by_key(|exit| (exit.planned.kind, std::cmp::Reverse(exit.planned.priority)));
             Mode { name: mode.name, exits, configurations }
         });
         Self {
@@ -161,10 +161,10 @@ impl ModeMachine {
         let Some(taken) = first else { return Transition::Stay };
         let exit = &self.modes[self.current].exits[taken].planned;
         self.taken = taken;
-        match (exit.sort, exit.to) {
-            (Sort::Fail, _) => Transition::Failed,
-            (Sort::Done, _) | (_, None) => Transition::Done,
-            (Sort::OnLost | Sort::Go, Some(to)) => {
+        match (exit.kind, exit.to) {
+            (ExitKind::Fail, _) => Transition::Failed,
+            (ExitKind::Done, _) | (_, None) => Transition::Done,
+            (ExitKind::OnLost | ExitKind::Go, Some(to)) => {
                 self.enter(to, ChangeReason::Exit(self.current, taken), tick);
                 Transition::Switched
             }
@@ -288,9 +288,9 @@ impl ConditionState {
             // A held value neither starts nor ends the condition: the next sample decides.
             _ if !is_new => return false,
             Test::Flag(expected) => input.value(bus).is_some_and(|value| (value != 0.0) == expected),
-            Test::Between { least, greatest, hysteresis } => {
+            Test::Between { min, max, hysteresis } => {
                 let by = if self.since.is_some() { hysteresis } else { 0.0 };
-                input.value(bus).is_some_and(|value| value > least - by && value < greatest + by)
+                input.value(bus).is_some_and(|value| value > min - by && value < max + by)
             }
         };
         if holds {

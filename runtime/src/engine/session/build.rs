@@ -12,8 +12,8 @@ use crate::engine::core::{
     AgedWire, CommandSlot, Core, DeviceSlot, Inlet, Link, ModeMachine, NodeRunner, ReportSlot, Timing,
 };
 use crate::graph::{
-    Age, Compiled, PlannedCommand, PlannedDevice, PlannedNode, PlannedPort, PlannedReport, PlannedShow, PlannedView,
-    PlannedWire, Policy, PortRef, Producer,
+    AgeLimit, Compiled, PlannedCommand, PlannedDevice, PlannedNode, PlannedPort, PlannedReport, PlannedShow,
+    PlannedView, PlannedWire, Policy, PortRef, Producer,
 };
 use crate::node::{Bus, PortId, Tick};
 use crate::signal::{Mark, Stamp};
@@ -154,8 +154,8 @@ fn watched_ends(commands: &[PlannedCommand], reports: &[PlannedReport], ids: &Id
     ends.filter_map(|(source, name, age, span)| watched_end(name, age, span, ids[&source])).collect()
 }
 
-fn watched_end(name: &[String; 2], age: Age, span: &Range<usize>, id: PortId) -> Option<WatchedWire> {
-    let (Age { max_age, stale }, [role, name]) = (age, name.clone());
+fn watched_end(name: &[String; 2], age: AgeLimit, span: &Range<usize>, id: PortId) -> Option<WatchedWire> {
+    let (AgeLimit { max_age, stale }, [role, name]) = (age, name.clone());
     // The slot of a command or report checks the age itself, so the wire needs no mark of its own.
     let aged = AgedWire { from: id.mark, to: id.mark, max_age };
     let watched = WatchedWire { aged, stale, node: role, port: Some(name), span: span.clone() };
@@ -167,7 +167,7 @@ fn runner(node: PlannedNode, ids: &Ids, bus: &mut Bus, watched: &mut Vec<Watched
     let mut aged = Vec::new();
     let mut end = |wire: &PlannedWire| {
         let id = ids[&wire.source];
-        let Some(Age { max_age, stale }) = wire.age else { return id };
+        let Some(AgeLimit { max_age, stale }) = wire.age else { return id };
         bus.marks.push(Mark::default());
         let to = bus.marks.len() as u32 - 1;
         aged.push(AgedWire { from: id.mark, to, max_age });

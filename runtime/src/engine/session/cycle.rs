@@ -9,7 +9,7 @@ use crate::device::DeviceError;
 use crate::engine::core::{Link, ModeMachine, Transition};
 use crate::fault::{Cause, Fault};
 use crate::graph::Policy;
-use crate::source::closest;
+use crate::source::suggestion;
 
 impl Engine {
     /// Runs the tick at `now` [ns]: exchange with the devices, then latch, step and commit.
@@ -142,7 +142,10 @@ impl Engine {
             self.halts.resume();
         } else if !self.words().any(|known| known == word) {
             let known = self.words().collect::<std::collections::BTreeSet<_>>();
-            return Err(format!("no mode has a condition on `{word}`: {}", closest(word, known.into_iter(), "words")));
+            return Err(format!(
+                "no mode has a condition on `{word}`: {}",
+                suggestion(word, known.into_iter(), "words")
+            ));
         } else if self.halts.is_stopped() {
             return Err(format!("`{word}` has no effect while the commands wait for `resume`"));
         } else {

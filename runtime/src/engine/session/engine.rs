@@ -8,7 +8,7 @@ use crate::engine::core::{Core, Counters, DeviceSlot, Link, ModeChange, ModeMach
 use crate::graph::{PlannedPort, Policy, PolicyTable};
 use crate::node::{Bus, PortId};
 use crate::signal::{Mark, Signal};
-use crate::source::{SourceMap, closest};
+use crate::source::{SourceMap, suggestion};
 
 /// A running graph.
 pub struct Engine {
@@ -270,7 +270,7 @@ impl Engine {
     fn known(&self, name: &str) -> &(PlannedPort, PortId) {
         self.port(name).unwrap_or_else(|| {
             let names = self.ports.iter().map(|(port, _)| port.name.as_str());
-            panic!("there is no port `{name}`: {}", closest(name, names, "ports"))
+            panic!("there is no port `{name}`: {}", suggestion(name, names, "ports"))
         })
     }
 

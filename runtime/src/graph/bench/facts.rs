@@ -1,20 +1,26 @@
-//! Facts of devices and numbers of `[limits]`, put where parameters ask for them.
+//! Inserts facts of devices and values of `[limits]` into parameters.
 
 use std::ops::Range;
 
-use super::open::Opened;
+use super::open::OpenedBench;
 use crate::graph::net::Net;
 use crate::graph::syntax::LIMITS;
 use crate::node::Word;
-use crate::source::{Code, Diagnostic, Item, Value, closest};
+use crate::source::{Code, Diagnostic, Diagnostics, Item, Value};
 
-/// Puts the facts of devices in the place of every `{ from = "role.fact" }`, and the numbers of [limits] in that of
-/// `{ from = "limits.key" }`.
-pub(crate) fn fill_facts(value: &mut Value, net: &Net<'_>, opened: &Opened, found: &mut Vec<Diagnostic>) -> bool {
+/// Replaces every `{ from = "role.fact" }` by the fact, and every `{ from = "limits.key" }` by the value in [limits].
+///
+/// Returns whether all of them are known.
+pub(crate) fn fill_facts(
+    value: &mut Value,
+    net: &Net<'_>,
+    opened: &OpenedBench,
+    diagnostics: &mut Diagnostics,
+) -> bool {
     let span = value.span.clone();
     let table = match &mut value.item {
         Item::Array(items) => {
-            return items.iter_mut().fold(true, |good, item| fill_facts(item, net, opened, found) & good);
+            return items.iter_mut().fold(true, |good, item| fill_facts(item, net, opened, diagnostics) & good);
         }
         Item::Table(table) => table,
         _ => return true,
@@ -22,40 +28,47 @@ pub(crate) fn fill_facts(value: &mut Value, net: &Net<'_>, opened: &Opened, foun
     let from = table.get("from").filter(|_| table.is_fact());
     let word = from.and_then(|from| Some(Word { text: from.as_str()?.to_owned(), span: from.span.clone() }));
     let Some(word) = word else {
-        return table.entries.iter_mut().fold(true, |good, (_, item)| fill_facts(item, net, opened, found) & good);
+        return table
+            .entries
+            .iter_mut()
+            .fold(true, |good, (_, item)| fill_facts(item, net, opened, diagnostics) & good);
     };
-    match fact(&word, &span, net, opened) {
+    match find_fact(&word, &span, net, opened) {
         Ok(Some(fact)) => *value = fact,
         Ok(None) => return false,
         Err(diagnostic) => {
-            found.push(*diagnostic);
+            diagnostics.push(*diagnostic);
             return false;
         }
     }
     true
 }
 
-fn fact(word: &Word, span: &Range<usize>, net: &Net<'_>, opened: &Opened) -> Result<Option<Value>, Box<Diagnostic>> {
-    let wrong = |message: String, help: String| {
-        Err(Box::new(Diagnostic::new(Code::UnknownFact, word.span.clone(), message).help(help)))
-    };
-    let roles = || net.flat.roles.iter().map(|(key, _)| key.name.as_str());
+/// Returns the fact that a word names, or `None` if another diagnostic explains why it is missing.
+fn find_fact(
+    word: &Word,
+    span: &Range<usize>,
+    net: &Net<'_>,
+    opened: &OpenedBench,
+) -> Result<Option<Value>, Box<Diagnostic>> {
+    let unknown = |message: String| Diagnostic::new(Code::UnknownFact, word.span.clone(), message);
     let (role, name) = word.text.split_once('.').unwrap_or((&word.text, ""));
     if role == LIMITS {
-        // What is missing there has been told at the section.
+        // A missing value is reported at the section.
         return Ok(net.flat.limits.as_ref().and_then(|(_, table)| table.get(name)).cloned());
     }
-    let Some(index) = roles().position(|known| known == role) else {
-        return wrong(format!("there is no role `{role}` to ask for a fact"), closest(role, roles(), "roles"));
+    let roles = net.flat.role_names();
+    let Some(index) = roles.clone().position(|known| known == role) else {
+        return Err(Box::new(unknown(format!("there is no role `{role}`")).suggest(role, roles, "roles")));
     };
-    // A device that could not be opened has had its say.
+    // A device that could not be opened has its own diagnostic.
     let Some(bound) = &opened.roles[index] else { return Ok(None) };
     let facts = &bound.facts;
     match facts.iter().find(|(fact, _)| fact == name) {
         Some((_, value)) => Ok(Some(Value::from_toml(value, span))),
         None => {
-            let help = closest(name, facts.iter().map(|(fact, _)| &**fact), "facts");
-            wrong(format!("the device behind `{role}` states no `{name}`"), help)
+            let message = format!("the device of role `{role}` has no fact `{name}`");
+            Err(Box::new(unknown(message).suggest(name, facts.iter().map(|(fact, _)| &**fact), "facts")))
         }
     }
 }

@@ -1,7 +1,7 @@
-//! The bench: devices are opened, and their facts are put where parameters ask for them.
+//! The bench: opens devices and inserts their facts into parameters.
 
 mod facts;
 mod open;
 
 pub(crate) use facts::fill_facts;
-pub(crate) use open::{BoundRole, Opened, open, place};
+pub(crate) use open::{BoundRole, OpenedBench, open, place_mistakes};

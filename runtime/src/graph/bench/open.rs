@@ -1,4 +1,4 @@
-//! The bench: opens the devices that the graph's roles are bound to.
+//! Opens the devices to which the roles of a graph are bound.
 
 use std::borrow::Cow;
 use std::ops::Range;
@@ -10,9 +10,9 @@ use crate::graph::plan::PlannedDevice;
 use crate::graph::syntax::{Bench, Block};
 use crate::node::{Mistake, PortSpec, Reader, Word};
 use crate::signal::Shape;
-use crate::source::{Code, Diagnostic, Key, SourceMap, Value, meant};
+use crate::source::{Code, Diagnostic, Diagnostics, Key, SourceMap, Value, suggest_name};
 
-/// A role with the device that fills it. Ports stand in the order of the role, each with its number in the device.
+/// A role that is bound to a device. Ports are in the order of the role, each with its index in the device.
 #[derive(Debug, Clone)]
 pub(crate) struct BoundRole {
     /// Index among the opened devices.
@@ -23,19 +23,19 @@ pub(crate) struct BoundRole {
     pub(crate) facts: Vec<(Cow<'static, str>, toml::Value)>,
 }
 
-/// The devices that are needed, and which role each fills.
+/// The opened devices, and the device of each role.
 #[derive(Default)]
-pub(crate) struct Opened {
+pub(crate) struct OpenedBench {
     pub(crate) devices: Vec<PlannedDevice>,
-    /// Nominal time between two samples of each device [s].
+    /// Nominal sample period of each device [s].
     pub(crate) periods: Vec<f64>,
     pub(crate) roles: Vec<Option<BoundRole>>,
-    /// What only a scenario and the recorder may read, as the net has it.
+    /// Roles for scenarios and recordings only, in the order of `Net::observed`.
     pub(crate) observed: Vec<Option<BoundRole>>,
 }
 
-impl Opened {
-    /// What the devices state of themselves: `role.fact`, and the value.
+impl OpenedBench {
+    /// Returns the facts of the devices: `role.fact` and the value.
     pub(crate) fn facts(&self, net: &Net<'_>) -> Vec<(String, toml::Value)> {
         let observed = net.observed.iter().map(|(key, ..)| *key).zip(&self.observed);
         let roles = net.flat.roles.iter().map(|(key, _)| key).zip(&self.roles).chain(observed);
@@ -44,20 +44,20 @@ impl Opened {
     }
 }
 
-/// Opens what the roles are bound to.
-pub(crate) fn open(net: &Net<'_>, sources: &mut SourceMap, found: &mut Vec<Diagnostic>) -> Opened {
+/// Opens the devices of all roles.
+pub(crate) fn open(net: &Net<'_>, sources: &mut SourceMap, diagnostics: &mut Diagnostics) -> OpenedBench {
     let mut opener = Opener {
         catalogue: net.catalogue,
         sources,
-        found,
+        diagnostics,
         names: Vec::new(),
         taken: Vec::new(),
-        opened: Opened::default(),
+        opened: OpenedBench::default(),
     };
     let bench = net.flat.bench.as_ref();
     if let Some(bench) = bench {
         opener.check_types(bench);
-        opener.check_rest(bench, net);
+        opener.check_unused(bench, net);
     }
     for (i, (key, kind)) in net.flat.roles.iter().enumerate() {
         let role = match bench {
@@ -74,40 +74,40 @@ pub(crate) fn open(net: &Net<'_>, sources: &mut SourceMap, found: &mut Vec<Diagn
     opener.opened
 }
 
-/// Periods of a device that make sense, in nanoseconds too [s].
-const PERIODS: std::ops::RangeInclusive<f64> = 1e-6..=1e3;
+/// Valid sample periods of a device [s]; a period is also counted in whole nanoseconds.
+const PERIOD_RANGE_S: std::ops::RangeInclusive<f64> = 1e-6..=1e3;
 
 struct Opener<'a> {
     catalogue: &'a Catalogue,
     sources: &'a mut SourceMap,
-    found: &'a mut Vec<Diagnostic>,
-    /// Devices that were opened or tried, with the description if it went well.
+    diagnostics: &'a mut Vec<Diagnostic>,
+    /// Devices that were tried: their name, and index and description if they opened.
     names: Vec<(String, Option<(usize, Description)>)>,
-    /// Roles of a device that are filled already: device, index of the filling, by whom.
+    /// Bindings so far: index of the device, index of the role among those it can fill, name of the role.
     taken: Vec<(usize, usize, String)>,
-    opened: Opened,
+    opened: OpenedBench,
 }
 
 impl Opener<'_> {
-    /// What no role asks for is not opened, but what it says must still mean something.
-    fn check_rest(&mut self, bench: &Bench, net: &Net<'_>) {
+    /// Checks bindings and devices that no role uses; such devices are not opened.
+    fn check_unused(&mut self, bench: &Bench, net: &Net<'_>) {
         let names = || bench.devices.iter().map(|device| device.key.name.as_str());
         let is_used = |role: &Key| {
             let declared = net.flat.roles.iter().map(|(key, _)| key);
             declared.chain(net.observed.iter().map(|(key, ..)| *key)).any(|key| key.name == role.name)
         };
-        // A spare binding may be for another task, but what only scenarios read is no task's.
-        let read_by_scenarios =
+        // An unused binding may belong to another task, unless it looks like a role that only scenarios read.
+        let observed_names =
             || self.catalogue.roles().iter().filter(|role| role.is_observed).map(|role| role.observed_name());
         for (role, word) in bench.bind.iter().filter(|(role, _)| !is_used(role)) {
             let is_right = self.catalogue.roles().iter().any(|known| known.is_observed_as(&role.name));
-            if let Some(meant) = meant(&role.name, read_by_scenarios()).filter(|_| !is_right) {
-                let message = format!("`{}` binds nothing that a scenario could read", role.name);
+            if let Some(name) = suggest_name(&role.name, observed_names()).filter(|_| !is_right) {
+                let message = format!("`{}` is not a role that scenarios read", role.name);
                 let diagnostic = Diagnostic::new(Code::ObservedRole, role.span.clone(), message);
-                self.found.push(diagnostic.help(format!("did you mean `{meant}`?")));
+                self.diagnostics.push(diagnostic.help(format!("did you mean `{name}`?")));
             }
             if !names().any(|name| name == word.text) {
-                self.found.push(no_device(word, bench));
+                self.diagnostics.push(unknown_device(word, bench));
             }
         }
         for device in &bench.devices {
@@ -118,11 +118,9 @@ impl Opener<'_> {
             let params = kind.params();
             for (key, _) in table.entries.iter().filter(|(key, _)| !params.iter().any(|param| param.name == key.name)) {
                 let message = format!("`{}` is not a parameter here", key.name);
-                self.found.push(Diagnostic::new(Code::UnknownKey, key.span.clone(), message).suggest(
-                    &key.name,
-                    params.iter().map(|param| param.name),
-                    "parameters",
-                ));
+                let diagnostic = Diagnostic::new(Code::UnknownKey, key.span.clone(), message);
+                let known = params.iter().map(|param| param.name);
+                self.diagnostics.push(diagnostic.suggest(&key.name, known, "parameters"));
             }
         }
     }
@@ -132,20 +130,18 @@ impl Opener<'_> {
             if !self.catalogue.devices().iter().any(|device| device.name() == kind.text) {
                 let names: Vec<_> = self.catalogue.devices().iter().map(|device| device.name()).collect();
                 let message = format!("there is no device type `{}`", kind.text);
-                self.found.push(Diagnostic::new(Code::UnknownType, kind.span.clone(), message).suggest(
-                    &kind.text,
-                    names.iter().map(|name| &**name),
-                    "device types",
-                ));
+                let diagnostic = Diagnostic::new(Code::UnknownType, kind.span.clone(), message);
+                let known = names.iter().map(|name| &**name);
+                self.diagnostics.push(diagnostic.suggest(&kind.text, known, "device types"));
             }
         }
     }
 
     fn role(&mut self, bench: &Bench, key: &Key, kind: &Word) -> Option<BoundRole> {
         let Some((_, word)) = bench.bind.iter().find(|(role, _)| role.name == key.name) else {
-            let message = format!("the bench binds role `{}` to no device", key.name);
+            let message = format!("the bench does not bind the role `{}`", key.name);
             let help = format!("add `{} = \"device\"` under [bind] in the bench", key.name);
-            self.found.push(Diagnostic::new(Code::UnboundRole, key.span.clone(), message).help(help));
+            self.diagnostics.push(Diagnostic::new(Code::UnboundRole, key.span.clone(), message).help(help));
             return None;
         };
         let (device, description) = self.device(bench, word)?;
@@ -154,15 +150,15 @@ impl Opener<'_> {
         let Some(fills) = fitting.clone().find(is_free) else {
             let by = fitting.next().and_then(|i| self.taken.iter().find(|(d, filled, _)| (*d, *filled) == (device, i)));
             let message = match by {
-                Some((_, _, by)) => format!("device `{}` fills role `{by}` already", word.text),
-                None => format!("device `{}` cannot be a `{}`, which role `{}` is", word.text, kind.text, key.name),
+                Some((_, _, by)) => format!("device `{}` already fills the role `{by}`", word.text),
+                None => format!("device `{}` cannot fill the role `{}` of type `{}`", word.text, key.name, kind.text),
             };
             let roles: Vec<_> = description.fills.iter().map(|filled| format!("`{}`", filled.role)).collect();
             let help = match by {
-                Some(_) => "give each role a device of its own".to_owned(),
-                None => format!("it can be: {}", roles.join(", ")),
+                Some(_) => "bind each role to its own device".to_owned(),
+                None => format!("it can fill: {}", roles.join(", ")),
             };
-            self.found.push(Diagnostic::new(Code::WrongRole, word.span.clone(), message).help(help));
+            self.diagnostics.push(Diagnostic::new(Code::WrongRole, word.span.clone(), message).help(help));
             return None;
         };
         self.taken.push((device, fills, key.name.clone()));
@@ -192,7 +188,7 @@ impl Opener<'_> {
 
     fn open(&mut self, bench: &Bench, word: &Word) -> Option<(usize, Description)> {
         let Some(block) = bench.devices.iter().find(|device| device.key.name == word.text) else {
-            self.found.push(no_device(word, bench));
+            self.diagnostics.push(unknown_device(word, bench));
             return None;
         };
         let kind = block.kind.as_ref()?;
@@ -200,16 +196,16 @@ impl Opener<'_> {
         let mut reader = Reader::new(self.sources);
         let opened = device.open(&block.params, &mut reader);
         let mistakes = reader.mistakes;
-        place(mistakes, &block.params, &[], self.sources, self.found);
+        place_mistakes(mistakes, &block.params, &[], self.sources, self.diagnostics);
         let crate::device::Opened { mut description, driver } = opened?;
         let period = description.period;
-        if !PERIODS.contains(&period) {
-            let message = format!("device `{}` says that it samples every {period:e} s", word.text);
-            let help = format!("a period is from {:e} to {:e} s", PERIODS.start(), PERIODS.end());
-            self.found.push(Diagnostic::new(Code::BadClock, block.key.span.clone(), message).help(help));
+        if !PERIOD_RANGE_S.contains(&period) {
+            let message = format!("device `{}` has a sample period of {period:e} s", word.text);
+            let help = format!("the period must be from {:e} to {:e} s", PERIOD_RANGE_S.start(), PERIOD_RANGE_S.end());
+            self.diagnostics.push(Diagnostic::new(Code::BadClock, block.key.span.clone(), message).help(help));
             return None;
         }
-        if !self.fits(&mut description, block) {
+        if !self.check_ports(&mut description, block) {
             return None;
         }
         let (name, span) = (word.text.clone(), block.key.span.clone());
@@ -218,9 +214,9 @@ impl Opener<'_> {
         Some((self.opened.devices.len() - 1, description))
     }
 
-    /// Compares what a device states of its roles with the roles, and adds the reports that it does not read.
-    fn fits(&mut self, description: &mut Description, block: &Block) -> bool {
-        let before = self.found.len();
+    /// Reports where the ports of a device differ from those of its roles, and adds the reports that it does not read.
+    fn check_ports(&mut self, description: &mut Description, block: &Block) -> bool {
+        let before = self.diagnostics.len();
         for fill in 0..description.fills.len() {
             let name = description.fills[fill].role.clone();
             let Some(role) = self.catalogue.roles().iter().find(|role| role.name == name) else { continue };
@@ -230,30 +226,27 @@ impl Opener<'_> {
                 let message = format!("device `{device}` does not match the role `{name}`: {}", misfits.join("; "));
                 let kind = block.kind.as_ref().map_or("", |kind| &kind.text);
                 let help = format!("the mistake is in the device type `{kind}`, not in this file");
-                self.found.push(Diagnostic::new(Code::WrongRole, block.key.span.clone(), message).help(help));
+                self.diagnostics.push(Diagnostic::new(Code::WrongRole, block.key.span.clone(), message).help(help));
             }
             description.add_reports(fill, role);
         }
-        self.found.len() == before
+        self.diagnostics.len() == before
     }
 }
 
-fn no_device(word: &Word, bench: &Bench) -> Diagnostic {
+fn unknown_device(word: &Word, bench: &Bench) -> Diagnostic {
     let message = format!("the bench has no device `{}`", word.text);
-    Diagnostic::new(Code::UnknownDevice, word.span.clone(), message).suggest(
-        &word.text,
-        bench.devices.iter().map(|device| device.key.name.as_str()),
-        "devices",
-    )
+    let known = bench.devices.iter().map(|device| device.key.name.as_str());
+    Diagnostic::new(Code::UnknownDevice, word.span.clone(), message).suggest(&word.text, known, "devices")
 }
 
-/// Gives mistakes their place: in the block they speak of, in a wire, or in a file of data.
-pub(crate) fn place(
+/// Converts the mistakes of a node or device into diagnostics, with spans in its block, its wires or a data file.
+pub(crate) fn place_mistakes(
     mistakes: Vec<Mistake>,
     block: &Value,
     wires: &[(Key, Word)],
     sources: &mut SourceMap,
-    found: &mut Vec<Diagnostic>,
+    diagnostics: &mut Diagnostics,
 ) {
     use crate::node::At;
     for Mistake { code, at, message, help } in mistakes {
@@ -261,8 +254,8 @@ pub(crate) fn place(
         let span = match at {
             At::Span(span) => span,
             At::Node => block.span.clone(),
-            At::Param(path) => lookup(block, &path).map_or(block.span.clone(), |(_, value)| value),
-            At::Key(path) => lookup(block, &path).map_or(block.span.clone(), |(key, _)| key),
+            At::Param(path) => find_spans(block, &path).map_or(block.span.clone(), |(_, value)| value),
+            At::Key(path) => find_spans(block, &path).map_or(block.span.clone(), |(key, _)| key),
             At::Input(name) => {
                 wires.iter().find(|(key, _)| key.name == name).map_or(&block.span, |(_, w)| &w.span).clone()
             }
@@ -272,17 +265,17 @@ pub(crate) fn place(
                 base + span.start..base + span.end
             }
         };
-        found.push(Diagnostic { code, message, span, notes, help });
+        diagnostics.push(Diagnostic { code, message, span, notes, help });
     }
 }
 
-/// Places of the key and of the value at a dotted path.
-fn lookup(block: &Value, path: &str) -> Option<(Range<usize>, Range<usize>)> {
+/// Returns the spans of the key and of the value at a dotted path.
+fn find_spans(block: &Value, path: &str) -> Option<(Range<usize>, Range<usize>)> {
     let mut value = block;
     let mut key = block.span.clone();
     for name in path.split('.') {
-        let (found, inner) = value.as_table()?.entry(name)?;
-        (key, value) = (found.span.clone(), inner);
+        let (entry_key, inner) = value.as_table()?.entry(name)?;
+        (key, value) = (entry_key.span.clone(), inner);
     }
     Some((key, value.span.clone()))
 }

@@ -1,9 +1,9 @@
-//! Builds what the plan needs: nodes, and the configurations of each mode.
+//! Builds the nodes, and their configurations in each mode.
 
 mod conditions;
 mod demand;
 mod modes;
 mod nodes;
 
-pub(crate) use modes::plan as modes;
+pub(crate) use modes::{BuiltModes, build_modes};
 pub(crate) use nodes::Builder;

@@ -1,15 +1,17 @@
-//! Frames: unified over all wires, so that one adjoint serves every frame and a wrong one is a load error.
+//! Checks the frames of all wires by unification.
+//!
+//! Node types declare frames as variables, so one type works in any frame and a wrong frame is a load error.
 
 use std::collections::{BTreeMap, BTreeSet};
 
 use crate::graph::load::FlatNode;
-use crate::graph::net::{Net, Origin, Wire};
+use crate::graph::net::{Net, Wire, WireOrigin};
 use crate::graph::plan::{PortRef, Producer};
 use crate::node::{NodeSpec, PortSpec, frame_args};
 use crate::signal::Kind;
-use crate::source::{Code, Diagnostic};
+use crate::source::{Code, Diagnostic, Diagnostics};
 
-/// Which frame every variable of every node stands for.
+/// The frame variables of all nodes, and the frames to which they are bound.
 #[derive(Debug, Default)]
 pub(crate) struct Frames {
     variables: BTreeMap<(Producer, String), usize>,
@@ -19,49 +21,58 @@ pub(crate) struct Frames {
     clashes: BTreeSet<usize>,
 }
 
+/// Unifies the frames of all wires, and reports wires in the wrong frame.
+///
+/// The most constrained wires are unified first (poses before twists), so that the error is reported on the wrong wire.
+pub(crate) fn check(net: &Net<'_>, diagnostics: &mut Diagnostics) -> Frames {
+    let mut frames = Frames::default();
+    for &node in &net.order {
+        let mut wires: Vec<&Wire> = net.wires[node].iter().collect();
+        wires.sort_by_key(|wire| rank(net.port(wire.source).kind));
+        for wire in wires {
+            let consumer = format!("{}.{}", net.flat.nodes[node].name, wire.key.name);
+            let end = WireTarget { owner: Producer::Node(node), port: net.input(node, wire), name: consumer };
+            if let Some(clash) = frames.wire(net, wire.source, &wire.origin, &end) {
+                frames.clashes.insert(node);
+                diagnostics.push(clash);
+            }
+        }
+    }
+    for wire in &net.commands {
+        let end =
+            WireTarget { owner: Producer::Role(wire.role), port: net.command_port(wire), name: net.command_name(wire) };
+        diagnostics.extend(frames.wire(net, wire.source, &wire.origin, &end));
+    }
+    frames
+}
+
 impl Frames {
-    /// Whether a wire of that node is in the wrong frame: it has been told, and the node cannot be built.
+    /// Returns whether a wire of the node is in the wrong frame, so that the node cannot be built.
     pub(crate) fn has_clash(&self, node: usize) -> bool {
         self.clashes.contains(&node)
     }
 
-    /// Unifies the frames of all wires; wires that tell most come first, so that a mistake shows where it is.
-    pub(crate) fn unify(net: &Net<'_>, found: &mut Vec<Diagnostic>) -> Self {
-        let mut frames = Self::default();
-        for &node in &net.order {
-            let mut wires: Vec<&Wire> = net.wires[node].iter().collect();
-            wires.sort_by_key(|wire| rank(net.port(wire.source).kind));
-            for wire in wires {
-                let consumer = format!("{}.{}", net.flat.nodes[node].name, wire.key.name);
-                let end = End { owner: Producer::Node(node), port: net.input(node, wire), name: consumer };
-                if let Some(clash) = frames.wire(net, wire.source, &wire.origin, &end) {
-                    frames.clashes.insert(node);
-                    found.push(clash);
-                }
-            }
-        }
-        for wire in &net.commands {
-            let end = End { owner: Producer::Role(wire.role), port: net.taken(wire), name: net.taken_name(wire) };
-            found.extend(frames.wire(net, wire.source, &wire.origin, &end));
-        }
-        frames
-    }
-
-    /// The frames of an output, where they are known.
+    /// Returns the frames of an output, `None` for those that are unknown.
     pub(crate) fn of(&mut self, net: &Net<'_>, source: PortRef) -> Vec<Option<String>> {
         self.known(net, source.producer, net.port(source))
     }
 
-    fn wire(&mut self, net: &Net<'_>, source: PortRef, origin: &Origin, end: &End<'_>) -> Option<Diagnostic> {
+    fn wire(
+        &mut self,
+        net: &Net<'_>,
+        source: PortRef,
+        origin: &WireOrigin,
+        end: &WireTarget<'_>,
+    ) -> Option<Diagnostic> {
         let port = net.port(source);
         let (has, takes) = (self.known(net, source.producer, port), self.known(net, end.owner, end.port));
         let clash = has.iter().zip(&takes).any(|(a, b)| matches!((a, b), (Some(a), Some(b)) if a != b));
         if clash {
             let (from, kind) = (net.port_name(source), port.kind);
             let message =
-                format!("`{from}` is {}, but `{}` takes {}", typed(kind, &has), end.name, typed(kind, &takes));
-            let help = self.converter(net, kind, &has, &takes, origin);
-            return Some(origin.mistake(Code::FrameMismatch, message).with_help(help));
+                format!("`{from}` is {}, but `{}` takes {}", describe(kind, &has), end.name, describe(kind, &takes));
+            let help = self.suggest_conversion(net, kind, &has, &takes, origin);
+            return Some(origin.diagnostic(Code::FrameMismatch, message).with_help(help));
         }
         for (a, b) in frame_args(port).iter().zip(frame_args(end.port)) {
             let (a, b) = (self.variable(net, source.producer, a), self.variable(net, end.owner, b));
@@ -70,14 +81,14 @@ impl Frames {
         None
     }
 
-    /// A node that takes the one and gives the other, to be put between.
-    fn converter(
+    /// Suggests a node that converts from one frame to the other.
+    fn suggest_conversion(
         &mut self,
         net: &Net<'_>,
         kind: Kind,
         has: &[Option<String>],
         takes: &[Option<String>],
-        origin: &Origin,
+        origin: &WireOrigin,
     ) -> Option<String> {
         let (spec, input, pose) = net.catalogue.specs().find_map(|spec| {
             let input = spec.inputs.iter().find(|input| input.kind == kind)?;
@@ -92,12 +103,12 @@ impl Frames {
         let Some(source) = self.find_pose(net, &wanted).and_then(|source| net.name_in(origin.scope, source)) else {
             let [from, to] = wanted.map(|frame| frame.unwrap_or_else(|| "?".into()));
             return Some(format!(
-                "put {article} `{name}` between them, with a pose of `{from}` in `{to}`: nothing here gives one yet"
+                "insert {article} `{name}` between them, with a pose of `{from}` in `{to}`, which no node outputs yet"
             ));
         };
         let (twist, from) = (&input.name, &origin.word.text);
         Some(format!(
-            "put {article} `{name}` between them:\n[nodes.{name}]\ntype = \"{name}\"\nin.{twist} = \"{from}\"\nin.{} = \"{source}\"",
+            "insert {article} `{name}` between them:\n[nodes.{name}]\ntype = \"{name}\"\nin.{twist} = \"{from}\"\nin.{} = \"{source}\"",
             pose.name,
         ))
     }
@@ -163,14 +174,14 @@ impl Frames {
     }
 }
 
-/// The consumer's end of a wire.
-struct End<'a> {
+/// The consumer of a wire.
+struct WireTarget<'a> {
     owner: Producer,
     port: &'a PortSpec,
     name: String,
 }
 
-/// The frame that a parameter names, or its default.
+/// Returns the frame that a parameter names, or its default.
 fn frame_param(node: &FlatNode, spec: &NodeSpec, param: &str) -> Option<String> {
     let given = node.block.params.as_table().and_then(|table| table.get(param)).map(|value| value.as_str());
     given
@@ -181,7 +192,7 @@ fn frame_param(node: &FlatNode, spec: &NodeSpec, param: &str) -> Option<String> 
         .map(str::to_owned)
 }
 
-/// Wires that pin frames down come before those that only pass them on.
+/// Ranks kinds by how much they constrain frames, the most constraining first.
 const fn rank(kind: Kind) -> u8 {
     match kind {
         Kind::Pose => 0,
@@ -192,8 +203,8 @@ const fn rank(kind: Kind) -> u8 {
     }
 }
 
-/// A kind with its frames, for a person.
-fn typed(kind: Kind, frames: &[Option<String>]) -> String {
+/// Describes a kind with its frames, for a message.
+fn describe(kind: Kind, frames: &[Option<String>]) -> String {
     let name = |i: usize| frames.get(i).cloned().flatten().map_or("any frame".into(), |frame| format!("`{frame}`"));
     let kind_name = kind.with_article();
     match kind {

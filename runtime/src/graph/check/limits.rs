@@ -1,125 +1,33 @@
-//! The proof that every command crosses the limits, and the section `[limits]` that the limiters take their numbers from.
+//! Checks that every command passes the limits that its role requires.
 //!
-//! A role names what must hold of its commands. From each command the wire is followed back, through the nodes that pass
-//! a motion on, and what they hold is gathered; a node in between that may break a limit makes it count for nothing.
+//! From each command the check follows the motion backwards and collects the limits that the nodes on the path hold. A
+//! limit does not count if a later node on the path may break it.
 
 use std::collections::BTreeSet;
 use std::ops::Range;
 
 use crate::graph::check::frames::Frames;
-use crate::graph::load::FlatGraph;
 use crate::graph::net::{CommandWire, Net};
 use crate::graph::plan::{PortRef, Producer};
-use crate::graph::syntax::LIMITS;
-use crate::node::{NodeSpec, ParamSpec, Word};
+use crate::node::{NodeSpec, Word};
 use crate::signal::Kind;
-use crate::source::{Code, Diagnostic, Item, Value, closest};
+use crate::source::{Code, Diagnostic, Diagnostics};
 
-/// A number of the section that a parameter asks for.
-struct Asked<'a> {
-    key: String,
-    span: Range<usize>,
-    /// The parameter that it is for.
-    spec: Option<&'a ParamSpec>,
-}
-
-/// Compares the section with what the nodes take from it: a number that nobody takes limits nothing. Where a limiter is
-/// missing, that is what is wrong, and its number is no mistake.
-pub(crate) fn compare(net: &Net<'_>, is_limited: bool, found: &mut Vec<Diagnostic>) {
-    let mut asked = Vec::new();
-    for (i, node) in net.flat.nodes.iter().enumerate() {
-        let specs = net.spec(i).map_or(&[][..], |spec| &spec.params);
-        let entries = node.block.params.as_table().into_iter().flat_map(|table| &table.entries);
-        for (key, value) in entries {
-            collect(value, specs.iter().find(|spec| spec.name == key.name), &mut asked);
-        }
-    }
-    let given = || net.flat.limits.iter().flat_map(|(_, table)| &table.entries);
-    let names: BTreeSet<&str> = asked.iter().map(|asked| asked.key.as_str()).collect();
-    for (key, _) in given().filter(|(key, _)| is_limited && !names.contains(key.name.as_str())) {
-        let message = format!("`{}` limits nothing: no node takes it", key.name);
-        let missing: Vec<&str> =
-            names.iter().copied().filter(|name| !given().any(|(key, _)| key.name == *name)).collect();
-        let help = match missing.is_empty() {
-            true => "every limit that is asked for is given: take it out".to_owned(),
-            false => closest(&key.name, missing.into_iter(), "limits that are asked for"),
-        };
-        found.push(Diagnostic::new(Code::UnknownKey, key.span.clone(), message).help(help));
-    }
-    asked.iter().for_each(|asked| found.extend(other_unit(asked)));
-    missing(net.flat, &asked, found);
-}
-
-fn missing(flat: &FlatGraph, asked: &[Asked<'_>], found: &mut Vec<Diagnostic>) {
-    let mut told = BTreeSet::new();
-    let is_given = |key: &str| flat.limits.as_ref().is_some_and(|(_, table)| table.get(key).is_some());
-    let missing: Vec<&Asked<'_>> =
-        asked.iter().filter(|asked| !is_given(&asked.key) && told.insert(asked.key.as_str())).collect();
-    let Some(first) = missing.first() else { return };
-    let lines = missing.iter().map(|asked| {
-        let doc = asked.spec.map(ParamSpec::doc_with_unit).unwrap_or_default();
-        format!("\n{} = …   # {}", asked.key, doc.trim_end_matches('.'))
-    });
-    let names: Vec<String> = missing.iter().map(|asked| format!("`{}`", asked.key)).collect();
-    let (span, message) = match &flat.limits {
-        Some((span, _)) => (span.clone(), format!("[limits] does not say {}", names.join(", "))),
-        None => (flat.place.clone(), format!("the graph has no section [limits]: it has to say {}", names.join(", "))),
-    };
-    let diagnostic =
-        Diagnostic::new(Code::MissingLimit, span, message).note(first.span.clone(), "it is asked for here");
-    found.push(diagnostic.help(format!("add under [limits]:{}", lines.collect::<String>())));
-}
-
-/// A number whose name says another unit than the parameter that takes it.
-fn other_unit(asked: &Asked<'_>) -> Option<Diagnostic> {
-    const UNITS: [(&str, &str); 7] = [
-        ("_m_per_s2", "m/s²"),
-        ("_rad_per_s2", "rad/s²"),
-        ("_m_per_s", "m/s"),
-        ("_rad_per_s", "rad/s"),
-        ("_n", "N"),
-        ("_rad", "rad"),
-        ("_m", "m"),
-    ];
-    let (_, says) = UNITS.iter().find(|(end, _)| asked.key.ends_with(end))?;
-    let spec = asked.spec?;
-    let takes = spec.unit.as_deref()?.split(';').next()?.trim();
-    let is_known = UNITS.iter().any(|(_, unit)| *unit == takes);
-    let message = format!("`{}` is in {says}, but `{}` takes {takes}", asked.key, spec.name);
-    (is_known && takes != *says).then(|| Diagnostic::new(Code::UnitMismatch, asked.span.clone(), message))
-}
-
-fn collect<'a>(value: &Value, spec: Option<&'a ParamSpec>, asked: &mut Vec<Asked<'a>>) {
-    match &value.item {
-        Item::Array(items) => items.iter().for_each(|item| collect(item, spec, asked)),
-        Item::Table(table) if table.is_fact() => {
-            let from = table.get("from").expect("a fact has it");
-            if let Some((LIMITS, key)) = from.as_str().and_then(|text| text.split_once('.')) {
-                asked.push(Asked { key: key.to_owned(), span: from.span.clone(), spec });
-            }
-        }
-        Item::Table(table) => table.entries.iter().for_each(|(_, item)| collect(item, spec, asked)),
-        _ => {}
-    }
-}
-
-/// A node on the way of a command that passes a motion on.
-struct Stop<'a> {
+/// A node on the path of a command that passes a motion on.
+struct PathNode<'a> {
     node: usize,
     spec: &'a NodeSpec,
-    /// What its motion comes from, and as its file says it.
+    /// The source of its motion, and the text that names it.
     source: PortRef,
     word: &'a Word,
 }
 
-/// Proves that each command has crossed what its role asks for, or says what is missing and where it belongs. Whether all
-/// have.
-pub(crate) fn prove(net: &Net<'_>, frames: &mut Frames, found: &mut Vec<Diagnostic>) -> bool {
-    let mut is_limited = true;
+/// Reports each command whose path lacks a required limit, with the node to insert and its place.
+pub(crate) fn check(net: &Net<'_>, frames: &mut Frames, diagnostics: &mut Diagnostics) {
     for command in net.commands.iter().filter(|command| !command.is_report) {
         let role = net.roles[command.role].expect("only known roles have commands");
-        // A wire that goes nowhere has been complained about, and what stands behind it is not known.
-        let Some(path) = path(net, command.source) else { continue };
+        // A missing wire has its own diagnostic, and hides the nodes behind it.
+        let Some(path) = find_path(net, command.source) else { continue };
         let mut held: Vec<&str> = Vec::new();
         let mut lost: Vec<(&str, &str)> = Vec::new();
         for stop in path.iter().rev() {
@@ -133,17 +41,15 @@ pub(crate) fn prove(net: &Net<'_>, frames: &mut Frames, found: &mut Vec<Diagnost
         let missing: Vec<&str> =
             role.limits.iter().map(|limit| &**limit).filter(|limit| !held.contains(limit)).collect();
         if !missing.is_empty() {
-            is_limited = false;
-            found.push(unlimited(net, command, &path, &missing, &lost));
+            diagnostics.push(unlimited(net, command, &path, &missing, &lost));
         }
-        found.extend(other_frame(net, frames, &path));
+        diagnostics.extend(mixed_frames(net, frames, &path));
     }
-    is_limited
 }
 
-/// The nodes that a motion passes through, the last one first; none if a wire in between is missing.
-fn path<'a>(net: &'a Net<'_>, from: PortRef) -> Option<Vec<Stop<'a>>> {
-    let (mut path, mut at) = (Vec::<Stop<'_>>::new(), from);
+/// Returns the nodes that a motion passes, the last one first, or `None` if a wire is missing.
+fn find_path<'a>(net: &'a Net<'_>, from: PortRef) -> Option<Vec<PathNode<'a>>> {
+    let (mut path, mut at) = (Vec::<PathNode<'_>>::new(), from);
     while let Producer::Node(node) = at.producer {
         let spec = net.spec(node)?;
         let Some(through) = spec.limits.through else { break };
@@ -153,7 +59,7 @@ fn path<'a>(net: &'a Net<'_>, from: PortRef) -> Option<Vec<Stop<'a>>> {
         if path.iter().any(|stop| stop.node == node) {
             return None;
         }
-        path.push(Stop { node, spec, source, word });
+        path.push(PathNode { node, spec, source, word });
         at = source;
     }
     Some(path)
@@ -162,7 +68,7 @@ fn path<'a>(net: &'a Net<'_>, from: PortRef) -> Option<Vec<Stop<'a>>> {
 fn unlimited(
     net: &Net<'_>,
     command: &CommandWire,
-    path: &[Stop<'_>],
+    path: &[PathNode<'_>],
     missing: &[&str],
     lost: &[(&str, &str)],
 ) -> Diagnostic {
@@ -170,33 +76,33 @@ fn unlimited(
     let consumer = format!("{}.{}", net.name(Producer::Role(command.role)), role.commands[command.command].name);
     let names = missing.iter().map(|limit| format!("`{limit}`")).collect::<Vec<_>>().join(", ");
     let source = net.port_name(command.source);
-    let message =
-        format!("`{consumer}` takes only what has crossed every limit, but `{source}` has not crossed {names}");
-    if let Some(part) = limiting_part(net, command, missing).filter(|_| lost.is_empty()) {
-        return command.origin.mistake(Code::UnlimitedCommand, message).help(part);
+    let plural = if missing.len() == 1 { "" } else { "s" };
+    let message = format!("`{source}` drives `{consumer}` without the required limit{plural} {names}");
+    if let Some(part) = suggest_part(net, command, missing).filter(|_| lost.is_empty()) {
+        return command.origin.diagnostic(Code::UnlimitedCommand, message).help(part);
     }
     let (mut helps, mut places) = (Vec::new(), Vec::new());
-    let mut told = BTreeSet::new();
+    let mut suggested = BTreeSet::new();
     for limit in missing {
         if let Some((_, by)) = lost.iter().find(|(lost, _)| lost == limit) {
-            helps.push(format!("`{by}` comes after what holds `{limit}` and may break it: put it before that"));
+            helps.push(format!("`{by}` may break the limit `{limit}`: move it before the node that holds this limit"));
             continue;
         }
         let holds = |spec: &NodeSpec| spec.limits.holds.contains(limit);
         let Some(spec) = net.catalogue.specs().find(|spec| holds(spec)) else { continue };
-        if told.insert(spec.name.to_string()) {
-            let (help, place) = between(net, command, &consumer, path, spec);
+        if suggested.insert(spec.name.to_string()) {
+            let (help, place) = suggest_limiter(net, command, &consumer, path, spec);
             helps.push(help);
-            places.extend(place.map(|place| (place, format!("a `{}` belongs here", spec.name))));
+            places.extend(place.map(|place| (place, format!("insert a `{}` here", spec.name))));
         }
     }
-    let mut diagnostic = command.origin.mistake(Code::UnlimitedCommand, message);
+    let mut diagnostic = command.origin.diagnostic(Code::UnlimitedCommand, message);
     diagnostic.notes.extend(places.into_iter().filter(|(place, _)| *place != command.origin.word.span));
     diagnostic.with_help((!helps.is_empty()).then(|| helps.join("\n")))
 }
 
-/// A part that the catalogue brings along and that holds all that is missing, where a single limiter would not do.
-fn limiting_part(net: &Net<'_>, command: &CommandWire, missing: &[&str]) -> Option<String> {
+/// Suggests a built-in part that holds all missing limits, if they need three or more nodes.
+fn suggest_part(net: &Net<'_>, command: &CommandWire, missing: &[&str]) -> Option<String> {
     let limiters: BTreeSet<&str> = missing
         .iter()
         .filter_map(|limit| net.catalogue.specs().find(|spec| spec.limits.holds.contains(limit)))
@@ -217,7 +123,7 @@ fn limiting_part(net: &Net<'_>, command: &CommandWire, missing: &[&str]) -> Opti
     let role = net.name(Producer::Role(command.role));
     let taken = &net.roles[command.role]?.commands[command.command].name;
     let mut text =
-        format!("let the motion go through a part that holds them all:\n[parts.{name}]\nfile = \"builtin:{file}\"");
+        format!("route the motion through a part that holds all of them:\n[parts.{name}]\nfile = \"builtin:{file}\"");
     for (input, what) in part.get("inputs").and_then(toml::Value::as_table).into_iter().flatten() {
         text.push_str(&format!("\nin.{input} = \"…\"   # {}", what.as_str().unwrap_or_default()));
     }
@@ -225,12 +131,12 @@ fn limiting_part(net: &Net<'_>, command: &CommandWire, missing: &[&str]) -> Opti
     Some(text)
 }
 
-/// Where on the way a limiter belongs: behind everything that must come before it.
-fn between(
+/// Suggests a limiter and its place on the path: after every limiter that must come before it.
+fn suggest_limiter(
     net: &Net<'_>,
     command: &CommandWire,
     consumer: &str,
-    path: &[Stop<'_>],
+    path: &[PathNode<'_>],
     limiter: &NodeSpec,
 ) -> (String, Option<Range<usize>>) {
     let order = &net.roles[command.role].expect("only known roles have commands").limits;
@@ -240,14 +146,14 @@ fn between(
     };
     let (name, through) = (&limiter.name, limiter.limits.through.unwrap_or_default());
     let kind = limiter.inputs.iter().find(|input| input.name == through).map(|input| input.kind);
-    // Links from the command back to where the motion comes from: who takes it, what is taken, and as which words.
+    // The wires on the path, from the command backwards: consumer, source, and the text that names the source.
     let mut links = vec![(consumer.to_owned(), command.source, &command.origin.word)];
     for stop in path {
         let through = stop.spec.limits.through.unwrap_or_default();
         links.push((format!("{}.{through}", net.flat.nodes[stop.node].block.key.name), stop.source, stop.word));
     }
-    // Behind a change of frame a twist is not the sensor's own any more.
-    let changes_frame = |stop: &Stop<'_>| {
+    // After a change of frame, a twist is no longer in the frame of the sensor.
+    let changes_frame = |stop: &PathNode<'_>| {
         let gives = net.outputs(Producer::Node(stop.node)).and_then(|ports| ports.first()).map(|port| port.kind);
         stop.spec.limits.holds.is_empty() && gives == Some(net.port(stop.source).kind)
     };
@@ -255,12 +161,12 @@ fn between(
     let fits = |at: &usize| Some(net.port(links[*at].1).kind) == kind && !path[*at..].iter().any(changes_frame);
     let at = (later..links.len()).find(fits).or_else(|| (0..links.len()).rev().find(fits));
     let Some((taker, _, word)) = at.map(|at| &links[at]) else {
-        return (format!("put a `{name}` on the way of the motion"), None);
+        return (format!("insert a `{name}` on the path of the motion"), None);
     };
     let article = if name.starts_with(['a', 'e', 'i', 'o', 'u']) { "an" } else { "a" };
     let needs = limiter.inputs.iter().filter(|input| input.need.must_be_wired);
     let mut block = format!(
-        "put {article} `{name}` between `{0}` and `{taker}`:\n[nodes.{name}]\ntype = \"{name}\"\nin.{through} = \"{0}\"",
+        "insert {article} `{name}` between `{0}` and `{taker}`:\n[nodes.{name}]\ntype = \"{name}\"\nin.{through} = \"{0}\"",
         word.text
     );
     for input in needs.filter(|input| input.name != through) {
@@ -273,10 +179,10 @@ fn between(
     (block, Some(word.span.clone()))
 }
 
-/// A limiter of a twist means the sensor's own motion: in another frame the same numbers limit something else.
-fn other_frame(net: &Net<'_>, frames: &mut Frames, path: &[Stop<'_>]) -> Option<Diagnostic> {
+/// Reports limiters of twists on one path that work in different frames.
+fn mixed_frames(net: &Net<'_>, frames: &mut Frames, path: &[PathNode<'_>]) -> Option<Diagnostic> {
     let mut limiters = path.iter().rev().filter(|stop| !stop.spec.limits.holds.is_empty());
-    let mut frame = |stop: &Stop<'_>| {
+    let mut frame = |stop: &PathNode<'_>| {
         let source = PortRef { producer: Producer::Node(stop.node), port: 0 };
         let is_twist = net.port(source).kind == Kind::Twist;
         is_twist.then(|| frames.of(net, source).into_iter().next().flatten()).flatten()
@@ -284,7 +190,10 @@ fn other_frame(net: &Net<'_>, frames: &mut Frames, path: &[Stop<'_>]) -> Option<
     let first = limiters.find_map(|stop| Some((stop, frame(stop)?)))?;
     let (other, its) = limiters.find_map(|stop| Some((stop, frame(stop).filter(|frame| *frame != first.1)?)))?;
     let (node, before) = (&net.flat.nodes[other.node], &net.flat.nodes[first.0.node].name);
-    let message = format!("`{}` limits a twist in `{its}`, but `{before}` before it one in `{}`", node.name, first.1);
+    let message = format!(
+        "`{}` limits a twist in `{its}`, but the limiter `{before}` before it works in `{}`",
+        node.name, first.1
+    );
     let diagnostic = Diagnostic::new(Code::FrameMismatch, node.block.key.span.clone(), message);
-    Some(diagnostic.help("limits are of the sensor's own motion: put it before the change of frame"))
+    Some(diagnostic.help("limits apply to the motion of the sensor: move it before the change of frame"))
 }

@@ -1,11 +1,19 @@
-//! What can be wrong with a net: one check per file.
+//! The checks of a graph, one per file. Each has a function `check` that adds to the diagnostics.
 
+pub(crate) mod absent;
+pub(crate) mod clock;
+pub(crate) mod commands;
+pub(crate) mod delays;
+pub(crate) mod exports;
 pub(crate) mod frames;
+pub(crate) mod inputs;
+pub(crate) mod limit_values;
 pub(crate) mod limits;
+pub(crate) mod live;
 pub(crate) mod motion;
 pub(crate) mod overlap;
 pub(crate) mod policy;
 pub(crate) mod reachability;
-pub(crate) mod shown;
 pub(crate) mod units;
 pub(crate) mod unused;
+pub(crate) mod view;

@@ -1,72 +1,79 @@
-//! Motion without contact: what moves the arm though no sample is behind it, and is ended by nothing.
+//! Checks that generated motion ends.
 //!
-//! A generator without a gate goes on for ever. It may run in a mode that watches a signal or bounds its time or its
-//! way, and nowhere else.
+//! A generator without a gate moves the arm forever without a sample. It may run only in a mode that watches a signal, or
+//! that bounds the time or the travel.
 
 use std::collections::BTreeSet;
 
 use crate::graph::net::{Net, Wire};
 use crate::graph::plan::Producer;
 use crate::graph::plan::{Condition, PlannedExit, PlannedMode};
-use crate::graph::syntax::{ModeBlock, Sort};
+use crate::graph::syntax::{ExitKind, ModeBlock};
 use crate::signal::Kind;
-use crate::source::{Code, Diagnostic};
+use crate::source::{Code, Diagnostic, Diagnostics};
 
-/// What of a graph can move by itself.
-pub(crate) struct Movers<'a> {
-    net: &'a Net<'a>,
-    /// Nodes that a command follows from.
-    driving: BTreeSet<usize>,
+/// Reports generated motion that nothing ends, in a mode or in a graph without modes.
+///
+/// `still` holds for each mode which nodes generate no motion. A graph without modes counts as one mode.
+pub(crate) fn check(net: &Net<'_>, modes: &[PlannedMode], still: &[Vec<bool>], diagnostics: &mut Diagnostics) {
+    let commands = net.commands.iter().filter(|wire| !wire.is_report);
+    let driving = net.upstream(commands.filter_map(|wire| wire.source.producer.node()));
+    let generators: Vec<Vec<usize>> = still.iter().map(|still| find_generators(net, &driving, still)).collect();
+    if modes.is_empty() {
+        report_in_graph(net, &generators.concat(), diagnostics);
+        return;
+    }
+    let ended = find_ended(modes, &generators, net);
+    for (i, block) in net.flat.modes.iter().enumerate().filter(|(i, _)| !ended[*i]) {
+        diagnostics.push(report_in_mode(net, &generators[i], block));
+    }
 }
 
-impl<'a> Movers<'a> {
-    pub(crate) fn new(net: &'a Net<'a>) -> Self {
-        let commands = net.commands.iter().filter(|wire| !wire.is_report);
-        Self { net, driving: net.upstream(commands.filter_map(|wire| wire.source.producer.node())) }
-    }
-
-    /// The nodes that start a motion by themselves, given which nodes are still in a mode.
-    pub(crate) fn of(&self, is_still: &dyn Fn(usize) -> bool) -> Vec<usize> {
-        let (mut sampled, mut still) = (BTreeSet::new(), BTreeSet::new());
-        // Those that start a motion, and all that only passes it on.
-        let (mut movers, mut moved) = (Vec::new(), BTreeSet::new());
-        for &node in &self.net.order {
-            let Some(spec) = self.net.spec(node) else { continue };
-            let wires = || self.net.wires[node].iter().filter(|wire| !spec.inputs[wire.input].need.is_delayed);
-            let is_sampled = |wire: &Wire| wire.source.producer.node().is_none_or(|source| sampled.contains(&source));
-            if wires().any(is_sampled) {
-                sampled.insert(node);
-                continue;
-            }
-            let sources: Vec<usize> = wires().filter_map(|wire| wire.source.producer.node()).collect();
-            let all_still = !sources.is_empty() && sources.iter().all(|source| still.contains(source));
-            let gives_motion = spec.outputs.iter().any(|port| matches!(port.kind, Kind::Twist | Kind::Joints));
-            if is_still(node) || all_still {
-                still.insert(node);
-            } else if sources.iter().any(|source| moved.contains(source)) {
-                moved.insert(node);
-            } else if gives_motion && self.driving.contains(&node) {
-                moved.insert(node);
-                movers.push(node);
-            }
+/// Returns the nodes that start a motion of the arm without a sample.
+///
+/// `driving` are the nodes upstream of a command.
+fn find_generators(net: &Net<'_>, driving: &BTreeSet<usize>, is_still: &[bool]) -> Vec<usize> {
+    let (mut sampled, mut still) = (BTreeSet::new(), BTreeSet::new());
+    // `moved` also contains the nodes that pass on a generated motion.
+    let (mut generators, mut moved) = (Vec::new(), BTreeSet::new());
+    for &node in &net.order {
+        let Some(spec) = net.spec(node) else { continue };
+        let wires = || net.wires[node].iter().filter(|wire| !spec.inputs[wire.input].need.is_delayed);
+        let is_sampled = |wire: &Wire| wire.source.producer.node().is_none_or(|source| sampled.contains(&source));
+        if wires().any(is_sampled) {
+            sampled.insert(node);
+            continue;
         }
-        movers
+        let sources: Vec<usize> = wires().filter_map(|wire| wire.source.producer.node()).collect();
+        let all_still = !sources.is_empty() && sources.iter().all(|source| still.contains(source));
+        let gives_motion = spec.outputs.iter().any(|port| matches!(port.kind, Kind::Twist | Kind::Joints));
+        if is_still[node] || all_still {
+            still.insert(node);
+        } else if sources.iter().any(|source| moved.contains(source)) {
+            moved.insert(node);
+        } else if gives_motion && driving.contains(&node) {
+            moved.insert(node);
+            generators.push(node);
+        }
     }
+    generators
 }
 
-/// Which modes end the motion that starts in them by itself: by a bound on time or way that ends the run or leads to a
-/// mode that does not move by itself, at once or through others; or by the loss of a signal of a sensor.
-pub(crate) fn ended(modes: &[PlannedMode], movers: &[Vec<usize>], net: &Net<'_>) -> Vec<bool> {
-    let mut ended: Vec<bool> = movers.iter().map(Vec::is_empty).collect();
-    // Modes that only hand the motion on to each other in a cycle are never reached.
+/// Returns for each mode whether it ends its generated motion.
+///
+/// A mode ends its motion if it generates none, or with a bound on time or travel that ends the run or leads to a mode that
+/// ends its motion, or with `on_lost` on a sensor signal.
+fn find_ended(modes: &[PlannedMode], generators: &[Vec<usize>], net: &Net<'_>) -> Vec<bool> {
+    let mut ended: Vec<bool> = generators.iter().map(Vec::is_empty).collect();
+    // Fixed point: modes that only lead to each other in a cycle stay false.
     loop {
         let is_end = |exit: &PlannedExit| {
             let is_bound = matches!(exit.condition, Condition::Elapsed(_) | Condition::Travel(..));
-            match (exit.sort, &exit.condition) {
-                (Sort::Fail | Sort::Done, _) => is_bound,
-                (Sort::Go, _) => is_bound && exit.to.is_some_and(|to| ended[to]),
-                (Sort::OnLost, Condition::Lost(watched, _)) => senses(net, watched.source.producer),
-                (Sort::OnLost, _) => false,
+            match (exit.kind, &exit.condition) {
+                (ExitKind::Fail | ExitKind::Done, _) => is_bound,
+                (ExitKind::Go, _) => is_bound && exit.to.is_some_and(|to| ended[to]),
+                (ExitKind::OnLost, Condition::Lost(watched, _)) => is_sensed(net, watched.source.producer),
+                (ExitKind::OnLost, _) => false,
             }
         };
         let next: Vec<bool> = modes.iter().zip(&ended).map(|(mode, is)| *is || mode.exits.iter().any(is_end)).collect();
@@ -77,8 +84,8 @@ pub(crate) fn ended(modes: &[PlannedMode], movers: &[Vec<usize>], net: &Net<'_>)
     }
 }
 
-/// Whether something follows from a device that only gives: from a sensor, and not from the arm alone.
-fn senses(net: &Net<'_>, producer: Producer) -> bool {
+/// Returns whether a sensor is upstream of a producer: a device without commands, so not the arm.
+fn is_sensed(net: &Net<'_>, producer: Producer) -> bool {
     let is_sensor = |producer: Producer| match producer {
         Producer::Role(role) => net.roles[role].is_some_and(|role| role.commands.is_empty()),
         Producer::Node(_) => false,
@@ -88,35 +95,35 @@ fn senses(net: &Net<'_>, producer: Producer) -> bool {
         || upstream.iter().any(|node| net.wires[*node].iter().any(|wire| is_sensor(wire.source.producer)))
 }
 
-/// Reports motion that nothing ends: in a mode, or in a graph without modes.
-pub(crate) fn ungated(net: &Net<'_>, movers: &[usize], mode: Option<&ModeBlock>, found: &mut Vec<Diagnostic>) {
-    if movers.is_empty() {
-        return;
-    }
-    let name = |node: &usize| format!("`{}`", net.flat.nodes[*node].name);
-    if let Some(block) = mode {
-        let names = movers.iter().map(name).collect::<Vec<_>>().join(", ");
-        let mode = &block.key.name;
-        let message = format!("in mode `{mode}` the arm is moved without a gate, and nothing ends it: by {names}");
-        let bound = "add a bound, as `fail = { after_ms = 10000, after_travel_mm = 60 }`, or `on_lost` of a signal of \
-                     the sensor";
-        let gate = movers.iter().find_map(|node| gate(net, *node)).map(|gate| format!(", or wire `{gate}` of {names}"));
-        let cycle = "a `go` counts if it leads to a mode that stands still, or ends in one";
-        let diagnostic = Diagnostic::new(Code::UngatedMotion, block.key.span.clone(), message);
-        found.push(diagnostic.help(format!("{bound}{}; {cycle}", gate.unwrap_or_default())));
-        return;
-    }
-    for node in movers {
-        let (name, key) = (name(node), &net.flat.nodes[*node].block.key);
-        let message = format!("{name} moves the arm without a gate, and nothing ends it");
-        let gate = gate(net, *node).map(|gate| format!("wire `{gate}` of {name}, or ")).unwrap_or_default();
-        let help = format!("{gate}let it move only in a mode that ends");
-        found.push(Diagnostic::new(Code::UngatedMotion, key.span.clone(), message).help(help));
+/// Reports the generators of a graph without modes.
+fn report_in_graph(net: &Net<'_>, generators: &[usize], diagnostics: &mut Diagnostics) {
+    for node in generators {
+        let key = &net.flat.nodes[*node].block.key;
+        let name = &net.flat.nodes[*node].name;
+        let message = format!("`{name}` moves the arm without a gate, and nothing ends the motion");
+        let gate = find_gate(net, *node).map(|gate| format!("wire `{gate}` of `{name}`, or ")).unwrap_or_default();
+        let help = format!("{gate}run it only in a mode with a bound");
+        diagnostics.push(Diagnostic::new(Code::UngatedMotion, key.span.clone(), message).help(help));
     }
 }
 
-/// The input of a node that can gate it: a flag that nothing is wired to.
-fn gate(net: &Net<'_>, node: usize) -> Option<String> {
+/// Reports the generators of a mode.
+fn report_in_mode(net: &Net<'_>, generators: &[usize], block: &ModeBlock) -> Diagnostic {
+    let names = generators.iter().map(|node| format!("`{}`", net.flat.nodes[*node].name));
+    let names = names.collect::<Vec<_>>().join(", ");
+    let mode = &block.key.name;
+    let message = format!("in mode `{mode}` the arm moves without a gate, and nothing ends the motion of {names}");
+    let bound =
+        "add a bound such as `fail = { after_ms = 10000, after_travel_mm = 60 }`, or `on_lost` with a sensor signal";
+    let gate = generators.iter().find_map(|node| find_gate(net, *node));
+    let gate = gate.map(|gate| format!(", or wire `{gate}` of {names}")).unwrap_or_default();
+    let targets = "a bounded `go` counts only if its target mode ends or does not move";
+    let diagnostic = Diagnostic::new(Code::UngatedMotion, block.key.span.clone(), message);
+    diagnostic.help(format!("{bound}{gate}; {targets}"))
+}
+
+/// Returns an unwired flag input of a node, which can gate its motion.
+fn find_gate(net: &Net<'_>, node: usize) -> Option<String> {
     let inputs = net.spec(node)?.inputs.iter().enumerate();
     let is_open = |input: usize| net.wires[node].iter().all(|wire| wire.input != input);
     let mut flags = inputs.filter(|(input, port)| port.kind == Kind::Flag && is_open(*input));

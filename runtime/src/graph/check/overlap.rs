@@ -1,21 +1,27 @@
-//! Two ways out of a mode that may hold at once: the file does not decide between them.
+//! Checks that two exits of a mode cannot hold at once without a priority.
 
+use crate::graph::net::Net;
 use crate::graph::plan::{Condition, PlannedExit, PlannedMode, Test};
-use crate::graph::syntax::Sort;
-use crate::source::{Code, Diagnostic};
+use crate::graph::syntax::ExitKind;
+use crate::source::{Code, Diagnostic, Diagnostics};
 
-/// Two `go` of a mode that can hold in one tick and do not say which wins. What ends the run or follows a loss has its
-/// fixed order, so only `go` has to be asked.
-pub(crate) fn overlaps(mode: &PlannedMode, names: &[&str], found: &mut Vec<Diagnostic>) {
-    let ways: Vec<&PlannedExit> = mode.exits.iter().filter(|exit| exit.sort == Sort::Go).collect();
-    for (i, second) in ways.iter().enumerate() {
+/// Reports two `go` of a mode that can hold in one tick with the same priority.
+///
+/// Other exits have a fixed order.
+pub(crate) fn check(net: &Net<'_>, modes: &[PlannedMode], diagnostics: &mut Diagnostics) {
+    modes.iter().for_each(|mode| check_mode(net, mode, diagnostics));
+}
+
+fn check_mode(net: &Net<'_>, mode: &PlannedMode, diagnostics: &mut Diagnostics) {
+    let exits: Vec<&PlannedExit> = mode.exits.iter().filter(|exit| exit.kind == ExitKind::Go).collect();
+    for (i, second) in exits.iter().enumerate() {
         let is_clash = |first: &&&PlannedExit| {
             first.to != second.to && first.priority == second.priority && !excludes(&first.condition, &second.condition)
         };
-        let Some(first) = ways[..i].iter().find(is_clash) else { continue };
-        let name = |exit: &PlannedExit| exit.to.map_or("", |to| names[to]);
+        let Some(first) = exits[..i].iter().find(is_clash) else { continue };
+        let name = |exit: &PlannedExit| exit.to.map_or("", |to| net.flat.modes[to].key.name.as_str());
         let message = format!(
-            "two ways out of `{}` can hold at once: to `{}` when {}, and to `{}` when {}",
+            "two exits of `{}` can hold at once: to `{}` when {}, and to `{}` when {}",
             mode.name,
             name(first),
             first.text,
@@ -24,12 +30,12 @@ pub(crate) fn overlaps(mode: &PlannedMode, names: &[&str], found: &mut Vec<Diagn
         );
         let diagnostic = Diagnostic::new(Code::OverlappingConditions, second.span.clone(), message);
         let more = second.priority + 1;
-        let help = format!("give the one that shall win `priority = {more}`, or let them exclude each other");
-        found.push(diagnostic.note(first.span.clone(), "the other is here").help(help));
+        let help = format!("add `priority = {more}` to the one that should win, or make their conditions exclusive");
+        diagnostics.push(diagnostic.note(first.span.clone(), "the other is here").help(help));
     }
 }
 
-/// Whether one of them never holds while the other does.
+/// Returns whether two conditions never hold at once.
 fn excludes(a: &Condition, b: &Condition) -> bool {
     match (a, b) {
         (Condition::Port(one, a), Condition::Port(other, b)) => one == other && are_apart(*a, *b),
@@ -43,10 +49,9 @@ fn are_apart(a: Test, b: Test) -> bool {
         (Test::Absent, Test::Absent) => false,
         (Test::Absent, _) | (_, Test::Absent) => true,
         (Test::Flag(a), Test::Flag(b)) => a != b,
-        (
-            Test::Between { least: a, greatest: b, hysteresis: h },
-            Test::Between { least: c, greatest: d, hysteresis: k },
-        ) => b + h <= c - k || d + k <= a - h,
+        (Test::Between { min: a, max: b, hysteresis: h }, Test::Between { min: c, max: d, hysteresis: k }) => {
+            b + h <= c - k || d + k <= a - h
+        }
         _ => false,
     }
 }
@@ -56,8 +61,8 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_excludes_what() {
-        let between = |least, greatest, hysteresis| Test::Between { least, greatest, hysteresis };
+    fn exclusive_tests_are_found() {
+        let between = |min, max, hysteresis| Test::Between { min, max, hysteresis };
         let (low, high) = (f64::NEG_INFINITY, f64::INFINITY);
         let cases = [
             (Test::Flag(true), Test::Flag(false), true),

@@ -1,22 +1,17 @@
-//! Policies of roles that the graph does not declare.
+//! Checks that [policy] names only declared roles.
 
-use crate::source::{Code, Diagnostic, Value};
+use crate::graph::net::Net;
+use crate::source::{Code, Diagnostic, Diagnostics, Value};
 
-/// Policies of roles that are not there.
-pub(crate) fn unknown_roles<'n>(
-    section: &Value,
-    roles: impl Iterator<Item = &'n str> + Clone,
-    found: &mut Vec<Diagnostic>,
-) {
-    let own = section.as_table().and_then(|table| table.get("roles")).and_then(Value::as_table);
-    for (key, _) in own.iter().flat_map(|table| &table.entries) {
-        if !roles.clone().any(|role| role == key.name) {
-            let message = format!("there is no role `{}` to have a policy", key.name);
-            found.push(Diagnostic::new(Code::UnknownKey, key.span.clone(), message).suggest(
-                &key.name,
-                roles.clone(),
-                "roles",
-            ));
+/// Reports each role in `policy.roles` that the graph does not declare.
+pub(crate) fn check(net: &Net<'_>, diagnostics: &mut Diagnostics) {
+    let Some((section, _)) = &net.flat.policy else { return };
+    let roles = section.as_table().and_then(|table| table.get("roles")).and_then(Value::as_table);
+    for (key, _) in roles.iter().flat_map(|table| &table.entries) {
+        if !net.flat.role_names().any(|role| role == key.name) {
+            let message = format!("there is no role `{}`", key.name);
+            let diagnostic = Diagnostic::new(Code::UnknownKey, key.span.clone(), message);
+            diagnostics.push(diagnostic.suggest(&key.name, net.flat.role_names(), "roles"));
         }
     }
 }

@@ -1,34 +1,34 @@
-//! Units: what an input takes, what an output gives, and what follows from one for the other.
+//! Units of one node: what its inputs accept, and what follows for its outputs.
 
 use std::collections::BTreeMap;
 
 use crate::node::{PortSpec, UnitPattern, unit_pattern};
 use crate::signal::{Shape, Unit};
 
-/// What comes in is not what is taken.
+/// An input received another unit than it accepts.
 #[derive(Debug, PartialEq, Eq)]
-pub(crate) struct Clash {
-    /// What comes in: `is in `m``.
+pub(crate) struct UnitMismatch {
+    /// The received unit, for example ``is in `m` ``.
     pub(crate) has: String,
-    /// What is taken: ``N``.
+    /// The accepted unit, for example `` `N` ``.
     pub(crate) takes: String,
 }
 
-/// What the variables of one node stand for, and which input told.
+/// The unit variables of one node: the unit, and the port that determined it.
 #[derive(Debug, Default)]
 pub(crate) struct Units {
     known: BTreeMap<char, (Unit, String)>,
 }
 
 impl Units {
-    /// Takes the unit of what comes in on the input called `name`.
-    pub(crate) fn take(&mut self, port: &PortSpec, name: &str, shape: &Shape) -> Result<(), Clash> {
+    /// Binds the unit variable of an input, or returns the mismatch. `name` is the full name of the input.
+    pub(crate) fn take(&mut self, port: &PortSpec, name: &str, shape: &Shape) -> Result<(), UnitMismatch> {
         if let Shape::Features(features) = shape {
-            let slow = features.features.iter().find(|feature| feature.unit.per_second == 0);
-            return match (unit_pattern(port), slow) {
+            let not_rate = features.features.iter().find(|feature| feature.unit.per_second == 0);
+            return match (unit_pattern(port), not_rate) {
                 (Some(UnitPattern::AnyRate | UnitPattern::Variable { per_second: true, .. }), Some(feature)) => {
                     let has = format!("has `{}` in `{}`", feature.name, feature.unit);
-                    Err(Clash { has, takes: "features per second".into() })
+                    Err(UnitMismatch { has, takes: "features per second".into() })
                 }
                 _ => Ok(()),
             };
@@ -37,22 +37,23 @@ impl Units {
         let takes = match unit_pattern(port) {
             None | Some(UnitPattern::Any) => return Ok(()),
             Some(UnitPattern::AnyRate) if unit.per_second > 0 => return Ok(()),
-            Some(UnitPattern::AnyRate) => "something per second".into(),
+            Some(UnitPattern::AnyRate) => "a unit per second".into(),
             Some(UnitPattern::Known(takes)) if takes == unit => return Ok(()),
             Some(UnitPattern::Known(takes)) => format!("`{takes}`"),
             Some(UnitPattern::Variable { name: letter, .. }) => {
-                let (takes, by) = self.known.entry(letter).or_insert_with(|| (unit, name.to_owned()));
+                let (takes, by) = self.known.entry(letter).or_insert_with(|| (unit, format!("`{name}`")));
                 if *takes == unit {
                     return Ok(());
                 }
-                format!("`{takes}` like `{by}`")
+                format!("`{takes}`, the unit of {by}")
             }
         };
-        Err(Clash { has: format!("is in `{unit}`"), takes })
+        Err(UnitMismatch { has: format!("is in `{unit}`"), takes })
     }
 
-    /// Fills in the unit of an output, called `name`, that follows from its declaration. What nothing has told so far
-    /// is what the node says: an input that is delayed has to agree.
+    /// Sets the unit of an output from its declaration. `name` is the full name of the output.
+    ///
+    /// A variable that no input has bound takes the unit that the node chose, so a delayed input must agree with it.
     pub(crate) fn give(&mut self, port: &PortSpec, name: &str, shape: &mut Shape) {
         match unit_pattern(port) {
             Some(UnitPattern::Known(unit)) => shape.set_unit(unit),
@@ -61,7 +62,7 @@ impl Units {
                     let unit = if per_tactel { unit.per_tactel() } else { *unit };
                     shape.set_unit(if per_second { unit.per_second() } else { unit });
                 } else if let Some(unit) = shape.unit().filter(|_| !per_tactel && !per_second) {
-                    self.known.insert(letter, (unit, name.to_owned()));
+                    self.known.insert(letter, (unit, format!("the output `{name}`")));
                 }
             }
             None | Some(UnitPattern::Any | UnitPattern::AnyRate) => {}
@@ -85,7 +86,7 @@ mod tests {
     }
 
     #[test]
-    fn what_goes_in_and_what_follows() {
+    fn inputs_bind_variables_and_outputs_follow() {
         let cases =
             [("N", "N", true), ("N", "m", false), ("_", "kPa", true), ("_/s", "m/s", true), ("_/s", "m", false)];
         for (takes, has, fits) in cases {
@@ -94,7 +95,7 @@ mod tests {
         let mut units = Units::default();
         units.take(&port("U"), "n.a", &scalar("raw")).unwrap();
         let clash = units.take(&port("U"), "n.b", &scalar("N")).unwrap_err();
-        assert_eq!((clash.has.as_str(), clash.takes.as_str()), ("is in `N`", "`raw` like `n.a`"));
+        assert_eq!((clash.has.as_str(), clash.takes.as_str()), ("is in `N`", "`raw`, the unit of `n.a`"));
         for (pattern, gives) in [("U", "raw"), ("U/tactel", "raw/tactel"), ("U/s", "raw/s"), ("m", "m"), ("V", "1")] {
             let mut shape = scalar("1");
             units.give(&port(pattern), "n.y", &mut shape);
@@ -102,6 +103,6 @@ mod tests {
         }
         units.give(&port("W"), "n.y", &mut scalar("kPa"));
         let clash = units.take(&port("W"), "n.c", &scalar("N")).unwrap_err();
-        assert_eq!(clash.takes, "`kPa` like `n.y`", "an input that is compared later");
+        assert_eq!(clash.takes, "`kPa`, the unit of the output `n.y`", "a delayed input");
     }
 }

@@ -1,13 +1,13 @@
-//! One flat graph: the parts are in place, names stand in scopes.
+//! The flat graph: parts are expanded, and each name belongs to a scope.
 
 use std::collections::BTreeMap;
 use std::ops::Range;
 
-use crate::graph::syntax::{Age, Bench, Block, GraphTable, ModeBlock, PolicyTable};
+use crate::graph::syntax::{AgeLimit, Bench, Block, GraphTable, ModeBlock, PolicyTable};
 use crate::node::Word;
 use crate::source::{Key, Table, Value};
 
-/// A name in a scope.
+/// What a name in a scope refers to, by index.
 #[derive(Debug, Clone, Copy)]
 pub(crate) enum Entity {
     Role(usize),
@@ -15,19 +15,19 @@ pub(crate) enum Entity {
     Part(usize),
 }
 
-/// The names that a file's wires can use.
+/// The names that the wires of one file can use.
 #[derive(Debug, Default)]
 pub(crate) struct Scope {
     pub(crate) names: BTreeMap<String, (Key, Entity)>,
     pub(crate) exports: Vec<(Key, Word)>,
-    /// Inputs that the part declares.
+    /// Inputs that the part declares, with their documentation.
     pub(crate) declared: Vec<(Key, Word)>,
-    /// Wires into the part; they stand in the scope of its parent.
+    /// Wires into the part, in the scope of its parent.
     pub(crate) inputs: Vec<(Key, Word)>,
     pub(crate) parent: Option<usize>,
 }
 
-/// A node in its scope, with its full name.
+/// A node with its full name and its scope.
 #[derive(Debug)]
 pub(crate) struct FlatNode {
     pub(crate) name: String,
@@ -35,24 +35,36 @@ pub(crate) struct FlatNode {
     pub(crate) block: Block,
 }
 
-/// A graph without parts, and its bench.
+/// A graph with all parts expanded, and its bench.
 #[derive(Debug, Default)]
 pub(crate) struct FlatGraph {
     pub(crate) table: Option<GraphTable>,
-    /// The section [graph] as it is written.
+    /// The section [graph] as written.
     pub(crate) settings: Option<Value>,
-    /// Where to show what is missing in the graph as a whole.
+    /// Span for diagnostics about the graph as a whole.
     pub(crate) place: Range<usize>,
     pub(crate) roles: Vec<(Key, Word)>,
     pub(crate) nodes: Vec<FlatNode>,
     pub(crate) scopes: Vec<Scope>,
     pub(crate) commands: Vec<(Key, Key, Word)>,
-    /// The section [limits] and its place.
+    /// The section [limits] and its span.
     pub(crate) limits: Option<(Range<usize>, Table)>,
     pub(crate) modes: Vec<ModeBlock>,
-    /// The section [policy], as it is written and as it reads.
+    /// The section [policy] as written, and parsed if it is valid.
     pub(crate) policy: Option<(Value, Option<PolicyTable>)>,
     pub(crate) bench: Option<Bench>,
-    /// Wires that may grow only so old, by the places of their sources.
-    pub(crate) ages: BTreeMap<usize, Age>,
+    /// Age limits of wires, by the offset of the text that names the source.
+    pub(crate) ages: BTreeMap<usize, AgeLimit>,
+}
+
+impl FlatGraph {
+    /// Returns the names of the declared roles.
+    pub(crate) fn role_names(&self) -> impl Iterator<Item = &str> + Clone {
+        self.roles.iter().map(|(key, _)| key.name.as_str())
+    }
+
+    /// Returns the names of the modes.
+    pub(crate) fn mode_names(&self) -> impl Iterator<Item = &str> + Clone {
+        self.modes.iter().map(|mode| mode.key.name.as_str())
+    }
 }

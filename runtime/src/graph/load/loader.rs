@@ -1,47 +1,49 @@
-//! From files to one flat graph: parts are put in place, `--set` and overrides are merged.
+//! Loads the files of a graph, expands its parts, and merges `--set` and overrides.
 
 use std::collections::BTreeMap;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 use super::flat::{Entity, FlatGraph, FlatNode, Scope};
-use crate::graph::syntax::{Age, Bench, Document, PartBlock, Sections};
-use crate::source::{BuiltinFile, Code, Diagnostic, Item, Key, SourceMap, Table, Value, meant, parse_table};
+use crate::graph::syntax::{AgeLimit, Bench, GraphDocument, PartBlock, Sections};
+use crate::source::{
+    BuiltinFile, Code, Diagnostic, Diagnostics, Item, Key, SourceMap, Table, Value, parse_table, suggest_name,
+};
 
-/// What to load.
+/// Which graph to load, and what to change in it.
 #[derive(Debug, Clone, Default)]
 pub struct Request {
     /// The graph file.
     pub graph: PathBuf,
-    /// The graph's text, if it does not stand in the file.
+    /// The text of the graph, instead of the content of the file.
     pub text: Option<String>,
-    /// The bench, if it is not the graph's own.
+    /// The bench file, instead of the bench of the graph.
     pub bench: Option<PathBuf>,
-    /// The bench's text, if it does not stand in a file.
+    /// The text of the bench, instead of a file.
     pub bench_text: Option<String>,
-    /// Values laid over those of the files, each `key=value`.
+    /// Assignments `key=value` that override values of the files.
     pub set: Vec<String>,
 }
 
 impl Request {
-    /// The graph of a file, on its own bench.
+    /// Requests the graph of a file, on its own bench.
     pub fn file(path: impl Into<PathBuf>) -> Self {
         Self { graph: path.into(), ..Self::default() }
     }
 
-    /// A graph that is given as text; its paths are relative to the working folder.
+    /// Requests a graph given as text, with paths relative to the working folder.
     pub fn text(text: impl Into<String>) -> Self {
         Self { graph: "graph.toml".into(), text: Some(text.into()), ..Self::default() }
     }
 
-    /// On another bench.
+    /// Replaces the bench.
     #[must_use]
     pub fn bench(mut self, path: impl Into<PathBuf>) -> Self {
         self.bench = Some(path.into());
         self
     }
 
-    /// With a value laid over those of the files: `nodes.pid.gains.x.kp=3`.
+    /// Overrides a value of the files, for example `nodes.pid.gains.x.kp=3`.
     #[must_use]
     pub fn set(mut self, assignment: impl Into<String>) -> Self {
         self.set.push(assignment.into());
@@ -49,40 +51,40 @@ impl Request {
     }
 }
 
-/// Reads files and notes what is wrong with them.
+/// Reads files and collects their diagnostics.
 #[derive(Default)]
 pub(crate) struct Loader {
     pub(crate) sources: SourceMap,
-    pub(crate) diagnostics: Vec<Diagnostic>,
-    ages: BTreeMap<usize, Age>,
+    pub(crate) diagnostics: Diagnostics,
+    ages: BTreeMap<usize, AgeLimit>,
     open_parts: Vec<PathBuf>,
-    /// Whether there were too many parts to go on.
+    /// Whether the maximum number of parts is exceeded, so that loading stops.
     is_full: bool,
 }
 
-/// As deep parts may stand in parts.
-const DEEPEST: usize = 32;
-/// As many parts a graph may have.
-const MOST_PARTS: usize = 4096;
+/// Maximum depth of parts inside parts.
+const MAX_PART_DEPTH: usize = 32;
+/// Maximum number of parts in a graph.
+const MAX_PARTS: usize = 4096;
 
 impl Loader {
-    /// A loader that knows the files a catalogue brings along.
+    /// Creates a loader with the built-in files of a catalogue.
     pub(crate) fn new(builtin: &[BuiltinFile]) -> Self {
         Self { sources: SourceMap::with_builtin(builtin), ..Self::default() }
     }
 
-    /// Reads everything that the request names.
+    /// Reads all files of a request into one flat graph.
     pub(crate) fn load(&mut self, request: &Request) -> FlatGraph {
         let mut flat = FlatGraph::default();
         let root = match &request.text {
             Some(text) => self.parse(&request.graph, text.clone()),
             None => self.read(&request.graph, None),
         };
-        let (graph_set, bench_set) = self.set(&request.set);
+        let (graph_set, bench_set) = self.assignments(&request.set);
         let Some(mut root) = root else { return flat };
-        if let Some(what) = other_file(&root.0, "graph") {
+        if let Some(what) = wrong_file_type(&root.0, "graph") {
             let message = format!("this is {what}, not a graph");
-            let help = (what == SCENARIO).then(|| "`tactflow verify` runs it".to_owned());
+            let help = (what == SCENARIO).then(|| "run it with `tactflow verify`".to_owned());
             self.diagnostics.push(Diagnostic::new(Code::WrongFile, root.1, message).with_help(help));
             return flat;
         }
@@ -117,15 +119,15 @@ impl Loader {
         let mut sections = Sections::new(&self.sources);
         let result = read(&mut sections);
         let ages = std::mem::take(&mut sections.ages);
-        let found = sections.finish();
+        let diagnostics = sections.finish();
         self.ages.extend(ages);
-        self.diagnostics.extend(found);
+        self.diagnostics.extend(diagnostics);
         result
     }
 
-    /// The bench that is asked for, the graph's own sections of one, or the one it names.
+    /// Loads the requested bench, or the sections of a bench in the graph, or the bench that the graph names.
     fn bench(&mut self, request: &Request, flat: &FlatGraph, graph: &Table, set: Table) -> Option<Bench> {
-        // A graph whose own section could not be read has been told so.
+        // An invalid section [graph] has its own diagnostic.
         let named = flat.table.as_ref()?.bench.as_ref();
         if let Some(text) = &request.bench_text {
             let mut root = self.parse(Path::new("bench.toml"), text.clone())?.0;
@@ -134,10 +136,10 @@ impl Loader {
         }
         let own = graph.entry("devices").or_else(|| graph.entry("bind")).map(|(key, _)| key.span.clone());
         if let (Some(own), Some(file)) = (&own, named) {
-            let message = "the graph has devices of its own and names a bench";
+            let message = "the graph has its own devices and also names a bench";
             let diagnostic = Diagnostic::new(Code::DuplicateName, file.span.clone(), message);
-            let help = "take one of them out; `--bench` takes the place of either";
-            self.diagnostics.push(diagnostic.note(own.clone(), "its own are here").help(help));
+            let help = "remove one of the two; `--bench` replaces either of them";
+            self.diagnostics.push(diagnostic.note(own.clone(), "its own devices are here").help(help));
             return None;
         }
         if own.is_some() && request.bench.is_none() {
@@ -152,16 +154,15 @@ impl Loader {
                 return Some(self.sections(|sections| sections.bench(&set)));
             }
             (None, None) => {
-                let diagnostic =
-                    Diagnostic::new(Code::MissingKey, flat.place.clone(), "the graph names no bench to run on");
-                let help = "add `bench = \"benches/….toml\"` under [graph], give one with `--bench`, or write \
-                            [bind] and [devices] here";
+                let diagnostic = Diagnostic::new(Code::MissingKey, flat.place.clone(), "the graph has no bench");
+                let help = "add `bench = \"benches/….toml\"` under [graph], pass `--bench`, or add [bind] and [devices] \
+                            here";
                 self.diagnostics.push(diagnostic.help(help));
                 return None;
             }
         };
         let (mut root, place) = self.read(&path, span)?;
-        if let Some(what) = other_file(&root, "devices") {
+        if let Some(what) = wrong_file_type(&root, "devices") {
             let message = format!("this is {what}, not a bench");
             self.diagnostics.push(Diagnostic::new(Code::WrongFile, place, message));
             return None;
@@ -170,7 +171,7 @@ impl Loader {
         Some(self.sections(|sections| sections.bench(&root)))
     }
 
-    /// Reads and parses a file; `from` is where its name stands.
+    /// Reads and parses a file; `from` is the span of its name.
     pub(crate) fn read(&mut self, path: &Path, from: Option<Range<usize>>) -> Option<(Table, Range<usize>)> {
         let text = match self.sources.builtin(path) {
             Ok(Some(bytes)) => Ok(String::from_utf8_lossy(bytes).into_owned()),
@@ -193,7 +194,7 @@ impl Loader {
 
     fn parse(&mut self, path: &Path, text: String) -> Option<(Table, Range<usize>)> {
         let file = self.sources.add_file(path, text);
-        // Without a section to point at, the place of the whole is the file's first line.
+        // Diagnostics about the file as a whole point at its first line.
         let first_line = file.base..file.base + file.text.lines().next().map_or(0, str::len);
         match parse_table(file) {
             Ok(Value { item: Item::Table(table), .. }) => Some((table, first_line)),
@@ -205,8 +206,8 @@ impl Loader {
         }
     }
 
-    /// What the command line sets: for the graph, and for the bench.
-    fn set(&mut self, assignments: &[String]) -> (Table, Table) {
+    /// Parses the assignments of the command line, for the graph and for the bench.
+    fn assignments(&mut self, assignments: &[String]) -> (Table, Table) {
         let (mut graph, mut bench) = (Table::default(), Table::default());
         for assignment in assignments {
             let Some(table) = self.assignment(assignment) else { continue };
@@ -219,7 +220,7 @@ impl Loader {
         (graph, bench)
     }
 
-    /// One `key=value`; what is no TOML value is a string, so that nobody has to quote twice in a shell.
+    /// Parses one `key=value`. A value that is not TOML is a string, so that no second quoting is needed in a shell.
     fn assignment(&mut self, text: &str) -> Option<Table> {
         let is_line = !text.contains(['\n', '\r']);
         let quoted = text.split_once('=').filter(|_| is_line).map(|(key, value)| format!("{key}={value:?}"));
@@ -238,8 +239,8 @@ impl Loader {
         None
     }
 
-    /// Puts the nodes and parts of a document into the graph.
-    fn flatten(&mut self, document: Document, prefix: &str, mut scope: Scope, flat: &mut FlatGraph) -> usize {
+    /// Adds the nodes and parts of a document to the graph, and returns the index of its scope.
+    fn flatten(&mut self, document: GraphDocument, prefix: &str, mut scope: Scope, flat: &mut FlatGraph) -> usize {
         let index = flat.scopes.len();
         flat.scopes.push(Scope::default());
         (scope.exports, scope.declared) = (document.exports, document.inputs);
@@ -261,10 +262,10 @@ impl Loader {
 
     fn declare(&mut self, scope: &mut Scope, key: &Key, entity: Entity) {
         if let Some((first, _)) = scope.names.get(&key.name) {
-            let message = format!("`{}` is the name of two things", key.name);
+            let message = format!("the name `{}` is used twice", key.name);
             let (first, second) = if first.span.start < key.span.start { (first, key) } else { (key, first) };
             let diagnostic = Diagnostic::new(Code::DuplicateName, second.span.clone(), message);
-            let diagnostic = diagnostic.note(first.span.clone(), "the first is here");
+            let diagnostic = diagnostic.note(first.span.clone(), "first used here");
             self.diagnostics.push(diagnostic.help("roles, nodes and parts share one namespace: rename one of them"));
             return;
         }
@@ -273,9 +274,9 @@ impl Loader {
 
     fn part(&mut self, part: &PartBlock, prefix: &str, parent: usize, flat: &mut FlatGraph) -> Option<usize> {
         let file = part.file.as_ref().filter(|_| !self.is_full)?;
-        if self.open_parts.len() >= DEEPEST || flat.scopes.len() > MOST_PARTS {
+        if self.open_parts.len() >= MAX_PART_DEPTH || flat.scopes.len() > MAX_PARTS {
             let message =
-                format!("parts are nested deeper than {DEEPEST}, or there are more than {MOST_PARTS} of them");
+                format!("parts are nested more than {MAX_PART_DEPTH} deep, or there are more than {MAX_PARTS} parts");
             self.diagnostics.push(Diagnostic::new(Code::EndlessPart, file.span.clone(), message));
             self.is_full = true;
             return None;
@@ -297,7 +298,7 @@ impl Loader {
         Some(inner)
     }
 
-    /// `set.NAME` lays values over node NAME, or over what is set in part NAME.
+    /// Merges `set.NAME` of a part into its node NAME, or into the `set` of its part NAME.
     fn override_with(&mut self, root: &mut Table, set: &Table) {
         let names = |section: &str| -> Vec<String> {
             let table = root.get(section).and_then(Value::as_table);
@@ -310,11 +311,9 @@ impl Loader {
                 () if parts.contains(&key.name) => &["parts", "set"],
                 () => {
                     let message = format!("the part has no node or part `{}`", key.name);
-                    self.diagnostics.push(Diagnostic::new(Code::UnknownKey, key.span.clone(), message).suggest(
-                        &key.name,
-                        nodes.iter().chain(&parts).map(String::as_str),
-                        "nodes and parts",
-                    ));
+                    let known = nodes.iter().chain(&parts).map(String::as_str);
+                    let diagnostic = Diagnostic::new(Code::UnknownKey, key.span.clone(), message);
+                    self.diagnostics.push(diagnostic.suggest(&key.name, known, "nodes and parts"));
                     continue;
                 }
             };
@@ -322,24 +321,23 @@ impl Loader {
         }
     }
 
-    fn check_part_wires(&mut self, part: &PartBlock, document: &Document) {
+    fn check_part_wires(&mut self, part: &PartBlock, document: &GraphDocument) {
+        let names = || document.inputs.iter().map(|(input, _)| input.name.as_str());
         for (key, _) in &part.wires {
-            if !document.inputs.iter().any(|(input, _)| input.name == key.name) {
+            if !names().any(|name| name == key.name) {
                 let message = format!("part `{}` has no input `{}`", part.key.name, key.name);
-                self.diagnostics.push(Diagnostic::new(Code::UnknownInput, key.span.clone(), message).suggest(
-                    &key.name,
-                    document.inputs.iter().map(|(input, _)| input.name.as_str()),
-                    "inputs",
-                ));
+                let diagnostic = Diagnostic::new(Code::UnknownInput, key.span.clone(), message);
+                self.diagnostics.push(diagnostic.suggest(&key.name, names(), "inputs"));
             }
         }
-        let names = || document.inputs.iter().map(|(input, _)| input.name.as_str());
         for (input, doc) in &document.inputs {
-            let is_meant =
-                |key: &Key| !names().any(|name| name == key.name) && meant(&key.name, names()) == Some(&input.name);
-            let mut wired = part.wires.iter().map(|(key, _)| key).chain(&part.unread);
-            if !wired.any(|key| key.name == input.name || is_meant(key)) {
-                let message = format!("part `{}` needs `in.{}`: {}", part.key.name, input.name, doc.text);
+            // A misspelt input has its own diagnostic.
+            let is_misspelt = |key: &Key| {
+                !names().any(|name| name == key.name) && suggest_name(&key.name, names()) == Some(&input.name)
+            };
+            let mut wired = part.wires.iter().map(|(key, _)| key).chain(&part.invalid);
+            if !wired.any(|key| key.name == input.name || is_misspelt(key)) {
+                let message = format!("part `{}` needs a wire to `in.{}`: {}", part.key.name, input.name, doc.text);
                 let diagnostic = Diagnostic::new(Code::MissingInput, part.key.span.clone(), message);
                 let help = format!("add `in.{} = \"…\"`", input.name);
                 self.diagnostics.push(diagnostic.note(input.span.clone(), "the part declares it here").help(help));
@@ -348,7 +346,7 @@ impl Loader {
     }
 }
 
-/// Whether a text sets one thing: an assignment on a line, and no header, comment or second one.
+/// Returns whether a text is a single assignment, without a header or a second line.
 fn is_one_assignment(table: &Table, text: &str) -> bool {
     table.entries.len() == 1
         && text.contains('=')
@@ -356,19 +354,19 @@ fn is_one_assignment(table: &Table, text: &str) -> bool {
         && !text.trim_start().starts_with('[')
 }
 
-/// What a file with the section [scenario] is.
+/// Name of the type of a file with the section [scenario].
 const SCENARIO: &str = "a scenario";
 
-/// What a file is that lacks its section `wanted` and has those of another sort of file.
-pub(crate) fn other_file(root: &Table, wanted: &str) -> Option<&'static str> {
-    if root.get(wanted).is_some() {
+/// Returns the type of a file, if it lacks the section `expected` and has the sections of another type.
+pub(crate) fn wrong_file_type(root: &Table, expected: &str) -> Option<&'static str> {
+    if root.get(expected).is_some() {
         return None;
     }
-    let sorts = [("scenario", SCENARIO), ("graph", "a graph"), ("devices", "a bench"), ("exports", "a part")];
-    sorts.iter().find(|(section, _)| root.get(section).is_some()).map(|(_, what)| *what)
+    let types = [("scenario", SCENARIO), ("graph", "a graph"), ("devices", "a bench"), ("exports", "a part")];
+    types.iter().find(|(section, _)| root.get(section).is_some()).map(|(_, what)| *what)
 }
 
-/// A value in a table in a table: `nodes.NAME`, or `parts.NAME.set`.
+/// Wraps a value in tables: `nodes.NAME`, or `parts.NAME.set`.
 fn nested(path: &[&str], key: &Key, value: &Value) -> Table {
     let named = |name: &str, table: Table| {
         let key = Key { name: name.to_owned(), span: key.span.clone() };

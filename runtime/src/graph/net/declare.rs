@@ -1,19 +1,19 @@
-//! The declarations behind the names of types: roles, nodes, and what only scenarios read.
+//! Looks up the types of roles and nodes in the catalogue.
 
 use super::Net;
 use crate::catalogue::Catalogue;
 use crate::device::RoleType;
 use crate::graph::load::FlatGraph;
 use crate::node::Word;
-use crate::source::{Code, Diagnostic, Key};
+use crate::source::{Code, Diagnostic, Diagnostics, Key};
 
 impl<'a> Net<'a> {
-    /// Looks up every type; nothing is wired yet.
-    pub(super) fn declared(flat: &'a FlatGraph, catalogue: &'a Catalogue, found: &mut Vec<Diagnostic>) -> Self {
+    /// Creates a net with all types looked up and without wires.
+    pub(super) fn declare(flat: &'a FlatGraph, catalogue: &'a Catalogue, diagnostics: &mut Diagnostics) -> Self {
         let mut unknown = |word: &Word, what: &str, names: Vec<&str>| {
             let message = format!("there is no {what} `{}`", word.text);
             let diagnostic = Diagnostic::new(Code::UnknownType, word.span.clone(), message);
-            found.push(diagnostic.suggest(&word.text, names.into_iter(), &format!("{what}s")));
+            diagnostics.push(diagnostic.suggest(&word.text, names.into_iter(), &format!("{what}s")));
         };
         let role = |(_, kind): &(Key, Word)| {
             let role = catalogue.role_type(&kind.text);
@@ -33,27 +33,28 @@ impl<'a> Net<'a> {
             known
         });
         let nodes = nodes.collect();
-        let roles = flat.roles.iter().zip(roles).map(|((_, kind), role)| not_observed(kind, role?, found)).collect();
-        let observed = observed(flat, catalogue, found);
+        let roles =
+            flat.roles.iter().zip(roles).map(|((_, kind), role)| reject_observed(kind, role?, diagnostics)).collect();
+        let observed = observed_roles(flat, catalogue, diagnostics);
         Self { flat, catalogue, roles, nodes, observed, wires: Vec::new(), commands: Vec::new(), order: Vec::new() }
     }
 }
 
-/// The type of a role, unless it is one that no task may declare: that is told.
-fn not_observed<'r>(kind: &Word, role: &'r RoleType, found: &mut Vec<Diagnostic>) -> Option<&'r RoleType> {
+/// Returns the type of a role, or reports that a task cannot declare it.
+fn reject_observed<'r>(kind: &Word, role: &'r RoleType, diagnostics: &mut Diagnostics) -> Option<&'r RoleType> {
     if role.is_observed {
-        let message = format!("a `{}` is for scenarios and the recorder: no task declares it", kind.text);
-        let help = format!("take it out: a bench binds it, as `{} = \"device\"`", role.observed_name());
-        found.push(Diagnostic::new(Code::ObservedRole, kind.span.clone(), message).help(help));
+        let message = format!("`{}` is only for scenarios and recordings: a task cannot declare it", kind.text);
+        let help = format!("remove it, and bind it in the bench: `{} = \"device\"`", role.observed_name());
+        diagnostics.push(Diagnostic::new(Code::ObservedRole, kind.span.clone(), message).help(help));
     }
     (!role.is_observed).then_some(role)
 }
 
-/// What the bench binds beside what the task declares, and only a scenario and the recorder may read.
-fn observed<'a>(
+/// Returns the roles that the bench binds for scenarios and recordings only.
+fn observed_roles<'a>(
     flat: &'a FlatGraph,
     catalogue: &'a Catalogue,
-    found: &mut Vec<Diagnostic>,
+    diagnostics: &mut Diagnostics,
 ) -> Vec<(&'a Key, &'a Word, &'a RoleType)> {
     let bound = flat.bench.iter().flat_map(|bench| &bench.bind);
     let undeclared = bound.filter(|(key, _)| !flat.roles.iter().any(|(role, _)| role.name == key.name));
@@ -65,12 +66,10 @@ fn observed<'a>(
     all.retain(|(key, ..)| {
         let taken = flat.scopes.first().and_then(|scope| scope.names.get(&key.name));
         if let Some((other, _)) = taken {
-            let message = format!("`{}` is the name of two things", key.name);
+            let message = format!("the name `{}` is used twice", key.name);
             let diagnostic = Diagnostic::new(Code::DuplicateName, other.span.clone(), message);
-            let diagnostic = diagnostic.note(key.span.clone(), "the bench binds a role of that name here");
-            found.push(
-                diagnostic.help("what a scenario reads has its name from the bench: rename the node or the part"),
-            );
+            let diagnostic = diagnostic.note(key.span.clone(), "the bench binds a role with this name here");
+            diagnostics.push(diagnostic.help("rename the node or the part: scenarios use the name in the bench"));
         }
         taken.is_none()
     });

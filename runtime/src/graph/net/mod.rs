@@ -13,11 +13,11 @@ use crate::device::RoleType;
 use crate::graph::load::FlatGraph;
 use crate::graph::plan::{PortRef, Producer};
 use crate::node::{NodeSpec, PortSpec, Word};
-use crate::source::{Diagnostic, Key};
+use crate::source::{Diagnostics, Key};
 
-pub(crate) use wire::{CommandWire, Origin, Wire};
+pub(crate) use wire::{CommandWire, Wire, WireOrigin};
 
-/// A flat graph with the declaration of each type, its wires and its order.
+/// A flat graph with the declarations of its types, its resolved wires and its step order.
 pub(crate) struct Net<'a> {
     pub(crate) flat: &'a FlatGraph,
     pub(crate) catalogue: &'a Catalogue,
@@ -25,37 +25,37 @@ pub(crate) struct Net<'a> {
     pub(crate) roles: Vec<Option<&'a RoleType>>,
     /// Index of each node's type in the catalogue, and its declaration; `None` if it is unknown.
     pub(crate) nodes: Vec<Option<(usize, &'a NodeSpec)>>,
-    /// What the bench binds and only a scenario and the recorder may read: name, device and type.
+    /// Roles that the bench binds for scenarios and recordings only: name, device and type.
     pub(crate) observed: Vec<(&'a Key, &'a Word, &'a RoleType)>,
-    /// The wires of each node that lead somewhere.
+    /// The resolved wires of each node.
     pub(crate) wires: Vec<Vec<Wire>>,
-    /// The wires of commands and reports that lead somewhere.
+    /// The resolved wires of commands and reports.
     pub(crate) commands: Vec<CommandWire>,
     /// The nodes in the order in which they step.
     pub(crate) order: Vec<usize>,
 }
 
 impl<'a> Net<'a> {
-    /// Looks up every type, connects every wire and orders the nodes.
-    pub(crate) fn new(flat: &'a FlatGraph, catalogue: &'a Catalogue, found: &mut Vec<Diagnostic>) -> Self {
-        let mut net = Self::declared(flat, catalogue, found);
-        net.wires = net.connect(found);
-        net.commands = net.connect_commands(found);
-        net.order = net.ordered(found);
+    /// Looks up all types, connects all wires and orders the nodes.
+    pub(crate) fn new(flat: &'a FlatGraph, catalogue: &'a Catalogue, diagnostics: &mut Diagnostics) -> Self {
+        let mut net = Self::declare(flat, catalogue, diagnostics);
+        net.wires = net.connect(diagnostics);
+        net.commands = net.connect_commands(diagnostics);
+        net.order = net.find_order(diagnostics);
         net
     }
 
-    /// The declaration of a node; `None` if its type is unknown.
+    /// Returns the declaration of a node, or `None` if its type is unknown.
     pub(crate) fn spec(&self, node: usize) -> Option<&'a NodeSpec> {
         self.nodes[node].map(|(_, spec)| spec)
     }
 
-    /// The declaration of the input that a wire of a node leads to.
+    /// Returns the declaration of the input at the end of a wire.
     pub(crate) fn input(&self, node: usize, wire: &Wire) -> &'a PortSpec {
         &self.spec(node).expect("only known nodes have wires").inputs[wire.input]
     }
 
-    /// The declaration of a producer's outputs.
+    /// Returns the declared outputs of a producer, or `None` if its type is unknown.
     pub(crate) fn outputs(&self, producer: Producer) -> Option<&[PortSpec]> {
         match producer {
             Producer::Role(i) => self.roles[i].map(|role| role.outputs.as_slice()),
@@ -63,7 +63,7 @@ impl<'a> Net<'a> {
         }
     }
 
-    /// Full name of a producer.
+    /// Returns the full name of a producer.
     pub(crate) fn name(&self, producer: Producer) -> &str {
         match producer {
             Producer::Role(i) => &self.flat.roles[i].0.name,
@@ -71,28 +71,28 @@ impl<'a> Net<'a> {
         }
     }
 
-    /// Declaration of what a command wire goes to.
-    pub(crate) fn taken(&self, wire: &CommandWire) -> &PortSpec {
+    /// Returns the declaration of the command or report at the end of a wire.
+    pub(crate) fn command_port(&self, wire: &CommandWire) -> &PortSpec {
         let role = self.roles[wire.role].expect("only known roles have commands");
         &(if wire.is_report { &role.reports } else { &role.commands })[wire.command]
     }
 
-    /// `role.command` of a command wire.
-    pub(crate) fn taken_name(&self, wire: &CommandWire) -> String {
-        format!("{}.{}", self.name(Producer::Role(wire.role)), self.taken(wire).name)
+    /// Formats the end of a command wire as `role.command`.
+    pub(crate) fn command_name(&self, wire: &CommandWire) -> String {
+        format!("{}.{}", self.name(Producer::Role(wire.role)), self.command_port(wire).name)
     }
 
-    /// Declaration of the port a wire comes from.
+    /// Returns the declaration of the port at the start of a wire.
     pub(crate) fn port(&self, source: PortRef) -> &PortSpec {
         &self.outputs(source.producer).expect("a wire comes from a known port")[source.port]
     }
 
-    /// `node.port` of a source.
+    /// Formats a port as `node.port`.
     pub(crate) fn port_name(&self, source: PortRef) -> String {
         format!("{}.{}", self.name(source.producer), self.port(source).name)
     }
 
-    /// The nodes from which `nodes` follow, themselves included.
+    /// Returns all nodes upstream of the given ones, including themselves.
     pub(crate) fn upstream(&self, nodes: impl IntoIterator<Item = usize>) -> BTreeSet<usize> {
         let mut reached: BTreeSet<usize> = nodes.into_iter().collect();
         let mut open: Vec<usize> = reached.iter().copied().collect();
@@ -103,7 +103,7 @@ impl<'a> Net<'a> {
         reached
     }
 
-    /// The nodes that read an output of a node.
+    /// Returns the nodes that read an output of a node.
     pub(crate) fn readers(&self, node: usize) -> impl Iterator<Item = usize> {
         let reads = move |wires: &[Wire]| wires.iter().any(|wire| wire.source.producer == Producer::Node(node));
         self.wires.iter().enumerate().filter(move |(_, wires)| reads(wires)).map(|(reader, _)| reader)

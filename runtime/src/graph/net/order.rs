@@ -1,28 +1,26 @@
-//! The order in which the nodes step, or the cycle that forbids one.
+//! The order in which the nodes step, and the cycles that prevent one.
 
-use super::{Net, Wire};
+use super::Net;
 use crate::graph::plan::Producer;
-use crate::source::{Code, Diagnostic};
+use crate::source::{Code, Diagnostic, Diagnostics};
 
-/// A wire between two nodes that says which one steps first.
+/// A wire between two nodes, which determines which one steps first.
 #[derive(Debug, Clone)]
 struct Edge {
     first: usize,
     then: usize,
-    /// The consumer's index and its wire, whichever steps first.
+    /// Index of the consumer, and index of the wire among its wires.
     wire: (usize, usize),
     is_delayed: bool,
 }
 
 impl Net<'_> {
-    /// The nodes in the order in which they step: rank by rank, those that wait for nothing first, as in the file
-    /// within a rank. So a node seldom waits for what the one before it has just written, and the processor works on
-    /// both at once.
+    /// Returns the nodes in topological order: rank by rank, and in file order within a rank.
     ///
-    /// A delayed input reads the last tick's value, so its node steps before the one it reads.
-    pub(super) fn ordered(&self, found: &mut Vec<Diagnostic>) -> Vec<usize> {
+    /// Neighbours in this order rarely depend on each other, so the processor can overlap their work. A delayed input
+    /// reads the value of the previous tick, so its node steps before its source.
+    pub(super) fn find_order(&self, diagnostics: &mut Diagnostics) -> Vec<usize> {
         let mut edges = edges(self);
-        found.extend(delayed_roles(self));
         let mut rest: Vec<usize> = (0..self.wires.len()).collect();
         let mut order = Vec::new();
         while !rest.is_empty() {
@@ -33,30 +31,15 @@ impl Net<'_> {
                 order.extend(free);
                 rest = bound;
             } else {
-                let cycle = cycle(rest[0], &edges);
-                found.push(describe(self, &cycle));
-                // The rest is ordered as if the cycle were cut at its last wire.
+                let cycle = find_cycle(rest[0], &edges);
+                diagnostics.push(report_cycle(self, &cycle));
+                // The rest is ordered as if the last wire of the cycle were missing.
                 let cut = cycle.last().expect("a cycle has wires").wire;
                 edges.retain(|edge| edge.wire != cut);
             }
         }
         order
     }
-}
-
-/// A role is latched before every node, so there is nothing of the last tick left to read.
-fn delayed_roles(net: &Net<'_>) -> Vec<Diagnostic> {
-    let mut mistakes = Vec::new();
-    for (node, wires) in net.wires.iter().enumerate() {
-        let from_role =
-            |wire: &&Wire| net.input(node, wire).need.is_delayed && matches!(wire.source.producer, Producer::Role(_));
-        for wire in wires.iter().filter(from_role) {
-            let (name, key) = (&net.flat.nodes[node].name, &wire.key.name);
-            let message = format!("`{name}.{key}` reads what the last tick left, which a role does not keep");
-            mistakes.push(wire.origin.mistake(Code::Loop, message).help("wire it from a node"));
-        }
-    }
-    mistakes
 }
 
 fn edges(net: &Net<'_>) -> Vec<Edge> {
@@ -72,11 +55,11 @@ fn edges(net: &Net<'_>) -> Vec<Edge> {
     edges
 }
 
-/// A cycle among nodes none of which is free: walk backwards until a node comes again.
-fn cycle(start: usize, edges: &[Edge]) -> Vec<Edge> {
+/// Returns a cycle among nodes that all wait for another one, by walking backwards until a node repeats.
+fn find_cycle(start: usize, edges: &[Edge]) -> Vec<Edge> {
     let (mut path, mut node): (Vec<Edge>, usize) = (Vec::new(), start);
     loop {
-        let edge = edges.iter().find(|edge| edge.then == node).expect("no node is free").clone();
+        let edge = edges.iter().find(|edge| edge.then == node).expect("every node waits for another one").clone();
         node = edge.first;
         path.push(edge);
         if let Some(from) = path.iter().position(|edge| edge.then == node) {
@@ -87,7 +70,7 @@ fn cycle(start: usize, edges: &[Edge]) -> Vec<Edge> {
     }
 }
 
-fn describe(net: &Net<'_>, cycle: &[Edge]) -> Diagnostic {
+fn report_cycle(net: &Net<'_>, cycle: &[Edge]) -> Diagnostic {
     let step = |edge: &Edge| {
         let (consumer, i) = edge.wire;
         let wire = &net.wires[consumer][i];
@@ -97,11 +80,11 @@ fn describe(net: &Net<'_>, cycle: &[Edge]) -> Diagnostic {
     let steps: Vec<_> = cycle.iter().map(step).collect();
     let path = steps.iter().map(|(_, text)| text.as_str()).collect::<Vec<_>>().join(", ");
     let (span, _) = steps.last().expect("a cycle has wires").clone();
-    let mut diagnostic = Diagnostic::new(Code::Loop, span, format!("wires run in a cycle: {path}"));
+    let mut diagnostic = Diagnostic::new(Code::Loop, span, format!("the wires form a cycle: {path}"));
     diagnostic.notes = steps.iter().rev().skip(1).rev().cloned().collect();
     diagnostic.help(if cycle.iter().all(|edge| edge.is_delayed) {
-        "a cycle of delays alone holds nothing: let it go through a node that declares none"
+        "every node in this cycle has a delayed input: add a node without one"
     } else {
-        "let one of them go through a node that declares a delay"
+        "route one of these wires through a node with a delayed input"
     })
 }

@@ -4,68 +4,100 @@ use super::Net;
 use crate::graph::load::{Entity, Scope};
 use crate::graph::plan::{PortRef, Producer};
 use crate::node::{PortSpec, Word};
-use crate::source::{Code, Diagnostic, closest};
+use crate::source::{Code, Diagnostic, Diagnostics};
 
-/// What to do instead of reading what only a simulation knows.
-const UNSEEN: &str = "a task knows what its sensors give, so that it runs on a robot too: take a port of a sensor or of \
-                      a node, and check this one in a scenario";
+/// Parts through which one wire may pass; more means that it refers to itself.
+const MAX_DEPTH: usize = 64;
+
+/// Help for a task that reads a role reserved for scenarios.
+const OBSERVED_HELP: &str = "this value does not exist on a robot: use a port of a sensor or of a node, and check this \
+                             one in a scenario";
 
 impl Net<'_> {
-    /// Where the port named by `word` is; `None` if it comes from something whose type is unknown.
-    pub(crate) fn resolve(&self, scope: usize, word: &Word, depth: usize) -> Result<Option<PortRef>, Box<Diagnostic>> {
-        const DEEPEST: usize = 64;
-        let wrong = |message: String, help: String| {
-            Box::new(Diagnostic::new(Code::UnknownPort, word.span.clone(), message).help(help))
-        };
-        if depth > DEEPEST {
-            let message = format!("`{}` comes from itself, through the inputs and exports of parts", word.text);
-            return Err(Box::new(Diagnostic::new(Code::Loop, word.span.clone(), message)));
+    /// Resolves the port that a wire names in a scope, through the inputs and exports of parts.
+    ///
+    /// Returns `None` if the wire leads to an unknown type or to an unwired input of a part. Those have their own
+    /// diagnostics.
+    pub(crate) fn resolve(&self, scope: usize, word: &Word) -> Result<Option<PortRef>, Box<Diagnostic>> {
+        self.resolve_at_depth(scope, word, 0)
+    }
+
+    /// Resolves a port like [`Net::resolve`], and adds the diagnostic if that fails.
+    pub(crate) fn resolve_or_report(
+        &self,
+        scope: usize,
+        word: &Word,
+        diagnostics: &mut Diagnostics,
+    ) -> Option<PortRef> {
+        self.resolve(scope, word).unwrap_or_else(|diagnostic| {
+            diagnostics.push(*diagnostic);
+            None
+        })
+    }
+
+    fn resolve_at_depth(&self, scope: usize, word: &Word, depth: usize) -> Result<Option<PortRef>, Box<Diagnostic>> {
+        let diagnostic = |code: Code, message: String| Diagnostic::new(code, word.span.clone(), message);
+        let unknown = |message: String| diagnostic(Code::UnknownPort, message);
+        if depth > MAX_DEPTH {
+            let message = format!("`{}` refers to itself, through the inputs and exports of parts", word.text);
+            return Err(Box::new(diagnostic(Code::Loop, message)));
         }
-        let names = &self.flat.scopes[scope].names;
+        let Scope { names, inputs, declared, parent, .. } = &self.flat.scopes[scope];
         let Some((name, port)) = word.text.split_once('.').filter(|(_, port)| !port.contains('.')) else {
-            let first = word.text.split('.').next().unwrap_or_default();
-            let ports = names.get(first).map(|(_, entity)| self.ports_of(*entity)).unwrap_or_default();
-            let list = ports.iter().map(|port| format!("`{first}.{port}`")).collect::<Vec<_>>().join(", ");
-            let help =
-                if list.is_empty() { "a port is written `node.port`".into() } else { format!("ports here: {list}") };
-            return Err(wrong(format!("`{}` is no port", word.text), help));
+            let help = self.ports_help(scope, word);
+            return Err(Box::new(unknown(format!("`{}` is not a port", word.text)).help(help)));
         };
         if name == "inputs"
-            && let Some(parent) = self.flat.scopes[scope].parent
+            && let Some(parent) = *parent
         {
-            let Scope { inputs, declared, .. } = &self.flat.scopes[scope];
             if !declared.iter().any(|(key, _)| key.name == port) {
-                let help = closest(port, declared.iter().map(|(key, _)| key.name.as_str()), "inputs");
-                return Err(wrong(format!("the part has no input `{port}`"), help));
+                let known = declared.iter().map(|(key, _)| key.name.as_str());
+                return Err(Box::new(
+                    unknown(format!("the part has no input `{port}`")).suggest(port, known, "inputs"),
+                ));
             }
-            // An input that is declared and not wired has been complained about.
+            // An input that is declared and not wired has its own diagnostic.
             let wired = inputs.iter().find(|(key, _)| key.name == port);
-            return wired.map_or(Ok(None), |(_, word)| self.resolve(parent, word, depth + 1));
+            return wired.map_or(Ok(None), |(_, word)| self.resolve_at_depth(parent, word, depth + 1));
         }
         let Some((_, entity)) = names.get(name) else {
             if self.observed.iter().any(|(key, ..)| key.name == name) {
-                let message = format!("`{}` is for scenarios and the recorder: no task reads it", word.text);
-                return Err(Box::new(Diagnostic::new(Code::ObservedRole, word.span.clone(), message).help(UNSEEN)));
+                let message = format!("`{}` is only for scenarios and recordings: a task cannot read it", word.text);
+                return Err(Box::new(diagnostic(Code::ObservedRole, message).help(OBSERVED_HELP)));
             }
-            let help = closest(name, names.keys().map(String::as_str), "roles, nodes and parts");
-            return Err(wrong(format!("nothing here is called `{name}`"), help));
+            let message = format!("there is no role, node or part `{name}`");
+            let known = names.keys().map(String::as_str);
+            return Err(Box::new(unknown(message).suggest(name, known, "roles, nodes and parts")));
         };
-        let no_port = || {
-            let ports = self.ports_of(*entity);
-            wrong(format!("`{name}` has no output `{port}`"), closest(port, ports.into_iter(), "outputs"))
+        let no_output = || {
+            let known = self.ports_of(*entity).into_iter();
+            Box::new(unknown(format!("`{name}` has no output `{port}`")).suggest(port, known, "outputs"))
         };
         let producer = match *entity {
             Entity::Role(i) => Producer::Role(i),
             Entity::Node(i) => Producer::Node(i),
             Entity::Part(inner) => {
                 let export = self.flat.scopes[inner].exports.iter().find(|(key, _)| key.name == port);
-                let (_, word) = export.ok_or_else(no_port)?;
-                return self.resolve(inner, word, depth + 1);
+                let (_, word) = export.ok_or_else(no_output)?;
+                return self.resolve_at_depth(inner, word, depth + 1);
             }
         };
         let Some(outputs) = self.outputs(producer) else { return Ok(None) };
-        let port = outputs.iter().position(|output| output.name == port).ok_or_else(no_port)?;
+        let port = outputs.iter().position(|output| output.name == port).ok_or_else(no_output)?;
         Ok(Some(PortRef { producer, port }))
+    }
+
+    /// Returns the help for a word that is not of the form `node.port`.
+    fn ports_help(&self, scope: usize, word: &Word) -> String {
+        let first = word.text.split('.').next().unwrap_or_default();
+        let entity = self.flat.scopes[scope].names.get(first);
+        let ports = entity.map(|(_, entity)| self.ports_of(*entity)).unwrap_or_default();
+        let ports: Vec<String> = ports.iter().map(|port| format!("`{first}.{port}`")).collect();
+        if ports.is_empty() {
+            "write a port as `node.port`".into()
+        } else {
+            format!("ports here: {}", ports.join(", "))
+        }
     }
 
     fn ports_of(&self, entity: Entity) -> Vec<&str> {
@@ -77,28 +109,22 @@ impl Net<'_> {
         }
     }
 
-    /// A port as the wires of a scope name it, if they can.
+    /// Returns the name by which the wires of a scope refer to a port, or `None` if they cannot.
     pub(crate) fn name_in(&self, scope: usize, source: PortRef) -> Option<String> {
-        let names = self.flat.scopes[scope].names.iter();
-        names.into_iter().find_map(|(name, (_, entity))| match *entity {
-            Entity::Role(i) if source.producer == Producer::Role(i) => {
-                Some(format!("{name}.{}", self.port(source).name))
-            }
-            Entity::Node(i) if source.producer == Producer::Node(i) => {
-                Some(format!("{name}.{}", self.port(source).name))
-            }
+        let port = &self.port(source).name;
+        self.flat.scopes[scope].names.iter().find_map(|(name, (_, entity))| match *entity {
+            Entity::Role(i) => (source.producer == Producer::Role(i)).then(|| format!("{name}.{port}")),
+            Entity::Node(i) => (source.producer == Producer::Node(i)).then(|| format!("{name}.{port}")),
             Entity::Part(inner) => {
                 let mut exports = self.flat.scopes[inner].exports.iter();
-                let export =
-                    exports.find(|(_, word)| matches!(self.resolve(inner, word, 0), Ok(Some(s)) if s == source))?;
-                Some(format!("{name}.{}", export.0.name))
+                let is_source = |word: &Word| matches!(self.resolve(inner, word), Ok(Some(port)) if port == source);
+                exports.find(|(_, word)| is_source(word)).map(|(export, _)| format!("{name}.{}", export.name))
             }
-            _ => None,
         })
     }
 
-    /// A port of the scope that has the kind of an input.
-    pub(super) fn candidate(&self, scope: usize, node: usize, input: &PortSpec) -> Option<String> {
+    /// Returns a port of the scope with the name and the kind of an input, as a suggestion for its wire.
+    pub(crate) fn find_candidate(&self, scope: usize, node: usize, input: &PortSpec) -> Option<String> {
         self.flat.scopes[scope].names.iter().find_map(|(name, (_, entity))| {
             let outputs = match *entity {
                 Entity::Role(i) => self.outputs(Producer::Role(i)),
@@ -107,7 +133,7 @@ impl Net<'_> {
                 Entity::Part(inner) => {
                     let (export, word) =
                         self.flat.scopes[inner].exports.iter().find(|(key, _)| key.name == input.name)?;
-                    let source = self.resolve(inner, word, 0).ok().flatten()?;
+                    let source = self.resolve(inner, word).ok().flatten()?;
                     return (self.port(source).kind == input.kind).then(|| format!("{name}.{}", export.name));
                 }
             };
@@ -116,7 +142,7 @@ impl Net<'_> {
         })
     }
 
-    /// What the parts of the graph export, as its wires name it, and the port behind each.
+    /// Returns the exports of the parts in the graph, each with the full name of the port behind it.
     pub(crate) fn exports_by_name(&self) -> Vec<(String, String)> {
         let names = self.flat.scopes.first().into_iter().flat_map(|scope| &scope.names);
         let parts = names.filter_map(|(name, (_, entity))| match entity {
@@ -126,15 +152,15 @@ impl Net<'_> {
         let exports = parts.flat_map(|(name, inner)| {
             self.flat.scopes[inner].exports.iter().map(move |(key, word)| (format!("{name}.{}", key.name), inner, word))
         });
-        let port = |(name, inner, word)| Some((name, self.port_name(self.resolve(inner, word, 0).ok()??)));
+        let port = |(name, inner, word)| Some((name, self.port_name(self.resolve(inner, word).ok()??)));
         exports.filter_map(port).collect()
     }
 
-    /// What the parts export.
+    /// Returns the producers of all exported ports.
     pub(crate) fn exported(&self) -> impl Iterator<Item = Producer> {
         let scopes = self.flat.scopes.iter().enumerate();
         let words =
             scopes.flat_map(|(scope, Scope { exports, .. })| exports.iter().map(move |(_, word)| (scope, word)));
-        words.filter_map(|(scope, word)| Some(self.resolve(scope, word, 0).ok()??.producer))
+        words.filter_map(|(scope, word)| Some(self.resolve(scope, word).ok()??.producer))
     }
 }

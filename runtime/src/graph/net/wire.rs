@@ -1,52 +1,52 @@
-//! Wires that lead somewhere, and where each is written.
+//! Wires whose source is resolved, and where each was written.
 
 use crate::graph::plan::PortRef;
-use crate::graph::syntax::Age;
+use crate::graph::syntax::AgeLimit;
 use crate::node::Word;
 use crate::source::{Code, Diagnostic, Key};
 
-/// A wire that goes somewhere.
+/// A wire to an input of a node.
 #[derive(Debug, Clone)]
 pub(crate) struct Wire {
     /// Index of the input in the node's declaration.
     pub(crate) input: usize,
     pub(crate) key: Key,
-    pub(crate) origin: Origin,
+    pub(crate) origin: WireOrigin,
     pub(crate) source: PortRef,
 }
 
-/// Where a wire was written: the node's own, or the one into its part that it passes on.
+/// Where a wire was written: at the node, or at the part whose input the node reads.
 #[derive(Debug, Clone)]
-pub(crate) struct Origin {
-    /// The wire that says where it comes from.
+pub(crate) struct WireOrigin {
+    /// The text that names the source.
     pub(crate) word: Word,
-    /// The scope it stands in.
+    /// The scope of that text.
     pub(crate) scope: usize,
-    /// The node's own wire, where that only passes on an input of its part.
+    /// The text at the node, if it refers to an input of its part.
     pub(crate) inner: Option<Word>,
-    /// How old what comes over the wire may be, as the strictest says of the node's own and all into the parts around.
-    pub(crate) age: Option<Age>,
+    /// The strictest age limit of the node's own wire and all wires into the parts around it.
+    pub(crate) age: Option<AgeLimit>,
 }
 
-impl Origin {
-    /// A mistake of this wire.
-    pub(crate) fn mistake(&self, code: Code, message: String) -> Diagnostic {
+impl WireOrigin {
+    /// Creates a diagnostic at this wire.
+    pub(crate) fn diagnostic(&self, code: Code, message: String) -> Diagnostic {
         let diagnostic = Diagnostic::new(code, self.word.span.clone(), message);
         match &self.inner {
-            Some(inner) => diagnostic.note(inner.span.clone(), "the part takes it here"),
+            Some(inner) => diagnostic.note(inner.span.clone(), "the part reads it here"),
             None => diagnostic,
         }
     }
 }
 
-/// A wire under [commands] that goes somewhere.
+/// A wire to a command or a report of a role.
 #[derive(Debug, Clone)]
 pub(crate) struct CommandWire {
     pub(crate) role: usize,
     /// Index of the command, or of the report, in the role's declaration.
     pub(crate) command: usize,
-    /// Whether it only tells the role something, and moves nothing.
+    /// Whether the wire leads to a report, which informs the device and moves nothing.
     pub(crate) is_report: bool,
-    pub(crate) origin: Origin,
+    pub(crate) origin: WireOrigin,
     pub(crate) source: PortRef,
 }

@@ -1,4 +1,4 @@
-//! What a check hands to the engine: everything looked up, built and in order.
+//! The plan: what the engine needs, with all names resolved and all nodes built.
 
 mod modes;
 mod port;
@@ -7,122 +7,121 @@ mod view;
 use std::ops::Range;
 
 use crate::device::{Description, Driver};
-use crate::graph::syntax::{Age, Policy, PolicyTable};
+use crate::graph::syntax::{AgeLimit, PolicyTable};
 use crate::node::{AnyNode, Need};
 use crate::signal::Shape;
 
-pub(crate) use modes::{Condition, PlannedExit, PlannedMode, PlannedModes, Test, Watched};
+pub(crate) use modes::{Condition, PlannedExit, PlannedMode, PlannedModes, Test, WatchedPort};
 pub use port::PlannedPort;
 pub(crate) use port::{PortRef, Producer};
 pub(crate) use view::{PlannedShow, PlannedView};
 
-/// A role and the device that fills it.
+/// A role and the device bound to it.
 pub(crate) struct PlannedRole {
     pub(crate) name: String,
     /// Index of the device.
     pub(crate) device: usize,
-    /// Number of each of the role's outputs among those of the device.
+    /// Index of each output of the role among those of the device.
     pub(crate) numbers: Vec<usize>,
     pub(crate) ports: Vec<PlannedPort>,
-    /// How old the newest sample may be [ns], and what it does when it is older.
-    pub(crate) max_age: i64,
-    pub(crate) stale: Policy,
-    /// Whether only a scenario and the recorder read it, so that a run goes on without it.
+    /// Maximum age of the newest sample, and the reaction to an older one.
+    pub(crate) age: AgeLimit,
+    /// Whether the role is for scenarios and recordings only, so that a run continues without it.
     pub(crate) is_observed: bool,
-    /// Nominal time between two samples of the device [ns].
+    /// Nominal sample period of the device [ns].
     pub(crate) period: i64,
 }
 
-/// A device, opened.
+/// An opened device.
 pub(crate) struct PlannedDevice {
     pub(crate) name: String,
     pub(crate) driver: Driver,
     pub(crate) description: Description,
-    /// Where its name stands in the bench.
+    /// Span of its name in the bench.
     pub(crate) span: Range<usize>,
 }
 
-/// Where a wire comes from, and how old what comes over it may be.
+/// A wire: its source and its age limit.
 #[derive(Debug, Clone)]
 pub(crate) struct PlannedWire {
     pub(crate) source: PortRef,
-    pub(crate) age: Option<Age>,
-    /// Where it is written.
+    pub(crate) age: Option<AgeLimit>,
+    /// Span of the text that names the source.
     pub(crate) span: Range<usize>,
 }
 
-/// A node, built.
+/// A built node.
 pub(crate) struct PlannedNode {
-    /// Its index in the flat graph, by which wires know it.
+    /// Its index in the flat graph, which [`Producer::Node`] uses.
     pub(crate) index: usize,
     pub(crate) name: String,
     pub(crate) node: Box<dyn AnyNode>,
     pub(crate) inputs: Vec<(Need, Vec<PlannedWire>)>,
     pub(crate) ports: Vec<PlannedPort>,
     pub(crate) is_every_tick: bool,
-    /// Whether the tool logs its inputs; see [`Node::LOGS`](crate::node::Node::LOGS).
+    /// Whether its inputs are logged; see [`Node::LOGS`](crate::node::Node::LOGS).
     pub(crate) is_logged: bool,
-    /// The limits it holds; each has an output of that name.
+    /// The limits that it holds; each has an output of the same name.
     pub(crate) holds: &'static [&'static str],
-    /// Where its name stands.
+    /// Span of its name.
     pub(crate) span: Range<usize>,
 }
 
-/// A command of a device, and what drives it.
+/// A command of a device and the port that drives it.
 pub(crate) struct PlannedCommand {
     pub(crate) source: PortRef,
     pub(crate) device: usize,
-    /// Its number among the device's commands.
+    /// Its index among the commands of the device.
     pub(crate) command: usize,
     /// Names of the role and of the command.
     pub(crate) name: [String; 2],
-    /// How old it may be, and what more than a ramp is done when it is older.
-    pub(crate) age: Age,
-    /// Where its wire is written.
+    /// Age limit. An older command ramps to zero in any case.
+    pub(crate) age: AgeLimit,
+    /// Span of its wire.
     pub(crate) span: Range<usize>,
-    /// Greatest acceleration of each joint [rad/s²]; infinite where nothing bounds it.
+    /// Maximum acceleration of each joint [rad/s²], infinite without a bound.
     pub(crate) accelerations: Vec<f64>,
 }
 
-/// What a device is told without moving it.
+/// A report to a device: a value that moves nothing.
 pub(crate) struct PlannedReport {
     pub(crate) source: PortRef,
-    /// Shape of what the wire brings.
+    /// Shape of the value.
     pub(crate) shape: Shape,
     pub(crate) device: usize,
-    /// Its number among the device's reports.
+    /// Its index among the reports of the device.
     pub(crate) report: usize,
     /// Names of the role and of the report.
     pub(crate) name: [String; 2],
-    /// How old it may be, and what more than falling silent is done when it is older.
-    pub(crate) age: Age,
-    /// Where its wire is written.
+    /// Age limit. An older report is not sent in any case.
+    pub(crate) age: AgeLimit,
+    /// Span of its wire.
     pub(crate) span: Range<usize>,
 }
 
-/// What makes the graph tick.
+/// What triggers a tick.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Clock {
-    /// The samples of a device.
+    /// The samples of a device, by its index.
     Device(usize),
-    /// A rate.
+    /// A timer.
     Rate,
 }
 
-/// A graph that is checked and built: it cannot fail to wire.
+/// A checked and built graph, from which an engine is created without errors.
 pub(crate) struct Plan {
     pub(crate) roles: Vec<PlannedRole>,
     pub(crate) devices: Vec<PlannedDevice>,
-    /// In the order in which they step.
+    /// The nodes in the order in which they step.
     pub(crate) nodes: Vec<PlannedNode>,
     pub(crate) commands: Vec<PlannedCommand>,
     pub(crate) reports: Vec<PlannedReport>,
     pub(crate) clock: Clock,
     /// Nominal time between two ticks [ns].
     pub(crate) period: i64,
-    /// Greatest time between two samples that counts as one step [s].
+    /// Maximum time step between two samples; longer gaps count as this long [s].
     pub(crate) max_gap: f64,
-    /// How long something must be absent before the state behind it is reset [ns].
+    /// How long an input must be absent before the state of its node is reset [ns].
     pub(crate) reset_after: i64,
     pub(crate) modes: Option<PlannedModes>,
     pub(crate) policy: PolicyTable,

@@ -1,75 +1,75 @@
-//! The modes of a graph as the tick needs them: conditions and configurations.
+//! The modes of a graph: conditions and configurations.
 
 use std::ops::Range;
 
 use super::port::PortRef;
-use crate::graph::syntax::Sort;
+use crate::graph::syntax::ExitKind;
 
 /// The modes of a graph.
 pub(crate) struct PlannedModes {
     pub(crate) modes: Vec<PlannedMode>,
-    /// The one it starts in.
+    /// Index of the start mode.
     pub(crate) start: usize,
 }
 
-/// A mode that is checked.
+/// A mode with its exits resolved.
 pub(crate) struct PlannedMode {
     pub(crate) name: String,
     pub(crate) exits: Vec<PlannedExit>,
-    /// The nodes that have a configuration of its own: by their place in the order of the steps, with its number.
+    /// Nodes that this mode changes: their index in step order, and the number of their configuration.
     pub(crate) configurations: Vec<(usize, usize)>,
 }
 
-/// What ends a mode.
+/// An exit of a mode.
 #[derive(Debug, Clone)]
 pub(crate) struct PlannedExit {
-    pub(crate) sort: Sort,
-    /// Mode to go to.
+    pub(crate) kind: ExitKind,
+    /// Index of the target mode, or `None` if the exit ends the run.
     pub(crate) to: Option<usize>,
     pub(crate) condition: Condition,
-    /// How long it has to last [ns].
+    /// How long the condition must hold [ns].
     pub(crate) lasts: i64,
     pub(crate) priority: u64,
-    /// The condition in words.
+    /// The condition as text.
     pub(crate) text: String,
-    /// Where it stands.
+    /// Where the exit was written.
     pub(crate) span: Range<usize>,
 }
 
-/// What is looked at.
+/// The condition of an exit.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum Condition {
-    /// A port, or one feature of it.
-    Port(Watched, Test),
-    /// Time in the mode [ns].
+    /// A test of a port, or of one feature of it.
+    Port(WatchedPort, Test),
+    /// The time in the mode reaches a bound [ns].
     Elapsed(i64),
-    /// Way of a pose's origin in the mode [m].
+    /// The distance that the origin of a pose travels in the mode exceeds a bound [m].
     Travel(PortRef, f64),
-    /// A word from outside.
+    /// The operator sent a word.
     Sent(String),
-    /// A signal that has not said yes for so long [ns].
-    Lost(Watched, i64),
+    /// No new sample of a signal was true for this long [ns].
+    Lost(WatchedPort, i64),
 }
 
-/// A port, or a feature of it.
+/// A port, or one feature of it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct Watched {
+pub(crate) struct WatchedPort {
     pub(crate) source: PortRef,
     pub(crate) feature: Option<usize>,
 }
 
-/// What a value has to be.
+/// The test of a port.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Test {
     New,
     Absent,
     Present,
-    /// A flag has to be so.
+    /// The flag has this value.
     Flag(bool),
-    /// A number has to be in between; once it is, it may leave by the hysteresis.
+    /// The number is between `min` and `max`; it then stays so until it is outside by more than `hysteresis`.
     Between {
-        least: f64,
-        greatest: f64,
+        min: f64,
+        max: f64,
         hysteresis: f64,
     },
 }

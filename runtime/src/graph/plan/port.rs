@@ -1,8 +1,8 @@
-//! The ports of a graph: which role or node owns one, and what is known of it.
+//! The ports of a graph: references to them, and their shapes and frames.
 
 use crate::signal::Shape;
 
-/// What a wire can come from.
+/// The source of a wire: a role or a node.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub(crate) enum Producer {
     /// A role, by its index in the graph file.
@@ -12,7 +12,7 @@ pub(crate) enum Producer {
 }
 
 impl Producer {
-    /// The index of the node, or `None` for a role.
+    /// Returns the index of the node, or `None` for a role.
     pub(crate) const fn node(self) -> Option<usize> {
         match self {
             Self::Node(node) => Some(node),
@@ -21,20 +21,20 @@ impl Producer {
     }
 }
 
-/// One output of a role or a node.
+/// A reference to one output of a role or a node.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub(crate) struct PortRef {
     pub(crate) producer: Producer,
     pub(crate) port: usize,
 }
 
-/// A port with everything that is known of it.
+/// A port with its name, shape and frames.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PlannedPort {
-    /// Its name: `node.port`.
+    /// Its full name: `node.port`.
     pub name: String,
-    /// Its shape, units filled in.
+    /// Its shape, with units.
     pub shape: Shape,
-    /// Its frames, where the wires tell them.
+    /// Its frames, `None` where the wires do not determine one.
     pub frames: Vec<Option<String>>,
 }

@@ -1,19 +1,19 @@
-//! What a run shows of its ports.
+//! The ports that a run shows.
 
 use super::port::PortRef;
 
-/// What is shown of a run.
+/// The ports that a run shows.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct PlannedView {
     pub(crate) ports: Vec<PlannedShow>,
-    /// Where the contact is in the first image: its x and its y.
+    /// Ports of the x and the y of the contact, marked in the first image.
     pub(crate) mark: Option<[PortRef; 2]>,
 }
 
 /// A port that is shown.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct PlannedShow {
-    /// As the graph file calls it.
+    /// Its name as written in the graph file.
     pub(crate) name: String,
     pub(crate) source: PortRef,
 }

@@ -1,10 +1,10 @@
-//! The sections of a graph file, a part and a bench, before anything is looked up.
+//! The sections of a graph file, a part and a bench, before names are resolved.
 
 mod modes;
 mod policy;
 mod sections;
 
-pub(crate) use modes::{Exit, Is, ModeBlock, Sort};
+pub(crate) use modes::{Exit, ExitKind, ModeBlock, PortState};
 pub use policy::Policy;
-pub(crate) use policy::{Age, PolicyTable};
-pub(crate) use sections::{Bench, Block, Document, GraphTable, LIMITS, PartBlock, Sections, spanned};
+pub(crate) use policy::{AgeLimit, PolicyTable, default_max_age_ns, default_max_age_s};
+pub(crate) use sections::{Bench, Block, GraphDocument, GraphTable, LIMITS, PartBlock, Sections, into_diagnostic};

@@ -1,25 +1,25 @@
-//! What a block `[modes.NAME]` says, before anything is looked up.
+//! Parses a block `[modes.NAME]`, before names are resolved.
 
 use std::ops::Range;
 
 use crate::node::{At, Mistake, NonNegative, Param, Positive, Reader, Word};
-use crate::source::{Code, Item, Key, Table, Value};
+use crate::source::{Code, Item, Key, Table, Value, suggestion};
 
-/// A mode: what it sets, and what ends it.
+/// A mode: the parameters it sets and its exits.
 #[derive(Debug, Clone)]
 pub(crate) struct ModeBlock {
     pub(crate) key: Key,
-    /// The block as it is written.
+    /// The block as written.
     pub(crate) table: Table,
-    /// Values laid over those of the nodes.
+    /// Values that override those of the nodes.
     pub(crate) set: Table,
-    /// What ends it, with its sort and its place.
-    pub(crate) exits: Vec<(Sort, Range<usize>, Exit)>,
+    /// Its exits, each with its kind and its span.
+    pub(crate) exits: Vec<(ExitKind, Range<usize>, Exit)>,
 }
 
-/// What an exit of a mode does. In one tick the first of these wins.
+/// What an exit of a mode does. If several exits hold in one tick, the first of these kinds wins.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub(crate) enum Sort {
+pub(crate) enum ExitKind {
     /// Ends the run with a fault.
     Fail,
     /// Goes to another mode because a signal is lost.
@@ -30,8 +30,8 @@ pub(crate) enum Sort {
     Go,
 }
 
-impl Sort {
-    /// Its key in a mode.
+impl ExitKind {
+    /// Returns the key in the block of a mode.
     pub(crate) const fn key(self) -> &'static str {
         match self {
             Self::Fail => "fail",
@@ -42,9 +42,9 @@ impl Sort {
     }
 }
 
-/// What a condition asks of a port beside a bound.
+/// The state of a port that a condition requires with `is`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Is {
+pub(crate) enum PortState {
     New,
     Absent,
     Present,
@@ -52,7 +52,7 @@ pub(crate) enum Is {
     False,
 }
 
-impl Is {
+impl PortState {
     const WORDS: [(&'static str, Self); 5] = [
         ("new", Self::New),
         ("absent", Self::Absent),
@@ -62,7 +62,7 @@ impl Is {
     ];
 }
 
-impl Param for Is {
+impl Param for PortState {
     const EXPECTS: &'static str = "`new`, `absent`, `present`, `true` or `false`";
 
     fn read(value: &Value, reader: &mut Reader<'_>) -> Option<Self> {
@@ -76,49 +76,49 @@ impl Param for Is {
             }
             _ => value.as_str().unwrap_or_default(),
         };
-        let found = Self::WORDS.iter().find(|(known, _)| *known == word).map(|(_, is)| *is);
-        if found.is_none() {
+        let state = Self::WORDS.iter().find(|(known, _)| *known == word).map(|(_, is)| *is);
+        if state.is_none() {
             reader.wrong_type(value, Self::EXPECTS);
         }
-        found
+        state
     }
 }
 
 crate::params! { Exit:
     /// Mode to go to.
     to: Option<Word>,
-    /// Port that is looked at: `node.port`, or `node.port.feature`; a flag has to be set.
+    /// Port to watch: `node.port` or `node.port.feature`. A flag must be true unless `is` is given.
     when: Option<Word>,
-    /// What it has to be.
-    is: Option<Is>,
-    /// It has to be greater [its unit].
+    /// Required state of the port.
+    is: Option<PortState>,
+    /// Lower bound of the port [unit of the port].
     above: Option<f64>,
-    /// It has to be less [its unit].
+    /// Upper bound of the port [unit of the port].
     below: Option<f64>,
-    /// Its size has to be less [its unit].
+    /// Upper bound of the absolute value of the port [unit of the port].
     within: Option<Positive>,
-    /// How far it may fall back behind the bound before it counts as fallen back [its unit].
+    /// How far the port may cross back over a bound before the condition ends [unit of the port].
     hysteresis: Option<NonNegative>,
-    /// How long that has to last, through new samples [ms].
+    /// How long the condition must hold, counted from new sample to new sample [ms].
     for_ms: Option<NonNegative>,
-    /// Time in the mode; for `on_lost` how long the signal has to be away, five periods of the graph unless given [ms].
+    /// Time in the mode; for `on_lost`, how long the signal must be lost. The default of `on_lost` is five periods of the graph [ms].
     after_ms: Option<Positive>,
-    /// Way of the sensor in the mode [mm].
+    /// Distance that the sensor travels in the mode [mm].
     after_travel_mm: Option<Positive>,
-    /// Signal that `on_lost` watches; for a way the pose that is meant, if there are several.
+    /// Signal that `on_lost` watches; for `after_travel_mm`, the pose to measure if the graph has several.
     of: Option<Word>,
-    /// Word from outside that is waited for.
+    /// Operator word that triggers the exit.
     on: Option<Word>,
-    /// Which of two that hold at once wins: the greater.
+    /// Priority among `go` exits that hold at once: the greatest wins.
     priority: Option<u64>,
 }
 
-/// The modes of a graph file.
-pub(crate) fn modes(tables: Vec<(Key, Table)>, reader: &mut Reader<'_>) -> Vec<ModeBlock> {
-    tables.into_iter().map(|(key, table)| mode(key, table, reader)).collect()
+/// Reads the modes of a graph file.
+pub(crate) fn read_modes(tables: Vec<(Key, Table)>, reader: &mut Reader<'_>) -> Vec<ModeBlock> {
+    tables.into_iter().map(|(key, table)| read_mode(key, table, reader)).collect()
 }
 
-fn mode(key: Key, mut table: Table, reader: &mut Reader<'_>) -> ModeBlock {
+fn read_mode(key: Key, mut table: Table, reader: &mut Reader<'_>) -> ModeBlock {
     let whole = table.clone();
     let set = match table.remove("set") {
         Some((_, Value { item: Item::Table(set), .. })) => set,
@@ -129,29 +129,29 @@ fn mode(key: Key, mut table: Table, reader: &mut Reader<'_>) -> ModeBlock {
         None => Table::default(),
     };
     let mut exits = Vec::new();
-    for sort in [Sort::Fail, Sort::OnLost, Sort::Done, Sort::Go] {
-        let Some((_, value)) = table.remove(sort.key()) else { continue };
-        let several = matches!(sort, Sort::Go | Sort::Done | Sort::Fail);
+    for kind in [ExitKind::Fail, ExitKind::OnLost, ExitKind::Done, ExitKind::Go] {
+        let Some((_, value)) = table.remove(kind.key()) else { continue };
+        let several = matches!(kind, ExitKind::Go | ExitKind::Done | ExitKind::Fail);
         match &value.item {
-            Item::Array(items) if several => items.iter().for_each(|item| exits.extend(exit(sort, item, reader))),
-            _ => exits.extend(exit(sort, &value, reader)),
+            Item::Array(items) if several => items.iter().for_each(|item| exits.extend(read_exits(kind, item, reader))),
+            _ => exits.extend(read_exits(kind, &value, reader)),
         }
     }
     for (other, _) in table.entries {
-        let message = format!("`{}` means nothing in a mode", other.name);
-        let help = crate::source::closest(&other.name, ["set", "go", "on_lost", "done", "fail"].into_iter(), "keys");
+        let message = format!("unknown key `{}` in a mode", other.name);
+        let help = suggestion(&other.name, ["set", "go", "on_lost", "done", "fail"].into_iter(), "keys");
         reader.mistakes.push(Mistake::new(Code::UnknownKey, At::Span(other.span), message).help(help));
     }
     ModeBlock { key, table: whole, set, exits }
 }
 
-/// The exits of one table: a bound on the time and one on the way may stand together, and the first of them counts.
-fn exit(sort: Sort, value: &Value, reader: &mut Reader<'_>) -> Vec<(Sort, Range<usize>, Exit)> {
+/// Reads the exits of one table. `after_ms` and `after_travel_mm` together make two exits, one for each.
+fn read_exits(kind: ExitKind, value: &Value, reader: &mut Reader<'_>) -> Vec<(ExitKind, Range<usize>, Exit)> {
     let Some(exit) = Exit::read(value, reader) else { return Vec::new() };
-    let place = value.span.clone();
+    let span = value.span.clone();
     if exit.after_ms.is_none() || exit.after_travel_mm.is_none() {
-        return vec![(sort, place, exit)];
+        return vec![(kind, span, exit)];
     }
     let time = Exit { after_travel_mm: None, of: None, ..exit.clone() };
-    vec![(sort, place.clone(), time), (sort, place, Exit { after_ms: None, ..exit })]
+    vec![(kind, span.clone(), time), (kind, span, Exit { after_ms: None, ..exit })]
 }

@@ -1,18 +1,18 @@
-//! The section `[policy]`: what each sort of trouble does, and how old a sample may be.
+//! The section `[policy]`: the reaction to each trouble, and the maximum age of samples.
 
 use crate::node::{Map, Param, Positive, Reader, Word, Written};
 use crate::source::{Item, SourceMap, Table, Value};
 
-/// What a trouble does.
+/// The reaction to a trouble.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Policy {
-    /// It is counted.
+    /// Count it.
     Count,
-    /// Commands ramp to zero, and go on by themselves when the trouble is over.
+    /// Ramp commands to zero, and resume when the trouble is over.
     Hold,
-    /// Commands ramp to zero, and wait for the operator.
+    /// Ramp commands to zero, and wait for the operator.
     Stop,
-    /// Commands ramp to zero, and the run ends.
+    /// Ramp commands to zero, and end the run.
     Fault,
 }
 
@@ -20,7 +20,7 @@ impl Policy {
     const WORDS: [(&'static str, Self); 4] =
         [("count", Self::Count), ("hold", Self::Hold), ("stop", Self::Stop), ("fault", Self::Fault)];
 
-    /// What it is called in a graph file.
+    /// Returns the word in a graph file.
     #[must_use]
     pub fn word(self) -> &'static str {
         Self::WORDS.iter().find(|(_, policy)| *policy == self).map_or("", |(word, _)| word)
@@ -36,11 +36,11 @@ impl Param for Policy {
     const EXPECTS: &'static str = "`count`, `hold`, `stop` or `fault`";
 
     fn read(value: &Value, reader: &mut Reader<'_>) -> Option<Self> {
-        let found = Self::from(value);
-        if found.is_none() {
+        let policy = Self::from(value);
+        if policy.is_none() {
             reader.wrong_type(value, Self::EXPECTS);
         }
-        found
+        policy
     }
 
     fn written(&self) -> Option<Written> {
@@ -48,19 +48,32 @@ impl Param for Policy {
     }
 }
 
-/// A policy that does something: for what cannot go on as if nothing was.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct Firm(pub(crate) Policy);
+/// Periods after which a value is too old, unless the graph sets another limit.
+const DEFAULT_MAX_AGE_PERIODS: f64 = 5.0;
 
-impl Param for Firm {
+/// Returns the default maximum age of values that arrive every `period` [s], in seconds.
+pub(crate) fn default_max_age_s(period: f64) -> f64 {
+    DEFAULT_MAX_AGE_PERIODS * period
+}
+
+/// Returns the default maximum age of values that arrive every `period` [s], in nanoseconds.
+pub(crate) fn default_max_age_ns(period: f64) -> i64 {
+    (default_max_age_s(period) * 1e9) as i64
+}
+
+/// A policy that halts commands, for troubles that must not be ignored.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct HaltingPolicy(pub(crate) Policy);
+
+impl Param for HaltingPolicy {
     const EXPECTS: &'static str = "`hold`, `stop` or `fault`";
 
     fn read(value: &Value, reader: &mut Reader<'_>) -> Option<Self> {
-        let found = Policy::from(value).filter(|policy| *policy != Policy::Count);
-        if found.is_none() {
+        let policy = Policy::from(value).filter(|policy| *policy != Policy::Count);
+        if policy.is_none() {
             reader.wrong_type(value, Self::EXPECTS);
         }
-        found.map(Self)
+        policy.map(Self)
     }
 
     fn written(&self) -> Option<Written> {
@@ -69,27 +82,28 @@ impl Param for Firm {
 }
 
 crate::params! { WireTable:
-    /// Where it comes from.
+    /// Port that the wire reads.
     from: Word,
-    /// How old what comes over the wire may be [ms].
+    /// Maximum age of values on the wire [ms].
     max_age_ms: Positive,
-    /// What else is done when it is older; `hold` is only that the node does without.
+    /// Reaction to an older value, which is absent for the node in any case.
     stale: Policy = Policy::Hold,
 }
 
-/// How old what comes over a wire may be [ns], and what is done when it is older.
+/// The maximum age of values on a wire, and the reaction to older ones.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct Age {
+pub(crate) struct AgeLimit {
+    /// Maximum age [ns].
     pub(crate) max_age: i64,
     pub(crate) stale: Policy,
 }
 
-impl Age {
+impl AgeLimit {
     pub(crate) fn of(table: &WireTable) -> Self {
         Self { max_age: (*table.max_age_ms * 1e6) as i64, stale: table.stale }
     }
 
-    /// What holds where both hold.
+    /// Returns the stricter combination of two limits.
     pub(crate) fn and(self, other: Option<Self>) -> Self {
         let Some(other) = other else { return self };
         Self { max_age: self.max_age.min(other.max_age), stale: self.stale.max(other.stale) }
@@ -97,9 +111,9 @@ impl Age {
 }
 
 crate::params! { RolePolicy:
-    /// How old the newest sample of the role may be [ms].
+    /// Maximum age of the newest sample of the role [ms].
     max_age_ms: Option<Positive>,
-    /// What it does when it is older.
+    /// Reaction to an older sample.
     stale: Option<Policy>,
 }
 
@@ -109,35 +123,33 @@ crate::params! { PolicyTable:
     /// The clock device is silent, and a timer stands in for it.
     clock: Policy = Policy::Hold,
     /// A value is not a finite number.
-    not_finite: Firm = Firm(Policy::Fault),
-    /// A tick began more than a period late; with a real clock only.
+    not_finite: HaltingPolicy = HaltingPolicy(Policy::Fault),
+    /// A tick began more than one period late. Applies to a real clock only.
     deadline: Policy = Policy::Count,
     /// A node panicked.
-    panic: Firm = Firm(Policy::Fault),
+    panic: HaltingPolicy = HaltingPolicy(Policy::Fault),
     /// A device failed.
-    device: Firm = Firm(Policy::Fault),
-    /// How old the newest sample of a role may be; five periods of its device unless given [ms].
+    device: HaltingPolicy = HaltingPolicy(Policy::Fault),
+    /// Maximum age of the newest sample of a role. The default is five periods of its device [ms].
     max_age_ms: Option<Positive>,
-    /// What holds for single roles.
+    /// Policies of individual roles.
     roles: Map<RolePolicy> = Map(std::collections::BTreeMap::new()),
 }
 
 impl Default for PolicyTable {
     fn default() -> Self {
-        let nothing = Value { span: 0..0, item: Item::Table(Table::default()) };
+        let empty = Value { span: 0..0, item: Item::Table(Table::default()) };
         let sources = SourceMap::default();
-        Self::read(&nothing, &mut Reader::new(&sources)).expect("every policy has a default")
+        Self::read(&empty, &mut Reader::new(&sources)).expect("every policy has a default")
     }
 }
 
 impl PolicyTable {
-    /// How old the newest sample of a role may be, whose device samples every `period` [s], and what it does when it is
-    /// older; the age in ns.
-    pub(crate) fn of(&self, role: &str, period: f64) -> (i64, Policy) {
-        /// As many periods of its device a sample is good for.
-        const PERIODS: f64 = 5.0;
+    /// Returns the age limit of a role whose device has the given sample period [s].
+    pub(crate) fn age_limit(&self, role: &str, period: f64) -> AgeLimit {
         let own = self.roles.0.get(role);
-        let age = own.and_then(|own| own.max_age_ms).or(self.max_age_ms).map_or(PERIODS * period, |ms| *ms * 1e-3);
-        ((age * 1e9) as i64, own.and_then(|own| own.stale).unwrap_or(self.stale))
+        let max_age = own.and_then(|own| own.max_age_ms).or(self.max_age_ms);
+        let max_age = max_age.map_or_else(|| default_max_age_ns(period), |ms| (*ms * 1e-3 * 1e9) as i64);
+        AgeLimit { max_age, stale: own.and_then(|own| own.stale).unwrap_or(self.stale) }
     }
 }

@@ -1,92 +1,92 @@
-//! What the sections of a graph file, a part and a bench hold, before anything is looked up.
+//! Parses the sections of a graph file, a part and a bench, before names are resolved.
 
 use std::collections::BTreeMap;
 use std::ops::Range;
 
 use super::modes::{self, ModeBlock};
-use super::policy::{Age, PolicyTable, WireTable};
+use super::policy::{AgeLimit, PolicyTable, WireTable};
 use crate::node::{At, FilePath, Mistake, NonNegative, Param, Positive, Rate, Reader, Word};
-use crate::source::{Code, Diagnostic, Item, Key, SourceMap, Table, Value, meant};
+use crate::source::{Code, Diagnostic, Diagnostics, Item, Key, SourceMap, Table, Value, suggest_name};
 
 crate::params! { GraphTable:
     /// Role whose samples trigger the ticks.
     clock: Option<Word>,
-    /// Ticks per second of a graph that has no role for a clock [Hz].
+    /// Tick rate of a graph without a clock role [Hz].
     rate_hz: Option<Rate>,
-    /// Mode that it starts in.
+    /// Start mode.
     start: Option<Word>,
-    /// Bench it runs on unless another is named.
+    /// Default bench.
     bench: Option<FilePath>,
-    /// Greatest time between two samples that counts as one step; five periods unless said [ms].
+    /// Maximum time step between two samples; longer gaps count as this long. The default is five periods [ms].
     max_gap_ms: Option<Positive>,
-    /// How long something must be absent before the state behind it is reset [ms].
+    /// How long an input must be absent before the state of its node is reset [ms].
     reset_after_ms: NonNegative = NonNegative(20.0),
-    /// Ports that a run shows: images as they were, and numbers over time.
+    /// Ports that a run shows: images as pictures, numbers as curves over time.
     show: Option<Vec<Word>>,
-    /// Where the contact is in the first image that is shown: ports of its x and of its y.
+    /// Ports of the x and the y of the contact, marked in the first image that is shown.
     mark: Option<[Word; 2]>,
 }
 
-/// A block of a node or a device: its type, its wires, and what is left are its parameters.
+/// The block of a node or a device: its type, its wires and its parameters.
 #[derive(Debug, Clone)]
 pub(crate) struct Block {
     pub(crate) key: Key,
     pub(crate) kind: Option<Word>,
     pub(crate) wires: Vec<(Key, Word)>,
-    /// Inputs whose wire cannot be read: that has been told.
-    pub(crate) unread: Vec<Key>,
+    /// Inputs whose wire is invalid and has its own diagnostic.
+    pub(crate) invalid: Vec<Key>,
     pub(crate) params: Value,
 }
 
-/// A block of a part: the file, the wires into it, and what is set in it.
+/// The block of a part: its file, the wires into it, and its overrides.
 #[derive(Debug, Clone)]
 pub(crate) struct PartBlock {
     pub(crate) key: Key,
     pub(crate) file: Option<FilePath>,
     pub(crate) wires: Vec<(Key, Word)>,
-    /// Inputs whose wire cannot be read: that has been told.
-    pub(crate) unread: Vec<Key>,
+    /// Inputs whose wire is invalid and has its own diagnostic.
+    pub(crate) invalid: Vec<Key>,
     pub(crate) set: Table,
 }
 
-/// A graph file or a part.
+/// The sections of a graph file or of a part.
 #[derive(Debug, Clone, Default)]
-pub(crate) struct Document {
-    /// The section [graph] and its place, if there is one; no table if it has mistakes.
+pub(crate) struct GraphDocument {
+    /// The span of the section [graph], and the section if it is valid.
     pub(crate) graph: Option<(Range<usize>, Option<GraphTable>)>,
     pub(crate) roles: Vec<(Key, Word)>,
     pub(crate) nodes: Vec<Block>,
     pub(crate) parts: Vec<PartBlock>,
     pub(crate) commands: Vec<(Key, Key, Word)>,
-    /// The section [limits] and its place.
+    /// The section [limits] and its span.
     pub(crate) limits: Option<(Range<usize>, Table)>,
     pub(crate) modes: Vec<ModeBlock>,
-    /// The section [policy], as it is written and as it reads.
+    /// The section [policy] as written, and parsed if it is valid.
     pub(crate) policy: Option<(Value, Option<PolicyTable>)>,
     pub(crate) inputs: Vec<(Key, Word)>,
     pub(crate) exports: Vec<(Key, Word)>,
 }
 
-/// A bench file.
+/// The sections of a bench file.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Bench {
     pub(crate) devices: Vec<Block>,
     pub(crate) bind: Vec<(Key, Word)>,
 }
 
-/// What parameters call the section [limits] in `{ from = "limits.…" }`.
+/// Name of the section [limits] in `{ from = "limits.KEY" }`.
 pub(crate) const LIMITS: &str = "limits";
 
-/// What cannot be a name: what wires and facts call something else.
+/// Reserved names, which have another meaning in wires and facts.
 const RESERVED: [&str; 2] = ["inputs", LIMITS];
 
-/// Reads sections and collects what is wrong with them.
+/// Reads sections and collects their diagnostics.
 pub(crate) struct Sections<'a> {
     reader: Reader<'a>,
-    diagnostics: Vec<Diagnostic>,
-    /// Wires that may grow only so old, by the places of their sources.
-    pub(crate) ages: BTreeMap<usize, Age>,
-    /// Blocks that are no tables: that has been told, and is all there is to tell.
+    diagnostics: Diagnostics,
+    /// Age limits of wires, by the offset of the text that names the source.
+    pub(crate) ages: BTreeMap<usize, AgeLimit>,
+    /// Blocks that are not tables and have their own diagnostic.
     broken: Vec<Key>,
 }
 
@@ -95,16 +95,16 @@ impl<'a> Sections<'a> {
         Self { reader: Reader::new(sources), diagnostics: Vec::new(), ages: BTreeMap::new(), broken: Vec::new() }
     }
 
-    /// Everything that was wrong.
-    pub(crate) fn finish(self) -> Vec<Diagnostic> {
+    /// Returns all diagnostics.
+    pub(crate) fn finish(self) -> Diagnostics {
         let mut diagnostics = self.diagnostics;
-        diagnostics.extend(self.reader.mistakes.into_iter().map(spanned));
+        diagnostics.extend(self.reader.mistakes.into_iter().map(into_diagnostic));
         diagnostics
     }
 
-    /// The sections of a graph file.
-    pub(crate) fn graph(&mut self, root: &Table) -> Document {
-        self.known(
+    /// Reads the sections of a graph file.
+    pub(crate) fn graph(&mut self, root: &Table) -> GraphDocument {
+        self.check_keys(
             root,
             &["graph", "roles", "parts", "nodes", "commands", "limits", "modes", "policy", "devices", "bind"],
         );
@@ -119,24 +119,32 @@ impl<'a> Sections<'a> {
         let policy = root.get("policy");
         let policy = policy.map(|value| (value.clone(), PolicyTable::read(value, &mut self.reader)));
         let modes = self.named_tables(root.get("modes"));
-        let modes = modes::modes(modes, &mut self.reader);
-        Document { graph, roles: self.names(root.get("roles")), commands, limits, modes, policy, ..self.body(root) }
+        let modes = modes::read_modes(modes, &mut self.reader);
+        GraphDocument {
+            graph,
+            roles: self.names(root.get("roles")),
+            commands,
+            limits,
+            modes,
+            policy,
+            ..self.body(root)
+        }
     }
 
-    /// The sections of a part.
-    pub(crate) fn part(&mut self, root: &Table) -> Document {
-        self.known(root, &["inputs", "exports", "parts", "nodes"]);
+    /// Reads the sections of a part.
+    pub(crate) fn part(&mut self, root: &Table) -> GraphDocument {
+        self.check_keys(root, &["inputs", "exports", "parts", "nodes"]);
         let (inputs, exports) = (self.names(root.get("inputs")), self.names(root.get("exports")));
-        Document { inputs, exports, ..self.body(root) }
+        GraphDocument { inputs, exports, ..self.body(root) }
     }
 
-    /// The sections of a bench file.
+    /// Reads the sections of a bench file.
     pub(crate) fn bench(&mut self, root: &Table) -> Bench {
-        self.known(root, &["devices", "bind"]);
+        self.check_keys(root, &["devices", "bind"]);
         self.own_bench(root)
     }
 
-    /// The sections of a bench, in a file with others.
+    /// Reads the sections of a bench in a file that may have others.
     pub(crate) fn own_bench(&mut self, root: &Table) -> Bench {
         let devices = self.named_tables(root.get("devices"));
         let names = names_of(&devices);
@@ -144,24 +152,24 @@ impl<'a> Sections<'a> {
         Bench { devices, bind: self.words(root.get("bind")) }
     }
 
-    fn body(&mut self, root: &Table) -> Document {
+    fn body(&mut self, root: &Table) -> GraphDocument {
         let nodes = self.named_tables(root.get("nodes"));
         let names = names_of(&nodes);
         let parts = self.named_tables(root.get("parts"));
-        let nodes = nodes.into_iter().filter(|(key, table)| !self.is_in_part(key, table, &parts));
+        let nodes = nodes.into_iter().filter(|(key, table)| !self.addresses_part(key, table, &parts));
         let nodes: Vec<(Key, Table)> = nodes.collect();
         let nodes = nodes.into_iter().map(|(key, table)| self.node(key, table, &names)).collect();
         let parts = parts.into_iter().map(|(key, table)| self.part_block(key, table)).collect();
-        Document { nodes, parts, ..Document::default() }
+        GraphDocument { nodes, parts, ..GraphDocument::default() }
     }
 
-    /// Whether what looks like a node is meant for one in a part, as `--set nodes.PART.NODE.…` is: `show` calls it so.
-    fn is_in_part(&mut self, key: &Key, table: &Table, parts: &[(Key, Table)]) -> bool {
+    /// Returns whether a block of [nodes] addresses a node in a part, as `--set nodes.PART.NODE.…` does, and reports it.
+    fn addresses_part(&mut self, key: &Key, table: &Table, parts: &[(Key, Table)]) -> bool {
         let is_part = parts.iter().any(|(part, _)| part.name == key.name);
         if !is_part || table.get("type").is_some() {
             return false;
         }
-        let message = format!("`{0}` is a part: its nodes are set through `parts.{0}.set`", key.name);
+        let message = format!("`{0}` is a part: set its nodes through `parts.{0}.set`", key.name);
         let node = table.entries.first().map_or("NODE", |(node, _)| &node.name);
         let help = format!("write `parts.{}.set.{node}.…`", key.name);
         self.diagnostics.push(Diagnostic::new(Code::UnknownKey, key.span.clone(), message).help(help));
@@ -169,8 +177,8 @@ impl<'a> Sections<'a> {
     }
 
     fn node(&mut self, key: Key, mut table: Table, names: &[String]) -> Block {
-        let (wires, unread) = self.wires(&mut table);
-        Block { wires, unread, ..self.block(key, table, names) }
+        let (wires, invalid) = self.wires(&mut table);
+        Block { wires, invalid, ..self.block(key, table, names) }
     }
 
     fn block(&mut self, key: Key, mut table: Table, names: &[String]) -> Block {
@@ -179,20 +187,20 @@ impl<'a> Sections<'a> {
             None if self.broken.contains(&key) => None,
             None => {
                 let message = format!("`{}` has no `type`", key.name);
-                // `--set nodes.pidd.…` makes a block of its own.
+                // A misspelt `--set nodes.pidd.…` creates a new block.
                 let others = names.iter().map(String::as_str).filter(|name| *name != key.name);
-                let help = meant(&key.name, others).map(|name| format!("did you mean `{name}`?"));
+                let help = suggest_name(&key.name, others).map(|name| format!("did you mean `{name}`?"));
                 self.diagnostics.push(Diagnostic::new(Code::MissingKey, key.span.clone(), message).with_help(help));
                 None
             }
         };
-        // What is missing among the parameters is shown at the block's name.
+        // A missing parameter is reported at the name of the block.
         let params = Value { span: key.span.clone(), item: Item::Table(table) };
-        Block { key, kind, wires: Vec::new(), unread: Vec::new(), params }
+        Block { key, kind, wires: Vec::new(), invalid: Vec::new(), params }
     }
 
     fn part_block(&mut self, key: Key, mut table: Table) -> PartBlock {
-        let (wires, unread) = self.wires(&mut table);
+        let (wires, invalid) = self.wires(&mut table);
         let set = table.remove("set").map(|(_, value)| value);
         let set = self.table(set.as_ref());
         let file = match table.remove("file") {
@@ -204,30 +212,29 @@ impl<'a> Sections<'a> {
                 None
             }
         };
-        self.known(&table, &["file", "in", "set"]);
-        PartBlock { key, file, wires, unread, set }
+        self.check_keys(&table, &["file", "in", "set"]);
+        PartBlock { key, file, wires, invalid, set }
     }
 
-    /// The wires of a block, its table `in`, and those that cannot be read.
+    /// Reads the table `in` of a block: the valid wires, and the keys of the invalid ones.
     fn wires(&mut self, table: &mut Table) -> (Vec<(Key, Word)>, Vec<Key>) {
         let wires = table.remove("in").map(|(_, value)| value);
-        let (mut wires, unread) = self.wire_words(wires.as_ref());
+        let (mut wires, invalid) = self.wire_words(wires.as_ref());
         wires.retain(|(key, _)| {
             if key.name == "from" {
-                let diagnostic = Diagnostic::new(Code::BadName, key.span.clone(), "a wire cannot be called `from`");
-                let help = "`{ from = \"role.fact\" }` asks a device for a fact: choose another name";
+                let diagnostic = Diagnostic::new(Code::BadName, key.span.clone(), "a wire cannot be named `from`");
+                let help = "`from` is reserved for facts, as in `{ from = \"role.fact\" }`: choose another name";
                 self.diagnostics.push(diagnostic.help(help));
             }
-            key.name != "from" && self.name(key)
+            key.name != "from" && self.check_name(key)
         });
-        (wires, unread)
+        (wires, invalid)
     }
 
-    /// Every key must be one of `keys`.
-    fn known(&mut self, table: &Table, keys: &[&str]) {
+    /// Reports each key that is not one of `keys`.
+    fn check_keys(&mut self, table: &Table, keys: &[&str]) {
         for (key, _) in table.entries.iter().filter(|(key, _)| !keys.contains(&key.name.as_str())) {
-            let diagnostic =
-                Diagnostic::new(Code::UnknownKey, key.span.clone(), format!("`{}` means nothing here", key.name));
+            let diagnostic = Diagnostic::new(Code::UnknownKey, key.span.clone(), format!("unknown key `{}`", key.name));
             self.diagnostics.push(diagnostic.suggest(&key.name, keys.iter().copied(), "keys"));
         }
     }
@@ -243,53 +250,54 @@ impl<'a> Sections<'a> {
         }
     }
 
-    /// Keys with a string each.
+    /// Reads a table whose values are strings.
     fn words(&mut self, value: Option<&Value>) -> Vec<(Key, Word)> {
         let table = self.table(value);
         let read = |(key, value): (Key, Value)| Some((key, Word::read(&value, &mut self.reader)?));
         table.entries.into_iter().filter_map(read).collect()
     }
 
-    /// Keys with a wire each: where it comes from, or a table that says how old it may be too. And the keys of those that
-    /// cannot be read.
+    /// Reads a table whose values are wires, each a port or a table with an age limit.
+    ///
+    /// Returns the valid wires, and the keys of the invalid ones.
     fn wire_words(&mut self, value: Option<&Value>) -> (Vec<(Key, Word)>, Vec<Key>) {
-        let (mut wires, mut unread) = (Vec::new(), Vec::new());
+        let (mut wires, mut invalid) = (Vec::new(), Vec::new());
         for (key, value) in self.table(value).entries {
             let from =
                 if value.as_table().is_some() { self.aged_wire(&value) } else { Word::read(&value, &mut self.reader) };
             match from {
                 Some(from) => wires.push((key, from)),
-                None => unread.push(key),
+                None => invalid.push(key),
             }
         }
-        (wires, unread)
+        (wires, invalid)
     }
 
-    /// Where a wire comes from that may grow only so old.
+    /// Reads a wire with an age limit.
     fn aged_wire(&mut self, value: &Value) -> Option<Word> {
         if let Some(wire) = WireTable::read(value, &mut self.reader) {
-            self.ages.insert(wire.from.span.start, Age::of(&wire));
+            self.ages.insert(wire.from.span.start, AgeLimit::of(&wire));
             return Some(wire.from);
         }
-        // What is wrong with it has been told; where it comes from is looked up all the same, if it says that.
+        // The table has a diagnostic; its port is still resolved, to report a second mistake there.
         let from = value.as_table().and_then(|table| table.get("from"))?;
         Some(Word { text: from.as_str()?.to_owned(), span: from.span.clone() })
     }
 
-    /// Keys that are names, with a string each.
+    /// Reads a table whose keys are names and whose values are strings.
     fn names(&mut self, value: Option<&Value>) -> Vec<(Key, Word)> {
         let words = self.words(value);
         for (key, _) in &words {
-            self.name(key);
+            self.check_name(key);
         }
         words
     }
 
-    /// Keys that are names, with a table each.
+    /// Reads a table whose keys are names and whose values are tables.
     fn named_tables(&mut self, value: Option<&Value>) -> Vec<(Key, Table)> {
         let mut tables = Vec::new();
         for (key, value) in self.table(value).entries {
-            self.name(&key);
+            self.check_name(&key);
             let table = self.table(Some(&value));
             if value.as_table().is_none() {
                 self.broken.push(key.clone());
@@ -299,15 +307,15 @@ impl<'a> Sections<'a> {
         tables
     }
 
-    /// Whether a key is a name.
-    fn name(&mut self, key: &Key) -> bool {
+    /// Returns whether a key is a valid name, and reports it if not.
+    fn check_name(&mut self, key: &Key) -> bool {
         let is_word = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '_';
         let starts_well = key.name.starts_with(|c: char| c.is_ascii_lowercase());
         let is_name = starts_well && key.name.chars().all(is_word) && !RESERVED.contains(&key.name.as_str());
         if !is_name {
-            let message = format!("`{}` cannot be a name", key.name);
+            let message = format!("`{}` is not a valid name", key.name);
             let help =
-                "a name is made of small letters, digits and `_`, starts with a letter and is not `inputs` or `limits`";
+                "a name has lower-case letters, digits and `_`, starts with a letter, and is not `inputs` or `limits`";
             self.diagnostics.push(Diagnostic::new(Code::BadName, key.span.clone(), message).help(help));
         }
         is_name
@@ -318,8 +326,8 @@ fn names_of(tables: &[(Key, Table)]) -> Vec<String> {
     tables.iter().map(|(key, _)| key.name.clone()).collect()
 }
 
-/// A mistake that knows its place.
-pub(crate) fn spanned(mistake: Mistake) -> Diagnostic {
-    let At::Span(span) = mistake.at else { unreachable!("a reader points at places") };
+/// Converts a mistake of a reader into a diagnostic.
+pub(crate) fn into_diagnostic(mistake: Mistake) -> Diagnostic {
+    let At::Span(span) = mistake.at else { unreachable!("a reader reports spans") };
     Diagnostic { code: mistake.code, message: mistake.message, span, notes: Vec::new(), help: mistake.help }
 }

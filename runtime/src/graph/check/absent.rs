@@ -1,0 +1,41 @@
+//! Checks that no condition watches a port that is absent in its mode.
+
+use std::collections::BTreeMap;
+
+use crate::graph::net::Net;
+use crate::graph::plan::{Condition, PlannedMode, PortRef, Producer, Test, WatchedPort};
+use crate::node::Components;
+use crate::source::{Code, Diagnostic, Diagnostics};
+
+/// Reports each condition on a port that is absent because nothing reads it in its mode.
+///
+/// `demand` holds the components that each mode reads. `freezes` holds which nodes make unused components absent.
+pub(crate) fn check(
+    net: &Net<'_>,
+    modes: &[PlannedMode],
+    demand: &[Vec<Vec<Components>>],
+    freezes: &BTreeMap<usize, bool>,
+    diagnostics: &mut Diagnostics,
+) {
+    for ((mode, demand), block) in modes.iter().zip(demand).zip(&net.flat.modes) {
+        for exit in &mode.exits {
+            let (Condition::Port(watched, _) | Condition::Lost(watched, _)) = &exit.condition else { continue };
+            let WatchedPort { source: PortRef { producer: Producer::Node(node), port }, feature } = *watched else {
+                continue;
+            };
+            let read = demand[node][port];
+            let is_read = feature.map_or(!read.is_empty(), |feature| read.has(feature));
+            if is_read || !freezes.get(&node).copied().unwrap_or(false) {
+                continue;
+            }
+            let what = if matches!(exit.condition, Condition::Port(_, Test::Absent)) { "always" } else { "never" };
+            let name = exit.text.split('`').nth(1).unwrap_or_default();
+            let message = format!(
+                "nothing reads `{name}` in mode `{}`, so it is absent there and this condition {what} holds",
+                block.key.name
+            );
+            let help = "select the feature in this mode, or watch a port upstream of it";
+            diagnostics.push(Diagnostic::new(Code::AbsentPort, exit.span.clone(), message).help(help));
+        }
+    }
+}

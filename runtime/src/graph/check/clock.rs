@@ -1,0 +1,51 @@
+//! Checks the clock of a graph, and that `max_gap_ms` is not shorter than its period.
+
+use crate::graph::bench::OpenedBench;
+use crate::graph::load::FlatGraph;
+use crate::graph::net::Net;
+use crate::graph::plan::Clock;
+use crate::source::{Code, Diagnostic, Diagnostics};
+
+/// Returns what triggers the ticks and the period [s], or reports why there is no clock.
+pub(crate) fn check(net: &Net<'_>, opened: &OpenedBench, diagnostics: &mut Diagnostics) -> Option<(Clock, f64)> {
+    let (clock, period) = match find_clock(net.flat, opened) {
+        Ok(clock) => clock?,
+        Err(diagnostic) => {
+            diagnostics.push(*diagnostic);
+            return None;
+        }
+    };
+    diagnostics.extend(short_gap(net.flat, period));
+    Some((clock, period))
+}
+
+fn find_clock(flat: &FlatGraph, opened: &OpenedBench) -> Result<Option<(Clock, f64)>, Box<Diagnostic>> {
+    // An invalid section [graph] has its own diagnostic.
+    let Some(table) = &flat.table else { return Ok(None) };
+    let (message, span, help) = match (&table.clock, table.rate_hz) {
+        (None, Some(rate)) => return Ok(Some((Clock::Rate, 1.0 / *rate))),
+        (Some(word), None) => {
+            let Some(role) = flat.role_names().position(|name| name == word.text) else {
+                let message = format!("the clock `{}` is not a role", word.text);
+                let diagnostic = Diagnostic::new(Code::BadClock, word.span.clone(), message);
+                return Err(Box::new(diagnostic.suggest(&word.text, flat.role_names(), "roles")));
+            };
+            let bound = opened.roles.get(role).and_then(Option::as_ref);
+            return Ok(bound.map(|bound| (Clock::Device(bound.device), opened.periods[bound.device])));
+        }
+        (Some(word), Some(_)) => ("the graph has two clocks", &word.span, "keep `clock` or `rate_hz`"),
+        (None, None) => {
+            ("the graph has no clock", &flat.place, "add `clock = \"role\"` or `rate_hz = 250` under [graph]")
+        }
+    };
+    Err(Box::new(Diagnostic::new(Code::BadClock, span.clone(), message).help(help)))
+}
+
+fn short_gap(flat: &FlatGraph, period: f64) -> Option<Diagnostic> {
+    let gap = *flat.table.as_ref()?.max_gap_ms?;
+    let span = flat.settings.as_ref()?.as_table()?.get("max_gap_ms")?.span.clone();
+    // The period of a device is rounded to nanoseconds, so it may be slightly longer than the same number here.
+    let is_short = gap * 1e-3 < period * (1.0 - 1e-6);
+    let message = format!("`max_gap_ms` of {gap} is shorter than the period, {:.3} ms", period * 1e3);
+    is_short.then(|| Diagnostic::new(Code::BadValue, span, message).help("give at least one period"))
+}

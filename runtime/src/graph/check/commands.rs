@@ -1,0 +1,26 @@
+//! Checks that every command of a role has a wire.
+
+use crate::graph::net::Net;
+use crate::source::{Code, Diagnostic, Diagnostics, Key};
+
+/// Reports each command that nothing drives.
+pub(crate) fn check(net: &Net<'_>, diagnostics: &mut Diagnostics) {
+    for ((key, _), role) in net.flat.roles.iter().zip(&net.roles) {
+        for command in role.iter().flat_map(|role| &role.commands) {
+            let is_driven = |role: &Key, driven: &Key| role.name == key.name && driven.name == command.name;
+            // A wire to an unknown role or command has its own diagnostic, and may be meant for this one.
+            let is_misspelt = |role: &Key, driven: &Key| {
+                let roles = || net.flat.roles.iter().zip(&net.roles).filter(|((key, _), _)| key.name == role.name);
+                let mut ports =
+                    roles().filter_map(|(_, kind)| *kind).flat_map(|kind| kind.commands.iter().chain(&kind.reports));
+                !ports.any(|port| port.name == driven.name) && (role.name == key.name || roles().next().is_none())
+            };
+            if !net.flat.commands.iter().any(|(role, driven, _)| is_driven(role, driven) || is_misspelt(role, driven)) {
+                let message = format!("nothing drives `{}.{}`", key.name, command.name);
+                let port = net.find_candidate(0, usize::MAX, command).unwrap_or_else(|| "node.port".into());
+                let help = format!("add `{}.{} = \"{port}\"` under [commands]", key.name, command.name);
+                diagnostics.push(Diagnostic::new(Code::UndrivenCommand, key.span.clone(), message).help(help));
+            }
+        }
+    }
+}

@@ -1,0 +1,115 @@
+//! Checks `show` and `mark` in the section [graph], and selects the ports that a run shows.
+
+use std::collections::BTreeMap;
+use std::ops::Range;
+
+use crate::graph::net::Net;
+use crate::graph::plan::{PlannedNode, PlannedShow, PlannedView};
+use crate::graph::plan::{PlannedPort, PortRef, Producer};
+use crate::node::Word;
+use crate::signal::{Kind, Unit};
+use crate::source::{Code, Diagnostic, Diagnostics};
+
+/// The ports of `show` and `mark`.
+pub(crate) struct RequestedView {
+    /// The ports of `show`, or `None` without that key.
+    ports: Option<Vec<PlannedShow>>,
+    mark: Vec<(PortRef, Range<usize>)>,
+}
+
+/// Resolves the ports of `show` and `mark`, and reports those that cannot be shown.
+pub(crate) fn check(net: &Net<'_>, diagnostics: &mut Diagnostics) -> RequestedView {
+    let table = net.flat.table.as_ref();
+    let mut seen: Vec<PortRef> = Vec::new();
+    let mut show = |word: &Word| {
+        let source = net.resolve_or_report(0, word, diagnostics)?;
+        let kind = net.port(source).kind;
+        let diagnostic = |code: Code, message: String| Diagnostic::new(code, word.span.clone(), message);
+        if !can_be_shown(kind) {
+            let message = format!("`{}` is {}: only images and numbers can be shown", word.text, kind.with_article());
+            let help = "show the image from which it is computed, or a port with numbers";
+            diagnostics.push(diagnostic(Code::KindMismatch, message).help(help));
+        }
+        if seen.contains(&source) {
+            let message = format!("`{}` is listed twice", word.text);
+            diagnostics.push(diagnostic(Code::BadValue, message).help("remove it"));
+        }
+        seen.push(source);
+        Some(PlannedShow { name: word.text.clone(), source })
+    };
+    let words = table.and_then(|table| table.show.as_ref());
+    let ports = words.map(|words| words.iter().filter_map(&mut show).collect());
+    let mark = table.and_then(|table| table.mark.as_ref()).map_or(&[][..], |mark| &mark[..]);
+    let mark = mark.iter().filter_map(|word| {
+        let source = net.resolve_or_report(0, word, diagnostics)?;
+        let kind = net.port(source).kind;
+        if kind != Kind::Scalar {
+            let message = format!("`{}` is {}, but `mark` takes scalars", word.text, kind.with_article());
+            diagnostics.push(Diagnostic::new(Code::KindMismatch, word.span.clone(), message));
+        }
+        Some((source, word.span.clone()))
+    });
+    RequestedView { mark: mark.collect(), ports }
+}
+
+impl RequestedView {
+    /// Returns the ports of `show`.
+    pub(crate) fn sources(&self) -> impl Iterator<Item = PortRef> {
+        self.ports.iter().flatten().map(|shown| shown.source)
+    }
+
+    /// Reports ports of `mark` that are not in metres, once the units are known.
+    pub(crate) fn check_units(&self, ports: &BTreeMap<PortRef, PlannedPort>, diagnostics: &mut Diagnostics) {
+        for (source, span) in &self.mark {
+            let Some(port) = ports.get(source) else { continue };
+            if let Some(unit) = port.shape.unit().filter(|unit| *unit != Unit::METRE) {
+                let message = format!("`{}` is in {unit}, but `mark` takes m", port.name);
+                diagnostics.push(Diagnostic::new(Code::UnitMismatch, span.clone(), message));
+            }
+        }
+    }
+
+    /// Plans the view: the ports of `show`, or a default selection.
+    pub(crate) fn plan(
+        self,
+        net: &Net<'_>,
+        nodes: &[PlannedNode],
+        ports: &BTreeMap<PortRef, PlannedPort>,
+    ) -> PlannedView {
+        let mark: Vec<PortRef> = self.mark.iter().map(|(source, _)| *source).collect();
+        let named = |source: PortRef| {
+            let name = net.name_in(0, source).unwrap_or_else(|| ports[&source].name.clone());
+            PlannedShow { name, source }
+        };
+        let default = || default_ports(nodes, ports).into_iter().map(named).collect();
+        PlannedView { ports: self.ports.unwrap_or_else(default), mark: mark.try_into().ok() }
+    }
+}
+
+const fn can_be_shown(kind: Kind) -> bool {
+    !matches!(kind, Kind::Mask | Kind::Regions | Kind::Jacobian)
+}
+
+/// Returns the ports shown without `show`: the images of the roles, and the first ports of one numeric kind.
+fn default_ports(nodes: &[PlannedNode], ports: &BTreeMap<PortRef, PlannedPort>) -> Vec<PortRef> {
+    /// Maximum number of curves, unless the first port alone has more.
+    const MAX_CURVES: usize = 6;
+    const KINDS: [Kind; 6] = [Kind::Features, Kind::Scalar, Kind::Twist, Kind::Joints, Kind::Pose, Kind::Flag];
+    let is_role = |source: &PortRef| matches!(source.producer, Producer::Role(_));
+    let of_kind = |kind: Kind| move |source: &PortRef| ports.get(source).is_some_and(|port| port.shape.kind() == kind);
+    let roles: Vec<PortRef> = ports.keys().copied().filter(is_role).collect();
+    let of_node = |node: &PlannedNode| {
+        let producer = Producer::Node(node.index);
+        (0..node.ports.len()).map(move |port| PortRef { producer, port })
+    };
+    let all: Vec<PortRef> = nodes.iter().flat_map(of_node).chain(roles.iter().copied()).collect();
+    let mut shown: Vec<PortRef> = roles.iter().copied().filter(of_kind(Kind::Image)).collect();
+    let Some(kind) = KINDS.into_iter().find(|kind| all.iter().any(of_kind(*kind))) else { return shown };
+    let mut count = 0;
+    shown.extend(all.into_iter().filter(of_kind(kind)).take_while(|source| {
+        let is_first = count == 0;
+        count += ports[source].shape.scalars().len();
+        is_first || count <= MAX_CURVES
+    }));
+    shown
+}
