@@ -65,7 +65,7 @@ pub(crate) fn compile_in(mut loader: Loader, catalogue: &Catalogue, request: &Re
     let mut warnings = Diagnostics::new();
     check::unused::check(&net, view.sources(), &mut warnings);
     let view = view.plan(&net, &nodes, &ports);
-    let reset_after = flat.table.as_ref().map_or(0, |table| (*table.reset_after_ms * 1e6) as i64);
+    let reset_after = flat.table.as_ref().map_or(0, |table| (table.reset_after_ms * 1e6) as i64);
     let period = ((period * 1e9).round() as i64).max(1);
     let (exports, facts) = (net.exports_by_name(), opened.facts(&net));
     let devices = opened.devices;
@@ -103,5 +103,5 @@ fn log_plan(nodes: &[PlannedNode], opened: &OpenedBench, sources: &SourceMap) {
 
 /// Returns the maximum time step between two samples [s].
 fn max_gap(table: Option<&GraphTable>, period: f64) -> f64 {
-    table.and_then(|table| table.max_gap_ms).map_or_else(|| default_max_age_s(period), |ms| *ms * 1e-3)
+    table.and_then(|table| table.max_gap_ms).map_or_else(|| default_max_age_s(period), |ms| ms * 1e-3)
 }

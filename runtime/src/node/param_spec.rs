@@ -100,19 +100,6 @@ impl ParamSpec {
         }
     }
 
-    /// The same for a field that `params!` declares: its unit ends the doc, and `source` is its default as written.
-    #[must_use]
-    pub fn from_macro<T: Param>(declared: &Declared, default: Option<fn() -> T>, source: &'static str) -> Self {
-        let text = declared.doc.trim_end().trim_end_matches('.');
-        let (doc, unit) = match text.strip_suffix(']').and_then(|doc| doc.rsplit_once('[')) {
-            Some((doc, unit)) => (format!("{}.", doc.trim_end()), Some(unit.to_owned())),
-            None => (declared.doc.to_owned(), None),
-        };
-        let spec = Self::of(declared, default);
-        let default = spec.default.or_else(|| default.map(|_| word(source)));
-        Self { doc, unit, default, ..spec }
-    }
-
     /// Its meaning with its unit, in one line.
     #[must_use]
     pub fn doc_with_unit(&self) -> String {
@@ -134,71 +121,57 @@ fn fault<T: Param>(written: &Written, bounds: Option<Bounds>) -> Option<String> 
     reader.mistakes.into_iter().next().map(|mistake| mistake.message)
 }
 
-/// A default that cannot say itself what a graph file would say: `Choose::LastSeen` is the word `"last_seen"`.
-fn word(source: &str) -> String {
-    let Some((_, variant)) = source.rsplit_once("::") else { return source.into() };
-    if !variant.chars().all(char::is_alphanumeric) {
-        return source.into();
-    }
-    let mut word = String::new();
-    for c in variant.chars() {
-        if c.is_uppercase() && !word.is_empty() {
-            word.push('_');
-        }
-        word.extend(c.to_lowercase());
-    }
-    format!("\"{word}\"")
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::node::{Map, NonNegative, Reader, Spanned};
+    use crate::node::{Map, Spanned};
     use crate::signal::Unit;
-    use crate::source::Value;
 
     /// A choice between words.
-    #[derive(Debug, Clone)]
-    #[allow(unreachable_pub, reason = "it is the type of a public field")]
-    pub struct Choice;
-
-    impl Choice {
-        #[allow(non_upper_case_globals, reason = "a stand-in for the variant of an enum")]
-        const LastSeen: Self = Self;
+    #[derive(Debug, Clone, Param)]
+    enum Choice {
+        /// The last one.
+        LastSeen,
     }
 
-    impl Param for Choice {
-        const EXPECTS: &'static str = "`last_seen`";
-        fn read(_: &Value, _: &mut Reader<'_>) -> Option<Self> {
-            Some(Self)
-        }
-    }
-
-    crate::params! { Inner:
-        /// Place [m].
-        xyz: [f64; 3] = [0.0; 3],
+    /// A table.
+    #[derive(Debug, Clone, Param)]
+    struct Inner {
+        /// A place.
+        #[param(unit = "m", default = [0.0; 3])]
+        xyz: [f64; 3],
         /// A name.
         of: Option<Spanned<String>>,
     }
 
-    crate::params! {
-        /// Must be given [N].
+    /// Parameters of every sort.
+    #[derive(Debug, Clone, Param)]
+    struct Params {
+        /// Must be given.
+        #[param(unit = "N")]
         force: f64,
-        /// A time [ms].
-        time_ms: NonNegative = NonNegative(20.0),
+        /// A time.
+        #[param(unit = "ms", range = 0.0.., default = 20.0)]
+        time_ms: f64,
         /// A name.
-        base: String = "base".into(),
+        #[param(default = "base")]
+        base: String,
         /// A unit.
-        unit: Unit = Unit::NEWTON.per_tactel(),
+        #[param(default = Unit::NEWTON.per_tactel())]
+        unit: Unit,
         /// A word.
-        choose: Choice = Choice::LastSeen,
+        #[param(default = Choice::LastSeen)]
+        choose: Choice,
         /// A table.
-        mount: Inner = Inner { xyz: [0.0, 0.0, 1e-3], of: None },
+        #[param(default = Inner { xyz: [0.0, 0.0, 1e-3], of: None })]
+        mount: Inner,
         /// A list of tables.
-        press: Vec<Inner> = vec![],
+        #[param(default = vec![])]
+        press: Vec<Inner>,
         /// A table for each name.
         gains: Map<Inner>,
-        /// May be left out [rad/s].
+        /// May be left out.
+        #[param(unit = "rad/s")]
         speed: Option<f64>,
     }
 
@@ -226,7 +199,7 @@ mod tests {
     }
 
     #[test]
-    fn the_unit_stands_at_the_end_of_the_doc() {
+    fn the_unit_stands_in_the_declaration() {
         let specs = Params::fields();
         let units: Vec<_> = specs.iter().map(|spec| spec.unit.as_deref()).collect();
         assert_eq!(units[..3], [Some("N"), Some("ms"), None]);

@@ -2,7 +2,7 @@
 
 use std::borrow::Cow;
 use std::collections::BTreeMap;
-use std::ops::{Deref, Range};
+use std::ops::Range;
 use std::path::PathBuf;
 
 use super::{At, Bounds, Mistake, Mistakes, ParamSpec, Reader, Repeats, Written, read_leaf};
@@ -108,50 +108,6 @@ impl Param for f64 {
     fn written(&self) -> Option<Written> {
         Some((*self).into())
     }
-}
-
-macro_rules! ranges {
-    ($($(#[$doc:meta])* $Name:ident($type:ty): $expects:literal, $holds:expr;)*) => {$(
-        $(#[$doc])*
-        #[derive(Debug, Clone, Copy, PartialEq, PartialOrd)]
-        pub struct $Name(pub $type);
-
-        impl Param for $Name {
-            const EXPECTS: &'static str = $expects;
-            fn read(value: &Value, reader: &mut Reader<'_>) -> Option<Self> {
-                let number: $type = read_leaf(value, reader, $expects)?;
-                let holds: fn($type) -> bool = $holds;
-                if !holds(number) {
-                    reader.wrong_type(value, $expects);
-                    return None;
-                }
-                Some(Self(number))
-            }
-            fn written(&self) -> Option<Written> {
-                self.0.written()
-            }
-        }
-
-        impl Deref for $Name {
-            type Target = $type;
-            fn deref(&self) -> &$type { &self.0 }
-        }
-    )*};
-}
-
-ranges! {
-    /// A finite number greater than zero.
-    Positive(f64): "a number greater than 0", |x| x > 0.0 && x.is_finite();
-    /// A finite number that is not below zero.
-    NonNegative(f64): "a number, 0 or more", |x| x >= 0.0 && x.is_finite();
-    /// A number from 0 to 1.
-    Ratio(f64): "a number from 0 to 1", |x| (0.0..=1.0).contains(&x);
-    /// A rate [Hz] whose period is a sensible number of nanoseconds.
-    Rate(f64): "a rate from 0.001 to 1000000", |x| (1e-3..=1e6).contains(&x);
-    /// A switch written as a number, as in a diagonal matrix.
-    Bit(u64): "0 or 1", |n| n <= 1;
-    /// How many, at least one.
-    Count(usize): "a whole number from 1 to 1000000", |n| (1..=1_000_000).contains(&n);
 }
 
 /// A parameter and where it stands, for a mistake that is found later.

@@ -2,73 +2,98 @@
 
 use std::ops::Range;
 
-use crate::node::{At, FilePath, Map, Mistake, NonNegative, Param, Positive, Reader, Word};
+use crate::node::{At, FilePath, Map, Mistake, Param, Reader, Word};
 use crate::source::{Code, Diagnostic};
 use crate::source::{Item, Key, SourceMap, Table, Value};
 
-crate::params! { ScenarioTable:
+/// The section `[scenario]`.
+#[derive(Debug, Clone, Param)]
+pub(crate) struct ScenarioTable {
     /// Task to run.
-    graph: FilePath,
+    pub(crate) graph: FilePath,
     /// Bench to run it on; by default the task's own.
-    bench: Option<FilePath>,
+    pub(crate) bench: Option<FilePath>,
     /// Number of seeds, from 1 on, or a list of seeds. Each run sets its seed as the `seed` of every device that has one.
-    seeds: Option<Seeds>,
-    /// Duration of a run [s].
-    for_s: Positive,
+    pub(crate) seeds: Option<Seeds>,
+    /// Duration of a run.
+    #[param(unit = "s", above = 0.0)]
+    pub(crate) for_s: f64,
     /// Flag that defines time 0 of all figures: when it is first set. By default, time 0 is the start of the run.
-    from: Option<Word>,
+    pub(crate) from: Option<Word>,
     /// Flag that must be set from time 0 to the end.
-    never_lost: Option<Word>,
+    pub(crate) never_lost: Option<Word>,
     /// Mode that must be reached and never left again.
-    stays_in: Option<Word>,
+    pub(crate) stays_in: Option<Word>,
     /// Mode in which the run must end, or `done` if it must end with a `done` condition.
-    ends_in: Option<Word>,
+    pub(crate) ends_in: Option<Word>,
     /// Values to print beside the figures: facts of devices as `role.fact`, and parameters as `devices.NAME.key`.
-    facts: Vec<Word> = vec![],
+    #[param(default = vec![])]
+    pub(crate) facts: Vec<Word>,
 }
 
-crate::params! { CheckTable:
+/// One check of a scenario.
+#[derive(Debug, Clone, Param)]
+pub(crate) struct CheckTable {
     /// Port or component to check, by its name in a recording or in the task's wires.
-    of: Word,
+    pub(crate) of: Word,
     /// Port or component to subtract from it, for example the true value from the measured one.
-    minus: Option<Word>,
-    /// Value that it must settle to [unit of the check].
-    settles_to: Option<f64>,
-    /// Half width of the band around `settles_to` [unit of the check].
-    within: Option<Positive>,
-    /// Maximum response time [s].
-    response_below_s: Option<Positive>,
-    /// Maximum steady-state error [unit of the check].
-    steady_state_error_below: Option<Positive>,
-    /// Length of the steady state at the end of the run; 10 by default [s].
-    steady_s: Option<Positive>,
-    /// Maximum standard deviation [unit of the check].
-    std_below: Option<Positive>,
-    /// Value that it must never exceed [unit of the check].
-    never_above: Option<f64>,
-    /// Value that it must never fall below [unit of the check].
-    never_below: Option<f64>,
-    /// Time from which it is checked [s]. The response and the steady state have their own times.
-    after_s: Option<NonNegative>,
+    pub(crate) minus: Option<Word>,
+    /// Value that it must settle to.
+    #[param(unit = "$unit")]
+    pub(crate) settles_to: Option<f64>,
+    /// Half width of the band around `settles_to`.
+    #[param(unit = "$unit", above = 0.0)]
+    pub(crate) within: Option<f64>,
+    /// Maximum response time.
+    #[param(unit = "s", above = 0.0)]
+    pub(crate) response_below_s: Option<f64>,
+    /// Maximum steady-state error.
+    #[param(unit = "$unit", above = 0.0)]
+    pub(crate) steady_state_error_below: Option<f64>,
+    /// Length of the steady state at the end of the run; 10 by default.
+    #[param(unit = "s", above = 0.0)]
+    pub(crate) steady_s: Option<f64>,
+    /// Maximum standard deviation.
+    #[param(unit = "$unit", above = 0.0)]
+    pub(crate) std_below: Option<f64>,
+    /// Value that it must never exceed.
+    #[param(unit = "$unit")]
+    pub(crate) never_above: Option<f64>,
+    /// Value that it must never fall below.
+    #[param(unit = "$unit")]
+    pub(crate) never_below: Option<f64>,
+    /// Time from which it is checked. The response and the steady state have their own times.
+    #[param(unit = "s", range = 0.0..)]
+    pub(crate) after_s: Option<f64>,
     /// Unit of all numbers of the check: its name, and its size in the unit of the port.
-    unit: Option<Map<Positive>>,
-    /// Values from the paper to print beside the figures [unit of the check].
-    paper: Option<PaperTable>,
+    #[param(unit = "1", above = 0.0)]
+    pub(crate) unit: Option<Map<f64>>,
+    /// Values from the paper to print beside the figures.
+    #[param(unit = "$unit")]
+    pub(crate) paper: Option<PaperTable>,
 }
 
-crate::params! { PaperTable:
-    /// Response time [s].
-    response_s: Option<f64>,
-    /// Steady-state error [unit of the check].
-    error: Option<f64>,
-    /// Mean [unit of the check].
-    mean: Option<f64>,
-    /// Standard deviation [unit of the check].
-    std: Option<f64>,
-    /// Maximum [unit of the check].
-    max: Option<f64>,
-    /// Minimum [unit of the check].
-    min: Option<f64>,
+/// Values from the paper.
+#[derive(Debug, Clone, Param)]
+pub(crate) struct PaperTable {
+    /// Response time.
+    #[param(unit = "s")]
+    pub(crate) response_s: Option<f64>,
+    /// Steady-state error.
+    #[param(unit = "$unit")]
+    pub(crate) error: Option<f64>,
+    /// Mean.
+    #[param(unit = "$unit")]
+    pub(crate) mean: Option<f64>,
+    /// Standard deviation.
+    #[param(unit = "$unit")]
+    pub(crate) std: Option<f64>,
+    /// Maximum.
+    #[param(unit = "$unit")]
+    pub(crate) max: Option<f64>,
+    /// Minimum.
+    #[param(unit = "$unit")]
+    pub(crate) min: Option<f64>,
 }
 
 /// The seeds and their position in the source.
@@ -206,9 +231,9 @@ impl CheckBlock {
             wrong(Code::BadValue, "never_below", message, "exchange `never_above` and `never_below`");
         }
         if let (Some(after), Some(for_s)) = (table.after_s, for_s)
-            && *after >= for_s
+            && after >= for_s
         {
-            let message = format!("the run ends after {for_s} s, so there is nothing to check after {} s", *after);
+            let message = format!("the run ends after {for_s} s, so there is nothing to check after {} s", after);
             wrong(Code::BadValue, "after_s", message, "write an earlier time, or a larger `for_s`");
         }
         if table.unit.as_ref().is_some_and(|unit| unit.0.len() != 1) {

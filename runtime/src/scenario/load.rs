@@ -34,7 +34,7 @@ impl Scenario {
         let mut reader = Reader::new(&loader.sources);
         let document = document(&root, &mut reader);
         found.extend(reader.mistakes.into_iter().map(into_diagnostic));
-        let for_s = document.scenario.as_ref().map(|scenario| *scenario.for_s);
+        let for_s = document.scenario.as_ref().map(|scenario| scenario.for_s);
         found.extend(document.checks.iter().flat_map(|check| check.mistakes(for_s)));
         found.extend(without_checks(&root, &document));
         let files = document.files(&loader.sources);

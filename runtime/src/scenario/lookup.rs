@@ -42,7 +42,7 @@ pub(super) fn look_up(
         rows.extend(rows_of(table));
         Scenario {
             path: path.to_owned(),
-            for_s: *table.for_s,
+            for_s: table.for_s,
             seeds: table.seeds.as_ref().map(|seeds| seeds.list.clone()).unwrap_or_default(),
             facts: table.facts.iter().filter_map(|word| lookup.fact(word)).collect(),
             request,
@@ -143,7 +143,7 @@ impl Lookup<'_> {
             None => None,
         };
         let (unit_name, unit) = match table.unit.as_ref().and_then(|unit| unit.0.iter().next()) {
-            Some((name, unit)) => (name.clone(), **unit),
+            Some((name, unit)) => (name.clone(), *unit),
             None => (column.unit.to_string(), 1.0),
         };
         let rows = figures.iter().map(|(figure, bound)| {
@@ -155,9 +155,9 @@ impl Lookup<'_> {
             period: column.unit.is_axial().then(|| std::f64::consts::PI / unit),
             column: column.name,
             unit,
-            settles: table.settles_to.zip(table.within.map(|within| *within)),
-            after: table.after_s.map(|after| *after),
-            steady: table.steady_s.map_or(DEFAULT_STEADY_S, |steady| *steady),
+            settles: table.settles_to.zip(table.within.map(|within| within)),
+            after: table.after_s.map(|after| after),
+            steady: table.steady_s.map_or(DEFAULT_STEADY_S, |steady| steady),
             figures: figures.iter().map(|(figure, _)| *figure).collect(),
         };
         Some((check, rows.collect()))
@@ -249,13 +249,12 @@ fn plain(value: &Value) -> Option<toml::Value> {
 /// Returns the figures of a check with their bounds.
 fn figures(table: &CheckTable) -> Vec<(Figure, Bound)> {
     let median = |bound: Option<f64>| bound.map_or(Bound::None, Bound::Median);
-    let positive = |bound: Option<crate::node::Positive>| median(bound.map(|bound| *bound));
-    let std = (Figure::Std, positive(table.std_below));
+    let std = (Figure::Std, median(table.std_below));
     let mut figures = Vec::new();
     let has_extremes = table.never_above.is_some() || table.never_below.is_some();
     if table.settles_to.is_some() {
-        let response = table.response_below_s.map_or(Bound::Settles, |bound| Bound::Median(*bound));
-        figures.extend([(Figure::Response, response), (Figure::Error, positive(table.steady_state_error_below)), std]);
+        let response = table.response_below_s.map_or(Bound::Settles, Bound::Median);
+        figures.extend([(Figure::Response, response), (Figure::Error, median(table.steady_state_error_below)), std]);
     } else if !has_extremes || table.std_below.is_some() {
         figures.extend([(Figure::Mean, Bound::None), std]);
     }

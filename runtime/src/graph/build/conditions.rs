@@ -37,7 +37,7 @@ pub(crate) fn resolve_exits(
         diagnostics.extend(misplaced_key(*kind, span, exit));
         match condition {
             Ok(Some((condition, text))) => {
-                let lasts = exit.for_ms.map_or(0, |ms| nanos(*ms));
+                let lasts = exit.for_ms.map_or(0, |ms| nanos(ms));
                 let priority = exit.priority.unwrap_or(0);
                 if let Ok(to) = to {
                     planned.push(PlannedExit { kind: *kind, to, condition, lasts, priority, text, span: span.clone() });
@@ -92,7 +92,7 @@ fn misplaced_key(kind: ExitKind, span: &Range<usize>, exit: &Exit) -> Option<Dia
         (exit.hysteresis.is_some() && !has_bound, "`hysteresis` needs `above`, `below` or `within`"),
         (exit.for_ms.is_some() && !is_on_port, "`for_ms` needs `when`"),
         (
-            exit.for_ms.is_some_and(|ms| *ms > 0.0) && exit.is == Some(PortState::New),
+            exit.for_ms.is_some_and(|ms| ms > 0.0) && exit.is == Some(PortState::New),
             "`new` holds for one tick only: remove `for_ms`",
         ),
         (
@@ -136,12 +136,12 @@ fn condition(
         return port_condition(when, span, exit, context);
     }
     if let Some(ms) = exit.after_ms {
-        return Ok(Some((Condition::Elapsed(nanos(*ms)), format!("{} ms have passed", *ms))));
+        return Ok(Some((Condition::Elapsed(nanos(ms)), format!("{} ms have passed", ms))));
     }
     if let Some(mm) = exit.after_travel_mm {
         let source = travel_pose(span, exit, context)?;
-        let text = format!("the sensor has moved {} mm", *mm);
-        return Ok(source.map(|source| (Condition::Travel(source, *mm * 1e-3), text)));
+        let text = format!("the sensor has moved {} mm", mm);
+        return Ok(source.map(|source| (Condition::Travel(source, mm * 1e-3), text)));
     }
     let word = exit.on.as_ref().expect("one of them is given");
     if word.text.trim() != word.text || word.text.is_empty() {
@@ -167,7 +167,7 @@ fn lost_condition(
         ));
     };
     let Some((watched, name)) = resolve_watched(of, context)? else { return Ok(None) };
-    let after = exit.after_ms.map_or(context.lost_after, |ms| nanos(*ms));
+    let after = exit.after_ms.map_or(context.lost_after, |ms| nanos(ms));
     let text = format!("`{name}` is lost");
     Ok(Some((Condition::Lost(watched, after), text)))
 }
@@ -283,7 +283,7 @@ fn number_condition(
     context: &ExitContext<'_>,
 ) -> Result<Option<(Condition, String)>, Box<Diagnostic>> {
     let (min, max) = match exit.within {
-        Some(size) => (-*size, *size),
+        Some(size) => (-size, size),
         None => (exit.above.unwrap_or(f64::NEG_INFINITY), exit.below.unwrap_or(f64::INFINITY)),
     };
     if exit.within.is_none() && exit.above.is_none() && exit.below.is_none() {
@@ -296,7 +296,7 @@ fn number_condition(
         return Err(Box::new(Diagnostic::new(Code::BoundOutOfRange, when.span.clone(), message)));
     }
     let text = match (exit.within, exit.above, exit.below) {
-        (Some(size), ..) => format!("within {}", *size),
+        (Some(size), ..) => format!("within {}", size),
         (_, Some(above), None) => format!("above {above}"),
         (_, None, Some(below)) => format!("below {below}"),
         _ => format!("between {min} and {max}"),
@@ -313,6 +313,6 @@ fn number_condition(
             return Err(Box::new(Diagnostic::new(Code::BoundOutOfRange, when.span.clone(), message)));
         }
     }
-    let (hysteresis, text) = (exit.hysteresis.map_or(0.0, |by| *by), format!("`{name}` is {text}"));
+    let (hysteresis, text) = (exit.hysteresis.map_or(0.0, |by| by), format!("`{name}` is {text}"));
     Ok(Some((Condition::Port(watched, Test::Between { min, max, hysteresis }), text)))
 }

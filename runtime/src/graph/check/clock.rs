@@ -23,7 +23,7 @@ fn find_clock(flat: &FlatGraph, opened: &OpenedBench) -> Result<Option<(Clock, f
     // An invalid section [graph] has its own diagnostic.
     let Some(table) = &flat.table else { return Ok(None) };
     let (message, span, help) = match (&table.clock, table.rate_hz) {
-        (None, Some(rate)) => return Ok(Some((Clock::Rate, 1.0 / *rate))),
+        (None, Some(rate)) => return Ok(Some((Clock::Rate, 1.0 / rate))),
         (Some(word), None) => {
             let Some(role) = flat.role_names().position(|name| name == word.text) else {
                 let message = format!("the clock `{}` is not a role", word.text);
@@ -42,7 +42,7 @@ fn find_clock(flat: &FlatGraph, opened: &OpenedBench) -> Result<Option<(Clock, f
 }
 
 fn short_gap(flat: &FlatGraph, period: f64) -> Option<Diagnostic> {
-    let gap = *flat.table.as_ref()?.max_gap_ms?;
+    let gap = flat.table.as_ref()?.max_gap_ms?;
     let span = flat.settings.as_ref()?.as_table()?.get("max_gap_ms")?.span.clone();
     // The period of a device is rounded to nanoseconds, so it may be slightly longer than the same number here.
     let is_short = gap * 1e-3 < period * (1.0 - 1e-6);

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use crate::node::{At, Mistake, NonNegative, Param, Positive, Reader, Word};
+use crate::node::{At, Mistake, Param, Reader, Word};
 use crate::source::{Code, Item, Key, Table, Value, suggestion};
 
 /// A mode: the parameters it sets and its exits.
@@ -84,33 +84,42 @@ impl Param for PortState {
     }
 }
 
-crate::params! { Exit:
+/// An exit of a mode: its condition and its target.
+#[derive(Debug, Clone, Param)]
+pub(crate) struct Exit {
     /// Mode to go to.
-    to: Option<Word>,
+    pub(crate) to: Option<Word>,
     /// Port to watch: `node.port` or `node.port.feature`. A flag must be true unless `is` is given.
-    when: Option<Word>,
+    pub(crate) when: Option<Word>,
     /// Required state of the port.
-    is: Option<PortState>,
-    /// Lower bound of the port [unit of the port].
-    above: Option<f64>,
-    /// Upper bound of the port [unit of the port].
-    below: Option<f64>,
-    /// Upper bound of the absolute value of the port [unit of the port].
-    within: Option<Positive>,
-    /// How far the port may cross back over a bound before the condition ends [unit of the port].
-    hysteresis: Option<NonNegative>,
-    /// How long the condition must hold, counted from new sample to new sample [ms].
-    for_ms: Option<NonNegative>,
-    /// Time in the mode; for `on_lost`, how long the signal must be lost. The default of `on_lost` is five periods of the graph [ms].
-    after_ms: Option<Positive>,
-    /// Distance that the sensor travels in the mode [mm].
-    after_travel_mm: Option<Positive>,
+    pub(crate) is: Option<PortState>,
+    /// Lower bound of the port.
+    #[param(unit = "_")]
+    pub(crate) above: Option<f64>,
+    /// Upper bound of the port.
+    #[param(unit = "_")]
+    pub(crate) below: Option<f64>,
+    /// Upper bound of the absolute value of the port.
+    #[param(unit = "_", above = 0.0)]
+    pub(crate) within: Option<f64>,
+    /// How far the port may cross back over a bound before the condition ends.
+    #[param(unit = "_", range = 0.0..)]
+    pub(crate) hysteresis: Option<f64>,
+    /// How long the condition must hold, counted from new sample to new sample.
+    #[param(unit = "ms", range = 0.0..)]
+    pub(crate) for_ms: Option<f64>,
+    /// Time in the mode; for `on_lost`, how long the signal must be lost. The default of `on_lost` is five periods of the graph.
+    #[param(unit = "ms", above = 0.0)]
+    pub(crate) after_ms: Option<f64>,
+    /// Distance that the sensor travels in the mode.
+    #[param(unit = "mm", above = 0.0)]
+    pub(crate) after_travel_mm: Option<f64>,
     /// Signal that `on_lost` watches; for `after_travel_mm`, the pose to measure if the graph has several.
-    of: Option<Word>,
+    pub(crate) of: Option<Word>,
     /// Operator word that triggers the exit.
-    on: Option<Word>,
+    pub(crate) on: Option<Word>,
     /// Priority among `go` exits that hold at once: the greatest wins.
-    priority: Option<u64>,
+    pub(crate) priority: Option<u64>,
 }
 
 /// Reads the modes of a graph file.

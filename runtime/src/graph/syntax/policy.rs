@@ -1,6 +1,6 @@
 //! The section `[policy]`: the reaction to each trouble, and the maximum age of samples.
 
-use crate::node::{Map, Param, Positive, Reader, Word, Written};
+use crate::node::{Map, Param, Reader, Word, Written};
 use crate::source::{Item, SourceMap, Table, Value};
 
 /// The reaction to a trouble.
@@ -81,13 +81,17 @@ impl Param for HaltingPolicy {
     }
 }
 
-crate::params! { WireTable:
+/// A wire with a maximum age.
+#[derive(Debug, Clone, Param)]
+pub(crate) struct WireTable {
     /// Port that the wire reads.
-    from: Word,
-    /// Maximum age of values on the wire [ms].
-    max_age_ms: Positive,
+    pub(crate) from: Word,
+    /// Maximum age of values on the wire.
+    #[param(unit = "ms", above = 0.0)]
+    pub(crate) max_age_ms: f64,
     /// Reaction to an older value, which is absent for the node in any case.
-    stale: Policy = Policy::Hold,
+    #[param(default = Policy::Hold)]
+    pub(crate) stale: Policy,
 }
 
 /// The maximum age of values on a wire, and the reaction to older ones.
@@ -100,7 +104,7 @@ pub(crate) struct AgeLimit {
 
 impl AgeLimit {
     pub(crate) fn of(table: &WireTable) -> Self {
-        Self { max_age: (*table.max_age_ms * 1e6) as i64, stale: table.stale }
+        Self { max_age: (table.max_age_ms * 1e6) as i64, stale: table.stale }
     }
 
     /// Returns the stricter combination of two limits.
@@ -110,30 +114,43 @@ impl AgeLimit {
     }
 }
 
-crate::params! { RolePolicy:
-    /// Maximum age of the newest sample of the role [ms].
-    max_age_ms: Option<Positive>,
+/// The policies of one role.
+#[derive(Debug, Clone, Param)]
+pub(crate) struct RolePolicy {
+    /// Maximum age of the newest sample of the role.
+    #[param(unit = "ms", above = 0.0)]
+    pub(crate) max_age_ms: Option<f64>,
     /// Reaction to an older sample.
-    stale: Option<Policy>,
+    pub(crate) stale: Option<Policy>,
 }
 
-crate::params! { PolicyTable:
+/// The section `[policy]`.
+#[derive(Debug, Clone, Param)]
+pub(crate) struct PolicyTable {
     /// The newest sample of a role is too old.
-    stale: Policy = Policy::Hold,
+    #[param(default = Policy::Hold)]
+    pub(crate) stale: Policy,
     /// The clock device is silent, and a timer stands in for it.
-    clock: Policy = Policy::Hold,
+    #[param(default = Policy::Hold)]
+    pub(crate) clock: Policy,
     /// A value is not a finite number.
-    not_finite: HaltingPolicy = HaltingPolicy(Policy::Fault),
+    #[param(default = HaltingPolicy(Policy::Fault))]
+    pub(crate) not_finite: HaltingPolicy,
     /// A tick began more than one period late. Applies to a real clock only.
-    deadline: Policy = Policy::Count,
+    #[param(default = Policy::Count)]
+    pub(crate) deadline: Policy,
     /// A node panicked.
-    panic: HaltingPolicy = HaltingPolicy(Policy::Fault),
+    #[param(default = HaltingPolicy(Policy::Fault))]
+    pub(crate) panic: HaltingPolicy,
     /// A device failed.
-    device: HaltingPolicy = HaltingPolicy(Policy::Fault),
-    /// Maximum age of the newest sample of a role. The default is five periods of its device [ms].
-    max_age_ms: Option<Positive>,
+    #[param(default = HaltingPolicy(Policy::Fault))]
+    pub(crate) device: HaltingPolicy,
+    /// Maximum age of the newest sample of a role. The default is five periods of its device.
+    #[param(unit = "ms", above = 0.0)]
+    pub(crate) max_age_ms: Option<f64>,
     /// Policies of individual roles.
-    roles: Map<RolePolicy> = Map(std::collections::BTreeMap::new()),
+    #[param(default = Map(std::collections::BTreeMap::new()))]
+    pub(crate) roles: Map<RolePolicy>,
 }
 
 impl Default for PolicyTable {
@@ -149,7 +166,7 @@ impl PolicyTable {
     pub(crate) fn age_limit(&self, role: &str, period: f64) -> AgeLimit {
         let own = self.roles.0.get(role);
         let max_age = own.and_then(|own| own.max_age_ms).or(self.max_age_ms);
-        let max_age = max_age.map_or_else(|| default_max_age_ns(period), |ms| (*ms * 1e-3 * 1e9) as i64);
+        let max_age = max_age.map_or_else(|| default_max_age_ns(period), |ms| (ms * 1e-3 * 1e9) as i64);
         AgeLimit { max_age, stale: own.and_then(|own| own.stale).unwrap_or(self.stale) }
     }
 }

@@ -5,26 +5,31 @@ use std::ops::Range;
 
 use super::modes::{self, ModeBlock};
 use super::policy::{AgeLimit, PolicyTable, WireTable};
-use crate::node::{At, FilePath, Mistake, NonNegative, Param, Positive, Rate, Reader, Word};
+use crate::node::{At, FilePath, Mistake, Param, Reader, Word};
 use crate::source::{Code, Diagnostic, Diagnostics, Item, Key, SourceMap, Table, Value, suggest_name};
 
-crate::params! { GraphTable:
+/// The section `[graph]`.
+#[derive(Debug, Clone, Param)]
+pub(crate) struct GraphTable {
     /// Role whose samples trigger the ticks.
-    clock: Option<Word>,
-    /// Tick rate of a graph without a clock role [Hz].
-    rate_hz: Option<Rate>,
+    pub(crate) clock: Option<Word>,
+    /// Tick rate of a graph without a clock role.
+    #[param(unit = "Hz", range = 0.001..=1e6)]
+    pub(crate) rate_hz: Option<f64>,
     /// Start mode.
-    start: Option<Word>,
+    pub(crate) start: Option<Word>,
     /// Default bench.
-    bench: Option<FilePath>,
-    /// Maximum time step between two samples; longer gaps count as this long. The default is five periods [ms].
-    max_gap_ms: Option<Positive>,
-    /// How long an input must be absent before the state of its node is reset [ms].
-    reset_after_ms: NonNegative = NonNegative(20.0),
+    pub(crate) bench: Option<FilePath>,
+    /// Maximum time step between two samples; filters and integrals start afresh after a longer gap. The default is five periods.
+    #[param(unit = "ms", above = 0.0)]
+    pub(crate) max_gap_ms: Option<f64>,
+    /// How long an input must be absent before the state of its node is reset.
+    #[param(unit = "ms", range = 0.0.., default = 20.0)]
+    pub(crate) reset_after_ms: f64,
     /// Ports that a run shows: images as pictures, numbers as curves over time.
-    show: Option<Vec<Word>>,
+    pub(crate) show: Option<Vec<Word>>,
     /// Ports of the x and the y of the contact, marked in the first image that is shown.
-    mark: Option<[Word; 2]>,
+    pub(crate) mark: Option<[Word; 2]>,
 }
 
 /// The block of a node or a device: its type, its wires and its parameters.
