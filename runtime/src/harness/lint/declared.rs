@@ -5,7 +5,6 @@ use crate::node::{ParamSpec, PortSpec};
 
 /// What is said of something in a catalogue.
 struct Entry<'c> {
-    sort: &'static str,
     name: String,
     summary: String,
     /// The reference; of a role only its ports are described.
@@ -17,7 +16,6 @@ struct Entry<'c> {
 impl Lint<'_> {
     fn entries(&self) -> Vec<Entry<'_>> {
         let nodes = self.catalogue.specs().map(|spec| Entry {
-            sort: "node",
             name: spec.name.to_string(),
             summary: spec.summary.to_string(),
             doc: Some(spec.doc.to_string()),
@@ -25,7 +23,6 @@ impl Lint<'_> {
             params: spec.params.clone(),
         });
         let devices = self.catalogue.devices().iter().map(|device| Entry {
-            sort: "device",
             name: device.name().into_owned(),
             summary: device.summary().into_owned(),
             doc: Some(device.doc().into_owned()),
@@ -33,7 +30,6 @@ impl Lint<'_> {
             params: device.params(),
         });
         let roles = self.catalogue.roles().iter().map(|role| Entry {
-            sort: "role",
             name: role.name.to_string(),
             summary: role.summary.to_string(),
             doc: None,
@@ -43,13 +39,10 @@ impl Lint<'_> {
         nodes.chain(devices).chain(roles).collect()
     }
 
-    /// Names are valid, and each is used once.
+    /// Names are valid, and each is used once. Two nodes, devices or roles of one name are no catalogue.
     pub(super) fn names(&self, found: &mut Vec<Violation>) {
-        let entries = self.entries();
-        for (i, entry) in entries.iter().enumerate() {
+        for entry in self.entries() {
             let mut notes = Notes { owner: entry.name.clone(), found };
-            let is_first = !entries[..i].iter().any(|other| (other.sort, &other.name) == (entry.sort, &entry.name));
-            notes.unless(is_first, None, format!("two {}s have this name", entry.sort));
             notes.unless(is_name(&entry.name), None, "a name is `snake_case`");
             for (sort, ports) in &entry.ports {
                 // A node may pass a port on under its name, so inputs and outputs are apart.
