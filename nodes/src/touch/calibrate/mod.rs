@@ -15,12 +15,12 @@ use tare::{Averages, Rules};
 
 /// Converts the reading of each tactel to a force, by a line or by the curves of a calibration file.
 ///
-/// Every tactel of a foam sensor has its own zero and its own compressive curve (paper section III, fig. 1). This node
+/// Every tactel of a foam sensor has its own zero and its own squashed curve (paper section III, fig. 1). This node
 /// inverts them: `force = curve(value - offset)`, tactel by tactel.
 ///
 /// Without a `file` the curve is a straight line, `(value - offset) * gain`, which has no upper end and continues below
 /// zero. A `file` that `tactflow calibrate` has made from a log with a reference force contains, for s = value - offset, a
-/// line, a rational curve, `gain s / (1 - squash s)`, or straight lines between knots. Rational curves and knots have no
+/// line, a squashed curve, `gain s / (1 - squash s)`, or straight lines between knots. Squashed curves and knots have no
 /// force below zero, and end at the largest force of the calibration. The file must be for this pad: its size and the unit
 /// of its readings are checked. A `dead` tactel is always 0. Tactels that have died since the calibration can be added to
 /// those of the file.

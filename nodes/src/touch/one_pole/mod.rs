@@ -16,9 +16,9 @@ use crate::motion::axis::{doubled, halved};
 /// stamps of the samples. So T means the same at 100 Hz and at 1 kHz, and for irregular samples. Set T as
 /// `time_constant_ms`, or as `cutoff_hz`, 1 / (2 pi T): 40 ms are 4 Hz.
 ///
-/// The filter is also called an exponential moving average. It lags a ramp by T, and leaves dt / (2 T) of the variance of
-/// white noise, as much as a `smooth` with a window of 2 T. Unlike `smooth` it needs no window, and old samples never lose
-/// all influence.
+/// The filter is also called a lowpass or an exponential moving average. It lags a ramp by T, and leaves dt / (2 T) of the
+/// variance of white noise, as much as a `smooth` with a window of 2 T. Unlike `smooth` it needs no window, and old samples
+/// never lose all influence.
 ///
 /// The first sample passes unchanged. The filter starts afresh after a gap longer than the graph's `max_gap_ms`, and when
 /// another device takes the sample: that sample also passes unchanged.
