@@ -1,3 +1,5 @@
+//! Errors of features: setpoint minus measured, component by component.
+
 use std::f64::consts::{FRAC_PI_2, PI};
 
 use proptest::prelude::*;
