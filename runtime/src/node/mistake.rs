@@ -4,7 +4,7 @@ use std::io;
 use std::ops::Range;
 use std::sync::Arc;
 
-use super::FilePath;
+use super::file_path::FilePath;
 use crate::source::Code;
 
 /// The place of a mistake, in the words of the graph file.

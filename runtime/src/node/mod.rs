@@ -35,7 +35,9 @@
 mod bounds;
 mod bus;
 mod bus_access;
+mod declare;
 mod erased;
+mod file_path;
 mod inputs;
 mod limits;
 mod mistake;
@@ -45,24 +47,25 @@ mod params;
 mod pattern;
 mod ports;
 mod reader;
+mod tick;
 mod time;
-
-use crate::signal::Stamp;
 
 pub use bounds::Bounds;
 pub use bus::{Bus, PortId, Wires};
 pub use bus_access::ScalarId;
 pub use erased::{AnyNode, Built, Configured, Given, NodeSpec, NodeType, of};
+pub use file_path::FilePath;
 pub use inputs::{In, InputSet, Many, View};
 pub use limits::{Components, Limits};
 pub use mistake::{At, Mistake, Mistakes};
 pub use outputs::{Out, OutputSet};
 pub use param_spec::{Declared, ParamSpec, Repeats, Written, written_table};
-pub use params::{FilePath, Map, Param, Spanned, Word};
+pub use params::{Map, Spanned, Word};
 pub(crate) use pattern::{UnitPattern, declares_a_unit, frame_args, may_fit, unit_pattern};
 pub use ports::{Letters, Need, PortSpec};
-pub use reader::{Reader, read_leaf};
+pub use reader::{Param, Reader, read_leaf};
 pub use tactflow_derive::{Describe, Inputs, Outputs, Param, State};
+pub use tick::Tick;
 pub use time::{Absence, Interval};
 
 /// The name and the documentation of a node or a device. `#[derive(Describe)]` takes them from the doc comment.
@@ -135,39 +138,4 @@ pub struct Setup<N: Node> {
     /// For the node to set: whether with these parameters it starts no motion by itself, though no sample is behind what
     /// it gives. What has samples behind it need not say so.
     pub is_still: bool,
-}
-
-/// What a step is told of the time: a node reads no clock.
-#[derive(Debug, Clone, Copy)]
-pub struct Tick {
-    /// Number of the tick, from 1.
-    pub index: u64,
-    /// Time of the tick in the graph's clock [ns].
-    pub now: i64,
-    /// Time since the last tick [s]; what every-tick nodes integrate with.
-    pub dt: f64,
-    /// Oldest stamp among the node's triggers; its outputs carry it.
-    pub stamp: Stamp,
-    /// Greatest time between two samples that counts as one step [s].
-    pub max_gap: f64,
-    /// How long something must be absent before its state is reset [ns].
-    pub reset_after: i64,
-    /// Whether the runtime holds all commands at zero: what remembers its own motion comes to rest too.
-    pub is_halted: bool,
-}
-
-impl Tick {
-    /// A first tick at time zero, for tests of a node.
-    #[must_use]
-    pub const fn first() -> Self {
-        Self {
-            index: 1,
-            now: 0,
-            dt: 0.0,
-            stamp: Stamp::TIMELESS,
-            max_gap: 0.1,
-            reset_after: 20_000_000,
-            is_halted: false,
-        }
-    }
 }

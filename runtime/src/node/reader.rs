@@ -1,12 +1,58 @@
-//! The reader of parameters: it collects the mistakes of a whole table, each with its place.
+//! What a parameter is, and the reader that collects the mistakes of a whole table, each with its place.
 
 use std::ops::Range;
 
 use serde::de::DeserializeOwned;
 
-use super::{At, Bounds, Declared, FilePath, Mistake, Mistakes, Param};
+use super::bounds::Bounds;
+use super::file_path::FilePath;
+use super::mistake::{At, Mistake, Mistakes};
+use super::param_spec::{Declared, ParamSpec, Repeats, Written};
 use crate::source::{Code, suggest_name, suggestion};
 use crate::source::{Item, Key, SourceMap, Table, Value};
+
+/// Something a graph file may set.
+#[diagnostic::on_unimplemented(
+    message = "`{Self}` is not a type of a parameter",
+    note = "a struct or an enum of yours becomes one with `#[derive(Param)]`"
+)]
+pub trait Param: Sized {
+    /// What it takes, for a person: `a number`.
+    const EXPECTS: &'static str;
+    /// How often the fields are there.
+    const REPEATS: Repeats = Repeats::Once;
+    /// Whether it is a number, or made of numbers, so that it takes a range.
+    const IS_NUMBER: bool = false;
+    /// The words it takes, each with its meaning, if it is one of a few.
+    const WORDS: &'static [(&'static str, &'static str)] = &[];
+
+    /// Reads it; a mistake goes to the reader.
+    fn read(value: &Value, reader: &mut Reader<'_>) -> Option<Self>;
+
+    /// What it takes in full, for the reference: `a list, each a number greater than 0`.
+    #[must_use]
+    fn takes(bounds: Option<&Bounds>) -> String {
+        bounds.map_or_else(|| Self::EXPECTS.into(), |bounds| bounds.describe(Self::EXPECTS))
+    }
+
+    /// The fields of a table.
+    #[must_use]
+    fn fields() -> Vec<ParamSpec> {
+        Vec::new()
+    }
+
+    /// What it is when it is not given and has no default; none if it must be given.
+    #[must_use]
+    fn when_missing() -> Option<Self> {
+        None
+    }
+
+    /// As a graph file would say it, for the reference; none if it says nothing, or cannot say it.
+    #[must_use]
+    fn written(&self) -> Option<Written> {
+        None
+    }
+}
 
 /// Collects the mistakes while parameters are read.
 pub struct Reader<'a> {

@@ -10,7 +10,7 @@ use tactflow_runtime::node::{
 use tactflow_runtime::signal::{Flag, Grid, Image, Mask, Region, Regions, RegionsShape, Run};
 use tactflow_runtime::source::Value;
 
-use super::check_same_array;
+use crate::touch::common::check_same_array;
 
 pub use centroids::{centroid_buffer, centroids, distance_squared, nearest};
 pub use runs::{number, paint, trace};

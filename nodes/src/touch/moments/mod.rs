@@ -8,7 +8,7 @@ mod sums;
 use tactflow_runtime::node::{Describe, In, Inputs, Mistakes, Node, Out, Outputs, Param, Setup, Tick};
 use tactflow_runtime::signal::{Image, ImageShape, Mask, Scalar};
 
-use super::check_same_array;
+use crate::touch::common::check_same_array;
 
 pub use sums::{Ellipse, Sums, Weighing, Weight, add_up, ellipse};
 

@@ -1,0 +1,126 @@
+//! From the declaration of a parameter and its type to its description.
+
+use super::bounds::Bounds;
+use super::param_spec::{Declared, ParamSpec, Written};
+use super::reader::{Param, Reader};
+use crate::source::{SourceMap, Value};
+
+impl ParamSpec {
+    /// The description of a field of type `T`.
+    #[must_use]
+    pub fn of<T: Param>(declared: &Declared, default: Option<fn() -> T>) -> Self {
+        let Declared { name, doc, unit, bounds, is_live } = *declared;
+        let written = default.and_then(|value| value().written());
+        Self {
+            name,
+            doc: doc.into(),
+            unit: unit
+                .map(|unit| if unit.starts_with('$') { unit.into() } else { unit.replace('2', "²").replace('3', "³") }),
+            bounds,
+            words: T::WORDS,
+            takes: T::takes(bounds.as_ref()),
+            default: written.as_ref().map(Written::to_string),
+            is_optional: default.is_some() || T::when_missing().is_some(),
+            repeats: T::REPEATS,
+            fields: T::fields(),
+            is_live,
+            fault: written.and_then(|written| fault::<T>(&written, bounds)),
+        }
+    }
+}
+
+/// Returns the message of the reader if it refuses the default.
+fn fault<T: Param>(written: &Written, bounds: Option<Bounds>) -> Option<String> {
+    let mut sources = SourceMap::default();
+    sources.add("default", "", "");
+    let mut reader = Reader::new(&sources);
+    reader.bounds = bounds;
+    T::read(&Value::from_toml(written, &(0..0)), &mut reader);
+    reader.mistakes.into_iter().next().map(|mistake| mistake.message)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::node::{Map, Param, Repeats, Spanned};
+    use crate::signal::Unit;
+
+    /// A choice between words.
+    #[derive(Debug, Clone, Param)]
+    enum Choice {
+        /// The last one.
+        LastSeen,
+    }
+
+    /// A table.
+    #[derive(Debug, Clone, Param)]
+    struct Inner {
+        /// A place.
+        #[param(unit = "m", default = [0.0; 3])]
+        xyz: [f64; 3],
+        /// A name.
+        of: Option<Spanned<String>>,
+    }
+
+    /// Parameters of every sort.
+    #[derive(Debug, Clone, Param)]
+    struct Params {
+        /// Must be given.
+        #[param(unit = "N")]
+        force: f64,
+        /// A time.
+        #[param(unit = "ms", range = 0.0.., default = 20.0)]
+        time_ms: f64,
+        /// A name.
+        #[param(default = "base")]
+        base: String,
+        /// A unit.
+        #[param(default = Unit::NEWTON.per_tactel())]
+        unit: Unit,
+        /// A word.
+        #[param(default = Choice::LastSeen)]
+        choose: Choice,
+        /// A table.
+        #[param(default = Inner { xyz: [0.0, 0.0, 1e-3], of: None })]
+        mount: Inner,
+        /// A list of tables.
+        #[param(default = vec![])]
+        press: Vec<Inner>,
+        /// A table for each name.
+        gains: Map<Inner>,
+        /// May be left out.
+        #[param(unit = "rad/s")]
+        speed: Option<f64>,
+    }
+
+    #[test]
+    fn a_default_reads_as_in_a_graph_file() {
+        let specs = Params::fields();
+        let defaults: Vec<_> =
+            specs.iter().map(|spec| (spec.name, spec.default.as_deref(), spec.is_optional)).collect();
+        let expected = [
+            ("force", None, false),
+            ("time_ms", Some("20.0"), true),
+            ("base", Some("\"base\""), true),
+            ("unit", Some("\"N/tactel\""), true),
+            ("choose", Some("\"last_seen\""), true),
+            ("mount", Some("{ xyz = [0.0, 0.0, 0.001] }"), true),
+            ("press", Some("[]"), true),
+            ("gains", None, false),
+            ("speed", None, true),
+        ];
+        assert_eq!(defaults, expected);
+        let repeats = |name| specs.iter().find(|spec| spec.name == name).map(|spec| spec.repeats);
+        assert_eq!(repeats("mount"), Some(Repeats::Once));
+        assert_eq!(repeats("press"), Some(Repeats::PerEntry));
+        assert_eq!(repeats("gains"), Some(Repeats::PerName));
+    }
+
+    #[test]
+    fn the_unit_stands_in_the_declaration() {
+        let specs = Params::fields();
+        let units: Vec<_> = specs.iter().map(|spec| spec.unit.as_deref()).collect();
+        assert_eq!(units[..3], [Some("N"), Some("ms"), None]);
+        assert_eq!(units[8], Some("rad/s"));
+    }
+}
