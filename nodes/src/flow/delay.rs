@@ -34,6 +34,7 @@ use tactflow_runtime::signal::{Scalar, ScalarShape, Settable, Signal, Twist, Twi
 /// in.value = "sum.twist"
 /// ```
 #[derive(Describe)]
+#[expect(clippy::duplicated_attributes, reason = "each attribute describes a node of its own")]
 #[describe(name = "delay", of = "Delay<Scalar>", every_tick)]
 #[describe(name = "twist_delay", of = "Delay<Twist>", every_tick)]
 pub struct Delay<T> {

@@ -41,7 +41,6 @@ fn fault<T: Param>(written: &Written, bounds: Option<Bounds>) -> Option<String> 
 
 #[cfg(test)]
 mod tests {
-    use super::*;
     use crate::node::{Map, Param, Repeats, Spanned};
     use crate::signal::Unit;
 

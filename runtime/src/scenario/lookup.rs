@@ -155,8 +155,8 @@ impl Lookup<'_> {
             period: column.unit.is_axial().then(|| std::f64::consts::PI / unit),
             column: column.name,
             unit,
-            settles: table.settles_to.zip(table.within.map(|within| within)),
-            after: table.after_s.map(|after| after),
+            settles: table.settles_to.zip(table.within),
+            after: table.after_s,
             steady: table.steady_s.map_or(DEFAULT_STEADY_S, |steady| steady),
             figures: figures.iter().map(|(figure, _)| *figure).collect(),
         };

@@ -87,7 +87,7 @@ impl Crate {
 
     fn resolve(&self, path: &[String], depth: usize) -> Option<PathBuf> {
         assert!(depth < 32, "re-exports go round: {path:?}");
-        let known = (0..=path.len()).rev().find(|end| self.modules.contains_key(&path[..*end].to_vec()))?;
+        let known = (0..=path.len()).rev().find(|end| self.modules.contains_key(&path[..*end]))?;
         let (module, rest) = path.split_at(known);
         let module = module.to_vec();
         let own = &self.modules[&module];

@@ -145,7 +145,7 @@ fn facts(params: &Params) -> Vec<(Cow<'static, str>, toml::Value)> {
 
 impl MockPad {
     fn new(image: Output<Image>, shape: ImageShape, period: i64, params: Params) -> Self {
-        let end = params.for_s.map_or(i64::MAX, |end| nanos(end));
+        let end = params.for_s.map_or(i64::MAX, nanos);
         let frames = end / period + i64::from(end % period != 0);
         let mut pad = Self {
             image,

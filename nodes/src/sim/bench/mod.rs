@@ -283,7 +283,7 @@ impl SimBench {
         let tactels = shape.tactels();
         let readout = Readout::new(tactels, params.electronics, params.seed);
         let world = World::new(arm, objects, contact, imprint, shape, params.step_s);
-        let end = params.for_s.map_or(i64::MAX, |end| nanos(end));
+        let end = params.for_s.map_or(i64::MAX, nanos);
         let (latency, threshold) = (nanos(params.latency_s), params.threshold);
         let frames = (latency / period) as usize + 2;
         let (taken, spare) = (VecDeque::with_capacity(frames), vec![vec![0.0; tactels]; frames]);

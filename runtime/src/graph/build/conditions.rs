@@ -37,7 +37,7 @@ pub(crate) fn resolve_exits(
         diagnostics.extend(misplaced_key(*kind, span, exit));
         match condition {
             Ok(Some((condition, text))) => {
-                let lasts = exit.for_ms.map_or(0, |ms| nanos(ms));
+                let lasts = exit.for_ms.map_or(0, nanos);
                 let priority = exit.priority.unwrap_or(0);
                 if let Ok(to) = to {
                     planned.push(PlannedExit { kind: *kind, to, condition, lasts, priority, text, span: span.clone() });
@@ -167,7 +167,7 @@ fn lost_condition(
         ));
     };
     let Some((watched, name)) = resolve_watched(of, context)? else { return Ok(None) };
-    let after = exit.after_ms.map_or(context.lost_after, |ms| nanos(ms));
+    let after = exit.after_ms.map_or(context.lost_after, nanos);
     let text = format!("`{name}` is lost");
     Ok(Some((Condition::Lost(watched, after), text)))
 }
