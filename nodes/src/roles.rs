@@ -47,14 +47,14 @@ const CONTACT: &str = "Where the task finds the contact in the base: the robot a
 const EQUILIBRIUM: &str = "Posture that the commands have moved to: where a compliant arm would be if nothing held it; \
     of a stiff arm its position [rad].";
 
-/// What a simulation knows of the contact and no sensor tells: for scenarios and the recorder. A device that fills it
+/// Facts of the contact that a simulation knows and no sensor measures: for scenarios and the recorder. A device that fills it
 /// gives all of it, and says of what does not apply that it is absent.
 #[must_use]
 pub fn ground_truth() -> RoleType {
     let scalar = |name, doc, unit: &'static [&'static str]| port(name, doc, Kind::Scalar, unit);
     RoleType {
         name: "ground_truth".into(),
-        summary: "what a simulation knows of the contact and no sensor tells".into(),
+        summary: "facts of the contact that a simulation knows and no sensor measures".into(),
         outputs: vec![
             scalar("force", "Normal force on the pad [N].", &["N"]),
             scalar("tangential", "Tangential force on the pad [N].", &["N"]),

@@ -29,7 +29,7 @@ pub(crate) fn check_start(joints: &[Joint], start: &[f64]) -> Result<(), Mistake
 /// What `arm_state` wants to know.
 ///
 /// # Errors
-/// When the path of the model cannot be told.
+/// If the path of the model is not UTF-8 or cannot be made absolute.
 pub(crate) fn facts(
     urdf: &FilePath,
     tip: &str,
@@ -45,7 +45,7 @@ pub(crate) fn facts(
 /// A file as a fact, for a graph that may stand in another folder: its absolute path; `param` is where it is named.
 ///
 /// # Errors
-/// When the path cannot be told.
+/// If the path is not UTF-8 or cannot be made absolute.
 pub(crate) fn fact_of(param: &str, file: &FilePath) -> Result<String, Mistakes> {
     let path = match file.builtin {
         Some(_) => file.path.clone(),

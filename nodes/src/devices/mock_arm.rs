@@ -1,4 +1,4 @@
-//! `mock_arm`: an arm that does exactly as it is told.
+//! `mock_arm`: an arm that follows its commands exactly.
 //!
 //! It integrates the commanded velocity exactly, q_eq += v dt: that is the equilibrium, where a compliant arm would be if
 //! nothing held it. The position is the same, but it stops at the ends of the joints, and it stays while somebody holds
@@ -75,7 +75,7 @@ struct Ports {
 
 impl tactflow_runtime::node::Describe for MockArm {
     const NAME: &'static str = "mock_arm";
-    const SUMMARY: &'static str = "an arm without dynamics that does exactly as it is told";
+    const SUMMARY: &'static str = "an arm without dynamics that follows its commands exactly";
     const DOC: &'static str = "It integrates the commanded joint velocity exactly: that is its `equilibrium`. Its \
         `position` is the same, but it stops at the ends of the joints, and while somebody holds it, as each `hold` \
         says. The equilibrium runs ahead then, and when the arm is let go it springs to it: a `joint_limit` keeps that \

@@ -89,7 +89,7 @@ pub trait Stepped: Send {
     fn exchange(&mut self, now: i64, commands: &Commands, samples: &mut Samples) -> Result<(), DeviceError>;
 
     /// The run is over, for that reason, and every command has been zero in the last exchange. A device that failed is
-    /// not told: it was dropped when it did.
+    /// not called: the engine dropped it when it failed.
     fn finish(&mut self, reason: &str) {
         let _ = reason;
     }

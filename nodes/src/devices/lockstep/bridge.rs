@@ -158,7 +158,7 @@ impl Bridge {
         /// How long a ramp may take in all.
         const LONGEST: Duration = Duration::from_secs(5);
         let end = Instant::now() + LONGEST;
-        // A frame that cannot be read is one all the same, and its simulator waits for the answer.
+        // A frame that cannot be read still counts, and its simulator waits for the answer.
         let mut seq = self.open.unwrap_or_else(|| self.newest.map_or(0, |(seq, _)| seq + 1));
         loop {
             let is_still = self.slow_down(Instant::now() >= end);

@@ -57,7 +57,7 @@ scale and threshold. So the simulator has to be there when a graph is checked, t
 built in, and `urdf` names a file for any other.\n\n\
 In lockstep it waits for each command, and a run is as fast as both are. Otherwise it runs by its own clock: then the \
 newest frame counts, and those before it are counted as gaps. Frames carry the simulator's time.\n\n\
-At the end of a run the commands go to zero first, frame by frame, and then the simulator is told. It may end the run \
+At the end of a run the commands go to zero first, frame by frame, and then the simulator receives the reason. It may end the run \
 itself. What it says wrongly, a value that is not finite, silence and a closed connection are faults that name the \
 message and the field; where it still listens, the arm is brought to rest before it is left.\n\n\
 It states the facts `urdf`, `tip` and `mount` of the arm and `dead`, `threshold`, `pressure` and `calibration` of the \

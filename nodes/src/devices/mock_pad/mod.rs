@@ -84,7 +84,7 @@ impl tactflow_runtime::node::Describe for MockPad {
     const SUMMARY: &'static str =
         "a simulated pad that is pressed by points and bars, and misbehaves, as its bench says";
     const DOC: &'static str = "Each `press` is a smooth bump of force, (1 - d²/r²)² at distance d from a point or from a \
-        bar, that comes, moves and goes as it is told. Its tactels sum to its `force` while it is on the pad, and it \
+        bar, that appears, moves and disappears on a schedule. Its tactels sum to its `force` while it is on the pad, and it \
         slides off smoothly. There is no foam, no noise and no hysteresis: the pad is for trying out a graph and for \
         tests whose result is known, not for tuning gains.\n\n\
         A `glitch` makes it misbehave for a while: `repeat` shows an old frame again, `freeze` shows it as if it were \

@@ -197,7 +197,7 @@ fn for_each_word(cells: &[f32], mask: &mut Mask, mut pack: impl FnMut(usize, &[f
     }
 }
 
-/// Bit j tells whether tactel j of at most 64 is above the threshold.
+/// Returns a word whose bit j is set if tactel j of at most 64 is above the threshold.
 fn pack(tactels: &[f32], threshold: f32) -> u64 {
     let (blocks, rest) = tactels.as_chunks::<BLOCK>();
     let mut word = 0;
