@@ -335,7 +335,7 @@ fn a_part_that_comes_along_shows_what_goes_in_and_out() {
 
 #[test]
 fn the_words_of_other_books_find_the_filters() {
-    for (word, node) in [("average", "smooth"), ("lowpass", "one_pole")] {
+    for (word, node) in [("mean", "moving_average"), ("smooth", "moving_average"), ("one-pole", "low_pass")] {
         let said = say(&["list", word]);
         assert!(said.out.contains(&format!("\n  {node} ")), "{word}: {}{}", said.out, said.err);
     }

@@ -76,7 +76,7 @@ fn is_built_line_by_line(page: &str, path: &str) {
 #[test]
 fn the_walkthrough_shows_the_node_as_it_is() {
     let page = page("writing-a-node.md");
-    is_built_line_by_line(&page, "tests/src/nodes/low_pass.rs");
+    is_built_line_by_line(&page, "tests/src/nodes/first_order_lag.rs");
     let [line] = &blocks(&page, "rust catalogue")[..] else { panic!("one line") };
     assert!(file("tests/src/nodes/mod.rs").contains(line.as_str()), "{line}");
     assert_eq!(blocks(&page, "rust main"), [file("tests/src/main.rs")]);

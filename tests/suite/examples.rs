@@ -48,7 +48,7 @@ fn what_is_delayed_has_the_unit_that_was_declared() {
     let said = report.render(false);
     assert!(
         said.contains(
-            "`smooth.value` is in `N/tactel`, but `delay.value` takes `kPa`, the unit of the output `delay.value`"
+            "`moving_average.value` is in `N/tactel`, but `delay.value` takes `kPa`, the unit of the output `delay.value`"
         ),
         "{said}"
     );

@@ -176,8 +176,7 @@ fn what_is_no_single_assignment_is_no_set() {
 #[test]
 fn a_mistake_in_a_part_that_is_used_twice_is_told_once() {
     let folder = tempfile::tempdir().unwrap();
-    let part =
-        "[inputs]\nvalue = \"a sum\"\n[nodes.smooth]\ntype = \"smooth\"\nin.value = \"inputs.value\"\nwindw = 3\n";
+    let part = "[inputs]\nvalue = \"a sum\"\n[nodes.moving_average]\ntype = \"moving_average\"\nin.value = \"inputs.value\"\nwindw = 3\n";
     fs::write(folder.path().join("part.toml"), part).unwrap();
     let parts = ["one", "two"].map(|name| format!("[parts.{name}]\nfile = \"part.toml\"\nin.value = \"pad.image\"\n"));
     let graph = folder.path().join("graph.toml");

@@ -376,12 +376,12 @@ clock = 'a'
 max_gap_ms = 100000
 [roles]
 a = 'length'
-[nodes.smooth]
-type = 'smooth'
+[nodes.moving_average]
+type = 'moving_average'
 in.value = 'a.value'
 window = 4
 [nodes.recent]
-type = 'smooth'
+type = 'moving_average'
 in.value = 'a.value'
 window_ms = 50
 [nodes.median]
@@ -389,7 +389,7 @@ type = 'median'
 in.value = 'a.value'
 window = 5
 [nodes.pole]
-type = 'one_pole'
+type = 'low_pass'
 in.value = 'a.value'
 time_constant_ms = 30
 [nodes.error]
@@ -402,11 +402,11 @@ in.error = 'error.error'
 gains.x = { kp = 1.0, ki = 2.0, kd = 0.1 }
 [nodes.count]
 type = 'count'
-in.value = 'smooth.value'
+in.value = 'moving_average.value'
 ";
 
 fn remembered(rig: &GraphRig) -> Vec<u64> {
-    let scalars = ["smooth.value", "recent.value", "median.value", "pole.value", "count.steps", "count.time"];
+    let scalars = ["moving_average.value", "recent.value", "median.value", "pole.value", "count.steps", "count.time"];
     let mut values: Vec<f64> = scalars.iter().map(|port| *rig.get::<f64>(port).unwrap()).collect();
     values.extend(rig.get::<Features>("pid.control").unwrap().components()[0].get());
     values.into_iter().map(f64::to_bits).collect()

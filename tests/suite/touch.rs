@@ -17,8 +17,8 @@ const NODES: [&str; 12] = [
     "eccentricity",
     "contact_area",
     "hough",
-    "smooth",
-    "one_pole",
+    "moving_average",
+    "low_pass",
     "median",
 ];
 
@@ -72,7 +72,7 @@ in.image = "calibrate.image"
 in.region = "nearest.region"
 weight = "area"
 [nodes.axis]
-type = "smooth"
+type = "moving_average"
 in.value = "shape.orientation"
 window = 4
 [nodes.middle]
@@ -80,7 +80,7 @@ type = "median"
 in.value = "hough.orientation"
 window = 4
 [nodes.cut]
-type = "one_pole"
+type = "low_pass"
 in.value = "hough.offset"
 cutoff_hz = 8
 "#;
@@ -102,7 +102,7 @@ fn the_examples_load_together_and_no_touch_node_allocates_in_a_tick() {
     let request = Request { text: Some(graph()), ..Request::file("examples.toml") };
     let plan = compile(&catalogue(), &request).unwrap_or_else(|report| panic!("{}", report.render(false)));
     let mut engine = Engine::new(plan);
-    let outputs = ["median.value", "one_pole.value", "smooth.value", "axis.value", "middle.value", "cut.value"]
+    let outputs = ["median.value", "low_pass.value", "moving_average.value", "axis.value", "middle.value", "cut.value"]
         .into_iter()
         .chain(["contact_area.area", "contact_area.interpolated", "eccentricity.eccentricity", "principal_axes.minor"]);
     let mut seen: Vec<(&str, u32)> = outputs.map(|name| (name, 0)).collect();

@@ -125,7 +125,7 @@ fn what_is_usual_is_shown_of_a_graph_that_does_not_say() {
 
 #[test]
 fn what_only_the_page_shows_is_not_lost() {
-    let extra = ["--set=nodes.extra.type=smooth", "--set=nodes.extra.in.value=touch.x", "--deny-warnings"];
+    let extra = ["--set=nodes.extra.type=moving_average", "--set=nodes.extra.in.value=touch.x", "--deny-warnings"];
     let check = |more: &[&str]| say(&[&["check", HYBRID], &extra[..], more].concat());
     let lost = check(&[]);
     assert!(lost.code == 2 && lost.err.contains("no output of `extra` is used"), "{}", lost.err);

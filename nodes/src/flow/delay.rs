@@ -23,7 +23,7 @@ use tactflow_runtime::signal::{Scalar, ScalarShape, Settable, Signal, Twist, Twi
 /// ```toml
 /// [nodes.delay]
 /// type = "delay"
-/// in.value = "smooth.value"
+/// in.value = "moving_average.value"
 /// unit = "N/tactel"
 /// initial = 0.0                       # [N/tactel]
 /// ```

@@ -16,7 +16,7 @@ use tactflow_runtime::signal::{Flag, Scalar, Signal, Twist};
 ///
 /// While the gate is open, the output counts as new only when the input is new, however often the flag is. When the gate
 /// opens on a held value, that value passes at once and keeps its stamp: an integral does not take it twice, but a
-/// `smooth` or a `median` behind a gate that shuts and opens on one sample does. For a gate that does not flicker wire
+/// `moving_average` or a `median` behind a gate that shuts and opens on one sample does. For a gate that does not flicker wire
 /// `contact_debounce.present`.
 ///
 /// Generated motion does not end with the contact by itself; a `twist_gate` on `label.present` ends it. `twist_source`

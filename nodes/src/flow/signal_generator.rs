@@ -25,7 +25,7 @@ use tactflow_runtime::source::Code;
 ///
 /// The output is a known scalar, so the response to it identifies the system behind it: `step` shows rise times and
 /// delays, `ramp` creep and thresholds, `sine` gain and phase at one frequency, and `chirp` those of a whole band. Wire it
-/// to a component of `twist_of` to move one axis, or to `feature_error` to move the reference of a controller.
+/// to a component of `compose_twist` to move one axis, or to `feature_error` to move the reference of a controller.
 ///
 /// With t the time since `start`, T = `duration` and A = `amplitude`: a step is A, a ramp is A t / T and then A, a sine is
 /// A sin(2 pi f t), a chirp is A sin(2 pi (f t + (f_end - f) t^2 / (2 T))). `offset` is added to all of them, and is the

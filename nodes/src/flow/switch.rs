@@ -22,7 +22,7 @@ use tactflow_runtime::signal::{Flag, Scalar, Signal, Twist};
 /// ```toml
 /// [nodes.switch]                      # the mean while there is a contact, the newest sample otherwise
 /// type = "switch"
-/// in.on = "smooth.value"
+/// in.on = "moving_average.value"
 /// in.off = "moments.pressure"
 /// in.select = "label.present"
 /// ```
@@ -31,7 +31,7 @@ use tactflow_runtime::signal::{Flag, Scalar, Signal, Twist};
 /// [nodes.twist_switch]                # servo on a contact, search without one
 /// type = "twist_switch"
 /// in.on = "projector.twist"
-/// in.off = "twist_of.twist"
+/// in.off = "compose_twist.twist"
 /// in.select = "label.present"
 /// ```
 #[derive(Describe)]

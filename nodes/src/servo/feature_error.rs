@@ -25,7 +25,7 @@ use crate::motion::axis::wrap_axial;
 /// type = "feature_error"
 /// in.x = "moments.x"
 /// in.y = "moments.y"
-/// in.pressure = "smooth.value"
+/// in.pressure = "moving_average.value"
 /// setpoint = { x = 0.0, y = 0.0, pressure = 0.1 }   # [m, m, N per tactel]
 /// ```
 #[derive(Describe)]

@@ -1,6 +1,7 @@
 //! From features to a twist of the sensor (paper section IV).
 
 pub mod adjoint;
+pub mod compose_twist;
 pub mod edge_guard;
 pub mod feature_error;
 pub mod integral;
@@ -10,5 +11,4 @@ pub mod projector;
 pub mod ridge_guide;
 pub mod scan_guide;
 pub mod twist_adder;
-pub mod twist_of;
 pub mod twist_source;

@@ -1,10 +1,10 @@
 //! From a tactile image to features (paper section III).
 //!
 //! A pad's image passes [`tactile_source`] (the sensor's frame) → [`calibrate`] → [`binarize`] → [`label`] (finds the
-//! contact) → [`moments`] (its position, force and orientation) → [`smooth`].
+//! contact) → [`moments`] (its position, force and orientation) → [`moving_average`].
 //!
 //! Besides them, [`select_region`] selects one of several regions; [`hough`], [`eccentricity`], [`principal_axes`] and
-//! [`contact_area`] measure the shape of a region; [`one_pole`] and [`median`] are other filters.
+//! [`contact_area`] measure the shape of a region; [`low_pass`] and [`median`] are other filters.
 
 pub mod binarize;
 pub mod calibrate;
@@ -13,10 +13,10 @@ pub mod contact_area;
 pub mod eccentricity;
 pub mod hough;
 pub mod label;
+pub mod low_pass;
 pub mod median;
 pub mod moments;
-pub mod one_pole;
+pub mod moving_average;
 pub mod principal_axes;
 pub mod select_region;
-pub mod smooth;
 pub mod tactile_source;

@@ -10,7 +10,7 @@ use crate::graph::bench::fill_facts;
 use crate::graph::net::{CommandWire, Net, Wire, WireOrigin};
 use crate::graph::plan::{PlannedNode, PlannedPort, PortRef};
 use crate::graph::syntax::{Block, GraphTable, ModeBlock, PolicyTable};
-use crate::node::{FilePath, Param, ParamSpec, Repeats, Word};
+use crate::node::{FilePath, Param, ParamSpec, Repeats, Spanned};
 use crate::source::{Diagnostics, Item, Key, Location, SourceMap, Table, Value, parse_table};
 
 /// The span of a default inside a list of tables, which was not written anywhere.
@@ -201,7 +201,7 @@ impl OutlineBuilder<'_> {
         let bind = self.net.flat.bench.iter().flat_map(|bench| &bench.bind);
         let device = |role: &str| bind.clone().find(|(key, _)| key.name == role).map(|(_, word)| word.clone());
         let roles = self.net.flat.roles.iter();
-        let role = |(key, kind): &(Key, Word)| {
+        let role = |(key, kind): &(Key, Spanned<String>)| {
             let device = self.word(&device(&key.name)?);
             Some(OutlinedRole { name: key.name.clone(), kind: self.word(kind), device })
         };
@@ -227,15 +227,15 @@ impl OutlineBuilder<'_> {
         }
     }
 
-    fn word(&self, word: &Word) -> OutlinedWord {
-        OutlinedWord { text: word.text.clone(), place: self.sources.location(&word.span) }
+    fn word(&self, word: &Spanned<String>) -> OutlinedWord {
+        OutlinedWord { text: word.value.clone(), place: self.sources.location(&word.span) }
     }
 
     fn device(&self, name: &str) -> Option<OutlinedBlock> {
         let bench = self.net.flat.bench.as_ref()?;
         let block = bench.devices.iter().find(|device| device.key.name == name)?;
         let kind = block.kind.as_ref()?;
-        let known = self.net.catalogue.find_device(&kind.text)?;
+        let known = self.net.catalogue.find_device(&kind.value)?;
         self.block(block, &known.params())
     }
 

@@ -60,7 +60,7 @@ pub use limits::{Components, Limits};
 pub use mistake::{At, Mistake, Mistakes};
 pub use outputs::{Out, OutputSet};
 pub use param_spec::{Declared, ParamSpec, Repeats, Written, written_table};
-pub use params::{Map, Spanned, Word};
+pub use params::{Map, Spanned};
 pub(crate) use pattern::{UnitPattern, declares_a_unit, frame_args, may_fit, unit_pattern};
 pub use ports::{Letters, Need, PortSpec};
 pub use reader::{Param, Reader, read_leaf};

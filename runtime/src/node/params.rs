@@ -102,27 +102,6 @@ impl<T: Param> Param for Spanned<T> {
     }
 }
 
-/// A name and where it stands.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Word {
-    /// The name.
-    pub text: String,
-    /// Where it stands.
-    pub span: Range<usize>,
-}
-
-impl Param for Word {
-    const EXPECTS: &'static str = "a string";
-
-    fn read(value: &Value, reader: &mut Reader<'_>) -> Option<Self> {
-        Some(Self { text: read_leaf(value, reader, Self::EXPECTS)?, span: value.span.clone() })
-    }
-
-    fn written(&self) -> Option<Written> {
-        self.text.written()
-    }
-}
-
 /// No parameters.
 impl Param for () {
     const EXPECTS: &'static str = "a table";

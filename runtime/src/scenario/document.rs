@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use crate::node::{At, FilePath, Map, Mistake, Param, Reader, Word};
+use crate::node::{At, FilePath, Map, Mistake, Param, Reader, Spanned};
 use crate::source::{Code, Diagnostic};
 use crate::source::{Item, Key, SourceMap, Table, Value};
 
@@ -19,25 +19,25 @@ pub(crate) struct ScenarioTable {
     #[param(unit = "s", above = 0.0)]
     pub(crate) for_s: f64,
     /// Flag that defines time 0 of all figures: when it is first set. By default, time 0 is the start of the run.
-    pub(crate) from: Option<Word>,
+    pub(crate) from: Option<Spanned<String>>,
     /// Flag that must be set from time 0 to the end.
-    pub(crate) never_lost: Option<Word>,
+    pub(crate) never_lost: Option<Spanned<String>>,
     /// Mode that must be reached and never left again.
-    pub(crate) stays_in: Option<Word>,
+    pub(crate) stays_in: Option<Spanned<String>>,
     /// Mode in which the run must end, or `done` if it must end with a `done` condition.
-    pub(crate) ends_in: Option<Word>,
+    pub(crate) ends_in: Option<Spanned<String>>,
     /// Values to print beside the figures: facts of devices as `role.fact`, and parameters as `devices.NAME.key`.
     #[param(default = vec![])]
-    pub(crate) facts: Vec<Word>,
+    pub(crate) facts: Vec<Spanned<String>>,
 }
 
 /// One check of a scenario.
 #[derive(Debug, Clone, Param)]
 pub(crate) struct CheckTable {
     /// Port or component to check, by its name in a recording or in the task's wires.
-    pub(crate) of: Word,
+    pub(crate) of: Spanned<String>,
     /// Port or component to subtract from it, for example the true value from the measured one.
-    pub(crate) minus: Option<Word>,
+    pub(crate) minus: Option<Spanned<String>>,
     /// Value that it must settle to.
     #[param(unit = "$unit")]
     pub(crate) settles_to: Option<f64>,

@@ -8,7 +8,7 @@ use super::judge::{Bound, Figure, Row};
 use super::model::{Check, Scenario, row};
 use crate::catalogue::Catalogue;
 use crate::graph::{Compiled, Request};
-use crate::node::Word;
+use crate::node::Spanned;
 use crate::record::{Column, Columns};
 use crate::signal::Kind;
 use crate::source::{Code, Diagnostic, Report, suggest_name};
@@ -35,7 +35,7 @@ pub(super) fn look_up(
         }
     }
     let scenario = document.scenario.as_ref().map(|table| {
-        let from = table.from.as_ref().and_then(|word| Some((word.text.clone(), lookup.flag(word)?)));
+        let from = table.from.as_ref().and_then(|word| Some((word.value.clone(), lookup.flag(word)?)));
         let never_lost = table.never_lost.as_ref().and_then(|word| lookup.flag(word));
         lookup.modes(table);
         lookup.real_time(table);
@@ -49,8 +49,8 @@ pub(super) fn look_up(
             seed_keys: lookup.seeds(table, catalogue),
             from,
             never_lost,
-            stays_in: table.stays_in.as_ref().map(|word| word.text.clone()),
-            ends_in: table.ends_in.as_ref().map(|word| word.text.clone()),
+            stays_in: table.stays_in.as_ref().map(|word| word.value.clone()),
+            ends_in: table.ends_in.as_ref().map(|word| word.value.clone()),
             checks,
             rows,
         }
@@ -67,7 +67,7 @@ fn rows_of(table: &ScenarioTable) -> impl Iterator<Item = Row> {
         (&table.ends_in, "ends_in", Figure::Ends, Bound::AtLeast(1.0)),
     ];
     let given = rows.into_iter().filter_map(|(word, key, figure, bound)| Some((word.as_ref()?, key, figure, bound)));
-    given.map(|(word, key, figure, bound)| row(key, &word.text, figure, "1", bound, None))
+    given.map(|(word, key, figure, bound)| row(key, &word.value, figure, "1", bound, None))
 }
 
 struct Lookup<'a> {
@@ -77,8 +77,8 @@ struct Lookup<'a> {
 
 impl Lookup<'_> {
     /// Finds a column by its name in a recording or in the wires of the task. Returns it with the kind of its port.
-    fn column(&mut self, word: &Word) -> Option<(Column, Kind)> {
-        let (port, rest) = self.plan.port_prefix(&word.text).or_else(|| self.unknown_port(word))?;
+    fn column(&mut self, word: &Spanned<String>) -> Option<(Column, Kind)> {
+        let (port, rest) = self.plan.port_prefix(&word.value).or_else(|| self.unknown_port(word))?;
         let (columns, kind) = (Columns::of(port), port.shape.kind());
         let column = columns.iter().find(|column| column.name.strip_prefix(&port.name) == Some(rest));
         if let Some(column) = column {
@@ -88,26 +88,26 @@ impl Lookup<'_> {
             self.unknown_port(word)?;
         }
         let parts = columns.iter().map(|part| part.name.strip_prefix(&port.name).unwrap_or_default());
-        let parts: Vec<String> = parts.map(|part| format!("`{}{part}`", word.text)).collect();
+        let parts: Vec<String> = parts.map(|part| format!("`{}{part}`", word.value)).collect();
         let what = if parts.is_empty() { "which has no number to check" } else { "but a check needs one number" };
-        let message = format!("`{}` is {}, {what}", word.text, kind.with_article());
+        let message = format!("`{}` is {}, {what}", word.value, kind.with_article());
         let help = (!parts.is_empty()).then(|| format!("write one of {}", parts.join(", ")));
         self.found.push(Diagnostic::new(Code::KindMismatch, word.span.clone(), message).with_help(help));
         None
     }
 
     /// Reports a port that does not exist, with the closest name, the ports of its owner, or the owners.
-    fn unknown_port<T>(&mut self, word: &Word) -> Option<T> {
-        let message = format!("there is no port `{}` in this task on this bench", word.text);
+    fn unknown_port<T>(&mut self, word: &Spanned<String>) -> Option<T> {
+        let message = format!("there is no port `{}` in this task on this bench", word.value);
         let diagnostic = Diagnostic::new(Code::UnknownPort, word.span.clone(), message);
         let columns = self.plan.ports().flat_map(Columns::of).map(|column| column.name);
         let all: Vec<String> = columns.chain(self.plan.exports().iter().map(|(export, _)| export.clone())).collect();
         let owner_of = |name: &'_ str| name.split('.').next().unwrap_or_default().to_owned();
-        let owner = owner_of(&word.text);
-        let is_close = suggest_name(&word.text, all.iter().map(String::as_str)).is_some();
+        let owner = owner_of(&word.value);
+        let is_close = suggest_name(&word.value, all.iter().map(String::as_str)).is_some();
         let ports = all.iter().map(String::as_str).filter(|name| is_close || owner_of(name) == owner);
         self.found.push(if ports.clone().next().is_some() {
-            diagnostic.suggest(&word.text, ports, "ports")
+            diagnostic.suggest(&word.value, ports, "ports")
         } else {
             let owners: BTreeSet<String> = all.iter().map(|name| owner_of(name)).collect();
             diagnostic.suggest(&owner, owners.iter().map(String::as_str), "roles, nodes and parts")
@@ -116,10 +116,10 @@ impl Lookup<'_> {
     }
 
     /// Finds the column of a flag.
-    fn flag(&mut self, word: &Word) -> Option<String> {
+    fn flag(&mut self, word: &Spanned<String>) -> Option<String> {
         let (column, kind) = self.column(word)?;
         if kind != Kind::Flag {
-            let message = format!("`{}` is {}, but this key needs a flag", word.text, kind.with_article());
+            let message = format!("`{}` is {}, but this key needs a flag", word.value, kind.with_article());
             self.found.push(Diagnostic::new(Code::KindMismatch, word.span.clone(), message));
             return None;
         }
@@ -148,7 +148,7 @@ impl Lookup<'_> {
         };
         let rows = figures.iter().map(|(figure, bound)| {
             let paper = papers.iter().find(|(of, _)| of == figure).and_then(|(_, value)| *value);
-            row(&block.key.name, &table.of.text, *figure, &unit_name, *bound, paper)
+            row(&block.key.name, &table.of.value, *figure, &unit_name, *bound, paper)
         });
         let check = Check {
             minus,
@@ -164,10 +164,10 @@ impl Lookup<'_> {
     }
 
     /// Finds the column to subtract from another. Both must have the same unit.
-    fn subtrahend(&mut self, word: &Word, other: &Column) -> Option<String> {
+    fn subtrahend(&mut self, word: &Spanned<String>, other: &Column) -> Option<String> {
         let (column, _) = self.column(word)?;
         if column.unit != other.unit {
-            let message = format!("`{}` is in {}, but `{}` is in {}", word.text, column.unit, other.name, other.unit);
+            let message = format!("`{}` is in {}, but `{}` is in {}", word.value, column.unit, other.name, other.unit);
             self.found.push(Diagnostic::new(Code::UnitMismatch, word.span.clone(), message));
             return None;
         }
@@ -178,11 +178,11 @@ impl Lookup<'_> {
     fn modes(&mut self, table: &ScenarioTable) {
         let modes: Vec<&str> = self.plan.modes().collect();
         let (ends_in, stays_in) = (table.ends_in.as_ref(), table.stays_in.as_ref());
-        let ends_in = ends_in.filter(|word| word.text != super::trial::DONE || modes.is_empty());
-        for word in ends_in.into_iter().chain(stays_in).filter(|word| !modes.contains(&word.text.as_str())) {
-            let message = format!("there is no mode `{}`", word.text);
+        let ends_in = ends_in.filter(|word| word.value != super::trial::DONE || modes.is_empty());
+        for word in ends_in.into_iter().chain(stays_in).filter(|word| !modes.contains(&word.value.as_str())) {
+            let message = format!("there is no mode `{}`", word.value);
             self.found.push(Diagnostic::new(Code::UnknownMode, word.span.clone(), message).suggest(
-                &word.text,
+                &word.value,
                 modes.iter().copied(),
                 "modes",
             ));
@@ -190,17 +190,17 @@ impl Lookup<'_> {
     }
 
     /// Finds a fact of a device or one of its parameters.
-    fn fact(&mut self, word: &Word) -> Option<(String, toml::Value)> {
+    fn fact(&mut self, word: &Spanned<String>) -> Option<(String, toml::Value)> {
         let settings = self.plan.outline().devices.iter().flat_map(|device| {
             let named = |path: &str| format!("devices.{}.{path}", device.name);
             device.settings.iter().filter_map(move |setting| Some((named(&setting.path), plain(&setting.value)?)))
         });
         let facts: Vec<_> = self.plan.facts().iter().cloned().chain(settings).collect();
-        let fact = facts.iter().find(|(name, _)| *name == word.text).cloned();
+        let fact = facts.iter().find(|(name, _)| *name == word.value).cloned();
         if fact.is_none() {
-            let message = format!("no device states the fact or has the parameter `{}`", word.text);
+            let message = format!("no device states the fact or has the parameter `{}`", word.value);
             self.found.push(Diagnostic::new(Code::UnknownFact, word.span.clone(), message).suggest(
-                &word.text,
+                &word.value,
                 facts.iter().map(|(name, _)| name.as_str()),
                 "facts",
             ));

@@ -2,8 +2,8 @@
 
 pub mod breaks;
 pub mod count;
+pub mod first_order_lag;
 pub mod line_length;
-pub mod low_pass;
 pub mod pair;
 pub mod plus;
 pub mod unit_delay;
@@ -24,7 +24,7 @@ pub fn catalogue() -> Catalogue {
         .group("tests: nodes that make one sentence of the semantics visible each")
         .node::<breaks::Breaks>()
         .node::<count::Count>()
-        .node::<low_pass::LowPass>()
+        .node::<first_order_lag::FirstOrderLag>()
         .node::<pair::Pair>()
         .node::<plus::Plus>()
         .node::<unit_delay::UnitDelay>()

@@ -17,8 +17,8 @@ use crate::motion::axis::wrap_axial;
 /// of distances to all others, modulo pi; of two that are equal, the newer. It is always one of the samples, so it exists
 /// even for axes that cancel each other.
 ///
-/// A step passes half a window late, and stays a step. Against white noise a `smooth` with the same window is better: the
-/// median leaves 1.25 times its standard deviation. Against both, use a short `median` and a `smooth` after it. A `smooth`
+/// A step passes half a window late, and stays a step. Against white noise a `moving_average` with the same window is better: the
+/// median leaves 1.25 times its standard deviation. Against both, use a short `median` and a `moving_average` after it. A `moving_average`
 /// can also have a longer window.
 ///
 /// If the feature is absent, the output is absent. The window survives flicker and is reset when the feature is absent for

@@ -5,7 +5,7 @@ use std::ops::Range;
 use super::open::OpenedBench;
 use crate::graph::net::Net;
 use crate::graph::syntax::LIMITS;
-use crate::node::Word;
+use crate::node::Spanned;
 use crate::source::{Code, Diagnostic, Diagnostics, Item, Value};
 
 /// Replaces every `{ from = "role.fact" }` by the fact, and every `{ from = "limits.key" }` by the value in [limits].
@@ -26,7 +26,7 @@ pub(crate) fn fill_facts(
         _ => return true,
     };
     let from = table.get("from").filter(|_| table.is_fact());
-    let word = from.and_then(|from| Some(Word { text: from.as_str()?.to_owned(), span: from.span.clone() }));
+    let word = from.and_then(|from| Some(Spanned { value: from.as_str()?.to_owned(), span: from.span.clone() }));
     let Some(word) = word else {
         return table
             .entries
@@ -46,13 +46,13 @@ pub(crate) fn fill_facts(
 
 /// Returns the fact that a word names, or `None` if another diagnostic explains why it is missing.
 fn find_fact(
-    word: &Word,
+    word: &Spanned<String>,
     span: &Range<usize>,
     net: &Net<'_>,
     opened: &OpenedBench,
 ) -> Result<Option<Value>, Box<Diagnostic>> {
     let unknown = |message: String| Diagnostic::new(Code::UnknownFact, word.span.clone(), message);
-    let (role, name) = word.text.split_once('.').unwrap_or((&word.text, ""));
+    let (role, name) = word.value.split_once('.').unwrap_or((&word.value, ""));
     if role == LIMITS {
         // A missing value is reported at the section.
         return Ok(net.flat.limits.as_ref().and_then(|(_, table)| table.get(name)).cloned());

@@ -8,7 +8,7 @@ use crate::device::{Description, StatedPort};
 use crate::graph::net::Net;
 use crate::graph::plan::PlannedDevice;
 use crate::graph::syntax::{Bench, Block};
-use crate::node::{Mistake, PortSpec, Reader, Word};
+use crate::node::{Mistake, PortSpec, Reader, Spanned};
 use crate::signal::Shape;
 use crate::source::{Code, Diagnostic, Diagnostics, Key, SourceMap, Value, suggest_name};
 
@@ -67,7 +67,7 @@ pub(crate) fn open(net: &Net<'_>, sources: &mut SourceMap, diagnostics: &mut Dia
         opener.opened.roles.push(role);
     }
     for (key, _, role) in &net.observed {
-        let kind = Word { text: role.name.to_string(), span: key.span.clone() };
+        let kind = Spanned { value: role.name.to_string(), span: key.span.clone() };
         let bound = bench.and_then(|bench| opener.role(bench, key, &kind));
         opener.opened.observed.push(bound);
     }
@@ -106,14 +106,15 @@ impl Opener<'_> {
                 let diagnostic = Diagnostic::new(Code::ObservedRole, role.span.clone(), message);
                 self.diagnostics.push(diagnostic.help(format!("did you mean `{name}`?")));
             }
-            if !names().any(|name| name == word.text) {
+            if !names().any(|name| name == word.value) {
                 self.diagnostics.push(unknown_device(word, bench));
             }
         }
         for device in &bench.devices {
-            let is_opened = bench.bind.iter().any(|(role, word)| word.text == device.key.name && is_used(role));
+            let is_opened = bench.bind.iter().any(|(role, word)| word.value == device.key.name && is_used(role));
             let kind = device.kind.as_ref().filter(|_| !is_opened);
-            let kind = self.catalogue.devices().iter().find(|known| kind.is_some_and(|kind| known.name() == kind.text));
+            let kind =
+                self.catalogue.devices().iter().find(|known| kind.is_some_and(|kind| known.name() == kind.value));
             let (Some(kind), Some(table)) = (kind, device.params.as_table()) else { continue };
             let params = kind.params();
             for (key, _) in table.entries.iter().filter(|(key, _)| !params.iter().any(|param| param.name == key.name)) {
@@ -127,17 +128,17 @@ impl Opener<'_> {
 
     fn check_types(&mut self, bench: &Bench) {
         for kind in bench.devices.iter().filter_map(|device| device.kind.as_ref()) {
-            if !self.catalogue.devices().iter().any(|device| device.name() == kind.text) {
+            if !self.catalogue.devices().iter().any(|device| device.name() == kind.value) {
                 let names: Vec<_> = self.catalogue.devices().iter().map(|device| device.name()).collect();
-                let message = format!("there is no device type `{}`", kind.text);
+                let message = format!("there is no device type `{}`", kind.value);
                 let diagnostic = Diagnostic::new(Code::UnknownType, kind.span.clone(), message);
                 let known = names.iter().map(|name| &**name);
-                self.diagnostics.push(diagnostic.suggest(&kind.text, known, "device types"));
+                self.diagnostics.push(diagnostic.suggest(&kind.value, known, "device types"));
             }
         }
     }
 
-    fn role(&mut self, bench: &Bench, key: &Key, kind: &Word) -> Option<BoundRole> {
+    fn role(&mut self, bench: &Bench, key: &Key, kind: &Spanned<String>) -> Option<BoundRole> {
         let Some((_, word)) = bench.bind.iter().find(|(role, _)| role.name == key.name) else {
             let message = format!("the bench does not bind the role `{}`", key.name);
             let help = format!("add `{} = \"device\"` under [bind] in the bench", key.name);
@@ -146,12 +147,12 @@ impl Opener<'_> {
         };
         let (device, description) = self.device(bench, word)?;
         let is_free = |i: &usize| !self.taken.iter().any(|(d, filled, _)| (*d, filled) == (device, i));
-        let mut fitting = (0..description.fills.len()).filter(|i| description.fills[*i].role == kind.text);
+        let mut fitting = (0..description.fills.len()).filter(|i| description.fills[*i].role == kind.value);
         let Some(fills) = fitting.clone().find(is_free) else {
             let by = fitting.next().and_then(|i| self.taken.iter().find(|(d, filled, _)| (*d, *filled) == (device, i)));
             let message = match by {
-                Some((_, _, by)) => format!("device `{}` already fills the role `{by}`", word.text),
-                None => format!("device `{}` cannot fill the role `{}` of type `{}`", word.text, key.name, kind.text),
+                Some((_, _, by)) => format!("device `{}` already fills the role `{by}`", word.value),
+                None => format!("device `{}` cannot fill the role `{}` of type `{}`", word.value, key.name, kind.value),
             };
             let roles: Vec<_> = description.fills.iter().map(|filled| format!("`{}`", filled.role)).collect();
             let help = match by {
@@ -162,7 +163,7 @@ impl Opener<'_> {
             return None;
         };
         self.taken.push((device, fills, key.name.clone()));
-        let role = self.catalogue.roles().iter().find(|role| role.name == kind.text)?;
+        let role = self.catalogue.roles().iter().find(|role| role.name == kind.value)?;
         let number = |stated: &[StatedPort], declared: &[PortSpec]| {
             let port = |spec: &PortSpec| stated.iter().position(|port| port.fill == fills && port.name == spec.name);
             let port = |spec: &PortSpec| port(spec).map(|port| (port, stated[port].shape.clone()));
@@ -177,22 +178,22 @@ impl Opener<'_> {
         })
     }
 
-    fn device(&mut self, bench: &Bench, word: &Word) -> Option<(usize, Description)> {
-        if let Some((_, opened)) = self.names.iter().find(|(name, _)| *name == word.text) {
+    fn device(&mut self, bench: &Bench, word: &Spanned<String>) -> Option<(usize, Description)> {
+        if let Some((_, opened)) = self.names.iter().find(|(name, _)| *name == word.value) {
             return opened.clone();
         }
         let opened = self.open(bench, word);
-        self.names.push((word.text.clone(), opened.clone()));
+        self.names.push((word.value.clone(), opened.clone()));
         opened
     }
 
-    fn open(&mut self, bench: &Bench, word: &Word) -> Option<(usize, Description)> {
-        let Some(block) = bench.devices.iter().find(|device| device.key.name == word.text) else {
+    fn open(&mut self, bench: &Bench, word: &Spanned<String>) -> Option<(usize, Description)> {
+        let Some(block) = bench.devices.iter().find(|device| device.key.name == word.value) else {
             self.diagnostics.push(unknown_device(word, bench));
             return None;
         };
         let kind = block.kind.as_ref()?;
-        let device = self.catalogue.devices().iter().find(|device| device.name() == kind.text)?;
+        let device = self.catalogue.devices().iter().find(|device| device.name() == kind.value)?;
         let mut reader = Reader::new(self.sources);
         let opened = device.open(&block.params, &mut reader);
         let mistakes = reader.mistakes;
@@ -200,7 +201,7 @@ impl Opener<'_> {
         let crate::device::Opened { mut description, driver } = opened?;
         let period = description.period;
         if !PERIOD_RANGE_S.contains(&period) {
-            let message = format!("device `{}` has a sample period of {period:e} s", word.text);
+            let message = format!("device `{}` has a sample period of {period:e} s", word.value);
             let help = format!("the period must be from {:e} to {:e} s", PERIOD_RANGE_S.start(), PERIOD_RANGE_S.end());
             self.diagnostics.push(Diagnostic::new(Code::BadClock, block.key.span.clone(), message).help(help));
             return None;
@@ -208,7 +209,7 @@ impl Opener<'_> {
         if !self.check_ports(&mut description, block) {
             return None;
         }
-        let (name, span) = (word.text.clone(), block.key.span.clone());
+        let (name, span) = (word.value.clone(), block.key.span.clone());
         self.opened.devices.push(PlannedDevice { name, driver, description: description.clone(), span });
         self.opened.periods.push(period);
         Some((self.opened.devices.len() - 1, description))
@@ -224,7 +225,7 @@ impl Opener<'_> {
             if !misfits.is_empty() {
                 let device = &block.key.name;
                 let message = format!("device `{device}` does not match the role `{name}`: {}", misfits.join("; "));
-                let kind = block.kind.as_ref().map_or("", |kind| &kind.text);
+                let kind = block.kind.as_ref().map_or("", |kind| &kind.value);
                 let help = format!("the mistake is in the device type `{kind}`, not in this file");
                 self.diagnostics.push(Diagnostic::new(Code::WrongRole, block.key.span.clone(), message).help(help));
             }
@@ -234,17 +235,17 @@ impl Opener<'_> {
     }
 }
 
-fn unknown_device(word: &Word, bench: &Bench) -> Diagnostic {
-    let message = format!("the bench has no device `{}`", word.text);
+fn unknown_device(word: &Spanned<String>, bench: &Bench) -> Diagnostic {
+    let message = format!("the bench has no device `{}`", word.value);
     let known = bench.devices.iter().map(|device| device.key.name.as_str());
-    Diagnostic::new(Code::UnknownDevice, word.span.clone(), message).suggest(&word.text, known, "devices")
+    Diagnostic::new(Code::UnknownDevice, word.span.clone(), message).suggest(&word.value, known, "devices")
 }
 
 /// Converts the mistakes of a node or device into diagnostics, with spans in its block, its wires or a data file.
 pub(crate) fn place_mistakes(
     mistakes: Vec<Mistake>,
     block: &Value,
-    wires: &[(Key, Word)],
+    wires: &[(Key, Spanned<String>)],
     sources: &mut SourceMap,
     diagnostics: &mut Diagnostics,
 ) {

@@ -7,7 +7,7 @@ use crate::graph::net::Net;
 use crate::graph::plan::{Condition, PlannedExit, Test, WatchedPort};
 use crate::graph::plan::{PlannedPort, PortRef};
 use crate::graph::syntax::{Exit, ExitKind, ModeBlock, PortState};
-use crate::node::Word;
+use crate::node::Spanned;
 use crate::signal::{Kind, Shape};
 use crate::source::{Code, Diagnostic, Diagnostics};
 
@@ -68,10 +68,10 @@ fn target(
 ) -> Result<Option<usize>, ()> {
     let has_target = matches!(kind, ExitKind::Go | ExitKind::OnLost);
     let diagnostic = match (&exit.to, has_target) {
-        (Some(to), true) => match context.modes.iter().position(|name| *name == to.text) {
+        (Some(to), true) => match context.modes.iter().position(|name| *name == to.value) {
             Some(mode) => return Ok(Some(mode)),
-            None => Diagnostic::new(Code::UnknownMode, to.span.clone(), format!("there is no mode `{}`", to.text))
-                .suggest(&to.text, context.modes.iter().copied(), "modes"),
+            None => Diagnostic::new(Code::UnknownMode, to.span.clone(), format!("there is no mode `{}`", to.value))
+                .suggest(&to.value, context.modes.iter().copied(), "modes"),
         },
         (None, true) => bad_condition(span, format!("`{}` has no target mode", kind.key())).help("add `to = \"MODE\"`"),
         (None, false) => return Ok(None),
@@ -144,14 +144,14 @@ fn condition(
         return Ok(source.map(|source| (Condition::Travel(source, mm * 1e-3), text)));
     }
     let word = exit.on.as_ref().expect("one of them is given");
-    if word.text.trim() != word.text || word.text.is_empty() {
+    if word.value.trim() != word.value || word.value.is_empty() {
         return Err(Box::new(bad_condition(&word.span, "the word of `on` is empty, or starts or ends with a space")));
     }
-    if ["stop", "resume"].contains(&word.text.as_str()) {
+    if ["stop", "resume"].contains(&word.value.as_str()) {
         let help = "`stop` halts the run and `resume` continues it: choose another word";
-        return Err(Box::new(bad_condition(&word.span, format!("the word `{}` is reserved", word.text)).help(help)));
+        return Err(Box::new(bad_condition(&word.span, format!("the word `{}` is reserved", word.value)).help(help)));
     }
-    Ok(Some((Condition::Sent(word.text.clone()), format!("`{}` was sent", word.text))))
+    Ok(Some((Condition::Sent(word.value.clone()), format!("`{}` was sent", word.value))))
 }
 
 fn lost_condition(
@@ -181,7 +181,7 @@ fn travel_pose(
     if let Some(of) = &exit.of {
         let source = context.net.resolve(0, of)?;
         let is_pose = source.is_none_or(|source| context.net.port(source).kind == Kind::Pose);
-        let message = format!("`{}` is not a pose, and only a pose has a travel", of.text);
+        let message = format!("`{}` is not a pose, and only a pose has a travel", of.value);
         return if is_pose { Ok(source) } else { Err(Box::new(bad_condition(&of.span, message))) };
     }
     match context.poses.as_slice() {
@@ -197,14 +197,19 @@ fn travel_pose(
 }
 
 /// Resolves a port or a feature of one, with its name; returns `None` if its node has mistakes of its own.
-fn resolve_watched(word: &Word, context: &ExitContext<'_>) -> Result<Option<(WatchedPort, String)>, Box<Diagnostic>> {
-    let (port, feature) = match word.text.match_indices('.').nth(1) {
-        Some((at, _)) => (Word { text: word.text[..at].into(), span: word.span.clone() }, Some(&word.text[at + 1..])),
+fn resolve_watched(
+    word: &Spanned<String>,
+    context: &ExitContext<'_>,
+) -> Result<Option<(WatchedPort, String)>, Box<Diagnostic>> {
+    let (port, feature) = match word.value.match_indices('.').nth(1) {
+        Some((at, _)) => {
+            (Spanned { value: word.value[..at].into(), span: word.span.clone() }, Some(&word.value[at + 1..]))
+        }
         None => (word.clone(), None),
     };
     let Some(source) = context.net.resolve(0, &port)? else { return Ok(None) };
     // The name as written in the file.
-    let name = port.text.clone();
+    let name = port.value.clone();
     let Some(feature) = feature else { return Ok(Some((WatchedPort { source, feature: None }, name))) };
     let Some(planned) = (context.port)(source) else { return Ok(None) };
     let Shape::Features(shape) = &planned.shape else {
@@ -222,7 +227,7 @@ fn resolve_watched(word: &Word, context: &ExitContext<'_>) -> Result<Option<(Wat
 }
 
 fn port_condition(
-    when: &Word,
+    when: &Spanned<String>,
     span: &Range<usize>,
     exit: &Exit,
     context: &ExitContext<'_>,
@@ -276,7 +281,7 @@ fn rounded(bound: f64) -> f64 {
 
 /// Returns the condition of a bound, which must be neither always nor never true in the range of the port.
 fn number_condition(
-    when: &Word,
+    when: &Spanned<String>,
     name: &str,
     watched: WatchedPort,
     exit: &Exit,

@@ -25,10 +25,10 @@ fn find_clock(flat: &FlatGraph, opened: &OpenedBench) -> Result<Option<(Clock, f
     let (message, span, help) = match (&table.clock, table.rate_hz) {
         (None, Some(rate)) => return Ok(Some((Clock::Rate, 1.0 / rate))),
         (Some(word), None) => {
-            let Some(role) = flat.role_names().position(|name| name == word.text) else {
-                let message = format!("the clock `{}` is not a role", word.text);
+            let Some(role) = flat.role_names().position(|name| name == word.value) else {
+                let message = format!("the clock `{}` is not a role", word.value);
                 let diagnostic = Diagnostic::new(Code::BadClock, word.span.clone(), message);
-                return Err(Box::new(diagnostic.suggest(&word.text, flat.role_names(), "roles")));
+                return Err(Box::new(diagnostic.suggest(&word.value, flat.role_names(), "roles")));
             };
             let bound = opened.roles.get(role).and_then(Option::as_ref);
             return Ok(bound.map(|bound| (Clock::Device(bound.device), opened.periods[bound.device])));

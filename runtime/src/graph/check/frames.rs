@@ -106,7 +106,7 @@ impl Frames {
                 "insert {article} `{name}` between them, with a pose of `{from}` in `{to}`, which no node outputs yet"
             ));
         };
-        let (twist, from) = (&input.name, &origin.word.text);
+        let (twist, from) = (&input.name, &origin.word.value);
         Some(format!(
             "insert {article} `{name}` between them:\n[nodes.{name}]\ntype = \"{name}\"\nin.{twist} = \"{from}\"\nin.{} = \"{source}\"",
             pose.name,

@@ -9,7 +9,7 @@ use std::ops::Range;
 use crate::graph::check::frames::Frames;
 use crate::graph::net::{CommandWire, Net};
 use crate::graph::plan::{PortRef, Producer};
-use crate::node::{NodeSpec, Word};
+use crate::node::{NodeSpec, Spanned};
 use crate::signal::Kind;
 use crate::source::{Code, Diagnostic, Diagnostics};
 
@@ -19,7 +19,7 @@ struct PathNode<'a> {
     spec: &'a NodeSpec,
     /// The source of its motion, and the text that names it.
     source: PortRef,
-    word: &'a Word,
+    word: &'a Spanned<String>,
 }
 
 /// Reports each command whose path lacks a required limit, with the node to insert and its place.
@@ -167,7 +167,7 @@ fn suggest_limiter(
     let needs = limiter.inputs.iter().filter(|input| input.need.must_be_wired);
     let mut block = format!(
         "insert {article} `{name}` between `{0}` and `{taker}`:\n[nodes.{name}]\ntype = \"{name}\"\nin.{through} = \"{0}\"",
-        word.text
+        word.value
     );
     for input in needs.filter(|input| input.name != through) {
         block.push_str(&format!("\nin.{} = \"…\"", input.name));

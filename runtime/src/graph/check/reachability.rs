@@ -30,11 +30,11 @@ fn find_start(net: &Net<'_>, diagnostics: &mut Diagnostics) -> Option<usize> {
         diagnostics.push(Diagnostic::new(Code::MissingKey, net.flat.place.clone(), message).help(help));
         return None;
     };
-    let start = names.clone().position(|name| name == word.text);
+    let start = names.clone().position(|name| name == word.value);
     if start.is_none() {
-        let message = format!("there is no mode `{}`", word.text);
+        let message = format!("there is no mode `{}`", word.value);
         let diagnostic = Diagnostic::new(Code::UnknownMode, word.span.clone(), message);
-        diagnostics.push(diagnostic.suggest(&word.text, names, "modes"));
+        diagnostics.push(diagnostic.suggest(&word.value, names, "modes"));
     }
     start
 }

@@ -6,7 +6,7 @@ use std::ops::Range;
 use crate::graph::net::Net;
 use crate::graph::plan::{PlannedNode, PlannedShow, PlannedView};
 use crate::graph::plan::{PlannedPort, PortRef, Producer};
-use crate::node::Word;
+use crate::node::Spanned;
 use crate::signal::{Kind, Unit};
 use crate::source::{Code, Diagnostic, Diagnostics};
 
@@ -21,21 +21,21 @@ pub(crate) struct RequestedView {
 pub(crate) fn check(net: &Net<'_>, diagnostics: &mut Diagnostics) -> RequestedView {
     let table = net.flat.table.as_ref();
     let mut seen: Vec<PortRef> = Vec::new();
-    let mut show = |word: &Word| {
+    let mut show = |word: &Spanned<String>| {
         let source = net.resolve_or_report(0, word, diagnostics)?;
         let kind = net.port(source).kind;
         let diagnostic = |code: Code, message: String| Diagnostic::new(code, word.span.clone(), message);
         if !can_be_shown(kind) {
-            let message = format!("`{}` is {}: only images and numbers can be shown", word.text, kind.with_article());
+            let message = format!("`{}` is {}: only images and numbers can be shown", word.value, kind.with_article());
             let help = "show the image from which it is computed, or a port with numbers";
             diagnostics.push(diagnostic(Code::KindMismatch, message).help(help));
         }
         if seen.contains(&source) {
-            let message = format!("`{}` is listed twice", word.text);
+            let message = format!("`{}` is listed twice", word.value);
             diagnostics.push(diagnostic(Code::BadValue, message).help("remove it"));
         }
         seen.push(source);
-        Some(PlannedShow { name: word.text.clone(), source })
+        Some(PlannedShow { name: word.value.clone(), source })
     };
     let words = table.and_then(|table| table.show.as_ref());
     let ports = words.map(|words| words.iter().filter_map(&mut show).collect());
@@ -44,7 +44,7 @@ pub(crate) fn check(net: &Net<'_>, diagnostics: &mut Diagnostics) -> RequestedVi
         let source = net.resolve_or_report(0, word, diagnostics)?;
         let kind = net.port(source).kind;
         if kind != Kind::Scalar {
-            let message = format!("`{}` is {}, but `mark` takes scalars", word.text, kind.with_article());
+            let message = format!("`{}` is {}, but `mark` takes scalars", word.value, kind.with_article());
             diagnostics.push(Diagnostic::new(Code::KindMismatch, word.span.clone(), message));
         }
         Some((source, word.span.clone()))

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::ops::Range;
 
 use crate::graph::syntax::{AgeLimit, Bench, Block, GraphTable, ModeBlock, PolicyTable};
-use crate::node::Word;
+use crate::node::Spanned;
 use crate::source::{Key, Table, Value};
 
 /// What a name in a scope refers to, by index.
@@ -19,11 +19,11 @@ pub(crate) enum Entity {
 #[derive(Debug, Default)]
 pub(crate) struct Scope {
     pub(crate) names: BTreeMap<String, (Key, Entity)>,
-    pub(crate) exports: Vec<(Key, Word)>,
+    pub(crate) exports: Vec<(Key, Spanned<String>)>,
     /// Inputs that the part declares, with their documentation.
-    pub(crate) declared: Vec<(Key, Word)>,
+    pub(crate) declared: Vec<(Key, Spanned<String>)>,
     /// Wires into the part, in the scope of its parent.
-    pub(crate) inputs: Vec<(Key, Word)>,
+    pub(crate) inputs: Vec<(Key, Spanned<String>)>,
     pub(crate) parent: Option<usize>,
 }
 
@@ -43,10 +43,10 @@ pub(crate) struct FlatGraph {
     pub(crate) settings: Option<Value>,
     /// Span for diagnostics about the graph as a whole.
     pub(crate) place: Range<usize>,
-    pub(crate) roles: Vec<(Key, Word)>,
+    pub(crate) roles: Vec<(Key, Spanned<String>)>,
     pub(crate) nodes: Vec<FlatNode>,
     pub(crate) scopes: Vec<Scope>,
-    pub(crate) commands: Vec<(Key, Key, Word)>,
+    pub(crate) commands: Vec<(Key, Key, Spanned<String>)>,
     /// The section [limits] and its span.
     pub(crate) limits: Option<(Range<usize>, Table)>,
     pub(crate) modes: Vec<ModeBlock>,

@@ -337,7 +337,7 @@ impl Loader {
             };
             let mut wired = part.wires.iter().map(|(key, _)| key).chain(&part.invalid);
             if !wired.any(|key| key.name == input.name || is_misspelt(key)) {
-                let message = format!("part `{}` needs a wire to `in.{}`: {}", part.key.name, input.name, doc.text);
+                let message = format!("part `{}` needs a wire to `in.{}`: {}", part.key.name, input.name, doc.value);
                 let diagnostic = Diagnostic::new(Code::MissingInput, part.key.span.clone(), message);
                 let help = format!("add `in.{} = \"…\"`", input.name);
                 self.diagnostics.push(diagnostic.note(input.span.clone(), "the part declares it here").help(help));

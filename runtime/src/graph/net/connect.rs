@@ -3,7 +3,7 @@
 use super::{CommandWire, Net, Wire, WireOrigin};
 use crate::device::RoleType;
 use crate::graph::plan::{PortRef, Producer};
-use crate::node::{NodeSpec, Word};
+use crate::node::{NodeSpec, Spanned};
 use crate::signal::Kind;
 use crate::source::{Code, Diagnostic, Diagnostics, Key};
 
@@ -11,7 +11,7 @@ impl Net<'_> {
     /// Resolves the wires of each node; wires with a mistake are left out.
     pub(super) fn connect(&self, diagnostics: &mut Diagnostics) -> Vec<Vec<Wire>> {
         let nodes = self.flat.nodes.iter().enumerate().map(|(i, node)| {
-            let wire = |(key, word): &(Key, Word)| self.wire(i, self.spec(i)?, key, word, diagnostics);
+            let wire = |(key, word): &(Key, Spanned<String>)| self.wire(i, self.spec(i)?, key, word, diagnostics);
             node.block.wires.iter().filter_map(wire).collect()
         });
         nodes.collect()
@@ -22,7 +22,7 @@ impl Net<'_> {
         node: usize,
         spec: &NodeSpec,
         key: &Key,
-        word: &Word,
+        word: &Spanned<String>,
         diagnostics: &mut Diagnostics,
     ) -> Option<Wire> {
         let scope = self.flat.nodes[node].scope;
@@ -45,10 +45,10 @@ impl Net<'_> {
     }
 
     /// Follows a wire out of the parts around it, to the text that names its source.
-    fn origin(&self, scope: usize, word: &Word) -> WireOrigin {
-        let of = |word: &Word| self.flat.ages.get(&word.span.start).copied();
+    fn origin(&self, scope: usize, word: &Spanned<String>) -> WireOrigin {
+        let of = |word: &Spanned<String>| self.flat.ages.get(&word.span.start).copied();
         let (mut at, mut outer, mut age) = (scope, word, of(word));
-        while let (Some(("inputs", port)), Some(parent)) = (outer.text.split_once('.'), self.flat.scopes[at].parent) {
+        while let (Some(("inputs", port)), Some(parent)) = (outer.value.split_once('.'), self.flat.scopes[at].parent) {
             let Some((_, wire)) = self.flat.scopes[at].inputs.iter().find(|(key, _)| key.name == port) else { break };
             (at, outer) = (parent, wire);
             age = of(wire).map(|own| own.and(age)).or(age);
@@ -63,11 +63,11 @@ impl Net<'_> {
         let outputs = self.outputs(source.producer).unwrap_or_default();
         let other = outputs.iter().find(|output| output.kind == takes);
         let help = other.map(|other| {
-            let written = origin.word.text.rsplit_once('.').map_or("", |(node, _)| node);
+            let written = origin.word.value.rsplit_once('.').map_or("", |(node, _)| node);
             format!("`{written}.{}` is {}", other.name, takes.with_article())
         });
         // A port inside a part cannot be wired directly, so it is not suggested.
-        let help = help.filter(|_| self.name_in(origin.scope, source).is_some_and(|name| name == origin.word.text));
+        let help = help.filter(|_| self.name_in(origin.scope, source).is_some_and(|name| name == origin.word.value));
         origin.diagnostic(Code::KindMismatch, message).with_help(help)
     }
 
@@ -86,7 +86,13 @@ impl Net<'_> {
         wires
     }
 
-    fn command(&self, role: usize, key: &Key, word: &Word, diagnostics: &mut Diagnostics) -> Option<CommandWire> {
+    fn command(
+        &self,
+        role: usize,
+        key: &Key,
+        word: &Spanned<String>,
+        diagnostics: &mut Diagnostics,
+    ) -> Option<CommandWire> {
         let source = self.resolve_or_report(0, word, diagnostics);
         let RoleType { commands, reports, .. } = self.roles[role]?;
         let name = self.name(Producer::Role(role));

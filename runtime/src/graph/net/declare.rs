@@ -4,19 +4,19 @@ use super::Net;
 use crate::catalogue::Catalogue;
 use crate::device::RoleType;
 use crate::graph::load::FlatGraph;
-use crate::node::Word;
+use crate::node::Spanned;
 use crate::source::{Code, Diagnostic, Diagnostics, Key};
 
 impl<'a> Net<'a> {
     /// Creates a net with all types looked up and without wires.
     pub(super) fn declare(flat: &'a FlatGraph, catalogue: &'a Catalogue, diagnostics: &mut Diagnostics) -> Self {
-        let mut unknown = |word: &Word, what: &str, names: Vec<&str>| {
-            let message = format!("there is no {what} `{}`", word.text);
+        let mut unknown = |word: &Spanned<String>, what: &str, names: Vec<&str>| {
+            let message = format!("there is no {what} `{}`", word.value);
             let diagnostic = Diagnostic::new(Code::UnknownType, word.span.clone(), message);
-            diagnostics.push(diagnostic.suggest(&word.text, names.into_iter(), &format!("{what}s")));
+            diagnostics.push(diagnostic.suggest(&word.value, names.into_iter(), &format!("{what}s")));
         };
-        let role = |(_, kind): &(Key, Word)| {
-            let role = catalogue.role_type(&kind.text);
+        let role = |(_, kind): &(Key, Spanned<String>)| {
+            let role = catalogue.role_type(&kind.value);
             if role.is_none() {
                 let tasks = catalogue.roles().iter().filter(|role| !role.is_observed);
                 unknown(kind, "role", tasks.map(|role| &*role.name).collect());
@@ -26,7 +26,7 @@ impl<'a> Net<'a> {
         let roles: Vec<Option<&RoleType>> = flat.roles.iter().map(role).collect();
         let nodes = flat.nodes.iter().map(|node| {
             let kind = node.block.kind.as_ref()?;
-            let known = catalogue.find_node(&kind.text);
+            let known = catalogue.find_node(&kind.value);
             if known.is_none() {
                 unknown(kind, "node type", catalogue.specs().map(|spec| &*spec.name).collect());
             }
@@ -41,9 +41,13 @@ impl<'a> Net<'a> {
 }
 
 /// Returns the type of a role, or reports that a task cannot declare it.
-fn reject_observed<'r>(kind: &Word, role: &'r RoleType, diagnostics: &mut Diagnostics) -> Option<&'r RoleType> {
+fn reject_observed<'r>(
+    kind: &Spanned<String>,
+    role: &'r RoleType,
+    diagnostics: &mut Diagnostics,
+) -> Option<&'r RoleType> {
     if role.is_observed {
-        let message = format!("`{}` is only for scenarios and recordings: a task cannot declare it", kind.text);
+        let message = format!("`{}` is only for scenarios and recordings: a task cannot declare it", kind.value);
         let help = format!("remove it, and bind it in the bench: `{} = \"device\"`", role.observed_name());
         diagnostics.push(Diagnostic::new(Code::ObservedRole, kind.span.clone(), message).help(help));
     }
@@ -55,7 +59,7 @@ fn observed_roles<'a>(
     flat: &'a FlatGraph,
     catalogue: &'a Catalogue,
     diagnostics: &mut Diagnostics,
-) -> Vec<(&'a Key, &'a Word, &'a RoleType)> {
+) -> Vec<(&'a Key, &'a Spanned<String>, &'a RoleType)> {
     let bound = flat.bench.iter().flat_map(|bench| &bench.bind);
     let undeclared = bound.filter(|(key, _)| !flat.roles.iter().any(|(role, _)| role.name == key.name));
     let all = undeclared.filter_map(|(key, device)| {

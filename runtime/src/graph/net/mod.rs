@@ -12,7 +12,7 @@ use crate::catalogue::Catalogue;
 use crate::device::RoleType;
 use crate::graph::load::FlatGraph;
 use crate::graph::plan::{PortRef, Producer};
-use crate::node::{NodeSpec, PortSpec, Word};
+use crate::node::{NodeSpec, PortSpec, Spanned};
 use crate::source::{Diagnostics, Key};
 
 pub(crate) use wire::{CommandWire, Wire, WireOrigin};
@@ -26,7 +26,7 @@ pub(crate) struct Net<'a> {
     /// Index of each node's type in the catalogue, and its declaration; `None` if it is unknown.
     pub(crate) nodes: Vec<Option<(usize, &'a NodeSpec)>>,
     /// Roles that the bench binds for scenarios and recordings only: name, device and type.
-    pub(crate) observed: Vec<(&'a Key, &'a Word, &'a RoleType)>,
+    pub(crate) observed: Vec<(&'a Key, &'a Spanned<String>, &'a RoleType)>,
     /// The resolved wires of each node.
     pub(crate) wires: Vec<Vec<Wire>>,
     /// The resolved wires of commands and reports.

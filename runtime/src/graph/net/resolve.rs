@@ -3,7 +3,7 @@
 use super::Net;
 use crate::graph::load::{Entity, Scope};
 use crate::graph::plan::{PortRef, Producer};
-use crate::node::{PortSpec, Word};
+use crate::node::{PortSpec, Spanned};
 use crate::source::{Code, Diagnostic, Diagnostics};
 
 /// Parts through which one wire may pass; more means that it refers to itself.
@@ -18,7 +18,7 @@ impl Net<'_> {
     ///
     /// Returns `None` if the wire leads to an unknown type or to an unwired input of a part. Those have their own
     /// diagnostics.
-    pub(crate) fn resolve(&self, scope: usize, word: &Word) -> Result<Option<PortRef>, Box<Diagnostic>> {
+    pub(crate) fn resolve(&self, scope: usize, word: &Spanned<String>) -> Result<Option<PortRef>, Box<Diagnostic>> {
         self.resolve_at_depth(scope, word, 0)
     }
 
@@ -26,7 +26,7 @@ impl Net<'_> {
     pub(crate) fn resolve_or_report(
         &self,
         scope: usize,
-        word: &Word,
+        word: &Spanned<String>,
         diagnostics: &mut Diagnostics,
     ) -> Option<PortRef> {
         self.resolve(scope, word).unwrap_or_else(|diagnostic| {
@@ -35,17 +35,22 @@ impl Net<'_> {
         })
     }
 
-    fn resolve_at_depth(&self, scope: usize, word: &Word, depth: usize) -> Result<Option<PortRef>, Box<Diagnostic>> {
+    fn resolve_at_depth(
+        &self,
+        scope: usize,
+        word: &Spanned<String>,
+        depth: usize,
+    ) -> Result<Option<PortRef>, Box<Diagnostic>> {
         let diagnostic = |code: Code, message: String| Diagnostic::new(code, word.span.clone(), message);
         let unknown = |message: String| diagnostic(Code::UnknownPort, message);
         if depth > MAX_DEPTH {
-            let message = format!("`{}` refers to itself, through the inputs and exports of parts", word.text);
+            let message = format!("`{}` refers to itself, through the inputs and exports of parts", word.value);
             return Err(Box::new(diagnostic(Code::Loop, message)));
         }
         let Scope { names, inputs, declared, parent, .. } = &self.flat.scopes[scope];
-        let Some((name, port)) = word.text.split_once('.').filter(|(_, port)| !port.contains('.')) else {
+        let Some((name, port)) = word.value.split_once('.').filter(|(_, port)| !port.contains('.')) else {
             let help = self.ports_help(scope, word);
-            return Err(Box::new(unknown(format!("`{}` is not a port", word.text)).help(help)));
+            return Err(Box::new(unknown(format!("`{}` is not a port", word.value)).help(help)));
         };
         if name == "inputs"
             && let Some(parent) = *parent
@@ -62,7 +67,7 @@ impl Net<'_> {
         }
         let Some((_, entity)) = names.get(name) else {
             if self.observed.iter().any(|(key, ..)| key.name == name) {
-                let message = format!("`{}` is only for scenarios and recordings: a task cannot read it", word.text);
+                let message = format!("`{}` is only for scenarios and recordings: a task cannot read it", word.value);
                 return Err(Box::new(diagnostic(Code::ObservedRole, message).help(OBSERVED_HELP)));
             }
             let message = format!("there is no role, node or part `{name}`");
@@ -88,8 +93,8 @@ impl Net<'_> {
     }
 
     /// Returns the help for a word that is not of the form `node.port`.
-    fn ports_help(&self, scope: usize, word: &Word) -> String {
-        let first = word.text.split('.').next().unwrap_or_default();
+    fn ports_help(&self, scope: usize, word: &Spanned<String>) -> String {
+        let first = word.value.split('.').next().unwrap_or_default();
         let entity = self.flat.scopes[scope].names.get(first);
         let ports = entity.map(|(_, entity)| self.ports_of(*entity)).unwrap_or_default();
         let ports: Vec<String> = ports.iter().map(|port| format!("`{first}.{port}`")).collect();
@@ -117,7 +122,8 @@ impl Net<'_> {
             Entity::Node(i) => (source.producer == Producer::Node(i)).then(|| format!("{name}.{port}")),
             Entity::Part(inner) => {
                 let mut exports = self.flat.scopes[inner].exports.iter();
-                let is_source = |word: &Word| matches!(self.resolve(inner, word), Ok(Some(port)) if port == source);
+                let is_source =
+                    |word: &Spanned<String>| matches!(self.resolve(inner, word), Ok(Some(port)) if port == source);
                 exports.find(|(_, word)| is_source(word)).map(|(export, _)| format!("{name}.{}", export.name))
             }
         })

@@ -2,7 +2,7 @@
 
 use crate::graph::plan::PortRef;
 use crate::graph::syntax::AgeLimit;
-use crate::node::Word;
+use crate::node::Spanned;
 use crate::source::{Code, Diagnostic, Key};
 
 /// A wire to an input of a node.
@@ -19,11 +19,11 @@ pub(crate) struct Wire {
 #[derive(Debug, Clone)]
 pub(crate) struct WireOrigin {
     /// The text that names the source.
-    pub(crate) word: Word,
+    pub(crate) word: Spanned<String>,
     /// The scope of that text.
     pub(crate) scope: usize,
     /// The text at the node, if it refers to an input of its part.
-    pub(crate) inner: Option<Word>,
+    pub(crate) inner: Option<Spanned<String>>,
     /// The strictest age limit of the node's own wire and all wires into the parts around it.
     pub(crate) age: Option<AgeLimit>,
 }

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use crate::node::{At, Mistake, Param, Reader, Word};
+use crate::node::{At, Mistake, Param, Reader, Spanned};
 use crate::source::{Code, Item, Key, Table, Value, suggestion};
 
 /// A mode: the parameters it sets and its exits.
@@ -88,9 +88,9 @@ impl Param for PortState {
 #[derive(Debug, Clone, Param)]
 pub(crate) struct Exit {
     /// Mode to go to.
-    pub(crate) to: Option<Word>,
+    pub(crate) to: Option<Spanned<String>>,
     /// Port to watch: `node.port` or `node.port.feature`. A flag must be true unless `is` is given.
-    pub(crate) when: Option<Word>,
+    pub(crate) when: Option<Spanned<String>>,
     /// Required state of the port.
     pub(crate) is: Option<PortState>,
     /// Lower bound of the port.
@@ -115,9 +115,9 @@ pub(crate) struct Exit {
     #[param(unit = "mm", above = 0.0)]
     pub(crate) after_travel_mm: Option<f64>,
     /// Signal that `on_lost` watches; for `after_travel_mm`, the pose to measure if the graph has several.
-    pub(crate) of: Option<Word>,
+    pub(crate) of: Option<Spanned<String>>,
     /// Operator word that triggers the exit.
-    pub(crate) on: Option<Word>,
+    pub(crate) on: Option<Spanned<String>>,
     /// Priority among `go` exits that hold at once: the greatest wins.
     pub(crate) priority: Option<u64>,
 }

@@ -1,6 +1,6 @@
 //! The section `[policy]`: the reaction to each trouble, and the maximum age of samples.
 
-use crate::node::{Map, Param, Reader, Word, Written};
+use crate::node::{Map, Param, Reader, Spanned, Written};
 use crate::source::{Item, SourceMap, Table, Value};
 
 /// The reaction to a trouble.
@@ -85,7 +85,7 @@ impl Param for HaltingPolicy {
 #[derive(Debug, Clone, Param)]
 pub(crate) struct WireTable {
     /// Port that the wire reads.
-    pub(crate) from: Word,
+    pub(crate) from: Spanned<String>,
     /// Maximum age of values on the wire.
     #[param(unit = "ms", above = 0.0)]
     pub(crate) max_age_ms: f64,

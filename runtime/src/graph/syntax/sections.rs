@@ -5,19 +5,19 @@ use std::ops::Range;
 
 use super::modes::{self, ModeBlock};
 use super::policy::{AgeLimit, PolicyTable, WireTable};
-use crate::node::{At, FilePath, Mistake, Param, Reader, Word};
+use crate::node::{At, FilePath, Mistake, Param, Reader, Spanned};
 use crate::source::{Code, Diagnostic, Diagnostics, Item, Key, SourceMap, Table, Value, suggest_name};
 
 /// The section `[graph]`.
 #[derive(Debug, Clone, Param)]
 pub(crate) struct GraphTable {
     /// Role whose samples trigger the ticks.
-    pub(crate) clock: Option<Word>,
+    pub(crate) clock: Option<Spanned<String>>,
     /// Tick rate of a graph without a clock role.
     #[param(unit = "Hz", range = 0.001..=1e6)]
     pub(crate) rate_hz: Option<f64>,
     /// Start mode.
-    pub(crate) start: Option<Word>,
+    pub(crate) start: Option<Spanned<String>>,
     /// Default bench.
     pub(crate) bench: Option<FilePath>,
     /// Maximum time step between two samples; filters and integrals start afresh after a longer gap. The default is five periods.
@@ -27,17 +27,17 @@ pub(crate) struct GraphTable {
     #[param(unit = "ms", range = 0.0.., default = 20.0)]
     pub(crate) reset_after_ms: f64,
     /// Ports that a run shows: images as pictures, numbers as curves over time.
-    pub(crate) show: Option<Vec<Word>>,
+    pub(crate) show: Option<Vec<Spanned<String>>>,
     /// Ports of the x and the y of the contact, marked in the first image that is shown.
-    pub(crate) mark: Option<[Word; 2]>,
+    pub(crate) mark: Option<[Spanned<String>; 2]>,
 }
 
 /// The block of a node or a device: its type, its wires and its parameters.
 #[derive(Debug, Clone)]
 pub(crate) struct Block {
     pub(crate) key: Key,
-    pub(crate) kind: Option<Word>,
-    pub(crate) wires: Vec<(Key, Word)>,
+    pub(crate) kind: Option<Spanned<String>>,
+    pub(crate) wires: Vec<(Key, Spanned<String>)>,
     /// Inputs whose wire is invalid and has its own diagnostic.
     pub(crate) invalid: Vec<Key>,
     pub(crate) params: Value,
@@ -48,7 +48,7 @@ pub(crate) struct Block {
 pub(crate) struct PartBlock {
     pub(crate) key: Key,
     pub(crate) file: Option<FilePath>,
-    pub(crate) wires: Vec<(Key, Word)>,
+    pub(crate) wires: Vec<(Key, Spanned<String>)>,
     /// Inputs whose wire is invalid and has its own diagnostic.
     pub(crate) invalid: Vec<Key>,
     pub(crate) set: Table,
@@ -59,24 +59,24 @@ pub(crate) struct PartBlock {
 pub(crate) struct GraphDocument {
     /// The span of the section [graph], and the section if it is valid.
     pub(crate) graph: Option<(Range<usize>, Option<GraphTable>)>,
-    pub(crate) roles: Vec<(Key, Word)>,
+    pub(crate) roles: Vec<(Key, Spanned<String>)>,
     pub(crate) nodes: Vec<Block>,
     pub(crate) parts: Vec<PartBlock>,
-    pub(crate) commands: Vec<(Key, Key, Word)>,
+    pub(crate) commands: Vec<(Key, Key, Spanned<String>)>,
     /// The section [limits] and its span.
     pub(crate) limits: Option<(Range<usize>, Table)>,
     pub(crate) modes: Vec<ModeBlock>,
     /// The section [policy] as written, and parsed if it is valid.
     pub(crate) policy: Option<(Value, Option<PolicyTable>)>,
-    pub(crate) inputs: Vec<(Key, Word)>,
-    pub(crate) exports: Vec<(Key, Word)>,
+    pub(crate) inputs: Vec<(Key, Spanned<String>)>,
+    pub(crate) exports: Vec<(Key, Spanned<String>)>,
 }
 
 /// The sections of a bench file.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Bench {
     pub(crate) devices: Vec<Block>,
-    pub(crate) bind: Vec<(Key, Word)>,
+    pub(crate) bind: Vec<(Key, Spanned<String>)>,
 }
 
 /// Name of the section [limits] in `{ from = "limits.KEY" }`.
@@ -188,7 +188,7 @@ impl<'a> Sections<'a> {
 
     fn block(&mut self, key: Key, mut table: Table, names: &[String]) -> Block {
         let kind = match table.remove("type") {
-            Some((_, value)) => Word::read(&value, &mut self.reader),
+            Some((_, value)) => Spanned::read(&value, &mut self.reader),
             None if self.broken.contains(&key) => None,
             None => {
                 let message = format!("`{}` has no `type`", key.name);
@@ -222,7 +222,7 @@ impl<'a> Sections<'a> {
     }
 
     /// Reads the table `in` of a block: the valid wires, and the keys of the invalid ones.
-    fn wires(&mut self, table: &mut Table) -> (Vec<(Key, Word)>, Vec<Key>) {
+    fn wires(&mut self, table: &mut Table) -> (Vec<(Key, Spanned<String>)>, Vec<Key>) {
         let wires = table.remove("in").map(|(_, value)| value);
         let (mut wires, invalid) = self.wire_words(wires.as_ref());
         wires.retain(|(key, _)| {
@@ -256,20 +256,23 @@ impl<'a> Sections<'a> {
     }
 
     /// Reads a table whose values are strings.
-    fn words(&mut self, value: Option<&Value>) -> Vec<(Key, Word)> {
+    fn words(&mut self, value: Option<&Value>) -> Vec<(Key, Spanned<String>)> {
         let table = self.table(value);
-        let read = |(key, value): (Key, Value)| Some((key, Word::read(&value, &mut self.reader)?));
+        let read = |(key, value): (Key, Value)| Some((key, Spanned::read(&value, &mut self.reader)?));
         table.entries.into_iter().filter_map(read).collect()
     }
 
     /// Reads a table whose values are wires, each a port or a table with an age limit.
     ///
     /// Returns the valid wires, and the keys of the invalid ones.
-    fn wire_words(&mut self, value: Option<&Value>) -> (Vec<(Key, Word)>, Vec<Key>) {
+    fn wire_words(&mut self, value: Option<&Value>) -> (Vec<(Key, Spanned<String>)>, Vec<Key>) {
         let (mut wires, mut invalid) = (Vec::new(), Vec::new());
         for (key, value) in self.table(value).entries {
-            let from =
-                if value.as_table().is_some() { self.aged_wire(&value) } else { Word::read(&value, &mut self.reader) };
+            let from = if value.as_table().is_some() {
+                self.aged_wire(&value)
+            } else {
+                Spanned::read(&value, &mut self.reader)
+            };
             match from {
                 Some(from) => wires.push((key, from)),
                 None => invalid.push(key),
@@ -279,18 +282,18 @@ impl<'a> Sections<'a> {
     }
 
     /// Reads a wire with an age limit.
-    fn aged_wire(&mut self, value: &Value) -> Option<Word> {
+    fn aged_wire(&mut self, value: &Value) -> Option<Spanned<String>> {
         if let Some(wire) = WireTable::read(value, &mut self.reader) {
             self.ages.insert(wire.from.span.start, AgeLimit::of(&wire));
             return Some(wire.from);
         }
         // The table has a diagnostic; its port is still resolved, to report a second mistake there.
         let from = value.as_table().and_then(|table| table.get("from"))?;
-        Some(Word { text: from.as_str()?.to_owned(), span: from.span.clone() })
+        Some(Spanned { value: from.as_str()?.to_owned(), span: from.span.clone() })
     }
 
     /// Reads a table whose keys are names and whose values are strings.
-    fn names(&mut self, value: Option<&Value>) -> Vec<(Key, Word)> {
+    fn names(&mut self, value: Option<&Value>) -> Vec<(Key, Spanned<String>)> {
         let words = self.words(value);
         for (key, _) in &words {
             self.check_name(key);

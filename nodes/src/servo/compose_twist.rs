@@ -15,23 +15,23 @@ use tactflow_runtime::source::Code;
 /// `frame` is the role of the sensor (`"pad"`) or `"base"`; leave it out if a wire defines it.
 ///
 /// ```toml
-/// [nodes.twist_of]                    # the test signal along the pad's normal
-/// type = "twist_of"
+/// [nodes.compose_twist]                    # the test signal along the pad's normal
+/// type = "compose_twist"
 /// in.vz = "signal_generator.value"
 /// frame = "pad"
 /// ```
 #[derive(Describe)]
-#[describe(name = "twist_of")]
-pub struct TwistOf;
+#[describe(name = "compose_twist")]
+pub struct ComposeTwist;
 
-/// Parameters of `twist_of`.
+/// Parameters of `compose_twist`.
 #[derive(Debug, Clone, Param)]
 pub struct Params {
     /// Frame of the twist. Without it, the frame follows from the wires.
     frame: Option<String>,
 }
 
-/// What `twist_of` reads.
+/// What `compose_twist` reads.
 #[derive(Inputs)]
 pub struct Inputs<'a> {
     /// Speed along x.
@@ -54,7 +54,7 @@ pub struct Inputs<'a> {
     wz: Option<In<'a, Scalar>>,
 }
 
-/// What `twist_of` writes.
+/// What `compose_twist` writes.
 #[derive(Outputs)]
 pub struct Outputs {
     /// The twist.
@@ -62,7 +62,7 @@ pub struct Outputs {
     twist: Out<Twist>,
 }
 
-impl Node for TwistOf {
+impl Node for ComposeTwist {
     type Params = Params;
     type Inputs<'a> = Inputs<'a>;
     type Outputs = Outputs;
@@ -100,7 +100,7 @@ mod tests {
     fn rig(names: &[&str]) -> Result<NodeRig, Mistakes> {
         let shape = || Shape::from(ScalarShape::of(Unit::METRE.per_second()));
         let wires: Vec<(&str, Shape)> = names.iter().map(|name| (*name, shape())).collect();
-        NodeRig::new::<TwistOf>("", &wires)
+        NodeRig::new::<ComposeTwist>("", &wires)
     }
 
     #[test]

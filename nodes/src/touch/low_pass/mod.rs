@@ -1,4 +1,4 @@
-//! `one_pole`: a first-order low-pass filter, T dy/dt = x - y.
+//! `low_pass`: a first-order low-pass filter, T dy/dt = x - y.
 
 use std::f64::consts::PI;
 
@@ -16,9 +16,9 @@ use crate::motion::axis::{doubled, halved};
 /// stamps of the samples. So T means the same at 100 Hz and at 1 kHz, and for irregular samples. Set T as
 /// `time_constant_ms`, or as `cutoff_hz`, 1 / (2 pi T): 40 ms are 4 Hz.
 ///
-/// The filter is also called a lowpass or an exponential moving average. It lags a ramp by T, and leaves dt / (2 T) of the
-/// variance of white noise, as much as a `smooth` with a window of 2 T. Unlike `smooth` it needs no window, and old samples
-/// never lose all influence.
+/// The filter is also called a lowpass, a one-pole filter or an exponential moving average. It lags a ramp by T, and leaves
+/// dt / (2 T) of the variance of white noise, as much as a `moving_average` with a window of 2 T. Unlike
+/// `moving_average` it needs no window, and old samples never lose all influence.
 ///
 /// The first sample passes unchanged. The filter starts afresh after a gap longer than the graph's `max_gap_ms`, and when
 /// another device takes the sample: that sample also passes unchanged.
@@ -31,20 +31,20 @@ use crate::motion::axis::{doubled, halved};
 /// the graph's `reset_after_ms`.
 ///
 /// ```toml
-/// [nodes.one_pole]
-/// type = "one_pole"
+/// [nodes.low_pass]
+/// type = "low_pass"
 /// in.value = "moments.orientation"
 /// time_constant_ms = 20               # [ms]
 /// ```
 #[derive(Describe)]
-#[describe(name = "one_pole")]
-pub struct OnePole {
+#[describe(name = "low_pass")]
+pub struct LowPass {
     /// Time constant T [s].
     time: f64,
     is_axial: bool,
 }
 
-/// Parameters of `one_pole`.
+/// Parameters of `low_pass`.
 #[derive(Debug, Clone, Param)]
 pub struct Params {
     /// Time constant T, in which 63 % of a step pass; this or `cutoff_hz`.
@@ -55,7 +55,7 @@ pub struct Params {
     cutoff_hz: Option<f64>,
 }
 
-/// What `one_pole` reads.
+/// What `low_pass` reads.
 #[derive(Inputs)]
 pub struct Inputs<'a> {
     /// Any feature.
@@ -63,7 +63,7 @@ pub struct Inputs<'a> {
     value: In<'a, Scalar>,
 }
 
-/// What `one_pole` writes.
+/// What `low_pass` writes.
 #[derive(Outputs)]
 pub struct Outputs {
     /// The filtered feature; absent for axes that cancel each other.
@@ -71,7 +71,7 @@ pub struct Outputs {
     value: Out<Scalar>,
 }
 
-/// What `one_pole` remembers.
+/// What `low_pass` remembers.
 #[derive(State)]
 pub struct State {
     /// The last output: the mean cosine and sine of the doubled angle of an axis, else the value and 0.
@@ -82,7 +82,7 @@ pub struct State {
 /// Smaller magnitudes become 0: far below any measurement, and far above the subnormal numbers, which are slow.
 const MIN_VALUE: f64 = 1e-200;
 
-impl Node for OnePole {
+impl Node for LowPass {
     type Params = Params;
     type Inputs<'a> = Inputs<'a>;
     type Outputs = Outputs;
@@ -95,7 +95,7 @@ impl Node for OnePole {
             (Some(ms), None) => Ok(Self { time: ms * 1e-3, is_axial }),
             (None, Some(hz)) => Ok(Self { time: 0.5 / (PI * hz), is_axial }),
             (None, None) => {
-                let message = "`one_pole` needs `time_constant_ms` or `cutoff_hz`";
+                let message = "`low_pass` needs `time_constant_ms` or `cutoff_hz`";
                 let mistake = Mistake::new(Code::MissingKey, At::Node, message);
                 Err(mistake.help("add one of the two, such as `time_constant_ms = 20`").into())
             }

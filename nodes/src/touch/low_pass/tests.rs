@@ -1,4 +1,4 @@
-//! `one_pole` against the solution of its equation.
+//! `low_pass` against the solution of its equation.
 
 use proptest::prelude::*;
 use tactflow_runtime::harness::NodeRig;
@@ -7,7 +7,7 @@ use tactflow_runtime::signal::{Freshness, ScalarShape, Stamp, Unit};
 use super::*;
 
 fn built(params: &str, unit: Unit) -> Result<NodeRig, Mistakes> {
-    NodeRig::new::<OnePole>(params, &[("value", ScalarShape::of(unit).into())])
+    NodeRig::new::<LowPass>(params, &[("value", ScalarShape::of(unit).into())])
 }
 
 fn rig(ms: f64, unit: Unit) -> NodeRig {

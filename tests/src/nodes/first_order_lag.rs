@@ -1,4 +1,4 @@
-//! `low_pass`: a low-pass filter of the first order, T dy/dt = x - y.
+//! `first_order_lag`: a low-pass filter of the first order, T dy/dt = x - y.
 //!
 //! Each sample is one implicit Euler step, y += dt / (T + dt) (x - y): no step overshoots, however late a sample comes.
 //! dt is the time between two samples, so T means the same at 100 Hz and at 1 kHz. The first sample passes as it is.
@@ -15,21 +15,21 @@ use tactflow_runtime::source::Code;
 /// T dy/dt = x - y, one implicit Euler step a sample: it never overshoots, however late a sample comes, and T means the
 /// same at any rate. The first sample passes as it is.
 ///
-/// It refuses the direction of a line, which has no plain mean: take a `smooth` for that.
+/// It refuses the direction of a line, which has no plain mean: take a `moving_average` for that.
 ///
 /// ```toml
-/// [nodes.low_pass]
-/// type = "low_pass"
+/// [nodes.first_order_lag]
+/// type = "first_order_lag"
 /// in.value = "moments.pressure"
 /// time = 0.05                         # [s]
 /// ```
 #[derive(Describe)]
-#[describe(name = "low_pass")]
-pub struct LowPass {
+#[describe(name = "first_order_lag")]
+pub struct FirstOrderLag {
     time: f64,
 }
 
-/// Parameters of `low_pass`.
+/// Parameters of `first_order_lag`.
 #[derive(Debug, Clone, Param)]
 pub struct Params {
     /// Time in which 63 % of a step have passed through, T.
@@ -37,7 +37,7 @@ pub struct Params {
     time: f64,
 }
 
-/// What `low_pass` reads.
+/// What `first_order_lag` reads.
 #[derive(Inputs)]
 pub struct Inputs<'a> {
     /// Any feature that has no axis.
@@ -45,7 +45,7 @@ pub struct Inputs<'a> {
     value: In<'a, Scalar>,
 }
 
-/// What `low_pass` writes.
+/// What `first_order_lag` writes.
 #[derive(Outputs)]
 pub struct Outputs {
     /// The same, smoothed.
@@ -53,7 +53,7 @@ pub struct Outputs {
     value: Out<Scalar>,
 }
 
-/// What `low_pass` remembers.
+/// What `first_order_lag` remembers.
 #[derive(State)]
 pub struct State {
     /// What came out last; nothing yet after a reset.
@@ -62,7 +62,7 @@ pub struct State {
     interval: Interval,
 }
 
-impl Node for LowPass {
+impl Node for FirstOrderLag {
     type Params = Params;
     type Inputs<'a> = Inputs<'a>;
     type Outputs = Outputs;
@@ -72,7 +72,7 @@ impl Node for LowPass {
         if setup.inputs.value.unit.is_axial() {
             let place = At::Input("value".into());
             let mistake = Mistake::new(Code::UnitMismatch, place, "the direction of a line has no plain mean");
-            return Err(mistake.help("take a `smooth`: it takes the mean of axes").into());
+            return Err(mistake.help("take a `moving_average`: it takes the mean of axes").into());
         }
         Ok(Self { time: params.time })
     }
@@ -108,7 +108,7 @@ mod tests {
     use super::*;
 
     fn rig(time: f64, unit: Unit) -> Result<NodeRig, Mistakes> {
-        NodeRig::new::<LowPass>(&format!("time = {time}"), &[("value", ScalarShape::of(unit).into())])
+        NodeRig::new::<FirstOrderLag>(&format!("time = {time}"), &[("value", ScalarShape::of(unit).into())])
     }
 
     /// What comes out of a sample, `ms` before the next.

@@ -1,4 +1,4 @@
-//! `smooth`: the mean of the newest samples of a feature (paper section V: of force and orientation, over ten).
+//! `moving_average`: the mean of the newest samples of a feature (paper section V: of force and orientation, over ten).
 //!
 //! The window is summed from its oldest sample to its newest in each step: the sum does not drift, and a sample that has
 //! left the window has no influence.
@@ -26,21 +26,21 @@ use crate::motion::axis::{doubled, halved};
 /// over (cos 2a, sin 2a) instead: over ten samples near 90° with 3° of noise its error is 0.65°, that of the arithmetic
 /// mean 72°. Axes that cancel each other have no mean: the output is absent.
 ///
-/// **Lag.** The mean lags by half the window, though its stamp is that of the newest sample. A `one_pole` whose time
+/// **Lag.** The mean lags by half the window, though its stamp is that of the newest sample. A `low_pass` whose time
 /// constant is half of `window_ms` has the same lag and leaves the same noise. A `median` removes single wrong samples.
 ///
 /// If the feature is absent, the output is absent. The window survives flicker and is reset when the feature is absent for
 /// the graph's `reset_after_ms`.
 ///
 /// ```toml
-/// [nodes.smooth]
-/// type = "smooth"
+/// [nodes.moving_average]
+/// type = "moving_average"
 /// in.value = "moments.pressure"
 /// window_ms = 40                      # ten frames at 250 Hz [ms]
 /// ```
 #[derive(Describe)]
-#[describe(name = "smooth")]
-pub struct Smooth {
+#[describe(name = "moving_average")]
+pub struct MovingAverage {
     /// Largest number of samples in the window.
     capacity: usize,
     /// Length of the window [ns], unless it is a number of samples.
@@ -48,7 +48,7 @@ pub struct Smooth {
     is_axial: bool,
 }
 
-/// Parameters of `smooth`.
+/// Parameters of `moving_average`.
 #[derive(Debug, Clone, Param)]
 pub struct Params {
     /// Length of the window as a number of samples; 10 without `window` and `window_ms`.
@@ -59,7 +59,7 @@ pub struct Params {
     window_ms: Option<f64>,
 }
 
-/// What `smooth` reads.
+/// What `moving_average` reads.
 #[derive(Inputs)]
 pub struct Inputs<'a> {
     /// Any feature.
@@ -67,7 +67,7 @@ pub struct Inputs<'a> {
     value: In<'a, Scalar>,
 }
 
-/// What `smooth` writes.
+/// What `moving_average` writes.
 #[derive(Outputs)]
 pub struct Outputs {
     /// Its mean over the window; absent for axes that cancel each other.
@@ -75,7 +75,7 @@ pub struct Outputs {
     value: Out<Scalar>,
 }
 
-/// What `smooth` remembers.
+/// What `moving_average` remembers.
 #[derive(State)]
 pub struct State {
     /// The newest samples in a ring: the cosine and the sine of the doubled angle of an axis, else the value and 0.
@@ -96,7 +96,7 @@ const DEFAULT_WINDOW: usize = 10;
 /// Largest number of samples in a window of time, at the graph's rate.
 const MAX_SAMPLES: f64 = 100_000.0;
 
-impl Node for Smooth {
+impl Node for MovingAverage {
     type Params = Params;
     type Inputs<'a> = Inputs<'a>;
     type Outputs = Outputs;
@@ -113,7 +113,7 @@ impl Node for Smooth {
                     let message =
                         format!("a window of {ms} ms has more than {MAX_SAMPLES} samples at the graph's rate");
                     let mistake = Mistake::param("window_ms", message);
-                    return Err(mistake.help("use a `one_pole`, which has no window").into());
+                    return Err(mistake.help("use a `low_pass`, which has no window").into());
                 }
                 (2 * samples.ceil() as usize + 1, Some((ms * 1e6).round() as i64))
             }

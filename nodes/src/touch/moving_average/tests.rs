@@ -1,4 +1,4 @@
-//! `smooth` against tables, and against the mean of the samples in the window.
+//! `moving_average` against tables, and against the mean of the samples in the window.
 
 use proptest::prelude::*;
 use tactflow_runtime::harness::NodeRig;
@@ -9,7 +9,7 @@ use super::*;
 
 fn rig(window: usize, unit: Unit) -> NodeRig {
     let params = format!("window = {window}");
-    NodeRig::new::<Smooth>(&params, &[("value", ScalarShape::of(unit).into())]).unwrap()
+    NodeRig::new::<MovingAverage>(&params, &[("value", ScalarShape::of(unit).into())]).unwrap()
 }
 
 fn show(rig: &mut NodeRig, value: f64) -> Option<f64> {
@@ -70,7 +70,7 @@ fn a_held_value_counts_once_and_the_window_survives_flicker() {
 }
 
 fn built(params: &str) -> Result<NodeRig, Mistakes> {
-    NodeRig::new::<Smooth>(params, &[("value", ScalarShape::of(Unit::NEWTON).into())])
+    NodeRig::new::<MovingAverage>(params, &[("value", ScalarShape::of(Unit::NEWTON).into())])
 }
 
 #[test]
