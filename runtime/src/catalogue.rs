@@ -261,6 +261,13 @@ mod tests {
                 "the default of parameter `gain` of `wrong` is refused: expected a number greater than 0, found -1",
             ),
             (
+                |spec| {
+                    let declared = Declared { unit: Some("$unit/s"), ..Declared::new("gain") };
+                    spec.params.push(ParamSpec::of::<f64>(&declared, None));
+                },
+                "the unit of parameter `gain` of `wrong` is `$unit`, but there is no parameter `unit`",
+            ),
+            (
                 |spec| spec.example = "[nodes.a]\ntype = \"other\"".into(),
                 "the example of `wrong` has no block in `[nodes]` with `type = \"wrong\"`",
             ),

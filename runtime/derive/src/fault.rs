@@ -2,8 +2,8 @@
 
 use std::fmt::Display;
 
-use proc_macro2::TokenStream;
-use quote::ToTokens;
+use proc_macro2::{Delimiter, Group, Span, TokenStream};
+use quote::{ToTokens, quote, quote_spanned};
 use syn::{Data, DeriveInput, Field, Fields};
 
 /// The mistakes found so far.
@@ -48,4 +48,22 @@ impl Faults {
             }
         }
     }
+}
+
+/// A constant assertion. If it fails, the compiler marks all of `at`: from its first token, which has the span of the
+/// macro's name, to its last, which has that of its parentheses.
+pub(crate) fn asserted(at: &impl ToTokens, condition: &TokenStream, message: &str) -> TokenStream {
+    let assertion = assertion(at, condition, message);
+    quote!(const _: () = #assertion;)
+}
+
+/// The assertion alone, for a block of constants in a function.
+pub(crate) fn assertion(at: &impl ToTokens, condition: &TokenStream, message: &str) -> TokenStream {
+    let tokens: Vec<_> = at.to_token_stream().into_iter().collect();
+    let here =
+        |token: Option<&proc_macro2::TokenTree>| token.map_or_else(Span::call_site, proc_macro2::TokenTree::span);
+    let (start, end) = (here(tokens.first()), here(tokens.last()));
+    let mut arguments = Group::new(Delimiter::Parenthesis, quote!(#condition, #message));
+    arguments.set_span(end);
+    quote_spanned!(start=> ::core::assert! #arguments)
 }

@@ -7,8 +7,8 @@ use syn::{Data, DataEnum, DeriveInput, Expr, ExprLit, ExprRange, Field, Ident, L
 
 use crate::attributes::{Words, snake_case};
 use crate::docs::text;
-use crate::fault::Faults;
-use crate::ports::{bound_letter, is_unit_letter};
+use crate::fault::{Faults, asserted};
+use crate::ports::{bound_letter, inputs_beside, is_unit_letter};
 
 const KNOWN: &[&str] = &["unit", "range", "above", "default", "live"];
 
@@ -52,7 +52,8 @@ fn table(input: &DeriveInput, faults: &mut Faults) -> TokenStream {
         let (ty, ident, name) = (&parameter.field.ty, &parameter.name, parameter.name.to_string());
         quote_spanned!(ty.span()=> (#name, <#ty as ::tactflow_runtime::node::Param>::written(&self.#ident)))
     });
-    let checks: TokenStream = parameters.iter().map(|parameter| checks(parameter, input)).collect();
+    let inputs = inputs_beside(&input.attrs, "param", faults);
+    let checks: TokenStream = parameters.iter().map(|parameter| checks(parameter, input, &inputs)).collect();
     quote! {
         #checks
 
@@ -143,16 +144,15 @@ fn default(parameter: &Parameter) -> TokenStream {
 }
 
 /// Checks what needs the type, the list of units or the inputs.
-fn checks(parameter: &Parameter, input: &DeriveInput) -> TokenStream {
+fn checks(parameter: &Parameter, input: &DeriveInput, inputs: &Ident) -> TokenStream {
     let (ty, name) = (&parameter.field.ty, &parameter.name);
     let is_concrete = input.generics.type_params().next().is_none();
     let bounds = parameter.bounds_at.as_ref().filter(|_| is_concrete).zip(parameter.bounds.as_ref());
     let bounds = bounds.map(|(at, bounds)| {
-        let message = format!("`{name}` is not a number, so it has no range");
-        quote_spanned! {at.span()=>
-            const _: () = ::core::assert!(<#ty as ::tactflow_runtime::node::Param>::IS_NUMBER, #message);
-            const _: () = ::core::assert!(!#bounds.is_empty(), "no number is in this range");
-        }
+        let is_number = quote!(<#ty as ::tactflow_runtime::node::Param>::IS_NUMBER);
+        let is_number = asserted(at, &is_number, &format!("`{name}` is not a number, so it has no range"));
+        let is_possible = asserted(at, &quote!(!#bounds.is_empty()), "no number is in this range");
+        quote!(#is_number #is_possible)
     });
     let unit = parameter.unit.as_ref().map(|unit| {
         let text = unit.value();
@@ -160,15 +160,10 @@ fn checks(parameter: &Parameter, input: &DeriveInput) -> TokenStream {
             "`{text}` is not a unit of a parameter: `m/s2`, `N s/m`, a capital letter that an input binds, `$` with the \
              name of a parameter, or several as `m/s, rad/s`"
         );
-        let atoms = text.split(['/', ' ', ',']).filter(|atom| is_unit_letter(atom));
-        let letters = atoms.filter_map(|atom| atom.chars().next()).map(|letter| {
-            bound_letter(true, letter, unit.span(), &format!("no input binds the unit letter `{letter}`"))
-        });
-        let letters: TokenStream = letters.collect();
-        quote_spanned! {unit.span()=>
-            const _: () = ::core::assert!(::tactflow_runtime::signal::Unit::is_param_unit(#unit), #message);
-            #letters
-        }
+        let is_unit = quote!(::tactflow_runtime::signal::Unit::is_param_unit(#unit));
+        let letters = text.split(['/', ' ', ',']).filter(|atom| is_unit_letter(atom)).filter_map(|atom| atom.chars().next());
+        let letters = letters.map(|letter| bound_letter(true, letter, unit, inputs));
+        letters.chain([asserted(unit, &is_unit, &message)]).collect::<TokenStream>()
     });
     quote! { #bounds #unit }
 }

@@ -3,11 +3,14 @@
 use proc_macro2::{Span, TokenStream, TokenTree};
 use quote::{ToTokens, quote, quote_spanned};
 use syn::spanned::Spanned;
-use syn::{DeriveInput, Field, GenericArgument, GenericParam, Generics, Ident, Lifetime, LitStr, PathArguments, Type};
+use syn::{
+    Attribute, DeriveInput, Field, GenericArgument, GenericParam, Generics, Ident, Lifetime, LitStr, PathArguments,
+    Type,
+};
 
-use crate::attributes::{Words, beside};
+use crate::attributes::{Words, beside, list};
 use crate::docs::text;
-use crate::fault::Faults;
+use crate::fault::{Faults, asserted, assertion};
 
 /// The arguments of ports, and what each says.
 const ARGUMENTS: [&str; 4] = ["unit", "frame", "reference", "robot"];
@@ -15,6 +18,10 @@ const INPUT_WORDS: &[&str] =
     &["unit", "frame", "reference", "robot", "optional", "present_if_wired", "sampled", "delayed"];
 const OUTPUT_WORDS: &[&str] = &["unit", "frame", "reference", "robot"];
 const INPUT_FORMS: &str = "an input is `In<'a, T>`, `Option<In<'a, T>>` or `Many<'a, T>`, where `T` is a signal";
+
+/// The closed set of signals, and the types that the first two stand for.
+const SIGNALS: [&str; 12] =
+    ["Scalar", "Flag", "Features", "Image", "Mask", "Regions", "Twist", "Pose", "Joints", "Jacobian", "f64", "bool"];
 
 /// How a port is declared.
 #[derive(Clone, Copy, PartialEq, Eq)]
@@ -67,7 +74,7 @@ pub(crate) fn inputs(input: &DeriveInput) -> TokenStream {
         let tick = if port.is_delayed { quote!(tick.wrapping_sub(1)) } else { quote!(tick) };
         quote_spanned!(port.signal.span()=> #name: #view::fetch(bus, wires, #i, #tick))
     });
-    let (letters, checks) = (letters(input, &ports), checks(&ports));
+    let (letters, checks, generic_checks) = (letters(input, &ports), checks(&ports), generic_checks(&ports));
     faults.with(quote! {
         #checks
         #shapes
@@ -78,6 +85,7 @@ pub(crate) fn inputs(input: &DeriveInput) -> TokenStream {
             type Shapes = #shapes_name #shape_arguments;
 
             fn specs() -> ::std::vec::Vec<::tactflow_runtime::node::PortSpec> {
+                #generic_checks
                 ::std::vec![#(#specs),*]
             }
 
@@ -102,7 +110,7 @@ pub(crate) fn inputs(input: &DeriveInput) -> TokenStream {
 
 pub(crate) fn outputs(input: &DeriveInput) -> TokenStream {
     let mut faults = Faults::default();
-    let ports = ports(input, false, &mut faults);
+    let (ports, inputs) = (ports(input, false, &mut faults), inputs_beside(&input.attrs, "port", &mut faults));
     let (name, shapes, shapes_name) = (&input.ident, shapes(input, &ports), beside(&input.ident, "Shapes"));
     let (head, arguments, bounds) = input.generics.split_for_impl();
     let (names, specs) = (names(&ports), ports.iter().map(spec));
@@ -119,7 +127,7 @@ pub(crate) fn outputs(input: &DeriveInput) -> TokenStream {
     let lost = each(
         |_, signal, i, span| quote_spanned!(span=> ::tactflow_runtime::node::Out::<#signal>::lose_port(bus, ports[#i], tick);),
     );
-    let (bound, checks) = (bound(&ports), checks(&ports));
+    let (bound, checks, generic_checks) = (bound(&ports, &inputs), checks(&ports), generic_checks(&ports));
     faults.with(quote! {
         #checks
         #bound
@@ -130,6 +138,7 @@ pub(crate) fn outputs(input: &DeriveInput) -> TokenStream {
             type Shapes = #shapes_name #arguments;
 
             fn specs() -> ::std::vec::Vec<::tactflow_runtime::node::PortSpec> {
+                #generic_checks
                 ::std::vec![#(#specs),*]
             }
 
@@ -198,6 +207,17 @@ fn port(field: Field, is_input: bool, type_parameters: &[&Ident], faults: &mut F
         faults.fatal(&field.ty, expected);
         return None;
     };
+    if !is_signal(&signal, type_parameters) {
+        let signals = list(&SIGNALS[..SIGNALS.len() - 2]);
+        faults.fatal(
+            &signal,
+            format!(
+                "`{}` is not a signal; signals are {signals}",
+                signal.to_token_stream().to_string().replace(' ', "")
+            ),
+        );
+        return None;
+    }
     combination(form, [&optional, &present_if_wired, &sampled, &delayed], faults);
     arguments.iter().for_each(|(name, text)| argument_is_sound(name, text, &arguments, faults));
     Some(Port {
@@ -275,6 +295,16 @@ fn form(ty: &Type) -> Option<(Form, Type)> {
         "Option" => form(&inner).filter(|(form, _)| *form == Form::In).map(|(_, signal)| (Form::OptionIn, signal)),
         _ => None,
     }
+}
+
+/// Whether a type is a signal, as far as its name shows. The compiler would say the same once for each use that the
+/// generated code makes of it.
+fn is_signal(ty: &Type, type_parameters: &[&Ident]) -> bool {
+    let name = match ty {
+        Type::Path(path) => path.path.segments.last().map(|segment| segment.ident.to_string()),
+        _ => None,
+    };
+    name.is_some_and(|name| SIGNALS.contains(&name.as_str())) || mentions(&ty.to_token_stream(), type_parameters)
 }
 
 /// The name of a generic type and its last type argument.
@@ -389,13 +419,13 @@ fn default_of_generic(input: &DeriveInput, ports: &[Port], shapes: &Ident) -> To
 }
 
 /// The letters that a port binds, or uses: of its unit and of its frames, each with its place.
-fn letters_of(port: &Port) -> impl Iterator<Item = (bool, char, Span)> {
+fn letters_of(port: &Port) -> impl Iterator<Item = (bool, char, &LitStr)> {
     port.arguments.iter().filter_map(|(name, text)| {
         let value = text.value();
         let letter = value.chars().next().filter(char::is_ascii_uppercase)?;
         let is_unit = *name == "unit";
         let is_letter = if is_unit { is_unit_letter(&value) } else { value.len() == 1 };
-        is_letter.then(|| (is_unit, letter, text.span()))
+        is_letter.then_some((is_unit, letter, text))
     })
 }
 
@@ -426,50 +456,64 @@ fn letters(input: &DeriveInput, ports: &[Port]) -> TokenStream {
     }
 }
 
-/// Checks that an input binds each letter of an output, and that a parameter that an output names is there.
-fn bound(ports: &[Port]) -> TokenStream {
-    let letters = ports.iter().flat_map(letters_of).map(|(is_unit, letter, span)| {
-        let what = if is_unit { "unit" } else { "frame" };
-        bound_letter(is_unit, letter, span, &format!("no input binds the {what} letter `{letter}`"))
-    });
-    letters.collect()
+/// The struct of the inputs whose letters count: `Inputs`, or what `inputs = "…"` names.
+pub(crate) fn inputs_beside(attributes: &[Attribute], attribute: &str, faults: &mut Faults) -> Ident {
+    let named = Words::new(attributes, attribute, &["inputs"], faults).text("inputs", faults);
+    named.and_then(|name| faults.take(name.parse())).unwrap_or_else(|| Ident::new("Inputs", Span::call_site()))
 }
 
-/// Checks that an input binds a letter.
-pub(crate) fn bound_letter(is_unit: bool, letter: char, span: Span, message: &str) -> TokenStream {
-    let inputs = Ident::new("Inputs", span.resolved_at(Span::call_site()).located_at(span));
-    quote_spanned!(span=> const _: () = ::core::assert!(#inputs.binds(#is_unit, #letter), #message);)
+/// Checks that an input binds each letter of an output.
+fn bound(ports: &[Port], inputs: &Ident) -> TokenStream {
+    ports
+        .iter()
+        .flat_map(letters_of)
+        .map(|(is_unit, letter, text)| bound_letter(is_unit, letter, text, inputs))
+        .collect()
 }
 
-/// Checks what the type of a port decides: which arguments it takes.
+/// Checks that the struct `inputs` binds a letter.
+pub(crate) fn bound_letter(is_unit: bool, letter: char, text: &LitStr, inputs: &Ident) -> TokenStream {
+    let what = if is_unit { "unit" } else { "frame" };
+    let inputs = Ident::new(&inputs.to_string(), inputs.span().located_at(text.span()));
+    let binds = quote!(#inputs.binds(#is_unit, #letter));
+    asserted(text, &binds, &format!("no input binds the {what} letter `{letter}`"))
+}
+
+/// Checks the units, and what the type of a port decides: which arguments it takes.
 fn checks(ports: &[Port]) -> TokenStream {
-    ports.iter().map(check).collect()
+    let units =
+        ports.iter().flat_map(|port| port.arguments.iter().filter(|(name, _)| *name == "unit")).map(|(_, text)| {
+            let message =
+                format!("`{}` is not a unit of a port: a unit, `_`, `_/s`, or a capital letter", text.value());
+            asserted(text, &quote!(::tactflow_runtime::signal::Unit::is_port_unit(#text)), &message)
+        });
+    let concrete = ports.iter().filter(|port| !port.is_generic).flat_map(arguments);
+    let arguments = concrete.map(|(at, condition, message)| asserted(&at, &condition, &message));
+    units.chain(arguments).collect()
 }
 
-fn check(port: &Port) -> TokenStream {
-    let (signal, name, place) = (&port.signal, &port.name, port.field.ty.span());
-    let units = port.arguments.iter().filter(|(name, _)| *name == "unit").map(|(_, text)| {
-        let message = format!("`{}` is not a unit of a port: a unit, `_`, `_/s`, or a capital letter", text.value());
-        quote_spanned!(text.span()=>
-            const _: () = ::core::assert!(::tactflow_runtime::signal::Unit::is_port_unit(#text), #message);)
+/// The same for a port whose kind a type parameter decides: checked for each type that a graph can use.
+fn generic_checks(ports: &[Port]) -> TokenStream {
+    let generic = ports.iter().filter(|port| port.is_generic).flat_map(arguments);
+    let checks = generic.map(|(at, condition, message)| {
+        let assertion = assertion(&at, &condition, &message);
+        quote!(const { #assertion };)
     });
-    let units: TokenStream = units.collect();
-    if port.is_generic {
-        return units;
-    }
-    let takes = |argument: &str, span| {
-        quote_spanned!(span=>
-            ::tactflow_runtime::signal::Kind::takes(<#signal as ::tactflow_runtime::signal::Signal>::KIND, #argument))
-    };
-    let arguments = ARGUMENTS.into_iter().map(|argument| {
-        if let Some((_, text)) = port.arguments.iter().find(|(name, _)| *name == argument) {
-            let (takes, message) = (takes(argument, text.span()), format!("the kind of `{name}` has no `{argument}`"));
-            quote_spanned!(text.span()=> const _: () = ::core::assert!(#takes, #message);)
-        } else {
-            let takes = takes(argument, place);
-            let message = format!("`{name}` needs `#[port({argument} = \"…\")]`; `\"_\"` if there is none");
-            quote_spanned!(place=> const _: () = ::core::assert!(!#takes, #message);)
+    checks.collect()
+}
+
+/// For each argument of a port: where a mistake is marked, what must hold, and what it means if it does not.
+fn arguments(port: &Port) -> impl Iterator<Item = (TokenStream, TokenStream, String)> {
+    let (signal, name) = (&port.signal, &port.name);
+    ARGUMENTS.into_iter().map(move |argument| {
+        let takes = quote!(::tactflow_runtime::signal::Kind::takes(
+            <#signal as ::tactflow_runtime::signal::Signal>::KIND, #argument));
+        match port.arguments.iter().find(|(name, _)| *name == argument) {
+            Some((_, text)) => (quote!(#text), takes, format!("the kind of `{name}` has no `{argument}`")),
+            None => {
+                let message = format!("`{name}` needs `#[port({argument} = \"…\")]`; `\"_\"` if there is none");
+                (port.field.ty.to_token_stream(), quote!(!#takes), message)
+            }
         }
-    });
-    arguments.chain([units]).collect()
+    })
 }

@@ -3,5 +3,7 @@
 
 #[test]
 fn every_mistake_shows_on_its_field() {
-    trybuild::TestCases::new().compile_fail("tests/errors/*.rs");
+    let cases = trybuild::TestCases::new();
+    cases.pass("tests/sound/*.rs");
+    cases.compile_fail("tests/errors/*.rs");
 }

@@ -23,23 +23,34 @@ pub(super) fn node(spec: &NodeSpec) {
             assert!(is_there, "`{name}.{}` names the parameter `{param}`, which `{name}` does not have", port.name);
         }
     }
-    defaults(name, &spec.params, "");
+    params(name, &spec.params, &mut Vec::new(), "");
     example(name, &spec.example, "nodes", &spec.params, Some(&spec.inputs));
 }
 
 /// Panics if the declaration of a device is wrong.
-pub(super) fn device(name: &str, params: &[ParamSpec], text: &str) {
-    defaults(name, params, "");
-    example(name, text, "devices", params, None);
+pub(super) fn device(name: &str, table: &[ParamSpec], text: &str) {
+    params(name, table, &mut Vec::new(), "");
+    example(name, text, "devices", table, None);
 }
 
-fn defaults(name: &str, params: &[ParamSpec], path: &str) {
-    for param in params {
+/// Checks the defaults of a table, and that a unit such as `$unit` names a parameter of it or of a table around it.
+fn params(name: &str, table: &[ParamSpec], outer: &mut Vec<&'static str>, path: &str) {
+    let depth = outer.len();
+    outer.extend(table.iter().map(|param| param.name));
+    for param in table {
         if let Some(fault) = &param.fault {
             panic!("the default of parameter `{path}{}` of `{name}` is refused: {fault}", param.name);
         }
-        defaults(name, &param.fields, &format!("{path}{}.", param.name));
+        let units = param.unit.as_deref().unwrap_or_default().split(['/', ' ', ',']);
+        if let Some(unit) = units.filter_map(|unit| unit.strip_prefix('$')).find(|unit| !outer.contains(unit)) {
+            panic!(
+                "the unit of parameter `{path}{}` of `{name}` is `${unit}`, but there is no parameter `{unit}`",
+                param.name
+            );
+        }
+        params(name, &param.fields, outer, &format!("{path}{}.", param.name));
     }
+    outer.truncate(depth);
 }
 
 /// Checks the blocks of an example that have the type `name`: that there is one, and that it names only what exists.

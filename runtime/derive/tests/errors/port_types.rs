@@ -3,17 +3,15 @@
 use tactflow_runtime::node::{In, Inputs, Many, Out, Outputs};
 use tactflow_runtime::signal::{Flag, Jacobian, Pose, Scalar, Twist};
 
-type Force = f64;
-
 /// Inputs.
 #[derive(Inputs)]
 pub struct Inputs<'a> {
     /// No unit.
     #[port(frame = "A")]
     no_unit: In<'a, Scalar>,
-    /// No frame, under another name of the type.
+    /// No frame, under the name of the number.
     #[port(unit = "N")]
-    no_frame: Option<In<'a, Force>>,
+    no_frame: Option<In<'a, f64>>,
     /// Nothing.
     nothing: Many<'a, Twist>,
     /// A unit too many.
