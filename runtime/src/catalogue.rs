@@ -242,7 +242,7 @@ mod tests {
             ParamSpec::of::<f64>(&declared, Some(default))
         };
         assert_eq!(bounded(|| 1.0).fault, None);
-        let cases: [(Change, &str); 9] = [
+        let cases: [(Change, &str); 10] = [
             (
                 |spec| spec.outputs[0].args = vec!["newton".into()].into(),
                 "`wrong.x` declares the unit Some(\"newton\")",

@@ -199,7 +199,7 @@ fn turns([first, last]: [f64; 2], duration: f64, time: f64) -> f64 {
 
 /// Returns a mistake for each parameter that the form needs but lacks, or has but does not use.
 fn check(params: &Params, period: f64) -> Mistakes {
-    let (form, _) = Form::WORDS[params.form as usize];
+    let (form, _) = Form::CONTENTS.words[params.form as usize];
     let waves = matches!(params.form, Form::Sine | Form::Chirp);
     let ends = matches!(params.form, Form::Ramp | Form::Chirp);
     let is_chirp = params.form == Form::Chirp;

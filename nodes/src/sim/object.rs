@@ -206,7 +206,7 @@ fn ease(t: f64) -> (f64, f64) {
 
 fn shape_of(params: &ObjectParams) -> Result<Geometry, String> {
     let kind = params.shape;
-    let (word, _) = ShapeKind::WORDS[kind as usize];
+    let (word, _) = ShapeKind::CONTENTS.words[kind as usize];
     let given = |name: &str| format!("a {word} needs `{name}`");
     let radius = || params.radius.ok_or_else(|| given("radius"));
     let size = || {

@@ -61,9 +61,10 @@ fn table(input: &DeriveInput, faults: &mut Faults) -> TokenStream {
         impl #generics ::tactflow_runtime::node::Param for #ident #arguments #bounds {
             const EXPECTS: &'static str = "a table";
 
-            fn fields() -> ::std::vec::Vec<::tactflow_runtime::node::ParamSpec> {
-                ::std::vec![#(#specs),*]
-            }
+            const CONTENTS: ::tactflow_runtime::node::Contents = ::tactflow_runtime::node::Contents {
+                fields: || ::std::vec![#(#specs),*],
+                ..::tactflow_runtime::node::Contents::OPAQUE
+            };
 
             fn written(&self) -> ::core::option::Option<::tactflow_runtime::node::Written> {
                 ::tactflow_runtime::node::written_table([#(#written),*])
@@ -149,7 +150,7 @@ fn checks(parameter: &Parameter, input: &DeriveInput, inputs: &Ident) -> TokenSt
     let is_concrete = input.generics.type_params().next().is_none();
     let bounds = parameter.bounds_at.as_ref().filter(|_| is_concrete).zip(parameter.bounds.as_ref());
     let bounds = bounds.map(|(at, bounds)| {
-        let is_number = quote!(<#ty as ::tactflow_runtime::node::Param>::IS_NUMBER);
+        let is_number = quote!(<#ty as ::tactflow_runtime::node::Param>::CONTENTS.is_number);
         let is_number = asserted(at, &is_number, &format!("`{name}` is not a number, so it has no range"));
         let is_possible = asserted(at, &quote!(!#bounds.is_empty()), "no number is in this range");
         quote!(#is_number #is_possible)
@@ -192,7 +193,10 @@ fn words(input: &DeriveInput, data: &DataEnum, faults: &mut Faults) -> TokenStre
         #[automatically_derived]
         impl ::tactflow_runtime::node::Param for #ident {
             const EXPECTS: &'static str = #expects;
-            const WORDS: &'static [(&'static str, &'static str)] = &[#((#words, #docs)),*];
+            const CONTENTS: ::tactflow_runtime::node::Contents = ::tactflow_runtime::node::Contents {
+                words: &[#((#words, #docs)),*],
+                ..::tactflow_runtime::node::Contents::OPAQUE
+            };
 
             fn written(&self) -> ::core::option::Option<::tactflow_runtime::node::Written> {
                 let word = match self { #(Self::#variants => #words),* };

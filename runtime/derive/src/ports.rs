@@ -385,36 +385,22 @@ fn shapes(input: &DeriveInput, ports: &[Port]) -> TokenStream {
         };
         quote!(#[doc = #doc] #vis #name: #shape)
     });
-    let fields: Vec<_> = fields.collect();
-    let derives = if ports.iter().any(|port| port.form == Form::Out) && generics.params.is_empty() {
-        quote!(#[derive(Debug, Default)])
-    } else {
-        TokenStream::new()
-    };
-    let default = default_of_generic(input, ports, &name);
+    // A derived `Default` would ask `Default` of the signal's type and not of its shape.
+    let default = ports.iter().any(|port| port.form == Form::Out).then(|| {
+        let ((head, arguments, _), names) = (generics.split_for_impl(), names(ports));
+        quote! {
+            impl #head ::core::default::Default for #name #arguments #bounds {
+                fn default() -> Self {
+                    Self { #(#names: ::core::default::Default::default()),* }
+                }
+            }
+        }
+    });
     quote! {
         #[doc = #doc]
         #[allow(dead_code, unreachable_pub, reason = "the shape of a port may not matter, and a node's module may be private")]
-        #derives
         #vis struct #name #generics #bounds { #(#fields),* }
         #default
-    }
-}
-
-/// A derived `Default` would ask `Default` of the signal's type and not of its shape.
-fn default_of_generic(input: &DeriveInput, ports: &[Port], shapes: &Ident) -> TokenStream {
-    let is_output = ports.iter().any(|port| port.form == Form::Out);
-    if input.generics.params.is_empty() || !is_output {
-        return TokenStream::new();
-    }
-    let (head, arguments, bounds) = input.generics.split_for_impl();
-    let names = names(ports);
-    quote! {
-        impl #head ::core::default::Default for #shapes #arguments #bounds {
-            fn default() -> Self {
-                Self { #(#names: ::core::default::Default::default()),* }
-            }
-        }
     }
 }
 

@@ -1,13 +1,13 @@
-//! The numbers that a parameter takes.
+//! The range of a numeric parameter.
 
-/// The range of a parameter.
+/// The range of a numeric parameter.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Bounds {
-    /// Lower end; negative infinity if there is none.
+    /// Lower end; negative infinity for none.
     pub min: f64,
-    /// Upper end; infinity if there is none.
+    /// Upper end; infinity for none.
     pub max: f64,
-    /// Whether the lower end itself is out of range.
+    /// Whether the range excludes its lower end.
     pub is_open: bool,
 }
 

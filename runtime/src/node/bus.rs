@@ -1,23 +1,23 @@
-//! Where the values of a running graph are, and how the inputs of a node find them.
+//! The storage of all values of a running graph, and the wires of a node into it.
 
 use super::Need;
 use crate::signal::{Arenas, Mark, Shape};
 
-/// Where a port's value and mark are.
+/// The location of a port's value and mark.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct PortId {
     /// Index into the arena of its kind.
     pub slot: u32,
-    /// Index of its mark.
+    /// Index of the mark.
     pub mark: u32,
 }
 
 impl PortId {
-    /// No port: an input that is not wired.
+    /// No port, for an input that is not wired.
     pub const NONE: Self = Self { slot: u32::MAX, mark: u32::MAX };
 }
 
-/// Every value of a running graph, with its mark.
+/// All values of a running graph and their marks.
 #[derive(Debug, Default)]
 pub struct Bus {
     /// Marks of all ports.
@@ -27,14 +27,14 @@ pub struct Bus {
 }
 
 impl Bus {
-    /// Makes room for one more port.
+    /// Adds a port.
     pub fn add(&mut self, shape: &Shape) -> PortId {
         self.marks.push(Mark::default());
         PortId { slot: self.arenas.add(shape), mark: self.marks.len() as u32 - 1 }
     }
 }
 
-/// The wires of one node: a port for each input, in the order of the declaration.
+/// The wires of one node: a port for each input, in the order of the declarations.
 #[derive(Debug, Clone, Default)]
 pub struct Wires {
     pub(super) single: Box<[PortId]>,
@@ -42,7 +42,7 @@ pub struct Wires {
 }
 
 impl Wires {
-    /// Wires from the ports of each input: at most one for a plain input, any number for `Many`.
+    /// Creates the wires from the ports of each input: at most one for a plain input, any number for `Many`.
     #[must_use]
     pub fn new(inputs: &[(Need, Vec<PortId>)]) -> Self {
         let mut many = Vec::new();
@@ -58,13 +58,13 @@ impl Wires {
         Self { single, many: many.into() }
     }
 
-    /// The port of input `i`, if it is wired.
+    /// Returns the port of input `i`, or `None` if it is not wired.
     #[must_use]
     pub fn port(&self, i: usize) -> Option<PortId> {
         Some(self.single[i]).filter(|port| *port != PortId::NONE)
     }
 
-    /// The ports of the variadic input `i`.
+    /// Returns the ports of the variadic input `i`.
     #[must_use]
     pub fn ports(&self, i: usize) -> &[PortId] {
         let PortId { slot, mark } = self.single[i];

@@ -1,4 +1,4 @@
-//! From the declaration of a parameter and its type to its description.
+//! The description of a parameter from its declaration and its type.
 
 use super::bounds::Bounds;
 use super::param_spec::{Declared, ParamSpec, Written};
@@ -6,7 +6,7 @@ use super::reader::{Param, Reader};
 use crate::source::{SourceMap, Value};
 
 impl ParamSpec {
-    /// The description of a field of type `T`.
+    /// Returns the description of a field of type `T`.
     #[must_use]
     pub fn of<T: Param>(declared: &Declared, default: Option<fn() -> T>) -> Self {
         let Declared { name, doc, unit, bounds, is_live } = *declared;
@@ -17,11 +17,11 @@ impl ParamSpec {
             unit: unit
                 .map(|unit| if unit.starts_with('$') { unit.into() } else { unit.replace('2', "²").replace('3', "³") }),
             bounds,
-            words: T::WORDS,
+            words: T::CONTENTS.words,
             takes: T::takes(bounds.as_ref()),
             default: written.as_ref().map(Written::to_string),
             is_optional: default.is_some() || T::when_missing().is_some(),
-            repeats: T::REPEATS,
+            repeats: T::CONTENTS.repeats,
             fields: T::fields(),
             is_live,
             fault: written.and_then(|written| fault::<T>(&written, bounds)),

@@ -1,7 +1,7 @@
 //! The erased contract: ports and parameters as data.
 //!
-//! [`of`] makes it from a [`Node`]; a node that is known only at run time, in another process say, implements
-//! [`NodeType`] itself.
+//! [`of`] creates it from a [`Node`]. A node that is known only at run time, for example one in another process,
+//! implements [`NodeType`] itself.
 
 use std::any::Any;
 use std::borrow::Cow;
@@ -14,85 +14,87 @@ use super::{
 use crate::signal::Shape;
 use crate::source::Value;
 
-/// What is known of a node type without a graph.
+/// The description of a node type, independent of any graph.
 #[derive(Debug, Clone)]
 pub struct NodeSpec {
-    /// Its `type` in a graph file.
+    /// The `type` in a graph file.
     pub name: Cow<'static, str>,
-    /// What it does, in one line.
+    /// What the node does, in one line.
     pub summary: Cow<'static, str>,
-    /// How it does it, in Markdown; empty if there is nothing more to say.
+    /// The full documentation in Markdown; may be empty.
     pub doc: Cow<'static, str>,
-    /// A block to paste; empty if there is none.
+    /// An example block to paste into a graph; may be empty.
     pub example: Cow<'static, str>,
-    /// What a graph file may set.
+    /// The parameters.
     pub params: Vec<ParamSpec>,
-    /// What it reads.
+    /// The inputs.
     pub inputs: Vec<PortSpec>,
-    /// What it writes.
+    /// The outputs.
     pub outputs: Vec<PortSpec>,
-    /// Whether it steps in every tick.
+    /// Whether the node steps in every tick.
     pub every_tick: bool,
-    /// Whether the tool logs what came in on its wires; see [`Describe::LOGS`](super::Describe::LOGS).
+    /// Whether the tool logs the inputs; see [`Describe::LOGS`](super::Describe::LOGS).
     pub logs: bool,
-    /// What holds of the motion it gives.
+    /// The limits that the node holds, passes on or breaks.
     pub limits: Limits,
 }
 
-/// What a node is made from: the shapes its wires bring, by input in the order of the declaration.
+/// The wiring from which a node is built.
 #[derive(Debug, Clone, Default)]
 pub struct Given {
-    /// For each input its wires, with the names that the graph file gives a variadic one's.
+    /// For each input, in the order of the declarations, the names and shapes of its wires. The names matter only for
+    /// `Many`.
     pub inputs: Vec<Vec<(String, Shape)>>,
     /// Nominal time between two ticks [s].
     pub period: f64,
 }
 
-/// A node type: what a catalogue lists.
+/// A node type: an entry of a catalogue.
 pub trait NodeType: Send + Sync {
-    /// Ports, parameters and docs.
+    /// Returns the ports, the parameters and the documentation.
     fn spec(&self) -> NodeSpec;
 
-    /// Reads the parameters from the node's table; every mistake goes to the reader.
+    /// Reads the parameters from the node's table. The reader collects the mistakes.
     fn configure(&self, table: &Value, reader: &mut Reader<'_>) -> Option<Box<dyn Configured>>;
 }
 
-/// A node whose parameters are read, but whose wires are not known yet.
+/// A node whose parameters are known, but not its wires.
 pub trait Configured {
-    /// Makes the node.
+    /// Builds the node.
     ///
     /// # Errors
-    /// What is wrong with the parameters or the wires.
+    /// The mistakes in the parameters or the wires.
     fn build(self: Box<Self>, given: Given) -> Result<Built, Mistakes>;
 }
 
-/// A node that can run, and the shapes of its outputs.
+/// A built node and the shapes of its outputs.
 pub struct Built {
     /// The node.
     pub node: Box<dyn AnyNode>,
-    /// Shape of each output in the order of the declaration.
+    /// Shape of each output in the order of the declarations.
     pub outputs: Vec<Shape>,
-    /// Whether it starts no motion by itself; see [`Setup`].
+    /// Whether the node starts no motion by itself; see [`Setup`].
     pub is_still: bool,
 }
 
 /// A node that can run.
 pub trait AnyNode: Any + Send {
-    /// One step: reads its wires from the bus and writes and marks its outputs.
+    /// Runs one step: reads the wires from the bus, then writes and marks the outputs.
     fn step(&mut self, tick: &Tick, bus: &mut Bus, wires: &Wires, outputs: &[PortId]);
     /// Makes every output absent.
     fn lose(&mut self, tick: u64, bus: &mut Bus, outputs: &[PortId]);
-    /// Puts the state back to what it was at first, without allocating.
+    /// Resets the state in place, without allocating.
     fn reset(&mut self);
-    /// Takes over the configuration of another node of its type, for a mode; its number, or the other if it cannot. That
-    /// of the node itself has number 0.
+    /// Adds the configuration of another node of the same type, for a mode. Returns its number; the node's own
+    /// configuration has number 0.
     ///
     /// # Errors
-    /// The other node, if its type knows no modes.
+    /// Returns the other node if this type does not support modes.
     fn adopt(&mut self, other: Box<dyn AnyNode>) -> Result<usize, Box<dyn AnyNode>> {
         Err(other)
     }
-    /// Goes on with the configuration of that number, without allocating; the state stays. Whether it is another.
+    /// Switches to a configuration by its number, without allocating. The state stays. Returns whether the configuration
+    /// changed.
     fn switch(&mut self, configuration: usize) -> bool {
         let _ = configuration;
         false
@@ -109,7 +111,7 @@ pub trait AnyNode: Any + Send {
     }
 }
 
-/// The erased form of a node written against the typed contract.
+/// Returns the erased form of a node.
 #[must_use]
 pub fn of<N: Node>() -> Box<dyn NodeType> {
     Box::new(Typed::<N>(PhantomData))
@@ -156,9 +158,9 @@ impl<N: Node> Configured for WithParams<N> {
 struct Cell<N: Node> {
     active: Configuration<N>,
     state: N::State,
-    /// The other configurations by their numbers; the place of the active one is empty.
+    /// The inactive configurations by number; the entry of the active one is `None`.
     parked: Vec<Option<Configuration<N>>>,
-    /// Number of the active one.
+    /// Number of the active configuration.
     number: usize,
 }
 

@@ -3,13 +3,13 @@
 use std::ops::Range;
 use std::path::PathBuf;
 
-/// A file, named relative to the file it stands in; or `builtin:NAME`, one that the catalogue brings along.
+/// The path of a file, relative to the file that names it, or `builtin:NAME` for a file of the catalogue.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct FilePath {
-    /// Where it is.
+    /// The path.
     pub path: PathBuf,
-    /// Where its name stands.
+    /// The place of its name in the source map.
     pub span: Range<usize>,
-    /// Its bytes, if it is one that the catalogue brings along.
+    /// The contents, if it is a file of the catalogue.
     pub builtin: Option<&'static [u8]>,
 }

@@ -5,7 +5,7 @@ use std::ops::Deref;
 use super::{Bus, PortId, PortSpec, Wires};
 use crate::signal::{Features, Freshness, Mark, Scalar, Shape, Signal, Stamp};
 
-/// A value that is there.
+/// A value that is present, with its freshness and its stamp.
 #[derive(Debug, Clone, Copy)]
 pub struct In<'a, T> {
     value: &'a T,
@@ -14,24 +14,24 @@ pub struct In<'a, T> {
 }
 
 impl<'a, T> In<'a, T> {
-    /// A value with its mark, as seen in `tick`.
+    /// Creates an input from a value and its mark, as seen in `tick`.
     pub const fn new(value: &'a T, mark: &'a Mark, tick: u64) -> Self {
         Self { value, mark, tick }
     }
 
-    /// The value, for as long as the tick lasts.
+    /// Returns the value with the lifetime of the tick.
     #[must_use]
     pub const fn value(&self) -> &'a T {
         self.value
     }
 
-    /// Whether it was made in this tick; otherwise it is held.
+    /// Whether the value was written in this tick. Otherwise it is held from an earlier one.
     #[must_use]
     pub const fn is_new(&self) -> bool {
         self.mark.changed_in(self.tick)
     }
 
-    /// Stamp of the sample it came from.
+    /// Returns the stamp of the sample that the value was computed from.
     #[must_use]
     pub const fn stamp(&self) -> Stamp {
         self.mark.stamp()
@@ -45,9 +45,9 @@ impl<T> Deref for In<'_, T> {
     }
 }
 
-/// The components of a feature vector, each with a freshness of its own.
+/// Each component of a feature vector has its own freshness.
 impl<'a> In<'a, Features> {
-    /// Number of components.
+    /// Returns the number of components.
     #[must_use]
     pub fn len(&self) -> usize {
         self.value.components().len()
@@ -88,7 +88,7 @@ pub struct Many<'a, T> {
 }
 
 impl<'a, T> Many<'a, T> {
-    /// Number of wires.
+    /// Returns the number of wires.
     #[must_use]
     pub const fn len(&self) -> usize {
         self.ports.len()
@@ -100,7 +100,7 @@ impl<'a, T> Many<'a, T> {
         self.ports.is_empty()
     }
 
-    /// What comes in on wire `i`, if it is there.
+    /// Returns the value of wire `i`, or `None` while it is absent.
     #[must_use]
     pub fn get(&self, i: usize) -> Option<In<'a, T>> {
         let port = self.ports[i];
@@ -108,28 +108,28 @@ impl<'a, T> Many<'a, T> {
         mark.is_present().then(|| In::new(&self.values[port.slot as usize], mark, self.tick))
     }
 
-    /// Freshness of wire `i`.
+    /// Returns the freshness of wire `i`.
     #[must_use]
     pub fn freshness(&self, i: usize) -> Freshness {
         self.marks[self.ports[i].mark as usize].freshness(self.tick)
     }
 
-    /// What comes in on each wire.
+    /// Returns the value of each wire; `None` where it is absent.
     pub fn iter(&self) -> impl Iterator<Item = Option<In<'a, T>>> {
         (0..self.len()).map(|i| self.get(i))
     }
 }
 
-/// How one input is seen in a step.
+/// One form of an input: `In`, `Option<In>` or `Many`.
 pub trait View<'a>: Sized {
-    /// Its signal.
+    /// The signal.
     type Signal: Signal;
-    /// What the node learns of its shape at load.
+    /// The shape that the node gets at load.
     type Shape;
 
-    /// What input `i` shows in `tick`.
+    /// Reads input `i` in `tick`.
     fn fetch(bus: &'a Bus, wires: &'a Wires, i: usize, tick: u64) -> Self;
-    /// The shape, from the named wires of the input.
+    /// Returns the shape of the input from its named wires.
     fn shape(wires: Vec<(String, Shape)>) -> Self::Shape;
 }
 
@@ -179,16 +179,16 @@ impl<'a, T: Signal> View<'a> for Many<'a, T> {
     }
 }
 
-/// All inputs of a node; made by [`inputs!`](crate::inputs).
+/// All inputs of a node. `#[derive(Inputs)]` implements it.
 pub trait InputSet<'a>: Sized {
-    /// What the node learns of its inputs at load.
+    /// The shapes that the node gets at load.
     type Shapes;
 
-    /// The declaration.
+    /// Returns the declarations of the ports, in their order.
     fn specs() -> Vec<PortSpec>;
-    /// The shapes, from the named wires of each input.
+    /// Returns the shapes from the named wires of each input.
     fn shapes(wires: Vec<Vec<(String, Shape)>>) -> Self::Shapes;
-    /// What the inputs show in `tick`.
+    /// Reads the inputs in `tick`.
     fn fetch(bus: &'a Bus, wires: &'a Wires, tick: u64) -> Self;
 }
 

@@ -1,66 +1,66 @@
-//! What a node does for the limits of a motion, and which components of a value matter: what load proves things with.
+//! The limits that a node holds, and the components of a value that are read.
 
-/// What holds of the motion that a node gives. Every device's command names the limits it must have crossed; the check
-/// follows its wire back and looks for them.
+/// The limits that a node guarantees for the motion at its output. The command of a role lists the limits that it must
+/// cross; the check follows its wire upstream and looks for them.
 ///
-/// A node that holds a limit has an output of that name: a scalar, the share of what was wanted that it lets pass, so 1
-/// when it does nothing.
+/// A node that holds a limit has a scalar output of that name: the fraction of the wanted motion that passes. It is 1
+/// while the limit is not reached.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Limits {
-    /// The input whose motion the node passes on: what holds of that, holds of the node's too.
+    /// The input whose motion the node passes on. The limits of that input hold for the output as well.
     pub through: Option<&'static str>,
-    /// What holds because of the node.
+    /// The limits that the node adds.
     pub holds: &'static [&'static str],
-    /// What held of the input and need not hold of the output, so that it must come later.
+    /// The limits of the input that the output may violate. They must come later.
     pub breaks: &'static [&'static str],
 }
 
 impl Limits {
-    /// Nothing holds: what most nodes give.
+    /// No limit holds. Most nodes use it.
     pub const NONE: Self = Self { through: None, holds: &[], breaks: &[] };
 
-    /// What holds of an input holds of the outputs, and no more: a change of frame, say.
+    /// The limits of an input hold for the outputs, and no others; for example in a change of frame.
     #[must_use]
     pub const fn passed(input: &'static str) -> Self {
         Self { through: Some(input), ..Self::NONE }
     }
 }
 
-/// Which components of a value anything reads: those of a twist or of a feature vector, in their order. Of other kinds
-/// all of them or none.
+/// The components of a twist or of a feature vector that something reads, in their order. For other kinds it is all or
+/// none.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Components(u64);
 
 impl Components {
-    /// All of them.
+    /// All components.
     pub const ALL: Self = Self(u64::MAX);
-    /// None.
+    /// No component.
     pub const NONE: Self = Self(0);
 
-    /// Those of the first `count` for which `is_one` holds.
+    /// Returns those of the first `count` components for which `is_one` holds.
     #[must_use]
     pub fn of(count: usize, is_one: impl Fn(usize) -> bool) -> Self {
         (0..count).filter(|i| is_one(*i)).fold(Self::NONE, |all, i| all.or(Self(1 << Self::bit(i))))
     }
 
-    /// Whether component `i` is one of them.
+    /// Whether it contains component `i`.
     #[must_use]
     pub const fn has(self, i: usize) -> bool {
         self.0 >> Self::bit(i) & 1 == 1
     }
 
-    /// Whether there is none.
+    /// Whether it contains no component.
     #[must_use]
     pub const fn is_empty(self) -> bool {
         self.0 == 0
     }
 
-    /// Those from the 64th on share a bit: as long as one of them counts, all do.
+    /// Components from the 64th on share a bit.
     const fn bit(i: usize) -> usize {
         if i < 63 { i } else { 63 }
     }
 
-    /// Those that are in one of both.
+    /// Returns the components that are in either.
     #[must_use]
     pub const fn or(self, other: Self) -> Self {
         Self(self.0 | other.0)

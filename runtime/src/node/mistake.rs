@@ -1,4 +1,4 @@
-//! What a node says is wrong with its parameters or its wires.
+//! Mistakes that a node or a device finds in its parameters or its wires.
 
 use std::io;
 use std::ops::Range;
@@ -7,22 +7,22 @@ use std::sync::Arc;
 use super::file_path::FilePath;
 use crate::source::Code;
 
-/// The place of a mistake, in the words of the graph file.
+/// The place of a mistake, by the names of the graph file.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum At {
     /// The value of a parameter, by its dotted path.
     Param(String),
     /// The key of a parameter, by its dotted path.
     Key(String),
-    /// The wire of an input, by its name (`x`, or `in.x`'s last part).
+    /// The wire of an input, by the input's name: `x` for `in.x`.
     Input(String),
-    /// A place that is known already.
+    /// A place in the source map.
     Span(Range<usize>),
-    /// A place in a file of data that the graph names.
+    /// A place in a data file that the graph names.
     Data {
-        /// The file, and where its name stands.
+        /// The file and the place of its name.
         file: Box<FilePath>,
-        /// Its text, which all mistakes in it share.
+        /// Its text, shared by all mistakes in it.
         text: Arc<str>,
         /// The place in that text.
         span: Range<usize>,
@@ -31,16 +31,16 @@ pub enum At {
     Node,
 }
 
-/// One mistake: where, what, and a way out.
+/// One mistake: its place, what is wrong, and how to fix it.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Mistake {
-    /// What sort of mistake.
+    /// The code.
     pub code: Code,
-    /// Where.
+    /// The place.
     pub at: At,
     /// What is wrong: lower case, no full stop, names in backticks.
     pub message: String,
-    /// What to do.
+    /// How to fix it.
     pub help: Option<String>,
 }
 
@@ -48,40 +48,40 @@ pub struct Mistake {
 pub type Mistakes = Vec<Mistake>;
 
 impl Mistake {
-    /// A mistake of any sort.
+    /// Creates a mistake with any code and place.
     pub fn new(code: Code, at: At, message: impl Into<String>) -> Self {
         Self { code, at, message: message.into(), help: None }
     }
 
-    /// The value at a parameter's dotted path will not do.
+    /// The value of a parameter, by its dotted path, is wrong.
     pub fn param(path: impl Into<String>, message: impl Into<String>) -> Self {
         Self::new(Code::BadValue, At::Param(path.into()), message)
     }
 
-    /// The key at a parameter's dotted path is one too many.
+    /// A key, by its dotted path, is unknown.
     pub fn key(path: impl Into<String>, message: impl Into<String>) -> Self {
         Self::new(Code::UnknownKey, At::Key(path.into()), message)
     }
 
-    /// What comes in on an input does not fit the rest.
+    /// The shape of an input does not match the other inputs or the parameters.
     pub fn input(name: impl Into<String>, message: impl Into<String>) -> Self {
         Self::new(Code::ShapeMismatch, At::Input(name.into()), message)
     }
 
-    /// A file of data is not what it should be, at a place in its text.
+    /// A data file is wrong at a place in its text.
     pub fn data(file: &FilePath, text: impl Into<Arc<str>>, span: Range<usize>, message: impl Into<String>) -> Self {
         let at = At::Data { file: Box::new(file.clone()), text: text.into(), span };
         Self::new(Code::BadData, at, message)
     }
 
-    /// A file cannot be read.
+    /// A file is not readable.
     #[must_use]
     pub fn unreadable(file: &FilePath, error: &io::Error) -> Self {
         let message = format!("cannot read `{}`: {error}", file.path.display());
         Self::new(Code::Unreadable, At::Span(file.span.clone()), message)
     }
 
-    /// The same mistake with a way out.
+    /// Adds a way to fix it.
     #[must_use]
     pub fn help(mut self, help: impl Into<String>) -> Self {
         self.help = Some(help.into());

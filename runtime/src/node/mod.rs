@@ -11,7 +11,7 @@
 //! | `#[derive(Outputs)]` | [`OutputSet`] | the same |
 //! | `#[derive(State)]` | [`Clone`], field by field, so that a reset does not allocate | |
 //!
-//! The type of an input and its attribute say what it needs. Each fact is independent: whether it must be wired
+//! The type of an input and its attribute declare what it needs. The three properties are independent: whether it must be wired
 //! (`optional`), whether it must be present while the node steps (`Option`), and whether a new value wakes the node
 //! (`sampled`).
 //!
@@ -27,10 +27,10 @@
 //! | `Option<In<'a, T>>` | `delayed` | new or lost one tick ago, if no other input wakes it | `None`; it is read as the last tick left it |
 //! | `Many<'a, T>` | | any is new or lost | `None` for that wire; any number of wires, each named in the graph |
 //!
-//! A port names what its kind has, and `"_"` where there is nothing to name: `unit` and `frame` (`Scalar`, `Features`,
+//! A port declares the arguments of its kind, with `"_"` for none: `unit` and `frame` (`Scalar`, `Features`,
 //! `Image`, `Regions`), `frame` (`Mask`, `Twist`), `frame` and `reference` (`Pose`), `unit` and `robot` (`Joints`), `frame`
-//! and `robot` (`Jacobian`), nothing (`Flag`). A capital letter is a variable: what it stands for is known when the graph
-//! is loaded, and it is the same for all ports of the node. `"$name"` is the frame or unit that the parameter `name` names.
+//! and `robot` (`Jacobian`), nothing (`Flag`). A capital letter is a variable: its value is known when the graph
+//! is loaded, and is the same for all ports of the node. `"$name"` is the frame or unit that the parameter `name` holds.
 
 mod bounds;
 mod bus;
@@ -59,7 +59,7 @@ pub use inputs::{In, InputSet, Many, View};
 pub use limits::{Components, Limits};
 pub use mistake::{At, Mistake, Mistakes};
 pub use outputs::{Out, OutputSet};
-pub use param_spec::{Declared, ParamSpec, Repeats, Written, written_table};
+pub use param_spec::{Contents, Declared, ParamSpec, Repeats, Written, written_table};
 pub use params::{Map, Spanned};
 pub(crate) use pattern::{UnitPattern, declares_a_unit, frame_args, may_fit, unit_pattern};
 pub use ports::{Letters, Need, PortSpec};
@@ -72,70 +72,71 @@ pub use time::{Absence, Interval};
 pub trait Describe {
     /// The `type` in a graph file.
     const NAME: &'static str;
-    /// What it does, in one line.
+    /// The summary in one line.
     const SUMMARY: &'static str;
-    /// How it does it, for the reference: the equation and its source, when to use it, what to look out for. Markdown.
+    /// The documentation for the reference, in Markdown: the equation and its source, when to use the node, its pitfalls.
     const DOC: &'static str = "";
-    /// A block `[nodes.…]` to paste, or what plugs a device into a graph. Its wires may name the blocks of other nodes'
-    /// examples and the roles of devices' examples: `describe` builds a graph from all of them, which loads.
+    /// A block `[nodes.…]` to paste, or the blocks that connect a device. Its wires may name the blocks of other nodes'
+    /// examples and the roles of devices' examples: `describe` composes a complete graph from them.
     const EXAMPLE: &'static str = "";
-    /// Whether a node steps in every tick, and not only when a trigger is new or lost: sinks and generators.
+    /// Whether the node steps in every tick, and not only when a trigger is new or lost. Sinks and generators do.
     const EVERY_TICK: bool = false;
-    /// Whether the tool logs the inputs of a node after each tick in which its first output, a flag, is new and set. A
-    /// step never logs: it decides, and the edge writes.
+    /// Whether the tool logs the inputs after each tick in which the first output, a flag, is new and set. A step itself
+    /// never logs.
     const LOGS: bool = false;
 }
 
-/// A node: configuration in `self`, made at load; state apart, so that a mode is a second configuration.
+/// A node. `self` is the configuration, built at load. The state is separate, so that a mode can exchange the configuration.
 pub trait Node: Describe + Sized + Send + 'static {
-    /// What the graph file may set.
+    /// The parameters; `()` for none.
     type Params: Param;
-    /// What the node reads.
+    /// The inputs; `()` for none.
     type Inputs<'a>: InputSet<'a>;
-    /// What the node writes.
+    /// The outputs; `()` for none.
     type Outputs: OutputSet;
-    /// What the node remembers from one step to the next; `()` if nothing.
+    /// The state that lasts from one step to the next; `()` for none.
     type State: Clone + Send + 'static;
 
-    /// What holds of the motion it gives.
+    /// The limits that the node holds, passes on or breaks.
     const LIMITS: Limits = Limits::NONE;
 
-    /// Makes the node: reads the shapes of the inputs and sets those of the outputs. May fail, may allocate.
+    /// Builds the node: reads the shapes of the inputs and sets those of the outputs. It may allocate.
     ///
     /// # Errors
-    /// What is wrong with the parameters or the wires, each with its place.
+    /// The mistakes in the parameters or the wires, each with its place.
     fn new(params: Self::Params, setup: &mut Setup<Self>) -> Result<Self, Mistakes>;
 
-    /// A fresh state: what a reset means.
+    /// Returns the initial state. A reset restores it.
     fn state(&self) -> Self::State;
 
-    /// Which components of each input matter, in the order of the declaration, if of each output only those matter that
-    /// are `wanted`: for a node that passes components on one by one. An empty list is all of all of them.
+    /// Returns the components of each input that the `wanted` components of the outputs depend on, in the order of the
+    /// declarations. Implement it for a node that passes on components one by one. An empty list stands for all
+    /// components of all inputs.
     fn uses(&self, wanted: &[Components]) -> Vec<Components> {
         let _ = wanted;
         Vec::new()
     }
 
-    /// Told at load which components of each output anything reads: a feature that is projected out is not, and what
-    /// is gathered for it would be gathered in vain. Whether the node leaves the others absent from then on.
+    /// Receives at load the components of each output that something reads. A feature that a projector removes is not
+    /// among them, so the node need not compute it. Returns whether the node leaves the other components absent.
     fn want(&mut self, wanted: &[Components]) -> bool {
         let _ = wanted;
         false
     }
 
-    /// One step. Cannot fail, block, allocate, log or read a clock. An output that is not written is absent.
+    /// Runs one step. It must not block, allocate, log or read a clock. An output that it does not write becomes absent.
     fn step(&self, tick: &Tick, inputs: Self::Inputs<'_>, out: &mut Self::Outputs, state: &mut Self::State);
 }
 
-/// What a node is made from, beside its parameters.
+/// The wiring that a node is built with.
 pub struct Setup<N: Node> {
-    /// Shapes of the inputs, as the wires give them.
+    /// Shapes of the inputs, from the wires.
     pub inputs: <N::Inputs<'static> as InputSet<'static>>::Shapes,
-    /// Shapes of the outputs, for the node to set. Units that follow from the declaration are filled in afterwards.
+    /// Shapes of the outputs, which the node sets. The runtime then fills in the units that follow from the declarations.
     pub outputs: <N::Outputs as OutputSet>::Shapes,
     /// Nominal time between two ticks of the graph [s].
     pub period: f64,
-    /// For the node to set: whether with these parameters it starts no motion by itself, though no sample is behind what
-    /// it gives. What has samples behind it need not say so.
+    /// Set by a generator whose parameters cause no motion. A node whose output is computed from samples leaves it
+    /// `false`.
     pub is_still: bool,
 }

@@ -3,7 +3,8 @@
 use super::{Bus, In, PortId, PortSpec, Tick};
 use crate::signal::{Features, Settable, Shape, Signal};
 
-/// A value for a step to write. What it does not write is absent, but for the components of a feature vector.
+/// An output that a step writes. An output that the step does not write becomes absent; components of a feature vector
+/// keep their values until the step sets or loses them.
 #[derive(Debug, Default)]
 pub struct Out<T> {
     value: T,
@@ -20,20 +21,20 @@ enum Done {
 }
 
 impl<T: Settable> Out<T> {
-    /// Writes the value.
+    /// Sets the value.
     pub fn set(&mut self, value: T) {
         *self.write() = value;
     }
 }
 
 impl Out<Features> {
-    /// Sets component `i`, with the stamp of the step: the oldest among the inputs that wake the node.
+    /// Sets component `i`. Its stamp is that of the step: the oldest among the inputs that wake the node.
     pub fn set(&mut self, i: usize, value: f64) {
         let (tick, stamp) = self.value.now();
         self.write().set(i, value, tick, stamp);
     }
 
-    /// Sets component `i`, with the stamp of the input that it is computed from.
+    /// Sets component `i`. Its stamp is that of `input`, from which the value is computed.
     pub fn set_from<T>(&mut self, i: usize, value: f64, input: &In<'_, T>) {
         let (tick, _) = self.value.now();
         self.write().set(i, value, tick, input.stamp());
@@ -52,14 +53,14 @@ impl<T: Signal> Out<T> {
         value.copy_to(self.write());
     }
 
-    /// The value, to be written whole and in place.
+    /// Returns the value, which the step must write completely.
     pub const fn write(&mut self) -> &mut T {
         self.done = Done::Written;
         &mut self.value
     }
 
-    /// Leaves the output as it was: a value that was there is held, and does not count as new once more. For a node
-    /// that is woken by one input and passes another on.
+    /// Leaves the output unchanged: a present value stays, and is held instead of new. Use it in a node that one input
+    /// wakes and that passes on another.
     pub const fn keep(&mut self) {
         self.done = Done::Kept;
     }
@@ -72,7 +73,7 @@ impl<T: Signal> Out<T> {
         Self { value: T::take(slot, tick.index, tick.stamp), done: Done::Nothing }
     }
 
-    /// Puts the buffer back and marks what the step did.
+    /// Returns the buffer to the bus and marks the port as written, held or absent.
     #[doc(hidden)]
     #[inline(always)]
     pub fn put(self, bus: &mut Bus, port: PortId, tick: &Tick) {
@@ -97,18 +98,18 @@ impl<T: Signal> Out<T> {
     }
 }
 
-/// All outputs of a node; made by [`outputs!`](crate::outputs).
+/// All outputs of a node. `#[derive(Outputs)]` implements it.
 pub trait OutputSet: Sized {
-    /// The shapes, for the node to set.
+    /// The shapes, which the node sets in `new`.
     type Shapes: Default;
 
-    /// The declaration.
+    /// Returns the declarations of the ports, in their order.
     fn specs() -> Vec<PortSpec>;
-    /// The shapes as the node set them, in the order of the declaration.
+    /// Returns the shapes that the node has set, in the order of the declarations.
     fn into_shapes(shapes: Self::Shapes) -> Vec<Shape>;
     /// Takes all buffers from the bus for one step.
     fn take(bus: &mut Bus, ports: &[PortId], tick: &Tick) -> Self;
-    /// Puts all buffers back and marks what the step did.
+    /// Returns all buffers to the bus and marks each port as written, held or absent.
     fn put(self, bus: &mut Bus, ports: &[PortId], tick: &Tick);
     /// Makes all outputs absent.
     fn lose(bus: &mut Bus, ports: &[PortId], tick: u64);

@@ -1,11 +1,11 @@
-//! What is known of a parameter without a graph: for the reference, and for whoever shows a graph with its defaults.
+//! The description of a parameter, for the reference and for displays of a graph with its defaults.
 
 use super::bounds::Bounds;
 
-/// A parameter as a graph file would say it.
+/// A parameter in the form of a graph file.
 pub type Written = toml::Value;
 
-/// A table of parameters as a graph file would say it; what says nothing is left out.
+/// Returns a table of parameters in the form of a graph file, without the entries that are `None`.
 #[doc(hidden)]
 #[must_use]
 pub fn written_table<const N: usize>(fields: [(&str, Option<Written>); N]) -> Option<Written> {
@@ -13,7 +13,7 @@ pub fn written_table<const N: usize>(fields: [(&str, Option<Written>); N]) -> Op
     Some(Written::Table(entries.collect()))
 }
 
-/// What is known of a parameter without a graph.
+/// The description of a parameter.
 #[derive(Debug, Clone)]
 pub struct ParamSpec {
     /// Name in the graph file.
@@ -24,36 +24,56 @@ pub struct ParamSpec {
     pub unit: Option<String>,
     /// Range of the number, or of each number in it.
     pub bounds: Option<Bounds>,
-    /// The words it takes, each with its meaning, if it is one of a few.
+    /// The words of an enum, each with its meaning.
     pub words: &'static [(&'static str, &'static str)],
-    /// What it takes, for a person.
+    /// The accepted values in words.
     pub takes: String,
-    /// Default as a graph file would say it; none if it must be given, or is nothing at all when it is left out.
+    /// Default in the form of a graph file; `None` for a required parameter and for an `Option`.
     pub default: Option<String>,
-    /// Whether it may be left out.
+    /// Whether a graph may leave it out.
     pub is_optional: bool,
-    /// How often the fields are there.
+    /// How often the nested fields repeat.
     pub repeats: Repeats,
     /// The parameters of a nested table.
     pub fields: Vec<ParamSpec>,
-    /// Whether it may change while the graph runs: a mode can set it.
+    /// Whether a mode can set it while the graph runs.
     pub is_live: bool,
-    /// Why a graph file could not give the default; the catalogue refuses such a node.
+    /// Why the reader refuses the default. The catalogue does not accept such a node.
     pub fault: Option<String>,
 }
 
-/// How often the fields of a nested table are there.
+/// How often the fields of a nested table repeat.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Repeats {
     /// Once.
     Once,
-    /// Once for each name that the graph chooses.
+    /// Once for each name in the graph.
     PerName,
     /// Once for each entry of a list.
     PerEntry,
 }
 
-/// What an author declares of a parameter, beside its type and its default.
+/// What a parameter consists of.
+#[derive(Debug, Clone, Copy)]
+pub struct Contents {
+    /// How often the nested fields repeat.
+    pub repeats: Repeats,
+    /// Whether it is a number or consists of numbers, so that it can have a range.
+    pub is_number: bool,
+    /// The words of an enum, each with its meaning.
+    pub words: &'static [(&'static str, &'static str)],
+    /// The fields of a table.
+    pub fields: fn() -> Vec<ParamSpec>,
+}
+
+impl Contents {
+    /// Neither a number, nor an enum, nor a table.
+    pub const OPAQUE: Self = Self { repeats: Repeats::Once, is_number: false, words: &[], fields: Vec::new };
+    /// A number.
+    pub const NUMBER: Self = Self { is_number: true, ..Self::OPAQUE };
+}
+
+/// The declaration of a parameter without its type and its default.
 #[derive(Debug, Clone, Copy)]
 pub struct Declared {
     /// Name in the graph file.
@@ -69,7 +89,7 @@ pub struct Declared {
 }
 
 impl Declared {
-    /// A parameter of which only the name is declared.
+    /// Declares only the name.
     #[must_use]
     pub const fn new(name: &'static str) -> Self {
         Self { name, doc: "", unit: None, bounds: None, is_live: false }
@@ -77,7 +97,7 @@ impl Declared {
 }
 
 impl ParamSpec {
-    /// Its meaning with its unit, in one line.
+    /// Returns the meaning with the unit, in one line.
     #[must_use]
     pub fn doc_with_unit(&self) -> String {
         let doc = self.doc.split_whitespace().collect::<Vec<_>>().join(" ");

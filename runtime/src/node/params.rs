@@ -1,4 +1,4 @@
-//! Parameters: read from the graph file value by value, so that every mistake of a node shows at once, on its token.
+//! The types that a parameter can have.
 
 use std::borrow::Cow;
 use std::collections::BTreeMap;
@@ -7,7 +7,7 @@ use std::ops::Range;
 use super::bounds::Bounds;
 use super::file_path::FilePath;
 use super::mistake::{At, Mistake, Mistakes};
-use super::param_spec::{ParamSpec, Repeats, Written};
+use super::param_spec::{Contents, Repeats, Written};
 use super::reader::{Param, Reader, read_leaf};
 use crate::signal::Unit;
 use crate::source::{Code, suggest_name, suggestion};
@@ -33,7 +33,7 @@ macro_rules! whole_numbers {
     ($($type:ty),*) => {$(
         impl Param for $type {
             const EXPECTS: &'static str = "a whole number, 0 or more";
-            const IS_NUMBER: bool = true;
+            const CONTENTS: Contents = Contents::NUMBER;
             fn read(value: &Value, reader: &mut Reader<'_>) -> Option<Self> {
                 let expects = if reader.bounds.is_some() { WHOLE_NUMBER } else { Self::EXPECTS };
                 reader.number(value, expects, |number| number as f64)
@@ -54,7 +54,7 @@ whole_numbers!(u64, usize);
 
 impl Param for f64 {
     const EXPECTS: &'static str = "a number";
-    const IS_NUMBER: bool = true;
+    const CONTENTS: Contents = Contents::NUMBER;
 
     fn read(value: &Value, reader: &mut Reader<'_>) -> Option<Self> {
         let number: Self = reader.number(value, Self::EXPECTS, |number| number)?;
@@ -70,20 +70,18 @@ impl Param for f64 {
     }
 }
 
-/// A parameter and where it stands, for a mistake that is found later.
+/// A parameter with its place, for mistakes that are found after reading.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Spanned<T> {
-    /// What it is.
+    /// The value.
     pub value: T,
-    /// Where it stands.
+    /// The place in the source map.
     pub span: Range<usize>,
 }
 
 impl<T: Param> Param for Spanned<T> {
     const EXPECTS: &'static str = T::EXPECTS;
-    const REPEATS: Repeats = T::REPEATS;
-    const IS_NUMBER: bool = T::IS_NUMBER;
-    const WORDS: &'static [(&'static str, &'static str)] = T::WORDS;
+    const CONTENTS: Contents = T::CONTENTS;
 
     fn read(value: &Value, reader: &mut Reader<'_>) -> Option<Self> {
         Some(Self { value: T::read(value, reader)?, span: value.span.clone() })
@@ -91,10 +89,6 @@ impl<T: Param> Param for Spanned<T> {
 
     fn takes(bounds: Option<&Bounds>) -> String {
         T::takes(bounds)
-    }
-
-    fn fields() -> Vec<ParamSpec> {
-        T::fields()
     }
 
     fn written(&self) -> Option<Written> {
@@ -136,7 +130,7 @@ impl FilePath {
     /// Reads the whole file.
     ///
     /// # Errors
-    /// When it cannot be read, at the place of its name.
+    /// If the file is not readable; the place is that of its name.
     pub fn bytes(&self) -> Result<Cow<'static, [u8]>, Mistake> {
         match self.builtin {
             Some(bytes) => Ok(Cow::Borrowed(bytes)),
@@ -160,9 +154,7 @@ impl Param for FilePath {
 
 impl<T: Param> Param for Option<T> {
     const EXPECTS: &'static str = T::EXPECTS;
-    const REPEATS: Repeats = T::REPEATS;
-    const IS_NUMBER: bool = T::IS_NUMBER;
-    const WORDS: &'static [(&'static str, &'static str)] = T::WORDS;
+    const CONTENTS: Contents = T::CONTENTS;
 
     fn read(value: &Value, reader: &mut Reader<'_>) -> Option<Self> {
         T::read(value, reader).map(Some)
@@ -170,10 +162,6 @@ impl<T: Param> Param for Option<T> {
 
     fn takes(bounds: Option<&Bounds>) -> String {
         T::takes(bounds)
-    }
-
-    fn fields() -> Vec<ParamSpec> {
-        T::fields()
     }
 
     fn when_missing() -> Option<Self> {
@@ -187,9 +175,7 @@ impl<T: Param> Param for Option<T> {
 
 impl<T: Param> Param for Vec<T> {
     const EXPECTS: &'static str = "a list";
-    const REPEATS: Repeats = Repeats::PerEntry;
-    const IS_NUMBER: bool = T::IS_NUMBER;
-    const WORDS: &'static [(&'static str, &'static str)] = T::WORDS;
+    const CONTENTS: Contents = Contents { repeats: Repeats::PerEntry, ..T::CONTENTS };
 
     fn read(value: &Value, reader: &mut Reader<'_>) -> Option<Self> {
         let Item::Array(items) = &value.item else {
@@ -204,12 +190,8 @@ impl<T: Param> Param for Vec<T> {
         format!("a list, each {}", T::takes(bounds))
     }
 
-    fn fields() -> Vec<ParamSpec> {
-        T::fields()
-    }
-
     fn written(&self) -> Option<Written> {
-        self.iter().map(Param::written).collect::<Option<Vec<_>>>().map(Written::Array)
+        written_list(self)
     }
 }
 
@@ -221,9 +203,7 @@ impl<T: Param, const N: usize> Param for [T; N] {
         16 => "a list of 16",
         _ => "a list of the right length",
     };
-    const REPEATS: Repeats = Repeats::PerEntry;
-    const IS_NUMBER: bool = T::IS_NUMBER;
-    const WORDS: &'static [(&'static str, &'static str)] = T::WORDS;
+    const CONTENTS: Contents = Contents { repeats: Repeats::PerEntry, ..T::CONTENTS };
 
     fn read(value: &Value, reader: &mut Reader<'_>) -> Option<Self> {
         match &value.item {
@@ -239,24 +219,22 @@ impl<T: Param, const N: usize> Param for [T; N] {
         format!("a list of {N}, each {}", T::takes(bounds))
     }
 
-    fn fields() -> Vec<ParamSpec> {
-        T::fields()
-    }
-
     fn written(&self) -> Option<Written> {
-        self.iter().map(Param::written).collect::<Option<Vec<_>>>().map(Written::Array)
+        written_list(self)
     }
 }
 
-/// A table whose keys the graph chooses: the names of features, mostly.
+fn written_list<T: Param>(list: &[T]) -> Option<Written> {
+    list.iter().map(Param::written).collect::<Option<_>>().map(Written::Array)
+}
+
+/// A table with keys that the graph chooses, for example names of features.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Map<T>(pub BTreeMap<String, T>);
 
 impl<T: Param> Param for Map<T> {
     const EXPECTS: &'static str = "a table with an entry for each name";
-    const REPEATS: Repeats = Repeats::PerName;
-    const IS_NUMBER: bool = T::IS_NUMBER;
-    const WORDS: &'static [(&'static str, &'static str)] = T::WORDS;
+    const CONTENTS: Contents = Contents { repeats: Repeats::PerName, ..T::CONTENTS };
 
     fn read(value: &Value, reader: &mut Reader<'_>) -> Option<Self> {
         let Item::Table(table) = &value.item else {
@@ -272,10 +250,6 @@ impl<T: Param> Param for Map<T> {
         format!("a table, for each name {}", T::takes(bounds))
     }
 
-    fn fields() -> Vec<ParamSpec> {
-        T::fields()
-    }
-
     fn written(&self) -> Option<Written> {
         let entries = self.0.iter().map(|(name, value)| Some((name.clone(), value.written()?)));
         entries.collect::<Option<toml::Table>>().map(Written::Table)
@@ -283,16 +257,16 @@ impl<T: Param> Param for Map<T> {
 }
 
 impl<T> Map<T> {
-    /// The entries in the order of `names`; it is a mistake at `param` to leave one out or to have one more.
+    /// Returns the entries of parameter `param` in the order of the features `names`.
     ///
     /// # Errors
-    /// Names every feature without an entry and every entry without a feature.
+    /// One mistake for every feature without an entry and for every entry without a feature.
     pub fn in_order<'n>(&self, param: &str, names: impl Iterator<Item = &'n str> + Clone) -> Result<Vec<&T>, Mistakes> {
         let mut mistakes = Mistakes::new();
         let listed = || names.clone().map(|name| format!("`{name}`")).collect::<Vec<_>>().join(", ");
         let strange = self.0.keys().filter(|key| !names.clone().any(|name| name == *key)).count();
         let mut missing = names.clone().filter(|name| !self.0.contains_key(*name));
-        // One that is missing and one that is strange are one mistake.
+        // One missing and one unknown name are one mistake.
         let renamed = missing.next().filter(|_| strange == 1 && missing.next().is_none());
         for key in self.0.keys() {
             if !names.clone().any(|name| name == key) {

@@ -1,51 +1,51 @@
-//! Ports as they are declared: what is known of them without a graph.
+//! The declarations of ports, independent of any graph.
 
 use std::borrow::Cow;
 
 use crate::signal::{Kind, Signal};
 
-/// What an input needs, and when it wakes its node; see the table in [`node`](super).
+/// When an input wakes its node, and whether it must be wired and present; see the table in [`node`](super).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Need {
     /// Whether the graph must wire it.
     pub must_be_wired: bool,
-    /// Whether the node steps only while its value is present, if it is wired; otherwise the outputs are absent.
+    /// Whether the node steps only while the wired value is present. While it is absent, the outputs are absent.
     pub must_be_present: bool,
-    /// Whether a new value wakes the node. The loss of a value always does.
+    /// Whether a new value wakes the node. The loss of a value always wakes it.
     pub is_trigger: bool,
-    /// Whether it is any number of wires, each named in the graph.
+    /// Whether it accepts any number of wires, each named in the graph.
     pub is_many: bool,
-    /// Whether it is read as the last tick left it. It wakes the node, one tick late, only if no other input does. Its
-    /// shape is not known when the node is made, except that of a flag: `Some` if it is wired.
+    /// Whether the node reads the value of the last tick. Such an input wakes the node, one tick late, only if no other
+    /// input does. Its shape is unknown when the node is built, except for a flag: `Some` if it is wired.
     pub is_delayed: bool,
 }
 
 impl Need {
-    /// An input that must be wired and present, and wakes the node.
+    /// Must be wired and present, and wakes the node.
     pub const REQUIRED: Self =
         Self { must_be_wired: true, must_be_present: true, is_trigger: true, is_many: false, is_delayed: false };
-    /// An input that need neither be wired nor present, and wakes the node.
+    /// May be unwired or absent, and wakes the node.
     pub const OPTIONAL: Self = Self { must_be_wired: false, must_be_present: false, ..Self::REQUIRED };
 }
 
-/// What is known of a port without a graph.
+/// The declaration of a port.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PortSpec {
     /// Name in the graph file.
     pub name: Cow<'static, str>,
-    /// What it carries, with its unit.
+    /// What the port carries.
     pub doc: Cow<'static, str>,
     /// Kind of signal.
     pub kind: Kind,
     /// Unit, then frames: `"N"`, `"E/s"`, `"base"`; a capital letter is a variable, `"$name"` the parameter `name`.
     pub args: Cow<'static, [Cow<'static, str>]>,
-    /// When it wakes; of no meaning for an output.
+    /// What an input needs; without meaning for an output.
     pub need: Need,
 }
 
 impl PortSpec {
-    /// The description of a port of signal `T`, with its arguments by name. Arguments that its kind does not take are
-    /// left out, and so are frames from the first `"_"` on.
+    /// Returns the declaration of a port of signal `T`, with its arguments by name. It leaves out arguments that the kind
+    /// does not have, and frames from the first `"_"` on.
     #[must_use]
     pub fn of<T: Signal>(
         name: &'static str,
@@ -61,7 +61,7 @@ impl PortSpec {
     }
 }
 
-/// The letters that the inputs of a node bind; for the derives.
+/// The letters that the inputs of a node bind; used by the derives.
 #[doc(hidden)]
 #[derive(Debug, Clone, Copy)]
 pub struct Letters {
@@ -70,7 +70,7 @@ pub struct Letters {
 }
 
 impl Letters {
-    /// The letters of the units and of the frames.
+    /// Creates it from the letters of the units and of the frames.
     #[must_use]
     pub const fn of(units: &'static str, frames: &'static str) -> Self {
         Self { units, frames }

@@ -1,4 +1,4 @@
-//! What a parameter is, and the reader that collects the mistakes of a whole table, each with its place.
+//! The contract of a parameter, and the reader that collects all mistakes of a table, each with its place.
 
 use std::ops::Range;
 
@@ -7,83 +7,79 @@ use serde::de::DeserializeOwned;
 use super::bounds::Bounds;
 use super::file_path::FilePath;
 use super::mistake::{At, Mistake, Mistakes};
-use super::param_spec::{Declared, ParamSpec, Repeats, Written};
+use super::param_spec::{Contents, Declared, ParamSpec, Written};
 use crate::source::{Code, suggest_name, suggestion};
 use crate::source::{Item, Key, SourceMap, Table, Value};
 
-/// Something a graph file may set.
+/// A type that a graph file can set. `#[derive(Param)]` implements it for a struct (a table) and an enum (a word).
 #[diagnostic::on_unimplemented(
     message = "`{Self}` is not a type of a parameter",
     note = "a struct or an enum of yours becomes one with `#[derive(Param)]`"
 )]
 pub trait Param: Sized {
-    /// What it takes, for a person: `a number`.
+    /// The accepted values in words: `a number`.
     const EXPECTS: &'static str;
-    /// How often the fields are there.
-    const REPEATS: Repeats = Repeats::Once;
-    /// Whether it is a number, or made of numbers, so that it takes a range.
-    const IS_NUMBER: bool = false;
-    /// The words it takes, each with its meaning, if it is one of a few.
-    const WORDS: &'static [(&'static str, &'static str)] = &[];
+    /// What it consists of. A list, a table of names or an option has the contents of its elements.
+    const CONTENTS: Contents = Contents::OPAQUE;
 
-    /// Reads it; a mistake goes to the reader.
+    /// Reads the value. It adds its mistakes to the reader and returns `None`.
     fn read(value: &Value, reader: &mut Reader<'_>) -> Option<Self>;
 
-    /// What it takes in full, for the reference: `a list, each a number greater than 0`.
+    /// Returns the accepted values in words, with the range: `a list, each a number greater than 0`.
     #[must_use]
     fn takes(bounds: Option<&Bounds>) -> String {
         bounds.map_or_else(|| Self::EXPECTS.into(), |bounds| bounds.describe(Self::EXPECTS))
     }
 
-    /// The fields of a table.
+    /// Returns the fields of a table.
     #[must_use]
     fn fields() -> Vec<ParamSpec> {
-        Vec::new()
+        (Self::CONTENTS.fields)()
     }
 
-    /// What it is when it is not given and has no default; none if it must be given.
+    /// Returns the value of a parameter that has no default and is left out; `None` if it is required.
     #[must_use]
     fn when_missing() -> Option<Self> {
         None
     }
 
-    /// As a graph file would say it, for the reference; none if it says nothing, or cannot say it.
+    /// Returns the value in the form of a graph file; `None` if it has no such form.
     #[must_use]
     fn written(&self) -> Option<Written> {
         None
     }
 }
 
-/// Collects the mistakes while parameters are read.
+/// Collects the mistakes in parameters.
 pub struct Reader<'a> {
     sources: &'a SourceMap,
-    /// Range of the numbers of the field that is being read.
+    /// Range of the numbers in the current field.
     pub(super) bounds: Option<Bounds>,
-    /// What is wrong so far.
+    /// The mistakes so far.
     pub mistakes: Mistakes,
 }
 
-/// A table that is being read: what is left of it, and its place.
+/// A table with the entries that are not read yet.
 pub struct OpenTable {
     rest: Table,
     span: Range<usize>,
-    /// Fields that must be given and are not.
+    /// Required fields that are missing, with their accepted values.
     missing: Vec<(&'static str, String)>,
 }
 
 impl<'a> Reader<'a> {
-    /// A reader of values that stand in `sources`.
+    /// Creates a reader of values from `sources`.
     #[must_use]
     pub const fn new(sources: &'a SourceMap) -> Self {
         Self { sources, bounds: None, mistakes: Vec::new() }
     }
 
-    /// Says that the value at `span` will not do.
+    /// Adds the mistake that the value at `span` is wrong.
     pub fn bad(&mut self, span: Range<usize>, message: impl Into<String>) {
         self.mistakes.push(Mistake::new(Code::BadValue, At::Span(span), message));
     }
 
-    /// Says that `value` is not what is expected.
+    /// Adds the mistake that `value` is not of the `expected` type.
     pub fn wrong_type(&mut self, value: &Value, expected: &str) {
         self.bad(value.span.clone(), format!("expected {expected}, found {}", value.described()));
     }
@@ -101,7 +97,7 @@ impl<'a> Reader<'a> {
         }
     }
 
-    /// Reads one field of a table; `None` stands for a mistake that is noted.
+    /// Reads one field of a table; returns `None` after a mistake.
     pub fn field<T: Param>(
         &mut self,
         table: &mut OpenTable,
@@ -117,7 +113,7 @@ impl<'a> Reader<'a> {
         }
         let default = default.map(|default| default()).or_else(T::when_missing);
         if default.is_none() {
-            // Of a list it says no more than that it is one.
+            // For a list, the message names only the list.
             let is_whole = T::takes(None) == T::EXPECTS;
             let expects = if is_whole { T::takes(bounds.as_ref()) } else { T::EXPECTS.into() };
             table.missing.push((name, expects));
@@ -128,14 +124,14 @@ impl<'a> Reader<'a> {
     /// Reads one of the words of `T` and returns its index.
     pub fn word<T: Param>(&mut self, value: &Value) -> Option<usize> {
         let text: String = read_leaf(value, self, T::EXPECTS)?;
-        let found = T::WORDS.iter().position(|(word, _)| *word == text);
+        let found = T::CONTENTS.words.iter().position(|(word, _)| *word == text);
         if found.is_none() {
             self.wrong_type(value, T::EXPECTS);
         }
         found
     }
 
-    /// Reads a number; it is a mistake if it is not in the range of the field.
+    /// Reads a number and checks the range of the field.
     pub(super) fn number<T: DeserializeOwned + Copy>(
         &mut self,
         value: &Value,
@@ -152,9 +148,9 @@ impl<'a> Reader<'a> {
         Some(read)
     }
 
-    /// Every key that is left is one too many, and what was not given is missing, unless it was only misspelt.
+    /// Adds a mistake for every key that is left and for every missing field, except one that is misspelt.
     pub fn close(&mut self, table: OpenTable, known: &[&str]) {
-        // One that is missing and one that is strange are one mistake.
+        // One missing and one unknown name are one mistake.
         let is_renamed = match (table.missing.as_slice(), table.rest.entries.as_slice()) {
             ([(missing, _)], [(strange, _)]) => {
                 suggest_name(&strange.name, known.iter().copied()).is_none_or(|m| m == *missing)
@@ -176,7 +172,7 @@ impl<'a> Reader<'a> {
         }
     }
 
-    /// A file as it is named at `span`: relative to the folder of the file it stands in, or built in.
+    /// Resolves the path of a file that is named at `span`, relative to the file that names it, or built in.
     pub fn file(&mut self, text: &str, span: Range<usize>) -> Option<FilePath> {
         let path = self.sources.path(text, span.start);
         match self.sources.builtin(&path) {
@@ -189,7 +185,7 @@ impl<'a> Reader<'a> {
     }
 }
 
-/// Reads a value whose type serde knows: what most leaves need.
+/// Reads a value whose type implements serde's `Deserialize`.
 pub fn read_leaf<T: DeserializeOwned>(value: &Value, reader: &mut Reader<'_>, expects: &str) -> Option<T> {
     let read = T::deserialize(value);
     if read.is_err() {

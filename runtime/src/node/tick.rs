@@ -1,28 +1,28 @@
-//! The time of a step.
+//! The time at which a step runs.
 
 use crate::signal::Stamp;
 
-/// The time of a step. A node reads no clock.
+/// The time at which a step runs. Nodes use it instead of a clock.
 #[derive(Debug, Clone, Copy)]
 pub struct Tick {
     /// Number of the tick, from 1.
     pub index: u64,
     /// Time of the tick in the graph's clock [ns].
     pub now: i64,
-    /// Time since the last tick [s]; what every-tick nodes integrate with.
+    /// Time since the last tick [s]. A node that steps in every tick integrates with it.
     pub dt: f64,
-    /// Oldest stamp among the node's triggers; its outputs carry it.
+    /// Oldest stamp among the node's triggers, and the stamp of its outputs.
     pub stamp: Stamp,
-    /// Greatest time between two samples that counts as one step [s].
+    /// Maximum time between two samples that counts as one step [s].
     pub max_gap: f64,
-    /// How long something must be absent before its state is reset [ns].
+    /// Time of absence after which a state is reset [ns].
     pub reset_after: i64,
-    /// Whether the runtime holds all commands at zero: what remembers its own motion comes to rest too.
+    /// Whether the runtime holds all commands at zero. A node that remembers its own motion brings it to rest.
     pub is_halted: bool,
 }
 
 impl Tick {
-    /// A first tick at time zero, for tests of a node.
+    /// Returns a first tick at time zero, for tests of a node.
     #[must_use]
     pub const fn first() -> Self {
         Self {

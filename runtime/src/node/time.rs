@@ -1,21 +1,21 @@
-//! Time in a step: how much has passed since the last sample, and for how long something has been absent.
+//! The time since the last sample, and the duration of an absence.
 
 use super::{In, Tick};
 use crate::signal::Stamp;
 
-/// The time between two samples, for a node that integrates or differentiates: part of its state.
+/// Measures the time between two samples. It is part of the state of a node that integrates or differentiates.
 ///
-/// The sum of the steps is the time between the first and the last sample, whatever the ticks are.
+/// The sum of the steps is the time between the first and the last sample, independent of the ticks.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Interval {
     last: Option<Stamp>,
 }
 
 impl Interval {
-    /// Returns the time since the last sample [s], or `None` if the node has to start afresh: at the first sample, when
-    /// the sample comes from another device, and after a gap longer than the graph's `max_gap`.
+    /// Returns the time since the last sample [s]. It returns `None` if the node must start afresh: at the first sample,
+    /// when the sample is from another device, and after a gap longer than the graph's `max_gap_ms`.
     ///
-    /// A sample that is older than the last one counts as no time. A generated value has the time of the tick.
+    /// A sample that is older than the last one gives 0. A generated value has the time of the tick.
     pub fn step<T>(&mut self, input: &In<'_, T>, tick: &Tick) -> Option<f64> {
         let stamp = input.stamp();
         let stamp = if stamp.is_timeless() { Stamp { nanos: tick.now, ..stamp } } else { stamp };
@@ -25,7 +25,7 @@ impl Interval {
     }
 }
 
-/// How long something has been absent, for a node that forgets after a while: part of its state.
+/// Measures how long something is absent. It is part of the state of a node that resets after a while.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Absence {
     /// Time of the first tick without it [ns].
@@ -33,8 +33,8 @@ pub struct Absence {
 }
 
 impl Absence {
-    /// Notes whether it is present in this tick. Returns whether it has been absent for the graph's `reset_after`,
-    /// without an end: it is `false` again in the tick in which it comes back.
+    /// Records whether it is present in this tick. Returns whether it has been absent for the graph's `reset_after_ms`.
+    /// The result is `false` again in the tick in which it returns.
     pub fn is_long(&mut self, is_present: bool, tick: &Tick) -> bool {
         if is_present {
             self.since = None;
@@ -43,12 +43,12 @@ impl Absence {
         tick.now - *self.since.get_or_insert(tick.now) >= tick.reset_after
     }
 
-    /// Notes that it is absent from the time `since` [ns] on, unless it has been absent before.
+    /// Records that it is absent from the time `since` [ns] on. An absence that has begun earlier continues.
     pub fn begin(&mut self, since: i64) {
         self.since.get_or_insert(since);
     }
 
-    /// Notes that it is present. Returns whether it was absent for the graph's `reset_after`.
+    /// Records that it is present. Returns whether it was absent for the graph's `reset_after_ms`.
     pub fn end(&mut self, tick: &Tick) -> bool {
         self.since.take().is_some_and(|since| tick.now - since >= tick.reset_after)
     }
