@@ -65,8 +65,8 @@ fn shipped(name: &str) -> PathBuf {
 }
 
 /// The Rust blocks of a page, put together, are the file.
-fn is_built_line_by_line(page: &str, path: &str) {
-    let (shown, real) = (blocks(page, "rust").concat(), file(path));
+fn is_built_line_by_line(page: &str, fence: &str, path: &str) {
+    let (shown, real) = (blocks(page, fence).concat(), file(path));
     for (i, (shown, real)) in shown.lines().zip(real.lines()).enumerate() {
         assert_eq!(shown, real, "line {} of {path}", i + 1);
     }
@@ -76,7 +76,12 @@ fn is_built_line_by_line(page: &str, path: &str) {
 #[test]
 fn the_walkthrough_shows_the_node_as_it_is() {
     let page = page("writing-a-node.md");
-    is_built_line_by_line(&page, "tests/src/nodes/first_order_lag.rs");
+    is_built_line_by_line(&page, "rust", "tests/src/nodes/first_order_lag.rs");
+    is_built_line_by_line(&page, "rust mix", "tests/src/nodes/mix.rs");
+    let generic = file("nodes/src/flow/gate.rs");
+    for part in blocks(&page, "rust gate") {
+        assert!(generic.contains(&part), "{part}");
+    }
     let [line] = &blocks(&page, "rust catalogue")[..] else { panic!("one line") };
     assert!(file("tests/src/nodes/mod.rs").contains(line.as_str()), "{line}");
     assert_eq!(blocks(&page, "rust main"), [file("tests/src/main.rs")]);
@@ -85,7 +90,7 @@ fn the_walkthrough_shows_the_node_as_it_is() {
 #[test]
 fn the_walkthrough_shows_the_device_as_it_is_and_its_graph_loads() {
     let page = page("writing-a-device.md");
-    is_built_line_by_line(&page, "tests/src/devices/udp_pad.rs");
+    is_built_line_by_line(&page, "rust", "tests/src/devices/udp_pad.rs");
     let [line] = &blocks(&page, "rust catalogue")[..] else { panic!("one line") };
     assert!(file("tests/src/devices/mod.rs").contains(line.trim()), "{line}");
     let [graph] = &blocks(&page, "toml")[..] else { panic!("one graph") };

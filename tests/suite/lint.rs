@@ -27,7 +27,7 @@ fn everything_is_documented_and_every_example_runs() {
     let shipped = tactflow_nodes::catalogue();
     let lint_shipped = lint(&shipped).counting(count).without_example_of(&["lockstep"]);
     lint_shipped.accepting_silence_of(&["hough.orientation", "hough.offset"]).assert_clean();
-    lint(&catalogue()).only(&["first_order_lag", "udp_pad"]).counting(count).assert_clean();
+    lint(&catalogue()).only(&["first_order_lag", "mix", "udp_pad"]).counting(count).assert_clean();
 }
 
 /// How a node misbehaves while it runs.

@@ -30,6 +30,8 @@ impl Parse for Word {
 pub(crate) struct Words {
     words: Vec<Word>,
     known: &'static [&'static str],
+    /// Whether all of them could be read. Otherwise what seems to be missing may be there.
+    pub(crate) are_complete: bool,
 }
 
 impl Words {
@@ -41,8 +43,10 @@ impl Words {
         faults: &mut Faults,
     ) -> Self {
         let mut words: Vec<Word> = Vec::new();
+        let mut are_complete = true;
         for attribute in attributes.iter().filter(|attribute| attribute.path().is_ident(name)) {
             let parsed = attribute.parse_args_with(Punctuated::<Word, Token![,]>::parse_terminated);
+            are_complete &= parsed.is_ok();
             for word in faults.take(parsed).into_iter().flatten() {
                 if !known.iter().any(|known| word.name == known) {
                     faults.add(&word.name, format!("`{}` is not known here; write {}", word.name, list(known)));
@@ -53,7 +57,7 @@ impl Words {
                 }
             }
         }
-        Self { words, known }
+        Self { words, known, are_complete }
     }
 
     /// Takes a word out.

@@ -35,7 +35,7 @@ pub(crate) fn derive(input: &DeriveInput) -> TokenStream {
             faults.add(name, format!("`{}` stands here twice", name.value()));
         }
     }
-    for Name { name, .. } in names.iter().filter(|_| !page.blocks.is_empty()) {
+    for Name { name, .. } in names.iter().filter(|name| !page.blocks.is_empty() && is_snake_case(&name.name.value())) {
         if !page.blocks.iter().any(|block| is_example_of(block, &name.value())) {
             faults.add(name, format!("no `toml` block of the doc comment has `type = \"{}\"`", name.value()));
         }

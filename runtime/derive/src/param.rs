@@ -3,7 +3,9 @@
 use proc_macro2::TokenStream;
 use quote::{quote, quote_spanned};
 use syn::spanned::Spanned;
-use syn::{Data, DataEnum, DeriveInput, Expr, ExprLit, ExprRange, Field, Ident, Lit, LitStr, RangeLimits, Variant};
+use syn::{
+    Data, DataEnum, DeriveInput, Expr, ExprLit, ExprRange, Field, Ident, Lit, LitStr, RangeLimits, Type, Variant,
+};
 
 use crate::attributes::{Words, snake_case};
 use crate::docs::text;
@@ -138,7 +140,9 @@ fn option(value: Option<TokenStream>) -> TokenStream {
 fn default(parameter: &Parameter) -> TokenStream {
     let ty = &parameter.field.ty;
     option(parameter.default.as_ref().map(|default| {
-        let is_text = matches!(default, Expr::Lit(ExprLit { lit: Lit::Str(_), .. }));
+        let is_string =
+            matches!(ty, Type::Path(path) if path.path.segments.last().is_some_and(|last| last.ident == "String"));
+        let is_text = is_string && matches!(default, Expr::Lit(ExprLit { lit: Lit::Str(_), .. }));
         let value = if is_text { quote!(::core::convert::Into::into(#default)) } else { quote!(#default) };
         quote_spanned!(default.span()=> (|| -> #ty { #value }) as fn() -> #ty)
     }))
@@ -185,6 +189,11 @@ fn words(input: &DeriveInput, data: &DataEnum, faults: &mut Faults) -> TokenStre
         (snake_case(&variant.ident.to_string()), doc)
     };
     let (words, docs): (Vec<String>, Vec<String>) = data.variants.iter().map(&mut word).unzip();
+    for (i, variant) in data.variants.iter().enumerate() {
+        if words[..i].contains(&words[i]) {
+            faults.add(&variant.ident, format!("two variants are the word `{}`", words[i]));
+        }
+    }
     let quoted: Vec<String> = words.iter().map(|word| format!("`{word}`")).collect();
     let expects = format!("one of {}", quoted.join(", "));
     let (ident, variants) = (&input.ident, data.variants.iter().map(|variant| &variant.ident));

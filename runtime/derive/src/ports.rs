@@ -42,6 +42,8 @@ struct Port {
     /// Whether a type parameter decides the kind.
     is_generic: bool,
     arguments: Vec<(&'static str, LitStr)>,
+    /// Whether all arguments could be read.
+    is_complete: bool,
     is_optional: bool,
     is_present_if_wired: bool,
     is_sampled: bool,
@@ -226,6 +228,7 @@ fn port(field: Field, is_input: bool, type_parameters: &[&Ident], faults: &mut F
         form,
         signal,
         arguments,
+        is_complete: words.are_complete,
         is_optional: optional.is_some(),
         is_present_if_wired: present_if_wired.is_some(),
         is_sampled: sampled.is_some(),
@@ -435,10 +438,15 @@ fn letters(input: &DeriveInput, ports: &[Port]) -> TokenStream {
             .collect()
     };
     let (units, frames) = (of(true), of(false));
+    let has = |port: &Port, argument: &str| port.arguments.iter().any(|(name, _)| *name == argument);
+    let says_all = |port: &Port| port.is_complete && (!port.is_generic || has(port, "unit") && has(port, "frame"));
+    let is_complete = ports.iter().all(says_all);
+    let conditions =
+        ports.iter().filter(|port| !port.is_generic).flat_map(arguments).map(|(_, condition, _)| condition);
     quote! {
         #[doc(hidden)]
         #[allow(non_upper_case_globals, dead_code, unreachable_pub, reason = "it goes with the struct of that name")]
-        #vis const #name: ::tactflow_runtime::node::Letters = ::tactflow_runtime::node::Letters::of(#units, #frames);
+        #vis const #name: ::tactflow_runtime::node::Letters = ::tactflow_runtime::node::Letters::of(#units, #frames, #is_complete #(&& #conditions)*);
     }
 }
 
@@ -478,7 +486,8 @@ fn checks(ports: &[Port]) -> TokenStream {
     units.chain(arguments).collect()
 }
 
-/// The same for a port whose kind a type parameter decides: checked for each type that a graph can use.
+/// The same for a port whose kind a type parameter decides, checked for each type that a graph can use. An argument that
+/// only some of them have is ignored by the others.
 fn generic_checks(ports: &[Port]) -> TokenStream {
     let generic = ports.iter().filter(|port| port.is_generic).flat_map(arguments);
     let checks = generic.map(|(at, condition, message)| {
@@ -491,11 +500,14 @@ fn generic_checks(ports: &[Port]) -> TokenStream {
 /// For each argument of a port: where a mistake is marked, what must hold, and what it means if it does not.
 fn arguments(port: &Port) -> impl Iterator<Item = (TokenStream, TokenStream, String)> {
     let (signal, name) = (&port.signal, &port.name);
-    ARGUMENTS.into_iter().map(move |argument| {
+    ARGUMENTS.into_iter().filter(|_| port.is_complete).map(move |argument| {
         let takes = quote!(::tactflow_runtime::signal::Kind::takes(
             <#signal as ::tactflow_runtime::signal::Signal>::KIND, #argument));
         match port.arguments.iter().find(|(name, _)| *name == argument) {
-            Some((_, text)) => (quote!(#text), takes, format!("the kind of `{name}` has no `{argument}`")),
+            Some((_, text)) => {
+                let is_generic = port.is_generic;
+                (quote!(#text), quote!(#is_generic || #takes), format!("the kind of `{name}` has no `{argument}`"))
+            }
             None => {
                 let message = format!("`{name}` needs `#[port({argument} = \"…\")]`; `\"_\"` if there is none");
                 (port.field.ty.to_token_stream(), quote!(!#takes), message)

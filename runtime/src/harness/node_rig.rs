@@ -4,7 +4,7 @@ use std::path::Path;
 
 use crate::engine::NodeRunner;
 use crate::node::{Bus, Components, Given, Mistakes, Need, Node, NodeSpec, PortId, Reader, Tick, of};
-use crate::signal::{Freshness, Mark, Shape, Signal, Stamp};
+use crate::signal::{Features, Freshness, Mark, Shape, Signal, Stamp};
 use crate::source::{SourceMap, parse_table};
 
 /// A node with nothing around it, for its own tests. It steps as in a graph: when a trigger is new or lost.
@@ -94,6 +94,22 @@ impl NodeRig {
         change(self.bus.slot_mut(port));
         self.bus.mark_mut(port).renew(self.tick.index, stamp);
         *self.bus.mark_mut(port) = self.bus.slot::<T>(port).mark(*self.bus.mark(port), self.tick.index);
+    }
+
+    /// A new sample of this moment on an input of features: a value for each, `None` if it is absent.
+    ///
+    /// # Panics
+    /// If there is no such wire, or if it has fewer components.
+    pub fn set_features(&mut self, input: &str, values: &[Option<f64>]) {
+        let (tick, stamp) = (self.tick.index, Stamp { nanos: self.tick.now, device: 0 });
+        self.edit(input, stamp, |features: &mut Features| {
+            for (i, value) in values.iter().enumerate() {
+                match value {
+                    Some(value) => features.set(i, *value, tick, stamp),
+                    None => features.lose(i, tick),
+                }
+            }
+        });
     }
 
     /// The input goes away.

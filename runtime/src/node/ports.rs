@@ -67,16 +67,18 @@ impl PortSpec {
 pub struct Letters {
     units: &'static str,
     frames: &'static str,
+    are_complete: bool,
 }
 
 impl Letters {
-    /// Creates it from the letters of the units and of the frames.
+    /// Creates it from the letters of the units and of the frames. If an input lacks an argument, they are not complete.
     #[must_use]
-    pub const fn of(units: &'static str, frames: &'static str) -> Self {
-        Self { units, frames }
+    pub const fn of(units: &'static str, frames: &'static str, are_complete: bool) -> Self {
+        Self { units, frames, are_complete }
     }
 
-    /// Whether an input binds a letter.
+    /// Whether an input binds a letter. If the letters are not complete it returns `true`, so that one mistake has one
+    /// message.
     #[must_use]
     pub const fn binds(&self, is_unit: bool, letter: char) -> bool {
         let letters = if is_unit { self.units } else { self.frames }.as_bytes();
@@ -84,6 +86,6 @@ impl Letters {
         while i < letters.len() && letters[i] != letter as u8 {
             i += 1;
         }
-        i < letters.len()
+        i < letters.len() || !self.are_complete
     }
 }

@@ -14,7 +14,8 @@ use crate::source::{Item, Key, SourceMap, Table, Value};
 /// A type that a graph file can set. `#[derive(Param)]` implements it for a struct (a table) and an enum (a word).
 #[diagnostic::on_unimplemented(
     message = "`{Self}` is not a type of a parameter",
-    note = "a struct or an enum of yours becomes one with `#[derive(Param)]`"
+    note = "parameters are `f64`, `usize`, `u64`, `bool`, `String`, `Unit` and `FilePath`, `Option<T>`, `Vec<T>`, `[T; N]`, \
+            `Map<T>` and `Spanned<T>` of them, and structs and enums with `#[derive(Param)]`"
 )]
 pub trait Param: Sized {
     /// The accepted values in words: `a number`.

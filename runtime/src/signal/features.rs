@@ -21,6 +21,12 @@ pub struct FeaturesShape {
 }
 
 impl FeaturesShape {
+    /// Creates the shape from the name and the unit of each feature.
+    pub fn new<'n>(features: impl IntoIterator<Item = (&'n str, Unit)>) -> Self {
+        let features = features.into_iter().map(|(name, unit)| Feature { name: name.to_owned(), unit });
+        Self { features: features.collect() }
+    }
+
     /// Returns the names of the features, in order.
     pub fn names(&self) -> impl Iterator<Item = &str> + Clone {
         self.features.iter().map(|feature| feature.name.as_str())
@@ -131,6 +137,11 @@ impl Features {
     #[must_use]
     pub fn components(&self) -> &[Component] {
         &self.components
+    }
+
+    /// Returns the value of each component, `None` while it is absent.
+    pub fn values(&self) -> impl Iterator<Item = Option<f64>> {
+        self.components.iter().map(Component::get)
     }
 
     /// Sets component `i`, which is new in `tick`.

@@ -110,6 +110,10 @@ pub trait Signal: Default + Clone + Send + 'static {
 }
 
 /// A signal whose value a step sets at once: every kind but [`Features`], whose components are set one by one.
+#[diagnostic::on_unimplemented(
+    message = "an output of `{Self}` is not set as a whole",
+    note = "`out.port.set(i, value)` sets one feature; `out.port.copy_from(&value)` copies a value of any kind"
+)]
 pub trait Settable: Signal {}
 
 macro_rules! settable {

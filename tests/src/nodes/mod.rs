@@ -4,6 +4,7 @@ pub mod breaks;
 pub mod count;
 pub mod first_order_lag;
 pub mod line_length;
+pub mod mix;
 pub mod pair;
 pub mod plus;
 pub mod unit_delay;
@@ -25,6 +26,7 @@ pub fn catalogue() -> Catalogue {
         .node::<breaks::Breaks>()
         .node::<count::Count>()
         .node::<first_order_lag::FirstOrderLag>()
+        .node::<mix::Mix>()
         .node::<pair::Pair>()
         .node::<plus::Plus>()
         .node::<unit_delay::UnitDelay>()
