@@ -58,7 +58,9 @@ pub trait Signal: Default + Clone + Send + 'static {
     type Shape: Clone + Default + PartialEq + fmt::Debug + Into<Shape> + 'static;
 
     /// Allocates a value of that shape. No other method allocates.
-    fn allocate(shape: &Self::Shape) -> Self;
+    fn allocate(_shape: &Self::Shape) -> Self {
+        Self::default()
+    }
 
     /// Whether every number is finite. Absent components count as finite.
     fn is_finite(&self) -> bool;
@@ -84,7 +86,7 @@ pub trait Signal: Default + Clone + Send + 'static {
     /// Takes the buffer out of its slot for a step in `tick` with that stamp. A value that [stays](Self::STAYS) in its slot
     /// is not moved: the step starts with a default value.
     fn take(slot: &mut Self, _tick: u64, _stamp: Stamp) -> Self {
-        std::mem::take(slot)
+        if Self::STAYS { Self::default() } else { std::mem::take(slot) }
     }
 
     /// Whether the slot keeps its value during a step; true for small kinds without a heap buffer.
@@ -271,15 +273,11 @@ pub struct JacobianShape(pub JointsShape);
 kinds! {
     Scalar ScalarShape scalars "scalar" "scalar": "a number with a unit",
         "It belongs to a frame. Its unit is known at load." {
-        fn allocate(_: &ScalarShape) -> Self { 0.0 }
-        fn take(_: &mut Self, _: u64, _: Stamp) -> Self { 0.0 }
         const STAYS: bool = true;
         fn is_finite(&self) -> bool { all_finite(&[*self]) }
     }
     Flag FlagShape flags "flag" "flag": "true or false",
         "It has no unit. Gates and conditions are flags." {
-        fn allocate(_: &FlagShape) -> Self { false }
-        fn take(_: &mut Self, _: u64, _: Stamp) -> Self { false }
         const STAYS: bool = true;
         fn is_finite(&self) -> bool { true }
     }
@@ -325,15 +323,11 @@ kinds! {
     Twist TwistShape twists "twist" "twist": "a velocity: linear and angular",
         "The order is `[v, omega]`, in m/s and rad/s. A twist in a sensor's frame is the velocity of the sensor's origin in \
         the sensor's axes. A twist in `base` is spatial: the velocity at the base's origin (paper eq. 4)." {
-        fn allocate(_: &TwistShape) -> Self { Self::default() }
-        fn take(_: &mut Self, _: u64, _: Stamp) -> Self { Self::default() }
         const STAYS: bool = true;
         fn is_finite(&self) -> bool { all_finite(self.0.as_slice()) }
     }
     Pose PoseShape poses "pose" "pose": "the position and orientation of one frame in another",
         "It consists of a rotation and a translation [m] that transform points of the first frame to the second." {
-        fn allocate(_: &PoseShape) -> Self { Self::default() }
-        fn take(_: &mut Self, _: u64, _: Stamp) -> Self { Self::default() }
         const STAYS: bool = true;
         fn is_finite(&self) -> bool {
             all_finite(self.0.translation.vector.as_slice()) && all_finite(self.0.rotation.matrix().as_slice())

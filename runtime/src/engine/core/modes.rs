@@ -4,8 +4,6 @@
 //! sensor that has stopped triggers no change. When several exits hold in one tick, `fail` comes first, then
 //! `on_lost`, `done` and `go`; among `go`, the higher priority wins. Exits that could still tie are rejected at load.
 
-use std::collections::BTreeMap;
-
 use crate::graph::{Condition, ExitKind, PlannedExit, PlannedModes, PortRef, Test};
 use crate::node::{Bus, PortId, ScalarId, Tick};
 use crate::signal::{Freshness, Kind, Pose};
@@ -102,16 +100,17 @@ struct ConditionState {
 }
 
 impl ModeMachine {
-    pub(crate) fn new(planned: PlannedModes, ports: &BTreeMap<PortRef, (PortId, Kind)>) -> Self {
+    /// Creates the machine. `port` finds a port on the bus and its kind.
+    pub(crate) fn new(planned: PlannedModes, port: impl Fn(PortRef) -> (PortId, Kind)) -> Self {
         let mut changed: Vec<usize> =
             planned.modes.iter().flat_map(|mode| mode.configurations.iter().map(|(runner, _)| *runner)).collect();
         changed.sort_unstable();
         changed.dedup();
         let input = |exit: &PlannedExit| match &exit.condition {
             Condition::Port(watched, _) | Condition::Lost(watched, _) => {
-                Some(ConditionInput::new(ports[&watched.source], watched.feature))
+                Some(ConditionInput::new(port(watched.source), watched.feature))
             }
-            Condition::Travel(source, _) => Some(ConditionInput::Port(ports[source].0)),
+            Condition::Travel(source, _) => Some(ConditionInput::Port(port(*source).0)),
             Condition::Elapsed(_) | Condition::Sent(_) => None,
         };
         let modes = planned.modes.into_iter().map(|mode| {

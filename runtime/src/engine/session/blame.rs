@@ -21,7 +21,7 @@ impl Engine {
                 self.fault(node, port.clone(), Cause::StaleWire(wire.into()), self.sources.locate(span.start))
             }
             // The role ports come first in `ports`, one per inlet, so the index of an inlet is that of its port.
-            Trouble::NotFinite(port) | Trouble::NotFiniteAt(port) => self.port_fault(port, Cause::NotFinite),
+            Trouble::NotFinite(port) => self.port_fault(port, Cause::NotFinite),
             Trouble::Panicked(runner) => {
                 let (node, place) = &self.names[runner];
                 self.fault(node, None, Cause::Panicked(self.panic.clone()), place.clone())

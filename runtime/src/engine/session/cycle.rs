@@ -270,7 +270,7 @@ impl Engine {
             !bus.arenas.is_finite(planned.shape.kind(), id.slot)
         };
         let port = (0..self.ports.len()).find(is_bad).expect("the finite check failed on some port");
-        self.raise(self.policy.not_finite.0, Trouble::NotFiniteAt(port))?;
+        self.raise(self.policy.not_finite.0, Trouble::NotFinite(port))?;
         let runner = self.runner_of(port);
         self.invalidate_from(runner);
         self.core.reset_from(runner);

@@ -8,7 +8,7 @@ use super::nodes::Builder;
 use crate::graph::check::live;
 use crate::graph::load::{Entity, FlatGraph};
 use crate::graph::plan::{PlannedExit, PlannedMode, PlannedNode};
-use crate::graph::plan::{PlannedPort, PortRef, Producer};
+use crate::graph::plan::{PlannedPort, PortRef};
 use crate::graph::syntax::{ModeBlock, default_max_age_ns};
 use crate::node::Built;
 use crate::signal::Kind;
@@ -63,15 +63,12 @@ fn find(nodes: &[PlannedNode], index: usize) -> Option<&PlannedNode> {
 fn exits(block: &ModeBlock, builder: &mut Builder<'_>, nodes: &[PlannedNode]) -> Vec<PlannedExit> {
     let ports = &builder.ports;
     let port = |source: PortRef| -> Option<&PlannedPort> { ports.get(&source) };
-    let poses = nodes.iter().flat_map(|node| {
-        let ports = node.ports.iter().enumerate().filter(|(_, port)| port.shape.kind() == Kind::Pose);
-        ports.map(|(port, _)| PortRef { producer: Producer::Node(node.index), port })
-    });
+    let poses = nodes.iter().flat_map(PlannedNode::outputs).filter(|(_, port)| port.shape.kind() == Kind::Pose);
     let context = ExitContext {
         net: builder.net,
         modes: builder.net.flat.mode_names().collect(),
         port: &port,
-        poses: poses.collect(),
+        poses: poses.map(|(source, _)| source).collect(),
         lost_after: default_max_age_ns(builder.period),
     };
     resolve_exits(block, &context, &mut builder.diagnostics)

@@ -7,11 +7,11 @@ use crate::graph::bench::{BoundRole, OpenedBench, place_mistakes};
 use crate::graph::check::frames::Frames;
 use crate::graph::check::units::{UnitMismatch, Units};
 use crate::graph::net::{CommandWire, Net, WireOrigin};
-use crate::graph::plan::{PlannedCommand, PlannedNode, PlannedReport, PlannedRole, PlannedWire};
+use crate::graph::plan::{PlannedCommand, PlannedNode, PlannedRole, PlannedWire};
 use crate::graph::plan::{PlannedPort, PortRef, Producer};
 use crate::graph::syntax::{AgeLimit, Policy, PolicyTable, default_max_age_ns};
 use crate::node::{Built, Configured, Given, Need, NodeSpec, PortSpec, Reader, frame_args};
-use crate::signal::{FlagShape, Kind, Shape};
+use crate::signal::{FlagShape, Joint, Kind, Shape};
 use crate::source::{Code, Diagnostic, Diagnostics, SourceMap, Value};
 
 /// Builds the nodes one after the other and collects their diagnostics.
@@ -253,55 +253,35 @@ impl Builder<'_> {
         }
     }
 
-    /// Plans a command, or returns `None` if its wire has a mistake.
+    /// Plans a command or a report, or returns `None` if its wire has a mistake.
     pub(crate) fn command(&mut self, wire: &CommandWire) -> Option<PlannedCommand> {
         let bound = self.opened.roles[wire.role].as_ref()?;
-        let port = self.command_source(wire)?;
-        let (spec, (command, takes)) = (self.net.command_port(wire), &bound.commands[wire.command]);
-        let (has, wants) = (joint_names(&port.shape), joint_names(takes));
-        if has != wants {
-            let consumer = self.net.command_name(wire);
+        let port = self.ports.get(&wire.source)?;
+        let (spec, consumer) = (self.net.command_port(wire), self.net.command_name(wire));
+        if let Err(mismatch) = Units::default().take(spec, &consumer, &port.shape) {
+            self.diagnostics.push(unit_mismatch(port, &consumer, &mismatch, &wire.origin));
+            return None;
+        }
+        let (number, takes) = &(if wire.is_report { &bound.reports } else { &bound.commands })[wire.command];
+        let (given, moved) = (joints(&port.shape), joints(takes));
+        let names = |joints: &[Joint]| joints.iter().map(|joint| joint.name.clone()).collect::<Vec<_>>();
+        let (has, wants) = (names(given), names(moved));
+        if !wire.is_report && has != wants {
             let message = format!("`{}` has the joints {has:?}, but `{consumer}` takes {wants:?}", port.name);
             self.diagnostics.push(wire.origin.diagnostic(Code::ShapeMismatch, message));
             return None;
         }
-        let accelerations = accelerations(&port.shape).zip(accelerations(takes)).map(|(a, b)| a.min(b)).collect();
         Some(PlannedCommand {
             source: wire.source,
             device: bound.device,
-            command: *command,
+            is_report: wire.is_report,
+            port: *number,
             name: [self.net.flat.roles[wire.role].0.name.clone(), spec.name.to_string()],
+            shape: port.shape.clone(),
             age: self.age_limit(wire),
             span: wire.origin.word.span.clone(),
-            accelerations,
+            accelerations: given.iter().zip(moved).map(|(a, b)| a.acceleration.min(b.acceleration)).collect(),
         })
-    }
-
-    /// Plans a report, or returns `None` if its wire has a mistake.
-    pub(crate) fn report(&mut self, wire: &CommandWire) -> Option<PlannedReport> {
-        let bound = self.opened.roles[wire.role].as_ref()?;
-        Some(PlannedReport {
-            source: wire.source,
-            shape: self.command_source(wire)?.shape,
-            device: bound.device,
-            report: bound.reports[wire.command].0,
-            name: [self.net.flat.roles[wire.role].0.name.clone(), self.net.command_port(wire).name.to_string()],
-            age: self.age_limit(wire),
-            span: wire.origin.word.span.clone(),
-        })
-    }
-
-    /// Returns the port at the start of a command wire, if its unit is accepted.
-    fn command_source(&mut self, wire: &CommandWire) -> Option<PlannedPort> {
-        let port = self.ports.get(&wire.source)?;
-        let consumer = self.net.command_name(wire);
-        match Units::default().take(self.net.command_port(wire), &consumer, &port.shape) {
-            Ok(()) => Some(port.clone()),
-            Err(mismatch) => {
-                self.diagnostics.push(unit_mismatch(port, &consumer, &mismatch, &wire.origin));
-                None
-            }
-        }
     }
 
     /// Returns the age limit of a command wire; the default is five periods of the graph.
@@ -315,19 +295,11 @@ fn numbers(bound: &BoundRole) -> Vec<usize> {
     bound.outputs.iter().map(|(number, _)| *number).collect()
 }
 
-/// Returns the maximum acceleration of each joint [rad/s²].
-fn accelerations(shape: &Shape) -> impl Iterator<Item = f64> {
-    let joints = match shape {
-        Shape::Joints(shape) => shape.joints.as_slice(),
-        _ => &[],
-    };
-    joints.iter().map(|joint| joint.acceleration)
-}
-
-fn joint_names(shape: &Shape) -> Vec<&str> {
+/// Returns the joints of a joint vector; other shapes have none.
+fn joints(shape: &Shape) -> &[Joint] {
     match shape {
-        Shape::Joints(shape) => shape.joints.iter().map(|joint| joint.name.as_str()).collect(),
-        _ => Vec::new(),
+        Shape::Joints(shape) => &shape.joints,
+        _ => &[],
     }
 }
 

@@ -98,11 +98,8 @@ fn default_ports(nodes: &[PlannedNode], ports: &BTreeMap<PortRef, PlannedPort>) 
     let is_role = |source: &PortRef| matches!(source.producer, Producer::Role(_));
     let of_kind = |kind: Kind| move |source: &PortRef| ports.get(source).is_some_and(|port| port.shape.kind() == kind);
     let roles: Vec<PortRef> = ports.keys().copied().filter(is_role).collect();
-    let of_node = |node: &PlannedNode| {
-        let producer = Producer::Node(node.index);
-        (0..node.ports.len()).map(move |port| PortRef { producer, port })
-    };
-    let all: Vec<PortRef> = nodes.iter().flat_map(of_node).chain(roles.iter().copied()).collect();
+    let of_nodes = nodes.iter().flat_map(PlannedNode::outputs).map(|(source, _)| source);
+    let all: Vec<PortRef> = of_nodes.chain(roles.iter().copied()).collect();
     let mut shown: Vec<PortRef> = roles.iter().copied().filter(of_kind(Kind::Image)).collect();
     let Some(kind) = KINDS.into_iter().find(|kind| all.iter().any(of_kind(*kind))) else { return shown };
     let mut count = 0;
