@@ -31,4 +31,4 @@ pub(crate) use plan::{
     PlannedView, PlannedWire, PortRef, Producer, Test,
 };
 pub use syntax::Policy;
-pub(crate) use syntax::{AgeLimit, ExitKind, PolicyTable, into_diagnostic};
+pub(crate) use syntax::{AgeLimit, ExitKind, PolicyTable, PortState, into_diagnostic};

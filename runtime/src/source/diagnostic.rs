@@ -183,6 +183,11 @@ impl Diagnostic {
         Self { help, ..self }
     }
 
+    /// Returns the diagnostic as the error of something that may also fail without one.
+    pub(crate) fn into_err<T>(self) -> Result<T, Option<Box<Self>>> {
+        Err(Some(Box::new(self)))
+    }
+
     /// Adds a related place with a label.
     #[must_use]
     pub fn note(mut self, span: Range<usize>, text: impl Into<String>) -> Self {

@@ -2,8 +2,7 @@
 
 use std::ops::Range;
 
-use serde::de::value::{MapDeserializer, SeqDeserializer};
-use serde::de::{self, IntoDeserializer, Visitor};
+use serde::de::DeserializeOwned;
 use serde::{Serialize, Serializer};
 use toml::de::{DeTable, DeValue};
 
@@ -128,6 +127,12 @@ impl Value {
         }
     }
 
+    /// Deserializes the value, or returns `None` if it is of another type.
+    #[must_use]
+    pub fn read<T: DeserializeOwned>(&self) -> Option<T> {
+        toml::Value::try_from(self).ok()?.try_into().ok()
+    }
+
     /// Describes the value for a message, for example `the string "x"`.
     #[must_use]
     pub fn described(&self) -> String {
@@ -212,52 +217,6 @@ fn from_value(
         DeValue::Table(table) => Item::Table(from_table(table, at, mistakes)),
     };
     Value { span, item }
-}
-
-impl<'de> IntoDeserializer<'de, de::value::Error> for &'de Value {
-    type Deserializer = Self;
-    fn into_deserializer(self) -> Self {
-        self
-    }
-}
-
-impl<'de> de::Deserializer<'de> for &'de Value {
-    type Error = de::value::Error;
-
-    fn deserialize_any<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, Self::Error> {
-        match &self.item {
-            Item::String(text) | Item::Datetime(text) => visitor.visit_borrowed_str(text),
-            Item::Integer(number) => visitor.visit_i64(*number),
-            Item::Float(number) => visitor.visit_f64(*number),
-            Item::Boolean(value) => visitor.visit_bool(*value),
-            Item::Array(items) => visitor.visit_seq(SeqDeserializer::new(items.iter())),
-            Item::Table(table) => {
-                let entries = table.entries.iter().map(|(key, value)| (key.name.as_str(), value));
-                visitor.visit_map(MapDeserializer::new(entries))
-            }
-        }
-    }
-
-    fn deserialize_option<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, Self::Error> {
-        visitor.visit_some(self)
-    }
-
-    fn deserialize_enum<V: Visitor<'de>>(
-        self,
-        name: &'static str,
-        variants: &'static [&'static str],
-        visitor: V,
-    ) -> Result<V::Value, Self::Error> {
-        match &self.item {
-            Item::String(text) => text.as_str().into_deserializer().deserialize_enum(name, variants, visitor),
-            _ => self.deserialize_any(visitor),
-        }
-    }
-
-    serde::forward_to_deserialize_any! {
-        bool i8 i16 i32 i64 i128 u8 u16 u32 u64 u128 f32 f64 char str string bytes byte_buf unit unit_struct
-        newtype_struct seq tuple tuple_struct map struct identifier ignored_any
-    }
 }
 
 #[cfg(test)]

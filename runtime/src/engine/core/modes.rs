@@ -4,7 +4,7 @@
 //! sensor that has stopped triggers no change. When several exits hold in one tick, `fail` comes first, then
 //! `on_lost`, `done` and `go`; among `go`, the higher priority wins. Exits that could still tie are rejected at load.
 
-use crate::graph::{Condition, ExitKind, PlannedExit, PlannedModes, PortRef, Test};
+use crate::graph::{Condition, ExitKind, PlannedExit, PlannedModes, PortRef, PortState, Test};
 use crate::node::{Bus, PortId, ScalarId, Tick};
 use crate::signal::{Freshness, Kind, Pose};
 
@@ -281,12 +281,12 @@ impl ConditionState {
             Freshness::New => (true, true),
         };
         let holds = match test {
-            Test::Absent => !is_present,
+            Test::Is(PortState::Absent) => !is_present,
             _ if !is_present => false,
-            Test::New | Test::Present => is_new,
+            Test::Is(PortState::New | PortState::Present) => is_new,
             // A held value neither starts nor ends the condition: the next sample decides.
             _ if !is_new => return false,
-            Test::Flag(expected) => input.value(bus).is_some_and(|value| (value != 0.0) == expected),
+            Test::Is(state) => input.value(bus).is_some_and(|value| (value != 0.0) == (state == PortState::True)),
             Test::Between { min, max, hysteresis } => {
                 let by = if self.since.is_some() { hysteresis } else { 0.0 };
                 input.value(bus).is_some_and(|value| value > min - by && value < max + by)

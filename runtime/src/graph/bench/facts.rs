@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use super::open::OpenedBench;
-use crate::graph::net::Net;
+use crate::graph::net::{Net, Resolved};
 use crate::graph::syntax::LIMITS;
 use crate::node::Spanned;
 use crate::source::{Code, Diagnostic, Diagnostics, Item, Value};
@@ -34,41 +34,32 @@ pub(crate) fn fill_facts(
             .fold(true, |good, (_, item)| fill_facts(item, net, opened, diagnostics) & good);
     };
     match find_fact(&word, &span, net, opened) {
-        Ok(Some(fact)) => *value = fact,
-        Ok(None) => return false,
+        Ok(fact) => *value = fact,
         Err(diagnostic) => {
-            diagnostics.push(*diagnostic);
+            diagnostics.extend(diagnostic.map(|diagnostic| *diagnostic));
             return false;
         }
     }
     true
 }
 
-/// Returns the fact that a word names, or `None` if another diagnostic explains why it is missing.
-fn find_fact(
-    word: &Spanned<String>,
-    span: &Range<usize>,
-    net: &Net<'_>,
-    opened: &OpenedBench,
-) -> Result<Option<Value>, Box<Diagnostic>> {
+/// Returns the fact that a word names.
+fn find_fact(word: &Spanned<String>, span: &Range<usize>, net: &Net<'_>, opened: &OpenedBench) -> Resolved<Value> {
     let unknown = |message: String| Diagnostic::new(Code::UnknownFact, word.span.clone(), message);
     let (role, name) = word.value.split_once('.').unwrap_or((&word.value, ""));
     if role == LIMITS {
         // A missing value is reported at the section.
-        return Ok(net.flat.limits.as_ref().and_then(|(_, table)| table.get(name)).cloned());
+        return net.flat.limits.as_ref().and_then(|(_, table)| table.get(name)).cloned().ok_or(None);
     }
     let roles = net.flat.role_names();
     let Some(index) = roles.clone().position(|known| known == role) else {
-        return Err(Box::new(unknown(format!("there is no role `{role}`")).suggest(role, roles, "roles")));
+        return unknown(format!("there is no role `{role}`")).suggest(role, roles, "roles").into_err();
     };
     // A device that could not be opened has its own diagnostic.
-    let Some(bound) = &opened.roles[index] else { return Ok(None) };
-    let facts = &bound.facts;
-    match facts.iter().find(|(fact, _)| fact == name) {
-        Some((_, value)) => Ok(Some(Value::from_toml(value, span))),
-        None => {
-            let message = format!("the device of role `{role}` has no fact `{name}`");
-            Err(Box::new(unknown(message).suggest(name, facts.iter().map(|(fact, _)| &**fact), "facts")))
-        }
-    }
+    let facts = &opened.roles[index].as_ref().ok_or(None)?.facts;
+    let Some((_, value)) = facts.iter().find(|(fact, _)| fact == name) else {
+        let message = format!("the device of role `{role}` has no fact `{name}`");
+        return unknown(message).suggest(name, facts.iter().map(|(fact, _)| &**fact), "facts").into_err();
+    };
+    Ok(Value::from_toml(value, span))
 }

@@ -7,7 +7,7 @@ use crate::catalogue::Catalogue;
 use crate::device::{Description, StatedPort};
 use crate::graph::net::Net;
 use crate::graph::plan::PlannedDevice;
-use crate::graph::syntax::{Bench, Block};
+use crate::graph::syntax::{BenchDocument, Block, WireEntry};
 use crate::node::{Mistake, PortSpec, Reader, Spanned};
 use crate::signal::Shape;
 use crate::source::{Code, Diagnostic, Diagnostics, Key, SourceMap, Value, suggest_name};
@@ -90,7 +90,7 @@ struct Opener<'a> {
 
 impl Opener<'_> {
     /// Checks bindings and devices that no role uses; such devices are not opened.
-    fn check_unused(&mut self, bench: &Bench, net: &Net<'_>) {
+    fn check_unused(&mut self, bench: &BenchDocument, net: &Net<'_>) {
         let names = || bench.devices.iter().map(|device| device.key.name.as_str());
         let is_used = |role: &Key| {
             let declared = net.flat.roles.iter().map(|(key, _)| key);
@@ -113,8 +113,7 @@ impl Opener<'_> {
         for device in &bench.devices {
             let is_opened = bench.bind.iter().any(|(role, word)| word.value == device.key.name && is_used(role));
             let kind = device.kind.as_ref().filter(|_| !is_opened);
-            let kind =
-                self.catalogue.devices().iter().find(|known| kind.is_some_and(|kind| known.name() == kind.value));
+            let kind = kind.and_then(|kind| self.catalogue.find_device(&kind.value));
             let (Some(kind), Some(table)) = (kind, device.params.as_table()) else { continue };
             let params = kind.params();
             for (key, _) in table.entries.iter().filter(|(key, _)| !params.iter().any(|param| param.name == key.name)) {
@@ -126,9 +125,9 @@ impl Opener<'_> {
         }
     }
 
-    fn check_types(&mut self, bench: &Bench) {
+    fn check_types(&mut self, bench: &BenchDocument) {
         for kind in bench.devices.iter().filter_map(|device| device.kind.as_ref()) {
-            if !self.catalogue.devices().iter().any(|device| device.name() == kind.value) {
+            if self.catalogue.find_device(&kind.value).is_none() {
                 let names: Vec<_> = self.catalogue.devices().iter().map(|device| device.name()).collect();
                 let message = format!("there is no device type `{}`", kind.value);
                 let diagnostic = Diagnostic::new(Code::UnknownType, kind.span.clone(), message);
@@ -138,7 +137,7 @@ impl Opener<'_> {
         }
     }
 
-    fn role(&mut self, bench: &Bench, key: &Key, kind: &Spanned<String>) -> Option<BoundRole> {
+    fn role(&mut self, bench: &BenchDocument, key: &Key, kind: &Spanned<String>) -> Option<BoundRole> {
         let Some((_, word)) = bench.bind.iter().find(|(role, _)| role.name == key.name) else {
             let message = format!("the bench does not bind the role `{}`", key.name);
             let help = format!("add `{} = \"device\"` under [bind] in the bench", key.name);
@@ -163,7 +162,7 @@ impl Opener<'_> {
             return None;
         };
         self.taken.push((device, fills, key.name.clone()));
-        let role = self.catalogue.roles().iter().find(|role| role.name == kind.value)?;
+        let role = self.catalogue.role_type(&kind.value)?;
         let number = |stated: &[StatedPort], declared: &[PortSpec]| {
             let port = |spec: &PortSpec| stated.iter().position(|port| port.fill == fills && port.name == spec.name);
             let port = |spec: &PortSpec| port(spec).map(|port| (port, stated[port].shape.clone()));
@@ -178,7 +177,7 @@ impl Opener<'_> {
         })
     }
 
-    fn device(&mut self, bench: &Bench, word: &Spanned<String>) -> Option<(usize, Description)> {
+    fn device(&mut self, bench: &BenchDocument, word: &Spanned<String>) -> Option<(usize, Description)> {
         if let Some((_, opened)) = self.names.iter().find(|(name, _)| *name == word.value) {
             return opened.clone();
         }
@@ -187,13 +186,13 @@ impl Opener<'_> {
         opened
     }
 
-    fn open(&mut self, bench: &Bench, word: &Spanned<String>) -> Option<(usize, Description)> {
+    fn open(&mut self, bench: &BenchDocument, word: &Spanned<String>) -> Option<(usize, Description)> {
         let Some(block) = bench.devices.iter().find(|device| device.key.name == word.value) else {
             self.diagnostics.push(unknown_device(word, bench));
             return None;
         };
         let kind = block.kind.as_ref()?;
-        let device = self.catalogue.devices().iter().find(|device| device.name() == kind.value)?;
+        let device = self.catalogue.find_device(&kind.value)?;
         let mut reader = Reader::new(self.sources);
         let opened = device.open(&block.params, &mut reader);
         let mistakes = reader.mistakes;
@@ -220,7 +219,7 @@ impl Opener<'_> {
         let before = self.diagnostics.len();
         for fill in 0..description.fills.len() {
             let name = description.fills[fill].role.clone();
-            let Some(role) = self.catalogue.roles().iter().find(|role| role.name == name) else { continue };
+            let Some(role) = self.catalogue.role_type(&name) else { continue };
             let misfits = description.misfits(fill, role);
             if !misfits.is_empty() {
                 let device = &block.key.name;
@@ -235,7 +234,7 @@ impl Opener<'_> {
     }
 }
 
-fn unknown_device(word: &Spanned<String>, bench: &Bench) -> Diagnostic {
+fn unknown_device(word: &Spanned<String>, bench: &BenchDocument) -> Diagnostic {
     let message = format!("the bench has no device `{}`", word.value);
     let known = bench.devices.iter().map(|device| device.key.name.as_str());
     Diagnostic::new(Code::UnknownDevice, word.span.clone(), message).suggest(&word.value, known, "devices")
@@ -245,7 +244,7 @@ fn unknown_device(word: &Spanned<String>, bench: &Bench) -> Diagnostic {
 pub(crate) fn place_mistakes(
     mistakes: Vec<Mistake>,
     block: &Value,
-    wires: &[(Key, Spanned<String>)],
+    wires: &[WireEntry],
     sources: &mut SourceMap,
     diagnostics: &mut Diagnostics,
 ) {
@@ -258,7 +257,7 @@ pub(crate) fn place_mistakes(
             At::Param(path) => find_spans(block, &path).map_or(block.span.clone(), |(_, value)| value),
             At::Key(path) => find_spans(block, &path).map_or(block.span.clone(), |(key, _)| key),
             At::Input(name) => {
-                wires.iter().find(|(key, _)| key.name == name).map_or(&block.span, |(_, w)| &w.span).clone()
+                wires.iter().find(|wire| wire.key.name == name).map_or(&block.span, |wire| &wire.from.span).clone()
             }
             At::Data { file, text, span } => {
                 notes.push((file.span.clone(), "the file is named here".to_owned()));

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use super::conditions::{ExitContext, resolve_exits};
+use super::conditions::ExitContext;
 use super::demand::{Demand, find_demand};
 use super::nodes::Builder;
 use crate::graph::check::live;
@@ -71,7 +71,7 @@ fn exits(block: &ModeBlock, builder: &mut Builder<'_>, nodes: &[PlannedNode]) ->
         poses: poses.map(|(source, _)| source).collect(),
         lost_after: default_max_age_ns(builder.period),
     };
-    resolve_exits(block, &context, &mut builder.diagnostics)
+    context.resolve(block, &mut builder.diagnostics)
 }
 
 /// Builds the nodes whose parameters a mode sets.

@@ -114,7 +114,7 @@ impl Builder<'_> {
             spec.inputs.iter().map(|input| (input.need, Vec::new())).collect();
         let mut given = Given { inputs: vec![Vec::new(); spec.inputs.len()], period: self.period };
         let mut units = Units::default();
-        let mut is_complete = wires.len() == node.block.wires.len();
+        let mut is_complete = wires.len() == node.block.wires.valid.len();
         for wire in wires {
             let input = &spec.inputs[wire.input];
             inputs[wire.input].1.push(PlannedWire {
@@ -150,7 +150,7 @@ impl Builder<'_> {
             Ok(built) => built,
             Err(mistakes) => {
                 let block = &node.block;
-                place_mistakes(mistakes, &params, &block.wires, &mut self.sources, &mut self.diagnostics);
+                place_mistakes(mistakes, &params, &block.wires.valid, &mut self.sources, &mut self.diagnostics);
                 return None;
             }
         };
@@ -189,7 +189,7 @@ impl Builder<'_> {
         let mut built = match configured?.build(given) {
             Ok(built) => built,
             Err(mistakes) => {
-                place_mistakes(mistakes, &params, &block.wires, &mut self.sources, &mut self.diagnostics);
+                place_mistakes(mistakes, &params, &block.wires.valid, &mut self.sources, &mut self.diagnostics);
                 return None;
             }
         };

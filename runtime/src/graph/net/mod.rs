@@ -13,9 +13,12 @@ use crate::device::RoleType;
 use crate::graph::load::FlatGraph;
 use crate::graph::plan::{PortRef, Producer};
 use crate::node::{NodeSpec, PortSpec, Spanned};
-use crate::source::{Diagnostics, Key};
+use crate::source::{Diagnostic, Diagnostics, Key};
 
 pub(crate) use wire::{CommandWire, Wire, WireOrigin};
+
+/// What a name refers to. The error is a diagnostic, or `None` if another one explains why the name refers to nothing.
+pub(crate) type Resolved<T> = Result<T, Option<Box<Diagnostic>>>;
 
 /// A flat graph with the declarations of its types, its resolved wires and its step order.
 pub(crate) struct Net<'a> {

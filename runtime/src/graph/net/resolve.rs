@@ -1,6 +1,6 @@
 //! Names of ports: from `node.port` in a scope to the port, and back.
 
-use super::Net;
+use super::{Net, Resolved};
 use crate::graph::load::{Entity, Scope};
 use crate::graph::plan::{PortRef, Producer};
 use crate::node::{PortSpec, Spanned};
@@ -16,9 +16,8 @@ const OBSERVED_HELP: &str = "this value does not exist on a robot: use a port of
 impl Net<'_> {
     /// Resolves the port that a wire names in a scope, through the inputs and exports of parts.
     ///
-    /// Returns `None` if the wire leads to an unknown type or to an unwired input of a part. Those have their own
-    /// diagnostics.
-    pub(crate) fn resolve(&self, scope: usize, word: &Spanned<String>) -> Result<Option<PortRef>, Box<Diagnostic>> {
+    /// A wire to an unknown type or to an unwired input of a part has its own diagnostic.
+    pub(crate) fn resolve(&self, scope: usize, word: &Spanned<String>) -> Resolved<PortRef> {
         self.resolve_at_depth(scope, word, 0)
     }
 
@@ -29,54 +28,45 @@ impl Net<'_> {
         word: &Spanned<String>,
         diagnostics: &mut Diagnostics,
     ) -> Option<PortRef> {
-        self.resolve(scope, word).unwrap_or_else(|diagnostic| {
-            diagnostics.push(*diagnostic);
-            None
-        })
+        let port = self.resolve(scope, word);
+        port.map_err(|diagnostic| diagnostics.extend(diagnostic.map(|diagnostic| *diagnostic))).ok()
     }
 
-    fn resolve_at_depth(
-        &self,
-        scope: usize,
-        word: &Spanned<String>,
-        depth: usize,
-    ) -> Result<Option<PortRef>, Box<Diagnostic>> {
+    fn resolve_at_depth(&self, scope: usize, word: &Spanned<String>, depth: usize) -> Resolved<PortRef> {
         let diagnostic = |code: Code, message: String| Diagnostic::new(code, word.span.clone(), message);
         let unknown = |message: String| diagnostic(Code::UnknownPort, message);
         if depth > MAX_DEPTH {
             let message = format!("`{}` refers to itself, through the inputs and exports of parts", word.value);
-            return Err(Box::new(diagnostic(Code::Loop, message)));
+            return diagnostic(Code::Loop, message).into_err();
         }
         let Scope { names, inputs, declared, parent, .. } = &self.flat.scopes[scope];
         let Some((name, port)) = word.value.split_once('.').filter(|(_, port)| !port.contains('.')) else {
             let help = self.ports_help(scope, word);
-            return Err(Box::new(unknown(format!("`{}` is not a port", word.value)).help(help)));
+            return unknown(format!("`{}` is not a port", word.value)).help(help).into_err();
         };
         if name == "inputs"
             && let Some(parent) = *parent
         {
             if !declared.iter().any(|(key, _)| key.name == port) {
                 let known = declared.iter().map(|(key, _)| key.name.as_str());
-                return Err(Box::new(
-                    unknown(format!("the part has no input `{port}`")).suggest(port, known, "inputs"),
-                ));
+                return unknown(format!("the part has no input `{port}`")).suggest(port, known, "inputs").into_err();
             }
             // An input that is declared and not wired has its own diagnostic.
-            let wired = inputs.iter().find(|(key, _)| key.name == port);
-            return wired.map_or(Ok(None), |(_, word)| self.resolve_at_depth(parent, word, depth + 1));
+            let wire = inputs.iter().find(|wire| wire.key.name == port).ok_or(None)?;
+            return self.resolve_at_depth(parent, &wire.from, depth + 1);
         }
         let Some((_, entity)) = names.get(name) else {
             if self.observed.iter().any(|(key, ..)| key.name == name) {
                 let message = format!("`{}` is only for scenarios and recordings: a task cannot read it", word.value);
-                return Err(Box::new(diagnostic(Code::ObservedRole, message).help(OBSERVED_HELP)));
+                return diagnostic(Code::ObservedRole, message).help(OBSERVED_HELP).into_err();
             }
             let message = format!("there is no role, node or part `{name}`");
             let known = names.keys().map(String::as_str);
-            return Err(Box::new(unknown(message).suggest(name, known, "roles, nodes and parts")));
+            return unknown(message).suggest(name, known, "roles, nodes and parts").into_err();
         };
         let no_output = || {
             let known = self.ports_of(*entity).into_iter();
-            Box::new(unknown(format!("`{name}` has no output `{port}`")).suggest(port, known, "outputs"))
+            Some(Box::new(unknown(format!("`{name}` has no output `{port}`")).suggest(port, known, "outputs")))
         };
         let producer = match *entity {
             Entity::Role(i) => Producer::Role(i),
@@ -87,9 +77,9 @@ impl Net<'_> {
                 return self.resolve_at_depth(inner, word, depth + 1);
             }
         };
-        let Some(outputs) = self.outputs(producer) else { return Ok(None) };
+        let outputs = self.outputs(producer).ok_or(None)?;
         let port = outputs.iter().position(|output| output.name == port).ok_or_else(no_output)?;
-        Ok(Some(PortRef { producer, port }))
+        Ok(PortRef { producer, port })
     }
 
     /// Returns the help for a word that is not of the form `node.port`.
@@ -122,8 +112,7 @@ impl Net<'_> {
             Entity::Node(i) => (source.producer == Producer::Node(i)).then(|| format!("{name}.{port}")),
             Entity::Part(inner) => {
                 let mut exports = self.flat.scopes[inner].exports.iter();
-                let is_source =
-                    |word: &Spanned<String>| matches!(self.resolve(inner, word), Ok(Some(port)) if port == source);
+                let is_source = |word: &Spanned<String>| self.resolve(inner, word).is_ok_and(|port| port == source);
                 exports.find(|(_, word)| is_source(word)).map(|(export, _)| format!("{name}.{}", export.name))
             }
         })
@@ -139,7 +128,7 @@ impl Net<'_> {
                 Entity::Part(inner) => {
                     let (export, word) =
                         self.flat.scopes[inner].exports.iter().find(|(key, _)| key.name == input.name)?;
-                    let source = self.resolve(inner, word).ok().flatten()?;
+                    let source = self.resolve(inner, word).ok()?;
                     return (self.port(source).kind == input.kind).then(|| format!("{name}.{}", export.name));
                 }
             };
@@ -158,7 +147,7 @@ impl Net<'_> {
         let exports = parts.flat_map(|(name, inner)| {
             self.flat.scopes[inner].exports.iter().map(move |(key, word)| (format!("{name}.{}", key.name), inner, word))
         });
-        let port = |(name, inner, word)| Some((name, self.port_name(self.resolve(inner, word).ok()??)));
+        let port = |(name, inner, word)| Some((name, self.port_name(self.resolve(inner, word).ok()?)));
         exports.filter_map(port).collect()
     }
 
@@ -167,6 +156,6 @@ impl Net<'_> {
         let scopes = self.flat.scopes.iter().enumerate();
         let words =
             scopes.flat_map(|(scope, Scope { exports, .. })| exports.iter().map(move |(_, word)| (scope, word)));
-        words.filter_map(|(scope, word)| Some(self.resolve(scope, word).ok()??.producer))
+        words.filter_map(|(scope, word)| Some(self.resolve(scope, word).ok()?.producer))
     }
 }
