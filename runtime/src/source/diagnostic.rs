@@ -162,6 +162,18 @@ impl Diagnostic {
         Self { code, message: message.into(), span, notes: Vec::new(), help: None }
     }
 
+    /// Creates the diagnostic of a `name` for which there is no `what`, with a suggestion among the `known` names.
+    pub fn unknown<'n>(
+        code: Code,
+        what: &str,
+        name: &str,
+        span: &Range<usize>,
+        known: impl Iterator<Item = &'n str>,
+    ) -> Self {
+        let message = format!("there is no {what} `{name}`");
+        Self::new(code, span.clone(), message).suggest(name, known, &format!("{what}s"))
+    }
+
     /// Sets the help text.
     #[must_use]
     pub fn help(mut self, help: impl Into<String>) -> Self {

@@ -122,7 +122,7 @@ impl Engine {
 
     /// Whether a device has reported why its samples are missing, while the commands are held only for missing samples.
     fn explains_halt(&self, trouble: Trouble) -> bool {
-        let last = self.halts.list().last().filter(|halt| halt.until.is_none());
+        let last = self.halts.list.last().filter(|halt| halt.until.is_none());
         let is_silence = last.is_some_and(|halt| {
             halt.policy == Policy::Hold && matches!(halt.fault.cause, Cause::SilentClock | Cause::Stale { .. })
         });
@@ -136,10 +136,10 @@ impl Engine {
     /// Returns a message if no mode has a condition on the word, or if the commands wait for `resume`.
     pub fn send(&mut self, word: &str) -> Result<(), String> {
         if word.eq_ignore_ascii_case("stop") {
-            self.halts.cancel_resume();
+            self.halts.resumes = false;
             self.trouble = Some((Policy::Stop, Trouble::Operator));
         } else if word.eq_ignore_ascii_case("resume") {
-            self.halts.resume();
+            self.halts.resumes = true;
         } else if !self.words().any(|known| known == word) {
             let known = self.words().collect::<std::collections::BTreeSet<_>>();
             return Err(format!(
@@ -206,10 +206,10 @@ impl Engine {
 
     /// Returns the time of the next sample of a stepped clock device [ns].
     fn clock_sample(&self) -> Option<i64> {
-        self.devices.iter().enumerate().find_map(|(i, device)| match &device.link {
-            Link::Stepped(driver) if self.schedule.is_clock(i) => driver.next(),
+        match &self.clock()?.link {
+            Link::Stepped(driver) => driver.next(),
             _ => None,
-        })
+        }
     }
 
     /// Sends every device its commands and receives its samples. A device that fails does not keep the others from their

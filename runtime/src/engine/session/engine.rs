@@ -117,7 +117,7 @@ impl Engine {
     /// Returns the halts so far, at most 1000.
     #[must_use]
     pub fn halts(&self) -> &[Halt] {
-        self.halts.list()
+        &self.halts.list
     }
 
     /// Returns the number of halts beyond those that [`halts`](Self::halts) lists.
@@ -141,10 +141,15 @@ impl Engine {
     /// Returns the time of the clock device's last sample, if the device knows it [ns].
     #[must_use]
     pub fn end(&self) -> Option<i64> {
-        self.devices.iter().enumerate().find_map(|(i, device)| match &device.link {
-            Link::Stepped(driver) if self.schedule.is_clock(i) => driver.end(),
+        match &self.clock()?.link {
+            Link::Stepped(driver) => driver.end(),
             _ => None,
-        })
+        }
+    }
+
+    /// Returns the device whose samples trigger the ticks; a graph with a rate has none.
+    pub(super) fn clock(&self) -> Option<&DeviceSlot> {
+        self.devices.get(self.schedule.clock_device()?)
     }
 
     /// Whether a device runs in real time.

@@ -33,11 +33,12 @@ enum State {
 /// The state of the halt machine and the list of halts.
 pub(crate) struct HaltMachine {
     state: State,
-    list: Vec<Halt>,
+    /// The halts so far, at most [`MAX_HALTS`].
+    pub(crate) list: Vec<Halt>,
     /// Number of halts beyond [`MAX_HALTS`].
     pub(crate) unlisted: u64,
     /// Whether the operator has asked to resume.
-    resumes: bool,
+    pub(crate) resumes: bool,
 }
 
 impl HaltMachine {
@@ -53,21 +54,6 @@ impl HaltMachine {
     /// Whether the commands wait for the operator to resume.
     pub(crate) fn is_stopped(&self) -> bool {
         self.state == State::Stopped
-    }
-
-    /// Notes that the operator wants to resume.
-    pub(crate) const fn resume(&mut self) {
-        self.resumes = true;
-    }
-
-    /// Cancels a pending resume: the operator wants a stop.
-    pub(crate) const fn cancel_resume(&mut self) {
-        self.resumes = false;
-    }
-
-    /// Returns the halts so far, at most [`MAX_HALTS`].
-    pub(crate) fn list(&self) -> &[Halt] {
-        &self.list
     }
 
     /// Whether a trouble with that policy starts a halt or turns a hold into a stop.
@@ -142,12 +128,12 @@ mod tests {
                     halts.halt(policy, fault());
                 }
                 if *resumes {
-                    halts.resume();
+                    halts.resumes = true;
                 }
                 halts.update(trouble.is_some(), 10);
                 assert_eq!(halts.is_halted(), *is_halted, "step {i} of {case:?}");
             }
-            assert!(halts.list().iter().all(|halt| halt.until.is_some()));
+            assert!(halts.list.iter().all(|halt| halt.until.is_some()));
         }
     }
 }

@@ -120,8 +120,8 @@ impl RealTimePacer<'_> {
     /// after `next` [ns].
     fn wait(&self, engine: &Engine, next: i64) -> (i64, i64) {
         let due = self.epoch + Duration::from_nanos(next.max(0) as u64);
-        let sampled = engine.devices.iter().enumerate().find_map(|(i, device)| match &device.link {
-            Link::Live(linked) if engine.schedule.is_clock(i) => Some(linked.sampled.clone()),
+        let sampled = engine.clock().and_then(|device| match &device.link {
+            Link::Live(linked) => Some(linked.sampled.clone()),
             _ => None,
         });
         let has_live_clock = sampled.is_some();

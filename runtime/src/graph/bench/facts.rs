@@ -53,7 +53,7 @@ fn find_fact(word: &Spanned<String>, span: &Range<usize>, net: &Net<'_>, opened:
     }
     let roles = net.flat.role_names();
     let Some(index) = roles.clone().position(|known| known == role) else {
-        return unknown(format!("there is no role `{role}`")).suggest(role, roles, "roles").into_err();
+        return Diagnostic::unknown(Code::UnknownFact, "role", role, &word.span, roles).into_err();
     };
     // A device that could not be opened has its own diagnostic.
     let facts = &opened.roles[index].as_ref().ok_or(None)?.facts;

@@ -129,10 +129,9 @@ impl Opener<'_> {
         for kind in bench.devices.iter().filter_map(|device| device.kind.as_ref()) {
             if self.catalogue.find_device(&kind.value).is_none() {
                 let names: Vec<_> = self.catalogue.devices().iter().map(|device| device.name()).collect();
-                let message = format!("there is no device type `{}`", kind.value);
-                let diagnostic = Diagnostic::new(Code::UnknownType, kind.span.clone(), message);
                 let known = names.iter().map(|name| &**name);
-                self.diagnostics.push(diagnostic.suggest(&kind.value, known, "device types"));
+                let unknown = Diagnostic::unknown(Code::UnknownType, "device type", &kind.value, &kind.span, known);
+                self.diagnostics.push(unknown);
             }
         }
     }
@@ -149,14 +148,17 @@ impl Opener<'_> {
         let mut fitting = (0..description.fills.len()).filter(|i| description.fills[*i].role == kind.value);
         let Some(fills) = fitting.clone().find(is_free) else {
             let by = fitting.next().and_then(|i| self.taken.iter().find(|(d, filled, _)| (*d, *filled) == (device, i)));
-            let message = match by {
-                Some((_, _, by)) => format!("device `{}` already fills the role `{by}`", word.value),
-                None => format!("device `{}` cannot fill the role `{}` of type `{}`", word.value, key.name, kind.value),
-            };
             let roles: Vec<_> = description.fills.iter().map(|filled| format!("`{}`", filled.role)).collect();
-            let help = match by {
-                Some(_) => "bind each role to its own device".to_owned(),
-                None => format!("it can fill: {}", roles.join(", ")),
+            let (device, role) = (&word.value, &key.name);
+            let (message, help) = match by {
+                Some((_, _, by)) => (
+                    format!("device `{device}` already fills the role `{by}`"),
+                    "bind each role to its own device".into(),
+                ),
+                None => (
+                    format!("device `{device}` cannot fill the role `{role}` of type `{}`", kind.value),
+                    format!("it can fill: {}", roles.join(", ")),
+                ),
             };
             self.diagnostics.push(Diagnostic::new(Code::WrongRole, word.span.clone(), message).help(help));
             return None;

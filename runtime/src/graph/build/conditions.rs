@@ -58,9 +58,8 @@ impl ExitContext<'_> {
                 if mode.is_some() {
                     return Ok(mode);
                 }
-                let message = format!("there is no mode `{}`", to.value);
-                let diagnostic = Diagnostic::new(Code::UnknownMode, to.span.clone(), message);
-                diagnostic.suggest(&to.value, self.modes.iter().copied(), "modes").into_err()
+                let known = self.modes.iter().copied();
+                Diagnostic::unknown(Code::UnknownMode, "mode", &to.value, &to.span, known).into_err()
             }
             (None, true) => {
                 let message = format!("`{}` has no target mode", kind.key());

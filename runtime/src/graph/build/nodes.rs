@@ -2,17 +2,15 @@
 
 use std::collections::BTreeMap;
 
-use crate::graph::bench::fill_facts;
-use crate::graph::bench::{BoundRole, OpenedBench, place_mistakes};
+use crate::graph::bench::{BoundRole, OpenedBench, fill_facts, place_mistakes};
 use crate::graph::check::frames::Frames;
 use crate::graph::check::units::{UnitMismatch, Units};
 use crate::graph::net::{CommandWire, Net, WireOrigin};
-use crate::graph::plan::{PlannedCommand, PlannedNode, PlannedRole, PlannedWire};
-use crate::graph::plan::{PlannedPort, PortRef, Producer};
+use crate::graph::plan::{PlannedCommand, PlannedNode, PlannedPort, PlannedRole, PlannedWire, PortRef, Producer};
 use crate::graph::syntax::{AgeLimit, Policy, PolicyTable, default_max_age_ns};
 use crate::node::{Built, Configured, Given, Need, NodeSpec, PortSpec, Reader, frame_args};
 use crate::signal::{FlagShape, Joint, Kind, Shape};
-use crate::source::{Code, Diagnostic, Diagnostics, SourceMap, Value};
+use crate::source::{Code, Diagnostic, Diagnostics, Key, SourceMap, Value};
 
 /// Builds the nodes one after the other and collects their diagnostics.
 pub(crate) struct Builder<'a> {
@@ -70,39 +68,40 @@ impl Builder<'_> {
 
     /// Plans the roles, with their age limits.
     pub(crate) fn plan_roles(&self, policy: &PolicyTable) -> Vec<PlannedRole> {
-        let role = |(i, bound): (usize, &Option<BoundRole>)| {
+        let declared = self.net.flat.roles.iter().zip(&self.opened.roles).enumerate();
+        let declared = declared.filter_map(|(i, ((key, _), bound))| {
             let bound = bound.as_ref()?;
             let source = |port| PortRef { producer: Producer::Role(i), port };
             let ports = (0..bound.outputs.len()).map(|port| self.ports[&source(port)].clone()).collect();
-            let name = self.net.flat.roles[i].0.name.clone();
-            let period = self.opened.periods[bound.device];
-            let age = policy.age_limit(&name, period);
-            let (device, numbers, period) = (bound.device, numbers(bound), (period * 1e9) as i64);
-            Some(PlannedRole { name, device, numbers, ports, age, is_observed: false, period })
-        };
-        let declared = self.opened.roles.iter().enumerate().filter_map(role);
-        declared.chain(self.plan_observed_roles()).collect()
-    }
-
-    /// Plans the roles for scenarios and recordings only; the age of their samples does not matter.
-    fn plan_observed_roles(&self) -> impl Iterator<Item = PlannedRole> {
-        self.net.observed.iter().zip(&self.opened.observed).filter_map(|((key, _, role), bound)| {
+            let age = policy.age_limit(&key.name, self.opened.periods[bound.device]);
+            Some(self.plan_role(key, bound, ports, age, false))
+        });
+        // The age of a sample for scenarios and recordings does not matter.
+        let ageless = AgeLimit { max_age: i64::MAX, stale: Policy::Count };
+        let observed = self.net.observed.iter().zip(&self.opened.observed).filter_map(|((key, _, role), bound)| {
             let bound = bound.as_ref()?;
             let port = |(spec, (_, shape)): (&PortSpec, &(usize, Shape))| PlannedPort {
                 name: format!("{}.{}", key.name, spec.name),
                 shape: shape.clone(),
                 frames: frame_args(spec).iter().map(|_| Some(key.name.clone())).collect(),
             };
-            Some(PlannedRole {
-                name: key.name.clone(),
-                device: bound.device,
-                numbers: numbers(bound),
-                ports: role.outputs.iter().zip(&bound.outputs).map(port).collect(),
-                age: AgeLimit { max_age: i64::MAX, stale: Policy::Count },
-                is_observed: true,
-                period: (self.opened.periods[bound.device] * 1e9) as i64,
-            })
-        })
+            let ports = role.outputs.iter().zip(&bound.outputs).map(port).collect();
+            Some(self.plan_role(key, bound, ports, ageless, true))
+        });
+        declared.chain(observed).collect()
+    }
+
+    fn plan_role(
+        &self,
+        key: &Key,
+        bound: &BoundRole,
+        ports: Vec<PlannedPort>,
+        age: AgeLimit,
+        is_observed: bool,
+    ) -> PlannedRole {
+        let numbers = bound.outputs.iter().map(|(number, _)| *number).collect();
+        let period = (self.opened.periods[bound.device] * 1e9) as i64;
+        PlannedRole { name: key.name.clone(), device: bound.device, numbers, ports, age, is_observed, period }
     }
 
     /// Builds a node, or returns `None` if it or its wires have mistakes.
@@ -146,14 +145,7 @@ impl Builder<'_> {
         if !is_complete || inputs.iter().any(missing) || self.frames.has_clash(index) {
             return None;
         }
-        let built = match configured?.build(given.clone()) {
-            Ok(built) => built,
-            Err(mistakes) => {
-                let block = &node.block;
-                place_mistakes(mistakes, &params, &block.wires.valid, &mut self.sources, &mut self.diagnostics);
-                return None;
-            }
-        };
+        let built = self.build(index, configured, &params, given.clone())?;
         let mut ports = Vec::new();
         for (port, (mut shape, output)) in built.outputs.into_iter().zip(&spec.outputs).enumerate() {
             units.give(output, &format!("{}.{}", node.name, output.name), &mut shape);
@@ -184,15 +176,8 @@ impl Builder<'_> {
     pub(crate) fn variant(&mut self, index: usize, params: &Value) -> Option<Built> {
         let (kind, spec) = self.net.nodes[index]?;
         let (given, _) = self.built.get(&index)?.clone();
-        let block = &self.net.flat.nodes[index].block;
         let (configured, params) = self.configure(kind, params);
-        let mut built = match configured?.build(given) {
-            Ok(built) => built,
-            Err(mistakes) => {
-                place_mistakes(mistakes, &params, &block.wires.valid, &mut self.sources, &mut self.diagnostics);
-                return None;
-            }
-        };
+        let mut built = self.build(index, configured, &params, given)?;
         let name = &self.net.flat.nodes[index].name;
         for (port, (shape, output)) in built.outputs.iter_mut().zip(&spec.outputs).enumerate() {
             self.units.get_mut(&index)?.give(output, &format!("{name}.{}", output.name), shape);
@@ -221,6 +206,19 @@ impl Builder<'_> {
         let is_valid = mistakes.is_empty();
         place_mistakes(mistakes, &params, &[], &mut self.sources, &mut self.diagnostics);
         (configured.filter(|_| is_valid), params)
+    }
+
+    /// Builds a node from its parameters and the shapes on its wires, or reports its mistakes.
+    fn build(
+        &mut self,
+        index: usize,
+        configured: Option<Box<dyn Configured>>,
+        params: &Value,
+        given: Given,
+    ) -> Option<Built> {
+        let wires = &self.net.flat.nodes[index].block.wires.valid;
+        let built = configured?.build(given);
+        built.map_err(|mistakes| place_mistakes(mistakes, params, wires, &mut self.sources, &mut self.diagnostics)).ok()
     }
 
     /// Suggests a node that converts any unit into that unit per second, for an input that takes only rates.
@@ -288,11 +286,6 @@ impl Builder<'_> {
     fn age_limit(&self, wire: &CommandWire) -> AgeLimit {
         wire.origin.age.unwrap_or(AgeLimit { max_age: default_max_age_ns(self.period), stale: Policy::Hold })
     }
-}
-
-/// Returns the index of each output of a role among those of its device.
-fn numbers(bound: &BoundRole) -> Vec<usize> {
-    bound.outputs.iter().map(|(number, _)| *number).collect()
 }
 
 /// Returns the joints of a joint vector; other shapes have none.

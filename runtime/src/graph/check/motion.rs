@@ -6,8 +6,7 @@
 use std::collections::BTreeSet;
 
 use crate::graph::net::{Net, Wire};
-use crate::graph::plan::Producer;
-use crate::graph::plan::{Condition, PlannedExit, PlannedMode};
+use crate::graph::plan::{Condition, PlannedExit, PlannedMode, Producer};
 use crate::graph::syntax::{ExitKind, ModeBlock};
 use crate::signal::Kind;
 use crate::source::{Code, Diagnostic, Diagnostics};

@@ -4,8 +4,7 @@ use std::collections::BTreeMap;
 use std::ops::Range;
 
 use crate::graph::net::Net;
-use crate::graph::plan::{PlannedNode, PlannedShow, PlannedView};
-use crate::graph::plan::{PlannedPort, PortRef, Producer};
+use crate::graph::plan::{PlannedNode, PlannedPort, PlannedShow, PlannedView, PortRef, Producer};
 use crate::node::Spanned;
 use crate::signal::{Kind, Unit};
 use crate::source::{Code, Diagnostic, Diagnostics};

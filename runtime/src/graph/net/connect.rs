@@ -69,9 +69,8 @@ impl Net<'_> {
         let mut wires = Vec::new();
         for (role, wire) in &self.flat.commands {
             let Some(index) = self.flat.role_names().position(|name| name == role.name) else {
-                let message = format!("there is no role `{}`", role.name);
-                let diagnostic = Diagnostic::new(Code::UnknownPort, role.span.clone(), message);
-                diagnostics.push(diagnostic.suggest(&role.name, self.flat.role_names(), "roles"));
+                let known = self.flat.role_names();
+                diagnostics.push(Diagnostic::unknown(Code::UnknownPort, "role", &role.name, &role.span, known));
                 continue;
             };
             wires.extend(self.command(index, wire, diagnostics));

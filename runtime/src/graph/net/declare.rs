@@ -11,9 +11,7 @@ impl<'a> Net<'a> {
     /// Creates a net with all types looked up and without wires.
     pub(super) fn declare(flat: &'a FlatGraph, catalogue: &'a Catalogue, diagnostics: &mut Diagnostics) -> Self {
         let mut unknown = |word: &Spanned<String>, what: &str, names: Vec<&str>| {
-            let message = format!("there is no {what} `{}`", word.value);
-            let diagnostic = Diagnostic::new(Code::UnknownType, word.span.clone(), message);
-            diagnostics.push(diagnostic.suggest(&word.value, names.into_iter(), &format!("{what}s")));
+            diagnostics.push(Diagnostic::unknown(Code::UnknownType, what, &word.value, &word.span, names.into_iter()));
         };
         let role = |(_, kind): &(Key, Spanned<String>)| {
             let role = catalogue.role_type(&kind.value);

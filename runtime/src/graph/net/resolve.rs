@@ -64,22 +64,25 @@ impl Net<'_> {
             let known = names.keys().map(String::as_str);
             return unknown(message).suggest(name, known, "roles, nodes and parts").into_err();
         };
-        let no_output = || {
-            let known = self.ports_of(*entity).into_iter();
-            Some(Box::new(unknown(format!("`{name}` has no output `{port}`")).suggest(port, known, "outputs")))
-        };
-        let producer = match *entity {
+        self.port_of(*entity, port, depth).unwrap_or_else(|| {
+            let message = format!("`{name}` has no output `{port}`");
+            unknown(message).suggest(port, self.ports_of(*entity).into_iter(), "outputs").into_err()
+        })
+    }
+
+    /// Resolves a port of a role, a node or a part, or returns `None` if it has none with that name.
+    fn port_of(&self, entity: Entity, port: &str, depth: usize) -> Option<Resolved<PortRef>> {
+        let producer = match entity {
             Entity::Role(i) => Producer::Role(i),
             Entity::Node(i) => Producer::Node(i),
             Entity::Part(inner) => {
-                let export = self.flat.scopes[inner].exports.iter().find(|(key, _)| key.name == port);
-                let (_, word) = export.ok_or_else(no_output)?;
-                return self.resolve_at_depth(inner, word, depth + 1);
+                let (_, word) = self.flat.scopes[inner].exports.iter().find(|(key, _)| key.name == port)?;
+                return Some(self.resolve_at_depth(inner, word, depth + 1));
             }
         };
-        let outputs = self.outputs(producer).ok_or(None)?;
-        let port = outputs.iter().position(|output| output.name == port).ok_or_else(no_output)?;
-        Ok(PortRef { producer, port })
+        let Some(outputs) = self.outputs(producer) else { return Some(Err(None)) };
+        let port = outputs.iter().position(|output| output.name == port)?;
+        Some(Ok(PortRef { producer, port }))
     }
 
     /// Returns the help for a word that is not of the form `node.port`.
@@ -104,51 +107,34 @@ impl Net<'_> {
         }
     }
 
+    /// Returns the ports that the wires of a scope can read, each with its name there.
+    fn ports_in(&self, scope: usize) -> impl Iterator<Item = (String, PortRef)> {
+        let ports = self.flat.scopes[scope]
+            .names
+            .iter()
+            .flat_map(|(name, (_, entity))| self.ports_of(*entity).into_iter().map(move |port| (name, *entity, port)));
+        ports.filter_map(|(name, entity, port)| Some((format!("{name}.{port}"), self.port_of(entity, port, 0)?.ok()?)))
+    }
+
     /// Returns the name by which the wires of a scope refer to a port, or `None` if they cannot.
     pub(crate) fn name_in(&self, scope: usize, source: PortRef) -> Option<String> {
-        let port = &self.port(source).name;
-        self.flat.scopes[scope].names.iter().find_map(|(name, (_, entity))| match *entity {
-            Entity::Role(i) => (source.producer == Producer::Role(i)).then(|| format!("{name}.{port}")),
-            Entity::Node(i) => (source.producer == Producer::Node(i)).then(|| format!("{name}.{port}")),
-            Entity::Part(inner) => {
-                let mut exports = self.flat.scopes[inner].exports.iter();
-                let is_source = |word: &Spanned<String>| self.resolve(inner, word).is_ok_and(|port| port == source);
-                exports.find(|(_, word)| is_source(word)).map(|(export, _)| format!("{name}.{}", export.name))
-            }
-        })
+        self.ports_in(scope).find(|(_, port)| *port == source).map(|(name, _)| name)
     }
 
     /// Returns a port of the scope with the name and the kind of an input, as a suggestion for its wire.
     pub(crate) fn find_candidate(&self, scope: usize, node: usize, input: &PortSpec) -> Option<String> {
-        self.flat.scopes[scope].names.iter().find_map(|(name, (_, entity))| {
-            let outputs = match *entity {
-                Entity::Role(i) => self.outputs(Producer::Role(i)),
-                Entity::Node(i) if i != node => self.outputs(Producer::Node(i)),
-                Entity::Node(_) => None,
-                Entity::Part(inner) => {
-                    let (export, word) =
-                        self.flat.scopes[inner].exports.iter().find(|(key, _)| key.name == input.name)?;
-                    let source = self.resolve(inner, word).ok()?;
-                    return (self.port(source).kind == input.kind).then(|| format!("{name}.{}", export.name));
-                }
-            };
-            let port = outputs?.iter().find(|output| output.kind == input.kind && output.name == input.name)?;
-            Some(format!("{name}.{}", port.name))
-        })
+        let end = format!(".{}", input.name);
+        let is_candidate = |(name, port): &(String, PortRef)| {
+            name.ends_with(&end) && port.producer != Producer::Node(node) && self.port(*port).kind == input.kind
+        };
+        self.ports_in(scope).find(is_candidate).map(|(name, _)| name)
     }
 
     /// Returns the exports of the parts in the graph, each with the full name of the port behind it.
     pub(crate) fn exports_by_name(&self) -> Vec<(String, String)> {
-        let names = self.flat.scopes.first().into_iter().flat_map(|scope| &scope.names);
-        let parts = names.filter_map(|(name, (_, entity))| match entity {
-            Entity::Part(inner) => Some((name, *inner)),
-            _ => None,
-        });
-        let exports = parts.flat_map(|(name, inner)| {
-            self.flat.scopes[inner].exports.iter().map(move |(key, word)| (format!("{name}.{}", key.name), inner, word))
-        });
-        let port = |(name, inner, word)| Some((name, self.port_name(self.resolve(inner, word).ok()?)));
-        exports.filter_map(port).collect()
+        let ports = self.ports_in(0).map(|(name, port)| (name, self.port_name(port)));
+        // A role or a node of the graph itself has its full name there.
+        ports.filter(|(name, port)| name != port).collect()
     }
 
     /// Returns the producers of all exported ports.
