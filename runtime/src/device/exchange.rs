@@ -9,14 +9,14 @@ use crate::signal::{Arenas, Kind, Shape, Signal};
 #[derive(Debug, Clone, Default)]
 pub struct Samples {
     pub(crate) arenas: Arenas,
-    pub(crate) ports: Vec<Sample>,
+    pub(crate) ports: Vec<PortSample>,
     /// How often any port was written.
     pub(crate) writes: u64,
     pub(crate) counts: Vec<(&'static str, u64)>,
 }
 
 #[derive(Debug, Clone)]
-pub(crate) struct Sample {
+pub(crate) struct PortSample {
     pub(crate) kind: Kind,
     pub(crate) slot: u32,
     /// Time of the sample in the graph's clock [ns].
@@ -25,12 +25,12 @@ pub(crate) struct Sample {
     pub(crate) sequence: u64,
     /// How often the device has written the port.
     pub(crate) writes: u64,
-    pub(crate) state: State,
+    pub(crate) state: SampleState,
 }
 
 /// What the last write of a port left there.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(crate) enum State {
+pub(crate) enum SampleState {
     Value,
     Absent,
     /// There is no value until the port is written again, and why.
@@ -44,7 +44,7 @@ impl Samples {
         let mut samples = Self::default();
         for port in &description.outputs {
             let (kind, slot) = (port.shape.kind(), samples.arenas.add(&port.shape));
-            samples.ports.push(Sample { kind, slot, stamp: 0, sequence: 0, writes: 0, state: State::Absent });
+            samples.ports.push(PortSample { kind, slot, stamp: 0, sequence: 0, writes: 0, state: SampleState::Absent });
         }
         samples
     }
@@ -56,7 +56,7 @@ impl Samples {
     /// # Panics
     /// If the port belongs to another device.
     pub fn write<T: Signal>(&mut self, port: Output<T>, stamp: i64, sequence: u64) -> &mut T {
-        let sample = self.renew(port.port, stamp, sequence, State::Value);
+        let sample = self.renew(port.port, stamp, sequence, SampleState::Value);
         assert_eq!(sample.kind, T::KIND, "output {} of the device", port.port);
         let slot = sample.slot as usize;
         &mut T::arena_mut(&mut self.arenas)[slot]
@@ -66,14 +66,14 @@ impl Samples {
     ///
     /// This is normal, as a position without contact; for a fault of the device, see [`lost`](Self::lost).
     pub fn clear<T: Signal>(&mut self, port: Output<T>, stamp: i64, sequence: u64) {
-        self.renew(port.port, stamp, sequence, State::Absent);
+        self.renew(port.port, stamp, sequence, SampleState::Absent);
     }
 
     /// Makes a port absent until it is written again, because something is wrong: `why` completes "`pad.image` is lost:".
     ///
     /// As long as the port is lost, the graph's policy `device` applies: it holds the commands, stops them or ends the run.
     pub fn lost<T: Signal>(&mut self, port: Output<T>, why: impl Into<Cow<'static, str>>) {
-        self.ports[port.port].state = State::Lost(why.into());
+        self.ports[port.port].state = SampleState::Lost(why.into());
     }
 
     /// Counts something for the summary of the run, as a plural noun: `"bad frames"`.
@@ -88,10 +88,10 @@ impl Samples {
     #[must_use]
     pub fn get<T: Signal>(&self, port: Output<T>) -> Option<&T> {
         let sample = &self.ports[port.port];
-        (sample.state == State::Value).then(|| &T::arena(&self.arenas)[sample.slot as usize])
+        (sample.state == SampleState::Value).then(|| &T::arena(&self.arenas)[sample.slot as usize])
     }
 
-    fn renew(&mut self, port: usize, stamp: i64, sequence: u64, state: State) -> &mut Sample {
+    fn renew(&mut self, port: usize, stamp: i64, sequence: u64, state: SampleState) -> &mut PortSample {
         let sample = &mut self.ports[port];
         (sample.stamp, sample.sequence, sample.state) = (stamp, sequence, state);
         sample.writes += 1;
@@ -101,7 +101,7 @@ impl Samples {
 
     /// Copies the samples of the same device, in place.
     pub(crate) fn copy_from(&mut self, other: &Self) {
-        for Sample { kind, slot, .. } in &other.ports {
+        for PortSample { kind, slot, .. } in &other.ports {
             other.arenas.copy(*kind, *slot, &mut self.arenas, *slot);
         }
         self.ports.clone_from(&other.ports);
@@ -115,12 +115,12 @@ impl Samples {
 pub struct Commands {
     pub(crate) values: Vec<Box<[f64]>>,
     arenas: Arenas,
-    reports: Vec<ReportSlot>,
+    reports: Vec<ReportValue>,
 }
 
 /// What a wire reports.
 #[derive(Debug, Clone, Copy)]
-struct ReportSlot {
+struct ReportValue {
     kind: Kind,
     slot: u32,
     is_present: bool,
@@ -140,7 +140,7 @@ impl Commands {
             other => unreachable!("a command is a joint vector, and not {}", other.kind().with_article()),
         };
         let mut arenas = Arenas::default();
-        let room = |(i, port): (usize, &super::StatedPort)| ReportSlot {
+        let room = |(i, port): (usize, &super::StatedPort)| ReportValue {
             kind: port.shape.kind(),
             slot: arenas.add(wired(i).unwrap_or(&port.shape)),
             is_present: false,

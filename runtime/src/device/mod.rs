@@ -20,7 +20,7 @@ use crate::source::Value;
 pub(crate) use description::StatedPort;
 pub use description::{Command, Description, Fill, Output, Report};
 pub use exchange::{Commands, Samples};
-pub(crate) use exchange::{Sample, State};
+pub(crate) use exchange::{PortSample, SampleState};
 pub use live::{Link, Live};
 pub(crate) use live::{Linked, link};
 
@@ -143,13 +143,13 @@ pub trait DeviceType: Send + Sync {
     fn open(&self, table: &Value, reader: &mut Reader<'_>) -> Option<Opened>;
 }
 
-struct Typed<D>(PhantomData<fn() -> D>);
+struct TypedDevice<D>(PhantomData<fn() -> D>);
 
 pub(crate) fn device_type<D: Device>() -> Box<dyn DeviceType> {
-    Box::new(Typed::<D>(PhantomData))
+    Box::new(TypedDevice::<D>(PhantomData))
 }
 
-impl<D: Device> DeviceType for Typed<D> {
+impl<D: Device> DeviceType for TypedDevice<D> {
     fn name(&self) -> Cow<'static, str> {
         D::NAME.into()
     }

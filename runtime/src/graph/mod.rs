@@ -22,8 +22,8 @@ pub use compiled::Compiled;
 pub use load::Request;
 pub(crate) use load::{Loader, wrong_file_type};
 pub use outline::{
-    NO_SPAN, Origin, Outline, OutlinedBlock, OutlinedMode, OutlinedPort, OutlinedRole, OutlinedWire, OutlinedWord,
-    Setting,
+    NO_SPAN, Outline, OutlinedBlock, OutlinedMode, OutlinedPort, OutlinedRole, OutlinedWire, OutlinedWord, Setting,
+    ValueOrigin,
 };
 pub use plan::PlannedPort;
 pub(crate) use plan::{

@@ -124,13 +124,13 @@ pub struct Setting {
     pub value: Value,
     /// Where it comes from.
     #[serde(flatten)]
-    pub origin: Origin,
+    pub origin: ValueOrigin,
 }
 
 /// Where a value comes from.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 #[serde(tag = "origin", rename_all = "lowercase")]
-pub enum Origin {
+pub enum ValueOrigin {
     /// A file or the command line.
     Written {
         /// Where the value is written.
@@ -184,7 +184,7 @@ impl OutlineBuilder<'_> {
         if !settings.iter().any(|setting| setting.path == "max_gap_ms") {
             // A whole number of microseconds, so that no digits are there by chance.
             let gap = Value { span: NO_SPAN, item: Item::Float((self.max_gap * 1e6).round() * 1e-3) };
-            settings.push(Setting { path: "max_gap_ms".into(), value: gap, origin: Origin::Default });
+            settings.push(Setting { path: "max_gap_ms".into(), value: gap, origin: ValueOrigin::Default });
         }
         settings
     }
@@ -249,7 +249,9 @@ impl OutlineBuilder<'_> {
             let path = format!("{path}{}", spec.name);
             match given.and_then(|table| table.get(spec.name)) {
                 Some(value) => settings.extend(self.value(value, spec, path)),
-                None => settings.extend(default(spec).map(|value| Setting { path, value, origin: Origin::Default })),
+                None => {
+                    settings.extend(default(spec).map(|value| Setting { path, value, origin: ValueOrigin::Default }))
+                }
             }
         }
         let is_declared = |name: &str| specs.iter().any(|spec| spec.name == name);
@@ -260,19 +262,18 @@ impl OutlineBuilder<'_> {
     }
 
     fn value(&self, value: &Value, spec: &ParamSpec, path: String) -> Vec<Setting> {
-        let table = |value: &'_ Value| value.as_table().filter(|table| !table.is_fact()).cloned();
         let fields = |table: &Table, path: &str| self.table(Some(table), &spec.fields, &format!("{path}."));
-        match (table(value), spec.repeats) {
-            (Some(table), Repeats::Once) if !spec.fields.is_empty() => fields(&table, &path),
-            (Some(entries), Repeats::PerName) => {
+        match (value.as_section(), spec.repeats) {
+            (Some(table), Repeats::Once) if !spec.fields.is_empty() => fields(table, &path),
+            (Some(section), Repeats::PerName) => {
                 let entry = |(key, value): &(Key, Value)| {
                     let path = format!("{path}.{}", key.name);
-                    match table(value).filter(|_| !spec.fields.is_empty()) {
-                        Some(table) => fields(&table, &path),
+                    match value.as_section().filter(|_| !spec.fields.is_empty()) {
+                        Some(table) => fields(table, &path),
                         None => vec![self.setting(value, path)],
                     }
                 };
-                entries.entries.iter().flat_map(entry).collect()
+                section.entries.iter().flat_map(entry).collect()
             }
             _ => {
                 let mut setting = self.setting(value, path);
@@ -285,8 +286,7 @@ impl OutlineBuilder<'_> {
 
     /// A value as it was written, or the fact that it asks for.
     fn setting(&self, value: &Value, path: String) -> Setting {
-        let fact = value.as_table().filter(|table| table.is_fact());
-        let word = fact.and_then(|table| table.get("from")).and_then(Value::as_str);
+        let word = value.as_table().and_then(Table::fact).map(|(word, _)| word);
         let role = word.and_then(|word| word.split_once('.'));
         let role = role.and_then(|(role, _)| self.net.flat.role_names().position(|name| name == role));
         let mut filled = value.clone();
@@ -296,17 +296,17 @@ impl OutlineBuilder<'_> {
         let origin = match (word, bound) {
             (Some(word), Some(bound)) => {
                 let device = &self.opened.devices[bound.device];
-                Origin::Fact { fact: word.to_owned(), place: self.sources.location(&device.span) }
+                ValueOrigin::Fact { fact: word.to_owned(), place: self.sources.location(&device.span) }
             }
             // A value from [limits] keeps its place there.
-            _ => Origin::Written { place: self.sources.location(&filled.span) },
+            _ => ValueOrigin::Written { place: self.sources.location(&filled.span) },
         };
         Setting { path, value: filled, origin }
     }
 
     /// The path of a file, which stands relative to the file it is written in, as seen from the working folder.
     fn resolve(&self, setting: &mut Setting, spec: &ParamSpec) {
-        if let (Origin::Written { .. }, Item::String(text)) = (&setting.origin, &mut setting.value.item)
+        if let (ValueOrigin::Written { .. }, Item::String(text)) = (&setting.origin, &mut setting.value.item)
             && spec.takes == FilePath::EXPECTS
         {
             *text = self.sources.path(text, setting.value.span.start).display().to_string();
@@ -326,14 +326,14 @@ impl OutlineBuilder<'_> {
 
     /// Collects the values in nested tables, down to `depth` levels.
     fn leaves(&self, value: &Value, path: &str, depth: usize, settings: &mut Vec<Setting>) {
-        match value.as_table().filter(|table| depth > 0 && !table.is_fact()) {
+        match value.as_section().filter(|_| depth > 0) {
             Some(table) => {
                 for (key, value) in &table.entries {
                     self.leaves(value, &format!("{path}.{}", key.name), depth - 1, settings);
                 }
             }
             None => {
-                let origin = Origin::Written { place: self.sources.location(&value.span) };
+                let origin = ValueOrigin::Written { place: self.sources.location(&value.span) };
                 settings.push(Setting { path: path.to_owned(), value: value.clone(), origin });
             }
         }

@@ -3,6 +3,8 @@
 use std::fmt;
 use std::str::FromStr;
 
+use crate::source::quoted;
+
 /// The base of a unit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum Base {
@@ -94,8 +96,7 @@ impl Unit {
     /// Lists every unit that a graph file may name, for messages.
     #[must_use]
     pub fn list() -> String {
-        let names: Vec<String> = NAMES.iter().map(|(_, name)| format!("`{name}`")).collect();
-        format!("{}, each also `…/tactel`, `…/s`, `…/s2`", names.join(", "))
+        format!("{}, each also `…/tactel`, `…/s`, `…/s2`", quoted(NAMES.iter().map(|(_, name)| name)))
     }
 }
 

@@ -84,11 +84,14 @@ impl Table {
         Some(self.entries.remove(at))
     }
 
-    /// Returns whether the table refers to a fact, as `{ from = "pad.threshold" }` does.
+    /// Returns the fact that the table refers to and its place, as in `{ from = "pad.threshold" }`.
     ///
     /// Such a table is one value: it is replaced as a whole, not merged.
-    pub(crate) fn is_fact(&self) -> bool {
-        matches!(self.entries.as_slice(), [(key, value)] if key.name == "from" && value.as_str().is_some())
+    pub(crate) fn fact(&self) -> Option<(&str, &Range<usize>)> {
+        match self.entries.as_slice() {
+            [(key, value)] if key.name == "from" => Some((value.as_str()?, &value.span)),
+            _ => None,
+        }
     }
 
     /// Merges another table over this one: tables merge recursively, other values replace, nothing is deleted.
@@ -97,7 +100,7 @@ impl Table {
             match self.entries.iter_mut().find(|(mine, _)| mine.name == key.name) {
                 None => self.entries.push((key, value)),
                 Some((mine, old)) => match (&mut old.item, value.item) {
-                    (Item::Table(old), Item::Table(new)) if !old.is_fact() && !new.is_fact() => old.merge(new),
+                    (Item::Table(old), Item::Table(new)) if old.fact().or(new.fact()).is_none() => old.merge(new),
                     (item, new) => {
                         *item = new;
                         (old.span, mine.span) = (value.span, key.span);
@@ -115,6 +118,23 @@ impl Value {
         match &self.item {
             Item::Table(table) => Some(table),
             _ => None,
+        }
+    }
+
+    /// Returns the table, unless it refers to a fact.
+    pub(crate) fn as_section(&self) -> Option<&Table> {
+        self.as_table().filter(|table| table.fact().is_none())
+    }
+
+    /// Returns the facts to which the value and the values in it refer, each with its place.
+    pub(crate) fn facts(&self) -> Vec<(&str, &Range<usize>)> {
+        match &self.item {
+            Item::Array(items) => items.iter().flat_map(Self::facts).collect(),
+            Item::Table(table) => match table.fact() {
+                Some(fact) => vec![fact],
+                None => table.entries.iter().flat_map(|(_, value)| value.facts()).collect(),
+            },
+            _ => Vec::new(),
         }
     }
 

@@ -4,6 +4,8 @@
 //! sensor that has stopped triggers no change. When several exits hold in one tick, `fail` comes first, then
 //! `on_lost`, `done` and `go`; among `go`, the higher priority wins. Exits that could still tie are rejected at load.
 
+use std::collections::BTreeSet;
+
 use crate::graph::{Condition, ExitKind, PlannedExit, PlannedModes, PortRef, PortState, Test};
 use crate::node::{Bus, PortId, ScalarId, Tick};
 use crate::signal::{Freshness, Kind, Pose};
@@ -102,10 +104,8 @@ struct ConditionState {
 impl ModeMachine {
     /// Creates the machine. `port` finds a port on the bus and its kind.
     pub(crate) fn new(planned: PlannedModes, port: impl Fn(PortRef) -> (PortId, Kind)) -> Self {
-        let mut changed: Vec<usize> =
-            planned.modes.iter().flat_map(|mode| mode.configurations.iter().map(|(runner, _)| *runner)).collect();
-        changed.sort_unstable();
-        changed.dedup();
+        let configurations = planned.modes.iter().flat_map(|mode| &mode.configurations);
+        let changed: BTreeSet<usize> = configurations.map(|(runner, _)| *runner).collect();
         let input = |exit: &PlannedExit| match &exit.condition {
             Condition::Port(watched, _) | Condition::Lost(watched, _) => {
                 Some(ConditionInput::new(port(watched.source), watched.feature))

@@ -8,7 +8,7 @@ use super::schedule::TickSchedule;
 use super::trouble::WatchedWire;
 use crate::device::{Commands, Driver, Samples};
 use crate::engine::core::{
-    AgedWire, CommandSlot, Core, DeviceSlot, Inlet, Link, ModeMachine, NodeRunner, ReportSlot, Timing,
+    AgedWire, CommandSlot, Core, DeviceLink, DeviceSlot, Inlet, ModeMachine, NodeRunner, ReportSlot, Timing,
 };
 use crate::graph::{
     AgeLimit, Compiled, PlannedCommand, PlannedDevice, PlannedNode, PlannedPort, PlannedShow, PlannedView, PlannedWire,
@@ -149,8 +149,8 @@ fn device_slot(i: usize, device: PlannedDevice, commands: &[PlannedCommand], sou
         samples: Samples::of(&device.description),
         commands: Commands::with_reports(&device.description, wired),
         link: match device.driver {
-            Driver::Stepped(driver) => Link::Stepped(driver),
-            Driver::Live(driver) => Link::Idle(driver),
+            Driver::Stepped(driver) => DeviceLink::Stepped(driver),
+            Driver::Live(driver) => DeviceLink::Idle(driver),
         },
         failed: None,
     }

@@ -6,7 +6,7 @@ use super::blame::owner;
 use super::engine::Engine;
 use super::trouble::{Trouble, panic_message};
 use crate::device::DeviceError;
-use crate::engine::core::{Link, ModeMachine, Transition};
+use crate::engine::core::{DeviceLink, ModeMachine, Transition};
 use crate::fault::{Cause, Fault};
 use crate::graph::Policy;
 use crate::source::suggestion;
@@ -197,7 +197,7 @@ impl Engine {
     /// Notifies the stepped devices that the run is over, and why.
     pub(crate) fn finish(&mut self, reason: &str) {
         for device in &mut self.devices {
-            if let Link::Stepped(driver) = &mut device.link {
+            if let DeviceLink::Stepped(driver) = &mut device.link {
                 // A panic here does not change why the run ended: the device has received its zero command.
                 let _ = catch_unwind(AssertUnwindSafe(|| driver.finish(reason)));
             }
@@ -207,7 +207,7 @@ impl Engine {
     /// Returns the time of the next sample of a stepped clock device [ns].
     fn clock_sample(&self) -> Option<i64> {
         match &self.clock()?.link {
-            Link::Stepped(driver) => driver.next(),
+            DeviceLink::Stepped(driver) => driver.next(),
             _ => None,
         }
     }
@@ -219,7 +219,7 @@ impl Engine {
         for i in 0..self.devices.len() {
             let device = &mut self.devices[i];
             match &mut device.link {
-                Link::Stepped(driver) => {
+                DeviceLink::Stepped(driver) => {
                     let exchange = || driver.exchange(now, &device.commands, &mut device.samples);
                     let result = catch_unwind(AssertUnwindSafe(exchange));
                     let result = result
@@ -228,12 +228,12 @@ impl Engine {
                         self.lose_device(i, why);
                     }
                 }
-                Link::Live(linked) => {
+                DeviceLink::Live(linked) => {
                     linked.send(&device.commands);
                     let is_newer = linked.receive(&mut device.samples);
                     has_sampled |= is_newer && self.schedule.is_clock(i);
                 }
-                Link::Idle(_) | Link::Gone => {}
+                DeviceLink::Idle(_) | DeviceLink::Gone => {}
             }
         }
         has_sampled
@@ -256,7 +256,7 @@ impl Engine {
     /// Marks a device as failed. The engine does not call it again.
     pub(crate) fn lose_device(&mut self, device: usize, why: String) {
         let device = &mut self.devices[device];
-        (device.link, device.failed) = (Link::Gone, Some(why));
+        (device.link, device.failed) = (DeviceLink::Gone, Some(why));
     }
 
     /// Handles a value that is not finite. Under every policy but `fault`, the outputs of the node and of all nodes after

@@ -4,7 +4,7 @@ use super::halt::{Halt, HaltMachine};
 use super::schedule::TickSchedule;
 use super::trouble::{Trouble, WatchedWire};
 use crate::device::Report;
-use crate::engine::core::{Core, Counters, DeviceSlot, Link, ModeChange, ModeMachine, Timing};
+use crate::engine::core::{Core, Counters, DeviceLink, DeviceSlot, ModeChange, ModeMachine, Timing};
 use crate::graph::{PlannedPort, Policy, PolicyTable};
 use crate::node::{Bus, PortId};
 use crate::signal::{Mark, Signal};
@@ -74,7 +74,7 @@ impl Engine {
     pub fn next(&self) -> Option<i64> {
         let mut clock = None;
         for (i, device) in self.devices.iter().enumerate() {
-            if let Link::Stepped(driver) = &device.link {
+            if let DeviceLink::Stepped(driver) = &device.link {
                 let next = driver.next()?;
                 if self.schedule.is_clock(i) {
                     clock = Some(next);
@@ -142,7 +142,7 @@ impl Engine {
     #[must_use]
     pub fn end(&self) -> Option<i64> {
         match &self.clock()?.link {
-            Link::Stepped(driver) => driver.end(),
+            DeviceLink::Stepped(driver) => driver.end(),
             _ => None,
         }
     }
@@ -154,12 +154,12 @@ impl Engine {
 
     /// Whether a device runs in real time.
     pub(super) fn is_live(&self) -> bool {
-        self.devices.iter().any(|device| matches!(device.link, Link::Idle(_) | Link::Live(_)))
+        self.devices.iter().any(|device| matches!(device.link, DeviceLink::Idle(_) | DeviceLink::Live(_)))
     }
 
     /// Whether the samples of a stepped device end at a known time.
     pub(super) fn has_end(&self) -> bool {
-        self.devices.iter().any(|device| matches!(&device.link, Link::Stepped(driver) if driver.end().is_some()))
+        self.devices.iter().any(|device| matches!(&device.link, DeviceLink::Stepped(driver) if driver.end().is_some()))
     }
 
     /// Returns the number of the last tick.

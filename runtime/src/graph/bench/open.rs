@@ -1,6 +1,7 @@
 //! Opens the devices to which the roles of a graph are bound.
 
 use std::borrow::Cow;
+use std::collections::BTreeMap;
 use std::ops::Range;
 
 use crate::catalogue::Catalogue;
@@ -10,7 +11,7 @@ use crate::graph::plan::PlannedDevice;
 use crate::graph::syntax::{BenchDocument, Block, WireEntry};
 use crate::node::{Mistake, PortSpec, Reader, Spanned};
 use crate::signal::Shape;
-use crate::source::{Code, Diagnostic, Diagnostics, Key, SourceMap, Value, suggest_name};
+use crate::source::{Code, Diagnostic, Diagnostics, Key, SourceMap, Value, quoted, suggest_name};
 
 /// A role that is bound to a device. Ports are in the order of the role, each with its index in the device.
 #[derive(Debug, Clone)]
@@ -27,14 +28,17 @@ pub(crate) struct BoundRole {
 #[derive(Default)]
 pub(crate) struct OpenedBench {
     pub(crate) devices: Vec<PlannedDevice>,
-    /// Nominal sample period of each device [s].
-    pub(crate) periods: Vec<f64>,
     pub(crate) roles: Vec<Option<BoundRole>>,
     /// Roles for scenarios and recordings only, in the order of `Net::observed`.
     pub(crate) observed: Vec<Option<BoundRole>>,
 }
 
 impl OpenedBench {
+    /// Returns the nominal sample period of the device of a role [s].
+    pub(crate) fn period(&self, role: &BoundRole) -> f64 {
+        self.devices[role.device].description.period
+    }
+
     /// Returns the facts of the devices: `role.fact` and the value.
     pub(crate) fn facts(&self, net: &Net<'_>) -> Vec<(String, toml::Value)> {
         let observed = net.observed.iter().map(|(key, ..)| *key).zip(&self.observed);
@@ -50,7 +54,7 @@ pub(crate) fn open(net: &Net<'_>, sources: &mut SourceMap, diagnostics: &mut Dia
         catalogue: net.catalogue,
         sources,
         diagnostics,
-        names: Vec::new(),
+        tried: BTreeMap::new(),
         taken: Vec::new(),
         opened: OpenedBench::default(),
     };
@@ -81,8 +85,8 @@ struct Opener<'a> {
     catalogue: &'a Catalogue,
     sources: &'a mut SourceMap,
     diagnostics: &'a mut Vec<Diagnostic>,
-    /// Devices that were tried: their name, and index and description if they opened.
-    names: Vec<(String, Option<(usize, Description)>)>,
+    /// Devices that were tried, by name: their index if they opened.
+    tried: BTreeMap<String, Option<usize>>,
     /// Bindings so far: index of the device, index of the role among those it can fill, name of the role.
     taken: Vec<(usize, usize, String)>,
     opened: OpenedBench,
@@ -143,12 +147,13 @@ impl Opener<'_> {
             self.diagnostics.push(Diagnostic::new(Code::UnboundRole, key.span.clone(), message).help(help));
             return None;
         };
-        let (device, description) = self.device(bench, word)?;
+        let device = self.device(bench, word)?;
+        let description = &self.opened.devices[device].description;
         let is_free = |i: &usize| !self.taken.iter().any(|(d, filled, _)| (*d, filled) == (device, i));
         let mut fitting = (0..description.fills.len()).filter(|i| description.fills[*i].role == kind.value);
         let Some(fills) = fitting.clone().find(is_free) else {
             let by = fitting.next().and_then(|i| self.taken.iter().find(|(d, filled, _)| (*d, *filled) == (device, i)));
-            let roles: Vec<_> = description.fills.iter().map(|filled| format!("`{}`", filled.role)).collect();
+            let roles = quoted(description.roles());
             let (device, role) = (&word.value, &key.name);
             let (message, help) = match by {
                 Some((_, _, by)) => (
@@ -157,7 +162,7 @@ impl Opener<'_> {
                 ),
                 None => (
                     format!("device `{device}` cannot fill the role `{role}` of type `{}`", kind.value),
-                    format!("it can fill: {}", roles.join(", ")),
+                    format!("it can fill: {roles}"),
                 ),
             };
             self.diagnostics.push(Diagnostic::new(Code::WrongRole, word.span.clone(), message).help(help));
@@ -179,16 +184,16 @@ impl Opener<'_> {
         })
     }
 
-    fn device(&mut self, bench: &BenchDocument, word: &Spanned<String>) -> Option<(usize, Description)> {
-        if let Some((_, opened)) = self.names.iter().find(|(name, _)| *name == word.value) {
-            return opened.clone();
+    fn device(&mut self, bench: &BenchDocument, word: &Spanned<String>) -> Option<usize> {
+        if let Some(opened) = self.tried.get(&word.value) {
+            return *opened;
         }
         let opened = self.open(bench, word);
-        self.names.push((word.value.clone(), opened.clone()));
+        self.tried.insert(word.value.clone(), opened);
         opened
     }
 
-    fn open(&mut self, bench: &BenchDocument, word: &Spanned<String>) -> Option<(usize, Description)> {
+    fn open(&mut self, bench: &BenchDocument, word: &Spanned<String>) -> Option<usize> {
         let Some(block) = bench.devices.iter().find(|device| device.key.name == word.value) else {
             self.diagnostics.push(unknown_device(word, bench));
             return None;
@@ -211,9 +216,8 @@ impl Opener<'_> {
             return None;
         }
         let (name, span) = (word.value.clone(), block.key.span.clone());
-        self.opened.devices.push(PlannedDevice { name, driver, description: description.clone(), span });
-        self.opened.periods.push(period);
-        Some((self.opened.devices.len() - 1, description))
+        self.opened.devices.push(PlannedDevice { name, driver, description, span });
+        Some(self.opened.devices.len() - 1)
     }
 
     /// Reports where the ports of a device differ from those of its roles, and adds the reports that it does not read.

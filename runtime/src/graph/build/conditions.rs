@@ -8,7 +8,7 @@ use crate::graph::plan::{Condition, PlannedExit, PlannedPort, PortRef, Test, Wat
 use crate::graph::syntax::{ExitKind, ExitTable, ModeBlock, ModeExit, PortState};
 use crate::node::Spanned;
 use crate::signal::{Kind, Shape};
-use crate::source::{Code, Diagnostic, Diagnostics};
+use crate::source::{Code, Diagnostic, Diagnostics, quoted};
 
 /// What the exits of a mode refer to.
 pub(crate) struct ExitContext<'a> {
@@ -124,9 +124,8 @@ impl ExitContext<'_> {
             [one] => Ok(*one),
             [] => bad_condition(span, "`after_travel_mm` needs a pose, and the graph has none").into_err(),
             several => {
-                let names: Vec<String> =
-                    several.iter().map(|source| format!("`{}`", self.net.port_name(*source))).collect();
-                let help = format!("add `of = \"node.port\"`; poses here: {}", names.join(", "));
+                let names = quoted(several.iter().map(|source| self.net.port_name(*source)));
+                let help = format!("add `of = \"node.port\"`; poses here: {names}");
                 bad_condition(span, "the graph has several poses: `of` must name one").help(help).into_err()
             }
         }

@@ -73,7 +73,7 @@ impl Builder<'_> {
             let bound = bound.as_ref()?;
             let source = |port| PortRef { producer: Producer::Role(i), port };
             let ports = (0..bound.outputs.len()).map(|port| self.ports[&source(port)].clone()).collect();
-            let age = policy.age_limit(&key.name, self.opened.periods[bound.device]);
+            let age = policy.age_limit(&key.name, self.opened.period(bound));
             Some(self.plan_role(key, bound, ports, age, false))
         });
         // The age of a sample for scenarios and recordings does not matter.
@@ -100,7 +100,7 @@ impl Builder<'_> {
         is_observed: bool,
     ) -> PlannedRole {
         let numbers = bound.outputs.iter().map(|(number, _)| *number).collect();
-        let period = (self.opened.periods[bound.device] * 1e9) as i64;
+        let period = (self.opened.period(bound) * 1e9) as i64;
         PlannedRole { name: key.name.clone(), device: bound.device, numbers, ports, age, is_observed, period }
     }
 

@@ -27,7 +27,7 @@ fn find_clock(flat: &FlatGraph, opened: &OpenedBench) -> Resolved<(Clock, f64)> 
                 return diagnostic.suggest(&word.value, flat.role_names(), "roles").into_err();
             };
             let bound = opened.roles.get(role).and_then(Option::as_ref).ok_or(None)?;
-            return Ok((Clock::Device(bound.device), opened.periods[bound.device]));
+            return Ok((Clock::Device(bound.device), opened.period(bound)));
         }
         (Some(word), Some(_)) => ("the graph has two clocks", &word.span, "keep `clock` or `rate_hz`"),
         (None, None) => {

@@ -98,17 +98,16 @@ impl Frames {
             is_converter.then_some((spec, input, pose))
         })?;
         let wanted = [has.first()?.clone(), takes.first()?.clone()];
-        let article = if spec.name.starts_with(['a', 'e', 'i', 'o']) { "an" } else { "a" };
-        let name = &spec.name;
+        let (name, converter) = (&spec.name, with_article(&spec.name));
         let Some(source) = self.find_pose(net, &wanted).and_then(|source| net.name_in(origin.scope, source)) else {
             let [from, to] = wanted.map(|frame| frame.unwrap_or_else(|| "?".into()));
             return Some(format!(
-                "insert {article} `{name}` between them, with a pose of `{from}` in `{to}`, which no node outputs yet"
+                "insert {converter} between them, with a pose of `{from}` in `{to}`, which no node outputs yet"
             ));
         };
         let (twist, from) = (&input.name, &origin.word.value);
         Some(format!(
-            "insert {article} `{name}` between them:\n[nodes.{name}]\ntype = \"{name}\"\nin.{twist} = \"{from}\"\nin.{} = \"{source}\"",
+            "insert {converter} between them:\n[nodes.{name}]\ntype = \"{name}\"\nin.{twist} = \"{from}\"\nin.{} = \"{source}\"",
             pose.name,
         ))
     }
@@ -201,6 +200,12 @@ const fn rank(kind: Kind) -> u8 {
         Kind::Image | Kind::Mask | Kind::Regions => 3,
         _ => 4,
     }
+}
+
+/// Formats the type of a node with its article.
+pub(super) fn with_article(name: &str) -> String {
+    let article = if name.starts_with(['a', 'e', 'i', 'o', 'u']) { "an" } else { "a" };
+    format!("{article} `{name}`")
 }
 
 /// Describes a kind with its frames, for a message.

@@ -6,12 +6,12 @@
 use std::collections::BTreeSet;
 use std::ops::Range;
 
-use crate::graph::check::frames::Frames;
+use crate::graph::check::frames::{Frames, with_article};
 use crate::graph::net::{CommandWire, Net};
 use crate::graph::plan::{PortRef, Producer};
 use crate::node::{NodeSpec, Spanned};
 use crate::signal::Kind;
-use crate::source::{Code, Diagnostic, Diagnostics};
+use crate::source::{Code, Diagnostic, Diagnostics, quoted};
 
 /// A node on the path of a command that passes a motion on.
 struct PathNode<'a> {
@@ -72,9 +72,8 @@ fn unlimited(
     missing: &[&str],
     lost: &[(&str, &str)],
 ) -> Diagnostic {
-    let role = net.roles[command.role].expect("only known roles have commands");
-    let consumer = format!("{}.{}", net.name(Producer::Role(command.role)), role.commands[command.command].name);
-    let names = missing.iter().map(|limit| format!("`{limit}`")).collect::<Vec<_>>().join(", ");
+    let consumer = net.command_name(command);
+    let names = quoted(missing);
     let source = net.port_name(command.source);
     let plural = if missing.len() == 1 { "" } else { "s" };
     let message = format!("`{source}` drives `{consumer}` without the required limit{plural} {names}");
@@ -121,7 +120,7 @@ fn suggest_part(net: &Net<'_>, command: &CommandWire, missing: &[&str]) -> Optio
     })?;
     let name = file.rsplit('/').next()?.strip_suffix(".toml")?;
     let role = net.name(Producer::Role(command.role));
-    let taken = &net.roles[command.role]?.commands[command.command].name;
+    let taken = &net.command_port(command).name;
     let mut text =
         format!("route the motion through a part that holds all of them:\n[parts.{name}]\nfile = \"builtin:{file}\"");
     for (input, what) in part.get("inputs").and_then(toml::Value::as_table).into_iter().flatten() {
@@ -163,11 +162,11 @@ fn suggest_limiter(
     let Some((taker, _, word)) = at.map(|at| &links[at]) else {
         return (format!("insert a `{name}` on the path of the motion"), None);
     };
-    let article = if name.starts_with(['a', 'e', 'i', 'o', 'u']) { "an" } else { "a" };
     let needs = limiter.inputs.iter().filter(|input| input.need.must_be_wired);
     let mut block = format!(
-        "insert {article} `{name}` between `{0}` and `{taker}`:\n[nodes.{name}]\ntype = \"{name}\"\nin.{through} = \"{0}\"",
-        word.value
+        "insert {limiter} between `{0}` and `{taker}`:\n[nodes.{name}]\ntype = \"{name}\"\nin.{through} = \"{0}\"",
+        word.value,
+        limiter = with_article(name)
     );
     for input in needs.filter(|input| input.name != through) {
         block.push_str(&format!("\nin.{} = \"…\"", input.name));

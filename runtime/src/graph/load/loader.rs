@@ -176,7 +176,7 @@ impl Loader {
                 let message = format!("cannot read `{}`: {error}", path.display());
                 let span = from.unwrap_or_else(|| {
                     let file = self.sources.add(SourceMap::COMMAND_LINE, path.display().to_string(), "");
-                    file.base..file.base + file.text.len()
+                    file.span()
                 });
                 self.diagnostics.push(Diagnostic::new(Code::Unreadable, span, message).with_help(help));
                 None
@@ -225,7 +225,7 @@ impl Loader {
             }
         }
         let file = self.sources.add(SourceMap::COMMAND_LINE, text, "");
-        let span = file.base..file.base + file.text.len();
+        let span = file.span();
         let diagnostic = Diagnostic::new(Code::Syntax, span, "this is not `key=value`");
         self.diagnostics.push(diagnostic.help("for example `--set nodes.pid.gains.x.kp=3`"));
         None

@@ -4,7 +4,7 @@ use super::{Net, Resolved};
 use crate::graph::load::{Entity, Scope};
 use crate::graph::plan::{PortRef, Producer};
 use crate::node::{PortSpec, Spanned};
-use crate::source::{Code, Diagnostic, Diagnostics};
+use crate::source::{Code, Diagnostic, Diagnostics, quoted};
 
 /// Parts through which one wire may pass; more means that it refers to itself.
 const MAX_DEPTH: usize = 64;
@@ -90,12 +90,10 @@ impl Net<'_> {
         let first = word.value.split('.').next().unwrap_or_default();
         let entity = self.flat.scopes[scope].names.get(first);
         let ports = entity.map(|(_, entity)| self.ports_of(*entity)).unwrap_or_default();
-        let ports: Vec<String> = ports.iter().map(|port| format!("`{first}.{port}`")).collect();
         if ports.is_empty() {
-            "write a port as `node.port`".into()
-        } else {
-            format!("ports here: {}", ports.join(", "))
+            return "write a port as `node.port`".into();
         }
+        format!("ports here: {}", quoted(ports.iter().map(|port| format!("{first}.{port}"))))
     }
 
     fn ports_of(&self, entity: Entity) -> Vec<&str> {
