@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use super::open::OpenedBench;
-use crate::graph::net::{Net, Resolved};
+use crate::graph::net::{Net, Resolved, report};
 use crate::graph::syntax::LIMITS;
 use crate::source::{Code, Diagnostic, Diagnostics, Item, Table, Value};
 
@@ -25,8 +25,7 @@ pub(crate) fn fill_facts(
         };
     };
     let fact = find_fact(word, place, &value.span, net, opened);
-    let fact = fact.map(|fact| *value = fact);
-    fact.map_err(|diagnostic| diagnostics.extend(diagnostic.map(|diagnostic| *diagnostic))).is_ok()
+    report(fact, diagnostics).map(|fact| *value = fact).is_some()
 }
 
 /// Returns the fact that the word at `place` names, as a value at `span`.

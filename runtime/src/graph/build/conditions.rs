@@ -152,11 +152,8 @@ impl ExitContext<'_> {
         Ok((WatchedPort { source, feature: Some(at) }, format!("{name}.{feature}")))
     }
 
-    fn port_condition(
-        &self,
-        when: &Spanned<String>,
-        ModeExit { span, table, .. }: &ModeExit,
-    ) -> Resolved<(Condition, String)> {
+    fn port_condition(&self, when: &Spanned<String>, exit: &ModeExit) -> Resolved<(Condition, String)> {
+        let ModeExit { span, table, .. } = exit;
         let (watched, name) = self.watched(when)?;
         let kind = self.net.port(watched.source).kind;
         let is_bounded = [table.above.is_some() || table.below.is_some(), table.within.is_some()];

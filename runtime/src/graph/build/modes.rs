@@ -41,7 +41,13 @@ pub(crate) fn build_modes(builder: &mut Builder<'_>, nodes: &mut [PlannedNode]) 
         let mut variants = variants(block, builder);
         let variant = |index: usize| variants.get(&index).map(|variant| &*variant.node);
         let demand = find_demand(builder.net, &|index| variant(index).or_else(|| Some(&*find(nodes, index)?.node)));
-        rebuild(builder, nodes, &base, &demand, &mut variants);
+        // A node whose parameters the mode does not set is built again if other components of its outputs are read.
+        let differs = |index: &usize| base[*index] != demand[*index] && !variants.contains_key(index);
+        let differing: Vec<usize> = nodes.iter().map(|node| node.index).filter(differs).collect();
+        for index in differing {
+            let built = builder.variant(index, &flat.nodes[index].block.params);
+            variants.extend(built.map(|built| (index, built)));
+        }
         for (index, variant) in &mut variants {
             variant.node.want(&demand[*index]);
         }
@@ -121,22 +127,6 @@ fn collect_tables(
                 let diagnostic = unknown(format!("there is no node or part `{}`", key.name));
                 diagnostics.push(diagnostic.suggest(&key.name, known, "nodes and parts"));
             }
-        }
-    }
-}
-
-/// Builds the nodes whose parameters a mode does not set, but whose demand differs from that of the base graph.
-fn rebuild(
-    builder: &mut Builder<'_>,
-    nodes: &[PlannedNode],
-    base: &Demand,
-    demand: &Demand,
-    variants: &mut BTreeMap<usize, Built>,
-) {
-    for index in nodes.iter().map(|node| node.index) {
-        if base[index] != demand[index] && !variants.contains_key(&index) {
-            let params = builder.net.flat.nodes[index].block.params.clone();
-            variants.extend(builder.variant(index, &params).map(|built| (index, built)));
         }
     }
 }

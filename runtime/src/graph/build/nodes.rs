@@ -16,7 +16,7 @@ use crate::source::{Code, Diagnostic, Diagnostics, Key, SourceMap, Value};
 pub(crate) struct Builder<'a> {
     pub(crate) net: &'a Net<'a>,
     opened: &'a OpenedBench,
-    frames: Frames,
+    frames: Frames<'a>,
     pub(crate) diagnostics: Diagnostics,
     sources: SourceMap,
     /// Nominal time between two ticks [s].
@@ -34,7 +34,7 @@ impl<'a> Builder<'a> {
     pub(crate) fn new(
         net: &'a Net<'a>,
         opened: &'a OpenedBench,
-        frames: Frames,
+        frames: Frames<'a>,
         (diagnostics, sources): (Diagnostics, SourceMap),
         period: f64,
     ) -> Self {
@@ -52,7 +52,7 @@ impl<'a> Builder<'a> {
 
 impl Builder<'_> {
     fn add_port(&mut self, source: PortRef, shape: Shape) -> PlannedPort {
-        let frames = self.frames.of(self.net, source);
+        let frames = self.frames.of(source);
         let port = PlannedPort { name: self.net.port_name(source), shape, frames };
         self.ports.insert(source, port.clone());
         port
@@ -68,13 +68,21 @@ impl Builder<'_> {
 
     /// Plans the roles, with their age limits.
     pub(crate) fn plan_roles(&self, policy: &PolicyTable) -> Vec<PlannedRole> {
+        let plan = |key: &Key, bound: &BoundRole, ports, age, is_observed| PlannedRole {
+            name: key.name.clone(),
+            device: bound.device,
+            numbers: bound.outputs.iter().map(|(number, _)| *number).collect(),
+            ports,
+            age,
+            is_observed,
+            period: (self.opened.period(bound) * 1e9) as i64,
+        };
         let declared = self.net.flat.roles.iter().zip(&self.opened.roles).enumerate();
         let declared = declared.filter_map(|(i, ((key, _), bound))| {
             let bound = bound.as_ref()?;
             let source = |port| PortRef { producer: Producer::Role(i), port };
             let ports = (0..bound.outputs.len()).map(|port| self.ports[&source(port)].clone()).collect();
-            let age = policy.age_limit(&key.name, self.opened.period(bound));
-            Some(self.plan_role(key, bound, ports, age, false))
+            Some(plan(key, bound, ports, policy.age_limit(&key.name, self.opened.period(bound)), false))
         });
         // The age of a sample for scenarios and recordings does not matter.
         let ageless = AgeLimit { max_age: i64::MAX, stale: Policy::Count };
@@ -86,22 +94,9 @@ impl Builder<'_> {
                 frames: frame_args(spec).iter().map(|_| Some(key.name.clone())).collect(),
             };
             let ports = role.outputs.iter().zip(&bound.outputs).map(port).collect();
-            Some(self.plan_role(key, bound, ports, ageless, true))
+            Some(plan(key, bound, ports, ageless, true))
         });
         declared.chain(observed).collect()
-    }
-
-    fn plan_role(
-        &self,
-        key: &Key,
-        bound: &BoundRole,
-        ports: Vec<PlannedPort>,
-        age: AgeLimit,
-        is_observed: bool,
-    ) -> PlannedRole {
-        let numbers = bound.outputs.iter().map(|(number, _)| *number).collect();
-        let period = (self.opened.period(bound) * 1e9) as i64;
-        PlannedRole { name: key.name.clone(), device: bound.device, numbers, ports, age, is_observed, period }
     }
 
     /// Builds a node, or returns `None` if it or its wires have mistakes.

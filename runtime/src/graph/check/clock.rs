@@ -2,15 +2,13 @@
 
 use crate::graph::bench::OpenedBench;
 use crate::graph::load::FlatGraph;
-use crate::graph::net::{Net, Resolved};
+use crate::graph::net::{Net, Resolved, report};
 use crate::graph::plan::Clock;
 use crate::source::{Code, Diagnostic, Diagnostics};
 
 /// Returns what triggers the ticks and the period [s], or reports why there is no clock.
 pub(crate) fn check(net: &Net<'_>, opened: &OpenedBench, diagnostics: &mut Diagnostics) -> Option<(Clock, f64)> {
-    let clock = find_clock(net.flat, opened);
-    let clock = clock.map_err(|diagnostic| diagnostics.extend(diagnostic.map(|diagnostic| *diagnostic)));
-    let (clock, period) = clock.ok()?;
+    let (clock, period) = report(find_clock(net.flat, opened), diagnostics)?;
     diagnostics.extend(short_gap(net.flat, period));
     Some((clock, period))
 }

@@ -23,7 +23,7 @@ struct PathNode<'a> {
 }
 
 /// Reports each command whose path lacks a required limit, with the node to insert and its place.
-pub(crate) fn check(net: &Net<'_>, frames: &mut Frames, diagnostics: &mut Diagnostics) {
+pub(crate) fn check(net: &Net<'_>, frames: &mut Frames<'_>, diagnostics: &mut Diagnostics) {
     for command in net.commands.iter().filter(|command| !command.is_report) {
         let role = net.roles[command.role].expect("only known roles have commands");
         // A missing wire has its own diagnostic, and hides the nodes behind it.
@@ -179,12 +179,12 @@ fn suggest_limiter(
 }
 
 /// Reports limiters of twists on one path that work in different frames.
-fn mixed_frames(net: &Net<'_>, frames: &mut Frames, path: &[PathNode<'_>]) -> Option<Diagnostic> {
+fn mixed_frames(net: &Net<'_>, frames: &mut Frames<'_>, path: &[PathNode<'_>]) -> Option<Diagnostic> {
     let mut limiters = path.iter().rev().filter(|stop| !stop.spec.limits.holds.is_empty());
     let mut frame = |stop: &PathNode<'_>| {
         let source = PortRef { producer: Producer::Node(stop.node), port: 0 };
         let is_twist = net.port(source).kind == Kind::Twist;
-        is_twist.then(|| frames.of(net, source).into_iter().next().flatten()).flatten()
+        is_twist.then(|| frames.of(source).into_iter().next().flatten()).flatten()
     };
     let first = limiters.find_map(|stop| Some((stop, frame(stop)?)))?;
     let (other, its) = limiters.find_map(|stop| Some((stop, frame(stop).filter(|frame| *frame != first.1)?)))?;

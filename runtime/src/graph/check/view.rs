@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::ops::Range;
 
-use crate::graph::net::Net;
+use crate::graph::net::{Net, report};
 use crate::graph::plan::{PlannedNode, PlannedPort, PlannedShow, PlannedView, PortRef, Producer};
 use crate::node::Spanned;
 use crate::signal::{Kind, Unit};
@@ -21,7 +21,7 @@ pub(crate) fn check(net: &Net<'_>, diagnostics: &mut Diagnostics) -> RequestedVi
     let table = net.flat.table.as_ref();
     let mut seen: Vec<PortRef> = Vec::new();
     let mut show = |word: &Spanned<String>| {
-        let source = net.resolve_or_report(0, word, diagnostics)?;
+        let source = report(net.resolve(0, word), diagnostics)?;
         let kind = net.port(source).kind;
         let diagnostic = |code: Code, message: String| Diagnostic::new(code, word.span.clone(), message);
         if !can_be_shown(kind) {
@@ -40,7 +40,7 @@ pub(crate) fn check(net: &Net<'_>, diagnostics: &mut Diagnostics) -> RequestedVi
     let ports = words.map(|words| words.iter().filter_map(&mut show).collect());
     let mark = table.and_then(|table| table.mark.as_ref()).map_or(&[][..], |mark| &mark[..]);
     let mark = mark.iter().filter_map(|word| {
-        let source = net.resolve_or_report(0, word, diagnostics)?;
+        let source = report(net.resolve(0, word), diagnostics)?;
         let kind = net.port(source).kind;
         if kind != Kind::Scalar {
             let message = format!("`{}` is {}, but `mark` takes scalars", word.value, kind.with_article());

@@ -1,6 +1,6 @@
 //! Connects wires and commands to their sources, and compares kinds.
 
-use super::{CommandWire, Net, Wire, WireOrigin};
+use super::{CommandWire, Net, Wire, WireOrigin, report};
 use crate::device::RoleType;
 use crate::graph::load::FlatNode;
 use crate::graph::plan::{PortRef, Producer};
@@ -21,7 +21,7 @@ impl Net<'_> {
 
     fn wire(&self, node: usize, spec: &NodeSpec, wire: &WireEntry, diagnostics: &mut Diagnostics) -> Option<Wire> {
         let (FlatNode { scope, name, .. }, key) = (&self.flat.nodes[node], &wire.key);
-        let source = self.resolve_or_report(*scope, &wire.from, diagnostics);
+        let source = report(self.resolve(*scope, &wire.from), diagnostics);
         let named = spec.inputs.iter().position(|input| !input.need.is_many && input.name == key.name);
         let Some(input) = named.or_else(|| spec.inputs.iter().position(|input| input.need.is_many)) else {
             let message = format!("`{}` has no input `{}`", spec.name, key.name);
@@ -79,7 +79,7 @@ impl Net<'_> {
     }
 
     fn command(&self, role: usize, wire: &WireEntry, diagnostics: &mut Diagnostics) -> Option<CommandWire> {
-        let (source, key) = (self.resolve_or_report(0, &wire.from, diagnostics), &wire.key);
+        let (source, key) = (report(self.resolve(0, &wire.from), diagnostics), &wire.key);
         let RoleType { commands, reports, .. } = self.roles[role]?;
         let name = self.name(Producer::Role(role));
         let ports = commands.iter().map(|port| (false, port)).chain(reports.iter().map(|port| (true, port)));

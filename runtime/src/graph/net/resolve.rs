@@ -4,7 +4,7 @@ use super::{Net, Resolved};
 use crate::graph::load::{Entity, Scope};
 use crate::graph::plan::{PortRef, Producer};
 use crate::node::{PortSpec, Spanned};
-use crate::source::{Code, Diagnostic, Diagnostics, quoted};
+use crate::source::{Code, Diagnostic, quoted};
 
 /// Parts through which one wire may pass; more means that it refers to itself.
 const MAX_DEPTH: usize = 64;
@@ -19,17 +19,6 @@ impl Net<'_> {
     /// A wire to an unknown type or to an unwired input of a part has its own diagnostic.
     pub(crate) fn resolve(&self, scope: usize, word: &Spanned<String>) -> Resolved<PortRef> {
         self.resolve_at_depth(scope, word, 0)
-    }
-
-    /// Resolves a port like [`Net::resolve`], and adds the diagnostic if that fails.
-    pub(crate) fn resolve_or_report(
-        &self,
-        scope: usize,
-        word: &Spanned<String>,
-        diagnostics: &mut Diagnostics,
-    ) -> Option<PortRef> {
-        let port = self.resolve(scope, word);
-        port.map_err(|diagnostic| diagnostics.extend(diagnostic.map(|diagnostic| *diagnostic))).ok()
     }
 
     fn resolve_at_depth(&self, scope: usize, word: &Spanned<String>, depth: usize) -> Resolved<PortRef> {
