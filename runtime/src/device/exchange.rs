@@ -5,7 +5,7 @@ use std::borrow::Cow;
 use super::{Command, Description, Output, Report};
 use crate::signal::{Arenas, Kind, Shape, Signal};
 
-/// The newest sample of each output of a device, and what the device has counted.
+/// The newest sample of each output of a device, and the counts of the device.
 #[derive(Debug, Clone, Default)]
 pub struct Samples {
     pub(crate) arenas: Arenas,
@@ -28,17 +28,17 @@ pub(crate) struct PortSample {
     pub(crate) state: SampleState,
 }
 
-/// What the last write of a port left there.
+/// The state of a port after its last write.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) enum SampleState {
     Value,
     Absent,
-    /// There is no value until the port is written again, and why.
+    /// There is no value until the port is written again, for this reason.
     Lost(Cow<'static, str>),
 }
 
 impl Samples {
-    /// Room for a sample of each output of a device.
+    /// Allocates a sample of each output of a device.
     #[must_use]
     pub fn of(description: &Description) -> Self {
         let mut samples = Self::default();
@@ -110,7 +110,7 @@ impl Samples {
     }
 }
 
-/// The command of each command port of a device, and what the task reports to it.
+/// The commands of a device, and the reports to it.
 #[derive(Debug, Clone, Default)]
 pub struct Commands {
     pub(crate) values: Vec<Box<[f64]>>,
@@ -118,7 +118,7 @@ pub struct Commands {
     reports: Vec<ReportValue>,
 }
 
-/// What a wire reports.
+/// A value that is reported to a device.
 #[derive(Debug, Clone, Copy)]
 struct ReportValue {
     kind: Kind,
@@ -127,13 +127,13 @@ struct ReportValue {
 }
 
 impl Commands {
-    /// Room for each command of a device, all zero, and for each of its reports, all absent.
+    /// Allocates the commands of a device, all zero, and its reports, all absent.
     #[must_use]
     pub fn of(description: &Description) -> Self {
         Self::with_reports(description, |_| None)
     }
 
-    /// Room for the commands and the reports of a device; `wired` is the shape of what is wired to a report.
+    /// Allocates the commands and the reports of a device. `wired` returns the shape of the value that is wired to a report.
     pub(crate) fn with_reports<'s>(description: &Description, wired: impl Fn(usize) -> Option<&'s Shape>) -> Self {
         let zeros = |shape: &Shape| match shape {
             Shape::Joints(shape) => vec![0.0; shape.joints.len()].into(),
@@ -155,29 +155,29 @@ impl Commands {
         &self.values[port.0]
     }
 
-    /// Commands values to a port, as a graph does.
+    /// Sets the command of a port, as a graph does.
     ///
     /// # Panics
-    /// If there is not one value per joint.
+    /// If the number of values is not the number of joints.
     pub fn command(&mut self, port: Command, values: &[f64]) {
         self.values[port.0].copy_from_slice(values);
     }
 
-    /// Returns what is reported to a port, or `None` while it is absent or nothing is wired to it.
+    /// Returns the report to a port, or `None` while it is absent or not wired.
     #[must_use]
     pub fn report<T: Signal>(&self, port: Report<T>) -> Option<&T> {
         let report = self.reports[port.port];
         report.is_present.then(|| &T::arena(&self.arenas)[report.slot as usize])
     }
 
-    /// Reports a value to a port, as a graph does.
-    pub fn tell<T: Signal>(&mut self, port: Report<T>, value: &T) {
+    /// Sets the report to a port, as a graph does.
+    pub fn set_report<T: Signal>(&mut self, port: Report<T>, value: &T) {
         let report = &mut self.reports[port.port];
         report.is_present = true;
         value.copy_to(&mut T::arena_mut(&mut self.arenas)[report.slot as usize]);
     }
 
-    /// Takes over what is reported to port `port` from a slot of `arenas`, or that it is absent.
+    /// Copies the report to `port` from a slot of `arenas`, or makes it absent.
     pub(crate) fn take_report(&mut self, port: usize, arenas: &Arenas, slot: Option<u32>) {
         let report = &mut self.reports[port];
         report.is_present = slot.is_some();
@@ -187,7 +187,7 @@ impl Commands {
     }
 
     /// Makes every report absent.
-    pub(crate) fn fall_silent(&mut self) {
+    pub(crate) fn clear_reports(&mut self) {
         self.reports.iter_mut().for_each(|report| report.is_present = false);
     }
 
@@ -201,7 +201,7 @@ impl Commands {
         }
     }
 
-    /// Whether nothing is commanded.
+    /// Whether every command is zero.
     pub(crate) fn are_zero(&self) -> bool {
         self.values.iter().flatten().all(|value| *value == 0.0)
     }

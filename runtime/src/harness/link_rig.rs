@@ -126,7 +126,7 @@ impl LinkRig {
     pub fn report<T: Signal>(&mut self, port: &str, value: &T) {
         let report = self.description.report::<T>(port);
         let report = report.unwrap_or_else(|| panic!("the device reads no report `{port}` of that kind"));
-        self.commands.tell(report, value);
+        self.commands.set_report(report, value);
         self.linked.send(&self.commands);
     }
 

@@ -198,7 +198,7 @@ mod tests {
         assert_eq!(commit(Some(0), 101), None, "too old");
         assert_eq!(commit(Some(50), 101), Some((101.0, first.1)));
         assert_eq!(commit(None, 102), None, "absent");
-        commands.fall_silent();
+        commands.clear_reports();
         assert!(commands.report(joints).is_none());
     }
 

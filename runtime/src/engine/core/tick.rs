@@ -103,7 +103,7 @@ impl Core {
 
     /// Ramps every command toward zero for `dt` [s]. Returns whether all are zero. Reports are absent, since no node steps.
     pub(crate) fn ramp(&mut self, devices: &mut [DeviceSlot], dt: f64) -> bool {
-        devices.iter_mut().for_each(|device| device.commands.fall_silent());
+        devices.iter_mut().for_each(|device| device.commands.clear_reports());
         let commands = self.commands.iter_mut();
         commands.fold(true, |still, command| command.ramp(&mut devices[command.device].commands, dt) & still)
     }
