@@ -70,11 +70,6 @@ pub trait Signal: Default + Clone + Send + 'static {
         [0, 0]
     }
 
-    /// Returns the [`size`](Self::size) of the values of a shape.
-    fn size_of(_shape: &Self::Shape) -> [usize; 2] {
-        [0, 0]
-    }
-
     /// Called on a sample that arrives in `tick` and replaces `previous`. Stamps the components, if the kind has any.
     fn arrive(&mut self, _previous: &Self, _tick: u64, _stamp: Stamp) {}
 
@@ -174,7 +169,7 @@ macro_rules! kinds {
 
             /// Returns rows and columns, or the number of elements and 0; zeros for a kind without a size.
             pub(crate) fn size(&self) -> [usize; 2] {
-                match self { $(Self::$kind(shape) => <$kind as Signal>::size_of(shape)),* }
+                match self { $(Self::$kind(shape) => <$kind as Signal>::allocate(shape).size()),* }
             }
         }
 
@@ -286,7 +281,6 @@ kinds! {
         its own; the vector is present if any component is. The vector belongs to one frame." {
         fn allocate(shape: &FeaturesShape) -> Self { Self::absent(shape.features.len()) }
         fn size(&self) -> [usize; 2] { [self.components().len(), 0] }
-        fn size_of(shape: &FeaturesShape) -> [usize; 2] { [shape.features.len(), 0] }
         fn arrive(&mut self, previous: &Self, tick: u64, stamp: Stamp) { self.follow(previous, tick, stamp); }
         fn copy_to(&self, slot: &mut Self) { slot.copy_from(self); }
         fn is_finite(&self) -> bool { Self::is_finite(self) }
@@ -301,7 +295,6 @@ kinds! {
         the object. An image belongs to the frame of its pad." {
         fn allocate(shape: &ImageShape) -> Self { Self::zeros(shape.rows, shape.cols) }
         fn size(&self) -> [usize; 2] { [self.rows(), self.cols()] }
-        fn size_of(shape: &ImageShape) -> [usize; 2] { [shape.rows, shape.cols] }
         fn copy_to(&self, slot: &mut Self) { slot.copy_from(self); }
         fn is_finite(&self) -> bool { Self::is_finite(self) }
     }
@@ -309,7 +302,6 @@ kinds! {
         "The shape is the number of rows and columns. A mask belongs to the frame of its pad." {
         fn allocate(grid: &MaskShape) -> Self { Self::empty(grid.rows, grid.cols) }
         fn size(&self) -> [usize; 2] { [self.rows(), self.cols()] }
-        fn size_of(grid: &MaskShape) -> [usize; 2] { [grid.rows, grid.cols] }
         fn copy_to(&self, slot: &mut Self) { slot.copy_from(self); }
         fn is_finite(&self) -> bool { true }
     }
@@ -338,7 +330,6 @@ kinds! {
         their limits." {
         fn allocate(shape: &JointsShape) -> Self { Self::zeros(shape.joints.len()) }
         fn size(&self) -> [usize; 2] { [self.0.len(), 0] }
-        fn size_of(shape: &JointsShape) -> [usize; 2] { [shape.joints.len(), 0] }
         fn copy_to(&self, slot: &mut Self) { slot.0.clone_from(&self.0); }
         fn is_finite(&self) -> bool { all_finite(&self.0) }
     }
@@ -346,7 +337,6 @@ kinds! {
         "It has one column per joint, which is the velocity of the origin of its frame." {
         fn allocate(shape: &JacobianShape) -> Self { Self::zeros(shape.0.joints.len()) }
         fn size(&self) -> [usize; 2] { [self.0.len(), 0] }
-        fn size_of(shape: &JacobianShape) -> [usize; 2] { [shape.0.joints.len(), 0] }
         fn copy_to(&self, slot: &mut Self) { slot.0.clone_from(&self.0); }
         fn is_finite(&self) -> bool { self.0.iter().all(|column| all_finite(column.0.as_slice())) }
     }

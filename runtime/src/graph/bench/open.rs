@@ -1,7 +1,7 @@
 //! Opens the devices to which the roles of a graph are bound.
 
 use std::borrow::Cow;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 
 use crate::catalogue::Catalogue;
@@ -60,8 +60,10 @@ pub(crate) fn open(net: &Net<'_>, sources: &mut SourceMap, diagnostics: &mut Dia
     };
     let bench = net.flat.bench.as_ref();
     if let Some(bench) = bench {
-        opener.check_types(bench);
-        opener.check_unused(bench, net);
+        let declared = net.flat.roles.iter().map(|(key, _)| key);
+        let roles = declared.chain(net.observed.iter().map(|(key, ..)| *key)).map(|key| key.name.as_str()).collect();
+        opener.check_unused_bindings(bench, &roles);
+        opener.check_devices(bench, &roles);
     }
     for (i, (key, kind)) in net.flat.roles.iter().enumerate() {
         let role = match bench {
@@ -93,49 +95,46 @@ struct Opener<'a> {
 }
 
 impl Opener<'_> {
-    /// Checks bindings and devices that no role uses; such devices are not opened.
-    fn check_unused(&mut self, bench: &BenchDocument, net: &Net<'_>) {
-        let names = || bench.devices.iter().map(|device| device.key.name.as_str());
-        let is_used = |role: &Key| {
-            let declared = net.flat.roles.iter().map(|(key, _)| key);
-            declared.chain(net.observed.iter().map(|(key, ..)| *key)).any(|key| key.name == role.name)
-        };
-        // An unused binding may belong to another task, unless it looks like a role that only scenarios read.
-        let observed_names =
-            || self.catalogue.roles().iter().filter(|role| role.is_observed).map(|role| role.observed_name());
-        for (role, word) in bench.bind.iter().filter(|(role, _)| !is_used(role)) {
-            let is_right = self.catalogue.roles().iter().any(|known| known.is_observed_as(&role.name));
-            if let Some(name) = suggest_name(&role.name, observed_names()).filter(|_| !is_right) {
+    /// Checks the bindings that none of the `roles` uses.
+    ///
+    /// Such a binding may belong to another task, unless it looks like a role that only scenarios read.
+    fn check_unused_bindings(&mut self, bench: &BenchDocument, roles: &BTreeSet<&str>) {
+        let observed = || self.catalogue.roles().iter().filter(|role| role.is_observed);
+        for (role, word) in bench.bind.iter().filter(|(role, _)| !roles.contains(&*role.name)) {
+            let is_right = observed().any(|known| known.is_observed_as(&role.name));
+            let names = observed().map(|role| role.observed_name());
+            if let Some(name) = suggest_name(&role.name, names).filter(|_| !is_right) {
                 let message = format!("`{}` is not a role that scenarios read", role.name);
                 let diagnostic = Diagnostic::new(Code::ObservedRole, role.span.clone(), message);
                 self.diagnostics.push(diagnostic.help(format!("did you mean `{name}`?")));
             }
-            if !names().any(|name| name == word.value) {
+            if !bench.devices.iter().any(|device| device.key.name == word.value) {
                 self.diagnostics.push(unknown_device(word, bench));
-            }
-        }
-        for device in &bench.devices {
-            let is_opened = bench.bind.iter().any(|(role, word)| word.value == device.key.name && is_used(role));
-            let kind = device.kind.as_ref().filter(|_| !is_opened);
-            let kind = kind.and_then(|kind| self.catalogue.find_device(&kind.value));
-            let (Some(kind), Some(table)) = (kind, device.params.as_table()) else { continue };
-            let params = kind.params();
-            for (key, _) in table.entries.iter().filter(|(key, _)| !params.iter().any(|param| param.name == key.name)) {
-                let message = format!("`{}` is not a parameter here", key.name);
-                let diagnostic = Diagnostic::new(Code::UnknownKey, key.span.clone(), message);
-                let known = params.iter().map(|param| param.name);
-                self.diagnostics.push(diagnostic.suggest(&key.name, known, "parameters"));
             }
         }
     }
 
-    fn check_types(&mut self, bench: &BenchDocument) {
-        for kind in bench.devices.iter().filter_map(|device| device.kind.as_ref()) {
-            if self.catalogue.find_device(&kind.value).is_none() {
+    /// Checks the types of all devices, and the parameters of those that are not opened because none of the `roles` uses
+    /// them.
+    fn check_devices(&mut self, bench: &BenchDocument, roles: &BTreeSet<&str>) {
+        for device in &bench.devices {
+            let Some(kind) = &device.kind else { continue };
+            let Some(known) = self.catalogue.find_device(&kind.value) else {
                 let names: Vec<_> = self.catalogue.devices().iter().map(|device| device.name()).collect();
                 let known = names.iter().map(|name| &**name);
                 let unknown = Diagnostic::unknown(Code::UnknownType, "device type", &kind.value, &kind.span, known);
                 self.diagnostics.push(unknown);
+                continue;
+            };
+            let mut bound = bench.bind.iter().filter(|(_, word)| word.value == device.key.name);
+            let is_opened = bound.any(|(role, _)| roles.contains(&*role.name));
+            let params = known.params();
+            let entries = device.params.as_table().filter(|_| !is_opened).into_iter().flat_map(|table| &table.entries);
+            for (key, _) in entries.filter(|(key, _)| !params.iter().any(|param| param.name == key.name)) {
+                let message = format!("`{}` is not a parameter here", key.name);
+                let diagnostic = Diagnostic::new(Code::UnknownKey, key.span.clone(), message);
+                let known = params.iter().map(|param| param.name);
+                self.diagnostics.push(diagnostic.suggest(&key.name, known, "parameters"));
             }
         }
     }
