@@ -9,7 +9,7 @@ use super::shell::Shell;
 use super::shell::command::{GraphArgs, OutputFormat};
 use super::text::number::milliseconds;
 use crate::graph::{
-    Compiled, NO_SPAN, Origin, OutlinedBlock, OutlinedWire, OutlinedWord, PlannedPort, Setting, compile,
+    Compiled, NO_SPAN, OutlinedBlock, OutlinedWire, OutlinedWord, PlannedPort, Setting, ValueOrigin, compile,
 };
 use crate::signal::Shape;
 use crate::source::{Item, Key, Location, SourceMap, Value};
@@ -109,9 +109,9 @@ fn at(place: &Location) -> String {
 
 fn assignment(setting: &Setting) -> Assignment {
     let origin = match &setting.origin {
-        Origin::Written { place } => at(place),
-        Origin::Default => "default".to_owned(),
-        Origin::Fact { fact, place } => format!("fact {fact} ({})", at(place)),
+        ValueOrigin::Written { place } => at(place),
+        ValueOrigin::Default => "default".to_owned(),
+        ValueOrigin::Fact { fact, place } => format!("fact {fact} ({})", at(place)),
     };
     let (path, tall) = (path(&setting.path), tall(&setting.value));
     let text = if tall.is_some() { "[".to_owned() } else { written(&setting.value) };

@@ -5,18 +5,18 @@ use std::borrow::Cow;
 use super::{Command, Description, Output, Report};
 use crate::signal::{Arenas, Kind, Shape, Signal};
 
-/// The newest sample of each output of a device, and what the device has counted.
+/// The newest sample of each output of a device, and the counts of the device.
 #[derive(Debug, Clone, Default)]
 pub struct Samples {
     pub(crate) arenas: Arenas,
-    pub(crate) ports: Vec<Sample>,
+    pub(crate) ports: Vec<PortSample>,
     /// How often any port was written.
     pub(crate) writes: u64,
     pub(crate) counts: Vec<(&'static str, u64)>,
 }
 
 #[derive(Debug, Clone)]
-pub(crate) struct Sample {
+pub(crate) struct PortSample {
     pub(crate) kind: Kind,
     pub(crate) slot: u32,
     /// Time of the sample in the graph's clock [ns].
@@ -25,26 +25,26 @@ pub(crate) struct Sample {
     pub(crate) sequence: u64,
     /// How often the device has written the port.
     pub(crate) writes: u64,
-    pub(crate) state: State,
+    pub(crate) state: SampleState,
 }
 
-/// What the last write of a port left there.
+/// The state of a port after its last write.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(crate) enum State {
+pub(crate) enum SampleState {
     Value,
     Absent,
-    /// There is no value until the port is written again, and why.
+    /// There is no value until the port is written again, for this reason.
     Lost(Cow<'static, str>),
 }
 
 impl Samples {
-    /// Room for a sample of each output of a device.
+    /// Allocates a sample of each output of a device.
     #[must_use]
     pub fn of(description: &Description) -> Self {
         let mut samples = Self::default();
         for port in &description.outputs {
             let (kind, slot) = (port.shape.kind(), samples.arenas.add(&port.shape));
-            samples.ports.push(Sample { kind, slot, stamp: 0, sequence: 0, writes: 0, state: State::Absent });
+            samples.ports.push(PortSample { kind, slot, stamp: 0, sequence: 0, writes: 0, state: SampleState::Absent });
         }
         samples
     }
@@ -56,7 +56,7 @@ impl Samples {
     /// # Panics
     /// If the port belongs to another device.
     pub fn write<T: Signal>(&mut self, port: Output<T>, stamp: i64, sequence: u64) -> &mut T {
-        let sample = self.renew(port.port, stamp, sequence, State::Value);
+        let sample = self.renew(port.port, stamp, sequence, SampleState::Value);
         assert_eq!(sample.kind, T::KIND, "output {} of the device", port.port);
         let slot = sample.slot as usize;
         &mut T::arena_mut(&mut self.arenas)[slot]
@@ -66,14 +66,14 @@ impl Samples {
     ///
     /// This is normal, as a position without contact; for a fault of the device, see [`lost`](Self::lost).
     pub fn clear<T: Signal>(&mut self, port: Output<T>, stamp: i64, sequence: u64) {
-        self.renew(port.port, stamp, sequence, State::Absent);
+        self.renew(port.port, stamp, sequence, SampleState::Absent);
     }
 
     /// Makes a port absent until it is written again, because something is wrong: `why` completes "`pad.image` is lost:".
     ///
     /// As long as the port is lost, the graph's policy `device` applies: it holds the commands, stops them or ends the run.
     pub fn lost<T: Signal>(&mut self, port: Output<T>, why: impl Into<Cow<'static, str>>) {
-        self.ports[port.port].state = State::Lost(why.into());
+        self.ports[port.port].state = SampleState::Lost(why.into());
     }
 
     /// Counts something for the summary of the run, as a plural noun: `"bad frames"`.
@@ -88,10 +88,10 @@ impl Samples {
     #[must_use]
     pub fn get<T: Signal>(&self, port: Output<T>) -> Option<&T> {
         let sample = &self.ports[port.port];
-        (sample.state == State::Value).then(|| &T::arena(&self.arenas)[sample.slot as usize])
+        (sample.state == SampleState::Value).then(|| &T::arena(&self.arenas)[sample.slot as usize])
     }
 
-    fn renew(&mut self, port: usize, stamp: i64, sequence: u64, state: State) -> &mut Sample {
+    fn renew(&mut self, port: usize, stamp: i64, sequence: u64, state: SampleState) -> &mut PortSample {
         let sample = &mut self.ports[port];
         (sample.stamp, sample.sequence, sample.state) = (stamp, sequence, state);
         sample.writes += 1;
@@ -101,7 +101,7 @@ impl Samples {
 
     /// Copies the samples of the same device, in place.
     pub(crate) fn copy_from(&mut self, other: &Self) {
-        for Sample { kind, slot, .. } in &other.ports {
+        for PortSample { kind, slot, .. } in &other.ports {
             other.arenas.copy(*kind, *slot, &mut self.arenas, *slot);
         }
         self.ports.clone_from(&other.ports);
@@ -110,37 +110,37 @@ impl Samples {
     }
 }
 
-/// The command of each command port of a device, and what the task reports to it.
+/// The commands of a device, and the reports to it.
 #[derive(Debug, Clone, Default)]
 pub struct Commands {
     pub(crate) values: Vec<Box<[f64]>>,
     arenas: Arenas,
-    reports: Vec<ReportSlot>,
+    reports: Vec<ReportValue>,
 }
 
-/// What a wire reports.
+/// A value that is reported to a device.
 #[derive(Debug, Clone, Copy)]
-struct ReportSlot {
+struct ReportValue {
     kind: Kind,
     slot: u32,
     is_present: bool,
 }
 
 impl Commands {
-    /// Room for each command of a device, all zero, and for each of its reports, all absent.
+    /// Allocates the commands of a device, all zero, and its reports, all absent.
     #[must_use]
     pub fn of(description: &Description) -> Self {
         Self::with_reports(description, |_| None)
     }
 
-    /// Room for the commands and the reports of a device; `wired` is the shape of what is wired to a report.
+    /// Allocates the commands and the reports of a device. `wired` returns the shape of the value that is wired to a report.
     pub(crate) fn with_reports<'s>(description: &Description, wired: impl Fn(usize) -> Option<&'s Shape>) -> Self {
         let zeros = |shape: &Shape| match shape {
             Shape::Joints(shape) => vec![0.0; shape.joints.len()].into(),
             other => unreachable!("a command is a joint vector, and not {}", other.kind().with_article()),
         };
         let mut arenas = Arenas::default();
-        let room = |(i, port): (usize, &super::StatedPort)| ReportSlot {
+        let room = |(i, port): (usize, &super::StatedPort)| ReportValue {
             kind: port.shape.kind(),
             slot: arenas.add(wired(i).unwrap_or(&port.shape)),
             is_present: false,
@@ -155,29 +155,29 @@ impl Commands {
         &self.values[port.0]
     }
 
-    /// Commands values to a port, as a graph does.
+    /// Sets the command of a port, as a graph does.
     ///
     /// # Panics
-    /// If there is not one value per joint.
+    /// If the number of values is not the number of joints.
     pub fn command(&mut self, port: Command, values: &[f64]) {
         self.values[port.0].copy_from_slice(values);
     }
 
-    /// Returns what is reported to a port, or `None` while it is absent or nothing is wired to it.
+    /// Returns the report to a port, or `None` while it is absent or not wired.
     #[must_use]
     pub fn report<T: Signal>(&self, port: Report<T>) -> Option<&T> {
         let report = self.reports[port.port];
         report.is_present.then(|| &T::arena(&self.arenas)[report.slot as usize])
     }
 
-    /// Reports a value to a port, as a graph does.
-    pub fn tell<T: Signal>(&mut self, port: Report<T>, value: &T) {
+    /// Sets the report to a port, as a graph does.
+    pub fn set_report<T: Signal>(&mut self, port: Report<T>, value: &T) {
         let report = &mut self.reports[port.port];
         report.is_present = true;
         value.copy_to(&mut T::arena_mut(&mut self.arenas)[report.slot as usize]);
     }
 
-    /// Takes over what is reported to port `port` from a slot of `arenas`, or that it is absent.
+    /// Copies the report to `port` from a slot of `arenas`, or makes it absent.
     pub(crate) fn take_report(&mut self, port: usize, arenas: &Arenas, slot: Option<u32>) {
         let report = &mut self.reports[port];
         report.is_present = slot.is_some();
@@ -187,7 +187,7 @@ impl Commands {
     }
 
     /// Makes every report absent.
-    pub(crate) fn fall_silent(&mut self) {
+    pub(crate) fn clear_reports(&mut self) {
         self.reports.iter_mut().for_each(|report| report.is_present = false);
     }
 
@@ -201,7 +201,7 @@ impl Commands {
         }
     }
 
-    /// Whether nothing is commanded.
+    /// Whether every command is zero.
     pub(crate) fn are_zero(&self) -> bool {
         self.values.iter().flatten().all(|value| *value == 0.0)
     }

@@ -13,8 +13,8 @@ use crate::signal::Signal;
 
 /// A device that runs on its own, in real time.
 ///
-/// A real robot's driver declares a command timeout of its own: for what this process cannot observe (kill -9, a loss
-/// of power) nobody else can stop the arm.
+/// The driver of a real robot declares a command timeout of its own. Only this timeout stops the arm after something
+/// that the process cannot observe, such as `kill -9` or a loss of power.
 #[async_trait]
 pub trait Live: Send {
     /// Runs until [`Link::stopped`] or a failure.

@@ -1,9 +1,9 @@
 //! The edge: what a sensor or a robot looks like to a graph. Time and I/O exist only here.
 //!
-//! A *role* is what a task asks for: `tactile_pad`, `velocity_arm`. A *device* fills one role or several. There are two
-//! contracts: a [`Stepped`] device is synchronous and deterministic (simulation, replay, mock, lockstep); a [`Live`] one
-//! is an async driver that fills a latest-value slot, so that a slow disk or network makes a sample old, never a tick
-//! late.
+//! A task declares *roles*, such as `tactile_pad` and `velocity_arm`. A *device* fills one role or several. There are two
+//! contracts. A [`Stepped`] device is synchronous and deterministic: a simulation, a replay, a mock, a simulator in
+//! lockstep. A [`Live`] device is an async driver that fills a latest-value slot, so a slow disk or network makes a sample
+//! old and never a tick late.
 
 mod description;
 mod exchange;
@@ -20,46 +20,46 @@ use crate::source::Value;
 pub(crate) use description::StatedPort;
 pub use description::{Command, Description, Fill, Output, Report};
 pub use exchange::{Commands, Samples};
-pub(crate) use exchange::{Sample, State};
+pub(crate) use exchange::{PortSample, SampleState};
 pub use live::{Link, Live};
 pub(crate) use live::{Linked, link};
 
-/// What a task asks of the world: ports it reads and ports it commands.
+/// The type of a role: the ports that a task reads, and the ports that it commands.
 #[derive(Debug, Clone)]
 pub struct RoleType {
-    /// Its name under `[roles]`.
+    /// Its name in the section `[roles]`.
     pub name: Cow<'static, str>,
-    /// What it is, in one line.
+    /// A summary in one line.
     pub summary: Cow<'static, str>,
-    /// What it gives; the frame `"self"` is the role's own.
+    /// The outputs. The frame `"self"` is the frame of the role.
     pub outputs: Vec<PortSpec>,
-    /// What it takes; joint vectors only.
+    /// The commands, which are joint vectors.
     pub commands: Vec<PortSpec>,
-    /// What a task may tell it without moving it, of any kind; a graph need not. No limits hold of them.
+    /// The reports: values of any kind that move nothing. A wire to them is optional, and no limits apply.
     pub reports: Vec<PortSpec>,
-    /// What must hold of every command; see [`Limits`](crate::node::Limits). The names of a node's `holds`, in the order
-    /// in which a motion crosses them.
+    /// The limits that every command must pass, in the order in which a motion passes them. They are names in the `holds`
+    /// of nodes; see [`Limits`](crate::node::Limits).
     pub limits: Vec<Cow<'static, str>>,
-    /// Whether only a scenario and the recorder may read it: what a simulation knows and no sensor can. A bench binds it
-    /// under the last word of its name, and no task declares it.
+    /// Whether only scenarios and recordings may read it: a simulation knows its values, and no sensor does. A bench binds
+    /// it under the last word of its name, and no task declares it.
     pub is_observed: bool,
 }
 
 impl RoleType {
-    /// Whether a bench means this role by `name`, if it is one that only a scenario and the recorder may read.
+    /// Whether it is for scenarios and recordings only, and a bench binds it as `name`.
     #[must_use]
     pub fn is_observed_as(&self, name: &str) -> bool {
         self.is_observed && (self.name == name || self.observed_name() == name)
     }
 
-    /// The last word of its name: under this a bench binds it, if it is observed.
+    /// Returns the last word of its name, under which a bench binds it if it is for scenarios and recordings only.
     #[must_use]
     pub fn observed_name(&self) -> &str {
         self.name.rsplit('_').next().unwrap_or(&self.name)
     }
 }
 
-/// What went wrong with a device while it ran.
+/// The failure of a device during a run: its message.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct DeviceError(pub String);
 
@@ -73,23 +73,23 @@ impl std::error::Error for DeviceError {}
 
 /// A synchronous device: deterministic, without a thread.
 pub trait Stepped: Send {
-    /// Time of the next sample in the device's own time from its start [ns]; `None` when there will be no more.
+    /// Returns the time of the next sample from the start of the device [ns], or `None` if there are no more.
     fn next(&self) -> Option<i64>;
 
-    /// Time of the last sample there will be, if that is known [ns]: for a progress bar, and to know that a
-    /// run ends by itself.
+    /// Returns the time of the last sample, if the device knows it [ns]. A progress bar uses it, and it shows that a run
+    /// ends by itself.
     fn end(&self) -> Option<i64> {
         None
     }
 
-    /// Takes the commands that hold since the last call and gives everything sampled up to `now` [ns].
+    /// Receives the commands since the last call, and writes everything sampled up to `now` [ns].
     ///
     /// # Errors
-    /// When the device fails; the run ends.
+    /// If the device fails. The run ends.
     fn exchange(&mut self, now: i64, commands: &Commands, samples: &mut Samples) -> Result<(), DeviceError>;
 
-    /// The run is over, for that reason, and every command has been zero in the last exchange. A device that failed is
-    /// not called: the engine dropped it when it failed.
+    /// Called at the end of the run, with its reason. Every command was zero in the last exchange. It is not called for a
+    /// device that has failed.
     fn finish(&mut self, reason: &str) {
         let _ = reason;
     }
@@ -99,57 +99,57 @@ pub trait Stepped: Send {
 pub enum Driver {
     /// Step by step with the graph.
     Stepped(Box<dyn Stepped>),
-    /// On its own, in real time.
+    /// By itself, in real time.
     Live(Box<dyn Live>),
 }
 
 /// A device that is described and ready to run.
 pub struct Opened {
-    /// What it says of itself.
+    /// Its description.
     pub description: Description,
     /// How it runs.
     pub driver: Driver,
 }
 
-/// A device type. Its example plugs it into a graph: `[roles]`, `[commands]`, `[bind]` and `[devices.…]`.
+/// A device type. Its example adds it to a graph: `[roles]`, `[commands]`, `[bind]` and `[devices.…]`.
 pub trait Device: Describe + Sized + 'static {
-    /// What a bench file may set.
+    /// The parameters in a bench file.
     type Params: Param;
 
-    /// Opens the device. A live one does not connect yet: it connects when it runs.
+    /// Opens the device. A live device connects later, when it runs.
     ///
     /// # Errors
-    /// What is wrong with the parameters or with the files they name.
+    /// The mistakes in the parameters and in the files that they name.
     fn open(params: Self::Params) -> Result<Opened, Mistakes>;
 }
 
-/// The erased form of a device type: what a catalogue lists.
+/// The erased form of a device type, as in a catalogue.
 pub trait DeviceType: Send + Sync {
-    /// Its `type` in a bench file.
+    /// Returns its `type` in a bench file.
     fn name(&self) -> Cow<'static, str>;
-    /// What it is, in one line.
+    /// Returns a summary in one line.
     fn summary(&self) -> Cow<'static, str>;
-    /// What else there is to know, in Markdown; empty if nothing.
+    /// Returns its documentation as Markdown; empty if it has none.
     fn doc(&self) -> Cow<'static, str> {
         "".into()
     }
-    /// What plugs it into a graph, to paste; empty if there is nothing.
+    /// Returns the sections that add it to a graph; empty if it has no example.
     fn example(&self) -> Cow<'static, str> {
         "".into()
     }
-    /// What a bench file may set.
+    /// Returns the parameters in a bench file.
     fn params(&self) -> Vec<ParamSpec>;
-    /// Reads the parameters and opens the device; every mistake goes to the reader.
+    /// Reads the parameters and opens the device. The reader collects the mistakes.
     fn open(&self, table: &Value, reader: &mut Reader<'_>) -> Option<Opened>;
 }
 
-struct Typed<D>(PhantomData<fn() -> D>);
+struct TypedDevice<D>(PhantomData<fn() -> D>);
 
 pub(crate) fn device_type<D: Device>() -> Box<dyn DeviceType> {
-    Box::new(Typed::<D>(PhantomData))
+    Box::new(TypedDevice::<D>(PhantomData))
 }
 
-impl<D: Device> DeviceType for Typed<D> {
+impl<D: Device> DeviceType for TypedDevice<D> {
     fn name(&self) -> Cow<'static, str> {
         D::NAME.into()
     }

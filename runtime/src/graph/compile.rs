@@ -6,9 +6,9 @@ use crate::graph::build::{Builder, BuiltModes, build_modes};
 use crate::graph::check;
 use crate::graph::compiled::Compiled;
 use crate::graph::load::{Loader, Request};
-use crate::graph::net::{CommandWire, Net};
+use crate::graph::net::Net;
 use crate::graph::outline::OutlineBuilder;
-use crate::graph::plan::{Plan, PlannedCommand, PlannedModes, PlannedNode, PlannedReport};
+use crate::graph::plan::{Plan, PlannedCommand, PlannedModes, PlannedNode};
 use crate::graph::syntax::{GraphTable, default_max_age_s};
 use crate::source::{Code, Diagnostics, Report, SourceMap};
 
@@ -50,7 +50,8 @@ pub(crate) fn compile_in(mut loader: Loader, catalogue: &Catalogue, request: &Re
     view.check_units(&builder.ports, &mut builder.diagnostics);
     let modes = build_modes(&mut builder, &mut nodes);
     let modes = check_modes(&net, modes, &mut builder.diagnostics);
-    let (commands, reports) = plan_outputs(&mut builder);
+    let mut commands: Vec<PlannedCommand> = net.commands.iter().filter_map(|wire| builder.command(wire)).collect();
+    commands.sort_by_key(|command| command.is_report);
     let policy = flat.policy.as_ref().and_then(|(_, policy)| policy.clone()).unwrap_or_default();
     let roles = builder.plan_roles(&policy);
     let ports = std::mem::take(&mut builder.ports);
@@ -69,7 +70,7 @@ pub(crate) fn compile_in(mut loader: Loader, catalogue: &Catalogue, request: &Re
     let period = ((period * 1e9).round() as i64).max(1);
     let (exports, facts) = (net.exports_by_name(), opened.facts(&net));
     let devices = opened.devices;
-    let plan = Plan { roles, devices, nodes, commands, reports, clock, period, max_gap, reset_after, modes, policy };
+    let plan = Plan { roles, devices, nodes, commands, clock, period, max_gap, reset_after, modes, policy };
     Ok(Compiled { plan, view, sources, warnings, outline, exports, facts })
 }
 
@@ -81,14 +82,6 @@ fn check_modes(net: &Net<'_>, built: BuiltModes, diagnostics: &mut Diagnostics) 
     check::motion::check(net, &modes, &still, diagnostics);
     let start = check::reachability::check(net, diagnostics)?;
     Some(PlannedModes { modes, start })
-}
-
-/// Plans what the devices receive: commands and reports.
-fn plan_outputs(builder: &mut Builder<'_>) -> (Vec<PlannedCommand>, Vec<PlannedReport>) {
-    let (reports, commands): (Vec<&CommandWire>, Vec<&CommandWire>) =
-        builder.net.commands.iter().partition(|wire| wire.is_report);
-    let commands = commands.into_iter().filter_map(|wire| builder.command(wire)).collect();
-    (commands, reports.into_iter().filter_map(|wire| builder.report(wire)).collect())
 }
 
 /// Logs the order of the nodes and the opened devices, for `-v`.

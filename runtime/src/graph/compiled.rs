@@ -57,7 +57,7 @@ impl Compiled {
 
     /// Returns the ports that the graph reports to its devices.
     pub fn reported(&self) -> impl Iterator<Item = &PlannedPort> {
-        self.plan.reports.iter().filter_map(|report| {
+        self.plan.commands.iter().filter(|wire| wire.is_report).filter_map(|report| {
             let ports = match report.source.producer {
                 Producer::Role(role) => &self.plan.roles.get(role)?.ports,
                 Producer::Node(index) => &self.plan.nodes.iter().find(|node| node.index == index)?.ports,

@@ -22,13 +22,13 @@ pub use compiled::Compiled;
 pub use load::Request;
 pub(crate) use load::{Loader, wrong_file_type};
 pub use outline::{
-    NO_SPAN, Origin, Outline, OutlinedBlock, OutlinedMode, OutlinedPort, OutlinedRole, OutlinedWire, OutlinedWord,
-    Setting,
+    NO_SPAN, Outline, OutlinedBlock, OutlinedMode, OutlinedPort, OutlinedRole, OutlinedWire, OutlinedWord, Setting,
+    ValueOrigin,
 };
 pub use plan::PlannedPort;
 pub(crate) use plan::{
-    Clock, Condition, PlannedCommand, PlannedDevice, PlannedExit, PlannedModes, PlannedNode, PlannedReport,
-    PlannedRole, PlannedShow, PlannedView, PlannedWire, PortRef, Producer, Test,
+    Clock, Condition, PlannedCommand, PlannedDevice, PlannedExit, PlannedModes, PlannedNode, PlannedRole, PlannedShow,
+    PlannedView, PlannedWire, PortRef, Producer, Test,
 };
 pub use syntax::Policy;
-pub(crate) use syntax::{AgeLimit, ExitKind, PolicyTable, into_diagnostic};
+pub(crate) use syntax::{AgeLimit, ExitKind, PolicyTable, PortState, into_diagnostic};

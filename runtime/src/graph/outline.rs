@@ -5,8 +5,7 @@ use std::path::Path;
 
 use serde::Serialize;
 
-use crate::graph::bench::OpenedBench;
-use crate::graph::bench::fill_facts;
+use crate::graph::bench::{OpenedBench, fill_facts};
 use crate::graph::net::{CommandWire, Net, Wire, WireOrigin};
 use crate::graph::plan::{PlannedNode, PlannedPort, PortRef};
 use crate::graph::syntax::{Block, GraphTable, ModeBlock, PolicyTable};
@@ -125,13 +124,13 @@ pub struct Setting {
     pub value: Value,
     /// Where it comes from.
     #[serde(flatten)]
-    pub origin: Origin,
+    pub origin: ValueOrigin,
 }
 
 /// Where a value comes from.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 #[serde(tag = "origin", rename_all = "lowercase")]
-pub enum Origin {
+pub enum ValueOrigin {
     /// A file or the command line.
     Written {
         /// Where the value is written.
@@ -164,13 +163,14 @@ pub(crate) struct OutlineBuilder<'a> {
 impl OutlineBuilder<'_> {
     pub(crate) fn build(&self) -> Outline {
         let flat = self.net.flat;
+        let policy = flat.policy.as_ref().map(|(section, _)| section);
         let command = |wire: &CommandWire| self.wire(self.net.command_name(wire), wire.source, &wire.origin);
         Outline {
             period_s: self.period,
             settings: self.graph(),
             roles: self.roles(),
             commands: self.net.commands.iter().map(command).collect(),
-            policy: self.policy(),
+            policy: self.table(policy.and_then(Value::as_table), &PolicyTable::fields(), ""),
             modes: flat.modes.iter().map(|mode| self.mode(mode)).collect(),
             nodes: self.nodes.iter().filter_map(|node| self.node(node)).collect(),
             devices: self.opened.devices.iter().filter_map(|device| self.device(&device.name)).collect(),
@@ -178,22 +178,14 @@ impl OutlineBuilder<'_> {
     }
 
     fn graph(&self) -> Vec<Setting> {
-        let mut settings = Vec::new();
         let given = self.net.flat.settings.as_ref().and_then(Value::as_table);
-        self.table(given, &GraphTable::fields(), "", &mut settings);
+        let mut settings = self.table(given, &GraphTable::fields(), "");
         settings.retain(|setting| setting.path != "bench");
         if !settings.iter().any(|setting| setting.path == "max_gap_ms") {
             // A whole number of microseconds, so that no digits are there by chance.
             let gap = Value { span: NO_SPAN, item: Item::Float((self.max_gap * 1e6).round() * 1e-3) };
-            settings.push(Setting { path: "max_gap_ms".into(), value: gap, origin: Origin::Default });
+            settings.push(Setting { path: "max_gap_ms".into(), value: gap, origin: ValueOrigin::Default });
         }
-        settings
-    }
-
-    fn policy(&self) -> Vec<Setting> {
-        let mut settings = Vec::new();
-        let given = self.net.flat.policy.as_ref().and_then(|(section, _)| section.as_table());
-        self.table(given, &PolicyTable::fields(), "", &mut settings);
         settings
     }
 
@@ -240,65 +232,63 @@ impl OutlineBuilder<'_> {
     }
 
     fn block(&self, block: &Block, specs: &[ParamSpec]) -> Option<OutlinedBlock> {
-        let mut settings = Vec::new();
-        self.table(block.params.as_table(), specs, "", &mut settings);
         Some(OutlinedBlock {
             name: block.key.name.clone(),
             place: self.sources.location(&block.key.span),
             kind: self.word(block.kind.as_ref()?),
             wires: Vec::new(),
-            settings,
+            settings: self.table(block.params.as_table(), specs, ""),
             outputs: Vec::new(),
         })
     }
 
     /// The settings of a table: what is given, and the defaults of what is not.
-    fn table(&self, given: Option<&Table>, specs: &[ParamSpec], path: &str, settings: &mut Vec<Setting>) {
+    fn table(&self, given: Option<&Table>, specs: &[ParamSpec], path: &str) -> Vec<Setting> {
+        let mut settings = Vec::new();
         for spec in specs {
             let path = format!("{path}{}", spec.name);
             match given.and_then(|table| table.get(spec.name)) {
-                Some(value) => self.value(value, spec, path, settings),
-                None => settings.extend(default(spec).map(|value| Setting { path, value, origin: Origin::Default })),
+                Some(value) => settings.extend(self.value(value, spec, path)),
+                None => {
+                    settings.extend(default(spec).map(|value| Setting { path, value, origin: ValueOrigin::Default }))
+                }
             }
         }
         let is_declared = |name: &str| specs.iter().any(|spec| spec.name == name);
         // A node that is known only at run time may take more than it declares.
-        for (key, value) in given.iter().flat_map(|table| &table.entries).filter(|(key, _)| !is_declared(&key.name)) {
-            settings.push(self.setting(value, format!("{path}{}", key.name)));
-        }
+        let more = given.iter().flat_map(|table| &table.entries).filter(|(key, _)| !is_declared(&key.name));
+        settings.extend(more.map(|(key, value)| self.setting(value, format!("{path}{}", key.name))));
+        settings
     }
 
-    fn value(&self, value: &Value, spec: &ParamSpec, path: String, settings: &mut Vec<Setting>) {
-        let table = value.as_table().filter(|table| !table.is_fact());
-        match (table, spec.repeats) {
-            (Some(table), Repeats::Once) if !spec.fields.is_empty() => {
-                self.table(Some(table), &spec.fields, &format!("{path}."), settings);
-            }
-            (Some(table), Repeats::PerName) => {
-                for (key, value) in &table.entries {
+    fn value(&self, value: &Value, spec: &ParamSpec, path: String) -> Vec<Setting> {
+        let fields = |table: &Table, path: &str| self.table(Some(table), &spec.fields, &format!("{path}."));
+        match (value.as_section(), spec.repeats) {
+            (Some(table), Repeats::Once) if !spec.fields.is_empty() => fields(table, &path),
+            (Some(section), Repeats::PerName) => {
+                let entry = |(key, value): &(Key, Value)| {
                     let path = format!("{path}.{}", key.name);
-                    match value.as_table().filter(|table| !table.is_fact() && !spec.fields.is_empty()) {
-                        Some(table) => self.table(Some(table), &spec.fields, &format!("{path}."), settings),
-                        None => settings.push(self.setting(value, path)),
+                    match value.as_section().filter(|_| !spec.fields.is_empty()) {
+                        Some(table) => fields(table, &path),
+                        None => vec![self.setting(value, path)],
                     }
-                }
+                };
+                section.entries.iter().flat_map(entry).collect()
             }
             _ => {
                 let mut setting = self.setting(value, path);
                 self.resolve(&mut setting, spec);
                 complete(&mut setting.value, spec);
-                settings.push(setting);
+                vec![setting]
             }
         }
     }
 
     /// A value as it was written, or the fact that it asks for.
     fn setting(&self, value: &Value, path: String) -> Setting {
-        let fact = value.as_table().filter(|table| table.is_fact());
-        let word = fact.and_then(|table| table.get("from")).and_then(Value::as_str);
-        let role = word.and_then(|word| {
-            self.net.flat.roles.iter().position(|(key, _)| word.starts_with(&format!("{}.", key.name)))
-        });
+        let word = value.as_table().and_then(Table::fact).map(|(word, _)| word);
+        let role = word.and_then(|word| word.split_once('.'));
+        let role = role.and_then(|(role, _)| self.net.flat.role_names().position(|name| name == role));
         let mut filled = value.clone();
         // The graph has no mistakes, so every fact is there.
         fill_facts(&mut filled, self.net, self.opened, &mut Diagnostics::new());
@@ -306,17 +296,17 @@ impl OutlineBuilder<'_> {
         let origin = match (word, bound) {
             (Some(word), Some(bound)) => {
                 let device = &self.opened.devices[bound.device];
-                Origin::Fact { fact: word.to_owned(), place: self.sources.location(&device.span) }
+                ValueOrigin::Fact { fact: word.to_owned(), place: self.sources.location(&device.span) }
             }
             // A value from [limits] keeps its place there.
-            _ => Origin::Written { place: self.sources.location(&filled.span) },
+            _ => ValueOrigin::Written { place: self.sources.location(&filled.span) },
         };
         Setting { path, value: filled, origin }
     }
 
     /// The path of a file, which stands relative to the file it is written in, as seen from the working folder.
     fn resolve(&self, setting: &mut Setting, spec: &ParamSpec) {
-        if let (Origin::Written { .. }, Item::String(text)) = (&setting.origin, &mut setting.value.item)
+        if let (ValueOrigin::Written { .. }, Item::String(text)) = (&setting.origin, &mut setting.value.item)
             && spec.takes == FilePath::EXPECTS
         {
             *text = self.sources.path(text, setting.value.span.start).display().to_string();
@@ -336,14 +326,14 @@ impl OutlineBuilder<'_> {
 
     /// Collects the values in nested tables, down to `depth` levels.
     fn leaves(&self, value: &Value, path: &str, depth: usize, settings: &mut Vec<Setting>) {
-        match value.as_table().filter(|table| depth > 0 && !table.is_fact()) {
+        match value.as_section().filter(|_| depth > 0) {
             Some(table) => {
                 for (key, value) in &table.entries {
                     self.leaves(value, &format!("{path}.{}", key.name), depth - 1, settings);
                 }
             }
             None => {
-                let origin = Origin::Written { place: self.sources.location(&value.span) };
+                let origin = ValueOrigin::Written { place: self.sources.location(&value.span) };
                 settings.push(Setting { path: path.to_owned(), value: value.clone(), origin });
             }
         }

@@ -7,7 +7,7 @@ use tokio::runtime::{Builder, Runtime};
 use tokio::task::JoinHandle;
 
 use crate::device::{
-    Commands, Description, Device, DeviceError, Driver, Linked, Opened, Output, Samples, State, device_type, link,
+    Commands, Description, Device, DeviceError, Driver, Linked, Opened, Output, SampleState, Samples, device_type, link,
 };
 use crate::node::{Mistakes, Reader};
 use crate::signal::Signal;
@@ -98,8 +98,8 @@ impl LinkRig {
         let index = self.description.outputs.iter().position(|output| output.name == port);
         let index = index.unwrap_or_else(|| panic!("the device has no output `{port}`"));
         match &self.samples.ports[index].state {
-            State::Lost(why) => Some(why),
-            State::Value | State::Absent => None,
+            SampleState::Lost(why) => Some(why),
+            SampleState::Value | SampleState::Absent => None,
         }
     }
 
@@ -126,7 +126,7 @@ impl LinkRig {
     pub fn report<T: Signal>(&mut self, port: &str, value: &T) {
         let report = self.description.report::<T>(port);
         let report = report.unwrap_or_else(|| panic!("the device reads no report `{port}` of that kind"));
-        self.commands.tell(report, value);
+        self.commands.set_report(report, value);
         self.linked.send(&self.commands);
     }
 

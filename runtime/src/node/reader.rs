@@ -188,9 +188,9 @@ impl<'a> Reader<'a> {
 
 /// Reads a value whose type implements serde's `Deserialize`.
 pub fn read_leaf<T: DeserializeOwned>(value: &Value, reader: &mut Reader<'_>, expects: &str) -> Option<T> {
-    let read = T::deserialize(value);
-    if read.is_err() {
+    let read = value.read();
+    if read.is_none() {
         reader.wrong_type(value, expects);
     }
-    read.ok()
+    read
 }

@@ -58,18 +58,15 @@ pub trait Signal: Default + Clone + Send + 'static {
     type Shape: Clone + Default + PartialEq + fmt::Debug + Into<Shape> + 'static;
 
     /// Allocates a value of that shape. No other method allocates.
-    fn allocate(shape: &Self::Shape) -> Self;
+    fn allocate(_shape: &Self::Shape) -> Self {
+        Self::default()
+    }
 
     /// Whether every number is finite. Absent components count as finite.
     fn is_finite(&self) -> bool;
 
     /// Returns rows and columns, or the number of elements and 0; zeros for a kind without a size.
     fn size(&self) -> [usize; 2] {
-        [0, 0]
-    }
-
-    /// Returns the [`size`](Self::size) of the values of a shape.
-    fn size_of(_shape: &Self::Shape) -> [usize; 2] {
         [0, 0]
     }
 
@@ -84,7 +81,7 @@ pub trait Signal: Default + Clone + Send + 'static {
     /// Takes the buffer out of its slot for a step in `tick` with that stamp. A value that [stays](Self::STAYS) in its slot
     /// is not moved: the step starts with a default value.
     fn take(slot: &mut Self, _tick: u64, _stamp: Stamp) -> Self {
-        std::mem::take(slot)
+        if Self::STAYS { Self::default() } else { std::mem::take(slot) }
     }
 
     /// Whether the slot keeps its value during a step; true for small kinds without a heap buffer.
@@ -176,7 +173,7 @@ macro_rules! kinds {
 
             /// Returns rows and columns, or the number of elements and 0; zeros for a kind without a size.
             pub(crate) fn size(&self) -> [usize; 2] {
-                match self { $(Self::$kind(shape) => <$kind as Signal>::size_of(shape)),* }
+                match self { $(Self::$kind(shape) => <$kind as Signal>::allocate(shape).size()),* }
             }
         }
 
@@ -275,15 +272,11 @@ pub struct JacobianShape(pub JointsShape);
 kinds! {
     Scalar ScalarShape scalars "scalar" "scalar": "a number with a unit",
         "It belongs to a frame. Its unit is known at load." {
-        fn allocate(_: &ScalarShape) -> Self { 0.0 }
-        fn take(_: &mut Self, _: u64, _: Stamp) -> Self { 0.0 }
         const STAYS: bool = true;
         fn is_finite(&self) -> bool { all_finite(&[*self]) }
     }
     Flag FlagShape flags "flag" "flag": "true or false",
         "It has no unit. Gates and conditions are flags." {
-        fn allocate(_: &FlagShape) -> Self { false }
-        fn take(_: &mut Self, _: u64, _: Stamp) -> Self { false }
         const STAYS: bool = true;
         fn is_finite(&self) -> bool { true }
     }
@@ -292,7 +285,6 @@ kinds! {
         its own; the vector is present if any component is. The vector belongs to one frame." {
         fn allocate(shape: &FeaturesShape) -> Self { Self::absent(shape.features.len()) }
         fn size(&self) -> [usize; 2] { [self.components().len(), 0] }
-        fn size_of(shape: &FeaturesShape) -> [usize; 2] { [shape.features.len(), 0] }
         fn arrive(&mut self, previous: &Self, tick: u64, stamp: Stamp) { self.follow(previous, tick, stamp); }
         fn copy_to(&self, slot: &mut Self) { slot.copy_from(self); }
         fn is_finite(&self) -> bool { Self::is_finite(self) }
@@ -307,7 +299,6 @@ kinds! {
         the object. An image belongs to the frame of its pad." {
         fn allocate(shape: &ImageShape) -> Self { Self::zeros(shape.rows, shape.cols) }
         fn size(&self) -> [usize; 2] { [self.rows(), self.cols()] }
-        fn size_of(shape: &ImageShape) -> [usize; 2] { [shape.rows, shape.cols] }
         fn copy_to(&self, slot: &mut Self) { slot.copy_from(self); }
         fn is_finite(&self) -> bool { Self::is_finite(self) }
     }
@@ -315,7 +306,6 @@ kinds! {
         "The shape is the number of rows and columns. A mask belongs to the frame of its pad." {
         fn allocate(grid: &MaskShape) -> Self { Self::empty(grid.rows, grid.cols) }
         fn size(&self) -> [usize; 2] { [self.rows(), self.cols()] }
-        fn size_of(grid: &MaskShape) -> [usize; 2] { [grid.rows, grid.cols] }
         fn copy_to(&self, slot: &mut Self) { slot.copy_from(self); }
         fn is_finite(&self) -> bool { true }
     }
@@ -329,15 +319,11 @@ kinds! {
     Twist TwistShape twists "twist" "twist": "a velocity: linear and angular",
         "The order is `[v, omega]`, in m/s and rad/s. A twist in a sensor's frame is the velocity of the sensor's origin in \
         the sensor's axes. A twist in `base` is spatial: the velocity at the base's origin (paper eq. 4)." {
-        fn allocate(_: &TwistShape) -> Self { Self::default() }
-        fn take(_: &mut Self, _: u64, _: Stamp) -> Self { Self::default() }
         const STAYS: bool = true;
         fn is_finite(&self) -> bool { all_finite(self.0.as_slice()) }
     }
     Pose PoseShape poses "pose" "pose": "the position and orientation of one frame in another",
         "It consists of a rotation and a translation [m] that transform points of the first frame to the second." {
-        fn allocate(_: &PoseShape) -> Self { Self::default() }
-        fn take(_: &mut Self, _: u64, _: Stamp) -> Self { Self::default() }
         const STAYS: bool = true;
         fn is_finite(&self) -> bool {
             all_finite(self.0.translation.vector.as_slice()) && all_finite(self.0.rotation.matrix().as_slice())
@@ -348,7 +334,6 @@ kinds! {
         their limits." {
         fn allocate(shape: &JointsShape) -> Self { Self::zeros(shape.joints.len()) }
         fn size(&self) -> [usize; 2] { [self.0.len(), 0] }
-        fn size_of(shape: &JointsShape) -> [usize; 2] { [shape.joints.len(), 0] }
         fn copy_to(&self, slot: &mut Self) { slot.0.clone_from(&self.0); }
         fn is_finite(&self) -> bool { all_finite(&self.0) }
     }
@@ -356,7 +341,6 @@ kinds! {
         "It has one column per joint, which is the velocity of the origin of its frame." {
         fn allocate(shape: &JacobianShape) -> Self { Self::zeros(shape.0.joints.len()) }
         fn size(&self) -> [usize; 2] { [self.0.len(), 0] }
-        fn size_of(shape: &JacobianShape) -> [usize; 2] { [shape.0.joints.len(), 0] }
         fn copy_to(&self, slot: &mut Self) { slot.0.clone_from(&self.0); }
         fn is_finite(&self) -> bool { self.0.iter().all(|column| all_finite(column.0.as_slice())) }
     }

@@ -3,6 +3,8 @@
 use std::fmt;
 use std::str::FromStr;
 
+use crate::source::quoted;
+
 /// The base of a unit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum Base {
@@ -94,8 +96,7 @@ impl Unit {
     /// Lists every unit that a graph file may name, for messages.
     #[must_use]
     pub fn list() -> String {
-        let names: Vec<String> = NAMES.iter().map(|(_, name)| format!("`{name}`")).collect();
-        format!("{}, each also `…/tactel`, `…/s`, `…/s2`", names.join(", "))
+        format!("{}, each also `…/tactel`, `…/s`, `…/s2`", quoted(NAMES.iter().map(|(_, name)| name)))
     }
 }
 
@@ -160,27 +161,7 @@ impl Unit {
     /// unit of the component that an entry of a table is for.
     #[must_use]
     pub const fn is_param_unit(text: &str) -> bool {
-        let text = text.as_bytes();
-        if let [b'$', b'a'..=b'z', ..] = text {
-            return true;
-        }
-        let (mut start, mut i) = (0, 0);
-        while i <= text.len() {
-            if i == text.len() || matches!(text[i], b'/' | b' ' | b',') {
-                let is_gap = i == start && i > 0 && text[i - 1] == b',' && i < text.len() && text[i] == b' ';
-                if i < text.len() && text[i] == b',' && (i + 1 == text.len() || text[i + 1] != b' ') {
-                    return false;
-                }
-                let (_, rest) = text.split_at(start);
-                let (atom, _) = rest.split_at(i - start);
-                if !is_gap && !is_atom(atom) {
-                    return false;
-                }
-                start = i + 1;
-            }
-            i += 1;
-        }
-        true
+        matches!(text.as_bytes(), [b'$', b'a'..=b'z', ..]) || are_factors(text.as_bytes())
     }
 
     /// The factors in the unit of a parameter, besides the capital letters that inputs bind.
@@ -190,8 +171,23 @@ impl Unit {
     ];
 }
 
+/// Whether a text consists of units of parameters with `/`, a space, or a comma and a space between them.
+const fn are_factors(text: &[u8]) -> bool {
+    let mut end = 0;
+    while end < text.len() && !matches!(text[end], b'/' | b' ' | b',') {
+        end += 1;
+    }
+    let (first, rest) = text.split_at(end);
+    is_factor(first)
+        && match rest {
+            [] => true,
+            [b',', b' ', rest @ ..] | [b'/' | b' ', rest @ ..] => are_factors(rest),
+            _ => false,
+        }
+}
+
 /// Whether a text is a unit of a parameter or a letter, to the power of one, two or three.
-const fn is_atom(text: &[u8]) -> bool {
+const fn is_factor(text: &[u8]) -> bool {
     let text = match text {
         [base @ .., b'2' | b'3'] if !base.is_empty() => base,
         _ => text,

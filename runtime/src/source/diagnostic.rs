@@ -162,6 +162,18 @@ impl Diagnostic {
         Self { code, message: message.into(), span, notes: Vec::new(), help: None }
     }
 
+    /// Creates the diagnostic of a `name` for which there is no `what`, with a suggestion among the `known` names.
+    pub fn unknown<'n>(
+        code: Code,
+        what: &str,
+        name: &str,
+        span: &Range<usize>,
+        known: impl Iterator<Item = &'n str>,
+    ) -> Self {
+        let message = format!("there is no {what} `{name}`");
+        Self::new(code, span.clone(), message).suggest(name, known, &format!("{what}s"))
+    }
+
     /// Sets the help text.
     #[must_use]
     pub fn help(mut self, help: impl Into<String>) -> Self {
@@ -181,6 +193,11 @@ impl Diagnostic {
     #[must_use]
     pub(crate) fn with_help(self, help: Option<String>) -> Self {
         Self { help, ..self }
+    }
+
+    /// Returns the diagnostic as the error of something that may also fail without one.
+    pub(crate) fn into_err<T>(self) -> Result<T, Option<Box<Self>>> {
+        Err(Some(Box::new(self)))
     }
 
     /// Adds a related place with a label.

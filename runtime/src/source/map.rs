@@ -20,6 +20,12 @@ pub struct SourceFile {
 }
 
 impl SourceFile {
+    /// Returns the range of this text in the source map.
+    #[must_use]
+    pub const fn span(&self) -> Range<usize> {
+        self.base..self.base + self.text.len()
+    }
+
     /// Converts a range of the source map into a range of this text.
     #[must_use]
     pub fn local(&self, span: &Range<usize>) -> Range<usize> {

@@ -1,5 +1,7 @@
 //! Suggestions for a misspelt name.
 
+use std::fmt::Display;
+
 /// Returns the known name closest to a misspelt one, or `None` if none is close.
 ///
 /// A name is close if its edit distance is at most one, plus one for every four characters of `name`.
@@ -18,6 +20,11 @@ pub fn suggestion<'n>(name: &str, known: impl Iterator<Item = &'n str>, what: &s
     match suggest_name(name, known.iter().copied()) {
         Some(best) => format!("did you mean `{best}`?"),
         None if known.is_empty() => format!("there are no {what} here"),
-        None => format!("{what} here: {}", known.iter().map(|n| format!("`{n}`")).collect::<Vec<_>>().join(", ")),
+        None => format!("{what} here: {}", quoted(&known)),
     }
+}
+
+/// Lists names in backticks, separated by commas.
+pub(crate) fn quoted<N: Display>(names: impl IntoIterator<Item = N>) -> String {
+    names.into_iter().map(|name| format!("`{name}`")).collect::<Vec<_>>().join(", ")
 }

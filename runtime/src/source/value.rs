@@ -2,8 +2,7 @@
 
 use std::ops::Range;
 
-use serde::de::value::{MapDeserializer, SeqDeserializer};
-use serde::de::{self, IntoDeserializer, Visitor};
+use serde::de::DeserializeOwned;
 use serde::{Serialize, Serializer};
 use toml::de::{DeTable, DeValue};
 
@@ -85,11 +84,14 @@ impl Table {
         Some(self.entries.remove(at))
     }
 
-    /// Returns whether the table refers to a fact, as `{ from = "pad.threshold" }` does.
+    /// Returns the fact that the table refers to and its place, as in `{ from = "pad.threshold" }`.
     ///
     /// Such a table is one value: it is replaced as a whole, not merged.
-    pub(crate) fn is_fact(&self) -> bool {
-        matches!(self.entries.as_slice(), [(key, value)] if key.name == "from" && value.as_str().is_some())
+    pub(crate) fn fact(&self) -> Option<(&str, &Range<usize>)> {
+        match self.entries.as_slice() {
+            [(key, value)] if key.name == "from" => Some((value.as_str()?, &value.span)),
+            _ => None,
+        }
     }
 
     /// Merges another table over this one: tables merge recursively, other values replace, nothing is deleted.
@@ -98,7 +100,7 @@ impl Table {
             match self.entries.iter_mut().find(|(mine, _)| mine.name == key.name) {
                 None => self.entries.push((key, value)),
                 Some((mine, old)) => match (&mut old.item, value.item) {
-                    (Item::Table(old), Item::Table(new)) if !old.is_fact() && !new.is_fact() => old.merge(new),
+                    (Item::Table(old), Item::Table(new)) if old.fact().or(new.fact()).is_none() => old.merge(new),
                     (item, new) => {
                         *item = new;
                         (old.span, mine.span) = (value.span, key.span);
@@ -119,6 +121,23 @@ impl Value {
         }
     }
 
+    /// Returns the table, unless it refers to a fact.
+    pub(crate) fn as_section(&self) -> Option<&Table> {
+        self.as_table().filter(|table| table.fact().is_none())
+    }
+
+    /// Returns the facts to which the value and the values in it refer, each with its place.
+    pub(crate) fn facts(&self) -> Vec<(&str, &Range<usize>)> {
+        match &self.item {
+            Item::Array(items) => items.iter().flat_map(Self::facts).collect(),
+            Item::Table(table) => match table.fact() {
+                Some(fact) => vec![fact],
+                None => table.entries.iter().flat_map(|(_, value)| value.facts()).collect(),
+            },
+            _ => Vec::new(),
+        }
+    }
+
     /// Returns the string, or `None` for other values.
     #[must_use]
     pub fn as_str(&self) -> Option<&str> {
@@ -126,6 +145,12 @@ impl Value {
             Item::String(text) => Some(text),
             _ => None,
         }
+    }
+
+    /// Deserializes the value, or returns `None` if it is of another type.
+    #[must_use]
+    pub fn read<T: DeserializeOwned>(&self) -> Option<T> {
+        toml::Value::try_from(self).ok()?.try_into().ok()
     }
 
     /// Describes the value for a message, for example `the string "x"`.
@@ -212,52 +237,6 @@ fn from_value(
         DeValue::Table(table) => Item::Table(from_table(table, at, mistakes)),
     };
     Value { span, item }
-}
-
-impl<'de> IntoDeserializer<'de, de::value::Error> for &'de Value {
-    type Deserializer = Self;
-    fn into_deserializer(self) -> Self {
-        self
-    }
-}
-
-impl<'de> de::Deserializer<'de> for &'de Value {
-    type Error = de::value::Error;
-
-    fn deserialize_any<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, Self::Error> {
-        match &self.item {
-            Item::String(text) | Item::Datetime(text) => visitor.visit_borrowed_str(text),
-            Item::Integer(number) => visitor.visit_i64(*number),
-            Item::Float(number) => visitor.visit_f64(*number),
-            Item::Boolean(value) => visitor.visit_bool(*value),
-            Item::Array(items) => visitor.visit_seq(SeqDeserializer::new(items.iter())),
-            Item::Table(table) => {
-                let entries = table.entries.iter().map(|(key, value)| (key.name.as_str(), value));
-                visitor.visit_map(MapDeserializer::new(entries))
-            }
-        }
-    }
-
-    fn deserialize_option<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, Self::Error> {
-        visitor.visit_some(self)
-    }
-
-    fn deserialize_enum<V: Visitor<'de>>(
-        self,
-        name: &'static str,
-        variants: &'static [&'static str],
-        visitor: V,
-    ) -> Result<V::Value, Self::Error> {
-        match &self.item {
-            Item::String(text) => text.as_str().into_deserializer().deserialize_enum(name, variants, visitor),
-            _ => self.deserialize_any(visitor),
-        }
-    }
-
-    serde::forward_to_deserialize_any! {
-        bool i8 i16 i32 i64 i128 u8 u16 u32 u64 u128 f32 f64 char str string bytes byte_buf unit unit_struct
-        newtype_struct seq tuple tuple_struct map struct identifier ignored_any
-    }
 }
 
 #[cfg(test)]

@@ -183,14 +183,7 @@ fn strings(table: &Table) -> impl Iterator<Item = String> {
 
 /// Collects the roles whose facts a value refers to.
 fn collect_facts(value: &Value, needs: &mut Vec<String>) {
-    match &value.item {
-        Item::Table(table) if table.is_fact() => {
-            needs.extend(strings(table).filter_map(|fact| Some(fact.split_once('.')?.0.to_owned())));
-        }
-        Item::Table(table) => table.entries.iter().for_each(|(_, inner)| collect_facts(inner, needs)),
-        Item::Array(items) => items.iter().for_each(|inner| collect_facts(inner, needs)),
-        _ => {}
-    }
+    needs.extend(value.facts().into_iter().filter_map(|(fact, _)| Some(fact.split_once('.')?.0.to_owned())));
 }
 
 /// Splits a text into sections. A comment above a header belongs to the header.

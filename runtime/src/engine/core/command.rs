@@ -5,7 +5,7 @@
 //! that command with the same accelerations before it follows again.
 
 use crate::device::Commands;
-use crate::graph::{PlannedCommand, PlannedReport};
+use crate::graph::PlannedCommand;
 use crate::node::{Bus, PortId, Tick};
 use crate::signal::Joints;
 use crate::signal::line::{scale_to, step_toward};
@@ -25,8 +25,15 @@ pub(crate) struct CommandSlot {
 
 impl CommandSlot {
     pub(crate) fn new(source: PortId, planned: PlannedCommand) -> Self {
-        let PlannedCommand { device, command, age, accelerations, .. } = planned;
-        Self { device, source, command, max_age: age.max_age, accelerations: accelerations.into(), follows: false }
+        let PlannedCommand { device, port, age, accelerations, .. } = planned;
+        Self {
+            device,
+            source,
+            command: port,
+            max_age: age.max_age,
+            accelerations: accelerations.into(),
+            follows: false,
+        }
     }
 
     /// Takes over the graph's command, or ramps toward zero if that is absent, too old or halted.
@@ -62,8 +69,8 @@ pub(crate) struct ReportSlot {
 }
 
 impl ReportSlot {
-    pub(crate) const fn new(source: PortId, planned: &PlannedReport) -> Self {
-        Self { device: planned.device, source, report: planned.report, max_age: planned.age.max_age }
+    pub(crate) const fn new(source: PortId, planned: &PlannedCommand) -> Self {
+        Self { device: planned.device, source, report: planned.port, max_age: planned.age.max_age }
     }
 
     /// Copies the report, or makes it absent if it is absent or too old.
@@ -191,7 +198,7 @@ mod tests {
         assert_eq!(commit(Some(0), 101), None, "too old");
         assert_eq!(commit(Some(50), 101), Some((101.0, first.1)));
         assert_eq!(commit(None, 102), None, "absent");
-        commands.fall_silent();
+        commands.clear_reports();
         assert!(commands.report(joints).is_none());
     }
 

@@ -1,6 +1,6 @@
 //! Inlets take the samples of devices into the graph. Each sample is new once, and time never goes back.
 
-use crate::device::{Sample, Samples, State};
+use crate::device::{PortSample, SampleState, Samples};
 use crate::graph::{PlannedRole, Policy};
 use crate::node::{Bus, PortId};
 use crate::signal::{Kind, Stamp};
@@ -73,8 +73,9 @@ impl Inlet {
     }
 
     /// Returns the pending sample: one with a value that has not been latched yet.
-    fn sample<'s>(&self, samples: &'s Samples) -> Option<&'s Sample> {
-        Some(&samples.ports[self.port]).filter(|sample| sample.writes != self.writes && sample.state == State::Value)
+    fn sample<'s>(&self, samples: &'s Samples) -> Option<&'s PortSample> {
+        Some(&samples.ports[self.port])
+            .filter(|sample| sample.writes != self.writes && sample.state == SampleState::Value)
     }
 
     /// Returns the size of the pending sample and the size that the device has stated, if they differ.
@@ -91,7 +92,7 @@ impl Inlet {
     /// Returns why the device has lost the port, if that is a trouble.
     pub(crate) fn lost<'s>(&self, samples: &'s Samples) -> Option<&'s str> {
         match &samples.ports[self.port].state {
-            State::Lost(why) if !self.is_observed => Some(why),
+            SampleState::Lost(why) if !self.is_observed => Some(why),
             _ => None,
         }
     }
@@ -100,7 +101,7 @@ impl Inlet {
     pub(crate) fn latch(&mut self, samples: &mut Samples, bus: &mut Bus, tick: u64, now: i64) {
         let Samples { arenas, ports, .. } = samples;
         let sample = &ports[self.port];
-        self.is_lost = matches!(sample.state, State::Lost(_));
+        self.is_lost = matches!(sample.state, SampleState::Lost(_));
         if self.is_lost {
             // After a reconnection, the device may number its samples from 1 again.
             (self.writes, self.seen) = (sample.writes, None);
@@ -125,7 +126,7 @@ impl Inlet {
                 self.counters.new += 1;
                 self.counters.gaps += missing;
                 self.counters.late += u64::from(now - sample.stamp > self.period);
-                if sample.state == State::Absent {
+                if sample.state == SampleState::Absent {
                     self.lose(bus, tick);
                 } else {
                     let stamp = Stamp { nanos: sample.stamp, device: self.device as u16 };

@@ -13,6 +13,6 @@ pub(crate) use inlet::Inlet;
 pub use modes::ModeChange;
 pub(crate) use modes::{ModeMachine, Transition};
 pub(crate) use runner::{AgedWire, NodeRunner};
-pub(crate) use slot::{DeviceSlot, Link};
+pub(crate) use slot::{DeviceLink, DeviceSlot};
 pub(crate) use tick::Core;
 pub use tick::Timing;

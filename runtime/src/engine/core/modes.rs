@@ -4,9 +4,9 @@
 //! sensor that has stopped triggers no change. When several exits hold in one tick, `fail` comes first, then
 //! `on_lost`, `done` and `go`; among `go`, the higher priority wins. Exits that could still tie are rejected at load.
 
-use std::collections::BTreeMap;
+use std::collections::BTreeSet;
 
-use crate::graph::{Condition, ExitKind, PlannedExit, PlannedModes, PortRef, Test};
+use crate::graph::{Condition, ExitKind, PlannedExit, PlannedModes, PortRef, PortState, Test};
 use crate::node::{Bus, PortId, ScalarId, Tick};
 use crate::signal::{Freshness, Kind, Pose};
 
@@ -102,16 +102,15 @@ struct ConditionState {
 }
 
 impl ModeMachine {
-    pub(crate) fn new(planned: PlannedModes, ports: &BTreeMap<PortRef, (PortId, Kind)>) -> Self {
-        let mut changed: Vec<usize> =
-            planned.modes.iter().flat_map(|mode| mode.configurations.iter().map(|(runner, _)| *runner)).collect();
-        changed.sort_unstable();
-        changed.dedup();
+    /// Creates the machine. `port` finds a port on the bus and its kind.
+    pub(crate) fn new(planned: PlannedModes, port: impl Fn(PortRef) -> (PortId, Kind)) -> Self {
+        let configurations = planned.modes.iter().flat_map(|mode| &mode.configurations);
+        let changed: BTreeSet<usize> = configurations.map(|(runner, _)| *runner).collect();
         let input = |exit: &PlannedExit| match &exit.condition {
             Condition::Port(watched, _) | Condition::Lost(watched, _) => {
-                Some(ConditionInput::new(ports[&watched.source], watched.feature))
+                Some(ConditionInput::new(port(watched.source), watched.feature))
             }
-            Condition::Travel(source, _) => Some(ConditionInput::Port(ports[source].0)),
+            Condition::Travel(source, _) => Some(ConditionInput::Port(port(*source).0)),
             Condition::Elapsed(_) | Condition::Sent(_) => None,
         };
         let modes = planned.modes.into_iter().map(|mode| {
@@ -282,12 +281,12 @@ impl ConditionState {
             Freshness::New => (true, true),
         };
         let holds = match test {
-            Test::Absent => !is_present,
+            Test::Is(PortState::Absent) => !is_present,
             _ if !is_present => false,
-            Test::New | Test::Present => is_new,
+            Test::Is(PortState::New | PortState::Present) => is_new,
             // A held value neither starts nor ends the condition: the next sample decides.
             _ if !is_new => return false,
-            Test::Flag(expected) => input.value(bus).is_some_and(|value| (value != 0.0) == expected),
+            Test::Is(state) => input.value(bus).is_some_and(|value| (value != 0.0) == (state == PortState::True)),
             Test::Between { min, max, hysteresis } => {
                 let by = if self.since.is_some() { hysteresis } else { 0.0 };
                 input.value(bus).is_some_and(|value| value > min - by && value < max + by)

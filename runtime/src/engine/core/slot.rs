@@ -8,13 +8,13 @@ pub(crate) struct DeviceSlot {
     pub(crate) place: String,
     pub(crate) samples: Samples,
     pub(crate) commands: Commands,
-    pub(crate) link: Link,
+    pub(crate) link: DeviceLink,
     /// Why the device failed, if it has.
     pub(crate) failed: Option<String>,
 }
 
 /// How a device is linked to the engine.
-pub(crate) enum Link {
+pub(crate) enum DeviceLink {
     /// A device that the engine steps.
     Stepped(Box<dyn Stepped>),
     /// A live device that has not been started yet.

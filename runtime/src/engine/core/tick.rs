@@ -41,7 +41,7 @@ impl Core {
 
     /// Steps the nodes, each at most once. Returns whether all values are finite.
     pub(crate) fn run(&mut self, timing: &mut Timing) -> bool {
-        if timing.is_due(self.tick.index) {
+        if Timing::is_due(self.tick.index) {
             self.step_timed(timing);
         } else {
             self.step();
@@ -103,7 +103,7 @@ impl Core {
 
     /// Ramps every command toward zero for `dt` [s]. Returns whether all are zero. Reports are absent, since no node steps.
     pub(crate) fn ramp(&mut self, devices: &mut [DeviceSlot], dt: f64) -> bool {
-        devices.iter_mut().for_each(|device| device.commands.fall_silent());
+        devices.iter_mut().for_each(|device| device.commands.clear_reports());
         let commands = self.commands.iter_mut();
         commands.fold(true, |still, command| command.ramp(&mut devices[command.device].commands, dt) & still)
     }
@@ -166,7 +166,6 @@ pub struct Timing {
     pub nodes: Vec<NodeTime>,
     /// Number of timed ticks.
     pub ticks: u64,
-    every: u64,
 }
 
 impl Timing {
@@ -174,10 +173,10 @@ impl Timing {
     const INTERVAL_TICKS: u64 = 64;
 
     pub(crate) fn new(nodes: usize) -> Self {
-        Self { nodes: vec![NodeTime::default(); nodes], ticks: 0, every: Self::INTERVAL_TICKS }
+        Self { nodes: vec![NodeTime::default(); nodes], ticks: 0 }
     }
 
-    const fn is_due(&self, tick: u64) -> bool {
-        tick % self.every == self.every / 2
+    const fn is_due(tick: u64) -> bool {
+        tick % Self::INTERVAL_TICKS == Self::INTERVAL_TICKS / 2
     }
 }

@@ -21,7 +21,7 @@ impl Engine {
                 self.fault(node, port.clone(), Cause::StaleWire(wire.into()), self.sources.locate(span.start))
             }
             // The role ports come first in `ports`, one per inlet, so the index of an inlet is that of its port.
-            Trouble::NotFinite(port) | Trouble::NotFiniteAt(port) => self.port_fault(port, Cause::NotFinite),
+            Trouble::NotFinite(port) => self.port_fault(port, Cause::NotFinite),
             Trouble::Panicked(runner) => {
                 let (node, place) = &self.names[runner];
                 self.fault(node, None, Cause::Panicked(self.panic.clone()), place.clone())
@@ -37,8 +37,7 @@ impl Engine {
                 self.port_fault(inlet, Cause::Lost(why.to_owned()))
             }
             Trouble::Clock => {
-                let clock = (0..self.devices.len()).find(|device| self.schedule.is_clock(*device));
-                let (name, place) = clock.map_or(("", ""), |i| (&self.devices[i].name, &self.devices[i].place));
+                let (name, place) = self.clock().map_or(("", ""), |device| (&device.name, &device.place));
                 self.fault(name, None, Cause::SilentClock, place.to_owned())
             }
             Trouble::Late(by) => self.fault("", None, Cause::Late { by }, String::new()),

@@ -1,7 +1,6 @@
 //! Builds an engine from a plan. Everything that a tick uses is allocated here, once.
 
 use std::collections::BTreeMap;
-use std::ops::Range;
 
 use super::engine::{Display, Engine, Logged};
 use super::halt::HaltMachine;
@@ -9,67 +8,84 @@ use super::schedule::TickSchedule;
 use super::trouble::WatchedWire;
 use crate::device::{Commands, Driver, Samples};
 use crate::engine::core::{
-    AgedWire, CommandSlot, Core, DeviceSlot, Inlet, Link, ModeMachine, NodeRunner, ReportSlot, Timing,
+    AgedWire, CommandSlot, Core, DeviceLink, DeviceSlot, Inlet, ModeMachine, NodeRunner, ReportSlot, Timing,
 };
 use crate::graph::{
-    AgeLimit, Compiled, PlannedCommand, PlannedDevice, PlannedNode, PlannedPort, PlannedReport, PlannedShow,
-    PlannedView, PlannedWire, Policy, PortRef, Producer,
+    AgeLimit, Compiled, PlannedCommand, PlannedDevice, PlannedNode, PlannedPort, PlannedShow, PlannedView, PlannedWire,
+    Policy, PortRef, Producer,
 };
 use crate::node::{Bus, PortId, Tick};
 use crate::signal::{Mark, Stamp};
 use crate::source::SourceMap;
 
-/// The bus port of every output.
-type Ids = BTreeMap<PortRef, PortId>;
+/// The ports of a graph on its bus.
+#[derive(Default)]
+struct BusPorts {
+    bus: Bus,
+    list: Vec<(PlannedPort, PortId)>,
+    /// Index of each port in `list`.
+    index: BTreeMap<PortRef, usize>,
+}
+
+impl BusPorts {
+    fn add(&mut self, source: PortRef, planned: &PlannedPort) -> PortId {
+        let id = self.bus.add(&planned.shape);
+        self.index.insert(source, self.list.len());
+        self.list.push((planned.clone(), id));
+        id
+    }
+
+    fn get(&self, source: PortRef) -> &(PlannedPort, PortId) {
+        &self.list[self.index[&source]]
+    }
+
+    fn id(&self, source: PortRef) -> PortId {
+        self.get(source).1
+    }
+}
 
 impl Engine {
     /// Creates the engine of a compiled graph. Ticks do not allocate.
     #[must_use]
     pub fn new(compiled: Compiled) -> Self {
         let Compiled { plan, view, sources, exports, .. } = compiled;
-        let (mut bus, mut ids, mut ports, mut inlets) = (Bus::default(), Ids::new(), Vec::new(), Vec::new());
-        let mut add = |source: PortRef, planned: &PlannedPort| {
-            let id = bus.add(&planned.shape);
-            ids.insert(source, id);
-            ports.push((planned.clone(), id));
-            id
-        };
+        let (mut ports, mut inlets) = (BusPorts::default(), Vec::new());
         for (i, role) in plan.roles.iter().enumerate() {
             for (port, planned) in role.ports.iter().enumerate() {
-                let id = add(PortRef { producer: Producer::Role(i), port }, planned);
+                let id = ports.add(PortRef { producer: Producer::Role(i), port }, planned);
                 inlets.push(Inlet::new(role, port, id));
             }
         }
-        for node in &plan.nodes {
-            for (port, planned) in node.ports.iter().enumerate() {
-                add(PortRef { producer: Producer::Node(node.index), port }, planned);
-            }
+        for (source, planned) in plan.nodes.iter().flat_map(PlannedNode::outputs) {
+            ports.add(source, planned);
         }
-        let logged = plan.nodes.iter().filter(|node| node.is_logged).map(|node| logged(node, &ids, &ports)).collect();
+        let logged = plan.nodes.iter().filter(|node| node.is_logged).map(|node| logged(node, &ports)).collect();
         let place = |device: usize| sources.locate(plan.devices[device].span.start);
         let roles = plan.roles.iter().map(|role| (role.name.clone(), place(role.device))).collect();
         let names = plan.nodes.iter().map(|node| (node.name.clone(), sources.locate(node.span.start))).collect();
-        let display = display(view, &ids, &ports);
         let limits = limits(&plan.nodes, &ports);
-        let mut watched = watched_ends(&plan.commands, &plan.reports, &ids);
-        let slot = |command: PlannedCommand| CommandSlot::new(ids[&command.source], command);
-        let commands = plan.commands.into_iter().map(slot).collect();
-        let slot = |report: &PlannedReport| ReportSlot::new(ids[&report.source], report);
-        let reports = plan.reports.iter().map(slot).collect();
-        let reported = reported(&plan.reports);
+        let mut watched = watched_commands(&plan.commands, &ports);
         let devices = plan.devices.into_iter().enumerate();
-        let devices = devices.map(|(i, device)| device_slot(i, device, &plan.reports, &sources)).collect();
-        let runners = plan.nodes.into_iter().map(|node| runner(node, &ids, &mut bus, &mut watched));
-        let runners: Vec<NodeRunner> = runners.collect();
+        let devices = devices.map(|(i, device)| device_slot(i, device, &plan.commands, &sources)).collect();
+        let runners: Vec<NodeRunner> =
+            plan.nodes.into_iter().map(|node| runner(node, &mut ports, &mut watched)).collect();
+        let (reports, commands): (Vec<_>, Vec<_>) = plan.commands.into_iter().partition(|wire| wire.is_report);
+        let report = |report: &PlannedCommand| ReportSlot::new(ports.id(report.source), report);
+        let slots = reports.iter().map(report).collect();
+        let reported = reports.into_iter().map(|report| (report.name.join("."), report.device, report.port)).collect();
+        let commands =
+            commands.into_iter().map(|command| CommandSlot::new(ports.id(command.source), command)).collect();
+        let modes = plan.modes.map(|modes| {
+            ModeMachine::new(modes, |source| {
+                let (port, id) = ports.get(source);
+                (*id, port.shape.kind())
+            })
+        });
+        let display = display(view, &ports);
         let (max_gap, reset_after) = (plan.max_gap, plan.reset_after);
         let tick = Tick { index: 0, now: 0, dt: 0.0, stamp: Stamp::TIMELESS, max_gap, reset_after, is_halted: false };
         let timing = Timing::new(runners.len());
-        let mut core = Core::new(bus, runners, inlets, (commands, reports), tick);
-        let kind = |id: PortId| ports.iter().find(|(_, known)| *known == id).map(|(port, _)| port.shape.kind());
-        let modes = plan.modes.map(|modes| {
-            let kinds = ids.iter().map(|(source, id)| (*source, (*id, kind(*id).expect("a port has a kind"))));
-            ModeMachine::new(modes, &kinds.collect())
-        });
+        let mut core = Core::new(ports.bus, runners, inlets, (commands, slots), tick);
         modes.iter().for_each(|modes| core.switch(modes.configurations()));
         Self {
             timing,
@@ -78,7 +94,7 @@ impl Engine {
             is_done: false,
             devices,
             schedule: TickSchedule::new(plan.clock, plan.period),
-            ports,
+            ports: ports.list,
             logged,
             display,
             limits,
@@ -99,39 +115,32 @@ impl Engine {
     }
 }
 
-fn logged(node: &PlannedNode, ids: &Ids, ports: &[(PlannedPort, PortId)]) -> Logged {
-    let sources = node.inputs.iter().flat_map(|(_, wires)| wires).map(|wire| ids[&wire.source]);
-    let port = |id: PortId| ports.iter().find(|(_, known)| *known == id).expect("a wire comes from a port").clone();
-    let due = ids[&PortRef { producer: Producer::Node(node.index), port: 0 }];
-    Logged { node: node.name.clone(), due, inputs: sources.map(port).collect() }
+fn logged(node: &PlannedNode, ports: &BusPorts) -> Logged {
+    let wires = node.inputs.iter().flat_map(|(_, wires)| wires);
+    let due = ports.id(PortRef { producer: Producer::Node(node.index), port: 0 });
+    Logged { node: node.name.clone(), due, inputs: wires.map(|wire| ports.get(wire.source).clone()).collect() }
 }
 
-fn display(view: PlannedView, ids: &Ids, ports: &[(PlannedPort, PortId)]) -> Display {
+fn display(view: PlannedView, ports: &BusPorts) -> Display {
     let port = |PlannedShow { name, source }: PlannedShow| {
-        let id = ids[&source];
-        let (port, _) = ports.iter().find(|(_, known)| *known == id).expect("the check resolved every shown port");
-        (name, port.clone(), id)
+        let (port, id) = ports.get(source).clone();
+        (name, port, id)
     };
-    let contact = view.mark.map(|mark| mark.map(|at| ids[&at]));
+    let contact = view.mark.map(|mark| mark.map(|source| ports.id(source)));
     Display { ports: view.ports.into_iter().map(port).collect(), contact }
 }
 
 /// Returns the ports on which limit nodes report the scale of the motion.
-fn limits(nodes: &[PlannedNode], ports: &[(PlannedPort, PortId)]) -> Vec<(String, PortId)> {
+fn limits(nodes: &[PlannedNode], ports: &BusPorts) -> Vec<(String, PortId)> {
     let is_scale =
         |name: &str| nodes.iter().any(|node| node.holds.iter().any(|limit| name == format!("{}.{limit}", node.name)));
-    let scales = ports.iter().filter(|(port, _)| is_scale(&port.name));
+    let scales = ports.list.iter().filter(|(port, _)| is_scale(&port.name));
     scales.map(|(port, id)| (port.name.clone(), *id)).collect()
 }
 
-/// Each report that is wired, with its device and its number there.
-fn reported(reports: &[PlannedReport]) -> Vec<(String, usize, usize)> {
-    reports.iter().map(|planned| (planned.name.join("."), planned.device, planned.report)).collect()
-}
-
-fn device_slot(i: usize, device: PlannedDevice, reports: &[PlannedReport], sources: &SourceMap) -> DeviceSlot {
+fn device_slot(i: usize, device: PlannedDevice, commands: &[PlannedCommand], sources: &SourceMap) -> DeviceSlot {
     let wired = |report: usize| {
-        let planned = reports.iter().find(|planned| (planned.device, planned.report) == (i, report));
+        let planned = commands.iter().find(|wire| wire.is_report && (wire.device, wire.port) == (i, report));
         planned.map(|planned| &planned.shape)
     };
     DeviceSlot {
@@ -140,45 +149,44 @@ fn device_slot(i: usize, device: PlannedDevice, reports: &[PlannedReport], sourc
         samples: Samples::of(&device.description),
         commands: Commands::with_reports(&device.description, wired),
         link: match device.driver {
-            Driver::Stepped(driver) => Link::Stepped(driver),
-            Driver::Live(driver) => Link::Idle(driver),
+            Driver::Stepped(driver) => DeviceLink::Stepped(driver),
+            Driver::Live(driver) => DeviceLink::Idle(driver),
         },
         failed: None,
     }
 }
 
 /// Returns the commands and reports that stop the run, or halt every command, when they are too old.
-fn watched_ends(commands: &[PlannedCommand], reports: &[PlannedReport], ids: &Ids) -> Vec<WatchedWire> {
-    let commands = commands.iter().map(|wire| (wire.source, &wire.name, wire.age, &wire.span));
-    let ends = commands.chain(reports.iter().map(|wire| (wire.source, &wire.name, wire.age, &wire.span)));
-    ends.filter_map(|(source, name, age, span)| watched_end(name, age, span, ids[&source])).collect()
-}
-
-fn watched_end(name: &[String; 2], age: AgeLimit, span: &Range<usize>, id: PortId) -> Option<WatchedWire> {
-    let (AgeLimit { max_age, stale }, [role, name]) = (age, name.clone());
-    // The slot of a command or report checks the age itself, so the wire needs no mark of its own.
-    let aged = AgedWire { from: id.mark, to: id.mark, max_age };
-    let watched = WatchedWire { aged, stale, node: role, port: Some(name), span: span.clone() };
-    (stale > Policy::Hold).then_some(watched)
+fn watched_commands(commands: &[PlannedCommand], ports: &BusPorts) -> Vec<WatchedWire> {
+    let strict = commands.iter().filter(|command| command.age.stale > Policy::Hold);
+    let watched = strict.map(|PlannedCommand { source, age: AgeLimit { max_age, stale }, name, span, .. }| {
+        // The slot of a command or report checks the age itself, so the wire needs no mark of its own.
+        let (mark, [role, name]) = (ports.id(*source).mark, name.clone());
+        let aged = AgedWire { from: mark, to: mark, max_age: *max_age };
+        WatchedWire { aged, stale: *stale, node: role, port: Some(name), span: span.clone() }
+    });
+    watched.collect()
 }
 
 /// Creates the runner of a node. A wire with a maximum age gets a mark of its own and shares the value.
-fn runner(node: PlannedNode, ids: &Ids, bus: &mut Bus, watched: &mut Vec<WatchedWire>) -> NodeRunner {
+fn runner(node: PlannedNode, ports: &mut BusPorts, watched: &mut Vec<WatchedWire>) -> NodeRunner {
+    let outputs = node.outputs().map(|(source, _)| ports.id(source)).collect();
     let mut aged = Vec::new();
     let mut end = |wire: &PlannedWire| {
-        let id = ids[&wire.source];
+        let id = ports.id(wire.source);
         let Some(AgeLimit { max_age, stale }) = wire.age else { return id };
-        bus.marks.push(Mark::default());
-        let to = bus.marks.len() as u32 - 1;
-        aged.push(AgedWire { from: id.mark, to, max_age });
+        let marks = &mut ports.bus.marks;
+        marks.push(Mark::default());
+        let to = marks.len() as u32 - 1;
+        let wire_end = AgedWire { from: id.mark, to, max_age };
+        aged.push(wire_end);
         if stale > Policy::Hold {
-            let (aged, span) = (AgedWire { from: id.mark, to, max_age }, wire.span.clone());
-            watched.push(WatchedWire { aged, stale, node: node.name.clone(), port: None, span });
+            let (node, span) = (node.name.clone(), wire.span.clone());
+            watched.push(WatchedWire { aged: wire_end, stale, node, port: None, span });
         }
         PortId { mark: to, ..id }
     };
     let inputs: Vec<_> =
         node.inputs.iter().map(|(need, wires)| (*need, wires.iter().map(&mut end).collect())).collect();
-    let outputs = (0..node.ports.len()).map(|port| ids[&PortRef { producer: Producer::Node(node.index), port }]);
-    NodeRunner::new(node.node, &inputs, outputs.collect(), node.is_every_tick).with_aged(aged)
+    NodeRunner::new(node.node, &inputs, outputs, node.is_every_tick).with_aged(aged)
 }

@@ -6,7 +6,7 @@ use super::blame::owner;
 use super::engine::Engine;
 use super::trouble::{Trouble, panic_message};
 use crate::device::DeviceError;
-use crate::engine::core::{Link, ModeMachine, Transition};
+use crate::engine::core::{DeviceLink, ModeMachine, Transition};
 use crate::fault::{Cause, Fault};
 use crate::graph::Policy;
 use crate::source::suggestion;
@@ -122,7 +122,7 @@ impl Engine {
 
     /// Whether a device has reported why its samples are missing, while the commands are held only for missing samples.
     fn explains_halt(&self, trouble: Trouble) -> bool {
-        let last = self.halts.list().last().filter(|halt| halt.until.is_none());
+        let last = self.halts.list.last().filter(|halt| halt.until.is_none());
         let is_silence = last.is_some_and(|halt| {
             halt.policy == Policy::Hold && matches!(halt.fault.cause, Cause::SilentClock | Cause::Stale { .. })
         });
@@ -136,10 +136,10 @@ impl Engine {
     /// Returns a message if no mode has a condition on the word, or if the commands wait for `resume`.
     pub fn send(&mut self, word: &str) -> Result<(), String> {
         if word.eq_ignore_ascii_case("stop") {
-            self.halts.cancel_resume();
+            self.halts.resumes = false;
             self.trouble = Some((Policy::Stop, Trouble::Operator));
         } else if word.eq_ignore_ascii_case("resume") {
-            self.halts.resume();
+            self.halts.resumes = true;
         } else if !self.words().any(|known| known == word) {
             let known = self.words().collect::<std::collections::BTreeSet<_>>();
             return Err(format!(
@@ -197,7 +197,7 @@ impl Engine {
     /// Notifies the stepped devices that the run is over, and why.
     pub(crate) fn finish(&mut self, reason: &str) {
         for device in &mut self.devices {
-            if let Link::Stepped(driver) = &mut device.link {
+            if let DeviceLink::Stepped(driver) = &mut device.link {
                 // A panic here does not change why the run ended: the device has received its zero command.
                 let _ = catch_unwind(AssertUnwindSafe(|| driver.finish(reason)));
             }
@@ -206,10 +206,10 @@ impl Engine {
 
     /// Returns the time of the next sample of a stepped clock device [ns].
     fn clock_sample(&self) -> Option<i64> {
-        self.devices.iter().enumerate().find_map(|(i, device)| match &device.link {
-            Link::Stepped(driver) if self.schedule.is_clock(i) => driver.next(),
+        match &self.clock()?.link {
+            DeviceLink::Stepped(driver) => driver.next(),
             _ => None,
-        })
+        }
     }
 
     /// Sends every device its commands and receives its samples. A device that fails does not keep the others from their
@@ -219,7 +219,7 @@ impl Engine {
         for i in 0..self.devices.len() {
             let device = &mut self.devices[i];
             match &mut device.link {
-                Link::Stepped(driver) => {
+                DeviceLink::Stepped(driver) => {
                     let exchange = || driver.exchange(now, &device.commands, &mut device.samples);
                     let result = catch_unwind(AssertUnwindSafe(exchange));
                     let result = result
@@ -228,12 +228,12 @@ impl Engine {
                         self.lose_device(i, why);
                     }
                 }
-                Link::Live(linked) => {
+                DeviceLink::Live(linked) => {
                     linked.send(&device.commands);
                     let is_newer = linked.receive(&mut device.samples);
                     has_sampled |= is_newer && self.schedule.is_clock(i);
                 }
-                Link::Idle(_) | Link::Gone => {}
+                DeviceLink::Idle(_) | DeviceLink::Gone => {}
             }
         }
         has_sampled
@@ -256,7 +256,7 @@ impl Engine {
     /// Marks a device as failed. The engine does not call it again.
     pub(crate) fn lose_device(&mut self, device: usize, why: String) {
         let device = &mut self.devices[device];
-        (device.link, device.failed) = (Link::Gone, Some(why));
+        (device.link, device.failed) = (DeviceLink::Gone, Some(why));
     }
 
     /// Handles a value that is not finite. Under every policy but `fault`, the outputs of the node and of all nodes after
@@ -270,7 +270,7 @@ impl Engine {
             !bus.arenas.is_finite(planned.shape.kind(), id.slot)
         };
         let port = (0..self.ports.len()).find(is_bad).expect("the finite check failed on some port");
-        self.raise(self.policy.not_finite.0, Trouble::NotFiniteAt(port))?;
+        self.raise(self.policy.not_finite.0, Trouble::NotFinite(port))?;
         let runner = self.runner_of(port);
         self.invalidate_from(runner);
         self.core.reset_from(runner);

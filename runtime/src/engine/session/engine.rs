@@ -4,7 +4,7 @@ use super::halt::{Halt, HaltMachine};
 use super::schedule::TickSchedule;
 use super::trouble::{Trouble, WatchedWire};
 use crate::device::Report;
-use crate::engine::core::{Core, Counters, DeviceSlot, Link, ModeChange, ModeMachine, Timing};
+use crate::engine::core::{Core, Counters, DeviceLink, DeviceSlot, ModeChange, ModeMachine, Timing};
 use crate::graph::{PlannedPort, Policy, PolicyTable};
 use crate::node::{Bus, PortId};
 use crate::signal::{Mark, Signal};
@@ -74,7 +74,7 @@ impl Engine {
     pub fn next(&self) -> Option<i64> {
         let mut clock = None;
         for (i, device) in self.devices.iter().enumerate() {
-            if let Link::Stepped(driver) = &device.link {
+            if let DeviceLink::Stepped(driver) = &device.link {
                 let next = driver.next()?;
                 if self.schedule.is_clock(i) {
                     clock = Some(next);
@@ -117,7 +117,7 @@ impl Engine {
     /// Returns the halts so far, at most 1000.
     #[must_use]
     pub fn halts(&self) -> &[Halt] {
-        self.halts.list()
+        &self.halts.list
     }
 
     /// Returns the number of halts beyond those that [`halts`](Self::halts) lists.
@@ -141,20 +141,25 @@ impl Engine {
     /// Returns the time of the clock device's last sample, if the device knows it [ns].
     #[must_use]
     pub fn end(&self) -> Option<i64> {
-        self.devices.iter().enumerate().find_map(|(i, device)| match &device.link {
-            Link::Stepped(driver) if self.schedule.is_clock(i) => driver.end(),
+        match &self.clock()?.link {
+            DeviceLink::Stepped(driver) => driver.end(),
             _ => None,
-        })
+        }
+    }
+
+    /// Returns the device whose samples trigger the ticks; a graph with a rate has none.
+    pub(super) fn clock(&self) -> Option<&DeviceSlot> {
+        self.devices.get(self.schedule.clock_device()?)
     }
 
     /// Whether a device runs in real time.
     pub(super) fn is_live(&self) -> bool {
-        self.devices.iter().any(|device| matches!(device.link, Link::Idle(_) | Link::Live(_)))
+        self.devices.iter().any(|device| matches!(device.link, DeviceLink::Idle(_) | DeviceLink::Live(_)))
     }
 
     /// Whether the samples of a stepped device end at a known time.
     pub(super) fn has_end(&self) -> bool {
-        self.devices.iter().any(|device| matches!(&device.link, Link::Stepped(driver) if driver.end().is_some()))
+        self.devices.iter().any(|device| matches!(&device.link, DeviceLink::Stepped(driver) if driver.end().is_some()))
     }
 
     /// Returns the number of the last tick.

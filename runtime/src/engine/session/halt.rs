@@ -21,7 +21,7 @@ pub struct Halt {
 const MAX_HALTS: usize = 1000;
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum State {
+enum HaltState {
     /// The commands follow the graph.
     Running,
     /// The commands are zero until the trouble is over.
@@ -32,47 +32,33 @@ enum State {
 
 /// The state of the halt machine and the list of halts.
 pub(crate) struct HaltMachine {
-    state: State,
-    list: Vec<Halt>,
+    state: HaltState,
+    /// The halts so far, at most [`MAX_HALTS`].
+    pub(crate) list: Vec<Halt>,
     /// Number of halts beyond [`MAX_HALTS`].
     pub(crate) unlisted: u64,
     /// Whether the operator has asked to resume.
-    resumes: bool,
+    pub(crate) resumes: bool,
 }
 
 impl HaltMachine {
     pub(crate) const fn new() -> Self {
-        Self { state: State::Running, list: Vec::new(), unlisted: 0, resumes: false }
+        Self { state: HaltState::Running, list: Vec::new(), unlisted: 0, resumes: false }
     }
 
     /// Whether the commands are zero or ramp to zero.
     pub(crate) fn is_halted(&self) -> bool {
-        self.state != State::Running
+        self.state != HaltState::Running
     }
 
     /// Whether the commands wait for the operator to resume.
     pub(crate) fn is_stopped(&self) -> bool {
-        self.state == State::Stopped
-    }
-
-    /// Notes that the operator wants to resume.
-    pub(crate) const fn resume(&mut self) {
-        self.resumes = true;
-    }
-
-    /// Cancels a pending resume: the operator wants a stop.
-    pub(crate) const fn cancel_resume(&mut self) {
-        self.resumes = false;
-    }
-
-    /// Returns the halts so far, at most [`MAX_HALTS`].
-    pub(crate) fn list(&self) -> &[Halt] {
-        &self.list
+        self.state == HaltState::Stopped
     }
 
     /// Whether a trouble with that policy starts a halt or turns a hold into a stop.
     pub(crate) fn is_escalated_by(&self, policy: Policy) -> bool {
-        self.state == State::Running || self.state == State::Held && policy == Policy::Stop
+        self.state == HaltState::Running || self.state == HaltState::Held && policy == Policy::Stop
     }
 
     /// Starts a halt. Call it only if the policy [escalates](Self::is_escalated_by) the state.
@@ -84,7 +70,7 @@ impl HaltMachine {
         } else {
             self.unlisted += 1;
         }
-        self.state = if policy == Policy::Stop { State::Stopped } else { State::Held };
+        self.state = if policy == Policy::Stop { HaltState::Stopped } else { HaltState::Held };
     }
 
     /// Ends the halt if it can end after the tick at `now` [ns]. Returns whether the operator has resumed from a stop, so
@@ -93,16 +79,16 @@ impl HaltMachine {
         let resumes = std::mem::take(&mut self.resumes);
         let previous = self.state;
         match (previous, has_trouble) {
-            (State::Held, false) => self.state = State::Running,
-            (State::Stopped, false) if resumes => self.state = State::Running,
+            (HaltState::Held, false) => self.state = HaltState::Running,
+            (HaltState::Stopped, false) if resumes => self.state = HaltState::Running,
             // The trouble is not over yet, so the stop becomes a hold.
-            (State::Stopped, true) if resumes => self.state = State::Held,
+            (HaltState::Stopped, true) if resumes => self.state = HaltState::Held,
             _ => return false,
         }
-        if self.state == State::Running {
+        if self.state == HaltState::Running {
             self.end(now);
         }
-        previous == State::Stopped
+        previous == HaltState::Stopped
     }
 
     fn end(&mut self, now: i64) {
@@ -142,12 +128,12 @@ mod tests {
                     halts.halt(policy, fault());
                 }
                 if *resumes {
-                    halts.resume();
+                    halts.resumes = true;
                 }
                 halts.update(trouble.is_some(), 10);
                 assert_eq!(halts.is_halted(), *is_halted, "step {i} of {case:?}");
             }
-            assert!(halts.list().iter().all(|halt| halt.until.is_some()));
+            assert!(halts.list.iter().all(|halt| halt.until.is_some()));
         }
     }
 }

@@ -15,7 +15,7 @@ use super::outcome::{Outcome, RunOptions};
 use super::signals::interrupts;
 use super::trouble::panic_message;
 use crate::device::{DeviceError, link};
-use crate::engine::core::Link;
+use crate::engine::core::DeviceLink;
 use crate::fault::Fault;
 
 /// Runs until a device ends, the time is over, the task is done, the operator interrupts or a fault occurs; then the
@@ -56,13 +56,13 @@ impl<'a> RealTimePacer<'a> {
         let epoch = Instant::now();
         let (mut drivers, mut tasks) = (JoinSet::new(), Vec::new());
         for (i, device) in engine.devices.iter_mut().enumerate() {
-            device.link = match std::mem::replace(&mut device.link, Link::Gone) {
-                Link::Idle(driver) => {
+            device.link = match std::mem::replace(&mut device.link, DeviceLink::Gone) {
+                DeviceLink::Idle(driver) => {
                     tracing::info!("device `{}` starts", device.name);
                     let (theirs, ours) = link(&device.samples, &device.commands, epoch);
                     let task = drivers.spawn_on(driver.run(theirs), runtime.handle());
                     tasks.push((task.id(), i));
-                    Link::Live(ours)
+                    DeviceLink::Live(ours)
                 }
                 other => other,
             };
@@ -120,8 +120,8 @@ impl RealTimePacer<'_> {
     /// after `next` [ns].
     fn wait(&self, engine: &Engine, next: i64) -> (i64, i64) {
         let due = self.epoch + Duration::from_nanos(next.max(0) as u64);
-        let sampled = engine.devices.iter().enumerate().find_map(|(i, device)| match &device.link {
-            Link::Live(linked) if engine.schedule.is_clock(i) => Some(linked.sampled.clone()),
+        let sampled = engine.clock().and_then(|device| match &device.link {
+            DeviceLink::Live(linked) => Some(linked.sampled.clone()),
             _ => None,
         });
         let has_live_clock = sampled.is_some();
@@ -176,7 +176,7 @@ impl RealTimePacer<'_> {
             std::thread::sleep(LAST_COMMAND_DELAY);
         }
         for device in &engine.devices {
-            if let Link::Live(linked) = &device.link {
+            if let DeviceLink::Live(linked) = &device.link {
                 linked.stop.send_replace(true);
             }
         }

@@ -25,9 +25,17 @@ impl TickSchedule {
         self.period
     }
 
+    /// Returns the index of the clock device.
+    pub(crate) const fn clock_device(&self) -> Option<usize> {
+        match self.clock {
+            Clock::Device(device) => Some(device),
+            Clock::Rate => None,
+        }
+    }
+
     /// Whether the device with that index is the clock.
     pub(crate) fn is_clock(&self, device: usize) -> bool {
-        self.clock == Clock::Device(device)
+        self.clock_device() == Some(device)
     }
 
     /// Whether a timer replaces the clock device.

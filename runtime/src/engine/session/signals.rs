@@ -3,6 +3,8 @@
 use std::io;
 
 use tokio::runtime::{Builder, Runtime};
+#[cfg(unix)]
+use tokio::signal::unix::{SignalKind, signal};
 use tokio::sync::watch;
 
 /// Catches Ctrl-C and SIGTERM for callers that do not use [`run`](super::run). A second signal ends the process at once.
@@ -32,61 +34,31 @@ impl Interrupt {
 
 /// Returns a flag that becomes true at the first Ctrl-C or SIGTERM. A second signal ends the process at once.
 ///
-/// The handlers are installed before this returns: on a busy machine the spawned task may start later.
+/// The handlers are installed before this returns: on a busy machine the spawned tasks may start later.
 pub(crate) fn interrupts() -> io::Result<watch::Receiver<bool>> {
-    const EXIT_INTERRUPTED: i32 = 130;
     let (sender, receiver) = watch::channel(false);
-    let mut signals = Signals::catch()?;
-    tokio::spawn(async move {
-        while signals.next().await.is_ok() {
-            if sender.send_replace(true) {
-                std::process::exit(EXIT_INTERRUPTED);
+    #[cfg(unix)]
+    for kind in [SignalKind::interrupt(), SignalKind::terminate(), SignalKind::hangup()] {
+        let (mut signal, sender) = (signal(kind)?, sender.clone());
+        tokio::spawn(async move {
+            while signal.recv().await.is_some() {
+                interrupt(&sender);
             }
+        });
+    }
+    #[cfg(not(unix))]
+    tokio::spawn(async move {
+        while tokio::signal::ctrl_c().await.is_ok() {
+            interrupt(&sender);
         }
     });
     Ok(receiver)
 }
 
-#[cfg(unix)]
-struct Signals {
-    interrupt: tokio::signal::unix::Signal,
-    terminate: tokio::signal::unix::Signal,
-    /// The terminal has closed.
-    hangup: tokio::signal::unix::Signal,
-}
-
-#[cfg(unix)]
-impl Signals {
-    fn catch() -> io::Result<Self> {
-        use tokio::signal::unix::{SignalKind, signal};
-        Ok(Self {
-            interrupt: signal(SignalKind::interrupt())?,
-            terminate: signal(SignalKind::terminate())?,
-            hangup: signal(SignalKind::hangup())?,
-        })
-    }
-
-    async fn next(&mut self) -> io::Result<()> {
-        tokio::select! {
-            _ = self.interrupt.recv() => {}
-            _ = self.terminate.recv() => {}
-            _ = self.hangup.recv() => {}
-        }
-        Ok(())
-    }
-}
-
-#[cfg(not(unix))]
-struct Signals;
-
-#[cfg(not(unix))]
-#[expect(clippy::unnecessary_wraps, reason = "the same form as on unix")]
-impl Signals {
-    fn catch() -> io::Result<Self> {
-        Ok(Self)
-    }
-
-    async fn next(&mut self) -> io::Result<()> {
-        tokio::signal::ctrl_c().await
+/// Handles one signal.
+fn interrupt(sender: &watch::Sender<bool>) {
+    const EXIT_INTERRUPTED: i32 = 130;
+    if sender.send_replace(true) {
+        std::process::exit(EXIT_INTERRUPTED);
     }
 }

@@ -25,10 +25,8 @@ pub(crate) enum Trouble {
     Stale(usize),
     /// The value of a watched wire is too old.
     StaleWire(usize),
-    /// A sample of an inlet is not finite.
+    /// The value of a port, or the sample of its inlet, is not finite.
     NotFinite(usize),
-    /// The value of a port is not finite.
-    NotFiniteAt(usize),
     /// A node panicked, or waits for its reset.
     Panicked(usize),
     /// A device has failed.

@@ -3,10 +3,9 @@
 use std::ops::Range;
 
 use super::open::OpenedBench;
-use crate::graph::net::Net;
+use crate::graph::net::{Net, Resolved, report};
 use crate::graph::syntax::LIMITS;
-use crate::node::Spanned;
-use crate::source::{Code, Diagnostic, Diagnostics, Item, Value};
+use crate::source::{Code, Diagnostic, Diagnostics, Item, Table, Value};
 
 /// Replaces every `{ from = "role.fact" }` by the fact, and every `{ from = "limits.key" }` by the value in [limits].
 ///
@@ -17,58 +16,41 @@ pub(crate) fn fill_facts(
     opened: &OpenedBench,
     diagnostics: &mut Diagnostics,
 ) -> bool {
-    let span = value.span.clone();
-    let table = match &mut value.item {
-        Item::Array(items) => {
-            return items.iter_mut().fold(true, |good, item| fill_facts(item, net, opened, diagnostics) & good);
-        }
-        Item::Table(table) => table,
-        _ => return true,
+    let Some((word, place)) = value.as_table().and_then(Table::fact) else {
+        let mut fill = |item| fill_facts(item, net, opened, diagnostics);
+        return match &mut value.item {
+            Item::Array(items) => items.iter_mut().fold(true, |good, item| fill(item) & good),
+            Item::Table(table) => table.entries.iter_mut().fold(true, |good, (_, item)| fill(item) & good),
+            _ => true,
+        };
     };
-    let from = table.get("from").filter(|_| table.is_fact());
-    let word = from.and_then(|from| Some(Spanned { value: from.as_str()?.to_owned(), span: from.span.clone() }));
-    let Some(word) = word else {
-        return table
-            .entries
-            .iter_mut()
-            .fold(true, |good, (_, item)| fill_facts(item, net, opened, diagnostics) & good);
-    };
-    match find_fact(&word, &span, net, opened) {
-        Ok(Some(fact)) => *value = fact,
-        Ok(None) => return false,
-        Err(diagnostic) => {
-            diagnostics.push(*diagnostic);
-            return false;
-        }
-    }
-    true
+    let fact = find_fact(word, place, &value.span, net, opened);
+    report(fact, diagnostics).map(|fact| *value = fact).is_some()
 }
 
-/// Returns the fact that a word names, or `None` if another diagnostic explains why it is missing.
+/// Returns the fact that the word at `place` names, as a value at `span`.
 fn find_fact(
-    word: &Spanned<String>,
+    word: &str,
+    place: &Range<usize>,
     span: &Range<usize>,
     net: &Net<'_>,
     opened: &OpenedBench,
-) -> Result<Option<Value>, Box<Diagnostic>> {
-    let unknown = |message: String| Diagnostic::new(Code::UnknownFact, word.span.clone(), message);
-    let (role, name) = word.value.split_once('.').unwrap_or((&word.value, ""));
+) -> Resolved<Value> {
+    let (role, name) = word.split_once('.').unwrap_or((word, ""));
     if role == LIMITS {
         // A missing value is reported at the section.
-        return Ok(net.flat.limits.as_ref().and_then(|(_, table)| table.get(name)).cloned());
+        return net.flat.limits.as_ref().and_then(|(_, table)| table.get(name)).cloned().ok_or(None);
     }
     let roles = net.flat.role_names();
     let Some(index) = roles.clone().position(|known| known == role) else {
-        return Err(Box::new(unknown(format!("there is no role `{role}`")).suggest(role, roles, "roles")));
+        return Diagnostic::unknown(Code::UnknownFact, "role", role, place, roles).into_err();
     };
     // A device that could not be opened has its own diagnostic.
-    let Some(bound) = &opened.roles[index] else { return Ok(None) };
-    let facts = &bound.facts;
-    match facts.iter().find(|(fact, _)| fact == name) {
-        Some((_, value)) => Ok(Some(Value::from_toml(value, span))),
-        None => {
-            let message = format!("the device of role `{role}` has no fact `{name}`");
-            Err(Box::new(unknown(message).suggest(name, facts.iter().map(|(fact, _)| &**fact), "facts")))
-        }
-    }
+    let facts = &opened.roles[index].as_ref().ok_or(None)?.facts;
+    let Some((_, value)) = facts.iter().find(|(fact, _)| fact == name) else {
+        let message = format!("the device of role `{role}` has no fact `{name}`");
+        let unknown = Diagnostic::new(Code::UnknownFact, place.clone(), message);
+        return unknown.suggest(name, facts.iter().map(|(fact, _)| &**fact), "facts").into_err();
+    };
+    Ok(Value::from_toml(value, span))
 }

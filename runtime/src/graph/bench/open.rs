@@ -1,16 +1,17 @@
 //! Opens the devices to which the roles of a graph are bound.
 
 use std::borrow::Cow;
+use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 
 use crate::catalogue::Catalogue;
 use crate::device::{Description, StatedPort};
 use crate::graph::net::Net;
 use crate::graph::plan::PlannedDevice;
-use crate::graph::syntax::{Bench, Block};
+use crate::graph::syntax::{BenchDocument, Block, WireEntry};
 use crate::node::{Mistake, PortSpec, Reader, Spanned};
 use crate::signal::Shape;
-use crate::source::{Code, Diagnostic, Diagnostics, Key, SourceMap, Value, suggest_name};
+use crate::source::{Code, Diagnostic, Diagnostics, Key, SourceMap, Value, quoted, suggest_name};
 
 /// A role that is bound to a device. Ports are in the order of the role, each with its index in the device.
 #[derive(Debug, Clone)]
@@ -27,14 +28,17 @@ pub(crate) struct BoundRole {
 #[derive(Default)]
 pub(crate) struct OpenedBench {
     pub(crate) devices: Vec<PlannedDevice>,
-    /// Nominal sample period of each device [s].
-    pub(crate) periods: Vec<f64>,
     pub(crate) roles: Vec<Option<BoundRole>>,
     /// Roles for scenarios and recordings only, in the order of `Net::observed`.
     pub(crate) observed: Vec<Option<BoundRole>>,
 }
 
 impl OpenedBench {
+    /// Returns the nominal sample period of the device of a role [s].
+    pub(crate) fn period(&self, role: &BoundRole) -> f64 {
+        self.devices[role.device].description.period
+    }
+
     /// Returns the facts of the devices: `role.fact` and the value.
     pub(crate) fn facts(&self, net: &Net<'_>) -> Vec<(String, toml::Value)> {
         let observed = net.observed.iter().map(|(key, ..)| *key).zip(&self.observed);
@@ -50,14 +54,16 @@ pub(crate) fn open(net: &Net<'_>, sources: &mut SourceMap, diagnostics: &mut Dia
         catalogue: net.catalogue,
         sources,
         diagnostics,
-        names: Vec::new(),
+        tried: BTreeMap::new(),
         taken: Vec::new(),
         opened: OpenedBench::default(),
     };
     let bench = net.flat.bench.as_ref();
     if let Some(bench) = bench {
-        opener.check_types(bench);
-        opener.check_unused(bench, net);
+        let declared = net.flat.roles.iter().map(|(key, _)| key);
+        let roles = declared.chain(net.observed.iter().map(|(key, ..)| *key)).map(|key| key.name.as_str()).collect();
+        opener.check_unused_bindings(bench, &roles);
+        opener.check_devices(bench, &roles);
     }
     for (i, (key, kind)) in net.flat.roles.iter().enumerate() {
         let role = match bench {
@@ -81,43 +87,50 @@ struct Opener<'a> {
     catalogue: &'a Catalogue,
     sources: &'a mut SourceMap,
     diagnostics: &'a mut Vec<Diagnostic>,
-    /// Devices that were tried: their name, and index and description if they opened.
-    names: Vec<(String, Option<(usize, Description)>)>,
+    /// Devices that were tried, by name: their index if they opened.
+    tried: BTreeMap<String, Option<usize>>,
     /// Bindings so far: index of the device, index of the role among those it can fill, name of the role.
     taken: Vec<(usize, usize, String)>,
     opened: OpenedBench,
 }
 
 impl Opener<'_> {
-    /// Checks bindings and devices that no role uses; such devices are not opened.
-    fn check_unused(&mut self, bench: &Bench, net: &Net<'_>) {
-        let names = || bench.devices.iter().map(|device| device.key.name.as_str());
-        let is_used = |role: &Key| {
-            let declared = net.flat.roles.iter().map(|(key, _)| key);
-            declared.chain(net.observed.iter().map(|(key, ..)| *key)).any(|key| key.name == role.name)
-        };
-        // An unused binding may belong to another task, unless it looks like a role that only scenarios read.
-        let observed_names =
-            || self.catalogue.roles().iter().filter(|role| role.is_observed).map(|role| role.observed_name());
-        for (role, word) in bench.bind.iter().filter(|(role, _)| !is_used(role)) {
-            let is_right = self.catalogue.roles().iter().any(|known| known.is_observed_as(&role.name));
-            if let Some(name) = suggest_name(&role.name, observed_names()).filter(|_| !is_right) {
+    /// Checks the bindings that none of the `roles` uses.
+    ///
+    /// Such a binding may belong to another task, unless it looks like a role that only scenarios read.
+    fn check_unused_bindings(&mut self, bench: &BenchDocument, roles: &BTreeSet<&str>) {
+        let observed = || self.catalogue.roles().iter().filter(|role| role.is_observed);
+        for (role, word) in bench.bind.iter().filter(|(role, _)| !roles.contains(&*role.name)) {
+            let is_right = observed().any(|known| known.is_observed_as(&role.name));
+            let names = observed().map(|role| role.observed_name());
+            if let Some(name) = suggest_name(&role.name, names).filter(|_| !is_right) {
                 let message = format!("`{}` is not a role that scenarios read", role.name);
                 let diagnostic = Diagnostic::new(Code::ObservedRole, role.span.clone(), message);
                 self.diagnostics.push(diagnostic.help(format!("did you mean `{name}`?")));
             }
-            if !names().any(|name| name == word.value) {
+            if !bench.devices.iter().any(|device| device.key.name == word.value) {
                 self.diagnostics.push(unknown_device(word, bench));
             }
         }
+    }
+
+    /// Checks the types of all devices, and the parameters of those that are not opened because none of the `roles` uses
+    /// them.
+    fn check_devices(&mut self, bench: &BenchDocument, roles: &BTreeSet<&str>) {
         for device in &bench.devices {
-            let is_opened = bench.bind.iter().any(|(role, word)| word.value == device.key.name && is_used(role));
-            let kind = device.kind.as_ref().filter(|_| !is_opened);
-            let kind =
-                self.catalogue.devices().iter().find(|known| kind.is_some_and(|kind| known.name() == kind.value));
-            let (Some(kind), Some(table)) = (kind, device.params.as_table()) else { continue };
-            let params = kind.params();
-            for (key, _) in table.entries.iter().filter(|(key, _)| !params.iter().any(|param| param.name == key.name)) {
+            let Some(kind) = &device.kind else { continue };
+            let Some(known) = self.catalogue.find_device(&kind.value) else {
+                let names: Vec<_> = self.catalogue.devices().iter().map(|device| device.name()).collect();
+                let known = names.iter().map(|name| &**name);
+                let unknown = Diagnostic::unknown(Code::UnknownType, "device type", &kind.value, &kind.span, known);
+                self.diagnostics.push(unknown);
+                continue;
+            };
+            let mut bound = bench.bind.iter().filter(|(_, word)| word.value == device.key.name);
+            let is_opened = bound.any(|(role, _)| roles.contains(&*role.name));
+            let params = known.params();
+            let entries = device.params.as_table().filter(|_| !is_opened).into_iter().flat_map(|table| &table.entries);
+            for (key, _) in entries.filter(|(key, _)| !params.iter().any(|param| param.name == key.name)) {
                 let message = format!("`{}` is not a parameter here", key.name);
                 let diagnostic = Diagnostic::new(Code::UnknownKey, key.span.clone(), message);
                 let known = params.iter().map(|param| param.name);
@@ -126,44 +139,36 @@ impl Opener<'_> {
         }
     }
 
-    fn check_types(&mut self, bench: &Bench) {
-        for kind in bench.devices.iter().filter_map(|device| device.kind.as_ref()) {
-            if !self.catalogue.devices().iter().any(|device| device.name() == kind.value) {
-                let names: Vec<_> = self.catalogue.devices().iter().map(|device| device.name()).collect();
-                let message = format!("there is no device type `{}`", kind.value);
-                let diagnostic = Diagnostic::new(Code::UnknownType, kind.span.clone(), message);
-                let known = names.iter().map(|name| &**name);
-                self.diagnostics.push(diagnostic.suggest(&kind.value, known, "device types"));
-            }
-        }
-    }
-
-    fn role(&mut self, bench: &Bench, key: &Key, kind: &Spanned<String>) -> Option<BoundRole> {
+    fn role(&mut self, bench: &BenchDocument, key: &Key, kind: &Spanned<String>) -> Option<BoundRole> {
         let Some((_, word)) = bench.bind.iter().find(|(role, _)| role.name == key.name) else {
             let message = format!("the bench does not bind the role `{}`", key.name);
             let help = format!("add `{} = \"device\"` under [bind] in the bench", key.name);
             self.diagnostics.push(Diagnostic::new(Code::UnboundRole, key.span.clone(), message).help(help));
             return None;
         };
-        let (device, description) = self.device(bench, word)?;
+        let device = self.device(bench, word)?;
+        let description = &self.opened.devices[device].description;
         let is_free = |i: &usize| !self.taken.iter().any(|(d, filled, _)| (*d, filled) == (device, i));
         let mut fitting = (0..description.fills.len()).filter(|i| description.fills[*i].role == kind.value);
         let Some(fills) = fitting.clone().find(is_free) else {
             let by = fitting.next().and_then(|i| self.taken.iter().find(|(d, filled, _)| (*d, *filled) == (device, i)));
-            let message = match by {
-                Some((_, _, by)) => format!("device `{}` already fills the role `{by}`", word.value),
-                None => format!("device `{}` cannot fill the role `{}` of type `{}`", word.value, key.name, kind.value),
-            };
-            let roles: Vec<_> = description.fills.iter().map(|filled| format!("`{}`", filled.role)).collect();
-            let help = match by {
-                Some(_) => "bind each role to its own device".to_owned(),
-                None => format!("it can fill: {}", roles.join(", ")),
+            let roles = quoted(description.roles());
+            let (device, role) = (&word.value, &key.name);
+            let (message, help) = match by {
+                Some((_, _, by)) => (
+                    format!("device `{device}` already fills the role `{by}`"),
+                    "bind each role to its own device".into(),
+                ),
+                None => (
+                    format!("device `{device}` cannot fill the role `{role}` of type `{}`", kind.value),
+                    format!("it can fill: {roles}"),
+                ),
             };
             self.diagnostics.push(Diagnostic::new(Code::WrongRole, word.span.clone(), message).help(help));
             return None;
         };
         self.taken.push((device, fills, key.name.clone()));
-        let role = self.catalogue.roles().iter().find(|role| role.name == kind.value)?;
+        let role = self.catalogue.role_type(&kind.value)?;
         let number = |stated: &[StatedPort], declared: &[PortSpec]| {
             let port = |spec: &PortSpec| stated.iter().position(|port| port.fill == fills && port.name == spec.name);
             let port = |spec: &PortSpec| port(spec).map(|port| (port, stated[port].shape.clone()));
@@ -178,22 +183,22 @@ impl Opener<'_> {
         })
     }
 
-    fn device(&mut self, bench: &Bench, word: &Spanned<String>) -> Option<(usize, Description)> {
-        if let Some((_, opened)) = self.names.iter().find(|(name, _)| *name == word.value) {
-            return opened.clone();
+    fn device(&mut self, bench: &BenchDocument, word: &Spanned<String>) -> Option<usize> {
+        if let Some(opened) = self.tried.get(&word.value) {
+            return *opened;
         }
         let opened = self.open(bench, word);
-        self.names.push((word.value.clone(), opened.clone()));
+        self.tried.insert(word.value.clone(), opened);
         opened
     }
 
-    fn open(&mut self, bench: &Bench, word: &Spanned<String>) -> Option<(usize, Description)> {
+    fn open(&mut self, bench: &BenchDocument, word: &Spanned<String>) -> Option<usize> {
         let Some(block) = bench.devices.iter().find(|device| device.key.name == word.value) else {
             self.diagnostics.push(unknown_device(word, bench));
             return None;
         };
         let kind = block.kind.as_ref()?;
-        let device = self.catalogue.devices().iter().find(|device| device.name() == kind.value)?;
+        let device = self.catalogue.find_device(&kind.value)?;
         let mut reader = Reader::new(self.sources);
         let opened = device.open(&block.params, &mut reader);
         let mistakes = reader.mistakes;
@@ -210,9 +215,8 @@ impl Opener<'_> {
             return None;
         }
         let (name, span) = (word.value.clone(), block.key.span.clone());
-        self.opened.devices.push(PlannedDevice { name, driver, description: description.clone(), span });
-        self.opened.periods.push(period);
-        Some((self.opened.devices.len() - 1, description))
+        self.opened.devices.push(PlannedDevice { name, driver, description, span });
+        Some(self.opened.devices.len() - 1)
     }
 
     /// Reports where the ports of a device differ from those of its roles, and adds the reports that it does not read.
@@ -220,7 +224,7 @@ impl Opener<'_> {
         let before = self.diagnostics.len();
         for fill in 0..description.fills.len() {
             let name = description.fills[fill].role.clone();
-            let Some(role) = self.catalogue.roles().iter().find(|role| role.name == name) else { continue };
+            let Some(role) = self.catalogue.role_type(&name) else { continue };
             let misfits = description.misfits(fill, role);
             if !misfits.is_empty() {
                 let device = &block.key.name;
@@ -235,7 +239,7 @@ impl Opener<'_> {
     }
 }
 
-fn unknown_device(word: &Spanned<String>, bench: &Bench) -> Diagnostic {
+fn unknown_device(word: &Spanned<String>, bench: &BenchDocument) -> Diagnostic {
     let message = format!("the bench has no device `{}`", word.value);
     let known = bench.devices.iter().map(|device| device.key.name.as_str());
     Diagnostic::new(Code::UnknownDevice, word.span.clone(), message).suggest(&word.value, known, "devices")
@@ -245,7 +249,7 @@ fn unknown_device(word: &Spanned<String>, bench: &Bench) -> Diagnostic {
 pub(crate) fn place_mistakes(
     mistakes: Vec<Mistake>,
     block: &Value,
-    wires: &[(Key, Spanned<String>)],
+    wires: &[WireEntry],
     sources: &mut SourceMap,
     diagnostics: &mut Diagnostics,
 ) {
@@ -258,7 +262,7 @@ pub(crate) fn place_mistakes(
             At::Param(path) => find_spans(block, &path).map_or(block.span.clone(), |(_, value)| value),
             At::Key(path) => find_spans(block, &path).map_or(block.span.clone(), |(key, _)| key),
             At::Input(name) => {
-                wires.iter().find(|(key, _)| key.name == name).map_or(&block.span, |(_, w)| &w.span).clone()
+                wires.iter().find(|wire| wire.key.name == name).map_or(&block.span, |wire| &wire.from.span).clone()
             }
             At::Data { file, text, span } => {
                 notes.push((file.span.clone(), "the file is named here".to_owned()));

@@ -3,13 +3,12 @@
 use std::f64::consts::FRAC_PI_2;
 use std::ops::Range;
 
-use crate::graph::net::Net;
-use crate::graph::plan::{Condition, PlannedExit, Test, WatchedPort};
-use crate::graph::plan::{PlannedPort, PortRef};
-use crate::graph::syntax::{Exit, ExitKind, ModeBlock, PortState};
+use crate::graph::net::{Net, Resolved};
+use crate::graph::plan::{Condition, PlannedExit, PlannedPort, PortRef, Test, WatchedPort};
+use crate::graph::syntax::{ExitKind, ExitTable, ModeBlock, ModeExit, PortState};
 use crate::node::Spanned;
 use crate::signal::{Kind, Shape};
-use crate::source::{Code, Diagnostic, Diagnostics};
+use crate::source::{Code, Diagnostic, Diagnostics, quoted};
 
 /// What the exits of a mode refer to.
 pub(crate) struct ExitContext<'a> {
@@ -24,66 +23,218 @@ pub(crate) struct ExitContext<'a> {
     pub(crate) lost_after: i64,
 }
 
-/// Resolves the exits of a mode; exits with a mistake are left out.
-pub(crate) fn resolve_exits(
-    mode: &ModeBlock,
-    context: &ExitContext<'_>,
-    diagnostics: &mut Diagnostics,
-) -> Vec<PlannedExit> {
-    let mut planned = Vec::new();
-    for (kind, span, exit) in &mode.exits {
-        let to = target(*kind, span, exit, context, diagnostics);
-        let condition = condition(*kind, span, exit, context);
-        diagnostics.extend(misplaced_key(*kind, span, exit));
-        match condition {
-            Ok(Some((condition, text))) => {
-                let lasts = exit.for_ms.map_or(0, nanos);
-                let priority = exit.priority.unwrap_or(0);
-                if let Ok(to) = to {
-                    planned.push(PlannedExit { kind: *kind, to, condition, lasts, priority, text, span: span.clone() });
+impl ExitContext<'_> {
+    /// Resolves the exits of a mode; exits with a mistake are left out.
+    pub(crate) fn resolve(&self, mode: &ModeBlock, diagnostics: &mut Diagnostics) -> Vec<PlannedExit> {
+        let mut planned = Vec::new();
+        for exit in &mode.exits {
+            let ModeExit { kind, span, table } = exit;
+            diagnostics.extend(misplaced_key(exit));
+            match (self.target(exit), self.condition(exit)) {
+                (Ok(to), Ok((condition, text))) => planned.push(PlannedExit {
+                    kind: *kind,
+                    to,
+                    condition,
+                    lasts: table.for_ms.map_or(0, nanos),
+                    priority: table.priority.unwrap_or(0),
+                    text,
+                    span: span.clone(),
+                }),
+                (to, condition) => {
+                    let found = [to.err(), condition.err()].into_iter().flatten().flatten();
+                    diagnostics.extend(found.map(|diagnostic| *diagnostic));
                 }
             }
-            Ok(None) => {}
-            Err(diagnostic) => diagnostics.push(*diagnostic),
+        }
+        planned
+    }
+
+    /// Returns the index of the target mode, or `None` if the exit ends the run.
+    fn target(&self, ModeExit { kind, span, table }: &ModeExit) -> Resolved<Option<usize>> {
+        let has_target = matches!(kind, ExitKind::Go | ExitKind::OnLost);
+        match (&table.to, has_target) {
+            (Some(to), true) => {
+                let mode = self.modes.iter().position(|name| *name == to.value);
+                if mode.is_some() {
+                    return Ok(mode);
+                }
+                let known = self.modes.iter().copied();
+                Diagnostic::unknown(Code::UnknownMode, "mode", &to.value, &to.span, known).into_err()
+            }
+            (None, true) => {
+                let message = format!("`{}` has no target mode", kind.key());
+                bad_condition(span, message).help("add `to = \"MODE\"`").into_err()
+            }
+            (None, false) => Ok(None),
+            (Some(to), false) => {
+                let message = format!("`{}` ends the run and has no target mode", kind.key());
+                bad_condition(&to.span, message).help("remove `to`, or use `go`").into_err()
+            }
         }
     }
-    planned
+
+    /// Returns the condition of an exit and its text.
+    fn condition(&self, exit: &ModeExit) -> Resolved<(Condition, String)> {
+        let ModeExit { kind, span, table } = exit;
+        if *kind == ExitKind::OnLost {
+            return self.lost_condition(span, table);
+        }
+        match (&table.when, table.after_ms, table.after_travel_mm, &table.on) {
+            (Some(when), None, None, None) => self.port_condition(when, exit),
+            (None, Some(ms), None, None) => Ok((Condition::Elapsed(nanos(ms)), format!("{ms} ms have passed"))),
+            (None, None, Some(mm), None) => {
+                let pose = self.travel_pose(span, table)?;
+                Ok((Condition::Travel(pose, mm * 1e-3), format!("the sensor has moved {mm} mm")))
+            }
+            (None, None, None, Some(word)) => sent_condition(word),
+            (None, None, None, None) => {
+                let help = "add `when = \"node.port\"`, `after_ms`, `after_travel_mm` or `on = \"WORD\"`";
+                bad_condition(span, format!("`{}` has no condition", kind.key())).help(help).into_err()
+            }
+            _ => {
+                let help = "give each exit one condition, and several exits as a list: `[{ … }, { … }]`";
+                bad_condition(span, format!("`{}` has more than one condition", kind.key())).help(help).into_err()
+            }
+        }
+    }
+
+    fn lost_condition(&self, span: &Range<usize>, table: &ExitTable) -> Resolved<(Condition, String)> {
+        let others = table.when.is_some() || table.after_travel_mm.is_some() || table.on.is_some();
+        let (Some(of), false) = (&table.of, others) else {
+            let help = "write `on_lost = { of = \"node.port\", after_ms = 100, to = \"MODE\" }`";
+            let message = "`on_lost` needs one signal in `of`, and no other condition";
+            return bad_condition(span, message).help(help).into_err();
+        };
+        let (watched, name) = self.watched(of)?;
+        let after = table.after_ms.map_or(self.lost_after, nanos);
+        Ok((Condition::Lost(watched, after), format!("`{name}` is lost")))
+    }
+
+    /// Returns the pose whose travel is measured: the one in `of`, or the only one in the graph.
+    fn travel_pose(&self, span: &Range<usize>, table: &ExitTable) -> Resolved<PortRef> {
+        if let Some(of) = &table.of {
+            let source = self.net.resolve(0, of)?;
+            if self.net.port(source).kind == Kind::Pose {
+                return Ok(source);
+            }
+            let message = format!("`{}` is not a pose, and only a pose has a travel", of.value);
+            return bad_condition(&of.span, message).into_err();
+        }
+        match self.poses.as_slice() {
+            [one] => Ok(*one),
+            [] => bad_condition(span, "`after_travel_mm` needs a pose, and the graph has none").into_err(),
+            several => {
+                let names = quoted(several.iter().map(|source| self.net.port_name(*source)));
+                let help = format!("add `of = \"node.port\"`; poses here: {names}");
+                bad_condition(span, "the graph has several poses: `of` must name one").help(help).into_err()
+            }
+        }
+    }
+
+    /// Resolves a port or a feature of one, with its name as written.
+    fn watched(&self, word: &Spanned<String>) -> Resolved<(WatchedPort, String)> {
+        let (name, feature) = match word.value.match_indices('.').nth(1) {
+            Some((at, _)) => (&word.value[..at], Some(&word.value[at + 1..])),
+            None => (word.value.as_str(), None),
+        };
+        let source = self.net.resolve(0, &Spanned { value: name.to_owned(), span: word.span.clone() })?;
+        let Some(feature) = feature else { return Ok((WatchedPort { source, feature: None }, name.to_owned())) };
+        let unknown = |message: String| Diagnostic::new(Code::UnknownPort, word.span.clone(), message);
+        let shape = &(self.port)(source).ok_or(None)?.shape;
+        let Shape::Features(features) = shape else {
+            let kind = shape.kind().with_article();
+            return unknown(format!("`{name}` is {kind} and has no features")).into_err();
+        };
+        let Some(at) = features.names().position(|known| known == feature) else {
+            let message = format!("`{name}` has no feature `{feature}`");
+            return unknown(message).suggest(feature, features.names(), "features").into_err();
+        };
+        Ok((WatchedPort { source, feature: Some(at) }, format!("{name}.{feature}")))
+    }
+
+    fn port_condition(&self, when: &Spanned<String>, exit: &ModeExit) -> Resolved<(Condition, String)> {
+        let ModeExit { span, table, .. } = exit;
+        let (watched, name) = self.watched(when)?;
+        let kind = self.net.port(watched.source).kind;
+        let is_bounded = [table.above.is_some() || table.below.is_some(), table.within.is_some()];
+        if is_bounded.into_iter().chain([table.is.is_some()]).filter(|is| *is).count() > 1 {
+            let help = "`above` and `below` can be combined, `within` and `is` cannot";
+            return bad_condition(span, "the condition has more than one test").help(help).into_err();
+        }
+        let is_number = kind == Kind::Scalar || watched.feature.is_some();
+        let bad = |what: &str| bad_condition(&when.span, format!("`{name}` is {}{what}", kind.with_article()));
+        let state = match table.is {
+            Some(PortState::True | PortState::False) if kind != Kind::Flag => {
+                return bad(": only a flag is true or false").into_err();
+            }
+            Some(state) => state,
+            None if is_number => return self.number_condition(when, &name, watched, table),
+            None if is_bounded.contains(&true) => {
+                let help = "a bound needs a scalar, or one feature of a vector";
+                return bad(" and cannot be compared with a bound").help(help).into_err();
+            }
+            None if kind == Kind::Flag => PortState::True,
+            None => {
+                let help = "add `is = \"new\"`, `\"absent\"` or `\"present\"`";
+                return bad(": the condition needs `is`").help(help).into_err();
+            }
+        };
+        Ok((Condition::Port(watched, Test::Is(state)), format!("`{name}` is {}", state.word())))
+    }
+
+    /// Returns the condition of a bound, which must be neither always nor never true in the range of the port.
+    fn number_condition(
+        &self,
+        when: &Spanned<String>,
+        name: &str,
+        watched: WatchedPort,
+        &ExitTable { within, above, below, hysteresis, .. }: &ExitTable,
+    ) -> Resolved<(Condition, String)> {
+        let out_of_range = |message: String| Diagnostic::new(Code::BoundOutOfRange, when.span.clone(), message);
+        let (min, max, text) = match (within, above, below) {
+            (Some(size), ..) => (-size, size, format!("within {size}")),
+            (_, Some(min), None) => (min, f64::INFINITY, format!("above {min}")),
+            (_, None, Some(max)) => (f64::NEG_INFINITY, max, format!("below {max}")),
+            (_, Some(min), Some(max)) if min >= max => {
+                return out_of_range(format!("no number is above {min} and below {max}")).into_err();
+            }
+            (_, Some(min), Some(max)) => (min, max, format!("between {min} and {max}")),
+            (None, None, None) => {
+                let message = format!("`{name}` is a number: the condition needs a bound or `is`");
+                let help = "add `above`, `below` or `within`, or `is = \"new\"`, `\"absent\"` or `\"present\"`";
+                return bad_condition(&when.span, message).help(help).into_err();
+            }
+        };
+        if let Shape::Scalar(shape) = &(self.port)(watched.source).ok_or(None)?.shape {
+            let unit = shape.unit;
+            let [low, high] = if unit.is_axial() { [-FRAC_PI_2, FRAC_PI_2] } else { shape.range };
+            let (never, always) = (min >= high || max <= low, min < low && max > high);
+            if (never || always) && low < high {
+                let what = if never { "never" } else { "always" };
+                let range = format!("{} to {} {unit}", rounded(low), rounded(high));
+                return out_of_range(format!("`{name}` is {what} {text}: its range is {range}")).into_err();
+            }
+        }
+        let test = Test::Between { min, max, hysteresis: hysteresis.unwrap_or(0.0) };
+        Ok((Condition::Port(watched, test), format!("`{name}` is {text}")))
+    }
 }
 
 fn nanos(ms: f64) -> i64 {
     (ms * 1e6).round() as i64
 }
 
+/// Rounds a bound to four decimal places, for a message.
+fn rounded(bound: f64) -> f64 {
+    (bound * 1e4).round() / 1e4
+}
+
 fn bad_condition(span: &Range<usize>, message: impl Into<String>) -> Diagnostic {
     Diagnostic::new(Code::BadCondition, span.clone(), message)
 }
 
-/// Returns the index of the target mode, or `None` if the exit ends the run.
-fn target(
-    kind: ExitKind,
-    span: &Range<usize>,
-    exit: &Exit,
-    context: &ExitContext<'_>,
-    diagnostics: &mut Diagnostics,
-) -> Result<Option<usize>, ()> {
-    let has_target = matches!(kind, ExitKind::Go | ExitKind::OnLost);
-    let diagnostic = match (&exit.to, has_target) {
-        (Some(to), true) => match context.modes.iter().position(|name| *name == to.value) {
-            Some(mode) => return Ok(Some(mode)),
-            None => Diagnostic::new(Code::UnknownMode, to.span.clone(), format!("there is no mode `{}`", to.value))
-                .suggest(&to.value, context.modes.iter().copied(), "modes"),
-        },
-        (None, true) => bad_condition(span, format!("`{}` has no target mode", kind.key())).help("add `to = \"MODE\"`"),
-        (None, false) => return Ok(None),
-        (Some(to), false) => bad_condition(&to.span, format!("`{}` ends the run and has no target mode", kind.key()))
-            .help("remove `to`, or use `go`"),
-    };
-    diagnostics.push(diagnostic);
-    Err(())
-}
-
 /// Reports a key of an exit that its condition does not use.
-fn misplaced_key(kind: ExitKind, span: &Range<usize>, exit: &Exit) -> Option<Diagnostic> {
+fn misplaced_key(ModeExit { kind, span, table: exit }: &ModeExit) -> Option<Diagnostic> {
     let has_bound = exit.above.is_some() || exit.below.is_some() || exit.within.is_some();
     let is_on_port = exit.when.is_some();
     let cases = [
@@ -96,11 +247,11 @@ fn misplaced_key(kind: ExitKind, span: &Range<usize>, exit: &Exit) -> Option<Dia
             "`new` holds for one tick only: remove `for_ms`",
         ),
         (
-            exit.of.is_some() && kind != ExitKind::OnLost && exit.after_travel_mm.is_none(),
+            exit.of.is_some() && *kind != ExitKind::OnLost && exit.after_travel_mm.is_none(),
             "`of` needs `on_lost` or `after_travel_mm`",
         ),
         (
-            exit.priority.is_some() && kind != ExitKind::Go,
+            exit.priority.is_some() && *kind != ExitKind::Go,
             "`priority` is only for `go`: other exits have a fixed order",
         ),
     ];
@@ -108,216 +259,13 @@ fn misplaced_key(kind: ExitKind, span: &Range<usize>, exit: &Exit) -> Option<Dia
     Some(bad_condition(span, message))
 }
 
-/// Returns the condition of an exit and its text, or `None` if its port has mistakes of its own.
-fn condition(
-    kind: ExitKind,
-    span: &Range<usize>,
-    exit: &Exit,
-    context: &ExitContext<'_>,
-) -> Result<Option<(Condition, String)>, Box<Diagnostic>> {
-    if kind == ExitKind::OnLost {
-        return lost_condition(span, exit, context);
-    }
-    let given = [exit.when.is_some(), exit.after_ms.is_some(), exit.after_travel_mm.is_some(), exit.on.is_some()];
-    match given.iter().filter(|is| **is).count() {
-        1 => {}
-        0 => {
-            let help = "add `when = \"node.port\"`, `after_ms`, `after_travel_mm` or `on = \"WORD\"`";
-            return Err(Box::new(bad_condition(span, format!("`{}` has no condition", kind.key())).help(help)));
-        }
-        _ => {
-            let help = "give each exit one condition, and several exits as a list: `[{ … }, { … }]`";
-            return Err(Box::new(
-                bad_condition(span, format!("`{}` has more than one condition", kind.key())).help(help),
-            ));
-        }
-    }
-    if let Some(when) = &exit.when {
-        return port_condition(when, span, exit, context);
-    }
-    if let Some(ms) = exit.after_ms {
-        return Ok(Some((Condition::Elapsed(nanos(ms)), format!("{} ms have passed", ms))));
-    }
-    if let Some(mm) = exit.after_travel_mm {
-        let source = travel_pose(span, exit, context)?;
-        let text = format!("the sensor has moved {} mm", mm);
-        return Ok(source.map(|source| (Condition::Travel(source, mm * 1e-3), text)));
-    }
-    let word = exit.on.as_ref().expect("one of them is given");
+fn sent_condition(word: &Spanned<String>) -> Resolved<(Condition, String)> {
     if word.value.trim() != word.value || word.value.is_empty() {
-        return Err(Box::new(bad_condition(&word.span, "the word of `on` is empty, or starts or ends with a space")));
+        return bad_condition(&word.span, "the word of `on` is empty, or starts or ends with a space").into_err();
     }
     if ["stop", "resume"].contains(&word.value.as_str()) {
         let help = "`stop` halts the run and `resume` continues it: choose another word";
-        return Err(Box::new(bad_condition(&word.span, format!("the word `{}` is reserved", word.value)).help(help)));
+        return bad_condition(&word.span, format!("the word `{}` is reserved", word.value)).help(help).into_err();
     }
-    Ok(Some((Condition::Sent(word.value.clone()), format!("`{}` was sent", word.value))))
-}
-
-fn lost_condition(
-    span: &Range<usize>,
-    exit: &Exit,
-    context: &ExitContext<'_>,
-) -> Result<Option<(Condition, String)>, Box<Diagnostic>> {
-    let others = exit.when.is_some() || exit.after_travel_mm.is_some() || exit.on.is_some();
-    let (Some(of), false) = (&exit.of, others) else {
-        let help = "write `on_lost = { of = \"node.port\", after_ms = 100, to = \"MODE\" }`";
-        return Err(Box::new(
-            bad_condition(span, "`on_lost` needs one signal in `of`, and no other condition").help(help),
-        ));
-    };
-    let Some((watched, name)) = resolve_watched(of, context)? else { return Ok(None) };
-    let after = exit.after_ms.map_or(context.lost_after, nanos);
-    let text = format!("`{name}` is lost");
-    Ok(Some((Condition::Lost(watched, after), text)))
-}
-
-/// Returns the pose whose travel is measured: the one in `of`, or the only one in the graph.
-fn travel_pose(
-    span: &Range<usize>,
-    exit: &Exit,
-    context: &ExitContext<'_>,
-) -> Result<Option<PortRef>, Box<Diagnostic>> {
-    if let Some(of) = &exit.of {
-        let source = context.net.resolve(0, of)?;
-        let is_pose = source.is_none_or(|source| context.net.port(source).kind == Kind::Pose);
-        let message = format!("`{}` is not a pose, and only a pose has a travel", of.value);
-        return if is_pose { Ok(source) } else { Err(Box::new(bad_condition(&of.span, message))) };
-    }
-    match context.poses.as_slice() {
-        [one] => Ok(Some(*one)),
-        [] => Err(Box::new(bad_condition(span, "`after_travel_mm` needs a pose, and the graph has none"))),
-        several => {
-            let names: Vec<String> =
-                several.iter().map(|source| format!("`{}`", context.net.port_name(*source))).collect();
-            let help = format!("add `of = \"node.port\"`; poses here: {}", names.join(", "));
-            Err(Box::new(bad_condition(span, "the graph has several poses: `of` must name one").help(help)))
-        }
-    }
-}
-
-/// Resolves a port or a feature of one, with its name; returns `None` if its node has mistakes of its own.
-fn resolve_watched(
-    word: &Spanned<String>,
-    context: &ExitContext<'_>,
-) -> Result<Option<(WatchedPort, String)>, Box<Diagnostic>> {
-    let (port, feature) = match word.value.match_indices('.').nth(1) {
-        Some((at, _)) => {
-            (Spanned { value: word.value[..at].into(), span: word.span.clone() }, Some(&word.value[at + 1..]))
-        }
-        None => (word.clone(), None),
-    };
-    let Some(source) = context.net.resolve(0, &port)? else { return Ok(None) };
-    // The name as written in the file.
-    let name = port.value.clone();
-    let Some(feature) = feature else { return Ok(Some((WatchedPort { source, feature: None }, name))) };
-    let Some(planned) = (context.port)(source) else { return Ok(None) };
-    let Shape::Features(shape) = &planned.shape else {
-        let message = format!("`{name}` is {} and has no features", planned.shape.kind().with_article());
-        return Err(Box::new(Diagnostic::new(Code::UnknownPort, word.span.clone(), message)));
-    };
-    match shape.names().position(|known| known == feature) {
-        Some(at) => Ok(Some((WatchedPort { source, feature: Some(at) }, format!("{name}.{feature}")))),
-        None => {
-            let message = format!("`{name}` has no feature `{feature}`");
-            let diagnostic = Diagnostic::new(Code::UnknownPort, word.span.clone(), message);
-            Err(Box::new(diagnostic.suggest(feature, shape.names(), "features")))
-        }
-    }
-}
-
-fn port_condition(
-    when: &Spanned<String>,
-    span: &Range<usize>,
-    exit: &Exit,
-    context: &ExitContext<'_>,
-) -> Result<Option<(Condition, String)>, Box<Diagnostic>> {
-    let Some((watched, name)) = resolve_watched(when, context)? else { return Ok(None) };
-    let kind = context.net.port(watched.source).kind;
-    let bounds = [exit.above.is_some() || exit.below.is_some(), exit.within.is_some(), exit.is.is_some()];
-    if bounds.iter().filter(|is| **is).count() > 1 {
-        let help = "`above` and `below` can be combined, `within` and `is` cannot";
-        return Err(Box::new(bad_condition(span, "the condition has more than one test").help(help)));
-    }
-    let is_number = kind == Kind::Scalar || watched.feature.is_some();
-    let test = match exit.is {
-        Some(PortState::New) => Test::New,
-        Some(PortState::Absent) => Test::Absent,
-        Some(PortState::Present) => Test::Present,
-        Some(is @ (PortState::True | PortState::False)) if kind == Kind::Flag => Test::Flag(is == PortState::True),
-        Some(PortState::True | PortState::False) => {
-            let message = format!("`{name}` is {}: only a flag is true or false", kind.with_article());
-            return Err(Box::new(bad_condition(&when.span, message)));
-        }
-        None if is_number => return number_condition(when, &name, watched, exit, context),
-        None if bounds[0] || bounds[1] => {
-            let message = format!("`{name}` is {} and cannot be compared with a bound", kind.with_article());
-            return Err(Box::new(
-                bad_condition(&when.span, message).help("a bound needs a scalar, or one feature of a vector"),
-            ));
-        }
-        None if kind == Kind::Flag => Test::Flag(true),
-        None => {
-            let message = format!("`{name}` is {}: the condition needs `is`", kind.with_article());
-            return Err(Box::new(
-                bad_condition(&when.span, message).help("add `is = \"new\"`, `\"absent\"` or `\"present\"`"),
-            ));
-        }
-    };
-    let text = match test {
-        Test::New => format!("`{name}` is new"),
-        Test::Absent => format!("`{name}` is absent"),
-        Test::Present => format!("`{name}` is present"),
-        Test::Flag(true) => format!("`{name}` is true"),
-        _ => format!("`{name}` is false"),
-    };
-    Ok(Some((Condition::Port(watched, test), text)))
-}
-
-/// Rounds a bound to four decimal places, for a message.
-fn rounded(bound: f64) -> f64 {
-    (bound * 1e4).round() / 1e4
-}
-
-/// Returns the condition of a bound, which must be neither always nor never true in the range of the port.
-fn number_condition(
-    when: &Spanned<String>,
-    name: &str,
-    watched: WatchedPort,
-    exit: &Exit,
-    context: &ExitContext<'_>,
-) -> Result<Option<(Condition, String)>, Box<Diagnostic>> {
-    let (min, max) = match exit.within {
-        Some(size) => (-size, size),
-        None => (exit.above.unwrap_or(f64::NEG_INFINITY), exit.below.unwrap_or(f64::INFINITY)),
-    };
-    if exit.within.is_none() && exit.above.is_none() && exit.below.is_none() {
-        let message = format!("`{name}` is a number: the condition needs a bound or `is`");
-        let help = "add `above`, `below` or `within`, or `is = \"new\"`, `\"absent\"` or `\"present\"`";
-        return Err(Box::new(bad_condition(&when.span, message).help(help)));
-    }
-    if min >= max && exit.within.is_none() {
-        let message = format!("no number is above {min} and below {max}");
-        return Err(Box::new(Diagnostic::new(Code::BoundOutOfRange, when.span.clone(), message)));
-    }
-    let text = match (exit.within, exit.above, exit.below) {
-        (Some(size), ..) => format!("within {}", size),
-        (_, Some(above), None) => format!("above {above}"),
-        (_, None, Some(below)) => format!("below {below}"),
-        _ => format!("between {min} and {max}"),
-    };
-    let Some(planned) = (context.port)(watched.source) else { return Ok(None) };
-    if let Shape::Scalar(shape) = &planned.shape {
-        let unit = shape.unit;
-        let [low, high] = if unit.is_axial() { [-FRAC_PI_2, FRAC_PI_2] } else { shape.range };
-        let (never, always) = (min >= high || max <= low, min < low && max > high);
-        if (never || always) && low < high {
-            let what = if never { "never" } else { "always" };
-            let message =
-                format!("`{name}` is {what} {text}: its range is {} to {} {unit}", rounded(low), rounded(high));
-            return Err(Box::new(Diagnostic::new(Code::BoundOutOfRange, when.span.clone(), message)));
-        }
-    }
-    let (hysteresis, text) = (exit.hysteresis.map_or(0.0, |by| by), format!("`{name}` is {text}"));
-    Ok(Some((Condition::Port(watched, Test::Between { min, max, hysteresis }), text)))
+    Ok((Condition::Sent(word.value.clone()), format!("`{}` was sent", word.value)))
 }

@@ -2,13 +2,12 @@
 
 use std::collections::BTreeMap;
 
-use super::conditions::{ExitContext, resolve_exits};
+use super::conditions::ExitContext;
 use super::demand::{Demand, find_demand};
 use super::nodes::Builder;
 use crate::graph::check::live;
 use crate::graph::load::{Entity, FlatGraph};
-use crate::graph::plan::{PlannedExit, PlannedMode, PlannedNode};
-use crate::graph::plan::{PlannedPort, PortRef, Producer};
+use crate::graph::plan::{PlannedExit, PlannedMode, PlannedNode, PlannedPort, PortRef};
 use crate::graph::syntax::{ModeBlock, default_max_age_ns};
 use crate::node::Built;
 use crate::signal::Kind;
@@ -42,7 +41,13 @@ pub(crate) fn build_modes(builder: &mut Builder<'_>, nodes: &mut [PlannedNode]) 
         let mut variants = variants(block, builder);
         let variant = |index: usize| variants.get(&index).map(|variant| &*variant.node);
         let demand = find_demand(builder.net, &|index| variant(index).or_else(|| Some(&*find(nodes, index)?.node)));
-        rebuild(builder, nodes, &base, &demand, &mut variants);
+        // A node whose parameters the mode does not set is built again if other components of its outputs are read.
+        let differs = |index: &usize| base[*index] != demand[*index] && !variants.contains_key(index);
+        let differing: Vec<usize> = nodes.iter().map(|node| node.index).filter(differs).collect();
+        for index in differing {
+            let built = builder.variant(index, &flat.nodes[index].block.params);
+            variants.extend(built.map(|built| (index, built)));
+        }
         for (index, variant) in &mut variants {
             variant.node.want(&demand[*index]);
         }
@@ -63,18 +68,15 @@ fn find(nodes: &[PlannedNode], index: usize) -> Option<&PlannedNode> {
 fn exits(block: &ModeBlock, builder: &mut Builder<'_>, nodes: &[PlannedNode]) -> Vec<PlannedExit> {
     let ports = &builder.ports;
     let port = |source: PortRef| -> Option<&PlannedPort> { ports.get(&source) };
-    let poses = nodes.iter().flat_map(|node| {
-        let ports = node.ports.iter().enumerate().filter(|(_, port)| port.shape.kind() == Kind::Pose);
-        ports.map(|(port, _)| PortRef { producer: Producer::Node(node.index), port })
-    });
+    let poses = nodes.iter().flat_map(PlannedNode::outputs).filter(|(_, port)| port.shape.kind() == Kind::Pose);
     let context = ExitContext {
         net: builder.net,
         modes: builder.net.flat.mode_names().collect(),
         port: &port,
-        poses: poses.collect(),
+        poses: poses.map(|(source, _)| source).collect(),
         lost_after: default_max_age_ns(builder.period),
     };
-    resolve_exits(block, &context, &mut builder.diagnostics)
+    context.resolve(block, &mut builder.diagnostics)
 }
 
 /// Builds the nodes whose parameters a mode sets.
@@ -125,22 +127,6 @@ fn collect_tables(
                 let diagnostic = unknown(format!("there is no node or part `{}`", key.name));
                 diagnostics.push(diagnostic.suggest(&key.name, known, "nodes and parts"));
             }
-        }
-    }
-}
-
-/// Builds the nodes whose parameters a mode does not set, but whose demand differs from that of the base graph.
-fn rebuild(
-    builder: &mut Builder<'_>,
-    nodes: &[PlannedNode],
-    base: &Demand,
-    demand: &Demand,
-    variants: &mut BTreeMap<usize, Built>,
-) {
-    for index in nodes.iter().map(|node| node.index) {
-        if base[index] != demand[index] && !variants.contains_key(&index) {
-            let params = builder.net.flat.nodes[index].block.params.clone();
-            variants.extend(builder.variant(index, &params).map(|built| (index, built)));
         }
     }
 }

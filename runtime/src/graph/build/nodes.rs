@@ -2,23 +2,21 @@
 
 use std::collections::BTreeMap;
 
-use crate::graph::bench::fill_facts;
-use crate::graph::bench::{BoundRole, OpenedBench, place_mistakes};
+use crate::graph::bench::{BoundRole, OpenedBench, fill_facts, place_mistakes};
 use crate::graph::check::frames::Frames;
 use crate::graph::check::units::{UnitMismatch, Units};
 use crate::graph::net::{CommandWire, Net, WireOrigin};
-use crate::graph::plan::{PlannedCommand, PlannedNode, PlannedReport, PlannedRole, PlannedWire};
-use crate::graph::plan::{PlannedPort, PortRef, Producer};
+use crate::graph::plan::{PlannedCommand, PlannedNode, PlannedPort, PlannedRole, PlannedWire, PortRef, Producer};
 use crate::graph::syntax::{AgeLimit, Policy, PolicyTable, default_max_age_ns};
 use crate::node::{Built, Configured, Given, Need, NodeSpec, PortSpec, Reader, frame_args};
-use crate::signal::{FlagShape, Kind, Shape};
-use crate::source::{Code, Diagnostic, Diagnostics, SourceMap, Value};
+use crate::signal::{FlagShape, Joint, Kind, Shape};
+use crate::source::{Code, Diagnostic, Diagnostics, Key, SourceMap, Value};
 
 /// Builds the nodes one after the other and collects their diagnostics.
 pub(crate) struct Builder<'a> {
     pub(crate) net: &'a Net<'a>,
     opened: &'a OpenedBench,
-    frames: Frames,
+    frames: Frames<'a>,
     pub(crate) diagnostics: Diagnostics,
     sources: SourceMap,
     /// Nominal time between two ticks [s].
@@ -36,7 +34,7 @@ impl<'a> Builder<'a> {
     pub(crate) fn new(
         net: &'a Net<'a>,
         opened: &'a OpenedBench,
-        frames: Frames,
+        frames: Frames<'a>,
         (diagnostics, sources): (Diagnostics, SourceMap),
         period: f64,
     ) -> Self {
@@ -54,7 +52,7 @@ impl<'a> Builder<'a> {
 
 impl Builder<'_> {
     fn add_port(&mut self, source: PortRef, shape: Shape) -> PlannedPort {
-        let frames = self.frames.of(self.net, source);
+        let frames = self.frames.of(source);
         let port = PlannedPort { name: self.net.port_name(source), shape, frames };
         self.ports.insert(source, port.clone());
         port
@@ -70,39 +68,35 @@ impl Builder<'_> {
 
     /// Plans the roles, with their age limits.
     pub(crate) fn plan_roles(&self, policy: &PolicyTable) -> Vec<PlannedRole> {
-        let role = |(i, bound): (usize, &Option<BoundRole>)| {
+        let plan = |key: &Key, bound: &BoundRole, ports, age, is_observed| PlannedRole {
+            name: key.name.clone(),
+            device: bound.device,
+            numbers: bound.outputs.iter().map(|(number, _)| *number).collect(),
+            ports,
+            age,
+            is_observed,
+            period: (self.opened.period(bound) * 1e9) as i64,
+        };
+        let declared = self.net.flat.roles.iter().zip(&self.opened.roles).enumerate();
+        let declared = declared.filter_map(|(i, ((key, _), bound))| {
             let bound = bound.as_ref()?;
             let source = |port| PortRef { producer: Producer::Role(i), port };
             let ports = (0..bound.outputs.len()).map(|port| self.ports[&source(port)].clone()).collect();
-            let name = self.net.flat.roles[i].0.name.clone();
-            let period = self.opened.periods[bound.device];
-            let age = policy.age_limit(&name, period);
-            let (device, numbers, period) = (bound.device, numbers(bound), (period * 1e9) as i64);
-            Some(PlannedRole { name, device, numbers, ports, age, is_observed: false, period })
-        };
-        let declared = self.opened.roles.iter().enumerate().filter_map(role);
-        declared.chain(self.plan_observed_roles()).collect()
-    }
-
-    /// Plans the roles for scenarios and recordings only; the age of their samples does not matter.
-    fn plan_observed_roles(&self) -> impl Iterator<Item = PlannedRole> {
-        self.net.observed.iter().zip(&self.opened.observed).filter_map(|((key, _, role), bound)| {
+            Some(plan(key, bound, ports, policy.age_limit(&key.name, self.opened.period(bound)), false))
+        });
+        // The age of a sample for scenarios and recordings does not matter.
+        let ageless = AgeLimit { max_age: i64::MAX, stale: Policy::Count };
+        let observed = self.net.observed.iter().zip(&self.opened.observed).filter_map(|((key, _, role), bound)| {
             let bound = bound.as_ref()?;
             let port = |(spec, (_, shape)): (&PortSpec, &(usize, Shape))| PlannedPort {
                 name: format!("{}.{}", key.name, spec.name),
                 shape: shape.clone(),
                 frames: frame_args(spec).iter().map(|_| Some(key.name.clone())).collect(),
             };
-            Some(PlannedRole {
-                name: key.name.clone(),
-                device: bound.device,
-                numbers: numbers(bound),
-                ports: role.outputs.iter().zip(&bound.outputs).map(port).collect(),
-                age: AgeLimit { max_age: i64::MAX, stale: Policy::Count },
-                is_observed: true,
-                period: (self.opened.periods[bound.device] * 1e9) as i64,
-            })
-        })
+            let ports = role.outputs.iter().zip(&bound.outputs).map(port).collect();
+            Some(plan(key, bound, ports, ageless, true))
+        });
+        declared.chain(observed).collect()
     }
 
     /// Builds a node, or returns `None` if it or its wires have mistakes.
@@ -114,7 +108,7 @@ impl Builder<'_> {
             spec.inputs.iter().map(|input| (input.need, Vec::new())).collect();
         let mut given = Given { inputs: vec![Vec::new(); spec.inputs.len()], period: self.period };
         let mut units = Units::default();
-        let mut is_complete = wires.len() == node.block.wires.len();
+        let mut is_complete = wires.len() == node.block.wires.valid.len();
         for wire in wires {
             let input = &spec.inputs[wire.input];
             inputs[wire.input].1.push(PlannedWire {
@@ -146,14 +140,7 @@ impl Builder<'_> {
         if !is_complete || inputs.iter().any(missing) || self.frames.has_clash(index) {
             return None;
         }
-        let built = match configured?.build(given.clone()) {
-            Ok(built) => built,
-            Err(mistakes) => {
-                let block = &node.block;
-                place_mistakes(mistakes, &params, &block.wires, &mut self.sources, &mut self.diagnostics);
-                return None;
-            }
-        };
+        let built = self.build(index, configured, &params, given.clone())?;
         let mut ports = Vec::new();
         for (port, (mut shape, output)) in built.outputs.into_iter().zip(&spec.outputs).enumerate() {
             units.give(output, &format!("{}.{}", node.name, output.name), &mut shape);
@@ -184,15 +171,8 @@ impl Builder<'_> {
     pub(crate) fn variant(&mut self, index: usize, params: &Value) -> Option<Built> {
         let (kind, spec) = self.net.nodes[index]?;
         let (given, _) = self.built.get(&index)?.clone();
-        let block = &self.net.flat.nodes[index].block;
         let (configured, params) = self.configure(kind, params);
-        let mut built = match configured?.build(given) {
-            Ok(built) => built,
-            Err(mistakes) => {
-                place_mistakes(mistakes, &params, &block.wires, &mut self.sources, &mut self.diagnostics);
-                return None;
-            }
-        };
+        let mut built = self.build(index, configured, &params, given)?;
         let name = &self.net.flat.nodes[index].name;
         for (port, (shape, output)) in built.outputs.iter_mut().zip(&spec.outputs).enumerate() {
             self.units.get_mut(&index)?.give(output, &format!("{name}.{}", output.name), shape);
@@ -221,6 +201,19 @@ impl Builder<'_> {
         let is_valid = mistakes.is_empty();
         place_mistakes(mistakes, &params, &[], &mut self.sources, &mut self.diagnostics);
         (configured.filter(|_| is_valid), params)
+    }
+
+    /// Builds a node from its parameters and the shapes on its wires, or reports its mistakes.
+    fn build(
+        &mut self,
+        index: usize,
+        configured: Option<Box<dyn Configured>>,
+        params: &Value,
+        given: Given,
+    ) -> Option<Built> {
+        let wires = &self.net.flat.nodes[index].block.wires.valid;
+        let built = configured?.build(given);
+        built.map_err(|mistakes| place_mistakes(mistakes, params, wires, &mut self.sources, &mut self.diagnostics)).ok()
     }
 
     /// Suggests a node that converts any unit into that unit per second, for an input that takes only rates.
@@ -253,55 +246,35 @@ impl Builder<'_> {
         }
     }
 
-    /// Plans a command, or returns `None` if its wire has a mistake.
+    /// Plans a command or a report, or returns `None` if its wire has a mistake.
     pub(crate) fn command(&mut self, wire: &CommandWire) -> Option<PlannedCommand> {
         let bound = self.opened.roles[wire.role].as_ref()?;
-        let port = self.command_source(wire)?;
-        let (spec, (command, takes)) = (self.net.command_port(wire), &bound.commands[wire.command]);
-        let (has, wants) = (joint_names(&port.shape), joint_names(takes));
-        if has != wants {
-            let consumer = self.net.command_name(wire);
+        let port = self.ports.get(&wire.source)?;
+        let (spec, consumer) = (self.net.command_port(wire), self.net.command_name(wire));
+        if let Err(mismatch) = Units::default().take(spec, &consumer, &port.shape) {
+            self.diagnostics.push(unit_mismatch(port, &consumer, &mismatch, &wire.origin));
+            return None;
+        }
+        let (number, takes) = &(if wire.is_report { &bound.reports } else { &bound.commands })[wire.command];
+        let (given, moved) = (joints(&port.shape), joints(takes));
+        let names = |joints: &[Joint]| joints.iter().map(|joint| joint.name.clone()).collect::<Vec<_>>();
+        let (has, wants) = (names(given), names(moved));
+        if !wire.is_report && has != wants {
             let message = format!("`{}` has the joints {has:?}, but `{consumer}` takes {wants:?}", port.name);
             self.diagnostics.push(wire.origin.diagnostic(Code::ShapeMismatch, message));
             return None;
         }
-        let accelerations = accelerations(&port.shape).zip(accelerations(takes)).map(|(a, b)| a.min(b)).collect();
         Some(PlannedCommand {
             source: wire.source,
             device: bound.device,
-            command: *command,
+            is_report: wire.is_report,
+            port: *number,
             name: [self.net.flat.roles[wire.role].0.name.clone(), spec.name.to_string()],
+            shape: port.shape.clone(),
             age: self.age_limit(wire),
             span: wire.origin.word.span.clone(),
-            accelerations,
+            accelerations: given.iter().zip(moved).map(|(a, b)| a.acceleration.min(b.acceleration)).collect(),
         })
-    }
-
-    /// Plans a report, or returns `None` if its wire has a mistake.
-    pub(crate) fn report(&mut self, wire: &CommandWire) -> Option<PlannedReport> {
-        let bound = self.opened.roles[wire.role].as_ref()?;
-        Some(PlannedReport {
-            source: wire.source,
-            shape: self.command_source(wire)?.shape,
-            device: bound.device,
-            report: bound.reports[wire.command].0,
-            name: [self.net.flat.roles[wire.role].0.name.clone(), self.net.command_port(wire).name.to_string()],
-            age: self.age_limit(wire),
-            span: wire.origin.word.span.clone(),
-        })
-    }
-
-    /// Returns the port at the start of a command wire, if its unit is accepted.
-    fn command_source(&mut self, wire: &CommandWire) -> Option<PlannedPort> {
-        let port = self.ports.get(&wire.source)?;
-        let consumer = self.net.command_name(wire);
-        match Units::default().take(self.net.command_port(wire), &consumer, &port.shape) {
-            Ok(()) => Some(port.clone()),
-            Err(mismatch) => {
-                self.diagnostics.push(unit_mismatch(port, &consumer, &mismatch, &wire.origin));
-                None
-            }
-        }
     }
 
     /// Returns the age limit of a command wire; the default is five periods of the graph.
@@ -310,24 +283,11 @@ impl Builder<'_> {
     }
 }
 
-/// Returns the index of each output of a role among those of its device.
-fn numbers(bound: &BoundRole) -> Vec<usize> {
-    bound.outputs.iter().map(|(number, _)| *number).collect()
-}
-
-/// Returns the maximum acceleration of each joint [rad/s²].
-fn accelerations(shape: &Shape) -> impl Iterator<Item = f64> {
-    let joints = match shape {
-        Shape::Joints(shape) => shape.joints.as_slice(),
-        _ => &[],
-    };
-    joints.iter().map(|joint| joint.acceleration)
-}
-
-fn joint_names(shape: &Shape) -> Vec<&str> {
+/// Returns the joints of a joint vector; other shapes have none.
+fn joints(shape: &Shape) -> &[Joint] {
     match shape {
-        Shape::Joints(shape) => shape.joints.iter().map(|joint| joint.name.as_str()).collect(),
-        _ => Vec::new(),
+        Shape::Joints(shape) => &shape.joints,
+        _ => &[],
     }
 }
 

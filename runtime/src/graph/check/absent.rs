@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use crate::graph::net::Net;
 use crate::graph::plan::{Condition, PlannedMode, PortRef, Producer, Test, WatchedPort};
+use crate::graph::syntax::PortState;
 use crate::node::Components;
 use crate::source::{Code, Diagnostic, Diagnostics};
 
@@ -28,7 +29,11 @@ pub(crate) fn check(
             if is_read || !freezes.get(&node).copied().unwrap_or(false) {
                 continue;
             }
-            let what = if matches!(exit.condition, Condition::Port(_, Test::Absent)) { "always" } else { "never" };
+            let what = if matches!(exit.condition, Condition::Port(_, Test::Is(PortState::Absent))) {
+                "always"
+            } else {
+                "never"
+            };
             let name = exit.text.split('`').nth(1).unwrap_or_default();
             let message = format!(
                 "nothing reads `{name}` in mode `{}`, so it is absent there and this condition {what} holds",

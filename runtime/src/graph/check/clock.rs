@@ -2,43 +2,37 @@
 
 use crate::graph::bench::OpenedBench;
 use crate::graph::load::FlatGraph;
-use crate::graph::net::Net;
+use crate::graph::net::{Net, Resolved, report};
 use crate::graph::plan::Clock;
 use crate::source::{Code, Diagnostic, Diagnostics};
 
 /// Returns what triggers the ticks and the period [s], or reports why there is no clock.
 pub(crate) fn check(net: &Net<'_>, opened: &OpenedBench, diagnostics: &mut Diagnostics) -> Option<(Clock, f64)> {
-    let (clock, period) = match find_clock(net.flat, opened) {
-        Ok(clock) => clock?,
-        Err(diagnostic) => {
-            diagnostics.push(*diagnostic);
-            return None;
-        }
-    };
+    let (clock, period) = report(find_clock(net.flat, opened), diagnostics)?;
     diagnostics.extend(short_gap(net.flat, period));
     Some((clock, period))
 }
 
-fn find_clock(flat: &FlatGraph, opened: &OpenedBench) -> Result<Option<(Clock, f64)>, Box<Diagnostic>> {
+fn find_clock(flat: &FlatGraph, opened: &OpenedBench) -> Resolved<(Clock, f64)> {
     // An invalid section [graph] has its own diagnostic.
-    let Some(table) = &flat.table else { return Ok(None) };
+    let table = flat.table.as_ref().ok_or(None)?;
     let (message, span, help) = match (&table.clock, table.rate_hz) {
-        (None, Some(rate)) => return Ok(Some((Clock::Rate, 1.0 / rate))),
+        (None, Some(rate)) => return Ok((Clock::Rate, 1.0 / rate)),
         (Some(word), None) => {
             let Some(role) = flat.role_names().position(|name| name == word.value) else {
                 let message = format!("the clock `{}` is not a role", word.value);
                 let diagnostic = Diagnostic::new(Code::BadClock, word.span.clone(), message);
-                return Err(Box::new(diagnostic.suggest(&word.value, flat.role_names(), "roles")));
+                return diagnostic.suggest(&word.value, flat.role_names(), "roles").into_err();
             };
-            let bound = opened.roles.get(role).and_then(Option::as_ref);
-            return Ok(bound.map(|bound| (Clock::Device(bound.device), opened.periods[bound.device])));
+            let bound = opened.roles.get(role).and_then(Option::as_ref).ok_or(None)?;
+            return Ok((Clock::Device(bound.device), opened.period(bound)));
         }
         (Some(word), Some(_)) => ("the graph has two clocks", &word.span, "keep `clock` or `rate_hz`"),
         (None, None) => {
             ("the graph has no clock", &flat.place, "add `clock = \"role\"` or `rate_hz = 250` under [graph]")
         }
     };
-    Err(Box::new(Diagnostic::new(Code::BadClock, span.clone(), message).help(help)))
+    Diagnostic::new(Code::BadClock, span.clone(), message).help(help).into_err()
 }
 
 fn short_gap(flat: &FlatGraph, period: f64) -> Option<Diagnostic> {

@@ -15,7 +15,8 @@ pub(crate) fn check(net: &Net<'_>, diagnostics: &mut Diagnostics) {
                     roles().filter_map(|(_, kind)| *kind).flat_map(|kind| kind.commands.iter().chain(&kind.reports));
                 !ports.any(|port| port.name == driven.name) && (role.name == key.name || roles().next().is_none())
             };
-            if !net.flat.commands.iter().any(|(role, driven, _)| is_driven(role, driven) || is_misspelt(role, driven)) {
+            if !net.flat.commands.iter().any(|(role, wire)| is_driven(role, &wire.key) || is_misspelt(role, &wire.key))
+            {
                 let message = format!("nothing drives `{}.{}`", key.name, command.name);
                 let port = net.find_candidate(0, usize::MAX, command).unwrap_or_else(|| "node.port".into());
                 let help = format!("add `{}.{} = \"{port}\"` under [commands]", key.name, command.name);

@@ -12,8 +12,8 @@ use crate::signal::Kind;
 use crate::source::{Code, Diagnostic, Diagnostics};
 
 /// The frame variables of all nodes, and the frames to which they are bound.
-#[derive(Debug, Default)]
-pub(crate) struct Frames {
+pub(crate) struct Frames<'a> {
+    net: &'a Net<'a>,
     variables: BTreeMap<(Producer, String), usize>,
     parents: Vec<usize>,
     known: Vec<Option<String>>,
@@ -24,15 +24,16 @@ pub(crate) struct Frames {
 /// Unifies the frames of all wires, and reports wires in the wrong frame.
 ///
 /// The most constrained wires are unified first (poses before twists), so that the error is reported on the wrong wire.
-pub(crate) fn check(net: &Net<'_>, diagnostics: &mut Diagnostics) -> Frames {
-    let mut frames = Frames::default();
+pub(crate) fn check<'a>(net: &'a Net<'a>, diagnostics: &mut Diagnostics) -> Frames<'a> {
+    let (variables, clashes) = (BTreeMap::new(), BTreeSet::new());
+    let mut frames = Frames { net, variables, parents: Vec::new(), known: Vec::new(), clashes };
     for &node in &net.order {
         let mut wires: Vec<&Wire> = net.wires[node].iter().collect();
         wires.sort_by_key(|wire| rank(net.port(wire.source).kind));
         for wire in wires {
             let consumer = format!("{}.{}", net.flat.nodes[node].name, wire.key.name);
             let end = WireTarget { owner: Producer::Node(node), port: net.input(node, wire), name: consumer };
-            if let Some(clash) = frames.wire(net, wire.source, &wire.origin, &end) {
+            if let Some(clash) = frames.wire(wire.source, &wire.origin, &end) {
                 frames.clashes.insert(node);
                 diagnostics.push(clash);
             }
@@ -41,79 +42,66 @@ pub(crate) fn check(net: &Net<'_>, diagnostics: &mut Diagnostics) -> Frames {
     for wire in &net.commands {
         let end =
             WireTarget { owner: Producer::Role(wire.role), port: net.command_port(wire), name: net.command_name(wire) };
-        diagnostics.extend(frames.wire(net, wire.source, &wire.origin, &end));
+        diagnostics.extend(frames.wire(wire.source, &wire.origin, &end));
     }
     frames
 }
 
-impl Frames {
+impl Frames<'_> {
     /// Returns whether a wire of the node is in the wrong frame, so that the node cannot be built.
     pub(crate) fn has_clash(&self, node: usize) -> bool {
         self.clashes.contains(&node)
     }
 
     /// Returns the frames of an output, `None` for those that are unknown.
-    pub(crate) fn of(&mut self, net: &Net<'_>, source: PortRef) -> Vec<Option<String>> {
-        self.known(net, source.producer, net.port(source))
+    pub(crate) fn of(&mut self, source: PortRef) -> Vec<Option<String>> {
+        self.known(source.producer, self.net.port(source))
     }
 
-    fn wire(
-        &mut self,
-        net: &Net<'_>,
-        source: PortRef,
-        origin: &WireOrigin,
-        end: &WireTarget<'_>,
-    ) -> Option<Diagnostic> {
-        let port = net.port(source);
-        let (has, takes) = (self.known(net, source.producer, port), self.known(net, end.owner, end.port));
+    fn wire(&mut self, source: PortRef, origin: &WireOrigin, end: &WireTarget<'_>) -> Option<Diagnostic> {
+        let port = self.net.port(source);
+        let (has, takes) = (self.known(source.producer, port), self.known(end.owner, end.port));
         let clash = has.iter().zip(&takes).any(|(a, b)| matches!((a, b), (Some(a), Some(b)) if a != b));
         if clash {
-            let (from, kind) = (net.port_name(source), port.kind);
+            let (from, kind) = (self.net.port_name(source), port.kind);
             let message =
                 format!("`{from}` is {}, but `{}` takes {}", describe(kind, &has), end.name, describe(kind, &takes));
-            let help = self.suggest_conversion(net, kind, &has, &takes, origin);
+            let help = self.suggest_conversion(kind, [has.first()?.clone(), takes.first()?.clone()], origin);
             return Some(origin.diagnostic(Code::FrameMismatch, message).with_help(help));
         }
         for (a, b) in frame_args(port).iter().zip(frame_args(end.port)) {
-            let (a, b) = (self.variable(net, source.producer, a), self.variable(net, end.owner, b));
+            let (a, b) = (self.variable(source.producer, a), self.variable(end.owner, b));
             self.join(a, b);
         }
         None
     }
 
     /// Suggests a node that converts from one frame to the other.
-    fn suggest_conversion(
-        &mut self,
-        net: &Net<'_>,
-        kind: Kind,
-        has: &[Option<String>],
-        takes: &[Option<String>],
-        origin: &WireOrigin,
-    ) -> Option<String> {
-        let (spec, input, pose) = net.catalogue.specs().find_map(|spec| {
+    fn suggest_conversion(&mut self, kind: Kind, wanted: [Option<String>; 2], origin: &WireOrigin) -> Option<String> {
+        let (spec, input, pose) = self.net.catalogue.specs().find_map(|spec| {
             let input = spec.inputs.iter().find(|input| input.kind == kind)?;
             let output = spec.outputs.iter().find(|output| output.kind == kind)?;
             let pose = spec.inputs.iter().find(|input| input.kind == Kind::Pose)?;
             let is_converter = *pose.args == [input.args[0].clone(), output.args[0].clone()];
             is_converter.then_some((spec, input, pose))
         })?;
-        let wanted = [has.first()?.clone(), takes.first()?.clone()];
-        let article = if spec.name.starts_with(['a', 'e', 'i', 'o']) { "an" } else { "a" };
-        let name = &spec.name;
-        let Some(source) = self.find_pose(net, &wanted).and_then(|source| net.name_in(origin.scope, source)) else {
+        let (name, converter) = (&spec.name, with_article(&spec.name));
+        let pose_port = self.find_pose(&wanted).and_then(|source| self.net.name_in(origin.scope, source));
+        let Some(source) = pose_port else {
             let [from, to] = wanted.map(|frame| frame.unwrap_or_else(|| "?".into()));
             return Some(format!(
-                "insert {article} `{name}` between them, with a pose of `{from}` in `{to}`, which no node outputs yet"
+                "insert {converter} between them, with a pose of `{from}` in `{to}`, which no node outputs yet"
             ));
         };
         let (twist, from) = (&input.name, &origin.word.value);
         Some(format!(
-            "insert {article} `{name}` between them:\n[nodes.{name}]\ntype = \"{name}\"\nin.{twist} = \"{from}\"\nin.{} = \"{source}\"",
+            "insert {converter} between them:\n[nodes.{name}]\ntype = \"{name}\"\nin.{twist} = \"{from}\"\nin.{} = \"{source}\"",
             pose.name,
         ))
     }
 
-    fn find_pose(&mut self, net: &Net<'_>, wanted: &[Option<String>]) -> Option<PortRef> {
+    fn find_pose(&mut self, wanted: &[Option<String>]) -> Option<PortRef> {
+        let net = self.net;
         let nodes = (0..net.nodes.len()).map(Producer::Node);
         let sources: Vec<PortRef> = nodes
             .flat_map(|producer| {
@@ -122,25 +110,26 @@ impl Frames {
                 poses.map(move |(port, _)| PortRef { producer, port }).collect::<Vec<_>>()
             })
             .collect();
-        sources.into_iter().find(|source| self.of(net, *source) == wanted)
+        sources.into_iter().find(|source| self.of(*source) == wanted)
     }
 
-    fn known(&mut self, net: &Net<'_>, owner: Producer, port: &PortSpec) -> Vec<Option<String>> {
+    fn known(&mut self, owner: Producer, port: &PortSpec) -> Vec<Option<String>> {
         let args = frame_args(port).to_vec();
         args.iter()
             .map(|arg| {
-                let variable = self.variable(net, owner, arg);
+                let variable = self.variable(owner, arg);
                 let root = self.root(variable);
                 self.known[root].clone()
             })
             .collect()
     }
 
-    fn variable(&mut self, net: &Net<'_>, owner: Producer, arg: &str) -> usize {
+    fn variable(&mut self, owner: Producer, arg: &str) -> usize {
         let key = (owner, arg.to_owned());
         if let Some(variable) = self.variables.get(&key) {
             return *variable;
         }
+        let net = self.net;
         let is_letter = arg.len() == 1 && arg.starts_with(|c: char| c.is_ascii_uppercase());
         let known = match (arg, arg.strip_prefix('$'), owner) {
             ("self", _, _) => Some(net.name(owner).to_owned()),
@@ -201,6 +190,12 @@ const fn rank(kind: Kind) -> u8 {
         Kind::Image | Kind::Mask | Kind::Regions => 3,
         _ => 4,
     }
+}
+
+/// Formats the type of a node with its article.
+pub(super) fn with_article(name: &str) -> String {
+    let article = if name.starts_with(['a', 'e', 'i', 'o', 'u']) { "an" } else { "a" };
+    format!("{article} `{name}`")
 }
 
 /// Describes a kind with its frames, for a message.

@@ -1,20 +1,15 @@
 //! Checks that every required input has a wire.
 
 use crate::graph::net::Net;
-use crate::source::{Code, Diagnostic, Diagnostics, Key, suggest_name};
+use crate::source::{Code, Diagnostic, Diagnostics};
 
 /// Reports each required input without a wire.
 pub(crate) fn check(net: &Net<'_>, diagnostics: &mut Diagnostics) {
     for (i, node) in net.flat.nodes.iter().enumerate() {
         let Some(spec) = net.spec(i) else { continue };
-        let names = || spec.inputs.iter().map(|input| &*input.name);
+        let names = spec.inputs.iter().map(|input| &*input.name);
         for input in spec.inputs.iter().filter(|input| input.need.must_be_wired) {
-            // A misspelt input has its own diagnostic.
-            let is_misspelt = |key: &Key| {
-                !names().any(|name| name == key.name) && suggest_name(&key.name, names()) == Some(&input.name)
-            };
-            let mut wired = node.block.wires.iter().map(|(key, _)| key).chain(&node.block.invalid);
-            if !wired.any(|key| key.name == input.name || is_misspelt(key)) {
+            if node.block.wires.lack(&input.name, names.clone()) {
                 let (key, name) = (&node.block.key, &input.name);
                 let message = format!("`{}` needs a wire to `in.{name}`, {}", key.name, input.kind.with_article());
                 let port = net.find_candidate(node.scope, i, input);

@@ -7,7 +7,7 @@ use crate::graph::load::FlatGraph;
 use crate::graph::net::Net;
 use crate::graph::syntax::LIMITS;
 use crate::node::ParamSpec;
-use crate::source::{Code, Diagnostic, Diagnostics, Item, Value};
+use crate::source::{Code, Diagnostic, Diagnostics, quoted};
 
 /// A reference to a value of the section, as `{ from = "limits.KEY" }`.
 struct LimitRef<'a> {
@@ -27,7 +27,12 @@ pub(crate) fn check(net: &Net<'_>, diagnostics: &mut Diagnostics) {
         let specs = net.spec(i).map_or(&[][..], |spec| &spec.params);
         let entries = node.block.params.as_table().into_iter().flat_map(|table| &table.entries);
         for (key, value) in entries {
-            collect(value, specs.iter().find(|spec| spec.name == key.name), &mut refs);
+            let spec = specs.iter().find(|spec| spec.name == key.name);
+            let limits = value.facts().into_iter().filter_map(|(fact, span)| match fact.split_once('.')? {
+                (LIMITS, key) => Some(LimitRef { key: key.to_owned(), span: span.clone(), spec }),
+                _ => None,
+            });
+            refs.extend(limits);
         }
     }
     let given = || net.flat.limits.iter().flat_map(|(_, table)| &table.entries);
@@ -57,10 +62,10 @@ fn missing(flat: &FlatGraph, refs: &[LimitRef<'_>]) -> Option<Diagnostic> {
         let doc = limit.spec.map(ParamSpec::doc_with_unit).unwrap_or_default();
         format!("\n{} = …   # {}", limit.key, doc.trim_end_matches('.'))
     });
-    let names: Vec<String> = missing.iter().map(|limit| format!("`{}`", limit.key)).collect();
+    let names = quoted(missing.iter().map(|limit| &limit.key));
     let (span, message) = match &flat.limits {
-        Some((span, _)) => (span.clone(), format!("[limits] lacks {}", names.join(", "))),
-        None => (flat.place.clone(), format!("the graph has no section [limits]; it needs {}", names.join(", "))),
+        Some((span, _)) => (span.clone(), format!("[limits] lacks {names}")),
+        None => (flat.place.clone(), format!("the graph has no section [limits]; it needs {names}")),
     };
     let diagnostic = Diagnostic::new(Code::MissingLimit, span, message).note(first.span.clone(), "used here");
     Some(diagnostic.help(format!("add under [limits]:{}", lines.collect::<String>())))
@@ -83,19 +88,4 @@ fn unit_mismatch(limit: &LimitRef<'_>) -> Option<Diagnostic> {
     let is_known = UNITS.iter().any(|(_, unit)| *unit == takes);
     let message = format!("`{}` is in {has}, but `{}` takes {takes}", limit.key, spec.name);
     (is_known && takes != *has).then(|| Diagnostic::new(Code::UnitMismatch, limit.span.clone(), message))
-}
-
-/// Collects the references to [limits] in a value.
-fn collect<'a>(value: &Value, spec: Option<&'a ParamSpec>, refs: &mut Vec<LimitRef<'a>>) {
-    match &value.item {
-        Item::Array(items) => items.iter().for_each(|item| collect(item, spec, refs)),
-        Item::Table(table) if table.is_fact() => {
-            let from = table.get("from").expect("a fact has the key `from`");
-            if let Some((LIMITS, key)) = from.as_str().and_then(|text| text.split_once('.')) {
-                refs.push(LimitRef { key: key.to_owned(), span: from.span.clone(), spec });
-            }
-        }
-        Item::Table(table) => table.entries.iter().for_each(|(_, item)| collect(item, spec, refs)),
-        _ => {}
-    }
 }

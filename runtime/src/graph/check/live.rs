@@ -1,12 +1,11 @@
 //! Checks that a mode sets only live parameters.
 
 use crate::node::NodeSpec;
-use crate::source::{Code, Diagnostic, Diagnostics, Table};
+use crate::source::{Code, Diagnostic, Diagnostics, Table, quoted};
 
 /// Reports each entry that a mode cannot set of a node, and removes it.
 pub(crate) fn check(spec: &NodeSpec, node: &str, set: &mut Table, diagnostics: &mut Diagnostics) {
-    let live = spec.params.iter().filter(|param| param.is_live).map(|param| format!("`{}`", param.name));
-    let live = live.collect::<Vec<_>>().join(", ");
+    let live = quoted(spec.params.iter().filter(|param| param.is_live).map(|param| param.name));
     set.entries.retain(|(key, _)| {
         let param = spec.params.iter().find(|param| param.name == key.name);
         let message = match (key.name.as_str(), param) {

@@ -6,11 +6,10 @@
 use std::collections::BTreeSet;
 
 use crate::graph::net::{Net, Wire};
-use crate::graph::plan::Producer;
-use crate::graph::plan::{Condition, PlannedExit, PlannedMode};
+use crate::graph::plan::{Condition, PlannedExit, PlannedMode, Producer};
 use crate::graph::syntax::{ExitKind, ModeBlock};
 use crate::signal::Kind;
-use crate::source::{Code, Diagnostic, Diagnostics};
+use crate::source::{Code, Diagnostic, Diagnostics, quoted};
 
 /// Reports generated motion that nothing ends, in a mode or in a graph without modes.
 ///
@@ -109,8 +108,7 @@ fn report_in_graph(net: &Net<'_>, generators: &[usize], diagnostics: &mut Diagno
 
 /// Reports the generators of a mode.
 fn report_in_mode(net: &Net<'_>, generators: &[usize], block: &ModeBlock) -> Diagnostic {
-    let names = generators.iter().map(|node| format!("`{}`", net.flat.nodes[*node].name));
-    let names = names.collect::<Vec<_>>().join(", ");
+    let names = quoted(generators.iter().map(|node| &net.flat.nodes[*node].name));
     let mode = &block.key.name;
     let message = format!("in mode `{mode}` the arm moves without a gate, and nothing ends the motion of {names}");
     let bound =

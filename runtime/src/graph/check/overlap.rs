@@ -2,7 +2,7 @@
 
 use crate::graph::net::Net;
 use crate::graph::plan::{Condition, PlannedExit, PlannedMode, Test};
-use crate::graph::syntax::ExitKind;
+use crate::graph::syntax::{ExitKind, PortState};
 use crate::source::{Code, Diagnostic, Diagnostics};
 
 /// Reports two `go` of a mode that can hold in one tick with the same priority.
@@ -45,10 +45,11 @@ fn excludes(a: &Condition, b: &Condition) -> bool {
 }
 
 fn are_apart(a: Test, b: Test) -> bool {
+    use PortState::{Absent, False, True};
     match (a, b) {
-        (Test::Absent, Test::Absent) => false,
-        (Test::Absent, _) | (_, Test::Absent) => true,
-        (Test::Flag(a), Test::Flag(b)) => a != b,
+        (Test::Is(Absent), Test::Is(Absent)) => false,
+        (Test::Is(Absent), _) | (_, Test::Is(Absent)) => true,
+        (Test::Is(True), Test::Is(False)) | (Test::Is(False), Test::Is(True)) => true,
         (Test::Between { min: a, max: b, hysteresis: h }, Test::Between { min: c, max: d, hysteresis: k }) => {
             b + h <= c - k || d + k <= a - h
         }
@@ -65,12 +66,12 @@ mod tests {
         let between = |min, max, hysteresis| Test::Between { min, max, hysteresis };
         let (low, high) = (f64::NEG_INFINITY, f64::INFINITY);
         let cases = [
-            (Test::Flag(true), Test::Flag(false), true),
-            (Test::Flag(true), Test::Flag(true), false),
-            (Test::Absent, Test::Flag(false), true),
-            (Test::Absent, Test::Absent, false),
-            (Test::New, Test::Present, false),
-            (Test::New, between(1.0, high, 0.0), false),
+            (Test::Is(PortState::True), Test::Is(PortState::False), true),
+            (Test::Is(PortState::True), Test::Is(PortState::True), false),
+            (Test::Is(PortState::Absent), Test::Is(PortState::False), true),
+            (Test::Is(PortState::Absent), Test::Is(PortState::Absent), false),
+            (Test::Is(PortState::New), Test::Is(PortState::Present), false),
+            (Test::Is(PortState::New), between(1.0, high, 0.0), false),
             (between(2.0, high, 0.0), between(low, 1.0, 0.0), true),
             (between(2.0, high, 0.6), between(low, 1.0, 0.6), false),
             (between(2.0, high, 0.0), between(low, 3.0, 0.0), false),

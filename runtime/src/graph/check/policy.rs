@@ -9,9 +9,8 @@ pub(crate) fn check(net: &Net<'_>, diagnostics: &mut Diagnostics) {
     let roles = section.as_table().and_then(|table| table.get("roles")).and_then(Value::as_table);
     for (key, _) in roles.iter().flat_map(|table| &table.entries) {
         if !net.flat.role_names().any(|role| role == key.name) {
-            let message = format!("there is no role `{}`", key.name);
-            let diagnostic = Diagnostic::new(Code::UnknownKey, key.span.clone(), message);
-            diagnostics.push(diagnostic.suggest(&key.name, net.flat.role_names(), "roles"));
+            let known = net.flat.role_names();
+            diagnostics.push(Diagnostic::unknown(Code::UnknownKey, "role", &key.name, &key.span, known));
         }
     }
 }

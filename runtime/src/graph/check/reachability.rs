@@ -32,9 +32,7 @@ fn find_start(net: &Net<'_>, diagnostics: &mut Diagnostics) -> Option<usize> {
     };
     let start = names.clone().position(|name| name == word.value);
     if start.is_none() {
-        let message = format!("there is no mode `{}`", word.value);
-        let diagnostic = Diagnostic::new(Code::UnknownMode, word.span.clone(), message);
-        diagnostics.push(diagnostic.suggest(&word.value, names, "modes"));
+        diagnostics.push(Diagnostic::unknown(Code::UnknownMode, "mode", &word.value, &word.span, names));
     }
     start
 }

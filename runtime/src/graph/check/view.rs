@@ -3,9 +3,8 @@
 use std::collections::BTreeMap;
 use std::ops::Range;
 
-use crate::graph::net::Net;
-use crate::graph::plan::{PlannedNode, PlannedShow, PlannedView};
-use crate::graph::plan::{PlannedPort, PortRef, Producer};
+use crate::graph::net::{Net, report};
+use crate::graph::plan::{PlannedNode, PlannedPort, PlannedShow, PlannedView, PortRef, Producer};
 use crate::node::Spanned;
 use crate::signal::{Kind, Unit};
 use crate::source::{Code, Diagnostic, Diagnostics};
@@ -22,7 +21,7 @@ pub(crate) fn check(net: &Net<'_>, diagnostics: &mut Diagnostics) -> RequestedVi
     let table = net.flat.table.as_ref();
     let mut seen: Vec<PortRef> = Vec::new();
     let mut show = |word: &Spanned<String>| {
-        let source = net.resolve_or_report(0, word, diagnostics)?;
+        let source = report(net.resolve(0, word), diagnostics)?;
         let kind = net.port(source).kind;
         let diagnostic = |code: Code, message: String| Diagnostic::new(code, word.span.clone(), message);
         if !can_be_shown(kind) {
@@ -41,7 +40,7 @@ pub(crate) fn check(net: &Net<'_>, diagnostics: &mut Diagnostics) -> RequestedVi
     let ports = words.map(|words| words.iter().filter_map(&mut show).collect());
     let mark = table.and_then(|table| table.mark.as_ref()).map_or(&[][..], |mark| &mark[..]);
     let mark = mark.iter().filter_map(|word| {
-        let source = net.resolve_or_report(0, word, diagnostics)?;
+        let source = report(net.resolve(0, word), diagnostics)?;
         let kind = net.port(source).kind;
         if kind != Kind::Scalar {
             let message = format!("`{}` is {}, but `mark` takes scalars", word.value, kind.with_article());
@@ -98,11 +97,8 @@ fn default_ports(nodes: &[PlannedNode], ports: &BTreeMap<PortRef, PlannedPort>) 
     let is_role = |source: &PortRef| matches!(source.producer, Producer::Role(_));
     let of_kind = |kind: Kind| move |source: &PortRef| ports.get(source).is_some_and(|port| port.shape.kind() == kind);
     let roles: Vec<PortRef> = ports.keys().copied().filter(is_role).collect();
-    let of_node = |node: &PlannedNode| {
-        let producer = Producer::Node(node.index);
-        (0..node.ports.len()).map(move |port| PortRef { producer, port })
-    };
-    let all: Vec<PortRef> = nodes.iter().flat_map(of_node).chain(roles.iter().copied()).collect();
+    let of_nodes = nodes.iter().flat_map(PlannedNode::outputs).map(|(source, _)| source);
+    let all: Vec<PortRef> = of_nodes.chain(roles.iter().copied()).collect();
     let mut shown: Vec<PortRef> = roles.iter().copied().filter(of_kind(Kind::Image)).collect();
     let Some(kind) = KINDS.into_iter().find(|kind| all.iter().any(of_kind(*kind))) else { return shown };
     let mut count = 0;

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::ops::Range;
 
-use crate::graph::syntax::{AgeLimit, Bench, Block, GraphTable, ModeBlock, PolicyTable};
+use crate::graph::syntax::{BenchDocument, Block, GraphTable, ModeBlock, PolicyTable, WireEntry};
 use crate::node::Spanned;
 use crate::source::{Key, Table, Value};
 
@@ -23,7 +23,7 @@ pub(crate) struct Scope {
     /// Inputs that the part declares, with their documentation.
     pub(crate) declared: Vec<(Key, Spanned<String>)>,
     /// Wires into the part, in the scope of its parent.
-    pub(crate) inputs: Vec<(Key, Spanned<String>)>,
+    pub(crate) inputs: Vec<WireEntry>,
     pub(crate) parent: Option<usize>,
 }
 
@@ -46,15 +46,13 @@ pub(crate) struct FlatGraph {
     pub(crate) roles: Vec<(Key, Spanned<String>)>,
     pub(crate) nodes: Vec<FlatNode>,
     pub(crate) scopes: Vec<Scope>,
-    pub(crate) commands: Vec<(Key, Key, Spanned<String>)>,
+    pub(crate) commands: Vec<(Key, WireEntry)>,
     /// The section [limits] and its span.
     pub(crate) limits: Option<(Range<usize>, Table)>,
     pub(crate) modes: Vec<ModeBlock>,
     /// The section [policy] as written, and parsed if it is valid.
     pub(crate) policy: Option<(Value, Option<PolicyTable>)>,
-    pub(crate) bench: Option<Bench>,
-    /// Age limits of wires, by the offset of the text that names the source.
-    pub(crate) ages: BTreeMap<usize, AgeLimit>,
+    pub(crate) bench: Option<BenchDocument>,
 }
 
 impl FlatGraph {

@@ -1,14 +1,11 @@
 //! Loads the files of a graph, expands its parts, and merges `--set` and overrides.
 
-use std::collections::BTreeMap;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 use super::flat::{Entity, FlatGraph, FlatNode, Scope};
-use crate::graph::syntax::{AgeLimit, Bench, GraphDocument, PartBlock, Sections};
-use crate::source::{
-    BuiltinFile, Code, Diagnostic, Diagnostics, Item, Key, SourceMap, Table, Value, parse_table, suggest_name,
-};
+use crate::graph::syntax::{BenchDocument, GraphDocument, PartBlock, Sections};
+use crate::source::{BuiltinFile, Code, Diagnostic, Diagnostics, Item, Key, SourceMap, Table, Value, parse_table};
 
 /// Which graph to load, and what to change in it.
 #[derive(Debug, Clone, Default)]
@@ -56,7 +53,6 @@ impl Request {
 pub(crate) struct Loader {
     pub(crate) sources: SourceMap,
     pub(crate) diagnostics: Diagnostics,
-    ages: BTreeMap<usize, AgeLimit>,
     open_parts: Vec<PathBuf>,
     /// Whether the maximum number of parts is exceeded, so that loading stops.
     is_full: bool,
@@ -111,22 +107,18 @@ impl Loader {
         flat.modes.clone_from(&document.modes);
         flat.policy.clone_from(&document.policy);
         self.flatten(document, "", Scope::default(), &mut flat);
-        flat.ages.clone_from(&self.ages);
         flat
     }
 
     fn sections<T>(&mut self, read: impl FnOnce(&mut Sections<'_>) -> T) -> T {
         let mut sections = Sections::new(&self.sources);
         let result = read(&mut sections);
-        let ages = std::mem::take(&mut sections.ages);
-        let diagnostics = sections.finish();
-        self.ages.extend(ages);
-        self.diagnostics.extend(diagnostics);
+        self.diagnostics.extend(sections.finish());
         result
     }
 
     /// Loads the requested bench, or the sections of a bench in the graph, or the bench that the graph names.
-    fn bench(&mut self, request: &Request, flat: &FlatGraph, graph: &Table, set: Table) -> Option<Bench> {
+    fn bench(&mut self, request: &Request, flat: &FlatGraph, graph: &Table, set: Table) -> Option<BenchDocument> {
         // An invalid section [graph] has its own diagnostic.
         let named = flat.table.as_ref()?.bench.as_ref();
         if let Some(text) = &request.bench_text {
@@ -184,7 +176,7 @@ impl Loader {
                 let message = format!("cannot read `{}`: {error}", path.display());
                 let span = from.unwrap_or_else(|| {
                     let file = self.sources.add(SourceMap::COMMAND_LINE, path.display().to_string(), "");
-                    file.base..file.base + file.text.len()
+                    file.span()
                 });
                 self.diagnostics.push(Diagnostic::new(Code::Unreadable, span, message).with_help(help));
                 None
@@ -233,7 +225,7 @@ impl Loader {
             }
         }
         let file = self.sources.add(SourceMap::COMMAND_LINE, text, "");
-        let span = file.base..file.base + file.text.len();
+        let span = file.span();
         let diagnostic = Diagnostic::new(Code::Syntax, span, "this is not `key=value`");
         self.diagnostics.push(diagnostic.help("for example `--set nodes.pid.gains.x.kp=3`"));
         None
@@ -292,7 +284,7 @@ impl Loader {
         let document = self.sections(|sections| sections.part(&root));
         self.check_part_wires(part, &document);
         self.open_parts.push(canonical);
-        let scope = Scope { inputs: part.wires.clone(), parent: Some(parent), ..Scope::default() };
+        let scope = Scope { inputs: part.wires.valid.clone(), parent: Some(parent), ..Scope::default() };
         let inner = self.flatten(document, &format!("{prefix}{}.", part.key.name), scope, flat);
         self.open_parts.pop();
         Some(inner)
@@ -306,37 +298,35 @@ impl Loader {
         };
         let (nodes, parts) = (names("nodes"), names("parts"));
         for (key, value) in &set.entries {
-            let path: &[&str] = match () {
-                () if nodes.contains(&key.name) => &["nodes"],
-                () if parts.contains(&key.name) => &["parts", "set"],
-                () => {
-                    let message = format!("the part has no node or part `{}`", key.name);
-                    let known = nodes.iter().chain(&parts).map(String::as_str);
-                    let diagnostic = Diagnostic::new(Code::UnknownKey, key.span.clone(), message);
-                    self.diagnostics.push(diagnostic.suggest(&key.name, known, "nodes and parts"));
-                    continue;
-                }
+            let entry = |name: &str, value: Value| Table {
+                entries: vec![(Key { name: name.to_owned(), span: key.span.clone() }, value)],
             };
-            root.merge(nested(path, key, value));
+            let wrap =
+                |name: &str, inner: Value| Value { span: value.span.clone(), item: Item::Table(entry(name, inner)) };
+            if nodes.contains(&key.name) {
+                root.merge(entry("nodes", wrap(&key.name, value.clone())));
+            } else if parts.contains(&key.name) {
+                root.merge(entry("parts", wrap(&key.name, wrap("set", value.clone()))));
+            } else {
+                let message = format!("the part has no node or part `{}`", key.name);
+                let known = nodes.iter().chain(&parts).map(String::as_str);
+                let diagnostic = Diagnostic::new(Code::UnknownKey, key.span.clone(), message);
+                self.diagnostics.push(diagnostic.suggest(&key.name, known, "nodes and parts"));
+            }
         }
     }
 
     fn check_part_wires(&mut self, part: &PartBlock, document: &GraphDocument) {
-        let names = || document.inputs.iter().map(|(input, _)| input.name.as_str());
-        for (key, _) in &part.wires {
-            if !names().any(|name| name == key.name) {
+        let names = document.inputs.iter().map(|(input, _)| input.name.as_str());
+        for key in part.wires.valid.iter().map(|wire| &wire.key) {
+            if !names.clone().any(|name| name == key.name) {
                 let message = format!("part `{}` has no input `{}`", part.key.name, key.name);
                 let diagnostic = Diagnostic::new(Code::UnknownInput, key.span.clone(), message);
-                self.diagnostics.push(diagnostic.suggest(&key.name, names(), "inputs"));
+                self.diagnostics.push(diagnostic.suggest(&key.name, names.clone(), "inputs"));
             }
         }
         for (input, doc) in &document.inputs {
-            // A misspelt input has its own diagnostic.
-            let is_misspelt = |key: &Key| {
-                !names().any(|name| name == key.name) && suggest_name(&key.name, names()) == Some(&input.name)
-            };
-            let mut wired = part.wires.iter().map(|(key, _)| key).chain(&part.invalid);
-            if !wired.any(|key| key.name == input.name || is_misspelt(key)) {
+            if part.wires.lack(&input.name, names.clone()) {
                 let message = format!("part `{}` needs a wire to `in.{}`: {}", part.key.name, input.name, doc.value);
                 let diagnostic = Diagnostic::new(Code::MissingInput, part.key.span.clone(), message);
                 let help = format!("add `in.{} = \"…\"`", input.name);
@@ -364,22 +354,4 @@ pub(crate) fn wrong_file_type(root: &Table, expected: &str) -> Option<&'static s
     }
     let types = [("scenario", SCENARIO), ("graph", "a graph"), ("devices", "a bench"), ("exports", "a part")];
     types.iter().find(|(section, _)| root.get(section).is_some()).map(|(_, what)| *what)
-}
-
-/// Wraps a value in tables: `nodes.NAME`, or `parts.NAME.set`.
-fn nested(path: &[&str], key: &Key, value: &Value) -> Table {
-    let named = |name: &str, table: Table| {
-        let key = Key { name: name.to_owned(), span: key.span.clone() };
-        Table { entries: vec![(key, Value { span: value.span.clone(), item: Item::Table(table) })] }
-    };
-    let inner = match (path, &value.item) {
-        ([_, set], Item::Table(table)) => Table {
-            entries: vec![(
-                key.clone(),
-                Value { span: value.span.clone(), item: Item::Table(named(set, table.clone())) },
-            )],
-        },
-        _ => Table { entries: vec![(key.clone(), value.clone())] },
-    };
-    named(path[0], inner)
 }

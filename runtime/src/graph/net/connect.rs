@@ -1,32 +1,27 @@
 //! Connects wires and commands to their sources, and compares kinds.
 
-use super::{CommandWire, Net, Wire, WireOrigin};
+use super::{CommandWire, Net, Wire, WireOrigin, report};
 use crate::device::RoleType;
+use crate::graph::load::FlatNode;
 use crate::graph::plan::{PortRef, Producer};
-use crate::node::{NodeSpec, Spanned};
+use crate::graph::syntax::WireEntry;
+use crate::node::NodeSpec;
 use crate::signal::Kind;
-use crate::source::{Code, Diagnostic, Diagnostics, Key};
+use crate::source::{Code, Diagnostic, Diagnostics};
 
 impl Net<'_> {
     /// Resolves the wires of each node; wires with a mistake are left out.
     pub(super) fn connect(&self, diagnostics: &mut Diagnostics) -> Vec<Vec<Wire>> {
         let nodes = self.flat.nodes.iter().enumerate().map(|(i, node)| {
-            let wire = |(key, word): &(Key, Spanned<String>)| self.wire(i, self.spec(i)?, key, word, diagnostics);
-            node.block.wires.iter().filter_map(wire).collect()
+            let wire = |wire: &WireEntry| self.wire(i, self.spec(i)?, wire, diagnostics);
+            node.block.wires.valid.iter().filter_map(wire).collect()
         });
         nodes.collect()
     }
 
-    fn wire(
-        &self,
-        node: usize,
-        spec: &NodeSpec,
-        key: &Key,
-        word: &Spanned<String>,
-        diagnostics: &mut Diagnostics,
-    ) -> Option<Wire> {
-        let scope = self.flat.nodes[node].scope;
-        let source = self.resolve_or_report(scope, word, diagnostics);
+    fn wire(&self, node: usize, spec: &NodeSpec, wire: &WireEntry, diagnostics: &mut Diagnostics) -> Option<Wire> {
+        let (FlatNode { scope, name, .. }, key) = (&self.flat.nodes[node], &wire.key);
+        let source = report(self.resolve(*scope, &wire.from), diagnostics);
         let named = spec.inputs.iter().position(|input| !input.need.is_many && input.name == key.name);
         let Some(input) = named.or_else(|| spec.inputs.iter().position(|input| input.need.is_many)) else {
             let message = format!("`{}` has no input `{}`", spec.name, key.name);
@@ -35,25 +30,23 @@ impl Net<'_> {
             diagnostics.push(diagnostic.suggest(&key.name, known, "inputs"));
             return None;
         };
-        let (source, origin, takes) = (source?, self.origin(scope, word), spec.inputs[input].kind);
+        let (source, origin, takes) = (source?, self.origin(*scope, wire), spec.inputs[input].kind);
         if self.port(source).kind != takes {
-            let consumer = format!("{}.{}", self.flat.nodes[node].name, key.name);
-            diagnostics.push(self.kind_mismatch(source, &consumer, takes, &origin));
+            diagnostics.push(self.kind_mismatch(source, &format!("{name}.{}", key.name), takes, &origin));
             return None;
         }
         Some(Wire { input, key: key.clone(), origin, source })
     }
 
     /// Follows a wire out of the parts around it, to the text that names its source.
-    fn origin(&self, scope: usize, word: &Spanned<String>) -> WireOrigin {
-        let of = |word: &Spanned<String>| self.flat.ages.get(&word.span.start).copied();
-        let (mut at, mut outer, mut age) = (scope, word, of(word));
+    fn origin(&self, scope: usize, wire: &WireEntry) -> WireOrigin {
+        let (mut at, mut outer, mut age) = (scope, &wire.from, wire.age);
         while let (Some(("inputs", port)), Some(parent)) = (outer.value.split_once('.'), self.flat.scopes[at].parent) {
-            let Some((_, wire)) = self.flat.scopes[at].inputs.iter().find(|(key, _)| key.name == port) else { break };
-            (at, outer) = (parent, wire);
-            age = of(wire).map(|own| own.and(age)).or(age);
+            let Some(wire) = self.flat.scopes[at].inputs.iter().find(|wire| wire.key.name == port) else { break };
+            (at, outer) = (parent, &wire.from);
+            age = wire.age.map(|own| own.and(age)).or(age);
         }
-        WireOrigin { age, word: outer.clone(), scope: at, inner: (at != scope).then(|| word.clone()) }
+        WireOrigin { age, word: outer.clone(), scope: at, inner: (at != scope).then(|| wire.from.clone()) }
     }
 
     fn kind_mismatch(&self, source: PortRef, consumer: &str, takes: Kind, origin: &WireOrigin) -> Diagnostic {
@@ -74,26 +67,19 @@ impl Net<'_> {
     /// Resolves the wires of commands and reports; wires with a mistake are left out.
     pub(super) fn connect_commands(&self, diagnostics: &mut Diagnostics) -> Vec<CommandWire> {
         let mut wires = Vec::new();
-        for (role, command, word) in &self.flat.commands {
+        for (role, wire) in &self.flat.commands {
             let Some(index) = self.flat.role_names().position(|name| name == role.name) else {
-                let message = format!("there is no role `{}`", role.name);
-                let diagnostic = Diagnostic::new(Code::UnknownPort, role.span.clone(), message);
-                diagnostics.push(diagnostic.suggest(&role.name, self.flat.role_names(), "roles"));
+                let known = self.flat.role_names();
+                diagnostics.push(Diagnostic::unknown(Code::UnknownPort, "role", &role.name, &role.span, known));
                 continue;
             };
-            wires.extend(self.command(index, command, word, diagnostics));
+            wires.extend(self.command(index, wire, diagnostics));
         }
         wires
     }
 
-    fn command(
-        &self,
-        role: usize,
-        key: &Key,
-        word: &Spanned<String>,
-        diagnostics: &mut Diagnostics,
-    ) -> Option<CommandWire> {
-        let source = self.resolve_or_report(0, word, diagnostics);
+    fn command(&self, role: usize, wire: &WireEntry, diagnostics: &mut Diagnostics) -> Option<CommandWire> {
+        let (source, key) = (report(self.resolve(0, &wire.from), diagnostics), &wire.key);
         let RoleType { commands, reports, .. } = self.roles[role]?;
         let name = self.name(Producer::Role(role));
         let ports = commands.iter().map(|port| (false, port)).chain(reports.iter().map(|port| (true, port)));
@@ -104,10 +90,9 @@ impl Net<'_> {
             diagnostics.push(diagnostic.suggest(&key.name, known, "commands"));
             return None;
         };
-        let (source, origin) = (source?, self.origin(0, word));
+        let (source, origin) = (source?, self.origin(0, wire));
         if self.port(source).kind != port.kind {
-            let consumer = format!("{name}.{}", key.name);
-            diagnostics.push(self.kind_mismatch(source, &consumer, port.kind, &origin));
+            diagnostics.push(self.kind_mismatch(source, &format!("{name}.{}", key.name), port.kind, &origin));
             return None;
         }
         let command = if is_report { place - commands.len() } else { place };

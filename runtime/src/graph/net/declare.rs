@@ -10,48 +10,40 @@ use crate::source::{Code, Diagnostic, Diagnostics, Key};
 impl<'a> Net<'a> {
     /// Creates a net with all types looked up and without wires.
     pub(super) fn declare(flat: &'a FlatGraph, catalogue: &'a Catalogue, diagnostics: &mut Diagnostics) -> Self {
-        let mut unknown = |word: &Spanned<String>, what: &str, names: Vec<&str>| {
-            let message = format!("there is no {what} `{}`", word.value);
-            let diagnostic = Diagnostic::new(Code::UnknownType, word.span.clone(), message);
-            diagnostics.push(diagnostic.suggest(&word.value, names.into_iter(), &format!("{what}s")));
-        };
-        let role = |(_, kind): &(Key, Spanned<String>)| {
-            let role = catalogue.role_type(&kind.value);
-            if role.is_none() {
-                let tasks = catalogue.roles().iter().filter(|role| !role.is_observed);
-                unknown(kind, "role", tasks.map(|role| &*role.name).collect());
-            }
-            role
-        };
-        let roles: Vec<Option<&RoleType>> = flat.roles.iter().map(role).collect();
+        let roles = flat.roles.iter().map(|(_, kind)| find_role(kind, catalogue, diagnostics)).collect();
         let nodes = flat.nodes.iter().map(|node| {
             let kind = node.block.kind.as_ref()?;
             let known = catalogue.find_node(&kind.value);
             if known.is_none() {
-                unknown(kind, "node type", catalogue.specs().map(|spec| &*spec.name).collect());
+                let names = catalogue.specs().map(|spec| &*spec.name);
+                diagnostics.push(Diagnostic::unknown(Code::UnknownType, "node type", &kind.value, &kind.span, names));
             }
             known
         });
         let nodes = nodes.collect();
-        let roles =
-            flat.roles.iter().zip(roles).map(|((_, kind), role)| reject_observed(kind, role?, diagnostics)).collect();
         let observed = observed_roles(flat, catalogue, diagnostics);
         Self { flat, catalogue, roles, nodes, observed, wires: Vec::new(), commands: Vec::new(), order: Vec::new() }
     }
 }
 
-/// Returns the type of a role, or reports that a task cannot declare it.
-fn reject_observed<'r>(
+/// Returns the type of a role, or reports that there is none or that a task cannot declare it.
+fn find_role<'a>(
     kind: &Spanned<String>,
-    role: &'r RoleType,
+    catalogue: &'a Catalogue,
     diagnostics: &mut Diagnostics,
-) -> Option<&'r RoleType> {
+) -> Option<&'a RoleType> {
+    let Some(role) = catalogue.role_type(&kind.value) else {
+        let names = catalogue.roles().iter().filter(|role| !role.is_observed).map(|role| &*role.name);
+        diagnostics.push(Diagnostic::unknown(Code::UnknownType, "role", &kind.value, &kind.span, names));
+        return None;
+    };
     if role.is_observed {
         let message = format!("`{}` is only for scenarios and recordings: a task cannot declare it", kind.value);
         let help = format!("remove it, and bind it in the bench: `{} = \"device\"`", role.observed_name());
         diagnostics.push(Diagnostic::new(Code::ObservedRole, kind.span.clone(), message).help(help));
+        return None;
     }
-    (!role.is_observed).then_some(role)
+    Some(role)
 }
 
 /// Returns the roles that the bench binds for scenarios and recordings only.

@@ -13,9 +13,17 @@ use crate::device::RoleType;
 use crate::graph::load::FlatGraph;
 use crate::graph::plan::{PortRef, Producer};
 use crate::node::{NodeSpec, PortSpec, Spanned};
-use crate::source::{Diagnostics, Key};
+use crate::source::{Diagnostic, Diagnostics, Key};
 
 pub(crate) use wire::{CommandWire, Wire, WireOrigin};
+
+/// What a name refers to. The error is a diagnostic, or `None` if another one explains why the name refers to nothing.
+pub(crate) type Resolved<T> = Result<T, Option<Box<Diagnostic>>>;
+
+/// Returns what a name refers to, or adds its diagnostic.
+pub(crate) fn report<T>(resolved: Resolved<T>, diagnostics: &mut Diagnostics) -> Option<T> {
+    resolved.map_err(|diagnostic| diagnostics.extend(diagnostic.map(|diagnostic| *diagnostic))).ok()
+}
 
 /// A flat graph with the declarations of its types, its resolved wires and its step order.
 pub(crate) struct Net<'a> {

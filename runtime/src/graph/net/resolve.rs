@@ -1,10 +1,10 @@
 //! Names of ports: from `node.port` in a scope to the port, and back.
 
-use super::Net;
+use super::{Net, Resolved};
 use crate::graph::load::{Entity, Scope};
 use crate::graph::plan::{PortRef, Producer};
 use crate::node::{PortSpec, Spanned};
-use crate::source::{Code, Diagnostic, Diagnostics};
+use crate::source::{Code, Diagnostic, quoted};
 
 /// Parts through which one wire may pass; more means that it refers to itself.
 const MAX_DEPTH: usize = 64;
@@ -16,80 +16,62 @@ const OBSERVED_HELP: &str = "this value does not exist on a robot: use a port of
 impl Net<'_> {
     /// Resolves the port that a wire names in a scope, through the inputs and exports of parts.
     ///
-    /// Returns `None` if the wire leads to an unknown type or to an unwired input of a part. Those have their own
-    /// diagnostics.
-    pub(crate) fn resolve(&self, scope: usize, word: &Spanned<String>) -> Result<Option<PortRef>, Box<Diagnostic>> {
+    /// A wire to an unknown type or to an unwired input of a part has its own diagnostic.
+    pub(crate) fn resolve(&self, scope: usize, word: &Spanned<String>) -> Resolved<PortRef> {
         self.resolve_at_depth(scope, word, 0)
     }
 
-    /// Resolves a port like [`Net::resolve`], and adds the diagnostic if that fails.
-    pub(crate) fn resolve_or_report(
-        &self,
-        scope: usize,
-        word: &Spanned<String>,
-        diagnostics: &mut Diagnostics,
-    ) -> Option<PortRef> {
-        self.resolve(scope, word).unwrap_or_else(|diagnostic| {
-            diagnostics.push(*diagnostic);
-            None
-        })
-    }
-
-    fn resolve_at_depth(
-        &self,
-        scope: usize,
-        word: &Spanned<String>,
-        depth: usize,
-    ) -> Result<Option<PortRef>, Box<Diagnostic>> {
+    fn resolve_at_depth(&self, scope: usize, word: &Spanned<String>, depth: usize) -> Resolved<PortRef> {
         let diagnostic = |code: Code, message: String| Diagnostic::new(code, word.span.clone(), message);
         let unknown = |message: String| diagnostic(Code::UnknownPort, message);
         if depth > MAX_DEPTH {
             let message = format!("`{}` refers to itself, through the inputs and exports of parts", word.value);
-            return Err(Box::new(diagnostic(Code::Loop, message)));
+            return diagnostic(Code::Loop, message).into_err();
         }
         let Scope { names, inputs, declared, parent, .. } = &self.flat.scopes[scope];
         let Some((name, port)) = word.value.split_once('.').filter(|(_, port)| !port.contains('.')) else {
             let help = self.ports_help(scope, word);
-            return Err(Box::new(unknown(format!("`{}` is not a port", word.value)).help(help)));
+            return unknown(format!("`{}` is not a port", word.value)).help(help).into_err();
         };
         if name == "inputs"
             && let Some(parent) = *parent
         {
             if !declared.iter().any(|(key, _)| key.name == port) {
                 let known = declared.iter().map(|(key, _)| key.name.as_str());
-                return Err(Box::new(
-                    unknown(format!("the part has no input `{port}`")).suggest(port, known, "inputs"),
-                ));
+                return unknown(format!("the part has no input `{port}`")).suggest(port, known, "inputs").into_err();
             }
             // An input that is declared and not wired has its own diagnostic.
-            let wired = inputs.iter().find(|(key, _)| key.name == port);
-            return wired.map_or(Ok(None), |(_, word)| self.resolve_at_depth(parent, word, depth + 1));
+            let wire = inputs.iter().find(|wire| wire.key.name == port).ok_or(None)?;
+            return self.resolve_at_depth(parent, &wire.from, depth + 1);
         }
         let Some((_, entity)) = names.get(name) else {
             if self.observed.iter().any(|(key, ..)| key.name == name) {
                 let message = format!("`{}` is only for scenarios and recordings: a task cannot read it", word.value);
-                return Err(Box::new(diagnostic(Code::ObservedRole, message).help(OBSERVED_HELP)));
+                return diagnostic(Code::ObservedRole, message).help(OBSERVED_HELP).into_err();
             }
             let message = format!("there is no role, node or part `{name}`");
             let known = names.keys().map(String::as_str);
-            return Err(Box::new(unknown(message).suggest(name, known, "roles, nodes and parts")));
+            return unknown(message).suggest(name, known, "roles, nodes and parts").into_err();
         };
-        let no_output = || {
-            let known = self.ports_of(*entity).into_iter();
-            Box::new(unknown(format!("`{name}` has no output `{port}`")).suggest(port, known, "outputs"))
-        };
-        let producer = match *entity {
+        self.port_of(*entity, port, depth).unwrap_or_else(|| {
+            let message = format!("`{name}` has no output `{port}`");
+            unknown(message).suggest(port, self.ports_of(*entity).into_iter(), "outputs").into_err()
+        })
+    }
+
+    /// Resolves a port of a role, a node or a part, or returns `None` if it has none with that name.
+    fn port_of(&self, entity: Entity, port: &str, depth: usize) -> Option<Resolved<PortRef>> {
+        let producer = match entity {
             Entity::Role(i) => Producer::Role(i),
             Entity::Node(i) => Producer::Node(i),
             Entity::Part(inner) => {
-                let export = self.flat.scopes[inner].exports.iter().find(|(key, _)| key.name == port);
-                let (_, word) = export.ok_or_else(no_output)?;
-                return self.resolve_at_depth(inner, word, depth + 1);
+                let (_, word) = self.flat.scopes[inner].exports.iter().find(|(key, _)| key.name == port)?;
+                return Some(self.resolve_at_depth(inner, word, depth + 1));
             }
         };
-        let Some(outputs) = self.outputs(producer) else { return Ok(None) };
-        let port = outputs.iter().position(|output| output.name == port).ok_or_else(no_output)?;
-        Ok(Some(PortRef { producer, port }))
+        let Some(outputs) = self.outputs(producer) else { return Some(Err(None)) };
+        let port = outputs.iter().position(|output| output.name == port)?;
+        Some(Ok(PortRef { producer, port }))
     }
 
     /// Returns the help for a word that is not of the form `node.port`.
@@ -97,12 +79,10 @@ impl Net<'_> {
         let first = word.value.split('.').next().unwrap_or_default();
         let entity = self.flat.scopes[scope].names.get(first);
         let ports = entity.map(|(_, entity)| self.ports_of(*entity)).unwrap_or_default();
-        let ports: Vec<String> = ports.iter().map(|port| format!("`{first}.{port}`")).collect();
         if ports.is_empty() {
-            "write a port as `node.port`".into()
-        } else {
-            format!("ports here: {}", ports.join(", "))
+            return "write a port as `node.port`".into();
         }
+        format!("ports here: {}", quoted(ports.iter().map(|port| format!("{first}.{port}"))))
     }
 
     fn ports_of(&self, entity: Entity) -> Vec<&str> {
@@ -114,52 +94,34 @@ impl Net<'_> {
         }
     }
 
+    /// Returns the ports that the wires of a scope can read, each with its name there.
+    fn ports_in(&self, scope: usize) -> impl Iterator<Item = (String, PortRef)> {
+        let ports = self.flat.scopes[scope]
+            .names
+            .iter()
+            .flat_map(|(name, (_, entity))| self.ports_of(*entity).into_iter().map(move |port| (name, *entity, port)));
+        ports.filter_map(|(name, entity, port)| Some((format!("{name}.{port}"), self.port_of(entity, port, 0)?.ok()?)))
+    }
+
     /// Returns the name by which the wires of a scope refer to a port, or `None` if they cannot.
     pub(crate) fn name_in(&self, scope: usize, source: PortRef) -> Option<String> {
-        let port = &self.port(source).name;
-        self.flat.scopes[scope].names.iter().find_map(|(name, (_, entity))| match *entity {
-            Entity::Role(i) => (source.producer == Producer::Role(i)).then(|| format!("{name}.{port}")),
-            Entity::Node(i) => (source.producer == Producer::Node(i)).then(|| format!("{name}.{port}")),
-            Entity::Part(inner) => {
-                let mut exports = self.flat.scopes[inner].exports.iter();
-                let is_source =
-                    |word: &Spanned<String>| matches!(self.resolve(inner, word), Ok(Some(port)) if port == source);
-                exports.find(|(_, word)| is_source(word)).map(|(export, _)| format!("{name}.{}", export.name))
-            }
-        })
+        self.ports_in(scope).find(|(_, port)| *port == source).map(|(name, _)| name)
     }
 
     /// Returns a port of the scope with the name and the kind of an input, as a suggestion for its wire.
     pub(crate) fn find_candidate(&self, scope: usize, node: usize, input: &PortSpec) -> Option<String> {
-        self.flat.scopes[scope].names.iter().find_map(|(name, (_, entity))| {
-            let outputs = match *entity {
-                Entity::Role(i) => self.outputs(Producer::Role(i)),
-                Entity::Node(i) if i != node => self.outputs(Producer::Node(i)),
-                Entity::Node(_) => None,
-                Entity::Part(inner) => {
-                    let (export, word) =
-                        self.flat.scopes[inner].exports.iter().find(|(key, _)| key.name == input.name)?;
-                    let source = self.resolve(inner, word).ok().flatten()?;
-                    return (self.port(source).kind == input.kind).then(|| format!("{name}.{}", export.name));
-                }
-            };
-            let port = outputs?.iter().find(|output| output.kind == input.kind && output.name == input.name)?;
-            Some(format!("{name}.{}", port.name))
-        })
+        let end = format!(".{}", input.name);
+        let is_candidate = |(name, port): &(String, PortRef)| {
+            name.ends_with(&end) && port.producer != Producer::Node(node) && self.port(*port).kind == input.kind
+        };
+        self.ports_in(scope).find(is_candidate).map(|(name, _)| name)
     }
 
     /// Returns the exports of the parts in the graph, each with the full name of the port behind it.
     pub(crate) fn exports_by_name(&self) -> Vec<(String, String)> {
-        let names = self.flat.scopes.first().into_iter().flat_map(|scope| &scope.names);
-        let parts = names.filter_map(|(name, (_, entity))| match entity {
-            Entity::Part(inner) => Some((name, *inner)),
-            _ => None,
-        });
-        let exports = parts.flat_map(|(name, inner)| {
-            self.flat.scopes[inner].exports.iter().map(move |(key, word)| (format!("{name}.{}", key.name), inner, word))
-        });
-        let port = |(name, inner, word)| Some((name, self.port_name(self.resolve(inner, word).ok()??)));
-        exports.filter_map(port).collect()
+        let ports = self.ports_in(0).map(|(name, port)| (name, self.port_name(port)));
+        // A role or a node of the graph itself has its full name there.
+        ports.filter(|(name, port)| name != port).collect()
     }
 
     /// Returns the producers of all exported ports.
@@ -167,6 +129,6 @@ impl Net<'_> {
         let scopes = self.flat.scopes.iter().enumerate();
         let words =
             scopes.flat_map(|(scope, Scope { exports, .. })| exports.iter().map(move |(_, word)| (scope, word)));
-        words.filter_map(|(scope, word)| Some(self.resolve(scope, word).ok()??.producer))
+        words.filter_map(|(scope, word)| Some(self.resolve(scope, word).ok()?.producer))
     }
 }

@@ -67,36 +67,32 @@ pub(crate) struct PlannedNode {
     pub(crate) span: Range<usize>,
 }
 
-/// A command of a device and the port that drives it.
+impl PlannedNode {
+    /// Returns the outputs of the node, each with its reference.
+    pub(crate) fn outputs(&self) -> impl Iterator<Item = (PortRef, &PlannedPort)> {
+        let producer = Producer::Node(self.index);
+        self.ports.iter().enumerate().map(move |(port, planned)| (PortRef { producer, port }, planned))
+    }
+}
+
+/// A command or a report of a device, and the port that drives it.
 pub(crate) struct PlannedCommand {
     pub(crate) source: PortRef,
     pub(crate) device: usize,
-    /// Its index among the commands of the device.
-    pub(crate) command: usize,
+    /// Whether it is a report: a value that moves nothing.
+    pub(crate) is_report: bool,
+    /// Its index among the commands, or the reports, of the device.
+    pub(crate) port: usize,
     /// Names of the role and of the command.
     pub(crate) name: [String; 2],
-    /// Age limit. An older command ramps to zero in any case.
-    pub(crate) age: AgeLimit,
-    /// Span of its wire.
-    pub(crate) span: Range<usize>,
-    /// Maximum acceleration of each joint [rad/s²], infinite without a bound.
-    pub(crate) accelerations: Vec<f64>,
-}
-
-/// A report to a device: a value that moves nothing.
-pub(crate) struct PlannedReport {
-    pub(crate) source: PortRef,
     /// Shape of the value.
     pub(crate) shape: Shape,
-    pub(crate) device: usize,
-    /// Its index among the reports of the device.
-    pub(crate) report: usize,
-    /// Names of the role and of the report.
-    pub(crate) name: [String; 2],
-    /// Age limit. An older report is not sent in any case.
+    /// Age limit. In any case, an older command ramps to zero, and an older report is not sent.
     pub(crate) age: AgeLimit,
     /// Span of its wire.
     pub(crate) span: Range<usize>,
+    /// Maximum acceleration of each joint [rad/s²], infinite without a bound. A report has none.
+    pub(crate) accelerations: Vec<f64>,
 }
 
 /// What triggers a tick.
@@ -114,8 +110,8 @@ pub(crate) struct Plan {
     pub(crate) devices: Vec<PlannedDevice>,
     /// The nodes in the order in which they step.
     pub(crate) nodes: Vec<PlannedNode>,
+    /// The commands of the devices, then the reports to them.
     pub(crate) commands: Vec<PlannedCommand>,
-    pub(crate) reports: Vec<PlannedReport>,
     pub(crate) clock: Clock,
     /// Nominal time between two ticks [ns].
     pub(crate) period: i64,

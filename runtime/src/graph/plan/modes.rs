@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use super::port::PortRef;
-use crate::graph::syntax::ExitKind;
+use crate::graph::syntax::{ExitKind, PortState};
 
 /// The modes of a graph.
 pub(crate) struct PlannedModes {
@@ -61,11 +61,7 @@ pub(crate) struct WatchedPort {
 /// The test of a port.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Test {
-    New,
-    Absent,
-    Present,
-    /// The flag has this value.
-    Flag(bool),
+    Is(PortState),
     /// The number is between `min` and `max`; it then stays so until it is outside by more than `hysteresis`.
     Between {
         min: f64,

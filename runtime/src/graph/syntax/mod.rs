@@ -2,9 +2,12 @@
 
 mod modes;
 mod policy;
+mod read;
 mod sections;
 
-pub(crate) use modes::{Exit, ExitKind, ModeBlock, PortState};
+pub(crate) use modes::{ExitKind, ExitTable, ModeBlock, ModeExit, PortState};
 pub use policy::Policy;
 pub(crate) use policy::{AgeLimit, PolicyTable, default_max_age_ns, default_max_age_s};
-pub(crate) use sections::{Bench, Block, GraphDocument, GraphTable, LIMITS, PartBlock, Sections, into_diagnostic};
+pub(crate) use sections::{
+    BenchDocument, Block, GraphDocument, GraphTable, LIMITS, PartBlock, Sections, WireEntry, into_diagnostic,
+};

@@ -2,8 +2,9 @@
 
 use std::ops::Range;
 
-use crate::node::{At, Mistake, Param, Reader, Spanned};
-use crate::source::{Code, Item, Key, Table, Value, suggestion};
+use super::read::{check_keys, read_table, read_word};
+use crate::node::{Param, Reader, Spanned};
+use crate::source::{Item, Key, Table, Value};
 
 /// A mode: the parameters it sets and its exits.
 #[derive(Debug, Clone)]
@@ -13,8 +14,15 @@ pub(crate) struct ModeBlock {
     pub(crate) table: Table,
     /// Values that override those of the nodes.
     pub(crate) set: Table,
-    /// Its exits, each with its kind and its span.
-    pub(crate) exits: Vec<(ExitKind, Range<usize>, Exit)>,
+    pub(crate) exits: Vec<ModeExit>,
+}
+
+/// An exit of a mode.
+#[derive(Debug, Clone)]
+pub(crate) struct ModeExit {
+    pub(crate) kind: ExitKind,
+    pub(crate) span: Range<usize>,
+    pub(crate) table: ExitTable,
 }
 
 /// What an exit of a mode does. If several exits hold in one tick, the first of these kinds wins.
@@ -60,33 +68,24 @@ impl PortState {
         ("true", Self::True),
         ("false", Self::False),
     ];
+
+    /// Returns the word in a graph file.
+    pub(crate) fn word(self) -> &'static str {
+        Self::WORDS.iter().find(|(_, state)| *state == self).map_or("", |(word, _)| word)
+    }
 }
 
 impl Param for PortState {
     const EXPECTS: &'static str = "`new`, `absent`, `present`, `true` or `false`";
 
     fn read(value: &Value, reader: &mut Reader<'_>) -> Option<Self> {
-        let word = match &value.item {
-            Item::Boolean(is) => {
-                if *is {
-                    "true"
-                } else {
-                    "false"
-                }
-            }
-            _ => value.as_str().unwrap_or_default(),
-        };
-        let state = Self::WORDS.iter().find(|(known, _)| *known == word).map(|(_, is)| *is);
-        if state.is_none() {
-            reader.wrong_type(value, Self::EXPECTS);
-        }
-        state
+        read_word(value, &Self::WORDS, Self::EXPECTS, reader)
     }
 }
 
-/// An exit of a mode: its condition and its target.
+/// The table of an exit: its condition and its target.
 #[derive(Debug, Clone, Param)]
-pub(crate) struct Exit {
+pub(crate) struct ExitTable {
     /// Mode to go to.
     pub(crate) to: Option<Spanned<String>>,
     /// Port to watch: `node.port` or `node.port.feature`. A flag must be true unless `is` is given.
@@ -122,45 +121,32 @@ pub(crate) struct Exit {
     pub(crate) priority: Option<u64>,
 }
 
-/// Reads the modes of a graph file.
-pub(crate) fn read_modes(tables: Vec<(Key, Table)>, reader: &mut Reader<'_>) -> Vec<ModeBlock> {
-    tables.into_iter().map(|(key, table)| read_mode(key, table, reader)).collect()
-}
-
-fn read_mode(key: Key, mut table: Table, reader: &mut Reader<'_>) -> ModeBlock {
+/// Reads the block of a mode.
+pub(super) fn read_mode(key: Key, mut table: Table, reader: &mut Reader<'_>) -> ModeBlock {
     let whole = table.clone();
-    let set = match table.remove("set") {
-        Some((_, Value { item: Item::Table(set), .. })) => set,
-        Some((_, value)) => {
-            reader.wrong_type(&value, "a table");
-            Table::default()
-        }
-        None => Table::default(),
-    };
+    let set = table.remove("set");
+    let set = read_table(set.as_ref().map(|(_, value)| value), reader);
     let mut exits = Vec::new();
     for kind in [ExitKind::Fail, ExitKind::OnLost, ExitKind::Done, ExitKind::Go] {
         let Some((_, value)) = table.remove(kind.key()) else { continue };
-        let several = matches!(kind, ExitKind::Go | ExitKind::Done | ExitKind::Fail);
         match &value.item {
-            Item::Array(items) if several => items.iter().for_each(|item| exits.extend(read_exits(kind, item, reader))),
+            Item::Array(items) if kind != ExitKind::OnLost => {
+                items.iter().for_each(|item| exits.extend(read_exits(kind, item, reader)));
+            }
             _ => exits.extend(read_exits(kind, &value, reader)),
         }
     }
-    for (other, _) in table.entries {
-        let message = format!("unknown key `{}` in a mode", other.name);
-        let help = suggestion(&other.name, ["set", "go", "on_lost", "done", "fail"].into_iter(), "keys");
-        reader.mistakes.push(Mistake::new(Code::UnknownKey, At::Span(other.span), message).help(help));
-    }
+    check_keys(&table, &["set", "go", "on_lost", "done", "fail"], " in a mode", reader);
     ModeBlock { key, table: whole, set, exits }
 }
 
 /// Reads the exits of one table. `after_ms` and `after_travel_mm` together make two exits, one for each.
-fn read_exits(kind: ExitKind, value: &Value, reader: &mut Reader<'_>) -> Vec<(ExitKind, Range<usize>, Exit)> {
-    let Some(exit) = Exit::read(value, reader) else { return Vec::new() };
-    let span = value.span.clone();
-    if exit.after_ms.is_none() || exit.after_travel_mm.is_none() {
-        return vec![(kind, span, exit)];
+fn read_exits(kind: ExitKind, value: &Value, reader: &mut Reader<'_>) -> Vec<ModeExit> {
+    let Some(table) = ExitTable::read(value, reader) else { return Vec::new() };
+    let exit = |table| ModeExit { kind, span: value.span.clone(), table };
+    if table.after_ms.is_none() || table.after_travel_mm.is_none() {
+        return vec![exit(table)];
     }
-    let time = Exit { after_travel_mm: None, of: None, ..exit.clone() };
-    vec![(kind, span.clone(), time), (kind, span, Exit { after_ms: None, ..exit })]
+    let time = ExitTable { after_travel_mm: None, of: None, ..table.clone() };
+    vec![exit(time), exit(ExitTable { after_ms: None, ..table })]
 }

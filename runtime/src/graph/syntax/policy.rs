@@ -1,5 +1,6 @@
 //! The section `[policy]`: the reaction to each trouble, and the maximum age of samples.
 
+use super::read::read_word;
 use crate::node::{Map, Param, Reader, Spanned, Written};
 use crate::source::{Item, SourceMap, Table, Value};
 
@@ -25,22 +26,13 @@ impl Policy {
     pub fn word(self) -> &'static str {
         Self::WORDS.iter().find(|(_, policy)| *policy == self).map_or("", |(word, _)| word)
     }
-
-    fn from(value: &Value) -> Option<Self> {
-        let word = value.as_str()?;
-        Self::WORDS.iter().find(|(known, _)| *known == word).map(|(_, policy)| *policy)
-    }
 }
 
 impl Param for Policy {
     const EXPECTS: &'static str = "`count`, `hold`, `stop` or `fault`";
 
     fn read(value: &Value, reader: &mut Reader<'_>) -> Option<Self> {
-        let policy = Self::from(value);
-        if policy.is_none() {
-            reader.wrong_type(value, Self::EXPECTS);
-        }
-        policy
+        read_word(value, &Self::WORDS, Self::EXPECTS, reader)
     }
 
     fn written(&self) -> Option<Written> {
@@ -69,11 +61,7 @@ impl Param for HaltingPolicy {
     const EXPECTS: &'static str = "`hold`, `stop` or `fault`";
 
     fn read(value: &Value, reader: &mut Reader<'_>) -> Option<Self> {
-        let policy = Policy::from(value).filter(|policy| *policy != Policy::Count);
-        if policy.is_none() {
-            reader.wrong_type(value, Self::EXPECTS);
-        }
-        policy.map(Self)
+        read_word(value, &Policy::WORDS[1..], Self::EXPECTS, reader).map(Self)
     }
 
     fn written(&self) -> Option<Written> {

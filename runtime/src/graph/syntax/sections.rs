@@ -1,10 +1,10 @@
 //! Parses the sections of a graph file, a part and a bench, before names are resolved.
 
-use std::collections::BTreeMap;
 use std::ops::Range;
 
-use super::modes::{self, ModeBlock};
+use super::modes::{ModeBlock, read_mode};
 use super::policy::{AgeLimit, PolicyTable, WireTable};
+use super::read::{check_keys, read_table};
 use crate::node::{At, FilePath, Mistake, Param, Reader, Spanned};
 use crate::source::{Code, Diagnostic, Diagnostics, Item, Key, SourceMap, Table, Value, suggest_name};
 
@@ -32,14 +32,39 @@ pub(crate) struct GraphTable {
     pub(crate) mark: Option<[Spanned<String>; 2]>,
 }
 
+/// A wire: its input or command, and the port that it reads.
+#[derive(Debug, Clone)]
+pub(crate) struct WireEntry {
+    pub(crate) key: Key,
+    pub(crate) from: Spanned<String>,
+    pub(crate) age: Option<AgeLimit>,
+}
+
+/// The table `in` of a block.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct InputWires {
+    pub(crate) valid: Vec<WireEntry>,
+    /// Inputs whose wire is invalid and has its own diagnostic.
+    invalid: Vec<Key>,
+}
+
+impl InputWires {
+    /// Returns whether an input has no wire. A wire to a misspelt name counts, since it has its own diagnostic.
+    pub(crate) fn lack<'n>(&self, input: &str, known: impl Iterator<Item = &'n str> + Clone) -> bool {
+        let is_misspelt = |key: &Key| {
+            !known.clone().any(|name| name == key.name) && suggest_name(&key.name, known.clone()) == Some(input)
+        };
+        let mut keys = self.valid.iter().map(|wire| &wire.key).chain(&self.invalid);
+        !keys.any(|key| key.name == input || is_misspelt(key))
+    }
+}
+
 /// The block of a node or a device: its type, its wires and its parameters.
 #[derive(Debug, Clone)]
 pub(crate) struct Block {
     pub(crate) key: Key,
     pub(crate) kind: Option<Spanned<String>>,
-    pub(crate) wires: Vec<(Key, Spanned<String>)>,
-    /// Inputs whose wire is invalid and has its own diagnostic.
-    pub(crate) invalid: Vec<Key>,
+    pub(crate) wires: InputWires,
     pub(crate) params: Value,
 }
 
@@ -48,9 +73,7 @@ pub(crate) struct Block {
 pub(crate) struct PartBlock {
     pub(crate) key: Key,
     pub(crate) file: Option<FilePath>,
-    pub(crate) wires: Vec<(Key, Spanned<String>)>,
-    /// Inputs whose wire is invalid and has its own diagnostic.
-    pub(crate) invalid: Vec<Key>,
+    pub(crate) wires: InputWires,
     pub(crate) set: Table,
 }
 
@@ -62,7 +85,8 @@ pub(crate) struct GraphDocument {
     pub(crate) roles: Vec<(Key, Spanned<String>)>,
     pub(crate) nodes: Vec<Block>,
     pub(crate) parts: Vec<PartBlock>,
-    pub(crate) commands: Vec<(Key, Key, Spanned<String>)>,
+    /// The wires to commands, each with its role.
+    pub(crate) commands: Vec<(Key, WireEntry)>,
     /// The section [limits] and its span.
     pub(crate) limits: Option<(Range<usize>, Table)>,
     pub(crate) modes: Vec<ModeBlock>,
@@ -74,7 +98,7 @@ pub(crate) struct GraphDocument {
 
 /// The sections of a bench file.
 #[derive(Debug, Clone, Default)]
-pub(crate) struct Bench {
+pub(crate) struct BenchDocument {
     pub(crate) devices: Vec<Block>,
     pub(crate) bind: Vec<(Key, Spanned<String>)>,
 }
@@ -89,15 +113,13 @@ const RESERVED: [&str; 2] = ["inputs", LIMITS];
 pub(crate) struct Sections<'a> {
     reader: Reader<'a>,
     diagnostics: Diagnostics,
-    /// Age limits of wires, by the offset of the text that names the source.
-    pub(crate) ages: BTreeMap<usize, AgeLimit>,
     /// Blocks that are not tables and have their own diagnostic.
     broken: Vec<Key>,
 }
 
 impl<'a> Sections<'a> {
     pub(crate) const fn new(sources: &'a SourceMap) -> Self {
-        Self { reader: Reader::new(sources), diagnostics: Vec::new(), ages: BTreeMap::new(), broken: Vec::new() }
+        Self { reader: Reader::new(sources), diagnostics: Vec::new(), broken: Vec::new() }
     }
 
     /// Returns all diagnostics.
@@ -109,52 +131,44 @@ impl<'a> Sections<'a> {
 
     /// Reads the sections of a graph file.
     pub(crate) fn graph(&mut self, root: &Table) -> GraphDocument {
-        self.check_keys(
-            root,
-            &["graph", "roles", "parts", "nodes", "commands", "limits", "modes", "policy", "devices", "bind"],
-        );
+        const KEYS: [&str; 10] =
+            ["graph", "roles", "parts", "nodes", "commands", "limits", "modes", "policy", "devices", "bind"];
+        check_keys(root, &KEYS, "", &mut self.reader);
         let graph =
             root.entry("graph").map(|(key, value)| (key.span.clone(), GraphTable::read(value, &mut self.reader)));
         let commands = self.table(root.get("commands")).entries.into_iter().flat_map(|(role, value)| {
-            let (wires, _) = self.wire_words(Some(&value));
-            wires.into_iter().map(move |(command, word)| (role.clone(), command, word))
+            let wires = self.wire_entries(Some(&value)).valid;
+            wires.into_iter().map(move |wire| (role.clone(), wire))
         });
         let commands = commands.collect();
         let limits = root.entry("limits").map(|(key, value)| (key.span.clone(), self.table(Some(value))));
         let policy = root.get("policy");
         let policy = policy.map(|value| (value.clone(), PolicyTable::read(value, &mut self.reader)));
-        let modes = self.named_tables(root.get("modes"));
-        let modes = modes::read_modes(modes, &mut self.reader);
-        GraphDocument {
-            graph,
-            roles: self.names(root.get("roles")),
-            commands,
-            limits,
-            modes,
-            policy,
-            ..self.body(root)
-        }
+        let modes = self.named_tables(root.get("modes")).into_iter();
+        let modes = modes.map(|(key, table)| read_mode(key, table, &mut self.reader)).collect();
+        let roles = self.names(root.get("roles"));
+        GraphDocument { graph, roles, commands, limits, modes, policy, ..self.body(root) }
     }
 
     /// Reads the sections of a part.
     pub(crate) fn part(&mut self, root: &Table) -> GraphDocument {
-        self.check_keys(root, &["inputs", "exports", "parts", "nodes"]);
+        check_keys(root, &["inputs", "exports", "parts", "nodes"], "", &mut self.reader);
         let (inputs, exports) = (self.names(root.get("inputs")), self.names(root.get("exports")));
         GraphDocument { inputs, exports, ..self.body(root) }
     }
 
     /// Reads the sections of a bench file.
-    pub(crate) fn bench(&mut self, root: &Table) -> Bench {
-        self.check_keys(root, &["devices", "bind"]);
+    pub(crate) fn bench(&mut self, root: &Table) -> BenchDocument {
+        check_keys(root, &["devices", "bind"], "", &mut self.reader);
         self.own_bench(root)
     }
 
     /// Reads the sections of a bench in a file that may have others.
-    pub(crate) fn own_bench(&mut self, root: &Table) -> Bench {
+    pub(crate) fn own_bench(&mut self, root: &Table) -> BenchDocument {
         let devices = self.named_tables(root.get("devices"));
         let names = names_of(&devices);
         let devices = devices.into_iter().map(|(key, table)| self.block(key, table, &names)).collect();
-        Bench { devices, bind: self.words(root.get("bind")) }
+        BenchDocument { devices, bind: self.words(root.get("bind")) }
     }
 
     fn body(&mut self, root: &Table) -> GraphDocument {
@@ -182,8 +196,7 @@ impl<'a> Sections<'a> {
     }
 
     fn node(&mut self, key: Key, mut table: Table, names: &[String]) -> Block {
-        let (wires, invalid) = self.wires(&mut table);
-        Block { wires, invalid, ..self.block(key, table, names) }
+        Block { wires: self.wires(&mut table), ..self.block(key, table, names) }
     }
 
     fn block(&mut self, key: Key, mut table: Table, names: &[String]) -> Block {
@@ -201,11 +214,11 @@ impl<'a> Sections<'a> {
         };
         // A missing parameter is reported at the name of the block.
         let params = Value { span: key.span.clone(), item: Item::Table(table) };
-        Block { key, kind, wires: Vec::new(), invalid: Vec::new(), params }
+        Block { key, kind, wires: InputWires::default(), params }
     }
 
     fn part_block(&mut self, key: Key, mut table: Table) -> PartBlock {
-        let (wires, invalid) = self.wires(&mut table);
+        let wires = self.wires(&mut table);
         let set = table.remove("set").map(|(_, value)| value);
         let set = self.table(set.as_ref());
         let file = match table.remove("file") {
@@ -217,15 +230,15 @@ impl<'a> Sections<'a> {
                 None
             }
         };
-        self.check_keys(&table, &["file", "in", "set"]);
-        PartBlock { key, file, wires, invalid, set }
+        check_keys(&table, &["file", "in", "set"], "", &mut self.reader);
+        PartBlock { key, file, wires, set }
     }
 
-    /// Reads the table `in` of a block: the valid wires, and the keys of the invalid ones.
-    fn wires(&mut self, table: &mut Table) -> (Vec<(Key, Spanned<String>)>, Vec<Key>) {
+    /// Reads the table `in` of a block.
+    fn wires(&mut self, table: &mut Table) -> InputWires {
         let wires = table.remove("in").map(|(_, value)| value);
-        let (mut wires, invalid) = self.wire_words(wires.as_ref());
-        wires.retain(|(key, _)| {
+        let mut wires = self.wire_entries(wires.as_ref());
+        wires.valid.retain(|WireEntry { key, .. }| {
             if key.name == "from" {
                 let diagnostic = Diagnostic::new(Code::BadName, key.span.clone(), "a wire cannot be named `from`");
                 let help = "`from` is reserved for facts, as in `{ from = \"role.fact\" }`: choose another name";
@@ -233,26 +246,11 @@ impl<'a> Sections<'a> {
             }
             key.name != "from" && self.check_name(key)
         });
-        (wires, invalid)
-    }
-
-    /// Reports each key that is not one of `keys`.
-    fn check_keys(&mut self, table: &Table, keys: &[&str]) {
-        for (key, _) in table.entries.iter().filter(|(key, _)| !keys.contains(&key.name.as_str())) {
-            let diagnostic = Diagnostic::new(Code::UnknownKey, key.span.clone(), format!("unknown key `{}`", key.name));
-            self.diagnostics.push(diagnostic.suggest(&key.name, keys.iter().copied(), "keys"));
-        }
+        wires
     }
 
     fn table(&mut self, value: Option<&Value>) -> Table {
-        match value.map(|value| (value, value.as_table())) {
-            Some((_, Some(table))) => table.clone(),
-            Some((value, None)) => {
-                self.reader.wrong_type(value, "a table");
-                Table::default()
-            }
-            None => Table::default(),
-        }
+        read_table(value, &mut self.reader)
     }
 
     /// Reads a table whose values are strings.
@@ -263,33 +261,30 @@ impl<'a> Sections<'a> {
     }
 
     /// Reads a table whose values are wires, each a port or a table with an age limit.
-    ///
-    /// Returns the valid wires, and the keys of the invalid ones.
-    fn wire_words(&mut self, value: Option<&Value>) -> (Vec<(Key, Spanned<String>)>, Vec<Key>) {
-        let (mut wires, mut invalid) = (Vec::new(), Vec::new());
+    fn wire_entries(&mut self, value: Option<&Value>) -> InputWires {
+        let mut wires = InputWires::default();
         for (key, value) in self.table(value).entries {
-            let from = if value.as_table().is_some() {
-                self.aged_wire(&value)
-            } else {
-                Spanned::read(&value, &mut self.reader)
+            let wire = match value.as_table() {
+                Some(table) => self.aged_wire(&value, table),
+                None => Spanned::read(&value, &mut self.reader).map(|from| (from, None)),
             };
-            match from {
-                Some(from) => wires.push((key, from)),
-                None => invalid.push(key),
+            match wire {
+                Some((from, age)) => wires.valid.push(WireEntry { key, from, age }),
+                None => wires.invalid.push(key),
             }
         }
-        (wires, invalid)
+        wires
     }
 
     /// Reads a wire with an age limit.
-    fn aged_wire(&mut self, value: &Value) -> Option<Spanned<String>> {
+    fn aged_wire(&mut self, value: &Value, table: &Table) -> Option<(Spanned<String>, Option<AgeLimit>)> {
         if let Some(wire) = WireTable::read(value, &mut self.reader) {
-            self.ages.insert(wire.from.span.start, AgeLimit::of(&wire));
-            return Some(wire.from);
+            let age = AgeLimit::of(&wire);
+            return Some((wire.from, Some(age)));
         }
         // The table has a diagnostic; its port is still resolved, to report a second mistake there.
-        let from = value.as_table().and_then(|table| table.get("from"))?;
-        Some(Spanned { value: from.as_str()?.to_owned(), span: from.span.clone() })
+        let from = table.get("from")?;
+        Some((Spanned { value: from.as_str()?.to_owned(), span: from.span.clone() }, None))
     }
 
     /// Reads a table whose keys are names and whose values are strings.
