@@ -1,15 +1,9 @@
-//! `mock_arm`: an arm that follows its commands exactly.
-//!
-//! It integrates the commanded velocity exactly, q_eq += v dt: that is the equilibrium, where a compliant arm would be if
-//! nothing held it. The position is the same, but it stops at the ends of the joints, and it stays while somebody holds
-//! the arm. The equilibrium then runs ahead, also past an end, and the position springs to it when the arm is let go:
-//! that is the windup that a bound on the lead is for. It is kinematic: it leaves out inertia, friction, stiffness,
-//! delay and noise, so what works on it need not work on an arm.
+//! `mock_arm`: an arm that follows its commands exactly, q_eq += v dt.
 
 use tactflow_runtime::device::{
     Command, Commands, Description, Device, DeviceError, Driver, Opened, Output, Samples, Stepped,
 };
-use tactflow_runtime::node::{FilePath, Mistake, Mistakes, Param};
+use tactflow_runtime::node::{Describe, FilePath, Mistake, Mistakes, Param};
 use tactflow_runtime::signal::{Joint, Joints, JointsShape, Unit};
 
 use super::arm_facts::{check_start, facts};
@@ -33,15 +27,15 @@ pub struct Params {
     /// Samples per second.
     #[param(unit = "1/s", range = 0.001..=1e6, default = 250.0)]
     rate_hz: f64,
-    /// Maximum acceleration that the arm states for each joint, in m/s² for a prismatic joint; it does not keep to it.
+    /// Maximum acceleration that the arm states for each joint, in m/s² for a prismatic joint; the arm does not keep to it.
     #[param(unit = "rad/s2", above = 0.0, default = 10.0)]
     acceleration: f64,
-    /// Times in which the arm is held in place.
+    /// Periods in which the arm is held in place.
     #[param(default = vec![])]
     hold: Vec<Hold>,
 }
 
-/// A time in which the arm is held in place.
+/// A period in which the arm is held in place.
 #[derive(Debug, Clone, Param)]
 struct Hold {
     /// Begin.
@@ -52,8 +46,37 @@ struct Hold {
     to_s: f64,
 }
 
-/// The arm's joints and where they are.
-#[derive(Debug)]
+/// An arm without dynamics that follows its commands exactly.
+///
+/// The device integrates the commanded joint velocity exactly: the result is its `equilibrium`, where a compliant arm would
+/// be if nothing held it. Its `position` is the same, but it stops at the ends of the joints, and it stays in place while
+/// the arm is held (`hold`). Meanwhile the equilibrium runs ahead, also past the end of a joint, and the position springs to
+/// it when the arm is released. A `joint_limit` keeps this lead small.
+///
+/// Inertia, friction, stiffness, delay and noise are not simulated: what works on this arm may fail on a real one. The arm
+/// states its `acceleration` and does not keep to it.
+///
+/// It states the facts `urdf`, `tip` and `mount` for `arm_state`.
+///
+/// ```toml
+/// [roles]
+/// arm = "velocity_arm"
+///
+/// [commands]
+/// arm.velocity = "joint_limit.velocity"
+///
+/// [bind]
+/// arm = "arm"
+///
+/// [devices.arm]
+/// type = "mock_arm"
+/// urdf = "builtin:lwr4p.urdf"          # a KUKA LWR 4+
+/// tip = "lwr_7_link"
+/// mount = { xyz = [0.0, 0.0, 0.03] }   # of the sensor on the tip [m]
+/// start = [0.0, 0.5, 0.0, -1.3, 0.0, 1.3, 0.0]   # [rad]
+/// ```
+#[derive(Debug, Describe)]
+#[describe(name = "mock_arm")]
 pub struct MockArm {
     ports: Ports,
     joints: Vec<Joint>,
@@ -71,35 +94,6 @@ struct Ports {
     position: Output<Joints>,
     equilibrium: Output<Joints>,
     velocity: Command,
-}
-
-impl tactflow_runtime::node::Describe for MockArm {
-    const NAME: &'static str = "mock_arm";
-    const SUMMARY: &'static str = "an arm without dynamics that follows its commands exactly";
-    const DOC: &'static str = "It integrates the commanded joint velocity exactly: that is its `equilibrium`. Its \
-        `position` is the same, but it stops at the ends of the joints, and while somebody holds it, as each `hold` \
-        says. The equilibrium runs ahead then, and when the arm is let go it springs to it: a `joint_limit` keeps that \
-        lead small.\n\n\
-        It leaves out inertia, friction, stiffness, delay and noise: what works on it need not work on an arm. It \
-        states `acceleration` and does not keep to it.\n\n\
-        It states the facts `urdf`, `tip` and `mount` for `arm_state`.";
-    const EXAMPLE: &'static str = r#"
-[roles]
-arm = "velocity_arm"
-
-[commands]
-arm.velocity = "joint_limit.velocity"
-
-[bind]
-arm = "arm"
-
-[devices.arm]
-type = "mock_arm"
-urdf = "builtin:lwr4p.urdf"          # a KUKA LWR 4+
-tip = "lwr_7_link"
-mount = { xyz = [0.0, 0.0, 0.03] }   # of the sensor on the tip [m]
-start = [0.0, 0.5, 0.0, -1.3, 0.0, 1.3, 0.0]   # [rad]
-"#;
 }
 
 impl Device for MockArm {

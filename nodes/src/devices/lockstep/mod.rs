@@ -1,8 +1,4 @@
-//! `lockstep`: a pad and an arm in a simulator of somebody else's, over a line of TCP.
-//!
-//! The simulator says what it is when the device is opened, so a task is checked against it before anything moves. Each
-//! exchange answers the frame that was shown last and waits for the next, so simulator and graph take turns. A frame
-//! counts from the simulator's own clock. `docs/lockstep.md` has the protocol.
+//! `lockstep`: a pad and an arm in an external simulator, over TCP. `docs/lockstep.md` describes the protocol.
 
 mod bridge;
 mod message;
@@ -12,7 +8,7 @@ use std::borrow::Cow;
 use std::time::Duration;
 
 use tactflow_runtime::device::{Description, Device, Driver, Opened};
-use tactflow_runtime::node::{At, FilePath, Mistake, Mistakes, Param};
+use tactflow_runtime::node::{At, Describe, FilePath, Mistake, Mistakes, Param};
 use tactflow_runtime::signal::{ImageShape, Joint, JointsShape, Unit};
 use tactflow_runtime::source::Code;
 
@@ -42,43 +38,45 @@ pub struct Params {
     acceleration: f64,
 }
 
-/// The device; what runs is a `Bridge`.
+/// A pad and an arm in another program: any simulator that speaks the lockstep protocol.
+///
+/// The device connects to a simulator that listens at `address` and exchanges lines of JSON with it; `docs/lockstep.md`
+/// describes how to write one. It replaces the built-in bench: `tactflow run graphs/hybrid.toml --bench
+/// graphs/benches/lockstep.toml`.
+///
+/// First the simulator describes itself: its joints with their limits, the mount of the sensor, and the size, pitch, scale
+/// and threshold of the pad. So the simulator must also run while a graph is checked. It names the model of the arm: `lwr4p`
+/// is built in, and `urdf` names the file of any other model.
+///
+/// In lockstep the simulator waits for each command, and a run is as fast as both allow. Otherwise it runs by its own clock:
+/// the device uses the newest frame, and counts the frames before it as gaps. Frames carry the time of the simulator.
+///
+/// At the end of a run the commands go to zero, frame by frame, and then the simulator receives the reason. The simulator can
+/// also end the run itself. A wrong message, a value that is not finite, silence and a closed connection are faults that name
+/// the message and the field. If the simulator still listens, the device brings the arm to rest before it disconnects.
+///
+/// It states the facts `urdf`, `tip` and `mount` of the arm and `dead`, `threshold`, `pressure` and `calibration` of the pad.
+/// The `contact` that a task reports is sent as `est`.
+///
+/// ```toml
+/// [roles]
+/// pad = "tactile_pad"
+/// arm = "velocity_arm"
+///
+/// [commands]
+/// arm.velocity = "joint_limit.velocity"
+///
+/// [bind]
+/// pad = "bench"
+/// arm = "bench"
+///
+/// [devices.bench]
+/// type = "lockstep"
+/// address = "127.0.0.1:7777"
+/// ```
+#[derive(Describe)]
+#[describe(name = "lockstep")]
 pub struct Lockstep;
-
-impl tactflow_runtime::node::Describe for Lockstep {
-    const NAME: &'static str = "lockstep";
-    const SUMMARY: &'static str =
-        "a pad and an arm in another program: any simulator that speaks the lockstep protocol";
-    const DOC: &'static str = "\
-The device connects to a simulator that listens at `address` and speaks lines of JSON; `docs/lockstep.md` says how to \
-write one. It stands in for the built-in bench: `tactflow run graphs/hybrid.toml --bench graphs/benches/lockstep.toml`.\n\n\
-The simulator says first what it is: its joints with their limits, where the sensor is mounted, the pad's size, pitch, \
-scale and threshold. So the simulator has to be there when a graph is checked, too. It names the arm's model; `lwr4p` is \
-built in, and `urdf` names a file for any other.\n\n\
-In lockstep it waits for each command, and a run is as fast as both are. Otherwise it runs by its own clock: then the \
-newest frame counts, and those before it are counted as gaps. Frames carry the simulator's time.\n\n\
-At the end of a run the commands go to zero first, frame by frame, and then the simulator receives the reason. It may end the run \
-itself. What it says wrongly, a value that is not finite, silence and a closed connection are faults that name the \
-message and the field; where it still listens, the arm is brought to rest before it is left.\n\n\
-It states the facts `urdf`, `tip` and `mount` of the arm and `dead`, `threshold`, `pressure` and `calibration` of the \
-pad. What a task reports as `contact` goes out as `est`.";
-    const EXAMPLE: &'static str = r#"
-[roles]
-pad = "tactile_pad"
-arm = "velocity_arm"
-
-[commands]
-arm.velocity = "joint_limit.velocity"
-
-[bind]
-pad = "bench"
-arm = "bench"
-
-[devices.bench]
-type = "lockstep"
-address = "127.0.0.1:7777"
-"#;
-}
 
 impl Device for Lockstep {
     type Params = Params;

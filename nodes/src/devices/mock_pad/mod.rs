@@ -1,8 +1,7 @@
-//! `mock_pad`: a pad that is pressed as its bench says, and that misbehaves as its bench says.
+//! `mock_pad`: a simulated pad with scripted presses and faults.
 //!
-//! A press is a smooth bump of force, (1 - d²/r²)² at distance d from a point or from a bar. Its samples at the tactels
-//! are scaled so that they sum to the press's force over an endless array: exact while it is on the pad, and falling
-//! smoothly to zero as it slides off. No foam, no noise, no hysteresis.
+//! The samples of a press at the tactels are scaled so that they sum to its force over an infinite array. So the sum is
+//! exact while the press is on the pad, and falls smoothly to zero as it slides off.
 
 mod glitch;
 mod press;
@@ -10,7 +9,7 @@ mod press;
 use std::borrow::Cow;
 
 use tactflow_runtime::device::{Commands, Description, Device, DeviceError, Driver, Opened, Output, Samples, Stepped};
-use tactflow_runtime::node::{Mistake, Mistakes, Param};
+use tactflow_runtime::node::{Describe, Mistake, Mistakes, Param};
 use tactflow_runtime::signal::{Image, ImageShape, Unit};
 
 use super::{nanos, period_of};
@@ -56,8 +55,34 @@ pub struct Params {
 /// Maximum number of tactels of a pad.
 const MAX_TACTELS: usize = 1 << 22;
 
-/// The script and how far it has got.
-#[derive(Debug)]
+/// A simulated pad with scripted presses of points and bars, and with scripted faults.
+///
+/// Each `press` is a smooth bump of force, (1 - d²/r²)² at distance d from a point or a bar. It appears, moves and
+/// disappears on a schedule. Its tactels sum to its `force` while it is on the pad, and it slides off smoothly. Foam, noise
+/// and hysteresis are not simulated: use the pad to try out a graph and for tests whose result is known, not to tune gains.
+///
+/// A `glitch` is a fault that lasts for a while: `repeat` repeats the last frame, `freeze` repeats it as if it were new,
+/// `silence` gives no frame, `nan` makes one tactel not a number, `back` gives stamps that lie in the past. With `unplug`
+/// the device fails, and it stays failed also after `for_s`. Try a graph with each of them.
+///
+/// It states the facts `dead` (no tactel is), `threshold`, `pressure` and `calibration` (its values are forces already).
+///
+/// ```toml
+/// [roles]
+/// pad = "tactile_pad"
+///
+/// [bind]
+/// pad = "pad"
+///
+/// [devices.pad]
+/// type = "mock_pad"                   # 16 by 16 tactels, 5 mm apart, in N, 250 frames a second
+/// for_s = 4.0                         # [s]
+/// press = [
+///     { from_s = 0.5, to_s = 3.5, at = [-0.010, 0.005], speed = [0.004, 0.0], force = 4.0 },   # [s, s, m, m/s, N]
+/// ]
+/// ```
+#[derive(Debug, Describe)]
+#[describe(name = "mock_pad")]
 pub struct MockPad {
     image: Output<Image>,
     shape: ImageShape,
@@ -77,34 +102,6 @@ struct Due {
     stamp: i64,
     sequence: u64,
     is_nan: bool,
-}
-
-impl tactflow_runtime::node::Describe for MockPad {
-    const NAME: &'static str = "mock_pad";
-    const SUMMARY: &'static str =
-        "a simulated pad that is pressed by points and bars, and misbehaves, as its bench says";
-    const DOC: &'static str = "Each `press` is a smooth bump of force, (1 - d²/r²)² at distance d from a point or from a \
-        bar, that appears, moves and disappears on a schedule. Its tactels sum to its `force` while it is on the pad, and it \
-        slides off smoothly. There is no foam, no noise and no hysteresis: the pad is for trying out a graph and for \
-        tests whose result is known, not for tuning gains.\n\n\
-        A `glitch` makes it misbehave for a while: `repeat` shows an old frame again, `freeze` shows it as if it were \
-        new, `silence` shows none, `nan` a value that is no number, `back` stamps that lie in the past; with `unplug` \
-        the device fails, and stays failed also after `for_s`. A graph should be tried with each of them.\n\n\
-        It states the facts `dead` (no tactel is), `threshold`, `pressure`, and `calibration`: it is calibrated already.";
-    const EXAMPLE: &'static str = r#"
-[roles]
-pad = "tactile_pad"
-
-[bind]
-pad = "pad"
-
-[devices.pad]
-type = "mock_pad"                   # 16 by 16 tactels, 5 mm apart, in N, 250 frames a second
-for_s = 4.0                         # [s]
-press = [
-    { from_s = 0.5, to_s = 3.5, at = [-0.010, 0.005], speed = [0.004, 0.0], force = 4.0 },   # [s, s, m, m/s, N]
-]
-"#;
 }
 
 impl Device for MockPad {

@@ -1,8 +1,7 @@
 //! `sim_bench`: the simulated bench as a device: a pad, an arm and objects.
 //!
-//! It is a stepped device in virtual time: the same commands and the same seed give the same bits. Between two exchanges
-//! the world advances in steps of at most `step_s`, at the velocity that was commanded last. An image is taken at the rate
-//! `rate_hz`. It is available `latency_s` later, with the stamp of the time when it was taken.
+//! Between two exchanges the world advances in steps of at most `step_s`, at the velocity that was commanded last. An image
+//! is taken at the rate `rate_hz`. It is available `latency_s` later, with the stamp of the time when it was taken.
 
 mod check;
 
@@ -12,7 +11,7 @@ use std::collections::VecDeque;
 use tactflow_runtime::device::{
     Command, Commands, Description, Device, DeviceError, Driver, Opened, Output, Report, Samples, Stepped,
 };
-use tactflow_runtime::node::{FilePath, Mistakes, Param, PortSpec};
+use tactflow_runtime::node::{Describe, FilePath, Mistakes, Param, PortSpec};
 use tactflow_runtime::signal::{Image, ImageShape, Joint, Joints, JointsShape, Kind, Pose, Scalar, ScalarShape, Unit};
 
 use super::contact::Contact;
@@ -111,7 +110,55 @@ const INERTIA: [f64; 7] = [2.0, 2.0, 1.0, 0.8, 0.3, 0.25, 0.1];
 /// Largest number of tactels of a simulated pad.
 pub const MAX_TACTELS: usize = 128 * 128;
 
-/// The bench.
+/// A simulated bench: a foam pad on an arm in joint impedance control, and objects to touch.
+///
+/// The bench closes the loop without hardware: commands move the arm and its pad, and contact gives an image and pushes the
+/// arm back.
+///
+/// The pad is an elastic foundation of foam on a rigid plate, simulated at points at most 1 mm apart. Each point is a
+/// stiffening spring in series with the stiffness of the object. The foam spreads a load over several tactels, and friction
+/// sticks and slips at every tactel. Each tactel has its own saturating curve, hysteresis, creep and noise, and reads 12
+/// bits: the image is in raw counts, and `calibration` names the file that converts them to forces.
+///
+/// The arm is that of the paper. Every joint is a spring and a damper toward a posture that moves at the commanded velocity,
+/// so the pad yields and tilts under a load.
+///
+/// Objects are placed relative to the sensor at the start, whose z points out of the pad: `at = [0.01, 0, 0.05]` is 1 cm
+/// along the sensor's x and 5 cm in front of it. They are fixed, stand on a compliant `mount`, or follow their `motion`.
+///
+/// It runs in virtual time, and the same commands and seed give the same bits; with `--realtime` it is paced by the clock.
+/// The pad states the facts `dead`, `threshold`, `pressure` and `calibration`, and the standard deviations of its noise:
+/// `common_noise`, which all tactels share, as a fraction of the reading, and `own_noise` of each tactel in raw counts. The
+/// arm states `urdf`, `tip` and `mount`. In the role `ground_truth` it provides true values to scenarios and recordings only.
+///
+/// Not simulated: gravity, coupling of the joints, rotation of objects under load, interaction between columns of foam, wear
+/// and temperature.
+///
+/// ```toml
+/// [roles]
+/// pad = "tactile_pad"
+/// arm = "velocity_arm"
+///
+/// [commands]
+/// arm.velocity = "joint_limit.velocity"
+///
+/// [bind]
+/// pad = "bench"
+/// arm = "bench"
+///
+/// [devices.bench]
+/// type = "sim_bench"
+/// for_s = 4.0                         # [s]
+/// urdf = "builtin:lwr4p.urdf"         # a KUKA LWR 4+
+/// tip = "lwr_7_link"
+/// mount = { xyz = [0.0, 0.0, 0.03] }  # of the sensor on the tip [m]
+/// start = [0.0, 0.5, 0.0, -1.3, 0.0, 1.3, 0.0]   # [rad]
+/// objects = [
+///     { shape = "ball", radius = 0.04, at = [0.01, -0.005, 0.041] },   # 1 mm before the pad [m]
+/// ]
+/// ```
+#[derive(Describe)]
+#[describe(name = "sim_bench")]
 pub struct SimBench {
     ports: Ports,
     world: World,
@@ -130,52 +177,6 @@ pub struct SimBench {
     /// Number of exchanges that advanced the time.
     sequence: u64,
     threshold: f64,
-}
-
-impl tactflow_runtime::node::Describe for SimBench {
-    const NAME: &'static str = "sim_bench";
-    const SUMMARY: &'static str =
-        "a simulated bench: a foam pad on an arm in joint impedance control, and objects to touch";
-    const DOC: &'static str = "\
-The bench closes the loop without hardware: commands move the arm and its pad, and contact gives an image and pushes the \
-arm back.\n\n\
-The pad is an elastic foundation of foam on a rigid plate, simulated at points at most 1 mm apart. Each point is a \
-stiffening spring in series with the stiffness of the object. The foam spreads a load over several tactels, and friction \
-sticks and slips at every tactel. Each tactel has its own saturating curve, hysteresis, creep and noise, and reads 12 bits: \
-the image is in raw counts, and `calibration` names the file that converts them to forces.\n\n\
-The arm is that of the paper. Every joint is a spring and a damper toward a posture that moves at the commanded velocity, \
-so the pad yields and tilts under a load.\n\n\
-Objects are placed relative to the sensor at the start, whose z points out of the pad: `at = [0.01, 0, 0.05]` is 1 cm \
-along the sensor's x and 5 cm in front of it. They are fixed, stand on a compliant `mount`, or follow their `motion`.\n\n\
-It runs in virtual time, and the same commands and seed give the same bits; with `--realtime` it is paced by the clock. The \
-pad states the facts `dead`, `threshold`, `pressure` and `calibration`, and the standard deviations of its noise: \
-`common_noise`, which all tactels share, as a fraction of the reading, and `own_noise` of each tactel [raw]. The arm states \
-`urdf`, `tip` and `mount`. In the role `ground_truth` it provides true values to scenarios and recordings only.\n\n\
-Not simulated: gravity, coupling of the joints, rotation of objects under load, interaction between columns of foam, wear \
-and temperature.";
-    const EXAMPLE: &'static str = r#"
-[roles]
-pad = "tactile_pad"
-arm = "velocity_arm"
-
-[commands]
-arm.velocity = "joint_limit.velocity"
-
-[bind]
-pad = "bench"
-arm = "bench"
-
-[devices.bench]
-type = "sim_bench"
-for_s = 4.0                         # [s]
-urdf = "builtin:lwr4p.urdf"         # a KUKA LWR 4+
-tip = "lwr_7_link"
-mount = { xyz = [0.0, 0.0, 0.03] }  # of the sensor on the tip [m]
-start = [0.0, 0.5, 0.0, -1.3, 0.0, 1.3, 0.0]   # [rad]
-objects = [
-    { shape = "ball", radius = 0.04, at = [0.01, -0.005, 0.041] },   # 1 mm before the pad [m]
-]
-"#;
 }
 
 impl Device for SimBench {
