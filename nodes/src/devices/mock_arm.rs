@@ -1,12 +1,10 @@
 //! `mock_arm`: an arm that follows its commands exactly, q_eq += v dt.
 
-use tactflow_runtime::device::{
-    Command, Commands, Description, Device, DeviceError, Driver, Opened, Output, Samples, Stepped,
-};
+use tactflow_runtime::device::{Commands, Description, Device, DeviceError, Driver, Opened, Samples, Stepped};
 use tactflow_runtime::node::{Describe, FilePath, Mistake, Mistakes, Param};
-use tactflow_runtime::signal::{Joint, Joints, JointsShape, Unit};
+use tactflow_runtime::signal::Joint;
 
-use super::arm_facts::{check_start, facts};
+use super::arm::{self, ArmPorts};
 use super::{nanos, period_of};
 use crate::arm::model::load;
 use crate::arm::mount::Mount;
@@ -78,10 +76,10 @@ struct Hold {
 #[derive(Debug, Describe)]
 #[describe(name = "mock_arm")]
 pub struct MockArm {
-    ports: Ports,
+    ports: ArmPorts,
     joints: Vec<Joint>,
     position: Vec<f64>,
-    /// What the commands add up to.
+    /// The sum of the commands.
     equilibrium: Vec<f64>,
     holds: Vec<Hold>,
     period: i64,
@@ -89,33 +87,18 @@ pub struct MockArm {
     sequence: u64,
 }
 
-#[derive(Debug, Clone, Copy)]
-struct Ports {
-    position: Output<Joints>,
-    equilibrium: Output<Joints>,
-    velocity: Command,
-}
-
 impl Device for MockArm {
     type Params = Params;
 
     fn open(params: Params) -> Result<Opened, Mistakes> {
         let chain = load(&params.urdf, &params.tip, &params.mount)?;
-        let period = period_of(params.rate_hz);
-        let acceleration = params.acceleration;
-        let joints: Vec<Joint> = chain.joints().iter().map(|joint| Joint { acceleration, ..joint.clone() }).collect();
-        check_start(&joints, &params.start)?;
+        let joints = arm::joints(&chain, params.acceleration, &params.start)?;
         check_holds(&params.hold)?;
-        let shape = JointsShape { joints: joints.clone(), unit: Unit::RADIAN };
+        let period = period_of(params.rate_hz);
         let mut description = Description::every(period as f64 * 1e-9);
-        let mut arm = description.fills("velocity_arm");
-        arm.facts(facts(&params.urdf, &params.tip, &params.mount)?);
-        let ports = Ports {
-            position: arm.output("position", shape.clone()),
-            equilibrium: arm.output("equilibrium", shape.clone()),
-            velocity: arm.command("velocity", shape.in_unit(Unit::RADIAN.per_second())),
-        };
-        let arm = Self::new(ports, joints, params.start, params.hold, period);
+        let facts = arm::facts(&params.urdf, &params.tip, &params.mount)?;
+        let ports = ArmPorts::fill(&mut description, &joints, facts);
+        let arm = Self::new(ports, joints.joints, params.start, params.hold, period);
         Ok(Opened { description, driver: Driver::Stepped(Box::new(arm)) })
     }
 }
@@ -129,30 +112,27 @@ impl Stepped for MockArm {
         let is_due = self.next().is_none_or(|next| next <= now);
         if self.advance(now, commands.joints(self.ports.velocity))? && is_due {
             self.sequence += 1;
-            samples.write(self.ports.position, now, self.sequence).0.copy_from_slice(&self.position);
-            samples.write(self.ports.equilibrium, now, self.sequence).0.copy_from_slice(&self.equilibrium);
+            self.ports.write(samples, now, self.sequence, [&self.position, &self.equilibrium]);
         }
         Ok(())
     }
 }
 
 impl MockArm {
-    fn new(ports: Ports, joints: Vec<Joint>, start: Vec<f64>, holds: Vec<Hold>, period: i64) -> Self {
+    fn new(ports: ArmPorts, joints: Vec<Joint>, start: Vec<f64>, holds: Vec<Hold>, period: i64) -> Self {
         Self { ports, joints, equilibrium: start.clone(), position: start, holds, period, last: None, sequence: 0 }
     }
 
-    /// Moves with `velocity` from the last exchange to `now`; whether time went on, so that there is a new sample.
+    /// Moves at `velocity` from the last exchange to `now` [ns]. Returns whether time advanced, so that there is a new sample.
     fn advance(&mut self, now: i64, velocity: &[f64]) -> Result<bool, DeviceError> {
         if self.last.is_some_and(|last| now <= last) {
             return Ok(false);
         }
+        arm::check_velocity(&self.joints, velocity)?;
         let dt = (now - self.last.unwrap_or(now)) as f64 * 1e-9;
         let is_held = self.holds.iter().any(|hold| (nanos(hold.from_s)..nanos(hold.to_s)).contains(&now));
         let places = self.equilibrium.iter_mut().zip(&mut self.position);
         for (((equilibrium, q), v), joint) in places.zip(velocity).zip(&self.joints) {
-            if !v.is_finite() {
-                return Err(DeviceError(format!("the velocity commanded to joint `{}` is not finite", joint.name)));
-            }
             *equilibrium += v * dt;
             if !is_held {
                 *q = equilibrium.clamp(joint.lower, joint.upper);
@@ -163,6 +143,7 @@ impl MockArm {
     }
 }
 
+/// Checks that every hold lasts for some time.
 fn check_holds(holds: &[Hold]) -> Result<(), Mistakes> {
     let backward = holds.iter().filter(|hold| hold.to_s <= hold.from_s);
     let message = |hold: &Hold| format!("a hold from {} s to {} s lasts no time", hold.from_s, hold.to_s);
@@ -175,7 +156,7 @@ mod tests {
     use std::path::Path;
 
     use tactflow_runtime::harness::NodeRig;
-    use tactflow_runtime::signal::Shape;
+    use tactflow_runtime::signal::{Joints, JointsShape, Shape, Unit};
 
     use super::*;
     use crate::devices::testing::{Bench, open, read};
@@ -211,12 +192,7 @@ mod tests {
         let joint = |name: &str| Joint { name: name.into(), lower: -1.0, upper: 1.0, speed: 1.0, acceleration: 10.0 };
         let params: Params = read(&format!("urdf = 'none'\ntip = ''\nstart = []\nhold = {holds}"));
         let mut description = Description::every(0.004);
-        let mut arm = description.fills("velocity_arm");
-        let ports = Ports {
-            position: arm.output("position", JointsShape::default()),
-            equilibrium: arm.output("equilibrium", JointsShape::default()),
-            velocity: arm.command("velocity", JointsShape::default()),
-        };
+        let ports = ArmPorts::fill(&mut description, &JointsShape::default(), vec![]);
         MockArm::new(ports, vec![joint("a"), joint("b")], vec![0.0, 0.5], params.hold, 4_000_000)
     }
 

@@ -36,9 +36,7 @@ fn lossless() -> Foam {
 fn world(arm: SimArm, foam: Foam, things: &[ObjectParams], step: f64) -> World {
     let from = start(&arm);
     let objects = things.iter().map(|thing| Object::new(thing, from, [0.0; 2]).unwrap()).collect();
-    let contact = Contact::new(shape(), foam.clone(), 0.001, 8);
-    let imprint = Imprint::new(&shape(), contact.fine(), foam.spread);
-    World::new(arm, objects, contact, imprint, shape(), step)
+    World::new(arm, objects, shape(), foam, 0.001, step)
 }
 
 /// Returns a prismatic joint along the pad's z.

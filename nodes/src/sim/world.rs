@@ -4,6 +4,7 @@ use parry3d_f64::math::{Pose3, Vec3};
 use tactflow_runtime::signal::ImageShape;
 
 use super::contact::{BodyMotion, Contact};
+use super::foam::Foam;
 use super::imprint::Imprint;
 use super::joints::SimArm;
 use super::object::Object;
@@ -31,20 +32,15 @@ pub struct World {
 }
 
 impl World {
-    /// Returns a world at time 0, with steps of at most `max_step` [s].
+    /// Returns a world at time 0, with points of the pad at most `apart` [m] apart and steps of at most `max_step` [s].
     #[must_use]
-    pub fn new(
-        arm: SimArm,
-        objects: Vec<Object>,
-        contact: Contact,
-        imprint: Imprint,
-        shape: ImageShape,
-        max_step: f64,
-    ) -> Self {
+    pub fn new(arm: SimArm, objects: Vec<Object>, shape: ImageShape, foam: Foam, apart: f64, max_step: f64) -> Self {
+        let spread = foam.spread;
+        let contact = Contact::new(shape.clone(), foam, apart, objects.len());
+        let imprint = Imprint::new(&shape, contact.fine(), spread);
         let loads = vec![Vec3::ZERO; objects.len()];
         let from = start(&arm);
-        let surveys = objects.iter().enumerate().filter_map(|(i, object)| Some((i, Survey::new(object, from)?)));
-        let survey = surveys.take(1).next();
+        let survey = objects.iter().enumerate().find_map(|(i, object)| Some((i, Survey::new(object, from)?)));
         Self { survey, arm, objects, contact, imprint, shape, loads, time: 0.0, max_step, is_stale: true }
     }
 

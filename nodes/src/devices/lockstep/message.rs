@@ -1,4 +1,4 @@
-//! The messages of the bridge: those of a simulator are read and checked, those to it are written.
+//! The messages of the lockstep protocol: those of a simulator are read and checked, those to it are written.
 //!
 //! JSON has no `NaN` and no infinity, so every number that is read is finite. An error names the field and the element,
 //! as `img[7]`, and where the text is wrong, the byte.
@@ -66,6 +66,13 @@ pub(super) struct Hello {
 #[serde(rename_all = "lowercase")]
 enum HelloType {
     Hello,
+}
+
+impl Hello {
+    /// Returns the sizes that a frame must have.
+    pub(super) const fn sizes(&self) -> Sizes {
+        Sizes { joints: self.joints.len(), rows: self.rows, cols: self.cols }
+    }
 }
 
 /// A frame.
@@ -138,10 +145,10 @@ pub(super) fn hello(line: &str) -> Result<Hello, String> {
 /// What is wrong, with its field and, where the line is JSON, with the number of the frame.
 pub(super) fn message(line: &str, sizes: Sizes) -> Result<Message, String> {
     #[derive(Deserialize)]
-    struct Head {
+    struct Tag {
         r#type: FrameType,
     }
-    if parse(line).is_ok_and(|head: Head| head.r#type == FrameType::End) {
+    if parse(line).is_ok_and(|tag: Tag| tag.r#type == FrameType::End) {
         return Ok(Message::End);
     }
     let obs = parse(line).and_then(|obs| check_sizes(obs, sizes));

@@ -1,4 +1,4 @@
-//! Faults of a scripted pad.
+//! Scripted faults of a pad.
 
 use tactflow_runtime::node::Param;
 
@@ -6,7 +6,7 @@ use crate::devices::nanos;
 
 /// A kind of fault.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Param)]
-pub enum Trouble {
+pub enum GlitchKind {
     /// The last frame is repeated with its old sequence number.
     Repeat,
     /// The last frame is repeated with new sequence numbers and stamps: a stuck sensor.
@@ -31,7 +31,7 @@ pub struct Glitch {
     #[param(unit = "s", above = 0.0)]
     pub(crate) for_s: f64,
     /// Kind of the fault.
-    pub(crate) kind: Trouble,
+    pub(crate) kind: GlitchKind,
 }
 
 impl Glitch {

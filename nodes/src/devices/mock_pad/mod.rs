@@ -6,15 +6,13 @@
 mod glitch;
 mod press;
 
-use std::borrow::Cow;
-
 use tactflow_runtime::device::{Commands, Description, Device, DeviceError, Driver, Opened, Output, Samples, Stepped};
 use tactflow_runtime::node::{Describe, Mistake, Mistakes, Param};
 use tactflow_runtime::signal::{Image, ImageShape, Unit};
 
-use super::{nanos, period_of};
+use super::{nanos, pad, period_of};
 
-pub use glitch::{Glitch, Trouble};
+pub use glitch::{Glitch, GlitchKind};
 pub use press::Press;
 
 /// Parameters of `mock_pad`.
@@ -94,7 +92,7 @@ pub struct MockPad {
     served: Option<i64>,
 }
 
-/// A frame that is due.
+/// A frame to serve.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 struct Due {
     /// Frame whose values it has.
@@ -121,23 +119,13 @@ impl Device for MockPad {
         }
         let shape = ImageShape { rows: params.rows, cols: params.cols, pitch: [params.pitch; 2], unit: params.unit };
         let mut description = Description::every(period as f64 * 1e-9);
-        let mut pad = description.fills("tactile_pad");
-        pad.facts(facts(&params));
-        let image = pad.output("image", shape.clone());
+        // The values are forces already.
+        let calibration = toml::Table::from_iter([("gain".to_owned(), 1.0.into())]);
+        let facts = pad::facts(params.threshold, params.pressure, calibration);
+        let image = pad::fill(&mut description, shape.clone(), facts);
         let pad = Self::new(image, shape, period, params);
         Ok(Opened { description, driver: Driver::Stepped(Box::new(pad)) })
     }
-}
-
-/// What a task may ask of it: its values are forces already.
-fn facts(params: &Params) -> Vec<(Cow<'static, str>, toml::Value)> {
-    let calibration = toml::Table::from_iter([("gain".to_owned(), 1.0.into())]);
-    vec![
-        ("dead".into(), toml::Value::Array(vec![])),
-        ("threshold".into(), params.threshold.into()),
-        ("pressure".into(), params.pressure.into()),
-        ("calibration".into(), calibration.into()),
-    ]
 }
 
 impl MockPad {
@@ -164,10 +152,10 @@ impl MockPad {
     }
 
     fn silence(&self, frame: i64) -> Option<&Glitch> {
-        self.glitch(frame).filter(|glitch| glitch.kind == Trouble::Silence)
+        self.glitch(frame).filter(|glitch| glitch.kind == GlitchKind::Silence)
     }
 
-    /// The first frame from `frame` on that is not in a silence.
+    /// Returns the first frame from `frame` on that is not in a silence.
     fn after_silence(&self, mut frame: i64) -> i64 {
         while let Some(silence) = self.silence(frame).filter(|_| frame < self.frames) {
             let end = silence.end();
@@ -176,7 +164,7 @@ impl MockPad {
         frame
     }
 
-    /// The newest frame up to `now` that was not served yet, if there is one; what comes before it is skipped.
+    /// Returns the newest frame up to `now` [ns] that was not served yet, or `None`. It skips the frames before that one.
     fn due(&mut self, now: i64) -> Option<Due> {
         if now < 0 {
             return None;
@@ -192,20 +180,20 @@ impl MockPad {
         let time = frame * self.period;
         let plain = |frame: i64| Due { frame, stamp: frame * self.period, sequence: frame as u64 + 1, is_nan: false };
         match self.glitch(frame).map(|glitch| (glitch.kind, glitch.start())) {
-            // What was served last comes once more; before anything was, there is nothing to repeat.
-            Some((Trouble::Repeat, _)) => self.served.map(plain),
-            // A stuck sensor: before anything was served it is stuck with this one.
-            Some((Trouble::Freeze, _)) => {
+            // The last frame once more. Before the first frame there is nothing to repeat.
+            Some((GlitchKind::Repeat, _)) => self.served.map(plain),
+            // A stuck sensor. Before the first frame it is stuck with this one.
+            Some((GlitchKind::Freeze, _)) => {
                 let stuck = *self.served.get_or_insert(frame);
                 Some(Due { frame: stuck, ..plain(frame) })
             }
-            Some((Trouble::Nan, _)) => Some(Due { is_nan: true, ..plain(frame) }),
-            // The clock runs back from the glitch's start, so that every stamp lies before the last good one.
-            Some((Trouble::Back, start)) => {
+            Some((GlitchKind::Nan, _)) => Some(Due { is_nan: true, ..plain(frame) }),
+            // The clock runs back from the start of the glitch, so every stamp lies before the last good one.
+            Some((GlitchKind::Back, start)) => {
                 Some(Due { stamp: start - (time - start) - 2 * self.period, ..plain(frame) })
             }
-            // An unplugged pad fails in `exchange`, before it is asked what is due.
-            Some((Trouble::Silence | Trouble::Unplug, _)) | None => {
+            // An unplugged pad has failed in `exchange` before this.
+            Some((GlitchKind::Silence | GlitchKind::Unplug, _)) | None => {
                 self.served = Some(frame);
                 Some(plain(frame))
             }
@@ -234,7 +222,7 @@ impl Stepped for MockPad {
     }
 
     fn exchange(&mut self, now: i64, _: &Commands, samples: &mut Samples) -> Result<(), DeviceError> {
-        if self.glitches.iter().any(|glitch| glitch.kind == Trouble::Unplug && now >= glitch.start()) {
+        if self.glitches.iter().any(|glitch| glitch.kind == GlitchKind::Unplug && now >= glitch.start()) {
             return Err(DeviceError("its plug is out".into()));
         }
         if let Some(due) = self.due(now) {
