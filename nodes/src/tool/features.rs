@@ -24,7 +24,7 @@ Examples:
   tactflow features pad.npy --pitch-mm 5x5 --rate-hz 250 --unit N --threshold 0.02 --min-area 6
   tactflow features press.csv --graph > press.toml"
 )]
-pub(super) struct Features {
+pub(super) struct FeaturesArgs {
     /// Recording, optionally in a .zip or .gz
     recording: PathBuf,
     /// Write one row a frame, as .csv or .ndjson
@@ -75,7 +75,7 @@ struct HintArgs {
 /// Default threshold of a touched tactel, as a fraction of the maximum value of the recording.
 const DEFAULT_THRESHOLD: f64 = 0.05;
 
-pub(super) fn features(args: Features, shell: &Shell) -> u8 {
+pub(super) fn features(args: FeaturesArgs, shell: &Shell) -> u8 {
     // The check of the graph reports what is wrong with the recording, once and at its place.
     let (headline, threshold) = match args.inspect() {
         Some((headline, threshold)) => (Some(headline), threshold),
@@ -118,7 +118,7 @@ impl Threshold {
     }
 }
 
-impl Features {
+impl FeaturesArgs {
     /// Returns the summary of the recording and the threshold. The recording is dropped: the graph reads it again.
     fn inspect(&self) -> Option<(String, Threshold)> {
         let bytes = std::fs::read(&self.recording).ok()?;

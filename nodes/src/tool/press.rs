@@ -26,7 +26,7 @@ Examples:
 
 Exit codes: 0 success; 2 the log cannot be written."
 )]
-pub(super) struct Press {
+pub(super) struct PressArgs {
     /// Write the log; replaces a log of this command, but no other file
     #[arg(short, long, value_name = "FILE")]
     out: PathBuf,
@@ -49,7 +49,7 @@ const REST_S: f64 = 5.0;
 /// Time of the press, up and down [s].
 const PRESS_S: f64 = 30.0;
 
-pub(super) fn run(args: Press, shell: &Shell) -> u8 {
+pub(super) fn run(args: PressArgs, shell: &Shell) -> u8 {
     let [rows, cols] = args.size.map(NonZeroUsize::get);
     if rows.saturating_mul(cols) > MAX_TACTELS {
         shell.error(format_args!("a simulated pad has at most {MAX_TACTELS} tactels, not {rows} by {cols}"));
@@ -73,7 +73,7 @@ fn shown(path: &Path) -> String {
     path.display().to_string()
 }
 
-fn write(args: &Press) -> std::io::Result<usize> {
+fn write(args: &PressArgs) -> std::io::Result<usize> {
     let [rows, cols] = args.size.map(NonZeroUsize::get);
     let tactels = rows * cols;
     let mut readout = Readout::new(tactels, Electronics { serial: args.serial, ..Electronics::DEFAULT }, args.serial);
