@@ -24,21 +24,10 @@ pub enum CurveKind {
 /// All kinds, the simplest first.
 pub const KINDS: [CurveKind; 3] = [CurveKind::Linear, CurveKind::Rational, CurveKind::Piecewise];
 
-impl CurveKind {
-    /// Returns the name in a file and on the command line.
-    #[must_use]
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Linear => "linear",
-            Self::Rational => "rational",
-            Self::Piecewise => "piecewise",
-        }
-    }
-}
-
 impl fmt::Display for CurveKind {
+    /// Writes the name in a file and on the command line.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.pad(self.name())
+        f.pad(["linear", "rational", "piecewise"][*self as usize])
     }
 }
 
@@ -172,16 +161,6 @@ impl ForceCurve {
         }
     }
 
-    /// Returns the maximum force, or `None` for a curve without an end.
-    #[must_use]
-    pub fn most(&self) -> Option<f32> {
-        match self {
-            Self::Linear { .. } => None,
-            Self::Rational { most, .. } => Some(*most),
-            Self::Piecewise { knots } => knots.last().map(|[_, force]| *force),
-        }
-    }
-
     /// Returns what makes the curve unusable: the name of the number and the mistake. `None` if the curve is good.
     #[must_use]
     pub fn flaw(&self) -> Option<(&'static str, String)> {
@@ -238,6 +217,7 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
+    use crate::calibration::testing::max_force;
 
     fn rational_of(gain: f32, squash: f32, most: f32) -> ForceCurve {
         ForceCurve::Rational { gain, squash, most }
@@ -331,16 +311,16 @@ mod tests {
     proptest! {
         #[test]
         fn the_characteristic_and_its_inverse_belong_together(curve in any_curve(), part in 0.0..1.0f64) {
-            let force = part * f64::from(curve.most().unwrap());
+            let force = part * f64::from(max_force(&curve));
             let back = f64::from(curve.force(curve.reading(force) as f32));
             // Where the curve is flat, 32 bits of a reading are few of a force; flat knots have a range of readings.
-            prop_assert!((back - force).abs() < 0.01 * f64::from(curve.most().unwrap()), "{} of {}", back, force);
+            prop_assert!((back - force).abs() < 0.01 * f64::from(max_force(&curve)), "{} of {}", back, force);
         }
 
         #[test]
         fn more_is_never_less_and_never_out_of_bounds(curve in any_curve(), s in -1e4..1e5f32, more in 0.0..1e5f32) {
             let (one, other) = (curve.force(s), curve.force(s + more));
-            let most = curve.most().unwrap();
+            let most = max_force(&curve);
             // Every operation rounds monotonically, so not even the last bit goes back.
             prop_assert!(other >= one, "{} then {}", one, other);
             for force in [one, other] {

@@ -335,18 +335,18 @@ mod tests {
         }
 
         #[test]
-        fn strays_do_not_count(a in 1000.0..4000.0f64, b in 1.0..10.0f64, every in 12..30usize, by in 300.0..3000.0f64) {
+        fn outliers_do_not_count(a in 1000.0..4000.0f64, b in 1.0..10.0f64, every in 12..30usize, by in 300.0..3000.0f64) {
             let clean = samples(|f| a * f / (f + b), 5.0);
-            let mut stray = clean.clone();
-            stray.iter_mut().skip(60).step_by(every).for_each(|sample| sample.s += by);
+            let mut outliers = clean.clone();
+            outliers.iter_mut().skip(60).step_by(every).for_each(|sample| sample.s += by);
             let at = |samples: &[TactelSample], kind: usize| {
                 let points = Points::new(samples, 0.01).unwrap();
                 let curve = [points.rational(1.0), points.piecewise(1.0)][kind].clone();
                 f64::from(curve.force((a * 2.5 / (2.5 + b)) as f32))
             };
             for kind in 0..2 {
-                let moved = (at(&stray, kind) - at(&clean, kind)).abs();
-                prop_assert!(moved < 0.1, "strays of {} counts move 2.5 N by {}", by, moved);
+                let moved = (at(&outliers, kind) - at(&clean, kind)).abs();
+                prop_assert!(moved < 0.1, "outliers of {} counts move 2.5 N by {}", by, moved);
             }
         }
 
@@ -394,7 +394,7 @@ mod tests {
     }
 
     #[test]
-    fn too_little_gives_no_points() {
+    fn too_few_samples_have_no_points() {
         let all = samples(|f| 100.0 * f, 4.0);
         assert!(Points::new(&all[..60], 0.01).is_none(), "ten with a force");
         assert!(Points::new(&[], 0.01).is_none());

@@ -107,7 +107,7 @@ impl<'l> LogAnalysis<'l> {
     /// by `bearing` tactels, or by the live ones.
     #[must_use]
     pub fn new(logs: &'l [Log], load: LoadKind, dead_below: Option<f64>, bearing: Option<usize>) -> Self {
-        let most = logs.iter().fold(0.0, |most: f64, log| most.max(log.most()));
+        let most = logs.iter().fold(0.0, |most: f64, log| most.max(peak(&log.force)));
         let tactels = logs.first().map_or(0, Log::tactels);
         let bearer = if load == LoadKind::Uniform { Bearer::All } else { Bearer::Unknown };
         let frame = |is_loading: bool| (bearer, is_loading);
@@ -125,8 +125,7 @@ impl<'l> LogAnalysis<'l> {
     /// Analyses a load that all tactels share.
     fn share_out(&mut self, dead_below: Option<f64>, bearing: Option<usize>) {
         for i in 0..self.answers.len() {
-            let response = self.mean_beyond(i, |log, frame| log.force[frame] >= MIN_RESPONSE_FORCE * self.most);
-            self.set_response(i, response);
+            self.set_response(i, self.mean_response(i));
         }
         self.mark_dead(dead_below);
         let live = self.answers.iter().filter(|answer| !answer.is_dead).count();
@@ -171,16 +170,11 @@ impl<'l> LogAnalysis<'l> {
     /// Returns the ranges of a log between unloaded frames with at least the minimum force of a press.
     fn stretches(&self, log: usize) -> Vec<(usize, Range<usize>)> {
         let from = &self.logs[log];
-        let (mut stretches, mut start) = (Vec::new(), 0);
-        for i in 0..=from.frames() {
-            if i == from.frames() || from.is_unloaded(i, self.most) {
-                if peak(&from.force[start..i]) >= MIN_PRESS * self.most {
-                    stretches.push((log, start..i));
-                }
-                start = i + 1;
-            }
-        }
-        stretches
+        let is_unloaded = |frame: &usize| from.is_unloaded(*frame, self.most);
+        let frames: Vec<usize> = (0..from.frames()).collect();
+        let runs = frames.chunk_by(|a, b| is_unloaded(a) == is_unloaded(b)).filter(|run| !is_unloaded(&run[0]));
+        let stretches = runs.map(|run| (log, run[0]..run[0] + run.len()));
+        stretches.filter(|(_, frames)| peak(&from.force[frames.clone()]) >= MIN_PRESS * self.most).collect()
     }
 
     /// Returns each tactel's mean reading beyond the offset, over the largest forces of a range of frames.
@@ -240,11 +234,11 @@ impl<'l> LogAnalysis<'l> {
         }
     }
 
-    /// Returns the mean reading of a tactel beyond its offset, over some frames.
-    fn mean_beyond(&self, tactel: usize, is_meant: impl Fn(&Log, usize) -> bool) -> f64 {
+    /// Returns the mean reading of a tactel beyond its offset, over the largest forces of all logs.
+    fn mean_response(&self, tactel: usize) -> f64 {
         let (mut sum, mut count) = (0.0, 0);
         for log in self.logs {
-            for frame in (0..log.frames()).filter(|frame| is_meant(log, *frame)) {
+            for frame in (0..log.frames()).filter(|frame| log.force[*frame] >= MIN_RESPONSE_FORCE * self.most) {
                 sum += f64::from(log.reading(frame, tactel) - self.answers[tactel].offset);
                 count += 1;
             }

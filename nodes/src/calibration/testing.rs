@@ -2,6 +2,7 @@
 
 use tactflow_runtime::signal::Unit;
 
+use super::ForceCurve;
 use super::log::Log;
 use crate::random::Random;
 
@@ -39,6 +40,15 @@ impl Characteristic {
     pub(super) fn force(&self, reading: f64) -> f64 {
         let s = (reading - self.offset).clamp(0.0, self.middle(MAX_FORCE_N) - self.offset);
         self.b * s / (self.a - s)
+    }
+}
+
+/// Returns the force at the end of a curve [N].
+pub(super) fn max_force(curve: &ForceCurve) -> f32 {
+    match curve {
+        ForceCurve::Linear { .. } => panic!("a line has no end"),
+        ForceCurve::Rational { most, .. } => *most,
+        ForceCurve::Piecewise { knots } => knots.last().expect("a curve has a knot")[1],
     }
 }
 

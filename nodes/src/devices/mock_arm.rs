@@ -169,7 +169,7 @@ mod tests {
     }
 
     #[test]
-    fn it_samples_at_its_rate_and_says_what_it_is() {
+    fn it_samples_at_its_rate_and_states_its_facts() {
         let mut bench = arm("start = [0, 0.5, 0, -1, 0, 1, 0]\nmount = { xyz = [0, 0, 0.05] }").unwrap();
         assert_eq!(bench.description.period, 0.004);
         for port in ["position", "equilibrium", "velocity"] {
@@ -181,7 +181,7 @@ mod tests {
             bench.exchange(now);
         }
         bench.exchange(9_000_000);
-        assert_eq!(bench.device.next(), Some(12_000_000), "off the beat it stays on the beat");
+        assert_eq!(bench.device.next(), Some(12_000_000), "the next sample is at a multiple of the period");
         assert!(Path::new(bench.fact("urdf").unwrap().as_str().unwrap()).is_absolute());
         assert_eq!(bench.fact("tip"), Some(&"lwr_7_link".into()));
         assert_eq!(bench.fact("mount").unwrap()["xyz"], vec![0.0, 0.0, 0.05].into());
@@ -202,11 +202,11 @@ mod tests {
         let steps = [
             (5, [9.0, 9.0], true, [0.0, 0.5], [0.0, 0.5], "the first exchange is where time starts"),
             (255, [1.0, -2.0], true, [0.25, 0.0], [0.25, 0.0], "a quarter of a second"),
-            (255, [1.0, -2.0], false, [0.25, 0.0], [0.25, 0.0], "the same moment once more"),
-            (200, [1.0, -2.0], false, [0.25, 0.0], [0.25, 0.0], "a moment that is gone"),
+            (255, [1.0, -2.0], false, [0.25, 0.0], [0.25, 0.0], "the same time again"),
+            (200, [1.0, -2.0], false, [0.25, 0.0], [0.25, 0.0], "a time in the past"),
             (755, [2.0, 0.5], true, [1.0, 0.25], [1.25, 0.25], "against an end"),
             (1255, [-0.25, 0.0], true, [1.0, 0.25], [1.125, 0.25], "it does not come back at once"),
-            (1755, [-1.0, 0.0], true, [0.625, 0.25], [0.625, 0.25], "but when the lead is used up"),
+            (1755, [-1.0, 0.0], true, [0.625, 0.25], [0.625, 0.25], "only when the lead is used up"),
         ];
         for (ms, velocity, is_new, position, equilibrium, what) in steps {
             assert_eq!(arm.advance(ms * 1_000_000, &velocity), Ok(is_new), "{what}");
@@ -216,7 +216,7 @@ mod tests {
     }
 
     #[test]
-    fn somebody_holds_it_and_it_springs_when_it_is_let_go() {
+    fn while_held_it_stays_and_when_released_it_springs() {
         let mut arm = two_joints("[{ from_s = 0.25, to_s = 0.75 }]");
         let steps = [
             (0, [0.0, 0.5], [0.0, 0.5], "the start"),
@@ -251,9 +251,9 @@ mod tests {
             rig.step_ms(4.0);
             command.copy_from_slice(&rig.get::<Joints>("velocity").unwrap().0);
         }
-        assert!(most > 0.099 && most <= 0.1 + 1e-12, "the lead grows up to its bound and no further: {most}");
-        assert!(spring > 0.099 && spring < 0.11, "and that is how far it springs: {spring}");
-        assert!(arm.position[0] > 0.5, "then it goes on: {}", arm.position[0]);
+        assert!(most > 0.099 && most <= 0.1 + 1e-12, "the lead grows up to its bound: {most}");
+        assert!(spring > 0.099 && spring < 0.11, "it springs by the lead: {spring}");
+        assert!(arm.position[0] > 0.5, "then it moves on: {}", arm.position[0]);
     }
 
     #[test]

@@ -43,7 +43,7 @@ impl Param for CurveKind {
 
     fn read(value: &Value, reader: &mut Reader<'_>) -> Option<Self> {
         let name: String = read_leaf(value, reader, Self::EXPECTS)?;
-        let found = KINDS.into_iter().find(|kind| kind.name() == name);
+        let found = KINDS.into_iter().find(|kind| kind.to_string() == name);
         if found.is_none() {
             reader.wrong_type(value, Self::EXPECTS);
         }

@@ -6,7 +6,7 @@ use tactflow_runtime::device::{Commands, DeviceError, Output, Samples, Stepped};
 use tactflow_runtime::signal::Image;
 
 use super::Params;
-use super::message::{self, Hello, Message, Obs};
+use super::message::{self, Hello, Obs};
 use super::socket::Socket;
 use crate::devices::arm::ArmPorts;
 
@@ -82,7 +82,7 @@ impl Bridge {
     /// Returns whether the simulator has sent that it ends the run.
     fn has_ended(&mut self) -> bool {
         while let Ok(Some(line)) = self.socket.line_within(Duration::ZERO) {
-            if message::message(&line, self.hello.sizes()) == Ok(Message::End) {
+            if message::message(&line, self.hello.sizes()) == Ok(None) {
                 return true;
             }
         }
@@ -104,8 +104,8 @@ impl Bridge {
 
     /// Reads a frame. Returns it with its stamp [ns], or `None` at the end of the run.
     fn frame(&mut self, line: &str) -> Result<Option<(i64, Obs)>, String> {
-        let message = message::message(line, self.hello.sizes()).map_err(|why| self.in_line(why))?;
-        let Message::Obs(obs) = message else { return Ok(None) };
+        let frame = message::message(line, self.hello.sizes()).map_err(|why| self.in_line(why))?;
+        let Some(obs) = frame else { return Ok(None) };
         let wrong = |why: String| Err(self.in_line(format!("obs {}: {why}", obs.seq)));
         if let Some((seq, t)) = self.newest {
             if obs.seq <= seq {

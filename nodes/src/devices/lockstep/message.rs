@@ -98,13 +98,6 @@ enum FrameType {
     End,
 }
 
-/// A message of a simulator after its hello.
-#[derive(Debug, Clone, PartialEq)]
-pub(super) enum Message {
-    Obs(Obs),
-    End,
-}
-
 /// The sizes that a frame must have.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Sizes {
@@ -139,20 +132,20 @@ pub(super) fn hello(line: &str) -> Result<Hello, String> {
     Ok(hello)
 }
 
-/// Reads a message after the hello.
+/// Reads a message after the hello: a frame, or `None` for the end of the run.
 ///
 /// # Errors
 /// What is wrong, with its field and, where the line is JSON, with the number of the frame.
-pub(super) fn message(line: &str, sizes: Sizes) -> Result<Message, String> {
+pub(super) fn message(line: &str, sizes: Sizes) -> Result<Option<Obs>, String> {
     #[derive(Deserialize)]
     struct Tag {
         r#type: FrameType,
     }
     if parse(line).is_ok_and(|tag: Tag| tag.r#type == FrameType::End) {
-        return Ok(Message::End);
+        return Ok(None);
     }
     let obs = parse(line).and_then(|obs| check_sizes(obs, sizes));
-    obs.map(Message::Obs).map_err(|why| match seq_of(line) {
+    obs.map(Some).map_err(|why| match seq_of(line) {
         Some(seq) => format!("obs {seq}: {why}"),
         None => why,
     })

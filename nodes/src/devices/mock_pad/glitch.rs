@@ -1,5 +1,7 @@
 //! Scripted faults of a pad.
 
+use std::ops::Range;
+
 use tactflow_runtime::node::Param;
 
 use crate::devices::nanos;
@@ -35,21 +37,10 @@ pub struct Glitch {
 }
 
 impl Glitch {
-    /// Returns the begin [ns].
+    /// Returns the time of the fault [ns].
     #[must_use]
-    pub fn start(&self) -> i64 {
-        nanos(self.at_s)
-    }
-
-    /// Returns the end [ns].
-    #[must_use]
-    pub fn end(&self) -> i64 {
-        self.start().saturating_add(nanos(self.for_s))
-    }
-
-    /// Returns whether the fault is active at `time` [ns].
-    #[must_use]
-    pub fn holds_at(&self, time: i64) -> bool {
-        (self.start()..self.end()).contains(&time)
+    pub fn time(&self) -> Range<i64> {
+        let start = nanos(self.at_s);
+        start..start.saturating_add(nanos(self.for_s))
     }
 }

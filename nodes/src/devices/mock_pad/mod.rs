@@ -148,7 +148,7 @@ impl MockPad {
 
     fn glitch(&self, frame: i64) -> Option<&Glitch> {
         let time = frame.saturating_mul(self.period);
-        self.glitches.iter().find(|glitch| glitch.holds_at(time))
+        self.glitches.iter().find(|glitch| glitch.time().contains(&time))
     }
 
     fn silence(&self, frame: i64) -> Option<&Glitch> {
@@ -158,7 +158,7 @@ impl MockPad {
     /// Returns the first frame from `frame` on that is not in a silence.
     fn after_silence(&self, mut frame: i64) -> i64 {
         while let Some(silence) = self.silence(frame).filter(|_| frame < self.frames) {
-            let end = silence.end();
+            let end = silence.time().end;
             frame = (end / self.period + i64::from(end % self.period != 0)).max(frame + 1);
         }
         frame
@@ -171,7 +171,7 @@ impl MockPad {
         }
         let mut frame = (now / self.period).min(self.frames - 1);
         while let Some(silence) = self.silence(frame).filter(|_| frame >= self.next) {
-            frame = ((silence.start() - 1).div_euclid(self.period)).min(frame - 1);
+            frame = ((silence.time().start - 1).div_euclid(self.period)).min(frame - 1);
         }
         if frame < self.next {
             return None;
@@ -179,7 +179,7 @@ impl MockPad {
         self.next = self.after_silence(frame + 1);
         let time = frame * self.period;
         let plain = |frame: i64| Due { frame, stamp: frame * self.period, sequence: frame as u64 + 1, is_nan: false };
-        match self.glitch(frame).map(|glitch| (glitch.kind, glitch.start())) {
+        match self.glitch(frame).map(|glitch| (glitch.kind, glitch.time().start)) {
             // The last frame once more. Before the first frame there is nothing to repeat.
             Some((GlitchKind::Repeat, _)) => self.served.map(plain),
             // A stuck sensor. Before the first frame it is stuck with this one.
@@ -222,7 +222,7 @@ impl Stepped for MockPad {
     }
 
     fn exchange(&mut self, now: i64, _: &Commands, samples: &mut Samples) -> Result<(), DeviceError> {
-        if self.glitches.iter().any(|glitch| glitch.kind == GlitchKind::Unplug && now >= glitch.start()) {
+        if self.glitches.iter().any(|glitch| glitch.kind == GlitchKind::Unplug && now >= glitch.time().start) {
             return Err(DeviceError("its plug is out".into()));
         }
         if let Some(due) = self.due(now) {

@@ -127,7 +127,7 @@ fn the_forces_have_the_bits_of_the_curves_in_the_file() {
     for kind in [CurveKind::Linear, CurveKind::Rational, CurveKind::Piecewise] {
         let calibration = calibration(kind);
         let text = file::write(&calibration, "a test");
-        let mut rig = with_file(kind.name(), &text, "dead = [[0, 1]]").unwrap();
+        let mut rig = with_file(&kind.to_string(), &text, "dead = [[0, 1]]").unwrap();
         let Shape::Image(shape) = rig.shape("image") else { panic!("an image") };
         assert_eq!((shape.rows, shape.cols, shape.unit), (2, 3, Unit::NEWTON));
         for reading in [-1e30, -50.0, 0.0, 7.5, 8.0, 20.0, 60.0, 111.1, 150.0, 1e4, 1e30f32] {
