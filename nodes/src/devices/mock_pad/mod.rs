@@ -128,10 +128,14 @@ impl Device for MockPad {
     }
 }
 
+/// Returns the first frame at a `time` or later [ns].
+fn frame_from(time: i64, period: i64) -> i64 {
+    time / period + i64::from(time % period != 0)
+}
+
 impl MockPad {
     fn new(image: Output<Image>, shape: ImageShape, period: i64, params: Params) -> Self {
-        let end = params.for_s.map_or(i64::MAX, nanos);
-        let frames = end / period + i64::from(end % period != 0);
+        let frames = frame_from(params.for_s.map_or(i64::MAX, nanos), period);
         let mut pad = Self {
             image,
             shape,
@@ -158,8 +162,7 @@ impl MockPad {
     /// Returns the first frame from `frame` on that is not in a silence.
     fn after_silence(&self, mut frame: i64) -> i64 {
         while let Some(silence) = self.silence(frame).filter(|_| frame < self.frames) {
-            let end = silence.time().end;
-            frame = (end / self.period + i64::from(end % self.period != 0)).max(frame + 1);
+            frame = frame_from(silence.time().end, self.period).max(frame + 1);
         }
         frame
     }
