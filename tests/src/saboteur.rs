@@ -1,4 +1,4 @@
-//! A catalogue one type of which goes wrong on purpose: every node of it writes what is no number, or panics.
+//! A catalogue in which one type of node fails on purpose: its nodes write NaN, or panic.
 
 use std::any::Any;
 use std::borrow::Cow;
@@ -12,29 +12,29 @@ use tactflow_runtime::node::{
 use tactflow_runtime::signal::{Features, Image, Jacobian, Joints, Kind, Pose, Scalar, Signal, Twist};
 use tactflow_runtime::source::Value;
 
-/// How it goes wrong.
+/// How the nodes fail.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum How {
-    /// Its first output that has numbers becomes NaN.
+    /// The first output that has numbers becomes NaN.
     Nan,
-    /// It panics.
+    /// The step panics.
     Panic,
 }
 
-/// What goes wrong, how, and in which ticks.
+/// Which nodes fail, how, and in which ticks.
 #[derive(Debug, Clone)]
 pub struct Sabotage {
     /// The node type.
     pub target: String,
     /// How.
     pub how: How,
-    /// The first tick in which it does.
+    /// First tick of the failure.
     pub from: u64,
-    /// The tick in which all is well again.
+    /// First tick after the failure.
     pub to: u64,
 }
 
-/// Everything that ships, with one type of node that goes wrong.
+/// Returns the shipped catalogue with one type of node that fails.
 #[must_use]
 pub fn sabotaged(sabotage: &Sabotage) -> Catalogue {
     let sound: &'static Catalogue = Box::leak(Box::new(tactflow_nodes::catalogue()));
@@ -151,7 +151,7 @@ impl AnyNode for Saboteur {
     }
 }
 
-/// Puts NaN into a value; whether it has numbers.
+/// Puts NaN into a value. Returns whether the value has numbers.
 fn spoil(bus: &mut Bus, kind: Kind, id: PortId, tick: &Tick) -> bool {
     const NAN: f64 = f64::NAN;
     let (slot, arenas) = (id.slot as usize, &mut bus.arenas);

@@ -1,11 +1,8 @@
-//! `true_pad`: a pad that is pressed by a round thing which slides to the middle, and that knows the truth of it.
-//!
-//! From `from_s` on the contact lies at `at · exp(-(t - from_s) / tau_s)` on the x axis, so that what a scenario measures
-//! of it is known in closed form. The image has white noise of the seed, the truth has none.
+//! `true_pad`: a simulated pad whose ground truth is known in closed form.
 
 use tactflow_nodes::random::Random;
 use tactflow_runtime::device::{Commands, Description, Device, DeviceError, Driver, Opened, Output, Samples, Stepped};
-use tactflow_runtime::node::{Mistakes, Param};
+use tactflow_runtime::node::{Describe, Mistakes, Param};
 use tactflow_runtime::signal::{Image, ImageShape, Scalar, ScalarShape, Unit};
 
 /// Parameters of `true_pad`.
@@ -17,32 +14,36 @@ pub struct Params {
     /// Standard deviation of a tactel.
     #[param(unit = "N", range = 0.0.., default = 0.0)]
     noise: f64,
-    /// When it is touched.
+    /// Time at which the contact begins.
     #[param(unit = "s", range = 0.0.., default = 0.5)]
     from_s: f64,
-    /// When it is let go; never unless given.
+    /// Time at which the contact ends; never if not given.
     #[param(unit = "s", above = 0.0)]
     to_s: Option<f64>,
-    /// Where it is touched.
+    /// Position of the contact at its begin.
     #[param(unit = "m", default = 0.01)]
     at: f64,
-    /// How long the contact takes for all but 1/e of its way to the middle.
+    /// Time constant of the motion to the middle.
     #[param(unit = "s", above = 0.0, default = 0.25)]
     tau_s: f64,
-    /// When the plug is pulled; never unless given.
+    /// Time at which the device fails; never if not given.
     #[param(unit = "s", above = 0.0)]
     unplug_s: Option<f64>,
-    /// When the samples end; never unless given.
+    /// Duration of the samples; unlimited if not given.
     #[param(unit = "s", above = 0.0)]
     for_s: Option<f64>,
 }
 
-/// The pad and how far it is.
-#[derive(Debug)]
+/// A pad under a round contact that slides to the middle, with the ground truth of that contact.
+///
+/// From `from_s` on the contact is at `at · exp(-(t - from_s) / tau_s)` on the x axis, so every figure of a scenario is known
+/// in closed form. The image has white noise from the seed; the ground truth has none.
+#[derive(Debug, Describe)]
+#[describe(name = "true_pad")]
 pub struct TruePad {
     params: Params,
     image: Output<Image>,
-    /// Each number of the truth with its name.
+    /// Each scalar of the ground truth with its name.
     truth: Vec<(&'static str, Output<Scalar>)>,
     clean: Output<Image>,
     random: Random,
@@ -55,7 +56,7 @@ const PITCH: f64 = 0.005;
 const FORCE: f64 = 3.0;
 const RADIUS: f64 = 0.012;
 
-/// Names and units of the truth's scalars.
+/// Names and units of the scalars of the ground truth.
 const TRUTH: [(&str, &str); 15] = [
     ("force", "N"),
     ("tangential", "N"),
@@ -73,11 +74,6 @@ const TRUTH: [(&str, &str); 15] = [
     ("common_noise", "N/tactel"),
     ("own_noise", "N/tactel"),
 ];
-
-impl tactflow_runtime::node::Describe for TruePad {
-    const NAME: &'static str = "true_pad";
-    const SUMMARY: &'static str = "a pad that is pressed, and that knows the truth of it";
-}
 
 impl Device for TruePad {
     type Params = Params;
@@ -105,15 +101,15 @@ impl Device for TruePad {
 }
 
 impl TruePad {
-    /// Where the contact is at `time` [s], if there is one [m].
+    /// Returns the position of the contact at `time` [s], or `None` without contact [m].
     fn contact(&self, time: f64) -> Option<f64> {
         let since = time - self.params.from_s;
-        let is_let_go = self.params.to_s.is_some_and(|to| time >= to);
-        (since >= 0.0 && !is_let_go).then(|| self.params.at * libm::exp(-since / self.params.tau_s))
+        let is_over = self.params.to_s.is_some_and(|to| time >= to);
+        (since >= 0.0 && !is_over).then(|| self.params.at * libm::exp(-since / self.params.tau_s))
     }
 }
 
-/// The image without noise.
+/// Returns the noise-free image.
 fn clean(x: f64) -> Vec<f32> {
     let place = |i: usize| (i as f64 - (SIDE - 1) as f64 / 2.0) * PITCH;
     let bump = |i: usize| {

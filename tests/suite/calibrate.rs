@@ -93,7 +93,7 @@ fn a_log_becomes_a_report_a_file_and_a_picture() {
     assert!(fs::read_to_string(path.join("pad.svg")).unwrap().starts_with("<svg "));
     let again = calibrate(path, &["press.csv", "-o", "pad.toml", "--curve", "piecewise"]);
     assert_eq!(again.code, 0, "a calibration file is replaced: {}", again.err);
-    assert_eq!(read(&path.join("pad.toml")).kind, tactflow_nodes::calibration::Kind::Piecewise);
+    assert_eq!(read(&path.join("pad.toml")).kind, tactflow_nodes::calibration::CurveKind::Piecewise);
 }
 
 #[test]

@@ -7,7 +7,7 @@ use tactflow_runtime::device::{Description, Device, DeviceError, Driver, Link, L
 use tactflow_runtime::engine::{self, End, Engine, RunOptions};
 use tactflow_runtime::fault::Cause;
 use tactflow_runtime::graph::{Request, compile};
-use tactflow_runtime::node::Mistakes;
+use tactflow_runtime::node::{Describe, Mistakes};
 use tactflow_runtime::signal::{Scalar, ScalarShape, Unit};
 use tactflow_tests::{catalogue, workspace};
 
@@ -83,6 +83,8 @@ fn every_sample_counts_once_and_silence_makes_it_old() {
 }
 
 /// A driver that panics.
+#[derive(Describe)]
+#[describe(name = "brittle")]
 struct Brittle;
 
 #[async_trait::async_trait]
@@ -90,11 +92,6 @@ impl Live for Brittle {
     async fn run(self: Box<Self>, _: Link) -> Result<(), DeviceError> {
         panic!("brittle")
     }
-}
-
-impl tactflow_runtime::node::Describe for Brittle {
-    const NAME: &'static str = "brittle";
-    const SUMMARY: &'static str = "a driver that panics";
 }
 
 impl Device for Brittle {

@@ -6,9 +6,13 @@
 
 use std::fmt;
 
+#[cfg(feature = "cli")]
+use tactflow_runtime::cli::clap;
+
 /// The kinds of curves.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Kind {
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
+pub enum CurveKind {
     /// f = gain s.
     Linear,
     /// f = gain s / (1 - squash s).
@@ -18,23 +22,12 @@ pub enum Kind {
 }
 
 /// All kinds, the simplest first.
-pub const KINDS: [Kind; 3] = [Kind::Linear, Kind::Rational, Kind::Piecewise];
+pub const KINDS: [CurveKind; 3] = [CurveKind::Linear, CurveKind::Rational, CurveKind::Piecewise];
 
-impl Kind {
-    /// Returns the name in a file and on the command line.
-    #[must_use]
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Linear => "linear",
-            Self::Rational => "rational",
-            Self::Piecewise => "piecewise",
-        }
-    }
-}
-
-impl fmt::Display for Kind {
+impl fmt::Display for CurveKind {
+    /// Writes the name in a file and on the command line.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.pad(self.name())
+        f.pad(["linear", "rational", "piecewise"][*self as usize])
     }
 }
 
@@ -44,12 +37,12 @@ pub struct Tactel {
     /// Unloaded reading [unit of the reading].
     pub offset: f32,
     /// Curve from the reading beyond the offset to a force.
-    pub curve: Curve,
+    pub curve: ForceCurve,
 }
 
 /// A curve from s, the reading beyond the offset, to a force.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Curve {
+pub enum ForceCurve {
     /// A straight line without an end: f = gain s, also below zero.
     Linear {
         /// Slope [force per reading].
@@ -108,14 +101,14 @@ impl Segment {
     }
 }
 
-impl Curve {
+impl ForceCurve {
     /// Returns the kind.
     #[must_use]
-    pub const fn kind(&self) -> Kind {
+    pub const fn kind(&self) -> CurveKind {
         match self {
-            Self::Linear { .. } => Kind::Linear,
-            Self::Rational { .. } => Kind::Rational,
-            Self::Piecewise { .. } => Kind::Piecewise,
+            Self::Linear { .. } => CurveKind::Linear,
+            Self::Rational { .. } => CurveKind::Rational,
+            Self::Piecewise { .. } => CurveKind::Piecewise,
         }
     }
 
@@ -168,16 +161,6 @@ impl Curve {
         }
     }
 
-    /// Returns the maximum force, or `None` for a curve without an end.
-    #[must_use]
-    pub fn most(&self) -> Option<f32> {
-        match self {
-            Self::Linear { .. } => None,
-            Self::Rational { most, .. } => Some(*most),
-            Self::Piecewise { knots } => knots.last().map(|[_, force]| *force),
-        }
-    }
-
     /// Returns what makes the curve unusable: the name of the number and the mistake. `None` if the curve is good.
     #[must_use]
     pub fn flaw(&self) -> Option<(&'static str, String)> {
@@ -225,7 +208,7 @@ fn flaw_of_knots(knots: &[[f32; 2]]) -> Option<(&'static str, String)> {
     if last[1] <= 0.0 {
         return Some(("forces", "the last force must be greater than 0".into()));
     }
-    let is_steep = Curve::segments(knots).any(|segment| !segment.slope.is_finite());
+    let is_steep = ForceCurve::segments(knots).any(|segment| !segment.slope.is_finite());
     is_steep.then(|| ("readings", "two knots are too close to each other".into()))
 }
 
@@ -234,9 +217,10 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
+    use crate::calibration::testing::max_force;
 
-    fn rational_of(gain: f32, squash: f32, most: f32) -> Curve {
-        Curve::Rational { gain, squash, most }
+    fn rational_of(gain: f32, squash: f32, most: f32) -> ForceCurve {
+        ForceCurve::Rational { gain, squash, most }
     }
 
     #[test]
@@ -254,9 +238,9 @@ mod tests {
     fn outside_of_what_was_calibrated_a_curve_stays() {
         let squashed = rational_of(3.0 / 4000.0, 1.0 / 4000.0, 5.0);
         let falling = rational_of(-3.0 / 4000.0, -1.0 / 4000.0, 5.0);
-        let knots = Curve::Piecewise { knots: vec![[100.0, 0.5], [300.0, 2.5]] };
-        let down = Curve::Piecewise { knots: vec![[-100.0, 0.5], [-300.0, 2.5]] };
-        let line = Curve::Linear { gain: 0.01 };
+        let knots = ForceCurve::Piecewise { knots: vec![[100.0, 0.5], [300.0, 2.5]] };
+        let down = ForceCurve::Piecewise { knots: vec![[-100.0, 0.5], [-300.0, 2.5]] };
+        let line = ForceCurve::Linear { gain: 0.01 };
         let cases = [
             (&squashed, -100.0, 0.0),
             (&squashed, 4000.0, 5.0),
@@ -285,9 +269,9 @@ mod tests {
 
     #[test]
     fn what_is_no_curve_is_named() {
-        let knots = |knots: &[[f32; 2]]| Curve::Piecewise { knots: knots.to_vec() };
+        let knots = |knots: &[[f32; 2]]| ForceCurve::Piecewise { knots: knots.to_vec() };
         let cases = [
-            (Curve::Linear { gain: 0.0 }, "gain"),
+            (ForceCurve::Linear { gain: 0.0 }, "gain"),
             (rational_of(0.0, 1e-3, 1.0), "gain"),
             (rational_of(1e-3, 1e-3, 0.0), "most"),
             (rational_of(1e-3, -1e-3, 1.0), "squash"),
@@ -309,12 +293,9 @@ mod tests {
     }
 
     /// A curve of any sort without a flaw, with an end.
-    fn any_curve() -> impl Strategy<Value = Curve> {
-        let rational = (1e-5..1.0f32, 0.0..0.1f32, 0.1..50.0f32).prop_map(|(gain, squash, most)| Curve::Rational {
-            gain,
-            squash,
-            most,
-        });
+    fn any_curve() -> impl Strategy<Value = ForceCurve> {
+        let rational = (1e-5..1.0f32, 0.0..0.1f32, 0.1..50.0f32)
+            .prop_map(|(gain, squash, most)| ForceCurve::Rational { gain, squash, most });
         let steps = prop::collection::vec((0.5..400.0f32, 0.0..3.0f32), 1..9);
         let knots = steps.prop_map(|steps| {
             let mut last = [0.0, 0.0];
@@ -322,7 +303,7 @@ mod tests {
                 last = [last[0] + s, last[1] + force];
                 last
             };
-            Curve::Piecewise { knots: steps.into_iter().map(add).collect() }
+            ForceCurve::Piecewise { knots: steps.into_iter().map(add).collect() }
         });
         prop_oneof![rational, knots].prop_filter("a curve without a flaw", |curve| curve.flaw().is_none())
     }
@@ -330,16 +311,16 @@ mod tests {
     proptest! {
         #[test]
         fn the_characteristic_and_its_inverse_belong_together(curve in any_curve(), part in 0.0..1.0f64) {
-            let force = part * f64::from(curve.most().unwrap());
+            let force = part * f64::from(max_force(&curve));
             let back = f64::from(curve.force(curve.reading(force) as f32));
             // Where the curve is flat, 32 bits of a reading are few of a force; flat knots have a range of readings.
-            prop_assert!((back - force).abs() < 0.01 * f64::from(curve.most().unwrap()), "{} of {}", back, force);
+            prop_assert!((back - force).abs() < 0.01 * f64::from(max_force(&curve)), "{} of {}", back, force);
         }
 
         #[test]
         fn more_is_never_less_and_never_out_of_bounds(curve in any_curve(), s in -1e4..1e5f32, more in 0.0..1e5f32) {
             let (one, other) = (curve.force(s), curve.force(s + more));
-            let most = curve.most().unwrap();
+            let most = max_force(&curve);
             // Every operation rounds monotonically, so not even the last bit goes back.
             prop_assert!(other >= one, "{} then {}", one, other);
             for force in [one, other] {

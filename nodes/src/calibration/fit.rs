@@ -8,8 +8,8 @@
 //! The rational curve and the knots are fitted to the readings, s over f, because the noise is in the readings: by least
 //! squares with Huber's weights. The straight line is fitted to the forces, because its model error is larger than the noise.
 
-use super::Curve;
-use super::samples::{Sample, median};
+use super::ForceCurve;
+use super::samples::{TactelSample, median};
 
 /// Number of bins of a branch.
 const BINS: usize = 24;
@@ -53,14 +53,14 @@ pub struct Points {
 impl Points {
     /// Sorts samples into points, or returns `None` if they are too few. A force up to `unloaded` [N] counts as no load.
     #[must_use]
-    pub fn new(samples: &[Sample], unloaded: f64) -> Option<Self> {
+    pub fn new(samples: &[TactelSample], unloaded: f64) -> Option<Self> {
         let most = samples.iter().fold(0.0, |most: f64, sample| most.max(sample.force));
         let loaded = samples.iter().filter(|sample| sample.force > unloaded).count();
         if most <= 0.0 || loaded < MIN_SAMPLES {
             return None;
         }
         let mut bins: Vec<[Vec<f64>; 2]> = vec![Default::default(); 2 * BINS];
-        for Sample { force, s, is_loading } in samples {
+        for TactelSample { force, s, is_loading } in samples {
             // The edges of the bins are squares.
             let bin = ((force / most).max(0.0).sqrt() * BINS as f64) as usize;
             let [forces, readings] = &mut bins[bin.min(BINS - 1) * 2 + usize::from(*is_loading)];
@@ -85,22 +85,22 @@ impl Points {
 
     /// Fits the straight line with the smallest error of the force; `sign` is 1 if readings rise with the force, else -1.
     #[must_use]
-    pub fn linear(&self, sign: f32) -> Curve {
+    pub fn linear(&self, sign: f32) -> ForceCurve {
         let sum = |g: fn(&Point) -> f64| self.points.iter().map(|point| point.weight * g(point)).sum::<f64>();
         let slope = sum(|point| point.x * point.y) / sum(|point| point.y * point.y).max(1e-9);
-        Curve::Linear { gain: (slope * self.most / self.range) as f32 * sign }
+        ForceCurve::Linear { gain: (slope * self.most / self.range) as f32 * sign }
     }
 
     /// Fits the rational curve y = x / (g + q x).
     #[must_use]
-    pub fn rational(&self, sign: f32) -> Curve {
+    pub fn rational(&self, sign: f32) -> ForceCurve {
         let mut curve = self.first_guess();
         for _ in 0..5 {
             let residuals: Vec<f64> = self.points.iter().map(|point| point.y - rational_at(curve, point.x)).collect();
             curve = self.descend(curve, &self.weights(&residuals));
         }
         let [g, q] = curve;
-        Curve::Rational {
+        ForceCurve::Rational {
             gain: (g * self.most / self.range) as f32 * sign,
             squash: (q / self.range) as f32 * sign,
             most: self.most as f32,
@@ -170,9 +170,9 @@ impl Points {
 
     /// Fits straight lines between knots.
     #[must_use]
-    pub fn piecewise(&self, sign: f32) -> Curve {
+    pub fn piecewise(&self, sign: f32) -> ForceCurve {
         let knots = self.middle[1..].iter().map(|[x, y]| [(y * self.range) as f32 * sign, (x * self.most) as f32]);
-        Curve::Piecewise { knots: knots.collect() }
+        ForceCurve::Piecewise { knots: knots.collect() }
     }
 
     /// Returns the knots of the forward curve from (0, 0): least squares, then made monotone.
@@ -316,11 +316,11 @@ mod tests {
     use super::*;
 
     /// Samples of a characteristic, up and down, with some unloaded ones.
-    fn samples(s: impl Fn(f64) -> f64, most: f64) -> Vec<Sample> {
+    fn samples(s: impl Fn(f64) -> f64, most: f64) -> Vec<TactelSample> {
         let force = |k: usize| most * (k as f64 / 400.0);
-        let up = (0..=400).map(|k| Sample { force: force(k), s: s(force(k)), is_loading: true });
-        let down = (0..400).rev().map(|k| Sample { force: force(k), s: s(force(k)), is_loading: false });
-        let rest = (0..50).map(|_| Sample { force: 0.0, s: 0.0, is_loading: true });
+        let up = (0..=400).map(|k| TactelSample { force: force(k), s: s(force(k)), is_loading: true });
+        let down = (0..400).rev().map(|k| TactelSample { force: force(k), s: s(force(k)), is_loading: false });
+        let rest = (0..50).map(|_| TactelSample { force: 0.0, s: 0.0, is_loading: true });
         rest.chain(up).chain(down).collect()
     }
 
@@ -328,25 +328,25 @@ mod tests {
         #[test]
         fn what_is_squashed_is_found_again(a in 500.0..5000.0f64, b in 0.5..50.0f64, most in 1.0..20.0f64) {
             let points = Points::new(&samples(|f| a * f / (f + b), most), 0.01).unwrap();
-            let Curve::Rational { gain, squash, .. } = points.rational(1.0) else { panic!("squashed") };
+            let ForceCurve::Rational { gain, squash, .. } = points.rational(1.0) else { panic!("squashed") };
             prop_assert!((f64::from(gain) * a / b - 1.0).abs() < 1e-3, "gain {} for {}", gain, b / a);
             prop_assert!((f64::from(squash) * a - 1.0).abs() < 1e-3 * (1.0 + b / most), "squash {} for {}", squash, 1.0 / a);
             prop_assert!(points.hysteresis().unwrap() < 0.005);
         }
 
         #[test]
-        fn strays_do_not_count(a in 1000.0..4000.0f64, b in 1.0..10.0f64, every in 12..30usize, by in 300.0..3000.0f64) {
+        fn outliers_do_not_count(a in 1000.0..4000.0f64, b in 1.0..10.0f64, every in 12..30usize, by in 300.0..3000.0f64) {
             let clean = samples(|f| a * f / (f + b), 5.0);
-            let mut stray = clean.clone();
-            stray.iter_mut().skip(60).step_by(every).for_each(|sample| sample.s += by);
-            let at = |samples: &[Sample], kind: usize| {
+            let mut outliers = clean.clone();
+            outliers.iter_mut().skip(60).step_by(every).for_each(|sample| sample.s += by);
+            let at = |samples: &[TactelSample], kind: usize| {
                 let points = Points::new(samples, 0.01).unwrap();
                 let curve = [points.rational(1.0), points.piecewise(1.0)][kind].clone();
                 f64::from(curve.force((a * 2.5 / (2.5 + b)) as f32))
             };
             for kind in 0..2 {
-                let moved = (at(&stray, kind) - at(&clean, kind)).abs();
-                prop_assert!(moved < 0.1, "strays of {} counts move 2.5 N by {}", by, moved);
+                let moved = (at(&outliers, kind) - at(&clean, kind)).abs();
+                prop_assert!(moved < 0.1, "outliers of {} counts move 2.5 N by {}", by, moved);
             }
         }
 
@@ -363,9 +363,9 @@ mod tests {
 
         #[test]
         fn no_heights_near_the_best_are_better(noise in prop::collection::vec(-0.1..0.1f64, 200), which in 1..6usize, by in -0.05..0.05f64) {
-            let samples: Vec<Sample> = noise.iter().enumerate().map(|(i, noise)| {
+            let samples: Vec<TactelSample> = noise.iter().enumerate().map(|(i, noise)| {
                 let force = i as f64 / 199.0;
-                Sample { force, s: force.sqrt() + noise, is_loading: true }
+                TactelSample { force, s: force.sqrt() + noise, is_loading: true }
             }).collect();
             let points = Points::new(&samples, 0.01).unwrap();
             let (places, weights) = (points.places(), vec![1.0; points.points.len()]);
@@ -384,9 +384,9 @@ mod tests {
     #[test]
     fn a_straight_line_is_found_and_knots_lie_on_it() {
         let points = Points::new(&samples(|f| 120.0 * f, 4.0), 0.01).unwrap();
-        let Curve::Linear { gain } = points.linear(-1.0) else { panic!("a line") };
+        let ForceCurve::Linear { gain } = points.linear(-1.0) else { panic!("a line") };
         assert!((gain + 1.0 / 120.0).abs() < 1e-7, "{gain}");
-        let Curve::Piecewise { knots } = points.piecewise(-1.0) else { panic!("knots") };
+        let ForceCurve::Piecewise { knots } = points.piecewise(-1.0) else { panic!("knots") };
         assert_eq!(knots.len(), MAX_SEGMENTS);
         for [s, force] in knots {
             assert!((s + 120.0 * force).abs() < 0.01, "{s} for {force} N");
@@ -394,7 +394,7 @@ mod tests {
     }
 
     #[test]
-    fn too_little_gives_no_points() {
+    fn too_few_samples_have_no_points() {
         let all = samples(|f| 100.0 * f, 4.0);
         assert!(Points::new(&all[..60], 0.01).is_none(), "ten with a force");
         assert!(Points::new(&[], 0.01).is_none());

@@ -83,12 +83,6 @@ impl Log {
         self.force.len()
     }
 
-    /// Returns the maximum force [N].
-    #[must_use]
-    pub fn most(&self) -> f64 {
-        self.force.iter().fold(0.0, |most: f64, force| most.max(*force))
-    }
-
     /// Whether frame `i` is unloaded; `most` is the maximum force of all logs [N].
     #[must_use]
     pub fn is_unloaded(&self, i: usize, most: f64) -> bool {
@@ -147,7 +141,7 @@ mod tests {
     }
 
     #[test]
-    fn a_log_that_cannot_be_used_says_why() {
+    fn the_mistake_of_a_bad_log_is_described() {
         assert_eq!(log(&[0.0, 0.0, 0.0, 1.0, 5.0, 0.0]).check(), Ok(()));
         let cases = [
             (log(&[0.0; 9]), "its force is from 0 N to 0 N"),

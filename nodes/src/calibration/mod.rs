@@ -15,13 +15,13 @@ pub mod samples;
 
 use tactflow_runtime::signal::Unit;
 
-pub use curve::{Curve, Kind, Tactel};
+pub use curve::{CurveKind, ForceCurve, Tactel};
 
 /// The curves of all tactels of an array.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Calibration {
     /// Kind of all curves.
-    pub kind: Kind,
+    pub kind: CurveKind,
     /// Number of rows.
     pub rows: usize,
     /// Number of columns.

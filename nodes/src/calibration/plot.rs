@@ -4,7 +4,9 @@
 
 use tactflow_runtime::cli::svg::{Axis, Svg};
 
-use super::report::{Report, State};
+use super::Tactel;
+use super::fit::Points;
+use super::report::{CalibrationReport, TactelFinding};
 
 /// Size of the picture and of the frame in it.
 const SIZE: [f64; 2] = [720.0, 480.0];
@@ -18,12 +20,13 @@ const POINTS: usize = 48;
 
 /// Returns the picture of a calibration: each tactel's branches thin, the mean of the fitted curves thick.
 #[must_use]
-pub fn svg(report: &Report) -> String {
+pub fn svg(report: &CalibrationReport) -> String {
     let calibration = &report.calibration;
-    let good: Vec<usize> = (0..report.findings.len()).filter(|i| report.findings[*i].state == State::Good).collect();
+    let count = report.calibrated().count();
+    let drawn = report.calibrated().step_by(count.div_ceil(MAX_DRAWN).max(1));
     let branches: Vec<Vec<[f64; 2]>> =
-        good.iter().step_by(good.len().div_ceil(MAX_DRAWN).max(1)).flat_map(|i| lines(report, *i)).collect();
-    let mean = mean(report, &good);
+        drawn.flat_map(|(_, finding, points, tactel)| lines(finding, points, tactel)).collect();
+    let mean = mean(report);
     let readings = branches.iter().flatten().chain(&mean).map(|point| point[0]);
     let (min, max) = readings.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| (a.min(x), b.max(x)));
     // From zero, unless all curves would be on one side.
@@ -31,8 +34,7 @@ pub fn svg(report: &Report) -> String {
     let x = Axis { from, to: (from + 1.02 * (max - from)).max(from + 1e-9), pixels: [FRAME[0][0], FRAME[1][0]] };
     let y = Axis { from: 0.0, to: 1.04 * report.most, pixels: [FRAME[1][1], FRAME[0][1]] };
     let title = format!(
-        "Force over reading, {} of {} x {} tactels, {} curves",
-        good.len(),
+        "Force over reading, {count} of {} x {} tactels, {} curves",
         calibration.rows,
         calibration.cols,
         report.kind()
@@ -47,38 +49,31 @@ pub fn svg(report: &Report) -> String {
     svg.group("fill=\"none\" stroke=\"#d9730d\" stroke-width=\"3\" stroke-linejoin=\"round\"", |svg| {
         svg.polyline(mean.iter().map(place));
     });
-    let legend = format!("thin: {} tactels, as measured; thick: mean of the fitted curves", good.len());
+    let legend = format!("thin: {count} tactels, as measured; thick: mean of the fitted curves");
     svg.text([FRAME[0][0], FRAME[0][1] - 14.0], "start", &legend);
     svg.finish()
 }
 
-/// What a tactel read under which force: force rising, then falling.
-fn lines(report: &Report, i: usize) -> Vec<Vec<[f64; 2]>> {
-    let (finding, tactel) = (&report.findings[i], &report.calibration.tactels[i]);
-    let (Some(points), Some(tactel)) = (&finding.points, tactel) else { return Vec::new() };
-    let sign = f64::from(finding.sign);
-    let place = |[force, s]: [f64; 2]| [f64::from(tactel.offset) + sign * s, force.max(0.0)];
-    points.branches().map(|branch| branch.into_iter().map(place).collect()).into()
+/// Returns the readings and forces of a tactel: the branch of rising force, then that of falling force.
+fn lines(finding: &TactelFinding, points: &Points, tactel: &Tactel) -> [Vec<[f64; 2]>; 2] {
+    let place = |[force, s]: [f64; 2]| [f64::from(tactel.offset) + f64::from(finding.sign) * s, force.max(0.0)];
+    points.branches().map(|branch| branch.into_iter().map(place).collect())
 }
 
-/// The mean over all tactels of what the fitted curves say of their readings, force by force.
-fn mean(report: &Report, good: &[usize]) -> Vec<[f64; 2]> {
+/// Returns the mean reading of the fitted curves of all tactels, force by force.
+fn mean(report: &CalibrationReport) -> Vec<[f64; 2]> {
     let mut mean = Vec::new();
     for k in 0..=POINTS {
         let force = report.most * k as f64 / POINTS as f64;
-        let (mut sum, mut count) = (0.0, 0);
-        for i in good {
-            let (finding, tactel) = (&report.findings[*i], &report.calibration.tactels[*i]);
-            let (Some(points), Some(tactel)) = (&finding.points, tactel) else { continue };
-            // A mean of some would jump where one of the others ends.
-            if force <= 1.01 * points.most {
-                sum +=
-                    f64::from(tactel.offset) + f64::from(finding.sign) * tactel.curve.reading(force.min(points.most));
-                count += 1;
-            }
-        }
-        if count > 0 && count * 10 >= good.len() * 9 {
-            mean.push([sum / f64::from(u32::try_from(count).unwrap_or(u32::MAX)), force]);
+        let reading = |(_, finding, points, tactel): (usize, &TactelFinding, &Points, &Tactel)| {
+            let s = tactel.curve.reading(force.min(points.most));
+            // Beyond its end a curve has no reading.
+            (force <= 1.01 * points.most).then(|| f64::from(tactel.offset) + f64::from(finding.sign) * s)
+        };
+        let (sum, count) =
+            report.calibrated().filter_map(reading).fold((0.0, 0), |(sum, n), reading| (sum + reading, n + 1));
+        if count > 0 && count * 10 >= report.calibrated().count() * 9 {
+            mean.push([sum / count as f64, force]);
         }
     }
     mean

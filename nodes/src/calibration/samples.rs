@@ -5,11 +5,15 @@
 
 use std::ops::Range;
 
+#[cfg(feature = "cli")]
+use tactflow_runtime::cli::clap;
+
 use super::log::Log;
 
 /// How the pad was loaded.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Load {
+#[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
+pub enum LoadKind {
     /// One tactel at a time bears the whole force.
     Probe,
     /// All tactels share the force.
@@ -18,7 +22,7 @@ pub enum Load {
 
 /// One frame of one tactel.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Sample {
+pub struct TactelSample {
     /// The force on it [N].
     pub force: f64,
     /// Reading beyond the offset, with the sign that makes it rise with the force [reading].
@@ -73,7 +77,7 @@ enum Bearer {
 }
 
 /// A range of frames between two unloaded ones.
-struct Press {
+struct ProbePress {
     log: usize,
     frames: Range<usize>,
     /// Maximum force [N].
@@ -84,7 +88,7 @@ struct Press {
 }
 
 /// Logs with the response of each tactel.
-pub struct Samples<'l> {
+pub struct LogAnalysis<'l> {
     logs: &'l [Log],
     /// Bearer of the force and whether it rises, by log and frame.
     frames: Vec<Vec<(Bearer, bool)>>,
@@ -98,22 +102,22 @@ pub struct Samples<'l> {
     pub is_shared: bool,
 }
 
-impl<'l> Samples<'l> {
+impl<'l> LogAnalysis<'l> {
     /// Analyses logs of one array. A live tactel responds with at least `dead_below` [reading]. A uniform load is shared
     /// by `bearing` tactels, or by the live ones.
     #[must_use]
-    pub fn new(logs: &'l [Log], load: Load, dead_below: Option<f64>, bearing: Option<usize>) -> Self {
-        let most = logs.iter().fold(0.0, |most: f64, log| most.max(log.most()));
+    pub fn new(logs: &'l [Log], load: LoadKind, dead_below: Option<f64>, bearing: Option<usize>) -> Self {
+        let most = logs.iter().fold(0.0, |most: f64, log| most.max(peak(&log.force)));
         let tactels = logs.first().map_or(0, Log::tactels);
-        let bearer = if load == Load::Uniform { Bearer::All } else { Bearer::Unknown };
+        let bearer = if load == LoadKind::Uniform { Bearer::All } else { Bearer::Unknown };
         let frame = |is_loading: bool| (bearer, is_loading);
         let frames =
             logs.iter().map(|log| log.is_loading(MIN_REVERSAL * most).into_iter().map(frame).collect()).collect();
         let answers = (0..tactels).map(|i| zero(logs, most, i)).collect();
         let mut samples = Self { logs, frames, answers, most, share: 1.0, is_shared: false };
         match load {
-            Load::Uniform => samples.share_out(dead_below, bearing),
-            Load::Probe => samples.find_presses(dead_below),
+            LoadKind::Uniform => samples.share_out(dead_below, bearing),
+            LoadKind::Probe => samples.find_presses(dead_below),
         }
         samples
     }
@@ -121,8 +125,7 @@ impl<'l> Samples<'l> {
     /// Analyses a load that all tactels share.
     fn share_out(&mut self, dead_below: Option<f64>, bearing: Option<usize>) {
         for i in 0..self.answers.len() {
-            let response = self.mean_beyond(i, |log, frame| log.force[frame] >= MIN_RESPONSE_FORCE * self.most);
-            self.set_response(i, response);
+            self.set_response(i, self.mean_response(i));
         }
         self.mark_dead(dead_below);
         let live = self.answers.iter().filter(|answer| !answer.is_dead).count();
@@ -143,9 +146,9 @@ impl<'l> Samples<'l> {
         let shared = stretches.iter().filter(|(log, frames)| self.is_on_most(*log, frames)).count();
         self.is_shared = 2 * shared > stretches.len();
         let presses = stretches.into_iter().filter_map(|(log, frames)| self.press(log, frames));
-        let presses: Vec<Press> = presses.collect();
+        let presses: Vec<ProbePress> = presses.collect();
         // A press on a dead tactel makes a neighbour respond, but less than a press on the neighbour itself.
-        let is_weak = |press: &Press| {
+        let is_weak = |press: &ProbePress| {
             presses.iter().any(|other| {
                 other.tactel == press.tactel
                     && other.peak <= 1.05 * press.peak
@@ -167,16 +170,11 @@ impl<'l> Samples<'l> {
     /// Returns the ranges of a log between unloaded frames with at least the minimum force of a press.
     fn stretches(&self, log: usize) -> Vec<(usize, Range<usize>)> {
         let from = &self.logs[log];
-        let (mut stretches, mut start) = (Vec::new(), 0);
-        for i in 0..=from.frames() {
-            if i == from.frames() || from.is_unloaded(i, self.most) {
-                if peak(&from.force[start..i]) >= MIN_PRESS * self.most {
-                    stretches.push((log, start..i));
-                }
-                start = i + 1;
-            }
-        }
-        stretches
+        let is_unloaded = |frame: &usize| from.is_unloaded(*frame, self.most);
+        let frames: Vec<usize> = (0..from.frames()).collect();
+        let runs = frames.chunk_by(|a, b| is_unloaded(a) == is_unloaded(b)).filter(|run| !is_unloaded(&run[0]));
+        let stretches = runs.map(|run| (log, run[0]..run[0] + run.len()));
+        stretches.filter(|(_, frames)| peak(&from.force[frames.clone()]) >= MIN_PRESS * self.most).collect()
     }
 
     /// Returns each tactel's mean reading beyond the offset, over the largest forces of a range of frames.
@@ -208,7 +206,7 @@ impl<'l> Samples<'l> {
 
     /// Returns the press of a range of frames: of the tactels near their maximum response, the one with the largest.
     /// Foam couples neighbours, and a sensitive neighbour may read more than the pressed tactel.
-    fn press(&self, log: usize, frames: Range<usize>) -> Option<Press> {
+    fn press(&self, log: usize, frames: Range<usize>) -> Option<ProbePress> {
         let responses = self.responses(log, &frames);
         let live = || (0..responses.len()).filter(|i| !self.answers[*i].is_dead);
         let part = |i: &usize| responses[*i].abs() / self.answers[*i].response;
@@ -216,7 +214,7 @@ impl<'l> Samples<'l> {
         let alike = live().filter(|i| part(i) >= MIN_ALIKE * best);
         let tactel = alike.max_by(|a, b| responses[*a].abs().total_cmp(&responses[*b].abs()))?;
         let peak = peak(&self.logs[log].force[frames.clone()]);
-        Some(Press { log, frames, peak, tactel, response: responses[tactel].abs() })
+        Some(ProbePress { log, frames, peak, tactel, response: responses[tactel].abs() })
     }
 
     fn set_response(&mut self, tactel: usize, response: f64) {
@@ -236,11 +234,11 @@ impl<'l> Samples<'l> {
         }
     }
 
-    /// Returns the mean reading of a tactel beyond its offset, over some frames.
-    fn mean_beyond(&self, tactel: usize, is_meant: impl Fn(&Log, usize) -> bool) -> f64 {
+    /// Returns the mean reading of a tactel beyond its offset, over the largest forces of all logs.
+    fn mean_response(&self, tactel: usize) -> f64 {
         let (mut sum, mut count) = (0.0, 0);
         for log in self.logs {
-            for frame in (0..log.frames()).filter(|frame| is_meant(log, *frame)) {
+            for frame in (0..log.frames()).filter(|frame| log.force[*frame] >= MIN_RESPONSE_FORCE * self.most) {
                 sum += f64::from(log.reading(frame, tactel) - self.answers[tactel].offset);
                 count += 1;
             }
@@ -250,7 +248,7 @@ impl<'l> Samples<'l> {
 
     /// Returns the samples of a tactel, each with its reading in the log.
     #[must_use]
-    pub fn of(&self, tactel: usize) -> Vec<(Sample, f32)> {
+    pub fn of(&self, tactel: usize) -> Vec<(TactelSample, f32)> {
         let Answer { offset, sign, .. } = self.answers[tactel];
         let mut samples = Vec::new();
         for (log, frames) in self.logs.iter().zip(&self.frames) {
@@ -259,7 +257,7 @@ impl<'l> Samples<'l> {
                     let reading = log.reading(i, tactel);
                     let s = f64::from((reading - offset) * sign);
                     let force = log.force[i] * self.share;
-                    samples.push((Sample { force, s, is_loading: *is_loading }, reading));
+                    samples.push((TactelSample { force, s, is_loading: *is_loading }, reading));
                 }
             }
         }

@@ -2,6 +2,7 @@
 
 use tactflow_runtime::signal::Unit;
 
+use super::ForceCurve;
 use super::log::Log;
 use crate::random::Random;
 
@@ -13,14 +14,14 @@ const MAX_COUNTS: f64 = 4095.0;
 
 /// The true characteristic of one tactel: offset + a f / (f + b).
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Truth {
+pub(super) struct Characteristic {
     pub(super) offset: f64,
     pub(super) a: f64,
     pub(super) b: f64,
     pub(super) is_dead: bool,
 }
 
-impl Truth {
+impl Characteristic {
     /// Returns the reading in the middle of the branches, without noise and quantisation.
     pub(super) fn middle(&self, force: f64) -> f64 {
         let force = force.max(0.0);
@@ -42,11 +43,20 @@ impl Truth {
     }
 }
 
+/// Returns the force at the end of a curve [N].
+pub(super) fn max_force(curve: &ForceCurve) -> f32 {
+    match curve {
+        ForceCurve::Linear { .. } => panic!("a line has no end"),
+        ForceCurve::Rational { most, .. } => *most,
+        ForceCurve::Piecewise { knots } => knots.last().expect("a curve has a knot")[1],
+    }
+}
+
 /// A pad.
 pub(super) struct Pad {
     pub(super) rows: usize,
     pub(super) cols: usize,
-    pub(super) truths: Vec<Truth>,
+    pub(super) truths: Vec<Characteristic>,
     pub(super) random: Random,
     /// Standard deviation of the noise [counts].
     pub(super) noise: f64,
@@ -65,7 +75,7 @@ impl Pad {
             let a = (3400.0 * libm::exp(0.25 * random.normal())).min(5400.0);
             let b = 3.0 * libm::exp(0.15 * random.normal());
             let offset = MAX_COUNTS * (0.05 + 0.05 * random.uniform(0.0, 1.0));
-            Truth { offset, a, b, is_dead: dead.contains(&i) }
+            Characteristic { offset, a, b, is_dead: dead.contains(&i) }
         };
         let truths = (0..rows * cols).map(truth).collect();
         Self { rows, cols, truths, random, noise: 4.0, hysteresis: 0.1, is_falling: false }

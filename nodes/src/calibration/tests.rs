@@ -4,19 +4,19 @@ use tactflow_runtime::harness::NodeRig;
 use tactflow_runtime::signal::{Image, ImageShape};
 
 use super::log::Log;
-use super::report::{Report, Settings, State, calibrate};
-use super::samples::Load;
-use super::testing::{MAX_FORCE_N, Pad};
+use super::report::{CalibrationReport, Settings, TactelStatus, calibrate};
+use super::samples::LoadKind;
+use super::testing::{MAX_FORCE_N, Pad, max_force};
 use super::*;
 use crate::touch::calibrate::Calibrate;
 
 const DEAD: [usize; 3] = [3, 17, 40];
 
-fn settings(load: Load, curve: Option<Kind>) -> Settings {
+fn settings(load: LoadKind, curve: Option<CurveKind>) -> Settings {
     Settings { load, curve, dead_below: None, bearing: None }
 }
 
-fn made(log: Log, load: Load, curve: Option<Kind>) -> Report {
+fn made(log: Log, load: LoadKind, curve: Option<CurveKind>) -> CalibrationReport {
     calibrate(&[log], &settings(load, curve)).unwrap()
 }
 
@@ -64,14 +64,14 @@ fn least(pad: &Pad, log: &Log) -> f64 {
 fn a_known_pad_is_recovered_through_file_and_node() {
     // Load, hysteresis of the pad, maximum error overall and of the worst tactel [N of 5 N].
     let cases = [
-        (Load::Uniform, 0.1, 0.26, 0.35, 2.0),
-        (Load::Probe, 0.1, 0.26, 0.35, 2.0),
-        (Load::Uniform, 0.0, 0.025, 0.1, 15.0),
-        (Load::Probe, 0.0, 0.025, 0.1, 15.0),
+        (LoadKind::Uniform, 0.1, 0.26, 0.35, 2.0),
+        (LoadKind::Probe, 0.1, 0.26, 0.35, 2.0),
+        (LoadKind::Uniform, 0.0, 0.025, 0.1, 15.0),
+        (LoadKind::Probe, 0.0, 0.025, 0.1, 15.0),
     ];
     for (load, hysteresis, overall, worst, better) in cases {
         let mut pad = Pad { hysteresis, ..Pad::new(8, 8, &DEAD, 7) };
-        let log = if load == Load::Uniform { pad.uniform(4, 250) } else { pad.probe(2, 100, 0.2) };
+        let log = if load == LoadKind::Uniform { pad.uniform(4, 250) } else { pad.probe(2, 100, 0.2) };
         let fresh = pad.uniform(3, 200);
         let least = least(&pad, &fresh);
         let figures = curve::KINDS.map(|kind| {
@@ -90,17 +90,20 @@ fn a_known_pad_is_recovered_through_file_and_node() {
 
 #[test]
 fn hysteresis_and_dead_tactels_are_found() {
-    for (load, hysteresis, seed) in
-        [(Load::Uniform, 0.05, 1), (Load::Uniform, 0.2, 2), (Load::Probe, 0.1, 3), (Load::Probe, 0.15, 4)]
-    {
+    for (load, hysteresis, seed) in [
+        (LoadKind::Uniform, 0.05, 1),
+        (LoadKind::Uniform, 0.2, 2),
+        (LoadKind::Probe, 0.1, 3),
+        (LoadKind::Probe, 0.15, 4),
+    ] {
         let mut pad = Pad { hysteresis, ..Pad::new(8, 8, &DEAD, seed) };
         // One is stuck at the maximum reading, one at zero.
         (pad.truths[17].offset, pad.truths[40].offset) = (4095.0, 0.0);
-        let log = if load == Load::Uniform { pad.uniform(3, 200) } else { pad.probe(3, 80, 0.25) };
+        let log = if load == LoadKind::Uniform { pad.uniform(3, 200) } else { pad.probe(3, 80, 0.25) };
         let report = made(log, load, None);
-        let dead: Vec<usize> = report.in_state(State::Dead).iter().map(|[i, j]| i * 8 + j).collect();
+        let dead: Vec<usize> = report.with_status(TactelStatus::Dead).iter().map(|[i, j]| i * 8 + j).collect();
         assert_eq!(dead, DEAD, "{load:?}");
-        assert!(report.in_state(State::Few).is_empty() && report.in_state(State::Unfit).is_empty());
+        assert!(report.with_status(TactelStatus::Few).is_empty() && report.with_status(TactelStatus::Unfit).is_empty());
         for (i, finding) in report.findings.iter().enumerate().filter(|(i, _)| !DEAD.contains(i)) {
             let found = finding.hysteresis.unwrap();
             let tolerance = if finding.is_saturated { 0.05 } else { 0.02 };
@@ -115,24 +118,24 @@ fn a_tactel_below_the_minimum_response_is_dead() {
     pad.truths[6].a *= 0.1;
     let log = pad.uniform(2, 100);
     let dead = |dead_below| {
-        let settings = Settings { dead_below, ..settings(Load::Uniform, None) };
-        calibrate(std::slice::from_ref(&log), &settings).unwrap().in_state(State::Dead)
+        let settings = Settings { dead_below, ..settings(LoadKind::Uniform, None) };
+        calibrate(std::slice::from_ref(&log), &settings).unwrap().with_status(TactelStatus::Dead)
     };
     assert_eq!(dead(None), Vec::<[usize; 2]>::new());
     assert_eq!(dead(Some(500.0)), [[1, 2]]);
     // A cell that the recording marks as absent is dead, whatever its reading.
     let absent = Log { absent: vec![0], ..log.clone() };
-    assert_eq!(made(absent, Load::Uniform, None).in_state(State::Dead), [[0, 0]]);
+    assert_eq!(made(absent, LoadKind::Uniform, None).with_status(TactelStatus::Dead), [[0, 0]]);
 }
 
 #[test]
 fn dead_tactels_can_share_the_load() {
     let mut pad = Pad { hysteresis: 0.0, ..Pad::new(4, 4, &[0, 1, 2, 3], 6) };
     let log = pad.uniform(2, 100);
-    let settings = Settings { bearing: Some(16), ..settings(Load::Uniform, None) };
+    let settings = Settings { bearing: Some(16), ..settings(LoadKind::Uniform, None) };
     let report = calibrate(std::slice::from_ref(&log), &settings).unwrap();
     assert!((report.most - MAX_FORCE_N * 12.0 / 16.0).abs() < 0.01, "{}", report.most);
-    assert!((made(log, Load::Uniform, None).most - MAX_FORCE_N).abs() < 0.01);
+    assert!((made(log, LoadKind::Uniform, None).most - MAX_FORCE_N).abs() < 0.01);
 }
 
 #[test]
@@ -141,10 +144,10 @@ fn a_sensor_with_falling_readings_is_calibrated() {
     let log = pad.uniform(3, 150);
     let fresh = pad.uniform(1, 100);
     for kind in curve::KINDS {
-        let report = made(log.clone(), Load::Uniform, Some(kind));
-        assert_eq!(report.in_state(State::Dead), [[1, 1]]);
+        let report = made(log.clone(), LoadKind::Uniform, Some(kind));
+        assert_eq!(report.with_status(TactelStatus::Dead), [[1, 1]]);
         let (overall, _) = errors(&pad, &fresh, &mut node(&report.calibration, &format!("falling-{kind}")));
-        assert!(overall < if kind == Kind::Linear { 0.6 } else { 0.03 }, "{kind}: {overall} N");
+        assert!(overall < if kind == CurveKind::Linear { 0.6 } else { 0.03 }, "{kind}: {overall} N");
     }
 }
 
@@ -153,12 +156,12 @@ fn a_saturated_tactel_is_calibrated_below_saturation() {
     let mut pad = Pad { hysteresis: 0.0, ..Pad::new(2, 3, &[], 9) };
     // It saturates at 4095 counts, at about 2.2 N.
     (pad.truths[4].a, pad.truths[4].b, pad.truths[4].offset) = (9000.0, 3.0, 300.0);
-    let report = made(pad.uniform(2, 250), Load::Uniform, Some(Kind::Rational));
+    let report = made(pad.uniform(2, 250), LoadKind::Uniform, Some(CurveKind::Rational));
     let saturated: Vec<bool> = report.findings.iter().map(|finding| finding.is_saturated).collect();
     assert_eq!(saturated, [false, false, false, false, true, false]);
     let Some(Tactel { curve, offset }) = &report.calibration.tactels[4] else { panic!("it has a curve") };
     let end = 3.0 * 3795.0 / (9000.0 - 3795.0);
-    assert!((f64::from(curve.most().unwrap()) - end).abs() < 0.05, "{curve:?}");
+    assert!((f64::from(max_force(curve)) - end).abs() < 0.05, "{curve:?}");
     let force = curve.force(pad.truths[4].middle(1.0) as f32 - offset);
     assert!((force - 1.0).abs() < 0.02, "{force} N for 1 N");
 }
@@ -167,7 +170,7 @@ fn a_saturated_tactel_is_calibrated_below_saturation() {
 fn a_falling_sensor_saturates_at_its_lowest_reading_and_a_dwell_is_no_saturation() {
     let mut falling = Pad { hysteresis: 0.0, is_falling: true, ..Pad::new(2, 3, &[], 9) };
     (falling.truths[4].a, falling.truths[4].b, falling.truths[4].offset) = (9000.0, 3.0, 300.0);
-    let report = made(falling.uniform(2, 250), Load::Uniform, None);
+    let report = made(falling.uniform(2, 250), LoadKind::Uniform, None);
     assert_eq!(report.findings.iter().position(|finding| finding.is_saturated), Some(4));
     assert_eq!(report.findings.iter().filter(|finding| finding.is_saturated).count(), 1);
 
@@ -180,7 +183,7 @@ fn a_falling_sensor_saturates_at_its_lowest_reading_and_a_dwell_is_no_saturation
         let held = log.cells[top * tactels..(top + 1) * tactels].to_vec();
         log.cells.extend(held);
     }
-    let report = made(log, Load::Uniform, None);
+    let report = made(log, LoadKind::Uniform, None);
     assert!(report.findings.iter().all(|finding| !finding.is_saturated), "nothing is past its end");
 }
 
@@ -192,14 +195,14 @@ fn tactels_that_were_not_pressed_are_left_out() {
     let frames = 6 * 130 + 40;
     let log =
         Log { force: whole.force[..frames].to_vec(), cells: whole.cells[..frames * 16].to_vec(), ..whole.clone() };
-    let report = made(log, Load::Probe, None);
+    let report = made(log, LoadKind::Probe, None);
     let good: Vec<usize> = (0..16).filter(|i| report.calibration.tactels[*i].is_some()).collect();
     assert!(good.starts_with(&[0, 1, 2, 3, 4, 5]) && good.len() <= 7, "{good:?}");
     // Two logs together are equivalent to one.
     let rest =
         Log { force: whole.force[6 * 130..].to_vec(), cells: whole.cells[6 * 130 * 16..].to_vec(), ..whole.clone() };
     let first = Log { force: whole.force[..6 * 130].to_vec(), cells: whole.cells[..6 * 130 * 16].to_vec(), ..whole };
-    let report = calibrate(&[first, rest], &settings(Load::Probe, None)).unwrap();
+    let report = calibrate(&[first, rest], &settings(LoadKind::Probe, None)).unwrap();
     assert!(report.calibration.tactels.iter().all(Option::is_some));
 }
 
@@ -207,7 +210,7 @@ fn tactels_that_were_not_pressed_are_left_out() {
 fn a_uniform_load_is_not_accepted_as_a_probe() {
     for (rows, cols, dead) in [(4, 4, &[][..]), (1, 2, &[]), (3, 5, &[0, 7])] {
         let log = Pad::new(rows, cols, dead, 5).uniform(3, 60);
-        let message = calibrate(std::slice::from_ref(&log), &settings(Load::Probe, None)).unwrap_err();
+        let message = calibrate(std::slice::from_ref(&log), &settings(LoadKind::Probe, None)).unwrap_err();
         assert!(message.starts_with("most tactels respond alike to most presses"), "{message}");
     }
     // A probe on one tactel, with foam that transmits a part of the force to its neighbours.
@@ -219,8 +222,8 @@ fn a_uniform_load_is_not_accepted_as_a_probe() {
     log.cells[..rest.len()].copy_from_slice(&rest);
     log.force.truncate(frames);
     log.cells.truncate(frames * tactels);
-    let report = made(log, Load::Probe, None);
-    assert_eq!(report.in_state(State::Good), [[1, 1]], "only the one in the middle was pressed");
+    let report = made(log, LoadKind::Probe, None);
+    assert_eq!(report.with_status(TactelStatus::Good), [[1, 1]], "only the one in the middle was pressed");
 }
 
 #[test]
@@ -228,22 +231,24 @@ fn a_log_without_a_live_tactel_is_refused_with_help() {
     let mut pad = Pad::new(2, 2, &[0, 1, 2, 3], 11);
     let log = pad.uniform(1, 50);
     let log = Log { force: log.force.iter().enumerate().map(|(i, _)| if i < 50 { 0.0 } else { 3.0 }).collect(), ..log };
-    for (load, way_out) in [(Load::Probe, "or is the load uniform?"), (Load::Uniform, "or of a probe on one tactel")] {
+    for (load, way_out) in
+        [(LoadKind::Probe, "or is the load uniform?"), (LoadKind::Uniform, "or of a probe on one tactel")]
+    {
         let message = calibrate(std::slice::from_ref(&log), &settings(load, None)).unwrap_err();
         assert!(message.contains("4 tactels do not respond") && message.contains(way_out), "{message}");
     }
-    assert_eq!(calibrate(&[], &settings(Load::Probe, None)).unwrap_err(), "there is no log");
+    assert_eq!(calibrate(&[], &settings(LoadKind::Probe, None)).unwrap_err(), "there is no log");
 }
 
 #[test]
 fn the_simplest_curve_that_is_good_enough_is_chosen() {
     let mut pad = Pad { hysteresis: 0.0, ..Pad::new(2, 3, &[], 12) };
-    assert_eq!(made(pad.uniform(2, 200), Load::Uniform, None).kind(), Kind::Rational);
+    assert_eq!(made(pad.uniform(2, 200), LoadKind::Uniform, None).kind(), CurveKind::Rational);
     // Saturation below the noise: a line is good enough.
     for truth in &mut pad.truths {
         (truth.a, truth.b) = (2000.0 * 4000.0 / MAX_FORCE_N, 4000.0);
     }
-    assert_eq!(made(pad.uniform(2, 200), Load::Uniform, None).kind(), Kind::Linear);
+    assert_eq!(made(pad.uniform(2, 200), LoadKind::Uniform, None).kind(), CurveKind::Linear);
     // A knee that no rational curve fits.
     let knee = |force: f64| if force < 2.0 { 200.0 * force } else { 400.0 + 800.0 * (force - 2.0) };
     let mut log = pad.uniform(2, 200);
@@ -251,15 +256,15 @@ fn the_simplest_curve_that_is_good_enough_is_chosen() {
         let force = log.force[i] / 6.0;
         cells.iter_mut().for_each(|cell| *cell = 300.0 + knee(force.max(0.0)).round() as f32);
     }
-    let report = made(log, Load::Uniform, None);
-    assert_eq!(report.kind(), Kind::Piecewise);
+    let report = made(log, LoadKind::Uniform, None);
+    assert_eq!(report.kind(), CurveKind::Piecewise);
     assert!(report.rms[2] < 0.05 && report.rms[1] > 0.2, "{:?}", report.rms);
 }
 
 #[test]
 fn the_report_has_results_with_units() {
     let mut pad = Pad::new(4, 4, &[7], 13);
-    let report = made(pad.uniform(2, 100), Load::Uniform, None);
+    let report = made(pad.uniform(2, 100), LoadKind::Uniform, None);
     let text = report.text(false);
     for part in [
         "15 of 4 x 4 tactels calibrated, readings in raw, forces up to 5.0",
@@ -281,7 +286,7 @@ fn the_report_has_results_with_units() {
         let upto = 150;
         Log { force: log.force[..upto].to_vec(), cells: log.cells[..upto * 16].to_vec(), ..log }
     };
-    let text = made(only_up, Load::Uniform, None).text(true);
+    let text = made(only_up, LoadKind::Uniform, None).text(true);
     assert!(text.contains("hysteresis   not measured") && text.lines().last().unwrap().ends_with(" -"), "{text}");
 }
 
@@ -289,7 +294,7 @@ fn the_report_has_results_with_units() {
 #[test]
 fn the_picture_has_every_tactel_and_the_mean_in_its_frame() {
     let mut pad = Pad::new(3, 4, &[7], 14);
-    let svg = plot::svg(&made(pad.uniform(2, 100), Load::Uniform, None));
+    let svg = plot::svg(&made(pad.uniform(2, 100), LoadKind::Uniform, None));
     let lines: Vec<&str> = svg.lines().filter(|line| line.starts_with("<polyline")).collect();
     assert_eq!(lines.len(), 2 * 11 + 1, "two branches a tactel, and the mean");
     for line in lines {

@@ -1,18 +1,10 @@
-//! `mock_arm`: an arm that follows its commands exactly.
-//!
-//! It integrates the commanded velocity exactly, q_eq += v dt: that is the equilibrium, where a compliant arm would be if
-//! nothing held it. The position is the same, but it stops at the ends of the joints, and it stays while somebody holds
-//! the arm. The equilibrium then runs ahead, also past an end, and the position springs to it when the arm is let go:
-//! that is the windup that a bound on the lead is for. It is kinematic: it leaves out inertia, friction, stiffness,
-//! delay and noise, so what works on it need not work on an arm.
+//! `mock_arm`: an arm that follows its commands exactly, q_eq += v dt.
 
-use tactflow_runtime::device::{
-    Command, Commands, Description, Device, DeviceError, Driver, Opened, Output, Samples, Stepped,
-};
-use tactflow_runtime::node::{FilePath, Mistake, Mistakes, Param};
-use tactflow_runtime::signal::{Joint, Joints, JointsShape, Unit};
+use tactflow_runtime::device::{Commands, Description, Device, DeviceError, Driver, Opened, Samples, Stepped};
+use tactflow_runtime::node::{Describe, FilePath, Mistake, Mistakes, Param};
+use tactflow_runtime::signal::Joint;
 
-use super::arm_facts::{check_start, facts};
+use super::arm::{self, ArmPorts};
 use super::{nanos, period_of};
 use crate::arm::model::load;
 use crate::arm::mount::Mount;
@@ -33,15 +25,15 @@ pub struct Params {
     /// Samples per second.
     #[param(unit = "1/s", range = 0.001..=1e6, default = 250.0)]
     rate_hz: f64,
-    /// Maximum acceleration that the arm states for each joint, in m/s² for a prismatic joint; it does not keep to it.
+    /// Maximum acceleration that the arm states for each joint, in m/s² for a prismatic joint; the arm does not keep to it.
     #[param(unit = "rad/s2", above = 0.0, default = 10.0)]
     acceleration: f64,
-    /// Times in which the arm is held in place.
+    /// Periods in which the arm is held in place.
     #[param(default = vec![])]
     hold: Vec<Hold>,
 }
 
-/// A time in which the arm is held in place.
+/// A period in which the arm is held in place.
 #[derive(Debug, Clone, Param)]
 struct Hold {
     /// Begin.
@@ -52,13 +44,42 @@ struct Hold {
     to_s: f64,
 }
 
-/// The arm's joints and where they are.
-#[derive(Debug)]
+/// An arm without dynamics that follows its commands exactly.
+///
+/// The device integrates the commanded joint velocity exactly: the result is its `equilibrium`, where a compliant arm would
+/// be if nothing held it. Its `position` is the same, but it stops at the ends of the joints, and it stays in place while
+/// the arm is held (`hold`). Meanwhile the equilibrium runs ahead, also past the end of a joint, and the position springs to
+/// it when the arm is released. A `joint_limit` keeps this lead small.
+///
+/// Inertia, friction, stiffness, delay and noise are not simulated: what works on this arm may fail on a real one. The arm
+/// states its `acceleration` and does not keep to it.
+///
+/// It states the facts `urdf`, `tip` and `mount` for `arm_state`.
+///
+/// ```toml
+/// [roles]
+/// arm = "velocity_arm"
+///
+/// [commands]
+/// arm.velocity = "joint_limit.velocity"
+///
+/// [bind]
+/// arm = "arm"
+///
+/// [devices.arm]
+/// type = "mock_arm"
+/// urdf = "builtin:lwr4p.urdf"          # a KUKA LWR 4+
+/// tip = "lwr_7_link"
+/// mount = { xyz = [0.0, 0.0, 0.03] }   # of the sensor on the tip [m]
+/// start = [0.0, 0.5, 0.0, -1.3, 0.0, 1.3, 0.0]   # [rad]
+/// ```
+#[derive(Debug, Describe)]
+#[describe(name = "mock_arm")]
 pub struct MockArm {
-    ports: Ports,
+    ports: ArmPorts,
     joints: Vec<Joint>,
     position: Vec<f64>,
-    /// What the commands add up to.
+    /// The sum of the commands.
     equilibrium: Vec<f64>,
     holds: Vec<Hold>,
     period: i64,
@@ -66,62 +87,18 @@ pub struct MockArm {
     sequence: u64,
 }
 
-#[derive(Debug, Clone, Copy)]
-struct Ports {
-    position: Output<Joints>,
-    equilibrium: Output<Joints>,
-    velocity: Command,
-}
-
-impl tactflow_runtime::node::Describe for MockArm {
-    const NAME: &'static str = "mock_arm";
-    const SUMMARY: &'static str = "an arm without dynamics that follows its commands exactly";
-    const DOC: &'static str = "It integrates the commanded joint velocity exactly: that is its `equilibrium`. Its \
-        `position` is the same, but it stops at the ends of the joints, and while somebody holds it, as each `hold` \
-        says. The equilibrium runs ahead then, and when the arm is let go it springs to it: a `joint_limit` keeps that \
-        lead small.\n\n\
-        It leaves out inertia, friction, stiffness, delay and noise: what works on it need not work on an arm. It \
-        states `acceleration` and does not keep to it.\n\n\
-        It states the facts `urdf`, `tip` and `mount` for `arm_state`.";
-    const EXAMPLE: &'static str = r#"
-[roles]
-arm = "velocity_arm"
-
-[commands]
-arm.velocity = "joint_limit.velocity"
-
-[bind]
-arm = "arm"
-
-[devices.arm]
-type = "mock_arm"
-urdf = "builtin:lwr4p.urdf"          # a KUKA LWR 4+
-tip = "lwr_7_link"
-mount = { xyz = [0.0, 0.0, 0.03] }   # of the sensor on the tip [m]
-start = [0.0, 0.5, 0.0, -1.3, 0.0, 1.3, 0.0]   # [rad]
-"#;
-}
-
 impl Device for MockArm {
     type Params = Params;
 
     fn open(params: Params) -> Result<Opened, Mistakes> {
         let chain = load(&params.urdf, &params.tip, &params.mount)?;
-        let period = period_of(params.rate_hz);
-        let acceleration = params.acceleration;
-        let joints: Vec<Joint> = chain.joints().iter().map(|joint| Joint { acceleration, ..joint.clone() }).collect();
-        check_start(&joints, &params.start)?;
+        let joints = arm::joints(&chain, params.acceleration, &params.start)?;
         check_holds(&params.hold)?;
-        let shape = JointsShape { joints: joints.clone(), unit: Unit::RADIAN };
+        let period = period_of(params.rate_hz);
         let mut description = Description::every(period as f64 * 1e-9);
-        let mut arm = description.fills("velocity_arm");
-        arm.facts(facts(&params.urdf, &params.tip, &params.mount)?);
-        let ports = Ports {
-            position: arm.output("position", shape.clone()),
-            equilibrium: arm.output("equilibrium", shape.clone()),
-            velocity: arm.command("velocity", shape.in_unit(Unit::RADIAN.per_second())),
-        };
-        let arm = Self::new(ports, joints, params.start, params.hold, period);
+        let facts = arm::facts(&params.urdf, &params.tip, &params.mount)?;
+        let ports = ArmPorts::fill(&mut description, &joints, facts);
+        let arm = Self::new(ports, joints.joints, params.start, params.hold, period);
         Ok(Opened { description, driver: Driver::Stepped(Box::new(arm)) })
     }
 }
@@ -135,30 +112,27 @@ impl Stepped for MockArm {
         let is_due = self.next().is_none_or(|next| next <= now);
         if self.advance(now, commands.joints(self.ports.velocity))? && is_due {
             self.sequence += 1;
-            samples.write(self.ports.position, now, self.sequence).0.copy_from_slice(&self.position);
-            samples.write(self.ports.equilibrium, now, self.sequence).0.copy_from_slice(&self.equilibrium);
+            self.ports.write(samples, now, self.sequence, [&self.position, &self.equilibrium]);
         }
         Ok(())
     }
 }
 
 impl MockArm {
-    fn new(ports: Ports, joints: Vec<Joint>, start: Vec<f64>, holds: Vec<Hold>, period: i64) -> Self {
+    fn new(ports: ArmPorts, joints: Vec<Joint>, start: Vec<f64>, holds: Vec<Hold>, period: i64) -> Self {
         Self { ports, joints, equilibrium: start.clone(), position: start, holds, period, last: None, sequence: 0 }
     }
 
-    /// Moves with `velocity` from the last exchange to `now`; whether time went on, so that there is a new sample.
+    /// Moves at `velocity` from the last exchange to `now` [ns]. Returns whether time advanced, so that there is a new sample.
     fn advance(&mut self, now: i64, velocity: &[f64]) -> Result<bool, DeviceError> {
         if self.last.is_some_and(|last| now <= last) {
             return Ok(false);
         }
+        arm::check_velocity(&self.joints, velocity)?;
         let dt = (now - self.last.unwrap_or(now)) as f64 * 1e-9;
         let is_held = self.holds.iter().any(|hold| (nanos(hold.from_s)..nanos(hold.to_s)).contains(&now));
         let places = self.equilibrium.iter_mut().zip(&mut self.position);
         for (((equilibrium, q), v), joint) in places.zip(velocity).zip(&self.joints) {
-            if !v.is_finite() {
-                return Err(DeviceError(format!("the velocity commanded to joint `{}` is not finite", joint.name)));
-            }
             *equilibrium += v * dt;
             if !is_held {
                 *q = equilibrium.clamp(joint.lower, joint.upper);
@@ -169,6 +143,7 @@ impl MockArm {
     }
 }
 
+/// Checks that every hold lasts for some time.
 fn check_holds(holds: &[Hold]) -> Result<(), Mistakes> {
     let backward = holds.iter().filter(|hold| hold.to_s <= hold.from_s);
     let message = |hold: &Hold| format!("a hold from {} s to {} s lasts no time", hold.from_s, hold.to_s);
@@ -181,7 +156,7 @@ mod tests {
     use std::path::Path;
 
     use tactflow_runtime::harness::NodeRig;
-    use tactflow_runtime::signal::Shape;
+    use tactflow_runtime::signal::{Joints, JointsShape, Shape, Unit};
 
     use super::*;
     use crate::devices::testing::{Bench, open, read};
@@ -194,7 +169,7 @@ mod tests {
     }
 
     #[test]
-    fn it_samples_at_its_rate_and_says_what_it_is() {
+    fn it_samples_at_its_rate_and_states_its_facts() {
         let mut bench = arm("start = [0, 0.5, 0, -1, 0, 1, 0]\nmount = { xyz = [0, 0, 0.05] }").unwrap();
         assert_eq!(bench.description.period, 0.004);
         for port in ["position", "equilibrium", "velocity"] {
@@ -206,7 +181,7 @@ mod tests {
             bench.exchange(now);
         }
         bench.exchange(9_000_000);
-        assert_eq!(bench.device.next(), Some(12_000_000), "off the beat it stays on the beat");
+        assert_eq!(bench.device.next(), Some(12_000_000), "the next sample is at a multiple of the period");
         assert!(Path::new(bench.fact("urdf").unwrap().as_str().unwrap()).is_absolute());
         assert_eq!(bench.fact("tip"), Some(&"lwr_7_link".into()));
         assert_eq!(bench.fact("mount").unwrap()["xyz"], vec![0.0, 0.0, 0.05].into());
@@ -217,12 +192,7 @@ mod tests {
         let joint = |name: &str| Joint { name: name.into(), lower: -1.0, upper: 1.0, speed: 1.0, acceleration: 10.0 };
         let params: Params = read(&format!("urdf = 'none'\ntip = ''\nstart = []\nhold = {holds}"));
         let mut description = Description::every(0.004);
-        let mut arm = description.fills("velocity_arm");
-        let ports = Ports {
-            position: arm.output("position", JointsShape::default()),
-            equilibrium: arm.output("equilibrium", JointsShape::default()),
-            velocity: arm.command("velocity", JointsShape::default()),
-        };
+        let ports = ArmPorts::fill(&mut description, &JointsShape::default(), vec![]);
         MockArm::new(ports, vec![joint("a"), joint("b")], vec![0.0, 0.5], params.hold, 4_000_000)
     }
 
@@ -232,11 +202,11 @@ mod tests {
         let steps = [
             (5, [9.0, 9.0], true, [0.0, 0.5], [0.0, 0.5], "the first exchange is where time starts"),
             (255, [1.0, -2.0], true, [0.25, 0.0], [0.25, 0.0], "a quarter of a second"),
-            (255, [1.0, -2.0], false, [0.25, 0.0], [0.25, 0.0], "the same moment once more"),
-            (200, [1.0, -2.0], false, [0.25, 0.0], [0.25, 0.0], "a moment that is gone"),
+            (255, [1.0, -2.0], false, [0.25, 0.0], [0.25, 0.0], "the same time again"),
+            (200, [1.0, -2.0], false, [0.25, 0.0], [0.25, 0.0], "a time in the past"),
             (755, [2.0, 0.5], true, [1.0, 0.25], [1.25, 0.25], "against an end"),
             (1255, [-0.25, 0.0], true, [1.0, 0.25], [1.125, 0.25], "it does not come back at once"),
-            (1755, [-1.0, 0.0], true, [0.625, 0.25], [0.625, 0.25], "but when the lead is used up"),
+            (1755, [-1.0, 0.0], true, [0.625, 0.25], [0.625, 0.25], "only when the lead is used up"),
         ];
         for (ms, velocity, is_new, position, equilibrium, what) in steps {
             assert_eq!(arm.advance(ms * 1_000_000, &velocity), Ok(is_new), "{what}");
@@ -246,7 +216,7 @@ mod tests {
     }
 
     #[test]
-    fn somebody_holds_it_and_it_springs_when_it_is_let_go() {
+    fn while_held_it_stays_and_when_released_it_springs() {
         let mut arm = two_joints("[{ from_s = 0.25, to_s = 0.75 }]");
         let steps = [
             (0, [0.0, 0.5], [0.0, 0.5], "the start"),
@@ -281,9 +251,9 @@ mod tests {
             rig.step_ms(4.0);
             command.copy_from_slice(&rig.get::<Joints>("velocity").unwrap().0);
         }
-        assert!(most > 0.099 && most <= 0.1 + 1e-12, "the lead grows up to its bound and no further: {most}");
-        assert!(spring > 0.099 && spring < 0.11, "and that is how far it springs: {spring}");
-        assert!(arm.position[0] > 0.5, "then it goes on: {}", arm.position[0]);
+        assert!(most > 0.099 && most <= 0.1 + 1e-12, "the lead grows up to its bound: {most}");
+        assert!(spring > 0.099 && spring < 0.11, "it springs by the lead: {spring}");
+        assert!(arm.position[0] > 0.5, "then it moves on: {}", arm.position[0]);
     }
 
     #[test]

@@ -1,20 +1,26 @@
-//! The edge: what gives images and takes joint velocities. One device a file.
+//! The devices, one per file: pads that provide images, and arms that take joint velocities.
 
-pub(crate) mod arm_facts;
+use std::borrow::Cow;
+
+pub(crate) mod arm;
 pub mod lockstep;
 pub mod mock_arm;
 pub mod mock_pad;
+pub(crate) mod pad;
 pub mod recording;
 
 #[cfg(test)]
 pub(crate) mod testing;
 
-/// Time between two samples of a device with a parameter `rate_hz` [ns].
+/// Facts that a device states of a role, by name.
+pub(crate) type Facts = Vec<(Cow<'static, str>, toml::Value)>;
+
+/// Returns the time between two samples of a device with a parameter `rate_hz` [ns].
 pub(crate) fn period_of(rate_hz: f64) -> i64 {
     (1e9 / rate_hz).round() as i64
 }
 
-/// Seconds as nanoseconds; what does not fit is for ever.
+/// Converts seconds to nanoseconds. Times that are too long for an `i64` saturate.
 pub(crate) fn nanos(seconds: f64) -> i64 {
     (seconds * 1e9).round() as i64
 }

@@ -1,4 +1,4 @@
-//! What the tests of the devices share.
+//! Helpers for tests of devices.
 
 use std::path::Path;
 
@@ -19,14 +19,14 @@ pub(crate) fn open<D: Device>(params: &str) -> Result<Opened, Mistakes> {
     catalogue.devices()[0].open(&table, &mut reader).ok_or(reader.mistakes)
 }
 
-/// Reads parameters that are known to be right.
+/// Reads valid parameters.
 pub(crate) fn read<P: Param>(params: &str) -> P {
     let mut sources = SourceMap::with_builtin(builtin::FILES);
     let table = parse_table(sources.add_file(Path::new("bench.toml"), params)).expect("the test's TOML");
     P::read(&table, &mut Reader::new(&sources)).expect("the test's parameters")
 }
 
-/// An open stepped device with room for what it gives and takes.
+/// An open stepped device with its samples and commands.
 pub(crate) struct Bench {
     pub(crate) description: Description,
     pub(crate) device: Box<dyn Stepped>,
@@ -45,12 +45,12 @@ impl Bench {
         self.description.fact(name)
     }
 
-    /// The image as the device left it, to be read or spoilt.
+    /// Returns the last image of the device.
     pub(crate) fn image(&mut self) -> &mut Image {
         self.samples.write(self.description.output("image").expect("the device has an image"), 0, 0)
     }
 
     pub(crate) fn exchange(&mut self, now: i64) {
-        self.device.exchange(now, &self.commands, &mut self.samples).expect("the device goes on");
+        self.device.exchange(now, &self.commands, &mut self.samples).expect("the device runs");
     }
 }

@@ -13,7 +13,7 @@
 use parry3d_f64::math::{Mat3, Pose3, Vec3};
 use tactflow_runtime::signal::ImageShape;
 
-use super::foam::{self, Column, Foam};
+use super::foam::{self, Foam, FoamColumn};
 use super::object::Object;
 
 /// Speed over which friction falls from its static to its sliding value [m/s].
@@ -43,17 +43,25 @@ pub struct Wrench {
     pub moment: Vec3,
 }
 
+impl Wrench {
+    /// Adds a force at a place.
+    fn push(&mut self, place: Vec3, force: Vec3) {
+        self.force += force;
+        self.moment += place.cross(force);
+    }
+}
+
 /// The foam of the pad in contact with objects.
 pub struct Contact {
     shape: ImageShape,
     /// Number of points along a side of a tactel.
-    fine: usize,
+    pub(super) fine: usize,
     foam: Foam,
-    column: Column,
+    column: FoamColumn,
     /// Shear stiffness of a tactel [N/m].
     shear: f64,
     /// The points that touch an object, in raster order.
-    touching: Vec<Touch>,
+    pub(super) touching: Vec<Touch>,
     tactels: Vec<Bristle>,
     /// Coordinates of the points along x and along y [m].
     xs: Vec<f64>,
@@ -64,8 +72,8 @@ pub struct Contact {
     near: Vec<usize>,
     /// Motion of each object relative to the pad.
     slides: Vec<Slide>,
-    /// Wrench on the pad about its origin, in the base.
-    wrench: Wrench,
+    /// Wrench on the pad about its origin, in the base, as of the last step.
+    pub(super) wrench: Wrench,
 }
 
 /// A point of the pad that touches an object.
@@ -127,7 +135,7 @@ impl Contact {
         let along = |point: usize| (point as f64 + 0.5) / fine as f64 - 0.5;
         Self {
             fine,
-            column: Column::new(&foam, area / points as f64),
+            column: FoamColumn::new(&foam, area / points as f64),
             shear: foam.shear * area / foam::REFERENCE_AREA,
             touching: Vec::with_capacity(shape.tactels() * points),
             tactels: vec![Bristle::default(); shape.tactels()],
@@ -140,24 +148,6 @@ impl Contact {
             shape,
             foam,
         }
-    }
-
-    /// Returns the number of points along a side of a tactel.
-    #[must_use]
-    pub const fn fine(&self) -> usize {
-        self.fine
-    }
-
-    /// Returns the points that touch an object, in raster order.
-    #[must_use]
-    pub fn touching(&self) -> &[Touch] {
-        &self.touching
-    }
-
-    /// Returns the wrench on the pad about its origin, in the base, as of the last step.
-    #[must_use]
-    pub const fn wrench(&self) -> Wrench {
-        self.wrench
     }
 
     /// Returns the friction force on the pad along its x and y, as of the last step [N].
@@ -263,8 +253,7 @@ impl Contact {
             let rate = touch.normal.dot(self.slides[touch.object].at(place)) / facing;
             touch.force = self.column.force(touch.depth, rate, objects[touch.object].softness * parts);
             let push = touch.normal * (touch.force / facing);
-            wrench.force += push;
-            wrench.moment += place.cross(push);
+            wrench.push(place, push);
             loads[touch.object] -= push;
             let tactel = &mut self.tactels[touch.tactel];
             tactel.normal += touch.force;
@@ -272,7 +261,7 @@ impl Contact {
         }
     }
 
-    /// How many points make a tactel of 5 mm by 5 mm: under a point alone an object is softer by that.
+    /// Returns the number of points per tactel of 5 mm by 5 mm: under a single point an object is softer by this factor.
     fn parts(&self) -> f64 {
         (self.fine * self.fine) as f64 * foam::REFERENCE_AREA / (self.shape.pitch[0] * self.shape.pitch[1])
     }
@@ -289,8 +278,7 @@ impl Contact {
             let slide = -self.slides[tactel.object].at(place);
             tactel.rub(dt, [slide.x, slide.y], self.shear, &self.foam);
             let push = Vec3::new(tactel.friction[0], tactel.friction[1], 0.0);
-            wrench.force += push;
-            wrench.moment += place.cross(push);
+            wrench.push(place, push);
             loads[tactel.object] -= push;
         }
     }

@@ -58,7 +58,7 @@ pub(super) const REFERENCE_AREA: f64 = 0.005 * 0.005;
 
 /// A column of foam under a patch of the pad.
 #[derive(Debug, Clone, Copy)]
-pub struct Column {
+pub struct FoamColumn {
     /// [N/m]
     k: f64,
     /// [N/m³]
@@ -68,7 +68,7 @@ pub struct Column {
     damping: f64,
 }
 
-impl Column {
+impl FoamColumn {
     /// Returns the column under an `area` [m²].
     #[must_use]
     pub fn new(foam: &Foam, area: f64) -> Self {
@@ -130,20 +130,20 @@ mod tests {
 
     #[test]
     fn a_column_is_a_stiffening_spring() {
-        let column = Column::new(&Foam::DEFAULT, 0.005 * 0.005);
+        let column = FoamColumn::new(&Foam::DEFAULT, 0.005 * 0.005);
         let cases = [(0.001, 0.3), (0.0025, 0.75), (0.005, 1.5 + 9.6e7 * 0.0025f64.powi(3))];
         for (depth, force) in cases {
             assert!((column.force(depth, 0.0, 0.0) - force).abs() < 1e-12, "{depth}");
         }
         assert!((column.force(0.001, 0.01, 0.0) - 0.315).abs() < 1e-12, "damped");
         assert_eq!(column.force(0.001, -1.0, 0.0), 0.0, "the foam does not pull");
-        let quarter = Column::new(&Foam::DEFAULT, 0.0025 * 0.0025);
+        let quarter = FoamColumn::new(&Foam::DEFAULT, 0.0025 * 0.0025);
         assert!((quarter.force(0.004, 0.0, 0.0) * 4.0 - column.force(0.004, 0.0, 0.0)).abs() < 1e-12);
     }
 
     #[test]
     fn a_compliant_object_is_a_spring_in_series() {
-        let column = Column::new(&Foam::DEFAULT, 0.005 * 0.005);
+        let column = FoamColumn::new(&Foam::DEFAULT, 0.005 * 0.005);
         for stiffness in [50.0, 300.0, 1e4, 1e7] {
             for depth in [1e-4, 1e-3, 3e-3, 6e-3, 8e-3] {
                 let force = column.force(depth, 0.0, 1.0 / stiffness);

@@ -38,7 +38,8 @@ pub struct Imprint {
     cols: usize,
     /// Loads of one row of points, spread along x.
     row: Vec<f64>,
-    image: Vec<f64>,
+    /// Force on each tactel at the last [`Imprint::take`] [N].
+    pub(super) forces: Vec<f64>,
 }
 
 impl Imprint {
@@ -50,19 +51,13 @@ impl Imprint {
             along_y: Weights::new(shape.rows, fine, shape.pitch[1], spread),
             cols: shape.cols,
             row: vec![0.0; shape.cols],
-            image: vec![0.0; shape.tactels()],
+            forces: vec![0.0; shape.tactels()],
         }
-    }
-
-    /// Returns the force on each tactel at the last [`Imprint::take`] [N].
-    #[must_use]
-    pub fn forces(&self) -> &[f64] {
-        &self.image
     }
 
     /// Computes the forces on the tactels from points in raster order.
     pub fn take(&mut self, touching: &[Touch]) {
-        self.image.fill(0.0);
+        self.forces.fill(0.0);
         for line in touching.chunk_by(|a, b| a.point[0] == b.point[0]) {
             self.row.fill(0.0);
             for touch in line {
@@ -71,7 +66,7 @@ impl Imprint {
                 cells.for_each(|(cell, weight)| *cell += weight * touch.force);
             }
             let (first, weights) = &self.along_y.bands[line[0].point[0]];
-            for (row, weight) in self.image[first * self.cols..].chunks_exact_mut(self.cols).zip(weights) {
+            for (row, weight) in self.forces[first * self.cols..].chunks_exact_mut(self.cols).zip(weights) {
                 row.iter_mut().zip(&self.row).for_each(|(cell, load)| *cell += weight * load);
             }
         }

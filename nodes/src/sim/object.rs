@@ -88,27 +88,19 @@ pub struct Object {
     /// Compliance of its surface under a tactel of 5 mm by 5 mm [m/N].
     pub(super) softness: f64,
     home: Pose3,
-    script: Vec<ScriptStep>,
+    /// Motions, with displacements in the base.
+    script: Vec<ScriptedMove>,
     /// Axis of its rotation, in the base.
     axis: Vec3,
     /// Stiffness of the mount [N/m] and mass on it [kg].
     mount: Option<(f64, f64)>,
     /// Deflection of the mount [m].
-    sag: Vec3,
+    pub(super) sag: Vec3,
     sag_speed: Vec3,
     pub(super) pose: Pose3,
     velocity: Vec3,
     /// Angular velocity about `axis` [rad/s].
     spin: f64,
-}
-
-/// A motion of the script.
-struct ScriptStep {
-    from: f64,
-    to: f64,
-    /// Displacement in the base [m].
-    by: Vec3,
-    turn: f64,
 }
 
 /// Damping of a mount as a fraction of the critical one [1].
@@ -127,17 +119,13 @@ impl Object {
         }
         let at = Vec3::from(params.at) + Vec3::new(offset[0], offset[1], 0.0);
         let home = start * Pose3::from_parts(at, pose3(&Pose(pose_of([0.0; 3], params.turn))).rotation);
-        let step = |step: &ScriptedMove| ScriptStep {
-            from: step.from_s,
-            to: step.to_s,
-            by: start.rotation * Vec3::from(step.by),
-            turn: step.turn,
-        };
+        let in_base =
+            |step: &ScriptedMove| ScriptedMove { by: (start.rotation * Vec3::from(step.by)).into(), ..step.clone() };
         Ok(Self {
             shape,
             softness: params.stiffness.map_or(0.0, |stiffness| 1.0 / stiffness),
             home,
-            script: params.motion.iter().map(step).collect(),
+            script: params.motion.iter().map(in_base).collect(),
             axis: start.rotation * Vec3::Z,
             mount: params.mount.map(|stiffness| (stiffness, params.mass)),
             sag: Vec3::ZERO,
@@ -158,10 +146,10 @@ impl Object {
         let (mut position, mut velocity) = (self.home.translation + self.sag, self.sag_speed);
         let (mut angle, mut spin) = (0.0, 0.0);
         for step in &self.script {
-            let span = step.to - step.from;
-            let (part, rate) = ease((time - step.from) / span);
-            position += step.by * part;
-            velocity += step.by * (rate / span);
+            let span = step.to_s - step.from_s;
+            let (part, rate) = ease((time - step.from_s) / span);
+            position += Vec3::from(step.by) * part;
+            velocity += Vec3::from(step.by) * (rate / span);
             angle += step.turn * part;
             spin += step.turn * rate / span;
         }
@@ -175,12 +163,6 @@ impl Object {
     #[must_use]
     pub fn velocity_at(&self, point: Vec3) -> Vec3 {
         self.velocity + self.spin().cross(point - self.pose.translation)
-    }
-
-    /// Returns the deflection of its mount [m].
-    #[must_use]
-    pub const fn sag(&self) -> Vec3 {
-        self.sag
     }
 
     /// Returns its angular velocity in the base [rad/s].
@@ -205,46 +187,41 @@ fn ease(t: f64) -> (f64, f64) {
 }
 
 fn shape_of(params: &ObjectParams) -> Result<Geometry, String> {
-    let kind = params.shape;
-    let (word, _) = ShapeKind::CONTENTS.words[kind as usize];
-    let given = |name: &str| format!("a {word} needs `{name}`");
-    let radius = || params.radius.ok_or_else(|| given("radius"));
-    let size = || {
-        let size = params.size.ok_or_else(|| given("size"))?;
-        let is_good = size.iter().all(|size| *size > 0.0 && size.is_finite());
-        if is_good { Ok(size.map(|size| size / 2.0)) } else { Err("each `size` must be greater than 0".to_owned()) }
-    };
-    let used: &[&str] = match kind {
+    let (word, _) = ShapeKind::CONTENTS.words[params.shape as usize];
+    let used: &[&str] = match params.shape {
         ShapeKind::Plane => &[],
         ShapeKind::Ball => &["radius"],
         ShapeKind::Box | ShapeKind::Ellipsoid => &["size"],
         ShapeKind::Pen => &["radius", "length"],
         ShapeKind::Cable => &["radius", "points"],
     };
-    let has = [
-        ("radius", params.radius.is_some()),
-        ("length", params.length.is_some()),
-        ("size", params.size.is_some()),
-        ("points", params.points.is_some()),
+    let ObjectParams { radius, length, size, points, .. } = params;
+    let given = [
+        ("radius", radius.is_some()),
+        ("length", length.is_some()),
+        ("size", size.is_some()),
+        ("points", points.is_some()),
     ];
-    if let Some((name, _)) = has.iter().find(|(name, is)| *is && !used.contains(name)) {
+    if let Some((name, _)) = given.iter().find(|(name, is_given)| *is_given && !used.contains(name)) {
         return Err(format!("a {word} has no `{name}`"));
     }
-    Ok(match kind {
+    if let Some((name, _)) = given.iter().find(|(name, is_given)| !is_given && used.contains(name)) {
+        return Err(format!("a {word} needs `{name}`"));
+    }
+    if size.is_some_and(|size| !size.iter().all(|size| *size > 0.0 && size.is_finite())) {
+        return Err("each `size` must be greater than 0".to_owned());
+    }
+    let is_far = |pair: &[[f64; 3]]| Vec3::from(pair[0]).distance(Vec3::from(pair[1])) > 1e-4;
+    if points.as_ref().is_some_and(|points| points.len() < 2 || !points.windows(2).all(is_far)) {
+        return Err("`points` of a cable must be two or more, each at least 0.1 mm from the one before".to_owned());
+    }
+    let (radius, half_size) = (radius.unwrap_or_default(), size.unwrap_or_default().map(|size| size / 2.0));
+    Ok(match params.shape {
         ShapeKind::Plane => Geometry::plane(),
-        ShapeKind::Ball => Geometry::Ball(Ball::new(radius()?)),
-        ShapeKind::Box => Geometry::Box(Cuboid::new(Vec3::from(size()?))),
-        ShapeKind::Ellipsoid => Geometry::ellipsoid(size()?),
-        ShapeKind::Pen => Geometry::pen(radius()?, params.length.ok_or_else(|| given("length"))?),
-        ShapeKind::Cable => {
-            let points = params.points.as_ref().ok_or_else(|| given("points"))?;
-            let is_far = |pair: &[[f64; 3]]| Vec3::from(pair[0]).distance(Vec3::from(pair[1])) > 1e-4;
-            if points.len() < 2 || !points.windows(2).all(is_far) {
-                return Err(
-                    "`points` of a cable must be two or more, each at least 0.1 mm from the one before".to_owned()
-                );
-            }
-            Geometry::cable(radius()?, points)
-        }
+        ShapeKind::Ball => Geometry::Ball(Ball::new(radius)),
+        ShapeKind::Box => Geometry::Box(Cuboid::new(Vec3::from(half_size))),
+        ShapeKind::Ellipsoid => Geometry::ellipsoid(half_size),
+        ShapeKind::Pen => Geometry::pen(radius, length.unwrap_or_default()),
+        ShapeKind::Cable => Geometry::cable(radius, points.as_deref().unwrap_or_default()),
     })
 }

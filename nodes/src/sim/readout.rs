@@ -114,9 +114,7 @@ impl Readout {
             *count = (tactel.offset + reading * common + noise).round().clamp(0.0, MAX_COUNT) as f32;
         }
     }
-}
 
-impl Readout {
     /// Returns the standard deviations that the common and the independent noise give to the mean force of `tactels`
     /// tactels, at a mean force of `pressure` [N per tactel].
     #[must_use]

@@ -5,7 +5,7 @@
 
 use parry3d_f64::math::{Pose3, Rot3, Vec3};
 use parry3d_f64::query::{PointQuery, PointQueryWithLocation, Ray, RayCast};
-use parry3d_f64::shape::{Ball, Capsule, Compound, Cuboid, HalfSpace, Polyline, SharedShape, TriMesh};
+use parry3d_f64::shape::{Ball, Capsule, Compound, Cuboid, HalfSpace, Polyline, Shape, SharedShape, TriMesh};
 use tactflow_runtime::signal::Pose;
 
 /// The geometry of an object, in its own frame [m].
@@ -49,7 +49,7 @@ pub struct Hit {
 
 /// The line of an object: the axis of a pen, an edge of a box, the course of a cable.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Line {
+pub struct ObjectLine {
     /// Nearest point of the line.
     pub at: Vec3,
     /// Unit vector along the line at that point, in either direction.
@@ -90,20 +90,28 @@ impl Geometry {
         Self::Cable(Cable { capsules, line: Polyline::new(points, None), radius })
     }
 
+    /// Returns the solid of the geometry library; an ellipsoid is a mesh.
+    fn solid(&self) -> &dyn Shape {
+        match self {
+            Self::Plane(shape) => shape,
+            Self::Ball(shape) => shape,
+            Self::Box(shape) => shape,
+            Self::Pen(shape) => shape,
+            Self::Ellipsoid(Ellipsoid { mesh, .. }) => mesh,
+            Self::Cable(cable) => &cable.capsules,
+        }
+    }
+
     /// Returns the first hit of a ray from outside, within `max_time` lengths of its direction.
     #[must_use]
     pub fn cast(&self, origin: Vec3, direction: Vec3, max_time: f64) -> Option<Hit> {
         let ray = Ray::new(origin, direction);
         let hit = match self {
-            Self::Plane(shape) => shape.cast_local_ray_and_get_normal(&ray, max_time, true),
-            Self::Ball(shape) => shape.cast_local_ray_and_get_normal(&ray, max_time, true),
-            Self::Box(shape) => shape.cast_local_ray_and_get_normal(&ray, max_time, true),
-            Self::Pen(shape) => shape.cast_local_ray_and_get_normal(&ray, max_time, true),
-            Self::Cable(cable) => cable.capsules.cast_local_ray_and_get_normal(&ray, max_time, true),
             Self::Ellipsoid(Ellipsoid { axes, .. }) => {
                 let ray = Ray::new(origin / *axes, direction / *axes);
                 Ball::new(1.0).cast_local_ray_and_get_normal(&ray, max_time, true)
             }
+            _ => self.solid().cast_local_ray_and_get_normal(&ray, max_time, true),
         }?;
         let normal = match self {
             Self::Ellipsoid(Ellipsoid { axes, .. }) => (hit.normal / *axes).normalize_or_zero(),
@@ -118,14 +126,11 @@ impl Geometry {
     #[must_use]
     pub fn clearance(&self, point: Vec3) -> f64 {
         match self {
-            Self::Plane(shape) => shape.distance_to_local_point(point, true),
-            Self::Ball(shape) => shape.distance_to_local_point(point, true),
-            Self::Box(shape) => shape.distance_to_local_point(point, true),
-            Self::Pen(shape) => shape.distance_to_local_point(point, true),
             Self::Cable(cable) => cable.line.distance_to_local_point(point, false) - cable.radius,
             Self::Ellipsoid(Ellipsoid { axes, .. }) => {
                 Ball::new(1.0).distance_to_local_point(point / *axes, true) * axes.min_element()
             }
+            _ => self.solid().distance_to_local_point(point, true),
         }
     }
 
@@ -133,36 +138,32 @@ impl Geometry {
     #[must_use]
     pub fn distance(&self, point: Vec3) -> f64 {
         match self {
-            Self::Plane(shape) => shape.distance_to_local_point(point, false).abs(),
-            Self::Ball(shape) => shape.distance_to_local_point(point, false).abs(),
-            Self::Box(shape) => shape.distance_to_local_point(point, false).abs(),
-            Self::Pen(shape) => shape.distance_to_local_point(point, false).abs(),
-            Self::Cable(cable) => (cable.line.distance_to_local_point(point, false) - cable.radius).abs(),
-            Self::Ellipsoid(Ellipsoid { mesh, .. }) => mesh.distance_to_local_point(point, false).abs(),
+            Self::Cable(_) => self.clearance(point).abs(),
+            _ => self.solid().distance_to_local_point(point, false).abs(),
         }
     }
 
     /// Returns the line of the object nearest to a point, or `None` if the object has no line.
     #[must_use]
-    pub fn line(&self, point: Vec3) -> Option<Line> {
+    pub fn line(&self, point: Vec3) -> Option<ObjectLine> {
         match self {
             Self::Plane(_) | Self::Ball(_) | Self::Ellipsoid(_) => None,
             Self::Box(shape) => Some(edge(shape.half_extents, point)),
             Self::Pen(shape) => {
                 let at = shape.segment.project_local_point(point, true).point;
-                Some(Line { at, along: Vec3::Y })
+                Some(ObjectLine { at, along: Vec3::Y })
             }
             Self::Cable(cable) => {
                 let (projected, (segment, _)) = cable.line.project_local_point_and_get_location(point, true);
                 let segment = cable.line.segment(segment);
-                Some(Line { at: projected.point, along: (segment.b - segment.a).normalize_or_zero() })
+                Some(ObjectLine { at: projected.point, along: (segment.b - segment.a).normalize_or_zero() })
             }
         }
     }
 }
 
 /// Returns the edge of a box nearest to a point.
-fn edge(half: Vec3, point: Vec3) -> Line {
+fn edge(half: Vec3, point: Vec3) -> ObjectLine {
     let edges = (0..3).flat_map(|axis| (0..4).map(move |corner| (axis, corner)));
     let lines = edges.map(|(axis, corner)| {
         let mut at = half;
@@ -172,7 +173,7 @@ fn edge(half: Vec3, point: Vec3) -> Line {
         at[axis] = point[axis].clamp(-half[axis], half[axis]);
         let mut along = Vec3::ZERO;
         along[axis] = 1.0;
-        Line { at, along }
+        ObjectLine { at, along }
     });
     lines.min_by(|a, b| a.at.distance(point).total_cmp(&b.at.distance(point))).expect("a box has edges")
 }

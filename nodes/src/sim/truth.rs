@@ -5,6 +5,7 @@ use tactflow_runtime::signal::ImageShape;
 
 use super::contact::{BodyMotion, Contact};
 use super::object::Object;
+use super::world::World;
 use crate::motion::axis::wrap_axial;
 
 /// The ground truth at one time.
@@ -32,39 +33,36 @@ pub struct Truth {
     pub tilt: Option<f64>,
 }
 
-impl Truth {
-    /// Returns the truth for a pad whose noise-free image is `clean` [N]; tactels count above `threshold` [N].
-    #[must_use]
-    pub fn of(
-        pad: &BodyMotion,
-        contact: &Contact,
-        objects: &[Object],
-        shape: &ImageShape,
-        clean: &[f64],
-        threshold: f64,
-    ) -> Self {
+impl World {
+    /// Returns the ground truth now; tactels count above `threshold` [N].
+    pub fn truth(&mut self, threshold: f64) -> Truth {
+        self.image();
+        let Self { contact, shape, imprint, .. } = &*self;
         let force = contact.normal();
         let [x, y] = contact.friction();
-        let (sum, tactels) =
-            clean.iter().filter(|cell| **cell > threshold).fold((0.0, 0), |(sum, count), cell| (sum + cell, count + 1));
-        let area = shape.pitch[0] * shape.pitch[1] / (contact.fine() * contact.fine()) as f64;
-        Self {
+        let (sum, tactels) = imprint
+            .forces
+            .iter()
+            .filter(|cell| **cell > threshold)
+            .fold((0.0, 0), |(sum, count), cell| (sum + cell, count + 1));
+        let area = shape.pitch[0] * shape.pitch[1] / (contact.fine * contact.fine) as f64;
+        Truth {
             force,
             tangential: (x * x + y * y).sqrt(),
-            peak: clean.iter().fold(0.0, |peak: f64, cell| peak.max(*cell)),
+            peak: imprint.forces.iter().fold(0.0, |peak: f64, cell| peak.max(*cell)),
             middle: middle(contact, force),
             pressure: (tactels > 0).then(|| sum / f64::from(tactels)),
             tactels: tactels as usize,
-            orientation: orientation(pad, objects, shape),
-            area: contact.touching().len() as f64 * area,
-            depth: contact.touching().iter().fold(0.0, |depth: f64, touch| depth.max(touch.depth)),
+            orientation: orientation(&self.arm.motion(), &self.objects, shape),
+            area: contact.touching.len() as f64 * area,
+            depth: contact.touching.iter().fold(0.0, |depth: f64, touch| depth.max(touch.depth)),
             tilt: tilt(contact, force),
         }
     }
 }
 
 fn middle(contact: &Contact, force: f64) -> Option<[f64; 2]> {
-    let sum = contact.touching().iter().fold([0.0; 2], |[sx, sy], touch| {
+    let sum = contact.touching.iter().fold([0.0; 2], |[sx, sy], touch| {
         let [x, y] = contact.place(touch.point);
         [sx + touch.force * x, sy + touch.force * y]
     });
@@ -86,7 +84,7 @@ fn orientation(pad: &BodyMotion, objects: &[Object], shape: &ImageShape) -> Opti
 }
 
 fn tilt(contact: &Contact, force: f64) -> Option<f64> {
-    let normal = contact.touching().iter().fold(Vec3::ZERO, |sum, touch| sum + touch.normal * touch.force);
+    let normal = contact.touching.iter().fold(Vec3::ZERO, |sum, touch| sum + touch.normal * touch.force);
     let cos = -normal.normalize_or_zero().z;
     (force > 0.0).then(|| libm::acos(cos.clamp(-1.0, 1.0)))
 }

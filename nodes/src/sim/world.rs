@@ -3,21 +3,21 @@
 use parry3d_f64::math::{Pose3, Vec3};
 use tactflow_runtime::signal::ImageShape;
 
-use super::contact::{BodyMotion, Contact};
+use super::contact::Contact;
+use super::foam::Foam;
 use super::imprint::Imprint;
 use super::joints::SimArm;
 use super::object::Object;
 use super::shape::pose3;
 use super::survey::{Measured, Survey, measure};
-use super::truth::Truth;
 
 /// The arm, the pad and the objects.
 pub struct World {
     pub(super) arm: SimArm,
     pub(super) objects: Vec<Object>,
     pub(super) contact: Contact,
-    imprint: Imprint,
-    shape: ImageShape,
+    pub(super) imprint: Imprint,
+    pub(super) shape: ImageShape,
     /// Force on each object [N].
     loads: Vec<Vec3>,
     /// Simulated time [s].
@@ -31,20 +31,15 @@ pub struct World {
 }
 
 impl World {
-    /// Returns a world at time 0, with steps of at most `max_step` [s].
+    /// Returns a world at time 0, with points of the pad at most `apart` [m] apart and steps of at most `max_step` [s].
     #[must_use]
-    pub fn new(
-        arm: SimArm,
-        objects: Vec<Object>,
-        contact: Contact,
-        imprint: Imprint,
-        shape: ImageShape,
-        max_step: f64,
-    ) -> Self {
+    pub fn new(arm: SimArm, objects: Vec<Object>, shape: ImageShape, foam: Foam, apart: f64, max_step: f64) -> Self {
+        let spread = foam.spread;
+        let contact = Contact::new(shape.clone(), foam, apart, objects.len());
+        let imprint = Imprint::new(&shape, contact.fine, spread);
         let loads = vec![Vec3::ZERO; objects.len()];
         let from = start(&arm);
-        let surveys = objects.iter().enumerate().filter_map(|(i, object)| Some((i, Survey::new(object, from)?)));
-        let survey = surveys.take(1).next();
+        let survey = objects.iter().enumerate().find_map(|(i, object)| Some((i, Survey::new(object, from)?)));
         Self { survey, arm, objects, contact, imprint, shape, loads, time: 0.0, max_step, is_stale: true }
     }
 
@@ -58,7 +53,7 @@ impl World {
                 object.step(now, dt, *load);
             }
             self.contact.step(dt, &self.arm.motion(), &self.objects, &mut self.loads);
-            self.arm.step(dt, velocity, &self.contact.wrench());
+            self.arm.step(dt, velocity, &self.contact.wrench);
         }
         self.time = time;
         self.is_stale = true;
@@ -68,28 +63,15 @@ impl World {
     #[must_use]
     pub fn is_sound(&self) -> bool {
         let is_near = |place: Vec3| place.is_finite() && place.length() < 1e3;
-        is_near(self.pad().pose.translation) && self.objects.iter().all(|object| is_near(object.sag()))
-    }
-
-    /// Returns pose and velocity of the pad.
-    #[must_use]
-    pub fn pad(&self) -> BodyMotion {
-        self.arm.motion()
+        is_near(self.arm.motion().pose.translation) && self.objects.iter().all(|object| is_near(object.sag))
     }
 
     /// Returns the noise-free image [N].
     pub fn image(&mut self) -> &[f64] {
         if std::mem::take(&mut self.is_stale) {
-            self.imprint.take(self.contact.touching());
+            self.imprint.take(&self.contact.touching);
         }
-        self.imprint.forces()
-    }
-
-    /// Returns the ground truth now; tactels count above `threshold` [N].
-    pub fn truth(&mut self, threshold: f64) -> Truth {
-        self.image();
-        let pad = self.pad();
-        Truth::of(&pad, &self.contact, &self.objects, &self.shape, self.imprint.forces(), threshold)
+        &self.imprint.forces
     }
 
     /// Returns the errors of a `point` in the base that the graph reports, and counts it for the coverage.
@@ -97,7 +79,7 @@ impl World {
         if let Some((object, survey)) = &mut self.survey {
             survey.add(&self.objects[*object], point);
         }
-        measure(&self.objects, self.pad().pose, point)
+        measure(&self.objects, self.arm.motion().pose, point)
     }
 
     /// Returns the fraction of the surface that has been touched, or `None` if every object is infinite.

@@ -3,17 +3,16 @@
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 
-use tactflow_runtime::cli::clap::{self, Parser, ValueEnum};
+use tactflow_runtime::cli::clap::{self, Parser};
 use tactflow_runtime::cli::{NOT_LOADED, Shell};
 use tactflow_runtime::signal::Unit;
-use tactflow_runtime::source::SourceMap;
-use tactflow_runtime::source::{Code, Diagnostic, Report as Mistakes};
+use tactflow_runtime::source::{Code, Diagnostic, Report, SourceMap};
 
 use super::arguments::{may_replace, pair, positive};
 use crate::calibration::log::Log;
-use crate::calibration::report::{Report, Settings, State, calibrate};
-use crate::calibration::samples::Load;
-use crate::calibration::{Kind, file, plot};
+use crate::calibration::report::{CalibrationReport, Settings, TactelStatus, calibrate};
+use crate::calibration::samples::LoadKind;
+use crate::calibration::{CurveKind, file, plot};
 use crate::recordings::{self, Assumed, Hints, Refusal};
 
 /// Make a calibration file for a pad from logs with a reference force
@@ -30,7 +29,7 @@ Examples:
 
 Exit codes: 0 success; 2 a log or a file cannot be used."
 )]
-pub(super) struct Calibrate {
+pub(super) struct CalibrateArgs {
     /// Logs of one pad
     #[arg(required = true, value_name = "LOG")]
     logs: Vec<PathBuf>,
@@ -38,11 +37,11 @@ pub(super) struct Calibrate {
     #[arg(short, long, value_name = "FILE")]
     out: Option<PathBuf>,
     /// How the pad was loaded: by a probe on one tactel at a time, or by a bladder on all equally
-    #[arg(long, value_enum, default_value_t = LoadArg::Probe)]
-    load: LoadArg,
+    #[arg(long, value_enum, default_value_t = LoadKind::Probe)]
+    load: LoadKind,
     /// Kind of the curves; by default the simplest that fits about as well as the best
     #[arg(long, value_enum)]
-    curve: Option<CurveArg>,
+    curve: Option<CurveKind>,
     /// Draw the curves of all tactels
     #[arg(long, value_name = "FILE")]
     svg: Option<PathBuf>,
@@ -66,29 +65,6 @@ pub(super) struct Calibrate {
     size: Option<[NonZeroUsize; 2]>,
 }
 
-#[derive(Clone, Copy, ValueEnum)]
-enum LoadArg {
-    Probe,
-    Uniform,
-}
-
-#[derive(Clone, Copy, ValueEnum)]
-enum CurveArg {
-    Linear,
-    Rational,
-    Piecewise,
-}
-
-impl From<CurveArg> for Kind {
-    fn from(curve: CurveArg) -> Self {
-        match curve {
-            CurveArg::Linear => Self::Linear,
-            CurveArg::Rational => Self::Rational,
-            CurveArg::Piecewise => Self::Piecewise,
-        }
-    }
-}
-
 /// Defaults: a calibration depends neither on the pitch nor on the frame rate.
 const ASSUMED: Assumed = Assumed { unit: Unit::RAW, pitch: [0.005; 2], rate_hz: 100.0 };
 
@@ -98,7 +74,7 @@ const MAX_RESIDUAL: f64 = 0.25;
 /// Why there is no calibration.
 enum Failure {
     Message(String),
-    Report(Box<Mistakes>),
+    Report(Box<Report>),
 }
 
 impl From<String> for Failure {
@@ -107,7 +83,7 @@ impl From<String> for Failure {
     }
 }
 
-pub(super) fn run(args: Calibrate, shell: &Shell) -> u8 {
+pub(super) fn run(args: CalibrateArgs, shell: &Shell) -> u8 {
     match make(&args, shell) {
         Ok(()) => 0,
         Err(Failure::Message(message)) => {
@@ -118,8 +94,8 @@ pub(super) fn run(args: Calibrate, shell: &Shell) -> u8 {
     }
 }
 
-fn make(args: &Calibrate, shell: &Shell) -> Result<(), Failure> {
-    if args.bearing.is_some() && matches!(args.load, LoadArg::Probe) {
+fn make(args: &CalibrateArgs, shell: &Shell) -> Result<(), Failure> {
+    if args.bearing.is_some() && args.load == LoadKind::Probe {
         return Err("`--bearing` needs `--load uniform`: the force of a probe is on one tactel".to_owned().into());
     }
     // Before the long calculation.
@@ -139,12 +115,8 @@ fn make(args: &Calibrate, shell: &Shell) -> Result<(), Failure> {
             return Err(Failure::Message(message));
         }
     }
-    let load = match args.load {
-        LoadArg::Probe => Load::Probe,
-        LoadArg::Uniform => Load::Uniform,
-    };
     let bearing = args.bearing.map(NonZeroUsize::get);
-    let settings = Settings { load, curve: args.curve.map(Kind::from), dead_below: args.dead_below, bearing };
+    let settings = Settings { load: args.load, curve: args.curve, dead_below: args.dead_below, bearing };
     let report = calibrate(&logs, &settings)?;
     shell.say(report.text(args.each).trim_end());
     let residual = report.typical_residual();
@@ -172,14 +144,14 @@ fn write(path: &Path, text: &str) -> Result<(), String> {
 }
 
 /// Returns the comment of the file: how it was made.
-fn origin(args: &Calibrate, report: &Report) -> String {
+fn origin(args: &CalibrateArgs, report: &CalibrationReport) -> String {
     let names = args.logs.iter().map(|path| path.file_name().unwrap_or_default().to_string_lossy().into_owned());
     let load = match args.load {
-        LoadArg::Probe => "a probe on one tactel at a time",
-        LoadArg::Uniform => "a uniform load",
+        LoadKind::Probe => "a probe on one tactel at a time",
+        LoadKind::Uniform => "a uniform load",
     };
     let residual = report.rms[report.kind() as usize];
-    let left_out = report.in_state(State::Few).len() + report.in_state(State::Unfit).len();
+    let left_out = report.with_status(TactelStatus::Few).len() + report.with_status(TactelStatus::Unfit).len();
     let left_out =
         if left_out > 0 { format!(" {left_out} of the dead could not be calibrated.") } else { String::new() };
     format!(
@@ -190,7 +162,7 @@ fn origin(args: &Calibrate, report: &Report) -> String {
 }
 
 /// Reads one log.
-fn read(path: &Path, args: &Calibrate) -> Result<Log, Failure> {
+fn read(path: &Path, args: &CalibrateArgs) -> Result<Log, Failure> {
     let name = path.display().to_string();
     let bytes = std::fs::read(path).map_err(|error| format!("cannot read `{name}`: {error}"))?;
     let hints = Hints {
@@ -211,7 +183,7 @@ fn refused(refusal: Refusal, name: &str) -> Failure {
             let mut sources = SourceMap::default();
             sources.add(name, text, "");
             let diagnostics = flaws.into_iter().map(|flaw| Diagnostic::new(Code::BadData, flaw.span, flaw.message));
-            Failure::Report(Box::new(Mistakes::new(sources, diagnostics.collect())))
+            Failure::Report(Box::new(Report::new(sources, diagnostics.collect())))
         }
         Refusal::Broken { message, help } => {
             let help = help.map_or_else(String::new, |help| format!("; {help}"));

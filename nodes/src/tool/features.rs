@@ -2,7 +2,6 @@
 //!
 //! It makes an ordinary graph from the command line; `--graph` prints it as a starting point.
 
-use std::fmt::Write;
 use std::num::NonZeroU32;
 use std::path::{Path, PathBuf};
 
@@ -24,7 +23,7 @@ Examples:
   tactflow features pad.npy --pitch-mm 5x5 --rate-hz 250 --unit N --threshold 0.02 --min-area 6
   tactflow features press.csv --graph > press.toml"
 )]
-pub(super) struct Features {
+pub(super) struct FeaturesArgs {
     /// Recording, optionally in a .zip or .gz
     recording: PathBuf,
     /// Write one row a frame, as .csv or .ndjson
@@ -75,21 +74,23 @@ struct HintArgs {
 /// Default threshold of a touched tactel, as a fraction of the maximum value of the recording.
 const DEFAULT_THRESHOLD: f64 = 0.05;
 
-pub(super) fn features(args: Features, shell: &Shell) -> u8 {
-    // The check of the graph reports what is wrong with the recording, once and at its place.
-    let (headline, threshold) = match args.inspect() {
-        Some((headline, threshold)) => (Some(headline), threshold),
-        None => (None, Threshold::given(0.0)),
-    };
-    let text = args.graph_text(&threshold);
-    if let Some(headline) = headline {
-        if args.graph {
-            shell.say(text.trim_end());
-            return 0;
+pub(super) fn features(args: FeaturesArgs, shell: &Shell) -> u8 {
+    let text = match args.inspect() {
+        Some((headline, threshold)) => {
+            let text = args.graph_text(&threshold);
+            if args.graph {
+                shell.say(text.trim_end());
+                return 0;
+            }
+            shell.say(&headline);
+            text
         }
-        shell.say(&headline);
-    }
-    let request = Request { set: args.settings(), ..Request::text(text) };
+        // The check of the graph reports what is wrong with the recording, once and at its place.
+        None => args.graph_text(&Threshold { value: 0.0, from: "from --threshold".into() }),
+    };
+    // As `--set`, so that a mistake shows in the arguments.
+    let set = args.settings().iter().map(|setting| format!("devices.recording.{setting}")).collect();
+    let request = Request { set, ..Request::text(text) };
     let title = format!("features of {}", args.recording.display());
     Job {
         request,
@@ -112,13 +113,7 @@ struct Threshold {
     from: String,
 }
 
-impl Threshold {
-    fn given(value: f64) -> Self {
-        Self { value, from: "from --threshold".into() }
-    }
-}
-
-impl Features {
+impl FeaturesArgs {
     /// Returns the summary of the recording and the threshold. The recording is dropped: the graph reads it again.
     fn inspect(&self) -> Option<(String, Threshold)> {
         let bytes = std::fs::read(&self.recording).ok()?;
@@ -128,15 +123,16 @@ impl Features {
     }
 
     fn threshold(&self, recording: &Recording) -> Threshold {
-        if let Some(value) = self.threshold {
-            return Threshold::given(value);
-        }
-        if let Some(value) = recording.threshold {
-            return Threshold { value, from: "from the file".into() };
-        }
-        let peak = recording.cells.iter().fold(0.0_f32, |peak, cell| peak.max(*cell));
-        let value = f64::from(peak) * DEFAULT_THRESHOLD;
-        let from = format!("{} % of the maximum value; set another with --threshold", DEFAULT_THRESHOLD * 100.0);
+        let (value, from) = match (self.threshold, recording.threshold) {
+            (Some(value), _) => (value, "from --threshold".into()),
+            (None, Some(value)) => (value, "from the file".into()),
+            (None, None) => {
+                let peak = recording.cells.iter().fold(0.0_f32, |peak, cell| peak.max(*cell));
+                let percent = DEFAULT_THRESHOLD * 100.0;
+                let from = format!("{percent} % of the maximum value; set another with --threshold");
+                (f64::from(peak) * DEFAULT_THRESHOLD, from)
+            }
+        };
         Threshold { value, from }
     }
 
@@ -190,33 +186,29 @@ type = "recording"
             threshold.value, threshold.from
         );
         if self.graph {
-            for setting in self.settings() {
-                let setting = setting.strip_prefix(DEVICE).expect("all settings are those of the device");
-                // Writing to a string cannot fail.
-                let _ = writeln!(text, "{setting}");
-            }
+            self.settings().iter().for_each(|setting| text.push_str(&format!("{setting}\n")));
         }
         text
     }
 
-    /// Returns the settings of the recording from the command line, as those of `--set`, so that mistakes appear there.
+    /// Returns the parameters of the device from the command line.
     fn settings(&self) -> Vec<String> {
         let HintArgs { format, unit, pitch_mm, rate_hz, size } = &self.hints;
         let word = |text: &str| toml::Value::from(text).to_string();
         // A printed graph may be stored in any folder.
         let path = if self.graph { std::path::absolute(&self.recording).ok() } else { None };
         let path = path.as_ref().unwrap_or(&self.recording).to_string_lossy();
-        let mut settings = vec![format!("{DEVICE}file = {}", word(&path))];
-        settings.extend(format.as_ref().map(|format| format!("{DEVICE}format = {}", word(format))));
-        settings.extend(unit.as_ref().map(|unit| format!("{DEVICE}unit = {}", word(unit))));
-        settings.extend(pitch_mm.as_ref().map(|pitch| format!("{DEVICE}pitch_mm = {pitch:?}")));
-        settings.extend(rate_hz.map(|rate| format!("{DEVICE}rate_hz = {rate:?}")));
-        settings.extend(size.as_ref().map(|size| format!("{DEVICE}size = {size:?}")));
-        settings
+        let settings = [
+            ("file", Some(word(&path))),
+            ("format", format.as_deref().map(word)),
+            ("unit", unit.as_deref().map(word)),
+            ("pitch_mm", pitch_mm.map(|pitch| format!("{pitch:?}"))),
+            ("rate_hz", rate_hz.map(|rate| format!("{rate:?}"))),
+            ("size", size.map(|size| format!("{size:?}"))),
+        ];
+        settings.into_iter().filter_map(|(name, value)| Some(format!("{name} = {}", value?))).collect()
     }
 }
-
-const DEVICE: &str = "devices.recording.";
 
 impl HintArgs {
     /// Returns the recording, or `None` if it has mistakes.

@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 use std::io::{BufWriter, Write as _};
 use std::num::NonZeroUsize;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use tactflow_runtime::cli::clap::{self, Parser};
 use tactflow_runtime::cli::{NOT_LOADED, Shell};
@@ -26,12 +26,12 @@ Examples:
 
 Exit codes: 0 success; 2 the log cannot be written."
 )]
-pub(super) struct Press {
+pub(super) struct PressArgs {
     /// Write the log; replaces a log of this command, but no other file
     #[arg(short, long, value_name = "FILE")]
     out: PathBuf,
     /// Serial number of the pad: `electronics.serial` of a `sim_bench`
-    #[arg(long, default_value_t = *SERIAL)]
+    #[arg(long, default_value_t = Electronics::DEFAULT.serial)]
     serial: u64,
     /// Rows and columns of the pad
     #[arg(long, value_name = "ROWSxCOLS", value_parser = pair::<NonZeroUsize>, default_value = "16x16")]
@@ -41,7 +41,6 @@ pub(super) struct Press {
     most: f64,
 }
 
-const SERIAL: &u64 = &Electronics::DEFAULT.serial;
 /// Frames per second of the log [1/s].
 const RATE_HZ: f64 = 50.0;
 /// Time before the press, for the zero. There is no rest after the press, because the foam recovers slowly [s].
@@ -49,7 +48,7 @@ const REST_S: f64 = 5.0;
 /// Time of the press, up and down [s].
 const PRESS_S: f64 = 30.0;
 
-pub(super) fn run(args: Press, shell: &Shell) -> u8 {
+pub(super) fn run(args: PressArgs, shell: &Shell) -> u8 {
     let [rows, cols] = args.size.map(NonZeroUsize::get);
     if rows.saturating_mul(cols) > MAX_TACTELS {
         shell.error(format_args!("a simulated pad has at most {MAX_TACTELS} tactels, not {rows} by {cols}"));
@@ -59,7 +58,7 @@ pub(super) fn run(args: Press, shell: &Shell) -> u8 {
         .and_then(|()| write(&args).map_err(|error| format!("cannot write `{}`: {error}", args.out.display())));
     match done {
         Ok(frames) => {
-            shell.say(&format!("wrote {}: {frames} frames at {RATE_HZ} Hz", shown(&args.out)));
+            shell.say(&format!("wrote {}: {frames} frames at {RATE_HZ} Hz", args.out.display()));
             0
         }
         Err(message) => {
@@ -69,11 +68,7 @@ pub(super) fn run(args: Press, shell: &Shell) -> u8 {
     }
 }
 
-fn shown(path: &Path) -> String {
-    path.display().to_string()
-}
-
-fn write(args: &Press) -> std::io::Result<usize> {
+fn write(args: &PressArgs) -> std::io::Result<usize> {
     let [rows, cols] = args.size.map(NonZeroUsize::get);
     let tactels = rows * cols;
     let mut readout = Readout::new(tactels, Electronics { serial: args.serial, ..Electronics::DEFAULT }, args.serial);

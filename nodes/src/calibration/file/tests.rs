@@ -7,7 +7,7 @@ use super::*;
 fn read_back(calibration: &Calibration) -> Calibration {
     let text = write(calibration, "a test");
     assert!(is_calibration(&text));
-    read(&text).unwrap_or_else(|flaws| panic!("{flaws:?}\n{text}"))
+    read(&text).unwrap_or_else(|mistakes| panic!("{mistakes:?}\n{text}"))
 }
 
 /// Generates finite numbers of 32 bits.
@@ -15,25 +15,25 @@ fn number() -> impl Strategy<Value = f32> {
     any::<u32>().prop_map(f32::from_bits).prop_filter("finite", |number| number.is_finite())
 }
 
-fn tactel(kind: Kind) -> BoxedStrategy<Option<Tactel>> {
+fn tactel(kind: CurveKind) -> BoxedStrategy<Option<Tactel>> {
     let gain = || number().prop_filter("a slope", |gain| *gain != 0.0);
     let curve = match kind {
-        Kind::Linear => gain().prop_map(|gain| Curve::Linear { gain }).boxed(),
-        Kind::Rational => (gain(), number(), number())
-            .prop_map(|(gain, squash, most)| Curve::Rational {
+        CurveKind::Linear => gain().prop_map(|gain| ForceCurve::Linear { gain }).boxed(),
+        CurveKind::Rational => (gain(), number(), number())
+            .prop_map(|(gain, squash, most)| ForceCurve::Rational {
                 gain,
                 squash: squash.abs().copysign(gain),
                 most: most.abs(),
             })
             .boxed(),
-        Kind::Piecewise => prop::collection::vec((1e-3..1e5f32, 0.0..1e3f32), 1..12)
+        CurveKind::Piecewise => prop::collection::vec((1e-3..1e5f32, 0.0..1e3f32), 1..12)
             .prop_map(|steps| {
                 let mut last = [0.0, 0.0];
                 let knots = steps.into_iter().map(|(s, force)| {
                     last = [last[0] + s, last[1] + force];
                     last
                 });
-                Curve::Piecewise { knots: knots.collect() }
+                ForceCurve::Piecewise { knots: knots.collect() }
             })
             .boxed(),
     };
@@ -95,7 +95,7 @@ fn a_file_written_by_hand_is_read_in_any_order() {
     let calibration = read(GOOD).unwrap();
     let offsets: Vec<Option<f32>> = calibration.tactels.iter().map(|t| t.as_ref().map(|t| t.offset)).collect();
     assert_eq!(offsets, [Some(10.0), None, Some(-3.0), Some(11.5)]);
-    assert_eq!((calibration.kind, calibration.unit), (Kind::Rational, Unit::NEWTON));
+    assert_eq!((calibration.kind, calibration.unit), (CurveKind::Rational, Unit::NEWTON));
     assert!(read(KNOTS).is_ok());
 }
 
@@ -140,11 +140,12 @@ fn every_mistake_has_its_place() {
     for (good, from, to, marked, message) in cases {
         assert!(good.contains(from), "{from}");
         let text = good.replacen(from, to, 1);
-        let flaws = read(&text).expect_err(message);
-        let flaw = &flaws[0];
-        assert!(flaw.message.starts_with(message), "{from} -> {to}: {flaws:?}");
-        assert!(text[flaw.span.clone()].starts_with(marked), "{from} -> {to}: {:?}", &text[flaw.span.clone()]);
-        assert!(flaws.len() == 1 || to.contains("linear") || to == "rows = 1", "{from} -> {to}: {flaws:?}");
+        let mistakes = read(&text).expect_err(message);
+        let first = &mistakes[0];
+        let At::Span(span) = first.at.clone() else { panic!("{first:?}") };
+        assert!(first.message.starts_with(message), "{from} -> {to}: {mistakes:?}");
+        assert!(text[span.clone()].starts_with(marked), "{from} -> {to}: {:?}", &text[span]);
+        assert!(mistakes.len() == 1 || to.contains("linear") || to == "rows = 1", "{from} -> {to}: {mistakes:?}");
     }
 }
 
@@ -155,7 +156,7 @@ fn text_that_is_not_toml_is_refused_and_long_lists_are_cut() {
     assert!(is_calibration("kind = \"calibration\"\nversion = 9"), "a later one is one too");
     let line = "  { at = [0, 0], offset = 10, gain = 0, squash = 0, most = 1 },\n";
     let text = GOOD.replacen("tactels = [\n", &format!("tactels = [\n{}", line.repeat(50)), 1);
-    assert_eq!(read(&text).unwrap_err().len(), MAX_FLAWS);
+    assert_eq!(read(&text).unwrap_err().len(), MAX_MISTAKES);
 }
 
 /// The node reserves the same number of segments for every tactel: one long line must not multiply the memory.
@@ -166,8 +167,8 @@ fn a_curve_has_a_maximum_number_of_knots() {
         read(&KNOTS.replace("10, 20, 30", &list).replace("0.5, 1.5, 4", &list))
     };
     assert!(with(64).is_ok());
-    let flaws = with(65).unwrap_err();
-    assert_eq!((flaws.len(), flaws[0].message.as_str()), (1, "65 knots, but the maximum is 64"));
+    let mistakes = with(65).unwrap_err();
+    assert_eq!((mistakes.len(), mistakes[0].message.as_str()), (1, "65 knots, but the maximum is 64"));
 }
 
 #[test]

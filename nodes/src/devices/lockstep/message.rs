@@ -1,4 +1,4 @@
-//! The messages of the bridge: those of a simulator are read and checked, those to it are written.
+//! The messages of the lockstep protocol: those of a simulator are read and checked, those to it are written.
 //!
 //! JSON has no `NaN` and no infinity, so every number that is read is finite. An error names the field and the element,
 //! as `img[7]`, and where the text is wrong, the byte.
@@ -68,6 +68,13 @@ enum HelloType {
     Hello,
 }
 
+impl Hello {
+    /// Returns the sizes that a frame must have.
+    pub(super) const fn sizes(&self) -> Sizes {
+        Sizes { joints: self.joints.len(), rows: self.rows, cols: self.cols }
+    }
+}
+
 /// A frame.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(expecting = "a JSON object")]
@@ -88,13 +95,6 @@ pub(super) struct Obs {
 #[serde(rename_all = "lowercase")]
 enum FrameType {
     Obs,
-    End,
-}
-
-/// A message of a simulator after its hello.
-#[derive(Debug, Clone, PartialEq)]
-pub(super) enum Message {
-    Obs(Obs),
     End,
 }
 
@@ -132,20 +132,20 @@ pub(super) fn hello(line: &str) -> Result<Hello, String> {
     Ok(hello)
 }
 
-/// Reads a message after the hello.
+/// Reads a message after the hello: a frame, or `None` for the end of the run.
 ///
 /// # Errors
 /// What is wrong, with its field and, where the line is JSON, with the number of the frame.
-pub(super) fn message(line: &str, sizes: Sizes) -> Result<Message, String> {
+pub(super) fn message(line: &str, sizes: Sizes) -> Result<Option<Obs>, String> {
     #[derive(Deserialize)]
-    struct Head {
+    struct Tag {
         r#type: FrameType,
     }
-    if parse(line).is_ok_and(|head: Head| head.r#type == FrameType::End) {
-        return Ok(Message::End);
+    if parse(line).is_ok_and(|tag: Tag| tag.r#type == FrameType::End) {
+        return Ok(None);
     }
     let obs = parse(line).and_then(|obs| check_sizes(obs, sizes));
-    obs.map(Message::Obs).map_err(|why| match seq_of(line) {
+    obs.map(Some).map_err(|why| match seq_of(line) {
         Some(seq) => format!("obs {seq}: {why}"),
         None => why,
     })

@@ -1,26 +1,22 @@
-//! `lockstep`: a pad and an arm in a simulator of somebody else's, over a line of TCP.
-//!
-//! The simulator says what it is when the device is opened, so a task is checked against it before anything moves. Each
-//! exchange answers the frame that was shown last and waits for the next, so simulator and graph take turns. A frame
-//! counts from the simulator's own clock. `docs/lockstep.md` has the protocol.
+//! `lockstep`: a pad and an arm in an external simulator, over TCP. `docs/lockstep.md` describes the protocol.
 
 mod bridge;
 mod message;
 mod socket;
 
-use std::borrow::Cow;
 use std::time::Duration;
 
 use tactflow_runtime::device::{Description, Device, Driver, Opened};
-use tactflow_runtime::node::{At, FilePath, Mistake, Mistakes, Param};
+use tactflow_runtime::node::{At, Describe, FilePath, Mistake, Mistakes, Param};
 use tactflow_runtime::signal::{ImageShape, Joint, JointsShape, Unit};
 use tactflow_runtime::source::Code;
 
-use super::arm_facts;
+use super::arm::{self, ArmPorts};
+use super::{Facts, pad};
 use crate::arm::model::load;
 use crate::builtin;
-use bridge::{Bridge, Ports};
-use message::{Hello, Sizes};
+use bridge::Bridge;
+use message::Hello;
 use socket::Socket;
 
 /// Parameters of `lockstep`.
@@ -42,96 +38,82 @@ pub struct Params {
     acceleration: f64,
 }
 
-/// The device; what runs is a `Bridge`.
+/// A pad and an arm in another program: any simulator that speaks the lockstep protocol.
+///
+/// The device connects to a simulator that listens at `address` and exchanges lines of JSON with it; `docs/lockstep.md`
+/// describes how to write one. It replaces the built-in bench: `tactflow run graphs/hybrid.toml --bench
+/// graphs/benches/lockstep.toml`.
+///
+/// First the simulator describes itself: its joints with their limits, the mount of the sensor, and the size, pitch, scale
+/// and threshold of the pad. So the simulator must also run while a graph is checked. It names the model of the arm: `lwr4p`
+/// is built in, and `urdf` names the file of any other model.
+///
+/// In lockstep the simulator waits for each command, and a run is as fast as both allow. Otherwise it runs by its own clock:
+/// the device uses the newest frame, and counts the frames before it as gaps. Frames carry the time of the simulator.
+///
+/// At the end of a run the commands go to zero, frame by frame, and then the simulator receives the reason. The simulator can
+/// also end the run itself. A wrong message, a value that is not finite, silence and a closed connection are faults that name
+/// the message and the field. If the simulator still listens, the device brings the arm to rest before it disconnects.
+///
+/// It states the facts `urdf`, `tip` and `mount` of the arm and `dead`, `threshold`, `pressure` and `calibration` of the pad.
+/// The `contact` that a task reports is sent as `est`.
+///
+/// ```toml
+/// [roles]
+/// pad = "tactile_pad"
+/// arm = "velocity_arm"
+///
+/// [commands]
+/// arm.velocity = "joint_limit.velocity"
+///
+/// [bind]
+/// pad = "bench"
+/// arm = "bench"
+///
+/// [devices.bench]
+/// type = "lockstep"
+/// address = "127.0.0.1:7777"
+/// ```
+#[derive(Describe)]
+#[describe(name = "lockstep")]
 pub struct Lockstep;
-
-impl tactflow_runtime::node::Describe for Lockstep {
-    const NAME: &'static str = "lockstep";
-    const SUMMARY: &'static str =
-        "a pad and an arm in another program: any simulator that speaks the lockstep protocol";
-    const DOC: &'static str = "\
-The device connects to a simulator that listens at `address` and speaks lines of JSON; `docs/lockstep.md` says how to \
-write one. It stands in for the built-in bench: `tactflow run graphs/hybrid.toml --bench graphs/benches/lockstep.toml`.\n\n\
-The simulator says first what it is: its joints with their limits, where the sensor is mounted, the pad's size, pitch, \
-scale and threshold. So the simulator has to be there when a graph is checked, too. It names the arm's model; `lwr4p` is \
-built in, and `urdf` names a file for any other.\n\n\
-In lockstep it waits for each command, and a run is as fast as both are. Otherwise it runs by its own clock: then the \
-newest frame counts, and those before it are counted as gaps. Frames carry the simulator's time.\n\n\
-At the end of a run the commands go to zero first, frame by frame, and then the simulator receives the reason. It may end the run \
-itself. What it says wrongly, a value that is not finite, silence and a closed connection are faults that name the \
-message and the field; where it still listens, the arm is brought to rest before it is left.\n\n\
-It states the facts `urdf`, `tip` and `mount` of the arm and `dead`, `threshold`, `pressure` and `calibration` of the \
-pad. What a task reports as `contact` goes out as `est`.";
-    const EXAMPLE: &'static str = r#"
-[roles]
-pad = "tactile_pad"
-arm = "velocity_arm"
-
-[commands]
-arm.velocity = "joint_limit.velocity"
-
-[bind]
-pad = "bench"
-arm = "bench"
-
-[devices.bench]
-type = "lockstep"
-address = "127.0.0.1:7777"
-"#;
-}
 
 impl Device for Lockstep {
     type Params = Params;
 
     fn open(params: Params) -> Result<Opened, Mistakes> {
-        let at = |why: String| refusal(&params.address, why);
-        let [connect, reply] = [params.connect_s, params.reply_s].map(|time| Duration::from_secs_f64(time.min(1e6)));
-        let mut socket = Socket::connect(&params.address, connect, reply).map_err(|why| {
-            let message = format!("cannot connect to the simulator at `{}`: {why}", params.address);
-            let mistake = Mistake::new(Code::Unreadable, At::Param("address".into()), message);
-            mistake.help("start the simulator first, or give its address: `--set devices.bench.address=127.0.0.1:7777`")
-        })?;
-        let line = socket.line().map_err(|why| at(format!("no hello: {why}")))?;
-        let hello = message::hello(&line).map_err(|why| at(format!("hello (line 1): {why}")))?;
-        let shape = ImageShape { rows: hello.rows, cols: hello.cols, pitch: [hello.pitch; 2], unit: Unit::RAW };
-        let joints = joints(&hello, params.acceleration);
+        let mut socket = connect(&params)?;
+        let line = socket.line().map_err(|why| refusal(&params.address, format!("no hello: {why}")))?;
+        let hello = message::hello(&line).map_err(|why| refusal(&params.address, format!("hello (line 1): {why}")))?;
         let mut description = Description::every((hello.dt * 1e9).round() * 1e-9);
-        let mut pad = description.fills("tactile_pad");
-        pad.facts(pad_facts(&hello));
-        let image = pad.output("image", shape);
-        let mut arm = description.fills("velocity_arm");
-        arm.facts(model_facts(&hello, &params)?);
-        let ports = Ports {
-            image,
-            position: arm.output("position", joints.clone()),
-            equilibrium: arm.output("equilibrium", joints.clone()),
-            velocity: arm.command("velocity", joints.in_unit(Unit::RADIAN.per_second())),
-            contact: arm.report("contact"),
-        };
-        let sizes = Sizes { joints: hello.joints.len(), rows: hello.rows, cols: hello.cols };
-        let bridge = Bridge::new(ports, socket, params.address, sizes, &hello, params.acceleration);
+        let shape = ImageShape { rows: hello.rows, cols: hello.cols, pitch: [hello.pitch; 2], unit: Unit::RAW };
+        let image = pad::fill(&mut description, shape, pad_facts(&hello));
+        let joints = joints(&hello, params.acceleration);
+        let arm = ArmPorts::fill(&mut description, &joints, model_facts(&hello, &params)?);
+        let bridge = Bridge::new(image, arm, socket, hello, params);
         Ok(Opened { description, driver: Driver::Stepped(Box::new(bridge)) })
     }
 }
 
-/// What the simulator says will not do.
+fn connect(params: &Params) -> Result<Socket, Mistakes> {
+    let [connect, reply] = [params.connect_s, params.reply_s].map(|time| Duration::from_secs_f64(time.min(1e6)));
+    Socket::connect(&params.address, connect, reply).map_err(|why| {
+        let message = format!("cannot connect to the simulator at `{}`: {why}", params.address);
+        let mistake = Mistake::new(Code::Unreadable, At::Param("address".into()), message);
+        let help = "start the simulator first, or give its address: `--set devices.bench.address=127.0.0.1:7777`";
+        mistake.help(help).into()
+    })
+}
+
+/// Returns the mistake of a simulator that cannot be used.
 fn refusal(address: &str, why: String) -> Mistakes {
     Mistake::new(Code::BadData, At::Param("address".into()), format!("the simulator at `{address}`: {why}")).into()
 }
 
-type Facts = Vec<(Cow<'static, str>, toml::Value)>;
-
 fn pad_facts(hello: &Hello) -> Facts {
-    let calibration: toml::Table =
-        [("gain".to_owned(), (hello.newton_per_unit / hello.counts_per_unit).into()), ("unit".to_owned(), "N".into())]
-            .into_iter()
-            .collect();
-    vec![
-        ("dead".into(), toml::Value::Array(vec![])),
-        ("threshold".into(), (hello.threshold_units * hello.newton_per_unit).into()),
-        ("pressure".into(), hello.newton_per_unit.into()),
-        ("calibration".into(), calibration.into()),
-    ]
+    let gain = hello.newton_per_unit / hello.counts_per_unit;
+    let calibration = toml::Table::from_iter([("gain".to_owned(), gain.into()), ("unit".to_owned(), "N".into())]);
+    pad::facts(hello.threshold_units * hello.newton_per_unit, hello.newton_per_unit, calibration)
 }
 
 fn joints(hello: &Hello, acceleration: f64) -> JointsShape {
@@ -145,7 +127,7 @@ fn joints(hello: &Hello, acceleration: f64) -> JointsShape {
     JointsShape { joints: hello.joints.iter().enumerate().map(joint).collect(), unit: Unit::RADIAN }
 }
 
-/// What the arm states, if its model has the joints of the simulator.
+/// Returns the facts of the arm. The joints of its model must be those of the simulator.
 fn model_facts(hello: &Hello, params: &Params) -> Result<Facts, Mistakes> {
     let urdf = match &params.urdf {
         Some(file) => file.clone(),
@@ -159,7 +141,7 @@ fn model_facts(hello: &Hello, params: &Params) -> Result<Facts, Mistakes> {
         })?,
     };
     let chain = load(&urdf, &hello.tip, &hello.mount).map_err(|mistakes| {
-        // The tip is the simulator's word, and stands in no file.
+        // The simulator names the tip, so no file has its place.
         let of_hello = |mistake: Mistake| match mistake.at {
             At::Param(_) => refusal(&params.address, mistake.message),
             _ => vec![mistake],
@@ -172,22 +154,23 @@ fn model_facts(hello: &Hello, params: &Params) -> Result<Facts, Mistakes> {
             format!("its `joints` are {:?}, but those of the model up to `{}` are {model:?}", hello.joints, hello.tip);
         return Err(refusal(&params.address, why));
     }
-    arm_facts::facts(&urdf, &hello.tip, &hello.mount)
+    arm::facts(&urdf, &hello.tip, &hello.mount)
 }
 
-/// The name of a model without folders and ending.
+/// Returns the name of a model without folders and extension.
 fn stem(name: &str) -> &str {
     let file = name.rsplit(['/', '\\', ':']).next().unwrap_or(name);
     file.strip_suffix(".urdf").unwrap_or(file)
 }
 
-/// The model of that name among those that are built in.
+/// Returns the built-in model with a name, or `None`.
 fn model(name: &str) -> Option<FilePath> {
-    let is_meant = |file: &str| file.strip_suffix(".urdf").is_some_and(|known| known.eq_ignore_ascii_case(stem(name)));
-    let (file, bytes) = builtin::FILES.iter().find(|(file, _)| is_meant(file))?;
+    let has_name = |file: &str| file.strip_suffix(".urdf").is_some_and(|known| known.eq_ignore_ascii_case(stem(name)));
+    let (file, bytes) = builtin::FILES.iter().find(|(file, _)| has_name(file))?;
     Some(FilePath { path: format!("builtin:{file}").into(), span: 0..0, builtin: Some(bytes) })
 }
 
+/// Returns the names of the built-in models.
 fn models() -> String {
     let names = builtin::FILES.iter().filter_map(|(file, _)| file.strip_suffix(".urdf"));
     names.map(|name| format!("`{name}`")).collect::<Vec<_>>().join(", ")

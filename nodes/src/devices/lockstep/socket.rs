@@ -1,179 +1,181 @@
-//! The line to a simulator: TCP, a message a line, and never a wait without an end.
+//! The TCP connection to a simulator: one message per line, and a limit on every wait.
 
-use std::io::{ErrorKind, Read, Write};
+use std::io::{BufRead, BufReader, ErrorKind, Write};
 use std::net::{Shutdown, TcpStream, ToSocketAddrs};
 use std::time::{Duration, Instant};
 
-/// The longest line [bytes].
-const LONGEST: usize = 1 << 20;
-/// Time between two attempts to connect: a simulator may be about to start.
-const AGAIN: Duration = Duration::from_millis(50);
-/// As much is read ahead at most of a simulator that does not wait [bytes].
-const AHEAD: usize = 8 << 20;
+/// Maximum length of a line [bytes].
+const MAX_LINE_BYTES: usize = 1 << 20;
+/// Time between two attempts to connect to a simulator that is starting.
+const RETRY_PERIOD: Duration = Duration::from_millis(50);
+/// Minimum timeout of a call of the operating system, where 0 would be no timeout.
+const MIN_TIMEOUT: Duration = Duration::from_millis(1);
 
-/// The line to a simulator.
+/// The connection to a simulator.
 #[derive(Debug)]
 pub(super) struct Socket {
-    stream: TcpStream,
-    /// What was read, from `read` on.
-    buffer: Vec<u8>,
-    read: usize,
-    /// Lines that were taken.
+    stream: BufReader<TcpStream>,
+    /// The line that is being received.
+    line: Vec<u8>,
+    /// Whether the rest of that line is skipped because it is too long.
+    is_skipping: bool,
+    /// Number of lines received.
     pub(super) lines: u64,
-    /// Whether the rest of a line that is too long is still to come.
-    skips: bool,
     /// Whether the simulator has closed its end.
     is_closed: bool,
-    patience: Duration,
+    timeout: Duration,
 }
 
 impl Socket {
-    /// Connects within `connect`; from then on the simulator may be silent for `patience`.
+    /// Connects within the time `connect`. Later the simulator may be silent for `timeout`.
     ///
     /// # Errors
     /// Why there is no connection.
-    pub(super) fn connect(address: &str, connect: Duration, patience: Duration) -> Result<Self, String> {
+    pub(super) fn connect(address: &str, connect: Duration, timeout: Duration) -> Result<Self, String> {
         let end = Instant::now() + connect;
         loop {
             let why = match attempt(address, end) {
-                Ok(stream) => return Self::on(stream, patience).map_err(|error| error.to_string()),
+                Ok(stream) => return Self::new(stream, timeout).map_err(|error| error.to_string()),
                 Err(why) => why,
             };
-            if Instant::now() + AGAIN >= end {
+            if Instant::now() + RETRY_PERIOD >= end {
                 return Err(why);
             }
-            std::thread::sleep(AGAIN);
+            std::thread::sleep(RETRY_PERIOD);
         }
     }
 
-    fn on(stream: TcpStream, patience: Duration) -> std::io::Result<Self> {
+    fn new(stream: TcpStream, timeout: Duration) -> std::io::Result<Self> {
         // Each command is one small packet that the simulator waits for.
         stream.set_nodelay(true)?;
-        stream.set_write_timeout(Some(patience))?;
-        Ok(Self { stream, buffer: Vec::new(), read: 0, lines: 0, skips: false, is_closed: false, patience })
+        stream.set_write_timeout(Some(timeout))?;
+        let stream = BufReader::with_capacity(1 << 16, stream);
+        Ok(Self { stream, line: Vec::new(), is_skipping: false, lines: 0, is_closed: false, timeout })
     }
 
     /// Sends a line.
     ///
     /// # Errors
     /// Why it cannot be sent.
-    pub(super) fn say(&mut self, line: &str) -> Result<(), String> {
-        self.stream.write_all(line.as_bytes()).map_err(|error| match error.kind() {
+    pub(super) fn send(&mut self, line: &str) -> Result<(), String> {
+        self.stream.get_mut().write_all(line.as_bytes()).map_err(|error| match error.kind() {
             ErrorKind::WouldBlock | ErrorKind::TimedOut => {
-                format!("the simulator has taken no command for {}", seconds(self.patience))
+                format!("the simulator has taken no command for {} s", self.timeout.as_secs_f64())
             }
             _ => format!("the simulator has closed the connection without an `end` ({error})"),
         })
     }
 
-    /// The next line; waits for it.
+    /// Waits for the next line.
     ///
     /// # Errors
-    /// If there is none in time, or it will not do.
+    /// If no line arrives in time, or if it is not valid.
     pub(super) fn line(&mut self) -> Result<String, String> {
-        let patience = self.patience;
-        self.line_within(patience)?.ok_or_else(|| format!("the simulator has said nothing for {}", seconds(patience)))
+        let timeout = self.timeout;
+        let silence = || format!("the simulator has said nothing for {} s", timeout.as_secs_f64());
+        self.line_within(timeout)?.ok_or_else(silence)
     }
 
-    /// The next line, if it comes within that time.
+    /// Waits for the next line for a `time`.
     ///
     /// # Errors
-    /// If it will not do, or none can come any more.
+    /// If the line is not valid, or if the connection is closed.
     pub(super) fn line_within(&mut self, time: Duration) -> Result<Option<String>, String> {
         let end = Instant::now() + time;
         loop {
-            if let Some(line) = self.take()? {
+            if let Some(line) = self.take_line()? {
                 return Ok(Some(line));
             }
             if self.is_closed {
-                let rest = self.buffer.len() - self.read;
-                let middle = if rest > 0 { " in the middle of a message" } else { "" };
+                let middle = if self.line.is_empty() { "" } else { " in the middle of a message" };
                 return Err(format!("the simulator has closed the connection without an `end`{middle}"));
             }
             let left = end.saturating_duration_since(Instant::now());
             if left.is_zero() {
                 return Ok(None);
             }
-            self.fill(Some(left))?;
+            self.receive(left)?;
         }
     }
 
-    /// The next line, if it is there already; never waits.
+    /// Returns the next line if it has arrived. Never waits.
     ///
     /// # Errors
-    /// If it will not do.
-    pub(super) fn line_at_hand(&mut self) -> Result<Option<String>, String> {
-        while !self.is_closed && self.buffer.len() - self.read < AHEAD && self.fill(None)? {}
-        self.take()
-    }
-
-    /// Takes a whole line out of what was read.
-    fn take(&mut self) -> Result<Option<String>, String> {
-        let rest = &self.buffer[self.read..];
-        let end = rest.iter().position(|byte| *byte == b'\n');
-        let is_too_long = end.unwrap_or(rest.len()) > LONGEST;
-        let Some(end) = end else {
-            if is_too_long || self.skips {
-                (self.read, self.buffer) = (0, Vec::new());
+    /// If the line is not valid.
+    pub(super) fn line_if_ready(&mut self) -> Result<Option<String>, String> {
+        loop {
+            let line = self.take_line()?;
+            if line.is_some() || self.is_closed {
+                return Ok(line);
             }
-            let is_news = is_too_long && !self.skips;
-            self.skips |= is_too_long;
-            return if is_news { Err(self.too_long(1)) } else { Ok(None) };
-        };
-        if is_too_long || self.skips {
-            (self.read, self.lines) = (self.read + end + 1, self.lines + 1);
-            return if std::mem::take(&mut self.skips) { self.take() } else { Err(self.too_long(0)) };
-        }
-        let line = String::from_utf8(rest[..end].to_vec());
-        (self.read, self.lines) = (self.read + end + 1, self.lines + 1);
-        if self.read == self.buffer.len() || self.read > LONGEST {
-            self.buffer.drain(..self.read);
-            self.read = 0;
-        }
-        line.map(Some).map_err(|_| format!("line {}: it is not UTF-8 text", self.lines))
-    }
-
-    fn too_long(&self, more: u64) -> String {
-        format!("line {}: it is longer than 1 MiB", self.lines + more)
-    }
-
-    /// Reads once, waiting for as long as it may; whether anything came.
-    fn fill(&mut self, wait: Option<Duration>) -> Result<bool, String> {
-        let mut chunk = [0; 1 << 14];
-        let setting = match wait {
-            Some(wait) => self.stream.set_read_timeout(Some(wait.max(Duration::from_millis(1)))),
-            None => self.stream.set_nonblocking(true),
-        };
-        let result = setting.and_then(|()| self.stream.read(&mut chunk));
-        if wait.is_none() {
-            self.stream.set_nonblocking(false).map_err(broken)?;
-        }
-        match result {
-            Ok(0) => self.is_closed = true,
-            Ok(count) => {
-                self.buffer.extend_from_slice(&chunk[..count]);
-                return Ok(true);
+            self.stream.get_ref().set_nonblocking(true).map_err(broken)?;
+            let received = self.receive_some();
+            self.stream.get_ref().set_nonblocking(false).map_err(broken)?;
+            if !received? {
+                return Ok(None);
             }
-            Err(error) if error.kind() == ErrorKind::Interrupted => {}
-            Err(error) if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut) => {}
-            Err(error) if error.kind() == ErrorKind::ConnectionReset => self.is_closed = true,
-            Err(error) => return Err(broken(error)),
+        }
+    }
+
+    /// Takes a whole line from the bytes that have arrived.
+    fn take_line(&mut self) -> Result<Option<String>, String> {
+        loop {
+            let arrived = self.stream.buffer();
+            let end = arrived.iter().position(|byte| *byte == b'\n');
+            if !self.is_skipping {
+                self.line.extend_from_slice(&arrived[..end.unwrap_or(arrived.len())]);
+            }
+            let count = end.map_or(arrived.len(), |end| end + 1);
+            self.stream.consume(count);
+            let number = self.lines + 1;
+            self.lines += u64::from(end.is_some());
+            let is_skipped = self.is_skipping;
+            self.is_skipping &= end.is_none();
+            if self.line.len() > MAX_LINE_BYTES {
+                (self.line, self.is_skipping) = (Vec::new(), end.is_none());
+                return Err(format!("line {number}: it is longer than 1 MiB"));
+            }
+            if end.is_none() {
+                return Ok(None);
+            }
+            if !is_skipped {
+                let line = String::from_utf8(std::mem::take(&mut self.line));
+                return line.map(Some).map_err(|_| format!("line {number}: it is not UTF-8 text"));
+            }
+        }
+    }
+
+    /// Waits for bytes for at most `time`.
+    fn receive(&mut self, time: Duration) -> Result<(), String> {
+        self.stream.get_ref().set_read_timeout(Some(time.max(MIN_TIMEOUT))).map_err(broken)?;
+        self.receive_some().map(|_| ())
+    }
+
+    /// Receives bytes. Returns whether any arrived.
+    fn receive_some(&mut self) -> Result<bool, String> {
+        match self.stream.fill_buf() {
+            Ok([]) => self.is_closed = true,
+            Ok(_) => return Ok(true),
+            Err(error) => match error.kind() {
+                ErrorKind::Interrupted | ErrorKind::WouldBlock | ErrorKind::TimedOut => {}
+                ErrorKind::ConnectionReset => self.is_closed = true,
+                _ => return Err(broken(error)),
+            },
         }
         Ok(false)
     }
 
-    /// Says no more, and gives the simulator a moment to read what was said last: to hang up on what it still sends could
-    /// take that from it.
-    pub(super) fn hang_up(&mut self) {
+    /// Closes the own end, and gives the simulator a moment to read the last message. A connection that is dropped while the
+    /// simulator still sends could lose that message.
+    pub(super) fn close(&mut self) {
         const MOMENT: Duration = Duration::from_millis(200);
-        if self.stream.shutdown(Shutdown::Write).is_err() {
+        if self.stream.get_ref().shutdown(Shutdown::Write).is_err() {
             return;
         }
         let end = Instant::now() + MOMENT;
         while !self.is_closed && Instant::now() < end {
-            self.buffer.clear();
-            self.read = 0;
-            if self.fill(Some(end.saturating_duration_since(Instant::now()))).is_err() {
+            self.stream.consume(self.stream.buffer().len());
+            if self.receive(end.saturating_duration_since(Instant::now())).is_err() {
                 return;
             }
         }
@@ -183,7 +185,7 @@ impl Socket {
 fn attempt(address: &str, end: Instant) -> Result<TcpStream, String> {
     let mut why = "the name stands for no address".to_owned();
     for address in address.to_socket_addrs().map_err(|error| error.to_string())? {
-        let left = end.saturating_duration_since(Instant::now()).max(Duration::from_millis(1));
+        let left = end.saturating_duration_since(Instant::now()).max(MIN_TIMEOUT);
         match TcpStream::connect_timeout(&address, left) {
             Ok(stream) => return Ok(stream),
             Err(error) => why = error.to_string(),
@@ -194,8 +196,4 @@ fn attempt(address: &str, end: Instant) -> Result<TcpStream, String> {
 
 fn broken(error: std::io::Error) -> String {
     format!("the connection to the simulator broke: {error}")
-}
-
-fn seconds(time: Duration) -> String {
-    format!("{} s", time.as_secs_f64())
 }

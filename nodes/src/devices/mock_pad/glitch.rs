@@ -1,4 +1,6 @@
-//! Faults of a scripted pad.
+//! Scripted faults of a pad.
+
+use std::ops::Range;
 
 use tactflow_runtime::node::Param;
 
@@ -6,7 +8,7 @@ use crate::devices::nanos;
 
 /// A kind of fault.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Param)]
-pub enum Trouble {
+pub enum GlitchKind {
     /// The last frame is repeated with its old sequence number.
     Repeat,
     /// The last frame is repeated with new sequence numbers and stamps: a stuck sensor.
@@ -31,25 +33,14 @@ pub struct Glitch {
     #[param(unit = "s", above = 0.0)]
     pub(crate) for_s: f64,
     /// Kind of the fault.
-    pub(crate) kind: Trouble,
+    pub(crate) kind: GlitchKind,
 }
 
 impl Glitch {
-    /// Returns the begin [ns].
+    /// Returns the time of the fault [ns].
     #[must_use]
-    pub fn start(&self) -> i64 {
-        nanos(self.at_s)
-    }
-
-    /// Returns the end [ns].
-    #[must_use]
-    pub fn end(&self) -> i64 {
-        self.start().saturating_add(nanos(self.for_s))
-    }
-
-    /// Returns whether the fault is active at `time` [ns].
-    #[must_use]
-    pub fn holds_at(&self, time: i64) -> bool {
-        (self.start()..self.end()).contains(&time)
+    pub fn time(&self) -> Range<i64> {
+        let start = nanos(self.at_s);
+        start..start.saturating_add(nanos(self.for_s))
     }
 }

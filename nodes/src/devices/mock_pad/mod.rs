@@ -1,21 +1,18 @@
-//! `mock_pad`: a pad that is pressed as its bench says, and that misbehaves as its bench says.
+//! `mock_pad`: a simulated pad with scripted presses and faults.
 //!
-//! A press is a smooth bump of force, (1 - d²/r²)² at distance d from a point or from a bar. Its samples at the tactels
-//! are scaled so that they sum to the press's force over an endless array: exact while it is on the pad, and falling
-//! smoothly to zero as it slides off. No foam, no noise, no hysteresis.
+//! The samples of a press at the tactels are scaled so that they sum to its force over an infinite array. So the sum is
+//! exact while the press is on the pad, and falls smoothly to zero as it slides off.
 
 mod glitch;
 mod press;
 
-use std::borrow::Cow;
-
 use tactflow_runtime::device::{Commands, Description, Device, DeviceError, Driver, Opened, Output, Samples, Stepped};
-use tactflow_runtime::node::{Mistake, Mistakes, Param};
+use tactflow_runtime::node::{Describe, Mistake, Mistakes, Param};
 use tactflow_runtime::signal::{Image, ImageShape, Unit};
 
-use super::{nanos, period_of};
+use super::{nanos, pad, period_of};
 
-pub use glitch::{Glitch, Trouble};
+pub use glitch::{Glitch, GlitchKind};
 pub use press::Press;
 
 /// Parameters of `mock_pad`.
@@ -56,8 +53,34 @@ pub struct Params {
 /// Maximum number of tactels of a pad.
 const MAX_TACTELS: usize = 1 << 22;
 
-/// The script and how far it has got.
-#[derive(Debug)]
+/// A simulated pad with scripted presses of points and bars, and with scripted faults.
+///
+/// Each `press` is a smooth bump of force, (1 - d²/r²)² at distance d from a point or a bar. It appears, moves and
+/// disappears on a schedule. Its tactels sum to its `force` while it is on the pad, and it slides off smoothly. Foam, noise
+/// and hysteresis are not simulated: use the pad to try out a graph and for tests whose result is known, not to tune gains.
+///
+/// A `glitch` is a fault that lasts for a while: `repeat` repeats the last frame, `freeze` repeats it as if it were new,
+/// `silence` gives no frame, `nan` makes one tactel not a number, `back` gives stamps that lie in the past. With `unplug`
+/// the device fails, and it stays failed also after `for_s`. Try a graph with each of them.
+///
+/// It states the facts `dead` (no tactel is), `threshold`, `pressure` and `calibration` (its values are forces already).
+///
+/// ```toml
+/// [roles]
+/// pad = "tactile_pad"
+///
+/// [bind]
+/// pad = "pad"
+///
+/// [devices.pad]
+/// type = "mock_pad"                   # 16 by 16 tactels, 5 mm apart, in N, 250 frames a second
+/// for_s = 4.0                         # [s]
+/// press = [
+///     { from_s = 0.5, to_s = 3.5, at = [-0.010, 0.005], speed = [0.004, 0.0], force = 4.0 },   # [s, s, m, m/s, N]
+/// ]
+/// ```
+#[derive(Debug, Describe)]
+#[describe(name = "mock_pad")]
 pub struct MockPad {
     image: Output<Image>,
     shape: ImageShape,
@@ -69,7 +92,7 @@ pub struct MockPad {
     served: Option<i64>,
 }
 
-/// A frame that is due.
+/// A frame to serve.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 struct Due {
     /// Frame whose values it has.
@@ -77,34 +100,6 @@ struct Due {
     stamp: i64,
     sequence: u64,
     is_nan: bool,
-}
-
-impl tactflow_runtime::node::Describe for MockPad {
-    const NAME: &'static str = "mock_pad";
-    const SUMMARY: &'static str =
-        "a simulated pad that is pressed by points and bars, and misbehaves, as its bench says";
-    const DOC: &'static str = "Each `press` is a smooth bump of force, (1 - d²/r²)² at distance d from a point or from a \
-        bar, that appears, moves and disappears on a schedule. Its tactels sum to its `force` while it is on the pad, and it \
-        slides off smoothly. There is no foam, no noise and no hysteresis: the pad is for trying out a graph and for \
-        tests whose result is known, not for tuning gains.\n\n\
-        A `glitch` makes it misbehave for a while: `repeat` shows an old frame again, `freeze` shows it as if it were \
-        new, `silence` shows none, `nan` a value that is no number, `back` stamps that lie in the past; with `unplug` \
-        the device fails, and stays failed also after `for_s`. A graph should be tried with each of them.\n\n\
-        It states the facts `dead` (no tactel is), `threshold`, `pressure`, and `calibration`: it is calibrated already.";
-    const EXAMPLE: &'static str = r#"
-[roles]
-pad = "tactile_pad"
-
-[bind]
-pad = "pad"
-
-[devices.pad]
-type = "mock_pad"                   # 16 by 16 tactels, 5 mm apart, in N, 250 frames a second
-for_s = 4.0                         # [s]
-press = [
-    { from_s = 0.5, to_s = 3.5, at = [-0.010, 0.005], speed = [0.004, 0.0], force = 4.0 },   # [s, s, m, m/s, N]
-]
-"#;
 }
 
 impl Device for MockPad {
@@ -124,29 +119,23 @@ impl Device for MockPad {
         }
         let shape = ImageShape { rows: params.rows, cols: params.cols, pitch: [params.pitch; 2], unit: params.unit };
         let mut description = Description::every(period as f64 * 1e-9);
-        let mut pad = description.fills("tactile_pad");
-        pad.facts(facts(&params));
-        let image = pad.output("image", shape.clone());
+        // The values are forces already.
+        let calibration = toml::Table::from_iter([("gain".to_owned(), 1.0.into())]);
+        let facts = pad::facts(params.threshold, params.pressure, calibration);
+        let image = pad::fill(&mut description, shape.clone(), facts);
         let pad = Self::new(image, shape, period, params);
         Ok(Opened { description, driver: Driver::Stepped(Box::new(pad)) })
     }
 }
 
-/// What a task may ask of it: its values are forces already.
-fn facts(params: &Params) -> Vec<(Cow<'static, str>, toml::Value)> {
-    let calibration = toml::Table::from_iter([("gain".to_owned(), 1.0.into())]);
-    vec![
-        ("dead".into(), toml::Value::Array(vec![])),
-        ("threshold".into(), params.threshold.into()),
-        ("pressure".into(), params.pressure.into()),
-        ("calibration".into(), calibration.into()),
-    ]
+/// Returns the first frame at a `time` or later [ns].
+fn frame_from(time: i64, period: i64) -> i64 {
+    time / period + i64::from(time % period != 0)
 }
 
 impl MockPad {
     fn new(image: Output<Image>, shape: ImageShape, period: i64, params: Params) -> Self {
-        let end = params.for_s.map_or(i64::MAX, nanos);
-        let frames = end / period + i64::from(end % period != 0);
+        let frames = frame_from(params.for_s.map_or(i64::MAX, nanos), period);
         let mut pad = Self {
             image,
             shape,
@@ -163,30 +152,29 @@ impl MockPad {
 
     fn glitch(&self, frame: i64) -> Option<&Glitch> {
         let time = frame.saturating_mul(self.period);
-        self.glitches.iter().find(|glitch| glitch.holds_at(time))
+        self.glitches.iter().find(|glitch| glitch.time().contains(&time))
     }
 
     fn silence(&self, frame: i64) -> Option<&Glitch> {
-        self.glitch(frame).filter(|glitch| glitch.kind == Trouble::Silence)
+        self.glitch(frame).filter(|glitch| glitch.kind == GlitchKind::Silence)
     }
 
-    /// The first frame from `frame` on that is not in a silence.
+    /// Returns the first frame from `frame` on that is not in a silence.
     fn after_silence(&self, mut frame: i64) -> i64 {
         while let Some(silence) = self.silence(frame).filter(|_| frame < self.frames) {
-            let end = silence.end();
-            frame = (end / self.period + i64::from(end % self.period != 0)).max(frame + 1);
+            frame = frame_from(silence.time().end, self.period).max(frame + 1);
         }
         frame
     }
 
-    /// The newest frame up to `now` that was not served yet, if there is one; what comes before it is skipped.
+    /// Returns the newest frame up to `now` [ns] that was not served yet, or `None`. It skips the frames before that one.
     fn due(&mut self, now: i64) -> Option<Due> {
         if now < 0 {
             return None;
         }
         let mut frame = (now / self.period).min(self.frames - 1);
         while let Some(silence) = self.silence(frame).filter(|_| frame >= self.next) {
-            frame = ((silence.start() - 1).div_euclid(self.period)).min(frame - 1);
+            frame = ((silence.time().start - 1).div_euclid(self.period)).min(frame - 1);
         }
         if frame < self.next {
             return None;
@@ -194,21 +182,21 @@ impl MockPad {
         self.next = self.after_silence(frame + 1);
         let time = frame * self.period;
         let plain = |frame: i64| Due { frame, stamp: frame * self.period, sequence: frame as u64 + 1, is_nan: false };
-        match self.glitch(frame).map(|glitch| (glitch.kind, glitch.start())) {
-            // What was served last comes once more; before anything was, there is nothing to repeat.
-            Some((Trouble::Repeat, _)) => self.served.map(plain),
-            // A stuck sensor: before anything was served it is stuck with this one.
-            Some((Trouble::Freeze, _)) => {
+        match self.glitch(frame).map(|glitch| (glitch.kind, glitch.time().start)) {
+            // The last frame once more. Before the first frame there is nothing to repeat.
+            Some((GlitchKind::Repeat, _)) => self.served.map(plain),
+            // A stuck sensor. Before the first frame it is stuck with this one.
+            Some((GlitchKind::Freeze, _)) => {
                 let stuck = *self.served.get_or_insert(frame);
                 Some(Due { frame: stuck, ..plain(frame) })
             }
-            Some((Trouble::Nan, _)) => Some(Due { is_nan: true, ..plain(frame) }),
-            // The clock runs back from the glitch's start, so that every stamp lies before the last good one.
-            Some((Trouble::Back, start)) => {
+            Some((GlitchKind::Nan, _)) => Some(Due { is_nan: true, ..plain(frame) }),
+            // The clock runs back from the start of the glitch, so every stamp lies before the last good one.
+            Some((GlitchKind::Back, start)) => {
                 Some(Due { stamp: start - (time - start) - 2 * self.period, ..plain(frame) })
             }
-            // An unplugged pad fails in `exchange`, before it is asked what is due.
-            Some((Trouble::Silence | Trouble::Unplug, _)) | None => {
+            // An unplugged pad has failed in `exchange` before this.
+            Some((GlitchKind::Silence | GlitchKind::Unplug, _)) | None => {
                 self.served = Some(frame);
                 Some(plain(frame))
             }
@@ -237,7 +225,7 @@ impl Stepped for MockPad {
     }
 
     fn exchange(&mut self, now: i64, _: &Commands, samples: &mut Samples) -> Result<(), DeviceError> {
-        if self.glitches.iter().any(|glitch| glitch.kind == Trouble::Unplug && now >= glitch.start()) {
+        if self.glitches.iter().any(|glitch| glitch.kind == GlitchKind::Unplug && now >= glitch.time().start) {
             return Err(DeviceError("its plug is out".into()));
         }
         if let Some(due) = self.due(now) {

@@ -1,4 +1,4 @@
-//! What presses on a scripted pad.
+//! Scripted presses on a pad.
 
 use tactflow_runtime::node::Param;
 use tactflow_runtime::signal::ImageShape;
@@ -36,7 +36,7 @@ pub struct Press {
 const MAX_WIDTH: f64 = 256.0;
 
 impl Press {
-    /// What is wrong with it on a pad of that pitch [m].
+    /// Returns what is wrong with the press on a pad with a `pitch` [m].
     #[must_use]
     pub fn mistake(&self, pitch: f64) -> Option<String> {
         let (radius, length) = (self.radius, self.length);
@@ -49,7 +49,7 @@ impl Press {
         None
     }
 
-    /// Adds its force at `time` [s] to the cells of a pad.
+    /// Adds the force of the press at `time` [s] to the cells of a pad.
     pub fn add(&self, shape: &ImageShape, time: f64, cells: &mut [f32]) {
         if time < self.from_s || self.to_s.is_some_and(|to| time >= to) {
             return;
@@ -58,7 +58,7 @@ impl Press {
         let middle = [self.at[0] + self.speed[0] * since, self.at[1] + self.speed[1] * since];
         let (sin, cos) = libm::sincos(self.angle);
         let reach = self.radius + 0.5 * self.length;
-        // Far off the pad there is nothing to add, and indices would lose their precision.
+        // Far off the pad the press adds nothing, and indices would lose their precision.
         let half = [shape.x(shape.cols as f64), shape.y(shape.rows as f64)];
         if (0..2).any(|k| middle[k].abs() > half[k] + reach) {
             return;
@@ -84,7 +84,7 @@ impl Press {
         }
     }
 
-    /// Height of the bump at (along, across) the bar from its middle [m]: 1 on the bar, 0 from the radius on.
+    /// Returns the height of the bump, from 1 on the bar to 0 at the radius; `along` and `across` start in its middle [m].
     fn bump(&self, along: f64, across: f64) -> f64 {
         let past = (along.abs() - 0.5 * self.length).max(0.0);
         let rest = (1.0 - (past * past + across * across) / (self.radius * self.radius)).max(0.0);

@@ -42,7 +42,7 @@ fn moments(shape: &ImageShape, cells: &[f32]) -> (f64, [f64; 2], f64) {
 
 proptest! {
     #[test]
-    fn on_the_pad_the_force_is_exact_and_the_middle_is_where_it_is_said(
+    fn on_the_pad_the_force_is_exact_and_the_middle_is_at_its_place(
         x in -0.02..0.02f64, y in -0.02..0.02f64, force in 0.1..100.0f64, radius in 0.008..0.018f64,
     ) {
         let (shape, cells) = image(&format!("press = [{{ at = [{x}, {y}], force = {force}, radius = {radius} }}]"), 0);
@@ -143,7 +143,7 @@ fn a_frozen_pad_shows_one_image_under_new_stamps() {
     assert_eq!(same, [false, true, true, false]);
     let mut stuck = pad("glitch = [{ at_s = 0, for_s = 1, kind = 'freeze' }]");
     let due = [8, 12].map(|ms| stuck.due(ms * MS).map(|due| (due.frame, due.sequence)));
-    assert_eq!(due, [Some((2, 3)), Some((2, 4))], "with what it saw first");
+    assert_eq!(due, [Some((2, 3)), Some((2, 4))], "with its first frame");
 }
 
 #[test]
@@ -157,7 +157,7 @@ fn an_unplugged_pad_fails_and_stays_failed() {
 }
 
 #[test]
-fn silence_is_no_time_to_wait_for() {
+fn a_silence_has_no_next_frame() {
     let mut silent = pad(
         "glitch = [{ at_s = 0.004, for_s = 1, kind = 'silence' }, { at_s = 0.5, for_s = 1e30, kind = 'silence' }]\nfor_s = 7",
     );
@@ -166,7 +166,7 @@ fn silence_is_no_time_to_wait_for() {
     let mut late = pad("glitch = [{ at_s = 0, for_s = 0.01, kind = 'silence' }]");
     assert_eq!((Stepped::next(&late), late.due(8 * MS)), (Some(12 * MS), None));
     let mut odd = pad("glitch = [{ at_s = 0, for_s = 0.01, kind = 'repeat' }]");
-    assert_eq!(odd.due(0), None, "nothing was served that could be repeated");
+    assert_eq!(odd.due(0), None, "there is no frame to repeat");
 }
 
 #[test]

@@ -19,37 +19,37 @@ const MAX_LATENCY_FRAMES: f64 = 1000.0;
 /// # Errors
 /// All parameters that are outside of what the simulation supports.
 pub(super) fn check(params: &Params, shape: &ImageShape) -> Result<(), Mistakes> {
-    let mut mistakes = Mistakes::new();
-    if shape.tactels() > MAX_TACTELS {
-        let message =
-            format!("{} by {} tactels are more than the {MAX_TACTELS} that can be simulated", shape.rows, shape.cols);
-        mistakes.push(Mistake::param("rows", message));
-    }
-    let points = (params.pitch / params.points_apart).ceil().max(1.0).powi(2) * shape.tactels() as f64;
-    if points > MAX_POINTS {
-        let (apart, pitch) = (params.points_apart, params.pitch);
-        let message = format!("a pitch of {pitch} m with points {apart} m apart needs more than {MAX_POINTS} points");
-        mistakes.push(Mistake::param("pitch", message));
-    }
-    if params.latency_s * params.rate_hz > MAX_LATENCY_FRAMES {
-        mistakes.push(Mistake::param("latency_s", format!("the latency must be at most {MAX_LATENCY_FRAMES} frames")));
-    }
-    let foam = &params.foam;
-    if foam.damping > 10.0 {
-        mistakes.push(Mistake::param("foam.damping", "the damping under a tactel must be at most 10 N s/m"));
-    }
-    if !(0.0002..=0.05).contains(&foam.spread) {
-        mistakes.push(Mistake::param("foam.spread", "the spread must be from 0.0002 to 0.05 m"));
-    }
-    if foam.static_friction < foam.sliding_friction {
-        mistakes.push(Mistake::param("foam.static_friction", "static friction must not be less than sliding friction"));
-    }
-    if !(0.0001..=0.001).contains(&params.points_apart) {
-        mistakes.push(Mistake::param("points_apart", "points must be from 0.0001 to 0.001 m apart"));
-    }
-    if !(1e-6..=0.002).contains(&params.step_s) {
-        mistakes.push(Mistake::param("step_s", "the step must be from 1e-6 to 0.002 s"));
-    }
+    let Params { pitch, points_apart, foam, .. } = params;
+    let (rows, cols) = (shape.rows, shape.cols);
+    let points = (pitch / points_apart).ceil().max(1.0).powi(2) * shape.tactels() as f64;
+    let limits = [
+        (
+            shape.tactels() <= MAX_TACTELS,
+            "rows",
+            format!("{rows} by {cols} tactels are more than the {MAX_TACTELS} that can be simulated"),
+        ),
+        (
+            points <= MAX_POINTS,
+            "pitch",
+            format!("a pitch of {pitch} m with points {points_apart} m apart needs more than {MAX_POINTS} points"),
+        ),
+        (
+            params.latency_s * params.rate_hz <= MAX_LATENCY_FRAMES,
+            "latency_s",
+            format!("the latency must be at most {MAX_LATENCY_FRAMES} frames"),
+        ),
+        (foam.damping <= 10.0, "foam.damping", "the damping under a tactel must be at most 10 N s/m".into()),
+        ((0.0002..=0.05).contains(&foam.spread), "foam.spread", "the spread must be from 0.0002 to 0.05 m".into()),
+        (
+            foam.static_friction >= foam.sliding_friction,
+            "foam.static_friction",
+            "static friction must not be less than sliding friction".into(),
+        ),
+        ((0.0001..=0.001).contains(points_apart), "points_apart", "points must be from 0.0001 to 0.001 m apart".into()),
+        ((1e-6..=0.002).contains(&params.step_s), "step_s", "the step must be from 1e-6 to 0.002 s".into()),
+    ];
+    let broken = limits.into_iter().filter(|(holds, ..)| !holds);
+    let mut mistakes: Mistakes = broken.map(|(_, name, message)| Mistake::param(name, message)).collect();
     if let Some(inertia) = &params.inertia {
         if inertia.len() != params.start.len() {
             let message =

@@ -1,23 +1,18 @@
 //! `sim_bench`: the simulated bench as a device: a pad, an arm and objects.
 //!
-//! It is a stepped device in virtual time: the same commands and the same seed give the same bits. Between two exchanges
-//! the world advances in steps of at most `step_s`, at the velocity that was commanded last. An image is taken at the rate
-//! `rate_hz`. It is available `latency_s` later, with the stamp of the time when it was taken.
+//! Between two exchanges the world advances in steps of at most `step_s`, at the velocity that was commanded last. An image
+//! is taken at the rate `rate_hz`. It is available `latency_s` later, with the stamp of the time when it was taken.
 
 mod check;
 
 use std::borrow::Cow;
 use std::collections::VecDeque;
 
-use tactflow_runtime::device::{
-    Command, Commands, Description, Device, DeviceError, Driver, Opened, Output, Report, Samples, Stepped,
-};
-use tactflow_runtime::node::{FilePath, Mistakes, Param, PortSpec};
-use tactflow_runtime::signal::{Image, ImageShape, Joint, Joints, JointsShape, Kind, Pose, Scalar, ScalarShape, Unit};
+use tactflow_runtime::device::{Commands, Description, Device, DeviceError, Driver, Opened, Output, Samples, Stepped};
+use tactflow_runtime::node::{Describe, FilePath, Mistakes, Param, PortSpec};
+use tactflow_runtime::signal::{Image, ImageShape, Joint, Kind, Pose, Scalar, ScalarShape, Unit};
 
-use super::contact::Contact;
 use super::foam::Foam;
-use super::imprint::Imprint;
 use super::joints::{JointDynamics, SimArm};
 use super::object::{Object, ObjectParams};
 use super::readout::{Electronics, Readout};
@@ -26,8 +21,8 @@ use super::world::{World, start};
 use crate::arm::chain::Chain;
 use crate::arm::model::load;
 use crate::arm::mount::Mount;
-use crate::devices::arm_facts::{check_start, fact_of, facts};
-use crate::devices::{nanos, period_of};
+use crate::devices::arm::{self, ArmPorts};
+use crate::devices::{Facts, nanos, pad, period_of};
 use crate::random::Random;
 use crate::roles::ground_truth;
 
@@ -111,9 +106,59 @@ const INERTIA: [f64; 7] = [2.0, 2.0, 1.0, 0.8, 0.3, 0.25, 0.1];
 /// Largest number of tactels of a simulated pad.
 pub const MAX_TACTELS: usize = 128 * 128;
 
-/// The bench.
+/// A simulated bench: a foam pad on an arm in joint impedance control, and objects to touch.
+///
+/// The bench closes the loop without hardware: commands move the arm and its pad, and contact gives an image and pushes the
+/// arm back.
+///
+/// The pad is an elastic foundation of foam on a rigid plate, simulated at points at most 1 mm apart. Each point is a
+/// stiffening spring in series with the stiffness of the object. The foam spreads a load over several tactels, and friction
+/// sticks and slips at every tactel. Each tactel has its own saturating curve, hysteresis, creep and noise, and reads 12
+/// bits: the image is in raw counts, and `calibration` names the file that converts them to forces.
+///
+/// The arm is that of the paper. Every joint is a spring and a damper toward a posture that moves at the commanded velocity,
+/// so the pad yields and tilts under a load.
+///
+/// Objects are placed relative to the sensor at the start, whose z points out of the pad: `at = [0.01, 0, 0.05]` is 1 cm
+/// along the sensor's x and 5 cm in front of it. They are fixed, stand on a compliant `mount`, or follow their `motion`.
+///
+/// It runs in virtual time, and the same commands and seed give the same bits; with `--realtime` it is paced by the clock.
+/// The pad states the facts `dead`, `threshold`, `pressure` and `calibration`, and the standard deviations of its noise:
+/// `common_noise`, which all tactels share, as a fraction of the reading, and `own_noise` of each tactel in raw counts. The
+/// arm states `urdf`, `tip` and `mount`. In the role `ground_truth` it provides true values to scenarios and recordings only.
+///
+/// Not simulated: gravity, coupling of the joints, rotation of objects under load, interaction between columns of foam, wear
+/// and temperature.
+///
+/// ```toml
+/// [roles]
+/// pad = "tactile_pad"
+/// arm = "velocity_arm"
+///
+/// [commands]
+/// arm.velocity = "joint_limit.velocity"
+///
+/// [bind]
+/// pad = "bench"
+/// arm = "bench"
+///
+/// [devices.bench]
+/// type = "sim_bench"
+/// for_s = 4.0                         # [s]
+/// urdf = "builtin:lwr4p.urdf"         # a KUKA LWR 4+
+/// tip = "lwr_7_link"
+/// mount = { xyz = [0.0, 0.0, 0.03] }  # of the sensor on the tip [m]
+/// start = [0.0, 0.5, 0.0, -1.3, 0.0, 1.3, 0.0]   # [rad]
+/// objects = [
+///     { shape = "ball", radius = 0.04, at = [0.01, -0.005, 0.041] },   # 1 mm before the pad [m]
+/// ]
+/// ```
+#[derive(Describe)]
+#[describe(name = "sim_bench")]
 pub struct SimBench {
-    ports: Ports,
+    image: Output<Image>,
+    arm: ArmPorts,
+    truth: TruthPorts,
     world: World,
     readout: Readout,
     joints: Vec<Joint>,
@@ -132,50 +177,27 @@ pub struct SimBench {
     threshold: f64,
 }
 
-impl tactflow_runtime::node::Describe for SimBench {
-    const NAME: &'static str = "sim_bench";
-    const SUMMARY: &'static str =
-        "a simulated bench: a foam pad on an arm in joint impedance control, and objects to touch";
-    const DOC: &'static str = "\
-The bench closes the loop without hardware: commands move the arm and its pad, and contact gives an image and pushes the \
-arm back.\n\n\
-The pad is an elastic foundation of foam on a rigid plate, simulated at points at most 1 mm apart. Each point is a \
-stiffening spring in series with the stiffness of the object. The foam spreads a load over several tactels, and friction \
-sticks and slips at every tactel. Each tactel has its own saturating curve, hysteresis, creep and noise, and reads 12 bits: \
-the image is in raw counts, and `calibration` names the file that converts them to forces.\n\n\
-The arm is that of the paper. Every joint is a spring and a damper toward a posture that moves at the commanded velocity, \
-so the pad yields and tilts under a load.\n\n\
-Objects are placed relative to the sensor at the start, whose z points out of the pad: `at = [0.01, 0, 0.05]` is 1 cm \
-along the sensor's x and 5 cm in front of it. They are fixed, stand on a compliant `mount`, or follow their `motion`.\n\n\
-It runs in virtual time, and the same commands and seed give the same bits; with `--realtime` it is paced by the clock. The \
-pad states the facts `dead`, `threshold`, `pressure` and `calibration`, and the standard deviations of its noise: \
-`common_noise`, which all tactels share, as a fraction of the reading, and `own_noise` of each tactel [raw]. The arm states \
-`urdf`, `tip` and `mount`. In the role `ground_truth` it provides true values to scenarios and recordings only.\n\n\
-Not simulated: gravity, coupling of the joints, rotation of objects under load, interaction between columns of foam, wear \
-and temperature.";
-    const EXAMPLE: &'static str = r#"
-[roles]
-pad = "tactile_pad"
-arm = "velocity_arm"
+/// The ports of the role `ground_truth`.
+struct TruthPorts {
+    /// Each scalar with its name.
+    scalars: Vec<(Cow<'static, str>, Output<Scalar>)>,
+    /// The noise-free image.
+    image: Output<Image>,
+}
 
-[commands]
-arm.velocity = "joint_limit.velocity"
-
-[bind]
-pad = "bench"
-arm = "bench"
-
-[devices.bench]
-type = "sim_bench"
-for_s = 4.0                         # [s]
-urdf = "builtin:lwr4p.urdf"         # a KUKA LWR 4+
-tip = "lwr_7_link"
-mount = { xyz = [0.0, 0.0, 0.03] }  # of the sensor on the tip [m]
-start = [0.0, 0.5, 0.0, -1.3, 0.0, 1.3, 0.0]   # [rad]
-objects = [
-    { shape = "ball", radius = 0.04, at = [0.01, -0.005, 0.041] },   # 1 mm before the pad [m]
-]
-"#;
+impl TruthPorts {
+    /// Adds the role to a description.
+    fn fill(description: &mut Description, shape: &ImageShape) -> Self {
+        let role = ground_truth();
+        let mut truth = description.fills(role.name);
+        let image = truth.output("image", ImageShape { unit: Unit::NEWTON, ..shape.clone() });
+        let scalars = role.outputs.into_iter().filter(|port| port.kind == Kind::Scalar);
+        let scalar = |port: PortSpec| {
+            let unit = port.args[0].parse().expect("the role's units are units");
+            (port.name.clone(), truth.output(port.name, ScalarShape::of(unit)))
+        };
+        Self { scalars: scalars.map(scalar).collect(), image }
+    }
 }
 
 impl Device for SimBench {
@@ -183,127 +205,68 @@ impl Device for SimBench {
 
     fn open(params: Params) -> Result<Opened, Mistakes> {
         let chain = load(&params.urdf, &params.tip, &params.mount)?;
-        let acceleration = params.acceleration;
-        let joints: Vec<Joint> = chain.joints().iter().map(|joint| Joint { acceleration, ..joint.clone() }).collect();
-        check_start(&joints, &params.start)?;
+        let joints = arm::joints(&chain, params.acceleration, &params.start)?;
         let shape = ImageShape { rows: params.rows, cols: params.cols, pitch: [params.pitch; 2], unit: Unit::RAW };
         check::check(&params, &shape)?;
-        let period = period_of(params.rate_hz);
+        let (period, latency) = (period_of(params.rate_hz), nanos(params.latency_s));
         let mut description = Description::every(period as f64 * 1e-9);
-        let ports = Ports::describe(&mut description, &params, &shape, &joints)?;
-        let bench = Self::new(ports, params, chain, joints, shape, period)?;
+        let image = pad::fill(&mut description, shape.clone(), pad_facts(&params)?);
+        let facts = arm::facts(&params.urdf, &params.tip, &params.mount)?;
+        let arm = ArmPorts::fill(&mut description, &joints, facts);
+        let frames = (latency / period) as usize + 2;
+        let bench = Self {
+            image,
+            arm,
+            truth: TruthPorts::fill(&mut description, &shape),
+            readout: Readout::new(shape.tactels(), params.electronics.clone(), params.seed),
+            joints: joints.joints,
+            period,
+            latency,
+            end: params.for_s.map_or(i64::MAX, nanos),
+            last: None,
+            taken: VecDeque::with_capacity(frames),
+            spare: vec![vec![0.0; shape.tactels()]; frames],
+            shown: 0,
+            sequence: 0,
+            threshold: params.threshold,
+            world: world(params, chain, shape)?,
+        };
         Ok(Opened { description, driver: Driver::Stepped(Box::new(bench)) })
     }
 }
 
-/// The ports of the pad, the arm and the ground truth.
-struct Ports {
-    image: Output<Image>,
-    position: Output<Joints>,
-    equilibrium: Output<Joints>,
-    velocity: Command,
-    contact: Report<Pose>,
-    /// Each number of the truth, with its name in the role.
-    truth: Vec<(Cow<'static, str>, Output<Scalar>)>,
-    clean_image: Output<Image>,
-}
-
-impl Ports {
-    fn describe(
-        description: &mut Description,
-        params: &Params,
-        shape: &ImageShape,
-        joints: &[Joint],
-    ) -> Result<Self, Mistakes> {
-        let mut pad = description.fills("tactile_pad");
-        pad.facts(pad_facts(params)?);
-        let image = pad.output("image", shape.clone());
-        let joints = JointsShape { joints: joints.to_vec(), unit: Unit::RADIAN };
-        let mut arm = description.fills("velocity_arm");
-        arm.facts(facts(&params.urdf, &params.tip, &params.mount)?);
-        let (position, equilibrium) =
-            (arm.output("position", joints.clone()), arm.output("equilibrium", joints.clone()));
-        let velocity = arm.command("velocity", joints.in_unit(Unit::RADIAN.per_second()));
-        let contact = arm.report("contact");
-        let role = ground_truth();
-        let mut truth = description.fills(role.name);
-        let clean_image = truth.output("image", ImageShape { unit: Unit::NEWTON, ..shape.clone() });
-        let numbers = role.outputs.into_iter().filter(|port| port.kind == Kind::Scalar);
-        let number = |port: PortSpec| {
-            let unit = port.args[0].parse().expect("the role's units are units");
-            (port.name.clone(), truth.output(port.name, ScalarShape::of(unit)))
-        };
-        let truth = numbers.map(number).collect();
-        Ok(Self { image, position, equilibrium, velocity, contact, truth, clean_image })
-    }
-}
-
-fn pad_facts(params: &Params) -> Result<Vec<(Cow<'static, str>, toml::Value)>, Mistakes> {
+fn pad_facts(params: &Params) -> Result<Facts, Mistakes> {
     let mut calibration = toml::Table::new();
     if let Some(file) = &params.calibration {
-        calibration.insert("file".into(), fact_of("calibration", file)?.into());
+        calibration.insert("file".into(), arm::fact_of("calibration", file)?.into());
     }
-    Ok(vec![
-        ("dead".into(), toml::Value::Array(vec![])),
-        ("threshold".into(), params.threshold.into()),
-        ("pressure".into(), params.pressure.into()),
-        ("calibration".into(), calibration.into()),
-        ("common_noise".into(), params.electronics.common_noise.into()),
-        ("own_noise".into(), params.electronics.own_noise.into()),
-    ])
+    let mut facts = pad::facts(params.threshold, params.pressure, calibration);
+    let Electronics { common_noise, own_noise, .. } = params.electronics;
+    facts.extend([("common_noise".into(), common_noise.into()), ("own_noise".into(), own_noise.into())]);
+    Ok(facts)
+}
+
+/// Returns the world with its objects, which are placed relative to the sensor.
+fn world(params: Params, chain: Chain, shape: ImageShape) -> Result<World, Mistakes> {
+    let joint = |inertia: f64| JointDynamics {
+        stiffness: params.stiffness,
+        damping_ratio: params.damping_ratio,
+        inertia,
+        friction: params.friction,
+    };
+    let inertia = params.inertia.as_deref().unwrap_or(&INERTIA);
+    let arm = SimArm::new(chain, inertia.iter().copied().map(joint).collect(), params.start);
+    let from = start(&arm);
+    let mut scatter = Random::new(params.seed, 3);
+    let place = |(i, object): (usize, &ObjectParams)| {
+        let offset = [0, 1].map(|_| scatter.uniform(-object.scatter, object.scatter));
+        Object::new(object, from, offset).map_err(|message| check::object(i, message))
+    };
+    let objects = params.objects.iter().enumerate().map(place).collect::<Result<Vec<_>, _>>()?;
+    Ok(World::new(arm, objects, shape, params.foam, params.points_apart, params.step_s))
 }
 
 impl SimBench {
-    fn new(
-        ports: Ports,
-        params: Params,
-        chain: Chain,
-        joints: Vec<Joint>,
-        shape: ImageShape,
-        period: i64,
-    ) -> Result<Self, Mistakes> {
-        let inertia = params.inertia.unwrap_or_else(|| INERTIA.to_vec());
-        let joint = |inertia: f64| JointDynamics {
-            stiffness: params.stiffness,
-            damping_ratio: params.damping_ratio,
-            inertia,
-            friction: params.friction,
-        };
-        let arm = SimArm::new(chain, inertia.into_iter().map(joint).collect(), params.start);
-        let from = start(&arm);
-        let mut scatter = Random::new(params.seed, 3);
-        let place = |(i, object): (usize, &ObjectParams)| {
-            let max_offset = object.scatter;
-            let offset = [0, 1].map(|_| scatter.uniform(-max_offset, max_offset));
-            Object::new(object, from, offset).map_err(|message| check::object(i, message))
-        };
-        let objects = params.objects.iter().enumerate().map(place).collect::<Result<Vec<_>, _>>()?;
-        let contact = Contact::new(shape.clone(), params.foam.clone(), params.points_apart, objects.len());
-        let imprint = Imprint::new(&shape, contact.fine(), params.foam.spread);
-        let tactels = shape.tactels();
-        let readout = Readout::new(tactels, params.electronics, params.seed);
-        let world = World::new(arm, objects, contact, imprint, shape, params.step_s);
-        let end = params.for_s.map_or(i64::MAX, nanos);
-        let (latency, threshold) = (nanos(params.latency_s), params.threshold);
-        let frames = (latency / period) as usize + 2;
-        let (taken, spare) = (VecDeque::with_capacity(frames), vec![vec![0.0; tactels]; frames]);
-        Ok(Self {
-            ports,
-            world,
-            readout,
-            joints,
-            period,
-            latency,
-            end,
-            last: None,
-            taken,
-            spare,
-            shown: 0,
-            sequence: 0,
-            threshold,
-        })
-    }
-
     /// Advances to `now` [ns] and takes the images that are due until then.
     fn advance(&mut self, now: i64, velocity: &[f64]) {
         let begin = self.last.unwrap_or(-1);
@@ -331,7 +294,7 @@ impl SimBench {
         while self.taken.front().is_some_and(|(stamp, _)| stamp + self.latency <= now) {
             let (stamp, counts) = self.taken.pop_front().expect("the front was just checked");
             self.shown += 1;
-            samples.write(self.ports.image, stamp, self.shown).cells_mut().copy_from_slice(&counts);
+            samples.write(self.image, stamp, self.shown).cells_mut().copy_from_slice(&counts);
             self.spare.push(counts);
         }
     }
@@ -351,21 +314,17 @@ impl Stepped for SimBench {
         if self.last.is_some_and(|last| now <= last) {
             return Ok(());
         }
-        let velocity = commands.joints(self.ports.velocity);
-        if let Some(i) = velocity.iter().position(|v| !v.is_finite()) {
-            let name = &self.joints[i].name;
-            return Err(DeviceError(format!("the velocity commanded to joint `{name}` is not finite")));
-        }
+        let velocity = commands.joints(self.arm.velocity);
+        arm::check_velocity(&self.joints, velocity)?;
         self.advance(now, velocity);
         if !self.world.is_sound() {
             return Err(DeviceError("the simulation diverged: make `step_s` smaller or the bench less stiff".into()));
         }
         self.sequence += 1;
         self.show(now, samples);
-        let arm = &self.world.arm;
-        samples.write(self.ports.position, now, self.sequence).0.copy_from_slice(&arm.position);
-        samples.write(self.ports.equilibrium, now, self.sequence).0.copy_from_slice(&arm.equilibrium);
-        self.write_truth(now, commands.report(self.ports.contact), samples);
+        let SimArm { position, equilibrium, .. } = &self.world.arm;
+        self.arm.write(samples, now, self.sequence, [position, equilibrium]);
+        self.write_truth(now, commands.report(self.arm.contact), samples);
         Ok(())
     }
 }
@@ -394,13 +353,13 @@ impl SimBench {
             "own_noise" => noise.map(|[_, own]| own),
             other => unreachable!("the role has an output `{other}` that the bench does not know"),
         };
-        for (name, port) in &self.ports.truth {
+        for (name, port) in &self.truth.scalars {
             match value(name) {
                 Some(value) => *samples.write(*port, now, self.sequence) = value,
                 None => samples.clear(*port, now, self.sequence),
             }
         }
-        let cells = samples.write(self.ports.clean_image, now, self.sequence).cells_mut();
+        let cells = samples.write(self.truth.image, now, self.sequence).cells_mut();
         cells.iter_mut().zip(self.world.image()).for_each(|(cell, force)| *cell = *force as f32);
     }
 }

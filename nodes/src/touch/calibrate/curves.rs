@@ -100,10 +100,12 @@ impl<'p> CurveParams<'p> {
     fn read_file(&self, path: &FilePath, image: &ImageShape) -> Result<Curves, Mistakes> {
         let bytes = path.bytes()?;
         let text = String::from_utf8_lossy(&bytes);
-        let calibration = file::read(&text).map_err(|flaws| {
-            let mistake =
-                |flaw: file::Flaw| Mistake { help: flaw.help, ..Mistake::data(path, &*text, flaw.span, flaw.message) };
-            flaws.into_iter().map(mistake).collect::<Mistakes>()
+        let calibration = file::read(&text).map_err(|mistakes| {
+            let in_file = |Mistake { at, message, help, .. }: Mistake| {
+                let span = if let At::Span(span) = at { span } else { 0..0 };
+                Mistake { help, ..Mistake::data(path, &*text, span, message) }
+            };
+            mistakes.into_iter().map(in_file).collect::<Mistakes>()
         })?;
         let Calibration { rows, cols, reading, unit, .. } = calibration;
         let unlike = |code, what: String, image: String| {

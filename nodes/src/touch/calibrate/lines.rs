@@ -1,7 +1,7 @@
 //! The curves of all tactels side by side, so that a step is a few plain loops over the array.
 
 use crate::calibration::curve::{Segment, clamp, rational};
-use crate::calibration::{Calibration, Curve, Kind, Tactel};
+use crate::calibration::{Calibration, CurveKind, ForceCurve, Tactel};
 
 /// The curves of all tactels, all of one kind. The curve of a dead tactel is 0 everywhere.
 #[derive(Debug, Clone, PartialEq)]
@@ -24,15 +24,15 @@ impl Lines {
     pub(super) fn new(calibration: &Calibration) -> (Vec<f32>, Self) {
         let count = calibration.tactels.len();
         let mut lines = match calibration.kind {
-            Kind::Linear => Self::Linear(vec![0.0; count]),
-            Kind::Rational => {
+            CurveKind::Linear => Self::Linear(vec![0.0; count]),
+            CurveKind::Rational => {
                 let zeros = || vec![0.0; count];
                 Self::Rational { gain: zeros(), squash: zeros(), low: zeros(), high: zeros() }
             }
-            Kind::Piecewise => {
+            CurveKind::Piecewise => {
                 let knots = calibration.tactels.iter().flatten().map(|tactel| match &tactel.curve {
-                    Curve::Piecewise { knots } => knots.len(),
-                    Curve::Linear { .. } | Curve::Rational { .. } => 0,
+                    ForceCurve::Piecewise { knots } => knots.len(),
+                    ForceCurve::Linear { .. } | ForceCurve::Rational { .. } => 0,
                 });
                 Self::Piecewise(vec![vec![Segment::default(); count]; knots.max().unwrap_or(0)])
             }
@@ -47,15 +47,15 @@ impl Lines {
         (offset, lines)
     }
 
-    fn set(&mut self, i: usize, curve: &Curve) {
+    fn set(&mut self, i: usize, curve: &ForceCurve) {
         match (self, curve) {
-            (Self::Linear(gain), Curve::Linear { gain: slope }) => gain[i] = *slope,
-            (Self::Rational { gain, squash, low, high }, Curve::Rational { gain: slope, squash: bend, most }) => {
+            (Self::Linear(gain), ForceCurve::Linear { gain: slope }) => gain[i] = *slope,
+            (Self::Rational { gain, squash, low, high }, ForceCurve::Rational { gain: slope, squash: bend, most }) => {
                 (gain[i], squash[i]) = (*slope, *bend);
-                [low[i], high[i]] = Curve::ends(*slope, *bend, *most);
+                [low[i], high[i]] = ForceCurve::ends(*slope, *bend, *most);
             }
-            (Self::Piecewise(segments), Curve::Piecewise { knots }) => {
-                for (k, segment) in Curve::segments(knots).enumerate() {
+            (Self::Piecewise(segments), ForceCurve::Piecewise { knots }) => {
+                for (k, segment) in ForceCurve::segments(knots).enumerate() {
                     segments[k][i] = segment;
                 }
             }

@@ -7,7 +7,7 @@ use tactflow_runtime::node::{At, Mistake};
 use tactflow_runtime::signal::{FlagShape, Freshness, Shape, Unit};
 
 use super::*;
-use crate::calibration::{Calibration, Curve, Kind, Tactel, file};
+use crate::calibration::{Calibration, CurveKind, ForceCurve, Tactel, file};
 
 fn rig(params: &str) -> Result<NodeRig, Mistakes> {
     let shape = ImageShape { rows: 2, cols: 3, pitch: [0.005, 0.004], unit: Unit::RAW };
@@ -99,15 +99,15 @@ fn with_file(name: &str, text: &str, params: &str) -> Result<NodeRig, Mistakes> 
 }
 
 /// A calibration of two by three tactels, of which the fifth is dead.
-fn calibration(kind: Kind) -> Calibration {
+fn calibration(kind: CurveKind) -> Calibration {
     let tactel = |i: usize| {
         let by = 1.0 + 0.1 * i as f32;
         let curve = match kind {
-            Kind::Linear => Curve::Linear { gain: 0.01 * by },
-            Kind::Rational => Curve::Rational { gain: 0.01 * by, squash: 0.002 * by, most: 3.0 * by },
-            Kind::Piecewise => {
+            CurveKind::Linear => ForceCurve::Linear { gain: 0.01 * by },
+            CurveKind::Rational => ForceCurve::Rational { gain: 0.01 * by, squash: 0.002 * by, most: 3.0 * by },
+            CurveKind::Piecewise => {
                 let knots = [[40.0, 0.3], [100.0, 1.1], [130.0, 2.0 * by]];
-                Curve::Piecewise { knots: knots[..=i % 3].to_vec() }
+                ForceCurve::Piecewise { knots: knots[..=i % 3].to_vec() }
             }
         };
         (i != 4).then_some(Tactel { offset: 7.5 * by, curve })
@@ -124,10 +124,10 @@ fn calibration(kind: Kind) -> Calibration {
 
 #[test]
 fn the_forces_have_the_bits_of_the_curves_in_the_file() {
-    for kind in [Kind::Linear, Kind::Rational, Kind::Piecewise] {
+    for kind in [CurveKind::Linear, CurveKind::Rational, CurveKind::Piecewise] {
         let calibration = calibration(kind);
         let text = file::write(&calibration, "a test");
-        let mut rig = with_file(kind.name(), &text, "dead = [[0, 1]]").unwrap();
+        let mut rig = with_file(&kind.to_string(), &text, "dead = [[0, 1]]").unwrap();
         let Shape::Image(shape) = rig.shape("image") else { panic!("an image") };
         assert_eq!((shape.rows, shape.cols, shape.unit), (2, 3, Unit::NEWTON));
         for reading in [-1e30, -50.0, 0.0, 7.5, 8.0, 20.0, 60.0, 111.1, 150.0, 1e4, 1e30f32] {
@@ -147,7 +147,7 @@ fn the_forces_have_the_bits_of_the_curves_in_the_file() {
 
 #[test]
 fn a_mistake_in_the_file_is_marked_in_the_file_and_a_wrong_file_in_the_graph() {
-    let good = file::write(&calibration(Kind::Rational), "a test");
+    let good = file::write(&calibration(CurveKind::Rational), "a test");
     let data = |name: &str, from: &str, to: &str, marked: &str| {
         assert!(good.contains(from), "{from}");
         let damaged = good.replacen(from, to, 1);
@@ -168,7 +168,7 @@ fn a_mistake_in_the_file_is_marked_in_the_file_and_a_wrong_file_in_the_graph() {
             "calibrates readings in `kPa`, but the image is in `raw`",
         ),
         (
-            file::write(&Calibration { rows: 3, cols: 2, ..calibration(Kind::Linear) }, ""),
+            file::write(&Calibration { rows: 3, cols: 2, ..calibration(CurveKind::Linear) }, ""),
             "",
             At::Param("file".into()),
             "calibrates 3 by 2 tactels, but the image has 2 by 3",

@@ -1,0 +1,94 @@
+//! What every arm states: the role `velocity_arm`, its joints, its ports and its facts.
+
+use tactflow_runtime::device::{Command, Description, DeviceError, Output, Report, Samples};
+use tactflow_runtime::node::{FilePath, Mistake, Mistakes};
+use tactflow_runtime::signal::{Joint, Joints, JointsShape, Pose, Unit};
+
+use super::Facts;
+use crate::arm::chain::Chain;
+use crate::arm::mount::Mount;
+
+/// The ports of the role `velocity_arm`.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct ArmPorts {
+    position: Output<Joints>,
+    equilibrium: Output<Joints>,
+    pub(crate) velocity: Command,
+    pub(crate) contact: Report<Pose>,
+}
+
+impl ArmPorts {
+    /// Adds the role `velocity_arm` to a description.
+    pub(crate) fn fill(description: &mut Description, joints: &JointsShape, facts: Facts) -> Self {
+        let mut arm = description.fills("velocity_arm");
+        arm.facts(facts);
+        Self {
+            position: arm.output("position", joints.clone()),
+            equilibrium: arm.output("equilibrium", joints.clone()),
+            velocity: arm.command("velocity", joints.in_unit(Unit::RADIAN.per_second())),
+            contact: arm.report("contact"),
+        }
+    }
+
+    /// Writes a sample of both postures.
+    pub(crate) fn write(&self, samples: &mut Samples, stamp: i64, sequence: u64, [position, equilibrium]: [&[f64]; 2]) {
+        samples.write(self.position, stamp, sequence).0.copy_from_slice(position);
+        samples.write(self.equilibrium, stamp, sequence).0.copy_from_slice(equilibrium);
+    }
+}
+
+/// Returns the joints of an arm with a maximum `acceleration`, which a model does not state.
+///
+/// # Errors
+/// If the arm cannot start at the positions `start` [rad; m for a prismatic joint].
+pub(crate) fn joints(chain: &Chain, acceleration: f64, start: &[f64]) -> Result<JointsShape, Mistakes> {
+    let joints: Vec<Joint> = chain.joints().iter().map(|joint| Joint { acceleration, ..joint.clone() }).collect();
+    if start.len() != joints.len() {
+        let message = format!("`start` has {} entries, but the arm has {} joints", start.len(), joints.len());
+        return Err(Mistake::param("start", message).into());
+    }
+    let outside = joints.iter().zip(start).filter(|(joint, q)| !(joint.lower..=joint.upper).contains(*q));
+    let mistakes: Mistakes = outside
+        .map(|(Joint { name, lower, upper, .. }, q)| {
+            let message = format!("joint `{name}` cannot start at {q}: it goes from {lower:.4} to {upper:.4}");
+            Mistake::param("start", message)
+        })
+        .collect();
+    if mistakes.is_empty() { Ok(JointsShape { joints, unit: Unit::RADIAN }) } else { Err(mistakes) }
+}
+
+/// Checks that every commanded velocity is finite.
+///
+/// # Errors
+/// The first joint whose velocity is not.
+pub(crate) fn check_velocity(joints: &[Joint], velocity: &[f64]) -> Result<(), DeviceError> {
+    match joints.iter().zip(velocity).find(|(_, v)| !v.is_finite()) {
+        Some((joint, _)) => Err(DeviceError(format!("the velocity commanded to joint `{}` is not finite", joint.name))),
+        None => Ok(()),
+    }
+}
+
+/// Returns the facts that `arm_state` reads.
+///
+/// # Errors
+/// If the path of the model is not UTF-8 or cannot be made absolute.
+pub(crate) fn facts(urdf: &FilePath, tip: &str, mount: &Mount) -> Result<Facts, Mistakes> {
+    let path = fact_of("urdf", urdf)?;
+    let mount = [("xyz", mount.xyz), ("rpy", mount.rpy)];
+    let mount: toml::Table = mount.into_iter().map(|(name, list)| (name.to_owned(), list.to_vec().into())).collect();
+    Ok(vec![("urdf".into(), path.into()), ("tip".into(), tip.into()), ("mount".into(), mount.into())])
+}
+
+/// Returns the path of a file as a fact. It is absolute, because the graph may be in another folder; `param` names the file.
+///
+/// # Errors
+/// If the path is not UTF-8 or cannot be made absolute.
+pub(crate) fn fact_of(param: &str, file: &FilePath) -> Result<String, Mistakes> {
+    let path = match file.builtin {
+        Some(_) => file.path.clone(),
+        None => std::path::absolute(&file.path).map_err(|error| Mistake::unreadable(file, &error))?,
+    };
+    path.into_os_string()
+        .into_string()
+        .map_err(|_| Mistake::param(param, format!("the path of `{param}` is not UTF-8 text")).into())
+}

@@ -1,0 +1,23 @@
+//! What every pad states: the role `tactile_pad`, its image and its facts.
+
+use tactflow_runtime::device::{Description, Output};
+use tactflow_runtime::signal::{Image, ImageShape};
+
+use super::Facts;
+
+/// Adds the role `tactile_pad` to a description. Returns the handle of its image.
+pub(crate) fn fill(description: &mut Description, shape: ImageShape, facts: Facts) -> Output<Image> {
+    let mut pad = description.fills("tactile_pad");
+    pad.facts(facts);
+    pad.output("image", shape)
+}
+
+/// Returns the facts of a pad without dead tactels.
+pub(crate) fn facts(threshold: f64, pressure: f64, calibration: toml::Table) -> Facts {
+    vec![
+        ("dead".into(), toml::Value::Array(vec![])),
+        ("threshold".into(), threshold.into()),
+        ("pressure".into(), pressure.into()),
+        ("calibration".into(), calibration.into()),
+    ]
+}
