@@ -10,7 +10,7 @@ pub(crate) const MAGIC: &[u8] = b"\x93NUMPY";
 pub(super) struct Array<'a> {
     /// Numbers of elements along the axes.
     pub(super) shape: Vec<usize>,
-    kind: Kind,
+    kind: ElementKind,
     /// Whether the first axis runs fastest.
     is_fortran: bool,
     is_big: bool,
@@ -20,7 +20,7 @@ pub(super) struct Array<'a> {
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Kind {
+enum ElementKind {
     Bool,
     Signed,
     Unsigned,
@@ -63,7 +63,7 @@ impl<'a> Array<'a> {
 
     /// Whether its elements are numbers.
     pub(super) const fn is_number(&self) -> bool {
-        !matches!(self.kind, Kind::Bytes | Kind::Text)
+        !matches!(self.kind, ElementKind::Bytes | ElementKind::Text)
     }
 
     /// Returns the number of elements.
@@ -87,10 +87,10 @@ impl<'a> Array<'a> {
         });
         let unused = 64 - 8 * self.width as u32;
         match (self.kind, self.width) {
-            (Kind::Float, 2) => half(bits as u16),
-            (Kind::Float, 4) => f32::from_bits(bits as u32).into(),
-            (Kind::Float, _) => f64::from_bits(bits),
-            (Kind::Signed, _) => (((bits << unused) as i64) >> unused) as f64,
+            (ElementKind::Float, 2) => half(bits as u16),
+            (ElementKind::Float, 4) => f32::from_bits(bits as u32).into(),
+            (ElementKind::Float, _) => f64::from_bits(bits),
+            (ElementKind::Signed, _) => (((bits << unused) as i64) >> unused) as f64,
             _ => bits as f64,
         }
     }
@@ -103,8 +103,8 @@ impl<'a> Array<'a> {
     /// Returns the text, or `None` if it is not a single text.
     pub(super) fn text(&self) -> Option<String> {
         let step = match self.kind {
-            Kind::Text => 4,
-            Kind::Bytes => 1,
+            ElementKind::Text => 4,
+            ElementKind::Bytes => 1,
             _ => return None,
         };
         let letter = |bytes: &[u8]| match (bytes, self.is_big) {
@@ -141,7 +141,7 @@ fn value<'h>(header: &'h str, key: &str) -> Option<&'h str> {
 }
 
 /// Parses `'<f8'`: byte order, kind and size.
-fn element(text: &str) -> Result<(bool, Kind, usize), String> {
+fn element(text: &str) -> Result<(bool, ElementKind, usize), String> {
     // A list of fields ends at `]`, a name at its quote.
     let end = match text.chars().next() {
         Some(quote @ ('\'' | '"')) => text[1..].find(quote).map(|at| at + 2),
@@ -163,12 +163,12 @@ fn element(text: &str) -> Result<(bool, Kind, usize), String> {
     let (kind, size) = name.split_at_checked(1).ok_or_else(strange)?;
     let size: usize = size.parse().map_err(|_| strange())?;
     let (kind, width) = match (kind, size) {
-        ("b", 1) => (Kind::Bool, 1),
-        ("i", 1 | 2 | 4 | 8) => (Kind::Signed, size),
-        ("u", 1 | 2 | 4 | 8) => (Kind::Unsigned, size),
-        ("f", 2 | 4 | 8) => (Kind::Float, size),
-        ("S", 1..=256) => (Kind::Bytes, size),
-        ("U", 1..=64) => (Kind::Text, 4 * size),
+        ("b", 1) => (ElementKind::Bool, 1),
+        ("i", 1 | 2 | 4 | 8) => (ElementKind::Signed, size),
+        ("u", 1 | 2 | 4 | 8) => (ElementKind::Unsigned, size),
+        ("f", 2 | 4 | 8) => (ElementKind::Float, size),
+        ("S", 1..=256) => (ElementKind::Bytes, size),
+        ("U", 1..=64) => (ElementKind::Text, 4 * size),
         _ => return Err(strange()),
     };
     Ok((order == ">" || order == "=" && cfg!(target_endian = "big"), kind, width))
