@@ -9,14 +9,10 @@ use tactflow_runtime::signal::Unit;
 
 use crate::recordings::common::reel::{Properties, Reel, bounded};
 use crate::recordings::common::text::{Lines, Notation, Piece};
-use crate::recordings::common::{FileFormat, FileHead, Hints, Parser, Recording, Refusal, TextError, Window};
+use crate::recordings::common::{FileFormat, FileHead, Hints, Recording, Refusal, TextError, Window};
 
-pub(super) const FORMAT: FileFormat = FileFormat {
-    name: "footscan",
-    title: "RSscan footscan, the whole plate's roll-off as text",
-    recognises,
-    parser: Parser::Text(parse),
-};
+pub(super) const FORMAT: FileFormat =
+    FileFormat::text("footscan", "RSscan footscan, the whole plate's roll-off as text", recognises, parse);
 
 /// Distance of the plates' sensors along a row and from row to row [m].
 const PITCH: [f64; 2] = [0.005_08, 0.007_62];
@@ -138,10 +134,8 @@ impl FootscanReader {
         let found = notation.fields(line).count();
         let [_, cols] = *self.size.get_or_insert([0, found]);
         let number = row + 1;
-        line.check(
-            found == cols,
-            format_args!("row {number} of frame {frame} has {found} cells, but the first has {cols}"),
-        )?;
+        let message = format_args!("row {number} of frame {frame} has {found} cells, but the first has {cols}");
+        line.check(found == cols, message)?;
         bounded(number, cols).map_err(|message| line.error(message))?;
         self.reel.row(notation.fields(line), |cell| notation.number(cell, "this cell"))
     }

@@ -14,17 +14,17 @@ use tactflow_runtime::signal::{Base, Unit};
 
 use crate::recordings::common::reel::{Properties, Reel};
 use crate::recordings::common::text::{Lines, Notation, Piece, shortened};
-use crate::recordings::common::{FileFormat, FileHead, Hints, Parser, Recording, Refusal, TextError, Window, units};
+use crate::recordings::common::{FileFormat, FileHead, Hints, Recording, Refusal, TextError, Window, units};
 use mat::{Corners, Mat};
 
-pub(super) const FORMAT: FileFormat =
-    FileFormat { name: "novel-asc", title: "novel pliance text (.asc)", recognises, parser: Parser::Text(parse) };
+pub(super) const FORMAT: FileFormat = FileFormat::text("novel-asc", "novel pliance text (.asc)", recognises, parse);
 
 fn recognises(head: &FileHead<'_>) -> bool {
     let has = |word: &str| head.text.contains(word);
     has("scanning rate [Hz]") || (has("pressure values in") && has("time["))
 }
 
+#[derive(Default)]
 struct AscReader<'t> {
     lines: Lines<'t>,
     notation: Notation,
@@ -46,18 +46,7 @@ struct AscReader<'t> {
 }
 
 fn parse(text: &str, hints: &Hints) -> Result<Recording, Refusal> {
-    let mut reader = AscReader {
-        lines: Lines::new(text),
-        notation: Notation::of(""),
-        found: Properties::default(),
-        has_masks: false,
-        labels: Vec::new(),
-        second: 1.0,
-        times: Vec::new(),
-        cells: Vec::new(),
-        corners: Corners::default(),
-        forces: Vec::new(),
-    };
+    let mut reader = AscReader { lines: Lines::new(text), second: 1.0, ..AscReader::default() };
     let labels = reader.head()?;
     reader.sensors(labels)?;
     let mut next = reader.pressures(text.len())?;

@@ -14,23 +14,18 @@ use tactflow_runtime::signal::{Base, Unit};
 
 use crate::recordings::common::reel::{Properties, Reel};
 use crate::recordings::common::text::{Lines, Notation, Piece, shortened};
-use crate::recordings::common::{
-    FileFormat, FileHead, Hints, MAX_CELLS, Parser, Recording, Refusal, TextError, Window,
-};
+use crate::recordings::common::{FileFormat, FileHead, Hints, MAX_CELLS, Recording, Refusal, TextError, Window};
 use header::{Label, ListingHeader, PageColumns, PageHeader, digit};
 
-pub(super) const FORMAT: FileFormat = FileFormat {
-    name: "novel-lst",
-    title: "novel emed or pliance listing (.lst)",
-    recognises,
-    parser: Parser::Text(parse),
-};
+pub(super) const FORMAT: FileFormat =
+    FileFormat::text("novel-lst", "novel emed or pliance listing (.lst)", recognises, parse);
 
 fn recognises(head: &FileHead<'_>) -> bool {
     let has = |word: &str| head.text.contains(word);
     has("Matrix:") && (has("Pict-No") || has("Sensor size:") || has("novel "))
 }
 
+#[derive(Default)]
 struct ListingReader<'t> {
     lines: Lines<'t>,
     header: ListingHeader,
@@ -58,17 +53,7 @@ struct Loaded {
 }
 
 fn parse(text: &str, hints: &Hints) -> Result<Recording, Refusal> {
-    let mut reader = ListingReader {
-        lines: Lines::new(text),
-        header: ListingHeader::default(),
-        factor: None,
-        cell_digit: 1.0,
-        page: None,
-        before: 0,
-        has_feeds: false,
-        reel: Reel::default(),
-        reach: [None, None],
-    };
+    let mut reader = ListingReader { lines: Lines::new(text), cell_digit: 1.0, ..ListingReader::default() };
     // A page has at least 24 characters.
     reader.reel.frames.reserve_exact(text.matches("Pict").count().min(text.len() / 24));
     while reader.page()? {}
@@ -185,10 +170,8 @@ impl<'t> ListingReader<'t> {
         let cols = columns.labels.len();
         let (found, wanted) = (fields.clone().count(), cols + usize::from(columns.has_force));
         let cut = self.lines.cut();
-        line.check(
-            found == wanted,
-            format_args!("row {label} has {found} numbers, but the header of its page has {wanted}{cut}"),
-        )?;
+        let message = format_args!("row {label} has {found} numbers, but the header of its page has {wanted}{cut}");
+        line.check(found == wanted, message)?;
         let mut sum = 0.0;
         for cell in fields.by_ref().take(cols) {
             let value = number(columns.notation, cell, "this cell")?;
@@ -210,10 +193,8 @@ impl<'t> ListingReader<'t> {
         let fields = columns.notation.fields(line).skip(1);
         let found = fields.clone().count();
         let is_whole = found == cols + 1 || (!columns.has_force && found == cols);
-        line.check(
-            is_whole,
-            format_args!("the row `Force` has {found} numbers, but the header of its page has {}", cols + 1),
-        )?;
+        let message = format_args!("the row `Force` has {found} numbers, but the header of its page has {}", cols + 1);
+        line.check(is_whole, message)?;
         let cells = &self.reel.cells[start..];
         let count = cells.len() / cols;
         let sum = |column: usize| cells.iter().skip(column).step_by(cols).map(|cell| f64::from(*cell)).sum();
@@ -241,10 +222,8 @@ impl<'t> ListingReader<'t> {
             None => KILOPASCAL,
         };
         let made = (newtons(factor) * 1e4).round() / 1e4;
-        force.check(
-            agrees(factor),
-            format_args!("the force of this {what} is {listed} N, but its cells sum to {made} N"),
-        )?;
+        let message = format_args!("the force of this {what} is {listed} N, but its cells sum to {made} N");
+        force.check(agrees(factor), message)?;
         self.factor = Some(factor);
         Ok(())
     }

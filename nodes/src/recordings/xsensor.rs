@@ -11,14 +11,10 @@
 use crate::recordings::common::fields::Fields;
 use crate::recordings::common::reel::{Properties, Reel, bounded};
 use crate::recordings::common::text::{Lines, Piece, shortened};
-use crate::recordings::common::{FileFormat, FileHead, Hints, Parser, Recording, Refusal, TextError, Window, units};
+use crate::recordings::common::{FileFormat, FileHead, Hints, Recording, Refusal, TextError, Window, units};
 
-pub(super) const FORMAT: FileFormat = FileFormat {
-    name: "xsensor",
-    title: "the CSV export of XSENSOR's software",
-    recognises,
-    parser: Parser::Text(parse),
-};
+pub(super) const FORMAT: FileFormat =
+    FileFormat::text("xsensor", "the CSV export of XSENSOR's software", recognises, parse);
 
 /// Length of a day [ns].
 const DAY_NS: i64 = 86_400_000_000_000;
@@ -73,16 +69,7 @@ impl<'t> KeyLine<'t> {
 }
 
 fn parse(text: &str, hints: &Hints) -> Result<Recording, Refusal> {
-    let mut reader = XsensorReader {
-        lines: Lines::new(text),
-        pad: choose(text, hints)?,
-        reel: Reel::default(),
-        found: Properties::default(),
-        pitch: [None; 2],
-        frame: None,
-        is_other: false,
-        day: 0,
-    };
+    let mut reader = XsensorReader { lines: Lines::new(text), pad: choose(text, hints)?, ..XsensorReader::default() };
     reader.read()?;
     let XsensorReader { mut reel, lines, mut found, pitch: [x, y], .. } = reader;
     lines.end().check(!reel.frames.is_empty(), "the file has no frame")?;
@@ -128,6 +115,7 @@ fn choose<'t>(text: &'t str, hints: &Hints) -> Result<Option<&'t str>, Refusal> 
     names.iter().find(|name| *name == wanted).map(|name| Some(*name)).ok_or_else(has_none)
 }
 
+#[derive(Default)]
 struct XsensorReader<'t> {
     lines: Lines<'t>,
     /// The selected pad.

@@ -11,14 +11,10 @@ use tactflow_runtime::signal::Unit;
 
 use crate::recordings::common::reel::{Properties, Reel, bounded};
 use crate::recordings::common::text::{Lines, Notation, Piece, shortened};
-use crate::recordings::common::{FileFormat, FileHead, Hints, Parser, Recording, Refusal, TextError, Window, units};
+use crate::recordings::common::{FileFormat, FileHead, Hints, Recording, Refusal, TextError, Window, units};
 
-pub(super) const FORMAT: FileFormat = FileFormat {
-    name: "zebris",
-    title: "Zebris raw data of a plate or treadmill as text",
-    recognises,
-    parser: Parser::Text(parse),
-};
+pub(super) const FORMAT: FileFormat =
+    FileFormat::text("zebris", "Zebris raw data of a plate or treadmill as text", recognises, parse);
 
 /// Maximum number of mistakes in a header that are reported.
 const MAX_REPORTED: usize = 20;
@@ -212,10 +208,8 @@ impl<'t> ZebrisReader<'t> {
         self.reel.row(fields.take(cols + 1), |cell| Ok(notation.number(cell, "this cell")? * self.factor))?;
         let found = self.reel.cells.len() - before;
         let count: &dyn Display = if found > cols { &"more" } else { &found };
-        line.check(
-            found == cols,
-            format_args!("row `y{row}` of frame {frame} has {count} cells, but `Columns` is {cols}"),
-        )
+        let message = format_args!("row `y{row}` of frame {frame} has {count} cells, but `Columns` is {cols}");
+        line.check(found == cols, message)
     }
 
     /// Returns the line of the next frame, or `None` at the end of the file.

@@ -31,6 +31,17 @@ pub enum Parser {
 }
 
 impl FileFormat {
+    /// Returns a format of texts.
+    #[must_use]
+    pub const fn text(
+        name: &'static str,
+        title: &'static str,
+        recognises: fn(&FileHead<'_>) -> bool,
+        parse: fn(&str, &Hints) -> Result<Recording, Refusal>,
+    ) -> Self {
+        Self { name, title, recognises, parser: Parser::Text(parse) }
+    }
+
     /// Reads a whole file.
     ///
     /// # Errors

@@ -91,13 +91,13 @@ impl Reel {
 
     /// Returns the index of the first cell of the incomplete frame.
     fn start(&self) -> usize {
-        self.frames.last().map_or(0, |last| last.start + last.window.len())
+        self.frames.last().map_or(0, |last| last.start + last.window.cells())
     }
 
     /// Ends a frame; `time` is its time in the file [ns].
     pub(crate) fn frame(&mut self, number: u64, time: Option<i64>, window: Window) {
         let start = self.start();
-        debug_assert!(self.cells.len() >= start + window.len(), "a frame has all its cells when it ends");
+        debug_assert!(self.cells.len() >= start + window.cells(), "a frame has all its cells when it ends");
         self.timed += usize::from(time.is_some());
         let time = time.unwrap_or_else(|| self.frames.last().map_or(0, |last| last.time));
         self.frames.push(Frame { number, time, window, start });

@@ -86,7 +86,7 @@ impl<'t> Piece<'t> {
 
     /// Parses a finite number, with a decimal point or a decimal comma.
     pub(crate) fn decimal(self, what: &str) -> Result<f64, TextError> {
-        Notation { separator: None }.number(self, what)
+        Notation::default().number(self, what)
     }
 
     /// Parses a number greater than 0, with a decimal point or a decimal comma.
@@ -110,7 +110,7 @@ impl<'t> Piece<'t> {
 }
 
 /// The lines of a text, without their ends.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub(crate) struct Lines<'t> {
     text: &'t str,
     next: usize,
@@ -160,7 +160,7 @@ impl<'t> Iterator for Lines<'t> {
 }
 
 /// How a text writes the numbers of a row. A comma that does not separate numbers is a decimal comma.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(crate) struct Notation {
     /// Separator of two numbers; `None` for blanks.
     pub(crate) separator: Option<char>,

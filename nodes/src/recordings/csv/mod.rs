@@ -18,14 +18,10 @@ mod tests;
 use self::columns::{CsvColumns, Role, names_of, unquoted};
 use crate::recordings::common::reel::{Properties, Reel, bounded};
 use crate::recordings::common::text::{Lines, Notation, Piece};
-use crate::recordings::common::{FileFormat, FileHead, Hints, Parser, Recording, Refusal, TextError, Window};
+use crate::recordings::common::{FileFormat, FileHead, Hints, Recording, Refusal, TextError, Window};
 
-pub(super) const FORMAT: FileFormat = FileFormat {
-    name: "csv",
-    title: "plain CSV, a frame a row or a frame a block",
-    recognises,
-    parser: Parser::Text(parse),
-};
+pub(super) const FORMAT: FileFormat =
+    FileFormat::text("csv", "plain CSV, a frame a row or a frame a block", recognises, parse);
 
 /// Minimum number of tactels.
 const MIN_TACTELS: usize = 3;

@@ -11,11 +11,11 @@ use tactflow_runtime::signal::Unit;
 
 use crate::recordings::common::reel::Reel;
 use crate::recordings::common::text::{Lines, Notation, Piece, shortened};
-use crate::recordings::common::{FileFormat, FileHead, Hints, Parser, Recording, Refusal, TextError, Window};
+use crate::recordings::common::{FileFormat, FileHead, Hints, Recording, Refusal, TextError, Window};
 use header::MovieHeader;
 
 pub(super) const FORMAT: FileFormat =
-    FileFormat { name: "tekscan", title: "Tekscan ASCII movie (.csv, .asf)", recognises, parser: Parser::Text(parse) };
+    FileFormat::text("tekscan", "Tekscan ASCII movie (.csv, .asf)", recognises, parse);
 
 fn recognises(head: &FileHead<'_>) -> bool {
     let is_key = |line: &str| line.starts_with("DATA_TYPE ") || line.starts_with("ASCII_DATA");
@@ -136,10 +136,8 @@ impl<'t> MovieReader<'t> {
         line.check(!is_end, format_args!("frame {frame} ends after {row} of its {rows} rows"))?;
         let notation = *self.notation.get_or_insert_with(|| Notation::of(line.text));
         let (found, cut) = (notation.fields(line).count(), self.lines.cut());
-        line.check(
-            found == cols,
-            format_args!("row {} of frame {frame} has {found} cells, but `COLS` is {cols}{cut}", row + 1),
-        )?;
+        let message = format_args!("row {} of frame {frame} has {found} cells, but `COLS` is {cols}{cut}", row + 1);
+        line.check(found == cols, message)?;
         let factor = self.header.found.factor();
         self.reel.row(notation.fields(line), |cell| {
             if matches!(cell.text, "B" | "b") {
