@@ -7,8 +7,6 @@
 
 use std::fmt::Display;
 
-use tactflow_runtime::signal::Unit;
-
 use crate::recordings::common::reel::{Properties, Reel, bounded};
 use crate::recordings::common::text::{Lines, Notation, Piece, shortened};
 use crate::recordings::common::{FileFormat, FileHead, Hints, Recording, Refusal, TextError, Window, units};
@@ -61,9 +59,9 @@ struct Platform<'t> {
     rows: Option<(usize, Piece<'t>)>,
     width: Option<f64>,
     height: Option<f64>,
-    unit: Option<(Unit, f64)>,
     count: Option<(u64, Piece<'t>)>,
-    rate: Option<f64>,
+    /// Unit, and time between two frames.
+    found: Properties,
 }
 
 impl<'t> Platform<'t> {
@@ -81,8 +79,8 @@ impl<'t> Platform<'t> {
             () if is(WIDTH) => self.width = Some(length()?),
             () if is(HEIGHT) => self.height = Some(length()?),
             () if is(COUNT) => self.count = Some((value.count(&what)?, value)),
-            () if is(FREQUENCY) => self.rate = Some(value.positive(&what)?),
-            () if is(UNITS) => self.unit = Some(units::parse(value)?),
+            () if is(FREQUENCY) => self.found.period = Some(value.positive(&what)?.recip()),
+            () if is(UNITS) => self.found.unit = Some(units::parse(value)?),
             () => {}
         }
         Ok(())
@@ -102,8 +100,7 @@ fn parse(text: &str, hints: &Hints) -> Result<Recording, Refusal> {
     let (platform, first) = platform(&mut lines)?;
     let size = platform.size(first)?;
     let pitch = platform.width.zip(platform.height).map(<[f64; 2]>::from);
-    let period = platform.rate.map(f64::recip);
-    let found = Properties { size: Some(size), unit: platform.unit, pitch, period, ..Properties::default() };
+    let found = Properties { size: Some(size), pitch, ..platform.found };
     let mut reader = ZebrisReader { reel: Reel::default(), size, factor: found.factor(), lines };
     let mut next = Some(first);
     while let Some(line) = next {
@@ -226,7 +223,7 @@ impl<'t> ZebrisReader<'t> {
 
 #[cfg(test)]
 mod tests {
-    use tactflow_runtime::signal::{Base, ImageShape};
+    use tactflow_runtime::signal::{Base, ImageShape, Unit};
 
     use super::super::read;
     use super::super::testing::{check_damages, count_refused};

@@ -88,13 +88,13 @@ impl Hints {
         pitch: Option<[f64; 2]>,
         period: Option<f64>,
     ) -> Result<(Unit, [f64; 2], f64), Refusal> {
-        let assumed = self.assumed.as_ref();
-        let unit = UNIT.choose(unit, self.unit, |a, b| a == b, Unit::to_string);
-        let pitch = PITCH.choose(pitch, self.pitch, |a, b| agree(a[0], b[0]) && agree(a[1], b[1]), show_pitch);
-        let period = RATE.choose(period, self.rate_hz.map(f64::recip), |a, b| agree(*a, *b), show_rate);
-        let unit = unit.map(|unit| unit.or(assumed.map(|assumed| assumed.unit)))?;
-        let pitch = pitch.map(|pitch| pitch.or(assumed.map(|assumed| assumed.pitch)))?;
-        let period = period.map(|period| period.or(assumed.map(|assumed| assumed.rate_hz.recip())))?;
+        let assumed = self.assumed;
+        let units = [unit, self.unit, assumed.map(|assumed| assumed.unit)];
+        let pitches = [pitch, self.pitch, assumed.map(|assumed| assumed.pitch)];
+        let periods = [period, self.rate_hz.map(f64::recip), assumed.map(|assumed| assumed.rate_hz.recip())];
+        let unit = UNIT.choose(units, |a, b| a == b, Unit::to_string)?;
+        let pitch = PITCH.choose(pitches, |a, b| agree(a[0], b[0]) && agree(a[1], b[1]), show_pitch)?;
+        let period = RATE.choose(periods, |a, b| agree(*a, *b), show_rate)?;
         if let Some(period) = period.filter(|period| !(MIN_PERIOD_S..=MAX_PERIOD_S).contains(period)) {
             let message = format!("a period of {period} s is not from {MIN_PERIOD_S} to {MAX_PERIOD_S} s");
             return Err(Refusal::broken(message));
@@ -113,17 +113,16 @@ impl Hints {
     /// If neither the file nor a hint gives it, or both do and differ.
     pub fn size(&self, found: Option<[usize; 2]>) -> Result<[usize; 2], Refusal> {
         let show = |[rows, cols]: &[usize; 2]| format!("{rows} rows by {cols} columns");
-        let size = SIZE.choose(found, self.size, |a, b| a == b, show)?;
+        let size = SIZE.choose([found, self.size, None], |a, b| a == b, show)?;
         size.ok_or_else(|| missing_properties(&[&SIZE]))
     }
 }
 
 impl Property {
-    /// Returns the value of the file or that of the hint, which must not differ.
+    /// Returns the value of the file or that of the hint, which must not differ, or else the default.
     fn choose<T>(
         &self,
-        found: Option<T>,
-        given: Option<T>,
+        [found, given, assumed]: [Option<T>; 3],
         same: impl Fn(&T, &T) -> bool,
         show: impl Fn(&T) -> String,
     ) -> Result<Option<T>, Refusal> {
@@ -132,7 +131,7 @@ impl Property {
                 hint: self.hint,
                 message: format!("the file has another value: {}", show(&found)),
             }),
-            (found, given) => Ok(found.or(given)),
+            (found, given) => Ok(found.or(given).or(assumed)),
         }
     }
 }
