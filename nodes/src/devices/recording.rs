@@ -8,7 +8,7 @@ use std::borrow::Cow;
 use std::sync::Arc;
 
 use tactflow_runtime::device::{Commands, Description, Device, DeviceError, Driver, Opened, Output, Samples, Stepped};
-use tactflow_runtime::node::{At, FilePath, Mistake, Mistakes, Param};
+use tactflow_runtime::node::{At, Describe, FilePath, Mistake, Mistakes, Param};
 use tactflow_runtime::signal::{Image, Unit};
 use tactflow_runtime::source::Code;
 
@@ -42,47 +42,49 @@ pub struct Params {
     pressure: Option<f64>,
 }
 
-/// A recording that is being shown.
-#[derive(Debug)]
+/// Plays a recorded file of a tactile or pressure sensor (Tekscan, novel, XSENSOR, CSV, …) as a pad.
+///
+/// The format is recognised by what the file begins with, or named by `format`:
+///
+/// - `tekscan`: ASCII movies of I-Scan, F-Scan and CONFORMat, `.csv` or `.asf`
+/// - `novel-lst`: listings of novel's emed and pliance, `.lst`
+/// - `novel-asc`: texts of novel's pliance, `.asc`; an insole of pedar has no rows and columns and is refused
+/// - `footscan`: texts of RSscan's footscan plates
+/// - `zebris`: `RawDataGaitAnalysis` texts of Zebris treadmills and plates
+/// - `xsensor`: `.csv` of XSENSOR
+/// - `csv`: plain tables, a frame a row or a frame a block
+/// - `npy`, `npz`: arrays of numpy, frames x rows x columns
+///
+/// Any of them may be in a `.zip` or `.gz`. Pressures become kPa and forces N, whatever the file counts in.
+///
+/// The file is read whole before anything runs. A damaged file is refused with the line of the damage; no damage is
+/// repaired silently. `unit`, `pitch_mm`, `rate_hz` and `size` give what the file does not state. Where the file states
+/// another value, that is an error. `pad` picks one of several pads in a file.
+///
+/// Frames come at the times of the file, the first at once. If several frames come between two ticks, only the newest is
+/// played. Rows and columns are counted as in the file: `tactile_source` turns them into the sensor's frame.
+///
+/// It states the facts `dead` (places without a sensor, as [row, column]), `frames`, `format`, and `threshold` if the
+/// parameter or the file gives a value below which the values are noise; and `pressure`, if it is given. Its
+/// `calibration` names the dead places, and leaves the values as they are.
+///
+/// ```toml
+/// [roles]
+/// pad = "tactile_pad"
+///
+/// [bind]
+/// pad = "pad"
+///
+/// [devices.pad]
+/// type = "recording"
+/// file = "builtin:finger_press.csv"   # a finger on a Tekscan I-Scan: 28 by 28 sensels, 1.27 mm apart, raw, 10 Hz
+/// ```
+#[derive(Debug, Describe)]
+#[describe(name = "recording")]
 pub struct Player {
     image: Output<Image>,
     recording: Recording,
     next: usize,
-}
-
-impl tactflow_runtime::node::Describe for Player {
-    const NAME: &'static str = "recording";
-    const SUMMARY: &'static str =
-        "plays a recorded file of a tactile or pressure sensor (Tekscan, novel, XSENSOR, CSV, …) as a pad";
-    const DOC: &'static str = "The format is recognised by what the file begins with, or named by `format`:\n\n\
-        - `tekscan`: ASCII movies of I-Scan, F-Scan and CONFORMat, `.csv` or `.asf`\n\
-        - `novel-lst`: listings of novel's emed and pliance, `.lst`\n\
-        - `novel-asc`: texts of novel's pliance, `.asc`; an insole of pedar has no rows and columns and is refused\n\
-        - `footscan`: texts of RSscan's footscan plates\n\
-        - `zebris`: `RawDataGaitAnalysis` texts of Zebris treadmills and plates\n\
-        - `xsensor`: `.csv` of XSENSOR\n\
-        - `csv`: plain tables, a frame a row or a frame a block\n\
-        - `npy`, `npz`: arrays of numpy, frames x rows x columns\n\n\
-        Any of them may be in a `.zip` or `.gz`. Pressures become kPa and forces N, whatever the file counts in.\n\n\
-        The file is read whole before anything runs. What is damaged is refused with its line; nothing is mended \
-        silently. `unit`, `pitch_mm`, `rate_hz` and `size` say what a file leaves open; where it says otherwise, \
-        that is an error. `pad` picks one of several pads in a file.\n\n\
-        Frames come at the times of the file, the first at once. Those between two ticks are skipped but for the \
-        newest. Rows and columns are counted as in the file: `tactile_source` turns them into the sensor's frame.\n\n\
-        It states the facts `dead` (places without a sensor, as [row, column]), `frames`, `format`, and `threshold` \
-        if it is given or the file says below what its values are noise; and `pressure`, if it is given. Its \
-        `calibration` names the dead places, and leaves the values as they are.";
-    const EXAMPLE: &'static str = r#"
-[roles]
-pad = "tactile_pad"
-
-[bind]
-pad = "pad"
-
-[devices.pad]
-type = "recording"
-file = "builtin:finger_press.csv"   # a finger on a Tekscan I-Scan: 28 by 28 sensels, 1.27 mm apart, raw, 10 Hz
-"#;
 }
 
 impl Device for Player {
@@ -103,9 +105,8 @@ impl Device for Player {
 }
 
 fn hints(params: &Params) -> Result<Hints, Mistakes> {
-    if let Some(format) = &params.format
-        && !recordings::FORMATS.iter().any(|known| known.name == format)
-    {
+    let is_known = |name: &String| recordings::FORMATS.iter().any(|format| format.name == name);
+    if let Some(format) = params.format.as_ref().filter(|format| !is_known(format)) {
         let names: Vec<String> = recordings::FORMATS.iter().map(|format| format!("`{}`", format.name)).collect();
         let mistake = Mistake::param("format", format!("unknown format `{format}`"));
         return Err(mistake.help(format!("known formats are {}", names.join(", "))).into());
@@ -126,12 +127,12 @@ fn mistakes(refusal: Refusal, file: &FilePath, bytes: &[u8]) -> Mistakes {
     let here = |message: String| Mistake::new(Code::BadData, At::Span(file.span.clone()), message);
     match refusal {
         Refusal::Stranger => {
-            let head = recordings::Head::new(bytes, "");
-            let line = head.text.lines().map(str::trim).find(|line| !line.is_empty());
-            let begins = line.map(|line| format!("it begins with `{}`", recordings::text::shortened(line)));
-            let begins = begins.unwrap_or_else(|| "it is empty".into());
-            let message = format!("`{name}` has an unknown format: {begins}");
-            here(message).help(recordings::list()).into()
+            let head = recordings::FileHead::new(bytes, "");
+            let begins = match head.text.trim().lines().next() {
+                Some(line) => format!("it begins with `{}`", recordings::text::shortened(line.trim())),
+                None => "it is empty".into(),
+            };
+            here(format!("`{name}` has an unknown format: {begins}")).help(recordings::list()).into()
         }
         Refusal::Damaged { text, flaws } => {
             let text: Arc<str> = text.into();
@@ -139,10 +140,7 @@ fn mistakes(refusal: Refusal, file: &FilePath, bytes: &[u8]) -> Mistakes {
         }
         Refusal::Broken { message, help } => {
             let mistake = here(format!("`{name}`: {message}"));
-            match help {
-                Some(help) => mistake.help(help).into(),
-                None => mistake.into(),
-            }
+            help.into_iter().fold(mistake, Mistake::help).into()
         }
         Refusal::Silent { message, help } => here(message).help(help).into(),
         Refusal::Contradicted { hint, message } => Mistake::param(hint, message).into(),
@@ -200,11 +198,7 @@ mod tests {
     #[test]
     fn the_doc_names_every_format() {
         for format in recordings::FORMATS {
-            assert!(
-                <Player as tactflow_runtime::node::Describe>::DOC.contains(&format!("`{}`", format.name)),
-                "{}",
-                format.name
-            );
+            assert!(Player::DOC.contains(&format!("`{}`", format.name)), "{}", format.name);
         }
     }
 

@@ -8,8 +8,8 @@ use std::io::Read;
 use flate2::bufread::MultiGzDecoder;
 
 use super::common::text::shortened;
-use super::common::zip::{self, Archive, File, MAX_UNPACKED_BYTES};
-use super::common::{HEAD_BYTES, Head, Hints, Refusal};
+use super::common::zip::{self, Archive, MAX_UNPACKED_BYTES, ZipFile};
+use super::common::{FileHead, HEAD_BYTES, Hints, Refusal};
 use super::formats::{list, recognise};
 use super::npy;
 
@@ -38,7 +38,7 @@ pub(super) fn unpack(bytes: &[u8], name: &str, hints: &Hints) -> Result<Option<(
     Ok(Some((unpacked, name)))
 }
 
-fn only_file<'a>(archive: &'a Archive<'_>) -> Result<File<'a>, Refusal> {
+fn only_file<'a>(archive: &'a Archive<'_>) -> Result<ZipFile<'a>, Refusal> {
     let mut files = Vec::new();
     let mut count = 0;
     for file in archive.files() {
@@ -70,7 +70,7 @@ fn unpack_recognised(source: &mut dyn Read, name: &str, hints: &Hints) -> Result
     if [GZIP, zip::MAGIC].iter().any(|magic| out.starts_with(magic)) && !npy::is_npz(&out) {
         return Err(Refusal::broken(format!("`{shown}` is an archive inside an archive")));
     }
-    let head = Head::new(&out, name);
+    let head = FileHead::new(&out, name);
     if hints.format.is_none() && recognise(&head).is_none() {
         let first = shortened(head.text.trim().lines().next().unwrap_or(""));
         let message = format!("`{shown}` in the archive has an unknown format: it begins with `{first}`");

@@ -5,18 +5,14 @@
 //! the load [N]. The plates of 0.5, 1 and 2 m are 64 sensors wide. Their pitch is 5.08 mm across the plate, which is
 //! along a row of the file, and 7.62 mm along it, from row to row. It is the default for up to 64 columns.
 
-use tactflow_runtime::signal::{ImageShape, Unit};
+use tactflow_runtime::signal::Unit;
 
-use crate::recordings::common::reel::{Reel, bounded};
-use crate::recordings::common::text::{self, Lines, Notation, Piece, Wrong, flaw};
-use crate::recordings::common::{Flaw, Format, Head, Hints, Recording};
+use crate::recordings::common::reel::{Properties, Reel, bounded};
+use crate::recordings::common::text::{Lines, Notation, Piece};
+use crate::recordings::common::{FileFormat, FileHead, Hints, Recording, Refusal, TextError, Window};
 
-pub(super) const FORMAT: Format = Format {
-    name: "footscan",
-    title: "RSscan footscan, the whole plate's roll-off as text",
-    recognises,
-    read: |bytes, hints| text::read(bytes, hints, parse),
-};
+pub(super) const FORMAT: FileFormat =
+    FileFormat::text("footscan", "RSscan footscan, the whole plate's roll-off as text", recognises, parse);
 
 /// Distance of the plates' sensors along a row and from row to row [m].
 const PITCH: [f64; 2] = [0.005_08, 0.007_62];
@@ -25,181 +21,133 @@ const PITCH: [f64; 2] = [0.005_08, 0.007_62];
 const MAX_COLS: usize = 64;
 
 /// Recognises the line of a frame with a row of numbers after it.
-fn recognises(head: &Head<'_>) -> bool {
+fn recognises(head: &FileHead<'_>) -> bool {
     let mut lines = Lines::new(&head.text);
     let has_frame = lines.any(|line| matches!(frame_line(line.trimmed()), Some(Ok(_))));
-    let is_row = |row: Piece<'_>| {
-        let notation = Notation::of(row.text);
-        notation.fields(row).next().is_some_and(|cell| notation.number(cell, "").is_ok())
-    };
-    has_frame && lines.find(|line| !line.text.trim().is_empty()).is_some_and(is_row)
+    let row = lines.next_filled();
+    let notation = Notation::of(row.text);
+    has_frame && notation.fields(row).next().is_some_and(|cell| notation.number(cell, "").is_ok())
 }
 
 /// The content of the line of a frame.
 struct FrameLine<'t> {
     number: u64,
     /// Time [ns], and its place.
-    time: Option<(i64, Piece<'t>)>,
+    time: Option<(f64, Piece<'t>)>,
 }
 
 /// Parses `Frame 12 (95.24 ms)`, or returns `None` for another line.
-fn frame_line(line: Piece<'_>) -> Option<Result<FrameLine<'_>, Flaw>> {
+fn frame_line(line: Piece<'_>) -> Option<Result<FrameLine<'_>, TextError>> {
     let rest = line.after("frame").or_else(|| line.after("bild"))?;
     let (number, time) = rest.text.split_once('(').map_or((rest.text, None), |(number, time)| (number, Some(time)));
     let number = rest.part(number).trimmed();
     let is_number = number.text.starts_with(|c: char| c.is_ascii_digit());
     is_number.then(|| {
         let number = number.count("the frame's number")?;
-        let time = time.map(|time| stamp(rest.part(time).trimmed())).transpose()?;
+        let time = time.map(|time| nanoseconds(rest.part(time).trimmed())).transpose()?;
         Ok(FrameLine { number, time })
     })
 }
 
 /// Parses `95.24 ms)`.
-fn stamp(text: Piece<'_>) -> Result<(i64, Piece<'_>), Flaw> {
+fn nanoseconds(text: Piece<'_>) -> Result<(f64, Piece<'_>), TextError> {
     let Some((inside, "")) = text.text.split_once(')') else {
-        return flaw(&text, "expected `)` after the frame's time, at the end of the line");
+        return Err(text.error("expected `)` after the frame's time, at the end of the line"));
     };
     let inside = text.part(inside).trimmed();
     let end = inside.text.find(char::is_alphabetic).unwrap_or(inside.text.len());
     let number = inside.part(&inside.text[..end]).trimmed().decimal("the frame's time")?;
-    let nanoseconds = match &*inside.text[end..].to_ascii_lowercase() {
-        "ms" => number * 1e6,
-        "s" | "sec" => number * 1e9,
-        _ => return flaw(&inside, "the unit of a frame's time must be `ms` or `s`"),
-    };
-    if (0.0..1e18).contains(&nanoseconds) {
-        Ok((nanoseconds.round() as i64, inside))
-    } else {
-        flaw(&inside, "the frame's time is not from 0 to 1e9 s")
+    match &*inside.text[end..].to_ascii_lowercase() {
+        "ms" => Ok((number * 1e6, inside)),
+        "s" | "sec" => Ok((number * 1e9, inside)),
+        _ => Err(inside.error("the unit of a frame's time must be `ms` or `s`")),
     }
 }
 
-fn parse(text: &str, hints: &Hints) -> Result<Recording, Wrong> {
-    let mut reader = Reader { reel: Reel::default(), size: None, has_times: true };
+fn parse(text: &str, hints: &Hints) -> Result<Recording, Refusal> {
+    let mut reader = FootscanReader::default();
     let mut lines = Lines::new(text);
     let mut next = first_frame(&mut lines)?;
     while let Some(line) = next {
         next = reader.frame(line, &mut lines)?;
     }
-    let Reader { mut reel, size, has_times } = reader;
-    let Some((rows, cols)) = size.filter(|_| !reel.frames.is_empty()) else {
-        return flaw(&lines.end(), "the file has no frame").map_err(Wrong::from);
-    };
-    hints.size(Some([rows, cols]))?;
+    let FootscanReader { reel, size } = reader;
+    let [_, cols] = size.ok_or_else(|| lines.end().error("the file has no frame"))?;
     let unit = hints.unit.unwrap_or(Unit::NEWTON);
     let pitch = (cols <= MAX_COLS && hints.pitch.is_none()).then_some(PITCH);
-    let (unit, pitch, period) = hints.complete(Some(unit), pitch, reel.mean_step())?;
-    if has_times {
-        reel.start_at_zero();
-    } else {
-        reel.tick(period);
-    }
-    let shape = ImageShape { rows, cols, pitch, unit };
-    let Reel { frames, cells, dead } = reel;
-    Ok(Recording { format: FORMAT.name, shape, frames, cells, dead, threshold: None, period, force: None })
+    reel.finish(FORMAT.name, Properties { size, unit: Some((unit, 1.0)), pitch, ..Properties::default() }, hints)
 }
 
 /// Skips the text before the first frame, which must not be a row of cells.
-fn first_frame<'t>(lines: &mut Lines<'t>) -> Result<Option<Piece<'t>>, Flaw> {
+fn first_frame<'t>(lines: &mut Lines<'t>) -> Result<Option<Piece<'t>>, TextError> {
     for line in lines.map(Piece::trimmed) {
         if frame_line(line).is_some() {
             return Ok(Some(line));
         }
         let notation = Notation::of(line.text);
         let mut cells = notation.fields(line);
-        if cells.clone().nth(1).is_some() && cells.all(|cell| notation.number(cell, "").is_ok()) {
-            return flaw(&line, "this row of cells comes before the line of its frame");
-        }
+        let is_row = cells.clone().nth(1).is_some() && cells.all(|cell| notation.number(cell, "").is_ok());
+        line.check(!is_row, "this row of cells comes before the line of its frame")?;
     }
     Ok(None)
 }
 
-struct Reader {
+#[derive(Default)]
+struct FootscanReader {
     reel: Reel,
     /// Rows and columns of the first frame.
-    size: Option<(usize, usize)>,
-    /// Whether the frames have times.
-    has_times: bool,
+    size: Option<[usize; 2]>,
 }
 
-impl Reader {
+impl FootscanReader {
     /// Reads the frame with the line `line`, and returns the line of the next frame.
-    fn frame<'t>(&mut self, line: Piece<'t>, lines: &mut Lines<'t>) -> Result<Option<Piece<'t>>, Flaw> {
+    fn frame<'t>(&mut self, line: Piece<'t>, lines: &mut Lines<'t>) -> Result<Option<Piece<'t>>, TextError> {
         let FrameLine { number, time } = frame_line(line).expect("the caller has checked the line")?;
-        let last = self.reel.frames.last();
-        if let Some(last) = last
-            && last.number.checked_add(1) != Some(number)
-        {
-            return flaw(&line, format!("frame {number} comes after frame {}", last.number));
-        }
-        if last.is_some() && self.has_times != time.is_some() {
-            return flaw(&line, "some frames have a time and some do not");
-        }
-        self.has_times = time.is_some();
-        if let (Some(last), Some((time, at))) = (last, time)
-            && last.time > time
-        {
-            return flaw(&at, "the time goes back");
-        }
-        let next = self.rows(number, lines)?;
-        let (rows, cols) = self.size.expect("the rows were counted");
-        self.reel.frame(number, time.map_or(0, |(time, _)| time), rows, cols);
+        self.reel.follows(number, line)?;
+        line.check(self.reel.is_timed_alike(time.is_some()), "some frames have a time and some do not")?;
+        let time = time.map(|(time, at)| self.reel.time(time, at)).transpose()?;
+        let ([rows, cols], next) = self.rows(number, lines)?;
+        self.reel.frame(number, time, Window::whole(rows, cols));
         Ok(next)
     }
 
-    /// Reads the rows of a frame, up to the line of the next frame or the end of the file.
-    fn rows<'t>(&mut self, frame: u64, lines: &mut Lines<'t>) -> Result<Option<Piece<'t>>, Flaw> {
+    /// Reads the rows of a frame. Returns its size, and the line of the next frame.
+    fn rows<'t>(&mut self, frame: u64, lines: &mut Lines<'t>) -> Result<([usize; 2], Option<Piece<'t>>), TextError> {
         let mut rows = 0;
-        let mut next = None;
-        for line in lines.by_ref() {
-            let line = line.trimmed();
-            if line.text.is_empty() {
-                continue;
-            }
-            if frame_line(line).is_some() {
-                next = Some(line);
-                break;
+        let end = loop {
+            let line = lines.next_filled();
+            if line.text.is_empty() || frame_line(line).is_some() {
+                break line;
             }
             self.row(frame, rows, line)?;
             rows += 1;
-        }
-        let end = next.unwrap_or_else(|| lines.end());
-        match self.size {
-            Some((wanted, _)) if !self.reel.frames.is_empty() && rows != wanted => {
-                flaw(&end, format!("frame {frame} ends after {rows} rows, but the earlier frames have {wanted}"))
-            }
-            Some((_, cols)) => {
-                self.size = Some((rows, cols));
-                Ok(next)
-            }
-            None => flaw(&end, format!("frame {frame} has no rows")),
-        }
+        };
+        let [wanted, cols] = self.size.ok_or_else(|| end.error(format!("frame {frame} has no rows")))?;
+        let fits = self.reel.frames.is_empty() || rows == wanted;
+        end.check(fits, format_args!("frame {frame} ends after {rows} rows, but the earlier frames have {wanted}"))?;
+        self.size = Some([rows, cols]);
+        Ok(([rows, cols], (!end.text.is_empty()).then_some(end)))
     }
 
-    fn row(&mut self, frame: u64, row: usize, line: Piece<'_>) -> Result<(), Flaw> {
+    fn row(&mut self, frame: u64, row: usize, line: Piece<'_>) -> Result<(), TextError> {
         let notation = Notation::of(line.text);
         let found = notation.fields(line).count();
-        let (_, cols) = *self.size.get_or_insert((0, found));
-        if found != cols {
-            return flaw(
-                &line,
-                format!("row {} of frame {frame} has {found} cells, but the first has {cols}", row + 1),
-            );
-        }
-        bounded(row + 1, cols).or_else(|message| flaw(&line, message))?;
-        for (col, cell) in notation.fields(line).enumerate() {
-            let value = notation.number(cell, "this cell")?;
-            self.reel.cell(row * cols + col, value).or_else(|message| flaw(&cell, message))?;
-        }
-        Ok(())
+        let [_, cols] = *self.size.get_or_insert([0, found]);
+        let number = row + 1;
+        let message = format_args!("row {number} of frame {frame} has {found} cells, but the first has {cols}");
+        line.check(found == cols, message)?;
+        bounded(number, cols).map_err(|message| line.error(message))?;
+        self.reel.row(notation.fields(line), |cell| notation.number(cell, "this cell"))
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use tactflow_runtime::signal::ImageShape;
+
     use super::super::read;
     use super::super::testing::{check_damages, complaints, count_refused};
+
     use super::*;
 
     const GOOD: &str = "Frame 0 (0.00 ms)\r\n0.0\t0.4\t0.0\r\n0.0\t1.1\t2.5\r\n\r\n\

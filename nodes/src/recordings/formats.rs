@@ -1,10 +1,10 @@
 //! The list of formats, and how one is recognised.
 
-use super::common::{Format, Head};
+use super::common::{FileFormat, FileHead};
 use super::{csv, footscan, novel_asc, novel_lst, npy, tekscan, xsensor, zebris};
 
 /// All formats, those with the strictest recognition first.
-pub const FORMATS: &[Format] = &[
+pub const FORMATS: &[FileFormat] = &[
     npy::NPY,
     npy::NPZ,
     tekscan::FORMAT,
@@ -18,7 +18,7 @@ pub const FORMATS: &[Format] = &[
 
 /// Returns the format of a file with this beginning.
 #[must_use]
-pub fn recognise(head: &Head<'_>) -> Option<&'static Format> {
+pub fn recognise(head: &FileHead<'_>) -> Option<&'static FileFormat> {
     FORMATS.iter().find(|format| (format.recognises)(head))
 }
 

@@ -20,6 +20,9 @@ mod zebris;
 #[cfg(test)]
 mod testing;
 
-pub use common::{Assumed, Flaw, Format, Frame, HEAD_BYTES, Head, Hints, MAX_CELLS, Recording, Refusal, Window, text};
+pub use common::{
+    Assumed, FileFormat, FileHead, Frame, HEAD_BYTES, Hints, MAX_CELLS, Parser, Recording, Refusal, TextError, Window,
+    text,
+};
 pub use formats::{FORMATS, list, recognise};
 pub use read::read;

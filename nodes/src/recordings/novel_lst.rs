@@ -10,30 +10,25 @@
 
 mod header;
 
-use tactflow_runtime::signal::{Base, ImageShape, Unit};
+use tactflow_runtime::signal::{Base, Unit};
 
-use crate::recordings::common::text::{self, Lines, Piece, Wrong, flaw, shortened};
-use crate::recordings::common::{Flaw, Format, Frame, Head, Hints, MAX_CELLS, Recording, Refusal, Window};
-use header::{Grid, Header, Page, digit, label};
+use crate::recordings::common::reel::{Properties, Reel};
+use crate::recordings::common::text::{Lines, Notation, Piece, shortened};
+use crate::recordings::common::{FileFormat, FileHead, Hints, MAX_CELLS, Recording, Refusal, TextError, Window};
+use header::{Label, ListingHeader, PageColumns, PageHeader, digit};
 
-pub(super) const FORMAT: Format =
-    Format { name: "novel-lst", title: "novel emed or pliance listing (.lst)", recognises, read };
+pub(super) const FORMAT: FileFormat =
+    FileFormat::text("novel-lst", "novel emed or pliance listing (.lst)", recognises, parse);
 
-fn recognises(head: &Head<'_>) -> bool {
+fn recognises(head: &FileHead<'_>) -> bool {
     let has = |word: &str| head.text.contains(word);
     has("Matrix:") && (has("Pict-No") || has("Sensor size:") || has("novel "))
 }
 
-fn read(bytes: &[u8], hints: &Hints) -> Result<Recording, Refusal> {
-    text::read(bytes, hints, parse)
-}
-
-/// A row or column of the array, and its place in the text.
-type Reach<'t> = Option<(u64, Piece<'t>)>;
-
-struct Reader<'t> {
+#[derive(Default)]
+struct ListingReader<'t> {
     lines: Lines<'t>,
-    header: Header,
+    header: ListingHeader,
     /// Factor from the file's unit to kPa, once the forces have shown it.
     factor: Option<f64>,
     /// Value of the last digit of a cell.
@@ -43,16 +38,13 @@ struct Reader<'t> {
     before: u64,
     /// Whether any page ended with a form feed.
     has_feeds: bool,
-    frames: Vec<Frame>,
-    cells: Vec<f32>,
+    reel: Reel,
     /// The last row and the last column of all pages.
-    reach: [Reach<'t>; 2],
+    reach: [Option<Label<'t>>; 2],
 }
 
-/// A force in the listing, for a row, a column or a page of cells.
-struct Force<'t> {
-    /// Place in the text.
-    figure: Piece<'t>,
+/// The cells of a row, a column or a page, whose force is in the listing.
+struct Loaded {
     /// Row, column or page.
     what: &'static str,
     /// Sum of the cells, in the file's unit.
@@ -60,241 +52,200 @@ struct Force<'t> {
     count: usize,
 }
 
-fn parse(text: &str, hints: &Hints) -> Result<Recording, Wrong> {
-    let mut reader = Reader {
-        lines: Lines::new(text),
-        header: Header::default(),
-        factor: None,
-        cell_digit: 1.0,
-        page: None,
-        before: 0,
-        has_feeds: false,
-        // A page has at least 24 characters.
-        frames: Vec::with_capacity(text.matches("Pict").count().min(text.len() / 24)),
-        cells: Vec::new(),
-        reach: [None, None],
-    };
+fn parse(text: &str, hints: &Hints) -> Result<Recording, Refusal> {
+    let mut reader = ListingReader { lines: Lines::new(text), cell_digit: 1.0, ..ListingReader::default() };
+    // A page has at least 24 characters.
+    reader.reel.frames.reserve_exact(text.matches("Pict").count().min(text.len() / 24));
     while reader.page()? {}
     reader.finish(hints)
 }
 
-impl<'t> Reader<'t> {
+impl<'t> ListingReader<'t> {
+    /// Returns the next line, or `None` at the end of the file.
+    fn line(&mut self) -> Option<Piece<'t>> {
+        let line = self.lines.next()?;
+        self.has_feeds |= line.text.contains('\u{c}');
+        Some(line.trimmed())
+    }
+
     /// Reads a page, and returns whether there was one.
-    fn page(&mut self) -> Result<bool, Flaw> {
-        let mut page = Page::default();
-        let grid = loop {
-            let Some(line) = self.lines.next() else {
-                return if page.is_begun {
-                    flaw(&self.lines.end(), "the file ends in the header of a page: it is truncated")
-                } else {
-                    Ok(false)
-                };
+    fn page(&mut self) -> Result<bool, TextError> {
+        let mut page = PageHeader::default();
+        let columns = loop {
+            let Some(line) = self.line() else {
+                let message = "the file ends in the header of a page: it is truncated";
+                return self.lines.end().check(!page.is_begun, message).map(|()| false);
             };
-            self.has_feeds |= line.text.contains('\u{c}');
-            let line = line.trimmed();
-            if let Some(grid) = Grid::of(line)? {
-                break grid;
+            if let Some(columns) = PageColumns::of(line)? {
+                break columns;
             }
             self.header.read(line, &mut page)?;
         };
-        self.number(&page)?;
-        let number = self.picture(&page, &grid)?;
-        let start = self.cells.len();
-        let window = self.rows(&grid)?;
+        // No page may be missing.
+        if let Some((number, at)) = page.number {
+            if let Some(last) = self.page {
+                let follows = last.checked_add(1) == Some(number);
+                at.check(follows, format_args!("page {number} comes after page {last}"))?;
+            }
+            self.page = Some(number);
+        }
+        let number = self.picture(&page, &columns)?;
+        let start = self.reel.cells.len();
+        let window = self.rows(&columns)?;
         match number {
-            Some(number) => self.frames.push(Frame { number, time: 0, window, start }),
-            None => self.cells.truncate(start),
+            Some(number) => self.reel.frame(number, None, window),
+            None => self.reel.cells.truncate(start),
         }
         Ok(true)
     }
 
-    /// Checks that no page is missing.
-    fn number(&mut self, page: &Page<'t>) -> Result<(), Flaw> {
-        if let Some((number, at)) = page.number {
-            match self.page {
-                Some(last) if last.checked_add(1) != Some(number) => {
-                    return flaw(&at, format!("page {number} comes after page {last}"));
-                }
-                _ => self.page = Some(number),
-            }
-        }
-        Ok(())
-    }
-
     /// Returns the number of a page's picture, or `None` for a summary. It keeps counting across measurements.
-    fn picture(&mut self, page: &Page<'t>, grid: &Grid<'t>) -> Result<Option<u64>, Flaw> {
+    fn picture(&mut self, page: &PageHeader<'t>, columns: &PageColumns<'t>) -> Result<Option<u64>, TextError> {
         let Some((number, at)) = page.picture else {
-            return if page.is_summary {
-                Ok(None)
-            } else {
-                flaw(&grid.columns[0].1, "`Pict-No.:` is missing on this page")
-            };
+            let (_, at) = columns.labels[0];
+            return at.check(page.is_summary, "`Pict-No.:` is missing on this page").map(|()| None);
         };
-        if number > 1_000_000_000 {
-            return flaw(&at, format!("the number of a picture must be at most 1000000000, not {number}"));
-        }
-        let Some(last) = self.frames.last() else { return Ok(Some(number)) };
-        if number == self.frames[0].number {
-            self.before = last.number + 1 - number;
-        } else if number + self.before <= last.number {
-            return flaw(&at, format!("picture {number} comes after picture {}", last.number - self.before));
+        let message = format_args!("the number of a picture must be at most {MAX_PICTURE}, not {number}");
+        at.check(number <= MAX_PICTURE, message)?;
+        if let (Some(first), Some(last)) = (self.reel.frames.first(), self.reel.frames.last()) {
+            if number == first.number {
+                self.before = last.number + 1 - number;
+            }
+            let is_next = number + self.before > last.number;
+            at.check(is_next, format_args!("picture {number} comes after picture {}", last.number - self.before))?;
         }
         Ok(Some(number + self.before))
     }
 
     /// Reads the rows of a page, and returns its window in the array.
-    fn rows(&mut self, grid: &Grid<'t>) -> Result<Window, Flaw> {
-        let cols = grid.columns.len();
-        let start = self.cells.len();
-        let mut first: Reach<'t> = None;
-        let mut last: Reach<'t> = None;
+    fn rows(&mut self, columns: &PageColumns<'t>) -> Result<Window, TextError> {
+        let cols = columns.labels.len();
+        let start = self.reel.cells.len();
+        let mut first = None;
+        let mut last = None;
         loop {
-            let next = self.lines.next();
-            let is_feed = next.is_some_and(|line| line.text.contains('\u{c}'));
-            self.has_feeds |= is_feed;
-            let line = next.map_or_else(|| self.lines.end(), Piece::trimmed);
+            let next = self.line();
+            let line = next.unwrap_or_else(|| self.lines.end());
             if line.after("Force").is_some() && first.is_some() {
-                self.forces(grid, line, start)?;
+                self.forces(columns, line, start)?;
                 break;
             }
             if line.text.is_empty() {
-                let is_cut = grid.has_force || (next.is_none() && self.has_feeds);
-                if is_cut || first.is_none() {
-                    let count = (self.cells.len() - start) / cols;
-                    return flaw(&line, format!("the page ends after {count} rows: it is truncated"));
-                }
+                let is_cut = columns.has_force || (next.is_none() && self.has_feeds) || first.is_none();
+                let count = (self.reel.cells.len() - start) / cols;
+                line.check(!is_cut, format_args!("the page ends after {count} rows: it is truncated"))?;
                 break;
             }
-            let label = self.row(grid, line, last)?;
+            let label = self.row(columns, line, last)?;
             first = first.or(Some(label));
             last = Some(label);
         }
-        let (first, last) = (first.zip(last)).ok_or_else(|| {
-            let at = self.lines.end();
-            Flaw { span: at.span(), message: "this page has no rows".into() }
-        })?;
-        Ok(self.window(grid, first, last))
+        let rows = first.zip(last).ok_or_else(|| self.lines.end().error("this page has no rows"))?;
+        Ok(self.window(columns, rows))
     }
 
-    fn window(&mut self, grid: &Grid<'t>, first: (u64, Piece<'t>), last: (u64, Piece<'t>)) -> Window {
-        let (left, right) = (grid.columns[0].0, grid.columns[grid.columns.len() - 1]);
-        for (reach, label) in self.reach.iter_mut().zip([last, right]) {
+    /// Returns the window of a page from its first and its last row.
+    fn window(&mut self, columns: &PageColumns<'t>, (top, bottom): (Label<'t>, Label<'t>)) -> Window {
+        let (left, right) = (columns.labels[0], columns.labels[columns.labels.len() - 1]);
+        for (reach, label) in self.reach.iter_mut().zip([bottom, right]) {
             *reach = Some(reach.filter(|reach| reach.0 >= label.0).unwrap_or(label));
         }
         let index = |label: u64| u32::try_from(label - 1).expect("a label is small");
-        let (rows, cols) = (index(last.0 - first.0 + 2), index(right.0 - left + 2));
-        Window { top: index(first.0), left: index(left), rows, cols }
+        let (rows, cols) = (index(bottom.0 - top.0 + 2), index(right.0 - left.0 + 2));
+        Window { top: index(top.0), left: index(left.0), rows, cols }
     }
 
     /// Reads one row, and returns its number.
-    fn row(&mut self, grid: &Grid<'t>, line: Piece<'t>, last: Reach<'t>) -> Result<(u64, Piece<'t>), Flaw> {
-        let mut fields = grid.notation.fields(line);
-        let at = fields.next().expect("the line is not empty");
-        let label = label(at, "row")?;
-        if let Some((last, _)) = last
-            && label != last + 1
-        {
-            return flaw(&at, format!("row {label} comes after row {last}"));
+    fn row(
+        &mut self,
+        columns: &PageColumns<'t>,
+        line: Piece<'t>,
+        last: Option<Label<'t>>,
+    ) -> Result<Label<'t>, TextError> {
+        let mut fields = columns.notation.fields(line);
+        let (label, at) = header::label(fields.next().expect("the line is not empty"), "row")?;
+        if let Some((last, _)) = last {
+            at.check(label == last + 1, format_args!("row {label} comes after row {last}"))?;
         }
-        let (found, wanted) = (fields.clone().count(), grid.columns.len() + usize::from(grid.has_force));
-        if found != wanted {
-            let cut = if self.lines.is_at_end() { ": the file ends in the middle of it" } else { "" };
-            return flaw(
-                &line,
-                format!("row {label} has {found} numbers, but the header of its page has {wanted}{cut}"),
-            );
-        }
+        let cols = columns.labels.len();
+        let (found, wanted) = (fields.clone().count(), cols + usize::from(columns.has_force));
+        let cut = self.lines.cut();
+        let message = format_args!("row {label} has {found} numbers, but the header of its page has {wanted}{cut}");
+        line.check(found == wanted, message)?;
         let mut sum = 0.0;
-        for cell in fields.by_ref().take(grid.columns.len()) {
-            let value = match cell.text {
-                "" | "-" => 0.0,
-                _ => grid.notation.number(cell, "this cell")?,
-            };
+        for cell in fields.by_ref().take(cols) {
+            let value = number(columns.notation, cell, "this cell")?;
             self.cell_digit = digit(cell.text);
-            if !(value as f32 * 10.0).is_finite() {
-                return flaw(&cell, format!("this cell is too large: `{}`", shortened(cell.text)));
-            }
+            let is_small = (value as f32 * NEWTON_PER_CM2 as f32).is_finite();
+            cell.check(is_small, format_args!("this cell is too large: `{}`", shortened(cell.text)))?;
             sum += value;
-            self.cells.push(value as f32);
+            self.reel.cells.push(value as f32);
         }
-        if let Some(figure) = fields.next() {
-            self.check(grid, &Force { figure, what: "row", sum, count: grid.columns.len() })?;
+        if let Some(force) = fields.next() {
+            self.check(columns, force, &Loaded { what: "row", sum, count: cols })?;
         }
         Ok((label, at))
     }
 
     /// Checks the last row of a page: the forces of its columns and of the page.
-    fn forces(&mut self, grid: &Grid<'t>, line: Piece<'t>, start: usize) -> Result<(), Flaw> {
-        let cols = grid.columns.len();
-        let fields = grid.notation.fields(line).skip(1);
+    fn forces(&mut self, columns: &PageColumns<'t>, line: Piece<'t>, start: usize) -> Result<(), TextError> {
+        let cols = columns.labels.len();
+        let fields = columns.notation.fields(line).skip(1);
         let found = fields.clone().count();
-        if found != cols + 1 && (grid.has_force || found != cols) {
-            return flaw(
-                &line,
-                format!("the row `Force` has {found} numbers, but the header of its page has {}", cols + 1),
-            );
-        }
-        let count = (self.cells.len() - start) / cols;
-        let sum = |column: usize| -> f64 {
-            self.cells[start..].iter().skip(column).step_by(cols).map(|cell| f64::from(*cell)).sum()
-        };
-        let mut sums: Vec<f64> = (0..cols).map(sum).collect();
-        sums.push(sums.iter().sum());
-        for (column, (figure, sum)) in fields.zip(sums).enumerate() {
-            let (count, what) = if column < cols { (count, "column") } else { (count * cols, "page") };
-            self.check(grid, &Force { figure, what, sum, count })?;
-        }
-        Ok(())
+        let is_whole = found == cols + 1 || (!columns.has_force && found == cols);
+        let message = format_args!("the row `Force` has {found} numbers, but the header of its page has {}", cols + 1);
+        line.check(is_whole, message)?;
+        let cells = &self.reel.cells[start..];
+        let count = cells.len() / cols;
+        let sum = |column: usize| cells.iter().skip(column).step_by(cols).map(|cell| f64::from(*cell)).sum();
+        let sums: Vec<f64> = (0..cols).map(sum).collect();
+        let page = Loaded { what: "page", sum: sums.iter().sum(), count: count * cols };
+        let sums = sums.into_iter().map(|sum| Loaded { what: "column", sum, count });
+        fields.zip(sums.chain([page])).try_for_each(|(force, loaded)| self.check(columns, force, &loaded))
     }
 
     /// Checks a force against its cells, within their rounding. The first nonzero force shows the unit of the cells.
-    fn check(&mut self, grid: &Grid<'t>, force: &Force<'t>) -> Result<(), Flaw> {
-        let Force { figure, what, sum, count } = *force;
-        let listed = match figure.text {
-            "" | "-" => 0.0,
-            _ => grid.notation.number(figure, "the force")?,
-        };
+    fn check(&mut self, columns: &PageColumns<'t>, force: Piece<'t>, loaded: &Loaded) -> Result<(), TextError> {
+        let Loaded { what, sum, count } = *loaded;
+        let listed = number(columns.notation, force, "the force")?;
         let Some((area, slack)) = self.header.area_of_sensor() else { return Ok(()) };
         // A square metre of 1 kPa is 1000 N.
         let newtons = |factor: f64| sum * factor * 1e3 * area;
         let agrees = |factor: f64| {
-            let rounding = digit(figure.text) + self.cell_digit * count as f64 * factor * 1e3 * area;
+            let rounding = digit(force.text) + self.cell_digit * count as f64 * factor * 1e3 * area;
             (newtons(factor) - listed).abs() <= 0.505 * rounding + slack * listed.abs()
         };
-        match self.factor {
+        let factor = match self.factor {
+            Some(factor) => factor,
             None if agrees(KILOPASCAL) && agrees(NEWTON_PER_CM2) => return Ok(()),
-            None if agrees(NEWTON_PER_CM2) => self.factor = Some(NEWTON_PER_CM2),
-            _ => {}
-        }
-        let factor = *self.factor.get_or_insert(KILOPASCAL);
-        if agrees(factor) {
-            return Ok(());
-        }
+            None if agrees(NEWTON_PER_CM2) => NEWTON_PER_CM2,
+            None => KILOPASCAL,
+        };
         let made = (newtons(factor) * 1e4).round() / 1e4;
-        flaw(&figure, format!("the force of this {what} is {listed} N, but its cells sum to {made} N"))
+        let message = format_args!("the force of this {what} is {listed} N, but its cells sum to {made} N");
+        force.check(agrees(factor), message)?;
+        self.factor = Some(factor);
+        Ok(())
     }
 
-    fn finish(mut self, hints: &Hints) -> Result<Recording, Wrong> {
-        if self.frames.is_empty() {
-            return Err(Flaw { span: self.lines.end().span(), message: "the file has no picture".into() }.into());
-        }
-        let [rows, cols] = self.size(hints)?;
-        let period = hints.period(self.header.period)?;
-        let unit = hints.unit(Some(Unit::of(Base::Kilopascal)))?;
-        let pitch = hints.pitch(self.header.size)?;
+    fn finish(mut self, hints: &Hints) -> Result<Recording, Refusal> {
+        self.lines.end().check(!self.reel.frames.is_empty(), "the file has no picture")?;
+        let size = Some(self.size(hints)?);
         let factor = self.factor.unwrap_or(KILOPASCAL) as f32;
-        self.cells.iter_mut().for_each(|cell| *cell *= factor);
-        let start = self.frames[0].number;
-        for frame in &mut self.frames {
-            frame.time = ((frame.number - start) as f64 * period * 1e9).round() as i64;
+        self.reel.cells.iter_mut().for_each(|cell| *cell *= factor);
+        let unit = Some((Unit::of(Base::Kilopascal), 1.0));
+        let pitch = self.header.sides.map(|(sides, _)| sides);
+        let found = Properties { size, unit, pitch, period: self.header.period, ..Properties::default() };
+        let mut recording = self.reel.finish(FORMAT.name, found, hints)?;
+        let start = recording.frames[0].number;
+        for frame in &mut recording.frames {
+            frame.time = ((frame.number - start) as f64 * recording.period * 1e9).round() as i64;
         }
-        let shape = ImageShape { rows, cols, pitch, unit };
-        let Self { frames, cells, .. } = self;
-        Ok(Recording { format: FORMAT.name, shape, frames, cells, dead: vec![], threshold: None, period, force: None })
+        Ok(recording)
     }
 
     /// Returns the number of rows and of columns of the whole array.
-    fn size(&self, hints: &Hints) -> Result<[usize; 2], Wrong> {
+    fn size(&self, hints: &Hints) -> Result<[usize; 2], Refusal> {
         let reach = self.reach.map(|reach| reach.expect("a picture has rows and columns"));
         let holds = |size: &[usize; 2]| (0..2).all(|k| reach[k].0 <= size[k] as u64);
         // The file has `columns x rows`; some programs write `rows x columns`.
@@ -303,20 +254,25 @@ impl<'t> Reader<'t> {
             if !holds(&[rows, cols]) && holds(&turned) { turned } else { [rows, cols] }
         });
         let size = hints.size(matrix)?;
-        if !holds(&size) {
-            let worst = usize::from(reach[0].0 <= size[0] as u64);
-            let (label, at) = reach[worst];
-            let name = ["row", "column"][worst];
-            let message = format!("{name} {label} is outside the array of {} rows and {} columns", size[0], size[1]);
-            return Err(Flaw { span: at.span(), message }.into());
+        let [rows, cols] = size;
+        for ((label, at), (count, name)) in reach.into_iter().zip([(rows, "row"), (cols, "column")]) {
+            let message = format_args!("{name} {label} is outside the array of {rows} rows and {cols} columns");
+            at.check(label <= count as u64, message)?;
         }
-        if size[0].checked_mul(size[1]).is_none_or(|cells| cells > MAX_CELLS) {
-            let message = format!("an array of {} by {} has more than {MAX_CELLS} cells", size[0], size[1]);
-            return Err(Refusal::broken(message).into());
+        if rows.checked_mul(cols).is_none_or(|cells| cells > MAX_CELLS) {
+            return Err(Refusal::broken(format!("an array of {rows} by {cols} has more than {MAX_CELLS} cells")));
         }
         Ok(size)
     }
 }
+
+/// Parses a number of a listing; an empty field and `-` are 0.
+fn number(notation: Notation, field: Piece<'_>, what: &str) -> Result<f64, TextError> {
+    if matches!(field.text, "" | "-") { Ok(0.0) } else { notation.number(field, what) }
+}
+
+/// Maximum number of a picture.
+const MAX_PICTURE: u64 = 1_000_000_000;
 
 /// Factors from the units of a listing to kPa.
 const KILOPASCAL: f64 = 1.0;

@@ -1,7 +1,7 @@
 //! Reads a file of any format, or the file in an archive.
 
 use super::archive;
-use super::common::{Head, Hints, Recording, Refusal};
+use super::common::{FileHead, Hints, Recording, Refusal};
 use super::formats::{FORMATS, recognise};
 
 /// Reads a file, or the file in an archive.
@@ -20,7 +20,7 @@ pub fn read(bytes: &[u8], name: &str, hints: &Hints) -> Result<Recording, Refusa
 fn read_plain(bytes: &[u8], name: &str, hints: &Hints) -> Result<Recording, Refusal> {
     let format = match &hints.format {
         Some(name) => FORMATS.iter().find(|format| format.name == name),
-        None => recognise(&Head::new(bytes, name)),
+        None => recognise(&FileHead::new(bytes, name)),
     };
-    format.map_or(Err(Refusal::Stranger), |format| (format.read)(bytes, hints))
+    format.map_or(Err(Refusal::Stranger), |format| format.read(bytes, hints))
 }

@@ -8,19 +8,13 @@
 //!
 //! A file may have several pads, as the two insoles of a pair: the bench selects one with `pad`. There is no default.
 
-use tactflow_runtime::signal::{ImageShape, Unit};
-
 use crate::recordings::common::fields::Fields;
-use crate::recordings::common::reel::{Reel, bounded};
-use crate::recordings::common::text::{self, Lines, Piece, Wrong, flaw, shortened};
-use crate::recordings::common::{Flaw, Format, Head, Hints, Recording, Refusal, units};
+use crate::recordings::common::reel::{Properties, Reel, bounded};
+use crate::recordings::common::text::{Lines, Piece, shortened};
+use crate::recordings::common::{FileFormat, FileHead, Hints, Recording, Refusal, TextError, Window, units};
 
-pub(super) const FORMAT: Format = Format {
-    name: "xsensor",
-    title: "the CSV export of XSENSOR's software",
-    recognises,
-    read: |bytes, hints| text::read(bytes, hints, parse),
-};
+pub(super) const FORMAT: FileFormat =
+    FileFormat::text("xsensor", "the CSV export of XSENSOR's software", recognises, parse);
 
 /// Length of a day [ns].
 const DAY_NS: i64 = 86_400_000_000_000;
@@ -30,234 +24,193 @@ const MAX_LENGTH_NS: i64 = 400 * DAY_NS;
 /// Maximum number of pads that a message lists.
 const MAX_LISTED: usize = 32;
 
-fn recognises(head: &Head<'_>) -> bool {
-    let has = |wanted: &str| Lines::new(&head.text).any(|line| Entry::of(line, separator(line.text)).is(wanted));
+fn recognises(head: &FileHead<'_>) -> bool {
+    let has = |wanted: &str| Lines::new(&head.text).any(|line| KeyLine::of(line).is(wanted));
     has("sensels") && has("columns") && (has("rows") || has("units"))
 }
 
-/// Returns the separator of a line with a key.
-fn separator(line: &str) -> char {
-    line.chars().find(|c| matches!(c, ',' | ';' | '\t')).unwrap_or(',')
-}
-
 /// The first field of a line, and the next field that is not empty.
-struct Entry<'t> {
+struct KeyLine<'t> {
     key: Piece<'t>,
     value: Piece<'t>,
 }
 
-impl<'t> Entry<'t> {
-    fn of(line: Piece<'t>, separator: char) -> Self {
+impl<'t> KeyLine<'t> {
+    fn of(line: Piece<'t>) -> Self {
+        let separator = line.text.chars().find(|c| matches!(c, ',' | ';' | '\t')).unwrap_or(',');
         let mut fields = Fields::new(line, separator);
         let key = fields.next().unwrap_or(line);
         let key = key.part(key.text.trim_end_matches(':').trim_end());
-        let value =
-            fields.find(|field| !field.text.is_empty()).unwrap_or_else(|| line.part(&line.text[line.text.len()..]));
-        Self { key, value }
+        let value = fields.find(|field| !field.text.is_empty());
+        Self { key, value: value.unwrap_or_else(|| line.part(&line.text[line.text.len()..])) }
     }
 
     fn is(&self, key: &str) -> bool {
         self.key.text.eq_ignore_ascii_case(key)
     }
 
-    /// Returns the unit in brackets after the key, as in `Sensel Width (cm)`.
-    fn unit_after(&self, key: &str) -> Option<&'t str> {
-        let rest = self.key.after(key)?.text.trim();
-        Some(rest.trim_start_matches('(').trim_end_matches(')'))
+    /// Returns the key as a message names it.
+    fn title(&self) -> String {
+        format!("`{}`", shortened(self.key.text))
+    }
+
+    /// Parses a length [m], with its unit in brackets after the key, as in `Sensel Width (cm)`. It must be the same in
+    /// the whole file. Returns `None` for another key.
+    fn length(&self, key: &str, before: Option<f64>) -> Result<Option<f64>, TextError> {
+        let Some(unit) = self.key.after(key) else { return Ok(before) };
+        let number = self.value.decimal(&self.title())?;
+        let metres = units::metres(unit.text.trim().trim_start_matches('(').trim_end_matches(')'));
+        let unknown = || self.key.error(format!("the unit of {} is unknown", self.title()));
+        let length = number * metres.ok_or_else(unknown)?;
+        self.value.check(length > 0.0, format_args!("{} must be greater than 0", self.title()))?;
+        self.value.check(before.is_none_or(|before| before == length), format_args!("{} changes", self.title()))?;
+        Ok(Some(length))
     }
 }
 
-fn parse(text: &str, hints: &Hints) -> Result<Recording, Wrong> {
-    let pad = choose(text, hints)?;
-    let mut reader = Reader {
-        lines: Lines::new(text),
-        pad,
-        reel: Reel::default(),
-        unit: None,
-        threshold: None,
-        size: None,
-        pitch: [None; 2],
-        frame: None,
-        part: Part::Pad,
-        has_times: true,
-        day: 0,
-    };
+fn parse(text: &str, hints: &Hints) -> Result<Recording, Refusal> {
+    let mut reader = XsensorReader { lines: Lines::new(text), pad: choose(text, hints)?, ..XsensorReader::default() };
     reader.read()?;
-    let Reader { mut reel, lines, unit, threshold, size, pitch, .. } = reader;
-    let Some([rows, cols]) = size.filter(|_| !reel.frames.is_empty()) else {
-        return flaw(&lines.end(), "the file has no frame").map_err(Wrong::from);
-    };
-    hints.size(Some([rows, cols]))?;
-    let (unit, factor) = unit.unzip();
-    let pitch = pitch[0].zip(pitch[1]).map(|(x, y)| [x, y]);
+    let XsensorReader { mut reel, lines, mut found, pitch: [x, y], .. } = reader;
+    lines.end().check(!reel.frames.is_empty(), "the file has no frame")?;
     // Stamps of whole seconds are too coarse for the times of the frames.
-    let has_times = reel.frames.is_sorted_by(|a, b| a.time < b.time);
-    let (unit, pitch, period) = hints.complete(unit, pitch, reel.mean_step().filter(|_| has_times))?;
-    if has_times {
-        reel.start_at_zero();
-    } else {
-        reel.tick(period);
-    }
-    let threshold = threshold.map(|threshold| threshold * factor.unwrap_or(1.0));
-    let shape = ImageShape { rows, cols, pitch, unit };
-    let Reel { frames, cells, dead } = reel;
-    Ok(Recording { format: FORMAT.name, shape, frames, cells, dead, threshold, period, force: None })
+    reel.forget_equal_times();
+    found.pitch = x.zip(y).map(<[f64; 2]>::from);
+    found.threshold = found.threshold.map(|threshold| threshold * found.factor());
+    reel.finish(FORMAT.name, found, hints)
 }
 
 /// Returns the pad that the bench selects, or the only pad of the first frame; `None` if the file does not name it.
 fn choose<'t>(text: &'t str, hints: &Hints) -> Result<Option<&'t str>, Refusal> {
     let mut frames = 0;
     let mut names: Vec<&str> = Vec::new();
-    for line in Lines::new(text) {
-        let entry = Entry::of(line, separator(line.text));
-        frames += usize::from(entry.is("frame"));
+    for line in Lines::new(text).map(KeyLine::of) {
+        frames += usize::from(line.is("frame"));
         if frames > 1 || names.len() == MAX_LISTED {
             break;
         }
-        if entry.is("sensor") && !names.contains(&entry.value.text) {
-            names.push(entry.value.text);
+        if line.is("sensor") && !names.contains(&line.value.text) {
+            names.push(line.value.text);
         }
     }
     let list = || names.iter().map(|name| format!("`{}`", shortened(name))).collect::<Vec<_>>().join(", ");
-    match (&hints.pad, &*names) {
-        (None, []) => Ok(None),
-        (None, [only]) => Ok(Some(only)),
-        (None, _) => Err(Refusal::Silent {
-            message: format!("the file has {} pads: {}", names.len(), list()),
-            help: format!("select one in the bench's device, as `pad = \"{}\"`", shortened(names[0])),
-        }),
-        (Some(wanted), names) => match names.iter().find(|name| *name == wanted) {
-            Some(name) => Ok(Some(name)),
-            None if names.is_empty() => {
-                Err(Refusal::Contradicted { hint: "pad", message: "the file has no names of pads".into() })
-            }
-            None => Err(Refusal::Contradicted { hint: "pad", message: format!("the file has the pads {}", list()) }),
+    let Some(wanted) = &hints.pad else {
+        return match *names {
+            [] => Ok(None),
+            [only] => Ok(Some(only)),
+            [first, ..] => Err(Refusal::Silent {
+                message: format!("the file has {} pads: {}", names.len(), list()),
+                help: format!("select one in the bench's device, as `pad = \"{}\"`", shortened(first)),
+            }),
+        };
+    };
+    let has_none = || Refusal::Contradicted {
+        hint: "pad",
+        message: if names.is_empty() {
+            "the file has no names of pads".into()
+        } else {
+            format!("the file has the pads {}", list())
         },
-    }
+    };
+    names.iter().find(|name| *name == wanted).map(|name| Some(*name)).ok_or_else(has_none)
 }
 
-/// The part of a frame that the lines describe.
-#[derive(Clone, Copy, PartialEq, Eq)]
-enum Part {
-    /// The selected pad, or the whole frame.
-    Pad,
-    /// Another pad, or a group of sensels.
-    Other,
-}
-
-struct Reader<'t> {
+#[derive(Default)]
+struct XsensorReader<'t> {
     lines: Lines<'t>,
     /// The selected pad.
     pad: Option<&'t str>,
     reel: Reel,
-    unit: Option<(Unit, f64)>,
-    threshold: Option<f64>,
-    size: Option<[usize; 2]>,
+    /// Size and unit; the threshold, still in the file's unit.
+    found: Properties,
+    /// Distance of two sensels along x and along y [m].
     pitch: [Option<f64>; 2],
     /// The frame that is being read.
-    frame: Option<Begun<'t>>,
-    part: Part,
-    /// Whether the frames have times.
-    has_times: bool,
+    frame: Option<BegunFrame<'t>>,
+    /// Whether the lines describe another pad, or a group of sensels.
+    is_other: bool,
     /// Time of the midnights since the first frame [ns].
     day: i64,
 }
 
 /// A frame that is not complete.
 #[derive(Clone, Copy)]
-struct Begun<'t> {
+struct BegunFrame<'t> {
     number: u64,
     at: Piece<'t>,
     time: Option<i64>,
     has_cells: bool,
 }
 
-impl<'t> Reader<'t> {
-    fn read(&mut self) -> Result<(), Flaw> {
+impl<'t> XsensorReader<'t> {
+    fn read(&mut self) -> Result<(), TextError> {
         let mut sides = [None; 2];
         while let Some(line) = self.lines.next() {
-            let entry = Entry::of(line, separator(line.text));
+            let line = KeyLine::of(line);
             match () {
-                () if entry.key.text.is_empty() => {}
-                () if entry.is("frame") => self.begin(entry.value)?,
-                () if entry.is("sensor") => {
-                    let is_played = self.pad.is_none_or(|pad| pad == entry.value.text);
-                    self.part = if is_played { Part::Pad } else { Part::Other };
-                }
-                () if entry.is("group") => self.part = Part::Other,
-                () if self.part == Part::Other => {}
-                () if entry.is("rows") => sides[0] = Some(side(&entry)?),
-                () if entry.is("columns") => sides[1] = Some(side(&entry)?),
-                () if entry.is("sensels") => self.sensels(sides, entry.key)?,
-                () => self.figure(&entry)?,
+                () if line.key.text.is_empty() => {}
+                () if line.is("frame") => self.begin(line.value)?,
+                () if line.is("sensor") => self.is_other = self.pad.is_some_and(|pad| pad != line.value.text),
+                () if line.is("group") => self.is_other = true,
+                () if self.is_other => {}
+                () if line.is("rows") => sides[0] = Some(line.value.side(&line.title())?),
+                () if line.is("columns") => sides[1] = Some(line.value.side(&line.title())?),
+                () if line.is("sensels") => self.sensels(sides, line.key)?,
+                () => self.property(&line)?,
             }
         }
         self.end(self.lines.end())
     }
 
     /// Reads a property of the file, of a frame or of a pad.
-    fn figure(&mut self, entry: &Entry<'t>) -> Result<(), Flaw> {
-        let value = entry.value;
-        if entry.is("units") {
-            let known = units::unit(value.text).ok_or(());
-            let known = known.or_else(|()| flaw(&value, format!("the unit `{}` is unknown", shortened(value.text))))?;
-            if self.unit.is_some_and(|unit| unit != known) {
-                return flaw(&value, "the unit changes");
-            }
-            self.unit = Some(known);
-        } else if entry.is("threshold") {
-            self.threshold = value.decimal("`Threshold`").ok();
-        } else if ["time", "timestamp", "frame timestamp", "time (s)"].iter().any(|key| entry.is(key)) {
+    fn property(&mut self, line: &KeyLine<'t>) -> Result<(), TextError> {
+        let value = line.value;
+        if line.is("units") {
+            let unit = units::parse(value)?;
+            value.check(self.found.unit.is_none_or(|before| before == unit), "the unit changes")?;
+            self.found.unit = Some(unit);
+        } else if line.is("threshold") {
+            self.found.threshold = value.decimal("`Threshold`").ok();
+        } else if ["time", "timestamp", "frame timestamp", "time (s)"].iter().any(|key| line.is(key)) {
             self.stamp(value)?;
-        } else if let Some(unit) = entry.unit_after("sensel width") {
-            self.pitch[0] = Some(length(entry, unit, self.pitch[0])?);
-        } else if let Some(unit) = entry.unit_after("sensel height") {
-            self.pitch[1] = Some(length(entry, unit, self.pitch[1])?);
-        } else if entry.key.text.parse::<f64>().is_ok() {
-            return flaw(&entry.key, "unexpected row of cells: the frame is complete, or `SENSELS` is missing");
         }
-        Ok(())
+        let [x, y] = self.pitch;
+        self.pitch = [line.length("sensel width", x)?, line.length("sensel height", y)?];
+        let is_row = line.key.text.parse::<f64>().is_ok();
+        line.key.check(!is_row, "unexpected row of cells: the frame is complete, or `SENSELS` is missing")
     }
 
     /// Starts the next frame.
-    fn begin(&mut self, at: Piece<'t>) -> Result<(), Flaw> {
+    fn begin(&mut self, at: Piece<'t>) -> Result<(), TextError> {
         self.end(at)?;
         let number = at.count("the frame's number")?;
-        if let Some(last) = self.reel.frames.last()
-            && last.number >= number
-        {
-            return flaw(&at, format!("frame {number} comes after frame {}", last.number));
+        if let Some(last) = self.reel.frames.last() {
+            at.check(last.number < number, format_args!("frame {number} comes after frame {}", last.number))?;
         }
-        self.frame = Some(Begun { number, at, time: None, has_cells: false });
-        self.part = Part::Pad;
+        self.frame = Some(BegunFrame { number, at, time: None, has_cells: false });
+        self.is_other = false;
         Ok(())
     }
 
     /// Ends the current frame, if there is one.
-    fn end(&mut self, at: Piece<'t>) -> Result<(), Flaw> {
-        let Some(Begun { number, at: begin, time, has_cells }) = self.frame.take() else { return Ok(()) };
-        let Some([rows, cols]) = self.size.filter(|_| has_cells) else {
+    fn end(&mut self, at: Piece<'t>) -> Result<(), TextError> {
+        let Some(BegunFrame { number, at: begin, time, has_cells }) = self.frame.take() else { return Ok(()) };
+        let Some([rows, cols]) = self.found.size.filter(|_| has_cells) else {
             let of = self.pad.map_or_else(String::new, |pad| format!(" of `{}`", shortened(pad)));
-            return flaw(&at, format!("frame {number} ends without the `SENSELS`{of}"));
+            return Err(at.error(format!("frame {number} ends without the `SENSELS`{of}")));
         };
-        if !self.reel.frames.is_empty() && self.has_times != time.is_some() {
-            return flaw(&begin, "some frames have a `Time` and some do not");
-        }
-        self.has_times = time.is_some();
-        self.reel.frame(number, time.unwrap_or(0), rows, cols);
+        begin.check(self.reel.is_timed_alike(time.is_some()), "some frames have a `Time` and some do not")?;
+        self.reel.frame(number, time, Window::whole(rows, cols));
         Ok(())
     }
 
     /// Sets the time of a frame, which keeps counting after midnight.
-    fn stamp(&mut self, value: Piece<'t>) -> Result<(), Flaw> {
+    fn stamp(&mut self, value: Piece<'t>) -> Result<(), TextError> {
         let Some(frame) = &mut self.frame else { return Ok(()) };
         let mut time = time_of_day(value)? + self.day;
-        if let Some(last) = self.reel.frames.last()
-            && last.time > time
-        {
-            if last.time - time < DAY_NS / 2 || self.day >= MAX_LENGTH_NS {
-                return flaw(&value, "the time goes back");
-            }
+        if let Some(last) = self.reel.frames.last().filter(|last| last.time > time) {
+            let is_midnight = last.time - time >= DAY_NS / 2 && self.day < MAX_LENGTH_NS;
+            value.check(is_midnight, "the time goes back")?;
             self.day += DAY_NS;
             time += DAY_NS;
         }
@@ -266,43 +219,33 @@ impl<'t> Reader<'t> {
     }
 
     /// Reads the rows of cells.
-    fn sensels(&mut self, sides: [Option<usize>; 2], at: Piece<'t>) -> Result<(), Flaw> {
+    fn sensels(&mut self, sides: [Option<usize>; 2], at: Piece<'t>) -> Result<(), TextError> {
         let [Some(rows), Some(cols)] = sides else {
-            return flaw(&at, "`SENSELS` comes before its `Rows` and `Columns`");
+            return Err(at.error("`SENSELS` comes before its `Rows` and `Columns`"));
         };
-        if self.size.is_some_and(|size| size != [rows, cols]) {
-            return flaw(&at, format!("the size of the pad changes to {rows} rows by {cols} columns"));
-        }
-        bounded(rows, cols).or_else(|message| flaw(&at, message))?;
-        self.size = Some([rows, cols]);
-        let factor = self.unit.map_or(1.0, |(_, factor)| factor);
-        match &mut self.frame {
-            None => return flaw(&at, "`SENSELS` comes before its `FRAME`"),
-            Some(frame) if frame.has_cells => {
-                return flaw(&at, format!("frame {} has two blocks of cells", frame.number));
-            }
-            Some(frame) => frame.has_cells = true,
-        }
-        for row in 0..rows {
-            self.row(row, cols, factor)?;
-        }
-        Ok(())
+        let is_same = self.found.size.is_none_or(|size| size == [rows, cols]);
+        at.check(is_same, format_args!("the size of the pad changes to {rows} rows by {cols} columns"))?;
+        bounded(rows, cols).map_err(|message| at.error(message))?;
+        self.found.size = Some([rows, cols]);
+        let frame = self.frame.as_mut().ok_or_else(|| at.error("`SENSELS` comes before its `FRAME`"))?;
+        at.check(!frame.has_cells, format_args!("frame {} has two blocks of cells", frame.number))?;
+        frame.has_cells = true;
+        (1..=rows).try_for_each(|row| self.row(row, cols))
     }
 
-    fn row(&mut self, row: usize, cols: usize, factor: f64) -> Result<(), Flaw> {
+    /// Reads a row of cells; `row` counts from 1.
+    fn row(&mut self, row: usize, cols: usize) -> Result<(), TextError> {
         let is_blank = |line: &Piece<'_>| line.text.trim_matches([',', ';', '\t', ' ']).is_empty();
         let line = self.lines.by_ref().find(|line| !is_blank(line)).unwrap_or_else(|| self.lines.end());
         let mut fields = Fields::new(line, separator_of_cells(line.text));
-        for col in 0..cols {
-            let cell = fields.next().filter(|cell| !cell.text.is_empty());
-            let Some(cell) = cell else {
-                return flaw(&line, format!("row {} has {col} cells, but `Columns` is {cols}", row + 1));
-            };
-            let value = cell.decimal("this cell")? * factor;
-            self.reel.cell(row * cols + col, value).or_else(|message| flaw(&cell, message))?;
-        }
+        let factor = self.found.factor();
+        let before = self.reel.cells.len();
+        let cells = fields.by_ref().take(cols).take_while(|cell| !cell.text.is_empty());
+        self.reel.row(cells, |cell| Ok(cell.decimal("this cell")? * factor))?;
+        let found = self.reel.cells.len() - before;
+        line.check(found == cols, format_args!("row {row} has {found} cells, but `Columns` is {cols}"))?;
         match fields.find(|field| !field.text.is_empty()) {
-            Some(field) => flaw(&field, format!("row {} has more than {cols} cells", row + 1)),
+            Some(field) => Err(field.error(format!("row {row} has more than {cols} cells"))),
             None => Ok(()),
         }
     }
@@ -318,59 +261,34 @@ fn separator_of_cells(line: &str) -> char {
     beside.find(|c| is_quoted && matches!(c, '\t' | ';' | ',')).unwrap_or_else(any)
 }
 
-fn side(entry: &Entry<'_>) -> Result<usize, Flaw> {
-    let what = format!("`{}`", shortened(entry.key.text));
-    match usize::try_from(entry.value.count(&what)?) {
-        Ok(side @ 1..) => Ok(side),
-        _ => flaw(&entry.value, format!("{what} must be at least 1")),
-    }
-}
-
-/// Parses a length [m], which must be the same in the whole file.
-fn length(entry: &Entry<'_>, unit: &str, before: Option<f64>) -> Result<f64, Flaw> {
-    let what = format!("`{}`", shortened(entry.key.text));
-    let number = entry.value.decimal(&what)?;
-    let Some(metres) = units::metres(unit) else {
-        return flaw(&entry.key, format!("the unit of {what} is unknown"));
-    };
-    match number * metres {
-        length if length <= 0.0 => flaw(&entry.value, format!("{what} must be greater than 0")),
-        length if before.is_some_and(|before| before != length) => flaw(&entry.value, format!("{what} changes")),
-        length => Ok(length),
-    }
-}
-
 /// Parses `08:21:17.982`, `8:21:17 PM` or plain seconds, and returns nanoseconds.
-fn time_of_day(value: Piece<'_>) -> Result<i64, Flaw> {
-    let lower = value.text.to_ascii_lowercase();
-    let (clock, noon) = match (lower.strip_suffix("pm"), lower.strip_suffix("am")) {
-        (Some(clock), _) => (clock, Some(12)),
-        (_, Some(clock)) => (clock, Some(0)),
-        _ => (&*lower, None),
-    };
-    let parts: Vec<&str> = clock.split(':').map(str::trim).take(4).collect();
-    let seconds = |text: &str| text.replacen(',', ".", 1).parse::<f64>().ok().filter(|s| (0.0..1e9).contains(s));
-    let count = |text: &str, below: i64| text.parse::<i64>().ok().filter(|count| (0..below).contains(count));
-    let whole = match *parts {
-        [text] if noon.is_none() => seconds(text).map(|seconds| (0, seconds)),
-        [hours, minutes, text] => count(hours, 24)
-            .zip(count(minutes, 60))
-            .zip(seconds(text).filter(|s| *s < 61.0))
-            .map(|((hours, minutes), seconds)| {
-                let hours = noon.map_or(hours, |noon| hours % 12 + noon);
-                (60 * (60 * hours + minutes), seconds)
-            }),
+fn time_of_day(value: Piece<'_>) -> Result<i64, TextError> {
+    let unknown = || value.error(format!("expected a time as `08:21:17.982`, found `{}`", shortened(value.text)));
+    let (whole, seconds) = clock(&value.text.to_ascii_lowercase()).ok_or_else(unknown)?;
+    Ok(whole * 1_000_000_000 + (seconds * 1e9).round() as i64)
+}
+
+/// Returns the seconds of the hours and minutes, and the seconds after them.
+fn clock(lower: &str) -> Option<(i64, f64)> {
+    let halves = [("am", 0), ("pm", 12)];
+    let half = halves.into_iter().find_map(|(half, noon)| Some((lower.strip_suffix(half)?, noon)));
+    let parts: Vec<&str> = half.map_or(lower, |(clock, _)| clock).split(':').map(str::trim).take(4).collect();
+    let seconds = |text: &str, below| text.replacen(',', ".", 1).parse().ok().filter(|s| (0.0..below).contains(s));
+    let count = |text: &str, below| text.parse::<i64>().ok().filter(|count| (0..below).contains(count));
+    match *parts {
+        [text] if half.is_none() => Some((0, seconds(text, 1e9)?)),
+        [hours, minutes, text] => {
+            let (hours, minutes) = (count(hours, 24)?, count(minutes, 60)?);
+            let hours = half.map_or(hours, |(_, noon)| hours % 12 + noon);
+            Some((60 * (60 * hours + minutes), seconds(text, 61.0)?))
+        }
         _ => None,
-    };
-    match whole {
-        Some((whole, seconds)) => Ok(whole * 1_000_000_000 + (seconds * 1e9).round() as i64),
-        None => flaw(&value, format!("expected a time as `08:21:17.982`, found `{}`", shortened(value.text))),
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use tactflow_runtime::signal::Base;
+    use tactflow_runtime::signal::{Base, ImageShape, Unit};
 
     use super::super::read;
     use super::super::testing::{check_damages, complaints, count_refused};

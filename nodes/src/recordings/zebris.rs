@@ -5,18 +5,17 @@
 //! row, `}`. x runs along the plate, so a row is a line along it. Pressures become kPa. The table's forces of the left
 //! and the right foot are sums of these cells, not a separate measurement.
 
-use tactflow_runtime::signal::{ImageShape, Unit};
+use std::fmt::Display;
 
-use crate::recordings::common::reel::{Reel, bounded};
-use crate::recordings::common::text::{self, Lines, Notation, Piece, Wrong, flaw, shortened};
-use crate::recordings::common::{Flaw, Format, Head, Hints, Recording, units};
+use crate::recordings::common::reel::{Properties, Reel, bounded};
+use crate::recordings::common::text::{Lines, Notation, Piece, shortened};
+use crate::recordings::common::{FileFormat, FileHead, Hints, Recording, Refusal, TextError, Window, units};
 
-pub(super) const FORMAT: Format = Format {
-    name: "zebris",
-    title: "Zebris raw data of a plate or treadmill as text",
-    recognises,
-    read: |bytes, hints| text::read(bytes, hints, parse),
-};
+pub(super) const FORMAT: FileFormat =
+    FileFormat::text("zebris", "Zebris raw data of a plate or treadmill as text", recognises, parse);
+
+/// Maximum number of mistakes in a header that are reported.
+const MAX_REPORTED: usize = 20;
 
 /// Keys in lower case, in English and in German.
 const PLATFORM: &[&str] = &["platform {", "plattform {", "platform{", "plattform{"];
@@ -29,7 +28,7 @@ const COUNT: &[&str] = &["frame count", "frames"];
 const FREQUENCY: &[&str] = &["frequency", "frequenz"];
 const TIME: &[&str] = &["time", "zeit"];
 
-fn recognises(head: &Head<'_>) -> bool {
+fn recognises(head: &FileHead<'_>) -> bool {
     // The table of forces comes first, and may fill all of the head.
     let has = |words: &[&str]| Lines::new(&head.text).any(|line| is_one_of(line.text.trim(), words));
     has(PLATFORM) || has(&["exercises\t{", "exercises {"]) && head.text.to_lowercase().contains("butterfly.")
@@ -40,127 +39,98 @@ fn is_one_of(text: &str, names: &[&str]) -> bool {
 }
 
 /// A property with its unit, as `Cell width,mm   8.47`.
-struct Entry<'t> {
+struct Property<'t> {
     name: Piece<'t>,
     unit: &'t str,
     value: Piece<'t>,
 }
 
-fn entry(line: Piece<'_>) -> Entry<'_> {
+fn property(line: Piece<'_>) -> Property<'_> {
     let split = line.text.split_once(['\t', ';']).or_else(|| line.text.rsplit_once(','));
     let (key, value) = split.unwrap_or((line.text, &line.text[line.text.len()..]));
     let (name, unit) = key.split_once(',').unwrap_or((key, ""));
-    Entry { name: line.part(name).trimmed(), unit: unit.trim(), value: line.part(value).trimmed() }
+    Property { name: line.part(name).trimmed(), unit: unit.trim(), value: line.part(value).trimmed() }
 }
 
 /// Properties of the plate.
 #[derive(Default)]
 struct Platform<'t> {
-    cols: Option<(usize, Piece<'t>)>,
+    cols: Option<usize>,
     rows: Option<(usize, Piece<'t>)>,
     width: Option<f64>,
     height: Option<f64>,
-    unit: Option<(Unit, f64)>,
     count: Option<(u64, Piece<'t>)>,
-    rate: Option<f64>,
+    /// Unit, and time between two frames.
+    found: Properties,
 }
 
 impl<'t> Platform<'t> {
-    fn read(&mut self, line: Piece<'t>) -> Result<(), Flaw> {
-        let Entry { name, unit, value } = entry(line);
+    fn read(&mut self, line: Piece<'t>) -> Result<(), TextError> {
+        let Property { name, unit, value } = property(line);
         let is = |names| is_one_of(name.text, names);
         let what = format!("`{}`", shortened(name.text));
         let length = || {
-            positive(value, &what).and_then(|number| match units::metres(unit) {
-                Some(metres) => Ok(number * metres),
-                None => flaw(&line, format!("the unit of {what} is unknown:  `{}`", shortened(unit))),
-            })
-        };
-        let count = || match usize::try_from(value.count(&what)?) {
-            Ok(count @ 1..) => Ok((count, value)),
-            _ => flaw(&value, format!("{what} must be at least 1")),
+            let unknown = || line.error(format!("the unit of {what} is unknown:  `{}`", shortened(unit)));
+            Ok::<f64, TextError>(value.positive(&what)? * units::metres(unit).ok_or_else(unknown)?)
         };
         match () {
-            () if is(COLUMNS) => self.cols = Some(count()?),
-            () if is(LINES) => self.rows = Some(count()?),
+            () if is(COLUMNS) => self.cols = Some(value.side(&what)?),
+            () if is(LINES) => self.rows = Some((value.side(&what)?, value)),
             () if is(WIDTH) => self.width = Some(length()?),
             () if is(HEIGHT) => self.height = Some(length()?),
             () if is(COUNT) => self.count = Some((value.count(&what)?, value)),
-            () if is(FREQUENCY) => self.rate = Some(positive(value, &what)?),
-            () if is(UNITS) => match units::unit(value.text) {
-                Some(unit) => self.unit = Some(unit),
-                None => return flaw(&value, format!("the unit `{}` is unknown", shortened(value.text))),
-            },
+            () if is(FREQUENCY) => self.found.period = Some(value.positive(&what)?.recip()),
+            () if is(UNITS) => self.found.unit = Some(units::parse(value)?),
             () => {}
         }
         Ok(())
     }
 
-    /// Rows and columns.
-    fn size(&self, end: Piece<'_>) -> Result<(usize, usize), Flaw> {
-        let Some((rows, at)) = self.rows else { return flaw(&end, "`Lines` is missing in `Platform`") };
-        let Some((cols, _)) = self.cols else { return flaw(&end, "`Columns` is missing in `Platform`") };
-        bounded(rows, cols).or_else(|message| flaw(&at, message))?;
-        Ok((rows, cols))
+    /// Returns the number of rows and of columns.
+    fn size(&self, end: Piece<'_>) -> Result<[usize; 2], TextError> {
+        let (rows, at) = self.rows.ok_or_else(|| end.error("`Lines` is missing in `Platform`"))?;
+        let cols = self.cols.ok_or_else(|| end.error("`Columns` is missing in `Platform`"))?;
+        bounded(rows, cols).map_err(|message| at.error(message))?;
+        Ok([rows, cols])
     }
 }
 
-fn positive(value: Piece<'_>, what: &str) -> Result<f64, Flaw> {
-    let number = value.decimal(what)?;
-    if number > 0.0 { Ok(number) } else { flaw(&value, format!("{what} must be greater than 0")) }
-}
-
-fn parse(text: &str, hints: &Hints) -> Result<Recording, Wrong> {
+fn parse(text: &str, hints: &Hints) -> Result<Recording, Refusal> {
     let mut lines = Lines::new(text);
     let (platform, first) = platform(&mut lines)?;
-    let (rows, cols) = platform.size(first)?;
-    let (unit, factor) = platform.unit.unzip();
-    let reel = Reel::default();
-    let mut reader = Reader { reel, rows, cols, factor: factor.unwrap_or(1.0), lines };
+    let size = platform.size(first)?;
+    let pitch = platform.width.zip(platform.height).map(<[f64; 2]>::from);
+    let found = Properties { size: Some(size), pitch, ..platform.found };
+    let mut reader = ZebrisReader { reel: Reel::default(), size, factor: found.factor(), lines };
     let mut next = Some(first);
     while let Some(line) = next {
         reader.frame(line)?;
         next = reader.next_frame()?;
     }
-    let Reader { mut reel, lines, .. } = reader;
-    if let Some((count, at)) = platform.count
-        && count != reel.frames.len() as u64
-    {
-        let found = reel.frames.len();
-        let message = format!("`Frame count` is {count}, but the file has {found} frames");
-        let at = if (found as u64) < count { lines.end() } else { at };
-        return flaw(&at, message).map_err(Wrong::from);
+    let ZebrisReader { reel, lines, .. } = reader;
+    let frames = reel.frames.len() as u64;
+    if let Some((count, at)) = platform.count {
+        let at = if frames < count { lines.end() } else { at };
+        at.check(count == frames, format_args!("`Frame count` is {count}, but the file has {frames} frames"))?;
     }
-    reel.start_at_zero();
-    hints.size(Some([rows, cols]))?;
-    let pitch = platform.width.zip(platform.height).map(|(width, height)| [width, height]);
-    let period = platform.rate.map(|rate| 1.0 / rate).or_else(|| reel.mean_step());
-    let (unit, pitch, period) = hints.complete(unit, pitch, period)?;
-    let shape = ImageShape { rows, cols, pitch, unit };
-    let Reel { frames, cells, dead } = reel;
-    Ok(Recording { format: FORMAT.name, shape, frames, cells, dead, threshold: None, period, force: None })
+    reel.finish(FORMAT.name, found, hints)
 }
 
 /// Reads the header up to the line of the first frame, which is returned too.
-fn platform<'t>(lines: &mut Lines<'t>) -> Result<(Platform<'t>, Piece<'t>), Vec<Flaw>> {
+fn platform<'t>(lines: &mut Lines<'t>) -> Result<(Platform<'t>, Piece<'t>), Refusal> {
+    let is_begun = lines.any(|line| is_one_of(line.text.trim(), PLATFORM));
+    lines.end().check(is_begun, "the file ends without `Platform {`")?;
     let mut platform = Platform::default();
     let mut flaws = Vec::new();
-    if !lines.any(|line| is_one_of(line.text.trim(), PLATFORM)) {
-        flaws.push(Flaw { span: lines.end().span(), message: "the file ends without `Platform {`".into() });
-        return Err(flaws);
-    }
     for line in lines.by_ref().map(Piece::trimmed) {
         if frame_number(line).is_some() {
-            return if flaws.is_empty() { Ok((platform, line)) } else { Err(flaws) };
+            return if flaws.is_empty() { Ok((platform, line)) } else { Err(flaws.into()) };
         }
-        if let Err(flaw) = platform.read(line)
-            && flaws.len() < 20
-        {
-            flaws.push(flaw);
-        }
+        let flaw = platform.read(line).err();
+        flaws.extend(flaw.filter(|_| flaws.len() < MAX_REPORTED));
     }
-    flaws.push(Flaw { span: lines.end().span(), message: "the file ends without a frame".into() });
-    Err(flaws)
+    flaws.push(lines.end().error("the file ends without a frame"));
+    Err(flaws.into())
 }
 
 /// Returns the number in `Frame 12 {`, or `None` for another line.
@@ -169,125 +139,91 @@ fn frame_number(line: Piece<'_>) -> Option<Piece<'_>> {
     rest.text.strip_suffix('{').map(|number| rest.part(number).trimmed())
 }
 
-struct Reader<'t> {
+struct ZebrisReader<'t> {
     reel: Reel,
-    rows: usize,
-    cols: usize,
+    /// Rows and columns.
+    size: [usize; 2],
     /// Factor from the file's unit to that of the cells.
     factor: f64,
     lines: Lines<'t>,
 }
 
-impl<'t> Reader<'t> {
+impl<'t> ZebrisReader<'t> {
     /// Reads the frame with the first line `line`, up to its `}`.
-    fn frame(&mut self, line: Piece<'t>) -> Result<(), Flaw> {
+    fn frame(&mut self, line: Piece<'t>) -> Result<(), TextError> {
         let at = frame_number(line).expect("the caller has checked the line");
         let number = at.count("the frame's number")?;
-        let last = self.reel.frames.last().copied();
-        if let Some(last) = last
-            && last.number.checked_add(1) != Some(number)
-        {
-            return flaw(&at, format!("frame {number} comes after frame {}", last.number));
-        }
-        let (time, at) = self.head(number)?;
-        if last.is_some_and(|last| last.time > time) {
-            return flaw(&at, "the time goes back");
-        }
-        for row in 0..self.rows {
+        self.reel.follows(number, at)?;
+        let time = self.head(number)?;
+        let [rows, cols] = self.size;
+        for row in 1..=rows {
             self.row(number, row)?;
         }
-        let end = self.line();
-        if end.text != "}" {
-            return flaw(&end, format!("expected `}}` after the {} rows of frame {number}", self.rows));
-        }
-        self.reel.frame(number, time, self.rows, self.cols);
+        let end = self.lines.next_filled();
+        end.check(end.text == "}", format_args!("expected `}}` after the {rows} rows of frame {number}"))?;
+        self.reel.frame(number, Some(time), Window::whole(rows, cols));
         Ok(())
     }
 
-    /// Returns the next line that is not blank, or the end of the file.
-    fn line(&mut self) -> Piece<'t> {
-        let line = self.lines.by_ref().map(Piece::trimmed).find(|line| !line.text.is_empty());
-        line.unwrap_or_else(|| self.lines.end())
-    }
-
     /// Reads the lines before the rows, up to the names of the columns, and returns the time [ns].
-    fn head(&mut self, frame: u64) -> Result<(i64, Piece<'t>), Flaw> {
-        let mut found = None;
+    fn head(&mut self, frame: u64) -> Result<i64, TextError> {
+        let [_, cols] = self.size;
+        let mut time = None;
         loop {
-            let line = self.line();
-            let names =
-                line.text.split(|c: char| c.is_whitespace() || c == ';' || c == ',').filter(|name| !name.is_empty());
-            if names.clone().next().is_some_and(|name| name.eq_ignore_ascii_case("x1")) {
-                let names = names.count();
-                if names != self.cols {
-                    let message = format!("frame {frame} has {names} names of columns, but `Columns` is {}", self.cols);
-                    return flaw(&line, message);
-                }
-                return found.map_or_else(|| flaw(&line, format!("frame {frame} has no `Time`")), Ok);
+            let line = self.lines.next_filled();
+            let names = line.text.split(|c: char| c.is_whitespace() || c == ';' || c == ',');
+            let mut names = names.filter(|name| !name.is_empty()).peekable();
+            if names.peek().is_some_and(|name| name.eq_ignore_ascii_case("x1")) {
+                let found = names.count();
+                let message = format_args!("frame {frame} has {found} names of columns, but `Columns` is {cols}");
+                line.check(found == cols, message)?;
+                let (time, at) = time.ok_or_else(|| line.error(format!("frame {frame} has no `Time`")))?;
+                return self.reel.time(time, at);
             }
-            if line.text.is_empty() || line.text == "}" || line.after("y1").is_some() || frame_number(line).is_some() {
-                return flaw(&line, format!("frame {frame} ends without its columns"));
-            }
-            let Entry { name, unit, value } = entry(line);
+            let is_end = line.text.is_empty() || line.text == "}";
+            let is_late = is_end || line.after("y1").is_some() || frame_number(line).is_some();
+            line.check(!is_late, format_args!("frame {frame} ends without its columns"))?;
+            let Property { name, unit, value } = property(line);
             if is_one_of(name.text, TIME) {
-                found = Some((nanoseconds(value, unit)?, value));
+                let is_second = ["s", "sec"].iter().any(|second| unit.eq_ignore_ascii_case(second));
+                let number = value.decimal("the frame's time")?;
+                time = Some((number * if is_second { 1e9 } else { 1e6 }, value));
             }
         }
     }
 
-    fn row(&mut self, frame: u64, row: usize) -> Result<(), Flaw> {
-        let line = self.line();
+    /// Reads a row of cells; `row` counts from 1.
+    fn row(&mut self, frame: u64, row: usize) -> Result<(), TextError> {
+        let [_, cols] = self.size;
+        let line = self.lines.next_filled();
         let notation = Notation::of(line.text);
         let mut fields = notation.fields(line);
-        let name =
-            fields.next().filter(|name| name.text.strip_prefix(['y', 'Y']).is_some_and(|n| n.parse() == Ok(row + 1)));
-        if name.is_none() {
-            return flaw(&line, format!("expected row `y{}` of frame {frame}", row + 1));
-        }
+        let is_row =
+            |name: Piece<'_>| name.text.strip_prefix(['y', 'Y']).is_some_and(|number| number.parse() == Ok(row));
+        line.check(fields.next().is_some_and(is_row), format_args!("expected row `y{row}` of frame {frame}"))?;
         let before = self.reel.cells.len();
-        for (col, cell) in fields.take(self.cols + 1).enumerate() {
-            let value = notation.number(cell, "this cell")? * self.factor;
-            self.reel.cell(row * self.cols + col, value).or_else(|message| flaw(&cell, message))?;
-        }
-        let (found, cols) = (self.reel.cells.len() - before, self.cols);
-        if found == cols {
-            return Ok(());
-        }
-        let found = if found > cols { "more".to_owned() } else { found.to_string() };
-        flaw(&line, format!("row `y{}` of frame {frame} has {found} cells, but `Columns` is {cols}", row + 1))
+        self.reel.row(fields.take(cols + 1), |cell| Ok(notation.number(cell, "this cell")? * self.factor))?;
+        let found = self.reel.cells.len() - before;
+        let count: &dyn Display = if found > cols { &"more" } else { &found };
+        let message = format_args!("row `y{row}` of frame {frame} has {count} cells, but `Columns` is {cols}");
+        line.check(found == cols, message)
     }
 
     /// Returns the line of the next frame, or `None` at the end of the file.
-    fn next_frame(&mut self) -> Result<Option<Piece<'t>>, Flaw> {
+    fn next_frame(&mut self) -> Result<Option<Piece<'t>>, TextError> {
         loop {
-            let line = self.line();
-            if line.text.is_empty() {
-                return Ok(None);
+            let line = self.lines.next_filled();
+            if line.text.is_empty() || frame_number(line).is_some() {
+                return Ok((!line.text.is_empty()).then_some(line));
             }
-            if frame_number(line).is_some() {
-                return Ok(Some(line));
-            }
-            if line.text != "}" {
-                return flaw(&line, format!("expected a frame, found `{}`", shortened(line.text)));
-            }
+            line.check(line.text == "}", format_args!("expected a frame, found `{}`", shortened(line.text)))?;
         }
-    }
-}
-
-fn nanoseconds(value: Piece<'_>, unit: &str) -> Result<i64, Flaw> {
-    let number = value.decimal("the frame's time")?;
-    let nanoseconds =
-        number * if unit.eq_ignore_ascii_case("s") || unit.eq_ignore_ascii_case("sec") { 1e9 } else { 1e6 };
-    if (0.0..1e18).contains(&nanoseconds) {
-        Ok(nanoseconds.round() as i64)
-    } else {
-        flaw(&value, "the frame's time is not from 0 to 1e9 s")
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use tactflow_runtime::signal::Base;
+    use tactflow_runtime::signal::{Base, ImageShape, Unit};
 
     use super::super::read;
     use super::super::testing::{check_damages, count_refused};

@@ -31,12 +31,40 @@ const MIN_PERIOD_S: f64 = 1e-6;
 /// Maximum time between two frames that can be played [s].
 const MAX_PERIOD_S: f64 = 1e3;
 
-/// Start of a message about a missing property.
-const MISSING: &str = "the file does not give ";
-
-fn agree(a: f64, b: f64) -> bool {
-    (a - b).abs() <= MAX_ROUNDING * a.abs().max(b.abs())
+/// A property that a hint may give.
+struct Property {
+    /// Name of the hint.
+    hint: &'static str,
+    /// What a message calls it.
+    title: &'static str,
+    /// What to write in the bench.
+    help: &'static str,
 }
+
+const UNIT: Property = Property {
+    hint: "unit",
+    title: "the unit of its values",
+    help: "set `unit` of the bench's device, as `unit = \"kPa\"`, or `unit = \"raw\"` for plain counts (`features`: `--unit kPa`)",
+};
+
+const PITCH: Property = Property {
+    hint: "pitch_mm",
+    title: "the pitch of its tactels",
+    help: "set `pitch_mm = [x, y]` of the bench's device: the distances between the centres of two tactels \
+           (`features`: `--pitch-mm 5x5`)",
+};
+
+const RATE: Property = Property {
+    hint: "rate_hz",
+    title: "its frame rate",
+    help: "set `rate_hz` of the bench's device: the frames per second of the recording (`features`: `--rate-hz 250`)",
+};
+
+const SIZE: Property = Property {
+    hint: "size",
+    title: "its number of rows and columns",
+    help: "set `size = [rows, columns]` of the bench's device (`features`: `--size 16x16`)",
+};
 
 /// Defaults for callers to whom unit, pitch and rate do not matter.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -50,77 +78,33 @@ pub struct Assumed {
 }
 
 impl Hints {
-    /// Returns the unit; `found` is that of the file.
+    /// Returns unit, pitch [m] and nominal time between two frames [s], from those of the file and the hints.
     ///
     /// # Errors
-    /// If neither the file nor a hint gives it, or both do and differ.
-    pub fn unit(&self, found: Option<Unit>) -> Result<Unit, Refusal> {
-        let help = "set `unit` of the bench's device, as `unit = \"kPa\"`, or `unit = \"raw\"` for plain counts (`features`: `--unit kPa`)";
-        let given = self.given(found.is_some(), self.unit, |assumed| assumed.unit);
-        choose(found, given, "unit", help, |a, b| a == b, Unit::to_string)
-    }
-
-    /// Returns the pitch along x and along y [m]; `found` is that of the file.
-    ///
-    /// # Errors
-    /// If neither the file nor a hint gives it, or both do and differ.
-    pub fn pitch(&self, found: Option<[f64; 2]>) -> Result<[f64; 2], Refusal> {
-        let help = "set `pitch_mm = [x, y]` of the bench's device: the distances between the centres of two tactels \
-                    (`features`: `--pitch-mm 5x5`)";
-        let same = |a: &[f64; 2], b: &[f64; 2]| agree(a[0], b[0]) && agree(a[1], b[1]);
-        let show = |pitch: &[f64; 2]| format!("[{}, {}] mm", millimetres(pitch[0]), millimetres(pitch[1]));
-        let given = self.given(found.is_some(), self.pitch, |assumed| assumed.pitch);
-        choose(found, given, "pitch_mm", help, same, show)
-    }
-
-    /// Returns the nominal time between two frames [s]; `found` is that of the file.
-    ///
-    /// # Errors
-    /// If neither the file nor a hint gives it, or both do and differ.
-    pub fn period(&self, found: Option<f64>) -> Result<f64, Refusal> {
-        let help =
-            "set `rate_hz` of the bench's device: the frames per second of the recording (`features`: `--rate-hz 250`)";
-        let given = self.given(found.is_some(), self.rate_hz, |assumed| assumed.rate_hz).map(|rate| 1.0 / rate);
-        let show = |period: &f64| format!("{} frames a second", (1e6 / period).round() / 1e6);
-        let period = choose(found, given, "rate_hz", help, |a, b| agree(*a, *b), show)?;
-        if (MIN_PERIOD_S..=MAX_PERIOD_S).contains(&period) {
-            Ok(period)
-        } else {
-            Err(Refusal::broken(format!("a period of {period} s is not from {MIN_PERIOD_S} to {MAX_PERIOD_S} s")))
-        }
-    }
-
-    /// Returns unit, pitch and period together, so one message lists all that is missing.
-    ///
-    /// # Errors
-    /// If neither the file nor a hint gives one of them, or both do and differ.
+    /// If neither the file nor a hint gives one of them, or both do and differ. One message lists all that is missing.
     pub fn complete(
         &self,
         unit: Option<Unit>,
         pitch: Option<[f64; 2]>,
         period: Option<f64>,
     ) -> Result<(Unit, [f64; 2], f64), Refusal> {
-        let found = (self.unit(unit), self.pitch(pitch), self.period(period));
-        let refusals = match found {
-            (Ok(unit), Ok(pitch), Ok(period)) => return Ok((unit, pitch, period)),
-            (unit, pitch, period) => [unit.err(), pitch.err(), period.err()],
-        };
-        let (mut missing, mut ways_out) = (Vec::new(), Vec::new());
-        for refusal in refusals.into_iter().flatten() {
-            match refusal {
-                Refusal::Silent { message, help } => {
-                    missing.push(message.trim_start_matches(MISSING).to_owned());
-                    ways_out.push(help);
-                }
-                other => return Err(other),
-            }
+        let assumed = self.assumed;
+        let units = [unit, self.unit, assumed.map(|assumed| assumed.unit)];
+        let pitches = [pitch, self.pitch, assumed.map(|assumed| assumed.pitch)];
+        let periods = [period, self.rate_hz.map(f64::recip), assumed.map(|assumed| assumed.rate_hz.recip())];
+        let unit = UNIT.choose(units, |a, b| a == b, Unit::to_string)?;
+        let pitch = PITCH.choose(pitches, |a, b| agree(a[0], b[0]) && agree(a[1], b[1]), show_pitch)?;
+        let period = RATE.choose(periods, |a, b| agree(*a, *b), show_rate)?;
+        if let Some(period) = period.filter(|period| !(MIN_PERIOD_S..=MAX_PERIOD_S).contains(period)) {
+            let message = format!("a period of {period} s is not from {MIN_PERIOD_S} to {MAX_PERIOD_S} s");
+            return Err(Refusal::broken(message));
         }
-        Err(Refusal::Silent { message: format!("{MISSING}{}", missing.join(", or ")), help: ways_out.join("; ") })
-    }
-
-    /// Returns the hint, or the default if the file gives nothing either.
-    fn given<T>(&self, is_found: bool, hint: Option<T>, assumed: impl Fn(&Assumed) -> T) -> Option<T> {
-        hint.or_else(|| self.assumed.as_ref().filter(|_| !is_found).map(assumed))
+        if let (Some(unit), Some(pitch), Some(period)) = (unit, pitch, period) {
+            return Ok((unit, pitch, period));
+        }
+        let are_missing = [(unit.is_none(), &UNIT), (pitch.is_none(), &PITCH), (period.is_none(), &RATE)];
+        let missing = are_missing.into_iter().filter(|(is_missing, _)| *is_missing);
+        Err(missing_properties(&missing.map(|(_, property)| property).collect::<Vec<_>>()))
     }
 
     /// Returns the number of rows and of columns; `found` is that of the file.
@@ -128,36 +112,49 @@ impl Hints {
     /// # Errors
     /// If neither the file nor a hint gives it, or both do and differ.
     pub fn size(&self, found: Option<[usize; 2]>) -> Result<[usize; 2], Refusal> {
-        let help = "set `size = [rows, columns]` of the bench's device (`features`: `--size 16x16`)";
-        choose(found, self.size, "size", help, |a, b| a == b, |[rows, cols]| format!("{rows} rows by {cols} columns"))
+        let show = |[rows, cols]: &[usize; 2]| format!("{rows} rows by {cols} columns");
+        let size = SIZE.choose([found, self.size, None], |a, b| a == b, show)?;
+        size.ok_or_else(|| missing_properties(&[&SIZE]))
     }
 }
 
-fn millimetres(metres: f64) -> f64 {
-    (metres * 1e7).round() / 1e4
-}
-
-fn choose<T>(
-    found: Option<T>,
-    given: Option<T>,
-    hint: &'static str,
-    help: &str,
-    same: impl Fn(&T, &T) -> bool,
-    show: impl Fn(&T) -> String,
-) -> Result<T, Refusal> {
-    match (found, given) {
-        (Some(found), Some(given)) if !same(&found, &given) => {
-            Err(Refusal::Contradicted { hint, message: format!("the file has another value: {}", show(&found)) })
-        }
-        (Some(value), _) | (None, Some(value)) => Ok(value),
-        (None, None) => {
-            let what = match hint {
-                "pitch_mm" => "the pitch of its tactels",
-                "rate_hz" => "its frame rate",
-                "size" => "its number of rows and columns",
-                _ => "the unit of its values",
-            };
-            Err(Refusal::Silent { message: format!("{MISSING}{what}"), help: help.into() })
+impl Property {
+    /// Returns the value of the file or that of the hint, which must not differ, or else the default.
+    fn choose<T>(
+        &self,
+        [found, given, assumed]: [Option<T>; 3],
+        same: impl Fn(&T, &T) -> bool,
+        show: impl Fn(&T) -> String,
+    ) -> Result<Option<T>, Refusal> {
+        match (found, given) {
+            (Some(found), Some(given)) if !same(&found, &given) => Err(Refusal::Contradicted {
+                hint: self.hint,
+                message: format!("the file has another value: {}", show(&found)),
+            }),
+            (found, given) => Ok(found.or(given).or(assumed)),
         }
     }
+}
+
+fn missing_properties(missing: &[&Property]) -> Refusal {
+    let list = |text: fn(&Property) -> &'static str, separator| {
+        missing.iter().map(|property| text(property)).collect::<Vec<_>>().join(separator)
+    };
+    Refusal::Silent {
+        message: format!("the file does not give {}", list(|property| property.title, ", or ")),
+        help: list(|property| property.help, "; "),
+    }
+}
+
+fn agree(a: f64, b: f64) -> bool {
+    (a - b).abs() <= MAX_ROUNDING * a.abs().max(b.abs())
+}
+
+fn show_pitch([x, y]: &[f64; 2]) -> String {
+    let millimetres = |metres: &f64| (metres * 1e7).round() / 1e4;
+    format!("[{}, {}] mm", millimetres(x), millimetres(y))
+}
+
+fn show_rate(period: &f64) -> String {
+    format!("{} frames a second", (1e6 / period).round() / 1e6)
 }

@@ -10,7 +10,7 @@ pub mod text;
 pub(super) mod units;
 pub(super) mod zip;
 
-pub use format::{Format, HEAD_BYTES, Head};
+pub use format::{FileFormat, FileHead, HEAD_BYTES, Parser};
 pub use hints::{Assumed, Hints};
 pub use recording::{Frame, MAX_CELLS, Recording, Window};
-pub use refusal::{Flaw, Refusal};
+pub use refusal::{Refusal, TextError};

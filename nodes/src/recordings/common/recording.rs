@@ -62,14 +62,8 @@ impl Window {
 
     /// Returns the number of cells.
     #[must_use]
-    pub const fn len(&self) -> usize {
+    pub const fn cells(&self) -> usize {
         self.rows as usize * self.cols as usize
-    }
-
-    /// Whether there are no cells.
-    #[must_use]
-    pub const fn is_empty(&self) -> bool {
-        self.len() == 0
     }
 }
 
@@ -97,7 +91,7 @@ impl Recording {
             let Window { top, left, rows: high, cols: wide } = frame.window;
             let fits = top as usize + high as usize <= rows && left as usize + wide as usize <= cols;
             let follows = frame.start == next;
-            next += frame.window.len();
+            next += frame.window.cells();
             fits && follows
         });
         frames_fit

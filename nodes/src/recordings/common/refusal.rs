@@ -4,7 +4,7 @@ use std::ops::Range;
 
 /// What is wrong with a text, and where.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Flaw {
+pub struct TextError {
     /// Byte range in the text.
     pub span: Range<usize>,
     /// What is wrong.
@@ -18,10 +18,10 @@ pub enum Refusal {
     Stranger,
     /// A text does not follow its format.
     Damaged {
-        /// The text, decoded.
+        /// The text, decoded. A parser leaves it empty; [`FileFormat::read`](super::FileFormat::read) adds it.
         text: String,
         /// What is wrong, and where.
-        flaws: Vec<Flaw>,
+        flaws: Vec<TextError>,
     },
     /// A file that is not text does not follow its format.
     Broken {
@@ -50,5 +50,17 @@ impl Refusal {
     /// Returns a refusal of a file that is not text.
     pub fn broken(message: impl Into<String>) -> Self {
         Self::Broken { message: message.into(), help: None }
+    }
+}
+
+impl From<Vec<TextError>> for Refusal {
+    fn from(flaws: Vec<TextError>) -> Self {
+        Self::Damaged { text: String::new(), flaws }
+    }
+}
+
+impl From<TextError> for Refusal {
+    fn from(flaw: TextError) -> Self {
+        vec![flaw].into()
     }
 }

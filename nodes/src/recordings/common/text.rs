@@ -1,54 +1,10 @@
 //! What the text formats share: decoding, lines, pieces with their place, numbers.
 
 use std::borrow::Cow;
+use std::fmt::Display;
 use std::ops::Range;
 
-use super::hints::Hints;
-use super::recording::Recording;
-use super::refusal::{Flaw, Refusal};
-
-/// Returns a flaw at a piece.
-pub(crate) fn flaw<T>(at: &Piece<'_>, message: impl Into<String>) -> Result<T, Flaw> {
-    Err(Flaw { span: at.span(), message: message.into() })
-}
-
-/// Why a text is refused: mistakes in it, or a refusal that is not about its text.
-#[derive(Debug)]
-pub(crate) enum Wrong {
-    Flaws(Vec<Flaw>),
-    Refusal(Refusal),
-}
-
-impl From<Flaw> for Wrong {
-    fn from(flaw: Flaw) -> Self {
-        Self::Flaws(vec![flaw])
-    }
-}
-
-impl From<Vec<Flaw>> for Wrong {
-    fn from(flaws: Vec<Flaw>) -> Self {
-        Self::Flaws(flaws)
-    }
-}
-
-impl From<Refusal> for Wrong {
-    fn from(refusal: Refusal) -> Self {
-        Self::Refusal(refusal)
-    }
-}
-
-/// Decodes bytes and parses the text.
-pub(crate) fn read(
-    bytes: &[u8],
-    hints: &Hints,
-    parse: impl FnOnce(&str, &Hints) -> Result<Recording, Wrong>,
-) -> Result<Recording, Refusal> {
-    let text = decode(bytes);
-    parse(&text, hints).map_err(|wrong| match wrong {
-        Wrong::Flaws(flaws) => Refusal::Damaged { text: text.into_owned(), flaws },
-        Wrong::Refusal(refusal) => refusal,
-    })
-}
+use super::refusal::TextError;
 
 /// Decodes bytes as text.
 ///
@@ -118,28 +74,43 @@ impl<'t> Piece<'t> {
         self.part(self.text.trim_start_matches('"')).trimmed()
     }
 
-    /// Parses a finite number, with a decimal point or a decimal comma.
-    pub(crate) fn decimal(self, what: &str) -> Result<f64, Flaw> {
-        Notation { separator: None, has_decimal_comma: true }.number(self, what)
+    /// Returns an error at this piece.
+    pub(crate) fn error(&self, message: impl Into<String>) -> TextError {
+        TextError { span: self.span(), message: message.into() }
     }
 
-    /// Parses a finite number.
-    pub(crate) fn number(self, what: &str) -> Result<f64, Flaw> {
-        match self.text.parse::<f64>() {
-            Ok(number) if number.is_finite() => Ok(number),
-            Ok(_) => flaw(&self, format!("{what} is not finite: `{}`", shortened(self.text))),
-            Err(_) => flaw(&self, format!("{what} is not a number: `{}`", shortened(self.text))),
-        }
+    /// Returns an error at this piece unless a condition holds.
+    pub(crate) fn check(&self, holds: bool, message: impl Display) -> Result<(), TextError> {
+        if holds { Ok(()) } else { Err(self.error(message.to_string())) }
+    }
+
+    /// Parses a finite number, with a decimal point or a decimal comma.
+    pub(crate) fn decimal(self, what: &str) -> Result<f64, TextError> {
+        Notation::default().number(self, what)
+    }
+
+    /// Parses a number greater than 0, with a decimal point or a decimal comma.
+    pub(crate) fn positive(self, what: &str) -> Result<f64, TextError> {
+        let number = self.decimal(what)?;
+        self.check(number > 0.0, format_args!("{what} must be greater than 0"))?;
+        Ok(number)
     }
 
     /// Parses a whole number.
-    pub(crate) fn count(self, what: &str) -> Result<u64, Flaw> {
-        self.text.parse().or_else(|_| flaw(&self, format!("{what} is not a whole number: `{}`", shortened(self.text))))
+    pub(crate) fn count(self, what: &str) -> Result<u64, TextError> {
+        let message = || format!("{what} is not a whole number: `{}`", shortened(self.text));
+        self.text.parse().map_err(|_| self.error(message()))
+    }
+
+    /// Parses a number of rows or columns: a whole number greater than 0.
+    pub(crate) fn side(self, what: &str) -> Result<usize, TextError> {
+        let side = usize::try_from(self.count(what)?).ok().filter(|side| *side > 0);
+        side.ok_or_else(|| self.error(format!("{what} must be at least 1")))
     }
 }
 
 /// The lines of a text, without their ends.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub(crate) struct Lines<'t> {
     text: &'t str,
     next: usize,
@@ -159,6 +130,17 @@ impl<'t> Lines<'t> {
     pub(crate) fn is_at_end(&self) -> bool {
         self.next >= self.text.len()
     }
+
+    /// Returns the end of a message about the last line: whether the file ends in it.
+    pub(crate) fn cut(&self) -> &'static str {
+        if self.is_at_end() { ": the file ends in the middle of it" } else { "" }
+    }
+
+    /// Returns the next line that is not blank, without surrounding blanks, or the end of the text.
+    pub(crate) fn next_filled(&mut self) -> Piece<'t> {
+        let line = self.map(Piece::trimmed).find(|line| !line.text.is_empty());
+        line.unwrap_or_else(|| self.end())
+    }
 }
 
 impl<'t> Iterator for Lines<'t> {
@@ -177,26 +159,19 @@ impl<'t> Iterator for Lines<'t> {
     }
 }
 
-/// How a text writes the numbers of a row.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+/// How a text writes the numbers of a row. A comma that does not separate numbers is a decimal comma.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(crate) struct Notation {
     /// Separator of two numbers; `None` for blanks.
     pub(crate) separator: Option<char>,
-    /// Whether a comma is a decimal comma: then it does not separate numbers.
-    pub(crate) has_decimal_comma: bool,
 }
 
 impl Notation {
     /// Detects the notation of a row: `;`, a tab, a comma or blanks. A comma next to another separator is decimal.
     pub(crate) fn of(row: &str) -> Self {
         let row = row.trim();
-        let separator = match row {
-            row if row.contains(';') => Some(';'),
-            row if row.contains('\t') => Some('\t'),
-            row if row.contains(',') && !is_decimal_comma_between_blanks(row) => Some(','),
-            _ => None,
-        };
-        Self { separator, has_decimal_comma: separator != Some(',') }
+        let comma = || (row.contains(',') && !is_decimal_comma_between_blanks(row)).then_some(',');
+        Self { separator: [';', '\t'].into_iter().find(|separator| row.contains(*separator)).or_else(comma) }
     }
 
     /// Returns the trimmed fields of a row. A separator at the end of the row is ignored.
@@ -211,28 +186,28 @@ impl Notation {
     }
 
     /// Parses a finite number.
-    pub(crate) fn number(self, piece: Piece<'_>, what: &str) -> Result<f64, Flaw> {
-        if !self.has_decimal_comma || !piece.text.contains(',') {
-            return piece.number(what);
+    pub(crate) fn number(self, piece: Piece<'_>, what: &str) -> Result<f64, TextError> {
+        let mut text = Cow::Borrowed(piece.text);
+        if self.separator != Some(',') && text.contains(',') {
+            text = text.replacen(',', ".", 1).into();
         }
-        if let Ok(number) = piece.text.replacen(',', ".", 1).parse::<f64>()
-            && number.is_finite()
-        {
-            return Ok(number);
-        }
-        piece.number(what)
+        let flaw = match text.parse::<f64>() {
+            Ok(number) if number.is_finite() => return Ok(number),
+            Ok(_) => "finite",
+            Err(_) => "a number",
+        };
+        Err(piece.error(format!("{what} is not {flaw}: `{}`", shortened(piece.text))))
     }
 }
 
 /// Whether every comma of a row of numbers between blanks is decimal, as in `0,5 1,25`.
 fn is_decimal_comma_between_blanks(row: &str) -> bool {
-    let mut words = row.split_whitespace().peekable();
     let is_decimal = |word: &str| {
         word.split_once(',').is_none_or(|(whole, part)| {
             !part.is_empty() && !part.contains(',') && !whole.contains('.') && !part.contains('.')
         })
     };
-    words.next().is_some() && words.peek().is_some() && row.split_whitespace().all(is_decimal)
+    row.split_whitespace().nth(1).is_some() && row.split_whitespace().all(is_decimal)
 }
 
 /// Shortens a text for a message: at most 40 characters, none of them a control character.

@@ -2,79 +2,45 @@
 
 use tactflow_runtime::signal::{Base, Unit};
 
-/// A name of a unit in lower case, and its factor to the unit of the table.
-type Name = (&'static str, f64);
+use super::refusal::TextError;
+use super::text::{Piece, shortened};
+
+/// Names of a unit in lower case, and its factor to the unit of the table.
+type Names = (f64, &'static [&'static str]);
 
 /// Pressures [kPa].
-const PRESSURES: &[Name] = &[
-    ("kpa", 1.0),
-    ("kn/m2", 1.0),
-    ("pa", 1e-3),
-    ("n/m2", 1e-3),
-    ("hpa", 0.1),
-    ("mbar", 0.1),
-    ("mpa", 1e3),
-    ("n/mm2", 1e3),
-    ("n/cm2", 10.0),
-    ("bar", 100.0),
-    ("atm", 101.325),
-    ("psi", PSI),
-    ("lb/in2", PSI),
-    ("lbs/in2", PSI),
-    ("lbf/in2", PSI),
-    ("mmhg", TORR),
-    ("torr", TORR),
-    ("inhg", 25.4 * TORR),
-    ("cmh2o", 0.01 * GRAVITY),
-    ("kg/cm2", 10.0 * GRAVITY),
-    ("kgf/cm2", 10.0 * GRAVITY),
-    ("kp/cm2", 10.0 * GRAVITY),
-    ("g/cm2", 0.01 * GRAVITY),
-    ("gf/cm2", 0.01 * GRAVITY),
+const PRESSURES: &[Names] = &[
+    (1.0, &["kpa", "kn/m2"]),
+    (1e-3, &["pa", "n/m2"]),
+    (0.1, &["hpa", "mbar"]),
+    (1e3, &["mpa", "n/mm2"]),
+    (10.0, &["n/cm2"]),
+    (100.0, &["bar"]),
+    (101.325, &["atm"]),
+    (PSI, &["psi", "lb/in2", "lbs/in2", "lbf/in2"]),
+    (TORR, &["mmhg", "torr"]),
+    (25.4 * TORR, &["inhg"]),
+    (0.01 * GRAVITY, &["cmh2o", "g/cm2", "gf/cm2"]),
+    (10.0 * GRAVITY, &["kg/cm2", "kgf/cm2", "kp/cm2"]),
 ];
 
 /// Forces [N].
-const FORCES: &[Name] = &[
-    ("n", 1.0),
-    ("newton", 1.0),
-    ("newtons", 1.0),
-    ("kn", 1e3),
-    ("lb", POUND),
-    ("lbs", POUND),
-    ("lbf", POUND),
-    ("pounds", POUND),
-    ("kg", GRAVITY),
-    ("kgs", GRAVITY),
-    ("kgf", GRAVITY),
-    ("kp", GRAVITY),
-    ("kilograms", GRAVITY),
-    ("g", 1e-3 * GRAVITY),
-    ("gf", 1e-3 * GRAVITY),
-    ("grams", 1e-3 * GRAVITY),
+const FORCES: &[Names] = &[
+    (1.0, &["n", "newton", "newtons"]),
+    (1e3, &["kn"]),
+    (POUND, &["lb", "lbs", "lbf", "pounds"]),
+    (GRAVITY, &["kg", "kgs", "kgf", "kp", "kilograms"]),
+    (1e-3 * GRAVITY, &["g", "gf", "grams"]),
 ];
 
-const COUNTS: &[Name] = &[("raw", 1.0), ("counts", 1.0), ("digits", 1.0), ("bits", 1.0), ("adc", 1.0), ("lsb", 1.0)];
+const COUNTS: &[Names] = &[(1.0, &["raw", "counts", "digits", "bits", "adc", "lsb"])];
 
 /// Lengths [m].
-const LENGTHS: &[Name] = &[
-    ("mm", 1e-3),
-    ("millimeter", 1e-3),
-    ("millimeters", 1e-3),
-    ("millimetre", 1e-3),
-    ("millimetres", 1e-3),
-    ("cm", 1e-2),
-    ("centimeter", 1e-2),
-    ("centimeters", 1e-2),
-    ("centimetre", 1e-2),
-    ("centimetres", 1e-2),
-    ("m", 1.0),
-    ("meter", 1.0),
-    ("meters", 1.0),
-    ("metre", 1.0),
-    ("metres", 1.0),
-    ("in", 0.0254),
-    ("inch", 0.0254),
-    ("inches", 0.0254),
+const LENGTHS: &[Names] = &[
+    (1e-3, &["mm", "millimeter", "millimeters", "millimetre", "millimetres"]),
+    (1e-2, &["cm", "centimeter", "centimeters", "centimetre", "centimetres"]),
+    (1.0, &["m", "meter", "meters", "metre", "metres"]),
+    (0.0254, &["in", "inch", "inches"]),
 ];
 
 /// Standard gravity [m/s²], which is also the weight of a kilogram [N].
@@ -89,18 +55,21 @@ const TORR: f64 = 101.325 / 760.0;
 /// Units that a message lists.
 pub(crate) const KNOWN: &str = "`raw`, pressures (`kPa`, `N/cm2`, `PSI`, `mmHg`, …) and forces (`N`, `lbs`, `kg`, …)";
 
-fn find(names: &[Name], name: &str) -> Option<f64> {
-    names.iter().find(|(known, _)| *known == name).map(|(_, factor)| *factor)
+fn find(table: &[Names], name: &str) -> Option<f64> {
+    table.iter().find(|(_, names)| names.contains(&name)).map(|(factor, _)| *factor)
 }
 
 /// Returns the unit that stands for a vendor's name, and the factor to it.
 pub(crate) fn unit(name: &str) -> Option<(Unit, f64)> {
     let is_ignored = |c: char| c.is_whitespace() || "[]()^\"".contains(c);
     let name: String = name.to_lowercase().replace('²', "2").chars().filter(|c| !is_ignored(*c)).collect();
-    let pressure = find(PRESSURES, &name).map(|factor| (Unit::of(Base::Kilopascal), factor));
-    let force = || find(FORCES, &name).map(|factor| (Unit::NEWTON, factor));
-    let count = || find(COUNTS, &name).map(|factor| (Unit::RAW, factor));
-    pressure.or_else(force).or_else(count)
+    let tables = [(PRESSURES, Unit::of(Base::Kilopascal)), (FORCES, Unit::NEWTON), (COUNTS, Unit::RAW)];
+    tables.into_iter().find_map(|(table, unit)| Some((unit, find(table, &name)?)))
+}
+
+/// Parses a vendor's name of a unit.
+pub(crate) fn parse(name: Piece<'_>) -> Result<(Unit, f64), TextError> {
+    unit(name.text).ok_or_else(|| name.error(format!("the unit `{}` is unknown", shortened(name.text))))
 }
 
 /// Returns the factor from a unit of length to metres.

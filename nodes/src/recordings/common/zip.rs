@@ -23,7 +23,7 @@ pub(crate) const EMPTY: &[u8] = b"PK\x05\x06";
 pub(crate) struct Archive<'z>(ZipSliceArchive<&'z [u8]>);
 
 /// One file of an archive, as the directory describes it.
-pub(crate) type File<'a> = ZipFileHeaderRecord<'a>;
+pub(crate) type ZipFile<'a> = ZipFileHeaderRecord<'a>;
 
 impl<'z> Archive<'z> {
     /// Finds the directory at the end of the archive.
@@ -36,7 +36,7 @@ impl<'z> Archive<'z> {
     }
 
     /// Returns the files in the order of the directory.
-    pub(crate) fn files(&self) -> impl Iterator<Item = Result<File<'_>, Refusal>> {
+    pub(crate) fn files(&self) -> impl Iterator<Item = Result<ZipFile<'_>, Refusal>> {
         self.0.entries().map(|file| file.map_err(|_| damaged("its directory cannot be read")))
     }
 
@@ -44,7 +44,7 @@ impl<'z> Archive<'z> {
     ///
     /// # Errors
     /// If the file has a password, is packed in another way, or is not in the archive.
-    pub(crate) fn open(&self, file: &File<'_>) -> Result<Box<dyn Read + '_>, Refusal> {
+    pub(crate) fn open(&self, file: &ZipFile<'_>) -> Result<Box<dyn Read + '_>, Refusal> {
         let name = name(file);
         if file.flags().is_encrypted() {
             return Err(Refusal::broken(format!("`{name}` in the archive is protected by a password")));
@@ -64,12 +64,12 @@ impl<'z> Archive<'z> {
 }
 
 /// Returns the path of a file in its archive.
-pub(crate) fn name(file: &File<'_>) -> String {
+pub(crate) fn name(file: &ZipFile<'_>) -> String {
     String::from_utf8_lossy(file.file_path().as_bytes()).into_owned()
 }
 
 /// Whether a user has put the file there: not a folder, and not a file that an operating system adds.
-pub(crate) fn is_of_user(file: &File<'_>) -> bool {
+pub(crate) fn is_of_user(file: &ZipFile<'_>) -> bool {
     let path = file.file_path().as_bytes();
     let last = path.rsplit(|byte| *byte == b'/').next().unwrap_or(b"");
     !(last.is_empty() || last.starts_with(b".") || path.starts_with(b"__MACOSX/") || last == b"Thumbs.db")

@@ -1,13 +1,13 @@
 //! The columns of a CSV file: by their names, or tactels in order.
 
-use crate::recordings::common::text::{Notation, Piece, Wrong, flaw, shortened};
-use crate::recordings::common::{Flaw, Hints, MAX_CELLS};
+use crate::recordings::common::text::{Notation, Piece, shortened};
+use crate::recordings::common::{Hints, MAX_CELLS, Refusal, TextError};
 
 /// The columns of a file with a frame a row.
 #[derive(Debug)]
-pub(super) struct Columns {
+pub(super) struct CsvColumns {
     /// Rows and columns of the array.
-    pub(super) size: (usize, usize),
+    pub(super) size: [usize; 2],
     /// Number of columns of the file.
     pub(super) count: usize,
     /// Factor from the file's times to seconds.
@@ -36,49 +36,45 @@ const TIME: Place = (u32::MAX, 0);
 const FORCE: Place = (u32::MAX, 1);
 const PASSED: Place = (u32::MAX, 2);
 
-impl Columns {
+impl CsvColumns {
     /// Returns columns that are tactels row by row.
     pub(super) const fn plain(rows: usize, cols: usize) -> Self {
-        Self { size: (rows, cols), count: rows * cols, second: 1.0, named: None }
+        Self { size: [rows, cols], count: rows * cols, second: 1.0, named: None }
     }
 
     /// Reads a row of names. For tactels whose names have no row and column, the bench gives the size.
-    pub(super) fn named(names: Piece<'_>, hints: &Hints) -> Result<Self, Wrong> {
+    pub(super) fn named(names: Piece<'_>, hints: &Hints) -> Result<Self, Refusal> {
         let notation = names_of(names);
         let count = notation.fields(names).count();
-        if count > MAX_CELLS {
-            let message = format!("{count} columns are more than the maximum of {MAX_CELLS}");
-            return flaw(&names, message).map_err(Wrong::from);
-        }
-        let mut columns = Self { size: (0, 0), count, second: 1.0, named: None };
+        names.check(count <= MAX_CELLS, format_args!("{count} columns are more than the maximum of {MAX_CELLS}"))?;
+        let mut columns = Self { size: [0, 0], count, second: 1.0, named: None };
         let mut places = Vec::with_capacity(count);
         let mut have_places = None;
         for name in notation.fields(names).map(unquoted) {
-            let place = match columns.mark(name)? {
-                Some(mark) if mark != PASSED && places.contains(&mark) => {
-                    return flaw(&name, format!("`{}` appears twice", shortened(name.text))).map_err(Wrong::from);
-                }
-                Some(mark) => mark,
-                None => {
-                    let place = place(name.text);
-                    if *have_places.get_or_insert(place.is_some()) != place.is_some() {
-                        let message = format!("`{}` has no row and column, but other names do", shortened(name.text));
-                        let message =
-                            if place.is_none() { message } else { "only some names have a row and a column".into() };
-                        return flaw(&name, message).map_err(Wrong::from);
-                    }
-                    place.unwrap_or((0, 0))
-                }
-            };
-            places.push(place);
-        }
-        columns.size = match have_places {
-            Some(true) => {
-                let size = settle(&mut places).or_else(|message| flaw(&names, message))?;
-                hints.size(Some([size.0, size.1]))?;
-                size
+            let title = || shortened(name.text);
+            if let Some(mark) = columns.mark(name)? {
+                let is_twice = mark != PASSED && places.contains(&mark);
+                name.check(!is_twice, format_args!("`{}` appears twice", title()))?;
+                places.push(mark);
+                continue;
             }
-            _ => in_order(&mut places, names, hints)?,
+            let place = place(name.text);
+            if *have_places.get_or_insert(place.is_some()) != place.is_some() {
+                return Err(match place {
+                    None => name.error(format!("`{}` has no row and column, but other names do", title())),
+                    Some(_) => name.error("only some names have a row and a column"),
+                }
+                .into());
+            }
+            places.push(place.unwrap_or((0, 0)));
+        }
+        columns.size = if have_places == Some(true) {
+            let size = settle(&mut places).map_err(|message| names.error(message))?;
+            hints.size(Some(size))?
+        } else {
+            let size = hints.size(None)?;
+            number(&mut places, size).map_err(|message| names.error(message))?;
+            size
         };
         columns.named = Some(places);
         Ok(columns)
@@ -92,13 +88,13 @@ impl Columns {
                 TIME => Role::Time,
                 FORCE => Role::Force,
                 PASSED => Role::Passed,
-                (row, col) => Role::Tactel(row as usize * self.size.1 + col as usize),
+                (row, col) => Role::Tactel(row as usize * self.size[1] + col as usize),
             }),
         }
     }
 
     /// Returns the mark of a column that is not a tactel.
-    fn mark(&mut self, name: Piece<'_>) -> Result<Option<Place>, Flaw> {
+    fn mark(&mut self, name: Piece<'_>) -> Result<Option<Place>, TextError> {
         let lower = if name.text.len() > 40 { String::new() } else { name.text.to_lowercase() };
         let (base, unit) = match lower.split_once(['[', '(']) {
             Some((base, unit)) => (base.trim(), unit.trim_end_matches([']', ')']).trim()),
@@ -107,7 +103,7 @@ impl Columns {
         match base {
             "time" | "t" | "timestamp" | "zeit" => {}
             "force" if matches!(unit, "" | "n") => return Ok(Some(FORCE)),
-            "force" => return flaw(&name, "the unit of `force` must be `N`"),
+            "force" => return Err(name.error("the unit of `force` must be `N`")),
             "frame" | "index" if unit.is_empty() => return Ok(Some(PASSED)),
             "" if name.text.is_empty() => return Ok(Some(PASSED)),
             _ => return Ok(None),
@@ -119,7 +115,7 @@ impl Columns {
             "ns" => 1e-9,
             // `t_0` is a tactel.
             _ if base == "t" => return Ok(None),
-            _ => return flaw(&name, "the unit of a time must be `s`, `ms`, `us` or `ns`"),
+            _ => return Err(name.error("the unit of a time must be `s`, `ms`, `us` or `ns`")),
         };
         Ok(Some(TIME))
     }
@@ -128,7 +124,7 @@ impl Columns {
 /// Returns the notation of a row of names.
 pub(super) fn names_of(names: Piece<'_>) -> Notation {
     let separator = ['\t', ';', ','].into_iter().find(|separator| names.text.contains(*separator));
-    Notation { separator, has_decimal_comma: false }
+    Notation { separator }
 }
 
 pub(super) fn unquoted(name: Piece<'_>) -> Piece<'_> {
@@ -148,41 +144,44 @@ fn place(name: &str) -> Option<Place> {
     (numbers.next().is_none() && place.0 < u32::MAX).then_some(place)
 }
 
-/// Shifts the places to count from 0, and returns the size of the array. Each tactel must appear once.
-fn settle(places: &mut [Place]) -> Result<(usize, usize), String> {
-    let tactels = || places.iter().filter(|place| place.0 != u32::MAX);
-    let range = |of: fn(&Place) -> u32| (tactels().map(of).min().unwrap_or(0), tactels().map(of).max().unwrap_or(0));
-    let ((top, bottom), (left, right)) = (range(|place| place.0), range(|place| place.1));
-    if top > 1 || left > 1 {
-        return Err("the names of the tactels must count rows and columns from 0 or from 1".into());
-    }
-    let size = ((bottom - top) as usize + 1, (right - left) as usize + 1);
-    let found = tactels().count();
-    if size.0.checked_mul(size.1) != Some(found) {
-        return Err(format!("the names reach {} rows by {} columns, but there are {found} names", size.0, size.1));
-    }
-    let mut is_there = vec![false; found];
-    for place in places.iter_mut().filter(|place| place.0 != u32::MAX) {
-        *place = (place.0 - top, place.1 - left);
-        let index = place.0 as usize * size.1 + place.1 as usize;
-        if std::mem::replace(&mut is_there[index], true) {
-            return Err(format!("row {} and column {} appear twice", place.0 + top, place.1 + left));
-        }
-    }
-    Ok(size)
+fn tactels(places: &mut [Place]) -> impl Iterator<Item = &mut Place> {
+    places.iter_mut().filter(|place| place.0 != u32::MAX)
 }
 
-/// Numbers the tactels row by row, and returns the size of the array.
-fn in_order(places: &mut [Place], names: Piece<'_>, hints: &Hints) -> Result<(usize, usize), Wrong> {
-    let [rows, cols] = hints.size(None)?;
-    let found = places.iter().filter(|place| place.0 != u32::MAX).count();
-    if rows.checked_mul(cols) != Some(found) {
-        let message = format!("these are the names of {found} tactels, not of {rows} by {cols}");
-        return flaw(&names, message).map_err(Wrong::from);
+/// Shifts the places to count from 0, and returns the size of the array. Each tactel must appear once.
+fn settle(places: &mut [Place]) -> Result<[usize; 2], String> {
+    let (mut first, mut last, mut found) = ((u32::MAX, u32::MAX), (0, 0), 0);
+    for place in tactels(places) {
+        first = (first.0.min(place.0), first.1.min(place.1));
+        last = (last.0.max(place.0), last.1.max(place.1));
+        found += 1;
     }
-    let tactels = places.iter_mut().filter(|place| place.0 != u32::MAX);
-    tactels.enumerate().for_each(|(i, place)| *place = ((i / cols) as u32, (i % cols) as u32));
-    Ok((rows, cols))
+    if first.0 > 1 || first.1 > 1 {
+        return Err("the names of the tactels must count rows and columns from 0 or from 1".into());
+    }
+    let [rows, cols] = [(last.0 - first.0) as usize + 1, (last.1 - first.1) as usize + 1];
+    if rows.checked_mul(cols) != Some(found) {
+        return Err(format!("the names reach {rows} rows by {cols} columns, but there are {found} names"));
+    }
+    let mut is_there = vec![false; found];
+    for place in tactels(places) {
+        let (row, col) = *place;
+        *place = (row - first.0, col - first.1);
+        if std::mem::replace(&mut is_there[place.0 as usize * cols + place.1 as usize], true) {
+            return Err(format!("row {row} and column {col} appear twice"));
+        }
+    }
+    Ok([rows, cols])
+}
+
+/// Numbers the tactels row by row.
+fn number(places: &mut [Place], [rows, cols]: [usize; 2]) -> Result<(), String> {
+    let found = tactels(places).count();
+    if rows.checked_mul(cols) != Some(found) {
+        return Err(format!("these are the names of {found} tactels, not of {rows} by {cols}"));
+    }
+    tactels(places).enumerate().for_each(|(i, place)| *place = ((i / cols) as u32, (i % cols) as u32));
+    Ok(())
 }
 
 #[cfg(test)]

@@ -15,25 +15,19 @@ mod columns;
 #[cfg(test)]
 mod tests;
 
-use tactflow_runtime::signal::ImageShape;
+use self::columns::{CsvColumns, Role, names_of, unquoted};
+use crate::recordings::common::reel::{Properties, Reel, bounded};
+use crate::recordings::common::text::{Lines, Notation, Piece};
+use crate::recordings::common::{FileFormat, FileHead, Hints, Recording, Refusal, TextError, Window};
 
-use self::columns::{Columns, Role, names_of, unquoted};
-use crate::recordings::common::reel::{Reel, bounded};
-use crate::recordings::common::text::{self, Lines, Notation, Piece, Wrong, flaw};
-use crate::recordings::common::{Flaw, Format, Head, Hints, Recording, Refusal};
-
-pub(super) const FORMAT: Format = Format {
-    name: "csv",
-    title: "plain CSV, a frame a row or a frame a block",
-    recognises,
-    read: |bytes, hints| text::read(bytes, hints, parse),
-};
+pub(super) const FORMAT: FileFormat =
+    FileFormat::text("csv", "plain CSV, a frame a row or a frame a block", recognises, parse);
 
 /// Minimum number of tactels.
 const MIN_TACTELS: usize = 3;
 
 /// Recognises rows of at least two numbers, under an optional row of as many names.
-fn recognises(head: &Head<'_>) -> bool {
+fn recognises(head: &FileHead<'_>) -> bool {
     let is_cut = head.bytes.len() == super::HEAD_BYTES;
     let mut lines = Lines::new(&head.text);
     let mut next = || {
@@ -79,217 +73,175 @@ fn is_mostly_numbers(line: Piece<'_>) -> bool {
 }
 
 /// Parses a number, optionally in quotes; `nan` and an empty cell are NaN.
-fn number(notation: Notation, cell: Piece<'_>, what: &str) -> Result<f64, Flaw> {
+fn number(notation: Notation, cell: Piece<'_>, what: &str) -> Result<f64, TextError> {
     let cell = unquoted(cell);
     let is_missing = cell.text.is_empty() || cell.text.eq_ignore_ascii_case("nan");
     if is_missing { Ok(f64::NAN) } else { notation.number(cell, what) }
 }
 
-fn parse(text: &str, hints: &Hints) -> Result<Recording, Wrong> {
+fn parse(text: &str, hints: &Hints) -> Result<Recording, Refusal> {
     let lines = Lines::new(text);
-    let Some(first) = lines.clone().find(is_content) else {
-        return flaw(&lines.end(), "the file has no frame").map_err(Wrong::from);
-    };
+    let first = lines.clone().find(is_content).ok_or_else(|| lines.end().error("the file has no frame"))?;
     let names = (!is_row_of_numbers(first.text)).then_some(first);
     let layout = match names {
-        Some(names) => Layout::Rows(Columns::named(names, hints)?),
+        Some(names) => FrameLayout::Row(CsvColumns::named(names, hints)?),
         None => layout(first, lines.clone(), hints)?,
     };
-    let (rows, cols) = layout.size();
-    bounded(rows, cols).or_else(|message| flaw(&first, message))?;
-    if rows * cols < MIN_TACTELS {
-        return flaw(&first, format!("an image needs at least {MIN_TACTELS} tactels")).map_err(Wrong::from);
+    let size @ [rows, cols] = match &layout {
+        FrameLayout::Row(columns) => columns.size,
+        FrameLayout::Block { size, .. } => *size,
+    };
+    bounded(rows, cols).map_err(|message| first.error(message))?;
+    first.check(rows * cols >= MIN_TACTELS, format_args!("an image needs at least {MIN_TACTELS} tactels"))?;
+    let mut reader = CsvReader { reel: Reel::default(), size, start: None, force: vec![] };
+    reader.reserve(lines.clone());
+    match layout {
+        FrameLayout::Row(columns) => reader.rows(lines.clone(), names, &columns)?,
+        FrameLayout::Block { are_separated, .. } => reader.blocks(lines.clone(), are_separated)?,
     }
-    let mut reader = Reader { reel: Reel::default(), time: vec![], force: vec![] };
-    reader.reserve(lines.clone(), rows * cols);
-    match &layout {
-        Layout::Rows(columns) => reader.rows(lines, names, columns)?,
-        Layout::Blocks { rows, cols, are_separated } => reader.blocks(lines, *rows, *cols, *are_separated)?,
-    }
-    let Reader { mut reel, time, force } = reader;
-    if reel.frames.is_empty() {
-        return flaw(&Lines::new(text).end(), "the file has names, but no frame").map_err(Wrong::from);
-    }
-    reel.frames.iter_mut().zip(&time).for_each(|(frame, time)| frame.time = *time);
-    let found = reel.mean_step().filter(|_| !time.is_empty());
-    let (unit, pitch, period) = hints.complete(None, None, found)?;
-    let shape = ImageShape { rows, cols, unit, pitch };
-    if time.is_empty() {
-        reel.tick(period);
-    }
+    let CsvReader { reel, force, .. } = reader;
+    lines.end().check(!reel.frames.is_empty(), "the file has names, but no frame")?;
     let force = Some(force).filter(|force| !force.is_empty());
-    let Reel { frames, cells, dead } = reel;
-    Ok(Recording { format: FORMAT.name, shape, frames, cells, dead, threshold: None, period, force })
+    reel.finish(FORMAT.name, Properties { size: Some(size), force, ..Properties::default() }, hints)
 }
 
 /// The layout of the frames in the file.
-enum Layout {
+enum FrameLayout {
     /// A frame a row.
-    Rows(Columns),
+    Row(CsvColumns),
     /// A frame a block of rows.
-    Blocks { rows: usize, cols: usize, are_separated: bool },
-}
-
-impl Layout {
-    fn size(&self) -> (usize, usize) {
-        match self {
-            Self::Rows(columns) => columns.size,
-            Self::Blocks { rows, cols, .. } => (*rows, *cols),
-        }
-    }
+    Block { size: [usize; 2], are_separated: bool },
 }
 
 /// Returns the layout of a file without names, from the bench's size or from the blank lines.
-fn layout(first: Piece<'_>, lines: Lines<'_>, hints: &Hints) -> Result<Layout, Wrong> {
+fn layout(first: Piece<'_>, lines: Lines<'_>, hints: &Hints) -> Result<FrameLayout, Refusal> {
     let width = Notation::of(first.text).fields(first).count();
-    if let Some([rows, cols]) = hints.size {
-        return match () {
-            () if rows.checked_mul(cols) == Some(width) => Ok(Layout::Rows(Columns::plain(rows, cols))),
-            () if cols == width => Ok(Layout::Blocks { rows, cols, are_separated: false }),
-            () => {
-                let message = format!(
-                    "the first row has {width} numbers: this is neither a frame of {rows} by {cols} tactels nor a row of one"
-                );
-                flaw(&first, message).map_err(Wrong::from)
-            }
-        };
+    if let Some(size @ [rows, cols]) = hints.size {
+        let is_row = rows.checked_mul(cols) == Some(width);
+        let message = format_args!(
+            "the first row has {width} numbers: this is neither a frame of {rows} by {cols} tactels nor a row of one"
+        );
+        first.check(is_row || cols == width, message)?;
+        let block = FrameLayout::Block { size, are_separated: false };
+        return Ok(if is_row { FrameLayout::Row(CsvColumns::plain(rows, cols)) } else { block });
     }
     let is_comment = |line: &Piece<'_>| line.text.trim_start().starts_with('#');
-    let mut lines = lines.filter(|line| !is_comment(line)).skip_while(|line| line.text.trim().is_empty());
-    let rows = lines.by_ref().take_while(|line| !line.text.trim().is_empty()).count();
-    if rows > 1 && lines.any(|line| !line.text.trim().is_empty()) {
-        return Ok(Layout::Blocks { rows, cols: width, are_separated: true });
+    let is_blank = |line: &Piece<'_>| line.text.trim().is_empty();
+    let mut lines = lines.filter(|line| !is_comment(line)).skip_while(is_blank);
+    let rows = lines.by_ref().take_while(|line| !is_blank(line)).count();
+    if rows > 1 && lines.any(|line| !is_blank(&line)) {
+        return Ok(FrameLayout::Block { size: [rows, width], are_separated: true });
     }
-    let refusal = hints.size(None).map(|_| ()).expect_err("there was no size");
-    Err(match refusal {
+    Err(match hints.size(None).expect_err("the bench gives no size") {
         Refusal::Silent { message, help } => Refusal::Silent {
             message,
             help: format!("{help}, or add a first row with names of rows and columns, as `t0_0,t0_1`"),
         },
         other => other,
-    }
-    .into())
+    })
 }
 
-struct Reader {
+struct CsvReader {
     reel: Reel,
-    /// Times from the first frame [ns]; empty if the file has none.
-    time: Vec<i64>,
+    /// Number of rows and of columns.
+    size: [usize; 2],
+    /// Time of the first frame [s].
+    start: Option<f64>,
     /// Forces of another sensor [N]; empty if the file has none.
     force: Vec<f64>,
 }
 
-impl Reader {
+impl CsvReader {
     /// Reserves memory for the frames that the file can hold at most.
-    fn reserve(&mut self, lines: Lines<'_>, tactels: usize) {
-        let (mut count, mut bytes) = (0, 0);
-        for line in lines.filter(is_content) {
-            count += 1;
-            bytes += line.text.len() + 1;
-        }
+    fn reserve(&mut self, lines: Lines<'_>) {
+        let tactels = self.size[0] * self.size[1];
+        let sizes = lines.filter(is_content).map(|line| line.text.len() + 1);
+        let (count, bytes) = sizes.fold((0, 0), |(count, bytes), size| (count + 1, bytes + size));
         // A number takes at least one character and one separator.
-        let frames = count.min(bytes / (2 * tactels) + 1);
+        let frames = (bytes / (2 * tactels) + 1).min(count);
         self.reel.frames.reserve_exact(frames);
         self.reel.cells.reserve_exact(frames * tactels);
     }
 
+    /// Ends a frame.
+    fn frame(&mut self, time: Option<i64>) {
+        let [rows, cols] = self.size;
+        self.reel.frame(self.reel.frames.len() as u64, time, Window::whole(rows, cols));
+    }
+
     /// Reads a frame a row.
-    fn rows(&mut self, lines: Lines<'_>, names: Option<Piece<'_>>, columns: &Columns) -> Result<(), Flaw> {
-        let tactels = columns.size.0 * columns.size.1;
-        let mut start = None;
+    fn rows(&mut self, lines: Lines<'_>, names: Option<Piece<'_>>, columns: &CsvColumns) -> Result<(), TextError> {
         let is_names = |line: &Piece<'_>| names.is_some_and(|names| names.start == line.start);
-        let mut frame = vec![0.0; tactels];
+        let mut frame = vec![0.0; self.size[0] * self.size[1]];
         for line in lines.filter(|line| is_content(line) && !is_names(line)) {
             let notation = Notation::of(line.text);
-            let mut found = 0;
-            for (i, cell) in notation.fields(line).enumerate() {
-                found += 1;
+            let (mut found, mut time) = (0, None);
+            for cell in notation.fields(line) {
                 let value = number(notation, cell, "this cell")?;
-                match columns.role(i) {
-                    None => {}
+                match columns.role(found) {
                     Some(Role::Tactel(index)) => frame[index] = value,
-                    Some(Role::Passed) => {}
-                    Some(Role::Force) if value.is_finite() => self.force.push(value),
-                    Some(Role::Time) => self.time.push(self.since(&mut start, value * columns.second, cell)?),
-                    Some(Role::Force) => return flaw(&cell, "a force must be a number"),
+                    Some(Role::Time) => time = Some(self.since_start(value * columns.second, cell)?),
+                    Some(Role::Force) => {
+                        cell.check(value.is_finite(), "a force must be a number")?;
+                        self.force.push(value);
+                    }
+                    Some(Role::Passed) | None => {}
                 }
+                found += 1;
             }
-            if found != columns.count {
-                let number = self.reel.frames.len() + 1;
-                let message = format!("frame {number} has {found} columns, not {}", columns.count);
-                return flaw(&line, message);
-            }
+            let (number, count) = (self.reel.frames.len() + 1, columns.count);
+            line.check(found == count, format_args!("frame {number} has {found} columns, not {count}"))?;
             for (index, value) in frame.iter().enumerate() {
-                let place =
-                    || notation.fields(line).enumerate().find(|(i, _)| columns.role(*i) == Some(Role::Tactel(index)));
-                self.reel.cell(index, *value).or_else(|message| flaw(&place().map_or(line, |(_, at)| at), message))?;
+                let is_here = |(column, _): &(usize, Piece<'_>)| columns.role(*column) == Some(Role::Tactel(index));
+                let place = || notation.fields(line).enumerate().find(is_here).map_or(line, |(_, at)| at);
+                self.reel.cell(*value).map_err(|message| place().error(message))?;
             }
-            self.reel.frame(self.reel.frames.len() as u64, 0, columns.size.0, columns.size.1);
+            self.frame(time);
         }
         Ok(())
     }
 
     /// Returns a time since the first [ns].
-    fn since(&self, start: &mut Option<f64>, seconds: f64, at: Piece<'_>) -> Result<i64, Flaw> {
-        let since = seconds - *start.get_or_insert(seconds);
-        if since < 0.0 {
-            return flaw(&at, "the time goes back");
-        }
-        if !(0.0..1e9).contains(&since) {
-            return flaw(&at, "a time must be a number, at most 1e9 s after the first frame");
-        }
-        let time = (since * 1e9).round() as i64;
-        if self.time.last().is_some_and(|last| *last > time) { flaw(&at, "the time goes back") } else { Ok(time) }
+    fn since_start(&mut self, seconds: f64, at: Piece<'_>) -> Result<i64, TextError> {
+        let since = seconds - *self.start.get_or_insert(seconds);
+        at.check(since >= 0.0 || since.is_nan(), "the time goes back")?;
+        at.check(since < 1e9, "a time must be a number, at most 1e9 s after the first frame")?;
+        self.reel.time(since * 1e9, at)
     }
 
     /// Reads a frame a block.
-    fn blocks(&mut self, mut lines: Lines<'_>, rows: usize, cols: usize, are_separated: bool) -> Result<(), Flaw> {
+    fn blocks(&mut self, mut lines: Lines<'_>, are_separated: bool) -> Result<(), TextError> {
+        let [rows, _] = self.size;
         let mut row = 0;
         let mut was_blank = true;
         for line in lines.by_ref() {
             let number = self.reel.frames.len() + 1;
             if line.text.trim().is_empty() {
                 was_blank = true;
-                if row > 0 {
-                    return flaw(&line, format!("frame {number} ends after {row} of its {rows} rows"));
-                }
-                continue;
+                line.check(row == 0, format_args!("frame {number} ends after {row} of its {rows} rows"))?;
             }
             if !is_content(&line) {
                 continue;
             }
-            if are_separated && row == 0 && !was_blank {
-                return flaw(&line, format!("frame {} has more than {rows} rows", number - 1));
-            }
+            let is_extra = are_separated && row == 0 && !was_blank;
+            line.check(!is_extra, format_args!("frame {} has more than {rows} rows", number - 1))?;
             was_blank = false;
-            self.row(line, row, cols)?;
-            row += 1;
-            if row == rows {
-                self.reel.frame(self.reel.frames.len() as u64, 0, rows, cols);
-                row = 0;
+            self.row(line, row)?;
+            row = (row + 1) % rows;
+            if row == 0 {
+                self.frame(None);
             }
         }
-        if row > 0 {
-            let number = self.reel.frames.len() + 1;
-            return flaw(
-                &lines.end(),
-                format!("frame {number} ends after {row} of its {rows} rows: the file is cut off"),
-            );
-        }
-        Ok(())
+        let number = self.reel.frames.len() + 1;
+        let message = format_args!("frame {number} ends after {row} of its {rows} rows: the file is cut off");
+        lines.end().check(row == 0, message)
     }
 
-    fn row(&mut self, line: Piece<'_>, row: usize, cols: usize) -> Result<(), Flaw> {
+    fn row(&mut self, line: Piece<'_>, row: usize) -> Result<(), TextError> {
         let notation = Notation::of(line.text);
-        let found = notation.fields(line).count();
-        if found != cols {
-            let number = self.reel.frames.len() + 1;
-            return flaw(&line, format!("row {} of frame {number} has {found} cells, not {cols}", row + 1));
-        }
-        for (col, cell) in notation.fields(line).enumerate() {
-            let value = number(notation, cell, "this cell")?;
-            self.reel.cell(row * cols + col, value).or_else(|message| flaw(&cell, message))?;
-        }
-        Ok(())
+        let (found, [_, cols]) = (notation.fields(line).count(), self.size);
+        let (row, frame) = (row + 1, self.reel.frames.len() + 1);
+        line.check(found == cols, format_args!("row {row} of frame {frame} has {found} cells, not {cols}"))?;
+        self.reel.row(notation.fields(line), |cell| number(notation, cell, "this cell"))
     }
 }

@@ -1,6 +1,6 @@
 //! Tests of plain CSV: both layouts, names, and mistakes with their places.
 
-use tactflow_runtime::signal::Unit;
+use tactflow_runtime::signal::{ImageShape, Unit};
 
 use super::super::testing::{check_damages, complaints, count_refused};
 use super::super::{Refusal, read};

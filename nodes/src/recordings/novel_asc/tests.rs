@@ -2,6 +2,8 @@
 
 use std::fmt::Write as _;
 
+use tactflow_runtime::signal::ImageShape;
+
 use super::*;
 use crate::recordings::testing::{check_damages, complaints, count_refused};
 

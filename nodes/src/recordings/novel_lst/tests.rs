@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::recordings::testing::{check_damages, complaints, count_refused};
+use crate::recordings::text;
 
 const EMED: &[u8] = include_bytes!("../../../../graphs/recordings/pressuRe/emed_test.zip");
 
@@ -45,7 +46,7 @@ Force\t2.50\t2.50
 \u{c}";
 
 fn parse(text: &str) -> Result<Recording, Refusal> {
-    read(text.as_bytes(), &Hints::default())
+    FORMAT.read(text.as_bytes(), &Hints::default())
 }
 
 /// Returns the text of the shipped recording.

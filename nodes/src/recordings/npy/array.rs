@@ -10,7 +10,7 @@ pub(crate) const MAGIC: &[u8] = b"\x93NUMPY";
 pub(super) struct Array<'a> {
     /// Numbers of elements along the axes.
     pub(super) shape: Vec<usize>,
-    kind: Kind,
+    kind: ElementKind,
     /// Whether the first axis runs fastest.
     is_fortran: bool,
     is_big: bool,
@@ -20,7 +20,7 @@ pub(super) struct Array<'a> {
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Kind {
+enum ElementKind {
     Bool,
     Signed,
     Unsigned,
@@ -47,23 +47,19 @@ impl<'a> Array<'a> {
         let header = str::from_utf8(header).map_err(|_| "the header of the array is not text")?;
         let value = |key: &str| value(header, key).ok_or_else(|| format!("the header of the array has no `{key}`"));
         let (is_big, kind, width) = element(value("descr")?)?;
-        let is_fortran = match value("fortran_order")?.split([',', '}']).next().unwrap_or("").trim() {
-            "True" => true,
-            "False" => false,
-            other => {
-                return Err(format!(
-                    "`fortran_order` of the array must be `True` or `False`, not `{}`",
-                    shortened(other)
-                ));
-            }
-        };
+        let order = value("fortran_order")?.split([',', '}']).next().unwrap_or("").trim();
+        if !matches!(order, "True" | "False") {
+            let order = shortened(order);
+            return Err(format!("`fortran_order` of the array must be `True` or `False`, not `{order}`"));
+        }
+        let is_fortran = order == "True";
         let shape = shape(value("shape")?)?;
         Ok(Self { shape, kind, is_fortran, is_big, width, bytes })
     }
 
     /// Whether its elements are numbers.
     pub(super) const fn is_number(&self) -> bool {
-        !matches!(self.kind, Kind::Bytes | Kind::Text)
+        !matches!(self.kind, ElementKind::Bytes | ElementKind::Text)
     }
 
     /// Returns the number of elements.
@@ -81,18 +77,20 @@ impl<'a> Array<'a> {
     /// Returns the number at a position.
     pub(super) fn number(&self, place: usize) -> f64 {
         let bytes = &self.bytes[place * self.width..][..self.width];
-        let bits = bytes.iter().enumerate().fold(0, |bits, (i, byte)| {
-            let shift = 8 * if self.is_big { self.width - 1 - i } else { i };
-            bits | u64::from(*byte) << shift
-        });
+        let bits = self.bits(bytes);
         let unused = 64 - 8 * self.width as u32;
         match (self.kind, self.width) {
-            (Kind::Float, 2) => half(bits as u16),
-            (Kind::Float, 4) => f32::from_bits(bits as u32).into(),
-            (Kind::Float, _) => f64::from_bits(bits),
-            (Kind::Signed, _) => (((bits << unused) as i64) >> unused) as f64,
+            (ElementKind::Float, 2) => half(bits as u16),
+            (ElementKind::Float, 4) => f32::from_bits(bits as u32).into(),
+            (ElementKind::Float, _) => f64::from_bits(bits),
+            (ElementKind::Signed, _) => (((bits << unused) as i64) >> unused) as f64,
             _ => bits as f64,
         }
+    }
+
+    fn bits(&self, bytes: &[u8]) -> u64 {
+        let add = |bits, byte: &u8| bits << 8 | u64::from(*byte);
+        if self.is_big { bytes.iter().fold(0, add) } else { bytes.iter().rev().fold(0, add) }
     }
 
     /// Returns all numbers, or `None` if there are more axes than one or no numbers.
@@ -103,17 +101,13 @@ impl<'a> Array<'a> {
     /// Returns the text, or `None` if it is not a single text.
     pub(super) fn text(&self) -> Option<String> {
         let step = match self.kind {
-            Kind::Text => 4,
-            Kind::Bytes => 1,
+            ElementKind::Text => 4,
+            ElementKind::Bytes => 1,
             _ => return None,
         };
-        let letter = |bytes: &[u8]| match (bytes, self.is_big) {
-            ([byte], _) => char::from(*byte),
-            (bytes, is_big) => {
-                let bytes: [u8; 4] = bytes.try_into().expect("four at a time");
-                let code = if is_big { u32::from_be_bytes(bytes) } else { u32::from_le_bytes(bytes) };
-                char::from_u32(code).unwrap_or(char::REPLACEMENT_CHARACTER)
-            }
+        let letter = |bytes: &[u8]| {
+            let code = u32::try_from(self.bits(bytes)).ok().and_then(char::from_u32);
+            code.unwrap_or(char::REPLACEMENT_CHARACTER)
         };
         let is_short = self.len() == 1 && self.width <= 256;
         is_short.then(|| self.bytes.chunks_exact(step).map(letter).filter(|letter| *letter != '\0').collect())
@@ -141,21 +135,20 @@ fn value<'h>(header: &'h str, key: &str) -> Option<&'h str> {
 }
 
 /// Parses `'<f8'`: byte order, kind and size.
-fn element(text: &str) -> Result<(bool, Kind, usize), String> {
-    // A list of fields ends at `]`, a name at its quote.
-    let end = match text.chars().next() {
-        Some(quote @ ('\'' | '"')) => text[1..].find(quote).map(|at| at + 2),
-        Some('[') => text.find(']').map(|at| at + 1),
-        _ => None,
-    };
+fn element(text: &str) -> Result<(bool, ElementKind, usize), String> {
+    let quote = text.chars().next().filter(|quote| matches!(quote, '\'' | '"'));
     let strange = || {
-        format!(
-            "elements of type `{}` are not supported: save plain numbers",
-            shortened(&text[..end.unwrap_or(text.len())])
-        )
+        // A list of fields ends at `]`, a name at its quote.
+        let end = match quote {
+            Some(quote) => text[1..].find(quote).map(|at| at + 2),
+            None if text.starts_with('[') => text.find(']').map(|at| at + 1),
+            None => None,
+        };
+        let name = shortened(&text[..end.unwrap_or(text.len())]);
+        format!("elements of type `{name}` are not supported: save plain numbers")
     };
-    let quote = text.chars().next().filter(|quote| matches!(quote, '\'' | '"')).ok_or_else(strange)?;
-    let name = text[1..].split(quote).next().unwrap_or("");
+    let mark = quote.ok_or_else(strange)?;
+    let name = text[1..].split(mark).next().unwrap_or("");
     let (order, name) = match name.split_at_checked(1) {
         Some((order @ ("<" | ">" | "=" | "|"), rest)) => (order, rest),
         _ => ("=", name),
@@ -163,12 +156,12 @@ fn element(text: &str) -> Result<(bool, Kind, usize), String> {
     let (kind, size) = name.split_at_checked(1).ok_or_else(strange)?;
     let size: usize = size.parse().map_err(|_| strange())?;
     let (kind, width) = match (kind, size) {
-        ("b", 1) => (Kind::Bool, 1),
-        ("i", 1 | 2 | 4 | 8) => (Kind::Signed, size),
-        ("u", 1 | 2 | 4 | 8) => (Kind::Unsigned, size),
-        ("f", 2 | 4 | 8) => (Kind::Float, size),
-        ("S", 1..=256) => (Kind::Bytes, size),
-        ("U", 1..=64) => (Kind::Text, 4 * size),
+        ("b", 1) => (ElementKind::Bool, 1),
+        ("i", 1 | 2 | 4 | 8) => (ElementKind::Signed, size),
+        ("u", 1 | 2 | 4 | 8) => (ElementKind::Unsigned, size),
+        ("f", 2 | 4 | 8) => (ElementKind::Float, size),
+        ("S", 1..=256) => (ElementKind::Bytes, size),
+        ("U", 1..=64) => (ElementKind::Text, 4 * size),
         _ => return Err(strange()),
     };
     Ok((order == ">" || order == "=" && cfg!(target_endian = "big"), kind, width))
@@ -191,14 +184,11 @@ pub(super) fn named(shape: &[usize]) -> String {
     format!("[{}]", axes.join(", "))
 }
 
-/// Converts a number of 16 bits (IEEE 754 binary16).
+/// Converts a number of 16 bits (IEEE 754 binary16). It is written as 64 bits, whose exponent has another bias.
 pub(super) fn half(bits: u16) -> f64 {
-    const MIN_SUBNORMAL: f64 = 1.0 / 16_777_216.0;
-    let (sign, exponent, fraction) = (u64::from(bits >> 15) << 63, u64::from(bits >> 10 & 31), u64::from(bits & 1023));
-    let magnitude = match exponent {
-        0 => return if sign == 0 { fraction as f64 * MIN_SUBNORMAL } else { -(fraction as f64) * MIN_SUBNORMAL },
-        31 => 0x7ff,
-        _ => exponent + 1023 - 15,
-    };
-    f64::from_bits(sign | magnitude << 52 | fraction << 42)
+    const BIAS: f64 = f64::from_bits((1023 - 15 + 1023) << 52);
+    let magnitude = u64::from(bits & 0x7fff) << 42;
+    let is_finite = bits & 0x7c00 != 0x7c00;
+    let number = if is_finite { f64::from_bits(magnitude) * BIAS } else { f64::from_bits(0x7ff << 52 | magnitude) };
+    if bits >> 15 == 0 { number } else { -number }
 }

@@ -1,28 +1,22 @@
 //! The header of a Tekscan ASCII movie.
 
-use std::ops::Range;
+use tactflow_runtime::signal::Unit;
 
-use tactflow_runtime::signal::{ImageShape, Unit};
-
-use crate::recordings::common::text::{Lines, Piece, flaw, shortened};
-use crate::recordings::common::units;
-use crate::recordings::common::{Flaw, Hints};
+use crate::recordings::common::reel::Properties;
+use crate::recordings::common::text::{Lines, Piece, shortened};
+use crate::recordings::common::{Hints, TextError, units};
 
 /// The properties of the header that are used.
-#[derive(Debug, Clone, PartialEq)]
-pub(super) struct Header<'t> {
-    /// Size, pitch and unit of the frames.
-    pub(super) shape: ImageShape,
-    /// Factor from the file's unit to that of the cells.
-    pub(super) factor: f64,
+#[derive(Debug)]
+pub(super) struct MovieHeader<'t> {
+    /// Number of rows and of columns.
+    pub(super) size: [usize; 2],
+    /// Size, pitch, unit, time between two frames, and noise threshold.
+    pub(super) found: Properties,
     /// Number of the first frame.
     pub(super) start_frame: Option<u64>,
     /// Number of the last frame, and its place.
-    pub(super) end_frame: Option<(u64, Range<usize>)>,
-    /// Noise threshold [raw].
-    pub(super) threshold: Option<f64>,
-    /// Nominal time between two frames [s].
-    pub(super) period: Option<f64>,
+    pub(super) end_frame: Option<(u64, Piece<'t>)>,
     /// The line that ends the movie.
     pub(super) mark: &'t str,
 }
@@ -48,13 +42,10 @@ const KEYS: [&str; 13] = [
 const MIN_PERIOD_US: f64 = 50.0;
 
 /// Reads the header up to its line `ASCII_DATA @@`, in a file of `bytes` bytes.
-pub(super) fn read<'t>(lines: &mut Lines<'t>, bytes: usize, hints: &Hints) -> Result<Header<'t>, Vec<Flaw>> {
+pub(super) fn read<'t>(lines: &mut Lines<'t>, bytes: usize, hints: &Hints) -> Result<MovieHeader<'t>, Vec<TextError>> {
     let mut keys = Keys { keys: Vec::new(), flaws: Vec::new(), end: Piece { text: "", start: 0 } };
     let header = keys.collect(lines).and_then(|mark| keys.header(mark, bytes, hints));
-    match header {
-        Some(header) if keys.flaws.is_empty() => Ok(header),
-        _ => Err(keys.flaws),
-    }
+    header.filter(|_| keys.flaws.is_empty()).ok_or(keys.flaws)
 }
 
 /// Removes what a spreadsheet adds to a line: quotes around it, separators after it.
@@ -65,19 +56,18 @@ pub(super) fn bare(line: Piece<'_>) -> Piece<'_> {
 
 struct Keys<'t> {
     keys: Vec<(&'static str, Piece<'t>)>,
-    flaws: Vec<Flaw>,
+    flaws: Vec<TextError>,
     end: Piece<'t>,
 }
 
 impl<'t> Keys<'t> {
     /// Collects the lines of the header, and returns the mark that ends the movie.
     fn collect(&mut self, lines: &mut Lines<'t>) -> Option<&'t str> {
+        let is_gap = |c: char| c.is_whitespace() || ",;:=".contains(c);
         let mut is_comment = false;
-        for line in lines {
-            let line = bare(line);
-            let key = line.text.split(|c: char| c.is_whitespace() || ",;:=".contains(c)).next().unwrap_or("");
+        for line in lines.map(bare) {
+            let key = line.text.split(is_gap).next().unwrap_or("");
             self.end = Piece { text: key, start: line.start };
-            let is_gap = |c: char| c.is_whitespace() || ",;:=".contains(c);
             let value = line.part(line.text[key.len()..].trim_start_matches(is_gap));
             if key == "ASCII_DATA" {
                 return Some(if value.text.is_empty() { "@@" } else { value.text });
@@ -85,8 +75,7 @@ impl<'t> Keys<'t> {
             if key == "Frame" && (!is_comment || value.text.starts_with(|c: char| c.is_ascii_digit())) {
                 break;
             }
-            let known = KEYS.iter().find(|known| known.eq_ignore_ascii_case(key));
-            match known {
+            match KEYS.iter().find(|known| known.eq_ignore_ascii_case(key)) {
                 // A comment may begin with any word.
                 Some(known) if is_comment && (*known != key || self.find(known).is_some()) => {}
                 Some(known) => {
@@ -96,15 +85,14 @@ impl<'t> Keys<'t> {
                 None => is_comment |= key == "COMMENTS",
             }
         }
-        self.flaws.push(Flaw { span: self.end.span(), message: "the header has no last line `ASCII_DATA @@`".into() });
+        self.flaws.push(self.end.error("the header has no last line `ASCII_DATA @@`"));
         None
     }
 
     fn add(&mut self, key: &'static str, value: Piece<'t>) {
         match self.find(key) {
             Some(other) if other.text != value.text => {
-                let message = format!("`{key}` is given twice");
-                self.flaws.push(Flaw { span: self.end.span(), message });
+                self.flaws.push(self.end.error(format!("`{key}` is given twice")));
             }
             Some(_) => {}
             None => self.keys.push((key, value)),
@@ -115,52 +103,51 @@ impl<'t> Keys<'t> {
         self.keys.iter().find(|(other, _)| *other == key).map(|(_, value)| *value)
     }
 
-    fn header(&mut self, mark: &'t str, bytes: usize, hints: &Hints) -> Option<Header<'t>> {
-        let movie = |value: Piece<'_>| match value.text {
-            text if text.eq_ignore_ascii_case("MOVIE") => Ok(()),
-            other => flaw(&value, format!("the file is a `{}`, not a `MOVIE`", shortened(other))),
-        };
-        self.optional("DATA_TYPE", movie);
+    fn header(&mut self, mark: &'t str, bytes: usize, hints: &Hints) -> Option<MovieHeader<'t>> {
+        self.optional("DATA_TYPE", |value, _| {
+            let kind = shortened(value.text);
+            let is_movie = value.text.eq_ignore_ascii_case("MOVIE");
+            value.check(is_movie, format_args!("the file is a `{kind}`, not a `MOVIE`"))
+        });
         let [known_rows, known_cols] = hints.size.map_or([None; 2], |size| size.map(Some));
         let [known_x, known_y] = hints.pitch.map_or([None; 2], |pitch| pitch.map(Some));
-        let rows = self.required("ROWS", known_rows, |value| size(value, "ROWS"));
-        let cols = self.required("COLS", known_cols, |value| size(value, "COLS"));
-        let x = self.required("COL_SPACING", known_x, |value| length(value, "COL_SPACING"));
-        let y = self.required("ROW_SPACING", known_y, |value| length(value, "ROW_SPACING"));
+        let rows = self.required("ROWS", known_rows, Piece::side);
+        let cols = self.required("COLS", known_cols, Piece::side);
+        let x = self.required("COL_SPACING", known_x, length);
+        let y = self.required("ROW_SPACING", known_y, length);
         let unit = self.required("UNITS", hints.unit.map(|unit| (unit, 1.0)), unit);
-        let start_frame = self.optional("START_FRAME", |value| value.count("`START_FRAME`"));
-        let end_frame = self.optional("END_FRAME", |value| Ok((value.count("`END_FRAME`")?, value.span())));
-        let threshold = self.optional("NOISE_THRESHOLD", |value| value.decimal("`NOISE_THRESHOLD`"));
+        let start_frame = self.optional("START_FRAME", Piece::count);
+        let end_frame = self.optional("END_FRAME", |value, what| Ok((value.count(what)?, value)));
+        let threshold = self.optional("NOISE_THRESHOLD", Piece::decimal);
         let period = self.period();
-        let (rows, cols) = (rows?, cols?);
+        let size @ [rows, cols] = [rows?, cols?];
         // A cell takes a character and what ends it.
         if rows.checked_mul(cols).and_then(|cells| cells.checked_mul(2)).is_none_or(|least| least > bytes) {
             let at = self.find("ROWS").unwrap_or(self.end);
-            let message = format!("a frame of {rows} by {cols} cells is more than the file holds");
-            self.flaws.push(Flaw { span: at.span(), message });
+            self.flaws.push(at.error(format!("a frame of {rows} by {cols} cells is more than the file holds")));
         }
-        let (unit, factor) = unit?;
-        let shape = ImageShape { rows, cols, pitch: [x?, y?], unit };
         // The threshold of the sensor's own filter is in raw counts.
-        let threshold = threshold.filter(|_| unit == Unit::RAW);
-        Some(Header { shape, factor, start_frame, end_frame, threshold, period, mark })
+        let threshold = threshold.filter(|_| unit.is_some_and(|(unit, _)| unit == Unit::RAW));
+        let pitch = Some([x?, y?]);
+        let found = Properties { size: Some(size), unit: Some(unit?), pitch, period, threshold, force: None };
+        Some(MovieHeader { size, found, start_frame, end_frame, mark })
     }
 
     /// Returns the time between two frames [s], from any of its keys.
     fn period(&mut self) -> Option<f64> {
-        let none_is_zero = |number: f64| Some(number).filter(|number| *number > 0.0);
-        let mut time = |key| self.optional(key, |value| not_negative(value, key)).and_then(none_is_zero);
+        let mut time = |key| self.optional(key, not_negative).filter(|number| *number > 0.0);
         let seconds = time("SECONDS_PER_FRAME");
         let milliseconds = time("MILLISECONDS_PER_FRAME").map(|ms| ms / 1e3);
-        let rate = time("FRAMES_PER_SECOND").map(|rate| 1.0 / rate);
+        let rate = time("FRAMES_PER_SECOND").map(f64::recip);
         let microseconds = time("MICRO_SECOND").filter(|us| *us >= MIN_PERIOD_US).map(|us| us / 1e6);
         let period = seconds.or(milliseconds).or(rate).or(microseconds);
         period.filter(|period| period.is_finite() && *period > 0.0)
     }
 
-    fn optional<T>(&mut self, key: &str, read: impl FnOnce(Piece<'t>) -> Result<T, Flaw>) -> Option<T> {
+    /// Parses the value of a key; `parse` also gets the name of the key for messages.
+    fn optional<T>(&mut self, key: &str, parse: impl FnOnce(Piece<'t>, &str) -> Result<T, TextError>) -> Option<T> {
         let value = self.find(key)?;
-        read(value).map_err(|flaw| self.flaws.push(flaw)).ok()
+        parse(value, &format!("`{key}`")).map_err(|flaw| self.flaws.push(flaw)).ok()
     }
 
     /// Returns the value of a key, or the known value if the header has no such key.
@@ -168,33 +155,26 @@ impl<'t> Keys<'t> {
         &mut self,
         key: &str,
         known: Option<T>,
-        read: impl FnOnce(Piece<'t>) -> Result<T, Flaw>,
+        parse: impl FnOnce(Piece<'t>, &str) -> Result<T, TextError>,
     ) -> Option<T> {
-        match (self.find(key), known) {
-            (None, None) => {
-                self.flaws.push(Flaw { span: self.end.span(), message: format!("the header has no `{key}`") });
-                None
-            }
-            (None, known) => known,
-            (Some(_), _) => self.optional(key, read),
+        if self.find(key).is_some() {
+            return self.optional(key, parse);
         }
+        if known.is_none() {
+            self.flaws.push(self.end.error(format!("the header has no `{key}`")));
+        }
+        known
     }
 }
 
-fn size(value: Piece<'_>, key: &str) -> Result<usize, Flaw> {
-    match usize::try_from(value.count(&format!("`{key}`"))?) {
-        Ok(size) if size > 0 => Ok(size),
-        _ => flaw(&value, format!("`{key}` must be at least 1")),
-    }
-}
-
-fn not_negative(value: Piece<'_>, key: &str) -> Result<f64, Flaw> {
-    let number = value.words().next().unwrap_or(value).decimal(&format!("`{key}`"))?;
-    if number >= 0.0 { Ok(number) } else { flaw(&value, format!("`{key}` must be greater than 0")) }
+fn not_negative(value: Piece<'_>, what: &str) -> Result<f64, TextError> {
+    let number = value.words().next().unwrap_or(value).decimal(what)?;
+    value.check(number >= 0.0, format_args!("{what} must be greater than 0"))?;
+    Ok(number)
 }
 
 /// Parses `0.127 centimeters` to metres.
-fn length(value: Piece<'_>, key: &str) -> Result<f64, Flaw> {
+fn length(value: Piece<'_>, what: &str) -> Result<f64, TextError> {
     let is_number = |c: char| c.is_ascii_digit() || ".,+-".contains(c);
     // `5.08e-3 meters` has two words, `4mm` has one.
     let split = value.text.split_once(char::is_whitespace);
@@ -202,18 +182,17 @@ fn length(value: Piece<'_>, key: &str) -> Result<f64, Flaw> {
         let name = value.text.trim_start_matches(is_number);
         value.text.split_at(value.text.len() - name.len())
     });
-    let number = not_negative(value.part(number), key)?;
-    match units::metres(name) {
-        Some(metres) if number > 0.0 && (number * metres).is_finite() => Ok(number * metres),
-        Some(_) => flaw(&value, format!("`{key}` must be greater than 0")),
-        None => {
-            let name = shortened(name.trim());
-            flaw(&value, format!("the unit of `{key}` must be `centimeters`, `millimeters` or `inches`, not `{name}`"))
-        }
-    }
+    let number = not_negative(value.part(number), what)?;
+    let strange = || {
+        let name = shortened(name.trim());
+        value.error(format!("the unit of {what} must be `centimeters`, `millimeters` or `inches`, not `{name}`"))
+    };
+    let length = number * units::metres(name).ok_or_else(strange)?;
+    value.check(length > 0.0 && length.is_finite(), format_args!("{what} must be greater than 0"))?;
+    Ok(length)
 }
 
-fn unit(value: Piece<'_>) -> Result<(Unit, f64), Flaw> {
+fn unit(value: Piece<'_>, _: &str) -> Result<(Unit, f64), TextError> {
     let unknown = || format!("the unit `{}` is unknown; known are {}", shortened(value.text), units::KNOWN);
-    units::unit(value.text).ok_or_else(|| Flaw { span: value.span(), message: unknown() })
+    units::unit(value.text).ok_or_else(|| value.error(unknown()))
 }

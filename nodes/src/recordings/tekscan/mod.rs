@@ -7,217 +7,147 @@
 
 mod header;
 
-use tactflow_runtime::signal::{ImageShape, Unit};
+use tactflow_runtime::signal::Unit;
 
-use crate::recordings::common::text::{self, Lines, Notation, Piece, Wrong, flaw, shortened};
-use crate::recordings::common::{Flaw, Format, Frame, Head, Hints, Recording, Refusal, Window};
-use header::Header;
+use crate::recordings::common::reel::Reel;
+use crate::recordings::common::text::{Lines, Notation, Piece, shortened};
+use crate::recordings::common::{FileFormat, FileHead, Hints, Recording, Refusal, TextError, Window};
+use header::MovieHeader;
 
-pub(super) const FORMAT: Format =
-    Format { name: "tekscan", title: "Tekscan ASCII movie (.csv, .asf)", recognises, read };
+pub(super) const FORMAT: FileFormat =
+    FileFormat::text("tekscan", "Tekscan ASCII movie (.csv, .asf)", recognises, parse);
 
-fn recognises(head: &Head<'_>) -> bool {
+fn recognises(head: &FileHead<'_>) -> bool {
     let is_key = |line: &str| line.starts_with("DATA_TYPE ") || line.starts_with("ASCII_DATA");
     head.text.lines().any(|line| is_key(line.trim_start().trim_start_matches('"')))
 }
 
-fn read(bytes: &[u8], hints: &Hints) -> Result<Recording, Refusal> {
-    text::read(bytes, hints, parse)
-}
-
 /// Reads a movie. Errors are all mistakes in the header, or the first mistake in the frames.
-fn parse(text: &str, hints: &Hints) -> Result<Recording, Wrong> {
+fn parse(text: &str, hints: &Hints) -> Result<Recording, Refusal> {
     let mut lines = Lines::new(text);
     let header = header::read(&mut lines, text.len(), hints)?;
-    let tactels = header.shape.tactels();
+    let [rows, cols] = header.size;
     // Both are counts of what the file has, not of what its header says.
-    let frames = text.matches("Frame").count().min(text.len() / (2 * tactels));
-    let mut reader = Reader {
-        header: &header,
-        notation: None,
-        first: None,
-        times: Vec::new(),
-        frames: Vec::with_capacity(frames),
-        cells: Vec::with_capacity(frames * tactels),
-        dead: Vec::new(),
-    };
-    reader.frames(&mut lines)?;
-    let Reader { mut frames, cells, dead, times, .. } = reader;
-    let period = set_times(&mut frames, &times, header.period, hints)?;
-    let Header { mut shape, threshold, .. } = header;
-    shape.unit = hints.unit(Some(shape.unit))?;
-    shape.pitch = hints.pitch(Some(shape.pitch))?;
-    hints.size(Some([shape.rows, shape.cols]))?;
-    Ok(Recording { format: FORMAT.name, shape, frames, cells, dead, threshold, period, force: None })
+    let frames = text.matches("Frame").count().min(text.len() / (2 * rows * cols));
+    let mut reel = Reel::new([
+        "this cell is `B`, but it has a sensel in the first frame",
+        "this cell has a sensel, but it is `B` in the first frame",
+    ]);
+    reel.frames.reserve_exact(frames);
+    reel.cells.reserve_exact(frames * rows * cols);
+    let mut reader = MovieReader { header, lines, notation: None, first: None, reel };
+    reader.frames()?;
+    let MovieReader { mut reel, header: MovieHeader { mut found, .. }, .. } = reader;
+    let single = (reel.frames.len() == 1 && hints.rate_hz.is_none()).then_some(1.0);
+    found.period = found.period.or(reel.mean_step()).or(single);
+    // Times that are rounded until two are equal are ignored: then the frames come at the nominal rate.
+    reel.forget_equal_times();
+    reel.finish(FORMAT.name, found, hints)
 }
 
-/// Sets the times of the frames, and returns the nominal time between two frames [s].
-///
-/// Times that are rounded until two are equal are ignored: then the frames come at the nominal rate.
-fn set_times(frames: &mut [Frame], times: &[i64], period: Option<f64>, hints: &Hints) -> Result<f64, Refusal> {
-    let is_single = frames.len() == 1;
-    let mean = match times {
-        [first, .., last] if last > first => Some((last - first) as f64 * 1e-9 / (times.len() - 1) as f64),
-        _ => hints.rate_hz.map(|rate| 1.0 / rate).or(is_single.then_some(1.0)),
-    };
-    let period = hints.period(period.or(mean))?;
-    let are_times = times.len() == frames.len() && times.is_sorted_by(|a, b| a < b);
-    for (index, frame) in frames.iter_mut().enumerate() {
-        frame.time = if are_times { times[index] - times[0] } else { (index as f64 * period * 1e9).round() as i64 };
-    }
-    Ok(period)
-}
-
-struct Reader<'h> {
-    header: &'h Header<'h>,
+struct MovieReader<'t> {
+    header: MovieHeader<'t>,
+    lines: Lines<'t>,
     notation: Option<Notation>,
     /// Place of the number of the first frame.
-    first: Option<std::ops::Range<usize>>,
-    /// Times of the frames [ns]; empty if the first frame has none.
-    times: Vec<i64>,
-    frames: Vec<Frame>,
-    cells: Vec<f32>,
-    dead: Vec<usize>,
+    first: Option<Piece<'t>>,
+    reel: Reel,
 }
 
-impl Reader<'_> {
-    fn frames(&mut self, lines: &mut Lines<'_>) -> Result<(), Flaw> {
-        while let Some(line) = lines.next() {
+impl<'t> MovieReader<'t> {
+    fn frames(&mut self) -> Result<(), TextError> {
+        while let Some(line) = self.lines.next() {
             let line = header::bare(line);
             match line.text {
                 "" => {}
-                text if text == self.header.mark => return self.end(line, lines),
-                _ if is_frame_line(line) => self.frame(line, lines)?,
-                text => return flaw(&line, format!("expected a frame or `@@`, found `{}`", shortened(text))),
+                text if text == self.header.mark => return self.end(line),
+                _ if is_frame_line(line) => self.frame(line)?,
+                text => return Err(line.error(format!("expected a frame or `@@`, found `{}`", shortened(text)))),
             }
         }
-        let after = self.frames.last().map_or_else(String::new, |frame| format!(" after frame {}", frame.number));
-        flaw(&lines.end(), format!("the file ends{after} without `@@`: it is truncated"))
+        let last = self.reel.frames.last();
+        let after = last.map_or_else(String::new, |frame| format!(" after frame {}", frame.number));
+        Err(self.lines.end().error(format!("the file ends{after} without `@@`: it is truncated")))
     }
 
     /// Checks the end at `@@`: no frame may be missing before it, and no text may come after it.
-    fn end(&self, at: Piece<'_>, lines: &mut Lines<'_>) -> Result<(), Flaw> {
-        let (Some(first), Some(last)) = (self.frames.first(), self.frames.last()) else {
-            return flaw(&at, "the file has no frame");
+    fn end(&mut self, at: Piece<'t>) -> Result<(), TextError> {
+        let (Some(first_at), [first, ..], Some(last)) = (self.first, &*self.reel.frames, self.reel.frames.last())
+        else {
+            return Err(at.error("the file has no frame"));
         };
-        let Header { start_frame, end_frame, .. } = self.header;
+        let MovieHeader { start_frame, end_frame, .. } = self.header;
+        let count = self.reel.frames.len() as u64;
         // A part of a movie may have new numbers.
-        let end = end_frame.as_ref().map(|(end, _)| *end);
-        let count = self.frames.len() as u64;
-        let is_complete = start_frame.zip(end).is_some_and(|(start, end)| end.checked_sub(start) == Some(count - 1));
-        match (start_frame, end_frame) {
-            _ if is_complete => {}
-            (Some(start), _) if *start != first.number => {
-                let message = format!("the first frame is {}, but `START_FRAME` is {start}", first.number);
-                let span = self.first.clone().expect("the first frame has set it");
-                return Err(Flaw { span, message });
-            }
-            (_, Some((end, span))) if last.number != *end => {
-                let message = format!("`END_FRAME` is {end}, but the last frame is {}", last.number);
-                return Err(Flaw { span: span.clone(), message });
-            }
-            _ => {}
+        let is_complete =
+            start_frame.zip(end_frame).is_some_and(|(start, (end, _))| end.checked_sub(start) == Some(count - 1));
+        if let Some(start) = start_frame {
+            let message = format_args!("the first frame is {}, but `START_FRAME` is {start}", first.number);
+            first_at.check(is_complete || start == first.number, message)?;
         }
-        match lines.map(header::bare).find(|line| !line.text.is_empty()) {
-            Some(line) => flaw(&line, "unexpected text after `@@`, the end of the movie"),
-            None => Ok(()),
+        if let Some((end, at)) = end_frame {
+            let message = format_args!("`END_FRAME` is {end}, but the last frame is {}", last.number);
+            at.check(is_complete || end == last.number, message)?;
         }
+        let after = self.lines.by_ref().map(header::bare).find(|line| !line.text.is_empty());
+        after.map_or(Ok(()), |line| Err(line.error("unexpected text after `@@`, the end of the movie")))
     }
 
-    fn frame(&mut self, line: Piece<'_>, lines: &mut Lines<'_>) -> Result<(), Flaw> {
-        let Line { number, at, time, sum } = frame_line(line)?;
-        match self.frames.last() {
-            Some(last) if last.number.checked_add(1) != Some(number) => {
-                return flaw(&at, format!("frame {number} comes after frame {}", last.number));
-            }
-            None => self.first = Some(at.span()),
-            _ => {}
+    fn frame(&mut self, line: Piece<'t>) -> Result<(), TextError> {
+        let FrameLine { number, at, time, sum } = frame_line(line)?;
+        self.reel.follows(number, at)?;
+        self.first.get_or_insert(at);
+        let time = self.time(time)?;
+        let [rows, cols] = self.header.size;
+        let start = self.reel.cells.len();
+        for row in 0..rows {
+            self.row(number, row)?;
         }
-        self.time(time)?;
-        let start = self.cells.len();
-        let mut total = 0.0;
-        for row in 0..self.header.shape.rows {
-            total += self.row(number, row, lines)?;
-        }
-        match sum {
+        if let Some((wanted, at)) = sum
+            && self.header.found.unit == Some((Unit::RAW, 1.0))
+        {
+            let total: f64 = self.reel.cells[start..].iter().map(|cell| f64::from(*cell)).sum();
+            let message = format_args!("`Raw Sum` is {wanted}, but the cells of frame {number} sum to {total}");
             // The sum of averages is rounded to a count.
-            Some((wanted, at)) if self.header.shape.unit == Unit::RAW && (total - wanted).abs() > 0.5 => {
-                let message = format!("`Raw Sum` is {wanted}, but the cells of frame {number} sum to {total}");
-                return flaw(&at, message);
-            }
-            _ => {}
+            at.check((total - wanted).abs() <= 0.5, message)?;
         }
-        let ImageShape { rows, cols, .. } = self.header.shape;
-        self.frames.push(Frame { number, time: 0, window: Window::whole(rows, cols), start });
+        self.reel.frame(number, time, Window::whole(rows, cols));
         Ok(())
     }
 
-    /// Adds the time of the next frame. The first frame decides whether the frames have times.
-    fn time(&mut self, field: Option<Piece<'_>>) -> Result<(), Flaw> {
-        let is_first = self.frames.is_empty();
-        let Some(field) = field.filter(|field| !is_first || field.decimal("").is_ok()) else { return Ok(()) };
-        if !is_first && self.times.is_empty() {
-            return Ok(());
-        }
+    /// Returns the time of the next frame [ns]. The first frame decides whether the frames have times.
+    fn time(&self, field: Option<Piece<'t>>) -> Result<Option<i64>, TextError> {
+        let is_first = self.reel.frames.is_empty();
+        let is_time =
+            |field: &Piece<'t>| if is_first { field.decimal("").is_ok() } else { self.reel.is_timed_alike(true) };
+        let Some(field) = field.filter(is_time) else { return Ok(None) };
         let seconds = field.decimal("the frame's time")?;
-        if !(0.0..1e9).contains(&seconds) {
-            let text = shortened(field.text);
-            return flaw(&field, format!("the frame's time is not from 0 to 1e9 s: `{text}`"));
-        }
-        let time = (seconds * 1e9).round() as i64;
-        if self.times.last().is_some_and(|last| *last > time) {
-            return flaw(&field, "the time goes back");
-        }
-        self.times.push(time);
-        Ok(())
+        let is_in_range = (0.0..1e9).contains(&seconds);
+        field
+            .check(is_in_range, format_args!("the frame's time is not from 0 to 1e9 s: `{}`", shortened(field.text)))?;
+        self.reel.time(seconds * 1e9, field).map(Some)
     }
 
-    /// Reads one row of cells, and returns its sum.
-    fn row(&mut self, frame: u64, row: usize, lines: &mut Lines<'_>) -> Result<f64, Flaw> {
-        let ImageShape { rows, cols, .. } = self.header.shape;
-        let line = lines.next().map_or_else(|| lines.end(), Piece::trimmed);
-        if line.text.is_empty() || line.text == self.header.mark || is_frame_line(line) {
-            return flaw(&line, format!("frame {frame} ends after {row} of its {rows} rows"));
-        }
+    /// Reads one row of cells.
+    fn row(&mut self, frame: u64, row: usize) -> Result<(), TextError> {
+        let [rows, cols] = self.header.size;
+        let line = self.lines.next().map_or_else(|| self.lines.end(), Piece::trimmed);
+        let is_end = line.text.is_empty() || line.text == self.header.mark || is_frame_line(line);
+        line.check(!is_end, format_args!("frame {frame} ends after {row} of its {rows} rows"))?;
         let notation = *self.notation.get_or_insert_with(|| Notation::of(line.text));
-        let found = notation.fields(line).count();
-        if found != cols {
-            let cut = if lines.is_at_end() { ": the file ends in the middle of it" } else { "" };
-            let message = format!("row {} of frame {frame} has {found} cells, but `COLS` is {cols}{cut}", row + 1);
-            return flaw(&line, message);
-        }
-        let mut sum = 0.0;
-        for (col, cell) in notation.fields(line).enumerate() {
-            let value = self.cell(row * cols + col, cell, notation)?;
-            sum += f64::from(value);
-            self.cells.push(value);
-        }
-        Ok(sum)
-    }
-
-    fn cell(&mut self, index: usize, cell: Piece<'_>, notation: Notation) -> Result<f32, Flaw> {
-        let is_dead = matches!(cell.text, "B" | "b");
-        if self.frames.is_empty() {
-            if is_dead {
-                self.dead.push(index);
+        let (found, cut) = (notation.fields(line).count(), self.lines.cut());
+        let message = format_args!("row {} of frame {frame} has {found} cells, but `COLS` is {cols}{cut}", row + 1);
+        line.check(found == cols, message)?;
+        let factor = self.header.found.factor();
+        self.reel.row(notation.fields(line), |cell| {
+            if matches!(cell.text, "B" | "b") {
+                return Ok(f64::NAN);
             }
-        } else if is_dead != self.dead.binary_search(&index).is_ok() {
-            let message = if is_dead {
-                "this cell is `B`, but it has a sensel in the first frame"
-            } else {
-                "this cell has a sensel, but it is `B` in the first frame"
-            };
-            return flaw(&cell, message);
-        }
-        if is_dead {
-            return Ok(0.0);
-        }
-        let value = (notation.number(cell, "this cell")? * self.header.factor) as f32;
-        if value.is_finite() {
+            let value = notation.number(cell, "this cell")? * factor;
+            let is_small = (value as f32).is_finite();
+            cell.check(is_small, format_args!("this cell is too large: `{}`", shortened(cell.text)))?;
             Ok(value)
-        } else {
-            flaw(&cell, format!("this cell is too large: `{}`", shortened(cell.text)))
-        }
+        })
     }
 }
 
@@ -226,7 +156,7 @@ fn is_frame_line(line: Piece<'_>) -> bool {
 }
 
 /// The content of the line of a frame.
-struct Line<'t> {
+struct FrameLine<'t> {
     number: u64,
     /// Place of the number.
     at: Piece<'t>,
@@ -237,7 +167,7 @@ struct Line<'t> {
 }
 
 /// Parses `Frame 3` or `Frame 3, 0.2,, …,,,Raw Sum=,,308`.
-fn frame_line(line: Piece<'_>) -> Result<Line<'_>, Flaw> {
+fn frame_line(line: Piece<'_>) -> Result<FrameLine<'_>, TextError> {
     let rest = line.part_after_quote().after("Frame").expect("the caller has checked the line");
     let rest = rest.part(rest.text.trim_start_matches([':', '#', '=', ' ', '\t']));
     let mut fields = Notation::of(rest.text).fields(rest);
@@ -245,14 +175,12 @@ fn frame_line(line: Piece<'_>) -> Result<Line<'_>, Flaw> {
     let number = at.count("the frame's number")?;
     let time = fields.next();
     let Some(key) = fields.find(|field| field.after("Raw Sum").is_some()) else {
-        return Ok(Line { number, at, time, sum: None });
+        return Ok(FrameLine { number, at, time, sum: None });
     };
     let beside = key.text.split_once('=').map(|(_, sum)| key.part(sum).trimmed());
     let sum = beside.filter(|sum| !sum.text.is_empty()).or_else(|| fields.find(|field| !field.text.is_empty()));
-    match sum {
-        Some(sum) => Ok(Line { number, at, time, sum: Some((sum.decimal("the frame's sum")?, sum)) }),
-        None => flaw(&key, "`Raw Sum=` has no number: the line is cut off"),
-    }
+    let sum = sum.ok_or_else(|| key.error("`Raw Sum=` has no number: the line is cut off"))?;
+    Ok(FrameLine { number, at, time, sum: Some((sum.decimal("the frame's sum")?, sum)) })
 }
 
 #[cfg(test)]

@@ -30,7 +30,7 @@ B,0,0
 ";
 
 fn parse(text: &str) -> Result<Recording, Refusal> {
-    read(text.as_bytes(), &Hints::default())
+    FORMAT.read(text.as_bytes(), &Hints::default())
 }
 
 fn flaws(bytes: &[u8]) -> Vec<(usize, String)> {
@@ -64,7 +64,7 @@ fn a_small_movie_in_every_notation() {
     assert_eq!(movie.shape.pitch, [0.004, 0.0127], "x runs along the columns");
     let spreadsheet = |text: &str| text.lines().map(|line| format!("{line},,,,,,\n")).collect::<String>();
     let wide: String = SMALL.encode_utf16().flat_map(|unit| unit.to_le_bytes()).map(char::from).collect();
-    assert_eq!(read(&wide.chars().map(|c| c as u8).collect::<Vec<_>>(), &Hints::default()).as_ref(), Ok(&movie));
+    assert_eq!(FORMAT.read(&wide.chars().map(|c| c as u8).collect::<Vec<_>>(), &Hints::default()).as_ref(), Ok(&movie));
     let semicolons = SMALL.replace(',', ";").replace("0.1", "0,1").replace("0.5", "0,5").replace("1;2", "1,0;2,00");
     let same = [
         SMALL.replace('\n', "\r\n"),
@@ -112,7 +112,7 @@ fn an_insole_with_numbers_but_no_times() {
     assert_eq!(movie.threshold, None, "the filter counts and knows no kPa");
     let silent = text.replace("SECONDS_PER_FRAME 0.1\n", "");
     assert_eq!(flaws(silent.as_bytes()), [(0, "the file does not give its frame rate".into())]);
-    let hinted = read(silent.as_bytes(), &Hints { rate_hz: Some(50.0), ..Hints::default() }).unwrap();
+    let hinted = FORMAT.read(silent.as_bytes(), &Hints { rate_hz: Some(50.0), ..Hints::default() }).unwrap();
     assert_eq!((hinted.frames[1].time, hinted.period), (20_000_000, 0.02));
 }
 
@@ -122,7 +122,7 @@ fn pressures_become_kpa_and_forces_newtons() {
         [("PSI", "kPa", 6.894_757), ("N/cm²", "kPa", 10.0), ("mmHg", "kPa", 0.133_322_4), ("lbs", "N", 4.448_222)];
     for (name, ours, factor) in cases {
         let latin: Vec<u8> = SMALL.replace("UNITS raw", &format!("UNITS {name}")).chars().map(|c| c as u8).collect();
-        let movie = read(&latin, &Hints::default()).expect(name);
+        let movie = FORMAT.read(&latin, &Hints::default()).expect(name);
         assert_eq!(movie.shape.unit.to_string(), ours);
         assert!((f64::from(movie.cells[5]) / 5.0 / factor - 1.0).abs() < 1e-6, "{name}: {:?}", movie.cells);
     }
@@ -132,7 +132,7 @@ fn pressures_become_kpa_and_forces_newtons() {
 fn hints_fill_gaps_and_must_agree() {
     let unsaid = SMALL.replace("UNITS raw\n", "").replace("COL_SPACING 4 millimeters\n", "");
     let hints = Hints { unit: Some(Unit::RAW), pitch: Some([0.004, 0.0127]), ..Hints::default() };
-    assert_eq!(read(unsaid.as_bytes(), &hints), parse(SMALL));
+    assert_eq!(FORMAT.read(unsaid.as_bytes(), &hints), parse(SMALL));
     let cases = [
         (Hints { unit: Some(Unit::NEWTON), ..Hints::default() }, "the file has another value: raw"),
         (Hints { pitch: Some([0.004, 0.004]), ..Hints::default() }, "the file has another value: [4, 12.7] mm"),
@@ -140,7 +140,7 @@ fn hints_fill_gaps_and_must_agree() {
         (Hints { size: Some([3, 2]), ..Hints::default() }, "the file has another value: 2 rows by 3 columns"),
     ];
     for (hints, message) in cases {
-        assert_eq!(complaints(read(SMALL.as_bytes(), &hints)), [(0, message.into())]);
+        assert_eq!(complaints(FORMAT.read(SMALL.as_bytes(), &hints)), [(0, message.into())]);
     }
 }
 

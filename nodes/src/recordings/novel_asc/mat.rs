@@ -1,7 +1,7 @@
 //! The places of the sensors of a mat.
 
-use crate::recordings::common::text::{Piece, flaw};
-use crate::recordings::common::{Flaw, MAX_CELLS, units};
+use crate::recordings::common::text::Piece;
+use crate::recordings::common::{MAX_CELLS, TextError, units};
 
 /// The corners of the sensors that were read so far.
 #[derive(Debug)]
@@ -24,11 +24,11 @@ impl Default for Corners {
 
 /// A rectangle of cells, and the cell of each sensor.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Layout {
+pub(super) struct Mat {
     pub(super) rows: usize,
     pub(super) cols: usize,
-    /// Distance between the centres of two neighbours along x and along y [m].
-    pub(super) pitch: [f64; 2],
+    /// Distance between the centres of two neighbours along x and along y [m], if there are corners.
+    pub(super) pitch: Option<[f64; 2]>,
     /// Index of the cell of each sensor.
     cells: Vec<usize>,
 }
@@ -38,12 +38,10 @@ const MAX_MISFIT: f64 = 0.1;
 
 impl Corners {
     /// Reads the unit in `corner[cm]`.
-    pub(super) fn unit(&mut self, line: Piece<'_>) -> Result<(), Flaw> {
+    pub(super) fn unit(&mut self, line: Piece<'_>) -> Result<(), TextError> {
         let inside = line.text.split_once('[').and_then(|(_, rest)| rest.split_once(']')).map(|(inside, _)| inside);
-        match units::metres(inside.unwrap_or("cm")) {
-            Some(metres) => self.metres = metres,
-            None => return flaw(&line, "the unit of the corners must be `cm` or `mm`"),
-        }
+        let metres = units::metres(inside.unwrap_or("cm"));
+        self.metres = metres.ok_or_else(|| line.error("the unit of the corners must be `cm` or `mm`"))?;
         self.is_begun = true;
         Ok(())
     }
@@ -60,43 +58,39 @@ impl Corners {
     }
 
     /// Returns the rectangle that contains the sensors.
-    pub(super) fn layout(&self, sensors: usize) -> Result<Layout, String> {
+    pub(super) fn mat(&self, sensors: usize) -> Result<Mat, String> {
         if self.lines != [4, 4] {
             let [x, y] = self.lines;
             return Err(format!("a sensor has 4 corners, but there are {x} lines of x and {y} of y: it is truncated"));
         }
-        let mut pitch = [0.0; 2];
-        let mut counts = [0; 2];
-        let mut indices = [vec![], vec![]];
-        for axis in 0..2 {
-            let bounds = &self.bounds[axis];
-            let size = bounds.iter().map(|[min, max]| max - min).sum::<f64>() / sensors as f64;
-            let start = bounds.iter().map(|bound| bound[0]).fold(f64::INFINITY, f64::min);
-            if !(size.is_finite() && size > 0.0) {
-                return Err("the sensors have no size".into());
-            }
-            let mut last = 0;
-            for [from, to] in bounds {
-                let place = (from - start) / size;
-                if (to - from - size).abs() > MAX_MISFIT * size
-                    || (place - place.round()).abs() > MAX_MISFIT
-                    || place > 1e6
-                {
-                    return Err("the sensors do not form rows and columns of one size".into());
-                }
-                indices[axis].push(place.round() as usize);
-                last = last.max(place.round() as usize);
-            }
-            (pitch[axis], counts[axis]) = (size * self.metres, last + 1);
-        }
-        let [cols, rows] = counts;
+        let (width, lefts) = self.places(0, sensors)?;
+        let (height, tops) = self.places(1, sensors)?;
+        let count = |places: &[usize]| places.iter().max().map_or(0, |last| last + 1);
+        let (rows, cols) = (count(&tops), count(&lefts));
         Self::check(rows, cols, sensors)?;
-        let cells: Vec<usize> = indices[1].iter().zip(&indices[0]).map(|(row, col)| row * cols + col).collect();
+        let cells: Vec<usize> = tops.iter().zip(&lefts).map(|(row, col)| row * cols + col).collect();
         let mut is_taken = vec![false; rows * cols];
         if cells.iter().any(|cell| std::mem::replace(&mut is_taken[*cell], true)) {
             return Err("two sensors have the same place".into());
         }
-        Ok(Layout { rows, cols, pitch, cells })
+        Ok(Mat { rows, cols, pitch: Some([width, height]), cells })
+    }
+
+    /// Returns the size of the sensors along an axis [m], and the index of each along it.
+    fn places(&self, axis: usize, sensors: usize) -> Result<(f64, Vec<usize>), String> {
+        let bounds = &self.bounds[axis];
+        let size = bounds.iter().map(|[from, to]| to - from).sum::<f64>() / sensors as f64;
+        let start = bounds.iter().map(|[from, _]| *from).fold(f64::INFINITY, f64::min);
+        if !(size.is_finite() && size > 0.0) {
+            return Err("the sensors have no size".into());
+        }
+        let index = |[from, to]: &[f64; 2]| {
+            let place = (from - start) / size;
+            let fits = (to - from - size).abs() <= MAX_MISFIT * size && (place - place.round()).abs() <= MAX_MISFIT;
+            (fits && place <= 1e6).then_some(place.round() as usize)
+        };
+        let places: Option<Vec<usize>> = bounds.iter().map(index).collect();
+        Ok((size * self.metres, places.ok_or("the sensors do not form rows and columns of one size")?))
     }
 
     /// Refuses a grid that is much larger than its sensors: even a round mat fills more than half of it.
@@ -108,13 +102,13 @@ impl Corners {
     }
 }
 
-impl Layout {
-    /// Returns the layout of sensors row by row.
-    pub(super) fn rows([rows, cols]: [usize; 2], pitch: [f64; 2], sensors: usize) -> Result<Self, String> {
+impl Mat {
+    /// Returns a mat of sensors row by row.
+    pub(super) fn row_by_row([rows, cols]: [usize; 2], sensors: usize) -> Result<Self, String> {
         if rows.checked_mul(cols) != Some(sensors) {
             return Err(format!("the file has {sensors} sensors, not those of {rows} rows by {cols} columns"));
         }
-        Ok(Self { rows, cols, pitch, cells: (0..sensors).collect() })
+        Ok(Self { rows, cols, pitch: None, cells: (0..sensors).collect() })
     }
 
     /// Moves the values of all sensors to their cells, moment by moment.
