@@ -150,8 +150,7 @@ mod tests {
         ];
         for (kind, unit, frames, words) in cases {
             let frames = frames.into_iter().map(str::to_owned).collect();
-            let unit = unit.map(str::to_owned);
-            let port = PortEntry { name: "p".into(), kind, unit, frames, need: None, doc: String::new(), fits: vec![] };
+            let port = PortEntry { kind, unit: unit.map(str::to_owned), frames, ..PortEntry::default() };
             assert_eq!(carried(&port), words);
         }
     }

@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use super::entry::{Category, Entries, Entry};
+use super::entry::{Category, Entry, entries};
 use super::page::page;
 use crate::catalogue::Catalogue;
 use crate::cli::text::prose::markdown;
@@ -13,7 +13,7 @@ use crate::cli::text::prose::markdown;
 /// A test can compare the pages with the files, so that they are never out of date; `tests/suite/reference.rs` does.
 #[must_use]
 pub fn reference(catalogue: &Catalogue) -> Vec<(String, String)> {
-    let mut entries = Entries::new(catalogue).all();
+    let mut entries = entries(catalogue);
     entries.retain(|entry| entry.category != Category::File);
     let mut index = "# Reference\n\nEverything that a graph can use. These pages are generated from the catalogue; \
                      `tactflow describe NAME` prints the same documentation and an example graph.\n"

@@ -4,8 +4,8 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use super::watched::{Finding, Watched};
 use super::{Lint, Notes, Violation};
-use crate::cli::example;
 use crate::engine::Engine;
+use crate::example::example_graph;
 use crate::graph::{Compiled, Request, compile};
 use crate::node::ParamSpec;
 
@@ -44,7 +44,7 @@ impl Lint<'_> {
             return None;
         }
         let mut notes = Notes { owner: asked.kind.to_owned(), found };
-        let text = match example(self.catalogue, asked.kind) {
+        let text = match example_graph(self.catalogue, asked.kind) {
             Ok(text) => text,
             Err(why) => {
                 notes.unless(false, None, format!("it has no example: {why}"));
