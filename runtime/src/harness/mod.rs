@@ -5,6 +5,7 @@ mod graph_rig;
 mod link_rig;
 mod lint;
 mod node_rig;
+mod params;
 
 pub use fed::FedRole;
 pub use graph_rig::GraphRig;

@@ -4,7 +4,7 @@ use super::{Lint, Notes, Violation};
 use crate::node::{ParamSpec, PortSpec};
 
 /// What is said of something in a catalogue.
-struct Entry<'c> {
+struct Declaration<'c> {
     name: String,
     summary: String,
     /// The reference; of a role only its ports are described.
@@ -14,22 +14,22 @@ struct Entry<'c> {
 }
 
 impl Lint<'_> {
-    fn entries(&self) -> Vec<Entry<'_>> {
-        let nodes = self.catalogue.specs().map(|spec| Entry {
+    fn entries(&self) -> Vec<Declaration<'_>> {
+        let nodes = self.catalogue.specs().map(|spec| Declaration {
             name: spec.name.to_string(),
             summary: spec.summary.to_string(),
             doc: Some(spec.doc.to_string()),
             ports: vec![("input", &spec.inputs), ("output", &spec.outputs)],
             params: spec.params.clone(),
         });
-        let devices = self.catalogue.devices().iter().map(|device| Entry {
+        let devices = self.catalogue.devices().iter().map(|device| Declaration {
             name: device.name().into_owned(),
             summary: device.summary().into_owned(),
             doc: Some(device.doc().into_owned()),
             ports: Vec::new(),
             params: device.params(),
         });
-        let roles = self.catalogue.roles().iter().map(|role| Entry {
+        let roles = self.catalogue.roles().iter().map(|role| Declaration {
             name: role.name.to_string(),
             summary: role.summary.to_string(),
             doc: None,
