@@ -64,7 +64,7 @@ mod bound {
     /// ```
     #[derive(Describe)]
     #[describe(name = "bound")]
-    pub(super) struct Bound;
+    pub(super) struct BoundVelocity;
 
     /// What it reads.
     #[derive(Inputs)]
@@ -83,7 +83,7 @@ mod bound {
         velocity: Out<Joints>,
     }
 
-    impl Node for Bound {
+    impl Node for BoundVelocity {
         type Params = ();
         type Inputs<'a> = Inputs<'a>;
         type Outputs = Outputs;
@@ -160,7 +160,7 @@ fn world() -> Catalogue {
         limits: vec![],
         is_observed: false,
     };
-    Catalogue::new().role(role).node::<follow::Follow>().node::<bound::Bound>().device::<Motor>()
+    Catalogue::new().role(role).node::<follow::Follow>().node::<bound::BoundVelocity>().device::<Motor>()
 }
 
 #[test]
@@ -202,7 +202,7 @@ fn a_node_that_nobody_reads_is_put_into_the_wire_it_reads() {
 
 #[test]
 fn a_missing_example_is_named() {
-    let bound = Catalogue::new().node::<bound::Bound>();
+    let bound = Catalogue::new().node::<bound::BoundVelocity>();
     assert_eq!(example_graph(&bound, "bound"), Err("no example has the `follow` that `bound` needs".into()));
     assert_eq!(example_graph(&bound, "follow"), Err("`follow` has no example".into()));
 }

@@ -3,7 +3,7 @@
 use std::fmt::Write;
 
 use super::entry::{Category, Entry, entries};
-use super::page::page;
+use super::page::{capitalised, page};
 use crate::catalogue::Catalogue;
 use crate::cli::text::prose::markdown;
 
@@ -43,10 +43,7 @@ fn file(first: &Entry) -> String {
 
 fn title(first: &Entry) -> String {
     match first.group {
-        "" => {
-            let name = first.category.name();
-            format!("{}{}s", name[..1].to_uppercase(), &name[1..])
-        }
-        group => format!("{}{}", group[..1].to_uppercase(), &group[1..]),
+        "" => capitalised(first.category.name()) + "s",
+        group => capitalised(group),
     }
 }

@@ -76,9 +76,8 @@ pub(crate) fn events(engine: &Engine, end: i64) -> String {
 
 /// Writes the table of the modes.
 fn modes(changes: &[ModeChange], end: i64) -> String {
-    let mut text = String::new();
     if changes.is_empty() {
-        return text;
+        return String::new();
     }
     let ends = changes.iter().skip(1).map(|change| change.time).chain([end]);
     let mut rows = vec![["mode", "from", "for", "reason"].map(String::from)];
@@ -89,12 +88,9 @@ fn modes(changes: &[ModeChange], end: i64) -> String {
     let omitted = rows.len().saturating_sub(2 * MAX_LISTED + 1);
     if omitted > 0 {
         rows.drain(MAX_LISTED + 1..=MAX_LISTED + omitted);
-        rows.insert(MAX_LISTED + 1, [format!("({omitted} more)"), String::new(), String::new(), String::new()]);
+        rows.insert(MAX_LISTED + 1, [format!("({omitted} more)"), "".into(), "".into(), "".into()]);
     }
-    // Writing to a string cannot fail.
-    let _ = write!(text, "{}", table(&rows, 1, 3));
-    text.push('\n');
-    text
+    table(&rows, 1, 3) + "\n"
 }
 
 /// Lists the halts of the commands, each with its fault.

@@ -50,41 +50,33 @@ pub(crate) struct VerifyArgs {
 }
 
 pub(crate) fn verify(args: VerifyArgs, shell: &Shell) -> u8 {
-    let result = prepare(&args, shell.catalogue()).and_then(|mut all| {
-        let is_complete = run(&mut all, &args, shell.catalogue())?;
-        Ok((all, is_complete))
-    });
-    let (all, is_complete) = match result {
-        Ok(result) => result,
-        Err(message) => {
-            return shell.refuse(message);
-        }
-    };
+    verify_all(&args, shell).unwrap_or_else(|message| shell.refuse(message))
+}
+
+fn verify_all(args: &VerifyArgs, shell: &Shell) -> Result<u8, String> {
+    let mut all = prepare(args, shell.catalogue())?;
+    let is_complete = run(&mut all, args, shell.catalogue())?;
     if args.json || args.format == OutputFormat::Json {
         shell.say_json(&table::json(&all));
     } else {
         all.iter().filter_map(|verified| verified.loaded.as_ref().err()).for_each(|report| shell.show(report));
         shell.say(table::text(&all, shell.has_colour()).trim_end());
     }
-    for (verified, trial) in all.iter().flat_map(|verified| verified.trials.iter().map(move |trial| (verified, trial)))
-    {
-        if let Some(why) = &trial.failure {
-            shell.error(format_args!("{}{}: {why}", verified.name(), of_seed(trial.seed)));
+    for verified in &all {
+        for (why, seed) in verified.trials.iter().filter_map(|trial| Some((trial.failure.as_ref()?, trial.seed))) {
+            let seed = seed.map_or_else(String::new, |seed| format!(", seed {seed}"));
+            shell.error(format_args!("{}{seed}: {why}", verified.name()));
         }
     }
     if !is_complete {
         shell.error("interrupted: some runs are missing");
     }
     let has_passed = is_complete && all.iter().all(Verified::has_passed);
-    match all.iter().any(|verified| verified.loaded.is_err()) {
+    Ok(match all.iter().any(|verified| verified.loaded.is_err()) {
         true => NOT_LOADED,
         false if has_passed => 0,
         false => FAULTED,
-    }
-}
-
-fn of_seed(seed: Option<u64>) -> String {
-    seed.map_or_else(String::new, |seed| format!(", seed {seed}"))
+    })
 }
 
 /// Finds and loads all scenario files.
@@ -94,11 +86,10 @@ fn prepare(args: &VerifyArgs, catalogue: &Catalogue) -> Result<Vec<Verified>, St
         files.extend(if path.is_dir() { files_of(path)? } else { vec![path.clone()] });
     }
     let load = |path: PathBuf| {
-        let loaded = Scenario::load(catalogue, &path);
-        let loaded = loaded.map(|scenario| match args.seeds {
-            Some(count) => scenario.with_seeds(count),
-            None => scenario,
-        });
+        let mut loaded = Scenario::load(catalogue, &path);
+        if let (Ok(scenario), Some(count)) = (&mut loaded, args.seeds) {
+            scenario.set_seeds(count);
+        }
         Verified { path, loaded, trials: Vec::new(), rows: Vec::new() }
     };
     let all: Vec<Verified> = files.into_iter().map(load).collect();
@@ -170,8 +161,7 @@ fn run(all: &mut [Verified], args: &VerifyArgs, catalogue: &Catalogue) -> Result
         all[of[which]].trials.extend(trial);
     }
     for verified in all {
-        verified.rows =
-            verified.loaded.as_ref().map_or_else(|_| Vec::new(), |scenario| scenario.rows(&verified.trials));
+        verified.rows = verified.loaded.iter().flat_map(|scenario| scenario.rows(&verified.trials)).collect();
     }
     Ok(is_complete)
 }
