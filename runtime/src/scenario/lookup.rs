@@ -122,8 +122,7 @@ impl Lookup<'_> {
     fn check(&mut self, block: &CheckBlock) -> Option<(Check, Vec<FigureRow>)> {
         let table = block.table.as_ref()?;
         let figures = figures(table);
-        let mut papers = papers(table.paper.as_ref());
-        papers.retain(|(_, value)| value.is_some());
+        let papers = table.paper.as_ref().map(papers).unwrap_or_default();
         for (paper, _) in papers.iter().filter(|(paper, _)| !figures.iter().any(|(figure, _)| figure == paper)) {
             let message = format!("the check has no figure `{}` to compare with the paper's", paper.name());
             let names: Vec<_> = figures.iter().map(|(figure, _)| format!("`{}`", figure.name())).collect();
@@ -140,7 +139,7 @@ impl Lookup<'_> {
             None => (column.unit.to_string(), 1.0),
         };
         let rows = figures.iter().map(|(figure, bound)| {
-            let paper = papers.iter().find(|(of, _)| of == figure).and_then(|(_, value)| *value);
+            let paper = papers.iter().find(|(of, _)| of == figure).map(|(_, value)| *value);
             row(&block.key.name, &table.of.value, *figure, &unit_name, *bound, paper)
         });
         let check = Check {
@@ -246,15 +245,15 @@ fn figures(table: &CheckTable) -> Vec<(Figure, Bound)> {
     figures
 }
 
-/// Returns the paper's value of each figure.
-fn papers(paper: Option<&PaperTable>) -> Vec<(Figure, Option<f64>)> {
-    let Some(paper) = paper else { return Vec::new() };
-    vec![
+/// Returns the values that the paper gives.
+fn papers(paper: &PaperTable) -> Vec<(Figure, f64)> {
+    let values = [
         (Figure::Response, paper.response_s),
         (Figure::Error, paper.error),
         (Figure::Mean, paper.mean),
         (Figure::Std, paper.std),
         (Figure::Max, paper.max),
         (Figure::Min, paper.min),
-    ]
+    ];
+    values.into_iter().filter_map(|(figure, value)| Some((figure, value?))).collect()
 }

@@ -192,14 +192,14 @@ impl Entry {
     }
 
     fn of_file(name: &str, bytes: &[u8]) -> Self {
-        let text = std::str::from_utf8(bytes);
+        let text = std::str::from_utf8(bytes).ok();
         // The first line of a built-in file is a comment with its summary.
-        let first = bytes.split(|byte| *byte == b'\n').next().and_then(|line| std::str::from_utf8(line).ok());
+        let first = text.and_then(|text| text.lines().next());
         let comment = first.and_then(|line| line.strip_prefix("# ")).map(|line| line.trim_end_matches('.'));
         let size = format!("{} kB", bytes.len().div_ceil(1000));
         let summary = comment.map_or_else(|| size.clone(), |comment| format!("{comment} ({size})"));
         // The text of a part shows its inputs, its exports and its parameters.
-        let block = text.ok().filter(|_| name.ends_with(".toml")).map(str::to_owned);
+        let block = text.filter(|_| name.ends_with(".toml")).map(str::to_owned);
         Self { block, ..Self::new(Category::File, &format!("builtin:{name}"), &summary, "") }
     }
 

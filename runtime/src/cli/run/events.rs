@@ -52,20 +52,17 @@ impl LimitWatch {
 
     /// Writes the table of the limits that reduced the motion.
     pub(crate) fn table(&self, end: i64) -> String {
-        if self.limits.is_empty() {
-            return String::new();
-        }
-        let active: Vec<&LimitUse> = self.limits.iter().filter(|limit| limit.time > 0.0).collect();
-        if active.is_empty() {
-            return "no limit reduced the motion\n".into();
-        }
         let duration = seconds(end).max(1e-9);
         let mut rows = vec![["limited by", "for", "of the run", "smallest scale"].map(String::from)];
-        for limit in active {
+        for limit in self.limits.iter().filter(|limit| limit.time > 0.0) {
             let share = format!("{:.1} %", 100.0 * limit.time / duration);
             rows.push([limit.name.clone(), format!("{:.3} s", limit.time), share, number(limit.smallest_scale)]);
         }
-        table(&rows, 1, usize::MAX)
+        match (self.limits.len(), rows.len()) {
+            (0, _) => String::new(),
+            (_, 1) => "no limit reduced the motion\n".into(),
+            _ => table(&rows, 1, usize::MAX),
+        }
     }
 }
 

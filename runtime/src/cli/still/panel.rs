@@ -61,7 +61,9 @@ impl Panel<'_> {
     pub(crate) fn draw(&self, svg: &mut Svg, time: PlotAxis, times: &[SeriesBin], title: Option<&str>) {
         let bins = self.curves.iter().flat_map(|(_, curve)| curve.series.bins());
         let Some(AxisRange { low, high }) = AxisRange::of(bins) else {
-            svg.text([CURVES[0], self.bottom - 0.5 * PANEL_HEIGHT], "start", &format!("{}: absent", self.names()));
+            let names: Vec<&str> = self.curves.iter().map(|(_, curve)| curve.name.as_str()).collect();
+            let text = format!("{}: absent", names.join(", "));
+            svg.text([CURVES[0], self.bottom - 0.5 * PANEL_HEIGHT], "start", &text);
             return;
         };
         let margin = match is_flat(low, high) {
@@ -73,10 +75,10 @@ impl Panel<'_> {
         svg.axes(time, y, [title, Some(&format!("[{}]", self.unit))]);
         for ((i, curve), [left, row]) in self.legend() {
             let colour = COLOURS[i % COLOURS.len()];
+            let baseline = self.top - 8.0 - LINE * row;
             let column = escaped(&curve.column);
             let group = format!("class=\"curve\" fill=\"none\" stroke=\"{colour}\" stroke-width=\"1.5\"");
             svg.group(&format!("{group} data-column=\"{column}\" stroke-linecap=\"round\""), |svg| {
-                let baseline = self.top - 8.0 - LINE * row;
                 svg.put(format_args!("<path stroke-width=\"3\" d=\"M{left:.1} {:.1}h18\"/>", baseline - 4.0));
                 for segment in segments(curve.series.bins(), times, time) {
                     // A line from a point to itself is a dot.
@@ -84,13 +86,8 @@ impl Panel<'_> {
                     svg.polyline(segment.iter().chain(dot).map(|[x, value]| [*x, y.at(*value)]));
                 }
             });
-            let baseline = self.top - 8.0 - LINE * row;
             svg.text([left + 24.0, baseline], "start", &curve.name);
         }
-    }
-
-    fn names(&self) -> String {
-        self.curves.iter().map(|(_, curve)| curve.name.as_str()).collect::<Vec<_>>().join(", ")
     }
 }
 

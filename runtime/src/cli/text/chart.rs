@@ -24,9 +24,7 @@ pub(crate) struct AxisRange {
 impl AxisRange {
     /// Returns the range of the values in the bins, extended to zero if zero is near, or `None` without a value.
     pub(crate) fn of<'b>(bins: impl IntoIterator<Item = &'b SeriesBin>) -> Option<Self> {
-        let Some(SeriesBin { low, high, .. }) = Some(SeriesBin::merged(bins)).filter(SeriesBin::is_present) else {
-            return None;
-        };
+        let SeriesBin { low, high, .. } = Some(SeriesBin::merged(bins)).filter(SeriesBin::is_present)?;
         let is_near = |least: f64, greatest: f64| least > 0.0 && least <= 0.5 * greatest;
         let low = if is_near(low, high) { 0.0 } else { low };
         let high = if is_near(-high, -low) { 0.0 } else { high };

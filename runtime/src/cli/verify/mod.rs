@@ -124,10 +124,11 @@ type PendingRun = (usize, Option<u64>);
 /// of threads.
 fn run(all: &mut [Verified], args: &VerifyArgs, catalogue: &Catalogue) -> Result<bool, String> {
     let interrupt = Interrupt::catch().map_err(|error| format!("cannot run: {error}"))?;
-    let scenarios = all.iter().enumerate().filter_map(|(i, verified)| Some((i, verified.loaded.as_ref().ok()?)));
-    let scenarios: Vec<(usize, &Scenario)> = scenarios.collect();
-    let each = scenarios.iter().flat_map(|(i, scenario)| scenario.runs().into_iter().map(|seed| (*i, seed)));
-    let work: Vec<PendingRun> = each.collect();
+    let runs = |(i, verified): (usize, &Verified)| {
+        let seeds: Vec<Option<u64>> = verified.loaded.iter().flat_map(Scenario::runs).collect();
+        seeds.into_iter().map(move |seed| (i, seed))
+    };
+    let work: Vec<PendingRun> = all.iter().enumerate().flat_map(runs).collect();
     let cores = std::thread::available_parallelism().map_or(1, usize::from);
     let jobs = args.jobs.map_or(cores, |jobs| jobs as usize).min(work.len());
     let (next, done) = (AtomicUsize::new(0), AtomicUsize::new(0));
@@ -136,7 +137,7 @@ fn run(all: &mut [Verified], args: &VerifyArgs, catalogue: &Catalogue) -> Result
         let record = args.out.as_deref().map(|folder| folder.join(record_name(&verified.name(), seed)));
         let scenario = verified.loaded.as_ref().ok()?;
         let trial = scenario.run(catalogue, seed, record.as_deref(), &|| interrupt.is_requested());
-        show_progress(done.fetch_add(1, Ordering::Relaxed) + 1, work.len());
+        show_progress(&format!("{} of {} runs", done.fetch_add(1, Ordering::Relaxed) + 1, work.len()));
         trial
     };
     let worker = || {
@@ -153,12 +154,11 @@ fn run(all: &mut [Verified], args: &VerifyArgs, catalogue: &Catalogue) -> Result
             joined.flat_map(|trials| trials.unwrap_or_else(|panic| std::panic::resume_unwind(panic))).collect()
         })
     });
-    clear_progress();
+    show_progress("");
     trials.sort_by_key(|(which, _)| *which);
     let is_complete = trials.iter().all(|(_, trial)| trial.is_some());
-    let of: Vec<usize> = work.iter().map(|(scenario, _)| *scenario).collect();
     for (which, trial) in trials {
-        all[of[which]].trials.extend(trial);
+        all[work[which].0].trials.extend(trial);
     }
     for verified in all {
         verified.rows = verified.loaded.iter().flat_map(|scenario| scenario.rows(&verified.trials)).collect();
@@ -170,16 +170,10 @@ fn record_name(scenario: &str, seed: Option<u64>) -> String {
     seed.map_or_else(|| format!("{scenario}.csv"), |seed| format!("{scenario}-{seed}.csv"))
 }
 
-/// Prints the number of completed runs on one line, if standard error is a terminal.
-fn show_progress(done: usize, all: usize) {
+/// Prints a line over the last one, if standard error is a terminal.
+fn show_progress(line: &str) {
     if stderr().is_terminal() {
         // Errors of the terminal are ignored.
-        let _ = write!(stderr(), "\r{done} of {all} runs\x1b[K");
-    }
-}
-
-fn clear_progress() {
-    if stderr().is_terminal() {
-        let _ = write!(stderr(), "\r\x1b[K");
+        let _ = write!(stderr(), "\r{line}\x1b[K");
     }
 }

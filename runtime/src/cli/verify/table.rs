@@ -142,6 +142,16 @@ struct ScenarioJson<'a> {
     rows: Vec<RowJson<'a>>,
 }
 
+/// What a bound applies to.
+#[derive(Serialize)]
+#[serde(rename_all = "lowercase")]
+enum Judged {
+    /// The median of the runs.
+    Median,
+    /// Every run.
+    Every,
+}
+
 #[derive(Serialize)]
 struct RowJson<'a> {
     check: &'a str,
@@ -154,8 +164,8 @@ struct RowJson<'a> {
     /// Confidence interval of the median, at least 95 %; an end is null if not measured.
     interval: Option<[Option<f64>; 2]>,
     bound: Option<f64>,
-    /// What the bound applies to: the `median` of the runs, or `every` run; null without a bound.
-    judged: Option<&'static str>,
+    /// What the bound applies to, or null without a bound.
+    judged: Option<Judged>,
     paper: Option<f64>,
     /// `informational` without a bound.
     mark: Verdict,
@@ -195,8 +205,8 @@ fn row_json(row: &FigureRow) -> RowJson<'_> {
         bound: row.bound.number(),
         judged: match row.bound {
             Bound::None => None,
-            Bound::Median(_) => Some("median"),
-            Bound::Settles | Bound::AtMost(_) | Bound::AtLeast(_) => Some("every"),
+            Bound::Median(_) => Some(Judged::Median),
+            Bound::Settles | Bound::AtMost(_) | Bound::AtLeast(_) => Some(Judged::Every),
         },
         paper: row.paper,
         mark: row.verdict(),

@@ -42,9 +42,9 @@ impl Lint<'_> {
             Ok(compiled) => Ok((text, compiled)),
             Err(why) => Err(format!("its example does not load:\n{why}")),
         });
-        let (text, compiled) = loaded.map_err(|why| notes.unless(false, None, why)).ok()?;
+        let (text, compiled) = loaded.map_err(|why| notes.add(None, why)).ok()?;
         if let Some(warnings) = compiled.warnings() {
-            notes.unless(false, None, format!("its example has warnings:\n{}", warnings.render(false)));
+            notes.add(None, format!("its example has warnings:\n{}", warnings.render(false)));
         }
         Some((text, compiled))
     }
@@ -59,7 +59,7 @@ impl Lint<'_> {
             let set = format!("{section}.{}.{}={default}", block.name, param.name);
             if let Err(why) = self.load(text, Some(set)) {
                 let place = format!("parameter `{}`", param.name);
-                notes.unless(false, Some(place), format!("its default {default} is not accepted:\n{why}"));
+                notes.add(Some(place), format!("its default {default} is not accepted:\n{why}"));
             }
         }
     }
@@ -75,10 +75,10 @@ impl Lint<'_> {
     }
 
     fn run_node(&self, text: &str, mut compiled: Compiled, block: &OutlinedBlock, notes: &mut Notes<'_>) {
-        let Ok(twin) = self.load(text, None) else { return };
         if compiled.is_live() {
             return;
         }
+        let Ok(twin) = self.load(text, None) else { return };
         let record = Arc::new(Mutex::new(StepRecord::default()));
         let is_its = |node: &PlannedNode| node.name == block.name;
         let nodes = &mut compiled.plan.nodes;
@@ -96,14 +96,14 @@ impl Lint<'_> {
             let message = format!("no step of its example writes it ({} steps)", record.steps);
             notes.unless(is_written || self.is_quiet(&notes.owner, name), place(), message);
             if let Some((value, [min, max])) = record.out_of_range.get(i).copied().flatten() {
-                notes.unless(false, place(), format!("it is {value}, and the node declares {min} to {max}"));
+                notes.add(place(), format!("it is {value}, and the node declares {min} to {max}"));
             }
         }
         let allocates = format!("a step allocates ({} of {} steps)", record.allocating, record.steps);
         notes.unless(record.allocating == 0, None, allocates);
         if let Some(i) = record.differs {
             let place = outputs.get(i).map(|name| format!("output `{name}`"));
-            notes.unless(false, place, "after a reset it differs from that of a fresh node with the same inputs");
+            notes.add(place, "after a reset it differs from that of a fresh node with the same inputs");
         }
     }
 
@@ -140,7 +140,7 @@ fn last_part(name: &str) -> &str {
 fn run(engine: &mut Engine, notes: &mut Notes<'_>, mut observe: impl FnMut(&Engine)) {
     while let Some(now) = engine.next().filter(|_| engine.ticks() < MAX_TICKS && !engine.is_done()) {
         if let Err(fault) = engine.tick(now) {
-            notes.unless(false, None, format!("its example fails: {fault}"));
+            notes.add(None, format!("its example fails: {fault}"));
             return;
         }
         observe(engine);

@@ -103,7 +103,9 @@ impl AnyNode for Watched {
         record.out_of_range.resize(outputs.len(), None);
         for (i, id) in outputs.iter().enumerate() {
             record.written[i] |= bus.mark(*id).is_present();
-            if let (Shape::Scalar(shape), Some(&value)) = (&self.shapes[i], bus.get::<Scalar>(*id)) {
+            if let Shape::Scalar(shape) = &self.shapes[i]
+                && let Some(&value) = bus.get::<Scalar>(*id)
+            {
                 let is_within = (shape.range[0]..=shape.range[1]).contains(&value);
                 record.out_of_range[i] = record.out_of_range[i].or((!is_within).then_some((value, shape.range)));
             }
