@@ -146,12 +146,12 @@ impl Catalogue {
         self.roles.iter().find(|role| role.name == name)
     }
 
-    /// The groups of node types in reading order, each with its title; those of no group have an empty one.
-    pub fn groups(&self) -> impl Iterator<Item = (&'static str, &[Box<dyn NodeType>])> {
-        let first = self.groups.first().map_or(self.nodes.len(), |(at, _)| *at);
-        let ends = self.groups.iter().skip(1).map(|(at, _)| *at).chain([self.nodes.len()]);
-        let titled = self.groups.iter().zip(ends).map(|((start, title), end)| (*title, &self.nodes[*start..end]));
-        [("", &self.nodes[..first])].into_iter().chain(titled).filter(|(_, nodes)| !nodes.is_empty())
+    /// The declarations of the node types in groups, each with its title; those of no group have an empty one.
+    pub fn groups(&self) -> impl Iterator<Item = (&'static str, &[NodeSpec])> {
+        let first = self.groups.first().map_or(self.specs.len(), |(at, _)| *at);
+        let ends = self.groups.iter().skip(1).map(|(at, _)| *at).chain([self.specs.len()]);
+        let titled = self.groups.iter().zip(ends).map(|((start, title), end)| (*title, &self.specs[*start..end]));
+        [("", &self.specs[..first])].into_iter().chain(titled).filter(|(_, specs)| !specs.is_empty())
     }
 
     /// The device types.
@@ -314,11 +314,8 @@ mod tests {
         let first = named(named(Catalogue::new(), "a").group("one"), "b");
         let second = named(named(Catalogue::new(), "c").group("two").group("empty").group("three"), "d");
         let all = first.join(second).join(named(Catalogue::new().group("four"), "e"));
-        let groups: Vec<(&str, Vec<String>)> = all
-            .groups()
-            .map(|(title, nodes)| (title, nodes.iter().map(|node| node.spec().name.into_owned()).collect()))
-            .collect();
-        let groups: Vec<(&str, String)> = groups.into_iter().map(|(title, names)| (title, names.concat())).collect();
+        let groups: Vec<(&str, String)> =
+            all.groups().map(|(title, specs)| (title, specs.iter().map(|spec| &*spec.name).collect())).collect();
         let expected = [("", "a"), ("one", "b"), ("", "c"), ("three", "d"), ("four", "e")];
         assert_eq!(groups, expected.map(|(title, names)| (title, names.to_owned())));
     }

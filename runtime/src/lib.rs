@@ -8,6 +8,7 @@
 //! - [`source`] and [`graph`]: graph files, compiled to a plan or to diagnostics for every mistake
 //! - [`engine`]: the tick and the run around it; [`fault`]: what ends or halts a run
 //! - [`device`]: the contract of devices
+//! - [`example`]: example graphs from a catalogue
 //! - [`record`]: recordings of runs; [`scenario`]: checks on the results of runs
 //! - [`harness`]: test rigs for nodes and graphs
 //! - `cli`: the command line as a library, behind the feature `cli`
@@ -19,8 +20,8 @@ pub mod catalogue;
 #[cfg(feature = "cli")]
 pub mod cli;
 pub mod device;
-
 pub mod engine;
+pub mod example;
 pub mod fault;
 pub mod graph;
 pub mod harness;

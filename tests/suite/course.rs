@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use tactflow_runtime::engine::Engine;
 use tactflow_runtime::fault::Fault;
 use tactflow_runtime::graph::{Compiled, Request, compile};
-use tactflow_runtime::record::Columns;
+use tactflow_runtime::record::PortColumns;
 use tactflow_runtime::signal::Signal;
 use tactflow_tests::{catalogue, on_the_mock_bench, workspace};
 
@@ -37,7 +37,7 @@ pub(crate) struct Course {
 /// Runs until a device ends, something goes wrong or there were `most` ticks.
 pub(crate) fn course(plan: Compiled, most: usize) -> Course {
     let mut engine = Engine::new(plan);
-    let columns = Columns::new(engine.ports());
+    let columns = PortColumns::new(engine.ports());
     let mut bits = vec![Vec::new(); columns.list.len()];
     let mut row = vec![0.0; columns.list.len()];
     let (mut times, mut fault) = (Vec::new(), None);

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use tactflow_runtime::engine::{self, Engine, RunOptions};
 use tactflow_runtime::graph::{Compiled, Request, compile};
-use tactflow_runtime::record::{Format, Recorder};
+use tactflow_runtime::record::{RecordFormat, Recorder};
 use tactflow_runtime::signal::Unit;
 use tactflow_runtime::source::{Code, Report};
 use tactflow_tests::{catalogue, workspace};
@@ -181,7 +181,8 @@ fn every_set_of_the_reference_loads() {
 fn recordings_are_as_shown() {
     let page = reference();
     let (folder, ..) = world(&page, "recordings");
-    for (format, name, fence) in [(Format::Csv, "push.csv", "csv"), (Format::Ndjson, "push.ndjson", "json")] {
+    for (format, name, fence) in [(RecordFormat::Csv, "push.csv", "csv"), (RecordFormat::Ndjson, "push.ndjson", "json")]
+    {
         let plan = compile(&catalogue(), &Request::file(folder.join("push.toml")));
         let mut engine = Engine::new(plan.unwrap_or_else(|report| panic!("{}", report.render(false))));
         let path = folder.join(name);

@@ -3,7 +3,7 @@
 use tactflow_runtime::engine::{self, Engine, RunOptions};
 use tactflow_runtime::graph::{Request, compile};
 use tactflow_runtime::harness::{FedRole, GraphRig};
-use tactflow_runtime::record::Columns;
+use tactflow_runtime::record::PortColumns;
 use tactflow_runtime::signal::{Freshness, Image, ImageShape, Unit};
 use tactflow_tests::catalogue;
 
@@ -23,7 +23,7 @@ fn engine(bench: &str) -> Engine {
 
 /// Names of the columns of a role.
 fn columns(engine: &Engine, role: &str) -> Vec<String> {
-    let all = Columns::new(engine.ports()).list.into_iter().map(|column| column.name);
+    let all = PortColumns::new(engine.ports()).list.into_iter().map(|column| column.name);
     all.filter(|name| name.starts_with(&format!("{role}."))).collect()
 }
 

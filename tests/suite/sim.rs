@@ -16,7 +16,7 @@ fn hybrid() -> Request {
 fn course(request: &Request, seconds: f64, names: &[&str]) -> Vec<Vec<f64>> {
     let plan = compile(&catalogue(), request).unwrap_or_else(|report| panic!("{}", report.render(false)));
     let mut engine = Engine::new(plan);
-    let columns = tactflow_runtime::record::Columns::new(engine.ports());
+    let columns = tactflow_runtime::record::PortColumns::new(engine.ports());
     let at = |name: &&str| columns.list.iter().position(|column| column.name == **name).expect("the column");
     let at: Vec<usize> = names.iter().map(at).collect();
     let (mut row, mut rows) = (vec![0.0; columns.list.len()], Vec::new());

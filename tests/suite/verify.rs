@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::Path;
 
-use tactflow_runtime::scenario::judge::{Figure, Row, Verdict};
+use tactflow_runtime::scenario::judge::{Figure, FigureRow, Verdict};
 use tactflow_runtime::scenario::{Scenario, Trial};
 use tactflow_tests::{catalogue, workspace};
 
@@ -222,7 +222,7 @@ fn a_run_may_be_done_early_but_samples_may_not_end_early() {
         let loaded =
             Scenario::load(&catalogue(), &scenario).unwrap_or_else(|report| panic!("{}", report.render(false)));
         let trial = loaded.run(&catalogue(), None, None, &|| false).unwrap();
-        let marks: Vec<Verdict> = loaded.rows(std::slice::from_ref(&trial)).iter().map(Row::verdict).collect();
+        let marks: Vec<Verdict> = loaded.rows(std::slice::from_ref(&trial)).iter().map(FigureRow::verdict).collect();
         (trial, marks)
     };
     let modes = "[modes.feel]\ndone = { after_ms = 1000 }\n[modes.other]\ngo = { to = 'feel', after_ms = 10 }\n";

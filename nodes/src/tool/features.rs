@@ -5,7 +5,7 @@
 use std::num::NonZeroU32;
 use std::path::{Path, PathBuf};
 
-use tactflow_runtime::cli::{Job, Print, Shell, clap, duration};
+use tactflow_runtime::cli::{Job, JobOptions, Print, Shell, clap, duration};
 use tactflow_runtime::graph::Request;
 
 use super::arguments::{pair, positive};
@@ -92,19 +92,8 @@ pub(super) fn features(args: FeaturesArgs, shell: &Shell) -> u8 {
     let set = args.settings().iter().map(|setting| format!("devices.recording.{setting}")).collect();
     let request = Request { set, ..Request::text(text) };
     let title = format!("features of {}", args.recording.display());
-    Job {
-        request,
-        title,
-        duration: args.duration,
-        realtime: false,
-        send: vec![],
-        listen: false,
-        out: args.out,
-        points: None,
-        svg: None,
-        print: Print::Ports,
-    }
-    .run(shell)
+    let options = JobOptions { duration: args.duration, out: args.out, ..JobOptions::default() };
+    Job { request, title, options, print: Print::Ports }.run(shell)
 }
 
 /// A threshold and its origin.

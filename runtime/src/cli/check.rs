@@ -7,7 +7,7 @@ use serde::Serialize;
 use super::shell::command::{GraphArgs, OutputFormat};
 use super::shell::json::{DiagnosticJson, diagnosed};
 use super::shell::{NOT_LOADED, Shell};
-use super::text::number::milliseconds;
+use super::text::number::{count_of, milliseconds};
 use crate::graph::{Compiled, compile};
 use crate::scenario::Scenario;
 use crate::source::Report;
@@ -37,32 +37,28 @@ pub(crate) struct CheckArgs {
 pub(crate) fn check(args: CheckArgs, shell: &Shell) -> u8 {
     let mut code = 0;
     let mut results = Vec::new();
-    for graph in &args.graphs {
-        if is_scenario(graph) {
-            let (scenario_code, result) = check_scenario(graph, &args, shell);
-            code = code.max(scenario_code);
-            results.extend(result);
-            continue;
-        }
-        let result = compile(shell.catalogue(), &args.graph_args.request(graph.clone()));
-        let (report, figures) = match &result {
-            Ok(plan) => (plan.warnings(), Some(PlanJson::of(plan))),
-            Err(report) => (Some(report.clone()), None),
+    for path in &args.graphs {
+        let checked = match is_scenario(path) {
+            true => check_scenario(path, &args.graph_args, shell),
+            false => Ok(check_graph(path, &args, shell)),
         };
-        let is_good = figures.is_some() && (report.is_none() || !args.deny_warnings);
-        if !is_good {
+        let checked = match checked {
+            Ok(checked) => checked,
+            Err(message) => {
+                code = shell.refuse(message);
+                continue;
+            }
+        };
+        if !checked.ok {
             code = NOT_LOADED;
         }
-        match args.format {
-            OutputFormat::Json => results.push(CheckJson::of(graph, is_good, report.as_ref(), figures)),
-            OutputFormat::Text => {
-                report.iter().for_each(|report| shell.show(report));
-                if let Some(figures) = figures.filter(|_| is_good) {
-                    let tick = milliseconds(figures.period_s);
-                    shell.say(&format!("{}: ok, {} nodes, one tick every {tick}", graph.display(), figures.nodes));
-                }
+        if args.format == OutputFormat::Text {
+            checked.report.iter().for_each(|report| shell.show(report));
+            if checked.ok {
+                shell.say(&format!("{}: ok, {}", checked.graph, checked.summary));
             }
         }
+        results.push(checked);
     }
     if args.format == OutputFormat::Json {
         shell.say_json(&results);
@@ -75,48 +71,53 @@ fn is_scenario(path: &Path) -> bool {
     std::fs::read_to_string(path).is_ok_and(|text| Scenario::is_one(&text))
 }
 
-/// Checks a scenario with its graph and its bench. Returns the exit code and the result as JSON.
-fn check_scenario(path: &Path, args: &CheckArgs, shell: &Shell) -> (u8, Option<CheckJson>) {
-    if args.graph_args.bench.is_some() || !args.graph_args.set.is_empty() {
-        shell.error(format_args!(
-            "`{}` is a scenario, which names its own bench: remove `--bench` and `--set`",
-            path.display()
-        ));
-        return (NOT_LOADED, None);
-    }
-    let loaded = Scenario::load(shell.catalogue(), path);
-    let code = if loaded.is_ok() { 0 } else { NOT_LOADED };
-    match (&loaded, args.format) {
-        (_, OutputFormat::Json) => {
-            return (code, Some(CheckJson::of(path, loaded.is_ok(), loaded.as_ref().err(), None)));
+fn check_graph(path: &Path, args: &CheckArgs, shell: &Shell) -> Checked {
+    match compile(shell.catalogue(), &args.graph_args.request(path.to_owned())) {
+        Ok(plan) => {
+            let (report, figures) = (plan.warnings(), PlanJson::of(&plan));
+            let summary = format!("{} nodes, one tick every {}", figures.nodes, milliseconds(figures.period_s));
+            let ok = report.is_none() || !args.deny_warnings;
+            Checked { ok, figures: Some(figures), summary, ..Checked::of(path, report) }
         }
-        (Ok(scenario), OutputFormat::Text) => {
-            let (runs, length) = (scenario.runs().len(), scenario.for_s);
-            let runs = if runs == 1 { "1 run".to_owned() } else { format!("{runs} runs") };
-            shell.say(&format!(
-                "{}: ok, a scenario of {runs}, {length} s each; run it with `tactflow verify`",
-                path.display()
-            ));
-        }
-        (Err(report), OutputFormat::Text) => shell.show(report),
+        Err(report) => Checked::of(path, Some(report)),
     }
-    (code, None)
 }
 
-/// The result of one file as JSON.
-#[derive(Serialize)]
-struct CheckJson {
+/// Checks a scenario with its graph and its bench.
+fn check_scenario(path: &Path, graph_args: &GraphArgs, shell: &Shell) -> Result<Checked, String> {
+    if graph_args.bench.is_some() || !graph_args.set.is_empty() {
+        let path = path.display();
+        return Err(format!("`{path}` is a scenario, which names its own bench: remove `--bench` and `--set`"));
+    }
+    Ok(match Scenario::load(shell.catalogue(), path) {
+        Ok(scenario) => {
+            let (runs, length) = (count_of(scenario.runs().len(), "run"), scenario.for_s);
+            let summary = format!("a scenario of {runs}, {length} s each; run it with `tactflow verify`");
+            Checked { ok: true, summary, ..Checked::of(path, None) }
+        }
+        Err(report) => Checked::of(path, Some(report)),
+    })
+}
+
+/// The result of one file, as JSON.
+#[derive(Default, Serialize)]
+struct Checked {
     graph: String,
     ok: bool,
     diagnostics: Vec<DiagnosticJson>,
     /// Figures of a graph that loads.
     figures: Option<PlanJson>,
+    #[serde(skip)]
+    report: Option<Report>,
+    /// What is printed of a good file.
+    #[serde(skip)]
+    summary: String,
 }
 
-impl CheckJson {
-    fn of(graph: &Path, ok: bool, report: Option<&Report>, figures: Option<PlanJson>) -> Self {
-        let diagnostics = report.map(diagnosed).unwrap_or_default();
-        Self { graph: graph.display().to_string(), ok, diagnostics, figures }
+impl Checked {
+    fn of(path: &Path, report: Option<Report>) -> Self {
+        let diagnostics = report.as_ref().map(diagnosed).unwrap_or_default();
+        Self { graph: path.display().to_string(), diagnostics, report, ..Self::default() }
     }
 }
 

@@ -2,7 +2,7 @@
 
 use clap::builder::{PossibleValue, PossibleValuesParser};
 
-use super::reference::entry::Entries;
+use super::reference::entry::entries;
 use super::shell::Shell;
 
 /// Print the completion script of a shell
@@ -23,11 +23,10 @@ pub(crate) struct CompletionsArgs {
 pub(crate) fn completions(args: CompletionsArgs, shell: &Shell) -> u8 {
     let mut text = Vec::new();
     // `describe` itself looks the name up, so that it can suggest a similar one.
-    let all = Entries::new(shell.catalogue()).all();
-    let names = PossibleValuesParser::new(all.into_iter().map(|entry| PossibleValue::new(entry.name)));
-    let arguments = shell.arguments().clone();
-    let mut arguments =
-        arguments.mut_subcommand("describe", |describe| describe.mut_arg("name", |name| name.value_parser(names)));
+    let all = entries(shell.catalogue()).into_iter();
+    let names = PossibleValuesParser::new(all.map(|entry| PossibleValue::new(entry.name)));
+    let describe = |command: clap::Command| command.mut_arg("name", |name| name.value_parser(names));
+    let mut arguments = shell.arguments().clone().mut_subcommand("describe", describe);
     clap_complete::generate(args.shell, &mut arguments, "tactflow", &mut text);
     shell.say(String::from_utf8_lossy(&text).trim_end());
     0

@@ -35,9 +35,8 @@ use shell::Colour;
 
 /// The parser of arguments, for the commands of other crates.
 pub use clap;
-pub use reference::example::example;
 pub use reference::pages::reference;
-pub use run::{Job, Print, duration};
+pub use run::{Job, JobOptions, Print, duration};
 pub use shell::command::{Subcommand, derived};
 pub use shell::{FAULTED, NOT_LOADED, Shell};
 pub use text::svg;

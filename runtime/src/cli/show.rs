@@ -56,14 +56,12 @@ pub(crate) fn show(args: ShowArgs, shell: &Shell) -> u8 {
 fn text(plan: &Compiled, has_colour: bool) -> String {
     let outline = plan.outline();
     let mut page = TomlPage { text: String::new(), has_colour };
+    let assign = |text: String, place: &Location| Assignment { text, origin: at(place), below: String::new() };
     let word = |name: &str, word: &OutlinedWord| {
-        let text = format!("{name} = {}", toml::Value::from(word.text.as_str()));
-        Assignment { text, origin: at(&word.place), below: String::new() }
+        assign(format!("{name} = {}", toml::Value::from(word.text.as_str())), &word.place)
     };
-    let wire = |prefix: &str, wire: &OutlinedWire| {
-        let text = format!("{prefix}{} = {}", wire.name, from(wire));
-        Assignment { text, origin: at(&wire.place), below: String::new() }
-    };
+    let wire =
+        |prefix: &str, wire: &OutlinedWire| assign(format!("{prefix}{} = {}", wire.name, from(wire)), &wire.place);
     let settings = |settings: &[Setting]| settings.iter().map(assignment).collect::<Vec<_>>();
     let block = |block: &OutlinedBlock| {
         let mut lines = vec![word("type", &block.kind)];
@@ -163,13 +161,8 @@ fn tall(value: &Value) -> Option<String> {
             line.push(' ');
             line.push_str(&text);
         }
-        let defaults: Vec<&str> = item
-            .as_table()
-            .into_iter()
-            .flat_map(|table| &table.entries)
-            .filter(|(key, _)| key.span == NO_SPAN)
-            .map(|(key, _)| key.name.as_str())
-            .collect();
+        let keys = item.as_table().into_iter().flat_map(|table| &table.entries).map(|(key, _)| key);
+        let defaults: Vec<&str> = keys.filter(|key| key.span == NO_SPAN).map(|key| key.name.as_str()).collect();
         if let Some(line) = lines.last_mut().filter(|_| !defaults.is_empty()) {
             line.push_str(&format!("  # default: {}", defaults.join(", ")));
         }

@@ -54,8 +54,7 @@ impl FedRole {
 
     /// Adds the outputs of the role that have no size.
     pub(super) fn complete(&mut self, catalogue: &Catalogue) {
-        let role = catalogue.roles().iter().find(|role| role.name == self.kind);
-        for port in role.iter().flat_map(|role| &role.outputs) {
+        for port in catalogue.role_type(&self.kind).iter().flat_map(|role| &role.outputs) {
             let shape = match port.kind {
                 Kind::Scalar => {
                     let unit = port.args.first().and_then(|unit| unit.parse().ok());
@@ -113,13 +112,13 @@ impl DeviceType for FedDevice {
         for (name, fact) in &self.role.facts {
             fill.fact(name.clone(), fact.clone());
         }
-        Some(Opened { description, driver: Driver::Stepped(Box::new(Fed(Arc::clone(&self.queue)))) })
+        Some(Opened { description, driver: Driver::Stepped(Box::new(FedDriver(Arc::clone(&self.queue)))) })
     }
 }
 
-struct Fed(Queue);
+struct FedDriver(Queue);
 
-impl Stepped for Fed {
+impl Stepped for FedDriver {
     /// What was fed next; a test that feeds nothing is a device that is silent, not one that has ended.
     fn next(&self) -> Option<i64> {
         let queue = self.0.lock().unwrap_or_else(PoisonError::into_inner);

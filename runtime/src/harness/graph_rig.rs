@@ -17,11 +17,11 @@ use crate::source::{Report, suggestion};
 pub struct GraphRig {
     /// The engine, for everything that the rig has no method for.
     pub engine: Engine,
-    fed: Vec<Fed>,
+    fed: Vec<RoleFeed>,
 }
 
 /// A fed role: its name, its outputs, each with the sequence number of its last sample, and what is to come.
-struct Fed {
+struct RoleFeed {
     role: String,
     outputs: Vec<(String, u64)>,
     queue: Queue,
@@ -54,7 +54,7 @@ impl GraphRig {
                 .set(format!("devices.{name}.type = \"{}\"", role.device_type()))
                 .set(format!("bind.{name} = \"{name}\""));
             let outputs = role.outputs.iter().map(|(output, _)| (output.clone(), 0)).collect();
-            rigged.push(Fed { role: name, outputs, queue: Arc::clone(&queue) });
+            rigged.push(RoleFeed { role: name, outputs, queue: Arc::clone(&queue) });
             catalogue = catalogue.device_type(Box::new(FedDevice { role, queue }));
         }
         Ok(Self { engine: Engine::new(compile(&catalogue, &request)?), fed: rigged })
@@ -123,14 +123,14 @@ impl GraphRig {
         fed.outputs[output].1 + 1
     }
 
-    fn role(&mut self, role: &str) -> &mut Fed {
+    fn role(&mut self, role: &str) -> &mut RoleFeed {
         let roles: Vec<String> = self.fed.iter().map(|fed| fed.role.clone()).collect();
         self.fed.iter_mut().find(|fed| fed.role == role).unwrap_or_else(|| {
             panic!("no role `{role}` is fed: {}", suggestion(role, roles.iter().map(String::as_str), "fed roles"))
         })
     }
 
-    fn output(&mut self, port: &str) -> (&mut Fed, usize) {
+    fn output(&mut self, port: &str) -> (&mut RoleFeed, usize) {
         let (role, name) = port.split_once('.').unwrap_or((port, ""));
         let fed = self.role(role);
         let found = fed.outputs.iter().position(|(output, _)| output == name);
@@ -197,7 +197,7 @@ impl GraphRig {
     }
 }
 
-fn push(fed: &Fed, ms: f64, event: Event) {
+fn push(fed: &RoleFeed, ms: f64, event: Event) {
     fed.queue.lock().unwrap_or_else(PoisonError::into_inner).push_back((nanos(ms), event));
 }
 

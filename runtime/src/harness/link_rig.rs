@@ -1,17 +1,17 @@
 //! A live driver in a test, without a graph.
 
-use std::path::Path;
 use std::time::{Duration, Instant};
 
 use tokio::runtime::{Builder, Runtime};
 use tokio::task::JoinHandle;
 
+use super::params::with_params;
 use crate::device::{
     Commands, Description, Device, DeviceError, Driver, Linked, Opened, Output, SampleState, Samples, device_type, link,
 };
 use crate::node::{Mistakes, Reader};
 use crate::signal::Signal;
-use crate::source::{SourceMap, parse_table};
+use crate::source::Value;
 
 /// A live device that runs on a tokio runtime of its own, in real time. The test takes the place of the graph: it waits
 /// for samples, sends commands and stops the device. Ports are named without their role: `value`.
@@ -35,14 +35,8 @@ impl LinkRig {
     /// # Panics
     /// If the text is not TOML, or if the device is not live.
     pub fn start<D: Device>(params: &str) -> Result<Self, Mistakes> {
-        let mut sources = SourceMap::default();
-        let table = parse_table(sources.add_file(Path::new("test.toml"), params));
-        let table = table.unwrap_or_else(|errors| panic!("{errors:?}"));
-        let mut reader = Reader::new(&sources);
-        let opened = device_type::<D>().open(&table, &mut reader);
-        let Some(Opened { description, driver }) = opened.filter(|_| reader.mistakes.is_empty()) else {
-            return Err(reader.mistakes);
-        };
+        let open = |table: &Value, reader: &mut Reader<'_>| device_type::<D>().open(table, reader);
+        let Opened { description, driver } = with_params(params, open)?;
         let Driver::Live(driver) = driver else { panic!("`{}` is a stepped device", D::NAME) };
         let runtime = Builder::new_multi_thread().worker_threads(1).enable_all().build();
         let runtime = runtime.expect("the operating system gives a thread");

@@ -3,13 +3,12 @@
 mod fed;
 mod graph_rig;
 mod link_rig;
-#[cfg(feature = "cli")]
 mod lint;
 mod node_rig;
+mod params;
 
 pub use fed::FedRole;
 pub use graph_rig::GraphRig;
 pub use link_rig::LinkRig;
-#[cfg(feature = "cli")]
 pub use lint::{CountAllocations, Lint, Violation, lint};
 pub use node_rig::NodeRig;

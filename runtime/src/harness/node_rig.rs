@@ -1,11 +1,9 @@
 //! One node on a table: set its inputs, step, look at its outputs.
 
-use std::path::Path;
-
+use super::params::with_params;
 use crate::engine::NodeRunner;
-use crate::node::{Bus, Components, Given, Mistakes, Need, Node, NodeSpec, PortId, Reader, Tick, of};
+use crate::node::{Bus, Components, Given, Mistakes, Need, Node, NodeSpec, PortId, Tick, of};
 use crate::signal::{Features, Freshness, Mark, Shape, Signal, Stamp};
-use crate::source::{SourceMap, parse_table};
 
 /// A node with nothing around it, for its own tests. It steps as in a graph: when a trigger is new or lost.
 ///
@@ -31,16 +29,9 @@ impl NodeRig {
     /// # Panics
     /// If the text is not TOML, or a name is no input.
     pub fn new<N: Node>(params: &str, wires: &[(&str, Shape)]) -> Result<Self, Mistakes> {
-        let mut sources = SourceMap::default();
-        let file = sources.add_file(Path::new("test.toml"), params);
-        let table = parse_table(file).unwrap_or_else(|errors| panic!("{errors:?}"));
-        let mut reader = Reader::new(&sources);
         let node_type = of::<N>();
         let spec = node_type.spec();
-        let configured = node_type.configure(&table, &mut reader);
-        let Some(configured) = configured.filter(|_| reader.mistakes.is_empty()) else {
-            return Err(reader.mistakes);
-        };
+        let configured = with_params(params, |table, reader| node_type.configure(table, reader))?;
         let mut bus = Bus::default();
         let mut given = vec![Vec::new(); spec.inputs.len()];
         let mut wired: Vec<(Need, Vec<PortId>)> = spec.inputs.iter().map(|input| (input.need, Vec::new())).collect();

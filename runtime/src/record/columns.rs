@@ -6,22 +6,24 @@ use crate::signal::{Kind, Shape, Unit};
 
 /// The name and unit of one scalar.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Column {
+pub struct PortColumn {
     /// `node.port`, or `node.port.x` for a component.
     pub name: String,
+    /// The end of the name behind that of the port: empty, or `.x` for a component.
+    pub part: String,
     /// Unit of the values.
     pub unit: Unit,
 }
 
 /// The scalars of several ports, port by port.
 #[derive(Debug, Clone, Default)]
-pub struct Columns {
+pub struct PortColumns {
     /// The columns.
-    pub list: Vec<Column>,
+    pub list: Vec<PortColumn>,
     ports: Vec<(PortId, Kind)>,
 }
 
-impl Columns {
+impl PortColumns {
     /// Returns the columns of `ports`. Images, masks, regions and Jacobians have none.
     #[must_use]
     pub fn new(ports: &[(PlannedPort, PortId)]) -> Self {
@@ -35,10 +37,10 @@ impl Columns {
 
     /// Returns the columns of one port.
     #[must_use]
-    pub fn of(port: &PlannedPort) -> Vec<Column> {
+    pub fn of(port: &PlannedPort) -> Vec<PortColumn> {
         let named = |(suffix, unit): (String, Unit)| {
-            let name = if suffix.is_empty() { port.name.clone() } else { format!("{}.{suffix}", port.name) };
-            Column { name, unit }
+            let part = if suffix.is_empty() { suffix } else { format!(".{suffix}") };
+            PortColumn { name: format!("{}{part}", port.name), part, unit }
         };
         port.shape.scalars().into_iter().map(named).collect()
     }

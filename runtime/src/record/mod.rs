@@ -6,8 +6,8 @@ mod points;
 mod recorder;
 mod writer;
 
-pub use columns::{Column, Columns, recorded};
+pub use columns::{PortColumn, PortColumns, recorded};
 #[cfg(feature = "cli")]
 pub use points::{PointPorts, PointRecorder, PointsRequest};
 pub use recorder::Recorder;
-pub use writer::Format;
+pub use writer::RecordFormat;

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use ply_rs_bw::ply::{ElementDef, Encoding, Header, PropertyAccess, PropertyDef, PropertyType, ScalarType};
 use ply_rs_bw::writer::Writer;
 
-use super::Columns;
+use super::PortColumns;
 use crate::engine::Engine;
 use crate::graph::{Compiled, PlannedPort};
 use crate::node::PortId;
@@ -69,7 +69,7 @@ impl PointsRequest {
         }
         let extra = rest.iter().map(|name| {
             let port = look_up(plan, name)?;
-            if Columns::width(&port.shape) == 0 {
+            if PortColumns::width(&port.shape) == 0 {
                 return Err(format!("`{name}` is {}, which has no numbers to write", port.shape.kind().with_article()));
             }
             Ok((name.clone(), port))
@@ -93,7 +93,7 @@ const POINT_COLUMNS: [&str; 7] = ["x", "y", "z", "nx", "ny", "nz", "time"];
 pub struct PointRecorder {
     file: File,
     pose: PortId,
-    extra: Columns,
+    extra: PortColumns,
     names: Vec<String>,
     comments: Vec<String>,
     values: Vec<f64>,
@@ -122,16 +122,15 @@ impl PointRecorder {
             "nx ny nz points out of the surface, against the sensor's z; time is in [s]".into(),
         ];
         for (word, port) in &ports.extra {
-            for column in Columns::of(port) {
-                let part = column.name.strip_prefix(port.name.as_str()).unwrap_or_default();
-                let name = format!("{word}{part}").replace('.', "_");
+            for column in PortColumns::of(port) {
+                let name = format!("{word}{}", column.part).replace('.', "_");
                 comments.push(format!("{name} [{}]", column.unit));
                 names.push(name);
             }
         }
         let extra: Vec<(PlannedPort, PortId)> =
             ports.extra.iter().map(|(_, port)| (port.clone(), id_of(port))).collect();
-        let (pose, extra) = (id_of(&ports.pose), Columns::new(&extra));
+        let (pose, extra) = (id_of(&ports.pose), PortColumns::new(&extra));
         Ok(Self { file: File::create(path)?, pose, extra, names, comments, values: Vec::with_capacity(1 << 16) })
     }
 

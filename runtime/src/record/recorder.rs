@@ -8,7 +8,7 @@ use std::time::Duration;
 
 use rtrb::{Consumer, Producer, RingBuffer};
 
-use super::{Column, Columns, Format};
+use super::{PortColumn, PortColumns, RecordFormat};
 use crate::engine::Engine;
 use crate::signal::Unit;
 
@@ -19,7 +19,7 @@ const POLL_INTERVAL: Duration = Duration::from_millis(1);
 
 /// Records every scalar of a graph, one row per tick.
 pub struct Recorder {
-    columns: Columns,
+    columns: PortColumns,
     row: Vec<f64>,
     /// Number of columns that belong to no port.
     own: usize,
@@ -38,10 +38,10 @@ impl Recorder {
     ///
     /// # Errors
     /// If the file cannot be created.
-    pub fn create(path: &Path, format: Format, engine: &Engine, may_wait: bool) -> io::Result<Self> {
-        let columns = Columns::new(engine.ports());
+    pub fn create(path: &Path, format: RecordFormat, engine: &Engine, may_wait: bool) -> io::Result<Self> {
+        let columns = PortColumns::new(engine.ports());
         let own = own_columns(engine);
-        let list: Vec<Column> = own.iter().chain(&columns.list).cloned().collect();
+        let list: Vec<PortColumn> = own.iter().chain(&columns.list).cloned().collect();
         let mut out = BufWriter::new(File::create(path)?);
         format.header(&list, &mut out)?;
         let width = list.len() + 1;
@@ -88,12 +88,17 @@ impl Recorder {
 
 /// Returns the columns that belong to no port. A graph with modes has two: the number of the next tick's mode, from 0 in the
 /// order of the file, and whether the commands are halted.
-fn own_columns(engine: &Engine) -> Vec<Column> {
+fn own_columns(engine: &Engine) -> Vec<PortColumn> {
     let names = if engine.mode().is_some() { &["mode", "halted"][..] } else { &[] };
-    names.iter().map(|name| Column { name: (*name).to_owned(), unit: Unit::ONE }).collect()
+    names.iter().map(|name| PortColumn { name: (*name).to_owned(), part: String::new(), unit: Unit::ONE }).collect()
 }
 
-fn write_rows(mut ring: Consumer<f64>, format: Format, columns: &[Column], mut out: impl Write) -> io::Result<()> {
+fn write_rows(
+    mut ring: Consumer<f64>,
+    format: RecordFormat,
+    columns: &[PortColumn],
+    mut out: impl Write,
+) -> io::Result<()> {
     let mut row = vec![0.0; columns.len() + 1];
     loop {
         // Checked before the ring is drained, so rows written before the end are not lost.

@@ -6,18 +6,18 @@ use std::path::Path;
 use serde::Serializer;
 use serde::ser::SerializeMap;
 
-use super::Column;
+use super::PortColumn;
 
 /// The format of a recording.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Format {
+pub enum RecordFormat {
     /// Comma-separated values. Comments before the header list the units.
     Csv,
     /// One JSON object per line. The first line lists the units.
     Ndjson,
 }
 
-impl Format {
+impl RecordFormat {
     /// The first bytes of a file in each format.
     pub const FILE_STARTS: [&'static str; 2] = ["# time [s]", "{\"units\":"];
 
@@ -32,7 +32,7 @@ impl Format {
     }
 
     /// Writes the lines before the rows.
-    pub(super) fn header(self, columns: &[Column], out: &mut impl Write) -> io::Result<()> {
+    pub(super) fn header(self, columns: &[PortColumn], out: &mut impl Write) -> io::Result<()> {
         match self {
             Self::Csv => {
                 writeln!(out, "# time [s]")?;
@@ -54,7 +54,7 @@ impl Format {
     }
 
     /// Writes one row: the time [ns] and one value per column. NaN stands for an absent value.
-    pub(super) fn row(self, columns: &[Column], time: i64, row: &[f64], out: &mut impl Write) -> io::Result<()> {
+    pub(super) fn row(self, columns: &[PortColumn], time: i64, row: &[f64], out: &mut impl Write) -> io::Result<()> {
         let seconds = time as f64 * 1e-9;
         match self {
             Self::Csv => {

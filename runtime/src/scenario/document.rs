@@ -3,8 +3,7 @@
 use std::ops::Range;
 
 use crate::node::{At, FilePath, Map, Mistake, Param, Reader, Spanned};
-use crate::source::{Code, Diagnostic};
-use crate::source::{Item, Key, SourceMap, Table, Value};
+use crate::source::{Code, Diagnostic, Item, Key, SourceMap, Table, Value, suggestion};
 
 /// The section `[scenario]`.
 #[derive(Debug, Clone, Param)]
@@ -109,15 +108,15 @@ impl Param for Seeds {
     const EXPECTS: &'static str = "a number of seeds from 1 to 10000, or a list of whole numbers, each once";
 
     fn read(value: &Value, reader: &mut Reader<'_>) -> Option<Self> {
-        let list = match &value.item {
-            Item::Integer(count) if (1..=MAX_SEEDS).contains(count) => Some((1..=*count as u64).collect::<Vec<_>>()),
+        let seed = |item: &Value| match item.item {
+            Item::Integer(seed) => u64::try_from(seed).ok(),
+            _ => None,
+        };
+        let is_distinct = |seeds: &Vec<u64>| (1..seeds.len()).all(|i| !seeds[..i].contains(&seeds[i]));
+        let list: Option<Vec<u64>> = match &value.item {
+            Item::Integer(count) if (1..=MAX_SEEDS).contains(count) => Some((1..=*count as u64).collect()),
             Item::Array(items) if !items.is_empty() => {
-                let seeds = items.iter().map(|item| match item.item {
-                    Item::Integer(seed) => u64::try_from(seed).ok(),
-                    _ => None,
-                });
-                let seeds: Option<Vec<u64>> = seeds.collect();
-                seeds.filter(|seeds| (1..seeds.len()).all(|i| !seeds[..i].contains(&seeds[i])))
+                items.iter().map(seed).collect::<Option<_>>().filter(is_distinct)
             }
             _ => None,
         };
@@ -156,43 +155,41 @@ impl Document {
     }
 }
 
+/// The sections of a scenario file.
+const SECTIONS: [&str; 2] = ["scenario", "check"];
+
 /// Reads the sections of a scenario file. Mistakes go to the reader.
 pub(super) fn document(root: &Table, reader: &mut Reader<'_>) -> Document {
-    for (key, _) in root.entries.iter().filter(|(key, _)| !["scenario", "check"].contains(&key.name.as_str())) {
+    for (key, _) in root.entries.iter().filter(|(key, _)| !SECTIONS.contains(&key.name.as_str())) {
         let message = format!("a scenario has no section `{}`", key.name);
         let help = match key.name.as_str() {
             "set" | "nodes" | "parts" | "devices" | "bind" => {
                 "a scenario cannot change its task or bench: write another task or bench for it".to_owned()
             }
-            name => crate::source::suggestion(name, ["scenario", "check"].into_iter(), "sections"),
+            name => suggestion(name, SECTIONS.into_iter(), "sections"),
         };
         reader.mistakes.push(Mistake::new(Code::UnknownKey, At::Span(key.span.clone()), message).help(help));
     }
-    // Diagnostics of missing keys point to the name of the section.
-    let section = root.entry("scenario").map(|(key, value)| match value.item {
-        Item::Table(_) => Value { span: key.span.clone(), ..value.clone() },
-        _ => value.clone(),
-    });
+    let section = root.entry("scenario").map(|(key, value)| at_key(key, value));
     let section = section.unwrap_or(Value { span: 0..0, item: Item::Table(Table::default()) });
     let scenario = ScenarioTable::read(&section, reader);
-    let checks = match root.get("check").map(|value| (value, value.as_table())) {
-        Some((_, Some(table))) => table.entries.iter().map(|(key, value)| check(key, value, reader)).collect(),
-        Some((value, None)) => {
-            reader.wrong_type(value, "a table of checks");
-            Vec::new()
-        }
-        None => Vec::new(),
+    let checks = root.get("check");
+    if let Some(value) = checks.filter(|value| value.as_table().is_none()) {
+        reader.wrong_type(value, "a table of checks");
+    }
+    let check = |(key, value): &(Key, Value)| {
+        let value = at_key(key, value);
+        let table = CheckTable::read(&value, reader);
+        CheckBlock { key: key.clone(), value, table }
     };
+    let checks = checks.and_then(Value::as_table).into_iter().flat_map(|table| &table.entries).map(check).collect();
     Document { section, scenario, checks }
 }
 
-fn check(key: &Key, value: &Value, reader: &mut Reader<'_>) -> CheckBlock {
-    let value = match value.item {
-        Item::Table(_) => Value { span: key.span.clone(), ..value.clone() },
-        _ => value.clone(),
-    };
-    let table = CheckTable::read(&value, reader);
-    CheckBlock { key: key.clone(), value, table }
+/// Returns a section with the span of its name, to which diagnostics of missing keys point.
+fn at_key(key: &Key, value: &Value) -> Value {
+    let span = if value.as_table().is_some() { &key.span } else { &value.span };
+    Value { span: span.clone(), ..value.clone() }
 }
 
 impl CheckBlock {
@@ -210,13 +207,9 @@ impl CheckBlock {
             found.push(Diagnostic::new(code, self.span(key), message).help(help));
         };
         let (target, within) = (table.settles_to, table.within);
-        let needs_target = [
-            ("within", within.is_some()),
-            ("response_below_s", table.response_below_s.is_some()),
-            ("steady_state_error_below", table.steady_state_error_below.is_some()),
-            ("steady_s", table.steady_s.is_some()),
-        ];
-        for (key, _) in needs_target.into_iter().filter(|(_, is_given)| *is_given && target.is_none()) {
+        let is_given = |key: &&str| self.value.as_table().is_some_and(|table| table.get(key).is_some());
+        let needs_target = ["within", "response_below_s", "steady_state_error_below", "steady_s"];
+        for key in needs_target.into_iter().filter(|key| target.is_none() && is_given(key)) {
             let help = "add `settles_to`: the value that the port must reach";
             wrong(Code::MissingKey, key, format!("`{key}` needs `settles_to`"), help);
         }

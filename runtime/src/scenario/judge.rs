@@ -1,5 +1,7 @@
 //! Combines the figures of many runs: the median, the worst, a confidence interval, and whether the bound is met.
 
+use serde::Serialize;
+
 /// A figure of a check.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Figure {
@@ -79,7 +81,8 @@ impl Bound {
 }
 
 /// The verdict on a row.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
 pub enum Verdict {
     /// The figure is within its bound.
     Passed,
@@ -91,7 +94,7 @@ pub enum Verdict {
 
 /// One figure of a scenario over all runs.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Row {
+pub struct FigureRow {
     /// Name of the check.
     pub check: String,
     /// The port or the mode that is checked.
@@ -108,7 +111,7 @@ pub struct Row {
     pub values: Vec<Option<f64>>,
 }
 
-impl Row {
+impl FigureRow {
     /// Returns the values from best to worst. A value that could not be measured is the worst.
     fn sorted(&self) -> Vec<f64> {
         let sign = if self.figure.is_better_high() { -1.0 } else { 1.0 };
@@ -190,9 +193,9 @@ fn skipped(count: usize) -> Option<usize> {
 mod tests {
     use super::*;
 
-    fn row(figure: Figure, bound: Bound, values: &[f64]) -> Row {
+    fn row(figure: Figure, bound: Bound, values: &[f64]) -> FigureRow {
         let values = values.iter().map(|value| Some(*value).filter(|value| !value.is_nan())).collect();
-        Row { check: "x".into(), of: "a.b".into(), figure, unit: "m".into(), bound, paper: None, values }
+        FigureRow { check: "x".into(), of: "a.b".into(), figure, unit: "m".into(), bound, paper: None, values }
     }
 
     #[test]

@@ -1,25 +1,22 @@
 //! Resolves the ports, modes, facts and seeds of a scenario in the plan of its task on its bench.
 
 use std::collections::BTreeSet;
-use std::path::Path;
 
 use super::document::{CheckBlock, CheckTable, Document, PaperTable, ScenarioTable};
-use super::judge::{Bound, Figure, Row};
+use super::judge::{Bound, Figure, FigureRow};
 use super::model::{Check, Scenario, row};
 use crate::catalogue::Catalogue;
 use crate::graph::{Compiled, Request};
 use crate::node::Spanned;
-use crate::record::{Column, Columns};
+use crate::record::{PortColumn, PortColumns};
 use crate::signal::Kind;
-use crate::source::{Code, Diagnostic, Report, suggest_name};
-use crate::source::{Item, Value};
+use crate::source::{Code, Diagnostic, Item, Report, Value, suggest_name};
 
 /// Default length of the steady state at the end of a run [s].
 const DEFAULT_STEADY_S: f64 = 10.0;
 
 /// Resolves every name of the scenario, or returns a diagnostic for each that does not exist.
 pub(super) fn look_up(
-    path: &Path,
     document: &Document,
     request: Request,
     plan: &Compiled,
@@ -29,10 +26,9 @@ pub(super) fn look_up(
     let mut lookup = Lookup { plan, found };
     let (mut checks, mut rows) = (Vec::new(), Vec::new());
     for block in &document.checks {
-        if let Some((check, its_rows)) = lookup.check(block) {
-            checks.push(check);
-            rows.extend(its_rows);
-        }
+        let Some((check, its_rows)) = lookup.check(block) else { continue };
+        checks.push(check);
+        rows.extend(its_rows);
     }
     let scenario = document.scenario.as_ref().map(|table| {
         let from = table.from.as_ref().and_then(|word| Some((word.value.clone(), lookup.flag(word)?)));
@@ -41,7 +37,6 @@ pub(super) fn look_up(
         lookup.real_time(table);
         rows.extend(rows_of(table));
         Scenario {
-            path: path.to_owned(),
             for_s: table.for_s,
             seeds: table.seeds.as_ref().map(|seeds| seeds.list.clone()).unwrap_or_default(),
             facts: table.facts.iter().filter_map(|word| lookup.fact(word)).collect(),
@@ -60,7 +55,7 @@ pub(super) fn look_up(
 }
 
 /// Returns the rows of the checks on the run as a whole.
-fn rows_of(table: &ScenarioTable) -> impl Iterator<Item = Row> {
+fn rows_of(table: &ScenarioTable) -> impl Iterator<Item = FigureRow> {
     let rows = [
         (&table.never_lost, "never_lost", Figure::Lost, Bound::AtMost(0.0)),
         (&table.stays_in, "stays_in", Figure::Away, Bound::AtMost(0.0)),
@@ -77,18 +72,16 @@ struct Lookup<'a> {
 
 impl Lookup<'_> {
     /// Finds a column by its name in a recording or in the wires of the task. Returns it with the kind of its port.
-    fn column(&mut self, word: &Spanned<String>) -> Option<(Column, Kind)> {
+    fn column(&mut self, word: &Spanned<String>) -> Option<(PortColumn, Kind)> {
         let (port, rest) = self.plan.port_prefix(&word.value).or_else(|| self.unknown_port(word))?;
-        let (columns, kind) = (Columns::of(port), port.shape.kind());
-        let column = columns.iter().find(|column| column.name.strip_prefix(&port.name) == Some(rest));
-        if let Some(column) = column {
+        let (columns, kind) = (PortColumns::of(port), port.shape.kind());
+        if let Some(column) = columns.iter().find(|column| column.part == rest) {
             return Some((column.clone(), kind));
         }
         if !rest.is_empty() {
             self.unknown_port(word)?;
         }
-        let parts = columns.iter().map(|part| part.name.strip_prefix(&port.name).unwrap_or_default());
-        let parts: Vec<String> = parts.map(|part| format!("`{}{part}`", word.value)).collect();
+        let parts: Vec<String> = columns.iter().map(|column| format!("`{}{}`", word.value, column.part)).collect();
         let what = if parts.is_empty() { "which has no number to check" } else { "but a check needs one number" };
         let message = format!("`{}` is {}, {what}", word.value, kind.with_article());
         let help = (!parts.is_empty()).then(|| format!("write one of {}", parts.join(", ")));
@@ -100,7 +93,7 @@ impl Lookup<'_> {
     fn unknown_port<T>(&mut self, word: &Spanned<String>) -> Option<T> {
         let message = format!("there is no port `{}` in this task on this bench", word.value);
         let diagnostic = Diagnostic::new(Code::UnknownPort, word.span.clone(), message);
-        let columns = self.plan.ports().flat_map(Columns::of).map(|column| column.name);
+        let columns = self.plan.ports().flat_map(PortColumns::of).map(|column| column.name);
         let all: Vec<String> = columns.chain(self.plan.exports().iter().map(|(export, _)| export.clone())).collect();
         let owner_of = |name: &'_ str| name.split('.').next().unwrap_or_default().to_owned();
         let owner = owner_of(&word.value);
@@ -126,11 +119,10 @@ impl Lookup<'_> {
         Some(column.name)
     }
 
-    fn check(&mut self, block: &CheckBlock) -> Option<(Check, Vec<Row>)> {
+    fn check(&mut self, block: &CheckBlock) -> Option<(Check, Vec<FigureRow>)> {
         let table = block.table.as_ref()?;
         let figures = figures(table);
-        let mut papers = papers(table.paper.as_ref());
-        papers.retain(|(_, value)| value.is_some());
+        let papers = table.paper.as_ref().map(papers).unwrap_or_default();
         for (paper, _) in papers.iter().filter(|(paper, _)| !figures.iter().any(|(figure, _)| figure == paper)) {
             let message = format!("the check has no figure `{}` to compare with the paper's", paper.name());
             let names: Vec<_> = figures.iter().map(|(figure, _)| format!("`{}`", figure.name())).collect();
@@ -147,7 +139,7 @@ impl Lookup<'_> {
             None => (column.unit.to_string(), 1.0),
         };
         let rows = figures.iter().map(|(figure, bound)| {
-            let paper = papers.iter().find(|(of, _)| of == figure).and_then(|(_, value)| *value);
+            let paper = papers.iter().find(|(of, _)| of == figure).map(|(_, value)| *value);
             row(&block.key.name, &table.of.value, *figure, &unit_name, *bound, paper)
         });
         let check = Check {
@@ -164,7 +156,7 @@ impl Lookup<'_> {
     }
 
     /// Finds the column to subtract from another. Both must have the same unit.
-    fn subtrahend(&mut self, word: &Spanned<String>, other: &Column) -> Option<String> {
+    fn subtrahend(&mut self, word: &Spanned<String>, other: &PortColumn) -> Option<String> {
         let (column, _) = self.column(word)?;
         if column.unit != other.unit {
             let message = format!("`{}` is in {}, but `{}` is in {}", word.value, column.unit, other.name, other.unit);
@@ -181,11 +173,8 @@ impl Lookup<'_> {
         let ends_in = ends_in.filter(|word| word.value != super::trial::DONE || modes.is_empty());
         for word in ends_in.into_iter().chain(stays_in).filter(|word| !modes.contains(&word.value.as_str())) {
             let message = format!("there is no mode `{}`", word.value);
-            self.found.push(Diagnostic::new(Code::UnknownMode, word.span.clone(), message).suggest(
-                &word.value,
-                modes.iter().copied(),
-                "modes",
-            ));
+            let diagnostic = Diagnostic::new(Code::UnknownMode, word.span.clone(), message);
+            self.found.push(diagnostic.suggest(&word.value, modes.iter().copied(), "modes"));
         }
     }
 
@@ -199,11 +188,9 @@ impl Lookup<'_> {
         let fact = facts.iter().find(|(name, _)| *name == word.value).cloned();
         if fact.is_none() {
             let message = format!("no device states the fact or has the parameter `{}`", word.value);
-            self.found.push(Diagnostic::new(Code::UnknownFact, word.span.clone(), message).suggest(
-                &word.value,
-                facts.iter().map(|(name, _)| name.as_str()),
-                "facts",
-            ));
+            let diagnostic = Diagnostic::new(Code::UnknownFact, word.span.clone(), message);
+            let names = facts.iter().map(|(name, _)| name.as_str());
+            self.found.push(diagnostic.suggest(&word.value, names, "facts"));
         }
         fact
     }
@@ -211,7 +198,7 @@ impl Lookup<'_> {
     /// Returns the keys that set the seed. Without such a key, every seed would give the same run.
     fn seeds(&mut self, table: &ScenarioTable, catalogue: &Catalogue) -> Vec<String> {
         let has_seed = |kind: &str| {
-            let known = catalogue.devices().iter().find(|device| device.name() == kind);
+            let known = catalogue.find_device(kind);
             known.is_some_and(|device| device.params().iter().any(|param| param.name == "seed"))
         };
         let devices = self.plan.outline().devices.iter().filter(|device| has_seed(&device.kind.text));
@@ -237,13 +224,8 @@ impl Lookup<'_> {
 
 /// Returns a value that is a string, a number or a boolean.
 fn plain(value: &Value) -> Option<toml::Value> {
-    Some(match &value.item {
-        Item::String(text) => text.as_str().into(),
-        Item::Integer(number) => (*number).into(),
-        Item::Float(number) => (*number).into(),
-        Item::Boolean(value) => (*value).into(),
-        Item::Datetime(_) | Item::Array(_) | Item::Table(_) => return None,
-    })
+    let is_plain = !matches!(value.item, Item::Datetime(_) | Item::Array(_) | Item::Table(_));
+    toml::Value::try_from(value).ok().filter(|_| is_plain)
 }
 
 /// Returns the figures of a check with their bounds.
@@ -263,15 +245,15 @@ fn figures(table: &CheckTable) -> Vec<(Figure, Bound)> {
     figures
 }
 
-/// Returns the paper's value of each figure.
-fn papers(paper: Option<&PaperTable>) -> Vec<(Figure, Option<f64>)> {
-    let Some(paper) = paper else { return Vec::new() };
-    vec![
+/// Returns the values that the paper gives.
+fn papers(paper: &PaperTable) -> Vec<(Figure, f64)> {
+    let values = [
         (Figure::Response, paper.response_s),
         (Figure::Error, paper.error),
         (Figure::Mean, paper.mean),
         (Figure::Std, paper.std),
         (Figure::Max, paper.max),
         (Figure::Min, paper.min),
-    ]
+    ];
+    values.into_iter().filter_map(|(figure, value)| Some((figure, value?))).collect()
 }

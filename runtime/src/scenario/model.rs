@@ -1,15 +1,11 @@
 //! A checked scenario: its runs, its checks and the rows of its table.
 
-use std::path::PathBuf;
-
-use super::judge::{self, Bound, Row};
+use super::judge::{Bound, Figure, FigureRow};
 use crate::graph::Request;
 
 /// A scenario that has been checked with its task and its bench: every port it names exists.
 #[derive(Debug, Clone)]
 pub struct Scenario {
-    /// The file.
-    pub path: PathBuf,
     /// Duration of a run [s].
     pub for_s: f64,
     /// The seeds. A scenario without seeds runs once.
@@ -27,7 +23,7 @@ pub struct Scenario {
     pub(super) ends_in: Option<String>,
     pub(super) checks: Vec<Check>,
     /// The rows of all figures, without values: those of the checks, then those of the run as a whole.
-    pub(super) rows: Vec<Row>,
+    pub(super) rows: Vec<FigureRow>,
 }
 
 /// A check on one value.
@@ -47,7 +43,7 @@ pub(super) struct Check {
     /// Length of the steady state at the end of the run [s].
     pub(super) steady: f64,
     /// The figures, in the order of the rows.
-    pub(super) figures: Vec<judge::Figure>,
+    pub(super) figures: Vec<Figure>,
 }
 
 impl Scenario {
@@ -57,19 +53,11 @@ impl Scenario {
         text.lines().any(|line| line.trim() == "[scenario]" || line.trim_start().starts_with("scenario."))
     }
 
-    /// Returns the name of the scenario: its file name without the extension.
-    #[must_use]
-    pub fn name(&self) -> String {
-        self.path.file_stem().unwrap_or(self.path.as_os_str()).to_string_lossy().into_owned()
-    }
-
     /// Replaces the seeds by 1 to `count`. A scenario without seeds does not change.
-    #[must_use]
-    pub fn with_seeds(mut self, count: u64) -> Self {
+    pub fn set_seeds(&mut self, count: u64) {
         if !self.seeds.is_empty() {
             self.seeds = (1..=count).collect();
         }
-        self
     }
 
     /// Returns the seed of each run.
@@ -80,7 +68,7 @@ impl Scenario {
 }
 
 /// Creates a row without values.
-pub(super) fn row(check: &str, of: &str, figure: judge::Figure, unit: &str, bound: Bound, paper: Option<f64>) -> Row {
+pub(super) fn row(check: &str, of: &str, figure: Figure, unit: &str, bound: Bound, paper: Option<f64>) -> FigureRow {
     let unit = if figure.is_time() { "s" } else { unit };
-    Row { check: check.into(), of: of.into(), figure, unit: unit.into(), bound, paper, values: Vec::new() }
+    FigureRow { check: check.into(), of: of.into(), figure, unit: unit.into(), bound, paper, values: Vec::new() }
 }

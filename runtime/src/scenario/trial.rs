@@ -2,36 +2,40 @@
 
 use std::path::Path;
 
-use super::judge::{Figure, Row};
+use serde::Serialize;
+
+use super::judge::{Figure, FigureRow};
 use super::measure::{self, Reading, since};
 use super::model::{Check, Scenario};
 use crate::catalogue::Catalogue;
 use crate::engine::{End, Engine, run_virtual};
 use crate::graph::{Request, compile};
 use crate::node::ScalarId;
-use crate::record::{Columns, Format, Recorder};
+use crate::record::{PortColumns, RecordFormat, Recorder};
 use crate::signal::Freshness;
 
 /// The value of `ends_in` for a run that ends with a `done` condition.
 pub(super) const DONE: &str = "done";
 
 /// The result of one run.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Trial {
     /// The seed, if the scenario has seeds.
     pub seed: Option<u64>,
     /// Duration of the run [s].
+    #[serde(rename = "time_s")]
     pub time: f64,
     /// Why the run cannot be measured, for example a fault.
     pub failure: Option<String>,
     /// Every figure, in the order of the scenario's rows; `None` if it could not be measured.
+    #[serde(skip)]
     pub figures: Vec<Option<f64>>,
 }
 
 impl Scenario {
     /// Returns every figure over all runs, in the order of the file.
     #[must_use]
-    pub fn rows(&self, trials: &[Trial]) -> Vec<Row> {
+    pub fn rows(&self, trials: &[Trial]) -> Vec<FigureRow> {
         let mut rows = self.rows.clone();
         for (i, row) in rows.iter_mut().enumerate() {
             row.values = trials.iter().map(|trial| trial.figures[i]).collect();
@@ -59,7 +63,7 @@ impl Scenario {
                 return failed(0.0, first.unwrap_or_default());
             }
         };
-        let recorder = record.map(|path| Recorder::create(path, Format::Csv, &engine, true)).transpose();
+        let recorder = record.map(|path| Recorder::create(path, RecordFormat::Csv, &engine, true)).transpose();
         let mut recorder = match recorder {
             Ok(recorder) => recorder,
             Err(error) => return failed(0.0, format!("the recording cannot be created: {error}")),
@@ -116,7 +120,7 @@ struct Observer<'s> {
 
 impl<'s> Observer<'s> {
     fn new(scenario: &'s Scenario, engine: &Engine) -> Self {
-        let find = |name: &String| Columns::find(engine.ports(), name).expect("the lookup found every column");
+        let find = |name: &String| PortColumns::find(engine.ports(), name).expect("the lookup found every column");
         let values = scenario.checks.iter().map(|check| (find(&check.column), check.minus.as_ref().map(find)));
         Self {
             scenario,

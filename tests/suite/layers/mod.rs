@@ -30,8 +30,11 @@ const RUNTIME: &[&str] = &[
     "engine/core",
     "engine/session",
     "engine",
+    "example",
     "record",
     "scenario",
+    "harness",
+    "harness/lint",
     "cli/text",
     "cli/shell",
     "cli/view",
@@ -40,8 +43,6 @@ const RUNTIME: &[&str] = &[
     "cli/verify",
     "cli/reference",
     "cli",
-    "harness",
-    "harness/lint",
 ];
 
 /// Rooms of `runtime/src` that stand above others and still take nothing from them.
@@ -58,7 +59,7 @@ const RUNTIME_APART: &[(&str, &str)] = &[
     ("cli/view", "cli/shell"),
     ("cli/verify", "cli/run"),
     ("cli/reference", "cli/run"),
-    ("harness", "cli"),
+    ("cli", "harness"),
 ];
 
 /// The rooms of `nodes/src`, each with the rooms that it may take something from.

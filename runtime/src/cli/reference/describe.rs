@@ -2,7 +2,7 @@
 
 use clap::ValueEnum;
 
-use super::entry::{Entries, Entry};
+use super::entry::{Entry, entries};
 use super::page::page;
 use crate::cli::shell::{Shell, unknown};
 use crate::cli::text::prose::{PageStyle, markdown};
@@ -36,9 +36,8 @@ enum PageFormat {
 }
 
 pub(crate) fn describe(args: DescribeArgs, shell: &Shell) -> u8 {
-    let entries = Entries::new(shell.catalogue());
-    let all = entries.all();
-    let found: Vec<Entry> = all.iter().filter(|entry| entry.name == args.name).cloned().collect();
+    let all = entries(shell.catalogue());
+    let mut found: Vec<Entry> = all.iter().filter(|entry| entry.name == args.name).cloned().collect();
     if found.is_empty() {
         let names = all.iter().map(|entry| entry.name.as_str());
         let name = &args.name;
@@ -47,10 +46,11 @@ pub(crate) fn describe(args: DescribeArgs, shell: &Shell) -> u8 {
         );
         return shell.refuse(unknown("node, device, role, kind or file", name, names, &otherwise));
     }
-    let (found, missing): (Vec<Entry>, Vec<Option<String>>) =
-        found.into_iter().map(|entry| entries.with_example(entry)).unzip();
     if args.example {
-        return print_example(shell, &found, missing);
+        return print_example(&found, shell);
+    }
+    for entry in &mut found {
+        entry.example = entry.example_graph(shell.catalogue()).ok();
     }
     match args.format {
         PageFormat::Json => shell.say_json(&found),
@@ -59,23 +59,23 @@ pub(crate) fn describe(args: DescribeArgs, shell: &Shell) -> u8 {
             shell.say(pages.collect::<String>().trim_end());
         }
         PageFormat::Text => {
-            let look = PageStyle::new(shell.has_colour());
-            let pages: Vec<String> = found.iter().map(|entry| look.render(&page(entry, true))).collect();
+            let style = PageStyle::new(shell.has_colour());
+            let pages: Vec<String> = found.iter().map(|entry| style.render(&page(entry, true))).collect();
             shell.say(&pages.join("\n\n"));
         }
     }
     0
 }
 
-fn print_example(shell: &Shell, found: &[Entry], missing: Vec<Option<String>>) -> u8 {
-    match found.iter().find_map(|entry| entry.example.as_ref()) {
-        Some(example) => {
-            shell.say(example.trim_end());
+/// Prints the first example graph, or why the first entry has none.
+fn print_example(found: &[Entry], shell: &Shell) -> u8 {
+    let mut graphs: Vec<_> = found.iter().map(|entry| entry.example_graph(shell.catalogue())).collect();
+    graphs.sort_by_key(Result::is_err);
+    match graphs.swap_remove(0) {
+        Ok(graph) => {
+            shell.say(graph.trim_end());
             0
         }
-        None => {
-            let why = missing.into_iter().flatten().next();
-            shell.refuse(why.unwrap_or_else(|| format!("`{}` has no example", found[0].name)))
-        }
+        Err(why) => shell.refuse(why),
     }
 }

@@ -1,21 +1,20 @@
 //! The documentation of the catalogue as data: the JSON of `describe`, from which its text is made.
 
-use std::borrow::Cow;
-
+use clap::ValueEnum;
 use serde::Serialize;
 
-use super::example::{self, Target};
 use crate::catalogue::Catalogue;
 use crate::device::{DeviceType, RoleType};
-use crate::node::{Need, NodeSpec, ParamSpec, PortSpec, Repeats};
-use crate::node::{frame_args, may_fit};
+use crate::example::example_graph;
+use crate::node::{Need, NodeSpec, ParamSpec, PortSpec, Repeats, frame_args, may_fit};
 use crate::record::recorded;
 use crate::signal::Kind;
 
 /// The categories, in the order of the lists.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, ValueEnum)]
 #[serde(rename_all = "lowercase")]
 pub(crate) enum Category {
+    #[default]
     Node,
     Device,
     Role,
@@ -24,9 +23,6 @@ pub(crate) enum Category {
 }
 
 impl Category {
-    /// All categories.
-    pub(crate) const ALL: [Self; 5] = [Self::Node, Self::Device, Self::Role, Self::Kind, Self::File];
-
     /// Returns its name.
     pub(crate) const fn name(self) -> &'static str {
         match self {
@@ -40,7 +36,7 @@ impl Category {
 }
 
 /// One entry of the catalogue.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Default, Serialize)]
 pub(crate) struct Entry {
     pub(crate) category: Category,
     pub(crate) name: String,
@@ -75,7 +71,7 @@ pub(crate) struct Entry {
 }
 
 /// A port as it is declared.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Default, Serialize)]
 pub(crate) struct PortEntry {
     pub(crate) name: String,
     pub(crate) kind: &'static str,
@@ -115,198 +111,171 @@ pub(crate) struct ParamEntry {
     pub(crate) fields: Vec<ParamEntry>,
 }
 
-/// Access to the entries of a catalogue, in its order.
-pub(crate) struct Entries<'a> {
-    catalogue: &'a Catalogue,
-    nodes: Vec<(&'static str, NodeSpec)>,
+/// Returns the entries of a catalogue in the order of the lists, without example graphs.
+pub(crate) fn entries(catalogue: &Catalogue) -> Vec<Entry> {
+    let groups = catalogue.groups();
+    let nodes = groups.flat_map(|(group, specs)| specs.iter().map(move |spec| Entry::of_node(catalogue, group, spec)));
+    let devices = catalogue.devices().iter().map(|device| Entry::of_device(&**device));
+    let roles = catalogue.roles().iter().map(|role| Entry::of_role(catalogue, role));
+    let kinds = Kind::ALL.iter().map(|kind| Entry::of_kind(catalogue, *kind));
+    let files = catalogue.builtin_files().iter().map(|(name, bytes)| Entry::of_file(name, bytes));
+    nodes.chain(devices).chain(roles).chain(kinds).chain(files).collect()
 }
 
-impl<'a> Entries<'a> {
-    pub(crate) fn new(catalogue: &'a Catalogue) -> Self {
-        let groups = catalogue.groups();
-        let nodes = groups.flat_map(|(title, nodes)| nodes.iter().map(move |node| (title, node.spec()))).collect();
-        Self { catalogue, nodes }
+impl Entry {
+    fn new(category: Category, name: &str, summary: &str, doc: &str) -> Self {
+        let doc = doc.trim().to_owned();
+        Self { category, name: name.to_owned(), summary: summary.to_owned(), doc, ..Self::default() }
     }
 
-    /// Returns the entries of one category, without example graphs.
-    pub(crate) fn of(&self, category: Category) -> Vec<Entry> {
-        match category {
-            Category::Node => self.nodes.iter().map(|(group, spec)| self.node(group, spec)).collect(),
-            Category::Device => self.catalogue.devices().iter().map(|device| self.device(&**device)).collect(),
-            Category::Role => self.catalogue.roles().iter().map(|role| self.role(role)).collect(),
-            Category::Kind => Kind::ALL.iter().map(|kind| self.kind(*kind)).collect(),
-            Category::File => self.catalogue.builtin_files().iter().map(|(name, bytes)| file(name, bytes)).collect(),
-        }
-    }
-
-    /// Returns all entries, without example graphs.
-    pub(crate) fn all(&self) -> Vec<Entry> {
-        Category::ALL.into_iter().flat_map(|category| self.of(category)).collect()
-    }
-
-    /// Adds the example graph to an entry, or returns the reason why there is none.
-    pub(crate) fn with_example(&self, entry: Entry) -> (Entry, Option<String>) {
-        let target = match entry.category {
-            Category::Node => Target::Node(&entry.name),
-            Category::Device => Target::Device(&entry.name),
-            Category::Role => match entry.fits.first() {
-                Some(device) => Target::Device(device),
-                None => return (entry, None),
-            },
-            Category::Kind | Category::File => return (entry, None),
-        };
-        match example::compose(self.catalogue, target) {
-            Ok(example) => (Entry { example: Some(example), ..entry }, None),
-            Err(why) => (entry, Some(why)),
-        }
-    }
-
-    fn node(&self, group: &'static str, spec: &NodeSpec) -> Entry {
-        let inputs = spec.inputs.iter().map(|port| PortEntry { need: Some(need(port.need)), ..self.input(port) });
-        Entry {
+    fn of_node(catalogue: &Catalogue, group: &'static str, spec: &NodeSpec) -> Self {
+        let input = |port: &PortSpec| PortEntry { need: Some(need(port.need)), ..PortEntry::input(catalogue, port) };
+        Self {
             group,
             limits: spec.limits.holds.iter().map(ToString::to_string).collect(),
             steps: Some(if spec.every_tick { "in every tick" } else { "when an input that wakes it is new or lost" }),
-            inputs: inputs.collect(),
-            outputs: spec.outputs.iter().map(|port| self.output(port)).collect(),
-            params: spec.params.iter().map(param).collect(),
-            block: example::block(&spec.example).map(str::to_owned),
-            ..entry(Category::Node, &spec.name, &spec.summary, &spec.doc)
+            inputs: spec.inputs.iter().map(input).collect(),
+            outputs: spec.outputs.iter().map(|port| PortEntry::output(catalogue, port)).collect(),
+            params: spec.params.iter().map(ParamEntry::of).collect(),
+            block: block(&spec.example),
+            ..Self::new(Category::Node, &spec.name, &spec.summary, &spec.doc)
         }
     }
 
-    fn device(&self, device: &dyn DeviceType) -> Entry {
-        let example = device.example();
-        Entry {
-            params: device.params().iter().map(param).collect(),
-            fits: self.roles_of(device),
-            block: example::block(&example).map(str::to_owned),
-            ..entry(Category::Device, &device.name(), &device.summary(), &device.doc())
+    fn of_device(device: &dyn DeviceType) -> Self {
+        Self {
+            params: device.params().iter().map(ParamEntry::of).collect(),
+            fits: roles_of(device),
+            block: block(&device.example()),
+            ..Self::new(Category::Device, &device.name(), &device.summary(), &device.doc())
         }
     }
 
-    /// Returns the roles that the example of a device binds it to.
-    fn roles_of(&self, device: &dyn DeviceType) -> Vec<String> {
-        let example: toml::Table = device.example().parse().unwrap_or_default();
-        let roles = example.get("roles").and_then(toml::Value::as_table);
-        let kinds = roles.into_iter().flatten().filter_map(|(_, kind)| kind.as_str());
-        kinds.map(str::to_owned).collect()
-    }
-
-    fn role(&self, role: &RoleType) -> Entry {
-        let devices = self.catalogue.devices().iter().map(|device| &**device);
-        let fills = devices.filter(|device| self.roles_of(*device).iter().any(|name| *name == role.name));
-        let observed = || {
-            let name = role.observed_name();
-            format!(
+    fn of_role(catalogue: &Catalogue, role: &RoleType) -> Self {
+        let fills =
+            catalogue.devices().iter().filter(|device| roles_of(&***device).iter().any(|name| *name == role.name));
+        let name = role.observed_name();
+        let doc = match role.is_observed {
+            true => format!(
                 "Only a scenario and the recorder read it. A bench binds it as `{name} = \"device\"`, and no task declares it."
-            )
+            ),
+            false => String::new(),
         };
-        let doc = role.is_observed.then(observed).unwrap_or_default();
-        Entry {
-            outputs: role
-                .outputs
-                .iter()
-                .map(|port| if role.is_observed { declared(port) } else { self.output(port) })
-                .collect(),
-            commands: role.commands.iter().map(|port| self.input(port)).collect(),
-            reports: role.reports.iter().map(|port| self.input(port)).collect(),
+        let output =
+            |port| if role.is_observed { PortEntry::declared(port) } else { PortEntry::output(catalogue, port) };
+        let input = |port| PortEntry::input(catalogue, port);
+        Self {
+            outputs: role.outputs.iter().map(output).collect(),
+            commands: role.commands.iter().map(input).collect(),
+            reports: role.reports.iter().map(input).collect(),
             fits: fills.map(|device| device.name().into_owned()).collect(),
             limits: role.limits.iter().map(ToString::to_string).collect(),
-            ..entry(Category::Role, &role.name, &role.summary, &doc)
+            ..Self::new(Category::Role, &role.name, &role.summary, &doc)
         }
     }
 
     /// Describes a kind, with the ports that produce it and those that take it.
-    fn kind(&self, kind: Kind) -> Entry {
-        let named =
-            |owner: &str, port: &PortSpec, of: PortEntry| PortEntry { name: format!("{owner}.{}", port.name), ..of };
-        let is_meant = |port: &&PortSpec| port.kind == kind;
-        let mut entry =
-            Entry { recorded: Some(recorded(kind)), ..entry(Category::Kind, kind.name(), kind.summary(), kind.doc()) };
-        for role in self.catalogue.roles() {
-            let outputs = role.outputs.iter().filter(is_meant);
-            entry.outputs.extend(outputs.map(|port| named(&role.name, port, self.output(port))));
-            let commands = role.commands.iter().chain(&role.reports).filter(is_meant);
-            entry.inputs.extend(commands.map(|port| named(&role.name, port, self.input(port))));
+    fn of_kind(catalogue: &Catalogue, kind: Kind) -> Self {
+        let is_meant = |(_, port): &OwnedPort<'_>| port.kind == kind;
+        let named = |owned: OwnedPort<'_>, port: PortEntry| PortEntry { name: full_name(owned), ..port };
+        let outputs = of_roles(catalogue, |role| &role.outputs).chain(of_nodes(catalogue, |spec| &spec.outputs));
+        let outputs = outputs.filter(is_meant).map(|owned| named(owned, PortEntry::output(catalogue, owned.1)));
+        let roles = of_roles(catalogue, |role| &role.commands).chain(of_roles(catalogue, |role| &role.reports));
+        let inputs = roles.chain(of_nodes(catalogue, |spec| &spec.inputs));
+        let inputs = inputs.filter(is_meant).map(|owned| named(owned, PortEntry::input(catalogue, owned.1)));
+        Self {
+            recorded: Some(recorded(kind)),
+            outputs: outputs.collect(),
+            inputs: inputs.collect(),
+            ..Self::new(Category::Kind, kind.name(), kind.summary(), kind.doc())
         }
-        for (_, spec) in &self.nodes {
-            let outputs = spec.outputs.iter().filter(is_meant);
-            entry.outputs.extend(outputs.map(|port| named(&spec.name, port, self.output(port))));
-            let inputs = spec.inputs.iter().filter(is_meant);
-            entry.inputs.extend(inputs.map(|port| named(&spec.name, port, self.input(port))));
-        }
-        entry
     }
 
+    fn of_file(name: &str, bytes: &[u8]) -> Self {
+        let text = std::str::from_utf8(bytes).ok();
+        // The first line of a built-in file is a comment with its summary.
+        let first = text.and_then(|text| text.lines().next());
+        let comment = first.and_then(|line| line.strip_prefix("# ")).map(|line| line.trim_end_matches('.'));
+        let size = format!("{} kB", bytes.len().div_ceil(1000));
+        let summary = comment.map_or_else(|| size.clone(), |comment| format!("{comment} ({size})"));
+        // The text of a part shows its inputs, its exports and its parameters.
+        let block = text.filter(|_| name.ends_with(".toml")).map(str::to_owned);
+        Self { block, ..Self::new(Category::File, &format!("builtin:{name}"), &summary, "") }
+    }
+
+    /// Composes the example graph.
+    ///
+    /// # Errors
+    /// If there is none.
+    pub(crate) fn example_graph(&self, catalogue: &Catalogue) -> Result<String, String> {
+        let subject = match self.category {
+            Category::Node | Category::Device => Some(&self.name),
+            Category::Role => self.fits.first(),
+            Category::Kind | Category::File => None,
+        };
+        example_graph(catalogue, subject.ok_or_else(|| format!("`{}` has no example", self.name))?)
+    }
+}
+
+/// Returns the roles that the example of a device binds it to.
+fn roles_of(device: &dyn DeviceType) -> Vec<String> {
+    let example: toml::Table = device.example().parse().unwrap_or_default();
+    let roles = example.get("roles").and_then(toml::Value::as_table);
+    let kinds = roles.into_iter().flatten().filter_map(|(_, kind)| kind.as_str());
+    kinds.map(str::to_owned).collect()
+}
+
+/// Returns the block of a node or a device as written, or `None` without an example.
+fn block(example: &str) -> Option<String> {
+    Some(example.trim().to_owned()).filter(|text| !text.is_empty())
+}
+
+/// A port with the name of its role or its node.
+type OwnedPort<'c> = (&'c str, &'c PortSpec);
+
+fn of_roles(catalogue: &Catalogue, ports: fn(&RoleType) -> &[PortSpec]) -> impl Iterator<Item = OwnedPort<'_>> {
+    catalogue.roles().iter().flat_map(move |role| ports(role).iter().map(|port| (&*role.name, port)))
+}
+
+fn of_nodes(catalogue: &Catalogue, ports: fn(&NodeSpec) -> &[PortSpec]) -> impl Iterator<Item = OwnedPort<'_>> {
+    catalogue.specs().flat_map(move |spec| ports(spec).iter().map(|port| (&*spec.name, port)))
+}
+
+fn full_name((owner, port): OwnedPort<'_>) -> String {
+    format!("{owner}.{}", port.name)
+}
+
+impl PortEntry {
     /// Describes an input, with the outputs that its wire can come from.
-    fn input(&self, port: &PortSpec) -> PortEntry {
-        let readable = self.catalogue.roles().iter().filter(|role| !role.is_observed);
-        let roles = readable.map(|role| (&role.name, &role.outputs));
-        let nodes = self.nodes.iter().map(|(_, spec)| (&spec.name, &spec.outputs));
-        let all = roles.chain(nodes).flat_map(|(owner, ports)| ports.iter().map(move |port| (owner, port)));
-        PortEntry { fits: best_first(port, all.filter(|(_, output)| may_fit(output, port))), ..declared(port) }
+    fn input(catalogue: &Catalogue, port: &PortSpec) -> Self {
+        let readable = of_roles(catalogue, |role| if role.is_observed { &[] } else { &role.outputs });
+        let outputs = readable.chain(of_nodes(catalogue, |spec| &spec.outputs));
+        Self::fitting(port, outputs.filter(|(_, output)| may_fit(output, port)))
     }
 
     /// Describes an output, with the inputs that a wire from it can lead to.
-    fn output(&self, port: &PortSpec) -> PortEntry {
-        let roles = self.catalogue.roles().iter().map(|role| (&role.name, &role.commands));
-        let nodes = self.nodes.iter().map(|(_, spec)| (&spec.name, &spec.inputs));
-        let reports = self.catalogue.roles().iter().map(|role| (&role.name, &role.reports));
-        let all =
-            nodes.chain(roles).chain(reports).flat_map(|(owner, ports)| ports.iter().map(move |port| (owner, port)));
-        PortEntry { fits: best_first(port, all.filter(|(_, input)| may_fit(port, input))), ..declared(port) }
+    fn output(catalogue: &Catalogue, port: &PortSpec) -> Self {
+        let roles = of_roles(catalogue, |role| &role.commands).chain(of_roles(catalogue, |role| &role.reports));
+        let inputs = of_nodes(catalogue, |spec| &spec.inputs).chain(roles);
+        Self::fitting(port, inputs.filter(|(_, input)| may_fit(port, input)))
     }
-}
 
-/// Returns the names of ports that fit `port`; ports that declare the same unit come first.
-fn best_first<'p>(port: &PortSpec, others: impl Iterator<Item = (&'p Cow<'static, str>, &'p PortSpec)>) -> Vec<String> {
-    let mut others: Vec<_> = others.collect();
-    others.sort_by_key(|(_, other)| port.kind.has_unit() && other.args.first() != port.args.first());
-    others.into_iter().map(|(owner, other)| format!("{owner}.{}", other.name)).collect()
-}
-
-fn entry(category: Category, name: &str, summary: &str, doc: &str) -> Entry {
-    Entry {
-        category,
-        name: name.to_owned(),
-        summary: summary.to_owned(),
-        group: "",
-        doc: doc.trim().to_owned(),
-        steps: None,
-        inputs: Vec::new(),
-        outputs: Vec::new(),
-        commands: Vec::new(),
-        reports: Vec::new(),
-        params: Vec::new(),
-        fits: Vec::new(),
-        limits: Vec::new(),
-        recorded: None,
-        block: None,
-        example: None,
+    /// Describes a port and names those that fit it; ports that declare the same unit come first.
+    fn fitting<'c>(port: &PortSpec, others: impl Iterator<Item = OwnedPort<'c>>) -> Self {
+        let mut others: Vec<OwnedPort<'_>> = others.collect();
+        others.sort_by_key(|(_, other)| port.kind.has_unit() && other.args.first() != port.args.first());
+        Self { fits: others.into_iter().map(full_name).collect(), ..Self::declared(port) }
     }
-}
 
-fn file(name: &str, bytes: &[u8]) -> Entry {
-    // The first line of a built-in file is a comment with its summary.
-    let first = bytes.split(|byte| *byte == b'\n').next().and_then(|line| std::str::from_utf8(line).ok());
-    let comment = first.and_then(|line| line.strip_prefix("# ")).map(|line| line.trim_end_matches('.').to_owned());
-    let size = format!("{} kB", bytes.len().div_ceil(1000));
-    let summary = comment.map_or_else(|| size.clone(), |comment| format!("{comment} ({size})"));
-    // The text of a part shows its inputs, its exports and its parameters.
-    let text = std::str::from_utf8(bytes).ok().filter(|_| name.ends_with(".toml"));
-    Entry { block: text.map(str::to_owned), ..entry(Category::File, &format!("builtin:{name}"), &summary, "") }
-}
-
-fn declared(port: &PortSpec) -> PortEntry {
-    PortEntry {
-        name: port.name.to_string(),
-        kind: port.kind.name(),
-        unit: port.args.first().filter(|_| port.kind.has_unit()).map(|unit| unit.to_string()),
-        frames: frame_args(port).iter().map(ToString::to_string).collect(),
-        need: None,
-        doc: port.doc.trim().lines().map(str::trim).collect::<Vec<_>>().join(" "),
-        fits: Vec::new(),
+    fn declared(port: &PortSpec) -> Self {
+        Self {
+            name: port.name.to_string(),
+            kind: port.kind.name(),
+            unit: port.args.first().filter(|_| port.kind.has_unit()).map(ToString::to_string),
+            frames: frame_args(port).iter().map(ToString::to_string).collect(),
+            doc: port.doc.trim().lines().map(str::trim).collect::<Vec<_>>().join(" "),
+            ..Self::default()
+        }
     }
 }
 
@@ -330,23 +299,27 @@ const fn need(need: Need) -> &'static str {
     }
 }
 
-fn param(spec: &ParamSpec) -> ParamEntry {
-    ParamEntry {
-        name: spec.name,
-        takes: spec.takes.clone(),
-        unit: spec.unit.clone(),
-        range: spec.bounds.map(|bounds| [bounds.min, bounds.max].map(|end| Some(end).filter(|end| end.is_finite()))),
-        is_open: spec.bounds.is_some_and(|bounds| bounds.is_open),
-        words: spec.words,
-        default: spec.default.clone(),
-        is_required: !spec.is_optional,
-        is_live: spec.is_live,
-        doc: spec.doc_with_unit(),
-        separator: match spec.repeats {
-            Repeats::Once => ".",
-            Repeats::PerName => ".NAME.",
-            Repeats::PerEntry => "[].",
-        },
-        fields: spec.fields.iter().map(param).collect(),
+impl ParamEntry {
+    fn of(spec: &ParamSpec) -> Self {
+        Self {
+            name: spec.name,
+            takes: spec.takes.clone(),
+            unit: spec.unit.clone(),
+            range: spec
+                .bounds
+                .map(|bounds| [bounds.min, bounds.max].map(|end| Some(end).filter(|end| end.is_finite()))),
+            is_open: spec.bounds.is_some_and(|bounds| bounds.is_open),
+            words: spec.words,
+            default: spec.default.clone(),
+            is_required: !spec.is_optional,
+            is_live: spec.is_live,
+            doc: spec.doc_with_unit(),
+            separator: match spec.repeats {
+                Repeats::Once => ".",
+                Repeats::PerName => ".NAME.",
+                Repeats::PerEntry => "[].",
+            },
+            fields: spec.fields.iter().map(Self::of).collect(),
+        }
     }
 }

@@ -1,6 +1,8 @@
 //! `list`: all entries of the catalogue, one line each.
 
-use super::entry::{Category, Entries, Entry};
+use clap::ValueEnum;
+
+use super::entry::{Category, Entry, entries};
 use crate::cli::shell::command::OutputFormat;
 use crate::cli::shell::{NOT_LOADED, Shell};
 use crate::cli::text::prose::{Definition, Element, PageStyle};
@@ -24,19 +26,18 @@ pub(crate) struct ListArgs {
 }
 
 pub(crate) fn list(args: ListArgs, shell: &Shell) -> u8 {
-    let (categories, words): (Vec<_>, Vec<_>) =
-        args.words.iter().map(|word| (category(word), word)).partition(|(s, _)| s.is_some());
-    let categories: Vec<Category> = categories.into_iter().filter_map(|(category, _)| category).collect();
-    let words: Vec<String> = words.into_iter().map(|(_, word)| word.to_lowercase()).collect();
-    let entries = Entries::new(shell.catalogue());
-    let mut found: Vec<Entry> = entries.all();
+    let category = |word: &str| Category::from_str(word.strip_suffix('s').unwrap_or(word), false).ok();
+    let categories: Vec<Category> = args.words.iter().filter_map(|word| category(word)).collect();
+    let words = args.words.iter().filter(|word| category(word).is_none());
+    let words: Vec<String> = words.map(|word| word.to_lowercase()).collect();
+    let mut found = entries(shell.catalogue());
     found.retain(|entry| {
         let text = format!("{} {} {}", entry.name, entry.summary, entry.doc).to_lowercase();
         (categories.is_empty() || categories.contains(&entry.category))
             && words.iter().all(|word| text.contains(word.as_str()))
     });
     if args.format == OutputFormat::Json {
-        shell.say_json(&found.iter().map(EntryJson::of).collect::<Vec<_>>());
+        shell.say_json(&found.iter().map(ListedJson::of).collect::<Vec<_>>());
     } else if found.is_empty() {
         shell.error(format_args!("nothing in the catalogue matches `{}`", args.words.join(" ")));
     } else {
@@ -47,23 +48,17 @@ pub(crate) fn list(args: ListArgs, shell: &Shell) -> u8 {
 
 /// An entry of the list as JSON.
 #[derive(serde::Serialize)]
-struct EntryJson<'a> {
+struct ListedJson<'a> {
     category: Category,
     name: &'a str,
     summary: &'a str,
     group: &'a str,
 }
 
-impl<'a> EntryJson<'a> {
+impl<'a> ListedJson<'a> {
     fn of(entry: &'a Entry) -> Self {
         Self { category: entry.category, name: &entry.name, summary: &entry.summary, group: entry.group }
     }
-}
-
-fn category(word: &str) -> Option<Category> {
-    Category::ALL
-        .into_iter()
-        .find(|category| word == category.name() || word.strip_suffix('s') == Some(category.name()))
 }
 
 /// Puts the entries of each group below the title of the group.
@@ -75,8 +70,8 @@ fn elements(entries: &[Entry]) -> Vec<Element> {
             summary: entry.summary.clone(),
             details: Vec::new(),
         };
-        elements.push(Element::Heading(title(&group[0])));
-        elements.push(Element::Definitions(group.iter().map(item).collect()));
+        let items = group.iter().map(item).collect();
+        elements.extend([Element::Heading(title(&group[0])), Element::Definitions(items)]);
     }
     elements
 }

@@ -2,7 +2,6 @@
 
 pub(crate) mod describe;
 pub(crate) mod entry;
-pub(crate) mod example;
 pub(crate) mod list;
 mod page;
 pub(crate) mod pages;

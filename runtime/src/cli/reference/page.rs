@@ -6,108 +6,93 @@ use crate::cli::text::prose::{Definition, Element};
 /// Builds the page. `has_fits` adds the ports at the other end of each wire; the reference leaves them out, so that a new
 /// node changes no page of another.
 pub(crate) fn page(entry: &Entry, has_fits: bool) -> Vec<Element> {
-    let mut elements =
-        vec![Element::Title(entry.name.clone(), entry.category.name()), Element::Prose(sentence(&entry.summary))];
+    let mut elements = vec![
+        Element::Title(entry.name.clone(), entry.category.name()),
+        Element::Prose(capitalised(&entry.summary) + "."),
+    ];
     if !entry.doc.is_empty() {
         elements.push(Element::Prose(entry.doc.clone()));
     }
     elements.extend(entry.recorded.map(|recorded| Element::Prose(format!("Recorded with `--out`: {recorded}."))));
     elements.extend(entry.steps.map(|steps| Element::Prose(format!("Steps {steps}."))));
-    match entry.category {
-        Category::Device => elements.extend(listed("Fills the roles: ", &entry.fits)),
-        Category::Role => elements.extend(listed("Filled by the devices: ", &entry.fits)),
-        _ => {}
-    }
-    match entry.category {
-        Category::Role => elements.extend(listed("Its commands must cross the limits: ", &entry.limits)),
-        _ => elements.extend(listed("Enforces the limits: ", &entry.limits)),
-    }
-    let (inputs, outputs) = match entry.category {
-        Category::Kind => ("Taken by", "Produced by"),
-        _ => ("Inputs", "Outputs"),
+    let (fits, limits, inputs, outputs) = match entry.category {
+        Category::Role => ("Filled by the devices: ", "Its commands must cross the limits: ", "Inputs", "Outputs"),
+        Category::Kind => ("", "", "Taken by", "Produced by"),
+        _ => ("Fills the roles: ", "Enforces the limits: ", "Inputs", "Outputs"),
     };
-    if entry.category != Category::Kind || has_fits {
-        let is_kind = entry.category == Category::Kind;
-        let sections = [
-            (inputs, "in.", &entry.inputs),
-            (outputs, "", &entry.outputs),
-            ("Commands", "", &entry.commands),
-            ("Reports", "", &entry.reports),
-        ];
-        for (heading, prefix, ports) in sections.into_iter().filter(|(_, _, ports)| !ports.is_empty()) {
-            let prefix = if is_kind { "" } else { prefix };
-            elements.push(Element::Heading(heading.to_owned()));
-            elements.push(Element::Definitions(
-                ports.iter().map(|port| port_item(port, prefix, has_fits && !is_kind)).collect(),
-            ));
-        }
+    elements.extend(listed(fits, &entry.fits));
+    elements.extend(listed(limits, &entry.limits));
+    let is_kind = entry.category == Category::Kind;
+    let sections = [
+        (inputs, if is_kind { "" } else { "in." }, &entry.inputs),
+        (outputs, "", &entry.outputs),
+        ("Commands", "", &entry.commands),
+        ("Reports", "", &entry.reports),
+    ];
+    let sections = sections.into_iter().filter(|(_, _, ports)| !ports.is_empty() && (has_fits || !is_kind));
+    for (heading, prefix, ports) in sections {
+        let items = ports.iter().map(|port| port_item(port, prefix, has_fits && !is_kind)).collect();
+        elements.extend([Element::Heading(heading.to_owned()), Element::Definitions(items)]);
     }
     if !entry.params.is_empty() {
         let mut items = Vec::new();
         add_params(&entry.params, "", &mut items);
         elements.extend([Element::Heading("Parameters".to_owned()), Element::Definitions(items)]);
     }
-    match (&entry.example, &entry.block) {
-        (Some(example), _) => {
-            elements.extend([Element::Heading("Example graph".to_owned()), Element::Code(example.clone())]);
-        }
-        (None, Some(block)) => {
-            let heading = if entry.category == Category::File { "The file" } else { "Example" };
-            elements.extend([Element::Heading(heading.to_owned()), Element::Code(block.clone())]);
-        }
-        (None, None) => {}
+    let (heading, code) = match (&entry.example, entry.category) {
+        (Some(example), _) => ("Example graph", Some(example)),
+        (None, Category::File) => ("The file", entry.block.as_ref()),
+        (None, _) => ("Example", entry.block.as_ref()),
+    };
+    if let Some(code) = code {
+        elements.extend([Element::Heading(heading.to_owned()), Element::Code(code.clone())]);
     }
     elements
 }
 
-/// Turns a summary into a sentence.
-fn sentence(summary: &str) -> String {
-    let mut chars = summary.chars();
+/// Returns a text with a capital letter at its start.
+pub(crate) fn capitalised(text: &str) -> String {
+    let mut chars = text.chars();
     let first = chars.next().map(|first| first.to_uppercase().to_string()).unwrap_or_default();
-    format!("{first}{}.", chars.as_str())
+    first + chars.as_str()
 }
 
 fn listed(title: &str, names: &[String]) -> Option<Element> {
-    let names: Vec<String> = names.iter().map(|name| format!("`{name}`")).collect();
-    (!names.is_empty()).then(|| Element::Prose(format!("{title}{}.", names.join(", "))))
+    (!names.is_empty()).then(|| Element::Prose(format!("{title}{}.", quoted(names))))
+}
+
+/// Puts names in backticks, with commas between them.
+fn quoted(names: &[String]) -> String {
+    names.iter().map(|name| format!("`{name}`")).collect::<Vec<_>>().join(", ")
 }
 
 fn port_item(port: &PortEntry, prefix: &str, has_fits: bool) -> Definition {
     /// Maximum number of ports that are named.
     const MAX_NAMED: usize = 8;
-    let mut summary = carried(port);
-    if let Some(need) = port.need {
-        summary.push_str("; ");
-        summary.push_str(need);
-    }
+    let need = port.need.map(|need| format!("; {need}")).unwrap_or_default();
     let mut details = vec![port.doc.clone()];
     if has_fits && !port.fits.is_empty() {
-        let names: Vec<String> = port.fits.iter().take(MAX_NAMED).map(|name| format!("`{name}`")).collect();
-        let rest = port.fits.len().saturating_sub(MAX_NAMED);
-        let rest = if rest > 0 { format!(" and {rest} more") } else { String::new() };
+        let (named, rest) = port.fits.split_at(MAX_NAMED.min(port.fits.len()));
+        let rest = if rest.is_empty() { String::new() } else { format!(" and {} more", rest.len()) };
         let which = if prefix.is_empty() { "to" } else { "from" };
-        details.push(format!("Fits {which} {}{rest}.", names.join(", ")));
+        details.push(format!("Fits {which} {}{rest}.", quoted(named)));
     }
-    Definition { name: format!("{prefix}{}", port.name), summary, details }
+    Definition { name: format!("{prefix}{}", port.name), summary: carried(port) + &need, details }
 }
 
 /// Describes the kind, the unit and the frames of a port.
 fn carried(port: &PortEntry) -> String {
-    let mut words = port.kind.to_owned();
-    match port.unit.as_deref() {
-        Some("_") => words.push_str(", any unit"),
-        Some("_/s") => words.push_str(", any unit per second"),
-        Some(unit) if unit.starts_with(|c: char| c.is_ascii_uppercase()) && unit != "N" => {
-            words.push_str(&format!(", unit {unit}"));
-        }
-        Some(unit) => words.push_str(&format!(" [{unit}]")),
-        None => {}
-    }
+    let is_variable = |unit: &str| unit.starts_with(|c: char| c.is_ascii_uppercase()) && unit != "N";
+    let unit = match port.unit.as_deref() {
+        Some("_") => ", any unit".to_owned(),
+        Some("_/s") => ", any unit per second".to_owned(),
+        Some(unit) if is_variable(unit) => format!(", unit {unit}"),
+        Some(unit) => format!(" [{unit}]"),
+        None => String::new(),
+    };
     let frames: Vec<String> = port.frames.iter().map(|frame| frame_in_words(frame)).collect();
-    if !frames.is_empty() {
-        words.push_str(&format!(", {}", frames.join(" in ")));
-    }
-    words
+    let frames = if frames.is_empty() { String::new() } else { format!(", {}", frames.join(" in ")) };
+    format!("{}{unit}{frames}", port.kind)
 }
 
 fn frame_in_words(frame: &str) -> String {
@@ -150,8 +135,7 @@ mod tests {
         ];
         for (kind, unit, frames, words) in cases {
             let frames = frames.into_iter().map(str::to_owned).collect();
-            let unit = unit.map(str::to_owned);
-            let port = PortEntry { name: "p".into(), kind, unit, frames, need: None, doc: String::new(), fits: vec![] };
+            let port = PortEntry { kind, unit: unit.map(str::to_owned), frames, ..PortEntry::default() };
             assert_eq!(carried(&port), words);
         }
     }

@@ -2,8 +2,8 @@
 
 use std::fmt::Write;
 
-use super::entry::{Category, Entries, Entry};
-use super::page::page;
+use super::entry::{Category, Entry, entries};
+use super::page::{capitalised, page};
 use crate::catalogue::Catalogue;
 use crate::cli::text::prose::markdown;
 
@@ -13,7 +13,7 @@ use crate::cli::text::prose::markdown;
 /// A test can compare the pages with the files, so that they are never out of date; `tests/suite/reference.rs` does.
 #[must_use]
 pub fn reference(catalogue: &Catalogue) -> Vec<(String, String)> {
-    let mut entries = Entries::new(catalogue).all();
+    let mut entries = entries(catalogue);
     entries.retain(|entry| entry.category != Category::File);
     let mut index = "# Reference\n\nEverything that a graph can use. These pages are generated from the catalogue; \
                      `tactflow describe NAME` prints the same documentation and an example graph.\n"
@@ -43,10 +43,7 @@ fn file(first: &Entry) -> String {
 
 fn title(first: &Entry) -> String {
     match first.group {
-        "" => {
-            let name = first.category.name();
-            format!("{}{}s", name[..1].to_uppercase(), &name[1..])
-        }
-        group => format!("{}{}", group[..1].to_uppercase(), &group[1..]),
+        "" => capitalised(first.category.name()) + "s",
+        group => capitalised(group),
     }
 }

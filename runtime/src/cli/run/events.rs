@@ -52,20 +52,17 @@ impl LimitWatch {
 
     /// Writes the table of the limits that reduced the motion.
     pub(crate) fn table(&self, end: i64) -> String {
-        if self.limits.is_empty() {
-            return String::new();
-        }
-        let active: Vec<&LimitUse> = self.limits.iter().filter(|limit| limit.time > 0.0).collect();
-        if active.is_empty() {
-            return "no limit reduced the motion\n".into();
-        }
         let duration = seconds(end).max(1e-9);
         let mut rows = vec![["limited by", "for", "of the run", "smallest scale"].map(String::from)];
-        for limit in active {
+        for limit in self.limits.iter().filter(|limit| limit.time > 0.0) {
             let share = format!("{:.1} %", 100.0 * limit.time / duration);
             rows.push([limit.name.clone(), format!("{:.3} s", limit.time), share, number(limit.smallest_scale)]);
         }
-        table(&rows, 1, usize::MAX)
+        match (self.limits.len(), rows.len()) {
+            (0, _) => String::new(),
+            (_, 1) => "no limit reduced the motion\n".into(),
+            _ => table(&rows, 1, usize::MAX),
+        }
     }
 }
 
@@ -76,9 +73,8 @@ pub(crate) fn events(engine: &Engine, end: i64) -> String {
 
 /// Writes the table of the modes.
 fn modes(changes: &[ModeChange], end: i64) -> String {
-    let mut text = String::new();
     if changes.is_empty() {
-        return text;
+        return String::new();
     }
     let ends = changes.iter().skip(1).map(|change| change.time).chain([end]);
     let mut rows = vec![["mode", "from", "for", "reason"].map(String::from)];
@@ -89,12 +85,9 @@ fn modes(changes: &[ModeChange], end: i64) -> String {
     let omitted = rows.len().saturating_sub(2 * MAX_LISTED + 1);
     if omitted > 0 {
         rows.drain(MAX_LISTED + 1..=MAX_LISTED + omitted);
-        rows.insert(MAX_LISTED + 1, [format!("({omitted} more)"), String::new(), String::new(), String::new()]);
+        rows.insert(MAX_LISTED + 1, [format!("({omitted} more)"), "".into(), "".into(), "".into()]);
     }
-    // Writing to a string cannot fail.
-    let _ = write!(text, "{}", table(&rows, 1, 3));
-    text.push('\n');
-    text
+    table(&rows, 1, 3) + "\n"
 }
 
 /// Lists the halts of the commands, each with its fault.

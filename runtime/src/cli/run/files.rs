@@ -2,48 +2,41 @@
 
 use std::fmt::Display;
 use std::fs::File;
-use std::io::Read;
-use std::path::{Path, PathBuf};
+use std::io::{self, Read};
+use std::path::Path;
 
+use super::{Job, JobOptions};
 use crate::cli::shell::{FAULTED, Shell};
 use crate::cli::still::Still;
 use crate::cli::text::svg::Svg;
 use crate::engine::Engine;
-use crate::record::{Format, PointPorts, PointRecorder, PointsRequest, Recorder};
-
-/// The files that are asked for.
-pub(crate) struct Outputs<'a> {
-    pub(crate) out: &'a Option<PathBuf>,
-    pub(crate) points: &'a Option<PointsRequest>,
-    pub(crate) svg: &'a Option<PathBuf>,
-    /// Title of the picture.
-    pub(crate) title: &'a str,
-}
+use crate::record::{PointPorts, PointRecorder, RecordFormat, Recorder};
 
 /// The open files of a run.
-pub(crate) struct OutputFiles<'a> {
-    outputs: Outputs<'a>,
+pub(crate) struct OutputFiles<'j> {
+    job: &'j Job,
     rows: Option<Recorder>,
     points: Option<PointRecorder>,
     still: Option<Still>,
 }
 
-impl<'a> OutputFiles<'a> {
+impl<'j> OutputFiles<'j> {
     /// Creates the files before the run starts. `may_wait` lets the run wait for the disk.
     ///
     /// # Errors
     /// If one of them cannot be created.
     pub(crate) fn create(
-        outputs: Outputs<'a>,
+        job: &'j Job,
         chosen: Option<&PointPorts>,
         engine: &Engine,
         may_wait: bool,
     ) -> Result<Self, String> {
-        let rows = outputs.out.as_deref().map(|path| recorder(path, engine, may_wait));
-        let points = outputs.points.as_ref().zip(chosen).map(|(wanted, chosen)| points(&wanted.path, chosen, engine));
-        let still = outputs.svg.as_deref().map(|path| still(path, outputs.title, engine));
-        let (rows, points, still) = (rows.transpose()?, points.transpose()?, still.transpose()?);
-        Ok(Self { outputs, rows, points, still })
+        let JobOptions { out, points: wanted, svg, .. } = &job.options;
+        let rows = out.as_deref().map(|path| recorder(path, engine, may_wait)).transpose()?;
+        let points = wanted.as_ref().zip(chosen).map(|(wanted, chosen)| points(&wanted.path, chosen, engine));
+        let points = points.transpose()?;
+        let still = svg.as_deref().map(|path| still(path, &job.title, engine)).transpose()?;
+        Ok(Self { job, rows, points, still })
     }
 
     /// Adds the last tick of the engine.
@@ -60,40 +53,37 @@ impl<'a> OutputFiles<'a> {
     }
 
     /// Completes the files and reports each; returns the exit code.
-    pub(crate) fn finish(self, shell: &Shell, engine: &Engine, say: impl Fn(&str)) -> u8 {
-        let (outputs, mut code) = (self.outputs, 0);
-        let mut report = |path: Option<&Path>, result: Result<String, std::io::Error>| {
-            let path = path.map(Path::display).map(|path| path.to_string()).unwrap_or_default();
-            match result {
-                Ok(details) => say(&format!("wrote {path}{details}")),
-                Err(error) => {
-                    shell.error(format_args!("cannot write `{path}`: {error}"));
-                    code = FAULTED;
-                }
+    pub(crate) fn finish(self, shell: &Shell, engine: &Engine) -> u8 {
+        let (job, mut code) = (self.job, 0);
+        let JobOptions { out, points, svg, .. } = &job.options;
+        let mut report = |path: &Path, result: io::Result<String>| match result {
+            Ok(details) => job.say(shell, &format!("wrote {}{details}", path.display())),
+            Err(error) => {
+                shell.error(format_args!("cannot write `{}`: {error}", path.display()));
+                code = FAULTED;
             }
         };
-        if let Some(result) = self.rows.map(Recorder::finish) {
-            match (result, outputs.out) {
-                (Ok(dropped), Some(path)) if dropped > 0 => {
+        if let (Some(path), Some(rows)) = (out, self.rows) {
+            match rows.finish() {
+                Ok(dropped) if dropped > 0 => {
                     shell.warning(format_args!("{} has {dropped} rows too few: the disk was too slow", path.display()))
                 }
-                (result, path) => report(path.as_deref(), result.map(|_| String::new())),
+                result => report(path, result.map(|_| String::new())),
             }
         }
-        if let Some(result) = self.points.map(PointRecorder::finish) {
-            let path = outputs.points.as_ref().map(|wanted| wanted.path.as_path());
-            report(path, result.map(|count| format!(": {count} points")));
+        if let (Some(wanted), Some(points)) = (points, self.points) {
+            report(&wanted.path, points.finish().map(|count| format!(": {count} points")));
         }
-        if let Some(result) = self.still.map(|still| still.finish(engine)) {
-            report(outputs.svg.as_deref(), result.map(|()| String::new()));
+        if let (Some(path), Some(still)) = (svg, self.still) {
+            report(path, still.finish(engine).map(|()| String::new()));
         }
         code
     }
 }
 
 fn recorder(path: &Path, engine: &Engine, may_wait: bool) -> Result<Recorder, String> {
-    let format = Format::of(path).ok_or_else(|| format!("`{}` is neither .csv nor .ndjson", path.display()))?;
-    refuse_other(path, &Format::FILE_STARTS, "a recording of a run")?;
+    let format = RecordFormat::of(path).ok_or_else(|| format!("`{}` is neither .csv nor .ndjson", path.display()))?;
+    refuse_other(path, &RecordFormat::FILE_STARTS, "a recording of a run")?;
     Recorder::create(path, format, engine, may_wait).map_err(|error| cannot_create(path, error))
 }
 

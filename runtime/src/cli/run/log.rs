@@ -5,7 +5,7 @@ use tracing::Level;
 use crate::cli::text::number::{number, seconds};
 use crate::engine::{Engine, Logged};
 use crate::node::PortId;
-use crate::record::{Column, Columns};
+use crate::record::{PortColumn, PortColumns};
 use crate::signal::{Flag, Freshness, Unit};
 
 /// Target of these lines, which the tool prints without `-v`.
@@ -20,14 +20,14 @@ struct LoggedNode {
     name: String,
     /// The flag that asks for a line.
     due: PortId,
-    columns: Columns,
+    columns: PortColumns,
     row: Vec<f64>,
 }
 
 impl NodeLog {
     pub(crate) fn new(engine: &Engine) -> Self {
         let node = |logged: &Logged| {
-            let columns = Columns::new(&logged.inputs);
+            let columns = PortColumns::new(&logged.inputs);
             let row = vec![0.0; columns.list.len()];
             LoggedNode { name: logged.node.clone(), due: logged.due, columns, row }
         };
@@ -59,8 +59,8 @@ impl LoggedNode {
 }
 
 /// Writes each value with its name and its unit.
-fn line(columns: &[Column], row: &[f64]) -> String {
-    let show = |(column, value): (&Column, &f64)| match value {
+fn line(columns: &[PortColumn], row: &[f64]) -> String {
+    let show = |(column, value): (&PortColumn, &f64)| match value {
         value if value.is_nan() => format!("{} is absent", column.name),
         // Flags and codes have no decimals.
         value if column.unit == Unit::ONE && value.fract() == 0.0 => format!("{} = {value}", column.name),
@@ -76,7 +76,7 @@ mod tests {
 
     #[test]
     fn a_line_has_names_values_and_units() {
-        let column = |name: &str, unit: Unit| Column { name: name.into(), unit };
+        let column = |name: &str, unit: Unit| PortColumn { name: name.into(), part: String::new(), unit };
         let columns = [
             column("moments.force", Unit::NEWTON),
             column("moments.x", Unit::METRE),

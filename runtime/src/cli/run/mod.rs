@@ -10,7 +10,7 @@ mod time;
 
 use std::path::PathBuf;
 
-use files::{OutputFiles, Outputs};
+use files::OutputFiles;
 use log::NodeLog;
 use progress::Progress;
 use summary::Summary;
@@ -47,27 +47,8 @@ pub(crate) struct RunArgs {
     graph: PathBuf,
     #[command(flatten)]
     graph_args: GraphArgs,
-    /// Stop after this time of the graph: 20s, 500ms, 2min
-    #[arg(long = "for", value_name = "TIME", value_parser = duration, allow_hyphen_values = true)]
-    duration: Option<f64>,
-    /// Run in real time; without it, virtual time runs as fast as possible
-    #[arg(long)]
-    realtime: bool,
-    /// Send a word at a time of the graph, for example 2s:resume; may be repeated
-    #[arg(long, value_name = "TIME:WORD", value_parser = time::word)]
-    send: Vec<(f64, String)>,
-    /// Read words from standard input during the run, one per line; requires real time
-    #[arg(long)]
-    listen: bool,
-    /// Record all ports in a .csv or .ndjson file: one row per tick, one column per number
-    #[arg(short, long, value_name = "FILE")]
-    out: Option<PathBuf>,
-    /// Write the points that a pose visits to a .ply file: the pose that the graph reports, or [POSE[,PORT]…=]FILE
-    #[arg(long, value_name = "FILE")]
-    points: Option<PointsRequest>,
-    /// Draw the strongest image and the curves that the graph shows to an .svg file
-    #[arg(long, value_name = "FILE")]
-    svg: Option<PathBuf>,
+    #[command(flatten)]
+    options: JobOptions,
     /// Print all ports and the time of each node instead of what the graph shows
     #[arg(long)]
     ports: bool,
@@ -78,14 +59,38 @@ pub(crate) struct RunArgs {
 
 pub(crate) fn run(args: RunArgs, shell: &Shell) -> u8 {
     let title = args.graph.display().to_string();
-    let RunArgs { graph, graph_args, duration, realtime, send, listen, out, points, svg, ports, quiet } = args;
-    let print = match (ports, quiet) {
+    let print = match (args.ports, args.quiet) {
         (true, _) => Print::Ports,
         (_, true) => Print::Nothing,
         _ => Print::Page,
     };
-    let request = graph_args.request(graph);
-    Job { request, title, duration, realtime, send, listen, out, points, svg, print }.run(shell)
+    Job { request: args.graph_args.request(args.graph), title, options: args.options, print }.run(shell)
+}
+
+/// The length, the words and the files of a run.
+#[derive(clap::Args, Default)]
+pub struct JobOptions {
+    /// Stop after this time of the graph: 20s, 500ms, 2min
+    #[arg(long = "for", value_name = "TIME", value_parser = duration, allow_hyphen_values = true)]
+    pub duration: Option<f64>,
+    /// Run in real time; without it, virtual time runs as fast as possible
+    #[arg(long)]
+    pub realtime: bool,
+    /// Send a word at a time of the graph, for example 2s:resume; may be repeated
+    #[arg(long, value_name = "TIME:WORD", value_parser = time::word)]
+    pub send: Vec<(f64, String)>,
+    /// Read words from standard input during the run, one per line; requires real time
+    #[arg(long)]
+    pub listen: bool,
+    /// Record all ports in a .csv or .ndjson file: one row per tick, one column per number
+    #[arg(short, long, value_name = "FILE")]
+    pub out: Option<PathBuf>,
+    /// Write the points that a pose visits to a .ply file: the pose that the graph reports, or [POSE[,PORT]…=]FILE
+    #[arg(long, value_name = "FILE")]
+    pub points: Option<PointsRequest>,
+    /// Draw the strongest image and the curves that the graph shows to an .svg file
+    #[arg(long, value_name = "FILE")]
+    pub svg: Option<PathBuf>,
 }
 
 /// What a run prints.
@@ -105,20 +110,8 @@ pub struct Job {
     pub request: Request,
     /// The title in the output.
     pub title: String,
-    /// Maximum duration in the time of the graph [s].
-    pub duration: Option<f64>,
-    /// Whether the run is in real time.
-    pub realtime: bool,
-    /// Words to send, each with its time in the graph [s].
-    pub send: Vec<(f64, String)>,
-    /// Whether words are read from standard input.
-    pub listen: bool,
-    /// File for the recording, .csv or .ndjson.
-    pub out: Option<PathBuf>,
-    /// File for the points of a pose, .ply.
-    pub points: Option<PointsRequest>,
-    /// File for the still picture, .svg.
-    pub svg: Option<PathBuf>,
+    /// Its length, its words and its files.
+    pub options: JobOptions,
     /// What is printed.
     pub print: Print,
 }
@@ -139,23 +132,23 @@ impl Job {
     /// If the arguments do not fit the graph, before the run starts.
     fn run_plan(&self, plan: Compiled, shell: &Shell) -> Result<u8, String> {
         plan.warnings().iter().for_each(|report| shell.show(report));
-        let is_real = self.realtime || plan.is_live();
-        if self.listen && !is_real {
+        let JobOptions { duration, realtime, send, listen, points, .. } = &self.options;
+        let is_real = *realtime || plan.is_live();
+        if *listen && !is_real {
             return Err("`--listen` requires real time: add `--realtime`, or send words with `--send 2s:resume`".into());
         }
-        let chosen = self.points.as_ref().map(|wanted| wanted.resolve(&plan)).transpose()?;
+        let chosen = points.as_ref().map(|wanted| wanted.resolve(&plan)).transpose()?;
         let mut engine = Engine::new(plan);
         self.check_words(&engine)?;
-        let outputs = Outputs { out: &self.out, points: &self.points, svg: &self.svg, title: &self.title };
-        let mut files = OutputFiles::create(outputs, chosen.as_ref(), &engine, !is_real)?;
+        let mut files = OutputFiles::create(self, chosen.as_ref(), &engine, !is_real)?;
         let period = milliseconds(seconds(engine.period()));
         self.say(shell, &format!("{}: {} nodes, one tick every {period}", self.title, engine.order().count()));
         let mut summary = Summary::new(&engine, self.print == Print::Ports);
         let mut log = NodeLog::new(&engine);
-        let (end, is_quiet) = (self.duration.or_else(|| engine.end().map(seconds)), self.print == Print::Nothing);
+        let (end, is_quiet) = (duration.or_else(|| engine.end().map(seconds)), self.print == Print::Nothing);
         let mut progress = Progress::new(end, is_quiet, shell.has_colour_on_stderr());
-        let (sends, listens) = (self.send.clone(), self.listen);
-        let options = RunOptions { duration: self.duration, is_realtime: self.realtime, sends, listens };
+        let (sends, listens) = (send.clone(), *listen);
+        let options = RunOptions { duration: *duration, is_realtime: *realtime, sends, listens };
         let outcome = without_panic_messages(|| {
             engine::run(&mut engine, &options, &mut |engine| {
                 summary.add(engine);
@@ -174,7 +167,7 @@ impl Job {
             self.say(shell, &ending(outcome));
         }
         let code = self.report_end(shell, &engine, outcome);
-        Ok(code.max(files.finish(shell, &engine, |text| self.say(shell, text))))
+        Ok(code.max(files.finish(shell, &engine)))
     }
 
     /// Reports words that were not sent and the fault that ended the run; returns the exit code.
@@ -186,7 +179,7 @@ impl Job {
                 return FAULTED;
             }
         };
-        for (at, word) in self.send.iter().filter(|(at, _)| *at > seconds(outcome.time)) {
+        for (at, word) in self.options.send.iter().filter(|(at, _)| *at > seconds(outcome.time)) {
             shell.warning(format_args!("`{word}` was not sent: the run ended before {at} s"));
         }
         let End::Fault(fault) = &outcome.end else { return 0 };
@@ -205,7 +198,7 @@ impl Job {
     fn check_words(&self, engine: &Engine) -> Result<(), String> {
         let is_own = |word: &str| ["stop", "resume"].iter().any(|own| word.eq_ignore_ascii_case(own));
         let is_unknown = |word: &str| !is_own(word) && engine.words().all(|known| known != word);
-        let Some((_, word)) = self.send.iter().find(|(_, word)| is_unknown(word)) else { return Ok(()) };
+        let Some((_, word)) = self.options.send.iter().find(|(_, word)| is_unknown(word)) else { return Ok(()) };
         let known: std::collections::BTreeSet<String> = engine.words().map(|word| format!("`{word}`")).collect();
         let known = known.into_iter().collect::<Vec<_>>().join(", ");
         Err(unknown("word", word, engine.words(), &format!("this graph accepts {known}")))

@@ -6,7 +6,7 @@ use crate::cli::text::number::number;
 use crate::cli::text::series::Series;
 use crate::cli::text::table::table;
 use crate::engine::{Engine, Outcome};
-use crate::record::Columns;
+use crate::record::PortColumns;
 use crate::signal::{Freshness, Shape};
 
 /// Freshness of one port, counted over the ticks.
@@ -17,47 +17,22 @@ struct FreshnessCounts {
     absent: u64,
 }
 
-/// Statistics of one column over the ticks.
-#[derive(Debug, Clone)]
-struct ColumnStats {
-    low: f64,
-    high: f64,
-    sum: f64,
-    count: u64,
-    series: Series,
-}
-
-impl ColumnStats {
-    fn new() -> Self {
-        Self { low: f64::INFINITY, high: f64::NEG_INFINITY, sum: 0.0, count: 0, series: Series::new() }
-    }
-
-    fn add(&mut self, value: f64) {
-        self.series.add(value);
-        if !value.is_nan() {
-            self.low = self.low.min(value);
-            self.high = self.high.max(value);
-            self.sum += value;
-            self.count += 1;
-        }
-    }
-}
-
 /// Collects the freshness and the values of all ports.
 pub(crate) struct PortTable {
-    columns: Columns,
+    columns: PortColumns,
     row: Vec<f64>,
     counts: Vec<FreshnessCounts>,
-    stats: Vec<ColumnStats>,
+    /// The values of each column.
+    series: Vec<Series>,
 }
 
 impl PortTable {
     pub(crate) fn new(engine: &Engine) -> Self {
-        let columns = Columns::new(engine.ports());
+        let columns = PortColumns::new(engine.ports());
         Self {
             row: vec![0.0; columns.list.len()],
             counts: vec![FreshnessCounts::default(); engine.ports().len()],
-            stats: vec![ColumnStats::new(); columns.list.len()],
+            series: vec![Series::new(); columns.list.len()],
             columns,
         }
     }
@@ -72,8 +47,8 @@ impl PortTable {
             }
         }
         self.columns.read(engine.bus(), &mut self.row);
-        for (stats, value) in self.stats.iter_mut().zip(&self.row) {
-            stats.add(*value);
+        for (series, value) in self.series.iter_mut().zip(&self.row) {
+            series.add(*value);
         }
     }
 
@@ -81,10 +56,10 @@ impl PortTable {
     pub(crate) fn render(&self, engine: &Engine) -> String {
         let mut rows =
             vec![["port", "unit", "new", "held", "absent", "min", "mean", "max", "over time"].map(String::from)];
-        let mut columns = self.columns.list.iter().zip(&self.stats);
+        let mut columns = self.columns.list.iter().zip(&self.series);
         for ((port, _), counts) in engine.ports().iter().zip(&self.counts) {
             let counted = [counts.new, counts.held, counts.absent].map(|count| count.to_string());
-            let width = Columns::width(&port.shape);
+            let width = PortColumns::width(&port.shape);
             let mut counted = Some(counted);
             // A vector has a row of its own, even with a single component.
             let is_scalar = matches!(port.shape, Shape::Scalar(_) | Shape::Flag(_));
@@ -94,16 +69,15 @@ impl PortTable {
                 let name = port.name.clone();
                 rows.push([name, unit, new, held, absent, String::new(), String::new(), String::new(), String::new()]);
             }
-            for (column, stats) in columns.by_ref().take(width) {
+            for (column, series) in columns.by_ref().take(width) {
                 let [new, held, absent] = counted.take().unwrap_or_default();
-                let part = column.name.strip_prefix(&port.name).filter(|part| !part.is_empty());
-                let name = part.map_or_else(|| port.name.clone(), |part| format!("  {part}"));
-                let [low, mean, high] = match stats.count {
-                    0 => ["-"; 3].map(String::from),
-                    count => [stats.low, stats.sum / count as f64, stats.high].map(number),
+                let name = if column.part.is_empty() { port.name.clone() } else { format!("  {}", column.part) };
+                let whole = series.tail(1.0);
+                let [low, mean, high] = match whole.is_present() {
+                    true => [whole.low, whole.mean, whole.high].map(number),
+                    false => ["-"; 3].map(String::from),
                 };
-                let sparkline = stats.series.sparkline();
-                rows.push([name, column.unit.to_string(), new, held, absent, low, mean, high, sparkline]);
+                rows.push([name, column.unit.to_string(), new, held, absent, low, mean, high, series.sparkline()]);
             }
         }
         table(&rows, 2, 8)

@@ -13,7 +13,7 @@ use layout::{CHARACTER, CURVES, LINE, TOP, WIDTH};
 use panel::panels;
 
 use crate::cli::text::number::{is_flat, seconds};
-use crate::cli::text::svg::{Axis, Svg};
+use crate::cli::text::svg::{PlotAxis, Svg};
 use crate::cli::view::RunView;
 use crate::engine::{Engine, ModeChange};
 
@@ -68,7 +68,7 @@ fn draw(title: &str, view: &RunView, changes: &[ModeChange]) -> String {
     }
     let Some([from, to]) = view.span().filter(|_| !panels.is_empty()) else { return svg.finish() };
     let to = if is_flat(from, to) { from + 1.0 } else { to };
-    let time = Axis { from, to, pixels: CURVES };
+    let time = PlotAxis { from, to, pixels: CURVES };
     draw_modes(&mut svg, time, changes, bottom);
     for (i, panel) in panels.iter().enumerate() {
         let is_last = i + 1 == panels.len();
@@ -78,7 +78,7 @@ fn draw(title: &str, view: &RunView, changes: &[ModeChange]) -> String {
 }
 
 /// Draws a line at each change of the mode, and the names of the modes where they do not overlap.
-fn draw_modes(svg: &mut Svg, time: Axis, changes: &[ModeChange], bottom: f64) {
+fn draw_modes(svg: &mut Svg, time: PlotAxis, changes: &[ModeChange], bottom: f64) {
     let mut lines: Vec<f64> = Vec::new();
     let mut ends = [f64::NEG_INFINITY; 2];
     svg.group("class=\"modes\" stroke=\"#888888\" stroke-dasharray=\"2 3\"", |svg| {

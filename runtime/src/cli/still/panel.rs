@@ -3,9 +3,9 @@
 use super::layout::{CHARACTER, CURVES, LINE, TOP};
 use crate::cli::text::chart::AxisRange;
 use crate::cli::text::number::is_flat;
-use crate::cli::text::series::Bin;
-use crate::cli::text::svg::{Axis, Svg, escaped};
-use crate::cli::view::{Curve, RunView};
+use crate::cli::text::series::SeriesBin;
+use crate::cli::text::svg::{PlotAxis, Svg, escaped};
+use crate::cli::view::{ColumnCurve, RunView};
 use crate::signal::Unit;
 
 /// Height of the curves of one unit [px].
@@ -17,7 +17,7 @@ const COLOURS: [&str; 7] = ["#3d85c6", "#d9730d", "#2a9d6f", "#c2558f", "#8a6fd1
 pub(crate) struct Panel<'v> {
     unit: Unit,
     /// The curves, each with its number among all curves.
-    curves: Vec<(usize, &'v Curve)>,
+    curves: Vec<(usize, &'v ColumnCurve)>,
     top: f64,
     pub(crate) bottom: f64,
 }
@@ -43,9 +43,9 @@ pub(crate) fn panels(view: &RunView) -> Vec<Panel<'_>> {
 
 impl Panel<'_> {
     /// Returns the curves with the places of their names: the left end [px] and the row.
-    fn legend(&self) -> Vec<((usize, &Curve), [f64; 2])> {
+    fn legend(&self) -> Vec<((usize, &ColumnCurve), [f64; 2])> {
         let mut at = [CURVES[0] + 6.0, 0.0];
-        let place = |(_, curve): &(usize, &Curve)| {
+        let place = |(_, curve): &(usize, &ColumnCurve)| {
             let width = 26.0 + CHARACTER * (curve.name.chars().count() + 2) as f64;
             if at[0] + width > CURVES[1] && at[0] > CURVES[0] + 6.0 {
                 at = [CURVES[0] + 6.0, at[1] + 1.0];
@@ -58,10 +58,12 @@ impl Panel<'_> {
     }
 
     /// Draws the axes, the names and the curves.
-    pub(crate) fn draw(&self, svg: &mut Svg, time: Axis, times: &[Bin], title: Option<&str>) {
+    pub(crate) fn draw(&self, svg: &mut Svg, time: PlotAxis, times: &[SeriesBin], title: Option<&str>) {
         let bins = self.curves.iter().flat_map(|(_, curve)| curve.series.bins());
         let Some(AxisRange { low, high }) = AxisRange::of(bins) else {
-            svg.text([CURVES[0], self.bottom - 0.5 * PANEL_HEIGHT], "start", &format!("{}: absent", self.names()));
+            let names: Vec<&str> = self.curves.iter().map(|(_, curve)| curve.name.as_str()).collect();
+            let text = format!("{}: absent", names.join(", "));
+            svg.text([CURVES[0], self.bottom - 0.5 * PANEL_HEIGHT], "start", &text);
             return;
         };
         let margin = match is_flat(low, high) {
@@ -69,14 +71,14 @@ impl Panel<'_> {
             true => 0.5 * high.abs(),
             false => 0.05 * (high - low),
         };
-        let y = Axis { from: low - margin, to: high + margin, pixels: [self.bottom, self.top] };
+        let y = PlotAxis { from: low - margin, to: high + margin, pixels: [self.bottom, self.top] };
         svg.axes(time, y, [title, Some(&format!("[{}]", self.unit))]);
         for ((i, curve), [left, row]) in self.legend() {
             let colour = COLOURS[i % COLOURS.len()];
+            let baseline = self.top - 8.0 - LINE * row;
             let column = escaped(&curve.column);
             let group = format!("class=\"curve\" fill=\"none\" stroke=\"{colour}\" stroke-width=\"1.5\"");
             svg.group(&format!("{group} data-column=\"{column}\" stroke-linecap=\"round\""), |svg| {
-                let baseline = self.top - 8.0 - LINE * row;
                 svg.put(format_args!("<path stroke-width=\"3\" d=\"M{left:.1} {:.1}h18\"/>", baseline - 4.0));
                 for segment in segments(curve.series.bins(), times, time) {
                     // A line from a point to itself is a dot.
@@ -84,13 +86,8 @@ impl Panel<'_> {
                     svg.polyline(segment.iter().chain(dot).map(|[x, value]| [*x, y.at(*value)]));
                 }
             });
-            let baseline = self.top - 8.0 - LINE * row;
             svg.text([left + 24.0, baseline], "start", &curve.name);
         }
-    }
-
-    fn names(&self) -> String {
-        self.curves.iter().map(|(_, curve)| curve.name.as_str()).collect::<Vec<_>>().join(", ")
     }
 }
 
@@ -98,13 +95,13 @@ impl Panel<'_> {
 ///
 /// The bins of a column of pixels are merged, so that each column has one point, or the minimum and the maximum of its
 /// values.
-fn segments(bins: &[Bin], times: &[Bin], time: Axis) -> Vec<Vec<[f64; 2]>> {
+fn segments(bins: &[SeriesBin], times: &[SeriesBin], time: PlotAxis) -> Vec<Vec<[f64; 2]>> {
     let mut segments: Vec<Vec<[f64; 2]>> = vec![Vec::new()];
-    let column = |(_, tick): &(&Bin, &Bin)| time.at(tick.mean).floor();
-    let bins: Vec<(&Bin, &Bin)> = bins.iter().zip(times).collect();
+    let column = |(_, tick): &(&SeriesBin, &SeriesBin)| time.at(tick.mean).floor();
+    let bins: Vec<(&SeriesBin, &SeriesBin)> = bins.iter().zip(times).collect();
     for group in bins.chunk_by(|a, b| column(a) == column(b) && a.0.is_present() == b.0.is_present()) {
-        let merged = group.iter().fold(Bin::EMPTY, |all, (bin, _)| all.merge(**bin));
-        let tick = group.iter().fold(Bin::EMPTY, |all, (_, tick)| all.merge(**tick));
+        let merged = SeriesBin::merged(group.iter().map(|(bin, _)| *bin));
+        let tick = SeriesBin::merged(group.iter().map(|(_, tick)| *tick));
         let segment = segments.last_mut().expect("`segments` starts with one segment");
         if !merged.is_present() {
             if !segment.is_empty() {
@@ -136,7 +133,7 @@ mod tests {
             series.add(*value);
             times.add(i as f64);
         }
-        let time = Axis { from: 0.0, to: values.len() as f64, pixels: [0.0, width] };
+        let time = PlotAxis { from: 0.0, to: values.len() as f64, pixels: [0.0, width] };
         segments(series.bins(), times.bins(), time)
     }
 

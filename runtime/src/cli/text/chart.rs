@@ -3,7 +3,7 @@
 use std::fmt::Write;
 
 use super::number::{is_flat, number};
-use super::series::Bin;
+use super::series::SeriesBin;
 
 /// Width of the numbers at the axis [characters].
 pub(crate) const LABEL_WIDTH: usize = 10;
@@ -23,13 +23,8 @@ pub(crate) struct AxisRange {
 
 impl AxisRange {
     /// Returns the range of the values in the bins, extended to zero if zero is near, or `None` without a value.
-    pub(crate) fn of<'b>(bins: impl IntoIterator<Item = &'b Bin>) -> Option<Self> {
-        let present = bins.into_iter().filter(|bin| bin.is_present());
-        let (low, high) =
-            present.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), bin| (low.min(bin.low), high.max(bin.high)));
-        if low > high {
-            return None;
-        }
+    pub(crate) fn of<'b>(bins: impl IntoIterator<Item = &'b SeriesBin>) -> Option<Self> {
+        let SeriesBin { low, high, .. } = Some(SeriesBin::merged(bins)).filter(SeriesBin::is_present)?;
         let is_near = |least: f64, greatest: f64| least > 0.0 && least <= 0.5 * greatest;
         let low = if is_near(low, high) { 0.0 } else { low };
         let high = if is_near(-high, -low) { 0.0 } else { high };
@@ -69,7 +64,7 @@ impl AxisRange {
 ///
 /// Each column of dots spans the minimum and the maximum of its time, and is empty where the value was absent. A dotted
 /// line marks zero.
-pub(crate) fn chart(bins: &[Bin], width: usize, rows: usize) -> Vec<String> {
+pub(crate) fn chart(bins: &[SeriesBin], width: usize, rows: usize) -> Vec<String> {
     let cols = width.saturating_sub(LABEL_WIDTH + 2).max(1);
     let Some(range) = AxisRange::of(bins) else {
         let mut lines = vec![format!("{:LABEL_WIDTH$} │", ""); rows];
@@ -84,7 +79,7 @@ pub(crate) fn chart(bins: &[Bin], width: usize, rows: usize) -> Vec<String> {
     let mut last: Option<(usize, usize)> = None;
     for x in 0..2 * cols {
         let part = column(bins, x, 2 * cols);
-        let span = part.map(|(low, high)| (range.row(high, rows), range.row(low, rows)));
+        let span = part.is_present().then(|| (range.row(part.high, rows), range.row(part.low, rows)));
         if let Some((mut top, mut bottom)) = span {
             // Connect to the previous column.
             if let Some((above, below)) = last {
@@ -108,12 +103,11 @@ pub(crate) fn chart(bins: &[Bin], width: usize, rows: usize) -> Vec<String> {
     bits.chunks(cols).enumerate().map(line).collect()
 }
 
-/// Returns the minimum and the maximum of the bins in column `x` of `count`.
-fn column(bins: &[Bin], x: usize, count: usize) -> Option<(f64, f64)> {
+/// Merges the bins in column `x` of `count`.
+fn column(bins: &[SeriesBin], x: usize, count: usize) -> SeriesBin {
     let first = x * bins.len() / count;
     let end = ((x + 1) * bins.len() / count).max(first + 1);
-    let present = bins[first..end].iter().filter(|bin| bin.is_present());
-    present.map(|bin| (bin.low, bin.high)).reduce(|(low, high), (l, h)| (low.min(l), high.max(h)))
+    SeriesBin::merged(&bins[first..end])
 }
 
 /// Draws the time axis below charts of that width, between two times [s].

@@ -17,6 +17,11 @@ pub(crate) fn milliseconds(seconds: f64) -> String {
     format!("{} ms", (seconds * 1e6).round() * 1e-3)
 }
 
+/// Formats a count with its noun: `1 run`, `2 runs`.
+pub(crate) fn count_of(count: usize, noun: &str) -> String {
+    format!("{count} {noun}{}", if count == 1 { "" } else { "s" })
+}
+
 /// Converts nanoseconds to seconds.
 pub(crate) fn seconds(nanos: i64) -> f64 {
     nanos as f64 * 1e-9

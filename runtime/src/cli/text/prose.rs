@@ -107,19 +107,15 @@ impl PageStyle {
         let mut text = String::new();
         for item in definitions {
             let used = 2 + item.name.chars().count();
-            text.push_str("  ");
-            text.push_str(&self.styled(AnsiColor::Cyan.on_default(), &item.name));
             let mut lines = wrap(&item.summary, self.width, column).into_iter();
-            if used + 2 <= column {
-                text.push_str(&" ".repeat(column - used));
-                text.push_str(lines.next().unwrap_or_default().trim_start());
-            }
-            text.push('\n');
+            let beside = match used + 2 <= column {
+                true => " ".repeat(column - used) + lines.next().unwrap_or_default().trim_start(),
+                false => String::new(),
+            };
+            let name = self.styled(AnsiColor::Cyan.on_default(), &item.name);
             let details = item.details.iter().flat_map(|text| wrap(text, self.width, column));
-            for line in lines.chain(details) {
-                text.push_str(&line);
-                text.push('\n');
-            }
+            let lines = [format!("  {name}{beside}")].into_iter().chain(lines).chain(details);
+            text.extend(lines.map(|line| line + "\n"));
         }
         text
     }
@@ -170,13 +166,11 @@ pub(crate) fn markdown(elements: &[Element], level: usize) -> String {
 }
 
 fn list(definitions: &[Definition]) -> String {
-    let mut text = String::new();
-    for Definition { name, summary, details } in definitions {
-        let lines: Vec<&str> =
-            [summary].into_iter().chain(details).map(|text| text.trim()).filter(|text| !text.is_empty()).collect();
-        let _ = writeln!(text, "- **`{name}`**: {}", lines.join("<br>\n  "));
-    }
-    text
+    let item = |Definition { name, summary, details }: &Definition| {
+        let lines = [summary].into_iter().chain(details).map(|text| text.trim()).filter(|text| !text.is_empty());
+        format!("- **`{name}`**: {}\n", lines.collect::<Vec<_>>().join("<br>\n  "))
+    };
+    definitions.iter().map(item).collect()
 }
 
 #[cfg(test)]

@@ -10,7 +10,7 @@ const SPARKLINE_BINS: usize = 48;
 /// A value over time in at most `capacity` bins. When all bins are in use, neighbours are merged in pairs.
 #[derive(Debug, Clone)]
 pub(crate) struct Series {
-    bins: Vec<Bin>,
+    bins: Vec<SeriesBin>,
     capacity: usize,
     /// Ticks in each bin but the last.
     stride: u64,
@@ -20,7 +20,7 @@ pub(crate) struct Series {
 
 /// Statistics of a value over some ticks.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Bin {
+pub(crate) struct SeriesBin {
     /// Number of ticks in which the value was present.
     count: f64,
     pub(crate) mean: f64,
@@ -30,17 +30,16 @@ pub(crate) struct Bin {
     pub(crate) high: f64,
 }
 
-impl Bin {
+impl SeriesBin {
     /// The bin of no ticks.
-    pub(crate) const EMPTY: Self =
-        Self { count: 0.0, mean: 0.0, squares: 0.0, low: f64::INFINITY, high: f64::NEG_INFINITY };
+    const EMPTY: Self = Self { count: 0.0, mean: 0.0, squares: 0.0, low: f64::INFINITY, high: f64::NEG_INFINITY };
 
     const fn of(value: f64) -> Self {
         Self { count: 1.0, mean: value, squares: 0.0, low: value, high: value }
     }
 
     /// Merges two bins by Chan's formula, which avoids the cancellation of a plain sum of squares.
-    pub(crate) fn merge(self, other: Self) -> Self {
+    fn merge(self, other: Self) -> Self {
         let count = self.count + other.count;
         if count == 0.0 {
             return self;
@@ -53,6 +52,11 @@ impl Bin {
             low: self.low.min(other.low),
             high: self.high.max(other.high),
         }
+    }
+
+    /// Merges the bins of a part of a run.
+    pub(crate) fn merged<'b>(bins: impl IntoIterator<Item = &'b Self>) -> Self {
+        bins.into_iter().fold(Self::EMPTY, |all, bin| all.merge(*bin))
     }
 
     /// Whether the value was present in any tick.
@@ -83,12 +87,12 @@ impl Series {
             if self.bins.len() == self.capacity {
                 self.halve();
             }
-            self.bins.push(Bin::EMPTY);
+            self.bins.push(SeriesBin::EMPTY);
             self.ticks = 0;
         }
         self.ticks += 1;
         if let Some(bin) = self.bins.last_mut().filter(|_| value.is_finite()) {
-            *bin = bin.merge(Bin::of(value));
+            *bin = bin.merge(SeriesBin::of(value));
         }
     }
 
@@ -101,15 +105,15 @@ impl Series {
     }
 
     /// Returns the bins in the order of time; all but the last have equally many ticks.
-    pub(crate) fn bins(&self) -> &[Bin] {
+    pub(crate) fn bins(&self) -> &[SeriesBin] {
         &self.bins
     }
 
     /// Returns the statistics of the last `share` of the bins, at least of one.
-    pub(crate) fn tail(&self, share: f64) -> Bin {
+    pub(crate) fn tail(&self, share: f64) -> SeriesBin {
         let count = (share * self.bins.len() as f64).ceil() as usize;
         let first = self.bins.len().saturating_sub(count.max(1));
-        self.bins[first..].iter().fold(Bin::EMPTY, |all, bin| all.merge(*bin))
+        SeriesBin::merged(&self.bins[first..])
     }
 
     /// Draws one bar for each bin, and a blank where the value was absent.

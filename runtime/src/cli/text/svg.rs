@@ -53,7 +53,7 @@ impl Svg {
     }
 
     /// Adds two axes with ticks, numbers, grid lines and titles. Without a title, the x axis has no numbers either.
-    pub fn axes(&mut self, x: Axis, y: Axis, [x_title, y_title]: [Option<&str>; 2]) {
+    pub fn axes(&mut self, x: PlotAxis, y: PlotAxis, [x_title, y_title]: [Option<&str>; 2]) {
         let ([left, right], [bottom, top]) = (x.pixels, y.pixels);
         self.group(&format!("stroke=\"{INK}\" fill=\"none\""), |svg| {
             svg.put(format_args!("<path d=\"M{left} {top}V{bottom}H{right}\"/>"));
@@ -82,7 +82,7 @@ impl Svg {
 
 /// A linear axis.
 #[derive(Debug, Clone, Copy)]
-pub struct Axis {
+pub struct PlotAxis {
     /// Value at the start.
     pub from: f64,
     /// Value at the end.
@@ -91,7 +91,7 @@ pub struct Axis {
     pub pixels: [f64; 2],
 }
 
-impl Axis {
+impl PlotAxis {
     /// Returns the position of a value [px].
     #[must_use]
     pub fn at(&self, value: f64) -> f64 {
@@ -137,17 +137,17 @@ mod tests {
             (310.0, 340.0, 310.0, 5.0),
             (0.0, 1e-5, 0.0, 2e-6),
         ] {
-            let ticks = Axis { from, to, pixels: [0.0, 400.0] }.ticks();
+            let ticks = PlotAxis { from, to, pixels: [0.0, 400.0] }.ticks();
             assert!((4..=11).contains(&ticks.len()), "{from}..{to}: {ticks:?}");
             assert!((ticks[0] - first).abs() < 1e-9 && (ticks[1] - ticks[0] - step).abs() < 1e-9 * step, "{ticks:?}");
-            let few = Axis { from, to, pixels: [100.0, 0.0] }.ticks();
+            let few = PlotAxis { from, to, pixels: [100.0, 0.0] }.ticks();
             assert!((1..=5).contains(&few.len()), "{from}..{to}: {few:?}");
         }
     }
 
     #[test]
     fn an_axis_ends_where_its_pixels_end() {
-        let axis = Axis { from: 10.0, to: 30.0, pixels: [424.0, 24.0] };
+        let axis = PlotAxis { from: 10.0, to: 30.0, pixels: [424.0, 24.0] };
         assert_eq!([axis.at(10.0), axis.at(20.0), axis.at(30.0)], [424.0, 224.0, 24.0]);
     }
 

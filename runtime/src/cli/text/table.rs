@@ -4,18 +4,13 @@
 pub(crate) fn table<const N: usize>(rows: &[[String; N]], first_right: usize, first_left: usize) -> String {
     let width = |i: usize| rows.iter().map(|row| row[i].chars().count()).max().unwrap_or(0);
     let widths: [usize; N] = std::array::from_fn(width);
-    let mut text = String::new();
-    for row in rows {
-        let mut line = String::new();
-        for (i, (cell, width)) in row.iter().zip(widths).enumerate() {
-            let pad = " ".repeat(width - cell.chars().count());
-            let is_right = (first_right..first_left).contains(&i);
-            let cell = if is_right { format!("{pad}{cell}") } else { format!("{cell}{pad}") };
-            line.push_str(&cell);
-            line.push_str("  ");
-        }
-        text.push_str(line.trim_end());
-        text.push('\n');
-    }
-    text
+    let line = |row: &[String; N]| {
+        let cells =
+            row.iter().zip(widths).enumerate().map(|(i, (cell, width))| match (first_right..first_left).contains(&i) {
+                true => format!("{cell:>width$}"),
+                false => format!("{cell:width$}"),
+            });
+        format!("{}\n", cells.collect::<Vec<_>>().join("  ").trim_end())
+    };
+    rows.iter().map(line).collect()
 }

@@ -50,41 +50,33 @@ pub(crate) struct VerifyArgs {
 }
 
 pub(crate) fn verify(args: VerifyArgs, shell: &Shell) -> u8 {
-    let result = prepare(&args, shell.catalogue()).and_then(|mut all| {
-        let is_complete = run(&mut all, &args, shell.catalogue())?;
-        Ok((all, is_complete))
-    });
-    let (all, is_complete) = match result {
-        Ok(result) => result,
-        Err(message) => {
-            return shell.refuse(message);
-        }
-    };
+    verify_all(&args, shell).unwrap_or_else(|message| shell.refuse(message))
+}
+
+fn verify_all(args: &VerifyArgs, shell: &Shell) -> Result<u8, String> {
+    let mut all = prepare(args, shell.catalogue())?;
+    let is_complete = run(&mut all, args, shell.catalogue())?;
     if args.json || args.format == OutputFormat::Json {
         shell.say_json(&table::json(&all));
     } else {
         all.iter().filter_map(|verified| verified.loaded.as_ref().err()).for_each(|report| shell.show(report));
         shell.say(table::text(&all, shell.has_colour()).trim_end());
     }
-    for (verified, trial) in all.iter().flat_map(|verified| verified.trials.iter().map(move |trial| (verified, trial)))
-    {
-        if let Some(why) = &trial.failure {
-            shell.error(format_args!("{}{}: {why}", verified.name(), of_seed(trial.seed)));
+    for verified in &all {
+        for (why, seed) in verified.trials.iter().filter_map(|trial| Some((trial.failure.as_ref()?, trial.seed))) {
+            let seed = seed.map_or_else(String::new, |seed| format!(", seed {seed}"));
+            shell.error(format_args!("{}{seed}: {why}", verified.name()));
         }
     }
     if !is_complete {
         shell.error("interrupted: some runs are missing");
     }
     let has_passed = is_complete && all.iter().all(Verified::has_passed);
-    match all.iter().any(|verified| verified.loaded.is_err()) {
+    Ok(match all.iter().any(|verified| verified.loaded.is_err()) {
         true => NOT_LOADED,
         false if has_passed => 0,
         false => FAULTED,
-    }
-}
-
-fn of_seed(seed: Option<u64>) -> String {
-    seed.map_or_else(String::new, |seed| format!(", seed {seed}"))
+    })
 }
 
 /// Finds and loads all scenario files.
@@ -94,11 +86,10 @@ fn prepare(args: &VerifyArgs, catalogue: &Catalogue) -> Result<Vec<Verified>, St
         files.extend(if path.is_dir() { files_of(path)? } else { vec![path.clone()] });
     }
     let load = |path: PathBuf| {
-        let loaded = Scenario::load(catalogue, &path);
-        let loaded = loaded.map(|scenario| match args.seeds {
-            Some(count) => scenario.with_seeds(count),
-            None => scenario,
-        });
+        let mut loaded = Scenario::load(catalogue, &path);
+        if let (Ok(scenario), Some(count)) = (&mut loaded, args.seeds) {
+            scenario.set_seeds(count);
+        }
         Verified { path, loaded, trials: Vec::new(), rows: Vec::new() }
     };
     let all: Vec<Verified> = files.into_iter().map(load).collect();
@@ -133,10 +124,11 @@ type PendingRun = (usize, Option<u64>);
 /// of threads.
 fn run(all: &mut [Verified], args: &VerifyArgs, catalogue: &Catalogue) -> Result<bool, String> {
     let interrupt = Interrupt::catch().map_err(|error| format!("cannot run: {error}"))?;
-    let scenarios = all.iter().enumerate().filter_map(|(i, verified)| Some((i, verified.loaded.as_ref().ok()?)));
-    let scenarios: Vec<(usize, &Scenario)> = scenarios.collect();
-    let each = scenarios.iter().flat_map(|(i, scenario)| scenario.runs().into_iter().map(|seed| (*i, seed)));
-    let work: Vec<PendingRun> = each.collect();
+    let runs = |(i, verified): (usize, &Verified)| {
+        let seeds: Vec<Option<u64>> = verified.loaded.iter().flat_map(Scenario::runs).collect();
+        seeds.into_iter().map(move |seed| (i, seed))
+    };
+    let work: Vec<PendingRun> = all.iter().enumerate().flat_map(runs).collect();
     let cores = std::thread::available_parallelism().map_or(1, usize::from);
     let jobs = args.jobs.map_or(cores, |jobs| jobs as usize).min(work.len());
     let (next, done) = (AtomicUsize::new(0), AtomicUsize::new(0));
@@ -145,7 +137,7 @@ fn run(all: &mut [Verified], args: &VerifyArgs, catalogue: &Catalogue) -> Result
         let record = args.out.as_deref().map(|folder| folder.join(record_name(&verified.name(), seed)));
         let scenario = verified.loaded.as_ref().ok()?;
         let trial = scenario.run(catalogue, seed, record.as_deref(), &|| interrupt.is_requested());
-        show_progress(done.fetch_add(1, Ordering::Relaxed) + 1, work.len());
+        show_progress(&format!("{} of {} runs", done.fetch_add(1, Ordering::Relaxed) + 1, work.len()));
         trial
     };
     let worker = || {
@@ -162,16 +154,14 @@ fn run(all: &mut [Verified], args: &VerifyArgs, catalogue: &Catalogue) -> Result
             joined.flat_map(|trials| trials.unwrap_or_else(|panic| std::panic::resume_unwind(panic))).collect()
         })
     });
-    clear_progress();
+    show_progress("");
     trials.sort_by_key(|(which, _)| *which);
     let is_complete = trials.iter().all(|(_, trial)| trial.is_some());
-    let of: Vec<usize> = work.iter().map(|(scenario, _)| *scenario).collect();
     for (which, trial) in trials {
-        all[of[which]].trials.extend(trial);
+        all[work[which].0].trials.extend(trial);
     }
     for verified in all {
-        verified.rows =
-            verified.loaded.as_ref().map_or_else(|_| Vec::new(), |scenario| scenario.rows(&verified.trials));
+        verified.rows = verified.loaded.iter().flat_map(|scenario| scenario.rows(&verified.trials)).collect();
     }
     Ok(is_complete)
 }
@@ -180,16 +170,10 @@ fn record_name(scenario: &str, seed: Option<u64>) -> String {
     seed.map_or_else(|| format!("{scenario}.csv"), |seed| format!("{scenario}-{seed}.csv"))
 }
 
-/// Prints the number of completed runs on one line, if standard error is a terminal.
-fn show_progress(done: usize, all: usize) {
+/// Prints a line over the last one, if standard error is a terminal.
+fn show_progress(line: &str) {
     if stderr().is_terminal() {
         // Errors of the terminal are ignored.
-        let _ = write!(stderr(), "\r{done} of {all} runs\x1b[K");
-    }
-}
-
-fn clear_progress() {
-    if stderr().is_terminal() {
-        let _ = write!(stderr(), "\r\x1b[K");
+        let _ = write!(stderr(), "\r{line}\x1b[K");
     }
 }

@@ -1,12 +1,14 @@
 //! The output of `verify`, as a table or as JSON.
 
+use std::collections::BTreeMap;
+
 use serde::Serialize;
 
 use super::verified::Verified;
-use crate::cli::shell::json::DiagnosticJson;
-use crate::cli::text::number::number;
+use crate::cli::shell::json::{DiagnosticJson, diagnosed};
+use crate::cli::text::number::{count_of, number};
 use crate::cli::text::table::table;
-use crate::scenario::judge::{Bound, Figure, Row, Verdict};
+use crate::scenario::judge::{Bound, Figure, FigureRow, Verdict};
 use crate::scenario::{Scenario, Trial};
 
 const HEADER: [&str; 10] =
@@ -42,7 +44,7 @@ pub(crate) fn text(all: &[Verified], has_colour: bool) -> String {
 }
 
 fn summary(all: &[Verified]) -> String {
-    let marks: Vec<Verdict> = all.iter().flat_map(|verified| &verified.rows).map(Row::verdict).collect();
+    let marks: Vec<Verdict> = all.iter().flat_map(|verified| &verified.rows).map(FigureRow::verdict).collect();
     let count = |mark: Verdict| marks.iter().filter(|known| **known == mark).count();
     let trials = || all.iter().flat_map(|verified| &verified.trials);
     let failed = trials().filter(|trial| trial.failure.is_some()).count();
@@ -50,14 +52,9 @@ fn summary(all: &[Verified]) -> String {
     let mut parts = vec![format!("{} passed", count(Verdict::Passed)), format!("{} failed", count(Verdict::Failed))];
     parts.push(format!("{} informational", count(Verdict::Informational)));
     let ended = if failed == 0 { String::new() } else { format!(" ({failed} ended in an error)") };
-    parts.push(format!("in {}{ended}", plural(trials().count(), "run")));
-    parts.extend((unloaded > 0).then(|| format!("{} not loaded", plural(unloaded, "scenario"))));
+    parts.push(format!("in {}{ended}", count_of(trials().count(), "run")));
+    parts.extend((unloaded > 0).then(|| format!("{} not loaded", count_of(unloaded, "scenario"))));
     parts.join(", ")
-}
-
-/// Formats a count with its noun.
-fn plural(count: usize, noun: &str) -> String {
-    format!("{count} {noun}{}", if count == 1 { "" } else { "s" })
 }
 
 /// Describes the seeds and the length of a scenario, and the facts of its devices.
@@ -80,8 +77,9 @@ fn remark(name: Option<String>, what: &str, has_colour: bool) -> [String; 10] {
 }
 
 /// Returns the row of a figure.
-fn cells(name: Option<String>, row: &Row, has_colour: bool) -> [String; 10] {
-    let figure = |value: Option<f64>| value.map_or_else(|| not_measured(row.figure).to_owned(), number);
+fn cells(name: Option<String>, row: &FigureRow, has_colour: bool) -> [String; 10] {
+    let not_measured = if row.figure == Figure::Response { "never" } else { "-" };
+    let figure = |value: Option<f64>| value.map_or_else(|| not_measured.to_owned(), number);
     let bound = match row.bound {
         Bound::None => String::new(),
         Bound::Settles => "each settles".to_owned(),
@@ -116,14 +114,6 @@ fn cells(name: Option<String>, row: &Row, has_colour: bool) -> [String; 10] {
     ]
 }
 
-/// Returns the text of a figure that could not be measured.
-const fn not_measured(figure: Figure) -> &'static str {
-    match figure {
-        Figure::Response => "never",
-        _ => "-",
-    }
-}
-
 const RED: &str = "\x1b[1;31m";
 const GREEN: &str = "\x1b[32m";
 
@@ -133,13 +123,13 @@ fn coloured(text: &str, colour: &str, has_colour: bool) -> String {
 
 /// The results as JSON.
 #[derive(Serialize)]
-pub(crate) struct VerifyJson {
+pub(crate) struct VerifyJson<'a> {
     ok: bool,
-    scenarios: Vec<ScenarioJson>,
+    scenarios: Vec<ScenarioJson<'a>>,
 }
 
 #[derive(Serialize)]
-struct ScenarioJson {
+struct ScenarioJson<'a> {
     name: String,
     file: String,
     ok: bool,
@@ -147,16 +137,9 @@ struct ScenarioJson {
     /// Length of a run [s].
     for_s: Option<f64>,
     /// Facts of the devices.
-    facts: serde_json::Map<String, serde_json::Value>,
-    runs: Vec<RunJson>,
-    rows: Vec<RowJson>,
-}
-
-#[derive(Serialize)]
-struct RunJson {
-    seed: Option<u64>,
-    time_s: f64,
-    failure: Option<String>,
+    facts: BTreeMap<&'a str, &'a toml::Value>,
+    runs: &'a [Trial],
+    rows: Vec<RowJson<'a>>,
 }
 
 /// What a bound applies to.
@@ -170,11 +153,11 @@ enum Judged {
 }
 
 #[derive(Serialize)]
-struct RowJson {
-    check: String,
-    of: String,
+struct RowJson<'a> {
+    check: &'a str,
+    of: &'a str,
     figure: &'static str,
-    unit: String,
+    unit: &'a str,
     /// Over the runs; null if not measured.
     median: Option<f64>,
     worst: Option<f64>,
@@ -184,40 +167,38 @@ struct RowJson {
     /// What the bound applies to, or null without a bound.
     judged: Option<Judged>,
     paper: Option<f64>,
-    /// `passed`, `failed`, or `informational` without a bound.
-    mark: &'static str,
+    /// `informational` without a bound.
+    mark: Verdict,
     /// In the order of the runs.
-    values: Vec<Option<f64>>,
+    values: &'a [Option<f64>],
 }
 
-pub(crate) fn json(all: &[Verified]) -> VerifyJson {
+pub(crate) fn json(all: &[Verified]) -> VerifyJson<'_> {
     VerifyJson { ok: all.iter().all(Verified::has_passed), scenarios: all.iter().map(scenario_json).collect() }
 }
 
-fn scenario_json(verified: &Verified) -> ScenarioJson {
+fn scenario_json(verified: &Verified) -> ScenarioJson<'_> {
     let scenario = verified.loaded.as_ref().ok();
     let facts = scenario.into_iter().flat_map(|scenario| &scenario.facts);
-    let value = |value: &toml::Value| serde_json::to_value(value).unwrap_or_default();
-    let run = |trial: &Trial| RunJson { seed: trial.seed, time_s: trial.time, failure: trial.failure.clone() };
     ScenarioJson {
         name: verified.name(),
         file: verified.path.display().to_string(),
         ok: verified.has_passed(),
-        diagnostics: verified.diagnostics(),
+        diagnostics: verified.loaded.as_ref().err().map(diagnosed).unwrap_or_default(),
         for_s: scenario.map(|scenario| scenario.for_s),
-        facts: facts.map(|(name, fact)| (name.clone(), value(fact))).collect(),
-        runs: verified.trials.iter().map(run).collect(),
+        facts: facts.map(|(name, fact)| (name.as_str(), fact)).collect(),
+        runs: &verified.trials,
         rows: verified.rows.iter().map(row_json).collect(),
     }
 }
 
-fn row_json(row: &Row) -> RowJson {
+fn row_json(row: &FigureRow) -> RowJson<'_> {
     let finite = |value: f64| Some(value).filter(|value| value.is_finite());
     RowJson {
-        check: row.check.clone(),
-        of: row.of.clone(),
+        check: &row.check,
+        of: &row.of,
         figure: row.figure.name(),
-        unit: row.unit.clone(),
+        unit: &row.unit,
         median: row.median(),
         worst: row.worst(),
         interval: row.interval().map(|(low, high)| [finite(low), finite(high)]),
@@ -228,11 +209,7 @@ fn row_json(row: &Row) -> RowJson {
             Bound::Settles | Bound::AtMost(_) | Bound::AtLeast(_) => Some(Judged::Every),
         },
         paper: row.paper,
-        mark: match row.verdict() {
-            Verdict::Passed => "passed",
-            Verdict::Failed => "failed",
-            Verdict::Informational => "informational",
-        },
-        values: row.values.clone(),
+        mark: row.verdict(),
+        values: &row.values,
     }
 }

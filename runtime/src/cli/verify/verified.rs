@@ -2,8 +2,7 @@
 
 use std::path::PathBuf;
 
-use crate::cli::shell::json::{DiagnosticJson, diagnosed};
-use crate::scenario::judge::{Row, Verdict};
+use crate::scenario::judge::{FigureRow, Verdict};
 use crate::scenario::{Scenario, Trial};
 use crate::source::Report;
 
@@ -13,7 +12,7 @@ pub(crate) struct Verified {
     pub(crate) loaded: Result<Scenario, Report>,
     /// The completed runs, in the order of the seeds.
     pub(crate) trials: Vec<Trial>,
-    pub(crate) rows: Vec<Row>,
+    pub(crate) rows: Vec<FigureRow>,
 }
 
 impl Verified {
@@ -26,9 +25,5 @@ impl Verified {
         let is_complete = self.loaded.as_ref().is_ok_and(|scenario| scenario.runs().len() == self.trials.len());
         let has_failed = self.trials.iter().any(|trial| trial.failure.is_some());
         is_complete && !has_failed && self.rows.iter().all(|row| row.verdict() != Verdict::Failed)
-    }
-
-    pub(crate) fn diagnostics(&self) -> Vec<DiagnosticJson> {
-        self.loaded.as_ref().err().map(diagnosed).unwrap_or_default()
     }
 }

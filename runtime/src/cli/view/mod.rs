@@ -7,9 +7,9 @@ use std::fmt::Write;
 use crate::cli::text::chart::{chart, time_axis};
 use crate::cli::text::number::{number, seconds};
 use crate::cli::text::prose::{PageStyle, break_at_semicolons};
-use crate::cli::text::series::{Bin, Series};
+use crate::cli::text::series::{Series, SeriesBin};
 use crate::engine::Engine;
-use crate::record::{Column, Columns};
+use crate::record::{PortColumn, PortColumns};
 use crate::signal::{Shape, Unit};
 use images::{ImageHistory, MIN_WIDE_PAGE};
 
@@ -25,15 +25,15 @@ pub(crate) struct RunView {
     pub(crate) images: Vec<ImageHistory>,
     /// Names of the ports that have curves, as the graph file calls them.
     pub(crate) plotted: Vec<String>,
-    columns: Columns,
+    columns: PortColumns,
     row: Vec<f64>,
-    pub(crate) curves: Vec<Curve>,
+    pub(crate) curves: Vec<ColumnCurve>,
     /// Times of the ticks [s], in the same bins as the curves.
     pub(crate) times: Series,
 }
 
 /// A column of a port over time.
-pub(crate) struct Curve {
+pub(crate) struct ColumnCurve {
     /// Name of the column; it begins with the name of the port only if several ports have curves.
     pub(crate) name: String,
     /// Full name of the column, as in a recording.
@@ -61,11 +61,14 @@ impl RunView {
                 ports.push((port.clone(), *id));
             }
         }
-        let columns = Columns::new(&ports);
+        let columns = PortColumns::new(&ports);
         let owners = plotted.iter().zip(&ports);
-        let owners = owners.flat_map(|(name, (port, _))| vec![(name, &port.name); Columns::width(&port.shape)]);
-        let curve = |(column, (name, port)): (&Column, (&String, &String))| Curve {
-            name: column_name(column, name, port, plotted.len() == 1),
+        let owners = owners.flat_map(|(name, (port, _))| vec![name; PortColumns::width(&port.shape)]);
+        let curve = |(column, name): (&PortColumn, &String)| ColumnCurve {
+            name: match column.part.strip_prefix('.').filter(|_| plotted.len() == 1) {
+                Some(part) => part.to_owned(),
+                None => format!("{name}{}", column.part),
+            },
             column: column.name.clone(),
             unit: column.unit,
             series: Series::with_capacity(bins),
@@ -119,7 +122,7 @@ impl RunView {
         let tail = (last - first) * TAIL;
         let title = format!("{} over time; mean ± deviation of the last {tail:.3} s", self.plotted.join(", "));
         let mut text = break_at_semicolons(&title, style.width) + "\n";
-        for (Curve { name, unit, series, .. }, value) in self.curves.iter().zip(&self.row) {
+        for (ColumnCurve { name, unit, series, .. }, value) in self.curves.iter().zip(&self.row) {
             let lines = chart(series.bins(), width, height.min(max_height));
             let values = final_values(*value, &series.tail(TAIL));
             text.push_str(&captioned(&format!("{name} [{unit}]"), &values, &lines, is_narrow));
@@ -132,17 +135,8 @@ impl RunView {
     }
 }
 
-/// Names a column of a port, which the graph calls `name`; shorter if no other port has curves.
-fn column_name(column: &Column, name: &str, port: &str, is_alone: bool) -> String {
-    match column.name.strip_prefix(port).unwrap_or_default().trim_start_matches('.') {
-        "" => name.to_owned(),
-        part if is_alone => part.to_owned(),
-        part => format!("{name}.{part}"),
-    }
-}
-
 /// Describes the last value, and mean and deviation at the end.
-fn final_values(last: f64, tail: &Bin) -> [String; 2] {
+fn final_values(last: f64, tail: &SeriesBin) -> [String; 2] {
     let last = if last.is_nan() { "absent at the end".to_owned() } else { format!("last {}", number(last)) };
     let mean = match tail.is_present() {
         true => format!("mean {} ± {}", number(tail.mean), number(tail.deviation())),

@@ -4,7 +4,7 @@ use super::{Lint, Notes, Violation};
 use crate::node::{ParamSpec, PortSpec};
 
 /// What is said of something in a catalogue.
-struct Entry<'c> {
+struct Declaration<'c> {
     name: String,
     summary: String,
     /// The reference; of a role only its ports are described.
@@ -14,22 +14,22 @@ struct Entry<'c> {
 }
 
 impl Lint<'_> {
-    fn entries(&self) -> Vec<Entry<'_>> {
-        let nodes = self.catalogue.specs().map(|spec| Entry {
+    fn entries(&self) -> Vec<Declaration<'_>> {
+        let nodes = self.catalogue.specs().map(|spec| Declaration {
             name: spec.name.to_string(),
             summary: spec.summary.to_string(),
             doc: Some(spec.doc.to_string()),
             ports: vec![("input", &spec.inputs), ("output", &spec.outputs)],
             params: spec.params.clone(),
         });
-        let devices = self.catalogue.devices().iter().map(|device| Entry {
+        let devices = self.catalogue.devices().iter().map(|device| Declaration {
             name: device.name().into_owned(),
             summary: device.summary().into_owned(),
             doc: Some(device.doc().into_owned()),
             ports: Vec::new(),
             params: device.params(),
         });
-        let roles = self.catalogue.roles().iter().map(|role| Entry {
+        let roles = self.catalogue.roles().iter().map(|role| Declaration {
             name: role.name.to_string(),
             summary: role.summary.to_string(),
             doc: None,
@@ -46,12 +46,10 @@ impl Lint<'_> {
             notes.unless(is_name(&entry.name), None, "a name is `snake_case`");
             for (sort, ports) in &entry.ports {
                 // A node may pass a port on under its name, so inputs and outputs are apart.
-                let names: Vec<&str> = ports.iter().map(|port| &*port.name).collect();
-                unique(&names, sort, &mut notes);
+                unique(ports.iter().map(|port| port.name.to_string()), sort, &mut notes);
             }
             params(&entry.params, "", &mut |specs, path| {
-                let names: Vec<String> = specs.iter().map(|spec| format!("{path}{}", spec.name)).collect();
-                unique(&names.iter().map(String::as_str).collect::<Vec<_>>(), "parameter", &mut notes);
+                unique(specs.iter().map(|spec| format!("{path}{}", spec.name)), "parameter", &mut notes);
             });
         }
     }
@@ -90,7 +88,9 @@ fn params(specs: &[ParamSpec], path: &str, visit: &mut impl FnMut(&[ParamSpec], 
     }
 }
 
-fn unique(names: &[&str], sort: &str, notes: &mut Notes<'_>) {
+/// Notes names that are used twice or are not valid.
+fn unique(names: impl Iterator<Item = String>, sort: &str, notes: &mut Notes<'_>) {
+    let names: Vec<String> = names.collect();
     for (i, name) in names.iter().enumerate() {
         let place = || Some(format!("{sort} `{name}`"));
         notes.unless(!names[..i].contains(name), place(), "it is declared twice");

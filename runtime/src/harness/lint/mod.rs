@@ -125,10 +125,15 @@ struct Notes<'f> {
 }
 
 impl Notes<'_> {
-    /// Notes `message` if `is_wrong`.
+    /// Notes a violation.
+    fn add(&mut self, place: Option<String>, message: impl Into<String>) {
+        self.found.push(Violation { owner: self.owner.clone(), place, message: message.into() });
+    }
+
+    /// Notes a violation unless `is_right`.
     fn unless(&mut self, is_right: bool, place: Option<String>, message: impl Into<String>) {
         if !is_right {
-            self.found.push(Violation { owner: self.owner.clone(), place, message: message.into() });
+            self.add(place, message);
         }
     }
 }

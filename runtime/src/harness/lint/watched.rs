@@ -5,9 +5,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use super::CountAllocations;
 use crate::graph::PlannedNode;
 use crate::node::{AnyNode, Bus, Components, PortId, Tick, Wires};
-use crate::signal::{
-    Arenas, Features, Flag, Image, Jacobian, Joints, Kind, Mark, Mask, Pose, Regions, Scalar, Shape, Signal, Twist,
-};
+use crate::signal::{Arenas, Scalar, Shape};
 
 /// The node is reset before this step, and compared with a fresh one from there on.
 const RESET_AT: u64 = 100;
@@ -16,7 +14,7 @@ const COMPARED: u64 = 50;
 
 /// What was found while a node ran.
 #[derive(Debug, Default)]
-pub(super) struct Finding {
+pub(super) struct StepRecord {
     pub(super) steps: u64,
     /// Whether each output had a value.
     pub(super) written: Vec<bool>,
@@ -34,26 +32,26 @@ pub(super) struct Watched {
     /// A node that has not stepped before the other is reset.
     twin: Box<dyn AnyNode>,
     shapes: Vec<Shape>,
-    /// Room for the outputs as they were before a step.
-    before: Arenas,
-    slots: Vec<u32>,
+    /// The outputs as they were before a step.
+    before: Bus,
+    saved: Vec<PortId>,
     count: Option<CountAllocations>,
-    finding: Arc<Mutex<Finding>>,
+    record: Arc<Mutex<StepRecord>>,
 }
 
 impl Watched {
-    /// Puts a watched node in the place of a planned one.
-    pub(super) fn take_place_of(
-        planned: &mut PlannedNode,
+    /// Returns a planned node that is watched.
+    pub(super) fn watch(
+        planned: PlannedNode,
         twin: PlannedNode,
         count: Option<CountAllocations>,
-        finding: Arc<Mutex<Finding>>,
-    ) {
+        record: Arc<Mutex<StepRecord>>,
+    ) -> PlannedNode {
         let shapes: Vec<Shape> = planned.ports.iter().map(|port| port.shape.clone()).collect();
-        let mut before = Arenas::default();
-        let slots = shapes.iter().map(|shape| before.add(shape)).collect();
-        let node = std::mem::replace(&mut planned.node, Box::new(Nothing));
-        planned.node = Box::new(Self { node, twin: twin.node, shapes, before, slots, count, finding });
+        let mut before = Bus::default();
+        let saved = shapes.iter().map(|shape| before.add(shape)).collect();
+        let watched = Self { node: planned.node, twin: twin.node, shapes, before, saved, count, record };
+        PlannedNode { node: Box::new(watched), ..planned }
     }
 
     /// Steps the node. Returns how often it allocated.
@@ -69,57 +67,52 @@ impl Watched {
     }
 
     /// Steps the fresh node on the same inputs. Returns the first output that differs.
-    fn compare(
-        &mut self,
-        tick: &Tick,
-        bus: &mut Bus,
-        wires: &Wires,
-        outputs: &[PortId],
-        marks: &[Mark],
-    ) -> Option<usize> {
+    fn compare(&mut self, tick: &Tick, bus: &mut Bus, wires: &Wires, outputs: &[PortId]) -> Option<usize> {
         let after = self.snapshots(bus, outputs);
-        for ((id, mark), (shape, slot)) in outputs.iter().zip(marks).zip(self.shapes.iter().zip(&self.slots)) {
-            self.before.copy(shape.kind(), *slot, &mut bus.arenas, id.slot);
-            bus.marks[id.mark as usize] = *mark;
-        }
+        copy(&self.shapes, (&self.before, &self.saved), (bus, outputs));
         self.twin.step(tick, bus, wires, outputs);
         let fresh = self.snapshots(bus, outputs);
         (0..outputs.len()).find(|i| after[*i] != fresh[*i])
     }
 
     fn snapshots(&self, bus: &Bus, outputs: &[PortId]) -> Vec<String> {
-        outputs.iter().zip(&self.shapes).map(|(id, shape)| snapshot(bus, *id, shape.kind())).collect()
+        outputs.iter().zip(&self.shapes).map(|(id, shape)| snapshot(bus, *id, shape)).collect()
+    }
+}
+
+/// Copies ports with their marks from one bus to another.
+fn copy(shapes: &[Shape], (bus, from): (&Bus, &[PortId]), (other, to): (&mut Bus, &[PortId])) {
+    for (shape, (from, to)) in shapes.iter().zip(from.iter().zip(to)) {
+        bus.arenas.copy(shape.kind(), from.slot, &mut other.arenas, to.slot);
+        *other.mark_mut(*to) = *bus.mark(*from);
     }
 }
 
 impl AnyNode for Watched {
     fn step(&mut self, tick: &Tick, bus: &mut Bus, wires: &Wires, outputs: &[PortId]) {
-        let finding = Arc::clone(&self.finding);
-        let mut finding = finding.lock().unwrap_or_else(PoisonError::into_inner);
-        finding.steps += 1;
-        let is_compared = (RESET_AT..RESET_AT + COMPARED).contains(&finding.steps);
-        if finding.steps == RESET_AT {
+        let record = Arc::clone(&self.record);
+        let mut record = record.lock().unwrap_or_else(PoisonError::into_inner);
+        record.steps += 1;
+        let is_compared = (RESET_AT..RESET_AT + COMPARED).contains(&record.steps);
+        if record.steps == RESET_AT {
             self.node.reset();
         }
-        let marks: Vec<Mark> = outputs.iter().map(|id| bus.marks[id.mark as usize]).collect();
-        for (id, (shape, slot)) in outputs.iter().zip(self.shapes.iter().zip(&self.slots)) {
-            bus.arenas.copy(shape.kind(), id.slot, &mut self.before, *slot);
-        }
-        finding.allocating += u64::from(self.measure(tick, bus, wires, outputs) > 0);
-        finding.written.resize(outputs.len(), false);
-        finding.out_of_range.resize(outputs.len(), None);
+        copy(&self.shapes, (bus, outputs), (&mut self.before, &self.saved));
+        record.allocating += u64::from(self.measure(tick, bus, wires, outputs) > 0);
+        record.written.resize(outputs.len(), false);
+        record.out_of_range.resize(outputs.len(), None);
         for (i, id) in outputs.iter().enumerate() {
-            let is_present = bus.marks[id.mark as usize].is_present();
-            finding.written[i] |= is_present;
-            if let (true, Shape::Scalar(shape)) = (is_present, &self.shapes[i]) {
-                let value = Scalar::arena(&bus.arenas)[id.slot as usize];
+            record.written[i] |= bus.mark(*id).is_present();
+            if let Shape::Scalar(shape) = &self.shapes[i]
+                && let Some(&value) = bus.get::<Scalar>(*id)
+            {
                 let is_within = (shape.range[0]..=shape.range[1]).contains(&value);
-                finding.out_of_range[i] = finding.out_of_range[i].or((!is_within).then_some((value, shape.range)));
+                record.out_of_range[i] = record.out_of_range[i].or((!is_within).then_some((value, shape.range)));
             }
         }
         if is_compared {
-            let differs = self.compare(tick, bus, wires, outputs, &marks);
-            finding.differs = finding.differs.or(differs);
+            let differs = self.compare(tick, bus, wires, outputs);
+            record.differs = record.differs.or(differs);
         }
     }
 
@@ -147,35 +140,14 @@ impl AnyNode for Watched {
     }
 }
 
-/// What stands in for a node that is being put elsewhere.
-struct Nothing;
-
-impl AnyNode for Nothing {
-    fn step(&mut self, _: &Tick, _: &mut Bus, _: &Wires, _: &[PortId]) {}
-    fn lose(&mut self, _: u64, _: &mut Bus, _: &[PortId]) {}
-    fn reset(&mut self) {}
-}
-
-/// An output in words: its mark, and its value while it has one.
-fn snapshot(bus: &Bus, id: PortId, kind: Kind) -> String {
-    fn value<T: Signal + std::fmt::Debug>(bus: &Bus, id: PortId) -> String {
-        format!("{:?}", T::arena(&bus.arenas)[id.slot as usize])
-    }
-    let mark = bus.marks[id.mark as usize];
+/// Writes an output in words: its mark, and its value while it has one.
+fn snapshot(bus: &Bus, id: PortId, shape: &Shape) -> String {
+    let mark = bus.mark(id);
     if !mark.is_present() {
         return "absent".into();
     }
-    let value = match kind {
-        Kind::Scalar => value::<Scalar>,
-        Kind::Flag => value::<Flag>,
-        Kind::Features => value::<Features>,
-        Kind::Image => value::<Image>,
-        Kind::Mask => value::<Mask>,
-        Kind::Regions => value::<Regions>,
-        Kind::Twist => value::<Twist>,
-        Kind::Pose => value::<Pose>,
-        Kind::Joints => value::<Joints>,
-        Kind::Jacobian => value::<Jacobian>,
-    };
-    format!("{mark:?} {}", value(bus, id))
+    let mut value = Arenas::default();
+    let slot = value.add(shape);
+    bus.arenas.copy(shape.kind(), id.slot, &mut value, slot);
+    format!("{mark:?} {value:?}")
 }

@@ -9,18 +9,9 @@ use std::path::Path;
 
 use crate::catalogue::Catalogue;
 use crate::graph::{Request, compile};
-use crate::node::{NodeSpec, PortSpec};
+use crate::node::PortSpec;
 use crate::signal::Kind;
 use crate::source::{Item, SourceMap, Table, Value, parse_table};
-
-/// The subject of an example graph.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Target<'a> {
-    /// A node type.
-    Node(&'a str),
-    /// A device type.
-    Device(&'a str),
-}
 
 /// The parsed example of one node or device.
 struct ExamplePart {
@@ -46,23 +37,20 @@ const SHARED: [&str; 3] = ["roles", "commands", "bind"];
 ///
 /// # Errors
 /// If an example is missing or is not TOML.
-pub fn example(catalogue: &Catalogue, name: &str) -> Result<String, String> {
-    let is_node = catalogue.nodes().iter().any(|node| node.spec().name == name);
-    compose(catalogue, if is_node { Target::Node(name) } else { Target::Device(name) })
+pub fn example_graph(catalogue: &Catalogue, name: &str) -> Result<String, String> {
+    let parts = parts(catalogue)?;
+    let start = parts.iter().position(|part| part.kind == name).ok_or_else(|| format!("`{name}` has no example"))?;
+    let chosen: Vec<&ExamplePart> = chosen(&parts, start)?.into_iter().map(|index| &parts[index]).collect();
+    let target = &parts[start];
+    let used = match target.is_device || !is_unused(&chosen, target) {
+        true => None,
+        false => insert_into_wire(catalogue, &chosen, target).or_else(|| append_log(catalogue, &chosen, target)),
+    };
+    Ok(used.unwrap_or_else(|| text(&chosen, target, None)))
 }
 
-/// Composes the example graph.
-///
-/// # Errors
-/// If an example is missing or is not TOML.
-pub(crate) fn compose(catalogue: &Catalogue, target: Target<'_>) -> Result<String, String> {
-    let parts = parts(catalogue)?;
-    let is_target = |part: &ExamplePart| match target {
-        Target::Node(name) => !part.is_device && part.kind == name,
-        Target::Device(name) => part.is_device && part.kind == name,
-    };
-    let (Target::Node(name) | Target::Device(name)) = target;
-    let start = parts.iter().position(is_target).ok_or_else(|| format!("`{name}` has no example"))?;
+/// Follows the wires from one part, and returns the indices of all the parts of its graph in order.
+fn chosen(parts: &[ExamplePart], start: usize) -> Result<Vec<usize>, String> {
     let mut chosen = vec![start];
     if parts[start].is_device {
         // A sensor alone does nothing, so the first node that reads it is added.
@@ -74,25 +62,18 @@ pub(crate) fn compose(catalogue: &Catalogue, target: Target<'_>) -> Result<Strin
     while let Some(part) = chosen.get(at).map(|index| &parts[*index]) {
         at += 1;
         for need in &part.needs {
-            if chosen.iter().any(|index| parts[*index].names.contains(need)) {
-                continue;
-            }
             // Only one device may fill a role.
             let is_taken = |name: &String| chosen.iter().any(|index| parts[*index].names.contains(name));
-            let is_free = |part: &ExamplePart| !part.names.iter().any(is_taken);
-            let provider = parts.iter().position(|part| part.names.contains(need) && is_free(part));
-            let provider = provider.ok_or_else(|| format!("no example has the `{need}` that `{}` needs", part.kind))?;
-            chosen.push(provider);
+            if is_taken(need) {
+                continue;
+            }
+            let is_free = |part: &ExamplePart| part.names.contains(need) && !part.names.iter().any(is_taken);
+            let provider = parts.iter().position(is_free);
+            chosen.push(provider.ok_or_else(|| format!("no example has the `{need}` that `{}` needs", part.kind))?);
         }
     }
     chosen.sort_unstable();
-    let chosen: Vec<&ExamplePart> = chosen.iter().map(|index| &parts[*index]).collect();
-    let target = &parts[start];
-    if target.is_device || !is_unused(&chosen, target) {
-        return Ok(text(&chosen, target, None));
-    }
-    let used = insert_into_wire(catalogue, &chosen, target).or_else(|| append_log(catalogue, &chosen, target));
-    Ok(used.unwrap_or_else(|| text(&chosen, target, None)))
+    Ok(chosen)
 }
 
 /// Whether the graph drives a command and nothing reads the target.
@@ -110,7 +91,7 @@ fn is_clean(catalogue: &Catalogue, text: &str) -> bool {
 /// Inserts the target into one of the wires that it reads, so that the readers of the wire read its output instead.
 /// Returns the first such graph that loads without a warning.
 fn insert_into_wire(catalogue: &Catalogue, chosen: &[&ExamplePart], target: &ExamplePart) -> Option<String> {
-    let spec = catalogue.nodes().iter().map(|node| node.spec()).find(|spec| spec.name == target.kind)?;
+    let (_, spec) = catalogue.find_node(&target.kind)?;
     let outputs =
         || target.names.iter().flat_map(|name| spec.outputs.iter().map(move |port| format!("{name}.{}", port.name)));
     let wires = target.wires.iter().flat_map(|wire| outputs().map(move |output| (wire.clone(), output)));
@@ -119,10 +100,9 @@ fn insert_into_wire(catalogue: &Catalogue, chosen: &[&ExamplePart], target: &Exa
 
 /// Adds a node that logs the scalar outputs of the target. Returns the graph if it loads without a warning.
 fn append_log(catalogue: &Catalogue, chosen: &[&ExamplePart], target: &ExamplePart) -> Option<String> {
-    let specs: Vec<NodeSpec> = catalogue.nodes().iter().map(|node| node.spec()).collect();
     let takes = |port: &PortSpec| port.need.is_many && port.kind == Kind::Scalar;
-    let logs = specs.iter().find(|spec| spec.logs && spec.inputs.iter().any(takes))?;
-    let spec = specs.iter().find(|spec| spec.name == target.kind)?;
+    let logs = catalogue.specs().find(|spec| spec.logs && spec.inputs.iter().any(takes))?;
+    let (_, spec) = catalogue.find_node(&target.kind)?;
     let name = target.names.first()?;
     let scalars = spec.outputs.iter().filter(|port| port.kind == Kind::Scalar);
     let wires: Vec<String> = scalars.map(|port| format!("in.{0} = \"{name}.{0}\"\n", port.name)).collect();
@@ -131,21 +111,12 @@ fn append_log(catalogue: &Catalogue, chosen: &[&ExamplePart], target: &ExamplePa
     Some(graph).filter(|text| is_clean(catalogue, text))
 }
 
-/// Returns the block of a node or a device as written, or `None` without an example.
-pub(crate) fn block(example: &str) -> Option<&str> {
-    Some(example.trim()).filter(|text| !text.is_empty())
-}
-
+/// Parses the examples of the catalogue: those of the nodes, then those of the devices.
 fn parts(catalogue: &Catalogue) -> Result<Vec<ExamplePart>, String> {
-    let mut parts = Vec::new();
-    let nodes = catalogue.nodes().iter().map(|node| node.spec()).map(|spec| (spec.name, spec.example, false));
+    let nodes = catalogue.specs().map(|spec| (spec.name.clone(), spec.example.clone(), false));
     let devices = catalogue.devices().iter().map(|device| (device.name(), device.example(), true));
-    for (kind, example, is_device) in nodes.chain(devices) {
-        if !example.trim().is_empty() {
-            parts.push(part(catalogue, &kind, &example, is_device)?);
-        }
-    }
-    Ok(parts)
+    let given = nodes.chain(devices).filter(|(_, example, _)| !example.trim().is_empty());
+    given.map(|(kind, example, is_device)| part(catalogue, &kind, &example, is_device)).collect()
 }
 
 fn part(catalogue: &Catalogue, kind: &str, example: &str, is_device: bool) -> Result<ExamplePart, String> {
@@ -166,11 +137,8 @@ fn part(catalogue: &Catalogue, kind: &str, example: &str, is_device: bool) -> Re
         wires.extend(inputs.into_iter().flat_map(strings));
         collect_facts(node, &mut needs);
     }
-    table("commands")
-        .entries
-        .iter()
-        .filter_map(|(_, wires)| wires.as_table())
-        .for_each(|drive| wires.extend(strings(drive)));
+    let commands = table("commands");
+    wires.extend(commands.entries.iter().filter_map(|(_, wires)| wires.as_table()).flat_map(strings));
     needs.extend(wires.iter().filter_map(|wire| Some(wire.split_once('.')?.0.to_owned())));
     let names = keys(if is_device { &roles } else { &nodes });
     Ok(ExamplePart { kind: kind.to_owned(), is_device, names, sensors, needs, wires, sections: sections(example) })
@@ -192,8 +160,7 @@ fn sections(example: &str) -> BTreeMap<&'static str, String> {
     let (mut section, mut comments) = ("", String::new());
     for line in example.trim().lines() {
         if line.starts_with('#') {
-            comments.push_str(line);
-            comments.push('\n');
+            comments.extend([line, "\n"]);
             continue;
         }
         let header = line.strip_prefix('[').and_then(|rest| rest.split(']').next());
@@ -203,8 +170,7 @@ fn sections(example: &str) -> BTreeMap<&'static str, String> {
         let text = sections.entry(section).or_default();
         text.push_str(&std::mem::take(&mut comments));
         if shared.is_none() {
-            text.push_str(line);
-            text.push('\n');
+            text.extend([line, "\n"]);
         }
     }
     sections.entry(section).or_default().push_str(&comments);

@@ -64,7 +64,7 @@ mod bound {
     /// ```
     #[derive(Describe)]
     #[describe(name = "bound")]
-    pub(super) struct Bound;
+    pub(super) struct BoundVelocity;
 
     /// What it reads.
     #[derive(Inputs)]
@@ -83,7 +83,7 @@ mod bound {
         velocity: Out<Joints>,
     }
 
-    impl Node for Bound {
+    impl Node for BoundVelocity {
         type Params = ();
         type Inputs<'a> = Inputs<'a>;
         type Outputs = Outputs;
@@ -160,7 +160,7 @@ fn world() -> Catalogue {
         limits: vec![],
         is_observed: false,
     };
-    Catalogue::new().role(role).node::<follow::Follow>().node::<bound::Bound>().device::<Motor>()
+    Catalogue::new().role(role).node::<follow::Follow>().node::<bound::BoundVelocity>().device::<Motor>()
 }
 
 #[test]
@@ -186,25 +186,25 @@ motor = \"m\"
 [devices.m]
 type = \"still_motor\"
 ";
-    assert_eq!(example(&world(), "still_motor").as_deref(), Ok(expected));
+    assert_eq!(example_graph(&world(), "still_motor").as_deref(), Ok(expected));
     assert!(compile(&world(), &Request::text(expected)).is_ok_and(|plan| plan.warnings().is_none()));
 }
 
 #[test]
 fn a_node_that_nobody_reads_is_put_into_the_wire_it_reads() {
-    let text = example(&world(), "bound").unwrap();
+    let text = example_graph(&world(), "bound").unwrap();
     assert!(text.contains("motor.velocity = \"bound.velocity\""), "{text}");
     assert!(text.contains("# ==== bound ====\n[nodes.bound]\ntype = \"bound\"\nin.velocity = \"follow.velocity\""));
     assert!(compile(&world(), &Request::text(text)).is_ok_and(|plan| plan.warnings().is_none()));
-    let other = example(&world(), "follow").unwrap();
+    let other = example_graph(&world(), "follow").unwrap();
     assert!(other.contains("motor.velocity = \"follow.velocity\"") && !other.contains("bound"), "{other}");
 }
 
 #[test]
 fn a_missing_example_is_named() {
-    let bound = Catalogue::new().node::<bound::Bound>();
-    assert_eq!(example(&bound, "bound"), Err("no example has the `follow` that `bound` needs".into()));
-    assert_eq!(example(&bound, "follow"), Err("`follow` has no example".into()));
+    let bound = Catalogue::new().node::<bound::BoundVelocity>();
+    assert_eq!(example_graph(&bound, "bound"), Err("no example has the `follow` that `bound` needs".into()));
+    assert_eq!(example_graph(&bound, "follow"), Err("`follow` has no example".into()));
 }
 
 #[test]
