@@ -60,7 +60,7 @@ pub(crate) struct Fused {
     rows: [null_space::Row; 7],
     smooth: [Twist; 2],
     reached: Twist,
-    limited: joint_limit::State,
+    limited: joint_limit::Limiter,
     /// Read off by the bench, so that nothing is optimised away.
     pub(crate) sum: f64,
     pub(crate) peak: f64,
@@ -115,7 +115,7 @@ impl Fused {
             rows: [[0.0; 8]; 7],
             smooth: [Twist::default(); 2],
             reached: Twist::default(),
-            limited: joint_limit::State::of(7),
+            limited: joint_limit::Limiter::new(7),
             sum: 0.0,
             peak: 0.0,
             shape,

@@ -4,6 +4,7 @@ use proptest::prelude::*;
 use tactflow_runtime::harness::NodeRig;
 use tactflow_runtime::signal::{Freshness, Joints, Shape, Stamp};
 
+use super::limiter::{Room, follow, room};
 use super::*;
 
 const MS: i64 = 1_000_000;
@@ -185,7 +186,7 @@ fn the_allowed_velocities_of_a_joint() {
 #[test]
 fn a_joint_without_room_to_brake_with_the_others_brakes_by_itself() {
     let shape = arm(&[0.5, 10.0]).joints;
-    let free = |joint: &Joint| Range::from((-joint.speed, joint.speed));
+    let free = |joint: &Joint| (-joint.speed, joint.speed);
     let rooms = [0, 1].map(|i| Room { speed: free(&shape[i]), position: free(&shape[i]), lead: free(&shape[i]) });
     let mut last = [1.0, 1.0];
     let share = follow(&shape, 0.01, &[0.0, 0.0], &rooms, &mut last);

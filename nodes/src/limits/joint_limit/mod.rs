@@ -16,16 +16,17 @@
 //! Invariants, while no tick takes longer than h: no joint changes its velocity by more than a dt, nor exceeds its speed;
 //! a joint that starts within its range never leaves it; no command makes the lead exceed its bound.
 
+mod limiter;
+
 use tactflow_runtime::node::{
-    At, Describe, In, Inputs, Limits, Mistake, Mistakes, Node, Out, Outputs, Param, Setup, State, Tick,
+    At, Describe, In, Inputs, Limits, Mistake, Mistakes, Node, Out, Outputs, Param, Setup, Tick,
 };
-use tactflow_runtime::signal::line::{scale_to, step_toward};
 use tactflow_runtime::signal::{Joint, Joints, JointsShape, Scalar, Stamp, Unit};
 use tactflow_runtime::source::Code;
 
 use super::{fraction, max_age};
-use crate::motion::bounds::scale_into;
-use crate::motion::braking::stopping_speed;
+
+pub use limiter::Limiter;
 
 /// Keeps the ranges, speeds and accelerations of the joints, and the lead of the equilibrium over the position.
 ///
@@ -117,33 +118,11 @@ pub struct Outputs {
     joint_acceleration: Out<Scalar>,
 }
 
-/// What `joint_limit` remembers.
-#[derive(State)]
-pub struct State {
-    /// The velocities of the last tick [rad/s].
-    last: Vec<f64>,
-    /// The wanted velocities within their ranges [rad/s].
-    target: Vec<f64>,
-    /// The allowed velocities of each joint.
-    room: Vec<Room>,
-}
-
-/// Smallest and largest allowed velocity of a joint [rad/s].
-type Range = (f64, f64);
-
-/// The velocities that each limit allows a joint in this tick.
-#[derive(Debug, Clone, Copy, Default)]
-pub struct Room {
-    speed: Range,
-    position: Range,
-    lead: Range,
-}
-
 impl Node for JointLimit {
     type Params = Params;
     type Inputs<'a> = Inputs<'a>;
     type Outputs = Outputs;
-    type State = State;
+    type State = Limiter;
 
     const LIMITS: Limits = Limits {
         through: Some("velocity"),
@@ -161,118 +140,27 @@ impl Node for JointLimit {
         Ok(Self { joints, lead: params.lead_rad, max_age: max_age(params.max_age_ms, setup.period) })
     }
 
-    fn state(&self) -> State {
-        State::of(self.joints.len())
+    fn state(&self) -> Limiter {
+        Limiter::new(self.joints.len())
     }
 
-    fn step(&self, tick: &Tick, inputs: Inputs<'_>, out: &mut Outputs, state: &mut State) {
+    fn step(&self, tick: &Tick, inputs: Inputs<'_>, out: &mut Outputs, limiter: &mut Limiter) {
         let arm = inputs.position.stamp().oldest(inputs.equilibrium.stamp());
         let is_fresh = |stamp: Stamp| stamp.age(tick.now) <= self.max_age && !tick.is_halted;
         let wanted = inputs.velocity.filter(|velocity| is_fresh(velocity.stamp()) && is_fresh(arm));
         let wanted = wanted.map(|velocity| &*velocity.value().0);
         let (position, equilibrium) = (&inputs.position.0, &inputs.equilibrium.0);
         let Some([lead, position, speed, acceleration]) =
-            state.limit(&self.joints, self.lead, tick, wanted, position, equilibrium)
+            limiter.limit(&self.joints, self.lead, tick, wanted, position, equilibrium)
         else {
             return;
         };
-        out.velocity.write().0.copy_from_slice(&state.last);
+        out.velocity.write().0.copy_from_slice(limiter.velocities());
         out.lead.set(lead);
         out.joint_position.set(position);
         out.joint_speed.set(speed);
         out.joint_acceleration.set(acceleration);
     }
-}
-
-impl State {
-    /// Returns the state of `count` joints at rest.
-    #[must_use]
-    pub fn of(count: usize) -> Self {
-        Self { last: vec![0.0; count], target: vec![0.0; count], room: vec![Room::default(); count] }
-    }
-
-    /// Returns the velocities of the last tick [rad/s].
-    #[must_use]
-    pub fn velocities(&self) -> &[f64] {
-        &self.last
-    }
-
-    /// Moves the velocities one tick toward the wanted ones, within all limits.
-    ///
-    /// Returns the fractions that the lead, the positions, the speeds and the accelerations let pass, or `None` if there
-    /// are no wanted velocities and all joints are at rest.
-    pub fn limit(
-        &mut self,
-        joints: &[Joint],
-        lead: f64,
-        tick: &Tick,
-        wanted: Option<&[f64]>,
-        position: &[f64],
-        equilibrium: &[f64],
-    ) -> Option<[f64; 4]> {
-        if wanted.is_none() && self.last.iter().all(|v| *v == 0.0) {
-            return None;
-        }
-        for (i, joint) in joints.iter().enumerate() {
-            self.room[i] = room(joint, position[i], equilibrium[i], lead, self.last[i], tick.max_gap);
-        }
-        let rooms = || self.room.iter();
-        let mut scales = [1.0; 4];
-        self.target.fill(0.0);
-        if let Some(wanted) = wanted {
-            scales[0] = scale_into(wanted, rooms().map(|room| room.lead));
-            scales[1] = scale_into(wanted, rooms().map(|room| room.position));
-            scales[2] = scale_into(wanted, rooms().map(|room| room.speed));
-            let scale = scales[0].min(scales[1]).min(scales[2]);
-            for ((target, wanted), room) in self.target.iter_mut().zip(wanted).zip(&self.room) {
-                let (min, max) = room.all();
-                *target = (wanted * scale).clamp(min, max);
-            }
-        }
-        let dt = tick.dt.min(tick.max_gap);
-        scales[3] = follow(joints, dt, &self.target, &self.room, &mut self.last);
-        Some(scales)
-    }
-}
-
-impl Room {
-    /// Returns the velocities that all limits allow; 0 is always among them.
-    fn all(&self) -> Range {
-        let both = |a: Range, b: Range| (a.0.max(b.0), a.1.min(b.1));
-        both(self.speed, both(self.position, self.lead))
-    }
-}
-
-/// Returns the allowed velocities of a joint whose last command was `last` [rad/s], if no tick takes longer than `gap`
-/// [s].
-fn room(joint: &Joint, q: f64, equilibrium: f64, lead: f64, last: f64, gap: f64) -> Room {
-    let both = |down: f64, up: f64| {
-        let toward =
-            |distance: f64, last: f64| stopping_speed(distance - last.max(0.0) * gap, joint.acceleration, 2.0 * gap);
-        (-toward(down, -last), toward(up, last))
-    };
-    let ahead = equilibrium - q;
-    Room {
-        speed: (-joint.speed, joint.speed),
-        position: both(q.min(equilibrium) - joint.lower, joint.upper - q.max(equilibrium)),
-        lead: both(lead + ahead, lead - ahead),
-    }
-}
-
-/// Moves `last` toward `target` on a straight line, except for the joints that have to brake by themselves. Returns the
-/// fraction of the change that it made.
-fn follow(joints: &[Joint], dt: f64, target: &[f64], room: &[Room], last: &mut [f64]) -> f64 {
-    let mut scale = 1.0f64;
-    for ((joint, target), last) in joints.iter().zip(target).zip(&*last) {
-        scale = scale.min(scale_to((target - last).abs(), joint.acceleration * dt));
-    }
-    for (((joint, target), room), last) in joints.iter().zip(target).zip(room).zip(last) {
-        let change = joint.acceleration * dt;
-        let next = step_toward(*last, *target, scale);
-        let (min, max) = room.all();
-        *last = next.clamp(min, max).clamp(*last - change, *last + change);
-    }
-    scale
 }
 
 /// Returns the joints with the narrowest of the limits that the inputs and the parameters state.
@@ -310,13 +198,12 @@ fn joints(
         let mistake = Mistake::new(Code::MissingKey, At::Node, message);
         return Err(mistake.help("add `acceleration = 5.0`, in rad/s²").into());
     }
-    match joints.iter().find(|joint| !joint.speed.is_finite()) {
-        Some(joint) => {
-            let message = format!("the arm states no maximum speed of joint `{}`", joint.name);
-            Err(Mistake::input("position", message).help("add the speed of the joint to the model of the arm").into())
-        }
-        None => Ok(joints),
+    if let Some(joint) = joints.iter().find(|joint| !joint.speed.is_finite()) {
+        let message = format!("the arm states no maximum speed of joint `{}`", joint.name);
+        let help = "add the speed of the joint to the model of the arm";
+        return Err(Mistake::input("position", message).help(help).into());
     }
+    Ok(joints)
 }
 
 #[cfg(test)]
