@@ -216,7 +216,7 @@ impl Fused {
 
     /// From the region to the twist of the sensor (eqs. 1-3 and 5).
     fn servo(&mut self, dt: f64) -> (Twist, bool) {
-        let sums = moments::add_up(&self.image, &self.region);
+        let sums = moments::Weighing::Force.add_up(&self.image, &self.region);
         let pressure = self.pressures.mean([sums.force / sums.area, 0.0])[0];
         let (j, i) = (sums.x / sums.force, sums.y / sums.force);
         let (x, y) = (self.shape.x(sums.first[1] + j), self.shape.y(sums.first[0] + i));

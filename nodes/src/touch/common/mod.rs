@@ -12,3 +12,16 @@ pub(crate) fn check_same_array(image: &ImageShape, input: &str, mask: &Grid) -> 
         format!("`{input}` is {} by {} tactels, but `image` is {} by {}", mask.rows, mask.cols, image.rows, image.cols);
     Err(Mistake::input(input, message).help("wire both from one pad").into())
 }
+
+/// Returns both values, or the mistakes of both.
+pub(crate) fn both<A, B>(a: Result<A, Mistakes>, b: Result<B, Mistakes>) -> Result<(A, B), Mistakes> {
+    match (a, b) {
+        (Ok(a), Ok(b)) => Ok((a, b)),
+        (a, b) => Err([a.err(), b.err()].into_iter().flatten().flatten().collect()),
+    }
+}
+
+/// Returns the mistakes as an error if there are any.
+pub(crate) fn none(mistakes: Mistakes) -> Result<(), Mistakes> {
+    if mistakes.is_empty() { Ok(()) } else { Err(mistakes) }
+}

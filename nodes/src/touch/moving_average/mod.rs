@@ -3,9 +3,12 @@
 //! The window is summed from its oldest sample to its newest in each step: the sum does not drift, and a sample that has
 //! left the window has no influence.
 
+mod mean;
+
 use tactflow_runtime::node::{Describe, Interval, Mistake, Mistakes, Node, Param, Setup, State, Tick};
 
 use super::filter::{Averaging, Inputs, Outputs, Ring};
+use mean::{TimedVector, mean};
 
 /// Smooths a feature: the mean over the newest samples, or over a time.
 ///
@@ -59,14 +62,11 @@ pub struct Params {
 /// What `moving_average` remembers.
 #[derive(State)]
 pub struct State {
-    ring: Ring<Sample>,
+    ring: Ring<TimedVector>,
     /// Time of the newest sample [ns], from an arbitrary zero; 0 if the window is a number of samples.
     now: i64,
     interval: Interval,
 }
-
-/// The time of a sample [ns], and its vector.
-type Sample = (i64, [f64; 2]);
 
 /// Window without parameters, as in the paper [samples].
 const DEFAULT_WINDOW: usize = 10;
@@ -116,29 +116,6 @@ impl Node for MovingAverage {
             out.value.set(mean);
         }
     }
-}
-
-/// Returns the mean vector of the samples.
-fn mean(ring: &Ring<Sample>) -> [f64; 2] {
-    let parts = ring.parts();
-    let count = (parts[0].len() + parts[1].len()) as f64;
-    let sum = add_up(parts, |part| part);
-    if sum[0].is_finite() {
-        return sum.map(|sum| sum / count);
-    }
-    // The sum of very large samples is infinite, their mean is not.
-    add_up(parts, |part| part / count).map(|mean| mean.clamp(f64::MIN, f64::MAX))
-}
-
-/// Returns the sums over both parts of the ring.
-fn add_up(parts: [&[Sample]; 2], scale: impl Fn(f64) -> f64) -> [f64; 2] {
-    let mut sum = [0.0; 2];
-    for samples in parts {
-        for (_, [a, b]) in samples {
-            sum = [sum[0] + scale(*a), sum[1] + scale(*b)];
-        }
-    }
-    sum
 }
 
 #[cfg(test)]
