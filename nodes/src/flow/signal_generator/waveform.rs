@@ -1,4 +1,17 @@
-//! The form of a signal over time, with amplitude 1.
+//! The form of a signal over time.
+//!
+//! With t the time since `start`, T the duration and A the amplitude:
+//!
+//! ```text
+//! step   offset + A                        for 0 <= t < T
+//! ramp   offset + A t / T                  and offset + A from T on
+//! sine   offset + A sin(2 pi f t)          for 0 <= t < T
+//! chirp  offset + A sin(2 pi (f t + (f_end - f) t^2 / (2 T)))
+//! ```
+//!
+//! Before and after, the value is the offset. The phase of a chirp is the integral of its frequency, which goes linearly
+//! from f to f_end; f(t) t would sweep twice as far. Phases are computed in turns and reduced to one turn before the sine,
+//! so a long run loses no precision. Time is that of the tick: a late tick has the value of its own time.
 
 use std::f64::consts::TAU;
 

@@ -1,4 +1,18 @@
 //! The limits of a contact on the pad, and the motion that keeps within them.
+//!
+//! A contact at p = (x, y, 0) of an object at rest moves over the pad with dp/dt = -(v + omega x p):
+//!
+//! ```text
+//! dx/dt = -vx + wz y        dy/dt = -vy - wz x
+//! ```
+//!
+//! The outward part is removed by a correction of vx and vy alone: all of it from the margin on, and a fraction that
+//! grows linearly over the ramp before the margin. A turn wz continues, but about the contact instead of the middle of
+//! the pad. Rolling over an object of radius R adds -R wy to dx/dt and R wx to dy/dt. R is unknown but its sign is not,
+//! so wx and wy are scaled when they roll toward the rim.
+//!
+//! Invariants: the output is a continuous function of the contact and the input, and inward motion passes unchanged, bit
+//! for bit.
 
 use tactflow_runtime::signal::Twist;
 

@@ -1,11 +1,5 @@
 //! `pid`: a PID controller on every feature, each on its own (paper eq. 3, the matrices K_P, K_I, K_D).
 //!
-//! u = kp e + I + kd de/dt, with I the sum of ki e dt. Time is that between the stamps of a component's samples, so a
-//! gain means the same at 100 Hz and at 1 kHz, and one sample is never integrated twice; the paper sums without dt, so
-//! its KI is ki times the period and its KD is kd over the period. The integral is kept in units of the control, so a
-//! change of ki makes no jump; it runs only near the target (`within`), is bounded, and does not grow outwards while
-//! the output is at its limit. The error of a line's direction is differenced modulo pi.
-//!
 //! A held component stays as it is. An absent one contributes nothing and resets only itself, and only when it has been
 //! away for long: a frame of flicker does not wipe an integral.
 

@@ -1,4 +1,17 @@
 //! The search for a ridge, and the way along it.
+//!
+//! e is the eccentricity of the contact, h a heading, and l the length of two legs at right angles, each at 45° to the
+//! heading:
+//!
+//! ```text
+//! seek    u = d1 = R(pi/4) h, then d2 = R(-pi/4) h, for l each        m1, m2: slopes of e over the distance along d1, d2
+//!         g = m1 d1 + m2 d2                                            h <- g / |g|    if |g| l >= least_rise
+//! follow  u = s (cos alpha, sin alpha), s = ±1 such that u u_last >= 0    while e is above the bound
+//! V_ext = speed (u, 0, 0, 0, 0)
+//! ```
+//!
+//! A slope is that of the least-squares line through all samples of its leg, which averages the noise of e. Distances
+//! are measured along the axes of the sensor, by its pose: R' (p - p_last).
 
 use std::f64::consts::FRAC_1_SQRT_2;
 

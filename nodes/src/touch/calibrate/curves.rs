@@ -9,7 +9,7 @@ use tactflow_runtime::source::{Code, Item, Value};
 use super::Inputs;
 use super::tactel_curves::TactelCurves;
 use crate::calibration::{Calibration, file};
-use crate::touch::common::{both, none};
+use crate::touch::common::{both, narrow, none};
 
 /// The zeros and the curves of all tactels, and the unit of the calibrated image.
 pub(super) type Curves = (Vec<f32>, TactelCurves, Unit);
@@ -45,7 +45,7 @@ impl Param for PerTactel {
     }
 }
 
-/// The calibration that a device states.
+/// The parameters of the curves, of the graph or of the device.
 #[derive(Debug, Clone, Default, Param)]
 pub(super) struct CurveParams {
     /// Reading of an unloaded tactel: a number for all, or a list of rows; 0 without it.
@@ -133,25 +133,20 @@ fn read_file(path: &FilePath, prefix: &str, image: &ImageShape) -> Result<Curves
 /// Returns the parameter `name` for each tactel.
 fn spread(name: &str, value: &PerTactel, image: &ImageShape) -> Result<Vec<f32>, Mistakes> {
     let &ImageShape { rows, cols, .. } = image;
-    let mut mistakes = Mistakes::new();
-    let numbers = match value {
-        PerTactel::All(number) => vec![*number; rows * cols],
+    let (numbers, flaw) = match value {
+        PerTactel::All(number) => (vec![*number; rows * cols], None),
+        PerTactel::Rows(list) if list.len() != rows => {
+            (list.concat(), Some(format!("`{name}` has {} rows, but the image has {rows}", list.len())))
+        }
         PerTactel::Rows(list) => {
-            if list.len() != rows {
-                let message = format!("`{name}` has {} rows, but the image has {rows}", list.len());
-                mistakes.push(Mistake::param(name, message));
-            } else if let Some((i, row)) = list.iter().enumerate().find(|(_, row)| row.len() != cols) {
-                let message =
-                    format!("row {i} of `{name}` has {} numbers, but the image has {cols} columns", row.len());
-                mistakes.push(Mistake::param(name, message));
-            }
-            list.concat()
+            let flaw = list.iter().enumerate().find(|(_, row)| row.len() != cols).map(|(i, row)| {
+                format!("row {i} of `{name}` has {} numbers, but the image has {cols} columns", row.len())
+            });
+            (list.concat(), flaw)
         }
     };
-    if let Some(number) = numbers.iter().find(|number| !(**number as f32).is_finite()) {
-        let message = format!("{number:e} is too large for a tactel: images are of 32-bit floats");
-        mistakes.push(Mistake::param(name, message));
-    }
-    none(mistakes)?;
-    Ok(numbers.into_iter().map(|number| number as f32).collect())
+    let flaws = flaw.into_iter().map(|message| Mistake::param(name, message)).collect();
+    let numbers = numbers.into_iter().map(|number| narrow(name, number)).collect();
+    let ((), numbers) = both(none(flaws), numbers)?;
+    Ok(numbers)
 }

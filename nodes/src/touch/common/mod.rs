@@ -25,3 +25,12 @@ pub(crate) fn both<A, B>(a: Result<A, Mistakes>, b: Result<B, Mistakes>) -> Resu
 pub(crate) fn none(mistakes: Mistakes) -> Result<(), Mistakes> {
     if mistakes.is_empty() { Ok(()) } else { Err(mistakes) }
 }
+
+/// Returns the number of a parameter as the value of a tactel.
+pub(crate) fn narrow(param: &str, number: f64) -> Result<f32, Mistakes> {
+    if (number as f32).is_finite() {
+        return Ok(number as f32);
+    }
+    let message = format!("{number:e} is too large for a tactel: images are of 32-bit floats");
+    Err(Mistake::param(param, message).into())
+}

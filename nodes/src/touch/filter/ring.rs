@@ -24,6 +24,10 @@ impl<T: Copy + Default> Ring<T> {
         self.count = (self.count + 1).min(self.samples.len());
     }
 
+    pub(crate) fn clear(&mut self) {
+        self.count = 0;
+    }
+
     /// Removes the oldest samples as long as `is_old` is true of them.
     pub(crate) fn forget(&mut self, is_old: impl Fn(&T) -> bool) {
         while self.count > 0 && is_old(&self.samples[self.oldest()]) {

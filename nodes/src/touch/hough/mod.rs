@@ -1,8 +1,4 @@
 //! `hough`: the line through a contact by the Hough transform (paper section III, its ref. 7, Duda and Hart 1972).
-//!
-//! Offsets are counted from the mean position of the region, so that a shift by a tactel changes no vote. With an offset
-//! step below the pitch, whole rows would vote for one offset and none for the next, and the transform would find the rows
-//! of the pad.
 
 mod votes;
 

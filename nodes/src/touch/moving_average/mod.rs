@@ -107,9 +107,11 @@ impl Node for MovingAverage {
 
     fn step(&self, tick: &Tick, inputs: Inputs<'_>, out: &mut Outputs, state: &mut State) {
         if let Some(window) = self.time {
-            let dt = state.interval.step(&inputs.value, tick);
-            state.now += dt.map_or(0, |dt| (dt * 1e9).round() as i64);
-            state.ring.forget(|(time, _)| dt.is_none() || state.now - time >= window);
+            match state.interval.step(&inputs.value, tick) {
+                Some(dt) => state.now += (dt * 1e9).round() as i64,
+                None => state.ring.clear(),
+            }
+            state.ring.forget(|(time, _)| state.now - time >= window);
         }
         state.ring.push((state.now, self.averaging.vector(*inputs.value)));
         if let Some(mean) = self.averaging.value(mean(&state.ring)) {
