@@ -60,7 +60,7 @@ pub(crate) struct Fused {
     rows: [null_space::Row; 7],
     smooth: [Twist; 2],
     reached: Twist,
-    limited: joint_limit::State,
+    limited: joint_limit::Limiter,
     /// Read off by the bench, so that nothing is optimised away.
     pub(crate) sum: f64,
     pub(crate) peak: f64,
@@ -115,7 +115,7 @@ impl Fused {
             rows: [[0.0; 8]; 7],
             smooth: [Twist::default(); 2],
             reached: Twist::default(),
-            limited: joint_limit::State::of(7),
+            limited: joint_limit::Limiter::new(7),
             sum: 0.0,
             peak: 0.0,
             shape,
@@ -216,7 +216,7 @@ impl Fused {
 
     /// From the region to the twist of the sensor (eqs. 1-3 and 5).
     fn servo(&mut self, dt: f64) -> (Twist, bool) {
-        let sums = moments::add_up(&self.image, &self.region);
+        let sums = moments::Weighing::Force.add_up(&self.image, &self.region);
         let pressure = self.pressures.mean([sums.force / sums.area, 0.0])[0];
         let (j, i) = (sums.x / sums.force, sums.y / sums.force);
         let (x, y) = (self.shape.x(sums.first[1] + j), self.shape.y(sums.first[0] + i));

@@ -1,11 +1,10 @@
-//! Jacobian and pose come from one pass over the chain, see [`Chain`].
+//! `arm_state`: the pose of the sensor and the Jacobian, in one pass over the chain, see [`Chain`].
 
-use tactflow_runtime::node::{
-    Describe, FilePath, In, Inputs, Mistake, Mistakes, Node, Out, Outputs, Param, Setup, Tick,
-};
+use tactflow_runtime::node::{Describe, FilePath, In, Inputs, Mistakes, Node, Out, Outputs, Param, Setup, Tick};
 use tactflow_runtime::signal::{Jacobian, JacobianShape, Joints, JointsShape, Pose, PoseShape, Unit};
 
 use super::chain::Chain;
+use super::joint_names::check_joints;
 use super::model::load;
 use super::mount::Mount;
 
@@ -84,7 +83,7 @@ impl Node for ArmState {
     fn new(params: Params, setup: &mut Setup<Self>) -> Result<Self, Mistakes> {
         let chain = load(&params.urdf, &params.tip, &params.mount)?;
         let joints = JointsShape { joints: chain.joints().to_vec(), unit: Unit::RADIAN };
-        check_joints(&names(&setup.inputs.position), &names(&joints))?;
+        check_joints(&setup.inputs.position, &joints)?;
         setup.outputs.sensor_pose = PoseShape;
         setup.outputs.jacobian = JacobianShape(joints.clone());
         setup.outputs.joints = joints;
@@ -99,23 +98,6 @@ impl Node for ArmState {
         out.sensor_pose.set(pose);
         out.joints.write().0.copy_from_slice(q);
     }
-}
-
-fn names(shape: &JointsShape) -> Vec<&str> {
-    shape.joints.iter().map(|joint| joint.name.as_str()).collect()
-}
-
-/// Checks that the joints of the wire are those of the model. The mistake marks `position`.
-fn check_joints(wire: &[&str], model: &[&str]) -> Result<(), Mistakes> {
-    let message = match wire.iter().zip(model).find(|(wire, model)| wire != model) {
-        _ if wire.len() != model.len() => {
-            format!("the wire has {} joints, but the model has {} up to the tip", wire.len(), model.len())
-        }
-        Some((wire, model)) => format!("the wire has joint `{wire}` where the model has `{model}`"),
-        None => return Ok(()),
-    };
-    let help = format!("the model's joints are `{}`", model.join("`, `"));
-    Err(Mistake::input("position", message).help(help).into())
 }
 
 #[cfg(test)]

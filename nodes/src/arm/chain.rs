@@ -47,12 +47,13 @@ struct PreparedSegment {
     offset: [f64; 3],
     turn: Option<[[f64; 3]; 3]>,
     motion: JointKind,
-    axis: Axis,
+    axis: FrameAxis,
     sign: f64,
 }
 
+/// An axis of a frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Axis {
+enum FrameAxis {
     X,
     Y,
     Z,
@@ -120,11 +121,11 @@ impl Chain {
 }
 
 /// Returns the frame axis that `axis` lies on, its sign and the identity; or z, 1 and a rotation that takes z to `axis`.
-fn own_axis(axis: &Vector3<f64>) -> (Axis, f64, Rotation3<f64>) {
+fn own_axis(axis: &Vector3<f64>) -> (FrameAxis, f64, Rotation3<f64>) {
     let own = match [axis.x != 0.0, axis.y != 0.0, axis.z != 0.0] {
-        [true, false, false] => Some((Axis::X, axis.x)),
-        [false, true, false] => Some((Axis::Y, axis.y)),
-        [false, false, true] => Some((Axis::Z, axis.z)),
+        [true, false, false] => Some((FrameAxis::X, axis.x)),
+        [false, true, false] => Some((FrameAxis::Y, axis.y)),
+        [false, false, true] => Some((FrameAxis::Z, axis.z)),
         _ => None,
     };
     if let Some((own, along)) = own {
@@ -140,7 +141,7 @@ fn own_axis(axis: &Vector3<f64>) -> (Axis, f64, Rotation3<f64>) {
     };
     let y = axis.cross(&away).normalize();
     let basis = Matrix3::from_columns(&[y.cross(axis), y, *axis]);
-    (Axis::Z, 1.0, Rotation3::from_matrix_unchecked(basis))
+    (FrameAxis::Z, 1.0, Rotation3::from_matrix_unchecked(basis))
 }
 
 #[inline]
@@ -169,18 +170,18 @@ fn times(m: &Columns, v: [f64; 3]) -> [f64; 3] {
 
 /// Returns `m` rotated about one of its own axes.
 #[inline]
-fn turned([x, y, z]: Columns, axis: Axis, sin: f64, cos: f64) -> Columns {
+fn turned([x, y, z]: Columns, axis: FrameAxis, sin: f64, cos: f64) -> Columns {
     let mix = |a: [f64; 3], b: [f64; 3]| (plus(scaled(a, cos), scaled(b, sin)), plus(scaled(b, cos), scaled(a, -sin)));
     match axis {
-        Axis::X => {
+        FrameAxis::X => {
             let (y, z) = mix(y, z);
             [x, y, z]
         }
-        Axis::Y => {
+        FrameAxis::Y => {
             let (z, x) = mix(z, x);
             [x, y, z]
         }
-        Axis::Z => {
+        FrameAxis::Z => {
             let (x, y) = mix(x, y);
             [x, y, z]
         }
@@ -266,7 +267,7 @@ mod tests {
         for axis in [[1.0, 2.0, 3.0], [3.0, -1.0, 2.0], [1e-9, 1.0, 0.0], [-1.0, -1.0, -1.0]] {
             let axis = Vector3::from(axis).normalize();
             let (own, sign, basis) = own_axis(&axis);
-            assert_eq!((own, sign), (Axis::Z, 1.0));
+            assert_eq!((own, sign), (FrameAxis::Z, 1.0));
             assert!((basis * Vector3::z() - axis).norm() < 1e-15);
             assert!((basis.matrix().determinant() - 1.0).abs() < 1e-14);
         }

@@ -1,4 +1,4 @@
-//! The pose is sampled: a pose that changes while the contact is held makes no point.
+//! `contact_point`: the contact in the base. The pose is sampled: a pose that changes while the contact is held makes no point.
 
 use nalgebra::{IsometryMatrix3, Translation3};
 use tactflow_runtime::node::{Describe, In, Inputs, Mistakes, Node, Out, Outputs, Param, Setup, Tick};

@@ -1,4 +1,4 @@
-//! Each step has four parts:
+//! `ik_sink`: joint velocities for a twist. Each step has four parts:
 //!
 //! 1. Twist and Jacobian are moved from the origin of the base to that of the sensor, along its axes (Ad of the inverse
 //!    pose, eq. 4). Damping depends on the frame, so it is done in the frame of the task.
@@ -13,6 +13,7 @@ use tactflow_runtime::node::{
 };
 use tactflow_runtime::signal::{Jacobian, Joint, Joints, JointsShape, Pose, Scalar, ScalarShape, Twist, Unit};
 
+use super::joint_names::names;
 use super::{damped, joint_limits, null_space};
 
 /// Moves the arm: computes joint velocities for a twist, within the limits of the arm.
@@ -43,9 +44,7 @@ use super::{damped, joint_limits, null_space};
 pub struct IkSink {
     /// With their limits.
     joints: Vec<Joint>,
-    damping: f64,
-    posture: Option<Vec<f64>>,
-    posture_gain: f64,
+    params: Params,
     limit_gain: f64,
 }
 
@@ -117,19 +116,11 @@ impl Node for IkSink {
 
     fn new(params: Params, setup: &mut Setup<Self>) -> Result<Self, Mistakes> {
         let shape = &setup.inputs.joints;
-        let mistakes = check(&params, shape, &setup.inputs.jacobian.0, setup.period);
-        if !mistakes.is_empty() {
-            return Err(mistakes);
-        }
+        check(&params, shape, &setup.inputs.jacobian.0, setup.period)?;
         setup.outputs.velocity = shape.in_unit(Unit::RADIAN.per_second());
         setup.outputs.share = ScalarShape::of(Unit::ONE).within(0.0, 1.0);
-        Ok(Self {
-            joints: shape.joints.clone(),
-            damping: params.damping,
-            posture: params.posture,
-            posture_gain: params.posture_gain,
-            limit_gain: params.limit_gain.unwrap_or(max_limit_gain(setup.period).min(5.0)),
-        })
+        let limit_gain = params.limit_gain.unwrap_or(max_limit_gain(setup.period).min(5.0));
+        Ok(Self { joints: shape.joints.clone(), params, limit_gain })
     }
 
     fn state(&self) -> State {
@@ -145,11 +136,11 @@ impl Node for IkSink {
         for (column, of_base) in state.columns.iter_mut().zip(&inputs.jacobian.0) {
             *column = at_sensor(&pose, of_base);
         }
-        damped::solve(&state.columns, &at_sensor(&pose, &inputs.twist), self.damping, velocity);
+        damped::solve(&state.columns, &at_sensor(&pose, &inputs.twist), self.params.damping, velocity);
         out.share.set(joint_limits::limit(&self.joints, q, self.limit_gain, velocity));
-        if let Some(posture) = &self.posture {
+        if let Some(posture) = &self.params.posture {
             for ((drift, posture), q) in state.drift.iter_mut().zip(posture).zip(q) {
-                *drift = self.posture_gain * (posture - q);
+                *drift = self.params.posture_gain * (posture - q);
             }
             null_space::project(&state.columns, &mut state.rows, &mut state.drift);
             joint_limits::add_within(&self.joints, q, self.limit_gain, velocity, &state.drift);
@@ -174,9 +165,8 @@ fn max_limit_gain(period: f64) -> f64 {
 }
 
 /// Checks the parameters against the arm and the period of the graph [s].
-fn check(params: &Params, joints: &JointsShape, columns: &JointsShape, period: f64) -> Mistakes {
+fn check(params: &Params, joints: &JointsShape, columns: &JointsShape, period: f64) -> Result<(), Mistakes> {
     let mut mistakes = Mistakes::new();
-    let names = |shape: &JointsShape| shape.joints.iter().map(|joint| joint.name.clone()).collect::<Vec<_>>();
     if names(joints) != names(columns) {
         let message = format!("the Jacobian has the joints {:?}, but `joints` has {:?}", names(columns), names(joints));
         mistakes.push(Mistake::input("jacobian", message).help("take both from one `arm_state`"));
@@ -190,20 +180,19 @@ fn check(params: &Params, joints: &JointsShape, columns: &JointsShape, period: f
         let message = format!("a joint could cross its limit: `limit_gain` is more than {max} 1/s");
         mistakes.push(Mistake::param("limit_gain", message).help("the maximum is half the rate of the graph"));
     }
-    let Some(posture) = &params.posture else { return mistakes };
+    let posture = params.posture.as_deref();
     let count = joints.joints.len();
-    if posture.len() != count {
-        let message = format!("`posture` has {} entries, but the arm has {count} joints", posture.len());
+    if let Some(entries) = posture.map(<[f64]>::len).filter(|entries| *entries != count) {
+        let message = format!("`posture` has {entries} entries, but the arm has {count} joints");
         mistakes.push(Mistake::param("posture", message));
     }
-    for (joint, entry) in joints.joints.iter().zip(posture) {
-        if !(joint.lower..=joint.upper).contains(entry) {
-            let Joint { name, lower, upper, .. } = joint;
+    for (Joint { name, lower, upper, .. }, entry) in joints.joints.iter().zip(posture.unwrap_or_default()) {
+        if !(lower..=upper).contains(&entry) {
             let message = format!("joint `{name}` cannot be at {entry}: it goes from {lower:.4} to {upper:.4}");
             mistakes.push(Mistake::param("posture", message));
         }
     }
-    mistakes
+    if mistakes.is_empty() { Ok(()) } else { Err(mistakes) }
 }
 
 #[cfg(test)]

@@ -6,6 +6,7 @@ pub mod contact_point;
 pub mod damped;
 pub mod ik_sink;
 pub mod joint_limits;
+mod joint_names;
 pub mod model;
 pub mod mount;
 pub mod null_space;

@@ -10,33 +10,13 @@ use std::collections::BTreeMap;
 use nalgebra::{IsometryMatrix3, Vector3};
 use tactflow_runtime::node::{FilePath, Mistake, Mistakes};
 use tactflow_runtime::signal::Joint;
-use urdf_rs::JointType;
+use urdf_rs::{JointType, Robot};
 
 use super::chain::{Chain, ChainSegment, JointKind};
 use super::mount::{Mount, pose_of};
 
 /// Position limit of a joint without one [rad; m for a prismatic joint].
 pub const UNBOUNDED: f64 = 1e9;
-
-/// An error in a robot model.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct ModelError {
-    /// Description of the error.
-    pub message: String,
-    /// Place of the error.
-    pub at: ModelPlace,
-}
-
-/// The place of an error in a robot model.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub enum ModelPlace {
-    /// The model as a whole.
-    Model,
-    /// The joint or link of that name.
-    Name(String),
-    /// The name of the tip, which the graph gives and not the model.
-    Tip,
-}
 
 /// Reads the chain from the root of a URDF file to the sensor on its link `tip`, for a node or a device with the
 /// parameters `urdf`, `tip` and `mount`.
@@ -50,123 +30,122 @@ pub fn load(urdf: &FilePath, tip: &str, mount: &Mount) -> Result<Chain, Mistakes
         let at = error.valid_up_to();
         Mistake::data(urdf, &*text, at..at + 3, "this is not UTF-8 text")
     })?;
-    chain_of(text, tip, mount).map_err(|error| {
-        let mistake = match error.at {
-            ModelPlace::Tip => Mistake::param("tip", error.message),
-            ModelPlace::Model => Mistake::data(urdf, text, 0..0, error.message),
-            ModelPlace::Name(name) => Mistake::data(urdf, text, find(text, &name), error.message),
-        };
-        mistake.into()
-    })
-}
-
-/// Returns the chain from the root of a URDF text to the sensor on its link `tip`.
-///
-/// # Errors
-/// If the text is not a URDF, or not a serial chain up to `tip`.
-pub fn chain_of(text: &str, tip: &str, mount: &Mount) -> Result<Chain, ModelError> {
     let robot = urdf_rs::read_from_string(text)
-        .map_err(|error| error_at(ModelPlace::Model, format!("not a URDF: {}", one_line(&error.to_string()))))?;
-    let mut segments = Vec::new();
-    let mut fixed = IsometryMatrix3::identity();
-    for joint in path_to(&robot, tip)? {
-        fixed *= origin_of(joint)?;
-        if joint.joint_type == JointType::Fixed {
-            continue;
-        }
-        let segment = segment_of(joint, fixed)?;
-        if segments.iter().any(|other: &ChainSegment| other.joint.name == joint.name) {
-            return Err(error_at(named(joint), format!("two joints have the name `{}`", joint.name)));
-        }
-        segments.push(segment);
-        fixed = IsometryMatrix3::identity();
-    }
-    if segments.is_empty() {
-        return Err(error_at(ModelPlace::Tip, format!("no joint moves between the root and `{tip}`")));
-    }
-    Ok(Chain::new(segments, fixed * mount.pose()))
+        .map_err(|error| Mistake::data(urdf, text, 0..0, format!("not a URDF: {}", one_line(&error.to_string()))))?;
+    Ok(Model { file: urdf, text, robot }.chain(tip, mount)?)
 }
 
-/// Returns the joints from the root to the link `tip`.
-fn path_to<'r>(robot: &'r urdf_rs::Robot, tip: &str) -> Result<Vec<&'r urdf_rs::Joint>, ModelError> {
-    let is_link = |name: &str| robot.links.iter().any(|link| link.name == name);
-    if !is_link(tip) {
-        let links: Vec<String> = robot.links.iter().map(|link| format!("`{}`", link.name)).collect();
-        return Err(error_at(ModelPlace::Tip, format!("the model has no link `{tip}`; it has {}", links.join(", "))));
-    }
-    let mut above = BTreeMap::new();
-    for joint in &robot.joints {
-        if let Some(link) = [&joint.parent.link, &joint.child.link].into_iter().find(|link| !is_link(link)) {
-            let message = format!("joint `{}` refers to link `{link}`, which the model does not have", joint.name);
-            return Err(error_at(named(joint), message));
-        }
-        if above.insert(joint.child.link.as_str(), joint).is_some() {
-            let message = format!("link `{}` is the child of two joints", joint.child.link);
-            return Err(error_at(ModelPlace::Name(joint.child.link.clone()), message));
-        }
-    }
-    let mut path = Vec::new();
-    let mut link = tip;
-    while let Some(joint) = above.get(link) {
-        if path.len() == robot.joints.len() {
-            return Err(error_at(ModelPlace::Name(link.into()), format!("the joints above link `{tip}` form a cycle")));
-        }
-        path.push(*joint);
-        link = &joint.parent.link;
-    }
-    path.reverse();
-    Ok(path)
+/// A robot model, and the file that it was read from.
+struct Model<'m> {
+    file: &'m FilePath,
+    text: &'m str,
+    robot: Robot,
 }
 
-fn segment_of(joint: &urdf_rs::Joint, fixed: IsometryMatrix3<f64>) -> Result<ChainSegment, ModelError> {
-    let bad = |what: &str| Err(error_at(named(joint), format!("joint `{}` {what}", joint.name)));
-    let motion = match joint.joint_type {
-        JointType::Revolute | JointType::Continuous => JointKind::Revolute,
-        JointType::Prismatic => JointKind::Prismatic,
-        JointType::Floating => {
-            return bad("is floating, but a serial chain has only revolute, continuous, prismatic and fixed joints");
+impl Model<'_> {
+    /// Returns a mistake at the declaration of a joint or a link.
+    fn mistake(&self, name: &str, message: String) -> Mistake {
+        Mistake::data(self.file, self.text, find(self.text, name), message)
+    }
+
+    /// Returns the chain from the root to the sensor on the link `tip`.
+    fn chain(&self, tip: &str, mount: &Mount) -> Result<Chain, Mistake> {
+        let mut segments = Vec::new();
+        let mut fixed = IsometryMatrix3::identity();
+        for joint in self.path_to(tip)? {
+            fixed *= self.origin_of(joint)?;
+            if joint.joint_type == JointType::Fixed {
+                continue;
+            }
+            let segment = self.segment_of(joint, fixed)?;
+            if segments.iter().any(|other: &ChainSegment| other.joint.name == joint.name) {
+                return Err(self.mistake(&joint.name, format!("two joints have the name `{}`", joint.name)));
+            }
+            segments.push(segment);
+            fixed = IsometryMatrix3::identity();
         }
-        JointType::Planar => {
-            return bad("is planar, but a serial chain has only revolute, continuous, prismatic and fixed joints");
+        if segments.is_empty() {
+            return Err(Mistake::param("tip", format!("no joint moves between the root and `{tip}`")));
         }
-        _ => return bad("has a type that is not supported"),
-    };
-    if joint.mimic.is_some() {
-        return bad("mimics another joint, which is not supported");
+        Ok(Chain::new(segments, fixed * mount.pose()))
     }
-    let axis = Vector3::from(joint.axis.xyz.0);
-    if !(axis.norm() > 1e-6 && axis.norm().is_finite()) {
-        return bad("has no axis");
-    }
-    let limit = &joint.limit;
-    let (lower, upper) = match joint.joint_type {
-        JointType::Continuous => (-UNBOUNDED, UNBOUNDED),
-        _ => (limit.lower.max(-UNBOUNDED), limit.upper.min(UNBOUNDED)),
-    };
-    if limit.lower.is_nan() || limit.upper.is_nan() || lower >= upper {
-        return bad("has no range: `<limit>` needs a `lower` that is less than its `upper`");
-    }
-    if !(limit.velocity > 0.0 && limit.velocity.is_finite()) {
-        return bad("has no speed limit: `<limit>` needs a `velocity` greater than 0");
-    }
-    let joint = Joint { name: joint.name.clone(), lower, upper, speed: limit.velocity, ..Joint::default() };
-    Ok(ChainSegment { fixed, axis: axis.normalize(), motion, joint })
-}
 
-fn origin_of(joint: &urdf_rs::Joint) -> Result<IsometryMatrix3<f64>, ModelError> {
-    let (xyz, rpy) = (joint.origin.xyz.0, joint.origin.rpy.0);
-    if xyz.iter().chain(&rpy).any(|number| !number.is_finite()) {
-        return Err(error_at(named(joint), format!("the origin of joint `{}` is not finite", joint.name)));
+    /// Returns the joints from the root to the link `tip`.
+    fn path_to(&self, tip: &str) -> Result<Vec<&urdf_rs::Joint>, Mistake> {
+        let robot = &self.robot;
+        let is_link = |name: &str| robot.links.iter().any(|link| link.name == name);
+        if !is_link(tip) {
+            let links: Vec<String> = robot.links.iter().map(|link| format!("`{}`", link.name)).collect();
+            return Err(Mistake::param("tip", format!("the model has no link `{tip}`; it has {}", links.join(", "))));
+        }
+        let mut above = BTreeMap::new();
+        for joint in &robot.joints {
+            if let Some(link) = [&joint.parent.link, &joint.child.link].into_iter().find(|link| !is_link(link)) {
+                let message = format!("joint `{}` refers to link `{link}`, which the model does not have", joint.name);
+                return Err(self.mistake(&joint.name, message));
+            }
+            if above.insert(joint.child.link.as_str(), joint).is_some() {
+                let message = format!("link `{}` is the child of two joints", joint.child.link);
+                return Err(self.mistake(&joint.child.link, message));
+            }
+        }
+        let mut path = Vec::new();
+        let mut link = tip;
+        while let Some(joint) = above.get(link) {
+            if path.len() == robot.joints.len() {
+                return Err(self.mistake(link, format!("the joints above link `{tip}` form a cycle")));
+            }
+            path.push(*joint);
+            link = &joint.parent.link;
+        }
+        path.reverse();
+        Ok(path)
     }
-    Ok(pose_of(xyz, rpy))
-}
 
-fn error_at(at: ModelPlace, message: String) -> ModelError {
-    ModelError { message, at }
-}
+    fn segment_of(&self, joint: &urdf_rs::Joint, fixed: IsometryMatrix3<f64>) -> Result<ChainSegment, Mistake> {
+        let bad = |what: &str| Err(self.mistake(&joint.name, format!("joint `{}` {what}", joint.name)));
+        let motion = match joint.joint_type {
+            JointType::Revolute | JointType::Continuous => JointKind::Revolute,
+            JointType::Prismatic => JointKind::Prismatic,
+            JointType::Floating => {
+                return bad(
+                    "is floating, but a serial chain has only revolute, continuous, prismatic and fixed joints",
+                );
+            }
+            JointType::Planar => {
+                return bad("is planar, but a serial chain has only revolute, continuous, prismatic and fixed joints");
+            }
+            _ => return bad("has a type that is not supported"),
+        };
+        if joint.mimic.is_some() {
+            return bad("mimics another joint, which is not supported");
+        }
+        let axis = Vector3::from(joint.axis.xyz.0);
+        if !(axis.norm() > 1e-6 && axis.norm().is_finite()) {
+            return bad("has no axis");
+        }
+        let limit = &joint.limit;
+        let (lower, upper) = match joint.joint_type {
+            JointType::Continuous => (-UNBOUNDED, UNBOUNDED),
+            _ => (limit.lower.max(-UNBOUNDED), limit.upper.min(UNBOUNDED)),
+        };
+        if limit.lower.is_nan() || limit.upper.is_nan() || lower >= upper {
+            return bad("has no range: `<limit>` needs a `lower` that is less than its `upper`");
+        }
+        if !(limit.velocity > 0.0 && limit.velocity.is_finite()) {
+            return bad("has no speed limit: `<limit>` needs a `velocity` greater than 0");
+        }
+        let joint = Joint { name: joint.name.clone(), lower, upper, speed: limit.velocity, ..Joint::default() };
+        Ok(ChainSegment { fixed, axis: axis.normalize(), motion, joint })
+    }
 
-fn named(joint: &urdf_rs::Joint) -> ModelPlace {
-    ModelPlace::Name(joint.name.clone())
+    fn origin_of(&self, joint: &urdf_rs::Joint) -> Result<IsometryMatrix3<f64>, Mistake> {
+        let (xyz, rpy) = (joint.origin.xyz.0, joint.origin.rpy.0);
+        if xyz.iter().chain(&rpy).any(|number| !number.is_finite()) {
+            return Err(self.mistake(&joint.name, format!("the origin of joint `{}` is not finite", joint.name)));
+        }
+        Ok(pose_of(xyz, rpy))
+    }
 }
 
 fn one_line(text: &str) -> String {
@@ -191,6 +170,11 @@ mod tests {
 
     fn file(path: &str) -> FilePath {
         FilePath { path: path.into(), span: 3..7, builtin: None }
+    }
+
+    fn load_text(text: &str, tip: &str, mount: &Mount) -> Result<Chain, Mistakes> {
+        let bytes = Some(&*text.as_bytes().to_vec().leak());
+        load(&FilePath { builtin: bytes, ..file("gantry.urdf") }, tip, mount)
     }
 
     #[test]
@@ -223,7 +207,7 @@ mod tests {
     #[test]
     fn prismatic_and_fixed_joints_and_a_mount() {
         let mount = Mount { xyz: [0.1, 0.0, 0.0], rpy: [0.0; 3] };
-        let chain = chain_of(GANTRY, "hand", &mount).unwrap();
+        let chain = load_text(GANTRY, "hand", &mount).unwrap();
         let mut columns = [Twist::default(); 2];
         let place = chain.forward(&[0.25, 90f64.to_radians()], &mut columns).0.translation.vector;
         // The post turns x into y, the hand turns it on into -x.
@@ -236,57 +220,56 @@ mod tests {
 
     #[test]
     fn every_bad_model_gives_its_message_and_place() {
-        let joint = |name: &str| ModelPlace::Name(name.into());
+        // The place is the text that is marked in the model, or the parameter.
         let edits = [
-            ("<robot", "<bot", "hand", ModelPlace::Model, "not a URDF: "),
-            ("velocity=\"0.2\"", "", "hand", ModelPlace::Model, "not a URDF: "),
-            ("2 0 0", "2 0", "hand", ModelPlace::Model, "not a URDF: "),
+            ("<robot", "<bot", "hand", "", "not a URDF: "),
+            ("velocity=\"0.2\"", "", "hand", "", "not a URDF: "),
+            ("2 0 0", "2 0", "hand", "", "not a URDF: "),
             (
                 "",
                 "",
                 "claw",
-                ModelPlace::Tip,
+                "param tip",
                 "the model has no link `claw`; it has `root`, `post`, `sled`, `hand`, `spare`",
             ),
-            ("", "", "spare", ModelPlace::Tip, "no joint moves between the root and `spare`"),
-            ("", "", "post", ModelPlace::Tip, "no joint moves between the root and `post`"),
-            ("prismatic", "planar", "hand", joint("slide"), "joint `slide` is planar"),
-            ("continuous", "floating", "hand", joint("spin"), "joint `spin` is floating"),
-            ("2 0 0", "0 0 0", "hand", joint("slide"), "joint `slide` has no axis"),
-            ("0.5", "0", "hand", joint("slide"), "joint `slide` has no range"),
-            ("0.5", "nan", "hand", joint("slide"), "joint `slide` has no range"),
-            ("0.2", "0", "hand", joint("slide"), "joint `slide` has no speed limit"),
-            ("0.2", "inf", "hand", joint("slide"), "joint `slide` has no speed limit"),
-            ("<limit effort=\"1\" velocity=\"3\"/>", "", "hand", joint("spin"), "joint `spin` has no speed limit"),
-            ("0 0 1\" rpy", "0 0 inf\" rpy", "hand", joint("up"), "the origin of joint `up` is not finite"),
+            ("", "", "spare", "param tip", "no joint moves between the root and `spare`"),
+            ("", "", "post", "param tip", "no joint moves between the root and `post`"),
+            ("prismatic", "planar", "hand", "slide", "joint `slide` is planar"),
+            ("continuous", "floating", "hand", "spin", "joint `spin` is floating"),
+            ("2 0 0", "0 0 0", "hand", "slide", "joint `slide` has no axis"),
+            ("0.5", "0", "hand", "slide", "joint `slide` has no range"),
+            ("0.5", "nan", "hand", "slide", "joint `slide` has no range"),
+            ("0.2", "0", "hand", "slide", "joint `slide` has no speed limit"),
+            ("0.2", "inf", "hand", "slide", "joint `slide` has no speed limit"),
+            ("<limit effort=\"1\" velocity=\"3\"/>", "", "hand", "spin", "joint `spin` has no speed limit"),
+            ("0 0 1\" rpy", "0 0 inf\" rpy", "hand", "up", "the origin of joint `up` is not finite"),
             (
                 "link=\"post\"/><child link=\"sled\"",
                 "link=\"pole\"/><child link=\"sled\"",
                 "hand",
-                joint("slide"),
+                "slide",
                 "joint `slide` refers to link `pole`",
             ),
-            (
-                "child link=\"post\"",
-                "child link=\"hand\"",
-                "hand",
-                joint("hand"),
-                "link `hand` is the child of two joints",
-            ),
+            ("child link=\"post\"", "child link=\"hand\"", "hand", "hand", "link `hand` is the child of two joints"),
             (
                 "parent link=\"root\"",
                 "parent link=\"hand\"",
                 "hand",
-                joint("hand"),
+                "hand",
                 "the joints above link `hand` form a cycle",
             ),
-            ("name=\"spin\"", "name=\"slide\"", "hand", joint("slide"), "two joints have the name `slide`"),
-            ("<axis xyz=\"0 0 1\"/>", "<mimic joint=\"slide\"/>", "hand", joint("spin"), "joint `spin` mimics"),
+            ("name=\"spin\"", "name=\"slide\"", "hand", "slide", "two joints have the name `slide`"),
+            ("<axis xyz=\"0 0 1\"/>", "<mimic joint=\"slide\"/>", "hand", "spin", "joint `spin` mimics"),
         ];
         for (from, to, tip, at, message) in edits {
             assert!(GANTRY.contains(from));
-            let error = chain_of(&GANTRY.replacen(from, to, 1), tip, &Mount::NONE).expect_err(message);
-            assert!(error.message.starts_with(message) && error.at == at, "{from} -> {to}: {error:?}");
+            let mistake = &load_text(&GANTRY.replacen(from, to, 1), tip, &Mount::NONE).expect_err(message)[0];
+            let place = match &mistake.at {
+                At::Data { text, span, .. } => text[span.clone()].to_owned(),
+                At::Param(name) => format!("param {name}"),
+                other => panic!("{other:?}"),
+            };
+            assert!(mistake.message.starts_with(message) && place == at, "{from} -> {to}: {mistake:?}");
         }
     }
 

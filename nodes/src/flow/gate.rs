@@ -5,8 +5,10 @@
 
 use std::marker::PhantomData;
 
-use tactflow_runtime::node::{Describe, In, Inputs, Mistakes, Node, Out, Outputs, Setup, State, Tick};
+use tactflow_runtime::node::{Describe, In, Inputs, Mistakes, Node, Out, Outputs, Setup, Tick};
 use tactflow_runtime::signal::{Flag, Scalar, Signal, Twist};
+
+use super::passing::State;
 
 /// Lets a signal pass only while a flag is set.
 ///
@@ -58,13 +60,6 @@ pub struct Outputs<T: Signal> {
     value: Out<T>,
 }
 
-/// What a gate remembers.
-#[derive(State)]
-pub struct State {
-    /// Whether it was open in the last step.
-    was_open: bool,
-}
-
 impl<T: Signal> Node for Gate<T>
 where
     Self: Describe,
@@ -80,17 +75,13 @@ where
     }
 
     fn state(&self) -> State {
-        State { was_open: false }
+        State::default()
     }
 
     fn step(&self, _: &Tick, inputs: Inputs<'_, T>, out: &mut Outputs<T>, state: &mut State) {
         let is_open = inputs.gate.is_some_and(|gate| *gate);
-        let was_open = std::mem::replace(&mut state.was_open, is_open);
-        if is_open && (inputs.value.is_new() || !was_open) {
-            out.value.copy_from(&inputs.value);
-        } else if is_open {
-            out.value.keep();
-        }
+        let value = is_open.then_some(&*inputs.value);
+        state.pass(is_open.then_some(true), value, inputs.value.is_new(), &mut out.value);
     }
 }
 

@@ -5,6 +5,7 @@
 pub mod contact_debounce;
 pub mod delay;
 pub mod gate;
+mod passing;
 pub mod probe;
 pub mod signal_generator;
 pub mod switch;

@@ -1,11 +1,11 @@
-//! `switch` and `twist_switch`: one implementation for both kinds.
-//!
-//! The state holds the selection of the last step, so that the output is new when the selection changes.
+//! `switch` and `twist_switch`: one implementation for both kinds. The output is new when the selection changes.
 
 use std::marker::PhantomData;
 
-use tactflow_runtime::node::{Describe, In, Inputs, Mistakes, Node, Out, Outputs, Setup, State, Tick};
+use tactflow_runtime::node::{Describe, In, Inputs, Mistakes, Node, Out, Outputs, Setup, Tick};
 use tactflow_runtime::signal::{Flag, Scalar, Signal, Twist};
+
+use super::passing::State;
 
 /// Selects one of two signals by a flag.
 ///
@@ -60,13 +60,6 @@ pub struct Outputs<T: Signal> {
     value: Out<T>,
 }
 
-/// What a switch remembers.
-#[derive(State)]
-pub struct State {
-    /// The selection of the last step, if its input was present.
-    last: Option<bool>,
-}
-
 impl<T: Signal> Node for Switch<T>
 where
     Self: Describe,
@@ -81,18 +74,14 @@ where
     }
 
     fn state(&self) -> State {
-        State { last: None }
+        State::default()
     }
 
     fn step(&self, _: &Tick, inputs: Inputs<'_, T>, out: &mut Outputs<T>, state: &mut State) {
         let select = inputs.select.map(|select| *select);
         let selected = select.and_then(|is_on| if is_on { inputs.on } else { inputs.off });
-        let last = std::mem::replace(&mut state.last, select.filter(|_| selected.is_some()));
-        match selected {
-            Some(selected) if selected.is_new() || last != select => out.value.copy_from(&selected),
-            Some(_) => out.value.keep(),
-            None => {}
-        }
+        let is_new = selected.as_ref().is_some_and(In::is_new);
+        state.pass(select.filter(|_| selected.is_some()), selected.as_deref(), is_new, &mut out.value);
     }
 }
 

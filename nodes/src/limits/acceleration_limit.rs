@@ -4,10 +4,10 @@
 //! allowed motions is convex, so every point between two of its points is in it. When a limit itself moves faster than
 //! the accelerations allow, the output follows it as fast as they allow.
 
-use tactflow_runtime::node::{Describe, In, Inputs, Limits, Mistakes, Node, Out, Outputs, Param, Setup, State, Tick};
+use tactflow_runtime::node::{Describe, In, Limits, Mistakes, Node, Out, Outputs, Param, Setup, State, Tick};
 use tactflow_runtime::signal::{Scalar, Twist};
 
-use super::{fraction, max_age};
+use super::{Inputs, fraction, max_age};
 use crate::motion::bounds::{approach_twist, countable};
 
 /// Limits the acceleration of the sensor, and brings it to rest when there is no motion to follow.
@@ -32,8 +32,7 @@ use crate::motion::bounds::{approach_twist, countable};
 #[derive(Describe)]
 #[describe(name = "acceleration_limit", every_tick)]
 pub struct AccelerationLimit {
-    linear: f64,
-    angular: f64,
+    params: Params,
     /// Maximum age of the motion [ns].
     max_age: i64,
 }
@@ -50,14 +49,6 @@ pub struct Params {
     /// Maximum age of the motion; five periods of the graph if not given.
     #[param(unit = "ms", above = 0.0)]
     max_age_ms: Option<f64>,
-}
-
-/// What `acceleration_limit` reads.
-#[derive(Inputs)]
-pub struct Inputs<'a> {
-    /// The wanted motion; zero while it is absent.
-    #[port(frame = "A")]
-    twist: Option<In<'a, Twist>>,
 }
 
 /// What `acceleration_limit` writes.
@@ -88,8 +79,8 @@ impl Node for AccelerationLimit {
 
     fn new(params: Params, setup: &mut Setup<Self>) -> Result<Self, Mistakes> {
         setup.outputs.acceleration = fraction();
-        let (linear, angular) = (params.linear_m_per_s2, params.angular_rad_per_s2);
-        Ok(Self { linear, angular, max_age: max_age(params.max_age_ms, setup.period) })
+        let max_age = max_age(params.max_age_ms, setup.period);
+        Ok(Self { params, max_age })
     }
 
     fn state(&self) -> State {
@@ -101,7 +92,8 @@ impl Node for AccelerationLimit {
         let wanted = inputs.twist.filter(is_fresh);
         let target = wanted.map_or_else(Twist::default, |twist| countable(&twist));
         let dt = tick.dt.min(tick.max_gap);
-        let scale = approach_twist(&mut state.reached, &target, self.linear * dt, self.angular * dt);
+        let (linear, angular) = (self.params.linear_m_per_s2 * dt, self.params.angular_rad_per_s2 * dt);
+        let scale = approach_twist(&mut state.reached, &target, linear, angular);
         if wanted.is_some() || state.reached != Twist::default() {
             out.twist.set(state.reached);
             out.acceleration.set(scale);

@@ -5,10 +5,10 @@
 //! never changes by more than the accelerations allow, whatever the input does. Once the offset is zero, the output is
 //! the input, to the last bit and without lag. One factor scales all six components of each change.
 
-use tactflow_runtime::node::{Describe, In, Inputs, Limits, Mistakes, Node, Out, Outputs, Param, Setup, State, Tick};
+use tactflow_runtime::node::{Describe, Limits, Mistakes, Node, Out, Outputs, Param, Setup, State, Tick};
 use tactflow_runtime::signal::{Scalar, Twist};
 
-use super::fraction;
+use super::{Inputs, fraction};
 use crate::motion::bounds::{countable, scale_twist, twist_ratio};
 
 /// Removes the jumps of a motion: a switch of modes, a contact found or lost (bumpless transfer).
@@ -34,8 +34,7 @@ use crate::motion::bounds::{countable, scale_twist, twist_ratio};
 #[derive(Describe)]
 #[describe(name = "bumpless", every_tick)]
 pub struct Bumpless {
-    linear: f64,
-    angular: f64,
+    params: Params,
     /// Maximum linear and angular speed of the input [m/s, rad/s].
     speeds: [f64; 2],
 }
@@ -55,14 +54,6 @@ pub struct Params {
     /// Angular speed to which the wanted motion is scaled down; unlimited if not given.
     #[param(unit = "rad/s", above = 0.0)]
     angular_rad_per_s: Option<f64>,
-}
-
-/// What `bumpless` reads.
-#[derive(Inputs)]
-pub struct Inputs<'a> {
-    /// The wanted motion; zero while it is absent.
-    #[port(frame = "A")]
-    twist: Option<In<'a, Twist>>,
 }
 
 /// What `bumpless` writes.
@@ -100,7 +91,7 @@ impl Node for Bumpless {
     fn new(params: Params, setup: &mut Setup<Self>) -> Result<Self, Mistakes> {
         setup.outputs.bumpless = fraction();
         let speeds = [params.linear_m_per_s, params.angular_rad_per_s].map(|speed| speed.unwrap_or(f64::INFINITY));
-        Ok(Self { linear: params.linear_m_per_s2, angular: params.angular_rad_per_s2, speeds })
+        Ok(Self { params, speeds })
     }
 
     fn state(&self) -> State {
@@ -108,19 +99,19 @@ impl Node for Bumpless {
     }
 
     fn step(&self, tick: &Tick, inputs: Inputs<'_>, out: &mut Outputs, state: &mut State) {
+        let Params { linear_m_per_s2: linear, angular_rad_per_s2: angular, .. } = self.params;
         let dt = tick.dt.min(tick.max_gap);
-        let (linear, angular) = (0.5 * self.linear * dt, 0.5 * self.angular * dt);
         // While the runtime holds all commands the motion counts as absent, so it starts from zero afterwards.
         let twist = inputs.twist.filter(|_| !tick.is_halted);
         let mut wanted = twist.map_or_else(Twist::default, |twist| countable(&twist));
         let pace = scale_twist(&wanted, self.speeds[0], self.speeds[1]);
         wanted.0 *= pace;
-        let smooth = smooth(&wanted, &mut state.last, &mut state.offset, [linear, angular]);
+        let smooth = smooth(&wanted, &mut state.last, &mut state.offset, [0.5 * linear * dt, 0.5 * angular * dt]);
         if twist.is_none() && state.offset == Twist::default() {
             return;
         }
         out.twist.set(smooth);
-        let [own, rest] = [&wanted, &state.offset].map(|twist| twist_ratio(twist, self.linear, self.angular));
+        let [own, rest] = [&wanted, &state.offset].map(|twist| twist_ratio(twist, linear, angular));
         out.bumpless.set(pace * if rest > 0.0 { own / (own + rest) } else { 1.0 });
     }
 }

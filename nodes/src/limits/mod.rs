@@ -13,7 +13,16 @@ pub mod workspace_limit;
 #[cfg(test)]
 mod tests;
 
-use tactflow_runtime::signal::{ScalarShape, Unit};
+use tactflow_runtime::node::{In, Inputs};
+use tactflow_runtime::signal::{ScalarShape, Twist, Unit};
+
+/// What a limiter reads that also acts without a motion.
+#[derive(Inputs)]
+pub struct Inputs<'a> {
+    /// The wanted motion; zero while it is absent.
+    #[port(frame = "A")]
+    twist: Option<In<'a, Twist>>,
+}
 
 /// Maximum age of an input in periods of the graph, if the parameter `max_age_ms` is not given.
 const DEFAULT_MAX_AGE_PERIODS: f64 = 5.0;

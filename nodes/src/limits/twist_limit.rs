@@ -22,8 +22,7 @@ use crate::motion::bounds::scale_twist;
 #[derive(Describe)]
 #[describe(name = "twist_limit")]
 pub struct TwistLimit {
-    linear: f64,
-    angular: f64,
+    params: Params,
 }
 
 /// Parameters of `twist_limit`.
@@ -66,13 +65,13 @@ impl Node for TwistLimit {
 
     fn new(params: Params, setup: &mut Setup<Self>) -> Result<Self, Mistakes> {
         setup.outputs.speed = fraction();
-        Ok(Self { linear: params.linear_m_per_s, angular: params.angular_rad_per_s })
+        Ok(Self { params })
     }
 
     fn state(&self) {}
 
     fn step(&self, _: &Tick, inputs: Inputs<'_>, out: &mut Outputs, (): &mut ()) {
-        let scale = scale_twist(&inputs.twist, self.linear, self.angular);
+        let scale = scale_twist(&inputs.twist, self.params.linear_m_per_s, self.params.angular_rad_per_s);
         out.twist.set(Twist(inputs.twist.0 * scale));
         out.speed.set(scale);
     }

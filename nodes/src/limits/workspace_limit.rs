@@ -38,9 +38,7 @@ use crate::motion::braking::stopping_speed;
 #[derive(Describe)]
 #[describe(name = "workspace_limit", every_tick)]
 pub struct WorkspaceLimit {
-    min: [f64; 3],
-    max: [f64; 3],
-    deceleration: f64,
+    params: Params,
     /// Maximum age of the pose [ns].
     max_age: i64,
 }
@@ -94,19 +92,14 @@ impl Node for WorkspaceLimit {
     const LIMITS: Limits = Limits { through: Some("twist"), holds: &["workspace"], breaks: &["acceleration"] };
 
     fn new(params: Params, setup: &mut Setup<Self>) -> Result<Self, Mistakes> {
-        let empty = (0..3).find(|axis| params.min_m[*axis] >= params.max_m[*axis]);
-        if let Some(axis) = empty {
-            let (min, max) = (params.min_m[axis], params.max_m[axis]);
-            let message = format!("the box is empty along {}: from {min} to {max} m", ["x", "y", "z"][axis]);
+        let sides = ["x", "y", "z"].into_iter().zip(params.min_m.into_iter().zip(params.max_m));
+        if let Some((axis, (min, max))) = sides.into_iter().find(|(_, (min, max))| min >= max) {
+            let message = format!("the box is empty along {axis}: from {min} to {max} m");
             return Err(Mistake::param("max_m", message).help("make each entry greater than that of `min_m`").into());
         }
         setup.outputs.workspace = fraction();
-        Ok(Self {
-            min: params.min_m,
-            max: params.max_m,
-            deceleration: params.deceleration_m_per_s2,
-            max_age: max_age(params.max_age_ms, setup.period),
-        })
+        let max_age = max_age(params.max_age_ms, setup.period);
+        Ok(Self { params, max_age })
     }
 
     fn state(&self) {}
@@ -115,9 +108,10 @@ impl Node for WorkspaceLimit {
         if inputs.pose.stamp().age(tick.now) > self.max_age {
             return;
         }
+        let Params { min_m: min, max_m: max, deceleration_m_per_s2: deceleration, .. } = self.params;
         let (twist, pose) = (countable(&inputs.twist), inputs.pose.0);
         let (velocity, position) = (pose.rotation * twist.linear(), pose.translation.vector);
-        let scale = scale(&velocity, &position, [self.min, self.max], self.deceleration, 2.0 * tick.max_gap);
+        let scale = scale(&velocity, &position, [min, max], deceleration, 2.0 * tick.max_gap);
         out.twist.set(Twist(twist.0 * scale));
         out.workspace.set(scale);
     }

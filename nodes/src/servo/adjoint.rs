@@ -1,3 +1,5 @@
+//! `adjoint`: a twist in another frame.
+//!
 //! The twist of a body depends on the point at which it is taken: in the base it is the spatial twist, which matches the
 //! spatial Jacobian and not the Jacobian whose rows are taken at the tip.
 

@@ -1,4 +1,4 @@
-//! All inputs are optional; a node without a wire is a mistake.
+//! `compose_twist`: a twist from scalars. All inputs are optional; a node without a wire is a mistake.
 
 use tactflow_runtime::node::{At, Describe, In, Inputs, Mistake, Mistakes, Node, Out, Outputs, Param, Setup, Tick};
 use tactflow_runtime::signal::{Scalar, Twist};

@@ -1,3 +1,5 @@
+//! `feature_error`: setpoint minus measurement, for every feature.
+//!
 //! Each component keeps the stamp of its own input, so that `pid` measures the time between the samples of a feature.
 
 use tactflow_runtime::node::{
@@ -32,7 +34,7 @@ use crate::motion::axis::wrap_axial;
 #[describe(name = "feature_error")]
 pub struct FeatureError {
     /// One for each wire.
-    targets: Box<[Target]>,
+    setpoints: Box<[Setpoint]>,
     /// Indices of the wires without which the error is absent.
     required: Box<[usize]>,
 }
@@ -65,8 +67,8 @@ pub struct Outputs {
 }
 
 /// What one feature is compared with.
-struct Target {
-    setpoint: f64,
+struct Setpoint {
+    value: f64,
     is_axial: bool,
 }
 
@@ -83,34 +85,34 @@ impl Node for FeatureError {
             return Err(mistake.help("wire each under its name: `in.x = \"touch.x\"`").into());
         }
         let names = || wires.iter().map(|(name, _)| name.as_str());
-        let setpoints = params.setpoint.in_order("setpoint", names());
+        let values = params.setpoint.in_order("setpoint", names());
         let required = indices(&params.requires, names());
-        let (setpoints, required) = match (setpoints, required) {
-            (Ok(setpoints), Ok(required)) => (setpoints, required),
-            (setpoints, required) => {
-                return Err([setpoints.err(), required.err()].into_iter().flatten().flatten().collect());
+        let (values, required) = match (values, required) {
+            (Ok(values), Ok(required)) => (values, required),
+            (values, required) => {
+                return Err([values.err(), required.err()].into_iter().flatten().flatten().collect());
             }
         };
-        let target = |(setpoint, (_, shape)): (&f64, &(String, ScalarShape))| Target {
-            setpoint: *setpoint,
+        let setpoint = |(value, (_, shape)): (&f64, &(String, ScalarShape))| Setpoint {
+            value: *value,
             is_axial: shape.unit.is_axial(),
         };
-        let targets = setpoints.into_iter().zip(wires).map(target).collect();
+        let setpoints = values.into_iter().zip(wires).map(setpoint).collect();
         let feature = |(name, shape): &(String, ScalarShape)| Feature { name: name.clone(), unit: shape.unit };
         setup.outputs.error = FeaturesShape { features: wires.iter().map(feature).collect() };
-        Ok(Self { targets, required })
+        Ok(Self { setpoints, required })
     }
 
     fn state(&self) {}
 
     fn step(&self, _: &Tick, inputs: Inputs<'_>, out: &mut Outputs, (): &mut ()) {
         let is_complete = self.required.iter().all(|i| inputs.feature.get(*i).is_some());
-        for (i, (target, measured)) in self.targets.iter().zip(inputs.feature.iter()).enumerate() {
+        for (i, (setpoint, measured)) in self.setpoints.iter().zip(inputs.feature.iter()).enumerate() {
             match measured.filter(|_| is_complete) {
                 // When a required feature returns, a held input sets its component again, with the stamp that it had.
                 // That is no second sample: no time passes between equal stamps.
                 Some(measured) if measured.is_new() || out.error.write().components()[i].get().is_none() => {
-                    out.error.set_from(i, difference(target, *measured), &measured);
+                    out.error.set_from(i, setpoint.error(*measured), &measured);
                 }
                 Some(_) => {}
                 None => out.error.lose(i),
@@ -119,10 +121,12 @@ impl Node for FeatureError {
     }
 }
 
-/// Returns the setpoint minus the measurement; for an axis, wrapped into (-pi/2, pi/2].
-fn difference(target: &Target, measured: f64) -> f64 {
-    let error = target.setpoint - measured;
-    if target.is_axial { wrap_axial(error) } else { error }
+impl Setpoint {
+    /// Returns the setpoint minus the measurement; for an axis, wrapped into (-pi/2, pi/2].
+    fn error(&self, measured: f64) -> f64 {
+        let error = self.value - measured;
+        if self.is_axial { wrap_axial(error) } else { error }
+    }
 }
 
 /// Returns the index in `names` of each name in `required`.

@@ -1,4 +1,4 @@
-//! The columns are parameters because conventions of signs differ between sensors.
+//! `inverse_jacobian`: the sum of column times control. The columns are parameters, as signs differ between sensors.
 //!
 //! The rolling entries (wx of y, wy of x) need opposite signs. With equal signs, as eq. 5 of the paper prints them, the
 //! contact is lost.
@@ -67,8 +67,7 @@ impl Node for InverseJacobian {
     type State = ();
 
     fn new(params: Params, setup: &mut Setup<Self>) -> Result<Self, Mistakes> {
-        let names = setup.inputs.control.features.iter().map(|feature| feature.name.as_str());
-        let columns = params.columns.in_order("columns", names)?;
+        let columns = params.columns.in_order("columns", setup.inputs.control.names())?;
         Ok(Self { columns: columns.into_iter().map(|column| Twist((*column).into())).collect() })
     }
 

@@ -1,4 +1,4 @@
-//! P is diagonal with ones and zeros, so a component either passes unchanged or is exactly zero: P P = P.
+//! `projector`: a diagonal of ones and zeros. A component either passes unchanged or is exactly zero: P P = P.
 
 use tactflow_runtime::node::{Components, Describe, In, Inputs, Mistakes, Node, Out, Outputs, Param, Setup, Tick};
 use tactflow_runtime::signal::Twist;

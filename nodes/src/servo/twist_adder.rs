@@ -1,4 +1,4 @@
-//! The order of summation is the order of the wires, so every run gives the same bits.
+//! `twist_adder`: the sum of twists, in the order of the wires, so every run gives the same bits.
 
 use tactflow_runtime::node::{
     At, Components, Describe, Inputs, Many, Mistake, Mistakes, Node, Out, Outputs, Setup, Tick,

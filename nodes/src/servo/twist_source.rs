@@ -1,4 +1,4 @@
-//! Without a gate the twist has no time, so the `max_age_ms` of a sink never stops it.
+//! `twist_source`: a constant twist. Without a gate it has no time, so the `max_age_ms` of a sink never stops it.
 
 use tactflow_runtime::node::{Describe, In, Inputs, Mistakes, Node, Out, Outputs, Param, Setup, Tick};
 use tactflow_runtime::signal::{Flag, Twist};

@@ -11,6 +11,7 @@ pub mod calibrate;
 mod common;
 pub mod contact_area;
 pub mod eccentricity;
+mod filter;
 pub mod hough;
 pub mod label;
 pub mod low_pass;

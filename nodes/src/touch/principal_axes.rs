@@ -1,10 +1,10 @@
 //! `principal_axes`: length, width and direction of a contact, from the second central moments of its tactels (paper
 //! section III uses the direction of the long axis).
 
-use tactflow_runtime::node::{Describe, Mistakes, Node, Out, Outputs, Param, Setup, Tick};
+use tactflow_runtime::node::{Describe, Mistakes, Node, Out, Outputs, Setup, Tick};
 use tactflow_runtime::signal::{ImageShape, Scalar};
 
-use super::moments::{Inputs, Weighing, Weight, ellipse, image_shape};
+use super::moments::{Inputs, Params, Weighing, ellipse, image_shape};
 
 /// Measures the length, the width and the direction of a contact.
 ///
@@ -31,20 +31,6 @@ pub struct PrincipalAxes {
     shape: ImageShape,
     weighing: Weighing,
     min_anisotropy: f64,
-}
-
-/// Parameters of `principal_axes`.
-#[derive(Debug, Clone, Param)]
-pub struct Params {
-    /// Smallest anisotropy, from 0 (round) to 1 (a line), at which a contact has an orientation.
-    #[param(unit = "1", range = 0.0..=1.0, default = 0.1)]
-    min_anisotropy: f64,
-    /// Weight of each tactel: its value, its excess over `threshold`, or 1.
-    #[param(default = Weight::Force)]
-    weight: Weight,
-    /// Zero of the excess, for `weight = "excess"`: the threshold of `binarize`, or its `release` if it has one.
-    #[param(unit = "U")]
-    threshold: Option<f64>,
 }
 
 /// What `principal_axes` writes.

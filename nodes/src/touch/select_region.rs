@@ -3,10 +3,10 @@
 use tactflow_runtime::node::{
     At, Describe, In, Inputs, Mistake, Mistakes, Node, Out, Outputs, Param, Setup, State, Tick,
 };
-use tactflow_runtime::signal::{Flag, Grid, Mask, Region, Regions};
+use tactflow_runtime::signal::{Flag, Grid, Mask, Regions};
 use tactflow_runtime::source::Code;
 
-use super::label::{centroid_buffer, centroids, distance_squared, paint};
+use super::label::{centroid_buffer, centroids, distance_squared, paint, ranked};
 
 /// Selects one of several contacts: the n-th largest, strongest, or nearest to a point.
 ///
@@ -34,10 +34,7 @@ use super::label::{centroid_buffer, centroids, distance_squared, paint};
 #[derive(Describe)]
 #[describe(name = "select_region")]
 pub struct SelectRegion {
-    order: Order,
-    rank: usize,
-    min_area: usize,
-    min_force: f64,
+    params: Params,
     grid: Grid,
 }
 
@@ -97,13 +94,6 @@ pub struct State {
     centroids: Vec<[f64; 2]>,
 }
 
-/// Order of the regions, with what it needs.
-enum Order {
-    Area,
-    Force,
-    Distance([f64; 2]),
-}
-
 impl Node for SelectRegion {
     type Params = Params;
     type Inputs<'a> = Inputs<'a>;
@@ -111,10 +101,7 @@ impl Node for SelectRegion {
     type State = State;
 
     fn new(params: Params, setup: &mut Setup<Self>) -> Result<Self, Mistakes> {
-        let order = match (params.by, params.point) {
-            (By::Area, None) => Order::Area,
-            (By::Force, None) => Order::Force,
-            (By::Distance, Some(point)) => Order::Distance(point),
+        match (params.by, params.point) {
             (By::Distance, None) => {
                 let message = "`by = \"distance\"` needs a `point`";
                 let mistake = Mistake::new(Code::MissingKey, At::Param("by".into()), message);
@@ -124,11 +111,11 @@ impl Node for SelectRegion {
                 let mistake = Mistake::key("point", "`point` has no effect without `by = \"distance\"`");
                 return Err(mistake.help("write `by = \"distance\"`, or leave `point` out").into());
             }
-        };
+            _ => {}
+        }
         let grid = setup.inputs.regions.grid.clone();
         setup.outputs.region = grid.clone();
-        let Params { rank, min_area, min_force, .. } = params;
-        Ok(Self { order, rank, min_area, min_force, grid })
+        Ok(Self { params, grid })
     }
 
     fn state(&self) -> State {
@@ -137,12 +124,15 @@ impl Node for SelectRegion {
 
     fn step(&self, _: &Tick, inputs: Inputs<'_>, out: &mut Outputs, state: &mut State) {
         let (list, runs) = (inputs.regions.list(), inputs.regions.runs());
-        let chosen = match self.order {
-            Order::Area => self.choose(list, |i| -f64::from(list[i].area)),
-            Order::Force => self.choose(list, |i| -list[i].force),
-            Order::Distance(point) => {
+        let Params { by, rank, point, min_area, min_force } = self.params;
+        let counts = |i: &usize| list[*i].area as usize >= min_area && list[*i].force >= min_force;
+        let counted = (0..list.len()).filter(counts);
+        let chosen = match (point, by) {
+            (None, By::Force) => ranked(rank, counted, |i| -list[i].force),
+            (None, _) => ranked(rank, counted, |i| -f64::from(list[i].area)),
+            (Some(point), _) => {
                 let centroids = centroids(&self.grid, runs, list, &mut state.centroids);
-                self.choose(list, |i| distance_squared(centroids[i], point))
+                ranked(rank, counted, |i| distance_squared(centroids[i], point))
             }
         };
         out.present.set(chosen.is_some());
@@ -152,30 +142,11 @@ impl Node for SelectRegion {
     }
 }
 
-impl SelectRegion {
-    /// Returns the region of the rank in ascending order of the key, where equals keep their order.
-    fn choose(&self, list: &[Region], key: impl Fn(usize) -> f64) -> Option<usize> {
-        let counts = |region: &Region| region.area as usize >= self.min_area && region.force >= self.min_force;
-        let mut last: Option<(f64, usize)> = None;
-        for _ in 0..self.rank {
-            let mut first: Option<(f64, usize)> = None;
-            for i in (0..list.len()).filter(|i| counts(&list[*i])) {
-                let candidate = (key(i), i);
-                if last.is_none_or(|last| candidate > last) && first.is_none_or(|first| candidate < first) {
-                    first = Some(candidate);
-                }
-            }
-            last = Some(first?);
-        }
-        last.map(|(_, i)| i)
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use proptest::prelude::*;
     use tactflow_runtime::harness::NodeRig;
-    use tactflow_runtime::signal::{RegionsShape, Run, Unit};
+    use tactflow_runtime::signal::{Region, RegionsShape, Run, Unit};
 
     use super::*;
 

@@ -2,19 +2,20 @@
 
 use proptest::prelude::*;
 use tactflow_runtime::harness::NodeRig;
-use tactflow_runtime::node::At;
+use tactflow_runtime::node::{At, FilePath};
 use tactflow_runtime::signal::{Jacobian, JacobianShape, Joints, PoseShape, Shape, Stamp, TwistShape};
 
 use super::*;
 use crate::arm::chain::Chain;
-use crate::arm::model::chain_of;
+use crate::arm::model::load;
 use crate::arm::mount::Mount;
 
-const LWR: &str = include_str!("../../../../graphs/robots/lwr4p.urdf");
+const LWR: &[u8] = include_bytes!("../../../../graphs/robots/lwr4p.urdf");
 const BENT: [f64; 7] = [0.2, 0.6, 0.1, -1.2, 0.3, 0.9, 0.0];
 
 fn lwr() -> Chain {
-    chain_of(LWR, "lwr_7_link", &Mount { xyz: [0.0, 0.02, 0.05], rpy: [0.1, 0.2, 0.3] }).unwrap()
+    let urdf = FilePath { path: "lwr4p.urdf".into(), span: 0..0, builtin: Some(LWR) };
+    load(&urdf, "lwr_7_link", &Mount { xyz: [0.0, 0.02, 0.05], rpy: [0.1, 0.2, 0.3] }).unwrap()
 }
 
 fn rig(params: &str) -> Result<NodeRig, Mistakes> {

@@ -2,8 +2,10 @@
 
 use proptest::prelude::*;
 use tactflow_runtime::harness::NodeRig;
+use tactflow_runtime::node::At;
 use tactflow_runtime::signal::{Freshness, Joints, Shape, Stamp};
 
+use super::limiter::{Room, follow, room};
 use super::*;
 
 const MS: i64 = 1_000_000;
@@ -48,7 +50,7 @@ fn velocity(rig: &NodeRig) -> Option<Vec<f64>> {
 
 /// The wanted velocities of some ticks.
 #[derive(Debug, Clone)]
-struct Phase {
+struct Course {
     /// The velocity is absent, or too old.
     is_absent: bool,
     is_old: bool,
@@ -60,12 +62,12 @@ struct Phase {
     count: usize,
 }
 
-fn phase() -> impl Strategy<Value = Phase> {
+fn course() -> impl Strategy<Value = Course> {
     let tick = prop_oneof![0.1..20.0f64, Just(20.0), Just(1.0)];
     let wanted = prop_oneof![-4.0..4.0f64, Just(1e300), Just(-1e300), Just(0.0)];
     let flags = (0..5u8, 0..3u8);
     (flags, prop::array::uniform3(wanted), prop::array::uniform3(tick), 1..80usize).prop_map(
-        |((what, held), wanted, ticks, count)| Phase {
+        |((what, held), wanted, ticks, count)| Course {
             is_absent: what == 0,
             is_old: what == 1,
             is_held: held == 0,
@@ -103,24 +105,24 @@ proptest! {
         accelerations in prop::array::uniform3(0.5..20.0f64),
         lead_rad in 0.01..0.5f64,
         is_late in any::<bool>(),
-        phases in prop::collection::vec(phase(), 1..25),
+        courses in prop::collection::vec(course(), 1..25),
     ) {
         let mut rig = rig(&format!("lead_rad = {lead_rad}"), &accelerations);
         let limits = arm(&accelerations).joints;
         let mut plant = Plant { position: start, equilibrium: start, late: is_late.then_some([0.0; 3]) };
         let mut last = [0.0; 3];
-        for phase in &phases {
-            for tick in 0..phase.count {
+        for course in &courses {
+            for tick in 0..course.count {
                 place(&mut rig, &plant.position, &plant.equilibrium);
-                if phase.is_absent {
+                if course.is_absent {
                     rig.lose("velocity");
                 } else {
-                    let old = i64::from(phase.is_old) * 500 * MS;
+                    let old = i64::from(course.is_old) * 500 * MS;
                     let stamp = Stamp { nanos: rig.tick.now - old, device: 0 };
-                    rig.edit("velocity", stamp, |velocity: &mut Joints| velocity.0.copy_from_slice(&phase.wanted));
+                    rig.edit("velocity", stamp, |velocity: &mut Joints| velocity.0.copy_from_slice(&course.wanted));
                 }
                 let since = rig.tick.dt;
-                let next = phase.ticks[tick % 3];
+                let next = course.ticks[tick % 3];
                 rig.step_ms(next);
                 let given: [f64; 3] = velocity(&rig).map_or([0.0; 3], |given| given.try_into().unwrap());
                 for ((v, last), joint) in given.iter().zip(last).zip(&limits) {
@@ -128,7 +130,7 @@ proptest! {
                     prop_assert!((v - last).abs() <= joint.acceleration * since + 1e-12, "{last} to {v} in {since}");
                 }
                 last = given;
-                plant.go(given, rig.tick.dt, phase.is_held);
+                plant.go(given, rig.tick.dt, course.is_held);
                 for ((e, q), joint) in plant.equilibrium.iter().zip(plant.position).zip(&limits) {
                     for x in [*e, q] {
                         prop_assert!((joint.lower - 1e-12..=joint.upper + 1e-12).contains(&x), "position {x}");
@@ -185,7 +187,7 @@ fn the_allowed_velocities_of_a_joint() {
 #[test]
 fn a_joint_without_room_to_brake_with_the_others_brakes_by_itself() {
     let shape = arm(&[0.5, 10.0]).joints;
-    let free = |joint: &Joint| Range::from((-joint.speed, joint.speed));
+    let free = |joint: &Joint| (-joint.speed, joint.speed);
     let rooms = [0, 1].map(|i| Room { speed: free(&shape[i]), position: free(&shape[i]), lead: free(&shape[i]) });
     let mut last = [1.0, 1.0];
     let share = follow(&shape, 0.01, &[0.0, 0.0], &rooms, &mut last);

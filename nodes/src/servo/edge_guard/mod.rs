@@ -1,21 +1,13 @@
-//! A contact at p = (x, y, 0) of an object at rest moves over the pad with dp/dt = -(v + omega x p):
-//!
-//! ```text
-//! dx/dt = -vx + wz y        dy/dt = -vy - wz x
-//! ```
-//!
-//! The outward part is removed by a correction of vx and vy alone: all of it from the margin on, and a fraction that
-//! grows linearly over the ramp before the margin. A turn wz continues, but about the contact instead of the middle of
-//! the pad. Rolling over an object of radius R adds -R wy to dx/dt and R wx to dy/dt. R is unknown but its sign is not,
-//! so wx and wy are scaled when they roll toward the rim.
-//!
-//! Invariants: the output is a continuous function of the contact and the input, and inward motion passes unchanged, bit
-//! for bit.
+//! `edge_guard`: the contact stays away from the rim of the pad.
+
+mod fence;
 
 use tactflow_runtime::node::{
     Absence, Describe, In, Inputs, Mistake, Mistakes, Node, Out, Outputs, Param, Setup, State, Tick,
 };
-use tactflow_runtime::signal::{Flag, Image, Scalar, Twist};
+use tactflow_runtime::signal::{Flag, Image, ImageShape, Scalar, Twist};
+
+use fence::{Fence, guarded};
 
 /// Keeps the contact away from the rim of the pad: near the rim, only inward motion passes unchanged.
 ///
@@ -102,15 +94,6 @@ pub struct State {
     at_rim: bool,
 }
 
-/// The limits of the contact along one axis.
-#[derive(Debug, Clone, Copy)]
-struct Fence {
-    /// Largest distance from the middle [m].
-    margin: f64,
-    /// Width of the zone before it [m].
-    ramp: f64,
-}
-
 impl Node for EdgeGuard {
     type Params = Params;
     type Inputs<'a> = Inputs<'a>;
@@ -118,29 +101,22 @@ impl Node for EdgeGuard {
     type State = State;
 
     fn new(params: Params, setup: &mut Setup<Self>) -> Result<Self, Mistakes> {
-        let shape = &setup.inputs.image;
-        let mut mistakes = Mistakes::new();
-        let (margin, ramp) = (params.margin_tactels, params.ramp_tactels);
-        let half = (shape.rows.min(shape.cols).max(1) as f64 - 1.0) / 2.0;
-        let (rows, cols) = (shape.rows, shape.cols);
+        let Params { margin_tactels: margin, ramp_tactels: ramp } = params;
+        let &ImageShape { rows, cols, pitch, .. } = &setup.inputs.image;
+        let half = (rows.min(cols).max(1) as f64 - 1.0) / 2.0;
         if half <= 0.0 {
             let message = format!("a pad of {rows} by {cols} tactels has no middle: every contact on it is at the rim");
-            mistakes.push(Mistake::input("image", message).help("remove the `edge_guard`"));
-        } else if margin + ramp > half {
+            return Err(Mistake::input("image", message).help("remove the `edge_guard`").into());
+        }
+        if margin + ramp > half {
             let message = format!(
                 "a margin of {margin} and a ramp of {ramp} tactels leave no middle on a pad of {rows} by {cols} tactels"
             );
             let help = format!("`margin_tactels` and `ramp_tactels` may add up to at most {half} here");
-            mistakes.push(Mistake::param("margin_tactels", message).help(help));
+            return Err(Mistake::param("margin_tactels", message).help(help).into());
         }
-        if !mistakes.is_empty() {
-            return Err(mistakes);
-        }
-        let fence = |count: usize, pitch: f64| Fence {
-            margin: ((count as f64 - 1.0) / 2.0 - margin) * pitch,
-            ramp: ramp * pitch,
-        };
-        Ok(Self { x: fence(shape.cols, shape.pitch[0]), y: fence(shape.rows, shape.pitch[1]) })
+        let fence = |count, pitch| Fence::new(count, pitch, margin, ramp);
+        Ok(Self { x: fence(cols, pitch[0]), y: fence(rows, pitch[1]) })
     }
 
     fn state(&self) -> State {
@@ -166,36 +142,6 @@ impl Node for EdgeGuard {
         state.at_rim = if state.at_rim { share < 1.0 } else { share < 0.5 };
         out.at_rim.set(state.at_rim);
     }
-}
-
-impl Fence {
-    /// Returns the fraction of a motion from `place` [m] in the direction of `speed` that passes: 1 in the middle, 0 from
-    /// the margin on.
-    fn share(self, place: f64, speed: f64) -> f64 {
-        let room = if speed > 0.0 { self.margin - place } else { self.margin + place };
-        (room / self.ramp).clamp(0.0, 1.0)
-    }
-
-    /// Returns the part of `speed` that does not pass.
-    fn excess(self, place: f64, speed: f64) -> f64 {
-        (1.0 - self.share(place, speed)) * speed
-    }
-}
-
-/// Returns the twist without the part that carries a contact at (x, y) [m] toward the rim.
-fn guarded(twist: &Twist, [x, y]: [f64; 2], along_x: Fence, along_y: Fence) -> Twist {
-    let [vx, vy, vz, wx, wy, wz] = twist.0.into();
-    Twist(
-        [
-            vx + along_x.excess(x, wz * y - vx),
-            vy + along_y.excess(y, -wz * x - vy),
-            vz,
-            wx * along_y.share(y, wx),
-            wy * along_x.share(x, -wy),
-            wz,
-        ]
-        .into(),
-    )
 }
 
 #[cfg(test)]

@@ -5,7 +5,7 @@ use proptest::array::{uniform2, uniform6};
 use proptest::prelude::*;
 use tactflow_runtime::harness::NodeRig;
 use tactflow_runtime::node::At;
-use tactflow_runtime::signal::{Freshness, Image, ImageShape, ScalarShape, Shape, TwistShape, Unit};
+use tactflow_runtime::signal::{Freshness, Image, ScalarShape, Shape, TwistShape, Unit};
 
 use super::*;
 

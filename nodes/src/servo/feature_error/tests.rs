@@ -61,10 +61,10 @@ fn setpoint_minus_measured() {
 proptest! {
     #[test]
     fn an_axial_error_leads_to_the_line_of_the_setpoint(setpoint in -7.0_f64..7.0, measured in -7.0_f64..7.0) {
-        let target = Target { setpoint, is_axial: true };
-        let error = difference(&target, measured);
+        let setpoint = Setpoint { value: setpoint, is_axial: true };
+        let error = setpoint.error(measured);
         prop_assert!(-FRAC_PI_2 < error && error <= FRAC_PI_2);
-        prop_assert!(libm::sin(measured + error - setpoint).abs() < 1e-14);
+        prop_assert!(libm::sin(measured + error - setpoint.value).abs() < 1e-14);
     }
 }
 

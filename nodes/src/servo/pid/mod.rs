@@ -1,21 +1,16 @@
 //! `pid`: a PID controller on every feature, each on its own (paper eq. 3, the matrices K_P, K_I, K_D).
 //!
-//! u = kp e + I + kd de/dt, with I the sum of ki e dt. Time is that between the stamps of a component's samples, so a
-//! gain means the same at 100 Hz and at 1 kHz, and one sample is never integrated twice; the paper sums without dt, so
-//! its KI is ki times the period and its KD is kd over the period. The integral is kept in units of the control, so a
-//! change of ki makes no jump; it runs only near the target (`within`), is bounded, and does not grow outwards while
-//! the output is at its limit. The error of a line's direction is differenced modulo pi.
-//!
 //! A held component stays as it is. An absent one contributes nothing and resets only itself, and only when it has been
 //! away for long: a frame of flicker does not wipe an integral.
 
+mod law;
+
 use tactflow_runtime::node::{
-    Absence, Components, Describe, In, Inputs, Interval, Map, Mistakes, Node, Out, Outputs, Param, Setup, State, Tick,
+    Components, Describe, In, Inputs, Map, Mistakes, Node, Out, Outputs, Param, Setup, State, Tick,
 };
 use tactflow_runtime::signal::{Features, Freshness, Unit};
 
-use super::integral::integrate;
-use crate::motion::axis::wrap_axial;
+use law::{Law, Memory};
 
 /// A PID controller on every feature, for force and position control.
 ///
@@ -105,29 +100,6 @@ pub struct State {
     stepped: i64,
 }
 
-/// What is remembered of one feature.
-#[derive(Debug, Clone, Copy, Default)]
-pub struct Memory {
-    /// The integral's part of the control, in the feature's unit per second.
-    integral: f64,
-    /// Error of the last sample, in the feature's unit.
-    error: f64,
-    interval: Interval,
-    absence: Absence,
-}
-
-struct Law {
-    kp: f64,
-    ki: f64,
-    kd: f64,
-    within: f64,
-    bound: f64,
-    limit: f64,
-    is_axial: bool,
-    /// Whether anything reads its control; otherwise it is frozen.
-    is_wanted: bool,
-}
-
 impl Node for Pid {
     type Params = Params;
     type Inputs<'a> = Inputs<'a>;
@@ -136,10 +108,9 @@ impl Node for Pid {
 
     fn new(params: Params, setup: &mut Setup<Self>) -> Result<Self, Mistakes> {
         let shape = &setup.inputs.error;
-        let names = shape.features.iter().map(|feature| feature.name.as_str());
-        let gains = params.gains.in_order("gains", names)?;
-        let laws = gains.into_iter().zip(&shape.features).map(|(gains, feature)| Law::new(gains, feature.unit));
-        let laws = laws.collect();
+        let gains = params.gains.in_order("gains", shape.names())?;
+        let laws =
+            gains.into_iter().zip(&shape.features).map(|(gains, feature)| Law::new(gains, feature.unit)).collect();
         setup.outputs.control = shape.map_units(Unit::per_second);
         Ok(Self { laws })
     }
@@ -182,35 +153,6 @@ impl Node for Pid {
             }
         }
         state.stepped = tick.now;
-    }
-}
-
-impl Law {
-    fn new(gains: &Gains, unit: Unit) -> Self {
-        Self {
-            kp: gains.kp,
-            ki: gains.ki,
-            kd: gains.kd,
-            within: gains.within.unwrap_or(f64::INFINITY),
-            bound: gains.bound,
-            limit: gains.limit.unwrap_or(f64::INFINITY),
-            is_axial: unit.is_axial(),
-            is_wanted: true,
-        }
-    }
-
-    /// The control for an error that comes `dt` [s] after the last one. Without a time there is neither a slope nor
-    /// growth of the integral.
-    fn control(&self, error: f64, dt: Option<f64>, memory: &mut Memory) -> f64 {
-        let change = error - memory.error;
-        let change = if self.is_axial { wrap_axial(change) } else { change };
-        let dt = dt.unwrap_or(0.0);
-        let slope = if dt > 0.0 { change / dt } else { 0.0 };
-        let others = self.kp * error + self.kd * slope;
-        let growth = if error.abs() <= self.within { self.ki * error * dt } else { 0.0 };
-        memory.integral = integrate(memory.integral, growth, self.bound, others, self.limit);
-        memory.error = error;
-        (others + memory.integral).clamp(-self.limit, self.limit)
     }
 }
 

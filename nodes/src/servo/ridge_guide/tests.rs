@@ -1,6 +1,6 @@
 //! The guide in fields of eccentricity with a known ridge, on a sensor that follows every command exactly.
 
-use std::f64::consts::{FRAC_PI_2, PI, TAU};
+use std::f64::consts::{FRAC_1_SQRT_2, FRAC_PI_2, PI, TAU};
 
 use nalgebra::{IsometryMatrix3, Rotation3, Translation3};
 use proptest::prelude::*;
@@ -31,7 +31,7 @@ fn wave([x, y]: [f64; 2]) -> (f64, f64) {
     ((y - 0.02 * libm::sin(30.0 * x)) / (1.0 + slope * slope).sqrt(), libm::atan(slope))
 }
 
-struct World {
+struct RidgeScene {
     rig: NodeRig,
     ridge: Ridge,
     at: [f64; 2],
@@ -48,7 +48,7 @@ const PARAMS: &str = "speed_m_per_s = 0.02\nleg_m = 0.01";
 /// Speed toward the middle of the contact, as the servoing adds it [1/s].
 const CENTRE: f64 = 2.0;
 
-impl World {
+impl RidgeScene {
     fn new(ridge: Ridge, at: [f64; 2], yaw: f64, noise: f64, params: &str) -> Self {
         let one = || ScalarShape::of(Unit::ONE).into();
         let wires =
@@ -109,18 +109,18 @@ fn the_search_finds_the_ridge_from_every_side_and_in_noise() {
     for (name, ridge) in [("straight", straight as Ridge), ("ring", ring), ("wave", wave)] {
         for start in [[0.05, 0.0], [-0.05, 0.01], [0.0, 0.05], [0.02, -0.05], [0.09, 0.04], [-0.07, -0.02]] {
             for (yaw, noise) in [(0.0, 0.0), (1.0, 0.0), (-2.5, 0.0), (0.0, 0.02), (2.0, 0.04)] {
-                let mut world = World::new(ridge, start, yaw, noise, PARAMS);
+                let mut scene = RidgeScene::new(ridge, start, yaw, noise, PARAMS);
                 // Farther off there is no slope to feel, and it goes straight on.
-                if world.eccentricity() < 0.36 {
+                if scene.eccentricity() < 0.36 {
                     continue;
                 }
                 cases += 1;
-                let way = world.find() * 0.02;
+                let way = scene.find() * 0.02;
                 // The bound is where the way is straight up the slope, and twice that for the zigzag and its first legs.
                 let off = ridge(start).0.abs();
                 assert!(way < 2.0 * off + 0.06, "{name} from {start:?} at {yaw}, {noise}: {way} m for {off} m");
                 // The bound on the eccentricity is 1 cm away, and noise brings it nearer.
-                assert!(ridge(world.at).0.abs() < 0.011 + 0.5 * noise, "{name} from {start:?}: {}", ridge(world.at).0);
+                assert!(ridge(scene.at).0.abs() < 0.011 + 0.5 * noise, "{name} from {start:?}: {}", ridge(scene.at).0);
             }
         }
     }
@@ -133,20 +133,20 @@ fn the_sensor_follows_the_ridge_without_turning_back() {
     for (name, ridge, noise) in
         [("straight", straight as Ridge, 0.0), ("ring", ring, 0.0), ("wave", wave, 0.0), ("ring", ring, 0.01)]
     {
-        let mut world = World::new(ridge, [0.05, 0.03], 0.4, noise, PARAMS);
-        world.find();
-        (0..500).for_each(|_| world.step());
-        let (mut way, mut worst, mut last) = (0.0, 0.0_f64, world.at);
+        let mut scene = RidgeScene::new(ridge, [0.05, 0.03], 0.4, noise, PARAMS);
+        scene.find();
+        (0..500).for_each(|_| scene.step());
+        let (mut way, mut worst, mut last) = (0.0, 0.0_f64, scene.at);
         for i in 0..10_000 {
-            world.step();
-            let (off, angle) = ridge(world.at);
+            scene.step();
+            let (off, angle) = ridge(scene.at);
             let (sine, cosine) = libm::sincos(angle);
-            let gone = (world.at[0] - last[0]) * cosine + (world.at[1] - last[1]) * sine;
-            last = world.at;
+            let gone = (scene.at[0] - last[0]) * cosine + (scene.at[1] - last[1]) * sine;
+            last = scene.at;
             // A full turn of the ring needs no change of sign; a line has none to change.
             way += gone;
             worst = worst.max(off.abs());
-            assert!(world.is_on, "{name}: off the ridge in step {i} at {:?}", world.at);
+            assert!(scene.is_on, "{name}: off the ridge in step {i} at {:?}", scene.at);
         }
         assert!(way.abs() > 0.99 * 0.02 * 40.0, "{name}: {way}");
         assert!(worst < 0.003, "{name}: {worst}");
@@ -155,33 +155,33 @@ fn the_sensor_follows_the_ridge_without_turning_back() {
 
 #[test]
 fn without_an_orientation_the_last_direction_is_kept() {
-    let mut world = World::new(straight, [0.03, 0.0], 0.0, 0.0, PARAMS);
-    world.find();
-    (0..10).for_each(|_| world.step());
-    let before = *world.rig.get::<Twist>("twist").unwrap();
+    let mut scene = RidgeScene::new(straight, [0.03, 0.0], 0.0, 0.0, PARAMS);
+    scene.find();
+    (0..10).for_each(|_| scene.step());
+    let before = *scene.rig.get::<Twist>("twist").unwrap();
     for _ in 0..50 {
-        world.rig.lose("orientation");
-        world.rig.set("eccentricity", 0.99);
-        world.rig.step_ms(4.0);
-        assert_eq!(world.rig.get::<Twist>("twist"), Some(&before));
+        scene.rig.lose("orientation");
+        scene.rig.set("eccentricity", 0.99);
+        scene.rig.step_ms(4.0);
+        assert_eq!(scene.rig.get::<Twist>("twist"), Some(&before));
     }
-    world.rig.set("orientation", wrap_axial(0.7 + PI));
-    world.rig.set("eccentricity", 0.99);
-    world.rig.step_ms(4.0);
-    let after = world.rig.get::<Twist>("twist").unwrap();
+    scene.rig.set("orientation", wrap_axial(0.7 + PI));
+    scene.rig.set("eccentricity", 0.99);
+    scene.rig.step_ms(4.0);
+    let after = scene.rig.get::<Twist>("twist").unwrap();
     assert!((after.0 - before.0).norm() < 1e-3, "{after:?}");
 }
 
 #[test]
 fn a_ridge_begins_and_ends_with_hysteresis() {
-    let mut world = World::new(straight, [1.0, 1.0], 0.0, 0.0, PARAMS);
+    let mut scene = RidgeScene::new(straight, [1.0, 1.0], 0.0, 0.0, PARAMS);
     let cases = [(0.92, false), (0.96, true), (0.92, true), (0.91, true), (0.89, false), (0.94, false), (0.951, true)];
     for (narrow, expected) in cases {
-        world.rig.set("eccentricity", narrow);
-        world.rig.set("orientation", 0.3);
-        world.rig.set("pose", Pose(IsometryMatrix3::identity()));
-        world.rig.step_ms(4.0);
-        assert_eq!(world.rig.get("on_ridge"), Some(&expected), "{narrow}");
+        scene.rig.set("eccentricity", narrow);
+        scene.rig.set("orientation", 0.3);
+        scene.rig.set("pose", Pose(IsometryMatrix3::identity()));
+        scene.rig.step_ms(4.0);
+        assert_eq!(scene.rig.get("on_ridge"), Some(&expected), "{narrow}");
     }
 }
 
@@ -189,24 +189,24 @@ fn a_ridge_begins_and_ends_with_hysteresis() {
 fn over_an_even_surface_noise_does_not_change_the_heading() {
     for heading in [0.0, 2.0] {
         let params = format!("{PARAMS}\nheading_rad = {heading}");
-        let mut world = World::new(|_| (1.0, 0.0), [0.0, 0.0], 0.0, 0.01, &params);
-        (0..5000).for_each(|_| world.step());
+        let mut scene = RidgeScene::new(|_| (1.0, 0.0), [0.0, 0.0], 0.0, 0.01, &params);
+        (0..5000).for_each(|_| scene.step());
         // Two legs of l at right angles go sqrt(2) l.
         let way = 0.02 * 20.0 * FRAC_1_SQRT_2;
         let (sine, cosine) = libm::sincos(heading);
-        let (x, y) = (world.at[0] - way * cosine, world.at[1] - way * sine);
-        assert!((x * x + y * y).sqrt() < 0.02, "{:?}, headed {heading}", world.at);
+        let (x, y) = (scene.at[0] - way * cosine, scene.at[1] - way * sine);
+        assert!((x * x + y * y).sqrt() < 0.02, "{:?}, headed {heading}", scene.at);
     }
 }
 
 #[test]
 fn a_sensor_without_progress_turns_round() {
-    let mut world = World::new(straight, [1.0, 1.0], 0.0, 0.0, PARAMS);
+    let mut scene = RidgeScene::new(straight, [1.0, 1.0], 0.0, 0.0, PARAMS);
     let mut course = || {
-        world.rig.set("eccentricity", 0.3);
-        world.rig.set("pose", Pose(IsometryMatrix3::identity()));
-        world.rig.step_ms(4.0);
-        world.rig.get::<Twist>("twist").unwrap().0[0]
+        scene.rig.set("eccentricity", 0.3);
+        scene.rig.set("pose", Pose(IsometryMatrix3::identity()));
+        scene.rig.step_ms(4.0);
+        scene.rig.get::<Twist>("twist").unwrap().0[0]
     };
     assert!((0..499).all(|_| course() > 0.0));
     assert!((0..100).map(|_| course()).last().unwrap() < 0.0);
@@ -214,14 +214,14 @@ fn a_sensor_without_progress_turns_round() {
 
 #[test]
 fn the_motion_is_as_old_as_the_contact_and_absent_without_one() {
-    let mut world = World::new(straight, [0.03, 0.0], 0.0, 0.0, PARAMS);
-    world.step();
-    assert_eq!(world.rig.mark("twist").stamp().nanos, 0);
-    world.rig.step_ms(4.0);
-    assert_eq!(world.rig.freshness("twist"), Freshness::Held);
-    world.rig.lose("eccentricity");
-    world.rig.step_ms(4.0);
-    assert_eq!((world.rig.get::<Twist>("twist"), world.rig.get::<bool>("on_ridge")), (None, None));
+    let mut scene = RidgeScene::new(straight, [0.03, 0.0], 0.0, 0.0, PARAMS);
+    scene.step();
+    assert_eq!(scene.rig.mark("twist").stamp().nanos, 0);
+    scene.rig.step_ms(4.0);
+    assert_eq!(scene.rig.freshness("twist"), Freshness::Held);
+    scene.rig.lose("eccentricity");
+    scene.rig.step_ms(4.0);
+    assert_eq!((scene.rig.get::<Twist>("twist"), scene.rig.get::<bool>("on_ridge")), (None, None));
 }
 
 #[test]
@@ -240,7 +240,7 @@ fn a_bad_parameter_is_a_mistake() {
 proptest! {
     #[test]
     fn the_slope_is_that_of_the_least_squares_line(samples in prop::collection::vec((0.0..0.002, 0.0..1.0), 3..200)) {
-        let mut leg = Leg::default();
+        let mut leg = slope::Slope::default();
         let mut points = Vec::new();
         for (step, narrow) in samples {
             leg.add(step, narrow);

@@ -14,7 +14,7 @@ const GRAIN: f64 = 0.02 * 0.004;
 const HALF_PAD: f64 = 0.04;
 
 /// A sensor on a plate that covers a rectangle of the base; the base lies as the sensor does at the start.
-struct World {
+struct ScanScene {
     rig: NodeRig,
     pose: IsometryMatrix3<f64>,
     plate: [[f64; 2]; 2],
@@ -28,7 +28,7 @@ struct World {
     is_done: bool,
 }
 
-impl World {
+impl ScanScene {
     fn new(params: &str) -> Self {
         let metre = || Shape::from(ScalarShape::of(Unit::METRE));
         let wires = [("gate", FlagShape.into()), ("pose", PoseShape.into()), ("x", metre()), ("y", metre())];
@@ -114,120 +114,123 @@ const ROWS: [[f64; 2]; 8] =
 
 #[test]
 fn the_scan_is_centred_on_its_start_and_ends_with_done() {
-    let mut world = World::new(SCAN);
-    let time = world.run();
-    world.assert_turns(&ROWS, 2.0 * GRAIN);
+    let mut scene = ScanScene::new(SCAN);
+    let time = scene.run();
+    scene.assert_turns(&ROWS, 2.0 * GRAIN);
     let way = 0.01 + 0.02 + 3.0 * 0.04 + 2.0 * 0.01;
     assert!((time - way / 0.02).abs() < 0.1, "{time}");
     for _ in 0..5 {
-        world.step(4.0, 1.0);
-        assert!(world.is_done && world.rig.freshness("twist") != Freshness::New);
+        scene.step(4.0, 1.0);
+        assert!(scene.is_done && scene.rig.freshness("twist") != Freshness::New);
     }
 }
 
 #[test]
 fn along_y_the_scan_is_the_same_with_the_axes_exchanged() {
-    let mut world = World::new(&format!("{SCAN}\naxis = \"y\""));
-    world.run();
-    world.assert_turns(&ROWS.map(|[x, y]| [y, x]), 2.0 * GRAIN);
+    let mut scene = ScanScene::new(&format!("{SCAN}\naxis = \"y\""));
+    scene.run();
+    scene.assert_turns(&ROWS.map(|[x, y]| [y, x]), 2.0 * GRAIN);
 }
 
 #[test]
 fn the_distance_counts_and_not_the_time() {
     // A sensor that lags, stands still for a while, and whose samples come as they will.
-    let mut world = World::new(SCAN);
+    let mut scene = ScanScene::new(SCAN);
     for i in 0..30_000 {
         let share = if (400..700).contains(&i) { 0.0 } else { 0.3 + 0.5 * f64::from(i % 5) / 4.0 };
-        world.step(if i % 7 == 0 { 9.0 } else { 3.0 }, share);
-        if world.is_done {
+        scene.step(if i % 7 == 0 { 9.0 } else { 3.0 }, share);
+        if scene.is_done {
             break;
         }
     }
-    world.assert_turns(&ROWS, 4.0 * GRAIN);
+    scene.assert_turns(&ROWS, 4.0 * GRAIN);
 }
 
 #[test]
 fn on_a_cylinder_the_distance_is_along_the_surface() {
     // The sensor's origin rolls along the arc, so the way along x is radius times angle.
-    let mut world = World { radius: 0.05, ..World::new("speed_m_per_s = 0.02\nstroke_m = 0.06\nstep_m = 0.01") };
-    world.run();
-    let start = World::new(SCAN).pose;
-    let turned = (start.rotation.inverse() * world.pose.rotation).scaled_axis();
+    let mut scene =
+        ScanScene { radius: 0.05, ..ScanScene::new("speed_m_per_s = 0.02\nstroke_m = 0.06\nstep_m = 0.01") };
+    scene.run();
+    let start = ScanScene::new(SCAN).pose;
+    let turned = (start.rotation.inverse() * scene.pose.rotation).scaled_axis();
     assert!((turned.y * 0.05 - 0.03).abs() < 3.0 * GRAIN, "{turned}");
 }
 
 #[test]
 fn the_scan_turns_at_the_edge_of_the_object_and_never_leaves_it() {
     // The contact is 20 mm behind the middle when the pad is past the edge by 10 mm: (-40 - 0) / 2 = -20.
-    let mut world = World { plate: [[-0.03, 0.02], [-1.0, 1.0]], ..World::new(&SCAN.replace("0.04", "0.2")) };
-    world.run();
-    let (least, most) = world.track.iter().fold((0.0, 0.0), |(a, b): (f64, f64), at| (a.min(at[0]), b.max(at[0])));
+    let mut scene = ScanScene { plate: [[-0.03, 0.02], [-1.0, 1.0]], ..ScanScene::new(&SCAN.replace("0.04", "0.2")) };
+    scene.run();
+    let (least, most) = scene.track.iter().fold((0.0, 0.0), |(a, b): (f64, f64), at| (a.min(at[0]), b.max(at[0])));
     // 40 ms pass before it is taken for an edge.
     let late = 0.04 * 0.02 + 3.0 * GRAIN;
     assert!((0.02..0.02 + late).contains(&most) && (-0.03 - late..-0.03).contains(&least), "{least} {most}");
-    let rows = world.turns.iter().map(|turn| (turn[1] * 1e3).round() as i64).collect::<std::collections::BTreeSet<_>>();
+    let rows = scene.turns.iter().map(|turn| (turn[1] * 1e3).round() as i64).collect::<std::collections::BTreeSet<_>>();
     assert_eq!(rows.into_iter().collect::<Vec<_>>(), [-10, 0, 10]);
 }
 
 #[test]
 fn the_scan_ends_where_a_step_across_leaves_the_surface() {
-    let mut world =
-        World { plate: [[-1.0, 1.0], [-0.1, 0.012]], ..World::new(&SCAN.replace("strokes = 3", "strokes = 9")) };
-    world.run();
-    let most = world.track.iter().fold(0.0, |most: f64, at| most.max(at[1]));
+    let mut scene = ScanScene {
+        plate: [[-1.0, 1.0], [-0.1, 0.012]],
+        ..ScanScene::new(&SCAN.replace("strokes = 3", "strokes = 9"))
+    };
+    scene.run();
+    let most = scene.track.iter().fold(0.0, |most: f64, at| most.max(at[1]));
     assert!((0.012..0.012 + 0.04 * 0.02 + 3.0 * GRAIN).contains(&most), "{most}");
-    assert_eq!(world.rig.get("progress"), Some(&1.0));
+    assert_eq!(scene.rig.get("progress"), Some(&1.0));
 }
 
 #[test]
 fn an_obstacle_ends_a_leg() {
-    let mut world = World { wall: 0.005, ..World::new(SCAN) };
-    world.run();
-    assert!(world.track.iter().all(|at| at[0] < 0.005 + 1e-9));
-    let rows = world.turns.iter().map(|turn| (turn[1] * 1e3).round() as i64).collect::<std::collections::BTreeSet<_>>();
+    let mut scene = ScanScene { wall: 0.005, ..ScanScene::new(SCAN) };
+    scene.run();
+    assert!(scene.track.iter().all(|at| at[0] < 0.005 + 1e-9));
+    let rows = scene.turns.iter().map(|turn| (turn[1] * 1e3).round() as i64).collect::<std::collections::BTreeSet<_>>();
     assert_eq!(rows.into_iter().collect::<Vec<_>>(), [-10, 0, 10]);
 }
 
 #[test]
 fn one_image_with_another_contact_is_not_an_edge() {
-    let mut world = World::new(SCAN);
-    (0..100).for_each(|_| world.step(4.0, 1.0));
-    let before = world.turns.len();
+    let mut scene = ScanScene::new(SCAN);
+    (0..100).for_each(|_| scene.step(4.0, 1.0));
+    let before = scene.turns.len();
     for _ in 0..9 {
-        world.rig.set("gate", true);
-        world.rig.set("x", 0.03);
-        world.rig.set("y", 0.03);
-        world.rig.step_ms(4.0);
+        scene.rig.set("gate", true);
+        scene.rig.set("x", 0.03);
+        scene.rig.set("y", 0.03);
+        scene.rig.step_ms(4.0);
     }
-    world.step(4.0, 1.0);
-    assert_eq!(world.turns.len(), before);
+    scene.step(4.0, 1.0);
+    assert_eq!(scene.turns.len(), before);
 }
 
 #[test]
 fn flicker_pauses_the_scan_and_a_loss_restarts_it() {
     for (ms, goes_on) in [(12, true), (40, false)] {
-        let mut world = World::new(SCAN);
-        while world.rig.get::<f64>("progress").is_none_or(|progress| *progress < 0.4) {
-            world.step(4.0, 1.0);
+        let mut scene = ScanScene::new(SCAN);
+        while scene.rig.get::<f64>("progress").is_none_or(|progress| *progress < 0.4) {
+            scene.step(4.0, 1.0);
         }
         for _ in 0..ms / 4 {
-            world.rig.set("gate", false);
-            world.rig.step_ms(4.0);
-            assert_eq!(world.rig.get::<Twist>("twist"), None, "no contact, no motion");
+            scene.rig.set("gate", false);
+            scene.rig.step_ms(4.0);
+            assert_eq!(scene.rig.get::<Twist>("twist"), None, "no contact, no motion");
         }
-        world.step(4.0, 1.0);
-        assert_eq!(*world.rig.get::<f64>("progress").unwrap() > 0.3, goes_on, "{ms} ms");
-        assert!(world.rig.get::<Twist>("twist").is_some(), "{ms} ms");
+        scene.step(4.0, 1.0);
+        assert_eq!(*scene.rig.get::<f64>("progress").unwrap() > 0.3, goes_on, "{ms} ms");
+        assert!(scene.rig.get::<Twist>("twist").is_some(), "{ms} ms");
     }
 }
 
 #[test]
 fn progress_rises_from_0_to_1() {
-    let mut world = World::new(SCAN);
+    let mut scene = ScanScene::new(SCAN);
     let mut last = 0.0;
-    while !world.is_done {
-        world.step(4.0, 1.0);
-        let progress = *world.rig.get::<f64>("progress").unwrap();
+    while !scene.is_done {
+        scene.step(4.0, 1.0);
+        let progress = *scene.rig.get::<f64>("progress").unwrap();
         assert!((last..=1.0).contains(&progress), "{progress} after {last}");
         last = progress;
     }
@@ -236,24 +239,25 @@ fn progress_rises_from_0_to_1() {
 
 #[test]
 fn the_motion_is_as_old_as_the_gate_and_absent_at_a_speed_of_0() {
-    let mut world = World::new(SCAN);
-    world.step(4.0, 1.0);
-    assert_eq!(world.rig.mark("twist").stamp().nanos, 0);
-    world.rig.step_ms(4.0);
-    assert_eq!(world.rig.freshness("twist"), Freshness::Held, "a silent pad makes nothing new");
-    let mut still = World::new("stroke_m = 0.04\nstep_m = 0.01");
+    let mut scene = ScanScene::new(SCAN);
+    scene.step(4.0, 1.0);
+    assert_eq!(scene.rig.mark("twist").stamp().nanos, 0);
+    scene.rig.step_ms(4.0);
+    assert_eq!(scene.rig.freshness("twist"), Freshness::Held, "a silent pad makes nothing new");
+    let mut still = ScanScene::new("stroke_m = 0.04\nstep_m = 0.01");
     still.step(4.0, 1.0);
     assert_eq!((still.rig.get::<Twist>("twist"), still.rig.get("done")), (None, Some(&false)));
 }
 
 #[test]
 fn another_axis_begins_another_scan() {
-    let guide = |axis| ScanGuide { speed: 0.02, axis, strokes: 2, stroke: 0.04, step: 0.01, edge: 0.02 };
-    let (across, along) = (guide(Axis::X), guide(Axis::Y));
-    let done = Scan { leg: None, ..across.begin() };
-    assert_eq!(across.progress(&done), 1.0);
-    assert!(along.begin().leg.is_some() && along.begin().axis != done.axis);
-    assert_eq!(along.to_scan([1.0, 2.0]), [2.0, 1.0]);
+    let params = |axis| Params { speed_m_per_s: 0.02, axis, strokes: 2, stroke_m: 0.04, step_m: 0.01, edge_m: 0.02 };
+    let (across, along) = (Scan::new(&params(StrokeAxis::X)), Scan::new(&params(StrokeAxis::Y)));
+    let mut done = across;
+    done.leg = None;
+    assert_eq!(done.progress(2), 1.0);
+    assert!(along.leg.is_some() && along.axis != done.axis);
+    assert_eq!(along.axis.order([1.0, 2.0]), [2.0, 1.0]);
 }
 
 #[test]
@@ -269,17 +273,17 @@ proptest! {
     fn every_row_is_swept_from_end_to_end(strokes in 1..6usize, stroke in 0.01..0.1_f64, step in 0.002..0.02_f64, along_y: bool) {
         let axis = if along_y { "y" } else { "x" };
         let params = format!("speed_m_per_s = 0.05\nstrokes = {strokes}\nstroke_m = {stroke}\nstep_m = {step}\naxis = \"{axis}\"");
-        let mut world = World::new(&params);
-        world.run();
+        let mut scene = ScanScene::new(&params);
+        scene.run();
         let side = usize::from(along_y);
         for row in 0..strokes {
             let v: f64 = (row as f64 - (strokes as f64 - 1.0) / 2.0) * step;
             // Each step aside may overshoot by a sample.
-            let near = world.track.iter().filter(|at: &&[f64; 2]| (at[1 - side] - v).abs() < (row + 1) as f64 * 2.5e-4);
+            let near = scene.track.iter().filter(|at: &&[f64; 2]| (at[1 - side] - v).abs() < (row + 1) as f64 * 2.5e-4);
             let (least, most) = near.fold((1.0, -1.0), |(a, b): (f64, f64), at| (a.min(at[side]), b.max(at[side])));
             prop_assert!(least <= -stroke / 2.0 + 4e-4 && most >= stroke / 2.0 - 4e-4, "row {row}: {least} {most}");
         }
-        let (least, most) = world.track.iter().fold((1.0, -1.0), |(a, b): (f64, f64), at| (a.min(at[side]), b.max(at[side])));
+        let (least, most) = scene.track.iter().fold((1.0, -1.0), |(a, b): (f64, f64), at| (a.min(at[side]), b.max(at[side])));
         prop_assert!(least > -stroke / 2.0 - 4e-4 && most < stroke / 2.0 + 4e-4);
     }
 }

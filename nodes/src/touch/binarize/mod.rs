@@ -5,12 +5,16 @@
 //! image's own (N. Otsu, "A threshold selection method from gray-level histograms", 1979), but never below the given one.
 
 mod otsu;
+mod pack;
+mod rule;
 
-use tactflow_runtime::node::{Describe, In, Inputs, Mistake, Mistakes, Node, Out, Outputs, Param, Setup, State, Tick};
+use tactflow_runtime::node::{Describe, In, Inputs, Mistakes, Node, Out, Outputs, Param, Setup, State, Tick};
 use tactflow_runtime::signal::{Image, Mask};
-use wide::f32x8;
 
 pub use otsu::otsu;
+pub use pack::binarize;
+use pack::{for_each_word, pack};
+use rule::{Rule, rule};
 
 /// Finds the tactels above a threshold: fixed, with hysteresis, or computed from the image.
 ///
@@ -95,17 +99,6 @@ pub struct State {
     last: Vec<u64>,
 }
 
-/// Tactels that are compared at once.
-const BLOCK: usize = 8;
-
-/// How tactels are chosen.
-#[derive(Debug, Clone, Copy)]
-enum Rule {
-    Above(f32),
-    Hysteresis { enter: f32, stay: f32 },
-    Otsu { least: f32 },
-}
-
 impl Node for Binarize {
     type Params = Params;
     type Inputs<'a> = Inputs<'a>;
@@ -142,81 +135,6 @@ impl Node for Binarize {
             }
         }
     }
-}
-
-/// The rule that the parameters ask for.
-fn rule(params: &Params) -> Result<Rule, Mistakes> {
-    let mut mistakes = Mistakes::new();
-    let mut narrow = |name: &str, number: f64| {
-        if !(number as f32).is_finite() {
-            let message = format!("{number:e} is too large for a tactel: images are of 32-bit floats");
-            mistakes.push(Mistake::param(name, message));
-        }
-        number as f32
-    };
-    let enter = narrow("threshold", params.threshold);
-    let stay = params.release.map(|release| narrow("release", release));
-    let rule = match (params.method, stay) {
-        (Method::Fixed, None) => Rule::Above(enter),
-        (Method::Otsu, None) => Rule::Otsu { least: enter },
-        (Method::Fixed, Some(stay)) => {
-            if stay >= enter && mistakes.is_empty() {
-                let message = "`release` is not lower than `threshold`";
-                let help =
-                    "a tactel enters above `threshold` and stays above `release`; leave it out for one threshold";
-                mistakes.push(Mistake::param("release", message).help(help));
-            }
-            Rule::Hysteresis { enter, stay }
-        }
-        (Method::Otsu, Some(_)) => {
-            let message = "`release` means nothing with `method = \"otsu\"`: that threshold moves from image to image";
-            mistakes.push(Mistake::key("release", message).help("leave one of the two out"));
-            Rule::Above(enter)
-        }
-    };
-    if mistakes.is_empty() { Ok(rule) } else { Err(mistakes) }
-}
-
-/// Makes the mask the cells above the threshold.
-pub fn binarize(cells: &[f32], threshold: f32, mask: &mut Mask) {
-    for_each_word(cells, mask, |_, tactels| pack(tactels, threshold));
-}
-
-/// Makes each word of the mask what `pack` makes of its number and its at most 64 tactels.
-#[inline]
-fn for_each_word(cells: &[f32], mask: &mut Mask, mut pack: impl FnMut(usize, &[f32]) -> u64) {
-    // An array without columns has no words either.
-    let (cols, stride) = (mask.cols().max(1), mask.stride().max(1));
-    let rows = cells.chunks_exact(cols);
-    let mut at = 0;
-    for (words, row) in mask.words_mut().chunks_exact_mut(stride).zip(rows) {
-        for (word, tactels) in words.iter_mut().zip(row.chunks(64)) {
-            *word = pack(at, tactels);
-            at += 1;
-        }
-    }
-}
-
-/// Returns a word whose bit j is set if tactel j of at most 64 is above the threshold.
-fn pack(tactels: &[f32], threshold: f32) -> u64 {
-    let (blocks, rest) = tactels.as_chunks::<BLOCK>();
-    let mut word = 0;
-    for (k, block) in blocks.iter().enumerate() {
-        word |= pack_block(block, threshold) << (BLOCK * k);
-    }
-    if rest.is_empty() {
-        return word;
-    }
-    // The last block laps over the one before: its bits there are the same.
-    match tactels.last_chunk::<BLOCK>() {
-        Some(block) => word | pack_block(block, threshold) << (tactels.len() - BLOCK),
-        None => rest.iter().rev().fold(0, |word, value| word << 1 | u64::from(*value > threshold)),
-    }
-}
-
-/// Compares all lanes at once and gathers their signs.
-fn pack_block(block: &[f32; BLOCK], threshold: f32) -> u64 {
-    u64::from(f32x8::new(*block).simd_gt(f32x8::splat(threshold)).to_bitmask())
 }
 
 #[cfg(test)]

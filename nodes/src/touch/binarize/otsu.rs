@@ -3,9 +3,9 @@
 /// Steps from the least to the greatest value at which the image may be split.
 pub(super) const STEPS: usize = 256;
 
-/// What fell between two steps.
+/// The values between two steps.
 #[derive(Debug, Clone, Copy)]
-struct Bin {
+struct Level {
     count: f64,
     sum: f64,
     greatest: f32,
@@ -24,24 +24,24 @@ pub fn otsu(cells: &[f32]) -> Option<f32> {
     if least >= greatest {
         return None;
     }
-    let mut bins = [Bin { count: 0.0, sum: 0.0, greatest: f32::NEG_INFINITY }; STEPS];
+    let mut levels = [Level { count: 0.0, sum: 0.0, greatest: f32::NEG_INFINITY }; STEPS];
     let per_value = (STEPS - 1) as f64 / (f64::from(greatest) - f64::from(least));
     for value in cells {
-        let bin = &mut bins[((f64::from(*value) - f64::from(least)) * per_value) as usize];
-        bin.count += 1.0;
-        bin.sum += f64::from(*value);
-        bin.greatest = if *value > bin.greatest { *value } else { bin.greatest };
+        let level = &mut levels[((f64::from(*value) - f64::from(least)) * per_value) as usize];
+        level.count += 1.0;
+        level.sum += f64::from(*value);
+        level.greatest = if *value > level.greatest { *value } else { level.greatest };
     }
-    Some(split(&bins))
+    Some(split(&levels))
 }
 
-fn split(bins: &[Bin; STEPS]) -> f32 {
-    let (count, sum) = bins.iter().fold((0.0, 0.0), |(count, sum), bin| (count + bin.count, sum + bin.sum));
+fn split(levels: &[Level; STEPS]) -> f32 {
+    let (count, sum) = levels.iter().fold((0.0, 0.0), |(count, sum), level| (count + level.count, sum + level.sum));
     let (mut below, mut sum_below) = (0.0, 0.0);
     let (mut best, mut variance) = (f32::NEG_INFINITY, f64::NEG_INFINITY);
-    for bin in bins.iter().filter(|bin| bin.count > 0.0) {
-        below += bin.count;
-        sum_below += bin.sum;
+    for level in levels.iter().filter(|level| level.count > 0.0) {
+        below += level.count;
+        sum_below += level.sum;
         let above = count - below;
         if above == 0.0 {
             break;
@@ -49,7 +49,7 @@ fn split(bins: &[Bin; STEPS]) -> f32 {
         let difference = sum_below / below - (sum - sum_below) / above;
         let between = below * above * difference * difference;
         if between > variance {
-            (best, variance) = (bin.greatest, between);
+            (best, variance) = (level.greatest, between);
         }
     }
     best

@@ -6,12 +6,13 @@ use tactflow_runtime::node::{At, FilePath, Mistake, Mistakes, Param, Reader, Wri
 use tactflow_runtime::signal::{ImageShape, Unit};
 use tactflow_runtime::source::{Code, Item, Value};
 
-use super::lines::Lines;
-use super::{DeviceParams, Params};
+use super::Inputs;
+use super::tactel_curves::TactelCurves;
 use crate::calibration::{Calibration, file};
+use crate::touch::common::{both, narrow, none};
 
 /// The zeros and the curves of all tactels, and the unit of the calibrated image.
-pub(super) type Curves = (Vec<f32>, Lines, Unit);
+pub(super) type Curves = (Vec<f32>, TactelCurves, Unit);
 
 /// A number for each tactel.
 #[derive(Debug, Clone, PartialEq)]
@@ -45,120 +46,109 @@ impl Param for PerTactel {
 }
 
 /// The parameters of the curves, of the graph or of the device.
-#[derive(Default)]
-pub(super) struct CurveParams<'p> {
-    /// Prefix of the names of the parameters.
-    prefix: &'static str,
-    offset: Option<&'p PerTactel>,
-    gain: Option<&'p PerTactel>,
-    unit: Option<&'p str>,
-    file: Option<&'p FilePath>,
+#[derive(Debug, Clone, Default, Param)]
+pub(super) struct CurveParams {
+    /// Reading of an unloaded tactel: a number for all, or a list of rows; 0 without it.
+    #[param(unit = "U")]
+    pub(super) offset: Option<PerTactel>,
+    /// Slope of the line, in units of the output per unit of the input: a number for all, or a list of rows; 1 without it.
+    #[param(unit = "1")]
+    pub(super) gain: Option<PerTactel>,
+    /// Unit of the calibrated image; without it, the unit of the input.
+    pub(super) unit: Option<String>,
+    /// Tactels that measure nothing, as `[row, column]` from 0.
+    #[param(default = Vec::new())]
+    pub(super) dead: Vec<[usize; 2]>,
+    /// A calibration file with a curve for each tactel, instead of `offset`, `gain` and `unit`.
+    pub(super) file: Option<FilePath>,
 }
 
-impl<'p> CurveParams<'p> {
-    /// Returns those of the graph if it has any, else those of the device.
-    pub(super) fn new(Params { offset, gain, unit, file, device, .. }: &'p Params) -> Self {
-        let (offset, gain, unit, file) = (offset.as_ref(), gain.as_ref(), unit.as_deref(), file.as_ref());
-        if offset.is_some() || gain.is_some() || unit.is_some() || file.is_some() {
-            return Self { prefix: "", offset, gain, unit, file };
-        }
-        device.as_ref().map_or_else(Self::default, |DeviceParams { offset, gain, unit, file, .. }| {
-            let (offset, gain, unit, file) = (offset.as_ref(), gain.as_ref(), unit.as_deref(), file.as_ref());
-            Self { prefix: "device.", offset, gain, unit, file }
-        })
+impl CurveParams {
+    /// Returns whether any of the parameters that exclude those of the device is given.
+    pub(super) const fn has_curves(&self) -> bool {
+        self.offset.is_some() || self.gain.is_some() || self.unit.is_some() || self.file.is_some()
     }
 
-    /// Returns the curves for an image.
-    pub(super) fn curves(&self, image: &ImageShape) -> Result<Curves, Mistakes> {
-        let Some(path) = self.file else { return self.read_numbers(image) };
+    /// Returns the curves for an image. `prefix` is that of the names of the parameters.
+    pub(super) fn curves(&self, prefix: &str, image: &ImageShape) -> Result<Curves, Mistakes> {
+        let Some(path) = &self.file else { return self.read_numbers(prefix, image) };
         let numbers = [("offset", self.offset.is_some()), ("gain", self.gain.is_some()), ("unit", self.unit.is_some())];
         let excluded = numbers.into_iter().filter(|(_, is_set)| *is_set).map(|(name, _)| {
-            let mistake = Mistake::key(self.at(name), format!("`{name}` and `file` exclude each other"));
+            let mistake = Mistake::key(format!("{prefix}{name}"), format!("`{name}` and `file` exclude each other"));
             mistake.help(format!("the file has its own: leave out `{name}`, or `file`"))
         });
-        let mut mistakes: Mistakes = excluded.collect();
-        let curves = self.read_file(path, image).map_err(|others| mistakes.extend(others)).ok();
-        curves.filter(|_| mistakes.is_empty()).ok_or(mistakes)
-    }
-
-    fn at(&self, name: &str) -> String {
-        format!("{}{name}", self.prefix)
+        let ((), curves) = both(none(excluded.collect()), read_file(path, prefix, image))?;
+        Ok(curves)
     }
 
     /// Returns straight lines.
-    fn read_numbers(&self, image: &ImageShape) -> Result<Curves, Mistakes> {
-        let mut mistakes = Mistakes::new();
-        let offset = spread(&self.at("offset"), self.offset.unwrap_or(&PerTactel::All(0.0)), image, &mut mistakes);
-        let gain = spread(&self.at("gain"), self.gain.unwrap_or(&PerTactel::All(1.0)), image, &mut mistakes);
-        let unit = self.unit.map_or(Ok(image.unit), Unit::from_str);
-        let unit = unit.map_err(|message| mistakes.push(Mistake::param(self.at("unit"), message))).ok();
-        let curves = unit.map(|unit| (offset, Lines::linear(gain), unit));
-        curves.filter(|_| mistakes.is_empty()).ok_or(mistakes)
-    }
-
-    /// Returns the curves of a calibration file.
-    fn read_file(&self, path: &FilePath, image: &ImageShape) -> Result<Curves, Mistakes> {
-        let bytes = path.bytes()?;
-        let text = String::from_utf8_lossy(&bytes);
-        let calibration = file::read(&text).map_err(|mistakes| {
-            let in_file = |Mistake { at, message, help, .. }: Mistake| {
-                let span = if let At::Span(span) = at { span } else { 0..0 };
-                Mistake { help, ..Mistake::data(path, &*text, span, message) }
-            };
-            mistakes.into_iter().map(in_file).collect::<Mistakes>()
-        })?;
-        let Calibration { rows, cols, reading, unit, .. } = calibration;
-        let unlike = |code, what: String, image: String| {
-            let message = format!("`{}` calibrates {what}, but the image {image}", path.path.display());
-            let mistake = Mistake::new(code, At::Param(self.at("file")), message);
-            Err(mistake.help("use the file that was made for this pad").into())
+    fn read_numbers(&self, prefix: &str, image: &ImageShape) -> Result<Curves, Mistakes> {
+        let spread = |name: &str, value: &Option<PerTactel>, default| {
+            spread(&format!("{prefix}{name}"), value.as_ref().unwrap_or(&PerTactel::All(default)), image)
         };
-        if (rows, cols) != (image.rows, image.cols) {
-            let size = format!("has {} by {}", image.rows, image.cols);
-            return unlike(Code::ShapeMismatch, format!("{rows} by {cols} tactels"), size);
-        }
-        if reading != image.unit {
-            return unlike(Code::UnitMismatch, format!("readings in `{reading}`"), format!("is in `{}`", image.unit));
-        }
-        let (offset, lines) = Lines::new(&calibration);
-        Ok((offset, lines, unit))
+        let numbers = both(spread("offset", &self.offset, 0.0), spread("gain", &self.gain, 1.0));
+        let unit = self.unit.as_deref().map_or(Ok(image.unit), Unit::from_str);
+        let unit = unit.map_err(|message| Mistake::param(format!("{prefix}unit"), message).into());
+        let ((offset, gain), unit) = both(numbers, unit)?;
+        Ok((offset, TactelCurves::Linear(gain), unit))
     }
-}
 
-/// Returns for each tactel whether it is in the list of dead ones.
-pub(super) fn dead(name: &str, list: &[[usize; 2]], image: &ImageShape, mistakes: &mut Mistakes) -> Vec<bool> {
-    let mut is_dead = vec![false; image.tactels()];
-    for [i, j] in list {
-        if *i >= image.rows || *j >= image.cols {
+    /// Returns the indices of the dead tactels.
+    pub(super) fn dead(&self, prefix: &str, image: &ImageShape) -> Result<Vec<usize>, Mistakes> {
+        let outside = self.dead.iter().filter(|[i, j]| *i >= image.rows || *j >= image.cols).map(|[i, j]| {
             let message = format!("tactel [{i}, {j}] is not on an array of {} by {}", image.rows, image.cols);
-            mistakes.push(Mistake::param(name, message).help("rows and columns count from 0"));
-        } else {
-            is_dead[i * image.cols + j] = true;
-        }
+            Mistake::param(format!("{prefix}dead"), message).help("rows and columns count from 0")
+        });
+        none(outside.collect())?;
+        Ok(self.dead.iter().map(|[i, j]| i * image.cols + j).collect())
     }
-    is_dead
 }
 
-/// Returns the parameter `name` for each tactel; its length is only right if there is no mistake.
-fn spread(name: &str, value: &PerTactel, image: &ImageShape, mistakes: &mut Mistakes) -> Vec<f32> {
-    let &ImageShape { rows, cols, .. } = image;
-    let numbers = match value {
-        PerTactel::All(number) => vec![*number; rows * cols],
-        PerTactel::Rows(list) => list.concat(),
+/// Returns the curves of a calibration file.
+fn read_file(path: &FilePath, prefix: &str, image: &ImageShape) -> Result<Curves, Mistakes> {
+    let bytes = path.bytes()?;
+    let text = String::from_utf8_lossy(&bytes);
+    let calibration = file::read(&text).map_err(|mistakes| {
+        let in_file = |Mistake { at, message, help, .. }: Mistake| {
+            let span = if let At::Span(span) = at { span } else { 0..0 };
+            Mistake { help, ..Mistake::data(path, &*text, span, message) }
+        };
+        mistakes.into_iter().map(in_file).collect::<Mistakes>()
+    })?;
+    let Calibration { rows, cols, reading, unit, .. } = calibration;
+    let unlike = |code, what: String, image: String| {
+        let message = format!("`{}` calibrates {what}, but the image {image}", path.path.display());
+        let mistake = Mistake::new(code, At::Param(format!("{prefix}file")), message);
+        Err(mistake.help("use the file that was made for this pad").into())
     };
-    if let PerTactel::Rows(list) = value {
-        if list.len() != rows {
-            let message = format!("`{name}` has {} rows, but the image has {rows}", list.len());
-            mistakes.push(Mistake::param(name, message));
-        } else if let Some(i) = list.iter().position(|row| row.len() != cols) {
-            let message =
-                format!("row {i} of `{name}` has {} numbers, but the image has {cols} columns", list[i].len());
-            mistakes.push(Mistake::param(name, message));
+    if (rows, cols) != (image.rows, image.cols) {
+        let size = format!("has {} by {}", image.rows, image.cols);
+        return unlike(Code::ShapeMismatch, format!("{rows} by {cols} tactels"), size);
+    }
+    if reading != image.unit {
+        return unlike(Code::UnitMismatch, format!("readings in `{reading}`"), format!("is in `{}`", image.unit));
+    }
+    let (offset, curves) = TactelCurves::new(&calibration);
+    Ok((offset, curves, unit))
+}
+
+/// Returns the parameter `name` for each tactel.
+fn spread(name: &str, value: &PerTactel, image: &ImageShape) -> Result<Vec<f32>, Mistakes> {
+    let &ImageShape { rows, cols, .. } = image;
+    let (numbers, flaw) = match value {
+        PerTactel::All(number) => (vec![*number; rows * cols], None),
+        PerTactel::Rows(list) if list.len() != rows => {
+            (list.concat(), Some(format!("`{name}` has {} rows, but the image has {rows}", list.len())))
         }
-    }
-    if let Some(number) = numbers.iter().find(|number| !(**number as f32).is_finite()) {
-        mistakes
-            .push(Mistake::param(name, format!("{number:e} is too large for a tactel: images are of 32-bit floats")));
-    }
-    numbers.into_iter().map(|number| number as f32).collect()
+        PerTactel::Rows(list) => {
+            let flaw = list.iter().enumerate().find(|(_, row)| row.len() != cols).map(|(i, row)| {
+                format!("row {i} of `{name}` has {} numbers, but the image has {cols} columns", row.len())
+            });
+            (list.concat(), flaw)
+        }
+    };
+    let flaws = flaw.into_iter().map(|message| Mistake::param(name, message)).collect();
+    let numbers = numbers.into_iter().map(|number| narrow(name, number)).collect();
+    let ((), numbers) = both(none(flaws), numbers)?;
+    Ok(numbers)
 }

@@ -3,14 +3,15 @@
 //! The zero is part of the state, as a tare changes it: a reset restores the calibrated zero.
 
 mod curves;
-mod lines;
+mod tactel_curves;
 mod tare;
 
 use tactflow_runtime::node::{Describe, FilePath, In, Inputs, Mistakes, Node, Out, Outputs, Param, Setup, State, Tick};
 use tactflow_runtime::signal::{Flag, Image, ImageShape};
 
-use curves::{CurveParams, PerTactel, dead};
-use lines::Lines;
+use super::common::both;
+use curves::{CurveParams, PerTactel};
+use tactel_curves::TactelCurves;
 use tare::{Averages, Rules};
 
 /// Converts the reading of each tactel to a force, by a line or by the curves of a calibration file.
@@ -51,7 +52,7 @@ use tare::{Averages, Rules};
 pub struct Calibrate {
     /// The calibrated zero of each tactel.
     offset: Vec<f32>,
-    lines: Lines,
+    curves: TactelCurves,
     /// `None` if nothing tares.
     rules: Option<Rules>,
 }
@@ -74,7 +75,7 @@ pub struct Params {
     file: Option<FilePath>,
     /// The calibration of the device: `{ from = "pad.calibration" }`. Any of `offset`, `gain`, `unit` and `file` beside it
     /// replaces all four of the device.
-    device: Option<DeviceParams>,
+    device: Option<CurveParams>,
     /// Number of frames whose mean is the new zero.
     #[param(range = 1..=1_000_000, default = 50)]
     tare_window: usize,
@@ -84,24 +85,6 @@ pub struct Params {
     /// Whether to tare with the first frames.
     #[param(default = false)]
     tare_at_start: bool,
-}
-
-/// The calibration that a device states.
-#[derive(Debug, Clone, Param)]
-struct DeviceParams {
-    /// Reading of an unloaded tactel: a number for all, or a list of rows; 0 without it.
-    #[param(unit = "U")]
-    offset: Option<PerTactel>,
-    /// Slope of the line, in units of the output per unit of the input: a number for all, or a list of rows; 1 without it.
-    #[param(unit = "1")]
-    gain: Option<PerTactel>,
-    /// Unit of the calibrated image; without it, the unit of the input.
-    unit: Option<String>,
-    /// Tactels that measure nothing, as `[row, column]` from 0.
-    #[param(default = Vec::new())]
-    dead: Vec<[usize; 2]>,
-    /// A calibration file with a curve for each tactel, instead of `offset`, `gain` and `unit`.
-    file: Option<FilePath>,
 }
 
 /// What `calibrate` reads.
@@ -142,22 +125,19 @@ impl Node for Calibrate {
     type State = State;
 
     fn new(params: Params, setup: &mut Setup<Self>) -> Result<Self, Mistakes> {
-        let mut mistakes = Mistakes::new();
         let image = setup.inputs.image.clone();
-        let rules = Rules::new(&params, &setup.inputs, &mut mistakes);
-        let mut is_dead = dead("dead", &params.dead, &image, &mut mistakes);
-        if let Some(device) = &params.device {
-            let others = dead("device.dead", &device.dead, &image, &mut mistakes);
-            is_dead.iter_mut().zip(others).for_each(|(is_dead, other)| *is_dead |= other);
-        }
-        let curves = CurveParams::new(&params).curves(&image).map_err(|others| mistakes.extend(others)).ok();
-        let Some((mut offset, mut lines, unit)) = curves.filter(|_| mistakes.is_empty()) else { return Err(mistakes) };
-        for i in (0..is_dead.len()).filter(|i| is_dead[*i]) {
+        let rules = Rules::new(&params, &setup.inputs);
+        let Params { offset, gain, unit, dead, file, device, .. } = params;
+        let (own, device) = (CurveParams { offset, gain, unit, dead, file }, device.unwrap_or_default());
+        let dead = both(own.dead("", &image), device.dead("device.", &image));
+        let curves = if own.has_curves() { own.curves("", &image) } else { device.curves("device.", &image) };
+        let ((rules, (dead, others)), (mut offset, mut curves, unit)) = both(both(rules, dead), curves)?;
+        for i in dead.into_iter().chain(others) {
             offset[i] = 0.0;
-            lines.disable(i);
+            curves.disable(i);
         }
         setup.outputs.image = ImageShape { unit, ..image };
-        Ok(Self { offset, lines, rules })
+        Ok(Self { offset, curves, rules })
     }
 
     fn state(&self) -> State {
@@ -167,11 +147,11 @@ impl Node for Calibrate {
 
     fn step(&self, _: &Tick, inputs: Inputs<'_>, out: &mut Outputs, state: &mut State) {
         if let Some(rules) = &self.rules {
-            rules.step(&inputs, &self.offset, &self.lines, state);
+            rules.step(&inputs, &self.offset, &self.curves, state);
         }
         // The loss of the command also wakes the node: without a new frame there is no new image.
         if inputs.image.is_new() {
-            self.lines.apply(inputs.image.cells(), &state.offset, out.image.write().cells_mut());
+            self.curves.apply(inputs.image.cells(), &state.offset, out.image.write().cells_mut());
         } else {
             out.image.keep();
         }

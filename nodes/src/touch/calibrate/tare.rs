@@ -6,7 +6,7 @@
 use tactflow_runtime::node::{At, Mistake, Mistakes};
 use tactflow_runtime::source::Code;
 
-use super::lines::Lines;
+use super::tactel_curves::TactelCurves;
 use super::{Inputs, InputsShapes, Params, State};
 
 /// When the zero changes.
@@ -46,20 +46,20 @@ impl Averages {
 
 impl Rules {
     /// Returns the rules, or `None` if nothing tares. It is a mistake if nothing detects a touched pad.
-    pub(super) fn new(params: &Params, inputs: &InputsShapes, mistakes: &mut Mistakes) -> Option<Self> {
+    pub(super) fn new(params: &Params, inputs: &InputsShapes) -> Result<Option<Self>, Mistakes> {
         let is_at_start = params.tare_at_start;
         if inputs.tare.is_none() && !is_at_start {
-            return None;
+            return Ok(None);
         }
         let is_watched = inputs.present.is_some();
         if !is_watched && params.tare_bound.is_none() {
             let at = if is_at_start { At::Param("tare_at_start".into()) } else { At::Input("tare".into()) };
             let message = "a tare needs `in.present` or `tare_bound`, which detect a touched pad";
             let help = "wire `in.present` to `present` of a `label` after this node, or add a `tare_bound`";
-            mistakes.push(Mistake::new(Code::MissingInput, at, message).help(help));
+            return Err(Mistake::new(Code::MissingInput, at, message).help(help).into());
         }
         let bound = params.tare_bound.map_or(f32::INFINITY, |bound| bound as f32);
-        Some(Self { window: params.tare_window, bound, is_at_start, is_watched })
+        Ok(Some(Self { window: params.tare_window, bound, is_at_start, is_watched }))
     }
 
     /// Returns the first state for an array of that many tactels.
@@ -68,7 +68,7 @@ impl Rules {
     }
 
     /// Checks the command and the last frame, and adds the new frame to the mean.
-    pub(super) fn step(&self, inputs: &Inputs<'_>, calibrated: &[f32], lines: &Lines, state: &mut State) {
+    pub(super) fn step(&self, inputs: &Inputs<'_>, calibrated: &[f32], curves: &TactelCurves, state: &mut State) {
         let is_commanded = inputs.tare.is_some_and(|tare| *tare);
         let averages = &mut state.averages;
         if !inputs.image.is_new() {
@@ -80,7 +80,7 @@ impl Rules {
         match averages.frames {
             Some(1..) if is_touched != Some(false) => averages.frames = None,
             Some(frames) if frames == self.window => {
-                self.apply(frames, &averages.sums, calibrated, lines, &mut state.offset);
+                self.apply(frames, &averages.sums, calibrated, curves, &mut state.offset);
                 averages.frames = None;
             }
             _ => {}
@@ -94,10 +94,10 @@ impl Rules {
     }
 
     /// Sets the zeros to the means, unless one of them is too far from the calibrated zero.
-    fn apply(&self, frames: usize, sums: &[f64], calibrated: &[f32], lines: &Lines, offset: &mut [f32]) {
+    fn apply(&self, frames: usize, sums: &[f64], calibrated: &[f32], curves: &TactelCurves, offset: &mut [f32]) {
         let mean = |i: usize| (sums[i] / frames as f64) as f32;
         let is_near = |i: usize| (mean(i) - calibrated[i]).abs() <= self.bound;
-        let live = || (0..sums.len()).filter(|i| !lines.is_dead(*i));
+        let live = || (0..sums.len()).filter(|i| !curves.is_dead(*i));
         if live().all(is_near) {
             live().for_each(|i| offset[i] = mean(i));
         }

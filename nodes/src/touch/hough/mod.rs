@@ -1,16 +1,16 @@
 //! `hough`: the line through a contact by the Hough transform (paper section III, its ref. 7, Duda and Hart 1972).
-//!
-//! Offsets are counted from the mean position of the region, so that a shift by a tactel changes no vote. With an offset
-//! step below the pitch, whole rows would vote for one offset and none for the next, and the transform would find the rows
-//! of the pad.
+
+mod votes;
 
 use std::f64::consts::PI;
 
 use tactflow_runtime::node::{Describe, Mistake, Mistakes, Node, Out, Outputs, Param, Setup, State, Tick};
-use tactflow_runtime::signal::{Image, ImageShape, Mask, Scalar};
+use tactflow_runtime::signal::{ImageShape, Scalar};
 
+use super::common::both;
 use super::moments::{Inputs, Weighing, Weight, image_shape};
 use crate::motion::axis::half_angle;
+use votes::{collect, peak, vote};
 
 /// Finds the line through a contact by the Hough transform: direction and offset.
 ///
@@ -107,29 +107,17 @@ impl Node for Hough {
 
     fn new(params: Params, setup: &mut Setup<Self>) -> Result<Self, Mistakes> {
         let shape = image_shape(&setup.inputs)?;
-        let mut mistakes = Mistakes::new();
-        let pitch = shape.pitch[0].max(shape.pitch[1]);
-        let offset_step = params.offset_step.unwrap_or(pitch);
-        if pitch <= 0.0 {
-            mistakes.push(Mistake::input("image", "`hough` needs a pad with a pitch"));
-        } else if offset_step < pitch {
-            let message = format!("`offset_step` is smaller than the pitch, {pitch} m");
-            mistakes.push(Mistake::param("offset_step", message).help("leave it out for the pitch"));
-        }
-        let weighing = Weighing::new(params.weight, params.threshold).unwrap_or_else(|others| {
-            mistakes.extend(others);
-            Weighing::Force
-        });
-        if !mistakes.is_empty() {
-            return Err(mistakes);
-        }
+        let weighing = Weighing::new(params.weight, params.threshold);
+        let (offset_step, weighing) = both(offset_step(params.offset_step, shape.pitch), weighing)?;
         let direction = |k: usize| libm::sincos(k as f64 * PI / params.angles as f64);
         let directions = (0..params.angles).map(direction).collect();
         Ok(Self { shape, directions, offset_step, min_strength: params.min_strength, weighing })
     }
 
     fn state(&self) -> State {
-        let offsets = 2 * (diagonal(&self.shape) / self.offset_step).ceil() as usize + 4;
+        let ImageShape { rows, cols, pitch, .. } = self.shape;
+        let diagonal = libm::hypot(cols as f64 * pitch[0], rows as f64 * pitch[1]);
+        let offsets = 2 * (diagonal / self.offset_step).ceil() as usize + 4;
         State {
             tactels: vec![[0.0; 3]; self.shape.tactels()],
             votes: vec![0.0; offsets],
@@ -139,9 +127,9 @@ impl Node for Hough {
 
     fn step(&self, _: &Tick, inputs: Inputs<'_>, out: &mut Outputs, state: &mut State) {
         let State { tactels, votes, scores } = state;
-        let Some((centre, tactels)) = self.collect(&inputs.image, &inputs.region, tactels) else { return };
+        let Some((centre, tactels)) = collect(&self.shape, self.weighing, &inputs, tactels) else { return };
         for (score, direction) in scores.iter_mut().zip(&self.directions) {
-            *score = self.vote(tactels, *direction, votes).1;
+            *score = vote(tactels, *direction, self.offset_step, votes).1;
         }
         let lowest = scores.iter().copied().fold(f64::INFINITY, f64::min);
         let (best, shift) = peak(scores);
@@ -152,7 +140,7 @@ impl Node for Hough {
         out.strength.set(strength);
         if strength > 0.0 && strength >= self.min_strength {
             let (sine, cosine) = libm::sincos((best as f64 + shift) * PI / scores.len() as f64);
-            let (offset, _) = self.vote(tactels, (sine, cosine), votes);
+            let (offset, _) = vote(tactels, (sine, cosine), self.offset_step, votes);
             out.orientation.set(half_angle(2.0 * sine * cosine, cosine * cosine - sine * sine));
             let side = if cosine > 0.0 { 1.0 } else { -1.0 };
             out.offset.set(side * (offset + centre[1] * cosine - centre[0] * sine));
@@ -160,72 +148,19 @@ impl Node for Hough {
     }
 }
 
-impl Hough {
-    /// Returns the mean position of the region from the middle of the pad [m], and its tactels relative to it, each with
-    /// its weight, or `None` if the region is empty.
-    fn collect<'t>(
-        &self,
-        image: &Image,
-        region: &Mask,
-        tactels: &'t mut [[f64; 3]],
-    ) -> Option<([f64; 2], &'t [[f64; 3]])> {
-        let (mut count, mut centre) = (0, [0.0; 2]);
-        for i in 0..region.rows() {
-            for (k, word) in region.row(i).iter().enumerate() {
-                let mut rest = *word;
-                while rest != 0 {
-                    let j = 64 * k + rest.trailing_zeros() as usize;
-                    rest &= rest - 1;
-                    let [x, y] = [self.shape.x(j as f64), self.shape.y(i as f64)];
-                    tactels[count] = [x, y, self.weighing.weight(image.row(i)[j].into())];
-                    centre = [centre[0] + x, centre[1] + y];
-                    count += 1;
-                }
-            }
-        }
-        if count == 0 {
-            return None;
-        }
-        let [x, y] = centre.map(|sum| sum / count as f64);
-        let tactels = &mut tactels[..count];
-        for tactel in tactels.iter_mut() {
-            *tactel = [tactel[0] - x, tactel[1] - y, tactel[2]];
-        }
-        Some(([x, y], tactels))
+/// Returns the distance between two offsets [m]: the parameter, or the pitch without it.
+fn offset_step(param: Option<f64>, pitch: [f64; 2]) -> Result<f64, Mistakes> {
+    let pitch = pitch[0].max(pitch[1]);
+    if pitch <= 0.0 {
+        return Err(Mistake::input("image", "`hough` needs a pad with a pitch").into());
     }
-
-    /// Collects the votes of the tactels for one direction. Returns the mean of the offsets [m], weighted by their squared
-    /// votes, and the sum of the squared votes.
-    fn vote(&self, tactels: &[[f64; 3]], (sine, cosine): (f64, f64), votes: &mut [f64]) -> (f64, f64) {
-        votes.fill(0.0);
-        let middle = votes.len() / 2;
-        for [x, y, weight] in tactels {
-            let position = (y * cosine - x * sine) / self.offset_step + middle as f64;
-            let (at, rest) = (position as usize, position - position.floor());
-            votes[at] += weight * (1.0 - rest);
-            votes[at + 1] += weight * rest;
+    match param {
+        Some(step) if step < pitch => {
+            let message = format!("`offset_step` is smaller than the pitch, {pitch} m");
+            Err(Mistake::param("offset_step", message).help("leave it out for the pitch").into())
         }
-        let (mut moment, mut sum) = (0.0, 0.0);
-        for (k, vote) in votes.iter().enumerate() {
-            moment += vote * vote * (k as f64 - middle as f64);
-            sum += vote * vote;
-        }
-        (if sum > 0.0 { moment / sum * self.offset_step } else { 0.0 }, sum)
+        step => Ok(step.unwrap_or(pitch)),
     }
-}
-
-/// Returns the diagonal of a pad [m].
-fn diagonal(shape: &ImageShape) -> f64 {
-    libm::hypot(shape.cols as f64 * shape.pitch[0], shape.rows as f64 * shape.pitch[1])
-}
-
-/// Returns the index of the highest score, the first one of equals, and the shift from it to the peak of the parabola
-/// through it and its neighbours.
-fn peak(scores: &[f64]) -> (usize, f64) {
-    let best = (1..scores.len()).fold(0, |best, k| if scores[k] > scores[best] { k } else { best });
-    let [before, after] = [scores.len() - 1, 1].map(|step| scores[(best + step) % scores.len()]);
-    let bend = before - 2.0 * scores[best] + after;
-    (best, if bend < 0.0 { (0.5 * (before - after) / bend).clamp(-0.5, 0.5) } else { 0.0 })
 }
 
 #[cfg(test)]

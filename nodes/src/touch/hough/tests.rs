@@ -4,7 +4,7 @@ use std::f64::consts::{FRAC_PI_2, FRAC_PI_4};
 
 use tactflow_runtime::harness::NodeRig;
 use tactflow_runtime::node::At;
-use tactflow_runtime::signal::{Grid, Shape, Unit};
+use tactflow_runtime::signal::{Grid, Image, Mask, Shape, Unit};
 
 use super::*;
 use crate::random::Random;

@@ -1,33 +1,6 @@
-//! The centroids of regions, and the region that is nearest to a position.
+//! The centroids of regions.
 
 use tactflow_runtime::signal::{Grid, Region, Run};
-
-/// Returns the first of the regions with at least `min_area` tactels and `min_force` whose centroid is nearest to
-/// `position` [m].
-#[must_use]
-pub fn nearest(
-    regions: &[Region],
-    centroids: &[[f64; 2]],
-    position: [f64; 2],
-    min_area: usize,
-    min_force: f64,
-) -> Option<usize> {
-    let (mut nearest, mut smallest) = (None, f64::INFINITY);
-    for (i, (region, centroid)) in regions.iter().zip(centroids).enumerate() {
-        let distance = distance_squared(*centroid, position);
-        if distance < smallest && region.area as usize >= min_area && region.force >= min_force {
-            (nearest, smallest) = (Some(i), distance);
-        }
-    }
-    nearest
-}
-
-/// Returns the square of the distance between two positions [m²].
-#[must_use]
-pub fn distance_squared(a: [f64; 2], b: [f64; 2]) -> f64 {
-    let [x, y] = [a[0] - b[0], a[1] - b[1]];
-    x * x + y * y
-}
 
 /// Returns a buffer for the centroids of all regions that an array can have.
 #[must_use]

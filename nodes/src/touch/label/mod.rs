@@ -1,18 +1,20 @@
 //! `label`: the connected regions of a mask, and the region that is the contact (paper section III, after its ref. 21).
 
 mod centroids;
+mod choice;
+mod neighbours;
 mod runs;
 
 use tactflow_runtime::node::{
-    Absence, Describe, In, Inputs, Mistake, Mistakes, Node, Out, Outputs, Param, Reader, Setup, State, Tick, Written,
-    read_leaf,
+    Absence, Describe, In, Inputs, Mistake, Mistakes, Node, Out, Outputs, Param, Setup, State, Tick,
 };
 use tactflow_runtime::signal::{Flag, Grid, Image, Mask, Region, Regions, RegionsShape, Run};
-use tactflow_runtime::source::Value;
 
 use crate::touch::common::check_same_array;
+use neighbours::Neighbours;
 
-pub use centroids::{centroid_buffer, centroids, distance_squared, nearest};
+pub use centroids::{centroid_buffer, centroids};
+pub use choice::{contact, distance_squared, nearest, ranked};
 pub use runs::{number, paint, trace};
 
 /// Finds the connected regions of a mask, and the region that is the contact.
@@ -49,9 +51,7 @@ pub use runs::{number, paint, trace};
 pub struct Label {
     /// How many columns beyond its ends a run touches runs of the next row.
     reach: u32,
-    min_area: usize,
-    min_force: f64,
-    choose: Choose,
+    params: Params,
     grid: Grid,
 }
 
@@ -59,7 +59,7 @@ pub struct Label {
 #[derive(Debug, Clone, Param)]
 pub struct Params {
     /// Number of neighbours of a tactel: 4 (common edges) or 8 (also common corners).
-    #[param(default = Neighbours::Eight)]
+    #[param(default = Neighbours::EIGHT)]
     neighbours: Neighbours,
     /// Smallest area of a contact.
     #[param(unit = "tactel", range = 1..=1_000_000, default = 1, live)]
@@ -70,37 +70,6 @@ pub struct Params {
     /// Which of the regions with `min_area` and `min_force` is the contact.
     #[param(default = Choose::Largest)]
     choose: Choose,
-}
-
-/// Which tactels are neighbours.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Neighbours {
-    /// Those with a common edge.
-    Four,
-    /// Those with a common edge or corner.
-    Eight,
-}
-
-impl Param for Neighbours {
-    const EXPECTS: &'static str = "4 or 8";
-
-    fn read(value: &Value, reader: &mut Reader<'_>) -> Option<Self> {
-        match read_leaf::<u64>(value, reader, Self::EXPECTS)? {
-            4 => Some(Self::Four),
-            8 => Some(Self::Eight),
-            _ => {
-                reader.wrong_type(value, Self::EXPECTS);
-                None
-            }
-        }
-    }
-
-    fn written(&self) -> Option<Written> {
-        Some(match self {
-            Self::Four => 4.into(),
-            Self::Eight => 8.into(),
-        })
-    }
 }
 
 /// Which region is the contact.
@@ -160,12 +129,11 @@ impl Node for Label {
             let message = format!("an array of {} by {} can have more than 65535 runs", mask.rows, mask.cols);
             return Err(Mistake::input("mask", message).help("use a smaller array").into());
         }
-        let reach = u32::from(params.neighbours == Neighbours::Eight);
-        let Params { min_area, min_force, choose, .. } = params;
+        let reach = u32::from(params.neighbours == Neighbours::EIGHT);
         let grid = mask.clone();
         setup.outputs.regions = RegionsShape { grid: grid.clone(), unit: image.unit };
         setup.outputs.region = grid.clone();
-        Ok(Self { reach, min_area, min_force, choose, grid })
+        Ok(Self { reach, params, grid })
     }
 
     fn state(&self) -> State {
@@ -176,8 +144,8 @@ impl Node for Label {
         let (runs, regions) = out.regions.write().parts_mut();
         trace(&inputs.mask, self.reach, runs);
         number(&inputs.image, runs, regions);
-        let largest = contact(regions, self.min_area, self.min_force);
-        let contact = match self.choose {
+        let largest = contact(regions, self.params.min_area, self.params.min_force);
+        let contact = match self.params.choose {
             Choose::Largest => largest,
             Choose::Nearest => self.track(largest, tick, runs, regions, state),
         };
@@ -206,24 +174,12 @@ impl Label {
             state.last = None;
         }
         let centroids = centroids(&self.grid, runs, regions, &mut state.centroids);
-        let nearest = state.last.and_then(|last| nearest(regions, centroids, last, self.min_area, self.min_force));
+        let Params { min_area, min_force, .. } = self.params;
+        let nearest = state.last.and_then(|last| nearest(regions, centroids, last, min_area, min_force));
         let contact = nearest.unwrap_or(largest);
         state.last = Some(centroids[contact]);
         Some(contact)
     }
-}
-
-/// Returns the largest region with at least `min_area` tactels and `min_force`, the first one of equals.
-#[must_use]
-pub fn contact(regions: &[Region], min_area: usize, min_force: f64) -> Option<usize> {
-    let mut largest = None;
-    let mut area = 0;
-    for (i, region) in regions.iter().enumerate() {
-        if region.area > area && region.area as usize >= min_area && region.force >= min_force {
-            (largest, area) = (Some(i), region.area);
-        }
-    }
-    largest
 }
 
 #[cfg(test)]

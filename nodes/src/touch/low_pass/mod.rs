@@ -2,13 +2,10 @@
 
 use std::f64::consts::PI;
 
-use tactflow_runtime::node::{
-    At, Describe, In, Inputs, Interval, Mistake, Mistakes, Node, Out, Outputs, Param, Setup, State, Tick,
-};
-use tactflow_runtime::signal::Scalar;
+use tactflow_runtime::node::{At, Describe, Interval, Mistake, Mistakes, Node, Param, Setup, State, Tick};
 use tactflow_runtime::source::Code;
 
-use crate::motion::axis::{doubled, halved};
+use super::filter::{Averaging, Inputs, Outputs};
 
 /// Smooths a feature with a first-order low-pass filter.
 ///
@@ -41,7 +38,7 @@ use crate::motion::axis::{doubled, halved};
 pub struct LowPass {
     /// Time constant T [s].
     time: f64,
-    is_axial: bool,
+    averaging: Averaging,
 }
 
 /// Parameters of `low_pass`.
@@ -55,26 +52,10 @@ pub struct Params {
     cutoff_hz: Option<f64>,
 }
 
-/// What `low_pass` reads.
-#[derive(Inputs)]
-pub struct Inputs<'a> {
-    /// Any feature.
-    #[port(unit = "U", frame = "A")]
-    value: In<'a, Scalar>,
-}
-
-/// What `low_pass` writes.
-#[derive(Outputs)]
-pub struct Outputs {
-    /// The filtered feature; absent for axes that cancel each other.
-    #[port(unit = "U", frame = "A")]
-    value: Out<Scalar>,
-}
-
 /// What `low_pass` remembers.
 #[derive(State)]
 pub struct State {
-    /// The last output: the mean cosine and sine of the doubled angle of an axis, else the value and 0.
+    /// The mean vector of the last output.
     last: Option<[f64; 2]>,
     interval: Interval,
 }
@@ -89,11 +70,10 @@ impl Node for LowPass {
     type State = State;
 
     fn new(params: Params, setup: &mut Setup<Self>) -> Result<Self, Mistakes> {
-        let is_axial = setup.inputs.value.unit.is_axial();
-        setup.outputs.value.range = setup.inputs.value.range;
+        let averaging = Averaging::new(&setup.inputs, &mut setup.outputs);
         match (params.time_constant_ms, params.cutoff_hz) {
-            (Some(ms), None) => Ok(Self { time: ms * 1e-3, is_axial }),
-            (None, Some(hz)) => Ok(Self { time: 0.5 / (PI * hz), is_axial }),
+            (Some(ms), None) => Ok(Self { time: ms * 1e-3, averaging }),
+            (None, Some(hz)) => Ok(Self { time: 0.5 / (PI * hz), averaging }),
             (None, None) => {
                 let message = "`low_pass` needs `time_constant_ms` or `cutoff_hz`";
                 let mistake = Mistake::new(Code::MissingKey, At::Node, message);
@@ -112,7 +92,7 @@ impl Node for LowPass {
 
     fn step(&self, tick: &Tick, inputs: Inputs<'_>, out: &mut Outputs, state: &mut State) {
         let dt = state.interval.step(&inputs.value, tick);
-        let next = if self.is_axial { doubled(*inputs.value) } else { [*inputs.value, 0.0] };
+        let next = self.averaging.vector(*inputs.value);
         let value = match state.last.zip(dt) {
             Some(([a, b], dt)) => {
                 // A time constant that underflows to 0 would make 0 / 0 of a dt of 0.
@@ -122,7 +102,7 @@ impl Node for LowPass {
             None => next,
         };
         state.last = Some(value);
-        if let Some(value) = if self.is_axial { halved(value) } else { Some(value[0]) } {
+        if let Some(value) = self.averaging.value(value) {
             out.value.set(value);
         }
     }

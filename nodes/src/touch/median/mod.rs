@@ -2,9 +2,9 @@
 
 use std::cmp::Ordering;
 
-use tactflow_runtime::node::{Describe, In, Inputs, Mistakes, Node, Out, Outputs, Param, Setup, State, Tick};
-use tactflow_runtime::signal::Scalar;
+use tactflow_runtime::node::{Describe, Mistakes, Node, Param, Setup, State, Tick};
 
+use super::filter::{Inputs, Outputs, Ring};
 use crate::motion::axis::wrap_axial;
 
 /// Removes single wrong samples from a feature: the median of the newest samples.
@@ -45,33 +45,12 @@ pub struct Params {
     window: usize,
 }
 
-/// What `median` reads.
-#[derive(Inputs)]
-pub struct Inputs<'a> {
-    /// Any feature.
-    #[port(unit = "U", frame = "A")]
-    value: In<'a, Scalar>,
-}
-
-/// What `median` writes.
-#[derive(Outputs)]
-pub struct Outputs {
-    /// The median of the window.
-    #[port(unit = "U", frame = "A")]
-    value: Out<Scalar>,
-}
-
 /// What `median` remembers.
 #[derive(State)]
 pub struct State {
-    /// The newest samples in a ring.
-    ring: Vec<f64>,
+    ring: Ring<f64>,
     /// Buffer for the samples in order of size.
     sorted: Vec<f64>,
-    /// Index of the next sample.
-    next: usize,
-    /// Number of samples in the window.
-    count: usize,
 }
 
 /// Largest window [samples]: a step compares each axis with each other.
@@ -89,41 +68,36 @@ impl Node for Median {
     }
 
     fn state(&self) -> State {
-        State { ring: vec![0.0; self.window], sorted: vec![0.0; self.window], next: 0, count: 0 }
+        State { ring: Ring::new(self.window), sorted: vec![0.0; self.window] }
     }
 
     fn step(&self, _: &Tick, inputs: Inputs<'_>, out: &mut Outputs, state: &mut State) {
-        state.push(*inputs.value);
-        out.value.set(if self.is_axial { wrap_axial(state.median_axis()) } else { state.median() });
+        state.ring.push(*inputs.value);
+        out.value.set(if self.is_axial {
+            wrap_axial(median_axis(&state.ring))
+        } else {
+            median(state.ring.unordered(), &mut state.sorted)
+        });
     }
 }
 
-impl State {
-    fn push(&mut self, sample: f64) {
-        self.ring[self.next] = sample;
-        self.next = if self.next + 1 < self.ring.len() { self.next + 1 } else { 0 };
-        self.count = (self.count + 1).min(self.ring.len());
+/// Returns the median of the samples; `sorted` is a buffer for as many.
+fn median(samples: &[f64], sorted: &mut [f64]) -> f64 {
+    let sorted = &mut sorted[..samples.len()];
+    sorted.copy_from_slice(samples);
+    let (below, middle, _) = sorted.select_nth_unstable_by(samples.len() / 2, f64::total_cmp);
+    if samples.len() % 2 == 1 {
+        return *middle;
     }
+    let lower = below.iter().copied().max_by(f64::total_cmp);
+    lower.map_or(*middle, |lower| lower.midpoint(*middle))
+}
 
-    fn median(&mut self) -> f64 {
-        // Until the ring is full, the samples are at its start.
-        let sorted = &mut self.sorted[..self.count];
-        sorted.copy_from_slice(&self.ring[..self.count]);
-        let (below, middle, _) = sorted.select_nth_unstable_by(self.count / 2, f64::total_cmp);
-        if self.count % 2 == 1 {
-            return *middle;
-        }
-        let lower = below.iter().copied().max_by(f64::total_cmp);
-        lower.map_or(*middle, |lower| lower.midpoint(*middle))
-    }
-
-    fn median_axis(&self) -> f64 {
-        let samples = &self.ring[..self.count];
-        let distance = |axis: f64| samples.iter().fold(0.0, |sum, other| sum + wrap_axial(axis - other).abs());
-        let newest_first = (1..=self.count).map(|k| samples[(self.next + self.count - k) % self.count]);
-        let nearer = |a: (f64, f64), b: (f64, f64)| if a.1.total_cmp(&b.1) == Ordering::Greater { b } else { a };
-        newest_first.map(|axis| (axis, distance(axis))).reduce(nearer).map_or(0.0, |(axis, _)| axis)
-    }
+/// Returns the axis with the smallest sum of distances to all others, the newest one of equals.
+fn median_axis(ring: &Ring<f64>) -> f64 {
+    let distance = |axis: f64| ring.unordered().iter().fold(0.0, |sum, other| sum + wrap_axial(axis - other).abs());
+    let nearer = |a: (f64, f64), b: (f64, f64)| if a.1.total_cmp(&b.1) == Ordering::Greater { b } else { a };
+    ring.newest_first().map(|axis| (axis, distance(axis))).reduce(nearer).map_or(0.0, |(axis, _)| axis)
 }
 
 #[cfg(test)]

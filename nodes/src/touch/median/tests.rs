@@ -4,7 +4,7 @@ use std::f64::consts::{FRAC_PI_2, PI};
 
 use proptest::prelude::*;
 use tactflow_runtime::harness::NodeRig;
-use tactflow_runtime::signal::{Freshness, ScalarShape, Unit};
+use tactflow_runtime::signal::{Freshness, Scalar, ScalarShape, Unit};
 
 use super::*;
 

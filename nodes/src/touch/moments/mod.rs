@@ -10,7 +10,7 @@ use tactflow_runtime::signal::{Image, ImageShape, Mask, Scalar};
 
 use crate::touch::common::check_same_array;
 
-pub use sums::{Ellipse, Sums, Weighing, Weight, add_up, ellipse};
+pub use sums::{Ellipse, Sums, Weighing, Weight, ellipse};
 
 /// Measures a contact: force, pressure, centre of gravity and orientation.
 ///
@@ -54,18 +54,18 @@ pub struct Moments {
     min_anisotropy: f64,
 }
 
-/// Parameters of `moments`.
+/// Parameters of a node that measures an orientation.
 #[derive(Debug, Clone, Param)]
 pub struct Params {
     /// Smallest anisotropy, from 0 (round) to 1 (a line), at which a contact has an orientation.
     #[param(unit = "1", range = 0.0..=1.0, default = 0.1)]
-    min_anisotropy: f64,
+    pub(super) min_anisotropy: f64,
     /// Weight of each tactel: its value, its excess over `threshold`, or 1.
     #[param(default = Weight::Force)]
-    weight: Weight,
+    pub(super) weight: Weight,
     /// Zero of the excess, for `weight = "excess"`: the threshold of `binarize`, or its `release` if it has one.
     #[param(unit = "U")]
-    threshold: Option<f64>,
+    pub(super) threshold: Option<f64>,
 }
 
 /// What a node that measures a contact reads.
@@ -126,7 +126,7 @@ impl Node for Moments {
     fn state(&self) {}
 
     fn step(&self, _: &Tick, inputs: Inputs<'_>, out: &mut Outputs, (): &mut ()) {
-        let sums = add_up(&inputs.image, &inputs.region);
+        let sums = Weighing::Force.add_up(&inputs.image, &inputs.region);
         out.force.set(sums.force);
         out.area.set(sums.area);
         if sums.area > 0.0 {

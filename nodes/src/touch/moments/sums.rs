@@ -64,7 +64,7 @@ impl Weighing {
     #[must_use]
     pub fn add_up(self, image: &Image, region: &Mask) -> Sums {
         match self {
-            Self::Force => add_up(image, region),
+            Self::Force => add_up_by(image, region, |value| value),
             other => add_up_by(image, region, |value| other.weight(value)),
         }
     }
@@ -86,12 +86,6 @@ pub struct Sums {
     xx: f64,
     xy: f64,
     yy: f64,
-}
-
-/// Returns the sums over a region with each tactel weighted by its value, in one pass in raster order.
-#[must_use]
-pub fn add_up(image: &Image, region: &Mask) -> Sums {
-    add_up_by(image, region, |value| value)
 }
 
 /// Returns the sums over a region with each tactel weighted by a function of its value.

@@ -3,12 +3,12 @@
 //! The window is summed from its oldest sample to its newest in each step: the sum does not drift, and a sample that has
 //! left the window has no influence.
 
-use tactflow_runtime::node::{
-    Describe, In, Inputs, Interval, Mistake, Mistakes, Node, Out, Outputs, Param, Setup, State, Tick,
-};
-use tactflow_runtime::signal::Scalar;
+mod mean;
 
-use crate::motion::axis::{doubled, halved};
+use tactflow_runtime::node::{Describe, Interval, Mistake, Mistakes, Node, Param, Setup, State, Tick};
+
+use super::filter::{Averaging, Inputs, Outputs, Ring};
+use mean::{TimedVector, mean};
 
 /// Smooths a feature: the mean over the newest samples, or over a time.
 ///
@@ -45,7 +45,7 @@ pub struct MovingAverage {
     capacity: usize,
     /// Length of the window [ns], unless it is a number of samples.
     time: Option<i64>,
-    is_axial: bool,
+    averaging: Averaging,
 }
 
 /// Parameters of `moving_average`.
@@ -59,36 +59,13 @@ pub struct Params {
     window_ms: Option<f64>,
 }
 
-/// What `moving_average` reads.
-#[derive(Inputs)]
-pub struct Inputs<'a> {
-    /// Any feature.
-    #[port(unit = "U", frame = "A")]
-    value: In<'a, Scalar>,
-}
-
-/// What `moving_average` writes.
-#[derive(Outputs)]
-pub struct Outputs {
-    /// Its mean over the window; absent for axes that cancel each other.
-    #[port(unit = "U", frame = "A")]
-    value: Out<Scalar>,
-}
-
 /// What `moving_average` remembers.
 #[derive(State)]
 pub struct State {
-    /// The newest samples in a ring: the cosine and the sine of the doubled angle of an axis, else the value and 0.
-    ring: Vec<[f64; 2]>,
-    /// Time of each of them [ns]; empty if the window is a number of samples.
-    times: Vec<i64>,
-    /// Time of the newest sample [ns], from an arbitrary zero.
+    ring: Ring<TimedVector>,
+    /// Time of the newest sample [ns], from an arbitrary zero; 0 if the window is a number of samples.
     now: i64,
     interval: Interval,
-    /// Index of the next sample.
-    next: usize,
-    /// Number of samples in the window.
-    count: usize,
 }
 
 /// Window without parameters, as in the paper [samples].
@@ -103,8 +80,7 @@ impl Node for MovingAverage {
     type State = State;
 
     fn new(params: Params, setup: &mut Setup<Self>) -> Result<Self, Mistakes> {
-        let is_axial = setup.inputs.value.unit.is_axial();
-        setup.outputs.value.range = setup.inputs.value.range;
+        let averaging = Averaging::new(&setup.inputs, &mut setup.outputs);
         let (capacity, time) = match (params.window, params.window_ms) {
             (window, None) => (window.unwrap_or(DEFAULT_WINDOW), None),
             (None, Some(ms)) => {
@@ -122,82 +98,26 @@ impl Node for MovingAverage {
                 return Err(mistake.help("leave out one of the two").into());
             }
         };
-        Ok(Self { capacity, time, is_axial })
+        Ok(Self { capacity, time, averaging })
     }
 
     fn state(&self) -> State {
-        let times = if self.time.is_some() { vec![0; self.capacity] } else { Vec::new() };
-        State { ring: vec![[0.0; 2]; self.capacity], times, now: 0, interval: Interval::default(), next: 0, count: 0 }
+        State { ring: Ring::new(self.capacity), now: 0, interval: Interval::default() }
     }
 
     fn step(&self, tick: &Tick, inputs: Inputs<'_>, out: &mut Outputs, state: &mut State) {
-        let value = *inputs.value;
-        if let Some(time) = self.time {
-            let dt = state.interval.step(&inputs.value, tick);
-            state.advance(dt, time);
+        if let Some(window) = self.time {
+            match state.interval.step(&inputs.value, tick) {
+                Some(dt) => state.now += (dt * 1e9).round() as i64,
+                None => state.ring.clear(),
+            }
+            state.ring.forget(|(time, _)| state.now - time >= window);
         }
-        if !self.is_axial {
-            state.push([value, 0.0]);
-            out.value.set(state.mean()[0]);
-            return;
-        }
-        state.push(doubled(value));
-        if let Some(mean) = halved(state.mean()) {
+        state.ring.push((state.now, self.averaging.vector(*inputs.value)));
+        if let Some(mean) = self.averaging.value(mean(&state.ring)) {
             out.value.set(mean);
         }
     }
-}
-
-impl State {
-    fn push(&mut self, sample: [f64; 2]) {
-        self.ring[self.next] = sample;
-        self.next = if self.next + 1 < self.ring.len() { self.next + 1 } else { 0 };
-        self.count = (self.count + 1).min(self.ring.len());
-    }
-
-    /// Sets the time of the next sample, `dt` [s] after the last one, and removes the samples that are `time` [ns] older or
-    /// more. Without a `dt` it removes all.
-    fn advance(&mut self, dt: Option<f64>, time: i64) {
-        match dt {
-            Some(dt) => self.now += (dt * 1e9).round() as i64,
-            None => self.count = 0,
-        }
-        // In a full ring the next sample replaces the oldest.
-        self.count = self.count.min(self.ring.len() - 1);
-        self.times[self.next] = self.now;
-        while self.count > 0 && self.now - self.times[self.oldest()] >= time {
-            self.count -= 1;
-        }
-    }
-
-    /// Returns the index of the oldest sample of the window, or of the next one if the window is empty.
-    fn oldest(&self) -> usize {
-        if self.next >= self.count { self.next - self.count } else { self.next + self.ring.len() - self.count }
-    }
-
-    fn mean(&self) -> [f64; 2] {
-        let oldest = self.oldest();
-        let end = (oldest + self.count).min(self.ring.len());
-        let (older, newer) = (&self.ring[oldest..end], &self.ring[..self.count - (end - oldest)]);
-        let count = self.count as f64;
-        let sum = add_up(older, newer, |sample| sample);
-        if sum[0].is_finite() {
-            return sum.map(|sum| sum / count);
-        }
-        // The sum of very large samples is infinite, their mean is not.
-        add_up(older, newer, |sample| sample / count).map(|mean| mean.clamp(f64::MIN, f64::MAX))
-    }
-}
-
-/// Returns the sums over both parts of the ring.
-fn add_up(older: &[[f64; 2]], newer: &[[f64; 2]], scale: impl Fn(f64) -> f64) -> [f64; 2] {
-    let mut sum = [0.0; 2];
-    for samples in [older, newer] {
-        for [a, b] in samples {
-            sum = [sum[0] + scale(*a), sum[1] + scale(*b)];
-        }
-    }
-    sum
 }
 
 #[cfg(test)]

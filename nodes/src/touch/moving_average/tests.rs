@@ -3,7 +3,7 @@
 use proptest::prelude::*;
 use tactflow_runtime::harness::NodeRig;
 use tactflow_runtime::node::At;
-use tactflow_runtime::signal::{Freshness, ScalarShape, Stamp, Unit};
+use tactflow_runtime::signal::{Freshness, Scalar, ScalarShape, Stamp, Unit};
 
 use super::*;
 

@@ -1,10 +1,12 @@
 //! `tactile_source`: a pad's image in the sensor's frame, with its sum and its peak.
 
+mod order;
 mod sums;
 
 use tactflow_runtime::node::{Describe, In, Inputs, Mistake, Mistakes, Node, Out, Outputs, Param, Setup, Tick};
-use tactflow_runtime::signal::{Image, ImageShape, Scalar};
+use tactflow_runtime::signal::{Image, Scalar};
 
+use order::{order, transposed};
 pub use sums::sum_and_peak;
 
 /// Converts a pad's image to the sensor's frame, with its sum and its peak.
@@ -104,27 +106,11 @@ impl Node for TactileSource {
     }
 }
 
-fn transposed(image: &ImageShape) -> ImageShape {
-    let [along_x, along_y] = image.pitch;
-    ImageShape { rows: image.cols, cols: image.rows, pitch: [along_y, along_x], unit: image.unit }
-}
-
-/// Returns the index in the device's image of each tactel of the sensor's.
-fn order(sensor: &ImageShape, params: &Params) -> Box<[u32]> {
-    let &ImageShape { rows, cols, .. } = sensor;
-    let from = |i: usize, j: usize| {
-        let i = if params.flip_y { rows - 1 - i } else { i };
-        let j = if params.flip_x { cols - 1 - j } else { j };
-        (if params.transpose { j * rows + i } else { i * cols + j }) as u32
-    };
-    (0..rows).flat_map(|i| (0..cols).map(move |j| from(i, j))).collect()
-}
-
 #[cfg(test)]
 mod tests {
     use proptest::prelude::*;
     use tactflow_runtime::harness::NodeRig;
-    use tactflow_runtime::signal::{Shape, Unit};
+    use tactflow_runtime::signal::{ImageShape, Shape, Unit};
 
     use super::*;
 

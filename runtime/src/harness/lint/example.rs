@@ -6,7 +6,7 @@ use super::watched::{StepRecord, Watched};
 use super::{Lint, Notes, Violation};
 use crate::engine::Engine;
 use crate::example::example_graph;
-use crate::graph::{Compiled, Origin, OutlinedBlock, PlannedNode, Request, Setting, compile};
+use crate::graph::{Compiled, OutlinedBlock, PlannedNode, Request, Setting, ValueOrigin, compile};
 use crate::node::ParamSpec;
 
 /// An example runs for so many ticks, unless its devices end before.
@@ -52,7 +52,7 @@ impl Lint<'_> {
     /// Writes each default into the block that relies on it.
     fn defaults(&self, text: &str, section: &str, block: &OutlinedBlock, specs: &[ParamSpec], notes: &mut Notes<'_>) {
         // A value that the example gives may be there because the default would not do.
-        let is_default = |setting: &&Setting| setting.origin == Origin::Default;
+        let is_default = |setting: &&Setting| setting.origin == ValueOrigin::Default;
         let settings: Vec<&str> = block.settings.iter().filter(is_default).map(|setting| &*setting.path).collect();
         for param in specs.iter().filter(|param| settings.contains(&param.name)) {
             let Some(default) = &param.default else { continue };

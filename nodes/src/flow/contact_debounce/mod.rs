@@ -1,19 +1,11 @@
-//! `contact_debounce`: the state follows from the newest `samples` flags.
-//!
-//! With five samples, written oldest first, it is the debouncer of the authors' later code:
-//!
-//! | flags | state | code |
-//! |---|---|---|
-//! | 00000 | none | 0 |
-//! | 00111 | initial | 1 |
-//! | 11111 | stable | 2 |
-//! | 11100 | leaving | 3 |
-//! | any other | uncertain | 4 |
-//!
-//! Samples that are still missing at the start count as no contact. A held flag is not a sample.
+//! `contact_debounce`: the state of a contact, from the newest flags. A held flag is not a sample.
+
+mod phase;
 
 use tactflow_runtime::node::{Describe, In, Inputs, Mistakes, Node, Out, Outputs, Param, Setup, State, Tick};
 use tactflow_runtime::signal::{Flag, Scalar};
+
+pub use phase::{ContactPhase, phase};
 
 /// Removes flicker from a contact: the contact begins once it has lasted for some samples.
 ///
@@ -80,21 +72,6 @@ pub struct State {
     is_present: bool,
 }
 
-/// The state of a contact.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Phase {
-    /// No sample has a contact.
-    None,
-    /// The newer half of the samples has a contact.
-    Initial,
-    /// All samples have a contact.
-    Stable,
-    /// The older half of the samples has a contact.
-    Leaving,
-    /// Anything else.
-    Uncertain,
-}
-
 impl Node for ContactDebounce {
     type Params = Params;
     type Inputs<'a> = Inputs<'a>;
@@ -113,29 +90,14 @@ impl Node for ContactDebounce {
         state.history = state.history << 1 | u64::from(*inputs.present);
         let phase = phase(state.history, self.samples);
         state.is_present = match phase {
-            Phase::Stable => true,
-            Phase::None => false,
+            ContactPhase::Stable => true,
+            ContactPhase::None => false,
             _ => state.is_present,
         };
         out.present.set(state.is_present);
         out.state.set(f64::from(phase as u8));
-        out.stable.set(phase == Phase::Stable);
-        out.uncertain.set(phase == Phase::Uncertain);
-    }
-}
-
-/// Returns the state for the newest `samples` of a history, from 1 to 64; the newest sample is the lowest bit.
-#[must_use]
-pub fn phase(history: u64, samples: u32) -> Phase {
-    let ones = |count: u32| u64::MAX.checked_shr(u64::BITS - count).unwrap_or(0);
-    let (all, newer) = (ones(samples), ones(samples - samples / 2));
-    let older = all ^ ones(samples / 2);
-    match history & all {
-        0 => Phase::None,
-        flags if flags == all => Phase::Stable,
-        flags if flags == newer => Phase::Initial,
-        flags if flags == older => Phase::Leaving,
-        _ => Phase::Uncertain,
+        out.stable.set(phase == ContactPhase::Stable);
+        out.uncertain.set(phase == ContactPhase::Uncertain);
     }
 }
 

@@ -3,8 +3,13 @@
 //! The input is read as the last tick left it, so the node steps before the node that it reads from. What was new then is
 //! new now, and what was held is held.
 
-use tactflow_runtime::node::{Describe, In, Inputs, Mistakes, Node, Out, Outputs, Param, Setup, State, Tick};
-use tactflow_runtime::signal::{Scalar, ScalarShape, Settable, Signal, Twist, TwistShape, Unit};
+mod delayable;
+
+use tactflow_runtime::node::{Describe, In, Inputs, Mistakes, Node, Out, Outputs, Setup, Tick};
+use tactflow_runtime::signal::{Scalar, Signal, Twist};
+
+use super::passing::State;
+pub use delayable::{Delayable, ScalarParams, TwistParams};
 
 /// Delays a signal by one tick, so that a loop is allowed.
 ///
@@ -41,33 +46,6 @@ pub struct Delay<T> {
     initial: Option<T>,
 }
 
-/// A kind of signal that can be delayed.
-pub trait Delayable: Settable + Copy {
-    /// Parameters of the delay.
-    type Params: Param;
-
-    /// Returns the shape of the output, and its value while the input is absent.
-    fn configure(params: Self::Params) -> (<Self as Signal>::Shape, Option<Self>);
-}
-
-/// Parameters of `delay`.
-#[derive(Debug, Clone, Param)]
-pub struct ScalarParams {
-    /// Unit of the input.
-    unit: Unit,
-    /// Output while the input is absent; without it the output is absent too.
-    #[param(unit = "$unit")]
-    initial: Option<f64>,
-}
-
-/// Parameters of `twist_delay`.
-#[derive(Debug, Clone, Param)]
-pub struct TwistParams {
-    /// Output while the input is absent, `[vx, vy, vz, wx, wy, wz]`; without it the output is absent too.
-    #[param(unit = "m/s, rad/s")]
-    initial: Option<[f64; 6]>,
-}
-
 /// What a delay reads.
 #[derive(Inputs)]
 pub struct Inputs<'a, T: Signal> {
@@ -82,36 +60,6 @@ pub struct Outputs<T: Signal> {
     /// The input one tick ago.
     #[port(unit = "U", frame = "A")]
     value: Out<T>,
-}
-
-/// What a delay remembers.
-#[derive(State)]
-pub struct State {
-    /// Where the output of the last step came from, if it was present.
-    last: Option<Origin>,
-}
-
-/// Where the output of a step comes from.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Origin {
-    Initial,
-    Input,
-}
-
-impl Delayable for Scalar {
-    type Params = ScalarParams;
-
-    fn configure(params: ScalarParams) -> (ScalarShape, Option<Self>) {
-        (ScalarShape::of(params.unit), params.initial)
-    }
-}
-
-impl Delayable for Twist {
-    type Params = TwistParams;
-
-    fn configure(params: TwistParams) -> (TwistShape, Option<Self>) {
-        (TwistShape, params.initial.map(|initial| Self(initial.into())))
-    }
 }
 
 impl<T: Delayable> Node for Delay<T>
@@ -130,28 +78,21 @@ where
     }
 
     fn state(&self) -> State {
-        State { last: None }
+        State::default()
     }
 
     fn step(&self, _: &Tick, inputs: Inputs<'_, T>, out: &mut Outputs<T>, state: &mut State) {
-        let next = match (inputs.value, self.initial) {
-            (Some(value), _) => Some((Origin::Input, *value, value.is_new())),
-            (None, Some(initial)) => Some((Origin::Initial, initial, false)),
-            (None, None) => None,
-        };
-        let last = std::mem::replace(&mut state.last, next.map(|(origin, ..)| origin));
-        match next {
-            Some((origin, value, is_new)) if is_new || last != Some(origin) => out.value.set(value),
-            Some(_) => out.value.keep(),
-            None => {}
-        }
+        let (input, initial) = (inputs.value, self.initial);
+        let is_input = input.map(|_| true).or(initial.map(|_| false));
+        let is_new = input.is_some_and(|value| value.is_new());
+        state.pass(is_input, input.as_deref().or(initial.as_ref()), is_new, &mut out.value);
     }
 }
 
 #[cfg(test)]
 mod tests {
     use tactflow_runtime::harness::NodeRig;
-    use tactflow_runtime::signal::{Freshness, Shape, Stamp};
+    use tactflow_runtime::signal::{Freshness, ScalarShape, Shape, Stamp, TwistShape, Unit};
 
     use super::*;
 

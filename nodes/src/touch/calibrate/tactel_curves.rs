@@ -5,7 +5,7 @@ use crate::calibration::{Calibration, CurveKind, ForceCurve, Tactel};
 
 /// The curves of all tactels, all of one kind. The curve of a dead tactel is 0 everywhere.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) enum Lines {
+pub(super) enum TactelCurves {
     /// Slopes.
     Linear(Vec<f32>),
     /// Rational curves with their ends.
@@ -14,16 +14,11 @@ pub(super) enum Lines {
     Piecewise(Vec<Vec<Segment>>),
 }
 
-impl Lines {
-    /// Returns straight lines with these slopes.
-    pub(super) const fn linear(gain: Vec<f32>) -> Self {
-        Self::Linear(gain)
-    }
-
+impl TactelCurves {
     /// Returns the zeros and the curves of a calibration.
     pub(super) fn new(calibration: &Calibration) -> (Vec<f32>, Self) {
         let count = calibration.tactels.len();
-        let mut lines = match calibration.kind {
+        let mut curves = match calibration.kind {
             CurveKind::Linear => Self::Linear(vec![0.0; count]),
             CurveKind::Rational => {
                 let zeros = || vec![0.0; count];
@@ -41,10 +36,10 @@ impl Lines {
         for (i, tactel) in calibration.tactels.iter().enumerate() {
             if let Some(Tactel { offset: zero, curve }) = tactel {
                 offset[i] = *zero;
-                lines.set(i, curve);
+                curves.set(i, curve);
             }
         }
-        (offset, lines)
+        (offset, curves)
     }
 
     fn set(&mut self, i: usize, curve: &ForceCurve) {

@@ -4,6 +4,8 @@
 //! vz + wx y - wy x. The point is the centre of gravity of the whole image for `force`, and the highest tactel for
 //! `peak`. The excess is subtracted from vz: a roll then goes on about the contact.
 
+mod load;
+
 use tactflow_runtime::node::{
     Describe, In, Inputs, Limits, Mistake, Mistakes, Node, Out, Outputs, Param, Setup, State, Tick,
 };
@@ -11,6 +13,8 @@ use tactflow_runtime::signal::{Image, ImageShape, Scalar, Stamp, Twist};
 
 use super::{fraction, max_age};
 use crate::motion::bounds::countable;
+
+pub use load::{PadLoad, load};
 
 /// Stops the motion into an object when the force or a single tactel reaches its ceiling.
 ///
@@ -39,11 +43,8 @@ use crate::motion::bounds::countable;
 #[derive(Describe)]
 #[describe(name = "contact_limit", every_tick)]
 pub struct ContactLimit {
+    params: Params,
     shape: ImageShape,
-    force: f64,
-    peak: f64,
-    begin: f64,
-    approach: f64,
     /// Maximum age of the image [ns].
     max_age: i64,
 }
@@ -99,20 +100,7 @@ pub struct State {
     /// Stamp of the image that `load` was computed from, if there was one.
     stamp: Option<Stamp>,
     /// Load of that image.
-    load: Load,
-}
-
-/// The load on the pad.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Load {
-    /// Sum of the tactels [unit of the image].
-    pub sum: f64,
-    /// Centre of gravity of the tactels [m].
-    pub centre: [f64; 2],
-    /// Value of the highest tactel [unit of the image].
-    pub peak: f64,
-    /// Position of the highest tactel [m].
-    pub place: [f64; 2],
+    load: PadLoad,
 }
 
 impl Node for ContactLimit {
@@ -131,32 +119,27 @@ impl Node for ContactLimit {
             return Err(Mistake::param("peak", message).help("let `peak` be at most `force`").into());
         }
         (setup.outputs.force, setup.outputs.peak) = (fraction(), fraction());
-        Ok(Self {
-            shape: setup.inputs.image.clone(),
-            force: params.force,
-            peak: params.peak,
-            begin: params.begin,
-            approach: params.approach_m_per_s,
-            max_age: max_age(params.max_age_ms, setup.period),
-        })
+        let max_age = max_age(params.max_age_ms, setup.period);
+        Ok(Self { params, shape: setup.inputs.image.clone(), max_age })
     }
 
     fn state(&self) -> State {
-        State { stamp: None, load: Load::default() }
+        State { stamp: None, load: PadLoad::default() }
     }
 
     fn step(&self, tick: &Tick, inputs: Inputs<'_>, out: &mut Outputs, state: &mut State) {
+        let Params { force, peak, begin, approach_m_per_s: approach, .. } = self.params;
         let stamp = inputs.image.stamp();
         if stamp.age(tick.now) > self.max_age {
             return;
         }
         if inputs.image.is_new() || state.stamp != Some(stamp) {
             state.stamp = Some(stamp);
-            state.load = load(&self.shape, &inputs.image, [self.begin * self.force, self.begin * self.peak]);
+            state.load = load(&self.shape, &inputs.image, [begin * force, begin * peak]);
         }
         let (load, mut twist) = (&state.load, countable(&inputs.twist));
-        let force = bar(&mut twist, load.centre, load.sum / self.force, self.begin, self.approach);
-        let peak = bar(&mut twist, load.place, load.peak / self.peak, self.begin, self.approach);
+        let force = bar(&mut twist, load.centre, load.sum / force, begin, approach);
+        let peak = bar(&mut twist, load.place, load.peak / peak, begin, approach);
         out.twist.set(twist);
         // A NaN in the image makes the fraction NaN, which ends the run.
         out.force.set(force + 0.0 * load.sum);
@@ -179,58 +162,4 @@ pub fn bar(twist: &mut Twist, [x, y]: [f64; 2], times: f64, begin: f64, approach
     }
     twist.0[2] -= speed - allowed;
     allowed / speed
-}
-
-/// Returns the load of an image; its sum is NaN if a tactel is.
-///
-/// The positions are computed only if the sum and the peak are at least those in `from`, and are 0 otherwise.
-#[must_use]
-pub fn load(shape: &ImageShape, image: &Image, from: [f64; 2]) -> Load {
-    let (sum, peak) = weigh(image.cells());
-    let mut load = Load { sum, peak, ..Load::default() };
-    let rows = || image.cells().chunks(shape.cols).enumerate();
-    if sum >= from[0] && sum > 0.0 {
-        let mut moments = [0.0; 2];
-        for (i, row) in rows() {
-            let (mut force, mut moment) = (0.0, 0.0);
-            for (j, cell) in row.iter().enumerate() {
-                let value = pressed(*cell);
-                force += value;
-                moment += value * shape.x(j as f64);
-            }
-            moments = [moments[0] + moment, moments[1] + force * shape.y(i as f64)];
-        }
-        load.centre = moments.map(|moment| moment / sum);
-    }
-    if peak >= from[1] && peak > 0.0 {
-        let highest = |(i, row): (usize, &[f32])| Some((i, row.iter().position(|cell| f64::from(*cell) == peak)?));
-        let place = rows().find_map(highest).map(|(i, j)| [shape.x(j as f64), shape.y(i as f64)]);
-        load.place = place.unwrap_or_default();
-    }
-    load
-}
-
-/// Returns the load of a tactel, 0 if it is negative. Unlike `max`, it keeps a NaN.
-fn pressed(cell: f32) -> f64 {
-    f64::from(if cell < 0.0 { 0.0 } else { cell })
-}
-
-/// Returns the sum and the maximum of the tactels, in eight lanes and a fixed order: the same bits on every machine.
-fn weigh(cells: &[f32]) -> (f64, f64) {
-    let (mut sums, mut peaks) = ([0.0_f64; 8], [0.0_f32; 8]);
-    let mut add = |lane: usize, cell: f32| {
-        sums[lane] += pressed(cell);
-        peaks[lane] = if cell > peaks[lane] { cell } else { peaks[lane] };
-    };
-    let (chunks, rest) = cells.as_chunks::<8>();
-    for chunk in chunks {
-        for (lane, cell) in chunk.iter().enumerate() {
-            add(lane, *cell);
-        }
-    }
-    for (lane, cell) in rest.iter().enumerate() {
-        add(lane, *cell);
-    }
-    let peak = peaks.into_iter().fold(0.0, |a: f32, b| if b > a { b } else { a });
-    (sums.into_iter().sum(), f64::from(peak))
 }

@@ -1,25 +1,14 @@
 //! `signal_generator`: a step, a ramp, a sine or a chirp over time, for identification.
-//!
-//! With t the time since `start`, T the duration and A the amplitude:
-//!
-//! ```text
-//! step   offset + A                        for 0 <= t < T
-//! ramp   offset + A t / T                  and offset + A from T on
-//! sine   offset + A sin(2 pi f t)          for 0 <= t < T
-//! chirp  offset + A sin(2 pi (f t + (f_end - f) t^2 / (2 T)))
-//! ```
-//!
-//! Before and after, the value is the offset. The phase of a chirp is the integral of its frequency, which goes linearly
-//! from f to f_end; f(t) t would sweep twice as far. Phases are computed in turns and reduced to one turn before the sine,
-//! so a long run loses no precision. Time is that of the tick: a late tick has the value of its own time.
 
-use std::f64::consts::TAU;
+mod waveform;
 
 use tactflow_runtime::node::{
     At, Describe, In, Inputs, Mistake, Mistakes, Node, Out, Outputs, Param, Setup, State, Tick,
 };
 use tactflow_runtime::signal::{Flag, Scalar, ScalarShape, Unit};
 use tactflow_runtime::source::Code;
+
+pub use waveform::Waveform;
 
 /// Generates a test signal: a step, a ramp, a sine or a chirp.
 ///
@@ -53,9 +42,7 @@ use tactflow_runtime::source::Code;
 #[derive(Describe)]
 #[describe(name = "signal_generator", every_tick)]
 pub struct SignalGenerator {
-    form: Form,
-    amplitude: f64,
-    offset: f64,
+    params: Params,
     /// Start [ns].
     start: i64,
     /// Duration [s]; infinite if not given.
@@ -69,7 +56,7 @@ pub struct SignalGenerator {
 #[derive(Debug, Clone, Param)]
 pub struct Params {
     /// Form of the signal.
-    form: Form,
+    form: Waveform,
     /// Unit of the signal.
     unit: Unit,
     /// Frame of the signal; if not given, the inputs that read it decide.
@@ -92,19 +79,6 @@ pub struct Params {
     /// Frequency of a chirp at its end.
     #[param(unit = "Hz", above = 0.0)]
     end_frequency: Option<f64>,
-}
-
-/// The form of a signal.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Param)]
-pub enum Form {
-    /// A jump at the start.
-    Step,
-    /// A straight line.
-    Ramp,
-    /// A sine of one frequency.
-    Sine,
-    /// A sine whose frequency changes linearly.
-    Chirp,
 }
 
 /// What `signal_generator` reads.
@@ -137,21 +111,16 @@ impl Node for SignalGenerator {
     type State = State;
 
     fn new(params: Params, setup: &mut Setup<Self>) -> Result<Self, Mistakes> {
-        let mistakes = check(&params, setup.period);
-        if !mistakes.is_empty() {
-            return Err(mistakes);
-        }
+        check(&params, setup.period)?;
         setup.is_still = params.amplitude == 0.0 && params.offset == 0.0;
         setup.outputs.value = ScalarShape::of(params.unit);
         let first = params.frequency.unwrap_or(0.0);
         Ok(Self {
-            form: params.form,
-            amplitude: params.amplitude,
-            offset: params.offset,
             start: (params.start * 1e9) as i64,
             duration: params.duration.unwrap_or(f64::INFINITY),
             frequencies: [first, params.end_frequency.unwrap_or(first)],
             is_gated: setup.inputs.gate.is_some(),
+            params,
         })
     }
 
@@ -169,40 +138,17 @@ impl Node for SignalGenerator {
             return;
         };
         let nanos = tick.now.saturating_sub(origin).saturating_sub(self.start);
-        out.value.set(self.at(nanos as f64 * 1e-9));
+        let Params { form, amplitude, offset, .. } = self.params;
+        out.value.set(offset + amplitude * form.at(nanos as f64 * 1e-9, self.duration, self.frequencies));
     }
-}
-
-impl SignalGenerator {
-    /// Returns the signal `time` [s] after its start.
-    fn at(&self, time: f64) -> f64 {
-        let is_over = time >= self.duration;
-        let part = match self.form {
-            _ if time < 0.0 => 0.0,
-            Form::Ramp => (time / self.duration).min(1.0),
-            _ if is_over => 0.0,
-            Form::Step => 1.0,
-            Form::Sine | Form::Chirp => {
-                let turns = turns(self.frequencies, self.duration, time);
-                libm::sin(TAU * (turns - turns.floor()))
-            }
-        };
-        self.offset + self.amplitude * part
-    }
-}
-
-/// Returns the phase after `time` [s] in turns, for a frequency that goes linearly from `first` to `last` [Hz] in
-/// `duration` [s].
-fn turns([first, last]: [f64; 2], duration: f64, time: f64) -> f64 {
-    (first + (last - first) * (0.5 * time / duration)) * time
 }
 
 /// Returns a mistake for each parameter that the form needs but lacks, or has but does not use.
-fn check(params: &Params, period: f64) -> Mistakes {
-    let (form, _) = Form::CONTENTS.words[params.form as usize];
-    let waves = matches!(params.form, Form::Sine | Form::Chirp);
-    let ends = matches!(params.form, Form::Ramp | Form::Chirp);
-    let is_chirp = params.form == Form::Chirp;
+fn check(params: &Params, period: f64) -> Result<(), Mistakes> {
+    let (form, _) = Waveform::CONTENTS.words[params.form as usize];
+    let waves = matches!(params.form, Waveform::Sine | Waveform::Chirp);
+    let ends = matches!(params.form, Waveform::Ramp | Waveform::Chirp);
+    let is_chirp = params.form == Waveform::Chirp;
     let table = [
         // Name, and whether it is given, needed, unused.
         ("duration", params.duration.is_some(), ends, false),
@@ -224,7 +170,7 @@ fn check(params: &Params, period: f64) -> Mistakes {
             mistakes.push(Mistake::param(name, message));
         }
     }
-    mistakes
+    if mistakes.is_empty() { Ok(()) } else { Err(mistakes) }
 }
 
 #[cfg(test)]
@@ -233,6 +179,9 @@ mod tests {
     use tactflow_runtime::harness::NodeRig;
     use tactflow_runtime::signal::{FlagShape, Freshness, Scalar};
 
+    use std::f64::consts::TAU;
+
+    use super::waveform::turns;
     use super::*;
 
     fn rig(params: &str) -> Result<NodeRig, Mistakes> {
@@ -300,12 +249,8 @@ mod tests {
         }
 
         #[test]
-        fn the_signal_stays_between_its_peaks(time in -1.0..100.0_f64, offset in -1.0..1.0_f64) {
-            let signal = SignalGenerator {
-                form: Form::Chirp, amplitude: 2.0, offset, start: 0, duration: 50.0,
-                frequencies: [1.0, 7.0], is_gated: false,
-            };
-            prop_assert!((signal.at(time) - offset).abs() <= 2.0);
+        fn the_signal_stays_between_its_peaks(time in -1.0..100.0_f64) {
+            prop_assert!(Waveform::Chirp.at(time, 50.0, [1.0, 7.0]).abs() <= 1.0);
         }
     }
 

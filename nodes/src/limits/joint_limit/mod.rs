@@ -1,0 +1,150 @@
+//! `joint_limit`: the last node before the arm.
+
+mod joints;
+mod limiter;
+
+use tactflow_runtime::node::{Describe, In, Inputs, Limits, Mistakes, Node, Out, Outputs, Param, Setup, Tick};
+use tactflow_runtime::signal::{Joint, Joints, JointsShape, Scalar, Stamp, Unit};
+
+use super::{fraction, max_age};
+
+use joints::joints;
+pub use limiter::Limiter;
+
+/// Keeps the ranges, speeds and accelerations of the joints, and the lead of the equilibrium over the position.
+///
+/// It is the last node before an arm. Near the end of its range a joint moves only as fast as it can stop:
+/// v τ + v²/(2a) <= d. The same holds for the lead: while a compliant arm is held, its equilibrium runs ahead, and the arm
+/// springs to it when it is released, by at most `lead_rad`. Ranges apply to the position and to the equilibrium. A joint
+/// outside its range can only move back.
+///
+/// Velocities that are too fast are scaled as a whole and keep their direction. The output then follows on a straight
+/// line, as far as the accelerations allow. Only a joint that cannot brake in time with the others brakes by itself.
+///
+/// When the velocities are absent, or they or the arm's state are older than `max_age_ms`, the output goes to zero on a
+/// straight line with these accelerations, and is absent once it is zero. When the arm's state is *absent*, the output is
+/// absent at once, and the runtime ramps the command down with the same accelerations.
+///
+/// The delay τ is twice the graph's `max_gap_ms`, and the distance that the last command may travel in such a gap is
+/// subtracted from d: no bound is crossed as long as no tick takes longer, also by an arm that acts one tick late. In a
+/// slow graph this leaves little speed near a bound: use a shorter `max_gap_ms`. An arm that is moved by hand can leave
+/// its range.
+///
+/// Each output beside the velocity is 1 while the limit of that name does not act.
+///
+/// ```toml
+/// [nodes.joint_limit]
+/// type = "joint_limit"
+/// in.velocity = "ik.velocity"
+/// in.position = "arm.position"
+/// in.equilibrium = "arm.equilibrium"
+/// acceleration = 5.0                  # [rad/s²]
+/// lead_rad = 0.1
+/// ```
+#[derive(Describe)]
+#[describe(name = "joint_limit", every_tick)]
+pub struct JointLimit {
+    joints: Vec<Joint>,
+    lead: f64,
+    /// Maximum age of the velocities and of the arm's state [ns].
+    max_age: i64,
+}
+
+/// Parameters of `joint_limit`.
+#[derive(Debug, Clone, Param)]
+pub struct Params {
+    /// Maximum acceleration of every joint; a smaller one that the arm states has priority.
+    #[param(unit = "rad/s2", above = 0.0)]
+    acceleration: Option<f64>,
+    /// Maximum lead of the equilibrium over the position.
+    #[param(unit = "rad", above = 0.0)]
+    lead_rad: f64,
+    /// Fraction of each joint's maximum speed that is used.
+    #[param(unit = "1", range = 0.0..=1.0, default = 1.0)]
+    speed: f64,
+    /// Maximum age of the velocities and of the arm's state; five periods of the graph if not given.
+    #[param(unit = "ms", above = 0.0)]
+    max_age_ms: Option<f64>,
+}
+
+/// What `joint_limit` reads.
+#[derive(Inputs)]
+pub struct Inputs<'a> {
+    /// Wanted joint velocities.
+    #[port(unit = "rad/s", robot = "R")]
+    velocity: Option<In<'a, Joints>>,
+    /// Measured joint positions.
+    #[port(unit = "rad", robot = "R")]
+    position: In<'a, Joints>,
+    /// Posture that the commands have moved to.
+    #[port(unit = "rad", robot = "R")]
+    equilibrium: In<'a, Joints>,
+}
+
+/// What `joint_limit` writes.
+#[derive(Outputs)]
+pub struct Outputs {
+    /// Joint velocities within all limits.
+    #[port(unit = "rad/s", robot = "R")]
+    velocity: Out<Joints>,
+    /// Fraction of the wanted velocities that the bound of the lead lets pass.
+    #[port(unit = "1", frame = "_")]
+    lead: Out<Scalar>,
+    /// Fraction of the wanted velocities that the ranges of the joints let pass.
+    #[port(unit = "1", frame = "_")]
+    joint_position: Out<Scalar>,
+    /// Fraction of the wanted velocities that the speeds of the joints let pass.
+    #[port(unit = "1", frame = "_")]
+    joint_speed: Out<Scalar>,
+    /// Fraction of the wanted change that the accelerations of the joints let pass in this tick.
+    #[port(unit = "1", frame = "_")]
+    joint_acceleration: Out<Scalar>,
+}
+
+impl Node for JointLimit {
+    type Params = Params;
+    type Inputs<'a> = Inputs<'a>;
+    type Outputs = Outputs;
+    type State = Limiter;
+
+    const LIMITS: Limits = Limits {
+        through: Some("velocity"),
+        holds: &["lead", "joint_position", "joint_speed", "joint_acceleration"],
+        breaks: &[],
+    };
+
+    fn new(params: Params, setup: &mut Setup<Self>) -> Result<Self, Mistakes> {
+        let InputsShapes { velocity, position, equilibrium } = &setup.inputs;
+        let velocity = velocity.as_ref().expect("the check of a graph reports an input without a wire");
+        let joints = joints(&params, velocity, position, equilibrium)?;
+        setup.outputs.velocity = JointsShape { joints: joints.clone(), unit: Unit::RADIAN.per_second() };
+        (setup.outputs.lead, setup.outputs.joint_position) = (fraction(), fraction());
+        (setup.outputs.joint_speed, setup.outputs.joint_acceleration) = (fraction(), fraction());
+        Ok(Self { joints, lead: params.lead_rad, max_age: max_age(params.max_age_ms, setup.period) })
+    }
+
+    fn state(&self) -> Limiter {
+        Limiter::new(self.joints.len())
+    }
+
+    fn step(&self, tick: &Tick, inputs: Inputs<'_>, out: &mut Outputs, limiter: &mut Limiter) {
+        let arm = inputs.position.stamp().oldest(inputs.equilibrium.stamp());
+        let is_fresh = |stamp: Stamp| stamp.age(tick.now) <= self.max_age && !tick.is_halted;
+        let wanted = inputs.velocity.filter(|velocity| is_fresh(velocity.stamp()) && is_fresh(arm));
+        let wanted = wanted.map(|velocity| &*velocity.value().0);
+        let (position, equilibrium) = (&inputs.position.0, &inputs.equilibrium.0);
+        let Some([lead, position, speed, acceleration]) =
+            limiter.limit(&self.joints, self.lead, tick, wanted, position, equilibrium)
+        else {
+            return;
+        };
+        out.velocity.write().0.copy_from_slice(limiter.velocities());
+        out.lead.set(lead);
+        out.joint_position.set(position);
+        out.joint_speed.set(speed);
+        out.joint_acceleration.set(acceleration);
+    }
+}
+
+#[cfg(test)]
+mod tests;

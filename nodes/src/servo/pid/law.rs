@@ -1,0 +1,60 @@
+//! The control law of one feature, and what it remembers.
+//!
+//! u = kp e + I + kd de/dt, with I the sum of ki e dt. Time is that between the stamps of a component's samples, so a
+//! gain means the same at 100 Hz and at 1 kHz, and one sample is never integrated twice; the paper sums without dt, so
+//! its KI is ki times the period and its KD is kd over the period. The integral is kept in units of the control, so a
+//! change of ki makes no jump; it runs only near the target (`within`), is bounded, and does not grow outwards while
+//! the output is at its limit. The error of a line's direction is differenced modulo pi.
+
+use tactflow_runtime::node::{Absence, Interval};
+use tactflow_runtime::signal::Unit;
+
+use super::Gains;
+use crate::motion::axis::wrap_axial;
+use crate::servo::integral::integrate;
+
+/// What is remembered of one feature.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Memory {
+    /// The integral's part of the control, in the feature's unit per second.
+    integral: f64,
+    /// Error of the last sample, in the feature's unit.
+    error: f64,
+    pub(super) interval: Interval,
+    pub(super) absence: Absence,
+}
+
+/// The control law of one feature.
+pub(super) struct Law {
+    kp: f64,
+    ki: f64,
+    kd: f64,
+    within: f64,
+    bound: f64,
+    limit: f64,
+    is_axial: bool,
+    /// Whether anything reads its control; otherwise it is frozen.
+    pub(super) is_wanted: bool,
+}
+
+impl Law {
+    pub(super) fn new(gains: &Gains, unit: Unit) -> Self {
+        let Gains { kp, ki, kd, bound, .. } = *gains;
+        let [within, limit] = [gains.within, gains.limit].map(|bound| bound.unwrap_or(f64::INFINITY));
+        Self { kp, ki, kd, within, bound, limit, is_axial: unit.is_axial(), is_wanted: true }
+    }
+
+    /// Returns the control for an error that comes `dt` [s] after the last one. Without a time there is neither a slope
+    /// nor growth of the integral.
+    pub(super) fn control(&self, error: f64, dt: Option<f64>, memory: &mut Memory) -> f64 {
+        let change = error - memory.error;
+        let change = if self.is_axial { wrap_axial(change) } else { change };
+        let dt = dt.unwrap_or(0.0);
+        let slope = if dt > 0.0 { change / dt } else { 0.0 };
+        let others = self.kp * error + self.kd * slope;
+        let growth = if error.abs() <= self.within { self.ki * error * dt } else { 0.0 };
+        memory.integral = integrate(memory.integral, growth, self.bound, others, self.limit);
+        memory.error = error;
+        (others + memory.integral).clamp(-self.limit, self.limit)
+    }
+}
