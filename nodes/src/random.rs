@@ -1,6 +1,7 @@
 //! Seeded random numbers that are the same in every run and on every machine.
 
-/// A generator of random numbers: splitmix64 (Steele, Lea and Flood 2014), and Marsaglia's polar method for normal ones.
+/// A generator of random numbers: splitmix64 (Steele, Lea and Flood 2014), and Marsaglia's polar method for normal
+/// ones.
 ///
 /// ```
 /// use tactflow_nodes::random::Random;

@@ -16,7 +16,7 @@ fn port(name: &'static str, doc: &'static str, kind: Kind, args: &'static [&'sta
 pub fn tactile_pad() -> RoleType {
     RoleType {
         name: "tactile_pad".into(),
-        summary: "an array of tactels that gives an image".into(),
+        summary: "an array of tactels that outputs an image".into(),
         outputs: vec![port("image", "The newest image, in the device's unit.", Kind::Image, &["U", "self"])],
         commands: vec![],
         reports: vec![],
@@ -30,7 +30,7 @@ pub fn tactile_pad() -> RoleType {
 pub fn velocity_arm() -> RoleType {
     RoleType {
         name: "velocity_arm".into(),
-        summary: "an arm that takes joint velocities".into(),
+        summary: "an arm that is commanded with joint velocities".into(),
         outputs: vec![
             port("position", "Measured joint positions [rad].", Kind::Joints, &["rad", "self"]),
             port("equilibrium", EQUILIBRIUM, Kind::Joints, &["rad", "self"]),
@@ -42,19 +42,19 @@ pub fn velocity_arm() -> RoleType {
     }
 }
 
-const CONTACT: &str = "Where the task finds the contact in the base: the robot as a ruler [m].";
+const CONTACT: &str = "Pose of the contact in the base, as the task measures it [m].";
 
-const EQUILIBRIUM: &str = "Posture that the commands have moved to: where a compliant arm would be if nothing held it; \
-    of a stiff arm its position [rad].";
+const EQUILIBRIUM: &str = "Posture that the commands add up to: where a compliant arm would be if nothing held it; \
+    for a stiff arm, its position [rad].";
 
-/// Facts of the contact that a simulation knows and no sensor measures: for scenarios and the recorder. A device that fills it
-/// gives all of it, and says of what does not apply that it is absent.
+/// Facts of the contact that a simulation knows and no sensor measures: for scenarios and the recorder. A device that
+/// fills it gives all of it, and says of what does not apply that it is absent.
 #[must_use]
 pub fn ground_truth() -> RoleType {
     let scalar = |name, doc, unit: &'static [&'static str]| port(name, doc, Kind::Scalar, unit);
     RoleType {
         name: "ground_truth".into(),
-        summary: "facts of the contact that a simulation knows and no sensor measures".into(),
+        summary: "true values of the contact, which only a simulation knows".into(),
         outputs: vec![
             scalar("force", "Normal force on the pad [N].", &["N"]),
             scalar("tangential", "Tangential force on the pad [N].", &["N"]),
@@ -64,7 +64,7 @@ pub fn ground_truth() -> RoleType {
             scalar("pressure", PRESSURE, &["N/tactel"]),
             scalar("orientation", ORIENTATION, &["rad mod pi"]),
             scalar("area", "Area of the contact [m²].", &["m2"]),
-            scalar("depth", "Greatest depth that the object is pressed in [m].", &["m"]),
+            scalar("depth", "Largest depth to which the object is pressed into the foam [m].", &["m"]),
             port("image", "The image without noise, spread and drift [N].", Kind::Image, &["N", "self"]),
             scalar("tilt", TILT, &["rad"]),
             scalar("path", PATH, &["m"]),
@@ -83,18 +83,18 @@ pub fn ground_truth() -> RoleType {
 const PRESSURE: &str = "Mean force on the tactels in contact, of the image without noise; absent without contact \
     [N/tactel].";
 const ORIENTATION: &str = "Angle of the edge, pen or cable in the sensor's frame, from +x toward +y, in (-pi/2, pi/2]; \
-    absent if there is none [rad].";
+    absent if no such line is under the pad [rad].";
 const TILT: &str = "Angle between the sensor's z and the object's inward normal at the contact; absent without contact \
     [rad].";
 const PATH: &str = "Distance, in the sensor's plane, of the reported contact point from the object's axis, edge or course; \
     absent if it has none [m].";
 const DISTANCE: &str = "Distance of the reported contact point from the object's surface; absent without a report [m].";
 const COVERAGE: &str =
-    "Share of the surface that faced the sensor at the start and is within 1 cm of a reported point [1].";
-const COMMON_NOISE: &str = "Standard deviation that the noise all tactels share gives the pressure; absent without contact \
+    "Fraction of the surface facing the sensor at the start that is within 1 cm of a reported point [1].";
+const COMMON_NOISE: &str = "Standard deviation of the pressure due to the noise that all tactels share; absent without contact \
     [N/tactel].";
 const OWN_NOISE: &str =
-    "Standard deviation that each tactel's own noise gives the pressure; absent without contact [N/tactel].";
+    "Standard deviation of the pressure due to the own noise of each tactel; absent without contact [N/tactel].";
 
 /// What every command of an arm must have crossed, in the order in which a motion does.
 const LIMITS: [&str; 10] = [

@@ -46,9 +46,9 @@ impl Catalogue {
     /// With one more node that is known only at run time.
     ///
     /// # Panics
-    /// If something has that name already, or if the declaration is wrong: a unit, a default that is not in its own range, an
-    /// example that is not of this type or names what the node does not have, or a node that logs without a flag to say
-    /// when.
+    /// If something has that name already, or if the declaration is wrong: a unit, a default that is not in its own
+    /// range, an example that is not of this type or names what the node does not have, or a node that logs without a
+    /// flag to say when.
     #[must_use]
     pub fn node_type(mut self, node: Box<dyn NodeType>) -> Self {
         let spec = node.spec();

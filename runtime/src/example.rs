@@ -1,8 +1,8 @@
 //! Example graphs for one node or device, composed from the examples of the catalogue.
 //!
-//! The example of a node is one block. Its wires name blocks in the examples of other nodes and roles in the examples of
-//! devices, so the blocks that a node needs are found by following its wires. The text of each block stays as written,
-//! including its comments.
+//! The example of a node is one block. Its wires name blocks in the examples of other nodes and roles in the examples
+//! of devices, so the blocks that a node needs are found by following its wires. The text of each block stays as
+//! written, including its comments.
 
 use std::collections::BTreeMap;
 use std::path::Path;

@@ -79,10 +79,10 @@ impl fmt::Display for Fault {
                 let StaleWire { from, age, max_age } = &**wire;
                 write!(f, "`{from}` is {:.1} ms old at `{name}`, but the maximum is {:.1} ms", ms(*age), ms(*max_age))?;
             }
-            Cause::SilentClock => write!(f, "the clock device `{name}` is silent")?,
+            Cause::SilentClock => write!(f, "the clock device `{name}` sends no samples")?,
             Cause::Late { by } => write!(f, "a tick began {:.1} ms late", ms(*by))?,
             Cause::Operator => write!(f, "the operator sent `stop`")?,
-            Cause::Mode(why) => write!(f, "mode `{name}` failed: {why}")?,
+            Cause::Mode(why) => write!(f, "a `fail` condition of mode `{name}` ended the run: {why}")?,
             Cause::Lost(why) => write!(f, "`{name}` is lost: {why}")?,
             Cause::Device(message) => write!(f, "device `{name}` failed: {message}")?,
         }

@@ -1,7 +1,7 @@
 //! The runtime of tactflow: loads, checks and runs the dataflow graphs of tactile servoing.
 //!
-//! The runtime contains no node, sensor or robot; they are registered in a [`Catalogue`](catalogue::Catalogue). Modules in
-//! reading order:
+//! The runtime contains no node, sensor or robot; they are registered in a [`Catalogue`](catalogue::Catalogue). Modules
+//! in reading order:
 //!
 //! - [`signal`]: the kinds of values on wires, their shapes, units and freshness
 //! - [`node`]: the contract of nodes

@@ -133,8 +133,8 @@ impl Fused {
     }
 
     /// One tick: the recording's cells, the arm's joints and its equilibrium in, joint velocities out. `dt` is the time
-    /// between the last two samples of the contact [s], `tick` that between the ticks. Tells whether there is a contact and
-    /// an axis.
+    /// between the last two samples of the contact [s], `tick` that between the ticks. Tells whether there is a contact
+    /// and an axis.
     pub(crate) fn tick(
         &mut self,
         cells: &[f32],

@@ -36,8 +36,8 @@ pub struct Params {
 
 /// A pad under a round contact that slides to the middle, with the ground truth of that contact.
 ///
-/// From `from_s` on the contact is at `at · exp(-(t - from_s) / tau_s)` on the x axis, so every figure of a scenario is known
-/// in closed form. The image has white noise from the seed; the ground truth has none.
+/// From `from_s` on the contact is at `at · exp(-(t - from_s) / tau_s)` on the x axis, so every figure of a scenario is
+/// known in closed form. The image has white noise from the seed; the ground truth has none.
 #[derive(Debug, Describe)]
 #[describe(name = "true_pad")]
 pub struct TruePad {

@@ -36,7 +36,7 @@ fn a_list_finds_a_node_by_what_it_is_for() {
     let lines = [
         "Nodes, servo: from features to a twist of the sensor",
         "  pid               a PID controller on every feature, for force and position control",
-        "  tactile_pad   an array of tactels that gives an image",
+        "  tactile_pad   an array of tactels that outputs an image",
         "  pose      the position and orientation of one frame in another",
     ];
     assert_lines(&all.out, &lines);
@@ -54,7 +54,7 @@ fn a_list_finds_a_node_by_what_it_is_for() {
     }
     assert_eq!(json(&["list", "nodes", "unicorn"], 2), "\n");
     let nothing = say(&["list", "nodes", "unicorn"]);
-    let message = "error: nothing in the catalogue matches `nodes unicorn`\n";
+    let message = "error: nothing in the catalogue matches `nodes unicorn`\nhelp: `tactflow list` prints everything\n";
     assert_eq!((nothing.code, nothing.out.as_str(), nothing.err.as_str()), (2, "", message));
 }
 
@@ -65,7 +65,7 @@ fn a_description_says_everything_of_a_node() {
     let lines = [
         "pid (node)",
         "A PID controller on every feature, for force and position control.",
-        "Steps when an input that wakes it is new or lost.",
+        "Steps when an input that wakes the node has a new value or loses its value.",
         "  in.error  features, unit E, frame A; required, wakes the node",
         "  control  features, unit E/s, frame A",
         "  gains.NAME.kp      a number; default 0.0",

@@ -147,7 +147,7 @@ fn what_cannot_be_used_is_refused_with_exit_code_2() {
         (&["press.csv", "wide.csv"], "error: `wide.csv` has 1 x 4 tactels in raw, but `press.csv` has 2 x 2"),
         (
             &["press.csv", "-o", "notes.txt"],
-            "error: `notes.txt` exists and is not a calibration file: it is not replaced",
+            "error: `notes.txt` exists and is not a calibration file, so it is not replaced: write to another file",
         ),
         (&["press.csv", "-o", "press.csv"], "error: `press.csv` exists and is not a calibration file"),
         (&["press.csv", "--svg", "notes.txt"], "error: `notes.txt` exists and is not an SVG picture"),

@@ -93,7 +93,10 @@ fn a_file_that_does_not_load_or_cannot_be_made_ends_with_2() {
         (&["check", "nowhere.toml"], format!("error[unreadable]: cannot read `nowhere.toml`: {missing}")),
         (&["check", "graphs"], "error[unreadable]: cannot read `graphs`: Is a directory (os error 21)".into()),
         (&["run", HYBRID, "--bench", "nowhere.toml"], format!("cannot read `nowhere.toml`: {missing}")),
-        (&["run", HYBRID, MOCK, "--out", "rows.xlsx"], "error: `rows.xlsx` is neither .csv nor .ndjson\n".into()),
+        (
+            &["run", HYBRID, MOCK, "--out", "rows.xlsx"],
+            "error: `rows.xlsx` does not end in .csv or .ndjson: write for example `--out run.csv`\n".into(),
+        ),
         (
             &["run", HYBRID, MOCK, "--out", "nowhere/rows.csv"],
             format!("error: cannot create `nowhere/rows.csv`: {missing}\n"),

@@ -1,4 +1,5 @@
-//! The pages of docs/ are true: their code is the code, their graphs load, their commands run, their tables are complete.
+//! The pages of docs/ are true: their code is the code, their graphs load, their commands run, their tables are
+//! complete.
 
 use std::fs;
 use std::path::{Path, PathBuf};

@@ -1,7 +1,7 @@
 //! Broken graphs and scenarios: the expected message stands under the offending token, in the file itself.
 //!
-//! `#  ^^^^ code: message` speaks of the line above it, `#       help: …` and `#           | …` of the message above. With `TACTFLOW_BLESS=1`
-//! the comments are written anew; read the difference before you commit it.
+//! `#  ^^^^ code: message` speaks of the line above it, `#       help: …` and `#           | …` of the message above.
+//! With `TACTFLOW_BLESS=1` the comments are written anew; read the difference before you commit it.
 
 use std::collections::BTreeSet;
 use std::fs;

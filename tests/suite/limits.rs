@@ -1,4 +1,5 @@
-//! Limits: no command reaches an arm around them, no chain of limiters exceeds what it says it holds, and directions stay.
+//! Limits: no command reaches an arm around them, no chain of limiters exceeds what it says it holds, and directions
+//! stay.
 
 use std::fs;
 use std::path::Path;
@@ -337,7 +338,10 @@ fn what_cannot_be() {
     let contact = "force = 1.0\npeak = 2.0\napproach_m_per_s = 0.1";
     let wires: [(&str, Shape); 2] = [("twist", TwistShape.into()), ("image", pad().into())];
     let mistakes = NodeRig::new::<ContactLimit>(contact, &wires).err().unwrap();
-    assert_eq!(mistakes[0].message, "`peak` is greater than `force`, which a single tactel cannot reach");
+    assert_eq!(
+        mistakes[0].message,
+        "`peak` is greater than `force`, so it would have no effect: one tactel is never above the sum"
+    );
     let empty = BOX.replace("0.1, 0.1, 0.1]\nd", "0.1, -0.2, 0.1]\nd");
     let wires: [(&str, Shape); 2] = [("twist", TwistShape.into()), ("pose", PoseShape.into())];
     let mistakes = NodeRig::new::<WorkspaceLimit>(&empty, &wires).err().unwrap();

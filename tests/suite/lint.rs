@@ -217,7 +217,7 @@ fn what_a_step_does_wrong_is_found() {
         (How::LeavesItsRange, "`counter`: output `steps`: it is -1, and the node declares 0 to 1000"),
         (
             How::KeepsItsState,
-            "`counter`: output `steps`: after a reset it differs from that of a fresh node with the same inputs",
+            "`counter`: output `steps`: after a reset its value differs from that of a new node with the same inputs",
         ),
     ];
     for (how, expected) in cases {

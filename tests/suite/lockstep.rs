@@ -106,8 +106,8 @@ const WRONGS: [(&str, &str, bool); 14] = [
     ("null", "line 252: obs 251: `dq[0]`: invalid type: null, expected f64", true),
     ("short", "line 252: obs 251: `img` has 255 numbers, but the pad has 16x16 = 256", true),
     ("missing", "line 252: obs 251: missing field `q_eq`", true),
-    ("back-t", "line 252: obs 251: `t` is 0 after 0.996: the clock of a simulator does not go back", true),
-    ("back-seq", "line 252: obs 250: `seq` is 250 after 250, but it grows with every frame", true),
+    ("back-t", "line 252: obs 251: `t` is 0 s after a frame at 0.996 s: the time must not go back", true),
+    ("back-seq", "line 252: obs 250: `seq` is 250 after a frame with 250, but it must increase with every frame", true),
     ("type", "line 252: obs 251: `type`: unknown variant `picture`, expected `obs` or `end`", true),
     ("garbage", "line 252: it is not UTF-8 text", true),
     ("words", "line 252: expected value at byte 1, found `ready`", true),
@@ -144,7 +144,7 @@ fn a_simulator_that_does_wrong_is_named_and_left_with_the_arm_at_rest() {
 #[test]
 fn a_hello_that_will_not_do_is_told_before_anything_runs() {
     let cases = [
-        ("proto", "hello (line 1): `proto`: 2 is not the version that the bridge speaks, 1"),
+        ("proto", "hello (line 1): `proto`: 2 is not the supported protocol version, 1"),
         ("missing", "hello (line 1): missing field `pitch`"),
         ("nan", "hello (line 1): `dq_max[0]`: expected value at byte "),
         ("short", "hello (line 1): `q_min` has 6 numbers, but there are 7 `joints`"),

@@ -137,7 +137,7 @@ fn a_value_that_a_good_one_lies_over_is_no_mistake() {
 
 #[test]
 fn what_a_node_refuses_when_it_is_built_shows_at_the_value_in_force_too() {
-    let wrong = "1e300 is too large for a tactel: images are of 32-bit floats";
+    let wrong = "1e300 is too large: a tactel is a 32-bit float";
     let request = shipped("finger_press.toml").set("parts.touch.set.binarize.threshold=1e300");
     assert_eq!(mistakes(&request), [("bad-value", "command line:1:36".to_owned(), wrong.to_owned())]);
 }

@@ -138,7 +138,7 @@ fn a_word_that_nothing_waits_for_is_told() {
     assert_eq!(rig.engine.send("STOP"), Ok(()), "in any case");
     rig.tick(0.0).unwrap();
     assert!(rig.engine.is_stopped());
-    let why = "`back` has no effect while the commands wait for `resume`";
+    let why = "`back` has no effect while the commands are stopped: send `resume` first";
     assert_eq!(rig.engine.send("back"), Err(why.into()));
     let refused = say(&["run", HYBRID, MOCK, "--send", "1s:bck"]);
     assert_eq!((refused.code, refused.out.as_str()), (2, ""));

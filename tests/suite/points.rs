@@ -71,7 +71,11 @@ fn what_cannot_be_points_is_told_before_anything_runs() {
             "graphs/finger_press.toml",
             "the graph does not report exactly one pose: name a port, as in `--points".to_owned(),
         ),
-        (&ply, "graphs/hybrid.toml", format!("`{ply}` exists and is not a file of points: it is not overwritten")),
+        (
+            &ply,
+            "graphs/hybrid.toml",
+            format!("`{ply}` exists and is not a file of points, so it is not overwritten: write to another file"),
+        ),
     ];
     fs::write(&ply, [0x93, b'N', b'U', b'M']).unwrap();
     for (wanted, graph, message) in cases {

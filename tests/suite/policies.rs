@@ -1,5 +1,5 @@
-//! What each trouble does: counted, held, stopped or a fault; wires that may grow only so old; and samples that come twice,
-//! late or not at all, which change nothing that the distinct ones would not.
+//! What each trouble does: counted, held, stopped or a fault; wires that may grow only so old; and samples that come
+//! twice, late or not at all, which change nothing that the distinct ones would not.
 
 use proptest::prelude::*;
 use tactflow_runtime::engine::{End, Engine, RunOptions, run};
@@ -28,7 +28,7 @@ const CASES: [Case; 6] = [
         key: "clock",
         glitch: Some("silence"),
         sabotage: None,
-        says: "the clock device `pad` is silent",
+        says: "the clock device `pad` sends no samples",
         ends: true,
     },
     Case { key: "not_finite", glitch: Some("nan"), sabotage: None, says: "`pad.image` is not a finite", ends: true },

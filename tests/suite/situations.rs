@@ -1,7 +1,7 @@
 //! What the arm is told in each of a table of situations: `situations/NAME.toml` says what happens to a graph that
-//! ships, `situations/NAME.csv` what came of it, the ramp at the end too; `situations/spoilt` holds the same of runs in which a
-//! type of node goes wrong. With `TACTFLOW_BLESS=1` the latter are written anew; read the difference
-//! before you commit it.
+//! ships, `situations/NAME.csv` what came of it, the ramp at the end too; `situations/spoilt` holds the same of runs in
+//! which a type of node goes wrong. With `TACTFLOW_BLESS=1` the latter are written anew; read the difference before you
+//! commit it.
 //!
 //! In all of them, tick by tick: neither the motion before the limiters nor the one behind them nor any joint ever
 //! changes by more than the accelerations of `[limits]` allow, and after a fault every command goes straight to zero.

@@ -47,7 +47,8 @@ fn a_picture_replaces_only_a_picture() {
     let (_folder, path) = in_new_folder("run.svg");
     fs::write(&path, "<html>").unwrap();
     let refused = say(&["run", VIEW, "--svg", &path]);
-    let message = format!("error: `{path}` exists and is not an SVG picture: it is not overwritten\n");
+    let message =
+        format!("error: `{path}` exists and is not an SVG picture, so it is not overwritten: write to another file\n");
     assert_eq!((refused.code, refused.out.as_str(), refused.err), (2, "", message));
     fs::remove_file(&path).unwrap();
     let draw = || {

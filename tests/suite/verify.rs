@@ -1,4 +1,5 @@
-//! `tactflow verify`: checks that pass and fail, runs that fail and files that do not load, on a pad whose truth is known.
+//! `tactflow verify`: checks that pass and fail, runs that fail and files that do not load, on a pad whose truth is
+//! known.
 
 use std::fs;
 use std::path::Path;
@@ -241,7 +242,7 @@ fn a_run_may_be_done_early_but_samples_may_not_end_early() {
     let (trial, _) = run(&task("", "for_s = 2.0"), "");
     assert_eq!((trial.failure, (trial.time * 1e3).round()), (None, 1996.0));
     let (trial, _) = run(&task("", "for_s = 1.9"), "");
-    assert_eq!(trial.failure.as_deref(), Some("the samples of a device end after 1.896 s"));
+    assert_eq!(trial.failure.as_deref(), Some("a device has no more samples after 1.896 s, before `for_s` is over"));
     assert_eq!(trial.figures, [None, None]);
 }
 

@@ -17,8 +17,8 @@ use super::mount::Mount;
 /// The Jacobian is spatial: its columns are twists at the origin of the base, as the output of `adjoint` is. It is not
 /// the "geometric" Jacobian of textbooks, which is taken at the tip.
 ///
-/// Model, tip and mount are facts of the arm's device. A graph that takes them from there fits any arm. The pose is that
-/// of the frame of the role `sensor`. The wire must have the joints of the model, in its order.
+/// Model, tip and mount are facts of the arm's device. A graph that takes them from there fits any arm. The pose is
+/// that of the frame of the role `sensor`. The wire must have the joints of the model, in its order.
 ///
 /// ```toml
 /// [nodes.state]

@@ -1,12 +1,14 @@
 //! A serial chain of joints: forward kinematics and the spatial Jacobian in one pass.
 //!
-//! T(q) = F_1 M_1(q_1) … F_n M_n(q_n) F_tip, with fixed transforms F and the motion M of each joint. Column i of the spatial
-//! Jacobian is the twist at the origin of the base for unit speed of joint i: `[p x w; w]` for a revolute joint with axis w
-//! through p, and `[w; 0]` for a prismatic joint, both in the frame of the base (Lynch and Park, *Modern Robotics*, section
+//! T(q) = F_1 M_1(q_1) … F_n M_n(q_n) F_tip, with fixed transforms F and the motion M of each joint. Column i of the
+//! spatial Jacobian is the twist at the origin of the base for unit speed of joint i: `[p x w; w]` for a revolute joint
+//! with axis w through p, and `[w; 0]` for a prismatic joint, both in the frame of the base (Lynch and Park, *Modern
+//! Robotics*, section
 //! 5.1.1). It does not depend on the links after the joint, nor on the mount.
 //!
 //! Numerics: a joint axis that is not an axis of its frame is rotated onto z, and the rotation is folded into the fixed
-//! transforms. So a revolute joint changes two columns of a matrix only. Fixed rotations that are the identity are skipped.
+//! transforms. So a revolute joint changes two columns of a matrix only. Fixed rotations that are the identity are
+//! skipped.
 
 use nalgebra::{IsometryMatrix3, Matrix3, Rotation3, Translation3, Vector3};
 use tactflow_runtime::signal::{Joint, Pose, Twist};
@@ -120,7 +122,8 @@ impl Chain {
     }
 }
 
-/// Returns the frame axis that `axis` lies on, its sign and the identity; or z, 1 and a rotation that takes z to `axis`.
+/// Returns the frame axis that `axis` lies on, its sign and the identity; or z, 1 and a rotation that takes z to
+/// `axis`.
 fn own_axis(axis: &Vector3<f64>) -> (FrameAxis, f64, Rotation3<f64>) {
     let own = match [axis.x != 0.0, axis.y != 0.0, axis.z != 0.0] {
         [true, false, false] => Some((FrameAxis::X, axis.x)),

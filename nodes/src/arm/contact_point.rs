@@ -1,17 +1,18 @@
-//! `contact_point`: the contact in the base. The pose is sampled: a pose that changes while the contact is held makes no point.
+//! `contact_point`: the contact in the base. The pose is sampled: a pose that changes while the contact is held makes
+//! no point.
 
 use nalgebra::{IsometryMatrix3, Translation3};
 use tactflow_runtime::node::{Describe, In, Inputs, Mistakes, Node, Out, Outputs, Param, Setup, Tick};
 use tactflow_runtime::signal::{Pose, Scalar};
 
-/// Measures where the contact is in the base, with the robot as a ruler.
+/// Measures the position of the contact in the base, from the pose of the sensor.
 ///
 /// p = T_gs (x, y, height), where T_gs is the pose of the sensor from `arm_state`. The surface of the pad is the plane
 /// z = 0 of the sensor. Section IV of the paper measures objects by touch in this way. Use `x`, `y` and `z` for
 /// recordings and plots, and `pose`, the same point with the axes of the sensor, for nodes that take a pose.
 ///
-/// Each new contact makes a point, which is as old as the contact. Without a contact the outputs are absent. An arm that
-/// moves between two images makes no point.
+/// Each new contact makes a point, which is as old as the contact. Without a contact the outputs are absent. An arm
+/// that moves between two images makes no point.
 ///
 /// The accuracy is that of the kinematics, the mount and the time between image and pose: at 0.05 m/s, a pose that is
 /// 4 ms too new is 0.2 mm off. Foam under pressure lies below the plane of the pad: set `height`.

@@ -1,7 +1,8 @@
 //! A damped inverse of a Jacobian that damps only near-singular directions, by one 6x6 Cholesky factorisation.
 //!
-//! With A = J J^T and a damping eps, x = J^T (A + eps² I) (A² + eps² A + eps⁴ I)^-1 t. Each singular value s is inverted to
-//! s (s² + eps²) / (s⁴ + eps² s² + eps⁴). Far above eps this is 1/s up to eps⁴/s⁴: at s = 0.2 and eps = 0.05 the error is
+//! With A = J J^T and a damping eps, x = J^T (A + eps² I) (A² + eps² A + eps⁴ I)^-1 t. Each singular value s is
+//! inverted to s (s² + eps²) / (s⁴ + eps² s² + eps⁴). Far above eps this is 1/s up to eps⁴/s⁴: at s = 0.2 and eps =
+//! 0.05 the error is
 //! 0.4 %, where plain damping s / (s² + eps²) costs 6 %. It falls to s/eps² near s = 0 and is smooth in between. It needs no
 //! threshold, no switch and no singular value decomposition.
 //!
@@ -13,8 +14,8 @@ pub const MIN_DAMPING: f64 = 1e-3;
 
 type Matrix = [[f64; 6]; 6];
 
-/// Writes to `out` the joint velocities [rad/s] that produce `twist` [m/s, rad/s], damped by `damping`, for a Jacobian with
-/// these columns.
+/// Writes to `out` the joint velocities [rad/s] that produce `twist` [m/s, rad/s], damped by `damping`, for a Jacobian
+/// with these columns.
 pub fn solve(columns: &[[f64; 6]], twist: &[f64; 6], damping: f64, out: &mut [f64]) {
     let gram = gram(columns);
     let square = damping * damping;
@@ -109,8 +110,8 @@ mod tests {
 
     use super::*;
 
-    /// Returns the closed form: with l = s² an eigenvalue of J^T J, it applies (l + eps²) / (l² + eps² l + eps⁴) to J^T t.
-    /// (The SVD of nalgebra is off by percents on some singular matrices.)
+    /// Returns the closed form: with l = s² an eigenvalue of J^T J, it applies (l + eps²) / (l² + eps² l + eps⁴) to J^T
+    /// t. (The SVD of nalgebra is off by percents on some singular matrices.)
     fn by_eigenvalues(columns: &[[f64; 6]], twist: &[f64; 6], damping: f64) -> DVector<f64> {
         let jacobian = DMatrix::from_fn(6, columns.len(), |i, j| columns[j][i]);
         let eigen = (jacobian.transpose() * &jacobian).symmetric_eigen();

@@ -18,9 +18,9 @@ use super::{damped, joint_limits, null_space};
 
 /// Moves the arm: computes joint velocities for a twist, within the limits of the arm.
 ///
-/// Resolved motion rate control, as in section IV of the paper. Twist and Jacobian are moved to the origin of the sensor,
-/// where the task is defined. A damped inverse damps only the directions whose singular value is below `damping`, so the
-/// arm follows the twist exactly when it is far from a singularity.
+/// Resolved motion rate control, as in section IV of the paper. Twist and Jacobian are moved to the origin of the
+/// sensor, where the task is defined. A damped inverse damps only the directions whose singular value is below
+/// `damping`, so the arm follows the twist exactly when it is far from a singularity.
 ///
 /// An arm with more than six joints can move its elbow while the sensor stays still. It drifts toward `posture`, at
 /// `posture_gain`. The speed and position limits of the model are kept: a command that is too fast is slowed down as a
@@ -54,7 +54,7 @@ pub struct Params {
     /// Singular values below this are damped.
     #[param(unit = "1, m", above = 0.0, default = 0.05)]
     damping: f64,
-    /// Posture that the arm drifts to where the motion of the sensor leaves it free, one entry for each joint; in m for
+    /// Posture that the arm drifts toward without moving the sensor, one entry for each joint; in m for
     /// a prismatic joint.
     #[param(unit = "rad", live)]
     posture: Option<Vec<f64>>,
@@ -169,10 +169,11 @@ fn check(params: &Params, joints: &JointsShape, columns: &JointsShape, period: f
     let mut mistakes = Mistakes::new();
     if names(joints) != names(columns) {
         let message = format!("the Jacobian has the joints {:?}, but `joints` has {:?}", names(columns), names(joints));
-        mistakes.push(Mistake::input("jacobian", message).help("take both from one `arm_state`"));
+        mistakes.push(Mistake::input("jacobian", message).help("wire both to the same `arm_state`"));
     }
     if params.damping < damped::MIN_DAMPING {
-        let message = format!("`damping` is less than {}: rounding errors are then larger", damped::MIN_DAMPING);
+        let message =
+            format!("`damping` is less than {}, which is too small for double precision", damped::MIN_DAMPING);
         mistakes.push(Mistake::param("damping", message));
     }
     let max = max_limit_gain(period);
@@ -188,7 +189,9 @@ fn check(params: &Params, joints: &JointsShape, columns: &JointsShape, period: f
     }
     for (Joint { name, lower, upper, .. }, entry) in joints.joints.iter().zip(posture.unwrap_or_default()) {
         if !(lower..=upper).contains(&entry) {
-            let message = format!("joint `{name}` cannot be at {entry}: it goes from {lower:.4} to {upper:.4}");
+            let message = format!(
+                "joint `{name}` cannot be at {entry}: its range is {lower:.4} to {upper:.4} (rad, or m if prismatic)"
+            );
             mistakes.push(Mistake::param("posture", message));
         }
     }

@@ -1,8 +1,8 @@
 //! Limits of joint velocities that keep the direction of the motion.
 //!
-//! Every joint has an interval of velocities: at most its largest speed, and toward a position limit at most `gain` times
-//! the distance to it, so that the limit is approached exponentially and never crossed. One factor scales the velocities
-//! of the task until all joints are within their intervals. The posture gets the velocity that is left.
+//! Every joint has an interval of velocities: at most its largest speed, and toward a position limit at most `gain`
+//! times the distance to it, so that the limit is approached exponentially and never crossed. One factor scales the
+//! velocities of the task until all joints are within their intervals. The posture gets the velocity that is left.
 
 use tactflow_runtime::signal::Joint;
 

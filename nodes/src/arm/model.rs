@@ -1,9 +1,9 @@
 //! Reads a kinematic chain from a robot model: the part of a URDF between its root link and a named tip link.
 //!
-//! Revolute, continuous and prismatic joints move. Fixed joints are merged into their neighbours. Other joints are errors.
-//! The base is the root link. A joint without position limits (continuous, or an omitted limit of URDF 1.2) gets the
-//! limits ±[`UNBOUNDED`], so that computations with limits stay finite. A joint without a speed limit is an error, because
-//! its velocity could not be limited.
+//! Revolute, continuous and prismatic joints move. Fixed joints are merged into their neighbours. Other joints are
+//! errors. The base is the root link. A joint without position limits (continuous, or an omitted limit of URDF 1.2)
+//! gets the limits ±[`UNBOUNDED`], so that computations with limits stay finite. A joint without a speed limit is an
+//! error, because its velocity could not be limited.
 
 use std::collections::BTreeMap;
 

@@ -1,16 +1,16 @@
 //! The exact null space of a 6xn Jacobian, n > 6: joint motion that does not move the sensor.
 //!
-//! J^T = Q R is computed by Householder reflections. The last n - 6 columns of Q, Q_2, satisfy J Q_2 = 0 for any rank of
-//! J. The projector Q_2 Q_2^T is applied as reflections and never formed. Unlike a damped projector, it moves the sensor
-//! only by rounding errors.
+//! J^T = Q R is computed by Householder reflections. The last n - 6 columns of Q, Q_2, satisfy J Q_2 = 0 for any rank
+//! of J. The projector Q_2 Q_2^T is applied as reflections and never formed. Unlike a damped projector, it moves the
+//! sensor only by rounding errors.
 
 /// Working memory for one joint: the six entries of its row of J^T, its motion, and padding to whole vector lanes.
 pub type Row = [f64; 8];
 
 /// Removes from `motion` [rad/s] the part that moves the sensor.
 ///
-/// `columns` are the columns of the Jacobian, and `rows` is working memory; both have one entry per joint. With 6 joints
-/// or fewer the result is zero.
+/// `columns` are the columns of the Jacobian, and `rows` is working memory; both have one entry per joint. With 6
+/// joints or fewer the result is zero.
 pub fn project(columns: &[[f64; 6]], rows: &mut [Row], motion: &mut [f64]) {
     if columns.len() <= 6 {
         motion.fill(0.0);

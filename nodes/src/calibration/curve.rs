@@ -1,8 +1,8 @@
 //! The curve of one tactel, from its reading to a force: the inverse of its characteristic (paper section III, fig. 1).
 //!
-//! Every curve starts at the unloaded reading, the offset, and is a function of s = reading - offset. All arithmetic uses
-//! 32-bit floats, like images, in the same order as the node `calibrate`. So a fitted curve, one from a file and one in a
-//! graph give the same bits.
+//! Every curve starts at the unloaded reading, the offset, and is a function of s = reading - offset. All arithmetic
+//! uses 32-bit floats, like images, in the same order as the node `calibrate`. So a fitted curve, one from a file and
+//! one in a graph give the same bits.
 
 use std::fmt;
 
@@ -197,7 +197,8 @@ fn flaw_of_knots(knots: &[[f32; 2]]) -> Option<(&'static str, String)> {
     let mut last = [0.0, 0.0];
     for [s, force] in knots {
         if (s - last[0]) * sign <= 0.0 {
-            let message = format!("`readings` must move away from 0 in one direction, but {s} comes after {}", last[0]);
+            let message =
+                format!("`readings` must increase from 0 or decrease from 0, but {s} comes after {}", last[0]);
             return Some(("readings", message));
         }
         if force - last[1] < 0.0 {

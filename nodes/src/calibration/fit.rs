@@ -1,12 +1,13 @@
 //! Fits curves to the samples of one tactel: robust, deterministic and monotone.
 //!
-//! The samples of each branch, force rising and force falling, are sorted into bins of force, which are narrow where the
-//! curve is steep. Each bin gives one point: the median of its forces and of its readings. So a long dwell does not
-//! outweigh a press, outliers do not count, and both branches have the same weight: a curve runs through the middle of the
-//! hysteresis. All fits pass through zero, so an unloaded tactel gives no force.
+//! The samples of each branch, force rising and force falling, are sorted into bins of force, which are narrow where
+//! the curve is steep. Each bin gives one point: the median of its forces and of its readings. So a long dwell does not
+//! outweigh a press, outliers do not count, and both branches have the same weight: a curve runs through the middle of
+//! the hysteresis. All fits pass through zero, so an unloaded tactel gives no force.
 //!
-//! The rational curve and the knots are fitted to the readings, s over f, because the noise is in the readings: by least
-//! squares with Huber's weights. The straight line is fitted to the forces, because its model error is larger than the noise.
+//! The rational curve and the knots are fitted to the readings, s over f, because the noise is in the readings: by
+//! least squares with Huber's weights. The straight line is fitted to the forces, because its model error is larger
+//! than the noise.
 
 use super::ForceCurve;
 use super::samples::{TactelSample, median};
@@ -51,7 +52,8 @@ pub struct Points {
 }
 
 impl Points {
-    /// Sorts samples into points, or returns `None` if they are too few. A force up to `unloaded` [N] counts as no load.
+    /// Sorts samples into points, or returns `None` if they are too few. A force up to `unloaded` [N] counts as no
+    /// load.
     #[must_use]
     pub fn new(samples: &[TactelSample], unloaded: f64) -> Option<Self> {
         let most = samples.iter().fold(0.0, |most: f64, sample| most.max(sample.force));
@@ -83,7 +85,8 @@ impl Points {
         (points.middle.len() > 1).then_some(points)
     }
 
-    /// Fits the straight line with the smallest error of the force; `sign` is 1 if readings rise with the force, else -1.
+    /// Fits the straight line with the smallest error of the force; `sign` is 1 if readings rise with the force, else
+    /// -1.
     #[must_use]
     pub fn linear(&self, sign: f32) -> ForceCurve {
         let sum = |g: fn(&Point) -> f64| self.points.iter().map(|point| point.weight * g(point)).sum::<f64>();

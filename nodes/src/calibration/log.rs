@@ -58,14 +58,16 @@ impl Log {
         let (max, min) = self.force.iter().fold((0.0, 0.0), |(max, min), force| (force.max(max), force.min(min)));
         if max <= 0.0 || -min > 0.5 * max {
             let range = format!("from {min} N to {max} N");
-            return Err(format!("its force is {range}: a force that presses on the pad must be positive"));
+            return Err(format!(
+                "its force is {range}, but a press must have a positive force: check the sign of `force`"
+            ));
         }
         let unloaded = (0..self.frames()).filter(|i| self.is_unloaded(*i, max)).count();
         if unloaded < MIN_UNLOADED_FRAMES {
             let percent = 100.0 * MAX_UNLOADED;
             return Err(format!(
-                "only {unloaded} of its frames are unloaded (below {percent} % of {max} N): they give the zero of each \
-                 tactel, so record a second before the first press"
+                "only {unloaded} of its frames are unloaded (below {percent} % of {max} N), but they define the zero of each \
+                 tactel: record at least one second before the first press"
             ));
         }
         Ok(())

@@ -1,8 +1,8 @@
 //! Calibration of a pad: from a log of presses with a reference force to a curve for each tactel.
 //!
-//! [`log`] is the input, [`samples`] finds which tactel bore which force, [`fit`] fits its [`curve`], [`file`] writes and
-//! reads the curves, [`report`] measures how good they are and [`plot`] draws them, as Fig. 1 of the paper does. None of
-//! this runs in a graph: there the node `calibrate` reads the file.
+//! [`log`] is the input, [`samples`] finds which tactel bore which force, [`fit`] fits its [`curve`], [`file`] writes
+//! and reads the curves, [`report`] measures how good they are and [`plot`] draws them, as Fig. 1 of the paper does.
+//! None of this runs in a graph: there the node `calibrate` reads the file.
 
 pub mod curve;
 pub mod file;

@@ -85,8 +85,8 @@ pub fn calibrate(logs: &[Log], settings: &Settings) -> Result<CalibrationReport,
     let first = logs.first().ok_or("there is no log")?;
     let samples = LogAnalysis::new(logs, settings.load, settings.dead_below, settings.bearing);
     if samples.is_shared {
-        let message = "most tactels respond alike to most presses, so the force is not on one tactel at a time: for a \
-                       load on all of them, add `--load uniform`";
+        let message = "most tactels respond equally to most presses, so the force is not on one tactel at a time: for a \
+                       uniform load on all tactels, add `--load uniform`";
         return Err(message.into());
     }
     let extremes = extremes(logs);
@@ -166,8 +166,8 @@ fn no_tactel(findings: &[TactelFinding], settings: &Settings) -> String {
     let (dead, few, unfit) = (count(TactelStatus::Dead), count(TactelStatus::Few), count(TactelStatus::Unfit));
     let what = format!("{dead} tactels do not respond, {few} have too few samples, {unfit} have no rising curve");
     let question = match settings.load {
-        LoadKind::Probe => "is the log of a probe on one tactel at a time, or is the load uniform?",
-        LoadKind::Uniform => "is the log of a uniform load, or of a probe on one tactel at a time?",
+        LoadKind::Probe => "if the load was uniform, add `--load uniform`",
+        LoadKind::Uniform => "if a probe loaded one tactel at a time, remove `--load uniform`",
     };
     format!("no tactel can be calibrated: {what}; {question}")
 }
@@ -223,7 +223,7 @@ impl CalibrationReport {
         let hysteresis = self.calibrated().filter_map(|(_, finding, ..)| finding.hysteresis);
         let [median, max] = median_and_max(hysteresis.clone()).map(percent);
         lines.push(match hysteresis.count() {
-            0 => "hysteresis   not measured: the force does not rise and fall".into(),
+            0 => "hysteresis   not measured: it needs a log in which the force rises and falls".into(),
             _ => format!("hysteresis   median {median}, maximum {max} of the range of the reading"),
         });
         let [median, max] = median_and_max(self.calibrated().map(|(_, finding, ..)| finding.noise));

@@ -1,7 +1,8 @@
 //! Finds which tactel bore which force, frame by frame.
 //!
-//! A *probe* presses one tactel at a time: between two unloaded frames the whole force is on one tactel. A *uniform* load,
-//! a bladder, is shared equally by all tactels. In both cases the zero of a tactel is the median of its unloaded readings.
+//! A *probe* presses one tactel at a time: between two unloaded frames the whole force is on one tactel. A *uniform*
+//! load, a bladder, is shared equally by all tactels. In both cases the zero of a tactel is the median of its unloaded
+//! readings.
 
 use std::ops::Range;
 
@@ -103,8 +104,8 @@ pub struct LogAnalysis<'l> {
 }
 
 impl<'l> LogAnalysis<'l> {
-    /// Analyses logs of one array. A live tactel responds with at least `dead_below` [reading]. A uniform load is shared
-    /// by `bearing` tactels, or by the live ones.
+    /// Analyses logs of one array. A live tactel responds with at least `dead_below` [reading]. A uniform load is
+    /// shared by `bearing` tactels, or by the live ones.
     #[must_use]
     pub fn new(logs: &'l [Log], load: LoadKind, dead_below: Option<f64>, bearing: Option<usize>) -> Self {
         let most = logs.iter().fold(0.0, |most: f64, log| most.max(peak(&log.force)));

@@ -50,7 +50,9 @@ pub(crate) fn joints(chain: &Chain, acceleration: f64, start: &[f64]) -> Result<
     let outside = joints.iter().zip(start).filter(|(joint, q)| !(joint.lower..=joint.upper).contains(*q));
     let mistakes: Mistakes = outside
         .map(|(Joint { name, lower, upper, .. }, q)| {
-            let message = format!("joint `{name}` cannot start at {q}: it goes from {lower:.4} to {upper:.4}");
+            let message = format!(
+                "joint `{name}` cannot start at {q}: its range is {lower:.4} to {upper:.4} (rad, or m if prismatic)"
+            );
             Mistake::param("start", message)
         })
         .collect();
@@ -79,7 +81,8 @@ pub(crate) fn facts(urdf: &FilePath, tip: &str, mount: &Mount) -> Result<Facts, 
     Ok(vec![("urdf".into(), path.into()), ("tip".into(), tip.into()), ("mount".into(), mount.into())])
 }
 
-/// Returns the path of a file as a fact. It is absolute, because the graph may be in another folder; `param` names the file.
+/// Returns the path of a file as a fact. It is absolute, because the graph may be in another folder; `param` names the
+/// file.
 ///
 /// # Errors
 /// If the path is not UTF-8 or cannot be made absolute.

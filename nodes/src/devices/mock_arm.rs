@@ -25,7 +25,8 @@ pub struct Params {
     /// Samples per second.
     #[param(unit = "1/s", range = 0.001..=1e6, default = 250.0)]
     rate_hz: f64,
-    /// Maximum acceleration that the arm states for each joint, in m/s² for a prismatic joint; the arm does not keep to it.
+    /// Maximum acceleration that the arm states for each joint, in m/s² for a prismatic joint; the arm does not keep to
+    /// it.
     #[param(unit = "rad/s2", above = 0.0, default = 10.0)]
     acceleration: f64,
     /// Periods in which the arm is held in place.
@@ -36,7 +37,7 @@ pub struct Params {
 /// A period in which the arm is held in place.
 #[derive(Debug, Clone, Param)]
 struct Hold {
-    /// Begin.
+    /// Start.
     #[param(unit = "s", range = 0.0..)]
     from_s: f64,
     /// End.
@@ -46,13 +47,13 @@ struct Hold {
 
 /// An arm without dynamics that follows its commands exactly.
 ///
-/// The device integrates the commanded joint velocity exactly: the result is its `equilibrium`, where a compliant arm would
-/// be if nothing held it. Its `position` is the same, but it stops at the ends of the joints, and it stays in place while
-/// the arm is held (`hold`). Meanwhile the equilibrium runs ahead, also past the end of a joint, and the position springs to
-/// it when the arm is released. A `joint_limit` keeps this lead small.
+/// The device integrates the commanded joint velocity exactly: the result is its `equilibrium`, where a compliant arm
+/// would be if nothing held it. Its `position` is the same, but it stops at the ends of the joints, and it stays in
+/// place while the arm is held (`hold`). Meanwhile the equilibrium runs ahead, also past the end of a joint, and the
+/// position springs to it when the arm is released. A `joint_limit` keeps this lead small.
 ///
-/// Inertia, friction, stiffness, delay and noise are not simulated: what works on this arm may fail on a real one. The arm
-/// states its `acceleration` and does not keep to it.
+/// Inertia, friction, stiffness, delay and noise are not simulated: what works on this arm may fail on a real one. The
+/// arm states its `acceleration` and does not keep to it.
 ///
 /// It states the facts `urdf`, `tip` and `mount` for `arm_state`.
 ///
@@ -123,7 +124,8 @@ impl MockArm {
         Self { ports, joints, equilibrium: start.clone(), position: start, holds, period, last: None, sequence: 0 }
     }
 
-    /// Moves at `velocity` from the last exchange to `now` [ns]. Returns whether time advanced, so that there is a new sample.
+    /// Moves at `velocity` from the last exchange to `now` [ns]. Returns whether time advanced, so that there is a new
+    /// sample.
     fn advance(&mut self, now: i64, velocity: &[f64]) -> Result<bool, DeviceError> {
         if self.last.is_some_and(|last| now <= last) {
             return Ok(false);
@@ -146,7 +148,8 @@ impl MockArm {
 /// Checks that every hold lasts for some time.
 fn check_holds(holds: &[Hold]) -> Result<(), Mistakes> {
     let backward = holds.iter().filter(|hold| hold.to_s <= hold.from_s);
-    let message = |hold: &Hold| format!("a hold from {} s to {} s lasts no time", hold.from_s, hold.to_s);
+    let message =
+        |hold: &Hold| format!("a hold must end after it starts, not go from {} s to {} s", hold.from_s, hold.to_s);
     let mistakes: Mistakes = backward.map(|hold| Mistake::param("hold", message(hold))).collect();
     if mistakes.is_empty() { Ok(()) } else { Err(mistakes) }
 }

@@ -44,29 +44,29 @@ pub struct Params {
 
 /// Plays a recorded file of a tactile or pressure sensor (Tekscan, novel, XSENSOR, CSV, …) as a pad.
 ///
-/// The format is recognised by what the file begins with, or named by `format`:
+/// The device recognises the format from the beginning of the file, or `format` names it:
 ///
 /// - `tekscan`: ASCII movies of I-Scan, F-Scan and CONFORMat, `.csv` or `.asf`
 /// - `novel-lst`: listings of novel's emed and pliance, `.lst`
-/// - `novel-asc`: texts of novel's pliance, `.asc`; an insole of pedar has no rows and columns and is refused
+/// - `novel-asc`: text exports of novel's pliance, `.asc`; pedar insoles have no rows and columns and are not supported
 /// - `footscan`: texts of RSscan's footscan plates
 /// - `zebris`: `RawDataGaitAnalysis` texts of Zebris treadmills and plates
 /// - `xsensor`: `.csv` of XSENSOR
-/// - `csv`: plain tables, a frame a row or a frame a block
+/// - `csv`: plain tables with one frame per row or one frame per block
 /// - `npy`, `npz`: arrays of numpy, frames x rows x columns
 ///
-/// Any of them may be in a `.zip` or `.gz`. Pressures become kPa and forces N, whatever the file counts in.
+/// Any of them may be in a `.zip` or `.gz`. Pressures are converted to kPa, and forces to N.
 ///
 /// The file is read whole before anything runs. A damaged file is refused with the line of the damage; no damage is
 /// repaired silently. `unit`, `pitch_mm`, `rate_hz` and `size` give what the file does not state. Where the file states
 /// another value, that is an error. `pad` picks one of several pads in a file.
 ///
-/// Frames come at the times of the file, the first at once. If several frames come between two ticks, only the newest is
-/// played. Rows and columns are counted as in the file: `tactile_source` turns them into the sensor's frame.
+/// Frames come at the times of the file, the first at once. If several frames come between two ticks, only the newest
+/// is played. Rows and columns are counted as in the file: `tactile_source` turns them into the sensor's frame.
 ///
-/// It states the facts `dead` (places without a sensor, as [row, column]), `frames`, `format`, and `threshold` if the
+/// It states these facts: `dead` (places without a sensor, as [row, column]), `frames`, `format`, `threshold` if the
 /// parameter or the file gives a value below which the values are noise; and `pressure`, if it is given. Its
-/// `calibration` names the dead places, and leaves the values as they are.
+/// `calibration` lists the dead places and does not change the values.
 ///
 /// ```toml
 /// [roles]

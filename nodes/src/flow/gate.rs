@@ -1,7 +1,7 @@
 //! `gate` and `twist_gate`: one implementation for both kinds.
 //!
-//! The output is new when the input is new, and when the gate opens on a held value. A held value keeps its stamp, so no
-//! time passes from one to the other.
+//! The output is new when the input is new, and when the gate opens on a held value. A held value keeps its stamp, so
+//! no time passes from one to the other.
 
 use std::marker::PhantomData;
 
@@ -12,14 +12,14 @@ use super::passing::State;
 
 /// Lets a signal pass only while a flag is set.
 ///
-/// `value` passes while `gate` is set. While the gate is not set or is absent, the output is absent, as if the sensor had
-/// no value: the nodes behind it reset, fade or wait as they do when a contact is lost. An absent twist is zero motion: a
-/// `twist_adder` leaves it out, and the limiters bring the arm to rest.
+/// `value` passes while `gate` is set. While the gate is not set or is absent, the output is absent, as if the sensor
+/// had no value: the nodes behind it reset, fade or wait as they do when a contact is lost. An absent twist is zero
+/// motion: a `twist_adder` leaves it out, and the limiters bring the arm to rest.
 ///
-/// While the gate is open, the output counts as new only when the input is new, however often the flag is. When the gate
-/// opens on a held value, that value passes at once and keeps its stamp: an integral does not take it twice, but a
-/// `moving_average` or a `median` behind a gate that shuts and opens on one sample does. For a gate that does not flicker wire
-/// `contact_debounce.present`.
+/// While the gate is open, the output is new only when `value` is new, even if the flag is new more often. When the
+/// gate opens on a held value, that value passes at once and keeps its stamp: an integral does not take it twice, but a
+/// `moving_average` or a `median` behind a gate that shuts and opens on one sample does. For a gate that does not
+/// flicker wire `contact_debounce.present`.
 ///
 /// Generated motion does not end with the contact by itself; a `twist_gate` on `label.present` ends it. `twist_source`
 /// has such a gate built in. The output is as old as the value or the flag, whichever is older.

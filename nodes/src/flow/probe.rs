@@ -1,5 +1,5 @@
-//! `probe`: a step never logs. It only decides whether a line is due and sets a flag; the tool writes the line after the
-//! tick, from the values on the wires at that time ([`Node::LOGS`]).
+//! `probe`: a step never logs. It only decides whether a line is due and sets a flag; the tool writes the line after
+//! the tick, from the values on the wires at that time ([`Node::LOGS`]).
 
 use tactflow_runtime::node::{
     At, Describe, In, Inputs, Many, Mistake, Mistakes, Node, Out, Outputs, Param, Setup, State, Tick,
@@ -10,8 +10,8 @@ use tactflow_runtime::source::Code;
 /// Prints the values of wires while the graph runs.
 ///
 /// Wire the signals to show by kind (`in.flag`, `in.features`, `in.twist`, `in.joints`, `in.pose`), and any number of
-/// scalars under names of your choice. `run` then prints lines to standard error with the time, the node's name, and every
-/// value with its port and its unit:
+/// scalars under names of your choice. `run` then prints lines to standard error with the time, the node's name, and
+/// every value with its port and its unit:
 ///
 /// ```text
 /// INFO probe: at 0.512 s: watch: moments.force = 1.500 N, moments.x is absent
@@ -19,8 +19,8 @@ use tactflow_runtime::source::Code;
 ///
 /// A line is due when a wire has a new value or loses its value, but not before `every_ms` have passed since the last
 /// line. A change before that time appears in the next line that is due, or not at all if no other change follows. The
-/// node does not print within the tick: it sets a flag, and the tool prints after the tick, so a probe delays no command.
-/// `RUST_LOG=warn` turns the lines off; `--out` records every tick instead.
+/// node does not print within the tick: it sets a flag, and the tool prints after the tick, so a probe delays no
+/// command. `RUST_LOG=warn` turns the lines off; `--out` records every tick instead.
 ///
 /// Without `every_ms` a graph that runs faster than real time prints thousands of lines per second.
 ///
@@ -95,8 +95,7 @@ impl Node for Probe {
         let InputsShapes { value, flag, features, twist, joints, pose } = &setup.inputs;
         let others = [flag.is_some(), features.is_some(), twist.is_some(), joints.is_some(), pose.is_some()];
         if value.is_empty() && !others.contains(&true) {
-            let mistake =
-                Mistake::new(Code::MissingInput, At::Node, "nothing is wired to it, so it has nothing to show");
+            let mistake = Mistake::new(Code::MissingInput, At::Node, "no input is wired, so there is nothing to print");
             return Err(mistake.help("wire a signal to it: `in.force = \"moments.force\"`").into());
         }
         Ok(Self { every: (params.every_ms * 1e6) as i64 })

@@ -9,15 +9,15 @@ use super::passing::State;
 
 /// Selects one of two signals by a flag.
 ///
-/// `on` passes while `select` is set, and `off` while it is not. Without `select`, or while the selected input is absent,
-/// the output is absent: the other input never replaces it. An absent twist is zero motion. Both inputs have the same
-/// unit and the same frame.
+/// `on` passes while `select` is set, and `off` while it is not. Without `select`, or while the selected input is
+/// absent, the output is absent: the other input never replaces it. An absent twist is zero motion. Both inputs have
+/// the same unit and the same frame.
 ///
 /// The output is new when the selected input is new, and when the selection changes. It is as old as the oldest of the
 /// three inputs: when the device behind the unselected input falls silent, the output becomes old too.
 ///
-/// The value jumps when the selection changes: a derivative behind the switch sees the jump, and the limiters of the arm
-/// smooth it. A flag that flickers makes the output flicker: wire `contact_debounce.present`.
+/// The value jumps when the selection changes: a derivative behind the switch sees the jump, and the limiters of the
+/// arm smooth it. A flag that flickers makes the output flicker: wire `contact_debounce.present`.
 ///
 /// ```toml
 /// [nodes.switch]                      # the mean while there is a contact, the newest sample otherwise

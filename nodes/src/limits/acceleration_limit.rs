@@ -18,7 +18,7 @@ use crate::motion::bounds::{approach_twist, countable};
 /// When the motion is absent or older than `max_age_ms`, or the runtime holds all commands, the output goes to zero in
 /// the same way, and is absent once it is zero.
 ///
-/// A generated motion is timeless. What remains of an absent motion is timeless too, and goes all the way to zero here.
+/// A generated motion never becomes too old. Neither does what remains of an absent motion: it goes to zero here.
 /// What remains of an old motion keeps its age: a `joint_limit` behind it drops it as well, and brings the joints to
 /// rest by their own accelerations.
 ///

@@ -1,9 +1,9 @@
 //! `bumpless`: out = in + offset.
 //!
-//! A change of the input from one tick to the next passes as far as half of the accelerations allows. The rest goes into
-//! the offset with the opposite sign, and the offset goes to zero on a straight line with the other half. So the output
-//! never changes by more than the accelerations allow, whatever the input does. Once the offset is zero, the output is
-//! the input, to the last bit and without lag. One factor scales all six components of each change.
+//! A change of the input from one tick to the next passes as far as half of the accelerations allows. The rest goes
+//! into the offset with the opposite sign, and the offset goes to zero on a straight line with the other half. So the
+//! output never changes by more than the accelerations allow, whatever the input does. Once the offset is zero, the
+//! output is the input, to the last bit and without lag. One factor scales all six components of each change.
 
 use tactflow_runtime::node::{Describe, Limits, Mistakes, Node, Out, Outputs, Param, Setup, State, Tick};
 use tactflow_runtime::signal::{Scalar, Twist};
@@ -11,17 +11,17 @@ use tactflow_runtime::signal::{Scalar, Twist};
 use super::{Inputs, fraction};
 use crate::motion::bounds::{countable, scale_twist, twist_ratio};
 
-/// Removes the jumps of a motion: a switch of modes, a contact found or lost (bumpless transfer).
+/// Removes the jumps of a motion, as when the mode changes or a contact begins or ends (bumpless transfer).
 ///
-/// The wanted motion jumps when a mode begins and when a contact is found or lost. The part of a change that exceeds half
-/// of the accelerations becomes an offset, which goes to zero with the other half. So the output is smooth before it
-/// reaches a limiter, and it is exactly the input, without lag, as soon as the offset is zero.
+/// The wanted motion jumps when a mode begins and when a contact is found or lost. The part of a change that exceeds
+/// half of the accelerations becomes an offset, which goes to zero with the other half. So the output is smooth before
+/// it reaches a limiter, and it is exactly the input, without lag, as soon as the offset is zero.
 ///
 /// A wanted motion that is faster than `linear_m_per_s` or `angular_rad_per_s` is scaled down to these speeds first. A
-/// controller can ask for a hundred times the speed of the arm, and when its contact is lost the output would have to come
-/// down from there. Use the speeds of the `twist_limit` behind it.
+/// controller can output a hundred times the speed of the arm, and when its contact is lost the output would have to
+/// come down from there. Use the speeds of the `twist_limit` behind it.
 ///
-/// While the motion is absent the output goes on until it is zero, and is absent then. The node comes after the sum of all
+/// When the motion becomes absent, the output decreases to zero and is then absent. The node comes after the sum of all
 /// motions and before the limiters.
 ///
 /// ```toml

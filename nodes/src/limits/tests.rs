@@ -1,5 +1,5 @@
-//! Limiters of a twist: motions of any size, images that change while a motion is held, motions that become too old, and
-//! a sensor that moves toward a face of its box.
+//! Limiters of a twist: motions of any size, images that change while a motion is held, motions that become too old,
+//! and a sensor that moves toward a face of its box.
 
 use nalgebra::IsometryMatrix3;
 use tactflow_runtime::harness::NodeRig;
@@ -196,8 +196,8 @@ fn a_tick_without_time_changes_nothing_and_a_long_gap_counts_as_max_gap() {
     }
 }
 
-/// Returns how far a sensor passes a face of its box when it moves straight toward it and turns to and fro at full speed:
-/// the acceleration limit keeps the direction of a change, so the turning delays the braking.
+/// Returns how far a sensor passes a face of its box when it moves straight toward it and turns to and fro at full
+/// speed: the acceleration limit keeps the direction of a change, so the turning delays the braking.
 fn past(gap: f64, turning: f64, flip: usize, margin: f64) -> f64 {
     let accelerations = format!("linear_m_per_s2 = 1.0\nangular_rad_per_s2 = {turning}");
     let (mut near, mut slow) = (rig::<WorkspaceLimit>(BOX), rig::<TwistLimit>(SPEEDS));

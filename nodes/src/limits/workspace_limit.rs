@@ -15,13 +15,13 @@ use crate::motion::braking::stopping_speed;
 /// Keeps the sensor in a box of the workspace, with room to brake.
 ///
 /// The sensor's origin stays between the corners `min_m` and `max_m` of a box in the base. It brakes before a face, so
-/// that it can stop with `deceleration_m_per_s2`; at the face only the way back is free. The motion is scaled as a whole
-/// and keeps its direction: it goes on along a face only if the task does not push against the face.
+/// that it can stop with `deceleration_m_per_s2`; at the face only the way back is free. The motion is scaled as a
+/// whole and keeps its direction: it goes on along a face only if the task does not push against the face.
 ///
-/// `deceleration_m_per_s2` must not exceed the linear acceleration of the `acceleration_limit` behind it. That node keeps
-/// the direction of a change of motion, so turning to and fro at full speed delays the braking. The sensor then passes a
-/// face by at most its maximum speed times the time in which the whole motion can be reversed: 8 mm with 0.05 m/s, 0.8
-/// rad/s, 1 m/s² and 10 rad/s². The worst case found at 250 Hz is 2.3 mm.
+/// `deceleration_m_per_s2` must not exceed the linear acceleration of the `acceleration_limit` behind it. That node
+/// keeps the direction of a change of motion, so rotating back and forth at full speed delays the braking. The sensor
+/// then passes a face by at most its maximum speed times the time in which the whole motion can be reversed: 8 mm with
+/// 0.05 m/s, 0.8 rad/s, 1 m/s² and 10 rad/s². The worst case found at 250 Hz is 2.3 mm.
 ///
 /// It checks the sensor's origin and no other point: a large sensor or holder needs a smaller box. When the pose is
 /// older than `max_age_ms` the output is absent.
@@ -119,8 +119,8 @@ impl Node for WorkspaceLimit {
 
 /// Returns the largest factor up to 1 with which a velocity can still be stopped within a box.
 ///
-/// `position` and the corners `[min, max]` are in [m], the velocity in [m/s], `deceleration` in [m/s²]. The velocity stays
-/// the same for `delay` [s] before it decreases.
+/// `position` and the corners `[min, max]` are in [m], the velocity in [m/s], `deceleration` in [m/s²]. The velocity
+/// stays the same for `delay` [s] before it decreases.
 #[must_use]
 pub fn scale(
     velocity: &Vector3<f64>,

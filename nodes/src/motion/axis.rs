@@ -1,6 +1,7 @@
 //! Angles of lines: a line at 0 and a line at pi are the same, so its angle is known modulo pi.
 //!
-//! Angles of lines cannot be averaged, as 89 and -89 degrees are neighbours. The unit vectors of the doubled angles can.
+//! Angles of lines cannot be averaged, as 89 and -89 degrees are neighbours. The unit vectors of the doubled angles
+//! can.
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
@@ -10,8 +11,8 @@ const MIN_RESULTANT: f64 = 1e-6;
 /// Returns the angle of the same line in (-pi/2, pi/2] [rad], as the paper wraps the angular error (section IV, below
 /// eq. 3).
 ///
-/// The result is exact: the remainder and both shifts are free of rounding. An angle in the range is returned unchanged,
-/// so wrapping twice changes no bit.
+/// The result is exact: the remainder and both shifts are free of rounding. An angle in the range is returned
+/// unchanged, so wrapping twice changes no bit.
 ///
 /// ```
 /// use std::f64::consts::{FRAC_PI_2, PI};

@@ -41,8 +41,8 @@ pub fn twist_ratio(twist: &Twist, linear: f64, angular: f64) -> f64 {
     (norm(twist, 0) / linear).max(norm(twist, 3) / angular)
 }
 
-/// Moves `reached` toward `target` on a straight line, by at most `linear` [m/s] and `angular` [rad/s]. Returns the part
-/// of the change that it made, up to 1.
+/// Moves `reached` toward `target` on a straight line, by at most `linear` [m/s] and `angular` [rad/s]. Returns the
+/// part of the change that it made, up to 1.
 pub fn approach_twist(reached: &mut Twist, target: &Twist, linear: f64, angular: f64) -> f64 {
     let scale = scale_twist(&Twist(target.0 - reached.0), linear, angular);
     *reached = Twist(reached.0.zip_map(&target.0, |from, to| step_toward(from, to, scale)));
@@ -63,7 +63,8 @@ pub fn scale_within(size: f64, parts: impl Iterator<Item = (f64, f64)>) -> f64 {
     scale
 }
 
-/// Returns the largest factor up to 1 that brings each velocity within its interval `(min, max)`; each interval contains
+/// Returns the largest factor up to 1 that brings each velocity within its interval `(min, max)`; each interval
+/// contains
 /// 0.
 pub fn scale_into(velocity: &[f64], intervals: impl Iterator<Item = (f64, f64)>) -> f64 {
     let largest = velocity.iter().fold(0.0, |largest: f64, v| largest.max(v.abs()));

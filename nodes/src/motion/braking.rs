@@ -2,9 +2,9 @@
 
 /// Returns the largest speed from which a stop within `distance` is possible: the v of v τ + v²/(2a) = d.
 ///
-/// The motion keeps its speed for `delay` τ [s] before it brakes with `deceleration` a. Distance, speed and deceleration
-/// are in one unit of length, for example m, m/s and m/s², or rad, rad/s and rad/s². The speed is infinite for an
-/// infinite distance, and 0 for a distance that is not positive or not a number.
+/// The motion keeps its speed for `delay` τ [s] before it brakes with `deceleration` a. Distance, speed and
+/// deceleration are in one unit of length, for example m, m/s and m/s², or rad, rad/s and rad/s². The speed is infinite
+/// for an infinite distance, and 0 for a distance that is not positive or not a number.
 ///
 /// ```
 /// use tactflow_nodes::motion::braking::stopping_speed;

@@ -11,8 +11,8 @@ pub struct Odometer {
 }
 
 impl Odometer {
-    /// Returns the step since the last pose along the sensor's x and y, R' (p - p_last) [m]; zero for the first pose and
-    /// for a step that is not finite.
+    /// Returns the step since the last pose along the sensor's x and y, R' (p - p_last) [m]; zero for the first pose
+    /// and for a step that is not finite.
     pub fn step(&mut self, pose: &Pose) -> [f64; 2] {
         let position = pose.0.translation.vector;
         let moved = self.last.replace(position).map_or_else(Vector3::zeros, |last| position - last);

@@ -59,7 +59,10 @@ fn only_file<'a>(archive: &'a Archive<'_>) -> Result<ZipFile<'a>, Refusal> {
         0 => "the archive has no file in it".to_owned(),
         _ => format!("the archive has {count} files in it: {}{more}", names.join(", ")),
     };
-    Err(Refusal::Broken { message, help: Some("pack the recording alone, or name the unpacked file".into()) })
+    Err(Refusal::Broken {
+        message,
+        help: Some("put only the recording into the archive, or use the unpacked file".into()),
+    })
 }
 
 /// Unpacks the first bytes, and the rest if a format recognises them.
@@ -68,7 +71,7 @@ fn unpack_recognised(source: &mut dyn Read, name: &str, hints: &Hints) -> Result
     let shown = shortened(name);
     let is_all = zip::read(source, &shown, HEAD_BYTES as u64, &mut out)?;
     if [GZIP, zip::MAGIC].iter().any(|magic| out.starts_with(magic)) && !npy::is_npz(&out) {
-        return Err(Refusal::broken(format!("`{shown}` is an archive inside an archive")));
+        return Err(Refusal::broken(format!("`{shown}` is an archive inside an archive: unpack it first")));
     }
     let head = FileHead::new(&out, name);
     if hints.format.is_none() && recognise(&head).is_none() {

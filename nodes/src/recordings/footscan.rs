@@ -1,8 +1,8 @@
 //! `footscan`: the text export of an RSscan plate ("Entire Plate Roll Off", often named `.xls` though it is text).
 //!
 //! A frame is a line `Frame 12 (95.24 ms)` and a line of cells for each row. Blank lines separate the frames, and text
-//! before the first frame is ignored. The file gives neither unit nor pitch. The cells are forces: the sum of a frame is
-//! the load [N]. The plates of 0.5, 1 and 2 m are 64 sensors wide. Their pitch is 5.08 mm across the plate, which is
+//! before the first frame is ignored. The file gives neither unit nor pitch. The cells are forces: the sum of a frame
+//! is the load [N]. The plates of 0.5, 1 and 2 m are 64 sensors wide. Their pitch is 5.08 mm across the plate, which is
 //! along a row of the file, and 7.62 mm along it, from row to row. It is the default for up to 64 columns.
 
 use tactflow_runtime::signal::Unit;

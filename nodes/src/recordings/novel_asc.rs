@@ -2,8 +2,8 @@
 //!
 //! A file has a header, a line `time[secs]` with the numbers of the sensors, the pressures, a mean and a maximum over
 //! time (`MVP`, `MPP`), the total force and its centre at each moment, and the corners of the sensors. The corners give
-//! the place of each sensor: row 0 is at the lowest y, column 0 at the lowest x, so x and y are those of the file. Places
-//! without a sensor are dead cells. A mat without corners needs a `size`, and is read row by row.
+//! the place of each sensor: row 0 is at the lowest y, column 0 at the lowest x, so x and y are those of the file.
+//! Places without a sensor are dead cells. A mat without corners needs a `size`, and is read row by row.
 //!
 //! The forces are checked against the pressures, within the rounding of the file. An insole of pedar is refused: its
 //! sensors follow the sole and have no rows and columns.
@@ -148,7 +148,7 @@ impl<'t> AscReader<'t> {
             self.corners.unit(line)?;
         } else if first == "sensor" {
             let labels: Vec<u64> = numbers(line, |field| field.count("the number of this sensor"))?;
-            line.check(labels == self.labels, "these sensors are not those of the pressures")?;
+            line.check(labels == self.labels, "these sensors differ from those of the pressures")?;
             self.corners.is_begun = true;
         } else if first.starts_with("x[") || first.starts_with("y[") || first == "area" {
             let places = numbers(line, |field| field.decimal("this figure"))?;

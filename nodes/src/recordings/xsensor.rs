@@ -3,8 +3,8 @@
 //! A line has a key and a value, with a colon after the key in some versions: `Units` and `Threshold` at the top, then
 //! for each frame `FRAME`, `Date`, `Time`, and for each pad `SENSOR`, `Rows`, `Columns`, `Sensel Width (cm)`, `Sensel
 //! Height (cm)`, figures, and `SENSELS` with a line of cells for each row. Blank lines and lines of commas may be
-//! anywhere. Numbers may be in quotes, with a decimal comma. Groups of sensels (`GROUP`) repeat parts of the pads and are
-//! ignored. Pressures become kPa. Times are times of the day.
+//! anywhere. Numbers may be in quotes, with a decimal comma. Groups of sensels (`GROUP`) repeat parts of the pads and
+//! are ignored. Pressures become kPa. Times are times of the day.
 //!
 //! A file may have several pads, as the two insoles of a pair: the bench selects one with `pad`. There is no default.
 
@@ -107,7 +107,7 @@ fn choose<'t>(text: &'t str, hints: &Hints) -> Result<Option<&'t str>, Refusal> 
     let has_none = || Refusal::Contradicted {
         hint: "pad",
         message: if names.is_empty() {
-            "the file has no names of pads".into()
+            "the file does not name its pads: remove `pad`".into()
         } else {
             format!("the file has the pads {}", list())
         },

@@ -1,9 +1,9 @@
 //! `zebris`: the raw data of a Zebris plate or treadmill as text (`RawDataGaitAnalysis`).
 //!
 //! A file has a header with a table of forces, `Platform {` with the size, the cells' width and height and their unit,
-//! and then frames: `Frame 1 {`, `Time, ms`, a line of column names `x1`, `x2`, …, a line `y1`, `y2`, … of cells for each
-//! row, `}`. x runs along the plate, so a row is a line along it. Pressures become kPa. The table's forces of the left
-//! and the right foot are sums of these cells, not a separate measurement.
+//! and then frames: `Frame 1 {`, `Time, ms`, a line of column names `x1`, `x2`, …, a line `y1`, `y2`, … of cells for
+//! each row, `}`. x runs along the plate, so a row is a line along it. Pressures become kPa. The table's forces of the
+//! left and the right foot are sums of these cells, not a separate measurement.
 
 use std::fmt::Display;
 

@@ -1,7 +1,7 @@
 //! `adjoint`: a twist in another frame.
 //!
-//! The twist of a body depends on the point at which it is taken: in the base it is the spatial twist, which matches the
-//! spatial Jacobian and not the Jacobian whose rows are taken at the tip.
+//! The twist of a body depends on the point at which it is taken: in the base it is the spatial twist, which matches
+//! the spatial Jacobian and not the Jacobian whose rows are taken at the tip.
 
 use nalgebra::Vector3;
 use tactflow_runtime::node::{Describe, In, Inputs, Limits, Mistakes, Node, Out, Outputs, Setup, Tick};
@@ -13,9 +13,9 @@ use tactflow_runtime::signal::{Pose, Twist};
 /// V = [v; omega]. Put it between nodes that compute in the frame of the sensor and an arm that moves in the base.
 ///
 /// A twist in the base is spatial: its linear part is the velocity of the point of the body that passes through the
-/// origin of the base, not the velocity of the sensor. A slow roll of a sensor that is 0.7 m away looks fast there. Limit
-/// and plot motions in the frame of the sensor, and wire the result only to nodes that take a spatial twist, such as
-/// `ik_sink`.
+/// origin of the base, not the velocity of the sensor. A slow roll of a sensor that is 0.7 m away looks fast there.
+/// Limit and plot motions in the frame of the sensor, and wire the result only to nodes that take a spatial twist, such
+/// as `ik_sink`.
 ///
 /// Both inputs must be present. The output is as old as the older of them.
 ///

@@ -10,9 +10,9 @@ use tactflow_runtime::source::Code;
 /// moves one axis alone, to identify an arm or a contact: a chirp on vz against the pressure, a step on wx against the
 /// place of the contact.
 ///
-/// A component that is absent counts as zero. When all wired components are absent, the twist is absent, which means zero
-/// motion. The twist is as old as the oldest component in it. The linear part is in m/s, the angular part in rad/s.
-/// `frame` is the role of the sensor (`"pad"`) or `"base"`; leave it out if a wire defines it.
+/// A component that is absent counts as zero. When all wired components are absent, the twist is absent, which means
+/// zero motion. The twist is as old as the oldest component in it. The linear part is in m/s, the angular part in
+/// rad/s. `frame` is the role of the sensor (`"pad"`) or `"base"`; leave it out if a wire defines it.
 ///
 /// ```toml
 /// [nodes.compose_twist]                    # the test signal along the pad's normal

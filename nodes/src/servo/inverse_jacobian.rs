@@ -13,10 +13,10 @@ use tactflow_runtime::signal::{Features, Twist};
 /// right for z out of the pad toward the object, a right-handed frame, an angle alpha from +x toward +y and
 /// e = setpoint - measured. The column of alpha is then `[0, 0, 0, 0, 0, -1]`.
 ///
-/// The first two columns slide the pad and also roll it, by 20 rad for each metre; with 1 instead of 20 it hardly rolls.
-/// The rolling entries (wy of x, wx of y) have opposite signs. With equal signs, as the paper prints them, the contact
-/// is lost. A wrong sign makes the error grow at once, so test the signs of a new sensor one at a time, and delete the
-/// other components with a `projector`.
+/// The first two columns slide the pad and also roll it, by 20 rad for each metre; with 1 instead of 20 it hardly
+/// rolls. The rolling entries (wy of x, wx of y) have opposite signs. With equal signs, as the paper prints them, the
+/// contact is lost. A wrong sign makes the error grow at once, so test the signs of a new sensor one at a time, and
+/// delete the other components with a `projector`.
 ///
 /// A feature that is absent contributes nothing. A `projector` behind this node selects the components that are used.
 ///

@@ -8,8 +8,8 @@ use tactflow_runtime::signal::Twist;
 /// The matrix P of eq. 3 of the paper: a diagonal of ones and zeros over `[vx, vy, vz, wx, wy, wz]`. A component whose
 /// entry is 1 passes unchanged; a component whose entry is 0 becomes exactly zero.
 ///
-/// P mostly defines the task: `[1, 1, 0, 0, 0, 0]` holds the place of the contact and `[0, 0, 1, 0, 0, 0]` its pressure.
-/// The fourth and the fifth entry let the pad roll, and the last one follows the direction of an edge.
+/// P mostly defines the task: `[1, 1, 0, 0, 0, 0]` holds the place of the contact and `[0, 0, 1, 0, 0, 0]` its
+/// pressure. The fourth and the fifth entry let the pad roll, and the last one follows the direction of an edge.
 ///
 /// A component that is deleted here is free for guidance, which a `twist_adder` adds behind the projector. Along a line
 /// that is longer than the pad, the centre of gravity carries no information: set that entry of P to 0.

@@ -6,11 +6,11 @@ use tactflow_runtime::node::{
 use tactflow_runtime::signal::Twist;
 use tactflow_runtime::source::Code;
 
-/// Adds motions of one frame, such as servoing and guidance.
+/// Adds motions in the same frame, such as servoing and guidance.
 ///
-/// The output is the sum of all twists that are wired, each under a name of your choice: the superposition of section IV
-/// of the paper. All twists must be in the same frame. A wire in another frame is an error, and its message names the
-/// `adjoint` to put between.
+/// The output is the sum of all twists that are wired, each under a name of your choice: the superposition of section
+/// IV of the paper. All twists must be in the same frame. A wire in another frame is an error, and its message names
+/// the `adjoint` to insert between them.
 ///
 /// An absent twist counts as zero motion. The sum is absent when all twists are absent, and it is as old as the oldest
 /// twist in it.

@@ -8,9 +8,10 @@ use tactflow_runtime::signal::{Flag, Twist};
 /// It writes the same twist in every tick: the external motion V_ext of Fig. 6 of the paper, which a `twist_adder` adds
 /// to the servoing. Use it to approach along +z, to slide along an edge, or to roll.
 ///
-/// Wire `in.gate`: the motion then continues only while that flag is present and set, and is as old as the flag. It ends
-/// with the contact, and when the pad stops sending images. Without a gate the motion never ends by itself, so a mode in
-/// which it moves the arm must have a condition that ends it. Set the twist to zeros in modes that do not need it.
+/// Wire `in.gate`: the motion then continues only while that flag is present and set, and is as old as the flag. It
+/// ends with the contact, and when the pad stops sending images. Without a gate the motion never ends by itself, so a
+/// mode in which it moves the arm must have a condition that ends it. Set the twist to zeros in modes that do not need
+/// it.
 ///
 /// The twist is in the frame of the input that it is wired to, usually the frame of the sensor. Guidance along a
 /// component that the projector controls works against the controller: set that entry of P to 0.

@@ -1,9 +1,9 @@
 //! Contact between the foam and the objects: the indentation of each point of the pad, and the resulting forces.
 //!
-//! A tactel of 5 mm has at least 5 by 5 points, at most 1 mm apart, and each point is the end of a column of foam. The depth
-//! of a column is found by casting a ray through it, from the plate outward. Its force f acts along the pad's z. The
-//! surface of the object, with normal n, is frictionless at such a point, so the force on the pad is f n / |n_z|. This is the
-//! gradient of the energy of the columns, so the contact does not create energy.
+//! A tactel of 5 mm has at least 5 by 5 points, at most 1 mm apart, and each point is the end of a column of foam. The
+//! depth of a column is found by casting a ray through it, from the plate outward. Its force f acts along the pad's z.
+//! The surface of the object, with normal n, is frictionless at such a point, so the force on the pad is f n / |n_z|.
+//! This is the gradient of the energy of the columns, so the contact does not create energy.
 //!
 //! Friction acts at each tactel as a bristle: the foam shears until the friction force reaches mu N. The coefficient mu
 //! falls from its static to its sliding value over 1 mm/s (Stribeck), which gives stick and slip.
@@ -261,7 +261,8 @@ impl Contact {
         }
     }
 
-    /// Returns the number of points per tactel of 5 mm by 5 mm: under a single point an object is softer by this factor.
+    /// Returns the number of points per tactel of 5 mm by 5 mm: under a single point an object is softer by this
+    /// factor.
     fn parts(&self) -> f64 {
         (self.fine * self.fine) as f64 * foam::REFERENCE_AREA / (self.shape.pitch[0] * self.shape.pitch[1])
     }
@@ -325,7 +326,8 @@ impl Rays {
         self.origin + self.axes[0] * x + self.axes[1] * y
     }
 
-    /// Returns whether an object is clear of all columns of the tactels from `first` to before `last`, as row and column.
+    /// Returns whether an object is clear of all columns of the tactels from `first` to before `last`, as row and
+    /// column.
     fn is_clear(&self, object: &Object, shape: &ImageShape, first: [usize; 2], last: [usize; 2]) -> bool {
         let middle = |axis: usize| (first[axis] + last[axis] - 1) as f64 / 2.0;
         let centre = self.from(shape.x(middle(1)), shape.y(middle(0))) + self.axes[2] * (self.thickness / 2.0);

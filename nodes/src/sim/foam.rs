@@ -1,8 +1,8 @@
 //! The material of the foam, and the force law of one column of it.
 //!
 //! The foam is an elastic foundation: independent columns side by side on a rigid plate. A column compressed by c bears
-//! p(c) = k c, plus k3 (c - c0)³ above c0. A compliant object is a spring in series: of an indentation d the column takes c
-//! with d = c + p(c) / k_object.
+//! p(c) = k c, plus k3 (c - c0)³ above c0. A compliant object is a spring in series: of an indentation d the column
+//! takes c with d = c + p(c) / k_object.
 
 use tactflow_runtime::node::Param;
 
@@ -87,8 +87,8 @@ impl FoamColumn {
         (self.k * c + self.k3 * beyond * beyond * beyond, self.k + 3.0 * self.k3 * beyond * beyond)
     }
 
-    /// Returns the force [N] at an indentation `depth` [m] that grows at `rate` [m/s], for an object of compliance `softness`
-    /// [m/N]. It is never negative: the foam does not pull.
+    /// Returns the force [N] at an indentation `depth` [m] that grows at `rate` [m/s], for an object of compliance
+    /// `softness` [m/N]. It is never negative: the foam does not pull.
     #[must_use]
     pub fn force(&self, depth: f64, rate: f64, softness: f64) -> f64 {
         let (elastic, _) = self.load(self.compression(depth, softness));

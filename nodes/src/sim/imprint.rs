@@ -1,7 +1,8 @@
 //! The noise-free image from the forces on the points: the foam spreads a load over several tactels.
 //!
-//! The force on each point is distributed by a Gaussian of the foam's spread, integrated over each tactel. So a probe between
-//! two tactels is felt by both. At the rim of the pad the weights are normalised to sum to 1, so that no load is lost.
+//! The force on each point is distributed by a Gaussian of the foam's spread, integrated over each tactel. So a probe
+//! between two tactels is felt by both. At the rim of the pad the weights are normalised to sum to 1, so that no load
+//! is lost.
 
 use tactflow_runtime::signal::ImageShape;
 

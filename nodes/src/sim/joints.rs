@@ -1,14 +1,15 @@
 //! The arm: joints in impedance control, as the KUKA LWR of the paper (stiffness 200, damping 0.2).
 //!
-//! Each joint is an inertia with a spring and a damper toward the equilibrium posture, which moves at the commanded velocity:
+//! Each joint is an inertia with a spring and a damper toward the equilibrium posture, which moves at the commanded
+//! velocity:
 //!
 //! ```text
 //! I q'' = K (q_eq - q) - 2 zeta sqrt(K I) q' - friction + J^T w
 //! ```
 //!
-//! with J the spatial Jacobian and w the wrench on the pad about the origin of the base. Damping is a ratio. Friction is a
-//! bristle that slips at the friction torque. Not simulated: gravity (the controller compensates it), coupling of the
-//! joint inertias, Coriolis forces, elasticity of the gears and delay of the bus.
+//! with J the spatial Jacobian and w the wrench on the pad about the origin of the base. Damping is a ratio. Friction
+//! is a bristle that slips at the friction torque. Not simulated: gravity (the controller compensates it), coupling of
+//! the joint inertias, Coriolis forces, elasticity of the gears and delay of the bus.
 
 use nalgebra::Vector6;
 use parry3d_f64::math::Vec3;
@@ -78,7 +79,8 @@ impl SimArm {
         BodyMotion { pose, linear, angular }
     }
 
-    /// Advances by `dt` [s] with the equilibrium moving at `velocity` [rad/s], under a wrench about the origin of the sensor.
+    /// Advances by `dt` [s] with the equilibrium moving at `velocity` [rad/s], under a wrench about the origin of the
+    /// sensor.
     pub fn step(&mut self, dt: f64, velocity: &[f64], wrench: &Wrench) {
         let place = Vec3::from(<[f64; 3]>::from(self.pose.0.translation.vector));
         let moment = wrench.moment + place.cross(wrench.force);

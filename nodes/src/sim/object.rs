@@ -107,8 +107,8 @@ pub struct Object {
 pub(super) const MOUNT_DAMPING: f64 = 0.5;
 
 impl Object {
-    /// Returns an object placed relative to a sensor that starts at `start` in the base, shifted by `offset` [m] along the
-    /// sensor's x and y.
+    /// Returns an object placed relative to a sensor that starts at `start` in the base, shifted by `offset` [m] along
+    /// the sensor's x and y.
     ///
     /// # Errors
     /// If a parameter of the shape is missing, not used or not positive, or if a motion has no duration.
@@ -203,7 +203,7 @@ fn shape_of(params: &ObjectParams) -> Result<Geometry, String> {
         ("points", points.is_some()),
     ];
     if let Some((name, _)) = given.iter().find(|(name, is_given)| *is_given && !used.contains(name)) {
-        return Err(format!("a {word} has no `{name}`"));
+        return Err(format!("a {word} does not use `{name}`: remove it"));
     }
     if let Some((name, _)) = given.iter().find(|(name, is_given)| !is_given && used.contains(name)) {
         return Err(format!("a {word} needs `{name}`"));

@@ -1,9 +1,9 @@
-//! The electronics: 12 bit counts from the force on each tactel, with saturation, variation between tactels, hysteresis,
-//! creep and noise.
+//! The electronics: 12 bit counts from the force on each tactel, with saturation, variation between tactels,
+//! hysteresis, creep and noise.
 //!
-//! A tactel reads offset + a (1 - exp(-u / b)) counts, where a and b vary over the pad. u is the force with hysteresis (the
-//! reading is higher while the force falls) and creep (the reading rises under a constant load). The noise of a frame is
-//! a factor that all tactels share, plus independent noise of each tactel.
+//! A tactel reads offset + a (1 - exp(-u / b)) counts, where a and b vary over the pad. u is the force with hysteresis
+//! (the reading is higher while the force falls) and creep (the reading rises under a constant load). The noise of a
+//! frame is a factor that all tactels share, plus independent noise of each tactel.
 
 use tactflow_runtime::node::Param;
 

@@ -96,8 +96,8 @@ impl World {
     }
 }
 
-/// Returns whether steps of `dt` [s] resolve a spring and a damper; `stiffness` [1/s²] and `damping` [1/s] are divided by
-/// the mass.
+/// Returns whether steps of `dt` [s] resolve a spring and a damper; `stiffness` [1/s²] and `damping` [1/s] are divided
+/// by the mass.
 ///
 /// Semi-implicit Euler is stable for dt² k + 2 dt c < 4. Half of that is left for the foam.
 #[must_use]

@@ -20,7 +20,9 @@ pub(super) fn positive(text: &str) -> Result<f64, String> {
 pub(super) fn may_replace(path: &Path, what: &str, is_one: impl Fn(&str) -> bool) -> Result<(), String> {
     match std::fs::read(path) {
         Ok(bytes) if str::from_utf8(&bytes).is_ok_and(is_one) => Ok(()),
-        Ok(_) => Err(format!("`{}` exists and is not {what}: it is not replaced", path.display())),
+        Ok(_) => {
+            Err(format!("`{}` exists and is not {what}, so it is not replaced: write to another file", path.display()))
+        }
         Err(error) if error.kind() == std::io::ErrorKind::NotFound => Ok(()),
         Err(error) => Err(format!("cannot write `{}`: {error}", path.display())),
     }

@@ -106,7 +106,7 @@ fn make(args: &CalibrateArgs, shell: &Shell) -> Result<(), Failure> {
         let (first, describe) = (&logs[0], |log: &Log| format!("{} x {} tactels in {}", log.rows, log.cols, log.unit));
         if (log.rows, log.cols, log.unit) != (first.rows, first.cols, first.unit) {
             let message = format!(
-                "`{}` has {}, but `{}` has {}",
+                "all logs must be of one pad, but `{}` has {} and `{}` has {}",
                 path.display(),
                 describe(log),
                 args.logs[0].display(),
@@ -152,8 +152,11 @@ fn origin(args: &CalibrateArgs, report: &CalibrationReport) -> String {
     };
     let residual = report.rms[report.kind() as usize];
     let left_out = report.with_status(TactelStatus::Few).len() + report.with_status(TactelStatus::Unfit).len();
-    let left_out =
-        if left_out > 0 { format!(" {left_out} of the dead could not be calibrated.") } else { String::new() };
+    let left_out = if left_out > 0 {
+        format!(" {left_out} of the tactels under `dead` could not be calibrated.")
+    } else {
+        String::new()
+    };
     format!(
         "Made by `tactflow calibrate` from {}, {load}, up to {:.3} N a tactel.\nResidual {residual:.4} N (RMS).{left_out}",
         names.collect::<Vec<_>>().join(", "),

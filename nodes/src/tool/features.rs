@@ -26,7 +26,7 @@ Examples:
 pub(super) struct FeaturesArgs {
     /// Recording, optionally in a .zip or .gz
     recording: PathBuf,
-    /// Write one row a frame, as .csv or .ndjson
+    /// Write one row per frame to a .csv or .ndjson file
     #[arg(short, long, value_name = "FILE")]
     out: Option<PathBuf>,
     /// Print the graph and do not run it
@@ -60,7 +60,7 @@ struct HintArgs {
     /// Unit of the values, if the file does not give it: raw, N, kPa
     #[arg(long, value_name = "UNIT")]
     unit: Option<String>,
-    /// Distance of neighbours along x and y [mm], if the file does not give it: 5x5
+    /// Distance between neighbouring tactels along x and y [mm], if the file does not give it: 5x5
     #[arg(long, value_name = "XxY", value_parser = lengths)]
     pitch_mm: Option<[f64; 2]>,
     /// Frames per second, if the file does not give it

@@ -8,15 +8,15 @@ use super::moments::{Inputs, Weighing, Weight, ellipse, image_shape};
 /// Distinguishes a round contact from a long one: the eccentricity of its ellipse.
 ///
 /// The ellipse with the same second central moments as the region has the half axes a and b, up to a common factor. The
-/// output is sqrt(1 - b² / a²): 0 for a circle or a square, 0.87 for twice as long as wide, 0.98 for five times, 1 for a
-/// single row of tactels.
+/// output is sqrt(1 - b² / a²): 0 for a circle or a square, 0.87 for twice as long as wide, 0.98 for five times, 1 for
+/// a single row of tactels.
 ///
-/// It grows steeply for shapes that are almost round. The `anisotropy` A of `moments` is flat there and contains the same
-/// information: the eccentricity is sqrt(2 A / (1 + A)), so an anisotropy of 0.05 is an eccentricity of 0.31.
+/// It grows steeply for shapes that are almost round. The `anisotropy` A of `moments` is flat there and contains the
+/// same information: the eccentricity is sqrt(2 A / (1 + A)), so an anisotropy of 0.05 is an eccentricity of 0.31.
 /// `principal_axes` measures a and b in metres.
 ///
-/// Tactels count as points, each with its `weight` as in `moments`. A region without extent, such as a single tactel, has
-/// no eccentricity: the output is absent.
+/// Tactels count as points, each with its `weight` as in `moments`. A region without extent, such as a single tactel,
+/// has no eccentricity: the output is absent.
 ///
 /// ```toml
 /// [nodes.eccentricity]

@@ -9,8 +9,8 @@ use super::moments::{Inputs, Params, Weighing, ellipse, image_shape};
 /// Measures the length, the width and the direction of a contact.
 ///
 /// The second central moments of a region are a 2 by 2 covariance in square metres. `major` and `minor` are the square
-/// roots of its eigenvalues, the standard deviations along the long and the short axis; `orientation` is the direction of
-/// the long axis, as in `moments`.
+/// roots of its eigenvalues, the standard deviations along the long and the short axis; `orientation` is the direction
+/// of the long axis, as in `moments`.
 ///
 /// A uniform bar of length L has a standard deviation of L / sqrt(12), a uniform disc of radius r has r / 2 along every
 /// axis. Tactels count as points, so a single row has a width of 0, and a bar of n tactels has a standard deviation of

@@ -14,14 +14,14 @@ use super::label::{centroid_buffer, centroids, distance_squared, paint, ranked};
 /// region. With one `select_region` for each contact, all on one `label`, each contact has its own features.
 ///
 /// Regions with less than `min_area` tactels or less than `min_force` are left out. The others are ordered by area (the
-/// largest first), by force (the strongest first) or by the distance of their centroid, the mean position of their tactels,
-/// from `point` (the nearest first). Equal regions are ordered row by row. The node selects the region of that `rank`. If
-/// there is none, `region` is absent and `present` is not set.
+/// largest first), by force (the strongest first) or by the distance of their centroid, the mean position of their
+/// tactels, from `point` (the nearest first). Equal regions are ordered row by row. The node selects the region of that
+/// `rank`. If there is none, `region` is absent and `present` is not set.
 ///
-/// The node has no memory: two contacts of about the same area swap their ranks from frame to frame. If the contacts stay
-/// in their places, `by = "distance"` separates them while all of them are present; when one is lifted, another one is the
-/// nearest to its `point`. To require a second contact, use `present` of a `select_region` with `rank = 2`. To follow a
-/// single contact, use `choose = "nearest"` of `label`.
+/// The node has no memory: two contacts of about the same area swap their ranks from frame to frame. If the contacts
+/// stay in their places, `by = "distance"` separates them while all of them are present; when one is lifted, another
+/// one is the nearest to its `point`. To require a second contact, use `present` of a `select_region` with `rank = 2`.
+/// To follow a single contact, use `choose = "nearest"` of `label`.
 ///
 /// ```toml
 /// [nodes.select_region]

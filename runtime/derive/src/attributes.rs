@@ -51,7 +51,7 @@ impl Words {
                 if !known.iter().any(|known| word.name == known) {
                     faults.add(&word.name, format!("`{}` is not known here; write {}", word.name, list(known)));
                 } else if words.iter().any(|other| other.name == word.name) {
-                    faults.add(&word.name, format!("`{}` stands here twice", word.name));
+                    faults.add(&word.name, format!("`{}` is given twice: remove one", word.name));
                 } else {
                     words.push(word);
                 }

@@ -28,11 +28,11 @@ pub(crate) fn derive(input: &DeriveInput) -> TokenStream {
     let attributes = input.attrs.iter().filter(|attribute| attribute.path().is_ident("describe"));
     let names: Vec<Name> = attributes.filter_map(|attribute| name(attribute, input, &mut faults)).collect();
     if !input.attrs.iter().any(|attribute| attribute.path().is_ident("describe")) {
-        faults.add(&input.ident, "`#[describe(name = \"…\")]` is missing: the `type` in a graph file");
+        faults.add(&input.ident, "`#[describe(name = \"…\")]` is missing: it defines the `type` in a graph file");
     }
     for (i, Name { name, .. }) in names.iter().enumerate() {
         if names[..i].iter().any(|other| other.name.value() == name.value()) {
-            faults.add(name, format!("`{}` stands here twice", name.value()));
+            faults.add(name, format!("the name `{}` is given twice: remove one", name.value()));
         }
     }
     for Name { name, .. } in names.iter().filter(|name| !page.blocks.is_empty() && is_snake_case(&name.name.value())) {
@@ -54,7 +54,8 @@ fn name(attribute: &Attribute, input: &DeriveInput, faults: &mut Faults) -> Opti
     match &of {
         Some(of) if !is_generic => faults.add(of, format!("`{}` is not generic: leave `of` out", input.ident)),
         None if is_generic => {
-            let message = format!("`{0}` is generic: say which type has this name, `of = \"{0}<…>\"`", input.ident);
+            let message =
+                format!("`{0}` is generic: add the concrete type of this name, `of = \"{0}<…>\"`", input.ident);
             faults.add(attribute, message);
             return None;
         }
@@ -62,7 +63,7 @@ fn name(attribute: &Attribute, input: &DeriveInput, faults: &mut Faults) -> Opti
     }
     let of = of.and_then(|of| faults.take(of.parse::<Type>()));
     let Some(name) = words.text("name", faults) else {
-        faults.add(attribute, "`name = \"…\"` is missing: the `type` in a graph file");
+        faults.add(attribute, "`name = \"…\"` is missing: it defines the `type` in a graph file");
         return None;
     };
     if !is_snake_case(&name.value()) {

@@ -1,5 +1,5 @@
-//! The derives of the contract for nodes and devices. Authors use them through `tactflow_runtime::node`, which documents
-//! them beside the traits that they implement.
+//! The derives of the contract for nodes and devices. Authors use them through `tactflow_runtime::node`, which
+//! documents them beside the traits that they implement.
 //!
 //! Every mistake is reported on the field or on the attribute that causes it. What a type decides (which arguments a
 //! port takes, whether a unit exists) is a constant assertion in the generated code, with the span of the field.

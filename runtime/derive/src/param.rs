@@ -108,7 +108,7 @@ fn parameter(field: Field, faults: &mut Faults) -> Option<Parameter> {
 
 /// The bounds that a range such as `0.0..=1.0` or `0.0..` says.
 fn between(range: &Expr, faults: &mut Faults) -> Option<TokenStream> {
-    let message = "a range is `a..=b`, `a..` or `..=b`; `above = a` leaves its end out";
+    let message = "a range is `a..=b`, `a..` or `..=b`; to exclude the lower end, write `above = a` instead of `range`";
     let Expr::Range(ExprRange { start, end, limits, .. }) = range else {
         faults.add(range, message);
         return None;
@@ -155,14 +155,14 @@ fn checks(parameter: &Parameter, input: &DeriveInput, inputs: &Ident) -> TokenSt
     let bounds = parameter.bounds_at.as_ref().filter(|_| is_concrete).zip(parameter.bounds.as_ref());
     let bounds = bounds.map(|(at, bounds)| {
         let is_number = quote!(<#ty as ::tactflow_runtime::node::Param>::CONTENTS.is_number);
-        let is_number = asserted(at, &is_number, &format!("`{name}` is not a number, so it has no range"));
+        let is_number = asserted(at, &is_number, &format!("`{name}` is not a number: remove its range"));
         let is_possible = asserted(at, &quote!(!#bounds.is_empty()), "no number is in this range");
         quote!(#is_number #is_possible)
     });
     let unit = parameter.unit.as_ref().map(|unit| {
         let text = unit.value();
         let message = format!(
-            "`{text}` is not a unit of a parameter: `m/s2`, `N s/m`, a capital letter that an input binds, `$` with the \
+            "`{text}` is not the unit of a parameter: write a unit such as `m/s2` or `N s/m`, a capital letter of an input, `$` with the \
              name of a parameter, or several as `m/s, rad/s`"
         );
         let is_unit = quote!(::tactflow_runtime::signal::Unit::is_param_unit(#unit));
@@ -176,11 +176,12 @@ fn checks(parameter: &Parameter, input: &DeriveInput, inputs: &Ident) -> TokenSt
 /// An enum without data: one of a few words.
 fn words(input: &DeriveInput, data: &DataEnum, faults: &mut Faults) -> TokenStream {
     if data.variants.is_empty() {
-        faults.fatal(&input.ident, "a parameter that is a word needs a word to be");
+        faults.fatal(&input.ident, "an enum of words needs at least one variant");
     }
     let mut word = |variant: &Variant| {
         if !variant.fields.is_empty() {
-            faults.fatal(&variant.fields, "a word of a graph file carries no data");
+            faults
+                .fatal(&variant.fields, "a variant of a parameter cannot have fields: graph files write it as a word");
         }
         let doc = text(&variant.attrs);
         if doc.is_empty() {

@@ -253,13 +253,13 @@ fn combination(form: Form, words: [&Option<Ident>; 4], faults: &mut Faults) {
             refuse(delayed, "in the first tick there is no value yet: write `Option<In<'a, T>>`");
         }
         Form::Many => {
-            refuse(optional, "any number of wires includes none: leave `optional` out");
+            refuse(optional, "`Many` already allows no wire: remove `optional`");
             refuse(present_if_wired, "each wire of `Many` may be absent: leave `present_if_wired` out");
             refuse(delayed, "`delayed` is for a single wire: write `Option<In<'a, T>>`");
         }
         Form::OptionIn => {
             if optional.is_some() {
-                refuse(present_if_wired, "`present_if_wired` says that it need not be wired: leave `optional` out");
+                refuse(present_if_wired, "`present_if_wired` already makes the wire optional: remove `optional`");
             }
             if delayed.is_some() {
                 refuse(present_if_wired, "in the first tick a delayed input is absent: leave `present_if_wired` out");
@@ -284,7 +284,7 @@ fn argument_is_sound(name: &str, text: &LitStr, all: &[(&'static str, LitStr)], 
         faults.add(text, message);
     }
     if name == "frame" && value == "_" && all.iter().any(|(name, text)| *name != "unit" && text.value() != "_") {
-        faults.add(text, "without a frame there is nothing to relate to: write `\"_\"` for both");
+        faults.add(text, "a `reference` needs a `frame`: name the frame, or write `\"_\"` for both");
     }
 }
 
@@ -425,8 +425,8 @@ pub(crate) fn is_unit_letter(atom: &str) -> bool {
     first.is_some() && matches!(letters.next(), None | Some('/'))
 }
 
-/// What the outputs and the parameters beside the inputs ask: which letters are bound. It has the name of the struct, so
-/// that it is imported with it.
+/// What the outputs and the parameters beside the inputs ask: which letters are bound. It has the name of the struct,
+/// so that it is imported with it.
 fn letters(input: &DeriveInput, ports: &[Port]) -> TokenStream {
     let (name, vis) = (&input.ident, &input.vis);
     let of = |units: bool| -> String {
@@ -470,7 +470,7 @@ pub(crate) fn bound_letter(is_unit: bool, letter: char, text: &LitStr, inputs: &
     let what = if is_unit { "unit" } else { "frame" };
     let inputs = Ident::new(&inputs.to_string(), inputs.span().located_at(text.span()));
     let binds = quote!(#inputs.binds(#is_unit, #letter));
-    asserted(text, &binds, &format!("no input binds the {what} letter `{letter}`"))
+    asserted(text, &binds, &format!("no input has the {what} letter `{letter}`, so it is not defined"))
 }
 
 /// Checks the units, and what the type of a port decides: which arguments it takes.
@@ -478,7 +478,7 @@ fn checks(ports: &[Port]) -> TokenStream {
     let units =
         ports.iter().flat_map(|port| port.arguments.iter().filter(|(name, _)| *name == "unit")).map(|(_, text)| {
             let message =
-                format!("`{}` is not a unit of a port: a unit, `_`, `_/s`, or a capital letter", text.value());
+                format!("`{}` is not the unit of a port: write a unit such as `m/s`, `_` (any), `_/s` (any per second), or a capital letter", text.value());
             asserted(text, &quote!(::tactflow_runtime::signal::Unit::is_port_unit(#text)), &message)
         });
     let concrete = ports.iter().filter(|port| !port.is_generic).flat_map(arguments);
@@ -486,8 +486,8 @@ fn checks(ports: &[Port]) -> TokenStream {
     units.chain(arguments).collect()
 }
 
-/// The same for a port whose kind a type parameter decides, checked for each type that a graph can use. An argument that
-/// only some of them have is ignored by the others.
+/// The same for a port whose kind a type parameter decides, checked for each type that a graph can use. An argument
+/// that only some of them have is ignored by the others.
 fn generic_checks(ports: &[Port]) -> TokenStream {
     let generic = ports.iter().filter(|port| port.is_generic).flat_map(arguments);
     let checks = generic.map(|(at, condition, message)| {
@@ -506,7 +506,11 @@ fn arguments(port: &Port) -> impl Iterator<Item = (TokenStream, TokenStream, Str
         match port.arguments.iter().find(|(name, _)| *name == argument) {
             Some((_, text)) => {
                 let is_generic = port.is_generic;
-                (quote!(#text), quote!(#is_generic || #takes), format!("the kind of `{name}` has no `{argument}`"))
+                (
+                    quote!(#text),
+                    quote!(#is_generic || #takes),
+                    format!("the kind of `{name}` has no `{argument}`: remove it"),
+                )
             }
             None => {
                 let message = format!("`{name}` needs `#[port({argument} = \"…\")]`; `\"_\"` if there is none");

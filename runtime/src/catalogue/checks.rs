@@ -9,14 +9,17 @@ use crate::signal::Kind;
 pub(super) fn node(spec: &NodeSpec) {
     let name = &spec.name;
     for port in spec.inputs.iter().chain(&spec.outputs) {
-        assert!(declares_a_unit(port), "`{name}.{}` declares the unit {:?}", port.name, port.args.first());
+        assert!(declares_a_unit(port), "`{name}.{}` declares {:?}, which is not a unit", port.name, port.args.first());
     }
     for (ports, what) in [(&spec.inputs, "inputs"), (&spec.outputs, "outputs")] {
         let double = ports.iter().enumerate().find(|(i, port)| ports[..*i].iter().any(|other| other.name == port.name));
         assert!(double.is_none(), "two {what} of `{name}` are called `{}`", double.map_or("", |(_, port)| &port.name));
     }
     let has_flag = spec.outputs.first().is_some_and(|port| port.kind == Kind::Flag);
-    assert!(!spec.logs || has_flag, "the first output of `{name}` is no flag that says when to log");
+    assert!(
+        !spec.logs || has_flag,
+        "the first output of `{name}` is not a flag: with `logs`, a flag that decides when to log must come first"
+    );
     for port in &spec.outputs {
         for param in port.args.iter().filter_map(|arg| arg.strip_prefix('$')) {
             let is_there = spec.params.iter().any(|spec| spec.name == param);
@@ -58,7 +61,8 @@ fn example(name: &str, text: &str, section: &str, params: &[ParamSpec], inputs: 
     if text.is_empty() {
         return;
     }
-    let table: toml::Table = text.parse().unwrap_or_else(|error| panic!("the example of `{name}` is no TOML: {error}"));
+    let table: toml::Table =
+        text.parse().unwrap_or_else(|error| panic!("the example of `{name}` is not valid TOML: {error}"));
     let blocks = table.get(section).and_then(toml::Value::as_table);
     let of_type = |block: &&toml::Value| block.get("type").and_then(toml::Value::as_str) == Some(name);
     let mut found = blocks.into_iter().flat_map(|blocks| blocks.values()).filter(of_type).peekable();

@@ -18,7 +18,7 @@ use crate::source::Report;
     name = "check",
     after_help = "Examples:
   tactflow check graphs/*.toml
-  tactflow check graphs/hybrid.toml --bench benches/lab.toml --deny-warnings"
+  tactflow check graphs/hybrid.toml --bench graphs/benches/pen.toml --deny-warnings"
 )]
 pub(crate) struct CheckArgs {
     /// Graph files and scenario files

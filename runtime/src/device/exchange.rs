@@ -49,7 +49,8 @@ impl Samples {
         samples
     }
 
-    /// Returns the value of a port, to be written in full: a sample taken at `stamp` [ns], the `sequence`-th of its port.
+    /// Returns the value of a port, to be written in full: a sample taken at `stamp` [ns], the `sequence`-th of its
+    /// port.
     ///
     /// The graph counts gaps in the sequence, and a number that it has seen is a repeated sample.
     ///
@@ -69,9 +70,11 @@ impl Samples {
         self.renew(port.port, stamp, sequence, SampleState::Absent);
     }
 
-    /// Makes a port absent until it is written again, because something is wrong: `why` completes "`pad.image` is lost:".
+    /// Makes a port absent until it is written again, because something is wrong: `why` completes "`pad.image` is
+    /// lost:".
     ///
-    /// As long as the port is lost, the graph's policy `device` applies: it holds the commands, stops them or ends the run.
+    /// As long as the port is lost, the graph's policy `device` applies: it holds the commands, stops them or ends the
+    /// run.
     pub fn lost<T: Signal>(&mut self, port: Output<T>, why: impl Into<Cow<'static, str>>) {
         self.ports[port.port].state = SampleState::Lost(why.into());
     }
@@ -133,7 +136,8 @@ impl Commands {
         Self::with_reports(description, |_| None)
     }
 
-    /// Allocates the commands and the reports of a device. `wired` returns the shape of the value that is wired to a report.
+    /// Allocates the commands and the reports of a device. `wired` returns the shape of the value that is wired to a
+    /// report.
     pub(crate) fn with_reports<'s>(description: &Description, wired: impl Fn(usize) -> Option<&'s Shape>) -> Self {
         let zeros = |shape: &Shape| match shape {
             Shape::Joints(shape) => vec![0.0; shape.joints.len()].into(),

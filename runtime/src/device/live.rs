@@ -48,7 +48,8 @@ impl Link {
         self.sampled.notify_one();
     }
 
-    /// Makes a port absent until it is written again; see [`Samples::lost`]. The driver goes on, to reconnect for example.
+    /// Makes a port absent until it is written again; see [`Samples::lost`]. The driver goes on, to reconnect for
+    /// example.
     pub fn lost<T: Signal>(&mut self, port: Output<T>, why: impl Into<Cow<'static, str>>) {
         self.hand_over(|samples| samples.lost(port, why));
     }

@@ -1,9 +1,9 @@
 //! The edge: what a sensor or a robot looks like to a graph. Time and I/O exist only here.
 //!
-//! A task declares *roles*, such as `tactile_pad` and `velocity_arm`. A *device* fills one role or several. There are two
-//! contracts. A [`Stepped`] device is synchronous and deterministic: a simulation, a replay, a mock, a simulator in
-//! lockstep. A [`Live`] device is an async driver that fills a latest-value slot, so a slow disk or network makes a sample
-//! old and never a tick late.
+//! A task declares *roles*, such as `tactile_pad` and `velocity_arm`. A *device* fills one role or several. There are
+//! two contracts. A [`Stepped`] device is synchronous and deterministic: a simulation, a replay, a mock, a simulator in
+//! lockstep. A [`Live`] device is an async driver that fills a latest-value slot, so a slow disk or network makes a
+//! sample old and never a tick late.
 
 mod description;
 mod exchange;
@@ -37,11 +37,11 @@ pub struct RoleType {
     pub commands: Vec<PortSpec>,
     /// The reports: values of any kind that move nothing. A wire to them is optional, and no limits apply.
     pub reports: Vec<PortSpec>,
-    /// The limits that every command must pass, in the order in which a motion passes them. They are names in the `holds`
-    /// of nodes; see [`Limits`](crate::node::Limits).
+    /// The limits that every command must pass, in the order in which a motion passes them. They are names in the
+    /// `holds` of nodes; see [`Limits`](crate::node::Limits).
     pub limits: Vec<Cow<'static, str>>,
-    /// Whether only scenarios and recordings may read it: a simulation knows its values, and no sensor does. A bench binds
-    /// it under the last word of its name, and no task declares it.
+    /// Whether only scenarios and recordings may read it: a simulation knows its values, and no sensor does. A bench
+    /// binds it under the last word of its name, and no task declares it.
     pub is_observed: bool,
 }
 
@@ -76,8 +76,8 @@ pub trait Stepped: Send {
     /// Returns the time of the next sample from the start of the device [ns], or `None` if there are no more.
     fn next(&self) -> Option<i64>;
 
-    /// Returns the time of the last sample, if the device knows it [ns]. A progress bar uses it, and it shows that a run
-    /// ends by itself.
+    /// Returns the time of the last sample, if the device knows it [ns]. A progress bar uses it, and it shows that a
+    /// run ends by itself.
     fn end(&self) -> Option<i64> {
         None
     }
@@ -88,8 +88,8 @@ pub trait Stepped: Send {
     /// If the device fails. The run ends.
     fn exchange(&mut self, now: i64, commands: &Commands, samples: &mut Samples) -> Result<(), DeviceError>;
 
-    /// Called at the end of the run, with its reason. Every command was zero in the last exchange. It is not called for a
-    /// device that has failed.
+    /// Called at the end of the run, with its reason. Every command was zero in the last exchange. It is not called for
+    /// a device that has failed.
     fn finish(&mut self, reason: &str) {
         let _ = reason;
     }

@@ -1,9 +1,9 @@
 //! Graphs: from text to a plan, or to all diagnostics. The only side effect is reading files.
 //!
 //! The modules in order; each imports only earlier ones: `syntax` (text to sections), `load` (files, parts and `--set`
-//! to one flat graph), `plan` (what the engine needs), `net` (declarations, wires, step order), `bench` (opens devices),
-//! `check` (one check per file), `build` (nodes and modes), `outline` (the graph with the origin of each value) and
-//! `compile`, which calls them in order.
+//! to one flat graph), `plan` (what the engine needs), `net` (declarations, wires, step order), `bench` (opens
+//! devices), `check` (one check per file), `build` (nodes and modes), `outline` (the graph with the origin of each
+//! value) and `compile`, which calls them in order.
 
 mod bench;
 mod build;

@@ -1,4 +1,5 @@
-//! The outline of a graph, for `show`: parts are expanded, and every value has its origin in a file, a default or a fact.
+//! The outline of a graph, for `show`: parts are expanded, and every value has its origin in a file, a default or a
+//! fact.
 
 use std::ops::Range;
 use std::path::Path;

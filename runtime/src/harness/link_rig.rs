@@ -134,7 +134,7 @@ impl LinkRig {
         match self.runtime.block_on(async { tokio::time::timeout(GRACE, self.driver).await }) {
             Ok(Ok(ended)) => ended,
             Ok(Err(error)) => Err(DeviceError(error.to_string())),
-            Err(_) => Err(DeviceError(format!("it does not end within {GRACE:?} of its stop"))),
+            Err(_) => Err(DeviceError(format!("it is still running {GRACE:?} after it was stopped"))),
         }
     }
 

@@ -93,8 +93,8 @@ pub trait AnyNode: Any + Send {
     fn adopt(&mut self, other: Box<dyn AnyNode>) -> Result<usize, Box<dyn AnyNode>> {
         Err(other)
     }
-    /// Switches to a configuration by its number, without allocating. The state stays. Returns whether the configuration
-    /// changed.
+    /// Switches to a configuration by its number, without allocating. The state stays. Returns whether the
+    /// configuration changed.
     fn switch(&mut self, configuration: usize) -> bool {
         let _ = configuration;
         false

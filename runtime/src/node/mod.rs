@@ -1,7 +1,7 @@
 //! The node contract: plain data in, plain data out.
 //!
-//! A node is one file: a struct with its documentation, the structs of its parameters, inputs, outputs and state, and one
-//! `impl` [`Node`]. `docs/writing-a-node.md` builds one.
+//! A node is one file: a struct with its documentation, the structs of its parameters, inputs, outputs and state, and
+//! one `impl` [`Node`]. `docs/writing-a-node.md` builds one.
 //!
 //! | Derive | implements | reads |
 //! |---|---|---|
@@ -11,9 +11,9 @@
 //! | `#[derive(Outputs)]` | [`OutputSet`] | the same |
 //! | `#[derive(State)]` | [`Clone`], field by field, so that a reset does not allocate | |
 //!
-//! The type of an input and its attribute declare what it needs. The three properties are independent: whether it must be wired
-//! (`optional`), whether it must be present while the node steps (`Option`), and whether a new value wakes the node
-//! (`sampled`).
+//! The type of an input and its attribute declare what it needs. The three properties are independent: whether it must
+//! be wired (`optional`), whether it must be present while the node steps (`Option`), and whether a new value wakes the
+//! node (`sampled`).
 //!
 //! | field | attribute | wakes the node when | when it is absent |
 //! |---|---|---|---|
@@ -27,10 +27,10 @@
 //! | `Option<In<'a, T>>` | `delayed` | new or lost one tick ago, if no other input wakes it | `None`; it is read as the last tick left it |
 //! | `Many<'a, T>` | | any is new or lost | `None` for that wire; any number of wires, each named in the graph |
 //!
-//! A port declares the arguments of its kind, with `"_"` for none: `unit` and `frame` (`Scalar`, `Features`,
-//! `Image`, `Regions`), `frame` (`Mask`, `Twist`), `frame` and `reference` (`Pose`), `unit` and `robot` (`Joints`), `frame`
-//! and `robot` (`Jacobian`), nothing (`Flag`). A capital letter is a variable: its value is known when the graph
-//! is loaded, and is the same for all ports of the node. `"$name"` is the frame or unit that the parameter `name` holds.
+//! A port declares the arguments of its kind, with `"_"` for none: `unit` and `frame` (`Scalar`, `Features`, `Image`,
+//! `Regions`), `frame` (`Mask`, `Twist`), `frame` and `reference` (`Pose`), `unit` and `robot` (`Joints`), `frame` and
+//! `robot` (`Jacobian`), nothing (`Flag`). A capital letter is a variable: its value is known when the graph is loaded,
+//! and is the same for all ports of the node. `"$name"` is the frame or unit that the parameter `name` holds.
 
 mod bounds;
 mod bus;
@@ -74,19 +74,21 @@ pub trait Describe {
     const NAME: &'static str;
     /// The summary in one line.
     const SUMMARY: &'static str;
-    /// The documentation for the reference, in Markdown: the equation and its source, when to use the node, its pitfalls.
+    /// The documentation for the reference, in Markdown: the equation and its source, when to use the node, its
+    /// pitfalls.
     const DOC: &'static str = "";
     /// A block `[nodes.…]` to paste, or the blocks that connect a device. Its wires may name the blocks of other nodes'
     /// examples and the roles of devices' examples: `describe` composes a complete graph from them.
     const EXAMPLE: &'static str = "";
     /// Whether the node steps in every tick, and not only when a trigger is new or lost. Sinks and generators do.
     const EVERY_TICK: bool = false;
-    /// Whether the tool logs the inputs after each tick in which the first output, a flag, is new and set. A step itself
-    /// never logs.
+    /// Whether the tool logs the inputs after each tick in which the first output, a flag, is new and set. A step
+    /// itself never logs.
     const LOGS: bool = false;
 }
 
-/// A node. `self` is the configuration, built at load. The state is separate, so that a mode can exchange the configuration.
+/// A node. `self` is the configuration, built at load. The state is separate, so that a mode can exchange the
+/// configuration.
 pub trait Node: Describe + Sized + Send + 'static {
     /// The parameters; `()` for none.
     type Params: Param;
@@ -124,7 +126,8 @@ pub trait Node: Describe + Sized + Send + 'static {
         false
     }
 
-    /// Runs one step. It must not block, allocate, log or read a clock. An output that it does not write becomes absent.
+    /// Runs one step. It must not block, allocate, log or read a clock. An output that it does not write becomes
+    /// absent.
     fn step(&self, tick: &Tick, inputs: Self::Inputs<'_>, out: &mut Self::Outputs, state: &mut Self::State);
 }
 
@@ -132,7 +135,8 @@ pub trait Node: Describe + Sized + Send + 'static {
 pub struct Setup<N: Node> {
     /// Shapes of the inputs, from the wires.
     pub inputs: <N::Inputs<'static> as InputSet<'static>>::Shapes,
-    /// Shapes of the outputs, which the node sets. The runtime then fills in the units that follow from the declarations.
+    /// Shapes of the outputs, which the node sets. The runtime then fills in the units that follow from the
+    /// declarations.
     pub outputs: <N::Outputs as OutputSet>::Shapes,
     /// Nominal time between two ticks of the graph [s].
     pub period: f64,

@@ -44,8 +44,8 @@ pub struct PortSpec {
 }
 
 impl PortSpec {
-    /// Returns the declaration of a port of signal `T`, with its arguments by name. It leaves out arguments that the kind
-    /// does not have, and frames from the first `"_"` on.
+    /// Returns the declaration of a port of signal `T`, with its arguments by name. It leaves out arguments that the
+    /// kind does not have, and frames from the first `"_"` on.
     #[must_use]
     pub fn of<T: Signal>(
         name: &'static str,
@@ -71,7 +71,8 @@ pub struct Letters {
 }
 
 impl Letters {
-    /// Creates it from the letters of the units and of the frames. If an input lacks an argument, they are not complete.
+    /// Creates it from the letters of the units and of the frames. If an input lacks an argument, they are not
+    /// complete.
     #[must_use]
     pub const fn of(units: &'static str, frames: &'static str, are_complete: bool) -> Self {
         Self { units, frames, are_complete }

@@ -12,8 +12,8 @@ pub struct Interval {
 }
 
 impl Interval {
-    /// Returns the time since the last sample [s]. It returns `None` if the node must start afresh: at the first sample,
-    /// when the sample is from another device, and after a gap longer than the graph's `max_gap_ms`.
+    /// Returns the time since the last sample [s]. It returns `None` if the node must start afresh: at the first
+    /// sample, when the sample is from another device, and after a gap longer than the graph's `max_gap_ms`.
     ///
     /// A sample that is older than the last one gives 0. A generated value has the time of the tick.
     pub fn step<T>(&mut self, input: &In<'_, T>, tick: &Tick) -> Option<f64> {

@@ -33,8 +33,8 @@ pub struct Recorder {
 impl Recorder {
     /// Creates the file and starts the writing thread.
     ///
-    /// With `may_wait`, a tick waits when the disk is too slow, and no row is lost. Without it, for runs in real time, the
-    /// row is dropped and counted.
+    /// With `may_wait`, a tick waits when the disk is too slow, and no row is lost. Without it, for runs in real time,
+    /// the row is dropped and counted.
     ///
     /// # Errors
     /// If the file cannot be created.
@@ -86,8 +86,8 @@ impl Recorder {
     }
 }
 
-/// Returns the columns that belong to no port. A graph with modes has two: the number of the next tick's mode, from 0 in the
-/// order of the file, and whether the commands are halted.
+/// Returns the columns that belong to no port. A graph with modes has two: the number of the next tick's mode, from 0
+/// in the order of the file, and whether the commands are halted.
 fn own_columns(engine: &Engine) -> Vec<PortColumn> {
     let names = if engine.mode().is_some() { &["mode", "halted"][..] } else { &[] };
     names.iter().map(|name| PortColumn { name: (*name).to_owned(), part: String::new(), unit: Unit::ONE }).collect()

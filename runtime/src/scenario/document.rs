@@ -12,7 +12,8 @@ pub(crate) struct ScenarioTable {
     pub(crate) graph: FilePath,
     /// Bench to run it on; by default the task's own.
     pub(crate) bench: Option<FilePath>,
-    /// Number of seeds, from 1 on, or a list of seeds. Each run sets its seed as the `seed` of every device that has one.
+    /// Number of seeds, from 1 on, or a list of seeds. Each run sets its seed as the `seed` of every device that has
+    /// one.
     pub(crate) seeds: Option<Seeds>,
     /// Duration of a run.
     #[param(unit = "s", above = 0.0)]
@@ -221,7 +222,7 @@ impl CheckBlock {
             && below > above
         {
             let message = format!("no value is at least {below} and at most {above}");
-            wrong(Code::BadValue, "never_below", message, "exchange `never_above` and `never_below`");
+            wrong(Code::BadValue, "never_below", message, "swap the values of `never_above` and `never_below`");
         }
         if let (Some(after), Some(for_s)) = (table.after_s, for_s)
             && after >= for_s
@@ -230,8 +231,13 @@ impl CheckBlock {
             wrong(Code::BadValue, "after_s", message, "write an earlier time, or a larger `for_s`");
         }
         if table.unit.as_ref().is_some_and(|unit| unit.0.len() != 1) {
-            let message = "a check has exactly one unit".into();
-            wrong(Code::BadValue, "unit", message, "write one name and its size, as in `unit = { tactel = 0.005 }`");
+            let message = "`unit` must have exactly one entry".into();
+            wrong(
+                Code::BadValue,
+                "unit",
+                message,
+                "write one name and its size in the unit of the port, as in `unit = { tactel = 0.005 }`",
+            );
         }
         found
     }

@@ -167,8 +167,8 @@ impl FigureRow {
     }
 }
 
-/// Returns how many order statistics can be skipped at each end of `count` so that the interval between the next two still
-/// contains the median with at least 95 %. Each sample lies below the median with a probability of one half.
+/// Returns how many order statistics can be skipped at each end of `count` so that the interval between the next two
+/// still contains the median with at least 95 %. Each sample lies below the median with a probability of one half.
 fn skipped(count: usize) -> Option<usize> {
     /// Above this count, the normal approximation replaces the binomial distribution, whose smallest terms underflow.
     const MAX_BINOMIAL_COUNT: usize = 1000;

@@ -66,6 +66,6 @@ fn without_checks(root: &Table, document: &Document) -> Option<Diagnostic> {
     let table = document.scenario.as_ref()?;
     let has_run_checks = [&table.never_lost, &table.stays_in, &table.ends_in].iter().any(|word| word.is_some());
     let is_empty = root.get("check").is_none() && !has_run_checks;
-    let help = "add a check: [check.force], of = \"touch.force\", settles_to = 1.0, within = 0.1";
+    let help = "add a check:\n[check.force]\nof = \"touch.force\"\nsettles_to = 1.0\nwithin = 0.1";
     is_empty.then(|| Diagnostic::new(Code::MissingKey, key.span.clone(), "the scenario checks nothing").help(help))
 }

@@ -124,9 +124,10 @@ impl Lookup<'_> {
         let figures = figures(table);
         let papers = table.paper.as_ref().map(papers).unwrap_or_default();
         for (paper, _) in papers.iter().filter(|(paper, _)| !figures.iter().any(|(figure, _)| figure == paper)) {
-            let message = format!("the check has no figure `{}` to compare with the paper's", paper.name());
+            let message =
+                format!("the check computes no `{}`, so the paper's value has nothing to compare with", paper.name());
             let names: Vec<_> = figures.iter().map(|(figure, _)| format!("`{}`", figure.name())).collect();
-            let help = format!("its figures are {}", names.join(", "));
+            let help = format!("the check computes {}", names.join(", "));
             self.found.push(Diagnostic::new(Code::UnknownKey, block.span("paper"), message).help(help));
         }
         let (column, _) = self.column(&table.of)?;

@@ -28,8 +28,8 @@ pub fn since(readings: &[Reading], from: f64) -> &[Reading] {
 
 /// Returns the response time [s], or `None` if the value never settles.
 ///
-/// It is the time at which the mean of the last ten new samples enters the band of `within` around `target` and then stays
-/// in it for half a second. The mean starts again after an absent value.
+/// It is the time at which the mean of the last ten new samples enters the band of `within` around `target` and then
+/// stays in it for half a second. The mean starts again after an absent value.
 #[must_use]
 pub fn response(readings: &[Reading], target: f64, within: f64) -> Option<f64> {
     let mut last: Vec<f64> = Vec::with_capacity(RESPONSE_SAMPLES + 1);
@@ -58,7 +58,8 @@ pub fn mean(readings: &[Reading]) -> Option<f64> {
     Some(samples.iter().sum::<f64>() / samples.len() as f64)
 }
 
-/// Returns the standard deviation of the new samples, or `None` if the value is absent in more than a tenth of the ticks.
+/// Returns the standard deviation of the new samples, or `None` if the value is absent in more than a tenth of the
+/// ticks.
 #[must_use]
 pub fn std(readings: &[Reading]) -> Option<f64> {
     let (samples, mean) = (samples(readings)?, mean(readings)?);

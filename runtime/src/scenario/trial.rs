@@ -43,8 +43,8 @@ impl Scenario {
         rows
     }
 
-    /// Runs the scenario with one seed, and records every tick to the file `record`, if it is given. Returns `None` if the
-    /// run was interrupted.
+    /// Runs the scenario with one seed, and records every tick to the file `record`, if it is given. Returns `None` if
+    /// the run was interrupted.
     #[must_use]
     pub fn run(
         &self,
@@ -82,7 +82,9 @@ impl Scenario {
             (End::Interrupted, _) => return None,
             (End::Fault(fault), _) => Some(fault.to_string()),
             (_, Err(error)) => Some(format!("the recording cannot be written: {error}")),
-            (End::Finished, _) if is_short => Some(format!("the samples of a device end after {time:.3} s")),
+            (End::Finished, _) if is_short => {
+                Some(format!("a device has no more samples after {time:.3} s, before `for_s` is over"))
+            }
             _ => observer.failure(),
         };
         match failure {

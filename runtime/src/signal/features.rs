@@ -108,8 +108,8 @@ impl Features {
         self.now
     }
 
-    /// Writes a sample of a device: one value per feature, `None` if it is absent. The inlet stamps the components when the
-    /// sample arrives, so a device needs no tick number.
+    /// Writes a sample of a device: one value per feature, `None` if it is absent. The inlet stamps the components when
+    /// the sample arrives, so a device needs no tick number.
     pub fn fill(&mut self, values: &[Option<f64>]) {
         if values.len() != self.components.len() {
             // The inlet finds the wrong size and reports the device.

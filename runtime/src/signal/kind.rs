@@ -78,8 +78,8 @@ pub trait Signal: Default + Clone + Send + 'static {
         from_step
     }
 
-    /// Takes the buffer out of its slot for a step in `tick` with that stamp. A value that [stays](Self::STAYS) in its slot
-    /// is not moved: the step starts with a default value.
+    /// Takes the buffer out of its slot for a step in `tick` with that stamp. A value that [stays](Self::STAYS) in its
+    /// slot is not moved: the step starts with a default value.
     fn take(slot: &mut Self, _tick: u64, _stamp: Stamp) -> Self {
         if Self::STAYS { Self::default() } else { std::mem::take(slot) }
     }
@@ -338,7 +338,7 @@ kinds! {
         fn is_finite(&self) -> bool { all_finite(&self.0) }
     }
     Jacobian JacobianShape jacobians "jacobian" "Jacobian": "the twist at unit speed of each joint",
-        "It has one column per joint, which is the velocity of the origin of its frame." {
+        "It has one column per joint. The linear part of a column is the velocity at the origin of the Jacobian's frame." {
         fn allocate(shape: &JacobianShape) -> Self { Self::zeros(shape.0.joints.len()) }
         fn size(&self) -> [usize; 2] { [self.0.len(), 0] }
         fn copy_to(&self, slot: &mut Self) { slot.0.clone_from(&self.0); }

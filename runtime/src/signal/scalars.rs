@@ -5,8 +5,8 @@ use nalgebra::UnitQuaternion;
 use super::{Arenas, Features, Flag, Joints, Kind, Pose, Scalar, Shape, Signal, Twist, Unit};
 
 impl Shape {
-    /// Returns the scalars of a value of this shape: the suffix of each name (empty for a scalar or a flag) and its unit.
-    /// Images, masks, regions and Jacobians have none.
+    /// Returns the scalars of a value of this shape: the suffix of each name (empty for a scalar or a flag) and its
+    /// unit. Images, masks, regions and Jacobians have none.
     #[must_use]
     pub fn scalars(&self) -> Vec<(String, Unit)> {
         let named =
@@ -31,8 +31,8 @@ impl Shape {
 }
 
 impl Arenas {
-    /// Reads the scalars of one value, from index `first` on, into the front of `row`. Returns the number of scalars read.
-    /// An absent feature is NaN. Allocates nothing.
+    /// Reads the scalars of one value, from index `first` on, into the front of `row`. Returns the number of scalars
+    /// read. An absent feature is NaN. Allocates nothing.
     #[inline]
     pub(crate) fn read_scalars(&self, kind: Kind, slot: u32, first: usize, row: &mut [f64]) -> usize {
         let slot = slot as usize;

@@ -4,8 +4,8 @@ use nalgebra::{IsometryMatrix3, Vector3, Vector6};
 
 /// A velocity twist `[v; omega]` [m/s, rad/s].
 ///
-/// A twist in a sensor's frame is the velocity of the sensor's origin in the sensor's axes. A twist in `base` is spatial:
-/// the velocity at the base's origin (paper eq. 4).
+/// A twist in a sensor's frame is the velocity of the sensor's origin in the sensor's axes. A twist in `base` is
+/// spatial: the velocity at the base's origin (paper eq. 4).
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Twist(pub Vector6<f64>);
 

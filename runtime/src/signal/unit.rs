@@ -156,9 +156,9 @@ impl Unit {
         is_variable || Self::parse(text.as_bytes()).is_some()
     }
 
-    /// Whether a parameter may declare the unit: products and quotients of [`PARAM_UNITS`](Self::PARAM_UNITS) and capital
-    /// letters, such as `N s/m` or `U/s2`, a list such as `m/s, rad/s`, or `$` with the name of a parameter. `_` is the
-    /// unit of the component that an entry of a table is for.
+    /// Whether a parameter may declare the unit: products and quotients of [`PARAM_UNITS`](Self::PARAM_UNITS) and
+    /// capital letters, such as `N s/m` or `U/s2`, a list such as `m/s, rad/s`, or `$` with the name of a parameter.
+    /// `_` is the unit of the component that an entry of a table is for.
     #[must_use]
     pub const fn is_param_unit(text: &str) -> bool {
         matches!(text.as_bytes(), [b'$', b'a'..=b'z', ..]) || are_factors(text.as_bytes())

@@ -1,8 +1,8 @@
 //! `udp_pad`: a tactile pad that streams its frames as UDP datagrams.
 //!
 //! The driver sends `hello` to the pad, and the pad sends frames to the port that the hello came from. A frame is its
-//! number (a `u64`) and one `f32` per tactel, row after row, all little-endian. When no frame comes for a while the port
-//! is lost, and the driver connects again, until it succeeds or the run ends.
+//! number (a `u64`) and one `f32` per tactel, row after row, all little-endian. When no frame comes for a while the
+//! port is lost, and the driver connects again, until it succeeds or the run ends.
 
 use std::io;
 use std::time::{Duration, Instant};
@@ -16,8 +16,8 @@ use tokio::time::timeout;
 
 /// A tactile pad that streams its frames as UDP datagrams.
 ///
-/// The device sends `hello` to `address`. The pad answers with frames: a number (`u64`) and one `f32` per tactel in N, row
-/// after row, all little-endian.
+/// The device sends `hello` to `address`. The pad answers with frames: a number (`u64`) and one `f32` per tactel in N,
+/// row after row, all little-endian.
 ///
 /// When no frame comes for `silence_s`, the pad is lost and the device connects again. It counts `bad frames` and
 /// `reconnects`. It states the facts `threshold` and `calibration`.

@@ -219,7 +219,7 @@ fn a_bad_parameter_is_a_mistake() {
         (
             "damping = 0.0005",
             At::Param("damping".into()),
-            "`damping` is less than 0.001: rounding errors are then larger",
+            "`damping` is less than 0.001, which is too small for double precision",
         ),
         (
             "limit_gain = 501",
@@ -230,7 +230,7 @@ fn a_bad_parameter_is_a_mistake() {
         (
             "posture = [0, 9, 0, 0, 0, 0, 0]",
             At::Param("posture".into()),
-            "joint `lwr_a2_joint` cannot be at 9: it goes from -2.0944 to 2.0944",
+            "joint `lwr_a2_joint` cannot be at 9: its range is -2.0944 to  (rad, or m if prismatic)2.0944",
         ),
     ];
     for (params, at, message) in cases {

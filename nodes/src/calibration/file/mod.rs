@@ -1,8 +1,8 @@
 //! A calibration as a TOML file with one line a tactel, easy to read and to compare.
 //!
-//! Numbers have enough digits for 32 bits, so a file that is written and read again gives the same bits. Every tactel is
-//! in the file, with a curve or as dead. A mistake has its place in the text. No memory is allocated from the size in the
-//! header before the tactels are counted.
+//! Numbers have enough digits for 32 bits, so a file that is written and read again gives the same bits. Every tactel
+//! is in the file, with a curve or as dead. A mistake has its place in the text. No memory is allocated from the size
+//! in the header before the tactels are counted.
 
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -177,7 +177,7 @@ fn read_calibration(root: &Value, reader: &mut Reader<'_>) -> Option<Calibration
     let mut tactels = BTreeMap::new();
     for ([i, j], span, tactel) in entries {
         if i >= rows || j >= cols {
-            let message = format!("tactel [{i}, {j}] is not on an array of {rows} by {cols}");
+            let message = format!("tactel [{i}, {j}] is outside the array of {rows} rows by {cols} columns");
             reader.mistakes.push(mistake(&span, message).help("rows and columns count from 0"));
         } else if tactels.insert(i * cols + j, tactel).is_some() {
             reader.mistakes.push(mistake(&span, format!("tactel [{i}, {j}] appears twice")));
@@ -188,7 +188,7 @@ fn read_calibration(root: &Value, reader: &mut Reader<'_>) -> Option<Calibration
         let rest = rows * cols - tactels.len() - 1;
         let more = if rest > 0 { format!(", and {rest} more") } else { String::new() };
         let message = format!("tactel [{}, {}] is missing{more}", first / cols, first % cols);
-        let help = "give it a curve, or list it under `dead`";
+        let help = "add a curve for it under `tactels`, or list it under `dead`";
         reader.mistakes.push(mistake(&place(root, "tactels"), message).help(help));
     }
     Some(Calibration { kind, rows, cols, reading, unit, tactels: tactels.into_values().collect() })
@@ -239,7 +239,7 @@ fn too_large(Tactel { offset, curve }: &Tactel) -> Option<(&'static str, String)
     };
     let mut numbers = std::iter::once(("offset", *offset)).chain(numbers);
     let (key, _) = numbers.find(|(_, number)| !number.is_finite())?;
-    Some((key, "too large: images have 32-bit floats".into()))
+    Some((key, "too large for a 32-bit float".into()))
 }
 
 /// Returns the text of a file; its first lines are `origin`, as comments.
@@ -263,7 +263,7 @@ pub fn write(calibration: &Calibration, origin: &str) -> String {
     origin.lines().for_each(|line| text.push_str(&format!("# {line}\n")));
     text.push_str(&format!(
         "# {formula}.\nkind = \"{KIND}\"\nversion = {VERSION}\ncurve = \"{kind}\"\nrows = {rows}\ncols = {cols}\n\
-         reading = \"{reading}\"\nunit = \"{unit}\"\n\n# These give a force of 0, as [row, column] from 0.\n\
+         reading = \"{reading}\"\nunit = \"{unit}\"\n\n# Tactels whose force is always 0, as [row, column] counted from 0.\n\
          dead = {dead:?}\n\n# At [row, column] from 0: offset [{reading}], {units}.\ntactels = [\n"
     ));
     for (i, tactel) in tactels.iter().enumerate() {

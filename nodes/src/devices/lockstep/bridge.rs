@@ -89,8 +89,8 @@ impl Bridge {
         false
     }
 
-    /// Waits for the next frame. If the simulator does not wait for commands, returns the newest frame that has arrived.
-    /// Returns `None` at the end of the run.
+    /// Waits for the next frame. If the simulator does not wait for commands, returns the newest frame that has
+    /// arrived. Returns `None` at the end of the run.
     fn next_frame(&mut self) -> Result<Option<(i64, Obs)>, String> {
         let line = self.socket.line()?;
         let mut frame = self.frame(&line)?;
@@ -109,10 +109,13 @@ impl Bridge {
         let wrong = |why: String| Err(self.in_line(format!("obs {}: {why}", obs.seq)));
         if let Some((seq, t)) = self.newest {
             if obs.seq <= seq {
-                return wrong(format!("`seq` is {} after {seq}, but it grows with every frame", obs.seq));
+                return wrong(format!(
+                    "`seq` is {} after a frame with {seq}, but it must increase with every frame",
+                    obs.seq
+                ));
             }
             if obs.t < t {
-                return wrong(format!("`t` is {} after {t}: the clock of a simulator does not go back", obs.t));
+                return wrong(format!("`t` is {} s after a frame at {t} s: the time must not go back", obs.t));
             }
         }
         let begin = *self.begin.get_or_insert(obs.t);
@@ -155,7 +158,8 @@ impl Bridge {
         self.end_run(why);
     }
 
-    /// Reduces the command by what the joints can decelerate in a frame, or to zero at once. Returns whether it is zero.
+    /// Reduces the command by what the joints can decelerate in a frame, or to zero at once. Returns whether it is
+    /// zero.
     fn slow_down(&mut self, at_once: bool) -> bool {
         let step = self.params.acceleration * self.period as f64 * 1e-9;
         let speed = self.commanded.iter().fold(0.0_f64, |speed, dq| speed.max(dq.abs()));

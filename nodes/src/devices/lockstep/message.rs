@@ -119,14 +119,16 @@ pub(super) fn hello(line: &str) -> Result<Hello, String> {
     for (i, name) in joints.iter().enumerate() {
         let (lower, upper, speed) = (q_min[i], q_max[i], dq_max[i]);
         if lower >= upper {
-            return Err(format!("`q_min` of joint `{name}` is {lower}, which is not less than its `q_max` of {upper}"));
+            return Err(format!(
+                "`q_min` of joint `{name}` is {lower} rad, which is not less than its `q_max` of {upper} rad"
+            ));
         }
         if speed <= 0.0 {
-            return Err(format!("`dq_max` of joint `{name}` is {speed}, which is not greater than 0"));
+            return Err(format!("`dq_max` of joint `{name}` is {speed} rad/s, which is not greater than 0"));
         }
     }
     if rows * cols > MAX_TACTELS {
-        let message = format!("`rows` and `cols` make {rows}x{cols} tactels, but a line has room for {MAX_TACTELS}");
+        let message = format!("`rows` and `cols` make {rows}x{cols} tactels, but the maximum is {MAX_TACTELS}");
         return Err(message);
     }
     Ok(hello)
@@ -223,7 +225,7 @@ fn number<'de, D: Deserializer<'de>>(from: D, what: &str, holds: impl FnOnce(f64
 }
 
 fn version<'de, D: Deserializer<'de>>(from: D) -> Result<f64, D::Error> {
-    number(from, &format!("the version that the bridge speaks, {PROTO}"), |proto| proto == PROTO)
+    number(from, &format!("the supported protocol version, {PROTO}"), |proto| proto == PROTO)
 }
 
 fn positive<'de, D: Deserializer<'de>>(from: D) -> Result<f64, D::Error> {
@@ -250,7 +252,7 @@ fn names<'de, D: Deserializer<'de>>(from: D) -> Result<Vec<String>, D::Error> {
         let is_taken = |(i, name): &(usize, &String)| name.is_empty() || names[..*i].contains(name);
         match names.iter().enumerate().find(is_taken) {
             Some((i, name)) => Err(format!("element {i} is `{name}`, but each joint needs its own name")),
-            None if names.is_empty() => Err("there is no name in the list".into()),
+            None if names.is_empty() => Err("the list is empty".into()),
             None => Ok(names),
         }
     })
@@ -264,7 +266,7 @@ fn mount<'de, D: Deserializer<'de>>(from: D) -> Result<Mount, D::Error> {
 fn mount_of(m: &[f64; 16]) -> Result<Mount, String> {
     let rotation = Matrix3::new(m[0], m[1], m[2], m[4], m[5], m[6], m[8], m[9], m[10]);
     if (0..4).any(|i| (m[12 + i] - [0.0, 0.0, 0.0, 1.0][i]).abs() > MAX_ROTATION_ERROR) {
-        return Err("this is not a pose: its last row is not 0, 0, 0, 1; it is row-major, flange to sensor".into());
+        return Err("this is not a pose: its last row is not 0, 0, 0, 1; write the matrix row by row, from the flange to the sensor".into());
     }
     let error = (rotation.transpose() * rotation - Matrix3::identity()).amax();
     // A product that overflows is not a rotation.
@@ -272,7 +274,7 @@ fn mount_of(m: &[f64; 16]) -> Result<Mount, String> {
         return Err(format!("this is not a pose: its rotation matrix is off by {error:.1e} from an orthonormal one"));
     }
     if rotation.determinant() < 0.0 {
-        return Err("this is not a pose: its rotation mirrors, but the axes must be right-handed".into());
+        return Err("this is not a pose: its axes are left-handed, but they must be right-handed".into());
     }
     Ok(Mount { xyz: [m[3], m[7], m[11]], rpy: rpy(&rotation) })
 }

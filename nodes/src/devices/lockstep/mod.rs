@@ -44,19 +44,21 @@ pub struct Params {
 /// describes how to write one. It replaces the built-in bench: `tactflow run graphs/hybrid.toml --bench
 /// graphs/benches/lockstep.toml`.
 ///
-/// First the simulator describes itself: its joints with their limits, the mount of the sensor, and the size, pitch, scale
-/// and threshold of the pad. So the simulator must also run while a graph is checked. It names the model of the arm: `lwr4p`
-/// is built in, and `urdf` names the file of any other model.
+/// First the simulator describes itself: its joints with their limits, the mount of the sensor, and the size, pitch,
+/// scale and threshold of the pad. So the simulator must also run while a graph is checked. It names the model of the
+/// arm: `lwr4p` is built in, and `urdf` names the file of any other model.
 ///
-/// In lockstep the simulator waits for each command, and a run is as fast as both allow. Otherwise it runs by its own clock:
-/// the device uses the newest frame, and counts the frames before it as gaps. Frames carry the time of the simulator.
+/// In lockstep the simulator waits for each command, and a run is as fast as both allow. Otherwise it runs by its own
+/// clock: the device uses the newest frame, and counts the frames before it as gaps. Frames carry the time of the
+/// simulator.
 ///
-/// At the end of a run the commands go to zero, frame by frame, and then the simulator receives the reason. The simulator can
-/// also end the run itself. A wrong message, a value that is not finite, silence and a closed connection are faults that name
-/// the message and the field. If the simulator still listens, the device brings the arm to rest before it disconnects.
+/// At the end of a run the commands go to zero, frame by frame, and then the simulator receives the reason. The
+/// simulator can also end the run itself. A wrong message, a value that is not finite, silence and a closed connection
+/// are faults that name the message and the field. If the simulator still listens, the device brings the arm to rest
+/// before it disconnects.
 ///
-/// It states the facts `urdf`, `tip` and `mount` of the arm and `dead`, `threshold`, `pressure` and `calibration` of the pad.
-/// The `contact` that a task reports is sent as `est`.
+/// It states the facts `urdf`, `tip` and `mount` of the arm and `dead`, `threshold`, `pressure` and `calibration` of
+/// the pad. The `contact` that a task reports is sent as `est`.
 ///
 /// ```toml
 /// [roles]
@@ -83,7 +85,8 @@ impl Device for Lockstep {
 
     fn open(params: Params) -> Result<Opened, Mistakes> {
         let mut socket = connect(&params)?;
-        let line = socket.line().map_err(|why| refusal(&params.address, format!("no hello: {why}")))?;
+        let line =
+            socket.line().map_err(|why| refusal(&params.address, format!("the simulator sent no `hello`: {why}")))?;
         let hello = message::hello(&line).map_err(|why| refusal(&params.address, format!("hello (line 1): {why}")))?;
         let mut description = Description::every((hello.dt * 1e9).round() * 1e-9);
         let shape = ImageShape { rows: hello.rows, cols: hello.cols, pitch: [hello.pitch; 2], unit: Unit::RAW };
@@ -137,7 +140,11 @@ fn model_facts(hello: &Hello, params: &Params) -> Result<Facts, Mistakes> {
                 params.address, hello.urdf
             );
             let mistake = Mistake::new(Code::Unreadable, At::Param("address".into()), message);
-            mistake.help(format!("give its file: `urdf = \"{}.urdf\"`; built in is {}", stem(&hello.urdf), models()))
+            mistake.help(format!(
+                "name its file: `urdf = \"{}.urdf\"`; built-in models: {}",
+                stem(&hello.urdf),
+                models()
+            ))
         })?,
     };
     let chain = load(&urdf, &hello.tip, &hello.mount).map_err(|mistakes| {

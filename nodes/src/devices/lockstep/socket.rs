@@ -60,7 +60,7 @@ impl Socket {
     pub(super) fn send(&mut self, line: &str) -> Result<(), String> {
         self.stream.get_mut().write_all(line.as_bytes()).map_err(|error| match error.kind() {
             ErrorKind::WouldBlock | ErrorKind::TimedOut => {
-                format!("the simulator has taken no command for {} s", self.timeout.as_secs_f64())
+                format!("the simulator has read no command for {} s", self.timeout.as_secs_f64())
             }
             _ => format!("the simulator has closed the connection without an `end` ({error})"),
         })
@@ -72,7 +72,7 @@ impl Socket {
     /// If no line arrives in time, or if it is not valid.
     pub(super) fn line(&mut self) -> Result<String, String> {
         let timeout = self.timeout;
-        let silence = || format!("the simulator has said nothing for {} s", timeout.as_secs_f64());
+        let silence = || format!("the simulator has sent nothing for {} s", timeout.as_secs_f64());
         self.line_within(timeout)?.ok_or_else(silence)
     }
 
@@ -165,8 +165,8 @@ impl Socket {
         Ok(false)
     }
 
-    /// Closes the own end, and gives the simulator a moment to read the last message. A connection that is dropped while the
-    /// simulator still sends could lose that message.
+    /// Closes the own end, and gives the simulator a moment to read the last message. A connection that is dropped
+    /// while the simulator still sends could lose that message.
     pub(super) fn close(&mut self) {
         const MOMENT: Duration = Duration::from_millis(200);
         if self.stream.get_ref().shutdown(Shutdown::Write).is_err() {
@@ -183,7 +183,7 @@ impl Socket {
 }
 
 fn attempt(address: &str, end: Instant) -> Result<TcpStream, String> {
-    let mut why = "the name stands for no address".to_owned();
+    let mut why = "the host name has no address".to_owned();
     for address in address.to_socket_addrs().map_err(|error| error.to_string())? {
         let left = end.saturating_duration_since(Instant::now()).max(MIN_TIMEOUT);
         match TcpStream::connect_timeout(&address, left) {

@@ -26,7 +26,7 @@ pub enum GlitchKind {
 /// A fault that lasts for a while.
 #[derive(Debug, Clone, Param)]
 pub struct Glitch {
-    /// Begin.
+    /// Start.
     #[param(unit = "s", range = 0.0..)]
     pub(crate) at_s: f64,
     /// Duration.

@@ -56,14 +56,16 @@ const MAX_TACTELS: usize = 1 << 22;
 /// A simulated pad with scripted presses of points and bars, and with scripted faults.
 ///
 /// Each `press` is a smooth bump of force, (1 - d²/r²)² at distance d from a point or a bar. It appears, moves and
-/// disappears on a schedule. Its tactels sum to its `force` while it is on the pad, and it slides off smoothly. Foam, noise
-/// and hysteresis are not simulated: use the pad to try out a graph and for tests whose result is known, not to tune gains.
+/// disappears on a schedule. Its tactels sum to its `force` while it is on the pad, and it slides off smoothly. Foam,
+/// noise and hysteresis are not simulated: use the pad to try out a graph and for tests whose result is known, not to
+/// tune gains.
 ///
-/// A `glitch` is a fault that lasts for a while: `repeat` repeats the last frame, `freeze` repeats it as if it were new,
-/// `silence` gives no frame, `nan` makes one tactel not a number, `back` gives stamps that lie in the past. With `unplug`
-/// the device fails, and it stays failed also after `for_s`. Try a graph with each of them.
+/// A `glitch` is a fault that lasts for a while: `repeat` repeats the last frame, `freeze` repeats it as if it were
+/// new, `silence` gives no frame, `nan` makes one tactel not a number, `back` gives stamps that lie in the past. With
+/// `unplug` the device fails, and it stays failed also after `for_s`. Try a graph with each of them.
 ///
-/// It states the facts `dead` (no tactel is), `threshold`, `pressure` and `calibration` (its values are forces already).
+/// It states the facts `dead` (no tactel is), `threshold`, `pressure` and `calibration` (its values are forces
+/// already).
 ///
 /// ```toml
 /// [roles]
@@ -167,7 +169,8 @@ impl MockPad {
         frame
     }
 
-    /// Returns the newest frame up to `now` [ns] that was not served yet, or `None`. It skips the frames before that one.
+    /// Returns the newest frame up to `now` [ns] that was not served yet, or `None`. It skips the frames before that
+    /// one.
     fn due(&mut self, now: i64) -> Option<Due> {
         if now < 0 {
             return None;
@@ -226,7 +229,7 @@ impl Stepped for MockPad {
 
     fn exchange(&mut self, now: i64, _: &Commands, samples: &mut Samples) -> Result<(), DeviceError> {
         if self.glitches.iter().any(|glitch| glitch.kind == GlitchKind::Unplug && now >= glitch.time().start) {
-            return Err(DeviceError("its plug is out".into()));
+            return Err(DeviceError("a `glitch` with `unplug` disconnected it".into()));
         }
         if let Some(due) = self.due(now) {
             self.render(due, samples.write(self.image, due.stamp, due.sequence).cells_mut());

@@ -6,13 +6,13 @@ use tactflow_runtime::signal::ImageShape;
 /// A press of a point or a bar on the pad.
 #[derive(Debug, Clone, Param)]
 pub struct Press {
-    /// Begin.
+    /// Start.
     #[param(unit = "s", default = 0.0)]
     from_s: f64,
     /// End; unlimited if not given.
     #[param(unit = "s")]
     to_s: Option<f64>,
-    /// Position of its middle at the begin, from the middle of the pad.
+    /// Position of its middle at `from_s`, from the middle of the pad.
     #[param(unit = "m", default = [0.0, 0.0])]
     at: [f64; 2],
     /// Velocity.
@@ -41,7 +41,9 @@ impl Press {
     pub fn mistake(&self, pitch: f64) -> Option<String> {
         let (radius, length) = (self.radius, self.length);
         if radius < pitch {
-            return Some(format!("a bump of radius {radius} m falls between tactels that are {pitch} m apart"));
+            return Some(format!(
+                "a bump of radius {radius} m can fit between two tactels: `radius` must be at least the pitch, {pitch} m"
+            ));
         }
         if 2.0 * radius + length > MAX_WIDTH * pitch {
             return Some(format!("a bump of {} m is wider than {MAX_WIDTH} tactels", 2.0 * radius + length));
@@ -84,7 +86,8 @@ impl Press {
         }
     }
 
-    /// Returns the height of the bump, from 1 on the bar to 0 at the radius; `along` and `across` start in its middle [m].
+    /// Returns the height of the bump, from 1 on the bar to 0 at the radius; `along` and `across` start in its middle
+    /// [m].
     fn bump(&self, along: f64, across: f64) -> f64 {
         let past = (along.abs() - 0.5 * self.length).max(0.0);
         let rest = (1.0 - (past * past + across * across) / (self.radius * self.radius)).max(0.0);

@@ -174,7 +174,10 @@ fn bad_settings() {
     let cases = [
         ("unit = 'pound'", "`pound` is not a unit"),
         ("rows = 100000\ncols = 100000", "100000 by 100000 tactels are more than"),
-        ("press = [{ radius = 0.001 }]", "a bump of radius 0.001 m falls between tactels that are 0.005 m apart"),
+        (
+            "press = [{ radius = 0.001 }]",
+            "a bump of radius 0.001 m can fit between two tactels: `radius` must be at least the pitch, 0.005 m",
+        ),
         ("press = [{ radius = 9 }]", "a bump of 18 m is wider than 256 tactels"),
         ("rate_hz = 1e9", "expected a number from 0.001"),
         (

@@ -9,17 +9,17 @@ pub use phase::{ContactPhase, phase};
 
 /// Removes flicker from a contact: the contact begins once it has lasted for some samples.
 ///
-/// The node looks at the newest `samples` flags. `present` is set once all of them have a contact, and cleared once none
-/// has one: a contact of a few frames does not count, and a gap of a few frames changes nothing. This delays the contact
-/// by `samples - 1` frames, 16 ms with five samples at 250 Hz.
+/// The node looks at the newest `samples` flags. `present` is set once all of them have a contact, and cleared once
+/// none has one: a contact of a few frames does not count, and a gap of a few frames changes nothing. This delays the
+/// contact by `samples - 1` frames, 16 ms with five samples at 250 Hz.
 ///
-/// `state` has more detail, as in the authors' later code: 0 none, 1 initial (contact in the newer half), 2 stable (in all),
-/// 3 leaving (in the older half), 4 uncertain (anything else). With five samples the newer half is the newest three, and
-/// the older half is the oldest three.
+/// `state` has more detail, as in the authors' later code: 0 none, 1 initial (contact in the newer half), 2 stable (in
+/// all), 3 leaving (in the older half), 4 uncertain (anything else). With five samples the newer half is the newest
+/// three, and the older half is the oldest three.
 ///
 /// Use it where flicker must not act: for the end of an approach, a gate of guidance, a switch of tasks. Each new flag
-/// counts once; a held flag does not count again. While the flag is absent the outputs are absent, and after the graph's
-/// `reset_after_ms` the node starts again without a contact.
+/// counts once; a held flag does not count again. While the flag is absent the outputs are absent, and after the
+/// graph's `reset_after_ms` the node starts again without a contact.
 ///
 /// ```toml
 /// [nodes.contact_debounce]

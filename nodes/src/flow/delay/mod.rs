@@ -1,7 +1,7 @@
 //! `delay` and `twist_delay`: one implementation for both kinds.
 //!
-//! The input is read as the last tick left it, so the node steps before the node that it reads from. What was new then is
-//! new now, and what was held is held.
+//! The input is read as the last tick left it, so the node steps before the node that it reads from. What was new then
+//! is new now, and what was held is held.
 
 mod delayable;
 
@@ -14,16 +14,16 @@ pub use delayable::{Delayable, ScalarParams, TwistParams};
 /// Delays a signal by one tick, so that a loop is allowed.
 ///
 /// A cycle of wires is an error, because no node of it could step first. A delay breaks the cycle: its output is its
-/// input as it was one tick ago. A `delay` states its unit, because its input is not known yet when the graph is built; a
-/// wire in another unit is an error.
+/// input as it was one tick ago. A `delay` states its unit, because its input is not known yet when the graph is built;
+/// a wire in another unit is an error.
 ///
-/// What was new one tick ago is new now and keeps its stamp; what was held is held. While the input is absent the output
-/// is `initial`, or absent if `initial` is not given. A loop that needs its own last value starts only with `initial`,
-/// and starts with it again after each absence. An absent twist is zero motion. An `initial` that moves is generated
-/// motion: it goes on without any contact.
+/// What was new one tick ago is new now and keeps its stamp; what was held is held. While the input is absent the
+/// output is `initial`, or absent if `initial` is not given. A loop that needs its own last value starts only with
+/// `initial`, and starts with it again after each absence. An absent twist is zero motion. An `initial` that moves is
+/// generated motion: it goes on without any contact.
 ///
-/// The delay is one tick and not one sample: 4 ms in a graph of 250 Hz, whatever the rate of the input. A port of a role
-/// cannot be delayed: its sample is present before any node steps.
+/// The delay is one tick and not one sample: 4 ms in a graph of 250 Hz, whatever the rate of the input. A port of a
+/// role cannot be delayed: its sample is present before any node steps.
 ///
 /// ```toml
 /// [nodes.delay]

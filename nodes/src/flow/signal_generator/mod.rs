@@ -13,20 +13,20 @@ pub use waveform::Waveform;
 /// Generates a test signal: a step, a ramp, a sine or a chirp.
 ///
 /// The output is a known scalar, so the response to it identifies the system behind it: `step` shows rise times and
-/// delays, `ramp` creep and thresholds, `sine` gain and phase at one frequency, and `chirp` those of a whole band. Wire it
-/// to a component of `compose_twist` to move one axis, or to `feature_error` to move the reference of a controller.
+/// delays, `ramp` creep and thresholds, `sine` gain and phase at one frequency, and `chirp` those of a whole band. Wire
+/// it to a component of `compose_twist` to move one axis, or to `feature_error` to move the reference of a controller.
 ///
-/// With t the time since `start`, T = `duration` and A = `amplitude`: a step is A, a ramp is A t / T and then A, a sine is
-/// A sin(2 pi f t), a chirp is A sin(2 pi (f t + (f_end - f) t^2 / (2 T))). `offset` is added to all of them, and is the
-/// value before the start and, except for a ramp, after the end. The phase of a chirp is the integral of its frequency, so
-/// the chirp ends at `end_frequency`.
+/// With t the time since `start`, T = `duration` and A = `amplitude`: a step is A, a ramp is A t / T and then A, a sine
+/// is A sin(2 pi f t), a chirp is A sin(2 pi (f t + (f_end - f) t^2 / (2 T))). `offset` is added to all of them, and is
+/// the value before the start and, except for a ramp, after the end. The phase of a chirp is the integral of its
+/// frequency, so the chirp ends at `end_frequency`.
 ///
-/// There is a new value in each tick, for the time of the tick. Without a gate the time is that of the graph. With a gate
-/// it is the time since the gate opened, and the output is absent while the gate is not set or is absent. A gate that
-/// flickers restarts the signal: wire `contact_debounce.present`.
+/// There is a new value in each tick, for the time of the tick. Without a gate the time is that of the graph. With a
+/// gate it is the time since the gate opened, and the output is absent while the gate is not set or is absent. A gate
+/// that flickers restarts the signal: wire `contact_debounce.present`.
 ///
-/// Generated motion is timeless: when a sensor falls silent, only a gate stops it. A frequency above half of the graph's
-/// rate is refused, because sampling would turn it into another one.
+/// Generated motion never becomes too old: when a sensor falls silent, only a gate stops it. A frequency above half of
+/// the graph's rate is refused, because sampling would turn it into another one.
 ///
 /// ```toml
 /// [nodes.signal_generator]            # in and out with a rising frequency, during a contact
@@ -160,7 +160,7 @@ fn check(params: &Params, period: f64) -> Result<(), Mistakes> {
         if is_needed && !is_given {
             mistakes.push(Mistake::new(Code::MissingKey, At::Node, format!("`{name}` is missing: a {form} needs it")));
         } else if is_given && is_unused {
-            mistakes.push(Mistake::key(name, format!("a {form} has no `{name}`")));
+            mistakes.push(Mistake::key(name, format!("a {form} does not use `{name}`: remove it")));
         }
     }
     let max = 0.5 / period;
@@ -227,7 +227,8 @@ mod tests {
         }
     }
 
-    /// Phase of a chirp by the trapezoidal rule over its frequency, which is exact for a straight line except for rounding.
+    /// Phase of a chirp by the trapezoidal rule over its frequency, which is exact for a straight line except for
+    /// rounding.
     fn integrated([first, last]: [f64; 2], duration: f64, time: f64) -> f64 {
         let count = 2000;
         let frequency = |t: f64| first + (last - first) * t / duration;

@@ -9,9 +9,10 @@
 //! chirp  offset + A sin(2 pi (f t + (f_end - f) t^2 / (2 T)))
 //! ```
 //!
-//! Before and after, the value is the offset. The phase of a chirp is the integral of its frequency, which goes linearly
-//! from f to f_end; f(t) t would sweep twice as far. Phases are computed in turns and reduced to one turn before the sine,
-//! so a long run loses no precision. Time is that of the tick: a late tick has the value of its own time.
+//! Before and after, the value is the offset. The phase of a chirp is the integral of its frequency, which goes
+//! linearly from f to f_end; f(t) t would sweep twice as far. Phases are computed in turns and reduced to one turn
+//! before the sine, so a long run loses no precision. Time is that of the tick: a late tick has the value of its own
+//! time.
 
 use std::f64::consts::TAU;
 
@@ -31,7 +32,8 @@ pub enum Waveform {
 }
 
 impl Waveform {
-    /// Returns the signal `time` [s] after its start, for a `duration` [s] and frequencies at the start and at the end [Hz].
+    /// Returns the signal `time` [s] after its start, for a `duration` [s] and frequencies at the start and at the end
+    /// [Hz].
     pub(super) fn at(self, time: f64, duration: f64, frequencies: [f64; 2]) -> f64 {
         let is_over = time >= duration;
         match self {

@@ -20,8 +20,8 @@ pub use load::{PadLoad, load};
 ///
 /// There are two ceilings: `force` for the sum of the whole image, and `peak` for its highest tactel. From the fraction
 /// `begin` of a ceiling on the approach is slowed down linearly, and at the ceiling it is zero. The way out is always
-/// free, and a roll goes on about the contact. The approach is the speed at the contact, vz + wx y - wy x with z pointing
-/// out of the pad: at the centre of gravity for `force`, and at the highest tactel for `peak`.
+/// free, and a roll goes on about the contact. The approach is the speed at the contact, vz + wx y - wy x with z
+/// pointing out of the pad: at the centre of gravity for `force`, and at the highest tactel for `peak`.
 ///
 /// It reads the whole image, because an object outside the selected region presses on the pad too. Negative tactels do
 /// not count. When the image is older than `max_age_ms` the output is absent: a blind sensor does not move.
@@ -115,7 +115,8 @@ impl Node for ContactLimit {
 
     fn new(params: Params, setup: &mut Setup<Self>) -> Result<Self, Mistakes> {
         if params.peak > params.force {
-            let message = "`peak` is greater than `force`, which a single tactel cannot reach";
+            let message =
+                "`peak` is greater than `force`, so it would have no effect: one tactel is never above the sum";
             return Err(Mistake::param("peak", message).help("let `peak` be at most `force`").into());
         }
         (setup.outputs.force, setup.outputs.peak) = (fraction(), fraction());

@@ -5,16 +5,16 @@
 //! position and for the equilibrium, and the lead of the equilibrium over the position.
 //!
 //! τ = 2h, where h is the longest tick that counts as one (`max_gap_ms`). The distance that the last command may still
-//! travel, v_last h, is subtracted from d. So the stop is certain for any sequence of ticks, also when a command acts one
-//! tick late: the speed at time t is then at most the braked speed at t - 2h.
+//! travel, v_last h, is subtracted from d. So the stop is certain for any sequence of ticks, also when a command acts
+//! one tick late: the speed at time t is then at most the braked speed at t - 2h.
 //!
 //! 1. One factor brings the wanted velocities into all ranges: the direction stays.
 //! 2. The output moves toward the result on a straight line, as far as the slowest joint's acceleration allows.
 //! 3. A joint that is then still too fast brakes by itself, with its own acceleration: the guarantee has priority over the
 //!    direction.
 //!
-//! Invariants, while no tick takes longer than h: no joint changes its velocity by more than a dt, nor exceeds its speed;
-//! a joint that starts within its range never leaves it; no command makes the lead exceed its bound.
+//! Invariants, while no tick takes longer than h: no joint changes its velocity by more than a dt, nor exceeds its
+//! speed; a joint that starts within its range never leaves it; no command makes the lead exceed its bound.
 
 use tactflow_runtime::node::{State, Tick};
 use tactflow_runtime::signal::Joint;
@@ -60,8 +60,8 @@ impl Limiter {
 
     /// Moves the velocities one tick toward the wanted ones, within all limits.
     ///
-    /// Returns the fractions that the lead, the positions, the speeds and the accelerations let pass, or `None` if there
-    /// are no wanted velocities and all joints are at rest.
+    /// Returns the fractions that the lead, the positions, the speeds and the accelerations let pass, or `None` if
+    /// there are no wanted velocities and all joints are at rest.
     pub fn limit(
         &mut self,
         joints: &[Joint],

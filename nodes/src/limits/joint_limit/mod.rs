@@ -11,19 +11,19 @@ use super::{fraction, max_age};
 use joints::joints;
 pub use limiter::Limiter;
 
-/// Keeps the ranges, speeds and accelerations of the joints, and the lead of the equilibrium over the position.
+/// Limits positions, speeds and accelerations of the joints, and the lead of the equilibrium over the position.
 ///
-/// It is the last node before an arm. Near the end of its range a joint moves only as fast as it can stop:
-/// v τ + v²/(2a) <= d. The same holds for the lead: while a compliant arm is held, its equilibrium runs ahead, and the arm
-/// springs to it when it is released, by at most `lead_rad`. Ranges apply to the position and to the equilibrium. A joint
-/// outside its range can only move back.
+/// It is the last node before an arm. Near the end of its range a joint moves only as fast as it can stop: v τ +
+/// v²/(2a) <= d. The same holds for the lead: while a compliant arm is held, its equilibrium runs ahead, and the arm
+/// springs to it when it is released, by at most `lead_rad`. Ranges apply to the position and to the equilibrium. A
+/// joint outside its range can only move back.
 ///
 /// Velocities that are too fast are scaled as a whole and keep their direction. The output then follows on a straight
 /// line, as far as the accelerations allow. Only a joint that cannot brake in time with the others brakes by itself.
 ///
 /// When the velocities are absent, or they or the arm's state are older than `max_age_ms`, the output goes to zero on a
-/// straight line with these accelerations, and is absent once it is zero. When the arm's state is *absent*, the output is
-/// absent at once, and the runtime ramps the command down with the same accelerations.
+/// straight line with these accelerations, and is absent once it is zero. When the arm's state is *absent*, the output
+/// is absent at once, and the runtime ramps the command down with the same accelerations.
 ///
 /// The delay τ is twice the graph's `max_gap_ms`, and the distance that the last command may travel in such a gap is
 /// subtracted from d: no bound is crossed as long as no tick takes longer, also by an arm that acts one tick late. In a

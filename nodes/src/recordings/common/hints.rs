@@ -44,26 +44,26 @@ struct Property {
 const UNIT: Property = Property {
     hint: "unit",
     title: "the unit of its values",
-    help: "set `unit` of the bench's device, as `unit = \"kPa\"`, or `unit = \"raw\"` for plain counts (`features`: `--unit kPa`)",
+    help: "add `unit = \"kPa\"` to the device in the bench, or `unit = \"raw\"` for plain counts (`tactflow features`: add `--unit kPa`)",
 };
 
 const PITCH: Property = Property {
     hint: "pitch_mm",
     title: "the pitch of its tactels",
-    help: "set `pitch_mm = [x, y]` of the bench's device: the distances between the centres of two tactels \
-           (`features`: `--pitch-mm 5x5`)",
+    help: "add `pitch_mm = [5.0, 5.0]` to the device in the bench: the distance of neighbouring tactels along x and y [mm] \
+           (`tactflow features`: add `--pitch-mm 5x5`)",
 };
 
 const RATE: Property = Property {
     hint: "rate_hz",
     title: "its frame rate",
-    help: "set `rate_hz` of the bench's device: the frames per second of the recording (`features`: `--rate-hz 250`)",
+    help: "add `rate_hz = 250` to the device in the bench: the frames per second (`tactflow features`: add `--rate-hz 250`)",
 };
 
 const SIZE: Property = Property {
     hint: "size",
     title: "its number of rows and columns",
-    help: "set `size = [rows, columns]` of the bench's device (`features`: `--size 16x16`)",
+    help: "add `size = [16, 16]` to the device in the bench: rows and columns (`tactflow features`: add `--size 16x16`)",
 };
 
 /// Defaults for callers to whom unit, pitch and rate do not matter.

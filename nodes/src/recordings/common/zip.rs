@@ -56,7 +56,8 @@ impl<'z> Archive<'z> {
             CompressionMethod::DEFLATE => Ok(Box::new(entry.verifying_reader(DeflateDecoder::new(entry.data())))),
             other => {
                 let method = other.as_u16();
-                let message = format!("`{name}` in the archive is packed by method {method}: only `deflate` is read");
+                let message =
+                    format!("`{name}` in the archive has compression method {method}, but only `deflate` is supported");
                 Err(Refusal::broken(message))
             }
         }

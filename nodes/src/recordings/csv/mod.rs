@@ -1,14 +1,14 @@
 //! `csv`: plain text, as any script writes it.
 //!
 //! There are two layouts. **A frame a row**: the tactels row by row, separated by `,`, `;`, tabs or blanks, under an
-//! optional first row of names. Names with two numbers, as `t0_3` or `r0c3`, give each tactel's row and column; otherwise
-//! the bench gives `size`. There may also be the columns `time` (seconds, or as in `time_ms`), `force` (a force that
-//! another sensor measured [N]) and `frame`. **A frame a block**: a line for each row of tactels, and a blank line
-//! between two frames; with the bench's `size` the blank lines may be missing.
+//! optional first row of names. Names with two numbers, as `t0_3` or `r0c3`, give each tactel's row and column;
+//! otherwise the bench gives `size`. There may also be the columns `time` (seconds, or as in `time_ms`), `force` (a
+//! force that another sensor measured [N]) and `frame`. **A frame a block**: a line for each row of tactels, and a
+//! blank line between two frames; with the bench's `size` the blank lines may be missing.
 //!
 //! Lines that begin with `#` are comments. Where `;`, tabs or blanks separate numbers, a comma is a decimal comma. A
-//! tactel that is `nan` or an empty cell in the first frame does not exist, and must be so in every frame. The bench gives
-//! unit and pitch, and the rate where there is no time.
+//! tactel that is `nan` or an empty cell in the first frame does not exist, and must be so in every frame. The bench
+//! gives unit and pitch, and the rate where there is no time.
 
 mod columns;
 

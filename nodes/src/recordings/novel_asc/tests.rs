@@ -195,7 +195,7 @@ fn a_damaged_file_has_its_line_and_message() {
         ("  4.000   5.000", "  4.000   1e39", 10, "this pressure is too large: `1e39`"),
         ("  4.000   5.000", "  4.000   5.100", 20, "the total force is 0.75 N, but the pressures sum to 0.755 N"),
         ("5.84000    0.750   0.817   1.100", "5.84000", 20, "the force at this time is missing"),
-        ("sensor        1", "sensor        9", 24, "these sensors are not those of the pressures"),
+        ("sensor        1", "sensor        9", 24, "these sensors differ from those of the pressures"),
         ("corner[cm]", "corner[ft]", 25, "the unit of the corners must be `cm` or `mm`"),
         ("x[1]   0.0000   0.0000", "x[1]   0.0000", 28, "this line has 4 numbers, but there are 5 sensors"),
         ("x[1]   0.0000", "x[1]   0.0x00", 28, "this figure is not a number: `0.0x00`"),

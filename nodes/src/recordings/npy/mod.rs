@@ -1,12 +1,12 @@
 //! `npy` and `npz`: arrays of numpy.
 //!
 //! An `.npy` is an array `[frames, rows, columns]` of integers or floats. One of `[frames, tactels]` needs the bench's
-//! `size`. Rows run along the pad's x, with row i at the i-th y. A tactel that is NaN in the first frame does not exist,
-//! and must be NaN in every frame. The bench gives unit, pitch and rate.
+//! `size`. Rows run along the pad's x, with row i at the i-th y. A tactel that is NaN in the first frame does not
+//! exist, and must be NaN in every frame. The bench gives unit, pitch and rate.
 //!
-//! An `.npz` may give them itself. The images are the array `images`, or the only array with three axes. It may also hold
-//! `time` [s] and `force` [N] (one number a frame), `rate_hz` [1/s], `pitch_mm` [mm] or `pitch` [m] (one number, or
-//! one along x and one along y) and `unit` (a text, as `np.array("N")`). Other arrays are ignored.
+//! An `.npz` may give them itself. The images are the array `images`, or the only array with three axes. It may also
+//! hold `time` [s] and `force` [N] (one number a frame), `rate_hz` [1/s], `pitch_mm` [mm] or `pitch` [m] (one number,
+//! or one along x and one along y) and `unit` (a text, as `np.array("N")`). Other arrays are ignored.
 
 mod array;
 
@@ -149,7 +149,7 @@ fn axes(array: &Array<'_>, hints: &Hints) -> Result<[usize; 3], Refusal> {
             let [rows, cols] = hints.size(None)?;
             if rows.checked_mul(cols) != Some(tactels) {
                 let message =
-                    format!("a row of the array has {tactels} numbers, not those of {rows} by {cols} tactels");
+                    format!("a frame of the array has {tactels} numbers, which is not {rows} by {cols} tactels");
                 return Err(Refusal::Contradicted { hint: "size", message });
             }
             [count, rows, cols]

@@ -2,8 +2,9 @@
 //!
 //! I-Scan, F-Scan and CONFORMat write it, as `.csv` and as `.asf`. A frame is a line `Frame 3`, with or without more
 //! (`Frame 3, 0.2,, 12/2/2019 6:21:52.54PM,,,Raw Sum=,,308`), and a line of cells for each row; `B` is a cell without a
-//! sensel. Pressures become kPa, forces become N. All other text is refused at its place, so that a recording that was cut
-//! or edited by hand does not pass as data. The header gives the mark that ends the movie: a file without it is cut off.
+//! sensel. Pressures become kPa, forces become N. All other text is refused at its place, so that a recording that was
+//! cut or edited by hand does not pass as data. The header gives the mark that ends the movie: a file without it is cut
+//! off.
 
 mod header;
 

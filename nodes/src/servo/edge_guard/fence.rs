@@ -11,8 +11,8 @@
 //! the pad. Rolling over an object of radius R adds -R wy to dx/dt and R wx to dy/dt. R is unknown but its sign is not,
 //! so wx and wy are scaled when they roll toward the rim.
 //!
-//! Invariants: the output is a continuous function of the contact and the input, and inward motion passes unchanged, bit
-//! for bit.
+//! Invariants: the output is a continuous function of the contact and the input, and inward motion passes unchanged,
+//! bit for bit.
 
 use tactflow_runtime::signal::Twist;
 
@@ -31,8 +31,8 @@ impl Fence {
         Self { margin: ((count as f64 - 1.0) / 2.0 - margin) * pitch, ramp: ramp * pitch }
     }
 
-    /// Returns the fraction of a motion from `place` [m] in the direction of `speed` that passes: 1 in the middle, 0 from
-    /// the margin on.
+    /// Returns the fraction of a motion from `place` [m] in the direction of `speed` that passes: 1 in the middle, 0
+    /// from the margin on.
     pub(super) fn share(self, place: f64, speed: f64) -> f64 {
         let room = if speed > 0.0 { self.margin - place } else { self.margin + place };
         (room / self.ramp).clamp(0.0, 1.0)

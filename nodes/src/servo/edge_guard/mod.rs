@@ -18,8 +18,8 @@ use fence::{Fence, guarded};
 /// The contact of an object at rest moves over the pad with dx/dt = -vx + wz y and dy/dt = -vy - wz x. In the middle of
 /// the pad all outward motion passes, from `margin_tactels` on none. Over `ramp_tactels` before the margin the fraction
 /// falls linearly, so the output does not chatter. Only vx and vy are corrected: a turn about z continues, about the
-/// contact. Outward rolling (wy < 0 at the +x side, wx > 0 at the +y side, and the opposite signs at the opposite sides)
-/// is scaled by the same fraction. Inward motion, vz and wz pass unchanged.
+/// contact. Outward rolling (wy < 0 at the +x side, wx > 0 at the +y side, and the opposite signs at the opposite
+/// sides) is scaled by the same fraction. Inward motion, vz and wz pass unchanged.
 ///
 /// Put it behind the `twist_adder` and directly before the `adjoint`, so that it guards guidance as well. The output is
 /// as old as the contact or the twist, whichever is older.
@@ -80,7 +80,7 @@ pub struct Outputs {
     /// The same motion without the part that carries the contact toward the rim.
     #[port(frame = "A")]
     twist: Out<Twist>,
-    /// Whether outward motion is held back: set when half of it is, cleared when none is.
+    /// Whether outward motion is reduced: set when more than half of it is removed, cleared when none is removed.
     at_rim: Out<Flag>,
 }
 

@@ -15,19 +15,19 @@ use law::{Law, Memory};
 /// A PID controller on every feature, for force and position control.
 ///
 /// u = kp e + I + kd de/dt, where I is the sum of ki e dt: eq. 3 of the paper, for each feature by itself. Time is the
-/// time between the stamps of the samples, so a gain means the same at 100 Hz and at 1 kHz. The paper sums without time:
-/// its K_I is ki times the period, and its K_D is kd over the period.
+/// time between the stamps of the samples, so a gain means the same at 100 Hz and at 1 kHz. The paper sums without
+/// time: its K_I is ki times the period, and its K_D is kd over the period.
 ///
 /// kp in 1/s is how fast an error is reduced: 2.0 takes half a second. Under velocity control soft foam integrates
 /// already, so ki is for creep and for objects that move. The integral grows only while the error is `within`, never
 /// exceeds `bound`, and does not grow outward while the control is at its `limit`.
 ///
 /// A repeated sample is neither integrated nor differentiated, and neither is the first one after a gap longer than the
-/// graph's `max_gap_ms`. A feature that is absent contributes nothing; its integral survives flicker and is reset when the
-/// feature is absent for the graph's `reset_after_ms`. kd amplifies noise: smooth the feature first, or leave it 0.
+/// graph's `max_gap_ms`. A feature that is absent contributes nothing; its integral survives flicker and is reset when
+/// the feature is absent for the graph's `reset_after_ms`. kd amplifies noise: smooth the feature first, or leave it 0.
 ///
-/// A feature that nothing uses, because a projector deletes everything it contributes, is frozen: its control is absent,
-/// and it starts afresh in a mode that selects it.
+/// A feature that nothing uses, because a projector deletes everything it contributes, is frozen: its control is
+/// absent, and it starts afresh in a mode that selects it.
 ///
 /// ```toml
 /// [nodes.pid]
@@ -70,7 +70,7 @@ struct Gains {
     /// Bound on the integral's part of the control.
     #[param(unit = "E/s", above = 0.0, default = 1.0)]
     bound: f64,
-    /// Bound on the whole control; none without it.
+    /// Bound on the whole control; without it, the control has no bound.
     #[param(unit = "E/s", above = 0.0)]
     limit: Option<f64>,
 }

@@ -14,21 +14,21 @@ use search::Search;
 /// contact depends on the curvature of the surface: on a flat or round place the contact is round, on a ridge it is a
 /// line. e is the eccentricity of the contact.
 ///
-/// **Seek.** The sensor moves along two legs of `leg_m` at right angles, the first at 45° to the left of its heading and
-/// the second at 45° to the right. m1 and m2 are the slopes of e over the legs, each of the line that fits all samples
-/// best. The gradient is g = m1 d1 + m2 d2, and the next heading is g / |g|. If e changes by less than `least_rise` over
-/// a leg, the heading is kept, so over an even surface the search goes straight on from `heading_rad`. Where the sensor
-/// makes no progress, it turns round.
+/// **Seek.** The sensor moves along two legs of `leg_m` at right angles, the first at 45° to the left of its heading
+/// and the second at 45° to the right. m1 and m2 are the slopes of e over the legs, each of the line that fits all
+/// samples best. The gradient is g = m1 d1 + m2 d2, and the next heading is g / |g|. If e changes by less than
+/// `least_rise` over a leg, the heading is kept, so over an even surface the search goes straight on from
+/// `heading_rad`. Where the sensor makes no progress, it turns round.
 ///
-/// **Follow.** Above `on_above` the contact is a ridge, until e falls below `off_below`; `on_ridge` is for the condition
-/// of a mode. The sensor moves along the orientation of the contact. Of the two directions along a line it takes the one
-/// nearer to its last, so the direction never turns by more than a right angle from one sample to the next. Without an
-/// orientation it keeps the last direction. Where the ridge ends, it seeks again.
+/// **Follow.** Above `on_above` the contact is a ridge, until e falls below `off_below`; `on_ridge` is for the
+/// condition of a mode. The sensor moves along the orientation of the contact. Of the two directions along a line it
+/// takes the one nearer to its last, so the direction never turns by more than a right angle from one sample to the
+/// next. Without an orientation it keeps the last direction. Where the ridge ends, it seeks again.
 ///
 /// The output is V_ext alone. Keep the contact in the middle and under pressure with `pid` and `projector`: with all
 /// components of P while the sensor seeks, and without the component along the ridge while it follows. Without an
-/// eccentricity the motion is absent, and it is as old as the eccentricity. After `reset_after_ms` without a contact the
-/// search starts afresh.
+/// eccentricity the motion is absent, and it is as old as the eccentricity. After `reset_after_ms` without a contact
+/// the search starts afresh.
 ///
 /// A gradient needs an e that depends on the place. If noise hides the slope, use longer legs. Three tactels are a good
 /// length, because the foam spreads the contact by one.
@@ -107,7 +107,7 @@ impl Node for RidgeGuide {
     fn new(params: Params, _: &mut Setup<Self>) -> Result<Self, Mistakes> {
         let (on, off) = (params.on_above, params.off_below);
         if off >= on {
-            let message = format!("`off_below` is {off}, not less than `on_above`, which is {on}");
+            let message = format!("`off_below` is {off}, but it must be less than `on_above`, which is {on}");
             let help = "a ridge begins above `on_above` and ends below `off_below`";
             return Err(Mistake::param("off_below", message).help(help).into());
         }

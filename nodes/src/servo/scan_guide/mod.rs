@@ -7,25 +7,26 @@ use tactflow_runtime::signal::{Flag, Pose, Scalar, Twist};
 
 use scan::Scan;
 
-/// Guides a sensor to and fro over a surface, stroke beside stroke.
+/// Moves a sensor back and forth over a surface, in parallel strokes.
 ///
 /// The guidance of section V-E of the paper: while the servoing keeps the contact, V_ext slides the sensor along one of
 /// its axes, steps across, and comes back. Wire it to a `twist_adder`.
 ///
-/// **The way** is the distance that the sensor moves over the surface, not a time: each step of `in.pose` is turned into
-/// the frame of the sensor and summed, u along the strokes and v across them. An arm that lags or is held therefore skips
-/// nothing. The scan is centred on its start: the sensor moves across by half of the width, along by half of `stroke_m`,
-/// and then makes `strokes` strokes between u = ±`stroke_m`/2, each `step_m` beside the last.
+/// **Distance.** The scan follows the distance that the sensor moves over the surface, not a time: each step of
+/// `in.pose` is turned into the frame of the sensor and summed, u along the strokes and v across them. An arm that lags
+/// or is held therefore skips nothing. The scan is centred on its start: the sensor moves across by half of the width,
+/// along by half of `stroke_m`, and then makes `strokes` strokes between u = ±`stroke_m`/2, each `step_m` beside the
+/// last.
 ///
 /// **Edges.** Where the object ends, the contact stays behind on the pad. A leg ends when the contact is more than
 /// `edge_m` behind the middle of the pad, against the motion, for 40 ms; this needs `in.x` and `in.y`. A leg also ends
 /// when the sensor moves less than a fifth of the distance at its speed within 2 s: a controller that keeps the contact
-/// in the middle stops it at an edge. The scan then continues with the next leg. A step across that moves less than half
-/// of its width is the end of the surface, and of the scan.
+/// in the middle stops it at an edge. The scan then continues with the next leg. A step across that moves less than
+/// half of its width is the end of the surface, and of the scan.
 ///
-/// **One scan** begins with the contact, when a mode sets a speed, and when a mode sets another axis. To scan across and
-/// along, use two modes that set `axis`, each with `go` or `done = { when = "scan.done" }`. A scan is abandoned when the
-/// gate is not set for `reset_after_ms`, or at a speed of 0. Flicker of the gate only pauses it.
+/// **One scan** begins with the contact, when a mode sets a speed, and when a mode sets another axis. To scan across
+/// and along, use two modes that set `axis`, each with `go` or `done = { when = "scan.done" }`. A scan is abandoned
+/// when the gate is not set for `reset_after_ms`, or at a speed of 0. Flicker of the gate only pauses it.
 ///
 /// The twist is as old as the gate, so it ends with the contact and when the pad stops sending images. Guidance along a
 /// component that the projector controls leaves an offset of v / kp on the pad.

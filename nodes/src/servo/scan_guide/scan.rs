@@ -6,12 +6,12 @@
 //! (u, v) += R' (p - p_last)          p, R the position and the axes of the sensor in the base
 //! ```
 //!
-//! On a curved surface this is the distance along the surface. The scan is centred on its start. With n strokes of length
-//! L and steps of width B, the sensor moves across to v = -(n - 1) B / 2, along to u = -L / 2, and then makes n strokes
-//! between u = -L / 2 and L / 2 with a step across by B between two strokes.
+//! On a curved surface this is the distance along the surface. The scan is centred on its start. With n strokes of
+//! length L and steps of width B, the sensor moves across to v = -(n - 1) B / 2, along to u = -L / 2, and then makes n
+//! strokes between u = -L / 2 and L / 2 with a step across by B between two strokes.
 //!
-//! A leg ends early at the edge of the object: where the contact has fallen back on the pad, against the motion, or where
-//! the sensor makes no progress.
+//! A leg ends early at the edge of the object: where the contact has fallen back on the pad, against the motion, or
+//! where the sensor makes no progress.
 
 use tactflow_runtime::node::Tick;
 

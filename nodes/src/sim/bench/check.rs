@@ -74,8 +74,10 @@ fn check_motion(params: &Params) -> Result<(), Mistakes> {
         let Some(mount) = thing.mount else { continue };
         let rate = mount / thing.mass;
         if !is_resolved(rate, 2.0 * MOUNT_DAMPING * rate.sqrt(), dt) {
-            let message =
-                format!("a mount of {} N/m under {} kg oscillates too fast for steps of {dt} s", mount, thing.mass);
+            let message = format!(
+                "a mount of {} N/m with {} kg oscillates too fast for a `step_s` of {dt} s: make `step_s` smaller",
+                mount, thing.mass
+            );
             mistakes.push(object(i, message));
         }
     }
@@ -88,7 +90,8 @@ fn check_motion(params: &Params) -> Result<(), Mistakes> {
         ("friction", params.friction / MAX_STRAIN / min_inertia, 0.0),
     ];
     for (name, _, _) in parts.iter().filter(|(_, stiffness, damping)| !is_resolved(*stiffness, *damping, dt)) {
-        let message = format!("a joint of {min_inertia} kg m² moves too fast for steps of {dt} s");
+        let message =
+            format!("a joint of {min_inertia} kg m² moves too fast for a `step_s` of {dt} s: make `step_s` smaller");
         mistakes.push(Mistake::param(*name, message));
     }
     if mistakes.is_empty() { Ok(()) } else { Err(mistakes) }

@@ -1,7 +1,8 @@
 //! `sim_bench`: the simulated bench as a device: a pad, an arm and objects.
 //!
-//! Between two exchanges the world advances in steps of at most `step_s`, at the velocity that was commanded last. An image
-//! is taken at the rate `rate_hz`. It is available `latency_s` later, with the stamp of the time when it was taken.
+//! Between two exchanges the world advances in steps of at most `step_s`, at the velocity that was commanded last. An
+//! image is taken at the rate `rate_hz`. It is available `latency_s` later, with the stamp of the time when it was
+//! taken.
 
 mod check;
 
@@ -108,27 +109,29 @@ pub const MAX_TACTELS: usize = 128 * 128;
 
 /// A simulated bench: a foam pad on an arm in joint impedance control, and objects to touch.
 ///
-/// The bench closes the loop without hardware: commands move the arm and its pad, and contact gives an image and pushes the
-/// arm back.
+/// The bench closes the loop without hardware: commands move the arm and its pad, and contact gives an image and pushes
+/// the arm back.
 ///
 /// The pad is an elastic foundation of foam on a rigid plate, simulated at points at most 1 mm apart. Each point is a
-/// stiffening spring in series with the stiffness of the object. The foam spreads a load over several tactels, and friction
-/// sticks and slips at every tactel. Each tactel has its own saturating curve, hysteresis, creep and noise, and reads 12
-/// bits: the image is in raw counts, and `calibration` names the file that converts them to forces.
+/// stiffening spring in series with the stiffness of the object. The foam spreads a load over several tactels, and
+/// friction sticks and slips at every tactel. Each tactel has its own saturating curve, hysteresis, creep and noise,
+/// and reads 12 bits: the image is in raw counts, and `calibration` names the file that converts them to forces.
 ///
-/// The arm is that of the paper. Every joint is a spring and a damper toward a posture that moves at the commanded velocity,
-/// so the pad yields and tilts under a load.
+/// The arm is that of the paper. Every joint is a spring and a damper toward a posture that moves at the commanded
+/// velocity, so the pad yields and tilts under a load.
 ///
-/// Objects are placed relative to the sensor at the start, whose z points out of the pad: `at = [0.01, 0, 0.05]` is 1 cm
-/// along the sensor's x and 5 cm in front of it. They are fixed, stand on a compliant `mount`, or follow their `motion`.
+/// Objects are placed relative to the sensor at the start, whose z points out of the pad: `at = [0.01, 0, 0.05]` is 1
+/// cm along the sensor's x and 5 cm in front of it. They are fixed, stand on a compliant `mount`, or follow their
+/// `motion`.
 ///
-/// It runs in virtual time, and the same commands and seed give the same bits; with `--realtime` it is paced by the clock.
-/// The pad states the facts `dead`, `threshold`, `pressure` and `calibration`, and the standard deviations of its noise:
-/// `common_noise`, which all tactels share, as a fraction of the reading, and `own_noise` of each tactel in raw counts. The
-/// arm states `urdf`, `tip` and `mount`. In the role `ground_truth` it provides true values to scenarios and recordings only.
+/// It runs in virtual time, and the same commands and seed give the same bits; with `--realtime` it is paced by the
+/// clock. The pad states the facts `dead`, `threshold`, `pressure` and `calibration`, and the standard deviations of
+/// its noise: `common_noise`, which all tactels share, as a fraction of the reading, and `own_noise` of each tactel in
+/// raw counts. The arm states `urdf`, `tip` and `mount`. In the role `ground_truth` it provides true values to
+/// scenarios and recordings only.
 ///
-/// Not simulated: gravity, coupling of the joints, rotation of objects under load, interaction between columns of foam, wear
-/// and temperature.
+/// Not simulated: gravity, coupling of the joints, rotation of objects under load, interaction between columns of foam,
+/// wear and temperature.
 ///
 /// ```toml
 /// [roles]

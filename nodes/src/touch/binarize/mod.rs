@@ -2,7 +2,8 @@
 //!
 //! With a second threshold, `release`, a tactel enters above the one and stays above the other: |R| then does not
 //! flicker at the edge of a contact, and p = f / |R| does not jump with it. With `method = "otsu"` the threshold is the
-//! image's own (N. Otsu, "A threshold selection method from gray-level histograms", 1979), but never below the given one.
+//! image's own (N. Otsu, "A threshold selection method from gray-level histograms", 1979), but never below the given
+//! one.
 
 mod otsu;
 mod pack;
@@ -20,21 +21,22 @@ use rule::{Rule, rule};
 ///
 /// A tactel belongs to the mask if its value is strictly greater than `threshold` (section III of the paper).
 ///
-/// **Two thresholds.** At the edge of a contact a tactel near the threshold comes and goes with the noise, so |R| flickers
-/// and p = f / |R| (eq. 2) jumps with it. Give `release`, lower than `threshold`: a tactel enters above `threshold` and
-/// stays while it is above `release`. The node remembers the last mask and forgets it when the image is absent for
-/// `reset_after_ms`. A gap of four times the noise of a tactel reduces the changes of |R| at the rim of a still contact
-/// from 9 frames in 10 to 1 in 7.
+/// **Two thresholds.** At the edge of a contact a tactel near the threshold comes and goes with the noise, so |R|
+/// flickers and p = f / |R| (eq. 2) jumps with it. Give `release`, lower than `threshold`: a tactel enters above
+/// `threshold` and stays while it is above `release`. The node remembers the last mask and forgets it when the image is
+/// absent for `reset_after_ms`. A gap of four times the noise of a tactel reduces the changes of |R| at the rim of a
+/// still contact from 9 frames in 10 to 1 in 7.
 ///
-/// **A threshold from the image.** `method = "otsu"` splits the values of each image into the two classes whose means are
-/// farthest apart (greatest variance between them, N. Otsu 1979), in 256 steps from the smallest to the largest tactel. It
-/// is for pads without a calibration, and for contacts that stand out clearly. `threshold` is then the lowest threshold
-/// that it chooses, so that noise on an empty pad is no contact: an image without a tactel above `threshold` gives an
-/// empty mask, and one whose tactels are all equal is compared with `threshold` alone. Otsu's method cuts off the weak rim
-/// of a contact, and its threshold follows the strength of the contact: |R| and p mean less than with a fixed threshold.
+/// **A threshold from the image.** `method = "otsu"` splits the values of each image into the two classes whose means
+/// are farthest apart (greatest variance between them, N. Otsu 1979), in 256 steps from the smallest to the largest
+/// tactel. It is for pads without a calibration, and for contacts that stand out clearly. `threshold` is then the
+/// lowest threshold that it chooses, so that noise on an empty pad is no contact: an image without a tactel above
+/// `threshold` gives an empty mask, and one whose tactels are all equal is compared with `threshold` alone. Otsu's
+/// method cuts off the weak rim of a contact, and its threshold follows the strength of the contact: |R| and p mean
+/// less than with a fixed threshold.
 ///
-/// `release` and `method = "otsu"` exclude each other: a threshold that moves from image to image has no second one below
-/// it.
+/// `release` and `method = "otsu"` exclude each other: a threshold that moves from image to image has no second one
+/// below it.
 ///
 /// ```toml
 /// [nodes.binarize]
@@ -58,8 +60,8 @@ pub struct Params {
     /// lowest threshold that is computed from an image.
     #[param(unit = "U", live)]
     threshold: f64,
-    /// A tactel of the mask stays in it while it is greater than this, which is lower than `threshold`; without it there
-    /// is only one threshold.
+    /// A tactel of the mask stays in it while it is greater than this, which is lower than `threshold`; without it
+    /// there is only one threshold.
     #[param(unit = "U", live)]
     release: Option<f64>,
     /// Where the threshold comes from.

@@ -34,6 +34,6 @@ fn check_method(params: &Params) -> Result<(), Mistakes> {
     if params.method == Method::Fixed || params.release.is_none() {
         return Ok(());
     }
-    let message = "`release` means nothing with `method = \"otsu\"`: that threshold moves from image to image";
-    Err(Mistake::key("release", message).help("leave one of the two out").into())
+    let message = "`release` cannot be used with `method = \"otsu\"`, whose threshold changes from image to image";
+    Err(Mistake::key("release", message).help("remove `release`, or write `method = \"fixed\"`").into())
 }

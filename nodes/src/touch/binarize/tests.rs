@@ -46,7 +46,7 @@ fn the_threshold_itself_is_not_above_it() {
 
 #[test]
 fn what_is_refused() {
-    let too_large = "1e39 is too large for a tactel: images are of 32-bit floats";
+    let too_large = "1e39 is too large: a tactel is a 32-bit float";
     let cases = [
         ("threshold = 1e39", At::Param("threshold".into()), too_large),
         ("threshold = 1\nrelease = -1e39", At::Param("release".into()), "-1e39 is too large"),

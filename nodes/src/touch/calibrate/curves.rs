@@ -51,7 +51,8 @@ pub(super) struct CurveParams {
     /// Reading of an unloaded tactel: a number for all, or a list of rows; 0 without it.
     #[param(unit = "U")]
     pub(super) offset: Option<PerTactel>,
-    /// Slope of the line, in units of the output per unit of the input: a number for all, or a list of rows; 1 without it.
+    /// Slope of the line, in units of the output per unit of the input: a number for all, or a list of rows; 1 without
+    /// it.
     #[param(unit = "1")]
     pub(super) gain: Option<PerTactel>,
     /// Unit of the calibrated image; without it, the unit of the input.
@@ -96,7 +97,8 @@ impl CurveParams {
     /// Returns the indices of the dead tactels.
     pub(super) fn dead(&self, prefix: &str, image: &ImageShape) -> Result<Vec<usize>, Mistakes> {
         let outside = self.dead.iter().filter(|[i, j]| *i >= image.rows || *j >= image.cols).map(|[i, j]| {
-            let message = format!("tactel [{i}, {j}] is not on an array of {} by {}", image.rows, image.cols);
+            let message =
+                format!("tactel [{i}, {j}] is outside the array of {} rows by {} columns", image.rows, image.cols);
             Mistake::param(format!("{prefix}dead"), message).help("rows and columns count from 0")
         });
         none(outside.collect())?;

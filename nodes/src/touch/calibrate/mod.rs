@@ -16,27 +16,27 @@ use tare::{Averages, Rules};
 
 /// Converts the reading of each tactel to a force, by a line or by the curves of a calibration file.
 ///
-/// Every tactel of a foam sensor has its own zero and its own squashed curve (paper section III, fig. 1). This node
-/// inverts them: `force = curve(value - offset)`, tactel by tactel.
+/// Every tactel of a foam sensor has its own zero and its own squashed (saturating) curve (paper section III, fig. 1).
+/// This node inverts them: `force = curve(value - offset)`, tactel by tactel.
 ///
 /// Without a `file` the curve is a straight line, `(value - offset) * gain`, which has no upper end and continues below
-/// zero. A `file` that `tactflow calibrate` has made from a log with a reference force contains, for s = value - offset, a
-/// line, a squashed curve, `gain s / (1 - squash s)`, or straight lines between knots. Squashed curves and knots have no
-/// force below zero, and end at the largest force of the calibration. The file must be for this pad: its size and the unit
-/// of its readings are checked. A `dead` tactel is always 0. Tactels that have died since the calibration can be added to
-/// those of the file.
+/// zero. A `file` that `tactflow calibrate` has made from a log with a reference force contains, for s = value -
+/// offset, a line, a squashed curve, `gain s / (1 - squash s)`, or straight lines between knots. Squashed curves and
+/// knots have no force below zero, and end at the largest force of the calibration. The file must be for this pad: its
+/// size and the unit of its readings are checked. A `dead` tactel is always 0. Tactels that have died since the
+/// calibration can be added to those of the file.
 ///
-/// With `device = { from = "pad.calibration" }` a task takes all of that from the device of the pad, so it works with any
-/// pad. If any of `offset`, `gain`, `unit` and `file` is set beside `device`, it replaces all four of the device. Dead
-/// tactels add up.
+/// With `device = { from = "pad.calibration" }` a task takes all of that from the device of the pad, so it works with
+/// any pad. If any of `offset`, `gain`, `unit` and `file` is set beside `device`, it replaces all four of the device.
+/// Dead tactels add up.
 ///
-/// **Tare.** The zero of foam drifts. When `in.tare` becomes set, the mean of the next `tare_window` frames becomes the zero
-/// of each tactel; with `tare_at_start` the mean of the first frames does. A pad is only tared while nothing touches it:
-/// wire `in.present` to a `label` after this node, set a `tare_bound`, or both. Do not wire it to a `contact_debounce`,
-/// which reports a contact some frames late. A contact during the window, or in the frame before it, cancels the tare, and
-/// so does a single tactel that is off by more than the bound: then all old zeros stay. Between two tares nothing changes:
-/// a long contact does not become the new zero. A repeated frame counts once. When the image is absent for the graph's
-/// `reset_after_ms`, the calibrated zero is restored.
+/// **Tare.** The zero of foam drifts. When `in.tare` becomes set, the mean of the next `tare_window` frames becomes the
+/// zero of each tactel; with `tare_at_start` the mean of the first frames does. A pad is only tared while nothing
+/// touches it: wire `in.present` to a `label` after this node, set a `tare_bound`, or both. Do not wire it to a
+/// `contact_debounce`, which reports a contact some frames late. A contact during the window, or in the frame before
+/// it, cancels the tare, and so does a single tactel that is off by more than the bound: then all old zeros stay.
+/// Between two tares nothing changes: a long contact does not become the new zero. A repeated frame counts once. When
+/// the image is absent for the graph's `reset_after_ms`, the calibrated zero is restored.
 ///
 /// ```toml
 /// [nodes.calibrate]
@@ -63,7 +63,8 @@ pub struct Params {
     /// Reading of an unloaded tactel: a number for all, or a list of rows; 0 without it.
     #[param(unit = "U")]
     offset: Option<PerTactel>,
-    /// Slope of the line, in units of the output per unit of the input: a number for all, or a list of rows; 1 without it.
+    /// Slope of the line, in units of the output per unit of the input: a number for all, or a list of rows; 1 without
+    /// it.
     #[param(unit = "1")]
     gain: Option<PerTactel>,
     /// Unit of the calibrated image; without it, the unit of the input.
@@ -73,13 +74,13 @@ pub struct Params {
     dead: Vec<[usize; 2]>,
     /// A calibration file with a curve for each tactel, instead of `offset`, `gain` and `unit`.
     file: Option<FilePath>,
-    /// The calibration of the device: `{ from = "pad.calibration" }`. Any of `offset`, `gain`, `unit` and `file` beside it
-    /// replaces all four of the device.
+    /// The calibration of the device: `{ from = "pad.calibration" }`. Any of `offset`, `gain`, `unit` and `file` beside
+    /// it replaces all four of the device.
     device: Option<CurveParams>,
     /// Number of frames whose mean is the new zero.
     #[param(range = 1..=1_000_000, default = 50)]
     tare_window: usize,
-    /// Largest difference between the new and the calibrated zero of a tactel; any without it.
+    /// Largest difference between the new and the calibrated zero of a tactel; without it, any difference is accepted.
     #[param(unit = "U", above = 0.0)]
     tare_bound: Option<f64>,
     /// Whether to tare with the first frames.
@@ -96,7 +97,8 @@ pub struct Inputs<'a> {
     /// Tares each time that it becomes set; keep it set for at least a frame of the pad.
     #[port(optional, sampled)]
     tare: Option<In<'a, Flag>>,
-    /// Whether something touches the pad: `present` of a `label` after this node. A frame with a contact cancels a tare.
+    /// Whether something touches the pad: `present` of a `label` after this node. A frame with a contact cancels a
+    /// tare.
     #[port(optional, delayed)]
     present: Option<In<'a, Flag>>,
 }

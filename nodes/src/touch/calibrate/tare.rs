@@ -1,7 +1,7 @@
 //! Tare: when the zero changes, and from which frames.
 //!
-//! `present` is known only after a frame has passed the nodes behind, so each frame of the window is checked when the next
-//! one arrives, also the last one: the zero changes with the frame after the window.
+//! `present` is known only after a frame has passed the nodes behind, so each frame of the window is checked when the
+//! next one arrives, also the last one: the zero changes with the frame after the window.
 
 use tactflow_runtime::node::{At, Mistake, Mistakes};
 use tactflow_runtime::source::Code;

@@ -43,7 +43,7 @@ fn a_line_per_tactel() {
 fn a_mistake_of_the_device_is_marked_at_device() {
     let cases = [
         ("device = { gain = [[1, 2, 3]] }", "device.gain", "`device.gain` has 1 rows, but the image has 2"),
-        ("device = { dead = [[2, 0]] }", "device.dead", "tactel [2, 0] is not on an array of 2 by 3"),
+        ("device = { dead = [[2, 0]] }", "device.dead", "tactel [2, 0] is outside the array of 2 rows by  columns3"),
         ("device = { unit = \"pounds\" }", "device.unit", "`pounds`"),
     ];
     for (params, at, message) in cases {
@@ -68,11 +68,11 @@ fn every_mistake_is_marked_at_its_parameter() {
     let cases = [
         ("offset = [[1, 2, 3]]", "offset", "`offset` has 1 rows, but the image has 2"),
         ("gain = [[1, 2, 3], [4, 5]]", "gain", "row 1 of `gain` has 2 numbers, but the image has 3 columns"),
-        ("gain = 1e39", "gain", "1e39 is too large for a tactel: images are of 32-bit floats"),
+        ("gain = 1e39", "gain", "1e39 is too large: a tactel is a 32-bit float"),
         ("offset = [[0, 0, 0], [0, -1e300, 0]]", "offset", "-1e300 is too large"),
         ("unit = \"Nm\"", "unit", "`Nm` is not a unit"),
-        ("dead = [[2, 0]]", "dead", "tactel [2, 0] is not on an array of 2 by 3"),
-        ("dead = [[0, 3]]", "dead", "tactel [0, 3] is not on an array of 2 by 3"),
+        ("dead = [[2, 0]]", "dead", "tactel [2, 0] is outside the array of 2 rows by  columns3"),
+        ("dead = [[0, 3]]", "dead", "tactel [0, 3] is outside the array of 2 rows by  columns3"),
     ];
     for (params, at, message) in cases {
         let mistakes = rig(params).err().unwrap();

@@ -10,7 +10,7 @@ pub(crate) fn check_same_array(image: &ImageShape, input: &str, mask: &Grid) -> 
     }
     let message =
         format!("`{input}` is {} by {} tactels, but `image` is {} by {}", mask.rows, mask.cols, image.rows, image.cols);
-    Err(Mistake::input(input, message).help("wire both from one pad").into())
+    Err(Mistake::input(input, message).help("wire both from the same pad").into())
 }
 
 /// Returns both values, or the mistakes of both.
@@ -31,6 +31,6 @@ pub(crate) fn narrow(param: &str, number: f64) -> Result<f32, Mistakes> {
     if (number as f32).is_finite() {
         return Ok(number as f32);
     }
-    let message = format!("{number:e} is too large for a tactel: images are of 32-bit floats");
+    let message = format!("{number:e} is too large: a tactel is a 32-bit float");
     Err(Mistake::param(param, message).into())
 }

@@ -1,8 +1,8 @@
 //! The area of a contact between the tactels: cubic convolution (R. Keys, "Cubic convolution interpolation for digital
 //! image processing", 1981), compared with the threshold at four by four points a tactel.
 //!
-//! A tactel that lies in the region with all its neighbours counts whole. Beyond the rim of the pad the image continues as
-//! it is there, so a contact that covers the pad has the area of the pad.
+//! A tactel that lies in the region with all its neighbours counts whole. Beyond the rim of the pad the image continues
+//! as it is there, so a contact that covers the pad has the area of the pad.
 
 use tactflow_runtime::signal::{Image, Mask};
 
@@ -71,7 +71,8 @@ fn bounds(region: &Mask) -> [usize; 4] {
     [top, bottom, left, right]
 }
 
-/// Returns how many of a tactel and its eight neighbours are in the region. Beyond the rim of the pad the region continues.
+/// Returns how many of a tactel and its eight neighbours are in the region. Beyond the rim of the pad the region
+/// continues.
 fn neighbours(region: &Mask, i: usize, j: usize) -> usize {
     let (last_row, last_col) = (region.rows() - 1, region.cols() - 1);
     let rows = [i.saturating_sub(1), i, (i + 1).min(last_row)];

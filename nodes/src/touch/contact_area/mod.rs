@@ -13,12 +13,12 @@ use interpolation::interpolated;
 /// `area` is the number of tactels of the region times the area of one, the pitch along x times the pitch along y. It
 /// jumps by a whole tactel whenever a tactel passes the threshold, even if the contact hardly changes.
 ///
-/// `interpolated` is finer: the area where the image, interpolated between the tactels (cubic convolution, R. Keys 1981),
-/// is above `threshold`, compared at 16 points a tactel. The foam spreads a contact, so the image is smooth between the
-/// tactels and the place where it crosses the threshold is well defined. Set `threshold` to the threshold of `binarize`
-/// (its `release`, if it has one), so that both describe the same contact. For Gaussian prints at any position between the
-/// tactels, the error is 0.6 of the error of the count at a radius of less than two tactels, and a fifth at four.
-/// Without `threshold` it is absent.
+/// `interpolated` is finer: the area where the image, interpolated between the tactels (cubic convolution, R. Keys
+/// 1981), is above `threshold`, compared at 16 points a tactel. The foam spreads a contact, so the image is smooth
+/// between the tactels and the place where it crosses the threshold is well defined. Set `threshold` to the threshold
+/// of `binarize` (its `release`, if it has one), so that both describe the same contact. For Gaussian prints at any
+/// position between the tactels, the error is 0.6 of the error of the count at a radius of less than two tactels, and a
+/// fifth at four. Without `threshold` it is absent.
 ///
 /// Both are areas of the print that the foam has spread, and grow with the force: an edge without any width has an area
 /// too. Both are absent without a region. `area` of `moments` is the count in tactels.
@@ -41,7 +41,8 @@ pub struct ContactArea {
 /// Parameters of `contact_area`.
 #[derive(Debug, Clone, Param)]
 pub struct Params {
-    /// Value at the edge of the contact, for `interpolated`: the threshold of `binarize`, or its `release` if it has one.
+    /// Value at the edge of the contact, for `interpolated`: the threshold of `binarize`, or its `release` if it has
+    /// one.
     #[param(unit = "U")]
     threshold: Option<f64>,
 }

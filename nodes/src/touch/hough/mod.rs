@@ -14,26 +14,26 @@ use votes::{collect, peak, vote};
 
 /// Finds the line through a contact by the Hough transform: direction and offset.
 ///
-/// A tactel at (x, y) lies on every line of direction a whose offset is r = y cos a - x sin a (Duda and Hart 1972; paper
-/// section III and Fig. 4). For each direction the tactels vote for their offsets. A vote is the tactel's `weight` as in
-/// `moments`, shared between the two nearest offsets. The paper takes the highest single vote; on a bar that is several
-/// tactels wide that is the diagonal, the longest line in it. This node takes the direction with the highest sum of
-/// squared votes, the one across which the contact is thinnest, refined by a parabola through the peak and its two
-/// neighbours.
+/// A tactel at (x, y) lies on every line of direction a whose offset is r = y cos a - x sin a (Duda and Hart 1972;
+/// paper section III and Fig. 4). For each direction the tactels vote for their offsets. A vote is the tactel's
+/// `weight` as in `moments`, shared between the two nearest offsets. The paper takes the highest single vote; on a bar
+/// that is several tactels wide that is the diagonal, the longest line in it. This node takes the direction with the
+/// highest sum of squared votes, the one across which the contact is thinnest, refined by a parabola through the peak
+/// and its two neighbours.
 ///
-/// **Prefer `moments`.** On bars of 8 to 14 by 2 to 3 tactels with 2 % noise the error of the angle is 0.9° here, 0.3° with
-/// `moments` and 0.2° with `weight = "excess"` of `moments`, in a fraction of the time. The Hough transform is for lines
-/// with gaps and with other prints beside them: wire `region` to the whole mask of `binarize`, where `moments` averages
-/// over all prints (error 4.3° against 0.3°).
+/// **Prefer `moments`.** On bars of 8 to 14 by 2 to 3 tactels with 2 % noise the error of the angle is 0.9° here, 0.3°
+/// with `moments` and 0.2° with `weight = "excess"` of `moments`, in a fraction of the time. The Hough transform is for
+/// lines with gaps and with other prints beside them: wire `region` to the whole mask of `binarize`, where `moments`
+/// averages over all prints (error 4.3° against 0.3°).
 ///
-/// A larger number of `angles` is not better: the parabola then goes through three directions close to the peak, where the
-/// lattice of the tactels dominates. 180 instead of 36 increase the error to 1.4° and take five times as long.
+/// A larger number of `angles` is not better: the parabola then goes through three directions close to the peak, where
+/// the lattice of the tactels dominates. 180 instead of 36 increase the error to 1.4° and take five times as long.
 ///
 /// `strength` is 1 - lowest / highest score over all directions: 0 for a round contact, about 1 - width / length for a
 /// bar. Below `min_strength`, `orientation` and `offset` are absent, as they are without a region.
 ///
-/// `offset` is the distance of the line from the middle of the pad. It is positive on the side of the direction turned by
-/// +90°, from +x toward +y, so it changes sign where the direction wraps from pi/2 to -pi/2.
+/// `offset` is the distance of the line from the middle of the pad. It is positive on the side of the direction turned
+/// by +90°, from +x toward +y, so it changes sign where the direction wraps from pi/2 to -pi/2.
 ///
 /// ```toml
 /// [nodes.hough]
@@ -152,12 +152,14 @@ impl Node for Hough {
 fn offset_step(param: Option<f64>, pitch: [f64; 2]) -> Result<f64, Mistakes> {
     let pitch = pitch[0].max(pitch[1]);
     if pitch <= 0.0 {
-        return Err(Mistake::input("image", "`hough` needs a pad with a pitch").into());
+        return Err(Mistake::input("image", "`hough` needs a pad whose pitch is greater than 0").into());
     }
     match param {
         Some(step) if step < pitch => {
             let message = format!("`offset_step` is smaller than the pitch, {pitch} m");
-            Err(Mistake::param("offset_step", message).help("leave it out for the pitch").into())
+            Err(Mistake::param("offset_step", message)
+                .help("write at least the pitch, or remove `offset_step` to use the pitch")
+                .into())
         }
         step => Ok(step.unwrap_or(pitch)),
     }

@@ -1,8 +1,8 @@
 //! The tactels of a region, their votes for the offsets of a line, and the peak of the scores.
 //!
-//! Offsets are counted from the mean position of the region, so that a shift by a tactel changes no vote. With an offset
-//! step below the pitch, whole rows would vote for one offset and none for the next, and the transform would find the rows
-//! of the pad.
+//! Offsets are counted from the mean position of the region, so that a shift by a tactel changes no vote. With an
+//! offset step below the pitch, whole rows would vote for one offset and none for the next, and the transform would
+//! find the rows of the pad.
 
 use tactflow_runtime::signal::ImageShape;
 

@@ -19,21 +19,21 @@ pub use runs::{number, paint, trace};
 
 /// Finds the connected regions of a mask, and the region that is the contact.
 ///
-/// Neighbouring tactels of the mask form a region (connected components, paper section III). The contact R is the largest
-/// region; `regions` lists all of them, for `select_region`. Of two equal regions the one that comes first, row by row, is
-/// the contact.
+/// Neighbouring tactels of the mask form a region (connected components, paper section III). The contact R is the
+/// largest region; `regions` lists all of them, for `select_region`. Of two equal regions the one that comes first, row
+/// by row, is the contact.
 ///
-/// **Absence.** A noisy pad has a region in almost every frame, even if nothing touches it: in 99.96 % of the frames with
-/// white noise of 0.08 and a threshold of 0.15 units. So a contact has at least `min_area` tactels and at least
-/// `min_force`. Without a contact, `region` is absent, `present` is not set, and all features of the contact are absent. On
-/// such an empty pad a region of six tactels occurs once in 4000 frames.
+/// **Absence.** A noisy pad has a region in almost every frame, even if nothing touches it: in 99.96 % of the frames
+/// with white noise of 0.08 and a threshold of 0.15 units. So a contact has at least `min_area` tactels and at least
+/// `min_force`. Without a contact, `region` is absent, `present` is not set, and all features of the contact are
+/// absent. On such an empty pad a region of six tactels occurs once in 4000 frames.
 ///
-/// **Two contacts.** With `choose = "largest"` the contact is chosen in each frame: a second, larger touch takes over at
-/// once, and two of the same size alternate. With `choose = "nearest"` the contact is the region whose centroid (the mean
-/// position of its tactels) is nearest to that of the last contact, however large the others are. The first contact is the
-/// largest region, and so is the one after an absence of `reset_after_ms`; a shorter absence keeps the position. If the
-/// contact is lifted while another region is present, that region is the contact from the next frame on. To track several
-/// contacts, use one `select_region` for each.
+/// **Two contacts.** With `choose = "largest"` the contact is chosen in each frame: a second, larger touch takes over
+/// at once, and two of the same size alternate. With `choose = "nearest"` the contact is the region whose centroid (the
+/// mean position of its tactels) is nearest to that of the last contact, however large the others are. The first
+/// contact is the largest region, and so is the one after an absence of `reset_after_ms`; a shorter absence keeps the
+/// position. If the contact is lifted while another region is present, that region is the contact from the next frame
+/// on. To track several contacts, use one `select_region` for each.
 ///
 /// **Neighbours.** With 8, two tactels with a common corner are in one region; with 4 they are not. On a recording with
 /// several contacts the numbers of regions differ in 39 % of the frames.
@@ -126,8 +126,11 @@ impl Node for Label {
         let (image, mask) = (&setup.inputs.image, &setup.inputs.mask);
         check_same_array(image, "mask", mask)?;
         if !runs::is_countable(mask) {
-            let message = format!("an array of {} by {} can have more than 65535 runs", mask.rows, mask.cols);
-            return Err(Mistake::input("mask", message).help("use a smaller array").into());
+            let message = format!(
+                "an array of {} by {} tactels is too large: a mask on it can have more than 65535 runs of tactels",
+                mask.rows, mask.cols
+            );
+            return Err(Mistake::input("mask", message).help("use a pad with fewer tactels").into());
         }
         let reach = u32::from(params.neighbours == Neighbours::EIGHT);
         let grid = mask.clone();

@@ -1,8 +1,9 @@
 //! The connected regions of a mask, as runs of tactels in its rows.
 //!
-//! A row is a few words of bits. Adding the lowest set bit carries through the lowest run of ones, which isolates a run in
-//! four operations; runs that touch in neighbouring rows are joined by union-find. A parent is never after its child, so
-//! one pass in raster order numbers the regions, and the field for the number of the region holds the parent until then.
+//! A row is a few words of bits. Adding the lowest set bit carries through the lowest run of ones, which isolates a run
+//! in four operations; runs that touch in neighbouring rows are joined by union-find. A parent is never after its
+//! child, so one pass in raster order numbers the regions, and the field for the number of the region holds the parent
+//! until then.
 
 use std::ops::Range;
 
@@ -13,8 +14,8 @@ pub(super) fn is_countable(grid: &Grid) -> bool {
     grid.rows.max(grid.cols) <= 65535 && grid.rows * grid.cols.div_ceil(2) <= 65535
 }
 
-/// Lists the runs of a mask in raster order. `reach` is how many columns beyond its ends a run touches runs of the next row:
-/// 0 if neighbours have a common edge, 1 if a common corner is enough.
+/// Lists the runs of a mask in raster order. `reach` is how many columns beyond its ends a run touches runs of the next
+/// row: 0 if neighbours have a common edge, 1 if a common corner is enough.
 ///
 /// Until [`number`], the `region` of each run is its parent among the runs: itself, or one before it.
 pub fn trace(mask: &Mask, reach: u32, runs: &mut Vec<Run>) {

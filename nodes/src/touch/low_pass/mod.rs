@@ -9,23 +9,23 @@ use super::filter::{Averaging, Inputs, Outputs};
 
 /// Smooths a feature with a first-order low-pass filter.
 ///
-/// T dy/dt = x - y, solved exactly from sample to sample: y += (1 - exp(-dt / T)) (x - y), where dt is the time between the
-/// stamps of the samples. So T means the same at 100 Hz and at 1 kHz, and for irregular samples. Set T as
+/// T dy/dt = x - y, solved exactly from sample to sample: y += (1 - exp(-dt / T)) (x - y), where dt is the time between
+/// the stamps of the samples. So T means the same at 100 Hz and at 1 kHz, and for irregular samples. Set T as
 /// `time_constant_ms`, or as `cutoff_hz`, 1 / (2 pi T): 40 ms are 4 Hz.
 ///
-/// The filter is also called a lowpass, a one-pole filter or an exponential moving average. It lags a ramp by T, and leaves
-/// dt / (2 T) of the variance of white noise, as much as a `moving_average` with a window of 2 T. Unlike
+/// The filter is also called a lowpass, a one-pole filter or an exponential moving average. It lags a ramp by T, and
+/// leaves dt / (2 T) of the variance of white noise, as much as a `moving_average` with a window of 2 T. Unlike
 /// `moving_average` it needs no window, and old samples never lose all influence.
 ///
-/// The first sample passes unchanged. The filter starts afresh after a gap longer than the graph's `max_gap_ms`, and when
-/// another device takes the sample: that sample also passes unchanged.
+/// The first sample passes unchanged. The filter starts afresh after a gap longer than the graph's `max_gap_ms`, and
+/// when another device takes the sample: that sample also passes unchanged.
 ///
 /// **Axes.** The direction of a line (`rad mod pi`) is filtered as (cos 2a, sin 2a), since 89° and -89° are neighbours.
-/// Small turns between two samples are filtered like any value; a turn by 90° passes through a point without a direction,
-/// where the output is absent.
+/// Small turns between two samples are filtered like any value; a turn by 90° passes through a point without a
+/// direction, where the output is absent.
 ///
-/// If the feature is absent, the output is absent. The state survives flicker and is reset when the feature is absent for
-/// the graph's `reset_after_ms`.
+/// If the feature is absent, the output is absent. The state survives flicker and is reset when the feature is absent
+/// for the graph's `reset_after_ms`.
 ///
 /// ```toml
 /// [nodes.low_pass]
@@ -44,10 +44,10 @@ pub struct LowPass {
 /// Parameters of `low_pass`.
 #[derive(Debug, Clone, Param)]
 pub struct Params {
-    /// Time constant T, in which 63 % of a step pass; this or `cutoff_hz`.
+    /// Time constant T, after which 63 % of a step has passed. Set this or `cutoff_hz`.
     #[param(unit = "ms", above = 0.0)]
     time_constant_ms: Option<f64>,
-    /// Frequency 1 / (2 pi T), above which less than 71 % of an amplitude pass; this or `time_constant_ms`.
+    /// Frequency 1 / (2 pi T), above which less than 71 % of an amplitude passes. Set this or `time_constant_ms`.
     #[param(unit = "Hz", above = 0.0)]
     cutoff_hz: Option<f64>,
 }

@@ -9,20 +9,20 @@ use crate::motion::axis::wrap_axial;
 
 /// Removes single wrong samples from a feature: the median of the newest samples.
 ///
-/// The middle one of the last `window` samples in order of size; of an even number, the mean of the two in the middle. At
-/// the start it is the median of the samples so far. A glitch of fewer than half the window has no influence, while it
-/// shifts a mean. Each sample counts once, however long it is held.
+/// The middle one of the last `window` samples in order of size; of an even number, the mean of the two in the middle.
+/// At the start it is the median of the samples so far. A glitch of fewer than half the window has no influence, while
+/// it shifts a mean. Each sample counts once, however long it is held.
 ///
-/// **Axes.** The directions of lines (`rad mod pi`) have no order of size. Their median is the sample with the smallest sum
-/// of distances to all others, modulo pi; of two that are equal, the newer. It is always one of the samples, so it exists
-/// even for axes that cancel each other.
+/// **Axes.** The directions of lines (`rad mod pi`) have no order of size. Their median is the sample with the smallest
+/// sum of distances to all others, modulo pi; of two that are equal, the newer. It is always one of the samples, so it
+/// exists even for axes that cancel each other.
 ///
-/// A step passes half a window late, and stays a step. Against white noise a `moving_average` with the same window is better: the
-/// median leaves 1.25 times its standard deviation. Against both, use a short `median` and a `moving_average` after it. A `moving_average`
-/// can also have a longer window.
+/// A step passes half a window late, and stays a step. Against white noise a `moving_average` with the same window is
+/// better: the median leaves 1.25 times its standard deviation. Against both, use a short `median` and a
+/// `moving_average` after it. A `moving_average` can also have a longer window.
 ///
-/// If the feature is absent, the output is absent. The window survives flicker and is reset when the feature is absent for
-/// the graph's `reset_after_ms`.
+/// If the feature is absent, the output is absent. The window survives flicker and is reset when the feature is absent
+/// for the graph's `reset_after_ms`.
 ///
 /// ```toml
 /// [nodes.median]

@@ -14,26 +14,27 @@ pub use sums::{Ellipse, Sums, Weighing, Weight, ellipse};
 
 /// Measures a contact: force, pressure, centre of gravity and orientation.
 ///
-/// The features of the paper's section III, computed from the values f_ij of the tactels of a region R, at the positions
-/// c_ij:
+/// The features of the paper's section III, computed from the values f_ij of the tactels of a region R, at the
+/// positions c_ij:
 ///
 /// - `force` f = Σ f_ij (eq. 1), `area` |R|, `pressure` p = f / |R| (eq. 2);
 /// - `x`, `y`: the centre of gravity c = Σ f_ij c_ij / f (eq. 1), in metres from the middle of the pad. With a pitch of
 ///   5 mm its error is about 0.5 mm (Fig. 2), as the foam spreads a contact over several tactels;
-/// - `orientation`: the long axis of the ellipse with the same second moments, from the sensor's +x toward +y, modulo pi;
+/// - `orientation`: the long axis of the ellipse with the same second moments, from the sensor's +x toward +y, modulo
+///   pi;
 /// - `anisotropy`: from 0 for a round patch to 1 for a line.
 ///
 /// **Absence.** A round or square patch has no orientation: below `min_anisotropy` it is absent, and servoing on the
 /// other features continues. All outputs are absent without a region.
 ///
-/// **Weights.** The paper weights position and shape by the force. A tactel at the edge of the mask then enters with the
-/// whole threshold at once, which is visible as an error of the angle. `weight = "excess"` uses f_ij - `threshold`, or 0
-/// where that is negative, so a tactel enters with 0. On bars of 8 to 14 by 2 to 3 tactels with 2 % noise the error of
-/// the angle is 0.20° instead of 0.33°, on short bars of 6 to 8 tactels 0.46° instead of 0.73°, and the error of the
-/// centre of a print of 2 mm is 0.11 mm instead of 0.17 mm. Set `threshold` to the threshold of `binarize`, or to its
-/// `release` if it has one. `weight = "area"` weights every tactel by 1: it measures the shape of the mask alone, for a
-/// pad whose values are unreliable. The weight applies to `x`, `y`, `orientation` and `anisotropy`, so the axis goes
-/// through the point (`x`, `y`); `force`, `pressure` and `area` do not depend on it.
+/// **Weights.** The paper weights position and shape by the force. A tactel at the edge of the mask then enters with
+/// the whole threshold at once, which is visible as an error of the angle. `weight = "excess"` uses f_ij - `threshold`,
+/// or 0 where that is negative, so a tactel enters with 0. On bars of 8 to 14 by 2 to 3 tactels with 2 % noise the
+/// error of the angle is 0.20° instead of 0.33°, on short bars of 6 to 8 tactels 0.46° instead of 0.73°, and the error
+/// of the centre of a print of 2 mm is 0.11 mm instead of 0.17 mm. Set `threshold` to the threshold of `binarize`, or
+/// to its `release` if it has one. `weight = "area"` weights every tactel by 1: it measures the shape of the mask
+/// alone, for a pad whose values are unreliable. The weight applies to `x`, `y`, `orientation` and `anisotropy`, so the
+/// axis goes through the point (`x`, `y`); `force`, `pressure` and `area` do not depend on it.
 ///
 /// **Pressure** varies less than the force: force and area grow together, and the mean is never below the threshold (or
 /// `release`) of `binarize`.
@@ -88,12 +89,12 @@ pub struct Outputs {
     /// Mean over the region, p = f / |R| (eq. 2); absent if the region is empty.
     #[port(unit = "U/tactel", frame = "A")]
     pressure: Out<Scalar>,
-    /// Centre of gravity along the sensor's x from the middle of the pad (eq. 1); absent if the sum of the weights is not
-    /// positive.
+    /// Centre of gravity along the sensor's x from the middle of the pad (eq. 1); absent if the sum of the weights is
+    /// not positive.
     #[port(unit = "m", frame = "A")]
     x: Out<Scalar>,
-    /// Centre of gravity along the sensor's y from the middle of the pad (eq. 1); absent if the sum of the weights is not
-    /// positive.
+    /// Centre of gravity along the sensor's y from the middle of the pad (eq. 1); absent if the sum of the weights is
+    /// not positive.
     #[port(unit = "m", frame = "A")]
     y: Out<Scalar>,
     /// Number of tactels of the region, |R|.
@@ -102,8 +103,8 @@ pub struct Outputs {
     /// Direction of the region's long axis from +x toward +y, in (-pi/2, pi/2]; absent if the region is round.
     #[port(unit = "rad mod pi", frame = "A")]
     orientation: Out<Scalar>,
-    /// Difference of the principal second moments over their sum, from 0 (round) to 1 (a line); absent if the sum of the
-    /// weights is not positive.
+    /// Difference of the principal second moments over their sum, from 0 (round) to 1 (a line); absent if the sum of
+    /// the weights is not positive.
     #[port(unit = "1", frame = "A")]
     anisotropy: Out<Scalar>,
 }

@@ -133,7 +133,8 @@ pub struct Ellipse {
     cosine: f64,
 }
 
-/// Returns the ellipse with the second central moments of a region whose weights have a positive sum; `pitch` is in metres.
+/// Returns the ellipse with the second central moments of a region whose weights have a positive sum; `pitch` is in
+/// metres.
 #[must_use]
 pub fn ellipse(sums: &Sums, pitch: [f64; 2]) -> Ellipse {
     let (x, y) = (sums.x / sums.force, sums.y / sums.force);
@@ -156,8 +157,8 @@ impl Ellipse {
         }
     }
 
-    /// Returns the angle of the long axis from +x toward +y, in (-pi/2, pi/2] [rad], or `None` if the anisotropy is 0 or
-    /// less than `min_anisotropy`.
+    /// Returns the angle of the long axis from +x toward +y, in (-pi/2, pi/2] [rad], or `None` if the anisotropy is 0
+    /// or less than `min_anisotropy`.
     #[must_use]
     pub fn orientation(&self, min_anisotropy: f64) -> Option<f64> {
         let anisotropy = self.anisotropy();

@@ -1,7 +1,7 @@
 //! `moving_average`: the mean of the newest samples of a feature (paper section V: of force and orientation, over ten).
 //!
-//! The window is summed from its oldest sample to its newest in each step: the sum does not drift, and a sample that has
-//! left the window has no influence.
+//! The window is summed from its oldest sample to its newest in each step: the sum does not drift, and a sample that
+//! has left the window has no influence.
 
 mod mean;
 
@@ -12,15 +12,15 @@ use mean::{TimedVector, mean};
 
 /// Smooths a feature: the mean over the newest samples, or over a time.
 ///
-/// The mean of the last samples (a moving average); the paper smooths force and orientation over ten samples (section V).
-/// At the start the mean is over the samples so far. Each sample counts once, however long it is held.
+/// The mean of the last samples (a moving average); the paper smooths force and orientation over ten samples (section
+/// V). At the start the mean is over the samples so far. Each sample counts once, however long it is held.
 ///
-/// **The window** is a number of samples, `window`, or a time, `window_ms`. A time means the same at every rate: the mean
-/// is over the samples whose stamps are less than `window_ms` older than the newest, even if they are irregular. At
-/// 250 Hz, 40 ms are ten samples. The newest sample always counts, so a window shorter than the time between two samples
-/// does not change them. The window holds twice as many samples as the graph's nominal rate gives; at a higher rate the
-/// window is shorter. A window of time starts afresh after a gap longer than the graph's `max_gap_ms`, and when another
-/// device takes the samples.
+/// **The window** is a number of samples, `window`, or a time, `window_ms`. A time means the same at every rate: the
+/// mean is over the samples whose stamps are less than `window_ms` older than the newest, even if they are irregular.
+/// At 250 Hz, 40 ms are ten samples. The newest sample always counts, so a window shorter than the time between two
+/// samples does not change them. The window holds twice as many samples as the graph's nominal rate gives; at a higher
+/// rate the window is shorter. A window of time starts afresh after a gap longer than the graph's `max_gap_ms`, and
+/// when another device takes the samples.
 ///
 /// **Axes.** The direction of a line (`rad mod pi`) has no arithmetic mean, as 89° and -89° are neighbours. The mean is
 /// over (cos 2a, sin 2a) instead: over ten samples near 90° with 3° of noise its error is 0.65°, that of the arithmetic
@@ -29,8 +29,8 @@ use mean::{TimedVector, mean};
 /// **Lag.** The mean lags by half the window, though its stamp is that of the newest sample. A `low_pass` whose time
 /// constant is half of `window_ms` has the same lag and leaves the same noise. A `median` removes single wrong samples.
 ///
-/// If the feature is absent, the output is absent. The window survives flicker and is reset when the feature is absent for
-/// the graph's `reset_after_ms`.
+/// If the feature is absent, the output is absent. The window survives flicker and is reset when the feature is absent
+/// for the graph's `reset_after_ms`.
 ///
 /// ```toml
 /// [nodes.moving_average]

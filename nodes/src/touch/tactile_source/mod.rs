@@ -12,9 +12,9 @@ pub use sums::sum_and_peak;
 /// Converts a pad's image to the sensor's frame, with its sum and its peak.
 ///
 /// The first node behind a pad. All nodes after it count rows along the sensor's +y and columns along its +x, from the
-/// middle of the pad; z points out of the pad toward the object. Devices have their own order: `transpose` swaps rows and
-/// columns, then `flip_x` and `flip_y` reverse the columns and the rows. To check it, press the corner toward +x and +y:
-/// `x` and `y` of `moments` must both be positive.
+/// middle of the pad; z points out of the pad toward the object. Devices have their own order: `transpose` swaps rows
+/// and columns, then `flip_x` and `flip_y` reverse the columns and the rows. To check it, press the corner toward +x
+/// and +y: `x` and `y` of `moments` must both be positive.
 ///
 /// `sum` and `peak` cover every tactel and not only a chosen region, so they include a second contact, and one that is
 /// too small to be a region. Force ceilings use them. The sum is exact for whole counts, and has the same bits on every

@@ -1,7 +1,7 @@
 //! Sum and peak of an image.
 //!
-//! The sum is made in f64, in a fixed number of lanes that are added in a fixed order: it is exact for whole counts, and
-//! has the same bits on every machine.
+//! The sum is made in f64, in a fixed number of lanes that are added in a fixed order: it is exact for whole counts,
+//! and has the same bits on every machine.
 
 /// Number of cells that are added at once.
 const LANES: usize = 8;

@@ -133,7 +133,11 @@ impl Entry {
         Self {
             group,
             limits: spec.limits.holds.iter().map(ToString::to_string).collect(),
-            steps: Some(if spec.every_tick { "in every tick" } else { "when an input that wakes it is new or lost" }),
+            steps: Some(if spec.every_tick {
+                "in every tick"
+            } else {
+                "when an input that wakes the node has a new value or loses its value"
+            }),
             inputs: spec.inputs.iter().map(input).collect(),
             outputs: spec.outputs.iter().map(|port| PortEntry::output(catalogue, port)).collect(),
             params: spec.params.iter().map(ParamEntry::of).collect(),
@@ -157,7 +161,7 @@ impl Entry {
         let name = role.observed_name();
         let doc = match role.is_observed {
             true => format!(
-                "Only a scenario and the recorder read it. A bench binds it as `{name} = \"device\"`, and no task declares it."
+                "Only scenarios and recordings read it. Bind it in the bench as `{name} = \"device\"`; a task cannot declare it."
             ),
             false => String::new(),
         };
@@ -283,19 +287,27 @@ impl PortEntry {
 const fn need(need: Need) -> &'static str {
     match need {
         Need { is_many: true, is_trigger: true, .. } => "any number of inputs, named in the graph; each wakes the node",
-        Need { is_many: true, .. } => "any number of inputs, named in the graph; each wakes the node when it is lost",
+        Need { is_many: true, .. } => {
+            "any number of inputs, named in the graph; each wakes the node when it loses its value"
+        }
         Need { is_delayed: true, must_be_wired: false, .. } => {
             "optional, the value of the previous tick; wakes the node only if no other input does"
         }
         Need { is_delayed: true, .. } => "the value of the previous tick; wakes the node only if no other input does",
         Need { must_be_wired: true, must_be_present: true, is_trigger: true, .. } => "required, wakes the node",
-        Need { must_be_wired: true, must_be_present: true, .. } => "required, wakes the node only when it is lost",
+        Need { must_be_wired: true, must_be_present: true, .. } => {
+            "required, wakes the node only when the input loses its value"
+        }
         Need { must_be_wired: true, is_trigger: true, .. } => "must be wired, may be absent, wakes the node",
-        Need { must_be_wired: true, .. } => "must be wired, may be absent, wakes the node only when it is lost",
+        Need { must_be_wired: true, .. } => {
+            "must be wired, may be absent, wakes the node only when the input loses its value"
+        }
         Need { must_be_present: true, is_trigger: true, .. } => "optional, must be present if wired, wakes the node",
-        Need { must_be_present: true, .. } => "optional, must be present if wired, wakes the node only when it is lost",
+        Need { must_be_present: true, .. } => {
+            "optional, must be present if wired, wakes the node only when the input loses its value"
+        }
         Need { is_trigger: true, .. } => "optional, wakes the node",
-        Need { .. } => "optional, wakes the node only when it is lost",
+        Need { .. } => "optional, wakes the node only when the input loses its value",
     }
 }
 

@@ -17,7 +17,7 @@ use crate::cli::text::prose::{Definition, Element, PageStyle};
   tactflow list nodes edge       the nodes whose name, summary or documentation contains `edge`"
 )]
 pub(crate) struct ListArgs {
-    /// A category (nodes, devices, roles, kinds or files), and words that must all occur
+    /// Category (nodes, devices, roles, kinds or files) and search words: an entry must contain all words
     #[arg(value_name = "WORD")]
     words: Vec<String>,
     /// Output format
@@ -39,7 +39,10 @@ pub(crate) fn list(args: ListArgs, shell: &Shell) -> u8 {
     if args.format == OutputFormat::Json {
         shell.say_json(&found.iter().map(ListedJson::of).collect::<Vec<_>>());
     } else if found.is_empty() {
-        shell.error(format_args!("nothing in the catalogue matches `{}`", args.words.join(" ")));
+        shell.error(format_args!(
+            "nothing in the catalogue matches `{}`\nhelp: `tactflow list` prints everything",
+            args.words.join(" ")
+        ));
     } else {
         shell.say(&PageStyle::new(shell.has_colour()).render(&elements(&found)));
     }

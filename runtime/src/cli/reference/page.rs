@@ -3,8 +3,8 @@
 use super::entry::{Category, Entry, ParamEntry, PortEntry};
 use crate::cli::text::prose::{Definition, Element};
 
-/// Builds the page. `has_fits` adds the ports at the other end of each wire; the reference leaves them out, so that a new
-/// node changes no page of another.
+/// Builds the page. `has_fits` adds the ports at the other end of each wire; the reference leaves them out, so that a
+/// new node changes no page of another.
 pub(crate) fn page(entry: &Entry, has_fits: bool) -> Vec<Element> {
     let mut elements = vec![
         Element::Title(entry.name.clone(), entry.category.name()),
@@ -14,9 +14,11 @@ pub(crate) fn page(entry: &Entry, has_fits: bool) -> Vec<Element> {
         elements.push(Element::Prose(entry.doc.clone()));
     }
     elements.extend(entry.recorded.map(|recorded| Element::Prose(format!("Recorded with `--out`: {recorded}."))));
-    elements.extend(entry.steps.map(|steps| Element::Prose(format!("Steps {steps}."))));
+    elements.extend(entry.steps.map(|steps| Element::Prose(format!("The node steps {steps}."))));
     let (fits, limits, inputs, outputs) = match entry.category {
-        Category::Role => ("Filled by the devices: ", "Its commands must cross the limits: ", "Inputs", "Outputs"),
+        Category::Role => {
+            ("Filled by the devices: ", "Its commands must pass through the limits: ", "Inputs", "Outputs")
+        }
         Category::Kind => ("", "", "Taken by", "Produced by"),
         _ => ("Fills the roles: ", "Enforces the limits: ", "Inputs", "Outputs"),
     };

@@ -16,7 +16,7 @@ pub fn reference(catalogue: &Catalogue) -> Vec<(String, String)> {
     let mut entries = entries(catalogue);
     entries.retain(|entry| entry.category != Category::File);
     let mut index = "# Reference\n\nEverything that a graph can use. These pages are generated from the catalogue; \
-                     `tactflow describe NAME` prints the same documentation and an example graph.\n"
+                     `tactflow describe NAME` prints the same documentation and an example graph.\n\nA capital letter, such as U in `unit U` or A in `frame A`, stands for a unit or a frame that the wires define. Within a node, the same letter is the same unit or frame. In brackets, `_` is any unit, and `$unit` is the value of the parameter `unit`.\n"
         .to_owned();
     let mut pages = Vec::new();
     for group in entries.chunk_by(|a, b| (a.category, a.group) == (b.category, b.group)) {

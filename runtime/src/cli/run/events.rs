@@ -53,7 +53,7 @@ impl LimitWatch {
     /// Writes the table of the limits that reduced the motion.
     pub(crate) fn table(&self, end: i64) -> String {
         let duration = seconds(end).max(1e-9);
-        let mut rows = vec![["limited by", "for", "of the run", "smallest scale"].map(String::from)];
+        let mut rows = vec![["limited by", "time", "part of run", "smallest scale"].map(String::from)];
         for limit in self.limits.iter().filter(|limit| limit.time > 0.0) {
             let share = format!("{:.1} %", 100.0 * limit.time / duration);
             rows.push([limit.name.clone(), format!("{:.3} s", limit.time), share, number(limit.smallest_scale)]);
@@ -100,11 +100,11 @@ fn halts(engine: &Engine) -> String {
             None => "until the end".to_owned(),
         };
         // Writing to a string cannot fail.
-        let _ = writeln!(text, "{what} {duration}: {}", halt.fault);
+        let _ = writeln!(text, "commands {what} {duration}: {}", halt.fault);
     }
     let more = engine.halts().len().saturating_sub(MAX_LISTED) as u64 + engine.unlisted_halts();
     if more > 0 {
-        let _ = writeln!(text, "held or stopped {more} more times");
+        let _ = writeln!(text, "commands held or stopped {more} more times");
     }
     if !text.is_empty() {
         text.push('\n');

@@ -65,9 +65,8 @@ impl<'j> OutputFiles<'j> {
         };
         if let (Some(path), Some(rows)) = (out, self.rows) {
             match rows.finish() {
-                Ok(dropped) if dropped > 0 => {
-                    shell.warning(format_args!("{} has {dropped} rows too few: the disk was too slow", path.display()))
-                }
+                Ok(dropped) if dropped > 0 => shell
+                    .warning(format_args!("`{}` lacks {dropped} rows, because the disk was too slow", path.display())),
                 result => report(path, result.map(|_| String::new())),
             }
         }
@@ -82,7 +81,9 @@ impl<'j> OutputFiles<'j> {
 }
 
 fn recorder(path: &Path, engine: &Engine, may_wait: bool) -> Result<Recorder, String> {
-    let format = RecordFormat::of(path).ok_or_else(|| format!("`{}` is neither .csv nor .ndjson", path.display()))?;
+    let format = RecordFormat::of(path).ok_or_else(|| {
+        format!("`{}` does not end in .csv or .ndjson: write for example `--out run.csv`", path.display())
+    })?;
     refuse_other(path, &RecordFormat::FILE_STARTS, "a recording of a run")?;
     Recorder::create(path, format, engine, may_wait).map_err(|error| cannot_create(path, error))
 }
@@ -94,7 +95,7 @@ fn points(path: &Path, chosen: &PointPorts, engine: &Engine) -> Result<PointReco
 
 fn still(path: &Path, title: &str, engine: &Engine) -> Result<Still, String> {
     if path.extension().is_none_or(|extension| extension != "svg") {
-        return Err(format!("`{}` is not .svg", path.display()));
+        return Err(format!("`{}` does not end in .svg: write for example `--svg run.svg`", path.display()));
     }
     refuse_other(path, &[Svg::START], "an SVG picture")?;
     Still::create(path, title, engine)
@@ -109,7 +110,10 @@ fn refuse_other(path: &Path, starts: &[&str], what: &str) -> Result<(), String> 
     let mut start = Vec::new();
     let read = File::open(path).and_then(|file| file.take(16).read_to_end(&mut start));
     if read.is_ok() && !start.is_empty() && !starts.iter().any(|known| start.starts_with(known.as_bytes())) {
-        return Err(format!("`{}` exists and is not {what}: it is not overwritten", path.display()));
+        return Err(format!(
+            "`{}` exists and is not {what}, so it is not overwritten: write to another file",
+            path.display()
+        ));
     }
     Ok(())
 }

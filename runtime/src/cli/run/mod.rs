@@ -36,7 +36,7 @@ pub use time::duration;
   tactflow run graphs/finger_press.toml --for 5s --out press.csv
   tactflow run graphs/hybrid.toml --svg hybrid.svg
   tactflow run graphs/explore.toml --points surface.ply
-  tactflow run graphs/hybrid.toml --set nodes.pid.gains.x.kp=3 --set devices.pad.rate_hz=500
+  tactflow run graphs/hybrid.toml --set nodes.pid.gains.x.kp=3 --set devices.bench.rate_hz=500
   tactflow run graphs/hybrid.toml --send 0.8s:stop --send 1.2s:resume
 
 Words: `stop` ramps every command to zero and holds it there, and `resume` releases it.
@@ -70,13 +70,13 @@ pub(crate) fn run(args: RunArgs, shell: &Shell) -> u8 {
 /// The length, the words and the files of a run.
 #[derive(clap::Args, Default)]
 pub struct JobOptions {
-    /// Stop after this time of the graph: 20s, 500ms, 2min
+    /// Stop when the clock of the graph reaches this time: 20s, 500ms, 2min
     #[arg(long = "for", value_name = "TIME", value_parser = duration, allow_hyphen_values = true)]
     pub duration: Option<f64>,
     /// Run in real time; without it, virtual time runs as fast as possible
     #[arg(long)]
     pub realtime: bool,
-    /// Send a word at a time of the graph, for example 2s:resume; may be repeated
+    /// Send an operator word at a time of the graph's clock, for example 2s:resume; may be repeated
     #[arg(long, value_name = "TIME:WORD", value_parser = time::word)]
     pub send: Vec<(f64, String)>,
     /// Read words from standard input during the run, one per line; requires real time
@@ -85,7 +85,8 @@ pub struct JobOptions {
     /// Record all ports in a .csv or .ndjson file: one row per tick, one column per number
     #[arg(short, long, value_name = "FILE")]
     pub out: Option<PathBuf>,
-    /// Write the points that a pose visits to a .ply file: the pose that the graph reports, or [POSE[,PORT]…=]FILE
+    /// Write the points of a pose to a .ply file: FILE for the reported pose, POSE=FILE, or POSE,PORT=FILE with more
+    /// columns
     #[arg(long, value_name = "FILE")]
     pub points: Option<PointsRequest>,
     /// Draw the strongest image and the curves that the graph shows to an .svg file
@@ -209,7 +210,7 @@ impl Job {
 fn endless_stop(engine: &Engine, fault: &Fault) -> &'static str {
     let is_the_stop = engine.halts().last().is_some_and(|halt| halt.fault == *fault);
     if engine.is_stopped() && is_the_stop {
-        ", and nothing could send `resume`: use `--send 2s:resume`, or type it with `--listen`"
+        "; the run ended because nothing can send `resume`: add `--send 2s:resume`, or add `--realtime --listen` and type it"
     } else {
         ""
     }
@@ -219,8 +220,8 @@ fn endless_stop(engine: &Engine, fault: &Fault) -> &'static str {
 fn ending(outcome: &Outcome) -> String {
     let reason = match outcome.end {
         End::Finished => "a device has no more samples",
-        End::Done => "the graph is done",
-        End::Duration => "the time is over",
+        End::Done => "a `done` condition ended the run",
+        End::Duration => "the time limit ended the run",
         End::Interrupted => "interrupted",
         End::Fault(_) => "a fault",
     };

@@ -1,7 +1,7 @@
 //! The progress and the live view of a run, drawn in place on a terminal and removed at the end.
 //!
-//! A separate thread writes to the terminal, so that a slow terminal never delays a tick. Drawings that it cannot keep up
-//! with are dropped.
+//! A separate thread writes to the terminal, so that a slow terminal never delays a tick. Drawings that it cannot keep
+//! up with are dropped.
 
 use std::io::{IsTerminal, Write, stderr};
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
@@ -93,7 +93,8 @@ fn draw(drawings: &Receiver<Drawing>) {
 
 /// Returns the text with the escape codes that draw it over a text of `lines` lines.
 ///
-/// Each line is overwritten, which avoids flicker. Wrapping is off, so that the number of lines on the terminal is known.
+/// Each line is overwritten, which avoids flicker. Wrapping is off, so that the number of lines on the terminal is
+/// known.
 fn redrawn(lines: usize, text: &str) -> String {
     let up = if lines > 1 { format!("\x1b[{}A", lines - 1) } else { String::new() };
     format!(

@@ -76,7 +76,7 @@ impl Summary {
             let _ = writeln!(text, "{} ticks started more than one period late", outcome.late);
         }
         if let Body::View(_) = self.body {
-            let _ = writeln!(text, "for all ports and the time of each node: --ports");
+            let _ = writeln!(text, "`--ports` prints all ports and the time of each node");
         }
         text
     }

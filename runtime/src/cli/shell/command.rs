@@ -59,7 +59,7 @@ impl<A: CommandFactory + FromArgMatches, F: Fn(A, &Shell) -> u8> Subcommand for 
 /// The bench of a graph, and values that replace those of its files.
 #[derive(Args)]
 pub(crate) struct GraphArgs {
-    /// Run on this bench instead of the one that the graph names
+    /// Use this bench instead of the one that the graph names
     #[arg(long, value_name = "FILE")]
     pub(crate) bench: Option<PathBuf>,
     /// Replace a value of the graph or its bench, for example nodes.pid.gains.x.kp=3; may be repeated

@@ -153,7 +153,7 @@ impl<'a> Raster<'a> {
         let pitch = if (x - y).abs() < 1e-9 { mm(x) } else { format!("{} and {}", mm(x), mm(y)) };
         let mean = match self.block {
             1 => String::new(),
-            block => format!("; a cell is the mean of {block}x{block}"),
+            block => format!("; a cell is the mean of {block}x{block} tactels"),
         };
         format!("{rows}x{cols} tactels, {pitch} mm apart{mean}; x right, y up")
     }

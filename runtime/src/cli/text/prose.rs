@@ -121,7 +121,8 @@ impl PageStyle {
     }
 }
 
-/// Wraps a text into lines of at most `width` characters, each indented by `indent` spaces. A longer word has its own line.
+/// Wraps a text into lines of at most `width` characters, each indented by `indent` spaces. A longer word has its own
+/// line.
 fn wrap(text: &str, width: usize, indent: usize) -> Vec<String> {
     let (text, pad) = (text.split_whitespace().collect::<Vec<_>>().join(" "), " ".repeat(indent));
     if text.is_empty() {

@@ -23,7 +23,7 @@ use crate::scenario::{Scenario, Trial};
     name = "verify",
     after_help = "Examples:
   tactflow verify graphs/scenarios
-  tactflow verify graphs/scenarios/hybrid_ball.toml --seeds 50 --out records
+  tactflow verify graphs/scenarios/table1_ball.toml --seeds 50 --out records
   tactflow verify graphs/scenarios --json > figures.json
 
 Exit codes: 0 every check passed; 1 a check failed, or a run ended in a fault; 2 a scenario does not load."
@@ -32,7 +32,7 @@ pub(crate) struct VerifyArgs {
     /// Scenario files, or folders of scenario files
     #[arg(required = true)]
     paths: Vec<PathBuf>,
-    /// Run each scenario that has seeds with the seeds 1 to N instead
+    /// Run each scenario that has `seeds` with the seeds 1 to N instead of its own
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=10_000))]
     seeds: Option<u64>,
     /// Number of parallel runs [default: number of cores]
@@ -96,7 +96,9 @@ fn prepare(args: &VerifyArgs, catalogue: &Catalogue) -> Result<Vec<Verified>, St
     if let Some(folder) = &args.out {
         let mut names = BTreeSet::new();
         if let Some(twice) = all.iter().map(Verified::name).find(|name| !names.insert(name.clone())) {
-            return Err(format!("two scenarios are called `{twice}`, so their recordings would have the same name"));
+            return Err(format!(
+                "two scenarios are called `{twice}`, so their recordings would have the same name: rename one of the files"
+            ));
         }
         std::fs::create_dir_all(folder).map_err(|error| format!("cannot create `{}`: {error}", folder.display()))?;
     }

@@ -12,7 +12,7 @@ use crate::scenario::judge::{Bound, Figure, FigureRow, Verdict};
 use crate::scenario::{Scenario, Trial};
 
 const HEADER: [&str; 10] =
-    ["scenario", "check", "figure", "unit", "median of runs", "bound", "paper", "worst", "95 % of the median", ""];
+    ["scenario", "check", "figure", "unit", "median of runs", "bound", "paper", "worst", "95 % interval of median", ""];
 
 /// Writes the table, a description of each scenario, and the number of checks that passed.
 pub(crate) fn text(all: &[Verified], has_colour: bool) -> String {
@@ -89,7 +89,7 @@ fn cells(name: Option<String>, row: &FigureRow, has_colour: bool) -> [String; 10
     };
     let missing = match row.missing() {
         0 => String::new(),
-        count => format!(" ({count} of {})", row.values.len()),
+        count => format!(" (in {count} of {} runs)", row.values.len()),
     };
     let interval = row.interval().map_or_else(String::new, |(low, high)| {
         let end = |value: f64| figure(Some(value).filter(|value| value.is_finite()));

@@ -1,8 +1,8 @@
 //! The last stage before a device: follows the graph's command or ramps to zero. It never holds the last velocity.
 //!
-//! A command follows the graph exactly. While the graph's command is absent or too old, or commands are halted, it ramps
-//! to zero on a straight line, as fast as the joint accelerations allow. When the graph's command returns, it approaches
-//! that command with the same accelerations before it follows again.
+//! A command follows the graph exactly. While the graph's command is absent or too old, or commands are halted, it
+//! ramps to zero on a straight line, as fast as the joint accelerations allow. When the graph's command returns, it
+//! approaches that command with the same accelerations before it follows again.
 
 use crate::device::Commands;
 use crate::graph::PlannedCommand;

@@ -149,8 +149,8 @@ impl Inlet {
         self.counters.not_finite += 1;
     }
 
-    /// Whether the newest sample is too old at `now` [ns]. Always `false` before the first sample, while the port is lost,
-    /// and under the policy `count`.
+    /// Whether the newest sample is too old at `now` [ns]. Always `false` before the first sample, while the port is
+    /// lost, and under the policy `count`.
     pub(crate) fn is_stale(&self, now: i64) -> bool {
         !self.is_lost && self.stale != Policy::Count && self.age(now).is_some_and(|age| age > self.max_age)
     }

@@ -114,8 +114,8 @@ impl NodeRunner {
         self.node.want(used);
     }
 
-    /// Switches to another configuration of the node and keeps its state. The node steps in the next tick even without a
-    /// new sample: with a slow sensor, the motion of the previous mode would go on otherwise.
+    /// Switches to another configuration of the node and keeps its state. The node steps in the next tick even without
+    /// a new sample: with a slow sensor, the motion of the previous mode would go on otherwise.
     pub(crate) fn switch(&mut self, configuration: usize) {
         self.is_switched |= self.node.switch(configuration);
     }
@@ -157,8 +157,8 @@ impl NodeRunner {
 
     /// Makes the node ready again; returns `false` if it still waits for its reset after a panic.
     ///
-    /// Resets a node whose input was absent for at least `reset_after`. This is checked here too because a slow graph may
-    /// not have ticked during the absence.
+    /// Resets a node whose input was absent for at least `reset_after`. This is checked here too because a slow graph
+    /// may not have ticked during the absence.
     #[cold]
     fn recover(&mut self, tick: &Tick) -> bool {
         match self.state {

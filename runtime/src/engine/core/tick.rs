@@ -85,7 +85,8 @@ impl Core {
         timing.ticks += 1;
     }
 
-    /// Returns the inlet whose sample is too old, with its policy; the one with the strictest policy if there are several.
+    /// Returns the inlet whose sample is too old, with its policy; the one with the strictest policy if there are
+    /// several.
     pub(crate) fn stale(&self) -> Option<(Policy, usize)> {
         let stale = self.inlets.iter().enumerate().filter(|(_, inlet)| inlet.is_stale(self.tick.now));
         stale.map(|(i, inlet)| (inlet.stale, i)).max_by_key(|(policy, _)| *policy)
@@ -101,7 +102,8 @@ impl Core {
         }
     }
 
-    /// Ramps every command toward zero for `dt` [s]. Returns whether all are zero. Reports are absent, since no node steps.
+    /// Ramps every command toward zero for `dt` [s]. Returns whether all are zero. Reports are absent, since no node
+    /// steps.
     pub(crate) fn ramp(&mut self, devices: &mut [DeviceSlot], dt: f64) -> bool {
         devices.iter_mut().for_each(|device| device.commands.clear_reports());
         let commands = self.commands.iter_mut();

@@ -129,8 +129,8 @@ impl Engine {
         is_silence && matches!(trouble, Trouble::Device(_) | Trouble::Lost(_))
     }
 
-    /// Sends an operator word. `stop` halts the commands and `resume` ends the halt, in upper or lower case; other words
-    /// go to the modes.
+    /// Sends an operator word. `stop` halts the commands and `resume` ends the halt, in upper or lower case; other
+    /// words go to the modes.
     ///
     /// # Errors
     /// Returns a message if no mode has a condition on the word, or if the commands wait for `resume`.
@@ -147,7 +147,7 @@ impl Engine {
                 suggestion(word, known.into_iter(), "words")
             ));
         } else if self.halts.is_stopped() {
-            return Err(format!("`{word}` has no effect while the commands wait for `resume`"));
+            return Err(format!("`{word}` has no effect while the commands are stopped: send `resume` first"));
         } else {
             self.sent = Some(word.to_owned());
         }
@@ -212,8 +212,8 @@ impl Engine {
         }
     }
 
-    /// Sends every device its commands and receives its samples. A device that fails does not keep the others from their
-    /// commands. Returns whether a live clock device has sampled.
+    /// Sends every device its commands and receives its samples. A device that fails does not keep the others from
+    /// their commands. Returns whether a live clock device has sampled.
     fn exchange_with_devices(&mut self, now: i64) -> bool {
         let mut has_sampled = false;
         for i in 0..self.devices.len() {
@@ -259,8 +259,8 @@ impl Engine {
         (device.link, device.failed) = (DeviceLink::Gone, Some(why));
     }
 
-    /// Handles a value that is not finite. Under every policy but `fault`, the outputs of the node and of all nodes after
-    /// it become absent, and those nodes are reset.
+    /// Handles a value that is not finite. Under every policy but `fault`, the outputs of the node and of all nodes
+    /// after it become absent, and those nodes are reset.
     #[cold]
     fn on_not_finite(&mut self) -> Result<(), Fault> {
         // Ports are in the order in which nodes write them, so the first that is not finite is the cause of the others.
@@ -277,8 +277,8 @@ impl Engine {
         Ok(())
     }
 
-    /// Handles the panic of a node. Under every policy but `fault`, the node waits for its reset, and its outputs and those
-    /// of all nodes after it become absent.
+    /// Handles the panic of a node. Under every policy but `fault`, the node waits for its reset, and its outputs and
+    /// those of all nodes after it become absent.
     #[cold]
     fn on_panic(&mut self, message: String) -> Result<(), Fault> {
         self.panic = message;
@@ -288,8 +288,8 @@ impl Engine {
         Ok(())
     }
 
-    /// Makes the outputs of a runner and of all that step after it absent. Allocates their buffers again, because a node
-    /// that panics may lose its buffers.
+    /// Makes the outputs of a runner and of all that step after it absent. Allocates their buffers again, because a
+    /// node that panics may lose its buffers.
     fn invalidate_from(&mut self, runner: usize) {
         // A node may have no outputs; then the ports of the next node that has some come first.
         let first = |name: &String| self.ports.iter().position(|(port, _)| owner(&port.name) == name);

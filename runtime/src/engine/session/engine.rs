@@ -204,7 +204,8 @@ impl Engine {
         &self.display
     }
 
-    /// Returns the name `node.limit` of each limit, and the port on which it reports the scale of the motion, from 0 to 1.
+    /// Returns the name `node.limit` of each limit, and the port on which it reports the scale of the motion, from 0 to
+    /// 1.
     pub fn limits(&self) -> impl Iterator<Item = (&str, PortId)> {
         self.limits.iter().map(|(name, id)| (name.as_str(), *id))
     }

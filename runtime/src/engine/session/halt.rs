@@ -73,8 +73,8 @@ impl HaltMachine {
         self.state = if policy == Policy::Stop { HaltState::Stopped } else { HaltState::Held };
     }
 
-    /// Ends the halt if it can end after the tick at `now` [ns]. Returns whether the operator has resumed from a stop, so
-    /// that the modes must restart.
+    /// Ends the halt if it can end after the tick at `now` [ns]. Returns whether the operator has resumed from a stop,
+    /// so that the modes must restart.
     pub(crate) fn update(&mut self, has_trouble: bool, now: i64) -> bool {
         let resumes = std::mem::take(&mut self.resumes);
         let previous = self.state;

@@ -12,8 +12,8 @@ pub struct RunOptions {
     pub duration: Option<f64>,
     /// Whether the wall clock paces virtual time. A run with live devices is always paced.
     pub is_realtime: bool,
-    /// Operator words, each with its time in the graph [s]. `stop` halts all commands, `resume` ends the halt, other words
-    /// go to the modes.
+    /// Operator words, each with its time in the graph [s]. `stop` halts all commands, `resume` ends the halt, other
+    /// words go to the modes.
     pub sends: Vec<(f64, String)>,
     /// Whether to read operator words from the standard input, one per line.
     pub listens: bool,
@@ -38,7 +38,7 @@ impl fmt::Display for End {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Finished => f.write_str("a device has no more samples"),
-            Self::Duration => f.write_str("the time is over"),
+            Self::Duration => f.write_str("the time limit is reached"),
             Self::Done => f.write_str("the task is done"),
             Self::Interrupted => f.write_str("the operator interrupted the run"),
             Self::Fault(fault) => fault.fmt(f),

@@ -109,15 +109,17 @@ impl RealTimePacer<'_> {
     fn log_clock(&mut self, engine: &Engine) {
         let seconds = engine.now() as f64 * 1e-9;
         match (self.is_on_timer, engine.schedule.is_on_timer()) {
-            (false, true) => tracing::warn!("at {seconds:.3} s: the clock device is silent; a timer replaces it"),
+            (false, true) => {
+                tracing::warn!("at {seconds:.3} s: the clock device sends no samples; a timer starts the ticks instead")
+            }
             (true, false) => tracing::info!("at {seconds:.3} s: the clock device is back"),
             _ => {}
         }
         self.is_on_timer = engine.schedule.is_on_timer();
     }
 
-    /// Waits for the next sample of a live clock device, or until `next` [ns]. Returns the time of the tick and its delay
-    /// after `next` [ns].
+    /// Waits for the next sample of a live clock device, or until `next` [ns]. Returns the time of the tick and its
+    /// delay after `next` [ns].
     fn wait(&self, engine: &Engine, next: i64) -> (i64, i64) {
         let due = self.epoch + Duration::from_nanos(next.max(0) as u64);
         let sampled = engine.clock().and_then(|device| match &device.link {

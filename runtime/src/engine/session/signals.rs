@@ -7,7 +7,8 @@ use tokio::runtime::{Builder, Runtime};
 use tokio::signal::unix::{SignalKind, signal};
 use tokio::sync::watch;
 
-/// Catches Ctrl-C and SIGTERM for callers that do not use [`run`](super::run). A second signal ends the process at once.
+/// Catches Ctrl-C and SIGTERM for callers that do not use [`run`](super::run). A second signal ends the process at
+/// once.
 pub struct Interrupt {
     /// Keeps the listening task alive.
     _runtime: Runtime,

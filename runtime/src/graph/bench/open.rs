@@ -104,7 +104,7 @@ impl Opener<'_> {
             let is_right = observed().any(|known| known.is_observed_as(&role.name));
             let names = observed().map(|role| role.observed_name());
             if let Some(name) = suggest_name(&role.name, names).filter(|_| !is_right) {
-                let message = format!("`{}` is not a role that scenarios read", role.name);
+                let message = format!("`{}` is neither a role of the task nor a role for scenarios", role.name);
                 let diagnostic = Diagnostic::new(Code::ObservedRole, role.span.clone(), message);
                 self.diagnostics.push(diagnostic.help(format!("did you mean `{name}`?")));
             }
@@ -114,8 +114,8 @@ impl Opener<'_> {
         }
     }
 
-    /// Checks the types of all devices, and the parameters of those that are not opened because none of the `roles` uses
-    /// them.
+    /// Checks the types of all devices, and the parameters of those that are not opened because none of the `roles`
+    /// uses them.
     fn check_devices(&mut self, bench: &BenchDocument, roles: &BTreeSet<&str>) {
         for device in &bench.devices {
             let Some(kind) = &device.kind else { continue };

@@ -117,12 +117,16 @@ impl ExitContext<'_> {
             if self.net.port(source).kind == Kind::Pose {
                 return Ok(source);
             }
-            let message = format!("`{}` is not a pose, and only a pose has a travel", of.value);
+            let message = format!("`after_travel_mm` measures a pose, but `{}` is not a pose", of.value);
             return bad_condition(&of.span, message).into_err();
         }
         match self.poses.as_slice() {
             [one] => Ok(*one),
-            [] => bad_condition(span, "`after_travel_mm` needs a pose, and the graph has none").into_err(),
+            [] => bad_condition(
+                span,
+                "`after_travel_mm` needs a pose, but no port of the graph is a pose: use `after_ms` instead",
+            )
+            .into_err(),
             several => {
                 let names = quoted(several.iter().map(|source| self.net.port_name(*source)));
                 let help = format!("add `of = \"node.port\"`; poses here: {names}");
@@ -170,7 +174,7 @@ impl ExitContext<'_> {
             Some(state) => state,
             None if is_number => return self.number_condition(when, &name, watched, table),
             None if is_bounded.contains(&true) => {
-                let help = "a bound needs a scalar, or one feature of a vector";
+                let help = "a bound needs a scalar, or one feature of a vector, as in `node.port.feature`";
                 return bad(" and cannot be compared with a bound").help(help).into_err();
             }
             None if kind == Kind::Flag => PortState::True,
@@ -241,7 +245,7 @@ fn misplaced_key(ModeExit { kind, span, table: exit }: &ModeExit) -> Option<Diag
         (exit.is.is_some() && !is_on_port, "`is` needs a port: add `when = \"node.port\"`"),
         (has_bound && !is_on_port, "a bound needs a port: add `when = \"node.port\"`"),
         (exit.hysteresis.is_some() && !has_bound, "`hysteresis` needs `above`, `below` or `within`"),
-        (exit.for_ms.is_some() && !is_on_port, "`for_ms` needs `when`"),
+        (exit.for_ms.is_some() && !is_on_port, "`for_ms` needs a port: add `when = \"node.port\"`"),
         (
             exit.for_ms.is_some_and(|ms| ms > 0.0) && exit.is == Some(PortState::New),
             "`new` holds for one tick only: remove `for_ms`",
@@ -261,7 +265,11 @@ fn misplaced_key(ModeExit { kind, span, table: exit }: &ModeExit) -> Option<Diag
 
 fn sent_condition(word: &Spanned<String>) -> Resolved<(Condition, String)> {
     if word.value.trim() != word.value || word.value.is_empty() {
-        return bad_condition(&word.span, "the word of `on` is empty, or starts or ends with a space").into_err();
+        return bad_condition(
+            &word.span,
+            "the word of `on` is empty, or starts or ends with a space: write for example `on = \"next\"`",
+        )
+        .into_err();
     }
     if ["stop", "resume"].contains(&word.value.as_str()) {
         let help = "`stop` halts the run and `resume` continues it: choose another word";

@@ -40,6 +40,9 @@ fn short_gap(flat: &FlatGraph, period: f64) -> Option<Diagnostic> {
     let span = flat.settings.as_ref()?.as_table()?.get("max_gap_ms")?.span.clone();
     // The period of a device is rounded to nanoseconds, so it may be slightly longer than the same number here.
     let is_short = gap * 1e-3 < period * (1.0 - 1e-6);
-    let message = format!("`max_gap_ms` of {gap} is shorter than the period, {:.3} ms", period * 1e3);
-    is_short.then(|| Diagnostic::new(Code::BadValue, span, message).help("give at least one period"))
+    let message = format!("`max_gap_ms` is {gap} ms, but the period of the graph is {:.3} ms", period * 1e3);
+    is_short.then(|| {
+        Diagnostic::new(Code::BadValue, span, message)
+            .help("write at least one period, or remove `max_gap_ms` (the default is five periods)")
+    })
 }

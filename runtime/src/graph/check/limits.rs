@@ -91,7 +91,7 @@ impl<'a> CommandPath<'a> {
         for limit in missing {
             if let Some((_, by)) = lost.iter().find(|(lost, _)| lost == limit) {
                 helps.push(format!(
-                    "`{by}` may break the limit `{limit}`: move it before the node that holds this limit"
+                    "`{by}` may break the limit `{limit}`: move `{by}` before the node that enforces `{limit}`"
                 ));
                 continue;
             }
@@ -132,7 +132,7 @@ impl<'a> CommandPath<'a> {
         let role = net.name(Producer::Role(wire.role));
         let taken = &net.command_port(wire).name;
         let mut text = format!(
-            "route the motion through a part that holds all of them:\n[parts.{name}]\nfile = \"builtin:{file}\""
+            "route the motion through a part that enforces all of them:\n[parts.{name}]\nfile = \"builtin:{file}\""
         );
         for (input, what) in part.get("inputs").and_then(toml::Value::as_table).into_iter().flatten() {
             text.push_str(&format!("\nin.{input} = \"…\"   # {}", what.as_str().unwrap_or_default()));
@@ -185,11 +185,11 @@ impl<'a> CommandPath<'a> {
         let (other, its) = limiters.find_map(|stop| Some((stop, frame(stop).filter(|frame| *frame != first.1)?)))?;
         let (node, before) = (&net.flat.nodes[other.node], &net.flat.nodes[first.0.node].name);
         let message = format!(
-            "`{}` limits a twist in `{its}`, but the limiter `{before}` before it works in `{}`",
+            "`{}` limits a twist in `{its}`, but `{before}`, the limiter before it, limits a twist in `{}`",
             node.name, first.1
         );
         let diagnostic = Diagnostic::new(Code::FrameMismatch, node.block.key.span.clone(), message);
-        Some(diagnostic.help("limits apply to the motion of the sensor: move it before the change of frame"))
+        Some(diagnostic.help("limits apply to the motion of the sensor: move this limiter before the change of frame"))
     }
 }
 

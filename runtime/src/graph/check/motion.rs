@@ -1,7 +1,7 @@
 //! Checks that generated motion ends.
 //!
-//! A generator without a gate moves the arm forever without a sample. It may run only in a mode that watches a signal, or
-//! that bounds the time or the travel.
+//! A generator without a gate moves the arm forever without a sample. It may run only in a mode that watches a signal,
+//! or that bounds the time or the travel.
 
 use std::collections::BTreeSet;
 
@@ -60,8 +60,8 @@ fn find_generators(net: &Net<'_>, driving: &BTreeSet<usize>, is_still: &[bool]) 
 
 /// Returns for each mode whether it ends its generated motion.
 ///
-/// A mode ends its motion if it generates none, or with a bound on time or travel that ends the run or leads to a mode that
-/// ends its motion, or with `on_lost` on a sensor signal.
+/// A mode ends its motion if it generates none, or with a bound on time or travel that ends the run or leads to a mode
+/// that ends its motion, or with `on_lost` on a sensor signal.
 fn find_ended(modes: &[PlannedMode], generators: &[Vec<usize>], net: &Net<'_>) -> Vec<bool> {
     let mut ended: Vec<bool> = generators.iter().map(Vec::is_empty).collect();
     // Fixed point: modes that only lead to each other in a cycle stay false.
@@ -101,7 +101,7 @@ fn report_in_graph(net: &Net<'_>, generators: &[usize], diagnostics: &mut Diagno
         let name = &net.flat.nodes[*node].name;
         let message = format!("`{name}` moves the arm without a gate, and nothing ends the motion");
         let gate = find_gate(net, *node).map(|gate| format!("wire `{gate}` of `{name}`, or ")).unwrap_or_default();
-        let help = format!("{gate}run it only in a mode with a bound");
+        let help = format!("{gate}run it only in a mode that ends the motion, as with `fail = {{ after_ms = 10000 }}`");
         diagnostics.push(Diagnostic::new(Code::UngatedMotion, key.span.clone(), message).help(help));
     }
 }
@@ -115,7 +115,8 @@ fn report_in_mode(net: &Net<'_>, generators: &[usize], block: &ModeBlock) -> Dia
         "add a bound such as `fail = { after_ms = 10000, after_travel_mm = 60 }`, or `on_lost` with a sensor signal";
     let gate = generators.iter().find_map(|node| find_gate(net, *node));
     let gate = gate.map(|gate| format!(", or wire `{gate}` of {names}")).unwrap_or_default();
-    let targets = "a bounded `go` counts only if its target mode ends or does not move";
+    let targets =
+        "a `go` with such a bound counts only if its target mode also ends the motion or does not move the arm";
     let diagnostic = Diagnostic::new(Code::UngatedMotion, block.key.span.clone(), message);
     diagnostic.help(format!("{bound}{gate}; {targets}"))
 }

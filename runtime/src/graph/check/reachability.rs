@@ -16,7 +16,7 @@ pub(crate) fn check(net: &Net<'_>, diagnostics: &mut Diagnostics) -> Option<usiz
     for (_, mode) in modes.iter().enumerate().filter(|(i, _)| !reached.contains(i)) {
         let name = &mode.key.name;
         let message = format!("mode `{name}` is never entered");
-        let help = format!("add `go = {{ to = \"{name}\", … }}` to a mode, or remove it");
+        let help = format!("add `go = {{ to = \"{name}\", … }}` to another mode, or remove this mode");
         diagnostics.push(Diagnostic::new(Code::UnreachableMode, mode.key.span.clone(), message).help(help));
     }
     Some(start)

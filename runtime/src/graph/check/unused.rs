@@ -1,7 +1,7 @@
 //! Warns about nodes whose outputs are not used, for example after a wire was deleted by mistake.
 //!
-//! A node is used if it is upstream of a command, a report, a node without outputs, a node that logs, a port in `show`, or
-//! an export of a part.
+//! A node is used if it is upstream of a command, a report, a node without outputs, a node that logs, a port in `show`,
+//! or an export of a part.
 
 use crate::graph::net::Net;
 use crate::graph::plan::{PortRef, Producer};

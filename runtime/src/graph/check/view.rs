@@ -62,7 +62,7 @@ impl RequestedView {
         for (source, span) in &self.mark {
             let Some(port) = ports.get(source) else { continue };
             if let Some(unit) = port.shape.unit().filter(|unit| *unit != Unit::METRE) {
-                let message = format!("`{}` is in {unit}, but `mark` takes m", port.name);
+                let message = format!("`{}` is in {unit}, but `mark` expects a position in m", port.name);
                 diagnostics.push(Diagnostic::new(Code::UnitMismatch, span.clone(), message));
             }
         }

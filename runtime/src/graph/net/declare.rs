@@ -39,7 +39,7 @@ fn find_role<'a>(
     };
     if role.is_observed {
         let message = format!("`{}` is only for scenarios and recordings: a task cannot declare it", kind.value);
-        let help = format!("remove it, and bind it in the bench: `{} = \"device\"`", role.observed_name());
+        let help = format!("remove it, and add `{} = \"device\"` under [bind] in the bench", role.observed_name());
         diagnostics.push(Diagnostic::new(Code::ObservedRole, kind.span.clone(), message).help(help));
         return None;
     }

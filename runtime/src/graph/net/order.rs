@@ -83,7 +83,7 @@ fn report_cycle(net: &Net<'_>, cycle: &[Edge]) -> Diagnostic {
     let mut diagnostic = Diagnostic::new(Code::Loop, span, format!("the wires form a cycle: {path}"));
     diagnostic.notes = steps.iter().rev().skip(1).rev().cloned().collect();
     diagnostic.help(if cycle.iter().all(|edge| edge.is_delayed) {
-        "every node in this cycle has a delayed input: add a node without one"
+        "every input in this cycle is delayed: insert a node whose input is not delayed"
     } else {
         "route one of these wires through a node with a delayed input"
     })

@@ -107,7 +107,8 @@ pub(crate) struct ExitTable {
     /// How long the condition must hold, counted from new sample to new sample.
     #[param(unit = "ms", range = 0.0..)]
     pub(crate) for_ms: Option<f64>,
-    /// Time in the mode; for `on_lost`, how long the signal must be lost. The default of `on_lost` is five periods of the graph.
+    /// Time in the mode; for `on_lost`, how long the signal must be lost. The default of `on_lost` is five periods of
+    /// the graph.
     #[param(unit = "ms", above = 0.0)]
     pub(crate) after_ms: Option<f64>,
     /// Distance that the sensor travels in the mode.

@@ -20,7 +20,8 @@ pub(crate) struct GraphTable {
     pub(crate) start: Option<Spanned<String>>,
     /// Default bench.
     pub(crate) bench: Option<FilePath>,
-    /// Maximum time step between two samples; filters and integrals start afresh after a longer gap. The default is five periods.
+    /// Maximum time step between two samples; filters and integrals start afresh after a longer gap. The default is
+    /// five periods.
     #[param(unit = "ms", above = 0.0)]
     pub(crate) max_gap_ms: Option<f64>,
     /// How long an input must be absent before the state of its node is reset.
@@ -182,7 +183,8 @@ impl<'a> Sections<'a> {
         GraphDocument { nodes, parts, ..GraphDocument::default() }
     }
 
-    /// Returns whether a block of [nodes] addresses a node in a part, as `--set nodes.PART.NODE.…` does, and reports it.
+    /// Returns whether a block of [nodes] addresses a node in a part, as `--set nodes.PART.NODE.…` does, and reports
+    /// it.
     fn addresses_part(&mut self, key: &Key, table: &Table, parts: &[(Key, Table)]) -> bool {
         let is_part = parts.iter().any(|(part, _)| part.name == key.name);
         if !is_part || table.get("type").is_some() {

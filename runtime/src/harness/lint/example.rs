@@ -103,7 +103,7 @@ impl Lint<'_> {
         notes.unless(record.allocating == 0, None, allocates);
         if let Some(i) = record.differs {
             let place = outputs.get(i).map(|name| format!("output `{name}`"));
-            notes.add(place, "after a reset it differs from that of a fresh node with the same inputs");
+            notes.add(place, "after a reset its value differs from that of a new node with the same inputs");
         }
     }
 
