@@ -1,4 +1,4 @@
-//! What a graph may be made of: a plain list of node types, device types and roles.
+//! Catalogues: lists of the node types, device types and roles that graphs can use.
 
 mod checks;
 
@@ -8,15 +8,16 @@ use crate::device::{Device, DeviceType, RoleType, device_type};
 use crate::node::{Node, NodeSpec, NodeType, of};
 use crate::source::BuiltinFile;
 
-/// A list of node types, device types and roles. Several can be joined: somebody else's crate adds its own.
+/// A list of node types, device types and roles. Catalogues can be joined, so that a crate can add its own to the
+/// shipped one.
 #[derive(Default)]
 pub struct Catalogue {
-    /// What each name is of.
+    /// The sort of entry behind each name.
     names: BTreeMap<String, &'static str>,
     nodes: Vec<Box<dyn NodeType>>,
     /// The declaration of each node type.
     specs: Vec<NodeSpec>,
-    /// Titles of groups, and with which node each starts.
+    /// Titles of groups, each with the number of its first node.
     groups: Vec<(usize, &'static str)>,
     devices: Vec<Box<dyn DeviceType>>,
     roles: Vec<RoleType>,
@@ -24,129 +25,151 @@ pub struct Catalogue {
 }
 
 impl Catalogue {
-    /// An empty list.
+    /// Creates an empty catalogue.
     #[must_use]
     pub fn new() -> Self {
         Self::default()
     }
 
-    /// The nodes that follow belong together: what they are for, in a line, for lists and the reference.
+    /// Starts a group of nodes. Lists and the reference show its title above the nodes that follow.
     #[must_use]
     pub fn group(mut self, title: &'static str) -> Self {
         self.groups.push((self.nodes.len(), title));
         self
     }
 
-    /// With one more node.
+    /// Adds a node.
+    ///
+    /// # Panics
+    /// As [`node_type`](Self::node_type).
     #[must_use]
+    #[track_caller]
     pub fn node<N: Node>(self) -> Self {
         self.node_type(of::<N>())
     }
 
-    /// With one more node that is known only at run time.
+    /// Adds a node that is known only at run time.
     ///
     /// # Panics
-    /// If something has that name already, or if the declaration is wrong: a unit, a default that is not in its own
-    /// range, an example that is not of this type or names what the node does not have, or a node that logs without a
-    /// flag to say when.
+    /// If the name is taken, or if the declaration is wrong: an unknown unit, a default outside its own range, two ports
+    /// of one name, or an example that is of another type, sets an unknown parameter or leaves a required input unwired.
+    /// The message lists everything that is wrong.
     #[must_use]
+    #[track_caller]
     pub fn node_type(mut self, node: Box<dyn NodeType>) -> Self {
         let spec = node.spec();
         self.claim(&spec.name, "node");
-        checks::node(&spec);
+        refuse(&checks::node(&spec));
         self.nodes.push(node);
         self.specs.push(spec);
         self
     }
 
-    /// Takes a name, which describes one thing only.
+    /// Reserves a name.
+    #[track_caller]
     fn claim(&mut self, name: &str, what: &'static str) {
         if let Some(other) = self.names.insert(name.to_owned(), what) {
-            panic!("a {other} and a {what} are both called `{name}`");
+            panic!("the {what} `{name}` cannot be added: a {other} has that name already");
         }
     }
 
-    /// With one more device.
-    #[must_use]
-    pub fn device<D: Device>(self) -> Self {
-        self.device_type(device_type::<D>())
-    }
-
-    /// With one more device that is known only at run time.
+    /// Adds a device.
     ///
     /// # Panics
     /// As [`node_type`](Self::node_type).
     #[must_use]
+    #[track_caller]
+    pub fn device<D: Device>(self) -> Self {
+        self.device_type(device_type::<D>())
+    }
+
+    /// Adds a device that is known only at run time.
+    ///
+    /// # Panics
+    /// As [`node_type`](Self::node_type).
+    #[must_use]
+    #[track_caller]
     pub fn device_type(mut self, device: Box<dyn DeviceType>) -> Self {
         self.claim(&device.name(), "device");
-        checks::device(&device.name(), &device.params(), &device.example());
+        refuse(&checks::device(&device.name(), &device.params(), &device.example()));
         self.devices.push(device);
         self
     }
 
-    /// With one more role.
+    /// Adds a type of role.
     ///
     /// # Panics
-    /// If something has that name already.
+    /// If the name is taken.
     #[must_use]
+    #[track_caller]
     pub fn role(mut self, role: RoleType) -> Self {
         self.claim(&role.name, "role");
         self.roles.push(role);
         self
     }
 
-    /// With files that `builtin:NAME` stands for, wherever a file is named.
+    /// Adds files that graphs can name as `builtin:NAME`.
     #[must_use]
     pub fn files(mut self, files: &[BuiltinFile]) -> Self {
         self.files.extend(files);
         self
     }
 
-    /// With all that is in another list.
+    /// Adds all entries of another catalogue.
+    ///
+    /// # Panics
+    /// If a name is in both.
     #[must_use]
+    #[track_caller]
     pub fn join(mut self, other: Self) -> Self {
         let before = self.nodes.len();
-        // What belongs to no group there does not fall into the last one here.
+        // Nodes without a group there must not fall into the last group here.
         let start = (!self.groups.is_empty()).then_some((before, ""));
         self.groups.extend(start.filter(|_| other.groups.first().is_none_or(|(at, _)| *at > 0)));
         self.groups.extend(other.groups.iter().map(|(at, title)| (before + at, *title)));
-        self = other.nodes.into_iter().fold(self, Self::node_type);
-        self = other.devices.into_iter().fold(self, Self::device_type);
-        self = other.roles.into_iter().fold(self, Self::role);
+        for node in other.nodes {
+            self = self.node_type(node);
+        }
+        for device in other.devices {
+            self = self.device_type(device);
+        }
+        for role in other.roles {
+            self = self.role(role);
+        }
         self.files.extend(other.files);
         self
     }
 
-    /// The node types.
+    /// Returns the node types.
     #[must_use]
     pub fn nodes(&self) -> &[Box<dyn NodeType>] {
         &self.nodes
     }
 
-    /// The declarations of the node types, in their order.
+    /// Returns the declarations of the node types, in their order.
     pub fn specs(&self) -> impl Iterator<Item = &NodeSpec> + Clone {
         self.specs.iter()
     }
 
-    /// Finds a node type by its name: its number and its declaration.
+    /// Returns the number and the declaration of a node type, by its name.
     #[must_use]
     pub fn find_node(&self, name: &str) -> Option<(usize, &NodeSpec)> {
         self.specs.iter().enumerate().find(|(_, spec)| spec.name == name)
     }
 
-    /// Finds a device type by its name.
+    /// Returns a device type by its name.
     #[must_use]
     pub fn find_device(&self, name: &str) -> Option<&dyn DeviceType> {
         self.devices.iter().find(|device| device.name() == name).map(|device| &**device)
     }
 
-    /// Finds a role by its name.
+    /// Returns a type of role by its name.
     #[must_use]
     pub fn role_type(&self, name: &str) -> Option<&RoleType> {
         self.roles.iter().find(|role| role.name == name)
     }
 
-    /// The declarations of the node types in groups, each with its title; those of no group have an empty one.
+    /// Returns the declarations of the node types in groups. The title of nodes without a group is empty.
     pub fn groups(&self) -> impl Iterator<Item = (&'static str, &[NodeSpec])> {
         let first = self.groups.first().map_or(self.specs.len(), |(at, _)| *at);
         let ends = self.groups.iter().skip(1).map(|(at, _)| *at).chain([self.specs.len()]);
@@ -154,23 +177,29 @@ impl Catalogue {
         [("", &self.specs[..first])].into_iter().chain(titled).filter(|(_, specs)| !specs.is_empty())
     }
 
-    /// The device types.
+    /// Returns the device types.
     #[must_use]
     pub fn devices(&self) -> &[Box<dyn DeviceType>] {
         &self.devices
     }
 
-    /// The files that `builtin:NAME` stands for.
+    /// Returns the files that graphs can name as `builtin:NAME`.
     #[must_use]
     pub fn builtin_files(&self) -> &[BuiltinFile] {
         &self.files
     }
 
-    /// The roles.
+    /// Returns the types of roles.
     #[must_use]
     pub fn roles(&self) -> &[RoleType] {
         &self.roles
     }
+}
+
+/// Panics if anything is wrong with a declaration.
+#[track_caller]
+fn refuse(wrong: &[String]) {
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
 }
 
 #[cfg(test)]
@@ -245,13 +274,13 @@ mod tests {
         let cases: [(Change, &str); 10] = [
             (
                 |spec| spec.outputs[0].args = vec!["newton".into()].into(),
-                "`wrong.x` declares the unit Some(\"newton\")",
+                "`wrong.x` declares `newton`, which is not a unit",
             ),
             (|spec| spec.inputs.push(spec.inputs[0].clone()), "two inputs of `wrong` are called `x`"),
-            (|spec| spec.logs = true, "the first output of `wrong` is no flag that says when to log"),
+            (|spec| spec.logs = true, "`wrong` logs, so its first output must be a flag"),
             (
                 |spec| spec.outputs[0].args = vec!["U".into(), "$frame".into()].into(),
-                "`wrong.x` names the parameter `frame`, which `wrong` does not have",
+                "`wrong.x` uses `$frame`, but there is no parameter `frame`",
             ),
             (
                 |spec| {
@@ -273,11 +302,11 @@ mod tests {
             ),
             (
                 |spec| spec.example = "[nodes.a]\ntype = \"wrong\"\nin.x = \"b.c\"\ngian = 1".into(),
-                "the example of `wrong` sets `gian`, which is no parameter of it",
+                "the example of `wrong` sets `gian`, which is not a parameter of it",
             ),
             (
                 |spec| spec.example = "[nodes.a]\ntype = \"wrong\"\nin.y = \"b.c\"".into(),
-                "the example of `wrong` wires `in.y`, which it does not have",
+                "the example of `wrong` wires `in.y`, which is not an input of it\nthe example of `wrong` does not wire `in.x`",
             ),
             (|spec| spec.example = "[nodes.a]\ntype = \"wrong\"".into(), "the example of `wrong` does not wire `in.x`"),
         ];
@@ -285,13 +314,16 @@ mod tests {
             assert_eq!(panic_message(move || Catalogue::new().node_type(Box::new(Wrong(change)))), expected);
         }
         let text = panic_message(|| Catalogue::new().node_type(Box::new(Wrong(|spec| spec.example = "[nodes".into()))));
-        assert!(text.starts_with("the example of `wrong` is no TOML: "), "{text}");
+        assert!(text.starts_with("the example of `wrong` is not valid TOML: "), "{text}");
     }
 
     #[test]
     fn a_name_describes_one_thing_only() {
         let twice = |make: fn() -> Catalogue| panic_message(make);
-        assert_eq!(twice(|| named(named(Catalogue::new(), "a"), "a")), "a node and a node are both called `a`");
+        assert_eq!(
+            twice(|| named(named(Catalogue::new(), "a"), "a")),
+            "the node `a` cannot be added: a node has that name already"
+        );
         let role = || RoleType {
             name: "a".into(),
             summary: "".into(),
@@ -303,10 +335,10 @@ mod tests {
         };
         assert_eq!(
             panic_message(|| named(Catalogue::new().role(role()), "a")),
-            "a role and a node are both called `a`"
+            "the node `a` cannot be added: a role has that name already"
         );
         let join = || Catalogue::new().role(role()).join(Catalogue::new().role(role()));
-        assert_eq!(panic_message(join), "a role and a role are both called `a`");
+        assert_eq!(panic_message(join), "the role `a` cannot be added: a role has that name already");
     }
 
     #[test]

@@ -144,7 +144,10 @@ fn what_cannot_be_used_is_refused_with_exit_code_2() {
         (&["forceless.csv"], "error: `forceless.csv` cannot be used: it has no reference force"),
         (&["loaded.csv"], "error: `loaded.csv` cannot be used: only 0 of its frames are unloaded"),
         (&["torn.csv"], "torn.csv:5:"),
-        (&["press.csv", "wide.csv"], "error: `wide.csv` has 1 x 4 tactels in raw, but `press.csv` has 2 x 2"),
+        (
+            &["press.csv", "wide.csv"],
+            "error: all logs must be of one pad, but `wide.csv` has 1 x 4 tactels in raw and `press.csv` has 2 x 2",
+        ),
         (
             &["press.csv", "-o", "notes.txt"],
             "error: `notes.txt` exists and is not a calibration file, so it is not replaced: write to another file",
@@ -156,7 +159,7 @@ fn what_cannot_be_used_is_refused_with_exit_code_2() {
             "error: no tactel can be calibrated: 1 tactels do not respond",
         ),
         (&["late.csv", "-o", "new.toml"], "% of the range, so no file is written"),
-        (&["bladder.csv", "-o", "new.toml"], "most tactels respond alike to most presses"),
+        (&["bladder.csv", "-o", "new.toml"], "most tactels respond equally to most presses"),
         (&["press.csv", "--bearing", "4"], "error: `--bearing` needs `--load uniform`"),
         (&["press.csv", "--curve", "cubic"], "invalid value 'cubic'"),
         (&["press.csv", "--dead-below", "0"], "`0` is not a number greater than 0"),

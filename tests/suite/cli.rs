@@ -101,7 +101,10 @@ fn a_file_that_does_not_load_or_cannot_be_made_ends_with_2() {
             &["run", HYBRID, MOCK, "--out", "nowhere/rows.csv"],
             format!("error: cannot create `nowhere/rows.csv`: {missing}\n"),
         ),
-        (&["run", HYBRID, MOCK, "--svg", "run.png"], "error: `run.png` is not .svg\n".into()),
+        (
+            &["run", HYBRID, MOCK, "--svg", "run.png"],
+            "error: `run.png` does not end in .svg: write for example `--svg run.svg`\n".into(),
+        ),
         (
             &["run", HYBRID, MOCK, "--svg", "nowhere/run.svg"],
             format!("error: cannot create `nowhere/run.svg`: {missing}\n"),
@@ -133,7 +136,10 @@ fn for_ends_a_run_in_the_graphs_time() {
         let run = say(&["run", HYBRID, MOCK, "--for", time]);
         let ending = run.out.lines().last().unwrap();
         assert_eq!(run.code, 0);
-        assert!(ending.starts_with("the time is over") && ending.contains(&format!(" {ticks} ticks;")), "{ending}");
+        assert!(
+            ending.starts_with("the time limit ended the run") && ending.contains(&format!(" {ticks} ticks;")),
+            "{ending}"
+        );
     }
 }
 
@@ -387,7 +393,7 @@ fn a_file_that_no_run_has_recorded_is_not_overwritten() {
     fs::write(&path, "DATA_TYPE MOVIE\n").unwrap();
     let said = say(&["run", HYBRID, MOCK, "--out", &path]);
     assert_eq!(
-        (said.code, said.err.contains("is not a recording of a run: it is not overwritten")),
+        (said.code, said.err.contains("is not a recording of a run, so it is not overwritten")),
         (2, true),
         "{}",
         said.err

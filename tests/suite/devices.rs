@@ -6,7 +6,7 @@ use tactflow_runtime::catalogue::Catalogue;
 use tactflow_runtime::device::{
     Commands, Description, DeviceError, DeviceType, Driver, Opened, Output, RoleType, Samples, Stepped,
 };
-use tactflow_runtime::engine::Engine;
+use tactflow_runtime::engine::{self, End, Engine, RunOptions};
 use tactflow_runtime::fault::Cause;
 use tactflow_runtime::graph::{Request, compile};
 use tactflow_runtime::harness::{FedRole, GraphRig};
@@ -61,7 +61,7 @@ fn metres() -> ScalarShape {
 }
 
 /// What a device states of the roles `length` and `velocity_arm`, and what the loader says of it.
-const MISFITS: [(Describe, &str); 9] = [
+const MISFITS: [(Describe, &str); 10] = [
     (|d| _ = d.fills("length"), "the role `length`: output `value` is missing"),
     (
         |d| {
@@ -96,6 +96,14 @@ const MISFITS: [(Describe, &str); 9] = [
             fill.output::<Scalar>("value", metres());
         },
         "the role `length`: output `value` is stated twice",
+    ),
+    (
+        |d| {
+            length(d);
+            let shape = ImageShape { rows: 0, cols: 4, pitch: [0.005; 2], unit: Unit::NEWTON };
+            d.fills("tactile_pad").output::<Image>("image", shape);
+        },
+        "the role `tactile_pad`: output `image` is an image of 0 by 4, which has no tactels",
     ),
     (
         |d| {
@@ -153,6 +161,13 @@ fn a_device_that_states_other_ports_than_its_role_does_not_load() {
         assert!(report.contains("the mistake is in the device type `stated`, not in this file"), "{report}");
         assert_eq!(report.matches("error[").count(), 1, "{report}");
     }
+    let unknown = load(Stated(|d| {
+        length(d);
+        d.fills("tactil_pad");
+    }));
+    let message =
+        "device `ruler` states the role type `tactil_pad`, which does not exist (did you mean `tactile_pad`?)";
+    assert!(unknown.as_ref().is_err_and(|report| report.contains(message)), "{unknown:?}");
     load(Stated(length)).unwrap();
     load(Stated(|description| {
         whole_arm(description);
@@ -363,10 +378,12 @@ fn a_graph_of_a_file_runs_with_one_role_fed_and_the_others_on_its_bench() {
     assert!(rig.get::<Joints>("arm.position").is_some(), "the arm of the bench");
 }
 
-/// A device that counts.
+/// A device that counts, until its time stops.
 struct Counting {
     value: Output<Scalar>,
     next: i64,
+    /// Time after which `next` stays the same [ns].
+    stuck_after: i64,
 }
 
 impl Stepped for Counting {
@@ -376,6 +393,9 @@ impl Stepped for Counting {
 
     fn exchange(&mut self, now: i64, _: &Commands, samples: &mut Samples) -> Result<(), DeviceError> {
         *samples.write(self.value, now, now as u64) = 1.0;
+        if now > self.stuck_after {
+            return Ok(());
+        }
         samples.count("frames");
         if now == 0 {
             samples.count("bad frames");
@@ -385,7 +405,9 @@ impl Stepped for Counting {
     }
 }
 
-struct CountingType;
+struct CountingType {
+    stuck_after: i64,
+}
 
 impl DeviceType for CountingType {
     fn name(&self) -> Cow<'static, str> {
@@ -403,14 +425,29 @@ impl DeviceType for CountingType {
     fn open(&self, _: &Value, _: &mut Reader<'_>) -> Option<Opened> {
         let mut description = Description::every(0.01);
         let value = description.fills("length").output("value", metres());
-        Some(Opened { description, driver: Driver::Stepped(Box::new(Counting { value, next: 0 })) })
+        Some(Opened {
+            description,
+            driver: Driver::Stepped(Box::new(Counting { value, next: 0, stuck_after: self.stuck_after })),
+        })
     }
+}
+
+#[test]
+fn a_device_whose_time_does_not_advance_has_failed() {
+    let graph = "graph.clock = 'a'\nroles.a = 'length'\nbind.a = 'counting'\n[devices.counting]\ntype = 'counting'\n\
+                 [nodes.count]\ntype = 'count'\nin.value = 'a.value'\n";
+    let catalogue = catalogue().device_type(Box::new(CountingType { stuck_after: 50_000_000 }));
+    let mut engine = Engine::new(compile(&catalogue, &Request::text(graph)).unwrap());
+    let outcome = engine::run(&mut engine, &RunOptions::default(), &mut |_| {}).unwrap();
+    let End::Fault(fault) = outcome.end else { panic!("{:?}", outcome.end) };
+    let why = "`next` returns a time that is not after the last exchange";
+    assert_eq!((fault.node.as_str(), fault.cause), ("counting", Cause::Device(why.into())));
 }
 
 #[test]
 fn what_a_device_counts_is_in_the_summary_of_the_run() {
     let graph = "graph.clock = 'a'\nroles.a = 'length'\nbind.a = 'ruler'\n[devices.ruler]\ntype = 'counting'\n";
-    let catalogue = || catalogue().device_type(Box::new(CountingType));
+    let catalogue = || catalogue().device_type(Box::new(CountingType { stuck_after: i64::MAX }));
     let plan = compile(&catalogue(), &Request::text(graph)).unwrap_or_else(|report| panic!("{}", report.render(false)));
     let mut engine = Engine::new(plan);
     for _ in 0..3 {

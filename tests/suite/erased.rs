@@ -103,7 +103,7 @@ fn its_mistakes_show_on_their_token_like_any_other() {
 }
 
 #[test]
-#[should_panic(expected = "the first output of `poly_8` is no flag that says when to log")]
+#[should_panic(expected = "`poly_8` logs, so its first output must be a flag")]
 fn a_node_that_logs_says_when() {
     let node = Polynomial { name: "poly_8".into(), coefficients: vec![], logs: true };
     drop(catalogue().node_type(Box::new(node)));

@@ -286,6 +286,8 @@ fn all_violations_are_told_at_once_and_only_of_what_is_asked_for() {
     ] {
         assert!(said.iter().any(|line| line == expected), "{expected}\n{said:#?}");
     }
+    let unknown = lint(&catalogue).only(&["Othre"]).violations();
+    assert_eq!(unknown[0].to_string(), "`Othre`: the catalogue has no `Othre`: did you mean `Other`?");
     let only = lint(&catalogue).only(&["Other"]).violations();
     assert!(only.len() == 2 && only.iter().all(|violation| violation.owner == "Other"), "{only:?}");
 }

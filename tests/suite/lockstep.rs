@@ -112,7 +112,7 @@ const WRONGS: [(&str, &str, bool); 14] = [
     ("garbage", "line 252: it is not UTF-8 text", true),
     ("words", "line 252: expected value at byte 1, found `ready`", true),
     ("long", "line 252: it is longer than 1 MiB", true),
-    ("silent", "the simulator has said nothing for 0.4 s", true),
+    ("silent", "the simulator has sent nothing for 0.4 s", true),
     ("partial", "the simulator has closed the connection without an `end` in the middle of a message", false),
     ("close", "the simulator has closed the connection without an `end`", false),
 ];
@@ -148,14 +148,14 @@ fn a_hello_that_will_not_do_is_told_before_anything_runs() {
         ("missing", "hello (line 1): missing field `pitch`"),
         ("nan", "hello (line 1): `dq_max[0]`: expected value at byte "),
         ("short", "hello (line 1): `q_min` has 6 numbers, but there are 7 `joints`"),
-        ("mirror", "hello (line 1): `T_es`: this is not a pose: its rotation mirrors"),
+        ("mirror", "hello (line 1): `T_es`: this is not a pose: its axes are left-handed"),
         ("dt", "hello (line 1): `dt`: 0 is not greater than 0"),
         ("urdf", "names the model `panda`, which is not built in"),
         ("names", "its `joints` are [\"lwr_a6_joint\""),
         ("tip", "the model has no link `hand`"),
         ("garbage", "hello (line 1): invalid type: integer `220`, expected a JSON object"),
-        ("silent", "no hello: the simulator has said nothing for 0.4 s"),
-        ("close", "no hello: the simulator has closed the connection without an `end`"),
+        ("silent", "the simulator sent no `hello`: the simulator has sent nothing for 0.4 s"),
+        ("close", "the simulator sent no `hello`: the simulator has closed the connection without an `end`"),
     ];
     for (wrong, message) in cases {
         let peer = Peer::start(&format!("--seconds 1 --silence 1 --misbehave hello-{wrong}"));
@@ -185,7 +185,7 @@ fn the_graph_ends_with_a_ramp_and_says_why() {
     let settings = ["--for", "1s", "--set", "devices.bench.acceleration=0.1"];
     let (said, seen) = run("hybrid", "--scene none --seconds 9", &settings);
     assert_eq!(said.code, 0, "{}", said.err);
-    assert_eq!((seen["end"].as_str(), number(&seen, "last_dq")), (Some("the time is over"), 0.0), "{seen}");
+    assert_eq!((seen["end"].as_str(), number(&seen, "last_dq")), (Some("the time limit is reached"), 0.0), "{seen}");
     // The command of the last tick is passed over, so the first step of the ramp may be two.
     assert!(number(&seen, "step") <= 2.0 * 0.1 * 0.004 + 1e-9 && number(&seen, "commands") > 255.0, "{seen}");
     // A fault of the task: it has found nothing within its way.

@@ -87,7 +87,9 @@ fn what_is_left_of_the_devices_plays_to_its_end() {
     let outcome = run(&mut engine, &RunOptions::default(), &mut |_| {}).unwrap();
     assert_eq!(outcome.end, End::Finished);
     assert!(outcome.time > 450_000_000, "{} ns", outcome.time);
-    assert!(engine.halts()[0].fault.to_string().starts_with("device `b` failed: its plug is out"));
+    assert!(
+        engine.halts()[0].fault.to_string().starts_with("device `b` failed: a `glitch` with `unplug` disconnected it")
+    );
 }
 
 /// Runs the hybrid task by the wall clock, with lines on the standard input and then its end.
@@ -113,8 +115,9 @@ fn a_stop_after_which_the_standard_input_ends_ends_the_run() {
 #[test]
 fn a_stop_that_nobody_can_end_says_so_and_what_would() {
     let stop = say(&["run", HYBRID, MOCK, "--send", "0.2s:stop"]);
-    let expected = "error: the operator sent `stop` in tick 51 at 0.200 s; every command went to zero, and nothing \
-                    could send `resume`: use `--send 2s:resume`, or type it with `--listen`\n";
+    let expected = "error: the operator sent `stop` in tick 51 at 0.200 s; every command went to zero; the run ended \
+                    because nothing can send `resume`: add `--send 2s:resume`, or add `--realtime --listen` and type \
+                    it\n";
     assert_eq!(stop.code, 1);
     assert!(stop.err.ends_with(expected), "{}", stop.err);
 }

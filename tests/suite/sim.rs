@@ -93,7 +93,10 @@ fn a_slower_clock_and_other_pads_run_too() {
 fn settings_that_cannot_be_are_told_at_their_place() {
     let cases = [
         ("objects=[{ shape = 'ball', at = [0, 0, 0.1] }]", "object 1: a ball needs `radius`"),
-        ("objects=[{ shape = 'ball', at = [0, 0, 0.1], radius = 0.1, length = 1 }]", "a ball has no `length`"),
+        (
+            "objects=[{ shape = 'ball', at = [0, 0, 0.1], radius = 0.1, length = 1 }]",
+            "a ball does not use `length`: remove it",
+        ),
         (
             "objects=[{ shape = 'cable', at = [0, 0, 0.1], radius = 0.003, points = [[0, 0, 0]] }]",
             "must be two or more",

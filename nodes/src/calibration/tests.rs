@@ -211,7 +211,7 @@ fn a_uniform_load_is_not_accepted_as_a_probe() {
     for (rows, cols, dead) in [(4, 4, &[][..]), (1, 2, &[]), (3, 5, &[0, 7])] {
         let log = Pad::new(rows, cols, dead, 5).uniform(3, 60);
         let message = calibrate(std::slice::from_ref(&log), &settings(LoadKind::Probe, None)).unwrap_err();
-        assert!(message.starts_with("most tactels respond alike to most presses"), "{message}");
+        assert!(message.starts_with("most tactels respond equally to most presses"), "{message}");
     }
     // A probe on one tactel, with foam that transmits a part of the force to its neighbours.
     let mut pad = Pad::new(3, 3, &[], 6);
@@ -231,9 +231,10 @@ fn a_log_without_a_live_tactel_is_refused_with_help() {
     let mut pad = Pad::new(2, 2, &[0, 1, 2, 3], 11);
     let log = pad.uniform(1, 50);
     let log = Log { force: log.force.iter().enumerate().map(|(i, _)| if i < 50 { 0.0 } else { 3.0 }).collect(), ..log };
-    for (load, way_out) in
-        [(LoadKind::Probe, "or is the load uniform?"), (LoadKind::Uniform, "or of a probe on one tactel")]
-    {
+    for (load, way_out) in [
+        (LoadKind::Probe, "if the load was uniform, add `--load uniform`"),
+        (LoadKind::Uniform, "if a probe loaded one tactel at a time, remove `--load uniform`"),
+    ] {
         let message = calibrate(std::slice::from_ref(&log), &settings(load, None)).unwrap_err();
         assert!(message.contains("4 tactels do not respond") && message.contains(way_out), "{message}");
     }

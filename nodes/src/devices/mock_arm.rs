@@ -263,7 +263,10 @@ mod tests {
     fn bad_settings() {
         let cases = [
             ("start = [0, 0]", "`start` has 2 entries, but the arm has 7 joints"),
-            ("start = [0, 0, 0, 0, 0, 0, 3]", "joint `lwr_a6_joint` cannot start at 3: it goes from -2.9671 to 2.9671"),
+            (
+                "start = [0, 0, 0, 0, 0, 0, 3]",
+                "joint `lwr_a6_joint` cannot start at 3: its range is -2.9671 to 2.9671 (rad, or m if prismatic)",
+            ),
             (
                 "start = [0, 0, 0, 0, 0, 0, 0]\nhold = [{ from_s = 2, to_s = 1 }]",
                 "a hold from 2 s to 1 s lasts no time",

@@ -140,7 +140,7 @@ mod tests {
             ),
             (zipped(8, &[]), "the archive has no file in it"),
             (zipped(8, &[("folder/", b"")]), "the archive has no file in it"),
-            (zipped(8, &[("plate.zip", &good)]), "`plate.zip` is an archive inside an archive"),
+            (zipped(8, &[("plate.zip", &good)]), "`plate.zip` is an archive inside an archive: unpack it first"),
             (
                 zipped(8, &[("README", b"hello\nworld")]),
                 "`README` in the archive has an unknown format: it begins with `hello`",

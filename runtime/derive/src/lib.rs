@@ -5,10 +5,12 @@
 //! port takes, whether a unit exists) is a constant assertion in the generated code, with the span of the field.
 
 mod attributes;
+mod checks;
 mod describe;
 mod docs;
 mod fault;
 mod param;
+mod port;
 mod ports;
 mod state;
 

@@ -8,9 +8,9 @@ use syn::{
 };
 
 use crate::attributes::{Words, snake_case};
+use crate::checks::{bound_letter, inputs_beside, is_unit_letter};
 use crate::docs::text;
 use crate::fault::{Faults, asserted};
-use crate::ports::{bound_letter, inputs_beside, is_unit_letter};
 
 const KNOWN: &[&str] = &["unit", "range", "above", "default", "live"];
 

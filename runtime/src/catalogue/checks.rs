@@ -1,90 +1,104 @@
-//! What is wrong with a node or a device, as far as it shows without a graph: found when the catalogue is made.
-
-use std::borrow::Cow;
+//! Checks of a declaration that need no graph. The catalogue makes them when a node or a device is added.
 
 use crate::node::{NodeSpec, ParamSpec, PortSpec, declares_a_unit};
 use crate::signal::Kind;
 
-/// Panics if the declaration of a node is wrong.
-pub(super) fn node(spec: &NodeSpec) {
+/// Returns everything that is wrong with the declaration of a node.
+pub(super) fn node(spec: &NodeSpec) -> Vec<String> {
     let name = &spec.name;
-    for port in spec.inputs.iter().chain(&spec.outputs) {
-        assert!(declares_a_unit(port), "`{name}.{}` declares {:?}, which is not a unit", port.name, port.args.first());
+    let mut wrong = Vec::new();
+    for port in spec.inputs.iter().chain(&spec.outputs).filter(|port| !declares_a_unit(port)) {
+        let unit = port.args.first().map_or("", |unit| unit);
+        wrong.push(format!("`{name}.{}` declares `{unit}`, which is not a unit", port.name));
     }
     for (ports, what) in [(&spec.inputs, "inputs"), (&spec.outputs, "outputs")] {
-        let double = ports.iter().enumerate().find(|(i, port)| ports[..*i].iter().any(|other| other.name == port.name));
-        assert!(double.is_none(), "two {what} of `{name}` are called `{}`", double.map_or("", |(_, port)| &port.name));
-    }
-    let has_flag = spec.outputs.first().is_some_and(|port| port.kind == Kind::Flag);
-    assert!(
-        !spec.logs || has_flag,
-        "the first output of `{name}` is not a flag: with `logs`, a flag that decides when to log must come first"
-    );
-    for port in &spec.outputs {
-        for param in port.args.iter().filter_map(|arg| arg.strip_prefix('$')) {
-            let is_there = spec.params.iter().any(|spec| spec.name == param);
-            assert!(is_there, "`{name}.{}` names the parameter `{param}`, which `{name}` does not have", port.name);
+        let is_double = |(i, port): &(usize, &PortSpec)| ports[..*i].iter().any(|other| other.name == port.name);
+        for (_, port) in ports.iter().enumerate().filter(is_double) {
+            wrong.push(format!("two {what} of `{name}` are called `{}`", port.name));
         }
     }
-    params(name, &spec.params, &mut Vec::new(), "");
-    example(name, &spec.example, "nodes", &spec.params, Some(&spec.inputs));
+    let has_flag = spec.outputs.first().is_some_and(|port| port.kind == Kind::Flag);
+    if spec.logs && !has_flag {
+        wrong.push(format!("`{name}` logs, so its first output must be a flag"));
+    }
+    for port in &spec.outputs {
+        for param in port.args.iter().filter_map(|arg| arg.strip_prefix('$')) {
+            if !spec.params.iter().any(|spec| spec.name == param) {
+                wrong.push(format!("`{name}.{}` uses `${param}`, but there is no parameter `{param}`", port.name));
+            }
+        }
+    }
+    params(name, &spec.params, &mut Vec::new(), "", &mut wrong);
+    example(name, &spec.example, "nodes", &spec.params, Some(&spec.inputs), &mut wrong);
+    wrong
 }
 
-/// Panics if the declaration of a device is wrong.
-pub(super) fn device(name: &str, table: &[ParamSpec], text: &str) {
-    params(name, table, &mut Vec::new(), "");
-    example(name, text, "devices", table, None);
+/// Returns everything that is wrong with the declaration of a device.
+pub(super) fn device(name: &str, table: &[ParamSpec], text: &str) -> Vec<String> {
+    let mut wrong = Vec::new();
+    params(name, table, &mut Vec::new(), "", &mut wrong);
+    example(name, text, "devices", table, None, &mut wrong);
+    wrong
 }
 
 /// Checks the defaults of a table, and that a unit such as `$unit` names a parameter of it or of a table around it.
-fn params(name: &str, table: &[ParamSpec], outer: &mut Vec<&'static str>, path: &str) {
+fn params(name: &str, table: &[ParamSpec], outer: &mut Vec<&'static str>, path: &str, wrong: &mut Vec<String>) {
     let depth = outer.len();
     outer.extend(table.iter().map(|param| param.name));
     for param in table {
+        let this = format!("parameter `{path}{}` of `{name}`", param.name);
         if let Some(fault) = &param.fault {
-            panic!("the default of parameter `{path}{}` of `{name}` is refused: {fault}", param.name);
+            wrong.push(format!("the default of {this} is refused: {fault}"));
         }
         let units = param.unit.as_deref().unwrap_or_default().split(['/', ' ', ',']);
-        if let Some(unit) = units.filter_map(|unit| unit.strip_prefix('$')).find(|unit| !outer.contains(unit)) {
-            panic!(
-                "the unit of parameter `{path}{}` of `{name}` is `${unit}`, but there is no parameter `{unit}`",
-                param.name
-            );
+        for unit in units.filter_map(|unit| unit.strip_prefix('$')).filter(|unit| !outer.contains(unit)) {
+            wrong.push(format!("the unit of {this} is `${unit}`, but there is no parameter `{unit}`"));
         }
-        params(name, &param.fields, outer, &format!("{path}{}.", param.name));
+        params(name, &param.fields, outer, &format!("{path}{}.", param.name), wrong);
     }
     outer.truncate(depth);
 }
 
-/// Checks the blocks of an example that have the type `name`: that there is one, and that it names only what exists.
-fn example(name: &str, text: &str, section: &str, params: &[ParamSpec], inputs: Option<&[PortSpec]>) {
+/// Checks the blocks of an example that have the type `name`: that there is one, and that its keys exist.
+fn example(
+    name: &str,
+    text: &str,
+    section: &str,
+    params: &[ParamSpec],
+    inputs: Option<&[PortSpec]>,
+    wrong: &mut Vec<String>,
+) {
     if text.is_empty() {
         return;
     }
-    let table: toml::Table =
-        text.parse().unwrap_or_else(|error| panic!("the example of `{name}` is not valid TOML: {error}"));
+    let table: toml::Table = match text.parse() {
+        Ok(table) => table,
+        Err(error) => return wrong.push(format!("the example of `{name}` is not valid TOML: {error}")),
+    };
     let blocks = table.get(section).and_then(toml::Value::as_table);
     let of_type = |block: &&toml::Value| block.get("type").and_then(toml::Value::as_str) == Some(name);
     let mut found = blocks.into_iter().flat_map(|blocks| blocks.values()).filter(of_type).peekable();
-    assert!(found.peek().is_some(), "the example of `{name}` has no block in `[{section}]` with `type = \"{name}\"`");
+    if found.peek().is_none() {
+        wrong.push(format!("the example of `{name}` has no block in `[{section}]` with `type = \"{name}\"`"));
+    }
     for block in found.filter_map(toml::Value::as_table) {
         for key in block.keys().filter(|key| *key != "type" && !(*key == "in" && inputs.is_some())) {
-            let is_there = params.iter().any(|param| param.name == key);
-            assert!(is_there, "the example of `{name}` sets `{key}`, which is no parameter of it");
+            if !params.iter().any(|param| param.name == key) {
+                wrong.push(format!("the example of `{name}` sets `{key}`, which is not a parameter of it"));
+            }
         }
-        wires(name, block, inputs.unwrap_or_default());
+        wires(name, block, inputs.unwrap_or_default(), wrong);
     }
 }
 
-fn wires(name: &str, block: &toml::Table, inputs: &[PortSpec]) {
+fn wires(name: &str, block: &toml::Table, inputs: &[PortSpec], wrong: &mut Vec<String>) {
     let is_open = inputs.iter().any(|input| input.need.is_many);
-    let wired: Vec<&str> = match block.get("in").and_then(toml::Value::as_table) {
-        Some(wires) => wires.keys().map(String::as_str).collect(),
-        None => Vec::new(),
-    };
-    let strange = wired.iter().find(|wire| !is_open && !inputs.iter().any(|input| input.name == **wire));
-    assert!(strange.is_none(), "the example of `{name}` wires `in.{}`, which it does not have", strange.unwrap_or(&""));
-    let must = |input: &&PortSpec| input.need.must_be_wired && !wired.contains(&&*input.name);
-    let missing: Option<&Cow<'static, str>> = inputs.iter().find(must).map(|input| &input.name);
-    assert!(missing.is_none(), "the example of `{name}` does not wire `in.{}`", missing.map_or("", |name| name));
+    let wires = block.get("in").and_then(toml::Value::as_table);
+    let wired: Vec<&str> = wires.into_iter().flat_map(toml::Table::keys).map(String::as_str).collect();
+    for wire in wired.iter().filter(|wire| !is_open && !inputs.iter().any(|input| input.name == **wire)) {
+        wrong.push(format!("the example of `{name}` wires `in.{wire}`, which is not an input of it"));
+    }
+    for input in inputs.iter().filter(|input| input.need.must_be_wired && !wired.contains(&&*input.name)) {
+        wrong.push(format!("the example of `{name}` does not wire `in.{}`", input.name));
+    }
 }

@@ -2,6 +2,7 @@
 
 use super::{Description, RoleType, StatedPort};
 use crate::node::{PortSpec, UnitPattern, unit_pattern};
+use crate::signal::{ImageShape, Shape};
 use crate::source::suggestion;
 
 impl Description {
@@ -36,6 +37,11 @@ fn misfit(sort: &str, port: &StatedPort, declared: &[PortSpec]) -> Option<String
     let kind = port.shape.kind();
     if kind != spec.kind {
         return Some(format!("is {}, but the role declares {}", kind.with_article(), spec.kind.with_article()));
+    }
+    if let Shape::Image(ImageShape { rows, cols, .. }) = &port.shape
+        && rows * cols == 0
+    {
+        return Some(format!("is an image of {rows} by {cols}, which has no tactels"));
     }
     // Of a report only the kind is known.
     match (unit_pattern(spec), port.shape.unit()) {

@@ -59,9 +59,27 @@ impl RoleType {
     }
 }
 
-/// The failure of a device during a run: its message.
+/// The failure of a device during a run: its message. A text and an `io::Error` convert to it with `?` or `into`.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct DeviceError(pub String);
+
+impl From<String> for DeviceError {
+    fn from(message: String) -> Self {
+        Self(message)
+    }
+}
+
+impl From<&str> for DeviceError {
+    fn from(message: &str) -> Self {
+        Self(message.to_owned())
+    }
+}
+
+impl From<std::io::Error> for DeviceError {
+    fn from(error: std::io::Error) -> Self {
+        Self(error.to_string())
+    }
+}
 
 impl fmt::Display for DeviceError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -73,7 +91,8 @@ impl std::error::Error for DeviceError {}
 
 /// A synchronous device: deterministic, without a thread.
 pub trait Stepped: Send {
-    /// Returns the time of the next sample from the start of the device [ns], or `None` if there are no more.
+    /// Returns the time of the next sample from the start of the device [ns], or `None` if there are no more. After an
+    /// exchange at a time it must be later than that time; otherwise the device fails.
     fn next(&self) -> Option<i64>;
 
     /// Returns the time of the last sample, if the device knows it [ns]. A progress bar uses it, and it shows that a

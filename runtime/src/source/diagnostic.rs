@@ -211,13 +211,20 @@ impl Diagnostic {
 /// A list of diagnostics, in the order in which they were found.
 pub type Diagnostics = Vec<Diagnostic>;
 
-/// All diagnostics of a graph, with the texts they refer to.
-#[derive(Debug, Clone)]
+/// All diagnostics of a graph, with the texts they refer to. `Debug` shows them as a terminal does, for `unwrap` in a
+/// test.
+#[derive(Clone)]
 pub struct Report {
     /// The files that were read.
     pub sources: SourceMap,
     /// The diagnostics in the order of their places.
     pub diagnostics: Diagnostics,
+}
+
+impl fmt::Debug for Report {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "\n{}", self.render(false))
+    }
 }
 
 impl Report {

@@ -230,7 +230,7 @@ fn a_bad_parameter_is_a_mistake() {
         (
             "posture = [0, 9, 0, 0, 0, 0, 0]",
             At::Param("posture".into()),
-            "joint `lwr_a2_joint` cannot be at 9: its range is -2.0944 to  (rad, or m if prismatic)2.0944",
+            "joint `lwr_a2_joint` cannot be at 9: its range is -2.0944 to 2.0944 (rad, or m if prismatic)",
         ),
     ];
     for (params, at, message) in cases {

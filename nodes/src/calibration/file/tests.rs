@@ -109,7 +109,7 @@ fn every_mistake_has_its_place() {
         (GOOD, "\"rational\"", "\"linear\"", "squash", "`squash` is not a parameter here"),
         (GOOD, "rows = 2", "rows = 0", "0", "expected a whole number from 1"),
         (GOOD, "rows = 2", "row = 2", "row", "`row` is not a parameter here"),
-        (GOOD, "rows = 2", "rows = 1", "[1, 1]", "tactel [1, 1] is outside the array of 1 rows by  columns2"),
+        (GOOD, "rows = 2", "rows = 1", "[1, 1]", "tactel [1, 1] is outside the array of 1 rows by 2 columns"),
         (GOOD, "rows = 2", "rows = 1000000", "[\n  {", "tactel [2, 0] is missing, and 1999995 more"),
         (GOOD, "\"raw\"", "\"counts\"", "\"counts\"", "`counts` is not a unit"),
         (GOOD, "[[0, 1]]", "[]", "[\n  {", "tactel [0, 1] is missing"),
@@ -125,7 +125,7 @@ fn every_mistake_has_its_place() {
         (GOOD, "squash = 0.001", "squash = -1", "-1", "`squash` must have the sign of `gain`"),
         (GOOD, "most = 5", "most = -5", "-5", "`most`, the maximum force, must be greater than 0"),
         (GOOD, "offset = -3", "offset = 1e50", "1e50", "too large"),
-        (KNOTS, "[0, 0]", "[0, 1]", "[0, 1]", "tactel [0, 1] is outside the array of 1 rows by  columns1"),
+        (KNOTS, "[0, 0]", "[0, 1]", "[0, 1]", "tactel [0, 1] is outside the array of 1 rows by 1 columns"),
         (KNOTS, "[0.5, 1.5, 4]", "[0.5, 1.5]", "[0.5, 1.5]", "3 readings, but 2 forces"),
         (
             KNOTS,
@@ -134,7 +134,7 @@ fn every_mistake_has_its_place() {
             "[0.5, 0.4, 4]",
             "`forces` must not decrease, but 0.4 comes after 0.5",
         ),
-        (KNOTS, "[10, 20, 30]", "[10, 10, 30]", "[10, 10, 30]", "`readings` must move away from 0 in one direction"),
+        (KNOTS, "[10, 20, 30]", "[10, 10, 30]", "[10, 10, 30]", "`readings` must increase from 0 or decrease from 0"),
         (KNOTS, "[10, 20, 30]", "[10, 20, 1e40]", "[10, 20, 1e40]", "too large"),
     ];
     for (good, from, to, marked, message) in cases {

@@ -309,8 +309,11 @@ mod tests {
             ("form = 'ramp'", &["`duration` is missing: a ramp needs it"]),
             ("form = 'sine'", &["`frequency` is missing: a sine needs it"]),
             ("form = 'chirp'\nduration = 1.0\nfrequency = 1.0", &["`end_frequency` is missing: a chirp needs it"]),
-            ("form = 'step'\nfrequency = 1.0", &["a step has no `frequency`"]),
-            ("form = 'sine'\nfrequency = 1.0\nend_frequency = 2.0", &["a sine has no `end_frequency`"]),
+            ("form = 'step'\nfrequency = 1.0", &["a step does not use `frequency`: remove it"]),
+            (
+                "form = 'sine'\nfrequency = 1.0\nend_frequency = 2.0",
+                &["a sine does not use `end_frequency`: remove it"],
+            ),
             (
                 "form = 'sine'\nfrequency = 501.0",
                 &["`frequency` is above half of the graph's rate: the maximum is 500 Hz"],

@@ -43,7 +43,7 @@ fn a_line_per_tactel() {
 fn a_mistake_of_the_device_is_marked_at_device() {
     let cases = [
         ("device = { gain = [[1, 2, 3]] }", "device.gain", "`device.gain` has 1 rows, but the image has 2"),
-        ("device = { dead = [[2, 0]] }", "device.dead", "tactel [2, 0] is outside the array of 2 rows by  columns3"),
+        ("device = { dead = [[2, 0]] }", "device.dead", "tactel [2, 0] is outside the array of 2 rows by 3 columns"),
         ("device = { unit = \"pounds\" }", "device.unit", "`pounds`"),
     ];
     for (params, at, message) in cases {
@@ -71,8 +71,8 @@ fn every_mistake_is_marked_at_its_parameter() {
         ("gain = 1e39", "gain", "1e39 is too large: a tactel is a 32-bit float"),
         ("offset = [[0, 0, 0], [0, -1e300, 0]]", "offset", "-1e300 is too large"),
         ("unit = \"Nm\"", "unit", "`Nm` is not a unit"),
-        ("dead = [[2, 0]]", "dead", "tactel [2, 0] is outside the array of 2 rows by  columns3"),
-        ("dead = [[0, 3]]", "dead", "tactel [0, 3] is outside the array of 2 rows by  columns3"),
+        ("dead = [[2, 0]]", "dead", "tactel [2, 0] is outside the array of 2 rows by 3 columns"),
+        ("dead = [[0, 3]]", "dead", "tactel [0, 3] is outside the array of 2 rows by 3 columns"),
     ];
     for (params, at, message) in cases {
         let mistakes = rig(params).err().unwrap();

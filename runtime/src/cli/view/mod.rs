@@ -120,7 +120,7 @@ impl RunView {
         let panel = if is_narrow { 0 } else { PANEL_WIDTH };
         let width = style.width - panel;
         let tail = (last - first) * TAIL;
-        let title = format!("{} over time; mean ± standard deviation of the last {tail:.3} s", self.plotted.join(", "));
+        let title = format!("{} over time; mean ± deviation of the last {tail:.3} s", self.plotted.join(", "));
         let mut text = break_at_semicolons(&title, style.width) + "\n";
         for (ColumnCurve { name, unit, series, .. }, value) in self.curves.iter().zip(&self.row) {
             let lines = chart(series.bins(), width, height.min(max_height));

@@ -24,19 +24,24 @@ use crate::fault::Fault;
 /// # Errors
 /// If the tokio runtime or the signal handlers cannot be set up.
 pub fn run(engine: &mut Engine, options: &RunOptions, observe: &mut dyn FnMut(&Engine)) -> io::Result<Outcome> {
-    let runtime = Builder::new_multi_thread().worker_threads(1).enable_all().build()?;
-    let mut pacer = RealTimePacer::start(engine, options, &runtime)?;
+    // A driver that blocks its thread stops neither the ticks nor Ctrl-C.
+    let worker = || Builder::new_multi_thread().worker_threads(1).enable_all().build();
+    let (session, drivers) = (worker()?, worker()?);
+    let mut pacer = RealTimePacer::start(engine, options, &session, &drivers)?;
     // After a panic, for example in `observe`, the arm must come to rest before the unwinding goes on.
     let end = catch_unwind(AssertUnwindSafe(|| drive(engine, pacer.until, &mut pacer, observe)));
     let (time, ticks) = (engine.now(), engine.ticks());
     pacer.stop(engine);
+    let wall = pacer.epoch.elapsed();
+    // It ends the drivers that are still running, and does not wait for one that blocks.
+    drivers.shutdown_background();
     engine.finish(&end.as_ref().map_or_else(|_| "a panic".to_owned(), ToString::to_string));
     let end = end.unwrap_or_else(|panic| resume_unwind(panic));
-    Ok(Outcome { end, time, ticks, wall: pacer.epoch.elapsed(), late: engine.late() })
+    Ok(Outcome { end, time, ticks, wall, late: engine.late() })
 }
 
 struct RealTimePacer<'a> {
-    runtime: &'a Runtime,
+    session: &'a Runtime,
     epoch: Instant,
     is_real: bool,
     /// Whether any device is live.
@@ -52,7 +57,7 @@ struct RealTimePacer<'a> {
 }
 
 impl<'a> RealTimePacer<'a> {
-    fn start(engine: &mut Engine, options: &RunOptions, runtime: &'a Runtime) -> io::Result<Self> {
+    fn start(engine: &mut Engine, options: &RunOptions, session: &'a Runtime, live: &Runtime) -> io::Result<Self> {
         let epoch = Instant::now();
         let (mut drivers, mut tasks) = (JoinSet::new(), Vec::new());
         for (i, device) in engine.devices.iter_mut().enumerate() {
@@ -60,7 +65,7 @@ impl<'a> RealTimePacer<'a> {
                 DeviceLink::Idle(driver) => {
                     tracing::info!("device `{}` starts", device.name);
                     let (theirs, ours) = link(&device.samples, &device.commands, epoch);
-                    let task = drivers.spawn_on(driver.run(theirs), runtime.handle());
+                    let task = drivers.spawn_on(driver.run(theirs), live.handle());
                     tasks.push((task.id(), i));
                     DeviceLink::Live(ours)
                 }
@@ -70,9 +75,9 @@ impl<'a> RealTimePacer<'a> {
         let is_live = !drivers.is_empty();
         let is_real = options.is_realtime || is_live;
         let until = options.duration.map_or(i64::MAX, |seconds| (seconds * 1e9) as i64);
-        let interrupted = runtime.block_on(async { interrupts() })?;
+        let interrupted = session.block_on(async { interrupts() })?;
         let input = OperatorInput::new(&options.sends, options.listens);
-        Ok(Self { runtime, epoch, is_real, is_live, until, interrupted, drivers, tasks, input, is_on_timer: false })
+        Ok(Self { session, epoch, is_real, is_live, until, interrupted, drivers, tasks, input, is_on_timer: false })
     }
 }
 
@@ -128,7 +133,7 @@ impl RealTimePacer<'_> {
         });
         let has_live_clock = sampled.is_some();
         let mut interrupted = self.interrupted.clone();
-        self.runtime.block_on(async {
+        self.session.block_on(async {
             let sample = async {
                 match &sampled {
                     Some(sampled) => sampled.notified().await,
@@ -183,8 +188,7 @@ impl RealTimePacer<'_> {
             }
         }
         let drivers = std::mem::take(&mut self.drivers);
-        // Dropping the tokio runtime ends the drivers that are still running.
-        let _ = self.runtime.block_on(async { tokio::time::timeout(STOP_TIMEOUT, drivers.join_all()).await });
+        let _ = self.session.block_on(async { tokio::time::timeout(STOP_TIMEOUT, drivers.join_all()).await });
     }
 }
 

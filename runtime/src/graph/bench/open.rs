@@ -11,7 +11,7 @@ use crate::graph::plan::PlannedDevice;
 use crate::graph::syntax::{BenchDocument, Block, WireEntry};
 use crate::node::{Mistake, PortSpec, Reader, Spanned};
 use crate::signal::Shape;
-use crate::source::{Code, Diagnostic, Diagnostics, Key, SourceMap, Value, quoted, suggest_name};
+use crate::source::{Code, Diagnostic, Diagnostics, Key, SourceMap, Value, quoted, suggest_name, suggestion};
 
 /// A role that is bound to a device. Ports are in the order of the role, each with its index in the device.
 #[derive(Debug, Clone)]
@@ -224,16 +224,25 @@ impl Opener<'_> {
         let before = self.diagnostics.len();
         for fill in 0..description.fills.len() {
             let name = description.fills[fill].role.clone();
-            let Some(role) = self.catalogue.role_type(&name) else { continue };
-            let misfits = description.misfits(fill, role);
-            if !misfits.is_empty() {
-                let device = &block.key.name;
-                let message = format!("device `{device}` does not match the role `{name}`: {}", misfits.join("; "));
-                let kind = block.kind.as_ref().map_or("", |kind| &kind.value);
-                let help = format!("the mistake is in the device type `{kind}`, not in this file");
-                self.diagnostics.push(Diagnostic::new(Code::WrongRole, block.key.span.clone(), message).help(help));
-            }
-            description.add_reports(fill, role);
+            let device = &block.key.name;
+            let message = match self.catalogue.role_type(&name) {
+                Some(role) => {
+                    let misfits = description.misfits(fill, role);
+                    description.add_reports(fill, role);
+                    if misfits.is_empty() {
+                        continue;
+                    }
+                    format!("device `{device}` does not match the role `{name}`: {}", misfits.join("; "))
+                }
+                None => {
+                    let roles = self.catalogue.roles().iter().map(|role| &*role.name);
+                    let help = suggestion(&name, roles, "role types");
+                    format!("device `{device}` states the role type `{name}`, which does not exist ({help})")
+                }
+            };
+            let kind = block.kind.as_ref().map_or("", |kind| &kind.value);
+            let help = format!("the mistake is in the device type `{kind}`, not in this file");
+            self.diagnostics.push(Diagnostic::new(Code::WrongRole, block.key.span.clone(), message).help(help));
         }
         self.diagnostics.len() == before
     }

@@ -7,6 +7,7 @@ mod watched;
 use std::fmt;
 
 use crate::catalogue::Catalogue;
+use crate::source::suggestion;
 
 /// Measures the allocations of what it runs; see [`Lint::counting`].
 pub type CountAllocations = fn(&mut dyn FnMut()) -> u64;
@@ -101,7 +102,23 @@ impl Lint<'_> {
         self.docs(&mut found);
         self.examples(&mut found);
         found.retain(|violation| self.is_checked(&violation.owner));
+        self.unknown_names(&mut found);
         found
+    }
+
+    /// Finds names in `only` and `without_example_of` that the catalogue does not have.
+    fn unknown_names(&self, found: &mut Vec<Violation>) {
+        let (nodes, devices) = (self.catalogue.specs(), self.catalogue.devices().iter());
+        let roles = self.catalogue.roles().iter().map(|role| role.name.to_string());
+        let known: Vec<String> = nodes
+            .map(|spec| spec.name.to_string())
+            .chain(devices.map(|device| device.name().into_owned()))
+            .chain(roles)
+            .collect();
+        for name in self.only.iter().chain(&self.without_example).filter(|name| !known.contains(name)) {
+            let help = suggestion(name, known.iter().map(String::as_str), "entries");
+            Notes { owner: name.clone(), found }.add(None, format!("the catalogue has no `{name}`: {help}"));
+        }
     }
 
     /// Checks everything.

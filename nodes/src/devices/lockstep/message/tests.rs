@@ -53,7 +53,7 @@ fn a_mistake_in_a_hello_names_its_field() {
         ("[\"a\",\"b\"]", "[\"a\",\"a\"]", "`joints`: element 1 is `a`, but each joint needs its own name"),
         ("[\"a\",\"b\"]", "[]", "`joints`: the list is empty"),
         ("[-1,-2.5]", "[-1]", "`q_min` has 1 numbers, but there are 2 `joints`"),
-        ("[1,2]", "[1,-2.5]", "`q_min` of joint `b` is -2.5 rad, which is not less than its `q_max` of  rad-2.5"),
+        ("[1,2]", "[1,-2.5]", "`q_min` of joint `b` is -2.5 rad, which is not less than its `q_max` of -2.5 rad"),
         ("[3,4]", "[3,0]", "`dq_max` of joint `b` is 0 rad/s, which is not greater than 0"),
         ("[3,4]", "[3,null]", "`dq_max[1]`: invalid type: null, expected f64"),
         ("[3,4]", "[3,4],\"dq_max\":[3,4]", "duplicate field `dq_max`"),
@@ -62,7 +62,7 @@ fn a_mistake_in_a_hello_names_its_field() {
         ("0,0,0,1]", "0,0,0]", "`T_es`: invalid length 15, expected an array of length 16"),
         ("0,0,0,1]", "0,0,1,1]", "`T_es`: this is not a pose: its last row"),
         ("[1,0,0,0.1", "[2,0,0,0.1", "`T_es`: this is not a pose: its rotation matrix is off by 3.0e0"),
-        ("[1,0,0,0.1", "[-1,0,0,0.1", "`T_es`: this is not a pose: its rotation mirrors"),
+        ("[1,0,0,0.1", "[-1,0,0,0.1", "`T_es`: this is not a pose: its axes are left-handed"),
         ("0.15", "-1", "`threshold_units`: -1 is not 0 or greater"),
         ("\"urdf\":\"lwr4p\"", "\"urdf\":null", "`urdf`: invalid type: null, expected a string"),
     ];
