@@ -292,15 +292,7 @@ mod tests {
     fn a_name_describes_one_thing_only() {
         let twice = |make: fn() -> Catalogue| panic_message(make);
         assert_eq!(twice(|| named(named(Catalogue::new(), "a"), "a")), "a node and a node are both called `a`");
-        let role = || RoleType {
-            name: "a".into(),
-            summary: "".into(),
-            outputs: vec![],
-            commands: vec![],
-            reports: vec![],
-            limits: vec![],
-            is_observed: false,
-        };
+        let role = || RoleType { name: "a".into(), ..RoleType::default() };
         assert_eq!(
             panic_message(|| named(Catalogue::new().role(role()), "a")),
             "a role and a node are both called `a`"

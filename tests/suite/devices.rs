@@ -163,10 +163,7 @@ fn a_device_that_states_other_ports_than_its_role_does_not_load() {
 
 /// A role with a value of every kind that has a size.
 fn sized() -> RoleType {
-    let port = |name: &'static str, kind, args: &[&'static str]| {
-        let args = args.iter().map(|arg| Cow::Borrowed(*arg)).collect();
-        PortSpec { name: name.into(), doc: "".into(), kind, args, need: Need::REQUIRED }
-    };
+    let port = |name, kind, args: &[&'static str]| PortSpec::new(name, "", kind, args);
     RoleType {
         name: "sized".into(),
         summary: "a value of each kind that has a size".into(),
@@ -175,10 +172,7 @@ fn sized() -> RoleType {
             port("joints", Kind::Joints, &["rad", "self"]),
             port("offsets", Kind::Features, &["_", "self"]),
         ],
-        commands: vec![],
-        reports: vec![],
-        limits: vec![],
-        is_observed: false,
+        ..RoleType::default()
     }
 }
 

@@ -20,13 +20,7 @@ struct Polynomial {
 
 impl NodeType for Polynomial {
     fn spec(&self) -> NodeSpec {
-        let port = |name: &'static str| PortSpec {
-            name: name.into(),
-            doc: "A length.".into(),
-            kind: Kind::Scalar,
-            args: vec!["m".into()].into(),
-            need: Need::REQUIRED,
-        };
+        let port = |name| PortSpec::new(name, "A length.", Kind::Scalar, &["m"]);
         NodeSpec {
             name: self.name.clone().into(),
             summary: "a polynomial".into(),

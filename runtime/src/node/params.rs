@@ -6,7 +6,7 @@ use std::ops::Range;
 
 use super::bounds::Bounds;
 use super::file_path::FilePath;
-use super::mistake::{At, Mistake, Mistakes};
+use super::mistake::{At, Mistake, Mistakes, refuse_any};
 use super::param_spec::{Contents, Repeats, Written};
 use super::reader::{Param, Reader, read_leaf};
 use crate::signal::Unit;
@@ -283,6 +283,7 @@ impl<T> Map<T> {
             let mistake = Mistake::new(Code::MissingKey, At::Key(param.into()), message);
             mistakes.push(mistake.help(format!("add `{param}.{name} = …`; the features here are {}", listed())));
         }
-        if mistakes.is_empty() { Ok(names.map(|name| &self.0[name]).collect()) } else { Err(mistakes) }
+        refuse_any(mistakes)?;
+        Ok(names.map(|name| &self.0[name]).collect())
     }
 }
