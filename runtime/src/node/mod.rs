@@ -5,7 +5,7 @@
 //!
 //! | Derive | implements | reads |
 //! |---|---|---|
-//! | `#[derive(Describe)]` | [`Describe`](trait@Describe) | the doc comment, `#[describe(name = "…", every_tick, logs)]` |
+//! | `#[derive(Describe)]` | [`Describe`](trait@Describe) | the name, the doc comment, `#[describe(name = "…", every_tick, logs)]` |
 //! | `#[derive(Param)]` | [`Param`](trait@Param) for a table or a word | `#[param(unit = "…", range = …, above = …, default = …, live)]` |
 //! | `#[derive(Inputs)]` | [`InputSet`] | `#[port(unit = "…", frame = "…", …)]` |
 //! | `#[derive(Outputs)]` | [`OutputSet`] | the same |
@@ -68,7 +68,8 @@ pub use tactflow_derive::{Describe, Inputs, Outputs, Param, State};
 pub use tick::Tick;
 pub use time::{Absence, Interval};
 
-/// The name and the documentation of a node or a device. `#[derive(Describe)]` takes them from the doc comment.
+/// The name and the documentation of a node or a device. `#[derive(Describe)]` takes them from the struct and its doc
+/// comment.
 pub trait Describe {
     /// The `type` in a graph file.
     const NAME: &'static str;

@@ -30,10 +30,7 @@ impl Param for PerTactel {
         match &value.item {
             Item::Array(_) => Vec::read(value, reader).map(Self::Rows),
             Item::Integer(_) | Item::Float(_) => f64::read(value, reader).map(Self::All),
-            _ => {
-                reader.wrong_type(value, Self::EXPECTS);
-                None
-            }
+            _ => reader.wrong_type(value, Self::EXPECTS),
         }
     }
 
