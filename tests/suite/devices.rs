@@ -10,7 +10,7 @@ use tactflow_runtime::engine::Engine;
 use tactflow_runtime::fault::Cause;
 use tactflow_runtime::graph::{Request, compile};
 use tactflow_runtime::harness::{FedRole, GraphRig};
-use tactflow_runtime::node::{Need, ParamSpec, PortSpec, Reader};
+use tactflow_runtime::node::{ParamSpec, PortSpec, Reader};
 use tactflow_runtime::signal::{
     Features, FeaturesShape, Freshness, Image, ImageShape, Joints, JointsShape, Kind, Pose, Scalar, ScalarShape, Unit,
 };

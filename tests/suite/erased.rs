@@ -2,8 +2,8 @@
 
 use tactflow_runtime::harness::GraphRig;
 use tactflow_runtime::node::{
-    AnyNode, Built, Bus, Configured, Declared, Given, Mistake, Mistakes, Need, NodeSpec, NodeType, Param, PortId,
-    PortSpec, Reader, Tick, Wires,
+    AnyNode, Built, Bus, Configured, Declared, Given, Mistake, Mistakes, NodeSpec, NodeType, Param, PortId, PortSpec,
+    Reader, Tick, Wires,
 };
 use tactflow_runtime::signal::{Freshness, Kind, Scalar, Shape};
 use tactflow_runtime::source::Value;

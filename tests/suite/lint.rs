@@ -8,8 +8,8 @@ use tactflow_runtime::device::{
 };
 use tactflow_runtime::harness::lint;
 use tactflow_runtime::node::{
-    AnyNode, Bounds, Built, Bus, Configured, Declared, Given, Limits, Mistakes, Need, NodeSpec, NodeType, ParamSpec,
-    PortId, PortSpec, Reader, Tick, Wires,
+    AnyNode, Bounds, Built, Bus, Configured, Declared, Given, Limits, Mistakes, NodeSpec, NodeType, ParamSpec, PortId,
+    PortSpec, Reader, Tick, Wires,
 };
 use tactflow_runtime::signal::{Kind, Scalar, ScalarShape, Signal, Unit};
 use tactflow_runtime::source::Value;

@@ -12,7 +12,7 @@ pub mod unit_delay;
 use tactflow_runtime::catalogue::Catalogue;
 use tactflow_runtime::device::RoleType;
 use tactflow_runtime::harness::FedRole;
-use tactflow_runtime::node::{Need, PortSpec};
+use tactflow_runtime::node::PortSpec;
 use tactflow_runtime::signal::Kind;
 
 /// The nodes and the role.
