@@ -3,13 +3,8 @@
 use std::borrow::Cow;
 
 use tactflow_runtime::device::RoleType;
-use tactflow_runtime::node::{Need, PortSpec};
+use tactflow_runtime::node::PortSpec;
 use tactflow_runtime::signal::Kind;
-
-fn port(name: &'static str, doc: &'static str, kind: Kind, args: &'static [&'static str]) -> PortSpec {
-    let args = args.iter().map(|arg| Cow::Borrowed(*arg)).collect();
-    PortSpec { name: name.into(), doc: doc.into(), kind, args, need: Need::REQUIRED }
-}
 
 /// An array of tactels.
 #[must_use]
@@ -17,11 +12,8 @@ pub fn tactile_pad() -> RoleType {
     RoleType {
         name: "tactile_pad".into(),
         summary: "an array of tactels that outputs an image".into(),
-        outputs: vec![port("image", "The newest image, in the device's unit.", Kind::Image, &["U", "self"])],
-        commands: vec![],
-        reports: vec![],
-        limits: vec![],
-        is_observed: false,
+        outputs: vec![PortSpec::new("image", "The newest image, in the device's unit.", Kind::Image, &["U", "self"])],
+        ..RoleType::default()
     }
 }
 
@@ -32,13 +24,13 @@ pub fn velocity_arm() -> RoleType {
         name: "velocity_arm".into(),
         summary: "an arm that is commanded with joint velocities".into(),
         outputs: vec![
-            port("position", "Measured joint positions [rad].", Kind::Joints, &["rad", "self"]),
-            port("equilibrium", EQUILIBRIUM, Kind::Joints, &["rad", "self"]),
+            PortSpec::new("position", "Measured joint positions [rad].", Kind::Joints, &["rad", "self"]),
+            PortSpec::new("equilibrium", EQUILIBRIUM, Kind::Joints, &["rad", "self"]),
         ],
-        commands: vec![port("velocity", "Joint velocities [rad/s].", Kind::Joints, &["rad/s", "self"])],
-        reports: vec![port("contact", CONTACT, Kind::Pose, &["C", "base"])],
+        commands: vec![PortSpec::new("velocity", "Joint velocities [rad/s].", Kind::Joints, &["rad/s", "self"])],
+        reports: vec![PortSpec::new("contact", CONTACT, Kind::Pose, &["C", "base"])],
         limits: LIMITS.map(Cow::Borrowed).into(),
-        is_observed: false,
+        ..RoleType::default()
     }
 }
 
@@ -51,7 +43,7 @@ const EQUILIBRIUM: &str = "Posture that the commands add up to: where a complian
 /// fills it gives all of it, and says of what does not apply that it is absent.
 #[must_use]
 pub fn ground_truth() -> RoleType {
-    let scalar = |name, doc, unit: &'static [&'static str]| port(name, doc, Kind::Scalar, unit);
+    let scalar = |name, doc, unit: &[&'static str]| PortSpec::new(name, doc, Kind::Scalar, unit);
     RoleType {
         name: "ground_truth".into(),
         summary: "true values of the contact, which only a simulation knows".into(),
@@ -65,7 +57,7 @@ pub fn ground_truth() -> RoleType {
             scalar("orientation", ORIENTATION, &["rad mod pi"]),
             scalar("area", "Area of the contact [m²].", &["m2"]),
             scalar("depth", "Largest depth to which the object is pressed into the foam [m].", &["m"]),
-            port("image", "The image without noise, spread and drift [N].", Kind::Image, &["N", "self"]),
+            PortSpec::new("image", "The image without noise, spread and drift [N].", Kind::Image, &["N", "self"]),
             scalar("tilt", TILT, &["rad"]),
             scalar("path", PATH, &["m"]),
             scalar("distance", DISTANCE, &["m"]),
@@ -73,10 +65,8 @@ pub fn ground_truth() -> RoleType {
             scalar("common_noise", COMMON_NOISE, &["N/tactel"]),
             scalar("own_noise", OWN_NOISE, &["N/tactel"]),
         ],
-        commands: vec![],
-        reports: vec![],
-        limits: vec![],
         is_observed: true,
+        ..RoleType::default()
     }
 }
 

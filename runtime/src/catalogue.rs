@@ -324,15 +324,7 @@ mod tests {
             twice(|| named(named(Catalogue::new(), "a"), "a")),
             "the node `a` cannot be added: a node has that name already"
         );
-        let role = || RoleType {
-            name: "a".into(),
-            summary: "".into(),
-            outputs: vec![],
-            commands: vec![],
-            reports: vec![],
-            limits: vec![],
-            is_observed: false,
-        };
+        let role = || RoleType { name: "a".into(), ..RoleType::default() };
         assert_eq!(
             panic_message(|| named(Catalogue::new().role(role()), "a")),
             "the node `a` cannot be added: a role has that name already"

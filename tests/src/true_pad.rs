@@ -39,7 +39,6 @@ pub struct Params {
 /// From `from_s` on the contact is at `at · exp(-(t - from_s) / tau_s)` on the x axis, so every figure of a scenario is
 /// known in closed form. The image has white noise from the seed; the ground truth has none.
 #[derive(Debug, Describe)]
-#[describe(name = "true_pad")]
 pub struct TruePad {
     params: Params,
     image: Output<Image>,

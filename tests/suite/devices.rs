@@ -10,7 +10,7 @@ use tactflow_runtime::engine::{self, End, Engine, RunOptions};
 use tactflow_runtime::fault::Cause;
 use tactflow_runtime::graph::{Request, compile};
 use tactflow_runtime::harness::{FedRole, GraphRig};
-use tactflow_runtime::node::{Need, ParamSpec, PortSpec, Reader};
+use tactflow_runtime::node::{ParamSpec, PortSpec, Reader};
 use tactflow_runtime::signal::{
     Features, FeaturesShape, Freshness, Image, ImageShape, Joints, JointsShape, Kind, Pose, Scalar, ScalarShape, Unit,
 };
@@ -178,10 +178,7 @@ fn a_device_that_states_other_ports_than_its_role_does_not_load() {
 
 /// A role with a value of every kind that has a size.
 fn sized() -> RoleType {
-    let port = |name: &'static str, kind, args: &[&'static str]| {
-        let args = args.iter().map(|arg| Cow::Borrowed(*arg)).collect();
-        PortSpec { name: name.into(), doc: "".into(), kind, args, need: Need::REQUIRED }
-    };
+    let port = |name, kind, args: &[&'static str]| PortSpec::new(name, "", kind, args);
     RoleType {
         name: "sized".into(),
         summary: "a value of each kind that has a size".into(),
@@ -190,10 +187,7 @@ fn sized() -> RoleType {
             port("joints", Kind::Joints, &["rad", "self"]),
             port("offsets", Kind::Features, &["_", "self"]),
         ],
-        commands: vec![],
-        reports: vec![],
-        limits: vec![],
-        is_observed: false,
+        ..RoleType::default()
     }
 }
 

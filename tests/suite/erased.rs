@@ -2,8 +2,8 @@
 
 use tactflow_runtime::harness::GraphRig;
 use tactflow_runtime::node::{
-    AnyNode, Built, Bus, Configured, Declared, Given, Mistake, Mistakes, Need, NodeSpec, NodeType, Param, PortId,
-    PortSpec, Reader, Tick, Wires,
+    AnyNode, Built, Bus, Configured, Declared, Given, Mistake, Mistakes, NodeSpec, NodeType, Param, PortId, PortSpec,
+    Reader, Tick, Wires,
 };
 use tactflow_runtime::signal::{Freshness, Kind, Scalar, Shape};
 use tactflow_runtime::source::Value;
@@ -20,13 +20,7 @@ struct Polynomial {
 
 impl NodeType for Polynomial {
     fn spec(&self) -> NodeSpec {
-        let port = |name: &'static str| PortSpec {
-            name: name.into(),
-            doc: "A length.".into(),
-            kind: Kind::Scalar,
-            args: vec!["m".into()].into(),
-            need: Need::REQUIRED,
-        };
+        let port = |name| PortSpec::new(name, "A length.", Kind::Scalar, &["m"]);
         NodeSpec {
             name: self.name.clone().into(),
             summary: "a polynomial".into(),

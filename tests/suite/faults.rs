@@ -64,7 +64,6 @@ fn a_sample_that_is_not_finite_is_a_fault_of_its_role() {
 /// in.value = "ruler.value"
 /// ```
 #[derive(Describe)]
-#[describe(name = "mute")]
 struct Mute;
 
 /// What `mute` reads.
@@ -85,8 +84,6 @@ impl Node for Mute {
     fn new((): (), _: &mut Setup<Self>) -> Result<Self, Mistakes> {
         Ok(Self)
     }
-
-    fn state(&self) {}
 
     fn step(&self, tick: &Tick, _: MuteInputs<'_>, (): &mut (), (): &mut ()) {
         assert!(tick.index != 3, "as told");

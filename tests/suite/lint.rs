@@ -8,8 +8,8 @@ use tactflow_runtime::device::{
 };
 use tactflow_runtime::harness::lint;
 use tactflow_runtime::node::{
-    AnyNode, Bounds, Built, Bus, Configured, Declared, Given, Limits, Mistakes, Need, NodeSpec, NodeType, ParamSpec,
-    PortId, PortSpec, Reader, Tick, Wires,
+    AnyNode, Bounds, Built, Bus, Configured, Declared, Given, Limits, Mistakes, NodeSpec, NodeType, ParamSpec, PortId,
+    PortSpec, Reader, Tick, Wires,
 };
 use tactflow_runtime::signal::{Kind, Scalar, ScalarShape, Signal, Unit};
 use tactflow_runtime::source::Value;
@@ -50,8 +50,7 @@ struct Counter {
 }
 
 fn port(name: &'static str, doc: &'static str) -> PortSpec {
-    let args = vec!["m".into()].into();
-    PortSpec { name: name.into(), doc: doc.into(), kind: Kind::Scalar, args, need: Need::REQUIRED }
+    PortSpec::new(name, doc, Kind::Scalar, &["m"])
 }
 
 fn param(name: &'static str, doc: &'static str, unit: Option<&'static str>) -> ParamSpec {
@@ -179,15 +178,7 @@ impl DeviceType for RulerType {
 }
 
 fn role(name: &'static str, doc: &'static str) -> RoleType {
-    RoleType {
-        name: name.into(),
-        summary: "a length".into(),
-        outputs: vec![port("value", doc)],
-        commands: vec![],
-        reports: vec![],
-        limits: vec![],
-        is_observed: false,
-    }
+    RoleType { name: name.into(), summary: "a length".into(), outputs: vec![port("value", doc)], ..RoleType::default() }
 }
 
 /// What lint says of a counter beside a ruler, the first line of each violation.

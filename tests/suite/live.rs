@@ -84,7 +84,6 @@ fn every_sample_counts_once_and_silence_makes_it_old() {
 
 /// A driver that panics.
 #[derive(Describe)]
-#[describe(name = "brittle")]
 struct Brittle;
 
 #[async_trait::async_trait]

@@ -30,7 +30,6 @@ use super::mount::Mount;
 /// mount = { from = "arm.mount" }
 /// ```
 #[derive(Describe)]
-#[describe(name = "arm_state")]
 pub struct ArmState {
     chain: Chain,
 }
@@ -89,8 +88,6 @@ impl Node for ArmState {
         setup.outputs.joints = joints;
         Ok(Self { chain })
     }
-
-    fn state(&self) {}
 
     fn step(&self, _: &Tick, inputs: Inputs<'_>, out: &mut Outputs, (): &mut ()) {
         let q = &inputs.position.0;

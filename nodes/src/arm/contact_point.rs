@@ -26,7 +26,6 @@ use tactflow_runtime::signal::{Pose, Scalar};
 /// height = -0.001                     # the foam is compressed by about 1 mm [m]
 /// ```
 #[derive(Describe)]
-#[describe(name = "contact_point")]
 pub struct ContactPoint {
     /// Above the plane of the pad [m].
     height: f64,
@@ -83,8 +82,6 @@ impl Node for ContactPoint {
     fn new(params: Params, _: &mut Setup<Self>) -> Result<Self, Mistakes> {
         Ok(Self { height: params.height })
     }
-
-    fn state(&self) {}
 
     fn step(&self, _: &Tick, inputs: Inputs<'_>, out: &mut Outputs, (): &mut ()) {
         let at = Translation3::new(*inputs.x, *inputs.y, self.height);

@@ -9,7 +9,7 @@
 //! The state is scratch memory alone: each output depends only on the inputs of its step.
 
 use tactflow_runtime::node::{
-    Describe, In, Inputs, Limits, Mistake, Mistakes, Node, Out, Outputs, Param, Setup, State, Tick,
+    Describe, In, Inputs, Limits, Mistake, Mistakes, Node, Out, Outputs, Param, Setup, State, Tick, refuse_any,
 };
 use tactflow_runtime::signal::{Jacobian, Joint, Joints, JointsShape, Pose, Scalar, ScalarShape, Twist, Unit};
 
@@ -40,7 +40,6 @@ use super::{damped, joint_limits, null_space};
 /// posture = [0.0, 0.5, 0.0, -1.3, 0.0, 1.3, 0.0]   # [rad]
 /// ```
 #[derive(Describe)]
-#[describe(name = "ik_sink")]
 pub struct IkSink {
     /// With their limits.
     joints: Vec<Joint>,
@@ -195,7 +194,7 @@ fn check(params: &Params, joints: &JointsShape, columns: &JointsShape, period: f
             mistakes.push(Mistake::param("posture", message));
         }
     }
-    if mistakes.is_empty() { Ok(()) } else { Err(mistakes) }
+    refuse_any(mistakes)
 }
 
 #[cfg(test)]

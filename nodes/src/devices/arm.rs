@@ -1,7 +1,7 @@
 //! What every arm states: the role `velocity_arm`, its joints, its ports and its facts.
 
 use tactflow_runtime::device::{Command, Description, DeviceError, Output, Report, Samples};
-use tactflow_runtime::node::{FilePath, Mistake, Mistakes};
+use tactflow_runtime::node::{FilePath, Mistake, Mistakes, refuse_any};
 use tactflow_runtime::signal::{Joint, Joints, JointsShape, Pose, Unit};
 
 use super::Facts;
@@ -48,15 +48,13 @@ pub(crate) fn joints(chain: &Chain, acceleration: f64, start: &[f64]) -> Result<
         return Err(Mistake::param("start", message).into());
     }
     let outside = joints.iter().zip(start).filter(|(joint, q)| !(joint.lower..=joint.upper).contains(*q));
-    let mistakes: Mistakes = outside
-        .map(|(Joint { name, lower, upper, .. }, q)| {
-            let message = format!(
-                "joint `{name}` cannot start at {q}: its range is {lower:.4} to {upper:.4} (rad, or m if prismatic)"
-            );
-            Mistake::param("start", message)
-        })
-        .collect();
-    if mistakes.is_empty() { Ok(JointsShape { joints, unit: Unit::RADIAN }) } else { Err(mistakes) }
+    refuse_any(outside.map(|(Joint { name, lower, upper, .. }, q)| {
+        let message = format!(
+            "joint `{name}` cannot start at {q}: its range is {lower:.4} to {upper:.4} (rad, or m if prismatic)"
+        );
+        Mistake::param("start", message)
+    }))?;
+    Ok(JointsShape { joints, unit: Unit::RADIAN })
 }
 
 /// Checks that every commanded velocity is finite.

@@ -1,7 +1,7 @@
 //! `mock_arm`: an arm that follows its commands exactly, q_eq += v dt.
 
 use tactflow_runtime::device::{Commands, Description, Device, DeviceError, Driver, Opened, Samples, Stepped};
-use tactflow_runtime::node::{Describe, FilePath, Mistake, Mistakes, Param};
+use tactflow_runtime::node::{Describe, FilePath, Mistake, Mistakes, Param, refuse_any};
 use tactflow_runtime::signal::Joint;
 
 use super::arm::{self, ArmPorts};
@@ -75,7 +75,6 @@ struct Hold {
 /// start = [0.0, 0.5, 0.0, -1.3, 0.0, 1.3, 0.0]   # [rad]
 /// ```
 #[derive(Debug, Describe)]
-#[describe(name = "mock_arm")]
 pub struct MockArm {
     ports: ArmPorts,
     joints: Vec<Joint>,
@@ -150,8 +149,7 @@ fn check_holds(holds: &[Hold]) -> Result<(), Mistakes> {
     let backward = holds.iter().filter(|hold| hold.to_s <= hold.from_s);
     let message =
         |hold: &Hold| format!("a hold must end after it starts, not go from {} s to {} s", hold.from_s, hold.to_s);
-    let mistakes: Mistakes = backward.map(|hold| Mistake::param("hold", message(hold))).collect();
-    if mistakes.is_empty() { Ok(()) } else { Err(mistakes) }
+    refuse_any(backward.map(|hold| Mistake::param("hold", message(hold))))
 }
 
 #[cfg(test)]

@@ -74,10 +74,6 @@ where
         Ok(Self(PhantomData))
     }
 
-    fn state(&self) -> State {
-        State::default()
-    }
-
     fn step(&self, _: &Tick, inputs: Inputs<'_, T>, out: &mut Outputs<T>, state: &mut State) {
         let is_open = inputs.gate.is_some_and(|gate| *gate);
         let value = is_open.then_some(&*inputs.value);

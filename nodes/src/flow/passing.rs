@@ -4,7 +4,7 @@ use tactflow_runtime::node::{Out, State};
 use tactflow_runtime::signal::Signal;
 
 /// What a node remembers that passes a signal on.
-#[derive(Default, State)]
+#[derive(State)]
 pub struct State {
     /// The source of the last output; `None` if it was absent.
     last: Option<bool>,

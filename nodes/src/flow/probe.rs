@@ -33,7 +33,7 @@ use tactflow_runtime::source::Code;
 /// every_ms = 100                      # at most ten lines per second
 /// ```
 #[derive(Describe)]
-#[describe(name = "probe", logs)]
+#[describe(logs)]
 pub struct Probe {
     /// Minimum time between two lines [ns].
     every: i64,
@@ -99,10 +99,6 @@ impl Node for Probe {
             return Err(mistake.help("wire a signal to it: `in.force = \"moments.force\"`").into());
         }
         Ok(Self { every: (params.every_ms * 1e6) as i64 })
-    }
-
-    fn state(&self) -> State {
-        State { last: None }
     }
 
     fn step(&self, tick: &Tick, _: Inputs<'_>, out: &mut Outputs, state: &mut State) {

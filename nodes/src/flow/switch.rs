@@ -73,10 +73,6 @@ where
         Ok(Self(PhantomData))
     }
 
-    fn state(&self) -> State {
-        State::default()
-    }
-
     fn step(&self, _: &Tick, inputs: Inputs<'_, T>, out: &mut Outputs<T>, state: &mut State) {
         let select = inputs.select.map(|select| *select);
         let selected = select.and_then(|is_on| if is_on { inputs.on } else { inputs.off });

@@ -30,7 +30,7 @@ use crate::motion::bounds::{approach_twist, countable};
 /// angular_rad_per_s2 = 10.0
 /// ```
 #[derive(Describe)]
-#[describe(name = "acceleration_limit", every_tick)]
+#[describe(every_tick)]
 pub struct AccelerationLimit {
     params: Params,
     /// Maximum age of the motion [ns].
@@ -81,10 +81,6 @@ impl Node for AccelerationLimit {
         setup.outputs.acceleration = fraction();
         let max_age = max_age(params.max_age_ms, setup.period);
         Ok(Self { params, max_age })
-    }
-
-    fn state(&self) -> State {
-        State { reached: Twist::default() }
     }
 
     fn step(&self, tick: &Tick, inputs: Inputs<'_>, out: &mut Outputs, state: &mut State) {

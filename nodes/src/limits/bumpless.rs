@@ -32,7 +32,7 @@ use crate::motion::bounds::{countable, scale_twist, twist_ratio};
 /// angular_rad_per_s2 = 10.0
 /// ```
 #[derive(Describe)]
-#[describe(name = "bumpless", every_tick)]
+#[describe(every_tick)]
 pub struct Bumpless {
     params: Params,
     /// Maximum linear and angular speed of the input [m/s, rad/s].
@@ -92,10 +92,6 @@ impl Node for Bumpless {
         setup.outputs.bumpless = fraction();
         let speeds = [params.linear_m_per_s, params.angular_rad_per_s].map(|speed| speed.unwrap_or(f64::INFINITY));
         Ok(Self { params, speeds })
-    }
-
-    fn state(&self) -> State {
-        State { last: Twist::default(), offset: Twist::default() }
     }
 
     fn step(&self, tick: &Tick, inputs: Inputs<'_>, out: &mut Outputs, state: &mut State) {

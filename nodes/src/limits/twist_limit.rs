@@ -20,7 +20,6 @@ use crate::motion::bounds::scale_twist;
 /// angular_rad_per_s = 0.8
 /// ```
 #[derive(Describe)]
-#[describe(name = "twist_limit")]
 pub struct TwistLimit {
     params: Params,
 }
@@ -67,8 +66,6 @@ impl Node for TwistLimit {
         setup.outputs.speed = fraction();
         Ok(Self { params })
     }
-
-    fn state(&self) {}
 
     fn step(&self, _: &Tick, inputs: Inputs<'_>, out: &mut Outputs, (): &mut ()) {
         let scale = scale_twist(&inputs.twist, self.params.linear_m_per_s, self.params.angular_rad_per_s);

@@ -36,7 +36,7 @@ use crate::motion::braking::stopping_speed;
 /// deceleration_m_per_s2 = 0.5
 /// ```
 #[derive(Describe)]
-#[describe(name = "workspace_limit", every_tick)]
+#[describe(every_tick)]
 pub struct WorkspaceLimit {
     params: Params,
     /// Maximum age of the pose [ns].
@@ -101,8 +101,6 @@ impl Node for WorkspaceLimit {
         let max_age = max_age(params.max_age_ms, setup.period);
         Ok(Self { params, max_age })
     }
-
-    fn state(&self) {}
 
     fn step(&self, tick: &Tick, inputs: Inputs<'_>, out: &mut Outputs, (): &mut ()) {
         if inputs.pose.stamp().age(tick.now) > self.max_age {

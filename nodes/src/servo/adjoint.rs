@@ -26,7 +26,6 @@ use tactflow_runtime::signal::{Pose, Twist};
 /// in.pose = "state.sensor_pose"
 /// ```
 #[derive(Describe)]
-#[describe(name = "adjoint")]
 pub struct Adjoint;
 
 /// What `adjoint` reads.
@@ -59,8 +58,6 @@ impl Node for Adjoint {
     fn new((): (), _: &mut Setup<Self>) -> Result<Self, Mistakes> {
         Ok(Self)
     }
-
-    fn state(&self) {}
 
     fn step(&self, _: &Tick, inputs: Inputs<'_>, out: &mut Outputs, (): &mut ()) {
         out.twist.set(adjoint(&inputs.pose, &inputs.twist));

@@ -21,7 +21,6 @@ use tactflow_runtime::source::Code;
 /// frame = "pad"
 /// ```
 #[derive(Describe)]
-#[describe(name = "compose_twist")]
 pub struct ComposeTwist;
 
 /// Parameters of `compose_twist`.
@@ -76,8 +75,6 @@ impl Node for ComposeTwist {
         }
         Ok(Self)
     }
-
-    fn state(&self) {}
 
     fn step(&self, _: &Tick, inputs: Inputs<'_>, out: &mut Outputs, (): &mut ()) {
         let Inputs { vx, vy, vz, wx, wy, wz, .. } = inputs;

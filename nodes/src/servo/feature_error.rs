@@ -3,7 +3,8 @@
 //! Each component keeps the stamp of its own input, so that `pid` measures the time between the samples of a feature.
 
 use tactflow_runtime::node::{
-    At, Describe, Inputs, Many, Map, Mistake, Mistakes, Node, Out, Outputs, Param, Setup, Tick,
+    At, Describe, Inputs, Many, Map, Mistake, Mistakes, Node, Out, Outputs, Param, Setup, Tick, collect_both,
+    refuse_any,
 };
 use tactflow_runtime::signal::{Feature, Features, FeaturesShape, Scalar, ScalarShape};
 use tactflow_runtime::source::Code;
@@ -31,7 +32,6 @@ use crate::motion::axis::wrap_axial;
 /// setpoint = { x = 0.0, y = 0.0, pressure = 0.1 }   # [m, m, N per tactel]
 /// ```
 #[derive(Describe)]
-#[describe(name = "feature_error")]
 pub struct FeatureError {
     /// One for each wire.
     setpoints: Box<[Setpoint]>,
@@ -86,13 +86,7 @@ impl Node for FeatureError {
         }
         let names = || wires.iter().map(|(name, _)| name.as_str());
         let values = params.setpoint.in_order("setpoint", names());
-        let required = indices(&params.requires, names());
-        let (values, required) = match (values, required) {
-            (Ok(values), Ok(required)) => (values, required),
-            (values, required) => {
-                return Err([values.err(), required.err()].into_iter().flatten().flatten().collect());
-            }
-        };
+        let (values, required) = collect_both(values, indices(&params.requires, names()))?;
         let setpoint = |(value, (_, shape)): (&f64, &(String, ScalarShape))| Setpoint {
             value: *value,
             is_axial: shape.unit.is_axial(),
@@ -102,8 +96,6 @@ impl Node for FeatureError {
         setup.outputs.error = FeaturesShape { features: wires.iter().map(feature).collect() };
         Ok(Self { setpoints, required })
     }
-
-    fn state(&self) {}
 
     fn step(&self, _: &Tick, inputs: Inputs<'_>, out: &mut Outputs, (): &mut ()) {
         let is_complete = self.required.iter().all(|i| inputs.feature.get(*i).is_some());
@@ -136,12 +128,8 @@ fn indices<'n>(required: &[String], names: impl Iterator<Item = &'n str> + Clone
         let mistake = Mistake::param("requires", format!("no feature is called `{name}`"));
         mistake.help(format!("the features here are {}", listed()))
     };
-    let mistakes: Mistakes = required.iter().filter(|name| !names.clone().any(|n| n == *name)).map(unknown).collect();
-    if mistakes.is_empty() {
-        Ok(required.iter().filter_map(|name| names.clone().position(|n| n == name)).collect())
-    } else {
-        Err(mistakes)
-    }
+    refuse_any(required.iter().filter(|name| !names.clone().any(|n| n == *name)).map(unknown))?;
+    Ok(required.iter().filter_map(|name| names.clone().position(|n| n == name)).collect())
 }
 
 #[cfg(test)]

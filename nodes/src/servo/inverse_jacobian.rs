@@ -30,7 +30,6 @@ use tactflow_runtime::signal::{Features, Twist};
 /// columns.pressure = [  0,  0,  1,   0,   0,  0 ]   # [m per N per tactel]
 /// ```
 #[derive(Describe)]
-#[describe(name = "inverse_jacobian")]
 pub struct InverseJacobian {
     /// One for each feature, in their order.
     columns: Box<[Twist]>,
@@ -70,8 +69,6 @@ impl Node for InverseJacobian {
         let columns = params.columns.in_order("columns", setup.inputs.control.names())?;
         Ok(Self { columns: columns.into_iter().map(|column| Twist((*column).into())).collect() })
     }
-
-    fn state(&self) {}
 
     fn uses(&self, wanted: &[Components]) -> Vec<Components> {
         let is_used = |column: &Twist| (0..6).any(|i| column.0[i] != 0.0 && wanted[0].has(i));

@@ -24,7 +24,6 @@ use tactflow_runtime::signal::Twist;
 /// select = [1, 1, 1, 0, 0, 0]         # place and pressure, no rolling
 /// ```
 #[derive(Describe)]
-#[describe(name = "projector")]
 pub struct Projector {
     passes: [bool; 6],
 }
@@ -62,8 +61,6 @@ impl Node for Projector {
     fn new(params: Params, _: &mut Setup<Self>) -> Result<Self, Mistakes> {
         Ok(Self { passes: params.select.map(|entry| entry == 1) })
     }
-
-    fn state(&self) {}
 
     fn uses(&self, wanted: &[Components]) -> Vec<Components> {
         vec![Components::of(6, |i| self.passes[i] && wanted[0].has(i))]

@@ -22,7 +22,6 @@ use tactflow_runtime::source::Code;
 /// in.guide = "guide.twist"
 /// ```
 #[derive(Describe)]
-#[describe(name = "twist_adder")]
 pub struct TwistAdder;
 
 /// What `twist_adder` reads.
@@ -54,8 +53,6 @@ impl Node for TwistAdder {
         }
         Ok(Self)
     }
-
-    fn state(&self) {}
 
     fn uses(&self, wanted: &[Components]) -> Vec<Components> {
         wanted.into()

@@ -23,7 +23,7 @@ use tactflow_runtime::signal::{Flag, Twist};
 /// twist = [0, 0.01, 0, 0, 0, 0]       # [m/s, rad/s]
 /// ```
 #[derive(Describe)]
-#[describe(name = "twist_source", every_tick)]
+#[describe(every_tick)]
 pub struct TwistSource {
     twist: Twist,
     is_still: bool,
@@ -67,8 +67,6 @@ impl Node for TwistSource {
         let (is_still, is_gated) = (setup.is_still, setup.inputs.gate.is_some());
         Ok(Self { twist: Twist(params.twist.into()), is_still, is_gated })
     }
-
-    fn state(&self) {}
 
     fn step(&self, _: &Tick, inputs: Inputs<'_>, out: &mut Outputs, (): &mut ()) {
         if !self.is_still && (!self.is_gated || inputs.gate.is_some_and(|gate| *gate)) {

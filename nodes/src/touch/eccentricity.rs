@@ -25,7 +25,6 @@ use super::moments::{Inputs, Weighing, Weight, ellipse, image_shape};
 /// in.region = "label.region"
 /// ```
 #[derive(Describe)]
-#[describe(name = "eccentricity")]
 pub struct Eccentricity {
     shape: ImageShape,
     weighing: Weighing,
@@ -61,8 +60,6 @@ impl Node for Eccentricity {
         let shape = image_shape(&setup.inputs)?;
         Ok(Self { shape, weighing: Weighing::new(params.weight, params.threshold)? })
     }
-
-    fn state(&self) {}
 
     fn step(&self, _: &Tick, inputs: Inputs<'_>, out: &mut Outputs, (): &mut ()) {
         let sums = self.weighing.add_up(&inputs.image, &inputs.region);

@@ -26,7 +26,6 @@ use super::moments::{Inputs, Params, Weighing, ellipse, image_shape};
 /// in.region = "label.region"
 /// ```
 #[derive(Describe)]
-#[describe(name = "principal_axes")]
 pub struct PrincipalAxes {
     shape: ImageShape,
     weighing: Weighing,
@@ -58,8 +57,6 @@ impl Node for PrincipalAxes {
         let weighing = Weighing::new(params.weight, params.threshold)?;
         Ok(Self { shape, weighing, min_anisotropy: params.min_anisotropy })
     }
-
-    fn state(&self) {}
 
     fn step(&self, _: &Tick, inputs: Inputs<'_>, out: &mut Outputs, (): &mut ()) {
         let sums = self.weighing.add_up(&inputs.image, &inputs.region);

@@ -32,7 +32,6 @@ use super::label::{centroid_buffer, centroids, distance_squared, paint, ranked};
 /// min_area = 4                        # [tactels]
 /// ```
 #[derive(Describe)]
-#[describe(name = "select_region")]
 pub struct SelectRegion {
     params: Params,
     grid: Grid,

@@ -1,10 +1,10 @@
 //! `#[derive(Describe)]`.
 
 use proc_macro2::TokenStream;
-use quote::quote;
+use quote::{ToTokens, quote};
 use syn::{Attribute, DeriveInput, LitStr, Type};
 
-use crate::attributes::{Words, is_snake_case};
+use crate::attributes::{Words, is_snake_case, snake_case};
 use crate::docs::{Page, is_example_of, lines};
 use crate::fault::Faults;
 
@@ -25,11 +25,12 @@ pub(crate) fn derive(input: &DeriveInput) -> TokenStream {
     if page.summary.is_empty() {
         faults.add(&input.ident, format!("`{}` needs a doc comment: its first line is the summary", input.ident));
     }
-    let attributes = input.attrs.iter().filter(|attribute| attribute.path().is_ident("describe"));
-    let names: Vec<Name> = attributes.filter_map(|attribute| name(attribute, input, &mut faults)).collect();
-    if !input.attrs.iter().any(|attribute| attribute.path().is_ident("describe")) {
-        faults.add(&input.ident, "`#[describe(name = \"…\")]` is missing: it defines the `type` in a graph file");
+    let mut attributes: Vec<Option<&Attribute>> =
+        input.attrs.iter().filter(|attribute| attribute.path().is_ident("describe")).map(Some).collect();
+    if attributes.is_empty() {
+        attributes.push(None);
     }
+    let names: Vec<Name> = attributes.iter().filter_map(|attribute| name(*attribute, input, &mut faults)).collect();
     for (i, Name { name, .. }) in names.iter().enumerate() {
         if names[..i].iter().any(|other| other.name.value() == name.value()) {
             faults.add(name, format!("the name `{}` is given twice: remove one", name.value()));
@@ -45,8 +46,9 @@ pub(crate) fn derive(input: &DeriveInput) -> TokenStream {
     faults.with(implementations)
 }
 
-fn name(attribute: &Attribute, input: &DeriveInput, faults: &mut Faults) -> Option<Name> {
-    let mut words = Words::new(std::slice::from_ref(attribute), "describe", KNOWN, faults);
+/// Reads one attribute, or none; without a name in it, the name is that of the struct in snake_case.
+fn name(attribute: Option<&Attribute>, input: &DeriveInput, faults: &mut Faults) -> Option<Name> {
+    let mut words = Words::new(attribute.map_or(&[], std::slice::from_ref), "describe", KNOWN, faults);
     let is_flag = |word: &str, words: &mut Words, faults: &mut Faults| words.flag(word, faults).is_some();
     let (every_tick, logs) = (is_flag("every_tick", &mut words, faults), is_flag("logs", &mut words, faults));
     let of = words.text("of", faults);
@@ -56,16 +58,15 @@ fn name(attribute: &Attribute, input: &DeriveInput, faults: &mut Faults) -> Opti
         None if is_generic => {
             let message =
                 format!("`{0}` is generic: add the concrete type of this name, `of = \"{0}<…>\"`", input.ident);
-            faults.add(attribute, message);
+            let place: &dyn ToTokens = attribute.map_or(&input.ident, |attribute| attribute);
+            faults.add(place, message);
             return None;
         }
         _ => {}
     }
     let of = of.and_then(|of| faults.take(of.parse::<Type>()));
-    let Some(name) = words.text("name", faults) else {
-        faults.add(attribute, "`name = \"…\"` is missing: it defines the `type` in a graph file");
-        return None;
-    };
+    let of_struct = || LitStr::new(&snake_case(&input.ident.to_string()), input.ident.span());
+    let name = words.text("name", faults).unwrap_or_else(of_struct);
     if !is_snake_case(&name.value()) {
         faults.add(&name, format!("`{}` is not snake_case, as every `type` in a graph file is", name.value()));
     }

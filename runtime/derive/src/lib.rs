@@ -41,7 +41,8 @@ pub fn derive_outputs(input: TokenStream) -> TokenStream {
     ports::outputs(&parse_macro_input!(input as DeriveInput)).into()
 }
 
-/// Implements `Clone` for a node's state, with a `clone_from` that goes field by field and so does not allocate.
+/// Implements `Default` for a node's state, and `Clone` with a `clone_from` that goes field by field and so does not
+/// allocate.
 #[proc_macro_derive(State)]
 pub fn derive_state(input: TokenStream) -> TokenStream {
     state::derive(&parse_macro_input!(input as DeriveInput)).into()

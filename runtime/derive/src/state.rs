@@ -13,6 +13,13 @@ pub(crate) fn derive(input: &DeriveInput) -> TokenStream {
     let (name, (generics, arguments, bounds)) = (&input.ident, input.generics.split_for_impl());
     faults.with(quote! {
         #[automatically_derived]
+        impl #generics ::core::default::Default for #name #arguments #bounds {
+            fn default() -> Self {
+                Self { #(#names: ::core::default::Default::default()),* }
+            }
+        }
+
+        #[automatically_derived]
         impl #generics ::core::clone::Clone for #name #arguments #bounds {
             fn clone(&self) -> Self {
                 Self { #(#names: ::core::clone::Clone::clone(&self.#names)),* }

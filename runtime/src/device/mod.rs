@@ -25,7 +25,7 @@ pub use live::{Link, Live};
 pub(crate) use live::{Linked, link};
 
 /// The type of a role: the ports that a task reads, and the ports that it commands.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub struct RoleType {
     /// Its name in the section `[roles]`.
     pub name: Cow<'static, str>,

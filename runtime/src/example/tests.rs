@@ -17,7 +17,6 @@ mod follow {
     /// in.position = "motor.position"
     /// ```
     #[derive(Describe)]
-    #[describe(name = "follow")]
     pub(super) struct Follow;
 
     /// What it reads.
@@ -47,7 +46,6 @@ mod follow {
             setup.outputs.velocity = setup.inputs.position.in_unit(Unit::RADIAN.per_second());
             Ok(Self)
         }
-        fn state(&self) {}
         fn step(&self, _: &Tick, _: Inputs<'_>, _: &mut Outputs, (): &mut ()) {}
     }
 }
@@ -93,7 +91,6 @@ mod bound {
             setup.outputs.velocity = setup.inputs.velocity.clone();
             Ok(Self)
         }
-        fn state(&self) {}
         fn step(&self, _: &Tick, _: Inputs<'_>, _: &mut Outputs, (): &mut ()) {}
     }
 }
@@ -143,22 +140,12 @@ impl Stepped for Motor {
 }
 
 fn world() -> Catalogue {
-    let port = |name: &'static str, unit: &'static str| PortSpec {
-        name: name.into(),
-        doc: "".into(),
-        kind: Kind::Joints,
-        args: vec![Cow::Borrowed(unit), "self".into()].into(),
-        need: Need::REQUIRED,
-    };
-    let (outputs, commands) = (vec![port("position", "rad")], vec![port("velocity", "rad/s")]);
+    let port = |name, unit| PortSpec::new(name, "", Kind::Joints, &[unit, "self"]);
     let role = RoleType {
         name: "motor".into(),
-        summary: "".into(),
-        outputs,
-        commands,
-        reports: vec![],
-        limits: vec![],
-        is_observed: false,
+        outputs: vec![port("position", "rad")],
+        commands: vec![port("velocity", "rad/s")],
+        ..RoleType::default()
     };
     Catalogue::new().role(role).node::<follow::Follow>().node::<bound::BoundVelocity>().device::<Motor>()
 }

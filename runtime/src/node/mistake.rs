@@ -94,3 +94,23 @@ impl From<Mistake> for Mistakes {
         vec![mistake]
     }
 }
+
+/// Returns the mistakes as an error if there are any.
+///
+/// # Errors
+/// All the mistakes.
+pub fn refuse_any(mistakes: impl IntoIterator<Item = Mistake>) -> Result<(), Mistakes> {
+    let mistakes: Mistakes = mistakes.into_iter().collect();
+    if mistakes.is_empty() { Ok(()) } else { Err(mistakes) }
+}
+
+/// Returns both values, or the mistakes of both.
+///
+/// # Errors
+/// The mistakes of `a`, then those of `b`.
+pub fn collect_both<A, B>(a: Result<A, Mistakes>, b: Result<B, Mistakes>) -> Result<(A, B), Mistakes> {
+    match (a, b) {
+        (Ok(a), Ok(b)) => Ok((a, b)),
+        (a, b) => Err([a.err(), b.err()].into_iter().flatten().flatten().collect()),
+    }
+}

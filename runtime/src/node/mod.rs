@@ -5,11 +5,11 @@
 //!
 //! | Derive | implements | reads |
 //! |---|---|---|
-//! | `#[derive(Describe)]` | [`Describe`](trait@Describe) | the doc comment, `#[describe(name = "…", every_tick, logs)]` |
+//! | `#[derive(Describe)]` | [`Describe`](trait@Describe) | the name, the doc comment, `#[describe(name = "…", every_tick, logs)]` |
 //! | `#[derive(Param)]` | [`Param`](trait@Param) for a table or a word | `#[param(unit = "…", range = …, above = …, default = …, live)]` |
 //! | `#[derive(Inputs)]` | [`InputSet`] | `#[port(unit = "…", frame = "…", …)]` |
 //! | `#[derive(Outputs)]` | [`OutputSet`] | the same |
-//! | `#[derive(State)]` | [`Clone`], field by field, so that a reset does not allocate | |
+//! | `#[derive(State)]` | [`Default`]; [`Clone`], field by field, so that a reset does not allocate | |
 //!
 //! The type of an input and its attribute declare what it needs. The three properties are independent: whether it must
 //! be wired (`optional`), whether it must be present while the node steps (`Option`), and whether a new value wakes the
@@ -57,7 +57,7 @@ pub use erased::{AnyNode, Built, Configured, Given, NodeSpec, NodeType, of};
 pub use file_path::FilePath;
 pub use inputs::{In, InputSet, Many, View};
 pub use limits::{Components, Limits};
-pub use mistake::{At, Mistake, Mistakes};
+pub use mistake::{At, Mistake, Mistakes, collect_both, refuse_any};
 pub use outputs::{Out, OutputSet};
 pub use param_spec::{Contents, Declared, ParamSpec, Repeats, Written, written_table};
 pub use params::{Map, Spanned};
@@ -68,7 +68,8 @@ pub use tactflow_derive::{Describe, Inputs, Outputs, Param, State};
 pub use tick::Tick;
 pub use time::{Absence, Interval};
 
-/// The name and the documentation of a node or a device. `#[derive(Describe)]` takes them from the doc comment.
+/// The name and the documentation of a node or a device. `#[derive(Describe)]` takes them from the struct and its doc
+/// comment.
 pub trait Describe {
     /// The `type` in a graph file.
     const NAME: &'static str;
@@ -97,7 +98,7 @@ pub trait Node: Describe + Sized + Send + 'static {
     /// The outputs; `()` for none.
     type Outputs: OutputSet;
     /// The state that lasts from one step to the next; `()` for none.
-    type State: Clone + Send + 'static;
+    type State: Clone + Default + Send + 'static;
 
     /// The limits that the node holds, passes on or breaks.
     const LIMITS: Limits = Limits::NONE;
@@ -108,8 +109,10 @@ pub trait Node: Describe + Sized + Send + 'static {
     /// The mistakes in the parameters or the wires, each with its place.
     fn new(params: Self::Params, setup: &mut Setup<Self>) -> Result<Self, Mistakes>;
 
-    /// Returns the initial state. A reset restores it.
-    fn state(&self) -> Self::State;
+    /// Returns the initial state. A reset restores it. Implement it for a state that depends on the configuration.
+    fn state(&self) -> Self::State {
+        Self::State::default()
+    }
 
     /// Returns the components of each input that the `wanted` components of the outputs depend on, in the order of the
     /// declarations. Implement it for a node that passes on components one by one. An empty list stands for all

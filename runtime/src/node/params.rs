@@ -6,7 +6,7 @@ use std::ops::Range;
 
 use super::bounds::Bounds;
 use super::file_path::FilePath;
-use super::mistake::{At, Mistake, Mistakes};
+use super::mistake::{At, Mistake, Mistakes, refuse_any};
 use super::param_spec::{Contents, Repeats, Written};
 use super::reader::{Param, Reader, read_leaf};
 use crate::signal::Unit;
@@ -58,11 +58,7 @@ impl Param for f64 {
 
     fn read(value: &Value, reader: &mut Reader<'_>) -> Option<Self> {
         let number: Self = reader.number(value, Self::EXPECTS, |number| number)?;
-        if !number.is_finite() {
-            reader.bad(value.span.clone(), "expected a finite number");
-            return None;
-        }
-        Some(number)
+        if number.is_finite() { Some(number) } else { reader.bad(value.span.clone(), "expected a finite number") }
     }
 
     fn written(&self) -> Option<Written> {
@@ -112,13 +108,7 @@ impl Param for Unit {
 
     fn read(value: &Value, reader: &mut Reader<'_>) -> Option<Self> {
         let text: String = read_leaf(value, reader, Self::EXPECTS)?;
-        match text.parse() {
-            Ok(unit) => Some(unit),
-            Err(message) => {
-                reader.bad(value.span.clone(), message);
-                None
-            }
-        }
+        text.parse().map_or_else(|message: String| reader.bad(value.span.clone(), message), Some)
     }
 
     fn written(&self) -> Option<Written> {
@@ -179,8 +169,7 @@ impl<T: Param> Param for Vec<T> {
 
     fn read(value: &Value, reader: &mut Reader<'_>) -> Option<Self> {
         let Item::Array(items) = &value.item else {
-            reader.wrong_type(value, Self::EXPECTS);
-            return None;
+            return reader.wrong_type(value, Self::EXPECTS);
         };
         let read: Vec<Option<T>> = items.iter().map(|item| T::read(item, reader)).collect();
         read.into_iter().collect()
@@ -208,10 +197,7 @@ impl<T: Param, const N: usize> Param for [T; N] {
     fn read(value: &Value, reader: &mut Reader<'_>) -> Option<Self> {
         match &value.item {
             Item::Array(items) if items.len() == N => Vec::<T>::read(value, reader)?.try_into().ok(),
-            _ => {
-                reader.wrong_type(value, &format!("a list of {N}"));
-                None
-            }
+            _ => reader.wrong_type(value, &format!("a list of {N}")),
         }
     }
 
@@ -238,8 +224,7 @@ impl<T: Param> Param for Map<T> {
 
     fn read(value: &Value, reader: &mut Reader<'_>) -> Option<Self> {
         let Item::Table(table) = &value.item else {
-            reader.wrong_type(value, Self::EXPECTS);
-            return None;
+            return reader.wrong_type(value, Self::EXPECTS);
         };
         let read = |(key, value): &(Key, Value)| Some((key.name.clone(), T::read(value, reader)?));
         let entries: Vec<Option<(String, T)>> = table.entries.iter().map(read).collect();
@@ -283,6 +268,7 @@ impl<T> Map<T> {
             let mistake = Mistake::new(Code::MissingKey, At::Key(param.into()), message);
             mistakes.push(mistake.help(format!("add `{param}.{name} = …`; the features here are {}", listed())));
         }
-        if mistakes.is_empty() { Ok(names.map(|name| &self.0[name]).collect()) } else { Err(mistakes) }
+        refuse_any(mistakes)?;
+        Ok(names.map(|name| &self.0[name]).collect())
     }
 }

@@ -66,12 +66,10 @@ pub(crate) fn frame_args(port: &PortSpec) -> &[std::borrow::Cow<'static, str>] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::node::Need;
     use crate::signal::Kind;
 
     fn port(unit: &'static str) -> PortSpec {
-        let args = vec![unit.into()].into();
-        PortSpec { name: "x".into(), doc: "".into(), kind: Kind::Scalar, args, need: Need::REQUIRED }
+        PortSpec::new("x", "", Kind::Scalar, &[unit])
     }
 
     #[test]

@@ -44,6 +44,14 @@ pub struct PortSpec {
 }
 
 impl PortSpec {
+    /// Returns the declaration of an output, or of an input that must be wired and present, with the arguments in the
+    /// order of its kind.
+    #[must_use]
+    pub fn new(name: &'static str, doc: &'static str, kind: Kind, args: &[&'static str]) -> Self {
+        let args = args.iter().copied().map(Cow::Borrowed).collect();
+        Self { name: name.into(), doc: doc.into(), kind, args, need: Need::REQUIRED }
+    }
+
     /// Returns the declaration of a port of signal `T`, with its arguments by name. It leaves out arguments that the
     /// kind does not have, and frames from the first `"_"` on.
     #[must_use]
@@ -56,8 +64,8 @@ impl PortSpec {
         let value = |argument: &&str| arguments.iter().find(|(name, _)| name == argument).map(|(_, value)| *value);
         let is_said = |argument: &&str| *argument == "unit" || value(argument) != Some("_");
         let arguments = T::KIND.arguments().iter().take_while(|argument| is_said(argument));
-        let args = arguments.filter_map(value).map(Cow::Borrowed).collect();
-        Self { name: name.into(), doc: doc.into(), kind: T::KIND, args, need }
+        let args: Vec<&'static str> = arguments.filter_map(value).collect();
+        Self { need, ..Self::new(name, doc, T::KIND, &args) }
     }
 }
 

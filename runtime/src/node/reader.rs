@@ -9,7 +9,7 @@ use super::file_path::FilePath;
 use super::mistake::{At, Mistake, Mistakes};
 use super::param_spec::{Contents, Declared, ParamSpec, Written};
 use crate::source::{Code, suggest_name, suggestion};
-use crate::source::{Item, Key, SourceMap, Table, Value};
+use crate::source::{Key, SourceMap, Table, Value};
 
 /// A type that a graph file can set. `#[derive(Param)]` implements it for a struct (a table) and an enum (a word).
 #[diagnostic::on_unimplemented(
@@ -75,27 +75,21 @@ impl<'a> Reader<'a> {
         Self { sources, bounds: None, mistakes: Vec::new() }
     }
 
-    /// Adds the mistake that the value at `span` is wrong.
-    pub fn bad(&mut self, span: Range<usize>, message: impl Into<String>) {
+    /// Adds the mistake that the value at `span` is wrong, and returns `None`.
+    pub fn bad<T>(&mut self, span: Range<usize>, message: impl Into<String>) -> Option<T> {
         self.mistakes.push(Mistake::new(Code::BadValue, At::Span(span), message));
+        None
     }
 
-    /// Adds the mistake that `value` is not of the `expected` type.
-    pub fn wrong_type(&mut self, value: &Value, expected: &str) {
-        self.bad(value.span.clone(), format!("expected {expected}, found {}", value.described()));
+    /// Adds the mistake that `value` is not of the `expected` type, and returns `None`.
+    pub fn wrong_type<T>(&mut self, value: &Value, expected: &str) -> Option<T> {
+        self.bad(value.span.clone(), format!("expected {expected}, found {}", value.described()))
     }
 
     /// Opens a table.
     pub fn table(&mut self, value: &Value) -> Option<OpenTable> {
-        match &value.item {
-            Item::Table(table) => {
-                Some(OpenTable { rest: table.clone(), span: value.span.clone(), missing: Vec::new() })
-            }
-            _ => {
-                self.wrong_type(value, "a table");
-                None
-            }
-        }
+        let rest = value.as_table().cloned().or_else(|| self.wrong_type(value, "a table"))?;
+        Some(OpenTable { rest, span: value.span.clone(), missing: Vec::new() })
     }
 
     /// Reads one field of a table; returns `None` after a mistake.
@@ -126,10 +120,7 @@ impl<'a> Reader<'a> {
     pub fn word<T: Param>(&mut self, value: &Value) -> Option<usize> {
         let text: String = read_leaf(value, self, T::EXPECTS)?;
         let found = T::CONTENTS.words.iter().position(|(word, _)| *word == text);
-        if found.is_none() {
-            self.wrong_type(value, T::EXPECTS);
-        }
-        found
+        found.or_else(|| self.wrong_type(value, T::EXPECTS))
     }
 
     /// Reads a number and checks the range of the field.
@@ -142,11 +133,7 @@ impl<'a> Reader<'a> {
         let Some(bounds) = self.bounds else { return read_leaf(value, self, expects) };
         let expects = bounds.describe(expects);
         let read: T = read_leaf(value, self, &expects)?;
-        if !bounds.contains(number(read)) {
-            self.wrong_type(value, &expects);
-            return None;
-        }
-        Some(read)
+        if bounds.contains(number(read)) { Some(read) } else { self.wrong_type(value, &expects) }
     }
 
     /// Adds a mistake for every key that is left and for every missing field, except one that is misspelt.
@@ -188,9 +175,5 @@ impl<'a> Reader<'a> {
 
 /// Reads a value whose type implements serde's `Deserialize`.
 pub fn read_leaf<T: DeserializeOwned>(value: &Value, reader: &mut Reader<'_>, expects: &str) -> Option<T> {
-    let read = value.read();
-    if read.is_none() {
-        reader.wrong_type(value, expects);
-    }
-    read
+    value.read().or_else(|| reader.wrong_type(value, expects))
 }

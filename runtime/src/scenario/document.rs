@@ -121,10 +121,8 @@ impl Param for Seeds {
             }
             _ => None,
         };
-        if list.is_none() {
-            reader.wrong_type(value, Self::EXPECTS);
-        }
-        Some(Self { list: list?, span: value.span.clone() })
+        let list = list.or_else(|| reader.wrong_type(value, Self::EXPECTS))?;
+        Some(Self { list, span: value.span.clone() })
     }
 }
 
@@ -175,15 +173,13 @@ pub(super) fn document(root: &Table, reader: &mut Reader<'_>) -> Document {
     let section = section.unwrap_or(Value { span: 0..0, item: Item::Table(Table::default()) });
     let scenario = ScenarioTable::read(&section, reader);
     let checks = root.get("check");
-    if let Some(value) = checks.filter(|value| value.as_table().is_none()) {
-        reader.wrong_type(value, "a table of checks");
-    }
+    let checks = checks.and_then(|value| value.as_table().or_else(|| reader.wrong_type(value, "a table of checks")));
     let check = |(key, value): &(Key, Value)| {
         let value = at_key(key, value);
         let table = CheckTable::read(&value, reader);
         CheckBlock { key: key.clone(), value, table }
     };
-    let checks = checks.and_then(Value::as_table).into_iter().flat_map(|table| &table.entries).map(check).collect();
+    let checks = checks.into_iter().flat_map(|table| &table.entries).map(check).collect();
     Document { section, scenario, checks }
 }
 

@@ -34,7 +34,6 @@ use tokio::time::timeout;
 /// address = "192.168.0.7:5005"
 /// ```
 #[derive(Describe)]
-#[describe(name = "udp_pad")]
 pub struct UdpPad {
     image: Output<Image>,
     address: String,

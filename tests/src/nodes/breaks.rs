@@ -5,7 +5,6 @@ use tactflow_runtime::signal::Scalar;
 
 /// Breaks in some tick.
 #[derive(Describe)]
-#[describe(name = "breaks")]
 pub struct Breaks {
     tick: u64,
     panics: bool,
@@ -49,8 +48,6 @@ impl Node for Breaks {
             other => Err(Mistake::param("how", format!("`{other}` is neither `nan` nor `panic`")).into()),
         }
     }
-
-    fn state(&self) {}
 
     fn step(&self, tick: &Tick, inputs: Inputs<'_>, out: &mut Outputs, (): &mut ()) {
         let is_due = tick.index == self.tick;

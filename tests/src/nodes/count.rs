@@ -5,7 +5,6 @@ use tactflow_runtime::signal::Scalar;
 
 /// Counts its steps.
 #[derive(Describe)]
-#[describe(name = "count")]
 pub struct Count;
 
 /// What `count` reads.
@@ -46,10 +45,6 @@ impl Node for Count {
 
     fn new((): (), _: &mut Setup<Self>) -> Result<Self, Mistakes> {
         Ok(Self)
-    }
-
-    fn state(&self) -> State {
-        State { steps: 0.0, time: 0.0, interval: Interval::default() }
     }
 
     fn step(&self, tick: &Tick, inputs: Inputs<'_>, out: &mut Outputs, state: &mut State) {

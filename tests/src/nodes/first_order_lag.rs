@@ -24,7 +24,6 @@ use tactflow_runtime::source::Code;
 /// time = 0.05                         # [s]
 /// ```
 #[derive(Describe)]
-#[describe(name = "first_order_lag")]
 pub struct FirstOrderLag {
     time: f64,
 }
@@ -75,10 +74,6 @@ impl Node for FirstOrderLag {
             return Err(mistake.help("take a `moving_average`: it takes the mean of axes").into());
         }
         Ok(Self { time: params.time })
-    }
-
-    fn state(&self) -> State {
-        State { last: None, interval: Interval::default() }
     }
 
     fn step(&self, tick: &Tick, inputs: Inputs<'_>, out: &mut Outputs, state: &mut State) {

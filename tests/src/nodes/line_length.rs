@@ -32,7 +32,6 @@ pub struct Params {
 /// address = "127.0.0.1:4000"
 /// ```
 #[derive(Describe)]
-#[describe(name = "line_length")]
 pub struct LineLength {
     address: String,
     value: Output<Scalar>,

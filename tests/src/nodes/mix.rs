@@ -25,7 +25,6 @@ use tactflow_runtime::signal::{Feature, Features, FeaturesShape};
 /// absent = "zero"
 /// ```
 #[derive(Describe)]
-#[describe(name = "mix")]
 pub struct Mix {
     rows: Vec<Vec<f64>>,
     absent: Absent,
@@ -94,8 +93,6 @@ impl Node for Mix {
         setup.outputs.mixed = FeaturesShape { features: mixed.collect() };
         Ok(Self { rows: params.matrix, absent: params.absent })
     }
-
-    fn state(&self) {}
 
     fn step(&self, _: &Tick, inputs: Inputs<'_>, out: &mut Outputs, (): &mut ()) {
         for (i, row) in self.rows.iter().enumerate() {

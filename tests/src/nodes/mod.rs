@@ -12,7 +12,7 @@ pub mod unit_delay;
 use tactflow_runtime::catalogue::Catalogue;
 use tactflow_runtime::device::RoleType;
 use tactflow_runtime::harness::FedRole;
-use tactflow_runtime::node::{Need, PortSpec};
+use tactflow_runtime::node::PortSpec;
 use tactflow_runtime::signal::Kind;
 
 /// The nodes and the role.
@@ -34,17 +34,11 @@ pub fn catalogue() -> Catalogue {
 
 /// A role that gives a length.
 fn length() -> RoleType {
-    let args = vec!["m".into(), "self".into()].into();
-    let value =
-        PortSpec { name: "value".into(), doc: "A length.".into(), kind: Kind::Scalar, args, need: Need::REQUIRED };
     RoleType {
         name: "length".into(),
         summary: "a length".into(),
-        outputs: vec![value],
-        commands: vec![],
-        reports: vec![],
-        limits: vec![],
-        is_observed: false,
+        outputs: vec![PortSpec::new("value", "A length.", Kind::Scalar, &["m", "self"])],
+        ..RoleType::default()
     }
 }
 

@@ -5,7 +5,6 @@ use tactflow_runtime::signal::Scalar;
 
 /// Adds what is present.
 #[derive(Describe)]
-#[describe(name = "pair")]
 pub struct Pair;
 
 /// What `pair` reads.
@@ -54,10 +53,6 @@ impl Node for Pair {
 
     fn new((): (), _: &mut Setup<Self>) -> Result<Self, Mistakes> {
         Ok(Self)
-    }
-
-    fn state(&self) -> State {
-        State { steps: 0.0 }
     }
 
     fn step(&self, _: &Tick, inputs: Inputs<'_>, out: &mut Outputs, state: &mut State) {

@@ -14,7 +14,6 @@ use tactflow_runtime::signal::Scalar;
 /// by = 0.5                            # [m]
 /// ```
 #[derive(Describe)]
-#[describe(name = "plus")]
 pub struct Plus {
     by: f64,
 }
@@ -52,8 +51,6 @@ impl Node for Plus {
     fn new(params: Params, _: &mut Setup<Self>) -> Result<Self, Mistakes> {
         Ok(Self { by: params.by })
     }
-
-    fn state(&self) {}
 
     fn step(&self, _: &Tick, inputs: Inputs<'_>, out: &mut Outputs, (): &mut ()) {
         out.value.set(*inputs.value + self.by);

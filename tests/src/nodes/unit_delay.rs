@@ -14,7 +14,7 @@ use tactflow_runtime::signal::Scalar;
 /// in.value = "plus.value"
 /// ```
 #[derive(Describe)]
-#[describe(name = "unit_delay", every_tick)]
+#[describe(every_tick)]
 pub struct UnitDelay {
     initial: f64,
 }
@@ -52,8 +52,6 @@ impl Node for UnitDelay {
     fn new(params: Params, _: &mut Setup<Self>) -> Result<Self, Mistakes> {
         Ok(Self { initial: params.initial })
     }
-
-    fn state(&self) {}
 
     fn step(&self, _: &Tick, inputs: Inputs<'_>, out: &mut Outputs, (): &mut ()) {
         out.value.set(inputs.value.map_or(self.initial, |value| *value));

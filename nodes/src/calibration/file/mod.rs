@@ -44,10 +44,7 @@ impl Param for CurveKind {
     fn read(value: &Value, reader: &mut Reader<'_>) -> Option<Self> {
         let name: String = read_leaf(value, reader, Self::EXPECTS)?;
         let found = KINDS.into_iter().find(|kind| kind.to_string() == name);
-        if found.is_none() {
-            reader.wrong_type(value, Self::EXPECTS);
-        }
-        found
+        found.or_else(|| reader.wrong_type(value, Self::EXPECTS))
     }
 }
 

@@ -77,7 +77,6 @@ pub struct Params {
 /// address = "127.0.0.1:7777"
 /// ```
 #[derive(Describe)]
-#[describe(name = "lockstep")]
 pub struct Lockstep;
 
 impl Device for Lockstep {

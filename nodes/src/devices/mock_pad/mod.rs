@@ -7,7 +7,7 @@ mod glitch;
 mod press;
 
 use tactflow_runtime::device::{Commands, Description, Device, DeviceError, Driver, Opened, Output, Samples, Stepped};
-use tactflow_runtime::node::{Describe, Mistake, Mistakes, Param};
+use tactflow_runtime::node::{Describe, Mistake, Mistakes, Param, refuse_any};
 use tactflow_runtime::signal::{Image, ImageShape, Unit};
 
 use super::{nanos, pad, period_of};
@@ -82,7 +82,6 @@ const MAX_TACTELS: usize = 1 << 22;
 /// ]
 /// ```
 #[derive(Debug, Describe)]
-#[describe(name = "mock_pad")]
 pub struct MockPad {
     image: Output<Image>,
     shape: ImageShape,
@@ -116,9 +115,7 @@ impl Device for MockPad {
         let wrong = params.press.iter().filter_map(|press| press.mistake(params.pitch));
         mistakes.extend(wrong.map(|message| Mistake::param("press", message)));
         let period = period_of(params.rate_hz);
-        if !mistakes.is_empty() {
-            return Err(mistakes);
-        }
+        refuse_any(mistakes)?;
         let shape = ImageShape { rows: params.rows, cols: params.cols, pitch: [params.pitch; 2], unit: params.unit };
         let mut description = Description::every(period as f64 * 1e-9);
         // The values are forces already.

@@ -28,7 +28,6 @@ pub use phase::{ContactPhase, phase};
 /// samples = 5                         # 20 ms at 250 Hz
 /// ```
 #[derive(Describe)]
-#[describe(name = "contact_debounce")]
 pub struct ContactDebounce {
     /// Number of samples, from 1 to 64.
     samples: u32,
@@ -80,10 +79,6 @@ impl Node for ContactDebounce {
 
     fn new(params: Params, _: &mut Setup<Self>) -> Result<Self, Mistakes> {
         Ok(Self { samples: params.samples as u32 })
-    }
-
-    fn state(&self) -> State {
-        State { history: 0, is_present: false }
     }
 
     fn step(&self, _: &Tick, inputs: Inputs<'_>, out: &mut Outputs, state: &mut State) {

@@ -77,10 +77,6 @@ where
         Ok(Self { initial })
     }
 
-    fn state(&self) -> State {
-        State::default()
-    }
-
     fn step(&self, _: &Tick, inputs: Inputs<'_, T>, out: &mut Outputs<T>, state: &mut State) {
         let (input, initial) = (inputs.value, self.initial);
         let is_input = input.map(|_| true).or(initial.map(|_| false));

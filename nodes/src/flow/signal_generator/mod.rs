@@ -3,7 +3,7 @@
 mod waveform;
 
 use tactflow_runtime::node::{
-    At, Describe, In, Inputs, Mistake, Mistakes, Node, Out, Outputs, Param, Setup, State, Tick,
+    At, Describe, In, Inputs, Mistake, Mistakes, Node, Out, Outputs, Param, Setup, State, Tick, refuse_any,
 };
 use tactflow_runtime::signal::{Flag, Scalar, ScalarShape, Unit};
 use tactflow_runtime::source::Code;
@@ -40,7 +40,7 @@ pub use waveform::Waveform;
 /// duration = 20.0                     # [s]
 /// ```
 #[derive(Describe)]
-#[describe(name = "signal_generator", every_tick)]
+#[describe(every_tick)]
 pub struct SignalGenerator {
     params: Params,
     /// Start [ns].
@@ -124,10 +124,6 @@ impl Node for SignalGenerator {
         })
     }
 
-    fn state(&self) -> State {
-        State { opened: None }
-    }
-
     fn step(&self, tick: &Tick, inputs: Inputs<'_>, out: &mut Outputs, state: &mut State) {
         let origin = if !self.is_gated {
             0
@@ -170,7 +166,7 @@ fn check(params: &Params, period: f64) -> Result<(), Mistakes> {
             mistakes.push(Mistake::param(name, message));
         }
     }
-    if mistakes.is_empty() { Ok(()) } else { Err(mistakes) }
+    refuse_any(mistakes)
 }
 
 #[cfg(test)]

@@ -41,7 +41,7 @@ pub use load::{PadLoad, load};
 /// approach_m_per_s = 0.05
 /// ```
 #[derive(Describe)]
-#[describe(name = "contact_limit", every_tick)]
+#[describe(every_tick)]
 pub struct ContactLimit {
     params: Params,
     shape: ImageShape,
@@ -122,10 +122,6 @@ impl Node for ContactLimit {
         (setup.outputs.force, setup.outputs.peak) = (fraction(), fraction());
         let max_age = max_age(params.max_age_ms, setup.period);
         Ok(Self { params, shape: setup.inputs.image.clone(), max_age })
-    }
-
-    fn state(&self) -> State {
-        State { stamp: None, load: PadLoad::default() }
     }
 
     fn step(&self, tick: &Tick, inputs: Inputs<'_>, out: &mut Outputs, state: &mut State) {

@@ -42,7 +42,7 @@ pub use limiter::Limiter;
 /// lead_rad = 0.1
 /// ```
 #[derive(Describe)]
-#[describe(name = "joint_limit", every_tick)]
+#[describe(every_tick)]
 pub struct JointLimit {
     joints: Vec<Joint>,
     lead: f64,

@@ -39,7 +39,6 @@ use fence::{Fence, guarded};
 /// ramp_tactels = 1.0
 /// ```
 #[derive(Describe)]
-#[describe(name = "edge_guard")]
 pub struct EdgeGuard {
     x: Fence,
     y: Fence,
@@ -117,10 +116,6 @@ impl Node for EdgeGuard {
         }
         let fence = |count, pitch| Fence::new(count, pitch, margin, ramp);
         Ok(Self { x: fence(cols, pitch[0]), y: fence(rows, pitch[1]) })
-    }
-
-    fn state(&self) -> State {
-        State { contact: None, absence: Absence::default(), at_rim: false }
     }
 
     fn step(&self, tick: &Tick, inputs: Inputs<'_>, out: &mut Outputs, state: &mut State) {

@@ -38,7 +38,6 @@ use law::{Law, Memory};
 /// gains.pressure = { kp = 0.2, ki = 0.06, within = 0.02 }   # integrates only near the target
 /// ```
 #[derive(Describe)]
-#[describe(name = "pid")]
 pub struct Pid {
     /// The control law of each feature.
     laws: Box<[Law]>,

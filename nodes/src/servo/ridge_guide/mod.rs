@@ -43,7 +43,6 @@ use search::Search;
 /// leg_m = 0.015                       # three tactels
 /// ```
 #[derive(Describe)]
-#[describe(name = "ridge_guide")]
 pub struct RidgeGuide {
     params: Params,
 }

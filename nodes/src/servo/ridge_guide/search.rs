@@ -23,7 +23,7 @@ use super::slope::Slope;
 use crate::motion::travel::{Odometer, Stall};
 
 /// What `ridge_guide` remembers.
-#[derive(Default, State)]
+#[derive(State)]
 pub struct Search {
     odometer: Odometer,
     /// Heading of the search, a unit vector.

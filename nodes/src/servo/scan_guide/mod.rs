@@ -45,7 +45,6 @@ use scan::Scan;
 /// step_m = 0.01
 /// ```
 #[derive(Describe)]
-#[describe(name = "scan_guide")]
 pub struct ScanGuide {
     params: Params,
 }
@@ -139,10 +138,6 @@ impl Node for ScanGuide {
     fn new(params: Params, setup: &mut Setup<Self>) -> Result<Self, Mistakes> {
         setup.outputs.progress.range = [0.0, 1.0];
         Ok(Self { params })
-    }
-
-    fn state(&self) -> State {
-        State { scan: None, absence: Absence::default() }
     }
 
     fn step(&self, tick: &Tick, inputs: Inputs<'_>, out: &mut Outputs, state: &mut State) {

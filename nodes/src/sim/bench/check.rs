@@ -1,6 +1,6 @@
 //! Checks of the parameters of a simulated bench.
 
-use tactflow_runtime::node::{At, Mistake, Mistakes};
+use tactflow_runtime::node::{At, Mistake, Mistakes, refuse_any};
 use tactflow_runtime::signal::ImageShape;
 use tactflow_runtime::source::Code;
 
@@ -63,7 +63,8 @@ pub(super) fn check(params: &Params, shape: &ImageShape) -> Result<(), Mistakes>
         let message = format!("an arm of {} joints needs `inertia`", params.start.len());
         mistakes.push(Mistake::new(Code::MissingKey, At::Node, message));
     }
-    if mistakes.is_empty() { check_motion(params) } else { Err(mistakes) }
+    refuse_any(mistakes)?;
+    check_motion(params)
 }
 
 /// Checks that every spring is slow enough for the steps: a faster one gains energy, and the simulation diverges.
@@ -94,7 +95,7 @@ fn check_motion(params: &Params) -> Result<(), Mistakes> {
             format!("a joint of {min_inertia} kg m² moves too fast for a `step_s` of {dt} s: make `step_s` smaller");
         mistakes.push(Mistake::param(*name, message));
     }
-    if mistakes.is_empty() { Ok(()) } else { Err(mistakes) }
+    refuse_any(mistakes)
 }
 
 /// Returns the mistake of an object. An entry of a list has no span of its own, so the message names its number.

@@ -157,7 +157,6 @@ pub const MAX_TACTELS: usize = 128 * 128;
 /// ]
 /// ```
 #[derive(Describe)]
-#[describe(name = "sim_bench")]
 pub struct SimBench {
     image: Output<Image>,
     arm: ArmPorts,

@@ -46,7 +46,6 @@ use rule::{Rule, rule};
 /// release = 0.010                     # and stays above this [N]
 /// ```
 #[derive(Describe)]
-#[describe(name = "binarize")]
 pub struct Binarize {
     rule: Rule,
     /// Size of the memory.

@@ -1,9 +1,9 @@
 //! The rule that chooses the tactels, from the parameters.
 
-use tactflow_runtime::node::{Mistake, Mistakes};
+use tactflow_runtime::node::{Mistake, Mistakes, collect_both};
 
 use super::{Method, Params};
-use crate::touch::common::{both, narrow};
+use crate::touch::common::narrow;
 
 /// How tactels are chosen.
 #[derive(Debug, Clone, Copy)]
@@ -16,8 +16,8 @@ pub(super) enum Rule {
 /// Returns the rule that the parameters select.
 pub(super) fn rule(params: &Params) -> Result<Rule, Mistakes> {
     let stay = params.release.map(|release| narrow("release", release)).transpose();
-    let thresholds = both(narrow("threshold", params.threshold), stay);
-    let ((enter, stay), ()) = both(thresholds, check_method(params))?;
+    let thresholds = collect_both(narrow("threshold", params.threshold), stay);
+    let ((enter, stay), ()) = collect_both(thresholds, check_method(params))?;
     match (params.method, stay) {
         (Method::Otsu, _) => Ok(Rule::Otsu { least: enter }),
         (Method::Fixed, None) => Ok(Rule::Above(enter)),

@@ -2,14 +2,14 @@
 
 use std::str::FromStr;
 
-use tactflow_runtime::node::{At, FilePath, Mistake, Mistakes, Param, Reader, Written};
+use tactflow_runtime::node::{At, FilePath, Mistake, Mistakes, Param, Reader, Written, collect_both, refuse_any};
 use tactflow_runtime::signal::{ImageShape, Unit};
 use tactflow_runtime::source::{Code, Item, Value};
 
 use super::Inputs;
 use super::tactel_curves::TactelCurves;
 use crate::calibration::{Calibration, file};
-use crate::touch::common::{both, narrow, none};
+use crate::touch::common::narrow;
 
 /// The zeros and the curves of all tactels, and the unit of the calibrated image.
 pub(super) type Curves = (Vec<f32>, TactelCurves, Unit);
@@ -30,10 +30,7 @@ impl Param for PerTactel {
         match &value.item {
             Item::Array(_) => Vec::read(value, reader).map(Self::Rows),
             Item::Integer(_) | Item::Float(_) => f64::read(value, reader).map(Self::All),
-            _ => {
-                reader.wrong_type(value, Self::EXPECTS);
-                None
-            }
+            _ => reader.wrong_type(value, Self::EXPECTS),
         }
     }
 
@@ -78,7 +75,7 @@ impl CurveParams {
             let mistake = Mistake::key(format!("{prefix}{name}"), format!("`{name}` and `file` exclude each other"));
             mistake.help(format!("the file has its own: leave out `{name}`, or `file`"))
         });
-        let ((), curves) = both(none(excluded.collect()), read_file(path, prefix, image))?;
+        let ((), curves) = collect_both(refuse_any(excluded), read_file(path, prefix, image))?;
         Ok(curves)
     }
 
@@ -87,10 +84,10 @@ impl CurveParams {
         let spread = |name: &str, value: &Option<PerTactel>, default| {
             spread(&format!("{prefix}{name}"), value.as_ref().unwrap_or(&PerTactel::All(default)), image)
         };
-        let numbers = both(spread("offset", &self.offset, 0.0), spread("gain", &self.gain, 1.0));
+        let numbers = collect_both(spread("offset", &self.offset, 0.0), spread("gain", &self.gain, 1.0));
         let unit = self.unit.as_deref().map_or(Ok(image.unit), Unit::from_str);
         let unit = unit.map_err(|message| Mistake::param(format!("{prefix}unit"), message).into());
-        let ((offset, gain), unit) = both(numbers, unit)?;
+        let ((offset, gain), unit) = collect_both(numbers, unit)?;
         Ok((offset, TactelCurves::Linear(gain), unit))
     }
 
@@ -101,7 +98,7 @@ impl CurveParams {
                 format!("tactel [{i}, {j}] is outside the array of {} rows by {} columns", image.rows, image.cols);
             Mistake::param(format!("{prefix}dead"), message).help("rows and columns count from 0")
         });
-        none(outside.collect())?;
+        refuse_any(outside)?;
         Ok(self.dead.iter().map(|[i, j]| i * image.cols + j).collect())
     }
 }
@@ -149,8 +146,8 @@ fn spread(name: &str, value: &PerTactel, image: &ImageShape) -> Result<Vec<f32>,
             (list.concat(), flaw)
         }
     };
-    let flaws = flaw.into_iter().map(|message| Mistake::param(name, message)).collect();
+    let flaws = refuse_any(flaw.map(|message| Mistake::param(name, message)));
     let numbers = numbers.into_iter().map(|number| narrow(name, number)).collect();
-    let ((), numbers) = both(none(flaws), numbers)?;
+    let ((), numbers) = collect_both(flaws, numbers)?;
     Ok(numbers)
 }

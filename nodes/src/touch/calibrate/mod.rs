@@ -6,10 +6,11 @@ mod curves;
 mod tactel_curves;
 mod tare;
 
-use tactflow_runtime::node::{Describe, FilePath, In, Inputs, Mistakes, Node, Out, Outputs, Param, Setup, State, Tick};
+use tactflow_runtime::node::{
+    Describe, FilePath, In, Inputs, Mistakes, Node, Out, Outputs, Param, Setup, State, Tick, collect_both,
+};
 use tactflow_runtime::signal::{Flag, Image, ImageShape};
 
-use super::common::both;
 use curves::{CurveParams, PerTactel};
 use tactel_curves::TactelCurves;
 use tare::{Averages, Rules};
@@ -48,7 +49,6 @@ use tare::{Averages, Rules};
 /// tare_at_start = true                # the first 50 frames are the zero, if nothing touches the pad
 /// ```
 #[derive(Describe)]
-#[describe(name = "calibrate")]
 pub struct Calibrate {
     /// The calibrated zero of each tactel.
     offset: Vec<f32>,
@@ -131,9 +131,10 @@ impl Node for Calibrate {
         let rules = Rules::new(&params, &setup.inputs);
         let Params { offset, gain, unit, dead, file, device, .. } = params;
         let (own, device) = (CurveParams { offset, gain, unit, dead, file }, device.unwrap_or_default());
-        let dead = both(own.dead("", &image), device.dead("device.", &image));
+        let dead = collect_both(own.dead("", &image), device.dead("device.", &image));
         let curves = if own.has_curves() { own.curves("", &image) } else { device.curves("device.", &image) };
-        let ((rules, (dead, others)), (mut offset, mut curves, unit)) = both(both(rules, dead), curves)?;
+        let ((rules, (dead, others)), (mut offset, mut curves, unit)) =
+            collect_both(collect_both(rules, dead), curves)?;
         for i in dead.into_iter().chain(others) {
             offset[i] = 0.0;
             curves.disable(i);

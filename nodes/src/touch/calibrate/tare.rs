@@ -20,7 +20,7 @@ pub(super) struct Rules {
 }
 
 /// The frames of the next zero so far.
-#[derive(Debug, Default, State)]
+#[derive(Debug, State)]
 pub(super) struct Averages {
     /// Sum of each tactel's readings; empty if nothing tares.
     sums: Vec<f64>,

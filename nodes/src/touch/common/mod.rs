@@ -13,19 +13,6 @@ pub(crate) fn check_same_array(image: &ImageShape, input: &str, mask: &Grid) -> 
     Err(Mistake::input(input, message).help("wire both from the same pad").into())
 }
 
-/// Returns both values, or the mistakes of both.
-pub(crate) fn both<A, B>(a: Result<A, Mistakes>, b: Result<B, Mistakes>) -> Result<(A, B), Mistakes> {
-    match (a, b) {
-        (Ok(a), Ok(b)) => Ok((a, b)),
-        (a, b) => Err([a.err(), b.err()].into_iter().flatten().flatten().collect()),
-    }
-}
-
-/// Returns the mistakes as an error if there are any.
-pub(crate) fn none(mistakes: Mistakes) -> Result<(), Mistakes> {
-    if mistakes.is_empty() { Ok(()) } else { Err(mistakes) }
-}
-
 /// Returns the number of a parameter as the value of a tactel.
 pub(crate) fn narrow(param: &str, number: f64) -> Result<f32, Mistakes> {
     if (number as f32).is_finite() {

@@ -31,7 +31,6 @@ use interpolation::interpolated;
 /// threshold = 0.010                   # the `release` of `binarize` [N]
 /// ```
 #[derive(Describe)]
-#[describe(name = "contact_area")]
 pub struct ContactArea {
     /// Area of a tactel [m²].
     tactel: f64,
@@ -68,8 +67,6 @@ impl Node for ContactArea {
         let [along_x, along_y] = image_shape(&setup.inputs)?.pitch;
         Ok(Self { tactel: along_x * along_y, threshold: params.threshold })
     }
-
-    fn state(&self) {}
 
     fn step(&self, _: &Tick, inputs: Inputs<'_>, out: &mut Outputs, (): &mut ()) {
         out.area.set(inputs.region.count() as f64 * self.tactel);

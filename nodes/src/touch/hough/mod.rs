@@ -4,10 +4,11 @@ mod votes;
 
 use std::f64::consts::PI;
 
-use tactflow_runtime::node::{Describe, Mistake, Mistakes, Node, Out, Outputs, Param, Setup, State, Tick};
+use tactflow_runtime::node::{
+    Describe, Mistake, Mistakes, Node, Out, Outputs, Param, Setup, State, Tick, collect_both,
+};
 use tactflow_runtime::signal::{ImageShape, Scalar};
 
-use super::common::both;
 use super::moments::{Inputs, Weighing, Weight, image_shape};
 use crate::motion::axis::half_angle;
 use votes::{collect, peak, vote};
@@ -43,7 +44,6 @@ use votes::{collect, peak, vote};
 /// min_strength = 0.3                  # below this the contact is not a line [1]
 /// ```
 #[derive(Describe)]
-#[describe(name = "hough")]
 pub struct Hough {
     shape: ImageShape,
     /// Sine and cosine of each direction.
@@ -108,7 +108,7 @@ impl Node for Hough {
     fn new(params: Params, setup: &mut Setup<Self>) -> Result<Self, Mistakes> {
         let shape = image_shape(&setup.inputs)?;
         let weighing = Weighing::new(params.weight, params.threshold);
-        let (offset_step, weighing) = both(offset_step(params.offset_step, shape.pitch), weighing)?;
+        let (offset_step, weighing) = collect_both(offset_step(params.offset_step, shape.pitch), weighing)?;
         let direction = |k: usize| libm::sincos(k as f64 * PI / params.angles as f64);
         let directions = (0..params.angles).map(direction).collect();
         Ok(Self { shape, directions, offset_step, min_strength: params.min_strength, weighing })

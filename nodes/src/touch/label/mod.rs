@@ -47,7 +47,6 @@ pub use runs::{number, paint, trace};
 /// min_force = 0.1                     # [N]
 /// ```
 #[derive(Describe)]
-#[describe(name = "label")]
 pub struct Label {
     /// How many columns beyond its ends a run touches runs of the next row.
     reach: u32,

@@ -19,11 +19,8 @@ impl Param for Neighbours {
 
     fn read(value: &Value, reader: &mut Reader<'_>) -> Option<Self> {
         let number = read_leaf(value, reader, Self::EXPECTS).map(Self)?;
-        if ![Self::FOUR, Self::EIGHT].contains(&number) {
-            reader.wrong_type(value, Self::EXPECTS);
-            return None;
-        }
-        Some(number)
+        let known = [Self::FOUR, Self::EIGHT].into_iter().find(|known| *known == number);
+        known.or_else(|| reader.wrong_type(value, Self::EXPECTS))
     }
 
     fn written(&self) -> Option<Written> {

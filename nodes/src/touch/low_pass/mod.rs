@@ -34,7 +34,6 @@ use super::filter::{Averaging, Inputs, Outputs};
 /// time_constant_ms = 20               # [ms]
 /// ```
 #[derive(Describe)]
-#[describe(name = "low_pass")]
 pub struct LowPass {
     /// Time constant T [s].
     time: f64,
@@ -84,10 +83,6 @@ impl Node for LowPass {
                 Err(mistake.help("leave out one of the two: a cutoff of 1 Hz is a time constant of 159 ms").into())
             }
         }
-    }
-
-    fn state(&self) -> State {
-        State { last: None, interval: Interval::default() }
     }
 
     fn step(&self, tick: &Tick, inputs: Inputs<'_>, out: &mut Outputs, state: &mut State) {

@@ -31,7 +31,6 @@ use crate::motion::axis::wrap_axial;
 /// window = 5                          # two wrong samples have no influence [samples]
 /// ```
 #[derive(Describe)]
-#[describe(name = "median")]
 pub struct Median {
     window: usize,
     is_axial: bool,

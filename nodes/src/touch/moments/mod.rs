@@ -48,7 +48,6 @@ pub use sums::{Ellipse, Sums, Weighing, Weight, ellipse};
 /// threshold = 0.010                   # the `release` of `binarize` [N]
 /// ```
 #[derive(Describe)]
-#[describe(name = "moments")]
 pub struct Moments {
     shape: ImageShape,
     weighing: Weighing,
@@ -123,8 +122,6 @@ impl Node for Moments {
         setup.outputs.area.range = [0.0, shape.tactels() as f64];
         Ok(Self { shape, weighing, min_anisotropy: params.min_anisotropy })
     }
-
-    fn state(&self) {}
 
     fn step(&self, _: &Tick, inputs: Inputs<'_>, out: &mut Outputs, (): &mut ()) {
         let sums = Weighing::Force.add_up(&inputs.image, &inputs.region);

@@ -39,7 +39,6 @@ use mean::{TimedVector, mean};
 /// window_ms = 40                      # ten frames at 250 Hz [ms]
 /// ```
 #[derive(Describe)]
-#[describe(name = "moving_average")]
 pub struct MovingAverage {
     /// Largest number of samples in the window.
     capacity: usize,

@@ -29,7 +29,6 @@ pub use sums::sum_and_peak;
 /// flip_y = false                      # `true` if the first row of the device is the one toward +y
 /// ```
 #[derive(Describe)]
-#[describe(name = "tactile_source")]
 pub struct TactileSource {
     /// Index in the device's image of each tactel; `None` if the device has the order of the sensor.
     order: Option<Box<[u32]>>,
@@ -87,8 +86,6 @@ impl Node for TactileSource {
         let is_reordered = params.transpose | params.flip_x | params.flip_y;
         Ok(Self { order: is_reordered.then(|| order(&setup.outputs.image, &params)) })
     }
-
-    fn state(&self) {}
 
     fn step(&self, _: &Tick, inputs: Inputs<'_>, out: &mut Outputs, (): &mut ()) {
         let (from, to) = (inputs.image.cells(), out.image.write().cells_mut());

@@ -6,14 +6,15 @@ use tactflow_runtime::node::Describe;
 #[describe(name = "no_docs")]
 pub struct NoDocs;
 
-/// No attribute.
+/// Generic without an attribute.
 #[derive(Describe)]
-pub struct NoAttribute;
+pub struct NoAttribute<T>(T);
 
-/// No name.
+/// Two names from one struct.
 #[derive(Describe)]
-#[describe(every_tick)]
-pub struct NoName;
+#[describe(of = "NoName<f64>")]
+#[describe(of = "NoName<bool>")]
+pub struct NoName<T>(T);
 
 /// Not snake_case.
 #[derive(Describe)]
@@ -60,5 +61,14 @@ pub struct Plain;
 #[derive(Describe)]
 #[describe(name = "example")]
 pub struct Example;
+
+/// An example of something else than the struct.
+///
+/// ```toml
+/// [nodes.example]
+/// type = "unamed"
+/// ```
+#[derive(Describe)]
+pub struct Unnamed;
 
 fn main() {}

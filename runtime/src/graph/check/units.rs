@@ -73,12 +73,10 @@ impl Units {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::node::Need;
     use crate::signal::{Kind, ScalarShape};
 
     fn port(unit: &'static str) -> PortSpec {
-        let args = vec![unit.into()].into();
-        PortSpec { name: "x".into(), doc: "".into(), kind: Kind::Scalar, args, need: Need::REQUIRED }
+        PortSpec::new("x", "", Kind::Scalar, &[unit])
     }
 
     fn scalar(unit: &str) -> Shape {

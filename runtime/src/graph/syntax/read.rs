@@ -5,11 +5,8 @@ use crate::source::{Code, Item, Table, Value, suggestion};
 
 /// Reads a table; one that is missing or invalid is empty.
 pub(super) fn read_table(value: Option<&Value>, reader: &mut Reader<'_>) -> Table {
-    let table = value.and_then(Value::as_table).cloned();
-    if let Some(value) = value.filter(|_| table.is_none()) {
-        reader.wrong_type(value, "a table");
-    }
-    table.unwrap_or_default()
+    let read = |value: &Value| value.as_table().cloned().or_else(|| reader.wrong_type(value, "a table"));
+    value.and_then(read).unwrap_or_default()
 }
 
 /// Reads one of a few words; `expects` lists them for a message. `true` and `false` are words too.
@@ -24,11 +21,8 @@ pub(super) fn read_word<T: Copy>(
         Item::Boolean(false) => "false",
         _ => value.as_str().unwrap_or_default(),
     };
-    let found = words.iter().find(|(known, _)| *known == word);
-    if found.is_none() {
-        reader.wrong_type(value, expects);
-    }
-    found.map(|(_, meaning)| *meaning)
+    let found = words.iter().find(|(known, _)| *known == word).map(|(_, meaning)| *meaning);
+    found.or_else(|| reader.wrong_type(value, expects))
 }
 
 /// Reports each key of a table that is not `known`. `place` ends the message, for example ` in a mode`.
