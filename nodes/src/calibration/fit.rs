@@ -99,8 +99,7 @@ impl Points {
     pub fn rational(&self, sign: f32) -> ForceCurve {
         let mut curve = self.first_guess();
         for _ in 0..5 {
-            let residuals: Vec<f64> = self.points.iter().map(|point| point.y - rational_at(curve, point.x)).collect();
-            curve = self.descend(curve, &self.weights(&residuals));
+            curve = self.descend(curve, &self.weights(|x| rational_at(curve, x)));
         }
         let [g, q] = curve;
         ForceCurve::Rational {
@@ -110,12 +109,13 @@ impl Points {
         }
     }
 
-    /// Returns the weights of the points, smaller for outliers.
-    fn weights(&self, residuals: &[f64]) -> Vec<f64> {
+    /// Returns the weights of the points, smaller for those far from a forward curve.
+    fn weights(&self, curve: impl Fn(f64) -> f64) -> Vec<f64> {
+        let residuals: Vec<f64> = self.points.iter().map(|point| point.y - curve(point.x)).collect();
         let mut sizes: Vec<f64> = residuals.iter().map(|residual| residual.abs()).collect();
         let bound = (1.5 * 1.4826 * median(&mut sizes)).max(1e-6);
         let huber = |residual: &f64| (bound / residual.abs()).min(1.0);
-        self.points.iter().zip(residuals).map(|(point, residual)| point.weight * huber(residual)).collect()
+        self.points.iter().zip(&residuals).map(|(point, residual)| point.weight * huber(residual)).collect()
     }
 
     /// Returns a first rational curve from x / y = g + q x, which is linear.
@@ -187,8 +187,7 @@ impl Points {
             heights = self.heights(&places, &weights);
             let knots: Vec<[f64; 2]> =
                 places.iter().copied().zip(heights.iter().copied()).map(<[f64; 2]>::from).collect();
-            let residuals: Vec<f64> = self.points.iter().map(|p| p.y - between(&knots, p.x)).collect();
-            weights = self.weights(&residuals);
+            weights = self.weights(|x| between(&knots, x));
         }
         let mut knots = vec![[0.0, 0.0]];
         for (x, y) in places.iter().zip(rising(&heights)).skip(1) {
@@ -259,12 +258,6 @@ impl Points {
         }
         let distances = down.iter().map(|[x, y]| (y - between(&up, *x)).abs());
         Some(distances.fold(0.0, f64::max))
-    }
-
-    /// Returns the reading beyond the offset under a force, in the middle of the two branches [reading].
-    #[must_use]
-    pub fn reading(&self, force: f64) -> f64 {
-        between(&self.middle, force / self.most) * self.range
     }
 
     /// Returns the branches as (force, reading beyond the offset) for a plot: rising, then falling.

@@ -77,10 +77,12 @@ enum Bearer {
     Unknown,
 }
 
-/// A range of frames between two unloaded ones.
+/// A log and a range of its frames.
+type Stretch = (usize, Range<usize>);
+
+/// A stretch between two unloaded frames with the force on one tactel.
 struct ProbePress {
-    log: usize,
-    frames: Range<usize>,
+    stretch: Stretch,
     /// Maximum force [N].
     peak: f64,
     /// The pressed tactel, and its response.
@@ -125,8 +127,9 @@ impl<'l> LogAnalysis<'l> {
 
     /// Analyses a load that all tactels share.
     fn share_out(&mut self, dead_below: Option<f64>, bearing: Option<usize>) {
-        for i in 0..self.answers.len() {
-            self.set_response(i, self.mean_response(i));
+        let all: Vec<Stretch> = self.logs.iter().map(|log| 0..log.frames()).enumerate().collect();
+        for (tactel, response) in self.responses(&all).into_iter().enumerate() {
+            self.set_response(tactel, response);
         }
         self.mark_dead(dead_below);
         let live = self.answers.iter().filter(|answer| !answer.is_dead).count();
@@ -135,19 +138,18 @@ impl<'l> LogAnalysis<'l> {
 
     /// Analyses a load that is on one tactel at a time.
     fn find_presses(&mut self, dead_below: Option<f64>) {
-        let stretches: Vec<(usize, Range<usize>)> = (0..self.logs.len()).flat_map(|log| self.stretches(log)).collect();
-        for (log, frames) in &stretches {
-            for (tactel, response) in self.responses(*log, frames).into_iter().enumerate() {
+        let stretches: Vec<Stretch> = (0..self.logs.len()).flat_map(|log| self.stretches(log)).collect();
+        for stretch in &stretches {
+            for (tactel, response) in self.responses([stretch]).into_iter().enumerate() {
                 if response.abs() > self.answers[tactel].response {
                     self.set_response(tactel, response);
                 }
             }
         }
         self.mark_dead(dead_below);
-        let shared = stretches.iter().filter(|(log, frames)| self.is_on_most(*log, frames)).count();
+        let shared = stretches.iter().filter(|stretch| self.is_on_most(stretch)).count();
         self.is_shared = 2 * shared > stretches.len();
-        let presses = stretches.into_iter().filter_map(|(log, frames)| self.press(log, frames));
-        let presses: Vec<ProbePress> = presses.collect();
+        let presses: Vec<ProbePress> = stretches.into_iter().filter_map(|stretch| self.press(stretch)).collect();
         // A press on a dead tactel makes a neighbour respond, but less than a press on the neighbour itself.
         let is_weak = |press: &ProbePress| {
             presses.iter().any(|other| {
@@ -157,7 +159,8 @@ impl<'l> LogAnalysis<'l> {
             })
         };
         for press in presses.iter().filter(|press| !is_weak(press)) {
-            for frame in &mut self.frames[press.log][press.frames.clone()] {
+            let (log, frames) = press.stretch.clone();
+            for frame in &mut self.frames[log][frames] {
                 frame.0 = Bearer::One(press.tactel);
             }
         }
@@ -169,33 +172,40 @@ impl<'l> LogAnalysis<'l> {
     }
 
     /// Returns the ranges of a log between unloaded frames with at least the minimum force of a press.
-    fn stretches(&self, log: usize) -> Vec<(usize, Range<usize>)> {
+    fn stretches(&self, log: usize) -> Vec<Stretch> {
         let from = &self.logs[log];
         let is_unloaded = |frame: &usize| from.is_unloaded(*frame, self.most);
         let frames: Vec<usize> = (0..from.frames()).collect();
         let runs = frames.chunk_by(|a, b| is_unloaded(a) == is_unloaded(b)).filter(|run| !is_unloaded(&run[0]));
         let stretches = runs.map(|run| (log, run[0]..run[0] + run.len()));
-        stretches.filter(|(_, frames)| peak(&from.force[frames.clone()]) >= MIN_PRESS * self.most).collect()
+        stretches.filter(|stretch| self.peak(stretch) >= MIN_PRESS * self.most).collect()
     }
 
-    /// Returns each tactel's mean reading beyond the offset, over the largest forces of a range of frames.
-    fn responses(&self, log: usize, frames: &Range<usize>) -> Vec<f64> {
-        let from = &self.logs[log];
-        let top = MIN_RESPONSE_FORCE * peak(&from.force[frames.clone()]);
-        let (mut sums, mut count) = (vec![0.0; self.answers.len()], 0.0);
-        for frame in frames.clone().filter(|frame| from.force[*frame] >= top) {
-            count += 1.0;
+    /// Returns the maximum force of a stretch.
+    fn peak(&self, (log, frames): &Stretch) -> f64 {
+        peak(&self.logs[*log].force[frames.clone()])
+    }
+
+    /// Returns each tactel's mean reading beyond the offset, over the largest forces of some stretches.
+    fn responses<'s>(&self, stretches: impl IntoIterator<Item = &'s Stretch> + Clone) -> Vec<f64> {
+        let top =
+            MIN_RESPONSE_FORCE * stretches.clone().into_iter().map(|stretch| self.peak(stretch)).fold(0.0, f64::max);
+        let frames =
+            stretches.into_iter().flat_map(|(log, frames)| frames.clone().map(|frame| (&self.logs[*log], frame)));
+        let (mut sums, mut count) = (vec![0.0; self.answers.len()], 0);
+        for (log, frame) in frames.filter(|(log, frame)| log.force[*frame] >= top) {
+            count += 1;
             for (i, (sum, answer)) in sums.iter_mut().zip(&self.answers).enumerate() {
-                *sum += f64::from(from.reading(frame, i) - answer.offset);
+                *sum += f64::from(log.reading(frame, i) - answer.offset);
             }
         }
-        sums.into_iter().map(|sum| sum / count).collect()
+        sums.into_iter().map(|sum| sum / f64::from(count.max(1))).collect()
     }
 
     /// Whether most live tactels respond as if all were pressed at once: near their maximum response, and not much less
     /// than the tactel with the largest response.
-    fn is_on_most(&self, log: usize, frames: &Range<usize>) -> bool {
-        let responses = self.responses(log, frames);
+    fn is_on_most(&self, stretch: &Stretch) -> bool {
+        let responses = self.responses([stretch]);
         let live: Vec<usize> = (0..responses.len()).filter(|i| !self.answers[*i].is_dead).collect();
         let size = |i: &usize| responses[*i].abs();
         let part = |i: &usize| size(i) / self.answers[*i].response;
@@ -207,15 +217,14 @@ impl<'l> LogAnalysis<'l> {
 
     /// Returns the press of a range of frames: of the tactels near their maximum response, the one with the largest.
     /// Foam couples neighbours, and a sensitive neighbour may read more than the pressed tactel.
-    fn press(&self, log: usize, frames: Range<usize>) -> Option<ProbePress> {
-        let responses = self.responses(log, &frames);
+    fn press(&self, stretch: Stretch) -> Option<ProbePress> {
+        let responses = self.responses([&stretch]);
         let live = || (0..responses.len()).filter(|i| !self.answers[*i].is_dead);
         let part = |i: &usize| responses[*i].abs() / self.answers[*i].response;
         let best = live().map(|i| part(&i)).fold(0.0, f64::max);
         let alike = live().filter(|i| part(i) >= MIN_ALIKE * best);
         let tactel = alike.max_by(|a, b| responses[*a].abs().total_cmp(&responses[*b].abs()))?;
-        let peak = peak(&self.logs[log].force[frames.clone()]);
-        Some(ProbePress { log, frames, peak, tactel, response: responses[tactel].abs() })
+        Some(ProbePress { peak: self.peak(&stretch), stretch, tactel, response: responses[tactel].abs() })
     }
 
     fn set_response(&mut self, tactel: usize, response: f64) {
@@ -233,18 +242,6 @@ impl<'l> LogAnalysis<'l> {
         for i in self.logs.iter().flat_map(|log| &log.absent) {
             self.answers[*i].is_dead = true;
         }
-    }
-
-    /// Returns the mean reading of a tactel beyond its offset, over the largest forces of all logs.
-    fn mean_response(&self, tactel: usize) -> f64 {
-        let (mut sum, mut count) = (0.0, 0);
-        for log in self.logs {
-            for frame in (0..log.frames()).filter(|frame| log.force[*frame] >= MIN_RESPONSE_FORCE * self.most) {
-                sum += f64::from(log.reading(frame, tactel) - self.answers[tactel].offset);
-                count += 1;
-            }
-        }
-        if count > 0 { sum / f64::from(count) } else { 0.0 }
     }
 
     /// Returns the samples of a tactel, each with its reading in the log.

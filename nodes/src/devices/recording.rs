@@ -4,7 +4,6 @@
 //! times that the file gives them; those between two exchanges are skipped but for the newest, and none is served
 //! twice. What the readers take is in [`crate::recordings`].
 
-use std::borrow::Cow;
 use std::sync::Arc;
 
 use tactflow_runtime::device::{Commands, Description, Device, DeviceError, Driver, Opened, Output, Samples, Stepped};
@@ -12,6 +11,7 @@ use tactflow_runtime::node::{At, Describe, FilePath, Mistake, Mistakes, Param};
 use tactflow_runtime::signal::{Image, Unit};
 use tactflow_runtime::source::Code;
 
+use super::{Facts, pad};
 use crate::recordings::{self, Hints, Recording, Refusal};
 
 /// Parameters of `recording`.
@@ -97,9 +97,7 @@ impl Device for Player {
         let recording = recordings::read(&bytes, &file.path.to_string_lossy(), &hints)
             .map_err(|refusal| mistakes(refusal, file, &bytes))?;
         let mut description = Description::every(recording.period);
-        let mut pad = description.fills("tactile_pad");
-        pad.facts(facts(&recording, &params));
-        let image = pad.output("image", recording.shape.clone());
+        let image = pad::fill(&mut description, recording.shape.clone(), facts(&recording, &params));
         Ok(Opened { description, driver: Driver::Stepped(Box::new(Self { image, recording, next: 0 })) })
     }
 }
@@ -169,7 +167,7 @@ impl Stepped for Player {
     }
 }
 
-fn facts(recording: &Recording, params: &Params) -> Vec<(Cow<'static, str>, toml::Value)> {
+fn facts(recording: &Recording, params: &Params) -> Facts {
     let cols = recording.shape.cols;
     let place = |index: &usize| toml::Value::from(vec![(index / cols) as i64, (index % cols) as i64]);
     let dead: Vec<toml::Value> = recording.dead.iter().map(place).collect();

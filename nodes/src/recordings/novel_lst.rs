@@ -43,15 +43,6 @@ struct ListingReader<'t> {
     reach: [Option<Label<'t>>; 2],
 }
 
-/// The cells of a row, a column or a page, whose force is in the listing.
-struct Loaded {
-    /// Row, column or page.
-    what: &'static str,
-    /// Sum of the cells, in the file's unit.
-    sum: f64,
-    count: usize,
-}
-
 fn parse(text: &str, hints: &Hints) -> Result<Recording, Refusal> {
     let mut reader = ListingReader { lines: Lines::new(text), cell_digit: 1.0, ..ListingReader::default() };
     // A page has at least 24 characters.
@@ -182,7 +173,7 @@ impl<'t> ListingReader<'t> {
             self.reel.cells.push(value as f32);
         }
         if let Some(force) = fields.next() {
-            self.check(columns, force, &Loaded { what: "row", sum, count: cols })?;
+            self.check(columns, force, "row", sum, cols)?;
         }
         Ok((label, at))
     }
@@ -199,14 +190,21 @@ impl<'t> ListingReader<'t> {
         let count = cells.len() / cols;
         let sum = |column: usize| cells.iter().skip(column).step_by(cols).map(|cell| f64::from(*cell)).sum();
         let sums: Vec<f64> = (0..cols).map(sum).collect();
-        let page = Loaded { what: "page", sum: sums.iter().sum(), count: count * cols };
-        let sums = sums.into_iter().map(|sum| Loaded { what: "column", sum, count });
-        fields.zip(sums.chain([page])).try_for_each(|(force, loaded)| self.check(columns, force, &loaded))
+        let page = ("page", sums.iter().sum(), count * cols);
+        let sums = sums.into_iter().map(|sum| ("column", sum, count)).chain([page]);
+        fields.zip(sums).try_for_each(|(force, (what, sum, count))| self.check(columns, force, what, sum, count))
     }
 
-    /// Checks a force against its cells, within their rounding. The first nonzero force shows the unit of the cells.
-    fn check(&mut self, columns: &PageColumns<'t>, force: Piece<'t>, loaded: &Loaded) -> Result<(), TextError> {
-        let Loaded { what, sum, count } = *loaded;
+    /// Checks the force of a row, a column or a page against the sum of its `count` cells, within their rounding. The
+    /// first nonzero force shows the unit of the cells.
+    fn check(
+        &mut self,
+        columns: &PageColumns<'t>,
+        force: Piece<'t>,
+        what: &str,
+        sum: f64,
+        count: usize,
+    ) -> Result<(), TextError> {
         let listed = number(columns.notation, force, "the force")?;
         let Some((area, slack)) = self.header.area_of_sensor() else { return Ok(()) };
         // A square metre of 1 kPa is 1000 N.

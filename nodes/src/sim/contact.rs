@@ -10,7 +10,7 @@
 //!
 //! Blocks of 4 by 4 tactels, and then single tactels, that are far from every object are skipped.
 
-use parry3d_f64::math::{Mat3, Pose3, Vec3};
+use parry3d_f64::math::{Mat3, Pose3, Vec2, Vec3};
 use tactflow_runtime::signal::ImageShape;
 
 use super::foam::{self, Foam, FoamColumn};
@@ -116,9 +116,9 @@ struct Bristle {
     normal: f64,
     object: usize,
     /// Shear of the foam along the pad's x and y [m].
-    shear: [f64; 2],
+    shear: Vec2,
     /// Force on the pad along its x and y [N].
-    friction: [f64; 2],
+    friction: Vec2,
 }
 
 /// Marks a point that touches nothing.
@@ -152,8 +152,8 @@ impl Contact {
 
     /// Returns the friction force on the pad along its x and y, as of the last step [N].
     #[must_use]
-    pub fn friction(&self) -> [f64; 2] {
-        self.tactels.iter().fold([0.0; 2], |sum, tactel| [sum[0] + tactel.friction[0], sum[1] + tactel.friction[1]])
+    pub fn friction(&self) -> Vec2 {
+        self.tactels.iter().map(|tactel| tactel.friction).sum()
     }
 
     /// Returns the force along the pad's z, positive when the pad is pressed, as of the last step [N].
@@ -164,8 +164,8 @@ impl Contact {
 
     /// Returns the position of a point in the plane of the pad, from its row and column in the grid of points [m].
     #[must_use]
-    pub fn place(&self, point: [usize; 2]) -> [f64; 2] {
-        [self.xs[point[1]], self.ys[point[0]]]
+    pub fn place(&self, [row, col]: [usize; 2]) -> Vec2 {
+        Vec2::new(self.xs[col], self.ys[row])
     }
 
     /// Advances by `dt` [s]. Writes to `loads` the force on each object, in the base [N].
@@ -272,13 +272,13 @@ impl Contact {
         let cols = self.shape.cols;
         for (index, tactel) in self.tactels.iter_mut().enumerate() {
             if tactel.normal == 0.0 {
-                (tactel.shear, tactel.friction) = ([0.0; 2], [0.0; 2]);
+                (tactel.shear, tactel.friction) = (Vec2::ZERO, Vec2::ZERO);
                 continue;
             }
             let place = Vec3::new(self.shape.x((index % cols) as f64), self.shape.y((index / cols) as f64), 0.0);
             let slide = -self.slides[tactel.object].at(place);
-            tactel.rub(dt, [slide.x, slide.y], self.shear, &self.foam);
-            let push = Vec3::new(tactel.friction[0], tactel.friction[1], 0.0);
+            tactel.rub(dt, slide.truncate(), self.shear, &self.foam);
+            let push = tactel.friction.extend(0.0);
             wrench.push(place, push);
             loads[tactel.object] -= push;
         }
@@ -289,24 +289,23 @@ impl Contact {
     pub(super) fn energy(&self, objects: &[Object]) -> f64 {
         let softness = |touch: &Touch| objects[touch.object].softness * self.parts();
         let columns: f64 = self.touching.iter().map(|touch| self.column.energy(touch.depth, softness(touch))).sum();
-        let bristles = self.tactels.iter().map(|t| self.shear / 2.0 * (t.shear[0].powi(2) + t.shear[1].powi(2)));
+        let bristles = self.tactels.iter().map(|t| self.shear / 2.0 * t.shear.length_squared());
         columns + bristles.sum::<f64>()
     }
 }
 
 impl Bristle {
     /// Shears the foam by the `velocity` of the pad relative to the object [m/s], up to the friction limit.
-    fn rub(&mut self, dt: f64, velocity: [f64; 2], stiffness: f64, foam: &Foam) {
-        let speed = norm(velocity) / STRIBECK_SPEED;
+    fn rub(&mut self, dt: f64, velocity: Vec2, stiffness: f64, foam: &Foam) {
+        let speed = velocity.length() / STRIBECK_SPEED;
         let (still, sliding) = (foam.static_friction, foam.sliding_friction);
         let max_force = (sliding + (still - sliding) / (1.0 + speed * speed)) * self.normal;
-        self.shear = [self.shear[0] + velocity[0] * dt, self.shear[1] + velocity[1] * dt];
-        let force = stiffness * norm(self.shear);
+        self.shear += velocity * dt;
+        let force = stiffness * self.shear.length();
         if force > max_force {
-            let scale = max_force / force;
-            self.shear = [self.shear[0] * scale, self.shear[1] * scale];
+            self.shear *= max_force / force;
         }
-        self.friction = [-stiffness * self.shear[0], -stiffness * self.shear[1]];
+        self.friction = self.shear * -stiffness;
     }
 }
 
@@ -332,11 +331,6 @@ impl Rays {
         let middle = |axis: usize| (first[axis] + last[axis] - 1) as f64 / 2.0;
         let centre = self.from(shape.x(middle(1)), shape.y(middle(0))) + self.axes[2] * (self.thickness / 2.0);
         let (wide, high) = ((last[1] - first[1]) as f64 * shape.pitch[0], (last[0] - first[0]) as f64 * shape.pitch[1]);
-        let reach = (wide * wide + high * high + self.thickness * self.thickness).sqrt() / 2.0;
-        object.shape.clearance(centre) > reach
+        object.shape.clearance(centre) > Vec3::new(wide, high, self.thickness).length() / 2.0
     }
-}
-
-fn norm([x, y]: [f64; 2]) -> f64 {
-    (x * x + y * y).sqrt()
 }

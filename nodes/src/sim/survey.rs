@@ -76,7 +76,7 @@ pub fn measure(objects: &[Object], pad: Pose3, point: Vec3) -> Option<Measured> 
     let across = |object: &Object| {
         let line = object.shape.line(object.pose.inverse_transform_point(point))?;
         let off = pad.inverse_transform_vector(point - object.pose.transform_point(line.at));
-        Some((off.x * off.x + off.y * off.y).sqrt())
+        Some(off.truncate().length())
     };
     Some(Measured { distance, path: objects.iter().filter_map(across).min_by(f64::total_cmp) })
 }

@@ -10,7 +10,7 @@ use super::imprint::Imprint;
 use super::joints::{JointDynamics, SimArm};
 use super::object::{Object, ObjectParams, ScriptedMove, ShapeKind};
 use super::testing::{ball, thing};
-use super::world::{World, is_resolved, start};
+use super::world::{World, is_resolved};
 use crate::arm::chain::{Chain, ChainSegment, JointKind};
 use crate::arm::model::load;
 use crate::arm::mount::Mount;
@@ -34,7 +34,7 @@ fn lossless() -> Foam {
 }
 
 fn world(arm: SimArm, foam: Foam, things: &[ObjectParams], step: f64) -> World {
-    let from = start(&arm);
+    let from = arm.motion().pose;
     let objects = things.iter().map(|thing| Object::new(thing, from, [0.0; 2]).unwrap()).collect();
     World::new(arm, objects, shape(), foam, 0.001, step)
 }
@@ -174,7 +174,7 @@ fn friction_stays_in_its_cone_and_sticks_and_slips() {
         let moving = BodyMotion { linear: Vec3::new(0.6, 0.8, 0.0) * speed, ..pad(0.001) };
         contact.step(0.001, &moving, &objects, &mut [Vec3::ZERO]);
         slid += speed * 0.001;
-        let [x, y] = contact.friction();
+        let [x, y] = contact.friction().to_array();
         let friction = x.hypot(y);
         assert!(friction <= 0.4 * contact.normal() + 1e-9, "within the cone of rest: {friction} N");
         assert!(friction < 1e-12 || (x * 0.8 - y * 0.6).abs() < 1e-9 && x <= 0.0, "against the motion");
@@ -185,7 +185,7 @@ fn friction_stays_in_its_cone_and_sticks_and_slips() {
         }
     }
     assert!((contact.normal() - normal).abs() < 1e-9);
-    let [x, y] = contact.friction();
+    let [x, y] = contact.friction().to_array();
     let wanted = (0.3 + 0.1 / (1.0 + 400.0)) * normal;
     assert!((x.hypot(y) - wanted).abs() < 1e-6, "slipping at 20 mm/s: {} N", x.hypot(y));
     assert!(at_rest > 0.8 * x.hypot(y), "{at_rest}");

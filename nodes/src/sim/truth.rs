@@ -1,6 +1,6 @@
 //! Quantities that a simulation knows and a sensor does not, for scenarios and recordings.
 
-use parry3d_f64::math::Vec3;
+use parry3d_f64::math::{Vec2, Vec3};
 use tactflow_runtime::signal::ImageShape;
 
 use super::contact::{BodyMotion, Contact};
@@ -18,7 +18,7 @@ pub struct Truth {
     /// Largest force on a tactel of the noise-free image [N].
     pub peak: f64,
     /// Centre of pressure [m]; `None` without contact.
-    pub middle: Option<[f64; 2]>,
+    pub middle: Option<Vec2>,
     /// Mean force on the tactels above the threshold [N per tactel]; `None` without contact.
     pub pressure: Option<f64>,
     /// Number of those tactels.
@@ -39,20 +39,16 @@ impl World {
         self.image();
         let Self { contact, shape, imprint, .. } = &*self;
         let force = contact.normal();
-        let [x, y] = contact.friction();
-        let (sum, tactels) = imprint
-            .forces
-            .iter()
-            .filter(|cell| **cell > threshold)
-            .fold((0.0, 0), |(sum, count), cell| (sum + cell, count + 1));
+        let pressed = || imprint.forces.iter().filter(|cell| **cell > threshold);
+        let tactels = pressed().count();
         let area = shape.pitch[0] * shape.pitch[1] / (contact.fine * contact.fine) as f64;
         Truth {
             force,
-            tangential: (x * x + y * y).sqrt(),
+            tangential: contact.friction().length(),
             peak: imprint.forces.iter().fold(0.0, |peak: f64, cell| peak.max(*cell)),
             middle: middle(contact, force),
-            pressure: (tactels > 0).then(|| sum / f64::from(tactels)),
-            tactels: tactels as usize,
+            pressure: (tactels > 0).then(|| pressed().sum::<f64>() / tactels as f64),
+            tactels,
             orientation: orientation(&self.arm.motion(), &self.objects, shape),
             area: contact.touching.len() as f64 * area,
             depth: contact.touching.iter().fold(0.0, |depth: f64, touch| depth.max(touch.depth)),
@@ -61,12 +57,9 @@ impl World {
     }
 }
 
-fn middle(contact: &Contact, force: f64) -> Option<[f64; 2]> {
-    let sum = contact.touching.iter().fold([0.0; 2], |[sx, sy], touch| {
-        let [x, y] = contact.place(touch.point);
-        [sx + touch.force * x, sy + touch.force * y]
-    });
-    (force > 0.0).then(|| [sum[0] / force, sum[1] / force])
+fn middle(contact: &Contact, force: f64) -> Option<Vec2> {
+    let sum: Vec2 = contact.touching.iter().map(|touch| contact.place(touch.point) * touch.force).sum();
+    (force > 0.0).then(|| sum / force)
 }
 
 /// Returns the angle of the nearest line that passes under the pad [rad].
@@ -80,11 +73,11 @@ fn orientation(pad: &BodyMotion, objects: &[Object], shape: &ImageShape) -> Opti
     let (at, along) = lines.min_by(|(a, _), (b, _)| a.length().total_cmp(&b.length()))?;
     let half = [shape.cols as f64 * shape.pitch[0] / 2.0, shape.rows as f64 * shape.pitch[1] / 2.0];
     let is_under = at.x.abs() < half[0] && at.y.abs() < half[1];
-    (is_under && along.x * along.x + along.y * along.y > 1e-6).then(|| wrap_axial(libm::atan2(along.y, along.x)))
+    (is_under && along.truncate().length_squared() > 1e-6).then(|| wrap_axial(libm::atan2(along.y, along.x)))
 }
 
 fn tilt(contact: &Contact, force: f64) -> Option<f64> {
-    let normal = contact.touching.iter().fold(Vec3::ZERO, |sum, touch| sum + touch.normal * touch.force);
+    let normal: Vec3 = contact.touching.iter().map(|touch| touch.normal * touch.force).sum();
     let cos = -normal.normalize_or_zero().z;
     (force > 0.0).then(|| libm::acos(cos.clamp(-1.0, 1.0)))
 }

@@ -1,6 +1,6 @@
 //! The physics of the simulated bench: an arm with a pad, and objects, stepped together.
 
-use parry3d_f64::math::{Pose3, Vec3};
+use parry3d_f64::math::Vec3;
 use tactflow_runtime::signal::ImageShape;
 
 use super::contact::Contact;
@@ -8,7 +8,6 @@ use super::foam::Foam;
 use super::imprint::Imprint;
 use super::joints::SimArm;
 use super::object::Object;
-use super::shape::pose3;
 use super::survey::{Measured, Survey, measure};
 
 /// The arm, the pad and the objects.
@@ -38,7 +37,7 @@ impl World {
         let contact = Contact::new(shape.clone(), foam, apart, objects.len());
         let imprint = Imprint::new(&shape, contact.fine, spread);
         let loads = vec![Vec3::ZERO; objects.len()];
-        let from = start(&arm);
+        let from = arm.motion().pose;
         let survey = objects.iter().enumerate().find_map(|(i, object)| Some((i, Survey::new(object, from)?)));
         Self { survey, arm, objects, contact, imprint, shape, loads, time: 0.0, max_step, is_stale: true }
     }
@@ -103,10 +102,4 @@ impl World {
 #[must_use]
 pub fn is_resolved(stiffness: f64, damping: f64, dt: f64) -> bool {
     dt * dt * stiffness + 2.0 * dt * damping <= 2.0
-}
-
-/// Returns the pose of the sensor of an arm in the base.
-#[must_use]
-pub fn start(arm: &SimArm) -> Pose3 {
-    pose3(&arm.pose)
 }

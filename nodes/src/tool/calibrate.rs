@@ -3,8 +3,8 @@
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 
+use tactflow_runtime::cli::Shell;
 use tactflow_runtime::cli::clap::{self, Parser};
-use tactflow_runtime::cli::{NOT_LOADED, Shell};
 use tactflow_runtime::signal::Unit;
 use tactflow_runtime::source::{Code, Diagnostic, Report, SourceMap};
 
@@ -71,62 +71,47 @@ const ASSUMED: Assumed = Assumed { unit: Unit::RAW, pitch: [0.005; 2], rate_hz: 
 /// Maximum residual of a calibration that is written, as a fraction of the maximum force.
 const MAX_RESIDUAL: f64 = 0.25;
 
-/// Why there is no calibration.
-enum Failure {
-    Message(String),
-    Report(Box<Report>),
-}
-
-impl From<String> for Failure {
-    fn from(message: String) -> Self {
-        Self::Message(message)
-    }
-}
-
 pub(super) fn run(args: CalibrateArgs, shell: &Shell) -> u8 {
-    match make(&args, shell) {
-        Ok(()) => 0,
-        Err(Failure::Message(message)) => {
-            shell.error(message);
-            NOT_LOADED
-        }
-        Err(Failure::Report(report)) => shell.reject(&report),
-    }
+    let refuse = |message: String| shell.refuse(message);
+    let logs =
+        check(&args).map_err(refuse).and_then(|()| args.logs.iter().map(|path| read(path, &args, shell)).collect());
+    let made = logs.and_then(|logs: Vec<Log>| make(&args, &logs, shell).map_err(refuse));
+    made.err().unwrap_or(0)
 }
 
-fn make(args: &CalibrateArgs, shell: &Shell) -> Result<(), Failure> {
+/// Checks the arguments and the files to write, before the long calculation.
+fn check(args: &CalibrateArgs) -> Result<(), String> {
     if args.bearing.is_some() && args.load == LoadKind::Probe {
-        return Err("`--bearing` needs `--load uniform`: the force of a probe is on one tactel".to_owned().into());
+        return Err("`--bearing` needs `--load uniform`: the force of a probe is on one tactel".into());
     }
-    // Before the long calculation.
     args.out.as_deref().map_or(Ok(()), |path| may_replace(path, "a calibration file", file::is_calibration))?;
-    args.svg.as_deref().map_or(Ok(()), |path| may_replace(path, "an SVG picture", |text| text.contains("<svg")))?;
-    let logs = args.logs.iter().map(|path| read(path, args)).collect::<Result<Vec<Log>, Failure>>()?;
-    for (path, log) in args.logs.iter().zip(&logs) {
+    args.svg.as_deref().map_or(Ok(()), |path| may_replace(path, "an SVG picture", |text| text.contains("<svg")))
+}
+
+fn make(args: &CalibrateArgs, logs: &[Log], shell: &Shell) -> Result<(), String> {
+    for (path, log) in args.logs.iter().zip(logs) {
         let (first, describe) = (&logs[0], |log: &Log| format!("{} x {} tactels in {}", log.rows, log.cols, log.unit));
         if (log.rows, log.cols, log.unit) != (first.rows, first.cols, first.unit) {
-            let message = format!(
+            return Err(format!(
                 "all logs must be of one pad, but `{}` has {} and `{}` has {}",
                 path.display(),
                 describe(log),
                 args.logs[0].display(),
                 describe(first)
-            );
-            return Err(Failure::Message(message));
+            ));
         }
     }
     let bearing = args.bearing.map(NonZeroUsize::get);
     let settings = Settings { load: args.load, curve: args.curve, dead_below: args.dead_below, bearing };
-    let report = calibrate(&logs, &settings)?;
+    let report = calibrate(logs, &settings)?;
     shell.say(report.text(args.each).trim_end());
     let residual = report.typical_residual();
     if residual > MAX_RESIDUAL {
         let percent = 100.0 * residual;
-        let message = format!(
+        return Err(format!(
             "the residual of the curves is {percent:.0} % of the range, so no file is written; does `--load` match the \
              log, and does `force` belong to the same frames?"
-        );
-        return Err(Failure::Message(message));
+        ));
     }
     if let Some(path) = &args.out {
         write(path, &file::write(&report.calibration, &origin(args, &report)))?;
@@ -164,10 +149,10 @@ fn origin(args: &CalibrateArgs, report: &CalibrationReport) -> String {
     )
 }
 
-/// Reads one log.
-fn read(path: &Path, args: &CalibrateArgs) -> Result<Log, Failure> {
+/// Reads one log. Prints why it cannot be used, and returns the exit code.
+fn read(path: &Path, args: &CalibrateArgs, shell: &Shell) -> Result<Log, u8> {
     let name = path.display().to_string();
-    let bytes = std::fs::read(path).map_err(|error| format!("cannot read `{name}`: {error}"))?;
+    let bytes = std::fs::read(path).map_err(|error| shell.refuse(format_args!("cannot read `{name}`: {error}")))?;
     let hints = Hints {
         format: args.format.clone(),
         unit: args.unit,
@@ -175,24 +160,25 @@ fn read(path: &Path, args: &CalibrateArgs) -> Result<Log, Failure> {
         assumed: Some(ASSUMED),
         ..Hints::default()
     };
-    let recording = recordings::read(&bytes, &name, &hints).map_err(|refusal| refused(refusal, &name))?;
-    Log::new(&recording).map_err(|message| Failure::Message(format!("`{name}` cannot be used: {message}")))
+    let recording = recordings::read(&bytes, &name, &hints).map_err(|refusal| refused(refusal, &name, shell))?;
+    Log::new(&recording).map_err(|message| shell.refuse(format_args!("`{name}` cannot be used: {message}")))
 }
 
-fn refused(refusal: Refusal, name: &str) -> Failure {
-    match refusal {
-        Refusal::Stranger => format!("`{name}` has an unknown format; {}", recordings::list()).into(),
+/// Prints why a log is refused, and returns the exit code.
+fn refused(refusal: Refusal, name: &str, shell: &Shell) -> u8 {
+    shell.refuse(match refusal {
+        Refusal::Stranger => format!("`{name}` has an unknown format; {}", recordings::list()),
         Refusal::Damaged { text, flaws } => {
             let mut sources = SourceMap::default();
             sources.add(name, text, "");
             let diagnostics = flaws.into_iter().map(|flaw| Diagnostic::new(Code::BadData, flaw.span, flaw.message));
-            Failure::Report(Box::new(Report::new(sources, diagnostics.collect())))
+            return shell.reject(&Report::new(sources, diagnostics.collect()));
         }
         Refusal::Broken { message, help } => {
             let help = help.map_or_else(String::new, |help| format!("; {help}"));
-            format!("`{name}`: {message}{help}").into()
+            format!("`{name}`: {message}{help}")
         }
-        Refusal::Silent { message, .. } => format!("`{name}`: {message}; add it, as `--size 16x16`").into(),
-        Refusal::Contradicted { hint, message } => format!("`{name}`: `{hint}`: {message}").into(),
-    }
+        Refusal::Silent { message, .. } => format!("`{name}`: {message}; add it, as `--size 16x16`"),
+        Refusal::Contradicted { hint, message } => format!("`{name}`: `{hint}`: {message}"),
+    })
 }

@@ -3,7 +3,7 @@
 //! It makes an ordinary graph from the command line; `--graph` prints it as a starting point.
 
 use std::num::NonZeroU32;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use tactflow_runtime::cli::{Job, JobOptions, Print, Shell, clap, duration};
 use tactflow_runtime::graph::Request;
@@ -44,16 +44,6 @@ pub(super) struct FeaturesArgs {
     /// Number of frames for the averages of pressure and orientation
     #[arg(long, value_name = "FRAMES", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..))]
     window: u32,
-    #[command(flatten)]
-    hints: HintArgs,
-    /// Stop after this time in the recording: 20s, 500ms, 2min
-    #[arg(long = "for", value_name = "TIME", value_parser = duration, allow_hyphen_values = true)]
-    duration: Option<f64>,
-}
-
-/// Properties that the file may not give.
-#[derive(clap::Args)]
-struct HintArgs {
     /// Name of the format, if the file is not recognised
     #[arg(long, value_name = "NAME")]
     format: Option<String>,
@@ -69,24 +59,28 @@ struct HintArgs {
     /// Number of rows and columns, if the file does not give it: 16x16
     #[arg(long, value_name = "ROWSxCOLS", value_parser = pair::<NonZeroU32>)]
     size: Option<[NonZeroU32; 2]>,
+    /// Stop after this time in the recording: 20s, 500ms, 2min
+    #[arg(long = "for", value_name = "TIME", value_parser = duration, allow_hyphen_values = true)]
+    duration: Option<f64>,
 }
 
 /// Default threshold of a touched tactel, as a fraction of the maximum value of the recording.
 const DEFAULT_THRESHOLD: f64 = 0.05;
 
 pub(super) fn features(args: FeaturesArgs, shell: &Shell) -> u8 {
-    let text = match args.inspect() {
-        Some((headline, threshold)) => {
-            let text = args.graph_text(&threshold);
+    let text = match args.read() {
+        Some(recording) => {
+            let (threshold, origin) = args.threshold(&recording);
+            let text = args.graph_text(threshold, &origin);
             if args.graph {
                 shell.say(text.trim_end());
                 return 0;
             }
-            shell.say(&headline);
+            shell.say(&args.headline(&recording, threshold, &origin));
             text
         }
         // The check of the graph reports what is wrong with the recording, once and at its place.
-        None => args.graph_text(&Threshold { value: 0.0, from: "from --threshold".into() }),
+        None => args.graph_text(0.0, "from --threshold"),
     };
     // As `--set`, so that a mistake shows in the arguments.
     let set = args.settings().iter().map(|setting| format!("devices.recording.{setting}")).collect();
@@ -96,43 +90,43 @@ pub(super) fn features(args: FeaturesArgs, shell: &Shell) -> u8 {
     Job { request, title, options, print: Print::Ports }.run(shell)
 }
 
-/// A threshold and its origin.
-struct Threshold {
-    value: f64,
-    from: String,
-}
-
 impl FeaturesArgs {
-    /// Returns the summary of the recording and the threshold. The recording is dropped: the graph reads it again.
-    fn inspect(&self) -> Option<(String, Threshold)> {
+    /// Returns the recording, or `None` if it has mistakes. The graph reads it again.
+    fn read(&self) -> Option<Recording> {
         let bytes = std::fs::read(&self.recording).ok()?;
-        let recording = self.hints.read(&bytes, &self.recording)?;
-        let threshold = self.threshold(&recording);
-        Some((self.headline(&recording, &threshold), threshold))
+        let hints = Hints {
+            format: self.format.clone(),
+            unit: self.unit.as_ref().map(|unit| unit.parse()).transpose().ok()?,
+            pitch: self.pitch_mm.map(|pitch| pitch.map(|mm| mm * 1e-3)),
+            rate_hz: self.rate_hz,
+            size: self.size.map(|size| size.map(|count| count.get() as usize)),
+            ..Hints::default()
+        };
+        recordings::read(&bytes, &self.recording.to_string_lossy(), &hints).ok()
     }
 
-    fn threshold(&self, recording: &Recording) -> Threshold {
-        let (value, from) = match (self.threshold, recording.threshold) {
+    /// Returns the threshold and its origin.
+    fn threshold(&self, recording: &Recording) -> (f64, String) {
+        match (self.threshold, recording.threshold) {
             (Some(value), _) => (value, "from --threshold".into()),
             (None, Some(value)) => (value, "from the file".into()),
             (None, None) => {
                 let peak = recording.cells.iter().fold(0.0_f32, |peak, cell| peak.max(*cell));
                 let percent = DEFAULT_THRESHOLD * 100.0;
-                let from = format!("{percent} % of the maximum value; set another with --threshold");
-                (f64::from(peak) * DEFAULT_THRESHOLD, from)
+                let origin = format!("{percent} % of the maximum value; set another with --threshold");
+                (f64::from(peak) * DEFAULT_THRESHOLD, origin)
             }
-        };
-        Threshold { value, from }
+        }
     }
 
     /// Returns the summary: the recording, and the definition of a contact.
-    fn headline(&self, recording: &Recording, threshold: &Threshold) -> String {
+    fn headline(&self, recording: &Recording, threshold: f64, origin: &str) -> String {
         let shape = &recording.shape;
         let [x, y] = shape.pitch.map(|pitch| (pitch * 1e6).round() * 1e-3);
         let seconds = recording.frames.last().map_or(0.0, |frame| frame.time as f64 * 1e-9);
         format!(
             "{}: {}, {} by {} tactels of {x} by {y} mm, {} frames in {seconds:.2} s, in {}\n\
-             contact: the largest region of at least {} tactels above {:.4} {} ({})",
+             contact: the largest region of at least {} tactels above {threshold:.4} {} ({origin})",
             self.recording.display(),
             recording.format,
             shape.rows,
@@ -140,14 +134,12 @@ impl FeaturesArgs {
             recording.frames.len(),
             shape.unit,
             self.min_area,
-            threshold.value,
             shape.unit,
-            threshold.from,
         )
     }
 
     /// Returns the graph, without the settings of the recording from the command line.
-    fn graph_text(&self, threshold: &Threshold) -> String {
+    fn graph_text(&self, threshold: f64, origin: &str) -> String {
         let Self { min_area, min_force, window, .. } = self;
         let mut text = format!(
             r#"# The features of the contact in a recording.
@@ -161,7 +153,7 @@ pad = "tactile_pad"
 file = "builtin:parts/touch.toml"
 in.image = "pad.image"
 set.calibrate.dead = {{ from = "pad.dead" }}
-set.binarize.threshold = {:?}       # [unit of the recording], {}
+set.binarize.threshold = {threshold:?}       # [unit of the recording], {origin}
 set.label = {{ min_area = {min_area}, min_force = {min_force:?} }}   # [tactels, unit of the recording]
 set.pressure.window = {window}
 set.orientation.window = {window}
@@ -171,8 +163,7 @@ pad = "recording"
 
 [devices.recording]
 type = "recording"
-"#,
-            threshold.value, threshold.from
+"#
         );
         if self.graph {
             self.settings().iter().for_each(|setting| text.push_str(&format!("{setting}\n")));
@@ -182,7 +173,7 @@ type = "recording"
 
     /// Returns the parameters of the device from the command line.
     fn settings(&self) -> Vec<String> {
-        let HintArgs { format, unit, pitch_mm, rate_hz, size } = &self.hints;
+        let Self { format, unit, pitch_mm, rate_hz, size, .. } = self;
         let word = |text: &str| toml::Value::from(text).to_string();
         // A printed graph may be stored in any folder.
         let path = if self.graph { std::path::absolute(&self.recording).ok() } else { None };
@@ -196,21 +187,6 @@ type = "recording"
             ("size", size.map(|size| format!("{size:?}"))),
         ];
         settings.into_iter().filter_map(|(name, value)| Some(format!("{name} = {}", value?))).collect()
-    }
-}
-
-impl HintArgs {
-    /// Returns the recording, or `None` if it has mistakes.
-    fn read(&self, bytes: &[u8], path: &Path) -> Option<Recording> {
-        let hints = Hints {
-            format: self.format.clone(),
-            unit: self.unit.as_ref().map(|unit| unit.parse()).transpose().ok()?,
-            pitch: self.pitch_mm.map(|pitch| pitch.map(|mm| mm * 1e-3)),
-            rate_hz: self.rate_hz,
-            size: self.size.map(|size| size.map(|count| count.get() as usize)),
-            ..Hints::default()
-        };
-        recordings::read(bytes, &path.to_string_lossy(), &hints).ok()
     }
 }
 

@@ -1,12 +1,11 @@
 //! `tactflow press`: presses the simulated pad with a bladder and writes the log for a calibration.
 
-use std::fmt::Write as _;
-use std::io::{BufWriter, Write as _};
+use std::io::{BufWriter, Write};
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
 
+use tactflow_runtime::cli::Shell;
 use tactflow_runtime::cli::clap::{self, Parser};
-use tactflow_runtime::cli::{NOT_LOADED, Shell};
 
 use super::arguments::{may_replace, pair, positive};
 use crate::sim::bench::MAX_TACTELS;
@@ -51,8 +50,7 @@ const PRESS_S: f64 = 30.0;
 pub(super) fn run(args: PressArgs, shell: &Shell) -> u8 {
     let [rows, cols] = args.size.map(NonZeroUsize::get);
     if rows.saturating_mul(cols) > MAX_TACTELS {
-        shell.error(format_args!("a simulated pad has at most {MAX_TACTELS} tactels, not {rows} by {cols}"));
-        return NOT_LOADED;
+        return shell.refuse(format_args!("a simulated pad has at most {MAX_TACTELS} tactels, not {rows} by {cols}"));
     }
     let done = may_replace(&args.out, "a log of `press`", |text| text.starts_with("time,force,t0_0"))
         .and_then(|()| write(&args).map_err(|error| format!("cannot write `{}`: {error}", args.out.display())));
@@ -61,10 +59,7 @@ pub(super) fn run(args: PressArgs, shell: &Shell) -> u8 {
             shell.say(&format!("wrote {}: {frames} frames at {RATE_HZ} Hz", args.out.display()));
             0
         }
-        Err(message) => {
-            shell.error(message);
-            NOT_LOADED
-        }
+        Err(message) => shell.refuse(message),
     }
 }
 
@@ -77,18 +72,13 @@ fn write(args: &PressArgs) -> std::io::Result<usize> {
     writeln!(file, "time,force{}", names.collect::<String>())?;
     let mut counts = vec![0.0; tactels];
     let frames = ((REST_S + PRESS_S) * RATE_HZ) as usize;
-    let mut line = String::new();
     for frame in 0..frames {
         let time = frame as f64 / RATE_HZ;
         let each = args.most * bladder(time);
         readout.read(1.0 / RATE_HZ, &vec![each; tactels], &mut counts);
-        line.clear();
-        // Writing to a string cannot fail.
-        let _ = write!(line, "{time:.2},{:.6}", each * tactels as f64);
-        counts.iter().for_each(|count| {
-            let _ = write!(line, ",{count}");
-        });
-        writeln!(file, "{line}")?;
+        write!(file, "{time:.2},{:.6}", each * tactels as f64)?;
+        counts.iter().try_for_each(|count| write!(file, ",{count}"))?;
+        writeln!(file)?;
     }
     file.flush()?;
     Ok(frames)

@@ -6,7 +6,7 @@ use tactflow_runtime::device::{Commands, DeviceError, Output, Samples, Stepped};
 use tactflow_runtime::signal::Image;
 
 use super::Params;
-use super::message::{self, Hello, Obs};
+use super::message::{self, Hello, Obs, Reply};
 use super::socket::Socket;
 use crate::devices::arm::ArmPorts;
 
@@ -73,7 +73,7 @@ impl Bridge {
 
     fn answer(&mut self, seq: u64, dq: &[f64], est: Option<[f64; 3]>) -> Result<(), String> {
         self.commanded.copy_from_slice(dq);
-        let sent = self.socket.send(&message::cmd(seq, dq, est));
+        let sent = self.socket.send(&Reply::Cmd { seq, dq, est }.line());
         // The simulator may have ended the run and closed the connection without waiting for this command.
         self.is_over = sent.is_err() && self.has_ended();
         if self.is_over { Ok(()) } else { sent }
@@ -82,7 +82,7 @@ impl Bridge {
     /// Returns whether the simulator has sent that it ends the run.
     fn has_ended(&mut self) -> bool {
         while let Ok(Some(line)) = self.socket.line_within(Duration::ZERO) {
-            if message::message(&line, self.hello.sizes()) == Ok(None) {
+            if message::message(&line, &self.hello) == Ok(None) {
                 return true;
             }
         }
@@ -104,7 +104,7 @@ impl Bridge {
 
     /// Reads a frame. Returns it with its stamp [ns], or `None` at the end of the run.
     fn frame(&mut self, line: &str) -> Result<Option<(i64, Obs)>, String> {
-        let frame = message::message(line, self.hello.sizes()).map_err(|why| self.in_line(why))?;
+        let frame = message::message(line, &self.hello).map_err(|why| self.in_line(why))?;
         let Some(obs) = frame else { return Ok(None) };
         let wrong = |why: String| Err(self.in_line(format!("obs {}: {why}", obs.seq)));
         if let Some((seq, t)) = self.newest {
@@ -145,7 +145,7 @@ impl Bridge {
         let mut seq = self.unanswered.unwrap_or_else(|| self.newest.map_or(0, |(seq, _)| seq + 1));
         loop {
             let is_still = self.slow_down(Instant::now() >= end);
-            if self.socket.send(&message::cmd(seq, &self.commanded, None)).is_err() || is_still {
+            if self.socket.send(&Reply::Cmd { seq, dq: &self.commanded, est: None }.line()).is_err() || is_still {
                 break;
             }
             match self.socket.line_within(FRAME_TIMEOUT) {
@@ -170,7 +170,7 @@ impl Bridge {
 
     /// Sends the end of the run, if it has not ended yet.
     fn end_run(&mut self, reason: &str) {
-        if !std::mem::replace(&mut self.is_over, true) && self.socket.send(&message::end(reason)).is_ok() {
+        if !std::mem::replace(&mut self.is_over, true) && self.socket.send(&Reply::End { reason }.line()).is_ok() {
             self.socket.close();
         }
     }

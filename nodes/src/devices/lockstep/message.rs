@@ -68,13 +68,6 @@ enum HelloType {
     Hello,
 }
 
-impl Hello {
-    /// Returns the sizes that a frame must have.
-    pub(super) const fn sizes(&self) -> Sizes {
-        Sizes { joints: self.joints.len(), rows: self.rows, cols: self.cols }
-    }
-}
-
 /// A frame.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(expecting = "a JSON object")]
@@ -96,14 +89,6 @@ pub(super) struct Obs {
 enum FrameType {
     Obs,
     End,
-}
-
-/// The sizes that a frame must have.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Sizes {
-    pub(super) joints: usize,
-    pub(super) rows: usize,
-    pub(super) cols: usize,
 }
 
 /// Reads a hello.
@@ -134,11 +119,11 @@ pub(super) fn hello(line: &str) -> Result<Hello, String> {
     Ok(hello)
 }
 
-/// Reads a message after the hello: a frame, or `None` for the end of the run.
+/// Reads a message after the `hello`: a frame, or `None` for the end of the run.
 ///
 /// # Errors
 /// What is wrong, with its field and, where the line is JSON, with the number of the frame.
-pub(super) fn message(line: &str, sizes: Sizes) -> Result<Option<Obs>, String> {
+pub(super) fn message(line: &str, hello: &Hello) -> Result<Option<Obs>, String> {
     #[derive(Deserialize)]
     struct Tag {
         r#type: FrameType,
@@ -146,14 +131,16 @@ pub(super) fn message(line: &str, sizes: Sizes) -> Result<Option<Obs>, String> {
     if parse(line).is_ok_and(|tag: Tag| tag.r#type == FrameType::End) {
         return Ok(None);
     }
-    let obs = parse(line).and_then(|obs| check_sizes(obs, sizes));
+    let obs = parse(line).and_then(|obs| check_sizes(obs, hello));
     obs.map(Some).map_err(|why| match seq_of(line) {
         Some(seq) => format!("obs {seq}: {why}"),
         None => why,
     })
 }
 
-fn check_sizes(obs: Obs, Sizes { joints, rows, cols }: Sizes) -> Result<Obs, String> {
+fn check_sizes(obs: Obs, hello: &Hello) -> Result<Obs, String> {
+    let Hello { rows, cols, .. } = hello;
+    let joints = hello.joints.len();
     for (name, numbers) in [("q", &obs.q), ("dq", &obs.dq), ("q_eq", &obs.q_eq)] {
         check_length(name, numbers, joints, || format!("the arm has {joints} joints"))?;
     }
@@ -292,28 +279,20 @@ fn rpy(rotation: &Matrix3<f64>) -> [f64; 3] {
     [libm::atan2(across[2], across[1]), libm::atan2(-r(2, 0), across[0]), yaw]
 }
 
-/// A message to the simulator.
+/// A message to the simulator: a command of joint speeds [rad/s] with where the task finds the contact [m], or the end of
+/// a run.
 #[derive(Serialize)]
 #[serde(tag = "type", rename_all = "lowercase")]
-enum Reply<'a> {
+pub(super) enum Reply<'a> {
     Cmd { seq: u64, dq: &'a [f64], est: Option<[f64; 3]> },
     End { reason: &'a str },
 }
 
 impl Reply<'_> {
-    fn line(&self) -> String {
+    /// Returns the message as a line.
+    pub(super) fn line(&self) -> String {
         serde_json::to_string(self).expect("numbers and text can always be written") + "\n"
     }
-}
-
-/// Returns a command as a line: joint speeds [rad/s], and where the task finds the contact [m].
-pub(super) fn cmd(seq: u64, dq: &[f64], est: Option<[f64; 3]>) -> String {
-    Reply::Cmd { seq, dq, est }.line()
-}
-
-/// Returns the end of a run as a line.
-pub(super) fn end(reason: &str) -> String {
-    Reply::End { reason }.line()
 }
 
 #[cfg(test)]

@@ -8,12 +8,10 @@ use crate::recordings::common::{Hints, MAX_CELLS, Refusal, TextError};
 pub(super) struct CsvColumns {
     /// Rows and columns of the array.
     pub(super) size: [usize; 2],
-    /// Number of columns of the file.
-    pub(super) count: usize,
     /// Factor from the file's times to seconds.
     pub(super) second: f64,
-    /// Role of each column; `None` without names, when each column is a tactel.
-    named: Option<Vec<Place>>,
+    /// Role of each column.
+    pub(super) roles: Vec<Role>,
 }
 
 /// The role of a column.
@@ -29,17 +27,13 @@ pub(super) enum Role {
     Passed,
 }
 
-/// A compact role: the row and the column of a tactel, or one of three marks.
+/// The row and the column in the name of a tactel.
 type Place = (u32, u32);
-
-const TIME: Place = (u32::MAX, 0);
-const FORCE: Place = (u32::MAX, 1);
-const PASSED: Place = (u32::MAX, 2);
 
 impl CsvColumns {
     /// Returns columns that are tactels row by row.
-    pub(super) const fn plain(rows: usize, cols: usize) -> Self {
-        Self { size: [rows, cols], count: rows * cols, second: 1.0, named: None }
+    pub(super) fn plain(rows: usize, cols: usize) -> Self {
+        Self { size: [rows, cols], second: 1.0, roles: (0..rows * cols).map(Role::Tactel).collect() }
     }
 
     /// Reads a row of names. For tactels whose names have no row and column, the bench gives the size.
@@ -47,54 +41,70 @@ impl CsvColumns {
         let notation = names_of(names);
         let count = notation.fields(names).count();
         names.check(count <= MAX_CELLS, format_args!("{count} columns are more than the maximum of {MAX_CELLS}"))?;
-        let mut columns = Self { size: [0, 0], count, second: 1.0, named: None };
-        let mut places = Vec::with_capacity(count);
-        let mut have_places = None;
+        let mut columns = Self { size: [0, 0], second: 1.0, roles: Vec::with_capacity(count) };
+        let (mut places, mut found) = (Vec::new(), 0);
         for name in notation.fields(names).map(unquoted) {
             let title = || shortened(name.text);
-            if let Some(mark) = columns.mark(name)? {
-                let is_twice = mark != PASSED && places.contains(&mark);
+            if let Some(role) = columns.beside(name)? {
+                let is_twice = role != Role::Passed && columns.roles.contains(&role);
                 name.check(!is_twice, format_args!("`{}` appears twice", title()))?;
-                places.push(mark);
+                columns.roles.push(role);
                 continue;
             }
             let place = place(name.text);
-            if *have_places.get_or_insert(place.is_some()) != place.is_some() {
+            if found > 0 && places.is_empty() == place.is_some() {
                 return Err(match place {
                     None => name.error(format!("`{}` has no row and column, but other names do", title())),
                     Some(_) => name.error("only some names have a row and a column"),
                 }
                 .into());
             }
-            places.push(place.unwrap_or((0, 0)));
+            columns.roles.push(Role::Tactel(found));
+            places.extend(place);
+            found += 1;
         }
-        columns.size = if have_places == Some(true) {
-            let size = settle(&mut places).map_err(|message| names.error(message))?;
-            hints.size(Some(size))?
-        } else {
-            let size = hints.size(None)?;
-            number(&mut places, size).map_err(|message| names.error(message))?;
+        columns.size = if places.is_empty() {
+            let size @ [rows, cols] = hints.size(None)?;
+            let message = format_args!("these are the names of {found} tactels, not of {rows} by {cols}");
+            names.check(rows.checked_mul(cols) == Some(found), message)?;
             size
+        } else {
+            let size = columns.settle(&places).map_err(|message| names.error(message))?;
+            hints.size(Some(size))?
         };
-        columns.named = Some(places);
         Ok(columns)
     }
 
-    /// Returns the role of a column, by its index.
-    pub(super) fn role(&self, column: usize) -> Option<Role> {
-        match &self.named {
-            None => (column < self.count).then_some(Role::Tactel(column)),
-            Some(places) => places.get(column).map(|place| match *place {
-                TIME => Role::Time,
-                FORCE => Role::Force,
-                PASSED => Role::Passed,
-                (row, col) => Role::Tactel(row as usize * self.size[1] + col as usize),
-            }),
+    /// Gives each tactel the index of its place, and returns the size of the array. Places count from 0 or from 1, and
+    /// each must appear once.
+    fn settle(&mut self, places: &[Place]) -> Result<[usize; 2], String> {
+        let (mut first, mut last) = (places[0], places[0]);
+        for (row, col) in places {
+            first = (first.0.min(*row), first.1.min(*col));
+            last = (last.0.max(*row), last.1.max(*col));
         }
+        if first.0 > 1 || first.1 > 1 {
+            return Err("the names of the tactels must count rows and columns from 0 or from 1".into());
+        }
+        let [rows, cols] = [(last.0 - first.0) as usize + 1, (last.1 - first.1) as usize + 1];
+        let found = places.len();
+        if rows.checked_mul(cols) != Some(found) {
+            return Err(format!("the names reach {rows} rows by {cols} columns, but there are {found} names"));
+        }
+        let mut is_there = vec![false; found];
+        let tactels = self.roles.iter_mut().filter(|role| matches!(role, Role::Tactel(_)));
+        for (role, (row, col)) in tactels.zip(places) {
+            let index = (row - first.0) as usize * cols + (col - first.1) as usize;
+            if std::mem::replace(&mut is_there[index], true) {
+                return Err(format!("row {row} and column {col} appear twice"));
+            }
+            *role = Role::Tactel(index);
+        }
+        Ok([rows, cols])
     }
 
-    /// Returns the mark of a column that is not a tactel.
-    fn mark(&mut self, name: Piece<'_>) -> Result<Option<Place>, TextError> {
+    /// Returns the role of a column beside the tactels, or `None` for a tactel.
+    fn beside(&mut self, name: Piece<'_>) -> Result<Option<Role>, TextError> {
         let lower = if name.text.len() > 40 { String::new() } else { name.text.to_lowercase() };
         let (base, unit) = match lower.split_once(['[', '(']) {
             Some((base, unit)) => (base.trim(), unit.trim_end_matches([']', ')']).trim()),
@@ -102,10 +112,10 @@ impl CsvColumns {
         };
         match base {
             "time" | "t" | "timestamp" | "zeit" => {}
-            "force" if matches!(unit, "" | "n") => return Ok(Some(FORCE)),
+            "force" if matches!(unit, "" | "n") => return Ok(Some(Role::Force)),
             "force" => return Err(name.error("the unit of `force` must be `N`")),
-            "frame" | "index" if unit.is_empty() => return Ok(Some(PASSED)),
-            "" if name.text.is_empty() => return Ok(Some(PASSED)),
+            "frame" | "index" if unit.is_empty() => return Ok(Some(Role::Passed)),
+            "" if name.text.is_empty() => return Ok(Some(Role::Passed)),
             _ => return Ok(None),
         }
         self.second = match unit {
@@ -117,7 +127,7 @@ impl CsvColumns {
             _ if base == "t" => return Ok(None),
             _ => return Err(name.error("the unit of a time must be `s`, `ms`, `us` or `ns`")),
         };
-        Ok(Some(TIME))
+        Ok(Some(Role::Time))
     }
 }
 
@@ -142,46 +152,6 @@ fn place(name: &str) -> Option<Place> {
     let is_column_first = matches!(letter, Some('x' | 'X' | 'c' | 'C')) && name.contains(['y', 'Y', 'r', 'R']);
     let place = if is_column_first { (second, first) } else { (first, second) };
     (numbers.next().is_none() && place.0 < u32::MAX).then_some(place)
-}
-
-fn tactels(places: &mut [Place]) -> impl Iterator<Item = &mut Place> {
-    places.iter_mut().filter(|place| place.0 != u32::MAX)
-}
-
-/// Shifts the places to count from 0, and returns the size of the array. Each tactel must appear once.
-fn settle(places: &mut [Place]) -> Result<[usize; 2], String> {
-    let (mut first, mut last, mut found) = ((u32::MAX, u32::MAX), (0, 0), 0);
-    for place in tactels(places) {
-        first = (first.0.min(place.0), first.1.min(place.1));
-        last = (last.0.max(place.0), last.1.max(place.1));
-        found += 1;
-    }
-    if first.0 > 1 || first.1 > 1 {
-        return Err("the names of the tactels must count rows and columns from 0 or from 1".into());
-    }
-    let [rows, cols] = [(last.0 - first.0) as usize + 1, (last.1 - first.1) as usize + 1];
-    if rows.checked_mul(cols) != Some(found) {
-        return Err(format!("the names reach {rows} rows by {cols} columns, but there are {found} names"));
-    }
-    let mut is_there = vec![false; found];
-    for place in tactels(places) {
-        let (row, col) = *place;
-        *place = (row - first.0, col - first.1);
-        if std::mem::replace(&mut is_there[place.0 as usize * cols + place.1 as usize], true) {
-            return Err(format!("row {row} and column {col} appear twice"));
-        }
-    }
-    Ok([rows, cols])
-}
-
-/// Numbers the tactels row by row.
-fn number(places: &mut [Place], [rows, cols]: [usize; 2]) -> Result<(), String> {
-    let found = tactels(places).count();
-    if rows.checked_mul(cols) != Some(found) {
-        return Err(format!("these are the names of {found} tactels, not of {rows} by {cols}"));
-    }
-    tactels(places).enumerate().for_each(|(i, place)| *place = ((i / cols) as u32, (i % cols) as u32));
-    Ok(())
 }
 
 #[cfg(test)]

@@ -122,6 +122,7 @@ fn layout(first: Piece<'_>, lines: Lines<'_>, hints: &Hints) -> Result<FrameLayo
             "the first row has {width} numbers: this is neither a frame of {rows} by {cols} tactels nor a row of one"
         );
         first.check(is_row || cols == width, message)?;
+        bounded(rows, cols).map_err(|message| first.error(message))?;
         let block = FrameLayout::Block { size, are_separated: false };
         return Ok(if is_row { FrameLayout::Row(CsvColumns::plain(rows, cols)) } else { block });
     }
@@ -178,8 +179,8 @@ impl CsvReader {
             let (mut found, mut time) = (0, None);
             for cell in notation.fields(line) {
                 let value = number(notation, cell, "this cell")?;
-                match columns.role(found) {
-                    Some(Role::Tactel(index)) => frame[index] = value,
+                match columns.roles.get(found) {
+                    Some(Role::Tactel(index)) => frame[*index] = value,
                     Some(Role::Time) => time = Some(self.since_start(value * columns.second, cell)?),
                     Some(Role::Force) => {
                         cell.check(value.is_finite(), "a force must be a number")?;
@@ -189,10 +190,11 @@ impl CsvReader {
                 }
                 found += 1;
             }
-            let (number, count) = (self.reel.frames.len() + 1, columns.count);
+            let (number, count) = (self.reel.frames.len() + 1, columns.roles.len());
             line.check(found == count, format_args!("frame {number} has {found} columns, not {count}"))?;
             for (index, value) in frame.iter().enumerate() {
-                let is_here = |(column, _): &(usize, Piece<'_>)| columns.role(*column) == Some(Role::Tactel(index));
+                let is_here =
+                    |(column, _): &(usize, Piece<'_>)| columns.roles.get(*column) == Some(&Role::Tactel(index));
                 let place = || notation.fields(line).enumerate().find(is_here).map_or(line, |(_, at)| at);
                 self.reel.cell(*value).map_err(|message| place().error(message))?;
             }

@@ -18,7 +18,7 @@ use super::joints::{JointDynamics, SimArm};
 use super::object::{Object, ObjectParams};
 use super::readout::{Electronics, Readout};
 use super::shape::pose3;
-use super::world::{World, start};
+use super::world::World;
 use crate::arm::chain::Chain;
 use crate::arm::model::load;
 use crate::arm::mount::Mount;
@@ -258,7 +258,7 @@ fn world(params: Params, chain: Chain, shape: ImageShape) -> Result<World, Mista
     };
     let inertia = params.inertia.as_deref().unwrap_or(&INERTIA);
     let arm = SimArm::new(chain, inertia.iter().copied().map(joint).collect(), params.start);
-    let from = start(&arm);
+    let from = arm.motion().pose;
     let mut scatter = Random::new(params.seed, 3);
     let place = |(i, object): (usize, &ObjectParams)| {
         let offset = [0, 1].map(|_| scatter.uniform(-object.scatter, object.scatter));
@@ -341,8 +341,8 @@ impl SimBench {
             "force" => Some(truth.force),
             "tangential" => Some(truth.tangential),
             "peak" => Some(truth.peak),
-            "x" => truth.middle.map(|[x, _]| x),
-            "y" => truth.middle.map(|[_, y]| y),
+            "x" => truth.middle.map(|middle| middle.x),
+            "y" => truth.middle.map(|middle| middle.y),
             "pressure" => truth.pressure,
             "orientation" => truth.orientation,
             "area" => Some(truth.area),

@@ -94,7 +94,7 @@ impl Shell {
     }
 
     /// Prints an error to standard error and returns the exit code of an invalid command line.
-    pub(crate) fn refuse(&self, message: impl Display) -> u8 {
+    pub fn refuse(&self, message: impl Display) -> u8 {
         self.error(message);
         NOT_LOADED
     }

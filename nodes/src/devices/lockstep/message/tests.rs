@@ -8,7 +8,11 @@ use crate::arm::mount::pose_of;
 const HELLO: &str = r#"{"type":"hello","proto":1,"dt":0.004,"lockstep":true,"task":"hybrid","joints":["a","b"],"q_min":[-1,-2.5],"q_max":[1,2],"dq_max":[3,4],"urdf":"lwr4p","tip":"flange","T_es":[1,0,0,0.1, 0,1,0,0.2, 0,0,1,0.03, 0,0,0,1],"rows":2,"cols":3,"pitch":0.005,"counts_per_unit":102.375,"newton_per_unit":0.1,"threshold_units":0.15,"colour":{"of":"pad"}}"#;
 const OBS: &str =
     r#"{"type":"obs","seq":17,"t":0.068,"q":[0.1,2],"dq":[0,0.0],"q_eq":[0.2,2],"img":[0,1,2,3.5,4,5],"more":[]}"#;
-const SIZES: Sizes = Sizes { joints: 2, rows: 2, cols: 3 };
+
+/// Returns what [`HELLO`] describes.
+fn bench() -> Hello {
+    hello(HELLO).unwrap()
+}
 
 #[test]
 fn a_hello_is_read_and_an_unknown_key_is_ignored() {
@@ -36,7 +40,7 @@ fn a_missing_key_is_named() {
         assert_eq!(hello(&line).unwrap_err(), format!("missing field `{key}`"));
     }
     for key in keys(OBS).into_iter().filter(|key| key != "more") {
-        let why = message(&OBS.replace(&format!("\"{key}\":"), &format!("\"no_{key}\":")), SIZES).unwrap_err();
+        let why = message(&OBS.replace(&format!("\"{key}\":"), &format!("\"no_{key}\":")), &bench()).unwrap_err();
         assert!(why.ends_with(&format!("missing field `{key}`")), "{why}");
     }
 }
@@ -75,11 +79,11 @@ fn a_mistake_in_a_hello_names_its_field() {
 
 #[test]
 fn a_mistake_in_a_frame_names_its_field() {
-    let Ok(Some(obs)) = message(OBS, SIZES) else { panic!("a frame") };
+    let Ok(Some(obs)) = message(OBS, &bench()) else { panic!("a frame") };
     assert_eq!((obs.seq, obs.t, &*obs.q, &*obs.q_eq), (17, 0.068, &[0.1, 2.0][..], &[0.2, 2.0][..]));
     assert_eq!(obs.img, [0.0, 1.0, 2.0, 3.5, 4.0, 5.0]);
-    assert_eq!(message(&OBS.replace("17", "17.0"), SIZES).map(|_| ()), Ok(()), "a float that is whole");
-    assert_eq!(message("{\"type\":\"end\",\"reason\":1}", SIZES), Ok(None));
+    assert_eq!(message(&OBS.replace("17", "17.0"), &bench()).map(|_| ()), Ok(()), "a float that is whole");
+    assert_eq!(message("{\"type\":\"end\",\"reason\":1}", &bench()), Ok(None));
     let cases = [
         ("3.5,4,5]", "3.5,4]", "obs 17: `img` has 5 numbers, but the pad has 2x3 = 6"),
         ("3.5", "NaN", "`img[3]`: expected value at byte 87, found `NaN`"),
@@ -97,7 +101,7 @@ fn a_mistake_in_a_frame_names_its_field() {
         ("3.5", "3;5", "`img`: expected `,` or `]` at byte 87, found `3;5`"),
     ];
     for (from, to, wanted) in cases {
-        let why = message(&OBS.replacen(from, to, 1), SIZES).unwrap_err();
+        let why = message(&OBS.replacen(from, to, 1), &bench()).unwrap_err();
         assert!(why.starts_with(wanted), "{to}: {why}");
     }
 }
@@ -117,7 +121,7 @@ fn a_line_that_is_not_json_is_described() {
         (&deep, "`a`: expected `,` or `]` at byte 900016, found `}`"),
     ];
     for (line, wanted) in cases {
-        let why = message(line, SIZES).unwrap_err();
+        let why = message(line, &bench()).unwrap_err();
         assert!(why.ends_with(wanted), "{}: {why}", &line[..line.len().min(40)]);
     }
 }
@@ -125,13 +129,13 @@ fn a_line_that_is_not_json_is_described() {
 #[test]
 fn a_reply_is_json_and_keeps_every_bit() {
     let dq = [0.1 + 0.2, -1e-300, 0.0, 1e22];
-    let line = cmd(3, &dq, Some([0.5, -0.25, 1e-7]));
+    let line = Reply::Cmd { seq: 3, dq: &dq, est: Some([0.5, -0.25, 1e-7]) }.line();
     assert!(line.ends_with("}\n") && line.starts_with("{\"type\":\"cmd\",\"seq\":3,"), "{line}");
     let fields: serde_json::Value = serde_json::from_str(&line).unwrap();
     assert_eq!(serde_json::from_value::<[f64; 4]>(fields["dq"].clone()).unwrap(), dq);
     assert_eq!(serde_json::from_value::<[f64; 3]>(fields["est"].clone()).unwrap(), [0.5, -0.25, 1e-7]);
-    assert!(cmd(3, &dq, None).contains("\"est\":null"));
-    assert_eq!(end("a \"b\"\n"), "{\"type\":\"end\",\"reason\":\"a \\\"b\\\"\\n\"}\n");
+    assert!(Reply::Cmd { seq: 3, dq: &dq, est: None }.line().contains("\"est\":null"));
+    assert_eq!(Reply::End { reason: "a \"b\"\n" }.line(), "{\"type\":\"end\",\"reason\":\"a \\\"b\\\"\\n\"}\n");
 }
 
 proptest! {
