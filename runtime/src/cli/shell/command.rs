@@ -7,12 +7,14 @@ use clap::{Args, Parser, ValueEnum};
 use super::Shell;
 use crate::graph::Request;
 
+/// Runs a command and returns the exit code.
+type RunCommand = dyn Fn(&clap::ArgMatches, &Shell) -> u8;
+
 /// A command of the tool.
 pub struct Subcommand {
     /// Its name, its arguments and its help.
     pub(crate) command: clap::Command,
-    /// Runs it and returns the exit code.
-    pub(crate) run: Box<dyn Fn(&clap::ArgMatches, &Shell) -> u8>,
+    pub(crate) run: Box<RunCommand>,
 }
 
 /// Makes a command from a function and from arguments that clap derives.
