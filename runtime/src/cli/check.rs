@@ -8,7 +8,7 @@ use super::shell::command::{GraphArgs, OutputFormat};
 use super::shell::json::{DiagnosticJson, diagnosed};
 use super::shell::{NOT_LOADED, Shell};
 use super::text::number::{count_of, milliseconds};
-use crate::graph::{Compiled, compile};
+use crate::graph::compile;
 use crate::scenario::Scenario;
 use crate::source::Report;
 
@@ -35,23 +35,21 @@ pub(crate) struct CheckArgs {
 }
 
 pub(crate) fn check(args: CheckArgs, shell: &Shell) -> u8 {
-    let mut code = 0;
     let mut results = Vec::new();
     for path in &args.graphs {
-        let checked = match is_scenario(path) {
-            true => check_scenario(path, &args.graph_args, shell),
-            false => Ok(check_graph(path, &args, shell)),
-        };
-        let checked = match checked {
-            Ok(checked) => checked,
-            Err(message) => {
-                code = shell.refuse(message);
+        // A file that cannot be read is reported as a graph.
+        let is_scenario = std::fs::read_to_string(path).is_ok_and(|text| Scenario::is_one(&text));
+        let checked = match is_scenario {
+            true if args.graph_args.is_given() => {
+                let path = path.display();
+                shell.error(format_args!(
+                    "`{path}` is a scenario, which names its own bench: remove `--bench` and `--set`"
+                ));
                 continue;
             }
+            true => check_scenario(path, shell),
+            false => check_graph(path, &args, shell),
         };
-        if !checked.ok {
-            code = NOT_LOADED;
-        }
         if args.format == OutputFormat::Text {
             checked.report.iter().for_each(|report| shell.show(report));
             if checked.ok {
@@ -63,18 +61,16 @@ pub(crate) fn check(args: CheckArgs, shell: &Shell) -> u8 {
     if args.format == OutputFormat::Json {
         shell.say_json(&results);
     }
-    code
-}
-
-/// Whether a file is a scenario. A file that cannot be read is reported as a graph.
-fn is_scenario(path: &Path) -> bool {
-    std::fs::read_to_string(path).is_ok_and(|text| Scenario::is_one(&text))
+    let is_ok = results.len() == args.graphs.len() && results.iter().all(|checked| checked.ok);
+    if is_ok { 0 } else { NOT_LOADED }
 }
 
 fn check_graph(path: &Path, args: &CheckArgs, shell: &Shell) -> Checked {
     match compile(shell.catalogue(), &args.graph_args.request(path.to_owned())) {
         Ok(plan) => {
-            let (report, figures) = (plan.warnings(), PlanJson::of(&plan));
+            let (report, order): (_, Vec<String>) = (plan.warnings(), plan.order().map(str::to_owned).collect());
+            let (ports, period_s, is_live) = (plan.ports().count(), plan.period(), plan.is_live());
+            let figures = PlanJson { nodes: order.len(), ports, period_s, is_live, order };
             let summary = format!("{} nodes, one tick every {}", figures.nodes, milliseconds(figures.period_s));
             let ok = report.is_none() || !args.deny_warnings;
             Checked { ok, figures: Some(figures), summary, ..Checked::of(path, report) }
@@ -84,19 +80,15 @@ fn check_graph(path: &Path, args: &CheckArgs, shell: &Shell) -> Checked {
 }
 
 /// Checks a scenario with its graph and its bench.
-fn check_scenario(path: &Path, graph_args: &GraphArgs, shell: &Shell) -> Result<Checked, String> {
-    if graph_args.bench.is_some() || !graph_args.set.is_empty() {
-        let path = path.display();
-        return Err(format!("`{path}` is a scenario, which names its own bench: remove `--bench` and `--set`"));
-    }
-    Ok(match Scenario::load(shell.catalogue(), path) {
+fn check_scenario(path: &Path, shell: &Shell) -> Checked {
+    match Scenario::load(shell.catalogue(), path) {
         Ok(scenario) => {
             let (runs, length) = (count_of(scenario.runs().len(), "run"), scenario.for_s);
             let summary = format!("a scenario of {runs}, {length} s each; run it with `tactflow verify`");
             Checked { ok: true, summary, ..Checked::of(path, None) }
         }
         Err(report) => Checked::of(path, Some(report)),
-    })
+    }
 }
 
 /// The result of one file, as JSON.
@@ -132,16 +124,4 @@ struct PlanJson {
     is_live: bool,
     /// The nodes in the order in which they step.
     order: Vec<String>,
-}
-
-impl PlanJson {
-    fn of(plan: &Compiled) -> Self {
-        Self {
-            nodes: plan.order().count(),
-            ports: plan.ports().count(),
-            period_s: plan.period(),
-            is_live: plan.is_live(),
-            order: plan.order().map(str::to_owned).collect(),
-        }
-    }
 }

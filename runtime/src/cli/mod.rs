@@ -61,7 +61,7 @@ struct Cli {
 /// The tool: a catalogue and its commands.
 pub struct Tool {
     catalogue: Catalogue,
-    commands: Vec<Box<dyn Subcommand>>,
+    commands: Vec<Subcommand>,
 }
 
 impl Tool {
@@ -87,10 +87,9 @@ impl Tool {
     /// # Panics
     /// If a command has that name already.
     #[must_use]
-    pub fn command(mut self, command: Box<dyn Subcommand>) -> Self {
-        let name = command.command().get_name().to_owned();
-        let is_taken = self.commands.iter().any(|other| other.command().get_name() == name);
-        assert!(!is_taken, "two commands are called `{name}`");
+    pub fn command(mut self, command: Subcommand) -> Self {
+        let is_taken = self.commands.iter().any(|other| other.name() == command.name());
+        assert!(!is_taken, "two commands are called `{}`", command.name());
         self.commands.push(command);
         self
     }
@@ -112,8 +111,8 @@ impl Tool {
         let arguments = self.arguments();
         let shell = Shell::new(self.catalogue, cli.color, arguments);
         let (name, matches) = matches.subcommand().expect("clap requires a subcommand");
-        let command = self.commands.iter().find(|command| command.command().get_name() == name);
-        match command.expect("clap accepts only these commands").run(matches, &shell) {
+        let command = self.commands.iter().find(|command| command.name() == name);
+        match (command.expect("clap accepts only these commands").run)(matches, &shell) {
             0 if shell.is_cut() => FAULTED.into(),
             code => code.into(),
         }
@@ -121,7 +120,7 @@ impl Tool {
 
     /// Returns the arguments of the tool, including those of all commands.
     fn arguments(&self) -> clap::Command {
-        Cli::command().subcommands(self.commands.iter().map(|command| command.command()))
+        Cli::command().subcommands(self.commands.iter().map(|command| &command.command))
     }
 }
 

@@ -4,9 +4,6 @@ use std::fs::File;
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 
-use ply_rs_bw::ply::{ElementDef, Encoding, Header, PropertyAccess, PropertyDef, PropertyType, ScalarType};
-use ply_rs_bw::writer::Writer;
-
 use super::PortColumns;
 use crate::engine::Engine;
 use crate::graph::{Compiled, PlannedPort};
@@ -154,36 +151,15 @@ impl PointRecorder {
     /// If the file cannot be written.
     pub fn finish(self) -> io::Result<usize> {
         let count = self.values.len() / self.names.len();
-        let double = |name: &String| PropertyDef::new(name.clone(), PropertyType::Scalar(ScalarType::Double));
-        let mut vertex = ElementDef::new("vertex".into());
-        vertex.count = count;
-        vertex.properties = self.names.iter().map(|name| (name.clone(), double(name))).collect();
-        let mut header = Header::new();
-        (header.encoding, header.comments) = (Encoding::BinaryLittleEndian, self.comments);
-        header.elements.insert(vertex.name.clone(), vertex.clone());
-        let (writer, mut out) = (Writer::<Vertex<'_>>::new(), BufWriter::new(self.file));
-        writer.write_header(&mut out, &header)?;
-        for values in self.values.chunks(self.names.len()) {
-            writer.write_little_endian_element(&mut out, &Vertex { names: &self.names, values }, &vertex)?;
-        }
+        let mut out = BufWriter::new(self.file);
+        writeln!(out, "{}format binary_little_endian 1.0", Self::FILE_START)?;
+        self.comments.iter().try_for_each(|comment| writeln!(out, "comment {comment}"))?;
+        writeln!(out, "element vertex {count}")?;
+        self.names.iter().try_for_each(|name| writeln!(out, "property double {name}"))?;
+        writeln!(out, "end_header")?;
+        self.values.iter().try_for_each(|value| out.write_all(&value.to_le_bytes()))?;
         out.flush()?;
         Ok(count)
-    }
-}
-
-/// One point, in the form that the PLY writer reads.
-struct Vertex<'a> {
-    names: &'a [String],
-    values: &'a [f64],
-}
-
-impl PropertyAccess for Vertex<'_> {
-    fn new() -> Self {
-        Self { names: &[], values: &[] }
-    }
-
-    fn get_double(&self, name: &str) -> Option<f64> {
-        self.values.get(self.names.iter().position(|other| other == name)?).copied()
     }
 }
 

@@ -69,17 +69,6 @@ pub enum Bound {
     AtLeast(f64),
 }
 
-impl Bound {
-    /// Returns the number of the bound, if it has one.
-    #[must_use]
-    pub const fn number(self) -> Option<f64> {
-        match self {
-            Self::None | Self::Settles => None,
-            Self::Median(bound) | Self::AtMost(bound) | Self::AtLeast(bound) => Some(bound),
-        }
-    }
-}
-
 /// The verdict on a row.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]

@@ -10,7 +10,7 @@ use crate::graph::{Compiled, Request};
 use crate::node::Spanned;
 use crate::record::{PortColumn, PortColumns};
 use crate::signal::Kind;
-use crate::source::{Code, Diagnostic, Item, Report, Value, suggest_name};
+use crate::source::{Code, Diagnostic, Item, Report, Value, suggest_name, suggestion};
 
 /// Default length of the steady state at the end of a run [s].
 const DEFAULT_STEADY_S: f64 = 10.0;
@@ -71,6 +71,12 @@ struct Lookup<'a> {
 }
 
 impl Lookup<'_> {
+    /// Reports a mistake in a word; returns `None` in place of what the word names.
+    fn mistake<T>(&mut self, code: Code, word: &Spanned<String>, message: String, help: Option<String>) -> Option<T> {
+        self.found.push(Diagnostic::new(code, word.span.clone(), message).with_help(help));
+        None
+    }
+
     /// Finds a column by its name in a recording or in the wires of the task. Returns it with the kind of its port.
     fn column(&mut self, word: &Spanned<String>) -> Option<(PortColumn, Kind)> {
         let (port, rest) = self.plan.port_prefix(&word.value).or_else(|| self.unknown_port(word))?;
@@ -85,27 +91,25 @@ impl Lookup<'_> {
         let what = if parts.is_empty() { "which has no number to check" } else { "but a check needs one number" };
         let message = format!("`{}` is {}, {what}", word.value, kind.with_article());
         let help = (!parts.is_empty()).then(|| format!("write one of {}", parts.join(", ")));
-        self.found.push(Diagnostic::new(Code::KindMismatch, word.span.clone(), message).with_help(help));
-        None
+        self.mistake(Code::KindMismatch, word, message, help)
     }
 
     /// Reports a port that does not exist, with the closest name, the ports of its owner, or the owners.
     fn unknown_port<T>(&mut self, word: &Spanned<String>) -> Option<T> {
         let message = format!("there is no port `{}` in this task on this bench", word.value);
-        let diagnostic = Diagnostic::new(Code::UnknownPort, word.span.clone(), message);
         let columns = self.plan.ports().flat_map(PortColumns::of).map(|column| column.name);
         let all: Vec<String> = columns.chain(self.plan.exports().iter().map(|(export, _)| export.clone())).collect();
         let owner_of = |name: &'_ str| name.split('.').next().unwrap_or_default().to_owned();
         let owner = owner_of(&word.value);
         let is_close = suggest_name(&word.value, all.iter().map(String::as_str)).is_some();
         let ports = all.iter().map(String::as_str).filter(|name| is_close || owner_of(name) == owner);
-        self.found.push(if ports.clone().next().is_some() {
-            diagnostic.suggest(&word.value, ports, "ports")
+        let help = if ports.clone().next().is_some() {
+            suggestion(&word.value, ports, "ports")
         } else {
             let owners: BTreeSet<String> = all.iter().map(|name| owner_of(name)).collect();
-            diagnostic.suggest(&owner, owners.iter().map(String::as_str), "roles, nodes and parts")
-        });
-        None
+            suggestion(&owner, owners.iter().map(String::as_str), "roles, nodes and parts")
+        };
+        self.mistake(Code::UnknownPort, word, message, Some(help))
     }
 
     /// Finds the column of a flag.
@@ -113,8 +117,7 @@ impl Lookup<'_> {
         let (column, kind) = self.column(word)?;
         if kind != Kind::Flag {
             let message = format!("`{}` is {}, but this key needs a flag", word.value, kind.with_article());
-            self.found.push(Diagnostic::new(Code::KindMismatch, word.span.clone(), message));
-            return None;
+            return self.mistake(Code::KindMismatch, word, message, None);
         }
         Some(column.name)
     }
@@ -150,7 +153,7 @@ impl Lookup<'_> {
             unit,
             settles: table.settles_to.zip(table.within),
             after: table.after_s,
-            steady: table.steady_s.map_or(DEFAULT_STEADY_S, |steady| steady),
+            steady: table.steady_s.unwrap_or(DEFAULT_STEADY_S),
             figures: figures.iter().map(|(figure, _)| *figure).collect(),
         };
         Some((check, rows.collect()))
@@ -161,8 +164,7 @@ impl Lookup<'_> {
         let (column, _) = self.column(word)?;
         if column.unit != other.unit {
             let message = format!("`{}` is in {}, but `{}` is in {}", word.value, column.unit, other.name, other.unit);
-            self.found.push(Diagnostic::new(Code::UnitMismatch, word.span.clone(), message));
-            return None;
+            return self.mistake(Code::UnitMismatch, word, message, None);
         }
         Some(column.name)
     }
@@ -174,8 +176,8 @@ impl Lookup<'_> {
         let ends_in = ends_in.filter(|word| word.value != super::trial::DONE || modes.is_empty());
         for word in ends_in.into_iter().chain(stays_in).filter(|word| !modes.contains(&word.value.as_str())) {
             let message = format!("there is no mode `{}`", word.value);
-            let diagnostic = Diagnostic::new(Code::UnknownMode, word.span.clone(), message);
-            self.found.push(diagnostic.suggest(&word.value, modes.iter().copied(), "modes"));
+            let help = suggestion(&word.value, modes.iter().copied(), "modes");
+            self.mistake::<()>(Code::UnknownMode, word, message, Some(help));
         }
     }
 
@@ -186,14 +188,11 @@ impl Lookup<'_> {
             device.settings.iter().filter_map(move |setting| Some((named(&setting.path), plain(&setting.value)?)))
         });
         let facts: Vec<_> = self.plan.facts().iter().cloned().chain(settings).collect();
-        let fact = facts.iter().find(|(name, _)| *name == word.value).cloned();
-        if fact.is_none() {
+        facts.iter().find(|(name, _)| *name == word.value).cloned().or_else(|| {
             let message = format!("no device states the fact or has the parameter `{}`", word.value);
-            let diagnostic = Diagnostic::new(Code::UnknownFact, word.span.clone(), message);
-            let names = facts.iter().map(|(name, _)| name.as_str());
-            self.found.push(diagnostic.suggest(&word.value, names, "facts"));
-        }
-        fact
+            let help = suggestion(&word.value, facts.iter().map(|(name, _)| name.as_str()), "facts");
+            self.mistake(Code::UnknownFact, word, message, Some(help))
+        })
     }
 
     /// Returns the keys that set the seed. Without such a key, every seed would give the same run.

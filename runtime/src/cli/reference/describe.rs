@@ -36,10 +36,10 @@ enum PageFormat {
 }
 
 pub(crate) fn describe(args: DescribeArgs, shell: &Shell) -> u8 {
-    let all = entries(shell.catalogue());
-    let mut found: Vec<Entry> = all.iter().filter(|entry| entry.name == args.name).cloned().collect();
+    let (mut found, others): (Vec<Entry>, Vec<Entry>) =
+        entries(shell.catalogue()).into_iter().partition(|entry| entry.name == args.name);
     if found.is_empty() {
-        let names = all.iter().map(|entry| entry.name.as_str());
+        let names = others.iter().map(|entry| entry.name.as_str());
         let name = &args.name;
         let otherwise = format!(
             "`tactflow list` prints all names, and `tactflow list {name}` those whose documentation has that word"

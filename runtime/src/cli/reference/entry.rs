@@ -80,7 +80,7 @@ pub(crate) struct PortEntry {
     pub(crate) frames: Vec<String>,
     /// Whether it must be wired, and whether it wakes the node.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub(crate) need: Option<&'static str>,
+    pub(crate) need: Option<String>,
     pub(crate) doc: String,
     /// Ports that a wire can connect it to.
     pub(crate) fits: Vec<String>,
@@ -283,32 +283,24 @@ impl PortEntry {
     }
 }
 
-/// Describes what an input needs.
-const fn need(need: Need) -> &'static str {
-    match need {
-        Need { is_many: true, is_trigger: true, .. } => "any number of inputs, named in the graph; each wakes the node",
-        Need { is_many: true, .. } => {
-            "any number of inputs, named in the graph; each wakes the node when it loses its value"
-        }
-        Need { is_delayed: true, must_be_wired: false, .. } => {
-            "optional, the value of the previous tick; wakes the node only if no other input does"
-        }
-        Need { is_delayed: true, .. } => "the value of the previous tick; wakes the node only if no other input does",
-        Need { must_be_wired: true, must_be_present: true, is_trigger: true, .. } => "required, wakes the node",
-        Need { must_be_wired: true, must_be_present: true, .. } => {
-            "required, wakes the node only when the input loses its value"
-        }
-        Need { must_be_wired: true, is_trigger: true, .. } => "must be wired, may be absent, wakes the node",
-        Need { must_be_wired: true, .. } => {
-            "must be wired, may be absent, wakes the node only when the input loses its value"
-        }
-        Need { must_be_present: true, is_trigger: true, .. } => "optional, must be present if wired, wakes the node",
-        Need { must_be_present: true, .. } => {
-            "optional, must be present if wired, wakes the node only when the input loses its value"
-        }
-        Need { is_trigger: true, .. } => "optional, wakes the node",
-        Need { .. } => "optional, wakes the node only when the input loses its value",
-    }
+/// Describes what an input needs, and when it wakes the node.
+fn need(need: Need) -> String {
+    let needs = match (need.must_be_wired, need.must_be_present) {
+        _ if need.is_many => "any number of inputs, named in the graph; each",
+        (true, _) if need.is_delayed => "the value of the previous tick;",
+        (false, _) if need.is_delayed => "optional, the value of the previous tick;",
+        (true, true) => "required,",
+        (true, false) => "must be wired, may be absent,",
+        (false, true) => "optional, must be present if wired,",
+        (false, false) => "optional,",
+    };
+    let when = match need {
+        Need { is_many: false, is_delayed: true, .. } => " only if no other input does",
+        Need { is_trigger: true, .. } => "",
+        Need { is_many: true, .. } => " when it loses its value",
+        Need { .. } => " only when the input loses its value",
+    };
+    format!("{needs} wakes the node{when}")
 }
 
 impl ParamEntry {

@@ -15,18 +15,17 @@ pub(crate) fn page(entry: &Entry, has_fits: bool) -> Vec<Element> {
     }
     elements.extend(entry.recorded.map(|recorded| Element::Prose(format!("Recorded with `--out`: {recorded}."))));
     elements.extend(entry.steps.map(|steps| Element::Prose(format!("The node steps {steps}."))));
-    let (fits, limits, inputs, outputs) = match entry.category {
-        Category::Role => {
-            ("Filled by the devices: ", "Its commands must pass through the limits: ", "Inputs", "Outputs")
-        }
-        Category::Kind => ("", "", "Taken by", "Produced by"),
-        _ => ("Fills the roles: ", "Enforces the limits: ", "Inputs", "Outputs"),
+    let is_kind = entry.category == Category::Kind;
+    let (fits, limits) = match entry.category {
+        Category::Role => ("Filled by the devices: ", "Its commands must pass through the limits: "),
+        _ => ("Fills the roles: ", "Enforces the limits: "),
     };
     elements.extend(listed(fits, &entry.fits));
     elements.extend(listed(limits, &entry.limits));
-    let is_kind = entry.category == Category::Kind;
+    let (inputs, prefix, outputs) =
+        if is_kind { ("Taken by", "", "Produced by") } else { ("Inputs", "in.", "Outputs") };
     let sections = [
-        (inputs, if is_kind { "" } else { "in." }, &entry.inputs),
+        (inputs, prefix, &entry.inputs),
         (outputs, "", &entry.outputs),
         ("Commands", "", &entry.commands),
         ("Reports", "", &entry.reports),
@@ -71,7 +70,7 @@ fn quoted(names: &[String]) -> String {
 fn port_item(port: &PortEntry, prefix: &str, has_fits: bool) -> Definition {
     /// Maximum number of ports that are named.
     const MAX_NAMED: usize = 8;
-    let need = port.need.map(|need| format!("; {need}")).unwrap_or_default();
+    let need = port.need.as_ref().map(|need| format!("; {need}")).unwrap_or_default();
     let mut details = vec![port.doc.clone()];
     if has_fits && !port.fits.is_empty() {
         let (named, rest) = port.fits.split_at(MAX_NAMED.min(port.fits.len()));

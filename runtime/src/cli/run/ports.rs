@@ -9,19 +9,12 @@ use crate::engine::{Engine, Outcome};
 use crate::record::PortColumns;
 use crate::signal::{Freshness, Shape};
 
-/// Freshness of one port, counted over the ticks.
-#[derive(Debug, Clone, Copy, Default)]
-struct FreshnessCounts {
-    new: u64,
-    held: u64,
-    absent: u64,
-}
-
 /// Collects the freshness and the values of all ports.
 pub(crate) struct PortTable {
     columns: PortColumns,
     row: Vec<f64>,
-    counts: Vec<FreshnessCounts>,
+    /// For each port, the number of ticks in which it is new, held and absent.
+    counts: Vec<[u64; 3]>,
     /// The values of each column.
     series: Vec<Series>,
 }
@@ -31,7 +24,7 @@ impl PortTable {
         let columns = PortColumns::new(engine.ports());
         Self {
             row: vec![0.0; columns.list.len()],
-            counts: vec![FreshnessCounts::default(); engine.ports().len()],
+            counts: vec![[0; 3]; engine.ports().len()],
             series: vec![Series::new(); columns.list.len()],
             columns,
         }
@@ -40,11 +33,12 @@ impl PortTable {
     /// Adds the last tick of the engine.
     pub(crate) fn add(&mut self, engine: &Engine) {
         for ((_, id), counts) in engine.ports().iter().zip(&mut self.counts) {
-            match engine.bus().mark(*id).freshness(engine.ticks()) {
-                Freshness::New => counts.new += 1,
-                Freshness::Held => counts.held += 1,
-                Freshness::Lost | Freshness::Absent => counts.absent += 1,
-            }
+            let column = match engine.bus().mark(*id).freshness(engine.ticks()) {
+                Freshness::New => 0,
+                Freshness::Held => 1,
+                Freshness::Lost | Freshness::Absent => 2,
+            };
+            counts[column] += 1;
         }
         self.columns.read(engine.bus(), &mut self.row);
         for (series, value) in self.series.iter_mut().zip(&self.row) {
@@ -58,27 +52,28 @@ impl PortTable {
             vec![["port", "unit", "new", "held", "absent", "min", "mean", "max", "over time"].map(String::from)];
         let mut columns = self.columns.list.iter().zip(&self.series);
         for ((port, _), counts) in engine.ports().iter().zip(&self.counts) {
-            let counted = [counts.new, counts.held, counts.absent].map(|count| count.to_string());
             let width = PortColumns::width(&port.shape);
-            let mut counted = Some(counted);
+            let first = rows.len();
             // A vector has a row of its own, even with a single component.
             let is_scalar = matches!(port.shape, Shape::Scalar(_) | Shape::Flag(_));
             if !is_scalar {
                 let unit = port.shape.unit().filter(|_| width == 0).map_or_else(String::new, |unit| unit.to_string());
-                let [new, held, absent] = counted.take().unwrap_or_default();
-                let name = port.name.clone();
-                rows.push([name, unit, new, held, absent, String::new(), String::new(), String::new(), String::new()]);
+                let mut row: [String; 9] = Default::default();
+                (row[0], row[1]) = (port.name.clone(), unit);
+                rows.push(row);
             }
             for (column, series) in columns.by_ref().take(width) {
-                let [new, held, absent] = counted.take().unwrap_or_default();
                 let name = if column.part.is_empty() { port.name.clone() } else { format!("  {}", column.part) };
                 let whole = series.tail(1.0);
                 let [low, mean, high] = match whole.is_present() {
                     true => [whole.low, whole.mean, whole.high].map(number),
                     false => ["-"; 3].map(String::from),
                 };
+                let [new, held, absent] = Default::default();
                 rows.push([name, column.unit.to_string(), new, held, absent, low, mean, high, series.sparkline()]);
             }
+            // The counts stand in the first row of the port.
+            rows[first][2..5].clone_from_slice(&counts.map(|count| count.to_string()));
         }
         table(&rows, 2, 8)
     }

@@ -28,13 +28,8 @@ pub(crate) struct Progress {
     thread: Option<SyncSender<Drawing>>,
 }
 
-/// A request to the thread.
-enum Drawing {
-    /// Replaces the last drawing.
-    Replace(String),
-    /// Removes the last drawing and acknowledges it.
-    Clear(SyncSender<()>),
-}
+/// A text that replaces the last drawing, and the channel that acknowledges it, if somebody waits.
+type Drawing = (String, Option<SyncSender<()>>);
 
 impl Progress {
     pub(crate) fn new(end: Option<f64>, is_quiet: bool, has_colour: bool) -> Self {
@@ -59,7 +54,7 @@ impl Progress {
             let [width, height] = size.map_or([0, 0], |(width, height)| [width.0, height.0].map(usize::from));
             let live = PageStyle::of_width(width, self.has_colour).map(live).unwrap_or_default();
             // While the thread still writes, this drawing is dropped.
-            let _ = thread.try_send(Drawing::Replace(fitted(&live, &line, [width, height])));
+            let _ = thread.try_send((fitted(&live, &line, [width, height]), None));
         }
     }
 
@@ -67,7 +62,7 @@ impl Progress {
     pub(crate) fn clear(&self) {
         let Some(thread) = self.thread.as_ref().filter(|_| self.drawn.is_some()) else { return };
         let (done, is_done) = sync_channel(1);
-        if thread.send(Drawing::Clear(done)).is_ok() {
+        if thread.send((String::new(), Some(done))).is_ok() {
             // A thread that has ended draws nothing more.
             let _ = is_done.recv();
         }
@@ -77,11 +72,7 @@ impl Progress {
 /// Draws until the run ends. Errors of the terminal are ignored.
 fn draw(drawings: &Receiver<Drawing>) {
     let mut lines = 0;
-    for drawing in drawings {
-        let (text, done) = match drawing {
-            Drawing::Replace(text) => (text, None),
-            Drawing::Clear(done) => (String::new(), Some(done)),
-        };
+    for (text, done) in drawings {
         let _ = stderr().lock().write_all(redrawn(lines, &text).as_bytes());
         let _ = stderr().flush();
         lines = text.lines().count();

@@ -8,6 +8,9 @@ use crate::cli::text::prose::PageStyle;
 use crate::cli::view::RunView;
 use crate::engine::{Counters, Engine, Outcome};
 
+/// Maximum number of bins of a curve on the terminal: two for each character of the widest page.
+const MAX_BINS: usize = 256;
+
 /// Collects the summary tick by tick.
 pub(crate) struct Summary {
     limits: LimitWatch,
@@ -27,7 +30,7 @@ impl Summary {
     pub(crate) fn new(engine: &Engine, has_all_ports: bool) -> Self {
         let body = match has_all_ports {
             true => Body::Ports(PortTable::new(engine)),
-            false => Body::View(Box::new(RunView::new(engine))),
+            false => Body::View(Box::new(RunView::new(engine, MAX_BINS))),
         };
         Self { limits: LimitWatch::new(engine), body }
     }

@@ -1,20 +1,20 @@
 //! What a command is, and the arguments and formats that commands share.
 
-use std::marker::PhantomData;
 use std::path::PathBuf;
 
-use clap::{Args, CommandFactory, FromArgMatches, Parser, ValueEnum};
+use clap::{Args, Parser, ValueEnum};
 
 use super::Shell;
 use crate::graph::Request;
 
-/// A command of the tool.
-pub trait Subcommand {
-    /// Returns its name, its arguments and its help.
-    fn command(&self) -> clap::Command;
+/// Runs a command and returns the exit code.
+type RunCommand = dyn Fn(&clap::ArgMatches, &Shell) -> u8;
 
-    /// Runs it and returns the exit code.
-    fn run(&self, matches: &clap::ArgMatches, shell: &Shell) -> u8;
+/// A command of the tool.
+pub struct Subcommand {
+    /// Its name, its arguments and its help.
+    pub(crate) command: clap::Command,
+    pub(crate) run: Box<RunCommand>,
 }
 
 /// Makes a command from a function and from arguments that clap derives.
@@ -34,25 +34,20 @@ pub trait Subcommand {
 ///     shell.say(&format!("hello {}", greet.name));
 ///     0
 /// });
-/// assert_eq!(greet.command().get_name(), "greet");
+/// assert_eq!(greet.name(), "greet");
 /// ```
-pub fn derived<A: Parser + 'static>(run: impl Fn(A, &Shell) -> u8 + 'static) -> Box<dyn Subcommand> {
-    Box::new(Derived { run, arguments: PhantomData })
+pub fn derived<A: Parser>(run: impl Fn(A, &Shell) -> u8 + 'static) -> Subcommand {
+    let run = move |matches: &clap::ArgMatches, shell: &Shell| {
+        run(A::from_arg_matches(matches).expect("the matches come from this command"), shell)
+    };
+    Subcommand { command: A::command(), run: Box::new(run) }
 }
 
-struct Derived<A, F> {
-    run: F,
-    arguments: PhantomData<A>,
-}
-
-impl<A: CommandFactory + FromArgMatches, F: Fn(A, &Shell) -> u8> Subcommand for Derived<A, F> {
-    fn command(&self) -> clap::Command {
-        A::command()
-    }
-
-    fn run(&self, matches: &clap::ArgMatches, shell: &Shell) -> u8 {
-        let arguments = A::from_arg_matches(matches).expect("the matches come from this command");
-        (self.run)(arguments, shell)
+impl Subcommand {
+    /// Returns its name.
+    #[must_use]
+    pub fn name(&self) -> &str {
+        self.command.get_name()
     }
 }
 
@@ -68,6 +63,11 @@ pub(crate) struct GraphArgs {
 }
 
 impl GraphArgs {
+    /// Whether one of these arguments is given.
+    pub(crate) fn is_given(&self) -> bool {
+        self.bench.is_some() || !self.set.is_empty()
+    }
+
     /// Returns the request to load a graph with these arguments.
     pub(crate) fn request(&self, graph: PathBuf) -> Request {
         Request { graph, bench: self.bench.clone(), set: self.set.clone(), ..Request::default() }

@@ -32,7 +32,7 @@ impl Still {
     /// # Errors
     /// If the graph shows nothing or the file cannot be created.
     pub(crate) fn create(path: &Path, title: &str, engine: &Engine) -> Result<Self, String> {
-        let view = RunView::with_bins(engine, MAX_BINS);
+        let view = RunView::new(engine, MAX_BINS);
         if view.images.is_empty() && view.curves.is_empty() {
             return Err(
                 "`--svg` draws the ports that the graph shows: add `show = [\"node.port\"]` under [graph]".into()

@@ -76,17 +76,11 @@ impl<'a> Raster<'a> {
 
     /// Returns the mean of the finite tactels of a cell, or `None` without any.
     pub(crate) fn cell(self, snapshot: &Snapshot, row: usize, col: usize) -> Option<f64> {
-        let rows = row * self.block..((row + 1) * self.block).min(self.shape.rows);
-        let (mut sum, mut count) = (0.0, 0_u32);
-        for i in rows {
-            let start = i * self.shape.cols;
-            let cells =
-                &snapshot.cells[start + col * self.block..start + ((col + 1) * self.block).min(self.shape.cols)];
-            for value in cells.iter().filter(|value| value.is_finite()) {
-                sum += f64::from(*value);
-                count += 1;
-            }
-        }
+        let ImageShape { rows, cols, .. } = *self.shape;
+        let within = |index: usize, count: usize| index * self.block..((index + 1) * self.block).min(count);
+        let tactels = within(row, rows).flat_map(|i| &snapshot.cells[i * cols..][within(col, cols)]);
+        let finite = tactels.filter(|value| value.is_finite());
+        let (sum, count) = finite.fold((0.0, 0_u32), |(sum, count), value| (sum + f64::from(*value), count + 1));
         (count > 0).then(|| sum / f64::from(count))
     }
 

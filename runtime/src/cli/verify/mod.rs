@@ -6,6 +6,7 @@ mod verified;
 use std::collections::BTreeSet;
 use std::io::{IsTerminal, Write, stderr};
 use std::path::{Path, PathBuf};
+use std::sync::OnceLock;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use verified::Verified;
@@ -63,7 +64,7 @@ fn verify_all(args: &VerifyArgs, shell: &Shell) -> Result<u8, String> {
         shell.say(table::text(&all, shell.has_colour()).trim_end());
     }
     for verified in &all {
-        for (why, seed) in verified.trials.iter().filter_map(|trial| Some((trial.failure.as_ref()?, trial.seed))) {
+        for (why, seed) in verified.failures() {
             let seed = seed.map_or_else(String::new, |seed| format!(", seed {seed}"));
             shell.error(format_args!("{}{seed}: {why}", verified.name()));
         }
@@ -107,14 +108,9 @@ fn prepare(args: &VerifyArgs, catalogue: &Catalogue) -> Result<Vec<Verified>, St
 
 /// Returns the scenario files of a folder, sorted by name.
 fn files_of(folder: &Path) -> Result<Vec<PathBuf>, String> {
-    let cannot_read = |error: std::io::Error| format!("cannot read `{}`: {error}", folder.display());
-    let mut files = Vec::new();
-    for entry in std::fs::read_dir(folder).map_err(cannot_read)? {
-        let path = entry.map_err(cannot_read)?.path();
-        if path.extension().is_some_and(|end| end == "toml") {
-            files.push(path);
-        }
-    }
+    let paths = std::fs::read_dir(folder).and_then(|entries| entries.map(|entry| Ok(entry?.path())).collect());
+    let mut files: Vec<PathBuf> = paths.map_err(|error| format!("cannot read `{}`: {error}", folder.display()))?;
+    files.retain(|path| path.extension().is_some_and(|end| end == "toml"));
     files.sort();
     if files.is_empty() { Err(format!("no scenario in folder `{}`", folder.display())) } else { Ok(files) }
 }
@@ -134,6 +130,7 @@ fn run(all: &mut [Verified], args: &VerifyArgs, catalogue: &Catalogue) -> Result
     let cores = std::thread::available_parallelism().map_or(1, usize::from);
     let jobs = args.jobs.map_or(cores, |jobs| jobs as usize).min(work.len());
     let (next, done) = (AtomicUsize::new(0), AtomicUsize::new(0));
+    let trials: Vec<OnceLock<Trial>> = work.iter().map(|_| OnceLock::new()).collect();
     let one = |(scenario, seed): PendingRun| {
         let verified = &all[scenario];
         let record = args.out.as_deref().map(|folder| folder.join(record_name(&verified.name(), seed)));
@@ -143,24 +140,21 @@ fn run(all: &mut [Verified], args: &VerifyArgs, catalogue: &Catalogue) -> Result
         trial
     };
     let worker = || {
-        let mut trials = Vec::new();
         while let Some(which) = Some(next.fetch_add(1, Ordering::Relaxed)).filter(|which| *which < work.len()) {
-            trials.push((which, one(work[which])));
+            one(work[which]).map(|trial| trials[which].set(trial));
         }
-        trials
     };
-    let mut trials: Vec<(usize, Option<Trial>)> = without_panic_messages(|| {
+    without_panic_messages(|| {
         std::thread::scope(|scope| {
             let workers: Vec<_> = (0..jobs).map(|_| scope.spawn(worker)).collect();
             let joined = workers.into_iter().map(|worker| worker.join());
-            joined.flat_map(|trials| trials.unwrap_or_else(|panic| std::panic::resume_unwind(panic))).collect()
-        })
+            joined.for_each(|end| end.unwrap_or_else(|panic| std::panic::resume_unwind(panic)));
+        });
     });
     show_progress("");
-    trials.sort_by_key(|(which, _)| *which);
-    let is_complete = trials.iter().all(|(_, trial)| trial.is_some());
-    for (which, trial) in trials {
-        all[work[which].0].trials.extend(trial);
+    let is_complete = trials.iter().all(|trial| trial.get().is_some());
+    for ((scenario, _), trial) in work.iter().zip(trials) {
+        all[*scenario].trials.extend(trial.into_inner());
     }
     for verified in all {
         verified.rows = verified.loaded.iter().flat_map(|scenario| scenario.rows(&verified.trials)).collect();

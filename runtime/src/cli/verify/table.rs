@@ -18,19 +18,15 @@ const HEADER: [&str; 10] =
 pub(crate) fn text(all: &[Verified], has_colour: bool) -> String {
     let mut rows = vec![HEADER.map(String::from)];
     for verified in all {
-        let mut name = Some(verified.name());
-        if verified.loaded.is_err() {
-            rows.push(remark(name.take(), "does not load", has_colour));
+        let first = rows.len();
+        let (failed, runs) = (verified.failures().count(), verified.trials.len());
+        let unloaded = verified.loaded.is_err().then(|| "does not load".to_owned());
+        let failed = (failed > 0).then(|| format!("{failed} of {runs} runs ended in an error"));
+        rows.extend(unloaded.into_iter().chain(failed).map(|what| remark(what, has_colour)));
+        rows.extend(verified.rows.iter().map(|row| cells(row, has_colour)));
+        if let Some(row) = rows.get_mut(first) {
+            row[0] = verified.name();
         }
-        let failed = verified.trials.iter().filter(|trial| trial.failure.is_some()).count();
-        if failed > 0 {
-            rows.push(remark(
-                name.take(),
-                &format!("{failed} of {} runs ended in an error", verified.trials.len()),
-                has_colour,
-            ));
-        }
-        rows.extend(verified.rows.iter().map(|row| cells(name.take(), row, has_colour)));
     }
     let mut text = table(&rows, 4, 9);
     text.push('\n');
@@ -46,13 +42,13 @@ pub(crate) fn text(all: &[Verified], has_colour: bool) -> String {
 fn summary(all: &[Verified]) -> String {
     let marks: Vec<Verdict> = all.iter().flat_map(|verified| &verified.rows).map(FigureRow::verdict).collect();
     let count = |mark: Verdict| marks.iter().filter(|known| **known == mark).count();
-    let trials = || all.iter().flat_map(|verified| &verified.trials);
-    let failed = trials().filter(|trial| trial.failure.is_some()).count();
+    let runs = all.iter().map(|verified| verified.trials.len()).sum();
+    let failed = all.iter().flat_map(Verified::failures).count();
     let unloaded = all.iter().filter(|verified| verified.loaded.is_err()).count();
     let mut parts = vec![format!("{} passed", count(Verdict::Passed)), format!("{} failed", count(Verdict::Failed))];
     parts.push(format!("{} informational", count(Verdict::Informational)));
     let ended = if failed == 0 { String::new() } else { format!(" ({failed} ended in an error)") };
-    parts.push(format!("in {}{ended}", count_of(trials().count(), "run")));
+    parts.push(format!("in {}{ended}", count_of(runs, "run")));
     parts.extend((unloaded > 0).then(|| format!("{} not loaded", count_of(unloaded, "scenario"))));
     parts.join(", ")
 }
@@ -69,15 +65,14 @@ fn describe(scenario: &Scenario) -> String {
 }
 
 /// Returns a row that says why there are no figures.
-fn remark(name: Option<String>, what: &str, has_colour: bool) -> [String; 10] {
+fn remark(what: String, has_colour: bool) -> [String; 10] {
     let mut cells: [String; 10] = Default::default();
-    (cells[0], cells[1]) = (name.unwrap_or_default(), what.to_owned());
-    cells[9] = coloured("FAILED", RED, has_colour);
+    (cells[1], cells[9]) = (what, mark(Verdict::Failed, has_colour));
     cells
 }
 
-/// Returns the row of a figure.
-fn cells(name: Option<String>, row: &FigureRow, has_colour: bool) -> [String; 10] {
+/// Returns the row of a figure, without the name of its scenario.
+fn cells(row: &FigureRow, has_colour: bool) -> [String; 10] {
     let not_measured = if row.figure == Figure::Response { "never" } else { "-" };
     let figure = |value: Option<f64>| value.map_or_else(|| not_measured.to_owned(), number);
     let bound = match row.bound {
@@ -95,13 +90,8 @@ fn cells(name: Option<String>, row: &FigureRow, has_colour: bool) -> [String; 10
         let end = |value: f64| figure(Some(value).filter(|value| value.is_finite()));
         format!("{} to {}", end(low), end(high))
     });
-    let mark = match row.verdict() {
-        Verdict::Passed => coloured("passed", GREEN, has_colour),
-        Verdict::Failed => coloured("FAILED", RED, has_colour),
-        Verdict::Informational => String::new(),
-    };
     [
-        name.unwrap_or_default(),
+        String::new(),
         row.check.clone(),
         row.figure.name().to_owned(),
         row.unit.clone(),
@@ -110,14 +100,17 @@ fn cells(name: Option<String>, row: &FigureRow, has_colour: bool) -> [String; 10
         row.paper.map_or_else(String::new, number),
         format!("{}{missing}", figure(row.worst())),
         interval,
-        mark,
+        mark(row.verdict(), has_colour),
     ]
 }
 
-const RED: &str = "\x1b[1;31m";
-const GREEN: &str = "\x1b[32m";
-
-fn coloured(text: &str, colour: &str, has_colour: bool) -> String {
+/// Writes a verdict, in green or in red.
+fn mark(verdict: Verdict, has_colour: bool) -> String {
+    let (text, colour) = match verdict {
+        Verdict::Passed => ("passed", "\x1b[32m"),
+        Verdict::Failed => ("FAILED", "\x1b[1;31m"),
+        Verdict::Informational => return String::new(),
+    };
     if has_colour { format!("{colour}{text}\x1b[0m") } else { text.to_owned() }
 }
 
@@ -142,16 +135,6 @@ struct ScenarioJson<'a> {
     rows: Vec<RowJson<'a>>,
 }
 
-/// What a bound applies to.
-#[derive(Serialize)]
-#[serde(rename_all = "lowercase")]
-enum Judged {
-    /// The median of the runs.
-    Median,
-    /// Every run.
-    Every,
-}
-
 #[derive(Serialize)]
 struct RowJson<'a> {
     check: &'a str,
@@ -162,10 +145,10 @@ struct RowJson<'a> {
     median: Option<f64>,
     worst: Option<f64>,
     /// Confidence interval of the median, at least 95 %; an end is null if not measured.
-    interval: Option<[Option<f64>; 2]>,
+    interval: Option<(f64, f64)>,
     bound: Option<f64>,
-    /// What the bound applies to, or null without a bound.
-    judged: Option<Judged>,
+    /// What the bound applies to: the `median` or `every` run; null without a bound.
+    judged: Option<&'static str>,
     paper: Option<f64>,
     /// `informational` without a bound.
     mark: Verdict,
@@ -193,7 +176,12 @@ fn scenario_json(verified: &Verified) -> ScenarioJson<'_> {
 }
 
 fn row_json(row: &FigureRow) -> RowJson<'_> {
-    let finite = |value: f64| Some(value).filter(|value| value.is_finite());
+    let (bound, judged) = match row.bound {
+        Bound::None => (None, None),
+        Bound::Settles => (None, Some("every")),
+        Bound::Median(bound) => (Some(bound), Some("median")),
+        Bound::AtMost(bound) | Bound::AtLeast(bound) => (Some(bound), Some("every")),
+    };
     RowJson {
         check: &row.check,
         of: &row.of,
@@ -201,13 +189,9 @@ fn row_json(row: &FigureRow) -> RowJson<'_> {
         unit: &row.unit,
         median: row.median(),
         worst: row.worst(),
-        interval: row.interval().map(|(low, high)| [finite(low), finite(high)]),
-        bound: row.bound.number(),
-        judged: match row.bound {
-            Bound::None => None,
-            Bound::Median(_) => Some(Judged::Median),
-            Bound::Settles | Bound::AtMost(_) | Bound::AtLeast(_) => Some(Judged::Every),
-        },
+        interval: row.interval(),
+        bound,
+        judged,
         paper: row.paper,
         mark: row.verdict(),
         values: &row.values,

@@ -20,10 +20,14 @@ impl Verified {
         self.path.file_stem().unwrap_or(self.path.as_os_str()).to_string_lossy().into_owned()
     }
 
+    /// Returns why runs could not be measured, each with the seed of the run.
+    pub(crate) fn failures(&self) -> impl Iterator<Item = (&str, Option<u64>)> {
+        self.trials.iter().filter_map(|trial| Some((trial.failure.as_deref()?, trial.seed)))
+    }
+
     /// Whether the scenario loads, no run failed and no check failed.
     pub(crate) fn has_passed(&self) -> bool {
         let is_complete = self.loaded.as_ref().is_ok_and(|scenario| scenario.runs().len() == self.trials.len());
-        let has_failed = self.trials.iter().any(|trial| trial.failure.is_some());
-        is_complete && !has_failed && self.rows.iter().all(|row| row.verdict() != Verdict::Failed)
+        is_complete && self.failures().next().is_none() && self.rows.iter().all(|row| row.verdict() != Verdict::Failed)
     }
 }

@@ -39,23 +39,19 @@ impl ImageHistory {
     pub(crate) fn add(&mut self, engine: &Engine) {
         let bus = engine.bus();
         let mark = self.mark.and_then(|mark| position(bus, mark));
-        match bus.mark(self.id).freshness(engine.ticks()) {
-            Freshness::New => {}
-            Freshness::Held => return,
-            Freshness::Lost | Freshness::Absent => {
-                self.last = None;
-                return;
-            }
+        let freshness = bus.mark(self.id).freshness(engine.ticks());
+        if freshness != Freshness::New {
+            self.last = self.last.take().filter(|_| freshness == Freshness::Held);
+            return;
         }
         let cells = bus.slot::<Image>(self.id).cells();
         let sum = cells.iter().filter(|value| value.is_finite()).map(|value| f64::from(*value)).sum();
         let (time, is_first) = (engine.now(), mark.is_some() || self.mark.is_none());
         let keep = |snapshot: &mut Option<Snapshot>| {
             // The buffer of the previous snapshot is reused.
-            let mut buffer = snapshot.take().map(|snapshot| snapshot.cells).unwrap_or_default();
-            buffer.clear();
-            buffer.extend_from_slice(cells);
-            *snapshot = Some(Snapshot { time, cells: buffer, sum, mark });
+            let mut kept = snapshot.take().map(|snapshot| snapshot.cells).unwrap_or_default();
+            cells.clone_into(&mut kept);
+            *snapshot = Some(Snapshot { time, cells: kept, sum, mark });
         };
         if self.first.is_none() && is_first {
             keep(&mut self.first);

@@ -13,8 +13,6 @@ use crate::record::{PortColumn, PortColumns};
 use crate::signal::{Shape, Unit};
 use images::{ImageHistory, MIN_WIDE_PAGE};
 
-/// Maximum number of bins of a curve on the terminal: two for each character of the widest page.
-const MAX_BINS: usize = 256;
 /// Share of the run at its end for which mean and deviation are printed [1].
 const TAIL: f64 = 0.2;
 /// Width of the title and the numbers beside a curve [characters].
@@ -43,13 +41,8 @@ pub(crate) struct ColumnCurve {
 }
 
 impl RunView {
-    /// Creates a view for the terminal.
-    pub(crate) fn new(engine: &Engine) -> Self {
-        Self::with_bins(engine, MAX_BINS)
-    }
-
     /// Creates a view whose curves have at most `bins` bins.
-    pub(crate) fn with_bins(engine: &Engine, bins: usize) -> Self {
+    pub(crate) fn new(engine: &Engine, bins: usize) -> Self {
         let mut images: Vec<ImageHistory> = Vec::new();
         let (mut plotted, mut ports) = (Vec::new(), Vec::new());
         for (name, port, id) in &engine.display().ports {
@@ -148,19 +141,17 @@ fn final_values(last: f64, tail: &SeriesBin) -> [String; 2] {
 /// Puts the title and the numbers on the left of a curve, or above it on a narrow page.
 fn captioned(title: &str, values: &[String; 2], lines: &[String], is_narrow: bool) -> String {
     if is_narrow {
-        let mut words: Vec<&str> = vec![title];
-        words.extend(values.iter().map(String::as_str).filter(|text| !text.is_empty()));
-        return format!("{}\n{}\n", words.join("\n  "), lines.join("\n"));
+        let [last, mean] = values;
+        let caption = format!("{title}\n  {last}\n  {mean}");
+        return format!("{}\n{}\n", caption.trim_end(), lines.join("\n"));
     }
-    let mut text = String::new();
     // A long title has a line of its own.
-    let (above, title) = if title.chars().count() < PANEL_WIDTH { ("", title) } else { (title, "") };
-    if !above.is_empty() {
-        text = format!("{above}\n");
-    }
-    let panel = [title, &format!("  {}", values[0]), &format!("  {}", values[1])].map(str::trim_end).map(str::to_owned);
-    for (i, line) in lines.iter().enumerate() {
-        let left = panel.get(i).map_or("", String::as_str);
+    let (mut text, title) = match title.chars().count() < PANEL_WIDTH {
+        true => (String::new(), title),
+        false => (format!("{title}\n"), ""),
+    };
+    let panel = [title, &format!("  {}", values[0]), &format!("  {}", values[1])];
+    for (line, left) in lines.iter().zip(panel.into_iter().chain(std::iter::repeat(""))) {
         // Writing to a string cannot fail.
         let _ = writeln!(text, "{}", format!("{left:PANEL_WIDTH$}{line}").trim_end());
     }
