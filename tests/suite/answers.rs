@@ -65,7 +65,7 @@ fn a_description_says_everything_of_a_node() {
     let lines = [
         "pid (node)",
         "A PID controller on every feature, for force and position control.",
-        "Steps when an input that wakes the",
+        "The node steps when an input that wakes the node has a new value or loses its value.",
         "  in.error  features, unit E, frame A; required, wakes the node",
         "  control  features, unit E/s, frame A",
         "  gains.NAME.kp      a number; default 0.0",

@@ -109,8 +109,8 @@ fn settings_that_cannot_be_are_told_at_their_place() {
         ("foam.static_friction=0.1", "static friction must not be less than sliding friction"),
         ("foam.damping=1e4", "must be at most 10 N s/m"),
         ("foam.spread=1e20", "the spread must be from 0.0002 to 0.05 m"),
-        ("stiffness=1e6", "moves too fast for steps of 0.002 s"),
-        ("friction=1000.0", "moves too fast for steps of 0.002 s"),
+        ("stiffness=1e6", "moves too fast for a `step_s` of 0.002 s"),
+        ("friction=1000.0", "moves too fast for a `step_s` of 0.002 s"),
         ("calibration='nowhere.toml'", "nowhere.toml"),
         ("rows=8", "16"),
     ];

@@ -84,7 +84,7 @@ fn no_page_is_wider_than_its_terminal_nor_than_100() {
 #[test]
 fn an_image_that_is_too_large_is_scaled_down_and_says_so() {
     let large = page(&[VIEW, "--set=devices.pad.rows=56", "--set=devices.pad.cols=128", "--for=0.3s"]);
-    assert!(large.contains("56x128 tactels, 5 mm apart; a cell is the mean of 4x tactels4; "), "{large}");
+    assert!(large.contains("56x128 tactels, 5 mm apart; a cell is the mean of 4x4 tactels; "), "{large}");
     assert!(large.lines().all(|line| line.chars().count() <= 100), "{large}");
     assert_eq!(large.lines().filter(|line| line.starts_with(". ")).count(), 14, "56 rows, four in one");
 }

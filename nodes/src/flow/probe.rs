@@ -112,7 +112,7 @@ impl Node for Probe {
 
 #[cfg(test)]
 mod tests {
-    use tactflow_runtime::harness::NodeRig;
+    use tactflow_runtime::harness::{NodeRig, places};
     use tactflow_runtime::signal::{
         Flag, FlagShape, Freshness, Joints, JointsShape, Pose, PoseShape, ScalarShape, Shape, Twist, TwistShape,
     };
@@ -171,6 +171,8 @@ mod tests {
     #[test]
     fn a_probe_without_a_wire_is_an_error() {
         assert_eq!(rig("", &[]).err().unwrap()[0].code, Code::MissingInput);
-        assert!(rig("every_ms = -1", &[("force", ScalarShape::default().into())]).is_err());
+        let negative = "every_ms = -1";
+        let refused = rig(negative, &[("force", ScalarShape::default().into())]);
+        assert_eq!(places(negative, &refused), ["bad-value: `-1`"]);
     }
 }

@@ -147,7 +147,10 @@ mod tests {
             ),
             (good[..good.len() - 30].to_vec(), "the archive is damaged: it has no directory: its end may be missing"),
             (edited(directory + 8, 1), "`plate` in the archive is protected by a password"),
-            (edited(directory + 10, 12), "`plate` in the archive is packed by method 12: only `deflate` is read"),
+            (
+                edited(directory + 10, 12),
+                "`plate` in the archive has compression method 12, but only `deflate` is supported",
+            ),
             (
                 edited(directory + 16, 0),
                 "the archive is damaged: `plate` cannot be unpacked: invalid checksum: expected 0x76f7c500, got 0x76f7c5d1",

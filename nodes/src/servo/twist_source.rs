@@ -77,7 +77,7 @@ impl Node for TwistSource {
 
 #[cfg(test)]
 mod tests {
-    use tactflow_runtime::harness::NodeRig;
+    use tactflow_runtime::harness::{NodeRig, places};
     use tactflow_runtime::signal::{FlagShape, Freshness, Stamp};
 
     use super::*;
@@ -133,10 +133,14 @@ mod tests {
 
     #[test]
     fn a_bad_twist_is_a_mistake() {
-        for bad in
-            ["", "twist = [0, 0, 0]", "twist = [0, 0, 0, 0, 0, inf]", "twist = 1", "twist = [0,0,0,0,0,0]\nframe = 1"]
-        {
-            assert!(NodeRig::new::<TwistSource>(bad, &[]).is_err(), "{bad}");
+        for (bad, place) in [
+            ("", "missing-key: `the node`"),
+            ("twist = [0, 0, 0]", "bad-value: `[0, 0, 0]`"),
+            ("twist = [0, 0, 0, 0, 0, inf]", "bad-value: `inf`"),
+            ("twist = 1", "bad-value: `1`"),
+            ("twist = [0,0,0,0,0,0]\nframe = 1", "bad-value: `1`"),
+        ] {
+            assert_eq!(places(bad, &NodeRig::new::<TwistSource>(bad, &[])), [place], "{bad}");
         }
     }
 }

@@ -74,7 +74,7 @@ impl Node for Eccentricity {
 
 #[cfg(test)]
 mod tests {
-    use tactflow_runtime::harness::NodeRig;
+    use tactflow_runtime::harness::{NodeRig, places};
     use tactflow_runtime::node::At;
     use tactflow_runtime::signal::{Grid, Image, Mask, Unit};
 
@@ -172,6 +172,7 @@ mod tests {
         for (params, at) in cases {
             assert_eq!(rig::<Eccentricity>(params).err().unwrap()[0].at, at, "{params}");
         }
-        assert!(rig::<Eccentricity>("weight = \"mass\"").is_err());
+        let unknown = "weight = \"mass\"";
+        assert_eq!(places(unknown, &rig::<Eccentricity>(unknown)), ["bad-value: `\"mass\"`"]);
     }
 }

@@ -144,7 +144,7 @@ impl Node for SelectRegion {
 #[cfg(test)]
 mod tests {
     use proptest::prelude::*;
-    use tactflow_runtime::harness::NodeRig;
+    use tactflow_runtime::harness::{NodeRig, places};
     use tactflow_runtime::signal::{Region, RegionsShape, Run, Unit};
 
     use super::*;
@@ -215,8 +215,13 @@ mod tests {
         for (params, at) in cases {
             assert_eq!(rig(params).err().unwrap()[0].at, at, "{params}");
         }
-        for bad in ["by = \"size\"", "rank = 0", "by = \"distance\"\npoint = [1, 2, 3]", "min_area = 0"] {
-            assert!(rig(bad).is_err(), "{bad}");
+        for (bad, place) in [
+            ("by = \"size\"", "bad-value: `\"size\"`"),
+            ("rank = 0", "bad-value: `0`"),
+            ("by = \"distance\"\npoint = [1, 2, 3]", "bad-value: `[1, 2, 3]`"),
+            ("min_area = 0", "bad-value: `0`"),
+        ] {
+            assert_eq!(places(bad, &rig(bad)), [place], "{bad}");
         }
     }
 

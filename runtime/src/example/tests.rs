@@ -1,9 +1,8 @@
 //! Examples of a world of one motor and two nodes.
-use std::borrow::Cow;
 
 use super::*;
 use crate::device::{Commands, Description, Device, DeviceError, Driver, Opened, RoleType, Samples, Stepped};
-use crate::node::{Describe, In, Inputs, Mistakes, Need, Node, Out, Outputs, PortSpec, Setup, Tick};
+use crate::node::{Describe, In, Inputs, Mistakes, Node, Out, Outputs, PortSpec, Setup, Tick};
 use crate::signal::{Joint, Joints, JointsShape, Kind, Unit};
 
 mod follow {

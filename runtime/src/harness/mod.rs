@@ -11,4 +11,4 @@ pub use fed::FedRole;
 pub use graph_rig::GraphRig;
 pub use link_rig::LinkRig;
 pub use lint::{CountAllocations, Lint, Violation, lint};
-pub use node_rig::NodeRig;
+pub use node_rig::{NodeRig, places};

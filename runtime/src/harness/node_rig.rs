@@ -2,8 +2,26 @@
 
 use super::params::with_params;
 use crate::engine::NodeRunner;
-use crate::node::{Bus, Components, Given, Mistakes, Need, Node, NodeSpec, PortId, Tick, of};
+use crate::node::{At, Bus, Components, Given, Mistake, Mistakes, Need, Node, NodeSpec, PortId, Tick, of};
 use crate::signal::{Features, Freshness, Mark, Shape, Signal, Stamp};
+
+/// Returns the code and the place of each mistake in a node, for tests of bad parameters: ``bad-value: `-1` `` for a value
+/// in the text `params`, ``unknown-key: `threshold` `` for a parameter, ``shape-mismatch: `in.image` `` for an input.
+#[must_use]
+pub fn places(params: &str, made: &Result<NodeRig, Mistakes>) -> Vec<String> {
+    let describe = |Mistake { code, at, .. }: &Mistake| {
+        let place = match at {
+            At::Span(span) if span.is_empty() => "the node".to_owned(),
+            At::Span(span) => params.get(span.clone()).unwrap_or_default().to_owned(),
+            At::Param(path) | At::Key(path) => path.clone(),
+            At::Input(name) => format!("in.{name}"),
+            At::Data { text, span, .. } => text.get(span.clone()).unwrap_or_default().to_owned(),
+            At::Node => "the node".to_owned(),
+        };
+        format!("{}: `{place}`", code.name())
+    };
+    made.as_ref().err().into_iter().flatten().map(describe).collect()
+}
 
 /// A node with nothing around it, for its own tests. It steps as in a graph: when a trigger is new or lost.
 ///

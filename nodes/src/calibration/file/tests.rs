@@ -151,7 +151,9 @@ fn every_mistake_has_its_place() {
 
 #[test]
 fn text_that_is_not_toml_is_refused_and_long_lists_are_cut() {
-    assert!(read("rows = = 2").is_err() && !is_calibration("rows = = 2"));
+    let syntax = read("rows = = 2").unwrap_err();
+    assert_eq!((syntax.len(), syntax[0].code, &syntax[0].at), (1, Code::BadData, &At::Span(7..8)));
+    assert!(!is_calibration("rows = = 2"));
     assert!(!is_calibration("kind = 1") && !is_calibration(""));
     assert!(is_calibration("kind = \"calibration\"\nversion = 9"), "a later one is one too");
     let line = "  { at = [0, 0], offset = 10, gain = 0, squash = 0, most = 1 },\n";

@@ -4,7 +4,7 @@ use std::f64::consts::{FRAC_1_SQRT_2, FRAC_PI_2, PI, TAU};
 
 use nalgebra::{IsometryMatrix3, Rotation3, Translation3};
 use proptest::prelude::*;
-use tactflow_runtime::harness::NodeRig;
+use tactflow_runtime::harness::{NodeRig, places};
 use tactflow_runtime::signal::{Freshness, PoseShape, ScalarShape, Unit};
 
 use super::*;
@@ -230,10 +230,14 @@ fn a_bad_parameter_is_a_mistake() {
         let one = ScalarShape::of(Unit::ONE).into();
         [("eccentricity", one), ("orientation", ScalarShape::of(Unit::AXIAL).into()), ("pose", PoseShape.into())]
     };
-    for bad in
-        ["on_above = 0.9\noff_below = 0.9", "off_below = 0.99", "on_above = 1.1", "leg_m = 0", "heading_rad = nan"]
-    {
-        assert!(NodeRig::new::<RidgeGuide>(bad, &wires()).is_err(), "{bad}");
+    for (bad, place) in [
+        ("on_above = 0.9\noff_below = 0.9", "bad-value: `off_below`"),
+        ("off_below = 0.99", "bad-value: `off_below`"),
+        ("on_above = 1.1", "bad-value: `1.1`"),
+        ("leg_m = 0", "bad-value: `0`"),
+        ("heading_rad = nan", "bad-value: `nan`"),
+    ] {
+        assert_eq!(places(bad, &NodeRig::new::<RidgeGuide>(bad, &wires())), [place], "{bad}");
     }
 }
 

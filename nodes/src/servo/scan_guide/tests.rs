@@ -2,7 +2,7 @@
 
 use nalgebra::{IsometryMatrix3, Rotation3, Translation3, Vector3};
 use proptest::prelude::*;
-use tactflow_runtime::harness::NodeRig;
+use tactflow_runtime::harness::{NodeRig, places};
 use tactflow_runtime::signal::{FlagShape, Freshness, Pose, PoseShape, ScalarShape, Shape, Unit};
 
 use super::*;
@@ -263,8 +263,13 @@ fn another_axis_begins_another_scan() {
 #[test]
 fn a_bad_parameter_is_a_mistake() {
     let wires = [("gate", FlagShape.into()), ("pose", PoseShape.into())];
-    for bad in ["step_m = 0.01", "stroke_m = 0.01", "axis = \"z\"\nstroke_m = 0.1\nstep_m = 0.1", "strokes = 0"] {
-        assert!(NodeRig::new::<ScanGuide>(bad, &wires).is_err(), "{bad}");
+    for (bad, place) in [
+        ("step_m = 0.01", "missing-key: `the node`"),
+        ("stroke_m = 0.01", "missing-key: `the node`"),
+        ("axis = \"z\"\nstroke_m = 0.1\nstep_m = 0.1", "bad-value: `\"z\"`"),
+        ("step_m = 0.01\nstroke_m = 0.1\nstrokes = 0", "bad-value: `0`"),
+    ] {
+        assert_eq!(places(bad, &NodeRig::new::<ScanGuide>(bad, &wires)), [place], "{bad}");
     }
 }
 

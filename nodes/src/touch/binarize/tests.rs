@@ -1,7 +1,7 @@
 //! `binarize` tactel by tactel, against naive references.
 
 use proptest::prelude::*;
-use tactflow_runtime::harness::{FedRole, GraphRig, NodeRig};
+use tactflow_runtime::harness::{FedRole, GraphRig, NodeRig, places};
 use tactflow_runtime::node::At;
 use tactflow_runtime::signal::{Image, ImageShape, Mask, Unit};
 
@@ -55,7 +55,7 @@ fn what_is_refused() {
         (
             "threshold = 1\nrelease = 0.5\nmethod = \"otsu\"",
             At::Key("release".into()),
-            "`release` means nothing with `method = \"otsu\"`",
+            "`release` cannot be used with `method = \"otsu\"`",
         ),
     ];
     for (params, at, message) in cases {
@@ -64,8 +64,14 @@ fn what_is_refused() {
         assert!(mistakes[0].message.starts_with(message), "{params}: {}", mistakes[0].message);
     }
     assert_eq!(rig("threshold = 1e39\nrelease = 1e40", 1, 1).err().unwrap().len(), 2);
-    for bad in ["threshold = nan", "threshold = \"1\"", "", "method = \"otsu\"", "threshold = 1\nmethod = 1"] {
-        assert!(rig(bad, 1, 1).is_err(), "{bad}");
+    for (bad, place) in [
+        ("threshold = nan", "bad-value: `nan`"),
+        ("threshold = \"1\"", "bad-value: `\"1\"`"),
+        ("", "missing-key: `the node`"),
+        ("method = \"otsu\"", "missing-key: `the node`"),
+        ("threshold = 1\nmethod = 1", "bad-value: `1`"),
+    ] {
+        assert_eq!(places(bad, &rig(bad, 1, 1)), [place], "{bad}");
     }
     let word = rig("threshold = 1\nmethod = \"otus\"", 1, 1).err().unwrap();
     assert_eq!(word[0].message, "expected one of `fixed`, `otsu`, found the string \"otus\"");

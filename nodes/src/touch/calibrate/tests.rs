@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use tactflow_runtime::harness::NodeRig;
+use tactflow_runtime::harness::{NodeRig, places};
 use tactflow_runtime::node::{At, Mistake};
 use tactflow_runtime::signal::{FlagShape, Freshness, Shape, Unit};
 
@@ -82,10 +82,16 @@ fn every_mistake_is_marked_at_its_parameter() {
     }
     let all = rig("offset = [[1]]\ngain = 1e39\nunit = \"x\"\ndead = [[9, 9]]").err().unwrap();
     assert_eq!(all.len(), 4, "{all:?}");
-    for wrong in
-        ["gain = \"1\"", "gain = [1, 2]", "gain = { from = 1 }", "gain = inf", "dead = [[1]]", "dead = [[-1, 0]]"]
-    {
-        assert!(rig(wrong).is_err(), "{wrong}");
+    let wrongs = [
+        ("gain = \"1\"", "bad-value: `\"1\"`"),
+        ("gain = [1]", "bad-value: `1`"),
+        ("gain = { from = 1 }", "bad-value: `{ from = 1 }`"),
+        ("gain = inf", "bad-value: `inf`"),
+        ("dead = [[1]]", "bad-value: `[1]`"),
+        ("dead = [[-1, 0]]", "bad-value: `-1`"),
+    ];
+    for (wrong, place) in wrongs {
+        assert_eq!(places(wrong, &rig(wrong)), [place], "{wrong}");
     }
 }
 
@@ -315,8 +321,12 @@ fn a_tare_without_a_check_is_refused() {
         assert!(tared(params, &watched).is_ok());
     }
     assert!(tared("", &["present"]).is_ok(), "without a tare `in.present` has no effect");
-    for wrong in ["tare_window = 0", "tare_bound = 0", "tare_at_start = 1"] {
-        assert!(tared(wrong, &["present"]).is_err(), "{wrong}");
+    for (wrong, place) in [
+        ("tare_window = 0", "bad-value: `0`"),
+        ("tare_bound = 0", "bad-value: `0`"),
+        ("tare_at_start = 1", "bad-value: `1`"),
+    ] {
+        assert_eq!(places(wrong, &tared(wrong, &["present"])), [place], "{wrong}");
     }
 }
 

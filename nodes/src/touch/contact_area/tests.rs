@@ -2,7 +2,7 @@
 
 use std::f64::consts::PI;
 
-use tactflow_runtime::harness::NodeRig;
+use tactflow_runtime::harness::{NodeRig, places};
 use tactflow_runtime::signal::{Grid, Image, ImageShape, Mask, Shape, Unit};
 
 use super::super::binarize::binarize;
@@ -134,6 +134,11 @@ fn without_a_threshold_only_tactels_are_counted() {
     rig.set("region", Mask::empty(8, 10));
     rig.step();
     assert_eq!((rig.get("area"), rig.get::<Scalar>("interpolated")), (Some(&0.0), None));
-    assert!(NodeRig::new::<ContactArea>("threshold = \"1\"", &wires(8, 10, 10)).is_err());
-    assert!(NodeRig::new::<ContactArea>("", &wires(8, 10, 9)).is_err(), "two arrays");
+    let text = "threshold = \"1\"";
+    assert_eq!(places(text, &NodeRig::new::<ContactArea>(text, &wires(8, 10, 10))), ["bad-value: `\"1\"`"]);
+    assert_eq!(
+        places("", &NodeRig::new::<ContactArea>("", &wires(8, 10, 9))),
+        ["shape-mismatch: `in.region`"],
+        "two arrays"
+    );
 }

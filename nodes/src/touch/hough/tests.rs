@@ -2,7 +2,7 @@
 
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_4};
 
-use tactflow_runtime::harness::NodeRig;
+use tactflow_runtime::harness::{NodeRig, places};
 use tactflow_runtime::node::At;
 use tactflow_runtime::signal::{Grid, Image, Mask, Shape, Unit};
 
@@ -127,7 +127,11 @@ fn wrong_parameters_are_refused() {
     }
     let flat = NodeRig::new::<Hough>("", &wires(4, 4, [0.0; 2])).err().unwrap();
     assert_eq!(flat[0].at, At::Input("image".into()));
-    for bad in ["angles = 7", "offset_step = 0", "min_strength = 1.1"] {
-        assert!(NodeRig::new::<Hough>(bad, &wires(4, 4, [0.005; 2])).is_err(), "{bad}");
+    for (bad, place) in [
+        ("angles = 7", "bad-value: `7`"),
+        ("offset_step = 0", "bad-value: `0`"),
+        ("min_strength = 1.1", "bad-value: `1.1`"),
+    ] {
+        assert_eq!(places(bad, &NodeRig::new::<Hough>(bad, &wires(4, 4, [0.005; 2]))), [place], "{bad}");
     }
 }

@@ -1,6 +1,6 @@
 //! `label` against pictures, a flood fill, and a simple tracker.
 
-use tactflow_runtime::harness::NodeRig;
+use tactflow_runtime::harness::{NodeRig, places};
 use tactflow_runtime::node::At;
 use tactflow_runtime::signal::ImageShape;
 
@@ -78,16 +78,16 @@ fn a_run_crosses_the_border_of_two_words_but_not_the_end_of_a_row() {
 
 #[test]
 fn wrong_parameters_and_arrays_are_refused() {
-    for bad in [
-        "choose = \"smallest\"",
-        "choose = 1",
-        "neighbours = 6",
-        "min_area = 0",
-        "min_area = -1",
-        "min_force = \"1\"",
-        "neighbors = 4",
+    for (bad, place) in [
+        ("choose = \"smallest\"", "bad-value: `\"smallest\"`"),
+        ("choose = 1", "bad-value: `1`"),
+        ("neighbours = 6", "bad-value: `6`"),
+        ("min_area = 0", "bad-value: `0`"),
+        ("min_area = -1", "bad-value: `-1`"),
+        ("min_force = \"1\"", "bad-value: `\"1\"`"),
+        ("neighbors = 4", "unknown-key: `neighbors`"),
     ] {
-        assert!(rig(bad, 4, 4).is_err(), "{bad}");
+        assert_eq!(places(bad, &rig(bad, 4, 4)), [place], "{bad}");
     }
     for (rows, cols, fits) in [(256, 63, true), (1, 65535, true), (65535, 1, true), (65535, 2, true), (255, 513, true)]
     {

@@ -1,7 +1,7 @@
 //! `low_pass` against the solution of its equation.
 
 use proptest::prelude::*;
-use tactflow_runtime::harness::NodeRig;
+use tactflow_runtime::harness::{NodeRig, places};
 use tactflow_runtime::signal::{Freshness, Scalar, ScalarShape, Stamp, Unit};
 
 use super::*;
@@ -128,8 +128,13 @@ fn it_needs_exactly_one_of_time_constant_and_cutoff() {
     assert_eq!((none[0].at.clone(), none[0].code), (At::Node, Code::MissingKey));
     let both = built("time_constant_ms = 20\ncutoff_hz = 8", Unit::NEWTON).err().unwrap();
     assert_eq!(both[0].at, At::Key("cutoff_hz".into()));
-    for bad in ["time_constant_ms = 0", "cutoff_hz = -1", "cutoff_hz = inf", "time = 1"] {
-        assert!(built(bad, Unit::NEWTON).is_err(), "{bad}");
+    for (bad, place) in [
+        ("time_constant_ms = 0", "bad-value: `0`"),
+        ("cutoff_hz = -1", "bad-value: `-1`"),
+        ("cutoff_hz = inf", "bad-value: `inf`"),
+        ("time = 1", "unknown-key: `time`"),
+    ] {
+        assert_eq!(places(bad, &built(bad, Unit::NEWTON)), [place], "{bad}");
     }
 }
 

@@ -4,7 +4,7 @@ use std::f64::consts::{FRAC_PI_2, PI, SQRT_2};
 
 use nalgebra::{Matrix2, Vector2};
 use proptest::prelude::*;
-use tactflow_runtime::harness::NodeRig;
+use tactflow_runtime::harness::{NodeRig, places};
 use tactflow_runtime::node::At;
 use tactflow_runtime::signal::{Grid, Unit};
 
@@ -227,10 +227,18 @@ fn with_the_excess_as_weight_a_tactel_enters_without_a_jump() {
 fn wrong_parameters_and_shapes_are_refused() {
     let image = ImageShape { rows: 4, cols: 5, pitch: PITCH, unit: Unit::NEWTON };
     let grid = Grid::from(&image);
-    let weights = ["weight = \"excess\"", "threshold = 0.1", "weight = \"area\"\nthreshold = 0.1", "weight = 1"];
-    for bad in ["min_anisotropy = -0.1", "min_anisotropy = 1.1", "min_anisotropy = nan"].into_iter().chain(weights) {
+    let cases = [
+        ("min_anisotropy = -0.1", "bad-value: `-0.1`"),
+        ("min_anisotropy = 1.1", "bad-value: `1.1`"),
+        ("min_anisotropy = nan", "bad-value: `nan`"),
+        ("weight = \"excess\"", "missing-key: `weight`"),
+        ("threshold = 0.1", "unknown-key: `threshold`"),
+        ("weight = \"area\"\nthreshold = 0.1", "unknown-key: `threshold`"),
+        ("weight = 1", "bad-value: `1`"),
+    ];
+    for (bad, place) in cases {
         let wires = [("image", image.clone().into()), ("region", grid.clone().into())];
-        assert!(NodeRig::new::<Moments>(bad, &wires).is_err(), "{bad}");
+        assert_eq!(places(bad, &NodeRig::new::<Moments>(bad, &wires)), [place], "{bad}");
     }
     let other = Grid { rows: 5, ..grid };
     let mistakes = NodeRig::new::<Moments>("", &[("image", image.into()), ("region", other.into())]).err().unwrap();

@@ -1,7 +1,7 @@
 //! `moving_average` against tables, and against the mean of the samples in the window.
 
 use proptest::prelude::*;
-use tactflow_runtime::harness::NodeRig;
+use tactflow_runtime::harness::{NodeRig, places};
 use tactflow_runtime::node::At;
 use tactflow_runtime::signal::{Freshness, Scalar, ScalarShape, Stamp, Unit};
 
@@ -75,8 +75,14 @@ fn built(params: &str) -> Result<NodeRig, Mistakes> {
 
 #[test]
 fn invalid_windows_are_refused() {
-    for bad in ["window = 0", "window_ms = 0", "window_ms = -1.0", "window = 2.5", "window_ms = \"40 ms\""] {
-        assert!(built(bad).is_err(), "{bad}");
+    for (bad, place) in [
+        ("window = 0", "bad-value: `0`"),
+        ("window_ms = 0", "bad-value: `0`"),
+        ("window_ms = -1.0", "bad-value: `-1.0`"),
+        ("window = 2.5", "bad-value: `2.5`"),
+        ("window_ms = \"40 ms\"", "bad-value: `\"40 ms\"`"),
+    ] {
+        assert_eq!(places(bad, &built(bad)), [place], "{bad}");
     }
     let both = built("window = 10\nwindow_ms = 40").err().unwrap();
     assert_eq!(both[0].at, At::Key("window_ms".into()));

@@ -106,7 +106,7 @@ impl Node for TactileSource {
 #[cfg(test)]
 mod tests {
     use proptest::prelude::*;
-    use tactflow_runtime::harness::NodeRig;
+    use tactflow_runtime::harness::{NodeRig, places};
     use tactflow_runtime::signal::{ImageShape, Shape, Unit};
 
     use super::*;
@@ -150,7 +150,8 @@ mod tests {
     #[test]
     fn an_image_without_tactels_is_refused() {
         for (rows, cols) in [(0, 0), (0, 4), (4, 0)] {
-            assert!(NodeRig::new::<TactileSource>("", &[("image", shape(rows, cols))]).is_err(), "{rows} by {cols}");
+            let refused = NodeRig::new::<TactileSource>("", &[("image", shape(rows, cols))]);
+            assert_eq!(places("", &refused), ["shape-mismatch: `in.image`"], "{rows} by {cols}");
         }
     }
 
