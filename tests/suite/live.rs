@@ -140,7 +140,7 @@ impl Device for Blocking {
 #[test]
 fn a_driver_that_blocks_stops_neither_the_ticks_nor_the_end_of_the_run() {
     let bench_text = Some("devices.b.type = 'blocking'\nbind.a = 'b'".into());
-    let request = Request { bench_text, ..Request::text(&format!("{GRAPH}\n[policy]\ndevice = \"hold\"\n")) };
+    let request = Request { bench_text, ..Request::text(format!("{GRAPH}\n[policy]\ndevice = \"hold\"\n")) };
     let plan = compile(&catalogue().device::<Blocking>(), &request).unwrap();
     let begin = std::time::Instant::now();
     let options = RunOptions { duration: Some(0.5), is_realtime: true, ..RunOptions::default() };

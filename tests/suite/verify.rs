@@ -65,7 +65,7 @@ fn what_is_missed_ends_with_1_and_is_printed_all_the_same() {
 fn a_fault_is_a_row_and_the_others_run() {
     let Said { code, out, err } = say(&["verify", FAULT, NEVER, MOCK]);
     assert_eq!(code, 1);
-    let fault = "`pad` failed: a `glitch` with `unplug` disconnected it in tick 376 at 1.500 s (tests/scenarios/benches/unplugged.toml:4:10)";
+    let fault = "`pad` failed: its plug is out in tick 376 at 1.500 s (tests/scenarios/benches/unplugged.toml:4:10)";
     let never = "error: never: `touch.present` was never set, so the figures have no time 0";
     let lines = [format!("error: fault, seed 3: device {fault}"), format!("error: fault, seed 7: device {fault}")];
     assert_eq!(err.lines().collect::<Vec<_>>(), [&lines[0], &lines[1], never]);

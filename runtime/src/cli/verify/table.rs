@@ -135,6 +135,16 @@ struct ScenarioJson<'a> {
     rows: Vec<RowJson<'a>>,
 }
 
+/// What a bound applies to.
+#[derive(Serialize)]
+#[serde(rename_all = "lowercase")]
+enum Judged {
+    /// The median of the runs.
+    Median,
+    /// Every run.
+    Every,
+}
+
 #[derive(Serialize)]
 struct RowJson<'a> {
     check: &'a str,
@@ -147,8 +157,8 @@ struct RowJson<'a> {
     /// Confidence interval of the median, at least 95 %; an end is null if not measured.
     interval: Option<(f64, f64)>,
     bound: Option<f64>,
-    /// What the bound applies to: the `median` or `every` run; null without a bound.
-    judged: Option<&'static str>,
+    /// What the bound applies to; null without a bound.
+    judged: Option<Judged>,
     paper: Option<f64>,
     /// `informational` without a bound.
     mark: Verdict,
@@ -178,9 +188,9 @@ fn scenario_json(verified: &Verified) -> ScenarioJson<'_> {
 fn row_json(row: &FigureRow) -> RowJson<'_> {
     let (bound, judged) = match row.bound {
         Bound::None => (None, None),
-        Bound::Settles => (None, Some("every")),
-        Bound::Median(bound) => (Some(bound), Some("median")),
-        Bound::AtMost(bound) | Bound::AtLeast(bound) => (Some(bound), Some("every")),
+        Bound::Settles => (None, Some(Judged::Every)),
+        Bound::Median(bound) => (Some(bound), Some(Judged::Median)),
+        Bound::AtMost(bound) | Bound::AtLeast(bound) => (Some(bound), Some(Judged::Every)),
     };
     RowJson {
         check: &row.check,
