@@ -4,6 +4,7 @@ use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use tactflow_runtime::signal::Kind;
 use tactflow_tests::workspace;
 
 fn rust_files(folder: &Path, files: &mut Vec<PathBuf>) {
@@ -94,6 +95,18 @@ fn the_runtime_knows_no_node_no_sensor_and_no_robot() {
     }
     let manifest = fs::read_to_string(workspace().join("runtime/Cargo.toml")).unwrap();
     assert!(!manifest.contains("tactflow-nodes") && !manifest.contains("urdf"));
+}
+
+#[test]
+fn the_derives_know_every_kind_of_signal() {
+    let port = fs::read_to_string(workspace().join("runtime/derive/src/port.rs")).unwrap();
+    let (_, list) = port.split_once("const SIGNALS").unwrap();
+    // Behind the type `[&str; 12]`.
+    let list = list.splitn(3, ';').nth(1).unwrap();
+    let named: BTreeSet<&str> = list.split('"').skip(1).step_by(2).collect();
+    let mut kinds: BTreeSet<String> = Kind::ALL.iter().map(|kind| format!("{kind:?}")).collect();
+    kinds.extend(["f64".to_owned(), "bool".to_owned()]);
+    assert_eq!(named, kinds.iter().map(String::as_str).collect());
 }
 
 #[test]

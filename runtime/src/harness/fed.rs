@@ -1,4 +1,4 @@
-//! A device that gives what a test feeds it.
+//! A device whose samples come from a test.
 
 use std::borrow::Cow;
 use std::collections::VecDeque;
@@ -22,30 +22,30 @@ pub struct FedRole {
 }
 
 impl FedRole {
-    /// The role `name` of the type `kind`, with a sample every `period_ms` nominally.
+    /// Creates the role `name` of the type `kind`, with a nominal period of `period_ms`.
     ///
-    /// Scalars, flags, twists and poses of the role have no size, so only its other ports need a shape.
+    /// Scalars, flags, twists and poses have no size, so only the other ports of the role need a shape.
     #[must_use]
     pub fn new(name: impl Into<String>, kind: impl Into<String>, period_ms: f64) -> Self {
         let (outputs, commands, facts) = (Vec::new(), Vec::new(), Vec::new());
         Self { name: name.into(), kind: kind.into(), period: period_ms * 1e-3, outputs, commands, facts }
     }
 
-    /// With the shape of an output.
+    /// Sets the shape of an output.
     #[must_use]
     pub fn output(mut self, name: impl Into<String>, shape: impl Into<Shape>) -> Self {
         self.outputs.push((name.into(), shape.into()));
         self
     }
 
-    /// With the joints of a command.
+    /// Sets the joints of a command.
     #[must_use]
     pub fn command(mut self, name: impl Into<String>, shape: JointsShape) -> Self {
         self.commands.push((name.into(), shape));
         self
     }
 
-    /// With a fact that the graph asks for: `{ from = "pad.threshold" }`.
+    /// States a fact that the graph uses, as in `{ from = "pad.threshold" }`.
     #[must_use]
     pub fn fact(mut self, name: impl Into<String>, value: impl Into<toml::Value>) -> Self {
         self.facts.push((name.into(), value.into()));
@@ -75,10 +75,10 @@ impl FedRole {
     }
 }
 
-/// What a fed device does next.
+/// The next action of a fed device.
 pub(super) type Event = Box<dyn FnOnce(&mut Samples) -> Result<(), DeviceError> + Send>;
 
-/// What a test has fed and a device has not given yet, each with its time [ns].
+/// The actions that a test has fed, each with its time [ns], in the order of the times.
 pub(super) type Queue = Arc<Mutex<VecDeque<(i64, Event)>>>;
 
 /// The device type behind a fed role.
@@ -119,7 +119,7 @@ impl DeviceType for FedDevice {
 struct FedDriver(Queue);
 
 impl Stepped for FedDriver {
-    /// What was fed next; a test that feeds nothing is a device that is silent, not one that has ended.
+    /// Returns the time of the next action. Without one the device is silent, and has not ended.
     fn next(&self) -> Option<i64> {
         let queue = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         Some(queue.front().map_or(i64::MAX, |(at, _)| *at))

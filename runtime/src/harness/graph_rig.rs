@@ -1,4 +1,4 @@
-//! A whole graph in a test, fed by hand.
+//! A whole graph in a test, which feeds its roles.
 
 use std::sync::{Arc, PoisonError};
 
@@ -11,16 +11,16 @@ use crate::graph::{Request, compile};
 use crate::signal::{Freshness, Signal};
 use crate::source::{Report, suggestion};
 
-/// A graph in virtual time, some or all of whose roles the test feeds. Ports are named as in the graph: `pad.image`.
+/// A graph in virtual time. The test feeds some or all of its roles. Ports have the names of the graph: `pad.image`.
 ///
-/// A sample that is fed is latched in the first tick at its time or later.
+/// The graph reads a fed sample in the first tick at its time or later.
 pub struct GraphRig {
     /// The engine, for everything that the rig has no method for.
     pub engine: Engine,
     fed: Vec<RoleFeed>,
 }
 
-/// A fed role: its name, its outputs, each with the sequence number of its last sample, and what is to come.
+/// A fed role: its name, its outputs with the sequence number of the last sample of each, and the actions to come.
 struct RoleFeed {
     role: String,
     outputs: Vec<(String, u64)>,
@@ -31,16 +31,16 @@ impl GraphRig {
     /// Builds the graph of a TOML text, with roles that the test feeds.
     ///
     /// # Errors
-    /// Everything that is wrong with the graph.
+    /// All diagnostics of the graph.
     pub fn new(catalogue: Catalogue, graph: &str, fed: impl IntoIterator<Item = FedRole>) -> Result<Self, Report> {
         Self::open(catalogue, Request::text(graph), fed)
     }
 
-    /// Builds a graph on its bench, such as `Request::file("graphs/hybrid.toml")`. The roles in `fed` take the place of
-    /// those that the bench fills; the others keep their devices.
+    /// Builds a graph on its bench, such as `Request::file("graphs/hybrid.toml")`. The roles in `fed` replace those
+    /// of the bench. The other roles keep their devices.
     ///
     /// # Errors
-    /// Everything that is wrong with the graph.
+    /// All diagnostics of the graph.
     pub fn open(
         catalogue: Catalogue,
         request: Request,
@@ -69,7 +69,7 @@ impl GraphRig {
         self.feed_as(port, ms, ms, sequence, value);
     }
 
-    /// Feeds a sample at `at_ms` that says it was taken at `stamp_ms`, as the `sequence`-th.
+    /// Feeds a sample at `at_ms` with the stamp `stamp_ms` and a sequence number.
     ///
     /// # Panics
     /// If no fed role has that port.
@@ -79,7 +79,7 @@ impl GraphRig {
         });
     }
 
-    /// Feeds a sample taken at `ms` that says that a port has no value.
+    /// Feeds a sample without a value, taken at `ms`.
     ///
     /// # Panics
     /// If no fed role has that port.
@@ -149,7 +149,7 @@ impl GraphRig {
         self.engine.tick(nanos(ms))
     }
 
-    /// Runs all ticks of the next `ms` milliseconds, each when the graph's clock says so.
+    /// Runs all ticks of the next `ms` milliseconds, at the times of the graph's clock.
     ///
     /// # Errors
     /// The reason of a fault.
@@ -161,10 +161,10 @@ impl GraphRig {
         Ok(())
     }
 
-    /// Sends a word from outside; it is there in the next tick.
+    /// Sends an operator word. It takes effect in the next tick.
     ///
     /// # Panics
-    /// If nothing waits for the word.
+    /// If no condition waits for the word.
     pub fn send(&mut self, word: &str) {
         self.engine.send(word).unwrap_or_else(|why| panic!("{why}"));
     }
@@ -178,7 +178,7 @@ impl GraphRig {
         self.engine.mark(port).freshness(self.engine.ticks())
     }
 
-    /// Returns what is on a port, or `None` if it is absent.
+    /// Returns the value of a port, or `None` while it is absent.
     ///
     /// # Panics
     /// If there is no port of that name and kind.
@@ -187,7 +187,7 @@ impl GraphRig {
         self.engine.get(port)
     }
 
-    /// Returns the age of what is on a port [ms]; zero for generated motion.
+    /// Returns the age of the value of a port [ms]; zero for generated motion.
     ///
     /// # Panics
     /// If there is no such port.

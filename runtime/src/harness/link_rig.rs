@@ -30,7 +30,7 @@ impl LinkRig {
     /// Opens a device with the parameters of a TOML text and starts it.
     ///
     /// # Errors
-    /// What is wrong with the parameters.
+    /// The mistakes in the parameters.
     ///
     /// # Panics
     /// If the text is not TOML, or if the device is not live.

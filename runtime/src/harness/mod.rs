@@ -1,4 +1,4 @@
-//! Graphs and nodes in tests, on mock sources and a virtual clock.
+//! Runs graphs, nodes and devices in tests, with fed roles and a virtual clock.
 
 mod fed;
 mod graph_rig;

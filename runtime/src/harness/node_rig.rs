@@ -1,12 +1,13 @@
-//! One node on a table: set its inputs, step, look at its outputs.
+//! A single node in a test: set its inputs, step, read its outputs.
 
 use super::params::with_params;
 use crate::engine::NodeRunner;
 use crate::node::{At, Bus, Components, Given, Mistake, Mistakes, Need, Node, NodeSpec, PortId, Tick, of};
 use crate::signal::{Features, Freshness, Mark, Shape, Signal, Stamp};
 
-/// Returns the code and the place of each mistake in a node, for tests of bad parameters: ``bad-value: `-1` `` for a value
-/// in the text `params`, ``unknown-key: `threshold` `` for a parameter, ``shape-mismatch: `in.image` `` for an input.
+/// Returns the code and the place of each mistake in a node, for tests of bad parameters: ``bad-value: `-1` `` for a
+/// value in the text `params`, ``unknown-key: `threshold` `` for a parameter, ``shape-mismatch: `in.image` `` for an
+/// input.
 #[must_use]
 pub fn places(params: &str, made: &Result<NodeRig, Mistakes>) -> Vec<String> {
     let describe = |Mistake { code, at, .. }: &Mistake| {
@@ -23,9 +24,9 @@ pub fn places(params: &str, made: &Result<NodeRig, Mistakes>) -> Vec<String> {
     made.as_ref().err().into_iter().flatten().map(describe).collect()
 }
 
-/// A node with nothing around it, for its own tests. It steps as in a graph: when a trigger is new or lost.
+/// A single node in a test. It steps as in a graph: when a trigger is new or lost.
 ///
-/// Every tick is 1 ms after the last unless said otherwise; an input that is set is a new sample of that moment.
+/// By default, each tick is 1 ms after the last. A value that the test sets is a new sample with the time of the tick.
 pub struct NodeRig {
     runner: NodeRunner,
     spec: NodeSpec,
@@ -33,19 +34,19 @@ pub struct NodeRig {
     inputs: Vec<(String, PortId)>,
     outputs: Vec<PortId>,
     shapes: Vec<Shape>,
-    /// The tick that the next step takes place in.
+    /// The tick of the next step.
     pub tick: Tick,
 }
 
 impl NodeRig {
-    /// The node with the parameters of a TOML text and wires of the given shapes, by the names of a graph file
-    /// (`in.x` is `x`).
+    /// Builds a node with the parameters of a TOML text, and with wires of the given shapes. The names are those of a
+    /// graph file: `x` for `in.x`.
     ///
     /// # Errors
-    /// What the node says is wrong.
+    /// The mistakes that the node finds.
     ///
     /// # Panics
-    /// If the text is not TOML, or a name is no input.
+    /// If the text is not TOML, or if a name is not an input.
     pub fn new<N: Node>(params: &str, wires: &[(&str, Shape)]) -> Result<Self, Mistakes> {
         let node_type = of::<N>();
         let spec = node_type.spec();
@@ -80,12 +81,12 @@ impl NodeRig {
         found.unwrap_or_else(|| panic!("no output is called `{name}`"))
     }
 
-    /// Tells the node which components of its outputs anything reads, as a mode does.
+    /// Sets which components of the outputs are read, as a mode does.
     pub fn want(&mut self, wanted: &[Components]) {
         self.runner.want(wanted);
     }
 
-    /// A new sample of this moment on an input.
+    /// Sets an input to a new sample with the time of the tick.
     ///
     /// # Panics
     /// If there is no such wire.
@@ -94,7 +95,7 @@ impl NodeRig {
         self.edit(input, stamp, |old: &mut T| *old = value);
     }
 
-    /// A new value with a stamp of its own on an input, changed in place.
+    /// Changes the value of an input in place, as a new sample with the given stamp.
     ///
     /// # Panics
     /// If there is no such wire.
@@ -105,7 +106,8 @@ impl NodeRig {
         *self.bus.mark_mut(port) = self.bus.slot::<T>(port).mark(*self.bus.mark(port), self.tick.index);
     }
 
-    /// A new sample of this moment on an input of features: a value for each, `None` if it is absent.
+    /// Sets an input of features to a new sample with the time of the tick: a value for each feature, `None` for an
+    /// absent one.
     ///
     /// # Panics
     /// If there is no such wire, or if it has fewer components.
@@ -121,7 +123,7 @@ impl NodeRig {
         });
     }
 
-    /// The input goes away.
+    /// Makes an input absent.
     ///
     /// # Panics
     /// If there is no such wire.
@@ -143,7 +145,7 @@ impl NodeRig {
         self.step_ms(1.0);
     }
 
-    /// What the last step left on an output; `None` if it is absent.
+    /// Returns the value of an output after the last step, or `None` if it is absent.
     ///
     /// # Panics
     /// If there is no such output of that kind.
@@ -155,7 +157,7 @@ impl NodeRig {
         self.bus.get(port)
     }
 
-    /// Mark of an output.
+    /// Returns the mark of an output.
     ///
     /// # Panics
     /// If there is no such output.
@@ -164,7 +166,7 @@ impl NodeRig {
         *self.bus.mark(self.outputs[self.output(output)])
     }
 
-    /// Freshness of an output in the tick of the last step.
+    /// Returns the freshness of an output in the tick of the last step.
     ///
     /// # Panics
     /// If there is no such output.
@@ -173,7 +175,7 @@ impl NodeRig {
         self.mark(output).freshness(self.tick.index - 1)
     }
 
-    /// Shape of an output as the node set it.
+    /// Returns the shape that the node has set for an output.
     ///
     /// # Panics
     /// If there is no such output.

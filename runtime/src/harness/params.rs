@@ -5,10 +5,10 @@ use std::path::Path;
 use crate::node::{Mistakes, Reader};
 use crate::source::{SourceMap, Value, parse_table};
 
-/// Makes a node or a device from the parameters of a TOML text.
+/// Creates a node or a device from the parameters of a TOML text.
 ///
 /// # Errors
-/// What is wrong with the parameters.
+/// The mistakes in the parameters.
 ///
 /// # Panics
 /// If the text is not TOML.

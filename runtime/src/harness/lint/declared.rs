@@ -1,9 +1,9 @@
-//! What a catalogue declares: names and docs.
+//! Checks the names and the docs in a catalogue.
 
 use super::{Lint, Notes, Violation};
 use crate::node::{ParamSpec, PortSpec};
 
-/// What is said of something in a catalogue.
+/// The docs of an entry of a catalogue.
 struct Declaration<'c> {
     name: String,
     summary: String,
@@ -39,7 +39,7 @@ impl Lint<'_> {
         nodes.chain(devices).chain(roles).collect()
     }
 
-    /// Names are valid, and each is used once. Two nodes, devices or roles of one name are no catalogue.
+    /// Checks that names are valid and that each is used once. The catalogue itself refuses two entries of one name.
     pub(super) fn names(&self, found: &mut Vec<Violation>) {
         for entry in self.entries() {
             let mut notes = Notes { owner: entry.name.clone(), found };
@@ -54,7 +54,7 @@ impl Lint<'_> {
         }
     }
 
-    /// Everything is documented.
+    /// Checks that everything is documented.
     pub(super) fn docs(&self, found: &mut Vec<Violation>) {
         for entry in self.entries() {
             let mut notes = Notes { owner: entry.name, found };
@@ -88,7 +88,7 @@ fn params(specs: &[ParamSpec], path: &str, visit: &mut impl FnMut(&[ParamSpec], 
     }
 }
 
-/// Notes names that are used twice or are not valid.
+/// Reports names that are used twice or are not valid.
 fn unique(names: impl Iterator<Item = String>, sort: &str, notes: &mut Notes<'_>) {
     let names: Vec<String> = names.collect();
     for (i, name) in names.iter().enumerate() {

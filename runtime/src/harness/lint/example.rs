@@ -1,4 +1,4 @@
-//! The examples of a catalogue: they load, their defaults are accepted, and they run.
+//! Checks the examples of a catalogue: they load, their defaults are accepted, and they run.
 
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -9,7 +9,7 @@ use crate::example::example_graph;
 use crate::graph::{Compiled, OutlinedBlock, PlannedNode, Request, Setting, ValueOrigin, compile};
 use crate::node::ParamSpec;
 
-/// An example runs for so many ticks, unless its devices end before.
+/// Number of ticks of an example, unless its devices end earlier.
 const MAX_TICKS: u64 = 2000;
 
 impl Lint<'_> {

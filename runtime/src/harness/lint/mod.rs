@@ -29,11 +29,11 @@ pub type CountAllocations = fn(&mut dyn FnMut()) -> u64;
 ///   parameter stands.
 /// - While the example runs, each output has a value at least once, and a scalar stays within the range that the node
 ///   declares for it.
-/// - A node that was reset gives what a fresh node gives for the same inputs.
+/// - After a reset, a node gives the same outputs as a new node with the same inputs.
 /// - A step allocates nothing. A library has no allocator of its own, so this is checked only if the test passes a
 ///   counter: [`Lint::counting`].
 ///
-/// An example with a live device is loaded and not run.
+/// An example with a live device is loaded, but not run.
 #[must_use]
 pub fn lint(catalogue: &Catalogue) -> Lint<'_> {
     Lint { catalogue, count: None, only: Vec::new(), without_example: Vec::new(), quiet: Vec::new() }
@@ -48,7 +48,7 @@ pub struct Lint<'c> {
     quiet: Vec<String>,
 }
 
-/// What is wrong with something in a catalogue.
+/// A violation of a rule.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Violation {
     /// The node, the device or the role.
@@ -82,7 +82,7 @@ impl Lint<'_> {
         Self { only: names.iter().map(|name| (*name).to_owned()).collect(), ..self }
     }
 
-    /// Does not load the examples of these: of a device that connects when it is opened, for example.
+    /// Does not load the examples of these entries, for example of a device that connects when it is opened.
     #[must_use]
     pub fn without_example_of(self, names: &[&str]) -> Self {
         Self { without_example: names.iter().map(|name| (*name).to_owned()).collect(), ..self }
@@ -124,7 +124,7 @@ impl Lint<'_> {
     /// Checks everything.
     ///
     /// # Panics
-    /// If anything is wrong, with a line for each violation.
+    /// If there is a violation; the message has a line for each.
     pub fn assert_clean(&self) {
         let lines: Vec<String> = self.violations().iter().map(ToString::to_string).collect();
         assert!(lines.is_empty(), "{} violations:\n{}", lines.len(), lines.join("\n"));
@@ -135,19 +135,19 @@ impl Lint<'_> {
     }
 }
 
-/// Notes violations of one owner.
+/// Collects violations of one owner.
 struct Notes<'f> {
     owner: String,
     found: &'f mut Vec<Violation>,
 }
 
 impl Notes<'_> {
-    /// Notes a violation.
+    /// Adds a violation.
     fn add(&mut self, place: Option<String>, message: impl Into<String>) {
         self.found.push(Violation { owner: self.owner.clone(), place, message: message.into() });
     }
 
-    /// Notes a violation unless `is_right`.
+    /// Adds a violation unless `is_right`.
     fn unless(&mut self, is_right: bool, place: Option<String>, message: impl Into<String>) {
         if !is_right {
             self.add(place, message);

@@ -1,4 +1,4 @@
-//! A node that is watched while it steps, beside a fresh one of the same kind.
+//! Observes a node while it steps, and compares it with a new node of the same type.
 
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -7,12 +7,12 @@ use crate::graph::PlannedNode;
 use crate::node::{AnyNode, Bus, Components, PortId, Tick, Wires};
 use crate::signal::{Arenas, Scalar, Shape};
 
-/// The node is reset before this step, and compared with a fresh one from there on.
+/// The step before which the node is reset. From there on it is compared with a new node.
 const RESET_AT: u64 = 100;
-/// So many steps are compared.
+/// Number of steps that are compared.
 const COMPARED: u64 = 50;
 
-/// What was found while a node ran.
+/// The observations of a run.
 #[derive(Debug, Default)]
 pub(super) struct StepRecord {
     pub(super) steps: u64,
@@ -26,10 +26,10 @@ pub(super) struct StepRecord {
     pub(super) differs: Option<usize>,
 }
 
-/// A node in the place of itself.
+/// A node that wraps another and observes it.
 pub(super) struct Watched {
     node: Box<dyn AnyNode>,
-    /// A node that has not stepped before the other is reset.
+    /// A new node, which first steps after the reset of the other.
     twin: Box<dyn AnyNode>,
     shapes: Vec<Shape>,
     /// The outputs as they were before a step.
@@ -40,7 +40,7 @@ pub(super) struct Watched {
 }
 
 impl Watched {
-    /// Returns a planned node that is watched.
+    /// Wraps a planned node.
     pub(super) fn watch(
         planned: PlannedNode,
         twin: PlannedNode,
