@@ -142,7 +142,10 @@ impl Opener<'_> {
     fn role(&mut self, bench: &BenchDocument, key: &Key, kind: &Spanned<String>) -> Option<BoundRole> {
         let Some((_, word)) = bench.bind.iter().find(|(role, _)| role.name == key.name) else {
             let message = format!("the bench does not bind the role `{}`", key.name);
-            let help = format!("add `{} = \"device\"` under [bind] in the bench", key.name);
+            let devices = quoted(bench.devices.iter().map(|device| device.key.name.as_str()));
+            let example = bench.devices.first().map_or("device", |device| &device.key.name);
+            let help =
+                format!("add `{} = \"{example}\"` under [bind] in the bench; its devices are {devices}", key.name);
             self.diagnostics.push(Diagnostic::new(Code::UnboundRole, key.span.clone(), message).help(help));
             return None;
         };

@@ -78,12 +78,12 @@ impl Frames<'_> {
 
     /// Suggests a node that converts from one frame to the other.
     fn suggest_conversion(&mut self, kind: Kind, wanted: [Option<String>; 2], origin: &WireOrigin) -> Option<String> {
-        let (spec, input, pose) = self.net.catalogue.specs().find_map(|spec| {
+        let (spec, input, output, pose) = self.net.catalogue.specs().find_map(|spec| {
             let input = spec.inputs.iter().find(|input| input.kind == kind)?;
             let output = spec.outputs.iter().find(|output| output.kind == kind)?;
             let pose = spec.inputs.iter().find(|input| input.kind == Kind::Pose)?;
             let is_converter = *pose.args == [input.args[0].clone(), output.args[0].clone()];
-            is_converter.then_some((spec, input, pose))
+            is_converter.then_some((spec, input, output, pose))
         })?;
         let (name, converter) = (&spec.name, with_article(&spec.name));
         let pose_port = self.find_pose(&wanted).and_then(|source| self.net.name_in(origin.scope, source));
@@ -95,8 +95,9 @@ impl Frames<'_> {
         };
         let (twist, from) = (&input.name, &origin.word.value);
         Some(format!(
-            "insert {converter} between them:\n[nodes.{name}]\ntype = \"{name}\"\nin.{twist} = \"{from}\"\nin.{} = \"{source}\"",
-            pose.name,
+            "insert {converter} between them, and replace `{from}` by `{name}.{}` here:\n[nodes.{name}]\ntype = \
+             \"{name}\"\nin.{twist} = \"{from}\"\nin.{} = \"{source}\"",
+            output.name, pose.name,
         ))
     }
 

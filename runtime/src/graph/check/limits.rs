@@ -168,7 +168,10 @@ impl<'a> CommandPath<'a> {
         let Some((taker, _, word)) = at.map(|at| &links[at]) else {
             return (format!("insert a `{name}` on the path of the motion"), None);
         };
-        let between = format!("insert {} between `{}` and `{taker}`:", with_article(name), word.value);
+        let output = limiter.outputs.first().map_or("", |output| &output.name);
+        let (limiter_name, from) = (with_article(name), &word.value);
+        let between =
+            format!("insert {limiter_name} between `{from}` and `{taker}`, which then takes `{name}.{output}`:");
         (format!("{between}\n{}", block(limiter, &word.value)), Some(word.span.clone()))
     }
 
