@@ -203,7 +203,7 @@ fn set_reaches_graph_part_and_bench_and_needs_no_quotes() {
 fn a_mistake_in_set_points_into_set() {
     let cases = [
         ("nodes.pid.gains.x.kp", "syntax", "1:1", "this is not `key=value`"),
-        ("nodes.pid.gains.x.kp=abc", "bad-value", "1:22", "expected a number, found the string \"abc\""),
+        ("nodes.pid.gains.x.kp=abc", "bad-value", "1:22", "expected a number [1/s], found the string \"abc\""),
         ("nodes.pid.gainss.x.kp=3", "unknown-key", "1:11", "`gainss` is not a parameter here"),
         ("nodes.pidd.gains.x.kp=3", "missing-key", "1:7", "`pidd` has no `type`"),
         ("node.pid.gains.x.kp=3", "unknown-key", "1:1", "unknown key `node`"),

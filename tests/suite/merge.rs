@@ -100,7 +100,7 @@ fn mistakes(request: &Request) -> Vec<(&'static str, String, String)> {
 
 #[test]
 fn a_mistake_shows_where_the_value_stands_that_is_in_force() {
-    let wrong = "expected a number, found the string \"x\"";
+    let wrong = "expected a number [m], found the string \"x\"";
     let cases: [(&str, &[&str], &str, &str, &str); 8] = [
         ("set.last.by = \"x\"", &[], "bad-value", "graph.toml:14:15", wrong),
         ("set.inner.one.by = \"x\"", &[], "bad-value", "graph.toml:14:20", wrong),

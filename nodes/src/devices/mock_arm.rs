@@ -269,10 +269,13 @@ mod tests {
                 "start = [0, 0, 0, 0, 0, 0, 0]\nhold = [{ from_s = 2, to_s = 1 }]",
                 "a hold must end after it starts, not go from 2 s to 1 s",
             ),
-            ("start = [0, 0, 0, 0, 0, 0, 0]\nrate_hz = 1e7", "expected a number from 0.001 to 1000000, found 10000000"),
+            (
+                "start = [0, 0, 0, 0, 0, 0, 0]\nrate_hz = 1e7",
+                "expected a number from 0.001 to 1000000 [1/s], found 10000000",
+            ),
             (
                 "start = [0, 0, 0, 0, 0, 0, 0]\nrate_hz = 1e-9",
-                "expected a number from 0.001 to 1000000, found 0.000000001",
+                "expected a number from 0.001 to 1000000 [1/s], found 0.000000001",
             ),
         ];
         for (params, message) in cases {

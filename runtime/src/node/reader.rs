@@ -56,6 +56,8 @@ pub struct Reader<'a> {
     sources: &'a SourceMap,
     /// Range of the numbers in the current field.
     pub(super) bounds: Option<Bounds>,
+    /// Unit of the numbers in the current field, as declared.
+    unit: Option<&'static str>,
     /// The mistakes so far.
     pub mistakes: Mistakes,
 }
@@ -72,7 +74,7 @@ impl<'a> Reader<'a> {
     /// Creates a reader of values from `sources`.
     #[must_use]
     pub const fn new(sources: &'a SourceMap) -> Self {
-        Self { sources, bounds: None, mistakes: Vec::new() }
+        Self { sources, bounds: None, unit: None, mistakes: Vec::new() }
     }
 
     /// Adds the mistake that the value at `span` is wrong, and returns `None`.
@@ -99,11 +101,12 @@ impl<'a> Reader<'a> {
         declared: &Declared,
         default: Option<fn() -> T>,
     ) -> Option<T> {
-        let Declared { name, bounds, .. } = *declared;
+        let Declared { name, bounds, unit, .. } = *declared;
         if let Some((_, value)) = table.rest.remove(name) {
-            let outer = std::mem::replace(&mut self.bounds, bounds);
+            let outer = (self.bounds, self.unit);
+            (self.bounds, self.unit) = (bounds, unit.filter(|unit| is_known(unit)));
             let read = T::read(&value, self);
-            self.bounds = outer;
+            (self.bounds, self.unit) = outer;
             return read;
         }
         let default = default.map(|default| default()).or_else(T::when_missing);
@@ -130,10 +133,11 @@ impl<'a> Reader<'a> {
         expects: &str,
         number: impl Fn(T) -> f64,
     ) -> Option<T> {
-        let Some(bounds) = self.bounds else { return read_leaf(value, self, expects) };
-        let expects = bounds.describe(expects);
+        let unit = self.unit.map_or_else(String::new, |unit| format!(" [{unit}]"));
+        let expects = self.bounds.map_or_else(|| expects.to_owned(), |bounds| bounds.describe(expects)) + &unit;
         let read: T = read_leaf(value, self, &expects)?;
-        if bounds.contains(number(read)) { Some(read) } else { self.wrong_type(value, &expects) }
+        let is_in_range = self.bounds.is_none_or(|bounds| bounds.contains(number(read)));
+        if is_in_range { Some(read) } else { self.wrong_type(value, &expects) }
     }
 
     /// Adds a mistake for every key that is left and for every missing field, except one that is misspelt.
@@ -171,6 +175,14 @@ impl<'a> Reader<'a> {
             }
         }
     }
+}
+
+/// Whether a declared unit is worth a place in a message: not the number 1, and no letter or parameter that stands for
+/// another unit.
+fn is_known(unit: &str) -> bool {
+    let stands_for_another =
+        |atom: &str| atom.starts_with('$') || (atom.len() == 1 && "ABCDEFGHIKLMOPQRSTUVWXYZ_".contains(atom));
+    unit != "1" && !unit.split(['/', ' ', ',']).any(stands_for_another)
 }
 
 /// Reads a value whose type implements serde's `Deserialize`.

@@ -163,6 +163,6 @@ mod tests {
         let axis = rig(0.02, Unit::AXIAL).err().unwrap();
         assert_eq!(axis[0].message, "the direction of a line has no plain mean");
         let zero = rig(0.0, Unit::NEWTON).err().unwrap();
-        assert_eq!(zero[0].message, "expected a number greater than 0, found 0");
+        assert_eq!(zero[0].message, "expected a number greater than 0 [s], found 0");
     }
 }

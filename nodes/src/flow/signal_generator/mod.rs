@@ -314,7 +314,7 @@ mod tests {
                 "form = 'sine'\nfrequency = 501.0",
                 &["`frequency` is above half of the graph's rate: the maximum is 500 Hz"],
             ),
-            ("form = 'step'\nstart = -1.0", &["expected a number, 0 or more, found -1"]),
+            ("form = 'step'\nstart = -1.0", &["expected a number, 0 or more [s], found -1"]),
         ];
         for (params, expected) in cases {
             let mistakes = rig(params).err().unwrap();

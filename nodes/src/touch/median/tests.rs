@@ -79,7 +79,7 @@ fn a_held_value_counts_once_and_the_window_survives_flicker() {
 #[test]
 fn empty_and_too_long_windows_are_refused() {
     let long = built("window = 256", Unit::NEWTON).err().unwrap();
-    assert_eq!(long[0].message, "expected a whole number from 1 to 255, found 256");
+    assert_eq!(long[0].message, "expected a whole number from 1 to 255 [sample], found 256");
     assert_eq!(places("window = 0", &built("window = 0", Unit::NEWTON)), ["bad-value: `0`"]);
     assert!(built("window = 255", Unit::NEWTON).is_ok());
 }
