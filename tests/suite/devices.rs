@@ -6,7 +6,7 @@ use tactflow_runtime::catalogue::Catalogue;
 use tactflow_runtime::device::{
     Commands, Description, DeviceError, DeviceType, Driver, Opened, Output, RoleType, Samples, Stepped,
 };
-use tactflow_runtime::engine::{self, End, Engine, RunOptions};
+use tactflow_runtime::engine::Engine;
 use tactflow_runtime::fault::Cause;
 use tactflow_runtime::graph::{Request, compile};
 use tactflow_runtime::harness::{FedRole, GraphRig};
@@ -372,12 +372,10 @@ fn a_graph_of_a_file_runs_with_one_role_fed_and_the_others_on_its_bench() {
     assert!(rig.get::<Joints>("arm.position").is_some(), "the arm of the bench");
 }
 
-/// A device that counts, until its time stops.
+/// A device that counts.
 struct Counting {
     value: Output<Scalar>,
     next: i64,
-    /// Time after which `next` stays the same [ns].
-    stuck_after: i64,
 }
 
 impl Stepped for Counting {
@@ -387,9 +385,6 @@ impl Stepped for Counting {
 
     fn exchange(&mut self, now: i64, _: &Commands, samples: &mut Samples) -> Result<(), DeviceError> {
         *samples.write(self.value, now, now as u64) = 1.0;
-        if now > self.stuck_after {
-            return Ok(());
-        }
         samples.count("frames");
         if now == 0 {
             samples.count("bad frames");
@@ -399,9 +394,7 @@ impl Stepped for Counting {
     }
 }
 
-struct CountingType {
-    stuck_after: i64,
-}
+struct CountingType;
 
 impl DeviceType for CountingType {
     fn name(&self) -> Cow<'static, str> {
@@ -419,29 +412,14 @@ impl DeviceType for CountingType {
     fn open(&self, _: &Value, _: &mut Reader<'_>) -> Option<Opened> {
         let mut description = Description::every(0.01);
         let value = description.fills("length").output("value", metres());
-        Some(Opened {
-            description,
-            driver: Driver::Stepped(Box::new(Counting { value, next: 0, stuck_after: self.stuck_after })),
-        })
+        Some(Opened { description, driver: Driver::Stepped(Box::new(Counting { value, next: 0 })) })
     }
-}
-
-#[test]
-fn a_device_whose_time_does_not_advance_has_failed() {
-    let graph = "graph.clock = 'a'\nroles.a = 'length'\nbind.a = 'counting'\n[devices.counting]\ntype = 'counting'\n\
-                 [nodes.count]\ntype = 'count'\nin.value = 'a.value'\n";
-    let catalogue = catalogue().device_type(Box::new(CountingType { stuck_after: 50_000_000 }));
-    let mut engine = Engine::new(compile(&catalogue, &Request::text(graph)).unwrap());
-    let outcome = engine::run(&mut engine, &RunOptions::default(), &mut |_| {}).unwrap();
-    let End::Fault(fault) = outcome.end else { panic!("{:?}", outcome.end) };
-    let why = "`next` returns a time that is not after the last exchange";
-    assert_eq!((fault.node.as_str(), fault.cause), ("counting", Cause::Device(why.into())));
 }
 
 #[test]
 fn what_a_device_counts_is_in_the_summary_of_the_run() {
     let graph = "graph.clock = 'a'\nroles.a = 'length'\nbind.a = 'ruler'\n[devices.ruler]\ntype = 'counting'\n";
-    let catalogue = || catalogue().device_type(Box::new(CountingType { stuck_after: i64::MAX }));
+    let catalogue = || catalogue().device_type(Box::new(CountingType));
     let plan = compile(&catalogue(), &Request::text(graph)).unwrap_or_else(|report| panic!("{}", report.render(false)));
     let mut engine = Engine::new(plan);
     for _ in 0..3 {

@@ -91,8 +91,7 @@ impl std::error::Error for DeviceError {}
 
 /// A synchronous device: deterministic, without a thread.
 pub trait Stepped: Send {
-    /// Returns the time of the next sample from the start of the device [ns], or `None` if there are no more. After an
-    /// exchange at a time it must be later than that time; otherwise the device fails.
+    /// Returns the time of the next sample from the start of the device [ns], or `None` if there are no more.
     fn next(&self) -> Option<i64>;
 
     /// Returns the time of the last sample, if the device knows it [ns]. A progress bar uses it, and it shows that a

@@ -11,9 +11,6 @@ use crate::fault::{Cause, Fault};
 use crate::graph::Policy;
 use crate::source::suggestion;
 
-/// Failure of a stepped device whose next sample is due again at once.
-const NO_PROGRESS: &str = "`next` returns a time that is not after the last exchange";
-
 impl Engine {
     /// Runs the tick at `now` [ns]: exchange with the devices, then latch, step and commit.
     ///
@@ -223,11 +220,7 @@ impl Engine {
             let device = &mut self.devices[i];
             match &mut device.link {
                 DeviceLink::Stepped(driver) => {
-                    let exchange = || {
-                        driver.exchange(now, &device.commands, &mut device.samples)?;
-                        let is_late = driver.next().is_some_and(|next| next <= now);
-                        if is_late { Err(DeviceError::from(NO_PROGRESS)) } else { Ok(()) }
-                    };
+                    let exchange = || driver.exchange(now, &device.commands, &mut device.samples);
                     let result = catch_unwind(AssertUnwindSafe(exchange));
                     let result = result
                         .unwrap_or_else(|panic| Err(DeviceError(format!("it panicked: {}", panic_message(&*panic)))));
