@@ -31,6 +31,7 @@ mod operator;
 mod oracles;
 mod points;
 mod policies;
+mod quantities;
 mod recordings;
 mod reference;
 mod reports;

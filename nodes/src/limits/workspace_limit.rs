@@ -67,7 +67,7 @@ pub struct Inputs<'a> {
     #[port(frame = "A")]
     twist: In<'a, Twist>,
     /// Pose of the sensor in the base.
-    #[port(frame = "A", reference = "B", sampled)]
+    #[port(frame = "A", reference = "B", quantity = "sensor_pose", known, sampled)]
     pose: In<'a, Pose>,
 }
 

@@ -8,7 +8,7 @@ use syn::{
 };
 
 use crate::attributes::{Words, snake_case};
-use crate::checks::{bound_letter, inputs_beside, is_unit_letter};
+use crate::checks::{LetterKind, bound_letter, inputs_beside, is_unit_letter};
 use crate::docs::text;
 use crate::fault::{Faults, asserted};
 
@@ -167,7 +167,7 @@ fn checks(parameter: &Parameter, input: &DeriveInput, inputs: &Ident) -> TokenSt
         );
         let is_unit = quote!(::tactflow_runtime::signal::Unit::is_param_unit(#unit));
         let letters = text.split(['/', ' ', ',']).filter(|atom| is_unit_letter(atom)).filter_map(|atom| atom.chars().next());
-        let letters = letters.map(|letter| bound_letter(true, letter, unit, inputs));
+        let letters = letters.map(|letter| bound_letter(LetterKind::Unit, letter, unit, inputs));
         letters.chain([asserted(unit, &is_unit, &message)]).collect::<TokenStream>()
     });
     quote! { #bounds #unit }

@@ -31,6 +31,10 @@
 //! `Regions`), `frame` (`Mask`, `Twist`), `frame` and `reference` (`Pose`), `unit` and `robot` (`Joints`), `frame` and
 //! `robot` (`Jacobian`), nothing (`Flag`). A capital letter is a variable: its value is known when the graph is loaded,
 //! and is the same for all ports of the node. `"$name"` is the frame or unit that the parameter `name` holds.
+//!
+//! Any port may declare its `quantity`, which tells apart what kind, unit and frame do not: `position` is not
+//! `equilibrium`. A capital letter passes a quantity through. A port without one outputs an unknown quantity and accepts
+//! any. An input with `known` refuses an unknown quantity too.
 
 mod bounds;
 mod bus;
@@ -62,7 +66,7 @@ pub use outputs::{Out, OutputSet};
 pub use param_spec::{Contents, Declared, ParamSpec, Repeats, Written, written_table};
 pub use params::{Map, Spanned};
 pub(crate) use pattern::{UnitPattern, declares_a_unit, frame_args, may_fit, unit_pattern};
-pub use ports::{Letters, Need, PortSpec};
+pub use ports::{LetterKind, Letters, Need, PortSpec};
 pub use reader::{Param, Reader, read_leaf};
 pub use tactflow_derive::{Describe, Inputs, Outputs, Param, State};
 pub use tick::Tick;

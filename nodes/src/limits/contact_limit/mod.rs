@@ -76,7 +76,7 @@ pub struct Inputs<'a> {
     #[port(frame = "A")]
     twist: In<'a, Twist>,
     /// The whole calibrated image.
-    #[port(unit = "U", frame = "A", sampled)]
+    #[port(unit = "U", frame = "A", quantity = "tactile_image", known, sampled)]
     image: In<'a, Image>,
 }
 

@@ -92,14 +92,14 @@ pub struct Params {
 #[derive(Inputs)]
 pub struct Inputs<'a> {
     /// The image as measured.
-    #[port(unit = "U", frame = "A")]
+    #[port(unit = "U", frame = "A", quantity = "Q")]
     image: In<'a, Image>,
     /// Tares each time that it becomes set; keep it set for at least a frame of the pad.
     #[port(optional, sampled)]
     tare: Option<In<'a, Flag>>,
     /// Whether something touches the pad: `present` of a `label` after this node. A frame with a contact cancels a
     /// tare.
-    #[port(optional, delayed)]
+    #[port(quantity = "contact", optional, delayed)]
     present: Option<In<'a, Flag>>,
 }
 
@@ -107,7 +107,7 @@ pub struct Inputs<'a> {
 #[derive(Outputs)]
 pub struct Outputs {
     /// The calibrated image, in `unit`.
-    #[port(unit = "_", frame = "A")]
+    #[port(unit = "_", frame = "A", quantity = "Q")]
     image: Out<Image>,
 }
 

@@ -3,11 +3,12 @@
 //! Node types declare frames as variables, so one type works in any frame and a wrong frame is a load error.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::ops::Range;
 
-use crate::graph::load::FlatNode;
+use super::frame_names::{find_named, named_frame};
 use crate::graph::net::{Net, Wire, WireOrigin};
 use crate::graph::plan::{PortRef, Producer};
-use crate::node::{NodeSpec, PortSpec, frame_args};
+use crate::node::{PortSpec, frame_args};
 use crate::signal::Kind;
 use crate::source::{Code, Diagnostic, Diagnostics};
 
@@ -16,15 +17,23 @@ pub(crate) struct Frames<'a> {
     net: &'a Net<'a>,
     variables: BTreeMap<(Producer, String), usize>,
     parents: Vec<usize>,
-    known: Vec<Option<String>>,
+    known: Vec<Option<KnownFrame>>,
     /// Nodes with a wire in the wrong frame.
     clashes: BTreeSet<usize>,
+}
+
+/// A frame, and the place that determined it.
+#[derive(Debug, Clone)]
+struct KnownFrame {
+    name: String,
+    place: Range<usize>,
 }
 
 /// Unifies the frames of all wires, and reports wires in the wrong frame.
 ///
 /// The most constrained wires are unified first (poses before twists), so that the error is reported on the wrong wire.
 pub(crate) fn check<'a>(net: &'a Net<'a>, diagnostics: &mut Diagnostics) -> Frames<'a> {
+    diagnostics.extend(find_named(net));
     let (variables, clashes) = (BTreeMap::new(), BTreeSet::new());
     let mut frames = Frames { net, variables, parents: Vec::new(), known: Vec::new(), clashes };
     for &node in &net.order {
@@ -38,6 +47,9 @@ pub(crate) fn check<'a>(net: &'a Net<'a>, diagnostics: &mut Diagnostics) -> Fram
                 diagnostics.push(clash);
             }
         }
+        // A frame that belongs to another one, as the base to its arm, is known once the inputs are.
+        let outputs = net.outputs(Producer::Node(node)).unwrap_or_default();
+        outputs.iter().for_each(|output| drop(frames.known(Producer::Node(node), output)));
     }
     for wire in &net.commands {
         let end =
@@ -55,19 +67,31 @@ impl Frames<'_> {
 
     /// Returns the frames of an output, `None` for those that are unknown.
     pub(crate) fn of(&mut self, source: PortRef) -> Vec<Option<String>> {
-        self.known(source.producer, self.net.port(source))
+        self.names(source.producer, self.net.port(source))
+    }
+
+    fn names(&mut self, owner: Producer, port: &PortSpec) -> Vec<Option<String>> {
+        self.known(owner, port).into_iter().map(|known| Some(known?.name)).collect()
     }
 
     fn wire(&mut self, source: PortRef, origin: &WireOrigin, end: &WireTarget<'_>) -> Option<Diagnostic> {
         let port = self.net.port(source);
         let (has, takes) = (self.known(source.producer, port), self.known(end.owner, end.port));
-        let clash = has.iter().zip(&takes).any(|(a, b)| matches!((a, b), (Some(a), Some(b)) if a != b));
-        if clash {
+        let differ = |(a, b): &(&Option<KnownFrame>, &Option<KnownFrame>)| match (a, b) {
+            (Some(a), Some(b)) => a.name != b.name,
+            _ => false,
+        };
+        if let Some((Some(a), Some(b))) = has.iter().zip(&takes).find(differ) {
+            let notes = [a, b].map(|known| (known.place.clone(), format!("`{}` comes from here", known.name)));
+            let [has, takes] =
+                [(source.producer, port), (end.owner, end.port)].map(|(owner, port)| self.names(owner, port));
             let (from, kind) = (self.net.port_name(source), port.kind);
             let message =
                 format!("`{from}` is {}, but `{}` takes {}", describe(kind, &has), end.name, describe(kind, &takes));
             let help = self.suggest_conversion(kind, [has.first()?.clone(), takes.first()?.clone()], origin);
-            return Some(origin.diagnostic(Code::FrameMismatch, message).with_help(help));
+            let mut diagnostic = origin.diagnostic(Code::FrameMismatch, message).with_help(help);
+            diagnostic.notes.extend(notes);
+            return Some(diagnostic);
         }
         for (a, b) in frame_args(port).iter().zip(frame_args(end.port)) {
             let (a, b) = (self.variable(source.producer, a), self.variable(end.owner, b));
@@ -114,15 +138,13 @@ impl Frames<'_> {
         sources.into_iter().find(|source| self.of(*source) == wanted)
     }
 
-    fn known(&mut self, owner: Producer, port: &PortSpec) -> Vec<Option<String>> {
+    fn known(&mut self, owner: Producer, port: &PortSpec) -> Vec<Option<KnownFrame>> {
         let args = frame_args(port).to_vec();
-        args.iter()
-            .map(|arg| {
-                let variable = self.variable(owner, arg);
-                let root = self.root(variable);
-                self.known[root].clone()
-            })
-            .collect()
+        let known = args.iter().map(|arg| {
+            let variable = self.variable(owner, arg);
+            self.known[self.root(variable)].clone()
+        });
+        known.collect()
     }
 
     fn variable(&mut self, owner: Producer, arg: &str) -> usize {
@@ -130,22 +152,35 @@ impl Frames<'_> {
         if let Some(variable) = self.variables.get(&key) {
             return *variable;
         }
-        let net = self.net;
-        let is_letter = arg.len() == 1 && arg.starts_with(|c: char| c.is_ascii_uppercase());
-        let known = match (arg, arg.strip_prefix('$'), owner) {
-            ("self", _, _) => Some(net.name(owner).to_owned()),
-            (_, Some(param), Producer::Node(node)) => {
-                let spec = net.spec(node).expect("only known nodes have ports");
-                frame_param(&net.flat.nodes[node], spec, param)
-            }
-            _ if is_letter => None,
-            _ => Some(arg.to_owned()),
-        };
+        let known = self.first_known(owner, arg);
         let variable = self.parents.len();
         self.parents.push(variable);
         self.known.push(known);
         self.variables.insert(key, variable);
         variable
+    }
+
+    /// Returns the frame that a declaration determines by itself.
+    fn first_known(&mut self, owner: Producer, arg: &str) -> Option<KnownFrame> {
+        let net = self.net;
+        let is_letter = arg.len() == 1 && arg.starts_with(|c: char| c.is_ascii_uppercase());
+        let place = net.place(owner);
+        match (arg.split_once('.'), arg.strip_prefix('$'), owner) {
+            (Some((whole, part)), ..) => {
+                let whole = self.variable(owner, whole);
+                // An unknown frame has no parts that another one could be mistaken for.
+                let whole = self.known[self.root(whole)].clone();
+                let name = whole.map_or_else(|| net.name(owner).to_owned(), |whole| whole.name);
+                Some(KnownFrame { name: format!("{name}.{part}"), place })
+            }
+            (_, Some(param), Producer::Node(node)) => {
+                let (name, place) = named_frame(net, node, param)?;
+                Some(KnownFrame { name, place })
+            }
+            _ if arg == "self" => Some(KnownFrame { name: net.name(owner).to_owned(), place }),
+            _ if is_letter => None,
+            _ => Some(KnownFrame { name: arg.to_owned(), place }),
+        }
     }
 
     fn root(&self, mut variable: usize) -> usize {
@@ -169,17 +204,6 @@ struct WireTarget<'a> {
     owner: Producer,
     port: &'a PortSpec,
     name: String,
-}
-
-/// Returns the frame that a parameter names, or its default.
-fn frame_param(node: &FlatNode, spec: &NodeSpec, param: &str) -> Option<String> {
-    let given = node.block.params.as_table().and_then(|table| table.get(param)).map(|value| value.as_str());
-    given
-        .unwrap_or_else(|| {
-            let default = spec.params.iter().find(|spec| spec.name == param)?.default.as_deref()?;
-            default.split('"').nth(1)
-        })
-        .map(str::to_owned)
 }
 
 /// Ranks kinds by how much they constrain frames, the most constraining first.

@@ -6,8 +6,9 @@
 use std::collections::BTreeSet;
 use std::ops::Range;
 
+use super::foreign;
+use super::frames::{Frames, with_article};
 use crate::device::RoleType;
-use crate::graph::check::frames::{Frames, with_article};
 use crate::graph::net::{CommandWire, Net};
 use crate::graph::plan::{PortRef, Producer};
 use crate::node::{NodeSpec, Spanned};
@@ -52,6 +53,11 @@ pub(crate) fn check(net: &Net<'_>, frames: &mut Frames<'_>, diagnostics: &mut Di
             diagnostics.push(path.unlimited(&missing, &lost));
         }
         diagnostics.extend(path.mixed_frames(frames));
+        // A wire in the wrong frame has its own diagnostic.
+        let limiters = path.nodes.iter().filter(|stop| !stop.spec.limits.holds.is_empty());
+        for stop in limiters.filter(|stop| !frames.has_clash(stop.node)).collect::<Vec<_>>() {
+            diagnostics.extend(foreign::check(net, frames, wire.role, stop.node, stop.source));
+        }
     }
 }
 

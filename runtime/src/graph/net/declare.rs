@@ -1,6 +1,7 @@
 //! Looks up the types of roles and nodes in the catalogue.
 
 use super::Net;
+use super::provenance::Provenance;
 use crate::catalogue::Catalogue;
 use crate::device::RoleType;
 use crate::graph::load::FlatGraph;
@@ -22,7 +23,8 @@ impl<'a> Net<'a> {
         });
         let nodes = nodes.collect();
         let observed = observed_roles(flat, catalogue, diagnostics);
-        Self { flat, catalogue, roles, nodes, observed, wires: Vec::new(), commands: Vec::new(), order: Vec::new() }
+        let (wires, commands, order) = (Vec::new(), Vec::new(), Vec::new());
+        Self { flat, catalogue, roles, nodes, observed, wires, commands, order, provenance: Provenance::default() }
     }
 }
 

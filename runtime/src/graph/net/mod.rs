@@ -3,18 +3,21 @@
 mod connect;
 mod declare;
 mod order;
+mod provenance;
 mod resolve;
 mod wire;
 
 use std::collections::BTreeSet;
+use std::ops::Range;
 
 use crate::catalogue::Catalogue;
 use crate::device::RoleType;
 use crate::graph::load::FlatGraph;
 use crate::graph::plan::{PortRef, Producer};
 use crate::node::{NodeSpec, PortSpec, Spanned};
-use crate::source::{Diagnostic, Diagnostics, Key};
+use crate::source::{Diagnostic, Diagnostics, Key, Value};
 
+use provenance::Provenance;
 pub(crate) use wire::{CommandWire, Wire, WireOrigin};
 
 /// What a name refers to. The error is a diagnostic, or `None` if another one explains why the name refers to nothing.
@@ -41,6 +44,7 @@ pub(crate) struct Net<'a> {
     pub(crate) commands: Vec<CommandWire>,
     /// The nodes in the order in which they step.
     pub(crate) order: Vec<usize>,
+    provenance: Provenance,
 }
 
 impl<'a> Net<'a> {
@@ -50,7 +54,13 @@ impl<'a> Net<'a> {
         net.wires = net.connect(diagnostics);
         net.commands = net.connect_commands(diagnostics);
         net.order = net.find_order(diagnostics);
+        net.provenance = Provenance::new(&net);
         net
+    }
+
+    /// Returns the roles whose samples a producer descends from.
+    pub(crate) fn roles_of(&self, producer: Producer) -> impl Iterator<Item = usize> {
+        self.provenance.roles(producer)
     }
 
     /// Returns the declaration of a node, or `None` if its type is unknown.
@@ -79,6 +89,14 @@ impl<'a> Net<'a> {
         }
     }
 
+    /// Returns where a producer is declared.
+    pub(crate) fn place(&self, producer: Producer) -> Range<usize> {
+        match producer {
+            Producer::Role(i) => self.flat.roles[i].0.span.clone(),
+            Producer::Node(i) => self.flat.nodes[i].block.key.span.clone(),
+        }
+    }
+
     /// Returns the declaration of the command or report at the end of a wire.
     pub(crate) fn command_port(&self, wire: &CommandWire) -> &PortSpec {
         let role = self.roles[wire.role].expect("only known roles have commands");
@@ -98,6 +116,16 @@ impl<'a> Net<'a> {
     /// Formats a port as `node.port`.
     pub(crate) fn port_name(&self, source: PortRef) -> String {
         format!("{}.{}", self.name(source.producer), self.port(source).name)
+    }
+
+    /// Returns the tables of parameters that modes set of a node.
+    pub(crate) fn settings_of(&self, node: usize) -> impl Iterator<Item = &'a Value> {
+        let name = &self.flat.nodes[node].name;
+        self.flat.modes.iter().filter_map(move |mode| {
+            let mut path = name.split('.');
+            let first = mode.set.get(path.next()?)?;
+            path.try_fold(first, |value, name| value.as_table()?.get(name))
+        })
     }
 
     /// Returns all nodes upstream of the given ones, including themselves.

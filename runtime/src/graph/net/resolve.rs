@@ -105,7 +105,12 @@ impl Net<'_> {
 
     /// Returns the name by which the wires of a scope refer to a port, or `None` if they cannot.
     pub(crate) fn name_in(&self, scope: usize, source: PortRef) -> Option<String> {
-        self.ports_in(scope).find(|(_, port)| *port == source).map(|(name, _)| name)
+        self.find_port(scope, |port| port == source)
+    }
+
+    /// Returns the name of the first port for which `fits` holds and that the wires of a scope can read.
+    pub(crate) fn find_port(&self, scope: usize, fits: impl Fn(PortRef) -> bool) -> Option<String> {
+        self.ports_in(scope).find(|(_, port)| fits(*port)).map(|(name, _)| name)
     }
 
     /// Returns a port of the scope with the name and the kind of an input, as a suggestion for its wire.
