@@ -93,7 +93,7 @@ impl NodeType for Counter {
 impl Configured for Counter {
     fn build(self: Box<Self>, _: Given) -> Result<Built, Mistakes> {
         let outputs = vec![ScalarShape::of(Unit::METRE).within(0.0, 1000.0).into()];
-        Ok(Built { node: self, outputs, is_still: false })
+        Ok(Built { node: self, outputs, is_still: false, is_uncalibrated: false })
     }
 }
 

@@ -49,6 +49,7 @@ pub(crate) fn compile_in(mut loader: Loader, catalogue: &Catalogue, request: &Re
     let mut builder = Builder::new(&net, &opened, frames, (diagnostics, sources), period);
     let mut nodes: Vec<PlannedNode> = net.order.iter().filter_map(|node| builder.node(*node)).collect();
     builder.check_delayed_units();
+    check::calibration::check(&net, &nodes, &mut builder.diagnostics);
     view.check_units(&builder.ports, &mut builder.diagnostics);
     let modes = build_modes(&mut builder, &mut nodes);
     let modes = check_modes(&net, modes, &mut builder.diagnostics);

@@ -287,7 +287,7 @@ impl OutlineBuilder<'_> {
 
     /// A value as it was written, or the fact that it asks for.
     fn setting(&self, value: &Value, path: String) -> Setting {
-        let word = value.as_table().and_then(Table::fact).map(|(word, _)| word);
+        let word = value.as_table().and_then(Table::fact).map(|fact| fact.word);
         let role = word.and_then(|word| word.split_once('.'));
         let role = role.and_then(|(role, _)| self.net.flat.role_names().position(|name| name == role));
         let mut filled = value.clone();

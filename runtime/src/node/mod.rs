@@ -150,4 +150,7 @@ pub struct Setup<N: Node> {
     /// Set by a generator whose parameters cause no motion. A node whose output is computed from samples leaves it
     /// `false`.
     pub is_still: bool,
+    /// Set by a limiter whose limits are in raw readings, so that nothing is limited in newtons. The bench must allow
+    /// it.
+    pub is_uncalibrated: bool,
 }

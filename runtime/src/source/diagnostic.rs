@@ -88,6 +88,8 @@ codes! {
     ForeignInput "foreign-input",
     /// A command whose path lacks a limit that its role requires.
     UnlimitedCommand "unlimited-command",
+    /// A limit in raw readings on a bench that does not allow it.
+    Uncalibrated "uncalibrated",
     /// A value that a node reads from [limits] and that is missing there.
     MissingLimit "missing-limit",
     /// A mode that does not exist.

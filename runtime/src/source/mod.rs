@@ -11,4 +11,5 @@ pub use diagnostic::{Code, Diagnostic, Diagnostics, Report, Severity};
 pub use map::{BuiltinFile, Location, SourceFile, SourceMap};
 pub(crate) use suggest::quoted;
 pub use suggest::{suggest_name, suggestion};
+pub(crate) use value::FactRef;
 pub use value::{Item, Key, Table, Value, parse_table};

@@ -64,6 +64,8 @@ impl Engine {
         let roles = plan.roles.iter().map(|role| (role.name.clone(), place(role.device))).collect();
         let names = plan.nodes.iter().map(|node| (node.name.clone(), sources.locate(node.span.start))).collect();
         let limits = limits(&plan.nodes, &ports);
+        let uncalibrated =
+            plan.nodes.iter().filter(|node| node.is_uncalibrated).map(|node| node.name.clone()).collect();
         let mut watched = watched_commands(&plan.commands, &ports);
         let devices = plan.devices.into_iter().enumerate();
         let devices = devices.map(|(i, device)| device_slot(i, device, &plan.commands, &sources)).collect();
@@ -98,6 +100,7 @@ impl Engine {
             logged,
             display,
             limits,
+            uncalibrated,
             names,
             roles,
             reported,

@@ -20,6 +20,8 @@ pub struct Engine {
     pub(super) display: Display,
     /// Name and port of the scale that each limit reports.
     pub(super) limits: Vec<(String, PortId)>,
+    /// Names of the limiters whose limits are in raw readings.
+    pub(super) uncalibrated: Vec<String>,
     /// Name and source location of each runner's node.
     pub(super) names: Vec<(String, String)>,
     /// Name of each role, and the source location of its device.
@@ -208,6 +210,12 @@ impl Engine {
     /// 1.
     pub fn limits(&self) -> impl Iterator<Item = (&str, PortId)> {
         self.limits.iter().map(|(name, id)| (name.as_str(), *id))
+    }
+
+    /// Returns the names of the limiters whose limits are in raw readings.
+    #[must_use]
+    pub fn uncalibrated(&self) -> &[String] {
+        &self.uncalibrated
     }
 
     /// Returns the names of the nodes in the order in which they step.

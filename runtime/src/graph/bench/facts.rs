@@ -8,6 +8,7 @@ use crate::graph::syntax::LIMITS;
 use crate::source::{Code, Diagnostic, Diagnostics, Item, Table, Value};
 
 /// Replaces every `{ from = "role.fact" }` by the fact, and every `{ from = "limits.key" }` by the value in [limits].
+/// An optional one that is not there is left out.
 ///
 /// Returns whether all of them are known.
 pub(crate) fn fill_facts(
@@ -16,7 +17,10 @@ pub(crate) fn fill_facts(
     opened: &OpenedBench,
     diagnostics: &mut Diagnostics,
 ) -> bool {
-    let Some((word, place)) = value.as_table().and_then(Table::fact) else {
+    let Some(fact) = value.as_table().and_then(Table::fact) else {
+        if let Item::Table(table) = &mut value.item {
+            table.entries.retain(|(_, item)| !is_left_out(item, net, opened));
+        }
         let mut fill = |item| fill_facts(item, net, opened, diagnostics);
         return match &mut value.item {
             Item::Array(items) => items.iter_mut().fold(true, |good, item| fill(item) & good),
@@ -24,8 +28,16 @@ pub(crate) fn fill_facts(
             _ => true,
         };
     };
-    let fact = find_fact(word, place, &value.span, net, opened);
+    let fact = find_fact(fact.word, fact.place, &value.span, net, opened);
     report(fact, diagnostics).map(|fact| *value = fact).is_some()
+}
+
+/// Returns whether a value is an optional fact that is not there.
+fn is_left_out(value: &Value, net: &Net<'_>, opened: &OpenedBench) -> bool {
+    let Some(fact) = value.as_table().and_then(Table::fact).filter(|fact| fact.is_optional) else { return false };
+    let role = fact.word.split_once('.').map_or(fact.word, |(role, _)| role);
+    let is_known = role == LIMITS || net.flat.role_names().any(|name| name == role);
+    is_known && find_fact(fact.word, fact.place, &value.span, net, opened).is_err()
 }
 
 /// Returns the fact that the word at `place` names, as a value at `span`.

@@ -157,6 +157,7 @@ impl Builder<'_> {
             is_every_tick: spec.every_tick,
             is_logged: spec.logs,
             holds: spec.limits.holds,
+            is_uncalibrated: built.is_uncalibrated,
             span: node.block.key.span.clone(),
         })
     }

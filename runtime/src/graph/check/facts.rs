@@ -6,7 +6,7 @@ use std::ops::Range;
 use crate::graph::net::Net;
 use crate::graph::plan::Producer;
 use crate::graph::syntax::LIMITS;
-use crate::source::{Code, Diagnostic, Diagnostics, Value, quoted};
+use crate::source::{Code, Diagnostic, Diagnostics, FactRef, Value, quoted};
 
 /// A fact of a role that the node does not read.
 struct ForeignFact<'a> {
@@ -38,7 +38,7 @@ pub(crate) fn check(net: &Net<'_>, diagnostics: &mut Diagnostics) {
 fn find_foreign<'a>(net: &Net<'_>, table: &'a Value, upstream: &BTreeSet<&str>) -> Vec<ForeignFact<'a>> {
     let entries = table.as_table().into_iter().flat_map(|table| &table.entries);
     let facts = entries.flat_map(|(key, value)| value.facts().into_iter().map(move |fact| (key.name.as_str(), fact)));
-    let foreign = facts.filter_map(|(param, (word, place))| {
+    let foreign = facts.filter_map(|(param, FactRef { word, place, .. })| {
         let (role, fact) = word.split_once('.')?;
         let is_foreign = role != LIMITS && net.flat.role_names().any(|name| name == role) && !upstream.contains(role);
         is_foreign.then_some(ForeignFact { param, role, fact, place })

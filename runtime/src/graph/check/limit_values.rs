@@ -15,6 +15,7 @@ struct LimitRef<'a> {
     span: Range<usize>,
     /// The parameter that uses it.
     spec: Option<&'a ParamSpec>,
+    is_optional: bool,
 }
 
 /// Reports values that no node uses, values in another unit than their parameter, and missing values.
@@ -28,8 +29,11 @@ pub(crate) fn check(net: &Net<'_>, diagnostics: &mut Diagnostics) {
         let entries = node.block.params.as_table().into_iter().flat_map(|table| &table.entries);
         for (key, value) in entries {
             let spec = specs.iter().find(|spec| spec.name == key.name);
-            let limits = value.facts().into_iter().filter_map(|(fact, span)| match fact.split_once('.')? {
-                (LIMITS, key) => Some(LimitRef { key: key.to_owned(), span: span.clone(), spec }),
+            let limits = value.facts().into_iter().filter_map(|fact| match fact.word.split_once('.')? {
+                (LIMITS, key) => {
+                    let (key, span) = (key.to_owned(), fact.place.clone());
+                    Some(LimitRef { key, span, spec, is_optional: fact.is_optional })
+                }
                 _ => None,
             });
             refs.extend(limits);
@@ -55,8 +59,10 @@ pub(crate) fn check(net: &Net<'_>, diagnostics: &mut Diagnostics) {
 fn missing(flat: &FlatGraph, refs: &[LimitRef<'_>]) -> Option<Diagnostic> {
     let mut seen = BTreeSet::new();
     let is_given = |key: &str| flat.limits.as_ref().is_some_and(|(_, table)| table.get(key).is_some());
-    let missing: Vec<&LimitRef<'_>> =
-        refs.iter().filter(|limit| !is_given(&limit.key) && seen.insert(limit.key.as_str())).collect();
+    let missing: Vec<&LimitRef<'_>> = refs
+        .iter()
+        .filter(|limit| !limit.is_optional && !is_given(&limit.key) && seen.insert(limit.key.as_str()))
+        .collect();
     let first = missing.first()?;
     let lines = missing.iter().map(|limit| {
         let doc = limit.spec.map(ParamSpec::doc_with_unit).unwrap_or_default();

@@ -1,6 +1,7 @@
 //! The checks of a graph, one per file. Each has a function `check` that adds to the diagnostics.
 
 pub(crate) mod absent;
+pub(crate) mod calibration;
 pub(crate) mod clock;
 pub(crate) mod commands;
 pub(crate) mod delays;

@@ -69,11 +69,10 @@ fn expected(net: &Net<'_>, input: &PortSpec, wire: &Wire, has: Option<&Quantity>
     })
 }
 
-/// Whether the node of a port has another output that differs from it in nothing but its quantity, which is `name`.
+/// Whether the node of a port outputs the quantity `name` too, so that the two can be confused.
 fn is_sibling(net: &Net<'_>, port: PortRef, name: &str) -> bool {
-    let own = net.port(port);
     let mut outputs = net.outputs(port.producer).unwrap_or_default().iter();
-    outputs.any(|other| other.quantity.as_deref() == Some(name) && other.kind == own.kind && other.args == own.args)
+    outputs.any(|other| other.quantity.as_deref() == Some(name) && other.kind == net.port(port).kind)
 }
 
 /// Returns the variable that a quantity is, or `None` if it is a name.

@@ -15,7 +15,7 @@ use crate::device::RoleType;
 use crate::graph::load::FlatGraph;
 use crate::graph::plan::{PortRef, Producer};
 use crate::node::{NodeSpec, PortSpec, Spanned};
-use crate::source::{Diagnostic, Diagnostics, Key, Value};
+use crate::source::{Code, Diagnostic, Diagnostics, Key, Value};
 
 use provenance::Provenance;
 pub(crate) use wire::{CommandWire, Wire, WireOrigin};
@@ -94,6 +94,16 @@ impl<'a> Net<'a> {
         match producer {
             Producer::Role(i) => self.flat.roles[i].0.span.clone(),
             Producer::Node(i) => self.flat.nodes[i].block.key.span.clone(),
+        }
+    }
+
+    /// Creates a diagnostic about a node. For a node in a part it is at the part in the graph file.
+    pub(crate) fn diagnostic_at(&self, node: usize, code: Code, message: String) -> Diagnostic {
+        let own = self.place(Producer::Node(node));
+        let part = self.flat.nodes[node].name.split_once('.').and_then(|(part, _)| self.flat.scopes[0].names.get(part));
+        match part {
+            Some((key, _)) => Diagnostic::new(code, key.span.clone(), message).note(own, "the part has it here"),
+            None => Diagnostic::new(code, own, message),
         }
     }
 

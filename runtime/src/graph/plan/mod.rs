@@ -63,6 +63,8 @@ pub(crate) struct PlannedNode {
     pub(crate) is_logged: bool,
     /// The limits that it holds; each has an output of the same name.
     pub(crate) holds: &'static [&'static str],
+    /// Whether its limits are in raw readings.
+    pub(crate) is_uncalibrated: bool,
     /// Span of its name.
     pub(crate) span: Range<usize>,
 }

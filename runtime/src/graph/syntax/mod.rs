@@ -9,5 +9,6 @@ pub(crate) use modes::{ExitKind, ExitTable, ModeBlock, ModeExit, PortState};
 pub use policy::Policy;
 pub(crate) use policy::{AgeLimit, PolicyTable, default_max_age_ns, default_max_age_s};
 pub(crate) use sections::{
-    BenchDocument, Block, GraphDocument, GraphTable, LIMITS, PartBlock, Sections, WireEntry, into_diagnostic,
+    ALLOW_UNCALIBRATED, BenchDocument, Block, GraphDocument, GraphTable, LIMITS, PartBlock, Sections, WireEntry,
+    into_diagnostic,
 };

@@ -102,10 +102,15 @@ pub(crate) struct GraphDocument {
 pub(crate) struct BenchDocument {
     pub(crate) devices: Vec<Block>,
     pub(crate) bind: Vec<(Key, Spanned<String>)>,
+    /// Whether limits may be in raw readings.
+    pub(crate) allow_uncalibrated: bool,
 }
 
 /// Name of the section [limits] in `{ from = "limits.KEY" }`.
 pub(crate) const LIMITS: &str = "limits";
+
+/// Key of a bench that allows limits in raw readings.
+pub(crate) const ALLOW_UNCALIBRATED: &str = "allow_uncalibrated";
 
 /// Reserved names, which have another meaning in wires and facts.
 const RESERVED: [&str; 2] = ["inputs", LIMITS];
@@ -132,9 +137,25 @@ impl<'a> Sections<'a> {
 
     /// Reads the sections of a graph file.
     pub(crate) fn graph(&mut self, root: &Table) -> GraphDocument {
-        const KEYS: [&str; 10] =
-            ["graph", "roles", "parts", "nodes", "commands", "limits", "modes", "policy", "devices", "bind"];
+        const KEYS: [&str; 11] = [
+            "graph",
+            "roles",
+            "parts",
+            "nodes",
+            "commands",
+            "limits",
+            "modes",
+            "policy",
+            "devices",
+            "bind",
+            ALLOW_UNCALIBRATED,
+        ];
         check_keys(root, &KEYS, "", &mut self.reader);
+        if let (Some((key, _)), None) = (root.entry(ALLOW_UNCALIBRATED), root.get("devices")) {
+            let message = format!("`{ALLOW_UNCALIBRATED}` is a key of a bench: a task cannot allow it");
+            let diagnostic = Diagnostic::new(Code::UnknownKey, key.span.clone(), message);
+            self.diagnostics.push(diagnostic.help("move it to the bench file"));
+        }
         let graph =
             root.entry("graph").map(|(key, value)| (key.span.clone(), GraphTable::read(value, &mut self.reader)));
         let commands = self.table(root.get("commands")).entries.into_iter().flat_map(|(role, value)| {
@@ -160,7 +181,7 @@ impl<'a> Sections<'a> {
 
     /// Reads the sections of a bench file.
     pub(crate) fn bench(&mut self, root: &Table) -> BenchDocument {
-        check_keys(root, &["devices", "bind"], "", &mut self.reader);
+        check_keys(root, &["devices", "bind", ALLOW_UNCALIBRATED], "", &mut self.reader);
         self.own_bench(root)
     }
 
@@ -169,7 +190,9 @@ impl<'a> Sections<'a> {
         let devices = self.named_tables(root.get("devices"));
         let names = names_of(&devices);
         let devices = devices.into_iter().map(|(key, table)| self.block(key, table, &names)).collect();
-        BenchDocument { devices, bind: self.words(root.get("bind")) }
+        let allow_uncalibrated = root.get(ALLOW_UNCALIBRATED).and_then(|value| bool::read(value, &mut self.reader));
+        let bind = self.words(root.get("bind"));
+        BenchDocument { devices, bind, allow_uncalibrated: allow_uncalibrated.unwrap_or(false) }
     }
 
     fn body(&mut self, root: &Table) -> GraphDocument {
