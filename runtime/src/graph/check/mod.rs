@@ -5,6 +5,7 @@ pub(crate) mod calibration;
 pub(crate) mod clock;
 pub(crate) mod commands;
 pub(crate) mod delays;
+mod endings;
 pub(crate) mod exports;
 pub(crate) mod facts;
 mod foreign;

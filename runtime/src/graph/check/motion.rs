@@ -5,9 +5,10 @@
 
 use std::collections::BTreeSet;
 
+use super::endings::{Endings, needs_contact};
 use crate::graph::net::{Net, Wire};
-use crate::graph::plan::{Condition, PlannedExit, PlannedMode, Producer};
-use crate::graph::syntax::{ExitKind, ModeBlock};
+use crate::graph::plan::PlannedMode;
+use crate::graph::syntax::ModeBlock;
 use crate::signal::Kind;
 use crate::source::{Code, Diagnostic, Diagnostics, quoted};
 
@@ -22,9 +23,16 @@ pub(crate) fn check(net: &Net<'_>, modes: &[PlannedMode], still: &[Vec<bool>], d
         report_in_graph(net, &generators.concat(), diagnostics);
         return;
     }
-    let ended = find_ended(modes, &generators, net);
-    for (i, block) in net.flat.modes.iter().enumerate().filter(|(i, _)| !ended[*i]) {
-        diagnostics.push(report_in_mode(net, &generators[i], block));
+    let endings = Endings::new(net, modes, &generators);
+    let ended = endings.find_ended();
+    let mut reported = BTreeSet::new();
+    for (i, block) in net.flat.modes.iter().enumerate().filter(|(i, _)| !generators[*i].is_empty()) {
+        if !ended[i] {
+            diagnostics.push(report_in_mode(net, &generators[i], block));
+        } else if let Some(cycle) = endings.find_cycle(i).filter(|_| !reported.contains(&i)) {
+            diagnostics.push(report_cycle(net, &generators[i], &cycle));
+            reported.extend(cycle);
+        }
     }
 }
 
@@ -38,7 +46,10 @@ fn find_generators(net: &Net<'_>, driving: &BTreeSet<usize>, is_still: &[bool]) 
     for &node in &net.order {
         let Some(spec) = net.spec(node) else { continue };
         let wires = || net.wires[node].iter().filter(|wire| !spec.inputs[wire.input].need.is_delayed);
-        let is_sampled = |wire: &Wire| wire.source.producer.node().is_none_or(|source| sampled.contains(&source));
+        // A flag that nothing ties to a contact may be set forever, so it gates nothing.
+        let is_gate = |wire: &Wire| net.port(wire.source).kind != Kind::Flag || needs_contact(net, wire.source);
+        let is_sampled =
+            |wire: &Wire| is_gate(wire) && wire.source.producer.node().is_none_or(|source| sampled.contains(&source));
         if wires().any(is_sampled) {
             sampled.insert(node);
             continue;
@@ -56,42 +67,6 @@ fn find_generators(net: &Net<'_>, driving: &BTreeSet<usize>, is_still: &[bool]) 
         }
     }
     generators
-}
-
-/// Returns for each mode whether it ends its generated motion.
-///
-/// A mode ends its motion if it generates none, or with a bound on time or travel that ends the run or leads to a mode
-/// that ends its motion, or with `on_lost` on a sensor signal.
-fn find_ended(modes: &[PlannedMode], generators: &[Vec<usize>], net: &Net<'_>) -> Vec<bool> {
-    let mut ended: Vec<bool> = generators.iter().map(Vec::is_empty).collect();
-    // Fixed point: modes that only lead to each other in a cycle stay false.
-    loop {
-        let is_end = |exit: &PlannedExit| {
-            let is_bound = matches!(exit.condition, Condition::Elapsed(_) | Condition::Travel(..));
-            match (exit.kind, &exit.condition) {
-                (ExitKind::Fail | ExitKind::Done, _) => is_bound,
-                (ExitKind::Go, _) => is_bound && exit.to.is_some_and(|to| ended[to]),
-                (ExitKind::OnLost, Condition::Lost(watched, _)) => is_sensed(net, watched.source.producer),
-                (ExitKind::OnLost, _) => false,
-            }
-        };
-        let next: Vec<bool> = modes.iter().zip(&ended).map(|(mode, is)| *is || mode.exits.iter().any(is_end)).collect();
-        if next == ended {
-            return ended;
-        }
-        ended = next;
-    }
-}
-
-/// Returns whether a sensor is upstream of a producer: a device without commands, so not the arm.
-fn is_sensed(net: &Net<'_>, producer: Producer) -> bool {
-    let is_sensor = |producer: Producer| match producer {
-        Producer::Role(role) => net.roles[role].is_some_and(|role| role.commands.is_empty()),
-        Producer::Node(_) => false,
-    };
-    let upstream = net.upstream(producer.node());
-    is_sensor(producer)
-        || upstream.iter().any(|node| net.wires[*node].iter().any(|wire| is_sensor(wire.source.producer)))
 }
 
 /// Reports the generators of a graph without modes.
@@ -119,6 +94,22 @@ fn report_in_mode(net: &Net<'_>, generators: &[usize], block: &ModeBlock) -> Dia
         "a `go` with such a bound counts only if its target mode also ends the motion or does not move the arm";
     let diagnostic = Diagnostic::new(Code::UngatedMotion, block.key.span.clone(), message);
     diagnostic.help(format!("{bound}{gate}; {targets}"))
+}
+
+/// Reports modes that follow each other without a contact, so that the bound of none of them is reached.
+fn report_cycle(net: &Net<'_>, generators: &[usize], cycle: &[usize]) -> Diagnostic {
+    let blocks: Vec<&ModeBlock> = cycle.iter().map(|mode| &net.flat.modes[*mode]).collect();
+    let modes = quoted(blocks.iter().map(|block| &block.key.name));
+    let names = quoted(generators.iter().map(|node| &net.flat.nodes[*node].name));
+    let way = match blocks.len() {
+        1 => format!("mode {modes} can start again"),
+        _ => format!("the modes {modes} can follow each other"),
+    };
+    let message = format!("{way} without a contact, and each start resets the bounds on the motion of {names}");
+    let mut diagnostic = Diagnostic::new(Code::UngatedMotion, blocks[0].key.span.clone(), message);
+    let others = blocks[1..].iter().map(|block| (block.key.span.clone(), "and this mode".to_owned()));
+    diagnostic.notes.extend(others);
+    diagnostic.help("let `fail = { after_ms = … }` come before the way back, or take that way only on a contact, as with `when = \"touch.present\"`")
 }
 
 /// Returns an unwired flag input of a node, which can gate its motion.

@@ -105,14 +105,14 @@ pub(crate) struct ExitTable {
     #[param(unit = "_", range = 0.0..)]
     pub(crate) hysteresis: Option<f64>,
     /// How long the condition must hold, counted from new sample to new sample.
-    #[param(unit = "ms", range = 0.0..)]
+    #[param(unit = "ms", range = 0.0..=3.6e6)]
     pub(crate) for_ms: Option<f64>,
     /// Time in the mode; for `on_lost`, how long the signal must be lost. The default of `on_lost` is five periods of
     /// the graph.
-    #[param(unit = "ms", above = 0.0)]
+    #[param(unit = "ms", range = 0.001..=3.6e6)]
     pub(crate) after_ms: Option<f64>,
     /// Distance that the sensor travels in the mode.
-    #[param(unit = "mm", above = 0.0)]
+    #[param(unit = "mm", range = 0.001..=1e4)]
     pub(crate) after_travel_mm: Option<f64>,
     /// Signal that `on_lost` watches; for `after_travel_mm`, the pose to measure if the graph has several.
     pub(crate) of: Option<Spanned<String>>,
