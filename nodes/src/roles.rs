@@ -91,11 +91,12 @@ const OWN_NOISE: &str =
     "Standard deviation of the pressure due to the own noise of each tactel; absent without contact [N/tactel].";
 
 /// What every command of an arm must have crossed, in the order in which a motion does.
-const LIMITS: [&str; 10] = [
+const LIMITS: [&str; 11] = [
     "bumpless",
     "force",
     "peak",
     "workspace",
+    "blind",
     "speed",
     "acceleration",
     "lead",

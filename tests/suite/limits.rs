@@ -116,7 +116,7 @@ fn a_limiter_says_what_it_does_and_no_mode_can_set_it() {
     let catalogue = catalogue();
     let mut limiters = 0;
     for spec in catalogue.nodes().iter().map(|node| node.spec()) {
-        let Limits { through, holds, breaks } = spec.limits;
+        let Limits { through, holds, breaks, .. } = spec.limits;
         if let Some(through) = through {
             assert!(spec.inputs.iter().any(|input| input.name == through), "{}: {through}", spec.name);
         }

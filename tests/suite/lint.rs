@@ -54,7 +54,7 @@ fn port(name: &'static str, doc: &'static str) -> PortSpec {
 }
 
 fn param(name: &'static str, doc: &'static str, unit: Option<&'static str>) -> ParamSpec {
-    let declared = Declared { name, doc, unit, bounds: Some(Bounds::above(0.0)), is_live: false };
+    let declared = Declared { doc, unit, bounds: Some(Bounds::above(0.0)), ..Declared::new(name) };
     ParamSpec::of::<f64>(&declared, Some(|| 1.0))
 }
 

@@ -6,7 +6,7 @@
 //! | Derive | implements | reads |
 //! |---|---|---|
 //! | `#[derive(Describe)]` | [`Describe`](trait@Describe) | the name, the doc comment, `#[describe(name = "…", every_tick, logs)]` |
-//! | `#[derive(Param)]` | [`Param`](trait@Param) for a table or a word | `#[param(unit = "…", range = …, above = …, default = …, live)]` |
+//! | `#[derive(Param)]` | [`Param`](trait@Param) for a table or a word | `#[param(unit = "…", range = …, above = …, default = …, live, from_bench)]` |
 //! | `#[derive(Inputs)]` | [`InputSet`] | `#[port(unit = "…", frame = "…", …)]` |
 //! | `#[derive(Outputs)]` | [`OutputSet`] | the same |
 //! | `#[derive(State)]` | [`Default`]; [`Clone`], field by field, so that a reset does not allocate | |

@@ -119,8 +119,12 @@ impl Node for ContactLimit {
     type State = State;
 
     // The image and its age move on while a motion is held.
-    const LIMITS: Limits =
-        Limits { through: Some("twist"), holds: &["force", "peak"], breaks: &["workspace", "speed", "acceleration"] };
+    const LIMITS: Limits = Limits {
+        through: Some("twist"),
+        holds: &["force", "peak"],
+        breaks: &["workspace", "blind", "speed", "acceleration"],
+        ..Limits::NONE
+    };
 
     fn new(params: Params, setup: &mut Setup<Self>) -> Result<Self, Mistakes> {
         let ceilings = Ceilings::new(&params, setup.inputs.image.unit)?;

@@ -110,7 +110,7 @@ impl Node for JointLimit {
     const LIMITS: Limits = Limits {
         through: Some("velocity"),
         holds: &["lead", "joint_position", "joint_speed", "joint_acceleration"],
-        breaks: &[],
+        ..Limits::NONE
     };
 
     fn new(params: Params, setup: &mut Setup<Self>) -> Result<Self, Mistakes> {

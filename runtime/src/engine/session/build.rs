@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use super::budgets::WatchedBudget;
 use super::engine::{Display, Engine, Logged};
 use super::halt::HaltMachine;
 use super::schedule::TickSchedule;
@@ -15,7 +16,7 @@ use crate::graph::{
     Policy, PortRef, Producer,
 };
 use crate::node::{Bus, PortId, Tick};
-use crate::signal::{Mark, Stamp};
+use crate::signal::Mark;
 use crate::source::SourceMap;
 
 /// The ports of a graph on its bus.
@@ -64,6 +65,7 @@ impl Engine {
         let roles = plan.roles.iter().map(|role| (role.name.clone(), place(role.device))).collect();
         let names = plan.nodes.iter().map(|node| (node.name.clone(), sources.locate(node.span.start))).collect();
         let limits = limits(&plan.nodes, &ports);
+        let budgets = budgets(&plan.nodes, &ports);
         let uncalibrated =
             plan.nodes.iter().filter(|node| node.is_uncalibrated).map(|node| node.name.clone()).collect();
         let mut watched = watched_commands(&plan.commands, &ports);
@@ -85,7 +87,7 @@ impl Engine {
         });
         let display = display(view, &ports);
         let (max_gap, reset_after) = (plan.max_gap, plan.reset_after);
-        let tick = Tick { index: 0, now: 0, dt: 0.0, stamp: Stamp::TIMELESS, max_gap, reset_after, is_halted: false };
+        let tick = Tick { index: 0, now: 0, max_gap, reset_after, ..Tick::first() };
         let timing = Timing::new(runners.len());
         let mut core = Core::new(ports.bus, runners, inlets, (commands, slots), tick);
         modes.iter().for_each(|modes| core.switch(modes.configurations()));
@@ -101,6 +103,8 @@ impl Engine {
             display,
             limits,
             uncalibrated,
+            budgets,
+            rests: Vec::new(),
             names,
             roles,
             reported,
@@ -139,6 +143,16 @@ fn limits(nodes: &[PlannedNode], ports: &BusPorts) -> Vec<(String, PortId)> {
         |name: &str| nodes.iter().any(|node| node.holds.iter().any(|limit| name == format!("{}.{limit}", node.name)));
     let scales = ports.list.iter().filter(|(port, _)| is_scale(&port.name));
     scales.map(|(port, id)| (port.name.clone(), *id)).collect()
+}
+
+/// Returns the budgets of the limiters.
+fn budgets(nodes: &[PlannedNode], ports: &BusPorts) -> Vec<WatchedBudget> {
+    let budget = |(runner, node): (usize, &PlannedNode)| {
+        let (port, role) = node.budget.clone()?;
+        let flag = ports.id(PortRef { producer: Producer::Node(node.index), port });
+        Some(WatchedBudget { role, runner, flag, is_spent: false })
+    };
+    nodes.iter().enumerate().filter_map(budget).collect()
 }
 
 fn device_slot(i: usize, device: PlannedDevice, commands: &[PlannedCommand], sources: &SourceMap) -> DeviceSlot {

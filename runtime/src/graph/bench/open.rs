@@ -177,12 +177,19 @@ impl Opener<'_> {
             let port = |spec: &PortSpec| port(spec).map(|port| (port, stated[port].shape.clone()));
             declared.iter().filter_map(port).collect()
         };
+        let own = bench.facts.iter().filter(|(role, _)| role.name == key.name).flat_map(|(_, table)| &table.entries);
+        let own = own.filter_map(|(fact, value)| Some((fact.name.clone().into(), toml::Value::try_from(value).ok()?)));
+        // The bench knows better than the device.
+        let own: Vec<(Cow<'static, str>, toml::Value)> = own.collect();
+        let stated =
+            description.fills[fills].facts.iter().filter(|(name, _)| !own.iter().any(|(fact, _)| fact == name));
+        let facts = stated.cloned().chain(own.iter().cloned()).collect();
         Some(BoundRole {
             device,
             outputs: number(&description.outputs, &role.outputs),
             commands: number(&description.commands, &role.commands),
             reports: number(&description.reports, &role.reports),
-            facts: description.fills[fills].facts.clone(),
+            facts,
         })
     }
 

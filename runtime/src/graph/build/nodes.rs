@@ -157,9 +157,18 @@ impl Builder<'_> {
             is_every_tick: spec.every_tick,
             is_logged: spec.logs,
             holds: spec.limits.holds,
+            budget: spec.limits.spends.and_then(|spent| self.budget(index, spec, spent)),
             is_uncalibrated: built.is_uncalibrated,
             span: node.block.key.span.clone(),
         })
+    }
+
+    /// Returns the output of a limiter that is set while a budget is spent, and the role whose commands it limits.
+    fn budget(&self, node: usize, spec: &NodeSpec, spent: &str) -> Option<(usize, String)> {
+        let port = spec.outputs.iter().position(|output| output.name == spent)?;
+        let mut commands = self.net.commands.iter().filter(|wire| !wire.is_report);
+        let command = commands.find(|wire| self.net.upstream(wire.source.producer.node()).contains(&node))?;
+        Some((port, self.net.name(Producer::Role(command.role)).to_owned()))
     }
 
     /// Returns whether a node generates no motion with the parameters of the graph.

@@ -102,6 +102,8 @@ pub(crate) struct GraphDocument {
 pub(crate) struct BenchDocument {
     pub(crate) devices: Vec<Block>,
     pub(crate) bind: Vec<(Key, Spanned<String>)>,
+    /// Facts that the bench states beside those of its devices, by role.
+    pub(crate) facts: Vec<(Key, Table)>,
     /// Whether limits may be in raw readings.
     pub(crate) allow_uncalibrated: bool,
 }
@@ -137,7 +139,7 @@ impl<'a> Sections<'a> {
 
     /// Reads the sections of a graph file.
     pub(crate) fn graph(&mut self, root: &Table) -> GraphDocument {
-        const KEYS: [&str; 11] = [
+        const KEYS: [&str; 12] = [
             "graph",
             "roles",
             "parts",
@@ -148,11 +150,13 @@ impl<'a> Sections<'a> {
             "policy",
             "devices",
             "bind",
+            "facts",
             ALLOW_UNCALIBRATED,
         ];
         check_keys(root, &KEYS, "", &mut self.reader);
-        if let (Some((key, _)), None) = (root.entry(ALLOW_UNCALIBRATED), root.get("devices")) {
-            let message = format!("`{ALLOW_UNCALIBRATED}` is a key of a bench: a task cannot allow it");
+        for name in [ALLOW_UNCALIBRATED, "facts"] {
+            let Some((key, _)) = root.entry(name).filter(|_| root.get("devices").is_none()) else { continue };
+            let message = format!("`{name}` is a key of a bench, and a task cannot set it");
             let diagnostic = Diagnostic::new(Code::UnknownKey, key.span.clone(), message);
             self.diagnostics.push(diagnostic.help("move it to the bench file"));
         }
@@ -181,7 +185,7 @@ impl<'a> Sections<'a> {
 
     /// Reads the sections of a bench file.
     pub(crate) fn bench(&mut self, root: &Table) -> BenchDocument {
-        check_keys(root, &["devices", "bind", ALLOW_UNCALIBRATED], "", &mut self.reader);
+        check_keys(root, &["devices", "bind", "facts", ALLOW_UNCALIBRATED], "", &mut self.reader);
         self.own_bench(root)
     }
 
@@ -191,8 +195,12 @@ impl<'a> Sections<'a> {
         let names = names_of(&devices);
         let devices = devices.into_iter().map(|(key, table)| self.block(key, table, &names)).collect();
         let allow_uncalibrated = root.get(ALLOW_UNCALIBRATED).and_then(|value| bool::read(value, &mut self.reader));
-        let bind = self.words(root.get("bind"));
-        BenchDocument { devices, bind, allow_uncalibrated: allow_uncalibrated.unwrap_or(false) }
+        let (bind, facts) = (self.words(root.get("bind")), self.named_tables(root.get("facts")));
+        for (key, _) in facts.iter().filter(|(key, _)| !bind.iter().any(|(role, _)| role.name == key.name)) {
+            let roles = bind.iter().map(|(role, _)| role.name.as_str());
+            self.diagnostics.push(Diagnostic::unknown(Code::UnboundRole, "role", &key.name, &key.span, roles));
+        }
+        BenchDocument { devices, bind, facts, allow_uncalibrated: allow_uncalibrated.unwrap_or(false) }
     }
 
     fn body(&mut self, root: &Table) -> GraphDocument {
