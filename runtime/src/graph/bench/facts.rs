@@ -41,9 +41,9 @@ fn find_fact(
         // A missing value is reported at the section.
         return net.flat.limits.as_ref().and_then(|(_, table)| table.get(name)).cloned().ok_or(None);
     }
-    let roles = net.flat.role_names();
-    let Some(index) = roles.clone().position(|known| known == role) else {
-        return Diagnostic::unknown(Code::UnknownFact, "role", role, place, roles).into_err();
+    let roles = &net.flat.roles;
+    let Some(index) = roles.position(role) else {
+        return Diagnostic::unknown(Code::UnknownFact, "role", role, place, roles.names()).into_err();
     };
     // A device that could not be opened has its own diagnostic.
     let facts = &opened.roles[index].as_ref().ok_or(None)?.facts;

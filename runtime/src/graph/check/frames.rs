@@ -16,6 +16,8 @@ pub(crate) struct Frames<'a> {
     net: &'a Net<'a>,
     variables: BTreeMap<(Producer, String), usize>,
     parents: Vec<usize>,
+    /// The number of variables below each root.
+    sizes: Vec<usize>,
     known: Vec<Option<String>>,
     /// Nodes with a wire in the wrong frame.
     clashes: BTreeSet<usize>,
@@ -26,7 +28,7 @@ pub(crate) struct Frames<'a> {
 /// The most constrained wires are unified first (poses before twists), so that the error is reported on the wrong wire.
 pub(crate) fn check<'a>(net: &'a Net<'a>, diagnostics: &mut Diagnostics) -> Frames<'a> {
     let (variables, clashes) = (BTreeMap::new(), BTreeSet::new());
-    let mut frames = Frames { net, variables, parents: Vec::new(), known: Vec::new(), clashes };
+    let mut frames = Frames { net, variables, parents: Vec::new(), sizes: Vec::new(), known: Vec::new(), clashes };
     for &node in &net.order {
         let mut wires: Vec<&Wire> = net.wires[node].iter().collect();
         wires.sort_by_key(|wire| rank(net.port(wire.source).kind));
@@ -143,6 +145,7 @@ impl Frames<'_> {
         };
         let variable = self.parents.len();
         self.parents.push(variable);
+        self.sizes.push(1);
         self.known.push(known);
         self.variables.insert(key, variable);
         variable
@@ -158,7 +161,10 @@ impl Frames<'_> {
     fn join(&mut self, a: usize, b: usize) {
         let (a, b) = (self.root(a), self.root(b));
         if a != b {
+            // The smaller tree joins the larger one, so no path to a root is long.
+            let (a, b) = if self.sizes[a] < self.sizes[b] { (b, a) } else { (a, b) };
             self.parents[b] = a;
+            self.sizes[a] += self.sizes[b];
             self.known[a] = self.known[a].take().or(self.known[b].take());
         }
     }

@@ -5,7 +5,7 @@
 
 use std::collections::BTreeSet;
 
-use crate::graph::net::{Net, Wire};
+use crate::graph::net::Net;
 use crate::graph::plan::{Condition, PlannedExit, PlannedMode, Producer};
 use crate::graph::syntax::{ExitKind, ModeBlock};
 use crate::signal::Kind;
@@ -13,45 +13,57 @@ use crate::source::{Code, Diagnostic, Diagnostics, quoted};
 
 /// Reports generated motion that nothing ends, in a mode or in a graph without modes.
 ///
-/// `still` holds for each mode which nodes generate no motion. A graph without modes counts as one mode.
-pub(crate) fn check(net: &Net<'_>, modes: &[PlannedMode], still: &[Vec<bool>], diagnostics: &mut Diagnostics) {
+/// `still` holds which nodes generate no motion, and `changes` for each mode the nodes that differ in that.
+pub(crate) fn check(
+    net: &Net<'_>,
+    modes: &[PlannedMode],
+    still: &[bool],
+    changes: &[BTreeSet<usize>],
+    diagnostics: &mut Diagnostics,
+) {
     let commands = net.commands.iter().filter(|wire| !wire.is_report);
     let driving = net.upstream(commands.filter_map(|wire| wire.source.producer.node()));
-    let generators: Vec<Vec<usize>> = still.iter().map(|still| find_generators(net, &driving, still)).collect();
+    let usual = find_generators(net, &driving, &|node| still[node]);
     if modes.is_empty() {
-        report_in_graph(net, &generators.concat(), diagnostics);
+        report_in_graph(net, &usual, diagnostics);
         return;
     }
+    let of_mode = |changes: &BTreeSet<usize>| {
+        let is_still = |node: usize| still[node] != changes.contains(&node);
+        (!changes.is_empty()).then(|| find_generators(net, &driving, &is_still))
+    };
+    let own: Vec<Option<Vec<usize>>> = changes.iter().map(of_mode).collect();
+    let generators = |mode: usize| own[mode].as_ref().unwrap_or(&usual).as_slice();
     let ended = find_ended(modes, &generators, net);
     for (i, block) in net.flat.modes.iter().enumerate().filter(|(i, _)| !ended[*i]) {
-        diagnostics.push(report_in_mode(net, &generators[i], block));
+        diagnostics.push(report_in_mode(net, generators(i), block));
     }
 }
 
 /// Returns the nodes that start a motion of the arm without a sample.
 ///
-/// `driving` are the nodes upstream of a command.
-fn find_generators(net: &Net<'_>, driving: &BTreeSet<usize>, is_still: &[bool]) -> Vec<usize> {
-    let (mut sampled, mut still) = (BTreeSet::new(), BTreeSet::new());
+/// `driving` holds which nodes are upstream of a command.
+fn find_generators(net: &Net<'_>, driving: &[bool], is_still: &dyn Fn(usize) -> bool) -> Vec<usize> {
+    let nodes = net.wires.len();
+    let (mut sampled, mut still) = (vec![false; nodes], vec![false; nodes]);
     // `moved` also contains the nodes that pass on a generated motion.
-    let (mut generators, mut moved) = (Vec::new(), BTreeSet::new());
+    let (mut generators, mut moved) = (Vec::new(), vec![false; nodes]);
     for &node in &net.order {
         let Some(spec) = net.spec(node) else { continue };
         let wires = || net.wires[node].iter().filter(|wire| !spec.inputs[wire.input].need.is_delayed);
-        let is_sampled = |wire: &Wire| wire.source.producer.node().is_none_or(|source| sampled.contains(&source));
-        if wires().any(is_sampled) {
-            sampled.insert(node);
+        if wires().any(|wire| wire.source.producer.node().is_none_or(|source| sampled[source])) {
+            sampled[node] = true;
             continue;
         }
         let sources: Vec<usize> = wires().filter_map(|wire| wire.source.producer.node()).collect();
-        let all_still = !sources.is_empty() && sources.iter().all(|source| still.contains(source));
+        let all_still = !sources.is_empty() && sources.iter().all(|source| still[*source]);
         let gives_motion = spec.outputs.iter().any(|port| matches!(port.kind, Kind::Twist | Kind::Joints));
-        if is_still[node] || all_still {
-            still.insert(node);
-        } else if sources.iter().any(|source| moved.contains(source)) {
-            moved.insert(node);
-        } else if gives_motion && driving.contains(&node) {
-            moved.insert(node);
+        if is_still(node) || all_still {
+            still[node] = true;
+        } else if sources.iter().any(|source| moved[*source]) {
+            moved[node] = true;
+        } else if gives_motion && driving[node] {
+            moved[node] = true;
             generators.push(node);
         }
     }
@@ -62,36 +74,60 @@ fn find_generators(net: &Net<'_>, driving: &BTreeSet<usize>, is_still: &[bool]) 
 ///
 /// A mode ends its motion if it generates none, or with a bound on time or travel that ends the run or leads to a mode
 /// that ends its motion, or with `on_lost` on a sensor signal.
-fn find_ended(modes: &[PlannedMode], generators: &[Vec<usize>], net: &Net<'_>) -> Vec<bool> {
-    let mut ended: Vec<bool> = generators.iter().map(Vec::is_empty).collect();
-    // Fixed point: modes that only lead to each other in a cycle stay false.
-    loop {
-        let is_end = |exit: &PlannedExit| {
-            let is_bound = matches!(exit.condition, Condition::Elapsed(_) | Condition::Travel(..));
-            match (exit.kind, &exit.condition) {
-                (ExitKind::Fail | ExitKind::Done, _) => is_bound,
-                (ExitKind::Go, _) => is_bound && exit.to.is_some_and(|to| ended[to]),
-                (ExitKind::OnLost, Condition::Lost(watched, _)) => is_sensed(net, watched.source.producer),
-                (ExitKind::OnLost, _) => false,
-            }
-        };
-        let next: Vec<bool> = modes.iter().zip(&ended).map(|(mode, is)| *is || mode.exits.iter().any(is_end)).collect();
-        if next == ended {
-            return ended;
-        }
-        ended = next;
+fn find_ended<'g>(modes: &[PlannedMode], generators: &dyn Fn(usize) -> &'g [usize], net: &Net<'_>) -> Vec<bool> {
+    let is_bound = |exit: &PlannedExit| matches!(exit.condition, Condition::Elapsed(_) | Condition::Travel(..));
+    let sensed = find_sensed(net);
+    let is_end = |exit: &PlannedExit| match (exit.kind, &exit.condition) {
+        (ExitKind::Fail | ExitKind::Done, _) => is_bound(exit),
+        (ExitKind::OnLost, Condition::Lost(watched, _)) => match watched.source.producer {
+            Producer::Role(role) => is_sensor(net, role),
+            Producer::Node(node) => sensed[node],
+        },
+        (ExitKind::OnLost | ExitKind::Go, _) => false,
+    };
+    // The modes that lead to each mode with a bound.
+    let mut before = vec![Vec::new(); modes.len()];
+    for (i, mode) in modes.iter().enumerate() {
+        let targets = mode.exits.iter().filter(|exit| exit.kind == ExitKind::Go && is_bound(exit));
+        targets.filter_map(|exit| exit.to).for_each(|to| before[to].push(i));
     }
+    let ends = |i: usize, mode: &PlannedMode| generators(i).is_empty() || mode.exits.iter().any(is_end);
+    let mut open: Vec<usize> = (0..modes.len()).filter(|i| ends(*i, &modes[*i])).collect();
+    // Modes that only lead to each other in a cycle stay false.
+    let mut ended = vec![false; modes.len()];
+    while let Some(mode) = open.pop() {
+        if !std::mem::replace(&mut ended[mode], true) {
+            open.append(&mut before[mode]);
+        }
+    }
+    ended
 }
 
-/// Returns whether a sensor is upstream of a producer: a device without commands, so not the arm.
-fn is_sensed(net: &Net<'_>, producer: Producer) -> bool {
-    let is_sensor = |producer: Producer| match producer {
-        Producer::Role(role) => net.roles[role].is_some_and(|role| role.commands.is_empty()),
-        Producer::Node(_) => false,
-    };
-    let upstream = net.upstream(producer.node());
-    is_sensor(producer)
-        || upstream.iter().any(|node| net.wires[*node].iter().any(|wire| is_sensor(wire.source.producer)))
+/// Returns whether a role is a sensor: a device without commands, so not the arm.
+fn is_sensor(net: &Net<'_>, role: usize) -> bool {
+    net.roles[role].is_some_and(|role| role.commands.is_empty())
+}
+
+/// Returns for each node whether a sensor is upstream of it.
+fn find_sensed(net: &Net<'_>) -> Vec<bool> {
+    let mut readers = vec![Vec::new(); net.wires.len()];
+    let mut open = Vec::new();
+    for (node, wires) in net.wires.iter().enumerate() {
+        for wire in wires {
+            match wire.source.producer {
+                Producer::Node(source) => readers[source].push(node),
+                Producer::Role(role) if is_sensor(net, role) => open.push(node),
+                Producer::Role(_) => {}
+            }
+        }
+    }
+    let mut sensed = vec![false; net.wires.len()];
+    while let Some(node) = open.pop() {
+        if !std::mem::replace(&mut sensed[node], true) {
+            open.append(&mut readers[node]);
+        }
+    }
+    sensed
 }
 
 /// Reports the generators of a graph without modes.
