@@ -18,6 +18,8 @@ mod faults;
 mod features;
 mod flow;
 mod freshness;
+#[cfg(target_os = "linux")]
+mod growth;
 mod layers;
 mod limits;
 mod lint;

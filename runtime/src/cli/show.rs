@@ -77,8 +77,8 @@ fn text(plan: &Compiled, has_colour: bool) -> String {
     for mode in &outline.modes {
         page.section(&format!("modes.{}", mode.name), &settings(&mode.settings), &[]);
     }
-    for node in &outline.nodes {
-        let outputs: Vec<String> = plan.outputs(&node.name).map(|port| format!("# {}", carried(port))).collect();
+    for (node, planned) in outline.nodes.iter().zip(&plan.plan.nodes) {
+        let outputs: Vec<String> = planned.ports.iter().map(|port| format!("# {}", carried(port))).collect();
         page.section(&format!("nodes.{}", node.name), &block(node), &outputs);
     }
     page.section("bind", &roles.iter().map(|role| word(&role.name, &role.device)).collect::<Vec<_>>(), &[]);

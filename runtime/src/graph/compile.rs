@@ -1,5 +1,7 @@
 //! Compiles a request into a plan, or into all its diagnostics.
 
+use std::cell::RefCell;
+
 use crate::catalogue::Catalogue;
 use crate::graph::bench::{self, OpenedBench};
 use crate::graph::build::{Builder, BuiltModes, build_modes};
@@ -64,7 +66,9 @@ pub(crate) fn compile_in(mut loader: Loader, catalogue: &Catalogue, request: &Re
     };
     log_plan(&nodes, &opened, &sources);
     let max_gap = max_gap(flat.table.as_ref(), period);
-    let outline = OutlineBuilder { net: &net, opened: &opened, sources: &sources, nodes: &nodes, period, max_gap };
+    let defaults = RefCell::default();
+    let outline =
+        OutlineBuilder { net: &net, opened: &opened, sources: &sources, nodes: &nodes, period, max_gap, defaults };
     let outline = outline.build();
     let mut warnings = Diagnostics::new();
     check::unused::check(&net, view.sources(), &mut warnings);
@@ -79,10 +83,11 @@ pub(crate) fn compile_in(mut loader: Loader, catalogue: &Catalogue, request: &Re
 
 /// Checks the modes together, and returns them with the start mode.
 fn check_modes(net: &Net<'_>, built: BuiltModes, diagnostics: &mut Diagnostics) -> Option<PlannedModes> {
-    let BuiltModes { modes, still, demand, freezes } = built;
-    check::absent::check(net, &modes, &demand, &freezes, diagnostics);
+    let BuiltModes { modes, still, still_changes, demand, demand_changes, freezes } = built;
+    let reads = |mode: usize, node: usize, port: usize| demand.of(node, &demand_changes[mode])[port];
+    check::absent::check(net, &modes, &reads, &freezes, diagnostics);
     check::overlap::check(net, &modes, diagnostics);
-    check::motion::check(net, &modes, &still, diagnostics);
+    check::motion::check(net, &modes, &still, &still_changes, diagnostics);
     let start = check::reachability::check(net, diagnostics)?;
     Some(PlannedModes { modes, start })
 }

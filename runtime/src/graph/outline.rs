@@ -1,6 +1,8 @@
 //! The outline of a graph, for `show`: parts are expanded, and every value has its origin in a file, a default or a
 //! fact.
 
+use std::cell::RefCell;
+use std::collections::BTreeMap;
 use std::ops::Range;
 use std::path::Path;
 
@@ -159,6 +161,8 @@ pub(crate) struct OutlineBuilder<'a> {
     pub(crate) period: f64,
     /// Longest time between two samples that counts as one step [s].
     pub(crate) max_gap: f64,
+    /// The default values by their texts.
+    pub(crate) defaults: RefCell<BTreeMap<String, Value>>,
 }
 
 impl OutlineBuilder<'_> {
@@ -174,7 +178,7 @@ impl OutlineBuilder<'_> {
             policy: self.table(policy.and_then(Value::as_table), &PolicyTable::fields(), ""),
             modes: flat.modes.iter().map(|mode| self.mode(mode)).collect(),
             nodes: self.nodes.iter().filter_map(|node| self.node(node)).collect(),
-            devices: self.opened.devices.iter().filter_map(|device| self.device(&device.name)).collect(),
+            devices: self.devices(),
         }
     }
 
@@ -191,11 +195,10 @@ impl OutlineBuilder<'_> {
     }
 
     fn roles(&self) -> Vec<OutlinedRole> {
-        let bind = self.net.flat.bench.iter().flat_map(|bench| &bench.bind);
-        let device = |role: &str| bind.clone().find(|(key, _)| key.name == role).map(|(_, word)| word.clone());
+        let device = |role: &str| self.net.flat.bench.as_ref()?.bind.get(role);
         let roles = self.net.flat.roles.iter();
         let role = |(key, kind): &(Key, Spanned<String>)| {
-            let device = self.word(&device(&key.name)?);
+            let device = self.word(device(&key.name)?);
             Some(OutlinedRole { name: key.name.clone(), kind: self.word(kind), device })
         };
         roles.filter_map(role).collect()
@@ -224,9 +227,13 @@ impl OutlineBuilder<'_> {
         OutlinedWord { text: word.value.clone(), place: self.sources.location(&word.span) }
     }
 
-    fn device(&self, name: &str) -> Option<OutlinedBlock> {
-        let bench = self.net.flat.bench.as_ref()?;
-        let block = bench.devices.iter().find(|device| device.key.name == name)?;
+    fn devices(&self) -> Vec<OutlinedBlock> {
+        let blocks = self.net.flat.bench.iter().flat_map(|bench| &bench.devices);
+        let blocks: BTreeMap<&str, &Block> = blocks.map(|block| (block.key.name.as_str(), block)).collect();
+        self.opened.devices.iter().filter_map(|device| self.device(blocks.get(&*device.name)?)).collect()
+    }
+
+    fn device(&self, block: &Block) -> Option<OutlinedBlock> {
         let kind = block.kind.as_ref()?;
         let known = self.net.catalogue.find_device(&kind.value)?;
         self.block(block, &known.params())
@@ -251,7 +258,8 @@ impl OutlineBuilder<'_> {
             match given.and_then(|table| table.get(spec.name)) {
                 Some(value) => settings.extend(self.value(value, spec, path)),
                 None => {
-                    settings.extend(default(spec).map(|value| Setting { path, value, origin: ValueOrigin::Default }))
+                    let value = self.default(spec);
+                    settings.extend(value.map(|value| Setting { path, value, origin: ValueOrigin::Default }));
                 }
             }
         }
@@ -279,7 +287,7 @@ impl OutlineBuilder<'_> {
             _ => {
                 let mut setting = self.setting(value, path);
                 self.resolve(&mut setting, spec);
-                complete(&mut setting.value, spec);
+                self.complete(&mut setting.value, spec);
                 vec![setting]
             }
         }
@@ -289,7 +297,7 @@ impl OutlineBuilder<'_> {
     fn setting(&self, value: &Value, path: String) -> Setting {
         let word = value.as_table().and_then(Table::fact).map(|fact| fact.word);
         let role = word.and_then(|word| word.split_once('.'));
-        let role = role.and_then(|(role, _)| self.net.flat.role_names().position(|name| name == role));
+        let role = role.and_then(|(role, _)| self.net.flat.roles.position(role));
         let mut filled = value.clone();
         // The graph has no mistakes, so every fact is there.
         fill_facts(&mut filled, self.net, self.opened, &mut Diagnostics::new());
@@ -312,6 +320,31 @@ impl OutlineBuilder<'_> {
         {
             *text = self.sources.path(text, setting.value.span.start).display().to_string();
         }
+    }
+
+    /// Fills the defaults into the tables of a list.
+    fn complete(&self, value: &mut Value, spec: &ParamSpec) {
+        let Item::Array(items) = &mut value.item else { return };
+        for item in items {
+            let Item::Table(table) = &mut item.item else { continue };
+            for field in &spec.fields {
+                let default = self.default(field).filter(|_| table.get(field.name).is_none());
+                let key = Key { name: field.name.to_owned(), span: NO_SPAN };
+                table.entries.extend(default.map(|value| (key, Value { span: NO_SPAN, ..value })));
+            }
+        }
+    }
+
+    /// Returns the default of a parameter as a value; none if nothing is set. Each text is parsed once.
+    fn default(&self, spec: &ParamSpec) -> Option<Value> {
+        let text = spec.default.as_deref()?;
+        let mut defaults = self.defaults.borrow_mut();
+        if let Some(value) = defaults.get(text) {
+            return Some(value.clone());
+        }
+        let value = parse_default(text);
+        defaults.insert(text.to_owned(), value.clone());
+        Some(value)
     }
 
     fn mode(&self, block: &ModeBlock) -> OutlinedMode {
@@ -352,24 +385,10 @@ impl OutlinedPort {
     }
 }
 
-/// Fills the defaults into the tables of a list.
-fn complete(value: &mut Value, spec: &ParamSpec) {
-    let Item::Array(items) = &mut value.item else { return };
-    for item in items {
-        let Item::Table(table) = &mut item.item else { continue };
-        for field in &spec.fields {
-            let default = default(field).filter(|_| table.get(field.name).is_none());
-            let key = Key { name: field.name.to_owned(), span: NO_SPAN };
-            table.entries.extend(default.map(|value| (key, Value { span: NO_SPAN, ..value })));
-        }
-    }
-}
-
-/// The default of a parameter as a value; none if nothing is set.
-fn default(spec: &ParamSpec) -> Option<Value> {
-    let text = spec.default.as_ref()?;
+/// Parses the text of a default.
+fn parse_default(text: &str) -> Value {
     let mut sources = SourceMap::default();
     let parsed = parse_table(sources.add_file(Path::new("default"), format!("value = {text}")));
     let value = parsed.ok().and_then(|value| value.as_table()?.get("value").cloned());
-    Some(value.unwrap_or_else(|| Value { span: NO_SPAN, item: Item::String(text.clone()) }))
+    value.unwrap_or_else(|| Value { span: NO_SPAN, item: Item::String(text.to_owned()) })
 }

@@ -267,19 +267,26 @@ impl Report {
 
     fn render_one(&self, diagnostic: &Diagnostic, renderer: &Renderer) -> String {
         let main = self.sources.file_at(diagnostic.span.start);
-        let place = AnnotationKind::Primary.span(marked(main, &diagnostic.span));
-        let mut snippet = Snippet::source(&main.text).path(&main.name).annotation(place);
+        let place = marked(main, &diagnostic.span);
         let mut others: Vec<Group<'_>> = Vec::new();
+        let (mut notes, mut shown) = (Vec::new(), place.clone());
         for (span, label) in &diagnostic.notes {
             let file = self.sources.file_at(span.start);
-            let place = AnnotationKind::Context.span(marked(file, span));
+            let place = marked(file, span);
             if std::ptr::eq(file, main) {
-                snippet = snippet.annotation(place.label(label));
+                shown = shown.start.min(place.start)..shown.end.max(place.end);
+                notes.push((place, label));
             } else {
-                let snippet = Snippet::source(&file.text).path(&file.name).annotation(place);
+                let excerpt = Excerpt::of(file, &place);
+                let snippet = excerpt.snippet().annotation(AnnotationKind::Context.span(excerpt.within(&place)));
                 others.push(Level::NOTE.secondary_title(label).element(snippet));
             }
         }
+        let excerpt = Excerpt::of(main, &shown);
+        let notes =
+            notes.into_iter().map(|(place, label)| AnnotationKind::Context.span(excerpt.within(&place)).label(label));
+        let snippet = excerpt.snippet().annotation(AnnotationKind::Primary.span(excerpt.within(&place)));
+        let snippet = snippet.annotations(notes);
         let level = match diagnostic.code.severity() {
             Severity::Error => Level::ERROR,
             Severity::Warning => Level::WARNING,
@@ -291,6 +298,32 @@ impl Report {
             groups.push(Group::with_title(Level::HELP.secondary_title(help)));
         }
         renderer.render(&groups)
+    }
+}
+
+/// The lines of a file that a message shows. The time to render them does not depend on the length of the file.
+struct Excerpt<'a> {
+    file: &'a SourceFile,
+    text: &'a str,
+    /// Number of the first line.
+    line: usize,
+    /// Offset of the first line in the file.
+    start: usize,
+}
+
+impl<'a> Excerpt<'a> {
+    fn of(file: &'a SourceFile, local: &Range<usize>) -> Self {
+        let (range, line) = file.lines_around(local);
+        Self { file, text: &file.text[range.clone()], line, start: range.start }
+    }
+
+    fn snippet<T: Clone>(&self) -> Snippet<'a, T> {
+        Snippet::source(self.text).path(&self.file.name).line_start(self.line)
+    }
+
+    /// Converts a range of the file into a range of the excerpt.
+    fn within(&self, local: &Range<usize>) -> Range<usize> {
+        local.start - self.start..local.end - self.start
     }
 }
 

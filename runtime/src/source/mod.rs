@@ -4,11 +4,13 @@
 
 mod diagnostic;
 mod map;
+mod named;
 mod suggest;
 mod value;
 
 pub use diagnostic::{Code, Diagnostic, Diagnostics, Report, Severity};
 pub use map::{BuiltinFile, Location, SourceFile, SourceMap};
+pub(crate) use named::Named;
 pub(crate) use suggest::quoted;
 pub use suggest::{suggest_name, suggestion};
 pub(crate) use value::FactRef;

@@ -16,7 +16,7 @@ use crate::graph::{
     Policy, PortRef, Producer,
 };
 use crate::node::{Bus, PortId, Tick};
-use crate::signal::Mark;
+use crate::signal::{Mark, Shape};
 use crate::source::SourceMap;
 
 /// The ports of a graph on its bus.
@@ -70,7 +70,13 @@ impl Engine {
             plan.nodes.iter().filter(|node| node.is_uncalibrated).map(|node| node.name.clone()).collect();
         let mut watched = watched_commands(&plan.commands, &ports);
         let devices = plan.devices.into_iter().enumerate();
-        let devices = devices.map(|(i, device)| device_slot(i, device, &plan.commands, &sources)).collect();
+        let reports: BTreeMap<(usize, usize), &Shape> = plan
+            .commands
+            .iter()
+            .filter(|wire| wire.is_report)
+            .map(|wire| ((wire.device, wire.port), &wire.shape))
+            .collect();
+        let devices = devices.map(|(i, device)| device_slot(i, device, &reports, &sources)).collect();
         let runners: Vec<NodeRunner> =
             plan.nodes.into_iter().map(|node| runner(node, &mut ports, &mut watched)).collect();
         let (reports, commands): (Vec<_>, Vec<_>) = plan.commands.into_iter().partition(|wire| wire.is_report);
@@ -139,10 +145,11 @@ fn display(view: PlannedView, ports: &BusPorts) -> Display {
 
 /// Returns the ports on which limit nodes report the scale of the motion.
 fn limits(nodes: &[PlannedNode], ports: &BusPorts) -> Vec<(String, PortId)> {
-    let is_scale =
-        |name: &str| nodes.iter().any(|node| node.holds.iter().any(|limit| name == format!("{}.{limit}", node.name)));
-    let scales = ports.list.iter().filter(|(port, _)| is_scale(&port.name));
-    scales.map(|(port, id)| (port.name.clone(), *id)).collect()
+    let scales = nodes.iter().flat_map(|node| {
+        let is_scale = |name: &str| node.holds.iter().any(|limit| name == format!("{}.{limit}", node.name));
+        node.outputs().filter(move |(_, port)| is_scale(&port.name))
+    });
+    scales.map(|(source, port)| (port.name.clone(), ports.id(source))).collect()
 }
 
 /// Returns the budgets of the limiters.
@@ -155,11 +162,14 @@ fn budgets(nodes: &[PlannedNode], ports: &BusPorts) -> Vec<WatchedBudget> {
     nodes.iter().enumerate().filter_map(budget).collect()
 }
 
-fn device_slot(i: usize, device: PlannedDevice, commands: &[PlannedCommand], sources: &SourceMap) -> DeviceSlot {
-    let wired = |report: usize| {
-        let planned = commands.iter().find(|wire| wire.is_report && (wire.device, wire.port) == (i, report));
-        planned.map(|planned| &planned.shape)
-    };
+/// `reports` holds the shape of each wired report, by its device and its number there.
+fn device_slot(
+    i: usize,
+    device: PlannedDevice,
+    reports: &BTreeMap<(usize, usize), &Shape>,
+    sources: &SourceMap,
+) -> DeviceSlot {
+    let wired = |report: usize| reports.get(&(i, report)).copied();
     DeviceSlot {
         place: sources.locate(device.span.start),
         name: device.name,

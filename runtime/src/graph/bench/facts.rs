@@ -36,7 +36,7 @@ pub(crate) fn fill_facts(
 fn is_left_out(value: &Value, net: &Net<'_>, opened: &OpenedBench) -> bool {
     let Some(fact) = value.as_table().and_then(Table::fact).filter(|fact| fact.is_optional) else { return false };
     let role = fact.word.split_once('.').map_or(fact.word, |(role, _)| role);
-    let is_known = role == LIMITS || net.flat.role_names().any(|name| name == role);
+    let is_known = role == LIMITS || net.flat.roles.position(role).is_some();
     is_known && find_fact(fact.word, fact.place, &value.span, net, opened).is_err()
 }
 
@@ -53,9 +53,9 @@ fn find_fact(
         // A missing value is reported at the section.
         return net.flat.limits.as_ref().and_then(|(_, table)| table.get(name)).cloned().ok_or(None);
     }
-    let roles = net.flat.role_names();
-    let Some(index) = roles.clone().position(|known| known == role) else {
-        return Diagnostic::unknown(Code::UnknownFact, "role", role, place, roles).into_err();
+    let roles = &net.flat.roles;
+    let Some(index) = roles.position(role) else {
+        return Diagnostic::unknown(Code::UnknownFact, "role", role, place, roles.names()).into_err();
     };
     // A device that could not be opened has its own diagnostic.
     let facts = &opened.roles[index].as_ref().ok_or(None)?.facts;

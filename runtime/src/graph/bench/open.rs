@@ -54,8 +54,9 @@ pub(crate) fn open(net: &Net<'_>, sources: &mut SourceMap, diagnostics: &mut Dia
         catalogue: net.catalogue,
         sources,
         diagnostics,
+        blocks: net.flat.bench.iter().flat_map(|bench| &bench.devices).map(|block| (&*block.key.name, block)).collect(),
         tried: BTreeMap::new(),
-        taken: Vec::new(),
+        taken: BTreeMap::new(),
         opened: OpenedBench::default(),
     };
     let bench = net.flat.bench.as_ref();
@@ -87,10 +88,13 @@ struct Opener<'a> {
     catalogue: &'a Catalogue,
     sources: &'a mut SourceMap,
     diagnostics: &'a mut Vec<Diagnostic>,
+    /// The blocks of the devices, by name.
+    blocks: BTreeMap<&'a str, &'a Block>,
     /// Devices that were tried, by name: their index if they opened.
     tried: BTreeMap<String, Option<usize>>,
-    /// Bindings so far: index of the device, index of the role among those it can fill, name of the role.
-    taken: Vec<(usize, usize, String)>,
+    /// Name of the role for each role of a device that is filled: index of the device, and index of the role among
+    /// those that it can fill.
+    taken: BTreeMap<(usize, usize), String>,
     opened: OpenedBench,
 }
 
@@ -108,7 +112,7 @@ impl Opener<'_> {
                 let diagnostic = Diagnostic::new(Code::ObservedRole, role.span.clone(), message);
                 self.diagnostics.push(diagnostic.help(format!("did you mean `{name}`?")));
             }
-            if !bench.devices.iter().any(|device| device.key.name == word.value) {
+            if !self.blocks.contains_key(&*word.value) {
                 self.diagnostics.push(unknown_device(word, bench));
             }
         }
@@ -117,6 +121,8 @@ impl Opener<'_> {
     /// Checks the types of all devices, and the parameters of those that are not opened because none of the `roles`
     /// uses them.
     fn check_devices(&mut self, bench: &BenchDocument, roles: &BTreeSet<&str>) {
+        let bound = bench.bind.iter().filter(|(role, _)| roles.contains(&*role.name));
+        let opened: BTreeSet<&str> = bound.map(|(_, word)| word.value.as_str()).collect();
         for device in &bench.devices {
             let Some(kind) = &device.kind else { continue };
             let Some(known) = self.catalogue.find_device(&kind.value) else {
@@ -126,8 +132,7 @@ impl Opener<'_> {
                 self.diagnostics.push(unknown);
                 continue;
             };
-            let mut bound = bench.bind.iter().filter(|(_, word)| word.value == device.key.name);
-            let is_opened = bound.any(|(role, _)| roles.contains(&*role.name));
+            let is_opened = opened.contains(&*device.key.name);
             let params = known.params();
             let entries = device.params.as_table().filter(|_| !is_opened).into_iter().flat_map(|table| &table.entries);
             for (key, _) in entries.filter(|(key, _)| !params.iter().any(|param| param.name == key.name)) {
@@ -140,7 +145,7 @@ impl Opener<'_> {
     }
 
     fn role(&mut self, bench: &BenchDocument, key: &Key, kind: &Spanned<String>) -> Option<BoundRole> {
-        let Some((_, word)) = bench.bind.iter().find(|(role, _)| role.name == key.name) else {
+        let Some(word) = bench.bind.get(&key.name) else {
             let message = format!("the bench does not bind the role `{}`", key.name);
             let devices = quoted(bench.devices.iter().map(|device| device.key.name.as_str()));
             let example = bench.devices.first().map_or("device", |device| &device.key.name);
@@ -151,14 +156,14 @@ impl Opener<'_> {
         };
         let device = self.device(bench, word)?;
         let description = &self.opened.devices[device].description;
-        let is_free = |i: &usize| !self.taken.iter().any(|(d, filled, _)| (*d, filled) == (device, i));
+        let is_free = |i: &usize| !self.taken.contains_key(&(device, *i));
         let mut fitting = (0..description.fills.len()).filter(|i| description.fills[*i].role == kind.value);
         let Some(fills) = fitting.clone().find(is_free) else {
-            let by = fitting.next().and_then(|i| self.taken.iter().find(|(d, filled, _)| (*d, *filled) == (device, i)));
+            let by = fitting.next().and_then(|i| self.taken.get(&(device, i)));
             let roles = quoted(description.roles());
             let (device, role) = (&word.value, &key.name);
             let (message, help) = match by {
-                Some((_, _, by)) => (
+                Some(by) => (
                     format!("device `{device}` already fills the role `{by}`"),
                     "bind each role to its own device".into(),
                 ),
@@ -170,7 +175,7 @@ impl Opener<'_> {
             self.diagnostics.push(Diagnostic::new(Code::WrongRole, word.span.clone(), message).help(help));
             return None;
         };
-        self.taken.push((device, fills, key.name.clone()));
+        self.taken.insert((device, fills), key.name.clone());
         let role = self.catalogue.role_type(&kind.value)?;
         let number = |stated: &[StatedPort], declared: &[PortSpec]| {
             let port = |spec: &PortSpec| stated.iter().position(|port| port.fill == fills && port.name == spec.name);
@@ -203,7 +208,7 @@ impl Opener<'_> {
     }
 
     fn open(&mut self, bench: &BenchDocument, word: &Spanned<String>) -> Option<usize> {
-        let Some(block) = bench.devices.iter().find(|device| device.key.name == word.value) else {
+        let Some(block) = self.blocks.get(&*word.value).copied() else {
             self.diagnostics.push(unknown_device(word, bench));
             return None;
         };

@@ -1,5 +1,6 @@
 //! Resolves the exits of modes: each has one condition, and the port of that condition must support it.
 
+use std::collections::BTreeMap;
 use std::f64::consts::FRAC_PI_2;
 use std::ops::Range;
 
@@ -13,8 +14,8 @@ use crate::source::{Code, Diagnostic, Diagnostics, quoted};
 /// What the exits of a mode refer to.
 pub(crate) struct ExitContext<'a> {
     pub(crate) net: &'a Net<'a>,
-    /// The names of the modes.
-    pub(crate) modes: Vec<&'a str>,
+    /// Index of each mode by its name.
+    pub(crate) modes: BTreeMap<&'a str, usize>,
     /// Returns a built port, or `None` if its node has mistakes.
     pub(crate) port: &'a dyn Fn(PortRef) -> Option<&'a PlannedPort>,
     /// The poses of the graph.
@@ -54,11 +55,11 @@ impl ExitContext<'_> {
         let has_target = matches!(kind, ExitKind::Go | ExitKind::OnLost);
         match (&table.to, has_target) {
             (Some(to), true) => {
-                let mode = self.modes.iter().position(|name| *name == to.value);
+                let mode = self.modes.get(to.value.as_str()).copied();
                 if mode.is_some() {
                     return Ok(mode);
                 }
-                let known = self.modes.iter().copied();
+                let known = self.net.flat.mode_names();
                 Diagnostic::unknown(Code::UnknownMode, "mode", &to.value, &to.span, known).into_err()
             }
             (None, true) => {

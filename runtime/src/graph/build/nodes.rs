@@ -167,7 +167,7 @@ impl Builder<'_> {
     fn budget(&self, node: usize, spec: &NodeSpec, spent: &str) -> Option<(usize, String)> {
         let port = spec.outputs.iter().position(|output| output.name == spent)?;
         let mut commands = self.net.commands.iter().filter(|wire| !wire.is_report);
-        let command = commands.find(|wire| self.net.upstream(wire.source.producer.node()).contains(&node))?;
+        let command = commands.find(|wire| self.net.upstream(wire.source.producer.node())[node])?;
         Some((port, self.net.name(Producer::Role(command.role)).to_owned()))
     }
 

@@ -6,55 +6,68 @@
 
 use std::collections::BTreeSet;
 
+use super::contact::ContactPorts;
 use crate::graph::net::{CommandWire, Net};
-use crate::graph::plan::{Condition, PlannedExit, PlannedMode, PortRef, Producer, Test};
+use crate::graph::plan::{Condition, PlannedExit, PlannedMode, PortRef, Test};
 use crate::graph::syntax::{ExitKind, PortState};
-use crate::signal::Kind;
 
 /// What the ends of motions depend on.
 pub(super) struct Endings<'a> {
     net: &'a Net<'a>,
+    contact: &'a ContactPorts,
     modes: &'a [PlannedMode],
     /// For each mode, the nodes that generate a motion.
-    generators: &'a [Vec<usize>],
+    generators: &'a [&'a [usize]],
+    /// For each command, whether each node is upstream of it.
+    driven: Vec<(&'a CommandWire, Vec<bool>)>,
 }
 
 impl<'a> Endings<'a> {
-    pub(super) const fn new(net: &'a Net<'a>, modes: &'a [PlannedMode], generators: &'a [Vec<usize>]) -> Self {
-        Self { net, modes, generators }
+    pub(super) fn new(
+        net: &'a Net<'a>,
+        contact: &'a ContactPorts,
+        modes: &'a [PlannedMode],
+        generators: &'a [&'a [usize]],
+    ) -> Self {
+        let commands = net.commands.iter().filter(|wire| !wire.is_report);
+        let driven = commands.map(|wire| (wire, net.upstream(wire.source.producer.node())));
+        Self { net, contact, modes, generators, driven: driven.collect() }
     }
 
     /// Returns for each mode whether an exit ends its motion, if the mode is entered once.
     pub(super) fn find_ended(&self) -> Vec<bool> {
-        let mut ended: Vec<bool> = self.generators.iter().map(Vec::is_empty).collect();
-        // Fixed point: modes that only lead to each other in a cycle stay false.
-        loop {
-            let is_ended = |mode: usize| {
-                let ends =
-                    |generator: &usize| self.modes[mode].exits.iter().any(|exit| self.ends(exit, *generator, &ended));
-                ended[mode] || self.generators[mode].iter().all(ends)
-            };
-            let next: Vec<bool> = (0..self.modes.len()).map(is_ended).collect();
-            if next == ended {
-                return ended;
+        // The modes that lead to each mode with an exit that ends their motion there.
+        let mut before = vec![Vec::new(); self.modes.len()];
+        let mut open = Vec::new();
+        for (i, mode) in self.modes.iter().enumerate() {
+            let ending =
+                || mode.exits.iter().filter(|exit| self.generators[i].iter().all(|node| self.ends(exit, *node)));
+            ending().filter_map(|exit| exit.to).for_each(|to| before[to].push(i));
+            if self.generators[i].is_empty() || ending().any(|exit| exit.to.is_none()) {
+                open.push(i);
             }
-            ended = next;
         }
+        // Modes that only lead to each other in a cycle stay false.
+        let mut ended = vec![false; self.modes.len()];
+        while let Some(mode) = open.pop() {
+            if !std::mem::replace(&mut ended[mode], true) {
+                open.append(&mut before[mode]);
+            }
+        }
+        ended
     }
 
-    /// Returns whether an exit ends the motion of a generator.
-    fn ends(&self, exit: &PlannedExit, generator: usize, ended: &[bool]) -> bool {
-        let leads_to_end = exit.to.is_none_or(|to| ended[to]);
-        leads_to_end
-            && match (exit.kind, &exit.condition) {
-                (ExitKind::OnLost, Condition::Lost(watched, _)) => {
-                    needs_contact(self.net, watched.source) && self.shares_sensor(watched.source, generator)
-                }
-                (ExitKind::OnLost, _) => false,
-                (_, Condition::Elapsed(_)) => true,
-                (_, Condition::Travel(pose, _)) => self.is_moved_by(*pose, generator),
-                _ => false,
+    /// Returns whether an exit ends the motion of a generator, if its target does.
+    fn ends(&self, exit: &PlannedExit, generator: usize) -> bool {
+        match (exit.kind, &exit.condition) {
+            (ExitKind::OnLost, Condition::Lost(watched, _)) => {
+                self.contact.need(self.net, watched.source) && self.shares_sensor(watched.source, generator)
             }
+            (ExitKind::OnLost, _) => false,
+            (_, Condition::Elapsed(_)) => true,
+            (_, Condition::Travel(pose, _)) => self.is_moved_by(*pose, generator),
+            _ => false,
+        }
     }
 
     /// Returns whether every command that a generator drives descends from a sensor of the port, as it does through the
@@ -73,27 +86,50 @@ impl<'a> Endings<'a> {
 
     /// Returns the commands that a generator drives.
     fn commands_of(&self, generator: usize) -> impl Iterator<Item = &CommandWire> {
-        let is_driven = move |wire: &&CommandWire| {
-            !wire.is_report && self.net.upstream(wire.source.producer.node()).contains(&generator)
-        };
-        self.net.commands.iter().filter(is_driven)
+        self.driven.iter().filter(move |(_, upstream)| upstream[generator]).map(|(wire, _)| *wire)
+    }
+
+    /// Returns for each mode whether modes that can follow each other without a contact lead to it and away from it
+    /// without end. Few modes do, so a search for cycles among them is short.
+    pub(super) fn find_cycling(&self) -> Vec<bool> {
+        let next: Vec<Vec<usize>> = (0..self.modes.len()).map(|mode| self.followers(mode).collect()).collect();
+        let mut entries = vec![0_usize; next.len()];
+        next.iter().flatten().for_each(|to| entries[*to] += 1);
+        // Modes that nothing leads to are on no cycle.
+        let mut open: Vec<usize> = (0..next.len()).filter(|mode| entries[*mode] == 0).collect();
+        let mut is_cycling = vec![true; next.len()];
+        while let Some(mode) = open.pop() {
+            is_cycling[mode] = false;
+            for &to in &next[mode] {
+                entries[to] -= 1;
+                if entries[to] == 0 {
+                    open.push(to);
+                }
+            }
+        }
+        is_cycling
     }
 
     /// Returns the modes, from `mode` back to itself, that can follow each other without a contact.
-    pub(super) fn find_cycle(&self, mode: usize) -> Option<Vec<usize>> {
-        let mut paths = vec![vec![mode]];
+    pub(super) fn find_cycle(&self, mode: usize, is_cycling: &[bool]) -> Option<Vec<usize>> {
+        let mut paths = if is_cycling[mode] { vec![vec![mode]] } else { Vec::new() };
         let mut reached = BTreeSet::new();
         while let Some(path) = paths.pop() {
-            let last = path.last().copied().unwrap_or(mode);
-            for exit in self.modes[last].exits.iter().filter(|exit| self.is_free(exit, last)) {
-                match exit.to {
-                    Some(to) if to == mode => return Some(path),
-                    Some(to) if reached.insert(to) => paths.push([path.as_slice(), &[to]].concat()),
-                    _ => {}
+            for to in path.last().into_iter().flat_map(|last| self.followers(*last)) {
+                if to == mode {
+                    return Some(path);
+                }
+                if reached.insert(to) {
+                    paths.push([path.as_slice(), &[to]].concat());
                 }
             }
         }
         None
+    }
+
+    /// Returns the modes that can follow a mode without a contact.
+    fn followers(&self, mode: usize) -> impl Iterator<Item = usize> {
+        self.modes[mode].exits.iter().filter(move |exit| self.is_free(exit, mode)).filter_map(|exit| exit.to)
     }
 
     /// Returns whether an exit can be taken again and again without a contact and without the operator.
@@ -101,10 +137,8 @@ impl<'a> Endings<'a> {
         match &exit.condition {
             Condition::Sent(_) => false,
             Condition::Elapsed(time) => self.first_end(mode).is_none_or(|end| *time < end),
-            Condition::Port(
-                watched,
-                Test::Is(PortState::True | PortState::Present | PortState::New) | Test::Between { .. },
-            ) => !needs_contact(self.net, watched.source),
+            Condition::Port(watched, Test::Is(PortState::True | PortState::Present | PortState::New))
+            | Condition::Port(watched, Test::Between { .. }) => !self.contact.need(self.net, watched.source),
             Condition::Port(..) | Condition::Travel(..) | Condition::Lost(..) => true,
         }
     }
@@ -118,24 +152,4 @@ impl<'a> Endings<'a> {
         });
         times.min()
     }
-}
-
-/// Returns whether a port is present, or set, only while something touches a sensor.
-///
-/// Such a port descends from sensors alone. It is a flag, or the contact was segmented upstream of it.
-pub(super) fn needs_contact(net: &Net<'_>, port: PortRef) -> bool {
-    let mut roles = net.roles_of(port.producer).peekable();
-    let is_sensor = |role: usize| net.roles[role].is_some_and(|role| role.commands.is_empty());
-    roles.peek().is_some()
-        && roles.all(is_sensor)
-        && (net.port(port).kind == Kind::Flag || is_segmented(net, port.producer))
-}
-
-/// Returns whether a mask or a list of regions is read at or upstream of a producer.
-fn is_segmented(net: &Net<'_>, producer: Producer) -> bool {
-    let is_segment = |node: &usize| {
-        let kinds = net.wires[*node].iter().map(|wire| net.port(wire.source).kind);
-        kinds.into_iter().any(|kind| matches!(kind, Kind::Mask | Kind::Regions))
-    };
-    net.upstream(producer.node()).iter().any(is_segment)
 }

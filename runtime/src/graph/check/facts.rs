@@ -64,7 +64,7 @@ fn find_foreign<'a>(net: &Net<'_>, table: &'a Value, upstream: &BTreeSet<&str>) 
     let facts = entries.flat_map(|(key, value)| value.facts().into_iter().map(move |fact| (key.name.as_str(), fact)));
     let foreign = facts.filter_map(|(param, FactRef { word, place, is_optional })| {
         let (role, fact) = word.split_once('.')?;
-        let is_foreign = role != LIMITS && net.flat.role_names().any(|name| name == role) && !upstream.contains(role);
+        let is_foreign = role != LIMITS && net.flat.roles.position(role).is_some() && !upstream.contains(role);
         is_foreign.then_some(ForeignFact { param, role, fact, place, is_optional })
     });
     foreign.collect()

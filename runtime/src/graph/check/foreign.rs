@@ -16,7 +16,7 @@ pub(super) fn check(
 ) -> Vec<Diagnostic> {
     let Some(spec) = net.spec(limiter) else { return Vec::new() };
     let frame = frames.of(motion).into_iter().next().flatten();
-    let sensor = frame.and_then(|frame| net.flat.role_names().position(|name| name == frame));
+    let sensor = frame.and_then(|frame| net.flat.roles.position(&frame));
     let mut found = Vec::new();
     for wire in net.wires[limiter].iter().filter(|wire| spec.inputs[wire.input].need.must_be_known) {
         let mut foreign = net.roles_of(wire.source.producer).filter(|read| *read != role && Some(*read) != sensor);

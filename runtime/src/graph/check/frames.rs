@@ -5,7 +5,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 
-use super::frame_names::{find_named, named_frame};
+use super::frame_names::FrameNames;
 use crate::graph::net::{Net, Wire, WireOrigin};
 use crate::graph::plan::{PortRef, Producer};
 use crate::node::{PortSpec, frame_args};
@@ -15,8 +15,11 @@ use crate::source::{Code, Diagnostic, Diagnostics};
 /// The frame variables of all nodes, and the frames to which they are bound.
 pub(crate) struct Frames<'a> {
     net: &'a Net<'a>,
+    names: FrameNames<'a>,
     variables: BTreeMap<(Producer, String), usize>,
     parents: Vec<usize>,
+    /// The number of variables below each root.
+    sizes: Vec<usize>,
     known: Vec<Option<KnownFrame>>,
     /// Nodes with a wire in the wrong frame.
     clashes: BTreeSet<usize>,
@@ -33,9 +36,11 @@ struct KnownFrame {
 ///
 /// The most constrained wires are unified first (poses before twists), so that the error is reported on the wrong wire.
 pub(crate) fn check<'a>(net: &'a Net<'a>, diagnostics: &mut Diagnostics) -> Frames<'a> {
-    diagnostics.extend(find_named(net));
+    let names = FrameNames::new(net);
+    names.check(diagnostics);
     let (variables, clashes) = (BTreeMap::new(), BTreeSet::new());
-    let mut frames = Frames { net, variables, parents: Vec::new(), known: Vec::new(), clashes };
+    let mut frames =
+        Frames { net, names, variables, parents: Vec::new(), sizes: Vec::new(), known: Vec::new(), clashes };
     for &node in &net.order {
         let mut wires: Vec<&Wire> = net.wires[node].iter().collect();
         wires.sort_by_key(|wire| rank(net.port(wire.source).kind));
@@ -155,6 +160,7 @@ impl Frames<'_> {
         let known = self.first_known(owner, arg);
         let variable = self.parents.len();
         self.parents.push(variable);
+        self.sizes.push(1);
         self.known.push(known);
         self.variables.insert(key, variable);
         variable
@@ -174,7 +180,7 @@ impl Frames<'_> {
                 Some(KnownFrame { name: format!("{name}.{part}"), place })
             }
             (_, Some(param), Producer::Node(node)) => {
-                let (name, place) = named_frame(net, node, param)?;
+                let (name, place) = self.names.named(node, param)?;
                 Some(KnownFrame { name, place })
             }
             _ if arg == "self" => Some(KnownFrame { name: net.name(owner).to_owned(), place }),
@@ -193,7 +199,10 @@ impl Frames<'_> {
     fn join(&mut self, a: usize, b: usize) {
         let (a, b) = (self.root(a), self.root(b));
         if a != b {
+            // The smaller tree joins the larger one, so no path to a root is long.
+            let (a, b) = if self.sizes[a] < self.sizes[b] { (b, a) } else { (a, b) };
             self.parents[b] = a;
+            self.sizes[a] += self.sizes[b];
             self.known[a] = self.known[a].take().or(self.known[b].take());
         }
     }

@@ -7,13 +7,13 @@ use crate::source::{Code, Diagnostic, Diagnostics};
 pub(crate) fn check(net: &Net<'_>, diagnostics: &mut Diagnostics) {
     for (i, node) in net.flat.nodes.iter().enumerate() {
         let Some(spec) = net.spec(i) else { continue };
-        let names = spec.inputs.iter().map(|input| &*input.name);
+        let lacking = node.block.wires.lacking(spec.inputs.iter().map(|input| &*input.name));
         for input in spec.inputs.iter().filter(|input| input.need.must_be_wired) {
-            if node.block.wires.lack(&input.name, names.clone()) {
+            if lacking.contains(&*input.name) {
                 let (key, name) = (&node.block.key, &input.name);
                 let message = format!("`{}` needs a wire to `in.{name}`, {}", key.name, input.kind.with_article());
                 let port = net.find_candidate(node.scope, i, input);
-                let help = format!("add `in.{name} = \"{}\"`", port.as_deref().unwrap_or("node.port"));
+                let help = format!("add `in.{name} = \"{}\"`", port.unwrap_or("node.port"));
                 diagnostics.push(Diagnostic::new(Code::MissingInput, key.span.clone(), message).help(help));
             }
         }

@@ -65,14 +65,14 @@ impl<'a> CommandPath<'a> {
     /// Follows a motion backwards, or returns `None` if a wire is missing.
     fn find(net: &'a Net<'a>, wire: &'a CommandWire) -> Option<Self> {
         let mut path = Self { net, wire, role: net.roles[wire.role]?, nodes: Vec::new() };
-        let mut at = wire.source;
+        let (mut at, mut passed) = (wire.source, BTreeSet::new());
         while let Producer::Node(node) = at.producer {
             let spec = net.spec(node)?;
             let Some(through) = spec.limits.through else { break };
             let input = spec.inputs.iter().position(|input| input.name == through)?;
             let wire = net.wires[node].iter().find(|wire| wire.input == input)?;
             let (source, word) = (wire.source, wire.origin.inner.as_ref().unwrap_or(&wire.origin.word));
-            if path.nodes.iter().any(|stop| stop.node == node) {
+            if !passed.insert(node) {
                 return None;
             }
             path.nodes.push(PathNode { node, spec, source, word });

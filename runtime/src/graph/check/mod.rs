@@ -4,6 +4,7 @@ pub(crate) mod absent;
 pub(crate) mod calibration;
 pub(crate) mod clock;
 pub(crate) mod commands;
+mod contact;
 pub(crate) mod delays;
 mod endings;
 pub(crate) mod exports;

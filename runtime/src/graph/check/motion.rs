@@ -5,7 +5,8 @@
 
 use std::collections::BTreeSet;
 
-use super::endings::{Endings, needs_contact};
+use super::contact::ContactPorts;
+use super::endings::Endings;
 use crate::graph::net::{Net, Wire};
 use crate::graph::plan::PlannedMode;
 use crate::graph::syntax::ModeBlock;
@@ -14,23 +15,36 @@ use crate::source::{Code, Diagnostic, Diagnostics, quoted};
 
 /// Reports generated motion that nothing ends, in a mode or in a graph without modes.
 ///
-/// `still` holds for each mode which nodes generate no motion. A graph without modes counts as one mode.
-pub(crate) fn check(net: &Net<'_>, modes: &[PlannedMode], still: &[Vec<bool>], diagnostics: &mut Diagnostics) {
+/// `still` holds which nodes generate no motion, and `changes` for each mode the nodes that differ in that.
+pub(crate) fn check(
+    net: &Net<'_>,
+    modes: &[PlannedMode],
+    still: &[bool],
+    changes: &[BTreeSet<usize>],
+    diagnostics: &mut Diagnostics,
+) {
     let commands = net.commands.iter().filter(|wire| !wire.is_report);
     let driving = net.upstream(commands.filter_map(|wire| wire.source.producer.node()));
-    let generators: Vec<Vec<usize>> = still.iter().map(|still| find_generators(net, &driving, still)).collect();
+    let contact = ContactPorts::new(net);
+    let usual = find_generators(net, &contact, &driving, &|node| still[node]);
     if modes.is_empty() {
-        report_in_graph(net, &generators.concat(), diagnostics);
+        report_in_graph(net, &usual, diagnostics);
         return;
     }
-    let endings = Endings::new(net, modes, &generators);
+    let of_mode = |changes: &BTreeSet<usize>| {
+        let is_still = |node: usize| still[node] != changes.contains(&node);
+        (!changes.is_empty()).then(|| find_generators(net, &contact, &driving, &is_still))
+    };
+    let own: Vec<Option<Vec<usize>>> = changes.iter().map(of_mode).collect();
+    let generators: Vec<&[usize]> = own.iter().map(|own| own.as_ref().unwrap_or(&usual).as_slice()).collect();
+    let endings = Endings::new(net, &contact, modes, &generators);
     let ended = endings.find_ended();
-    let mut reported = BTreeSet::new();
+    let (cycling, mut reported) = (endings.find_cycling(), BTreeSet::new());
     for (i, block) in net.flat.modes.iter().enumerate().filter(|(i, _)| !generators[*i].is_empty()) {
         if !ended[i] {
-            diagnostics.push(report_in_mode(net, &generators[i], block));
-        } else if let Some(cycle) = endings.find_cycle(i).filter(|_| !reported.contains(&i)) {
-            diagnostics.push(report_cycle(net, &generators[i], &cycle));
+            diagnostics.push(report_in_mode(net, generators[i], block));
+        } else if let Some(cycle) = endings.find_cycle(i, &cycling).filter(|_| !reported.contains(&i)) {
+            diagnostics.push(report_cycle(net, generators[i], &cycle));
             reported.extend(cycle);
         }
     }
@@ -38,31 +52,37 @@ pub(crate) fn check(net: &Net<'_>, modes: &[PlannedMode], still: &[Vec<bool>], d
 
 /// Returns the nodes that start a motion of the arm without a sample.
 ///
-/// `driving` are the nodes upstream of a command.
-fn find_generators(net: &Net<'_>, driving: &BTreeSet<usize>, is_still: &[bool]) -> Vec<usize> {
-    let (mut sampled, mut still) = (BTreeSet::new(), BTreeSet::new());
+/// `driving` holds which nodes are upstream of a command.
+fn find_generators(
+    net: &Net<'_>,
+    contact: &ContactPorts,
+    driving: &[bool],
+    is_still: &dyn Fn(usize) -> bool,
+) -> Vec<usize> {
+    let nodes = net.wires.len();
+    let (mut sampled, mut still) = (vec![false; nodes], vec![false; nodes]);
     // `moved` also contains the nodes that pass on a generated motion.
-    let (mut generators, mut moved) = (Vec::new(), BTreeSet::new());
+    let (mut generators, mut moved) = (Vec::new(), vec![false; nodes]);
     for &node in &net.order {
         let Some(spec) = net.spec(node) else { continue };
         let wires = || net.wires[node].iter().filter(|wire| !spec.inputs[wire.input].need.is_delayed);
         // A flag that nothing ties to a contact may be set forever, so it gates nothing.
-        let is_gate = |wire: &Wire| net.port(wire.source).kind != Kind::Flag || needs_contact(net, wire.source);
+        let is_gate = |wire: &Wire| net.port(wire.source).kind != Kind::Flag || contact.need(net, wire.source);
         let is_sampled =
-            |wire: &Wire| is_gate(wire) && wire.source.producer.node().is_none_or(|source| sampled.contains(&source));
+            |wire: &Wire| is_gate(wire) && wire.source.producer.node().is_none_or(|source| sampled[source]);
         if wires().any(is_sampled) {
-            sampled.insert(node);
+            sampled[node] = true;
             continue;
         }
         let sources: Vec<usize> = wires().filter_map(|wire| wire.source.producer.node()).collect();
-        let all_still = !sources.is_empty() && sources.iter().all(|source| still.contains(source));
+        let all_still = !sources.is_empty() && sources.iter().all(|source| still[*source]);
         let gives_motion = spec.outputs.iter().any(|port| matches!(port.kind, Kind::Twist | Kind::Joints));
-        if is_still[node] || all_still {
-            still.insert(node);
-        } else if sources.iter().any(|source| moved.contains(source)) {
-            moved.insert(node);
-        } else if gives_motion && driving.contains(&node) {
-            moved.insert(node);
+        if is_still(node) || all_still {
+            still[node] = true;
+        } else if sources.iter().any(|source| moved[*source]) {
+            moved[node] = true;
+        } else if gives_motion && driving[node] {
+            moved[node] = true;
             generators.push(node);
         }
     }

@@ -2,8 +2,8 @@
 
 use std::collections::BTreeSet;
 
+use crate::graph::load::FlatGraph;
 use crate::graph::net::Net;
-use crate::graph::syntax::ModeBlock;
 use crate::source::{Code, Diagnostic, Diagnostics, Item, Value};
 
 /// Reports modes that are never entered, and returns the index of the start mode.
@@ -12,7 +12,7 @@ use crate::source::{Code, Diagnostic, Diagnostics, Item, Value};
 pub(crate) fn check(net: &Net<'_>, diagnostics: &mut Diagnostics) -> Option<usize> {
     let start = find_start(net, diagnostics)?;
     let modes = &net.flat.modes;
-    let reached = reachable(start, modes);
+    let reached = reachable(start, net.flat);
     for (_, mode) in modes.iter().enumerate().filter(|(i, _)| !reached.contains(i)) {
         let name = &mode.key.name;
         let message = format!("mode `{name}` is never entered");
@@ -38,13 +38,14 @@ fn find_start(net: &Net<'_>, diagnostics: &mut Diagnostics) -> Option<usize> {
 }
 
 /// Returns the modes that can be reached from the start mode.
-fn reachable(start: usize, modes: &[ModeBlock]) -> BTreeSet<usize> {
+fn reachable(start: usize, flat: &FlatGraph) -> BTreeSet<usize> {
+    let (modes, numbers) = (&flat.modes, flat.mode_numbers());
     let (mut reached, mut open) = (BTreeSet::from([start]), vec![start]);
     while let Some(mode) = open.pop() {
         // The written targets count, so that a mistake in an exit does not make its target unreachable too.
         let mut names = Vec::new();
         modes[mode].table.entries.iter().for_each(|(_, value)| collect_targets(value, &mut names));
-        let next = names.iter().filter_map(|to| modes.iter().position(|mode| mode.key.name == **to));
+        let next = names.iter().filter_map(|to| numbers.get(to).copied());
         open.extend(next.filter(|to| reached.insert(*to)));
     }
     reached

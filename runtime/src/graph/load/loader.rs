@@ -284,7 +284,8 @@ impl Loader {
         let document = self.sections(|sections| sections.part(&root));
         self.check_part_wires(part, &document);
         self.open_parts.push(canonical);
-        let scope = Scope { inputs: part.wires.valid.clone(), parent: Some(parent), ..Scope::default() };
+        let inputs = part.wires.valid.iter().map(|wire| (wire.key.clone(), wire.clone())).collect();
+        let scope = Scope { inputs, parent: Some(parent), ..Scope::default() };
         let inner = self.flatten(document, &format!("{prefix}{}.", part.key.name), scope, flat);
         self.open_parts.pop();
         Some(inner)
@@ -317,16 +318,17 @@ impl Loader {
     }
 
     fn check_part_wires(&mut self, part: &PartBlock, document: &GraphDocument) {
-        let names = document.inputs.iter().map(|(input, _)| input.name.as_str());
+        let names = document.inputs.names();
         for key in part.wires.valid.iter().map(|wire| &wire.key) {
-            if !names.clone().any(|name| name == key.name) {
+            if document.inputs.position(&key.name).is_none() {
                 let message = format!("part `{}` has no input `{}`", part.key.name, key.name);
                 let diagnostic = Diagnostic::new(Code::UnknownInput, key.span.clone(), message);
                 self.diagnostics.push(diagnostic.suggest(&key.name, names.clone(), "inputs"));
             }
         }
-        for (input, doc) in &document.inputs {
-            if part.wires.lack(&input.name, names.clone()) {
+        let lacking = part.wires.lacking(names);
+        for (input, doc) in document.inputs.iter() {
+            if lacking.contains(input.name.as_str()) {
                 let message = format!("part `{}` needs a wire to `in.{}`: {}", part.key.name, input.name, doc.value);
                 let diagnostic = Diagnostic::new(Code::MissingInput, part.key.span.clone(), message);
                 let help = format!("add `in.{} = \"…\"`", input.name);

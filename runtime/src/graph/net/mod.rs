@@ -5,9 +5,12 @@ mod declare;
 mod order;
 mod provenance;
 mod resolve;
+mod scope_ports;
+mod sorter;
 mod wire;
 
-use std::collections::BTreeSet;
+use std::cell::OnceCell;
+use std::collections::BTreeMap;
 use std::ops::Range;
 
 use crate::catalogue::Catalogue;
@@ -18,6 +21,7 @@ use crate::node::{NodeSpec, PortSpec, Spanned};
 use crate::source::{Code, Diagnostic, Diagnostics, Key, Value};
 
 use provenance::Provenance;
+use scope_ports::ScopePorts;
 pub(crate) use wire::{CommandWire, Wire, WireOrigin};
 
 /// What a name refers to. The error is a diagnostic, or `None` if another one explains why the name refers to nothing.
@@ -45,6 +49,10 @@ pub(crate) struct Net<'a> {
     /// The nodes in the order in which they step.
     pub(crate) order: Vec<usize>,
     provenance: Provenance,
+    /// What modes set of each node and each part of the graph.
+    settings: BTreeMap<&'a str, Vec<&'a Value>>,
+    /// The ports of each scope by name, which only suggestions and views need.
+    scope_ports: Vec<OnceCell<ScopePorts>>,
 }
 
 impl<'a> Net<'a> {
@@ -130,28 +138,37 @@ impl<'a> Net<'a> {
 
     /// Returns the tables of parameters that modes set of a node.
     pub(crate) fn settings_of(&self, node: usize) -> impl Iterator<Item = &'a Value> {
-        let name = &self.flat.nodes[node].name;
-        self.flat.modes.iter().filter_map(move |mode| {
-            let mut path = name.split('.');
-            let first = mode.set.get(path.next()?)?;
-            path.try_fold(first, |value, name| value.as_table()?.get(name))
-        })
+        let mut path = self.flat.nodes[node].name.split('.');
+        let tables = path.next().and_then(|first| self.settings.get(first));
+        tables
+            .into_iter()
+            .flatten()
+            .filter_map(move |table| path.clone().try_fold(*table, |value, name| value.as_table()?.get(name)))
     }
 
-    /// Returns all nodes upstream of the given ones, including themselves.
-    pub(crate) fn upstream(&self, nodes: impl IntoIterator<Item = usize>) -> BTreeSet<usize> {
-        let mut reached: BTreeSet<usize> = nodes.into_iter().collect();
-        let mut open: Vec<usize> = reached.iter().copied().collect();
+    /// Marks the given nodes and all nodes upstream of them, and goes no further where a node is marked.
+    pub(crate) fn mark_upstream(&self, nodes: impl IntoIterator<Item = usize>, marked: &mut [bool]) {
+        let mut open: Vec<usize> = nodes.into_iter().collect();
         while let Some(node) = open.pop() {
-            let sources = self.wires[node].iter().filter_map(|wire| wire.source.producer.node());
-            open.extend(sources.filter(|source| reached.insert(*source)));
+            if !std::mem::replace(&mut marked[node], true) {
+                open.extend(self.wires[node].iter().filter_map(|wire| wire.source.producer.node()));
+            }
         }
-        reached
     }
 
-    /// Returns the nodes that read an output of a node.
-    pub(crate) fn readers(&self, node: usize) -> impl Iterator<Item = usize> {
-        let reads = move |wires: &[Wire]| wires.iter().any(|wire| wire.source.producer == Producer::Node(node));
-        self.wires.iter().enumerate().filter(move |(_, wires)| reads(wires)).map(|(reader, _)| reader)
+    /// Returns for each node whether it is one of the given ones or upstream of them.
+    pub(crate) fn upstream(&self, nodes: impl IntoIterator<Item = usize>) -> Vec<bool> {
+        let mut marked = vec![false; self.wires.len()];
+        self.mark_upstream(nodes, &mut marked);
+        marked
+    }
+
+    /// Returns for each node whether a node reads one of its outputs.
+    pub(crate) fn read_nodes(&self) -> Vec<bool> {
+        let mut is_read = vec![false; self.wires.len()];
+        for source in self.wires.iter().flatten().filter_map(|wire| wire.source.producer.node()) {
+            is_read[source] = true;
+        }
+        is_read
     }
 }

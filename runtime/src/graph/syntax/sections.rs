@@ -1,12 +1,13 @@
 //! Parses the sections of a graph file, a part and a bench, before names are resolved.
 
+use std::collections::BTreeSet;
 use std::ops::Range;
 
 use super::modes::{ModeBlock, read_mode};
 use super::policy::{AgeLimit, PolicyTable, WireTable};
 use super::read::{check_keys, read_table};
 use crate::node::{At, FilePath, Mistake, Param, Reader, Spanned};
-use crate::source::{Code, Diagnostic, Diagnostics, Item, Key, SourceMap, Table, Value, suggest_name};
+use crate::source::{Code, Diagnostic, Diagnostics, Item, Key, Named, SourceMap, Table, Value, suggest_name};
 
 /// The section `[graph]`.
 #[derive(Debug, Clone, Param)]
@@ -50,13 +51,20 @@ pub(crate) struct InputWires {
 }
 
 impl InputWires {
-    /// Returns whether an input has no wire. A wire to a misspelt name counts, since it has its own diagnostic.
-    pub(crate) fn lack<'n>(&self, input: &str, known: impl Iterator<Item = &'n str> + Clone) -> bool {
-        let is_misspelt = |key: &Key| {
-            !known.clone().any(|name| name == key.name) && suggest_name(&key.name, known.clone()) == Some(input)
-        };
-        let mut keys = self.valid.iter().map(|wire| &wire.key).chain(&self.invalid);
-        !keys.any(|key| key.name == input || is_misspelt(key))
+    /// Returns the `known` inputs that have no wire. A wire to a misspelt name counts, since it has its own diagnostic.
+    pub(crate) fn lacking<'n>(&self, known: impl Iterator<Item = &'n str> + Clone) -> BTreeSet<&'n str> {
+        let names: BTreeSet<&str> = known.clone().collect();
+        let keys = || self.valid.iter().map(|wire| &wire.key).chain(&self.invalid).map(|key| key.name.as_str());
+        let wired: BTreeSet<&str> = keys().collect();
+        let mut lacking = names.clone();
+        lacking.retain(|name| !wired.contains(name));
+        for strange in keys().filter(|key| !names.contains(key)) {
+            if lacking.is_empty() {
+                break;
+            }
+            suggest_name(strange, known.clone()).map(|meant| lacking.remove(meant));
+        }
+        lacking
     }
 }
 
@@ -83,7 +91,7 @@ pub(crate) struct PartBlock {
 pub(crate) struct GraphDocument {
     /// The span of the section [graph], and the section if it is valid.
     pub(crate) graph: Option<(Range<usize>, Option<GraphTable>)>,
-    pub(crate) roles: Vec<(Key, Spanned<String>)>,
+    pub(crate) roles: Named<Spanned<String>>,
     pub(crate) nodes: Vec<Block>,
     pub(crate) parts: Vec<PartBlock>,
     /// The wires to commands, each with its role.
@@ -93,15 +101,15 @@ pub(crate) struct GraphDocument {
     pub(crate) modes: Vec<ModeBlock>,
     /// The section [policy] as written, and parsed if it is valid.
     pub(crate) policy: Option<(Value, Option<PolicyTable>)>,
-    pub(crate) inputs: Vec<(Key, Spanned<String>)>,
-    pub(crate) exports: Vec<(Key, Spanned<String>)>,
+    pub(crate) inputs: Named<Spanned<String>>,
+    pub(crate) exports: Named<Spanned<String>>,
 }
 
 /// The sections of a bench file.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct BenchDocument {
     pub(crate) devices: Vec<Block>,
-    pub(crate) bind: Vec<(Key, Spanned<String>)>,
+    pub(crate) bind: Named<Spanned<String>>,
     /// Facts that the bench states beside those of its devices, by role.
     pub(crate) facts: Vec<(Key, Table)>,
     /// Whether limits may be in raw readings.
@@ -207,7 +215,8 @@ impl<'a> Sections<'a> {
         let nodes = self.named_tables(root.get("nodes"));
         let names = names_of(&nodes);
         let parts = self.named_tables(root.get("parts"));
-        let nodes = nodes.into_iter().filter(|(key, table)| !self.addresses_part(key, table, &parts));
+        let part_names: BTreeSet<&str> = parts.iter().map(|(key, _)| key.name.as_str()).collect();
+        let nodes = nodes.into_iter().filter(|(key, table)| !self.addresses_part(key, table, &part_names));
         let nodes: Vec<(Key, Table)> = nodes.collect();
         let nodes = nodes.into_iter().map(|(key, table)| self.node(key, table, &names)).collect();
         let parts = parts.into_iter().map(|(key, table)| self.part_block(key, table)).collect();
@@ -216,9 +225,8 @@ impl<'a> Sections<'a> {
 
     /// Returns whether a block of [nodes] addresses a node in a part, as `--set nodes.PART.NODE.…` does, and reports
     /// it.
-    fn addresses_part(&mut self, key: &Key, table: &Table, parts: &[(Key, Table)]) -> bool {
-        let is_part = parts.iter().any(|(part, _)| part.name == key.name);
-        if !is_part || table.get("type").is_some() {
+    fn addresses_part(&mut self, key: &Key, table: &Table, parts: &BTreeSet<&str>) -> bool {
+        if !parts.contains(key.name.as_str()) || table.get("type").is_some() {
             return false;
         }
         let message = format!("`{0}` is a part: set its nodes through `parts.{0}.set`", key.name);
@@ -287,7 +295,7 @@ impl<'a> Sections<'a> {
     }
 
     /// Reads a table whose values are strings.
-    fn words(&mut self, value: Option<&Value>) -> Vec<(Key, Spanned<String>)> {
+    fn words(&mut self, value: Option<&Value>) -> Named<Spanned<String>> {
         let table = self.table(value);
         let read = |(key, value): (Key, Value)| Some((key, Spanned::read(&value, &mut self.reader)?));
         table.entries.into_iter().filter_map(read).collect()
@@ -321,9 +329,9 @@ impl<'a> Sections<'a> {
     }
 
     /// Reads a table whose keys are names and whose values are strings.
-    fn names(&mut self, value: Option<&Value>) -> Vec<(Key, Spanned<String>)> {
+    fn names(&mut self, value: Option<&Value>) -> Named<Spanned<String>> {
         let words = self.words(value);
-        for (key, _) in &words {
+        for (key, _) in words.iter() {
             self.check_name(key);
         }
         words
