@@ -76,7 +76,7 @@ fn exits(block: &ModeBlock, builder: &mut Builder<'_>, nodes: &[PlannedNode]) ->
         poses: poses.map(|(source, _)| source).collect(),
         lost_after: default_max_age_ns(builder.period),
     };
-    context.resolve(block, &mut builder.diagnostics)
+    context.resolve(block, &mut builder.measured, &mut builder.diagnostics)
 }
 
 /// Builds the nodes whose parameters a mode sets.
