@@ -165,7 +165,7 @@ const SAME: [[&str; 2]; 24] = [
         "nodes.jacobian.columns.x=['-0.9 m/m', 0, 0, 0, '-20 rad/m', 0]",
     ],
     ["nodes.reach.twist=[0, 0, 0, 0, 0, 0.017453292519943295]", "nodes.reach.twist=[0, '0 mm/s', 0, 0, 0, '1 deg/s']"],
-    ["parts.touch.set.label.min_area=4", "parts.touch.set.label.min_area=4 tactel"],
+    ["parts.touch.set.label.min_area=5", "parts.touch.set.label.min_area=5 tactel"],
     [
         "modes.approach.set.reach.twist=[0, 0, 0.012, 0, 0, 0]",
         "modes.approach.set.reach.twist=[0, 0, '12 mm/s', 0, 0, 0]",

@@ -320,7 +320,8 @@ impl OutlineBuilder<'_> {
         for values in [self.measured, &self.opened.measured] {
             values.replace_texts(&mut setting.value, node);
         }
-        Setting { written: Some(written).filter(|written| *written != setting.value), ..setting }
+        let is_of_a_file = matches!(setting.origin, ValueOrigin::Written { .. });
+        Setting { written: Some(written).filter(|written| is_of_a_file && *written != setting.value), ..setting }
     }
 
     /// The path of a file, which stands relative to the file it is written in, as seen from the working folder.
