@@ -15,11 +15,10 @@ impl Reader<'_> {
     pub(super) fn in_declared_unit<'v>(&mut self, value: &'v Value) -> Option<Cow<'v, Value>> {
         let Some(text) = value.as_str() else { return Some(Cow::Borrowed(value)) };
         let known = self.unit_size();
-        let usual = known.as_ref().map(|(size, _)| size);
         let measure = match Measure::parse(text) {
             Ok(measure) => measure,
             Err(MeasureError::NoNumber | MeasureError::NoUnit) => return Some(Cow::Borrowed(value)),
-            Err(error) => return self.refuse(error_mistake(text, &error, usual, &value.span)),
+            Err(error) => return self.refuse(error_mistake(text, &error, known.as_ref(), &value.span)),
         };
         let Some((size, unit)) = known else {
             return if self.units.is_incomplete() {
@@ -66,6 +65,7 @@ impl Reader<'_> {
                 (message, format!("write `{}`", measure.number))
             }
             Some(unit) => {
+                let unit = self.unit_of_entry().unwrap_or(unit);
                 let message = format!("the unit of this number [{unit}] is not known here, so it cannot be converted");
                 (message, "write a plain number".to_owned())
             }
@@ -74,8 +74,8 @@ impl Reader<'_> {
     }
 }
 
-/// The text is no number with a unit. `size` is that of the unit that is expected, if it is known.
-fn error_mistake(text: &str, error: &MeasureError, size: Option<&UnitSize>, span: &Range<usize>) -> Mistake {
+/// The text is no number with a unit. `known` is the unit that is expected, with its text.
+fn error_mistake(text: &str, error: &MeasureError, known: Option<&(UnitSize, String)>, span: &Range<usize>) -> Mistake {
     let MeasureError::UnknownUnit { number, unit } = error else {
         return Mistake::new(
             Code::BadValue,
@@ -84,6 +84,7 @@ fn error_mistake(text: &str, error: &MeasureError, size: Option<&UnitSize>, span
         );
     };
     let mistake = Mistake::new(Code::BadValue, At::Span(span.clone()), format!("there is no unit `{unit}`"));
+    let size = known.map(|(size, _)| size);
     let usual: Vec<&str> = size.map_or_else(UnitSize::all_usual_units, |size| size.usual_units().collect());
     let close = close_unit(unit, &usual);
     let others: Vec<&str> = usual.iter().copied().filter(|unit| close.as_deref() != Some(unit)).collect();
@@ -94,7 +95,10 @@ fn error_mistake(text: &str, error: &MeasureError, size: Option<&UnitSize>, span
         }
         (Some(close), _) => format!("did you mean `\"{number} {close}\"`?"),
         (None, Some(name)) => format!("units of {name}: {}", quoted(&others)),
-        (None, None) => "write a plain number".to_owned(),
+        (None, None) => match known {
+            Some((_, unit)) => format!("write for example `\"{number} {unit}\"`"),
+            None => "write a plain number".to_owned(),
+        },
     })
 }
 
@@ -207,14 +211,89 @@ impl Amount {
             let mistake = Mistake::new(Code::BadValue, At::Span(self.span.clone()), message);
             return Err(mistake.help("write a plain number"));
         };
-        let size = UnitSize::of(unit);
-        let measure = Measure::parse(&text).map_err(|error| error_mistake(&text, &error, Some(&size), &self.span))?;
-        let wrong = || mismatch(&measure, &size, &unit.to_string(), &self.span);
-        self.number = measure.to(&size).ok_or_else(wrong)?;
+        let known = (UnitSize::of(unit), unit.to_string());
+        let measure = Measure::parse(&text).map_err(|error| error_mistake(&text, &error, Some(&known), &self.span))?;
+        self.number = measure.to(&known.0).ok_or_else(|| mismatch(&measure, &known.0, &known.1, &self.span))?;
         if !self.number.is_finite() {
             return Err(error_mistake(&text, &MeasureError::NotFinite, None, &self.span));
         }
         measured.push((self.span.clone(), written_item(self.number)));
         Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use crate::node::{KnownUnits, Map, Param, PortSpec, Reader};
+    use crate::signal::{FeaturesShape, ImageShape, Kind, Shape, Unit};
+    use crate::source::{SourceMap, parse_table};
+
+    /// Parameters in units that follow from the wires.
+    #[derive(Debug, Clone, Param)]
+    #[param(inputs = "Inputs")]
+    struct Params {
+        /// In the unit of the image.
+        #[param(unit = "U", above = 0.0)]
+        threshold: Option<f64>,
+        /// In products of it.
+        #[param(unit = "N s/U")]
+        product: Option<f64>,
+        /// In the unit of each feature, without `/s`.
+        #[param(unit = "m/_, rad/_")]
+        columns: Option<Map<[f64; 2]>>,
+        /// A number of samples.
+        #[param(unit = "sample")]
+        window: Option<u64>,
+        /// Not a number.
+        name: Option<String>,
+    }
+
+    #[allow(non_upper_case_globals, reason = "the derive looks for the letters under this name")]
+    const Inputs: crate::node::Letters = crate::node::Letters::of("U", "", true);
+
+    fn inputs() -> [PortSpec; 2] {
+        let image = PortSpec::new("image", "", Kind::Image, &["U"]);
+        [image, PortSpec::new("control", "", Kind::Features, &["_/s"])]
+    }
+
+    /// Returns the parameters, or the first message; an empty one if there is none.
+    fn read(text: &str, unit: Option<Unit>, is_incomplete: bool) -> Result<Params, String> {
+        let mut sources = SourceMap::default();
+        let table = parse_table(sources.add_file(Path::new("x.toml"), text)).unwrap();
+        let image = |unit| ("image".to_owned(), Shape::from(ImageShape { unit, ..ImageShape::default() }));
+        let features = FeaturesShape::new([("x", Unit::METRE.per_second()), ("a", Unit::AXIAL.per_second())]);
+        let wires = [unit.map(image).into_iter().collect(), vec![("control".to_owned(), Shape::from(features))]];
+        let inputs = inputs();
+        let units = KnownUnits::NONE.with_wires(&inputs, &wires, is_incomplete);
+        let mut reader = Reader::new(&sources).with_units(units);
+        let params = Params::read(&table, &mut reader);
+        params.ok_or_else(|| reader.mistakes.first().map_or_else(String::new, |mistake| mistake.message.clone()))
+    }
+
+    #[test]
+    fn letters_stand_for_the_units_of_the_wires() {
+        let good = |text: &str, unit| read(text, Some(unit), false).unwrap();
+        assert_eq!(good("threshold = '15 mN'", Unit::NEWTON).threshold, Some(0.015));
+        assert_eq!(good("threshold = '15 raw'", Unit::RAW).threshold, Some(15.0));
+        assert_eq!(good("product = '3 N ms/raw'", Unit::RAW).product, Some(0.003));
+        assert_eq!(good("product = '3 ms'", Unit::NEWTON).product, Some(0.003));
+        assert_eq!(good("columns.x = ['2 mm/m', '1 rad/cm']", Unit::RAW).columns.unwrap().0["x"], [0.002, 100.0]);
+        assert_eq!(good("columns.a = ['2 mm/rad', 1]", Unit::RAW).columns.unwrap().0["a"], [0.002, 1.0]);
+        assert_eq!(good("window = '5 sample'", Unit::RAW).window, Some(5));
+        assert_eq!(good("name = '5 sample'", Unit::RAW).name.as_deref(), Some("5 sample"), "no number");
+    }
+
+    #[test]
+    fn a_unit_that_is_not_known_is_a_mistake_unless_wires_have_one() {
+        let unknown = "the unit of this number [U] is not known here, so it cannot be converted";
+        assert_eq!(read("threshold = '15 mN'", None, false).unwrap_err(), unknown);
+        assert_eq!(read("threshold = '15 mN'", None, true).unwrap_err(), "");
+        assert_eq!(read("threshold = 0.015", None, false).unwrap().threshold, Some(0.015));
+        let other = "expected a raw reading [raw], found `15 mN`, a force";
+        assert_eq!(read("threshold = '15 mN'", Some(Unit::RAW), false).unwrap_err(), other);
+        let strange = read("columns.y = ['1 m/m', 0]", Some(Unit::RAW), false).unwrap_err();
+        assert_eq!(strange, "the unit of this number [m/_] is not known here, so it cannot be converted");
     }
 }

@@ -7,7 +7,7 @@ use super::judge::{Bound, Figure, FigureRow};
 use super::model::{Check, Scenario, row};
 use crate::catalogue::Catalogue;
 use crate::graph::{Compiled, Request, into_diagnostic};
-use crate::node::{Amount, Spanned};
+use crate::node::{Amount, Mistake, Spanned};
 use crate::record::{PortColumn, PortColumns};
 use crate::signal::Kind;
 use crate::source::{Code, Diagnostic, Item, Report, Value, suggest_name, suggestion};
@@ -165,7 +165,12 @@ impl Lookup<'_> {
         let before = self.found.len();
         let unit = table.unit.is_none().then_some(column.unit);
         let wrong = table.amounts_mut().filter_map(|amount| amount.settle(unit, &mut Vec::new()).err());
-        self.found.extend(wrong.map(into_diagnostic));
+        let own = block.table.as_ref().and_then(|table| table.unit.as_ref()?.0.keys().next());
+        let explain = |mistake: Mistake| match own {
+            Some(own) => Mistake { message: format!("this check has its own unit `{own}`"), ..mistake },
+            None => mistake,
+        };
+        self.found.extend(wrong.map(explain).map(into_diagnostic));
         if let (Some(above), Some(below)) = (number(&table.never_above), number(&table.never_below))
             && below > above
         {
