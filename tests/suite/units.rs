@@ -236,3 +236,45 @@ fn each_instance_of_a_part_reads_a_number_in_its_own_unit() {
     let raw = compile(&catalogue(), &Request::file(&graph).set("devices.pad.unit=raw")).err().unwrap();
     assert!(format!("{raw:?}").contains("expected a raw reading [raw], found `20 mN`, a force"), "{raw:?}");
 }
+
+/// Returns the text that a help suggests in place of the marked one.
+fn suggestion(help: &str) -> Option<&str> {
+    let (_, rest) = help.split_once('`')?;
+    let (text, _) = rest.split_once('`')?;
+    (help.starts_with("write") || help.starts_with("did you mean")).then_some(text)
+}
+
+#[test]
+fn every_suggested_number_works() {
+    let files = ["units", "units_of_devices", "units_of_sections", "units_of_wires"];
+    let mut count = 0;
+    for file in files {
+        let path = Path::new("errors").join(format!("{file}.toml"));
+        let text = std::fs::read_to_string(&path).unwrap();
+        let report =
+            |text: String| compile(&catalogue(), &Request { text: Some(text), ..Request::file(&path) }).err().unwrap();
+        let before = report(text.clone());
+        for diagnostic in &before.diagnostics {
+            let Some(suggested) = diagnostic.help.as_deref().and_then(suggestion) else { continue };
+            let place = before.sources.file_at(diagnostic.span.start).local(&diagnostic.span);
+            let mended = format!("{}{suggested}{}", &text[..place.start], &text[place.end..]);
+            let after = report(mended);
+            let is_left = after.diagnostics.iter().any(|other| other.span.start == diagnostic.span.start);
+            assert!(!is_left, "{file}: `{suggested}` does not mend: {}", diagnostic.message);
+            count += 1;
+        }
+    }
+    assert!(count > 30, "only {count} suggestions");
+}
+
+#[test]
+fn a_limit_that_several_nodes_read_has_one_mistake() {
+    for (key, value) in [("linear_m_per_s2", "15 mm"), ("angular_rad_per_s2", "3 deg/s"), ("force_n", "15 mm")] {
+        let request = tactflow_tests::on_the_mock_bench("hybrid.toml").set(format!("limits.{key}={value}"));
+        let report = compile(&catalogue(), &request).err().unwrap();
+        let places: Vec<String> =
+            report.diagnostics.iter().map(|one| format!("{}: {}", one.code, one.message)).collect();
+        assert_eq!(places.len(), 1, "{key}: {places:?}");
+        assert_eq!(report.sources.file_at(report.diagnostics[0].span.start).name, SourceMap::COMMAND_LINE);
+    }
+}

@@ -226,6 +226,8 @@ impl Amount {
 mod tests {
     use std::path::Path;
 
+    use proptest::prelude::*;
+
     use crate::node::{KnownUnits, Map, Param, PortSpec, Reader};
     use crate::signal::{FeaturesShape, ImageShape, Kind, Shape, Unit};
     use crate::source::{SourceMap, parse_table};
@@ -295,5 +297,16 @@ mod tests {
         assert_eq!(read("threshold = '15 mN'", Some(Unit::RAW), false).unwrap_err(), other);
         let strange = read("columns.y = ['1 m/m', 0]", Some(Unit::RAW), false).unwrap_err();
         assert_eq!(strange, "the unit of this number [m/_] is not known here, so it cannot be converted");
+    }
+
+    proptest! {
+        #[test]
+        fn every_text_is_a_number_or_has_a_message(text in "-?[0-9]{0,3}[.e]?[0-9]{0,3} ?\\PC{0,8}") {
+            let text = toml::Value::from(text).to_string();
+            for table in ["threshold = ", "product = ", "window = "].map(|key| format!("{key}{text}")) {
+                let read = read(&table, Some(Unit::NEWTON), false);
+                prop_assert!(read.is_ok() || read.is_err_and(|message| !message.is_empty()), "{}", table);
+            }
+        }
     }
 }
