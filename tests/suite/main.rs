@@ -45,5 +45,6 @@ mod tidy;
 mod tool;
 mod touch;
 mod udp_pad;
+mod units;
 mod verify;
 mod view;

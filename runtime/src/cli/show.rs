@@ -111,6 +111,8 @@ fn assignment(setting: &Setting) -> Assignment {
         ValueOrigin::Default => "default".to_owned(),
         ValueOrigin::Fact { fact, place } => format!("fact {fact} ({})", at(place)),
     };
+    let as_written = setting.written.as_ref().map(|value| format!(", written {}", written(value)));
+    let origin = origin + as_written.as_deref().unwrap_or_default();
     let (path, tall) = (path(&setting.path), tall(&setting.value));
     let text = if tall.is_some() { "[".to_owned() } else { written(&setting.value) };
     Assignment { text: format!("{path} = {text}"), origin, below: tall.map(|lines| lines + "\n]").unwrap_or_default() }

@@ -25,7 +25,7 @@ pub fn compile(catalogue: &Catalogue, request: &Request) -> Result<Compiled, Rep
 /// Compiles a graph with a loader that may have read other files before.
 pub(crate) fn compile_in(mut loader: Loader, catalogue: &Catalogue, request: &Request) -> Result<Compiled, Report> {
     let flat = loader.load(request);
-    let Loader { mut sources, mut diagnostics, .. } = loader;
+    let Loader { mut sources, mut diagnostics, mut measured, .. } = loader;
     let is_unreadable = diagnostics
         .iter()
         .any(|d| matches!(d.code, Code::Syntax | Code::Unreadable | Code::EndlessPart | Code::WrongFile));
@@ -60,15 +60,23 @@ pub(crate) fn compile_in(mut loader: Loader, catalogue: &Catalogue, request: &Re
     let policy = flat.policy.as_ref().and_then(|(_, policy)| policy.clone()).unwrap_or_default();
     let roles = builder.plan_roles(&policy);
     let ports = std::mem::take(&mut builder.ports);
-    let (diagnostics, sources) = builder.finish();
+    let (diagnostics, sources, of_nodes) = builder.finish();
+    measured.extend(of_nodes);
     let Some((clock, _)) = clock.filter(|_| diagnostics.is_empty()) else {
         return Err(Report::new(sources, diagnostics));
     };
     log_plan(&nodes, &opened, &sources);
     let max_gap = max_gap(flat.table.as_ref(), period);
-    let defaults = RefCell::default();
-    let outline =
-        OutlineBuilder { net: &net, opened: &opened, sources: &sources, nodes: &nodes, period, max_gap, defaults };
+    let outline = OutlineBuilder {
+        net: &net,
+        opened: &opened,
+        sources: &sources,
+        nodes: &nodes,
+        measured: &measured,
+        period,
+        max_gap,
+        defaults: RefCell::default(),
+    };
     let outline = outline.build();
     let mut warnings = Diagnostics::new();
     check::unused::check(&net, view.sources(), &mut warnings);

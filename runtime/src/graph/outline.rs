@@ -9,6 +9,7 @@ use std::path::Path;
 use serde::Serialize;
 
 use crate::graph::bench::{OpenedBench, fill_facts};
+use crate::graph::load::MeasuredValues;
 use crate::graph::net::{CommandWire, Net, Wire, WireOrigin};
 use crate::graph::plan::{PlannedNode, PlannedPort, PortRef};
 use crate::graph::syntax::{Block, GraphTable, ModeBlock, PolicyTable};
@@ -123,8 +124,11 @@ pub struct OutlinedPort {
 pub struct Setting {
     /// Dotted path in its block.
     pub path: String,
-    /// The value.
+    /// The value, with numbers in the units of their parameters.
     pub value: Value,
+    /// The value as written, if it has numbers with units.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub written: Option<Value>,
     /// Where it comes from.
     #[serde(flatten)]
     pub origin: ValueOrigin,
@@ -157,6 +161,8 @@ pub(crate) struct OutlineBuilder<'a> {
     pub(crate) sources: &'a SourceMap,
     /// The nodes, in the order in which they step.
     pub(crate) nodes: &'a [PlannedNode],
+    /// The values of sections and of nodes that were written with a unit.
+    pub(crate) measured: &'a MeasuredValues,
     /// Nominal time between two ticks [s].
     pub(crate) period: f64,
     /// Longest time between two samples that counts as one step [s].
@@ -175,7 +181,7 @@ impl OutlineBuilder<'_> {
             settings: self.graph(),
             roles: self.roles(),
             commands: self.net.commands.iter().map(command).collect(),
-            policy: self.table(policy.and_then(Value::as_table), &PolicyTable::fields(), ""),
+            policy: self.table(policy.and_then(Value::as_table), &PolicyTable::fields(), "", None),
             modes: flat.modes.iter().map(|mode| self.mode(mode)).collect(),
             nodes: self.nodes.iter().filter_map(|node| self.node(node)).collect(),
             devices: self.devices(),
@@ -184,12 +190,12 @@ impl OutlineBuilder<'_> {
 
     fn graph(&self) -> Vec<Setting> {
         let given = self.net.flat.settings.as_ref().and_then(Value::as_table);
-        let mut settings = self.table(given, &GraphTable::fields(), "");
+        let mut settings = self.table(given, &GraphTable::fields(), "", None);
         settings.retain(|setting| setting.path != "bench");
         if !settings.iter().any(|setting| setting.path == "max_gap_ms") {
             // A whole number of microseconds, so that no digits are there by chance.
             let gap = Value { span: NO_SPAN, item: Item::Float((self.max_gap * 1e6).round() * 1e-3) };
-            settings.push(Setting { path: "max_gap_ms".into(), value: gap, origin: ValueOrigin::Default });
+            settings.push(Setting::default_of("max_gap_ms".into(), gap));
         }
         settings
     }
@@ -210,7 +216,12 @@ impl OutlineBuilder<'_> {
         let wire = |wire: &Wire| self.wire(wire.key.name.clone(), wire.source, &wire.origin);
         let wires = self.net.wires[planned.index].iter().map(wire).collect();
         let outputs = planned.ports.iter().map(OutlinedPort::of).collect();
-        Some(OutlinedBlock { name: node.name.clone(), wires, outputs, ..self.block(&node.block, &spec.params)? })
+        Some(OutlinedBlock {
+            name: node.name.clone(),
+            wires,
+            outputs,
+            ..self.block(&node.block, &spec.params, Some(planned.index))?
+        })
     }
 
     fn wire(&self, name: String, source: PortRef, origin: &WireOrigin) -> OutlinedWire {
@@ -236,42 +247,39 @@ impl OutlineBuilder<'_> {
     fn device(&self, block: &Block) -> Option<OutlinedBlock> {
         let kind = block.kind.as_ref()?;
         let known = self.net.catalogue.find_device(&kind.value)?;
-        self.block(block, &known.params())
+        self.block(block, &known.params(), None)
     }
 
-    fn block(&self, block: &Block, specs: &[ParamSpec]) -> Option<OutlinedBlock> {
+    fn block(&self, block: &Block, specs: &[ParamSpec], node: Option<usize>) -> Option<OutlinedBlock> {
         Some(OutlinedBlock {
             name: block.key.name.clone(),
             place: self.sources.location(&block.key.span),
             kind: self.word(block.kind.as_ref()?),
             wires: Vec::new(),
-            settings: self.table(block.params.as_table(), specs, ""),
+            settings: self.table(block.params.as_table(), specs, "", node),
             outputs: Vec::new(),
         })
     }
 
     /// The settings of a table: what is given, and the defaults of what is not.
-    fn table(&self, given: Option<&Table>, specs: &[ParamSpec], path: &str) -> Vec<Setting> {
+    fn table(&self, given: Option<&Table>, specs: &[ParamSpec], path: &str, node: Option<usize>) -> Vec<Setting> {
         let mut settings = Vec::new();
         for spec in specs {
             let path = format!("{path}{}", spec.name);
             match given.and_then(|table| table.get(spec.name)) {
-                Some(value) => settings.extend(self.value(value, spec, path)),
-                None => {
-                    let value = self.default(spec);
-                    settings.extend(value.map(|value| Setting { path, value, origin: ValueOrigin::Default }));
-                }
+                Some(value) => settings.extend(self.value(value, spec, path, node)),
+                None => settings.extend(self.default(spec).map(|value| Setting::default_of(path, value))),
             }
         }
         let is_declared = |name: &str| specs.iter().any(|spec| spec.name == name);
         // A node that is known only at run time may take more than it declares.
         let more = given.iter().flat_map(|table| &table.entries).filter(|(key, _)| !is_declared(&key.name));
-        settings.extend(more.map(|(key, value)| self.setting(value, format!("{path}{}", key.name))));
+        settings.extend(more.map(|(key, value)| self.setting(value, format!("{path}{}", key.name), node)));
         settings
     }
 
-    fn value(&self, value: &Value, spec: &ParamSpec, path: String) -> Vec<Setting> {
-        let fields = |table: &Table, path: &str| self.table(Some(table), &spec.fields, &format!("{path}."));
+    fn value(&self, value: &Value, spec: &ParamSpec, path: String, node: Option<usize>) -> Vec<Setting> {
+        let fields = |table: &Table, path: &str| self.table(Some(table), &spec.fields, &format!("{path}."), node);
         match (value.as_section(), spec.repeats) {
             (Some(table), Repeats::Once) if !spec.fields.is_empty() => fields(table, &path),
             (Some(section), Repeats::PerName) => {
@@ -279,13 +287,13 @@ impl OutlineBuilder<'_> {
                     let path = format!("{path}.{}", key.name);
                     match value.as_section().filter(|_| !spec.fields.is_empty()) {
                         Some(table) => fields(table, &path),
-                        None => vec![self.setting(value, path)],
+                        None => vec![self.setting(value, path, node)],
                     }
                 };
                 section.entries.iter().flat_map(entry).collect()
             }
             _ => {
-                let mut setting = self.setting(value, path);
+                let mut setting = self.setting(value, path, node);
                 self.resolve(&mut setting, spec);
                 self.complete(&mut setting.value, spec);
                 vec![setting]
@@ -294,7 +302,7 @@ impl OutlineBuilder<'_> {
     }
 
     /// A value as it was written, or the fact that it asks for.
-    fn setting(&self, value: &Value, path: String) -> Setting {
+    fn setting(&self, value: &Value, path: String, node: Option<usize>) -> Setting {
         let word = value.as_table().and_then(Table::fact).map(|fact| fact.word);
         let role = word.and_then(|word| word.split_once('.'));
         let role = role.and_then(|(role, _)| self.net.flat.roles.position(role));
@@ -310,7 +318,17 @@ impl OutlineBuilder<'_> {
             // A value from [limits] keeps its place there.
             _ => ValueOrigin::Written { place: self.sources.location(&filled.span) },
         };
-        Setting { path, value: filled, origin }
+        self.in_units(Setting { path, value: filled, written: None, origin }, node)
+    }
+
+    /// Replaces the numbers that were written with a unit by those that were read.
+    fn in_units(&self, mut setting: Setting, node: Option<usize>) -> Setting {
+        let written = setting.value.clone();
+        for values in [self.measured, &self.opened.measured] {
+            values.replace_texts(&mut setting.value, node);
+        }
+        let is_of_a_file = matches!(setting.origin, ValueOrigin::Written { .. });
+        Setting { written: Some(written).filter(|written| is_of_a_file && *written != setting.value), ..setting }
     }
 
     /// The path of a file, which stands relative to the file it is written in, as seen from the working folder.
@@ -368,9 +386,16 @@ impl OutlineBuilder<'_> {
             }
             None => {
                 let origin = ValueOrigin::Written { place: self.sources.location(&value.span) };
-                settings.push(Setting { path: path.to_owned(), value: value.clone(), origin });
+                let setting = Setting { path: path.to_owned(), value: value.clone(), written: None, origin };
+                settings.push(self.in_units(setting, None));
             }
         }
+    }
+}
+
+impl Setting {
+    fn default_of(path: String, value: Value) -> Self {
+        Self { path, value, written: None, origin: ValueOrigin::Default }
     }
 }
 

@@ -56,7 +56,7 @@ codes! {
     MissingInput "missing-input",
     /// A wire between ports of different kinds.
     KindMismatch "kind-mismatch",
-    /// A wire between ports of different units.
+    /// A wire between ports of different units, or a number in a unit that measures something else.
     UnitMismatch "unit-mismatch",
     /// A wire between ports in different frames.
     FrameMismatch "frame-mismatch",

@@ -29,7 +29,7 @@ impl Param for PerTactel {
     fn read(value: &Value, reader: &mut Reader<'_>) -> Option<Self> {
         match &value.item {
             Item::Array(_) => Vec::read(value, reader).map(Self::Rows),
-            Item::Integer(_) | Item::Float(_) => f64::read(value, reader).map(Self::All),
+            Item::Integer(_) | Item::Float(_) | Item::String(_) => f64::read(value, reader).map(Self::All),
             _ => reader.wrong_type(value, Self::EXPECTS),
         }
     }

@@ -6,10 +6,11 @@ use std::ops::Range;
 
 use crate::catalogue::Catalogue;
 use crate::device::{Description, StatedPort};
+use crate::graph::load::MeasuredValues;
 use crate::graph::net::Net;
 use crate::graph::plan::PlannedDevice;
 use crate::graph::syntax::{BenchDocument, Block, WireEntry};
-use crate::node::{Mistake, PortSpec, Reader, Spanned};
+use crate::node::{KnownUnits, Mistake, PortSpec, Reader, Spanned};
 use crate::signal::Shape;
 use crate::source::{Code, Diagnostic, Diagnostics, Key, SourceMap, Value, quoted, suggest_name, suggestion};
 
@@ -31,6 +32,8 @@ pub(crate) struct OpenedBench {
     pub(crate) roles: Vec<Option<BoundRole>>,
     /// Roles for scenarios and recordings only, in the order of `Net::observed`.
     pub(crate) observed: Vec<Option<BoundRole>>,
+    /// The values of parameters that were written with a unit.
+    pub(crate) measured: MeasuredValues,
 }
 
 impl OpenedBench {
@@ -214,9 +217,11 @@ impl Opener<'_> {
         };
         let kind = block.kind.as_ref()?;
         let device = self.catalogue.find_device(&kind.value)?;
-        let mut reader = Reader::new(self.sources);
+        let specs = device.params();
+        let mut reader = Reader::new(self.sources).with_units(KnownUnits::of_params(&block.params, &specs));
         let opened = device.open(&block.params, &mut reader);
-        let mistakes = reader.mistakes;
+        let (mistakes, measured) = (reader.mistakes, reader.measured);
+        self.opened.measured.add(None, measured);
         place_mistakes(mistakes, &block.params, &[], self.sources, self.diagnostics);
         let crate::device::Opened { mut description, driver } = opened?;
         let period = description.period;

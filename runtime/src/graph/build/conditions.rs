@@ -4,9 +4,10 @@ use std::collections::BTreeMap;
 use std::f64::consts::FRAC_PI_2;
 use std::ops::Range;
 
+use crate::graph::load::MeasuredValues;
 use crate::graph::net::{Net, Resolved};
 use crate::graph::plan::{Condition, PlannedExit, PlannedPort, PortRef, Test, WatchedPort};
-use crate::graph::syntax::{ExitKind, ExitTable, ModeBlock, ModeExit, PortState};
+use crate::graph::syntax::{ExitKind, ExitTable, ModeBlock, ModeExit, PortState, into_diagnostic};
 use crate::node::Spanned;
 use crate::signal::{Kind, Shape};
 use crate::source::{Code, Diagnostic, Diagnostics, quoted};
@@ -26,12 +27,18 @@ pub(crate) struct ExitContext<'a> {
 
 impl ExitContext<'_> {
     /// Resolves the exits of a mode; exits with a mistake are left out.
-    pub(crate) fn resolve(&self, mode: &ModeBlock, diagnostics: &mut Diagnostics) -> Vec<PlannedExit> {
+    pub(crate) fn resolve(
+        &self,
+        mode: &ModeBlock,
+        measured: &mut MeasuredValues,
+        diagnostics: &mut Diagnostics,
+    ) -> Vec<PlannedExit> {
         let mut planned = Vec::new();
         for exit in &mode.exits {
             let ModeExit { kind, span, table } = exit;
             diagnostics.extend(misplaced_key(exit));
-            match (self.target(exit), self.condition(exit)) {
+            let settled = self.in_port_unit(exit, measured, diagnostics);
+            match (self.target(exit), settled.and_then(|exit| self.condition(&exit))) {
                 (Ok(to), Ok((condition, text))) => planned.push(PlannedExit {
                     kind: *kind,
                     to,
@@ -48,6 +55,36 @@ impl ExitContext<'_> {
             }
         }
         planned
+    }
+
+    /// Returns an exit with its bounds in the unit of the port that it watches.
+    fn in_port_unit(
+        &self,
+        exit: &ModeExit,
+        measured: &mut MeasuredValues,
+        diagnostics: &mut Diagnostics,
+    ) -> Resolved<ModeExit> {
+        let mut exit = exit.clone();
+        if !exit.table.amounts_mut().any(|amount| amount.has_unit()) {
+            return Ok(exit);
+        }
+        let Some(when) = exit.table.when.clone() else { return Ok(exit) };
+        let (watched, _) = self.watched(&when)?;
+        let unit = match (&(self.port)(watched.source).ok_or(None)?.shape, watched.feature) {
+            (Shape::Scalar(shape), None) => shape.unit,
+            (Shape::Features(shape), Some(feature)) => shape.features[feature].unit,
+            // A bound on another port has its own diagnostic.
+            _ => return Ok(exit),
+        };
+        let mut numbers = Vec::new();
+        let wrong = exit.table.amounts_mut().filter_map(|amount| amount.settle(Some(unit), &mut numbers).err());
+        let wrong: Vec<_> = wrong.map(into_diagnostic).collect();
+        measured.add(None, numbers);
+        if wrong.is_empty() {
+            return Ok(exit);
+        }
+        diagnostics.extend(wrong);
+        Err(None)
     }
 
     /// Returns the index of the target mode, or `None` if the exit ends the run.
@@ -193,8 +230,10 @@ impl ExitContext<'_> {
         when: &Spanned<String>,
         name: &str,
         watched: WatchedPort,
-        &ExitTable { within, above, below, hysteresis, .. }: &ExitTable,
+        table: &ExitTable,
     ) -> Resolved<(Condition, String)> {
+        let [within, above, below, hysteresis] = [&table.within, &table.above, &table.below, &table.hysteresis]
+            .map(|amount| amount.as_ref().map(|amount| amount.number));
         let out_of_range = |message: String| Diagnostic::new(Code::BoundOutOfRange, when.span.clone(), message);
         let (min, max, text) = match (within, above, below) {
             (Some(size), ..) => (-size, size, format!("within {size}")),

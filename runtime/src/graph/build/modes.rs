@@ -76,7 +76,8 @@ fn exits(builder: &mut Builder<'_>, nodes: &[PlannedNode]) -> Vec<Vec<PlannedExi
         poses: poses.map(|(source, _)| source).collect(),
         lost_after: default_max_age_ns(builder.period),
     };
-    builder.net.flat.modes.iter().map(|block| context.resolve(block, &mut builder.diagnostics)).collect()
+    let (net, measured, diagnostics) = (builder.net, &mut builder.measured, &mut builder.diagnostics);
+    net.flat.modes.iter().map(|block| context.resolve(block, measured, diagnostics)).collect()
 }
 
 /// Builds the nodes whose parameters a mode sets.

@@ -4,6 +4,7 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 use super::flat::{Entity, FlatGraph, FlatNode, Scope};
+use super::measured::MeasuredValues;
 use crate::graph::syntax::{BenchDocument, GraphDocument, PartBlock, Sections};
 use crate::source::{BuiltinFile, Code, Diagnostic, Diagnostics, Item, Key, SourceMap, Table, Value, parse_table};
 
@@ -53,6 +54,8 @@ impl Request {
 pub(crate) struct Loader {
     pub(crate) sources: SourceMap,
     pub(crate) diagnostics: Diagnostics,
+    /// The values of sections that were written with a unit.
+    pub(crate) measured: MeasuredValues,
     open_parts: Vec<PathBuf>,
     /// Whether the maximum number of parts is exceeded, so that loading stops.
     is_full: bool,
@@ -113,7 +116,9 @@ impl Loader {
     fn sections<T>(&mut self, read: impl FnOnce(&mut Sections<'_>) -> T) -> T {
         let mut sections = Sections::new(&self.sources);
         let result = read(&mut sections);
-        self.diagnostics.extend(sections.finish());
+        let (diagnostics, measured) = sections.finish();
+        self.diagnostics.extend(diagnostics);
+        self.measured.add(None, measured);
         result
     }
 

@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use super::read::{check_keys, read_table, read_word};
-use crate::node::{Param, Reader, Spanned};
+use crate::node::{Amount, Param, Reader, Spanned};
 use crate::source::{Item, Key, Table, Value};
 
 /// A mode: the parameters it sets and its exits.
@@ -94,16 +94,16 @@ pub(crate) struct ExitTable {
     pub(crate) is: Option<PortState>,
     /// Lower bound of the port.
     #[param(unit = "_")]
-    pub(crate) above: Option<f64>,
+    pub(crate) above: Option<Amount>,
     /// Upper bound of the port.
     #[param(unit = "_")]
-    pub(crate) below: Option<f64>,
+    pub(crate) below: Option<Amount>,
     /// Upper bound of the absolute value of the port.
     #[param(unit = "_", above = 0.0)]
-    pub(crate) within: Option<f64>,
+    pub(crate) within: Option<Amount>,
     /// How far the port may cross back over a bound before the condition ends.
     #[param(unit = "_", range = 0.0..)]
-    pub(crate) hysteresis: Option<f64>,
+    pub(crate) hysteresis: Option<Amount>,
     /// How long the condition must hold, counted from new sample to new sample.
     #[param(unit = "ms", range = 0.0..=3.6e6)]
     pub(crate) for_ms: Option<f64>,
@@ -120,6 +120,13 @@ pub(crate) struct ExitTable {
     pub(crate) on: Option<Spanned<String>>,
     /// Priority among `go` exits that hold at once: the greatest wins.
     pub(crate) priority: Option<u64>,
+}
+
+impl ExitTable {
+    /// Returns the numbers in the unit of the port.
+    pub(crate) fn amounts_mut(&mut self) -> impl Iterator<Item = &mut Amount> {
+        [&mut self.above, &mut self.below, &mut self.within, &mut self.hysteresis].into_iter().flatten()
+    }
 }
 
 /// Reads the block of a mode.

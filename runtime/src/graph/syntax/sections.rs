@@ -6,7 +6,7 @@ use std::ops::Range;
 use super::modes::{ModeBlock, read_mode};
 use super::policy::{AgeLimit, PolicyTable, WireTable};
 use super::read::{check_keys, read_table};
-use crate::node::{At, FilePath, Mistake, Param, Reader, Spanned};
+use crate::node::{At, FilePath, Measured, Mistake, Param, Reader, Spanned};
 use crate::source::{Code, Diagnostic, Diagnostics, Item, Key, Named, SourceMap, Table, Value, suggest_name};
 
 /// The section `[graph]`.
@@ -138,11 +138,11 @@ impl<'a> Sections<'a> {
         Self { reader: Reader::new(sources), diagnostics: Vec::new(), broken: Vec::new() }
     }
 
-    /// Returns all diagnostics.
-    pub(crate) fn finish(self) -> Diagnostics {
+    /// Returns all diagnostics, and the values that were written with a unit.
+    pub(crate) fn finish(self) -> (Diagnostics, Measured) {
         let mut diagnostics = self.diagnostics;
         diagnostics.extend(self.reader.mistakes.into_iter().map(into_diagnostic));
-        diagnostics
+        (diagnostics, self.reader.measured)
     }
 
     /// Reads the sections of a graph file.
