@@ -14,6 +14,7 @@ mod docs;
 mod erased;
 mod errors;
 mod examples;
+mod explain;
 mod faults;
 mod features;
 mod flow;

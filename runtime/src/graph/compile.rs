@@ -41,7 +41,7 @@ pub(crate) fn compile_in(mut loader: Loader, catalogue: &Catalogue, request: &Re
     let view = check::view::check(&net, &mut diagnostics);
     let mut frames = check::frames::check(&net, &mut diagnostics);
     check::limits::check(&net, &mut frames, &mut diagnostics);
-    check::limit_values::check(&net, &mut diagnostics);
+    check::limit_values::check(&net, &sources, &mut diagnostics);
     let clock = check::clock::check(&net, &opened, &mut diagnostics);
     let period = clock.map_or(1.0, |(_, period)| period);
     let mut builder = Builder::new(&net, &opened, frames, (diagnostics, sources), period);
@@ -57,6 +57,7 @@ pub(crate) fn compile_in(mut loader: Loader, catalogue: &Catalogue, request: &Re
     let ports = std::mem::take(&mut builder.ports);
     let (diagnostics, sources) = builder.finish();
     let Some((clock, _)) = clock.filter(|_| diagnostics.is_empty()) else {
+        let diagnostics = check::parts::move_out(&flat, &sources, diagnostics);
         return Err(Report::new(sources, diagnostics));
     };
     log_plan(&nodes, &opened, &sources);
@@ -65,6 +66,7 @@ pub(crate) fn compile_in(mut loader: Loader, catalogue: &Catalogue, request: &Re
     let outline = outline.build();
     let mut warnings = Diagnostics::new();
     check::unused::check(&net, view.sources(), &mut warnings);
+    let warnings = check::parts::move_out(&flat, &sources, warnings);
     let view = view.plan(&net, &nodes, &ports);
     let reset_after = flat.table.as_ref().map_or(0, |table| (table.reset_after_ms * 1e6) as i64);
     let period = ((period * 1e9).round() as i64).max(1);

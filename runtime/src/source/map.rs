@@ -26,6 +26,12 @@ impl SourceFile {
         self.base..self.base + self.text.len()
     }
 
+    /// Returns whether the text is a file that is built into a catalogue.
+    #[must_use]
+    pub fn is_builtin(&self) -> bool {
+        self.name.starts_with(BUILTIN)
+    }
+
     /// Converts a range of the source map into a range of this text.
     #[must_use]
     pub fn local(&self, span: &Range<usize>) -> Range<usize> {
@@ -94,6 +100,16 @@ impl SourceMap {
                 Err((format!("there is no built-in file `{name}`"), help))
             }
         }
+    }
+
+    /// Returns how often a word occurs in the texts and in the built-in graph files, comments excepted.
+    pub(crate) fn occurrences(&self, word: &str) -> usize {
+        let builtin = self.builtin.iter().filter(|(name, _)| name.ends_with(".toml"));
+        let builtin = builtin.filter_map(|(_, bytes)| std::str::from_utf8(bytes).ok());
+        let texts = self.files.iter().map(|file| file.text.as_str()).chain(builtin);
+        let is_end = |c: char| !(c.is_ascii_alphanumeric() || c == '_');
+        let code = texts.flat_map(str::lines).filter_map(|line| line.split('#').next());
+        code.flat_map(|code| code.split(is_end)).filter(|other| *other == word).count()
     }
 
     /// Resolves a path written at offset `at`, relative to the folder of the file that contains it.

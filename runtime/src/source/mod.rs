@@ -3,12 +3,18 @@
 //! This is the lowest layer: it has no notion of graphs, nodes or devices.
 
 mod diagnostic;
+mod fix;
 mod map;
+mod report;
 mod suggest;
+mod syntax;
 mod value;
 
-pub use diagnostic::{Code, Diagnostic, Diagnostics, Report, Severity};
+pub use diagnostic::{Code, Diagnostic, Diagnostics, Severity};
+pub use fix::Edit;
 pub use map::{BuiltinFile, Location, SourceFile, SourceMap};
+pub use report::Report;
 pub(crate) use suggest::quoted;
-pub use suggest::{suggest_name, suggestion};
-pub use value::{Item, Key, Table, Value, parse_table};
+pub use suggest::{did_you_mean, suggest_name, suggest_path, suggestion};
+pub use syntax::parse_table;
+pub use value::{Item, Key, Table, Value};

@@ -141,7 +141,7 @@ impl ExitContext<'_> {
             Some((at, _)) => (&word.value[..at], Some(&word.value[at + 1..])),
             None => (word.value.as_str(), None),
         };
-        let source = self.net.resolve(0, &Spanned { value: name.to_owned(), span: word.span.clone() })?;
+        let source = self.net.resolve(0, &Spanned { value: name.to_owned(), span: word.part(0..name.len()) })?;
         let Some(feature) = feature else { return Ok((WatchedPort { source, feature: None }, name.to_owned())) };
         let unknown = |message: String| Diagnostic::new(Code::UnknownPort, word.span.clone(), message);
         let shape = &(self.port)(source).ok_or(None)?.shape;
@@ -151,7 +151,10 @@ impl ExitContext<'_> {
         };
         let Some(at) = features.names().position(|known| known == feature) else {
             let message = format!("`{name}` has no feature `{feature}`");
-            return unknown(message).suggest(feature, features.names(), "features").into_err();
+            let at = word.part(name.len() + 1..word.value.len());
+            return Diagnostic::new(Code::UnknownPort, at, message)
+                .suggest(feature, features.names(), "features")
+                .into_err();
         };
         Ok((WatchedPort { source, feature: Some(at) }, format!("{name}.{feature}")))
     }

@@ -116,6 +116,7 @@ fn collect_tables(
         let unknown = |message: String| Diagnostic::new(Code::UnknownKey, key.span.clone(), message);
         match names.get(&key.name) {
             Some((_, Entity::Node(node))) => tables.entry(*node).or_default().merge(table.clone()),
+            Some((_, Entity::Unknown)) => {}
             Some((_, Entity::Part(inner))) => collect_tables(flat, *inner, table, tables, diagnostics),
             Some((_, Entity::Role(_))) => {
                 let message = format!("`{}` is a role: a mode sets only parameters of nodes", key.name);

@@ -1,7 +1,7 @@
 //! Checks that every command of a role has a wire.
 
 use crate::graph::net::Net;
-use crate::source::{Code, Diagnostic, Diagnostics, Key};
+use crate::source::{Code, Diagnostic, Diagnostics, Edit, Key};
 
 /// Reports each command that nothing drives.
 pub(crate) fn check(net: &Net<'_>, diagnostics: &mut Diagnostics) {
@@ -18,9 +18,18 @@ pub(crate) fn check(net: &Net<'_>, diagnostics: &mut Diagnostics) {
             if !net.flat.commands.iter().any(|(role, wire)| is_driven(role, &wire.key) || is_misspelt(role, &wire.key))
             {
                 let message = format!("nothing drives `{}.{}`", key.name, command.name);
-                let port = net.find_candidate(0, usize::MAX, command).unwrap_or_else(|| "node.port".into());
-                let help = format!("add `{}.{} = \"{port}\"` under [commands]", key.name, command.name);
-                diagnostics.push(Diagnostic::new(Code::UndrivenCommand, key.span.clone(), message).help(help));
+                let diagnostic = Diagnostic::new(Code::UndrivenCommand, key.span.clone(), message);
+                diagnostics.push(match net.find_candidate(0, usize::MAX, command) {
+                    Some(port) => {
+                        let line = format!("{}.{} = \"{port}\"", key.name, command.name);
+                        let edit = match net.flat.commands.last() {
+                            Some((_, wire)) => Edit::Below(wire.key.span.clone(), line.clone()),
+                            None => Edit::Append(key.span.clone(), format!("\n[commands]\n{line}")),
+                        };
+                        diagnostic.help(format!("add `{line}` under [commands]")).edit(edit)
+                    }
+                    None => diagnostic.help(format!("wire {} to it under [commands]", command.kind.with_article())),
+                });
             }
         }
     }

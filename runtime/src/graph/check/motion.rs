@@ -22,6 +22,10 @@ pub(crate) fn check(net: &Net<'_>, modes: &[PlannedMode], still: &[Vec<bool>], d
         report_in_graph(net, &generators.concat(), diagnostics);
         return;
     }
+    // An exit with a mistake may be the one that ends the motion.
+    if net.flat.modes.iter().any(|mode| mode.has_any(diagnostics)) {
+        return;
+    }
     let ended = find_ended(modes, &generators, net);
     for (i, block) in net.flat.modes.iter().enumerate().filter(|(i, _)| !ended[*i]) {
         diagnostics.push(report_in_mode(net, &generators[i], block));
@@ -39,7 +43,10 @@ fn find_generators(net: &Net<'_>, driving: &BTreeSet<usize>, is_still: &[bool]) 
         let Some(spec) = net.spec(node) else { continue };
         let wires = || net.wires[node].iter().filter(|wire| !spec.inputs[wire.input].need.is_delayed);
         let is_sampled = |wire: &Wire| wire.source.producer.node().is_none_or(|source| sampled.contains(&source));
-        if wires().any(is_sampled) {
+        // A wire with a mistake may be the gate.
+        let given = &net.flat.nodes[node].block.wires;
+        let has_mistake = given.has_invalid() || given.valid.len() != net.wires[node].len();
+        if has_mistake || wires().any(is_sampled) {
             sampled.insert(node);
             continue;
         }

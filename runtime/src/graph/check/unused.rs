@@ -57,7 +57,8 @@ fn suggest_wire(net: &Net<'_>, node: usize) -> Option<String> {
     });
     inputs.find_map(|(other, input)| {
         let output = outputs.iter().find(|output| may_fit(output, input))?;
-        let name = if input.need.is_many { "NAME" } else { &*input.name };
+        // A repeated input takes any name, for example that of the node.
+        let name = if input.need.is_many { &flat[node].block.key.name } else { &*input.name };
         let (from, to) = (&flat[node].block.key.name, &flat[other].block.key.name);
         Some(format!("`in.{name} = \"{from}.{}\"` to `{to}`", output.name))
     })

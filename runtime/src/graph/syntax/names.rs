@@ -1,0 +1,189 @@
+//! Misspelt definitions: nothing refers to the name, while other places refer to a similar name that does not exist.
+//!
+//! Such a name is reported once, at its definition, and the graph is then read as it was meant. Whether the definition
+//! or the reference is misspelt is decided by the number of times that each name occurs in the files.
+
+use std::ops::Range;
+
+use super::reserved::{INPUTS, LIMITS, is_name};
+use super::sections::{BenchDocument, GraphDocument};
+use crate::node::Spanned;
+use crate::source::{Code, Diagnostic, Diagnostics, Edit, Item, Key, SourceMap, Value, suggest_name};
+
+/// A reference to a port: the name of the node, role or part, and the port unless the reference is to the whole.
+#[derive(Debug, Clone)]
+pub(crate) struct Use {
+    pub(crate) name: String,
+    pub(crate) port: Option<String>,
+    pub(crate) span: Range<usize>,
+}
+
+impl Use {
+    fn of(word: &Spanned<String>) -> Self {
+        let (name, port) = word.value.split_once('.').map_or((&*word.value, None), |(name, port)| (name, Some(port)));
+        Self { name: name.to_owned(), port: port.map(str::to_owned), span: word.span.clone() }
+    }
+
+    fn of_key(key: &Key) -> Self {
+        Self { name: key.name.clone(), port: None, span: key.span.clone() }
+    }
+
+    /// Returns the reference to the port inside `name`, as a reference to a name of its own.
+    pub(crate) fn inside(&self, name: &str) -> Option<Self> {
+        let port = self.port.as_ref().filter(|_| self.name == name)?;
+        Some(Self { name: port.clone(), port: None, span: self.span.clone() })
+    }
+}
+
+/// Gives each misspelt definition the name that its references use, and reports it.
+///
+/// `may_be` tests whether a definition, by its index, could be what a name refers to. With `may_be_far`, the only unused
+/// definition is what the only unknown name refers to, even if they are not alike.
+fn correct<'k>(
+    code: Code,
+    defined: impl IntoIterator<Item = &'k mut Key>,
+    uses: &[Use],
+    may_be: &dyn Fn(usize, &str) -> bool,
+    may_be_far: bool,
+    sources: &SourceMap,
+) -> Diagnostics {
+    let mut defined: Vec<&mut Key> = defined.into_iter().collect();
+    let names: Vec<String> = defined.iter().map(|key| key.name.clone()).collect();
+    let count = |name: &str| uses.iter().filter(|reference| reference.name == name).count();
+    let mut unused: Vec<usize> = (0..names.len()).filter(|i| count(&names[*i]) == 0).collect();
+    let mut unknown: Vec<&Use> = Vec::new();
+    for reference in uses.iter().filter(|reference| !names.contains(&reference.name)) {
+        if !unknown.iter().any(|other| other.name == reference.name) {
+            unknown.push(reference);
+        }
+    }
+    let mut found = Diagnostics::new();
+    for first in &unknown {
+        let wanted = &first.name;
+        let candidates: Vec<usize> = unused.iter().copied().filter(|i| may_be(*i, wanted)).collect();
+        let near = suggest_name(wanted, candidates.iter().map(|i| names[*i].as_str()));
+        let is_nearest = count(wanted) > 1 || near == suggest_name(wanted, names.iter().map(String::as_str));
+        let close = candidates.iter().find(|i| near == Some(&names[**i])).filter(|_| is_nearest);
+        let is_only = may_be_far && (unknown.len(), candidates.len()) == (1, 1);
+        let only = candidates.first().filter(|_| is_only && count(wanted) > 1);
+        let Some(&i) = close.or(only) else { continue };
+        let is_invalid = !is_name(&names[i]);
+        let is_rarer = || sources.occurrences(&names[i]) < sources.occurrences(wanted);
+        if is_invalid || count(wanted) > 1 || is_rarer() {
+            let message = if is_invalid {
+                format!("`{}` is not a valid name", names[i])
+            } else {
+                format!("nothing refers to `{}`, but `{wanted}` is used and does not exist", names[i])
+            };
+            let code = if is_invalid { Code::BadName } else { code };
+            let diagnostic = Diagnostic::new(code, defined[i].span.clone(), message);
+            let diagnostic = diagnostic.note(first.span.clone(), format!("`{wanted}` is used here"));
+            found.push(diagnostic.instead(&names[i], wanted));
+            defined[i].name.clone_from(wanted);
+            unused.retain(|other| *other != i);
+        }
+    }
+    found
+}
+
+impl GraphDocument {
+    /// Returns the references in this file to its roles, nodes and parts, and to the inputs of the part.
+    pub(crate) fn uses(&self) -> Vec<Use> {
+        let nodes = self.nodes.iter().map(|node| &node.wires).chain(self.parts.iter().map(|part| &part.wires));
+        let wires = nodes.flat_map(|wires| &wires.valid).chain(self.commands.iter().map(|(_, wire)| wire));
+        let mut uses: Vec<Use> = wires.map(|wire| Use::of(&wire.from)).collect();
+        uses.extend(self.exports.iter().map(|(_, word)| Use::of(word)));
+        uses.extend(self.commands.iter().map(|(role, _)| Use::of_key(role)));
+        let exits = self.modes.iter().flat_map(|mode| &mode.exits);
+        uses.extend(exits.flat_map(|exit| [&exit.table.when, &exit.table.of]).flatten().map(Use::of));
+        uses.extend(self.modes.iter().flat_map(|mode| &mode.set.entries).map(|(key, _)| Use::of_key(key)));
+        // The facts in a part are those of the roles of the graph.
+        let facts = self.nodes.iter().filter(|_| !self.roles.is_empty()).flat_map(|node| node.params.facts());
+        let fact = |(word, span): (&str, &Range<usize>)| Use::of(&Spanned { value: word.into(), span: span.clone() });
+        uses.extend(facts.map(fact).filter(|reference| reference.name != LIMITS));
+        if let Some((_, Some(graph))) = &self.graph {
+            let mark = graph.mark.iter().flatten();
+            uses.extend(graph.clock.iter().chain(graph.show.iter().flatten()).chain(mark).map(Use::of));
+        }
+        uses
+    }
+
+    /// Corrects the names of roles, nodes, parts and modes. Only a role can have a name that the bench `binds`.
+    ///
+    /// `set` are the names of nodes and parts that the graph around a part sets.
+    pub(crate) fn correct_names(
+        &mut self,
+        binds: &[(Key, Spanned<String>)],
+        set: &[&Key],
+        sources: &SourceMap,
+    ) -> Diagnostics {
+        let uses = self.uses().into_iter().filter(|reference| reference.name != INPUTS);
+        let uses: Vec<Use> = uses.chain(set.iter().map(|key| Use::of_key(key))).collect();
+        let roles = self.roles.len();
+        let may_be = |i: usize, name: &str| i < roles || !binds.iter().any(|(role, _)| role.name == name);
+        let nodes =
+            self.nodes.iter_mut().map(|node| &mut node.key).chain(self.parts.iter_mut().map(|part| &mut part.key));
+        let names = self.roles.iter_mut().map(|(key, _)| key).chain(nodes);
+        let mut found = correct(Code::UnknownPort, names, &uses, &may_be, true, sources);
+        let start = self.graph.iter().filter_map(|(_, graph)| graph.as_ref()?.start.as_ref());
+        let mut targets: Vec<Use> = start.map(Use::of).collect();
+        self.modes.iter().flat_map(|mode| &mode.table.entries).for_each(|(_, value)| add_targets(value, &mut targets));
+        let modes = self.modes.iter_mut().map(|mode| &mut mode.key);
+        found.extend(correct(Code::UnknownMode, modes, &targets, &|_, _| true, true, sources));
+        found
+    }
+
+    /// Corrects the names of the inputs and exports of a part, given the wires into it and the references to it.
+    pub(crate) fn correct_ports(&mut self, wires: &[&Key], reads: &[Use], sources: &SourceMap) -> Diagnostics {
+        let inner: Vec<Use> = self.uses().iter().filter_map(|reference| reference.inside(INPUTS)).collect();
+        let outer: Vec<Use> = wires.iter().map(|key| Use::of_key(key)).collect();
+        let inputs = self.inputs.iter_mut().map(|(key, _)| key);
+        let uses = [&inner[..], &outer[..]].concat();
+        let mut found = correct(Code::UnknownInput, inputs, &uses, &|_, _| true, true, sources);
+        let exports = self.exports.iter_mut().map(|(key, _)| key);
+        found.extend(correct(Code::UnknownPort, exports, reads, &|_, _| true, false, sources));
+        found.extend(self.declare_missing(&inner, &outer));
+        found
+    }
+
+    /// Declares each input that the graph wires and the part reads, and reports that it is not declared.
+    fn declare_missing(&mut self, inner: &[Use], outer: &[Use]) -> Diagnostics {
+        let mut found = Diagnostics::new();
+        for read in inner {
+            let is_declared = self.inputs.iter().any(|(key, _)| key.name == read.name);
+            if is_declared || !outer.iter().any(|wire| wire.name == read.name) {
+                continue;
+            }
+            let place = self.inputs.last().map_or(&read.span, |(key, _)| &key.span).clone();
+            let message = format!("the part reads the input `{}` and does not declare it", read.name);
+            let line = format!("{} = \"what it is\"", read.name);
+            let help = format!("add `{line}` under [inputs]");
+            let diagnostic = Diagnostic::new(Code::UnknownInput, place.clone(), message).help(help);
+            found.push(diagnostic.note(read.span.clone(), "it reads it here").edit(Edit::Below(place.clone(), line)));
+            let key = Key { name: read.name.clone(), span: place.clone() };
+            self.inputs.push((key, Spanned { value: String::new(), span: place }));
+        }
+        found
+    }
+}
+
+impl BenchDocument {
+    /// Corrects the names of devices.
+    pub(crate) fn correct_names(&mut self, sources: &SourceMap) -> Diagnostics {
+        let uses: Vec<Use> = self.bind.iter().map(|(_, word)| Use::of(word)).collect();
+        let devices = self.devices.iter_mut().map(|device| &mut device.key);
+        correct(Code::UnknownDevice, devices, &uses, &|_, _| true, false, sources)
+    }
+}
+
+/// Collects the target modes of the exits in a value.
+fn add_targets(value: &Value, targets: &mut Vec<Use>) {
+    match &value.item {
+        Item::Array(items) => items.iter().for_each(|item| add_targets(item, targets)),
+        Item::Table(table) => {
+            let to = table.get("to").and_then(|to| Some((to.as_str()?, &to.span)));
+            targets.extend(to.map(|(name, span)| Use { name: name.into(), port: None, span: span.clone() }));
+        }
+        _ => {}
+    }
+}
