@@ -302,7 +302,7 @@ fn a_deleted_wire_leaves_a_node_that_nobody_reads() {
     let said = say(&["check", path.to_str().unwrap()]);
     assert_eq!(said.code, 0, "{}", said.err);
     assert!(said.err.contains("no output of `guide` is used"), "{}", said.err);
-    assert!(said.err.contains("help: add `in.NAME = \"guide.twist\"` to `sum`, or remove `guide`"), "{}", said.err);
+    assert!(said.err.contains("help: write `in.guide = \"guide.twist\"` in `sum`, or remove `guide`"), "{}", said.err);
 }
 
 #[test]

@@ -17,6 +17,7 @@ mod examples;
 mod explain;
 mod faults;
 mod features;
+mod fixes;
 mod flow;
 mod freshness;
 mod layers;

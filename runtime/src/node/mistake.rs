@@ -5,7 +5,7 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use super::file_path::FilePath;
-use crate::source::{Code, did_you_mean, suggest_name, suggestion};
+use crate::source::{Code, Meant, did_you_mean, suggest_name, suggestion};
 
 /// The place of a mistake, by the names of the graph file.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -98,6 +98,15 @@ impl Mistake {
     #[must_use]
     pub fn instead(self, name: &str, best: &str) -> Self {
         Self { instead: Some((name.to_owned(), best.to_owned())), ..self.help(did_you_mean(best)) }
+    }
+
+    /// Suggests the name that an unknown key, which is marked, misspells. `what` names the known things in the plural.
+    pub(crate) fn meant(self, key: &str, meant: Meant<'_>, known: &[&str], what: &str) -> Self {
+        match meant {
+            Meant::Free(name) => self.instead(key, name),
+            Meant::Taken(name) => self.help(format!("did you mean `{name}`, which is there already?")),
+            Meant::Unknown => self.help(suggestion(key, known.iter().copied(), what)),
+        }
     }
 
     /// Adds a way to fix it.

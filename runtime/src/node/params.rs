@@ -281,7 +281,7 @@ impl<T> Map<T> {
         for name in names.clone().filter(|name| !self.0.contains_key(*name) && !is_told(name)) {
             let message = format!("`{param}` has no entry for feature `{name}`");
             let mistake = Mistake::new(Code::MissingKey, At::Key(param.into()), message);
-            mistakes.push(mistake.help(format!("add `{param}.{name} = …`; the features here are {}", listed())));
+            mistakes.push(mistake.help(format!("write an entry for `{name}`; the features here are {}", listed())));
         }
         refuse_any(mistakes)?;
         Ok(names.map(|name| &self.0[name]).collect())

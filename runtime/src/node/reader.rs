@@ -10,7 +10,7 @@ use super::file_path::FilePath;
 use super::mistake::{At, Mistake, Mistakes};
 use super::param_spec::{Contents, Declared, ParamSpec, Written};
 use crate::source::{Code, suggest_name, suggest_path, suggestion};
-use crate::source::{Key, SourceMap, Table, Value};
+use crate::source::{Key, Meant, SourceMap, Table, Value};
 
 /// A type that a graph file can set. `#[derive(Param)]` implements it for a struct (a table) and an enum (a word).
 #[diagnostic::on_unimplemented(
@@ -98,8 +98,8 @@ impl<'a> Reader<'a> {
         let mut strange = Vec::new();
         for (key, meant) in rest.correct(known) {
             match meant {
-                Some(name) => self.mistakes.push(unknown_key(&key).instead(&key.name, name)),
-                None => strange.push(key),
+                Meant::Unknown => strange.push(key),
+                meant => self.mistakes.push(unknown_key(&key).meant(&key.name, meant, known, "parameters")),
             }
         }
         Some(OpenTable { rest, span: value.span.clone(), known: known.to_vec(), strange, missing: Vec::new() })
@@ -191,8 +191,12 @@ impl<'a> Reader<'a> {
         match self.sources.builtin(&path) {
             Ok(None) if !path.exists() => self.missing_file(text, path, span),
             Ok(builtin) => Some(FilePath { path, span, builtin }),
-            Err((message, help)) => {
-                self.mistakes.push(Mistake::new(Code::Unreadable, At::Span(span), message).help(help));
+            Err(unknown) => {
+                let mistake = Mistake::new(Code::Unreadable, At::Span(span), unknown.message);
+                self.mistakes.push(match unknown.similar {
+                    Some(similar) => mistake.instead(text, &similar),
+                    None => mistake.help(unknown.help),
+                });
                 None
             }
         }

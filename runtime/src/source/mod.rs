@@ -12,9 +12,10 @@ mod value;
 
 pub use diagnostic::{Code, Diagnostic, Diagnostics, Severity};
 pub use fix::Edit;
-pub use map::{BuiltinFile, Location, SourceFile, SourceMap};
+pub use map::{BuiltinFile, Location, SourceFile, SourceMap, UnknownBuiltin};
 pub use report::Report;
 pub(crate) use suggest::quoted;
 pub use suggest::{did_you_mean, suggest_name, suggest_path, suggestion};
 pub use syntax::parse_table;
+pub(crate) use value::Meant;
 pub use value::{Item, Key, Table, Value};

@@ -109,12 +109,23 @@ impl Table {
     }
 }
 
+/// The known name that a key misspells.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Meant<'n> {
+    /// The name can replace the key.
+    Free(&'n str),
+    /// The table has this name too.
+    Taken(&'n str),
+    /// The key resembles no known name.
+    Unknown,
+}
+
 impl Table {
     /// Gives each key that is not `known` the known name that it probably misspells, and returns these keys as they were
-    /// written, each with that name. A key that resembles no known name stays, with `None`.
+    /// written, each with that name. A key that resembles no known name stays.
     ///
     /// After one message about the key, the rest of the table is then read as it was meant.
-    pub(crate) fn correct<'n>(&mut self, known: &[&'n str]) -> Vec<(Key, Option<&'n str>)> {
+    pub(crate) fn correct<'n>(&mut self, known: &[&'n str]) -> Vec<(Key, Meant<'n>)> {
         let (right, wrong): (Vec<_>, Vec<_>) =
             std::mem::take(&mut self.entries).into_iter().partition(|(key, _)| known.contains(&key.name.as_str()));
         self.entries = right;
@@ -127,11 +138,24 @@ impl Table {
             };
             let open = known.iter().copied().filter(is_open);
             let meant = suggest_name(&key.name, open).or_else(|| suggest_name(&key.name, known.iter().copied()));
-            let name = meant.filter(is_open).map_or_else(|| key.name.clone(), str::to_owned);
-            if meant.is_none() || meant == Some(&name) {
+            let is_free = meant.is_none_or(|name| is_open(&name));
+            // Two headers of the same section are a syntax error, but `[nodes.a]` and `[nodes.b]` are not.
+            let is_nested =
+                value.as_section().is_some_and(|table| table.entries.iter().all(|(_, v)| v.as_table().is_some()));
+            let is_dotted = value.span == key.span;
+            let is_taken = meant.is_some_and(|name| self.get(name).is_some()) && !is_nested && !is_dotted;
+            if is_free {
+                let name = meant.map_or_else(|| key.name.clone(), str::to_owned);
                 self.merge(Self { entries: vec![(Key { name, span: key.span.clone() }, value)] });
             }
-            corrected.push((key, meant));
+            corrected.push((
+                key,
+                match meant {
+                    Some(name) if is_taken => Meant::Taken(name),
+                    Some(name) => Meant::Free(name),
+                    None => Meant::Unknown,
+                },
+            ));
         }
         self.entries.sort_by_key(|(key, _)| key.span.start);
         corrected

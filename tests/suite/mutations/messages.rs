@@ -12,6 +12,7 @@ use tactflow_tests::catalogue;
 
 use super::lexer::{Token, tokens};
 use super::{Copy, Operation, difference, mutate};
+use crate::fixes;
 
 /// Graphs with a bench each, and the files that they read.
 const GRAPHS: [(&str, &[&str]); 6] = [
@@ -75,7 +76,8 @@ fn mutant(file: PathBuf, text: &str, tokens: &[Token], operation: Operation, ran
         Operation::DeleteLine | Operation::DuplicateLine | Operation::DropQuote | Operation::SwapTokens
     );
     // Nobody can know the text that another text has replaced as a whole.
-    let is_lost = matches!(operation, Operation::Replace) && token.starts_with('"');
+    let is_whole = matches!(operation, Operation::Replace) && token.starts_with('"');
+    let is_lost = is_whole || matches!(operation, Operation::Delete) && token.len() == 1;
     let original = (is_name && changes_name && !is_lost).then(|| token.trim_matches('"').to_owned());
     let is_on_line = |other: &&Token| text[..other.span.start].matches('\n').count() + 1 == line;
     let changed = match operation {
@@ -153,6 +155,45 @@ fn sum(scores: &BTreeMap<String, Score>) -> Score {
     })
 }
 
+/// Each fix of a mutant can be applied: its mistake is gone, and no new one appears.
+#[test]
+fn the_fixes_of_mutants_mend_them() {
+    let (copy, fresh) = (Copy::new(), Copy::new());
+    let mut random = Random::new(7, 0);
+    let (mut tried, mut mended, mut wrong, mut left) = (0, 0, Vec::new(), Vec::new());
+    for _ in 0..250 {
+        let (graph, files) = GRAPHS[random.below(GRAPHS.len())];
+        let (graph, file) = (copy.path(graph), copy.path(files[random.below(files.len())]));
+        let text = fs::read_to_string(&file).unwrap();
+        let tokens = tokens(&text);
+        let operation = Operation::ALL[random.below(Operation::ALL.len())];
+        let Some(mutant) = mutant(file.clone(), &text, &tokens, operation, &mut random) else { continue };
+        fs::write(&file, &mutant.text).unwrap();
+        let report = fixes::check(&graph);
+        let fixed = report.iter().flat_map(|report| &report.diagnostics).find(|diagnostic| !diagnostic.fix.is_empty());
+        if let (Some(report), Some(fixed)) = (&report, fixed) {
+            tried += 1;
+            let change = || difference(&text, &mutant.text);
+            wrong.extend(fixes::try_fix(&graph, report, fixed).map(|wrong| format!("{}{wrong}", change())));
+            match fixes::rounds(&graph) {
+                Some(_) => mended += 1,
+                None => left.push(format!("{}{}", change(), fixes::check(&graph).unwrap().render(false))),
+            }
+        }
+        restore(&copy, &fresh);
+    }
+    assert!(tried > 60, "{tried} fixes");
+    assert!(wrong.is_empty(), "{} of {tried} fixes are wrong\n{}", wrong.len(), wrong.join("\n"));
+    assert!(mended * 4 >= tried * 3, "{mended} of {tried} load after their fixes\n{}", left.join("\n"));
+}
+
+/// Undoes all changes in a copy.
+fn restore(copy: &Copy, fresh: &Copy) {
+    for file in GRAPHS.iter().flat_map(|(_, files)| *files) {
+        fs::copy(fresh.path(file), copy.path(file)).unwrap();
+    }
+}
+
 /// One changed token gives one message, on its line, that suggests the token that was there.
 #[test]
 fn the_first_message_is_about_the_changed_token() {
@@ -161,6 +202,7 @@ fn the_first_message_is_about_the_changed_token() {
     let scores = scores(seed, count, &Operation::ALL, std::env::var_os("TACTFLOW_SEED").is_some());
     let total = sum(&scores);
     let text = format!("{total:?}, of {scores:#?}");
+    eprintln!("seed {seed}, {count} mutants: {total:?}");
     assert!(total.told * 2 > count, "{text}");
     assert!(total.on_line * 100 >= total.told * 97, "first message on another line: {text}");
     assert!(total.suggested * 100 >= total.named * 95, "the original token is not suggested: {text}");

@@ -58,13 +58,13 @@ pub(crate) fn open(net: &Net<'_>, sources: &mut SourceMap, diagnostics: &mut Dia
         diagnostics,
         tried: BTreeMap::new(),
         taken: Vec::new(),
-        roles: net.flat.role_names().map(str::to_owned).collect(),
+        kinds: net.flat.roles.iter().map(|(key, kind)| (key.name.clone(), kind.value.clone())).collect(),
         unbound: Vec::new(),
         opened: OpenedBench::default(),
     };
     let bench = net.flat.bench.as_ref();
     let is_bound = |role: &&String| bench.is_none_or(|bench| bench.bind.iter().any(|(key, _)| key.name == **role));
-    opener.unbound = opener.roles.iter().filter(|role| !is_bound(role)).cloned().collect();
+    opener.unbound = opener.kinds.keys().filter(|role| !is_bound(role)).cloned().collect();
     if let Some(bench) = bench {
         let declared = net.flat.roles.iter().map(|(key, _)| key);
         let roles = declared.chain(net.observed.iter().map(|(key, ..)| *key)).map(|key| key.name.as_str()).collect();
@@ -97,8 +97,8 @@ struct Opener<'a> {
     tried: BTreeMap<String, Option<usize>>,
     /// Bindings so far: index of the device, index of the role among those it can fill, name of the role.
     taken: Vec<(usize, usize, String)>,
-    /// The roles of the task, and those of them that no device is bound to.
-    roles: BTreeSet<String>,
+    /// The roles of the task with their types, and those of them that no device is bound to.
+    kinds: BTreeMap<String, String>,
     unbound: Vec<String>,
     opened: OpenedBench,
 }
@@ -211,26 +211,58 @@ impl Opener<'_> {
             return diagnostic.note(role.span.clone(), "the role is here").instead(&binding.name, name);
         }
         let message = format!("the bench does not bind the role `{name}`");
-        let is_free = |device: &&Block| !bench.bind.iter().any(|(_, word)| word.value == device.key.name);
-        let named = bench.devices.iter().find(|device| device.key.name == *name);
-        let device = named.or_else(|| bench.devices.iter().find(is_free)).or(bench.devices.first());
-        let line = format!("{name} = \"{}\"", device.map_or("device", |device| &device.key.name));
+        let device = self.device_for(bench, name, kind);
         let devices = quoted(bench.devices.iter().map(|device| device.key.name.as_str()));
-        let help = format!("add `{line}` under [bind] in the bench; its devices are {devices}");
-        match &bench.place {
-            Some(place) => Diagnostic::new(Code::UnboundRole, place.clone(), message)
+        let Some(device) = device else {
+            let help = format!("bind it to a device of a type that fills `{kind}`; the devices here are {devices}");
+            let place = bench.place.as_ref().unwrap_or(&role.span).clone();
+            let diagnostic = Diagnostic::new(Code::UnboundRole, place, message).help(help);
+            return if bench.place.is_some() {
+                diagnostic.note(role.span.clone(), "the role is here")
+            } else {
+                diagnostic
+            };
+        };
+        let line = format!("{name} = \"{device}\"");
+        let help = format!("add `{line}` under [bind]");
+        match (&bench.place, bench.devices.first()) {
+            (Some(place), _) => Diagnostic::new(Code::UnboundRole, place.clone(), message)
                 .note(role.span.clone(), "the role is here")
                 .edit(Edit::Below(place.clone(), line)),
-            None => Diagnostic::new(Code::UnboundRole, role.span.clone(), message),
+            (None, Some(device)) => Diagnostic::new(Code::UnboundRole, role.span.clone(), message)
+                .edit(Edit::Append(device.key.span.clone(), format!("\n[bind]\n{line}"))),
+            (None, None) => Diagnostic::new(Code::UnboundRole, role.span.clone(), message),
         }
         .help(help)
+    }
+
+    /// Returns the device that can fill a role: one with its name, or the first that has a place for such a role.
+    fn device_for(&mut self, bench: &BenchDocument, role: &str, kind: &str) -> Option<String> {
+        let names: Vec<Spanned<String>> = bench
+            .devices
+            .iter()
+            .map(|device| Spanned { value: device.key.name.clone(), span: device.key.span.clone() })
+            .collect();
+        let mut fitting = Vec::new();
+        for word in names {
+            let Some(device) = self.device(bench, &word) else { continue };
+            let fills = self.opened.devices[device].description.roles().filter(|role| *role == kind).count();
+            let is_taken = |name: &Key| self.kinds.get(&name.name).is_some_and(|taken| taken == kind);
+            let taken = bench.bind.iter().filter(|(name, device)| device.value == word.value && is_taken(name)).count();
+            fitting.extend((fills > taken).then_some(word.value));
+        }
+        fitting
+            .iter()
+            .position(|name| name == role)
+            .map(|at| fitting[at].clone())
+            .or_else(|| fitting.into_iter().next())
     }
 
     /// Returns the bindings of names that are neither roles of the task nor roles for scenarios.
     fn strange_bindings<'b>(&self, bench: &'b BenchDocument) -> Vec<&'b Key> {
         let keys = bench.bind.iter().map(|(key, _)| key);
         let is_observed = |key: &Key| self.catalogue.roles().iter().any(|role| role.is_observed_as(&key.name));
-        keys.filter(|key| !self.roles.contains(&key.name) && !is_observed(key)).collect()
+        keys.filter(|key| !self.kinds.contains_key(&key.name) && !is_observed(key)).collect()
     }
 
     fn device(&mut self, bench: &BenchDocument, word: &Spanned<String>) -> Option<usize> {

@@ -63,7 +63,7 @@ impl ExitContext<'_> {
             }
             (None, true) => {
                 let message = format!("`{}` has no target mode", kind.key());
-                bad_condition(span, message).help("add `to = \"MODE\"`").into_err()
+                bad_condition(span, message).help("write the mode in `to`").into_err()
             }
             (None, false) => Ok(None),
             (Some(to), false) => {
@@ -88,11 +88,11 @@ impl ExitContext<'_> {
             }
             (None, None, None, Some(word)) => sent_condition(word),
             (None, None, None, None) => {
-                let help = "add `when = \"node.port\"`, `after_ms`, `after_travel_mm` or `on = \"WORD\"`";
+                let help = "write a condition: `when` with a port, `after_ms`, `after_travel_mm` or `on` with a word";
                 bad_condition(span, format!("`{}` has no condition", kind.key())).help(help).into_err()
             }
             _ => {
-                let help = "give each exit one condition, and several exits as a list: `[{ … }, { … }]`";
+                let help = "give each exit one condition, and write several exits as a list";
                 bad_condition(span, format!("`{}` has more than one condition", kind.key())).help(help).into_err()
             }
         }
@@ -129,7 +129,7 @@ impl ExitContext<'_> {
             .into_err(),
             several => {
                 let names = quoted(several.iter().map(|source| self.net.port_name(*source)));
-                let help = format!("add `of = \"node.port\"`; poses here: {names}");
+                let help = format!("name one in `of`; poses here: {names}");
                 bad_condition(span, "the graph has several poses: `of` must name one").help(help).into_err()
             }
         }
@@ -182,7 +182,7 @@ impl ExitContext<'_> {
             }
             None if kind == Kind::Flag => PortState::True,
             None => {
-                let help = "add `is = \"new\"`, `\"absent\"` or `\"present\"`";
+                let help = "write `is = \"new\"`, `\"absent\"` or `\"present\"`";
                 return bad(": the condition needs `is`").help(help).into_err();
             }
         };
@@ -208,7 +208,7 @@ impl ExitContext<'_> {
             (_, Some(min), Some(max)) => (min, max, format!("between {min} and {max}")),
             (None, None, None) => {
                 let message = format!("`{name}` is a number: the condition needs a bound or `is`");
-                let help = "add `above`, `below` or `within`, or `is = \"new\"`, `\"absent\"` or `\"present\"`";
+                let help = "write `above`, `below` or `within`, or `is = \"new\"`, `\"absent\"` or `\"present\"`";
                 return bad_condition(&when.span, message).help(help).into_err();
             }
         };

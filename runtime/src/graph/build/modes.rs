@@ -109,7 +109,7 @@ fn collect_tables(
     for (key, value) in &set.entries {
         let Some(table) = value.as_table() else {
             let message = format!("`set.{}` does not name a parameter", key.name);
-            let help = format!("write `set.{}.PARAMETER = …`", key.name);
+            let help = format!("write the name of a parameter behind `set.{}`", key.name);
             diagnostics.push(Diagnostic::new(Code::BadValue, value.span.clone(), message).help(help));
             continue;
         };

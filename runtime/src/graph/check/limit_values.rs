@@ -146,6 +146,11 @@ pub(crate) fn limit_of(catalogue: &Catalogue, kind: &str, param: &str) -> Option
     readers(catalogue).find(|(node, name, _)| node == kind && name == param).map(|(.., limit)| limit)
 }
 
+/// Returns the limits that a type of node reads in the built-in parts.
+pub(crate) fn limits_of(catalogue: &Catalogue, kind: &str) -> impl Iterator<Item = String> {
+    readers(catalogue).filter(move |(node, ..)| node == kind).map(|(.., limit)| limit)
+}
+
 /// Returns the parameters in built-in parts that read a limit: type of node, parameter and limit.
 fn readers(catalogue: &Catalogue) -> impl Iterator<Item = (String, String, String)> {
     let files = catalogue.builtin_files().iter().filter(|(name, _)| name.ends_with(".toml"));

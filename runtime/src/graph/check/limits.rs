@@ -8,7 +8,7 @@ use std::ops::Range;
 
 use crate::device::RoleType;
 use crate::graph::check::frames::{Frames, with_article};
-use crate::graph::check::limit_values::limit_of;
+use crate::graph::check::limit_values::{limit_of, limits_of};
 use crate::graph::net::{CommandWire, Net, Wire, WireOrigin};
 use crate::graph::plan::{PortRef, Producer};
 use crate::graph::syntax::LIMITS;
@@ -139,6 +139,13 @@ impl<'a> CommandPath<'a> {
         let role = net.name(Producer::Role(wire.role));
         let taken = &net.command_port(wire).name;
         let mut block = format!("[parts.{name}]\nfile = \"builtin:{file}\"");
+        if !limiters.iter().all(|kind| limits_of(net.catalogue, kind).all(|limit| self.is_given(&limit))) {
+            let help = format!(
+                "route the motion through the part `builtin:{file}`, and write its limits under [limits]: {}",
+                quoted(limiters.iter().flat_map(|kind| limits_of(net.catalogue, kind)).collect::<BTreeSet<_>>())
+            );
+            return Some((help, Vec::new()));
+        }
         let inputs = part.get("inputs").and_then(toml::Value::as_table);
         for input in inputs.into_iter().flat_map(toml::Table::keys) {
             let Some(port) = self.port_for(input) else {
@@ -153,6 +160,11 @@ impl<'a> CommandPath<'a> {
         let place = wire.origin.word.span.clone();
         let edits = [Edit::Replace(place.clone(), format!("\"{source}\"")), Edit::Append(place, format!("\n{block}"))];
         Some((help, edits.into()))
+    }
+
+    /// Returns whether the graph gives a limit.
+    fn is_given(&self, limit: &str) -> bool {
+        self.net.flat.limits.as_ref().is_some_and(|(_, table)| table.get(limit).is_some())
     }
 
     /// Returns the port of the graph that fits an input with the name `input`: the motion itself, or a port with that
@@ -231,7 +243,7 @@ impl<'a> CommandPath<'a> {
             block.push_str(&format!("\nin.{} = \"{}\"", input.name, net.find_candidate(scope, usize::MAX, input)?));
         }
         for param in limiter.params.iter().filter(|param| !param.is_optional) {
-            let limit = limit_of(net.catalogue, name, param.name)?;
+            let limit = limit_of(net.catalogue, name, param.name).filter(|limit| self.is_given(limit))?;
             block.push_str(&format!("\n{} = {{ from = \"{LIMITS}.{limit}\" }}", param.name));
         }
         (!is_taken).then_some(block)

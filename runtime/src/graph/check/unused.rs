@@ -33,7 +33,7 @@ pub(crate) fn check(net: &Net<'_>, shown: impl Iterator<Item = PortRef>, diagnos
                 true => format!("`{name}` leads only to a cycle of unused nodes"),
             };
             let help = match suggest_wire(net, node) {
-                Some(wire) => format!("add {wire}, or remove `{name}`"),
+                Some(wire) => format!("write {wire}, or remove `{name}`"),
                 None => format!("wire an output of `{name}` to another node, or remove it"),
             };
             diagnostics.push(Diagnostic::new(Code::UnusedNode, key.span.clone(), message).help(help));
@@ -60,6 +60,6 @@ fn suggest_wire(net: &Net<'_>, node: usize) -> Option<String> {
         // A repeated input takes any name, for example that of the node.
         let name = if input.need.is_many { &flat[node].block.key.name } else { &*input.name };
         let (from, to) = (&flat[node].block.key.name, &flat[other].block.key.name);
-        Some(format!("`in.{name} = \"{from}.{}\"` to `{to}`", output.name))
+        Some(format!("`in.{name} = \"{from}.{}\"` in `{to}`", output.name))
     })
 }

@@ -174,7 +174,7 @@ impl Loader {
         let text = match self.sources.builtin(path) {
             Ok(Some(bytes)) => Ok(String::from_utf8_lossy(bytes).into_owned()),
             Ok(None) => std::fs::read_to_string(path).map_err(|error| (error.to_string(), None)),
-            Err((message, help)) => Err((message, Some(help))),
+            Err(unknown) => Err((unknown.message, Some(unknown.help))),
         };
         match text {
             Ok(text) => self.parse(path, text),

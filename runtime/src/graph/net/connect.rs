@@ -7,7 +7,7 @@ use crate::graph::plan::{PortRef, Producer};
 use crate::graph::syntax::WireEntry;
 use crate::node::{NodeSpec, Spanned};
 use crate::signal::Kind;
-use crate::source::{Code, Diagnostic, Diagnostics};
+use crate::source::{Code, Diagnostic, Diagnostics, quoted, suggest_name};
 
 impl Net<'_> {
     /// Resolves the wires of each node; wires with a mistake are left out.
@@ -106,9 +106,15 @@ impl Net<'_> {
         let ports = commands.iter().map(|port| (false, port)).chain(reports.iter().map(|port| (true, port)));
         let Some((place, (is_report, port))) = ports.enumerate().find(|(_, (_, port))| port.name == key.name) else {
             let message = format!("`{name}` has no command `{}`", key.name);
-            let known = commands.iter().chain(reports).map(|port| &*port.name);
+            // A command that has a wire is not what was meant.
+            let wires = self.flat.commands.iter().filter(|(key, _)| key.name == name);
+            let is_open = |port: &&str| !wires.clone().any(|(_, wire)| wire.key.name == *port);
+            let known = || commands.iter().chain(reports).map(|port| &*port.name);
             let diagnostic = Diagnostic::new(Code::UnknownInput, key.span.clone(), message);
-            diagnostics.push(diagnostic.suggest(&key.name, known, "commands"));
+            diagnostics.push(match suggest_name(&key.name, known().filter(is_open)) {
+                Some(best) => diagnostic.instead(&key.name, best),
+                None => diagnostic.help(format!("commands here: {}", quoted(known()))),
+            });
             return None;
         };
         let (source, origin) = (source?, self.origin(0, wire));

@@ -62,8 +62,16 @@ impl Net<'_> {
                 return diagnostic(Code::ObservedRole, message).help(OBSERVED_HELP).into_err();
             }
             let message = format!("there is no role, node or part `{name}`");
-            let known = names.keys().map(String::as_str).chain(parent.map(|_| INPUTS));
-            return unknown_name(name.len(), message).suggest(name, known, "roles, nodes and parts").into_err();
+            let known = || names.keys().map(String::as_str).chain(parent.map(|_| INPUTS));
+            // Both names of the port may be wrong, for example in capital letters.
+            let meant = suggest_name(name, known()).and_then(|best| Some((best, names.get(best)?.1)));
+            let ports = meant.map(|(_, entity)| self.ports_of(entity)).unwrap_or_default();
+            let both = suggest_name(port, ports.iter().copied()).filter(|_| !ports.contains(&port)).zip(meant);
+            return match both {
+                Some((port, (best, _))) => unknown(message).instead(&word.value, &format!("{best}.{port}")),
+                None => unknown_name(name.len(), message).suggest(name, known(), "roles, nodes and parts"),
+            }
+            .into_err();
         };
         self.port_of(*entity, port, depth).unwrap_or_else(|| {
             let message = format!("`{name}` has no output `{port}`");

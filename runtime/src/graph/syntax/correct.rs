@@ -2,7 +2,7 @@
 
 use super::reserved::INPUTS;
 use crate::node::{At, Mistake, Reader};
-use crate::source::{Code, Item, Key, Table, Value, suggest_name, suggestion};
+use crate::source::{Code, Item, Key, Meant, Table, Value, suggest_name};
 
 /// Reports each key of a table that is not `known`, and gives it the name that it misspells. `place` ends the message,
 /// for example ` in a mode`.
@@ -16,22 +16,18 @@ pub(super) fn correct_keys(table: &mut Table, known: &[&str], place: &str, reade
 pub(super) fn correct_sections(root: &mut Table, known: &[&str], reader: &mut Reader<'_>) {
     for (key, meant) in root.correct(known) {
         let guess = || root.get(&key.name).and_then(|value| guess_section(value, root, known));
-        let guessed = if meant.is_none() { guess() } else { None };
-        if let Some((_, value)) = guessed.and_then(|_| root.remove(&key.name)) {
-            let key = Key { name: guessed.unwrap_or_default().to_owned(), span: key.span.clone() };
-            root.merge(Table { entries: vec![(key, value)] });
+        let guessed = if meant == Meant::Unknown { guess() } else { None };
+        report(&key, guessed.map_or(meant, Meant::Free), known, "", reader);
+        if let Some((name, (_, value))) = guessed.and_then(|name| Some((name, root.remove(&key.name)?))) {
+            root.merge(Table { entries: vec![(Key { name: name.to_owned(), span: key.span }, value)] });
         }
-        report(&key, meant.or(guessed), known, "", reader);
     }
 }
 
-fn report(key: &Key, meant: Option<&str>, known: &[&str], place: &str, reader: &mut Reader<'_>) {
+fn report(key: &Key, meant: Meant<'_>, known: &[&str], place: &str, reader: &mut Reader<'_>) {
     let message = format!("unknown key `{}`{place}", key.name);
     let mistake = Mistake::new(Code::UnknownKey, At::Span(key.span.clone()), message);
-    reader.mistakes.push(match meant {
-        Some(name) => mistake.instead(&key.name, name),
-        None => mistake.help(suggestion(&key.name, known.iter().copied(), "keys")),
-    });
+    reader.mistakes.push(mistake.meant(&key.name, meant, known, "keys"));
 }
 
 /// Returns the only section that holds such values and that the file lacks or may have in several places.
@@ -96,7 +92,9 @@ pub(super) fn correct_wires(table: &mut Table, names: &[String], reader: &mut Re
         let is_close = suggest_name(&key.name, std::iter::once("in")).is_some();
         let mut wires = value.as_section().into_iter().flat_map(|table| &table.entries);
         let fits: &dyn Fn(&Value) -> bool = if is_close { &is_port } else { &is_known };
-        key.name != "in" && value.as_section().is_some() && wires.all(|(_, wire)| fits(wire))
+        key.name != "in"
+            && value.as_section().is_some_and(|table| !table.entries.is_empty())
+            && wires.all(|(_, wire)| fits(wire))
     };
     let wrong: Vec<String> = table.entries.iter().filter(is_wires).map(|(key, _)| key.name.clone()).collect();
     wrong.iter().for_each(|name| rename(table, name, "in", reader));
@@ -105,7 +103,7 @@ pub(super) fn correct_wires(table: &mut Table, names: &[String], reader: &mut Re
 /// Reports the key `from` of a table and gives it the name `to`.
 fn rename(table: &mut Table, from: &str, to: &'static str, reader: &mut Reader<'_>) {
     let Some((key, value)) = table.remove(from) else { return };
-    report(&key, Some(to), &[], "", reader);
+    report(&key, Meant::Free(to), &[], "", reader);
     table.merge(Table { entries: vec![(Key { name: to.to_owned(), span: key.span }, value)] });
 }
 
@@ -119,7 +117,7 @@ pub(super) fn correct_facts(value: &mut Value, reader: &mut Reader<'_>) {
                 && is_port(inner)
                 && suggest_name(&key.name, std::iter::once("from")).is_some()
             {
-                report(key, Some("from"), &[], "", reader);
+                report(key, Meant::Free("from"), &[], "", reader);
                 "from".clone_into(&mut key.name);
             }
             table.entries.iter_mut().for_each(|(_, value)| correct_facts(value, reader));

@@ -8,7 +8,7 @@ use std::ops::Range;
 use super::reserved::{INPUTS, LIMITS, is_name};
 use super::sections::{BenchDocument, GraphDocument};
 use crate::node::Spanned;
-use crate::source::{Code, Diagnostic, Diagnostics, Edit, Item, Key, SourceMap, Value, suggest_name};
+use crate::source::{Code, Diagnostic, Diagnostics, Edit, Item, Key, SourceMap, Value, quoted, suggest_name};
 
 /// A reference to a port: the name of the node, role or part, and the port unless the reference is to the whole.
 #[derive(Debug, Clone)]
@@ -146,24 +146,36 @@ impl GraphDocument {
         found
     }
 
-    /// Declares each input that the graph wires and the part reads, and reports that it is not declared.
-    fn declare_missing(&mut self, inner: &[Use], outer: &[Use]) -> Diagnostics {
-        let mut found = Diagnostics::new();
-        for read in inner {
-            let is_declared = self.inputs.iter().any(|(key, _)| key.name == read.name);
-            if is_declared || !outer.iter().any(|wire| wire.name == read.name) {
-                continue;
+    /// Declares the inputs that the graph wires and the part reads, and reports that they are not declared.
+    fn declare_missing(&mut self, inner: &[Use], outer: &[Use]) -> Option<Diagnostic> {
+        let is_declared = |name: &str| self.inputs.iter().any(|(key, _)| key.name == name);
+        let is_wired = |name: &str| outer.iter().any(|wire| wire.name == name);
+        let mut missing: Vec<&Use> = Vec::new();
+        for read in inner.iter().filter(|read| !is_declared(&read.name) && is_wired(&read.name)) {
+            if !missing.iter().any(|other| other.name == read.name) {
+                missing.push(read);
             }
-            let place = self.inputs.last().map_or(&read.span, |(key, _)| &key.span).clone();
-            let message = format!("the part reads the input `{}` and does not declare it", read.name);
-            let line = format!("{} = \"what it is\"", read.name);
-            let help = format!("add `{line}` under [inputs]");
-            let diagnostic = Diagnostic::new(Code::UnknownInput, place.clone(), message).help(help);
-            found.push(diagnostic.note(read.span.clone(), "it reads it here").edit(Edit::Below(place.clone(), line)));
-            let key = Key { name: read.name.clone(), span: place.clone() };
-            self.inputs.push((key, Spanned { value: String::new(), span: place }));
         }
-        found
+        let first = missing.first()?;
+        let names = quoted(missing.iter().map(|read| &read.name));
+        let message = format!("the part reads {names} from its inputs and does not declare them");
+        let lines: Vec<String> = missing.iter().map(|read| format!("{} = \"what it is\"", read.name)).collect();
+        let lines = lines.join("\n");
+        let help = format!("declare them under [inputs]:\n{lines}");
+        let last = self.inputs.last().map(|(key, _)| key.span.clone());
+        let diagnostic = match &last {
+            Some(last) => Diagnostic::new(Code::UnknownInput, last.clone(), message)
+                .note(first.span.clone(), "one is read here")
+                .edit(Edit::Below(last.clone(), lines)),
+            None => Diagnostic::new(Code::UnknownInput, first.span.clone(), message)
+                .edit(Edit::Append(first.span.clone(), format!("\n[inputs]\n{lines}"))),
+        };
+        let place = last.unwrap_or_else(|| first.span.clone());
+        for read in missing {
+            let key = Key { name: read.name.clone(), span: place.clone() };
+            self.inputs.push((key, Spanned { value: String::new(), span: place.clone() }));
+        }
+        Some(diagnostic.help(help))
     }
 }
 

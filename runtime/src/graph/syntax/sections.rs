@@ -235,8 +235,8 @@ impl<'a> Sections<'a> {
             return false;
         }
         let message = format!("`{0}` is a part: set its nodes through `parts.{0}.set`", key.name);
-        let node = table.entries.first().map_or("NODE", |(node, _)| &node.name);
-        let help = format!("write `parts.{}.set.{node}.…`", key.name);
+        let node = table.entries.first().map_or_else(String::new, |(node, _)| format!(".{}", node.name));
+        let help = format!("write `parts.{}.set{node}`", key.name);
         self.diagnostics.push(Diagnostic::new(Code::UnknownKey, key.span.clone(), message).help(help));
         true
     }
