@@ -217,7 +217,7 @@ fn a_mistake_in_set_points_into_set() {
         ("devices.pad.rows=-1", "bad-value", "1:18", "expected a whole number from 1 to 1000000, found -1"),
         ("devices.pad.row=4", "unknown-key", "1:13", "`row` is not a parameter here"),
         ("bind.pad=padd", "unknown-device", "1:10", "the bench has no device `padd`"),
-        ("nodes.pid.in.error=error.eror", "unknown-port", "1:20", "`error` has no output `eror`"),
+        ("nodes.pid.in.error=error.eror", "unknown-port", "1:27", "`error` has no output `eror`"),
         ("graph.clock=pda", "bad-clock", "1:13", "the clock `pda` is not a role"),
     ];
     for (assignment, code, place, message) in cases {
@@ -355,7 +355,7 @@ fn help_names_every_option() {
     let texts: [(&[&str], &[&str]); 3] = [
         (&["--help"], &["run ", "check ", "--color <WHEN>", "--version", "Exit codes: 0 success; 1 a run"]),
         (&["run", "--help"], &run),
-        (&["check", "--help"], &["<GRAPHS>..."]),
+        (&["check", "--help"], &["[GRAPHS]...", "--explain [<CODE>]"]),
     ];
     for (args, words) in texts {
         let help = say(args);

@@ -36,9 +36,9 @@ impl NodeType for Polynomial {
     }
 
     fn configure(&self, table: &Value, reader: &mut Reader<'_>) -> Option<Box<dyn Configured>> {
-        let mut open = reader.table(table)?;
+        let mut open = reader.table(table, &["scale"])?;
         let scale = reader.field::<f64>(&mut open, &Declared::new("scale"), Some(|| 1.0));
-        reader.close(open, &["scale"]);
+        reader.close(open);
         let coefficients = self.coefficients.iter().map(|c| c * scale.unwrap_or(1.0)).collect();
         Some(Box::new(Self { coefficients, ..self.clone() }))
     }

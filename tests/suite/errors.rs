@@ -1,6 +1,7 @@
 //! Broken graphs and scenarios: the expected message stands under the offending token, in the file itself.
 //!
-//! `#  ^^^^ code: message` speaks of the line above it, `#       help: …` and `#           | …` of the message above.
+//! `#  ^^^^ code: message` speaks of the line above it, `#       help: …` and `#           | …` of the message above. A help
+//! that can be applied as it stands is a `fix: …`.
 //! With `TACTFLOW_BLESS=1` the comments are written anew; read the difference before you commit it.
 
 use std::collections::BTreeSet;
@@ -20,7 +21,9 @@ fn folder() -> PathBuf {
 
 fn is_expectation(line: &str) -> bool {
     let comment = line.trim_start().strip_prefix('#').map(str::trim_start);
-    comment.is_some_and(|text| text.starts_with('^') || text.starts_with("help: ") || text.starts_with("| "))
+    comment.is_some_and(|text| {
+        text.starts_with('^') || text.starts_with("help: ") || text.starts_with("fix: ") || text.starts_with("| ")
+    })
 }
 
 /// What a diagnostic looks like under its line.
@@ -36,7 +39,8 @@ fn comment(diagnostic: &Diagnostic, sources: &SourceMap) -> Vec<String> {
     if let Some(help) = &diagnostic.help {
         let indent = " ".repeat(width);
         for (i, line) in help.lines().enumerate() {
-            lines.push(format!("#{pad}{indent} {} {line}", if i == 0 { "help:" } else { "    |" }));
+            let label = if diagnostic.fix.is_empty() { "help:" } else { "fix:" };
+            lines.push(format!("#{pad}{indent} {} {line}", if i == 0 { label } else { "    |" }));
         }
     }
     lines

@@ -82,10 +82,10 @@ impl NodeType for Counter {
     }
 
     fn configure(&self, table: &Value, reader: &mut Reader<'_>) -> Option<Box<dyn Configured>> {
-        let mut open = reader.table(table)?;
+        let mut open = reader.table(table, &["gain"])?;
         let declared = Declared { bounds: Some(Bounds::above(0.0)), ..Declared::new("gain") };
         reader.field::<f64>(&mut open, &declared, Some(|| 1.0));
-        reader.close(open, &["gain"]);
+        reader.close(open);
         Some(Box::new(self.clone()))
     }
 }

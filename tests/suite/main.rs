@@ -14,8 +14,10 @@ mod docs;
 mod erased;
 mod errors;
 mod examples;
+mod explain;
 mod faults;
 mod features;
+mod fixes;
 mod flow;
 mod freshness;
 #[cfg(target_os = "linux")]

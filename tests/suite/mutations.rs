@@ -6,6 +6,7 @@
 
 mod lexer;
 mod meant;
+mod messages;
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -37,20 +38,30 @@ enum Operation {
     Replace,
     DeleteLine,
     DuplicateLine,
+    Case,
+    Plural,
+    DropQuote,
+    SwapTokens,
 }
 
-const OPERATIONS: [Operation; 6] = [
-    Operation::Delete,
-    Operation::Double,
-    Operation::Swap,
-    Operation::Replace,
-    Operation::DeleteLine,
-    Operation::DuplicateLine,
-];
+impl Operation {
+    const ALL: [Self; 10] = [
+        Self::Delete,
+        Self::Double,
+        Self::Swap,
+        Self::Replace,
+        Self::DeleteLine,
+        Self::DuplicateLine,
+        Self::Case,
+        Self::Plural,
+        Self::DropQuote,
+        Self::SwapTokens,
+    ];
+}
 
-/// A text with one token mutated; none if that changes nothing.
-fn mutate(text: &str, tokens: &[Token], operation: Operation, random: &mut Random) -> Option<String> {
-    let token = &tokens[random.below(tokens.len())];
+/// A text with the token at `index` mutated; none if that changes nothing.
+fn mutate(text: &str, tokens: &[Token], index: usize, operation: Operation, random: &mut Random) -> Option<String> {
+    let token = &tokens[index];
     let mut chars: Vec<char> = text[token.span.clone()].chars().collect();
     let at = random.below(chars.len());
     match operation {
@@ -59,6 +70,25 @@ fn mutate(text: &str, tokens: &[Token], operation: Operation, random: &mut Rando
         Operation::Swap => {
             let next = (at + 1).min(chars.len() - 1);
             chars.swap(at, next);
+        }
+        Operation::Case => chars = chars.into_iter().flat_map(char::to_uppercase).collect(),
+        Operation::Plural => match chars.iter().rposition(|c| c.is_ascii_alphabetic())? {
+            last if chars[last] == 's' => drop(chars.remove(last)),
+            last => chars.insert(last + 1, 's'),
+        },
+        Operation::DropQuote => {
+            let quote = if random.below(2) == 0 { 0 } else { chars.len() - 1 };
+            if chars[quote] != '"' {
+                return None;
+            }
+            chars.remove(quote);
+        }
+        Operation::SwapTokens => {
+            let next = tokens.get(index + 1)?;
+            let (one, other) = (&text[token.span.clone()], &text[next.span.clone()]);
+            let between = &text[token.span.end..next.span.start];
+            let mutant = [&text[..token.span.start], other, between, one, &text[next.span.end..]].concat();
+            return (!between.contains('\n') && mutant != text).then_some(mutant);
         }
         Operation::Replace => chars = text[tokens[random.below(tokens.len())].span.clone()].chars().collect(),
         Operation::DeleteLine | Operation::DuplicateLine => {
@@ -172,8 +202,10 @@ fn mutants(name: &str, files: &[&str], seed: u64, counts: &mut BTreeMap<Fate, us
                 }
             })
             .unwrap();
-        let operation = OPERATIONS[random.below(OPERATIONS.len())];
-        let Some(mutant) = mutate(text, tokens, operation, &mut random) else { continue };
+        // Two numbers of a list exchanged are another list that somebody could have meant.
+        let operation = Operation::ALL[random.below(Operation::ALL.len() - 1)];
+        let index = random.below(tokens.len());
+        let Some(mutant) = mutate(text, tokens, index, operation, &mut random) else { continue };
         fs::write(path, &mutant).unwrap();
         let told =
             || format!("{name}, seed {seed}, {operation:?} in {}:\n{}", path.display(), difference(text, &mutant));

@@ -75,8 +75,8 @@ impl Model<'_> {
         let robot = &self.robot;
         let is_link = |name: &str| robot.links.iter().any(|link| link.name == name);
         if !is_link(tip) {
-            let links: Vec<String> = robot.links.iter().map(|link| format!("`{}`", link.name)).collect();
-            return Err(Mistake::param("tip", format!("the model has no link `{tip}`; it has {}", links.join(", "))));
+            let links = robot.links.iter().map(|link| link.name.as_str());
+            return Err(Mistake::param("tip", format!("the model has no link `{tip}`")).suggest(tip, links, "links"));
         }
         let mut above = BTreeMap::new();
         for joint in &robot.joints {
@@ -225,13 +225,7 @@ mod tests {
             ("<robot", "<bot", "hand", "", "not a URDF: "),
             ("velocity=\"0.2\"", "", "hand", "", "not a URDF: "),
             ("2 0 0", "2 0", "hand", "", "not a URDF: "),
-            (
-                "",
-                "",
-                "claw",
-                "param tip",
-                "the model has no link `claw`; it has `root`, `post`, `sled`, `hand`, `spare`",
-            ),
+            ("", "", "claw", "param tip", "the model has no link `claw`"),
             ("", "", "spare", "param tip", "no joint moves between the root and `spare`"),
             ("", "", "post", "param tip", "no joint moves between the root and `post`"),
             ("prismatic", "planar", "hand", "slide", "joint `slide` is planar"),

@@ -191,7 +191,7 @@ mod tests {
 
     fn two_joints(holds: &str) -> MockArm {
         let joint = |name: &str| Joint { name: name.into(), lower: -1.0, upper: 1.0, speed: 1.0, acceleration: 10.0 };
-        let params: Params = read(&format!("urdf = 'none'\ntip = ''\nstart = []\nhold = {holds}"));
+        let params: Params = read(&format!("urdf = 'Cargo.toml'\ntip = ''\nstart = []\nhold = {holds}"));
         let mut description = Description::every(0.004);
         let ports = ArmPorts::fill(&mut description, &JointsShape::default(), vec![]);
         MockArm::new(ports, vec![joint("a"), joint("b")], vec![0.0, 0.5], params.hold, 4_000_000)

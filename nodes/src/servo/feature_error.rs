@@ -3,7 +3,7 @@
 //! Each component keeps the stamp of its own input, so that `pid` measures the time between the samples of a feature.
 
 use tactflow_runtime::node::{
-    At, Describe, Inputs, Many, Map, Mistake, Mistakes, Node, Out, Outputs, Param, Setup, Tick, collect_both,
+    At, Describe, Inputs, Many, Map, Mistake, Mistakes, Node, Out, Outputs, Param, Setup, Spanned, Tick, collect_both,
     refuse_any,
 };
 use tactflow_runtime::signal::{Feature, Features, FeaturesShape, Scalar, ScalarShape};
@@ -47,7 +47,7 @@ pub struct Params {
     setpoint: Map<f64>,
     /// Features without which the whole error is absent. Without any other feature, only its own component is absent.
     #[param(default = Vec::new())]
-    requires: Vec<String>,
+    requires: Vec<Spanned<String>>,
 }
 
 /// What `feature_error` reads.
@@ -122,14 +122,17 @@ impl Setpoint {
 }
 
 /// Returns the index in `names` of each name in `required`.
-fn indices<'n>(required: &[String], names: impl Iterator<Item = &'n str> + Clone) -> Result<Box<[usize]>, Mistakes> {
-    let listed = || names.clone().map(|name| format!("`{name}`")).collect::<Vec<_>>().join(", ");
-    let unknown = |name: &String| {
-        let mistake = Mistake::param("requires", format!("no feature is called `{name}`"));
-        mistake.help(format!("the features here are {}", listed()))
+fn indices<'n>(
+    required: &[Spanned<String>],
+    names: impl Iterator<Item = &'n str> + Clone,
+) -> Result<Box<[usize]>, Mistakes> {
+    let unknown = |name: &Spanned<String>| {
+        let message = format!("no feature is called `{}`", name.value);
+        let mistake = Mistake::new(Code::BadValue, At::Span(name.span.clone()), message);
+        mistake.suggest(&name.value, names.clone(), "features")
     };
-    refuse_any(required.iter().filter(|name| !names.clone().any(|n| n == *name)).map(unknown))?;
-    Ok(required.iter().filter_map(|name| names.clone().position(|n| n == name)).collect())
+    refuse_any(required.iter().filter(|name| !names.clone().any(|n| n == name.value)).map(unknown))?;
+    Ok(required.iter().filter_map(|name| names.clone().position(|n| n == name.value)).collect())
 }
 
 #[cfg(test)]

@@ -77,9 +77,9 @@ fn table(input: &DeriveInput, faults: &mut Faults) -> TokenStream {
                 value: &::tactflow_runtime::source::Value,
                 reader: &mut ::tactflow_runtime::node::Reader<'_>,
             ) -> ::core::option::Option<Self> {
-                let mut table = reader.table(value)?;
+                let mut table = reader.table(value, &[#(#names),*])?;
                 #(#reads)*
-                reader.close(table, &[#(#names),*]);
+                reader.close(table);
                 ::core::option::Option::Some(Self { #(#idents: #idents?),* })
             }
         }

@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 
+use super::explain::explain;
 use super::shell::command::{GraphArgs, OutputFormat};
 use super::shell::json::{DiagnosticJson, diagnosed};
 use super::shell::{NOT_LOADED, Shell};
@@ -18,12 +19,16 @@ use crate::source::Report;
     name = "check",
     after_help = "Examples:
   tactflow check graphs/*.toml
-  tactflow check graphs/hybrid.toml --bench graphs/benches/pen.toml --deny-warnings"
+  tactflow check graphs/hybrid.toml --bench graphs/benches/pen.toml --deny-warnings
+  tactflow check --explain unknown-port"
 )]
 pub(crate) struct CheckArgs {
     /// Graph files and scenario files
-    #[arg(required = true)]
+    #[arg(required_unless_present = "explain")]
     graphs: Vec<PathBuf>,
+    /// Print the page of a code, such as unknown-port; without a code, list all codes
+    #[arg(long, value_name = "CODE", num_args = 0..=1, default_missing_value = "", conflicts_with = "graphs")]
+    explain: Option<String>,
     #[command(flatten)]
     graph_args: GraphArgs,
     /// Treat warnings as errors
@@ -35,6 +40,9 @@ pub(crate) struct CheckArgs {
 }
 
 pub(crate) fn check(args: CheckArgs, shell: &Shell) -> u8 {
+    if let Some(code) = &args.explain {
+        return explain(code, shell);
+    }
     let mut results = Vec::new();
     for path in &args.graphs {
         // A file that cannot be read is reported as a graph.

@@ -14,6 +14,7 @@
 
 mod check;
 mod completions;
+mod explain;
 mod reference;
 mod run;
 mod shell;
@@ -31,10 +32,12 @@ use tracing_subscriber::EnvFilter;
 use crate::catalogue::Catalogue;
 
 use reference::{describe, list};
+
 use shell::Colour;
 
 /// The parser of arguments, for the commands of other crates.
 pub use clap;
+pub use explain::explanation;
 pub use reference::pages::reference;
 pub use run::{Job, JobOptions, Print, duration};
 pub use shell::command::{Subcommand, derived};

@@ -189,7 +189,8 @@ impl<D: Device> DeviceType for TypedDevice<D> {
     }
 
     fn open(&self, table: &Value, reader: &mut Reader<'_>) -> Option<Opened> {
-        let params = D::Params::read(table, reader)?;
+        let before = reader.mistakes.len();
+        let params = D::Params::read(table, reader).filter(|_| reader.mistakes.len() == before)?;
         match D::open(params) {
             Ok(opened) => Some(opened),
             Err(mistakes) => {

@@ -45,7 +45,7 @@ pub(crate) fn compile_in(mut loader: Loader, catalogue: &Catalogue, request: &Re
     check::quantities::check(&net, &mut diagnostics);
     check::facts::check(&net, &opened, &mut diagnostics);
     check::limits::check(&net, &mut frames, &mut diagnostics);
-    check::limit_values::check(&net, &mut diagnostics);
+    check::limit_values::check(&net, &sources, &mut diagnostics);
     let clock = check::clock::check(&net, &opened, &mut diagnostics);
     let period = clock.map_or(1.0, |(_, period)| period);
     let mut builder = Builder::new(&net, &opened, frames, (diagnostics, sources), period);
@@ -63,6 +63,7 @@ pub(crate) fn compile_in(mut loader: Loader, catalogue: &Catalogue, request: &Re
     let (diagnostics, sources, of_nodes) = builder.finish();
     measured.extend(of_nodes);
     let Some((clock, _)) = clock.filter(|_| diagnostics.is_empty()) else {
+        let diagnostics = check::parts::move_out(&flat, &sources, diagnostics);
         return Err(Report::new(sources, diagnostics));
     };
     log_plan(&nodes, &opened, &sources);
@@ -80,6 +81,7 @@ pub(crate) fn compile_in(mut loader: Loader, catalogue: &Catalogue, request: &Re
     let outline = outline.build();
     let mut warnings = Diagnostics::new();
     check::unused::check(&net, view.sources(), &mut warnings);
+    let warnings = check::parts::move_out(&flat, &sources, warnings);
     let view = view.plan(&net, &nodes, &ports);
     let reset_after = flat.table.as_ref().map_or(0, |table| (table.reset_after_ms * 1e6) as i64);
     let period = ((period * 1e9).round() as i64).max(1);

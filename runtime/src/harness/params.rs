@@ -18,7 +18,7 @@ pub(super) fn with_params<T>(
 ) -> Result<T, Mistakes> {
     let mut sources = SourceMap::default();
     let table = parse_table(sources.add_file(Path::new("test.toml"), text));
-    let table = table.unwrap_or_else(|errors| panic!("{errors:?}"));
+    let table = table.unwrap_or_else(|error| panic!("{error:?}"));
     let mut reader = Reader::new(&sources);
     let made = make(&table, &mut reader);
     made.filter(|_| reader.mistakes.is_empty()).ok_or(reader.mistakes)

@@ -5,7 +5,7 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use super::file_path::FilePath;
-use crate::source::Code;
+use crate::source::{Code, Meant, did_you_mean, suggest_name, suggestion};
 
 /// The place of a mistake, by the names of the graph file.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -42,6 +42,8 @@ pub struct Mistake {
     pub message: String,
     /// How to fix it.
     pub help: Option<String>,
+    /// The marked name and the one to write instead, if that fixes it.
+    pub instead: Option<(String, String)>,
 }
 
 /// One or more mistakes.
@@ -50,7 +52,7 @@ pub type Mistakes = Vec<Mistake>;
 impl Mistake {
     /// Creates a mistake with any code and place.
     pub fn new(code: Code, at: At, message: impl Into<String>) -> Self {
-        Self { code, at, message: message.into(), help: None }
+        Self { code, at, message: message.into(), help: None, instead: None }
     }
 
     /// The value of a parameter, by its dotted path, is wrong.
@@ -79,6 +81,32 @@ impl Mistake {
     pub fn unreadable(file: &FilePath, error: &io::Error) -> Self {
         let message = format!("cannot read `{}`: {error}", file.path.display());
         Self::new(Code::Unreadable, At::Span(file.span.clone()), message)
+    }
+
+    /// Adds the help for an unknown `name`, which is marked: the closest of the `known` names, or all of them.
+    ///
+    /// `what` names the known things in the plural, for example "features".
+    #[must_use]
+    pub fn suggest<'n>(self, name: &str, known: impl Iterator<Item = &'n str> + Clone, what: &str) -> Self {
+        match suggest_name(name, known.clone()) {
+            Some(best) => self.instead(name, best),
+            None => self.help(suggestion(name, known, what)),
+        }
+    }
+
+    /// Suggests `best` in place of `name`, which is marked.
+    #[must_use]
+    pub fn instead(self, name: &str, best: &str) -> Self {
+        Self { instead: Some((name.to_owned(), best.to_owned())), ..self.help(did_you_mean(best)) }
+    }
+
+    /// Suggests the name that an unknown key, which is marked, misspells. `what` names the known things in the plural.
+    pub(crate) fn meant(self, key: &str, meant: Meant<'_>, known: &[&str], what: &str) -> Self {
+        match meant {
+            Meant::Free(name) => self.instead(key, name),
+            Meant::Taken(name) => self.help(format!("did you mean `{name}`, which is there already?")),
+            Meant::Unknown => self.help(suggestion(key, known.iter().copied(), what)),
+        }
     }
 
     /// Adds a way to fix it.

@@ -10,7 +10,7 @@ use super::mistake::{At, Mistake, Mistakes, refuse_any};
 use super::param_spec::{Contents, Repeats, Written};
 use super::reader::{Param, Reader, read_leaf};
 use crate::signal::Unit;
-use crate::source::{Code, suggest_name, suggestion};
+use crate::source::{Code, suggest_name};
 use crate::source::{Item, Key, Value};
 
 macro_rules! leaves {
@@ -75,6 +75,20 @@ pub struct Spanned<T> {
     pub span: Range<usize>,
 }
 
+impl Spanned<String> {
+    /// Returns the place of a part of the text, or of the whole if it is written with escapes.
+    #[must_use]
+    pub fn part(&self, range: Range<usize>) -> Range<usize> {
+        match self.span.len().checked_sub(self.value.len()) {
+            Some(around @ (0 | 2)) => {
+                let start = self.span.start + around / 2;
+                start + range.start..start + range.end
+            }
+            _ => self.span.clone(),
+        }
+    }
+}
+
 impl<T: Param> Param for Spanned<T> {
     const EXPECTS: &'static str = T::EXPECTS;
     const CONTENTS: Contents = T::CONTENTS;
@@ -97,8 +111,8 @@ impl Param for () {
     const EXPECTS: &'static str = "a table";
 
     fn read(value: &Value, reader: &mut Reader<'_>) -> Option<Self> {
-        let table = reader.table(value)?;
-        reader.close(table, &[]);
+        let table = reader.table(value, &[])?;
+        reader.close(table);
         Some(())
     }
 }
@@ -266,10 +280,11 @@ impl<T> Map<T> {
         let renamed = missing.next().filter(|_| strange == 1 && missing.next().is_none());
         for key in self.0.keys() {
             if !names.clone().any(|name| name == key) {
-                let help = renamed.map(|name| format!("did you mean `{name}`?"));
-                let help = help.unwrap_or_else(|| suggestion(key, names.clone(), "features"));
-                mistakes
-                    .push(Mistake::key(format!("{param}.{key}"), format!("no feature is called `{key}`")).help(help));
+                let mistake = Mistake::key(format!("{param}.{key}"), format!("no feature is called `{key}`"));
+                mistakes.push(match renamed {
+                    Some(name) => mistake.instead(key, name),
+                    None => mistake.suggest(key, names.clone(), "features"),
+                });
             }
         }
         let is_misspelt = |name: &str| self.0.keys().any(|key| suggest_name(key, names.clone()) == Some(name));
@@ -277,7 +292,7 @@ impl<T> Map<T> {
         for name in names.clone().filter(|name| !self.0.contains_key(*name) && !is_told(name)) {
             let message = format!("`{param}` has no entry for feature `{name}`");
             let mistake = Mistake::new(Code::MissingKey, At::Key(param.into()), message);
-            mistakes.push(mistake.help(format!("add `{param}.{name} = …`; the features here are {}", listed())));
+            mistakes.push(mistake.help(format!("write an entry for `{name}`; the features here are {}", listed())));
         }
         refuse_any(mistakes)?;
         Ok(names.map(|name| &self.0[name]).collect())

@@ -2,6 +2,7 @@
 
 use std::borrow::Cow;
 use std::ops::Range;
+use std::path::PathBuf;
 
 use serde::de::DeserializeOwned;
 
@@ -10,8 +11,8 @@ use super::file_path::FilePath;
 use super::known_units::KnownUnits;
 use super::mistake::{At, Mistake, Mistakes};
 use super::param_spec::{Contents, Declared, ParamSpec, Written};
-use crate::source::{Code, suggest_name, suggestion};
-use crate::source::{Item, Key, SourceMap, Table, Value};
+use crate::source::{Code, suggest_name, suggest_path, suggestion};
+use crate::source::{Item, Key, Meant, SourceMap, Table, Value};
 
 /// A type that a graph file can set. `#[derive(Param)]` implements it for a struct (a table) and an enum (a word).
 #[diagnostic::on_unimplemented(
@@ -79,6 +80,9 @@ pub struct Reader<'a> {
 pub struct OpenTable {
     rest: Table,
     span: Range<usize>,
+    known: Vec<&'static str>,
+    /// Keys that resemble no known name.
+    strange: Vec<Key>,
     /// Required fields that are missing, with their accepted values.
     missing: Vec<(&'static str, String)>,
 }
@@ -116,10 +120,17 @@ impl<'a> Reader<'a> {
         self.bad(value.span.clone(), format!("expected {expected}, found {}", value.described()))
     }
 
-    /// Opens a table.
-    pub fn table(&mut self, value: &Value) -> Option<OpenTable> {
-        let rest = value.as_table().cloned().or_else(|| self.wrong_type(value, "a table"))?;
-        Some(OpenTable { rest, span: value.span.clone(), missing: Vec::new() })
+    /// Opens a table with the `known` fields. A misspelt name is a mistake; its value is read as it was meant.
+    pub fn table(&mut self, value: &Value, known: &[&'static str]) -> Option<OpenTable> {
+        let mut rest = value.as_table().cloned().or_else(|| self.wrong_type(value, "a table"))?;
+        let mut strange = Vec::new();
+        for (key, meant) in rest.correct(known) {
+            match meant {
+                Meant::Unknown => strange.push(key),
+                meant => self.mistakes.push(unknown_key(&key).meant(&key.name, meant, known, "parameters")),
+            }
+        }
+        Some(OpenTable { rest, span: value.span.clone(), known: known.to_vec(), strange, missing: Vec::new() })
     }
 
     /// Reads one field of a table; returns `None` after a mistake.
@@ -151,7 +162,22 @@ impl<'a> Reader<'a> {
     pub fn word<T: Param>(&mut self, value: &Value) -> Option<usize> {
         let text: String = read_leaf(value, self, T::EXPECTS)?;
         let found = T::CONTENTS.words.iter().position(|(word, _)| *word == text);
-        found.or_else(|| self.wrong_type(value, T::EXPECTS))
+        found.or_else(|| self.unknown_word(value, T::CONTENTS.words.iter().map(|(word, _)| *word), T::EXPECTS))
+    }
+
+    /// Adds the mistake that `value` is none of the `known` words, and returns `None`.
+    pub(crate) fn unknown_word<'w, T>(
+        &mut self,
+        value: &Value,
+        known: impl Iterator<Item = &'w str>,
+        expected: &str,
+    ) -> Option<T> {
+        self.wrong_type::<T>(value, expected);
+        let text = value.as_str()?;
+        let meant = suggest_name(text, known)?;
+        let mistake = self.mistakes.pop()?;
+        self.mistakes.push(mistake.instead(text, meant));
+        None
     }
 
     /// Reads a number, plain or with a unit, and checks the range of the field.
@@ -185,27 +211,22 @@ impl<'a> Reader<'a> {
         self.entry.filter(|(_, count)| count % units.len() == 0).map_or(Some(declared), of_entry)
     }
 
-    /// Adds a mistake for every key that is left and for every missing field, except one that is misspelt.
-    pub fn close(&mut self, table: OpenTable, known: &[&str]) {
-        // One missing and one unknown name are one mistake.
-        let is_renamed = match (table.missing.as_slice(), table.rest.entries.as_slice()) {
-            ([(missing, _)], [(strange, _)]) => {
-                suggest_name(&strange.name, known.iter().copied()).is_none_or(|m| m == *missing)
-            }
-            _ => false,
+    /// Adds a mistake for every missing field. One missing and one unknown name are one mistake.
+    pub fn close(&mut self, table: OpenTable) {
+        let renamed = match (table.missing.as_slice(), table.strange.as_slice()) {
+            ([(missing, _)], [_]) => Some(*missing),
+            _ => None,
         };
-        let renamed = table.missing.first().filter(|_| is_renamed).map(|(name, _)| format!("did you mean `{name}`?"));
-        for (name, expects) in table.missing {
-            let is_misspelt = |(key, _): &(Key, Value)| suggest_name(&key.name, known.iter().copied()) == Some(name);
-            if !is_renamed && !table.rest.entries.iter().any(is_misspelt) {
-                let message = format!("`{name}` is missing: expected {expects}");
-                self.mistakes.push(Mistake::new(Code::MissingKey, At::Span(table.span.clone()), message));
-            }
+        for (name, expects) in table.missing.into_iter().filter(|_| renamed.is_none()) {
+            let message = format!("`{name}` is missing: expected {expects}");
+            self.mistakes.push(Mistake::new(Code::MissingKey, At::Span(table.span.clone()), message));
         }
-        for (key, _) in table.rest.entries {
-            let message = format!("`{}` is not a parameter here", key.name);
-            let help = renamed.clone().unwrap_or_else(|| suggestion(&key.name, known.iter().copied(), "parameters"));
-            self.mistakes.push(Mistake::new(Code::UnknownKey, At::Span(key.span), message).help(help));
+        for key in table.strange {
+            let mistake = unknown_key(&key);
+            self.mistakes.push(match renamed {
+                Some(name) => mistake.instead(&key.name, name),
+                None => mistake.help(suggestion(&key.name, table.known.iter().copied(), "parameters")),
+            });
         }
     }
 
@@ -213,13 +234,34 @@ impl<'a> Reader<'a> {
     pub fn file(&mut self, text: &str, span: Range<usize>) -> Option<FilePath> {
         let path = self.sources.path(text, span.start);
         match self.sources.builtin(&path) {
+            Ok(None) if !path.exists() => self.missing_file(text, path, span),
             Ok(builtin) => Some(FilePath { path, span, builtin }),
-            Err((message, help)) => {
-                self.mistakes.push(Mistake::new(Code::Unreadable, At::Span(span), message).help(help));
+            Err(unknown) => {
+                let mistake = Mistake::new(Code::Unreadable, At::Span(span), unknown.message);
+                self.mistakes.push(match unknown.similar {
+                    Some(similar) => mistake.instead(text, &similar),
+                    None => mistake.help(unknown.help),
+                });
                 None
             }
         }
     }
+
+    /// Adds the mistake that a file does not exist, and returns `None`.
+    fn missing_file<T>(&mut self, text: &str, path: PathBuf, span: Range<usize>) -> Option<T> {
+        let similar = suggest_path(self.sources.folder(span.start), text);
+        let file = FilePath { path, span, builtin: None };
+        let mistake = Mistake::unreadable(&file, &std::fs::metadata(&file.path).err()?);
+        self.mistakes.push(match similar {
+            Some(similar) => mistake.instead(text, &similar),
+            None => mistake,
+        });
+        None
+    }
+}
+
+fn unknown_key(key: &Key) -> Mistake {
+    Mistake::new(Code::UnknownKey, At::Span(key.span.clone()), format!("`{}` is not a parameter here", key.name))
 }
 
 /// Whether a declared unit is worth a place in a message: not the number 1, and no letter or parameter that stands for

@@ -3,10 +3,8 @@
 use std::fmt;
 use std::ops::Range;
 
-use annotate_snippets::{AnnotationKind, Group, Level, Renderer, Snippet};
-
-use super::map::{SourceFile, SourceMap};
-use super::suggest::suggestion;
+use super::fix::Edit;
+use super::suggest::{did_you_mean, suggest_name, suggestion};
 
 macro_rules! codes {
     ($($(#[doc = $doc:literal])* $Code:ident $name:literal),* $(,)?) => {
@@ -143,6 +141,11 @@ impl Code {
             _ => Severity::Error,
         }
     }
+
+    /// Returns whether it reports a reference to a name that does not exist.
+    pub(super) const fn is_missing_name(self) -> bool {
+        matches!(self, Self::UnknownPort | Self::UnknownFact | Self::UnknownMode | Self::UnknownDevice)
+    }
 }
 
 impl fmt::Display for Code {
@@ -164,12 +167,14 @@ pub struct Diagnostic {
     pub notes: Vec<(Range<usize>, String)>,
     /// How to fix it.
     pub help: Option<String>,
+    /// The changes that the help asks for, if they can be made as they stand; otherwise empty.
+    pub fix: Vec<Edit>,
 }
 
 impl Diagnostic {
     /// Creates a diagnostic without notes and help.
     pub fn new(code: Code, span: Range<usize>, message: impl Into<String>) -> Self {
-        Self { code, message: message.into(), span, notes: Vec::new(), help: None }
+        Self { code, message: message.into(), span, notes: Vec::new(), help: None, fix: Vec::new() }
     }
 
     /// Creates the diagnostic of a `name` for which there is no `what`, with a suggestion among the `known` names.
@@ -196,7 +201,25 @@ impl Diagnostic {
     /// `what` names the known things in the plural, for example "roles".
     #[must_use]
     pub fn suggest<'n>(self, name: &str, known: impl Iterator<Item = &'n str>, what: &str) -> Self {
-        self.help(suggestion(name, known, what))
+        let known: Vec<&str> = known.collect();
+        match suggest_name(name, known.iter().copied()) {
+            Some(best) => self.instead(name, best),
+            None => self.help(suggestion(name, known.into_iter(), what)),
+        }
+    }
+
+    /// Suggests `best` in place of `name`, which is marked.
+    #[must_use]
+    pub fn instead(mut self, name: &str, best: &str) -> Self {
+        self.fix.extend(inside(&self.span, name).map(|span| Edit::Replace(span, best.to_owned())));
+        self.help(did_you_mean(best))
+    }
+
+    /// Adds a change that the help asks for.
+    #[must_use]
+    pub fn edit(mut self, edit: Edit) -> Self {
+        self.fix.push(edit);
+        self
     }
 
     /// Sets or clears the help text.
@@ -221,115 +244,11 @@ impl Diagnostic {
 /// A list of diagnostics, in the order in which they were found.
 pub type Diagnostics = Vec<Diagnostic>;
 
-/// All diagnostics of a graph, with the texts they refer to. `Debug` shows them as a terminal does, for `unwrap` in a
-/// test.
-#[derive(Clone)]
-pub struct Report {
-    /// The files that were read.
-    pub sources: SourceMap,
-    /// The diagnostics in the order of their places.
-    pub diagnostics: Diagnostics,
-}
-
-impl fmt::Debug for Report {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "\n{}", self.render(false))
+/// Returns the place of `name` in the text at `span`: a word with or without quotes.
+fn inside(span: &Range<usize>, name: &str) -> Option<Range<usize>> {
+    match span.len().checked_sub(name.len())? {
+        0 => Some(span.clone()),
+        2 => Some(span.start + 1..span.end - 1),
+        _ => None,
     }
-}
-
-impl Report {
-    /// Sorts the diagnostics by place and removes duplicates.
-    #[must_use]
-    pub fn new(sources: SourceMap, mut diagnostics: Diagnostics) -> Self {
-        diagnostics.sort_by(|a, b| (a.span.start, a.span.end, &a.message).cmp(&(b.span.start, b.span.end, &b.message)));
-        diagnostics.dedup();
-        Self { sources, diagnostics }
-    }
-
-    /// Formats all diagnostics for a terminal, with or without colours.
-    #[must_use]
-    pub fn render(&self, has_colour: bool) -> String {
-        let renderer = if has_colour { Renderer::styled() } else { Renderer::plain() };
-        let mut text = String::new();
-        for diagnostic in &self.diagnostics {
-            text.push_str(&self.render_one(diagnostic, &renderer));
-            text.push_str("\n\n");
-        }
-        let is_warning = |diagnostic: &&Diagnostic| diagnostic.code.severity() == Severity::Warning;
-        let warnings = self.diagnostics.iter().filter(is_warning).count();
-        let counts = [(self.diagnostics.len() - warnings, "mistake"), (warnings, "warning")];
-        let counts = counts.iter().filter(|(count, _)| *count > 0);
-        let counts: Vec<String> =
-            counts.map(|(count, what)| format!("{count} {what}{}", if *count == 1 { "" } else { "s" })).collect();
-        text.push_str(&format!("{}\n", counts.join(", ")));
-        text
-    }
-
-    fn render_one(&self, diagnostic: &Diagnostic, renderer: &Renderer) -> String {
-        let main = self.sources.file_at(diagnostic.span.start);
-        let place = marked(main, &diagnostic.span);
-        let mut others: Vec<Group<'_>> = Vec::new();
-        let (mut notes, mut shown) = (Vec::new(), place.clone());
-        for (span, label) in &diagnostic.notes {
-            let file = self.sources.file_at(span.start);
-            let place = marked(file, span);
-            if std::ptr::eq(file, main) {
-                shown = shown.start.min(place.start)..shown.end.max(place.end);
-                notes.push((place, label));
-            } else {
-                let excerpt = Excerpt::of(file, &place);
-                let snippet = excerpt.snippet().annotation(AnnotationKind::Context.span(excerpt.within(&place)));
-                others.push(Level::NOTE.secondary_title(label).element(snippet));
-            }
-        }
-        let excerpt = Excerpt::of(main, &shown);
-        let notes =
-            notes.into_iter().map(|(place, label)| AnnotationKind::Context.span(excerpt.within(&place)).label(label));
-        let snippet = excerpt.snippet().annotation(AnnotationKind::Primary.span(excerpt.within(&place)));
-        let snippet = snippet.annotations(notes);
-        let level = match diagnostic.code.severity() {
-            Severity::Error => Level::ERROR,
-            Severity::Warning => Level::WARNING,
-        };
-        let title = level.primary_title(&diagnostic.message).id(diagnostic.code.name());
-        let mut groups = vec![title.element(snippet)];
-        groups.append(&mut others);
-        if let Some(help) = &diagnostic.help {
-            groups.push(Group::with_title(Level::HELP.secondary_title(help)));
-        }
-        renderer.render(&groups)
-    }
-}
-
-/// The lines of a file that a message shows. The time to render them does not depend on the length of the file.
-struct Excerpt<'a> {
-    file: &'a SourceFile,
-    text: &'a str,
-    /// Number of the first line.
-    line: usize,
-    /// Offset of the first line in the file.
-    start: usize,
-}
-
-impl<'a> Excerpt<'a> {
-    fn of(file: &'a SourceFile, local: &Range<usize>) -> Self {
-        let (range, line) = file.lines_around(local);
-        Self { file, text: &file.text[range.clone()], line, start: range.start }
-    }
-
-    fn snippet<T: Clone>(&self) -> Snippet<'a, T> {
-        Snippet::source(self.text).path(&self.file.name).line_start(self.line)
-    }
-
-    /// Converts a range of the file into a range of the excerpt.
-    fn within(&self, local: &Range<usize>) -> Range<usize> {
-        local.start - self.start..local.end - self.start
-    }
-}
-
-/// Returns the part of a span that is underlined, so that a huge value does not print a million carets.
-fn marked(file: &SourceFile, span: &Range<usize>) -> Range<usize> {
-    const MAX_MARKED_BYTES: usize = 200;
-    let local = file.local(span);
-    local.start..local.end.min(file.text.floor_char_boundary(local.start + MAX_MARKED_BYTES))
 }

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 
-use crate::source::suggestion;
+use super::suggest::{suggest_name, suggestion};
 
 /// One source text.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -26,6 +26,12 @@ impl SourceFile {
     #[must_use]
     pub const fn span(&self) -> Range<usize> {
         self.base..self.base + self.text.len()
+    }
+
+    /// Returns whether the text is a file that is built into a catalogue.
+    #[must_use]
+    pub fn is_builtin(&self) -> bool {
+        self.name.starts_with(BUILTIN)
     }
 
     /// Converts a range of the source map into a range of this text.
@@ -74,6 +80,17 @@ pub struct Location {
 /// A file built into a catalogue: its name after `builtin:`, and its bytes.
 pub type BuiltinFile = (&'static str, &'static [u8]);
 
+/// The path of a built-in file that does not exist.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct UnknownBuiltin {
+    /// What is wrong.
+    pub message: String,
+    /// The path of a built-in file with a similar name.
+    pub similar: Option<String>,
+    /// The built-in files with similar names, or all of them.
+    pub help: String,
+}
+
 /// Prefix of the path of a file that is built into a catalogue.
 const BUILTIN: &str = "builtin:";
 
@@ -97,16 +114,30 @@ impl SourceMap {
     /// Returns the bytes of `builtin:NAME`, or `None` if the path is not a built-in one.
     ///
     /// # Errors
-    /// A message and a help text, if no built-in file has that name.
-    pub fn builtin(&self, path: &Path) -> Result<Option<&'static [u8]>, (String, String)> {
+    /// The message if no built-in file has that name, and the path of one with a similar name or a list of all.
+    pub fn builtin(&self, path: &Path) -> Result<Option<&'static [u8]>, UnknownBuiltin> {
         let Some(name) = path.to_str().and_then(|path| path.strip_prefix(BUILTIN)) else { return Ok(None) };
         match self.builtin.iter().find(|(other, _)| *other == name) {
             Some((_, bytes)) => Ok(Some(bytes)),
             None => {
-                let help = suggestion(name, self.builtin.iter().map(|(name, _)| *name), "built-in files");
-                Err((format!("there is no built-in file `{name}`"), help))
+                let known = || self.builtin.iter().map(|(name, _)| *name);
+                Err(UnknownBuiltin {
+                    message: format!("there is no built-in file `{name}`"),
+                    similar: suggest_name(name, known()).map(|name| format!("{BUILTIN}{name}")),
+                    help: suggestion(name, known(), "built-in files"),
+                })
             }
         }
+    }
+
+    /// Returns how often a word occurs in the texts and in the built-in graph files, comments excepted.
+    pub(crate) fn occurrences(&self, word: &str) -> usize {
+        let builtin = self.builtin.iter().filter(|(name, _)| name.ends_with(".toml"));
+        let builtin = builtin.filter_map(|(_, bytes)| std::str::from_utf8(bytes).ok());
+        let texts = self.files.iter().map(|file| file.text.as_str()).chain(builtin);
+        let is_end = |c: char| !(c.is_ascii_alphanumeric() || c == '_');
+        let code = texts.flat_map(str::lines).filter_map(|line| line.split('#').next());
+        code.flat_map(|code| code.split(is_end)).filter(|other| *other == word).count()
     }
 
     /// Resolves a path written at offset `at`, relative to the folder of the file that contains it.
@@ -180,11 +211,10 @@ mod tests {
         let base = sources.add_file(Path::new("a/one.toml"), "x = 1").base;
         assert_eq!(sources.builtin(Path::new("arm.urdf")), Ok(None));
         assert_eq!(sources.builtin(Path::new("builtin:arm.urdf")), Ok(Some(b"<robot/>".as_slice())));
-        let (message, help) = sources.builtin(Path::new("builtin:arm.udrf")).unwrap_err();
-        assert_eq!(
-            (message.as_str(), help.as_str()),
-            ("there is no built-in file `arm.udrf`", "did you mean `arm.urdf`?")
-        );
+        let unknown = sources.builtin(Path::new("builtin:arm.udrf")).unwrap_err();
+        assert_eq!(unknown.message, "there is no built-in file `arm.udrf`");
+        assert_eq!(unknown.similar.as_deref(), Some("builtin:arm.urdf"));
+        assert_eq!(unknown.help, "did you mean `arm.urdf`?");
         assert_eq!(sources.path("b.csv", base), Path::new("a/b.csv"));
         assert_eq!(sources.path("builtin:b.csv", base), Path::new("builtin:b.csv"));
     }

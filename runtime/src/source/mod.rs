@@ -3,15 +3,21 @@
 //! This is the lowest layer: it has no notion of graphs, nodes or devices.
 
 mod diagnostic;
+mod fix;
 mod map;
 mod named;
+mod report;
 mod suggest;
+mod syntax;
 mod value;
 
-pub use diagnostic::{Code, Diagnostic, Diagnostics, Report, Severity};
-pub use map::{BuiltinFile, Location, SourceFile, SourceMap};
+pub use diagnostic::{Code, Diagnostic, Diagnostics, Severity};
+pub use fix::Edit;
+pub use map::{BuiltinFile, Location, SourceFile, SourceMap, UnknownBuiltin};
 pub(crate) use named::Named;
+pub use report::Report;
 pub(crate) use suggest::quoted;
-pub use suggest::{suggest_name, suggestion};
-pub(crate) use value::FactRef;
-pub use value::{Item, Key, Table, Value, parse_table};
+pub use suggest::{did_you_mean, suggest_name, suggest_path, suggestion};
+pub use syntax::parse_table;
+pub(crate) use value::{FactRef, Meant};
+pub use value::{Item, Key, Table, Value};

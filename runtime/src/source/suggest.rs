@@ -1,24 +1,34 @@
 //! Suggestions for a misspelt name.
 
+use std::cmp::Reverse;
 use std::fmt::Display;
+use std::path::Path;
 
 /// Maximum number of names that a help lists.
 const MAX_LISTED_NAMES: usize = 100;
 
 /// Returns the known name closest to a misspelt one, or `None` if none is close.
 ///
-/// A name is close if its edit distance is at most one, plus one for every four characters of `name`.
+/// A name is close if its edit distance is at most one, plus one for every four characters of `name`. Capitals count as
+/// small letters, and `-` as `_`. Among equally close names, the one with the longest common start is returned.
 #[must_use]
 pub fn suggest_name<'n>(name: &str, known: impl Iterator<Item = &'n str>) -> Option<&'n str> {
-    let letters = Letters::of(name);
-    let (mut best, mut max_distance) = (None, 1 + name.chars().count() / 4);
-    for other in known.filter(|other| letters.min_distance(other) <= 1 + name.len() / 4) {
-        let distance = strsim::damerau_levenshtein(name, other);
-        if distance < max_distance || best.is_none() && distance == max_distance {
-            (best, max_distance) = (Some(other), distance);
-        }
-    }
-    best
+    let (name, letters) = (plain(name), Letters::of(name));
+    let common = |other: &str| name.chars().zip(other.chars()).take_while(|(a, b)| a == b).count();
+    let max_distance = 1 + name.chars().count() / 4;
+    // The bound counts bytes, of which a character may have several.
+    let is_near = |other: &&str| letters.min_distance(other) <= 1 + name.len() / 4;
+    let scored = known.filter(is_near).map(|other| {
+        let plain = plain(other);
+        ((strsim::damerau_levenshtein(&name, &plain), Reverse(common(&plain))), other)
+    });
+    let (score, best) = scored.min_by_key(|(score, _)| *score)?;
+    (score.0 <= max_distance).then_some(best)
+}
+
+/// Returns a name without the differences that do not matter: capitals, and `-` for `_`.
+fn plain(name: &str) -> String {
+    name.to_lowercase().replace('-', "_")
 }
 
 /// How often each letter occurs in a name: a bound of the edit distance that is much faster to compute.
@@ -30,7 +40,7 @@ struct Letters {
 impl Letters {
     fn of(name: &str) -> Self {
         let mut counts = [0; 64];
-        name.bytes().for_each(|byte| counts[usize::from(byte % 64)] += 1);
+        name.bytes().for_each(|byte| counts[slot(byte)] += 1);
         Self { counts, is_ascii: name.is_ascii() }
     }
 
@@ -40,11 +50,39 @@ impl Letters {
             return 0;
         }
         let mut counts = self.counts;
-        other.bytes().for_each(|byte| counts[usize::from(byte % 64)] -= 1);
+        other.bytes().for_each(|byte| counts[slot(byte)] -= 1);
         let (missing, surplus) =
             counts.iter().fold((0, 0), |(missing, surplus), count| (missing + count.max(&0), surplus - count.min(&0)));
         missing.max(surplus).unsigned_abs() as usize
     }
+}
+
+/// Returns where a letter is counted: capitals as small letters, and `-` as `_`.
+fn slot(byte: u8) -> usize {
+    usize::from(if byte == b'-' { b'_' } else { byte.to_ascii_lowercase() } % 64)
+}
+
+/// Returns the path of an existing file that is like `text`, which is relative to `folder`: each of its names is right,
+/// or is replaced by a similar one in the same folder.
+#[must_use]
+pub fn suggest_path(folder: &Path, text: &str) -> Option<String> {
+    let (mut at, mut names) = (folder.to_owned(), Vec::new());
+    for name in text.split('/') {
+        let exists = name.is_empty() || at.join(name).exists();
+        let here = if at.as_os_str().is_empty() { Path::new(".") } else { &at };
+        let found = if exists { name.to_owned() } else { suggest_file(here, name)? };
+        at = if name.is_empty() { Path::new("/").to_owned() } else { at.join(&found) };
+        names.push(found);
+    }
+    at.is_file().then(|| names.join("/"))
+}
+
+/// Returns the name in a folder that is like `name`.
+fn suggest_file(folder: &Path, name: &str) -> Option<String> {
+    let names = std::fs::read_dir(folder).ok()?.filter_map(|entry| entry.ok()?.file_name().into_string().ok());
+    let mut names: Vec<String> = names.collect();
+    names.sort();
+    suggest_name(name, names.iter().map(String::as_str)).map(str::to_owned)
 }
 
 /// Returns the help for an unknown name: the closest known name, or the list of all known names.
@@ -54,7 +92,7 @@ impl Letters {
 pub fn suggestion<'n>(name: &str, known: impl Iterator<Item = &'n str>, what: &str) -> String {
     let known: Vec<&str> = known.collect();
     match suggest_name(name, known.iter().copied()) {
-        Some(best) => format!("did you mean `{best}`?"),
+        Some(best) => did_you_mean(best),
         None if known.is_empty() => format!("there are no {what} here"),
         None if known.len() > MAX_LISTED_NAMES => {
             let more = known.len() - MAX_LISTED_NAMES;
@@ -62,6 +100,12 @@ pub fn suggestion<'n>(name: &str, known: impl Iterator<Item = &'n str>, what: &s
         }
         None => format!("{what} here: {}", quoted(&known)),
     }
+}
+
+/// Returns the help that suggests a name.
+#[must_use]
+pub fn did_you_mean(name: &str) -> String {
+    format!("did you mean `{name}`?")
 }
 
 /// Lists names in backticks, separated by commas.
@@ -74,17 +118,22 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_first_of_the_closest_names_is_suggested() {
+    fn the_closest_name_is_suggested() {
         let cases = [
-            ("pdi", &["pid", "pad"][..], Some("pid")),
-            ("mments", &["momentum", "moments", "moment"], Some("moments")),
-            ("pad", &["pid", "pod"], Some("pid")),
-            ("threshold", &["hold", "gate"], None),
-            ("größe", &["grosse", "größen"], Some("größen")),
-            ("ab", &["abcd", "x"], None),
+            ("imag", "image mask", Some("image")),
+            ("Image", "imago image", Some("image")),
+            ("FOR-MS", "for_ms after_ms", Some("for_ms")),
+            ("ki", "kp kii", Some("kii")),
+            ("min_n", "max_m min_m", Some("min_m")),
+            ("q", "select", None),
+            ("x", "", None),
+            ("mments", "momentum moments moment", Some("moments")),
+            ("threshold", "hold gate", None),
+            ("größe", "grosse größen", Some("größen")),
+            ("ab", "abcd x", None),
         ];
         for (name, known, expected) in cases {
-            assert_eq!(suggest_name(name, known.iter().copied()), expected, "{name}");
+            assert_eq!(suggest_name(name, known.split_whitespace()), expected, "{name}");
         }
     }
 
@@ -97,9 +146,10 @@ mod tests {
 
     #[test]
     fn the_bound_by_letters_is_no_longer_than_the_distance() {
-        let names = ["", "a", "ab", "ba", "abc", "cab", "moments", "momentum", "n12", "n21", "N12", "größe"];
+        let names = ["", "a", "ab", "ba", "abc", "cab", "moments", "Momentum", "n-12", "n_21", "N12", "größe"];
         for (a, b) in names.iter().flat_map(|a| names.map(|b| (*a, b))) {
-            assert!(Letters::of(a).min_distance(b) <= strsim::damerau_levenshtein(a, b), "{a} {b}");
+            let distance = strsim::damerau_levenshtein(&plain(a), &plain(b));
+            assert!(Letters::of(a).min_distance(b) <= distance, "{a} {b}");
         }
     }
 }

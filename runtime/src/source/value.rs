@@ -2,11 +2,9 @@
 
 use std::ops::Range;
 
+use super::suggest::suggest_name;
 use serde::de::DeserializeOwned;
 use serde::{Serialize, Serializer};
-use toml::de::{DeTable, DeValue};
-
-use crate::source::{Code, Diagnostic, Diagnostics, SourceFile};
 
 /// A value of a graph file with its span.
 #[derive(Debug, Clone, PartialEq)]
@@ -124,6 +122,59 @@ impl Table {
     }
 }
 
+/// The known name that a key misspells.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Meant<'n> {
+    /// The name can replace the key.
+    Free(&'n str),
+    /// The table has this name too.
+    Taken(&'n str),
+    /// The key resembles no known name.
+    Unknown,
+}
+
+impl Table {
+    /// Gives each key that is not `known` the known name that it probably misspells, and returns these keys as they were
+    /// written, each with that name. A key that resembles no known name stays.
+    ///
+    /// After one message about the key, the rest of the table is then read as it was meant.
+    pub(crate) fn correct<'n>(&mut self, known: &[&'n str]) -> Vec<(Key, Meant<'n>)> {
+        let (right, wrong): (Vec<_>, Vec<_>) =
+            std::mem::take(&mut self.entries).into_iter().partition(|(key, _)| known.contains(&key.name.as_str()));
+        self.entries = right;
+        let mut corrected = Vec::new();
+        for (key, value) in wrong {
+            // A name that is there already is not what was meant, unless both are tables, as in `in.x` and `inn.y`.
+            let is_open = |name: &&str| match self.get(name) {
+                Some(there) => there.as_section().is_some() && value.as_section().is_some(),
+                None => true,
+            };
+            let open = known.iter().copied().filter(is_open);
+            let meant = suggest_name(&key.name, open).or_else(|| suggest_name(&key.name, known.iter().copied()));
+            let is_free = meant.is_none_or(|name| is_open(&name));
+            // Two headers of the same section are a syntax error, but `[nodes.a]` and `[nodes.b]` are not.
+            let is_nested =
+                value.as_section().is_some_and(|table| table.entries.iter().all(|(_, v)| v.as_table().is_some()));
+            let is_dotted = value.span == key.span;
+            let is_taken = meant.is_some_and(|name| self.get(name).is_some()) && !is_nested && !is_dotted;
+            if is_free {
+                let name = meant.map_or_else(|| key.name.clone(), str::to_owned);
+                self.merge(Self { entries: vec![(Key { name, span: key.span.clone() }, value)] });
+            }
+            corrected.push((
+                key,
+                match meant {
+                    Some(name) if is_taken => Meant::Taken(name),
+                    Some(name) => Meant::Free(name),
+                    None => Meant::Unknown,
+                },
+            ));
+        }
+        self.entries.sort_by_key(|(key, _)| key.span.start);
+        corrected
+    }
+}
+
 impl Value {
     /// Returns the table, or `None` for other values.
     #[must_use]
@@ -201,63 +252,12 @@ impl Value {
     }
 }
 
-/// Parses a text as TOML.
-///
-/// # Errors
-/// One diagnostic for each syntax error.
-pub fn parse_table(file: &SourceFile) -> Result<Value, Diagnostics> {
-    let (table, errors) = DeTable::parse_recoverable(&file.text);
-    let at = |span: Range<usize>| span.start + file.base..span.end + file.base;
-    let mut mistakes = Vec::new();
-    for error in errors {
-        let message = error.message().lines().collect::<Vec<_>>().join("; ");
-        mistakes.push(Diagnostic::new(Code::Syntax, at(error.span().unwrap_or(0..0)), message));
-    }
-    let span = at(table.span());
-    let item = Item::Table(from_table(table.get_ref(), &at, &mut mistakes));
-    if mistakes.is_empty() { Ok(Value { span, item }) } else { Err(mistakes) }
-}
-
-fn from_table(table: &DeTable<'_>, at: &dyn Fn(Range<usize>) -> Range<usize>, mistakes: &mut Diagnostics) -> Table {
-    let mut entries: Vec<(Key, Value)> = Vec::new();
-    for (key, value) in table {
-        let key = Key { name: key.get_ref().to_string(), span: at(key.span()) };
-        entries.push((key, from_value(value, at, mistakes)));
-    }
-    entries.sort_by_key(|(key, _)| key.span.start);
-    Table { entries }
-}
-
-fn from_value(
-    value: &toml::Spanned<DeValue<'_>>,
-    at: &dyn Fn(Range<usize>) -> Range<usize>,
-    mistakes: &mut Diagnostics,
-) -> Value {
-    let span = at(value.span());
-    let item = match value.get_ref() {
-        DeValue::String(text) => Item::String(text.to_string()),
-        DeValue::Integer(number) => {
-            let read = i64::from_str_radix(number.as_str(), number.radix());
-            if read.is_err() {
-                mistakes.push(Diagnostic::new(Code::Syntax, span.clone(), format!("{number} does not fit in 64 bits")));
-            }
-            Item::Integer(read.unwrap_or_default())
-        }
-        DeValue::Float(number) => Item::Float(number.as_str().parse().unwrap_or(f64::NAN)),
-        DeValue::Boolean(value) => Item::Boolean(*value),
-        DeValue::Datetime(date) => Item::Datetime(date.to_string()),
-        DeValue::Array(items) => Item::Array(items.iter().map(|item| from_value(item, at, mistakes)).collect()),
-        DeValue::Table(table) => Item::Table(from_table(table, at, mistakes)),
-    };
-    Value { span, item }
-}
-
 #[cfg(test)]
 mod tests {
     use std::path::Path;
 
     use super::*;
-    use crate::source::SourceMap;
+    use crate::source::{SourceMap, parse_table};
 
     fn parse(sources: &mut SourceMap, text: &str) -> Table {
         let value = parse_table(sources.add_file(Path::new("x.toml"), text)).unwrap();
@@ -276,18 +276,5 @@ mod tests {
         let z = a.get("b").unwrap().as_table().unwrap().get("z").unwrap();
         assert_eq!((z.as_str(), sources.locate(z.span.start).as_str()), (Some("new"), "x.toml:2:9"));
         assert_eq!(sources.locate(a.get("x").unwrap().span.start), "x.toml:2:5");
-    }
-
-    #[test]
-    fn every_mistake_of_syntax_shows_at_its_place() {
-        let mut sources = SourceMap::default();
-        sources.add_file(Path::new("first.toml"), "ok = 1");
-        let file = sources.add_file(Path::new("x.toml"), "a = \nb = 1\nc = = 2\n").clone();
-        let mistakes = parse_table(&file).unwrap_err();
-        let places: Vec<String> = mistakes.iter().map(|m| sources.locate(m.span.start)).collect();
-        assert!(
-            places.iter().any(|p| p.starts_with("x.toml:1")) && places.iter().any(|p| p.starts_with("x.toml:3")),
-            "{places:?}"
-        );
     }
 }

@@ -129,10 +129,7 @@ pub fn is_calibration(text: &str) -> bool {
 /// The first mistakes in it, each with its place in the text.
 pub fn read(text: &str) -> Result<Calibration, Mistakes> {
     let mut sources = SourceMap::default();
-    let root = parse_table(sources.add("", text, "")).map_err(|diagnostics| {
-        // Later mistakes follow from the first: a file that is not TOML has one on every line.
-        diagnostics.into_iter().take(1).map(|first| mistake(&first.span, first.message)).collect::<Mistakes>()
-    })?;
+    let root = parse_table(sources.add("", text, "")).map_err(|first| mistake(&first.span, first.message))?;
     let mut reader = Reader::new(&sources);
     let calibration = read_calibration(&root, &mut reader);
     let mut mistakes = reader.mistakes;

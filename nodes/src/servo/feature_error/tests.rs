@@ -148,13 +148,19 @@ fn a_component_that_returns_is_not_integrated_twice() {
 fn a_name_that_does_not_match_is_a_mistake() {
     let key = |name: &str| (Code::UnknownKey, At::Key(name.into()));
     let missing = (Code::MissingKey, At::Key("setpoint".into()));
-    let requires = (Code::BadValue, At::Param("requires".into()));
+    let required = |params: &str| {
+        let at = params.find("\"z\"").unwrap();
+        (Code::BadValue, At::Span(at..at + 3))
+    };
+    let (one, two) =
+        ("setpoint = { y = 0, alpha = 0, force = 1 }", "setpoint = { y = 0, alpha = 0, force = 1, z = 0 }");
+    let (one, two) = (format!("{one}\nrequires = [\"force\", \"z\"]"), format!("{two}\nrequires = [\"z\"]"));
     let cases = [
         ("setpoint = { y = 0, alpha = 0 }", vec![missing]),
         ("setpoint = { y = 0, alpha = 0, force = 1, z = 0 }", vec![key("setpoint.z")]),
         ("setpoint = { y = 0, alpha = 0, f = 1 }", vec![key("setpoint.f")]),
-        ("setpoint = { y = 0, alpha = 0, force = 1 }\nrequires = [\"force\", \"z\"]", vec![requires.clone()]),
-        ("setpoint = { y = 0, alpha = 0, force = 1, z = 0 }\nrequires = [\"z\"]", vec![key("setpoint.z"), requires]),
+        (&one, vec![required(&one)]),
+        (&two, vec![key("setpoint.z"), required(&two)]),
     ];
     for (params, expected) in cases {
         let mistakes = rig(params).err().unwrap();

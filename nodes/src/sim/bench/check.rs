@@ -98,7 +98,7 @@ fn check_motion(params: &Params) -> Result<(), Mistakes> {
     refuse_any(mistakes)
 }
 
-/// Returns the mistake of an object. An entry of a list has no span of its own, so the message names its number.
+/// Returns the mistake of an object, by its number from 0; the message counts from 1.
 pub(super) fn object(index: usize, message: impl std::fmt::Display) -> Mistake {
-    Mistake::param("objects", format!("object {}: {message}", index + 1))
+    Mistake::param(format!("objects.{index}"), format!("object {}: {message}", index + 1))
 }

@@ -26,7 +26,10 @@ fn a_line_per_tactel() {
         ("dead = [[0, 1], [1, 2]]", [10.0, 0.0, 30.0, 40.0, 50.0, 0.0]),
         ("device = { offset = 10, gain = 2 }", [0.0, 20.0, 40.0, 60.0, 80.0, 100.0]),
         // The graph replaces all four parameters of the device, but not its dead tactels.
-        ("device = { offset = 10, gain = 2, file = \"none.toml\" }\ngain = 3", [30.0, 60.0, 90.0, 120.0, 150.0, 180.0]),
+        (
+            "device = { offset = 10, gain = 2, file = \"Cargo.toml\" }\ngain = 3",
+            [30.0, 60.0, 90.0, 120.0, 150.0, 180.0],
+        ),
         ("device = { dead = [[0, 0]] }\ndead = [[1, 2]]", [0.0, 20.0, 30.0, 40.0, 50.0, 0.0]),
         ("device = { dead = [[0, 0]] }\noffset = 10", [0.0, 10.0, 20.0, 30.0, 40.0, 50.0]),
         ("offset = 100\ndead = [[1, 0]]", [-90.0, -80.0, -70.0, 0.0, -50.0, -40.0]),
@@ -51,7 +54,7 @@ fn a_mistake_of_the_device_is_marked_at_device() {
         assert_eq!((mistakes.len(), &mistakes[0].at), (1, &At::Param(at.into())), "{params}: {mistakes:?}");
         assert!(mistakes[0].message.contains(message), "{params}: {mistakes:?}");
     }
-    let mistakes = rig("device = { gain = 2, file = \"none.toml\" }").err().unwrap();
+    let mistakes = rig("device = { gain = 2, file = \"Cargo.toml\" }").err().unwrap();
     assert_eq!(mistakes[0].at, At::Key("device.gain".into()), "{mistakes:?}");
 }
 

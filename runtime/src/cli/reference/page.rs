@@ -40,13 +40,13 @@ pub(crate) fn page(entry: &Entry, has_fits: bool) -> Vec<Element> {
         add_params(&entry.params, "", &mut items);
         elements.extend([Element::Heading("Parameters".to_owned()), Element::Definitions(items)]);
     }
-    let (heading, code) = match (&entry.example, entry.category) {
-        (Some(example), _) => ("Example graph", Some(example)),
-        (None, Category::File) => ("The file", entry.block.as_ref()),
-        (None, _) => ("Example", entry.block.as_ref()),
-    };
-    if let Some(code) = code {
+    if let Some(code) = &entry.block {
+        let heading = if entry.category == Category::File { "The file" } else { "Example" };
         elements.extend([Element::Heading(heading.to_owned()), Element::Code(code.clone())]);
+    }
+    if entry.example.is_some() {
+        let line = format!("`tactflow describe {} --example` prints a whole graph with it.", entry.name);
+        elements.push(Element::Prose(line));
     }
     elements
 }

@@ -5,6 +5,7 @@ use std::ops::Range;
 use super::open::OpenedBench;
 use crate::graph::net::{Net, Resolved, report};
 use crate::graph::syntax::LIMITS;
+use crate::node::Spanned;
 use crate::source::{Code, Diagnostic, Diagnostics, Item, Table, Value};
 
 /// Replaces every `{ from = "role.fact" }` by the fact, and every `{ from = "limits.key" }` by the value in [limits].
@@ -49,19 +50,21 @@ fn find_fact(
     opened: &OpenedBench,
 ) -> Resolved<Value> {
     let (role, name) = word.split_once('.').unwrap_or((word, ""));
+    let part = |range: Range<usize>| Spanned { value: word.to_owned(), span: place.clone() }.part(range);
     if role == LIMITS {
         // A missing value is reported at the section.
         return net.flat.limits.as_ref().and_then(|(_, table)| table.get(name)).cloned().ok_or(None);
     }
     let roles = &net.flat.roles;
     let Some(index) = roles.position(role) else {
-        return Diagnostic::unknown(Code::UnknownFact, "role", role, place, roles.names()).into_err();
+        let place = part(0..role.len());
+        return Diagnostic::unknown(Code::UnknownFact, "role", role, &place, roles.names().chain([LIMITS])).into_err();
     };
     // A device that could not be opened has its own diagnostic.
     let facts = &opened.roles[index].as_ref().ok_or(None)?.facts;
     let Some((_, value)) = facts.iter().find(|(fact, _)| fact == name) else {
         let message = format!("the device of role `{role}` has no fact `{name}`");
-        let unknown = Diagnostic::new(Code::UnknownFact, place.clone(), message);
+        let unknown = Diagnostic::new(Code::UnknownFact, part(word.len() - name.len()..word.len()), message);
         return unknown.suggest(name, facts.iter().map(|(fact, _)| &**fact), "facts").into_err();
     };
     Ok(Value::from_toml(value, span))

@@ -12,7 +12,9 @@ use crate::graph::plan::PlannedDevice;
 use crate::graph::syntax::{BenchDocument, Block, WireEntry};
 use crate::node::{KnownUnits, Mistake, PortSpec, Reader, Spanned};
 use crate::signal::Shape;
-use crate::source::{Code, Diagnostic, Diagnostics, Key, SourceMap, Value, quoted, suggest_name, suggestion};
+use crate::source::{
+    Code, Diagnostic, Diagnostics, Edit, Item, Key, SourceMap, Value, quoted, suggest_name, suggestion,
+};
 
 /// A role that is bound to a device. Ports are in the order of the role, each with its index in the device.
 #[derive(Debug, Clone)]
@@ -66,9 +68,13 @@ pub(crate) fn open(net: &Net<'_>, sources: &mut SourceMap, diagnostics: &mut Dia
         blocks: net.flat.bench.iter().flat_map(|bench| &bench.devices).map(|block| (&*block.key.name, block)).collect(),
         tried: BTreeMap::new(),
         taken: BTreeMap::new(),
+        kinds: net.flat.roles.iter().map(|(key, kind)| (key.name.clone(), kind.value.clone())).collect(),
+        unbound: Vec::new(),
         opened: OpenedBench::default(),
     };
     let bench = net.flat.bench.as_ref();
+    let is_bound = |role: &&String| bench.is_none_or(|bench| bench.bind.iter().any(|(key, _)| key.name == **role));
+    opener.unbound = opener.kinds.keys().filter(|role| !is_bound(role)).cloned().collect();
     if let Some(bench) = bench {
         let declared = net.flat.roles.iter().map(|(key, _)| key);
         let roles = declared.chain(net.observed.iter().map(|(key, ..)| *key)).map(|key| key.name.as_str()).collect();
@@ -104,6 +110,9 @@ struct Opener<'a> {
     /// Name of the role for each role of a device that is filled: index of the device, and index of the role among
     /// those that it can fill.
     taken: BTreeMap<(usize, usize), String>,
+    /// The roles of the task with their types, and those of them that no device is bound to.
+    kinds: BTreeMap<String, String>,
+    unbound: Vec<String>,
     opened: OpenedBench,
 }
 
@@ -155,12 +164,10 @@ impl Opener<'_> {
 
     fn role(&mut self, bench: &BenchDocument, key: &Key, kind: &Spanned<String>) -> Option<BoundRole> {
         let Some(word) = bench.bind.get(&key.name) else {
-            let message = format!("the bench does not bind the role `{}`", key.name);
-            let devices = quoted(bench.devices.iter().map(|device| device.key.name.as_str()));
-            let example = bench.devices.first().map_or("device", |device| &device.key.name);
-            let help =
-                format!("add `{} = \"{example}\"` under [bind] in the bench; its devices are {devices}", key.name);
-            self.diagnostics.push(Diagnostic::new(Code::UnboundRole, key.span.clone(), message).help(help));
+            if !bench.invalid.iter().any(|role| role.name == key.name) {
+                let unbound = self.unbound(bench, key, &kind.value);
+                self.diagnostics.push(unbound);
+            }
             return None;
         };
         let device = self.device(bench, word)?;
@@ -205,6 +212,78 @@ impl Opener<'_> {
             reports: number(&description.reports, &role.reports),
             facts,
         })
+    }
+
+    /// Reports that no device is bound to a role: a binding has a similar name or is the only one left over, or there is
+    /// none.
+    fn unbound(&mut self, bench: &BenchDocument, role: &Key, kind: &str) -> Diagnostic {
+        let name = &role.name;
+        let strange = self.strange_bindings(bench);
+        let only = strange.first().filter(|_| strange.len() == 1 && self.unbound.len() == 1);
+        let only = only.filter(|key| {
+            let device = bench.bind.iter().find(|(other, _)| other.name == key.name);
+            let device = device.and_then(|(_, word)| self.device(bench, word));
+            device.is_some_and(|device| self.opened.devices[device].description.roles().any(|role| role == kind))
+        });
+        let similar = suggest_name(name, strange.iter().map(|key| key.name.as_str()));
+        if let Some(binding) = strange.iter().find(|key| similar == Some(&key.name)).or(only) {
+            let message = format!("the task has no role `{}`, and its role `{name}` is not bound", binding.name);
+            let diagnostic = Diagnostic::new(Code::UnboundRole, binding.span.clone(), message);
+            return diagnostic.note(role.span.clone(), "the role is here").instead(&binding.name, name);
+        }
+        let message = format!("the bench does not bind the role `{name}`");
+        let device = self.device_for(bench, name, kind);
+        let devices = quoted(bench.devices.iter().map(|device| device.key.name.as_str()));
+        let Some(device) = device else {
+            let help = format!("bind it to a device of a type that fills `{kind}`; the devices here are {devices}");
+            let place = bench.place.as_ref().unwrap_or(&role.span).clone();
+            let diagnostic = Diagnostic::new(Code::UnboundRole, place, message).help(help);
+            return if bench.place.is_some() {
+                diagnostic.note(role.span.clone(), "the role is here")
+            } else {
+                diagnostic
+            };
+        };
+        let line = format!("{name} = \"{device}\"");
+        let help = format!("add `{line}` under [bind]");
+        match (&bench.place, bench.devices.first()) {
+            (Some(place), _) => Diagnostic::new(Code::UnboundRole, place.clone(), message)
+                .note(role.span.clone(), "the role is here")
+                .edit(Edit::Below(place.clone(), line)),
+            (None, Some(device)) => Diagnostic::new(Code::UnboundRole, role.span.clone(), message)
+                .edit(Edit::Append(device.key.span.clone(), format!("\n[bind]\n{line}"))),
+            (None, None) => Diagnostic::new(Code::UnboundRole, role.span.clone(), message),
+        }
+        .help(help)
+    }
+
+    /// Returns the device that can fill a role: one with its name, or the first that has a place for such a role.
+    fn device_for(&mut self, bench: &BenchDocument, role: &str, kind: &str) -> Option<String> {
+        let names: Vec<Spanned<String>> = bench
+            .devices
+            .iter()
+            .map(|device| Spanned { value: device.key.name.clone(), span: device.key.span.clone() })
+            .collect();
+        let mut fitting = Vec::new();
+        for word in names {
+            let Some(device) = self.device(bench, &word) else { continue };
+            let fills = self.opened.devices[device].description.roles().filter(|role| *role == kind).count();
+            let is_taken = |name: &Key| self.kinds.get(&name.name).is_some_and(|taken| taken == kind);
+            let taken = bench.bind.iter().filter(|(name, device)| device.value == word.value && is_taken(name)).count();
+            fitting.extend((fills > taken).then_some(word.value));
+        }
+        fitting
+            .iter()
+            .position(|name| name == role)
+            .map(|at| fitting[at].clone())
+            .or_else(|| fitting.into_iter().next())
+    }
+
+    /// Returns the bindings of names that are neither roles of the task nor roles for scenarios.
+    fn strange_bindings<'b>(&self, bench: &'b BenchDocument) -> Vec<&'b Key> {
+        let keys = bench.bind.iter().map(|(key, _)| key);
+        let is_observed = |key: &Key| self.catalogue.roles().iter().any(|role| role.is_observed_as(&key.name));
+        keys.filter(|key| !self.kinds.contains_key(&key.name) && !is_observed(key)).collect()
     }
 
     fn device(&mut self, bench: &BenchDocument, word: &Spanned<String>) -> Option<usize> {
@@ -289,7 +368,7 @@ pub(crate) fn place_mistakes(
     diagnostics: &mut Diagnostics,
 ) {
     use crate::node::At;
-    for Mistake { code, at, message, help } in mistakes {
+    for Mistake { code, at, message, help, instead } in mistakes {
         let mut notes = Vec::new();
         let span = match at {
             At::Span(span) => span,
@@ -305,17 +384,44 @@ pub(crate) fn place_mistakes(
                 base + span.start..base + span.end
             }
         };
-        diagnostics.push(Diagnostic { code, message, span, notes, help });
+        let diagnostic = Diagnostic { notes, ..Diagnostic::new(code, span, message).with_help(help) };
+        diagnostics.push(match instead {
+            Some((name, best)) => misspelt_wire(&diagnostic, wires, (&name, &best), sources)
+                .unwrap_or_else(|| diagnostic.instead(&name, &best)),
+            None => diagnostic,
+        });
     }
 }
 
-/// Returns the spans of the key and of the value at a dotted path.
+/// Returns the diagnostic of a wire whose name, which is `best`, is misspelt, and not the `name` that a parameter has.
+fn misspelt_wire(
+    diagnostic: &Diagnostic,
+    wires: &[WireEntry],
+    (name, best): (&str, &str),
+    sources: &SourceMap,
+) -> Option<Diagnostic> {
+    let wire = wires.iter().find(|wire| wire.key.name == best)?;
+    let is_rarer = sources.occurrences(best) == 1 && sources.occurrences(name) > 1;
+    let message = format!("the parameters name `{name}`, and no wire is called so");
+    let wrong = Diagnostic::new(Code::UnknownInput, wire.key.span.clone(), message);
+    is_rarer.then(|| wrong.note(diagnostic.span.clone(), "it is named here").instead(best, name))
+}
+
+/// Returns the spans of the key and of the value at a dotted path. An entry of a list is named by its number, from 0.
 fn find_spans(block: &Value, path: &str) -> Option<(Range<usize>, Range<usize>)> {
     let mut value = block;
     let mut key = block.span.clone();
     for name in path.split('.') {
-        let (entry_key, inner) = value.as_table()?.entry(name)?;
-        (key, value) = (entry_key.span.clone(), inner);
+        (key, value) = match &value.item {
+            Item::Array(items) => {
+                let item = items.get(name.parse::<usize>().ok()?)?;
+                (item.span.clone(), item)
+            }
+            _ => {
+                let (entry_key, inner) = value.as_table()?.entry(name)?;
+                (entry_key.span.clone(), inner)
+            }
+        };
     }
     Some((key, value.span.clone()))
 }

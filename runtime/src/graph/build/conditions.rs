@@ -101,7 +101,7 @@ impl ExitContext<'_> {
             }
             (None, true) => {
                 let message = format!("`{}` has no target mode", kind.key());
-                bad_condition(span, message).help("add `to = \"MODE\"`").into_err()
+                bad_condition(span, message).help("write the mode in `to`").into_err()
             }
             (None, false) => Ok(None),
             (Some(to), false) => {
@@ -126,11 +126,11 @@ impl ExitContext<'_> {
             }
             (None, None, None, Some(word)) => sent_condition(word),
             (None, None, None, None) => {
-                let help = "add `when = \"node.port\"`, `after_ms`, `after_travel_mm` or `on = \"WORD\"`";
+                let help = "write a condition: `when` with a port, `after_ms`, `after_travel_mm` or `on` with a word";
                 bad_condition(span, format!("`{}` has no condition", kind.key())).help(help).into_err()
             }
             _ => {
-                let help = "give each exit one condition, and several exits as a list: `[{ … }, { … }]`";
+                let help = "give each exit one condition, and write several exits as a list";
                 bad_condition(span, format!("`{}` has more than one condition", kind.key())).help(help).into_err()
             }
         }
@@ -167,7 +167,7 @@ impl ExitContext<'_> {
             .into_err(),
             several => {
                 let names = quoted(several.iter().map(|source| self.net.port_name(*source)));
-                let help = format!("add `of = \"node.port\"`; poses here: {names}");
+                let help = format!("name one in `of`; poses here: {names}");
                 bad_condition(span, "the graph has several poses: `of` must name one").help(help).into_err()
             }
         }
@@ -179,7 +179,7 @@ impl ExitContext<'_> {
             Some((at, _)) => (&word.value[..at], Some(&word.value[at + 1..])),
             None => (word.value.as_str(), None),
         };
-        let source = self.net.resolve(0, &Spanned { value: name.to_owned(), span: word.span.clone() })?;
+        let source = self.net.resolve(0, &Spanned { value: name.to_owned(), span: word.part(0..name.len()) })?;
         let Some(feature) = feature else { return Ok((WatchedPort { source, feature: None }, name.to_owned())) };
         let unknown = |message: String| Diagnostic::new(Code::UnknownPort, word.span.clone(), message);
         let shape = &(self.port)(source).ok_or(None)?.shape;
@@ -189,7 +189,10 @@ impl ExitContext<'_> {
         };
         let Some(at) = features.names().position(|known| known == feature) else {
             let message = format!("`{name}` has no feature `{feature}`");
-            return unknown(message).suggest(feature, features.names(), "features").into_err();
+            let at = word.part(name.len() + 1..word.value.len());
+            return Diagnostic::new(Code::UnknownPort, at, message)
+                .suggest(feature, features.names(), "features")
+                .into_err();
         };
         Ok((WatchedPort { source, feature: Some(at) }, format!("{name}.{feature}")))
     }
@@ -217,7 +220,7 @@ impl ExitContext<'_> {
             }
             None if kind == Kind::Flag => PortState::True,
             None => {
-                let help = "add `is = \"new\"`, `\"absent\"` or `\"present\"`";
+                let help = "write `is = \"new\"`, `\"absent\"` or `\"present\"`";
                 return bad(": the condition needs `is`").help(help).into_err();
             }
         };
@@ -245,7 +248,7 @@ impl ExitContext<'_> {
             (_, Some(min), Some(max)) => (min, max, format!("between {min} and {max}")),
             (None, None, None) => {
                 let message = format!("`{name}` is a number: the condition needs a bound or `is`");
-                let help = "add `above`, `below` or `within`, or `is = \"new\"`, `\"absent\"` or `\"present\"`";
+                let help = "write `above`, `below` or `within`, or `is = \"new\"`, `\"absent\"` or `\"present\"`";
                 return bad_condition(&when.span, message).help(help).into_err();
             }
         };

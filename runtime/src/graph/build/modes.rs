@@ -110,13 +110,14 @@ fn collect_tables(
     for (key, value) in &set.entries {
         let Some(table) = value.as_table() else {
             let message = format!("`set.{}` does not name a parameter", key.name);
-            let help = format!("write `set.{}.PARAMETER = …`", key.name);
+            let help = format!("write the name of a parameter behind `set.{}`", key.name);
             diagnostics.push(Diagnostic::new(Code::BadValue, value.span.clone(), message).help(help));
             continue;
         };
         let unknown = |message: String| Diagnostic::new(Code::UnknownKey, key.span.clone(), message);
         match names.get(&key.name) {
             Some((_, Entity::Node(node))) => tables.entry(*node).or_default().merge(table.clone()),
+            Some((_, Entity::Unknown)) => {}
             Some((_, Entity::Part(inner))) => collect_tables(flat, *inner, table, tables, diagnostics),
             Some((_, Entity::Role(_))) => {
                 let message = format!("`{}` is a role: a mode sets only parameters of nodes", key.name);

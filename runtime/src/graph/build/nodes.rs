@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use crate::graph::bench::{BoundRole, OpenedBench, fill_facts, place_mistakes};
 use crate::graph::check::frames::Frames;
-use crate::graph::check::units::{UnitMismatch, Units};
+use crate::graph::check::units::{UnitMismatch, UnitOrigin, Units};
 use crate::graph::load::MeasuredValues;
 use crate::graph::net::{CommandWire, Net, WireOrigin};
 use crate::graph::plan::{PlannedCommand, PlannedNode, PlannedPort, PlannedRole, PlannedWire, PortRef, Producer};
@@ -26,6 +26,8 @@ pub(crate) struct Builder<'a> {
     pub(crate) ports: BTreeMap<PortRef, PlannedPort>,
     /// The unit variables of each node.
     units: BTreeMap<usize, Units>,
+    /// What determined the unit of each port.
+    origins: BTreeMap<PortRef, UnitOrigin>,
     /// The shapes from which each node was built, and whether it generates no motion.
     built: BTreeMap<usize, (Given, bool)>,
     /// The values of parameters that were written with a unit.
@@ -50,6 +52,7 @@ impl<'a> Builder<'a> {
             period,
             ports: BTreeMap::new(),
             units: BTreeMap::new(),
+            origins: BTreeMap::new(),
             built: BTreeMap::new(),
             measured: MeasuredValues::default(),
         };
@@ -74,7 +77,14 @@ impl Builder<'_> {
     fn add_roles(&mut self) {
         for (i, bound) in self.opened.roles.iter().enumerate() {
             for (port, (_, shape)) in bound.iter().flat_map(|bound| &bound.outputs).enumerate() {
-                self.add_port(PortRef { producer: Producer::Role(i), port }, shape.clone());
+                let source = PortRef { producer: Producer::Role(i), port };
+                let device = bound.as_ref().map(|bound| &self.opened.devices[bound.device]);
+                let port = self.add_port(source, shape.clone());
+                let unit = shape.unit().map(|unit| unit.to_string()).unwrap_or_default();
+                self.origins.extend(device.map(|device| {
+                    let text = format!("the device `{}` gives `{}` in `{unit}`", device.name, port.name);
+                    (source, UnitOrigin { span: device.span.clone(), text })
+                }));
             }
         }
     }
@@ -140,10 +150,9 @@ impl Builder<'_> {
                 continue;
             };
             let consumer = format!("{}.{}", node.name, wire.key.name);
-            if let Err(mismatch) = units.take(input, &consumer, &port.shape) {
-                self.diagnostics.push(
-                    unit_mismatch(port, &consumer, &mismatch, &wire.origin).with_help(self.suggest_rate_node(input)),
-                );
+            if let Err(mismatch) = units.take(input, &consumer, &port.shape, &self.origins[&wire.source]) {
+                let diagnostic = self.unit_mismatch(wire.source, &consumer, mismatch, &wire.origin);
+                self.diagnostics.push(diagnostic.with_help(self.suggest_rate_node(input)));
                 is_complete = false;
             }
             given.inputs[wire.input].push((wire.key.name.clone(), port.shape.clone()));
@@ -156,8 +165,11 @@ impl Builder<'_> {
         let built = self.build(index, configured, &params, given.clone())?;
         let mut ports = Vec::new();
         for (port, (mut shape, output)) in built.outputs.into_iter().zip(&spec.outputs).enumerate() {
-            units.give(output, &format!("{}.{}", node.name, output.name), &mut shape);
-            ports.push(self.add_port(PortRef { producer: Producer::Node(index), port }, shape));
+            let name = format!("{}.{}", node.name, output.name);
+            let origin = units.give(output, &name, &node.block.key.span, &mut shape);
+            let source = PortRef { producer: Producer::Node(index), port };
+            self.origins.insert(source, origin);
+            ports.push(self.add_port(source, shape));
         }
         self.units.insert(index, units);
         self.built.insert(index, (given, built.is_still));
@@ -196,9 +208,11 @@ impl Builder<'_> {
         let (given, _) = self.built.get(&index)?.clone();
         let (configured, params) = self.configure(index, kind, params, &given, true);
         let mut built = self.build(index, configured, &params, given)?;
-        let name = &self.net.flat.nodes[index].name;
+        let node = &self.net.flat.nodes[index];
+        let name = &node.name;
         for (port, (shape, output)) in built.outputs.iter_mut().zip(&spec.outputs).enumerate() {
-            self.units.get_mut(&index)?.give(output, &format!("{name}.{}", output.name), shape);
+            let place = &node.block.key.span;
+            self.units.get_mut(&index)?.give(output, &format!("{name}.{}", output.name), place, shape);
             if self.ports[&PortRef { producer: Producer::Node(index), port }].shape != *shape {
                 let message =
                     format!("this mode would change the shape of `{name}.{}`, which is fixed at load", output.name);
@@ -250,6 +264,20 @@ impl Builder<'_> {
         built.map_err(|mistakes| place_mistakes(mistakes, params, wires, &mut self.sources, &mut self.diagnostics)).ok()
     }
 
+    /// Reports a wire whose ends differ in their units, with the places that determined both.
+    fn unit_mismatch(
+        &self,
+        source: PortRef,
+        consumer: &str,
+        UnitMismatch { has, takes, by }: UnitMismatch,
+        wire: &WireOrigin,
+    ) -> Diagnostic {
+        let message = format!("`{}` {has}, but `{consumer}` takes {takes}", self.ports[&source].name);
+        let diagnostic = wire.diagnostic(Code::UnitMismatch, message);
+        let origins = [self.origins.get(&source).cloned(), by].into_iter().flatten();
+        origins.fold(diagnostic, |diagnostic, UnitOrigin { span, text }| diagnostic.note(span, text))
+    }
+
     /// Suggests a node that converts any unit into that unit per second, for an input that takes only rates.
     fn suggest_rate_node(&self, input: &PortSpec) -> Option<String> {
         let unit = |port: &PortSpec| port.args.first().filter(|_| port.kind == input.kind).cloned();
@@ -273,8 +301,10 @@ impl Builder<'_> {
                 let Some(port) = self.ports.get(&wire.source) else { continue };
                 let consumer = format!("{}.{}", self.net.flat.nodes[index].name, wire.key.name);
                 let units = self.units.entry(index).or_default();
-                if let Err(mismatch) = units.take(&spec.inputs[wire.input], &consumer, &port.shape) {
-                    self.diagnostics.push(unit_mismatch(port, &consumer, &mismatch, &wire.origin));
+                let origin = &self.origins[&wire.source];
+                if let Err(mismatch) = units.take(&spec.inputs[wire.input], &consumer, &port.shape, origin) {
+                    let diagnostic = self.unit_mismatch(wire.source, &consumer, mismatch, &wire.origin);
+                    self.diagnostics.push(diagnostic);
                 }
             }
         }
@@ -285,8 +315,8 @@ impl Builder<'_> {
         let bound = self.opened.roles[wire.role].as_ref()?;
         let port = self.ports.get(&wire.source)?;
         let (spec, consumer) = (self.net.command_port(wire), self.net.command_name(wire));
-        if let Err(mismatch) = Units::default().take(spec, &consumer, &port.shape) {
-            self.diagnostics.push(unit_mismatch(port, &consumer, &mismatch, &wire.origin));
+        if let Err(mismatch) = Units::default().take(spec, &consumer, &port.shape, &self.origins[&wire.source]) {
+            self.diagnostics.push(self.unit_mismatch(wire.source, &consumer, mismatch, &wire.origin));
             return None;
         }
         let (number, takes) = &(if wire.is_report { &bound.reports } else { &bound.commands })[wire.command];
@@ -323,9 +353,4 @@ fn joints(shape: &Shape) -> &[Joint] {
         Shape::Joints(shape) => &shape.joints,
         _ => &[],
     }
-}
-
-fn unit_mismatch(port: &PlannedPort, consumer: &str, mismatch: &UnitMismatch, origin: &WireOrigin) -> Diagnostic {
-    let message = format!("`{}` {}, but `{consumer}` takes {}", port.name, mismatch.has, mismatch.takes);
-    origin.diagnostic(Code::UnitMismatch, message)
 }

@@ -4,16 +4,21 @@ use crate::graph::bench::OpenedBench;
 use crate::graph::load::FlatGraph;
 use crate::graph::net::{Net, Resolved, report};
 use crate::graph::plan::Clock;
-use crate::source::{Code, Diagnostic, Diagnostics};
+use crate::source::{Code, Diagnostic, Diagnostics, Edit};
 
 /// Returns what triggers the ticks and the period [s], or reports why there is no clock.
 pub(crate) fn check(net: &Net<'_>, opened: &OpenedBench, diagnostics: &mut Diagnostics) -> Option<(Clock, f64)> {
-    let (clock, period) = report(find_clock(net.flat, opened), diagnostics)?;
+    let has_clock = net.flat.table.as_ref().is_some_and(|table| table.clock.is_some() || table.rate_hz.is_some());
+    if !has_clock && net.flat.has_unknown_setting(diagnostics) {
+        return None;
+    }
+    let (clock, period) = report(find_clock(net, opened), diagnostics)?;
     diagnostics.extend(short_gap(net.flat, period));
     Some((clock, period))
 }
 
-fn find_clock(flat: &FlatGraph, opened: &OpenedBench) -> Resolved<(Clock, f64)> {
+fn find_clock(net: &Net<'_>, opened: &OpenedBench) -> Resolved<(Clock, f64)> {
+    let flat = net.flat;
     // An invalid section [graph] has its own diagnostic.
     let table = flat.table.as_ref().ok_or(None)?;
     let (message, span, help) = match (&table.clock, table.rate_hz) {
@@ -29,7 +34,13 @@ fn find_clock(flat: &FlatGraph, opened: &OpenedBench) -> Resolved<(Clock, f64)> 
         }
         (Some(word), Some(_)) => ("the graph has two clocks", &word.span, "keep `clock` or `rate_hz`"),
         (None, None) => {
-            ("the graph has no clock", &flat.place, "add `clock = \"role\"` or `rate_hz = 250` under [graph]")
+            // The first sensor, or a rate.
+            let is_sensor = |role: &usize| net.roles[*role].is_some_and(|role| role.commands.is_empty());
+            let sensor = (0..flat.roles.len()).find(is_sensor).map(|role| &flat.roles[role].0.name);
+            let line = sensor.map_or_else(|| "rate_hz = 250".to_owned(), |role| format!("clock = \"{role}\""));
+            let diagnostic = Diagnostic::new(Code::BadClock, flat.place.clone(), "the graph has no clock");
+            let diagnostic = diagnostic.help(format!("add `{line}` under [graph]"));
+            return diagnostic.edit(Edit::Below(flat.place.clone(), line)).into_err();
         }
     };
     Diagnostic::new(Code::BadClock, span.clone(), message).help(help).into_err()

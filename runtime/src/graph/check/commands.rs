@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 
 use crate::graph::net::Net;
-use crate::source::{Code, Diagnostic, Diagnostics};
+use crate::source::{Code, Diagnostic, Diagnostics, Edit};
 
 /// Reports each command that nothing drives.
 pub(crate) fn check(net: &Net<'_>, diagnostics: &mut Diagnostics) {
@@ -23,9 +23,18 @@ pub(crate) fn check(net: &Net<'_>, diagnostics: &mut Diagnostics) {
         for command in role.iter().flat_map(|role| &role.commands) {
             if !driven.contains(&(&*key.name, &*command.name)) {
                 let message = format!("nothing drives `{}.{}`", key.name, command.name);
-                let port = net.find_candidate(0, usize::MAX, command).unwrap_or("node.port");
-                let help = format!("add `{}.{} = \"{port}\"` under [commands]", key.name, command.name);
-                diagnostics.push(Diagnostic::new(Code::UndrivenCommand, key.span.clone(), message).help(help));
+                let diagnostic = Diagnostic::new(Code::UndrivenCommand, key.span.clone(), message);
+                diagnostics.push(match net.find_candidate(0, usize::MAX, command) {
+                    Some(port) => {
+                        let line = format!("{}.{} = \"{port}\"", key.name, command.name);
+                        let edit = match net.flat.commands.last() {
+                            Some((_, wire)) => Edit::Below(wire.key.span.clone(), line.clone()),
+                            None => Edit::Append(key.span.clone(), format!("\n[commands]\n{line}")),
+                        };
+                        diagnostic.help(format!("add `{line}` under [commands]")).edit(edit)
+                    }
+                    None => diagnostic.help(format!("wire {} to it under [commands]", command.kind.with_article())),
+                });
             }
         }
     }

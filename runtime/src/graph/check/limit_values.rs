@@ -1,17 +1,19 @@
 //! Checks that [limits] and the parameters that read from it agree.
 
-use std::collections::BTreeSet;
+use std::collections::BTreeMap;
 use std::ops::Range;
 
-use crate::graph::load::FlatGraph;
+use crate::catalogue::Catalogue;
+use crate::graph::load::Entity;
 use crate::graph::net::Net;
 use crate::graph::syntax::LIMITS;
-use crate::node::ParamSpec;
-use crate::source::{Code, Diagnostic, Diagnostics, quoted};
+use crate::node::{ParamSpec, Spanned};
+use crate::source::{Code, Diagnostic, Diagnostics, Edit, Key, SourceMap, quoted, suggest_name};
 
 /// A reference to a value of the section, as `{ from = "limits.KEY" }`.
 struct LimitRef<'a> {
     key: String,
+    /// The place of the key in the reference.
     span: Range<usize>,
     /// The parameter that uses it.
     spec: Option<&'a ParamSpec>,
@@ -20,9 +22,46 @@ struct LimitRef<'a> {
 
 /// Reports values that no node uses, values in another unit than their parameter, and missing values.
 ///
-/// While a limiter is missing, an unused value may belong to it and is not reported.
-pub(crate) fn check(net: &Net<'_>, diagnostics: &mut Diagnostics) {
-    let is_limited = diagnostics.iter().all(|diagnostic| diagnostic.code != Code::UnlimitedCommand);
+/// A misspelt key is both unused and missing; it is reported once, where it is misspelt. While a limiter is missing, an
+/// unused value may belong to it and is not reported.
+pub(crate) fn check(net: &Net<'_>, sources: &SourceMap, diagnostics: &mut Diagnostics) {
+    let mut names = net.flat.scopes.iter().flat_map(|scope| scope.names.values());
+    let has_unknown_part = names.any(|(_, entity)| matches!(entity, Entity::Unknown));
+    let is_limited =
+        !has_unknown_part && diagnostics.iter().all(|diagnostic| diagnostic.code != Code::UnlimitedCommand);
+    let refs = find_refs(net);
+    diagnostics.extend(refs.iter().filter_map(unit_mismatch));
+    let given: Vec<&Key> = net.flat.limits.iter().flat_map(|(_, table)| &table.entries).map(|(key, _)| key).collect();
+    let mut wanted: BTreeMap<&str, Vec<&LimitRef<'_>>> = BTreeMap::new();
+    for limit in refs.iter().filter(|limit| !given.iter().any(|key| key.name == limit.key)) {
+        wanted.entry(&limit.key).or_default().push(limit);
+    }
+    let mut unused: Vec<&Key> = given.iter().copied().filter(|key| !refs.iter().any(|r| r.key == key.name)).collect();
+    let mut missing: Vec<&LimitRef<'_>> = Vec::new();
+    let is_required = |limits: &[&LimitRef<'_>]| !limits[0].is_optional;
+    let required = wanted.values().filter(|limits| is_required(limits)).count();
+    let is_single = (required, unused.len()) == (1, 1);
+    for (name, limits) in &wanted {
+        // A name that occurs once in all files is a misspelt reference to a limit that other parameters use.
+        let is_alone = limits.len() == 1 && sources.occurrences(name) == 1;
+        if let Some(key) =
+            similar(name, &unused).or_else(|| unused.first().copied().filter(|_| is_single && is_required(limits)))
+        {
+            unused.retain(|other| other.name != key.name);
+            diagnostics.push(misspelt(key, limits, net, sources));
+        } else if let Some(key) = similar(name, &given).filter(|_| is_alone) {
+            diagnostics.push(misspelt_reference(key, limits));
+        } else {
+            missing.extend(limits.first().filter(|limit| !limit.is_optional));
+        }
+    }
+    missing.sort_by_key(|limit| refs.iter().position(|other| other.span == limit.span));
+    diagnostics.extend(unused.into_iter().filter(|_| is_limited).filter_map(|key| unread(key, net)));
+    diagnostics.extend(report_missing(net, &missing));
+}
+
+/// Returns the references in the order of the nodes.
+fn find_refs<'a>(net: &Net<'a>) -> Vec<LimitRef<'a>> {
     let mut refs = Vec::new();
     for (i, node) in net.flat.nodes.iter().enumerate() {
         let specs = net.spec(i).map_or(&[][..], |spec| &spec.params);
@@ -31,50 +70,122 @@ pub(crate) fn check(net: &Net<'_>, diagnostics: &mut Diagnostics) {
             let spec = specs.iter().find(|spec| spec.name == key.name);
             let limits = value.facts().into_iter().filter_map(|fact| match fact.word.split_once('.')? {
                 (LIMITS, key) => {
-                    let (key, span) = (key.to_owned(), fact.place.clone());
-                    Some(LimitRef { key, span, spec, is_optional: fact.is_optional })
+                    let word = Spanned { value: fact.word.to_owned(), span: fact.place.clone() };
+                    let span = word.part(fact.word.len() - key.len()..fact.word.len());
+                    Some(LimitRef { key: key.to_owned(), span, spec, is_optional: fact.is_optional })
                 }
                 _ => None,
             });
             refs.extend(limits);
         }
     }
-    let given = || net.flat.limits.iter().flat_map(|(_, table)| &table.entries);
-    let names: BTreeSet<&str> = refs.iter().map(|limit| limit.key.as_str()).collect();
-    for (key, _) in given().filter(|(key, _)| is_limited && !names.contains(key.name.as_str())) {
-        let message = format!("no node uses the limit `{}`", key.name);
-        let missing: Vec<&str> =
-            names.iter().copied().filter(|name| !given().any(|(key, _)| key.name == *name)).collect();
-        let diagnostic = Diagnostic::new(Code::UnknownKey, key.span.clone(), message);
-        diagnostics.push(match missing.is_empty() {
-            true => diagnostic.help("remove it"),
-            false => diagnostic.suggest(&key.name, missing.into_iter(), "missing limits"),
-        });
+    refs
+}
+
+/// Returns the key whose name is like `name`.
+fn similar<'k>(name: &str, keys: &[&'k Key]) -> Option<&'k Key> {
+    let found = suggest_name(name, keys.iter().map(|key| key.name.as_str()))?;
+    keys.iter().copied().find(|key| key.name == found)
+}
+
+/// Reports an unused key of [limits] or the references to a missing one, whichever is misspelt: the name that the
+/// built-in parts do not use, or that occurs less often.
+fn misspelt(key: &Key, limits: &[&LimitRef<'_>], net: &Net<'_>, sources: &SourceMap) -> Diagnostic {
+    let wanted = &limits[0].key;
+    let rank = |name: &str| (find_reader(net.catalogue, name).is_some(), sources.occurrences(name));
+    if limits.len() == 1 && rank(&key.name) > rank(wanted) {
+        return misspelt_reference(key, limits);
     }
-    diagnostics.extend(refs.iter().filter_map(unit_mismatch));
-    diagnostics.extend(missing(net.flat, &refs));
+    let message = format!("no node uses the limit `{}`, and `{wanted}` is missing", key.name);
+    let diagnostic = Diagnostic::new(Code::UnknownKey, key.span.clone(), message);
+    diagnostic.note(limits[0].span.clone(), format!("`{wanted}` is used here")).instead(&key.name, wanted)
+}
+
+/// Reports references to a missing limit that mean the given `key`.
+fn misspelt_reference(key: &Key, limits: &[&LimitRef<'_>]) -> Diagnostic {
+    let wanted = &limits[0].key;
+    let message = format!("[limits] has no `{wanted}`");
+    let diagnostic = Diagnostic::new(Code::MissingLimit, limits[0].span.clone(), message).instead(wanted, &key.name);
+    limits[1..].iter().fold(diagnostic, |diagnostic, limit| {
+        let edit = Edit::Replace(limit.span.clone(), key.name.clone());
+        diagnostic.note(limit.span.clone(), "and here").edit(edit)
+    })
+}
+
+/// Reports a limit that no node uses, with the limiter that should. A limiter that lacks a required parameter has its own
+/// diagnostic.
+fn unread(key: &Key, net: &Net<'_>) -> Option<Diagnostic> {
+    let name = &key.name;
+    let diagnostic = Diagnostic::new(Code::UnknownKey, key.span.clone(), format!("no node uses the limit `{name}`"));
+    let line = |param: &str| format!("{param} = {{ from = \"{LIMITS}.{name}\" }}");
+    let Some((kind, param)) = find_reader(net.catalogue, name) else {
+        let help = format!("let a parameter of a limiter read it: `{}`", line("PARAMETER"));
+        return Some(diagnostic.help(help));
+    };
+    let mut nodes = net.flat.nodes.iter().enumerate();
+    let limiter = nodes.find(|(i, _)| net.spec(*i).is_some_and(|spec| spec.name == kind));
+    let Some((index, limiter)) = limiter else {
+        return Some(diagnostic.help(format!("it is for a `{kind}`, which the graph lacks, with `{}`", line(&param))));
+    };
+    let diagnostic = diagnostic.help(format!("write `{}` in `{}`", line(&param), limiter.name));
+    let is_required = |spec: &ParamSpec| spec.name == param && !spec.is_optional;
+    match limiter.block.params.as_table().and_then(|table| table.get(&param)) {
+        Some(value) => {
+            let place = value.span.clone();
+            let diagnostic = diagnostic.note(place.clone(), format!("`{}` has another value here", limiter.name));
+            Some(diagnostic.edit(Edit::Replace(place, format!("{{ from = \"{LIMITS}.{name}\" }}"))))
+        }
+        None if net.spec(index).is_some_and(|spec| spec.params.iter().any(is_required)) => None,
+        None => Some(diagnostic.edit(Edit::Below(limiter.block.key.span.clone(), line(&param)))),
+    }
+}
+
+/// Returns the type of node, and its parameter, that read a limit in a built-in part.
+fn find_reader(catalogue: &Catalogue, limit: &str) -> Option<(String, String)> {
+    let known = readers(catalogue).find(|(.., read)| read == limit);
+    known.map(|(kind, param, _)| (kind, param))
+}
+
+/// Returns the limit that a parameter of a type of node reads in a built-in part.
+pub(crate) fn limit_of(catalogue: &Catalogue, kind: &str, param: &str) -> Option<String> {
+    readers(catalogue).find(|(node, name, _)| node == kind && name == param).map(|(.., limit)| limit)
+}
+
+/// Returns the limits that a type of node reads in the built-in parts.
+pub(crate) fn limits_of(catalogue: &Catalogue, kind: &str) -> impl Iterator<Item = String> {
+    readers(catalogue).filter(move |(node, ..)| node == kind).map(|(.., limit)| limit)
+}
+
+/// Returns the parameters in built-in parts that read a limit: type of node, parameter and limit.
+fn readers(catalogue: &Catalogue) -> impl Iterator<Item = (String, String, String)> {
+    let files = catalogue.builtin_files().iter().filter(|(name, _)| name.ends_with(".toml"));
+    let parts = files.filter_map(|(_, bytes)| str::from_utf8(bytes).ok()?.parse::<toml::Table>().ok());
+    let table = |value: toml::Value| value.try_into::<toml::Table>().ok();
+    let nodes = parts.filter_map(move |mut part| table(part.remove("nodes")?)).flatten();
+    nodes.filter_map(move |(_, node)| table(node)).flat_map(|node| {
+        let kind = node.get("type").and_then(toml::Value::as_str).unwrap_or_default().to_owned();
+        let prefix = format!("{LIMITS}.");
+        let limit = move |value: &toml::Value| Some(value.get("from")?.as_str()?.strip_prefix(&prefix)?.to_owned());
+        node.into_iter()
+            .filter_map(move |(param, value)| Some((kind.clone(), param, limit(&value)?)))
+            .collect::<Vec<_>>()
+    })
 }
 
 /// Reports all missing values in one diagnostic.
-fn missing(flat: &FlatGraph, refs: &[LimitRef<'_>]) -> Option<Diagnostic> {
-    let mut seen = BTreeSet::new();
-    let is_given = |key: &str| flat.limits.as_ref().is_some_and(|(_, table)| table.get(key).is_some());
-    let missing: Vec<&LimitRef<'_>> = refs
-        .iter()
-        .filter(|limit| !limit.is_optional && !is_given(&limit.key) && seen.insert(limit.key.as_str()))
-        .collect();
+fn report_missing(net: &Net<'_>, missing: &[&LimitRef<'_>]) -> Option<Diagnostic> {
     let first = missing.first()?;
     let lines = missing.iter().map(|limit| {
         let doc = limit.spec.map(ParamSpec::doc_with_unit).unwrap_or_default();
-        format!("\n{} = …   # {}", limit.key, doc.trim_end_matches('.'))
+        format!("\n- `{}`: {}", limit.key, doc.trim_end_matches('.'))
     });
     let names = quoted(missing.iter().map(|limit| &limit.key));
-    let (span, message) = match &flat.limits {
+    let (span, message) = match &net.flat.limits {
         Some((span, _)) => (span.clone(), format!("[limits] lacks {names}")),
-        None => (flat.place.clone(), format!("the graph has no section [limits]; it needs {names}")),
+        None => (net.flat.place.clone(), format!("the graph has no section [limits]; it needs {names}")),
     };
     let diagnostic = Diagnostic::new(Code::MissingLimit, span, message).note(first.span.clone(), "used here");
-    Some(diagnostic.help(format!("add under [limits]:{}", lines.collect::<String>())))
+    Some(diagnostic.help(format!("write a value under [limits] for each:{}", lines.collect::<String>())))
 }
 
 /// Reports a value whose name ends with another unit than that of its parameter.

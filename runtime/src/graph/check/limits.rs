@@ -8,12 +8,14 @@ use std::ops::Range;
 
 use super::foreign;
 use super::frames::{Frames, with_article};
+use super::limit_values::{limit_of, limits_of};
 use crate::device::RoleType;
-use crate::graph::net::{CommandWire, Net};
+use crate::graph::net::{CommandWire, Net, Wire, WireOrigin};
 use crate::graph::plan::{PortRef, Producer};
+use crate::graph::syntax::LIMITS;
 use crate::node::{NodeSpec, Spanned};
 use crate::signal::Kind;
-use crate::source::{Code, Diagnostic, Diagnostics, quoted};
+use crate::source::{Code, Diagnostic, Diagnostics, Edit, quoted};
 
 /// A node on the path of a command that passes a motion on.
 struct PathNode<'a> {
@@ -89,10 +91,11 @@ impl<'a> CommandPath<'a> {
         let source = net.port_name(wire.source);
         let plural = if missing.len() == 1 { "" } else { "s" };
         let message = format!("`{source}` drives `{consumer}` without the required limit{plural} {names}");
-        if let Some(part) = self.suggest_part(missing).filter(|_| lost.is_empty()) {
-            return wire.origin.diagnostic(Code::UnlimitedCommand, message).help(part);
+        if let Some((help, edits)) = self.suggest_part(missing).filter(|_| lost.is_empty()) {
+            let diagnostic = wire.origin.diagnostic(Code::UnlimitedCommand, message).help(help);
+            return edits.into_iter().fold(diagnostic, Diagnostic::edit);
         }
-        let (mut helps, mut places) = (Vec::new(), Vec::new());
+        let (mut helps, mut places, mut edits) = (Vec::new(), Vec::new(), Vec::new());
         let mut suggested = BTreeSet::new();
         for limit in missing {
             if let Some((_, by)) = lost.iter().find(|(lost, _)| lost == limit) {
@@ -104,18 +107,22 @@ impl<'a> CommandPath<'a> {
             let holds = |spec: &NodeSpec| spec.limits.holds.contains(limit);
             let Some(spec) = net.catalogue.specs().find(|spec| holds(spec)) else { continue };
             if suggested.insert(spec.name.to_string()) {
-                let (help, place) = self.suggest_limiter(spec);
+                let (help, place, edit) = self.suggest_limiter(spec);
                 helps.push(help);
+                edits.push(edit);
                 places.extend(place.map(|place| (place, format!("insert a `{}` here", spec.name))));
             }
         }
         let mut diagnostic = wire.origin.diagnostic(Code::UnlimitedCommand, message);
         diagnostic.notes.extend(places.into_iter().filter(|(place, _)| *place != wire.origin.word.span));
+        // Limiters at one place change the same wire, so only one of them can be inserted at a time.
+        let fix = edits.into_iter().next().flatten().filter(|_| lost.is_empty()).unwrap_or_default();
+        let diagnostic = fix.into_iter().fold(diagnostic, Diagnostic::edit);
         diagnostic.with_help((!helps.is_empty()).then(|| helps.join("\n")))
     }
 
     /// Suggests a built-in part that holds all missing limits, if they need three or more nodes.
-    fn suggest_part(&self, missing: &[&str]) -> Option<String> {
+    fn suggest_part(&self, missing: &[&str]) -> Option<(String, Vec<Edit>)> {
         let Self { net, wire, .. } = self;
         let limiters: BTreeSet<&str> = missing
             .iter()
@@ -137,18 +144,53 @@ impl<'a> CommandPath<'a> {
         let name = file.rsplit('/').next()?.strip_suffix(".toml")?;
         let role = net.name(Producer::Role(wire.role));
         let taken = &net.command_port(wire).name;
-        let mut text = format!(
-            "route the motion through a part that enforces all of them:\n[parts.{name}]\nfile = \"builtin:{file}\""
-        );
-        for (input, what) in part.get("inputs").and_then(toml::Value::as_table).into_iter().flatten() {
-            text.push_str(&format!("\nin.{input} = \"…\"   # {}", what.as_str().unwrap_or_default()));
+        let mut block = format!("[parts.{name}]\nfile = \"builtin:{file}\"");
+        if !limiters.iter().all(|kind| limits_of(net.catalogue, kind).all(|limit| self.is_given(&limit))) {
+            let help = format!(
+                "route the motion through the part `builtin:{file}`, and write its limits under [limits]: {}",
+                quoted(limiters.iter().flat_map(|kind| limits_of(net.catalogue, kind)).collect::<BTreeSet<_>>())
+            );
+            return Some((help, Vec::new()));
         }
-        text.push_str(&format!("\n[commands]\n{role}.{taken} = \"{name}.{taken}\""));
-        Some(text)
+        let inputs = part.get("inputs").and_then(toml::Value::as_table);
+        for input in inputs.into_iter().flat_map(toml::Table::keys) {
+            let Some(port) = self.port_for(input) else {
+                return Some((format!("route the motion through the part `builtin:{file}`"), Vec::new()));
+            };
+            block.push_str(&format!("\nin.{input} = \"{port}\""));
+        }
+        let source = format!("{name}.{taken}");
+        let help = format!(
+            "route the motion through a part that enforces all of them, and let `{role}.{taken}` read `{source}`:\n{block}"
+        );
+        let place = wire.origin.word.span.clone();
+        let edits = [Edit::Replace(place.clone(), format!("\"{source}\"")), Edit::Append(place, format!("\n{block}"))];
+        Some((help, edits.into()))
+    }
+
+    /// Returns whether the graph gives a limit.
+    fn is_given(&self, limit: &str) -> bool {
+        self.net.flat.limits.as_ref().is_some_and(|(_, table)| table.get(limit).is_some())
+    }
+
+    /// Returns the port of the graph that fits an input with the name `input`: the motion itself, or a port with that
+    /// name. A calibrated image comes from the last node that has one.
+    fn port_for(&self, input: &str) -> Option<String> {
+        let Self { net, .. } = self;
+        let start = self.nodes.last().map(|stop| stop.source);
+        let is_motion = |source: &PortRef| net.port(*source).name == input && net.port(*source).kind == Kind::Twist;
+        if let Some(source) = start.filter(is_motion) {
+            return net.name_in(0, source).map(str::to_owned);
+        }
+        let end = format!(".{input}");
+        let ports = net.ports_in(0).filter(|(name, port)| name.ends_with(&end) && net.port(*port).kind != Kind::Twist);
+        ports
+            .max_by_key(|(_, port)| net.order.iter().position(|node| Some(*node) == port.producer.node()))
+            .map(|(n, _)| n)
     }
 
     /// Suggests a limiter and its place on the path: after every limiter that must come before it.
-    fn suggest_limiter(&self, limiter: &NodeSpec) -> (String, Option<Range<usize>>) {
+    fn suggest_limiter(&self, limiter: &NodeSpec) -> (String, Option<Range<usize>>, Option<Vec<Edit>>) {
         let Self { net, wire, role, nodes: path } = self;
         let rank = |spec: &NodeSpec| {
             let ranks =
@@ -172,13 +214,45 @@ impl<'a> CommandPath<'a> {
         let fits = |at: &usize| Some(net.port(links[*at].1).kind) == kind && !path[*at..].iter().any(changes_frame);
         let at = (later..links.len()).find(fits).or_else(|| (0..links.len()).rev().find(fits));
         let Some((taker, _, word)) = at.map(|at| &links[at]) else {
-            return (format!("insert a `{name}` on the path of the motion"), None);
+            return (format!("insert a `{name}` on the path of the motion"), None, None);
         };
         let output = limiter.outputs.first().map_or("", |output| &output.name);
         let (limiter_name, from) = (with_article(name), &word.value);
         let between =
             format!("insert {limiter_name} between `{from}` and `{taker}`, which then takes `{name}.{output}`:");
-        (format!("{between}\n{}", block(limiter, &word.value)), Some(word.span.clone()))
+        let place = Some(word.span.clone());
+        match self.block(limiter, word) {
+            Some(block) => {
+                let replace = Edit::Replace(word.span.clone(), format!("\"{name}.{output}\""));
+                let edits = vec![replace, Edit::Append(word.span.clone(), format!("\n{block}"))];
+                (format!("{between}\n{block}"), place, Some(edits))
+            }
+            None => (between.trim_end_matches(':').to_owned(), place, None),
+        }
+    }
+
+    /// Returns the block of a limiter of the motion that `word` names, if all its inputs and parameters are known: the
+    /// built-in parts tell which limits its parameters read.
+    fn block(&self, limiter: &NodeSpec, word: &Spanned<String>) -> Option<String> {
+        let Self { net, wire, .. } = self;
+        let (name, through) = (&limiter.name, limiter.limits.through.unwrap_or_default());
+        let by_wire = |(node, wires): (usize, &Vec<Wire>)| {
+            let mut origins = wires.iter().map(|wire| &wire.origin);
+            let holds = |origin: &WireOrigin| origin.inner.as_ref().unwrap_or(&origin.word).span == word.span;
+            origins.any(holds).then(|| net.flat.nodes[node].scope)
+        };
+        let scope = net.wires.iter().enumerate().find_map(by_wire).unwrap_or(wire.origin.scope);
+        let is_taken = net.flat.scopes[scope].names.contains_key(&**name);
+        let mut block = format!("[nodes.{name}]\ntype = \"{name}\"\nin.{through} = \"{}\"", word.value);
+        let needs = limiter.inputs.iter().filter(|input| input.need.must_be_wired && input.name != through);
+        for input in needs {
+            block.push_str(&format!("\nin.{} = \"{}\"", input.name, net.find_candidate(scope, usize::MAX, input)?));
+        }
+        for param in limiter.params.iter().filter(|param| !param.is_optional) {
+            let limit = limit_of(net.catalogue, name, param.name).filter(|limit| self.is_given(limit))?;
+            block.push_str(&format!("\n{} = {{ from = \"{LIMITS}.{limit}\" }}", param.name));
+        }
+        (!is_taken).then_some(block)
     }
 
     /// Reports limiters of twists on one path that work in different frames.
@@ -200,19 +274,4 @@ impl<'a> CommandPath<'a> {
         let diagnostic = Diagnostic::new(Code::FrameMismatch, node.block.key.span.clone(), message);
         Some(diagnostic.help("limits apply to the motion of the sensor: move this limiter before the change of frame"))
     }
-}
-
-/// Returns the block of a limiter of the motion from `source`, to be completed.
-fn block(limiter: &NodeSpec, source: &str) -> String {
-    let (name, through) = (&limiter.name, limiter.limits.through.unwrap_or_default());
-    let mut block = format!("[nodes.{name}]\ntype = \"{name}\"\nin.{through} = \"{source}\"");
-    let needs = limiter.inputs.iter().filter(|input| input.need.must_be_wired);
-    for input in needs.filter(|input| input.name != through) {
-        block.push_str(&format!("\nin.{} = \"…\"", input.name));
-    }
-    for param in limiter.params.iter().filter(|param| !param.is_optional) {
-        let unit = param.unit.as_ref().map(|unit| format!("   # [{unit}]")).unwrap_or_default();
-        block.push_str(&format!("\n{} = …{unit}", param.name));
-    }
-    block
 }

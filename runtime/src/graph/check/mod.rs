@@ -18,6 +18,7 @@ pub(crate) mod limits;
 pub(crate) mod live;
 pub(crate) mod motion;
 pub(crate) mod overlap;
+pub(crate) mod parts;
 pub(crate) mod policy;
 pub(crate) mod quantities;
 pub(crate) mod reachability;

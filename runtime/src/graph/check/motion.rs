@@ -31,6 +31,10 @@ pub(crate) fn check(
         report_in_graph(net, &usual, diagnostics);
         return;
     }
+    // An exit with a mistake may be the one that ends the motion.
+    if net.flat.modes.iter().any(|mode| mode.has_any(diagnostics)) {
+        return;
+    }
     let of_mode = |changes: &BTreeSet<usize>| {
         let is_still = |node: usize| still[node] != changes.contains(&node);
         (!changes.is_empty()).then(|| find_generators(net, &contact, &driving, &is_still))
@@ -70,7 +74,10 @@ fn find_generators(
         let is_gate = |wire: &Wire| net.port(wire.source).kind != Kind::Flag || contact.need(net, wire.source);
         let is_sampled =
             |wire: &Wire| is_gate(wire) && wire.source.producer.node().is_none_or(|source| sampled[source]);
-        if wires().any(is_sampled) {
+        // A wire with a mistake may be the gate.
+        let given = &net.flat.nodes[node].block.wires;
+        let has_mistake = given.has_invalid() || given.valid.len() != net.wires[node].len();
+        if has_mistake || wires().any(is_sampled) {
             sampled[node] = true;
             continue;
         }

@@ -30,7 +30,7 @@ fn check_mode(net: &Net<'_>, mode: &PlannedMode, diagnostics: &mut Diagnostics) 
         );
         let diagnostic = Diagnostic::new(Code::OverlappingConditions, second.span.clone(), message);
         let more = second.priority + 1;
-        let help = format!("add `priority = {more}` to the one that should win, or make their conditions exclusive");
+        let help = format!("write `priority = {more}` in the one that should win, or make their conditions exclusive");
         diagnostics.push(diagnostic.note(first.span.clone(), "the other is here").help(help));
     }
 }

@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 
 use crate::graph::load::FlatGraph;
 use crate::graph::net::Net;
-use crate::source::{Code, Diagnostic, Diagnostics, Item, Value};
+use crate::source::{Code, Diagnostic, Diagnostics, Edit, Item, Value};
 
 /// Reports modes that are never entered, and returns the index of the start mode.
 ///
@@ -12,12 +12,21 @@ use crate::source::{Code, Diagnostic, Diagnostics, Item, Value};
 pub(crate) fn check(net: &Net<'_>, diagnostics: &mut Diagnostics) -> Option<usize> {
     let start = find_start(net, diagnostics)?;
     let modes = &net.flat.modes;
-    let reached = reachable(start, net.flat);
-    for (_, mode) in modes.iter().enumerate().filter(|(i, _)| !reached.contains(i)) {
+    // An exit with a mistake may be the one that leads to a mode.
+    if modes.iter().any(|mode| mode.has_any(diagnostics)) {
+        return Some(start);
+    }
+    let mut reached = reachable(start, net.flat);
+    for (i, mode) in modes.iter().enumerate() {
+        if reached.contains(&i) {
+            continue;
+        }
         let name = &mode.key.name;
         let message = format!("mode `{name}` is never entered");
-        let help = format!("add `go = {{ to = \"{name}\", … }}` to another mode, or remove this mode");
+        let help = format!("let an exit of another mode lead to `{name}`, or remove this mode");
         diagnostics.push(Diagnostic::new(Code::UnreachableMode, mode.key.span.clone(), message).help(help));
+        // The modes that only this one leads to are not reported again.
+        reached.extend(reachable(i, net.flat));
     }
     Some(start)
 }
@@ -25,9 +34,14 @@ pub(crate) fn check(net: &Net<'_>, diagnostics: &mut Diagnostics) -> Option<usiz
 fn find_start(net: &Net<'_>, diagnostics: &mut Diagnostics) -> Option<usize> {
     let mut names = net.flat.mode_names();
     let Some(word) = net.flat.table.as_ref().and_then(|table| table.start.as_ref()) else {
-        let help = format!("add `start = \"{}\"` under [graph]", names.next()?);
+        if net.flat.has_unknown_setting(diagnostics) {
+            return None;
+        }
+        let line = format!("start = \"{}\"", names.next()?);
         let message = "the graph has modes but no start mode";
-        diagnostics.push(Diagnostic::new(Code::MissingKey, net.flat.place.clone(), message).help(help));
+        let diagnostic = Diagnostic::new(Code::MissingKey, net.flat.place.clone(), message);
+        let diagnostic = diagnostic.help(format!("add `{line}` under [graph]"));
+        diagnostics.push(diagnostic.edit(Edit::Below(net.flat.place.clone(), line)));
         return None;
     };
     let start = names.clone().position(|name| name == word.value);

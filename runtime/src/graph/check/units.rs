@@ -1,6 +1,7 @@
 //! Units of one node: what its inputs accept, and what follows for its outputs.
 
 use std::collections::BTreeMap;
+use std::ops::Range;
 
 use crate::node::{PortSpec, UnitPattern, unit_pattern};
 use crate::signal::{Shape, Unit};
@@ -12,23 +13,41 @@ pub(crate) struct UnitMismatch {
     pub(crate) has: String,
     /// The accepted unit, for example `` `N` ``.
     pub(crate) takes: String,
+    /// What determined the accepted unit, if it is not the declaration of the input.
+    pub(crate) by: Option<UnitOrigin>,
 }
 
-/// The unit variables of one node: the unit, and the port that determined it.
+/// The place that determined a unit, and what happens there.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) struct UnitOrigin {
+    pub(crate) span: Range<usize>,
+    pub(crate) text: String,
+}
+
+/// The unit variables of one node: the unit, the port that determined it, and where that port got it.
 #[derive(Debug, Default)]
 pub(crate) struct Units {
-    known: BTreeMap<char, (Unit, String)>,
+    known: BTreeMap<char, (Unit, String, UnitOrigin)>,
 }
 
 impl Units {
-    /// Binds the unit variable of an input, or returns the mismatch. `name` is the full name of the input.
-    pub(crate) fn take(&mut self, port: &PortSpec, name: &str, shape: &Shape) -> Result<(), UnitMismatch> {
+    /// Binds the unit variable of an input, or returns the mismatch.
+    ///
+    /// `name` is the full name of the input, and `origin` what determined the unit of its source.
+    pub(crate) fn take(
+        &mut self,
+        port: &PortSpec,
+        name: &str,
+        shape: &Shape,
+        origin: &UnitOrigin,
+    ) -> Result<(), UnitMismatch> {
+        let mismatch = |has: String, takes: String| UnitMismatch { has, takes, by: None };
         if let Shape::Features(features) = shape {
             let not_rate = features.features.iter().find(|feature| feature.unit.per_second == 0);
             return match (unit_pattern(port), not_rate) {
                 (Some(UnitPattern::AnyRate | UnitPattern::Variable { per_second: true, .. }), Some(feature)) => {
                     let has = format!("has `{}` in `{}`", feature.name, feature.unit);
-                    Err(UnitMismatch { has, takes: "features per second".into() })
+                    Err(mismatch(has, "features per second".into()))
                 }
                 _ => Ok(()),
             };
@@ -41,32 +60,45 @@ impl Units {
             Some(UnitPattern::Known(takes)) if takes == unit => return Ok(()),
             Some(UnitPattern::Known(takes)) => format!("`{takes}`"),
             Some(UnitPattern::Variable { name: letter, .. }) => {
-                let (takes, by) = self.known.entry(letter).or_insert_with(|| (unit, format!("`{name}`")));
+                let bind = || (unit, format!("`{name}`"), origin.clone());
+                let (takes, by, first) = self.known.entry(letter).or_insert_with(bind);
                 if *takes == unit {
                     return Ok(());
                 }
-                format!("`{takes}`, the unit of {by}")
+                let (has, takes) = (format!("is in `{unit}`"), format!("`{takes}`, the unit of {by}"));
+                return Err(UnitMismatch { has, takes, by: Some(first.clone()) });
             }
         };
-        Err(UnitMismatch { has: format!("is in `{unit}`"), takes })
+        Err(mismatch(format!("is in `{unit}`"), takes))
     }
 
-    /// Sets the unit of an output from its declaration. `name` is the full name of the output.
+    /// Sets the unit of an output from its declaration, and returns what determined it. `name` is the full name of the
+    /// output, and `node` the place of its node.
     ///
     /// A variable that no input has bound takes the unit that the node chose, so a delayed input must agree with it.
-    pub(crate) fn give(&mut self, port: &PortSpec, name: &str, shape: &mut Shape) {
+    pub(crate) fn give(&mut self, port: &PortSpec, name: &str, node: &Range<usize>, shape: &mut Shape) -> UnitOrigin {
+        let here = |shape: &Shape| {
+            let text = match shape.unit() {
+                Some(unit) => format!("`{name}` is in `{unit}` by its declaration"),
+                None => format!("`{name}` is computed here"),
+            };
+            UnitOrigin { span: node.clone(), text }
+        };
         match unit_pattern(port) {
             Some(UnitPattern::Known(unit)) => shape.set_unit(unit),
             Some(UnitPattern::Variable { name: letter, per_tactel, per_second }) => {
-                if let Some((unit, _)) = self.known.get(&letter) {
+                if let Some((unit, _, origin)) = self.known.get(&letter) {
                     let unit = if per_tactel { unit.per_tactel() } else { *unit };
                     shape.set_unit(if per_second { unit.per_second() } else { unit });
-                } else if let Some(unit) = shape.unit().filter(|_| !per_tactel && !per_second) {
-                    self.known.insert(letter, (unit, format!("the output `{name}`")));
+                    return origin.clone();
+                }
+                if let Some(unit) = shape.unit().filter(|_| !per_tactel && !per_second) {
+                    self.known.insert(letter, (unit, format!("the output `{name}`"), here(shape)));
                 }
             }
             None | Some(UnitPattern::Any | UnitPattern::AnyRate) => {}
         }
+        here(shape)
     }
 }
 
@@ -79,6 +111,10 @@ mod tests {
         PortSpec::new("x", "", Kind::Scalar, &[unit])
     }
 
+    fn origin(text: &str) -> UnitOrigin {
+        UnitOrigin { span: 0..1, text: text.to_owned() }
+    }
+
     fn scalar(unit: &str) -> Shape {
         ScalarShape::of(unit.parse().unwrap()).into()
     }
@@ -88,19 +124,22 @@ mod tests {
         let cases =
             [("N", "N", true), ("N", "m", false), ("_", "kPa", true), ("_/s", "m/s", true), ("_/s", "m", false)];
         for (takes, has, fits) in cases {
-            assert_eq!(Units::default().take(&port(takes), "n.x", &scalar(has)).is_ok(), fits, "{takes} {has}");
+            let taken = Units::default().take(&port(takes), "n.x", &scalar(has), &origin("m.x"));
+            assert_eq!(taken.is_ok(), fits, "{takes} {has}");
         }
         let mut units = Units::default();
-        units.take(&port("U"), "n.a", &scalar("raw")).unwrap();
-        let clash = units.take(&port("U"), "n.b", &scalar("N")).unwrap_err();
+        units.take(&port("U"), "n.a", &scalar("raw"), &origin("m.a")).unwrap();
+        let clash = units.take(&port("U"), "n.b", &scalar("N"), &origin("m.b")).unwrap_err();
+        assert_eq!(clash.by, Some(origin("m.a")), "what determined the unit first");
         assert_eq!((clash.has.as_str(), clash.takes.as_str()), ("is in `N`", "`raw`, the unit of `n.a`"));
         for (pattern, gives) in [("U", "raw"), ("U/tactel", "raw/tactel"), ("U/s", "raw/s"), ("m", "m"), ("V", "1")] {
             let mut shape = scalar("1");
-            units.give(&port(pattern), "n.y", &mut shape);
+            let given = units.give(&port(pattern), "n.y", &(7..8), &mut shape);
+            assert_eq!(given == origin("m.a"), pattern.starts_with('U'), "{pattern}: {given:?}");
             assert_eq!(shape.unit().unwrap().to_string(), gives);
         }
-        units.give(&port("W"), "n.y", &mut scalar("kPa"));
-        let clash = units.take(&port("W"), "n.c", &scalar("N")).unwrap_err();
+        units.give(&port("W"), "n.y", &(7..8), &mut scalar("kPa"));
+        let clash = units.take(&port("W"), "n.c", &scalar("N"), &origin("m.c")).unwrap_err();
         assert_eq!(clash.takes, "`kPa`, the unit of the output `n.y`", "a delayed input");
     }
 }

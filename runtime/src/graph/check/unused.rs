@@ -37,7 +37,7 @@ pub(crate) fn check(net: &Net<'_>, shown: impl Iterator<Item = PortRef>, diagnos
                 true => format!("`{name}` leads only to a cycle of unused nodes"),
             };
             let help = match open_inputs.get_or_insert_with(|| OpenInputs::of(net)).suggest_wire(net, node) {
-                Some(wire) => format!("add {wire}, or remove `{name}`"),
+                Some(wire) => format!("write {wire}, or remove `{name}`"),
                 None => format!("wire an output of `{name}` to another node, or remove it"),
             };
             diagnostics.push(Diagnostic::new(Code::UnusedNode, key.span.clone(), message).help(help));
@@ -76,8 +76,9 @@ impl<'a> OpenInputs<'a> {
             Some((*other, *i, input, output))
         });
         let (other, _, input, output) = inputs.min_by_key(|(other, i, ..)| (*other, *i))?;
-        let name = if input.need.is_many { "NAME" } else { &*input.name };
         let (from, to) = (&net.flat.nodes[node].block.key.name, &net.flat.nodes[other].block.key.name);
-        Some(format!("`in.{name} = \"{from}.{}\"` to `{to}`", output.name))
+        // A repeated input takes any name, for example that of the node.
+        let name = if input.need.is_many { from } else { &*input.name };
+        Some(format!("`in.{name} = \"{from}.{}\"` in `{to}`", output.name))
     }
 }

@@ -5,7 +5,7 @@ use std::ops::Range;
 
 use crate::graph::syntax::{BenchDocument, Block, GraphTable, ModeBlock, PolicyTable, WireEntry};
 use crate::node::Spanned;
-use crate::source::{Key, Named, Table, Value};
+use crate::source::{Code, Diagnostic, Key, Named, Table, Value};
 
 /// What a name in a scope refers to, by index.
 #[derive(Debug, Clone, Copy)]
@@ -13,6 +13,8 @@ pub(crate) enum Entity {
     Role(usize),
     Node(usize),
     Part(usize),
+    /// A part whose file cannot be read, which has its own diagnostic.
+    Unknown,
 }
 
 /// The names that the wires of one file can use.
@@ -25,6 +27,8 @@ pub(crate) struct Scope {
     /// Wires into the part, in the scope of its parent.
     pub(crate) inputs: Named<WireEntry>,
     pub(crate) parent: Option<usize>,
+    /// The name of the part in the scope of its parent.
+    pub(crate) part: Option<Key>,
 }
 
 /// A node with its full name and its scope.
@@ -56,6 +60,13 @@ pub(crate) struct FlatGraph {
 }
 
 impl FlatGraph {
+    /// Returns whether the section [graph] has an unknown key, which may be meant for a missing one.
+    pub(crate) fn has_unknown_setting(&self, diagnostics: &[Diagnostic]) -> bool {
+        let keys = || self.settings.iter().filter_map(Value::as_table).flat_map(|table| &table.entries);
+        let is_key = |found: &Diagnostic| keys().any(|(key, _)| key.span == found.span);
+        diagnostics.iter().any(|found| found.code == Code::UnknownKey && is_key(found))
+    }
+
     /// Returns the names of the modes.
     pub(crate) fn mode_names(&self) -> impl Iterator<Item = &str> + Clone {
         self.modes.iter().map(|mode| mode.key.name.as_str())

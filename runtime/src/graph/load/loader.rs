@@ -5,8 +5,10 @@ use std::path::{Path, PathBuf};
 
 use super::flat::{Entity, FlatGraph, FlatNode, Scope};
 use super::measured::MeasuredValues;
-use crate::graph::syntax::{BenchDocument, GraphDocument, PartBlock, Sections};
-use crate::source::{BuiltinFile, Code, Diagnostic, Diagnostics, Item, Key, SourceMap, Table, Value, parse_table};
+use crate::graph::syntax::{BenchDocument, GraphDocument, PartBlock, Sections, Use};
+use crate::source::{
+    BuiltinFile, Code, Diagnostic, Diagnostics, Item, Key, SourceMap, Table, Value, parse_table, suggest_name,
+};
 
 /// Which graph to load, and what to change in it.
 #[derive(Debug, Clone, Default)]
@@ -89,7 +91,7 @@ impl Loader {
         }
         flat.place = root.1;
         root.0.merge(graph_set);
-        let document = self.sections(|sections| sections.graph(&root.0));
+        let mut document = self.sections(|sections| sections.graph(&mut root.0));
         flat.table = match &document.graph {
             Some((span, table)) => {
                 flat.place = span.clone();
@@ -97,13 +99,17 @@ impl Loader {
             }
             None => {
                 let message = "the graph has no section [graph]";
-                let help = "add [graph] with `clock = \"role\"` or `rate_hz = 250`, and a `bench`";
+                let help = "write a section [graph] with `clock = \"role\"` or `rate_hz = 250`, and a `bench`";
                 self.diagnostics.push(Diagnostic::new(Code::MissingKey, flat.place.clone(), message).help(help));
                 None
             }
         };
         flat.settings = root.0.get("graph").cloned();
         flat.bench = self.bench(request, &flat, &root.0, bench_set);
+        let bench = flat.bench.as_mut();
+        self.diagnostics.extend(bench.into_iter().flat_map(|bench| bench.correct_names(&self.sources)));
+        let binds = flat.bench.as_ref().map_or(&[][..], |bench| &bench.bind);
+        self.diagnostics.extend(document.correct_names(binds, &[], &self.sources));
         flat.roles.clone_from(&document.roles);
         flat.commands.clone_from(&document.commands);
         flat.limits.clone_from(&document.limits);
@@ -123,13 +129,13 @@ impl Loader {
     }
 
     /// Loads the requested bench, or the sections of a bench in the graph, or the bench that the graph names.
-    fn bench(&mut self, request: &Request, flat: &FlatGraph, graph: &Table, set: Table) -> Option<BenchDocument> {
+    fn bench(&mut self, request: &Request, flat: &FlatGraph, graph: &Table, mut set: Table) -> Option<BenchDocument> {
         // An invalid section [graph] has its own diagnostic.
         let named = flat.table.as_ref()?.bench.as_ref();
         if let Some(text) = &request.bench_text {
             let mut root = self.parse(Path::new("bench.toml"), text.clone())?.0;
             root.merge(set);
-            return Some(self.sections(|sections| sections.bench(&root)));
+            return Some(self.sections(|sections| sections.bench(&mut root)));
         }
         let own = graph.entry("devices").or_else(|| graph.entry("bind")).map(|(key, _)| key.span.clone());
         if let (Some(own), Some(file)) = (&own, named) {
@@ -148,12 +154,12 @@ impl Loader {
             (Some(path), _) => (path.clone(), None),
             (None, Some(file)) => (file.path.clone(), Some(file.span.clone())),
             (None, None) if set.get("devices").is_some() => {
-                return Some(self.sections(|sections| sections.bench(&set)));
+                return Some(self.sections(|sections| sections.bench(&mut set)));
             }
             (None, None) => {
                 let diagnostic = Diagnostic::new(Code::MissingKey, flat.place.clone(), "the graph has no bench");
-                let help = "add `bench = \"benches/….toml\"` under [graph], pass `--bench`, or add [bind] and [devices] \
-                            here";
+                let help =
+                    "name a bench under [graph] with `bench`, pass `--bench`, or write [bind] and [devices] here";
                 self.diagnostics.push(diagnostic.help(help));
                 return None;
             }
@@ -165,7 +171,7 @@ impl Loader {
             return None;
         }
         root.merge(set);
-        Some(self.sections(|sections| sections.bench(&root)))
+        Some(self.sections(|sections| sections.bench(&mut root)))
     }
 
     /// Reads and parses a file; `from` is the span of its name.
@@ -173,7 +179,7 @@ impl Loader {
         let text = match self.sources.builtin(path) {
             Ok(Some(bytes)) => Ok(String::from_utf8_lossy(bytes).into_owned()),
             Ok(None) => std::fs::read_to_string(path).map_err(|error| (error.to_string(), None)),
-            Err((message, help)) => Err((message, Some(help))),
+            Err(unknown) => Err((unknown.message, Some(unknown.help))),
         };
         match text {
             Ok(text) => self.parse(path, text),
@@ -196,8 +202,8 @@ impl Loader {
         match parse_table(file) {
             Ok(Value { item: Item::Table(table), .. }) => Some((table, first_line)),
             Ok(_) => None,
-            Err(mistakes) => {
-                self.diagnostics.extend(mistakes);
+            Err(mistake) => {
+                self.diagnostics.push(*mistake);
                 None
             }
         }
@@ -240,6 +246,7 @@ impl Loader {
     fn flatten(&mut self, document: GraphDocument, prefix: &str, mut scope: Scope, flat: &mut FlatGraph) -> usize {
         let index = flat.scopes.len();
         flat.scopes.push(Scope::default());
+        let uses = if document.parts.is_empty() { Vec::new() } else { document.uses() };
         (scope.exports, scope.declared) = (document.exports, document.inputs);
         for (i, (key, _)) in document.roles.iter().enumerate() {
             self.declare(&mut scope, key, Entity::Role(i));
@@ -249,9 +256,9 @@ impl Loader {
             flat.nodes.push(FlatNode { name: format!("{prefix}{}", block.key.name), scope: index, block });
         }
         for part in document.parts {
-            if let Some(inner) = self.part(&part, prefix, index, flat) {
-                self.declare(&mut scope, &part.key, Entity::Part(inner));
-            }
+            let reads: Vec<Use> = uses.iter().filter_map(|reference| reference.inside(&part.key.name)).collect();
+            let inner = self.part(&part, &reads, prefix, index, flat);
+            self.declare(&mut scope, &part.key, inner.map_or(Entity::Unknown, Entity::Part));
         }
         flat.scopes[index] = scope;
         index
@@ -269,7 +276,15 @@ impl Loader {
         scope.names.insert(key.name.clone(), (key.clone(), entity));
     }
 
-    fn part(&mut self, part: &PartBlock, prefix: &str, parent: usize, flat: &mut FlatGraph) -> Option<usize> {
+    /// Loads a part whose ports the `reads` of its parent name, and returns the index of its scope.
+    fn part(
+        &mut self,
+        part: &PartBlock,
+        reads: &[Use],
+        prefix: &str,
+        parent: usize,
+        flat: &mut FlatGraph,
+    ) -> Option<usize> {
         let file = part.file.as_ref().filter(|_| !self.is_full)?;
         if self.open_parts.len() >= MAX_PART_DEPTH || flat.scopes.len() > MAX_PARTS {
             let message =
@@ -285,41 +300,28 @@ impl Loader {
             return None;
         }
         let mut root = self.read(&file.path, Some(file.span.clone()))?.0;
-        self.override_with(&mut root, &part.set);
-        let document = self.sections(|sections| sections.part(&root));
+        self.sections(|sections| sections.correct_part(&mut root));
+        let strange = override_with(&mut root, &part.set);
+        let mut document = self.sections(|sections| sections.part(&root));
+        let wires: Vec<&Key> = part.wires.valid.iter().map(|wire| &wire.key).collect();
+        self.diagnostics.extend(document.correct_ports(&wires, reads, &self.sources));
+        let set: Vec<&Key> = part.set.entries.iter().map(|(key, _)| key).collect();
+        self.diagnostics.extend(document.correct_names(&[], &set, &self.sources));
+        // What sets a node with a misspelt name is right.
+        let names = || document.nodes.iter().map(|node| &node.key).chain(document.parts.iter().map(|part| &part.key));
+        for key in strange.iter().filter(|key| !names().any(|name| name.name == key.name)) {
+            let message = format!("the part has no node or part `{}`", key.name);
+            let diagnostic = Diagnostic::new(Code::UnknownKey, key.span.clone(), message);
+            let known = names().map(|key| key.name.as_str());
+            self.diagnostics.push(diagnostic.suggest(&key.name, known, "nodes and parts"));
+        }
         self.check_part_wires(part, &document);
         self.open_parts.push(canonical);
         let inputs = part.wires.valid.iter().map(|wire| (wire.key.clone(), wire.clone())).collect();
-        let scope = Scope { inputs, parent: Some(parent), ..Scope::default() };
+        let scope = Scope { inputs, parent: Some(parent), part: Some(part.key.clone()), ..Scope::default() };
         let inner = self.flatten(document, &format!("{prefix}{}.", part.key.name), scope, flat);
         self.open_parts.pop();
         Some(inner)
-    }
-
-    /// Merges `set.NAME` of a part into its node NAME, or into the `set` of its part NAME.
-    fn override_with(&mut self, root: &mut Table, set: &Table) {
-        let names = |section: &str| -> Vec<String> {
-            let table = root.get(section).and_then(Value::as_table);
-            table.map(|table| table.entries.iter().map(|(key, _)| key.name.clone()).collect()).unwrap_or_default()
-        };
-        let (nodes, parts) = (names("nodes"), names("parts"));
-        for (key, value) in &set.entries {
-            let entry = |name: &str, value: Value| Table {
-                entries: vec![(Key { name: name.to_owned(), span: key.span.clone() }, value)],
-            };
-            let wrap =
-                |name: &str, inner: Value| Value { span: value.span.clone(), item: Item::Table(entry(name, inner)) };
-            if nodes.contains(&key.name) {
-                root.merge(entry("nodes", wrap(&key.name, value.clone())));
-            } else if parts.contains(&key.name) {
-                root.merge(entry("parts", wrap(&key.name, wrap("set", value.clone()))));
-            } else {
-                let message = format!("the part has no node or part `{}`", key.name);
-                let known = nodes.iter().chain(&parts).map(String::as_str);
-                let diagnostic = Diagnostic::new(Code::UnknownKey, key.span.clone(), message);
-                self.diagnostics.push(diagnostic.suggest(&key.name, known, "nodes and parts"));
-            }
-        }
     }
 
     fn check_part_wires(&mut self, part: &PartBlock, document: &GraphDocument) {
@@ -328,19 +330,46 @@ impl Loader {
             if document.inputs.position(&key.name).is_none() {
                 let message = format!("part `{}` has no input `{}`", part.key.name, key.name);
                 let diagnostic = Diagnostic::new(Code::UnknownInput, key.span.clone(), message);
-                self.diagnostics.push(diagnostic.suggest(&key.name, names.clone(), "inputs"));
+                self.diagnostics.push(match part.wires.only_lacks(names.clone(), names.clone()) {
+                    Some(name) => diagnostic.instead(&key.name, name),
+                    None => diagnostic.suggest(&key.name, names.clone(), "inputs"),
+                });
             }
         }
-        let lacking = part.wires.lacking(names);
+        let lacking = part.wires.lacking(names.clone(), names);
         for (input, doc) in document.inputs.iter() {
             if lacking.contains(input.name.as_str()) {
                 let message = format!("part `{}` needs a wire to `in.{}`: {}", part.key.name, input.name, doc.value);
                 let diagnostic = Diagnostic::new(Code::MissingInput, part.key.span.clone(), message);
-                let help = format!("add `in.{} = \"…\"`", input.name);
+                let help = format!("wire a port to `in.{}`", input.name);
                 self.diagnostics.push(diagnostic.note(input.span.clone(), "the part declares it here").help(help));
             }
         }
     }
+}
+
+/// Merges `set.NAME` of a part into its node NAME, or into the `set` of its part NAME. Returns the names of neither.
+fn override_with(root: &mut Table, set: &Table) -> Vec<Key> {
+    let names = |section: &str| -> Vec<String> {
+        let table = root.get(section).and_then(Value::as_table);
+        table.map(|table| table.entries.iter().map(|(key, _)| key.name.clone()).collect()).unwrap_or_default()
+    };
+    let (nodes, parts) = (names("nodes"), names("parts"));
+    let mut strange = Vec::new();
+    for (key, value) in &set.entries {
+        let entry = |name: &str, value: Value| Table {
+            entries: vec![(Key { name: name.to_owned(), span: key.span.clone() }, value)],
+        };
+        let wrap = |name: &str, inner: Value| Value { span: value.span.clone(), item: Item::Table(entry(name, inner)) };
+        if nodes.contains(&key.name) {
+            root.merge(entry("nodes", wrap(&key.name, value.clone())));
+        } else if parts.contains(&key.name) {
+            root.merge(entry("parts", wrap(&key.name, wrap("set", value.clone()))));
+        } else {
+            strange.push(key.clone());
+        }
+    }
+    strange
 }
 
 /// Returns whether a text is a single assignment, without a header or a second line.
@@ -356,7 +385,8 @@ const SCENARIO: &str = "a scenario";
 
 /// Returns the type of a file, if it lacks the section `expected` and has the sections of another type.
 pub(crate) fn wrong_file_type(root: &Table, expected: &str) -> Option<&'static str> {
-    if root.get(expected).is_some() {
+    let is_misspelt = |(key, _): &(Key, Value)| suggest_name(&key.name, std::iter::once(expected)).is_some();
+    if root.entries.iter().any(is_misspelt) {
         return None;
     }
     let types = [("scenario", SCENARIO), ("graph", "a graph"), ("devices", "a bench"), ("exports", "a part")];

@@ -5,9 +5,9 @@ use crate::device::RoleType;
 use crate::graph::load::FlatNode;
 use crate::graph::plan::{PortRef, Producer};
 use crate::graph::syntax::WireEntry;
-use crate::node::NodeSpec;
+use crate::node::{NodeSpec, Spanned};
 use crate::signal::Kind;
-use crate::source::{Code, Diagnostic, Diagnostics};
+use crate::source::{Code, Diagnostic, Diagnostics, quoted, suggest_name};
 
 impl Net<'_> {
     /// Resolves the wires of each node; wires with a mistake are left out.
@@ -21,13 +21,19 @@ impl Net<'_> {
 
     fn wire(&self, node: usize, spec: &NodeSpec, wire: &WireEntry, diagnostics: &mut Diagnostics) -> Option<Wire> {
         let (FlatNode { scope, name, .. }, key) = (&self.flat.nodes[node], &wire.key);
-        let source = report(self.resolve(*scope, &wire.from), diagnostics);
+        let source = self.resolve(*scope, &wire.from).map_err(|found| self.same_name(*scope, wire, found));
+        let source = report(source, diagnostics);
         let named = spec.inputs.iter().position(|input| !input.need.is_many && input.name == key.name);
         let Some(input) = named.or_else(|| spec.inputs.iter().position(|input| input.need.is_many)) else {
             let message = format!("`{}` has no input `{}`", spec.name, key.name);
             let known = spec.inputs.iter().map(|input| &*input.name);
             let diagnostic = Diagnostic::new(Code::UnknownInput, key.span.clone(), message);
-            diagnostics.push(diagnostic.suggest(&key.name, known, "inputs"));
+            let required = spec.inputs.iter().filter(|input| input.need.must_be_wired).map(|input| &*input.name);
+            let wires = &self.flat.nodes[node].block.wires;
+            diagnostics.push(match wires.only_lacks(known.clone(), required) {
+                Some(name) => diagnostic.instead(&key.name, name),
+                None => diagnostic.suggest(&key.name, known, "inputs"),
+            });
             return None;
         };
         let (source, origin, takes) = (source?, self.origin(*scope, wire), spec.inputs[input].kind);
@@ -36,6 +42,21 @@ impl Net<'_> {
             return None;
         }
         Some(Wire { input, key: key.clone(), origin, source })
+    }
+
+    /// Suggests the output with the name of the input for a port of one or two letters, to which many are close.
+    fn same_name(&self, scope: usize, wire: &WireEntry, found: Option<Box<Diagnostic>>) -> Option<Box<Diagnostic>> {
+        let Some((node, port)) = wire.from.value.split_once('.') else { return found };
+        let same = Spanned { value: format!("{node}.{}", wire.key.name), span: wire.from.span.clone() };
+        let is_short = port.chars().count() <= 2 && self.resolve(scope, &same).is_ok();
+        match found {
+            Some(found) if is_short => {
+                let Diagnostic { code, message, span, notes, .. } = *found;
+                let diagnostic = Diagnostic { notes, ..Diagnostic::new(code, span, message) };
+                Some(Box::new(diagnostic.instead(port, &wire.key.name)))
+            }
+            found => found,
+        }
     }
 
     /// Follows a wire out of the parts around it, to the text that names its source.
@@ -85,9 +106,15 @@ impl Net<'_> {
         let ports = commands.iter().map(|port| (false, port)).chain(reports.iter().map(|port| (true, port)));
         let Some((place, (is_report, port))) = ports.enumerate().find(|(_, (_, port))| port.name == key.name) else {
             let message = format!("`{name}` has no command `{}`", key.name);
-            let known = commands.iter().chain(reports).map(|port| &*port.name);
+            // A command that has a wire is not what was meant.
+            let wires = self.flat.commands.iter().filter(|(key, _)| key.name == name);
+            let is_open = |port: &&str| !wires.clone().any(|(_, wire)| wire.key.name == *port);
+            let known = || commands.iter().chain(reports).map(|port| &*port.name);
             let diagnostic = Diagnostic::new(Code::UnknownInput, key.span.clone(), message);
-            diagnostics.push(diagnostic.suggest(&key.name, known, "commands"));
+            diagnostics.push(match suggest_name(&key.name, known().filter(is_open)) {
+                Some(best) => diagnostic.instead(&key.name, best),
+                None => diagnostic.help(format!("commands here: {}", quoted(known()))),
+            });
             return None;
         };
         let (source, origin) = (source?, self.origin(0, wire));

@@ -4,8 +4,9 @@ use super::scope_ports::ScopePorts;
 use super::{Net, Resolved};
 use crate::graph::load::{Entity, Scope};
 use crate::graph::plan::{PortRef, Producer};
+use crate::graph::syntax::INPUTS;
 use crate::node::{PortSpec, Spanned};
-use crate::source::{Code, Diagnostic, quoted};
+use crate::source::{Code, Diagnostic, quoted, suggest_name};
 
 /// Parts through which one wire may pass; more means that it refers to itself.
 const MAX_DEPTH: usize = 64;
@@ -25,21 +26,32 @@ impl Net<'_> {
     fn resolve_at_depth(&self, scope: usize, word: &Spanned<String>, depth: usize) -> Resolved<PortRef> {
         let diagnostic = |code: Code, message: String| Diagnostic::new(code, word.span.clone(), message);
         let unknown = |message: String| diagnostic(Code::UnknownPort, message);
+        // The mistake is in the name before the dot, or in the port behind it.
+        let unknown_name =
+            |length: usize, message: String| Diagnostic::new(Code::UnknownPort, word.part(0..length), message);
+        let unknown_port = |length: usize, message: String| {
+            Diagnostic::new(Code::UnknownPort, word.part(word.value.len() - length..word.value.len()), message)
+        };
         if depth > MAX_DEPTH {
             let message = format!("`{}` refers to itself, through the inputs and exports of parts", word.value);
             return diagnostic(Code::Loop, message).into_err();
         }
         let Scope { names, inputs, declared, parent, .. } = &self.flat.scopes[scope];
         let Some((name, port)) = word.value.split_once('.').filter(|(_, port)| !port.contains('.')) else {
-            let help = self.ports_help(scope, word);
-            return unknown(format!("`{}` is not a port", word.value)).help(help).into_err();
+            let diagnostic = unknown(format!("`{}` is not a port", word.value));
+            return match self.port_like(scope, &word.value) {
+                Some(port) => diagnostic.instead(&word.value, &port),
+                None => diagnostic.help(self.ports_help(scope, word)),
+            }
+            .into_err();
         };
-        if name == "inputs"
+        if name == INPUTS
             && let Some(parent) = *parent
         {
             if declared.position(port).is_none() {
                 let known = declared.names();
-                return unknown(format!("the part has no input `{port}`")).suggest(port, known, "inputs").into_err();
+                let message = format!("the part has no input `{port}`");
+                return unknown_port(port.len(), message).suggest(port, known, "inputs").into_err();
             }
             // An input that is declared and not wired has its own diagnostic.
             let wire = inputs.get(port).ok_or(None)?;
@@ -51,12 +63,20 @@ impl Net<'_> {
                 return diagnostic(Code::ObservedRole, message).help(OBSERVED_HELP).into_err();
             }
             let message = format!("there is no role, node or part `{name}`");
-            let known = names.keys().map(String::as_str);
-            return unknown(message).suggest(name, known, "roles, nodes and parts").into_err();
+            let known = || names.keys().map(String::as_str).chain(parent.map(|_| INPUTS));
+            // Both names of the port may be wrong, for example in capital letters.
+            let meant = suggest_name(name, known()).and_then(|best| Some((best, names.get(best)?.1)));
+            let ports = meant.map(|(_, entity)| self.ports_of(entity)).unwrap_or_default();
+            let both = suggest_name(port, ports.iter().copied()).filter(|_| !ports.contains(&port)).zip(meant);
+            return match both {
+                Some((port, (best, _))) => unknown(message).instead(&word.value, &format!("{best}.{port}")),
+                None => unknown_name(name.len(), message).suggest(name, known(), "roles, nodes and parts"),
+            }
+            .into_err();
         };
         self.port_of(*entity, port, depth).unwrap_or_else(|| {
             let message = format!("`{name}` has no output `{port}`");
-            unknown(message).suggest(port, self.ports_of(*entity).into_iter(), "outputs").into_err()
+            unknown_port(port.len(), message).suggest(port, self.ports_of(*entity).into_iter(), "outputs").into_err()
         })
     }
 
@@ -69,6 +89,7 @@ impl Net<'_> {
                 let word = self.flat.scopes[inner].exports.get(port)?;
                 return Some(self.resolve_at_depth(inner, word, depth + 1));
             }
+            Entity::Unknown => return Some(Err(None)),
         };
         let Some(outputs) = self.outputs(producer) else { return Some(Err(None)) };
         let port = outputs.iter().position(|output| output.name == port)?;
@@ -86,17 +107,25 @@ impl Net<'_> {
         format!("ports here: {}", quoted(ports.iter().map(|port| format!("{first}.{port}"))))
     }
 
+    /// Returns the port that a word of another form than `node.port` misspells.
+    fn port_like(&self, scope: usize, word: &str) -> Option<String> {
+        let inputs = self.flat.scopes[scope].declared.iter().map(|(key, _)| format!("{INPUTS}.{}", key.name));
+        let known: Vec<String> = self.ports_in(scope).map(|(name, _)| name).chain(inputs).collect();
+        suggest_name(word, known.iter().map(String::as_str)).map(str::to_owned)
+    }
+
     fn ports_of(&self, entity: Entity) -> Vec<&str> {
         let names = |producer| self.outputs(producer).unwrap_or_default().iter().map(|port| &*port.name).collect();
         match entity {
             Entity::Role(i) => names(Producer::Role(i)),
             Entity::Node(i) => names(Producer::Node(i)),
             Entity::Part(inner) => self.flat.scopes[inner].exports.names().collect(),
+            Entity::Unknown => Vec::new(),
         }
     }
 
     /// Returns the ports that the wires of a scope can read, each with its name there.
-    fn ports_in(&self, scope: usize) -> impl Iterator<Item = (String, PortRef)> {
+    pub(crate) fn ports_in(&self, scope: usize) -> impl Iterator<Item = (String, PortRef)> {
         let names = self.flat.scopes[scope].names.iter();
         names.flat_map(move |(name, (_, entity))| {
             let ports = self.ports_of(*entity).into_iter();

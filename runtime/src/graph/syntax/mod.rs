@@ -1,14 +1,19 @@
 //! The sections of a graph file, a part and a bench, before names are resolved.
 
+mod correct;
 mod modes;
+mod names;
 mod policy;
 mod read;
+mod reserved;
 mod sections;
 
 pub(crate) use modes::{ExitKind, ExitTable, ModeBlock, ModeExit, PortState};
+pub(crate) use names::Use;
 pub use policy::Policy;
 pub(crate) use policy::{AgeLimit, PolicyTable, default_max_age_ns, default_max_age_s};
+pub(crate) use reserved::{INPUTS, LIMITS};
 pub(crate) use sections::{
-    ALLOW_UNCALIBRATED, BenchDocument, Block, GraphDocument, GraphTable, LIMITS, PartBlock, Sections, WireEntry,
+    ALLOW_UNCALIBRATED, BenchDocument, Block, GraphDocument, GraphTable, PartBlock, Sections, WireEntry,
     into_diagnostic,
 };

@@ -2,9 +2,10 @@
 
 use std::ops::Range;
 
-use super::read::{check_keys, read_table, read_word};
+use super::correct::{correct_facts, correct_keys};
+use super::read::{read_table, read_word};
 use crate::node::{Amount, Param, Reader, Spanned};
-use crate::source::{Item, Key, Table, Value};
+use crate::source::{Diagnostic, Item, Key, Table, Value};
 
 /// A mode: the parameters it sets and its exits.
 #[derive(Debug, Clone)]
@@ -15,6 +16,16 @@ pub(crate) struct ModeBlock {
     /// Values that override those of the nodes.
     pub(crate) set: Table,
     pub(crate) exits: Vec<ModeExit>,
+}
+
+impl ModeBlock {
+    /// Returns whether the block has one of the diagnostics, so that an exit may be missing.
+    pub(crate) fn has_any(&self, diagnostics: &[Diagnostic]) -> bool {
+        let holds = |(key, value): &(Key, Value), span: &Range<usize>| {
+            key.span.start <= span.start && span.end <= value.span.end.max(key.span.end)
+        };
+        diagnostics.iter().any(|diagnostic| self.table.entries.iter().any(|entry| holds(entry, &diagnostic.span)))
+    }
 }
 
 /// An exit of a mode.
@@ -131,8 +142,10 @@ impl ExitTable {
 
 /// Reads the block of a mode.
 pub(super) fn read_mode(key: Key, mut table: Table, reader: &mut Reader<'_>) -> ModeBlock {
+    correct_keys(&mut table, &["set", "go", "on_lost", "done", "fail"], " in a mode", reader);
     let whole = table.clone();
-    let set = table.remove("set");
+    let mut set = table.remove("set");
+    set.iter_mut().for_each(|(_, value)| correct_facts(value, reader));
     let set = read_table(set.as_ref().map(|(_, value)| value), reader);
     let mut exits = Vec::new();
     for kind in [ExitKind::Fail, ExitKind::OnLost, ExitKind::Done, ExitKind::Go] {
@@ -144,13 +157,16 @@ pub(super) fn read_mode(key: Key, mut table: Table, reader: &mut Reader<'_>) -> 
             _ => exits.extend(read_exits(kind, &value, reader)),
         }
     }
-    check_keys(&table, &["set", "go", "on_lost", "done", "fail"], " in a mode", reader);
     ModeBlock { key, table: whole, set, exits }
 }
 
 /// Reads the exits of one table. `after_ms` and `after_travel_mm` together make two exits, one for each.
 fn read_exits(kind: ExitKind, value: &Value, reader: &mut Reader<'_>) -> Vec<ModeExit> {
-    let Some(table) = ExitTable::read(value, reader) else { return Vec::new() };
+    let before = reader.mistakes.len();
+    let table = ExitTable::read(value, reader);
+    // After an unknown key, the condition may be incomplete.
+    let is_complete = reader.mistakes[before..].iter().all(|mistake| mistake.instead.is_some());
+    let Some(table) = table.filter(|_| is_complete) else { return Vec::new() };
     let exit = |table| ModeExit { kind, span: value.span.clone(), table };
     if table.after_ms.is_none() || table.after_travel_mm.is_none() {
         return vec![exit(table)];

@@ -1,7 +1,7 @@
-//! Reads tables, words and keys: what the sections have in common.
+//! Reads tables and words: what the sections have in common.
 
-use crate::node::{At, Mistake, Reader};
-use crate::source::{Code, Item, Table, Value, suggestion};
+use crate::node::Reader;
+use crate::source::{Item, Table, Value};
 
 /// Reads a table; one that is missing or invalid is empty.
 pub(super) fn read_table(value: Option<&Value>, reader: &mut Reader<'_>) -> Table {
@@ -22,14 +22,5 @@ pub(super) fn read_word<T: Copy>(
         _ => value.as_str().unwrap_or_default(),
     };
     let found = words.iter().find(|(known, _)| *known == word).map(|(_, meaning)| *meaning);
-    found.or_else(|| reader.wrong_type(value, expects))
-}
-
-/// Reports each key of a table that is not `known`. `place` ends the message, for example ` in a mode`.
-pub(super) fn check_keys(table: &Table, known: &[&str], place: &str, reader: &mut Reader<'_>) {
-    for (key, _) in table.entries.iter().filter(|(key, _)| !known.contains(&key.name.as_str())) {
-        let message = format!("unknown key `{}`{place}", key.name);
-        let help = suggestion(&key.name, known.iter().copied(), "keys");
-        reader.mistakes.push(Mistake::new(Code::UnknownKey, At::Span(key.span.clone()), message).help(help));
-    }
+    found.or_else(|| reader.unknown_word(value, words.iter().map(|(known, _)| *known), expects))
 }

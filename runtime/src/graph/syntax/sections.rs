@@ -3,9 +3,11 @@
 use std::collections::BTreeSet;
 use std::ops::Range;
 
+use super::correct::{correct_block, correct_facts, correct_keys, correct_sections, correct_wires};
 use super::modes::{ModeBlock, read_mode};
 use super::policy::{AgeLimit, PolicyTable, WireTable};
-use super::read::{check_keys, read_table};
+use super::read::read_table;
+use super::reserved::is_name;
 use crate::node::{At, FilePath, Measured, Mistake, Param, Reader, Spanned};
 use crate::source::{Code, Diagnostic, Diagnostics, Item, Key, Named, SourceMap, Table, Value, suggest_name};
 
@@ -51,20 +53,47 @@ pub(crate) struct InputWires {
 }
 
 impl InputWires {
-    /// Returns the `known` inputs that have no wire. A wire to a misspelt name counts, since it has its own diagnostic.
-    pub(crate) fn lacking<'n>(&self, known: impl Iterator<Item = &'n str> + Clone) -> BTreeSet<&'n str> {
+    /// Returns whether a wire is invalid and has its own diagnostic.
+    pub(crate) fn has_invalid(&self) -> bool {
+        !self.invalid.is_empty()
+    }
+
+    fn keys(&self) -> impl Iterator<Item = &Key> + Clone {
+        self.valid.iter().map(|wire| &wire.key).chain(&self.invalid)
+    }
+
+    /// Returns the `known` inputs that have no wire. A wire to a misspelt name counts, since it has its own diagnostic,
+    /// and so does one to a strange name if only one of the `required` inputs has no wire.
+    pub(crate) fn lacking<'n>(
+        &self,
+        known: impl Iterator<Item = &'n str> + Clone,
+        required: impl Iterator<Item = &'n str>,
+    ) -> BTreeSet<&'n str> {
         let names: BTreeSet<&str> = known.clone().collect();
-        let keys = || self.valid.iter().map(|wire| &wire.key).chain(&self.invalid).map(|key| key.name.as_str());
-        let wired: BTreeSet<&str> = keys().collect();
+        let wired: BTreeSet<&str> = self.keys().map(|key| key.name.as_str()).collect();
         let mut lacking = names.clone();
         lacking.retain(|name| !wired.contains(name));
-        for strange in keys().filter(|key| !names.contains(key)) {
+        for strange in wired.iter().filter(|key| !names.contains(*key)) {
             if lacking.is_empty() {
                 break;
             }
             suggest_name(strange, known.clone()).map(|meant| lacking.remove(meant));
         }
+        self.only_lacks(known, required).map(|meant| lacking.remove(meant));
         lacking
+    }
+
+    /// Returns the only `required` input without a wire, if one wire leads to none of the `known` inputs: it was meant.
+    pub(crate) fn only_lacks<'n>(
+        &self,
+        known: impl Iterator<Item = &'n str>,
+        required: impl Iterator<Item = &'n str>,
+    ) -> Option<&'n str> {
+        let names: BTreeSet<&str> = known.collect();
+        let wired: BTreeSet<&str> = self.keys().map(|key| key.name.as_str()).collect();
+        let strange = wired.iter().filter(|key| !names.contains(*key)).count();
+        let mut open = required.filter(|name| !wired.contains(name));
+        open.next().filter(|_| strange == 1 && open.next().is_none())
     }
 }
 
@@ -110,20 +139,18 @@ pub(crate) struct GraphDocument {
 pub(crate) struct BenchDocument {
     pub(crate) devices: Vec<Block>,
     pub(crate) bind: Named<Spanned<String>>,
+    /// The place of the name of the section [bind].
+    pub(crate) place: Option<Range<usize>>,
+    /// Roles whose binding is not a string, which has its own diagnostic.
+    pub(crate) invalid: Vec<Key>,
     /// Facts that the bench states beside those of its devices, by role.
     pub(crate) facts: Vec<(Key, Table)>,
     /// Whether limits may be in raw readings.
     pub(crate) allow_uncalibrated: bool,
 }
 
-/// Name of the section [limits] in `{ from = "limits.KEY" }`.
-pub(crate) const LIMITS: &str = "limits";
-
 /// Key of a bench that allows limits in raw readings.
 pub(crate) const ALLOW_UNCALIBRATED: &str = "allow_uncalibrated";
-
-/// Reserved names, which have another meaning in wires and facts.
-const RESERVED: [&str; 2] = ["inputs", LIMITS];
 
 /// Reads sections and collects their diagnostics.
 pub(crate) struct Sections<'a> {
@@ -146,7 +173,7 @@ impl<'a> Sections<'a> {
     }
 
     /// Reads the sections of a graph file.
-    pub(crate) fn graph(&mut self, root: &Table) -> GraphDocument {
+    pub(crate) fn graph(&mut self, root: &mut Table) -> GraphDocument {
         const KEYS: [&str; 12] = [
             "graph",
             "roles",
@@ -161,7 +188,7 @@ impl<'a> Sections<'a> {
             "facts",
             ALLOW_UNCALIBRATED,
         ];
-        check_keys(root, &KEYS, "", &mut self.reader);
+        correct_sections(root, &KEYS, &mut self.reader);
         for name in [ALLOW_UNCALIBRATED, "facts"] {
             let Some((key, _)) = root.entry(name).filter(|_| root.get("devices").is_none()) else { continue };
             let message = format!("`{name}` is a key of a bench, and a task cannot set it");
@@ -184,16 +211,20 @@ impl<'a> Sections<'a> {
         GraphDocument { graph, roles, commands, limits, modes, policy, ..self.body(root) }
     }
 
+    /// Corrects the names of the sections of a part, before the graph overrides values in them.
+    pub(crate) fn correct_part(&mut self, root: &mut Table) {
+        correct_sections(root, &["inputs", "exports", "parts", "nodes"], &mut self.reader);
+    }
+
     /// Reads the sections of a part.
     pub(crate) fn part(&mut self, root: &Table) -> GraphDocument {
-        check_keys(root, &["inputs", "exports", "parts", "nodes"], "", &mut self.reader);
         let (inputs, exports) = (self.names(root.get("inputs")), self.names(root.get("exports")));
         GraphDocument { inputs, exports, ..self.body(root) }
     }
 
     /// Reads the sections of a bench file.
-    pub(crate) fn bench(&mut self, root: &Table) -> BenchDocument {
-        check_keys(root, &["devices", "bind", "facts", ALLOW_UNCALIBRATED], "", &mut self.reader);
+    pub(crate) fn bench(&mut self, root: &mut Table) -> BenchDocument {
+        correct_sections(root, &["devices", "bind", "facts", ALLOW_UNCALIBRATED], &mut self.reader);
         self.own_bench(root)
     }
 
@@ -201,14 +232,24 @@ impl<'a> Sections<'a> {
     pub(crate) fn own_bench(&mut self, root: &Table) -> BenchDocument {
         let devices = self.named_tables(root.get("devices"));
         let names = names_of(&devices);
-        let devices = devices.into_iter().map(|(key, table)| self.block(key, table, &names)).collect();
+        let block = |(key, mut table): (Key, Table)| {
+            correct_block(&mut table, &[], &mut self.reader);
+            self.block(key, table, &names)
+        };
+        let devices = devices.into_iter().map(block).collect();
         let allow_uncalibrated = root.get(ALLOW_UNCALIBRATED).and_then(|value| bool::read(value, &mut self.reader));
-        let (bind, facts) = (self.words(root.get("bind")), self.named_tables(root.get("facts")));
-        for (key, _) in facts.iter().filter(|(key, _)| !bind.iter().any(|(role, _)| role.name == key.name)) {
-            let roles = bind.iter().map(|(role, _)| role.name.as_str());
-            self.diagnostics.push(Diagnostic::unknown(Code::UnboundRole, "role", &key.name, &key.span, roles));
+        let bind = root.entry("bind");
+        let is_invalid = |(_, value): &&(Key, Value)| value.as_str().is_none();
+        let entries = bind.and_then(|(_, value)| value.as_table()).into_iter().flat_map(|table| &table.entries);
+        let invalid = entries.filter(is_invalid).map(|(key, _)| key.clone()).collect();
+        let (place, bind) = (bind.map(|(key, _)| key.span.clone()), self.words(bind.map(|(_, value)| value)));
+        let facts = self.named_tables(root.get("facts"));
+        for (key, _) in facts.iter().filter(|(key, _)| bind.position(&key.name).is_none()) {
+            let unknown = Diagnostic::unknown(Code::UnboundRole, "role", &key.name, &key.span, bind.names());
+            self.diagnostics.push(unknown);
         }
-        BenchDocument { devices, bind, facts, allow_uncalibrated: allow_uncalibrated.unwrap_or(false) }
+        let allow_uncalibrated = allow_uncalibrated.unwrap_or(false);
+        BenchDocument { devices, bind, place, invalid, facts, allow_uncalibrated }
     }
 
     fn body(&mut self, root: &Table) -> GraphDocument {
@@ -218,8 +259,11 @@ impl<'a> Sections<'a> {
         let part_names: BTreeSet<&str> = parts.iter().map(|(key, _)| key.name.as_str()).collect();
         let nodes = nodes.into_iter().filter(|(key, table)| !self.addresses_part(key, table, &part_names));
         let nodes: Vec<(Key, Table)> = nodes.collect();
-        let nodes = nodes.into_iter().map(|(key, table)| self.node(key, table, &names)).collect();
-        let parts = parts.into_iter().map(|(key, table)| self.part_block(key, table)).collect();
+        let roles = root.get("roles").and_then(Value::as_table).into_iter().flat_map(|table| &table.entries);
+        let roles = roles.map(|(key, _)| key.name.clone());
+        let all: Vec<String> = names.iter().cloned().chain(names_of(&parts)).chain(roles).collect();
+        let nodes = nodes.into_iter().map(|(key, table)| self.node(key, table, &names, &all)).collect();
+        let parts = parts.into_iter().map(|(key, table)| self.part_block(key, table, &all)).collect();
         GraphDocument { nodes, parts, ..GraphDocument::default() }
     }
 
@@ -230,13 +274,14 @@ impl<'a> Sections<'a> {
             return false;
         }
         let message = format!("`{0}` is a part: set its nodes through `parts.{0}.set`", key.name);
-        let node = table.entries.first().map_or("NODE", |(node, _)| &node.name);
-        let help = format!("write `parts.{}.set.{node}.…`", key.name);
+        let node = table.entries.first().map_or_else(String::new, |(node, _)| format!(".{}", node.name));
+        let help = format!("write `parts.{}.set{node}`", key.name);
         self.diagnostics.push(Diagnostic::new(Code::UnknownKey, key.span.clone(), message).help(help));
         true
     }
 
-    fn node(&mut self, key: Key, mut table: Table, names: &[String]) -> Block {
+    fn node(&mut self, key: Key, mut table: Table, names: &[String], sources: &[String]) -> Block {
+        correct_block(&mut table, sources, &mut self.reader);
         Block { wires: self.wires(&mut table), ..self.block(key, table, names) }
     }
 
@@ -258,9 +303,12 @@ impl<'a> Sections<'a> {
         Block { key, kind, wires: InputWires::default(), params }
     }
 
-    fn part_block(&mut self, key: Key, mut table: Table) -> PartBlock {
+    fn part_block(&mut self, key: Key, mut table: Table, sources: &[String]) -> PartBlock {
+        correct_wires(&mut table, sources, &mut self.reader);
+        correct_keys(&mut table, &["file", "in", "set"], "", &mut self.reader);
         let wires = self.wires(&mut table);
-        let set = table.remove("set").map(|(_, value)| value);
+        let mut set = table.remove("set").map(|(_, value)| value);
+        set.iter_mut().for_each(|value| correct_facts(value, &mut self.reader));
         let set = self.table(set.as_ref());
         let file = match table.remove("file") {
             Some((_, value)) => FilePath::read(&value, &mut self.reader),
@@ -271,7 +319,6 @@ impl<'a> Sections<'a> {
                 None
             }
         };
-        check_keys(&table, &["file", "in", "set"], "", &mut self.reader);
         PartBlock { key, file, wires, set }
     }
 
@@ -279,14 +326,18 @@ impl<'a> Sections<'a> {
     fn wires(&mut self, table: &mut Table) -> InputWires {
         let wires = table.remove("in").map(|(_, value)| value);
         let mut wires = self.wire_entries(wires.as_ref());
-        wires.valid.retain(|WireEntry { key, .. }| {
+        let mut invalid = Vec::new();
+        wires.valid.retain_mut(|WireEntry { key, .. }| {
             if key.name == "from" {
                 let diagnostic = Diagnostic::new(Code::BadName, key.span.clone(), "a wire cannot be named `from`");
                 let help = "`from` is reserved for facts, as in `{ from = \"role.fact\" }`: choose another name";
                 self.diagnostics.push(diagnostic.help(help));
             }
-            key.name != "from" && self.check_name(key)
+            let is_valid = key.name != "from" && self.check_name(key);
+            invalid.extend((!is_valid).then(|| key.clone()));
+            is_valid
         });
+        wires.invalid.extend(invalid);
         wires
     }
 
@@ -330,18 +381,20 @@ impl<'a> Sections<'a> {
 
     /// Reads a table whose keys are names and whose values are strings.
     fn names(&mut self, value: Option<&Value>) -> Named<Spanned<String>> {
-        let words = self.words(value);
-        for (key, _) in words.iter() {
-            self.check_name(key);
-        }
+        let mut words = self.words(value);
+        words.edit(|entries| {
+            for (key, _) in entries {
+                self.check_name(key);
+            }
+        });
         words
     }
 
     /// Reads a table whose keys are names and whose values are tables.
     fn named_tables(&mut self, value: Option<&Value>) -> Vec<(Key, Table)> {
         let mut tables = Vec::new();
-        for (key, value) in self.table(value).entries {
-            self.check_name(&key);
+        for (mut key, value) in self.table(value).entries {
+            self.check_name(&mut key);
             let table = self.table(Some(&value));
             if value.as_table().is_none() {
                 self.broken.push(key.clone());
@@ -351,18 +404,23 @@ impl<'a> Sections<'a> {
         tables
     }
 
-    /// Returns whether a key is a valid name, and reports it if not.
-    fn check_name(&mut self, key: &Key) -> bool {
-        let is_word = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '_';
-        let starts_well = key.name.starts_with(|c: char| c.is_ascii_lowercase());
-        let is_name = starts_well && key.name.chars().all(is_word) && !RESERVED.contains(&key.name.as_str());
-        if !is_name {
-            let message = format!("`{}` is not a valid name", key.name);
-            let help =
-                "a name has lower-case letters, digits and `_`, starts with a letter, and is not `inputs` or `limits`";
-            self.diagnostics.push(Diagnostic::new(Code::BadName, key.span.clone(), message).help(help));
+    /// Returns whether a key is a valid name. If not, it is reported, and a name with the same letters replaces it.
+    fn check_name(&mut self, key: &mut Key) -> bool {
+        if is_name(&key.name) {
+            return true;
         }
-        is_name
+        let message = format!("`{}` is not a valid name", key.name);
+        let diagnostic = Diagnostic::new(Code::BadName, key.span.clone(), message);
+        let meant = key.name.to_lowercase().replace(['-', ' '], "_");
+        if is_name(&meant) {
+            self.diagnostics.push(diagnostic.instead(&key.name, &meant));
+            key.name = meant;
+            return true;
+        }
+        let help =
+            "a name has lower-case letters, digits and `_`, starts with a letter, and is not `inputs` or `limits`";
+        self.diagnostics.push(diagnostic.help(help));
+        false
     }
 }
 
@@ -373,5 +431,9 @@ fn names_of(tables: &[(Key, Table)]) -> Vec<String> {
 /// Converts a mistake of a reader into a diagnostic.
 pub(crate) fn into_diagnostic(mistake: Mistake) -> Diagnostic {
     let At::Span(span) = mistake.at else { unreachable!("a reader reports spans") };
-    Diagnostic { code: mistake.code, message: mistake.message, span, notes: Vec::new(), help: mistake.help }
+    let diagnostic = Diagnostic::new(mistake.code, span, mistake.message);
+    match mistake.instead {
+        Some((name, best)) => diagnostic.instead(&name, &best),
+        None => diagnostic.with_help(mistake.help),
+    }
 }
