@@ -74,7 +74,7 @@ pub struct Params {
 #[derive(Inputs)]
 pub struct Inputs<'a> {
     /// Eccentricity of the contact, from 0 (round) to 1 (a line): from `eccentricity`, or the anisotropy of `moments`.
-    #[port(unit = "1", frame = "A", quantity = "eccentricity")]
+    #[port(unit = "1", frame = "A")]
     eccentricity: In<'a, Scalar>,
     /// Direction of the long axis of the contact.
     #[port(unit = "rad mod pi", frame = "A", quantity = "orientation")]

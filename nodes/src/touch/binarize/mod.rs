@@ -63,6 +63,10 @@ pub struct Params {
     /// there is only one threshold.
     #[param(unit = "U", live)]
     release: Option<f64>,
+    /// Value of a tactel that noise alone does not exceed, from the device of the pad. A lower threshold than a third
+    /// of it would find a contact in the noise, which is a mistake.
+    #[param(unit = "U", range = 0.0..)]
+    noise: Option<f64>,
     /// Where the threshold comes from.
     #[param(default = Method::Fixed)]
     method: Method,
@@ -107,6 +111,10 @@ impl Node for Binarize {
     type State = State;
 
     fn new(params: Params, setup: &mut Setup<Self>) -> Result<Self, Mistakes> {
+        if let Some(noise) = params.noise.filter(|noise| params.threshold < noise / 3.0) {
+            let message = format!("{} is within the noise of the pad, so noise would be a contact", params.threshold);
+            return Err(Mistake::param("threshold", message).help(format!("use {noise} or more")).into());
+        }
         setup.outputs.mask = (&setup.inputs.image).into();
         let grid = &setup.outputs.mask;
         Ok(Self { rule: rule(&params)?, words: grid.rows * grid.cols.div_ceil(64) })

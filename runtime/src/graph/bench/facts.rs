@@ -35,10 +35,8 @@ pub(crate) fn fill_facts(
 
 /// Returns whether a value is an optional fact that is not there.
 fn is_left_out(value: &Value, net: &Net<'_>, opened: &OpenedBench) -> bool {
-    let Some(fact) = value.as_table().and_then(Table::fact).filter(|fact| fact.is_optional) else { return false };
-    let role = fact.word.split_once('.').map_or(fact.word, |(role, _)| role);
-    let is_known = role == LIMITS || net.flat.roles.position(role).is_some();
-    is_known && find_fact(fact.word, fact.place, &value.span, net, opened).is_err()
+    let fact = value.as_table().and_then(Table::fact).filter(|fact| fact.is_optional);
+    fact.is_some_and(|fact| find_fact(fact.word, fact.place, &value.span, net, opened).is_err())
 }
 
 /// Returns the fact that the word at `place` names, as a value at `span`.

@@ -31,10 +31,13 @@ impl ContactPorts {
 
     /// Returns whether a port is present, or set, only while something touches a sensor.
     ///
-    /// Such a port descends from sensors alone. It is a flag, or the contact was segmented upstream of it.
+    /// Such a port descends from sensors alone, and the contact was segmented upstream of it. A flag must also be of a
+    /// known quantity: other flags may be set without a contact.
     pub(super) fn need(&self, net: &Net<'_>, port: PortRef) -> bool {
-        let is_flag = net.port(port).kind == Kind::Flag;
+        let declared = net.port(port);
+        let is_flag = declared.kind == Kind::Flag;
         match port.producer {
+            _ if is_flag && declared.quantity.is_none() => false,
             Producer::Role(role) => is_sensor(net, role) && is_flag,
             Producer::Node(node) => self.is_sensed[node] && (is_flag || self.is_segmented[node]),
         }

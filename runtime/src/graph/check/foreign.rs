@@ -1,5 +1,7 @@
 //! Checks that the limiters of an arm read that arm and the sensor that it moves, and no other role.
 
+use std::collections::BTreeSet;
+
 use super::frames::Frames;
 use crate::graph::net::Net;
 use crate::graph::plan::{PortRef, Producer};
@@ -19,7 +21,9 @@ pub(super) fn check(
     let sensor = frame.and_then(|frame| net.flat.roles.position(&frame));
     let mut found = Vec::new();
     for wire in net.wires[limiter].iter().filter(|wire| spec.inputs[wire.input].need.must_be_known) {
-        let mut foreign = net.roles_of(wire.source.producer).filter(|read| *read != role && Some(*read) != sensor);
+        let makers = find_makers(net, wire.source);
+        let roles = makers.iter().flat_map(|maker| net.roles_of(maker.producer));
+        let mut foreign = roles.filter(|read| *read != role && Some(*read) != sensor);
         let Some(foreign) = foreign.next() else { continue };
         let [arm, other] = [role, foreign].map(|role| net.name(Producer::Role(role)));
         let message = format!(
@@ -34,4 +38,24 @@ pub(super) fn check(
         );
     }
     found
+}
+
+/// Returns the ports that make the value of a port: itself, or those whose quantity its node passes on. What else the
+/// node reads, such as a gate, only makes the value present or absent.
+fn find_makers(net: &Net<'_>, port: PortRef) -> Vec<PortRef> {
+    let is_letter = |text: &&str| text.starts_with(|c: char| c.is_ascii_uppercase());
+    let (mut makers, mut open, mut seen) = (Vec::new(), vec![port], BTreeSet::new());
+    while let Some(port) = open.pop() {
+        if !seen.insert(port) {
+            continue;
+        }
+        match (port.producer, net.port(port).quantity.as_deref().filter(is_letter)) {
+            (Producer::Node(node), letter @ Some(_)) => {
+                let passed = net.wires[node].iter().filter(|wire| net.input(node, wire).quantity.as_deref() == letter);
+                open.extend(passed.map(|wire| wire.source));
+            }
+            _ => makers.push(port),
+        }
+    }
+    makers
 }

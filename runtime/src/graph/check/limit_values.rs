@@ -65,8 +65,8 @@ fn find_refs<'a>(net: &Net<'a>) -> Vec<LimitRef<'a>> {
     let mut refs = Vec::new();
     for (i, node) in net.flat.nodes.iter().enumerate() {
         let specs = net.spec(i).map_or(&[][..], |spec| &spec.params);
-        let entries = node.block.params.as_table().into_iter().flat_map(|table| &table.entries);
-        for (key, value) in entries {
+        let tables = [&node.block.params].into_iter().chain(net.settings_of(i)).filter_map(Value::as_table);
+        for (key, value) in tables.flat_map(|table| &table.entries) {
             let spec = specs.iter().find(|spec| spec.name == key.name);
             let limits = value.facts().into_iter().filter_map(|fact| match fact.word.split_once('.')? {
                 (LIMITS, key) => {
