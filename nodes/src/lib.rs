@@ -95,6 +95,7 @@ pub fn catalogue() -> Catalogue {
         .node::<limits::bumpless::Bumpless>()
         .node::<limits::contact_limit::ContactLimit>()
         .node::<limits::workspace_limit::WorkspaceLimit>()
+        .node::<limits::blind_limit::BlindLimit>()
         .node::<limits::twist_limit::TwistLimit>()
         .node::<limits::acceleration_limit::AccelerationLimit>()
         .node::<limits::joint_limit::JointLimit>()

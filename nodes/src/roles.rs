@@ -12,7 +12,10 @@ pub fn tactile_pad() -> RoleType {
     RoleType {
         name: "tactile_pad".into(),
         summary: "an array of tactels that outputs an image".into(),
-        outputs: vec![PortSpec::new("image", "The newest image, in the device's unit.", Kind::Image, &["U", "self"])],
+        outputs: vec![
+            PortSpec::new("image", "The newest image, in the device's unit.", Kind::Image, &["U", "self"])
+                .of_quantity("tactile_image"),
+        ],
         ..RoleType::default()
     }
 }
@@ -24,11 +27,12 @@ pub fn velocity_arm() -> RoleType {
         name: "velocity_arm".into(),
         summary: "an arm that is commanded with joint velocities".into(),
         outputs: vec![
-            PortSpec::new("position", "Measured joint positions [rad].", Kind::Joints, &["rad", "self"]),
-            PortSpec::new("equilibrium", EQUILIBRIUM, Kind::Joints, &["rad", "self"]),
+            PortSpec::new("position", "Measured joint positions [rad].", Kind::Joints, &["rad", "self"])
+                .of_quantity("position"),
+            PortSpec::new("equilibrium", EQUILIBRIUM, Kind::Joints, &["rad", "self"]).of_quantity("equilibrium"),
         ],
         commands: vec![PortSpec::new("velocity", "Joint velocities [rad/s].", Kind::Joints, &["rad/s", "self"])],
-        reports: vec![PortSpec::new("contact", CONTACT, Kind::Pose, &["C", "base"])],
+        reports: vec![PortSpec::new("contact", CONTACT, Kind::Pose, &["C", "self.base"])],
         limits: LIMITS.map(Cow::Borrowed).into(),
         ..RoleType::default()
     }
@@ -87,11 +91,12 @@ const OWN_NOISE: &str =
     "Standard deviation of the pressure due to the own noise of each tactel; absent without contact [N/tactel].";
 
 /// What every command of an arm must have crossed, in the order in which a motion does.
-const LIMITS: [&str; 10] = [
+const LIMITS: [&str; 11] = [
     "bumpless",
     "force",
     "peak",
     "workspace",
+    "blind",
     "speed",
     "acceleration",
     "lead",

@@ -151,7 +151,7 @@ fn strings(table: &Table) -> impl Iterator<Item = String> {
 
 /// Collects the roles whose facts a value refers to.
 fn collect_facts(value: &Value, needs: &mut Vec<String>) {
-    needs.extend(value.facts().into_iter().filter_map(|(fact, _)| Some(fact.split_once('.')?.0.to_owned())));
+    needs.extend(value.facts().into_iter().filter_map(|fact| Some(fact.word.split_once('.')?.0.to_owned())));
 }
 
 /// Splits a text into sections. A comment above a header belongs to the header.

@@ -29,6 +29,8 @@ pub enum Cause {
         /// Delay of the tick [ns].
         by: i64,
     },
+    /// A budget of a limiter is spent.
+    Spent,
     /// The operator sent `stop`.
     Operator,
     /// A `fail` condition of a mode holds: its text.
@@ -81,6 +83,7 @@ impl fmt::Display for Fault {
             }
             Cause::SilentClock => write!(f, "the clock device `{name}` sends no samples")?,
             Cause::Late { by } => write!(f, "a tick began {:.1} ms late", ms(*by))?,
+            Cause::Spent => write!(f, "`{name}` has spent its budget of motion without a contact")?,
             Cause::Operator => write!(f, "the operator sent `stop`")?,
             Cause::Mode(why) => write!(f, "a `fail` condition of mode `{name}` ended the run: {why}")?,
             Cause::Lost(why) => write!(f, "`{name}` is lost: {why}")?,

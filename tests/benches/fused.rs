@@ -6,9 +6,10 @@
 use std::hint::black_box;
 use std::path::Path;
 
+use nalgebra::Vector3;
 use tactflow_nodes::arm::chain::Chain;
 use tactflow_nodes::arm::{damped, joint_limits, model, mount::Mount, null_space};
-use tactflow_nodes::limits::{bumpless, contact_limit, joint_limit, workspace_limit};
+use tactflow_nodes::limits::{blind_limit, bumpless, contact_limit, joint_limit, workspace_limit};
 use tactflow_nodes::motion::axis::{half_angle, wrap_axial};
 use tactflow_nodes::motion::bounds::{approach_twist, scale_twist};
 use tactflow_nodes::servo::{adjoint::adjoint, integral::integrate};
@@ -35,6 +36,7 @@ struct Law {
 
 const P: Law = Law { kp: 0.5, ki: 0.0, kd: 0.0, within: f64::INFINITY, bound: 1.0, limit: f64::INFINITY };
 const LAWS: [Law; 4] = [P, P, Law { ki: 0.1, within: 10.0, bound: 5.0, ..P }, P];
+const BLIND: blind_limit::Bounds = blind_limit::Bounds { time: 20.0, way: 0.1, linear: 1.0, angular: 10.0 };
 const POSTURE: [f64; 7] = [0.0, 0.5, 0.0, -1.3, 0.0, 1.3, 0.0];
 
 /// The controller and everything it remembers.
@@ -60,6 +62,13 @@ pub(crate) struct Fused {
     rows: [null_space::Row; 7],
     smooth: [Twist; 2],
     reached: Twist,
+    corners: [Vector3<f64>; 4],
+    budget: blind_limit::Budget,
+    /// Speed of the fastest corner of the pad [m/s].
+    speed: f64,
+    /// Time of this tick, and of the last contact if it lasts [ns].
+    now: i64,
+    contact_at: Option<i64>,
     limited: joint_limit::Limiter,
     /// Read off by the bench, so that nothing is optimised away.
     pub(crate) sum: f64,
@@ -115,6 +124,11 @@ impl Fused {
             rows: [[0.0; 8]; 7],
             smooth: [Twist::default(); 2],
             reached: Twist::default(),
+            corners: blind_limit::corners(&shape),
+            budget: blind_limit::Budget::default(),
+            speed: 0.0,
+            now: 0,
+            contact_at: None,
             limited: joint_limit::Limiter::new(7),
             sum: 0.0,
             peak: 0.0,
@@ -153,6 +167,8 @@ impl Fused {
         label::trace(&self.mask, 1, runs);
         label::number(&self.image, runs, regions);
         let contact = label::contact(regions, 6, 100.0);
+        self.now += (tick * 1e9) as i64;
+        self.contact_at = contact.map(|_| self.now);
         let pose = self.chain.forward(arm[0], &mut self.columns);
         let (mut wanted, mut has_axis) = (None, false);
         if let Some(contact) = contact {
@@ -184,12 +200,24 @@ impl Fused {
             let (velocity, place) = (pose.0.rotation * twist.linear(), pose.0.translation.vector);
             let corners = [[-0.8, -0.4, 0.1], [-0.3, 0.4, 0.7]];
             twist.0 *= workspace_limit::scale(&velocity, &place, corners, 1.0, 2.0 * tick.max_gap);
+            twist.0 *= self.blind(&twist, tick);
             twist.0 *= scale_twist(&twist, 0.05, 0.8);
         } else {
+            self.blind(&Twist::default(), tick);
             twist = Twist::default();
         }
         approach_twist(&mut self.reached, &twist, dt, 10.0 * dt);
         (is_there || self.reached != Twist::default()).then_some(self.reached)
+    }
+
+    /// The fraction of a motion that the budgets without a contact let pass.
+    fn blind(&mut self, twist: &Twist, tick: &Tick) -> f64 {
+        let motion = blind_limit::Motion::of(twist, &self.corners, &BLIND);
+        self.budget.touch(self.contact_at, false);
+        self.budget.spend(self.speed, tick.dt);
+        let scale = self.budget.scale(&motion, &BLIND, 0.0, 2.0 * tick.max_gap);
+        self.speed = scale * motion.speed;
+        scale
     }
 
     /// From a twist of the sensor to joint velocities.

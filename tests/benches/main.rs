@@ -8,6 +8,10 @@ mod fused;
 use std::hint::black_box;
 use std::time::Instant;
 
+use tactflow_runtime::engine::Engine;
+use tactflow_runtime::graph::{Request, compile};
+use tactflow_tests::large::FAMILIES;
+
 /// Rounds of which the median is taken.
 const ROUNDS: usize = 61;
 
@@ -123,9 +127,19 @@ fn count(what: &str, ticks: u32) {
     }
 }
 
+/// Loads a large graph and runs its first tick, for a tool that counts instructions: `tick -- load chain 1000`.
+fn load(family: &str, nodes: usize) {
+    let (_, graph) = FAMILIES.iter().find(|(name, _)| *name == family).expect("a family of large graphs");
+    let plan = compile(&tactflow_nodes::catalogue(), &Request::text(graph(nodes))).expect("the graph has no mistake");
+    let mut engine = Engine::new(plan);
+    let now = engine.next().expect("there is a first sample");
+    engine.tick(now).expect("the first tick has no fault");
+}
+
 fn main() {
     let arguments: Vec<String> = std::env::args().skip(1).filter(|argument| argument != "--bench").collect();
     match arguments.as_slice() {
+        [what, family, nodes] if what == "load" => load(family, nodes.parse().expect("a number of nodes")),
         [what, ticks] => count(what, ticks.parse().expect("a number of ticks")),
         _ => {
             chains();

@@ -2,6 +2,7 @@
 
 pub mod devices;
 pub mod examples;
+pub mod large;
 pub mod nodes;
 pub mod saboteur;
 pub mod true_pad;

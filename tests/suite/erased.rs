@@ -50,7 +50,7 @@ impl Configured for Polynomial {
             return Err(Mistake::param("scale", "there is nothing to scale").into());
         }
         let outputs: Vec<Shape> = vec![given.inputs[0][0].1.clone()];
-        Ok(Built { node: self, outputs, is_still: false })
+        Ok(Built { node: self, outputs, is_still: false, is_uncalibrated: false })
     }
 }
 

@@ -14,8 +14,8 @@ fn all_examples_load_at_once_and_run() {
     let plan =
         load(graph_of_all(&tactflow_nodes::catalogue())).unwrap_or_else(|report| panic!("{}", report.render(false)));
     let frames = |name: &str| plan.ports().find(|port| port.name == name).unwrap().frames.clone();
-    assert_eq!(frames("contact_point.z"), [Some("base".to_owned())]);
-    assert_eq!(frames("contact_point.pose"), ["contact", "base"].map(|frame| Some(frame.to_owned())));
+    assert_eq!(frames("contact_point.z"), [Some("arm.base".to_owned())]);
+    assert_eq!(frames("contact_point.pose"), ["contact_point", "arm.base"].map(|frame| Some(frame.to_owned())));
     assert_eq!(frames("edge_guard.twist"), [Some("pad".to_owned())]);
     let mut engine = Engine::new(plan);
     while let Some(now) = engine.next().filter(|_| engine.ticks() < 500) {

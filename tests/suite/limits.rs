@@ -116,7 +116,7 @@ fn a_limiter_says_what_it_does_and_no_mode_can_set_it() {
     let catalogue = catalogue();
     let mut limiters = 0;
     for spec in catalogue.nodes().iter().map(|node| node.spec()) {
-        let Limits { through, holds, breaks } = spec.limits;
+        let Limits { through, holds, breaks, .. } = spec.limits;
         if let Some(through) = through {
             assert!(spec.inputs.iter().any(|input| input.name == through), "{}: {through}", spec.name);
         }
@@ -173,9 +173,11 @@ fn chain(kinds: &[u8]) -> Vec<Link> {
         1 => link::<TwistLimit>(&speeds, true, &[]),
         2 => link::<AccelerationLimit>(&accelerations, false, &[]),
         3 => link::<WorkspaceLimit>(BOX, true, &[("pose", PoseShape.into())]),
-        _ => {
-            link::<ContactLimit>("force = 10.0\npeak = 4.0\napproach_m_per_s = 0.2", false, &[("image", pad().into())])
-        }
+        _ => link::<ContactLimit>(
+            "force_n = 10.0\npeak_n = 4.0\napproach_m_per_s = 0.2",
+            false,
+            &[("image", pad().into())],
+        ),
     });
     made.collect()
 }
@@ -335,12 +337,12 @@ fn an_object_at_the_rim_counts_like_one_in_the_middle() {
 
 #[test]
 fn what_cannot_be() {
-    let contact = "force = 1.0\npeak = 2.0\napproach_m_per_s = 0.1";
+    let contact = "force_n = 1.0\npeak_n = 2.0\napproach_m_per_s = 0.1";
     let wires: [(&str, Shape); 2] = [("twist", TwistShape.into()), ("image", pad().into())];
     let mistakes = NodeRig::new::<ContactLimit>(contact, &wires).err().unwrap();
     assert_eq!(
         mistakes[0].message,
-        "`peak` is greater than `force`, so it would have no effect: one tactel is never above the sum"
+        "`peak_n` is greater than `force_n`, so it has no effect: one tactel is never above the sum"
     );
     let empty = BOX.replace("0.1, 0.1, 0.1]\nd", "0.1, -0.2, 0.1]\nd");
     let wires: [(&str, Shape); 2] = [("twist", TwistShape.into()), ("pose", PoseShape.into())];

@@ -54,7 +54,7 @@ fn port(name: &'static str, doc: &'static str) -> PortSpec {
 }
 
 fn param(name: &'static str, doc: &'static str, unit: Option<&'static str>) -> ParamSpec {
-    let declared = Declared { name, doc, unit, bounds: Some(Bounds::above(0.0)), is_live: false };
+    let declared = Declared { doc, unit, bounds: Some(Bounds::above(0.0)), ..Declared::new(name) };
     ParamSpec::of::<f64>(&declared, Some(|| 1.0))
 }
 
@@ -93,7 +93,7 @@ impl NodeType for Counter {
 impl Configured for Counter {
     fn build(self: Box<Self>, _: Given) -> Result<Built, Mistakes> {
         let outputs = vec![ScalarShape::of(Unit::METRE).within(0.0, 1000.0).into()];
-        Ok(Built { node: self, outputs, is_still: false })
+        Ok(Built { node: self, outputs, is_still: false, is_uncalibrated: false })
     }
 }
 

@@ -18,7 +18,7 @@ use super::mount::Mount;
 /// the "geometric" Jacobian of textbooks, which is taken at the tip.
 ///
 /// Model, tip and mount are facts of the arm's device. A graph that takes them from there fits any arm. The pose is
-/// that of the frame of the role `sensor`. The wire must have the joints of the model, in its order.
+/// that of the frame of the role `sensor`, in the frame `base` of the arm's role. The wire must have the joints of the model, in its order.
 ///
 /// ```toml
 /// [nodes.state]
@@ -46,16 +46,13 @@ pub struct Params {
     mount: Mount,
     /// Role of the sensor; names the frame of the pose.
     sensor: String,
-    /// Name of the frame at the root of the model.
-    #[param(default = "base")]
-    base: String,
 }
 
 /// What `arm_state` reads.
 #[derive(Inputs)]
 pub struct Inputs<'a> {
     /// Measured joint positions; those of prismatic joints are in m.
-    #[port(unit = "rad", robot = "R")]
+    #[port(unit = "rad", robot = "R", quantity = "position", known)]
     position: In<'a, Joints>,
 }
 
@@ -63,13 +60,13 @@ pub struct Inputs<'a> {
 #[derive(Outputs)]
 pub struct Outputs {
     /// The same positions, with the names and limits of the model's joints.
-    #[port(unit = "rad", robot = "R")]
+    #[port(unit = "rad", robot = "R", quantity = "position")]
     joints: Out<Joints>,
     /// Pose of the sensor in the base.
-    #[port(frame = "$sensor", reference = "$base")]
+    #[port(frame = "$sensor", reference = "R.base", quantity = "sensor_pose")]
     sensor_pose: Out<Pose>,
     /// Spatial Jacobian of the sensor in the base.
-    #[port(frame = "$base", robot = "R")]
+    #[port(frame = "R.base", robot = "R")]
     jacobian: Out<Jacobian>,
 }
 

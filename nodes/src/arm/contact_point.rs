@@ -37,22 +37,19 @@ pub struct Params {
     /// Height of the contact above the plane of the pad, along the sensor's z; negative if the foam is compressed.
     #[param(unit = "m", default = 0.0)]
     height: f64,
-    /// Name of the frame with its origin at the contact and the axes of the sensor.
-    #[param(default = "contact")]
-    frame: String,
 }
 
 /// What `contact_point` reads.
 #[derive(Inputs)]
 pub struct Inputs<'a> {
     /// Centre of the contact along the sensor's x, from the middle of the pad.
-    #[port(unit = "m", frame = "A")]
+    #[port(unit = "m", frame = "A", quantity = "x")]
     x: In<'a, Scalar>,
     /// Centre of the contact along the sensor's y, from the middle of the pad.
-    #[port(unit = "m", frame = "A")]
+    #[port(unit = "m", frame = "A", quantity = "y")]
     y: In<'a, Scalar>,
     /// Pose of the sensor in the base.
-    #[port(frame = "A", reference = "B", sampled)]
+    #[port(frame = "A", reference = "B", quantity = "sensor_pose", sampled)]
     pose: In<'a, Pose>,
 }
 
@@ -60,16 +57,16 @@ pub struct Inputs<'a> {
 #[derive(Outputs)]
 pub struct Outputs {
     /// The contact's x in the base.
-    #[port(unit = "m", frame = "B")]
+    #[port(unit = "m", frame = "B", quantity = "x")]
     x: Out<Scalar>,
     /// The contact's y in the base.
-    #[port(unit = "m", frame = "B")]
+    #[port(unit = "m", frame = "B", quantity = "y")]
     y: Out<Scalar>,
     /// The contact's z in the base.
-    #[port(unit = "m", frame = "B")]
+    #[port(unit = "m", frame = "B", quantity = "z")]
     z: Out<Scalar>,
     /// Position of the contact with the orientation of the sensor, in the base.
-    #[port(frame = "$frame", reference = "B")]
+    #[port(frame = "self", reference = "B")]
     pose: Out<Pose>,
 }
 

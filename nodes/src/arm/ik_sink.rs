@@ -73,13 +73,13 @@ pub struct Inputs<'a> {
     #[port(frame = "B")]
     twist: In<'a, Twist>,
     /// Pose of the sensor in the base.
-    #[port(frame = "S", reference = "B")]
+    #[port(frame = "S", reference = "B", quantity = "sensor_pose")]
     sensor_pose: In<'a, Pose>,
     /// Spatial Jacobian of the sensor in the base.
     #[port(frame = "B", robot = "R")]
     jacobian: In<'a, Jacobian>,
     /// Joint positions with their limits; those of prismatic joints are in m.
-    #[port(unit = "rad", robot = "R")]
+    #[port(unit = "rad", robot = "R", quantity = "position")]
     joints: In<'a, Joints>,
 }
 

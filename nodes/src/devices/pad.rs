@@ -1,7 +1,7 @@
 //! What every pad states: the role `tactile_pad`, its image and its facts.
 
 use tactflow_runtime::device::{Description, Output};
-use tactflow_runtime::signal::{Image, ImageShape};
+use tactflow_runtime::signal::{Image, ImageShape, Unit};
 
 use super::Facts;
 
@@ -12,12 +12,12 @@ pub(crate) fn fill(description: &mut Description, shape: ImageShape, facts: Fact
     pad.output("image", shape)
 }
 
-/// Returns the facts of a pad without dead tactels.
-pub(crate) fn facts(threshold: f64, pressure: f64, calibration: toml::Table) -> Facts {
+/// Returns the facts of a pad without dead tactels. The threshold is in `unit`, and the pressure in `unit` per tactel.
+pub(crate) fn facts(threshold: f64, pressure: f64, unit: Unit, calibration: toml::Table) -> Facts {
     vec![
         ("dead".into(), toml::Value::Array(vec![])),
-        ("threshold".into(), threshold.into()),
-        ("pressure".into(), pressure.into()),
+        ("threshold".into(), format!("{threshold} {unit}").into()),
+        ("pressure".into(), format!("{pressure} {}", unit.per_tactel()).into()),
         ("calibration".into(), calibration.into()),
     ]
 }

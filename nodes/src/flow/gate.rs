@@ -46,7 +46,7 @@ pub struct Gate<T>(PhantomData<T>);
 #[derive(Inputs)]
 pub struct Inputs<'a, T: Signal> {
     /// Passes while the gate is open.
-    #[port(unit = "U", frame = "A")]
+    #[port(unit = "U", frame = "A", quantity = "Q")]
     value: In<'a, T>,
     /// The gate is open while this is present and set.
     gate: Option<In<'a, Flag>>,
@@ -56,7 +56,7 @@ pub struct Inputs<'a, T: Signal> {
 #[derive(Outputs)]
 pub struct Outputs<T: Signal> {
     /// The same value while the gate is open; absent while it is shut.
-    #[port(unit = "U", frame = "A")]
+    #[port(unit = "U", frame = "A", quantity = "Q")]
     value: Out<T>,
 }
 

@@ -43,10 +43,10 @@ pub struct Switch<T>(PhantomData<T>);
 #[derive(Inputs)]
 pub struct Inputs<'a, T: Signal> {
     /// Passes while `select` is set.
-    #[port(unit = "U", frame = "A")]
+    #[port(unit = "U", frame = "A", quantity = "Q")]
     on: Option<In<'a, T>>,
     /// Passes while `select` is not set.
-    #[port(unit = "U", frame = "A")]
+    #[port(unit = "U", frame = "A", quantity = "Q")]
     off: Option<In<'a, T>>,
     /// Selects `on` while it is set, and `off` while it is not.
     select: Option<In<'a, Flag>>,
@@ -56,7 +56,7 @@ pub struct Inputs<'a, T: Signal> {
 #[derive(Outputs)]
 pub struct Outputs<T: Signal> {
     /// The selected input; absent while that input or `select` is absent.
-    #[port(unit = "U", frame = "A")]
+    #[port(unit = "U", frame = "A", quantity = "Q")]
     value: Out<T>,
 }
 

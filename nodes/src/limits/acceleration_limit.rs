@@ -75,7 +75,7 @@ impl Node for AccelerationLimit {
     type Outputs = Outputs;
     type State = State;
 
-    const LIMITS: Limits = Limits { through: Some("twist"), holds: &["acceleration"], breaks: &[] };
+    const LIMITS: Limits = Limits { through: Some("twist"), holds: &["acceleration"], ..Limits::NONE };
 
     fn new(params: Params, setup: &mut Setup<Self>) -> Result<Self, Mistakes> {
         setup.outputs.acceleration = fraction();

@@ -85,7 +85,8 @@ impl Node for Bumpless {
     const LIMITS: Limits = Limits {
         through: Some("twist"),
         holds: &["bumpless"],
-        breaks: &["force", "peak", "workspace", "speed", "acceleration"],
+        breaks: &["force", "peak", "workspace", "blind", "speed", "acceleration"],
+        ..Limits::NONE
     };
 
     fn new(params: Params, setup: &mut Setup<Self>) -> Result<Self, Mistakes> {

@@ -4,6 +4,7 @@
 //! that none is missing.
 
 pub mod acceleration_limit;
+pub mod blind_limit;
 pub mod bumpless;
 pub mod contact_limit;
 pub mod joint_limit;

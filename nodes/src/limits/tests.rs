@@ -17,7 +17,7 @@ use super::workspace_limit::WorkspaceLimit;
 const SPEEDS: &str = "linear_m_per_s = 0.05\nangular_rad_per_s = 0.8";
 const ACCELERATIONS: &str = "linear_m_per_s2 = 1.0\nangular_rad_per_s2 = 10.0";
 const BOX: &str = "min_m = [-0.1, -0.1, -0.1]\nmax_m = [0.1, 0.1, 0.1]\ndeceleration_m_per_s2 = 1.0";
-const CEILINGS: &str = "force = 10.0\npeak = 4.0\napproach_m_per_s = 0.2";
+const CEILINGS: &str = "force_n = 10.0\npeak_n = 4.0\napproach_m_per_s = 0.2";
 
 fn rig<N: Node>(params: &str) -> NodeRig {
     let pad = ImageShape { rows: 2, cols: 2, pitch: [0.01; 2], unit: Unit::NEWTON };

@@ -15,7 +15,7 @@ use crate::motion::bounds::scale_twist;
 /// ```toml
 /// [nodes.twist_limit]
 /// type = "twist_limit"
-/// in.twist = "workspace_limit.twist"
+/// in.twist = "blind_limit.twist"
 /// linear_m_per_s = 0.05
 /// angular_rad_per_s = 0.8
 /// ```
@@ -60,7 +60,8 @@ impl Node for TwistLimit {
     type Outputs = Outputs;
     type State = ();
 
-    const LIMITS: Limits = Limits { through: Some("twist"), holds: &["speed"], breaks: &["acceleration"] };
+    const LIMITS: Limits =
+        Limits { through: Some("twist"), holds: &["speed"], breaks: &["acceleration"], ..Limits::NONE };
 
     fn new(params: Params, setup: &mut Setup<Self>) -> Result<Self, Mistakes> {
         setup.outputs.speed = fraction();

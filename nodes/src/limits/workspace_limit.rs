@@ -67,7 +67,7 @@ pub struct Inputs<'a> {
     #[port(frame = "A")]
     twist: In<'a, Twist>,
     /// Pose of the sensor in the base.
-    #[port(frame = "A", reference = "B", sampled)]
+    #[port(frame = "A", reference = "B", quantity = "sensor_pose", known, sampled)]
     pose: In<'a, Pose>,
 }
 
@@ -89,7 +89,8 @@ impl Node for WorkspaceLimit {
     type State = ();
 
     // The pose and its age move on while a motion is held.
-    const LIMITS: Limits = Limits { through: Some("twist"), holds: &["workspace"], breaks: &["acceleration"] };
+    const LIMITS: Limits =
+        Limits { through: Some("twist"), holds: &["workspace"], breaks: &["acceleration"], ..Limits::NONE };
 
     fn new(params: Params, setup: &mut Setup<Self>) -> Result<Self, Mistakes> {
         let sides = ["x", "y", "z"].into_iter().zip(params.min_m.into_iter().zip(params.max_m));

@@ -54,7 +54,7 @@ pub struct Params {
 #[derive(Inputs)]
 pub struct Inputs<'a> {
     /// The measured features, each under its name.
-    #[port(unit = "_", frame = "A")]
+    #[port(unit = "_", frame = "A", quantity = "$wire")]
     feature: Many<'a, Scalar>,
 }
 

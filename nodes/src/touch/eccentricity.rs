@@ -45,7 +45,7 @@ pub struct Params {
 #[derive(Outputs)]
 pub struct Outputs {
     /// From 0 for a circle to 1 for a line; absent for a region without extent, such as a single tactel.
-    #[port(unit = "1", frame = "A")]
+    #[port(unit = "1", frame = "A", quantity = "eccentricity")]
     eccentricity: Out<Scalar>,
 }
 

@@ -36,13 +36,13 @@ pub struct PrincipalAxes {
 #[derive(Outputs)]
 pub struct Outputs {
     /// Standard deviation along the long axis.
-    #[port(unit = "m", frame = "A")]
+    #[port(unit = "m", frame = "A", quantity = "major")]
     major: Out<Scalar>,
     /// Standard deviation along the short axis.
-    #[port(unit = "m", frame = "A")]
+    #[port(unit = "m", frame = "A", quantity = "minor")]
     minor: Out<Scalar>,
     /// Direction of the long axis from +x toward +y, in (-pi/2, pi/2]; absent if the contact is round.
-    #[port(unit = "rad mod pi", frame = "A")]
+    #[port(unit = "rad mod pi", frame = "A", quantity = "orientation")]
     orientation: Out<Scalar>,
 }
 

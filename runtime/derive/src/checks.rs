@@ -6,16 +6,58 @@ use syn::{Attribute, DeriveInput, Ident, LitStr};
 
 use crate::attributes::Words;
 use crate::fault::{Faults, asserted, assertion};
-use crate::port::{ARGUMENTS, Port};
+use crate::port::{ARGUMENTS, Port, QUANTITY, is_letter};
 
-/// The letters that a port binds, or uses: of its unit and of its frames, each with its place.
-fn letters_of(port: &Port) -> impl Iterator<Item = (bool, char, &LitStr)> {
+/// What a letter stands for.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(crate) enum LetterKind {
+    Unit,
+    Frame,
+    Quantity,
+}
+
+impl LetterKind {
+    const ALL: [Self; 3] = [Self::Unit, Self::Frame, Self::Quantity];
+
+    fn of(argument: &str) -> Self {
+        match argument {
+            "unit" => Self::Unit,
+            QUANTITY => Self::Quantity,
+            _ => Self::Frame,
+        }
+    }
+
+    const fn name(self) -> &'static str {
+        match self {
+            Self::Unit => "unit",
+            Self::Frame => "frame",
+            Self::Quantity => "quantity",
+        }
+    }
+}
+
+impl ToTokens for LetterKind {
+    fn to_tokens(&self, tokens: &mut TokenStream) {
+        let variant = match self {
+            Self::Unit => quote!(Unit),
+            Self::Frame => quote!(Frame),
+            Self::Quantity => quote!(Quantity),
+        };
+        tokens.extend(quote!(::tactflow_runtime::node::LetterKind::#variant));
+    }
+}
+
+/// The letters that a port binds, or uses, each with its place.
+fn letters_of(port: &Port) -> impl Iterator<Item = (LetterKind, char, &LitStr)> {
     port.arguments.iter().filter_map(|(name, text)| {
-        let value = text.value();
+        let (value, kind) = (text.value(), LetterKind::of(name));
         let letter = value.chars().next().filter(char::is_ascii_uppercase)?;
-        let is_unit = *name == "unit";
-        let is_letter = if is_unit { is_unit_letter(&value) } else { value.len() == 1 };
-        is_letter.then_some((is_unit, letter, text))
+        let is_letter = match kind {
+            LetterKind::Unit => is_unit_letter(&value),
+            LetterKind::Frame => is_letter(value.split('.').next().unwrap_or_default()),
+            LetterKind::Quantity => is_letter(&value),
+        };
+        is_letter.then_some((kind, letter, text))
     })
 }
 
@@ -30,15 +72,10 @@ pub(crate) fn is_unit_letter(atom: &str) -> bool {
 /// so that it is imported with it.
 pub(crate) fn letters(input: &DeriveInput, ports: &[Port]) -> TokenStream {
     let (name, vis) = (&input.ident, &input.vis);
-    let of = |units: bool| -> String {
-        ports
-            .iter()
-            .flat_map(letters_of)
-            .filter(|(is_unit, ..)| *is_unit == units)
-            .map(|(_, letter, _)| letter)
-            .collect()
-    };
-    let (units, frames) = (of(true), of(false));
+    let letters = LetterKind::ALL.map(|of| -> String {
+        let all = ports.iter().flat_map(letters_of);
+        all.filter(|(kind, ..)| *kind == of).map(|(_, letter, _)| letter).collect()
+    });
     let has = |port: &Port, argument: &str| port.arguments.iter().any(|(name, _)| *name == argument);
     let says_all = |port: &Port| port.is_complete && (!port.is_generic || has(port, "unit") && has(port, "frame"));
     let is_complete = ports.iter().all(says_all);
@@ -47,7 +84,7 @@ pub(crate) fn letters(input: &DeriveInput, ports: &[Port]) -> TokenStream {
     quote! {
         #[doc(hidden)]
         #[allow(non_upper_case_globals, dead_code, unreachable_pub, reason = "it goes with the struct of that name")]
-        #vis const #name: ::tactflow_runtime::node::Letters = ::tactflow_runtime::node::Letters::of(#units, #frames, #is_complete #(&& #conditions)*);
+        #vis const #name: ::tactflow_runtime::node::Letters = ::tactflow_runtime::node::Letters::of([#(#letters),*], #is_complete #(&& #conditions)*);
     }
 }
 
@@ -59,18 +96,14 @@ pub(crate) fn inputs_beside(attributes: &[Attribute], attribute: &str, faults: &
 
 /// Checks that an input binds each letter of an output.
 pub(crate) fn bound(ports: &[Port], inputs: &Ident) -> TokenStream {
-    ports
-        .iter()
-        .flat_map(letters_of)
-        .map(|(is_unit, letter, text)| bound_letter(is_unit, letter, text, inputs))
-        .collect()
+    ports.iter().flat_map(letters_of).map(|(kind, letter, text)| bound_letter(kind, letter, text, inputs)).collect()
 }
 
 /// Checks that the struct `inputs` binds a letter.
-pub(crate) fn bound_letter(is_unit: bool, letter: char, text: &LitStr, inputs: &Ident) -> TokenStream {
-    let what = if is_unit { "unit" } else { "frame" };
+pub(crate) fn bound_letter(kind: LetterKind, letter: char, text: &LitStr, inputs: &Ident) -> TokenStream {
+    let what = kind.name();
     let inputs = Ident::new(&inputs.to_string(), inputs.span().located_at(text.span()));
-    let binds = quote!(#inputs.binds(#is_unit, #letter));
+    let binds = quote!(#inputs.binds(#kind, #letter));
     asserted(text, &binds, &format!("no input has the {what} letter `{letter}`, so it is not defined"))
 }
 

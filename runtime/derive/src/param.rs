@@ -8,11 +8,11 @@ use syn::{
 };
 
 use crate::attributes::{Words, snake_case};
-use crate::checks::{bound_letter, inputs_beside, is_unit_letter};
+use crate::checks::{LetterKind, bound_letter, inputs_beside, is_unit_letter};
 use crate::docs::text;
 use crate::fault::{Faults, asserted};
 
-const KNOWN: &[&str] = &["unit", "range", "above", "default", "live"];
+const KNOWN: &[&str] = &["unit", "range", "above", "default", "live", "from_bench"];
 
 /// One field of a table of parameters.
 struct Parameter {
@@ -24,6 +24,7 @@ struct Parameter {
     bounds_at: Option<Expr>,
     default: Option<Expr>,
     is_live: bool,
+    is_from_bench: bool,
 }
 
 pub(crate) fn derive(input: &DeriveInput) -> TokenStream {
@@ -92,6 +93,7 @@ fn parameter(field: Field, faults: &mut Faults) -> Option<Parameter> {
     }
     let mut words = Words::new(&field.attrs, "param", KNOWN, faults);
     let (unit, is_live) = (words.text("unit", faults), words.flag("live", faults).is_some());
+    let is_from_bench = words.flag("from_bench", faults).is_some();
     let (range, above) = (words.value("range", faults), words.value("above", faults));
     let default = words.value("default", faults).map(|(_, value)| value);
     if let (Some(_), Some((above, _))) = (&range, &above) {
@@ -103,7 +105,7 @@ fn parameter(field: Field, faults: &mut Faults) -> Option<Parameter> {
         (None, None) => None,
     };
     let bounds_at = range.or(above).map(|(_, value)| value);
-    Some(Parameter { field, name, unit, bounds, bounds_at, default, is_live })
+    Some(Parameter { field, name, unit, bounds, bounds_at, default, is_live, is_from_bench })
 }
 
 /// The bounds that a range such as `0.0..=1.0` or `0.0..` says.
@@ -124,11 +126,14 @@ fn between(range: &Expr, faults: &mut Faults) -> Option<TokenStream> {
 
 /// What is declared of a parameter beside its type and its default.
 fn declared(parameter: &Parameter) -> TokenStream {
-    let (name, doc, is_live) = (parameter.name.to_string(), text(&parameter.field.attrs), parameter.is_live);
+    let Parameter { is_live, is_from_bench, .. } = *parameter;
+    let (name, doc) = (parameter.name.to_string(), text(&parameter.field.attrs));
     let unit = option(parameter.unit.as_ref().map(|unit| quote!(#unit)));
     let bounds = option(parameter.bounds.clone());
     quote! {
-        ::tactflow_runtime::node::Declared { name: #name, doc: #doc, unit: #unit, bounds: #bounds, is_live: #is_live }
+        ::tactflow_runtime::node::Declared {
+            name: #name, doc: #doc, unit: #unit, bounds: #bounds, is_live: #is_live, is_from_bench: #is_from_bench
+        }
     }
 }
 
@@ -167,7 +172,7 @@ fn checks(parameter: &Parameter, input: &DeriveInput, inputs: &Ident) -> TokenSt
         );
         let is_unit = quote!(::tactflow_runtime::signal::Unit::is_param_unit(#unit));
         let letters = text.split(['/', ' ', ',']).filter(|atom| is_unit_letter(atom)).filter_map(|atom| atom.chars().next());
-        let letters = letters.map(|letter| bound_letter(true, letter, unit, inputs));
+        let letters = letters.map(|letter| bound_letter(LetterKind::Unit, letter, unit, inputs));
         letters.chain([asserted(unit, &is_unit, &message)]).collect::<TokenStream>()
     });
     quote! { #bounds #unit }

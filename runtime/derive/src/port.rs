@@ -4,15 +4,17 @@ use proc_macro2::{TokenStream, TokenTree};
 use quote::ToTokens;
 use syn::{DeriveInput, Field, GenericArgument, Ident, LitStr, PathArguments, Type};
 
-use crate::attributes::{Words, list};
+use crate::attributes::{Words, is_snake_case, list};
 use crate::docs::text;
 use crate::fault::Faults;
 
 /// The arguments of ports, and what each says.
 pub(crate) const ARGUMENTS: [&str; 4] = ["unit", "frame", "reference", "robot"];
+/// The argument that every port may have.
+pub(crate) const QUANTITY: &str = "quantity";
 const INPUT_WORDS: &[&str] =
-    &["unit", "frame", "reference", "robot", "optional", "present_if_wired", "sampled", "delayed"];
-const OUTPUT_WORDS: &[&str] = &["unit", "frame", "reference", "robot"];
+    &["unit", "frame", "reference", "robot", QUANTITY, "known", "optional", "present_if_wired", "sampled", "delayed"];
+const OUTPUT_WORDS: &[&str] = &["unit", "frame", "reference", "robot", QUANTITY];
 const INPUT_FORMS: &str = "an input is `In<'a, T>`, `Option<In<'a, T>>` or `Many<'a, T>`, where `T` is a signal";
 
 /// The closed set of signals, and the types that the first two stand for.
@@ -44,6 +46,7 @@ pub(crate) struct Port {
     pub(crate) is_present_if_wired: bool,
     pub(crate) is_sampled: bool,
     pub(crate) is_delayed: bool,
+    pub(crate) must_be_known: bool,
 }
 
 /// Reads the fields.
@@ -62,12 +65,12 @@ fn port(field: Field, is_input: bool, type_parameters: &[&Ident], faults: &mut F
     let known = if is_input { INPUT_WORDS } else { OUTPUT_WORDS };
     let mut words = Words::new(&field.attrs, "port", known, faults);
     let argument = |name: &'static str| Some((name, words.text(name, faults)?));
-    let arguments: Vec<_> = ARGUMENTS.into_iter().filter_map(argument).collect();
+    let arguments: Vec<_> = ARGUMENTS.into_iter().chain([QUANTITY]).filter_map(argument).collect();
     let flag = |word: &str, words: &mut Words, faults: &mut Faults| {
         if is_input { words.flag(word, faults) } else { None }
     };
-    let [optional, present_if_wired, sampled, delayed] =
-        ["optional", "present_if_wired", "sampled", "delayed"].map(|word| flag(word, &mut words, faults));
+    let [optional, present_if_wired, sampled, delayed, known] =
+        ["optional", "present_if_wired", "sampled", "delayed", "known"].map(|word| flag(word, &mut words, faults));
     let Some((form, signal)) = form(&field.ty).filter(|(form, _)| (*form == Form::Out) != is_input) else {
         let expected = if is_input { INPUT_FORMS } else { "an output is `Out<T>`, where `T` is a signal" };
         faults.fatal(&field.ty, expected);
@@ -85,6 +88,9 @@ fn port(field: Field, is_input: bool, type_parameters: &[&Ident], faults: &mut F
         return None;
     }
     combination(form, [&optional, &present_if_wired, &sampled, &delayed], faults);
+    if let Some(word) = known.as_ref().filter(|_| !arguments.iter().any(|(name, _)| *name == QUANTITY)) {
+        faults.add(word, "`known` needs the quantity that the input accepts: add `quantity = \"…\"`");
+    }
     arguments.iter().for_each(|(name, text)| argument_is_sound(name, text, &arguments, faults));
     Some(Port {
         is_generic: mentions(&signal.to_token_stream(), type_parameters),
@@ -97,6 +103,7 @@ fn port(field: Field, is_input: bool, type_parameters: &[&Ident], faults: &mut F
         is_present_if_wired: present_if_wired.is_some(),
         is_sampled: sampled.is_some(),
         is_delayed: delayed.is_some(),
+        must_be_known: known.is_some(),
         field,
     })
 }
@@ -136,20 +143,44 @@ fn combination(form: Form, words: [&Option<Ident>; 4], faults: &mut Faults) {
 
 /// Checks what needs no type: the frames, and two that only make sense together.
 fn argument_is_sound(name: &str, text: &LitStr, all: &[(&'static str, LitStr)], faults: &mut Faults) {
-    let value = text.value();
-    if name == "unit" {
-        return;
+    match name {
+        "unit" => {}
+        QUANTITY => quantity_is_sound(text, faults),
+        _ => frame_is_sound(name, text, all, faults),
     }
-    let plain = value.strip_prefix('$').unwrap_or(&value);
+}
+
+fn is_frame(argument: &str) -> bool {
+    !matches!(argument, "unit" | QUANTITY)
+}
+
+fn quantity_is_sound(text: &LitStr, faults: &mut Faults) {
+    let value = text.value();
+    if !(is_snake_case(&value) || is_letter(&value) || value == "$wire") {
+        faults.add(text, "a quantity is a name in snake_case, a capital letter, or `$wire` for the name of the wire");
+    }
+}
+
+fn frame_is_sound(name: &str, text: &LitStr, all: &[(&'static str, LitStr)], faults: &mut Faults) {
+    let value = text.value();
+    // The frame `base` of a robot is `R.base`.
+    let (whole, part) = value.split_once('.').unwrap_or((&value, "part"));
+    let plain = whole.strip_prefix('$').unwrap_or(whole);
     let is_name = !plain.is_empty() && plain.chars().all(|c| c.is_ascii_alphanumeric() || c == '_');
-    let is_letter = plain.len() == 1 && !value.starts_with('$');
-    if !is_name || (plain.starts_with(|c: char| c.is_ascii_uppercase()) && !is_letter) {
-        let message = "a frame is a capital letter, `_` for none, `self`, `$` with the name of a parameter, or a name";
+    let is_lowercase = !plain.starts_with(|c: char| c.is_ascii_uppercase());
+    if !is_name || !is_snake_case(part) || !(is_lowercase || is_letter(whole)) {
+        let message = "a frame is a capital letter, `_` for none, `self`, `$` with the name of a parameter, or a name; \
+                       `.` with a name is a part of it, as in `R.base`";
         faults.add(text, message);
     }
-    if name == "frame" && value == "_" && all.iter().any(|(name, text)| *name != "unit" && text.value() != "_") {
+    if name == "frame" && value == "_" && all.iter().any(|(name, text)| is_frame(name) && text.value() != "_") {
         faults.add(text, "a `reference` needs a `frame`: name the frame, or write `\"_\"` for both");
     }
+}
+
+/// Whether a text is a capital letter, which is a variable.
+pub(crate) fn is_letter(text: &str) -> bool {
+    text.len() == 1 && text.starts_with(|c: char| c.is_ascii_uppercase())
 }
 
 /// How the type of a field declares a port, and the type of its signal.

@@ -164,6 +164,7 @@ fn spec(port: &Port) -> TokenStream {
         matches!(port.form, Form::In | Form::OptionIn) && !port.is_optional && !port.is_present_if_wired;
     let must_be_present = port.form == Form::In || port.is_present_if_wired;
     let (is_trigger, is_many, is_delayed) = (!port.is_sampled, port.form == Form::Many, port.is_delayed);
+    let must_be_known = port.must_be_known;
     let need = match port.form {
         Form::Out => quote!(::tactflow_runtime::node::Need::REQUIRED),
         _ => quote! {
@@ -173,6 +174,7 @@ fn spec(port: &Port) -> TokenStream {
                 is_trigger: #is_trigger,
                 is_many: #is_many,
                 is_delayed: #is_delayed,
+                must_be_known: #must_be_known,
             }
         },
     };

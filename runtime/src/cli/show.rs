@@ -77,8 +77,8 @@ fn text(plan: &Compiled, has_colour: bool) -> String {
     for mode in &outline.modes {
         page.section(&format!("modes.{}", mode.name), &settings(&mode.settings), &[]);
     }
-    for node in &outline.nodes {
-        let outputs: Vec<String> = plan.outputs(&node.name).map(|port| format!("# {}", carried(port))).collect();
+    for (node, planned) in outline.nodes.iter().zip(&plan.plan.nodes) {
+        let outputs: Vec<String> = planned.ports.iter().map(|port| format!("# {}", carried(port))).collect();
         page.section(&format!("nodes.{}", node.name), &block(node), &outputs);
     }
     page.section("bind", &roles.iter().map(|role| word(&role.name, &role.device)).collect::<Vec<_>>(), &[]);
@@ -111,6 +111,8 @@ fn assignment(setting: &Setting) -> Assignment {
         ValueOrigin::Default => "default".to_owned(),
         ValueOrigin::Fact { fact, place } => format!("fact {fact} ({})", at(place)),
     };
+    let as_written = setting.written.as_ref().map(|value| format!(", written {}", written(value)));
+    let origin = origin + as_written.as_deref().unwrap_or_default();
     let (path, tall) = (path(&setting.path), tall(&setting.value));
     let text = if tall.is_some() { "[".to_owned() } else { written(&setting.value) };
     Assignment { text: format!("{path} = {text}"), origin, below: tall.map(|lines| lines + "\n]").unwrap_or_default() }

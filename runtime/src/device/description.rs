@@ -4,7 +4,7 @@ use std::borrow::Cow;
 use std::marker::PhantomData;
 
 use super::RoleType;
-use crate::signal::{JointsShape, Kind, Shape, Signal};
+use crate::signal::{JointsShape, Kind, Shape, Signal, Unit};
 
 /// A name that is written in the source or made at load.
 type Name = Cow<'static, str>;
@@ -23,7 +23,7 @@ type Name = Cow<'static, str>;
 /// let mut description = Description::every(0.004);
 /// let mut pad = description.fills("tactile_pad");
 /// let image = pad.output::<Image>("image", shape);
-/// pad.fact("threshold", 0.015);
+/// pad.fact_in("threshold", 0.015, Unit::NEWTON);
 /// # let _ = image;
 /// ```
 #[derive(Debug, Clone)]
@@ -144,6 +144,11 @@ impl Fill<'_> {
     /// States a fact, which a graph file may use: `threshold = { from = "pad.threshold" }`.
     pub fn fact(&mut self, name: impl Into<Name>, value: impl Into<toml::Value>) {
         self.description.fills[self.index].facts.push((name.into(), value.into()));
+    }
+
+    /// States a fact with its unit. A parameter of another dimension does not accept it.
+    pub fn fact_in(&mut self, name: impl Into<Name>, number: f64, unit: Unit) {
+        self.fact(name, format!("{number} {unit}"));
     }
 
     /// States several facts.

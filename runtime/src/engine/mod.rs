@@ -8,4 +8,4 @@ mod session;
 
 pub(crate) use self::core::NodeRunner;
 pub use self::core::{Counters, ModeChange, Timing};
-pub use session::{Display, End, Engine, Halt, Interrupt, Logged, Outcome, RunOptions, run, run_virtual};
+pub use session::{Display, End, Engine, Halt, Interrupt, Logged, Outcome, Rest, RunOptions, run, run_virtual};

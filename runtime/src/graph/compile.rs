@@ -1,5 +1,7 @@
 //! Compiles a request into a plan, or into all its diagnostics.
 
+use std::cell::RefCell;
+
 use crate::catalogue::Catalogue;
 use crate::graph::bench::{self, OpenedBench};
 use crate::graph::build::{Builder, BuiltModes, build_modes};
@@ -23,7 +25,7 @@ pub fn compile(catalogue: &Catalogue, request: &Request) -> Result<Compiled, Rep
 /// Compiles a graph with a loader that may have read other files before.
 pub(crate) fn compile_in(mut loader: Loader, catalogue: &Catalogue, request: &Request) -> Result<Compiled, Report> {
     let flat = loader.load(request);
-    let Loader { mut sources, mut diagnostics, .. } = loader;
+    let Loader { mut sources, mut diagnostics, mut measured, .. } = loader;
     let is_unreadable = diagnostics
         .iter()
         .any(|d| matches!(d.code, Code::Syntax | Code::Unreadable | Code::EndlessPart | Code::WrongFile));
@@ -40,6 +42,8 @@ pub(crate) fn compile_in(mut loader: Loader, catalogue: &Catalogue, request: &Re
     check::policy::check(&net, &mut diagnostics);
     let view = check::view::check(&net, &mut diagnostics);
     let mut frames = check::frames::check(&net, &mut diagnostics);
+    check::quantities::check(&net, &mut diagnostics);
+    check::facts::check(&net, &mut diagnostics);
     check::limits::check(&net, &mut frames, &mut diagnostics);
     check::limit_values::check(&net, &sources, &mut diagnostics);
     let clock = check::clock::check(&net, &opened, &mut diagnostics);
@@ -47,6 +51,7 @@ pub(crate) fn compile_in(mut loader: Loader, catalogue: &Catalogue, request: &Re
     let mut builder = Builder::new(&net, &opened, frames, (diagnostics, sources), period);
     let mut nodes: Vec<PlannedNode> = net.order.iter().filter_map(|node| builder.node(*node)).collect();
     builder.check_delayed_units();
+    check::calibration::check(&net, &nodes, &mut builder.diagnostics);
     view.check_units(&builder.ports, &mut builder.diagnostics);
     let modes = build_modes(&mut builder, &mut nodes);
     let modes = check_modes(&net, modes, &mut builder.diagnostics);
@@ -55,14 +60,24 @@ pub(crate) fn compile_in(mut loader: Loader, catalogue: &Catalogue, request: &Re
     let policy = flat.policy.as_ref().and_then(|(_, policy)| policy.clone()).unwrap_or_default();
     let roles = builder.plan_roles(&policy);
     let ports = std::mem::take(&mut builder.ports);
-    let (diagnostics, sources) = builder.finish();
+    let (diagnostics, sources, of_nodes) = builder.finish();
+    measured.extend(of_nodes);
     let Some((clock, _)) = clock.filter(|_| diagnostics.is_empty()) else {
         let diagnostics = check::parts::move_out(&flat, &sources, diagnostics);
         return Err(Report::new(sources, diagnostics));
     };
     log_plan(&nodes, &opened, &sources);
     let max_gap = max_gap(flat.table.as_ref(), period);
-    let outline = OutlineBuilder { net: &net, opened: &opened, sources: &sources, nodes: &nodes, period, max_gap };
+    let outline = OutlineBuilder {
+        net: &net,
+        opened: &opened,
+        sources: &sources,
+        nodes: &nodes,
+        measured: &measured,
+        period,
+        max_gap,
+        defaults: RefCell::default(),
+    };
     let outline = outline.build();
     let mut warnings = Diagnostics::new();
     check::unused::check(&net, view.sources(), &mut warnings);
@@ -78,10 +93,11 @@ pub(crate) fn compile_in(mut loader: Loader, catalogue: &Catalogue, request: &Re
 
 /// Checks the modes together, and returns them with the start mode.
 fn check_modes(net: &Net<'_>, built: BuiltModes, diagnostics: &mut Diagnostics) -> Option<PlannedModes> {
-    let BuiltModes { modes, still, demand, freezes } = built;
-    check::absent::check(net, &modes, &demand, &freezes, diagnostics);
+    let BuiltModes { modes, still, still_changes, demand, demand_changes, freezes } = built;
+    let reads = |mode: usize, node: usize, port: usize| demand.of(node, &demand_changes[mode])[port];
+    check::absent::check(net, &modes, &reads, &freezes, diagnostics);
     check::overlap::check(net, &modes, diagnostics);
-    check::motion::check(net, &modes, &still, diagnostics);
+    check::motion::check(net, &modes, &still, &still_changes, diagnostics);
     let start = check::reachability::check(net, diagnostics)?;
     Some(PlannedModes { modes, start })
 }

@@ -1,12 +1,15 @@
 //! The outline of a graph, for `show`: parts are expanded, and every value has its origin in a file, a default or a
 //! fact.
 
+use std::cell::RefCell;
+use std::collections::BTreeMap;
 use std::ops::Range;
 use std::path::Path;
 
 use serde::Serialize;
 
 use crate::graph::bench::{OpenedBench, fill_facts};
+use crate::graph::load::MeasuredValues;
 use crate::graph::net::{CommandWire, Net, Wire, WireOrigin};
 use crate::graph::plan::{PlannedNode, PlannedPort, PortRef};
 use crate::graph::syntax::{Block, GraphTable, ModeBlock, PolicyTable};
@@ -121,8 +124,11 @@ pub struct OutlinedPort {
 pub struct Setting {
     /// Dotted path in its block.
     pub path: String,
-    /// The value.
+    /// The value, with numbers in the units of their parameters.
     pub value: Value,
+    /// The value as written, if it has numbers with units.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub written: Option<Value>,
     /// Where it comes from.
     #[serde(flatten)]
     pub origin: ValueOrigin,
@@ -155,10 +161,14 @@ pub(crate) struct OutlineBuilder<'a> {
     pub(crate) sources: &'a SourceMap,
     /// The nodes, in the order in which they step.
     pub(crate) nodes: &'a [PlannedNode],
+    /// The values of sections and of nodes that were written with a unit.
+    pub(crate) measured: &'a MeasuredValues,
     /// Nominal time between two ticks [s].
     pub(crate) period: f64,
     /// Longest time between two samples that counts as one step [s].
     pub(crate) max_gap: f64,
+    /// The default values by their texts.
+    pub(crate) defaults: RefCell<BTreeMap<String, Value>>,
 }
 
 impl OutlineBuilder<'_> {
@@ -171,31 +181,30 @@ impl OutlineBuilder<'_> {
             settings: self.graph(),
             roles: self.roles(),
             commands: self.net.commands.iter().map(command).collect(),
-            policy: self.table(policy.and_then(Value::as_table), &PolicyTable::fields(), ""),
+            policy: self.table(policy.and_then(Value::as_table), &PolicyTable::fields(), "", None),
             modes: flat.modes.iter().map(|mode| self.mode(mode)).collect(),
             nodes: self.nodes.iter().filter_map(|node| self.node(node)).collect(),
-            devices: self.opened.devices.iter().filter_map(|device| self.device(&device.name)).collect(),
+            devices: self.devices(),
         }
     }
 
     fn graph(&self) -> Vec<Setting> {
         let given = self.net.flat.settings.as_ref().and_then(Value::as_table);
-        let mut settings = self.table(given, &GraphTable::fields(), "");
+        let mut settings = self.table(given, &GraphTable::fields(), "", None);
         settings.retain(|setting| setting.path != "bench");
         if !settings.iter().any(|setting| setting.path == "max_gap_ms") {
             // A whole number of microseconds, so that no digits are there by chance.
             let gap = Value { span: NO_SPAN, item: Item::Float((self.max_gap * 1e6).round() * 1e-3) };
-            settings.push(Setting { path: "max_gap_ms".into(), value: gap, origin: ValueOrigin::Default });
+            settings.push(Setting::default_of("max_gap_ms".into(), gap));
         }
         settings
     }
 
     fn roles(&self) -> Vec<OutlinedRole> {
-        let bind = self.net.flat.bench.iter().flat_map(|bench| &bench.bind);
-        let device = |role: &str| bind.clone().find(|(key, _)| key.name == role).map(|(_, word)| word.clone());
+        let device = |role: &str| self.net.flat.bench.as_ref()?.bind.get(role);
         let roles = self.net.flat.roles.iter();
         let role = |(key, kind): &(Key, Spanned<String>)| {
-            let device = self.word(&device(&key.name)?);
+            let device = self.word(device(&key.name)?);
             Some(OutlinedRole { name: key.name.clone(), kind: self.word(kind), device })
         };
         roles.filter_map(role).collect()
@@ -207,7 +216,12 @@ impl OutlineBuilder<'_> {
         let wire = |wire: &Wire| self.wire(wire.key.name.clone(), wire.source, &wire.origin);
         let wires = self.net.wires[planned.index].iter().map(wire).collect();
         let outputs = planned.ports.iter().map(OutlinedPort::of).collect();
-        Some(OutlinedBlock { name: node.name.clone(), wires, outputs, ..self.block(&node.block, &spec.params)? })
+        Some(OutlinedBlock {
+            name: node.name.clone(),
+            wires,
+            outputs,
+            ..self.block(&node.block, &spec.params, Some(planned.index))?
+        })
     }
 
     fn wire(&self, name: String, source: PortRef, origin: &WireOrigin) -> OutlinedWire {
@@ -224,46 +238,48 @@ impl OutlineBuilder<'_> {
         OutlinedWord { text: word.value.clone(), place: self.sources.location(&word.span) }
     }
 
-    fn device(&self, name: &str) -> Option<OutlinedBlock> {
-        let bench = self.net.flat.bench.as_ref()?;
-        let block = bench.devices.iter().find(|device| device.key.name == name)?;
-        let kind = block.kind.as_ref()?;
-        let known = self.net.catalogue.find_device(&kind.value)?;
-        self.block(block, &known.params())
+    fn devices(&self) -> Vec<OutlinedBlock> {
+        let blocks = self.net.flat.bench.iter().flat_map(|bench| &bench.devices);
+        let blocks: BTreeMap<&str, &Block> = blocks.map(|block| (block.key.name.as_str(), block)).collect();
+        self.opened.devices.iter().filter_map(|device| self.device(blocks.get(&*device.name)?)).collect()
     }
 
-    fn block(&self, block: &Block, specs: &[ParamSpec]) -> Option<OutlinedBlock> {
+    fn device(&self, block: &Block) -> Option<OutlinedBlock> {
+        let kind = block.kind.as_ref()?;
+        let known = self.net.catalogue.find_device(&kind.value)?;
+        self.block(block, &known.params(), None)
+    }
+
+    fn block(&self, block: &Block, specs: &[ParamSpec], node: Option<usize>) -> Option<OutlinedBlock> {
         Some(OutlinedBlock {
             name: block.key.name.clone(),
             place: self.sources.location(&block.key.span),
             kind: self.word(block.kind.as_ref()?),
             wires: Vec::new(),
-            settings: self.table(block.params.as_table(), specs, ""),
+            settings: self.table(block.params.as_table(), specs, "", node),
             outputs: Vec::new(),
         })
     }
 
     /// The settings of a table: what is given, and the defaults of what is not.
-    fn table(&self, given: Option<&Table>, specs: &[ParamSpec], path: &str) -> Vec<Setting> {
+    fn table(&self, given: Option<&Table>, specs: &[ParamSpec], path: &str, node: Option<usize>) -> Vec<Setting> {
         let mut settings = Vec::new();
         for spec in specs {
             let path = format!("{path}{}", spec.name);
             match given.and_then(|table| table.get(spec.name)) {
-                Some(value) => settings.extend(self.value(value, spec, path)),
-                None => {
-                    settings.extend(default(spec).map(|value| Setting { path, value, origin: ValueOrigin::Default }))
-                }
+                Some(value) => settings.extend(self.value(value, spec, path, node)),
+                None => settings.extend(self.default(spec).map(|value| Setting::default_of(path, value))),
             }
         }
         let is_declared = |name: &str| specs.iter().any(|spec| spec.name == name);
         // A node that is known only at run time may take more than it declares.
         let more = given.iter().flat_map(|table| &table.entries).filter(|(key, _)| !is_declared(&key.name));
-        settings.extend(more.map(|(key, value)| self.setting(value, format!("{path}{}", key.name))));
+        settings.extend(more.map(|(key, value)| self.setting(value, format!("{path}{}", key.name), node)));
         settings
     }
 
-    fn value(&self, value: &Value, spec: &ParamSpec, path: String) -> Vec<Setting> {
-        let fields = |table: &Table, path: &str| self.table(Some(table), &spec.fields, &format!("{path}."));
+    fn value(&self, value: &Value, spec: &ParamSpec, path: String, node: Option<usize>) -> Vec<Setting> {
+        let fields = |table: &Table, path: &str| self.table(Some(table), &spec.fields, &format!("{path}."), node);
         match (value.as_section(), spec.repeats) {
             (Some(table), Repeats::Once) if !spec.fields.is_empty() => fields(table, &path),
             (Some(section), Repeats::PerName) => {
@@ -271,25 +287,25 @@ impl OutlineBuilder<'_> {
                     let path = format!("{path}.{}", key.name);
                     match value.as_section().filter(|_| !spec.fields.is_empty()) {
                         Some(table) => fields(table, &path),
-                        None => vec![self.setting(value, path)],
+                        None => vec![self.setting(value, path, node)],
                     }
                 };
                 section.entries.iter().flat_map(entry).collect()
             }
             _ => {
-                let mut setting = self.setting(value, path);
+                let mut setting = self.setting(value, path, node);
                 self.resolve(&mut setting, spec);
-                complete(&mut setting.value, spec);
+                self.complete(&mut setting.value, spec);
                 vec![setting]
             }
         }
     }
 
     /// A value as it was written, or the fact that it asks for.
-    fn setting(&self, value: &Value, path: String) -> Setting {
-        let word = value.as_table().and_then(Table::fact).map(|(word, _)| word);
+    fn setting(&self, value: &Value, path: String, node: Option<usize>) -> Setting {
+        let word = value.as_table().and_then(Table::fact).map(|fact| fact.word);
         let role = word.and_then(|word| word.split_once('.'));
-        let role = role.and_then(|(role, _)| self.net.flat.role_names().position(|name| name == role));
+        let role = role.and_then(|(role, _)| self.net.flat.roles.position(role));
         let mut filled = value.clone();
         // The graph has no mistakes, so every fact is there.
         fill_facts(&mut filled, self.net, self.opened, &mut Diagnostics::new());
@@ -302,7 +318,17 @@ impl OutlineBuilder<'_> {
             // A value from [limits] keeps its place there.
             _ => ValueOrigin::Written { place: self.sources.location(&filled.span) },
         };
-        Setting { path, value: filled, origin }
+        self.in_units(Setting { path, value: filled, written: None, origin }, node)
+    }
+
+    /// Replaces the numbers that were written with a unit by those that were read.
+    fn in_units(&self, mut setting: Setting, node: Option<usize>) -> Setting {
+        let written = setting.value.clone();
+        for values in [self.measured, &self.opened.measured] {
+            values.replace_texts(&mut setting.value, node);
+        }
+        let is_of_a_file = matches!(setting.origin, ValueOrigin::Written { .. });
+        Setting { written: Some(written).filter(|written| is_of_a_file && *written != setting.value), ..setting }
     }
 
     /// The path of a file, which stands relative to the file it is written in, as seen from the working folder.
@@ -312,6 +338,31 @@ impl OutlineBuilder<'_> {
         {
             *text = self.sources.path(text, setting.value.span.start).display().to_string();
         }
+    }
+
+    /// Fills the defaults into the tables of a list.
+    fn complete(&self, value: &mut Value, spec: &ParamSpec) {
+        let Item::Array(items) = &mut value.item else { return };
+        for item in items {
+            let Item::Table(table) = &mut item.item else { continue };
+            for field in &spec.fields {
+                let default = self.default(field).filter(|_| table.get(field.name).is_none());
+                let key = Key { name: field.name.to_owned(), span: NO_SPAN };
+                table.entries.extend(default.map(|value| (key, Value { span: NO_SPAN, ..value })));
+            }
+        }
+    }
+
+    /// Returns the default of a parameter as a value; none if nothing is set. Each text is parsed once.
+    fn default(&self, spec: &ParamSpec) -> Option<Value> {
+        let text = spec.default.as_deref()?;
+        let mut defaults = self.defaults.borrow_mut();
+        if let Some(value) = defaults.get(text) {
+            return Some(value.clone());
+        }
+        let value = parse_default(text);
+        defaults.insert(text.to_owned(), value.clone());
+        Some(value)
     }
 
     fn mode(&self, block: &ModeBlock) -> OutlinedMode {
@@ -335,9 +386,16 @@ impl OutlineBuilder<'_> {
             }
             None => {
                 let origin = ValueOrigin::Written { place: self.sources.location(&value.span) };
-                settings.push(Setting { path: path.to_owned(), value: value.clone(), origin });
+                let setting = Setting { path: path.to_owned(), value: value.clone(), written: None, origin };
+                settings.push(self.in_units(setting, None));
             }
         }
+    }
+}
+
+impl Setting {
+    fn default_of(path: String, value: Value) -> Self {
+        Self { path, value, written: None, origin: ValueOrigin::Default }
     }
 }
 
@@ -352,24 +410,10 @@ impl OutlinedPort {
     }
 }
 
-/// Fills the defaults into the tables of a list.
-fn complete(value: &mut Value, spec: &ParamSpec) {
-    let Item::Array(items) = &mut value.item else { return };
-    for item in items {
-        let Item::Table(table) = &mut item.item else { continue };
-        for field in &spec.fields {
-            let default = default(field).filter(|_| table.get(field.name).is_none());
-            let key = Key { name: field.name.to_owned(), span: NO_SPAN };
-            table.entries.extend(default.map(|value| (key, Value { span: NO_SPAN, ..value })));
-        }
-    }
-}
-
-/// The default of a parameter as a value; none if nothing is set.
-fn default(spec: &ParamSpec) -> Option<Value> {
-    let text = spec.default.as_ref()?;
+/// Parses the text of a default.
+fn parse_default(text: &str) -> Value {
     let mut sources = SourceMap::default();
     let parsed = parse_table(sources.add_file(Path::new("default"), format!("value = {text}")));
     let value = parsed.ok().and_then(|value| value.as_table()?.get("value").cloned());
-    Some(value.unwrap_or_else(|| Value { span: NO_SPAN, item: Item::String(text.clone()) }))
+    value.unwrap_or_else(|| Value { span: NO_SPAN, item: Item::String(text.to_owned()) })
 }

@@ -75,6 +75,8 @@ pub struct Built {
     pub outputs: Vec<Shape>,
     /// Whether the node starts no motion by itself; see [`Setup`].
     pub is_still: bool,
+    /// Whether its limits are in raw readings; see [`Setup`].
+    pub is_uncalibrated: bool,
 }
 
 /// A node that can run.
@@ -146,12 +148,14 @@ struct WithParams<N: Node>(N::Params);
 impl<N: Node> Configured for WithParams<N> {
     fn build(self: Box<Self>, given: Given) -> Result<Built, Mistakes> {
         let inputs = <N::Inputs<'static> as InputSet<'static>>::shapes(given.inputs);
-        let mut setup = Setup::<N> { inputs, outputs: Default::default(), period: given.period, is_still: false };
+        let (outputs, period) = (Default::default(), given.period);
+        let mut setup = Setup::<N> { inputs, outputs, period, is_still: false, is_uncalibrated: false };
         let node = N::new(self.0, &mut setup)?;
-        let (outputs, is_still) = (N::Outputs::into_shapes(setup.outputs), setup.is_still);
+        let Setup { is_still, is_uncalibrated, .. } = setup;
+        let outputs = N::Outputs::into_shapes(setup.outputs);
         let state = node.state();
         let cell = Cell { active: Configuration { fresh: node.state(), node }, state, parked: vec![None], number: 0 };
-        Ok(Built { node: Box::new(cell), outputs, is_still })
+        Ok(Built { node: Box::new(cell), outputs, is_still, is_uncalibrated })
     }
 }
 

@@ -13,11 +13,13 @@ pub struct Limits {
     pub holds: &'static [&'static str],
     /// The limits of the input that the output may violate. They must come later.
     pub breaks: &'static [&'static str],
+    /// The flag that is set once a budget of the limiter is spent, so that its arm rests until the budget is refilled.
+    pub spends: Option<&'static str>,
 }
 
 impl Limits {
     /// No limit holds. Most nodes use it.
-    pub const NONE: Self = Self { through: None, holds: &[], breaks: &[] };
+    pub const NONE: Self = Self { through: None, holds: &[], breaks: &[], spends: None };
 
     /// The limits of an input hold for the outputs, and no others; for example in a change of frame.
     #[must_use]

@@ -6,7 +6,7 @@
 //! | Derive | implements | reads |
 //! |---|---|---|
 //! | `#[derive(Describe)]` | [`Describe`](trait@Describe) | the name, the doc comment, `#[describe(name = "…", every_tick, logs)]` |
-//! | `#[derive(Param)]` | [`Param`](trait@Param) for a table or a word | `#[param(unit = "…", range = …, above = …, default = …, live)]` |
+//! | `#[derive(Param)]` | [`Param`](trait@Param) for a table or a word | `#[param(unit = "…", range = …, above = …, default = …, live, from_bench)]` |
 //! | `#[derive(Inputs)]` | [`InputSet`] | `#[port(unit = "…", frame = "…", …)]` |
 //! | `#[derive(Outputs)]` | [`OutputSet`] | the same |
 //! | `#[derive(State)]` | [`Default`]; [`Clone`], field by field, so that a reset does not allocate | |
@@ -31,6 +31,10 @@
 //! `Regions`), `frame` (`Mask`, `Twist`), `frame` and `reference` (`Pose`), `unit` and `robot` (`Joints`), `frame` and
 //! `robot` (`Jacobian`), nothing (`Flag`). A capital letter is a variable: its value is known when the graph is loaded,
 //! and is the same for all ports of the node. `"$name"` is the frame or unit that the parameter `name` holds.
+//!
+//! Any port may declare its `quantity`, which tells apart what kind, unit and frame do not: `position` is not
+//! `equilibrium`. A capital letter passes a quantity through. A port without one outputs an unknown quantity and accepts
+//! any. An input with `known` refuses an unknown quantity too.
 
 mod bounds;
 mod bus;
@@ -39,7 +43,9 @@ mod declare;
 mod erased;
 mod file_path;
 mod inputs;
+mod known_units;
 mod limits;
+mod measured;
 mod mistake;
 mod outputs;
 mod param_spec;
@@ -56,14 +62,16 @@ pub use bus_access::ScalarId;
 pub use erased::{AnyNode, Built, Configured, Given, NodeSpec, NodeType, of};
 pub use file_path::FilePath;
 pub use inputs::{In, InputSet, Many, View};
+pub use known_units::KnownUnits;
 pub use limits::{Components, Limits};
+pub(crate) use measured::Amount;
 pub use mistake::{At, Mistake, Mistakes, collect_both, refuse_any};
 pub use outputs::{Out, OutputSet};
 pub use param_spec::{Contents, Declared, ParamSpec, Repeats, Written, written_table};
 pub use params::{Map, Spanned};
 pub(crate) use pattern::{UnitPattern, declares_a_unit, frame_args, may_fit, unit_pattern};
-pub use ports::{Letters, Need, PortSpec};
-pub use reader::{Param, Reader, read_leaf};
+pub use ports::{LetterKind, Letters, Need, PortSpec};
+pub use reader::{Measured, Param, Reader, read_leaf};
 pub use tactflow_derive::{Describe, Inputs, Outputs, Param, State};
 pub use tick::Tick;
 pub use time::{Absence, Interval};
@@ -146,4 +154,7 @@ pub struct Setup<N: Node> {
     /// Set by a generator whose parameters cause no motion. A node whose output is computed from samples leaves it
     /// `false`.
     pub is_still: bool,
+    /// Set by a limiter whose limits are in raw readings, so that nothing is limited in newtons. The bench must allow
+    /// it.
+    pub is_uncalibrated: bool,
 }

@@ -38,6 +38,8 @@ pub struct ParamSpec {
     pub fields: Vec<ParamSpec>,
     /// Whether a mode can set it while the graph runs.
     pub is_live: bool,
+    /// Whether only a fact can set it, which the bench states and the task cannot.
+    pub is_from_bench: bool,
     /// Why the reader refuses the default. The catalogue does not accept such a node.
     pub fault: Option<String>,
 }
@@ -86,13 +88,15 @@ pub struct Declared {
     pub bounds: Option<Bounds>,
     /// Whether a mode can set it.
     pub is_live: bool,
+    /// Whether only a fact can set it, which the bench states and the task cannot.
+    pub is_from_bench: bool,
 }
 
 impl Declared {
     /// Declares only the name.
     #[must_use]
     pub const fn new(name: &'static str) -> Self {
-        Self { name, doc: "", unit: None, bounds: None, is_live: false }
+        Self { name, doc: "", unit: None, bounds: None, is_live: false, is_from_bench: false }
     }
 }
 

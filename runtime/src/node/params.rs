@@ -185,7 +185,13 @@ impl<T: Param> Param for Vec<T> {
         let Item::Array(items) = &value.item else {
             return reader.wrong_type(value, Self::EXPECTS);
         };
-        let read: Vec<Option<T>> = items.iter().map(|item| T::read(item, reader)).collect();
+        let outer = reader.entry;
+        let mut read: Vec<Option<T>> = Vec::with_capacity(items.len());
+        for (i, item) in items.iter().enumerate() {
+            reader.entry = Some((i, items.len()));
+            read.push(T::read(item, reader));
+        }
+        reader.entry = outer;
         read.into_iter().collect()
     }
 
@@ -240,8 +246,13 @@ impl<T: Param> Param for Map<T> {
         let Item::Table(table) = &value.item else {
             return reader.wrong_type(value, Self::EXPECTS);
         };
-        let read = |(key, value): &(Key, Value)| Some((key.name.clone(), T::read(value, reader)?));
+        let outer = reader.component.take();
+        let read = |(key, value): &(Key, Value)| {
+            reader.component = Some(key.name.clone());
+            Some((key.name.clone(), T::read(value, reader)?))
+        };
         let entries: Vec<Option<(String, T)>> = table.entries.iter().map(read).collect();
+        reader.component = outer;
         entries.into_iter().collect::<Option<_>>().map(Self)
     }
 

@@ -54,7 +54,17 @@ pub(crate) fn may_fit(output: &PortSpec, input: &PortSpec) -> bool {
     let is_fixed = |frame: &str| frame != "self" && frame.starts_with(|c: char| c.is_ascii_lowercase());
     let frames = frame_args(output).iter().zip(frame_args(input));
     let do_frames_fit = frames.into_iter().all(|(a, b)| a == b || !is_fixed(a) || !is_fixed(b));
-    output.kind == input.kind && units && do_frames_fit
+    output.kind == input.kind && units && do_frames_fit && may_quantity_fit(output, input)
+}
+
+/// Whether a port's quantity can be the one that an input accepts. A variable may be any.
+fn may_quantity_fit(output: &PortSpec, input: &PortSpec) -> bool {
+    let is_name = |quantity: &&str| quantity.starts_with(|c: char| c.is_ascii_lowercase());
+    match (output.quantity.as_deref(), input.quantity.as_deref().filter(is_name)) {
+        (Some(has), Some(takes)) => !is_name(&has) || has == takes,
+        (None, Some(_)) => !input.need.must_be_known,
+        (_, None) => true,
+    }
 }
 
 /// The frames among a port's arguments.

@@ -18,12 +18,20 @@ pub struct Need {
     /// Whether the node reads the value of the last tick. Such an input wakes the node, one tick late, only if no other
     /// input does. Its shape is unknown when the node is built, except for a flag: `Some` if it is wired.
     pub is_delayed: bool,
+    /// Whether it accepts only a port whose quantity is known; see [`PortSpec::quantity`].
+    pub must_be_known: bool,
 }
 
 impl Need {
     /// Must be wired and present, and wakes the node.
-    pub const REQUIRED: Self =
-        Self { must_be_wired: true, must_be_present: true, is_trigger: true, is_many: false, is_delayed: false };
+    pub const REQUIRED: Self = Self {
+        must_be_wired: true,
+        must_be_present: true,
+        is_trigger: true,
+        is_many: false,
+        is_delayed: false,
+        must_be_known: false,
+    };
     /// May be unwired or absent, and wakes the node.
     pub const OPTIONAL: Self = Self { must_be_wired: false, must_be_present: false, ..Self::REQUIRED };
 }
@@ -39,6 +47,9 @@ pub struct PortSpec {
     pub kind: Kind,
     /// Unit, then frames: `"N"`, `"E/s"`, `"base"`; a capital letter is a variable, `"$name"` the parameter `name`.
     pub args: Cow<'static, [Cow<'static, str>]>,
+    /// What the value is, beside its unit: `position` is not `equilibrium`. A capital letter is a variable. `"$wire"` is
+    /// the name of the wire. `None` if an output does not know it, or an input accepts any.
+    pub quantity: Option<Cow<'static, str>>,
     /// What an input needs; without meaning for an output.
     pub need: Need,
 }
@@ -49,7 +60,13 @@ impl PortSpec {
     #[must_use]
     pub fn new(name: &'static str, doc: &'static str, kind: Kind, args: &[&'static str]) -> Self {
         let args = args.iter().copied().map(Cow::Borrowed).collect();
-        Self { name: name.into(), doc: doc.into(), kind, args, need: Need::REQUIRED }
+        Self { name: name.into(), doc: doc.into(), kind, args, quantity: None, need: Need::REQUIRED }
+    }
+
+    /// Returns the declaration with a quantity.
+    #[must_use]
+    pub fn of_quantity(self, quantity: &'static str) -> Self {
+        Self { quantity: Some(quantity.into()), ..self }
     }
 
     /// Returns the declaration of a port of signal `T`, with its arguments by name. It leaves out arguments that the
@@ -65,7 +82,7 @@ impl PortSpec {
         let is_said = |argument: &&str| *argument == "unit" || value(argument) != Some("_");
         let arguments = T::KIND.arguments().iter().take_while(|argument| is_said(argument));
         let args: Vec<&'static str> = arguments.filter_map(value).collect();
-        Self { need, ..Self::new(name, doc, T::KIND, &args) }
+        Self { need, quantity: value(&"quantity").map(Cow::Borrowed), ..Self::new(name, doc, T::KIND, &args) }
     }
 }
 
@@ -75,22 +92,40 @@ impl PortSpec {
 pub struct Letters {
     units: &'static str,
     frames: &'static str,
+    quantities: &'static str,
     are_complete: bool,
 }
 
+/// What a letter stands for; used by the derives.
+#[doc(hidden)]
+#[derive(Debug, Clone, Copy)]
+pub enum LetterKind {
+    /// A unit.
+    Unit,
+    /// A frame.
+    Frame,
+    /// A quantity.
+    Quantity,
+}
+
 impl Letters {
-    /// Creates it from the letters of the units and of the frames. If an input lacks an argument, they are not
-    /// complete.
+    /// Creates it from the letters of the units, the frames and the quantities. If an input lacks an argument, they are
+    /// not complete.
     #[must_use]
-    pub const fn of(units: &'static str, frames: &'static str, are_complete: bool) -> Self {
-        Self { units, frames, are_complete }
+    pub const fn of([units, frames, quantities]: [&'static str; 3], are_complete: bool) -> Self {
+        Self { units, frames, quantities, are_complete }
     }
 
     /// Whether an input binds a letter. If the letters are not complete it returns `true`, so that one mistake has one
     /// message.
     #[must_use]
-    pub const fn binds(&self, is_unit: bool, letter: char) -> bool {
-        let letters = if is_unit { self.units } else { self.frames }.as_bytes();
+    pub const fn binds(&self, kind: LetterKind, letter: char) -> bool {
+        let letters = match kind {
+            LetterKind::Unit => self.units,
+            LetterKind::Frame => self.frames,
+            LetterKind::Quantity => self.quantities,
+        };
+        let letters = letters.as_bytes();
         let mut i = 0;
         while i < letters.len() && letters[i] != letter as u8 {
             i += 1;

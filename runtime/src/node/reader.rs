@@ -1,5 +1,6 @@
 //! The contract of a parameter, and the reader that collects all mistakes of a table, each with its place.
 
+use std::borrow::Cow;
 use std::ops::Range;
 use std::path::PathBuf;
 
@@ -7,10 +8,11 @@ use serde::de::DeserializeOwned;
 
 use super::bounds::Bounds;
 use super::file_path::FilePath;
+use super::known_units::KnownUnits;
 use super::mistake::{At, Mistake, Mistakes};
 use super::param_spec::{Contents, Declared, ParamSpec, Written};
 use crate::source::{Code, suggest_name, suggest_path, suggestion};
-use crate::source::{Key, Meant, SourceMap, Table, Value};
+use crate::source::{Item, Key, Meant, SourceMap, Table, Value};
 
 /// A type that a graph file can set. `#[derive(Param)]` implements it for a struct (a table) and an enum (a word).
 #[diagnostic::on_unimplemented(
@@ -52,13 +54,24 @@ pub trait Param: Sized {
     }
 }
 
+/// The values that were written with a unit, each as the number that was read, with its place.
+pub type Measured = Vec<(Range<usize>, Item)>;
+
 /// Collects the mistakes in parameters.
 pub struct Reader<'a> {
     sources: &'a SourceMap,
     /// Range of the numbers in the current field.
     pub(super) bounds: Option<Bounds>,
     /// Unit of the numbers in the current field, as declared.
-    unit: Option<&'static str>,
+    pub(super) unit: Option<&'static str>,
+    /// The units that the letters in declarations stand for.
+    pub(super) units: KnownUnits<'a>,
+    /// Name of the current entry of a table of names.
+    pub(super) component: Option<String>,
+    /// Index of the current entry of a list, and the length of the list.
+    pub(super) entry: Option<(usize, usize)>,
+    /// The values so far that were written with a unit.
+    pub measured: Measured,
     /// The mistakes so far.
     pub mistakes: Mistakes,
 }
@@ -78,7 +91,22 @@ impl<'a> Reader<'a> {
     /// Creates a reader of values from `sources`.
     #[must_use]
     pub const fn new(sources: &'a SourceMap) -> Self {
-        Self { sources, bounds: None, unit: None, mistakes: Vec::new() }
+        Self {
+            sources,
+            bounds: None,
+            unit: None,
+            units: KnownUnits::NONE,
+            component: None,
+            entry: None,
+            measured: Vec::new(),
+            mistakes: Vec::new(),
+        }
+    }
+
+    /// Sets the units that the letters in declarations stand for.
+    #[must_use]
+    pub fn with_units(self, units: KnownUnits<'a>) -> Self {
+        Self { units, ..self }
     }
 
     /// Adds the mistake that the value at `span` is wrong, and returns `None`.
@@ -115,7 +143,7 @@ impl<'a> Reader<'a> {
         let Declared { name, bounds, unit, .. } = *declared;
         if let Some((_, value)) = table.rest.remove(name) {
             let outer = (self.bounds, self.unit);
-            (self.bounds, self.unit) = (bounds, unit.filter(|unit| is_known(unit)));
+            (self.bounds, self.unit) = (bounds, unit);
             let read = T::read(&value, self);
             (self.bounds, self.unit) = outer;
             return read;
@@ -152,18 +180,35 @@ impl<'a> Reader<'a> {
         None
     }
 
-    /// Reads a number and checks the range of the field.
+    /// Reads a number, plain or with a unit, and checks the range of the field.
     pub(super) fn number<T: DeserializeOwned + Copy>(
         &mut self,
         value: &Value,
         expects: &str,
         number: impl Fn(T) -> f64,
     ) -> Option<T> {
-        let unit = self.unit.map_or_else(String::new, |unit| format!(" [{unit}]"));
+        let unit =
+            self.unit_of_entry().filter(|unit| is_known(unit)).map_or_else(String::new, |unit| format!(" [{unit}]"));
         let expects = self.bounds.map_or_else(|| expects.to_owned(), |bounds| bounds.describe(expects)) + &unit;
-        let read: T = read_leaf(value, self, &expects)?;
-        let is_in_range = self.bounds.is_none_or(|bounds| bounds.contains(number(read)));
-        if is_in_range { Some(read) } else { self.wrong_type(value, &expects) }
+        let converted = self.in_declared_unit(value)?;
+        let is_in_range = |read: &T| self.bounds.is_none_or(|bounds| bounds.contains(number(*read)));
+        let read: Option<T> = converted.read().filter(is_in_range);
+        match (read, converted) {
+            (Some(read), Cow::Owned(converted)) => {
+                self.measured.push((converted.span, converted.item));
+                Some(read)
+            }
+            (Some(read), Cow::Borrowed(_)) => Some(read),
+            (None, _) => self.wrong_number(value, &expects),
+        }
+    }
+
+    /// Returns the declared unit of the current field, or of the current entry of a list with several units.
+    pub(super) fn unit_of_entry(&self) -> Option<&'static str> {
+        let declared = self.unit?;
+        let units: Vec<&str> = declared.split(", ").collect();
+        let of_entry = |(entry, count): (usize, usize)| units.get(entry * units.len() / count).copied();
+        self.entry.filter(|(_, count)| count % units.len() == 0).map_or(Some(declared), of_entry)
     }
 
     /// Adds a mistake for every missing field. One missing and one unknown name are one mistake.

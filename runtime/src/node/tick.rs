@@ -19,6 +19,8 @@ pub struct Tick {
     pub reset_after: i64,
     /// Whether the runtime holds all commands at zero. A node that remembers its own motion brings it to rest.
     pub is_halted: bool,
+    /// Whether the operator sent `resume` before this tick.
+    pub is_resumed: bool,
 }
 
 impl Tick {
@@ -33,6 +35,7 @@ impl Tick {
             max_gap: 0.1,
             reset_after: 20_000_000,
             is_halted: false,
+            is_resumed: false,
         }
     }
 }

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use crate::node::{At, FilePath, Map, Mistake, Param, Reader, Spanned};
+use crate::node::{Amount, At, FilePath, Map, Mistake, Param, Reader, Spanned};
 use crate::source::{Code, Diagnostic, Item, Key, SourceMap, Table, Value, suggestion};
 
 /// The section `[scenario]`.
@@ -40,28 +40,28 @@ pub(crate) struct CheckTable {
     pub(crate) minus: Option<Spanned<String>>,
     /// Value that it must settle to.
     #[param(unit = "$unit")]
-    pub(crate) settles_to: Option<f64>,
+    pub(crate) settles_to: Option<Amount>,
     /// Half width of the band around `settles_to`.
     #[param(unit = "$unit", above = 0.0)]
-    pub(crate) within: Option<f64>,
+    pub(crate) within: Option<Amount>,
     /// Maximum response time.
     #[param(unit = "s", above = 0.0)]
     pub(crate) response_below_s: Option<f64>,
     /// Maximum steady-state error.
     #[param(unit = "$unit", above = 0.0)]
-    pub(crate) steady_state_error_below: Option<f64>,
+    pub(crate) steady_state_error_below: Option<Amount>,
     /// Length of the steady state at the end of the run; 10 by default.
     #[param(unit = "s", above = 0.0)]
     pub(crate) steady_s: Option<f64>,
     /// Maximum standard deviation.
     #[param(unit = "$unit", above = 0.0)]
-    pub(crate) std_below: Option<f64>,
+    pub(crate) std_below: Option<Amount>,
     /// Value that it must never exceed.
     #[param(unit = "$unit")]
-    pub(crate) never_above: Option<f64>,
+    pub(crate) never_above: Option<Amount>,
     /// Value that it must never fall below.
     #[param(unit = "$unit")]
-    pub(crate) never_below: Option<f64>,
+    pub(crate) never_below: Option<Amount>,
     /// Time from which it is checked. The response and the steady state have their own times.
     #[param(unit = "s", range = 0.0..)]
     pub(crate) after_s: Option<f64>,
@@ -81,19 +81,38 @@ pub(crate) struct PaperTable {
     pub(crate) response_s: Option<f64>,
     /// Steady-state error.
     #[param(unit = "$unit")]
-    pub(crate) error: Option<f64>,
+    pub(crate) error: Option<Amount>,
     /// Mean.
     #[param(unit = "$unit")]
-    pub(crate) mean: Option<f64>,
+    pub(crate) mean: Option<Amount>,
     /// Standard deviation.
     #[param(unit = "$unit")]
-    pub(crate) std: Option<f64>,
+    pub(crate) std: Option<Amount>,
     /// Maximum.
     #[param(unit = "$unit")]
-    pub(crate) max: Option<f64>,
+    pub(crate) max: Option<Amount>,
     /// Minimum.
     #[param(unit = "$unit")]
-    pub(crate) min: Option<f64>,
+    pub(crate) min: Option<Amount>,
+}
+
+impl CheckTable {
+    /// Returns the numbers in the unit of the check.
+    pub(super) fn amounts_mut(&mut self) -> impl Iterator<Item = &mut Amount> {
+        let bounds = [
+            &mut self.settles_to,
+            &mut self.within,
+            &mut self.steady_state_error_below,
+            &mut self.std_below,
+            &mut self.never_above,
+            &mut self.never_below,
+        ];
+        let paper = self
+            .paper
+            .iter_mut()
+            .flat_map(|paper| [&mut paper.error, &mut paper.mean, &mut paper.std, &mut paper.max, &mut paper.min]);
+        bounds.into_iter().chain(paper).flatten()
+    }
 }
 
 /// The seeds and their position in the source.
@@ -203,7 +222,7 @@ impl CheckBlock {
         let mut wrong = |code: Code, key: &str, message: String, help: &str| {
             found.push(Diagnostic::new(code, self.span(key), message).help(help));
         };
-        let (target, within) = (table.settles_to, table.within);
+        let (target, within) = (&table.settles_to, &table.within);
         let is_given = |key: &&str| self.value.as_table().is_some_and(|table| table.get(key).is_some());
         let needs_target = ["within", "response_below_s", "steady_state_error_below", "steady_s"];
         for key in needs_target.into_iter().filter(|key| target.is_none() && is_given(key)) {
@@ -213,12 +232,6 @@ impl CheckBlock {
         if target.is_some() && within.is_none() {
             let help = "add `within`: the largest error that counts as settled";
             wrong(Code::MissingKey, "settles_to", "`settles_to` needs `within`".into(), help);
-        }
-        if let (Some(above), Some(below)) = (table.never_above, table.never_below)
-            && below > above
-        {
-            let message = format!("no value is at least {below} and at most {above}");
-            wrong(Code::BadValue, "never_below", message, "swap the values of `never_above` and `never_below`");
         }
         if let (Some(after), Some(for_s)) = (table.after_s, for_s)
             && after >= for_s

@@ -6,8 +6,8 @@ use super::document::{CheckBlock, CheckTable, Document, PaperTable, ScenarioTabl
 use super::judge::{Bound, Figure, FigureRow};
 use super::model::{Check, Scenario, row};
 use crate::catalogue::Catalogue;
-use crate::graph::{Compiled, Request};
-use crate::node::Spanned;
+use crate::graph::{Compiled, Request, into_diagnostic};
+use crate::node::{Amount, Mistake, Spanned};
 use crate::record::{PortColumn, PortColumns};
 use crate::signal::Kind;
 use crate::source::{Code, Diagnostic, Item, Report, Value, suggest_name, suggestion};
@@ -123,7 +123,8 @@ impl Lookup<'_> {
     }
 
     fn check(&mut self, block: &CheckBlock) -> Option<(Check, Vec<FigureRow>)> {
-        let table = block.table.as_ref()?;
+        let (column, _) = self.column(&block.table.as_ref()?.of)?;
+        let table = &self.in_unit(block, &column)?;
         let figures = figures(table);
         let papers = table.paper.as_ref().map(papers).unwrap_or_default();
         for (paper, _) in papers.iter().filter(|(paper, _)| !figures.iter().any(|(figure, _)| figure == paper)) {
@@ -133,7 +134,6 @@ impl Lookup<'_> {
             let help = format!("the check computes {}", names.join(", "));
             self.found.push(Diagnostic::new(Code::UnknownKey, block.span("paper"), message).help(help));
         }
-        let (column, _) = self.column(&table.of)?;
         let minus = match &table.minus {
             Some(word) => Some(self.subtrahend(word, &column)?),
             None => None,
@@ -151,12 +151,34 @@ impl Lookup<'_> {
             period: column.unit.is_axial().then(|| std::f64::consts::PI / unit),
             column: column.name,
             unit,
-            settles: table.settles_to.zip(table.within),
+            settles: number(&table.settles_to).zip(number(&table.within)),
             after: table.after_s,
             steady: table.steady_s.unwrap_or(DEFAULT_STEADY_S),
             figures: figures.iter().map(|(figure, _)| *figure).collect(),
         };
         Some((check, rows.collect()))
+    }
+
+    /// Returns a check with its numbers in the unit of its column. Numbers in a unit of the check's own are plain.
+    fn in_unit(&mut self, block: &CheckBlock, column: &PortColumn) -> Option<CheckTable> {
+        let mut table = block.table.clone()?;
+        let before = self.found.len();
+        let unit = table.unit.is_none().then_some(column.unit);
+        let wrong = table.amounts_mut().filter_map(|amount| amount.settle(unit, &mut Vec::new()).err());
+        let own = block.table.as_ref().and_then(|table| table.unit.as_ref()?.0.keys().next());
+        let explain = |mistake: Mistake| match own {
+            Some(own) => Mistake { message: format!("this check has its own unit `{own}`"), ..mistake },
+            None => mistake,
+        };
+        self.found.extend(wrong.map(explain).map(into_diagnostic));
+        if let (Some(above), Some(below)) = (number(&table.never_above), number(&table.never_below))
+            && below > above
+        {
+            let message = format!("no value is at least {below} and at most {above}");
+            let diagnostic = Diagnostic::new(Code::BadValue, block.span("never_below"), message);
+            self.found.push(diagnostic.help("swap the values of `never_above` and `never_below`"));
+        }
+        (self.found.len() == before).then_some(table)
     }
 
     /// Finds the column to subtract from another. Both must have the same unit.
@@ -228,20 +250,25 @@ fn plain(value: &Value) -> Option<toml::Value> {
     toml::Value::try_from(value).ok().filter(|_| is_plain)
 }
 
+/// Returns the number of an amount in the unit of the check.
+fn number(amount: &Option<Amount>) -> Option<f64> {
+    amount.as_ref().map(|amount| amount.number)
+}
+
 /// Returns the figures of a check with their bounds.
 fn figures(table: &CheckTable) -> Vec<(Figure, Bound)> {
-    let median = |bound: Option<f64>| bound.map_or(Bound::None, Bound::Median);
-    let std = (Figure::Std, median(table.std_below));
+    let median = |bound: &Option<Amount>| number(bound).map_or(Bound::None, Bound::Median);
+    let std = (Figure::Std, median(&table.std_below));
     let mut figures = Vec::new();
     let has_extremes = table.never_above.is_some() || table.never_below.is_some();
     if table.settles_to.is_some() {
         let response = table.response_below_s.map_or(Bound::Settles, Bound::Median);
-        figures.extend([(Figure::Response, response), (Figure::Error, median(table.steady_state_error_below)), std]);
+        figures.extend([(Figure::Response, response), (Figure::Error, median(&table.steady_state_error_below)), std]);
     } else if !has_extremes || table.std_below.is_some() {
         figures.extend([(Figure::Mean, Bound::None), std]);
     }
-    figures.extend(table.never_above.map(|bound| (Figure::Max, Bound::AtMost(bound))));
-    figures.extend(table.never_below.map(|bound| (Figure::Min, Bound::AtLeast(bound))));
+    figures.extend(number(&table.never_above).map(|bound| (Figure::Max, Bound::AtMost(bound))));
+    figures.extend(number(&table.never_below).map(|bound| (Figure::Min, Bound::AtLeast(bound))));
     figures
 }
 
@@ -249,11 +276,11 @@ fn figures(table: &CheckTable) -> Vec<(Figure, Bound)> {
 fn papers(paper: &PaperTable) -> Vec<(Figure, f64)> {
     let values = [
         (Figure::Response, paper.response_s),
-        (Figure::Error, paper.error),
-        (Figure::Mean, paper.mean),
-        (Figure::Std, paper.std),
-        (Figure::Max, paper.max),
-        (Figure::Min, paper.min),
+        (Figure::Error, number(&paper.error)),
+        (Figure::Mean, number(&paper.mean)),
+        (Figure::Std, number(&paper.std)),
+        (Figure::Max, number(&paper.max)),
+        (Figure::Min, number(&paper.min)),
     ];
     values.into_iter().filter_map(|(figure, value)| Some((figure, value?))).collect()
 }

@@ -123,7 +123,7 @@ macro_rules! kinds {
     ($($kind:ident $shape:ident $arena:ident $name:literal $word:literal: $summary:literal, $doc:literal
         { $($item:tt)* })*) => {
         /// The kinds of signals, a closed set.
-        #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+        #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
         pub enum Kind { $(#[doc = concat!("A ", $word, ": ", $summary, ".")] $kind),* }
 
         impl Kind {

@@ -3,6 +3,7 @@
 //! Other crates can add nodes but not kinds, so the recorder, the finite check and the bridges handle every kind in one
 //! place. The shape fixes the size of a value, so every slot is allocated at load and never later.
 
+mod decimal;
 mod features;
 mod freshness;
 mod image;
@@ -10,10 +11,12 @@ mod joints;
 mod kind;
 pub mod line;
 mod mask;
+mod measure;
 mod regions;
 mod scalars;
 mod spatial;
 mod unit;
+mod unit_size;
 
 pub use features::{Component, Feature, Features, FeaturesShape};
 pub use freshness::{Freshness, Mark, Stamp};
@@ -21,9 +24,11 @@ pub use image::{Image, ImageShape};
 pub use joints::{Jacobian, Joint, Joints, JointsShape};
 pub use kind::{Arenas, Flag, FlagShape, JacobianShape, Kind, MaskShape, Scalar, ScalarShape, Settable, Shape, Signal};
 pub use mask::{Grid, Mask};
+pub use measure::{Measure, MeasureError};
 pub use regions::{Region, Regions, RegionsShape, Run};
 pub use spatial::{Pose, PoseShape, Twist, TwistShape};
 pub use unit::{Base, Unit};
+pub use unit_size::UnitSize;
 
 /// Whether every value is finite. Checks the bits of the exponents, so that the loop vectorises.
 #[inline]

@@ -54,10 +54,14 @@ codes! {
     MissingInput "missing-input",
     /// A wire between ports of different kinds.
     KindMismatch "kind-mismatch",
-    /// A wire between ports of different units.
+    /// A wire between ports of different units, or a number in a unit that measures something else.
     UnitMismatch "unit-mismatch",
     /// A wire between ports in different frames.
     FrameMismatch "frame-mismatch",
+    /// A parameter that names a frame which no role has.
+    UnknownFrame "unknown-frame",
+    /// A wire from a port that carries another quantity than its input accepts, or an unknown one.
+    QuantityMismatch "quantity-mismatch",
     /// A wire between ports of different sizes.
     ShapeMismatch "shape-mismatch",
     /// Wires that form a cycle.
@@ -66,6 +70,8 @@ codes! {
     EndlessPart "endless-part",
     /// A fact that the device does not provide.
     UnknownFact "unknown-fact",
+    /// A fact of a role that its node does not read.
+    ForeignFact "foreign-fact",
     /// A role that the bench does not bind to a device.
     UnboundRole "unbound-role",
     /// A device that cannot fill the role it is bound to.
@@ -76,8 +82,12 @@ codes! {
     UnknownDevice "unknown-device",
     /// A command without a wire.
     UndrivenCommand "undriven-command",
+    /// A limiter that reads another arm or another arm's sensor.
+    ForeignInput "foreign-input",
     /// A command whose path lacks a limit that its role requires.
     UnlimitedCommand "unlimited-command",
+    /// A limit in raw readings on a bench that does not allow it.
+    Uncalibrated "uncalibrated",
     /// A value that a node reads from [limits] and that is missing there.
     MissingLimit "missing-limit",
     /// A mode that does not exist.

@@ -17,6 +17,8 @@ pub struct SourceFile {
     /// Offset of its first byte in the source map.
     pub base: usize,
     folder: PathBuf,
+    /// Offsets in the text at which its lines begin.
+    lines: Vec<usize>,
 }
 
 impl SourceFile {
@@ -44,10 +46,21 @@ impl SourceFile {
     /// Both count from 1; the column counts characters.
     #[must_use]
     pub fn line_column(&self, at: usize) -> (usize, usize) {
-        let before = &self.text[..self.text.floor_char_boundary(self.local(&(at..at)).start)];
-        let line = before.matches('\n').count() + 1;
-        let column = before.rsplit('\n').next().unwrap_or("").chars().count() + 1;
-        (line, column)
+        let at = self.text.floor_char_boundary(self.local(&(at..at)).start);
+        let line = self.line_at(at);
+        (line, self.text[self.lines[line - 1]..at].chars().count() + 1)
+    }
+
+    /// Returns the number of the line that contains an offset in the text, from 1.
+    fn line_at(&self, at: usize) -> usize {
+        self.lines.partition_point(|start| *start <= at)
+    }
+
+    /// Returns the range of the whole lines around a range of this text, and the number of the first line.
+    pub(super) fn lines_around(&self, local: &Range<usize>) -> (Range<usize>, usize) {
+        let [first, last] = [local.start, local.end].map(|at| self.line_at(at));
+        let end = self.lines.get(last).copied().unwrap_or(self.text.len());
+        (self.lines[first - 1]..end, first)
     }
 }
 
@@ -137,7 +150,9 @@ impl SourceMap {
     pub fn add(&mut self, name: impl Into<String>, text: impl Into<String>, folder: impl Into<PathBuf>) -> &SourceFile {
         // Files are one byte apart: the offset just past the end of one file is not in the next.
         let base = self.files.last().map_or(0, |last| last.base + last.text.len() + 1);
-        self.files.push(SourceFile { name: name.into(), text: text.into(), base, folder: folder.into() });
+        let text = text.into();
+        let lines = std::iter::once(0).chain(text.match_indices('\n').map(|(end, _)| end + 1)).collect();
+        self.files.push(SourceFile { name: name.into(), text, base, folder: folder.into(), lines });
         self.files.last().expect("it was just pushed")
     }
 

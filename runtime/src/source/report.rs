@@ -1,12 +1,16 @@
 //! The report of a graph: all its diagnostics with the texts they refer to, and its text for a terminal.
 
+use std::collections::BTreeMap;
 use std::fmt;
 use std::ops::Range;
 
 use annotate_snippets::{AnnotationKind, Group, Level, Renderer, Snippet};
 
-use super::diagnostic::{Diagnostic, Diagnostics, Severity};
+use super::diagnostic::{Code, Diagnostic, Diagnostics, Severity};
 use super::map::{SourceFile, SourceMap};
+
+/// Maximum number of places that a message about one missing name shows.
+const MAX_NOTES: usize = 8;
 
 /// All diagnostics of a graph, with the texts they refer to. `Debug` shows them as a terminal does, for `unwrap` in a
 /// test.
@@ -34,13 +38,21 @@ impl Report {
         // Of two with the same message, the one with a fix stays.
         diagnostics.dedup_by(|b, a| (place(a), a.code, &a.message) == (place(b), b.code, &b.message));
         let mut joined = Diagnostics::new();
+        // A name that is missing at several places has one diagnostic.
+        let mut places: BTreeMap<(Code, String, Option<String>), usize> = BTreeMap::new();
         for diagnostic in diagnostics {
-            match joined.iter_mut().find(|first| is_same_name(first, &diagnostic)) {
+            let name = (diagnostic.code, diagnostic.message.clone(), diagnostic.help.clone());
+            match places.get(&name).filter(|_| diagnostic.code.is_missing_name()) {
                 Some(first) => {
-                    first.notes.push((diagnostic.span, "and here".into()));
-                    first.fix.extend(diagnostic.fix);
+                    if joined[*first].notes.len() < MAX_NOTES {
+                        joined[*first].notes.push((diagnostic.span, "and here".into()));
+                    }
+                    joined[*first].fix.extend(diagnostic.fix);
                 }
-                None => joined.push(diagnostic),
+                None => {
+                    places.insert(name, joined.len());
+                    joined.push(diagnostic);
+                }
             }
         }
         Self { sources, diagnostics: joined }
@@ -67,19 +79,26 @@ impl Report {
 
     fn render_one(&self, diagnostic: &Diagnostic, renderer: &Renderer) -> String {
         let main = self.sources.file_at(diagnostic.span.start);
-        let place = AnnotationKind::Primary.span(marked(main, &diagnostic.span));
-        let mut snippet = Snippet::source(&main.text).path(&main.name).annotation(place);
+        let place = marked(main, &diagnostic.span);
         let mut others: Vec<Group<'_>> = Vec::new();
+        let (mut notes, mut shown) = (Vec::new(), place.clone());
         for (span, label) in &diagnostic.notes {
             let file = self.sources.file_at(span.start);
-            let place = AnnotationKind::Context.span(marked(file, span));
+            let place = marked(file, span);
             if std::ptr::eq(file, main) {
-                snippet = snippet.annotation(place.label(label));
+                shown = shown.start.min(place.start)..shown.end.max(place.end);
+                notes.push((place, label));
             } else {
-                let snippet = Snippet::source(&file.text).path(&file.name).annotation(place);
+                let excerpt = Excerpt::of(file, &place);
+                let snippet = excerpt.snippet().annotation(AnnotationKind::Context.span(excerpt.within(&place)));
                 others.push(Level::NOTE.secondary_title(label).element(snippet));
             }
         }
+        let excerpt = Excerpt::of(main, &shown);
+        let notes =
+            notes.into_iter().map(|(place, label)| AnnotationKind::Context.span(excerpt.within(&place)).label(label));
+        let snippet = excerpt.snippet().annotation(AnnotationKind::Primary.span(excerpt.within(&place)));
+        let snippet = snippet.annotations(notes);
         let level = match diagnostic.code.severity() {
             Severity::Error => Level::ERROR,
             Severity::Warning => Level::WARNING,
@@ -94,14 +113,35 @@ impl Report {
     }
 }
 
+/// The lines of a file that a message shows. The time to render them does not depend on the length of the file.
+struct Excerpt<'a> {
+    file: &'a SourceFile,
+    text: &'a str,
+    /// Number of the first line.
+    line: usize,
+    /// Offset of the first line in the file.
+    start: usize,
+}
+
+impl<'a> Excerpt<'a> {
+    fn of(file: &'a SourceFile, local: &Range<usize>) -> Self {
+        let (range, line) = file.lines_around(local);
+        Self { file, text: &file.text[range.clone()], line, start: range.start }
+    }
+
+    fn snippet<T: Clone>(&self) -> Snippet<'a, T> {
+        Snippet::source(self.text).path(&self.file.name).line_start(self.line)
+    }
+
+    /// Converts a range of the file into a range of the excerpt.
+    fn within(&self, local: &Range<usize>) -> Range<usize> {
+        local.start - self.start..local.end - self.start
+    }
+}
+
 /// Returns the part of a span that is underlined, so that a huge value does not print a million carets.
 fn marked(file: &SourceFile, span: &Range<usize>) -> Range<usize> {
     const MAX_MARKED_BYTES: usize = 200;
     let local = file.local(span);
     local.start..local.end.min(file.text.floor_char_boundary(local.start + MAX_MARKED_BYTES))
-}
-
-/// Returns whether two diagnostics report the same missing name at two places.
-fn is_same_name(a: &Diagnostic, b: &Diagnostic) -> bool {
-    a.code.is_missing_name() && (a.code, &a.message, &a.help) == (b.code, &b.message, &b.help)
 }

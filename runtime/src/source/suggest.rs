@@ -4,24 +4,59 @@ use std::cmp::Reverse;
 use std::fmt::Display;
 use std::path::Path;
 
+/// Maximum number of names that a help lists.
+const MAX_LISTED_NAMES: usize = 100;
+
 /// Returns the known name closest to a misspelt one, or `None` if none is close.
 ///
 /// A name is close if its edit distance is at most one, plus one for every four characters of `name`. Capitals count as
 /// small letters, and `-` as `_`. Among equally close names, the one with the longest common start is returned.
 #[must_use]
 pub fn suggest_name<'n>(name: &str, known: impl Iterator<Item = &'n str>) -> Option<&'n str> {
-    let name = plain(name);
-    let common = |other: &str| name.chars().zip(other.chars()).take_while(|(a, b)| a == b).count();
-    let scored = known.map(|other| {
-        let plain = plain(other);
-        ((strsim::damerau_levenshtein(&name, &plain), Reverse(common(&plain))), other)
-    });
-    let (score, best) = scored.min_by_key(|(score, _)| *score)?;
-    (score.0 <= 1 + name.chars().count() / 4).then_some(best)
+    let letters = Letters::of(name);
+    let plain_name = plain(name);
+    let common = |other: &str| plain_name.chars().zip(other.chars()).take_while(|(a, b)| a == b).count();
+    let score = |other: &str| (strsim::damerau_levenshtein(&plain_name, other), Reverse(common(other)));
+    let max_distance = 1 + name.chars().count() / 4;
+    let near = known.filter(|other| letters.min_distance(other) <= 1 + name.len() / 4);
+    let (score, best) = near.map(|other| (score(&plain(other)), other)).min_by_key(|(score, _)| *score)?;
+    (score.0 <= max_distance).then_some(best)
 }
 
 fn plain(name: &str) -> String {
     name.to_lowercase().replace('-', "_")
+}
+
+/// How often each letter occurs in a name: a bound of the edit distance that is much faster to compute.
+struct Letters {
+    counts: [i32; 64],
+    is_ascii: bool,
+}
+
+impl Letters {
+    fn of(name: &str) -> Self {
+        let mut counts = [0; 64];
+        name.bytes().for_each(|byte| counts[place(byte)] += 1);
+        Self { counts, is_ascii: name.is_ascii() }
+    }
+
+    /// Returns a distance that no edit from one name to the other is shorter than.
+    fn min_distance(&self, other: &str) -> usize {
+        if !self.is_ascii || !other.is_ascii() {
+            return 0;
+        }
+        let mut counts = self.counts;
+        other.bytes().for_each(|byte| counts[place(byte)] -= 1);
+        let (missing, surplus) =
+            counts.iter().fold((0, 0), |(missing, surplus), count| (missing + count.max(&0), surplus - count.min(&0)));
+        missing.max(surplus).unsigned_abs() as usize
+    }
+}
+
+/// Returns the place of a letter in the counts; a capital has that of its small letter, and `-` that of `_`.
+fn place(byte: u8) -> usize {
+    let plain = if byte == b'-' { b'_' } else { byte.to_ascii_lowercase() };
+    usize::from(plain % 64)
 }
 
 /// Returns the path of an existing file that is like `text`, which is relative to `folder`: each of its names is right,
@@ -56,6 +91,10 @@ pub fn suggestion<'n>(name: &str, known: impl Iterator<Item = &'n str>, what: &s
     match suggest_name(name, known.iter().copied()) {
         Some(best) => did_you_mean(best),
         None if known.is_empty() => format!("there are no {what} here"),
+        None if known.len() > MAX_LISTED_NAMES => {
+            let more = known.len() - MAX_LISTED_NAMES;
+            format!("{what} here: {}, and {more} more", quoted(&known[..MAX_LISTED_NAMES]))
+        }
         None => format!("{what} here: {}", quoted(&known)),
     }
 }
@@ -85,9 +124,30 @@ mod tests {
             ("min_n", "max_m min_m", Some("min_m")),
             ("q", "select", None),
             ("x", "", None),
+            ("pdi", "pid pad", Some("pid")),
+            ("mments", "momentum moments moment", Some("moments")),
+            ("pad", "pid pod", Some("pid")),
+            ("threshold", "hold gate", None),
+            ("größe", "grosse größen", Some("größen")),
+            ("ab", "abcd x", None),
         ];
         for (name, known, expected) in cases {
             assert_eq!(suggest_name(name, known.split_whitespace()), expected, "{name}");
+        }
+    }
+
+    #[test]
+    fn a_long_list_is_cut() {
+        let names: Vec<String> = (0..150).map(|i| format!("name_{i}")).collect();
+        let help = suggestion("x", names.iter().map(String::as_str), "nodes");
+        assert!(help.starts_with("nodes here: `name_0`") && help.ends_with("`name_99`, and 50 more"), "{help}");
+    }
+
+    #[test]
+    fn the_bound_by_letters_is_no_longer_than_the_distance() {
+        let names = ["", "a", "ab", "ba", "abc", "cab", "moments", "momentum", "n12", "n21", "N12", "größe"];
+        for (a, b) in names.iter().flat_map(|a| names.map(|b| (*a, b))) {
+            assert!(Letters::of(a).min_distance(b) <= strsim::damerau_levenshtein(&plain(a), &plain(b)), "{a} {b}");
         }
     }
 }

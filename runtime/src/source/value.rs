@@ -63,6 +63,16 @@ impl Serialize for Value {
     }
 }
 
+/// A reference to a fact of a role or to a value of `[limits]`.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct FactRef<'a> {
+    /// `role.fact` or `limits.key`.
+    pub(crate) word: &'a str,
+    pub(crate) place: &'a Range<usize>,
+    /// Whether the parameter is left out if there is no such fact, as in `{ from = "limits.force_raw", optional = true }`.
+    pub(crate) is_optional: bool,
+}
+
 impl Table {
     /// Returns the value of a key.
     #[must_use]
@@ -82,14 +92,17 @@ impl Table {
         Some(self.entries.remove(at))
     }
 
-    /// Returns the fact that the table refers to and its place, as in `{ from = "pad.threshold" }`.
+    /// Returns the fact that the table refers to, as in `{ from = "pad.threshold" }`.
     ///
     /// Such a table is one value: it is replaced as a whole, not merged.
-    pub(crate) fn fact(&self) -> Option<(&str, &Range<usize>)> {
-        match self.entries.as_slice() {
-            [(key, value)] if key.name == "from" => Some((value.as_str()?, &value.span)),
-            _ => None,
-        }
+    pub(crate) fn fact(&self) -> Option<FactRef<'_>> {
+        let ((key, value), is_optional) = match self.entries.as_slice() {
+            [from] => (from, false),
+            [from, (key, Value { item: Item::Boolean(is), .. })] if key.name == "optional" => (from, *is),
+            _ => return None,
+        };
+        let word = value.as_str().filter(|_| key.name == "from")?;
+        Some(FactRef { word, place: &value.span, is_optional })
     }
 
     /// Merges another table over this one: tables merge recursively, other values replace, nothing is deleted.
@@ -177,8 +190,8 @@ impl Value {
         self.as_table().filter(|table| table.fact().is_none())
     }
 
-    /// Returns the facts to which the value and the values in it refer, each with its place.
-    pub(crate) fn facts(&self) -> Vec<(&str, &Range<usize>)> {
+    /// Returns the facts to which the value and the values in it refer.
+    pub(crate) fn facts(&self) -> Vec<FactRef<'_>> {
         match &self.item {
             Item::Array(items) => items.iter().flat_map(Self::facts).collect(),
             Item::Table(table) => match table.fact() {

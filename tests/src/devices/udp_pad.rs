@@ -76,7 +76,7 @@ impl Device for UdpPad {
         let mut description = Description::every(1.0 / params.rate_hz);
         let mut pad = description.fills("tactile_pad");
         let image = pad.output("image", shape);
-        pad.fact("threshold", params.threshold);
+        pad.fact_in("threshold", params.threshold, Unit::NEWTON);
         pad.fact("calibration", toml::Table::from_iter([("gain".to_owned(), 1.0.into())]));
         let silence = Duration::from_secs_f64(params.silence_s);
         let driver = Self { image, address: params.address, silence, frame: vec![0.0; rows * cols] };

@@ -40,7 +40,7 @@ pub struct Params {
 #[derive(Inputs)]
 pub struct Inputs<'a> {
     /// Any feature that has no axis.
-    #[port(unit = "U", frame = "A")]
+    #[port(unit = "U", frame = "A", quantity = "Q")]
     value: In<'a, Scalar>,
 }
 
@@ -48,7 +48,7 @@ pub struct Inputs<'a> {
 #[derive(Outputs)]
 pub struct Outputs {
     /// The same, smoothed.
-    #[port(unit = "U", frame = "A")]
+    #[port(unit = "U", frame = "A", quantity = "Q")]
     value: Out<Scalar>,
 }
 

@@ -115,7 +115,7 @@ fn refusal(address: &str, why: String) -> Mistakes {
 fn pad_facts(hello: &Hello) -> Facts {
     let gain = hello.newton_per_unit / hello.counts_per_unit;
     let calibration = toml::Table::from_iter([("gain".to_owned(), gain.into()), ("unit".to_owned(), "N".into())]);
-    pad::facts(hello.threshold_units * hello.newton_per_unit, hello.newton_per_unit, calibration)
+    pad::facts(hello.threshold_units * hello.newton_per_unit, hello.newton_per_unit, Unit::NEWTON, calibration)
 }
 
 fn joints(hello: &Hello, acceleration: f64) -> JointsShape {

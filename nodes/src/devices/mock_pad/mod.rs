@@ -120,7 +120,7 @@ impl Device for MockPad {
         let mut description = Description::every(period as f64 * 1e-9);
         // The values are forces already.
         let calibration = toml::Table::from_iter([("gain".to_owned(), 1.0.into())]);
-        let facts = pad::facts(params.threshold, params.pressure, calibration);
+        let facts = pad::facts(params.threshold, params.pressure, params.unit, calibration);
         let image = pad::fill(&mut description, shape.clone(), facts);
         let pad = Self::new(image, shape, period, params);
         Ok(Opened { description, driver: Driver::Stepped(Box::new(pad)) })

@@ -45,6 +45,7 @@ pub struct Params {
 #[derive(Inputs)]
 pub struct Inputs<'a> {
     /// Whether there is a contact in the newest sample.
+    #[port(quantity = "contact")]
     present: In<'a, Flag>,
 }
 
@@ -52,6 +53,7 @@ pub struct Inputs<'a> {
 #[derive(Outputs)]
 pub struct Outputs {
     /// Whether there is a contact: from `stable` until `none`.
+    #[port(quantity = "contact")]
     present: Out<Flag>,
     /// The state: 0 none, 1 initial, 2 stable, 3 leaving, 4 uncertain.
     #[port(unit = "1", frame = "_")]

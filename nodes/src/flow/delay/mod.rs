@@ -50,7 +50,7 @@ pub struct Delay<T> {
 #[derive(Inputs)]
 pub struct Inputs<'a, T: Signal> {
     /// The signal to delay.
-    #[port(unit = "U", frame = "A", optional, delayed)]
+    #[port(unit = "U", frame = "A", quantity = "Q", optional, delayed)]
     value: Option<In<'a, T>>,
 }
 
@@ -58,7 +58,7 @@ pub struct Inputs<'a, T: Signal> {
 #[derive(Outputs)]
 pub struct Outputs<T: Signal> {
     /// The input one tick ago.
-    #[port(unit = "U", frame = "A")]
+    #[port(unit = "U", frame = "A", quantity = "Q")]
     value: Out<T>,
 }
 

@@ -4,22 +4,26 @@
 //! vz + wx y - wy x. The point is the centre of gravity of the whole image for `force`, and the highest tactel for
 //! `peak`. The excess is subtracted from vz: a roll then goes on about the contact.
 
+mod ceilings;
 mod load;
 
-use tactflow_runtime::node::{
-    Describe, In, Inputs, Limits, Mistake, Mistakes, Node, Out, Outputs, Param, Setup, State, Tick,
-};
-use tactflow_runtime::signal::{Image, ImageShape, Scalar, Stamp, Twist};
+use tactflow_runtime::node::{Describe, In, Inputs, Limits, Mistakes, Node, Out, Outputs, Param, Setup, State, Tick};
+use tactflow_runtime::signal::{Image, ImageShape, Scalar, Stamp, Twist, Unit};
 
 use super::{fraction, max_age};
 use crate::motion::bounds::countable;
 
+use ceilings::Ceilings;
 pub use load::{PadLoad, load};
 
 /// Stops the motion into an object when the force or a single tactel reaches its ceiling.
 ///
-/// There are two ceilings: `force` for the sum of the whole image, and `peak` for its highest tactel. From the fraction
-/// `begin` of a ceiling on the approach is slowed down linearly, and at the ceiling it is zero. The way out is always
+/// There are two ceilings: `force_n` for the sum of the whole image, and `peak_n` for its highest tactel. They take an
+/// image in N. An image of raw readings takes `force_raw` and `peak_raw` instead: then nothing is limited in newtons, so
+/// the bench must say `allow_uncalibrated = true`. For an image of pressures no sum is a force: `calibrate` converts it
+/// to N.
+///
+/// From the fraction `begin` of a ceiling on the approach is slowed down linearly, and at the ceiling it is zero. The way out is always
 /// free, and a roll goes on about the contact. The approach is the speed at the contact, vz + wx y - wy x with z
 /// pointing out of the pad: at the centre of gravity for `force`, and at the highest tactel for `peak`.
 ///
@@ -29,21 +33,20 @@ pub use load::{PadLoad, load};
 /// It does not predict the force that a stiff object adds while the motion brakes, which is about the stiffness times
 /// the braking distance. For hard objects use a lower `begin` or a lower `approach_m_per_s`.
 ///
-/// The ceilings are in the unit of the image. For an image of pressures the sum is not a force.
-///
 /// ```toml
 /// [nodes.contact_limit]
 /// type = "contact_limit"
 /// in.twist = "bumpless.twist"
 /// in.image = "calibrate.image"
-/// force = 15.0                        # [N]
-/// peak = 3.0                          # [N]
+/// force_n = 15.0
+/// peak_n = 3.0
 /// approach_m_per_s = 0.05
 /// ```
 #[derive(Describe)]
 #[describe(every_tick)]
 pub struct ContactLimit {
     params: Params,
+    ceilings: Ceilings,
     shape: ImageShape,
     /// Maximum age of the image [ns].
     max_age: i64,
@@ -52,12 +55,18 @@ pub struct ContactLimit {
 /// Parameters of `contact_limit`.
 #[derive(Debug, Clone, Param)]
 pub struct Params {
-    /// Ceiling of the sum of the whole image.
-    #[param(unit = "U", above = 0.0)]
-    force: f64,
-    /// Ceiling of a single tactel.
-    #[param(unit = "U", above = 0.0)]
-    peak: f64,
+    /// Ceiling of the sum of an image in N.
+    #[param(unit = "N", above = 0.0)]
+    force_n: Option<f64>,
+    /// Ceiling of a single tactel of an image in N.
+    #[param(unit = "N", above = 0.0)]
+    peak_n: Option<f64>,
+    /// Ceiling of the sum of an image of raw readings.
+    #[param(unit = "raw", above = 0.0)]
+    force_raw: Option<f64>,
+    /// Ceiling of a single tactel of an image of raw readings.
+    #[param(unit = "raw", above = 0.0)]
+    peak_raw: Option<f64>,
     /// Fraction of a ceiling at which the approach begins to slow down; with 1 it stops at the ceiling at once.
     #[param(unit = "1", range = 0.0..=1.0, default = 0.5)]
     begin: f64,
@@ -76,7 +85,7 @@ pub struct Inputs<'a> {
     #[port(frame = "A")]
     twist: In<'a, Twist>,
     /// The whole calibrated image.
-    #[port(unit = "U", frame = "A", sampled)]
+    #[port(unit = "U", frame = "A", quantity = "tactile_image", known, sampled)]
     image: In<'a, Image>,
 }
 
@@ -110,22 +119,24 @@ impl Node for ContactLimit {
     type State = State;
 
     // The image and its age move on while a motion is held.
-    const LIMITS: Limits =
-        Limits { through: Some("twist"), holds: &["force", "peak"], breaks: &["workspace", "speed", "acceleration"] };
+    const LIMITS: Limits = Limits {
+        through: Some("twist"),
+        holds: &["force", "peak"],
+        breaks: &["workspace", "blind", "speed", "acceleration"],
+        ..Limits::NONE
+    };
 
     fn new(params: Params, setup: &mut Setup<Self>) -> Result<Self, Mistakes> {
-        if params.peak > params.force {
-            let message =
-                "`peak` is greater than `force`, so it would have no effect: one tactel is never above the sum";
-            return Err(Mistake::param("peak", message).help("let `peak` be at most `force`").into());
-        }
+        let ceilings = Ceilings::new(&params, setup.inputs.image.unit)?;
+        setup.is_uncalibrated = setup.inputs.image.unit == Unit::RAW;
         (setup.outputs.force, setup.outputs.peak) = (fraction(), fraction());
         let max_age = max_age(params.max_age_ms, setup.period);
-        Ok(Self { params, shape: setup.inputs.image.clone(), max_age })
+        Ok(Self { params, ceilings, shape: setup.inputs.image.clone(), max_age })
     }
 
     fn step(&self, tick: &Tick, inputs: Inputs<'_>, out: &mut Outputs, state: &mut State) {
-        let Params { force, peak, begin, approach_m_per_s: approach, .. } = self.params;
+        let (Ceilings { force, peak }, &Params { begin, approach_m_per_s: approach, .. }) =
+            (self.ceilings, &self.params);
         let stamp = inputs.image.stamp();
         if stamp.age(tick.now) > self.max_age {
             return;

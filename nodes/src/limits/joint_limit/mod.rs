@@ -74,10 +74,10 @@ pub struct Inputs<'a> {
     #[port(unit = "rad/s", robot = "R")]
     velocity: Option<In<'a, Joints>>,
     /// Measured joint positions.
-    #[port(unit = "rad", robot = "R")]
+    #[port(unit = "rad", robot = "R", quantity = "position", known)]
     position: In<'a, Joints>,
     /// Posture that the commands have moved to.
-    #[port(unit = "rad", robot = "R")]
+    #[port(unit = "rad", robot = "R", quantity = "equilibrium", known)]
     equilibrium: In<'a, Joints>,
 }
 
@@ -110,7 +110,7 @@ impl Node for JointLimit {
     const LIMITS: Limits = Limits {
         through: Some("velocity"),
         holds: &["lead", "joint_position", "joint_speed", "joint_acceleration"],
-        breaks: &[],
+        ..Limits::NONE
     };
 
     fn new(params: Params, setup: &mut Setup<Self>) -> Result<Self, Mistakes> {

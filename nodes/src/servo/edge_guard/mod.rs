@@ -62,10 +62,10 @@ pub struct Inputs<'a> {
     #[port(frame = "A")]
     twist: In<'a, Twist>,
     /// Centre of the contact along the sensor's x, from the middle of the pad.
-    #[port(unit = "m", frame = "A")]
+    #[port(unit = "m", frame = "A", quantity = "x")]
     x: Option<In<'a, Scalar>>,
     /// Centre of the contact along the sensor's y, from the middle of the pad.
-    #[port(unit = "m", frame = "A")]
+    #[port(unit = "m", frame = "A", quantity = "y")]
     y: Option<In<'a, Scalar>>,
     /// Any image of the pad, for its size and pitch.
     #[port(unit = "_", frame = "A", sampled)]

@@ -74,13 +74,13 @@ pub struct Params {
 #[derive(Inputs)]
 pub struct Inputs<'a> {
     /// Eccentricity of the contact, from 0 (round) to 1 (a line): from `eccentricity`, or the anisotropy of `moments`.
-    #[port(unit = "1", frame = "A")]
+    #[port(unit = "1", frame = "A", quantity = "eccentricity")]
     eccentricity: In<'a, Scalar>,
     /// Direction of the long axis of the contact.
-    #[port(unit = "rad mod pi", frame = "A")]
+    #[port(unit = "rad mod pi", frame = "A", quantity = "orientation")]
     orientation: Option<In<'a, Scalar>>,
     /// Pose of the sensor in the base, to measure distances.
-    #[port(frame = "A", reference = "B", sampled)]
+    #[port(frame = "A", reference = "B", quantity = "sensor_pose", sampled)]
     pose: In<'a, Pose>,
 }
 

@@ -97,13 +97,13 @@ pub struct Inputs<'a> {
     /// The scan continues while this is set: the contact.
     gate: In<'a, Flag>,
     /// Pose of the sensor in the base, to measure distances.
-    #[port(frame = "A", reference = "B", sampled)]
+    #[port(frame = "A", reference = "B", quantity = "sensor_pose", sampled)]
     pose: In<'a, Pose>,
     /// Centre of the contact along the sensor's x, to find edges.
-    #[port(unit = "m", frame = "A", optional, sampled)]
+    #[port(unit = "m", frame = "A", quantity = "x", optional, sampled)]
     x: Option<In<'a, Scalar>>,
     /// Centre of the contact along the sensor's y, to find edges.
-    #[port(unit = "m", frame = "A", optional, sampled)]
+    #[port(unit = "m", frame = "A", quantity = "y", optional, sampled)]
     y: Option<In<'a, Scalar>>,
 }
 

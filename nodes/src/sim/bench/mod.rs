@@ -242,7 +242,7 @@ fn pad_facts(params: &Params) -> Result<Facts, Mistakes> {
     if let Some(file) = &params.calibration {
         calibration.insert("file".into(), arm::fact_of("calibration", file)?.into());
     }
-    let mut facts = pad::facts(params.threshold, params.pressure, calibration);
+    let mut facts = pad::facts(params.threshold, params.pressure, Unit::NEWTON, calibration);
     let Electronics { common_noise, own_noise, .. } = params.electronics;
     facts.extend([("common_noise".into(), common_noise.into()), ("own_noise".into(), own_noise.into())]);
     Ok(facts)

@@ -3,7 +3,7 @@
 use std::str::FromStr;
 
 use tactflow_runtime::node::{At, FilePath, Mistake, Mistakes, Param, Reader, Written, collect_both, refuse_any};
-use tactflow_runtime::signal::{ImageShape, Unit};
+use tactflow_runtime::signal::{Base, ImageShape, Unit};
 use tactflow_runtime::source::{Code, Item, Value};
 
 use super::Inputs;
@@ -29,7 +29,7 @@ impl Param for PerTactel {
     fn read(value: &Value, reader: &mut Reader<'_>) -> Option<Self> {
         match &value.item {
             Item::Array(_) => Vec::read(value, reader).map(Self::Rows),
-            Item::Integer(_) | Item::Float(_) => f64::read(value, reader).map(Self::All),
+            Item::Integer(_) | Item::Float(_) | Item::String(_) => f64::read(value, reader).map(Self::All),
             _ => reader.wrong_type(value, Self::EXPECTS),
         }
     }
@@ -84,11 +84,27 @@ impl CurveParams {
         let spread = |name: &str, value: &Option<PerTactel>, default| {
             spread(&format!("{prefix}{name}"), value.as_ref().unwrap_or(&PerTactel::All(default)), image)
         };
-        let numbers = collect_both(spread("offset", &self.offset, 0.0), spread("gain", &self.gain, 1.0));
         let unit = self.unit.as_deref().map_or(Ok(image.unit), Unit::from_str);
-        let unit = unit.map_err(|message| Mistake::param(format!("{prefix}unit"), message).into());
-        let ((offset, gain), unit) = collect_both(numbers, unit)?;
+        let unit = unit.map_err(|message| Mistake::param(format!("{prefix}unit"), message));
+        let unit = unit.and_then(|unit| Ok((unit, self.default_gain(prefix, image, unit)?)));
+        let default_gain = unit.as_ref().map_or(1.0, |(_, gain)| *gain);
+        let numbers = collect_both(spread("offset", &self.offset, 0.0), spread("gain", &self.gain, default_gain));
+        let ((offset, gain), (unit, _)) = collect_both(numbers, unit.map_err(Mistakes::from))?;
         Ok((offset, TactelCurves::Linear(gain), unit))
+    }
+
+    /// Returns the slope of the line if `gain` is not given: 1, or the area of a tactel from kPa to N.
+    fn default_gain(&self, prefix: &str, image: &ImageShape, unit: Unit) -> Result<f64, Mistake> {
+        if unit == image.unit || self.gain.is_some() {
+            return Ok(1.0);
+        }
+        if (image.unit, unit) == (Unit::of(Base::Kilopascal), Unit::NEWTON) {
+            let [along_x, along_y] = image.pitch;
+            return Ok(1e3 * along_x * along_y);
+        }
+        let message = format!("nothing converts the image from `{}` to `{unit}`", image.unit);
+        let help = format!("add `{prefix}gain = …`   # [{unit} per {}], or a calibration `file`", image.unit);
+        Err(Mistake::param(format!("{prefix}unit"), message).help(help))
     }
 
     /// Returns the indices of the dead tactels.

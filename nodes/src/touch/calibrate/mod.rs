@@ -7,9 +7,10 @@ mod tactel_curves;
 mod tare;
 
 use tactflow_runtime::node::{
-    Describe, FilePath, In, Inputs, Mistakes, Node, Out, Outputs, Param, Setup, State, Tick, collect_both,
+    At, Describe, FilePath, In, Inputs, Mistake, Mistakes, Node, Out, Outputs, Param, Setup, State, Tick, collect_both,
 };
 use tactflow_runtime::signal::{Flag, Image, ImageShape};
+use tactflow_runtime::source::Code;
 
 use curves::{CurveParams, PerTactel};
 use tactel_curves::TactelCurves;
@@ -21,7 +22,7 @@ use tare::{Averages, Rules};
 /// This node inverts them: `force = curve(value - offset)`, tactel by tactel.
 ///
 /// Without a `file` the curve is a straight line, `(value - offset) * gain`, which has no upper end and continues below
-/// zero. A `file` that `tactflow calibrate` has made from a log with a reference force contains, for s = value -
+/// zero. From an image in kPa to `unit = "N"` the default of `gain` is the area of a tactel, from the pitch. A `file` that `tactflow calibrate` has made from a log with a reference force contains, for s = value -
 /// offset, a line, a squashed curve, `gain s / (1 - squash s)`, or straight lines between knots. Squashed curves and
 /// knots have no force below zero, and end at the largest force of the calibration. The file must be for this pad: its
 /// size and the unit of its readings are checked. A `dead` tactel is always 0. Tactels that have died since the
@@ -63,8 +64,8 @@ pub struct Params {
     /// Reading of an unloaded tactel: a number for all, or a list of rows; 0 without it.
     #[param(unit = "U")]
     offset: Option<PerTactel>,
-    /// Slope of the line, in units of the output per unit of the input: a number for all, or a list of rows; 1 without
-    /// it.
+    /// Slope of the line, in units of the output per unit of the input: a number for all, or a list of rows. Without it
+    /// the slope is 1, or the area of a tactel from kPa to N. Another change of unit needs it.
     #[param(unit = "1")]
     gain: Option<PerTactel>,
     /// Unit of the calibrated image; without it, the unit of the input.
@@ -92,14 +93,14 @@ pub struct Params {
 #[derive(Inputs)]
 pub struct Inputs<'a> {
     /// The image as measured.
-    #[port(unit = "U", frame = "A")]
+    #[port(unit = "U", frame = "A", quantity = "Q")]
     image: In<'a, Image>,
     /// Tares each time that it becomes set; keep it set for at least a frame of the pad.
     #[port(optional, sampled)]
     tare: Option<In<'a, Flag>>,
     /// Whether something touches the pad: `present` of a `label` after this node. A frame with a contact cancels a
     /// tare.
-    #[port(optional, delayed)]
+    #[port(quantity = "contact", optional, delayed)]
     present: Option<In<'a, Flag>>,
 }
 
@@ -107,7 +108,7 @@ pub struct Inputs<'a> {
 #[derive(Outputs)]
 pub struct Outputs {
     /// The calibrated image, in `unit`.
-    #[port(unit = "_", frame = "A")]
+    #[port(unit = "_", frame = "A", quantity = "Q")]
     image: Out<Image>,
 }
 
@@ -138,6 +139,10 @@ impl Node for Calibrate {
         for i in dead.into_iter().chain(others) {
             offset[i] = 0.0;
             curves.disable(i);
+        }
+        if (0..offset.len()).all(|i| curves.is_dead(i)) {
+            let message = "every tactel is dead or has a gain of 0, so the calibrated image is always zero";
+            return Err(Mistake::new(Code::BadValue, At::Node, message).help("check `gain` and `dead`").into());
         }
         setup.outputs.image = ImageShape { unit, ..image };
         Ok(Self { offset, curves, rules })

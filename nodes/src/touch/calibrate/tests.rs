@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use tactflow_runtime::harness::{NodeRig, places};
 use tactflow_runtime::node::{At, Mistake};
-use tactflow_runtime::signal::{FlagShape, Freshness, Shape, Unit};
+use tactflow_runtime::signal::{Base, FlagShape, Freshness, Shape, Unit};
 
 use super::*;
 use crate::calibration::{Calibration, CurveKind, ForceCurve, Tactel, file};
@@ -60,7 +60,9 @@ fn a_mistake_of_the_device_is_marked_at_device() {
 
 #[test]
 fn the_unit_is_that_of_the_input_unless_it_is_set() {
-    for (params, unit) in [("", Unit::RAW), ("unit = \"N\"", Unit::NEWTON), ("unit = \"1\"", Unit::ONE)] {
+    for (params, unit) in
+        [("", Unit::RAW), ("unit = \"N\"\ngain = 0.01", Unit::NEWTON), ("unit = \"1\"\ngain = 2.0", Unit::ONE)]
+    {
         let expected = ImageShape { rows: 2, cols: 3, pitch: [0.005, 0.004], unit };
         assert_eq!(rig(params).unwrap().shape("image"), &Shape::from(expected), "{params}");
     }
@@ -74,6 +76,7 @@ fn every_mistake_is_marked_at_its_parameter() {
         ("gain = 1e39", "gain", "1e39 is too large: a tactel is a 32-bit float"),
         ("offset = [[0, 0, 0], [0, -1e300, 0]]", "offset", "-1e300 is too large"),
         ("unit = \"Nm\"", "unit", "`Nm` is not a unit"),
+        ("unit = \"N\"", "unit", "nothing converts the image from `raw` to `N`"),
         ("dead = [[2, 0]]", "dead", "tactel [2, 0] is outside the array of 2 rows by 3 columns"),
         ("dead = [[0, 3]]", "dead", "tactel [0, 3] is outside the array of 2 rows by 3 columns"),
     ];
@@ -96,6 +99,25 @@ fn every_mistake_is_marked_at_its_parameter() {
     for (wrong, place) in wrongs {
         assert_eq!(places(wrong, &rig(wrong)), [place], "{wrong}");
     }
+}
+
+#[test]
+fn an_image_that_is_always_zero_is_a_mistake() {
+    for params in ["gain = 0.0", "gain = [[0, 0, 0], [0, 0, 0]]", "dead = [[0,0],[0,1],[0,2],[1,0],[1,1],[1,2]]"] {
+        let mistakes = rig(params).err().unwrap();
+        assert!(mistakes[0].message.ends_with("the calibrated image is always zero"), "{params}: {mistakes:?}");
+    }
+    assert!(rig("gain = [[0, 0, 0], [0, 0.1, 0]]").is_ok());
+}
+
+#[test]
+fn pressures_become_forces_with_the_area_of_a_tactel() {
+    let shape = ImageShape { rows: 1, cols: 2, pitch: [0.005, 0.004], unit: Unit::of(Base::Kilopascal) };
+    let mut rig = NodeRig::new::<Calibrate>("unit = 'N'", &[("image", shape.into())]).unwrap();
+    rig.set("image", Image::from_cells(2, &[50.0, -50.0]));
+    rig.step();
+    // 50 kPa on 5 mm by 4 mm is 1 N.
+    assert_eq!(rig.get::<Image>("image").unwrap().cells(), [1.0, -1.0]);
 }
 
 /// A rig with a calibration file of that text.

@@ -50,10 +50,10 @@ pub struct Params {
 #[derive(Outputs)]
 pub struct Outputs {
     /// Number of tactels times the area of one.
-    #[port(unit = "m2", frame = "A")]
+    #[port(unit = "m2", frame = "A", quantity = "area")]
     area: Out<Scalar>,
     /// Area where the interpolated image is above `threshold`; absent without `threshold`.
-    #[port(unit = "m2", frame = "A")]
+    #[port(unit = "m2", frame = "A", quantity = "area")]
     interpolated: Out<Scalar>,
 }
 

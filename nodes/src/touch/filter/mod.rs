@@ -13,7 +13,7 @@ pub(super) use ring::Ring;
 #[derive(Inputs)]
 pub struct Inputs<'a> {
     /// Any feature.
-    #[port(unit = "U", frame = "A")]
+    #[port(unit = "U", frame = "A", quantity = "Q")]
     pub(super) value: In<'a, Scalar>,
 }
 
@@ -21,7 +21,7 @@ pub struct Inputs<'a> {
 #[derive(Outputs)]
 pub struct Outputs {
     /// The filtered feature.
-    #[port(unit = "U", frame = "A")]
+    #[port(unit = "U", frame = "A", quantity = "Q")]
     pub(super) value: Out<Scalar>,
 }
 

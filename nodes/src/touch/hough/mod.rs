@@ -77,14 +77,14 @@ pub struct Params {
 #[derive(Outputs)]
 pub struct Outputs {
     /// Direction of the line from +x toward +y, in (-pi/2, pi/2]; absent if there is no line.
-    #[port(unit = "rad mod pi", frame = "A")]
+    #[port(unit = "rad mod pi", frame = "A", quantity = "orientation")]
     orientation: Out<Scalar>,
     /// Distance of the line from the middle of the pad, positive on the side of the direction turned by +90°; absent if
     /// there is no line.
-    #[port(unit = "m", frame = "A")]
+    #[port(unit = "m", frame = "A", quantity = "offset")]
     offset: Out<Scalar>,
     /// How clear the line is, from 0 (all directions are equal) to 1; absent if the sum of the weights is 0.
-    #[port(unit = "1", frame = "A")]
+    #[port(unit = "1", frame = "A", quantity = "strength")]
     strength: Out<Scalar>,
 }
 

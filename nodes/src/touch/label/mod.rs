@@ -101,6 +101,7 @@ pub struct Outputs {
     #[port(unit = "U", frame = "A")]
     regions: Out<Regions>,
     /// Whether there is a contact.
+    #[port(quantity = "contact")]
     present: Out<Flag>,
 }
 

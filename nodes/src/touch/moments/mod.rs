@@ -83,28 +83,28 @@ pub struct Inputs<'a> {
 #[derive(Outputs)]
 pub struct Outputs {
     /// Sum over the region, f (eq. 1).
-    #[port(unit = "U", frame = "A")]
+    #[port(unit = "U", frame = "A", quantity = "force")]
     force: Out<Scalar>,
     /// Mean over the region, p = f / |R| (eq. 2); absent if the region is empty.
-    #[port(unit = "U/tactel", frame = "A")]
+    #[port(unit = "U/tactel", frame = "A", quantity = "pressure")]
     pressure: Out<Scalar>,
     /// Centre of gravity along the sensor's x from the middle of the pad (eq. 1); absent if the sum of the weights is
     /// not positive.
-    #[port(unit = "m", frame = "A")]
+    #[port(unit = "m", frame = "A", quantity = "x")]
     x: Out<Scalar>,
     /// Centre of gravity along the sensor's y from the middle of the pad (eq. 1); absent if the sum of the weights is
     /// not positive.
-    #[port(unit = "m", frame = "A")]
+    #[port(unit = "m", frame = "A", quantity = "y")]
     y: Out<Scalar>,
     /// Number of tactels of the region, |R|.
-    #[port(unit = "tactel", frame = "A")]
+    #[port(unit = "tactel", frame = "A", quantity = "area")]
     area: Out<Scalar>,
     /// Direction of the region's long axis from +x toward +y, in (-pi/2, pi/2]; absent if the region is round.
-    #[port(unit = "rad mod pi", frame = "A")]
+    #[port(unit = "rad mod pi", frame = "A", quantity = "orientation")]
     orientation: Out<Scalar>,
     /// Difference of the principal second moments over their sum, from 0 (round) to 1 (a line); absent if the sum of
     /// the weights is not positive.
-    #[port(unit = "1", frame = "A")]
+    #[port(unit = "1", frame = "A", quantity = "anisotropy")]
     anisotropy: Out<Scalar>,
 }
 

@@ -52,7 +52,7 @@ pub struct Params {
 #[derive(Inputs)]
 pub struct Inputs<'a> {
     /// The newest image, in the device's order of rows and columns.
-    #[port(unit = "U", frame = "A")]
+    #[port(unit = "U", frame = "A", quantity = "Q")]
     image: In<'a, Image>,
 }
 
@@ -60,13 +60,13 @@ pub struct Inputs<'a> {
 #[derive(Outputs)]
 pub struct Outputs {
     /// The image in the sensor's frame: row i along +y, column j along +x.
-    #[port(unit = "U", frame = "A")]
+    #[port(unit = "U", frame = "A", quantity = "Q")]
     image: Out<Image>,
     /// Sum over the whole image.
-    #[port(unit = "U", frame = "A")]
+    #[port(unit = "U", frame = "A", quantity = "sum")]
     sum: Out<Scalar>,
     /// Largest tactel of the whole image.
-    #[port(unit = "U", frame = "A")]
+    #[port(unit = "U", frame = "A", quantity = "peak")]
     peak: Out<Scalar>,
 }
 

@@ -4,7 +4,7 @@ use std::fmt::Write;
 
 use crate::cli::text::number::{number, seconds};
 use crate::cli::text::table::table;
-use crate::engine::{Engine, ModeChange};
+use crate::engine::{Engine, ModeChange, Rest};
 use crate::graph::Policy;
 use crate::node::PortId;
 use crate::signal::Scalar;
@@ -101,6 +101,13 @@ fn halts(engine: &Engine) -> String {
         };
         // Writing to a string cannot fail.
         let _ = writeln!(text, "commands {what} {duration}: {}", halt.fault);
+    }
+    for Rest { role, fault, until } in engine.rests().iter().take(MAX_LISTED) {
+        let duration = match until {
+            Some(until) => format!("for {:.3} s", seconds(until - fault.time)),
+            None => "until the end".to_owned(),
+        };
+        let _ = writeln!(text, "`{role}` stopped {duration}: {fault}");
     }
     let more = engine.halts().len().saturating_sub(MAX_LISTED) as u64 + engine.unlisted_halts();
     if more > 0 {

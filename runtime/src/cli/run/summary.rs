@@ -75,6 +75,10 @@ impl Summary {
             let counts: Vec<String> = counts.iter().map(|(what, count)| format!("{count} {what}")).collect();
             let _ = writeln!(text, "device `{device}`: {}", counts.join(", "));
         }
+        if !engine.uncalibrated().is_empty() {
+            let names = engine.uncalibrated().join("`, `");
+            let _ = writeln!(text, "nothing was limited in newtons: the limits of `{names}` are raw readings");
+        }
         if outcome.late > 0 {
             let _ = writeln!(text, "{} ticks started more than one period late", outcome.late);
         }

@@ -4,8 +4,6 @@
 //! sensor that has stopped triggers no change. When several exits hold in one tick, `fail` comes first, then
 //! `on_lost`, `done` and `go`; among `go`, the higher priority wins. Exits that could still tie are rejected at load.
 
-use std::collections::BTreeSet;
-
 use crate::graph::{Condition, ExitKind, PlannedExit, PlannedModes, PortRef, PortState, Test};
 use crate::node::{Bus, PortId, ScalarId, Tick};
 use crate::signal::{Freshness, Kind, Pose};
@@ -45,6 +43,8 @@ pub(crate) enum Transition {
 pub(crate) struct ModeMachine {
     modes: Vec<Mode>,
     current: usize,
+    /// The mode before the current one.
+    before: usize,
     /// Time at which the current mode began [ns]; `None` before the first tick.
     entered: Option<i64>,
     /// Index of the exit that was taken last.
@@ -68,7 +68,7 @@ enum ChangeReason {
 struct Mode {
     name: String,
     exits: Vec<Exit>,
-    /// For each runner that any mode changes: its index, and the configuration it has in this mode.
+    /// The runners that this mode changes: their indices, in this order, and the configurations that they have.
     configurations: Vec<(usize, usize)>,
 }
 
@@ -104,8 +104,6 @@ struct ConditionState {
 impl ModeMachine {
     /// Creates the machine. `port` finds a port on the bus and its kind.
     pub(crate) fn new(planned: PlannedModes, port: impl Fn(PortRef) -> (PortId, Kind)) -> Self {
-        let configurations = planned.modes.iter().flat_map(|mode| &mode.configurations);
-        let changed: BTreeSet<usize> = configurations.map(|(runner, _)| *runner).collect();
         let input = |exit: &PlannedExit| match &exit.condition {
             Condition::Port(watched, _) | Condition::Lost(watched, _) => {
                 Some(ConditionInput::new(port(watched.source), watched.feature))
@@ -114,8 +112,8 @@ impl ModeMachine {
             Condition::Elapsed(_) | Condition::Sent(_) => None,
         };
         let modes = planned.modes.into_iter().map(|mode| {
-            let own = |runner: usize| mode.configurations.iter().find(|(own, _)| *own == runner).map_or(0, |(_, n)| *n);
-            let configurations = changed.iter().map(|runner| (*runner, own(*runner))).collect();
+            let mut configurations = mode.configurations;
+            configurations.sort_unstable();
             let mut exits: Vec<Exit> = mode
                 .exits
                 .into_iter()
@@ -127,6 +125,7 @@ impl ModeMachine {
         Self {
             modes: modes.collect(),
             current: planned.start,
+            before: planned.start,
             entered: None,
             taken: 0,
             changes: Vec::with_capacity(MAX_CHANGES),
@@ -134,9 +133,14 @@ impl ModeMachine {
         }
     }
 
-    /// Returns the configurations of the current mode: the index of each runner and the number of its configuration.
-    pub(crate) fn configurations(&self) -> &[(usize, usize)] {
-        &self.modes[self.current].configurations
+    /// Returns what the last switch changes: the index of each runner and the number of its configuration.
+    ///
+    /// A runner that only the mode before changed has its first configuration again.
+    pub(crate) fn configurations(&self) -> impl Iterator<Item = (usize, usize)> {
+        let [before, own] = [self.before, self.current].map(|mode| &self.modes[mode].configurations);
+        let is_kept = |runner: usize| own.binary_search_by_key(&runner, |(own, _)| *own).is_ok();
+        let restored = before.iter().filter(move |(runner, _)| !is_kept(*runner)).map(|(runner, _)| (*runner, 0));
+        restored.chain(own.iter().copied())
     }
 
     /// Returns to the start mode. After a stop, the contact may have changed, so no condition keeps its state.
@@ -171,7 +175,7 @@ impl ModeMachine {
     }
 
     fn enter(&mut self, mode: usize, reason: ChangeReason, tick: &Tick) {
-        self.current = mode;
+        (self.before, self.current) = (self.current, mode);
         self.entered = Some(tick.now);
         self.modes[mode].exits.iter_mut().for_each(|exit| exit.state = ConditionState::default());
         if self.changes.len() < MAX_CHANGES {

@@ -118,9 +118,9 @@ impl Core {
     }
 
     /// Switches the configurations of runners: the index of each runner and the number of its configuration.
-    pub(crate) fn switch(&mut self, configurations: &[(usize, usize)]) {
+    pub(crate) fn switch(&mut self, configurations: impl Iterator<Item = (usize, usize)>) {
         for (runner, configuration) in configurations {
-            self.runners[*runner].switch(*configuration);
+            self.runners[runner].switch(configuration);
         }
     }
 

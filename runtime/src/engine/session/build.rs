@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use super::budgets::WatchedBudget;
 use super::engine::{Display, Engine, Logged};
 use super::halt::HaltMachine;
 use super::schedule::TickSchedule;
@@ -15,7 +16,7 @@ use crate::graph::{
     Policy, PortRef, Producer,
 };
 use crate::node::{Bus, PortId, Tick};
-use crate::signal::{Mark, Stamp};
+use crate::signal::{Mark, Shape};
 use crate::source::SourceMap;
 
 /// The ports of a graph on its bus.
@@ -64,9 +65,18 @@ impl Engine {
         let roles = plan.roles.iter().map(|role| (role.name.clone(), place(role.device))).collect();
         let names = plan.nodes.iter().map(|node| (node.name.clone(), sources.locate(node.span.start))).collect();
         let limits = limits(&plan.nodes, &ports);
+        let budgets = budgets(&plan.nodes, &ports);
+        let uncalibrated =
+            plan.nodes.iter().filter(|node| node.is_uncalibrated).map(|node| node.name.clone()).collect();
         let mut watched = watched_commands(&plan.commands, &ports);
         let devices = plan.devices.into_iter().enumerate();
-        let devices = devices.map(|(i, device)| device_slot(i, device, &plan.commands, &sources)).collect();
+        let reports: BTreeMap<(usize, usize), &Shape> = plan
+            .commands
+            .iter()
+            .filter(|wire| wire.is_report)
+            .map(|wire| ((wire.device, wire.port), &wire.shape))
+            .collect();
+        let devices = devices.map(|(i, device)| device_slot(i, device, &reports, &sources)).collect();
         let runners: Vec<NodeRunner> =
             plan.nodes.into_iter().map(|node| runner(node, &mut ports, &mut watched)).collect();
         let (reports, commands): (Vec<_>, Vec<_>) = plan.commands.into_iter().partition(|wire| wire.is_report);
@@ -83,7 +93,7 @@ impl Engine {
         });
         let display = display(view, &ports);
         let (max_gap, reset_after) = (plan.max_gap, plan.reset_after);
-        let tick = Tick { index: 0, now: 0, dt: 0.0, stamp: Stamp::TIMELESS, max_gap, reset_after, is_halted: false };
+        let tick = Tick { index: 0, now: 0, max_gap, reset_after, ..Tick::first() };
         let timing = Timing::new(runners.len());
         let mut core = Core::new(ports.bus, runners, inlets, (commands, slots), tick);
         modes.iter().for_each(|modes| core.switch(modes.configurations()));
@@ -98,6 +108,9 @@ impl Engine {
             logged,
             display,
             limits,
+            uncalibrated,
+            budgets,
+            rests: Vec::new(),
             names,
             roles,
             reported,
@@ -132,17 +145,31 @@ fn display(view: PlannedView, ports: &BusPorts) -> Display {
 
 /// Returns the ports on which limit nodes report the scale of the motion.
 fn limits(nodes: &[PlannedNode], ports: &BusPorts) -> Vec<(String, PortId)> {
-    let is_scale =
-        |name: &str| nodes.iter().any(|node| node.holds.iter().any(|limit| name == format!("{}.{limit}", node.name)));
-    let scales = ports.list.iter().filter(|(port, _)| is_scale(&port.name));
-    scales.map(|(port, id)| (port.name.clone(), *id)).collect()
+    let scales = nodes.iter().flat_map(|node| {
+        let is_scale = |name: &str| node.holds.iter().any(|limit| name == format!("{}.{limit}", node.name));
+        node.outputs().filter(move |(_, port)| is_scale(&port.name))
+    });
+    scales.map(|(source, port)| (port.name.clone(), ports.id(source))).collect()
 }
 
-fn device_slot(i: usize, device: PlannedDevice, commands: &[PlannedCommand], sources: &SourceMap) -> DeviceSlot {
-    let wired = |report: usize| {
-        let planned = commands.iter().find(|wire| wire.is_report && (wire.device, wire.port) == (i, report));
-        planned.map(|planned| &planned.shape)
+/// Returns the budgets of the limiters.
+fn budgets(nodes: &[PlannedNode], ports: &BusPorts) -> Vec<WatchedBudget> {
+    let budget = |(runner, node): (usize, &PlannedNode)| {
+        let (port, role) = node.budget.clone()?;
+        let flag = ports.id(PortRef { producer: Producer::Node(node.index), port });
+        Some(WatchedBudget { role, runner, flag, is_spent: false })
     };
+    nodes.iter().enumerate().filter_map(budget).collect()
+}
+
+/// `reports` holds the shape of each wired report, by its device and its number there.
+fn device_slot(
+    i: usize,
+    device: PlannedDevice,
+    reports: &BTreeMap<(usize, usize), &Shape>,
+    sources: &SourceMap,
+) -> DeviceSlot {
+    let wired = |report: usize| reports.get(&(i, report)).copied();
     DeviceSlot {
         place: sources.locate(device.span.start),
         name: device.name,

@@ -68,6 +68,7 @@ impl Engine {
     /// Returns the fault that ends the run. The commands of this tick are not committed.
     pub fn step(&mut self) -> Result<(), Fault> {
         self.core.latch(&mut self.devices);
+        self.core.tick.is_resumed = self.halts.resumes;
         if let Some((policy, inlet)) = self.core.stale() {
             self.raise(policy, Trouble::Stale(inlet))?;
         }
@@ -76,6 +77,7 @@ impl Engine {
             Ok(false) => self.on_not_finite()?,
             Err(panic) => self.on_panic(panic_message(&*panic))?,
         }
+        self.watch_budgets()?;
         for i in 0..self.watched.len() {
             let wire = &self.watched[i];
             if wire.aged.is_stale(&self.core.bus, self.core.tick.now) {

@@ -1,5 +1,6 @@
 //! The engine: the state of a running graph and its accessors.
 
+use super::budgets::{Rest, WatchedBudget};
 use super::halt::{Halt, HaltMachine};
 use super::schedule::TickSchedule;
 use super::trouble::{Trouble, WatchedWire};
@@ -20,6 +21,10 @@ pub struct Engine {
     pub(super) display: Display,
     /// Name and port of the scale that each limit reports.
     pub(super) limits: Vec<(String, PortId)>,
+    pub(super) budgets: Vec<WatchedBudget>,
+    pub(super) rests: Vec<Rest>,
+    /// Names of the limiters whose limits are in raw readings.
+    pub(super) uncalibrated: Vec<String>,
     /// Name and source location of each runner's node.
     pub(super) names: Vec<(String, String)>,
     /// Name of each role, and the source location of its device.
@@ -208,6 +213,12 @@ impl Engine {
     /// 1.
     pub fn limits(&self) -> impl Iterator<Item = (&str, PortId)> {
         self.limits.iter().map(|(name, id)| (name.as_str(), *id))
+    }
+
+    /// Returns the names of the limiters whose limits are in raw readings.
+    #[must_use]
+    pub fn uncalibrated(&self) -> &[String] {
+        &self.uncalibrated
     }
 
     /// Returns the names of the nodes in the order in which they step.

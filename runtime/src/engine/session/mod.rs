@@ -1,6 +1,7 @@
 //! Runs around the tick: the exchange with devices, faults and halts, pacing, real time and the operator.
 
 mod blame;
+mod budgets;
 mod build;
 mod cycle;
 mod drive;
@@ -13,6 +14,7 @@ mod schedule;
 mod signals;
 mod trouble;
 
+pub use budgets::Rest;
 pub use drive::run_virtual;
 pub use engine::{Display, Engine, Logged};
 pub use halt::Halt;

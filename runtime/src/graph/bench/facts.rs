@@ -9,6 +9,7 @@ use crate::node::Spanned;
 use crate::source::{Code, Diagnostic, Diagnostics, Item, Table, Value};
 
 /// Replaces every `{ from = "role.fact" }` by the fact, and every `{ from = "limits.key" }` by the value in [limits].
+/// An optional one that is not there is left out.
 ///
 /// Returns whether all of them are known.
 pub(crate) fn fill_facts(
@@ -17,7 +18,10 @@ pub(crate) fn fill_facts(
     opened: &OpenedBench,
     diagnostics: &mut Diagnostics,
 ) -> bool {
-    let Some((word, place)) = value.as_table().and_then(Table::fact) else {
+    let Some(fact) = value.as_table().and_then(Table::fact) else {
+        if let Item::Table(table) = &mut value.item {
+            table.entries.retain(|(_, item)| !is_left_out(item, net, opened));
+        }
         let mut fill = |item| fill_facts(item, net, opened, diagnostics);
         return match &mut value.item {
             Item::Array(items) => items.iter_mut().fold(true, |good, item| fill(item) & good),
@@ -25,8 +29,16 @@ pub(crate) fn fill_facts(
             _ => true,
         };
     };
-    let fact = find_fact(word, place, &value.span, net, opened);
+    let fact = find_fact(fact.word, fact.place, &value.span, net, opened);
     report(fact, diagnostics).map(|fact| *value = fact).is_some()
+}
+
+/// Returns whether a value is an optional fact that is not there.
+fn is_left_out(value: &Value, net: &Net<'_>, opened: &OpenedBench) -> bool {
+    let Some(fact) = value.as_table().and_then(Table::fact).filter(|fact| fact.is_optional) else { return false };
+    let role = fact.word.split_once('.').map_or(fact.word, |(role, _)| role);
+    let is_known = role == LIMITS || net.flat.roles.position(role).is_some();
+    is_known && find_fact(fact.word, fact.place, &value.span, net, opened).is_err()
 }
 
 /// Returns the fact that the word at `place` names, as a value at `span`.
@@ -43,10 +55,10 @@ fn find_fact(
         // A missing value is reported at the section.
         return net.flat.limits.as_ref().and_then(|(_, table)| table.get(name)).cloned().ok_or(None);
     }
-    let roles = net.flat.role_names();
-    let Some(index) = roles.clone().position(|known| known == role) else {
+    let roles = &net.flat.roles;
+    let Some(index) = roles.position(role) else {
         let place = part(0..role.len());
-        return Diagnostic::unknown(Code::UnknownFact, "role", role, &place, roles.chain([LIMITS])).into_err();
+        return Diagnostic::unknown(Code::UnknownFact, "role", role, &place, roles.names().chain([LIMITS])).into_err();
     };
     // A device that could not be opened has its own diagnostic.
     let facts = &opened.roles[index].as_ref().ok_or(None)?.facts;

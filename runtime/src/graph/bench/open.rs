@@ -6,10 +6,11 @@ use std::ops::Range;
 
 use crate::catalogue::Catalogue;
 use crate::device::{Description, StatedPort};
+use crate::graph::load::MeasuredValues;
 use crate::graph::net::Net;
 use crate::graph::plan::PlannedDevice;
 use crate::graph::syntax::{BenchDocument, Block, WireEntry};
-use crate::node::{Mistake, PortSpec, Reader, Spanned};
+use crate::node::{KnownUnits, Mistake, PortSpec, Reader, Spanned};
 use crate::signal::Shape;
 use crate::source::{
     Code, Diagnostic, Diagnostics, Edit, Item, Key, SourceMap, Value, quoted, suggest_name, suggestion,
@@ -33,6 +34,8 @@ pub(crate) struct OpenedBench {
     pub(crate) roles: Vec<Option<BoundRole>>,
     /// Roles for scenarios and recordings only, in the order of `Net::observed`.
     pub(crate) observed: Vec<Option<BoundRole>>,
+    /// The values of parameters that were written with a unit.
+    pub(crate) measured: MeasuredValues,
 }
 
 impl OpenedBench {
@@ -56,14 +59,15 @@ pub(crate) fn open(net: &Net<'_>, sources: &mut SourceMap, diagnostics: &mut Dia
         catalogue: net.catalogue,
         sources,
         diagnostics,
+        blocks: net.flat.bench.iter().flat_map(|bench| &bench.devices).map(|block| (&*block.key.name, block)).collect(),
         tried: BTreeMap::new(),
-        taken: Vec::new(),
+        taken: BTreeMap::new(),
         kinds: net.flat.roles.iter().map(|(key, kind)| (key.name.clone(), kind.value.clone())).collect(),
         unbound: Vec::new(),
         opened: OpenedBench::default(),
     };
     let bench = net.flat.bench.as_ref();
-    let is_bound = |role: &&String| bench.is_none_or(|bench| bench.bind.iter().any(|(key, _)| key.name == **role));
+    let is_bound = |role: &&String| bench.is_none_or(|bench| bench.bind.position(role).is_some());
     opener.unbound = opener.kinds.keys().filter(|role| !is_bound(role)).cloned().collect();
     if let Some(bench) = bench {
         let declared = net.flat.roles.iter().map(|(key, _)| key);
@@ -93,10 +97,13 @@ struct Opener<'a> {
     catalogue: &'a Catalogue,
     sources: &'a mut SourceMap,
     diagnostics: &'a mut Vec<Diagnostic>,
+    /// The blocks of the devices, by name.
+    blocks: BTreeMap<&'a str, &'a Block>,
     /// Devices that were tried, by name: their index if they opened.
     tried: BTreeMap<String, Option<usize>>,
-    /// Bindings so far: index of the device, index of the role among those it can fill, name of the role.
-    taken: Vec<(usize, usize, String)>,
+    /// Name of the role for each role of a device that is filled: index of the device, and index of the role among
+    /// those that it can fill.
+    taken: BTreeMap<(usize, usize), String>,
     /// The roles of the task with their types, and those of them that no device is bound to.
     kinds: BTreeMap<String, String>,
     unbound: Vec<String>,
@@ -117,7 +124,7 @@ impl Opener<'_> {
                 let diagnostic = Diagnostic::new(Code::ObservedRole, role.span.clone(), message);
                 self.diagnostics.push(diagnostic.help(format!("did you mean `{name}`?")));
             }
-            if !bench.devices.iter().any(|device| device.key.name == word.value) {
+            if !self.blocks.contains_key(&*word.value) {
                 self.diagnostics.push(unknown_device(word, bench));
             }
         }
@@ -126,6 +133,8 @@ impl Opener<'_> {
     /// Checks the types of all devices, and the parameters of those that are not opened because none of the `roles`
     /// uses them.
     fn check_devices(&mut self, bench: &BenchDocument, roles: &BTreeSet<&str>) {
+        let bound = bench.bind.iter().filter(|(role, _)| roles.contains(&*role.name));
+        let opened: BTreeSet<&str> = bound.map(|(_, word)| word.value.as_str()).collect();
         for device in &bench.devices {
             let Some(kind) = &device.kind else { continue };
             let Some(known) = self.catalogue.find_device(&kind.value) else {
@@ -135,8 +144,7 @@ impl Opener<'_> {
                 self.diagnostics.push(unknown);
                 continue;
             };
-            let mut bound = bench.bind.iter().filter(|(_, word)| word.value == device.key.name);
-            let is_opened = bound.any(|(role, _)| roles.contains(&*role.name));
+            let is_opened = opened.contains(&*device.key.name);
             let params = known.params();
             let entries = device.params.as_table().filter(|_| !is_opened).into_iter().flat_map(|table| &table.entries);
             for (key, _) in entries.filter(|(key, _)| !params.iter().any(|param| param.name == key.name)) {
@@ -149,7 +157,7 @@ impl Opener<'_> {
     }
 
     fn role(&mut self, bench: &BenchDocument, key: &Key, kind: &Spanned<String>) -> Option<BoundRole> {
-        let Some((_, word)) = bench.bind.iter().find(|(role, _)| role.name == key.name) else {
+        let Some(word) = bench.bind.get(&key.name) else {
             if !bench.invalid.iter().any(|role| role.name == key.name) {
                 let unbound = self.unbound(bench, key, &kind.value);
                 self.diagnostics.push(unbound);
@@ -158,14 +166,14 @@ impl Opener<'_> {
         };
         let device = self.device(bench, word)?;
         let description = &self.opened.devices[device].description;
-        let is_free = |i: &usize| !self.taken.iter().any(|(d, filled, _)| (*d, filled) == (device, i));
+        let is_free = |i: &usize| !self.taken.contains_key(&(device, *i));
         let mut fitting = (0..description.fills.len()).filter(|i| description.fills[*i].role == kind.value);
         let Some(fills) = fitting.clone().find(is_free) else {
-            let by = fitting.next().and_then(|i| self.taken.iter().find(|(d, filled, _)| (*d, *filled) == (device, i)));
+            let by = fitting.next().and_then(|i| self.taken.get(&(device, i)));
             let roles = quoted(description.roles());
             let (device, role) = (&word.value, &key.name);
             let (message, help) = match by {
-                Some((_, _, by)) => (
+                Some(by) => (
                     format!("device `{device}` already fills the role `{by}`"),
                     "bind each role to its own device".into(),
                 ),
@@ -177,19 +185,26 @@ impl Opener<'_> {
             self.diagnostics.push(Diagnostic::new(Code::WrongRole, word.span.clone(), message).help(help));
             return None;
         };
-        self.taken.push((device, fills, key.name.clone()));
+        self.taken.insert((device, fills), key.name.clone());
         let role = self.catalogue.role_type(&kind.value)?;
         let number = |stated: &[StatedPort], declared: &[PortSpec]| {
             let port = |spec: &PortSpec| stated.iter().position(|port| port.fill == fills && port.name == spec.name);
             let port = |spec: &PortSpec| port(spec).map(|port| (port, stated[port].shape.clone()));
             declared.iter().filter_map(port).collect()
         };
+        let own = bench.facts.iter().filter(|(role, _)| role.name == key.name).flat_map(|(_, table)| &table.entries);
+        let own = own.filter_map(|(fact, value)| Some((fact.name.clone().into(), toml::Value::try_from(value).ok()?)));
+        // The bench knows better than the device.
+        let own: Vec<(Cow<'static, str>, toml::Value)> = own.collect();
+        let stated =
+            description.fills[fills].facts.iter().filter(|(name, _)| !own.iter().any(|(fact, _)| fact == name));
+        let facts = stated.cloned().chain(own.iter().cloned()).collect();
         Some(BoundRole {
             device,
             outputs: number(&description.outputs, &role.outputs),
             commands: number(&description.commands, &role.commands),
             reports: number(&description.reports, &role.reports),
-            facts: description.fills[fills].facts.clone(),
+            facts,
         })
     }
 
@@ -275,15 +290,17 @@ impl Opener<'_> {
     }
 
     fn open(&mut self, bench: &BenchDocument, word: &Spanned<String>) -> Option<usize> {
-        let Some(block) = bench.devices.iter().find(|device| device.key.name == word.value) else {
+        let Some(block) = self.blocks.get(&*word.value).copied() else {
             self.diagnostics.push(unknown_device(word, bench));
             return None;
         };
         let kind = block.kind.as_ref()?;
         let device = self.catalogue.find_device(&kind.value)?;
-        let mut reader = Reader::new(self.sources);
+        let specs = device.params();
+        let mut reader = Reader::new(self.sources).with_units(KnownUnits::of_params(&block.params, &specs));
         let opened = device.open(&block.params, &mut reader);
-        let mistakes = reader.mistakes;
+        let (mistakes, measured) = (reader.mistakes, reader.measured);
+        self.opened.measured.add(None, measured);
         place_mistakes(mistakes, &block.params, &[], self.sources, self.diagnostics);
         let crate::device::Opened { mut description, driver } = opened?;
         let period = description.period;

@@ -1,11 +1,13 @@
 //! Resolves the exits of modes: each has one condition, and the port of that condition must support it.
 
+use std::collections::BTreeMap;
 use std::f64::consts::FRAC_PI_2;
 use std::ops::Range;
 
+use crate::graph::load::MeasuredValues;
 use crate::graph::net::{Net, Resolved};
 use crate::graph::plan::{Condition, PlannedExit, PlannedPort, PortRef, Test, WatchedPort};
-use crate::graph::syntax::{ExitKind, ExitTable, ModeBlock, ModeExit, PortState};
+use crate::graph::syntax::{ExitKind, ExitTable, ModeBlock, ModeExit, PortState, into_diagnostic};
 use crate::node::Spanned;
 use crate::signal::{Kind, Shape};
 use crate::source::{Code, Diagnostic, Diagnostics, quoted};
@@ -13,8 +15,8 @@ use crate::source::{Code, Diagnostic, Diagnostics, quoted};
 /// What the exits of a mode refer to.
 pub(crate) struct ExitContext<'a> {
     pub(crate) net: &'a Net<'a>,
-    /// The names of the modes.
-    pub(crate) modes: Vec<&'a str>,
+    /// Index of each mode by its name.
+    pub(crate) modes: BTreeMap<&'a str, usize>,
     /// Returns a built port, or `None` if its node has mistakes.
     pub(crate) port: &'a dyn Fn(PortRef) -> Option<&'a PlannedPort>,
     /// The poses of the graph.
@@ -25,12 +27,18 @@ pub(crate) struct ExitContext<'a> {
 
 impl ExitContext<'_> {
     /// Resolves the exits of a mode; exits with a mistake are left out.
-    pub(crate) fn resolve(&self, mode: &ModeBlock, diagnostics: &mut Diagnostics) -> Vec<PlannedExit> {
+    pub(crate) fn resolve(
+        &self,
+        mode: &ModeBlock,
+        measured: &mut MeasuredValues,
+        diagnostics: &mut Diagnostics,
+    ) -> Vec<PlannedExit> {
         let mut planned = Vec::new();
         for exit in &mode.exits {
             let ModeExit { kind, span, table } = exit;
             diagnostics.extend(misplaced_key(exit));
-            match (self.target(exit), self.condition(exit)) {
+            let settled = self.in_port_unit(exit, measured, diagnostics);
+            match (self.target(exit), settled.and_then(|exit| self.condition(&exit))) {
                 (Ok(to), Ok((condition, text))) => planned.push(PlannedExit {
                     kind: *kind,
                     to,
@@ -49,16 +57,46 @@ impl ExitContext<'_> {
         planned
     }
 
+    /// Returns an exit with its bounds in the unit of the port that it watches.
+    fn in_port_unit(
+        &self,
+        exit: &ModeExit,
+        measured: &mut MeasuredValues,
+        diagnostics: &mut Diagnostics,
+    ) -> Resolved<ModeExit> {
+        let mut exit = exit.clone();
+        if !exit.table.amounts_mut().any(|amount| amount.has_unit()) {
+            return Ok(exit);
+        }
+        let Some(when) = exit.table.when.clone() else { return Ok(exit) };
+        let (watched, _) = self.watched(&when)?;
+        let unit = match (&(self.port)(watched.source).ok_or(None)?.shape, watched.feature) {
+            (Shape::Scalar(shape), None) => shape.unit,
+            (Shape::Features(shape), Some(feature)) => shape.features[feature].unit,
+            // A bound on another port has its own diagnostic.
+            _ => return Ok(exit),
+        };
+        let mut numbers = Vec::new();
+        let wrong = exit.table.amounts_mut().filter_map(|amount| amount.settle(Some(unit), &mut numbers).err());
+        let wrong: Vec<_> = wrong.map(into_diagnostic).collect();
+        measured.add(None, numbers);
+        if wrong.is_empty() {
+            return Ok(exit);
+        }
+        diagnostics.extend(wrong);
+        Err(None)
+    }
+
     /// Returns the index of the target mode, or `None` if the exit ends the run.
     fn target(&self, ModeExit { kind, span, table }: &ModeExit) -> Resolved<Option<usize>> {
         let has_target = matches!(kind, ExitKind::Go | ExitKind::OnLost);
         match (&table.to, has_target) {
             (Some(to), true) => {
-                let mode = self.modes.iter().position(|name| *name == to.value);
+                let mode = self.modes.get(to.value.as_str()).copied();
                 if mode.is_some() {
                     return Ok(mode);
                 }
-                let known = self.modes.iter().copied();
+                let known = self.net.flat.mode_names();
                 Diagnostic::unknown(Code::UnknownMode, "mode", &to.value, &to.span, known).into_err()
             }
             (None, true) => {
@@ -195,8 +233,10 @@ impl ExitContext<'_> {
         when: &Spanned<String>,
         name: &str,
         watched: WatchedPort,
-        &ExitTable { within, above, below, hysteresis, .. }: &ExitTable,
+        table: &ExitTable,
     ) -> Resolved<(Condition, String)> {
+        let [within, above, below, hysteresis] = [&table.within, &table.above, &table.below, &table.hysteresis]
+            .map(|amount| amount.as_ref().map(|amount| amount.number));
         let out_of_range = |message: String| Diagnostic::new(Code::BoundOutOfRange, when.span.clone(), message);
         let (min, max, text) = match (within, above, below) {
             (Some(size), ..) => (-size, size, format!("within {size}")),

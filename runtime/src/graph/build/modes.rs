@@ -1,9 +1,9 @@
 //! Builds the configurations of each mode: nodes that a mode changes are built again with its parameters.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use super::conditions::ExitContext;
-use super::demand::{Demand, find_demand};
+use super::demand::{Demand, DemandChanges};
 use super::nodes::Builder;
 use crate::graph::check::live;
 use crate::graph::load::{Entity, FlatGraph};
@@ -16,67 +16,68 @@ use crate::source::{Code, Diagnostic, Diagnostics, Item, Table};
 /// The modes of a graph, with what the checks need to know about each.
 pub(crate) struct BuiltModes {
     pub(crate) modes: Vec<PlannedMode>,
-    /// For each mode, which nodes generate no motion. A graph without modes counts as one mode.
-    pub(crate) still: Vec<Vec<bool>>,
-    /// For each mode, the components that are read.
-    pub(crate) demand: Vec<Demand>,
+    /// Which nodes generate no motion with the parameters of the graph.
+    pub(crate) still: Vec<bool>,
+    /// For each mode, the nodes that differ in that from `still`.
+    pub(crate) still_changes: Vec<BTreeSet<usize>>,
+    /// The components that are read with the parameters of the graph.
+    pub(crate) demand: Demand,
+    /// For each mode, where it reads other components.
+    pub(crate) demand_changes: Vec<DemandChanges>,
     /// Nodes whose outputs are absent where nothing reads them.
     pub(crate) freezes: BTreeMap<usize, bool>,
 }
 
 /// Builds the modes and adds their configurations to the nodes.
 pub(crate) fn build_modes(builder: &mut Builder<'_>, nodes: &mut [PlannedNode]) -> BuiltModes {
-    let flat = builder.net.flat;
-    let all = 0..flat.nodes.len();
-    let base = find_demand(builder.net, &|index| find(nodes, index).map(|node| &*node.node));
-    let want = |node: &mut PlannedNode| (node.index, node.node.want(&base[node.index]));
+    let net = builder.net;
+    let mut places = vec![None; net.flat.nodes.len()];
+    nodes.iter().enumerate().for_each(|(place, node)| places[node.index] = Some(place));
+    let demand = Demand::find(net, &|index| Some(&*nodes[places[index]?].node));
+    let want = |node: &mut PlannedNode| (node.index, node.node.want(demand.of(node.index, &DemandChanges::new())));
     let freezes = nodes.iter_mut().map(want).collect();
-    let mut built = BuiltModes { modes: Vec::new(), still: Vec::new(), demand: Vec::new(), freezes };
-    if flat.modes.is_empty() {
-        built.still.push(all.map(|node| builder.is_still(node)).collect());
-        return built;
-    }
-    for block in &flat.modes {
-        let exits = exits(block, builder, nodes);
+    let still = (0..places.len()).map(|node| builder.is_still(node)).collect();
+    let (mut modes, mut still_changes, mut demand_changes) = (Vec::new(), Vec::new(), Vec::new());
+    for (block, exits) in net.flat.modes.iter().zip(exits(builder, nodes)) {
         let mut variants = variants(block, builder);
-        let variant = |index: usize| variants.get(&index).map(|variant| &*variant.node);
-        let demand = find_demand(builder.net, &|index| variant(index).or_else(|| Some(&*find(nodes, index)?.node)));
+        let changed: Vec<usize> = variants.keys().copied().collect();
+        let built = |index: usize| match variants.get(&index) {
+            Some(variant) => Some(&*variant.node),
+            None => Some(&*nodes[places[index]?].node),
+        };
+        let changes = demand.changes(net, changed.into_iter(), &built);
         // A node whose parameters the mode does not set is built again if other components of its outputs are read.
-        let differs = |index: &usize| base[*index] != demand[*index] && !variants.contains_key(index);
-        let differing: Vec<usize> = nodes.iter().map(|node| node.index).filter(differs).collect();
+        let differing: Vec<usize> = changes.keys().copied().filter(|node| !variants.contains_key(node)).collect();
         for index in differing {
-            let built = builder.variant(index, &flat.nodes[index].block.params);
+            let built = builder.variant(index, &net.flat.nodes[index].block.params);
             variants.extend(built.map(|built| (index, built)));
         }
         for (index, variant) in &mut variants {
-            variant.node.want(&demand[*index]);
+            variant.node.want(demand.of(*index, &changes));
         }
-        let is_still =
-            |node: usize| variants.get(&node).map_or_else(|| builder.is_still(node), |variant| variant.is_still);
-        built.still.push(all.clone().map(is_still).collect());
-        let configurations = adopt(block, variants, nodes, &mut builder.diagnostics);
-        built.modes.push(PlannedMode { name: block.key.name.clone(), exits, configurations });
-        built.demand.push(demand);
+        let differs = |(node, variant): &(&usize, &Built)| variant.is_still != builder.is_still(**node);
+        still_changes.push(variants.iter().filter(differs).map(|(node, _)| *node).collect());
+        demand_changes.push(changes);
+        let configurations = adopt(block, variants, nodes, &places, &mut builder.diagnostics);
+        modes.push(PlannedMode { name: block.key.name.clone(), exits, configurations });
     }
-    built
+    BuiltModes { modes, still, still_changes, demand, demand_changes, freezes }
 }
 
-fn find(nodes: &[PlannedNode], index: usize) -> Option<&PlannedNode> {
-    nodes.iter().find(|node| node.index == index)
-}
-
-fn exits(block: &ModeBlock, builder: &mut Builder<'_>, nodes: &[PlannedNode]) -> Vec<PlannedExit> {
+/// Resolves the exits of each mode.
+fn exits(builder: &mut Builder<'_>, nodes: &[PlannedNode]) -> Vec<Vec<PlannedExit>> {
     let ports = &builder.ports;
     let port = |source: PortRef| -> Option<&PlannedPort> { ports.get(&source) };
     let poses = nodes.iter().flat_map(PlannedNode::outputs).filter(|(_, port)| port.shape.kind() == Kind::Pose);
     let context = ExitContext {
         net: builder.net,
-        modes: builder.net.flat.mode_names().collect(),
+        modes: builder.net.flat.mode_numbers(),
         port: &port,
         poses: poses.map(|(source, _)| source).collect(),
         lost_after: default_max_age_ns(builder.period),
     };
-    context.resolve(block, &mut builder.diagnostics)
+    let (net, measured, diagnostics) = (builder.net, &mut builder.measured, &mut builder.diagnostics);
+    net.flat.modes.iter().map(|block| context.resolve(block, measured, diagnostics)).collect()
 }
 
 /// Builds the nodes whose parameters a mode sets.
@@ -137,11 +138,12 @@ fn adopt(
     block: &ModeBlock,
     variants: BTreeMap<usize, Built>,
     nodes: &mut [PlannedNode],
+    places: &[Option<usize>],
     diagnostics: &mut Diagnostics,
 ) -> Vec<(usize, usize)> {
     let mut configurations = Vec::new();
     for (index, variant) in variants {
-        let Some(place) = nodes.iter().position(|node| node.index == index) else { continue };
+        let Some(place) = places[index] else { continue };
         match nodes[place].node.adopt(variant.node) {
             Ok(number) => configurations.push((place, number)),
             Err(_) => {

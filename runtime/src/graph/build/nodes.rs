@@ -5,10 +5,11 @@ use std::collections::BTreeMap;
 use crate::graph::bench::{BoundRole, OpenedBench, fill_facts, place_mistakes};
 use crate::graph::check::frames::Frames;
 use crate::graph::check::units::{UnitMismatch, UnitOrigin, Units};
+use crate::graph::load::MeasuredValues;
 use crate::graph::net::{CommandWire, Net, WireOrigin};
 use crate::graph::plan::{PlannedCommand, PlannedNode, PlannedPort, PlannedRole, PlannedWire, PortRef, Producer};
 use crate::graph::syntax::{AgeLimit, Policy, PolicyTable, default_max_age_ns};
-use crate::node::{Built, Configured, Given, Need, NodeSpec, PortSpec, Reader, frame_args};
+use crate::node::{Built, Configured, Given, KnownUnits, Need, NodeSpec, PortSpec, Reader, frame_args};
 use crate::signal::{FlagShape, Joint, Kind, Shape};
 use crate::source::{Code, Diagnostic, Diagnostics, Key, SourceMap, Value};
 
@@ -29,6 +30,8 @@ pub(crate) struct Builder<'a> {
     origins: BTreeMap<PortRef, UnitOrigin>,
     /// The shapes from which each node was built, and whether it generates no motion.
     built: BTreeMap<usize, (Given, bool)>,
+    /// The values of parameters that were written with a unit.
+    pub(crate) measured: MeasuredValues,
 }
 
 impl<'a> Builder<'a> {
@@ -40,15 +43,26 @@ impl<'a> Builder<'a> {
         (diagnostics, sources): (Diagnostics, SourceMap),
         period: f64,
     ) -> Self {
-        let (ports, units, built, origins) = (BTreeMap::new(), BTreeMap::new(), BTreeMap::new(), BTreeMap::new());
-        let mut builder = Self { net, opened, frames, diagnostics, sources, period, ports, units, origins, built };
+        let mut builder = Self {
+            net,
+            opened,
+            frames,
+            diagnostics,
+            sources,
+            period,
+            ports: BTreeMap::new(),
+            units: BTreeMap::new(),
+            origins: BTreeMap::new(),
+            built: BTreeMap::new(),
+            measured: MeasuredValues::default(),
+        };
         builder.add_roles();
         builder
     }
 
-    /// Returns the diagnostics and their source texts.
-    pub(crate) fn finish(self) -> (Diagnostics, SourceMap) {
-        (self.diagnostics, self.sources)
+    /// Returns the diagnostics, their source texts, and the values that were written with a unit.
+    pub(crate) fn finish(self) -> (Diagnostics, SourceMap, MeasuredValues) {
+        (self.diagnostics, self.sources, self.measured)
     }
 }
 
@@ -112,7 +126,6 @@ impl Builder<'_> {
     pub(crate) fn node(&mut self, index: usize) -> Option<PlannedNode> {
         let (node, wires) = (&self.net.flat.nodes[index], &self.net.wires[index]);
         let (kind, spec) = self.net.nodes[index]?;
-        let (configured, params) = self.configure(kind, &node.block.params);
         let mut inputs: Vec<(Need, Vec<PlannedWire>)> =
             spec.inputs.iter().map(|input| (input.need, Vec::new())).collect();
         let mut given = Given { inputs: vec![Vec::new(); spec.inputs.len()], period: self.period };
@@ -144,6 +157,7 @@ impl Builder<'_> {
             }
             given.inputs[wire.input].push((wire.key.name.clone(), port.shape.clone()));
         }
+        let (configured, params) = self.configure(index, kind, &node.block.params, &given, is_complete);
         let missing = |(need, ports): &(Need, Vec<PlannedWire>)| need.must_be_wired && ports.is_empty();
         if !is_complete || inputs.iter().any(missing) || self.frames.has_clash(index) {
             return None;
@@ -168,8 +182,18 @@ impl Builder<'_> {
             is_every_tick: spec.every_tick,
             is_logged: spec.logs,
             holds: spec.limits.holds,
+            budget: spec.limits.spends.and_then(|spent| self.budget(index, spec, spent)),
+            is_uncalibrated: built.is_uncalibrated,
             span: node.block.key.span.clone(),
         })
+    }
+
+    /// Returns the output of a limiter that is set while a budget is spent, and the role whose commands it limits.
+    fn budget(&self, node: usize, spec: &NodeSpec, spent: &str) -> Option<(usize, String)> {
+        let port = spec.outputs.iter().position(|output| output.name == spent)?;
+        let mut commands = self.net.commands.iter().filter(|wire| !wire.is_report);
+        let command = commands.find(|wire| self.net.upstream(wire.source.producer.node())[node])?;
+        Some((port, self.net.name(Producer::Role(command.role)).to_owned()))
     }
 
     /// Returns whether a node generates no motion with the parameters of the graph.
@@ -182,7 +206,7 @@ impl Builder<'_> {
     pub(crate) fn variant(&mut self, index: usize, params: &Value) -> Option<Built> {
         let (kind, spec) = self.net.nodes[index]?;
         let (given, _) = self.built.get(&index)?.clone();
-        let (configured, params) = self.configure(kind, params);
+        let (configured, params) = self.configure(index, kind, params, &given, true);
         let mut built = self.build(index, configured, &params, given)?;
         let node = &self.net.flat.nodes[index];
         let name = &node.name;
@@ -201,16 +225,27 @@ impl Builder<'_> {
 
     /// Reads the parameters of a node, and returns them with all facts filled in.
     ///
-    /// A filled-in value of [limits] keeps its span there, so a mistake in it is reported in that section.
-    fn configure(&mut self, kind: usize, params: &Value) -> (Option<Box<dyn Configured>>, Value) {
+    /// The units of parameters follow from the shapes on the wires, which may be incomplete. A filled-in value of
+    /// [limits] keeps its span there, so a mistake in it is reported in that section.
+    fn configure(
+        &mut self,
+        index: usize,
+        kind: usize,
+        params: &Value,
+        given: &Given,
+        is_complete: bool,
+    ) -> (Option<Box<dyn Configured>>, Value) {
         let mut params = params.clone();
-        let has_facts = fill_facts(&mut params, self.net, self.opened, &mut self.diagnostics);
-        let mut reader = Reader::new(&self.sources);
-        if !has_facts {
+        if !fill_facts(&mut params, self.net, self.opened, &mut self.diagnostics) {
             return (None, params);
         }
+        let spec = self.net.spec(index);
+        let (specs, inputs) = spec.map_or((&[][..], &[][..]), |spec| (&spec.params, &spec.inputs));
+        let units = KnownUnits::of_params(&params, specs).with_wires(inputs, &given.inputs, !is_complete);
+        let mut reader = Reader::new(&self.sources).with_units(units);
         let configured = self.net.catalogue.nodes()[kind].configure(&params, &mut reader);
-        let mistakes = reader.mistakes;
+        let (mistakes, measured) = (reader.mistakes, reader.measured);
+        self.measured.add(Some(index), measured);
         let is_valid = mistakes.is_empty();
         place_mistakes(mistakes, &params, &[], &mut self.sources, &mut self.diagnostics);
         (configured.filter(|_| is_valid), params)

@@ -10,21 +10,22 @@ use crate::source::{Code, Diagnostic, Diagnostics};
 
 /// Reports each condition on a port that is absent because nothing reads it in its mode.
 ///
-/// `demand` holds the components that each mode reads. `freezes` holds which nodes make unused components absent.
+/// `reads` returns the components that a mode reads of a node's port. `freezes` holds which nodes make unused components
+/// absent.
 pub(crate) fn check(
     net: &Net<'_>,
     modes: &[PlannedMode],
-    demand: &[Vec<Vec<Components>>],
+    reads: &dyn Fn(usize, usize, usize) -> Components,
     freezes: &BTreeMap<usize, bool>,
     diagnostics: &mut Diagnostics,
 ) {
-    for ((mode, demand), block) in modes.iter().zip(demand).zip(&net.flat.modes) {
+    for (number, (mode, block)) in modes.iter().zip(&net.flat.modes).enumerate() {
         for exit in &mode.exits {
             let (Condition::Port(watched, _) | Condition::Lost(watched, _)) = &exit.condition else { continue };
             let WatchedPort { source: PortRef { producer: Producer::Node(node), port }, feature } = *watched else {
                 continue;
             };
-            let read = demand[node][port];
+            let read = reads(number, node, port);
             let is_read = feature.map_or(!read.is_empty(), |feature| read.has(feature));
             if is_read || !freezes.get(&node).copied().unwrap_or(false) {
                 continue;

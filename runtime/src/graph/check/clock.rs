@@ -24,10 +24,10 @@ fn find_clock(net: &Net<'_>, opened: &OpenedBench) -> Resolved<(Clock, f64)> {
     let (message, span, help) = match (&table.clock, table.rate_hz) {
         (None, Some(rate)) => return Ok((Clock::Rate, 1.0 / rate)),
         (Some(word), None) => {
-            let Some(role) = flat.role_names().position(|name| name == word.value) else {
+            let Some(role) = flat.roles.position(&word.value) else {
                 let message = format!("the clock `{}` is not a role", word.value);
                 let diagnostic = Diagnostic::new(Code::BadClock, word.span.clone(), message);
-                return diagnostic.suggest(&word.value, flat.role_names(), "roles").into_err();
+                return diagnostic.suggest(&word.value, flat.roles.names(), "roles").into_err();
             };
             let bound = opened.roles.get(role).and_then(Option::as_ref).ok_or(None)?;
             return Ok((Clock::Device(bound.device), opened.period(bound)));

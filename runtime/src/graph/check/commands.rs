@@ -1,25 +1,32 @@
 //! Checks that every command of a role has a wire.
 
+use std::collections::BTreeSet;
+
 use crate::graph::net::Net;
-use crate::source::{Code, Diagnostic, Diagnostics, Edit, Key};
+use crate::source::{Code, Diagnostic, Diagnostics, Edit};
 
 /// Reports each command that nothing drives.
 pub(crate) fn check(net: &Net<'_>, diagnostics: &mut Diagnostics) {
-    for ((key, _), role) in net.flat.roles.iter().zip(&net.roles) {
+    let wires = net.flat.commands.iter().map(|(role, wire)| (role.name.as_str(), wire.key.name.as_str()));
+    let driven: BTreeSet<(&str, &str)> = wires.clone().collect();
+    // A wire to an unknown role or command has its own diagnostic, and may be meant for any that has no wire.
+    let has_misspelt_role = driven.iter().any(|(role, _)| net.flat.roles.position(role).is_none());
+    let has_port = |(role, port): &(&str, &str)| {
+        let kind = net.flat.roles.position(role).and_then(|role| net.roles[role]);
+        kind.is_some_and(|kind| kind.commands.iter().chain(&kind.reports).any(|known| known.name == *port))
+    };
+    let misspelt: BTreeSet<&str> = wires.filter(|wire| !has_port(wire)).map(|(role, _)| role).collect();
+    for ((key, kind), role) in net.flat.roles.iter().zip(&net.roles) {
+        if has_misspelt_role || misspelt.contains(&*key.name) {
+            continue;
+        }
         for command in role.iter().flat_map(|role| &role.commands) {
-            let is_driven = |role: &Key, driven: &Key| role.name == key.name && driven.name == command.name;
-            // A wire to an unknown role or command has its own diagnostic, and may be meant for this one.
-            let is_misspelt = |role: &Key, driven: &Key| {
-                let roles = || net.flat.roles.iter().zip(&net.roles).filter(|((key, _), _)| key.name == role.name);
-                let mut ports =
-                    roles().filter_map(|(_, kind)| *kind).flat_map(|kind| kind.commands.iter().chain(&kind.reports));
-                !ports.any(|port| port.name == driven.name) && (role.name == key.name || roles().next().is_none())
-            };
-            if !net.flat.commands.iter().any(|(role, wire)| is_driven(role, &wire.key) || is_misspelt(role, &wire.key))
-            {
+            if !driven.contains(&(&*key.name, &*command.name)) {
                 let message = format!("nothing drives `{}.{}`", key.name, command.name);
                 let diagnostic = Diagnostic::new(Code::UndrivenCommand, key.span.clone(), message);
-                diagnostics.push(match net.find_candidate(0, usize::MAX, command) {
+                // With two arms, the port of that name may move the other one.
+                let is_only = net.flat.roles.iter().filter(|(_, other)| other.value == kind.value).count() == 1;
+                diagnostics.push(match net.find_candidate(0, usize::MAX, command).filter(|_| is_only) {
                     Some(port) => {
                         let line = format!("{}.{} = \"{port}\"", key.name, command.name);
                         let edit = match net.flat.commands.last() {

@@ -3,30 +3,44 @@
 //! Node types declare frames as variables, so one type works in any frame and a wrong frame is a load error.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::ops::Range;
 
-use crate::graph::load::FlatNode;
+use super::frame_names::FrameNames;
 use crate::graph::net::{Net, Wire, WireOrigin};
 use crate::graph::plan::{PortRef, Producer};
-use crate::node::{NodeSpec, PortSpec, frame_args};
+use crate::node::{PortSpec, frame_args};
 use crate::signal::Kind;
-use crate::source::{Code, Diagnostic, Diagnostics};
+use crate::source::{Code, Diagnostic, Diagnostics, Edit};
 
 /// The frame variables of all nodes, and the frames to which they are bound.
 pub(crate) struct Frames<'a> {
     net: &'a Net<'a>,
+    names: FrameNames<'a>,
     variables: BTreeMap<(Producer, String), usize>,
     parents: Vec<usize>,
-    known: Vec<Option<String>>,
+    /// The number of variables below each root.
+    sizes: Vec<usize>,
+    known: Vec<Option<KnownFrame>>,
     /// Nodes with a wire in the wrong frame.
     clashes: BTreeSet<usize>,
+}
+
+/// A frame, and the place that determined it.
+#[derive(Debug, Clone)]
+struct KnownFrame {
+    name: String,
+    place: Range<usize>,
 }
 
 /// Unifies the frames of all wires, and reports wires in the wrong frame.
 ///
 /// The most constrained wires are unified first (poses before twists), so that the error is reported on the wrong wire.
 pub(crate) fn check<'a>(net: &'a Net<'a>, diagnostics: &mut Diagnostics) -> Frames<'a> {
+    let names = FrameNames::new(net);
+    names.check(diagnostics);
     let (variables, clashes) = (BTreeMap::new(), BTreeSet::new());
-    let mut frames = Frames { net, variables, parents: Vec::new(), known: Vec::new(), clashes };
+    let mut frames =
+        Frames { net, names, variables, parents: Vec::new(), sizes: Vec::new(), known: Vec::new(), clashes };
     for &node in &net.order {
         let mut wires: Vec<&Wire> = net.wires[node].iter().collect();
         wires.sort_by_key(|wire| rank(net.port(wire.source).kind));
@@ -38,6 +52,9 @@ pub(crate) fn check<'a>(net: &'a Net<'a>, diagnostics: &mut Diagnostics) -> Fram
                 diagnostics.push(clash);
             }
         }
+        // A frame that belongs to another one, as the base to its arm, is known once the inputs are.
+        let outputs = net.outputs(Producer::Node(node)).unwrap_or_default();
+        outputs.iter().for_each(|output| drop(frames.known(Producer::Node(node), output)));
     }
     for wire in &net.commands {
         let end =
@@ -55,19 +72,34 @@ impl Frames<'_> {
 
     /// Returns the frames of an output, `None` for those that are unknown.
     pub(crate) fn of(&mut self, source: PortRef) -> Vec<Option<String>> {
-        self.known(source.producer, self.net.port(source))
+        self.names(source.producer, self.net.port(source))
+    }
+
+    fn names(&mut self, owner: Producer, port: &PortSpec) -> Vec<Option<String>> {
+        self.known(owner, port).into_iter().map(|known| Some(known?.name)).collect()
     }
 
     fn wire(&mut self, source: PortRef, origin: &WireOrigin, end: &WireTarget<'_>) -> Option<Diagnostic> {
         let port = self.net.port(source);
         let (has, takes) = (self.known(source.producer, port), self.known(end.owner, end.port));
-        let clash = has.iter().zip(&takes).any(|(a, b)| matches!((a, b), (Some(a), Some(b)) if a != b));
-        if clash {
+        let differ = |(a, b): &(&Option<KnownFrame>, &Option<KnownFrame>)| match (a, b) {
+            (Some(a), Some(b)) => a.name != b.name,
+            _ => false,
+        };
+        if let Some((Some(a), Some(b))) = has.iter().zip(&takes).find(differ) {
+            let notes = [a, b].map(|known| (known.place.clone(), format!("`{}` comes from here", known.name)));
+            let [has, takes] =
+                [(source.producer, port), (end.owner, end.port)].map(|(owner, port)| self.names(owner, port));
             let (from, kind) = (self.net.port_name(source), port.kind);
             let message =
                 format!("`{from}` is {}, but `{}` takes {}", describe(kind, &has), end.name, describe(kind, &takes));
             let help = self.suggest_conversion(kind, [has.first()?.clone(), takes.first()?.clone()], origin);
-            return Some(origin.diagnostic(Code::FrameMismatch, message).with_help(help));
+            let mut diagnostic = origin.diagnostic(Code::FrameMismatch, message);
+            if let Some((help, edits)) = help {
+                diagnostic = edits.into_iter().fold(diagnostic.help(help), Diagnostic::edit);
+            }
+            diagnostic.notes.extend(notes);
+            return Some(diagnostic);
         }
         for (a, b) in frame_args(port).iter().zip(frame_args(end.port)) {
             let (a, b) = (self.variable(source.producer, a), self.variable(end.owner, b));
@@ -77,7 +109,12 @@ impl Frames<'_> {
     }
 
     /// Suggests a node that converts from one frame to the other.
-    fn suggest_conversion(&mut self, kind: Kind, wanted: [Option<String>; 2], origin: &WireOrigin) -> Option<String> {
+    fn suggest_conversion(
+        &mut self,
+        kind: Kind,
+        wanted: [Option<String>; 2],
+        origin: &WireOrigin,
+    ) -> Option<(String, Vec<Edit>)> {
         let (spec, input, output, pose) = self.net.catalogue.specs().find_map(|spec| {
             let input = spec.inputs.iter().find(|input| input.kind == kind)?;
             let output = spec.outputs.iter().find(|output| output.kind == kind)?;
@@ -89,16 +126,22 @@ impl Frames<'_> {
         let pose_port = self.find_pose(&wanted).and_then(|source| self.net.name_in(origin.scope, source));
         let Some(source) = pose_port else {
             let [from, to] = wanted.map(|frame| frame.unwrap_or_else(|| "?".into()));
-            return Some(format!(
+            let help = format!(
                 "insert {converter} between them, with a pose of `{from}` in `{to}`, which no node outputs yet"
-            ));
+            );
+            return Some((help, Vec::new()));
         };
         let (twist, from) = (&input.name, &origin.word.value);
-        Some(format!(
-            "insert {converter} between them, and replace `{from}` by `{name}.{}` here:\n[nodes.{name}]\ntype = \
-             \"{name}\"\nin.{twist} = \"{from}\"\nin.{} = \"{source}\"",
-            output.name, pose.name,
-        ))
+        let (output, place) = (&output.name, &origin.word.span);
+        let block =
+            format!("[nodes.{name}]\ntype = \"{name}\"\nin.{twist} = \"{from}\"\nin.{} = \"{source}\"", pose.name);
+        let help = format!("insert {converter} between them, and replace `{from}` by `{name}.{output}` here:\n{block}");
+        let is_taken = self.net.flat.scopes[origin.scope].names.contains_key(&**name);
+        let edits = [
+            Edit::Replace(place.clone(), format!("\"{name}.{output}\"")),
+            Edit::Append(place.clone(), format!("\n{block}")),
+        ];
+        Some((help, if is_taken { Vec::new() } else { edits.into() }))
     }
 
     fn find_pose(&mut self, wanted: &[Option<String>]) -> Option<PortRef> {
@@ -114,15 +157,13 @@ impl Frames<'_> {
         sources.into_iter().find(|source| self.of(*source) == wanted)
     }
 
-    fn known(&mut self, owner: Producer, port: &PortSpec) -> Vec<Option<String>> {
+    fn known(&mut self, owner: Producer, port: &PortSpec) -> Vec<Option<KnownFrame>> {
         let args = frame_args(port).to_vec();
-        args.iter()
-            .map(|arg| {
-                let variable = self.variable(owner, arg);
-                let root = self.root(variable);
-                self.known[root].clone()
-            })
-            .collect()
+        let known = args.iter().map(|arg| {
+            let variable = self.variable(owner, arg);
+            self.known[self.root(variable)].clone()
+        });
+        known.collect()
     }
 
     fn variable(&mut self, owner: Producer, arg: &str) -> usize {
@@ -130,22 +171,36 @@ impl Frames<'_> {
         if let Some(variable) = self.variables.get(&key) {
             return *variable;
         }
-        let net = self.net;
-        let is_letter = arg.len() == 1 && arg.starts_with(|c: char| c.is_ascii_uppercase());
-        let known = match (arg, arg.strip_prefix('$'), owner) {
-            ("self", _, _) => Some(net.name(owner).to_owned()),
-            (_, Some(param), Producer::Node(node)) => {
-                let spec = net.spec(node).expect("only known nodes have ports");
-                frame_param(&net.flat.nodes[node], spec, param)
-            }
-            _ if is_letter => None,
-            _ => Some(arg.to_owned()),
-        };
+        let known = self.first_known(owner, arg);
         let variable = self.parents.len();
         self.parents.push(variable);
+        self.sizes.push(1);
         self.known.push(known);
         self.variables.insert(key, variable);
         variable
+    }
+
+    /// Returns the frame that a declaration determines by itself.
+    fn first_known(&mut self, owner: Producer, arg: &str) -> Option<KnownFrame> {
+        let net = self.net;
+        let is_letter = arg.len() == 1 && arg.starts_with(|c: char| c.is_ascii_uppercase());
+        let place = net.place(owner);
+        match (arg.split_once('.'), arg.strip_prefix('$'), owner) {
+            (Some((whole, part)), ..) => {
+                let whole = self.variable(owner, whole);
+                // An unknown frame has no parts that another one could be mistaken for.
+                let whole = self.known[self.root(whole)].clone();
+                let name = whole.map_or_else(|| net.name(owner).to_owned(), |whole| whole.name);
+                Some(KnownFrame { name: format!("{name}.{part}"), place })
+            }
+            (_, Some(param), Producer::Node(node)) => {
+                let (name, place) = self.names.named(node, param)?;
+                Some(KnownFrame { name, place })
+            }
+            _ if arg == "self" => Some(KnownFrame { name: net.name(owner).to_owned(), place }),
+            _ if is_letter => None,
+            _ => Some(KnownFrame { name: arg.to_owned(), place }),
+        }
     }
 
     fn root(&self, mut variable: usize) -> usize {
@@ -158,7 +213,10 @@ impl Frames<'_> {
     fn join(&mut self, a: usize, b: usize) {
         let (a, b) = (self.root(a), self.root(b));
         if a != b {
+            // The smaller tree joins the larger one, so no path to a root is long.
+            let (a, b) = if self.sizes[a] < self.sizes[b] { (b, a) } else { (a, b) };
             self.parents[b] = a;
+            self.sizes[a] += self.sizes[b];
             self.known[a] = self.known[a].take().or(self.known[b].take());
         }
     }
@@ -169,17 +227,6 @@ struct WireTarget<'a> {
     owner: Producer,
     port: &'a PortSpec,
     name: String,
-}
-
-/// Returns the frame that a parameter names, or its default.
-fn frame_param(node: &FlatNode, spec: &NodeSpec, param: &str) -> Option<String> {
-    let given = node.block.params.as_table().and_then(|table| table.get(param)).map(|value| value.as_str());
-    given
-        .unwrap_or_else(|| {
-            let default = spec.params.iter().find(|spec| spec.name == param)?.default.as_deref()?;
-            default.split('"').nth(1)
-        })
-        .map(str::to_owned)
 }
 
 /// Ranks kinds by how much they constrain frames, the most constraining first.

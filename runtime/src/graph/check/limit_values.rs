@@ -17,6 +17,8 @@ struct LimitRef<'a> {
     span: Range<usize>,
     /// The parameter that uses it.
     spec: Option<&'a ParamSpec>,
+    /// Whether the parameter can do without it.
+    is_optional: bool,
 }
 
 /// Reports values that no node uses, values in another unit than their parameter, and missing values.
@@ -37,17 +39,21 @@ pub(crate) fn check(net: &Net<'_>, sources: &SourceMap, diagnostics: &mut Diagno
     }
     let mut unused: Vec<&Key> = given.iter().copied().filter(|key| !refs.iter().any(|r| r.key == key.name)).collect();
     let mut missing: Vec<&LimitRef<'_>> = Vec::new();
-    let is_single = (wanted.len(), unused.len()) == (1, 1);
+    let is_optional = |limits: &[&LimitRef<'_>]| limits.iter().all(|limit| limit.is_optional);
+    let required = wanted.values().filter(|limits| !is_optional(limits)).count();
+    let is_single = (required, unused.len()) == (1, 1);
     for (name, limits) in &wanted {
         // A name that occurs once in all files is a misspelt reference to a limit that other parameters use.
         let is_alone = limits.len() == 1 && sources.occurrences(name) == 1;
-        if let Some(key) = similar(name, &unused).or_else(|| unused.first().copied().filter(|_| is_single)) {
+        let is_needed = !is_optional(limits);
+        let only = unused.first().copied().filter(|_| is_single && is_needed);
+        if let Some(key) = similar(name, &unused).or(only) {
             unused.retain(|other| other.name != key.name);
             diagnostics.push(misspelt(key, limits, net, sources));
-        } else if let Some(key) = similar(name, &given).filter(|_| is_alone) {
+        } else if let Some(key) = similar(name, &given).filter(|_| is_alone && is_needed) {
             diagnostics.push(misspelt_reference(key, limits));
-        } else {
-            missing.extend(limits.first());
+        } else if is_needed {
+            missing.extend(limits.iter().find(|limit| !limit.is_optional));
         }
     }
     missing.sort_by_key(|limit| refs.iter().position(|other| other.span == limit.span));
@@ -63,11 +69,11 @@ fn find_refs<'a>(net: &Net<'a>) -> Vec<LimitRef<'a>> {
         let entries = node.block.params.as_table().into_iter().flat_map(|table| &table.entries);
         for (key, value) in entries {
             let spec = specs.iter().find(|spec| spec.name == key.name);
-            let limits = value.facts().into_iter().filter_map(|(fact, span)| match fact.split_once('.')? {
+            let limits = value.facts().into_iter().filter_map(|fact| match fact.word.split_once('.')? {
                 (LIMITS, key) => {
-                    let word = Spanned { value: fact.to_owned(), span: span.clone() };
-                    let span = word.part(fact.len() - key.len()..fact.len());
-                    Some(LimitRef { key: key.to_owned(), span, spec })
+                    let word = Spanned { value: fact.word.to_owned(), span: fact.place.clone() };
+                    let span = word.part(fact.word.len() - key.len()..fact.word.len());
+                    Some(LimitRef { key: key.to_owned(), span, spec, is_optional: fact.is_optional })
                 }
                 _ => None,
             });

@@ -6,9 +6,10 @@
 use std::collections::BTreeSet;
 use std::ops::Range;
 
+use super::foreign;
+use super::frames::{Frames, with_article};
+use super::limit_values::{limit_of, limits_of};
 use crate::device::RoleType;
-use crate::graph::check::frames::{Frames, with_article};
-use crate::graph::check::limit_values::{limit_of, limits_of};
 use crate::graph::net::{CommandWire, Net, Wire, WireOrigin};
 use crate::graph::plan::{PortRef, Producer};
 use crate::graph::syntax::LIMITS;
@@ -54,6 +55,11 @@ pub(crate) fn check(net: &Net<'_>, frames: &mut Frames<'_>, diagnostics: &mut Di
             diagnostics.push(path.unlimited(&missing, &lost));
         }
         diagnostics.extend(path.mixed_frames(frames));
+        // A wire in the wrong frame has its own diagnostic.
+        let limiters = path.nodes.iter().filter(|stop| !stop.spec.limits.holds.is_empty());
+        for stop in limiters.filter(|stop| !frames.has_clash(stop.node)).collect::<Vec<_>>() {
+            diagnostics.extend(foreign::check(net, frames, wire.role, stop.node, stop.source));
+        }
     }
 }
 
@@ -61,14 +67,14 @@ impl<'a> CommandPath<'a> {
     /// Follows a motion backwards, or returns `None` if a wire is missing.
     fn find(net: &'a Net<'a>, wire: &'a CommandWire) -> Option<Self> {
         let mut path = Self { net, wire, role: net.roles[wire.role]?, nodes: Vec::new() };
-        let mut at = wire.source;
+        let (mut at, mut passed) = (wire.source, BTreeSet::new());
         while let Producer::Node(node) = at.producer {
             let spec = net.spec(node)?;
             let Some(through) = spec.limits.through else { break };
             let input = spec.inputs.iter().position(|input| input.name == through)?;
             let wire = net.wires[node].iter().find(|wire| wire.input == input)?;
             let (source, word) = (wire.source, wire.origin.inner.as_ref().unwrap_or(&wire.origin.word));
-            if path.nodes.iter().any(|stop| stop.node == node) {
+            if !passed.insert(node) {
                 return None;
             }
             path.nodes.push(PathNode { node, spec, source, word });
@@ -174,7 +180,7 @@ impl<'a> CommandPath<'a> {
         let start = self.nodes.last().map(|stop| stop.source);
         let is_motion = |source: &PortRef| net.port(*source).name == input && net.port(*source).kind == Kind::Twist;
         if let Some(source) = start.filter(is_motion) {
-            return net.name_in(0, source);
+            return net.name_in(0, source).map(str::to_owned);
         }
         let end = format!(".{input}");
         let ports = net.ports_in(0).filter(|(name, port)| name.ends_with(&end) && net.port(*port).kind != Kind::Twist);

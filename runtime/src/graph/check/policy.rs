@@ -8,8 +8,8 @@ pub(crate) fn check(net: &Net<'_>, diagnostics: &mut Diagnostics) {
     let Some((section, _)) = &net.flat.policy else { return };
     let roles = section.as_table().and_then(|table| table.get("roles")).and_then(Value::as_table);
     for (key, _) in roles.iter().flat_map(|table| &table.entries) {
-        if !net.flat.role_names().any(|role| role == key.name) {
-            let known = net.flat.role_names();
+        if net.flat.roles.position(&key.name).is_none() {
+            let known = net.flat.roles.names();
             diagnostics.push(Diagnostic::unknown(Code::UnknownKey, "role", &key.name, &key.span, known));
         }
     }

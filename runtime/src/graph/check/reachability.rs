@@ -2,8 +2,8 @@
 
 use std::collections::BTreeSet;
 
+use crate::graph::load::FlatGraph;
 use crate::graph::net::Net;
-use crate::graph::syntax::ModeBlock;
 use crate::source::{Code, Diagnostic, Diagnostics, Edit, Item, Value};
 
 /// Reports modes that are never entered, and returns the index of the start mode.
@@ -16,7 +16,7 @@ pub(crate) fn check(net: &Net<'_>, diagnostics: &mut Diagnostics) -> Option<usiz
     if modes.iter().any(|mode| mode.has_any(diagnostics)) {
         return Some(start);
     }
-    let mut reached = reachable(start, modes);
+    let mut reached = reachable(start, net.flat);
     for (i, mode) in modes.iter().enumerate() {
         if reached.contains(&i) {
             continue;
@@ -26,7 +26,7 @@ pub(crate) fn check(net: &Net<'_>, diagnostics: &mut Diagnostics) -> Option<usiz
         let help = format!("let an exit of another mode lead to `{name}`, or remove this mode");
         diagnostics.push(Diagnostic::new(Code::UnreachableMode, mode.key.span.clone(), message).help(help));
         // The modes that only this one leads to are not reported again.
-        reached.extend(reachable(i, modes));
+        reached.extend(reachable(i, net.flat));
     }
     Some(start)
 }
@@ -52,13 +52,14 @@ fn find_start(net: &Net<'_>, diagnostics: &mut Diagnostics) -> Option<usize> {
 }
 
 /// Returns the modes that can be reached from the start mode.
-fn reachable(start: usize, modes: &[ModeBlock]) -> BTreeSet<usize> {
+fn reachable(start: usize, flat: &FlatGraph) -> BTreeSet<usize> {
+    let (modes, numbers) = (&flat.modes, flat.mode_numbers());
     let (mut reached, mut open) = (BTreeSet::from([start]), vec![start]);
     while let Some(mode) = open.pop() {
         // The written targets count, so that a mistake in an exit does not make its target unreachable too.
         let mut names = Vec::new();
         modes[mode].table.entries.iter().for_each(|(_, value)| collect_targets(value, &mut names));
-        let next = names.iter().filter_map(|to| modes.iter().position(|mode| mode.key.name == **to));
+        let next = names.iter().filter_map(|to| numbers.get(to).copied());
         open.extend(next.filter(|to| reached.insert(*to)));
     }
     reached

@@ -3,9 +3,12 @@
 //! A node is used if it is upstream of a command, a report, a node without outputs, a node that logs, a port in `show`,
 //! or an export of a part.
 
+use std::cell::LazyCell;
+use std::collections::{BTreeMap, BTreeSet};
+
 use crate::graph::net::Net;
 use crate::graph::plan::{PortRef, Producer};
-use crate::node::may_fit;
+use crate::node::{PortSpec, may_fit};
 use crate::source::{Code, Diagnostic, Diagnostics};
 
 /// Reports unused nodes. A graph without commands has none, since its outputs are recorded.
@@ -19,10 +22,11 @@ pub(crate) fn check(net: &Net<'_>, shown: impl Iterator<Item = PortRef>, diagnos
     let used =
         driving.chain(shown.map(|source| source.producer)).chain(net.exported()).chain(sinks.map(Producer::Node));
     let mut used = net.upstream(used.filter_map(Producer::node));
+    let (is_read, mut open_inputs) = (net.read_nodes(), None);
     // Nodes without readers come first. An unused cycle has none, so it is reported at one of its nodes.
     for is_cycle in [false, true] {
         for node in 0..net.wires.len() {
-            if used.contains(&node) || !is_cycle && net.readers(node).next().is_some() {
+            if used[node] || !is_cycle && is_read[node] {
                 continue;
             }
             let key = &net.flat.nodes[node].block.key;
@@ -32,34 +36,49 @@ pub(crate) fn check(net: &Net<'_>, shown: impl Iterator<Item = PortRef>, diagnos
                 false => format!("no output of `{name}` is used"),
                 true => format!("`{name}` leads only to a cycle of unused nodes"),
             };
-            let help = match suggest_wire(net, node) {
+            let help = match open_inputs.get_or_insert_with(|| OpenInputs::of(net)).suggest_wire(net, node) {
                 Some(wire) => format!("write {wire}, or remove `{name}`"),
                 None => format!("wire an output of `{name}` to another node, or remove it"),
             };
             diagnostics.push(Diagnostic::new(Code::UnusedNode, key.span.clone(), message).help(help));
             // Nodes that only this one reads are not reported again.
-            used.extend(net.upstream([node]));
+            net.mark_upstream([node], &mut used);
         }
     }
 }
 
-/// Suggests a wire to an unwired input of another node in the same scope.
-fn suggest_wire(net: &Net<'_>, node: usize) -> Option<String> {
-    let outputs = net.outputs(Producer::Node(node))?;
-    let upstream = net.upstream([node]);
-    let flat = &net.flat.nodes;
-    let beside = (0..flat.len()).filter(|other| flat[*other].scope == flat[node].scope && !upstream.contains(other));
-    let mut inputs = beside.flat_map(|other| {
-        let open = net.spec(other).into_iter().flat_map(|spec| spec.inputs.iter().enumerate()).filter(
-            move |(index, input)| input.need.is_many || net.wires[other].iter().all(|wire| wire.input != *index),
-        );
-        open.map(move |(_, input)| (other, input))
-    });
-    inputs.find_map(|(other, input)| {
-        let output = outputs.iter().find(|output| may_fit(output, input))?;
+/// The inputs that take another wire, by scope, type of node and index of the input, each with its nodes.
+struct OpenInputs<'a>(BTreeMap<(usize, usize, usize), (&'a PortSpec, Vec<usize>)>);
+
+impl<'a> OpenInputs<'a> {
+    fn of(net: &Net<'a>) -> Self {
+        let mut open = BTreeMap::new();
+        for (node, wires) in net.wires.iter().enumerate() {
+            let Some((kind, spec)) = net.nodes[node] else { continue };
+            let is_wired: BTreeSet<usize> = wires.iter().map(|wire| wire.input).collect();
+            for (i, input) in spec.inputs.iter().enumerate() {
+                if input.need.is_many || !is_wired.contains(&i) {
+                    let key = (net.flat.nodes[node].scope, kind, i);
+                    open.entry(key).or_insert_with(|| (input, Vec::new())).1.push(node);
+                }
+            }
+        }
+        Self(open)
+    }
+
+    /// Suggests a wire from an unused node to another node in the same scope that is not upstream of it.
+    fn suggest_wire(&self, net: &Net<'_>, node: usize) -> Option<String> {
+        let (outputs, scope) = (net.outputs(Producer::Node(node))?, net.flat.nodes[node].scope);
+        let upstream = LazyCell::new(|| net.upstream([node]));
+        let inputs = self.0.range((scope, 0, 0)..(scope + 1, 0, 0)).filter_map(|((.., i), (input, nodes))| {
+            let output = outputs.iter().find(|output| may_fit(output, input))?;
+            let other = nodes.iter().find(|other| !upstream[**other])?;
+            Some((*other, *i, input, output))
+        });
+        let (other, _, input, output) = inputs.min_by_key(|(other, i, ..)| (*other, *i))?;
+        let (from, to) = (&net.flat.nodes[node].block.key.name, &net.flat.nodes[other].block.key.name);
         // A repeated input takes any name, for example that of the node.
-        let name = if input.need.is_many { &flat[node].block.key.name } else { &*input.name };
-        let (from, to) = (&flat[node].block.key.name, &flat[other].block.key.name);
+        let name = if input.need.is_many { from } else { &*input.name };
         Some(format!("`in.{name} = \"{from}.{}\"` in `{to}`", output.name))
-    })
+    }
 }

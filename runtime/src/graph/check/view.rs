@@ -1,6 +1,6 @@
 //! Checks `show` and `mark` in the section [graph], and selects the ports that a run shows.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 
 use crate::graph::net::{Net, report};
@@ -19,7 +19,7 @@ pub(crate) struct RequestedView {
 /// Resolves the ports of `show` and `mark`, and reports those that cannot be shown.
 pub(crate) fn check(net: &Net<'_>, diagnostics: &mut Diagnostics) -> RequestedView {
     let table = net.flat.table.as_ref();
-    let mut seen: Vec<PortRef> = Vec::new();
+    let mut seen: BTreeSet<PortRef> = BTreeSet::new();
     let mut show = |word: &Spanned<String>| {
         let source = report(net.resolve(0, word), diagnostics)?;
         let kind = net.port(source).kind;
@@ -29,11 +29,10 @@ pub(crate) fn check(net: &Net<'_>, diagnostics: &mut Diagnostics) -> RequestedVi
             let help = "show the image from which it is computed, or a port with numbers";
             diagnostics.push(diagnostic(Code::KindMismatch, message).help(help));
         }
-        if seen.contains(&source) {
+        if !seen.insert(source) {
             let message = format!("`{}` is listed twice", word.value);
             diagnostics.push(diagnostic(Code::BadValue, message).help("remove it"));
         }
-        seen.push(source);
         Some(PlannedShow { name: word.value.clone(), source })
     };
     let words = table.and_then(|table| table.show.as_ref());
@@ -77,7 +76,7 @@ impl RequestedView {
     ) -> PlannedView {
         let mark: Vec<PortRef> = self.mark.iter().map(|(source, _)| *source).collect();
         let named = |source: PortRef| {
-            let name = net.name_in(0, source).unwrap_or_else(|| ports[&source].name.clone());
+            let name = net.name_in(0, source).unwrap_or(&ports[&source].name).to_owned();
             PlannedShow { name, source }
         };
         let default = || default_ports(nodes, ports).into_iter().map(named).collect();

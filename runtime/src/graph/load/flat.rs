@@ -5,7 +5,7 @@ use std::ops::Range;
 
 use crate::graph::syntax::{BenchDocument, Block, GraphTable, ModeBlock, PolicyTable, WireEntry};
 use crate::node::Spanned;
-use crate::source::{Code, Diagnostic, Key, Table, Value};
+use crate::source::{Code, Diagnostic, Key, Named, Table, Value};
 
 /// What a name in a scope refers to, by index.
 #[derive(Debug, Clone, Copy)]
@@ -21,11 +21,11 @@ pub(crate) enum Entity {
 #[derive(Debug, Default)]
 pub(crate) struct Scope {
     pub(crate) names: BTreeMap<String, (Key, Entity)>,
-    pub(crate) exports: Vec<(Key, Spanned<String>)>,
+    pub(crate) exports: Named<Spanned<String>>,
     /// Inputs that the part declares, with their documentation.
-    pub(crate) declared: Vec<(Key, Spanned<String>)>,
+    pub(crate) declared: Named<Spanned<String>>,
     /// Wires into the part, in the scope of its parent.
-    pub(crate) inputs: Vec<WireEntry>,
+    pub(crate) inputs: Named<WireEntry>,
     pub(crate) parent: Option<usize>,
     /// The name of the part in the scope of its parent.
     pub(crate) part: Option<Key>,
@@ -47,7 +47,7 @@ pub(crate) struct FlatGraph {
     pub(crate) settings: Option<Value>,
     /// Span for diagnostics about the graph as a whole.
     pub(crate) place: Range<usize>,
-    pub(crate) roles: Vec<(Key, Spanned<String>)>,
+    pub(crate) roles: Named<Spanned<String>>,
     pub(crate) nodes: Vec<FlatNode>,
     pub(crate) scopes: Vec<Scope>,
     pub(crate) commands: Vec<(Key, WireEntry)>,
@@ -67,13 +67,13 @@ impl FlatGraph {
         diagnostics.iter().any(|found| found.code == Code::UnknownKey && is_key(found))
     }
 
-    /// Returns the names of the declared roles.
-    pub(crate) fn role_names(&self) -> impl Iterator<Item = &str> + Clone {
-        self.roles.iter().map(|(key, _)| key.name.as_str())
-    }
-
     /// Returns the names of the modes.
     pub(crate) fn mode_names(&self) -> impl Iterator<Item = &str> + Clone {
         self.modes.iter().map(|mode| mode.key.name.as_str())
+    }
+
+    /// Returns the index of each mode by its name.
+    pub(crate) fn mode_numbers(&self) -> BTreeMap<&str, usize> {
+        self.mode_names().enumerate().map(|(number, name)| (name, number)).collect()
     }
 }

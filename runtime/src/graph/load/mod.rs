@@ -2,7 +2,9 @@
 
 mod flat;
 mod loader;
+mod measured;
 
 pub(crate) use flat::{Entity, FlatGraph, FlatNode, Scope};
 pub use loader::Request;
 pub(crate) use loader::{Loader, wrong_file_type};
+pub(crate) use measured::MeasuredValues;

@@ -63,7 +63,7 @@ impl Net<'_> {
     fn origin(&self, scope: usize, wire: &WireEntry) -> WireOrigin {
         let (mut at, mut outer, mut age) = (scope, &wire.from, wire.age);
         while let (Some(("inputs", port)), Some(parent)) = (outer.value.split_once('.'), self.flat.scopes[at].parent) {
-            let Some(wire) = self.flat.scopes[at].inputs.iter().find(|wire| wire.key.name == port) else { break };
+            let Some(wire) = self.flat.scopes[at].inputs.get(port) else { break };
             (at, outer) = (parent, &wire.from);
             age = wire.age.map(|own| own.and(age)).or(age);
         }
@@ -89,8 +89,8 @@ impl Net<'_> {
     pub(super) fn connect_commands(&self, diagnostics: &mut Diagnostics) -> Vec<CommandWire> {
         let mut wires = Vec::new();
         for (role, wire) in &self.flat.commands {
-            let Some(index) = self.flat.role_names().position(|name| name == role.name) else {
-                let known = self.flat.role_names();
+            let Some(index) = self.flat.roles.position(&role.name) else {
+                let known = self.flat.roles.names();
                 diagnostics.push(Diagnostic::unknown(Code::UnknownPort, "role", &role.name, &role.span, known));
                 continue;
             };

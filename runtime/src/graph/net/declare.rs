@@ -1,6 +1,10 @@
 //! Looks up the types of roles and nodes in the catalogue.
 
+use std::cell::OnceCell;
+use std::collections::BTreeMap;
+
 use super::Net;
+use super::provenance::Provenance;
 use crate::catalogue::Catalogue;
 use crate::device::RoleType;
 use crate::graph::load::FlatGraph;
@@ -22,7 +26,13 @@ impl<'a> Net<'a> {
         });
         let nodes = nodes.collect();
         let observed = observed_roles(flat, catalogue, diagnostics);
-        Self { flat, catalogue, roles, nodes, observed, wires: Vec::new(), commands: Vec::new(), order: Vec::new() }
+        let (wires, commands, order) = (Vec::new(), Vec::new(), Vec::new());
+        let scope_ports = flat.scopes.iter().map(|_| OnceCell::new()).collect();
+        let (provenance, mut settings) = (Provenance::default(), BTreeMap::<&str, Vec<_>>::new());
+        for (key, value) in flat.modes.iter().flat_map(|mode| &mode.set.entries) {
+            settings.entry(key.name.as_str()).or_default().push(value);
+        }
+        Self { flat, catalogue, roles, nodes, observed, wires, commands, order, provenance, settings, scope_ports }
     }
 }
 
@@ -52,8 +62,8 @@ fn observed_roles<'a>(
     catalogue: &'a Catalogue,
     diagnostics: &mut Diagnostics,
 ) -> Vec<(&'a Key, &'a Spanned<String>, &'a RoleType)> {
-    let bound = flat.bench.iter().flat_map(|bench| &bench.bind);
-    let undeclared = bound.filter(|(key, _)| !flat.roles.iter().any(|(role, _)| role.name == key.name));
+    let bound = flat.bench.iter().flat_map(|bench| bench.bind.iter());
+    let undeclared = bound.filter(|(key, _)| flat.roles.position(&key.name).is_none());
     let all = undeclared.filter_map(|(key, device)| {
         let role = catalogue.roles().iter().find(|role| role.is_observed_as(&key.name))?;
         Some((key, device, role))

@@ -3,18 +3,25 @@
 mod connect;
 mod declare;
 mod order;
+mod provenance;
 mod resolve;
+mod scope_ports;
+mod sorter;
 mod wire;
 
-use std::collections::BTreeSet;
+use std::cell::OnceCell;
+use std::collections::BTreeMap;
+use std::ops::Range;
 
 use crate::catalogue::Catalogue;
 use crate::device::RoleType;
 use crate::graph::load::FlatGraph;
 use crate::graph::plan::{PortRef, Producer};
 use crate::node::{NodeSpec, PortSpec, Spanned};
-use crate::source::{Diagnostic, Diagnostics, Key};
+use crate::source::{Code, Diagnostic, Diagnostics, Key, Value};
 
+use provenance::Provenance;
+use scope_ports::ScopePorts;
 pub(crate) use wire::{CommandWire, Wire, WireOrigin};
 
 /// What a name refers to. The error is a diagnostic, or `None` if another one explains why the name refers to nothing.
@@ -41,6 +48,11 @@ pub(crate) struct Net<'a> {
     pub(crate) commands: Vec<CommandWire>,
     /// The nodes in the order in which they step.
     pub(crate) order: Vec<usize>,
+    provenance: Provenance,
+    /// What modes set of each node and each part of the graph.
+    settings: BTreeMap<&'a str, Vec<&'a Value>>,
+    /// The ports of each scope by name, which only suggestions and views need.
+    scope_ports: Vec<OnceCell<ScopePorts>>,
 }
 
 impl<'a> Net<'a> {
@@ -50,7 +62,13 @@ impl<'a> Net<'a> {
         net.wires = net.connect(diagnostics);
         net.commands = net.connect_commands(diagnostics);
         net.order = net.find_order(diagnostics);
+        net.provenance = Provenance::new(&net);
         net
+    }
+
+    /// Returns the roles whose samples a producer descends from.
+    pub(crate) fn roles_of(&self, producer: Producer) -> impl Iterator<Item = usize> {
+        self.provenance.roles(producer)
     }
 
     /// Returns the declaration of a node, or `None` if its type is unknown.
@@ -79,6 +97,24 @@ impl<'a> Net<'a> {
         }
     }
 
+    /// Returns where a producer is declared.
+    pub(crate) fn place(&self, producer: Producer) -> Range<usize> {
+        match producer {
+            Producer::Role(i) => self.flat.roles[i].0.span.clone(),
+            Producer::Node(i) => self.flat.nodes[i].block.key.span.clone(),
+        }
+    }
+
+    /// Creates a diagnostic about a node. For a node in a part it is at the part in the graph file.
+    pub(crate) fn diagnostic_at(&self, node: usize, code: Code, message: String) -> Diagnostic {
+        let own = self.place(Producer::Node(node));
+        let part = self.flat.nodes[node].name.split_once('.').and_then(|(part, _)| self.flat.scopes[0].names.get(part));
+        match part {
+            Some((key, _)) => Diagnostic::new(code, key.span.clone(), message).note(own, "the part has it here"),
+            None => Diagnostic::new(code, own, message),
+        }
+    }
+
     /// Returns the declaration of the command or report at the end of a wire.
     pub(crate) fn command_port(&self, wire: &CommandWire) -> &PortSpec {
         let role = self.roles[wire.role].expect("only known roles have commands");
@@ -100,20 +136,39 @@ impl<'a> Net<'a> {
         format!("{}.{}", self.name(source.producer), self.port(source).name)
     }
 
-    /// Returns all nodes upstream of the given ones, including themselves.
-    pub(crate) fn upstream(&self, nodes: impl IntoIterator<Item = usize>) -> BTreeSet<usize> {
-        let mut reached: BTreeSet<usize> = nodes.into_iter().collect();
-        let mut open: Vec<usize> = reached.iter().copied().collect();
-        while let Some(node) = open.pop() {
-            let sources = self.wires[node].iter().filter_map(|wire| wire.source.producer.node());
-            open.extend(sources.filter(|source| reached.insert(*source)));
-        }
-        reached
+    /// Returns the tables of parameters that modes set of a node.
+    pub(crate) fn settings_of(&self, node: usize) -> impl Iterator<Item = &'a Value> {
+        let mut path = self.flat.nodes[node].name.split('.');
+        let tables = path.next().and_then(|first| self.settings.get(first));
+        tables
+            .into_iter()
+            .flatten()
+            .filter_map(move |table| path.clone().try_fold(*table, |value, name| value.as_table()?.get(name)))
     }
 
-    /// Returns the nodes that read an output of a node.
-    pub(crate) fn readers(&self, node: usize) -> impl Iterator<Item = usize> {
-        let reads = move |wires: &[Wire]| wires.iter().any(|wire| wire.source.producer == Producer::Node(node));
-        self.wires.iter().enumerate().filter(move |(_, wires)| reads(wires)).map(|(reader, _)| reader)
+    /// Marks the given nodes and all nodes upstream of them, and goes no further where a node is marked.
+    pub(crate) fn mark_upstream(&self, nodes: impl IntoIterator<Item = usize>, marked: &mut [bool]) {
+        let mut open: Vec<usize> = nodes.into_iter().collect();
+        while let Some(node) = open.pop() {
+            if !std::mem::replace(&mut marked[node], true) {
+                open.extend(self.wires[node].iter().filter_map(|wire| wire.source.producer.node()));
+            }
+        }
+    }
+
+    /// Returns for each node whether it is one of the given ones or upstream of them.
+    pub(crate) fn upstream(&self, nodes: impl IntoIterator<Item = usize>) -> Vec<bool> {
+        let mut marked = vec![false; self.wires.len()];
+        self.mark_upstream(nodes, &mut marked);
+        marked
+    }
+
+    /// Returns for each node whether a node reads one of its outputs.
+    pub(crate) fn read_nodes(&self) -> Vec<bool> {
+        let mut is_read = vec![false; self.wires.len()];
+        for source in self.wires.iter().flatten().filter_map(|wire| wire.source.producer.node()) {
+            is_read[source] = true;
+        }
+        is_read
     }
 }

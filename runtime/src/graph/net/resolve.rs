@@ -1,5 +1,6 @@
 //! Names of ports: from `node.port` in a scope to the port, and back.
 
+use super::scope_ports::ScopePorts;
 use super::{Net, Resolved};
 use crate::graph::load::{Entity, Scope};
 use crate::graph::plan::{PortRef, Producer};
@@ -47,13 +48,12 @@ impl Net<'_> {
         if name == INPUTS
             && let Some(parent) = *parent
         {
-            if !declared.iter().any(|(key, _)| key.name == port) {
-                let known = declared.iter().map(|(key, _)| key.name.as_str());
+            if declared.position(port).is_none() {
                 let message = format!("the part has no input `{port}`");
-                return unknown_port(port.len(), message).suggest(port, known, "inputs").into_err();
+                return unknown_port(port.len(), message).suggest(port, declared.names(), "inputs").into_err();
             }
             // An input that is declared and not wired has its own diagnostic.
-            let wire = inputs.iter().find(|wire| wire.key.name == port).ok_or(None)?;
+            let wire = inputs.get(port).ok_or(None)?;
             return self.resolve_at_depth(parent, &wire.from, depth + 1);
         }
         let Some((_, entity)) = names.get(name) else {
@@ -85,7 +85,7 @@ impl Net<'_> {
             Entity::Role(i) => Producer::Role(i),
             Entity::Node(i) => Producer::Node(i),
             Entity::Part(inner) => {
-                let (_, word) = self.flat.scopes[inner].exports.iter().find(|(key, _)| key.name == port)?;
+                let word = self.flat.scopes[inner].exports.get(port)?;
                 return Some(self.resolve_at_depth(inner, word, depth + 1));
             }
             Entity::Unknown => return Some(Err(None)),
@@ -118,32 +118,38 @@ impl Net<'_> {
         match entity {
             Entity::Role(i) => names(Producer::Role(i)),
             Entity::Node(i) => names(Producer::Node(i)),
-            Entity::Part(inner) => self.flat.scopes[inner].exports.iter().map(|(key, _)| key.name.as_str()).collect(),
+            Entity::Part(inner) => self.flat.scopes[inner].exports.names().collect(),
             Entity::Unknown => Vec::new(),
         }
     }
 
     /// Returns the ports that the wires of a scope can read, each with its name there.
     pub(crate) fn ports_in(&self, scope: usize) -> impl Iterator<Item = (String, PortRef)> {
-        let ports = self.flat.scopes[scope]
-            .names
-            .iter()
-            .flat_map(|(name, (_, entity))| self.ports_of(*entity).into_iter().map(move |port| (name, *entity, port)));
-        ports.filter_map(|(name, entity, port)| Some((format!("{name}.{port}"), self.port_of(entity, port, 0)?.ok()?)))
+        let names = self.flat.scopes[scope].names.iter();
+        names.flat_map(move |(name, (_, entity))| {
+            let ports = self.ports_of(*entity).into_iter();
+            ports.filter_map(move |port| Some((format!("{name}.{port}"), self.port_of(*entity, port, 0)?.ok()?)))
+        })
+    }
+
+    fn scope_ports(&self, scope: usize) -> &ScopePorts {
+        let ports = || ScopePorts::new(self.ports_in(scope), |port| self.port(port).kind);
+        self.scope_ports[scope].get_or_init(ports)
     }
 
     /// Returns the name by which the wires of a scope refer to a port, or `None` if they cannot.
-    pub(crate) fn name_in(&self, scope: usize, source: PortRef) -> Option<String> {
-        self.ports_in(scope).find(|(_, port)| *port == source).map(|(name, _)| name)
+    pub(crate) fn name_in(&self, scope: usize, source: PortRef) -> Option<&str> {
+        self.scope_ports(scope).name(source)
+    }
+
+    /// Returns the name of the first port for which `fits` holds and that the wires of a scope can read.
+    pub(crate) fn find_port(&self, scope: usize, fits: impl Fn(PortRef) -> bool) -> Option<&str> {
+        self.scope_ports(scope).find(fits)
     }
 
     /// Returns a port of the scope with the name and the kind of an input, as a suggestion for its wire.
-    pub(crate) fn find_candidate(&self, scope: usize, node: usize, input: &PortSpec) -> Option<String> {
-        let end = format!(".{}", input.name);
-        let is_candidate = |(name, port): &(String, PortRef)| {
-            name.ends_with(&end) && port.producer != Producer::Node(node) && self.port(*port).kind == input.kind
-        };
-        self.ports_in(scope).find(is_candidate).map(|(name, _)| name)
+    pub(crate) fn find_candidate(&self, scope: usize, node: usize, input: &PortSpec) -> Option<&str> {
+        self.scope_ports(scope).candidate(node, input)
     }
 
     /// Returns the exports of the parts in the graph, each with the full name of the port behind it.

@@ -63,6 +63,10 @@ pub(crate) struct PlannedNode {
     pub(crate) is_logged: bool,
     /// The limits that it holds; each has an output of the same name.
     pub(crate) holds: &'static [&'static str],
+    /// Index of the flag that is set while a budget of the limiter is spent, and the role whose commands it limits.
+    pub(crate) budget: Option<(usize, String)>,
+    /// Whether its limits are in raw readings.
+    pub(crate) is_uncalibrated: bool,
     /// Span of its name.
     pub(crate) span: Range<usize>,
 }

@@ -14,5 +14,6 @@ pub use policy::Policy;
 pub(crate) use policy::{AgeLimit, PolicyTable, default_max_age_ns, default_max_age_s};
 pub(crate) use reserved::{INPUTS, LIMITS};
 pub(crate) use sections::{
-    BenchDocument, Block, GraphDocument, GraphTable, PartBlock, Sections, WireEntry, into_diagnostic,
+    ALLOW_UNCALIBRATED, BenchDocument, Block, GraphDocument, GraphTable, PartBlock, Sections, WireEntry,
+    into_diagnostic,
 };

@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use super::correct::{correct_facts, correct_keys};
 use super::read::{read_table, read_word};
-use crate::node::{Param, Reader, Spanned};
+use crate::node::{Amount, Param, Reader, Spanned};
 use crate::source::{Diagnostic, Item, Key, Table, Value};
 
 /// A mode: the parameters it sets and its exits.
@@ -105,25 +105,25 @@ pub(crate) struct ExitTable {
     pub(crate) is: Option<PortState>,
     /// Lower bound of the port.
     #[param(unit = "_")]
-    pub(crate) above: Option<f64>,
+    pub(crate) above: Option<Amount>,
     /// Upper bound of the port.
     #[param(unit = "_")]
-    pub(crate) below: Option<f64>,
+    pub(crate) below: Option<Amount>,
     /// Upper bound of the absolute value of the port.
     #[param(unit = "_", above = 0.0)]
-    pub(crate) within: Option<f64>,
+    pub(crate) within: Option<Amount>,
     /// How far the port may cross back over a bound before the condition ends.
     #[param(unit = "_", range = 0.0..)]
-    pub(crate) hysteresis: Option<f64>,
+    pub(crate) hysteresis: Option<Amount>,
     /// How long the condition must hold, counted from new sample to new sample.
-    #[param(unit = "ms", range = 0.0..)]
+    #[param(unit = "ms", range = 0.0..=3.6e6)]
     pub(crate) for_ms: Option<f64>,
     /// Time in the mode; for `on_lost`, how long the signal must be lost. The default of `on_lost` is five periods of
     /// the graph.
-    #[param(unit = "ms", above = 0.0)]
+    #[param(unit = "ms", range = 0.001..=3.6e6)]
     pub(crate) after_ms: Option<f64>,
     /// Distance that the sensor travels in the mode.
-    #[param(unit = "mm", above = 0.0)]
+    #[param(unit = "mm", range = 0.001..=1e4)]
     pub(crate) after_travel_mm: Option<f64>,
     /// Signal that `on_lost` watches; for `after_travel_mm`, the pose to measure if the graph has several.
     pub(crate) of: Option<Spanned<String>>,
@@ -131,6 +131,13 @@ pub(crate) struct ExitTable {
     pub(crate) on: Option<Spanned<String>>,
     /// Priority among `go` exits that hold at once: the greatest wins.
     pub(crate) priority: Option<u64>,
+}
+
+impl ExitTable {
+    /// Returns the numbers in the unit of the port.
+    pub(crate) fn amounts_mut(&mut self) -> impl Iterator<Item = &mut Amount> {
+        [&mut self.above, &mut self.below, &mut self.within, &mut self.hysteresis].into_iter().flatten()
+    }
 }
 
 /// Reads the block of a mode.

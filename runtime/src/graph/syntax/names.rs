@@ -3,12 +3,15 @@
 //! Such a name is reported once, at its definition, and the graph is then read as it was meant. Whether the definition
 //! or the reference is misspelt is decided by the number of times that each name occurs in the files.
 
+use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 
 use super::reserved::{INPUTS, LIMITS, is_name};
 use super::sections::{BenchDocument, GraphDocument};
 use crate::node::Spanned;
-use crate::source::{Code, Diagnostic, Diagnostics, Edit, Item, Key, SourceMap, Value, quoted, suggest_name};
+use crate::source::{
+    Code, Diagnostic, Diagnostics, Edit, FactRef, Item, Key, Named, SourceMap, Value, quoted, suggest_name,
+};
 
 /// A reference to a port: the name of the node, role or part, and the port unless the reference is to the whole.
 #[derive(Debug, Clone)]
@@ -49,14 +52,14 @@ fn correct<'k>(
 ) -> Diagnostics {
     let mut defined: Vec<&mut Key> = defined.into_iter().collect();
     let names: Vec<String> = defined.iter().map(|key| key.name.clone()).collect();
-    let count = |name: &str| uses.iter().filter(|reference| reference.name == name).count();
+    let mut counts: BTreeMap<&str, usize> = BTreeMap::new();
+    uses.iter().for_each(|reference| *counts.entry(&reference.name).or_default() += 1);
+    let count = |name: &str| counts.get(name).copied().unwrap_or(0);
     let mut unused: Vec<usize> = (0..names.len()).filter(|i| count(&names[*i]) == 0).collect();
-    let mut unknown: Vec<&Use> = Vec::new();
-    for reference in uses.iter().filter(|reference| !names.contains(&reference.name)) {
-        if !unknown.iter().any(|other| other.name == reference.name) {
-            unknown.push(reference);
-        }
-    }
+    let known: BTreeSet<&str> = names.iter().map(String::as_str).collect();
+    let mut seen = BTreeSet::new();
+    let strange = uses.iter().filter(|reference| !known.contains(&*reference.name));
+    let unknown: Vec<&Use> = strange.filter(|reference| seen.insert(reference.name.as_str())).collect();
     let mut found = Diagnostics::new();
     for first in &unknown {
         let wanted = &first.name;
@@ -99,7 +102,7 @@ impl GraphDocument {
         uses.extend(self.modes.iter().flat_map(|mode| &mode.set.entries).map(|(key, _)| Use::of_key(key)));
         // The facts in a part are those of the roles of the graph.
         let facts = self.nodes.iter().filter(|_| !self.roles.is_empty()).flat_map(|node| node.params.facts());
-        let fact = |(word, span): (&str, &Range<usize>)| Use::of(&Spanned { value: word.into(), span: span.clone() });
+        let fact = |fact: FactRef<'_>| Use::of(&Spanned { value: fact.word.into(), span: fact.place.clone() });
         uses.extend(facts.map(fact).filter(|reference| reference.name != LIMITS));
         if let Some((_, Some(graph))) = &self.graph {
             let mark = graph.mark.iter().flatten();
@@ -113,18 +116,20 @@ impl GraphDocument {
     /// `set` are the names of nodes and parts that the graph around a part sets.
     pub(crate) fn correct_names(
         &mut self,
-        binds: &[(Key, Spanned<String>)],
+        binds: &Named<Spanned<String>>,
         set: &[&Key],
         sources: &SourceMap,
     ) -> Diagnostics {
         let uses = self.uses().into_iter().filter(|reference| reference.name != INPUTS);
         let uses: Vec<Use> = uses.chain(set.iter().map(|key| Use::of_key(key))).collect();
         let roles = self.roles.len();
-        let may_be = |i: usize, name: &str| i < roles || !binds.iter().any(|(role, _)| role.name == name);
+        let may_be = |i: usize, name: &str| i < roles || binds.position(name).is_none();
         let nodes =
             self.nodes.iter_mut().map(|node| &mut node.key).chain(self.parts.iter_mut().map(|part| &mut part.key));
-        let names = self.roles.iter_mut().map(|(key, _)| key).chain(nodes);
+        let mut role_keys = self.roles.to_vec();
+        let names = role_keys.iter_mut().map(|(key, _)| key).chain(nodes);
         let mut found = correct(Code::UnknownPort, names, &uses, &may_be, true, sources);
+        self.roles = role_keys.into_iter().collect();
         let start = self.graph.iter().filter_map(|(_, graph)| graph.as_ref()?.start.as_ref());
         let mut targets: Vec<Use> = start.map(Use::of).collect();
         self.modes.iter().flat_map(|mode| &mode.table.entries).for_each(|(_, value)| add_targets(value, &mut targets));
@@ -137,45 +142,21 @@ impl GraphDocument {
     pub(crate) fn correct_ports(&mut self, wires: &[&Key], reads: &[Use], sources: &SourceMap) -> Diagnostics {
         let inner: Vec<Use> = self.uses().iter().filter_map(|reference| reference.inside(INPUTS)).collect();
         let outer: Vec<Use> = wires.iter().map(|key| Use::of_key(key)).collect();
-        let inputs = self.inputs.iter_mut().map(|(key, _)| key);
+        let (mut inputs, mut exports) = (self.inputs.to_vec(), self.exports.to_vec());
         let uses = [&inner[..], &outer[..]].concat();
-        let mut found = correct(Code::UnknownInput, inputs, &uses, &|_, _| true, true, sources);
-        let exports = self.exports.iter_mut().map(|(key, _)| key);
-        found.extend(correct(Code::UnknownPort, exports, reads, &|_, _| true, false, sources));
-        found.extend(self.declare_missing(&inner, &outer));
+        let mut found =
+            correct(Code::UnknownInput, inputs.iter_mut().map(|(key, _)| key), &uses, &|_, _| true, true, sources);
+        found.extend(correct(
+            Code::UnknownPort,
+            exports.iter_mut().map(|(key, _)| key),
+            reads,
+            &|_, _| true,
+            false,
+            sources,
+        ));
+        found.extend(declare_missing(&mut inputs, &inner, &outer));
+        (self.inputs, self.exports) = (inputs.into_iter().collect(), exports.into_iter().collect());
         found
-    }
-
-    /// Declares the inputs that the graph wires and the part reads, and reports that they are not declared.
-    fn declare_missing(&mut self, inner: &[Use], outer: &[Use]) -> Option<Diagnostic> {
-        let is_declared = |name: &str| self.inputs.iter().any(|(key, _)| key.name == name);
-        let is_wired = |name: &str| outer.iter().any(|wire| wire.name == name);
-        let mut missing: Vec<&Use> = Vec::new();
-        for read in inner.iter().filter(|read| !is_declared(&read.name) && is_wired(&read.name)) {
-            if !missing.iter().any(|other| other.name == read.name) {
-                missing.push(read);
-            }
-        }
-        let first = missing.first()?;
-        let names = quoted(missing.iter().map(|read| &read.name));
-        let message = format!("the part reads {names} from its inputs and does not declare them");
-        let lines: Vec<String> = missing.iter().map(|read| format!("{} = \"what it is\"", read.name)).collect();
-        let lines = lines.join("\n");
-        let help = format!("declare them under [inputs]:\n{lines}");
-        let last = self.inputs.last().map(|(key, _)| key.span.clone());
-        let diagnostic = match &last {
-            Some(last) => Diagnostic::new(Code::UnknownInput, last.clone(), message)
-                .note(first.span.clone(), "one is read here")
-                .edit(Edit::Below(last.clone(), lines)),
-            None => Diagnostic::new(Code::UnknownInput, first.span.clone(), message)
-                .edit(Edit::Append(first.span.clone(), format!("\n[inputs]\n{lines}"))),
-        };
-        let place = last.unwrap_or_else(|| first.span.clone());
-        for read in missing {
-            let key = Key { name: read.name.clone(), span: place.clone() };
-            self.inputs.push((key, Spanned { value: String::new(), span: place.clone() }));
-        }
-        Some(diagnostic.help(help))
     }
 }
 
@@ -198,4 +179,36 @@ fn add_targets(value: &Value, targets: &mut Vec<Use>) {
         }
         _ => {}
     }
+}
+
+/// Declares the inputs that the graph wires and the part reads, and reports that they are not declared.
+fn declare_missing(inputs: &mut Vec<(Key, Spanned<String>)>, inner: &[Use], outer: &[Use]) -> Option<Diagnostic> {
+    let is_declared = |name: &str| inputs.iter().any(|(key, _)| key.name == name);
+    let is_wired = |name: &str| outer.iter().any(|wire| wire.name == name);
+    let mut missing: Vec<&Use> = Vec::new();
+    for read in inner.iter().filter(|read| !is_declared(&read.name) && is_wired(&read.name)) {
+        if !missing.iter().any(|other| other.name == read.name) {
+            missing.push(read);
+        }
+    }
+    let first = missing.first()?;
+    let names = quoted(missing.iter().map(|read| &read.name));
+    let message = format!("the part reads {names} from its inputs and does not declare them");
+    let lines: Vec<String> = missing.iter().map(|read| format!("{} = \"what it is\"", read.name)).collect();
+    let lines = lines.join("\n");
+    let help = format!("declare them under [inputs]:\n{lines}");
+    let last = inputs.last().map(|(key, _)| key.span.clone());
+    let diagnostic = match &last {
+        Some(last) => Diagnostic::new(Code::UnknownInput, last.clone(), message)
+            .note(first.span.clone(), "one is read here")
+            .edit(Edit::Below(last.clone(), lines)),
+        None => Diagnostic::new(Code::UnknownInput, first.span.clone(), message)
+            .edit(Edit::Append(first.span.clone(), format!("\n[inputs]\n{lines}"))),
+    };
+    let place = last.unwrap_or_else(|| first.span.clone());
+    for read in missing {
+        let key = Key { name: read.name.clone(), span: place.clone() };
+        inputs.push((key, Spanned { value: String::new(), span: place.clone() }));
+    }
+    Some(diagnostic.help(help))
 }

@@ -69,6 +69,22 @@ impl Param for HaltingPolicy {
     }
 }
 
+/// A policy for a budget of motion that is spent. Its arm rests in any case.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct BudgetPolicy(pub(crate) Policy);
+
+impl Param for BudgetPolicy {
+    const EXPECTS: &'static str = "`stop` or `fault`";
+
+    fn read(value: &Value, reader: &mut Reader<'_>) -> Option<Self> {
+        read_word(value, &Policy::WORDS[2..], Self::EXPECTS, reader).map(Self)
+    }
+
+    fn written(&self) -> Option<Written> {
+        self.0.written()
+    }
+}
+
 /// A wire with a maximum age.
 #[derive(Debug, Clone, Param)]
 pub(crate) struct WireTable {
@@ -127,6 +143,10 @@ pub(crate) struct PolicyTable {
     /// A tick began more than one period late. Applies to a real clock only.
     #[param(default = Policy::Count)]
     pub(crate) deadline: Policy,
+    /// The budget of motion without a contact is spent. `stop` stops the arm of that limiter alone, until a contact or
+    /// `resume` refills the budget.
+    #[param(default = BudgetPolicy(Policy::Stop))]
+    pub(crate) blind: BudgetPolicy,
     /// A node panicked.
     #[param(default = HaltingPolicy(Policy::Fault))]
     pub(crate) panic: HaltingPolicy,

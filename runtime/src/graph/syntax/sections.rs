@@ -1,5 +1,6 @@
 //! Parses the sections of a graph file, a part and a bench, before names are resolved.
 
+use std::collections::BTreeSet;
 use std::ops::Range;
 
 use super::correct::{correct_block, correct_facts, correct_keys, correct_sections, correct_wires};
@@ -7,8 +8,8 @@ use super::modes::{ModeBlock, read_mode};
 use super::policy::{AgeLimit, PolicyTable, WireTable};
 use super::read::read_table;
 use super::reserved::is_name;
-use crate::node::{At, FilePath, Mistake, Param, Reader, Spanned};
-use crate::source::{Code, Diagnostic, Diagnostics, Item, Key, SourceMap, Table, Value, suggest_name};
+use crate::node::{At, FilePath, Measured, Mistake, Param, Reader, Spanned};
+use crate::source::{Code, Diagnostic, Diagnostics, Item, Key, Named, SourceMap, Table, Value, suggest_name};
 
 /// The section `[graph]`.
 #[derive(Debug, Clone, Param)]
@@ -57,33 +58,34 @@ impl InputWires {
         !self.invalid.is_empty()
     }
 
-    fn keys(&self) -> impl Iterator<Item = &Key> + Clone {
-        self.valid.iter().map(|wire| &wire.key).chain(&self.invalid)
-    }
-
-    /// Returns whether an input has no wire. A wire to a misspelt name counts, since it has its own diagnostic.
-    pub(crate) fn lack<'n>(
-        &self,
-        input: &str,
-        known: impl Iterator<Item = &'n str> + Clone,
-        required: impl Iterator<Item = &'n str>,
-    ) -> bool {
-        let is_misspelt = |key: &Key| {
-            !known.clone().any(|name| name == key.name) && suggest_name(&key.name, known.clone()) == Some(input)
-        };
-        let is_wired = self.keys().any(|key| key.name == input || is_misspelt(key));
-        !is_wired && self.only_lacks(known, required) != Some(input)
-    }
-
     /// Returns the only `required` input without a wire, if one wire leads to none of the `known` inputs: it was meant.
     pub(crate) fn only_lacks<'n>(
         &self,
-        known: impl Iterator<Item = &'n str> + Clone,
+        known: impl Iterator<Item = &'n str>,
         required: impl Iterator<Item = &'n str>,
     ) -> Option<&'n str> {
-        let strange = self.keys().filter(|key| !known.clone().any(|name| name == key.name)).count();
-        let mut open = required.filter(|name| !self.keys().any(|key| key.name == *name));
+        let names: BTreeSet<&str> = known.collect();
+        let keys = || self.valid.iter().map(|wire| &wire.key).chain(&self.invalid).map(|key| key.name.as_str());
+        let wired: BTreeSet<&str> = keys().collect();
+        let strange = keys().filter(|key| !names.contains(key)).count();
+        let mut open = required.filter(|name| !wired.contains(name));
         open.next().filter(|_| strange == 1 && open.next().is_none())
+    }
+
+    /// Returns the `known` inputs that have no wire. A wire to a misspelt name counts, since it has its own diagnostic.
+    pub(crate) fn lacking<'n>(&self, known: impl Iterator<Item = &'n str> + Clone) -> BTreeSet<&'n str> {
+        let names: BTreeSet<&str> = known.clone().collect();
+        let keys = || self.valid.iter().map(|wire| &wire.key).chain(&self.invalid).map(|key| key.name.as_str());
+        let wired: BTreeSet<&str> = keys().collect();
+        let mut lacking = names.clone();
+        lacking.retain(|name| !wired.contains(name));
+        for strange in keys().filter(|key| !names.contains(key)) {
+            if lacking.is_empty() {
+                break;
+            }
+            suggest_name(strange, known.clone()).map(|meant| lacking.remove(meant));
+        }
+        lacking
     }
 }
 
@@ -110,7 +112,7 @@ pub(crate) struct PartBlock {
 pub(crate) struct GraphDocument {
     /// The span of the section [graph], and the section if it is valid.
     pub(crate) graph: Option<(Range<usize>, Option<GraphTable>)>,
-    pub(crate) roles: Vec<(Key, Spanned<String>)>,
+    pub(crate) roles: Named<Spanned<String>>,
     pub(crate) nodes: Vec<Block>,
     pub(crate) parts: Vec<PartBlock>,
     /// The wires to commands, each with its role.
@@ -120,20 +122,27 @@ pub(crate) struct GraphDocument {
     pub(crate) modes: Vec<ModeBlock>,
     /// The section [policy] as written, and parsed if it is valid.
     pub(crate) policy: Option<(Value, Option<PolicyTable>)>,
-    pub(crate) inputs: Vec<(Key, Spanned<String>)>,
-    pub(crate) exports: Vec<(Key, Spanned<String>)>,
+    pub(crate) inputs: Named<Spanned<String>>,
+    pub(crate) exports: Named<Spanned<String>>,
 }
 
 /// The sections of a bench file.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct BenchDocument {
     pub(crate) devices: Vec<Block>,
-    pub(crate) bind: Vec<(Key, Spanned<String>)>,
+    pub(crate) bind: Named<Spanned<String>>,
     /// The place of the name of the section [bind].
     pub(crate) place: Option<Range<usize>>,
     /// Roles whose binding is not a string, which has its own diagnostic.
     pub(crate) invalid: Vec<Key>,
+    /// Facts that the bench states beside those of its devices, by role.
+    pub(crate) facts: Vec<(Key, Table)>,
+    /// Whether limits may be in raw readings.
+    pub(crate) allow_uncalibrated: bool,
 }
+
+/// Key of a bench that allows limits in raw readings.
+pub(crate) const ALLOW_UNCALIBRATED: &str = "allow_uncalibrated";
 
 /// Reads sections and collects their diagnostics.
 pub(crate) struct Sections<'a> {
@@ -148,18 +157,36 @@ impl<'a> Sections<'a> {
         Self { reader: Reader::new(sources), diagnostics: Vec::new(), broken: Vec::new() }
     }
 
-    /// Returns all diagnostics.
-    pub(crate) fn finish(self) -> Diagnostics {
+    /// Returns all diagnostics, and the values that were written with a unit.
+    pub(crate) fn finish(self) -> (Diagnostics, Measured) {
         let mut diagnostics = self.diagnostics;
         diagnostics.extend(self.reader.mistakes.into_iter().map(into_diagnostic));
-        diagnostics
+        (diagnostics, self.reader.measured)
     }
 
     /// Reads the sections of a graph file.
     pub(crate) fn graph(&mut self, root: &mut Table) -> GraphDocument {
-        const KEYS: [&str; 10] =
-            ["graph", "roles", "parts", "nodes", "commands", "limits", "modes", "policy", "devices", "bind"];
+        const KEYS: [&str; 12] = [
+            "graph",
+            "roles",
+            "parts",
+            "nodes",
+            "commands",
+            "limits",
+            "modes",
+            "policy",
+            "devices",
+            "bind",
+            "facts",
+            ALLOW_UNCALIBRATED,
+        ];
         correct_sections(root, &KEYS, &mut self.reader);
+        for name in [ALLOW_UNCALIBRATED, "facts"] {
+            let Some((key, _)) = root.entry(name).filter(|_| root.get("devices").is_none()) else { continue };
+            let message = format!("`{name}` is a key of a bench, and a task cannot set it");
+            let diagnostic = Diagnostic::new(Code::UnknownKey, key.span.clone(), message);
+            self.diagnostics.push(diagnostic.help("move it to the bench file"));
+        }
         let graph =
             root.entry("graph").map(|(key, value)| (key.span.clone(), GraphTable::read(value, &mut self.reader)));
         let commands = self.table(root.get("commands")).entries.into_iter().flat_map(|(role, value)| {
@@ -189,7 +216,7 @@ impl<'a> Sections<'a> {
 
     /// Reads the sections of a bench file.
     pub(crate) fn bench(&mut self, root: &mut Table) -> BenchDocument {
-        correct_sections(root, &["devices", "bind"], &mut self.reader);
+        correct_sections(root, &["devices", "bind", "facts", ALLOW_UNCALIBRATED], &mut self.reader);
         self.own_bench(root)
     }
 
@@ -202,22 +229,26 @@ impl<'a> Sections<'a> {
             self.block(key, table, &names)
         };
         let devices = devices.into_iter().map(block).collect();
-        let bind = root.entry("bind");
+        let section = root.entry("bind");
         let is_invalid = |(_, value): &&(Key, Value)| value.as_str().is_none();
-        let entries = bind.and_then(|(_, value)| value.as_table()).into_iter().flat_map(|table| &table.entries);
-        BenchDocument {
-            devices,
-            invalid: entries.filter(is_invalid).map(|(key, _)| key.clone()).collect(),
-            place: bind.map(|(key, _)| key.span.clone()),
-            bind: self.words(bind.map(|(_, value)| value)),
+        let entries = section.and_then(|(_, value)| value.as_table()).into_iter().flat_map(|table| &table.entries);
+        let invalid = entries.filter(is_invalid).map(|(key, _)| key.clone()).collect();
+        let allow_uncalibrated = root.get(ALLOW_UNCALIBRATED).and_then(|value| bool::read(value, &mut self.reader));
+        let (bind, facts) = (self.words(root.get("bind")), self.named_tables(root.get("facts")));
+        for (key, _) in facts.iter().filter(|(key, _)| bind.position(&key.name).is_none()) {
+            let unknown = Diagnostic::unknown(Code::UnboundRole, "role", &key.name, &key.span, bind.names());
+            self.diagnostics.push(unknown);
         }
+        let place = section.map(|(key, _)| key.span.clone());
+        BenchDocument { devices, bind, place, invalid, facts, allow_uncalibrated: allow_uncalibrated.unwrap_or(false) }
     }
 
     fn body(&mut self, root: &Table) -> GraphDocument {
         let nodes = self.named_tables(root.get("nodes"));
         let names = names_of(&nodes);
         let parts = self.named_tables(root.get("parts"));
-        let nodes = nodes.into_iter().filter(|(key, table)| !self.addresses_part(key, table, &parts));
+        let part_names: BTreeSet<&str> = parts.iter().map(|(key, _)| key.name.as_str()).collect();
+        let nodes = nodes.into_iter().filter(|(key, table)| !self.addresses_part(key, table, &part_names));
         let nodes: Vec<(Key, Table)> = nodes.collect();
         let roles = root.get("roles").and_then(Value::as_table).into_iter().flat_map(|table| &table.entries);
         let roles = roles.map(|(key, _)| key.name.clone());
@@ -229,9 +260,8 @@ impl<'a> Sections<'a> {
 
     /// Returns whether a block of [nodes] addresses a node in a part, as `--set nodes.PART.NODE.…` does, and reports
     /// it.
-    fn addresses_part(&mut self, key: &Key, table: &Table, parts: &[(Key, Table)]) -> bool {
-        let is_part = parts.iter().any(|(part, _)| part.name == key.name);
-        if !is_part || table.get("type").is_some() {
+    fn addresses_part(&mut self, key: &Key, table: &Table, parts: &BTreeSet<&str>) -> bool {
+        if !parts.contains(key.name.as_str()) || table.get("type").is_some() {
             return false;
         }
         let message = format!("`{0}` is a part: set its nodes through `parts.{0}.set`", key.name);
@@ -307,7 +337,7 @@ impl<'a> Sections<'a> {
     }
 
     /// Reads a table whose values are strings.
-    fn words(&mut self, value: Option<&Value>) -> Vec<(Key, Spanned<String>)> {
+    fn words(&mut self, value: Option<&Value>) -> Named<Spanned<String>> {
         let table = self.table(value);
         let read = |(key, value): (Key, Value)| Some((key, Spanned::read(&value, &mut self.reader)?));
         table.entries.into_iter().filter_map(read).collect()
@@ -341,12 +371,12 @@ impl<'a> Sections<'a> {
     }
 
     /// Reads a table whose keys are names and whose values are strings.
-    fn names(&mut self, value: Option<&Value>) -> Vec<(Key, Spanned<String>)> {
-        let mut words = self.words(value);
+    fn names(&mut self, value: Option<&Value>) -> Named<Spanned<String>> {
+        let mut words = self.words(value).to_vec();
         for (key, _) in &mut words {
             self.check_name(key);
         }
-        words
+        words.into_iter().collect()
     }
 
     /// Reads a table whose keys are names and whose values are tables.

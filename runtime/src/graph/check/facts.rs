@@ -1,0 +1,102 @@
+//! Checks that a node takes facts only of the roles that it reads: the model of one arm does not fit another one.
+
+use std::collections::BTreeSet;
+use std::ops::Range;
+
+use crate::graph::net::Net;
+use crate::graph::plan::Producer;
+use crate::graph::syntax::LIMITS;
+use crate::source::{Code, Diagnostic, Diagnostics, Edit, FactRef, Key, Table, Value, quoted};
+
+/// A fact of a role that the node does not read.
+struct ForeignFact<'a> {
+    /// The parameter, with the facts in it.
+    param: &'a str,
+    role: &'a str,
+    fact: &'a str,
+    place: &'a Range<usize>,
+    is_optional: bool,
+}
+
+/// Reports facts of roles that are not upstream of their node, one diagnostic for each node and role.
+///
+/// A node that reads no role generates its outputs, and may use the facts of any role.
+pub(crate) fn check(net: &Net<'_>, diagnostics: &mut Diagnostics) {
+    for (node, flat) in net.flat.nodes.iter().enumerate() {
+        let upstream: BTreeSet<&str> =
+            net.roles_of(Producer::Node(node)).map(|role| net.name(Producer::Role(role))).collect();
+        diagnostics.extend(task_values(net, node));
+        let tables = [&flat.block.params].into_iter().chain(net.settings_of(node));
+        let foreign: Vec<ForeignFact<'_>> = tables.flat_map(|table| find_foreign(net, table, &upstream)).collect();
+        let roles: BTreeSet<&str> = foreign.iter().map(|fact| fact.role).filter(|_| !upstream.is_empty()).collect();
+        for role in roles {
+            let facts: Vec<_> = foreign.iter().filter(|fact| fact.role == role).collect();
+            diagnostics.push(report(net, node, &facts, &upstream));
+        }
+    }
+}
+
+/// Reports parameters that only a fact can set, and that the task sets itself.
+fn task_values(net: &Net<'_>, node: usize) -> Vec<Diagnostic> {
+    let specs = net.spec(node).map_or(&[][..], |spec| &spec.params);
+    let tables = [&net.flat.nodes[node].block.params].into_iter().chain(net.settings_of(node));
+    let entries = tables.flat_map(|table| table.as_table().into_iter().flat_map(|table| &table.entries));
+    let is_fact = |value: &Value| {
+        let role = value.as_table().and_then(Table::fact).and_then(|fact| fact.word.split_once('.'));
+        role.is_some_and(|(role, _)| role != LIMITS)
+    };
+    let is_for_bench = |name: &str| specs.iter().any(|spec| spec.name == name && spec.is_from_bench);
+    let own = entries.filter(|(key, value)| is_for_bench(&key.name) && !is_fact(value));
+    let report = |(key, value): &(Key, Value)| {
+        let name = &key.name;
+        let message = format!("only the bench can set `{name}`, as a fact of a role");
+        let diagnostic = Diagnostic::new(Code::BadValue, value.span.clone(), message);
+        diagnostic.help(format!(
+            "write `{{ from = \"ROLE.{name}\", optional = true }}`, and state it under [facts.ROLE] in the bench"
+        ))
+    };
+    own.map(report).collect()
+}
+
+/// Returns the facts in a table of parameters that are not of the given roles. Unknown roles have their own diagnostic.
+fn find_foreign<'a>(net: &Net<'_>, table: &'a Value, upstream: &BTreeSet<&str>) -> Vec<ForeignFact<'a>> {
+    let entries = table.as_table().into_iter().flat_map(|table| &table.entries);
+    let facts = entries.flat_map(|(key, value)| value.facts().into_iter().map(move |fact| (key.name.as_str(), fact)));
+    let foreign = facts.filter_map(|(param, FactRef { word, place, is_optional })| {
+        let (role, fact) = word.split_once('.')?;
+        let is_foreign = role != LIMITS && net.flat.roles.position(role).is_some() && !upstream.contains(role);
+        is_foreign.then_some(ForeignFact { param, role, fact, place, is_optional })
+    });
+    foreign.collect()
+}
+
+fn report(net: &Net<'_>, node: usize, facts: &[&ForeignFact<'_>], upstream: &BTreeSet<&str>) -> Diagnostic {
+    let (name, role) = (&net.flat.nodes[node].name, facts[0].role);
+    let params = quoted(facts.iter().map(|fact| fact.param));
+    let reads = quoted(upstream);
+    let message = format!("`{name}` takes {params} from the facts of `{role}`, but it reads only {reads}");
+    let place = facts[0].place.clone();
+    let part = name.split_once('.');
+    let used = part.and_then(|(part, _)| net.flat.scopes[0].names.get(part)).map(|(key, _)| key.span.clone());
+    let block = used.clone();
+    let diagnostic = match used {
+        Some(used) => Diagnostic::new(Code::ForeignFact, used, message).note(place, "the part takes it here"),
+        None => Diagnostic::new(Code::ForeignFact, place, message),
+    };
+    let kind =
+        |role: &str| net.flat.roles.iter().find(|(key, _)| key.name == role).map(|(_, kind)| kind.value.as_str());
+    let Some(own) = upstream.iter().find(|own| kind(own) == kind(role)) else { return diagnostic };
+    let path = part.map(|(_, inner)| format!("set.{inner}.")).unwrap_or_default();
+    let line = |ForeignFact { param, fact, is_optional, .. }: &&ForeignFact<'_>| {
+        let optional = if *is_optional { ", optional = true" } else { "" };
+        format!("\n{path}{param} = {{ from = \"{own}.{fact}\"{optional} }}")
+    };
+    let lines = facts.iter().map(line);
+    let lines: String = lines.collect();
+    match (part, block) {
+        (Some((part, _)), Some(block)) => diagnostic
+            .help(format!("add to [parts.{part}]:{lines}"))
+            .edit(Edit::Below(block, lines.trim_start().to_owned())),
+        _ => diagnostic.help(format!("write in [nodes.{name}]:{lines}")),
+    }
+}

@@ -1,0 +1,54 @@
+//! Provenance: the roles whose samples a port descends from.
+
+use super::Net;
+use crate::graph::plan::Producer;
+
+/// For each node, the roles upstream of it, as bits.
+#[derive(Debug, Default)]
+pub(crate) struct Provenance {
+    /// Number of words of a node.
+    width: usize,
+    words: Vec<u64>,
+}
+
+impl Provenance {
+    /// Follows all wires, delayed ones too.
+    pub(super) fn new(net: &Net<'_>) -> Self {
+        let width = net.roles.len().div_ceil(64);
+        let mut found = Self { width, words: vec![0; width * net.wires.len()] };
+        // A delayed wire comes from a later node, so one pass may not be enough.
+        while net.order.iter().fold(false, |has_changed, node| found.collect(net, *node) || has_changed) {}
+        found
+    }
+
+    /// Adds the roles of the sources of a node, and returns whether there were new ones.
+    fn collect(&mut self, net: &Net<'_>, node: usize) -> bool {
+        let mut has_changed = false;
+        let own = node * self.width;
+        for wire in &net.wires[node] {
+            for i in 0..self.width {
+                let word = match wire.source.producer {
+                    Producer::Node(source) => self.words[source * self.width + i],
+                    Producer::Role(role) if role / 64 == i => 1 << (role % 64),
+                    Producer::Role(_) => 0,
+                };
+                has_changed |= word & !self.words[own + i] != 0;
+                self.words[own + i] |= word;
+            }
+        }
+        has_changed
+    }
+
+    /// Returns the roles that a producer descends from; a role descends from itself.
+    pub(crate) fn roles(&self, producer: Producer) -> impl Iterator<Item = usize> {
+        let (role, words) = match producer {
+            Producer::Role(role) => (Some(role), &[][..]),
+            Producer::Node(node) => (None, &self.words[node * self.width..][..self.width]),
+        };
+        let bits = words
+            .iter()
+            .enumerate()
+            .flat_map(|(i, word)| (0..64).filter(move |bit| word >> bit & 1 == 1).map(move |bit| i * 64 + bit));
+        role.into_iter().chain(bits)
+    }
+}
