@@ -12,7 +12,9 @@ use tempfile::TempDir;
 use crate::tool::{Said, said, tool};
 use tactflow_tests::workspace;
 
-const BENCH: &str = r#"[bind]
+const BENCH: &str = r#"allow_uncalibrated = true
+
+[bind]
 pad = "pad"
 arm = "arm"
 

@@ -56,7 +56,7 @@ fn without_any_one_limiter_no_shipped_graph_loads() {
                 .and_then(|(name, limits)| Some((name, limits.through?)))
         })
         .collect();
-    assert_eq!(limiters.len(), 6, "{limiters:?}");
+    assert_eq!(limiters.len(), 7, "{limiters:?}");
     for (name, through) in limiters {
         let mut part = whole.clone();
         let nodes = part["nodes"].as_table_mut().unwrap();
@@ -132,7 +132,7 @@ fn a_limiter_says_what_it_does_and_no_mode_can_set_it() {
             assert!(live.is_empty(), "a mode could set {live:?} of `{}`", spec.name);
         }
     }
-    assert_eq!(limiters, 6);
+    assert_eq!(limiters, 7);
     // Whatever an arm asks for, some node holds.
     for limit in catalogue.roles().iter().flat_map(|role| &role.limits) {
         let is_held = catalogue.nodes().iter().any(|node| node.spec().limits.holds.contains(&&**limit));

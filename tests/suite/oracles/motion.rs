@@ -116,7 +116,7 @@ fn no_joint_is_ever_told_to_be_faster_than_its_model_allows() {
     assert_eq!((lower.len(), upper.len(), fastest.len()), (7, 7, 7));
     let hurried = [
         "modes.approach.set.reach.twist=[0, 4, 0, 0, 0, 3]",
-        "modes.approach.fail.after_travel_mm=1e6",
+        "modes.approach.fail.after_travel_mm=1e4",
         "limits.linear_m_per_s=9.0",
         "limits.angular_rad_per_s=9.0",
         "limits.linear_m_per_s2=900.0",

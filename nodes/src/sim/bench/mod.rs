@@ -148,6 +148,7 @@ pub const MAX_TACTELS: usize = 128 * 128;
 /// [devices.bench]
 /// type = "sim_bench"
 /// for_s = 4.0                         # [s]
+/// calibration = "builtin:calibrations/sim_pad.toml"
 /// urdf = "builtin:lwr4p.urdf"         # a KUKA LWR 4+
 /// tip = "lwr_7_link"
 /// mount = { xyz = [0.0, 0.0, 0.03] }  # of the sensor on the tip [m]

@@ -44,8 +44,7 @@ use tare::{Averages, Rules};
 /// [nodes.calibrate]
 /// type = "calibrate"
 /// in.image = "source.image"
-/// offset = 0.0                        # [N] the mock pad is calibrated; for a real one write `file = "pad.toml"`
-/// gain = 1.0                          # [N per N]
+/// device = { from = "pad.calibration" }   # or `file = "pad.toml"`, from `tactflow calibrate`
 /// in.present = "label.present"
 /// tare_at_start = true                # the first 50 frames are the zero, if nothing touches the pad
 /// ```

@@ -1,35 +1,13 @@
 //! Budgets of limiters: while one is spent, its arm rests and the others go on.
 
 use super::engine::Engine;
+use super::halt::Rest;
 use crate::fault::{Cause, Fault};
 use crate::graph::Policy;
-use crate::node::PortId;
 use crate::signal::Flag;
-
-/// A time in which one arm rested because a budget of its limiter was spent.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Rest {
-    /// The role of the arm.
-    pub role: String,
-    /// Which limiter, and when.
-    pub fault: Fault,
-    /// Time at which the budget was refilled [ns]; `None` while it is spent.
-    pub until: Option<i64>,
-}
 
 /// Maximum number of rests that are kept for the summary.
 const MAX_RESTS: usize = 1000;
-
-/// A budget of a limiter.
-pub(crate) struct WatchedBudget {
-    /// The role whose commands pass the limiter.
-    pub(crate) role: String,
-    /// Index of the limiter's runner.
-    pub(crate) runner: usize,
-    /// The flag that is set while the budget is spent.
-    pub(crate) flag: PortId,
-    pub(crate) is_spent: bool,
-}
 
 impl Engine {
     /// Notes budgets that were spent or refilled in this tick.

@@ -2,11 +2,10 @@
 
 use std::collections::BTreeMap;
 
-use super::budgets::WatchedBudget;
 use super::engine::{Display, Engine, Logged};
 use super::halt::HaltMachine;
 use super::schedule::TickSchedule;
-use super::trouble::WatchedWire;
+use super::trouble::{WatchedBudget, WatchedWire};
 use crate::device::{Commands, Driver, Samples};
 use crate::engine::core::{
     AgedWire, CommandSlot, Core, DeviceLink, DeviceSlot, Inlet, ModeMachine, NodeRunner, ReportSlot, Timing,

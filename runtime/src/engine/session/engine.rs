@@ -1,9 +1,8 @@
 //! The engine: the state of a running graph and its accessors.
 
-use super::budgets::{Rest, WatchedBudget};
-use super::halt::{Halt, HaltMachine};
+use super::halt::{Halt, HaltMachine, Rest};
 use super::schedule::TickSchedule;
-use super::trouble::{Trouble, WatchedWire};
+use super::trouble::{Trouble, WatchedBudget, WatchedWire};
 use crate::device::Report;
 use crate::engine::core::{Core, Counters, DeviceLink, DeviceSlot, ModeChange, ModeMachine, Timing};
 use crate::graph::{PlannedPort, Policy, PolicyTable};

@@ -17,6 +17,17 @@ pub struct Halt {
     pub until: Option<i64>,
 }
 
+/// A time in which one arm rested because a budget of its limiter was spent.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Rest {
+    /// The role of the arm.
+    pub role: String,
+    /// Which limiter, and when.
+    pub fault: Fault,
+    /// Time at which the budget was refilled [ns]; `None` while it is spent.
+    pub until: Option<i64>,
+}
+
 /// Number of halts that are kept for the summary.
 const MAX_HALTS: usize = 1000;
 

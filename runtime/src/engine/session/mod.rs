@@ -14,10 +14,9 @@ mod schedule;
 mod signals;
 mod trouble;
 
-pub use budgets::Rest;
 pub use drive::run_virtual;
 pub use engine::{Display, Engine, Logged};
-pub use halt::Halt;
+pub use halt::{Halt, Rest};
 pub use outcome::{End, Outcome, RunOptions};
 pub use real_time::run;
 pub use signals::Interrupt;

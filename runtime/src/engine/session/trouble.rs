@@ -4,6 +4,7 @@ use std::ops::Range;
 
 use crate::engine::core::AgedWire;
 use crate::graph::Policy;
+use crate::node::PortId;
 
 /// A wire whose policy stops the commands or ends the run when its value is too old.
 pub(crate) struct WatchedWire {
@@ -16,6 +17,17 @@ pub(crate) struct WatchedWire {
     pub(crate) port: Option<String>,
     /// Position of the wire in the source.
     pub(crate) span: Range<usize>,
+}
+
+/// A budget of a limiter.
+pub(crate) struct WatchedBudget {
+    /// The role whose commands pass the limiter.
+    pub(crate) role: String,
+    /// Index of the limiter's runner.
+    pub(crate) runner: usize,
+    /// The flag that is set while the budget is spent.
+    pub(crate) flag: PortId,
+    pub(crate) is_spent: bool,
 }
 
 /// A trouble of a tick, as indices: only a trouble that halts or ends the run is described as a fault.

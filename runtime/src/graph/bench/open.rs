@@ -44,6 +44,12 @@ impl OpenedBench {
         self.devices[role.device].description.period
     }
 
+    /// Returns whether a role has a fact.
+    pub(crate) fn states(&self, net: &Net<'_>, role: &str, fact: &str) -> bool {
+        let bound = net.flat.roles.position(role).and_then(|role| self.roles[role].as_ref());
+        bound.is_some_and(|bound| bound.facts.iter().any(|(name, _)| name == fact))
+    }
+
     /// Returns the facts of the devices: `role.fact` and the value.
     pub(crate) fn facts(&self, net: &Net<'_>) -> Vec<(String, toml::Value)> {
         let observed = net.observed.iter().map(|(key, ..)| *key).zip(&self.observed);

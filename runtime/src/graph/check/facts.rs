@@ -3,6 +3,7 @@
 use std::collections::BTreeSet;
 use std::ops::Range;
 
+use crate::graph::bench::OpenedBench;
 use crate::graph::net::Net;
 use crate::graph::plan::Producer;
 use crate::graph::syntax::LIMITS;
@@ -21,13 +22,16 @@ struct ForeignFact<'a> {
 /// Reports facts of roles that are not upstream of their node, one diagnostic for each node and role.
 ///
 /// A node that reads no role generates its outputs, and may use the facts of any role.
-pub(crate) fn check(net: &Net<'_>, diagnostics: &mut Diagnostics) {
+pub(crate) fn check(net: &Net<'_>, opened: &OpenedBench, diagnostics: &mut Diagnostics) {
     for (node, flat) in net.flat.nodes.iter().enumerate() {
         let upstream: BTreeSet<&str> =
             net.roles_of(Producer::Node(node)).map(|role| net.name(Producer::Role(role))).collect();
         diagnostics.extend(task_values(net, node));
         let tables = [&flat.block.params].into_iter().chain(net.settings_of(node));
-        let foreign: Vec<ForeignFact<'_>> = tables.flat_map(|table| find_foreign(net, table, &upstream)).collect();
+        let foreign: Vec<ForeignFact<'_>> = tables
+            .flat_map(|table| find_foreign(net, table, &upstream))
+            .filter(|fact| !fact.is_optional || opened.states(net, fact.role, fact.fact))
+            .collect();
         let roles: BTreeSet<&str> = foreign.iter().map(|fact| fact.role).filter(|_| !upstream.is_empty()).collect();
         for role in roles {
             let facts: Vec<_> = foreign.iter().filter(|fact| fact.role == role).collect();
