@@ -23,13 +23,13 @@ const COMMON: [(&str, &str); 10] = [
     (
         "[parts.move]",
         "file = \"builtin:parts/move.toml\"\nin.twist = \"guide.twist\"\nin.image = \"touch.image\"\n\
-         in.position = \"arm.position\"\nin.equilibrium = \"arm.equilibrium\"",
+         in.contact = \"touch.present\"\nin.position = \"arm.position\"\nin.equilibrium = \"arm.equilibrium\"",
     ),
     (
         "[limits]",
         "linear_m_per_s = 0.05\nangular_rad_per_s = 0.8\nlinear_m_per_s2 = 1.0\nangular_rad_per_s2 = 10.0\n\
          force_n = 15.0\npeak_n = 3.0\nworkspace_min_m = [-0.8, -0.4, 0.1]\nworkspace_max_m = [-0.3, 0.4, 0.7]\n\
-         joint_rad_per_s2 = 5.0\nlead_rad = 0.1",
+         joint_rad_per_s2 = 5.0\nlead_rad = 0.1\nblind_s = 20.0\nblind_mm = 100.0",
     ),
     ("[bind]", "pad = \"pad\"\narm = \"arm\""),
     ("[devices.pad]", "type = \"mock_pad\""),
@@ -52,7 +52,7 @@ fn check(example: &str) -> Option<Report> {
     let (mut name, mut text) = ("graph.toml", String::new());
     let mut files: Vec<(&str, String)> = Vec::new();
     for line in example.lines() {
-        match line.strip_prefix("# ").filter(|name| name.ends_with(".toml") || name.ends_with(".csv")) {
+        match line.strip_prefix("# ").filter(|name| name.ends_with(".toml") || name.ends_with(".urdf")) {
             Some(next) if text.is_empty() => name = next,
             Some(next) => files.push((std::mem::replace(&mut name, next), std::mem::take(&mut text))),
             None => text.push_str(&format!("{line}\n")),

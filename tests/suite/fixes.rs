@@ -6,17 +6,19 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use tactflow_runtime::graph::{Request, compile};
-use tactflow_runtime::source::{Code, Diagnostic, Edit, Report, SourceMap};
+use tactflow_runtime::source::{Code, Diagnostic, Edit, Report, Severity, SourceMap};
 use tactflow_tests::{catalogue, toml_files, workspace};
 
 /// Rounds of fixes after which a graph loads.
 const MAX_ROUNDS: usize = 3;
 
-/// The diagnostics of a graph by code and message.
+/// The errors of a graph by code and message.
 type Found = BTreeSet<(Code, String)>;
 
 fn found(report: Option<&Report>) -> Found {
-    report.iter().flat_map(|report| &report.diagnostics).map(|d| (d.code, d.message.clone())).collect()
+    let all = report.iter().flat_map(|report| &report.diagnostics);
+    let errors = all.filter(|diagnostic| diagnostic.code.severity() == Severity::Error);
+    errors.map(|diagnostic| (diagnostic.code, diagnostic.message.clone())).collect()
 }
 
 pub(crate) fn check(graph: &Path) -> Option<Report> {

@@ -70,7 +70,8 @@ fn report_time(mistake: LargeGraph, mistakes: usize) -> f64 {
     let catalogue = tactflow_nodes::catalogue();
     let start = processor_time();
     let report = compile(&catalogue, &request).map(|_| ()).unwrap_err();
-    assert!(report.diagnostics.len() >= mistakes);
+    // One missing name has one diagnostic, however many places refer to it.
+    assert!(!report.diagnostics.is_empty());
     assert!(!report.render(false).is_empty());
     processor_time() - start
 }

@@ -24,14 +24,6 @@ impl<T> Named<T> {
         self.position(name).map(|place| &self.entries[place].1)
     }
 
-    /// Changes the entries, and finds them by their new names afterwards.
-    pub(crate) fn edit<R>(&mut self, change: impl FnOnce(&mut Vec<(Key, T)>) -> R) -> R {
-        let mut entries = std::mem::take(&mut self.entries);
-        let result = change(&mut entries);
-        *self = entries.into_iter().collect();
-        result
-    }
-
     /// Returns the names in the order of the file.
     pub(crate) fn names(&self) -> impl Iterator<Item = &str> + Clone {
         self.entries.iter().map(|(key, _)| key.name.as_str())

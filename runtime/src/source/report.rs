@@ -1,12 +1,16 @@
 //! The report of a graph: all its diagnostics with the texts they refer to, and its text for a terminal.
 
+use std::collections::BTreeMap;
 use std::fmt;
 use std::ops::Range;
 
 use annotate_snippets::{AnnotationKind, Group, Level, Renderer, Snippet};
 
-use super::diagnostic::{Diagnostic, Diagnostics, Severity};
+use super::diagnostic::{Code, Diagnostic, Diagnostics, Severity};
 use super::map::{SourceFile, SourceMap};
+
+/// Maximum number of places that a message about one missing name shows.
+const MAX_NOTES: usize = 8;
 
 /// All diagnostics of a graph, with the texts they refer to. `Debug` shows them as a terminal does, for `unwrap` in a
 /// test.
@@ -34,13 +38,21 @@ impl Report {
         // Of two with the same message, the one with a fix stays.
         diagnostics.dedup_by(|b, a| (place(a), a.code, &a.message) == (place(b), b.code, &b.message));
         let mut joined = Diagnostics::new();
+        // A name that is missing at several places has one diagnostic.
+        let mut places: BTreeMap<(Code, String, Option<String>), usize> = BTreeMap::new();
         for diagnostic in diagnostics {
-            match joined.iter_mut().find(|first| is_same_name(first, &diagnostic)) {
+            let name = (diagnostic.code, diagnostic.message.clone(), diagnostic.help.clone());
+            match places.get(&name).filter(|_| diagnostic.code.is_missing_name()) {
                 Some(first) => {
-                    first.notes.push((diagnostic.span, "and here".into()));
-                    first.fix.extend(diagnostic.fix);
+                    if joined[*first].notes.len() < MAX_NOTES {
+                        joined[*first].notes.push((diagnostic.span, "and here".into()));
+                    }
+                    joined[*first].fix.extend(diagnostic.fix);
                 }
-                None => joined.push(diagnostic),
+                None => {
+                    places.insert(name, joined.len());
+                    joined.push(diagnostic);
+                }
             }
         }
         Self { sources, diagnostics: joined }
@@ -132,9 +144,4 @@ fn marked(file: &SourceFile, span: &Range<usize>) -> Range<usize> {
     const MAX_MARKED_BYTES: usize = 200;
     let local = file.local(span);
     local.start..local.end.min(file.text.floor_char_boundary(local.start + MAX_MARKED_BYTES))
-}
-
-/// Returns whether two diagnostics report the same missing name at two places.
-fn is_same_name(a: &Diagnostic, b: &Diagnostic) -> bool {
-    a.code.is_missing_name() && (a.code, &a.message, &a.help) == (b.code, &b.message, &b.help)
 }

@@ -37,7 +37,7 @@ impl Ceilings {
         let unfit: Vec<Mistake> = unfit.collect();
         let missing = own.into_iter().filter(|(_, value)| value.is_none() && unfit.is_empty()).map(|(name, _)| {
             let message = format!("the image is in `{unit}`, so `{name}` must limit it");
-            Mistake::new(Code::MissingLimit, At::Node, message).help(format!("add `{name} = …`   # [{unit}]"))
+            Mistake::new(Code::MissingLimit, At::Node, message).help(format!("set `{name}` [{unit}]"))
         });
         let missing: Vec<Mistake> = missing.collect();
         refuse_any(unfit.into_iter().chain(missing))?;

@@ -103,7 +103,7 @@ impl CurveParams {
             return Ok(1e3 * along_x * along_y);
         }
         let message = format!("nothing converts the image from `{}` to `{unit}`", image.unit);
-        let help = format!("add `{prefix}gain = …`   # [{unit} per {}], or a calibration `file`", image.unit);
+        let help = format!("set `{prefix}gain` [{unit} per {}], or name a calibration in `file`", image.unit);
         Err(Mistake::param(format!("{prefix}unit"), message).help(help))
     }
 

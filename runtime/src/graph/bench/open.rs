@@ -73,7 +73,7 @@ pub(crate) fn open(net: &Net<'_>, sources: &mut SourceMap, diagnostics: &mut Dia
         opened: OpenedBench::default(),
     };
     let bench = net.flat.bench.as_ref();
-    let is_bound = |role: &&String| bench.is_none_or(|bench| bench.bind.iter().any(|(key, _)| key.name == **role));
+    let is_bound = |role: &&String| bench.is_none_or(|bench| bench.bind.position(role).is_some());
     opener.unbound = opener.kinds.keys().filter(|role| !is_bound(role)).cloned().collect();
     if let Some(bench) = bench {
         let declared = net.flat.roles.iter().map(|(key, _)| key);

@@ -16,7 +16,7 @@ pub(crate) fn check(net: &Net<'_>, diagnostics: &mut Diagnostics) {
         kind.is_some_and(|kind| kind.commands.iter().chain(&kind.reports).any(|known| known.name == *port))
     };
     let misspelt: BTreeSet<&str> = wires.filter(|wire| !has_port(wire)).map(|(role, _)| role).collect();
-    for ((key, _), role) in net.flat.roles.iter().zip(&net.roles) {
+    for ((key, kind), role) in net.flat.roles.iter().zip(&net.roles) {
         if has_misspelt_role || misspelt.contains(&*key.name) {
             continue;
         }
@@ -24,7 +24,9 @@ pub(crate) fn check(net: &Net<'_>, diagnostics: &mut Diagnostics) {
             if !driven.contains(&(&*key.name, &*command.name)) {
                 let message = format!("nothing drives `{}.{}`", key.name, command.name);
                 let diagnostic = Diagnostic::new(Code::UndrivenCommand, key.span.clone(), message);
-                diagnostics.push(match net.find_candidate(0, usize::MAX, command) {
+                // With two arms, the port of that name may move the other one.
+                let is_only = net.flat.roles.iter().filter(|(_, other)| other.value == kind.value).count() == 1;
+                diagnostics.push(match net.find_candidate(0, usize::MAX, command).filter(|_| is_only) {
                     Some(port) => {
                         let line = format!("{}.{} = \"{port}\"", key.name, command.name);
                         let edit = match net.flat.commands.last() {

@@ -7,7 +7,7 @@ use crate::graph::bench::OpenedBench;
 use crate::graph::net::Net;
 use crate::graph::plan::Producer;
 use crate::graph::syntax::LIMITS;
-use crate::source::{Code, Diagnostic, Diagnostics, FactRef, Key, Table, Value, quoted};
+use crate::source::{Code, Diagnostic, Diagnostics, Edit, FactRef, Key, Table, Value, quoted};
 
 /// A fact of a role that the node does not read.
 struct ForeignFact<'a> {
@@ -82,6 +82,7 @@ fn report(net: &Net<'_>, node: usize, facts: &[&ForeignFact<'_>], upstream: &BTr
     let place = facts[0].place.clone();
     let part = name.split_once('.');
     let used = part.and_then(|(part, _)| net.flat.scopes[0].names.get(part)).map(|(key, _)| key.span.clone());
+    let block = used.clone();
     let diagnostic = match used {
         Some(used) => Diagnostic::new(Code::ForeignFact, used, message).note(place, "the part takes it here"),
         None => Diagnostic::new(Code::ForeignFact, place, message),
@@ -96,8 +97,10 @@ fn report(net: &Net<'_>, node: usize, facts: &[&ForeignFact<'_>], upstream: &BTr
     };
     let lines = facts.iter().map(line);
     let lines: String = lines.collect();
-    diagnostic.help(match part {
-        Some((part, _)) => format!("add to [parts.{part}]:{lines}"),
-        None => format!("write in [nodes.{name}]:{lines}"),
-    })
+    match (part, block) {
+        (Some((part, _)), Some(block)) => diagnostic
+            .help(format!("add to [parts.{part}]:{lines}"))
+            .edit(Edit::Below(block, lines.trim_start().to_owned())),
+        _ => diagnostic.help(format!("write in [nodes.{name}]:{lines}")),
+    }
 }

@@ -10,7 +10,7 @@ use crate::graph::net::{Net, Wire, WireOrigin};
 use crate::graph::plan::{PortRef, Producer};
 use crate::node::{PortSpec, frame_args};
 use crate::signal::Kind;
-use crate::source::{Code, Diagnostic, Diagnostics};
+use crate::source::{Code, Diagnostic, Diagnostics, Edit};
 
 /// The frame variables of all nodes, and the frames to which they are bound.
 pub(crate) struct Frames<'a> {
@@ -94,7 +94,10 @@ impl Frames<'_> {
             let message =
                 format!("`{from}` is {}, but `{}` takes {}", describe(kind, &has), end.name, describe(kind, &takes));
             let help = self.suggest_conversion(kind, [has.first()?.clone(), takes.first()?.clone()], origin);
-            let mut diagnostic = origin.diagnostic(Code::FrameMismatch, message).with_help(help);
+            let mut diagnostic = origin.diagnostic(Code::FrameMismatch, message);
+            if let Some((help, edits)) = help {
+                diagnostic = edits.into_iter().fold(diagnostic.help(help), Diagnostic::edit);
+            }
             diagnostic.notes.extend(notes);
             return Some(diagnostic);
         }
@@ -106,7 +109,12 @@ impl Frames<'_> {
     }
 
     /// Suggests a node that converts from one frame to the other.
-    fn suggest_conversion(&mut self, kind: Kind, wanted: [Option<String>; 2], origin: &WireOrigin) -> Option<String> {
+    fn suggest_conversion(
+        &mut self,
+        kind: Kind,
+        wanted: [Option<String>; 2],
+        origin: &WireOrigin,
+    ) -> Option<(String, Vec<Edit>)> {
         let (spec, input, output, pose) = self.net.catalogue.specs().find_map(|spec| {
             let input = spec.inputs.iter().find(|input| input.kind == kind)?;
             let output = spec.outputs.iter().find(|output| output.kind == kind)?;
@@ -118,16 +126,22 @@ impl Frames<'_> {
         let pose_port = self.find_pose(&wanted).and_then(|source| self.net.name_in(origin.scope, source));
         let Some(source) = pose_port else {
             let [from, to] = wanted.map(|frame| frame.unwrap_or_else(|| "?".into()));
-            return Some(format!(
+            let help = format!(
                 "insert {converter} between them, with a pose of `{from}` in `{to}`, which no node outputs yet"
-            ));
+            );
+            return Some((help, Vec::new()));
         };
         let (twist, from) = (&input.name, &origin.word.value);
-        Some(format!(
-            "insert {converter} between them, and replace `{from}` by `{name}.{}` here:\n[nodes.{name}]\ntype = \
-             \"{name}\"\nin.{twist} = \"{from}\"\nin.{} = \"{source}\"",
-            output.name, pose.name,
-        ))
+        let (output, place) = (&output.name, &origin.word.span);
+        let block =
+            format!("[nodes.{name}]\ntype = \"{name}\"\nin.{twist} = \"{from}\"\nin.{} = \"{source}\"", pose.name);
+        let help = format!("insert {converter} between them, and replace `{from}` by `{name}.{output}` here:\n{block}");
+        let is_taken = self.net.flat.scopes[origin.scope].names.contains_key(&**name);
+        let edits = [
+            Edit::Replace(place.clone(), format!("\"{name}.{output}\"")),
+            Edit::Append(place.clone(), format!("\n{block}")),
+        ];
+        Some((help, if is_taken { Vec::new() } else { edits.into() }))
     }
 
     fn find_pose(&mut self, wanted: &[Option<String>]) -> Option<PortRef> {

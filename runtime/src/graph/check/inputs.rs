@@ -8,10 +8,11 @@ pub(crate) fn check(net: &Net<'_>, diagnostics: &mut Diagnostics) {
     for (i, node) in net.flat.nodes.iter().enumerate() {
         let Some(spec) = net.spec(i) else { continue };
         let names = spec.inputs.iter().map(|input| &*input.name);
+        let lacking = node.block.wires.lacking(names.clone());
         let required = spec.inputs.iter().filter(|input| input.need.must_be_wired).map(|input| &*input.name);
-        let lacking = node.block.wires.lacking(names, required);
+        let renamed = node.block.wires.only_lacks(names, required);
         for input in spec.inputs.iter().filter(|input| input.need.must_be_wired) {
-            if lacking.contains(&*input.name) {
+            if lacking.contains(&*input.name) && renamed != Some(&*input.name) {
                 let (key, name) = (&node.block.key, &input.name);
                 let message = format!("`{}` needs a wire to `in.{name}`, {}", key.name, input.kind.with_article());
                 let diagnostic = Diagnostic::new(Code::MissingInput, key.span.clone(), message);

@@ -17,6 +17,7 @@ struct LimitRef<'a> {
     span: Range<usize>,
     /// The parameter that uses it.
     spec: Option<&'a ParamSpec>,
+    /// Whether the parameter can do without it.
     is_optional: bool,
 }
 
@@ -38,21 +39,21 @@ pub(crate) fn check(net: &Net<'_>, sources: &SourceMap, diagnostics: &mut Diagno
     }
     let mut unused: Vec<&Key> = given.iter().copied().filter(|key| !refs.iter().any(|r| r.key == key.name)).collect();
     let mut missing: Vec<&LimitRef<'_>> = Vec::new();
-    let is_required = |limits: &[&LimitRef<'_>]| !limits[0].is_optional;
-    let required = wanted.values().filter(|limits| is_required(limits)).count();
+    let is_optional = |limits: &[&LimitRef<'_>]| limits.iter().all(|limit| limit.is_optional);
+    let required = wanted.values().filter(|limits| !is_optional(limits)).count();
     let is_single = (required, unused.len()) == (1, 1);
     for (name, limits) in &wanted {
         // A name that occurs once in all files is a misspelt reference to a limit that other parameters use.
         let is_alone = limits.len() == 1 && sources.occurrences(name) == 1;
-        if let Some(key) =
-            similar(name, &unused).or_else(|| unused.first().copied().filter(|_| is_single && is_required(limits)))
-        {
+        let is_needed = !is_optional(limits);
+        let only = unused.first().copied().filter(|_| is_single && is_needed);
+        if let Some(key) = similar(name, &unused).or(only) {
             unused.retain(|other| other.name != key.name);
             diagnostics.push(misspelt(key, limits, net, sources));
-        } else if let Some(key) = similar(name, &given).filter(|_| is_alone) {
+        } else if let Some(key) = similar(name, &given).filter(|_| is_alone && is_needed) {
             diagnostics.push(misspelt_reference(key, limits));
-        } else {
-            missing.extend(limits.first().filter(|limit| !limit.is_optional));
+        } else if is_needed {
+            missing.extend(limits.iter().find(|limit| !limit.is_optional));
         }
     }
     missing.sort_by_key(|limit| refs.iter().position(|other| other.span == limit.span));

@@ -146,7 +146,10 @@ fn mismatch(net: &Net<'_>, node: usize, wire: &Wire, has: Option<&Quantity>, tak
     let better =
         net.find_port(wire.origin.scope, |port| fits(net.port(port)) && origin.is_none_or(|at| port.producer == at));
     let better = better.or_else(|| net.find_port(wire.origin.scope, |port| fits(net.port(port))));
-    diagnostic.with_help(better.map(|better| format!("did you mean `{better}`?")))
+    match better {
+        Some(better) => diagnostic.instead(&wire.origin.word.value, better),
+        None => diagnostic,
+    }
 }
 
 fn describe_mismatch(net: &Net<'_>, source: PortRef, has: &Quantity, consumer: &str, takes: &str) -> String {

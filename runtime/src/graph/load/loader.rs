@@ -1,5 +1,6 @@
 //! Loads the files of a graph, expands its parts, and merges `--set` and overrides.
 
+use std::collections::BTreeMap;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
@@ -7,7 +8,7 @@ use super::flat::{Entity, FlatGraph, FlatNode, Scope};
 use super::measured::MeasuredValues;
 use crate::graph::syntax::{BenchDocument, GraphDocument, PartBlock, Sections, Use};
 use crate::source::{
-    BuiltinFile, Code, Diagnostic, Diagnostics, Item, Key, SourceMap, Table, Value, parse_table, suggest_name,
+    BuiltinFile, Code, Diagnostic, Diagnostics, Item, Key, Named, SourceMap, Table, Value, parse_table, suggest_name,
 };
 
 /// Which graph to load, and what to change in it.
@@ -108,8 +109,8 @@ impl Loader {
         flat.bench = self.bench(request, &flat, &root.0, bench_set);
         let bench = flat.bench.as_mut();
         self.diagnostics.extend(bench.into_iter().flat_map(|bench| bench.correct_names(&self.sources)));
-        let binds = flat.bench.as_ref().map_or(&[][..], |bench| &bench.bind);
-        self.diagnostics.extend(document.correct_names(binds, &[], &self.sources));
+        let binds = flat.bench.as_ref().map(|bench| bench.bind.clone()).unwrap_or_default();
+        self.diagnostics.extend(document.correct_names(&binds, &[], &self.sources));
         flat.roles.clone_from(&document.roles);
         flat.commands.clone_from(&document.commands);
         flat.limits.clone_from(&document.limits);
@@ -246,7 +247,12 @@ impl Loader {
     fn flatten(&mut self, document: GraphDocument, prefix: &str, mut scope: Scope, flat: &mut FlatGraph) -> usize {
         let index = flat.scopes.len();
         flat.scopes.push(Scope::default());
+        let mut reads: BTreeMap<String, Vec<Use>> = BTreeMap::new();
         let uses = if document.parts.is_empty() { Vec::new() } else { document.uses() };
+        for reference in uses {
+            let inside = reference.inside(&reference.name);
+            reads.entry(reference.name).or_default().extend(inside);
+        }
         (scope.exports, scope.declared) = (document.exports, document.inputs);
         for (i, (key, _)) in document.roles.iter().enumerate() {
             self.declare(&mut scope, key, Entity::Role(i));
@@ -256,8 +262,8 @@ impl Loader {
             flat.nodes.push(FlatNode { name: format!("{prefix}{}", block.key.name), scope: index, block });
         }
         for part in document.parts {
-            let reads: Vec<Use> = uses.iter().filter_map(|reference| reference.inside(&part.key.name)).collect();
-            let inner = self.part(&part, &reads, prefix, index, flat);
+            let reads = reads.get(&part.key.name).map_or(&[][..], Vec::as_slice);
+            let inner = self.part(&part, reads, prefix, index, flat);
             self.declare(&mut scope, &part.key, inner.map_or(Entity::Unknown, Entity::Part));
         }
         flat.scopes[index] = scope;
@@ -306,7 +312,7 @@ impl Loader {
         let wires: Vec<&Key> = part.wires.valid.iter().map(|wire| &wire.key).collect();
         self.diagnostics.extend(document.correct_ports(&wires, reads, &self.sources));
         let set: Vec<&Key> = part.set.entries.iter().map(|(key, _)| key).collect();
-        self.diagnostics.extend(document.correct_names(&[], &set, &self.sources));
+        self.diagnostics.extend(document.correct_names(&Named::default(), &set, &self.sources));
         // What sets a node with a misspelt name is right.
         let names = || document.nodes.iter().map(|node| &node.key).chain(document.parts.iter().map(|part| &part.key));
         for key in strange.iter().filter(|key| !names().any(|name| name.name == key.name)) {
@@ -318,7 +324,8 @@ impl Loader {
         self.check_part_wires(part, &document);
         self.open_parts.push(canonical);
         let inputs = part.wires.valid.iter().map(|wire| (wire.key.clone(), wire.clone())).collect();
-        let scope = Scope { inputs, parent: Some(parent), part: Some(part.key.clone()), ..Scope::default() };
+        let key = part.key.clone();
+        let scope = Scope { inputs, parent: Some(parent), part: Some(key), ..Scope::default() };
         let inner = self.flatten(document, &format!("{prefix}{}.", part.key.name), scope, flat);
         self.open_parts.pop();
         Some(inner)
@@ -336,9 +343,10 @@ impl Loader {
                 });
             }
         }
-        let lacking = part.wires.lacking(names.clone(), names);
+        let lacking = part.wires.lacking(names.clone());
+        let renamed = part.wires.only_lacks(names.clone(), names);
         for (input, doc) in document.inputs.iter() {
-            if lacking.contains(input.name.as_str()) {
+            if lacking.contains(input.name.as_str()) && renamed != Some(&input.name) {
                 let message = format!("part `{}` needs a wire to `in.{}`: {}", part.key.name, input.name, doc.value);
                 let diagnostic = Diagnostic::new(Code::MissingInput, part.key.span.clone(), message);
                 let help = format!("wire a port to `in.{}`", input.name);

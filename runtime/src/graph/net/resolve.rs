@@ -49,9 +49,8 @@ impl Net<'_> {
             && let Some(parent) = *parent
         {
             if declared.position(port).is_none() {
-                let known = declared.names();
                 let message = format!("the part has no input `{port}`");
-                return unknown_port(port.len(), message).suggest(port, known, "inputs").into_err();
+                return unknown_port(port.len(), message).suggest(port, declared.names(), "inputs").into_err();
             }
             // An input that is declared and not wired has its own diagnostic.
             let wire = inputs.get(port).ok_or(None)?;

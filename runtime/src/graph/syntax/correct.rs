@@ -112,7 +112,7 @@ pub(super) fn correct_facts(value: &mut Value, reader: &mut Reader<'_>) {
     match &mut value.item {
         Item::Array(items) => items.iter_mut().for_each(|item| correct_facts(item, reader)),
         Item::Table(table) => {
-            if let [(key, inner)] = table.entries.as_mut_slice()
+            if let [(key, inner)] | [(key, inner), _] = table.entries.as_mut_slice()
                 && key.name != "from"
                 && is_port(inner)
                 && suggest_name(&key.name, std::iter::once("from")).is_some()

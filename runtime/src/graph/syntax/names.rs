@@ -9,7 +9,9 @@ use std::ops::Range;
 use super::reserved::{INPUTS, LIMITS, is_name};
 use super::sections::{BenchDocument, GraphDocument};
 use crate::node::Spanned;
-use crate::source::{Code, Diagnostic, Diagnostics, Edit, FactRef, Item, Key, SourceMap, Value, quoted, suggest_name};
+use crate::source::{
+    Code, Diagnostic, Diagnostics, Edit, FactRef, Item, Key, Named, SourceMap, Value, quoted, suggest_name,
+};
 
 /// A reference to a port: the name of the node, role or part, and the port unless the reference is to the whole.
 #[derive(Debug, Clone)]
@@ -54,8 +56,10 @@ fn correct<'k>(
     uses.iter().for_each(|reference| *counts.entry(&reference.name).or_default() += 1);
     let count = |name: &str| counts.get(name).copied().unwrap_or(0);
     let mut unused: Vec<usize> = (0..names.len()).filter(|i| count(&names[*i]) == 0).collect();
-    let mut seen: BTreeSet<&str> = names.iter().map(String::as_str).collect();
-    let unknown: Vec<&Use> = uses.iter().filter(|reference| seen.insert(&reference.name)).collect();
+    let known: BTreeSet<&str> = names.iter().map(String::as_str).collect();
+    let mut seen = BTreeSet::new();
+    let strange = uses.iter().filter(|reference| !known.contains(&*reference.name));
+    let unknown: Vec<&Use> = strange.filter(|reference| seen.insert(reference.name.as_str())).collect();
     let mut found = Diagnostics::new();
     for first in &unknown {
         let wanted = &first.name;
@@ -112,20 +116,20 @@ impl GraphDocument {
     /// `set` are the names of nodes and parts that the graph around a part sets.
     pub(crate) fn correct_names(
         &mut self,
-        binds: &[(Key, Spanned<String>)],
+        binds: &Named<Spanned<String>>,
         set: &[&Key],
         sources: &SourceMap,
     ) -> Diagnostics {
         let uses = self.uses().into_iter().filter(|reference| reference.name != INPUTS);
         let uses: Vec<Use> = uses.chain(set.iter().map(|key| Use::of_key(key))).collect();
         let roles = self.roles.len();
-        let may_be = |i: usize, name: &str| i < roles || !binds.iter().any(|(role, _)| role.name == name);
-        let (nodes, parts) = (&mut self.nodes, &mut self.parts);
-        let mut found = self.roles.edit(|roles| {
-            let blocks = nodes.iter_mut().map(|node| &mut node.key).chain(parts.iter_mut().map(|part| &mut part.key));
-            let names = roles.iter_mut().map(|(key, _)| key).chain(blocks);
-            correct(Code::UnknownPort, names, &uses, &may_be, true, sources)
-        });
+        let may_be = |i: usize, name: &str| i < roles || binds.position(name).is_none();
+        let nodes =
+            self.nodes.iter_mut().map(|node| &mut node.key).chain(self.parts.iter_mut().map(|part| &mut part.key));
+        let mut role_keys = self.roles.to_vec();
+        let names = role_keys.iter_mut().map(|(key, _)| key).chain(nodes);
+        let mut found = correct(Code::UnknownPort, names, &uses, &may_be, true, sources);
+        self.roles = role_keys.into_iter().collect();
         let start = self.graph.iter().filter_map(|(_, graph)| graph.as_ref()?.start.as_ref());
         let mut targets: Vec<Use> = start.map(Use::of).collect();
         self.modes.iter().flat_map(|mode| &mode.table.entries).for_each(|(_, value)| add_targets(value, &mut targets));
@@ -138,46 +142,21 @@ impl GraphDocument {
     pub(crate) fn correct_ports(&mut self, wires: &[&Key], reads: &[Use], sources: &SourceMap) -> Diagnostics {
         let inner: Vec<Use> = self.uses().iter().filter_map(|reference| reference.inside(INPUTS)).collect();
         let outer: Vec<Use> = wires.iter().map(|key| Use::of_key(key)).collect();
+        let (mut inputs, mut exports) = (self.inputs.to_vec(), self.exports.to_vec());
         let uses = [&inner[..], &outer[..]].concat();
-        let mut found = self.inputs.edit(|inputs| {
-            let keys = inputs.iter_mut().map(|(key, _)| key);
-            correct(Code::UnknownInput, keys, &uses, &|_, _| true, true, sources)
-        });
-        found.extend(self.exports.edit(|exports| {
-            let keys = exports.iter_mut().map(|(key, _)| key);
-            correct(Code::UnknownPort, keys, reads, &|_, _| true, false, sources)
-        }));
-        found.extend(self.declare_missing(&inner, &outer));
+        let mut found =
+            correct(Code::UnknownInput, inputs.iter_mut().map(|(key, _)| key), &uses, &|_, _| true, true, sources);
+        found.extend(correct(
+            Code::UnknownPort,
+            exports.iter_mut().map(|(key, _)| key),
+            reads,
+            &|_, _| true,
+            false,
+            sources,
+        ));
+        found.extend(declare_missing(&mut inputs, &inner, &outer));
+        (self.inputs, self.exports) = (inputs.into_iter().collect(), exports.into_iter().collect());
         found
-    }
-
-    /// Declares the inputs that the graph wires and the part reads, and reports that they are not declared.
-    fn declare_missing(&mut self, inner: &[Use], outer: &[Use]) -> Option<Diagnostic> {
-        let wired: BTreeSet<&str> = outer.iter().map(|wire| wire.name.as_str()).collect();
-        let mut seen: BTreeSet<&str> = self.inputs.names().collect();
-        let wanted = inner.iter().filter(|read| wired.contains(read.name.as_str()));
-        let missing: Vec<&Use> = wanted.filter(|read| seen.insert(&read.name)).collect();
-        let first = missing.first()?;
-        let names = quoted(missing.iter().map(|read| &read.name));
-        let message = format!("the part reads {names} from its inputs and does not declare them");
-        let lines: Vec<String> = missing.iter().map(|read| format!("{} = \"what it is\"", read.name)).collect();
-        let lines = lines.join("\n");
-        let help = format!("declare them under [inputs]:\n{lines}");
-        let last = self.inputs.last().map(|(key, _)| key.span.clone());
-        let diagnostic = match &last {
-            Some(last) => Diagnostic::new(Code::UnknownInput, last.clone(), message)
-                .note(first.span.clone(), "one is read here")
-                .edit(Edit::Below(last.clone(), lines)),
-            None => Diagnostic::new(Code::UnknownInput, first.span.clone(), message)
-                .edit(Edit::Append(first.span.clone(), format!("\n[inputs]\n{lines}"))),
-        };
-        let place = last.unwrap_or_else(|| first.span.clone());
-        let declared = missing.iter().map(|read| {
-            let key = Key { name: read.name.clone(), span: place.clone() };
-            (key, Spanned { value: String::new(), span: place.clone() })
-        });
-        self.inputs.edit(|inputs| inputs.extend(declared));
-        Some(diagnostic.help(help))
     }
 }
 
@@ -200,4 +179,36 @@ fn add_targets(value: &Value, targets: &mut Vec<Use>) {
         }
         _ => {}
     }
+}
+
+/// Declares the inputs that the graph wires and the part reads, and reports that they are not declared.
+fn declare_missing(inputs: &mut Vec<(Key, Spanned<String>)>, inner: &[Use], outer: &[Use]) -> Option<Diagnostic> {
+    let is_declared = |name: &str| inputs.iter().any(|(key, _)| key.name == name);
+    let is_wired = |name: &str| outer.iter().any(|wire| wire.name == name);
+    let mut missing: Vec<&Use> = Vec::new();
+    for read in inner.iter().filter(|read| !is_declared(&read.name) && is_wired(&read.name)) {
+        if !missing.iter().any(|other| other.name == read.name) {
+            missing.push(read);
+        }
+    }
+    let first = missing.first()?;
+    let names = quoted(missing.iter().map(|read| &read.name));
+    let message = format!("the part reads {names} from its inputs and does not declare them");
+    let lines: Vec<String> = missing.iter().map(|read| format!("{} = \"what it is\"", read.name)).collect();
+    let lines = lines.join("\n");
+    let help = format!("declare them under [inputs]:\n{lines}");
+    let last = inputs.last().map(|(key, _)| key.span.clone());
+    let diagnostic = match &last {
+        Some(last) => Diagnostic::new(Code::UnknownInput, last.clone(), message)
+            .note(first.span.clone(), "one is read here")
+            .edit(Edit::Below(last.clone(), lines)),
+        None => Diagnostic::new(Code::UnknownInput, first.span.clone(), message)
+            .edit(Edit::Append(first.span.clone(), format!("\n[inputs]\n{lines}"))),
+    };
+    let place = last.unwrap_or_else(|| first.span.clone());
+    for read in missing {
+        let key = Key { name: read.name.clone(), span: place.clone() };
+        inputs.push((key, Spanned { value: String::new(), span: place.clone() }));
+    }
+    Some(diagnostic.help(help))
 }

@@ -58,31 +58,6 @@ impl InputWires {
         !self.invalid.is_empty()
     }
 
-    fn keys(&self) -> impl Iterator<Item = &Key> + Clone {
-        self.valid.iter().map(|wire| &wire.key).chain(&self.invalid)
-    }
-
-    /// Returns the `known` inputs that have no wire. A wire to a misspelt name counts, since it has its own diagnostic,
-    /// and so does one to a strange name if only one of the `required` inputs has no wire.
-    pub(crate) fn lacking<'n>(
-        &self,
-        known: impl Iterator<Item = &'n str> + Clone,
-        required: impl Iterator<Item = &'n str>,
-    ) -> BTreeSet<&'n str> {
-        let names: BTreeSet<&str> = known.clone().collect();
-        let wired: BTreeSet<&str> = self.keys().map(|key| key.name.as_str()).collect();
-        let mut lacking = names.clone();
-        lacking.retain(|name| !wired.contains(name));
-        for strange in wired.iter().filter(|key| !names.contains(*key)) {
-            if lacking.is_empty() {
-                break;
-            }
-            suggest_name(strange, known.clone()).map(|meant| lacking.remove(meant));
-        }
-        self.only_lacks(known, required).map(|meant| lacking.remove(meant));
-        lacking
-    }
-
     /// Returns the only `required` input without a wire, if one wire leads to none of the `known` inputs: it was meant.
     pub(crate) fn only_lacks<'n>(
         &self,
@@ -90,10 +65,27 @@ impl InputWires {
         required: impl Iterator<Item = &'n str>,
     ) -> Option<&'n str> {
         let names: BTreeSet<&str> = known.collect();
-        let wired: BTreeSet<&str> = self.keys().map(|key| key.name.as_str()).collect();
-        let strange = wired.iter().filter(|key| !names.contains(*key)).count();
+        let keys = || self.valid.iter().map(|wire| &wire.key).chain(&self.invalid).map(|key| key.name.as_str());
+        let wired: BTreeSet<&str> = keys().collect();
+        let strange = keys().filter(|key| !names.contains(key)).count();
         let mut open = required.filter(|name| !wired.contains(name));
         open.next().filter(|_| strange == 1 && open.next().is_none())
+    }
+
+    /// Returns the `known` inputs that have no wire. A wire to a misspelt name counts, since it has its own diagnostic.
+    pub(crate) fn lacking<'n>(&self, known: impl Iterator<Item = &'n str> + Clone) -> BTreeSet<&'n str> {
+        let names: BTreeSet<&str> = known.clone().collect();
+        let keys = || self.valid.iter().map(|wire| &wire.key).chain(&self.invalid).map(|key| key.name.as_str());
+        let wired: BTreeSet<&str> = keys().collect();
+        let mut lacking = names.clone();
+        lacking.retain(|name| !wired.contains(name));
+        for strange in keys().filter(|key| !names.contains(key)) {
+            if lacking.is_empty() {
+                break;
+            }
+            suggest_name(strange, known.clone()).map(|meant| lacking.remove(meant));
+        }
+        lacking
     }
 }
 
@@ -237,19 +229,18 @@ impl<'a> Sections<'a> {
             self.block(key, table, &names)
         };
         let devices = devices.into_iter().map(block).collect();
-        let allow_uncalibrated = root.get(ALLOW_UNCALIBRATED).and_then(|value| bool::read(value, &mut self.reader));
-        let bind = root.entry("bind");
+        let section = root.entry("bind");
         let is_invalid = |(_, value): &&(Key, Value)| value.as_str().is_none();
-        let entries = bind.and_then(|(_, value)| value.as_table()).into_iter().flat_map(|table| &table.entries);
+        let entries = section.and_then(|(_, value)| value.as_table()).into_iter().flat_map(|table| &table.entries);
         let invalid = entries.filter(is_invalid).map(|(key, _)| key.clone()).collect();
-        let (place, bind) = (bind.map(|(key, _)| key.span.clone()), self.words(bind.map(|(_, value)| value)));
-        let facts = self.named_tables(root.get("facts"));
+        let allow_uncalibrated = root.get(ALLOW_UNCALIBRATED).and_then(|value| bool::read(value, &mut self.reader));
+        let (bind, facts) = (self.words(root.get("bind")), self.named_tables(root.get("facts")));
         for (key, _) in facts.iter().filter(|(key, _)| bind.position(&key.name).is_none()) {
             let unknown = Diagnostic::unknown(Code::UnboundRole, "role", &key.name, &key.span, bind.names());
             self.diagnostics.push(unknown);
         }
-        let allow_uncalibrated = allow_uncalibrated.unwrap_or(false);
-        BenchDocument { devices, bind, place, invalid, facts, allow_uncalibrated }
+        let place = section.map(|(key, _)| key.span.clone());
+        BenchDocument { devices, bind, place, invalid, facts, allow_uncalibrated: allow_uncalibrated.unwrap_or(false) }
     }
 
     fn body(&mut self, root: &Table) -> GraphDocument {
@@ -381,13 +372,11 @@ impl<'a> Sections<'a> {
 
     /// Reads a table whose keys are names and whose values are strings.
     fn names(&mut self, value: Option<&Value>) -> Named<Spanned<String>> {
-        let mut words = self.words(value);
-        words.edit(|entries| {
-            for (key, _) in entries {
-                self.check_name(key);
-            }
-        });
-        words
+        let mut words = self.words(value).to_vec();
+        for (key, _) in &mut words {
+            self.check_name(key);
+        }
+        words.into_iter().collect()
     }
 
     /// Reads a table whose keys are names and whose values are tables.
