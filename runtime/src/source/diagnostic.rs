@@ -54,14 +54,14 @@ codes! {
     MissingInput "missing-input",
     /// A wire between ports of different kinds.
     KindMismatch "kind-mismatch",
-    /// A wire between ports of different units, or a number in a unit that measures something else.
-    UnitMismatch "unit-mismatch",
     /// A wire between ports in different frames.
     FrameMismatch "frame-mismatch",
     /// A parameter that names a frame which no role has.
     UnknownFrame "unknown-frame",
     /// A wire from a port that carries another quantity than its input accepts, or an unknown one.
     QuantityMismatch "quantity-mismatch",
+    /// A wire between ports of different units, or a number in a unit that measures something else.
+    UnitMismatch "unit-mismatch",
     /// A wire between ports of different sizes.
     ShapeMismatch "shape-mismatch",
     /// Wires that form a cycle.
@@ -140,6 +140,11 @@ impl Code {
             Self::UnusedNode => Severity::Warning,
             _ => Severity::Error,
         }
+    }
+
+    /// Returns whether it reports that the two ends of a wire differ. The coarsest difference comes first.
+    pub(super) const fn is_mismatch(self) -> bool {
+        matches!(self, Self::KindMismatch | Self::FrameMismatch | Self::QuantityMismatch | Self::UnitMismatch)
     }
 
     /// Returns whether it reports a reference to a name that does not exist.

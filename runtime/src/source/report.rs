@@ -37,6 +37,9 @@ impl Report {
             .sort_by(|a, b| (place(a), &a.message, a.fix.is_empty()).cmp(&(place(b), &b.message, b.fix.is_empty())));
         // Of two with the same message, the one with a fix stays.
         diagnostics.dedup_by(|b, a| (place(a), a.code, &a.message) == (place(b), b.code, &b.message));
+        // A wire that is wrong in several ways, or for several nodes, has one diagnostic: that of the coarsest check.
+        diagnostics.sort_by_key(|d| (place(d), d.code.is_mismatch().then_some(d.code)));
+        diagnostics.dedup_by(|b, a| place(a) == place(b) && a.code.is_mismatch() && b.code.is_mismatch());
         let mut joined = Diagnostics::new();
         // A name that is missing at several places has one diagnostic.
         let mut places: BTreeMap<(Code, String, Option<String>), usize> = BTreeMap::new();

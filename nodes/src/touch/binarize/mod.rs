@@ -9,7 +9,7 @@ mod otsu;
 mod pack;
 mod rule;
 
-use tactflow_runtime::node::{Describe, In, Inputs, Mistakes, Node, Out, Outputs, Param, Setup, State, Tick};
+use tactflow_runtime::node::{Describe, In, Inputs, Mistake, Mistakes, Node, Out, Outputs, Param, Setup, State, Tick};
 use tactflow_runtime::signal::{Image, Mask};
 
 pub use otsu::otsu;

@@ -8,7 +8,7 @@ use crate::graph::load::Entity;
 use crate::graph::net::Net;
 use crate::graph::syntax::LIMITS;
 use crate::node::{ParamSpec, Spanned};
-use crate::source::{Code, Diagnostic, Diagnostics, Edit, Key, SourceMap, quoted, suggest_name};
+use crate::source::{Code, Diagnostic, Diagnostics, Edit, Key, SourceMap, Value, quoted, suggest_name};
 
 /// A reference to a value of the section, as `{ from = "limits.KEY" }`.
 struct LimitRef<'a> {
