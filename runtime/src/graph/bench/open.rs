@@ -386,8 +386,10 @@ pub(crate) fn place_mistakes(
         };
         let diagnostic = Diagnostic { notes, ..Diagnostic::new(code, span, message).with_help(help) };
         diagnostics.push(match instead {
-            Some((name, best)) => misspelt_wire(&diagnostic, wires, (&name, &best), sources)
-                .unwrap_or_else(|| diagnostic.instead(&name, &best)),
+            Some(names) => misspelt_wire(&diagnostic, wires, (&names.0, &names.1), sources).unwrap_or_else(|| {
+                let help = diagnostic.help.clone();
+                diagnostic.instead(&names.0, &names.1).with_help(help)
+            }),
             None => diagnostic,
         });
     }

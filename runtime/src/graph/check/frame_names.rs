@@ -49,7 +49,12 @@ impl<'a> FrameNames<'a> {
                 let value = flat.block.params.as_table().and_then(|table| table.get(param));
                 let Some((name, value)) = value.and_then(|value| Some((value.as_str()?, value))) else { continue };
                 if let Err((message, help)) = self.resolve(name) {
-                    diagnostics.push(Diagnostic::new(Code::UnknownFrame, value.span.clone(), message).help(help));
+                    let diagnostic = Diagnostic::new(Code::UnknownFrame, value.span.clone(), message);
+                    let meant = help.strip_prefix("did you mean `").and_then(|rest| rest.strip_suffix("`?"));
+                    diagnostics.push(match meant {
+                        Some(meant) => diagnostic.instead(name, meant),
+                        None => diagnostic.help(help),
+                    });
                 }
             }
         }
