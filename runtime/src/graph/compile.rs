@@ -43,7 +43,7 @@ pub(crate) fn compile_in(mut loader: Loader, catalogue: &Catalogue, request: &Re
     let view = check::view::check(&net, &mut diagnostics);
     let mut frames = check::frames::check(&net, &mut diagnostics);
     check::quantities::check(&net, &mut diagnostics);
-    check::facts::check(&net, &opened, &mut diagnostics);
+    check::facts::check(&net, &mut diagnostics);
     check::limits::check(&net, &mut frames, &mut diagnostics);
     check::limit_values::check(&net, &sources, &mut diagnostics);
     let clock = check::clock::check(&net, &opened, &mut diagnostics);

@@ -294,6 +294,10 @@ impl OutlineBuilder<'_> {
             }
             _ => {
                 let mut setting = self.setting(value, path, node);
+                // An optional fact that is not there is no value.
+                if setting.value.as_table().and_then(Table::fact).is_some() {
+                    return Vec::new();
+                }
                 self.resolve(&mut setting, spec);
                 self.complete(&mut setting.value, spec);
                 vec![setting]
@@ -308,7 +312,7 @@ impl OutlineBuilder<'_> {
         let role = role.and_then(|(role, _)| self.net.flat.roles.position(role));
         let mut filled = value.clone();
         // The graph has no mistakes, so every fact is there.
-        fill_facts(&mut filled, self.net, self.opened, &mut Diagnostics::new());
+        fill_facts(&mut filled, node, self.net, self.opened, &mut Diagnostics::new());
         let bound = role.and_then(|role| self.opened.roles[role].as_ref());
         let origin = match (word, bound) {
             (Some(word), Some(bound)) => {

@@ -89,7 +89,8 @@ fn error_mistake(text: &str, error: &MeasureError, known: Option<&(UnitSize, Str
     let close = close_unit(unit, &usual);
     let others: Vec<&str> = usual.iter().copied().filter(|unit| close.as_deref() != Some(unit)).collect();
     let dimension = size.and_then(UnitSize::dimension);
-    mistake.help(match (close, dimension) {
+    let instead = close.as_ref().map(|close| Box::new((text.to_owned(), format!("{number} {close}"))));
+    let help = match (close, dimension) {
         (Some(close), Some(_)) if !others.is_empty() => {
             format!("did you mean `\"{number} {close}\"`? Other units here: {}", quoted(&others))
         }
@@ -99,7 +100,8 @@ fn error_mistake(text: &str, error: &MeasureError, known: Option<&(UnitSize, Str
             Some((_, unit)) => format!("write for example `\"{number} {unit}\"`"),
             None => "write a plain number".to_owned(),
         },
-    })
+    };
+    Mistake { instead, ..mistake.help(help) }
 }
 
 /// Returns a number as a file would have it: whole numbers without a decimal point.

@@ -43,7 +43,7 @@ pub struct Mistake {
     /// How to fix it.
     pub help: Option<String>,
     /// The marked name and the one to write instead, if that fixes it.
-    pub instead: Option<(String, String)>,
+    pub instead: Option<Box<(String, String)>>,
 }
 
 /// One or more mistakes.
@@ -97,7 +97,7 @@ impl Mistake {
     /// Suggests `best` in place of `name`, which is marked.
     #[must_use]
     pub fn instead(self, name: &str, best: &str) -> Self {
-        Self { instead: Some((name.to_owned(), best.to_owned())), ..self.help(did_you_mean(best)) }
+        Self { instead: Some(Box::new((name.to_owned(), best.to_owned()))), ..self.help(did_you_mean(best)) }
     }
 
     /// Suggests the name that an unknown key, which is marked, misspells. `what` names the known things in the plural.

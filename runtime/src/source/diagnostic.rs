@@ -147,6 +147,13 @@ impl Code {
         matches!(self, Self::KindMismatch | Self::FrameMismatch | Self::QuantityMismatch | Self::UnitMismatch)
     }
 
+    /// Returns whether a wire may be missing because of it, so that what depends on the wire is not known.
+    pub(crate) const fn hides_wires(self) -> bool {
+        use Code::{BadName, KindMismatch, Loop, MissingInput, MissingKey};
+        let is_wire = matches!(self, KindMismatch | Loop | MissingInput | MissingKey | BadName | Self::BadValue);
+        is_wire || matches!(self, Self::UnknownInput | Self::UnknownPort | Self::UnknownType | Self::UnknownKey)
+    }
+
     /// Returns whether it reports a reference to a name that does not exist.
     pub(super) const fn is_missing_name(self) -> bool {
         matches!(self, Self::UnknownPort | Self::UnknownFact | Self::UnknownMode | Self::UnknownDevice)

@@ -36,7 +36,12 @@ pub fn parse_table(file: &SourceFile) -> Result<Value, Box<Diagnostic>> {
                 let message = "a string needs a quote on each side";
                 let quoted = format!("\"{text}\"");
                 let diagnostic = Diagnostic::new(Code::Syntax, at(value.clone()), message);
-                diagnostic.help(did_you_mean(&quoted)).edit(Edit::Replace(at(value), quoted))
+                // A word without any quote may stand for a number.
+                if file.text[value.clone()].contains('"') {
+                    diagnostic.help(did_you_mean(&quoted)).edit(Edit::Replace(at(value), quoted))
+                } else {
+                    diagnostic.help(format!("write `{quoted}` if a string is meant"))
+                }
             },
         ),
     };

@@ -9,20 +9,21 @@ use crate::node::Spanned;
 use crate::source::{Code, Diagnostic, Diagnostics, Item, Table, Value};
 
 /// Replaces every `{ from = "role.fact" }` by the fact, and every `{ from = "limits.key" }` by the value in [limits].
-/// An optional one that is not there is left out.
+/// An optional one that is not there, or that is of a role which `node` does not read, is left out.
 ///
 /// Returns whether all of them are known.
 pub(crate) fn fill_facts(
     value: &mut Value,
+    node: Option<usize>,
     net: &Net<'_>,
     opened: &OpenedBench,
     diagnostics: &mut Diagnostics,
 ) -> bool {
     let Some(fact) = value.as_table().and_then(Table::fact) else {
         if let Item::Table(table) = &mut value.item {
-            table.entries.retain(|(_, item)| !is_left_out(item, net, opened));
+            table.entries.retain(|(_, item)| !is_left_out(item, node, net, opened));
         }
-        let mut fill = |item| fill_facts(item, net, opened, diagnostics);
+        let mut fill = |item| fill_facts(item, node, net, opened, diagnostics);
         return match &mut value.item {
             Item::Array(items) => items.iter_mut().fold(true, |good, item| fill(item) & good),
             Item::Table(table) => table.entries.iter_mut().fold(true, |good, (_, item)| fill(item) & good),
@@ -33,10 +34,12 @@ pub(crate) fn fill_facts(
     report(fact, diagnostics).map(|fact| *value = fact).is_some()
 }
 
-/// Returns whether a value is an optional fact that is not there.
-fn is_left_out(value: &Value, net: &Net<'_>, opened: &OpenedBench) -> bool {
-    let fact = value.as_table().and_then(Table::fact).filter(|fact| fact.is_optional);
-    fact.is_some_and(|fact| find_fact(fact.word, fact.place, &value.span, net, opened).is_err())
+/// Returns whether a value is an optional fact that is not there, or that is of a role which the node does not read.
+fn is_left_out(value: &Value, node: Option<usize>, net: &Net<'_>, opened: &OpenedBench) -> bool {
+    let Some(fact) = value.as_table().and_then(Table::fact).filter(|fact| fact.is_optional) else { return false };
+    let role = fact.word.split_once('.').map_or(fact.word, |(role, _)| role);
+    let is_foreign = |node: usize| role != LIMITS && !net.reads(node, role);
+    node.is_some_and(is_foreign) || find_fact(fact.word, fact.place, &value.span, net, opened).is_err()
 }
 
 /// Returns the fact that the word at `place` names, as a value at `span`.

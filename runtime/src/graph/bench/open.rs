@@ -44,12 +44,6 @@ impl OpenedBench {
         self.devices[role.device].description.period
     }
 
-    /// Returns whether a role has a fact.
-    pub(crate) fn states(&self, net: &Net<'_>, role: &str, fact: &str) -> bool {
-        let bound = net.flat.roles.position(role).and_then(|role| self.roles[role].as_ref());
-        bound.is_some_and(|bound| bound.facts.iter().any(|(name, _)| name == fact))
-    }
-
     /// Returns the facts of the devices: `role.fact` and the value.
     pub(crate) fn facts(&self, net: &Net<'_>) -> Vec<(String, toml::Value)> {
         let observed = net.observed.iter().map(|(key, ..)| *key).zip(&self.observed);
@@ -386,8 +380,10 @@ pub(crate) fn place_mistakes(
         };
         let diagnostic = Diagnostic { notes, ..Diagnostic::new(code, span, message).with_help(help) };
         diagnostics.push(match instead {
-            Some((name, best)) => misspelt_wire(&diagnostic, wires, (&name, &best), sources)
-                .unwrap_or_else(|| diagnostic.instead(&name, &best)),
+            Some(names) => misspelt_wire(&diagnostic, wires, (&names.0, &names.1), sources).unwrap_or_else(|| {
+                let help = diagnostic.help.clone();
+                diagnostic.instead(&names.0, &names.1).with_help(help)
+            }),
             None => diagnostic,
         });
     }

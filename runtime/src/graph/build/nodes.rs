@@ -236,7 +236,7 @@ impl Builder<'_> {
         is_complete: bool,
     ) -> (Option<Box<dyn Configured>>, Value) {
         let mut params = params.clone();
-        if !fill_facts(&mut params, self.net, self.opened, &mut self.diagnostics) {
+        if !fill_facts(&mut params, Some(index), self.net, self.opened, &mut self.diagnostics) {
             return (None, params);
         }
         let spec = self.net.spec(index);

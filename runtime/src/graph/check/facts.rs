@@ -3,7 +3,6 @@
 use std::collections::BTreeSet;
 use std::ops::Range;
 
-use crate::graph::bench::OpenedBench;
 use crate::graph::net::Net;
 use crate::graph::plan::Producer;
 use crate::graph::syntax::LIMITS;
@@ -16,22 +15,18 @@ struct ForeignFact<'a> {
     role: &'a str,
     fact: &'a str,
     place: &'a Range<usize>,
-    is_optional: bool,
 }
 
 /// Reports facts of roles that are not upstream of their node, one diagnostic for each node and role.
 ///
 /// A node that reads no role generates its outputs, and may use the facts of any role.
-pub(crate) fn check(net: &Net<'_>, opened: &OpenedBench, diagnostics: &mut Diagnostics) {
+pub(crate) fn check(net: &Net<'_>, diagnostics: &mut Diagnostics) {
     for (node, flat) in net.flat.nodes.iter().enumerate() {
         let upstream: BTreeSet<&str> =
             net.roles_of(Producer::Node(node)).map(|role| net.name(Producer::Role(role))).collect();
         diagnostics.extend(task_values(net, node));
         let tables = [&flat.block.params].into_iter().chain(net.settings_of(node));
-        let foreign: Vec<ForeignFact<'_>> = tables
-            .flat_map(|table| find_foreign(net, table, &upstream))
-            .filter(|fact| !fact.is_optional || opened.states(net, fact.role, fact.fact))
-            .collect();
+        let foreign: Vec<ForeignFact<'_>> = tables.flat_map(|table| find_foreign(net, table, &upstream)).collect();
         let roles: BTreeSet<&str> = foreign.iter().map(|fact| fact.role).filter(|_| !upstream.is_empty()).collect();
         for role in roles {
             let facts: Vec<_> = foreign.iter().filter(|fact| fact.role == role).collect();
@@ -68,8 +63,9 @@ fn find_foreign<'a>(net: &Net<'_>, table: &'a Value, upstream: &BTreeSet<&str>) 
     let facts = entries.flat_map(|(key, value)| value.facts().into_iter().map(move |fact| (key.name.as_str(), fact)));
     let foreign = facts.filter_map(|(param, FactRef { word, place, is_optional })| {
         let (role, fact) = word.split_once('.')?;
-        let is_foreign = role != LIMITS && net.flat.roles.position(role).is_some() && !upstream.contains(role);
-        is_foreign.then_some(ForeignFact { param, role, fact, place, is_optional })
+        let is_foreign =
+            !is_optional && role != LIMITS && net.flat.roles.position(role).is_some() && !upstream.contains(role);
+        is_foreign.then_some(ForeignFact { param, role, fact, place })
     });
     foreign.collect()
 }
@@ -91,11 +87,8 @@ fn report(net: &Net<'_>, node: usize, facts: &[&ForeignFact<'_>], upstream: &BTr
         |role: &str| net.flat.roles.iter().find(|(key, _)| key.name == role).map(|(_, kind)| kind.value.as_str());
     let Some(own) = upstream.iter().find(|own| kind(own) == kind(role)) else { return diagnostic };
     let path = part.map(|(_, inner)| format!("set.{inner}.")).unwrap_or_default();
-    let line = |ForeignFact { param, fact, is_optional, .. }: &&ForeignFact<'_>| {
-        let optional = if *is_optional { ", optional = true" } else { "" };
-        format!("\n{path}{param} = {{ from = \"{own}.{fact}\"{optional} }}")
-    };
-    let lines = facts.iter().map(line);
+    let lines =
+        facts.iter().map(|ForeignFact { param, fact, .. }| format!("\n{path}{param} = {{ from = \"{own}.{fact}\" }}"));
     let lines: String = lines.collect();
     match (part, block) {
         (Some((part, _)), Some(block)) => diagnostic

@@ -8,7 +8,7 @@ use std::ops::Range;
 
 use crate::graph::net::Net;
 use crate::node::{PortSpec, frame_args};
-use crate::source::{Code, Diagnostic, Diagnostics, suggestion};
+use crate::source::{Code, Diagnostic, Diagnostics};
 
 /// The names of all frames that roles have.
 pub(super) struct FrameNames<'a> {
@@ -31,7 +31,7 @@ impl<'a> FrameNames<'a> {
     /// Returns the frame that a parameter of a node names, and its place. Returns `None` if it names none.
     pub(super) fn named(&self, node: usize, param: &str) -> Option<(String, Range<usize>)> {
         let value = self.net.flat.nodes[node].block.params.as_table()?.get(param)?;
-        let name = self.resolve(value.as_str()?).ok()?;
+        let name = self.resolve(value.as_str()?, &value.span).ok()?;
         Some((name, value.span.clone()))
     }
 
@@ -48,21 +48,22 @@ impl<'a> FrameNames<'a> {
             for param in params {
                 let value = flat.block.params.as_table().and_then(|table| table.get(param));
                 let Some((name, value)) = value.and_then(|value| Some((value.as_str()?, value))) else { continue };
-                if let Err((message, help)) = self.resolve(name) {
-                    diagnostics.push(Diagnostic::new(Code::UnknownFrame, value.span.clone(), message).help(help));
+                if let Err(unknown) = self.resolve(name, &value.span) {
+                    diagnostics.push(*unknown);
                 }
             }
         }
     }
 
-    /// Returns the full name of a frame, or the message and the help for a name that no frame has.
-    fn resolve(&self, name: &str) -> Result<String, (String, String)> {
+    /// Returns the full name of a frame, or the diagnostic of a name at `span` that no frame has.
+    fn resolve(&self, name: &str, span: &Range<usize>) -> Result<String, Box<Diagnostic>> {
+        let unknown = |message: String| Diagnostic::new(Code::UnknownFrame, span.clone(), message);
         let roles = &self.net.flat.roles;
         match self.parts.get(name).map(Vec::as_slice) {
             Some([only]) => return Ok(format!("{only}.{name}")),
             Some([first, ..]) => {
                 let help = format!("write `{first}.{name}`, or the frame of another role");
-                return Err((format!("several roles have a frame `{name}`"), help));
+                return Err(Box::new(unknown(format!("several roles have a frame `{name}`")).help(help)));
             }
             Some([]) | None => {}
         }
@@ -75,7 +76,7 @@ impl<'a> FrameNames<'a> {
         let full = self.parts.iter().flat_map(|(part, roles)| roles.iter().map(move |role| format!("{role}.{part}")));
         let full: Vec<String> = full.collect();
         let known = roles.names().chain(full.iter().map(String::as_str));
-        Err((format!("there is no frame `{name}`"), suggestion(name, known, "frames")))
+        Err(Box::new(unknown(format!("there is no frame `{name}`")).suggest(name, known, "frames")))
     }
 }
 

@@ -24,6 +24,8 @@ type Quantities = BTreeMap<PortRef, Quantity>;
 /// Reports each wire whose quantity is not that of its input, and each unknown quantity where it must be known.
 pub(crate) fn check(net: &Net<'_>, diagnostics: &mut Diagnostics) {
     let known = propagate(net);
+    // Behind a wire with a mistake, nothing is known yet.
+    let is_connected = !diagnostics.iter().any(|diagnostic| diagnostic.code.hides_wires());
     for (node, wires) in net.wires.iter().enumerate() {
         let mut letters: BTreeMap<char, &Quantity> = BTreeMap::new();
         for wire in wires {
@@ -37,7 +39,7 @@ pub(crate) fn check(net: &Net<'_>, diagnostics: &mut Diagnostics) {
                 Some(Expected::Name(name)) => name,
                 None => continue,
             };
-            if has.map_or(input.need.must_be_known, |has| has.name != takes) {
+            if has.map_or(input.need.must_be_known && is_connected, |has| has.name != takes) {
                 diagnostics.push(mismatch(net, node, wire, has, &takes));
             }
         }

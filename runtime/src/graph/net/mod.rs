@@ -66,6 +66,12 @@ impl<'a> Net<'a> {
         net
     }
 
+    /// Returns whether a node reads a role, directly or not. A node that reads none may use the facts of any role.
+    pub(crate) fn reads(&self, node: usize, role: &str) -> bool {
+        let mut roles = self.roles_of(Producer::Node(node)).peekable();
+        roles.peek().is_none() || roles.any(|read| self.name(Producer::Role(read)) == role)
+    }
+
     /// Returns the roles whose samples a producer descends from.
     pub(crate) fn roles_of(&self, producer: Producer) -> impl Iterator<Item = usize> {
         self.provenance.roles(producer)

@@ -422,7 +422,8 @@ pub(crate) fn into_diagnostic(mistake: Mistake) -> Diagnostic {
     let At::Span(span) = mistake.at else { unreachable!("a reader reports spans") };
     let diagnostic = Diagnostic::new(mistake.code, span, mistake.message);
     match mistake.instead {
-        Some((name, best)) => diagnostic.instead(&name, &best),
-        None => diagnostic.with_help(mistake.help),
+        Some(names) => diagnostic.instead(&names.0, &names.1),
+        None => diagnostic,
     }
+    .with_help(mistake.help)
 }
