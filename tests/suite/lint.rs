@@ -8,8 +8,8 @@ use tactflow_runtime::device::{
 };
 use tactflow_runtime::harness::lint;
 use tactflow_runtime::node::{
-    AnyNode, Bounds, Built, Bus, Configured, Declared, Given, Limits, Mistakes, NodeSpec, NodeType, ParamSpec, PortId,
-    PortSpec, Reader, Tick, Wires,
+    AnyNode, Bounds, Built, Bus, Configured, Declared, Given, Limits, Mistakes, Motion, NodeSpec, NodeType, ParamSpec,
+    PortId, PortSpec, Reader, Tick, Wires,
 };
 use tactflow_runtime::signal::{Kind, Scalar, ScalarShape, Signal, Unit};
 use tactflow_runtime::source::Value;
@@ -54,7 +54,7 @@ fn port(name: &'static str, doc: &'static str) -> PortSpec {
 }
 
 fn param(name: &'static str, doc: &'static str, unit: Option<&'static str>) -> ParamSpec {
-    let declared = Declared { name, doc, unit, bounds: Some(Bounds::above(0.0)), is_live: false };
+    let declared = Declared { name, doc, unit, bounds: Some(Bounds::above(0.0)), usual: None, is_live: false };
     ParamSpec::of::<f64>(&declared, Some(|| 1.0))
 }
 
@@ -93,7 +93,8 @@ impl NodeType for Counter {
 impl Configured for Counter {
     fn build(self: Box<Self>, _: Given) -> Result<Built, Mistakes> {
         let outputs = vec![ScalarShape::of(Unit::METRE).within(0.0, 1000.0).into()];
-        Ok(Built { node: self, outputs, is_still: false, is_uncalibrated: false })
+        let (motion, warnings) = (Motion::Any, Mistakes::new());
+        Ok(Built { node: self, outputs, motion, is_uncalibrated: false, warnings })
     }
 }
 

@@ -21,7 +21,8 @@ const CEILINGS: &str = "force_n = 10.0\npeak_n = 4.0\napproach_m_per_s = 0.2";
 
 fn rig<N: Node>(params: &str) -> NodeRig {
     let pad = ImageShape { rows: 2, cols: 2, pitch: [0.01; 2], unit: Unit::NEWTON };
-    let all: [(&str, Shape); 3] = [("twist", TwistShape.into()), ("image", pad.into()), ("pose", PoseShape.into())];
+    let all: [(&str, Shape); 3] =
+        [("twist", TwistShape.into()), ("image", pad.into()), ("pose", PoseShape::default().into())];
     let inputs = of::<N>().spec().inputs;
     let wires = all.into_iter().filter(|(name, _)| inputs.iter().any(|input| input.name == *name));
     NodeRig::new::<N>(params, &wires.collect::<Vec<_>>()).unwrap_or_else(|mistakes| panic!("{}: {mistakes:?}", N::NAME))

@@ -1,7 +1,12 @@
 //! `twist_source`: a constant twist. Without a gate it has no time, so the `max_age_ms` of a sink never stops it.
 
-use tactflow_runtime::node::{Describe, In, Inputs, Mistakes, Node, Out, Outputs, Param, Setup, Tick};
+use tactflow_runtime::node::{
+    At, Describe, In, Inputs, Mistake, Mistakes, Motion, Node, Out, Outputs, Param, Setup, Tick,
+};
 use tactflow_runtime::signal::{Flag, Twist};
+use tactflow_runtime::source::Code;
+
+use crate::motion::usual::{USUAL_M_PER_S, USUAL_RAD_PER_S};
 
 /// A constant motion, to approach an object or to guide along it.
 ///
@@ -63,9 +68,12 @@ impl Node for TwistSource {
     type State = ();
 
     fn new(params: Params, setup: &mut Setup<Self>) -> Result<Self, Mistakes> {
-        setup.is_still = params.twist == [0.0; 6];
-        let (is_still, is_gated) = (setup.is_still, setup.inputs.gate.is_some());
-        Ok(Self { twist: Twist(params.twist.into()), is_still, is_gated })
+        let (twist, is_gated) = (Twist(params.twist.into()), setup.inputs.gate.is_some());
+        setup.motion = motion(&twist, params.frame.as_deref());
+        if let Some(warning) = unusual(&twist) {
+            setup.warn(warning);
+        }
+        Ok(Self { twist, is_still: setup.motion == Motion::Still, is_gated })
     }
 
     fn step(&self, _: &Tick, inputs: Inputs<'_>, out: &mut Outputs, (): &mut ()) {
@@ -73,6 +81,26 @@ impl Node for TwistSource {
             out.twist.set(self.twist);
         }
     }
+}
+
+/// Returns the motion of a twist. In the frame of a sensor, z points out of it toward the object.
+fn motion(twist: &Twist, frame: Option<&str>) -> Motion {
+    let linear = twist.linear();
+    let is_of_base = frame.is_some_and(|frame| frame.rsplit('.').next() == Some("base"));
+    match twist.0 == Twist::default().0 {
+        true => Motion::Still,
+        false if !is_of_base && -linear.z > 0.5 * linear.norm() => Motion::Retreat,
+        false => Motion::Any,
+    }
+}
+
+/// Returns the warning about a motion that is far beyond what an arm can do.
+fn unusual(twist: &Twist) -> Option<Mistake> {
+    let parts = [(twist.linear(), USUAL_M_PER_S, "m/s", "mm/s"), (twist.angular(), USUAL_RAD_PER_S, "rad/s", "deg/s")];
+    let (part, max, unit, other) = parts.into_iter().find(|(part, max, ..)| part.amax() > *max)?;
+    let message = format!("`twist` has {} {unit}, but usual is at most {max} {unit}", part.amax());
+    let help = format!("write the motion in {unit}, not in {other}");
+    Some(Mistake::new(Code::UnusualValue, At::Param("twist".into()), message).help(help))
 }
 
 #[cfg(test)]

@@ -12,7 +12,7 @@ use crate::checks::{LetterKind, bound_letter, inputs_beside, is_unit_letter};
 use crate::docs::text;
 use crate::fault::{Faults, asserted};
 
-const KNOWN: &[&str] = &["unit", "range", "above", "default", "live"];
+const KNOWN: &[&str] = &["unit", "range", "above", "usual", "default", "live"];
 
 /// One field of a table of parameters.
 struct Parameter {
@@ -22,6 +22,7 @@ struct Parameter {
     bounds: Option<TokenStream>,
     /// What stands in the attribute for the bounds: where a mistake is marked.
     bounds_at: Option<Expr>,
+    usual: Option<TokenStream>,
     default: Option<Expr>,
     is_live: bool,
 }
@@ -93,6 +94,7 @@ fn parameter(field: Field, faults: &mut Faults) -> Option<Parameter> {
     let mut words = Words::new(&field.attrs, "param", KNOWN, faults);
     let (unit, is_live) = (words.text("unit", faults), words.flag("live", faults).is_some());
     let (range, above) = (words.value("range", faults), words.value("above", faults));
+    let usual = words.value("usual", faults).and_then(|(_, usual)| between(&usual, faults));
     let default = words.value("default", faults).map(|(_, value)| value);
     if let (Some(_), Some((above, _))) = (&range, &above) {
         faults.add(above, "`range` and `above` exclude each other");
@@ -103,7 +105,7 @@ fn parameter(field: Field, faults: &mut Faults) -> Option<Parameter> {
         (None, None) => None,
     };
     let bounds_at = range.or(above).map(|(_, value)| value);
-    Some(Parameter { field, name, unit, bounds, bounds_at, default, is_live })
+    Some(Parameter { field, name, unit, bounds, bounds_at, usual, default, is_live })
 }
 
 /// The bounds that a range such as `0.0..=1.0` or `0.0..` says.
@@ -126,9 +128,11 @@ fn between(range: &Expr, faults: &mut Faults) -> Option<TokenStream> {
 fn declared(parameter: &Parameter) -> TokenStream {
     let (name, doc, is_live) = (parameter.name.to_string(), text(&parameter.field.attrs), parameter.is_live);
     let unit = option(parameter.unit.as_ref().map(|unit| quote!(#unit)));
-    let bounds = option(parameter.bounds.clone());
+    let (bounds, usual) = (option(parameter.bounds.clone()), option(parameter.usual.clone()));
     quote! {
-        ::tactflow_runtime::node::Declared { name: #name, doc: #doc, unit: #unit, bounds: #bounds, is_live: #is_live }
+        ::tactflow_runtime::node::Declared {
+            name: #name, doc: #doc, unit: #unit, bounds: #bounds, usual: #usual, is_live: #is_live,
+        }
     }
 }
 

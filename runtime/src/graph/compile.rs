@@ -10,7 +10,7 @@ use crate::graph::net::Net;
 use crate::graph::outline::OutlineBuilder;
 use crate::graph::plan::{Plan, PlannedCommand, PlannedModes, PlannedNode};
 use crate::graph::syntax::{GraphTable, default_max_age_s};
-use crate::source::{Code, Diagnostics, Report, SourceMap};
+use crate::source::{Code, Diagnostics, Report, Severity, SourceMap};
 
 /// Checks and builds a graph.
 ///
@@ -29,7 +29,7 @@ pub(crate) fn compile_in(mut loader: Loader, catalogue: &Catalogue, request: &Re
         .any(|d| matches!(d.code, Code::Syntax | Code::Unreadable | Code::EndlessPart | Code::WrongFile));
     if is_unreadable {
         // The checks would report everything that a missing file declares as missing.
-        return Err(Report::new(sources, diagnostics));
+        return Err(Report::new(sources, split(diagnostics).0));
     }
     let net = Net::new(&flat, catalogue, &mut diagnostics);
     let opened = bench::open(&net, &mut sources, &mut diagnostics);
@@ -51,39 +51,50 @@ pub(crate) fn compile_in(mut loader: Loader, catalogue: &Catalogue, request: &Re
     builder.check_delayed_units();
     check::calibration::check(&net, &nodes, &mut builder.diagnostics);
     view.check_units(&builder.ports, &mut builder.diagnostics);
+    check::times::check(&net, &opened, period, &mut builder.diagnostics);
     let modes = build_modes(&mut builder, &mut nodes);
-    let modes = check_modes(&net, modes, &mut builder.diagnostics);
+    let modes = check_modes(&net, modes, period, &mut builder.diagnostics);
     let mut commands: Vec<PlannedCommand> = net.commands.iter().filter_map(|wire| builder.command(wire)).collect();
     commands.sort_by_key(|command| command.is_report);
     let policy = flat.policy.as_ref().and_then(|(_, policy)| policy.clone()).unwrap_or_default();
     let roles = builder.plan_roles(&policy);
     let ports = std::mem::take(&mut builder.ports);
     let (diagnostics, sources) = builder.finish();
-    let Some((clock, _)) = clock.filter(|_| diagnostics.is_empty()) else {
-        return Err(Report::new(sources, diagnostics));
+    let (mistakes, mut warnings) = split(diagnostics);
+    let Some((clock, _)) = clock.filter(|_| mistakes.is_empty()) else {
+        return Err(Report::new(sources, mistakes));
     };
     log_plan(&nodes, &opened, &sources);
     let max_gap = max_gap(flat.table.as_ref(), period);
     let outline = OutlineBuilder { net: &net, opened: &opened, sources: &sources, nodes: &nodes, period, max_gap };
     let outline = outline.build();
-    let mut warnings = Diagnostics::new();
-    check::unused::check(&net, view.sources(), &mut warnings);
+    let watching = modes.as_ref().map_or(&[][..], |modes| &modes.modes);
+    check::unused::check(&net, watching, view.sources(), &mut warnings);
+    let allowed = check::allow::silence(&flat, &mut warnings);
     let view = view.plan(&net, &nodes, &ports);
     let reset_after = flat.table.as_ref().map_or(0, |table| (table.reset_after_ms * 1e6) as i64);
     let period = ((period * 1e9).round() as i64).max(1);
     let (exports, facts) = (net.exports_by_name(), opened.facts(&net));
     let devices = opened.devices;
-    let plan = Plan { roles, devices, nodes, commands, clock, period, max_gap, reset_after, modes, policy };
+    let plan = Plan { roles, devices, nodes, commands, clock, period, max_gap, reset_after, modes, policy, allowed };
     Ok(Compiled { plan, view, sources, warnings, outline, exports, facts })
 }
 
+/// Separates the mistakes from the warnings.
+fn split(diagnostics: Diagnostics) -> (Diagnostics, Diagnostics) {
+    diagnostics.into_iter().partition(|diagnostic| diagnostic.code.severity() == Severity::Error)
+}
+
 /// Checks the modes together, and returns them with the start mode.
-fn check_modes(net: &Net<'_>, built: BuiltModes, diagnostics: &mut Diagnostics) -> Option<PlannedModes> {
-    let BuiltModes { modes, still, demand, freezes } = built;
+fn check_modes(net: &Net<'_>, built: BuiltModes, period: f64, diagnostics: &mut Diagnostics) -> Option<PlannedModes> {
+    let BuiltModes { modes, motions, demand, freezes } = built;
     check::absent::check(net, &modes, &demand, &freezes, diagnostics);
     check::overlap::check(net, &modes, diagnostics);
-    check::motion::check(net, &modes, &still, diagnostics);
+    check::motion::check(net, &modes, &motions, diagnostics);
+    check::late::check(&modes, diagnostics);
+    check::immediate::check(net, &modes, period, diagnostics);
     let start = check::reachability::check(net, diagnostics)?;
+    check::approach::check(net, &modes, start, &motions, diagnostics);
     Some(PlannedModes { modes, start })
 }
 

@@ -2,7 +2,7 @@
 
 use crate::device::Driver;
 use crate::graph::outline::Outline;
-use crate::graph::plan::{Plan, PlannedPort, PlannedView, Producer};
+use crate::graph::plan::{AllowedWarning, Plan, PlannedPort, PlannedView, Producer};
 use crate::source::{Diagnostic, Report, SourceMap};
 
 /// A graph that was checked and built.
@@ -24,6 +24,12 @@ impl Compiled {
     pub fn warnings(&self) -> Option<Report> {
         let report = || Report::new(self.sources.clone(), self.warnings.clone());
         (!self.warnings.is_empty()).then(report)
+    }
+
+    /// Returns the warnings that a section [allow] silences, each with its reason.
+    #[must_use]
+    pub fn allowed(&self) -> &[AllowedWarning] {
+        &self.plan.allowed
     }
 
     /// Returns all ports: those of the roles, then those of the nodes in step order.

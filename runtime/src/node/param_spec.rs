@@ -84,6 +84,8 @@ pub struct Declared {
     pub unit: Option<&'static str>,
     /// Range.
     pub bounds: Option<Bounds>,
+    /// Range of the usual numbers. One outside of it is accepted with a warning.
+    pub usual: Option<Bounds>,
     /// Whether a mode can set it.
     pub is_live: bool,
 }
@@ -92,7 +94,7 @@ impl Declared {
     /// Declares only the name.
     #[must_use]
     pub const fn new(name: &'static str) -> Self {
-        Self { name, doc: "", unit: None, bounds: None, is_live: false }
+        Self { name, doc: "", unit: None, bounds: None, usual: None, is_live: false }
     }
 }
 

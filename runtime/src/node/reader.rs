@@ -8,6 +8,7 @@ use super::bounds::Bounds;
 use super::file_path::FilePath;
 use super::mistake::{At, Mistake, Mistakes};
 use super::param_spec::{Contents, Declared, ParamSpec, Written};
+use super::usual::Usual;
 use crate::source::{Code, suggest_name, suggestion};
 use crate::source::{Key, SourceMap, Table, Value};
 
@@ -58,8 +59,12 @@ pub struct Reader<'a> {
     pub(super) bounds: Option<Bounds>,
     /// Unit of the numbers in the current field, as declared.
     unit: Option<&'static str>,
+    /// The usual numbers of the current field.
+    usual: Usual,
     /// The mistakes so far.
     pub mistakes: Mistakes,
+    /// The warnings so far.
+    pub warnings: Mistakes,
 }
 
 /// A table with the entries that are not read yet.
@@ -74,7 +79,13 @@ impl<'a> Reader<'a> {
     /// Creates a reader of values from `sources`.
     #[must_use]
     pub const fn new(sources: &'a SourceMap) -> Self {
-        Self { sources, bounds: None, unit: None, mistakes: Vec::new() }
+        Self { sources, bounds: None, unit: None, usual: Usual::NONE, mistakes: Vec::new(), warnings: Vec::new() }
+    }
+
+    /// Warns of times that are shorter than a `period` [s].
+    pub(crate) const fn with_period(mut self, period: f64) -> Self {
+        self.usual.period = period;
+        self
     }
 
     /// Adds the mistake that the value at `span` is wrong, and returns `None`.
@@ -103,10 +114,11 @@ impl<'a> Reader<'a> {
     ) -> Option<T> {
         let Declared { name, bounds, unit, .. } = *declared;
         if let Some((_, value)) = table.rest.remove(name) {
-            let outer = (self.bounds, self.unit);
+            let outer = (self.bounds, self.unit, self.usual);
             (self.bounds, self.unit) = (bounds, unit.filter(|unit| is_known(unit)));
+            self.usual = self.usual.of(declared);
             let read = T::read(&value, self);
-            (self.bounds, self.unit) = outer;
+            (self.bounds, self.unit, self.usual) = outer;
             return read;
         }
         let default = default.map(|default| default()).or_else(T::when_missing);
@@ -137,6 +149,7 @@ impl<'a> Reader<'a> {
         let expects = self.bounds.map_or_else(|| expects.to_owned(), |bounds| bounds.describe(expects)) + &unit;
         let read: T = read_leaf(value, self, &expects)?;
         let is_in_range = self.bounds.is_none_or(|bounds| bounds.contains(number(read)));
+        self.warnings.extend(self.usual.find_warning(number(read), value.span.clone()));
         if is_in_range { Some(read) } else { self.wrong_type(value, &expects) }
     }
 

@@ -9,8 +9,13 @@ mod otsu;
 mod pack;
 mod rule;
 
-use tactflow_runtime::node::{Describe, In, Inputs, Mistakes, Node, Out, Outputs, Param, Setup, State, Tick};
-use tactflow_runtime::signal::{Image, Mask};
+use tactflow_runtime::node::{
+    At, Describe, In, Inputs, Mistake, Mistakes, Node, Out, Outputs, Param, Setup, State, Tick,
+};
+use tactflow_runtime::signal::{Image, Mask, Unit};
+use tactflow_runtime::source::Code;
+
+use crate::motion::usual::USUAL_THRESHOLD_N;
 
 pub use otsu::otsu;
 pub use pack::binarize;
@@ -108,6 +113,7 @@ impl Node for Binarize {
 
     fn new(params: Params, setup: &mut Setup<Self>) -> Result<Self, Mistakes> {
         setup.outputs.mask = (&setup.inputs.image).into();
+        setup.warnings.extend(unusual(params.threshold, setup.inputs.image.unit));
         let grid = &setup.outputs.mask;
         Ok(Self { rule: rule(&params)?, words: grid.rows * grid.cols.div_ceil(64) })
     }
@@ -136,6 +142,14 @@ impl Node for Binarize {
             }
         }
     }
+}
+
+/// Returns the warning about a threshold that hardly any contact reaches.
+fn unusual(threshold: f64, unit: Unit) -> Option<Mistake> {
+    let message = format!("`threshold` is {threshold} N, but usual is at most {USUAL_THRESHOLD_N} N");
+    let help = format!("if {threshold} is in mN, write `{}`, because the image is in N", threshold * 1e-3);
+    let warning = Mistake::new(Code::UnusualValue, At::Param("threshold".into()), message).help(help);
+    (unit == Unit::NEWTON && threshold > USUAL_THRESHOLD_N).then_some(warning)
 }
 
 #[cfg(test)]

@@ -4,6 +4,7 @@ use std::fmt::Write;
 
 use super::events::{LimitWatch, events};
 use super::ports::{PortTable, node_times};
+use crate::cli::check::allowed;
 use crate::cli::text::prose::PageStyle;
 use crate::cli::view::RunView;
 use crate::engine::{Counters, Engine, Outcome};
@@ -78,6 +79,9 @@ impl Summary {
         if !engine.uncalibrated().is_empty() {
             let names = engine.uncalibrated().join("`, `");
             let _ = writeln!(text, "nothing was limited in newtons: the limits of `{names}` are raw readings");
+        }
+        for warning in engine.allowed() {
+            let _ = writeln!(text, "{}", allowed(warning));
         }
         if outcome.late > 0 {
             let _ = writeln!(text, "{} ticks started more than one period late", outcome.late);

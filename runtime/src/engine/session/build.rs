@@ -101,6 +101,7 @@ impl Engine {
             display,
             limits,
             uncalibrated,
+            allowed: plan.allowed,
             names,
             roles,
             reported,

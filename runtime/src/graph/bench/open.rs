@@ -204,8 +204,9 @@ impl Opener<'_> {
         let device = self.catalogue.find_device(&kind.value)?;
         let mut reader = Reader::new(self.sources);
         let opened = device.open(&block.params, &mut reader);
-        let mistakes = reader.mistakes;
-        place_mistakes(mistakes, &block.params, &[], self.sources, self.diagnostics);
+        let Reader { mistakes, warnings, .. } = reader;
+        let found = mistakes.into_iter().chain(warnings).collect();
+        place_mistakes(found, &block.params, &[], self.sources, self.diagnostics);
         let crate::device::Opened { mut description, driver } = opened?;
         let period = description.period;
         if !PERIOD_RANGE_S.contains(&period) {

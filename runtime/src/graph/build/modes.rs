@@ -9,15 +9,15 @@ use crate::graph::check::live;
 use crate::graph::load::{Entity, FlatGraph};
 use crate::graph::plan::{PlannedExit, PlannedMode, PlannedNode, PlannedPort, PortRef};
 use crate::graph::syntax::{ModeBlock, default_max_age_ns};
-use crate::node::Built;
+use crate::node::{Built, Motion};
 use crate::signal::Kind;
 use crate::source::{Code, Diagnostic, Diagnostics, Item, Table};
 
 /// The modes of a graph, with what the checks need to know about each.
 pub(crate) struct BuiltModes {
     pub(crate) modes: Vec<PlannedMode>,
-    /// For each mode, which nodes generate no motion. A graph without modes counts as one mode.
-    pub(crate) still: Vec<Vec<bool>>,
+    /// For each mode, the motion that each node generates. A graph without modes counts as one mode.
+    pub(crate) motions: Vec<Vec<Motion>>,
     /// For each mode, the components that are read.
     pub(crate) demand: Vec<Demand>,
     /// Nodes whose outputs are absent where nothing reads them.
@@ -31,9 +31,9 @@ pub(crate) fn build_modes(builder: &mut Builder<'_>, nodes: &mut [PlannedNode]) 
     let base = find_demand(builder.net, &|index| find(nodes, index).map(|node| &*node.node));
     let want = |node: &mut PlannedNode| (node.index, node.node.want(&base[node.index]));
     let freezes = nodes.iter_mut().map(want).collect();
-    let mut built = BuiltModes { modes: Vec::new(), still: Vec::new(), demand: Vec::new(), freezes };
+    let mut built = BuiltModes { modes: Vec::new(), motions: Vec::new(), demand: Vec::new(), freezes };
     if flat.modes.is_empty() {
-        built.still.push(all.map(|node| builder.is_still(node)).collect());
+        built.motions.push(all.map(|node| builder.motion(node)).collect());
         return built;
     }
     for block in &flat.modes {
@@ -51,9 +51,8 @@ pub(crate) fn build_modes(builder: &mut Builder<'_>, nodes: &mut [PlannedNode]) 
         for (index, variant) in &mut variants {
             variant.node.want(&demand[*index]);
         }
-        let is_still =
-            |node: usize| variants.get(&node).map_or_else(|| builder.is_still(node), |variant| variant.is_still);
-        built.still.push(all.clone().map(is_still).collect());
+        let motion = |node: usize| variants.get(&node).map_or_else(|| builder.motion(node), |variant| variant.motion);
+        built.motions.push(all.clone().map(motion).collect());
         let configurations = adopt(block, variants, nodes, &mut builder.diagnostics);
         built.modes.push(PlannedMode { name: block.key.name.clone(), exits, configurations });
         built.demand.push(demand);

@@ -1,14 +1,15 @@
 //! Builds the nodes of a graph in step order, each from the shapes on its wires.
 
 use std::collections::BTreeMap;
+use std::ops::Range;
 
 use crate::graph::bench::{BoundRole, OpenedBench, fill_facts, place_mistakes};
 use crate::graph::check::frames::Frames;
 use crate::graph::check::units::{UnitMismatch, Units};
 use crate::graph::net::{CommandWire, Net, WireOrigin};
 use crate::graph::plan::{PlannedCommand, PlannedNode, PlannedPort, PlannedRole, PlannedWire, PortRef, Producer};
-use crate::graph::syntax::{AgeLimit, Policy, PolicyTable, default_max_age_ns};
-use crate::node::{Built, Configured, Given, Need, NodeSpec, PortSpec, Reader, frame_args};
+use crate::graph::syntax::{AgeLimit, LIMITS, Policy, PolicyTable, default_max_age_ns};
+use crate::node::{At, Built, Configured, Given, Motion, Need, NodeSpec, PortSpec, Reader, frame_args};
 use crate::signal::{FlagShape, Joint, Kind, Shape};
 use crate::source::{Code, Diagnostic, Diagnostics, Key, SourceMap, Value};
 
@@ -25,8 +26,8 @@ pub(crate) struct Builder<'a> {
     pub(crate) ports: BTreeMap<PortRef, PlannedPort>,
     /// The unit variables of each node.
     units: BTreeMap<usize, Units>,
-    /// The shapes from which each node was built, and whether it generates no motion.
-    built: BTreeMap<usize, (Given, bool)>,
+    /// The shapes from which each node was built, and the motion that it generates.
+    built: BTreeMap<usize, (Given, Motion)>,
 }
 
 impl<'a> Builder<'a> {
@@ -147,7 +148,7 @@ impl Builder<'_> {
             ports.push(self.add_port(PortRef { producer: Producer::Node(index), port }, shape));
         }
         self.units.insert(index, units);
-        self.built.insert(index, (given, built.is_still));
+        self.built.insert(index, (given, built.motion));
         Some(PlannedNode {
             index,
             name: node.name.clone(),
@@ -162,10 +163,10 @@ impl Builder<'_> {
         })
     }
 
-    /// Returns whether a node generates no motion with the parameters of the graph.
-    pub(crate) fn is_still(&self, node: usize) -> bool {
+    /// Returns the motion that a node generates with the parameters of the graph.
+    pub(crate) fn motion(&self, node: usize) -> Motion {
         // A node that could not be built has its own diagnostic.
-        self.built.get(&node).is_none_or(|(_, is_still)| *is_still)
+        self.built.get(&node).map_or(Motion::Still, |(_, motion)| *motion)
     }
 
     /// Builds a node again with other parameters, from the same input shapes; its output shapes must not change.
@@ -190,17 +191,23 @@ impl Builder<'_> {
     /// Reads the parameters of a node, and returns them with all facts filled in.
     ///
     /// A filled-in value of [limits] keeps its span there, so a mistake in it is reported in that section.
-    fn configure(&mut self, kind: usize, params: &Value) -> (Option<Box<dyn Configured>>, Value) {
-        let mut params = params.clone();
+    fn configure(&mut self, kind: usize, written: &Value) -> (Option<Box<dyn Configured>>, Value) {
+        let mut params = written.clone();
         let has_facts = fill_facts(&mut params, self.net, self.opened, &mut self.diagnostics);
-        let mut reader = Reader::new(&self.sources);
+        let mut reader = Reader::new(&self.sources).with_period(self.period);
         if !has_facts {
             return (None, params);
         }
         let configured = self.net.catalogue.nodes()[kind].configure(&params, &mut reader);
-        let mistakes = reader.mistakes;
+        let Reader { mistakes, warnings, .. } = reader;
         let is_valid = mistakes.is_empty();
         place_mistakes(mistakes, &params, &[], &mut self.sources, &mut self.diagnostics);
+        // A fact has its warnings in the bench, if it was written there.
+        let facts = written.facts().into_iter().filter(|fact| fact.word.split('.').next() != Some(LIMITS));
+        let facts: Vec<Range<usize>> = facts.map(|fact| fact.place.clone()).collect();
+        let is_fact = |at: &At| matches!(at, At::Span(span) if facts.iter().any(|fact| span.contains(&fact.start)));
+        let warnings = warnings.into_iter().filter(|warning| !is_fact(&warning.at)).collect();
+        place_mistakes(warnings, &params, &[], &mut self.sources, &mut self.diagnostics);
         (configured.filter(|_| is_valid), params)
     }
 
@@ -213,8 +220,17 @@ impl Builder<'_> {
         given: Given,
     ) -> Option<Built> {
         let wires = &self.net.flat.nodes[index].block.wires.valid;
-        let built = configured?.build(given);
-        built.map_err(|mistakes| place_mistakes(mistakes, params, wires, &mut self.sources, &mut self.diagnostics)).ok()
+        let mut place = |mistakes| place_mistakes(mistakes, params, wires, &mut self.sources, &mut self.diagnostics);
+        match configured?.build(given) {
+            Ok(mut built) => {
+                place(std::mem::take(&mut built.warnings));
+                Some(built)
+            }
+            Err(mistakes) => {
+                place(mistakes);
+                None
+            }
+        }
     }
 
     /// Suggests a node that converts any unit into that unit per second, for an input that takes only rates.

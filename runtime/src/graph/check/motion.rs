@@ -9,16 +9,16 @@ use super::endings::{Endings, needs_contact};
 use crate::graph::net::{Net, Wire};
 use crate::graph::plan::PlannedMode;
 use crate::graph::syntax::ModeBlock;
+use crate::node::Motion;
 use crate::signal::Kind;
 use crate::source::{Code, Diagnostic, Diagnostics, quoted};
 
 /// Reports generated motion that nothing ends, in a mode or in a graph without modes.
 ///
-/// `still` holds for each mode which nodes generate no motion. A graph without modes counts as one mode.
-pub(crate) fn check(net: &Net<'_>, modes: &[PlannedMode], still: &[Vec<bool>], diagnostics: &mut Diagnostics) {
-    let commands = net.commands.iter().filter(|wire| !wire.is_report);
-    let driving = net.upstream(commands.filter_map(|wire| wire.source.producer.node()));
-    let generators: Vec<Vec<usize>> = still.iter().map(|still| find_generators(net, &driving, still)).collect();
+/// `motions` holds for each mode the motion that each node generates. A graph without modes counts as one mode.
+pub(crate) fn check(net: &Net<'_>, modes: &[PlannedMode], motions: &[Vec<Motion>], diagnostics: &mut Diagnostics) {
+    let is_still = |motions: &Vec<Motion>| -> Vec<bool> { motions.iter().map(|one| *one == Motion::Still).collect() };
+    let generators: Vec<Vec<usize>> = motions.iter().map(|all| find_generators(net, &is_still(all))).collect();
     if modes.is_empty() {
         report_in_graph(net, &generators.concat(), diagnostics);
         return;
@@ -38,8 +38,10 @@ pub(crate) fn check(net: &Net<'_>, modes: &[PlannedMode], still: &[Vec<bool>], d
 
 /// Returns the nodes that start a motion of the arm without a sample.
 ///
-/// `driving` are the nodes upstream of a command.
-fn find_generators(net: &Net<'_>, driving: &BTreeSet<usize>, is_still: &[bool]) -> Vec<usize> {
+/// `is_still` holds which nodes generate no motion.
+pub(super) fn find_generators(net: &Net<'_>, is_still: &[bool]) -> Vec<usize> {
+    let commands = net.commands.iter().filter(|wire| !wire.is_report);
+    let driving = net.upstream(commands.filter_map(|wire| wire.source.producer.node()));
     let (mut sampled, mut still) = (BTreeSet::new(), BTreeSet::new());
     // `moved` also contains the nodes that pass on a generated motion.
     let (mut generators, mut moved) = (Vec::new(), BTreeSet::new());

@@ -130,12 +130,14 @@ impl<'a> Net<'a> {
 
     /// Returns the tables of parameters that modes set of a node.
     pub(crate) fn settings_of(&self, node: usize) -> impl Iterator<Item = &'a Value> {
-        let name = &self.flat.nodes[node].name;
-        self.flat.modes.iter().filter_map(move |mode| {
-            let mut path = name.split('.');
-            let first = mode.set.get(path.next()?)?;
-            path.try_fold(first, |value, name| value.as_table()?.get(name))
-        })
+        (0..self.flat.modes.len()).filter_map(move |mode| self.setting(mode, node))
+    }
+
+    /// Returns the table of parameters that a mode sets of a node.
+    pub(crate) fn setting(&self, mode: usize, node: usize) -> Option<&'a Value> {
+        let mut path = self.flat.nodes[node].name.split('.');
+        let first = self.flat.modes[mode].set.get(path.next()?)?;
+        path.try_fold(first, |value, name| value.as_table()?.get(name))
     }
 
     /// Returns all nodes upstream of the given ones, including themselves.

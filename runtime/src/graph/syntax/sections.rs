@@ -2,6 +2,7 @@
 
 use std::ops::Range;
 
+use super::allow::{ALLOW, Allowance, read_allow};
 use super::modes::{ModeBlock, read_mode};
 use super::policy::{AgeLimit, PolicyTable, WireTable};
 use super::read::{check_keys, read_table};
@@ -95,6 +96,7 @@ pub(crate) struct GraphDocument {
     pub(crate) policy: Option<(Value, Option<PolicyTable>)>,
     pub(crate) inputs: Vec<(Key, Spanned<String>)>,
     pub(crate) exports: Vec<(Key, Spanned<String>)>,
+    pub(crate) allow: Vec<Allowance>,
 }
 
 /// The sections of a bench file.
@@ -104,6 +106,7 @@ pub(crate) struct BenchDocument {
     pub(crate) bind: Vec<(Key, Spanned<String>)>,
     /// Whether limits may be in raw readings.
     pub(crate) allow_uncalibrated: bool,
+    pub(crate) allow: Vec<Allowance>,
 }
 
 /// Name of the section [limits] in `{ from = "limits.KEY" }`.
@@ -131,13 +134,14 @@ impl<'a> Sections<'a> {
     /// Returns all diagnostics.
     pub(crate) fn finish(self) -> Diagnostics {
         let mut diagnostics = self.diagnostics;
-        diagnostics.extend(self.reader.mistakes.into_iter().map(into_diagnostic));
+        let Reader { mistakes, warnings, .. } = self.reader;
+        diagnostics.extend(mistakes.into_iter().chain(warnings).map(into_diagnostic));
         diagnostics
     }
 
     /// Reads the sections of a graph file.
     pub(crate) fn graph(&mut self, root: &Table) -> GraphDocument {
-        const KEYS: [&str; 11] = [
+        const KEYS: [&str; 12] = [
             "graph",
             "roles",
             "parts",
@@ -148,6 +152,7 @@ impl<'a> Sections<'a> {
             "policy",
             "devices",
             "bind",
+            ALLOW,
             ALLOW_UNCALIBRATED,
         ];
         check_keys(root, &KEYS, "", &mut self.reader);
@@ -169,7 +174,8 @@ impl<'a> Sections<'a> {
         let modes = self.named_tables(root.get("modes")).into_iter();
         let modes = modes.map(|(key, table)| read_mode(key, table, &mut self.reader)).collect();
         let roles = self.names(root.get("roles"));
-        GraphDocument { graph, roles, commands, limits, modes, policy, ..self.body(root) }
+        let allow = read_allow(root.get(ALLOW), &mut self.reader);
+        GraphDocument { graph, roles, commands, limits, modes, policy, allow, ..self.body(root) }
     }
 
     /// Reads the sections of a part.
@@ -181,18 +187,19 @@ impl<'a> Sections<'a> {
 
     /// Reads the sections of a bench file.
     pub(crate) fn bench(&mut self, root: &Table) -> BenchDocument {
-        check_keys(root, &["devices", "bind", ALLOW_UNCALIBRATED], "", &mut self.reader);
-        self.own_bench(root)
+        check_keys(root, &["devices", "bind", ALLOW, ALLOW_UNCALIBRATED], "", &mut self.reader);
+        let allow = read_allow(root.get(ALLOW), &mut self.reader);
+        BenchDocument { allow, ..self.own_bench(root) }
     }
 
-    /// Reads the sections of a bench in a file that may have others.
+    /// Reads the sections of a bench in a file that may have others. Its [allow] belongs to the graph.
     pub(crate) fn own_bench(&mut self, root: &Table) -> BenchDocument {
         let devices = self.named_tables(root.get("devices"));
         let names = names_of(&devices);
         let devices = devices.into_iter().map(|(key, table)| self.block(key, table, &names)).collect();
         let allow_uncalibrated = root.get(ALLOW_UNCALIBRATED).and_then(|value| bool::read(value, &mut self.reader));
         let bind = self.words(root.get("bind"));
-        BenchDocument { devices, bind, allow_uncalibrated: allow_uncalibrated.unwrap_or(false) }
+        BenchDocument { devices, bind, allow_uncalibrated: allow_uncalibrated.unwrap_or(false), allow: Vec::new() }
     }
 
     fn body(&mut self, root: &Table) -> GraphDocument {

@@ -1,0 +1,84 @@
+//! Warns of modes that wait for a contact and do not move toward it.
+
+use std::ops::Range;
+
+use super::endings::needs_contact;
+use super::motion::find_generators;
+use crate::graph::net::Net;
+use crate::graph::plan::{Condition, PlannedExit, PlannedMode, Test};
+use crate::graph::syntax::{ExitKind, PortState};
+use crate::node::Motion;
+use crate::source::{Code, Diagnostic, Diagnostics, Value, quoted};
+
+/// Warns of each mode that begins without a contact and ends with one, and in which the sensor moves away or not at all.
+///
+/// `start` is the start mode. `motions` holds for each mode the motion that each node generates.
+pub(crate) fn check(
+    net: &Net<'_>,
+    modes: &[PlannedMode],
+    start: usize,
+    motions: &[Vec<Motion>],
+    diagnostics: &mut Diagnostics,
+) {
+    let generators = find_generators(net, &vec![false; net.wires.len()]);
+    for i in (0..modes.len()).filter(|i| is_approach(net, modes, start, *i)) {
+        let moving = generators.iter().copied().filter(|node| motions[i][*node] != Motion::Still);
+        let moving: Vec<usize> = moving.collect();
+        if moving.is_empty() && is_meant_to_move(net, &modes[i], i, (&generators, motions)) {
+            diagnostics.push(report(net, i, &generators, true));
+        } else if !moving.is_empty() && moving.iter().all(|node| motions[i][*node] == Motion::Retreat) {
+            diagnostics.push(report(net, i, &moving, false));
+        }
+    }
+}
+
+/// Returns whether a mode without a motion is meant to have one. A task may wait at rest until it is touched.
+fn is_meant_to_move(
+    net: &Net<'_>,
+    mode: &PlannedMode,
+    index: usize,
+    (generators, motions): (&[usize], &[Vec<Motion>]),
+) -> bool {
+    let is_bounded = mode.exits.iter().any(|exit| matches!(exit.condition, Condition::Travel(..)));
+    let is_set = || generators.iter().any(|node| net.setting(index, *node).is_some());
+    let never_moves = |node: &usize| motions.iter().all(|motions| motions[*node] == Motion::Still);
+    !generators.is_empty() && (is_bounded || is_set() || generators.iter().all(never_moves))
+}
+
+/// Returns whether a mode can begin without a contact, and only a contact leads on.
+fn is_approach(net: &Net<'_>, modes: &[PlannedMode], start: usize, mode: usize) -> bool {
+    let leads_in = |exit: &PlannedExit| exit.to == Some(mode) && !waits(net, exit);
+    let begins_without = mode == start || modes.iter().flat_map(|mode| &mode.exits).any(leads_in);
+    let mut ways =
+        modes[mode].exits.iter().filter(|exit| matches!(exit.kind, ExitKind::Go | ExitKind::Done)).peekable();
+    begins_without && ways.peek().is_some() && ways.all(|exit| waits(net, exit))
+}
+
+/// Returns whether an exit waits for a contact.
+fn waits(net: &Net<'_>, exit: &PlannedExit) -> bool {
+    let Condition::Port(watched, test) = &exit.condition else { return false };
+    let is_met_by_contact = match test {
+        Test::Is(state) => matches!(state, PortState::True | PortState::Present | PortState::New),
+        Test::Between { min, .. } => *min > 0.0,
+    };
+    is_met_by_contact && needs_contact(net, watched.source)
+}
+
+fn report(net: &Net<'_>, mode: usize, generators: &[usize], is_still: bool) -> Diagnostic {
+    let block = &net.flat.modes[mode];
+    let (name, names) = (&block.key.name, quoted(generators.iter().map(|node| &net.flat.nodes[*node].name)));
+    let message = match is_still {
+        true => format!("mode `{name}` waits for a contact, but {names} does not move the sensor"),
+        false => {
+            format!("mode `{name}` waits for a contact, but {names} moves the sensor away from the object, along -z")
+        }
+    };
+    let place = generators.iter().find_map(|node| net.setting(mode, *node)).and_then(first_place);
+    let help = format!("let {names} move along +z of the sensor in this mode, which points toward the object");
+    Diagnostic::new(Code::NoApproach, place.unwrap_or_else(|| block.key.span.clone()), message).help(help)
+}
+
+/// Returns the place of the first parameter in a table.
+fn first_place(settings: &Value) -> Option<Range<usize>> {
+    settings.as_table()?.entries.first().map(|(_, value)| value.span.clone())
+}
