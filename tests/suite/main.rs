@@ -45,3 +45,4 @@ mod touch;
 mod udp_pad;
 mod verify;
 mod view;
+mod warnings;

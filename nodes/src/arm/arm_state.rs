@@ -139,6 +139,23 @@ mod tests {
     }
 
     #[test]
+    fn the_pose_has_the_start_of_the_arm() {
+        let params = format!("urdf = '{URDF}'\nsensor = 'pad'\ntip = 'lwr_7_link'\nmount = {{ xyz = [0, 0, 0.1215] }}");
+        let start_of = |starts: [Option<f64>; 7]| {
+            let mut shape = wire(&NAMES);
+            shape.joints.iter_mut().zip(starts).for_each(|(joint, start)| joint.start = start);
+            let rig = NodeRig::new::<ArmState>(&params, &[("position", shape.into())]).unwrap();
+            let Shape::Pose(pose) = rig.shape("sensor_pose").clone() else { panic!("a pose") };
+            pose.start
+        };
+        let start = start_of([Some(0.0); 7]).expect("every joint has a start");
+        assert!((nalgebra::Vector3::from(start) - nalgebra::Vector3::new(0.0, 0.0, 1.3)).norm() < 1e-12, "{start:?}");
+        let mut unknown = [Some(0.0); 7];
+        unknown[3] = None;
+        assert_eq!(start_of(unknown), None);
+    }
+
+    #[test]
     fn joints_other_than_those_of_the_model_are_a_mistake() {
         let mut swapped = NAMES;
         swapped.swap(0, 1);

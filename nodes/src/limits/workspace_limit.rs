@@ -101,8 +101,10 @@ impl Node for WorkspaceLimit {
             let message = format!("the box is empty along {axis}: from {min} to {max} m");
             return Err(Mistake::param("max_m", message).help("make each entry greater than that of `min_m`").into());
         }
-        let start = setup.inputs.pose.start;
-        setup.warnings.extend(start.and_then(|start| start_outside(&start, [&params.min_m, &params.max_m])));
+        if let Some(start) = &setup.inputs.pose.start {
+            setup.warnings.extend(start_outside(start, "min_m", &params.min_m, -1.0));
+            setup.warnings.extend(start_outside(start, "max_m", &params.max_m, 1.0));
+        }
         setup.outputs.workspace = fraction();
         let max_age = max_age(params.max_age_ms, setup.period);
         Ok(Self { params, max_age })
@@ -121,18 +123,23 @@ impl Node for WorkspaceLimit {
     }
 }
 
-/// Returns the warning about a sensor that starts outside the box, from which only motion toward the box is free.
-fn start_outside(start: &[f64; 3], [min, max]: [&[f64; 3]; 2]) -> Option<Mistake> {
-    let axis = (0..3).find(|axis| !(min[*axis]..=max[*axis]).contains(&start[*axis]))?;
-    let (param, end, side) = if start[axis] < min[axis] { ("min_m", min, "less") } else { ("max_m", max, "more") };
-    let (name, at) = (["x", "y", "z"][axis], start.map(|value| (value * 1e3).round() / 1e3));
+/// Returns the warning about a sensor that starts beyond a corner of the box, from which only the way back is free.
+///
+/// `sign` is -1 for the corner with the smallest coordinates, and 1 for the other one.
+fn start_outside(start: &[f64; 3], param: &str, corner: &[f64; 3], sign: f64) -> Option<Mistake> {
+    let is_beyond = |axis: usize| sign * (start[axis] - corner[axis]) > 0.0;
+    let axis = (0..3).find(|axis| is_beyond(*axis))?;
+    let (name, side) = (["x", "y", "z"][axis], if sign < 0.0 { "less" } else { "greater" });
+    let at = start.map(|value| (value * 1e3).round() / 1e3);
     let message = format!(
         "the sensor starts outside the workspace, at {at:?} m: its {name} is {side} than {} m, so only motion toward the \
          box is free",
-        end[axis]
+        corner[axis]
     );
-    let help =
-        format!("extend the box to {name} = {} m, or change the start or the mount of the arm in the bench", at[axis]);
+    // A few centimetres of room, so that the sensor can move there.
+    let room = |axis: usize| ((start[axis] + sign * 0.05) * 100.0).round() / 100.0;
+    let wider = [0, 1, 2].map(|axis| if is_beyond(axis) { room(axis) } else { corner[axis] });
+    let help = format!("write `{wider:?}`, or change the start or the mount of the arm in the bench");
     Some(Mistake::new(Code::StartOutside, At::Param(param.into()), message).help(help))
 }
 

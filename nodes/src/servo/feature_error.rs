@@ -10,7 +10,7 @@ use tactflow_runtime::signal::{Feature, Features, FeaturesShape, Scalar, ScalarS
 use tactflow_runtime::source::Code;
 
 use crate::motion::axis::wrap_axial;
-use crate::motion::usual::{USUAL_FORCE_N, USUAL_PRESSURE_N, USUAL_RAD};
+use crate::motion::usual::{USUAL_FORCE_N, USUAL_PRESSURE_N, USUAL_RAD, unusual};
 
 /// Computes the error of every feature: setpoint minus measurement.
 ///
@@ -92,8 +92,10 @@ impl Node for FeatureError {
             value: *value,
             is_axial: shape.unit.is_axial(),
         };
-        let unusual = values.iter().zip(wires).filter_map(|(value, (name, shape))| unusual(**value, name, shape));
-        setup.warnings.extend(unusual);
+        let warnings = values.iter().zip(wires).filter_map(|(value, (name, shape))| {
+            unusual(&format!("setpoint.{name}"), **value, usual(shape), shape.unit)
+        });
+        setup.warnings.extend(warnings);
         let setpoints = values.into_iter().zip(wires).map(setpoint).collect();
         let feature = |(name, shape): &(String, ScalarShape)| Feature { name: name.clone(), unit: shape.unit };
         setup.outputs.error = FeaturesShape { features: wires.iter().map(feature).collect() };
@@ -124,25 +126,15 @@ impl Setpoint {
     }
 }
 
-/// Returns the warning about a setpoint that its feature never has.
-fn unusual(setpoint: f64, feature: &str, shape: &ScalarShape) -> Option<Mistake> {
-    let unit = shape.unit;
-    let [min, max] = match shape.range {
-        _ if unit.is_axial() => [-USUAL_RAD, USUAL_RAD],
+/// Returns the range of the setpoints that a feature can have; infinite if it is unknown.
+fn usual(shape: &ScalarShape) -> [f64; 2] {
+    match shape.range {
+        _ if shape.unit.is_axial() => [-USUAL_RAD, USUAL_RAD],
         range if range.iter().all(|end| end.is_finite()) => range,
-        _ if unit == Unit::NEWTON.per_tactel() => [0.0, USUAL_PRESSURE_N],
-        _ if unit == Unit::NEWTON => [0.0, USUAL_FORCE_N],
+        _ if shape.unit == Unit::NEWTON.per_tactel() => [0.0, USUAL_PRESSURE_N],
+        _ if shape.unit == Unit::NEWTON => [0.0, USUAL_FORCE_N],
         range => range,
-    };
-    let round = |end: f64| (end * 1e4).round() / 1e4;
-    let message = format!(
-        "the setpoint of `{feature}` is {setpoint} {unit}, but `{feature}` is {} to {} {unit}",
-        round(min),
-        round(max)
-    );
-    let help = format!("write a setpoint in {unit} that is in this range");
-    let warning = Mistake::new(Code::UnusualValue, At::Param(format!("setpoint.{feature}")), message).help(help);
-    (!(min..=max).contains(&setpoint)).then_some(warning)
+    }
 }
 
 /// Returns the index in `names` of each name in `required`.

@@ -3,10 +3,10 @@
 use tactflow_runtime::node::{
     At, Describe, In, Inputs, Mistake, Mistakes, Motion, Node, Out, Outputs, Param, Setup, Tick,
 };
-use tactflow_runtime::signal::{Flag, Twist};
+use tactflow_runtime::signal::{Flag, Twist, Unit};
 use tactflow_runtime::source::Code;
 
-use crate::motion::usual::{USUAL_M_PER_S, USUAL_RAD_PER_S};
+use crate::motion::usual::{USUAL_M_PER_S, USUAL_RAD_PER_S, from_smaller_unit};
 
 /// A constant motion, to approach an object or to guide along it.
 ///
@@ -70,9 +70,7 @@ impl Node for TwistSource {
     fn new(params: Params, setup: &mut Setup<Self>) -> Result<Self, Mistakes> {
         let (twist, is_gated) = (Twist(params.twist.into()), setup.inputs.gate.is_some());
         setup.motion = motion(&twist, params.frame.as_deref());
-        if let Some(warning) = unusual(&twist) {
-            setup.warn(warning);
-        }
+        setup.warnings.extend(unusual(&twist));
         Ok(Self { twist, is_still: setup.motion == Motion::Still, is_gated })
     }
 
@@ -96,10 +94,21 @@ fn motion(twist: &Twist, frame: Option<&str>) -> Motion {
 
 /// Returns the warning about a motion that is far beyond what an arm can do.
 fn unusual(twist: &Twist) -> Option<Mistake> {
-    let parts = [(twist.linear(), USUAL_M_PER_S, "m/s", "mm/s"), (twist.angular(), USUAL_RAD_PER_S, "rad/s", "deg/s")];
-    let (part, max, unit, other) = parts.into_iter().find(|(part, max, ..)| part.amax() > *max)?;
-    let message = format!("`twist` has {} {unit}, but usual is at most {max} {unit}", part.amax());
-    let help = format!("write the motion in {unit}, not in {other}");
+    let (linear, angular) = (twist.linear().amax() > USUAL_M_PER_S, twist.angular().amax() > USUAL_RAD_PER_S);
+    let (speed, max, unit, other) = match (linear, angular) {
+        (false, false) => return None,
+        (true, _) => (twist.linear().amax(), USUAL_M_PER_S, "m/s", "mm/s"),
+        (false, true) => (twist.angular().amax(), USUAL_RAD_PER_S, "rad/s", "deg/s"),
+    };
+    let message = format!("`twist` has {speed} {unit}, but usual is at most {max} {unit}");
+    let part = |is_small: bool, unit: Unit| {
+        move |number: f64| match is_small {
+            true => from_smaller_unit(number, unit).map_or(number, |(number, _)| number),
+            false => number,
+        }
+    };
+    let (v, w) = (twist.linear().map(part(linear, Unit::METRE)), twist.angular().map(part(angular, Unit::RADIAN)));
+    let help = format!("if it is in {other}, write `[{}, {}, {}, {}, {}, {}]`", v.x, v.y, v.z, w.x, w.y, w.z);
     Some(Mistake::new(Code::UnusualValue, At::Param("twist".into()), message).help(help))
 }
 
@@ -170,5 +179,34 @@ mod tests {
         ] {
             assert_eq!(places(bad, &NodeRig::new::<TwistSource>(bad, &[])), [place], "{bad}");
         }
+    }
+
+    #[test]
+    fn a_motion_away_from_the_object_is_told_apart() {
+        let cases = [
+            ([0.0; 6], None, Motion::Still),
+            ([0.0, 0.0, 0.015, 0.0, 0.0, 0.0], None, Motion::Any),
+            ([0.0, 0.0, -0.015, 0.0, 0.0, 0.0], None, Motion::Retreat),
+            ([0.0, 0.0, -0.015, 0.0, 0.0, 0.0], Some("pad"), Motion::Retreat),
+            ([0.0, 0.0, -0.015, 0.0, 0.0, 0.0], Some("base"), Motion::Any),
+            ([0.0, 0.0, -0.015, 0.0, 0.0, 0.0], Some("arm2.base"), Motion::Any),
+            ([0.01, 0.0, -0.002, 0.0, 0.0, 0.0], None, Motion::Any),
+            ([0.0, 0.0, 0.0, 0.0, 0.0, 0.1], None, Motion::Any),
+        ];
+        for (twist, frame, expected) in cases {
+            assert_eq!(motion(&Twist(twist.into()), frame), expected, "{twist:?} in {frame:?}");
+        }
+    }
+
+    #[test]
+    fn a_motion_in_another_unit_is_warned_of() {
+        let warnings = |twist: &str| {
+            let params = format!("twist = {twist}");
+            places(&params, &NodeRig::new::<TwistSource>(&params, &[]))
+        };
+        for twist in ["[0, 0, 15, 0, 0, 0]", "[0, 0, 0.015, 0, 0, 20]"] {
+            assert_eq!(warnings(twist), ["unusual-value: `twist`"], "{twist}");
+        }
+        assert!(warnings("[0.1, 0, 0.05, 0, 0, -1]").is_empty());
     }
 }

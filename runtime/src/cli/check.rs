@@ -47,7 +47,7 @@ pub(crate) fn check(args: CheckArgs, shell: &Shell) -> u8 {
                 ));
                 continue;
             }
-            true => check_scenario(path, shell),
+            true => check_scenario(path, &args, shell),
             false => check_graph(path, &args, shell),
         };
         if args.format == OutputFormat::Text {
@@ -92,12 +92,14 @@ fn allowed_json<S: Serializer>(allowed: &[AllowedWarning], serializer: S) -> Res
 }
 
 /// Checks a scenario with its graph and its bench.
-fn check_scenario(path: &Path, shell: &Shell) -> Checked {
+fn check_scenario(path: &Path, args: &CheckArgs, shell: &Shell) -> Checked {
     match Scenario::load(shell.catalogue(), path) {
         Ok(scenario) => {
             let (runs, length) = (count_of(scenario.runs().len(), "run"), scenario.for_s);
             let summary = format!("a scenario of {runs}, {length} s each; run it with `tactflow verify`");
-            Checked { ok: true, summary, ..Checked::of(path, None) }
+            let report = scenario.warnings().cloned();
+            let ok = report.is_none() || !args.deny_warnings;
+            Checked { ok, summary, ..Checked::of(path, report) }
         }
         Err(report) => Checked::of(path, Some(report)),
     }

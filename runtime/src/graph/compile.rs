@@ -70,6 +70,9 @@ pub(crate) fn compile_in(mut loader: Loader, catalogue: &Catalogue, request: &Re
     let outline = outline.build();
     let watching = modes.as_ref().map_or(&[][..], |modes| &modes.modes);
     check::unused::check(&net, watching, view.sources(), &mut warnings);
+    warnings.sort_by_key(|warning| (warning.span.start, warning.code));
+    // Several nodes may read the same number of [limits].
+    warnings.dedup();
     let allowed = check::allow::silence(&flat, &mut warnings);
     let view = view.plan(&net, &nodes, &ports);
     let reset_after = flat.table.as_ref().map_or(0, |table| (table.reset_after_ms * 1e6) as i64);
@@ -91,7 +94,7 @@ fn check_modes(net: &Net<'_>, built: BuiltModes, period: f64, diagnostics: &mut 
     check::absent::check(net, &modes, &demand, &freezes, diagnostics);
     check::overlap::check(net, &modes, diagnostics);
     check::motion::check(net, &modes, &motions, diagnostics);
-    check::late::check(&modes, diagnostics);
+    check::late::check(&modes, period, diagnostics);
     check::immediate::check(net, &modes, period, diagnostics);
     let start = check::reachability::check(net, diagnostics)?;
     check::approach::check(net, &modes, start, &motions, diagnostics);

@@ -156,13 +156,7 @@ pub struct Setup<N: Node> {
     /// Set by a limiter whose limits are in raw readings, so that nothing is limited in newtons. The bench must allow
     /// it.
     pub is_uncalibrated: bool,
-    /// The warnings: values that are valid, but probably a mistake.
+    /// Warnings, which the node adds: what is valid, but probably a mistake. Each code has the severity of a warning,
+    /// so that the graph still loads.
     pub warnings: Mistakes,
-}
-
-impl<N: Node> Setup<N> {
-    /// Adds a warning. Its code has the severity of a warning, so that the graph still loads.
-    pub fn warn(&mut self, warning: Mistake) {
-        self.warnings.push(warning);
-    }
 }

@@ -40,7 +40,7 @@ impl Usual {
         let message = format!("`{name}` is {number} {unit}, but usual is {}", in_words(&range, &unit));
         let help = match converted(number, &unit).filter(|(number, _)| range.contains(*number)) {
             Some((converted, other)) => {
-                format!("if {number} is in {other}, write `{converted}`, because `{name}` is in {unit}")
+                format!("if {number} is in {other}, write `{converted}`")
             }
             None => format!("write a number that is {}", in_words(&range, &unit)),
         };
@@ -88,34 +88,16 @@ mod tests {
     fn an_unusual_number_is_named_with_its_unit_and_converted() {
         let (to, between) = (|max| Some(Bounds::between(f64::NEG_INFINITY, max)), Some(Bounds::between(-10.0, 10.0)));
         let cases = [
-            (
-                "m/s",
-                to(3.0),
-                50.0,
-                "`x` is 50 m/s, but usual is at most 3 m/s",
-                "if 50 is in mm/s, write `0.05`, because `x` is in m/s",
-            ),
+            ("m/s", to(3.0), 50.0, "`x` is 50 m/s, but usual is at most 3 m/s", "if 50 is in mm/s, write `0.05`"),
             (
                 "rad/s2",
                 to(100.0),
                 570.0,
                 "`x` is 570 rad/s², but usual is at most 100 rad/s²",
-                "if 570 is in deg/s², write `9.948377`, because `x` is in rad/s²",
+                "if 570 is in deg/s², write `9.948377`",
             ),
-            (
-                "N",
-                to(1000.0),
-                15000.0,
-                "`x` is 15000 N, but usual is at most 1000 N",
-                "if 15000 is in mN, write `15`, because `x` is in N",
-            ),
-            (
-                "m",
-                between,
-                -800.0,
-                "`x` is -800 m, but usual is -10 to 10 m",
-                "if -800 is in mm, write `-0.8`, because `x` is in m",
-            ),
+            ("N", to(1000.0), 15000.0, "`x` is 15000 N, but usual is at most 1000 N", "if 15000 is in mN, write `15`"),
+            ("m", between, -800.0, "`x` is -800 m, but usual is -10 to 10 m", "if -800 is in mm, write `-0.8`"),
             ("K", between, 11.0, "`x` is 11 K, but usual is -10 to 10 K", "write a number that is -10 to 10 K"),
         ];
         for (unit, range, number, message, help) in cases {

@@ -20,6 +20,7 @@ fn arm(accelerations: &[f64]) -> JointsShape {
         upper: 0.8,
         speed: 1.5 + i as f64,
         acceleration: *acceleration,
+        start: None,
     };
     JointsShape { joints: accelerations.iter().enumerate().map(joint).collect(), unit: Unit::RADIAN }
 }

@@ -9,13 +9,10 @@ mod otsu;
 mod pack;
 mod rule;
 
-use tactflow_runtime::node::{
-    At, Describe, In, Inputs, Mistake, Mistakes, Node, Out, Outputs, Param, Setup, State, Tick,
-};
-use tactflow_runtime::signal::{Image, Mask, Unit};
-use tactflow_runtime::source::Code;
+use tactflow_runtime::node::{Describe, In, Inputs, Mistakes, Node, Out, Outputs, Param, Setup, State, Tick};
+use tactflow_runtime::signal::{Image, Mask};
 
-use crate::motion::usual::USUAL_THRESHOLD_N;
+use crate::motion::usual::{USUAL_THRESHOLD_N, unusual_force};
 
 pub use otsu::otsu;
 pub use pack::binarize;
@@ -113,7 +110,8 @@ impl Node for Binarize {
 
     fn new(params: Params, setup: &mut Setup<Self>) -> Result<Self, Mistakes> {
         setup.outputs.mask = (&setup.inputs.image).into();
-        setup.warnings.extend(unusual(params.threshold, setup.inputs.image.unit));
+        let unit = setup.inputs.image.unit;
+        setup.warnings.extend(unusual_force("threshold", params.threshold, USUAL_THRESHOLD_N, unit));
         let grid = &setup.outputs.mask;
         Ok(Self { rule: rule(&params)?, words: grid.rows * grid.cols.div_ceil(64) })
     }
@@ -142,14 +140,6 @@ impl Node for Binarize {
             }
         }
     }
-}
-
-/// Returns the warning about a threshold that hardly any contact reaches.
-fn unusual(threshold: f64, unit: Unit) -> Option<Mistake> {
-    let message = format!("`threshold` is {threshold} N, but usual is at most {USUAL_THRESHOLD_N} N");
-    let help = format!("if {threshold} is in mN, write `{}`, because the image is in N", threshold * 1e-3);
-    let warning = Mistake::new(Code::UnusualValue, At::Param("threshold".into()), message).help(help);
-    (unit == Unit::NEWTON && threshold > USUAL_THRESHOLD_N).then_some(warning)
 }
 
 #[cfg(test)]

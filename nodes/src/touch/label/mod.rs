@@ -10,6 +10,7 @@ use tactflow_runtime::node::{
 };
 use tactflow_runtime::signal::{Flag, Grid, Image, Mask, Region, Regions, RegionsShape, Run};
 
+use crate::motion::usual::{USUAL_CONTACT_N, unusual_force};
 use crate::touch::common::check_same_array;
 use neighbours::Neighbours;
 
@@ -133,6 +134,7 @@ impl Node for Label {
             return Err(Mistake::input("mask", message).help("use a pad with fewer tactels").into());
         }
         let reach = u32::from(params.neighbours == Neighbours::EIGHT);
+        setup.warnings.extend(unusual_force("min_force", params.min_force, USUAL_CONTACT_N, image.unit));
         let grid = mask.clone();
         setup.outputs.regions = RegionsShape { grid: grid.clone(), unit: image.unit };
         setup.outputs.region = grid.clone();

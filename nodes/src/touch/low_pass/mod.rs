@@ -80,7 +80,9 @@ impl Node for LowPass {
                         time * 1e3
                     );
                     let help = format!("write less than {:.0} Hz, or remove the filter", 0.5 / (PI * setup.period));
-                    setup.warn(Mistake::new(Code::ShortTime, At::Param("cutoff_hz".into()), message).help(help));
+                    setup
+                        .warnings
+                        .push(Mistake::new(Code::ShortTime, At::Param("cutoff_hz".into()), message).help(help));
                 }
                 Ok(Self { time, averaging })
             }

@@ -9,7 +9,9 @@ use crate::graph::check::units::{UnitMismatch, Units};
 use crate::graph::net::{CommandWire, Net, WireOrigin};
 use crate::graph::plan::{PlannedCommand, PlannedNode, PlannedPort, PlannedRole, PlannedWire, PortRef, Producer};
 use crate::graph::syntax::{AgeLimit, LIMITS, Policy, PolicyTable, default_max_age_ns};
-use crate::node::{At, Built, Configured, Given, Motion, Need, NodeSpec, PortSpec, Reader, frame_args};
+use crate::node::{
+    At, Built, Configured, Given, Mistake, Mistakes, Motion, Need, NodeSpec, PortSpec, Reader, frame_args,
+};
 use crate::signal::{FlagShape, Joint, Kind, Shape};
 use crate::source::{Code, Diagnostic, Diagnostics, Key, SourceMap, Value};
 
@@ -202,13 +204,26 @@ impl Builder<'_> {
         let Reader { mistakes, warnings, .. } = reader;
         let is_valid = mistakes.is_empty();
         place_mistakes(mistakes, &params, &[], &mut self.sources, &mut self.diagnostics);
-        // A fact has its warnings in the bench, if it was written there.
-        let facts = written.facts().into_iter().filter(|fact| fact.word.split('.').next() != Some(LIMITS));
-        let facts: Vec<Range<usize>> = facts.map(|fact| fact.place.clone()).collect();
-        let is_fact = |at: &At| matches!(at, At::Span(span) if facts.iter().any(|fact| span.contains(&fact.start)));
-        let warnings = warnings.into_iter().filter(|warning| !is_fact(&warning.at)).collect();
+        let warnings = self.warnings_of_written(warnings, written);
         place_mistakes(warnings, &params, &[], &mut self.sources, &mut self.diagnostics);
         (configured.filter(|_| is_valid), params)
+    }
+
+    /// Returns the warnings about numbers that the graph contains, under their name there. A fact has its warnings in
+    /// the bench.
+    fn warnings_of_written(&self, warnings: Mistakes, written: &Value) -> Mistakes {
+        let facts = written.facts().into_iter().filter(|fact| fact.word.split('.').next() != Some(LIMITS));
+        let facts: Vec<Range<usize>> = facts.map(|fact| fact.place.clone()).collect();
+        let limits = || self.net.flat.limits.iter().flat_map(|(_, table)| &table.entries);
+        let name = |mut warning: Mistake| {
+            let At::Span(span) = &warning.at else { return Some(warning) };
+            let limit = limits().find(|(_, value)| value.span.start <= span.start && span.end <= value.span.end);
+            if let (Some((key, _)), Some((_, rest))) = (limit, warning.message[1..].split_once('`')) {
+                warning.message = format!("`{}`{rest}", key.name);
+            }
+            facts.iter().all(|fact| !span.contains(&fact.start)).then_some(warning)
+        };
+        warnings.into_iter().filter_map(name).collect()
     }
 
     /// Builds a node from its parameters and the shapes on its wires, or reports its mistakes.

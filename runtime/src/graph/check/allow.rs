@@ -15,7 +15,7 @@ pub(crate) fn silence(flat: &FlatGraph, warnings: &mut Diagnostics) -> Vec<Allow
         warnings.retain(|warning| warning.code != entry.code);
         match before - warnings.len() {
             0 if is_own => {
-                let message = format!("the graph has no warning `{}` that could be allowed", entry.key.name);
+                let message = format!("the graph has no warning `{}` to allow", entry.key.name);
                 warnings
                     .push(Diagnostic::new(Code::UnusedAllow, entry.key.span.clone(), message).help("remove the line"));
             }

@@ -21,28 +21,19 @@ pub(crate) fn check(
     diagnostics: &mut Diagnostics,
 ) {
     let generators = find_generators(net, &vec![false; net.wires.len()]);
+    let is_still = |motions: &Vec<Motion>| -> Vec<bool> { motions.iter().map(|one| *one == Motion::Still).collect() };
+    let moving: Vec<Vec<usize>> = motions.iter().map(|all| find_generators(net, &is_still(all))).collect();
     for i in (0..modes.len()).filter(|i| is_approach(net, modes, start, *i)) {
-        let moving = generators.iter().copied().filter(|node| motions[i][*node] != Motion::Still);
-        let moving: Vec<usize> = moving.collect();
-        if moving.is_empty() && is_meant_to_move(net, &modes[i], i, (&generators, motions)) {
+        let is_bounded = modes[i].exits.iter().any(|exit| matches!(exit.condition, Condition::Travel(..)));
+        let is_set = generators.iter().any(|node| net.setting(i, *node).is_some());
+        // A task may wait at rest until it is touched, and move in other modes.
+        let is_meant_to_move = is_bounded || is_set || moving.iter().all(Vec::is_empty);
+        if moving[i].is_empty() && is_meant_to_move && !generators.is_empty() {
             diagnostics.push(report(net, i, &generators, true));
-        } else if !moving.is_empty() && moving.iter().all(|node| motions[i][*node] == Motion::Retreat) {
-            diagnostics.push(report(net, i, &moving, false));
+        } else if !moving[i].is_empty() && moving[i].iter().all(|node| motions[i][*node] == Motion::Retreat) {
+            diagnostics.push(report(net, i, &moving[i], false));
         }
     }
-}
-
-/// Returns whether a mode without a motion is meant to have one. A task may wait at rest until it is touched.
-fn is_meant_to_move(
-    net: &Net<'_>,
-    mode: &PlannedMode,
-    index: usize,
-    (generators, motions): (&[usize], &[Vec<Motion>]),
-) -> bool {
-    let is_bounded = mode.exits.iter().any(|exit| matches!(exit.condition, Condition::Travel(..)));
-    let is_set = || generators.iter().any(|node| net.setting(index, *node).is_some());
-    let never_moves = |node: &usize| motions.iter().all(|motions| motions[*node] == Motion::Still);
-    !generators.is_empty() && (is_bounded || is_set() || generators.iter().all(never_moves))
 }
 
 /// Returns whether a mode can begin without a contact, and only a contact leads on.

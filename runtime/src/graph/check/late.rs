@@ -7,11 +7,15 @@ use crate::graph::syntax::ExitKind;
 use crate::source::{Code, Diagnostic, Diagnostics};
 
 /// Warns of each `go` and `done` that another exit of its mode always precedes. A late `fail` is a second bound.
-pub(crate) fn check(modes: &[PlannedMode], diagnostics: &mut Diagnostics) {
+///
+/// A bound that is shorter than the `period` of the graph [s] has its own warning.
+pub(crate) fn check(modes: &[PlannedMode], period: f64, diagnostics: &mut Diagnostics) {
+    let is_short =
+        |exit: &PlannedExit| matches!(exit.condition, Condition::Elapsed(time) if (time as f64) < period * 1e9);
     for mode in modes {
         let late = mode.exits.iter().enumerate().filter(|(_, exit)| matches!(exit.kind, ExitKind::Go | ExitKind::Done));
         for (i, exit) in late {
-            let mut others = mode.exits.iter().enumerate().filter(|(other, _)| *other != i);
+            let mut others = mode.exits.iter().enumerate().filter(|(other, first)| *other != i && !is_short(first));
             let first = others.find(|(other, first)| precedes((*other, first), (i, exit)));
             let Some((_, first)) = first else { continue };
             diagnostics.push(report(mode, first, exit));
@@ -44,18 +48,19 @@ const fn earliest(exit: &PlannedExit) -> Option<i64> {
 }
 
 fn report(mode: &PlannedMode, first: &PlannedExit, exit: &PlannedExit) -> Diagnostic {
-    let (key, name) = (exit.kind.key(), &mode.name);
+    let (key, name, kind) = (exit.kind.key(), &mode.name, first.kind.key());
     let lasts = match exit.lasts {
         0 => String::new(),
         lasts => format!(" for {} ms", lasts as f64 * 1e-6),
     };
     let message = format!(
-        "mode `{name}` never takes this `{key}`: `{}` comes first, when {}, but `{key}` needs that {}{lasts}",
-        first.kind.key(),
-        first.text,
-        exit.text
+        "mode `{name}` never takes `{key}` when {}{lasts}: `{kind}` comes first, when {}",
+        exit.text, first.text
     );
-    let bound = if matches!(first.condition, Condition::Travel(..)) { "after_travel_mm" } else { "after_ms" };
-    let help = format!("increase `{bound}` of `{}` above that of `{key}`, or remove one of the two", first.kind.key());
+    let later = match exit.condition {
+        Condition::Travel(_, way) => format!("after_travel_mm = {:.0}", way * 2e3),
+        _ => format!("after_ms = {:.0}", earliest(exit).map_or(0.0, |time| time as f64 * 2e-6)),
+    };
+    let help = format!("let `{kind}` come later, for example `{later}`, or remove one of the two");
     Diagnostic::new(Code::LateExit, first.span.clone(), message).note(exit.span.clone(), "never taken").help(help)
 }
