@@ -105,4 +105,11 @@ fn a_mode_that_waits_at_rest_is_no_approach() {
     let lost = "modes.servo.on_lost={ of = \"touch.present\", after_ms = 100, to = \"approach\" }";
     let moved = "modes.approach.go={ to = \"servo\", when = \"touch.present\", for_ms = 40 }";
     assert_eq!(codes(hybrid(&[wait[0], wait[1], lost, moved]).warnings().as_ref()), none, "`wait` is at rest");
+    let settled = [
+        "modes.approach.go={ to = \"settle\", when = \"touch.present\", for_ms = 40 }",
+        "modes.settle.go={ to = \"servo\", after_ms = 500 }",
+        "modes.servo.set.reach.twist=[0, 0, 0, 0, 0, 0]",
+        "modes.servo.done={ when = \"touch.pressure\", above = 0.12, for_ms = 500 }",
+    ];
+    assert_eq!(codes(hybrid(&settled).warnings().as_ref()), none, "`servo` begins with the contact of `settle`");
 }

@@ -3,7 +3,7 @@
 use nalgebra::{IsometryMatrix3, Matrix3, Rotation3, Translation3};
 use tactflow_runtime::node::Param;
 
-use crate::motion::usual::{USUAL_LENGTH_M, USUAL_RAD};
+use crate::usual::{USUAL_LENGTH_M, USUAL_RAD};
 
 /// Where the sensor's frame is in the frame of the tip.
 #[derive(Debug, Clone, Param)]

@@ -9,7 +9,7 @@ use tactflow_runtime::signal::{Scalar, Twist};
 
 use super::{Inputs, fraction, max_age};
 use crate::motion::bounds::{approach_twist, countable};
-use crate::motion::usual::{USUAL_M_PER_S2, USUAL_RAD_PER_S2};
+use crate::usual::{USUAL_M_PER_S2, USUAL_RAD_PER_S2};
 
 /// Limits the acceleration of the sensor, and brings it to rest when there is no motion to follow.
 ///

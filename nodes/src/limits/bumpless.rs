@@ -10,7 +10,7 @@ use tactflow_runtime::signal::{Scalar, Twist};
 
 use super::{Inputs, fraction};
 use crate::motion::bounds::{countable, scale_twist, twist_ratio};
-use crate::motion::usual::{USUAL_M_PER_S, USUAL_M_PER_S2, USUAL_RAD_PER_S, USUAL_RAD_PER_S2};
+use crate::usual::{USUAL_M_PER_S, USUAL_M_PER_S2, USUAL_RAD_PER_S, USUAL_RAD_PER_S2};
 
 /// Removes the jumps of a motion, as when the mode changes or a contact begins or ends (bumpless transfer).
 ///

@@ -5,7 +5,7 @@ use tactflow_runtime::signal::{Scalar, Twist};
 
 use super::fraction;
 use crate::motion::bounds::scale_twist;
-use crate::motion::usual::{USUAL_M_PER_S, USUAL_RAD_PER_S};
+use crate::usual::{USUAL_M_PER_S, USUAL_RAD_PER_S};
 
 /// Limits the speed of the sensor and keeps the direction of its motion.
 ///

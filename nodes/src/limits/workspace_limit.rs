@@ -14,7 +14,7 @@ use tactflow_runtime::source::Code;
 use super::{fraction, max_age};
 use crate::motion::bounds::{countable, scale_within};
 use crate::motion::braking::stopping_speed;
-use crate::motion::usual::{USUAL_M_PER_S2, USUAL_REACH_M};
+use crate::usual::{USUAL_M_PER_S2, USUAL_REACH_M};
 
 /// Keeps the sensor in a box of the workspace, with room to brake.
 ///

@@ -10,7 +10,7 @@ use tactflow_runtime::signal::{Feature, Features, FeaturesShape, Scalar, ScalarS
 use tactflow_runtime::source::Code;
 
 use crate::motion::axis::wrap_axial;
-use crate::motion::usual::{USUAL_FORCE_N, USUAL_PRESSURE_N, USUAL_RAD, unusual};
+use crate::usual::{USUAL_FORCE_N, USUAL_PRESSURE_N, USUAL_RAD, unusual};
 
 /// Computes the error of every feature: setpoint minus measurement.
 ///

@@ -6,7 +6,7 @@ use tactflow_runtime::node::{
 use tactflow_runtime::signal::{Flag, Twist, Unit};
 use tactflow_runtime::source::Code;
 
-use crate::motion::usual::{USUAL_M_PER_S, USUAL_RAD_PER_S, from_smaller_unit};
+use crate::usual::{USUAL_M_PER_S, USUAL_RAD_PER_S, from_smaller_unit};
 
 /// A constant motion, to approach an object or to guide along it.
 ///

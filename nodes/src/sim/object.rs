@@ -7,7 +7,7 @@ use tactflow_runtime::signal::Pose;
 
 use super::shape::{Geometry, pose3};
 use crate::arm::mount::pose_of;
-use crate::motion::usual::{USUAL_RAD, USUAL_REACH_M};
+use crate::usual::{USUAL_RAD, USUAL_REACH_M};
 
 /// Shape of an object.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Param)]

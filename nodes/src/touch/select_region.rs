@@ -7,7 +7,7 @@ use tactflow_runtime::signal::{Flag, Grid, Mask, Regions};
 use tactflow_runtime::source::Code;
 
 use super::label::{centroid_buffer, centroids, distance_squared, paint, ranked};
-use crate::motion::usual::{USUAL_CONTACT_N, unusual_force};
+use crate::usual::{USUAL_CONTACT_N, unusual_force};
 
 /// Selects one of several contacts: the n-th largest, strongest, or nearest to a point.
 ///

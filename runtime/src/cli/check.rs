@@ -55,7 +55,7 @@ pub(crate) fn check(args: CheckArgs, shell: &Shell) -> u8 {
             if checked.ok {
                 shell.say(&format!("{}: ok, {}", checked.graph, checked.summary));
             }
-            checked.allowed.iter().for_each(|warning| shell.say(&allowed(warning)));
+            checked.allowed.iter().for_each(|warning| shell.say(&warning.to_string()));
         }
         results.push(checked);
     }
@@ -79,11 +79,6 @@ fn check_graph(path: &Path, args: &CheckArgs, shell: &Shell) -> Checked {
         }
         Err(report) => Checked::of(path, Some(report)),
     }
-}
-
-/// Formats the warnings that a section [allow] silences, with their reason.
-pub(crate) fn allowed(AllowedWarning { code, reason, count }: &AllowedWarning) -> String {
-    format!("allowed: {} of `{code}`: {reason}", count_of(*count, "warning"))
 }
 
 fn allowed_json<S: Serializer>(allowed: &[AllowedWarning], serializer: S) -> Result<S::Ok, S::Error> {

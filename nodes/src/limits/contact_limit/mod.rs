@@ -12,7 +12,7 @@ use tactflow_runtime::signal::{Image, ImageShape, Scalar, Stamp, Twist, Unit};
 
 use super::{fraction, max_age};
 use crate::motion::bounds::countable;
-use crate::motion::usual::{USUAL_FORCE_N, USUAL_M_PER_S, USUAL_PEAK_N};
+use crate::usual::{USUAL_FORCE_N, USUAL_M_PER_S, USUAL_PEAK_N};
 
 use ceilings::Ceilings;
 pub use load::{PadLoad, load};

@@ -7,7 +7,7 @@ use tactflow_runtime::node::{Describe, In, Inputs, Limits, Mistakes, Node, Out, 
 use tactflow_runtime::signal::{Joint, Joints, JointsShape, Scalar, Stamp, Unit};
 
 use super::{fraction, max_age};
-use crate::motion::usual::{USUAL_LEAD_RAD, USUAL_RAD_PER_S2};
+use crate::usual::{USUAL_LEAD_RAD, USUAL_RAD_PER_S2};
 
 use joints::joints;
 pub use limiter::Limiter;

@@ -6,7 +6,7 @@ mod slope;
 use tactflow_runtime::node::{Describe, In, Inputs, Mistake, Mistakes, Node, Out, Outputs, Param, Setup, Tick};
 use tactflow_runtime::signal::{Flag, Pose, Scalar, Twist};
 
-use crate::motion::usual::{USUAL_LENGTH_M, USUAL_M_PER_S, USUAL_RAD};
+use crate::usual::{USUAL_LENGTH_M, USUAL_M_PER_S, USUAL_RAD};
 use search::Search;
 
 /// Guides a sensor toward where the contact gets narrower, and then along the ridge.

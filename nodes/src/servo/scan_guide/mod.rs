@@ -5,7 +5,7 @@ mod scan;
 use tactflow_runtime::node::{Absence, Describe, In, Inputs, Mistakes, Node, Out, Outputs, Param, Setup, State, Tick};
 use tactflow_runtime::signal::{Flag, Pose, Scalar, Twist};
 
-use crate::motion::usual::{USUAL_LENGTH_M, USUAL_M_PER_S};
+use crate::usual::{USUAL_LENGTH_M, USUAL_M_PER_S};
 use scan::Scan;
 
 /// Moves a sensor back and forth over a surface, in parallel strokes.

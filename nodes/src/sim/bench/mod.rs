@@ -24,9 +24,9 @@ use crate::arm::model::load;
 use crate::arm::mount::Mount;
 use crate::devices::arm::{self, ArmPorts};
 use crate::devices::{Facts, nanos, pad, period_of};
-use crate::motion::usual::{USUAL_PRESSURE_N, USUAL_THRESHOLD_N};
 use crate::random::Random;
 use crate::roles::ground_truth;
+use crate::usual::{USUAL_PRESSURE_N, USUAL_THRESHOLD_N};
 
 /// Parameters of `sim_bench`.
 #[derive(Debug, Clone, Param)]

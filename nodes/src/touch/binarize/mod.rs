@@ -12,7 +12,7 @@ mod rule;
 use tactflow_runtime::node::{Describe, In, Inputs, Mistakes, Node, Out, Outputs, Param, Setup, State, Tick};
 use tactflow_runtime::signal::{Image, Mask};
 
-use crate::motion::usual::{USUAL_THRESHOLD_N, unusual_force};
+use crate::usual::{USUAL_THRESHOLD_N, unusual_force};
 
 pub use otsu::otsu;
 pub use pack::binarize;

@@ -10,8 +10,8 @@ use tactflow_runtime::node::{
 };
 use tactflow_runtime::signal::{Flag, Grid, Image, Mask, Region, Regions, RegionsShape, Run};
 
-use crate::motion::usual::{USUAL_CONTACT_N, unusual_force};
 use crate::touch::common::check_same_array;
+use crate::usual::{USUAL_CONTACT_N, unusual_force};
 use neighbours::Neighbours;
 
 pub use centroids::{centroid_buffer, centroids};

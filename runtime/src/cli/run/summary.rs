@@ -4,7 +4,6 @@ use std::fmt::Write;
 
 use super::events::{LimitWatch, events};
 use super::ports::{PortTable, node_times};
-use crate::cli::check::allowed;
 use crate::cli::text::prose::PageStyle;
 use crate::cli::view::RunView;
 use crate::engine::{Counters, Engine, Outcome};
@@ -81,7 +80,7 @@ impl Summary {
             let _ = writeln!(text, "nothing was limited in newtons: the limits of `{names}` are raw readings");
         }
         for warning in engine.allowed() {
-            let _ = writeln!(text, "{}", allowed(warning));
+            let _ = writeln!(text, "{warning}");
         }
         if outcome.late > 0 {
             let _ = writeln!(text, "{} ticks started more than one period late", outcome.late);

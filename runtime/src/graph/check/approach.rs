@@ -23,7 +23,8 @@ pub(crate) fn check(
     let generators = find_generators(net, &vec![false; net.wires.len()]);
     let is_still = |motions: &Vec<Motion>| -> Vec<bool> { motions.iter().map(|one| *one == Motion::Still).collect() };
     let moving: Vec<Vec<usize>> = motions.iter().map(|all| find_generators(net, &is_still(all))).collect();
-    for i in (0..modes.len()).filter(|i| is_approach(net, modes, start, *i)) {
+    let free = find_free(net, modes, start);
+    for i in (0..modes.len()).filter(|i| free[*i] && is_approach(net, &modes[*i], *i == start)) {
         let is_bounded = modes[i].exits.iter().any(|exit| matches!(exit.condition, Condition::Travel(..)));
         let is_set = generators.iter().any(|node| net.setting(i, *node).is_some());
         // A task may wait at rest until it is touched, and move in other modes.
@@ -36,13 +37,31 @@ pub(crate) fn check(
     }
 }
 
-/// Returns whether a mode can begin without a contact, and only a contact leads on.
-fn is_approach(net: &Net<'_>, modes: &[PlannedMode], start: usize, mode: usize) -> bool {
-    let leads_in = |exit: &PlannedExit| exit.to == Some(mode) && !waits(net, exit);
-    let begins_without = mode == start || modes.iter().flat_map(|mode| &mode.exits).any(leads_in);
-    let mut ways =
-        modes[mode].exits.iter().filter(|exit| matches!(exit.kind, ExitKind::Go | ExitKind::Done)).peekable();
-    begins_without && ways.peek().is_some() && ways.all(|exit| waits(net, exit))
+/// Returns for each mode whether it begins without a contact: at the start, after a contact is lost, or after such a
+/// mode.
+fn find_free(net: &Net<'_>, modes: &[PlannedMode], start: usize) -> Vec<bool> {
+    let entries = |to: usize| {
+        let exits = modes.iter().enumerate().flat_map(|(from, mode)| mode.exits.iter().map(move |exit| (from, exit)));
+        exits.filter(move |(_, exit)| exit.to == Some(to))
+    };
+    let begins_with = |mode: usize| entries(mode).any(|(_, exit)| waits(net, exit));
+    let mut free = vec![false; modes.len()];
+    loop {
+        let follows = |(from, exit): (usize, &PlannedExit)| free[from] || exit.kind == ExitKind::OnLost;
+        let is_free = |mode: usize| !begins_with(mode) && (mode == start || entries(mode).any(follows));
+        let next: Vec<bool> = (0..modes.len()).map(is_free).collect();
+        if next == free {
+            return free;
+        }
+        free = next;
+    }
+}
+
+/// Returns whether only a contact leads on from a mode. A mode after the start may back off for a while.
+fn is_approach(net: &Net<'_>, mode: &PlannedMode, is_start: bool) -> bool {
+    let mut ways = mode.exits.iter().filter(|exit| matches!(exit.kind, ExitKind::Go | ExitKind::Done)).peekable();
+    let is_only_way = ways.peek().is_some() && ways.clone().all(|exit| waits(net, exit));
+    is_only_way || is_start && ways.any(|exit| waits(net, exit))
 }
 
 /// Returns whether an exit waits for a contact.

@@ -49,7 +49,7 @@ fn stays(net: &Net<'_>, from: usize, to: usize, port: PortRef) -> bool {
 fn report((from, way): (&PlannedMode, &PlannedExit), (mode, exit): (&PlannedMode, &PlannedExit)) -> Diagnostic {
     let (name, key) = (&mode.name, exit.kind.key());
     let message = format!(
-        "mode `{name}` ends as soon as it begins: it begins when {}, and `{key}` ends it when {}",
+        "mode `{name}` ends right after it begins: it begins when {}, and `{key}` ends it when {}",
         way.text, exit.text
     );
     let note = format!("leads from `{}` to `{name}`", from.name);

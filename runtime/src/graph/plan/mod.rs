@@ -4,6 +4,7 @@ mod modes;
 mod port;
 mod view;
 
+use std::fmt;
 use std::ops::Range;
 
 use crate::device::{Description, Driver};
@@ -137,4 +138,11 @@ pub struct AllowedWarning {
     pub reason: String,
     /// How many there are.
     pub count: usize,
+}
+
+impl fmt::Display for AllowedWarning {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { code, reason, count } = self;
+        write!(f, "allowed: {count} warning{} of `{code}`: {reason}", if *count == 1 { "" } else { "s" })
+    }
 }

@@ -34,7 +34,7 @@ pub const USUAL_CONTACT_N: f64 = 50.0;
 /// Returns a number in `unit` for one that was probably written in a smaller unit, and the name of that unit.
 ///
 /// ```
-/// use tactflow_nodes::motion::usual::from_smaller_unit;
+/// use tactflow_nodes::usual::from_smaller_unit;
 /// use tactflow_runtime::signal::Unit;
 ///
 /// assert_eq!(from_smaller_unit(15.0, Unit::METRE), Some((0.015, "mm")));
