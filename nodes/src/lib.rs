@@ -44,6 +44,7 @@ pub mod sim;
 #[cfg(feature = "cli")]
 mod tool;
 pub mod touch;
+pub mod usual;
 
 use tactflow_runtime::catalogue::Catalogue;
 use tactflow_runtime::signal::{Scalar, Twist};

@@ -223,7 +223,7 @@ fn what_a_trouble_does_is_shown_with_its_defaults_and_so_is_the_age_of_a_wire() 
         PRESS,
         "--set=policy.device=hold",
         "--set=policy.roles.pad.max_age_ms=300",
-        "--set=nodes.guide.in.gate={ from = 'touch.present', max_age_ms = 40 }",
+        "--set=nodes.guide.in.gate={ from = 'touch.present', max_age_ms = 400 }",
     ];
     let text = say(&args);
     assert_eq!((text.code, text.err.as_str()), (0, ""));
@@ -234,7 +234,7 @@ fn what_a_trouble_does_is_shown_with_its_defaults_and_so_is_the_age_of_a_wire() 
         "deadline = \"count\" # default",
         "device = \"hold\" # command line",
         "roles.pad.max_age_ms = 300 # command line",
-        "in.gate = { from = \"touch.label.present\", max_age_ms = 40, stale = \"hold\" } # command line",
+        "in.gate = { from = \"touch.label.present\", max_age_ms = 400, stale = \"hold\" } # command line",
     ];
     assert_lines(&text.out, &lines);
     let shown: toml::Table = text.out.parse().expect("what is shown is TOML");
@@ -243,7 +243,7 @@ fn what_a_trouble_does_is_shown_with_its_defaults_and_so_is_the_age_of_a_wire() 
         "stale = \"hold\" default",
         "device = \"hold\" written command line:1:15+6",
         "roles.pad.max_age_ms = 300 written command line:1:29+3",
-        "in.gate = touch.label.present 40.0 ms hold command line:1:30+15",
+        "in.gate = touch.label.present 400.0 ms hold command line:1:30+15",
     ];
     assert_lines(&json(&args, 0), &lines);
 }

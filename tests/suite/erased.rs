@@ -2,8 +2,8 @@
 
 use tactflow_runtime::harness::GraphRig;
 use tactflow_runtime::node::{
-    AnyNode, Built, Bus, Configured, Declared, Given, Mistake, Mistakes, NodeSpec, NodeType, Param, PortId, PortSpec,
-    Reader, Tick, Wires,
+    AnyNode, Built, Bus, Configured, Declared, Given, Mistake, Mistakes, Motion, NodeSpec, NodeType, Param, PortId,
+    PortSpec, Reader, Tick, Wires,
 };
 use tactflow_runtime::signal::{Freshness, Kind, Scalar, Shape};
 use tactflow_runtime::source::Value;
@@ -50,7 +50,8 @@ impl Configured for Polynomial {
             return Err(Mistake::param("scale", "there is nothing to scale").into());
         }
         let outputs: Vec<Shape> = vec![given.inputs[0][0].1.clone()];
-        Ok(Built { node: self, outputs, is_still: false, is_uncalibrated: false })
+        let (motion, warnings) = (Motion::Any, Mistakes::new());
+        Ok(Built { node: self, outputs, motion, is_uncalibrated: false, warnings })
     }
 }
 

@@ -172,7 +172,7 @@ fn chain(kinds: &[u8]) -> Vec<Link> {
         0 => link::<Bumpless>(&accelerations, false, &[]),
         1 => link::<TwistLimit>(&speeds, true, &[]),
         2 => link::<AccelerationLimit>(&accelerations, false, &[]),
-        3 => link::<WorkspaceLimit>(BOX, true, &[("pose", PoseShape.into())]),
+        3 => link::<WorkspaceLimit>(BOX, true, &[("pose", PoseShape::default().into())]),
         _ => link::<ContactLimit>(
             "force_n = 10.0\npeak_n = 4.0\napproach_m_per_s = 0.2",
             false,
@@ -345,7 +345,7 @@ fn what_cannot_be() {
         "`peak_n` is greater than `force_n`, so it has no effect: one tactel is never above the sum"
     );
     let empty = BOX.replace("0.1, 0.1, 0.1]\nd", "0.1, -0.2, 0.1]\nd");
-    let wires: [(&str, Shape); 2] = [("twist", TwistShape.into()), ("pose", PoseShape.into())];
+    let wires: [(&str, Shape); 2] = [("twist", TwistShape.into()), ("pose", PoseShape::default().into())];
     let mistakes = NodeRig::new::<WorkspaceLimit>(&empty, &wires).err().unwrap();
     assert_eq!(mistakes[0].message, "the box is empty along y: from -0.1 to -0.2 m");
 }

@@ -8,8 +8,8 @@ use tactflow_runtime::device::{
 };
 use tactflow_runtime::harness::lint;
 use tactflow_runtime::node::{
-    AnyNode, Bounds, Built, Bus, Configured, Declared, Given, Limits, Mistakes, NodeSpec, NodeType, ParamSpec, PortId,
-    PortSpec, Reader, Tick, Wires,
+    AnyNode, Bounds, Built, Bus, Configured, Declared, Given, Limits, Mistakes, Motion, NodeSpec, NodeType, ParamSpec,
+    PortId, PortSpec, Reader, Tick, Wires,
 };
 use tactflow_runtime::signal::{Kind, Scalar, ScalarShape, Signal, Unit};
 use tactflow_runtime::source::Value;
@@ -93,7 +93,8 @@ impl NodeType for Counter {
 impl Configured for Counter {
     fn build(self: Box<Self>, _: Given) -> Result<Built, Mistakes> {
         let outputs = vec![ScalarShape::of(Unit::METRE).within(0.0, 1000.0).into()];
-        Ok(Built { node: self, outputs, is_still: false, is_uncalibrated: false })
+        let (motion, warnings) = (Motion::Any, Mistakes::new());
+        Ok(Built { node: self, outputs, motion, is_uncalibrated: false, warnings })
     }
 }
 

@@ -50,3 +50,4 @@ mod udp_pad;
 mod units;
 mod verify;
 mod view;
+mod warnings;

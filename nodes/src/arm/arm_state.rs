@@ -1,7 +1,7 @@
 //! `arm_state`: the pose of the sensor and the Jacobian, in one pass over the chain, see [`Chain`].
 
 use tactflow_runtime::node::{Describe, FilePath, In, Inputs, Mistakes, Node, Out, Outputs, Param, Setup, Tick};
-use tactflow_runtime::signal::{Jacobian, JacobianShape, Joints, JointsShape, Pose, PoseShape, Unit};
+use tactflow_runtime::signal::{Jacobian, JacobianShape, Joints, JointsShape, Pose, PoseShape, Twist, Unit};
 
 use super::chain::Chain;
 use super::joint_names::check_joints;
@@ -80,7 +80,7 @@ impl Node for ArmState {
         let chain = load(&params.urdf, &params.tip, &params.mount)?;
         let joints = JointsShape { joints: chain.joints().to_vec(), unit: Unit::RADIAN };
         check_joints(&setup.inputs.position, &joints)?;
-        setup.outputs.sensor_pose = PoseShape;
+        setup.outputs.sensor_pose = PoseShape { start: start(&chain, &setup.inputs.position) };
         setup.outputs.jacobian = JacobianShape(joints.clone());
         setup.outputs.joints = joints;
         Ok(Self { chain })
@@ -92,6 +92,13 @@ impl Node for ArmState {
         out.sensor_pose.set(pose);
         out.joints.write().0.copy_from_slice(q);
     }
+}
+
+/// Returns the origin of the sensor at the start of a run, if the arm states its start [m].
+fn start(chain: &Chain, arm: &JointsShape) -> Option<[f64; 3]> {
+    let joints: Vec<f64> = arm.joints.iter().map(|joint| joint.start).collect::<Option<_>>()?;
+    let pose = chain.forward(&joints, &mut vec![Twist::default(); joints.len()]);
+    Some(pose.0.translation.vector.into())
 }
 
 #[cfg(test)]
@@ -129,6 +136,23 @@ mod tests {
         let Shape::Joints(shape) = rig.shape("joints") else { panic!("joints") };
         assert!((shape.joints[1].upper - 120f64.to_radians()).abs() < 1e-9);
         assert_eq!(rig.shape("jacobian"), &JacobianShape(shape.clone()).into());
+    }
+
+    #[test]
+    fn the_pose_has_the_start_of_the_arm() {
+        let params = format!("urdf = '{URDF}'\nsensor = 'pad'\ntip = 'lwr_7_link'\nmount = {{ xyz = [0, 0, 0.1215] }}");
+        let start_of = |starts: [Option<f64>; 7]| {
+            let mut shape = wire(&NAMES);
+            shape.joints.iter_mut().zip(starts).for_each(|(joint, start)| joint.start = start);
+            let rig = NodeRig::new::<ArmState>(&params, &[("position", shape.into())]).unwrap();
+            let Shape::Pose(pose) = rig.shape("sensor_pose").clone() else { panic!("a pose") };
+            pose.start
+        };
+        let start = start_of([Some(0.0); 7]).expect("every joint has a start");
+        assert!((nalgebra::Vector3::from(start) - nalgebra::Vector3::new(0.0, 0.0, 1.3)).norm() < 1e-12, "{start:?}");
+        let mut unknown = [Some(0.0); 7];
+        unknown[3] = None;
+        assert_eq!(start_of(unknown), None);
     }
 
     #[test]

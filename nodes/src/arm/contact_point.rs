@@ -102,7 +102,7 @@ mod tests {
 
     fn rig(params: &str) -> NodeRig {
         let metre = || Shape::from(ScalarShape::of(Unit::METRE));
-        let wires = [("x", metre()), ("y", metre()), ("pose", PoseShape.into())];
+        let wires = [("x", metre()), ("y", metre()), ("pose", PoseShape::default().into())];
         NodeRig::new::<ContactPoint>(params, &wires).unwrap()
     }
 

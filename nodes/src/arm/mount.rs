@@ -3,14 +3,16 @@
 use nalgebra::{IsometryMatrix3, Matrix3, Rotation3, Translation3};
 use tactflow_runtime::node::Param;
 
+use crate::usual::{USUAL_LENGTH_M, USUAL_RAD};
+
 /// Where the sensor's frame is in the frame of the tip.
 #[derive(Debug, Clone, Param)]
 pub struct Mount {
     /// Origin of the sensor's frame in the frame of the tip.
-    #[param(unit = "m", default = [0.0; 3])]
+    #[param(unit = "m", usual = -USUAL_LENGTH_M..=USUAL_LENGTH_M, default = [0.0; 3])]
     pub xyz: [f64; 3],
     /// Roll, pitch and yaw of the sensor's frame in the frame of the tip: Rz(yaw) Ry(pitch) Rx(roll), as in a URDF.
-    #[param(unit = "rad", default = [0.0; 3])]
+    #[param(unit = "rad", usual = -USUAL_RAD..=USUAL_RAD, default = [0.0; 3])]
     pub rpy: [f64; 3],
 }
 

@@ -42,7 +42,9 @@ impl ArmPorts {
 /// # Errors
 /// If the arm cannot start at the positions `start` [rad; m for a prismatic joint].
 pub(crate) fn joints(chain: &Chain, acceleration: f64, start: &[f64]) -> Result<JointsShape, Mistakes> {
-    let joints: Vec<Joint> = chain.joints().iter().map(|joint| Joint { acceleration, ..joint.clone() }).collect();
+    let joints = chain.joints().iter().enumerate();
+    let joints = joints.map(|(i, joint)| Joint { acceleration, start: start.get(i).copied(), ..joint.clone() });
+    let joints: Vec<Joint> = joints.collect();
     if start.len() != joints.len() {
         let message = format!("`start` has {} entries, but the arm has {} joints", start.len(), joints.len());
         return Err(Mistake::param("start", message).into());

@@ -190,7 +190,14 @@ mod tests {
     }
 
     fn two_joints(holds: &str) -> MockArm {
-        let joint = |name: &str| Joint { name: name.into(), lower: -1.0, upper: 1.0, speed: 1.0, acceleration: 10.0 };
+        let joint = |name: &str| Joint {
+            name: name.into(),
+            lower: -1.0,
+            upper: 1.0,
+            speed: 1.0,
+            acceleration: 10.0,
+            start: None,
+        };
         let params: Params = read(&format!("urdf = 'Cargo.toml'\ntip = ''\nstart = []\nhold = {holds}"));
         let mut description = Description::every(0.004);
         let ports = ArmPorts::fill(&mut description, &JointsShape::default(), vec![]);

@@ -132,7 +132,7 @@ mod tests {
             ("flag", FlagShape.into()),
             ("twist", TwistShape.into()),
             ("joints", JointsShape::default().into()),
-            ("pose", PoseShape.into()),
+            ("pose", PoseShape::default().into()),
         ];
         let mut rig = rig("", &wires).unwrap();
         let bring: [fn(&mut NodeRig); 6] = [

@@ -9,6 +9,7 @@ use tactflow_runtime::signal::{Scalar, Twist};
 
 use super::{Inputs, fraction, max_age};
 use crate::motion::bounds::{approach_twist, countable};
+use crate::usual::{USUAL_M_PER_S2, USUAL_RAD_PER_S2};
 
 /// Limits the acceleration of the sensor, and brings it to rest when there is no motion to follow.
 ///
@@ -41,10 +42,10 @@ pub struct AccelerationLimit {
 #[derive(Debug, Clone, Param)]
 pub struct Params {
     /// Maximum linear acceleration.
-    #[param(unit = "m/s2", above = 0.0)]
+    #[param(unit = "m/s2", above = 0.0, usual = ..=USUAL_M_PER_S2)]
     linear_m_per_s2: f64,
     /// Maximum angular acceleration.
-    #[param(unit = "rad/s2", above = 0.0)]
+    #[param(unit = "rad/s2", above = 0.0, usual = ..=USUAL_RAD_PER_S2)]
     angular_rad_per_s2: f64,
     /// Maximum age of the motion; five periods of the graph if not given.
     #[param(unit = "ms", above = 0.0)]

@@ -10,6 +10,7 @@ use tactflow_runtime::signal::{Scalar, Twist};
 
 use super::{Inputs, fraction};
 use crate::motion::bounds::{countable, scale_twist, twist_ratio};
+use crate::usual::{USUAL_M_PER_S, USUAL_M_PER_S2, USUAL_RAD_PER_S, USUAL_RAD_PER_S2};
 
 /// Removes the jumps of a motion, as when the mode changes or a contact begins or ends (bumpless transfer).
 ///
@@ -43,16 +44,16 @@ pub struct Bumpless {
 #[derive(Debug, Clone, Param)]
 pub struct Params {
     /// Maximum linear acceleration.
-    #[param(unit = "m/s2", above = 0.0)]
+    #[param(unit = "m/s2", above = 0.0, usual = ..=USUAL_M_PER_S2)]
     linear_m_per_s2: f64,
     /// Maximum angular acceleration.
-    #[param(unit = "rad/s2", above = 0.0)]
+    #[param(unit = "rad/s2", above = 0.0, usual = ..=USUAL_RAD_PER_S2)]
     angular_rad_per_s2: f64,
     /// Linear speed to which the wanted motion is scaled down; unlimited if not given.
-    #[param(unit = "m/s", above = 0.0)]
+    #[param(unit = "m/s", above = 0.0, usual = ..=USUAL_M_PER_S)]
     linear_m_per_s: Option<f64>,
     /// Angular speed to which the wanted motion is scaled down; unlimited if not given.
-    #[param(unit = "rad/s", above = 0.0)]
+    #[param(unit = "rad/s", above = 0.0, usual = ..=USUAL_RAD_PER_S)]
     angular_rad_per_s: Option<f64>,
 }
 

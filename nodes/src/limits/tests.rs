@@ -2,7 +2,7 @@
 //! and a sensor that moves toward a face of its box.
 
 use nalgebra::IsometryMatrix3;
-use tactflow_runtime::harness::NodeRig;
+use tactflow_runtime::harness::{NodeRig, places};
 use tactflow_runtime::node::{Node, of};
 use tactflow_runtime::signal::{
     Freshness, Image, ImageShape, Pose, PoseShape, Scalar, Shape, Stamp, Twist, TwistShape, Unit,
@@ -21,7 +21,8 @@ const CEILINGS: &str = "force_n = 10.0\npeak_n = 4.0\napproach_m_per_s = 0.2";
 
 fn rig<N: Node>(params: &str) -> NodeRig {
     let pad = ImageShape { rows: 2, cols: 2, pitch: [0.01; 2], unit: Unit::NEWTON };
-    let all: [(&str, Shape); 3] = [("twist", TwistShape.into()), ("image", pad.into()), ("pose", PoseShape.into())];
+    let all: [(&str, Shape); 3] =
+        [("twist", TwistShape.into()), ("image", pad.into()), ("pose", PoseShape::default().into())];
     let inputs = of::<N>().spec().inputs;
     let wires = all.into_iter().filter(|(name, _)| inputs.iter().any(|input| input.name == *name));
     NodeRig::new::<N>(params, &wires.collect::<Vec<_>>()).unwrap_or_else(|mistakes| panic!("{}: {mistakes:?}", N::NAME))
@@ -234,4 +235,17 @@ fn turning_delays_the_braking_by_no_more_than_documented() {
         assert!(worst <= bound, "{worst} m beyond the face, with {turning} rad/s²");
         assert!(worst < found, "{worst} m beyond the face, with {turning} rad/s² and a gap of {gap} s");
     }
+}
+
+#[test]
+fn a_start_outside_the_box_is_warned_of_at_its_corner() {
+    let warnings = |start: Option<[f64; 3]>| {
+        let wires = [("twist", TwistShape.into()), ("pose", PoseShape { start }.into())];
+        places(BOX, &NodeRig::new::<WorkspaceLimit>(BOX, &wires))
+    };
+    for start in [None, Some([0.0; 3]), Some([0.1, -0.1, 0.1])] {
+        assert!(warnings(start).is_empty(), "{start:?}");
+    }
+    assert_eq!(warnings(Some([0.0, -0.11, 0.0])), ["start-outside: `min_m`"]);
+    assert_eq!(warnings(Some([0.0, 0.0, 0.2])), ["start-outside: `max_m`"]);
 }

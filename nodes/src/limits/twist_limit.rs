@@ -5,6 +5,7 @@ use tactflow_runtime::signal::{Scalar, Twist};
 
 use super::fraction;
 use crate::motion::bounds::scale_twist;
+use crate::usual::{USUAL_M_PER_S, USUAL_RAD_PER_S};
 
 /// Limits the speed of the sensor and keeps the direction of its motion.
 ///
@@ -28,10 +29,10 @@ pub struct TwistLimit {
 #[derive(Debug, Clone, Param)]
 pub struct Params {
     /// Maximum speed of the sensor's origin.
-    #[param(unit = "m/s", above = 0.0)]
+    #[param(unit = "m/s", above = 0.0, usual = ..=USUAL_M_PER_S)]
     linear_m_per_s: f64,
     /// Maximum speed of the sensor's rotation.
-    #[param(unit = "rad/s", above = 0.0)]
+    #[param(unit = "rad/s", above = 0.0, usual = ..=USUAL_RAD_PER_S)]
     angular_rad_per_s: f64,
 }
 

@@ -5,12 +5,16 @@
 //! At a face and beyond it only the way back is free. One factor scales the whole twist, so its direction stays.
 
 use nalgebra::Vector3;
-use tactflow_runtime::node::{Describe, In, Inputs, Limits, Mistake, Mistakes, Node, Out, Outputs, Param, Setup, Tick};
+use tactflow_runtime::node::{
+    At, Describe, In, Inputs, Limits, Mistake, Mistakes, Node, Out, Outputs, Param, Setup, Tick,
+};
 use tactflow_runtime::signal::{Pose, Scalar, Twist};
+use tactflow_runtime::source::Code;
 
 use super::{fraction, max_age};
 use crate::motion::bounds::{countable, scale_within};
 use crate::motion::braking::stopping_speed;
+use crate::usual::{USUAL_M_PER_S2, USUAL_REACH_M};
 
 /// Keeps the sensor in a box of the workspace, with room to brake.
 ///
@@ -47,13 +51,13 @@ pub struct WorkspaceLimit {
 #[derive(Debug, Clone, Param)]
 pub struct Params {
     /// Corner of the box with the smallest coordinates, `[x, y, z]` in the base.
-    #[param(unit = "m")]
+    #[param(unit = "m", usual = -USUAL_REACH_M..=USUAL_REACH_M)]
     min_m: [f64; 3],
     /// Corner of the box with the largest coordinates.
-    #[param(unit = "m")]
+    #[param(unit = "m", usual = -USUAL_REACH_M..=USUAL_REACH_M)]
     max_m: [f64; 3],
     /// Deceleration with which the sensor can stop before a face.
-    #[param(unit = "m/s2", above = 0.0)]
+    #[param(unit = "m/s2", above = 0.0, usual = ..=USUAL_M_PER_S2)]
     deceleration_m_per_s2: f64,
     /// Maximum age of the pose; five periods of the graph if not given.
     #[param(unit = "ms", above = 0.0)]
@@ -98,6 +102,10 @@ impl Node for WorkspaceLimit {
             let message = format!("the box is empty along {axis}: from {min} to {max} m");
             return Err(Mistake::param("max_m", message).help("make each entry greater than that of `min_m`").into());
         }
+        if let Some(start) = &setup.inputs.pose.start {
+            setup.warnings.extend(start_outside(start, "min_m", &params.min_m, -1.0));
+            setup.warnings.extend(start_outside(start, "max_m", &params.max_m, 1.0));
+        }
         setup.outputs.workspace = fraction();
         let max_age = max_age(params.max_age_ms, setup.period);
         Ok(Self { params, max_age })
@@ -114,6 +122,26 @@ impl Node for WorkspaceLimit {
         out.twist.set(Twist(twist.0 * scale));
         out.workspace.set(scale);
     }
+}
+
+/// Returns the warning about a sensor that starts beyond a corner of the box, from which only the way back is free.
+///
+/// `sign` is -1 for the corner with the smallest coordinates, and 1 for the other one.
+fn start_outside(start: &[f64; 3], param: &str, corner: &[f64; 3], sign: f64) -> Option<Mistake> {
+    let is_beyond = |axis: usize| sign * (start[axis] - corner[axis]) > 0.0;
+    let axis = (0..3).find(|axis| is_beyond(*axis))?;
+    let (name, side) = (["x", "y", "z"][axis], if sign < 0.0 { "less" } else { "greater" });
+    let at = start.map(|value| (value * 1e3).round() / 1e3);
+    let message = format!(
+        "the sensor starts outside the workspace, at {at:?} m: its {name} is {side} than {} m, so only motion toward the \
+         box is free",
+        corner[axis]
+    );
+    // A few centimetres of room, so that the sensor can move there.
+    let room = |axis: usize| ((start[axis] + sign * 0.05) * 100.0).round() / 100.0;
+    let wider = [0, 1, 2].map(|axis| if is_beyond(axis) { room(axis) } else { corner[axis] });
+    let help = format!("write `{wider:?}`, or change the start or the mount of the arm in the bench");
+    Some(Mistake::new(Code::StartOutside, At::Param(param.into()), message).help(help))
 }
 
 /// Returns the largest factor up to 1 with which a velocity can still be stopped within a box.

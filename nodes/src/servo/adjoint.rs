@@ -168,7 +168,7 @@ mod tests {
 
     #[test]
     fn the_result_follows_both_inputs_and_is_as_old_as_the_older() {
-        let wires = [("twist", TwistShape.into()), ("pose", PoseShape.into())];
+        let wires = [("twist", TwistShape.into()), ("pose", PoseShape::default().into())];
         let mut rig = NodeRig::new::<Adjoint>("", &wires).unwrap();
         rig.set("twist", Twist::new(Vector3::x(), Vector3::zeros()));
         rig.step();

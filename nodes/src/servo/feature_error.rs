@@ -6,10 +6,11 @@ use tactflow_runtime::node::{
     At, Describe, Inputs, Many, Map, Mistake, Mistakes, Node, Out, Outputs, Param, Setup, Spanned, Tick, collect_both,
     refuse_any,
 };
-use tactflow_runtime::signal::{Feature, Features, FeaturesShape, Scalar, ScalarShape};
+use tactflow_runtime::signal::{Feature, Features, FeaturesShape, Scalar, ScalarShape, Unit};
 use tactflow_runtime::source::Code;
 
 use crate::motion::axis::wrap_axial;
+use crate::usual::{USUAL_FORCE_N, USUAL_PRESSURE_N, USUAL_RAD, unusual};
 
 /// Computes the error of every feature: setpoint minus measurement.
 ///
@@ -91,6 +92,10 @@ impl Node for FeatureError {
             value: *value,
             is_axial: shape.unit.is_axial(),
         };
+        let warnings = values.iter().zip(wires).filter_map(|(value, (name, shape))| {
+            unusual(&format!("setpoint.{name}"), **value, usual(shape), shape.unit)
+        });
+        setup.warnings.extend(warnings);
         let setpoints = values.into_iter().zip(wires).map(setpoint).collect();
         let feature = |(name, shape): &(String, ScalarShape)| Feature { name: name.clone(), unit: shape.unit };
         setup.outputs.error = FeaturesShape { features: wires.iter().map(feature).collect() };
@@ -118,6 +123,17 @@ impl Setpoint {
     fn error(&self, measured: f64) -> f64 {
         let error = self.value - measured;
         if self.is_axial { wrap_axial(error) } else { error }
+    }
+}
+
+/// Returns the range of the setpoints that a feature can have; infinite if it is unknown.
+fn usual(shape: &ScalarShape) -> [f64; 2] {
+    match shape.range {
+        _ if shape.unit.is_axial() => [-USUAL_RAD, USUAL_RAD],
+        range if range.iter().all(|end| end.is_finite()) => range,
+        _ if shape.unit == Unit::NEWTON.per_tactel() => [0.0, USUAL_PRESSURE_N],
+        _ if shape.unit == Unit::NEWTON => [0.0, USUAL_FORCE_N],
+        range => range,
     }
 }
 

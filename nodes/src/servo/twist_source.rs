@@ -1,7 +1,12 @@
 //! `twist_source`: a constant twist. Without a gate it has no time, so the `max_age_ms` of a sink never stops it.
 
-use tactflow_runtime::node::{Describe, In, Inputs, Mistakes, Node, Out, Outputs, Param, Setup, Tick};
-use tactflow_runtime::signal::{Flag, Twist};
+use tactflow_runtime::node::{
+    At, Describe, In, Inputs, Mistake, Mistakes, Motion, Node, Out, Outputs, Param, Setup, Tick,
+};
+use tactflow_runtime::signal::{Flag, Twist, Unit};
+use tactflow_runtime::source::Code;
+
+use crate::usual::{USUAL_M_PER_S, USUAL_RAD_PER_S, from_smaller_unit};
 
 /// A constant motion, to approach an object or to guide along it.
 ///
@@ -63,9 +68,10 @@ impl Node for TwistSource {
     type State = ();
 
     fn new(params: Params, setup: &mut Setup<Self>) -> Result<Self, Mistakes> {
-        setup.is_still = params.twist == [0.0; 6];
-        let (is_still, is_gated) = (setup.is_still, setup.inputs.gate.is_some());
-        Ok(Self { twist: Twist(params.twist.into()), is_still, is_gated })
+        let (twist, is_gated) = (Twist(params.twist.into()), setup.inputs.gate.is_some());
+        setup.motion = motion(&twist, params.frame.as_deref());
+        setup.warnings.extend(unusual(&twist));
+        Ok(Self { twist, is_still: setup.motion == Motion::Still, is_gated })
     }
 
     fn step(&self, _: &Tick, inputs: Inputs<'_>, out: &mut Outputs, (): &mut ()) {
@@ -73,6 +79,37 @@ impl Node for TwistSource {
             out.twist.set(self.twist);
         }
     }
+}
+
+/// Returns the motion of a twist. In the frame of a sensor, z points out of it toward the object.
+fn motion(twist: &Twist, frame: Option<&str>) -> Motion {
+    let linear = twist.linear();
+    let is_of_base = frame.is_some_and(|frame| frame.rsplit('.').next() == Some("base"));
+    match twist.0 == Twist::default().0 {
+        true => Motion::Still,
+        false if !is_of_base && -linear.z > 0.5 * linear.norm() => Motion::Retreat,
+        false => Motion::Any,
+    }
+}
+
+/// Returns the warning about a motion that is far beyond what an arm can do.
+fn unusual(twist: &Twist) -> Option<Mistake> {
+    let (linear, angular) = (twist.linear().amax() > USUAL_M_PER_S, twist.angular().amax() > USUAL_RAD_PER_S);
+    let (speed, max, unit, other) = match (linear, angular) {
+        (false, false) => return None,
+        (true, _) => (twist.linear().amax(), USUAL_M_PER_S, "m/s", "mm/s"),
+        (false, true) => (twist.angular().amax(), USUAL_RAD_PER_S, "rad/s", "deg/s"),
+    };
+    let message = format!("`twist` has {speed} {unit}, but usual is at most {max} {unit}");
+    let part = |is_small: bool, unit: Unit| {
+        move |number: f64| match is_small {
+            true => from_smaller_unit(number, unit).map_or(number, |(number, _)| number),
+            false => number,
+        }
+    };
+    let (v, w) = (twist.linear().map(part(linear, Unit::METRE)), twist.angular().map(part(angular, Unit::RADIAN)));
+    let help = format!("if it is in {other}, write `[{}, {}, {}, {}, {}, {}]`", v.x, v.y, v.z, w.x, w.y, w.z);
+    Some(Mistake::new(Code::UnusualValue, At::Param("twist".into()), message).help(help))
 }
 
 #[cfg(test)]
@@ -142,5 +179,34 @@ mod tests {
         ] {
             assert_eq!(places(bad, &NodeRig::new::<TwistSource>(bad, &[])), [place], "{bad}");
         }
+    }
+
+    #[test]
+    fn a_motion_away_from_the_object_is_told_apart() {
+        let cases = [
+            ([0.0; 6], None, Motion::Still),
+            ([0.0, 0.0, 0.015, 0.0, 0.0, 0.0], None, Motion::Any),
+            ([0.0, 0.0, -0.015, 0.0, 0.0, 0.0], None, Motion::Retreat),
+            ([0.0, 0.0, -0.015, 0.0, 0.0, 0.0], Some("pad"), Motion::Retreat),
+            ([0.0, 0.0, -0.015, 0.0, 0.0, 0.0], Some("base"), Motion::Any),
+            ([0.0, 0.0, -0.015, 0.0, 0.0, 0.0], Some("arm2.base"), Motion::Any),
+            ([0.01, 0.0, -0.002, 0.0, 0.0, 0.0], None, Motion::Any),
+            ([0.0, 0.0, 0.0, 0.0, 0.0, 0.1], None, Motion::Any),
+        ];
+        for (twist, frame, expected) in cases {
+            assert_eq!(motion(&Twist(twist.into()), frame), expected, "{twist:?} in {frame:?}");
+        }
+    }
+
+    #[test]
+    fn a_motion_in_another_unit_is_warned_of() {
+        let warnings = |twist: &str| {
+            let params = format!("twist = {twist}");
+            places(&params, &NodeRig::new::<TwistSource>(&params, &[]))
+        };
+        for twist in ["[0, 0, 15, 0, 0, 0]", "[0, 0, 0.015, 0, 0, 20]"] {
+            assert_eq!(warnings(twist), ["unusual-value: `twist`"], "{twist}");
+        }
+        assert!(warnings("[0.1, 0, 0.05, 0, 0, -1]").is_empty());
     }
 }

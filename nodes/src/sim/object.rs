@@ -7,6 +7,7 @@ use tactflow_runtime::signal::Pose;
 
 use super::shape::{Geometry, pose3};
 use crate::arm::mount::pose_of;
+use crate::usual::{USUAL_RAD, USUAL_REACH_M};
 
 /// Shape of an object.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Param)]
@@ -31,19 +32,19 @@ pub struct ObjectParams {
     /// Shape.
     pub(crate) shape: ShapeKind,
     /// Position of its centre relative to the sensor at the start, in the sensor's axes; for a plane, a point on it.
-    #[param(unit = "m")]
+    #[param(unit = "m", usual = -USUAL_REACH_M..=USUAL_REACH_M)]
     pub(crate) at: [f64; 3],
     /// Roll, pitch and yaw in the sensor's axes at the start.
-    #[param(unit = "rad", default = [0.0; 3])]
+    #[param(unit = "rad", usual = -USUAL_RAD..=USUAL_RAD, default = [0.0; 3])]
     pub(crate) turn: [f64; 3],
     /// Radius of a ball, a pen or a cable.
-    #[param(unit = "m", above = 0.0)]
+    #[param(unit = "m", above = 0.0, usual = ..=USUAL_REACH_M)]
     pub(crate) radius: Option<f64>,
     /// Length of a pen between the centres of its ends.
-    #[param(unit = "m", above = 0.0)]
+    #[param(unit = "m", above = 0.0, usual = ..=USUAL_REACH_M)]
     pub(crate) length: Option<f64>,
     /// Edge lengths of a box, or full axes of an ellipsoid.
-    #[param(unit = "m")]
+    #[param(unit = "m", usual = ..=USUAL_REACH_M)]
     pub(crate) size: Option<[f64; 3]>,
     /// Points that a cable passes through, in its own frame.
     #[param(unit = "m")]

@@ -7,6 +7,7 @@ use tactflow_runtime::signal::{Flag, Grid, Mask, Regions};
 use tactflow_runtime::source::Code;
 
 use super::label::{centroid_buffer, centroids, distance_squared, paint, ranked};
+use crate::usual::{USUAL_CONTACT_N, unusual_force};
 
 /// Selects one of several contacts: the n-th largest, strongest, or nearest to a point.
 ///
@@ -112,6 +113,8 @@ impl Node for SelectRegion {
             }
             _ => {}
         }
+        let unit = setup.inputs.regions.unit;
+        setup.warnings.extend(unusual_force("min_force", params.min_force, USUAL_CONTACT_N, unit));
         let grid = setup.inputs.regions.grid.clone();
         setup.outputs.region = grid.clone();
         Ok(Self { params, grid })

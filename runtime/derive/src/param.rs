@@ -12,7 +12,7 @@ use crate::checks::{LetterKind, bound_letter, inputs_beside, is_unit_letter};
 use crate::docs::text;
 use crate::fault::{Faults, asserted};
 
-const KNOWN: &[&str] = &["unit", "range", "above", "default", "live", "from_bench"];
+const KNOWN: &[&str] = &["unit", "range", "above", "usual", "default", "live", "from_bench"];
 
 /// One field of a table of parameters.
 struct Parameter {
@@ -22,6 +22,8 @@ struct Parameter {
     bounds: Option<TokenStream>,
     /// What stands in the attribute for the bounds: where a mistake is marked.
     bounds_at: Option<Expr>,
+    /// The usual numbers, and the expression for them.
+    usual: Option<(Expr, TokenStream)>,
     default: Option<Expr>,
     is_live: bool,
     is_from_bench: bool,
@@ -95,6 +97,8 @@ fn parameter(field: Field, faults: &mut Faults) -> Option<Parameter> {
     let (unit, is_live) = (words.text("unit", faults), words.flag("live", faults).is_some());
     let is_from_bench = words.flag("from_bench", faults).is_some();
     let (range, above) = (words.value("range", faults), words.value("above", faults));
+    let usual = words.value("usual", faults);
+    let usual = usual.and_then(|(_, usual)| between(&usual, faults).map(|bounds| (usual, bounds)));
     let default = words.value("default", faults).map(|(_, value)| value);
     if let (Some(_), Some((above, _))) = (&range, &above) {
         faults.add(above, "`range` and `above` exclude each other");
@@ -105,7 +109,7 @@ fn parameter(field: Field, faults: &mut Faults) -> Option<Parameter> {
         (None, None) => None,
     };
     let bounds_at = range.or(above).map(|(_, value)| value);
-    Some(Parameter { field, name, unit, bounds, bounds_at, default, is_live, is_from_bench })
+    Some(Parameter { field, name, unit, bounds, bounds_at, usual, default, is_live, is_from_bench })
 }
 
 /// The bounds that a range such as `0.0..=1.0` or `0.0..` says.
@@ -129,10 +133,12 @@ fn declared(parameter: &Parameter) -> TokenStream {
     let Parameter { is_live, is_from_bench, .. } = *parameter;
     let (name, doc) = (parameter.name.to_string(), text(&parameter.field.attrs));
     let unit = option(parameter.unit.as_ref().map(|unit| quote!(#unit)));
-    let bounds = option(parameter.bounds.clone());
+    let (bounds, usual) =
+        (option(parameter.bounds.clone()), option(parameter.usual.as_ref().map(|(_, usual)| usual.clone())));
     quote! {
         ::tactflow_runtime::node::Declared {
-            name: #name, doc: #doc, unit: #unit, bounds: #bounds, is_live: #is_live, is_from_bench: #is_from_bench
+            name: #name, doc: #doc, unit: #unit, bounds: #bounds, usual: #usual, is_live: #is_live,
+            is_from_bench: #is_from_bench,
         }
     }
 }
@@ -157,13 +163,15 @@ fn default(parameter: &Parameter) -> TokenStream {
 fn checks(parameter: &Parameter, input: &DeriveInput, inputs: &Ident) -> TokenStream {
     let (ty, name) = (&parameter.field.ty, &parameter.name);
     let is_concrete = input.generics.type_params().next().is_none();
-    let bounds = parameter.bounds_at.as_ref().filter(|_| is_concrete).zip(parameter.bounds.as_ref());
-    let bounds = bounds.map(|(at, bounds)| {
+    let bounds = parameter.bounds_at.as_ref().zip(parameter.bounds.as_ref());
+    let usual = parameter.usual.as_ref().map(|(at, usual)| (at, usual));
+    let bounds = bounds.into_iter().chain(usual).filter(|_| is_concrete).map(|(at, bounds)| {
         let is_number = quote!(<#ty as ::tactflow_runtime::node::Param>::CONTENTS.is_number);
         let is_number = asserted(at, &is_number, &format!("`{name}` is not a number: remove its range"));
         let is_possible = asserted(at, &quote!(!#bounds.is_empty()), "no number is in this range");
         quote!(#is_number #is_possible)
     });
+    let bounds: TokenStream = bounds.collect();
     let unit = parameter.unit.as_ref().map(|unit| {
         let text = unit.value();
         let message = format!(

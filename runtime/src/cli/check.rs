@@ -2,14 +2,14 @@
 
 use std::path::{Path, PathBuf};
 
-use serde::Serialize;
+use serde::{Serialize, Serializer};
 
 use super::explain::explain;
 use super::shell::command::{GraphArgs, OutputFormat};
 use super::shell::json::{DiagnosticJson, diagnosed};
 use super::shell::{NOT_LOADED, Shell};
 use super::text::number::{count_of, milliseconds};
-use crate::graph::compile;
+use crate::graph::{AllowedWarning, compile};
 use crate::scenario::Scenario;
 use crate::source::Report;
 
@@ -55,7 +55,7 @@ pub(crate) fn check(args: CheckArgs, shell: &Shell) -> u8 {
                 ));
                 continue;
             }
-            true => check_scenario(path, shell),
+            true => check_scenario(path, &args, shell),
             false => check_graph(path, &args, shell),
         };
         if args.format == OutputFormat::Text {
@@ -63,6 +63,7 @@ pub(crate) fn check(args: CheckArgs, shell: &Shell) -> u8 {
             if checked.ok {
                 shell.say(&format!("{}: ok, {}", checked.graph, checked.summary));
             }
+            checked.allowed.iter().for_each(|warning| shell.say(&warning.to_string()));
         }
         results.push(checked);
     }
@@ -81,19 +82,27 @@ fn check_graph(path: &Path, args: &CheckArgs, shell: &Shell) -> Checked {
             let figures = PlanJson { nodes: order.len(), ports, period_s, is_live, order };
             let summary = format!("{} nodes, one tick every {}", figures.nodes, milliseconds(figures.period_s));
             let ok = report.is_none() || !args.deny_warnings;
-            Checked { ok, figures: Some(figures), summary, ..Checked::of(path, report) }
+            let allowed = plan.allowed().to_vec();
+            Checked { ok, figures: Some(figures), summary, allowed, ..Checked::of(path, report) }
         }
         Err(report) => Checked::of(path, Some(report)),
     }
 }
 
+fn allowed_json<S: Serializer>(allowed: &[AllowedWarning], serializer: S) -> Result<S::Ok, S::Error> {
+    let entry = |AllowedWarning { code, reason, count }: &AllowedWarning| serde_json::json!({ "code": code.name(), "reason": reason, "count": count });
+    serializer.collect_seq(allowed.iter().map(entry))
+}
+
 /// Checks a scenario with its graph and its bench.
-fn check_scenario(path: &Path, shell: &Shell) -> Checked {
+fn check_scenario(path: &Path, args: &CheckArgs, shell: &Shell) -> Checked {
     match Scenario::load(shell.catalogue(), path) {
         Ok(scenario) => {
             let (runs, length) = (count_of(scenario.runs().len(), "run"), scenario.for_s);
             let summary = format!("a scenario of {runs}, {length} s each; run it with `tactflow verify`");
-            Checked { ok: true, summary, ..Checked::of(path, None) }
+            let report = scenario.warnings().cloned();
+            let ok = report.is_none() || !args.deny_warnings;
+            Checked { ok, summary, ..Checked::of(path, report) }
         }
         Err(report) => Checked::of(path, Some(report)),
     }
@@ -107,6 +116,9 @@ struct Checked {
     diagnostics: Vec<DiagnosticJson>,
     /// Figures of a graph that loads.
     figures: Option<PlanJson>,
+    /// The warnings that a section [allow] silences.
+    #[serde(serialize_with = "allowed_json")]
+    allowed: Vec<AllowedWarning>,
     #[serde(skip)]
     report: Option<Report>,
     /// What is printed of a good file.

@@ -119,7 +119,7 @@ impl Device for Motor {
     type Params = ();
 
     fn open((): ()) -> Result<Opened, Mistakes> {
-        let joint = Joint { name: "a".into(), lower: -1.0, upper: 1.0, speed: 1.0, acceleration: 10.0 };
+        let joint = Joint { name: "a".into(), lower: -1.0, upper: 1.0, speed: 1.0, acceleration: 10.0, start: None };
         let shape = JointsShape { joints: vec![joint], unit: Unit::RADIAN };
         let mut description = Description::every(0.004);
         let mut motor = description.fills("motor");

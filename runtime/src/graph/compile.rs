@@ -6,13 +6,15 @@ use crate::catalogue::Catalogue;
 use crate::graph::bench::{self, OpenedBench};
 use crate::graph::build::{Builder, BuiltModes, build_modes};
 use crate::graph::check;
+use crate::graph::check::contact::ContactPorts;
+use crate::graph::check::generators::Generators;
 use crate::graph::compiled::Compiled;
 use crate::graph::load::{Loader, Request};
 use crate::graph::net::Net;
 use crate::graph::outline::OutlineBuilder;
 use crate::graph::plan::{Plan, PlannedCommand, PlannedModes, PlannedNode};
 use crate::graph::syntax::{GraphTable, default_max_age_s};
-use crate::source::{Code, Diagnostics, Report, SourceMap};
+use crate::source::{Code, Diagnostics, Report, Severity, SourceMap};
 
 /// Checks and builds a graph.
 ///
@@ -31,7 +33,7 @@ pub(crate) fn compile_in(mut loader: Loader, catalogue: &Catalogue, request: &Re
         .any(|d| matches!(d.code, Code::Syntax | Code::Unreadable | Code::EndlessPart | Code::WrongFile));
     if is_unreadable {
         // The checks would report everything that a missing file declares as missing.
-        return Err(Report::new(sources, diagnostics));
+        return Err(Report::new(sources, split(diagnostics).0));
     }
     let net = Net::new(&flat, catalogue, &mut diagnostics);
     let opened = bench::open(&net, &mut sources, &mut diagnostics);
@@ -53,8 +55,9 @@ pub(crate) fn compile_in(mut loader: Loader, catalogue: &Catalogue, request: &Re
     builder.check_delayed_units();
     check::calibration::check(&net, &nodes, &mut builder.diagnostics);
     view.check_units(&builder.ports, &mut builder.diagnostics);
+    check::times::check(&net, &opened, period, &mut builder.diagnostics);
     let modes = build_modes(&mut builder, &mut nodes);
-    let modes = check_modes(&net, modes, &mut builder.diagnostics);
+    let modes = check_modes(&net, modes, period, &mut builder.diagnostics);
     let mut commands: Vec<PlannedCommand> = net.commands.iter().filter_map(|wire| builder.command(wire)).collect();
     commands.sort_by_key(|command| command.is_report);
     let policy = flat.policy.as_ref().and_then(|(_, policy)| policy.clone()).unwrap_or_default();
@@ -62,9 +65,9 @@ pub(crate) fn compile_in(mut loader: Loader, catalogue: &Catalogue, request: &Re
     let ports = std::mem::take(&mut builder.ports);
     let (diagnostics, sources, of_nodes) = builder.finish();
     measured.extend(of_nodes);
-    let Some((clock, _)) = clock.filter(|_| diagnostics.is_empty()) else {
-        let diagnostics = check::parts::move_out(&flat, &sources, diagnostics);
-        return Err(Report::new(sources, diagnostics));
+    let (mistakes, warnings) = split(check::parts::move_out(&flat, &sources, diagnostics));
+    let Some((clock, _)) = clock.filter(|_| mistakes.is_empty()) else {
+        return Err(Report::new(sources, mistakes));
     };
     log_plan(&nodes, &opened, &sources);
     let max_gap = max_gap(flat.table.as_ref(), period);
@@ -79,26 +82,41 @@ pub(crate) fn compile_in(mut loader: Loader, catalogue: &Catalogue, request: &Re
         defaults: RefCell::default(),
     };
     let outline = outline.build();
-    let mut warnings = Diagnostics::new();
-    check::unused::check(&net, view.sources(), &mut warnings);
-    let warnings = check::parts::move_out(&flat, &sources, warnings);
+    let watching = modes.as_ref().map_or(&[][..], |modes| &modes.modes);
+    let mut unused = Diagnostics::new();
+    check::unused::check(&net, watching, view.sources(), &mut unused);
+    let mut warnings = check::parts::move_out(&flat, &sources, warnings.into_iter().chain(unused).collect());
+    warnings.sort_by_key(|warning| (warning.span.start, warning.code));
+    // Several nodes may read the same number of [limits].
+    warnings.dedup();
+    let allowed = check::allow::silence(&flat, &mut warnings);
     let view = view.plan(&net, &nodes, &ports);
     let reset_after = flat.table.as_ref().map_or(0, |table| (table.reset_after_ms * 1e6) as i64);
     let period = ((period * 1e9).round() as i64).max(1);
     let (exports, facts) = (net.exports_by_name(), opened.facts(&net));
     let devices = opened.devices;
-    let plan = Plan { roles, devices, nodes, commands, clock, period, max_gap, reset_after, modes, policy };
+    let plan = Plan { roles, devices, nodes, commands, clock, period, max_gap, reset_after, modes, policy, allowed };
     Ok(Compiled { plan, view, sources, warnings, outline, exports, facts })
 }
 
+/// Separates the mistakes from the warnings.
+fn split(diagnostics: Diagnostics) -> (Diagnostics, Diagnostics) {
+    diagnostics.into_iter().partition(|diagnostic| diagnostic.code.severity() == Severity::Error)
+}
+
 /// Checks the modes together, and returns them with the start mode.
-fn check_modes(net: &Net<'_>, built: BuiltModes, diagnostics: &mut Diagnostics) -> Option<PlannedModes> {
-    let BuiltModes { modes, still, still_changes, demand, demand_changes, freezes } = built;
+fn check_modes(net: &Net<'_>, built: BuiltModes, period: f64, diagnostics: &mut Diagnostics) -> Option<PlannedModes> {
+    let BuiltModes { modes, motions, demand, demand_changes, freezes } = built;
     let reads = |mode: usize, node: usize, port: usize| demand.of(node, &demand_changes[mode])[port];
+    let contact = ContactPorts::new(net);
+    let generators = Generators::new(net, &contact, &motions);
     check::absent::check(net, &modes, &reads, &freezes, diagnostics);
     check::overlap::check(net, &modes, diagnostics);
-    check::motion::check(net, &modes, &still, &still_changes, diagnostics);
+    check::motion::check(net, &contact, &modes, &generators, diagnostics);
+    check::late::check(&modes, period, diagnostics);
+    check::immediate::check(net, &modes, period, diagnostics);
     let start = check::reachability::check(net, diagnostics)?;
+    check::approach::check(net, &contact, &modes, start, (&motions, &generators), diagnostics);
     Some(PlannedModes { modes, start })
 }
 

@@ -1,9 +1,11 @@
 //! The compiled graph: its plan, its view and its outline.
 
+use std::collections::BTreeSet;
+
 use crate::device::Driver;
 use crate::graph::outline::Outline;
-use crate::graph::plan::{Plan, PlannedPort, PlannedView, Producer};
-use crate::source::{Diagnostic, Report, SourceMap};
+use crate::graph::plan::{AllowedWarning, Plan, PlannedNode, PlannedPort, PlannedView, Producer};
+use crate::source::{Code, Diagnostic, Report, SourceMap};
 
 /// A graph that was checked and built.
 pub struct Compiled {
@@ -24,6 +26,32 @@ impl Compiled {
     pub fn warnings(&self) -> Option<Report> {
         let report = || Report::new(self.sources.clone(), self.warnings.clone());
         (!self.warnings.is_empty()).then(report)
+    }
+
+    /// Returns the warnings of a graph whose ports of these names are read from outside, as the checks of a scenario do.
+    pub(crate) fn warnings_of_read(&self, ports: &BTreeSet<String>) -> Option<Report> {
+        let is_read = |node: &&PlannedNode| node.ports.iter().any(|port| ports.contains(&port.name));
+        let mut open: Vec<&PlannedNode> = self.plan.nodes.iter().filter(is_read).collect();
+        let mut used = BTreeSet::new();
+        while let Some(node) = open.pop() {
+            if used.insert(node.index) {
+                let sources = node.inputs.iter().flat_map(|(_, wires)| wires).map(|wire| wire.source.producer.node());
+                let sources = sources.flatten();
+                open.extend(sources.filter_map(|source| self.plan.nodes.iter().find(|node| node.index == source)));
+            }
+        }
+        let is_used = |warning: &Diagnostic| {
+            let mut nodes = self.plan.nodes.iter().filter(|node| used.contains(&node.index));
+            warning.code == Code::UnusedNode && nodes.any(|node| node.span == warning.span)
+        };
+        let warnings: Vec<Diagnostic> = self.warnings.iter().filter(|warning| !is_used(warning)).cloned().collect();
+        (!warnings.is_empty()).then(|| Report::new(self.sources.clone(), warnings))
+    }
+
+    /// Returns the warnings that a section [allow] silences, each with its reason.
+    #[must_use]
+    pub fn allowed(&self) -> &[AllowedWarning] {
+        &self.plan.allowed
     }
 
     /// Returns all ports: those of the roles, then those of the nodes in step order.

@@ -25,7 +25,7 @@ pub use outline::{
     NO_SPAN, Outline, OutlinedBlock, OutlinedMode, OutlinedPort, OutlinedRole, OutlinedWire, OutlinedWord, Setting,
     ValueOrigin,
 };
-pub use plan::PlannedPort;
+pub use plan::{AllowedWarning, PlannedPort};
 pub(crate) use plan::{
     Clock, Condition, PlannedCommand, PlannedDevice, PlannedExit, PlannedModes, PlannedNode, PlannedRole, PlannedShow,
     PlannedView, PlannedWire, PortRef, Producer, Test,

@@ -5,7 +5,7 @@ use crate::engine::NodeRunner;
 use crate::node::{At, Bus, Components, Given, Mistake, Mistakes, Need, Node, NodeSpec, PortId, Tick, of};
 use crate::signal::{Features, Freshness, Mark, Shape, Signal, Stamp};
 
-/// Returns the code and the place of each mistake in a node, for tests of bad parameters: ``bad-value: `-1` `` for a
+/// Returns the code and the place of each mistake or warning of a node, for tests of bad parameters: ``bad-value: `-1` `` for a
 /// value in the text `params`, ``unknown-key: `threshold` `` for a parameter, ``shape-mismatch: `in.image` `` for an
 /// input.
 #[must_use]
@@ -21,7 +21,8 @@ pub fn places(params: &str, made: &Result<NodeRig, Mistakes>) -> Vec<String> {
         };
         format!("{}: `{place}`", code.name())
     };
-    made.as_ref().err().into_iter().flatten().map(describe).collect()
+    let found = made.as_ref().map_or_else(|mistakes| mistakes, |rig| &rig.warnings);
+    found.iter().map(describe).collect()
 }
 
 /// A single node in a test. It steps as in a graph: when a trigger is new or lost.
@@ -34,6 +35,8 @@ pub struct NodeRig {
     inputs: Vec<(String, PortId)>,
     outputs: Vec<PortId>,
     shapes: Vec<Shape>,
+    /// The warnings of the node.
+    pub warnings: Mistakes,
     /// The tick of the next step.
     pub tick: Tick,
 }
@@ -68,7 +71,8 @@ impl NodeRig {
         let built = configured.build(Given { inputs: given, period: 0.001 })?;
         let outputs: Vec<PortId> = built.outputs.iter().map(|shape| bus.add(shape)).collect();
         let runner = NodeRunner::new(built.node, &wired, outputs.clone(), N::EVERY_TICK);
-        Ok(Self { runner, spec, bus, inputs, outputs, shapes: built.outputs, tick: Tick::first() })
+        let (shapes, warnings) = (built.outputs, built.warnings);
+        Ok(Self { runner, spec, bus, inputs, outputs, shapes, warnings, tick: Tick::first() })
     }
 
     fn input(&self, name: &str) -> PortId {

@@ -9,7 +9,7 @@ impl ParamSpec {
     /// Returns the description of a field of type `T`.
     #[must_use]
     pub fn of<T: Param>(declared: &Declared, default: Option<fn() -> T>) -> Self {
-        let Declared { name, doc, unit, bounds, is_live, is_from_bench } = *declared;
+        let Declared { name, doc, unit, bounds, is_live, is_from_bench, .. } = *declared;
         let written = default.and_then(|value| value().written());
         Self {
             name,

@@ -8,8 +8,8 @@ use std::borrow::Cow;
 use std::marker::PhantomData;
 
 use super::{
-    Bus, Components, InputSet, Limits, Mistakes, Node, OutputSet, Param, ParamSpec, PortId, PortSpec, Reader, Setup,
-    Tick, Wires,
+    Bus, Components, InputSet, Limits, Mistakes, Motion, Node, OutputSet, Param, ParamSpec, PortId, PortSpec, Reader,
+    Setup, Tick, Wires,
 };
 use crate::signal::Shape;
 use crate::source::Value;
@@ -73,10 +73,12 @@ pub struct Built {
     pub node: Box<dyn AnyNode>,
     /// Shape of each output in the order of the declarations.
     pub outputs: Vec<Shape>,
-    /// Whether the node starts no motion by itself; see [`Setup`].
-    pub is_still: bool,
+    /// The motion that the node generates; see [`Setup`].
+    pub motion: Motion,
     /// Whether its limits are in raw readings; see [`Setup`].
     pub is_uncalibrated: bool,
+    /// The warnings about its parameters and its wires.
+    pub warnings: Mistakes,
 }
 
 /// A node that can run.
@@ -149,13 +151,14 @@ impl<N: Node> Configured for WithParams<N> {
     fn build(self: Box<Self>, given: Given) -> Result<Built, Mistakes> {
         let inputs = <N::Inputs<'static> as InputSet<'static>>::shapes(given.inputs);
         let (outputs, period) = (Default::default(), given.period);
-        let mut setup = Setup::<N> { inputs, outputs, period, is_still: false, is_uncalibrated: false };
+        let (motion, warnings) = (Motion::Any, Mistakes::new());
+        let mut setup = Setup::<N> { inputs, outputs, period, motion, is_uncalibrated: false, warnings };
         let node = N::new(self.0, &mut setup)?;
-        let Setup { is_still, is_uncalibrated, .. } = setup;
+        let Setup { motion, is_uncalibrated, warnings, .. } = setup;
         let outputs = N::Outputs::into_shapes(setup.outputs);
         let state = node.state();
         let cell = Cell { active: Configuration { fresh: node.state(), node }, state, parked: vec![None], number: 0 };
-        Ok(Built { node: Box::new(cell), outputs, is_still, is_uncalibrated })
+        Ok(Built { node: Box::new(cell), outputs, motion, is_uncalibrated, warnings })
     }
 }
 

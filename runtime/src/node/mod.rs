@@ -6,7 +6,7 @@
 //! | Derive | implements | reads |
 //! |---|---|---|
 //! | `#[derive(Describe)]` | [`Describe`](trait@Describe) | the name, the doc comment, `#[describe(name = "…", every_tick, logs)]` |
-//! | `#[derive(Param)]` | [`Param`](trait@Param) for a table or a word | `#[param(unit = "…", range = …, above = …, default = …, live, from_bench)]` |
+//! | `#[derive(Param)]` | [`Param`](trait@Param) for a table or a word | `#[param(unit = "…", range = …, above = …, usual = …, default = …, live, from_bench)]` |
 //! | `#[derive(Inputs)]` | [`InputSet`] | `#[port(unit = "…", frame = "…", …)]` |
 //! | `#[derive(Outputs)]` | [`OutputSet`] | the same |
 //! | `#[derive(State)]` | [`Default`]; [`Clone`], field by field, so that a reset does not allocate | |
@@ -47,6 +47,7 @@ mod known_units;
 mod limits;
 mod measured;
 mod mistake;
+mod motion;
 mod outputs;
 mod param_spec;
 mod params;
@@ -55,6 +56,7 @@ mod ports;
 mod reader;
 mod tick;
 mod time;
+mod usual;
 
 pub use bounds::Bounds;
 pub use bus::{Bus, PortId, Wires};
@@ -66,6 +68,7 @@ pub use known_units::KnownUnits;
 pub use limits::{Components, Limits};
 pub(crate) use measured::Amount;
 pub use mistake::{At, Mistake, Mistakes, collect_both, refuse_any};
+pub use motion::Motion;
 pub use outputs::{Out, OutputSet};
 pub use param_spec::{Contents, Declared, ParamSpec, Repeats, Written, written_table};
 pub use params::{Map, Spanned};
@@ -75,6 +78,7 @@ pub use reader::{Measured, Param, Reader, read_leaf};
 pub use tactflow_derive::{Describe, Inputs, Outputs, Param, State};
 pub use tick::Tick;
 pub use time::{Absence, Interval};
+pub(crate) use usual::shortest;
 
 /// The name and the documentation of a node or a device. `#[derive(Describe)]` takes them from the struct and its doc
 /// comment.
@@ -151,10 +155,12 @@ pub struct Setup<N: Node> {
     pub outputs: <N::Outputs as OutputSet>::Shapes,
     /// Nominal time between two ticks of the graph [s].
     pub period: f64,
-    /// Set by a generator whose parameters cause no motion. A node whose output is computed from samples leaves it
-    /// `false`.
-    pub is_still: bool,
+    /// The motion that the node generates. A node whose output is computed from samples leaves it `Any`.
+    pub motion: Motion,
     /// Set by a limiter whose limits are in raw readings, so that nothing is limited in newtons. The bench must allow
     /// it.
     pub is_uncalibrated: bool,
+    /// Warnings, which the node adds: what is valid, but probably a mistake. Each code has the severity of a warning,
+    /// so that the graph still loads.
+    pub warnings: Mistakes,
 }

@@ -86,6 +86,8 @@ pub struct Declared {
     pub unit: Option<&'static str>,
     /// Range.
     pub bounds: Option<Bounds>,
+    /// Range of the usual numbers. One outside of it is accepted with a warning.
+    pub usual: Option<Bounds>,
     /// Whether a mode can set it.
     pub is_live: bool,
     /// Whether only a fact can set it, which the bench states and the task cannot.
@@ -96,7 +98,7 @@ impl Declared {
     /// Declares only the name.
     #[must_use]
     pub const fn new(name: &'static str) -> Self {
-        Self { name, doc: "", unit: None, bounds: None, is_live: false, is_from_bench: false }
+        Self { name, doc: "", unit: None, bounds: None, usual: None, is_live: false, is_from_bench: false }
     }
 }
 

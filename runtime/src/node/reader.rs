@@ -11,6 +11,7 @@ use super::file_path::FilePath;
 use super::known_units::KnownUnits;
 use super::mistake::{At, Mistake, Mistakes};
 use super::param_spec::{Contents, Declared, ParamSpec, Written};
+use super::usual::Usual;
 use crate::source::{Code, suggest_name, suggest_path, suggestion};
 use crate::source::{Item, Key, Meant, SourceMap, Table, Value};
 
@@ -72,8 +73,12 @@ pub struct Reader<'a> {
     pub(super) entry: Option<(usize, usize)>,
     /// The values so far that were written with a unit.
     pub measured: Measured,
+    /// The usual numbers of the current field.
+    usual: Usual,
     /// The mistakes so far.
     pub mistakes: Mistakes,
+    /// The warnings so far.
+    pub warnings: Mistakes,
 }
 
 /// A table with the entries that are not read yet.
@@ -98,8 +103,10 @@ impl<'a> Reader<'a> {
             units: KnownUnits::NONE,
             component: None,
             entry: None,
+            usual: Usual::NONE,
             measured: Vec::new(),
             mistakes: Vec::new(),
+            warnings: Vec::new(),
         }
     }
 
@@ -107,6 +114,12 @@ impl<'a> Reader<'a> {
     #[must_use]
     pub fn with_units(self, units: KnownUnits<'a>) -> Self {
         Self { units, ..self }
+    }
+
+    /// Warns of times that are shorter than a `period` [s].
+    pub(crate) fn with_period(mut self, period: f64) -> Self {
+        self.usual.period = period;
+        self
     }
 
     /// Adds the mistake that the value at `span` is wrong, and returns `None`.
@@ -142,10 +155,10 @@ impl<'a> Reader<'a> {
     ) -> Option<T> {
         let Declared { name, bounds, unit, .. } = *declared;
         if let Some((_, value)) = table.rest.remove(name) {
-            let outer = (self.bounds, self.unit);
-            (self.bounds, self.unit) = (bounds, unit);
+            let outer = (self.bounds, self.unit, self.usual);
+            (self.bounds, self.unit, self.usual) = (bounds, unit, self.usual.of(declared));
             let read = T::read(&value, self);
-            (self.bounds, self.unit) = outer;
+            (self.bounds, self.unit, self.usual) = outer;
             return read;
         }
         let default = default.map(|default| default()).or_else(T::when_missing);
@@ -193,6 +206,7 @@ impl<'a> Reader<'a> {
         let converted = self.in_declared_unit(value)?;
         let is_in_range = |read: &T| self.bounds.is_none_or(|bounds| bounds.contains(number(*read)));
         let read: Option<T> = converted.read().filter(is_in_range);
+        self.warnings.extend(read.and_then(|read| self.usual.find_warning(number(read), value.span.clone())));
         match (read, converted) {
             (Some(read), Cow::Owned(converted)) => {
                 self.measured.push((converted.span, converted.item));

@@ -110,7 +110,7 @@ mod tests {
             MaskShape::default().into(),
             RegionsShape::default().into(),
             TwistShape.into(),
-            PoseShape.into(),
+            PoseShape::default().into(),
             JointsShape { joints: vec![Joint::default()], ..JointsShape::default() }.into(),
             JacobianShape::default().into(),
         ];

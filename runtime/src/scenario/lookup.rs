@@ -23,7 +23,7 @@ pub(super) fn look_up(
     catalogue: &Catalogue,
     found: Vec<Diagnostic>,
 ) -> Result<Scenario, Report> {
-    let mut lookup = Lookup { plan, found };
+    let mut lookup = Lookup { plan, found, read: BTreeSet::new() };
     let (mut checks, mut rows) = (Vec::new(), Vec::new());
     for block in &document.checks {
         let Some((check, its_rows)) = lookup.check(block) else { continue };
@@ -48,6 +48,7 @@ pub(super) fn look_up(
             ends_in: table.ends_in.as_ref().map(|word| word.value.clone()),
             checks,
             rows,
+            warnings: plan.warnings_of_read(&lookup.read),
         }
     });
     let found = lookup.found;
@@ -68,6 +69,8 @@ fn rows_of(table: &ScenarioTable) -> impl Iterator<Item = FigureRow> {
 struct Lookup<'a> {
     plan: &'a Compiled,
     found: Vec<Diagnostic>,
+    /// The names of the ports that the scenario reads.
+    read: BTreeSet<String>,
 }
 
 impl Lookup<'_> {
@@ -80,6 +83,7 @@ impl Lookup<'_> {
     /// Finds a column by its name in a recording or in the wires of the task. Returns it with the kind of its port.
     fn column(&mut self, word: &Spanned<String>) -> Option<(PortColumn, Kind)> {
         let (port, rest) = self.plan.port_prefix(&word.value).or_else(|| self.unknown_port(word))?;
+        self.read.insert(port.name.clone());
         let (columns, kind) = (PortColumns::of(port), port.shape.kind());
         if let Some(column) = columns.iter().find(|column| column.part == rest) {
             return Some((column.clone(), kind));

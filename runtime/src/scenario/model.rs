@@ -2,6 +2,7 @@
 
 use super::judge::{Bound, Figure, FigureRow};
 use crate::graph::Request;
+use crate::source::Report;
 
 /// A scenario that has been checked with its task and its bench: every port it names exists.
 #[derive(Debug, Clone)]
@@ -24,6 +25,7 @@ pub struct Scenario {
     pub(super) checks: Vec<Check>,
     /// The rows of all figures, without values: those of the checks, then those of the run as a whole.
     pub(super) rows: Vec<FigureRow>,
+    pub(super) warnings: Option<Report>,
 }
 
 /// A check on one value.
@@ -51,6 +53,12 @@ impl Scenario {
     #[must_use]
     pub fn is_one(text: &str) -> bool {
         text.lines().any(|line| line.trim() == "[scenario]" || line.trim_start().starts_with("scenario."))
+    }
+
+    /// Returns the warnings of its task on its bench. A node is used if a check reads it.
+    #[must_use]
+    pub const fn warnings(&self) -> Option<&Report> {
+        self.warnings.as_ref()
     }
 
     /// Replaces the seeds by 1 to `count`. A scenario without seeds does not change.

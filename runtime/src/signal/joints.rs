@@ -16,11 +16,13 @@ pub struct Joint {
     pub speed: f64,
     /// Maximum acceleration [rad/s²]; infinite if it is unknown.
     pub acceleration: f64,
+    /// Position at which a run starts, if it is known [rad].
+    pub start: Option<f64>,
 }
 
 impl Default for Joint {
     fn default() -> Self {
-        Self { name: String::new(), lower: 0.0, upper: 0.0, speed: 0.0, acceleration: f64::INFINITY }
+        Self { name: String::new(), lower: 0.0, upper: 0.0, speed: 0.0, acceleration: f64::INFINITY, start: None }
     }
 }
 

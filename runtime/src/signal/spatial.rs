@@ -43,6 +43,9 @@ impl Default for Pose {
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct TwistShape;
 
-/// The shape of a pose, which has no properties: its frames belong to the wire.
-#[derive(Debug, Clone, PartialEq, Eq, Default)]
-pub struct PoseShape;
+/// The shape of a pose: what is known of it before a run. Its frames belong to the wire.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct PoseShape {
+    /// Origin at the start of a run, if it is known [m].
+    pub start: Option<[f64; 3]>,
+}

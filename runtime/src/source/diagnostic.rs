@@ -110,6 +110,24 @@ codes! {
     BadClock "bad-clock",
     /// A node whose outputs are not used.
     UnusedNode "unused-node",
+    /// A number far beyond what an arm or a sensor can do, as in another unit.
+    UnusualValue "unusual-value",
+    /// A time that is shorter than a period.
+    ShortTime "short-time",
+    /// A gain of zero or below, so that a loop does not correct its error.
+    UnusualGain "unusual-gain",
+    /// A gain that is too high for the period, so that a loop diverges.
+    UnstableGain "unstable-gain",
+    /// A sensor that starts outside its workspace.
+    StartOutside "start-outside",
+    /// A mode that waits for a contact and does not move toward it.
+    NoApproach "no-approach",
+    /// An exit of a mode that is never taken, because another one comes first.
+    LateExit "late-exit",
+    /// An exit of a mode that holds as soon as the mode begins.
+    ImmediateExit "immediate-exit",
+    /// An entry of [allow] that silences no warning.
+    UnusedAllow "unused-allow",
 }
 
 /// The severity of a diagnostic.
@@ -137,7 +155,16 @@ impl Code {
     #[must_use]
     pub const fn severity(self) -> Severity {
         match self {
-            Self::UnusedNode => Severity::Warning,
+            Self::UnusedNode
+            | Self::UnusualValue
+            | Self::ShortTime
+            | Self::UnusualGain
+            | Self::UnstableGain
+            | Self::StartOutside
+            | Self::NoApproach
+            | Self::LateExit
+            | Self::ImmediateExit
+            | Self::UnusedAllow => Severity::Warning,
             _ => Severity::Error,
         }
     }

@@ -26,7 +26,7 @@ fn wires() -> [(&'static str, Shape); 4] {
     let joints = JointsShape { joints: lwr().joints().to_vec(), unit: Unit::RADIAN };
     [
         ("twist", TwistShape.into()),
-        ("sensor_pose", PoseShape.into()),
+        ("sensor_pose", PoseShape::default().into()),
         ("jacobian", JacobianShape(joints.clone()).into()),
         ("joints", joints.into()),
     ]
@@ -241,7 +241,7 @@ fn a_bad_parameter_is_a_mistake() {
     let fewer = JointsShape { joints: joints.joints[..6].to_vec(), unit: Unit::RADIAN };
     let wires = [
         ("twist", TwistShape.into()),
-        ("sensor_pose", PoseShape.into()),
+        ("sensor_pose", PoseShape::default().into()),
         ("jacobian", JacobianShape(fewer).into()),
         ("joints", joints.into()),
     ];

@@ -125,6 +125,7 @@ fn joints(hello: &Hello, acceleration: f64) -> JointsShape {
         upper: hello.q_max[i],
         speed: hello.dq_max[i],
         acceleration,
+        start: None,
     };
     JointsShape { joints: hello.joints.iter().enumerate().map(joint).collect(), unit: Unit::RADIAN }
 }

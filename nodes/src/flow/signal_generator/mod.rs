@@ -3,7 +3,7 @@
 mod waveform;
 
 use tactflow_runtime::node::{
-    At, Describe, In, Inputs, Mistake, Mistakes, Node, Out, Outputs, Param, Setup, State, Tick, refuse_any,
+    At, Describe, In, Inputs, Mistake, Mistakes, Motion, Node, Out, Outputs, Param, Setup, State, Tick, refuse_any,
 };
 use tactflow_runtime::signal::{Flag, Scalar, ScalarShape, Unit};
 use tactflow_runtime::source::Code;
@@ -112,7 +112,9 @@ impl Node for SignalGenerator {
 
     fn new(params: Params, setup: &mut Setup<Self>) -> Result<Self, Mistakes> {
         check(&params, setup.period)?;
-        setup.is_still = params.amplitude == 0.0 && params.offset == 0.0;
+        if params.amplitude == 0.0 && params.offset == 0.0 {
+            setup.motion = Motion::Still;
+        }
         setup.outputs.value = ScalarShape::of(params.unit);
         let first = params.frequency.unwrap_or(0.0);
         Ok(Self {

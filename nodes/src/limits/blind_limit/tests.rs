@@ -21,7 +21,7 @@ fn try_rig(more: &str) -> Result<NodeRig, Mistakes> {
         ("twist", TwistShape.into()),
         ("contact", FlagShape.into()),
         ("image", pad.into()),
-        ("pose", PoseShape.into()),
+        ("pose", PoseShape::default().into()),
     ];
     NodeRig::new::<BlindLimit>(&format!("{PARAMS}\n{more}"), &wires)
 }

@@ -12,6 +12,7 @@ use tactflow_runtime::signal::{Image, ImageShape, Scalar, Stamp, Twist, Unit};
 
 use super::{fraction, max_age};
 use crate::motion::bounds::countable;
+use crate::usual::{USUAL_FORCE_N, USUAL_M_PER_S, USUAL_PEAK_N};
 
 use ceilings::Ceilings;
 pub use load::{PadLoad, load};
@@ -56,10 +57,10 @@ pub struct ContactLimit {
 #[derive(Debug, Clone, Param)]
 pub struct Params {
     /// Ceiling of the sum of an image in N.
-    #[param(unit = "N", above = 0.0)]
+    #[param(unit = "N", above = 0.0, usual = ..=USUAL_FORCE_N)]
     force_n: Option<f64>,
     /// Ceiling of a single tactel of an image in N.
-    #[param(unit = "N", above = 0.0)]
+    #[param(unit = "N", above = 0.0, usual = ..=USUAL_PEAK_N)]
     peak_n: Option<f64>,
     /// Ceiling of the sum of an image of raw readings.
     #[param(unit = "raw", above = 0.0)]
@@ -71,7 +72,7 @@ pub struct Params {
     #[param(unit = "1", range = 0.0..=1.0, default = 0.5)]
     begin: f64,
     /// Maximum speed of the approach at `begin`.
-    #[param(unit = "m/s", above = 0.0)]
+    #[param(unit = "m/s", above = 0.0, usual = ..=USUAL_M_PER_S)]
     approach_m_per_s: f64,
     /// Maximum age of the image; five periods of the graph if not given.
     #[param(unit = "ms", above = 0.0)]

@@ -34,6 +34,7 @@ pub(super) fn joints(
             upper: has.upper.min(wanted.upper),
             speed: has.speed.min(wanted.speed) * params.speed,
             acceleration: has.acceleration.min(wanted.acceleration).min(acceleration),
+            start: has.start,
         })
         .collect();
     if let Some(joint) = joints.iter().find(|joint| !joint.acceleration.is_finite()) {

@@ -7,6 +7,7 @@ use tactflow_runtime::node::{Describe, In, Inputs, Limits, Mistakes, Node, Out, 
 use tactflow_runtime::signal::{Joint, Joints, JointsShape, Scalar, Stamp, Unit};
 
 use super::{fraction, max_age};
+use crate::usual::{USUAL_LEAD_RAD, USUAL_RAD_PER_S2};
 
 use joints::joints;
 pub use limiter::Limiter;
@@ -54,10 +55,10 @@ pub struct JointLimit {
 #[derive(Debug, Clone, Param)]
 pub struct Params {
     /// Maximum acceleration of every joint; a smaller one that the arm states has priority.
-    #[param(unit = "rad/s2", above = 0.0)]
+    #[param(unit = "rad/s2", above = 0.0, usual = ..=USUAL_RAD_PER_S2)]
     acceleration: Option<f64>,
     /// Maximum lead of the equilibrium over the position.
-    #[param(unit = "rad", above = 0.0)]
+    #[param(unit = "rad", above = 0.0, usual = ..=USUAL_LEAD_RAD)]
     lead_rad: f64,
     /// Fraction of each joint's maximum speed that is used.
     #[param(unit = "1", range = 0.0..=1.0, default = 1.0)]

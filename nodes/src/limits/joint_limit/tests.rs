@@ -20,6 +20,7 @@ fn arm(accelerations: &[f64]) -> JointsShape {
         upper: 0.8,
         speed: 1.5 + i as f64,
         acceleration: *acceleration,
+        start: None,
     };
     JointsShape { joints: accelerations.iter().enumerate().map(joint).collect(), unit: Unit::RADIAN }
 }
@@ -161,7 +162,7 @@ proptest! {
 
 #[test]
 fn the_allowed_velocities_of_a_joint() {
-    let joint = Joint { name: String::new(), lower: -1.0, upper: 1.0, speed: 2.0, acceleration: 5.0 };
+    let joint = Joint { lower: -1.0, upper: 1.0, speed: 2.0, acceleration: 5.0, ..Joint::default() };
     // With τ = 0.2 s and 5 rad/s² a stop from 1 rad/s takes 0.3 rad.
     let cases = [
         ((0.0, 0.0, 0.0), 9.0, (-2.0, 2.0), "in the middle: its speed"),
@@ -291,7 +292,7 @@ fn the_narrowest_of_all_stated_limits_applies() {
     let wires = [("velocity", velocity.into()), ("position", shape.clone().into()), ("equilibrium", shape.into())];
     let rig = NodeRig::new::<JointLimit>("lead_rad = 0.1\nspeed = 0.5\nacceleration = 12.0", &wires).unwrap();
     let Shape::Joints(given) = rig.shape("velocity") else { panic!("joints") };
-    let narrowest = Joint { name: "j0".into(), lower: -0.5, upper: 0.8, speed: 0.5, acceleration: 10.0 };
+    let narrowest = Joint { name: "j0".into(), lower: -0.5, upper: 0.8, speed: 0.5, acceleration: 10.0, start: None };
     assert_eq!((&given.joints, given.unit), (&vec![narrowest], Unit::RADIAN.per_second()));
 }
 

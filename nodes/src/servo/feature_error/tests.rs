@@ -3,7 +3,7 @@
 use std::f64::consts::{FRAC_PI_2, PI};
 
 use proptest::prelude::*;
-use tactflow_runtime::harness::NodeRig;
+use tactflow_runtime::harness::{NodeRig, places};
 use tactflow_runtime::signal::{Features, Freshness, Scalar, Shape, Stamp, Unit};
 
 use super::super::pid::Pid;
@@ -169,4 +169,28 @@ fn a_name_that_does_not_match_is_a_mistake() {
     }
     let mistakes = NodeRig::new::<FeatureError>("setpoint = {}", &[]).err().unwrap();
     assert_eq!((mistakes.len(), mistakes[0].code, &mistakes[0].at), (1, Code::MissingInput, &At::Node));
+}
+
+#[test]
+fn a_setpoint_that_a_feature_never_has_is_warned_of() {
+    let scalar = |unit| ScalarShape::of(unit);
+    let wires = [
+        ("x", scalar(Unit::METRE).within(-0.04, 0.04).into()),
+        ("alpha", scalar(Unit::AXIAL).into()),
+        ("pressure", scalar(Unit::NEWTON.per_tactel()).into()),
+        ("force", scalar(Unit::NEWTON).into()),
+        ("raw", scalar(Unit::RAW).into()),
+    ];
+    let cases: [(&str, &[&str]); 6] = [
+        ("x = 0.04, alpha = 1.5708, pressure = 0.1, force = 15, raw = 4000", &[]),
+        ("x = -0.02, alpha = -3.1416, pressure = 0, force = 0, raw = -1", &[]),
+        ("x = 5.0, alpha = 0, pressure = 0, force = 0, raw = 0", &["unusual-value: `setpoint.x`"]),
+        ("x = 0, alpha = 90, pressure = 0, force = 0, raw = 0", &["unusual-value: `setpoint.alpha`"]),
+        ("x = 0, alpha = 0, pressure = 100, force = 0, raw = 0", &["unusual-value: `setpoint.pressure`"]),
+        ("x = 0, alpha = 0, pressure = 0, force = 15000, raw = 0", &["unusual-value: `setpoint.force`"]),
+    ];
+    for (setpoint, expected) in cases {
+        let params = format!("setpoint = {{ {setpoint} }}");
+        assert_eq!(places(&params, &NodeRig::new::<FeatureError>(&params, &wires)), expected, "{setpoint}");
+    }
 }

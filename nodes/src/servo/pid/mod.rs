@@ -6,9 +6,10 @@
 mod law;
 
 use tactflow_runtime::node::{
-    Components, Describe, In, Inputs, Map, Mistakes, Node, Out, Outputs, Param, Setup, State, Tick,
+    At, Components, Describe, In, Inputs, Map, Mistake, Mistakes, Node, Out, Outputs, Param, Setup, State, Tick,
 };
 use tactflow_runtime::signal::{Features, Freshness, Unit};
+use tactflow_runtime::source::Code;
 
 use law::{Law, Memory};
 
@@ -51,6 +52,9 @@ pub struct Params {
     gains: Map<Gains>,
 }
 
+/// Part of the error that one period corrects, from which on the loop diverges: e := (1 - kp T) e [1].
+const MAX_STABLE_STEP: f64 = 2.0;
+
 /// Gains of one feature.
 #[derive(Debug, Clone, Param)]
 struct Gains {
@@ -72,6 +76,38 @@ struct Gains {
     /// Bound on the whole control; without it, the control has no bound.
     #[param(unit = "E/s", above = 0.0)]
     limit: Option<f64>,
+}
+
+impl Gains {
+    /// Returns the warning about gains that do not reduce the error of a feature with one sample in each `period` [s].
+    fn warning(&self, feature: &str, period: f64) -> Option<Mistake> {
+        let warn = |code, gain: &str, message: String| {
+            Some(Mistake::new(code, At::Param(format!("gains.{feature}.{gain}")), message))
+        };
+        let negative = [("kp", self.kp), ("ki", self.ki), ("kd", self.kd)].into_iter().find(|(_, value)| *value < 0.0);
+        if let Some((gain, value)) = negative {
+            let message = format!("the gain `{gain}` of `{feature}` is {value}: it increases the error");
+            let help = format!("write `{gain} = {}`, and reverse the motion in the column of `{feature}`", -value);
+            return Some(warn(Code::UnusualGain, gain, message)?.help(help));
+        }
+        if self.kp == 0.0 {
+            let message = format!("the gain `kp` of `{feature}` is 0 1/s: nothing corrects the error");
+            let help = format!("write a gain greater than 0, or remove the wire of `{feature}` to stop controlling it");
+            return Some(warn(Code::UnusualGain, "kp", message)?.help(help));
+        }
+        let (step, max) = (self.kp * period, MAX_STABLE_STEP / period);
+        if step < MAX_STABLE_STEP {
+            return None;
+        }
+        let message = format!(
+            "the gain `kp` of `{feature}` is {} 1/s, so one period of {} ms corrects {step:.1} times the error, and the loop \
+             diverges",
+            self.kp,
+            (period * 1e6).round() / 1e3
+        );
+        let help = format!("write less than {max:.0} 1/s, for example `kp = {}`", (max / 100.0).max(0.1));
+        Some(warn(Code::UnstableGain, "kp", message)?.help(help))
+    }
 }
 
 /// What `pid` reads.
@@ -108,6 +144,8 @@ impl Node for Pid {
     fn new(params: Params, setup: &mut Setup<Self>) -> Result<Self, Mistakes> {
         let shape = &setup.inputs.error;
         let gains = params.gains.in_order("gains", shape.names())?;
+        let warnings = shape.names().zip(&gains).filter_map(|(name, gains)| gains.warning(name, setup.period));
+        setup.warnings.extend(warnings);
         let laws =
             gains.into_iter().zip(&shape.features).map(|(gains, feature)| Law::new(gains, feature.unit)).collect();
         setup.outputs.control = shape.map_units(Unit::per_second);

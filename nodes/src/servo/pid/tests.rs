@@ -3,7 +3,7 @@
 use std::f64::consts::PI;
 
 use proptest::prelude::*;
-use tactflow_runtime::harness::NodeRig;
+use tactflow_runtime::harness::{NodeRig, places};
 use tactflow_runtime::node::At;
 use tactflow_runtime::signal::{Feature, Features, FeaturesShape, Shape, Stamp};
 use tactflow_runtime::source::Code;
@@ -333,5 +333,25 @@ fn gains_and_features_must_agree() {
         assert_eq!(mistakes.len(), 1, "{bad}");
         let At::Span(span) = &mistakes[0].at else { panic!("{bad}: {:?}", mistakes[0].at) };
         assert!(token.start <= span.start && span.end <= token.end, "{bad}: {span:?} is not in {token:?}");
+    }
+}
+
+#[test]
+fn gains_that_do_not_reduce_the_error_are_warned_of() {
+    let wires = [("error", Shape::from(shape(&[("x", Unit::METRE)])))];
+    let cases: [(&str, &[&str]); 9] = [
+        ("{ kp = 2.0, ki = 0.1, kd = 0.0 }", &[]),
+        ("{ kp = 1999.0 }", &[]),
+        ("{ kp = 2000.0 }", &["unstable-gain: `gains.x.kp`"]),
+        ("{ kp = 0.0 }", &["unusual-gain: `gains.x.kp`"]),
+        ("{}", &["unusual-gain: `gains.x.kp`"]),
+        ("{ kp = 0, ki = 0.1 }", &["unusual-gain: `gains.x.kp`"]),
+        ("{ kp = -2.0 }", &["unusual-gain: `gains.x.kp`"]),
+        ("{ kp = 2.0, ki = -0.1 }", &["unusual-gain: `gains.x.ki`"]),
+        ("{ kp = 2.0, kd = -0.1 }", &["unusual-gain: `gains.x.kd`"]),
+    ];
+    for (gains, expected) in cases {
+        let params = format!("gains.x = {gains}");
+        assert_eq!(places(&params, &NodeRig::new::<Pid>(&params, &wires)), expected, "{gains}");
     }
 }

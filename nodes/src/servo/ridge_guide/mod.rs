@@ -6,6 +6,7 @@ mod slope;
 use tactflow_runtime::node::{Describe, In, Inputs, Mistake, Mistakes, Node, Out, Outputs, Param, Setup, Tick};
 use tactflow_runtime::signal::{Flag, Pose, Scalar, Twist};
 
+use crate::usual::{USUAL_LENGTH_M, USUAL_M_PER_S, USUAL_RAD};
 use search::Search;
 
 /// Guides a sensor toward where the contact gets narrower, and then along the ridge.
@@ -51,13 +52,13 @@ pub struct RidgeGuide {
 #[derive(Debug, Clone, Param)]
 pub struct Params {
     /// Speed of the sensor. At 0 there is no motion, and the search starts afresh.
-    #[param(unit = "m/s", range = 0.0.., default = 0.0, live)]
+    #[param(unit = "m/s", range = 0.0.., usual = ..=USUAL_M_PER_S, default = 0.0, live)]
     speed_m_per_s: f64,
     /// First heading, from the sensor's +x toward +y.
-    #[param(unit = "rad", default = 0.0)]
+    #[param(unit = "rad", usual = -USUAL_RAD..=USUAL_RAD, default = 0.0)]
     heading_rad: f64,
     /// Length of each of the two legs that a gradient is computed from.
-    #[param(unit = "m", above = 0.0, default = 0.01)]
+    #[param(unit = "m", above = 0.0, usual = ..=USUAL_LENGTH_M, default = 0.01)]
     leg_m: f64,
     /// Smallest change of the eccentricity over a leg that changes the heading.
     #[param(unit = "1", range = 0.0..=1.0, default = 0.02)]

@@ -51,8 +51,11 @@ const CENTRE: f64 = 2.0;
 impl RidgeScene {
     fn new(ridge: Ridge, at: [f64; 2], yaw: f64, noise: f64, params: &str) -> Self {
         let one = || ScalarShape::of(Unit::ONE).into();
-        let wires =
-            [("eccentricity", one()), ("orientation", ScalarShape::of(Unit::AXIAL).into()), ("pose", PoseShape.into())];
+        let wires = [
+            ("eccentricity", one()),
+            ("orientation", ScalarShape::of(Unit::AXIAL).into()),
+            ("pose", PoseShape::default().into()),
+        ];
         let rig = NodeRig::new::<RidgeGuide>(params, &wires).unwrap();
         Self { rig, ridge, at, yaw, noise, random: Random::new(11, 0), is_on: false, course: f64::NAN }
     }
@@ -228,7 +231,11 @@ fn the_motion_is_as_old_as_the_contact_and_absent_without_one() {
 fn a_bad_parameter_is_a_mistake() {
     let wires = || {
         let one = ScalarShape::of(Unit::ONE).into();
-        [("eccentricity", one), ("orientation", ScalarShape::of(Unit::AXIAL).into()), ("pose", PoseShape.into())]
+        [
+            ("eccentricity", one),
+            ("orientation", ScalarShape::of(Unit::AXIAL).into()),
+            ("pose", PoseShape::default().into()),
+        ]
     };
     for (bad, place) in [
         ("on_above = 0.9\noff_below = 0.9", "bad-value: `off_below`"),
@@ -263,7 +270,7 @@ proptest! {
         let guide = NodeRig::new::<RidgeGuide>(&format!("{PARAMS}\nheading_rad = {heading}"), &[
             ("eccentricity", ScalarShape::of(Unit::ONE).into()),
             ("orientation", ScalarShape::of(Unit::AXIAL).into()),
-            ("pose", PoseShape.into()),
+            ("pose", PoseShape::default().into()),
         ]);
         let mut rig = guide.unwrap();
         let (mut at, mut courses) = ([0.0; 2], Vec::new());

@@ -5,6 +5,7 @@ mod scan;
 use tactflow_runtime::node::{Absence, Describe, In, Inputs, Mistakes, Node, Out, Outputs, Param, Setup, State, Tick};
 use tactflow_runtime::signal::{Flag, Pose, Scalar, Twist};
 
+use crate::usual::{USUAL_LENGTH_M, USUAL_M_PER_S};
 use scan::Scan;
 
 /// Moves a sensor back and forth over a surface, in parallel strokes.
@@ -53,7 +54,7 @@ pub struct ScanGuide {
 #[derive(Debug, Clone, Param)]
 pub struct Params {
     /// Speed of the sensor. At 0 there is no scan.
-    #[param(unit = "m/s", range = 0.0.., default = 0.0, live)]
+    #[param(unit = "m/s", range = 0.0.., usual = ..=USUAL_M_PER_S, default = 0.0, live)]
     speed_m_per_s: f64,
     /// Axis of the sensor along which the strokes go.
     #[param(default = StrokeAxis::X, live)]
@@ -62,13 +63,13 @@ pub struct Params {
     #[param(unit = "1", range = 1..=1_000_000, default = 1, live)]
     strokes: usize,
     /// Length of a stroke.
-    #[param(unit = "m", above = 0.0, live)]
+    #[param(unit = "m", above = 0.0, usual = ..=USUAL_LENGTH_M, live)]
     stroke_m: f64,
     /// Width of the step between two strokes.
-    #[param(unit = "m", above = 0.0, live)]
+    #[param(unit = "m", above = 0.0, usual = ..=USUAL_LENGTH_M, live)]
     step_m: f64,
     /// A leg ends where the contact is further than this behind the middle of the pad: the edge of the object.
-    #[param(unit = "m", above = 0.0, default = 0.02)]
+    #[param(unit = "m", above = 0.0, usual = ..=USUAL_LENGTH_M, default = 0.02)]
     edge_m: f64,
 }
 

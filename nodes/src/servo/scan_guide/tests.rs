@@ -31,7 +31,7 @@ struct ScanScene {
 impl ScanScene {
     fn new(params: &str) -> Self {
         let metre = || Shape::from(ScalarShape::of(Unit::METRE));
-        let wires = [("gate", FlagShape.into()), ("pose", PoseShape.into()), ("x", metre()), ("y", metre())];
+        let wires = [("gate", FlagShape.into()), ("pose", PoseShape::default().into()), ("x", metre()), ("y", metre())];
         let tilt = Rotation3::from_euler_angles(0.3, -0.2, 0.5);
         Self {
             rig: NodeRig::new::<ScanGuide>(params, &wires).unwrap(),
@@ -262,7 +262,7 @@ fn another_axis_begins_another_scan() {
 
 #[test]
 fn a_bad_parameter_is_a_mistake() {
-    let wires = [("gate", FlagShape.into()), ("pose", PoseShape.into())];
+    let wires = [("gate", FlagShape.into()), ("pose", PoseShape::default().into())];
     for (bad, place) in [
         ("step_m = 0.01", "missing-key: `the node`"),
         ("stroke_m = 0.01", "missing-key: `the node`"),

@@ -26,6 +26,7 @@ use crate::devices::arm::{self, ArmPorts};
 use crate::devices::{Facts, nanos, pad, period_of};
 use crate::random::Random;
 use crate::roles::ground_truth;
+use crate::usual::{USUAL_PRESSURE_N, USUAL_THRESHOLD_N};
 
 /// Parameters of `sim_bench`.
 #[derive(Debug, Clone, Param)]
@@ -57,10 +58,10 @@ pub struct Params {
     /// Calibration file of the pad, stated as a fact for `calibrate`.
     calibration: Option<FilePath>,
     /// Noise threshold that the pad states as a fact.
-    #[param(unit = "N", range = 0.0.., default = 0.015)]
+    #[param(unit = "N", range = 0.0.., usual = ..=USUAL_THRESHOLD_N, default = 0.015)]
     threshold: f64,
     /// Unit of pressure that the pad states as a fact: p = 1 in the paper.
-    #[param(unit = "N/tactel", above = 0.0, default = 0.1)]
+    #[param(unit = "N/tactel", above = 0.0, usual = ..=USUAL_PRESSURE_N, default = 0.1)]
     pressure: f64,
     /// Properties of the foam.
     #[param(default = Foam::DEFAULT)]

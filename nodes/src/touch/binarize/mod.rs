@@ -12,6 +12,8 @@ mod rule;
 use tactflow_runtime::node::{Describe, In, Inputs, Mistake, Mistakes, Node, Out, Outputs, Param, Setup, State, Tick};
 use tactflow_runtime::signal::{Image, Mask};
 
+use crate::usual::{USUAL_THRESHOLD_N, unusual_force};
+
 pub use otsu::otsu;
 pub use pack::binarize;
 use pack::{for_each_word, pack};
@@ -116,6 +118,8 @@ impl Node for Binarize {
             return Err(Mistake::param("threshold", message).help(format!("use {noise} or more")).into());
         }
         setup.outputs.mask = (&setup.inputs.image).into();
+        let unit = setup.inputs.image.unit;
+        setup.warnings.extend(unusual_force("threshold", params.threshold, USUAL_THRESHOLD_N, unit));
         let grid = &setup.outputs.mask;
         Ok(Self { rule: rule(&params)?, words: grid.rows * grid.cols.div_ceil(64) })
     }

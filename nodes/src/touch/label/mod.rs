@@ -6,11 +6,13 @@ mod neighbours;
 mod runs;
 
 use tactflow_runtime::node::{
-    Absence, Describe, In, Inputs, Mistake, Mistakes, Node, Out, Outputs, Param, Setup, State, Tick,
+    Absence, At, Describe, In, Inputs, Mistake, Mistakes, Node, Out, Outputs, Param, Setup, State, Tick,
 };
 use tactflow_runtime::signal::{Flag, Grid, Image, Mask, Region, Regions, RegionsShape, Run};
+use tactflow_runtime::source::Code;
 
 use crate::touch::common::check_same_array;
+use crate::usual::{USUAL_CONTACT_N, unusual_force};
 use neighbours::Neighbours;
 
 pub use centroids::{centroid_buffer, centroids};
@@ -133,6 +135,8 @@ impl Node for Label {
             return Err(Mistake::input("mask", message).help("use a pad with fewer tactels").into());
         }
         let reach = u32::from(params.neighbours == Neighbours::EIGHT);
+        setup.warnings.extend(unusual_force("min_force", params.min_force, USUAL_CONTACT_N, image.unit));
+        setup.warnings.extend(unreachable_area(params.min_area, image.tactels()));
         let grid = mask.clone();
         setup.outputs.regions = RegionsShape { grid: grid.clone(), unit: image.unit };
         setup.outputs.region = grid.clone();
@@ -183,6 +187,13 @@ impl Label {
         state.last = Some(centroids[contact]);
         Some(contact)
     }
+}
+
+/// Returns the warning about a minimum area that is larger than the pad, so that there is never a contact.
+fn unreachable_area(min_area: usize, tactels: usize) -> Option<Mistake> {
+    let message = format!("`min_area` is {min_area} tactels, but the pad has {tactels}: no contact is that large");
+    let warning = Mistake::new(Code::UnusualValue, At::Param("min_area".into()), message);
+    (min_area > tactels).then(|| warning.help("write the tactels that a small contact has, for example `4`"))
 }
 
 #[cfg(test)]

@@ -333,3 +333,9 @@ fn the_nearest_region_agrees_with_a_simple_tracker_on_random_films() {
     }
     assert!(frames > 4000 && ties < 5 && kept > 400, "{frames} frames, {ties} ties, {kept} times not the largest");
 }
+
+#[test]
+fn a_contact_larger_than_the_pad_is_warned_of() {
+    assert_eq!(places("min_area = 17", &rig("min_area = 17", 4, 4)), ["unusual-value: `min_area`"]);
+    assert!(places("min_area = 16", &rig("min_area = 16", 4, 4)).is_empty());
+}

@@ -72,7 +72,20 @@ impl Node for LowPass {
         let averaging = Averaging::new(&setup.inputs, &mut setup.outputs);
         match (params.time_constant_ms, params.cutoff_hz) {
             (Some(ms), None) => Ok(Self { time: ms * 1e-3, averaging }),
-            (None, Some(hz)) => Ok(Self { time: 0.5 / (PI * hz), averaging }),
+            (None, Some(hz)) => {
+                let time = 0.5 / (PI * hz);
+                if time < setup.period {
+                    let message = format!(
+                        "`cutoff_hz` is {hz} Hz: a time constant of {:.3} ms, shorter than a period",
+                        time * 1e3
+                    );
+                    let help = format!("write less than {:.0} Hz, or remove the filter", 0.5 / (PI * setup.period));
+                    setup
+                        .warnings
+                        .push(Mistake::new(Code::ShortTime, At::Param("cutoff_hz".into()), message).help(help));
+                }
+                Ok(Self { time, averaging })
+            }
             (None, None) => {
                 let message = "`low_pass` needs `time_constant_ms` or `cutoff_hz`";
                 let mistake = Mistake::new(Code::MissingKey, At::Node, message);

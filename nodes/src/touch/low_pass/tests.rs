@@ -166,3 +166,10 @@ proptest! {
         prop_assert!(libm::sin(turned).abs() < 1e-12, "off by {turned}");
     }
 }
+
+#[test]
+fn a_cutoff_above_what_a_period_can_filter_is_warned_of() {
+    let warnings = |params: &str| places(params, &built(params, Unit::NEWTON));
+    assert_eq!(warnings("cutoff_hz = 200"), ["short-time: `cutoff_hz`"]);
+    assert!(warnings("cutoff_hz = 100").is_empty() && warnings("time_constant_ms = 1.6").is_empty());
+}

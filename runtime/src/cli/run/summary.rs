@@ -79,6 +79,9 @@ impl Summary {
             let names = engine.uncalibrated().join("`, `");
             let _ = writeln!(text, "nothing was limited in newtons: the limits of `{names}` are raw readings");
         }
+        for warning in engine.allowed() {
+            let _ = writeln!(text, "{warning}");
+        }
         if outcome.late > 0 {
             let _ = writeln!(text, "{} ticks started more than one period late", outcome.late);
         }

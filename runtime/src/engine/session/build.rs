@@ -110,6 +110,7 @@ impl Engine {
             uncalibrated,
             budgets,
             rests: Vec::new(),
+            allowed: plan.allowed,
             names,
             roles,
             reported,

@@ -5,7 +5,7 @@ use super::schedule::TickSchedule;
 use super::trouble::{Trouble, WatchedBudget, WatchedWire};
 use crate::device::Report;
 use crate::engine::core::{Core, Counters, DeviceLink, DeviceSlot, ModeChange, ModeMachine, Timing};
-use crate::graph::{PlannedPort, Policy, PolicyTable};
+use crate::graph::{AllowedWarning, PlannedPort, Policy, PolicyTable};
 use crate::node::{Bus, PortId};
 use crate::signal::{Mark, Signal};
 use crate::source::{SourceMap, suggestion};
@@ -24,6 +24,7 @@ pub struct Engine {
     pub(super) rests: Vec<Rest>,
     /// Names of the limiters whose limits are in raw readings.
     pub(super) uncalibrated: Vec<String>,
+    pub(super) allowed: Vec<AllowedWarning>,
     /// Name and source location of each runner's node.
     pub(super) names: Vec<(String, String)>,
     /// Name of each role, and the source location of its device.
@@ -212,6 +213,12 @@ impl Engine {
     /// 1.
     pub fn limits(&self) -> impl Iterator<Item = (&str, PortId)> {
         self.limits.iter().map(|(name, id)| (name.as_str(), *id))
+    }
+
+    /// Returns the warnings that a section [allow] silences, each with its reason.
+    #[must_use]
+    pub fn allowed(&self) -> &[AllowedWarning] {
+        &self.allowed
     }
 
     /// Returns the names of the limiters whose limits are in raw readings.

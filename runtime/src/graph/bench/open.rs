@@ -299,9 +299,10 @@ impl Opener<'_> {
         let specs = device.params();
         let mut reader = Reader::new(self.sources).with_units(KnownUnits::of_params(&block.params, &specs));
         let opened = device.open(&block.params, &mut reader);
-        let (mistakes, measured) = (reader.mistakes, reader.measured);
+        let Reader { mistakes, warnings, measured, .. } = reader;
         self.opened.measured.add(None, measured);
-        place_mistakes(mistakes, &block.params, &[], self.sources, self.diagnostics);
+        let found = mistakes.into_iter().chain(warnings).collect();
+        place_mistakes(found, &block.params, &[], self.sources, self.diagnostics);
         let crate::device::Opened { mut description, driver } = opened?;
         let period = description.period;
         if !PERIOD_RANGE_S.contains(&period) {

@@ -1,10 +1,11 @@
 //! Builds the configurations of each mode: nodes that a mode changes are built again with its parameters.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 
 use super::conditions::ExitContext;
 use super::demand::{Demand, DemandChanges};
 use super::nodes::Builder;
+use crate::graph::check::generators::Motions;
 use crate::graph::check::live;
 use crate::graph::load::{Entity, FlatGraph};
 use crate::graph::plan::{PlannedExit, PlannedMode, PlannedNode, PlannedPort, PortRef};
@@ -16,10 +17,8 @@ use crate::source::{Code, Diagnostic, Diagnostics, Item, Table};
 /// The modes of a graph, with what the checks need to know about each.
 pub(crate) struct BuiltModes {
     pub(crate) modes: Vec<PlannedMode>,
-    /// Which nodes generate no motion with the parameters of the graph.
-    pub(crate) still: Vec<bool>,
-    /// For each mode, the nodes that differ in that from `still`.
-    pub(crate) still_changes: Vec<BTreeSet<usize>>,
+    /// The motion that each node generates.
+    pub(crate) motions: Motions,
     /// The components that are read with the parameters of the graph.
     pub(crate) demand: Demand,
     /// For each mode, where it reads other components.
@@ -36,8 +35,8 @@ pub(crate) fn build_modes(builder: &mut Builder<'_>, nodes: &mut [PlannedNode]) 
     let demand = Demand::find(net, &|index| Some(&*nodes[places[index]?].node));
     let want = |node: &mut PlannedNode| (node.index, node.node.want(demand.of(node.index, &DemandChanges::new())));
     let freezes = nodes.iter_mut().map(want).collect();
-    let still = (0..places.len()).map(|node| builder.is_still(node)).collect();
-    let (mut modes, mut still_changes, mut demand_changes) = (Vec::new(), Vec::new(), Vec::new());
+    let mut motions = Motions::new((0..places.len()).map(|node| builder.motion(node)).collect());
+    let (mut modes, mut demand_changes) = (Vec::new(), Vec::new());
     for (block, exits) in net.flat.modes.iter().zip(exits(builder, nodes)) {
         let mut variants = variants(block, builder);
         let changed: Vec<usize> = variants.keys().copied().collect();
@@ -55,13 +54,12 @@ pub(crate) fn build_modes(builder: &mut Builder<'_>, nodes: &mut [PlannedNode]) 
         for (index, variant) in &mut variants {
             variant.node.want(demand.of(*index, &changes));
         }
-        let differs = |(node, variant): &(&usize, &Built)| variant.is_still != builder.is_still(**node);
-        still_changes.push(variants.iter().filter(differs).map(|(node, _)| *node).collect());
+        motions.add_mode(variants.iter().map(|(node, variant)| (*node, variant.motion)));
         demand_changes.push(changes);
         let configurations = adopt(block, variants, nodes, &places, &mut builder.diagnostics);
         modes.push(PlannedMode { name: block.key.name.clone(), exits, configurations });
     }
-    BuiltModes { modes, still, still_changes, demand, demand_changes, freezes }
+    BuiltModes { modes, motions, demand, demand_changes, freezes }
 }
 
 /// Resolves the exits of each mode.

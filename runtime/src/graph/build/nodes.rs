@@ -1,6 +1,7 @@
 //! Builds the nodes of a graph in step order, each from the shapes on its wires.
 
 use std::collections::BTreeMap;
+use std::ops::Range;
 
 use crate::graph::bench::{BoundRole, OpenedBench, fill_facts, place_mistakes};
 use crate::graph::check::frames::Frames;
@@ -8,8 +9,10 @@ use crate::graph::check::units::{UnitMismatch, UnitOrigin, Units};
 use crate::graph::load::MeasuredValues;
 use crate::graph::net::{CommandWire, Net, WireOrigin};
 use crate::graph::plan::{PlannedCommand, PlannedNode, PlannedPort, PlannedRole, PlannedWire, PortRef, Producer};
-use crate::graph::syntax::{AgeLimit, Policy, PolicyTable, default_max_age_ns};
-use crate::node::{Built, Configured, Given, KnownUnits, Need, NodeSpec, PortSpec, Reader, frame_args};
+use crate::graph::syntax::{AgeLimit, LIMITS, Policy, PolicyTable, default_max_age_ns};
+use crate::node::{
+    At, Built, Configured, Given, KnownUnits, Mistake, Mistakes, Motion, Need, NodeSpec, PortSpec, Reader, frame_args,
+};
 use crate::signal::{FlagShape, Joint, Kind, Shape};
 use crate::source::{Code, Diagnostic, Diagnostics, Key, SourceMap, Value};
 
@@ -28,8 +31,8 @@ pub(crate) struct Builder<'a> {
     units: BTreeMap<usize, Units>,
     /// What determined the unit of each port.
     origins: BTreeMap<PortRef, UnitOrigin>,
-    /// The shapes from which each node was built, and whether it generates no motion.
-    built: BTreeMap<usize, (Given, bool)>,
+    /// The shapes from which each node was built, and the motion that it generates.
+    built: BTreeMap<usize, (Given, Motion)>,
     /// The values of parameters that were written with a unit.
     pub(crate) measured: MeasuredValues,
 }
@@ -172,7 +175,7 @@ impl Builder<'_> {
             ports.push(self.add_port(source, shape));
         }
         self.units.insert(index, units);
-        self.built.insert(index, (given, built.is_still));
+        self.built.insert(index, (given, built.motion));
         Some(PlannedNode {
             index,
             name: node.name.clone(),
@@ -196,10 +199,10 @@ impl Builder<'_> {
         Some((port, self.net.name(Producer::Role(command.role)).to_owned()))
     }
 
-    /// Returns whether a node generates no motion with the parameters of the graph.
-    pub(crate) fn is_still(&self, node: usize) -> bool {
+    /// Returns the motion that a node generates with the parameters of the graph.
+    pub(crate) fn motion(&self, node: usize) -> Motion {
         // A node that could not be built has its own diagnostic.
-        self.built.get(&node).is_none_or(|(_, is_still)| *is_still)
+        self.built.get(&node).map_or(Motion::Still, |(_, motion)| *motion)
     }
 
     /// Builds a node again with other parameters, from the same input shapes; its output shapes must not change.
@@ -231,24 +234,43 @@ impl Builder<'_> {
         &mut self,
         index: usize,
         kind: usize,
-        params: &Value,
+        written: &Value,
         given: &Given,
         is_complete: bool,
     ) -> (Option<Box<dyn Configured>>, Value) {
-        let mut params = params.clone();
+        let mut params = written.clone();
         if !fill_facts(&mut params, Some(index), self.net, self.opened, &mut self.diagnostics) {
             return (None, params);
         }
         let spec = self.net.spec(index);
         let (specs, inputs) = spec.map_or((&[][..], &[][..]), |spec| (&spec.params, &spec.inputs));
         let units = KnownUnits::of_params(&params, specs).with_wires(inputs, &given.inputs, !is_complete);
-        let mut reader = Reader::new(&self.sources).with_units(units);
+        let mut reader = Reader::new(&self.sources).with_units(units).with_period(self.period);
         let configured = self.net.catalogue.nodes()[kind].configure(&params, &mut reader);
-        let (mistakes, measured) = (reader.mistakes, reader.measured);
+        let Reader { mistakes, warnings, measured, .. } = reader;
         self.measured.add(Some(index), measured);
         let is_valid = mistakes.is_empty();
         place_mistakes(mistakes, &params, &[], &mut self.sources, &mut self.diagnostics);
+        let warnings = self.warnings_of_written(warnings, written);
+        place_mistakes(warnings, &params, &[], &mut self.sources, &mut self.diagnostics);
         (configured.filter(|_| is_valid), params)
+    }
+
+    /// Returns the warnings about numbers that the graph contains, under their name there. A fact has its warnings in
+    /// the bench.
+    fn warnings_of_written(&self, warnings: Mistakes, written: &Value) -> Mistakes {
+        let facts = written.facts().into_iter().filter(|fact| fact.word.split('.').next() != Some(LIMITS));
+        let facts: Vec<Range<usize>> = facts.map(|fact| fact.place.clone()).collect();
+        let limits = || self.net.flat.limits.iter().flat_map(|(_, table)| &table.entries);
+        let name = |mut warning: Mistake| {
+            let At::Span(span) = &warning.at else { return Some(warning) };
+            let limit = limits().find(|(_, value)| value.span.start <= span.start && span.end <= value.span.end);
+            if let (Some((key, _)), Some((_, rest))) = (limit, warning.message[1..].split_once('`')) {
+                warning.message = format!("`{}`{rest}", key.name);
+            }
+            facts.iter().all(|fact| !span.contains(&fact.start)).then_some(warning)
+        };
+        warnings.into_iter().filter_map(name).collect()
     }
 
     /// Builds a node from its parameters and the shapes on its wires, or reports its mistakes.
@@ -260,8 +282,17 @@ impl Builder<'_> {
         given: Given,
     ) -> Option<Built> {
         let wires = &self.net.flat.nodes[index].block.wires.valid;
-        let built = configured?.build(given);
-        built.map_err(|mistakes| place_mistakes(mistakes, params, wires, &mut self.sources, &mut self.diagnostics)).ok()
+        let mut place = |mistakes| place_mistakes(mistakes, params, wires, &mut self.sources, &mut self.diagnostics);
+        match configured?.build(given) {
+            Ok(mut built) => {
+                place(std::mem::take(&mut built.warnings));
+                Some(built)
+            }
+            Err(mistakes) => {
+                place(mistakes);
+                None
+            }
+        }
     }
 
     /// Reports a wire whose ends differ in their units, with the places that determined both.

@@ -5,7 +5,7 @@ use crate::graph::plan::{PortRef, Producer};
 use crate::signal::Kind;
 
 /// What is known about the contact upstream of each node.
-pub(super) struct ContactPorts {
+pub(crate) struct ContactPorts {
     /// Whether the node descends from sensors alone: from roles without commands.
     is_sensed: Vec<bool>,
     /// Whether the node, or one upstream of it, reads a mask or a list of regions.
@@ -14,7 +14,7 @@ pub(super) struct ContactPorts {
 
 impl ContactPorts {
     /// Follows all wires once, in the order of the nodes.
-    pub(super) fn new(net: &Net<'_>) -> Self {
+    pub(crate) fn new(net: &Net<'_>) -> Self {
         let nodes = net.wires.len();
         let mut found = Self { is_sensed: vec![false; nodes], is_segmented: vec![false; nodes] };
         for &node in &net.order {

@@ -1,10 +1,12 @@
 //! The checks of a graph, one per file. Each has a function `check` that adds to the diagnostics.
 
 pub(crate) mod absent;
+pub(crate) mod allow;
+pub(crate) mod approach;
 pub(crate) mod calibration;
 pub(crate) mod clock;
 pub(crate) mod commands;
-mod contact;
+pub(crate) mod contact;
 pub(crate) mod delays;
 mod endings;
 pub(crate) mod exports;
@@ -12,7 +14,10 @@ pub(crate) mod facts;
 mod foreign;
 mod frame_names;
 pub(crate) mod frames;
+pub(crate) mod generators;
+pub(crate) mod immediate;
 pub(crate) mod inputs;
+pub(crate) mod late;
 pub(crate) mod limit_values;
 pub(crate) mod limits;
 pub(crate) mod live;
@@ -22,6 +27,7 @@ pub(crate) mod parts;
 pub(crate) mod policy;
 pub(crate) mod quantities;
 pub(crate) mod reachability;
+pub(crate) mod times;
 pub(crate) mod units;
 pub(crate) mod unused;
 pub(crate) mod view;

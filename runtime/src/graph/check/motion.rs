@@ -7,7 +7,8 @@ use std::collections::BTreeSet;
 
 use super::contact::ContactPorts;
 use super::endings::Endings;
-use crate::graph::net::{Net, Wire};
+use super::generators::Generators;
+use crate::graph::net::Net;
 use crate::graph::plan::PlannedMode;
 use crate::graph::syntax::ModeBlock;
 use crate::signal::Kind;
@@ -15,33 +16,24 @@ use crate::source::{Code, Diagnostic, Diagnostics, quoted};
 
 /// Reports generated motion that nothing ends, in a mode or in a graph without modes.
 ///
-/// `still` holds which nodes generate no motion, and `changes` for each mode the nodes that differ in that.
+/// A graph without modes counts as one mode.
 pub(crate) fn check(
     net: &Net<'_>,
+    contact: &ContactPorts,
     modes: &[PlannedMode],
-    still: &[bool],
-    changes: &[BTreeSet<usize>],
+    found: &Generators,
     diagnostics: &mut Diagnostics,
 ) {
-    let commands = net.commands.iter().filter(|wire| !wire.is_report);
-    let driving = net.upstream(commands.filter_map(|wire| wire.source.producer.node()));
-    let contact = ContactPorts::new(net);
-    let usual = find_generators(net, &contact, &driving, &|node| still[node]);
     if modes.is_empty() {
-        report_in_graph(net, &usual, diagnostics);
+        report_in_graph(net, &found.usual, diagnostics);
         return;
     }
     // An exit with a mistake may be the one that ends the motion.
     if net.flat.modes.iter().any(|mode| mode.has_any(diagnostics)) {
         return;
     }
-    let of_mode = |changes: &BTreeSet<usize>| {
-        let is_still = |node: usize| still[node] != changes.contains(&node);
-        (!changes.is_empty()).then(|| find_generators(net, &contact, &driving, &is_still))
-    };
-    let own: Vec<Option<Vec<usize>>> = changes.iter().map(of_mode).collect();
-    let generators: Vec<&[usize]> = own.iter().map(|own| own.as_ref().unwrap_or(&usual).as_slice()).collect();
-    let endings = Endings::new(net, &contact, modes, &generators);
+    let generators: Vec<&[usize]> = (0..modes.len()).map(|mode| found.of(mode)).collect();
+    let endings = Endings::new(net, contact, modes, &generators);
     let ended = endings.find_ended();
     let (cycling, mut reported) = (endings.find_cycling(), BTreeSet::new());
     for (i, block) in net.flat.modes.iter().enumerate().filter(|(i, _)| !generators[*i].is_empty()) {
@@ -52,48 +44,6 @@ pub(crate) fn check(
             reported.extend(cycle);
         }
     }
-}
-
-/// Returns the nodes that start a motion of the arm without a sample.
-///
-/// `driving` holds which nodes are upstream of a command.
-fn find_generators(
-    net: &Net<'_>,
-    contact: &ContactPorts,
-    driving: &[bool],
-    is_still: &dyn Fn(usize) -> bool,
-) -> Vec<usize> {
-    let nodes = net.wires.len();
-    let (mut sampled, mut still) = (vec![false; nodes], vec![false; nodes]);
-    // `moved` also contains the nodes that pass on a generated motion.
-    let (mut generators, mut moved) = (Vec::new(), vec![false; nodes]);
-    for &node in &net.order {
-        let Some(spec) = net.spec(node) else { continue };
-        let wires = || net.wires[node].iter().filter(|wire| !spec.inputs[wire.input].need.is_delayed);
-        // A flag that nothing ties to a contact may be set forever, so it gates nothing.
-        let is_gate = |wire: &Wire| net.port(wire.source).kind != Kind::Flag || contact.need(net, wire.source);
-        let is_sampled =
-            |wire: &Wire| is_gate(wire) && wire.source.producer.node().is_none_or(|source| sampled[source]);
-        // A wire with a mistake may be the gate.
-        let given = &net.flat.nodes[node].block.wires;
-        let has_mistake = given.has_invalid() || given.valid.len() != net.wires[node].len();
-        if has_mistake || wires().any(is_sampled) {
-            sampled[node] = true;
-            continue;
-        }
-        let sources: Vec<usize> = wires().filter_map(|wire| wire.source.producer.node()).collect();
-        let all_still = !sources.is_empty() && sources.iter().all(|source| still[*source]);
-        let gives_motion = spec.outputs.iter().any(|port| matches!(port.kind, Kind::Twist | Kind::Joints));
-        if is_still(node) || all_still {
-            still[node] = true;
-        } else if sources.iter().any(|source| moved[*source]) {
-            moved[node] = true;
-        } else if gives_motion && driving[node] {
-            moved[node] = true;
-            generators.push(node);
-        }
-    }
-    generators
 }
 
 /// Reports the generators of a graph without modes.

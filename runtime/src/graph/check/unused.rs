@@ -1,26 +1,32 @@
 //! Warns about nodes whose outputs are not used, for example after a wire was deleted by mistake.
 //!
 //! A node is used if it is upstream of a command, a report, a node without outputs, a node that logs, a port in `show`,
-//! or an export of a part.
+//! a port in a condition of a mode, or an export of a part.
 
 use std::cell::LazyCell;
 use std::collections::{BTreeMap, BTreeSet};
 
 use crate::graph::net::Net;
-use crate::graph::plan::{PortRef, Producer};
+use crate::graph::plan::{PlannedMode, PortRef, Producer};
 use crate::node::{PortSpec, may_fit};
 use crate::source::{Code, Diagnostic, Diagnostics};
 
 /// Reports unused nodes. A graph without commands has none, since its outputs are recorded.
-pub(crate) fn check(net: &Net<'_>, shown: impl Iterator<Item = PortRef>, diagnostics: &mut Diagnostics) {
+pub(crate) fn check(
+    net: &Net<'_>,
+    modes: &[PlannedMode],
+    shown: impl Iterator<Item = PortRef>,
+    diagnostics: &mut Diagnostics,
+) {
     if net.commands.iter().all(|wire| wire.is_report) {
         return;
     }
     let is_sink = |node: &usize| net.spec(*node).is_some_and(|spec| spec.outputs.is_empty() || spec.logs);
     let sinks = (0..net.wires.len()).filter(is_sink);
     let driving = net.commands.iter().map(|wire| wire.source.producer);
-    let used =
-        driving.chain(shown.map(|source| source.producer)).chain(net.exported()).chain(sinks.map(Producer::Node));
+    let watched = modes.iter().flat_map(|mode| &mode.exits).filter_map(|exit| exit.condition.port());
+    let ports = shown.chain(watched).map(|source| source.producer);
+    let used = driving.chain(ports).chain(net.exported()).chain(sinks.map(Producer::Node));
     let mut used = net.upstream(used.filter_map(Producer::node));
     let (is_read, mut open_inputs) = (net.read_nodes(), None);
     // Nodes without readers come first. An unused cycle has none, so it is reported at one of its nodes.

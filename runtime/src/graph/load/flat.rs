@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::ops::Range;
 
-use crate::graph::syntax::{BenchDocument, Block, GraphTable, ModeBlock, PolicyTable, WireEntry};
+use crate::graph::syntax::{Allowance, BenchDocument, Block, GraphTable, ModeBlock, PolicyTable, WireEntry};
 use crate::node::Spanned;
 use crate::source::{Code, Diagnostic, Key, Named, Table, Value};
 
@@ -57,6 +57,7 @@ pub(crate) struct FlatGraph {
     /// The section [policy] as written, and parsed if it is valid.
     pub(crate) policy: Option<(Value, Option<PolicyTable>)>,
     pub(crate) bench: Option<BenchDocument>,
+    pub(crate) allow: Vec<Allowance>,
 }
 
 impl FlatGraph {

@@ -116,6 +116,7 @@ impl Loader {
         flat.limits.clone_from(&document.limits);
         flat.modes.clone_from(&document.modes);
         flat.policy.clone_from(&document.policy);
+        flat.allow.clone_from(&document.allow);
         self.flatten(document, "", Scope::default(), &mut flat);
         flat
     }

@@ -152,6 +152,13 @@ impl<'a> Net<'a> {
             .filter_map(move |table| path.clone().try_fold(*table, |value, name| value.as_table()?.get(name)))
     }
 
+    /// Returns the table of parameters that a mode sets of a node.
+    pub(crate) fn setting(&self, mode: usize, node: usize) -> Option<&'a Value> {
+        let mut path = self.flat.nodes[node].name.split('.');
+        let first = self.flat.modes[mode].set.get(path.next()?)?;
+        path.try_fold(first, |value, name| value.as_table()?.get(name))
+    }
+
     /// Marks the given nodes and all nodes upstream of them, and goes no further where a node is marked.
     pub(crate) fn mark_upstream(&self, nodes: impl IntoIterator<Item = usize>, marked: &mut [bool]) {
         let mut open: Vec<usize> = nodes.into_iter().collect();

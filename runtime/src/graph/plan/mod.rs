@@ -4,12 +4,14 @@ mod modes;
 mod port;
 mod view;
 
+use std::fmt;
 use std::ops::Range;
 
 use crate::device::{Description, Driver};
 use crate::graph::syntax::{AgeLimit, PolicyTable};
 use crate::node::{AnyNode, Need};
 use crate::signal::Shape;
+use crate::source::Code;
 
 pub(crate) use modes::{Condition, PlannedExit, PlannedMode, PlannedModes, Test, WatchedPort};
 pub use port::PlannedPort;
@@ -125,4 +127,24 @@ pub(crate) struct Plan {
     pub(crate) reset_after: i64,
     pub(crate) modes: Option<PlannedModes>,
     pub(crate) policy: PolicyTable,
+    /// The warnings that [allow] silences.
+    pub(crate) allowed: Vec<AllowedWarning>,
+}
+
+/// Warnings of one code that a section [allow] silences.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct AllowedWarning {
+    /// Their code.
+    pub code: Code,
+    /// Why they are right, as the author of the graph or of the bench wrote it.
+    pub reason: String,
+    /// How many there are.
+    pub count: usize,
+}
+
+impl fmt::Display for AllowedWarning {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { code, reason, count } = self;
+        write!(f, "allowed: {count} warning{} of `{code}`: {reason}", if *count == 1 { "" } else { "s" })
+    }
 }

@@ -51,6 +51,17 @@ pub(crate) enum Condition {
     Lost(WatchedPort, i64),
 }
 
+impl Condition {
+    /// Returns the port that it watches.
+    pub(crate) const fn port(&self) -> Option<PortRef> {
+        match self {
+            Self::Port(watched, _) | Self::Lost(watched, _) => Some(watched.source),
+            Self::Travel(pose, _) => Some(*pose),
+            Self::Elapsed(_) | Self::Sent(_) => None,
+        }
+    }
+}
+
 /// A port, or one feature of it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct WatchedPort {

@@ -1,5 +1,6 @@
 //! The sections of a graph file, a part and a bench, before names are resolved.
 
+mod allow;
 mod correct;
 mod modes;
 mod names;
@@ -8,6 +9,7 @@ mod read;
 mod reserved;
 mod sections;
 
+pub(crate) use allow::Allowance;
 pub(crate) use modes::{ExitKind, ExitTable, ModeBlock, ModeExit, PortState};
 pub(crate) use names::Use;
 pub use policy::Policy;

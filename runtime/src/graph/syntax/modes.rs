@@ -123,7 +123,7 @@ pub(crate) struct ExitTable {
     #[param(unit = "ms", range = 0.001..=3.6e6)]
     pub(crate) after_ms: Option<f64>,
     /// Distance that the sensor travels in the mode.
-    #[param(unit = "mm", range = 0.001..=1e4)]
+    #[param(unit = "mm", range = 0.001..=1e4, usual = 0.1..=5000.0)]
     pub(crate) after_travel_mm: Option<f64>,
     /// Signal that `on_lost` watches; for `after_travel_mm`, the pose to measure if the graph has several.
     pub(crate) of: Option<Spanned<String>>,

@@ -3,6 +3,7 @@
 use std::collections::BTreeSet;
 use std::ops::Range;
 
+use super::allow::{ALLOW, Allowance, read_allow};
 use super::correct::{correct_block, correct_facts, correct_keys, correct_sections, correct_wires};
 use super::modes::{ModeBlock, read_mode};
 use super::policy::{AgeLimit, PolicyTable, WireTable};
@@ -124,6 +125,7 @@ pub(crate) struct GraphDocument {
     pub(crate) policy: Option<(Value, Option<PolicyTable>)>,
     pub(crate) inputs: Named<Spanned<String>>,
     pub(crate) exports: Named<Spanned<String>>,
+    pub(crate) allow: Vec<Allowance>,
 }
 
 /// The sections of a bench file.
@@ -139,6 +141,7 @@ pub(crate) struct BenchDocument {
     pub(crate) facts: Vec<(Key, Table)>,
     /// Whether limits may be in raw readings.
     pub(crate) allow_uncalibrated: bool,
+    pub(crate) allow: Vec<Allowance>,
 }
 
 /// Key of a bench that allows limits in raw readings.
@@ -160,13 +163,14 @@ impl<'a> Sections<'a> {
     /// Returns all diagnostics, and the values that were written with a unit.
     pub(crate) fn finish(self) -> (Diagnostics, Measured) {
         let mut diagnostics = self.diagnostics;
-        diagnostics.extend(self.reader.mistakes.into_iter().map(into_diagnostic));
-        (diagnostics, self.reader.measured)
+        let Reader { mistakes, warnings, measured, .. } = self.reader;
+        diagnostics.extend(mistakes.into_iter().chain(warnings).map(into_diagnostic));
+        (diagnostics, measured)
     }
 
     /// Reads the sections of a graph file.
     pub(crate) fn graph(&mut self, root: &mut Table) -> GraphDocument {
-        const KEYS: [&str; 12] = [
+        const KEYS: [&str; 13] = [
             "graph",
             "roles",
             "parts",
@@ -178,6 +182,7 @@ impl<'a> Sections<'a> {
             "devices",
             "bind",
             "facts",
+            ALLOW,
             ALLOW_UNCALIBRATED,
         ];
         correct_sections(root, &KEYS, &mut self.reader);
@@ -200,7 +205,8 @@ impl<'a> Sections<'a> {
         let modes = self.named_tables(root.get("modes")).into_iter();
         let modes = modes.map(|(key, table)| read_mode(key, table, &mut self.reader)).collect();
         let roles = self.names(root.get("roles"));
-        GraphDocument { graph, roles, commands, limits, modes, policy, ..self.body(root) }
+        let allow = read_allow(root.get(ALLOW), &mut self.reader);
+        GraphDocument { graph, roles, commands, limits, modes, policy, allow, ..self.body(root) }
     }
 
     /// Corrects the names of the sections of a part, before the graph overrides values in them.
@@ -216,11 +222,12 @@ impl<'a> Sections<'a> {
 
     /// Reads the sections of a bench file.
     pub(crate) fn bench(&mut self, root: &mut Table) -> BenchDocument {
-        correct_sections(root, &["devices", "bind", "facts", ALLOW_UNCALIBRATED], &mut self.reader);
-        self.own_bench(root)
+        correct_sections(root, &["devices", "bind", "facts", ALLOW, ALLOW_UNCALIBRATED], &mut self.reader);
+        let allow = read_allow(root.get(ALLOW), &mut self.reader);
+        BenchDocument { allow, ..self.own_bench(root) }
     }
 
-    /// Reads the sections of a bench in a file that may have others.
+    /// Reads the sections of a bench in a file that may have others. Its [allow] belongs to the graph.
     pub(crate) fn own_bench(&mut self, root: &Table) -> BenchDocument {
         let devices = self.named_tables(root.get("devices"));
         let names = names_of(&devices);
@@ -240,7 +247,8 @@ impl<'a> Sections<'a> {
             self.diagnostics.push(unknown);
         }
         let place = section.map(|(key, _)| key.span.clone());
-        BenchDocument { devices, bind, place, invalid, facts, allow_uncalibrated: allow_uncalibrated.unwrap_or(false) }
+        let allow_uncalibrated = allow_uncalibrated.unwrap_or(false);
+        BenchDocument { devices, bind, place, invalid, facts, allow_uncalibrated, allow: Vec::new() }
     }
 
     fn body(&mut self, root: &Table) -> GraphDocument {

@@ -1,0 +1,96 @@
+//! Warns of modes that wait for a contact and do not move toward it.
+
+use std::ops::Range;
+
+use super::contact::ContactPorts;
+use super::generators::{Generators, Motions};
+use crate::graph::net::Net;
+use crate::graph::plan::{Condition, PlannedExit, PlannedMode, Test};
+use crate::graph::syntax::{ExitKind, PortState};
+use crate::node::Motion;
+use crate::source::{Code, Diagnostic, Diagnostics, Value, quoted};
+
+/// Warns of each mode that begins without a contact and ends with one, and in which the sensor moves away or not at all.
+///
+/// `start` is the start mode.
+pub(crate) fn check(
+    net: &Net<'_>,
+    contact: &ContactPorts,
+    modes: &[PlannedMode],
+    start: usize,
+    (motions, generators): (&Motions, &Generators),
+    diagnostics: &mut Diagnostics,
+) {
+    let waits = |exit: &PlannedExit| waits(net, contact, exit);
+    let free = find_free(modes, start, &waits);
+    let is_always_still = (0..modes.len()).all(|mode| generators.of(mode).is_empty());
+    for i in (0..modes.len()).filter(|i| free[*i] && is_approach(&modes[*i], *i == start, &waits)) {
+        let moving = generators.of(i);
+        let is_bounded = modes[i].exits.iter().any(|exit| matches!(exit.condition, Condition::Travel(..)));
+        let is_set = || generators.all.iter().any(|node| net.setting(i, *node).is_some());
+        // A task may wait at rest until it is touched, and move in other modes.
+        let is_meant_to_move = is_bounded || is_always_still || is_set();
+        if moving.is_empty() && is_meant_to_move && !generators.all.is_empty() {
+            diagnostics.push(report(net, i, &generators.all, true));
+        } else if !moving.is_empty() && moving.iter().all(|node| motions.of(i, *node) == Motion::Retreat) {
+            diagnostics.push(report(net, i, moving, false));
+        }
+    }
+}
+
+/// Returns for each mode whether it begins without a contact: at the start, after a contact is lost, or after such a
+/// mode.
+fn find_free(modes: &[PlannedMode], start: usize, waits: &dyn Fn(&PlannedExit) -> bool) -> Vec<bool> {
+    let mut begins_with_contact = vec![false; modes.len()];
+    let mut open = vec![start];
+    for exit in modes.iter().flat_map(|mode| &mode.exits) {
+        let Some(to) = exit.to else { continue };
+        begins_with_contact[to] |= waits(exit);
+        if exit.kind == ExitKind::OnLost {
+            open.push(to);
+        }
+    }
+    let mut free = vec![false; modes.len()];
+    while let Some(mode) = open.pop() {
+        if !begins_with_contact[mode] && !std::mem::replace(&mut free[mode], true) {
+            open.extend(modes[mode].exits.iter().filter_map(|exit| exit.to));
+        }
+    }
+    free
+}
+
+/// Returns whether only a contact leads on from a mode. A mode after the start may back off for a while.
+fn is_approach(mode: &PlannedMode, is_start: bool, waits: &dyn Fn(&PlannedExit) -> bool) -> bool {
+    let mut ways = mode.exits.iter().filter(|exit| matches!(exit.kind, ExitKind::Go | ExitKind::Done)).peekable();
+    let is_only_way = ways.peek().is_some() && ways.clone().all(|exit| waits(exit));
+    is_only_way || is_start && ways.any(|exit| waits(exit))
+}
+
+/// Returns whether an exit waits for a contact.
+fn waits(net: &Net<'_>, contact: &ContactPorts, exit: &PlannedExit) -> bool {
+    let Condition::Port(watched, test) = &exit.condition else { return false };
+    let is_met_by_contact = match test {
+        Test::Is(state) => matches!(state, PortState::True | PortState::Present | PortState::New),
+        Test::Between { min, .. } => *min > 0.0,
+    };
+    is_met_by_contact && contact.need(net, watched.source)
+}
+
+fn report(net: &Net<'_>, mode: usize, generators: &[usize], is_still: bool) -> Diagnostic {
+    let block = &net.flat.modes[mode];
+    let (name, names) = (&block.key.name, quoted(generators.iter().map(|node| &net.flat.nodes[*node].name)));
+    let message = match is_still {
+        true => format!("mode `{name}` waits for a contact, but {names} does not move the sensor"),
+        false => {
+            format!("mode `{name}` waits for a contact, but {names} moves the sensor away from the object, along -z")
+        }
+    };
+    let place = generators.iter().find_map(|node| net.setting(mode, *node)).and_then(first_place);
+    let help = format!("let {names} move along +z of the sensor in this mode, which points toward the object");
+    Diagnostic::new(Code::NoApproach, place.unwrap_or_else(|| block.key.span.clone()), message).help(help)
+}
+
+/// Returns the place of the first parameter in a table.
+fn first_place(settings: &Value) -> Option<Range<usize>> {
+    settings.as_table()?.entries.first().map(|(_, value)| value.span.clone())
+}

@@ -1,0 +1,98 @@
+//! The nodes that generate a motion, in the graph and in each mode.
+
+use std::collections::BTreeMap;
+
+use super::contact::ContactPorts;
+use crate::graph::net::{Net, Wire};
+use crate::node::Motion;
+use crate::signal::Kind;
+
+/// The motion that each node generates: with the parameters of the graph, and where a mode changes them.
+pub(crate) struct Motions {
+    usual: Vec<Motion>,
+    /// For each mode, the nodes that it changes.
+    changes: Vec<BTreeMap<usize, Motion>>,
+}
+
+impl Motions {
+    /// Creates it from the motions with the parameters of the graph.
+    pub(crate) const fn new(usual: Vec<Motion>) -> Self {
+        Self { usual, changes: Vec::new() }
+    }
+
+    /// Adds the next mode, with the nodes that it builds again.
+    pub(crate) fn add_mode(&mut self, nodes: impl Iterator<Item = (usize, Motion)>) {
+        let changes = nodes.filter(|(node, motion)| self.usual[*node] != *motion).collect();
+        self.changes.push(changes);
+    }
+
+    /// Returns the motion of a node in a mode.
+    pub(super) fn of(&self, mode: usize, node: usize) -> Motion {
+        self.changes[mode].get(&node).copied().unwrap_or(self.usual[node])
+    }
+}
+
+/// The nodes that start a motion of the arm without a sample.
+pub(crate) struct Generators {
+    /// Those of a graph without modes, and of modes that change none of them.
+    pub(super) usual: Vec<usize>,
+    /// Those of each mode that changes some.
+    own: Vec<Option<Vec<usize>>>,
+    /// All nodes that could start a motion with other parameters.
+    pub(super) all: Vec<usize>,
+}
+
+impl Generators {
+    pub(crate) fn new(net: &Net<'_>, contact: &ContactPorts, motions: &Motions) -> Self {
+        let commands = net.commands.iter().filter(|wire| !wire.is_report);
+        let driving = net.upstream(commands.filter_map(|wire| wire.source.producer.node()));
+        let find = |is_still: &dyn Fn(usize) -> bool| find(net, contact, &driving, is_still);
+        let own = motions.changes.iter().enumerate().map(|(mode, changes)| {
+            (!changes.is_empty()).then(|| find(&|node| motions.of(mode, node) == Motion::Still))
+        });
+        let own = own.collect();
+        Self { usual: find(&|node| motions.usual[node] == Motion::Still), own, all: find(&|_| false) }
+    }
+
+    /// Returns the generators of a mode.
+    pub(super) fn of(&self, mode: usize) -> &[usize] {
+        self.own[mode].as_ref().unwrap_or(&self.usual)
+    }
+}
+
+/// Returns the nodes that start a motion of the arm without a sample.
+///
+/// `driving` holds which nodes are upstream of a command.
+fn find(net: &Net<'_>, contact: &ContactPorts, driving: &[bool], is_still: &dyn Fn(usize) -> bool) -> Vec<usize> {
+    let nodes = net.wires.len();
+    let (mut sampled, mut still) = (vec![false; nodes], vec![false; nodes]);
+    // `moved` also contains the nodes that pass on a generated motion.
+    let (mut generators, mut moved) = (Vec::new(), vec![false; nodes]);
+    for &node in &net.order {
+        let Some(spec) = net.spec(node) else { continue };
+        let wires = || net.wires[node].iter().filter(|wire| !spec.inputs[wire.input].need.is_delayed);
+        // A flag that nothing ties to a contact may be set forever, so it gates nothing.
+        let is_gate = |wire: &Wire| net.port(wire.source).kind != Kind::Flag || contact.need(net, wire.source);
+        let is_sampled =
+            |wire: &Wire| is_gate(wire) && wire.source.producer.node().is_none_or(|source| sampled[source]);
+        // A wire with a mistake may be the gate.
+        let given = &net.flat.nodes[node].block.wires;
+        let has_mistake = given.has_invalid() || given.valid.len() != net.wires[node].len();
+        if has_mistake || wires().any(is_sampled) {
+            sampled[node] = true;
+            continue;
+        }
+        let sources: Vec<usize> = wires().filter_map(|wire| wire.source.producer.node()).collect();
+        let all_still = !sources.is_empty() && sources.iter().all(|source| still[*source]);
+        let gives_motion = spec.outputs.iter().any(|port| matches!(port.kind, Kind::Twist | Kind::Joints));
+        if is_still(node) || all_still {
+            still[node] = true;
+        } else if sources.iter().any(|source| moved[*source]) {
+            moved[node] = true;
+        } else if gives_motion && driving[node] {
+            moved[node] = true;
+            generators.push(node);
+        }
+    }
+    generators
+}

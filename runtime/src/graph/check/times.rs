@@ -1,0 +1,70 @@
+//! Warns of times that are shorter than a period: they end before the next sample.
+
+use std::ops::Range;
+
+use crate::graph::bench::OpenedBench;
+use crate::graph::net::{Net, WireOrigin};
+use crate::graph::plan::PortRef;
+use crate::node::shortest;
+use crate::source::{Code, Diagnostic, Diagnostics};
+
+/// Warns of each time outside the parameters of nodes that is shorter than a period.
+///
+/// `period` is that of the graph [s]. The age of a sample is compared with the period of its device.
+pub(crate) fn check(net: &Net<'_>, opened: &OpenedBench, period: f64, diagnostics: &mut Diagnostics) {
+    let flat = net.flat;
+    let exits = flat.modes.iter().flat_map(|mode| &mode.exits);
+    diagnostics.extend(exits.flat_map(|exit| {
+        let times = [("for_ms", exit.table.for_ms), ("after_ms", exit.table.after_ms)];
+        times.into_iter().filter_map(|(key, time)| short(key, time?, period, &exit.span))
+    }));
+    let reset = flat.settings.iter().filter_map(|settings| settings.as_table()?.get("reset_after_ms"));
+    let time = flat.table.as_ref().map(|table| table.reset_after_ms);
+    diagnostics.extend(reset.filter_map(|value| short("reset_after_ms", time?, period, &value.span)));
+    let wires = net.wires.iter().flatten().map(|wire| (&wire.origin, wire.source));
+    let wires = wires.chain(net.commands.iter().map(|wire| (&wire.origin, wire.source)));
+    diagnostics.extend(wires.filter_map(|(origin, source)| short_age(net, opened, period, origin, source)));
+    diagnostics.extend(short_policies(net, opened));
+}
+
+/// Returns the warning about a wire whose maximum age is shorter than the periods of all devices that it descends from.
+fn short_age(
+    net: &Net<'_>,
+    opened: &OpenedBench,
+    period: f64,
+    origin: &WireOrigin,
+    source: PortRef,
+) -> Option<Diagnostic> {
+    let age = origin.age?.max_age as f64 * 1e-6;
+    let periods = net.roles_of(source.producer).filter_map(|role| period_of(opened, role));
+    short("max_age_ms", age, periods.reduce(f64::min).unwrap_or(period), &origin.word.span)
+}
+
+/// Returns the warnings about maximum ages in [policy], each compared with the device of its role.
+fn short_policies(net: &Net<'_>, opened: &OpenedBench) -> Diagnostics {
+    let Some((written, Some(policy))) = &net.flat.policy else { return Diagnostics::new() };
+    let Some(table) = written.as_table() else { return Diagnostics::new() };
+    let roles = || net.flat.roles.names().enumerate();
+    let all = table.get("max_age_ms").and_then(|value| {
+        let periods = roles().filter_map(|(role, _)| period_of(opened, role));
+        short("max_age_ms", policy.max_age_ms?, periods.reduce(f64::min)?, &value.span)
+    });
+    let of_role = |(role, name): (usize, &str)| {
+        let value = table.get("roles")?.as_table()?.get(name)?.as_table()?.get("max_age_ms")?;
+        short("max_age_ms", policy.roles.0.get(name)?.max_age_ms?, period_of(opened, role)?, &value.span)
+    };
+    all.into_iter().chain(roles().filter_map(of_role)).collect()
+}
+
+/// Returns the sample period of the device of a role [s].
+fn period_of(opened: &OpenedBench, role: usize) -> Option<f64> {
+    opened.roles.get(role)?.as_ref().map(|bound| opened.period(bound))
+}
+
+/// Returns the warning about a `time` [ms] that is shorter than a `period` [s].
+fn short(key: &str, time: f64, period: f64, span: &Range<usize>) -> Option<Diagnostic> {
+    let shortest = shortest(time, period * 1e3)?;
+    let message = format!("`{key}` is {time} ms, but a new sample comes every {shortest} ms");
+    let help = format!("write `{key} = {shortest}` or more");
+    Some(Diagnostic::new(Code::ShortTime, span.clone(), message).help(help))
+}
