@@ -127,8 +127,13 @@ impl Node for BlindLimit {
     type Outputs = Outputs;
     type State = State;
 
-    const LIMITS: Limits =
-        Limits { through: Some("twist"), holds: &["blind"], breaks: &["acceleration"], spends: Some("spent") };
+    const LIMITS: Limits = Limits {
+        through: Some("twist"),
+        holds: &["blind"],
+        // It stands before the speed limit, so that only that one scales what it lets pass.
+        breaks: &["speed", "acceleration"],
+        spends: Some("spent"),
+    };
 
     fn new(params: Params, setup: &mut Setup<Self>) -> Result<Self, Mistakes> {
         let image = setup.inputs.image.clone().unwrap_or_default();

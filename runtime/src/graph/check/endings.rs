@@ -7,7 +7,8 @@
 use std::collections::BTreeSet;
 
 use super::contact::ContactPorts;
-use crate::graph::net::{CommandWire, Net};
+use super::generators::Drives;
+use crate::graph::net::Net;
 use crate::graph::plan::{Condition, PlannedExit, PlannedMode, PortRef, Test};
 use crate::graph::syntax::{ExitKind, PortState};
 
@@ -18,8 +19,7 @@ pub(super) struct Endings<'a> {
     modes: &'a [PlannedMode],
     /// For each mode, the nodes that generate a motion.
     generators: &'a [&'a [usize]],
-    /// For each command, whether each node is upstream of it.
-    driven: Vec<(&'a CommandWire, Vec<bool>)>,
+    drives: Drives<'a>,
 }
 
 impl<'a> Endings<'a> {
@@ -29,9 +29,7 @@ impl<'a> Endings<'a> {
         modes: &'a [PlannedMode],
         generators: &'a [&'a [usize]],
     ) -> Self {
-        let commands = net.commands.iter().filter(|wire| !wire.is_report);
-        let driven = commands.map(|wire| (wire, net.upstream(wire.source.producer.node())));
-        Self { net, contact, modes, generators, driven: driven.collect() }
+        Self { net, contact, modes, generators, drives: Drives::new(net) }
     }
 
     /// Returns for each mode whether an exit ends its motion, if the mode is entered once.
@@ -61,7 +59,7 @@ impl<'a> Endings<'a> {
     fn ends(&self, exit: &PlannedExit, generator: usize) -> bool {
         match (exit.kind, &exit.condition) {
             (ExitKind::OnLost, Condition::Lost(watched, _)) => {
-                self.contact.need(self.net, watched.source) && self.shares_sensor(watched.source, generator)
+                self.contact.need(self.net, watched.source) && self.drives.shares_sensor(watched.source, generator)
             }
             (ExitKind::OnLost, _) => false,
             (_, Condition::Elapsed(_)) => true,
@@ -70,23 +68,10 @@ impl<'a> Endings<'a> {
         }
     }
 
-    /// Returns whether every command that a generator drives descends from a sensor of the port, as it does through the
-    /// limiter that reads the sensor of its arm.
-    fn shares_sensor(&self, port: PortRef, generator: usize) -> bool {
-        let sensors: BTreeSet<usize> = self.net.roles_of(port.producer).collect();
-        let reads = |wire: &CommandWire| self.net.roles_of(wire.source.producer).any(|role| sensors.contains(&role));
-        self.commands_of(generator).all(reads)
-    }
-
     /// Returns whether a pose descends from an arm that a generator moves.
     fn is_moved_by(&self, pose: PortRef, generator: usize) -> bool {
         let arms: BTreeSet<usize> = self.net.roles_of(pose.producer).collect();
-        self.commands_of(generator).all(|wire| arms.contains(&wire.role))
-    }
-
-    /// Returns the commands that a generator drives.
-    fn commands_of(&self, generator: usize) -> impl Iterator<Item = &CommandWire> {
-        self.driven.iter().filter(move |(_, upstream)| upstream[generator]).map(|(wire, _)| *wire)
+        self.drives.commands(generator).all(|wire| arms.contains(&wire.role))
     }
 
     /// Returns for each mode whether modes that can follow each other without a contact lead to it and away from it
@@ -136,20 +121,20 @@ impl<'a> Endings<'a> {
     fn is_free(&self, exit: &PlannedExit, mode: usize) -> bool {
         match &exit.condition {
             Condition::Sent(_) => false,
-            Condition::Elapsed(time) => self.first_end(mode).is_none_or(|end| *time < end),
+            Condition::Elapsed(time) => {
+                self.ends_of(mode).all(|end| !matches!(end, Condition::Elapsed(at) if at <= time))
+            }
+            Condition::Travel(pose, way) => {
+                self.ends_of(mode).all(|end| !matches!(end, Condition::Travel(of, at) if of == pose && at <= way))
+            }
             Condition::Port(watched, Test::Is(PortState::True | PortState::Present | PortState::New))
             | Condition::Port(watched, Test::Between { .. }) => !self.contact.need(self.net, watched.source),
-            Condition::Port(..) | Condition::Travel(..) | Condition::Lost(..) => true,
+            Condition::Port(..) | Condition::Lost(..) => true,
         }
     }
 
-    /// Returns the time after which a mode ends the run [ns].
-    fn first_end(&self, mode: usize) -> Option<i64> {
-        let ends = self.modes[mode].exits.iter().filter(|exit| exit.to.is_none());
-        let times = ends.filter_map(|exit| match exit.condition {
-            Condition::Elapsed(time) => Some(time),
-            _ => None,
-        });
-        times.min()
+    /// Returns the conditions on which a mode ends the run.
+    fn ends_of(&self, mode: usize) -> impl Iterator<Item = &Condition> {
+        self.modes[mode].exits.iter().filter(|exit| exit.to.is_none()).map(|exit| &exit.condition)
     }
 }

@@ -1,9 +1,10 @@
 //! The nodes that generate a motion, in the graph and in each mode.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use super::contact::ContactPorts;
-use crate::graph::net::{Net, Wire};
+use crate::graph::net::{CommandWire, Net, Wire};
+use crate::graph::plan::PortRef;
 use crate::node::Motion;
 use crate::signal::Kind;
 
@@ -32,6 +33,34 @@ impl Motions {
     }
 }
 
+/// The commands that each node drives.
+pub(super) struct Drives<'a> {
+    net: &'a Net<'a>,
+    /// For each command, whether each node is upstream of it.
+    upstream: Vec<(&'a CommandWire, Vec<bool>)>,
+}
+
+impl<'a> Drives<'a> {
+    pub(super) fn new(net: &'a Net<'a>) -> Self {
+        let commands = net.commands.iter().filter(|wire| !wire.is_report);
+        let upstream = commands.map(|wire| (wire, net.upstream(wire.source.producer.node())));
+        Self { net, upstream: upstream.collect() }
+    }
+
+    /// Returns the commands that a node drives.
+    pub(super) fn commands(&self, node: usize) -> impl Iterator<Item = &CommandWire> {
+        self.upstream.iter().filter(move |(_, upstream)| upstream[node]).map(|(wire, _)| *wire)
+    }
+
+    /// Returns whether every command that a node drives descends from a sensor of the port, as it does through the
+    /// limiter that reads the sensor of its arm.
+    pub(super) fn shares_sensor(&self, port: PortRef, node: usize) -> bool {
+        let sensors: BTreeSet<usize> = self.net.roles_of(port.producer).collect();
+        let reads = |wire: &CommandWire| self.net.roles_of(wire.source.producer).any(|role| sensors.contains(&role));
+        self.commands(node).all(reads)
+    }
+}
+
 /// The nodes that start a motion of the arm without a sample.
 pub(crate) struct Generators {
     /// Those of a graph without modes, and of modes that change none of them.
@@ -44,9 +73,8 @@ pub(crate) struct Generators {
 
 impl Generators {
     pub(crate) fn new(net: &Net<'_>, contact: &ContactPorts, motions: &Motions) -> Self {
-        let commands = net.commands.iter().filter(|wire| !wire.is_report);
-        let driving = net.upstream(commands.filter_map(|wire| wire.source.producer.node()));
-        let find = |is_still: &dyn Fn(usize) -> bool| find(net, contact, &driving, is_still);
+        let drives = Drives::new(net);
+        let find = |is_still: &dyn Fn(usize) -> bool| find(net, contact, &drives, is_still);
         let own = motions.changes.iter().enumerate().map(|(mode, changes)| {
             (!changes.is_empty()).then(|| find(&|node| motions.of(mode, node) == Motion::Still))
         });
@@ -61,9 +89,7 @@ impl Generators {
 }
 
 /// Returns the nodes that start a motion of the arm without a sample.
-///
-/// `driving` holds which nodes are upstream of a command.
-fn find(net: &Net<'_>, contact: &ContactPorts, driving: &[bool], is_still: &dyn Fn(usize) -> bool) -> Vec<usize> {
+fn find(net: &Net<'_>, contact: &ContactPorts, drives: &Drives<'_>, is_still: &dyn Fn(usize) -> bool) -> Vec<usize> {
     let nodes = net.wires.len();
     let (mut sampled, mut still) = (vec![false; nodes], vec![false; nodes]);
     // `moved` also contains the nodes that pass on a generated motion.
@@ -71,8 +97,9 @@ fn find(net: &Net<'_>, contact: &ContactPorts, driving: &[bool], is_still: &dyn 
     for &node in &net.order {
         let Some(spec) = net.spec(node) else { continue };
         let wires = || net.wires[node].iter().filter(|wire| !spec.inputs[wire.input].need.is_delayed);
-        // A flag that nothing ties to a contact may be set forever, so it gates nothing.
-        let is_gate = |wire: &Wire| net.port(wire.source).kind != Kind::Flag || contact.need(net, wire.source);
+        // A flag that nothing ties to a contact of that arm may be set forever, so it gates nothing.
+        let is_contact = |port: PortRef| contact.need(net, port) && drives.shares_sensor(port, node);
+        let is_gate = |wire: &Wire| net.port(wire.source).kind != Kind::Flag || is_contact(wire.source);
         let is_sampled =
             |wire: &Wire| is_gate(wire) && wire.source.producer.node().is_none_or(|source| sampled[source]);
         // A wire with a mistake may be the gate.
@@ -89,7 +116,7 @@ fn find(net: &Net<'_>, contact: &ContactPorts, driving: &[bool], is_still: &dyn 
             still[node] = true;
         } else if sources.iter().any(|source| moved[*source]) {
             moved[node] = true;
-        } else if gives_motion && driving[node] {
+        } else if gives_motion && drives.commands(node).next().is_some() {
             moved[node] = true;
             generators.push(node);
         }
