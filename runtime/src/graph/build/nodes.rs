@@ -106,7 +106,7 @@ impl Builder<'_> {
     pub(crate) fn node(&mut self, index: usize) -> Option<PlannedNode> {
         let (node, wires) = (&self.net.flat.nodes[index], &self.net.wires[index]);
         let (kind, spec) = self.net.nodes[index]?;
-        let (configured, params) = self.configure(kind, &node.block.params);
+        let (configured, params) = self.configure(index, kind, &node.block.params);
         let mut inputs: Vec<(Need, Vec<PlannedWire>)> =
             spec.inputs.iter().map(|input| (input.need, Vec::new())).collect();
         let mut given = Given { inputs: vec![Vec::new(); spec.inputs.len()], period: self.period };
@@ -175,7 +175,7 @@ impl Builder<'_> {
     pub(crate) fn variant(&mut self, index: usize, params: &Value) -> Option<Built> {
         let (kind, spec) = self.net.nodes[index]?;
         let (given, _) = self.built.get(&index)?.clone();
-        let (configured, params) = self.configure(kind, params);
+        let (configured, params) = self.configure(index, kind, params);
         let mut built = self.build(index, configured, &params, given)?;
         let name = &self.net.flat.nodes[index].name;
         for (port, (shape, output)) in built.outputs.iter_mut().zip(&spec.outputs).enumerate() {
@@ -193,10 +193,11 @@ impl Builder<'_> {
     /// Reads the parameters of a node, and returns them with all facts filled in.
     ///
     /// A filled-in value of [limits] keeps its span there, so a mistake in it is reported in that section.
-    fn configure(&mut self, kind: usize, written: &Value) -> (Option<Box<dyn Configured>>, Value) {
+    fn configure(&mut self, node: usize, kind: usize, written: &Value) -> (Option<Box<dyn Configured>>, Value) {
         let mut params = written.clone();
         let has_facts = fill_facts(&mut params, self.net, self.opened, &mut self.diagnostics);
-        let mut reader = Reader::new(&self.sources).with_period(self.period);
+        let period = self.opened.shortest_period(self.net.roles_of(Producer::Node(node))).unwrap_or(self.period);
+        let mut reader = Reader::new(&self.sources).with_period(period);
         if !has_facts {
             return (None, params);
         }
