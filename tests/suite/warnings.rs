@@ -113,3 +113,24 @@ fn a_mode_that_waits_at_rest_is_no_approach() {
     ];
     assert_eq!(codes(hybrid(&settled).warnings().as_ref()), none, "`servo` begins with the contact of `settle`");
 }
+
+#[test]
+fn a_time_is_compared_with_the_samples_that_its_node_reads() {
+    // The pad has 10 Hz and is the clock, the arm has 250 Hz.
+    let press = |set: &str| {
+        let request = Request::file(workspace().join("graphs/finger_press.toml")).set(set);
+        let plan = compile(&catalogue(), &request).unwrap_or_else(|report| panic!("{}", report.render(false)));
+        codes(plan.warnings().as_ref())
+    };
+    let cases: [(&str, &[&str]); 6] = [
+        ("nodes.error.in.x={ from = \"touch.x\", max_age_ms = 50 }", &["short-time"]),
+        ("nodes.error.in.x={ from = \"touch.x\", max_age_ms = 100 }", &[]),
+        ("parts.move.in.position={ from = \"arm.position\", max_age_ms = 20 }", &[]),
+        ("parts.move.set.workspace.max_age_ms=20", &[]),
+        ("parts.move.set.workspace.max_age_ms=2", &["short-time"]),
+        ("policy.roles={ arm = { max_age_ms = 20 }, pad = { max_age_ms = 90 } }", &["short-time"]),
+    ];
+    for (set, expected) in cases {
+        assert_eq!(press(set), expected, "{set}");
+    }
+}

@@ -243,7 +243,7 @@ fn a_start_outside_the_box_is_warned_of_at_its_corner() {
         let wires = [("twist", TwistShape.into()), ("pose", PoseShape { start }.into())];
         places(BOX, &NodeRig::new::<WorkspaceLimit>(BOX, &wires))
     };
-    for start in [None, Some([0.0; 3]), Some([0.1, -0.1, 0.1])] {
+    for start in [None, Some([0.0; 3]), Some([0.1, -0.1, 0.1]), Some([0.0, 0.0, 30.0])] {
         assert!(warnings(start).is_empty(), "{start:?}");
     }
     assert_eq!(warnings(Some([0.0, -0.11, 0.0])), ["start-outside: `min_m`"]);

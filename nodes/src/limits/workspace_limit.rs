@@ -128,6 +128,10 @@ impl Node for WorkspaceLimit {
 ///
 /// `sign` is -1 for the corner with the smallest coordinates, and 1 for the other one.
 fn start_outside(start: &[f64; 3], param: &str, corner: &[f64; 3], sign: f64) -> Option<Mistake> {
+    // A corner or a mount in another unit has its own warning.
+    if start.iter().chain(corner).any(|value| value.abs() > USUAL_REACH_M) {
+        return None;
+    }
     let is_beyond = |axis: usize| sign * (start[axis] - corner[axis]) > 0.0;
     let axis = (0..3).find(|axis| is_beyond(*axis))?;
     let (name, side) = (["x", "y", "z"][axis], if sign < 0.0 { "less" } else { "greater" });

@@ -13,7 +13,7 @@ pub(super) struct Usual {
     name: &'static str,
     unit: &'static str,
     range: Option<Bounds>,
-    /// Nominal time between two ticks [s]; 0 if it is unknown.
+    /// Nominal time between two samples that the node reads [s]; 0 if it is unknown.
     pub(super) period: f64,
 }
 
@@ -31,7 +31,7 @@ impl Usual {
         let Self { name, unit, range, period } = *self;
         let unit_s = [("ms", 1e-3), ("s", 1.0)].iter().find(|(time, _)| *time == unit).map(|(_, seconds)| *seconds);
         if let Some(shortest) = unit_s.and_then(|unit_s| shortest(number, period / unit_s)) {
-            let message = format!("`{name}` is {number} {unit}, but the period of the graph is {shortest} {unit}");
+            let message = format!("`{name}` is {number} {unit}, but a new sample comes every {shortest} {unit}");
             let help = format!("write `{name} = {shortest}` or more");
             return Some(Mistake::new(Code::ShortTime, At::Span(span), message).help(help));
         }

@@ -39,6 +39,12 @@ pub(crate) struct OpenedBench {
 }
 
 impl OpenedBench {
+    /// Returns the shortest sample period of the devices of some roles [s], or `None` if there is no device.
+    pub(crate) fn shortest_period(&self, roles: impl Iterator<Item = usize>) -> Option<f64> {
+        let bound = roles.filter_map(|role| self.roles.get(role)?.as_ref());
+        bound.map(|bound| self.period(bound)).reduce(f64::min)
+    }
+
     /// Returns the nominal sample period of the device of a role [s].
     pub(crate) fn period(&self, role: &BoundRole) -> f64 {
         self.devices[role.device].description.period

@@ -245,7 +245,8 @@ impl Builder<'_> {
         let spec = self.net.spec(index);
         let (specs, inputs) = spec.map_or((&[][..], &[][..]), |spec| (&spec.params, &spec.inputs));
         let units = KnownUnits::of_params(&params, specs).with_wires(inputs, &given.inputs, !is_complete);
-        let mut reader = Reader::new(&self.sources).with_units(units).with_period(self.period);
+        let period = self.opened.shortest_period(self.net.roles_of(Producer::Node(index))).unwrap_or(self.period);
+        let mut reader = Reader::new(&self.sources).with_units(units).with_period(period);
         let configured = self.net.catalogue.nodes()[kind].configure(&params, &mut reader);
         let Reader { mistakes, warnings, measured, .. } = reader;
         self.measured.add(Some(index), measured);

@@ -10,7 +10,7 @@ use crate::graph::syntax::{ExitKind, PortState};
 use crate::node::Motion;
 use crate::source::{Code, Diagnostic, Diagnostics, Value, quoted};
 
-/// Warns of each mode that begins without a contact and ends with one, and in which the sensor moves away or not at all.
+/// Warns of each mode that waits for a contact and in which the sensor moves away from the object, or not at all.
 ///
 /// `start` is the start mode.
 pub(crate) fn check(

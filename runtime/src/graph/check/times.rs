@@ -36,8 +36,8 @@ fn short_age(
     source: PortRef,
 ) -> Option<Diagnostic> {
     let age = origin.age?.max_age as f64 * 1e-6;
-    let periods = net.roles_of(source.producer).filter_map(|role| period_of(opened, role));
-    short("max_age_ms", age, periods.reduce(f64::min).unwrap_or(period), &origin.word.span)
+    let period = opened.shortest_period(net.roles_of(source.producer)).unwrap_or(period);
+    short("max_age_ms", age, period, &origin.word.span)
 }
 
 /// Returns the warnings about maximum ages in [policy], each compared with the device of its role.
@@ -46,19 +46,15 @@ fn short_policies(net: &Net<'_>, opened: &OpenedBench) -> Diagnostics {
     let Some(table) = written.as_table() else { return Diagnostics::new() };
     let roles = || net.flat.roles.names().enumerate();
     let all = table.get("max_age_ms").and_then(|value| {
-        let periods = roles().filter_map(|(role, _)| period_of(opened, role));
-        short("max_age_ms", policy.max_age_ms?, periods.reduce(f64::min)?, &value.span)
+        let period = opened.shortest_period(roles().map(|(role, _)| role))?;
+        short("max_age_ms", policy.max_age_ms?, period, &value.span)
     });
     let of_role = |(role, name): (usize, &str)| {
         let value = table.get("roles")?.as_table()?.get(name)?.as_table()?.get("max_age_ms")?;
-        short("max_age_ms", policy.roles.0.get(name)?.max_age_ms?, period_of(opened, role)?, &value.span)
+        let period = opened.shortest_period(std::iter::once(role))?;
+        short("max_age_ms", policy.roles.0.get(name)?.max_age_ms?, period, &value.span)
     };
     all.into_iter().chain(roles().filter_map(of_role)).collect()
-}
-
-/// Returns the sample period of the device of a role [s].
-fn period_of(opened: &OpenedBench, role: usize) -> Option<f64> {
-    opened.roles.get(role)?.as_ref().map(|bound| opened.period(bound))
 }
 
 /// Returns the warning about a `time` [ms] that is shorter than a `period` [s].
