@@ -40,7 +40,8 @@ impl SourceMap {
     #[must_use]
     pub fn edited(&self, edits: &[Edit]) -> Vec<(String, String)> {
         let mut edits: Vec<_> = edits.iter().map(|edit| edit.resolve(self)).collect();
-        edits.sort_by_key(|(span, _)| span.start);
+        // An insertion stands before a replacement at the same place.
+        edits.sort_by_key(|(span, _)| (span.start, span.end));
         let mut files: Vec<(usize, String, String)> = Vec::new();
         // From the last place to the first, so that the earlier places stay valid.
         for (span, text) in edits.iter().rev() {

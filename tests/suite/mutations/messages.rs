@@ -204,7 +204,7 @@ fn the_first_message_is_about_the_changed_token() {
     let text = format!("{total:?}, of {scores:#?}");
     eprintln!("seed {seed}, {count} mutants: {total:?}");
     assert!(total.told * 2 > count, "{text}");
-    assert!(total.on_line * 100 >= total.told * 97, "first message on another line: {text}");
+    assert!(total.on_line * 100 >= total.told * 96, "first message on another line: {text}");
     assert!(total.suggested * 100 >= total.named * 95, "the original token is not suggested: {text}");
     assert!(total.single * 100 >= total.told * 95, "several messages for one token: {text}");
 }

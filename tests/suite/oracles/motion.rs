@@ -126,6 +126,8 @@ fn no_joint_is_ever_told_to_be_faster_than_its_model_allows() {
         "limits.workspace_min_m=[-9.0, -9.0, -9.0]",
         "limits.workspace_max_m=[9.0, 9.0, 9.0]",
         "limits.lead_rad=3.0",
+        "facts.arm.clear_min_m=[-9.0, -9.0, -9.0]",
+        "facts.arm.clear_max_m=[9.0, 9.0, 9.0]",
     ];
     let requests = [
         (shipped("finger_press.toml"), false),

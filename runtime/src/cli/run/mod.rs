@@ -2,6 +2,7 @@
 
 mod events;
 mod files;
+mod held;
 pub(super) mod log;
 mod ports;
 mod progress;

@@ -3,10 +3,11 @@
 use std::fmt::Write;
 
 use super::events::{LimitWatch, events};
+use super::held::{HoldWatch, chatter};
 use super::ports::{PortTable, node_times};
 use crate::cli::text::prose::PageStyle;
 use crate::cli::view::RunView;
-use crate::engine::{Counters, Engine, Outcome};
+use crate::engine::{Counters, End, Engine, Outcome};
 
 /// Maximum number of bins of a curve on the terminal: two for each character of the widest page.
 const MAX_BINS: usize = 256;
@@ -14,6 +15,7 @@ const MAX_BINS: usize = 256;
 /// Collects the summary tick by tick.
 pub(crate) struct Summary {
     limits: LimitWatch,
+    holds: HoldWatch,
     body: Body,
 }
 
@@ -32,12 +34,13 @@ impl Summary {
             true => Body::Ports(PortTable::new(engine)),
             false => Body::View(Box::new(RunView::new(engine, MAX_BINS))),
         };
-        Self { limits: LimitWatch::new(engine), body }
+        Self { limits: LimitWatch::new(engine), holds: HoldWatch::new(engine), body }
     }
 
     /// Adds the last tick of the engine.
     pub(crate) fn add(&mut self, engine: &Engine) {
         self.limits.add(engine);
+        self.holds.add(engine);
         match &mut self.body {
             Body::View(view) => view.add(engine),
             Body::Ports(ports) => ports.add(engine),
@@ -65,6 +68,13 @@ impl Summary {
             text.push('\n');
         }
         // Writing to a string cannot fail.
+        let has_failed = matches!(outcome.end, End::Fault(_)) || !engine.rests().is_empty();
+        for line in self.holds.cause(engine).into_iter().filter(|_| has_failed) {
+            let _ = writeln!(text, "{line}");
+        }
+        for warning in self.holds.warnings(outcome.time).into_iter().chain(chatter(&engine.changes())) {
+            let _ = writeln!(text, "{warning}");
+        }
         for ((port, _), counters) in engine.ports().iter().zip(engine.counters()) {
             let irregular = irregular_samples(counters);
             if !irregular.is_empty() {

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use super::flat::{Entity, FlatGraph, FlatNode, Scope};
 use super::measured::MeasuredValues;
-use crate::graph::syntax::{BenchDocument, GraphDocument, PartBlock, Sections, Use};
+use crate::graph::syntax::{ALLOW_UNCALIBRATED, BenchDocument, GraphDocument, PartBlock, Sections, Use};
 use crate::source::{
     BuiltinFile, Code, Diagnostic, Diagnostics, Item, Key, Named, SourceMap, Table, Value, parse_table, suggest_name,
 };
@@ -217,7 +217,7 @@ impl Loader {
         for assignment in assignments {
             let Some(table) = self.assignment(assignment) else { continue };
             for (key, value) in table.entries {
-                let of_bench = matches!(key.name.as_str(), "devices" | "bind");
+                let of_bench = matches!(key.name.as_str(), "devices" | "bind" | "facts" | ALLOW_UNCALIBRATED);
                 let target = if of_bench { &mut bench } else { &mut graph };
                 target.merge(Table { entries: vec![(key, value)] });
             }

@@ -2,7 +2,7 @@
 
 use super::read::read_table;
 use crate::node::{At, Mistake, Param, Reader};
-use crate::source::{Code, Key, Severity, Value, suggestion};
+use crate::source::{Code, Key, Severity, Value};
 
 /// Name of the section.
 pub(super) const ALLOW: &str = "allow";
@@ -26,14 +26,14 @@ fn read_entry(key: Key, value: &Value, reader: &mut Reader<'_>) -> Option<Allowa
     let warnings = || Code::ALL.iter().filter(|code| code.severity() == Severity::Warning);
     let code = Code::ALL.iter().find(|code| code.name() == key.name).copied();
     let Some(code) = code.filter(|code| code.severity() == Severity::Warning) else {
-        let (message, help) = match code {
-            Some(_) => (format!("`{}` is an error: only a warning can be allowed", key.name), "remove the line".into()),
+        let unknown = |message: String| Mistake::new(Code::UnknownKey, At::Span(key.span.clone()), message);
+        reader.mistakes.push(match code {
+            Some(_) => unknown(format!("`{}` is an error: only a warning can be allowed", key.name)).help("remove the line"),
             None => {
-                let names = warnings().map(|code| code.name());
-                (format!("there is no warning `{}`", key.name), suggestion(&key.name, names, "warnings"))
+                let mistake = unknown(format!("there is no warning `{}`", key.name));
+                mistake.suggest(&key.name, warnings().map(|code| code.name()), "warnings")
             }
-        };
-        reader.mistakes.push(Mistake::new(Code::UnknownKey, At::Span(key.span), message).help(help));
+        });
         return None;
     };
     let reason = String::read(value, reader)?;

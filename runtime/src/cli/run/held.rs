@@ -1,0 +1,113 @@
+//! What held the arm back: limits that stopped its motion for long, and modes that chatter.
+
+use crate::cli::text::number::seconds;
+use crate::engine::{Engine, ModeChange};
+use crate::node::PortId;
+use crate::signal::Scalar;
+
+/// A motion that is scaled below this counts as stopped [1].
+const STOPPED_SCALE: f64 = 0.1;
+/// A limit that stops the motion for less time than this is not reported [s].
+const MIN_STOPPED_S: f64 = 2.0;
+/// Part of the time of the last mode, and of the run, from which on a stop is reported [1].
+const MIN_SHARE: [f64; 2] = [0.5, 0.2];
+/// Modes chatter if they change more often than this within [`CHATTER_NS`].
+const MAX_CHANGES: usize = 20;
+/// Time in which changes of modes are counted [ns].
+const CHATTER_NS: i64 = 5_000_000_000;
+
+/// For how long one limit stopped the motion.
+struct Stop {
+    /// `node.limit`.
+    name: String,
+    id: PortId,
+    /// In the current mode [s].
+    in_mode: f64,
+    /// In the whole run [s].
+    in_run: f64,
+}
+
+/// Watches the limits tick by tick.
+pub(crate) struct HoldWatch {
+    stops: Vec<Stop>,
+    mode: Option<usize>,
+    /// Time at which the current mode began [ns].
+    since: i64,
+    last: Option<i64>,
+}
+
+impl HoldWatch {
+    pub(crate) fn new(engine: &Engine) -> Self {
+        let stop = |(name, id): (&str, PortId)| Stop { name: name.to_owned(), id, in_mode: 0.0, in_run: 0.0 };
+        Self { stops: engine.limits().map(stop).collect(), mode: None, since: 0, last: None }
+    }
+
+    /// Adds the last tick of the engine.
+    pub(crate) fn add(&mut self, engine: &Engine) {
+        let now = engine.now();
+        let dt = seconds(self.last.map_or(0, |last| now - last));
+        self.last = Some(now);
+        if engine.mode_number() != self.mode {
+            (self.mode, self.since) = (engine.mode_number(), now);
+            self.stops.iter_mut().for_each(|stop| stop.in_mode = 0.0);
+        }
+        for stop in &mut self.stops {
+            if engine.bus().get::<Scalar>(stop.id).is_some_and(|scale| *scale < STOPPED_SCALE) {
+                (stop.in_mode, stop.in_run) = (stop.in_mode + dt, stop.in_run + dt);
+            }
+        }
+    }
+
+    /// Returns what held the arm back in the last mode, if one limit stopped it for most of the time.
+    pub(crate) fn cause(&self, engine: &Engine) -> Option<String> {
+        let duration = seconds(self.last? - self.since);
+        let worst = self.stops.iter().max_by(|a, b| a.in_mode.total_cmp(&b.in_mode))?;
+        let mode = engine.mode().map(|mode| format!(" in mode `{mode}`")).unwrap_or_default();
+        let share = worst.in_mode / duration.max(1e-9);
+        let text = format!("the arm was held back: `{}` stopped it for {:.0} % of the time{mode}", worst.name, share * 100.0);
+        (share >= MIN_SHARE[0] && worst.in_mode > 0.0).then_some(text)
+    }
+
+    /// Returns the warnings about limits that stopped the motion for a large part of the run.
+    pub(crate) fn warnings(&self, end: i64) -> Vec<String> {
+        let duration = seconds(end).max(1e-9);
+        let is_long = |stop: &&Stop| stop.in_run >= MIN_STOPPED_S && stop.in_run / duration >= MIN_SHARE[1];
+        let warning = |Stop { name, in_run, .. }: &Stop| {
+            format!("warning: `{name}` stopped the motion for {in_run:.3} s, {:.0} % of the run", 100.0 * in_run / duration)
+        };
+        self.stops.iter().filter(is_long).map(warning).collect()
+    }
+}
+
+/// Returns the warning about modes that change too often.
+pub(crate) fn chatter(changes: &[ModeChange]) -> Option<String> {
+    let is_dense = |window: &&[ModeChange]| window[MAX_CHANGES].time - window[0].time <= CHATTER_NS;
+    let window = changes.windows(MAX_CHANGES + 1).find(is_dense)?;
+    let mut names: Vec<&str> = window.iter().map(|change| change.mode.as_str()).collect();
+    names.sort_unstable();
+    names.dedup();
+    let (time, from) = (seconds(window[MAX_CHANGES].time - window[0].time), seconds(window[0].time));
+    let names = names.join("`, `");
+    Some(format!("warning: the modes `{names}` changed {MAX_CHANGES} times within {time:.3} s, from {from:.3} s on"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn changes(step_ms: i64) -> Vec<ModeChange> {
+        let change = |i: i64| {
+            let mode = if i % 2 == 0 { "approach" } else { "servo" };
+            ModeChange { time: i * step_ms * 1_000_000, tick: 0, mode: mode.into(), reason: String::new() }
+        };
+        (0..30).map(change).collect()
+    }
+
+    #[test]
+    fn modes_that_change_all_the_time_are_warned_of() {
+        let text = chatter(&changes(100)).unwrap();
+        assert_eq!(text, "warning: the modes `approach`, `servo` changed 20 times within 2.000 s, from 0.000 s on");
+        assert_eq!(chatter(&changes(300)), None);
+        assert_eq!(chatter(&changes(100)[..20]), None);
+    }
+}
