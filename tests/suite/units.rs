@@ -278,3 +278,27 @@ fn a_limit_that_several_nodes_read_has_one_mistake() {
         assert_eq!(report.sources.file_at(report.diagnostics[0].span.start).name, SourceMap::COMMAND_LINE);
     }
 }
+
+#[test]
+fn the_bounds_of_a_scenario_may_have_units() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("scenario.toml");
+    let verified = |checks: &str| {
+        let tests = tactflow_tests::workspace().join("tests/scenarios");
+        let [graph, bench] = ["tasks/slide.toml", "benches/slide.toml"].map(|name| tests.join(name));
+        let head = format!("[scenario]\ngraph = {graph:?}\nbench = {bench:?}\nseeds = 1\n");
+        std::fs::write(&file, head + checks).unwrap();
+        let verified = say(&["verify", file.to_str().unwrap(), "--format=json"]);
+        (verified.code, verified.out, verified.err)
+    };
+    let check = |for_s: &str, above: &str, below: &str, mean: &str| {
+        verified(&format!(
+            "for_s = {for_s}\n[check.force]\nof = \"truth.force\"\nnever_above = {above}\nnever_below = {below}\n\
+             std_below = 3.0\npaper = {{ std = {mean} }}\n"
+        ))
+    };
+    let plain = check("4.0", "3.0", "0.0", "0.125");
+    assert_eq!(plain, check("\"4000 ms\"", "\"3000 mN\"", "\"0 kN\"", "\"125 mN\""));
+    assert_eq!(plain.0, 0, "{plain:?}");
+    assert_ne!(plain, check("4.0", "\"2999 mN\"", "0.0", "0.125"));
+}

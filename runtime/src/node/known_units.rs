@@ -40,9 +40,11 @@ impl<'a> KnownUnits<'a> {
         Self { inputs, wires, is_incomplete, ..self }
     }
 
-    /// Whether a unit that is not known is no mistake.
-    pub(super) const fn is_incomplete(&self) -> bool {
-        self.is_incomplete
+    /// Whether a declared unit is not known because of a mistake that has its own diagnostic.
+    pub(super) fn has_mistake(&self, declared: &str) -> bool {
+        let Some(param) = declared.strip_prefix('$') else { return self.is_incomplete };
+        let is_given = self.params.is_some_and(|table| table.get(param).is_some());
+        is_given || self.specs.iter().any(|spec| spec.name == param && !spec.is_optional)
     }
 
     /// Returns the size of a declared unit and its text with the letters replaced, or `None` if a letter stands for no

@@ -21,11 +21,8 @@ impl Reader<'_> {
             Err(error) => return self.refuse(error_mistake(text, &error, known.as_ref(), &value.span)),
         };
         let Some((size, unit)) = known else {
-            return if self.units.is_incomplete() {
-                None
-            } else {
-                self.refuse(self.unknown_unit(&measure, &value.span))
-            };
+            let has_mistake = self.unit.is_some_and(|unit| self.units.has_mistake(unit));
+            return if has_mistake { None } else { self.refuse(self.unknown_unit(&measure, &value.span)) };
         };
         match measure.to(&size) {
             Some(number) => Some(Cow::Owned(Value { item: written_item(number), span: value.span.clone() })),

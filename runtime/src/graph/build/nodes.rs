@@ -160,9 +160,10 @@ impl Builder<'_> {
             }
             given.inputs[wire.input].push((wire.key.name.clone(), port.shape.clone()));
         }
-        let (configured, params) = self.configure(index, kind, &node.block.params, &given, is_complete);
         let missing = |(need, ports): &(Need, Vec<PlannedWire>)| need.must_be_wired && ports.is_empty();
-        if !is_complete || inputs.iter().any(missing) || self.frames.has_clash(index) {
+        is_complete &= !inputs.iter().any(missing);
+        let (configured, params) = self.configure(index, kind, &node.block.params, &given, is_complete);
+        if !is_complete || self.frames.has_clash(index) {
             return None;
         }
         let built = self.build(index, configured, &params, given.clone())?;
