@@ -69,7 +69,7 @@ fn check(example: &str) -> Option<Report> {
                 }
             }
         }
-        fs::write(folder.path().join(&*name), text).unwrap();
+        fs::write(folder.path().join(*name), text).unwrap();
     }
     match compile(&tactflow_nodes::catalogue(), &Request::file(folder.path().join("graph.toml"))) {
         Ok(plan) => plan.warnings(),

@@ -27,8 +27,8 @@ pub use outline::{
 };
 pub use plan::{AllowedWarning, PlannedPort};
 pub(crate) use plan::{
-    Clock, Condition, PlannedCommand, PlannedDevice, PlannedExit, PlannedModes, PlannedNode, PlannedRole, PlannedShow,
-    PlannedView, PlannedWire, PortRef, Producer, Test,
+    Clock, Condition, Plan, PlannedCommand, PlannedDevice, PlannedExit, PlannedModes, PlannedNode, PlannedRole,
+    PlannedShow, PlannedView, PlannedWire, PortRef, Producer, Test,
 };
 pub use syntax::Policy;
 pub(crate) use syntax::{AgeLimit, ExitKind, PolicyTable, PortState, into_diagnostic};

@@ -119,6 +119,7 @@ impl Mutant {
 
 /// Mutates the files of all graphs and returns the scores of each operation. What is wrong is written out if
 /// `is_verbose`.
+#[expect(clippy::print_stderr, reason = "whoever measures with a seed reads what is wrong")]
 fn scores(seed: u64, count: usize, operations: &[Operation], is_verbose: bool) -> BTreeMap<String, Score> {
     let copy = Copy::new();
     let catalogue = catalogue();
@@ -202,7 +203,6 @@ fn the_first_message_is_about_the_changed_token() {
     let scores = scores(seed, count, &Operation::ALL, std::env::var_os("TACTFLOW_SEED").is_some());
     let total = sum(&scores);
     let text = format!("{total:?}, of {scores:#?}");
-    eprintln!("seed {seed}, {count} mutants: {total:?}");
     assert!(total.told * 2 > count, "{text}");
     assert!(total.on_line * 100 >= total.told * 96, "first message on another line: {text}");
     assert!(total.suggested * 100 >= total.named * 95, "the original token is not suggested: {text}");

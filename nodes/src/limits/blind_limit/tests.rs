@@ -95,7 +95,7 @@ fn until_it_brakes_the_twist_passes_with_its_bits() {
 #[test]
 fn flicker_does_not_refill_and_a_contact_that_lasts_does() {
     let push = [0.0, 0.0, 0.02, 0.0, 0.0, 0.0];
-    let flicker = |ms: f64| Some((ms / 20.0) as u64 % 2 == 0);
+    let flicker = |ms: f64| Some(((ms / 20.0) as u64).is_multiple_of(2));
     let mut rig = rig("");
     let course = run(&mut rig, 20.0, push, flicker);
     assert!(course.way <= 0.05 + 1e-9 && is_spent(&rig), "{course:?}");

@@ -64,7 +64,8 @@ impl HoldWatch {
         let worst = self.stops.iter().max_by(|a, b| a.in_mode.total_cmp(&b.in_mode))?;
         let mode = engine.mode().map(|mode| format!(" in mode `{mode}`")).unwrap_or_default();
         let share = worst.in_mode / duration.max(1e-9);
-        let text = format!("the arm was held back: `{}` stopped it for {:.0} % of the time{mode}", worst.name, share * 100.0);
+        let text =
+            format!("the arm was held back: `{}` stopped it for {:.0} % of the time{mode}", worst.name, share * 100.0);
         (share >= MIN_SHARE[0] && worst.in_mode > 0.0).then_some(text)
     }
 
@@ -73,7 +74,10 @@ impl HoldWatch {
         let duration = seconds(end).max(1e-9);
         let is_long = |stop: &&Stop| stop.in_run >= MIN_STOPPED_S && stop.in_run / duration >= MIN_SHARE[1];
         let warning = |Stop { name, in_run, .. }: &Stop| {
-            format!("warning: `{name}` stopped the motion for {in_run:.3} s, {:.0} % of the run", 100.0 * in_run / duration)
+            format!(
+                "warning: `{name}` stopped the motion for {in_run:.3} s, {:.0} % of the run",
+                100.0 * in_run / duration
+            )
         };
         self.stops.iter().filter(is_long).map(warning).collect()
     }

@@ -11,8 +11,8 @@ use crate::engine::core::{
     AgedWire, CommandSlot, Core, DeviceLink, DeviceSlot, Inlet, ModeMachine, NodeRunner, ReportSlot, Timing,
 };
 use crate::graph::{
-    AgeLimit, Compiled, PlannedCommand, PlannedDevice, PlannedNode, PlannedPort, PlannedShow, PlannedView, PlannedWire,
-    Policy, PortRef, Producer,
+    AgeLimit, Compiled, Plan, PlannedCommand, PlannedDevice, PlannedNode, PlannedPort, PlannedShow, PlannedView,
+    PlannedWire, Policy, PortRef, Producer,
 };
 use crate::node::{Bus, PortId, Tick};
 use crate::signal::{Mark, Shape};
@@ -28,6 +28,21 @@ struct BusPorts {
 }
 
 impl BusPorts {
+    /// Adds the ports of a plan, and returns them with an inlet for each port of a role.
+    fn of(plan: &Plan) -> (Self, Vec<Inlet>) {
+        let (mut ports, mut inlets) = (Self::default(), Vec::new());
+        for (i, role) in plan.roles.iter().enumerate() {
+            for (port, planned) in role.ports.iter().enumerate() {
+                let id = ports.add(PortRef { producer: Producer::Role(i), port }, planned);
+                inlets.push(Inlet::new(role, port, id));
+            }
+        }
+        for (source, planned) in plan.nodes.iter().flat_map(PlannedNode::outputs) {
+            ports.add(source, planned);
+        }
+        (ports, inlets)
+    }
+
     fn add(&mut self, source: PortRef, planned: &PlannedPort) -> PortId {
         let id = self.bus.add(&planned.shape);
         self.index.insert(source, self.list.len());
@@ -49,16 +64,7 @@ impl Engine {
     #[must_use]
     pub fn new(compiled: Compiled) -> Self {
         let Compiled { plan, view, sources, exports, .. } = compiled;
-        let (mut ports, mut inlets) = (BusPorts::default(), Vec::new());
-        for (i, role) in plan.roles.iter().enumerate() {
-            for (port, planned) in role.ports.iter().enumerate() {
-                let id = ports.add(PortRef { producer: Producer::Role(i), port }, planned);
-                inlets.push(Inlet::new(role, port, id));
-            }
-        }
-        for (source, planned) in plan.nodes.iter().flat_map(PlannedNode::outputs) {
-            ports.add(source, planned);
-        }
+        let (mut ports, inlets) = BusPorts::of(&plan);
         let logged = plan.nodes.iter().filter(|node| node.is_logged).map(|node| logged(node, &ports)).collect();
         let place = |device: usize| sources.locate(plan.devices[device].span.start);
         let roles = plan.roles.iter().map(|role| (role.name.clone(), place(role.device))).collect();
@@ -68,13 +74,7 @@ impl Engine {
         let uncalibrated =
             plan.nodes.iter().filter(|node| node.is_uncalibrated).map(|node| node.name.clone()).collect();
         let mut watched = watched_commands(&plan.commands, &ports);
-        let devices = plan.devices.into_iter().enumerate();
-        let reports: BTreeMap<(usize, usize), &Shape> = plan
-            .commands
-            .iter()
-            .filter(|wire| wire.is_report)
-            .map(|wire| ((wire.device, wire.port), &wire.shape))
-            .collect();
+        let (devices, reports) = (plan.devices.into_iter().enumerate(), report_shapes(&plan.commands));
         let devices = devices.map(|(i, device)| device_slot(i, device, &reports, &sources)).collect();
         let runners: Vec<NodeRunner> =
             plan.nodes.into_iter().map(|node| runner(node, &mut ports, &mut watched)).collect();
@@ -126,6 +126,12 @@ impl Engine {
             sources,
         }
     }
+}
+
+/// Returns the shape of each wired report, by its device and its number there.
+fn report_shapes(commands: &[PlannedCommand]) -> BTreeMap<(usize, usize), &Shape> {
+    let reports = commands.iter().filter(|wire| wire.is_report);
+    reports.map(|wire| ((wire.device, wire.port), &wire.shape)).collect()
 }
 
 fn logged(node: &PlannedNode, ports: &BusPorts) -> Logged {

@@ -62,8 +62,8 @@ fn find_free(modes: &[PlannedMode], start: usize, waits: &dyn Fn(&PlannedExit) -
 /// Returns whether only a contact leads on from a mode. A mode after the start may back off for a while.
 fn is_approach(mode: &PlannedMode, is_start: bool, waits: &dyn Fn(&PlannedExit) -> bool) -> bool {
     let mut ways = mode.exits.iter().filter(|exit| matches!(exit.kind, ExitKind::Go | ExitKind::Done)).peekable();
-    let is_only_way = ways.peek().is_some() && ways.clone().all(|exit| waits(exit));
-    is_only_way || is_start && ways.any(|exit| waits(exit))
+    let is_only_way = ways.peek().is_some() && ways.clone().all(waits);
+    is_only_way || is_start && ways.any(waits)
 }
 
 /// Returns whether an exit waits for a contact.

@@ -17,7 +17,10 @@ impl Provenance {
         let width = net.roles.len().div_ceil(64);
         let mut found = Self { width, words: vec![0; width * net.wires.len()] };
         // A delayed wire comes from a later node, so one pass may not be enough.
-        while net.order.iter().fold(false, |has_changed, node| found.collect(net, *node) || has_changed) {}
+        let mut has_changed = true;
+        while has_changed {
+            has_changed = net.order.iter().filter(|node| found.collect(net, **node)).count() > 0;
+        }
         found
     }
 

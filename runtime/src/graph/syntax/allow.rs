@@ -28,7 +28,9 @@ fn read_entry(key: Key, value: &Value, reader: &mut Reader<'_>) -> Option<Allowa
     let Some(code) = code.filter(|code| code.severity() == Severity::Warning) else {
         let unknown = |message: String| Mistake::new(Code::UnknownKey, At::Span(key.span.clone()), message);
         reader.mistakes.push(match code {
-            Some(_) => unknown(format!("`{}` is an error: only a warning can be allowed", key.name)).help("remove the line"),
+            Some(_) => {
+                unknown(format!("`{}` is an error: only a warning can be allowed", key.name)).help("remove the line")
+            }
             None => {
                 let mistake = unknown(format!("there is no warning `{}`", key.name));
                 mistake.suggest(&key.name, warnings().map(|code| code.name()), "warnings")

@@ -202,8 +202,8 @@ fn declare_missing(inputs: &mut Vec<(Key, Spanned<String>)>, inner: &[Use], oute
         Some(last) => Diagnostic::new(Code::UnknownInput, last.clone(), message)
             .note(first.span.clone(), "one is read here")
             .edit(Edit::Below(last.clone(), lines)),
-        None => Diagnostic::new(Code::UnknownInput, first.span.clone(), message)
-            .edit(Edit::Append(first.span.clone(), format!("\n[inputs]\n{lines}"))),
+        // The section may be there and empty.
+        None => Diagnostic::new(Code::UnknownInput, first.span.clone(), message),
     };
     let place = last.unwrap_or_else(|| first.span.clone());
     for read in missing {
