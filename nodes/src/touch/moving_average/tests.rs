@@ -80,7 +80,7 @@ fn invalid_windows_are_refused() {
         ("window_ms = 0", "bad-value: `0`"),
         ("window_ms = -1.0", "bad-value: `-1.0`"),
         ("window = 2.5", "bad-value: `2.5`"),
-        ("window_ms = \"40 mm\"", "bad-value: `\"40 mm\"`"),
+        ("window_ms = \"40 mm\"", "unit-mismatch: `\"40 mm\"`"),
     ] {
         assert_eq!(places(bad, &built(bad)), [place], "{bad}");
     }
