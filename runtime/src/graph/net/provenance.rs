@@ -1,5 +1,7 @@
 //! Provenance: the roles whose samples a port descends from.
 
+use std::iter::successors;
+
 use super::Net;
 use crate::graph::plan::Producer;
 
@@ -48,10 +50,17 @@ impl Provenance {
             Producer::Role(role) => (Some(role), &[][..]),
             Producer::Node(node) => (None, &self.words[node * self.width..][..self.width]),
         };
+        // Each step clears the lowest bit, so that only bits that are set take time.
+        let rest = |word: u64| successors(used(word), |word| used(word & (word - 1)));
         let bits = words
             .iter()
             .enumerate()
-            .flat_map(|(i, word)| (0..64).filter(move |bit| word >> bit & 1 == 1).map(move |bit| i * 64 + bit));
+            .flat_map(move |(i, word)| rest(*word).map(move |word| i * 64 + word.trailing_zeros() as usize));
         role.into_iter().chain(bits)
     }
+}
+
+/// Returns a word in which a bit is set.
+fn used(word: u64) -> Option<u64> {
+    (word != 0).then_some(word)
 }
