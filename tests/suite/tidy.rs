@@ -18,7 +18,7 @@ fn rust_files(folder: &Path, files: &mut Vec<PathBuf>) {
     }
 }
 
-fn sources(folders: &[&str]) -> Vec<(PathBuf, String)> {
+pub(crate) fn sources(folders: &[&str]) -> Vec<(PathBuf, String)> {
     let mut files = Vec::new();
     folders.iter().for_each(|folder| rust_files(&workspace().join(folder), &mut files));
     assert!(!files.is_empty());
@@ -26,7 +26,7 @@ fn sources(folders: &[&str]) -> Vec<(PathBuf, String)> {
 }
 
 /// The code of a file, without its comments and its tests.
-fn code(text: &str) -> String {
+pub(crate) fn code(text: &str) -> String {
     let text = text.split("#[cfg(test)]\nmod ").next().unwrap_or_default();
     text.lines().map(|line| line.split("//").next().unwrap_or_default()).collect::<Vec<_>>().join("\n")
 }

@@ -32,8 +32,8 @@
 //! `robot` (`Jacobian`), nothing (`Flag`). A capital letter is a variable: its value is known when the graph is loaded,
 //! and is the same for all ports of the node. `"$name"` is the frame or unit that the parameter `name` holds.
 //!
-//! Any port may declare its `quantity`, which tells apart what kind, unit and frame do not: `position` is not
-//! `equilibrium`. A capital letter passes a quantity through. A port without one outputs an unknown quantity and accepts
+//! Any port may declare its `quantity`, which says what the value is: `position` is not `equilibrium`, although kind,
+//! unit and frame are the same. A capital letter passes a quantity through. A port without one outputs an unknown quantity and accepts
 //! any. An input with `known` refuses an unknown quantity too.
 
 mod bounds;

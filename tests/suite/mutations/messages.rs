@@ -27,7 +27,7 @@ const GRAPHS: [(&str, &[&str]); 6] = [
 /// The mutations of one token, and how well the messages about them are.
 #[derive(Debug, Default)]
 struct Score {
-    told: usize,
+    reported: usize,
     on_line: usize,
     named: usize,
     suggested: usize,
@@ -98,7 +98,7 @@ impl Mutant {
                 wrong.push(what);
             }
         };
-        score.told += 1;
+        score.reported += 1;
         let first = &report.diagnostics[0];
         let place = report.sources.location(&first.span);
         let is_here = self.file.ends_with(&place.file) || PathBuf::from(&place.file).ends_with(&self.file);
@@ -148,7 +148,7 @@ fn scores(seed: u64, count: usize, operations: &[Operation], is_verbose: bool) -
 
 fn sum(scores: &BTreeMap<String, Score>) -> Score {
     scores.values().fold(Score::default(), |sum, score| Score {
-        told: sum.told + score.told,
+        reported: sum.reported + score.reported,
         on_line: sum.on_line + score.on_line,
         named: sum.named + score.named,
         suggested: sum.suggested + score.suggested,
@@ -203,8 +203,8 @@ fn the_first_message_is_about_the_changed_token() {
     let scores = scores(seed, count, &Operation::ALL, std::env::var_os("TACTFLOW_SEED").is_some());
     let total = sum(&scores);
     let text = format!("{total:?}, of {scores:#?}");
-    assert!(total.told * 2 > count, "{text}");
-    assert!(total.on_line * 100 >= total.told * 96, "first message on another line: {text}");
+    assert!(total.reported * 2 > count, "{text}");
+    assert!(total.on_line * 100 >= total.reported * 96, "first message on another line: {text}");
     assert!(total.suggested * 100 >= total.named * 95, "the original token is not suggested: {text}");
-    assert!(total.single * 100 >= total.told * 95, "several messages for one token: {text}");
+    assert!(total.single * 100 >= total.reported * 95, "several messages for one token: {text}");
 }

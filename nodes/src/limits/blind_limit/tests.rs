@@ -35,7 +35,7 @@ struct Course {
     way: f64,
 }
 
-/// Steps for `seconds` with a wanted twist, while `contact` tells by the time [ms] whether there is one.
+/// Steps for `seconds` with a wanted twist. `contact` returns the flag at a time [ms]; with `None` it is absent.
 fn run(rig: &mut NodeRig, seconds: f64, wanted: [f64; 6], contact: impl Fn(f64) -> Option<bool>) -> Course {
     let corners = corners(&ImageShape { rows: 8, cols: 8, pitch: [0.005; 2], unit: Unit::NEWTON });
     let mut course = Course::default();

@@ -22,15 +22,13 @@ struct ForeignFact<'a> {
 /// A node that reads no role generates its outputs, and may use the facts of any role.
 pub(crate) fn check(net: &Net<'_>, diagnostics: &mut Diagnostics) {
     for (node, flat) in net.flat.nodes.iter().enumerate() {
-        let upstream: BTreeSet<&str> =
-            net.roles_of(Producer::Node(node)).map(|role| net.name(Producer::Role(role))).collect();
         diagnostics.extend(task_values(net, node));
         let tables = [&flat.block.params].into_iter().chain(net.settings_of(node));
-        let foreign: Vec<ForeignFact<'_>> = tables.flat_map(|table| find_foreign(net, table, &upstream)).collect();
-        let roles: BTreeSet<&str> = foreign.iter().map(|fact| fact.role).filter(|_| !upstream.is_empty()).collect();
+        let foreign: Vec<ForeignFact<'_>> = tables.flat_map(|table| find_foreign(net, node, table)).collect();
+        let roles: BTreeSet<&str> = foreign.iter().map(|fact| fact.role).collect();
         for role in roles {
             let facts: Vec<_> = foreign.iter().filter(|fact| fact.role == role).collect();
-            diagnostics.push(report(net, node, &facts, &upstream));
+            diagnostics.push(report(net, node, &facts));
         }
     }
 }
@@ -57,43 +55,40 @@ fn task_values(net: &Net<'_>, node: usize) -> Vec<Diagnostic> {
     own.map(report).collect()
 }
 
-/// Returns the facts in a table of parameters that are not of the given roles. Unknown roles have their own diagnostic.
-fn find_foreign<'a>(net: &Net<'_>, table: &'a Value, upstream: &BTreeSet<&str>) -> Vec<ForeignFact<'a>> {
+/// Returns the facts in a table of parameters that are of roles which the node does not read. Unknown roles have their
+/// own diagnostic, and optional facts are left out.
+fn find_foreign<'a>(net: &Net<'_>, node: usize, table: &'a Value) -> Vec<ForeignFact<'a>> {
     let entries = table.as_table().into_iter().flat_map(|table| &table.entries);
     let facts = entries.flat_map(|(key, value)| value.facts().into_iter().map(move |fact| (key.name.as_str(), fact)));
     let foreign = facts.filter_map(|(param, FactRef { word, place, is_optional })| {
         let (role, fact) = word.split_once('.')?;
-        let is_foreign =
-            !is_optional && role != LIMITS && net.flat.roles.position(role).is_some() && !upstream.contains(role);
-        is_foreign.then_some(ForeignFact { param, role, fact, place })
+        let is_role = role != LIMITS && net.flat.roles.position(role).is_some();
+        (is_role && !is_optional && !net.reads(node, role)).then_some(ForeignFact { param, role, fact, place })
     });
     foreign.collect()
 }
 
-fn report(net: &Net<'_>, node: usize, facts: &[&ForeignFact<'_>], upstream: &BTreeSet<&str>) -> Diagnostic {
-    let (name, role) = (&net.flat.nodes[node].name, facts[0].role);
-    let params = quoted(facts.iter().map(|fact| fact.param));
-    let reads = quoted(upstream);
+fn report(net: &Net<'_>, node: usize, facts: &[&ForeignFact<'_>]) -> Diagnostic {
+    let (name, role, part) = (&net.flat.nodes[node].name, facts[0].role, net.part_of(node));
+    let upstream: Vec<&str> = net.roles_of(Producer::Node(node)).map(|role| net.name(Producer::Role(role))).collect();
+    let (params, reads) = (quoted(facts.iter().map(|fact| fact.param)), quoted(&upstream));
     let message = format!("`{name}` takes {params} from the facts of `{role}`, but it reads only {reads}");
     let place = facts[0].place.clone();
-    let part = name.split_once('.');
-    let used = part.and_then(|(part, _)| net.flat.scopes[0].names.get(part)).map(|(key, _)| key.span.clone());
-    let block = used.clone();
-    let diagnostic = match used {
-        Some(used) => Diagnostic::new(Code::ForeignFact, used, message).note(place, "the part takes it here"),
+    let diagnostic = match part {
+        Some(part) => {
+            Diagnostic::new(Code::ForeignFact, part.span.clone(), message).note(place, "the part takes it here")
+        }
         None => Diagnostic::new(Code::ForeignFact, place, message),
     };
-    let kind =
-        |role: &str| net.flat.roles.iter().find(|(key, _)| key.name == role).map(|(_, kind)| kind.value.as_str());
-    let Some(own) = upstream.iter().find(|own| kind(own) == kind(role)) else { return diagnostic };
-    let path = part.map(|(_, inner)| format!("set.{inner}.")).unwrap_or_default();
-    let lines =
-        facts.iter().map(|ForeignFact { param, fact, .. }| format!("\n{path}{param} = {{ from = \"{own}.{fact}\" }}"));
-    let lines: String = lines.collect();
-    match (part, block) {
-        (Some((part, _)), Some(block)) => diagnostic
-            .help(format!("add to [parts.{part}]:{lines}"))
-            .edit(Edit::Below(block, lines.trim_start().to_owned())),
-        _ => diagnostic.help(format!("write in [nodes.{name}]:{lines}")),
+    let kind = |role: &str| net.flat.roles.get(role).map(|kind| kind.value.as_str());
+    let Some(own) = upstream.into_iter().find(|own| kind(own) == kind(role)) else { return diagnostic };
+    let path = part.and(name.split_once('.')).map(|(_, inner)| format!("set.{inner}.")).unwrap_or_default();
+    let line = |fact: &&ForeignFact<'_>| format!("\n{path}{} = {{ from = \"{own}.{}\" }}", fact.param, fact.fact);
+    let lines: String = facts.iter().map(line).collect();
+    match part {
+        Some(part) => diagnostic
+            .help(format!("add to [parts.{}]:{lines}", part.name))
+            .edit(Edit::Below(part.span.clone(), lines.trim_start().to_owned())),
+        None => diagnostic.help(format!("write in [nodes.{name}]:{lines}")),
     }
 }

@@ -114,11 +114,16 @@ impl<'a> Net<'a> {
     /// Creates a diagnostic about a node. For a node in a part it is at the part in the graph file.
     pub(crate) fn diagnostic_at(&self, node: usize, code: Code, message: String) -> Diagnostic {
         let own = self.place(Producer::Node(node));
-        let part = self.flat.nodes[node].name.split_once('.').and_then(|(part, _)| self.flat.scopes[0].names.get(part));
-        match part {
-            Some((key, _)) => Diagnostic::new(code, key.span.clone(), message).note(own, "the part has it here"),
+        match self.part_of(node) {
+            Some(part) => Diagnostic::new(code, part.span.clone(), message).note(own, "the part has it here"),
             None => Diagnostic::new(code, own, message),
         }
+    }
+
+    /// Returns the part of the graph file that contains a node, or `None` for a node of the graph file itself.
+    pub(crate) fn part_of(&self, node: usize) -> Option<&'a Key> {
+        let (part, _) = self.flat.nodes[node].name.split_once('.')?;
+        self.flat.scopes[0].names.get(part).map(|(key, _)| key)
     }
 
     /// Returns the declaration of the command or report at the end of a wire.
