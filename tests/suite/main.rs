@@ -4,6 +4,7 @@
 mod absence;
 mod answers;
 mod bad_data;
+mod blind;
 mod calibrate;
 mod cli;
 

@@ -202,6 +202,15 @@ impl Value {
         }
     }
 
+    /// Returns whether the value, or an entry of it, is a string at this place.
+    pub(crate) fn has_text_at(&self, span: &Range<usize>) -> bool {
+        match &self.item {
+            Item::String(_) => self.span == *span,
+            Item::Array(items) => items.iter().any(|item| item.has_text_at(span)),
+            _ => false,
+        }
+    }
+
     /// Returns the string, or `None` for other values.
     #[must_use]
     pub fn as_str(&self) -> Option<&str> {

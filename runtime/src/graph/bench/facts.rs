@@ -34,6 +34,34 @@ pub(crate) fn fill_facts(
     report(fact, diagnostics).map(|fact| *value = fact).is_some()
 }
 
+/// Returns the unit that the name of a limit ends with: m/s2 for `linear_m_per_s2`.
+fn unit_of_limit(name: &str) -> Option<&'static str> {
+    const UNITS: [(&str, &str); 10] = [
+        ("_m_per_s2", "m/s2"),
+        ("_rad_per_s2", "rad/s2"),
+        ("_m_per_s", "m/s"),
+        ("_rad_per_s", "rad/s"),
+        ("_raw", "raw"),
+        ("_rad", "rad"),
+        ("_mm", "mm"),
+        ("_m", "m"),
+        ("_n", "N"),
+        ("_s", "s"),
+    ];
+    UNITS.iter().find(|(end, _)| name.ends_with(end)).map(|(_, unit)| *unit)
+}
+
+/// Adds a unit to the plain numbers in a value, so that a parameter of another unit refuses them.
+fn with_unit(value: Value, unit: &str) -> Value {
+    let item = match value.item {
+        Item::Integer(number) => Item::String(format!("{number} {unit}")),
+        Item::Float(number) if number.is_finite() => Item::String(format!("{number} {unit}")),
+        Item::Array(items) => Item::Array(items.into_iter().map(|item| with_unit(item, unit)).collect()),
+        other => other,
+    };
+    Value { item, ..value }
+}
+
 /// Returns whether a value is an optional fact that is not there, or that is of a role which the node does not read.
 fn is_left_out(value: &Value, node: Option<usize>, net: &Net<'_>, opened: &OpenedBench) -> bool {
     let Some(fact) = value.as_table().and_then(Table::fact).filter(|fact| fact.is_optional) else { return false };
@@ -54,7 +82,8 @@ fn find_fact(
     let part = |range: Range<usize>| Spanned { value: word.to_owned(), span: place.clone() }.part(range);
     if role == LIMITS {
         // A missing value is reported at the section.
-        return net.flat.limits.as_ref().and_then(|(_, table)| table.get(name)).cloned().ok_or(None);
+        let value = net.flat.limits.as_ref().and_then(|(_, table)| table.get(name)).cloned().ok_or(None)?;
+        return Ok(unit_of_limit(name).map_or(value.clone(), |unit| with_unit(value, unit)));
     }
     let roles = &net.flat.roles;
     let Some(index) = roles.position(role) else {

@@ -252,10 +252,26 @@ impl Builder<'_> {
         let Reader { mistakes, warnings, measured, .. } = reader;
         self.measured.add(Some(index), measured);
         let is_valid = mistakes.is_empty();
+        let mistakes = mistakes.into_iter().map(|mistake| self.at_reference(mistake, written)).collect();
         place_mistakes(mistakes, &params, &[], &mut self.sources, &mut self.diagnostics);
         let warnings = self.warnings_of_written(warnings, written);
         place_mistakes(warnings, &params, &[], &mut self.sources, &mut self.diagnostics);
         (configured.filter(|_| is_valid), params)
+    }
+
+    /// Moves the mistake that a limit is in another unit than its parameter to the reference in the parameter.
+    fn at_reference(&self, mistake: Mistake, written: &Value) -> Mistake {
+        let (At::Span(span), Code::UnitMismatch) = (&mistake.at, mistake.code) else { return mistake };
+        let mut limits = self.net.flat.limits.iter().flat_map(|(_, table)| &table.entries);
+        let is_limit = |value: &Value| value.span.start <= span.start && span.end <= value.span.end;
+        // A text has the unit that the user wrote, so the mistake is there.
+        let Some((key, _)) = limits.find(|(_, value)| is_limit(value) && !value.has_text_at(span)) else {
+            return mistake;
+        };
+        let word = format!("{LIMITS}.{}", key.name);
+        let Some(fact) = written.facts().into_iter().find(|fact| fact.word == word) else { return mistake };
+        let help = format!("`{}` is a limit in another unit: take one in the unit of the parameter", key.name);
+        Mistake { at: At::Span(fact.place.clone()), help: Some(help), ..mistake }
     }
 
     /// Returns the warnings about numbers that the graph contains, under their name there. A fact has its warnings in

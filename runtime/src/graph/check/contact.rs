@@ -45,6 +45,6 @@ impl ContactPorts {
 }
 
 /// Returns whether a role is a sensor: a device without commands, so not the arm.
-fn is_sensor(net: &Net<'_>, role: usize) -> bool {
+pub(super) fn is_sensor(net: &Net<'_>, role: usize) -> bool {
     net.roles[role].is_some_and(|role| role.commands.is_empty())
 }

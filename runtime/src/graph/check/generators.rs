@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::contact::ContactPorts;
+use super::contact::{ContactPorts, is_sensor};
 use crate::graph::net::{CommandWire, Net, Wire};
 use crate::graph::plan::PortRef;
 use crate::node::Motion;
@@ -36,29 +36,59 @@ impl Motions {
 /// The commands that each node drives.
 pub(super) struct Drives<'a> {
     net: &'a Net<'a>,
-    /// For each command, whether each node is upstream of it.
-    upstream: Vec<(&'a CommandWire, Vec<bool>)>,
+    commands: Vec<Driven<'a>>,
+}
+
+/// A command and what it depends on.
+struct Driven<'a> {
+    wire: &'a CommandWire,
+    /// Whether each node is upstream of the command.
+    upstream: Vec<bool>,
+    /// The roles that the limiters of the command read: its arm and the sensors on it.
+    limiting: BTreeSet<usize>,
 }
 
 impl<'a> Drives<'a> {
     pub(super) fn new(net: &'a Net<'a>) -> Self {
         let commands = net.commands.iter().filter(|wire| !wire.is_report);
-        let upstream = commands.map(|wire| (wire, net.upstream(wire.source.producer.node())));
-        Self { net, upstream: upstream.collect() }
+        Self { net, commands: commands.map(|wire| Driven::new(net, wire)).collect() }
     }
 
     /// Returns the commands that a node drives.
     pub(super) fn commands(&self, node: usize) -> impl Iterator<Item = &CommandWire> {
-        self.upstream.iter().filter(move |(_, upstream)| upstream[node]).map(|(wire, _)| *wire)
+        self.driven(node).map(|command| command.wire)
     }
 
-    /// Returns whether every command that a node drives descends from a sensor of the port, as it does through the
-    /// limiter that reads the sensor of its arm.
+    fn driven(&self, node: usize) -> impl Iterator<Item = &Driven<'a>> {
+        self.commands.iter().filter(move |command| command.upstream[node])
+    }
+
+    /// Returns whether the limiters of every command that a node drives read a sensor of the port. A sensor on another
+    /// arm may have its contact while this one moves through air.
     pub(super) fn shares_sensor(&self, port: PortRef, node: usize) -> bool {
         let sensors: BTreeSet<usize> = self.net.roles_of(port.producer).collect();
-        let reads = |wire: &CommandWire| self.net.roles_of(wire.source.producer).any(|role| sensors.contains(&role));
-        self.commands(node).all(reads)
+        self.driven(node).all(|command| !command.limiting.is_disjoint(&sensors))
     }
+}
+
+impl<'a> Driven<'a> {
+    fn new(net: &'a Net<'a>, wire: &'a CommandWire) -> Self {
+        let upstream = net.upstream(wire.source.producer.node());
+        let limiters = || net.order.iter().filter(|node| upstream[**node]);
+        let mut limiting: BTreeSet<usize> = limiters().flat_map(|node| read_by_limiter(net, *node)).collect();
+        // A command whose limiters read no sensor has a mistake of its own.
+        if limiting.iter().all(|role| !is_sensor(net, *role)) {
+            limiting = net.roles_of(wire.source.producer).collect();
+        }
+        Self { wire, upstream, limiting }
+    }
+}
+
+/// Returns the roles of the known inputs of a limiter, and none for other nodes.
+fn read_by_limiter(net: &Net<'_>, node: usize) -> Vec<usize> {
+    let Some(spec) = net.spec(node).filter(|spec| !spec.limits.holds.is_empty()) else { return Vec::new() };
+    let known = net.wires[node].iter().filter(|wire| spec.inputs[wire.input].need.must_be_known);
+    known.flat_map(|wire| net.roles_of(wire.source.producer)).collect()
 }
 
 /// The nodes that start a motion of the arm without a sample.

@@ -21,7 +21,7 @@ struct LimitRef<'a> {
     is_optional: bool,
 }
 
-/// Reports values that no node uses, values in another unit than their parameter, and missing values.
+/// Reports values that no node uses, and missing values.
 ///
 /// A misspelt key is both unused and missing; it is reported once, where it is misspelt. While a limiter is missing, an
 /// unused value may belong to it and is not reported.
@@ -31,7 +31,6 @@ pub(crate) fn check(net: &Net<'_>, sources: &SourceMap, diagnostics: &mut Diagno
     let is_limited =
         !has_unknown_part && diagnostics.iter().all(|diagnostic| diagnostic.code != Code::UnlimitedCommand);
     let refs = find_refs(net);
-    diagnostics.extend(refs.iter().filter_map(unit_mismatch));
     let given: Vec<&Key> = net.flat.limits.iter().flat_map(|(_, table)| &table.entries).map(|(key, _)| key).collect();
     let mut wanted: BTreeMap<&str, Vec<&LimitRef<'_>>> = BTreeMap::new();
     for limit in refs.iter().filter(|limit| !given.iter().any(|key| key.name == limit.key)) {
@@ -187,23 +186,4 @@ fn report_missing(net: &Net<'_>, missing: &[&LimitRef<'_>]) -> Option<Diagnostic
     };
     let diagnostic = Diagnostic::new(Code::MissingLimit, span, message).note(first.span.clone(), "used here");
     Some(diagnostic.help(format!("write a value under [limits] for each:{}", lines.collect::<String>())))
-}
-
-/// Reports a value whose name ends with another unit than that of its parameter.
-fn unit_mismatch(limit: &LimitRef<'_>) -> Option<Diagnostic> {
-    const UNITS: [(&str, &str); 7] = [
-        ("_m_per_s2", "m/s²"),
-        ("_rad_per_s2", "rad/s²"),
-        ("_m_per_s", "m/s"),
-        ("_rad_per_s", "rad/s"),
-        ("_n", "N"),
-        ("_rad", "rad"),
-        ("_m", "m"),
-    ];
-    let (_, has) = UNITS.iter().find(|(end, _)| limit.key.ends_with(end))?;
-    let spec = limit.spec?;
-    let takes = spec.unit.as_deref()?.split(';').next()?.trim();
-    let is_known = UNITS.iter().any(|(_, unit)| *unit == takes);
-    let message = format!("`{}` is in {has}, but `{}` takes {takes}", limit.key, spec.name);
-    (is_known && takes != *has).then(|| Diagnostic::new(Code::UnitMismatch, limit.span.clone(), message))
 }

@@ -1,0 +1,94 @@
+//! Blind motion in closed loop: an arm that feels nothing stops within its bound, whatever else runs beside it.
+
+use nalgebra::Vector3;
+use tactflow_runtime::engine::Engine;
+use tactflow_runtime::graph::{Request, compile};
+use tactflow_runtime::signal::{Pose, Twist};
+use tactflow_tests::{catalogue, workspace};
+
+/// How far a sensor moved in a run. An approach is straight, and the arm vibrates, so it is the distance from the start.
+#[derive(Default)]
+struct Way {
+    start: Option<Vector3<f64>>,
+    end: Vector3<f64>,
+    whole_m: f64,
+    /// Before the last second.
+    early_m: f64,
+}
+
+impl Way {
+    fn add(&mut self, pose: &Pose, is_last_second: bool) {
+        self.end = pose.0.translation.vector;
+        self.whole_m = (self.end - *self.start.get_or_insert(self.end)).norm();
+        if !is_last_second {
+            self.early_m = self.whole_m;
+        }
+    }
+
+    fn last_second_m(&self) -> f64 {
+        (self.whole_m - self.early_m).abs()
+    }
+}
+
+fn engine(request: &Request) -> Engine {
+    Engine::new(compile(&catalogue(), request).unwrap_or_else(|report| panic!("{}", report.render(false))))
+}
+
+/// Runs until `until_s` and returns the ways of the sensors with these poses.
+fn ways<const N: usize>(engine: &mut Engine, until_s: f64, poses: [&str; N]) -> [Way; N] {
+    let mut ways = std::array::from_fn(|_| Way::default());
+    let seconds = |now: i64| now as f64 * 1e-9;
+    while let Some(next) = engine.next().filter(|next| seconds(*next) < until_s) {
+        engine.tick(next).unwrap_or_else(|fault| panic!("{fault}"));
+        for (way, pose) in ways.iter_mut().zip(poses) {
+            if let Some(pose) = engine.get::<Pose>(pose) {
+                way.add(pose, seconds(next) > until_s - 1.0);
+            }
+        }
+    }
+    ways
+}
+
+fn two_arms() -> Request {
+    Request::file(workspace().join("tests/data/two_arms/press_and_slide.toml"))
+}
+
+#[test]
+fn an_arm_that_finds_nothing_stops_within_its_bound_and_the_other_one_goes_on() {
+    let mut engine = engine(&two_arms());
+    let poses = ["left_move.state.sensor_pose", "right_move.state.sensor_pose"];
+    let [left, right] = ways(&mut engine, 7.0, poses);
+    assert!((0.048..=0.0501).contains(&right.whole_m), "the right arm moved {:.4} m of 0.05 m", right.whole_m);
+    // At 15 mm/s the budget is spent after some 3.4 s; the object that nobody holds is still searched for then.
+    let last = right.last_second_m();
+    assert!(last < 1e-4, "the right arm moved {last:.6} m in the last second");
+    assert!(engine.get::<Twist>("right_reach.twist").is_some_and(|twist| twist.0[2] > 0.0), "its task still wants to");
+    assert!((left.last_second_m() - 0.005).abs() < 0.001, "the left arm moved {:.4} m", left.last_second_m());
+    let rests: Vec<&str> = engine.rests().iter().map(|rest| rest.role.as_str()).collect();
+    assert_eq!(rests, ["right_arm"]);
+}
+
+#[test]
+fn a_contact_on_another_arm_does_not_end_a_motion() {
+    let own = compile(&catalogue(), &two_arms());
+    assert!(own.is_ok(), "a gate on the contact of its own arm");
+    let request = two_arms().set("nodes.left_slide.in.gate='right_touch.present'");
+    let Err(report) = compile(&catalogue(), &request) else { panic!("a gate on the contact of the other arm") };
+    let codes: Vec<&str> = report.diagnostics.iter().map(|diagnostic| diagnostic.code.name()).collect();
+    // The modes that nothing else ends: the wait for a time and the hold.
+    assert_eq!(codes, ["ungated-motion"; 2], "{}", report.render(false));
+    assert!(report.render(false).contains("left_slide"), "{}", report.render(false));
+}
+
+#[test]
+fn without_an_object_every_approach_stops_within_its_bound() {
+    for task in ["hybrid", "force", "edge", "explore"] {
+        let request = Request::file(workspace().join(format!("graphs/{task}.toml")))
+            .set("devices.bench.objects=[]")
+            .set("modes.approach.fail={ after_ms = 9000 }")
+            .set("limits.blind_mm=40.0");
+        let [way] = ways(&mut engine(&request), 6.0, ["move.state.sensor_pose"]);
+        assert!((0.038..=0.0401).contains(&way.whole_m), "{task}: the arm moved {:.4} m of 0.04 m", way.whole_m);
+        assert!(way.last_second_m() < 1e-4, "{task}: the arm moved {:.6} m at last", way.last_second_m());
+    }
+}
