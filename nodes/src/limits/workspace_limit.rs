@@ -100,7 +100,13 @@ impl Node for WorkspaceLimit {
         let sides = ["x", "y", "z"].into_iter().zip(params.min_m.into_iter().zip(params.max_m));
         if let Some((axis, (min, max))) = sides.into_iter().find(|(_, (min, max))| min >= max) {
             let message = format!("the box is empty along {axis}: from {min} to {max} m");
-            return Err(Mistake::param("max_m", message).help("make each entry greater than that of `min_m`").into());
+            // A number that no arm reaches is the wrong one of the two.
+            let is_min = min.abs() > USUAL_REACH_M && max.abs() <= USUAL_REACH_M;
+            let (param, help) = match is_min {
+                true => ("min_m", "make each entry less than that of `max_m`"),
+                false => ("max_m", "make each entry greater than that of `min_m`"),
+            };
+            return Err(Mistake::param(param, message).help(help).into());
         }
         if let Some(start) = &setup.inputs.pose.start {
             setup.warnings.extend(start_outside(start, "min_m", &params.min_m, -1.0));

@@ -12,7 +12,7 @@ use crate::graph::bench::{OpenedBench, fill_facts};
 use crate::graph::load::MeasuredValues;
 use crate::graph::net::{CommandWire, Net, Wire, WireOrigin};
 use crate::graph::plan::{PlannedNode, PlannedPort, PortRef};
-use crate::graph::syntax::{Block, GraphTable, ModeBlock, PolicyTable};
+use crate::graph::syntax::{Block, GraphTable, LIMITS, ModeBlock, PolicyTable};
 use crate::node::{FilePath, Param, ParamSpec, Repeats, Spanned};
 use crate::source::{Diagnostics, Item, Key, Location, SourceMap, Table, Value, parse_table};
 
@@ -322,12 +322,15 @@ impl OutlineBuilder<'_> {
             // A value from [limits] keeps its place there.
             _ => ValueOrigin::Written { place: self.sources.location(&filled.span) },
         };
-        self.in_units(Setting { path, value: filled, written: None, origin }, node)
+        // A limit is filled in with the unit of its name, which nobody has written.
+        let limit = word.and_then(|word| word.split_once('.')).filter(|(section, _)| *section == LIMITS);
+        let written = limit.and_then(|(_, name)| self.net.limit(name)).cloned();
+        self.in_units(Setting { path, value: filled, written, origin }, node)
     }
 
     /// Replaces the numbers that were written with a unit by those that were read.
     fn in_units(&self, mut setting: Setting, node: Option<usize>) -> Setting {
-        let written = setting.value.clone();
+        let written = setting.written.take().unwrap_or_else(|| setting.value.clone());
         for values in [self.measured, &self.opened.measured] {
             values.replace_texts(&mut setting.value, node);
         }

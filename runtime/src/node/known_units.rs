@@ -40,6 +40,19 @@ impl<'a> KnownUnits<'a> {
         Self { inputs, wires, is_incomplete, ..self }
     }
 
+    /// Returns the names of the features on the wires, and of the wires whose name the author of the graph chooses.
+    pub(super) fn names(&self) -> Vec<&'a str> {
+        let inputs = self.inputs.iter().zip(self.wires);
+        let names = inputs.flat_map(|(input, wires)| {
+            wires.iter().flat_map(|(name, shape)| match shape {
+                Shape::Features(features) => features.features.iter().map(|feature| &*feature.name).collect(),
+                _ if input.need.is_many => vec![&**name],
+                _ => Vec::new(),
+            })
+        });
+        names.collect()
+    }
+
     /// Whether a declared unit is not known because of a mistake that has its own diagnostic.
     pub(super) fn has_mistake(&self, declared: &str) -> bool {
         let Some(param) = declared.strip_prefix('$') else { return self.is_incomplete };

@@ -7,7 +7,7 @@ use super::mistake::{At, Mistake};
 use super::param_spec::{Contents, Written};
 use super::reader::{Measured, Param, Reader};
 use crate::signal::{Measure, MeasureError, Unit, UnitSize};
-use crate::source::{Code, Item, Value, quoted, suggest_name};
+use crate::source::{Code, Item, Key, Value, quoted, suggest_name};
 
 impl Reader<'_> {
     /// Returns the value in the unit of the current field if it is a text such as `40 mm`, and any other value as it
@@ -22,7 +22,8 @@ impl Reader<'_> {
         };
         let Some((size, unit)) = known else {
             let has_mistake = self.unit.is_some_and(|unit| self.units.has_mistake(unit));
-            return if has_mistake { None } else { self.refuse(self.unknown_unit(&measure, &value.span)) };
+            let mistake = || self.unknown_feature().unwrap_or_else(|| self.unknown_unit(&measure, &value.span));
+            return if has_mistake { None } else { self.refuse(mistake()) };
         };
         match measure.to(&size) {
             Some(number) => Some(Cow::Owned(Value { item: written_item(number), span: value.span.clone() })),
@@ -51,7 +52,16 @@ impl Reader<'_> {
     /// known.
     fn unit_size(&self) -> Option<(UnitSize, String)> {
         let unit = self.unit_of_entry()?;
-        self.units.resolve(unit, self.component.as_deref())
+        self.units.resolve(unit, self.component.as_ref().map(|key| &*key.name))
+    }
+
+    /// The entry is for a feature that the node does not have, so its unit cannot be known either.
+    fn unknown_feature(&self) -> Option<Mistake> {
+        let (Key { name, span }, known) = (self.component.as_ref()?, self.units.names());
+        let is_unknown = !known.is_empty() && !known.contains(&&**name);
+        let message = format!("no feature is called `{name}`");
+        let mistake = Mistake::new(Code::UnknownKey, At::Span(span.clone()), message);
+        is_unknown.then(|| mistake.suggest(name, known.into_iter(), "features"))
     }
 
     /// The unit of a number is not known, so it cannot have another.

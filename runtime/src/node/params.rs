@@ -248,7 +248,7 @@ impl<T: Param> Param for Map<T> {
         };
         let outer = reader.component.take();
         let read = |(key, value): &(Key, Value)| {
-            reader.component = Some(key.name.clone());
+            reader.component = Some(key.clone());
             Some((key.name.clone(), T::read(value, reader)?))
         };
         let entries: Vec<Option<(String, T)>> = table.entries.iter().map(read).collect();

@@ -68,7 +68,7 @@ pub struct Reader<'a> {
     /// The units that the letters in declarations stand for.
     pub(super) units: KnownUnits<'a>,
     /// Name of the current entry of a table of names.
-    pub(super) component: Option<String>,
+    pub(super) component: Option<Key>,
     /// Index of the current entry of a list, and the length of the list.
     pub(super) entry: Option<(usize, usize)>,
     /// The values so far that were written with a unit.

@@ -23,6 +23,24 @@ pub fn suggest_name<'n>(name: &str, known: impl Iterator<Item = &'n str>) -> Opt
     (score.0 <= max_distance).then_some(best)
 }
 
+/// Returns whether `name` is `meant` with a slip of the finger, rather than the other way round: with a capital letter,
+/// a doubled letter or an `s` at its end, or without one of its letters.
+pub(crate) fn is_typing_error(name: &str, meant: &str) -> bool {
+    let has_capital = |text: &str| text.contains(|c: char| c.is_uppercase());
+    match (has_capital(name), has_capital(meant)) {
+        (false, false) => is_slip(name, meant) || (name.len() < meant.len() && !is_slip(meant, name)),
+        (capital, _) => capital,
+    }
+}
+
+/// Returns whether `long` is `short` with a doubled letter, or with an `s` at its end.
+fn is_slip(long: &str, short: &str) -> bool {
+    let (long, short): (Vec<char>, Vec<char>) = (long.chars().collect(), short.chars().collect());
+    let at = long.iter().zip(&short).take_while(|(a, b)| a == b).count();
+    let is_longer = long.len() == short.len() + 1 && long[at + 1..] == short[at..];
+    is_longer && ((at > 0 && long[at] == long[at - 1]) || (at == short.len() && long[at] == 's'))
+}
+
 fn plain(name: &str) -> String {
     name.to_lowercase().replace('-', "_")
 }
@@ -113,6 +131,13 @@ pub(crate) fn quoted<N: Display>(names: impl IntoIterator<Item = N>) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn of_two_names_one_looks_misspelt() {
+        let pairs = [("calms", "calm"), ("caalm", "calm"), ("clm", "calm"), ("Calm", "calm"), ("clam", "calm")];
+        let found = pairs.map(|(wrong, right)| (is_typing_error(wrong, right), is_typing_error(right, wrong)));
+        assert_eq!(found, [(true, false), (true, false), (true, false), (true, false), (false, false)]);
+    }
 
     #[test]
     fn the_closest_name_is_suggested() {

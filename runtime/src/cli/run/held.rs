@@ -30,6 +30,8 @@ struct Stop {
 /// Watches the limits tick by tick.
 pub(crate) struct HoldWatch {
     stops: Vec<Stop>,
+    /// The warning that the arm starts where a limit stops most motions.
+    start: Option<String>,
     mode: Option<usize>,
     /// Time at which the current mode began [ns].
     since: i64,
@@ -37,9 +39,9 @@ pub(crate) struct HoldWatch {
 }
 
 impl HoldWatch {
-    pub(crate) fn new(engine: &Engine) -> Self {
+    pub(crate) fn new(engine: &Engine, start: Option<String>) -> Self {
         let stop = |(name, id): (&str, PortId)| Stop { name: name.to_owned(), id, in_mode: 0.0, in_run: 0.0 };
-        Self { stops: engine.limits().map(stop).collect(), mode: None, since: 0, last: None }
+        Self { stops: engine.limits().map(stop).collect(), start, mode: None, since: 0, last: None }
     }
 
     /// Adds the last tick of the engine.
@@ -64,8 +66,9 @@ impl HoldWatch {
         let worst = self.stops.iter().max_by(|a, b| a.in_mode.total_cmp(&b.in_mode))?;
         let mode = engine.mode().map(|mode| format!(" in mode `{mode}`")).unwrap_or_default();
         let share = worst.in_mode / duration.max(1e-9);
-        let text =
-            format!("the arm was held back: `{}` stopped it for {:.0} % of the time{mode}", worst.name, share * 100.0);
+        let start = self.start.iter().map(|start| format!(": {start}")).collect::<String>();
+        let share_text = format!("{:.0} % of the time{mode}{start}", share * 100.0);
+        let text = format!("the arm was held back: `{}` stopped it for {share_text}", worst.name);
         (share >= MIN_SHARE[0] && worst.in_mode > 0.0).then_some(text)
     }
 

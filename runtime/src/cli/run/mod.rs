@@ -25,6 +25,7 @@ use crate::engine::{self, End, Engine, Outcome, RunOptions};
 use crate::fault::Fault;
 use crate::graph::{Compiled, Request, compile};
 use crate::record::PointsRequest;
+use crate::source::Code;
 
 pub use time::duration;
 
@@ -140,12 +141,13 @@ impl Job {
             return Err("`--listen` requires real time: add `--realtime`, or send words with `--send 2s:resume`".into());
         }
         let chosen = points.as_ref().map(|wanted| wanted.resolve(&plan)).transpose()?;
+        let start = plan.warnings().and_then(|report| report.message_of(Code::StartOutside).map(str::to_owned));
         let mut engine = Engine::new(plan);
         self.check_words(&engine)?;
         let mut files = OutputFiles::create(self, chosen.as_ref(), &engine, !is_real)?;
         let period = milliseconds(seconds(engine.period()));
         self.say(shell, &format!("{}: {} nodes, one tick every {period}", self.title, engine.order().count()));
-        let mut summary = Summary::new(&engine, self.print == Print::Ports);
+        let mut summary = Summary::new(&engine, self.print == Print::Ports, start);
         let mut log = NodeLog::new(&engine);
         let (end, is_quiet) = (duration.or_else(|| engine.end().map(seconds)), self.print == Print::Nothing);
         let mut progress = Progress::new(end, is_quiet, shell.has_colour_on_stderr());

@@ -28,13 +28,13 @@ enum Body {
 }
 
 impl Summary {
-    /// Creates a summary of all ports, or of those that the graph shows.
-    pub(crate) fn new(engine: &Engine, has_all_ports: bool) -> Self {
+    /// Creates a summary of all ports, or of those that the graph shows. `start` is the warning about where the arm starts.
+    pub(crate) fn new(engine: &Engine, has_all_ports: bool, start: Option<String>) -> Self {
         let body = match has_all_ports {
             true => Body::Ports(PortTable::new(engine)),
             false => Body::View(Box::new(RunView::new(engine, MAX_BINS))),
         };
-        Self { limits: LimitWatch::new(engine), holds: HoldWatch::new(engine), body }
+        Self { limits: LimitWatch::new(engine), holds: HoldWatch::new(engine, start), body }
     }
 
     /// Adds the last tick of the engine.

@@ -82,7 +82,7 @@ fn find_fact(
     let part = |range: Range<usize>| Spanned { value: word.to_owned(), span: place.clone() }.part(range);
     if role == LIMITS {
         // A missing value is reported at the section.
-        let value = net.flat.limits.as_ref().and_then(|(_, table)| table.get(name)).cloned().ok_or(None)?;
+        let value = net.limit(name).cloned().ok_or(None)?;
         return Ok(unit_of_limit(name).map_or(value.clone(), |unit| with_unit(value, unit)));
     }
     let roles = &net.flat.roles;

@@ -188,8 +188,11 @@ impl Frames<'_> {
         match (arg.split_once('.'), arg.strip_prefix('$'), owner) {
             (Some((whole, part)), ..) => {
                 let whole = self.variable(owner, whole);
-                // An unknown frame has no parts that another one could be mistaken for.
                 let whole = self.known[self.root(whole)].clone();
+                // An unknown frame has no parts that another one could be mistaken for, unless a mistake hides it.
+                if whole.is_none() && owner.node().is_some_and(|node| net.lacks_wires(node)) {
+                    return None;
+                }
                 let name = whole.map_or_else(|| net.name(owner).to_owned(), |whole| whole.name);
                 Some(KnownFrame { name: format!("{name}.{part}"), place })
             }

@@ -133,9 +133,7 @@ fn find(net: &Net<'_>, contact: &ContactPorts, drives: &Drives<'_>, is_still: &d
         let is_sampled =
             |wire: &Wire| is_gate(wire) && wire.source.producer.node().is_none_or(|source| sampled[source]);
         // A wire with a mistake may be the gate.
-        let given = &net.flat.nodes[node].block.wires;
-        let has_mistake = given.has_invalid() || given.valid.len() != net.wires[node].len();
-        if has_mistake || wires().any(is_sampled) {
+        if net.lacks_wires(node) || wires().any(is_sampled) {
             sampled[node] = true;
             continue;
         }

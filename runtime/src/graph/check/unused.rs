@@ -6,6 +6,7 @@
 use std::cell::LazyCell;
 use std::collections::{BTreeMap, BTreeSet};
 
+use crate::graph::load::FlatNode;
 use crate::graph::net::Net;
 use crate::graph::plan::{PlannedMode, PortRef, Producer};
 use crate::node::{PortSpec, may_fit};
@@ -46,11 +47,30 @@ pub(crate) fn check(
                 Some(wire) => format!("write {wire}, or remove `{name}`"),
                 None => format!("wire an output of `{name}` to another node, or remove it"),
             };
-            diagnostics.push(Diagnostic::new(Code::UnusedNode, key.span.clone(), message).help(help));
+            diagnostics.push(match namesake(net, node) {
+                Some(diagnostic) => diagnostic.note(key.span.clone(), message),
+                None => Diagnostic::new(Code::UnusedNode, key.span.clone(), message).help(help),
+            });
             // Nodes that only this one reads are not reported again.
             net.mark_upstream([node], &mut used);
         }
     }
+}
+
+/// Reports a wire to an input that has the name of an unused node in the same file, and that reads another one.
+fn namesake(net: &Net<'_>, node: usize) -> Option<Diagnostic> {
+    let FlatNode { scope, block, .. } = &net.flat.nodes[node];
+    let name = &block.key.name;
+    let outputs = net.outputs(Producer::Node(node))?;
+    let (reader, wire) = net.wires.iter().enumerate().find_map(|(reader, wires)| {
+        let is_here = net.flat.nodes[reader].scope == *scope;
+        Some((reader, wires.iter().find(|wire| is_here && wire.key.name == *name)?))
+    })?;
+    let output = outputs.iter().find(|output| may_fit(output, net.input(reader, wire)))?;
+    let (wired, reader) = (&wire.origin.word, &net.flat.nodes[reader].block.key.name);
+    let message = format!("`in.{name}` of `{reader}` reads `{}`, and nothing reads `{name}`", wired.value);
+    let diagnostic = Diagnostic::new(Code::UnusedNode, wired.span.clone(), message);
+    Some(diagnostic.instead(&wired.value, &format!("{name}.{}", output.name)))
 }
 
 /// The inputs that take another wire, by scope, type of node and index of the input, each with its nodes.

@@ -4,6 +4,7 @@ use std::cell::OnceCell;
 use std::collections::BTreeMap;
 
 use super::Net;
+use super::meant_type::{unknown_type, wrong_type};
 use super::provenance::Provenance;
 use crate::catalogue::Catalogue;
 use crate::device::RoleType;
@@ -18,11 +19,13 @@ impl<'a> Net<'a> {
         let nodes = flat.nodes.iter().map(|node| {
             let kind = node.block.kind.as_ref()?;
             let known = catalogue.find_node(&kind.value);
-            if known.is_none() {
-                let names = catalogue.specs().map(|spec| &*spec.name);
-                diagnostics.push(Diagnostic::unknown(Code::UnknownType, "node type", &kind.value, &kind.span, names));
-            }
-            known
+            let mistake = match known {
+                Some((_, spec)) => wrong_type(catalogue, &node.block, kind, spec),
+                None => Some(unknown_type(catalogue, &node.block, kind)),
+            };
+            let is_right = mistake.is_none();
+            diagnostics.extend(mistake);
+            known.filter(|_| is_right)
         });
         let nodes = nodes.collect();
         let observed = observed_roles(flat, catalogue, diagnostics);

@@ -2,6 +2,7 @@
 
 mod connect;
 mod declare;
+mod meant_type;
 mod order;
 mod provenance;
 mod resolve;
@@ -80,6 +81,19 @@ impl<'a> Net<'a> {
     /// Returns the declaration of a node, or `None` if its type is unknown.
     pub(crate) fn spec(&self, node: usize) -> Option<&'a NodeSpec> {
         self.nodes[node].map(|(_, spec)| spec)
+    }
+
+    /// Returns whether a wire of a node is missing or has a mistake, so that what follows from it is unknown.
+    pub(crate) fn lacks_wires(&self, node: usize) -> bool {
+        let (given, found) = (&self.flat.nodes[node].block.wires, &self.wires[node]);
+        let inputs = self.spec(node).map_or(&[][..], |spec| &spec.inputs);
+        let is_open = |i: usize| inputs[i].need.must_be_wired && !found.iter().any(|wire| wire.input == i);
+        given.has_invalid() || given.valid.len() != found.len() || (0..inputs.len()).any(is_open)
+    }
+
+    /// Returns a value of the section [limits].
+    pub(crate) fn limit(&self, name: &str) -> Option<&'a Value> {
+        self.flat.limits.as_ref().and_then(|(_, table)| table.get(name))
     }
 
     /// Returns the declaration of the input at the end of a wire.

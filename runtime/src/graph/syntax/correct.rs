@@ -1,8 +1,11 @@
 //! Misspelt keys of sections and blocks: each is reported once, and what it holds is read as it was meant.
 
-use super::reserved::INPUTS;
+use super::reserved::{INPUTS, is_name};
 use crate::node::{At, Mistake, Reader};
 use crate::source::{Code, Item, Key, Meant, Table, Value, suggest_name};
+
+/// Sections with a block for each name.
+const REPEATED: [&str; 4] = ["nodes", "parts", "modes", "devices"];
 
 /// Reports each key of a table that is not `known`, and gives it the name that it misspells. `place` ends the message,
 /// for example ` in a mode`.
@@ -14,6 +17,7 @@ pub(super) fn correct_keys(table: &mut Table, known: &[&str], place: &str, reade
 
 /// Corrects the names of the sections of a file. A name that resembles none is recognized by what the section holds.
 pub(super) fn correct_sections(root: &mut Table, known: &[&str], reader: &mut Reader<'_>) {
+    separate_names(root, known, reader);
     for (key, meant) in root.correct(known) {
         let guess = || root.get(&key.name).and_then(|value| guess_section(value, root, known));
         let guessed = if meant == Meant::Unknown { guess() } else { None };
@@ -21,6 +25,26 @@ pub(super) fn correct_sections(root: &mut Table, known: &[&str], reader: &mut Re
         if let Some((name, (_, value))) = guessed.and_then(|name| Some((name, root.remove(&key.name)?))) {
             root.merge(Table { entries: vec![(Key { name: name.to_owned(), span: key.span }, value)] });
         }
+    }
+}
+
+/// Separates the name of a section from that of a block where the point between them is missing: `[nodespid]`.
+fn separate_names(root: &mut Table, known: &[&str], reader: &mut Reader<'_>) {
+    let parts = |key: &Key, value: &Value| {
+        let section = REPEATED.into_iter().find(|section| known.contains(section) && key.name.starts_with(section))?;
+        let name = key.name[section.len()..].trim_start_matches(['_', '-', ':', '/']);
+        let block = (Key { name: name.to_owned(), span: key.span.clone() }, value.clone());
+        let value = Value { span: value.span.clone(), item: Item::Table(Table { entries: vec![block] }) };
+        (is_name(name) && could_be(section, &value)).then_some((section, name.to_owned(), value))
+    };
+    let unknown = root.entries.iter().filter(|(key, _)| !known.contains(&&*key.name));
+    let found: Vec<_> = unknown.filter_map(|(key, value)| Some((key.clone(), parts(key, value)?))).collect();
+    for (key, (section, name, value)) in found {
+        root.remove(&key.name);
+        let message = format!("unknown key `{}`", key.name);
+        let mistake = Mistake::new(Code::UnknownKey, At::Span(key.span.clone()), message);
+        reader.mistakes.push(mistake.instead(&key.name, &format!("{section}.{name}")));
+        root.merge(Table { entries: vec![(Key { name: section.to_owned(), span: key.span }, value)] });
     }
 }
 
@@ -33,7 +57,7 @@ fn report(key: &Key, meant: Meant<'_>, known: &[&str], place: &str, reader: &mut
 /// Returns the only section that holds such values and that the file lacks or may have in several places.
 fn guess_section<'n>(value: &Value, root: &Table, known: &[&'n str]) -> Option<&'n str> {
     let holds = |section: &&&str| {
-        let is_repeated = ["nodes", "parts", "modes", "devices"].contains(section);
+        let is_repeated = REPEATED.contains(section);
         // The blocks of nodes and devices look alike.
         let is_device = **section == "devices" && known.contains(&"nodes");
         (is_repeated || root.get(section).is_none()) && !is_device && could_be(section, value)

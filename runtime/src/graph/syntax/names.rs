@@ -3,6 +3,7 @@
 //! Such a name is reported once, at its definition, and the graph is then read as it was meant. Whether the definition
 //! or the reference is misspelt is decided by the number of times that each name occurs in the files.
 
+use std::cmp::Ordering;
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 
@@ -10,7 +11,8 @@ use super::reserved::{INPUTS, LIMITS, is_name};
 use super::sections::{BenchDocument, GraphDocument};
 use crate::node::Spanned;
 use crate::source::{
-    Code, Diagnostic, Diagnostics, Edit, FactRef, Item, Key, Named, SourceMap, Value, quoted, suggest_name,
+    Code, Diagnostic, Diagnostics, Edit, FactRef, Item, Key, Named, SourceMap, Value, is_typing_error, quoted,
+    suggest_name,
 };
 
 /// A reference to a port: the name of the node, role or part, and the port unless the reference is to the whole.
@@ -71,7 +73,10 @@ fn correct<'k>(
         let only = candidates.first().filter(|_| is_only && count(wanted) > 1);
         let Some(&i) = close.or(only) else { continue };
         let is_invalid = !is_name(&names[i]);
-        let is_rarer = || sources.occurrences(&names[i]) < sources.occurrences(wanted);
+        let is_rarer = || match sources.occurrences(&names[i]).cmp(&sources.occurrences(wanted)) {
+            Ordering::Equal => is_typing_error(&names[i], wanted),
+            order => order.is_lt(),
+        };
         if is_invalid || count(wanted) > 1 || is_rarer() {
             let message = if is_invalid {
                 format!("`{}` is not a valid name", names[i])
