@@ -1,11 +1,12 @@
 //! The source map: all texts of a graph laid end to end, so that one byte range identifies a place in any of them.
 
+use std::cmp::Ordering;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 
-use super::suggest::{suggest_name, suggestion};
+use super::suggest::{is_typing_error, suggest_name, suggestion};
 
 /// One source text.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -138,6 +139,15 @@ impl SourceMap {
         let is_end = |c: char| !(c.is_ascii_alphanumeric() || c == '_');
         let code = texts.flat_map(str::lines).filter_map(|line| line.split('#').next());
         code.flat_map(|code| code.split(is_end)).filter(|other| *other == word).count()
+    }
+
+    /// Returns whether of two names, of which one is misspelt, it is `name`: it occurs less often, or has a slip of the
+    /// finger.
+    pub(crate) fn is_misspelt(&self, name: &str, meant: &str) -> bool {
+        match self.occurrences(name).cmp(&self.occurrences(meant)) {
+            Ordering::Equal => is_typing_error(name, meant),
+            order => order.is_lt(),
+        }
     }
 
     /// Resolves a path written at offset `at`, relative to the folder of the file that contains it.

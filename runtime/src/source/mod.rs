@@ -16,7 +16,6 @@ pub use fix::Edit;
 pub use map::{BuiltinFile, Location, SourceFile, SourceMap, UnknownBuiltin};
 pub(crate) use named::Named;
 pub use report::Report;
-pub(crate) use suggest::is_typing_error;
 pub(crate) use suggest::quoted;
 pub use suggest::{did_you_mean, suggest_name, suggest_path, suggestion};
 pub use syntax::parse_table;

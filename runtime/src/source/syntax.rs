@@ -30,6 +30,12 @@ pub fn parse_table(file: &SourceFile) -> Result<Value, Box<Diagnostic>> {
             let message = format!("`{bracket}` is opened here and never closed");
             Diagnostic::new(Code::Syntax, at(open), message)
         }
+        None if message.starts_with("cannot extend value") => {
+            let key = &file.text[span.clone()];
+            let first = first_value(&file.text, key, span.start).unwrap_or(span.clone());
+            let message = format!("`{key}` has a value here, so it cannot have keys of its own");
+            Diagnostic::new(Code::Syntax, at(first), message).note(at(span), "it has one here")
+        }
         None => unquoted(&file.text, &span, &message).map_or_else(
             || Diagnostic::new(Code::Syntax, at(span), message),
             |(value, text)| {
@@ -71,6 +77,16 @@ fn unquoted(text: &str, mistake: &Range<usize>, message: &str) -> Option<(Range<
         }
     }
     None
+}
+
+/// Returns the last key of this name before `end` that has a value.
+fn first_value(text: &str, key: &str, end: usize) -> Option<Range<usize>> {
+    let is_value = |at: &usize| {
+        let before = text[..*at].rsplit('\n').next().unwrap_or_default();
+        before.trim().is_empty() && text[at + key.len()..].trim_start_matches([' ', '\t']).starts_with('=')
+    };
+    let found = text[..end].rmatch_indices(key).map(|(at, _)| at).find(is_value)?;
+    Some(found..found + key.len())
 }
 
 /// Returns whether a word can be meant as a string: it begins with a letter or a dot.

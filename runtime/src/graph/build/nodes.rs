@@ -14,7 +14,7 @@ use crate::node::{
     At, Built, Configured, Given, KnownUnits, Mistake, Mistakes, Motion, Need, NodeSpec, PortSpec, Reader, frame_args,
 };
 use crate::signal::{FlagShape, Joint, Kind, Shape};
-use crate::source::{Code, Diagnostic, Diagnostics, Key, SourceMap, Value};
+use crate::source::{Code, Diagnostic, Diagnostics, Key, SourceMap, Value, suggest_name};
 
 /// Builds the nodes one after the other and collects their diagnostics.
 pub(crate) struct Builder<'a> {
@@ -252,7 +252,8 @@ impl Builder<'_> {
         let Reader { mistakes, warnings, measured, .. } = reader;
         self.measured.add(Some(index), measured);
         let is_valid = mistakes.is_empty();
-        let mistakes = mistakes.into_iter().map(|mistake| self.at_reference(mistake, written)).collect();
+        let place = |mistake| self.at_wire(self.at_reference(mistake, written), index);
+        let mistakes = mistakes.into_iter().map(place).collect();
         place_mistakes(mistakes, &params, &[], &mut self.sources, &mut self.diagnostics);
         let warnings = self.warnings_of_written(warnings, written);
         place_mistakes(warnings, &params, &[], &mut self.sources, &mut self.diagnostics);
@@ -272,6 +273,20 @@ impl Builder<'_> {
         let Some(fact) = written.facts().into_iter().find(|fact| fact.word == word) else { return mistake };
         let help = format!("`{}` is a limit in another unit: take one in the unit of the parameter", key.name);
         Mistake { at: At::Span(fact.place.clone()), help: Some(help), ..mistake }
+    }
+
+    /// Moves the mistake that an entry has the name of no wire to the wire, if that looks misspelt.
+    fn at_wire(&self, mistake: Mistake, node: usize) -> Mistake {
+        let (Code::UnknownKey, Some(names)) = (mistake.code, &mistake.instead) else { return mistake };
+        let (name, wired) = &**names;
+        let wires = &self.net.flat.nodes[node].block.wires.valid;
+        if suggest_name(name, std::iter::once(wired.as_str())).is_none() {
+            return mistake;
+        }
+        let named = wires.iter().find(|wire| wire.key.name == *wired && self.sources.is_misspelt(wired, name));
+        let Some(wire) = named.filter(|_| self.net.takes_any_wire(node)) else { return mistake };
+        let message = format!("nothing else here is called `{wired}`, and `{name}` has no wire");
+        Mistake::new(mistake.code, At::Span(wire.key.span.clone()), message).instead(wired, name)
     }
 
     /// Returns the warnings about numbers that the graph contains, under their name there. A fact has its warnings in
@@ -299,18 +314,13 @@ impl Builder<'_> {
         params: &Value,
         given: Given,
     ) -> Option<Built> {
+        let (mistakes, built) = match configured?.build(given) {
+            Ok(mut built) => (std::mem::take(&mut built.warnings), Some(built)),
+            Err(mistakes) => (mistakes.into_iter().map(|mistake| self.at_wire(mistake, index)).collect(), None),
+        };
         let wires = &self.net.flat.nodes[index].block.wires.valid;
-        let mut place = |mistakes| place_mistakes(mistakes, params, wires, &mut self.sources, &mut self.diagnostics);
-        match configured?.build(given) {
-            Ok(mut built) => {
-                place(std::mem::take(&mut built.warnings));
-                Some(built)
-            }
-            Err(mistakes) => {
-                place(mistakes);
-                None
-            }
-        }
+        place_mistakes(mistakes, params, wires, &mut self.sources, &mut self.diagnostics);
+        built
     }
 
     /// Reports a wire whose ends differ in their units, with the places that determined both.

@@ -46,7 +46,9 @@ pub(crate) fn check(net: &Net<'_>, sources: &SourceMap, diagnostics: &mut Diagno
         let is_alone = limits.len() == 1 && sources.occurrences(name) == 1;
         let is_needed = !is_optional(limits);
         let only = unused.first().copied().filter(|_| is_single && is_needed);
-        if let Some(key) = similar(name, &unused).or(only) {
+        // A limit that the built-in parts read is not meant for one that can be left out.
+        let is_meant = |key: &&Key| is_needed || find_reader(net.catalogue, &key.name).is_none();
+        if let Some(key) = similar(name, &unused).filter(is_meant).or(only) {
             unused.retain(|other| other.name != key.name);
             diagnostics.push(misspelt(key, limits, net, sources));
         } else if let Some(key) = similar(name, &given).filter(|_| is_alone && is_needed) {

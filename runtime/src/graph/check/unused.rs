@@ -47,7 +47,7 @@ pub(crate) fn check(
                 Some(wire) => format!("write {wire}, or remove `{name}`"),
                 None => format!("wire an output of `{name}` to another node, or remove it"),
             };
-            diagnostics.push(match namesake(net, node) {
+            diagnostics.push(match namesake(net, node).or_else(|| bypass(net, node)) {
                 Some(diagnostic) => diagnostic.note(key.span.clone(), message),
                 None => Diagnostic::new(Code::UnusedNode, key.span.clone(), message).help(help),
             });
@@ -71,6 +71,25 @@ fn namesake(net: &Net<'_>, node: usize) -> Option<Diagnostic> {
     let message = format!("`in.{name}` of `{reader}` reads `{}`, and nothing reads `{name}`", wired.value);
     let diagnostic = Diagnostic::new(Code::UnusedNode, wired.span.clone(), message);
     Some(diagnostic.instead(&wired.value, &format!("{name}.{}", output.name)))
+}
+
+/// Reports the only wire that could read an unused node and reads what that node reads instead.
+fn bypass(net: &Net<'_>, node: usize) -> Option<Diagnostic> {
+    let FlatNode { scope, block, .. } = &net.flat.nodes[node];
+    let (name, outputs) = (&block.key.name, net.outputs(Producer::Node(node))?);
+    let sources: BTreeSet<PortRef> = net.wires[node].iter().map(|wire| wire.source).collect();
+    let upstream = LazyCell::new(|| net.upstream([node]));
+    let all = net.wires.iter().enumerate().flat_map(|(reader, wires)| wires.iter().map(move |wire| (reader, wire)));
+    let past = all.filter(|(_, wire)| wire.origin.scope == *scope && sources.contains(&wire.source));
+    let mut found = past.filter_map(|(reader, wire)| {
+        let output = outputs.iter().find(|output| may_fit(output, net.input(reader, wire)))?;
+        (!upstream[reader]).then_some((wire, output))
+    });
+    let (wire, output) = found.next().filter(|_| found.next().is_none())?;
+    let word = &wire.origin.word;
+    let message = format!("`{}` is read here, past `{name}`, and nothing reads `{name}`", word.value);
+    let diagnostic = Diagnostic::new(Code::UnusedNode, word.span.clone(), message);
+    Some(diagnostic.instead(&word.value, &format!("{name}.{}", output.name)))
 }
 
 /// The inputs that take another wire, by scope, type of node and index of the input, each with its nodes.

@@ -1,56 +1,15 @@
-//! Loads the files of a graph, expands its parts, and merges `--set` and overrides.
+//! Reads the files of a graph and merges `--set` into them.
 
-use std::collections::BTreeMap;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
-use super::flat::{Entity, FlatGraph, FlatNode, Scope};
+use super::flat::{FlatGraph, Scope};
 use super::measured::MeasuredValues;
-use crate::graph::syntax::{ALLOW_UNCALIBRATED, BenchDocument, GraphDocument, PartBlock, Sections, Use};
+use super::request::Request;
+use crate::graph::syntax::{ALLOW_UNCALIBRATED, BenchDocument, Sections};
 use crate::source::{
-    BuiltinFile, Code, Diagnostic, Diagnostics, Item, Key, Named, SourceMap, Table, Value, parse_table, suggest_name,
+    BuiltinFile, Code, Diagnostic, Diagnostics, Item, Key, SourceMap, Table, Value, parse_table, suggest_name,
 };
-
-/// Which graph to load, and what to change in it.
-#[derive(Debug, Clone, Default)]
-pub struct Request {
-    /// The graph file.
-    pub graph: PathBuf,
-    /// The text of the graph, instead of the content of the file.
-    pub text: Option<String>,
-    /// The bench file, instead of the bench of the graph.
-    pub bench: Option<PathBuf>,
-    /// The text of the bench, instead of a file.
-    pub bench_text: Option<String>,
-    /// Assignments `key=value` that override values of the files.
-    pub set: Vec<String>,
-}
-
-impl Request {
-    /// Requests the graph of a file, on its own bench.
-    pub fn file(path: impl Into<PathBuf>) -> Self {
-        Self { graph: path.into(), ..Self::default() }
-    }
-
-    /// Requests a graph given as text, with paths relative to the working folder.
-    pub fn text(text: impl Into<String>) -> Self {
-        Self { graph: "graph.toml".into(), text: Some(text.into()), ..Self::default() }
-    }
-
-    /// Replaces the bench.
-    #[must_use]
-    pub fn bench(mut self, path: impl Into<PathBuf>) -> Self {
-        self.bench = Some(path.into());
-        self
-    }
-
-    /// Overrides a value of the files, for example `nodes.pid.gains.x.kp=3`.
-    #[must_use]
-    pub fn set(mut self, assignment: impl Into<String>) -> Self {
-        self.set.push(assignment.into());
-        self
-    }
-}
 
 /// Reads files and collects their diagnostics.
 #[derive(Default)]
@@ -59,15 +18,10 @@ pub(crate) struct Loader {
     pub(crate) diagnostics: Diagnostics,
     /// The values of sections that were written with a unit.
     pub(crate) measured: MeasuredValues,
-    open_parts: Vec<PathBuf>,
+    pub(super) open_parts: Vec<PathBuf>,
     /// Whether the maximum number of parts is exceeded, so that loading stops.
-    is_full: bool,
+    pub(super) is_full: bool,
 }
-
-/// Maximum depth of parts inside parts.
-const MAX_PART_DEPTH: usize = 32;
-/// Maximum number of parts in a graph.
-const MAX_PARTS: usize = 4096;
 
 impl Loader {
     /// Creates a loader with the built-in files of a catalogue.
@@ -121,7 +75,7 @@ impl Loader {
         flat
     }
 
-    fn sections<T>(&mut self, read: impl FnOnce(&mut Sections<'_>) -> T) -> T {
+    pub(super) fn sections<T>(&mut self, read: impl FnOnce(&mut Sections<'_>) -> T) -> T {
         let mut sections = Sections::new(&self.sources);
         let result = read(&mut sections);
         let (diagnostics, measured) = sections.finish();
@@ -158,6 +112,7 @@ impl Loader {
             (None, None) if set.get("devices").is_some() => {
                 return Some(self.sections(|sections| sections.bench(&mut set)));
             }
+            (None, None) if flat.has_unknown_setting(&self.diagnostics) => return None,
             (None, None) => {
                 let diagnostic = Diagnostic::new(Code::MissingKey, flat.place.clone(), "the graph has no bench");
                 let help =
@@ -243,142 +198,6 @@ impl Loader {
         self.diagnostics.push(diagnostic.help("for example `--set nodes.pid.gains.x.kp=3`"));
         None
     }
-
-    /// Adds the nodes and parts of a document to the graph, and returns the index of its scope.
-    fn flatten(&mut self, document: GraphDocument, prefix: &str, mut scope: Scope, flat: &mut FlatGraph) -> usize {
-        let index = flat.scopes.len();
-        flat.scopes.push(Scope::default());
-        let mut reads: BTreeMap<String, Vec<Use>> = BTreeMap::new();
-        let uses = if document.parts.is_empty() { Vec::new() } else { document.uses() };
-        for reference in uses {
-            let inside = reference.inside(&reference.name);
-            reads.entry(reference.name).or_default().extend(inside);
-        }
-        (scope.exports, scope.declared) = (document.exports, document.inputs);
-        for (i, (key, _)) in document.roles.iter().enumerate() {
-            self.declare(&mut scope, key, Entity::Role(i));
-        }
-        for block in document.nodes {
-            self.declare(&mut scope, &block.key, Entity::Node(flat.nodes.len()));
-            flat.nodes.push(FlatNode { name: format!("{prefix}{}", block.key.name), scope: index, block });
-        }
-        for part in document.parts {
-            let reads = reads.get(&part.key.name).map_or(&[][..], Vec::as_slice);
-            let inner = self.part(&part, reads, prefix, index, flat);
-            self.declare(&mut scope, &part.key, inner.map_or(Entity::Unknown, Entity::Part));
-        }
-        flat.scopes[index] = scope;
-        index
-    }
-
-    fn declare(&mut self, scope: &mut Scope, key: &Key, entity: Entity) {
-        if let Some((first, _)) = scope.names.get(&key.name) {
-            let message = format!("the name `{}` is used twice", key.name);
-            let (first, second) = if first.span.start < key.span.start { (first, key) } else { (key, first) };
-            let diagnostic = Diagnostic::new(Code::DuplicateName, second.span.clone(), message);
-            let diagnostic = diagnostic.note(first.span.clone(), "first used here");
-            self.diagnostics.push(diagnostic.help("roles, nodes and parts share one namespace: rename one of them"));
-            return;
-        }
-        scope.names.insert(key.name.clone(), (key.clone(), entity));
-    }
-
-    /// Loads a part whose ports the `reads` of its parent name, and returns the index of its scope.
-    fn part(
-        &mut self,
-        part: &PartBlock,
-        reads: &[Use],
-        prefix: &str,
-        parent: usize,
-        flat: &mut FlatGraph,
-    ) -> Option<usize> {
-        let file = part.file.as_ref().filter(|_| !self.is_full)?;
-        if self.open_parts.len() >= MAX_PART_DEPTH || flat.scopes.len() > MAX_PARTS {
-            let message =
-                format!("parts are nested more than {MAX_PART_DEPTH} deep, or there are more than {MAX_PARTS} parts");
-            self.diagnostics.push(Diagnostic::new(Code::EndlessPart, file.span.clone(), message));
-            self.is_full = true;
-            return None;
-        }
-        let canonical = file.path.canonicalize().unwrap_or_else(|_| file.path.clone());
-        if self.open_parts.contains(&canonical) {
-            let message = format!("part `{}` contains itself", part.key.name);
-            self.diagnostics.push(Diagnostic::new(Code::EndlessPart, file.span.clone(), message));
-            return None;
-        }
-        let mut root = self.read(&file.path, Some(file.span.clone()))?.0;
-        self.sections(|sections| sections.correct_part(&mut root));
-        let strange = override_with(&mut root, &part.set);
-        let mut document = self.sections(|sections| sections.part(&root));
-        let wires: Vec<&Key> = part.wires.valid.iter().map(|wire| &wire.key).collect();
-        self.diagnostics.extend(document.correct_ports(&wires, reads, &self.sources));
-        let set: Vec<&Key> = part.set.entries.iter().map(|(key, _)| key).collect();
-        self.diagnostics.extend(document.correct_names(&Named::default(), &set, &self.sources));
-        // What sets a node with a misspelt name is right.
-        let names = || document.nodes.iter().map(|node| &node.key).chain(document.parts.iter().map(|part| &part.key));
-        for key in strange.iter().filter(|key| !names().any(|name| name.name == key.name)) {
-            let message = format!("the part has no node or part `{}`", key.name);
-            let diagnostic = Diagnostic::new(Code::UnknownKey, key.span.clone(), message);
-            let known = names().map(|key| key.name.as_str());
-            self.diagnostics.push(diagnostic.suggest(&key.name, known, "nodes and parts"));
-        }
-        self.check_part_wires(part, &document);
-        self.open_parts.push(canonical);
-        let inputs = part.wires.valid.iter().map(|wire| (wire.key.clone(), wire.clone())).collect();
-        let key = part.key.clone();
-        let scope = Scope { inputs, parent: Some(parent), part: Some(key), ..Scope::default() };
-        let inner = self.flatten(document, &format!("{prefix}{}.", part.key.name), scope, flat);
-        self.open_parts.pop();
-        Some(inner)
-    }
-
-    fn check_part_wires(&mut self, part: &PartBlock, document: &GraphDocument) {
-        let names = document.inputs.names();
-        for key in part.wires.valid.iter().map(|wire| &wire.key) {
-            if document.inputs.position(&key.name).is_none() {
-                let message = format!("part `{}` has no input `{}`", part.key.name, key.name);
-                let diagnostic = Diagnostic::new(Code::UnknownInput, key.span.clone(), message);
-                self.diagnostics.push(match part.wires.only_lacks(names.clone(), names.clone()) {
-                    Some(name) => diagnostic.instead(&key.name, name),
-                    None => diagnostic.suggest(&key.name, names.clone(), "inputs"),
-                });
-            }
-        }
-        let lacking = part.wires.lacking(names.clone());
-        let renamed = part.wires.only_lacks(names.clone(), names);
-        for (input, doc) in document.inputs.iter() {
-            if lacking.contains(input.name.as_str()) && renamed != Some(&input.name) {
-                let message = format!("part `{}` needs a wire to `in.{}`: {}", part.key.name, input.name, doc.value);
-                let diagnostic = Diagnostic::new(Code::MissingInput, part.key.span.clone(), message);
-                let help = format!("wire a port to `in.{}`", input.name);
-                self.diagnostics.push(diagnostic.note(input.span.clone(), "the part declares it here").help(help));
-            }
-        }
-    }
-}
-
-/// Merges `set.NAME` of a part into its node NAME, or into the `set` of its part NAME. Returns the names of neither.
-fn override_with(root: &mut Table, set: &Table) -> Vec<Key> {
-    let names = |section: &str| -> Vec<String> {
-        let table = root.get(section).and_then(Value::as_table);
-        table.map(|table| table.entries.iter().map(|(key, _)| key.name.clone()).collect()).unwrap_or_default()
-    };
-    let (nodes, parts) = (names("nodes"), names("parts"));
-    let mut strange = Vec::new();
-    for (key, value) in &set.entries {
-        let entry = |name: &str, value: Value| Table {
-            entries: vec![(Key { name: name.to_owned(), span: key.span.clone() }, value)],
-        };
-        let wrap = |name: &str, inner: Value| Value { span: value.span.clone(), item: Item::Table(entry(name, inner)) };
-        if nodes.contains(&key.name) {
-            root.merge(entry("nodes", wrap(&key.name, value.clone())));
-        } else if parts.contains(&key.name) {
-            root.merge(entry("parts", wrap(&key.name, wrap("set", value.clone()))));
-        } else {
-            strange.push(key.clone());
-        }
-    }
-    strange
 }
 
 /// Returns whether a text is a single assignment, without a header or a second line.

@@ -3,8 +3,10 @@
 mod flat;
 mod loader;
 mod measured;
+mod parts;
+mod request;
 
 pub(crate) use flat::{Entity, FlatGraph, FlatNode, Scope};
-pub use loader::Request;
 pub(crate) use loader::{Loader, wrong_file_type};
 pub(crate) use measured::MeasuredValues;
+pub use request::Request;

@@ -4,7 +4,7 @@ use std::cell::OnceCell;
 use std::collections::BTreeMap;
 
 use super::Net;
-use super::meant_type::{unknown_type, wrong_type};
+use super::meant_type::{Candidate, has_keys_of};
 use super::provenance::Provenance;
 use crate::catalogue::Catalogue;
 use crate::device::RoleType;
@@ -16,12 +16,14 @@ impl<'a> Net<'a> {
     /// Creates a net with all types looked up and without wires.
     pub(super) fn declare(flat: &'a FlatGraph, catalogue: &'a Catalogue, diagnostics: &mut Diagnostics) -> Self {
         let roles = flat.roles.iter().map(|(_, kind)| find_role(kind, catalogue, diagnostics)).collect();
-        let nodes = flat.nodes.iter().map(|node| {
+        let nodes = flat.nodes.iter().enumerate().map(|(index, node)| {
             let kind = node.block.kind.as_ref()?;
             let known = catalogue.find_node(&kind.value);
+            let candidate = || Candidate::new(flat, index, catalogue);
             let mistake = match known {
-                Some((_, spec)) => wrong_type(catalogue, &node.block, kind, spec),
-                None => Some(unknown_type(catalogue, &node.block, kind)),
+                Some((_, spec)) if has_keys_of(spec, &node.block) => None,
+                Some((_, spec)) => candidate().wrong_type(kind, spec),
+                None => Some(candidate().unknown_type(kind)),
             };
             let is_right = mistake.is_none();
             diagnostics.extend(mistake);

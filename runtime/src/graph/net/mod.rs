@@ -91,6 +91,11 @@ impl<'a> Net<'a> {
         given.has_invalid() || given.valid.len() != found.len() || (0..inputs.len()).any(is_open)
     }
 
+    /// Returns whether the author of the graph chooses the names of the wires into a node.
+    pub(crate) fn takes_any_wire(&self, node: usize) -> bool {
+        self.spec(node).is_some_and(|spec| spec.inputs.iter().any(|input| input.need.is_many))
+    }
+
     /// Returns a value of the section [limits].
     pub(crate) fn limit(&self, name: &str) -> Option<&'a Value> {
         self.flat.limits.as_ref().and_then(|(_, table)| table.get(name))

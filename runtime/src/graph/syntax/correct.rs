@@ -18,6 +18,7 @@ pub(super) fn correct_keys(table: &mut Table, known: &[&str], place: &str, reade
 /// Corrects the names of the sections of a file. A name that resembles none is recognized by what the section holds.
 pub(super) fn correct_sections(root: &mut Table, known: &[&str], reader: &mut Reader<'_>) {
     separate_names(root, known, reader);
+    move_blocks(root, known, reader);
     for (key, meant) in root.correct(known) {
         let guess = || root.get(&key.name).and_then(|value| guess_section(value, root, known));
         let guessed = if meant == Meant::Unknown { guess() } else { None };
@@ -46,6 +47,27 @@ fn separate_names(root: &mut Table, known: &[&str], reader: &mut Reader<'_>) {
         reader.mistakes.push(mistake.instead(&key.name, &format!("{section}.{name}")));
         root.merge(Table { entries: vec![(Key { name: section.to_owned(), span: key.span }, value)] });
     }
+}
+
+/// Moves blocks to the section that they are for from one that has none: `[limits.servo]` with the exits of a mode.
+fn move_blocks(root: &mut Table, known: &[&str], reader: &mut Reader<'_>) {
+    let mut moved = Vec::new();
+    let flat = root.entries.iter_mut().filter(|(key, _)| ["graph", "roles", "limits", "bind"].contains(&&*key.name));
+    for (key, value) in flat {
+        let Item::Table(table) = &mut value.item else { continue };
+        table.entries.retain(|(name, block)| {
+            let entries = vec![(name.clone(), block.clone())];
+            let alone = Value { span: block.span.clone(), item: Item::Table(Table { entries }) };
+            let is_meant = |section: &&str| known.contains(section) && could_be(section, &alone);
+            let Some(section) = REPEATED.into_iter().find(is_meant) else { return true };
+            let message = format!("[{}] has no blocks, and `{}` is one of [{section}]", key.name, name.name);
+            let mistake = Mistake::new(Code::UnknownKey, At::Span(name.span.clone()), message);
+            reader.mistakes.push(mistake.help(format!("write `[{section}.{}]`", name.name)));
+            moved.push((Key { name: section.to_owned(), span: name.span.clone() }, alone));
+            false
+        });
+    }
+    moved.into_iter().for_each(|entry| root.merge(Table { entries: vec![entry] }));
 }
 
 fn report(key: &Key, meant: Meant<'_>, known: &[&str], place: &str, reader: &mut Reader<'_>) {
@@ -120,8 +142,35 @@ pub(super) fn correct_wires(table: &mut Table, names: &[String], reader: &mut Re
             && value.as_section().is_some_and(|table| !table.entries.is_empty())
             && wires.all(|(_, wire)| fits(wire))
     };
+    separate_wires(table, &is_known, reader);
     let wrong: Vec<String> = table.entries.iter().filter(is_wires).map(|(key, _)| key.name.clone()).collect();
     wrong.iter().for_each(|name| rename(table, name, "in", reader));
+}
+
+/// Separates `in` from the name of an input where the point between them is missing: `inimage`.
+fn separate_wires(table: &mut Table, is_known: &dyn Fn(&Value) -> bool, reader: &mut Reader<'_>) {
+    let input = |(key, value): &(Key, Value)| {
+        let name = key.name.strip_prefix("in")?.trim_start_matches(['_', '-', ':', '/']);
+        (is_name(name) && is_known(value)).then(|| (key.clone(), name.to_owned()))
+    };
+    let found: Vec<(Key, String)> = table.entries.iter().filter_map(input).collect();
+    for (key, name) in found {
+        let Some((_, value)) = table.remove(&key.name) else { continue };
+        let mistake = Mistake::new(Code::UnknownKey, At::Span(key.span.clone()), format!("unknown key `{}`", key.name));
+        reader.mistakes.push(mistake.instead(&key.name, &format!("in.{name}")));
+        let wire = Table { entries: vec![(Key { name, span: key.span.clone() }, value)] };
+        let wires = Value { span: key.span.clone(), item: Item::Table(wire) };
+        table.merge(Table { entries: vec![(Key { name: "in".to_owned(), span: key.span }, wires)] });
+    }
+}
+
+/// Corrects the key `file` of a part: the only one that holds the name of a file.
+pub(super) fn correct_part_file(table: &mut Table, reader: &mut Reader<'_>) {
+    let is_file = |(_, value): &&(Key, Value)| value.as_str().is_some_and(|text| text.ends_with(".toml"));
+    let found = table.entries.iter().find(is_file).map(|(key, _)| key.name.clone());
+    if let Some(name) = found.filter(|_| table.get("file").is_none()) {
+        rename(table, &name, "file", reader);
+    }
 }
 
 /// Reports the key `from` of a table and gives it the name `to`.

@@ -3,7 +3,6 @@
 //! Such a name is reported once, at its definition, and the graph is then read as it was meant. Whether the definition
 //! or the reference is misspelt is decided by the number of times that each name occurs in the files.
 
-use std::cmp::Ordering;
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 
@@ -11,8 +10,7 @@ use super::reserved::{INPUTS, LIMITS, is_name};
 use super::sections::{BenchDocument, GraphDocument};
 use crate::node::Spanned;
 use crate::source::{
-    Code, Diagnostic, Diagnostics, Edit, FactRef, Item, Key, Named, SourceMap, Value, is_typing_error, quoted,
-    suggest_name,
+    Code, Diagnostic, Diagnostics, Edit, FactRef, Item, Key, Named, SourceMap, Value, quoted, suggest_name,
 };
 
 /// A reference to a port: the name of the node, role or part, and the port unless the reference is to the whole.
@@ -67,17 +65,14 @@ fn correct<'k>(
         let wanted = &first.name;
         let candidates: Vec<usize> = unused.iter().copied().filter(|i| may_be(*i, wanted)).collect();
         let near = suggest_name(wanted, candidates.iter().map(|i| names[*i].as_str()));
-        let is_nearest = count(wanted) > 1 || near == suggest_name(wanted, names.iter().map(String::as_str));
+        let is_nearest =
+            count(wanted) > 1 || near == suggest_name(wanted, near.into_iter().chain(names.iter().map(String::as_str)));
         let close = candidates.iter().find(|i| near == Some(&names[**i])).filter(|_| is_nearest);
         let is_only = may_be_far && (unknown.len(), candidates.len()) == (1, 1);
         let only = candidates.first().filter(|_| is_only && count(wanted) > 1);
         let Some(&i) = close.or(only) else { continue };
         let is_invalid = !is_name(&names[i]);
-        let is_rarer = || match sources.occurrences(&names[i]).cmp(&sources.occurrences(wanted)) {
-            Ordering::Equal => is_typing_error(&names[i], wanted),
-            order => order.is_lt(),
-        };
-        if is_invalid || count(wanted) > 1 || is_rarer() {
+        if is_invalid || count(wanted) > 1 || sources.is_misspelt(&names[i], wanted) {
             let message = if is_invalid {
                 format!("`{}` is not a valid name", names[i])
             } else {

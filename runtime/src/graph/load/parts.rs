@@ -1,0 +1,184 @@
+//! Expands the parts of a graph, each in a scope of its own.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use super::flat::{Entity, FlatGraph, FlatNode, Scope};
+use super::loader::{Loader, wrong_file_type};
+use crate::graph::syntax::{GraphDocument, PartBlock, Use};
+use crate::node::FilePath;
+use crate::source::{Code, Diagnostic, Item, Key, Named, Table, Value, quoted};
+
+/// Maximum depth of parts inside parts.
+const MAX_PART_DEPTH: usize = 32;
+/// Maximum number of parts in a graph.
+const MAX_PARTS: usize = 4096;
+
+impl Loader {
+    /// Adds the nodes and parts of a document to the graph, and returns the index of its scope.
+    pub(super) fn flatten(
+        &mut self,
+        document: GraphDocument,
+        prefix: &str,
+        mut scope: Scope,
+        flat: &mut FlatGraph,
+    ) -> usize {
+        let index = flat.scopes.len();
+        flat.scopes.push(Scope::default());
+        let mut reads: BTreeMap<String, Vec<Use>> = BTreeMap::new();
+        let uses = if document.parts.is_empty() { Vec::new() } else { document.uses() };
+        for reference in uses {
+            let inside = reference.inside(&reference.name);
+            reads.entry(reference.name).or_default().extend(inside);
+        }
+        (scope.exports, scope.declared) = (document.exports, document.inputs);
+        for (i, (key, _)) in document.roles.iter().enumerate() {
+            self.declare(&mut scope, key, Entity::Role(i));
+        }
+        for block in document.nodes {
+            self.declare(&mut scope, &block.key, Entity::Node(flat.nodes.len()));
+            flat.nodes.push(FlatNode { name: format!("{prefix}{}", block.key.name), scope: index, block });
+        }
+        for part in document.parts {
+            let reads = reads.get(&part.key.name).map_or(&[][..], Vec::as_slice);
+            let inner = self.part(&part, reads, prefix, index, flat);
+            self.declare(&mut scope, &part.key, inner.map_or(Entity::Unknown, Entity::Part));
+        }
+        flat.scopes[index] = scope;
+        index
+    }
+
+    fn declare(&mut self, scope: &mut Scope, key: &Key, entity: Entity) {
+        if let Some((first, _)) = scope.names.get(&key.name) {
+            let message = format!("the name `{}` is used twice", key.name);
+            let (first, second) = if first.span.start < key.span.start { (first, key) } else { (key, first) };
+            let diagnostic = Diagnostic::new(Code::DuplicateName, second.span.clone(), message);
+            let diagnostic = diagnostic.note(first.span.clone(), "first used here");
+            self.diagnostics.push(diagnostic.help("roles, nodes and parts share one namespace: rename one of them"));
+            return;
+        }
+        scope.names.insert(key.name.clone(), (key.clone(), entity));
+    }
+
+    /// Loads a part whose ports the `reads` of its parent name, and returns the index of its scope.
+    fn part(
+        &mut self,
+        part: &PartBlock,
+        reads: &[Use],
+        prefix: &str,
+        parent: usize,
+        flat: &mut FlatGraph,
+    ) -> Option<usize> {
+        let file = part.file.as_ref().filter(|_| !self.is_full)?;
+        if self.open_parts.len() >= MAX_PART_DEPTH || flat.scopes.len() > MAX_PARTS {
+            let message =
+                format!("parts are nested more than {MAX_PART_DEPTH} deep, or there are more than {MAX_PARTS} parts");
+            self.diagnostics.push(Diagnostic::new(Code::EndlessPart, file.span.clone(), message));
+            self.is_full = true;
+            return None;
+        }
+        let canonical = file.path.canonicalize().unwrap_or_else(|_| file.path.clone());
+        if self.open_parts.contains(&canonical) {
+            let message = format!("part `{}` contains itself", part.key.name);
+            self.diagnostics.push(Diagnostic::new(Code::EndlessPart, file.span.clone(), message));
+            return None;
+        }
+        let mut root = self.read(&file.path, Some(file.span.clone()))?.0;
+        if let Some(what) = wrong_file_type(&root, "exports").filter(|_| root.get("inputs").is_none()) {
+            let message = format!("this file is {what}, not a part");
+            self.diagnostics.push(Diagnostic::new(Code::WrongFile, file.span.clone(), message));
+            return None;
+        }
+        self.sections(|sections| sections.correct_part(&mut root));
+        let strange = override_with(&mut root, &part.set);
+        let mut document = self.sections(|sections| sections.part(&root));
+        let wires: Vec<&Key> = part.wires.valid.iter().map(|wire| &wire.key).collect();
+        if let Some(mistake) = wrong_part(&document, file, &wires, reads) {
+            self.diagnostics.push(mistake);
+            return None;
+        }
+        self.diagnostics.extend(document.correct_ports(&wires, reads, &self.sources));
+        let set: Vec<&Key> = part.set.entries.iter().map(|(key, _)| key).collect();
+        self.diagnostics.extend(document.correct_names(&Named::default(), &set, &self.sources));
+        // What sets a node with a misspelt name is right.
+        let names = || document.nodes.iter().map(|node| &node.key).chain(document.parts.iter().map(|part| &part.key));
+        for key in strange.iter().filter(|key| !names().any(|name| name.name == key.name)) {
+            let message = format!("the part has no node or part `{}`", key.name);
+            let diagnostic = Diagnostic::new(Code::UnknownKey, key.span.clone(), message);
+            let known = names().map(|key| key.name.as_str());
+            self.diagnostics.push(diagnostic.suggest(&key.name, known, "nodes and parts"));
+        }
+        self.check_part_wires(part, &document);
+        self.open_parts.push(canonical);
+        let inputs = part.wires.valid.iter().map(|wire| (wire.key.clone(), wire.clone())).collect();
+        let key = part.key.clone();
+        let scope = Scope { inputs, parent: Some(parent), part: Some(key), ..Scope::default() };
+        let inner = self.flatten(document, &format!("{prefix}{}.", part.key.name), scope, flat);
+        self.open_parts.pop();
+        Some(inner)
+    }
+
+    fn check_part_wires(&mut self, part: &PartBlock, document: &GraphDocument) {
+        let names = document.inputs.names();
+        for key in part.wires.valid.iter().map(|wire| &wire.key) {
+            if document.inputs.position(&key.name).is_none() {
+                let message = format!("part `{}` has no input `{}`", part.key.name, key.name);
+                let diagnostic = Diagnostic::new(Code::UnknownInput, key.span.clone(), message);
+                self.diagnostics.push(match part.wires.only_lacks(names.clone(), names.clone()) {
+                    Some(name) => diagnostic.instead(&key.name, name),
+                    None => diagnostic.suggest(&key.name, names.clone(), "inputs"),
+                });
+            }
+        }
+        let lacking = part.wires.lacking(names.clone());
+        let renamed = part.wires.only_lacks(names.clone(), names);
+        for (input, doc) in document.inputs.iter() {
+            if lacking.contains(input.name.as_str()) && renamed != Some(&input.name) {
+                let message = format!("part `{}` needs a wire to `in.{}`: {}", part.key.name, input.name, doc.value);
+                let diagnostic = Diagnostic::new(Code::MissingInput, part.key.span.clone(), message);
+                let help = format!("wire a port to `in.{}`", input.name);
+                self.diagnostics.push(diagnostic.note(input.span.clone(), "the part declares it here").help(help));
+            }
+        }
+    }
+}
+
+/// Reports the file of another part: none of the exports that are used are its own, nor most of the wired inputs.
+fn wrong_part(document: &GraphDocument, file: &FilePath, wires: &[&Key], reads: &[Use]) -> Option<Diagnostic> {
+    let inputs: Vec<&str> = wires.iter().map(|key| &*key.name).collect();
+    let strange: Vec<&str> = inputs.iter().copied().filter(|name| document.inputs.position(name).is_none()).collect();
+    let exports: BTreeSet<&str> = reads.iter().map(|reference| &*reference.name).collect();
+    let has_export = exports.iter().any(|name| document.exports.position(name).is_some());
+    let has_inputs = strange.len() < 2 || 2 * strange.len() <= inputs.len();
+    if exports.is_empty() || has_export || has_inputs && exports.len() < 2 {
+        return None;
+    }
+    let message = format!("this part has no exports {}", quoted(&exports));
+    let more = if strange.is_empty() { String::new() } else { format!(", and no inputs {}", quoted(&strange)) };
+    let own = quoted(document.exports.names());
+    let help = format!("name the file of the part that is meant; the exports of this one are {own}");
+    Some(Diagnostic::new(Code::UnknownPort, file.span.clone(), message + &more).help(help))
+}
+
+/// Merges `set.NAME` of a part into its node NAME, or into the `set` of its part NAME. Returns the names of neither.
+fn override_with(root: &mut Table, set: &Table) -> Vec<Key> {
+    let names = |section: &str| -> Vec<String> {
+        let table = root.get(section).and_then(Value::as_table);
+        table.map(|table| table.entries.iter().map(|(key, _)| key.name.clone()).collect()).unwrap_or_default()
+    };
+    let (nodes, parts) = (names("nodes"), names("parts"));
+    let mut strange = Vec::new();
+    for (key, value) in &set.entries {
+        let entry = |name: &str, value: Value| Table {
+            entries: vec![(Key { name: name.to_owned(), span: key.span.clone() }, value)],
+        };
+        let wrap = |name: &str, inner: Value| Value { span: value.span.clone(), item: Item::Table(entry(name, inner)) };
+        if nodes.contains(&key.name) {
+            root.merge(entry("nodes", wrap(&key.name, value.clone())));
+        } else if parts.contains(&key.name) {
+            root.merge(entry("parts", wrap(&key.name, wrap("set", value.clone()))));
+        } else {
+            strange.push(key.clone());
+        }
+    }
+    strange
+}

@@ -1,0 +1,44 @@
+//! Which graph to load, on which bench, and with which changes.
+
+use std::path::PathBuf;
+
+/// Which graph to load, and what to change in it.
+#[derive(Debug, Clone, Default)]
+pub struct Request {
+    /// The graph file.
+    pub graph: PathBuf,
+    /// The text of the graph, instead of the content of the file.
+    pub text: Option<String>,
+    /// The bench file, instead of the bench of the graph.
+    pub bench: Option<PathBuf>,
+    /// The text of the bench, instead of a file.
+    pub bench_text: Option<String>,
+    /// Assignments `key=value` that override values of the files.
+    pub set: Vec<String>,
+}
+
+impl Request {
+    /// Requests the graph of a file, on its own bench.
+    pub fn file(path: impl Into<PathBuf>) -> Self {
+        Self { graph: path.into(), ..Self::default() }
+    }
+
+    /// Requests a graph given as text, with paths relative to the working folder.
+    pub fn text(text: impl Into<String>) -> Self {
+        Self { graph: "graph.toml".into(), text: Some(text.into()), ..Self::default() }
+    }
+
+    /// Replaces the bench.
+    #[must_use]
+    pub fn bench(mut self, path: impl Into<PathBuf>) -> Self {
+        self.bench = Some(path.into());
+        self
+    }
+
+    /// Overrides a value of the files, for example `nodes.pid.gains.x.kp=3`.
+    #[must_use]
+    pub fn set(mut self, assignment: impl Into<String>) -> Self {
+        self.set.push(assignment.into());
+        self
+    }
+}
