@@ -42,7 +42,11 @@ impl Compiled {
         }
         let is_used = |warning: &Diagnostic| {
             let mut nodes = self.plan.nodes.iter().filter(|node| used.contains(&node.index));
-            warning.code == Code::UnusedNode && nodes.any(|node| node.span == warning.span)
+            // A warning at a wire has the node as a note.
+            let marks = |node: &PlannedNode| {
+                node.span == warning.span || warning.notes.iter().any(|(place, _)| *place == node.span)
+            };
+            warning.code == Code::UnusedNode && nodes.any(marks)
         };
         let warnings: Vec<Diagnostic> = self.warnings.iter().filter(|warning| !is_used(warning)).cloned().collect();
         (!warnings.is_empty()).then(|| Report::new(self.sources.clone(), warnings))

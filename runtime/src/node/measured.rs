@@ -305,7 +305,7 @@ mod tests {
         let other = "expected a raw reading [raw], found `15 mN`, a force";
         assert_eq!(read("threshold = '15 mN'", Some(Unit::RAW), false).unwrap_err(), other);
         let strange = read("columns.y = ['1 m/m', 0]", Some(Unit::RAW), false).unwrap_err();
-        assert_eq!(strange, "the unit of this number [m/_] is not known here, so it cannot be converted");
+        assert_eq!(strange, "no feature is called `y`");
     }
 
     proptest! {
