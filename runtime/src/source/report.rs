@@ -29,11 +29,6 @@ impl fmt::Debug for Report {
 }
 
 impl Report {
-    /// Returns the message of the first diagnostic with a code.
-    pub(crate) fn message_of(&self, code: Code) -> Option<&str> {
-        self.diagnostics.iter().find(|diagnostic| diagnostic.code == code).map(|diagnostic| &*diagnostic.message)
-    }
-
     /// Sorts the diagnostics by place, removes duplicates, and joins those of one missing name.
     #[must_use]
     pub fn new(sources: SourceMap, mut diagnostics: Diagnostics) -> Self {

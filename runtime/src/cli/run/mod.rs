@@ -141,7 +141,8 @@ impl Job {
             return Err("`--listen` requires real time: add `--realtime`, or send words with `--send 2s:resume`".into());
         }
         let chosen = points.as_ref().map(|wanted| wanted.resolve(&plan)).transpose()?;
-        let start = plan.warnings().and_then(|report| report.message_of(Code::StartOutside).map(str::to_owned));
+        let mut warnings = plan.warnings().into_iter().flat_map(|report| report.diagnostics);
+        let start = warnings.find(|warning| warning.code == Code::StartOutside).map(|warning| warning.message);
         let mut engine = Engine::new(plan);
         self.check_words(&engine)?;
         let mut files = OutputFiles::create(self, chosen.as_ref(), &engine, !is_real)?;

@@ -4,6 +4,7 @@ mod conditions;
 mod demand;
 mod modes;
 mod nodes;
+mod params;
 
 pub(crate) use modes::{BuiltModes, build_modes};
 pub(crate) use nodes::Builder;

@@ -1,0 +1,91 @@
+//! Reads the parameters of a node: its facts, its units, and the place of each mistake.
+
+use std::ops::Range;
+
+use super::nodes::Builder;
+use crate::graph::bench::{fill_facts, place_mistakes};
+use crate::graph::plan::Producer;
+use crate::graph::syntax::LIMITS;
+use crate::node::{At, Configured, Given, KnownUnits, Mistake, Mistakes, Reader};
+use crate::source::{Code, Value, suggest_name};
+
+impl Builder<'_> {
+    /// Reads the parameters of a node, and returns them with all facts filled in.
+    ///
+    /// The units of parameters follow from the shapes on the wires, which may be incomplete. A filled-in value of
+    /// [limits] keeps its span there, so a mistake in it is reported in that section.
+    pub(super) fn configure(
+        &mut self,
+        index: usize,
+        kind: usize,
+        written: &Value,
+        given: &Given,
+        is_complete: bool,
+    ) -> (Option<Box<dyn Configured>>, Value) {
+        let mut params = written.clone();
+        if !fill_facts(&mut params, Some(index), self.net, self.opened, &mut self.diagnostics) {
+            return (None, params);
+        }
+        let spec = self.net.spec(index);
+        let (specs, inputs) = spec.map_or((&[][..], &[][..]), |spec| (&spec.params, &spec.inputs));
+        let units = KnownUnits::of_params(&params, specs).with_wires(inputs, &given.inputs, !is_complete);
+        let period = self.opened.shortest_period(self.net.roles_of(Producer::Node(index))).unwrap_or(self.period);
+        let mut reader = Reader::new(&self.sources).with_units(units).with_period(period);
+        let configured = self.net.catalogue.nodes()[kind].configure(&params, &mut reader);
+        let Reader { mistakes, warnings, measured, .. } = reader;
+        self.measured.add(Some(index), measured);
+        let is_valid = mistakes.is_empty();
+        let place = |mistake| self.at_wire(self.at_reference(mistake, written), index);
+        let mistakes = mistakes.into_iter().map(place).collect();
+        place_mistakes(mistakes, &params, &[], &mut self.sources, &mut self.diagnostics);
+        let warnings = self.warnings_of_written(warnings, written);
+        place_mistakes(warnings, &params, &[], &mut self.sources, &mut self.diagnostics);
+        (configured.filter(|_| is_valid), params)
+    }
+
+    /// Moves the mistake that a limit is in another unit than its parameter to the reference in the parameter.
+    fn at_reference(&self, mistake: Mistake, written: &Value) -> Mistake {
+        let (At::Span(span), Code::UnitMismatch) = (&mistake.at, mistake.code) else { return mistake };
+        let mut limits = self.net.flat.limits.iter().flat_map(|(_, table)| &table.entries);
+        let is_limit = |value: &Value| value.span.start <= span.start && span.end <= value.span.end;
+        // A text has the unit that the user wrote, so the mistake is there.
+        let Some((key, _)) = limits.find(|(_, value)| is_limit(value) && !value.has_text_at(span)) else {
+            return mistake;
+        };
+        let word = format!("{LIMITS}.{}", key.name);
+        let Some(fact) = written.facts().into_iter().find(|fact| fact.word == word) else { return mistake };
+        let help = format!("`{}` is a limit in another unit: take one in the unit of the parameter", key.name);
+        Mistake { at: At::Span(fact.place.clone()), help: Some(help), ..mistake }
+    }
+
+    /// Moves the mistake that an entry has the name of no wire to the wire, if that looks misspelt.
+    pub(super) fn at_wire(&self, mistake: Mistake, node: usize) -> Mistake {
+        let (Code::UnknownKey, Some(names)) = (mistake.code, &mistake.instead) else { return mistake };
+        let (name, wired) = &**names;
+        let wires = &self.net.flat.nodes[node].block.wires.valid;
+        if suggest_name(name, std::iter::once(wired.as_str())).is_none() {
+            return mistake;
+        }
+        let named = wires.iter().find(|wire| wire.key.name == *wired && self.sources.is_misspelt(wired, name));
+        let Some(wire) = named.filter(|_| self.net.takes_any_wire(node)) else { return mistake };
+        let message = format!("nothing else here is called `{wired}`, and `{name}` has no wire");
+        Mistake::new(mistake.code, At::Span(wire.key.span.clone()), message).instead(wired, name)
+    }
+
+    /// Returns the warnings about numbers that the graph contains, under their name there. A fact has its warnings in
+    /// the bench.
+    fn warnings_of_written(&self, warnings: Mistakes, written: &Value) -> Mistakes {
+        let facts = written.facts().into_iter().filter(|fact| fact.word.split('.').next() != Some(LIMITS));
+        let facts: Vec<Range<usize>> = facts.map(|fact| fact.place.clone()).collect();
+        let limits = || self.net.flat.limits.iter().flat_map(|(_, table)| &table.entries);
+        let name = |mut warning: Mistake| {
+            let At::Span(span) = &warning.at else { return Some(warning) };
+            let limit = limits().find(|(_, value)| value.span.start <= span.start && span.end <= value.span.end);
+            if let (Some((key, _)), Some((_, rest))) = (limit, warning.message[1..].split_once('`')) {
+                warning.message = format!("`{}`{rest}", key.name);
+            }
+            facts.iter().all(|fact| !span.contains(&fact.start)).then_some(warning)
+        };
+        warnings.into_iter().filter_map(name).collect()
+    }
+}
