@@ -137,7 +137,7 @@ fn load(family: &str, nodes: usize) {
 }
 
 fn main() {
-    let arguments: Vec<String> = std::env::args().skip(1).filter(|argument| argument != "--bench").collect();
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
     match arguments.as_slice() {
         [what, family, nodes] if what == "load" => load(family, nodes.parse().expect("a number of nodes")),
         [what, ticks] => count(what, ticks.parse().expect("a number of ticks")),

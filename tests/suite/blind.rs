@@ -59,7 +59,7 @@ fn an_arm_that_finds_nothing_stops_within_its_bound_and_the_other_one_goes_on() 
     let poses = ["left_move.state.sensor_pose", "right_move.state.sensor_pose"];
     let [left, right] = ways(&mut engine, 7.0, poses);
     assert!((0.048..=0.0501).contains(&right.whole_m), "the right arm moved {:.4} m of 0.05 m", right.whole_m);
-    // At 15 mm/s the budget is spent after some 3.4 s; the object that nobody holds is still searched for then.
+    // At 15 mm/s the budget is spent after some 3.4 s. After that, the task still asks the arm to move.
     let last = right.last_second_m();
     assert!(last < 1e-4, "the right arm moved {last:.6} m in the last second");
     assert!(engine.get::<Twist>("right_reach.twist").is_some_and(|twist| twist.0[2] > 0.0), "its task still wants to");
@@ -78,6 +78,35 @@ fn a_contact_on_another_arm_does_not_end_a_motion() {
     // The modes that nothing else ends: the wait for a time and the hold.
     assert_eq!(codes, ["ungated-motion"; 2], "{}", report.render(false));
     assert!(report.render(false).contains("left_slide"), "{}", report.render(false));
+}
+
+/// A right arm whose motion reads the force of the left arm's limiter, and whose guidance has this gate.
+fn coupled(gate: &str) -> Request {
+    let blocks = [
+        "nodes.left_soft={ type = 'contact_limit', in.twist = 'left_sum.twist', in.image = 'left_touch.image', \
+         force_n = 15.0, peak_n = 3.0, approach_m_per_s = 0.05 }",
+        "parts.left_move.in.twist='left_soft.twist'",
+        "nodes.copy_error={ type = 'feature_error', in.k = 'left_soft.force', setpoint.k = 1.0 }",
+        "nodes.copy_pid={ type = 'pid', in.error = 'copy_error.error', gains.k.kp = 0.1 }",
+        "nodes.copy={ type = 'inverse_jacobian', in.control = 'copy_pid.control', columns.k = [0, 0, 0.001, 0, 0, 0] }",
+        "nodes.right_sum={ type = 'twist_adder', in.reach = 'right_reach.twist', in.slide = 'right_slide.twist', \
+         in.copy = 'copy.twist' }",
+        "parts.right_move.in.twist='right_sum.twist'",
+    ];
+    let slide =
+        format!("nodes.right_slide={{ type = 'twist_source', in.gate = '{gate}', twist = [0, 0.005, 0, 0, 0, 0] }}");
+    blocks.iter().fold(two_arms().set(slide), |request, set| request.set(*set))
+}
+
+#[test]
+fn a_limiter_of_another_arm_does_not_make_its_contact_count() {
+    let text = |gate: &str| match compile(&catalogue(), &coupled(gate)) {
+        Ok(_) => String::new(),
+        Err(report) => report.render(false),
+    };
+    let [own, other] = ["right_touch.present", "left_touch.present"].map(text);
+    assert!(!own.contains("`right_slide`"), "{own}");
+    assert!(other.contains("ungated-motion") && other.contains("`right_slide`"), "{other}");
 }
 
 #[test]

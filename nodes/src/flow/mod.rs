@@ -2,9 +2,11 @@
 //!
 //! [`gate`], [`switch`] and [`delay`] come for scalars and for twists, each pair from one text.
 
+pub mod compare;
 pub mod contact_debounce;
 pub mod delay;
 pub mod gate;
+pub mod logic;
 mod passing;
 pub mod probe;
 pub mod signal_generator;

@@ -141,8 +141,8 @@ impl SourceMap {
         code.flat_map(|code| code.split(is_end)).filter(|other| *other == word).count()
     }
 
-    /// Returns whether of two names, of which one is misspelt, it is `name`: it occurs less often, or has a slip of the
-    /// finger.
+    /// Returns whether `name` is the misspelt one of two similar names: it occurs less often than `meant`, or as often
+    /// and looks like a typing error.
     pub(crate) fn is_misspelt(&self, name: &str, meant: &str) -> bool {
         match self.occurrences(name).cmp(&self.occurrences(meant)) {
             Ordering::Equal => is_typing_error(name, meant),

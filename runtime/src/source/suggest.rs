@@ -23,12 +23,12 @@ pub fn suggest_name<'n>(name: &str, known: impl Iterator<Item = &'n str>) -> Opt
     (score.0 <= max_distance).then_some(best)
 }
 
-/// Returns whether `name` is `meant` with a slip of the finger, rather than the other way round: with a capital letter,
-/// a doubled letter or an `s` at its end, or without one of its letters.
+/// Returns whether `name` looks like `meant` with a typing error: a capital letter, a doubled letter, an additional `s`
+/// at the end, or a missing letter.
 pub(crate) fn is_typing_error(name: &str, meant: &str) -> bool {
     let has_capital = |text: &str| text.contains(|c: char| c.is_uppercase());
     match (has_capital(name), has_capital(meant)) {
-        (false, false) => is_slip(name, meant) || (name.len() < meant.len() && !is_slip(meant, name)),
+        (false, false) => is_slip(name, meant) || (name.len() + 1 == meant.len() && !is_slip(meant, name)),
         (capital, _) => capital,
     }
 }

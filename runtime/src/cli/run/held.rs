@@ -66,7 +66,7 @@ impl HoldWatch {
         let worst = self.stops.iter().max_by(|a, b| a.in_mode.total_cmp(&b.in_mode))?;
         let mode = engine.mode().map(|mode| format!(" in mode `{mode}`")).unwrap_or_default();
         let share = worst.in_mode / duration.max(1e-9);
-        let start = self.start.iter().map(|start| format!(": {start}")).collect::<String>();
+        let start = self.start.iter().map(|start| format!("; the check warned that {start}")).collect::<String>();
         let share_text = format!("{:.0} % of the time{mode}{start}", share * 100.0);
         let text = format!("the arm was held back: `{}` stopped it for {share_text}", worst.name);
         (share >= MIN_SHARE[0] && worst.in_mode > 0.0).then_some(text)

@@ -34,21 +34,24 @@ pub(crate) fn fill_facts(
     report(fact, diagnostics).map(|fact| *value = fact).is_some()
 }
 
-/// Returns the unit that the name of a limit ends with: m/s2 for `linear_m_per_s2`.
+/// Returns the unit that the name of a limit ends with: m/s2 for `linear_m_per_s2`. Of other units, such as that of
+/// `gain_per_s`, it returns `None`.
 fn unit_of_limit(name: &str) -> Option<&'static str> {
     const UNITS: [(&str, &str); 10] = [
-        ("_m_per_s2", "m/s2"),
-        ("_rad_per_s2", "rad/s2"),
-        ("_m_per_s", "m/s"),
-        ("_rad_per_s", "rad/s"),
-        ("_raw", "raw"),
-        ("_rad", "rad"),
-        ("_mm", "mm"),
-        ("_m", "m"),
-        ("_n", "N"),
-        ("_s", "s"),
+        ("m_per_s2", "m/s2"),
+        ("rad_per_s2", "rad/s2"),
+        ("m_per_s", "m/s"),
+        ("rad_per_s", "rad/s"),
+        ("raw", "raw"),
+        ("rad", "rad"),
+        ("mm", "mm"),
+        ("m", "m"),
+        ("n", "N"),
+        ("s", "s"),
     ];
-    UNITS.iter().find(|(end, _)| name.ends_with(end)).map(|(_, unit)| *unit)
+    let units = UNITS.iter().filter_map(|(end, unit)| Some((name.strip_suffix(end)?.strip_suffix('_')?, unit)));
+    let mut whole = units.filter(|(rest, _)| rest.rsplit('_').next() != Some("per"));
+    whole.next().map(|(_, unit)| *unit)
 }
 
 /// Adds a unit to the plain numbers in a value, so that a parameter of another unit refuses them.
@@ -83,7 +86,10 @@ fn find_fact(
     if role == LIMITS {
         // A missing value is reported at the section.
         let value = net.limit(name).cloned().ok_or(None)?;
-        return Ok(unit_of_limit(name).map_or(value.clone(), |unit| with_unit(value, unit)));
+        return Ok(match unit_of_limit(name) {
+            Some(unit) => with_unit(value, unit),
+            None => value,
+        });
     }
     let roles = &net.flat.roles;
     let Some(index) = roles.position(role) else {
@@ -98,4 +104,29 @@ fn find_fact(
         return unknown.suggest(name, facts.iter().map(|(fact, _)| &**fact), "facts").into_err();
     };
     Ok(Value::from_toml(value, span))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_name_of_a_limit_ends_with_its_unit() {
+        let cases = [
+            ("linear_m_per_s", Some("m/s")),
+            ("joint_rad_per_s2", Some("rad/s2")),
+            ("force_n", Some("N")),
+            ("blind_s", Some("s")),
+            ("blind_mm", Some("mm")),
+            ("workspace_min_m", Some("m")),
+            ("gain_per_s", None),
+            ("turn_rad_per_m", None),
+            ("rate_n_per_s", None),
+            ("window", None),
+            ("m", None),
+        ];
+        for (name, unit) in cases {
+            assert_eq!(unit_of_limit(name), unit, "{name}");
+        }
+    }
 }

@@ -54,7 +54,10 @@ impl Builder<'_> {
         };
         let word = format!("{LIMITS}.{}", key.name);
         let Some(fact) = written.facts().into_iter().find(|fact| fact.word == word) else { return mistake };
-        let help = format!("`{}` is a limit in another unit: take one in the unit of the parameter", key.name);
+        let help = format!(
+            "the name `{}` says its unit: use a limit whose name ends with the unit of the parameter",
+            key.name
+        );
         Mistake { at: At::Span(fact.place.clone()), help: Some(help), ..mistake }
     }
 
@@ -68,7 +71,7 @@ impl Builder<'_> {
         }
         let named = wires.iter().find(|wire| wire.key.name == *wired && self.sources.is_misspelt(wired, name));
         let Some(wire) = named.filter(|_| self.net.takes_any_wire(node)) else { return mistake };
-        let message = format!("nothing else here is called `{wired}`, and `{name}` has no wire");
+        let message = format!("no other key has the name `{wired}`, and no wire has the name `{name}`");
         Mistake::new(mistake.code, At::Span(wire.key.span.clone()), message).instead(wired, name)
     }
 

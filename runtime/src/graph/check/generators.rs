@@ -3,6 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::contact::{ContactPorts, is_sensor};
+use super::limits::limiters;
 use crate::graph::net::{CommandWire, Net, Wire};
 use crate::graph::plan::PortRef;
 use crate::node::Motion;
@@ -74,8 +75,8 @@ impl<'a> Drives<'a> {
 impl<'a> Driven<'a> {
     fn new(net: &'a Net<'a>, wire: &'a CommandWire) -> Self {
         let upstream = net.upstream(wire.source.producer.node());
-        let limiters = || net.order.iter().filter(|node| upstream[**node]);
-        let mut limiting: BTreeSet<usize> = limiters().flat_map(|node| read_by_limiter(net, *node)).collect();
+        let mut limiting: BTreeSet<usize> =
+            limiters(net, wire).into_iter().flat_map(|node| known_roles(net, node)).collect();
         // A command whose limiters read no sensor has a mistake of its own.
         if limiting.iter().all(|role| !is_sensor(net, *role)) {
             limiting = net.roles_of(wire.source.producer).collect();
@@ -84,10 +85,10 @@ impl<'a> Driven<'a> {
     }
 }
 
-/// Returns the roles of the known inputs of a limiter, and none for other nodes.
-fn read_by_limiter(net: &Net<'_>, node: usize) -> Vec<usize> {
-    let Some(spec) = net.spec(node).filter(|spec| !spec.limits.holds.is_empty()) else { return Vec::new() };
-    let known = net.wires[node].iter().filter(|wire| spec.inputs[wire.input].need.must_be_known);
+/// Returns the roles upstream of the known inputs of a limiter.
+fn known_roles(net: &Net<'_>, limiter: usize) -> Vec<usize> {
+    let inputs = net.spec(limiter).map_or(&[][..], |spec| &spec.inputs);
+    let known = net.wires[limiter].iter().filter(|wire| inputs[wire.input].need.must_be_known);
     known.flat_map(|wire| net.roles_of(wire.source.producer)).collect()
 }
 

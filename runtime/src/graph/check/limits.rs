@@ -63,6 +63,13 @@ pub(crate) fn check(net: &Net<'_>, frames: &mut Frames<'_>, diagnostics: &mut Di
     }
 }
 
+/// Returns the nodes with limits that the motion of a command passes through.
+pub(super) fn limiters(net: &Net<'_>, wire: &CommandWire) -> Vec<usize> {
+    let path = CommandPath::find(net, wire);
+    let nodes = path.iter().flat_map(|path| &path.nodes);
+    nodes.filter(|stop| !stop.spec.limits.holds.is_empty()).map(|stop| stop.node).collect()
+}
+
 impl<'a> CommandPath<'a> {
     /// Follows a motion backwards, or returns `None` if a wire is missing.
     fn find(net: &'a Net<'a>, wire: &'a CommandWire) -> Option<Self> {

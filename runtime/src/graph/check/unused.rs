@@ -7,7 +7,7 @@ use std::cell::LazyCell;
 use std::collections::{BTreeMap, BTreeSet};
 
 use crate::graph::load::FlatNode;
-use crate::graph::net::Net;
+use crate::graph::net::{Net, Wire};
 use crate::graph::plan::{PlannedMode, PortRef, Producer};
 use crate::node::{PortSpec, may_fit};
 use crate::source::{Code, Diagnostic, Diagnostics};
@@ -57,14 +57,17 @@ pub(crate) fn check(
     }
 }
 
-/// Reports a wire to an input that has the name of an unused node in the same file, and that reads another one.
+/// Reports a wire that has the name of an unused node in the same file, and that reads another one.
 fn namesake(net: &Net<'_>, node: usize) -> Option<Diagnostic> {
     let FlatNode { scope, block, .. } = &net.flat.nodes[node];
     let name = &block.key.name;
     let outputs = net.outputs(Producer::Node(node))?;
+    let upstream = net.upstream([node]);
     let (reader, wire) = net.wires.iter().enumerate().find_map(|(reader, wires)| {
-        let is_here = net.flat.nodes[reader].scope == *scope;
-        Some((reader, wires.iter().find(|wire| is_here && wire.key.name == *name)?))
+        let is_here = net.flat.nodes[reader].scope == *scope && !upstream[reader];
+        // Of another input, the author of the graph does not choose the name.
+        let is_free = |wire: &&Wire| wire.key.name == *name && net.input(reader, wire).need.is_many;
+        Some((reader, wires.iter().find(|wire| is_here && is_free(wire))?))
     })?;
     let output = outputs.iter().find(|output| may_fit(output, net.input(reader, wire)))?;
     let (wired, reader) = (&wire.origin.word, &net.flat.nodes[reader].block.key.name);

@@ -50,7 +50,7 @@ impl<'a> Candidate<'a> {
             return None;
         }
         let (name, kind_name) = (&self.block.key.name, &kind.value);
-        let message = format!("`{name}` uses {}, which a `{kind_name}` does not have", quoted(&unknown));
+        let message = format!("`{name}` is no `{kind_name}`: that type has no {}", quoted(&unknown));
         Some(Diagnostic::new(Code::UnknownType, kind.span.clone(), message).instead(&kind.value, &meant.name))
     }
 
@@ -101,7 +101,7 @@ pub(super) fn has_keys_of(spec: &NodeSpec, block: &Block) -> bool {
     has_params && (takes_any || block.wires.valid.iter().all(|wire| has_input(spec, &wire.key.name)))
 }
 
-/// Returns whether a type has an input whose name it chooses.
+/// Returns whether a type has an input with this fixed name.
 fn has_input(spec: &NodeSpec, name: &str) -> bool {
     spec.inputs.iter().any(|input| !input.need.is_many && input.name == name)
 }

@@ -29,7 +29,7 @@ pub(super) fn correct_sections(root: &mut Table, known: &[&str], reader: &mut Re
     }
 }
 
-/// Separates the name of a section from that of a block where the point between them is missing: `[nodespid]`.
+/// Separates the name of a section from that of a block where the dot between them is missing: `[nodespid]`.
 fn separate_names(root: &mut Table, known: &[&str], reader: &mut Reader<'_>) {
     let parts = |key: &Key, value: &Value| {
         let section = REPEATED.into_iter().find(|section| known.contains(section) && key.name.starts_with(section))?;
@@ -60,7 +60,7 @@ fn move_blocks(root: &mut Table, known: &[&str], reader: &mut Reader<'_>) {
             let alone = Value { span: block.span.clone(), item: Item::Table(Table { entries }) };
             let is_meant = |section: &&str| known.contains(section) && could_be(section, &alone);
             let Some(section) = REPEATED.into_iter().find(is_meant) else { return true };
-            let message = format!("[{}] has no blocks, and `{}` is one of [{section}]", key.name, name.name);
+            let message = format!("`{}` is a block of [{section}], but it is in [{}]", name.name, key.name);
             let mistake = Mistake::new(Code::UnknownKey, At::Span(name.span.clone()), message);
             reader.mistakes.push(mistake.help(format!("write `[{section}.{}]`", name.name)));
             moved.push((Key { name: section.to_owned(), span: name.span.clone() }, alone));
@@ -142,16 +142,15 @@ pub(super) fn correct_wires(table: &mut Table, names: &[String], reader: &mut Re
             && value.as_section().is_some_and(|table| !table.entries.is_empty())
             && wires.all(|(_, wire)| fits(wire))
     };
-    separate_wires(table, &is_known, reader);
     let wrong: Vec<String> = table.entries.iter().filter(is_wires).map(|(key, _)| key.name.clone()).collect();
     wrong.iter().for_each(|name| rename(table, name, "in", reader));
 }
 
-/// Separates `in` from the name of an input where the point between them is missing: `inimage`.
-fn separate_wires(table: &mut Table, is_known: &dyn Fn(&Value) -> bool, reader: &mut Reader<'_>) {
+/// Separates `in` from the name of an input of a part where the dot between them is missing: `inimage`.
+pub(super) fn separate_wires(table: &mut Table, reader: &mut Reader<'_>) {
     let input = |(key, value): &(Key, Value)| {
         let name = key.name.strip_prefix("in")?.trim_start_matches(['_', '-', ':', '/']);
-        (is_name(name) && is_known(value)).then(|| (key.clone(), name.to_owned()))
+        (is_name(name) && is_port(value)).then(|| (key.clone(), name.to_owned()))
     };
     let found: Vec<(Key, String)> = table.entries.iter().filter_map(input).collect();
     for (key, name) in found {

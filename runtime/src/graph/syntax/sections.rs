@@ -4,7 +4,9 @@ use std::collections::BTreeSet;
 use std::ops::Range;
 
 use super::allow::{ALLOW, Allowance, read_allow};
-use super::correct::{correct_block, correct_facts, correct_keys, correct_part_file, correct_sections, correct_wires};
+use super::correct::{
+    correct_block, correct_facts, correct_keys, correct_part_file, correct_sections, correct_wires, separate_wires,
+};
 use super::modes::{ModeBlock, read_mode};
 use super::policy::{AgeLimit, PolicyTable, WireTable};
 use super::read::read_table;
@@ -303,6 +305,7 @@ impl<'a> Sections<'a> {
     }
 
     fn part_block(&mut self, key: Key, mut table: Table, sources: &[String]) -> PartBlock {
+        separate_wires(&mut table, &mut self.reader);
         correct_wires(&mut table, sources, &mut self.reader);
         correct_part_file(&mut table, &mut self.reader);
         correct_keys(&mut table, &["file", "in", "set"], "", &mut self.reader);
