@@ -8,6 +8,7 @@ use tactflow_runtime::source::BuiltinFile;
 pub const FILES: &[BuiltinFile] = &[
     ("finger_press.csv", include_bytes!("../../graphs/recordings/pressuRe/iscan_test.csv")),
     ("lwr4p.urdf", include_bytes!("../../graphs/robots/lwr4p.urdf")),
+    ("lwr4p.toml", include_bytes!("../../graphs/robots/lwr4p.toml")),
     ("calibrations/sim_pad.toml", include_bytes!("../../graphs/calibrations/sim_pad.toml")),
     ("parts/touch.toml", include_bytes!("../../graphs/parts/touch.toml")),
     ("parts/ruler.toml", include_bytes!("../../graphs/parts/ruler.toml")),

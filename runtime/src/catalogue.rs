@@ -1,12 +1,16 @@
 //! Catalogues: lists of the node types, device types and roles that graphs can use.
 
 mod checks;
+mod limit_readers;
 
 use std::collections::BTreeMap;
+use std::sync::OnceLock;
 
 use crate::device::{Device, DeviceType, RoleType, device_type};
 use crate::node::{Node, NodeSpec, NodeType, of};
 use crate::source::BuiltinFile;
+
+pub(crate) use limit_readers::LimitReaders;
 
 /// A list of node types, device types and roles. Catalogues can be joined, so that a crate can add its own to the
 /// shipped one.
@@ -22,6 +26,7 @@ pub struct Catalogue {
     devices: Vec<Box<dyn DeviceType>>,
     roles: Vec<RoleType>,
     files: Vec<BuiltinFile>,
+    limit_readers: OnceLock<LimitReaders>,
 }
 
 impl Catalogue {
@@ -187,6 +192,11 @@ impl Catalogue {
     #[must_use]
     pub fn builtin_files(&self) -> &[BuiltinFile] {
         &self.files
+    }
+
+    /// Returns which parameters of limiters read which limits, as the built-in parts wire them.
+    pub(crate) fn limit_readers(&self) -> &LimitReaders {
+        self.limit_readers.get_or_init(|| LimitReaders::new(&self.files))
     }
 
     /// Returns the types of roles.

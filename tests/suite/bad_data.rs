@@ -27,6 +27,12 @@ type = "mock_arm"
 urdf = "arm.urdf"
 tip = "lwr_7_link"
 start = [0.0, 0.5, 0.0, -1.3, 0.0, 1.3, 0.0]
+
+[limits]
+workspace_min_m = [-0.8, -0.4, 0.1]
+workspace_max_m = [-0.3, 0.4, 0.7]
+joint_rad_per_s2 = 5.0
+lead_rad = 0.1
 "#;
 
 /// Two frames of three by four sensels, one of which does not exist.

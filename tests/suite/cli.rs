@@ -165,8 +165,7 @@ fn a_probe_is_heard_without_a_switch_and_can_be_silenced() {
 fn another_bench_is_another_pad() {
     let (_folder, bench) = in_new_folder("bench.toml");
     let text = fs::read_to_string(tactflow_tests::workspace().join("graphs/benches/mock.toml")).unwrap();
-    let urdf = tactflow_tests::workspace().join("graphs/robots/lwr4p.urdf");
-    let text = text.replace("rate_hz = 250", "rate_hz = 500").replace("../robots/lwr4p.urdf", urdf.to_str().unwrap());
+    let text = text.replace("rate_hz = 250", "rate_hz = 500").replace("../robots/", "builtin:");
     fs::write(&bench, text).unwrap();
     let run = say(&["run", HYBRID, "--bench", &bench, "--for", "1s"]);
     assert!(run.out.starts_with(&format!("{HYBRID}: 25 nodes, one tick every 2 ms\n")), "{}", run.out);

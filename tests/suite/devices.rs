@@ -352,7 +352,11 @@ fn a_graph_of_a_file_runs_with_one_role_fed_and_the_others_on_its_bench() {
     let shape = ImageShape { rows: 16, cols: 16, pitch: [0.005; 2], unit: Unit::NEWTON };
     let calibration = toml::Table::from_iter([("gain".to_owned(), 1.0.into())]);
     let pad = FedRole::new("pad", "tactile_pad", 4.0).output("image", shape);
-    let pad = pad.fact("threshold", 0.015).fact("pressure", 0.1).fact("calibration", calibration);
+    let pad = pad
+        .fact("threshold", 0.015)
+        .fact("pressure", 0.1)
+        .fact("calibration", calibration)
+        .fact("mount", toml::Table::new());
     let request = on_the_mock_bench("force.toml");
     let mut rig = match GraphRig::open(catalogue(), request, [pad]) {
         Ok(rig) => rig,

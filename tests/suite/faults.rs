@@ -195,7 +195,9 @@ impl DeviceType for SpyType {
     }
 
     fn params(&self) -> Vec<ParamSpec> {
-        Vec::new()
+        let nodes = tactflow_nodes::catalogue();
+        let arm = nodes.devices().iter().find(|device| device.name() == "mock_arm");
+        arm.map(|arm| arm.params()).unwrap_or_default()
     }
 
     fn open(&self, table: &Value, reader: &mut Reader<'_>) -> Option<Opened> {

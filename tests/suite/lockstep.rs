@@ -1,5 +1,6 @@
 //! The lockstep bridge against a simulator in another language, which knows nothing of this one.
 
+use std::fs;
 use std::io::{BufRead, BufReader, Read};
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
@@ -7,6 +8,7 @@ use std::time::{Duration, Instant};
 use serde_json::Value;
 use tactflow_tests::workspace;
 
+use crate::cli::in_new_folder;
 use crate::tool::{Said, said, tool};
 
 /// The simulator and the port it listens on; it ends with the test.
@@ -142,6 +144,23 @@ fn a_simulator_that_does_wrong_is_named_and_left_with_the_arm_at_rest() {
 }
 
 #[test]
+fn a_bench_without_a_robot_takes_the_model_that_the_simulator_names() {
+    let (_folder, bench) = in_new_folder("bench.toml");
+    let shipped = fs::read_to_string(workspace().join("graphs/benches/lockstep.toml")).unwrap();
+    let without: String =
+        shipped.lines().filter(|line| !line.starts_with("robot")).map(|line| format!("{line}\n")).collect();
+    assert!(without.len() < shipped.len());
+    fs::write(&bench, without + "joint_rad_per_s2 = 5.0\nlead_rad = 0.1\n").unwrap();
+    for (wrong, message) in [("hello-urdf", "names the model `titan`, which is not built in"), ("none", "")] {
+        let peer = Peer::start(&format!("--seconds 1 --silence 1 --misbehave {wrong}"));
+        let address = format!("devices.bench.address=127.0.0.1:{}", peer.port);
+        let said = said(&mut tool(&["check", "graphs/hybrid.toml", "--bench", &bench, "--set", &address]));
+        assert_eq!(said.code, if message.is_empty() { 0 } else { 2 }, "{wrong}: {}", said.err);
+        assert!(said.err.contains(message), "{wrong}: {}", said.err);
+    }
+}
+
+#[test]
 fn a_hello_that_will_not_do_is_told_before_anything_runs() {
     let cases = [
         ("proto", "hello (line 1): `proto`: 2 is not the supported protocol version, 1"),
@@ -150,7 +169,6 @@ fn a_hello_that_will_not_do_is_told_before_anything_runs() {
         ("short", "hello (line 1): `q_min` has 6 numbers, but there are 7 `joints`"),
         ("mirror", "hello (line 1): `T_es`: this is not a pose: its axes are left-handed"),
         ("dt", "hello (line 1): `dt`: 0 is not greater than 0"),
-        ("urdf", "names the model `panda`, which is not built in"),
         ("names", "its `joints` are [\"lwr_a6_joint\""),
         ("tip", "the model has no link `hand`"),
         ("garbage", "hello (line 1): invalid type: integer `220`, expected a JSON object"),

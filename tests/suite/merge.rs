@@ -152,7 +152,7 @@ fn one_mistake_in_a_part_of_two_instances_is_told_once() {
 #[test]
 fn a_fact_over_a_table_replaces_it() {
     let table = shipped("hybrid.toml").set("parts.move.set.state.mount={ xyz = [0, 0, 0.5] }");
-    let fact = table.clone().set("parts.move.set.state.mount={ from = \"arm.mount\" }");
+    let fact = table.clone().set("parts.move.set.state.mount={ from = \"pad.mount\" }");
     let plain = shipped("hybrid.toml");
     let heights = [plain, table, fact].map(|request| {
         let mut engine = Engine::new(loaded(&request));

@@ -55,12 +55,11 @@ fn pad(script: Vec<Act>) -> (SocketAddr, JoinHandle<()>) {
 }
 
 fn bench(address: SocketAddr) -> String {
-    let urdf = workspace().join("graphs/robots/lwr4p.urdf");
     format!(
         "[bind]\npad = \"skin\"\narm = \"arm\"\n[devices.skin]\ntype = \"udp_pad\"\naddress = \"{address}\"\n\
-         silence_s = 0.1\n[devices.arm]\ntype = \"mock_arm\"\nurdf = '{}'\ntip = \"lwr_7_link\"\n\
-         mount = {{ xyz = [0.0, 0.0, 0.03] }}\nstart = [0.0, 0.5, 0.0, -1.3, 0.0, 1.3, 0.0]\n",
-        urdf.display()
+         silence_s = 0.1\n[devices.arm]\ntype = \"mock_arm\"\nrobot = \"builtin:lwr4p.toml\"\n\
+         [facts.pad]\nmount = {{ xyz = [0.0, 0.0, 0.03], rpy = [0.0, 0.0, 0.0] }}\n\
+         [limits]\nworkspace_min_m = [-0.8, -0.4, 0.1]\nworkspace_max_m = [-0.3, 0.4, 0.7]\n"
     )
 }
 

@@ -147,7 +147,7 @@ const SAME: [[&str; 2]; 24] = [
     ["graph.max_gap_ms=40", "graph.max_gap_ms=40ms"],
     ["policy.max_age_ms=60000", "policy.max_age_ms=1 min"],
     ["policy.roles.pad.max_age_ms=300", "policy.roles.pad.max_age_ms=0.3 s"],
-    ["limits.force_n=15.5", "limits.force_n=15500 mN"],
+    ["limits.force_n=14.5", "limits.force_n=14500 mN"],
     ["limits.linear_m_per_s=0.04", "limits.linear_m_per_s=40 mm/s"],
     ["limits.linear_m_per_s2=1.9", "limits.linear_m_per_s2=1.9 m/s²"],
     ["limits.lead_rad=0.06981317007977318", "limits.lead_rad=4 deg"],

@@ -17,8 +17,9 @@ use super::mount::Mount;
 /// The Jacobian is spatial: its columns are twists at the origin of the base, as the output of `adjoint` is. It is not
 /// the "geometric" Jacobian of textbooks, which is taken at the tip.
 ///
-/// Model, tip and mount are facts of the arm's device. A graph that takes them from there fits any arm. The pose is
-/// that of the frame of the role `sensor`, in the frame `base` of the arm's role. The wire must have the joints of the model, in its order.
+/// Model and tip are facts of the arm, and the mount is a fact of the sensor on it. A graph that takes them from there
+/// fits any arm. The pose is that of the frame of the role `sensor`, in the frame `base` of the arm's role. The wire
+/// must have the joints of the model, in its order.
 ///
 /// ```toml
 /// [nodes.state]
@@ -27,7 +28,7 @@ use super::mount::Mount;
 /// sensor = "pad"
 /// urdf = { from = "arm.urdf" }
 /// tip = { from = "arm.tip" }
-/// mount = { from = "arm.mount" }
+/// mount = { from = "pad.mount" }
 /// ```
 #[derive(Describe)]
 pub struct ArmState {

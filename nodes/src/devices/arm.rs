@@ -1,12 +1,12 @@
 //! What every arm states: the role `velocity_arm`, its joints, its ports and its facts.
 
 use tactflow_runtime::device::{Command, Description, DeviceError, Output, Report, Samples};
-use tactflow_runtime::node::{FilePath, Mistake, Mistakes, refuse_any};
+use tactflow_runtime::node::{At, FilePath, Mistake, Mistakes, refuse_any};
 use tactflow_runtime::signal::{Joint, Joints, JointsShape, Pose, Unit};
+use tactflow_runtime::source::Code;
 
 use super::Facts;
 use crate::arm::chain::Chain;
-use crate::arm::mount::Mount;
 
 /// The ports of the role `velocity_arm`.
 #[derive(Debug, Clone, Copy)]
@@ -70,15 +70,28 @@ pub(crate) fn check_velocity(joints: &[Joint], velocity: &[f64]) -> Result<(), D
     }
 }
 
-/// Returns the facts that `arm_state` reads.
+/// Returns the facts that `arm_state` and `ik_sink` read. The posture `home` is left out if it is not known.
 ///
 /// # Errors
 /// If the path of the model is not UTF-8 or cannot be made absolute.
-pub(crate) fn facts(urdf: &FilePath, tip: &str, mount: &Mount) -> Result<Facts, Mistakes> {
+pub(crate) fn facts(urdf: &FilePath, tip: &str, home: Option<&[f64]>) -> Result<Facts, Mistakes> {
     let path = fact_of("urdf", urdf)?;
-    let mount = [("xyz", mount.xyz), ("rpy", mount.rpy)];
-    let mount: toml::Table = mount.into_iter().map(|(name, list)| (name.to_owned(), list.to_vec().into())).collect();
-    Ok(vec![("urdf".into(), path.into()), ("tip".into(), tip.into()), ("mount".into(), mount.into())])
+    let mut facts: Facts = vec![("urdf".into(), path.into()), ("tip".into(), tip.into())];
+    facts.extend(home.map(|home| ("home".into(), home.to_vec().into())));
+    Ok(facts)
+}
+
+/// Returns the posture in which an arm starts: `start`, or else `home` [rad; m for a prismatic joint].
+///
+/// # Errors
+/// If neither is given.
+pub(crate) fn start_of(start: Option<&[f64]>, home: Option<&[f64]>) -> Result<Vec<f64>, Mistakes> {
+    let mistake = || {
+        let message = "the arm needs `start`, the positions of its joints at the start";
+        let mistake = Mistake::new(Code::MissingKey, At::Node, message);
+        mistake.help("write `start = [...]`, or name a `robot` whose file has a `home`")
+    };
+    start.or(home).map(<[f64]>::to_vec).ok_or_else(|| mistake().into())
 }
 
 /// Returns the path of a file as a fact. It is absolute, because the graph may be in another folder; `param` names the

@@ -16,12 +16,12 @@ pub struct Params {
     urdf: FilePath,
     /// Link that carries the sensor.
     tip: String,
-    /// Pose of the sensor on that link.
-    #[param(default = Mount::NONE)]
-    mount: Mount,
-    /// Position of each joint at the start; in m for a prismatic joint.
+    /// Posture that the arm prefers, stated as a fact; in m for a prismatic joint.
     #[param(unit = "rad")]
-    start: Vec<f64>,
+    home: Option<Vec<f64>>,
+    /// Position of each joint at the start, `home` if not given; in m for a prismatic joint.
+    #[param(unit = "rad")]
+    start: Option<Vec<f64>>,
     /// Samples per second.
     #[param(unit = "1/s", range = 0.001..=1e6, default = 250.0)]
     rate_hz: f64,
@@ -55,7 +55,7 @@ struct Hold {
 /// Inertia, friction, stiffness, delay and noise are not simulated: what works on this arm may fail on a real one. The
 /// arm states its `acceleration` and does not keep to it.
 ///
-/// It states the facts `urdf`, `tip` and `mount` for `arm_state`.
+/// It states the facts `urdf` and `tip` for `arm_state`, and `home`, which is its start if no `home` is given.
 ///
 /// ```toml
 /// [roles]
@@ -71,7 +71,6 @@ struct Hold {
 /// type = "mock_arm"
 /// urdf = "builtin:lwr4p.urdf"          # a KUKA LWR 4+
 /// tip = "lwr_7_link"
-/// mount = { xyz = [0.0, 0.0, 0.03] }   # of the sensor on the tip [m]
 /// start = [0.0, 0.5, 0.0, -1.3, 0.0, 1.3, 0.0]   # [rad]
 /// ```
 #[derive(Debug, Describe)]
@@ -91,14 +90,15 @@ impl Device for MockArm {
     type Params = Params;
 
     fn open(params: Params) -> Result<Opened, Mistakes> {
-        let chain = load(&params.urdf, &params.tip, &params.mount)?;
-        let joints = arm::joints(&chain, params.acceleration, &params.start)?;
+        let chain = load(&params.urdf, &params.tip, &Mount::NONE)?;
+        let start = arm::start_of(params.start.as_deref(), params.home.as_deref())?;
+        let joints = arm::joints(&chain, params.acceleration, &start)?;
         check_holds(&params.hold)?;
         let period = period_of(params.rate_hz);
         let mut description = Description::every(period as f64 * 1e-9);
-        let facts = arm::facts(&params.urdf, &params.tip, &params.mount)?;
+        let facts = arm::facts(&params.urdf, &params.tip, Some(params.home.as_deref().unwrap_or(&start)))?;
         let ports = ArmPorts::fill(&mut description, &joints, facts);
-        let arm = Self::new(ports, joints.joints, params.start, params.hold, period);
+        let arm = Self::new(ports, joints.joints, start, params.hold, period);
         Ok(Opened { description, driver: Driver::Stepped(Box::new(arm)) })
     }
 }
@@ -171,7 +171,7 @@ mod tests {
 
     #[test]
     fn it_samples_at_its_rate_and_states_its_facts() {
-        let mut bench = arm("start = [0, 0.5, 0, -1, 0, 1, 0]\nmount = { xyz = [0, 0, 0.05] }").unwrap();
+        let mut bench = arm("start = [0, 0.5, 0, -1, 0, 1, 0]").unwrap();
         assert_eq!(bench.description.period, 0.004);
         for port in ["position", "equilibrium", "velocity"] {
             let Some(Shape::Joints(shape)) = bench.description.shape(port) else { panic!("joints") };
@@ -185,8 +185,7 @@ mod tests {
         assert_eq!(bench.device.next(), Some(12_000_000), "the next sample is at a multiple of the period");
         assert!(Path::new(bench.fact("urdf").unwrap().as_str().unwrap()).is_absolute());
         assert_eq!(bench.fact("tip"), Some(&"lwr_7_link".into()));
-        assert_eq!(bench.fact("mount").unwrap()["xyz"], vec![0.0, 0.0, 0.05].into());
-        assert_eq!(bench.fact("mount").unwrap()["rpy"], vec![0.0; 3].into());
+        assert_eq!(bench.fact("home"), Some(&vec![0.0, 0.5, 0.0, -1.0, 0.0, 1.0, 0.0].into()));
     }
 
     fn two_joints(holds: &str) -> MockArm {

@@ -1,15 +1,25 @@
 //! What every pad states: the role `tactile_pad`, its image and its facts.
 
+use std::borrow::Cow;
+
 use tactflow_runtime::device::{Description, Output};
 use tactflow_runtime::signal::{Image, ImageShape, Unit};
 
 use super::Facts;
+use crate::arm::mount::Mount;
 
 /// Adds the role `tactile_pad` to a description. Returns the handle of its image.
 pub(crate) fn fill(description: &mut Description, shape: ImageShape, facts: Facts) -> Output<Image> {
     let mut pad = description.fills("tactile_pad");
     pad.facts(facts);
     pad.output("image", shape)
+}
+
+/// Returns the fact of where a pad sits on its arm.
+pub(crate) fn mount(mount: &Mount) -> (Cow<'static, str>, toml::Value) {
+    let mount = [("xyz", mount.xyz), ("rpy", mount.rpy)];
+    let mount: toml::Table = mount.into_iter().map(|(name, list)| (name.to_owned(), list.to_vec().into())).collect();
+    ("mount".into(), mount.into())
 }
 
 /// Returns the facts of a pad without dead tactels. The threshold is in `unit`, and the pressure in `unit` per tactel.

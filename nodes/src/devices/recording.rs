@@ -12,6 +12,7 @@ use tactflow_runtime::signal::{Image, Unit};
 use tactflow_runtime::source::Code;
 
 use super::{Facts, pad};
+use crate::arm::mount::Mount;
 use crate::recordings::{self, Hints, Recording, Refusal};
 
 /// Parameters of `recording`.
@@ -40,6 +41,9 @@ pub struct Params {
     /// Unit of pressure that the pad states as a fact, per tactel: p = 1 in the paper.
     #[param(unit = "$unit", above = 0.0)]
     pressure: Option<f64>,
+    /// Pose of the pad on the tip of its arm, stated as a fact.
+    #[param(default = Mount::NONE)]
+    mount: Mount,
 }
 
 /// Plays a recorded file of a tactile or pressure sensor (Tekscan, novel, XSENSOR, CSV, …) as a pad.
@@ -65,7 +69,7 @@ pub struct Params {
 /// is played. Rows and columns are counted as in the file: `tactile_source` turns them into the sensor's frame.
 ///
 /// It states these facts: `dead` (places without a sensor, as [row, column]), `frames`, `format`, `threshold` if the
-/// parameter or the file gives a value below which the values are noise; and `pressure`, if it is given. Its
+/// parameter or the file gives a value below which the values are noise; `pressure`, if it is given, and `mount`. Its
 /// `calibration` lists the dead places and does not change the values.
 ///
 /// ```toml
@@ -176,6 +180,7 @@ fn facts(recording: &Recording, params: &Params) -> Facts {
         ("dead".into(), dead.into()),
         ("frames".into(), (recording.frames.len() as i64).into()),
         ("format".into(), recording.format.into()),
+        pad::mount(&params.mount),
     ];
     if let Some(threshold) = params.threshold.or(recording.threshold) {
         facts.push(("threshold".into(), threshold.into()));

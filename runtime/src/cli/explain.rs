@@ -29,6 +29,7 @@ pages! {
     "loop",
     "missing-input",
     "missing-key",
+    "loose-limit",
     "missing-limit",
     "no-approach",
     "not-live",

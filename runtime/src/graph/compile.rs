@@ -26,7 +26,7 @@ pub fn compile(catalogue: &Catalogue, request: &Request) -> Result<Compiled, Rep
 
 /// Compiles a graph with a loader that may have read other files before.
 pub(crate) fn compile_in(mut loader: Loader, catalogue: &Catalogue, request: &Request) -> Result<Compiled, Report> {
-    let flat = loader.load(request);
+    let mut flat = loader.load(request);
     let Loader { mut sources, mut diagnostics, mut measured, .. } = loader;
     let is_unreadable = diagnostics
         .iter()
@@ -34,6 +34,9 @@ pub(crate) fn compile_in(mut loader: Loader, catalogue: &Catalogue, request: &Re
     if is_unreadable {
         // The checks would report everything that a missing file declares as missing.
         return Err(Report::new(sources, split(diagnostics).0));
+    }
+    if let Some(bench) = &mut flat.bench {
+        bench::add_robots(bench, catalogue, &mut diagnostics);
     }
     let net = Net::new(&flat, catalogue, &mut diagnostics);
     let opened = bench::open(&net, &mut sources, &mut diagnostics);
@@ -47,7 +50,8 @@ pub(crate) fn compile_in(mut loader: Loader, catalogue: &Catalogue, request: &Re
     check::quantities::check(&net, &mut diagnostics);
     check::facts::check(&net, &mut diagnostics);
     check::limits::check(&net, &mut frames, &mut diagnostics);
-    check::limit_values::check(&net, &sources, &mut diagnostics);
+    check::limit_values::check(&net, &opened, &sources, &mut diagnostics);
+    check::limit_sections::check(&net, &mut diagnostics);
     let clock = check::clock::check(&net, &opened, &mut diagnostics);
     let period = clock.map_or(1.0, |(_, period)| period);
     let mut builder = Builder::new(&net, &opened, frames, (diagnostics, sources), period);

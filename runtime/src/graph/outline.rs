@@ -324,7 +324,8 @@ impl OutlineBuilder<'_> {
         };
         // A limit is filled in with the unit of its name, which nobody has written.
         let limit = word.and_then(|word| word.split_once('.')).filter(|(section, _)| *section == LIMITS);
-        let written = limit.and_then(|(_, name)| self.net.limit(name)).cloned();
+        let arms = node.map_or(&[][..], |node| self.net.arms_of(node));
+        let written = limit.and_then(|(_, name)| self.net.limit(arms, name));
         self.in_units(Setting { path, value: filled, written, origin }, node)
     }
 

@@ -90,6 +90,8 @@ codes! {
     Uncalibrated "uncalibrated",
     /// A value that a node reads from [limits] and that is missing there.
     MissingLimit "missing-limit",
+    /// A limiter whose bound is looser than a limit that holds for its arm.
+    LooseLimit "loose-limit",
     /// A mode that does not exist.
     UnknownMode "unknown-mode",
     /// A mode that cannot be reached from the start mode.

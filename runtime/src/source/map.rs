@@ -153,7 +153,11 @@ impl SourceMap {
     /// Resolves a path written at offset `at`, relative to the folder of the file that contains it.
     #[must_use]
     pub fn path(&self, text: &str, at: usize) -> PathBuf {
-        if text.starts_with(BUILTIN) { PathBuf::from(text) } else { self.folder(at).join(text) }
+        match self.file_at(at).name.strip_prefix(BUILTIN) {
+            _ if text.starts_with(BUILTIN) => PathBuf::from(text),
+            Some(name) => PathBuf::from(format!("{BUILTIN}{}", beside(name, text))),
+            None => self.folder(at).join(text),
+        }
     }
 
     /// Adds a text whose paths are relative to `folder`.
@@ -211,6 +215,20 @@ impl SourceMap {
     }
 }
 
+/// Returns the name of a built-in file whose path is written in another one.
+fn beside(name: &str, path: &str) -> String {
+    let mut folders: Vec<&str> = name.split('/').collect();
+    folders.pop();
+    for step in path.split('/') {
+        match step {
+            "." => {}
+            ".." => drop(folders.pop()),
+            step => folders.push(step),
+        }
+    }
+    folders.join("/")
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -227,6 +245,9 @@ mod tests {
         assert_eq!(unknown.help, "did you mean `arm.urdf`?");
         assert_eq!(sources.path("b.csv", base), Path::new("a/b.csv"));
         assert_eq!(sources.path("builtin:b.csv", base), Path::new("builtin:b.csv"));
+        let base = sources.add_file(Path::new("builtin:robots/a.toml"), "").base;
+        assert_eq!(sources.path("a.urdf", base), Path::new("builtin:robots/a.urdf"));
+        assert_eq!(sources.path("../parts/./b.toml", base), Path::new("builtin:parts/b.toml"));
     }
 
     #[test]

@@ -60,6 +60,10 @@ pub(super) fn could_be_meant(before: &str, after: &str) -> Option<Meant> {
     match (gone.as_slice(), come.as_slice(), changed.next(), changed.next()) {
         ([], [], Some((path, old, new)), None) => other_value(path, old, new),
         ([gone], [], None, _) => may_be_left_out(&old.0, gone).then_some(Meant::Omitted),
+        // A fact that may be missing: `{ from = "arm.home", optional = true }`.
+        ([from, optional], [], None, _) if is_fact(from, optional) => {
+            may_be_left_out(&old.0, &from[..from.len() - 1]).then_some(Meant::Omitted)
+        }
         ([left, ..], [], None, _) => {
             // A line of a part's overrides can set several, and what a mode does about a loss says several things.
             let is_override = gone.iter().all(|path| is_override(path) && path[..4] == left[..4]);
@@ -72,6 +76,11 @@ pub(super) fn could_be_meant(before: &str, after: &str) -> Option<Meant> {
         }
         _ => None,
     }
+}
+
+fn is_fact(from: &[String], optional: &[String]) -> bool {
+    let ends = |path: &[String], name: &str| path.last().is_some_and(|last| last == name);
+    ends(from, "from") && ends(optional, "optional") && from[..from.len() - 1] == optional[..optional.len() - 1]
 }
 
 fn other_value(path: &[String], old: &Value, new: &Value) -> Option<Meant> {

@@ -33,6 +33,9 @@ pub struct Params {
     reply_s: f64,
     /// Model of the arm; the one that the simulator names if not given.
     urdf: Option<FilePath>,
+    /// Posture that the arm prefers, stated as a fact; the simulator does not name one.
+    #[param(unit = "rad")]
+    home: Option<Vec<f64>>,
     /// Maximum acceleration of each joint; it is not part of the protocol.
     #[param(unit = "rad/s2", above = 0.0, default = 10.0)]
     acceleration: f64,
@@ -57,8 +60,8 @@ pub struct Params {
 /// are faults that name the message and the field. If the simulator still listens, the device brings the arm to rest
 /// before it disconnects.
 ///
-/// It states the facts `urdf`, `tip` and `mount` of the arm and `dead`, `threshold`, `pressure` and `calibration` of
-/// the pad. The `contact` that a task reports is sent as `est`.
+/// It states the facts `urdf`, `tip` and, if it is given, `home` of the arm, and `dead`, `threshold`, `pressure`,
+/// `calibration` and `mount` of the pad. The `contact` that a task reports is sent as `est`.
 ///
 /// ```toml
 /// [roles]
@@ -115,7 +118,10 @@ fn refusal(address: &str, why: String) -> Mistakes {
 fn pad_facts(hello: &Hello) -> Facts {
     let gain = hello.newton_per_unit / hello.counts_per_unit;
     let calibration = toml::Table::from_iter([("gain".to_owned(), gain.into()), ("unit".to_owned(), "N".into())]);
-    pad::facts(hello.threshold_units * hello.newton_per_unit, hello.newton_per_unit, Unit::NEWTON, calibration)
+    let [threshold, pressure] = [hello.threshold_units, 1.0].map(|units| units * hello.newton_per_unit);
+    let mut facts = pad::facts(threshold, pressure, Unit::NEWTON, calibration);
+    facts.push(pad::mount(&hello.mount));
+    facts
 }
 
 fn joints(hello: &Hello, acceleration: f64) -> JointsShape {
@@ -161,7 +167,7 @@ fn model_facts(hello: &Hello, params: &Params) -> Result<Facts, Mistakes> {
             format!("its `joints` are {:?}, but those of the model up to `{}` are {model:?}", hello.joints, hello.tip);
         return Err(refusal(&params.address, why));
     }
-    arm::facts(&urdf, &hello.tip, &hello.mount)
+    arm::facts(&urdf, &hello.tip, params.home.as_deref())
 }
 
 /// Returns the name of a model without folders and extension.

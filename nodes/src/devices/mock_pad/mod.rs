@@ -11,6 +11,7 @@ use tactflow_runtime::node::{Describe, Mistake, Mistakes, Param, refuse_any};
 use tactflow_runtime::signal::{Image, ImageShape, Unit};
 
 use super::{nanos, pad, period_of};
+use crate::arm::mount::Mount;
 
 pub use glitch::{Glitch, GlitchKind};
 pub use press::Press;
@@ -48,6 +49,9 @@ pub struct Params {
     /// Unit of pressure that the pad states as a fact, per tactel: p = 1 in the paper.
     #[param(unit = "$unit", above = 0.0, default = 0.1)]
     pressure: f64,
+    /// Pose of the pad on the tip of its arm, stated as a fact.
+    #[param(default = Mount::NONE)]
+    mount: Mount,
 }
 
 /// Maximum number of tactels of a pad.
@@ -64,8 +68,8 @@ const MAX_TACTELS: usize = 1 << 22;
 /// new, `silence` gives no frame, `nan` makes one tactel not a number, `back` gives stamps that lie in the past. With
 /// `unplug` the device fails, and it stays failed also after `for_s`. Try a graph with each of them.
 ///
-/// It states the facts `dead` (no tactel is), `threshold`, `pressure` and `calibration` (its values are forces
-/// already).
+/// It states the facts `dead` (no tactel is), `threshold`, `pressure`, `calibration` (its values are forces already)
+/// and `mount`.
 ///
 /// ```toml
 /// [roles]
@@ -120,7 +124,8 @@ impl Device for MockPad {
         let mut description = Description::every(period as f64 * 1e-9);
         // The values are forces already.
         let calibration = toml::Table::from_iter([("gain".to_owned(), 1.0.into())]);
-        let facts = pad::facts(params.threshold, params.pressure, params.unit, calibration);
+        let mut facts = pad::facts(params.threshold, params.pressure, params.unit, calibration);
+        facts.push(pad::mount(&params.mount));
         let image = pad::fill(&mut description, shape.clone(), facts);
         let pad = Self::new(image, shape, period, params);
         Ok(Opened { description, driver: Driver::Stepped(Box::new(pad)) })

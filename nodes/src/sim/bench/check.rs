@@ -14,11 +14,11 @@ const MAX_POINTS: f64 = 4e6;
 /// Largest latency of an image [frames].
 const MAX_LATENCY_FRAMES: f64 = 1000.0;
 
-/// Checks that a bench with these parameters can be simulated.
+/// Checks that a bench with these parameters, and an arm of so many joints, can be simulated.
 ///
 /// # Errors
 /// All parameters that are outside of what the simulation supports.
-pub(super) fn check(params: &Params, shape: &ImageShape) -> Result<(), Mistakes> {
+pub(super) fn check(params: &Params, joints: usize, shape: &ImageShape) -> Result<(), Mistakes> {
     let Params { pitch, points_apart, foam, .. } = params;
     let (rows, cols) = (shape.rows, shape.cols);
     let points = (pitch / points_apart).ceil().max(1.0).powi(2) * shape.tactels() as f64;
@@ -51,16 +51,15 @@ pub(super) fn check(params: &Params, shape: &ImageShape) -> Result<(), Mistakes>
     let broken = limits.into_iter().filter(|(holds, ..)| !holds);
     let mut mistakes: Mistakes = broken.map(|(_, name, message)| Mistake::param(name, message)).collect();
     if let Some(inertia) = &params.inertia {
-        if inertia.len() != params.start.len() {
-            let message =
-                format!("`inertia` has {} entries, but the arm has {} joints", inertia.len(), params.start.len());
+        if inertia.len() != joints {
+            let message = format!("`inertia` has {} entries, but the arm has {joints} joints", inertia.len());
             mistakes.push(Mistake::param("inertia", message));
         }
         if inertia.iter().any(|inertia| !(0.01..=1e3).contains(inertia)) {
             mistakes.push(Mistake::param("inertia", "each inertia must be from 0.01 to 1000 kg m²"));
         }
-    } else if params.start.len() != INERTIA.len() {
-        let message = format!("an arm of {} joints needs `inertia`", params.start.len());
+    } else if joints != INERTIA.len() {
+        let message = format!("an arm of {joints} joints needs `inertia`");
         mistakes.push(Mistake::new(Code::MissingKey, At::Node, message));
     }
     refuse_any(mistakes)?;

@@ -79,9 +79,12 @@ pub struct Params {
     /// Pose of the sensor on that link.
     #[param(default = Mount::NONE)]
     mount: Mount,
-    /// Joint positions at the start, one per joint.
+    /// Posture that the arm prefers, stated as a fact; in m for a prismatic joint.
     #[param(unit = "rad")]
-    start: Vec<f64>,
+    home: Option<Vec<f64>>,
+    /// Joint positions at the start, one per joint; `home` if not given.
+    #[param(unit = "rad")]
+    start: Option<Vec<f64>>,
     /// Stiffness of the joints.
     #[param(unit = "N m/rad", above = 0.0, default = 200.0)]
     stiffness: f64,
@@ -128,7 +131,8 @@ pub const MAX_TACTELS: usize = 128 * 128;
 /// It runs in virtual time, and the same commands and seed give the same bits; with `--realtime` it is paced by the
 /// clock. The pad states the facts `dead`, `threshold`, `pressure` and `calibration`, and the standard deviations of
 /// its noise: `common_noise`, which all tactels share, as a fraction of the reading, and `own_noise` of each tactel in
-/// raw counts. The arm states `urdf`, `tip` and `mount`. In the role `ground_truth` it provides true values to
+/// raw counts. The pad also states its `mount`. The arm states `urdf`, `tip` and `home`, which is its start if no `home` is
+/// given. In the role `ground_truth` it provides true values to
 /// scenarios and recordings only.
 ///
 /// Not simulated: gravity, coupling of the joints, rotation of objects under load, interaction between columns of foam,
@@ -209,13 +213,14 @@ impl Device for SimBench {
 
     fn open(params: Params) -> Result<Opened, Mistakes> {
         let chain = load(&params.urdf, &params.tip, &params.mount)?;
-        let joints = arm::joints(&chain, params.acceleration, &params.start)?;
+        let start = arm::start_of(params.start.as_deref(), params.home.as_deref())?;
+        let joints = arm::joints(&chain, params.acceleration, &start)?;
         let shape = ImageShape { rows: params.rows, cols: params.cols, pitch: [params.pitch; 2], unit: Unit::RAW };
-        check::check(&params, &shape)?;
+        check::check(&params, joints.joints.len(), &shape)?;
         let (period, latency) = (period_of(params.rate_hz), nanos(params.latency_s));
         let mut description = Description::every(period as f64 * 1e-9);
         let image = pad::fill(&mut description, shape.clone(), pad_facts(&params)?);
-        let facts = arm::facts(&params.urdf, &params.tip, &params.mount)?;
+        let facts = arm::facts(&params.urdf, &params.tip, Some(params.home.as_deref().unwrap_or(&start)))?;
         let arm = ArmPorts::fill(&mut description, &joints, facts);
         let frames = (latency / period) as usize + 2;
         let bench = Self {
@@ -233,7 +238,7 @@ impl Device for SimBench {
             shown: 0,
             sequence: 0,
             threshold: params.threshold,
-            world: world(params, chain, shape)?,
+            world: world(params, chain, start, shape)?,
         };
         Ok(Opened { description, driver: Driver::Stepped(Box::new(bench)) })
     }
@@ -246,12 +251,13 @@ fn pad_facts(params: &Params) -> Result<Facts, Mistakes> {
     }
     let mut facts = pad::facts(params.threshold, params.pressure, Unit::NEWTON, calibration);
     let Electronics { common_noise, own_noise, .. } = params.electronics;
+    facts.push(pad::mount(&params.mount));
     facts.extend([("common_noise".into(), common_noise.into()), ("own_noise".into(), own_noise.into())]);
     Ok(facts)
 }
 
 /// Returns the world with its objects, which are placed relative to the sensor.
-fn world(params: Params, chain: Chain, shape: ImageShape) -> Result<World, Mistakes> {
+fn world(params: Params, chain: Chain, start: Vec<f64>, shape: ImageShape) -> Result<World, Mistakes> {
     let joint = |inertia: f64| JointDynamics {
         stiffness: params.stiffness,
         damping_ratio: params.damping_ratio,
@@ -259,7 +265,7 @@ fn world(params: Params, chain: Chain, shape: ImageShape) -> Result<World, Mista
         friction: params.friction,
     };
     let inertia = params.inertia.as_deref().unwrap_or(&INERTIA);
-    let arm = SimArm::new(chain, inertia.iter().copied().map(joint).collect(), params.start);
+    let arm = SimArm::new(chain, inertia.iter().copied().map(joint).collect(), start);
     let from = arm.motion().pose;
     let mut scatter = Random::new(params.seed, 3);
     let place = |(i, object): (usize, &ObjectParams)| {

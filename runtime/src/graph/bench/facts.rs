@@ -3,10 +3,11 @@
 use std::ops::Range;
 
 use super::open::OpenedBench;
+use crate::graph::net::limits::unit_of_limit;
 use crate::graph::net::{Net, Resolved, report};
 use crate::graph::syntax::LIMITS;
 use crate::node::Spanned;
-use crate::source::{Code, Diagnostic, Diagnostics, Item, Table, Value};
+use crate::source::{Code, Diagnostic, Diagnostics, FactRef, Item, Table, Value};
 
 /// Replaces every `{ from = "role.fact" }` by the fact, and every `{ from = "limits.key" }` by the value in [limits].
 /// An optional one that is not there, or that is of a role which `node` does not read, is left out.
@@ -30,28 +31,8 @@ pub(crate) fn fill_facts(
             _ => true,
         };
     };
-    let fact = find_fact(fact.word, fact.place, &value.span, net, opened);
+    let fact = find_fact(&fact, &value.span, node, net, opened);
     report(fact, diagnostics).map(|fact| *value = fact).is_some()
-}
-
-/// Returns the unit that the name of a limit ends with: m/s2 for `linear_m_per_s2`. Of other units, such as that of
-/// `gain_per_s`, it returns `None`.
-fn unit_of_limit(name: &str) -> Option<&'static str> {
-    const UNITS: [(&str, &str); 10] = [
-        ("m_per_s2", "m/s2"),
-        ("rad_per_s2", "rad/s2"),
-        ("m_per_s", "m/s"),
-        ("rad_per_s", "rad/s"),
-        ("raw", "raw"),
-        ("rad", "rad"),
-        ("mm", "mm"),
-        ("m", "m"),
-        ("n", "N"),
-        ("s", "s"),
-    ];
-    let units = UNITS.iter().filter_map(|(end, unit)| Some((name.strip_suffix(end)?.strip_suffix('_')?, unit)));
-    let mut whole = units.filter(|(rest, _)| rest.rsplit('_').next() != Some("per"));
-    whole.next().map(|(_, unit)| *unit)
 }
 
 /// Adds a unit to the plain numbers in a value, so that a parameter of another unit refuses them.
@@ -69,23 +50,28 @@ fn with_unit(value: Value, unit: &str) -> Value {
 fn is_left_out(value: &Value, node: Option<usize>, net: &Net<'_>, opened: &OpenedBench) -> bool {
     let Some(fact) = value.as_table().and_then(Table::fact).filter(|fact| fact.is_optional) else { return false };
     let role = fact.word.split_once('.').map_or(fact.word, |(role, _)| role);
-    let is_foreign = |node: usize| role != LIMITS && !net.reads(node, role);
-    node.is_some_and(is_foreign) || find_fact(fact.word, fact.place, &value.span, net, opened).is_err()
+    let is_foreign = |node: usize| !net.reads(node, role);
+    if role == LIMITS {
+        let arms = node.map_or(&[][..], |node| net.arms_of(node));
+        return net.limit(arms, fact.word.split_once('.').map_or("", |(_, name)| name)).is_none();
+    }
+    node.is_some_and(is_foreign) || find_fact(&fact, &value.span, node, net, opened).is_err()
 }
 
-/// Returns the fact that the word at `place` names, as a value at `span`.
+/// Returns the fact that a reference in a parameter of `node` names, as a value at `span`.
 fn find_fact(
-    word: &str,
-    place: &Range<usize>,
+    FactRef { word, place, .. }: &FactRef<'_>,
     span: &Range<usize>,
+    node: Option<usize>,
     net: &Net<'_>,
     opened: &OpenedBench,
 ) -> Resolved<Value> {
     let (role, name) = word.split_once('.').unwrap_or((word, ""));
-    let part = |range: Range<usize>| Spanned { value: word.to_owned(), span: place.clone() }.part(range);
+    let part = |range: Range<usize>| Spanned { value: (*word).to_owned(), span: (*place).clone() }.part(range);
     if role == LIMITS {
-        // A missing value is reported at the section.
-        let value = net.limit(name).cloned().ok_or(None)?;
+        // A missing value is reported at the section, and a contradiction between sections too.
+        let arms = node.map_or(&[][..], |node| net.arms_of(node));
+        let value = net.limit(arms, name).filter(|_| !net.contradicts(arms, name)).ok_or(None)?;
         return Ok(match unit_of_limit(name) {
             Some(unit) => with_unit(value, unit),
             None => value,
@@ -101,32 +87,12 @@ fn find_fact(
     let Some((_, value)) = facts.iter().find(|(fact, _)| fact == name) else {
         let message = format!("the device of role `{role}` has no fact `{name}`");
         let unknown = Diagnostic::new(Code::UnknownFact, part(word.len() - name.len()..word.len()), message);
-        return unknown.suggest(name, facts.iter().map(|(fact, _)| &**fact), "facts").into_err();
+        let unknown = unknown.suggest(name, facts.iter().map(|(fact, _)| &**fact), "facts");
+        let listed = unknown.help.clone().filter(|_| unknown.fix.is_empty());
+        return match listed {
+            Some(facts) => unknown.help(format!("{facts}; a bench can state others under [facts.{role}]")).into_err(),
+            None => unknown.into_err(),
+        };
     };
     Ok(Value::from_toml(value, span))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_name_of_a_limit_ends_with_its_unit() {
-        let cases = [
-            ("linear_m_per_s", Some("m/s")),
-            ("joint_rad_per_s2", Some("rad/s2")),
-            ("force_n", Some("N")),
-            ("blind_s", Some("s")),
-            ("blind_mm", Some("mm")),
-            ("workspace_min_m", Some("m")),
-            ("gain_per_s", None),
-            ("turn_rad_per_m", None),
-            ("rate_n_per_s", None),
-            ("window", None),
-            ("m", None),
-        ];
-        for (name, unit) in cases {
-            assert_eq!(unit_of_limit(name), unit, "{name}");
-        }
-    }
 }

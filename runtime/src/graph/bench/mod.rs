@@ -2,6 +2,8 @@
 
 mod facts;
 mod open;
+mod robots;
 
 pub(crate) use facts::fill_facts;
 pub(crate) use open::{BoundRole, OpenedBench, open, place_mistakes};
+pub(crate) use robots::add_robots;

@@ -4,10 +4,11 @@ use std::ops::Range;
 
 use super::nodes::Builder;
 use crate::graph::bench::{fill_facts, place_mistakes};
+use crate::graph::net::limits::is_looser;
 use crate::graph::plan::Producer;
 use crate::graph::syntax::LIMITS;
 use crate::node::{At, Configured, Given, KnownUnits, Mistake, Mistakes, Reader};
-use crate::source::{Code, Value, suggest_name};
+use crate::source::{Code, Diagnostic, Value, suggest_name};
 
 impl Builder<'_> {
     /// Reads the parameters of a node, and returns them with all facts filled in.
@@ -26,6 +27,7 @@ impl Builder<'_> {
         if !fill_facts(&mut params, Some(index), self.net, self.opened, &mut self.diagnostics) {
             return (None, params);
         }
+        self.check_limits(index, &params);
         let spec = self.net.spec(index);
         let (specs, inputs) = spec.map_or((&[][..], &[][..]), |spec| (&spec.params, &spec.inputs));
         let units = KnownUnits::of_params(&params, specs).with_wires(inputs, &given.inputs, !is_complete);
@@ -43,15 +45,35 @@ impl Builder<'_> {
         (configured.filter(|_| is_valid), params)
     }
 
+    /// Reports parameters of a limiter that are looser than the limits of the arm whose motion it passes on.
+    fn check_limits(&mut self, index: usize, params: &Value) {
+        let (net, arms) = (self.net, self.net.arms_of(index));
+        let Some(spec) = net.spec(index).filter(|_| !arms.is_empty()) else { return };
+        for (key, value) in params.as_table().into_iter().flat_map(|table| &table.entries) {
+            let Some(limit) = net.catalogue.limit_readers().limit_of(&spec.name, &key.name) else { continue };
+            let Some(bound) = net.limit(arms, limit).filter(|bound| is_looser(limit, value, bound)) else { continue };
+            let name = &net.flat.nodes[index].name;
+            let message = format!("`{}` of `{name}` is looser than the limit `{limit}`", key.name);
+            let diagnostic = Diagnostic::new(Code::LooseLimit, value.span.clone(), message);
+            let diagnostic = diagnostic.note(bound.span, "the limit is here");
+            let help = format!("write `{{ from = \"{LIMITS}.{limit}\" }}`, or a tighter value");
+            let diagnostic = diagnostic.help(help);
+            // That nothing else uses the limit is not the mistake.
+            let unused = net.flat.all_limits().filter(|(key, _)| key.name == limit).map(|(key, _)| &key.span);
+            let unused: Vec<&Range<usize>> = unused.collect();
+            self.diagnostics.retain(|found| found.code != Code::UnknownKey || !unused.contains(&&found.span));
+            if !self.diagnostics.contains(&diagnostic) {
+                self.diagnostics.push(diagnostic);
+            }
+        }
+    }
+
     /// Moves the mistake that a limit is in another unit than its parameter to the reference in the parameter.
     fn at_reference(&self, mistake: Mistake, written: &Value) -> Mistake {
         let (At::Span(span), Code::UnitMismatch) = (&mistake.at, mistake.code) else { return mistake };
-        let mut limits = self.net.flat.limits.iter().flat_map(|(_, table)| &table.entries);
-        let is_limit = |value: &Value| value.span.start <= span.start && span.end <= value.span.end;
         // A text has the unit that the user wrote, so the mistake is there.
-        let Some((key, _)) = limits.find(|(_, value)| is_limit(value) && !value.has_text_at(span)) else {
-            return mistake;
-        };
+        let limit = self.net.flat.limit_at(span).filter(|(_, value)| !value.has_text_at(span));
+        let Some((key, _)) = limit else { return mistake };
         let word = format!("{LIMITS}.{}", key.name);
         let Some(fact) = written.facts().into_iter().find(|fact| fact.word == word) else { return mistake };
         let help = format!(
@@ -80,10 +102,9 @@ impl Builder<'_> {
     fn warnings_of_written(&self, warnings: Mistakes, written: &Value) -> Mistakes {
         let facts = written.facts().into_iter().filter(|fact| fact.word.split('.').next() != Some(LIMITS));
         let facts: Vec<Range<usize>> = facts.map(|fact| fact.place.clone()).collect();
-        let limits = || self.net.flat.limits.iter().flat_map(|(_, table)| &table.entries);
         let name = |mut warning: Mistake| {
             let At::Span(span) = &warning.at else { return Some(warning) };
-            let limit = limits().find(|(_, value)| value.span.start <= span.start && span.end <= value.span.end);
+            let limit = self.net.flat.limit_at(span);
             if let (Some((key, _)), Some((_, rest))) = (limit, warning.message[1..].split_once('`')) {
                 warning.message = format!("`{}`{rest}", key.name);
             }

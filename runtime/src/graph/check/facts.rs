@@ -80,6 +80,14 @@ fn report(net: &Net<'_>, node: usize, facts: &[&ForeignFact<'_>]) -> Diagnostic 
         }
         None => Diagnostic::new(Code::ForeignFact, place, message),
     };
+    if let Some(sensor) =
+        net.flat.roles.position(role).filter(|role| !net.is_arm(*role) && net.carrier(*role).is_none())
+    {
+        let (name, kind) = (net.name(Producer::Role(sensor)), &net.flat.roles[sensor].1.value);
+        let arm = first_arm(&upstream, net).unwrap_or("ARM");
+        return diagnostic
+            .help(format!("say which arm carries it: `{name} = {{ type = \"{kind}\", on = \"{arm}\" }}`"));
+    }
     let kind = |role: &str| net.flat.roles.get(role).map(|kind| kind.value.as_str());
     let Some(own) = upstream.into_iter().find(|own| kind(own) == kind(role)) else { return diagnostic };
     let path = part.and(name.split_once('.')).map(|(_, inner)| format!("set.{inner}.")).unwrap_or_default();
@@ -91,4 +99,9 @@ fn report(net: &Net<'_>, node: usize, facts: &[&ForeignFact<'_>]) -> Diagnostic 
             .edit(Edit::Below(part.span.clone(), lines.trim_start().to_owned())),
         None => diagnostic.help(format!("write in [nodes.{name}]:{lines}")),
     }
+}
+
+/// Returns the first of some roles that is an arm.
+fn first_arm<'r>(roles: &[&'r str], net: &Net<'_>) -> Option<&'r str> {
+    roles.iter().copied().find(|role| net.flat.roles.position(role).is_some_and(|role| net.is_arm(role)))
 }

@@ -19,7 +19,8 @@ pub(super) fn check(
     let Some(spec) = net.spec(limiter) else { return Vec::new() };
     let frame = frames.of(motion).into_iter().next().flatten();
     let sensor = frame.and_then(|frame| net.flat.roles.position(&frame));
-    let mut found = Vec::new();
+    let mut found: Vec<Diagnostic> =
+        sensor.and_then(|sensor| on_another_arm(net, role, limiter, sensor)).into_iter().collect();
     for wire in net.wires[limiter].iter().filter(|wire| spec.inputs[wire.input].need.must_be_known) {
         let makers = find_makers(net, wire.source);
         let roles = makers.iter().flat_map(|maker| net.roles_of(maker.producer));
@@ -38,6 +39,16 @@ pub(super) fn check(
         );
     }
     found
+}
+
+/// Reports that a limiter works in the frame of a sensor which another arm carries.
+fn on_another_arm(net: &Net<'_>, arm: usize, limiter: usize, sensor: usize) -> Option<Diagnostic> {
+    let carrier = net.carrier(sensor).filter(|carrier| *carrier != arm && sensor != arm)?;
+    let [arm, sensor, carrier] = [arm, sensor, carrier].map(|role| net.name(Producer::Role(role)));
+    let name = &net.flat.nodes[limiter].name;
+    let message = format!("`{name}` limits the motion of `{arm}` in the frame of `{sensor}`, which is on `{carrier}`");
+    let diagnostic = net.diagnostic_at(limiter, Code::ForeignInput, message);
+    Some(diagnostic.help(format!("let the motion be in the frame of a sensor on `{arm}`")))
 }
 
 /// Returns the ports that make the value of a port: itself, or those whose quantity its node passes on. What else the

@@ -3,15 +3,18 @@
 use std::collections::BTreeMap;
 use std::ops::Range;
 
-use crate::catalogue::Catalogue;
+use crate::graph::bench::OpenedBench;
 use crate::graph::load::Entity;
 use crate::graph::net::Net;
-use crate::graph::syntax::LIMITS;
+use crate::graph::net::limits::twin;
+use crate::graph::syntax::{LIMITS, LimitSection};
 use crate::node::{ParamSpec, Spanned};
 use crate::source::{Code, Diagnostic, Diagnostics, Edit, Key, SourceMap, Value, quoted, suggest_name};
 
 /// A reference to a value of the section, as `{ from = "limits.KEY" }`.
 struct LimitRef<'a> {
+    /// The node that reads it.
+    node: usize,
     key: String,
     /// The place of the key in the reference.
     span: Range<usize>,
@@ -25,15 +28,15 @@ struct LimitRef<'a> {
 ///
 /// A misspelt key is both unused and missing; it is reported once, where it is misspelt. While a limiter is missing, an
 /// unused value may belong to it and is not reported.
-pub(crate) fn check(net: &Net<'_>, sources: &SourceMap, diagnostics: &mut Diagnostics) {
+pub(crate) fn check(net: &Net<'_>, opened: &OpenedBench, sources: &SourceMap, diagnostics: &mut Diagnostics) {
     let mut names = net.flat.scopes.iter().flat_map(|scope| scope.names.values());
     let has_unknown_part = names.any(|(_, entity)| matches!(entity, Entity::Unknown));
     let is_limited =
         !has_unknown_part && diagnostics.iter().all(|diagnostic| diagnostic.code != Code::UnlimitedCommand);
     let refs = find_refs(net);
-    let given: Vec<&Key> = net.flat.limits.iter().flat_map(|(_, table)| &table.entries).map(|(key, _)| key).collect();
+    let given: Vec<&Key> = net.flat.all_limits().map(|(key, _)| key).collect();
     let mut wanted: BTreeMap<&str, Vec<&LimitRef<'_>>> = BTreeMap::new();
-    for limit in refs.iter().filter(|limit| !given.iter().any(|key| key.name == limit.key)) {
+    for limit in refs.iter().filter(|limit| net.limit(net.arms_of(limit.node), &limit.key).is_none()) {
         wanted.entry(&limit.key).or_default().push(limit);
     }
     let mut unused: Vec<&Key> = given.iter().copied().filter(|key| !refs.iter().any(|r| r.key == key.name)).collect();
@@ -47,7 +50,7 @@ pub(crate) fn check(net: &Net<'_>, sources: &SourceMap, diagnostics: &mut Diagno
         let is_needed = !is_optional(limits);
         let only = unused.first().copied().filter(|_| is_single && is_needed);
         // A limit that the built-in parts read is not meant for one that can be left out.
-        let is_meant = |key: &&Key| is_needed || find_reader(net.catalogue, &key.name).is_none();
+        let is_meant = |key: &&Key| is_needed || net.catalogue.limit_readers().find(&key.name).is_none();
         if let Some(key) = similar(name, &unused).filter(is_meant).or(only) {
             unused.retain(|other| other.name != key.name);
             diagnostics.push(misspelt(key, limits, net, sources));
@@ -57,7 +60,17 @@ pub(crate) fn check(net: &Net<'_>, sources: &SourceMap, diagnostics: &mut Diagno
             missing.extend(limits.iter().find(|limit| !limit.is_optional));
         }
     }
+    // The robot of a device that could not be opened may state it.
+    let is_open = |arm: &usize| opened.roles.get(*arm).is_some_and(Option::is_some);
+    let moved = |limit: &LimitRef<'_>| match net.arms_of(limit.node) {
+        [] => (0..net.roles.len()).filter(|role| net.is_arm(*role)).collect(),
+        arms => arms.to_vec(),
+    };
+    missing.retain(|limit| moved(limit).iter().all(is_open));
     missing.sort_by_key(|limit| refs.iter().position(|other| other.span == limit.span));
+    // A cell and a robot state what other tasks use, too.
+    let is_of_task = |key: &Key| net.flat.limits.iter().any(|section| section.is_of_task() && section.has(key));
+    unused.retain(|key| is_of_task(key) || net.catalogue.limit_readers().find(&key.name).is_none());
     diagnostics.extend(unused.into_iter().filter(|_| is_limited).filter_map(|key| unread(key, net)));
     diagnostics.extend(report_missing(net, &missing));
 }
@@ -74,7 +87,7 @@ fn find_refs<'a>(net: &Net<'a>) -> Vec<LimitRef<'a>> {
                 (LIMITS, key) => {
                     let word = Spanned { value: fact.word.to_owned(), span: fact.place.clone() };
                     let span = word.part(fact.word.len() - key.len()..fact.word.len());
-                    Some(LimitRef { key: key.to_owned(), span, spec, is_optional: fact.is_optional })
+                    Some(LimitRef { node: i, key: key.to_owned(), span, spec, is_optional: fact.is_optional })
                 }
                 _ => None,
             });
@@ -94,7 +107,7 @@ fn similar<'k>(name: &str, keys: &[&'k Key]) -> Option<&'k Key> {
 /// built-in parts do not use, or that occurs less often.
 fn misspelt(key: &Key, limits: &[&LimitRef<'_>], net: &Net<'_>, sources: &SourceMap) -> Diagnostic {
     let wanted = &limits[0].key;
-    let rank = |name: &str| (find_reader(net.catalogue, name).is_some(), sources.occurrences(name));
+    let rank = |name: &str| (net.catalogue.limit_readers().find(name).is_some(), sources.occurrences(name));
     if limits.len() == 1 && rank(&key.name) > rank(wanted) {
         return misspelt_reference(key, limits);
     }
@@ -120,58 +133,26 @@ fn unread(key: &Key, net: &Net<'_>) -> Option<Diagnostic> {
     let name = &key.name;
     let diagnostic = Diagnostic::new(Code::UnknownKey, key.span.clone(), format!("no node uses the limit `{name}`"));
     let line = |param: &str| format!("{param} = {{ from = \"{LIMITS}.{name}\" }}");
-    let Some((kind, param)) = find_reader(net.catalogue, name) else {
+    let Some((kind, param)) = net.catalogue.limit_readers().find(name) else {
         let help = format!("let a parameter of a limiter read it: `{}`", line("PARAMETER"));
         return Some(diagnostic.help(help));
     };
     let mut nodes = net.flat.nodes.iter().enumerate();
     let limiter = nodes.find(|(i, _)| net.spec(*i).is_some_and(|spec| spec.name == kind));
     let Some((index, limiter)) = limiter else {
-        return Some(diagnostic.help(format!("it is for a `{kind}`, which the graph lacks, with `{}`", line(&param))));
+        return Some(diagnostic.help(format!("it is for a `{kind}`, which the graph lacks, with `{}`", line(param))));
     };
-    let diagnostic = diagnostic.help(format!("write `{}` in `{}`", line(&param), limiter.name));
+    let diagnostic = diagnostic.help(format!("write `{}` in `{}`", line(param), limiter.name));
     let is_required = |spec: &ParamSpec| spec.name == param && !spec.is_optional;
-    match limiter.block.params.as_table().and_then(|table| table.get(&param)) {
+    match limiter.block.params.as_table().and_then(|table| table.get(param)) {
         Some(value) => {
             let place = value.span.clone();
             let diagnostic = diagnostic.note(place.clone(), format!("`{}` has another value here", limiter.name));
             Some(diagnostic.edit(Edit::Replace(place, format!("{{ from = \"{LIMITS}.{name}\" }}"))))
         }
         None if net.spec(index).is_some_and(|spec| spec.params.iter().any(is_required)) => None,
-        None => Some(diagnostic.edit(Edit::Below(limiter.block.key.span.clone(), line(&param)))),
+        None => Some(diagnostic.edit(Edit::Below(limiter.block.key.span.clone(), line(param)))),
     }
-}
-
-/// Returns the type of node, and its parameter, that read a limit in a built-in part.
-fn find_reader(catalogue: &Catalogue, limit: &str) -> Option<(String, String)> {
-    let known = readers(catalogue).find(|(.., read)| read == limit);
-    known.map(|(kind, param, _)| (kind, param))
-}
-
-/// Returns the limit that a parameter of a type of node reads in a built-in part.
-pub(crate) fn limit_of(catalogue: &Catalogue, kind: &str, param: &str) -> Option<String> {
-    readers(catalogue).find(|(node, name, _)| node == kind && name == param).map(|(.., limit)| limit)
-}
-
-/// Returns the limits that a type of node reads in the built-in parts.
-pub(crate) fn limits_of(catalogue: &Catalogue, kind: &str) -> impl Iterator<Item = String> {
-    readers(catalogue).filter(move |(node, ..)| node == kind).map(|(.., limit)| limit)
-}
-
-/// Returns the parameters in built-in parts that read a limit: type of node, parameter and limit.
-fn readers(catalogue: &Catalogue) -> impl Iterator<Item = (String, String, String)> {
-    let files = catalogue.builtin_files().iter().filter(|(name, _)| name.ends_with(".toml"));
-    let parts = files.filter_map(|(_, bytes)| str::from_utf8(bytes).ok()?.parse::<toml::Table>().ok());
-    let table = |value: toml::Value| value.try_into::<toml::Table>().ok();
-    let nodes = parts.filter_map(move |mut part| table(part.remove("nodes")?)).flatten();
-    nodes.filter_map(move |(_, node)| table(node)).flat_map(|node| {
-        let kind = node.get("type").and_then(toml::Value::as_str).unwrap_or_default().to_owned();
-        let prefix = format!("{LIMITS}.");
-        let limit = move |value: &toml::Value| Some(value.get("from")?.as_str()?.strip_prefix(&prefix)?.to_owned());
-        node.into_iter()
-            .filter_map(move |(param, value)| Some((kind.clone(), param, limit(&value)?)))
-            .collect::<Vec<_>>()
-    })
 }
 
 /// Reports all missing values in one diagnostic.
@@ -182,10 +163,15 @@ fn report_missing(net: &Net<'_>, missing: &[&LimitRef<'_>]) -> Option<Diagnostic
         format!("\n- `{}`: {}", limit.key, doc.trim_end_matches('.'))
     });
     let names = quoted(missing.iter().map(|limit| &limit.key));
-    let (span, message) = match &net.flat.limits {
-        Some((span, _)) => (span.clone(), format!("[limits] lacks {names}")),
+    let beside = missing.iter().find_map(|limit| {
+        let twin = twin(&limit.key)?;
+        net.flat.limits.iter().find(|section| section.table.get(&twin).is_some())
+    });
+    let (span, message) = match beside.or_else(|| net.flat.task_limits()) {
+        Some(LimitSection { span, .. }) => (span.clone(), format!("[limits] lacks {names}")),
         None => (net.flat.place.clone(), format!("the graph has no section [limits]; it needs {names}")),
     };
     let diagnostic = Diagnostic::new(Code::MissingLimit, span, message).note(first.span.clone(), "used here");
-    Some(diagnostic.help(format!("write a value under [limits] for each:{}", lines.collect::<String>())))
+    let lines: String = lines.collect();
+    Some(diagnostic.help(format!("write a value for each under [limits] of the task, the bench or the robot:{lines}")))
 }

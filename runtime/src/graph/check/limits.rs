@@ -8,23 +8,14 @@ use std::ops::Range;
 
 use super::foreign;
 use super::frames::{Frames, with_article};
-use super::limit_values::{limit_of, limits_of};
 use crate::device::RoleType;
+use crate::graph::net::limits::PathNode;
 use crate::graph::net::{CommandWire, Net, Wire, WireOrigin};
 use crate::graph::plan::{PortRef, Producer};
 use crate::graph::syntax::LIMITS;
 use crate::node::{NodeSpec, Spanned};
 use crate::signal::Kind;
 use crate::source::{Code, Diagnostic, Diagnostics, Edit, quoted};
-
-/// A node on the path of a command that passes a motion on.
-struct PathNode<'a> {
-    node: usize,
-    spec: &'a NodeSpec,
-    /// The source of its motion, and the text that names it.
-    source: PortRef,
-    word: &'a Spanned<String>,
-}
 
 /// A command and the nodes that its motion passes, the last one first.
 struct CommandPath<'a> {
@@ -73,21 +64,7 @@ pub(super) fn limiters(net: &Net<'_>, wire: &CommandWire) -> Vec<usize> {
 impl<'a> CommandPath<'a> {
     /// Follows a motion backwards, or returns `None` if a wire is missing.
     fn find(net: &'a Net<'a>, wire: &'a CommandWire) -> Option<Self> {
-        let mut path = Self { net, wire, role: net.roles[wire.role]?, nodes: Vec::new() };
-        let (mut at, mut passed) = (wire.source, BTreeSet::new());
-        while let Producer::Node(node) = at.producer {
-            let spec = net.spec(node)?;
-            let Some(through) = spec.limits.through else { break };
-            let input = spec.inputs.iter().position(|input| input.name == through)?;
-            let wire = net.wires[node].iter().find(|wire| wire.input == input)?;
-            let (source, word) = (wire.source, wire.origin.inner.as_ref().unwrap_or(&wire.origin.word));
-            if !passed.insert(node) {
-                return None;
-            }
-            path.nodes.push(PathNode { node, spec, source, word });
-            at = source;
-        }
-        Some(path)
+        Some(Self { net, wire, role: net.roles[wire.role]?, nodes: net.motion_path(wire)? })
     }
 
     /// Returns the diagnostic of the missing limits, of which the nodes in `lost` broke some.
@@ -152,10 +129,11 @@ impl<'a> CommandPath<'a> {
         let role = net.name(Producer::Role(wire.role));
         let taken = &net.command_port(wire).name;
         let mut block = format!("[parts.{name}]\nfile = \"builtin:{file}\"");
-        if !limiters.iter().all(|kind| limits_of(net.catalogue, kind).all(|limit| self.is_given(&limit))) {
+        let readers = net.catalogue.limit_readers();
+        if !limiters.iter().all(|kind| readers.limits_of(kind).all(|limit| self.is_given(limit))) {
             let help = format!(
                 "route the motion through the part `builtin:{file}`, and write its limits under [limits]: {}",
-                quoted(limiters.iter().flat_map(|kind| limits_of(net.catalogue, kind)).collect::<BTreeSet<_>>())
+                quoted(limiters.iter().flat_map(|kind| readers.limits_of(kind)).collect::<BTreeSet<_>>())
             );
             return Some((help, Vec::new()));
         }
@@ -177,7 +155,7 @@ impl<'a> CommandPath<'a> {
 
     /// Returns whether the graph gives a limit.
     fn is_given(&self, limit: &str) -> bool {
-        self.net.flat.limits.as_ref().is_some_and(|(_, table)| table.get(limit).is_some())
+        self.net.limit(&[self.wire.role], limit).is_some()
     }
 
     /// Returns the port of the graph that fits an input with the name `input`: the motion itself, or a port with that
@@ -256,7 +234,8 @@ impl<'a> CommandPath<'a> {
             block.push_str(&format!("\nin.{} = \"{}\"", input.name, net.find_candidate(scope, usize::MAX, input)?));
         }
         for param in limiter.params.iter().filter(|param| !param.is_optional) {
-            let limit = limit_of(net.catalogue, name, param.name).filter(|limit| self.is_given(limit))?;
+            let limit =
+                net.catalogue.limit_readers().limit_of(name, param.name).filter(|limit| self.is_given(limit))?;
             block.push_str(&format!("\n{} = {{ from = \"{LIMITS}.{limit}\" }}", param.name));
         }
         (!is_taken).then_some(block)

@@ -18,6 +18,7 @@ pub(crate) mod generators;
 pub(crate) mod immediate;
 pub(crate) mod inputs;
 pub(crate) mod late;
+pub(crate) mod limit_sections;
 pub(crate) mod limit_values;
 pub(crate) mod limits;
 pub(crate) mod live;

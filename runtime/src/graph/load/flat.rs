@@ -3,9 +3,11 @@
 use std::collections::BTreeMap;
 use std::ops::Range;
 
-use crate::graph::syntax::{Allowance, BenchDocument, Block, GraphTable, ModeBlock, PolicyTable, WireEntry};
+use crate::graph::syntax::{
+    Allowance, BenchDocument, Block, GraphTable, LimitOwner, LimitSection, ModeBlock, PolicyTable, WireEntry,
+};
 use crate::node::Spanned;
-use crate::source::{Code, Diagnostic, Key, Named, Table, Value};
+use crate::source::{Code, Diagnostic, Key, Named, Value};
 
 /// What a name in a scope refers to, by index.
 #[derive(Debug, Clone, Copy)]
@@ -47,12 +49,15 @@ pub(crate) struct FlatGraph {
     pub(crate) settings: Option<Value>,
     /// Span for diagnostics about the graph as a whole.
     pub(crate) place: Range<usize>,
+    /// The type of each role.
     pub(crate) roles: Named<Spanned<String>>,
+    /// The arm that carries each sensor which names one.
+    pub(crate) carriers: Named<Spanned<String>>,
     pub(crate) nodes: Vec<FlatNode>,
     pub(crate) scopes: Vec<Scope>,
     pub(crate) commands: Vec<(Key, WireEntry)>,
-    /// The section [limits] and its span.
-    pub(crate) limits: Option<(Range<usize>, Table)>,
+    /// The limits of the task, the bench, the robots and the command line.
+    pub(crate) limits: Vec<LimitSection>,
     pub(crate) modes: Vec<ModeBlock>,
     /// The section [policy] as written, and parsed if it is valid.
     pub(crate) policy: Option<(Value, Option<PolicyTable>)>,
@@ -66,6 +71,21 @@ impl FlatGraph {
         let keys = || self.settings.iter().filter_map(Value::as_table).flat_map(|table| &table.entries);
         let is_key = |found: &Diagnostic| keys().any(|(key, _)| key.span == found.span);
         diagnostics.iter().any(|found| found.code == Code::UnknownKey && is_key(found))
+    }
+
+    /// Returns the limits of all sections, each with its name.
+    pub(crate) fn all_limits(&self) -> impl Iterator<Item = &(Key, Value)> {
+        self.limits.iter().flat_map(|section| &section.table.entries)
+    }
+
+    /// Returns the limit of which a place is a part.
+    pub(crate) fn limit_at(&self, place: &Range<usize>) -> Option<&(Key, Value)> {
+        self.all_limits().find(|(_, value)| value.span.start <= place.start && place.end <= value.span.end)
+    }
+
+    /// Returns the section [limits] of the task, or `None` if it has none.
+    pub(crate) fn task_limits(&self) -> Option<&LimitSection> {
+        self.limits.iter().find(|section| section.owner == LimitOwner::Task)
     }
 
     /// Returns the names of the modes.

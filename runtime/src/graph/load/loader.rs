@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use super::flat::{FlatGraph, Scope};
 use super::measured::MeasuredValues;
 use super::request::Request;
-use crate::graph::syntax::{ALLOW_UNCALIBRATED, BenchDocument, Sections};
+use crate::graph::syntax::{ALLOW_UNCALIBRATED, BenchDocument, LIMITS, ROBOT, Sections};
 use crate::source::{
     BuiltinFile, Code, Diagnostic, Diagnostics, Item, Key, SourceMap, Table, Value, parse_table, suggest_name,
 };
@@ -36,7 +36,8 @@ impl Loader {
             Some(text) => self.parse(&request.graph, text.clone()),
             None => self.read(&request.graph, None),
         };
-        let (graph_set, bench_set) = self.assignments(&request.set);
+        let Assignments { graph: graph_set, bench: bench_set, limits: set_limits } = self.assignments(&request.set);
+        let set_limits = self.sections(|sections| sections.set_limits(&set_limits));
         let Some(mut root) = root else { return flat };
         if let Some(what) = wrong_file_type(&root.0, "graph") {
             let message = format!("this is {what}, not a graph");
@@ -61,13 +62,17 @@ impl Loader {
         };
         flat.settings = root.0.get("graph").cloned();
         flat.bench = self.bench(request, &flat, &root.0, bench_set);
+        flat.bench.iter_mut().for_each(|bench| self.robots(bench));
         let bench = flat.bench.as_mut();
         self.diagnostics.extend(bench.into_iter().flat_map(|bench| bench.correct_names(&self.sources)));
         let binds = flat.bench.as_ref().map(|bench| bench.bind.clone()).unwrap_or_default();
         self.diagnostics.extend(document.correct_names(&binds, &[], &self.sources));
         flat.roles.clone_from(&document.roles);
         flat.commands.clone_from(&document.commands);
+        flat.carriers.clone_from(&document.carriers);
         flat.limits.clone_from(&document.limits);
+        flat.limits.extend(flat.bench.iter().flat_map(|bench| bench.limits.iter().cloned()));
+        flat.limits.extend(set_limits);
         flat.modes.clone_from(&document.modes);
         flat.policy.clone_from(&document.policy);
         flat.allow.clone_from(&document.allow);
@@ -131,6 +136,21 @@ impl Loader {
         Some(self.sections(|sections| sections.bench(&mut root)))
     }
 
+    /// Reads the files of the robots that the devices of a bench drive.
+    fn robots(&mut self, bench: &mut BenchDocument) {
+        for (device, file) in &bench.robot_files {
+            let Some((mut root, _)) = self.read(&file.path, Some(file.span.clone())) else { continue };
+            if let Some(what) = wrong_file_type(&root, ROBOT) {
+                let message = format!("this is {what}, not a robot");
+                self.diagnostics.push(Diagnostic::new(Code::WrongFile, file.span.clone(), message));
+                continue;
+            }
+            let robot = self.sections(|sections| sections.robot(&mut root, device));
+            bench.limits.extend(robot.limits.iter().cloned());
+            bench.robots.push((device.clone(), robot));
+        }
+    }
+
     /// Reads and parses a file; `from` is the span of its name.
     pub(crate) fn read(&mut self, path: &Path, from: Option<Range<usize>>) -> Option<(Table, Range<usize>)> {
         let text = match self.sources.builtin(path) {
@@ -166,18 +186,22 @@ impl Loader {
         }
     }
 
-    /// Parses the assignments of the command line, for the graph and for the bench.
-    fn assignments(&mut self, assignments: &[String]) -> (Table, Table) {
-        let (mut graph, mut bench) = (Table::default(), Table::default());
+    /// Parses the assignments of the command line.
+    fn assignments(&mut self, assignments: &[String]) -> Assignments {
+        let Assignments { mut graph, mut bench, mut limits } = Assignments::default();
         for assignment in assignments {
             let Some(table) = self.assignment(assignment) else { continue };
             for (key, value) in table.entries {
                 let of_bench = matches!(key.name.as_str(), "devices" | "bind" | "facts" | ALLOW_UNCALIBRATED);
-                let target = if of_bench { &mut bench } else { &mut graph };
+                let target = match of_bench {
+                    true => &mut bench,
+                    false if key.name == LIMITS => &mut limits,
+                    false => &mut graph,
+                };
                 target.merge(Table { entries: vec![(key, value)] });
             }
         }
-        (graph, bench)
+        Assignments { graph, bench, limits }
     }
 
     /// Parses one `key=value`. A value that is not TOML is a string, so that no second quoting is needed in a shell.
@@ -200,6 +224,15 @@ impl Loader {
     }
 }
 
+/// The assignments of the command line: for the graph and the bench, which they replace, and for [limits], which they
+/// can only make tighter.
+#[derive(Default)]
+struct Assignments {
+    graph: Table,
+    bench: Table,
+    limits: Table,
+}
+
 /// Returns whether a text is a single assignment, without a header or a second line.
 fn is_one_assignment(table: &Table, text: &str) -> bool {
     table.entries.len() == 1
@@ -217,6 +250,12 @@ pub(crate) fn wrong_file_type(root: &Table, expected: &str) -> Option<&'static s
     if root.entries.iter().any(is_misspelt) {
         return None;
     }
-    let types = [("scenario", SCENARIO), ("graph", "a graph"), ("devices", "a bench"), ("exports", "a part")];
+    let types = [
+        ("scenario", SCENARIO),
+        ("graph", "a graph"),
+        ("devices", "a bench"),
+        ("exports", "a part"),
+        (ROBOT, "a robot"),
+    ];
     types.iter().find(|(section, _)| root.get(section).is_some()).map(|(_, what)| *what)
 }

@@ -15,7 +15,7 @@ use crate::source::{Code, Diagnostic, Diagnostics, Key};
 impl<'a> Net<'a> {
     /// Creates a net with all types looked up and without wires.
     pub(super) fn declare(flat: &'a FlatGraph, catalogue: &'a Catalogue, diagnostics: &mut Diagnostics) -> Self {
-        let roles = flat.roles.iter().map(|(_, kind)| find_role(kind, catalogue, diagnostics)).collect();
+        let roles: Vec<_> = flat.roles.iter().map(|(_, kind)| find_role(kind, catalogue, diagnostics)).collect();
         let nodes = flat.nodes.iter().enumerate().map(|(index, node)| {
             let kind = node.block.kind.as_ref()?;
             let known = catalogue.find_node(&kind.value);
@@ -31,13 +31,27 @@ impl<'a> Net<'a> {
         });
         let nodes = nodes.collect();
         let observed = observed_roles(flat, catalogue, diagnostics);
-        let (wires, commands, order) = (Vec::new(), Vec::new(), Vec::new());
+        check_carriers(flat, &roles, diagnostics);
+        let (wires, commands, order, arms) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
         let scope_ports = flat.scopes.iter().map(|_| OnceCell::new()).collect();
         let (provenance, mut settings) = (Provenance::default(), BTreeMap::<&str, Vec<_>>::new());
         for (key, value) in flat.modes.iter().flat_map(|mode| &mode.set.entries) {
             settings.entry(key.name.as_str()).or_default().push(value);
         }
-        Self { flat, catalogue, roles, nodes, observed, wires, commands, order, provenance, settings, scope_ports }
+        Self {
+            flat,
+            catalogue,
+            roles,
+            nodes,
+            observed,
+            wires,
+            commands,
+            order,
+            provenance,
+            arms,
+            settings,
+            scope_ports,
+        }
     }
 }
 
@@ -59,6 +73,21 @@ fn find_role<'a>(
         return None;
     }
     Some(role)
+}
+
+/// Reports sensors that are on a role which is no arm, and arms that are on another role.
+fn check_carriers(flat: &FlatGraph, roles: &[Option<&RoleType>], diagnostics: &mut Diagnostics) {
+    let is_arm = |index: usize| roles[index].is_none_or(|role| !role.commands.is_empty());
+    let arms = || (0..roles.len()).filter(|index| is_arm(*index)).map(|index| flat.roles[index].0.name.as_str());
+    for (sensor, on) in flat.carriers.iter() {
+        let carries = flat.roles.position(&on.value);
+        if carries.is_none_or(|index| !is_arm(index)) {
+            diagnostics.push(Diagnostic::unknown(Code::UnknownPort, "arm", &on.value, &on.span, arms()));
+        } else if flat.roles.position(&sensor.name).is_some_and(|sensor| roles[sensor].is_some() && is_arm(sensor)) {
+            let message = format!("`{}` is an arm, and only a sensor can be on an arm", sensor.name);
+            diagnostics.push(Diagnostic::new(Code::WrongRole, on.span.clone(), message).help("remove `on`"));
+        }
+    }
 }
 
 /// Returns the roles that the bench binds for scenarios and recordings only.

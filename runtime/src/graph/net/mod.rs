@@ -2,6 +2,7 @@
 
 mod connect;
 mod declare;
+pub(crate) mod limits;
 mod meant_type;
 mod order;
 mod provenance;
@@ -50,6 +51,8 @@ pub(crate) struct Net<'a> {
     /// The nodes in the order in which they step.
     pub(crate) order: Vec<usize>,
     provenance: Provenance,
+    /// For each node the arms whose motion passes through it.
+    arms: Vec<Vec<usize>>,
     /// What modes set of each node and each part of the graph.
     settings: BTreeMap<&'a str, Vec<&'a Value>>,
     /// The ports of each scope by name, which only suggestions and views need.
@@ -64,13 +67,35 @@ impl<'a> Net<'a> {
         net.commands = net.connect_commands(diagnostics);
         net.order = net.find_order(diagnostics);
         net.provenance = Provenance::new(&net);
+        net.arms = net.find_arms();
         net
     }
 
-    /// Returns whether a node reads a role, directly or not. A node that reads none may use the facts of any role.
+    /// Returns whether a node reads a role or the arm that carries it, directly or not. A node that reads none may use
+    /// the facts of any role.
     pub(crate) fn reads(&self, node: usize, role: &str) -> bool {
+        let carrier = self.flat.roles.position(role).and_then(|role| self.carrier(role));
+        // A sensor on an unknown arm has its own diagnostic.
+        if carrier.is_none() && self.flat.carriers.get(role).is_some() {
+            return true;
+        }
         let mut roles = self.roles_of(Producer::Node(node)).peekable();
-        roles.peek().is_none() || roles.any(|read| self.name(Producer::Role(read)) == role)
+        roles.peek().is_none() || roles.any(|read| self.name(Producer::Role(read)) == role || Some(read) == carrier)
+    }
+
+    /// Returns the arm that carries a sensor: the one that it names, or the only arm of the graph. An arm carries none.
+    pub(crate) fn carrier(&self, sensor: usize) -> Option<usize> {
+        let (key, _) = &self.flat.roles[sensor];
+        if let Some(on) = self.flat.carriers.get(&key.name) {
+            return self.flat.roles.position(&on.value).filter(|arm| *arm != sensor);
+        }
+        let mut arms = (0..self.roles.len()).filter(|role| self.is_arm(*role));
+        arms.next().filter(|arm| *arm != sensor && arms.next().is_none())
+    }
+
+    /// Returns whether a role is commanded.
+    pub(crate) fn is_arm(&self, role: usize) -> bool {
+        self.roles[role].is_some_and(|role| !role.commands.is_empty())
     }
 
     /// Returns the roles whose samples a producer descends from.
@@ -94,11 +119,6 @@ impl<'a> Net<'a> {
     /// Returns whether the author of the graph chooses the names of the wires into a node.
     pub(crate) fn takes_any_wire(&self, node: usize) -> bool {
         self.spec(node).is_some_and(|spec| spec.inputs.iter().any(|input| input.need.is_many))
-    }
-
-    /// Returns a value of the section [limits].
-    pub(crate) fn limit(&self, name: &str) -> Option<&'a Value> {
-        self.flat.limits.as_ref().and_then(|(_, table)| table.get(name))
     }
 
     /// Returns the declaration of the input at the end of a wire.

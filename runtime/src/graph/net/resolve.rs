@@ -69,6 +69,10 @@ impl Net<'_> {
             let both = suggest_name(port, ports.iter().copied()).filter(|_| !ports.contains(&port)).zip(meant);
             return match both {
                 Some((port, (best, _))) => unknown(message).instead(&word.value, &format!("{best}.{port}")),
+                None if self.flat.bench.as_ref().is_some_and(|bench| bench.bind.position(name).is_some()) => {
+                    unknown_name(name.len(), message)
+                        .help(format!("declare `{name}` under [roles]: the bench binds it"))
+                }
                 None => unknown_name(name.len(), message).suggest(name, known(), "roles, nodes and parts"),
             }
             .into_err();

@@ -1,6 +1,6 @@
 //! Misspelt keys of sections and blocks: each is reported once, and what it holds is read as it was meant.
 
-use super::reserved::{INPUTS, is_name};
+use super::reserved::{INPUTS, ROBOT, is_name};
 use crate::node::{At, Mistake, Reader};
 use crate::source::{Code, Item, Key, Meant, Table, Value, suggest_name};
 
@@ -55,7 +55,11 @@ fn move_blocks(root: &mut Table, known: &[&str], reader: &mut Reader<'_>) {
     let flat = root.entries.iter_mut().filter(|(key, _)| ["graph", "roles", "limits", "bind"].contains(&&*key.name));
     for (key, value) in flat {
         let Item::Table(table) = &mut value.item else { continue };
+        let is_roles = key.name == "roles";
         table.entries.retain(|(name, block)| {
+            if is_roles && block.as_table().is_some_and(is_role) {
+                return true;
+            }
             let entries = vec![(name.clone(), block.clone())];
             let alone = Value { span: block.span.clone(), item: Item::Table(Table { entries }) };
             let is_meant = |section: &&str| known.contains(section) && could_be(section, &alone);
@@ -68,6 +72,11 @@ fn move_blocks(root: &mut Table, known: &[&str], reader: &mut Reader<'_>) {
         });
     }
     moved.into_iter().for_each(|entry| root.merge(Table { entries: vec![entry] }));
+}
+
+/// Returns whether a table declares a role, and no node.
+fn is_role(table: &Table) -> bool {
+    table.entries.iter().all(|(key, _)| ["type", "on"].contains(&&*key.name))
 }
 
 fn report(key: &Key, meant: Meant<'_>, known: &[&str], place: &str, reader: &mut Reader<'_>) {
@@ -101,7 +110,8 @@ fn could_be(section: &str, value: &Value) -> bool {
         "nodes" | "devices" => each(&has(&["type"])),
         "parts" => each(&has(&["file"])),
         "modes" => each(&has(&["go", "on_lost", "done", "fail", "set"])),
-        "roles" | "bind" => each(&is_word),
+        "roles" => each(&|value| is_word(value) || value.as_table().is_some_and(is_role)),
+        "bind" => each(&is_word),
         "commands" => {
             each(&|value| value.as_table().is_some_and(|table| table.entries.iter().all(|(_, v)| is_port(v))))
         }
@@ -169,6 +179,16 @@ pub(super) fn correct_part_file(table: &mut Table, reader: &mut Reader<'_>) {
     let found = table.entries.iter().find(is_file).map(|(key, _)| key.name.clone());
     if let Some(name) = found.filter(|_| table.get("file").is_none()) {
         rename(table, &name, "file", reader);
+    }
+}
+
+/// Corrects the key `robot` of a device, which names a file.
+pub(super) fn correct_robot(table: &mut Table, reader: &mut Reader<'_>) {
+    let is_file = |value: &Value| value.as_str().is_some_and(|text| text.ends_with(".toml"));
+    let is_close = |name: &str| suggest_name(name, std::iter::once(ROBOT)).is_some();
+    let found = table.entries.iter().find(|(key, value)| key.name != ROBOT && is_file(value) && is_close(&key.name));
+    if let Some(name) = found.map(|(key, _)| key.name.clone()).filter(|_| table.get(ROBOT).is_none()) {
+        rename(table, &name, ROBOT, reader);
     }
 }
 

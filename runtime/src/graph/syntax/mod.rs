@@ -2,19 +2,23 @@
 
 mod allow;
 mod correct;
+mod limits;
 mod modes;
 mod names;
 mod policy;
 mod read;
 mod reserved;
+mod robot;
+mod roles;
 mod sections;
 
 pub(crate) use allow::Allowance;
+pub(crate) use limits::{LimitOwner, LimitSection};
 pub(crate) use modes::{ExitKind, ExitTable, ModeBlock, ModeExit, PortState};
 pub(crate) use names::Use;
 pub use policy::Policy;
 pub(crate) use policy::{AgeLimit, PolicyTable, default_max_age_ns, default_max_age_s};
-pub(crate) use reserved::{INPUTS, LIMITS};
+pub(crate) use reserved::{INPUTS, LIMITS, ROBOT};
 pub(crate) use sections::{
     ALLOW_UNCALIBRATED, BenchDocument, Block, GraphDocument, GraphTable, PartBlock, Sections, WireEntry,
     into_diagnostic,

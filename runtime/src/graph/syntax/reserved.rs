@@ -2,6 +2,8 @@
 
 /// Name of the section [limits] in `{ from = "limits.KEY" }`.
 pub(crate) const LIMITS: &str = "limits";
+/// Key of a device for its robot, and section of the file that it names.
+pub(crate) const ROBOT: &str = "robot";
 
 /// Name of the inputs of a part in `in.NAME = "inputs.INPUT"`.
 pub(crate) const INPUTS: &str = "inputs";

@@ -5,12 +5,15 @@ use std::ops::Range;
 
 use super::allow::{ALLOW, Allowance, read_allow};
 use super::correct::{
-    correct_block, correct_facts, correct_keys, correct_part_file, correct_sections, correct_wires, separate_wires,
+    correct_block, correct_facts, correct_keys, correct_part_file, correct_robot, correct_sections, correct_wires,
+    separate_wires,
 };
+use super::limits::{LimitOwner, LimitSection, read_limits};
 use super::modes::{ModeBlock, read_mode};
 use super::policy::{AgeLimit, PolicyTable, WireTable};
 use super::read::read_table;
-use super::reserved::is_name;
+use super::reserved::{LIMITS, ROBOT, is_name};
+use super::robot::{RobotDocument, read_robot};
 use crate::node::{At, FilePath, Measured, Mistake, Param, Reader, Spanned};
 use crate::source::{Code, Diagnostic, Diagnostics, Item, Key, Named, SourceMap, Table, Value, suggest_name};
 
@@ -115,13 +118,15 @@ pub(crate) struct PartBlock {
 pub(crate) struct GraphDocument {
     /// The span of the section [graph], and the section if it is valid.
     pub(crate) graph: Option<(Range<usize>, Option<GraphTable>)>,
+    /// The type of each role.
     pub(crate) roles: Named<Spanned<String>>,
+    /// The arm that carries each sensor which names one.
+    pub(crate) carriers: Named<Spanned<String>>,
     pub(crate) nodes: Vec<Block>,
     pub(crate) parts: Vec<PartBlock>,
     /// The wires to commands, each with its role.
     pub(crate) commands: Vec<(Key, WireEntry)>,
-    /// The section [limits] and its span.
-    pub(crate) limits: Option<(Range<usize>, Table)>,
+    pub(crate) limits: Vec<LimitSection>,
     pub(crate) modes: Vec<ModeBlock>,
     /// The section [policy] as written, and parsed if it is valid.
     pub(crate) policy: Option<(Value, Option<PolicyTable>)>,
@@ -141,6 +146,12 @@ pub(crate) struct BenchDocument {
     pub(crate) invalid: Vec<Key>,
     /// Facts that the bench states beside those of its devices, by role.
     pub(crate) facts: Vec<(Key, Table)>,
+    /// The limits of the cell, and of the robots of its devices.
+    pub(crate) limits: Vec<LimitSection>,
+    /// The file of the robot of each device that has one, in the order of the file.
+    pub(crate) robot_files: Vec<(Key, FilePath)>,
+    /// What these files say of each robot, by device.
+    pub(crate) robots: Vec<(Key, RobotDocument)>,
     /// Whether limits may be in raw readings.
     pub(crate) allow_uncalibrated: bool,
     pub(crate) allow: Vec<Allowance>,
@@ -151,8 +162,8 @@ pub(crate) const ALLOW_UNCALIBRATED: &str = "allow_uncalibrated";
 
 /// Reads sections and collects their diagnostics.
 pub(crate) struct Sections<'a> {
-    reader: Reader<'a>,
-    diagnostics: Diagnostics,
+    pub(super) reader: Reader<'a>,
+    pub(super) diagnostics: Diagnostics,
     /// Blocks that are not tables and have their own diagnostic.
     broken: Vec<Key>,
 }
@@ -178,7 +189,7 @@ impl<'a> Sections<'a> {
             "parts",
             "nodes",
             "commands",
-            "limits",
+            LIMITS,
             "modes",
             "policy",
             "devices",
@@ -201,14 +212,14 @@ impl<'a> Sections<'a> {
             wires.into_iter().map(move |wire| (role.clone(), wire))
         });
         let commands = commands.collect();
-        let limits = root.entry("limits").map(|(key, value)| (key.span.clone(), self.table(Some(value))));
+        let limits = read_limits(root, &LimitOwner::Task, &mut self.reader);
         let policy = root.get("policy");
         let policy = policy.map(|value| (value.clone(), PolicyTable::read(value, &mut self.reader)));
         let modes = self.named_tables(root.get("modes")).into_iter();
         let modes = modes.map(|(key, table)| read_mode(key, table, &mut self.reader)).collect();
-        let roles = self.names(root.get("roles"));
+        let (roles, carriers) = self.roles(root.get("roles"));
         let allow = read_allow(root.get(ALLOW), &mut self.reader);
-        GraphDocument { graph, roles, commands, limits, modes, policy, allow, ..self.body(root) }
+        GraphDocument { graph, roles, carriers, commands, limits, modes, policy, allow, ..self.body(root) }
     }
 
     /// Corrects the names of the sections of a part, before the graph overrides values in them.
@@ -224,17 +235,32 @@ impl<'a> Sections<'a> {
 
     /// Reads the sections of a bench file.
     pub(crate) fn bench(&mut self, root: &mut Table) -> BenchDocument {
-        correct_sections(root, &["devices", "bind", "facts", ALLOW, ALLOW_UNCALIBRATED], &mut self.reader);
+        correct_sections(root, &["devices", "bind", "facts", LIMITS, ALLOW, ALLOW_UNCALIBRATED], &mut self.reader);
         let allow = read_allow(root.get(ALLOW), &mut self.reader);
-        BenchDocument { allow, ..self.own_bench(root) }
+        let limits = read_limits(root, &LimitOwner::Bench, &mut self.reader);
+        BenchDocument { allow, limits, ..self.own_bench(root) }
     }
 
-    /// Reads the sections of a bench in a file that may have others. Its [allow] belongs to the graph.
+    /// Reads the limits of the command line.
+    pub(crate) fn set_limits(&mut self, root: &Table) -> Vec<LimitSection> {
+        read_limits(root, &LimitOwner::CommandLine, &mut self.reader)
+    }
+
+    /// Reads the sections of the file of a robot that `device` drives.
+    pub(crate) fn robot(&mut self, root: &mut Table, device: &Key) -> RobotDocument {
+        read_robot(root, device, &mut self.reader)
+    }
+
+    /// Reads the sections of a bench in a file that may have others. Its [allow] and [limits] belong to the graph.
     pub(crate) fn own_bench(&mut self, root: &Table) -> BenchDocument {
         let devices = self.named_tables(root.get("devices"));
         let names = names_of(&devices);
+        let mut robot_files = Vec::new();
         let block = |(key, mut table): (Key, Table)| {
             correct_block(&mut table, &[], &mut self.reader);
+            correct_robot(&mut table, &mut self.reader);
+            let robot = table.remove(ROBOT).and_then(|(_, value)| FilePath::read(&value, &mut self.reader));
+            robot_files.extend(robot.map(|file| (key.clone(), file)));
             self.block(key, table, &names)
         };
         let devices = devices.into_iter().map(block).collect();
@@ -250,7 +276,16 @@ impl<'a> Sections<'a> {
         }
         let place = section.map(|(key, _)| key.span.clone());
         let allow_uncalibrated = allow_uncalibrated.unwrap_or(false);
-        BenchDocument { devices, bind, place, invalid, facts, allow_uncalibrated, allow: Vec::new() }
+        BenchDocument {
+            devices,
+            bind,
+            place,
+            invalid,
+            facts,
+            allow_uncalibrated,
+            robot_files,
+            ..BenchDocument::default()
+        }
     }
 
     fn body(&mut self, root: &Table) -> GraphDocument {
@@ -344,7 +379,7 @@ impl<'a> Sections<'a> {
         wires
     }
 
-    fn table(&mut self, value: Option<&Value>) -> Table {
+    pub(super) fn table(&mut self, value: Option<&Value>) -> Table {
         read_table(value, &mut self.reader)
     }
 
@@ -406,7 +441,7 @@ impl<'a> Sections<'a> {
     }
 
     /// Returns whether a key is a valid name. If not, it is reported, and a name with the same letters replaces it.
-    fn check_name(&mut self, key: &mut Key) -> bool {
+    pub(super) fn check_name(&mut self, key: &mut Key) -> bool {
         if is_name(&key.name) {
             return true;
         }

@@ -1,0 +1,258 @@
+//! The limits that hold for a node: those of the task, the bench, the robots and the command line, intersected.
+
+use std::collections::BTreeSet;
+
+use super::Net;
+use super::wire::CommandWire;
+use crate::graph::plan::{PortRef, Producer};
+use crate::graph::syntax::{LimitOwner, LimitSection};
+use crate::node::{NodeSpec, Spanned};
+use crate::signal::{Measure, UnitSize};
+use crate::source::{Item, Value};
+
+/// A node on the path of a command that passes a motion on.
+pub(crate) struct PathNode<'a> {
+    pub(crate) node: usize,
+    pub(crate) spec: &'a NodeSpec,
+    /// The source of its motion, and the text that names it.
+    pub(crate) source: PortRef,
+    pub(crate) word: &'a Spanned<String>,
+}
+
+impl<'a> Net<'a> {
+    /// Follows the motion of a command backwards through the nodes that pass it on, the last one first. Returns `None`
+    /// if a wire is missing.
+    pub(crate) fn motion_path<'n>(&'n self, wire: &'n CommandWire) -> Option<Vec<PathNode<'n>>> {
+        let (mut at, mut path, mut passed) = (wire.source, Vec::new(), BTreeSet::new());
+        while let Producer::Node(node) = at.producer {
+            let spec = self.spec(node)?;
+            let Some(through) = spec.limits.through else { break };
+            let input = spec.inputs.iter().position(|input| input.name == through)?;
+            let wire = self.wires[node].iter().find(|wire| wire.input == input)?;
+            let (source, word) = (wire.source, wire.origin.inner.as_ref().unwrap_or(&wire.origin.word));
+            if !passed.insert(node) {
+                return None;
+            }
+            path.push(PathNode { node, spec, source, word });
+            at = source;
+        }
+        Some(path)
+    }
+
+    /// Returns for each node the arms whose motion passes through it.
+    pub(super) fn find_arms(&self) -> Vec<Vec<usize>> {
+        let mut arms = vec![Vec::new(); self.nodes.len()];
+        for wire in self.commands.iter().filter(|wire| !wire.is_report) {
+            for stop in self.motion_path(wire).into_iter().flatten() {
+                arms[stop.node].push(wire.role);
+            }
+        }
+        arms
+    }
+
+    /// Returns the arms whose motion passes through a node.
+    pub(crate) fn arms_of(&self, node: usize) -> &[usize] {
+        &self.arms[node]
+    }
+
+    /// Returns the sections whose limits hold for one of some arms: all sections if there is none.
+    pub(crate) fn limit_sections(&self, arms: &[usize]) -> impl Iterator<Item = &'a LimitSection> {
+        self.flat
+            .limits
+            .iter()
+            .filter(move |section| arms.is_empty() || arms.iter().any(|arm| self.holds(section, *arm)))
+    }
+
+    /// Returns whether the limits of a section hold for an arm.
+    fn holds(&self, section: &LimitSection, arm: usize) -> bool {
+        let name = self.name(Producer::Role(arm));
+        let is_own = section.role.as_ref().is_none_or(|role| role.name == name);
+        let device = || self.flat.bench.as_ref().and_then(|bench| bench.bind.get(name));
+        match &section.owner {
+            LimitOwner::Robot(robot) => device().is_some_and(|device| device.value == *robot),
+            _ => is_own,
+        }
+    }
+
+    /// Returns the tightest value of a limit that holds for one of some arms, or `None` if nobody states it.
+    pub(crate) fn limit(&self, arms: &[usize], name: &str) -> Option<Value> {
+        let values = self.limit_sections(arms).filter_map(|section| section.table.get(name));
+        values.cloned().reduce(|one, other| tighter(name, one, other))
+    }
+
+    /// Returns whether the sections contradict each other about a limit, so that it has no value.
+    pub(crate) fn contradicts(&self, arms: &[usize], name: &str) -> bool {
+        let mut values = self.limit_sections(arms).filter_map(|section| section.table.get(name));
+        let first = values.next().map(length);
+        values.any(|value| Some(length(value)) != first) || self.excludes_all(arms, name)
+    }
+
+    /// Returns whether the bounds of which a limit is one exclude each other, although no section alone is wrong.
+    pub(crate) fn excludes_all(&self, arms: &[usize], name: &str) -> bool {
+        let Some(twin) = twin(name) else { return false };
+        let is_min = is_lower_bound(name);
+        let (Some(own), Some(other)) = (self.limit(arms, name), self.limit(arms, &twin)) else { return false };
+        let (min, max) = if is_min { (own, other) } else { (other, own) };
+        let is_empty = |min: &Value, max: &Value| {
+            let numbers = |value: &Value| numbers(name, value);
+            numbers(min).zip(numbers(max)).is_some_and(|(min, max)| min.iter().zip(&max).any(|(min, max)| min > max))
+        };
+        let pairs = self.limit_sections(arms).filter_map(|section| {
+            let [low, high] = if is_min { [name, &twin] } else { [&twin, name] };
+            Some((section.table.get(low)?, section.table.get(high)?))
+        });
+        is_empty(&min, &max) && !pairs.into_iter().any(|(min, max)| is_empty(min, max))
+    }
+}
+
+/// Returns whether a value is looser than a bound of the limit `name`, in any of its entries.
+pub(crate) fn is_looser(name: &str, value: &Value, bound: &Value) -> bool {
+    let (Some(values), Some(bounds)) = (numbers(name, value), numbers(name, bound)) else { return false };
+    let is_looser = |(value, bound): (&f64, &f64)| if is_lower_bound(name) { value < bound } else { value > bound };
+    values.iter().zip(&bounds).any(is_looser)
+}
+
+/// Returns the number of values of a limit that is a list, or `None` if it is none.
+pub(crate) fn length(value: &Value) -> Option<usize> {
+    match &value.item {
+        Item::Array(items) => Some(items.len()),
+        _ => None,
+    }
+}
+
+/// Returns the tighter one of two values of a limit, entry by entry. A value that is no number is returned, so that it
+/// is reported.
+fn tighter(name: &str, one: Value, other: Value) -> Value {
+    if numbers(name, &one).is_none() {
+        return one;
+    }
+    if numbers(name, &other).is_none() || is_looser(name, &one, &other) && !is_looser(name, &other, &one) {
+        return other;
+    }
+    match (one.item, other.item) {
+        (Item::Array(ones), Item::Array(others)) if ones.len() == others.len() => {
+            let items = ones.into_iter().zip(others).map(|(one, other)| tighter(name, one, other));
+            Value { item: Item::Array(items.collect()), span: one.span }
+        }
+        (item, _) => Value { item, span: one.span },
+    }
+}
+
+/// Returns the finite numbers of a limit in the unit of its name, or `None` if it has others.
+fn numbers(name: &str, value: &Value) -> Option<Vec<f64>> {
+    match &value.item {
+        Item::Integer(number) => Some(vec![*number as f64]),
+        Item::Float(number) => number.is_finite().then(|| vec![*number]),
+        Item::String(text) => {
+            let unit = unit_of_limit(name).and_then(UnitSize::parse)?;
+            Measure::parse(text).ok()?.to(&unit).filter(|number| number.is_finite()).map(|number| vec![number])
+        }
+        Item::Array(items) => {
+            items.iter().map(|item| numbers(name, item)).collect::<Option<Vec<_>>>().map(|n| n.concat())
+        }
+        _ => None,
+    }
+}
+
+/// Returns whether a limit is a lower bound, so that the greater of two values is the tighter one.
+fn is_lower_bound(name: &str) -> bool {
+    name.split('_').any(|word| word == "min")
+}
+
+/// Returns the name of the upper bound that belongs to a lower one, and the other way round.
+pub(crate) fn twin(name: &str) -> Option<String> {
+    let swap = |word| match word {
+        "min" => "max",
+        "max" => "min",
+        other => other,
+    };
+    let swapped: Vec<&str> = name.split('_').map(swap).collect();
+    Some(swapped.join("_")).filter(|twin| twin != name)
+}
+
+/// Returns the unit that the name of a limit ends with: m/s2 for `linear_m_per_s2`. Of other units, such as that of
+/// `gain_per_s`, it returns `None`.
+pub(crate) fn unit_of_limit(name: &str) -> Option<&'static str> {
+    const UNITS: [(&str, &str); 10] = [
+        ("m_per_s2", "m/s2"),
+        ("rad_per_s2", "rad/s2"),
+        ("m_per_s", "m/s"),
+        ("rad_per_s", "rad/s"),
+        ("raw", "raw"),
+        ("rad", "rad"),
+        ("mm", "mm"),
+        ("m", "m"),
+        ("n", "N"),
+        ("s", "s"),
+    ];
+    let units = UNITS.iter().filter_map(|(end, unit)| Some((name.strip_suffix(end)?.strip_suffix('_')?, unit)));
+    let mut whole = units.filter(|(rest, _)| rest.rsplit('_').next() != Some("per"));
+    whole.next().map(|(_, unit)| *unit)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn value(text: &str) -> Value {
+        let table: toml::Table = format!("x = {text}").parse().expect("TOML");
+        Value::from_toml(&table["x"], &(0..0))
+    }
+
+    #[test]
+    fn the_name_of_a_limit_ends_with_its_unit() {
+        let cases = [
+            ("linear_m_per_s", Some("m/s")),
+            ("joint_rad_per_s2", Some("rad/s2")),
+            ("force_n", Some("N")),
+            ("blind_s", Some("s")),
+            ("blind_mm", Some("mm")),
+            ("workspace_min_m", Some("m")),
+            ("gain_per_s", None),
+            ("turn_rad_per_m", None),
+            ("rate_n_per_s", None),
+            ("window", None),
+            ("m", None),
+        ];
+        for (name, unit) in cases {
+            assert_eq!(unit_of_limit(name), unit, "{name}");
+        }
+    }
+
+    #[test]
+    fn of_two_values_the_tighter_one_holds_entry_by_entry() {
+        let cases = [
+            ("force_n", "15", "10.0", vec![10.0]),
+            ("force_n", "'8000 mN'", "10", vec![8.0]),
+            ("blind_mm", "100", "'5 cm'", vec![50.0]),
+            ("workspace_min_m", "[-0.8, -0.4, 0.1]", "[-0.5, -0.6, '200 mm']", vec![-0.5, -0.4, 0.2]),
+            ("workspace_max_m", "[-0.3, 0.4, 0.7]", "[-0.5, 0.6, 0.7]", vec![-0.5, 0.4, 0.7]),
+        ];
+        for (name, one, other, tightest) in cases {
+            for (one, other) in [(one, other), (other, one)] {
+                let held = tighter(name, value(one), value(other));
+                assert_eq!(numbers(name, &held), Some(tightest.clone()), "{name}: {one} and {other}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_value_that_is_no_number_is_never_lost() {
+        for wrong in ["'15'", "nan", "true", "'3 m'", "{ a = 1 }"] {
+            for (one, other) in [(wrong, "15"), ("15", wrong)] {
+                let held = tighter("force_n", value(one), value(other));
+                assert_eq!(numbers("force_n", &held), None, "{one} and {other}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_value_is_looser_if_one_entry_is() {
+        assert!(is_looser("force_n", &value("15.1"), &value("15")));
+        assert!(!is_looser("force_n", &value("15"), &value("15")));
+        assert!(is_looser("workspace_min_m", &value("[0, -0.5, 0]"), &value("[0, -0.4, 0]")));
+        assert!(!is_looser("workspace_min_m", &value("[0, -0.3, 0]"), &value("[0, -0.4, 0]")));
+        assert_eq!(twin("workspace_min_m").as_deref(), Some("workspace_max_m"));
+        assert_eq!(twin("force_n"), None);
+    }
+}
