@@ -8,6 +8,8 @@ use tactflow_runtime::source::BuiltinFile;
 pub const FILES: &[BuiltinFile] = &[
     ("finger_press.csv", include_bytes!("../../graphs/recordings/pressuRe/iscan_test.csv")),
     ("lwr4p.urdf", include_bytes!("../../graphs/robots/lwr4p.urdf")),
+    ("ur5e.urdf", include_bytes!("../../graphs/robots/ur5e.urdf")),
+    ("panda.urdf", include_bytes!("../../graphs/robots/panda.urdf")),
     ("calibrations/sim_pad.toml", include_bytes!("../../graphs/calibrations/sim_pad.toml")),
     ("parts/touch.toml", include_bytes!("../../graphs/parts/touch.toml")),
     ("parts/ruler.toml", include_bytes!("../../graphs/parts/ruler.toml")),

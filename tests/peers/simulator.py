@@ -211,7 +211,7 @@ def hello(args):
     }
     changes = {
         "hello-proto": ("proto", 2), "hello-nan": ("dq_max", [float("nan")] * 7), "hello-short": ("q_min", [-1.0] * 6),
-        "hello-mirror": ("T_es", [-1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]), "hello-urdf": ("urdf", "panda"),
+        "hello-mirror": ("T_es", [-1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]), "hello-urdf": ("urdf", "iiwa14"),
         "hello-names": ("joints", NAMES[::-1]), "hello-tip": ("tip", "hand"), "hello-dt": ("dt", 0),
     }
     if args.misbehave in changes:

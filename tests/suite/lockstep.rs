@@ -150,7 +150,7 @@ fn a_hello_that_will_not_do_is_told_before_anything_runs() {
         ("short", "hello (line 1): `q_min` has 6 numbers, but there are 7 `joints`"),
         ("mirror", "hello (line 1): `T_es`: this is not a pose: its axes are left-handed"),
         ("dt", "hello (line 1): `dt`: 0 is not greater than 0"),
-        ("urdf", "names the model `panda`, which is not built in"),
+        ("urdf", "names the model `iiwa14`, which is not built in"),
         ("names", "its `joints` are [\"lwr_a6_joint\""),
         ("tip", "the model has no link `hand`"),
         ("garbage", "hello (line 1): invalid type: integer `220`, expected a JSON object"),
