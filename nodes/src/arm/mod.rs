@@ -8,5 +8,7 @@ pub mod ik_sink;
 pub mod joint_limits;
 mod joint_names;
 pub mod model;
+#[cfg(test)]
+mod models;
 pub mod mount;
 pub mod null_space;

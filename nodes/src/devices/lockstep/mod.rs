@@ -49,7 +49,7 @@ pub struct Params {
 ///
 /// First the simulator describes itself: its joints with their limits, the mount of the sensor, and the size, pitch,
 /// scale and threshold of the pad. So the simulator must also run while a graph is checked. It names the model of the
-/// arm: `lwr4p` is built in, and `urdf` names the file of any other model.
+/// arm: `lwr4p`, `ur5e` and `panda` are built in, and `urdf` names the file of any other model.
 ///
 /// In lockstep the simulator waits for each command, and a run is as fast as both allow. Otherwise it runs by its own
 /// clock: the device uses the newest frame, and counts the frames before it as gaps. Frames carry the time of the
