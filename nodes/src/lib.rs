@@ -88,6 +88,8 @@ pub fn catalogue() -> Catalogue {
         .node::<servo::twist_source::TwistSource>()
         .node::<servo::scan_guide::ScanGuide>()
         .node::<servo::ridge_guide::RidgeGuide>()
+        .node::<servo::hold_pose::HoldPose>()
+        .node::<servo::follow_path::FollowPath>()
         .node::<servo::twist_adder::TwistAdder>()
         .node::<servo::compose_twist::ComposeTwist>()
         .node::<servo::edge_guard::EdgeGuard>()

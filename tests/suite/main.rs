@@ -34,6 +34,7 @@ mod mutations;
 mod observed;
 mod operator;
 mod oracles;
+mod paths;
 mod points;
 mod policies;
 mod quantities;

@@ -199,7 +199,7 @@ mod tests {
     use super::*;
 
     fn segment(xyz: [f64; 3], rpy: [f64; 3], axis: [f64; 3], motion: JointKind) -> ChainSegment {
-        let fixed = super::super::mount::pose_of(xyz, rpy);
+        let fixed = crate::motion::pose::pose_of(xyz, rpy);
         ChainSegment { fixed, axis: Vector3::from(axis).normalize(), motion, joint: Joint::default() }
     }
 
@@ -254,7 +254,7 @@ mod tests {
             tip in prop::array::uniform6(-1.0..1.0f64),
         ) {
             let q = &q[..segments.len()];
-            let tip = super::super::mount::pose_of([tip[0], tip[1], tip[2]], [tip[3], tip[4], tip[5]]);
+            let tip = crate::motion::pose::pose_of([tip[0], tip[1], tip[2]], [tip[3], tip[4], tip[5]]);
             let chain = Chain::new(segments.clone(), tip);
             let mut columns = vec![Twist::default(); q.len()];
             let pose = chain.forward(q, &mut columns).0.to_homogeneous();

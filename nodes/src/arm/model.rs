@@ -13,7 +13,8 @@ use tactflow_runtime::signal::Joint;
 use urdf_rs::{JointType, Robot};
 
 use super::chain::{Chain, ChainSegment, JointKind};
-use super::mount::{Mount, pose_of};
+use super::mount::Mount;
+use crate::motion::pose::pose_of;
 
 /// Position limit of a joint without one [rad; m for a prismatic joint].
 pub const UNBOUNDED: f64 = 1e9;

@@ -6,7 +6,7 @@ use tactflow_runtime::node::Param;
 use tactflow_runtime::signal::Pose;
 
 use super::shape::{Geometry, pose3};
-use crate::arm::mount::pose_of;
+use crate::motion::pose::pose_of;
 use crate::usual::{USUAL_RAD, USUAL_REACH_M};
 
 /// Shape of an object.

@@ -3,7 +3,7 @@
 use proptest::prelude::*;
 
 use super::*;
-use crate::arm::mount::pose_of;
+use crate::motion::pose::pose_of;
 
 const HELLO: &str = r#"{"type":"hello","proto":1,"dt":0.004,"lockstep":true,"task":"hybrid","joints":["a","b"],"q_min":[-1,-2.5],"q_max":[1,2],"dq_max":[3,4],"urdf":"lwr4p","tip":"flange","T_es":[1,0,0,0.1, 0,1,0,0.2, 0,0,1,0.03, 0,0,0,1],"rows":2,"cols":3,"pitch":0.005,"counts_per_unit":102.375,"newton_per_unit":0.1,"threshold_units":0.15,"colour":{"of":"pad"}}"#;
 const OBS: &str =
