@@ -41,6 +41,7 @@ mod quantities;
 mod recordings;
 mod reference;
 mod reports;
+mod robots;
 mod sim;
 mod situations;
 mod svg;

@@ -151,17 +151,17 @@ fn one_mistake_in_a_part_of_two_instances_is_told_once() {
 
 #[test]
 fn a_fact_over_a_table_replaces_it() {
-    let table = shipped("hybrid.toml").set("parts.move.set.state.mount={ xyz = [0, 0, 0.5] }");
-    let fact = table.clone().set("parts.move.set.state.mount={ from = \"pad.mount\" }");
+    let table = shipped("hybrid.toml").set("parts.touch.set.calibrate.device={ gain = 2.0, unit = 'N' }");
+    let fact = table.clone().set("parts.touch.set.calibrate.device={ from = \"pad.calibration\" }");
     let plain = shipped("hybrid.toml");
-    let heights = [plain, table, fact].map(|request| {
-        let mut engine = Engine::new(loaded(&request));
-        engine.tick(0).unwrap();
-        let (_, id) = engine.ports().iter().find(|(port, _)| port.name == "move.state.sensor_pose").unwrap();
-        engine.bus().slot::<Pose>(*id).0.translation.z
+    let devices = [plain, table, fact].map(|request| {
+        let plan = loaded(&request);
+        let node = plan.outline().nodes.iter().find(|node| node.name == "touch.calibrate").unwrap();
+        let settings = node.settings.iter().filter(|setting| setting.path.starts_with("device"));
+        settings.map(|setting| format!("{:?}", setting.value.item)).collect::<String>()
     });
-    assert!(heights[0] - heights[1] > 0.1, "the longer mount points down: {heights:?}");
-    assert_eq!(heights[0], heights[2]);
+    let gains = devices.each_ref().map(|device| ["Float(1.0)", "Float(2.0)"].map(|gain| device.contains(gain)));
+    assert_eq!(gains, [[true, false], [false, true], [true, false]], "{devices:?}");
 }
 
 #[test]

@@ -6,7 +6,7 @@ use tactflow_runtime::graph::Request;
 use tactflow_runtime::signal::{Pose, Scalar};
 use tactflow_tests::workspace;
 
-use crate::course::{get, watch};
+use crate::course::{get, loaded};
 
 /// Half of a side of the square [m].
 const HALF: f64 = 0.02;
@@ -60,7 +60,12 @@ impl Traced {
 #[test]
 fn the_arm_stays_within_half_a_millimetre_of_a_square_with_round_corners() {
     let mut traced = Traced::default();
-    watch(&Request::file(workspace().join("graphs/square.toml")), |engine| traced.look(engine));
+    let request = Request::file(workspace().join("graphs/square.toml"));
+    let mut engine = Engine::new(loaded(&request));
+    while let Some(next) = engine.next().filter(|_| !engine.is_done()) {
+        engine.tick(next).unwrap_or_else(|fault| panic!("{fault}"));
+        traced.look(&engine);
+    }
     assert_eq!(traced.modes, ["approach", "press", "trace", "retreat"]);
     let [from, to] = [traced.from, traced.to];
     let sides = [from.x + HALF, from.y, to.x - HALF, to.y - 2.0 * HALF];

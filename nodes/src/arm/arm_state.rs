@@ -43,7 +43,7 @@ pub struct Params {
     /// Link that carries the sensor.
     tip: String,
     /// Pose of the sensor on that link.
-    #[param(default = Mount::NONE)]
+    #[param(default = Mount::NONE, from_bench)]
     mount: Mount,
     /// Role of the sensor; names the frame of the pose.
     sensor: String,

@@ -73,6 +73,7 @@ pub(crate) fn compile_in(mut loader: Loader, catalogue: &Catalogue, request: &Re
     let Some((clock, _)) = clock.filter(|_| mistakes.is_empty()) else {
         return Err(Report::new(sources, mistakes));
     };
+    assert_eq!(nodes.len(), flat.nodes.len(), "a graph without a mistake has all its nodes");
     log_plan(&nodes, &opened, &sources);
     let max_gap = max_gap(flat.table.as_ref(), period);
     let outline = OutlineBuilder {

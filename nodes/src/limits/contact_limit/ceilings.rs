@@ -17,7 +17,7 @@ pub(super) struct Ceilings {
 
 impl Ceilings {
     /// Chooses the pair of parameters for an image in that unit. The other pair must not be given.
-    pub(super) fn new(params: &Params, unit: Unit) -> Result<Self, Mistakes> {
+    pub(super) fn new(params: &Params, unit: Unit, warnings: &mut Mistakes) -> Result<Self, Mistakes> {
         let newton = [("force_n", params.force_n), ("peak_n", params.peak_n)];
         let raw = [("force_raw", params.force_raw), ("peak_raw", params.peak_raw)];
         let (own, other) = match unit {
@@ -46,7 +46,8 @@ impl Ceilings {
             let [(force, _), (peak, _)] = own;
             let message =
                 format!("`{peak}` is greater than `{force}`, so it has no effect: one tactel is never above the sum");
-            return Err(Mistake::param(peak, message).help(format!("let `{peak}` be at most `{force}`")).into());
+            let warning = Mistake::new(Code::UnusualValue, At::Param(peak.into()), message);
+            warnings.push(warning.help(format!("let `{peak}` be at most `{force}`")));
         }
         Ok(Self { force, peak })
     }

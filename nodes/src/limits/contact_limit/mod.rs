@@ -128,7 +128,7 @@ impl Node for ContactLimit {
     };
 
     fn new(params: Params, setup: &mut Setup<Self>) -> Result<Self, Mistakes> {
-        let ceilings = Ceilings::new(&params, setup.inputs.image.unit)?;
+        let ceilings = Ceilings::new(&params, setup.inputs.image.unit, &mut setup.warnings)?;
         setup.is_uncalibrated = setup.inputs.image.unit == Unit::RAW;
         (setup.outputs.force, setup.outputs.peak) = (fraction(), fraction());
         let max_age = max_age(params.max_age_ms, setup.period);

@@ -12,7 +12,7 @@ pub(crate) fn add_robots(bench: &mut BenchDocument, catalogue: &Catalogue, diagn
         let Some(block) = bench.devices.iter_mut().find(|block| block.key.name == name.name) else { continue };
         let Some(device) = block.kind.as_ref().and_then(|kind| catalogue.find_device(&kind.value)) else { continue };
         let own = device.params();
-        let mut table = Table::default();
+        let (mut table, before) = (Table::default(), diagnostics.len());
         for (key, value) in &robot.params.entries {
             let has = |params: &[crate::node::ParamSpec]| params.iter().any(|param| param.name == key.name);
             if has(&own) {
@@ -24,7 +24,7 @@ pub(crate) fn add_robots(bench: &mut BenchDocument, catalogue: &Catalogue, diagn
             }
         }
         let Item::Table(params) = &mut block.params.item else { continue };
-        if table.entries.is_empty() && !robot.params.entries.is_empty() {
+        if table.entries.is_empty() && diagnostics.len() == before && !robot.params.entries.is_empty() {
             let place = bench.robot_files.iter().find(|(device, _)| device.name == name.name);
             let place = place.map_or(&block.key.span, |(_, file)| &file.span);
             let message = format!("a device of type `{}` takes nothing from a robot", device.name());

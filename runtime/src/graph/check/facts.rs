@@ -63,9 +63,19 @@ fn find_foreign<'a>(net: &Net<'_>, node: usize, table: &'a Value) -> Vec<Foreign
     let foreign = facts.filter_map(|(param, FactRef { word, place, is_optional })| {
         let (role, fact) = word.split_once('.')?;
         let is_role = role != LIMITS && net.flat.roles.position(role).is_some();
-        (is_role && !is_optional && !net.reads(node, role)).then_some(ForeignFact { param, role, fact, place })
+        let is_foreign = !net.reads(node, role) || is_of_other_sensor(net, node, role);
+        (is_role && !is_optional && is_foreign).then_some(ForeignFact { param, role, fact, place })
     });
     foreign.collect()
+}
+
+/// Returns whether a sensor is not the one in whose frame a node works: a pose of one pad with the mount of another.
+fn is_of_other_sensor(net: &Net<'_>, node: usize, role: &str) -> bool {
+    let Some(sensor) = net.flat.roles.position(role).filter(|role| !net.is_arm(*role)) else { return false };
+    let frames = net.named_frames(node);
+    // An unknown frame has its own diagnostic.
+    let names_role = frames.iter().any(|frame| net.flat.roles.position(frame).is_some());
+    names_role && !frames.contains(&role) && !net.roles_of(Producer::Node(node)).any(|read| read == sensor)
 }
 
 fn report(net: &Net<'_>, node: usize, facts: &[&ForeignFact<'_>]) -> Diagnostic {
@@ -89,7 +99,8 @@ fn report(net: &Net<'_>, node: usize, facts: &[&ForeignFact<'_>]) -> Diagnostic 
             .help(format!("say which arm carries it: `{name} = {{ type = \"{kind}\", on = \"{arm}\" }}`"));
     }
     let kind = |role: &str| net.flat.roles.get(role).map(|kind| kind.value.as_str());
-    let Some(own) = upstream.into_iter().find(|own| kind(own) == kind(role)) else { return diagnostic };
+    let mut known = upstream.into_iter().chain(net.named_frames(node));
+    let Some(own) = known.find(|own| kind(own) == kind(role)) else { return diagnostic };
     let path = part.and(name.split_once('.')).map(|(_, inner)| format!("set.{inner}.")).unwrap_or_default();
     let line = |fact: &&ForeignFact<'_>| format!("\n{path}{} = {{ from = \"{own}.{}\" }}", fact.param, fact.fact);
     let lines: String = facts.iter().map(line).collect();

@@ -5,8 +5,8 @@ use std::collections::BTreeSet;
 use crate::graph::net::Net;
 use crate::graph::net::limits::{is_looser, length, twin};
 use crate::graph::plan::Producer;
-use crate::graph::syntax::{LimitOwner, LimitSection};
-use crate::source::{Code, Diagnostic, Diagnostics, Key, Value};
+use crate::graph::syntax::{LIMITS, LimitOwner, LimitSection};
+use crate::source::{Code, Diagnostic, Diagnostics, Key, Table, Value};
 
 /// Reports sections of unknown arms, values of different lengths, bounds that exclude each other, and assignments on
 /// the command line that would loosen a limit.
@@ -19,14 +19,27 @@ pub(crate) fn check(net: &Net<'_>, diagnostics: &mut Diagnostics) {
             diagnostics.extend(found.or_else(|| loosened(net, &arms, name)));
         }
     }
-    let mut seen = BTreeSet::new();
-    diagnostics.retain(|found| found.code != Code::LooseLimit || seen.insert(found.span.start));
+    diagnostics.extend(unread(net));
+    // The same sections may hold for several arms.
+    let mut seen: Diagnostics = Vec::new();
+    for found in diagnostics.drain(..) {
+        if !seen.contains(&found) {
+            seen.push(found);
+        }
+    }
+    *diagnostics = seen;
 }
 
-/// Returns each arm alone, or one empty group if the graph moves none.
-fn groups(net: &Net<'_>) -> Vec<Vec<usize>> {
-    let arms: BTreeSet<usize> = net.commands.iter().filter(|wire| !wire.is_report).map(|wire| wire.role).collect();
-    if arms.is_empty() { vec![Vec::new()] } else { arms.into_iter().map(|arm| vec![arm]).collect() }
+/// Returns the groups of arms for which limits hold at once: each arm alone, and those that a node moves.
+fn groups(net: &Net<'_>) -> BTreeSet<Vec<usize>> {
+    let alone = net.commands.iter().filter(|wire| !wire.is_report).map(|wire| vec![wire.role]);
+    let reads = |node: &usize| {
+        let tables = [&net.flat.nodes[*node].block.params].into_iter().chain(net.settings_of(*node));
+        tables.flat_map(Value::facts).any(|fact| fact.word.split('.').next() == Some(LIMITS))
+    };
+    let moved = (0..net.flat.nodes.len()).filter(reads).map(|node| net.arms_of(node).to_vec());
+    let all: BTreeSet<Vec<usize>> = alone.chain(moved).collect();
+    if all.is_empty() { BTreeSet::from([Vec::new()]) } else { all }
 }
 
 fn names(section: &LimitSection) -> impl Iterator<Item = &str> {
@@ -39,7 +52,9 @@ fn unknown_arm(net: &Net<'_>, section: &LimitSection) -> Option<Diagnostic> {
     let limited = |index: &usize| net.roles[*index].is_none_or(|role| !role.limits.is_empty());
     let is_bound = net.flat.bench.as_ref().is_some_and(|bench| bench.bind.position(&role.name).is_some());
     let index = net.flat.roles.position(&role.name);
-    if index.as_ref().is_some_and(limited) || index.is_none() && is_bound && section.owner == LimitOwner::Bench {
+    let is_observed = net.catalogue.roles().iter().any(|known| known.is_observed_as(&role.name));
+    let is_of_another_task = index.is_none() && is_bound && !is_observed && section.owner == LimitOwner::Bench;
+    if index.as_ref().is_some_and(limited) || is_of_another_task {
         return None;
     }
     let arms = (0..net.flat.roles.len()).filter(limited).map(|index| net.name(Producer::Role(index)));
@@ -90,4 +105,45 @@ fn loosened(net: &Net<'_>, arms: &[usize], name: &str) -> Option<Diagnostic> {
     let message = format!("`--set` cannot loosen the limit `{}`, which {} states", key.name, section.owner.name());
     let diagnostic = Diagnostic::new(Code::LooseLimit, value.span.clone(), message);
     Some(diagnostic.note(bound.span.clone(), "the limit is here").help("change the limit in its file"))
+}
+
+/// Reports limits that are stated for an arm and that the limiters on its path do not read, although they could.
+fn unread(net: &Net<'_>) -> Vec<Diagnostic> {
+    let readers = net.catalogue.limit_readers();
+    let mut found = Vec::new();
+    for wire in net.commands.iter().filter(|wire| !wire.is_report) {
+        let path = net.motion_path(wire).unwrap_or_default();
+        let limits =
+            path.iter().flat_map(|stop| readers.limits_of(&stop.spec.name).map(move |limit| (stop.node, limit)));
+        let stated = limits.filter(|(_, limit)| net.limit(&[wire.role], limit).is_some());
+        let is_read = |limit: &str| path.iter().any(|stop| enforces(net, stop.node, limit));
+        let mut open: Vec<(usize, &str)> = stated.filter(|(_, limit)| !is_read(limit)).collect();
+        open.dedup();
+        found.extend(open.into_iter().map(|(node, limit)| report_unread(net, node, limit)));
+    }
+    found
+}
+
+/// Returns whether a parameter of a limiter reads a limit, or has a value of its own, which is compared with the limit.
+fn enforces(net: &Net<'_>, node: usize, limit: &str) -> bool {
+    let kind = net.spec(node).map_or("", |spec| &spec.name);
+    let params = net.flat.nodes[node].block.params.as_table();
+    let mut entries = params.into_iter().flat_map(|table| &table.entries);
+    entries.any(|(key, value)| {
+        let is_for_limit = net.catalogue.limit_readers().limit_of(kind, &key.name) == Some(limit);
+        let fact = value.as_table().and_then(Table::fact);
+        let is_certain = fact.is_none_or(|fact| !fact.is_optional || fact.word == format!("{LIMITS}.{limit}"));
+        is_for_limit && is_certain
+    })
+}
+
+fn report_unread(net: &Net<'_>, node: usize, limit: &str) -> Diagnostic {
+    let (kind, specs) = net.spec(node).map_or(("", &[][..]), |spec| (&spec.name, &spec.params));
+    let reads = |param: &&str| net.catalogue.limit_readers().limit_of(kind, param) == Some(limit);
+    let param = specs.iter().map(|param| param.name).find(reads).unwrap_or("PARAMETER");
+    let message = format!("`{}` does not read the limit `{limit}` of its arm", net.flat.nodes[node].name);
+    let diagnostic = net.diagnostic_at(node, Code::LooseLimit, message);
+    let bound = net.limit(net.arms_of(node), limit);
+    let diagnostic = bound.into_iter().fold(diagnostic, |found, bound| found.note(bound.span, "the limit is here"));
+    diagnostic.help(format!("write `{param} = {{ from = \"{LIMITS}.{limit}\" }}` in it"))
 }

@@ -37,7 +37,8 @@ impl Loader {
             None => self.read(&request.graph, None),
         };
         let Assignments { graph: graph_set, bench: bench_set, limits: set_limits } = self.assignments(&request.set);
-        let set_limits = self.sections(|sections| sections.set_limits(&set_limits));
+        let set_limits: Vec<_> =
+            set_limits.iter().flat_map(|table| self.sections(|sections| sections.set_limits(table))).collect();
         let Some(mut root) = root else { return flat };
         if let Some(what) = wrong_file_type(&root.0, "graph") {
             let message = format!("this is {what}, not a graph");
@@ -195,7 +196,11 @@ impl Loader {
                 let of_bench = matches!(key.name.as_str(), "devices" | "bind" | "facts" | ALLOW_UNCALIBRATED);
                 let target = match of_bench {
                     true => &mut bench,
-                    false if key.name == LIMITS => &mut limits,
+                    // Each of two assignments of a limit holds.
+                    false if key.name == LIMITS => {
+                        limits.push(Table { entries: vec![(key, value)] });
+                        continue;
+                    }
                     false => &mut graph,
                 };
                 target.merge(Table { entries: vec![(key, value)] });
@@ -230,7 +235,7 @@ impl Loader {
 struct Assignments {
     graph: Table,
     bench: Table,
-    limits: Table,
+    limits: Vec<Table>,
 }
 
 /// Returns whether a text is a single assignment, without a header or a second line.

@@ -55,22 +55,25 @@ impl<'a> Net<'a> {
         &self.arms[node]
     }
 
-    /// Returns the sections whose limits hold for one of some arms: all sections if there is none.
+    /// Returns the sections whose limits hold for one of some arms: for any arm of the graph if there is none.
     pub(crate) fn limit_sections(&self, arms: &[usize]) -> impl Iterator<Item = &'a LimitSection> {
-        self.flat
-            .limits
-            .iter()
-            .filter(move |section| arms.is_empty() || arms.iter().any(|arm| self.holds(section, *arm)))
+        let all = || (0..self.roles.len()).filter(|role| self.is_arm(*role)).collect();
+        let arms: Vec<usize> = if arms.is_empty() { all() } else { arms.to_vec() };
+        let holds = move |section: &&LimitSection| arms.is_empty() || arms.iter().any(|arm| self.holds(section, *arm));
+        self.flat.limits.iter().filter(holds)
     }
 
     /// Returns whether the limits of a section hold for an arm.
     fn holds(&self, section: &LimitSection, arm: usize) -> bool {
         let name = self.name(Producer::Role(arm));
-        let is_own = section.role.as_ref().is_none_or(|role| role.name == name);
-        let device = || self.flat.bench.as_ref().and_then(|bench| bench.bind.get(name));
-        match &section.owner {
-            LimitOwner::Robot(robot) => device().is_some_and(|device| device.value == *robot),
-            _ => is_own,
+        let device = |role: &str| self.flat.bench.as_ref()?.bind.get(role).map(|device| &device.value);
+        match (&section.owner, &section.role) {
+            (LimitOwner::Robot(robot), _) => device(name) == Some(robot),
+            // A task may call an arm of the bench by another name.
+            (LimitOwner::Bench, Some(role)) => {
+                role.name == name || device(name).is_some_and(|own| device(&role.name) == Some(own))
+            }
+            (_, role) => role.as_ref().is_none_or(|role| role.name == name),
         }
     }
 

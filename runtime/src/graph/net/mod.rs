@@ -12,14 +12,14 @@ mod sorter;
 mod wire;
 
 use std::cell::OnceCell;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 
 use crate::catalogue::Catalogue;
 use crate::device::RoleType;
 use crate::graph::load::FlatGraph;
 use crate::graph::plan::{PortRef, Producer};
-use crate::node::{NodeSpec, PortSpec, Spanned};
+use crate::node::{NodeSpec, PortSpec, Spanned, frame_args};
 use crate::source::{Code, Diagnostic, Diagnostics, Key, Value};
 
 use provenance::Provenance;
@@ -87,10 +87,18 @@ impl<'a> Net<'a> {
     pub(crate) fn carrier(&self, sensor: usize) -> Option<usize> {
         let (key, _) = &self.flat.roles[sensor];
         if let Some(on) = self.flat.carriers.get(&key.name) {
-            return self.flat.roles.position(&on.value).filter(|arm| *arm != sensor);
+            return self.flat.roles.position(&on.value).filter(|arm| *arm != sensor && self.is_arm(*arm));
         }
         let mut arms = (0..self.roles.len()).filter(|role| self.is_arm(*role));
         arms.next().filter(|arm| *arm != sensor && arms.next().is_none())
+    }
+
+    /// Returns the words of the parameters with which a node names frames, such as the `sensor` of a pose.
+    pub(crate) fn named_frames(&self, node: usize) -> Vec<&'a str> {
+        let ports = self.spec(node).into_iter().flat_map(|spec| spec.inputs.iter().chain(&spec.outputs));
+        let params: BTreeSet<&str> = ports.flat_map(frame_args).filter_map(|arg| arg.strip_prefix('$')).collect();
+        let table = self.flat.nodes[node].block.params.as_table();
+        params.into_iter().filter_map(|param| table?.get(param)?.as_str()).collect()
     }
 
     /// Returns whether a role is commanded.

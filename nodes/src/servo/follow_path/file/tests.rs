@@ -215,7 +215,6 @@ fn bad_parameters_are_mistakes_with_a_way_out() {
             "the corner at point 2 with a radius of 0.005 m does not fit the leg of 0.004 m that begins at point 2",
             Some("write `corner_m = 0.003998` or less, or move the points apart"),
         ),
-        ("path = [[0,0,0],[1,0,0]]\nfile = \"a.csv\"", "`path` and `file` exclude each other", None),
         ("path = [[0,0,0],[1,0,0]]\ncorner_m = 0", "expected a number greater than 0 [m], found 0", None),
     ];
     for (params, message, help) in cases {
@@ -227,6 +226,9 @@ fn bad_parameters_are_mistakes_with_a_way_out() {
         }
     }
     assert!(node(&format!("{right_angle}\ncorner_m = 0.003998")).is_ok());
+    let file = Written::new("both.csv", "x,y,z\n0,0,0\n0.1,0,0\n");
+    let both = node(&format!("path = [[0,0,0],[1,0,0]]\nfile = {:?}", file.0)).err().unwrap();
+    assert_eq!(both[0].message, "`path` and `file` exclude each other");
 }
 
 #[test]

@@ -7,7 +7,7 @@ use super::{Path, Station};
 
 /// The speed that corners and the end allow.
 #[derive(Debug, Clone, PartialEq)]
-pub(in super::super) struct Profile {
+pub(crate) struct Profile {
     /// Largest acceleration [m/s²].
     acceleration: f64,
     /// For each element, the speed that it allows in itself [m/s].
@@ -18,7 +18,7 @@ pub(in super::super) struct Profile {
 
 impl Profile {
     /// Returns the profile of a path.
-    pub(in super::super) fn new(path: &Path, acceleration: f64) -> Self {
+    pub(crate) fn new(path: &Path, acceleration: f64) -> Self {
         let within: Vec<f64> = path
             .elements()
             .iter()
@@ -33,7 +33,7 @@ impl Profile {
     }
 
     /// Returns the speed that is allowed at a station [m/s].
-    pub(in super::super) fn speed(&self, path: &Path, station: Station) -> f64 {
+    pub(crate) fn speed(&self, path: &Path, station: Station) -> f64 {
         let (element, rest) = path.rest_of_element(station);
         braking_speed(self.at_end[element], self.acceleration, rest).min(self.within[element])
     }

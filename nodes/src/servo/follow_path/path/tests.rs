@@ -8,13 +8,13 @@ use proptest::prelude::*;
 use super::{Path, Profile, Refusal, Station};
 
 /// Points of a square of 40 mm in the plane z = 0, beginning in the middle of a side.
-pub(in super::super) const SQUARE: [[f64; 3]; 5] =
+pub(crate) const SQUARE: [[f64; 3]; 5] =
     [[0.0, 0.0, 0.0], [0.02, 0.0, 0.0], [0.02, 0.04, 0.0], [-0.02, 0.04, 0.0], [-0.02, 0.0, 0.0]];
 
 /// The distance of a place from that square with corners of a radius, across and along its plane [m].
 ///
 /// The rounded square is what lies at most `radius` from a smaller square.
-pub(in super::super) fn off_square(place: &Vector3<f64>, radius: f64) -> f64 {
+pub(crate) fn off_square(place: &Vector3<f64>, radius: f64) -> f64 {
     let inner = 0.02 - radius;
     let [x, y] = [place.x.abs() - inner, (place.y - 0.02).abs() - inner];
     let in_plane = x.max(0.0).hypot(y.max(0.0)) + x.max(y).min(0.0) - radius;
