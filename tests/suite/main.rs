@@ -52,3 +52,4 @@ mod units;
 mod verify;
 mod view;
 mod warnings;
+mod windows;
