@@ -54,3 +54,4 @@ mod units;
 mod verify;
 mod view;
 mod warnings;
+mod windows;

@@ -4,7 +4,8 @@
 use std::fs;
 use std::path::Path;
 
-use tactflow_runtime::scenario::judge::{Figure, FigureRow, Verdict};
+use tactflow_runtime::scenario::figure::Figure;
+use tactflow_runtime::scenario::judge::{FigureRow, Verdict};
 use tactflow_runtime::scenario::{Scenario, Trial};
 use tactflow_tests::{catalogue, workspace};
 
@@ -37,7 +38,7 @@ fn what_is_met_ends_with_0_and_prints_figure_bound_paper_and_mark() {
     assert_eq!(row(&out, "x", "response")[6], "0.90000", "the paper's");
     assert!(rows(&out)[1..].iter().all(|row| *row.last().unwrap() == "passed" || row.len() < 9), "{out}");
     assert!(out.contains("slide: 6 seeds of 4 s, pad.noise = 0.002, devices.pad.tau_s = 0.25\n"), "{out}");
-    assert!(out.ends_with("\n11 passed, 0 failed, 4 informational, in 6 runs\n"), "{out}");
+    assert!(out.ends_with("\n13 passed, 0 failed, 4 informational, in 6 runs\n"), "{out}");
 }
 
 #[test]
@@ -116,7 +117,7 @@ fn the_json_is_json_and_does_not_depend_on_the_number_of_jobs() {
         mock: ok, 1 runs, 0 failed, passed informational informational passed\n\
         never: not ok, 1 runs, 1 failed, informational informational\n\
         slide: ok, 6 runs, 0 failed, passed passed passed passed informational informational passed passed passed passed informational \
-         informational passed passed passed\n";
+         informational passed passed passed passed passed\n";
     assert_eq!(peer("verified.py", &[file.path().to_str().unwrap()]), expected);
 }
 

@@ -1,9 +1,10 @@
-//! The sections of a scenario file, and the checks that need no task.
+//! The sections of a scenario file.
 
 use std::ops::Range;
 
-use crate::node::{Amount, At, FilePath, Map, Mistake, Param, Reader, Spanned};
-use crate::source::{Code, Diagnostic, Item, Key, SourceMap, Table, Value, suggestion};
+use super::check_table::{CheckBlock, CheckTable};
+use crate::node::{At, FilePath, Mistake, Param, Reader, Spanned};
+use crate::source::{Code, Item, Key, SourceMap, Table, Value, suggestion};
 
 /// The section `[scenario]`.
 #[derive(Debug, Clone, Param)]
@@ -29,90 +30,6 @@ pub(crate) struct ScenarioTable {
     /// Values to print beside the figures: facts of devices as `role.fact`, and parameters as `devices.NAME.key`.
     #[param(default = vec![])]
     pub(crate) facts: Vec<Spanned<String>>,
-}
-
-/// One check of a scenario.
-#[derive(Debug, Clone, Param)]
-pub(crate) struct CheckTable {
-    /// Port or component to check, by its name in a recording or in the task's wires.
-    pub(crate) of: Spanned<String>,
-    /// Port or component to subtract from it, for example the true value from the measured one.
-    pub(crate) minus: Option<Spanned<String>>,
-    /// Value that it must settle to.
-    #[param(unit = "$unit")]
-    pub(crate) settles_to: Option<Amount>,
-    /// Half width of the band around `settles_to`.
-    #[param(unit = "$unit", above = 0.0)]
-    pub(crate) within: Option<Amount>,
-    /// Maximum response time.
-    #[param(unit = "s", above = 0.0)]
-    pub(crate) response_below_s: Option<f64>,
-    /// Maximum steady-state error.
-    #[param(unit = "$unit", above = 0.0)]
-    pub(crate) steady_state_error_below: Option<Amount>,
-    /// Length of the steady state at the end of the run; 10 by default.
-    #[param(unit = "s", above = 0.0)]
-    pub(crate) steady_s: Option<f64>,
-    /// Maximum standard deviation.
-    #[param(unit = "$unit", above = 0.0)]
-    pub(crate) std_below: Option<Amount>,
-    /// Value that it must never exceed.
-    #[param(unit = "$unit")]
-    pub(crate) never_above: Option<Amount>,
-    /// Value that it must never fall below.
-    #[param(unit = "$unit")]
-    pub(crate) never_below: Option<Amount>,
-    /// Time from which it is checked. The response and the steady state have their own times.
-    #[param(unit = "s", range = 0.0..)]
-    pub(crate) after_s: Option<f64>,
-    /// Unit of all numbers of the check: its name, and its size in the unit of the port.
-    #[param(unit = "1", above = 0.0)]
-    pub(crate) unit: Option<Map<f64>>,
-    /// Values from the paper to print beside the figures.
-    #[param(unit = "$unit")]
-    pub(crate) paper: Option<PaperTable>,
-}
-
-/// Values from the paper.
-#[derive(Debug, Clone, Param)]
-pub(crate) struct PaperTable {
-    /// Response time.
-    #[param(unit = "s")]
-    pub(crate) response_s: Option<f64>,
-    /// Steady-state error.
-    #[param(unit = "$unit")]
-    pub(crate) error: Option<Amount>,
-    /// Mean.
-    #[param(unit = "$unit")]
-    pub(crate) mean: Option<Amount>,
-    /// Standard deviation.
-    #[param(unit = "$unit")]
-    pub(crate) std: Option<Amount>,
-    /// Maximum.
-    #[param(unit = "$unit")]
-    pub(crate) max: Option<Amount>,
-    /// Minimum.
-    #[param(unit = "$unit")]
-    pub(crate) min: Option<Amount>,
-}
-
-impl CheckTable {
-    /// Returns the numbers in the unit of the check.
-    pub(super) fn amounts_mut(&mut self) -> impl Iterator<Item = &mut Amount> {
-        let bounds = [
-            &mut self.settles_to,
-            &mut self.within,
-            &mut self.steady_state_error_below,
-            &mut self.std_below,
-            &mut self.never_above,
-            &mut self.never_below,
-        ];
-        let paper = self
-            .paper
-            .iter_mut()
-            .flat_map(|paper| [&mut paper.error, &mut paper.mean, &mut paper.std, &mut paper.max, &mut paper.min]);
-        bounds.into_iter().chain(paper).flatten()
-    }
 }
 
 /// The seeds and their position in the source.
@@ -143,14 +60,6 @@ impl Param for Seeds {
         let list = list.or_else(|| reader.wrong_type(value, Self::EXPECTS))?;
         Some(Self { list, span: value.span.clone() })
     }
-}
-
-/// A section [check.NAME].
-pub(super) struct CheckBlock {
-    pub(super) key: Key,
-    pub(super) value: Value,
-    /// The keys of the section, or `None` if a mistake in them has been reported.
-    pub(super) table: Option<CheckTable>,
 }
 
 /// A scenario file.
@@ -206,48 +115,4 @@ pub(super) fn document(root: &Table, reader: &mut Reader<'_>) -> Document {
 fn at_key(key: &Key, value: &Value) -> Value {
     let span = if value.as_table().is_some() { &key.span } else { &value.span };
     Value { span: span.clone(), ..value.clone() }
-}
-
-impl CheckBlock {
-    /// Returns the span of a key of the check, or of the check's name if the key is missing.
-    pub(super) fn span(&self, key: &str) -> Range<usize> {
-        let entry = self.value.as_table().and_then(|table| table.entry(key));
-        entry.map_or(self.value.span.clone(), |(key, _)| key.span.clone())
-    }
-
-    /// Returns a diagnostic for each key that contradicts the others or needs another one.
-    pub(super) fn mistakes(&self, for_s: Option<f64>) -> Vec<Diagnostic> {
-        let Some(table) = &self.table else { return Vec::new() };
-        let mut found = Vec::new();
-        let mut wrong = |code: Code, key: &str, message: String, help: &str| {
-            found.push(Diagnostic::new(code, self.span(key), message).help(help));
-        };
-        let (target, within) = (&table.settles_to, &table.within);
-        let is_given = |key: &&str| self.value.as_table().is_some_and(|table| table.get(key).is_some());
-        let needs_target = ["within", "response_below_s", "steady_state_error_below", "steady_s"];
-        for key in needs_target.into_iter().filter(|key| target.is_none() && is_given(key)) {
-            let help = "add `settles_to`: the value that the port must reach";
-            wrong(Code::MissingKey, key, format!("`{key}` needs `settles_to`"), help);
-        }
-        if target.is_some() && within.is_none() {
-            let help = "add `within`: the largest error that counts as settled";
-            wrong(Code::MissingKey, "settles_to", "`settles_to` needs `within`".into(), help);
-        }
-        if let (Some(after), Some(for_s)) = (table.after_s, for_s)
-            && after >= for_s
-        {
-            let message = format!("the run ends after {for_s} s, so there is nothing to check after {} s", after);
-            wrong(Code::BadValue, "after_s", message, "write an earlier time, or a larger `for_s`");
-        }
-        if table.unit.as_ref().is_some_and(|unit| unit.0.len() != 1) {
-            let message = "`unit` must have exactly one entry".into();
-            wrong(
-                Code::BadValue,
-                "unit",
-                message,
-                "write one name and its size in the unit of the port, as in `unit = { tactel = 0.005 }`",
-            );
-        }
-        found
-    }
 }

@@ -2,72 +2,7 @@
 
 use serde::Serialize;
 
-/// A figure of a check.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Figure {
-    /// Time at which the value has settled [s].
-    Response,
-    /// Distance between the steady state and the target.
-    Error,
-    /// Mean.
-    Mean,
-    /// Standard deviation.
-    Std,
-    /// Maximum.
-    Max,
-    /// Minimum.
-    Min,
-    /// Total time in which a flag is absent or not set [s].
-    Lost,
-    /// Total time outside a mode after it was reached [s].
-    Away,
-    /// Whether the run ends in the expected mode: 1 or 0.
-    Ends,
-}
-
-impl Figure {
-    /// Returns the name of the figure in tables.
-    #[must_use]
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Response => "response",
-            Self::Error => "error",
-            Self::Mean => "mean",
-            Self::Std => "std",
-            Self::Max => "max",
-            Self::Min => "min",
-            Self::Lost => "lost",
-            Self::Away => "away",
-            Self::Ends => "ends",
-        }
-    }
-
-    /// Whether the figure is a time.
-    #[must_use]
-    pub const fn is_time(self) -> bool {
-        matches!(self, Self::Response | Self::Lost | Self::Away)
-    }
-
-    /// Whether a larger value is better.
-    const fn is_better_high(self) -> bool {
-        matches!(self, Self::Min | Self::Ends)
-    }
-}
-
-/// The bound on a figure.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Bound {
-    /// No bound: the figure is informational.
-    None,
-    /// The value settles in every run.
-    Settles,
-    /// The median over the runs is at most this.
-    Median(f64),
-    /// The figure is at most this in every run.
-    AtMost(f64),
-    /// The figure is at least this in every run.
-    AtLeast(f64),
-}
+use super::figure::{Bound, Figure};
 
 /// The verdict on a row.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -88,6 +23,10 @@ pub struct FigureRow {
     pub check: String,
     /// The port or the mode that is checked.
     pub of: String,
+    /// The mode to which the check is restricted.
+    pub during: Option<String>,
+    /// The mode or the flag that ends the check.
+    pub until: Option<String>,
     /// The figure.
     pub figure: Figure,
     /// Unit of the figure.
@@ -98,6 +37,8 @@ pub struct FigureRow {
     pub paper: Option<f64>,
     /// The figure of each run, in the order of the seeds; `None` if it could not be measured.
     pub values: Vec<Option<f64>>,
+    /// Number of runs without a tick to check, for example because the mode of `during` was never reached.
+    pub not_checked: usize,
 }
 
 impl FigureRow {
@@ -117,9 +58,14 @@ impl FigureRow {
         Some((low + high) / 2.0).filter(|median| median.is_finite())
     }
 
-    /// Returns the worst value of all runs, or `None` if one of them could not be measured.
+    /// Returns the worst value of all runs, or `None` if one of them could not be measured. The worst change is the one
+    /// that is farthest from its target.
     #[must_use]
     pub fn worst(&self) -> Option<f64> {
+        if let Bound::Near { target, .. } = self.bound {
+            let values: Option<Vec<f64>> = self.values.iter().copied().collect();
+            return values?.into_iter().max_by(|a, b| (a - target).abs().total_cmp(&(b - target).abs()));
+        }
         self.sorted().last().copied().filter(|worst| worst.is_finite())
     }
 
@@ -141,9 +87,12 @@ impl FigureRow {
         Some((good.min(bad), good.max(bad)))
     }
 
-    /// Compares the figure with its bound.
+    /// Compares the figure with its bound. A run without a tick to check fails, even if the figure has no bound.
     #[must_use]
     pub fn verdict(&self) -> Verdict {
+        if self.not_checked > 0 {
+            return Verdict::Failed;
+        }
         let every = |holds: &dyn Fn(f64) -> bool| self.values.iter().all(|value| value.is_some_and(holds));
         let has_passed = match self.bound {
             Bound::None => return Verdict::Informational,
@@ -151,6 +100,7 @@ impl FigureRow {
             Bound::Median(bound) => self.median().is_some_and(|median| median <= bound),
             Bound::AtMost(bound) => every(&|value| value <= bound),
             Bound::AtLeast(bound) => every(&|value| value >= bound),
+            Bound::Near { target, tolerance } => every(&|value| (value - target).abs() <= tolerance),
         };
         if has_passed && !self.values.is_empty() { Verdict::Passed } else { Verdict::Failed }
     }
@@ -184,7 +134,8 @@ mod tests {
 
     fn row(figure: Figure, bound: Bound, values: &[f64]) -> FigureRow {
         let values = values.iter().map(|value| Some(*value).filter(|value| !value.is_nan())).collect();
-        FigureRow { check: "x".into(), of: "a.b".into(), figure, unit: "m".into(), bound, paper: None, values }
+        let (check, of, unit) = ("x".into(), "a.b".into(), "m".into());
+        FigureRow { check, of, during: None, until: None, figure, unit, bound, paper: None, values, not_checked: 0 }
     }
 
     #[test]
@@ -232,11 +183,12 @@ mod tests {
 
     #[test]
     fn a_figure_passes_within_its_bound_and_fails_outside_it() {
-        use Bound::{AtLeast, AtMost, Median, None, Settles};
-        use Figure::{Max, Min, Response, Std};
+        use Bound::{AtLeast, AtMost, Median, Near, None, Settles};
+        use Figure::{Change, Max, Min, Response, Std};
         use Verdict::{Failed, Informational, Passed};
         const NEVER: f64 = f64::NAN;
-        let cases: [(Figure, Bound, &[f64], Verdict); 12] = [
+        const CHANGE: Bound = Near { target: -2.0, tolerance: 0.5 };
+        let cases: [(Figure, Bound, &[f64], Verdict); 16] = [
             (Std, None, &[NEVER], Informational),
             (Std, Median(2.0), &[1.0, 2.0, 9.0], Passed),
             (Std, Median(1.9), &[1.0, 2.0, 9.0], Failed),
@@ -249,9 +201,26 @@ mod tests {
             (Min, AtLeast(1.0), &[1.0, 1.0], Passed),
             (Min, AtLeast(1.0), &[1.0, NEVER], Failed),
             (Std, Median(1.0), &[], Failed),
+            (Change, CHANGE, &[-2.5, -1.5], Passed),
+            (Change, CHANGE, &[-2.5, -1.4], Failed),
+            (Change, CHANGE, &[-2.6, -1.5], Failed),
+            (Change, CHANGE, &[-2.0, NEVER], Failed),
         ];
         for (figure, bound, values, verdict) in cases {
             assert_eq!(row(figure, bound, values).verdict(), verdict, "{figure:?} {bound:?} {values:?}");
+            let empty = FigureRow { not_checked: 1, ..row(figure, bound, values) };
+            assert_eq!(empty.verdict(), Failed, "{figure:?} {bound:?} in a run without a tick to check");
         }
+    }
+
+    #[test]
+    fn the_worst_change_is_the_farthest_from_its_target() {
+        let near = |target: f64, values: &[f64]| {
+            let row = row(Figure::Change, Bound::Near { target, tolerance: 1.0 }, values);
+            (row.median(), row.worst())
+        };
+        assert_eq!(near(-2.0, &[-3.5, -2.0, 0.0]), (Some(-2.0), Some(0.0)));
+        assert_eq!(near(-1.0, &[-3.5, -2.0, 0.0]), (Some(-2.0), Some(-3.5)));
+        assert_eq!(near(-1.0, &[-3.5, f64::NAN, 0.0]), (Some(0.0), None));
     }
 }

@@ -2,18 +2,20 @@
 
 use std::collections::BTreeSet;
 
-use super::document::{CheckBlock, CheckTable, Document, PaperTable, ScenarioTable};
-use super::judge::{Bound, Figure, FigureRow};
+use super::bounds::{figures, number, papers, rows_of};
+use super::check_table::{CheckBlock, CheckTable};
+use super::document::{Document, ScenarioTable};
+use super::figure::{Bound, Figure};
+use super::judge::FigureRow;
 use super::model::{Check, Scenario, row};
+use super::observer::DONE;
+use super::window::{Event, ModeName, Window};
 use crate::catalogue::Catalogue;
 use crate::graph::{Compiled, Request, into_diagnostic};
-use crate::node::{Amount, Mistake, Spanned};
+use crate::node::{Mistake, Spanned};
 use crate::record::{PortColumn, PortColumns};
 use crate::signal::Kind;
-use crate::source::{Code, Diagnostic, Item, Report, Value, suggest_name, suggestion};
-
-/// Default length of the steady state at the end of a run [s].
-const DEFAULT_STEADY_S: f64 = 10.0;
+use crate::source::{Code, Diagnostic, Item, Report, Value, quoted, suggest_name, suggestion};
 
 /// Resolves every name of the scenario, or returns a diagnostic for each that does not exist.
 pub(super) fn look_up(
@@ -53,17 +55,6 @@ pub(super) fn look_up(
     });
     let found = lookup.found;
     scenario.filter(|_| found.is_empty()).ok_or_else(|| Report::new(plan.sources().clone(), found))
-}
-
-/// Returns the rows of the checks on the run as a whole.
-fn rows_of(table: &ScenarioTable) -> impl Iterator<Item = FigureRow> {
-    let rows = [
-        (&table.never_lost, "never_lost", Figure::Lost, Bound::AtMost(0.0)),
-        (&table.stays_in, "stays_in", Figure::Away, Bound::AtMost(0.0)),
-        (&table.ends_in, "ends_in", Figure::Ends, Bound::AtLeast(1.0)),
-    ];
-    let given = rows.into_iter().filter_map(|(word, key, figure, bound)| Some((word.as_ref()?, key, figure, bound)));
-    given.map(|(word, key, figure, bound)| row(key, &word.value, figure, "1", bound, None))
 }
 
 struct Lookup<'a> {
@@ -127,17 +118,12 @@ impl Lookup<'_> {
     }
 
     fn check(&mut self, block: &CheckBlock) -> Option<(Check, Vec<FigureRow>)> {
+        let window = self.window(block.table.as_ref()?);
         let (column, _) = self.column(&block.table.as_ref()?.of)?;
         let table = &self.in_unit(block, &column)?;
         let figures = figures(table);
         let papers = table.paper.as_ref().map(papers).unwrap_or_default();
-        for (paper, _) in papers.iter().filter(|(paper, _)| !figures.iter().any(|(figure, _)| figure == paper)) {
-            let message =
-                format!("the check computes no `{}`, so the paper's value has nothing to compare with", paper.name());
-            let names: Vec<_> = figures.iter().map(|(figure, _)| format!("`{}`", figure.name())).collect();
-            let help = format!("the check computes {}", names.join(", "));
-            self.found.push(Diagnostic::new(Code::UnknownKey, block.span("paper"), message).help(help));
-        }
+        self.uncomputed(block, &papers, &figures);
         let minus = match &table.minus {
             Some(word) => Some(self.subtrahend(word, &column)?),
             None => None,
@@ -148,19 +134,34 @@ impl Lookup<'_> {
         };
         let rows = figures.iter().map(|(figure, bound)| {
             let paper = papers.iter().find(|(of, _)| of == figure).map(|(_, value)| *value);
-            row(&block.key.name, &table.of.value, *figure, &unit_name, *bound, paper)
+            let row = row(&block.key.name, &table.of.value, *figure, &unit_name, *bound, paper);
+            let name = |word: &Option<Spanned<String>>| word.as_ref().map(|word| word.value.clone());
+            FigureRow { during: name(&table.during), until: name(&table.until), ..row }
         });
         let check = Check {
+            name: block.key.name.clone(),
             minus,
             period: column.unit.is_axial().then(|| std::f64::consts::PI / unit),
             column: column.name,
             unit,
             settles: number(&table.settles_to).zip(number(&table.within)),
+            changes: number(&table.changes_by),
             after: table.after_s,
-            steady: table.steady_s.unwrap_or(DEFAULT_STEADY_S),
+            steady: table.steady(),
+            window: window?,
             figures: figures.iter().map(|(figure, _)| *figure).collect(),
         };
         Some((check, rows.collect()))
+    }
+
+    /// Reports each value of the paper whose figure the check does not compute.
+    fn uncomputed(&mut self, block: &CheckBlock, papers: &[(Figure, f64)], figures: &[(Figure, Bound)]) {
+        for (paper, _) in papers.iter().filter(|(paper, _)| !figures.iter().any(|(figure, _)| figure == paper)) {
+            let message =
+                format!("the check computes no `{}`, so the paper's value has nothing to compare with", paper.name());
+            let help = format!("the check computes {}", quoted(figures.iter().map(|(figure, _)| figure.name())));
+            self.found.push(Diagnostic::new(Code::UnknownKey, block.span("paper"), message).help(help));
+        }
     }
 
     /// Returns a check with its numbers in the unit of its column. Numbers in a unit of the check's own are plain.
@@ -185,6 +186,49 @@ impl Lookup<'_> {
         (self.found.len() == before).then_some(table)
     }
 
+    /// Finds the mode of `during` and the mode or the flag of `until`.
+    fn window(&mut self, table: &CheckTable) -> Option<Window> {
+        let before = self.found.len();
+        let during = table.during.as_ref().and_then(|word| self.during(word));
+        let until = table.until.as_ref().and_then(|word| self.event(word));
+        (self.found.len() == before).then_some(Window { during, until })
+    }
+
+    /// Finds the mode of `during`.
+    fn during(&mut self, word: &Spanned<String>) -> Option<ModeName> {
+        if self.plan.modes().next().is_none() {
+            let message = format!("this task has no modes, so it is never in a mode `{}`", word.value);
+            return self.mistake(Code::UnknownMode, word, message, Some("remove `during`".to_owned()));
+        }
+        self.mode(&word.value).or_else(|| self.unknown_mode(word))
+    }
+
+    /// Finds the mode or the flag of `until`. The name of a port has a dot, and the name of a mode has none.
+    fn event(&mut self, word: &Spanned<String>) -> Option<Event> {
+        let name = word.value.clone();
+        if name.contains('.') {
+            return Some(Event::BecomesTrue { column: self.flag(word)?, name });
+        }
+        if let Some(mode) = self.mode(&name) {
+            return Some(Event::Enters(mode));
+        }
+        let flags = self.plan.ports().filter(|port| port.shape.kind() == Kind::Flag).map(|port| port.name.as_str());
+        let help = suggestion(&name, self.plan.modes().chain(flags), "modes and flags");
+        self.mistake(Code::UnknownMode, word, format!("`{name}` is neither a mode nor a flag of this task"), Some(help))
+    }
+
+    /// Finds a mode by its name.
+    fn mode(&self, name: &str) -> Option<ModeName> {
+        let number = self.plan.modes().position(|known| known == name)?;
+        Some(ModeName { name: name.to_owned(), number })
+    }
+
+    /// Reports a mode that does not exist.
+    fn unknown_mode<T>(&mut self, word: &Spanned<String>) -> Option<T> {
+        let help = suggestion(&word.value, self.plan.modes(), "modes");
+        self.mistake(Code::UnknownMode, word, format!("there is no mode `{}`", word.value), Some(help))
+    }
+
     /// Finds the column to subtract from another. Both must have the same unit.
     fn subtrahend(&mut self, word: &Spanned<String>, other: &PortColumn) -> Option<String> {
         let (column, _) = self.column(word)?;
@@ -199,11 +243,9 @@ impl Lookup<'_> {
     fn modes(&mut self, table: &ScenarioTable) {
         let modes: Vec<&str> = self.plan.modes().collect();
         let (ends_in, stays_in) = (table.ends_in.as_ref(), table.stays_in.as_ref());
-        let ends_in = ends_in.filter(|word| word.value != super::trial::DONE || modes.is_empty());
+        let ends_in = ends_in.filter(|word| word.value != DONE || modes.is_empty());
         for word in ends_in.into_iter().chain(stays_in).filter(|word| !modes.contains(&word.value.as_str())) {
-            let message = format!("there is no mode `{}`", word.value);
-            let help = suggestion(&word.value, modes.iter().copied(), "modes");
-            self.mistake::<()>(Code::UnknownMode, word, message, Some(help));
+            self.unknown_mode::<()>(word);
         }
     }
 
@@ -252,39 +294,4 @@ impl Lookup<'_> {
 fn plain(value: &Value) -> Option<toml::Value> {
     let is_plain = !matches!(value.item, Item::Datetime(_) | Item::Array(_) | Item::Table(_));
     toml::Value::try_from(value).ok().filter(|_| is_plain)
-}
-
-/// Returns the number of an amount in the unit of the check.
-fn number(amount: &Option<Amount>) -> Option<f64> {
-    amount.as_ref().map(|amount| amount.number)
-}
-
-/// Returns the figures of a check with their bounds.
-fn figures(table: &CheckTable) -> Vec<(Figure, Bound)> {
-    let median = |bound: &Option<Amount>| number(bound).map_or(Bound::None, Bound::Median);
-    let std = (Figure::Std, median(&table.std_below));
-    let mut figures = Vec::new();
-    let has_extremes = table.never_above.is_some() || table.never_below.is_some();
-    if table.settles_to.is_some() {
-        let response = table.response_below_s.map_or(Bound::Settles, Bound::Median);
-        figures.extend([(Figure::Response, response), (Figure::Error, median(&table.steady_state_error_below)), std]);
-    } else if !has_extremes || table.std_below.is_some() {
-        figures.extend([(Figure::Mean, Bound::None), std]);
-    }
-    figures.extend(number(&table.never_above).map(|bound| (Figure::Max, Bound::AtMost(bound))));
-    figures.extend(number(&table.never_below).map(|bound| (Figure::Min, Bound::AtLeast(bound))));
-    figures
-}
-
-/// Returns the values that the paper gives.
-fn papers(paper: &PaperTable) -> Vec<(Figure, f64)> {
-    let values = [
-        (Figure::Response, paper.response_s),
-        (Figure::Error, number(&paper.error)),
-        (Figure::Mean, number(&paper.mean)),
-        (Figure::Std, number(&paper.std)),
-        (Figure::Max, number(&paper.max)),
-        (Figure::Min, number(&paper.min)),
-    ];
-    values.into_iter().filter_map(|(figure, value)| Some((figure, value?))).collect()
 }

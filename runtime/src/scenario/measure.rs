@@ -79,6 +79,14 @@ pub fn min(readings: &[Reading]) -> Option<f64> {
     readings.iter().map(|reading| reading.value).filter(|value| !value.is_nan()).reduce(f64::min)
 }
 
+/// Returns the last present value minus the first, or `None` if the value is present in fewer than two ticks.
+#[must_use]
+pub fn change(readings: &[Reading]) -> Option<f64> {
+    let mut present = readings.iter().map(|reading| reading.value).filter(|value| !value.is_nan());
+    let start = present.next()?;
+    present.next_back().map(|end| end - start)
+}
+
 /// Returns the new samples, or `None` if the value is absent too often.
 fn samples(readings: &[Reading]) -> Option<Vec<f64>> {
     let present = readings.iter().filter(|reading| !reading.value.is_nan());

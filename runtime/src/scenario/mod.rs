@@ -1,17 +1,25 @@
 //! Scenarios: a task on a bench with seeds, a duration and checks on the results.
 //!
-//! `document` reads the file, `load` checks it, and `lookup` resolves the ports that it names. `trial` runs it with one
-//! seed, [`measure`] computes the figures of a run, and [`judge`] combines the figures of all runs. A scenario cannot
-//! change its task or its bench; it only sets the seed.
+//! `document` and `check_table` read the file, `load` checks it, and `lookup` resolves the ports and modes that it
+//! names. `trial` runs it with one seed while `observer` collects the readings in the `window` of each check.
+//! [`measure`] and `figures` compute the figures of a run, and [`judge`] combines the figures of all runs. A scenario
+//! cannot change its task or its bench; it only sets the seed.
 
+mod bounds;
+mod check_table;
 mod document;
+pub mod figure;
+mod figures;
 pub mod judge;
 mod load;
 mod lookup;
 pub mod measure;
 mod model;
+mod observer;
 mod trial;
+mod window;
 
 pub use document::Seeds;
 pub use model::Scenario;
+pub use observer::NotChecked;
 pub use trial::Trial;

@@ -1,6 +1,8 @@
 //! A checked scenario: its runs, its checks and the rows of its table.
 
-use super::judge::{Bound, Figure, FigureRow};
+use super::figure::{Bound, Figure};
+use super::judge::FigureRow;
+use super::window::Window;
 use crate::graph::Request;
 use crate::source::Report;
 
@@ -31,6 +33,8 @@ pub struct Scenario {
 /// A check on one value.
 #[derive(Debug, Clone)]
 pub(super) struct Check {
+    /// Name of the section.
+    pub(super) name: String,
     pub(super) column: String,
     /// The column to subtract.
     pub(super) minus: Option<String>,
@@ -40,10 +44,14 @@ pub(super) struct Check {
     pub(super) unit: f64,
     /// The target, and the half width of the band around it [unit of the check].
     pub(super) settles: Option<(f64, f64)>,
-    /// Time from which the value is checked [s].
+    /// The expected change, if there is one [unit of the check].
+    pub(super) changes: Option<f64>,
+    /// Time from which the value is checked, after time 0 or after each entry into the mode of the window [s].
     pub(super) after: Option<f64>,
     /// Length of the steady state at the end of the run [s].
     pub(super) steady: f64,
+    /// The ticks that the figures use.
+    pub(super) window: Window,
     /// The figures, in the order of the rows.
     pub(super) figures: Vec<Figure>,
 }
@@ -78,5 +86,16 @@ impl Scenario {
 /// Creates a row without values.
 pub(super) fn row(check: &str, of: &str, figure: Figure, unit: &str, bound: Bound, paper: Option<f64>) -> FigureRow {
     let unit = if figure.is_time() { "s" } else { unit };
-    FigureRow { check: check.into(), of: of.into(), figure, unit: unit.into(), bound, paper, values: Vec::new() }
+    FigureRow {
+        check: check.into(),
+        of: of.into(),
+        during: None,
+        until: None,
+        figure,
+        unit: unit.into(),
+        bound,
+        paper,
+        values: Vec::new(),
+        not_checked: 0,
+    }
 }

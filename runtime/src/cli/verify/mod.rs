@@ -16,7 +16,7 @@ use super::shell::panics::without_panic_messages;
 use super::shell::{FAULTED, NOT_LOADED, Shell};
 use crate::catalogue::Catalogue;
 use crate::engine::Interrupt;
-use crate::scenario::{Scenario, Trial};
+use crate::scenario::{NotChecked, Scenario, Trial};
 
 /// Run scenarios and check their results
 #[derive(clap::Parser)]
@@ -64,9 +64,14 @@ fn verify_all(args: &VerifyArgs, shell: &Shell) -> Result<u8, String> {
         shell.say(table::text(&all, shell.has_colour()).trim_end());
     }
     for verified in &all {
+        let run = |seed: Option<u64>| {
+            format!("{}{}", verified.name(), seed.map_or_else(String::new, |seed| format!(", seed {seed}")))
+        };
         for (why, seed) in verified.failures() {
-            let seed = seed.map_or_else(String::new, |seed| format!(", seed {seed}"));
-            shell.error(format_args!("{}{seed}: {why}", verified.name()));
+            shell.error(format_args!("{}: {why}", run(seed)));
+        }
+        for (NotChecked { check, why }, seed) in verified.not_checked() {
+            shell.error(format_args!("{}: check `{check}`: {why}", run(seed)));
         }
     }
     if !is_complete {

@@ -8,7 +8,8 @@ use super::verified::Verified;
 use crate::cli::shell::json::{DiagnosticJson, diagnosed};
 use crate::cli::text::number::{count_of, number};
 use crate::cli::text::table::table;
-use crate::scenario::judge::{Bound, Figure, FigureRow, Verdict};
+use crate::scenario::figure::{Bound, Figure};
+use crate::scenario::judge::{FigureRow, Verdict};
 use crate::scenario::{Scenario, Trial};
 
 const HEADER: [&str; 10] =
@@ -81,6 +82,7 @@ fn cells(row: &FigureRow, has_colour: bool) -> [String; 10] {
         Bound::Median(bound) => format!("≤ {}", number(bound)),
         Bound::AtMost(bound) => format!("each ≤ {}", number(bound)),
         Bound::AtLeast(bound) => format!("each ≥ {}", number(bound)),
+        Bound::Near { target, tolerance } => format!("each {} ± {}", number(target), number(tolerance)),
     };
     let missing = match row.missing() {
         0 => String::new(),
@@ -93,7 +95,7 @@ fn cells(row: &FigureRow, has_colour: bool) -> [String; 10] {
     [
         String::new(),
         row.check.clone(),
-        row.figure.name().to_owned(),
+        limited(row),
         row.unit.clone(),
         figure(row.median()),
         bound,
@@ -102,6 +104,13 @@ fn cells(row: &FigureRow, has_colour: bool) -> [String; 10] {
         interval,
         mark(row.verdict(), has_colour),
     ]
+}
+
+/// Returns the name of a figure, with the mode and the event that limit it.
+fn limited(row: &FigureRow) -> String {
+    let during = row.during.iter().map(|mode| format!(" during {mode}"));
+    let until = row.until.iter().map(|event| format!(" until {event}"));
+    row.figure.name().to_owned() + &during.chain(until).collect::<String>()
 }
 
 /// Writes a verdict, in green or in red.
@@ -149,6 +158,10 @@ enum Judged {
 struct RowJson<'a> {
     check: &'a str,
     of: &'a str,
+    /// The mode to which the check is restricted; null without one.
+    during: Option<&'a str>,
+    /// The mode or the flag that ends the check; null without one.
+    until: Option<&'a str>,
     figure: &'static str,
     unit: &'a str,
     /// Over the runs; null if not measured.
@@ -156,7 +169,10 @@ struct RowJson<'a> {
     worst: Option<f64>,
     /// Confidence interval of the median, at least 95 %; an end is null if not measured.
     interval: Option<(f64, f64)>,
+    /// The largest or the smallest value; the largest error if there is a target.
     bound: Option<f64>,
+    /// The expected change; null for other figures.
+    target: Option<f64>,
     /// What the bound applies to; null without a bound.
     judged: Option<Judged>,
     paper: Option<f64>,
@@ -190,17 +206,26 @@ fn row_json(row: &FigureRow) -> RowJson<'_> {
         Bound::None => (None, None),
         Bound::Settles => (None, Some(Judged::Every)),
         Bound::Median(bound) => (Some(bound), Some(Judged::Median)),
-        Bound::AtMost(bound) | Bound::AtLeast(bound) => (Some(bound), Some(Judged::Every)),
+        Bound::AtMost(bound) | Bound::AtLeast(bound) | Bound::Near { tolerance: bound, .. } => {
+            (Some(bound), Some(Judged::Every))
+        }
+    };
+    let target = match row.bound {
+        Bound::Near { target, .. } => Some(target),
+        _ => None,
     };
     RowJson {
         check: &row.check,
         of: &row.of,
+        during: row.during.as_deref(),
+        until: row.until.as_deref(),
         figure: row.figure.name(),
         unit: &row.unit,
         median: row.median(),
         worst: row.worst(),
         interval: row.interval(),
         bound,
+        target,
         judged,
         paper: row.paper,
         mark: row.verdict(),

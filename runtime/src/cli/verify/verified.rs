@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use crate::scenario::judge::{FigureRow, Verdict};
-use crate::scenario::{Scenario, Trial};
+use crate::scenario::{NotChecked, Scenario, Trial};
 use crate::source::Report;
 
 /// A scenario and its results.
@@ -23,6 +23,11 @@ impl Verified {
     /// Returns why runs could not be measured, each with the seed of the run.
     pub(crate) fn failures(&self) -> impl Iterator<Item = (&str, Option<u64>)> {
         self.trials.iter().filter_map(|trial| Some((trial.failure.as_deref()?, trial.seed)))
+    }
+
+    /// Returns the checks without a tick to check, each with the seed of the run.
+    pub(crate) fn not_checked(&self) -> impl Iterator<Item = (&NotChecked, Option<u64>)> {
+        self.trials.iter().flat_map(|trial| trial.not_checked.iter().map(|one| (one, trial.seed)))
     }
 
     /// Whether the scenario loads, no run failed and no check failed.
