@@ -154,7 +154,7 @@ impl SourceMap {
     #[must_use]
     pub fn path(&self, text: &str, at: usize) -> PathBuf {
         match self.file_at(at).name.strip_prefix(BUILTIN) {
-            _ if text.starts_with(BUILTIN) => PathBuf::from(text),
+            _ if text.starts_with(BUILTIN) || Path::new(text).is_absolute() => PathBuf::from(text),
             Some(name) => PathBuf::from(format!("{BUILTIN}{}", beside(name, text))),
             None => self.folder(at).join(text),
         }
@@ -247,6 +247,7 @@ mod tests {
         assert_eq!(sources.path("builtin:b.csv", base), Path::new("builtin:b.csv"));
         let base = sources.add_file(Path::new("builtin:robots/a.toml"), "").base;
         assert_eq!(sources.path("a.urdf", base), Path::new("builtin:robots/a.urdf"));
+        assert_eq!(sources.path("/a.urdf", base), Path::new("/a.urdf"));
         assert_eq!(sources.path("../parts/./b.toml", base), Path::new("builtin:parts/b.toml"));
     }
 
