@@ -128,14 +128,6 @@ fn a_speed_of_zero_frees_a_part_and_there_counts_the_others() {
 }
 
 #[test]
-fn a_target_in_millimetres_is_warned_of() {
-    let wires: [(&str, Shape); 1] = [("pose", PoseShape::default().into())];
-    let rig = NodeRig::new::<HoldPose>("target = { xyz = [400, 0, 300] }", &wires).unwrap();
-    let codes: Vec<_> = rig.warnings.iter().map(|warning| warning.code.name()).collect();
-    assert_eq!(codes, ["unusual-value"; 2]);
-}
-
-#[test]
 fn a_bad_parameter_is_a_mistake_at_its_place() {
     let cases = [
         ("gain_per_s = 0", "bad-value: `0`"),
