@@ -9,6 +9,7 @@ mod calibrate;
 mod cli;
 
 mod course;
+mod crossings;
 mod determinism;
 mod devices;
 mod docs;

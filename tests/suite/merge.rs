@@ -5,7 +5,7 @@
 use std::fs;
 
 use tactflow_runtime::graph::{Request, compile};
-use tactflow_runtime::signal::{Pose, Scalar};
+use tactflow_runtime::signal::Scalar;
 use tactflow_runtime::source::Code;
 use tactflow_tests::catalogue;
 

@@ -40,11 +40,7 @@ pub(crate) fn compile_in(mut loader: Loader, catalogue: &Catalogue, request: &Re
     }
     let net = Net::new(&flat, catalogue, &mut diagnostics);
     let opened = bench::open(&net, &mut sources, &mut diagnostics);
-    check::inputs::check(&net, &mut diagnostics);
-    check::commands::check(&net, &mut diagnostics);
-    check::exports::check(&net, &mut diagnostics);
-    check::delays::check(&net, &mut diagnostics);
-    check::policy::check(&net, &mut diagnostics);
+    check_wires(&net, &mut diagnostics);
     let view = check::view::check(&net, &mut diagnostics);
     let mut frames = check::frames::check(&net, &mut diagnostics);
     check::quantities::check(&net, &mut diagnostics);
@@ -102,6 +98,15 @@ pub(crate) fn compile_in(mut loader: Loader, catalogue: &Catalogue, request: &Re
     let devices = opened.devices;
     let plan = Plan { roles, devices, nodes, commands, clock, period, max_gap, reset_after, modes, policy, allowed };
     Ok(Compiled { plan, view, sources, warnings, outline, exports, facts })
+}
+
+/// Checks what needs neither frames nor limits.
+fn check_wires(net: &Net<'_>, diagnostics: &mut Diagnostics) {
+    check::inputs::check(net, diagnostics);
+    check::commands::check(net, diagnostics);
+    check::exports::check(net, diagnostics);
+    check::delays::check(net, diagnostics);
+    check::policy::check(net, diagnostics);
 }
 
 /// Separates the mistakes from the warnings.

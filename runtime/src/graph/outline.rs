@@ -309,7 +309,7 @@ impl OutlineBuilder<'_> {
     fn setting(&self, value: &Value, path: String, node: Option<usize>) -> Setting {
         let word = value.as_table().and_then(Table::fact).map(|fact| fact.word);
         let role = word.and_then(|word| word.split_once('.'));
-        let role = role.and_then(|(role, _)| self.net.flat.roles.position(role));
+        let role = role.and_then(|(role, _)| self.net.flat.roles.position(self.net.role_in(node, role)));
         let mut filled = value.clone();
         // The graph has no mistakes, so every fact is there.
         fill_facts(&mut filled, node, self.net, self.opened, &mut Diagnostics::new());

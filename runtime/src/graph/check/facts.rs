@@ -57,11 +57,12 @@ fn task_values(net: &Net<'_>, node: usize) -> Vec<Diagnostic> {
 
 /// Returns the facts in a table of parameters that are of roles which the node does not read. Unknown roles have their
 /// own diagnostic, and optional facts are left out.
-fn find_foreign<'a>(net: &Net<'_>, node: usize, table: &'a Value) -> Vec<ForeignFact<'a>> {
+fn find_foreign<'a>(net: &'a Net<'_>, node: usize, table: &'a Value) -> Vec<ForeignFact<'a>> {
     let entries = table.as_table().into_iter().flat_map(|table| &table.entries);
     let facts = entries.flat_map(|(key, value)| value.facts().into_iter().map(move |fact| (key.name.as_str(), fact)));
     let foreign = facts.filter_map(|(param, FactRef { word, place, is_optional })| {
         let (role, fact) = word.split_once('.')?;
+        let role = net.role_in(Some(node), role);
         let is_role = role != LIMITS && net.flat.roles.position(role).is_some();
         let is_foreign = !net.reads(node, role) || is_of_other_sensor(net, node, role);
         (is_role && !is_optional && is_foreign).then_some(ForeignFact { param, role, fact, place })

@@ -19,8 +19,7 @@ pub(super) fn check(
     let Some(spec) = net.spec(limiter) else { return Vec::new() };
     let frame = frames.of(motion).into_iter().next().flatten();
     let sensor = frame.and_then(|frame| net.flat.roles.position(&frame));
-    let mut found: Vec<Diagnostic> =
-        sensor.and_then(|sensor| on_another_arm(net, role, limiter, sensor)).into_iter().collect();
+    let mut found = Vec::new();
     for wire in net.wires[limiter].iter().filter(|wire| spec.inputs[wire.input].need.must_be_known) {
         let makers = find_makers(net, wire.source);
         let roles = makers.iter().flat_map(|maker| net.roles_of(maker.producer));
@@ -42,7 +41,15 @@ pub(super) fn check(
 }
 
 /// Reports that a limiter works in the frame of a sensor which another arm carries.
-fn on_another_arm(net: &Net<'_>, arm: usize, limiter: usize, sensor: usize) -> Option<Diagnostic> {
+pub(super) fn on_another_arm(
+    net: &Net<'_>,
+    frames: &mut Frames<'_>,
+    arm: usize,
+    limiter: usize,
+    motion: PortRef,
+) -> Option<Diagnostic> {
+    let frame = frames.of(motion).into_iter().next().flatten()?;
+    let sensor = net.flat.roles.position(&frame)?;
     let carrier = net.carrier(sensor).filter(|carrier| *carrier != arm && sensor != arm)?;
     let [arm, sensor, carrier] = [arm, sensor, carrier].map(|role| net.name(Producer::Role(role)));
     let name = &net.flat.nodes[limiter].name;

@@ -48,9 +48,13 @@ pub(crate) fn check(net: &Net<'_>, frames: &mut Frames<'_>, diagnostics: &mut Di
         diagnostics.extend(path.mixed_frames(frames));
         // A wire in the wrong frame has its own diagnostic.
         let limiters = path.nodes.iter().filter(|stop| !stop.spec.limits.holds.is_empty());
-        for stop in limiters.filter(|stop| !frames.has_clash(stop.node)).collect::<Vec<_>>() {
+        let limiters: Vec<_> = limiters.filter(|stop| !frames.has_clash(stop.node)).collect();
+        for stop in &limiters {
             diagnostics.extend(foreign::check(net, frames, wire.role, stop.node, stop.source));
         }
+        let mut along = limiters.iter().rev();
+        let find = |stop: &&PathNode<'_>| foreign::on_another_arm(net, frames, wire.role, stop.node, stop.source);
+        diagnostics.extend(along.find_map(find));
     }
 }
 

@@ -31,6 +31,8 @@ pub(crate) struct Scope {
     pub(crate) parent: Option<usize>,
     /// The name of the part in the scope of its parent.
     pub(crate) part: Option<Key>,
+    /// The role of the graph for each name of a role in this file that differs from it.
+    pub(crate) roles: BTreeMap<String, String>,
 }
 
 /// A node with its full name and its scope.
@@ -71,6 +73,11 @@ impl FlatGraph {
         let keys = || self.settings.iter().filter_map(Value::as_table).flat_map(|table| &table.entries);
         let is_key = |found: &Diagnostic| keys().any(|(key, _)| key.span == found.span);
         diagnostics.iter().any(|found| found.code == Code::UnknownKey && is_key(found))
+    }
+
+    /// Returns the role of the graph that a name means in the file of a scope.
+    pub(crate) fn role_in<'n>(&'n self, scope: usize, name: &'n str) -> &'n str {
+        self.scopes[scope].roles.get(name).map_or(name, String::as_str)
     }
 
     /// Returns the limits of all sections, each with its name.

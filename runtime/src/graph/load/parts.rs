@@ -6,7 +6,7 @@ use super::flat::{Entity, FlatGraph, FlatNode, Scope};
 use super::loader::{Loader, wrong_file_type};
 use crate::graph::syntax::{GraphDocument, PartBlock, Use};
 use crate::node::FilePath;
-use crate::source::{Code, Diagnostic, Item, Key, Named, Table, Value, quoted};
+use crate::source::{Code, Diagnostic, Item, Key, Named, Table, Value, quoted, suggest_name};
 
 /// Maximum depth of parts inside parts.
 const MAX_PART_DEPTH: usize = 32;
@@ -23,7 +23,8 @@ impl Loader {
         flat: &mut FlatGraph,
     ) -> usize {
         let index = flat.scopes.len();
-        flat.scopes.push(Scope::default());
+        // Parts inside look up the roles while the rest of the scope is being read.
+        flat.scopes.push(Scope { roles: scope.roles.clone(), ..Scope::default() });
         let mut reads: BTreeMap<String, Vec<Use>> = BTreeMap::new();
         let uses = if document.parts.is_empty() { Vec::new() } else { document.uses() };
         for reference in uses {
@@ -111,10 +112,35 @@ impl Loader {
         self.open_parts.push(canonical);
         let inputs = part.wires.valid.iter().map(|wire| (wire.key.clone(), wire.clone())).collect();
         let key = part.key.clone();
-        let scope = Scope { inputs, parent: Some(parent), part: Some(key), ..Scope::default() };
+        let roles = self.part_roles(part, parent, flat);
+        let scope = Scope { inputs, parent: Some(parent), part: Some(key), roles, ..Scope::default() };
         let inner = self.flatten(document, &format!("{prefix}{}.", part.key.name), scope, flat);
         self.open_parts.pop();
         Some(inner)
+    }
+
+    /// Returns the role of the graph for each name of a role in a part: those that the part lists, and those of the file
+    /// around it.
+    fn part_roles(&mut self, part: &PartBlock, parent: usize, flat: &FlatGraph) -> BTreeMap<String, String> {
+        let mut roles = flat.scopes[parent].roles.clone();
+        for (inner, outer) in part.roles.iter() {
+            let role = flat.role_in(parent, &outer.value);
+            if flat.roles.position(role).is_none() {
+                let unknown = Diagnostic::unknown(Code::UnknownPort, "role", role, &outer.span, flat.roles.names());
+                self.diagnostics.push(unknown);
+                // What follows from the mistake is not reported.
+                roles
+                    .extend(suggest_name(role, flat.roles.names()).map(|meant| (inner.name.clone(), meant.to_owned())));
+                continue;
+            }
+            // The name occurs here, and at least once in the file of the part.
+            if self.sources.occurrences(&inner.name) < 2 {
+                let message = format!("part `{}` has no role `{}`", part.key.name, inner.name);
+                self.diagnostics.push(Diagnostic::new(Code::UnknownKey, inner.span.clone(), message));
+            }
+            roles.insert(inner.name.clone(), role.to_owned());
+        }
+        roles
     }
 
     fn check_part_wires(&mut self, part: &PartBlock, document: &GraphDocument) {

@@ -111,6 +111,8 @@ pub(crate) struct PartBlock {
     pub(crate) file: Option<FilePath>,
     pub(crate) wires: InputWires,
     pub(crate) set: Table,
+    /// The role for each name of a role in the file of the part.
+    pub(crate) roles: Named<Spanned<String>>,
 }
 
 /// The sections of a graph file or of a part.
@@ -343,7 +345,8 @@ impl<'a> Sections<'a> {
         separate_wires(&mut table, &mut self.reader);
         correct_wires(&mut table, sources, &mut self.reader);
         correct_part_file(&mut table, &mut self.reader);
-        correct_keys(&mut table, &["file", "in", "set"], "", &mut self.reader);
+        correct_keys(&mut table, &["file", "in", "set", "roles"], "", &mut self.reader);
+        let roles = table.remove("roles").map(|(_, value)| self.words(Some(&value))).unwrap_or_default();
         let wires = self.wires(&mut table);
         let mut set = table.remove("set").map(|(_, value)| value);
         set.iter_mut().for_each(|value| correct_facts(value, &mut self.reader));
@@ -357,7 +360,7 @@ impl<'a> Sections<'a> {
                 None
             }
         };
-        PartBlock { key, file, wires, set }
+        PartBlock { key, file, wires, set, roles }
     }
 
     /// Reads the table `in` of a block.

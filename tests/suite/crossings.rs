@@ -1,0 +1,83 @@
+//! Two arms in one graph: whatever of one arm is given to the other one, the graph does not load.
+
+use tactflow_runtime::graph::{Request, compile};
+use tactflow_tests::{catalogue, workspace};
+
+fn two_arms() -> Request {
+    Request::file(workspace().join("tests/data/two_arms/press_and_slide.toml"))
+}
+
+/// The codes of the mistakes of a request, each once; none if it loads.
+fn codes(request: &Request) -> Vec<&'static str> {
+    let Err(report) = compile(&catalogue(), request) else { return Vec::new() };
+    let mut codes: Vec<&str> = report.diagnostics.iter().map(|diagnostic| diagnostic.code.name()).collect();
+    codes.sort_unstable();
+    codes.dedup();
+    codes
+}
+
+#[test]
+fn nothing_of_one_arm_can_be_given_to_the_other_one() {
+    let crossings = [
+        // The pad, the arm or both of a part.
+        ("parts.left_move.roles.pad='right_pad'", "foreign-input"),
+        ("parts.left_move.roles.arm='right_arm'", "foreign-fact"),
+        ("parts.left_move.roles={ pad = 'right_pad', arm = 'right_arm' }", "foreign-input"),
+        ("parts.left_touch.roles.pad='right_pad'", "foreign-fact"),
+        // Wires.
+        ("parts.left_move.in.position='right_arm.position'", "frame-mismatch"),
+        ("parts.left_move.in.equilibrium='right_arm.equilibrium'", "frame-mismatch"),
+        ("parts.left_move.in.image='right_touch.image'", "foreign-input"),
+        ("parts.left_move.in.contact='right_touch.present'", "foreign-input"),
+        ("parts.left_move.in.twist='right_reach.twist'", "foreign-input"),
+        ("parts.left_touch.in.image='right_pad.image'", "foreign-fact"),
+        ("commands.left_arm.velocity='right_move.velocity'", "frame-mismatch"),
+        // Facts.
+        ("parts.left_move.set.state.mount={ from = 'right_pad.mount' }", "foreign-fact"),
+        ("parts.left_move.set.state.urdf={ from = 'right_arm.urdf' }", "foreign-fact"),
+        ("parts.left_move.set.state.tip={ from = 'right_arm.tip' }", "foreign-fact"),
+        ("parts.left_move.set.ik.posture={ from = 'right_arm.home' }", "foreign-fact"),
+        ("parts.left_move.set.state.sensor='right_pad'", "foreign-input"),
+        ("parts.left_touch.set.calibrate.device={ from = 'right_pad.calibration' }", "foreign-fact"),
+        ("parts.left_touch.set.binarize.threshold={ from = 'right_pad.threshold' }", "foreign-fact"),
+        // Which arm carries a pad.
+        ("roles.left_pad={ type = 'tactile_pad', on = 'right_arm' }", "foreign-input"),
+        ("roles.left_pad={ type = 'tactile_pad', on = 'right_pad' }", "unknown-port"),
+        ("roles.left_pad={ type = 'tactile_pad', on = 'left_pad' }", "unknown-port"),
+        ("roles.left_arm={ type = 'velocity_arm', on = 'right_arm' }", "wrong-role"),
+        // Names that are no role.
+        ("parts.left_move.roles.pad='left_pda'", "unknown-port"),
+        ("parts.left_move.roles.padd='left_pad'", "unknown-key"),
+        ("limits.left_pad.force_n=3", "unknown-port"),
+        ("limits.left.force_n=3", "unknown-port"),
+        // Limits of one arm, and of both.
+        ("limits.left_arm.force_n=15.1", "loose-limit"),
+        ("limits.right_arm.workspace_max_m=[-0.3, 0.4, 0.71]", "loose-limit"),
+        ("limits.blind_mm=50.1", "loose-limit"),
+        ("parts.left_move.set.contact.force_n=15.1", "loose-limit"),
+        ("parts.left_move.set.joints.acceleration={ from = 'limits.none', optional = true }", "loose-limit"),
+        ("parts.left_move.set.joints.acceleration={ from = 'left_arm.none', optional = true }", "loose-limit"),
+        ("limits.left_arm.workspace_min_m=[-0.2, -0.4, 0.1]", "bad-value"),
+    ];
+    assert_eq!(codes(&two_arms()), [""; 0], "it loads as it is");
+    let mut wrong = Vec::new();
+    for (set, code) in crossings {
+        let found = codes(&two_arms().set(set));
+        if !found.contains(&code) {
+            wrong.push(format!("{set}: {found:?} without {code}"));
+        }
+    }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
+
+#[test]
+fn a_limit_of_one_arm_is_not_that_of_the_other_one() {
+    let request = two_arms().set("limits.left_arm.force_n=5.0").set("limits.force_n=12").set("limits.force_n=14");
+    let plan = compile(&catalogue(), &request).unwrap_or_else(|report| panic!("{}", report.render(false)));
+    let of = |name: &str| {
+        let node = plan.outline().nodes.iter().find(|node| node.name == name).expect("a node of the graph");
+        let setting = node.settings.iter().find(|setting| setting.path == "force_n").expect("a parameter of the node");
+        format!("{:?}", setting.value.item)
+    };
+    assert_eq!([of("left_move.contact"), of("right_move.contact")], ["Integer(5)", "Integer(12)"]);
+}
