@@ -83,7 +83,11 @@ fn report(net: &Net<'_>, node: usize, facts: &[&ForeignFact<'_>]) -> Diagnostic 
     let (name, role, part) = (&net.flat.nodes[node].name, facts[0].role, net.part_of(node));
     let upstream: Vec<&str> = net.roles_of(Producer::Node(node)).map(|role| net.name(Producer::Role(role))).collect();
     let (params, reads) = (quoted(facts.iter().map(|fact| fact.param)), quoted(&upstream));
-    let message = format!("`{name}` takes {params} from the facts of `{role}`, but it reads only {reads}");
+    let why = match net.reads(node, role) {
+        true => format!("it works in the frame of {}", quoted(net.named_frames(node))),
+        false => format!("it reads only {reads}"),
+    };
+    let message = format!("`{name}` takes {params} from the facts of `{role}`, but {why}");
     let place = facts[0].place.clone();
     let diagnostic = match part {
         Some(part) => {
