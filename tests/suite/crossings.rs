@@ -81,3 +81,39 @@ fn a_limit_of_one_arm_is_not_that_of_the_other_one() {
     };
     assert_eq!([of("left_move.contact"), of("right_move.contact")], ["Integer(5)", "Integer(12)"]);
 }
+
+/// Two pads whose parts call each of them `pad`, with more lines at the second part.
+fn two_pads(more: &str) -> Request {
+    let graph = format!(
+        "graph.clock = 'pad'\n[roles]\npad = 'tactile_pad'\npad2 = 'tactile_pad'\n\
+         [parts.touch]\nfile = 'builtin:parts/touch.toml'\nin.image = 'pad.image'\n\
+         [parts.touch2]\nfile = 'builtin:parts/touch.toml'\nin.image = 'pad2.image'\nroles.pad = 'pad2'\n{more}"
+    );
+    let bench = "[bind]\npad = 'one'\npad2 = 'two'\n[devices.one]\ntype = 'mock_pad'\nthreshold = 0.01\n\
+                 [devices.two]\ntype = 'mock_pad'\nthreshold = 0.02\n";
+    Request { bench_text: Some(bench.into()), ..Request::text(graph) }
+}
+
+#[test]
+fn a_name_of_a_role_means_what_it_means_in_the_file_where_it_is_written() {
+    let cases: [(&str, &[&str]); 5] = [
+        ("", &[]),
+        // The graph names its own roles, also where it sets something in a part.
+        ("set.binarize.threshold = { from = 'pad2.threshold' }", &[]),
+        ("set.binarize.threshold = { from = 'pad.threshold' }", &["foreign-fact"]),
+        ("[graph]\nstart = 'm'\n[modes.m]\nset.touch2.binarize.threshold = { from = 'pad2.threshold' }", &[]),
+        (
+            "[graph]\nstart = 'm'\n[modes.m]\nset.touch2.binarize.threshold = { from = 'pad.threshold' }",
+            &["foreign-fact"],
+        ),
+    ];
+    for (more, wanted) in cases {
+        let (table, rest) = more.strip_prefix("[graph]\n").map_or((None, more), |more| {
+            let (start, modes) = more.split_once('\n').expect("a key and the modes");
+            (Some(start), modes)
+        });
+        let mut request = two_pads(rest);
+        request = table.into_iter().fold(request, |request, start| request.set(format!("graph.{start}")));
+        assert_eq!(codes(&request), wanted, "{more}");
+    }
+}

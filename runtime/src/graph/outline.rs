@@ -307,9 +307,10 @@ impl OutlineBuilder<'_> {
 
     /// A value as it was written, or the fact that it asks for.
     fn setting(&self, value: &Value, path: String, node: Option<usize>) -> Setting {
-        let word = value.as_table().and_then(Table::fact).map(|fact| fact.word);
-        let role = word.and_then(|word| word.split_once('.'));
-        let role = role.and_then(|(role, _)| self.net.flat.roles.position(self.net.role_in(node, role)));
+        let fact = value.as_table().and_then(Table::fact);
+        let word = fact.as_ref().map(|fact| fact.word);
+        let role = fact.as_ref().and_then(|fact| Some((fact.word.split_once('.')?.0, fact.place.start)));
+        let role = role.and_then(|(role, at)| self.net.flat.roles.position(self.net.role_at(node, role, at)));
         let mut filled = value.clone();
         // The graph has no mistakes, so every fact is there.
         fill_facts(&mut filled, node, self.net, self.opened, &mut Diagnostics::new());

@@ -7,11 +7,18 @@ use tactflow_runtime::source::Code;
 use super::path::{Path, Refusal};
 use super::{Params, file};
 
+/// Maximum number of points in a graph file; a file of points may have more.
+const MAX_INLINE_POINTS: usize = 1000;
+
 impl Params {
     /// Returns the path, and a warning about coordinates in another unit.
     pub(super) fn read_path(&self) -> Result<(Path, Option<Mistake>), Mistakes> {
         let round = |points: &[Vector3<f64>]| Path::new(points, self.corner_m, self.closed);
         match (&self.path, &self.file) {
+            (Some(path), None) if path.len() > MAX_INLINE_POINTS => {
+                let message = format!("the path has {} points, but the maximum is {MAX_INLINE_POINTS}", path.len());
+                Err(Mistake::param("path", message).help("write them to a file, and name it with `file`").into())
+            }
             (Some(path), None) => {
                 let points: Vec<Vector3<f64>> = path.iter().map(|point| Vector3::from(*point)).collect();
                 let place = |i: usize| At::Param(format!("path.{i}"));

@@ -50,7 +50,7 @@ fn with_unit(value: Value, unit: &str) -> Value {
 fn is_left_out(value: &Value, node: Option<usize>, net: &Net<'_>, opened: &OpenedBench) -> bool {
     let Some(fact) = value.as_table().and_then(Table::fact).filter(|fact| fact.is_optional) else { return false };
     let role = fact.word.split_once('.').map_or(fact.word, |(role, _)| role);
-    let is_foreign = |node: usize| !net.reads(node, net.role_in(Some(node), role));
+    let is_foreign = |node: usize| !net.reads(node, net.role_at(Some(node), role, fact.place.start));
     if role == LIMITS {
         let arms = node.map_or(&[][..], |node| net.arms_of(node));
         return net.limit(arms, fact.word.split_once('.').map_or("", |(_, name)| name)).is_none();
@@ -78,7 +78,7 @@ fn find_fact(
         });
     }
     let (roles, length) = (&net.flat.roles, role.len());
-    let role = net.role_in(node, role);
+    let role = net.role_at(node, role, place.start);
     let Some(index) = roles.position(role) else {
         let place = part(0..length);
         return Diagnostic::unknown(Code::UnknownFact, "role", role, &place, roles.names().chain([LIMITS])).into_err();

@@ -62,7 +62,7 @@ fn find_foreign<'a>(net: &'a Net<'_>, node: usize, table: &'a Value) -> Vec<Fore
     let facts = entries.flat_map(|(key, value)| value.facts().into_iter().map(move |fact| (key.name.as_str(), fact)));
     let foreign = facts.filter_map(|(param, FactRef { word, place, is_optional })| {
         let (role, fact) = word.split_once('.')?;
-        let role = net.role_in(Some(node), role);
+        let role = net.role_at(Some(node), role, place.start);
         let is_role = role != LIMITS && net.flat.roles.position(role).is_some();
         let is_foreign = !net.reads(node, role) || is_of_other_sensor(net, node, role);
         (is_role && !is_optional && is_foreign).then_some(ForeignFact { param, role, fact, place })

@@ -31,7 +31,7 @@ impl<'a> FrameNames<'a> {
     /// Returns the frame that a parameter of a node names, and its place. Returns `None` if it names none.
     pub(super) fn named(&self, node: usize, param: &str) -> Option<(String, Range<usize>)> {
         let value = self.net.flat.nodes[node].block.params.as_table()?.get(param)?;
-        let name = self.resolve(&self.outer(node, value.as_str()?), &value.span).ok()?;
+        let name = self.resolve(&self.outer(node, value.as_str()?, value.span.start), &value.span).ok()?;
         Some((name, value.span.clone()))
     }
 
@@ -48,17 +48,18 @@ impl<'a> FrameNames<'a> {
             for param in params {
                 let value = flat.block.params.as_table().and_then(|table| table.get(param));
                 let Some((name, value)) = value.and_then(|value| Some((value.as_str()?, value))) else { continue };
-                if let Err(unknown) = self.resolve(&self.outer(node, name), &value.span) {
+                if let Err(unknown) = self.resolve(&self.outer(node, name, value.span.start), &value.span) {
                     diagnostics.push(*unknown);
                 }
             }
         }
     }
 
-    /// Returns the name of a frame outside of the part of a node, where a role may have another name.
-    fn outer(&self, node: usize, name: &str) -> String {
+    /// Returns the name of a frame outside of the part of a node, where a role may have another name. The name is
+    /// written at `at`.
+    fn outer(&self, node: usize, name: &str, at: usize) -> String {
         let (role, rest) = name.split_once('.').map_or((name, None), |(role, rest)| (role, Some(rest)));
-        let role = self.net.role_in(Some(node), role);
+        let role = self.net.role_at(Some(node), role, at);
         rest.map_or_else(|| role.to_owned(), |rest| format!("{role}.{rest}"))
     }
 

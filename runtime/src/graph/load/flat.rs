@@ -33,6 +33,8 @@ pub(crate) struct Scope {
     pub(crate) part: Option<Key>,
     /// The role of the graph for each name of a role in this file that differs from it.
     pub(crate) roles: BTreeMap<String, String>,
+    /// Where the text of the file of a part is.
+    pub(crate) text: Range<usize>,
 }
 
 /// A node with its full name and its scope.
@@ -75,9 +77,13 @@ impl FlatGraph {
         diagnostics.iter().any(|found| found.code == Code::UnknownKey && is_key(found))
     }
 
-    /// Returns the role of the graph that a name means in the file of a scope.
-    pub(crate) fn role_in<'n>(&'n self, scope: usize, name: &'n str) -> &'n str {
-        self.scopes[scope].roles.get(name).map_or(name, String::as_str)
+    /// Returns the role of the graph that a name means which is written at `at`: in the file of a scope, or in one of
+    /// those around it, which may override a value of the part.
+    pub(crate) fn role_at<'n>(&'n self, scope: usize, name: &'n str, at: usize) -> &'n str {
+        let around = std::iter::successors(Some(scope), |scope| self.scopes[*scope].parent);
+        let mut scopes = around.map(|scope| &self.scopes[scope]);
+        let own = scopes.find(|scope| scope.text.contains(&at));
+        own.and_then(|scope| scope.roles.get(name)).map_or(name, String::as_str)
     }
 
     /// Returns the limits of all sections, each with its name.

@@ -24,7 +24,8 @@ impl Loader {
     ) -> usize {
         let index = flat.scopes.len();
         // Parts inside look up the roles while the rest of the scope is being read.
-        flat.scopes.push(Scope { roles: scope.roles.clone(), ..Scope::default() });
+        let (roles, text, parent) = (scope.roles.clone(), scope.text.clone(), scope.parent);
+        flat.scopes.push(Scope { roles, text, parent, ..Scope::default() });
         let mut reads: BTreeMap<String, Vec<Use>> = BTreeMap::new();
         let uses = if document.parts.is_empty() { Vec::new() } else { document.uses() };
         for reference in uses {
@@ -83,7 +84,8 @@ impl Loader {
             self.diagnostics.push(Diagnostic::new(Code::EndlessPart, file.span.clone(), message));
             return None;
         }
-        let mut root = self.read(&file.path, Some(file.span.clone()))?.0;
+        let (mut root, start) = self.read(&file.path, Some(file.span.clone()))?;
+        let text = self.sources.file_at(start.start).span();
         if let Some(what) = wrong_file_type(&root, "exports").filter(|_| root.get("inputs").is_none()) {
             let message = format!("this file is {what}, not a part");
             self.diagnostics.push(Diagnostic::new(Code::WrongFile, file.span.clone(), message));
@@ -113,7 +115,7 @@ impl Loader {
         let inputs = part.wires.valid.iter().map(|wire| (wire.key.clone(), wire.clone())).collect();
         let key = part.key.clone();
         let roles = self.part_roles(part, parent, flat);
-        let scope = Scope { inputs, parent: Some(parent), part: Some(key), roles, ..Scope::default() };
+        let scope = Scope { inputs, parent: Some(parent), part: Some(key), roles, text, ..Scope::default() };
         let inner = self.flatten(document, &format!("{prefix}{}.", part.key.name), scope, flat);
         self.open_parts.pop();
         Some(inner)
@@ -124,7 +126,7 @@ impl Loader {
     fn part_roles(&mut self, part: &PartBlock, parent: usize, flat: &FlatGraph) -> BTreeMap<String, String> {
         let mut roles = flat.scopes[parent].roles.clone();
         for (inner, outer) in part.roles.iter() {
-            let role = flat.role_in(parent, &outer.value);
+            let role = flat.role_at(parent, &outer.value, outer.span.start);
             if flat.roles.position(role).is_none() {
                 let unknown = Diagnostic::unknown(Code::UnknownPort, "role", role, &outer.span, flat.roles.names());
                 self.diagnostics.push(unknown);

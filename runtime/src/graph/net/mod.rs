@@ -93,9 +93,9 @@ impl<'a> Net<'a> {
         arms.next().filter(|arm| *arm != sensor && arms.next().is_none())
     }
 
-    /// Returns the role of the graph that a name means in the file of a node, or outside of all parts.
-    pub(crate) fn role_in<'n>(&'n self, node: Option<usize>, name: &'n str) -> &'n str {
-        self.flat.role_in(node.map_or(0, |node| self.flat.nodes[node].scope), name)
+    /// Returns the role of the graph that a name means which is written at `at`, in a parameter of a node.
+    pub(crate) fn role_at<'n>(&'n self, node: Option<usize>, name: &'n str, at: usize) -> &'n str {
+        self.flat.role_at(node.map_or(0, |node| self.flat.nodes[node].scope), name, at)
     }
 
     /// Returns the words of the parameters with which a node names frames, such as the `sensor` of a pose.
@@ -103,8 +103,10 @@ impl<'a> Net<'a> {
         let ports = self.spec(node).into_iter().flat_map(|spec| spec.inputs.iter().chain(&spec.outputs));
         let params: BTreeSet<&str> = ports.flat_map(frame_args).filter_map(|arg| arg.strip_prefix('$')).collect();
         let table = self.flat.nodes[node].block.params.as_table();
-        let scope = self.flat.nodes[node].scope;
-        params.into_iter().filter_map(|param| Some(self.flat.role_in(scope, table?.get(param)?.as_str()?))).collect()
+        let values = params.into_iter().filter_map(|param| table?.get(param));
+        let role =
+            |value: &'a Value| Some(self.flat.role_at(self.flat.nodes[node].scope, value.as_str()?, value.span.start));
+        values.filter_map(role).collect()
     }
 
     /// Returns whether a role is commanded.

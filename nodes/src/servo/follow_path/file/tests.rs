@@ -34,6 +34,9 @@ fn node(params: &str) -> Result<NodeRig, Mistakes> {
     NodeRig::new::<FollowPath>(params, &wires)
 }
 
+/// A file by its name and its bytes, and the code, the message and the place (line, column) of its mistake.
+type Damaged<'c> = (&'c str, Vec<u8>, Code, &'c str, Option<(usize, usize)>);
+
 /// The code, the message and the place in its line of the only mistake of a file.
 fn mistake(name: &str, bytes: impl AsRef<[u8]>) -> (Code, String, Option<(usize, usize)>) {
     let file = Written::new(name, bytes);
@@ -105,7 +108,7 @@ fn hostile_files_give_one_message_at_its_place() {
     use Code::{BadData, BadValue};
     let huge = "x,y,z\n".to_owned() + &"0,0,0\n".repeat(10_000_000 / 20);
     let ascii = String::from_utf8(cloud(false, &[[0.0; 3], [1.0; 3]])).unwrap();
-    let cases: [(&str, Vec<u8>, Code, &str, Option<(usize, usize)>); 16] = [
+    let cases: [Damaged<'_>; 16] = [
         ("empty.csv", b"".to_vec(), BadData, "the file is empty", None),
         ("blank.csv", b"\n \n".to_vec(), BadData, "the file is empty", None),
         ("header.csv", b"x,y,z\n".to_vec(), BadValue, "a path needs at least 2 points", None),

@@ -103,7 +103,8 @@ impl Path {
             let (leg, along) = (way.norm(), way.normalize());
             let [before, after] = [turns[i], turns[i + 1]].map(|turn| turn.half_tangent * radius);
             let end = points[i] + along * (leg - after);
-            if leg - before - after > 0.0 {
+            // Two arcs that meet have no line between them; rounding may leave one without a direction.
+            if leg - before - after > MIN_LEG_M {
                 elements.push(Element::line(points[i] + along * before, end));
             }
             if turns[i + 1].angle > 0.0 {

@@ -181,3 +181,26 @@ fn a_path_that_crosses_itself_is_not_cut_short() {
         way = path.way(station);
     }
 }
+
+#[test]
+fn arcs_that_meet_have_no_line_between_them() {
+    let mut tried = 0;
+    for millimetres in [6.0, 10.0, 20.0, 30.0] {
+        for corner in [[-0.02, 0.0, 0.0], [0.4, 0.1, 0.3], [0.123, -0.4, 0.05]] {
+            let side: f64 = millimetres * 1e-3;
+            let from = Vector3::from(corner);
+            let points = [[0.0, 0.0], [side, 0.0], [side, side], [0.0, side]];
+            let points = points.map(|[x, y]| from + Vector3::new(x, y, 0.0));
+            // Rounding may leave no room for the radius itself.
+            let Ok(path) = Path::new(&points, 0.5 * side * (1.0 - 1e-15), true) else { continue };
+            let length = 2.0 * std::f64::consts::PI * 0.5 * side;
+            assert!((path.length - length).abs() < 1e-9, "{side} m at {from}: {}", path.length);
+            for station in samples(&path, 1e-4) {
+                let vectors = [path.point(station), path.direction(station), path.curvature(station)];
+                assert!(vectors.iter().flatten().all(|value| value.is_finite()), "{side} m at {from}");
+            }
+            tried += 1;
+        }
+    }
+    assert!(tried >= 4, "{tried} circles");
+}
