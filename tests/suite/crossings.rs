@@ -117,3 +117,16 @@ fn a_name_of_a_role_means_what_it_means_in_the_file_where_it_is_written() {
         assert_eq!(codes(&request), wanted, "{more}");
     }
 }
+
+#[test]
+fn a_second_pad_on_an_arm_needs_a_limiter_of_its_own() {
+    let hybrid =
+        || Request::file(workspace().join("graphs/hybrid.toml")).bench(workspace().join("graphs/benches/mock.toml"));
+    let second = |role: &str| {
+        let request = hybrid().set(format!("roles.pad2={role}")).set("bind.pad2='pad2'");
+        codes(&request.set("devices.pad2={ type = 'mock_pad' }"))
+    };
+    assert_eq!(second("'tactile_pad'"), ["unlimited-command"]);
+    assert_eq!(second("{ type = 'tactile_pad', on = 'arm' }"), ["unlimited-command"]);
+    assert_eq!(second("{ type = 'tactile_pad', on = 'none' }"), [""; 0], "it is on no arm");
+}

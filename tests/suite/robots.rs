@@ -26,7 +26,8 @@ fn on_robot(task: &str, bench: &str, (robot, min, max): (&str, [f64; 3], [f64; 3
         _ => folder.join(format!("robots/{robot}.toml")),
     };
     let text = text.lines().map(|line| match line.split(" = ").next() {
-        Some("robot") => format!("robot = {file:?}\n"),
+        Some("robot" | "urdf") => format!("robot = {file:?}\n"),
+        Some("tip" | "home") => String::new(),
         Some("workspace_min_m") => format!("workspace_min_m = {min:?}\n"),
         Some("workspace_max_m") => format!("workspace_max_m = {max:?}\n"),
         _ => format!("{line}\n"),

@@ -44,7 +44,7 @@ pub(crate) fn compile_in(mut loader: Loader, catalogue: &Catalogue, request: &Re
     let view = check::view::check(&net, &mut diagnostics);
     let mut frames = check::frames::check(&net, &mut diagnostics);
     check::quantities::check(&net, &mut diagnostics);
-    check::facts::check(&net, &mut diagnostics);
+    check::facts::check(&net, &sources, &mut diagnostics);
     check::limits::check(&net, &mut frames, &mut diagnostics);
     check::limit_values::check(&net, &opened, &sources, &mut diagnostics);
     check::limit_sections::check(&net, &mut diagnostics);

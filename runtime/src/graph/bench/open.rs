@@ -150,9 +150,12 @@ impl Opener<'_> {
                 self.diagnostics.push(unknown);
                 continue;
             };
-            let is_opened = opened.contains(&*device.key.name);
+            // A device that is opened checks its own parameters.
+            if opened.contains(&*device.key.name) {
+                continue;
+            }
             let params = known.params();
-            let entries = device.params.as_table().filter(|_| !is_opened).into_iter().flat_map(|table| &table.entries);
+            let entries = device.params.as_table().into_iter().flat_map(|table| &table.entries);
             for (key, _) in entries.filter(|(key, _)| !params.iter().any(|param| param.name == key.name)) {
                 let message = format!("`{}` is not a parameter here", key.name);
                 let diagnostic = Diagnostic::new(Code::UnknownKey, key.span.clone(), message);

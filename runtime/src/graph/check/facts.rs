@@ -6,7 +6,8 @@ use std::ops::Range;
 use crate::graph::net::Net;
 use crate::graph::plan::Producer;
 use crate::graph::syntax::LIMITS;
-use crate::source::{Code, Diagnostic, Diagnostics, Edit, FactRef, Key, Table, Value, quoted};
+use crate::node::Spanned;
+use crate::source::{Code, Diagnostic, Diagnostics, Edit, FactRef, Key, SourceMap, Table, Value, quoted, suggest_name};
 
 /// A fact of a role that the node does not read.
 struct ForeignFact<'a> {
@@ -20,17 +21,32 @@ struct ForeignFact<'a> {
 /// Reports facts of roles that are not upstream of their node, one diagnostic for each node and role.
 ///
 /// A node that reads no role generates its outputs, and may use the facts of any role.
-pub(crate) fn check(net: &Net<'_>, diagnostics: &mut Diagnostics) {
+pub(crate) fn check(net: &Net<'_>, sources: &SourceMap, diagnostics: &mut Diagnostics) {
     for (node, flat) in net.flat.nodes.iter().enumerate() {
         diagnostics.extend(task_values(net, node));
         let tables = [&flat.block.params].into_iter().chain(net.settings_of(node));
         let foreign: Vec<ForeignFact<'_>> = tables.flat_map(|table| find_foreign(net, node, table)).collect();
         let roles: BTreeSet<&str> = foreign.iter().map(|fact| fact.role).collect();
+        diagnostics.extend(misspelt_roles(net, sources, node));
         for role in roles {
             let facts: Vec<_> = foreign.iter().filter(|fact| fact.role == role).collect();
             diagnostics.push(report(net, node, &facts));
         }
     }
+}
+
+/// Reports optional facts of a role that does not exist, if its name is misspelt: it occurs once, and a role is similar.
+fn misspelt_roles(net: &Net<'_>, sources: &SourceMap, node: usize) -> Vec<Diagnostic> {
+    let tables = [&net.flat.nodes[node].block.params].into_iter().chain(net.settings_of(node));
+    let optional = tables.flat_map(Value::facts).filter(|fact| fact.is_optional);
+    let report = |fact: FactRef<'_>| {
+        let (role, known) = (fact.word.split_once('.')?.0, net.flat.roles.names().chain([LIMITS]));
+        let is_known = known.clone().any(|name| name == net.role_at(Some(node), role, fact.place.start));
+        suggest_name(role, known.clone()).filter(|_| !is_known && sources.occurrences(role) == 1)?;
+        let place = Spanned { value: fact.word.to_owned(), span: fact.place.clone() }.part(0..role.len());
+        Some(Diagnostic::unknown(Code::UnknownFact, "role", role, &place, known))
+    };
+    optional.filter_map(report).collect()
 }
 
 /// Reports parameters that only a fact can set, and that the task sets itself.

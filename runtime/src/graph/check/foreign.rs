@@ -40,6 +40,15 @@ pub(super) fn check(
     found
 }
 
+/// Returns the roles that the inputs of a limiter which must be known descend from.
+pub(super) fn read_roles(net: &Net<'_>, limiter: usize) -> Vec<usize> {
+    let spec = net.spec(limiter).filter(|spec| !spec.limits.holds.is_empty());
+    let Some(spec) = spec else { return Vec::new() };
+    let known = net.wires[limiter].iter().filter(|wire| spec.inputs[wire.input].need.must_be_known);
+    let makers = known.flat_map(|wire| find_makers(net, wire.source));
+    makers.flat_map(|maker| net.roles_of(maker.producer).collect::<Vec<_>>()).collect()
+}
+
 /// Reports that a limiter works in the frame of a sensor which another arm carries.
 pub(super) fn on_another_arm(
     net: &Net<'_>,

@@ -42,7 +42,9 @@ pub(crate) fn check(net: &Net<'_>, frames: &mut Frames<'_>, diagnostics: &mut Di
         }
         let required = path.role.limits.iter().map(|limit| &**limit);
         let missing: Vec<&str> = required.filter(|limit| !held.contains(limit)).collect();
-        if !missing.is_empty() {
+        if missing.is_empty() {
+            diagnostics.extend(path.unprotected());
+        } else {
             diagnostics.push(path.unlimited(&missing, &lost));
         }
         diagnostics.extend(path.mixed_frames(frames));
@@ -69,6 +71,25 @@ impl<'a> CommandPath<'a> {
     /// Follows a motion backwards, or returns `None` if a wire is missing.
     fn find(net: &'a Net<'a>, wire: &'a CommandWire) -> Option<Self> {
         Some(Self { net, wire, role: net.roles[wire.role]?, nodes: net.motion_path(wire)? })
+    }
+
+    /// Reports sensors on the arm that no limiter reads, while limiters read another sensor of the same type: nothing
+    /// would bound the force on them.
+    fn unprotected(&self) -> Vec<Diagnostic> {
+        let Self { net, wire, .. } = self;
+        let kind = |role: usize| &net.flat.roles[role].1.value;
+        let read: BTreeSet<usize> = self.nodes.iter().flat_map(|stop| foreign::read_roles(net, stop.node)).collect();
+        let kinds: BTreeSet<&String> = read.iter().filter(|role| !net.is_arm(**role)).map(|role| kind(*role)).collect();
+        let is_open =
+            |role: &usize| net.carrier(*role) == Some(wire.role) && kinds.contains(kind(*role)) && !read.contains(role);
+        let arm = net.name(Producer::Role(wire.role));
+        let report = |role: usize| {
+            let (key, kind) = (&net.flat.roles[role].0, kind(role));
+            let message = format!("`{}` is on `{arm}`, and no limiter of `{arm}` reads it", key.name);
+            let help = format!("if it is on no arm, write `{} = {{ type = \"{kind}\", on = \"none\" }}`", key.name);
+            Diagnostic::new(Code::UnlimitedCommand, key.span.clone(), message).help(help)
+        };
+        (0..net.roles.len()).filter(is_open).map(report).collect()
     }
 
     /// Returns the diagnostic of the missing limits, of which the nodes in `lost` broke some.

@@ -9,6 +9,7 @@ use super::provenance::Provenance;
 use crate::catalogue::Catalogue;
 use crate::device::RoleType;
 use crate::graph::load::FlatGraph;
+use crate::graph::syntax::NO_ARM;
 use crate::node::Spanned;
 use crate::source::{Code, Diagnostic, Diagnostics, Key};
 
@@ -79,7 +80,7 @@ fn find_role<'a>(
 fn check_carriers(flat: &FlatGraph, roles: &[Option<&RoleType>], diagnostics: &mut Diagnostics) {
     let is_arm = |index: usize| roles[index].is_none_or(|role| !role.commands.is_empty());
     let arms = || (0..roles.len()).filter(|index| is_arm(*index)).map(|index| flat.roles[index].0.name.as_str());
-    for (sensor, on) in flat.carriers.iter() {
+    for (sensor, on) in flat.carriers.iter().filter(|(_, on)| on.value != NO_ARM) {
         let carries = flat.roles.position(&on.value);
         if carries.is_none_or(|index| !is_arm(index)) {
             diagnostics.push(Diagnostic::unknown(Code::UnknownPort, "arm", &on.value, &on.span, arms()));

@@ -19,6 +19,7 @@ use crate::catalogue::Catalogue;
 use crate::device::RoleType;
 use crate::graph::load::FlatGraph;
 use crate::graph::plan::{PortRef, Producer};
+use crate::graph::syntax::NO_ARM;
 use crate::node::{NodeSpec, PortSpec, Spanned, frame_args};
 use crate::source::{Code, Diagnostic, Diagnostics, Key, Value};
 
@@ -76,7 +77,7 @@ impl<'a> Net<'a> {
     pub(crate) fn reads(&self, node: usize, role: &str) -> bool {
         let carrier = self.flat.roles.position(role).and_then(|role| self.carrier(role));
         // A sensor on an unknown arm has its own diagnostic.
-        if carrier.is_none() && self.flat.carriers.get(role).is_some() {
+        if carrier.is_none() && self.flat.carriers.get(role).is_some_and(|on| on.value != NO_ARM) {
             return true;
         }
         let mut roles = self.roles_of(Producer::Node(node)).peekable();

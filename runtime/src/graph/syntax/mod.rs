@@ -18,7 +18,7 @@ pub(crate) use modes::{ExitKind, ExitTable, ModeBlock, ModeExit, PortState};
 pub(crate) use names::Use;
 pub use policy::Policy;
 pub(crate) use policy::{AgeLimit, PolicyTable, default_max_age_ns, default_max_age_s};
-pub(crate) use reserved::{INPUTS, LIMITS, ROBOT};
+pub(crate) use reserved::{INPUTS, LIMITS, NO_ARM, ROBOT};
 pub(crate) use sections::{
     ALLOW_UNCALIBRATED, BenchDocument, Block, GraphDocument, GraphTable, PartBlock, Sections, WireEntry,
     into_diagnostic,

@@ -2,6 +2,8 @@
 
 /// Name of the section [limits] in `{ from = "limits.KEY" }`.
 pub(crate) const LIMITS: &str = "limits";
+/// Where a sensor is that no arm carries.
+pub(crate) const NO_ARM: &str = "none";
 /// Key of a device for its robot, and section of the file that it names.
 pub(crate) const ROBOT: &str = "robot";
 
