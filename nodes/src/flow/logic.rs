@@ -83,6 +83,15 @@ fn refuse_none(wires: usize) -> Result<(), Mistakes> {
     Err(mistake.help("wire each under a name of your choice: `in.left = \"label.present\"`").into())
 }
 
+/// Writes the `decisive` value if one flag has it, and the other value if none has. An absent flag is not set; without any
+/// flag the result is absent.
+fn combine(inputs: &Inputs<'_>, out: &mut Outputs, decisive: bool) {
+    if inputs.flag.iter().any(|flag| flag.is_some()) {
+        let has_decisive = inputs.flag.iter().any(|flag| flag.is_some_and(|flag| *flag) == decisive);
+        out.is_met.set(has_decisive == decisive);
+    }
+}
+
 impl Node for All {
     type Params = ();
     type Inputs<'a> = Inputs<'a>;
@@ -94,9 +103,7 @@ impl Node for All {
     }
 
     fn step(&self, _: &Tick, inputs: Inputs<'_>, out: &mut Outputs, (): &mut ()) {
-        if inputs.flag.iter().any(|flag| flag.is_some()) {
-            out.is_met.set(inputs.flag.iter().all(|flag| flag.is_some_and(|flag| *flag)));
-        }
+        combine(&inputs, out, false);
     }
 }
 
@@ -111,9 +118,7 @@ impl Node for Any {
     }
 
     fn step(&self, _: &Tick, inputs: Inputs<'_>, out: &mut Outputs, (): &mut ()) {
-        if inputs.flag.iter().any(|flag| flag.is_some()) {
-            out.is_met.set(inputs.flag.iter().any(|flag| flag.is_some_and(|flag| *flag)));
-        }
+        combine(&inputs, out, true);
     }
 }
 

@@ -2,6 +2,7 @@
 
 use crate::catalogue::Catalogue;
 use crate::graph::syntax::BenchDocument;
+use crate::node::ParamSpec;
 use crate::source::{Code, Diagnostic, Diagnostics, Item, Table};
 
 /// Adds to each device the parameters of its robot that its type has; those of the bench replace them.
@@ -14,7 +15,7 @@ pub(crate) fn add_robots(bench: &mut BenchDocument, catalogue: &Catalogue, diagn
         let own = device.params();
         let (mut table, before) = (Table::default(), diagnostics.len());
         for (key, value) in &robot.params.entries {
-            let has = |params: &[crate::node::ParamSpec]| params.iter().any(|param| param.name == key.name);
+            let has = |params: &[ParamSpec]| params.iter().any(|param| param.name == key.name);
             if has(&own) {
                 table.entries.push((key.clone(), value.clone()));
             } else if !catalogue.devices().iter().any(|device| has(&device.params())) {

@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 
 use crate::graph::net::Net;
-use crate::graph::net::limits::{is_looser, length, twin};
+use crate::graph::net::limits::{is_looser, is_lower_bound, length, twin};
 use crate::graph::plan::Producer;
 use crate::graph::syntax::{LIMITS, LimitOwner, LimitSection};
 use crate::source::{Code, Diagnostic, Diagnostics, Key, Table, Value};
@@ -78,7 +78,7 @@ fn different_lengths(net: &Net<'_>, arms: &[usize], name: &str) -> Option<Diagno
 
 /// Reports a lower bound and an upper bound of different sections between which there is nothing.
 fn excluded(net: &Net<'_>, arms: &[usize], name: &str) -> Option<Diagnostic> {
-    let upper = twin(name).filter(|_| name.split('_').any(|word| word == "min"))?;
+    let upper = twin(name).filter(|_| is_lower_bound(name))?;
     if !net.excludes_all(arms, name) {
         return None;
     }

@@ -158,7 +158,7 @@ fn numbers(name: &str, value: &Value) -> Option<Vec<f64>> {
 }
 
 /// Returns whether a limit is a lower bound, so that the greater of two values is the tighter one.
-fn is_lower_bound(name: &str) -> bool {
+pub(crate) fn is_lower_bound(name: &str) -> bool {
     name.split('_').any(|word| word == "min")
 }
 
