@@ -85,7 +85,7 @@ impl fmt::Display for Fault {
             Cause::Late { by } => write!(f, "a tick began {:.1} ms late", ms(*by))?,
             Cause::Spent => write!(f, "`{name}` has spent its budget of motion without a contact")?,
             Cause::Operator => write!(f, "the operator sent `stop`")?,
-            Cause::Mode(why) => write!(f, "a `fail` condition of mode `{name}` ended the run: {why}")?,
+            Cause::Mode(why) => write!(f, "a `fail` condition of mode `{name}` holds: {why}")?,
             Cause::Lost(why) => write!(f, "`{name}` is lost: {why}")?,
             Cause::Device(message) => write!(f, "device `{name}` failed: {message}")?,
         }

@@ -91,7 +91,7 @@ impl Node for Mute {
 }
 
 #[test]
-fn what_comes_after_a_panic_is_absent_also_behind_a_node_that_gives_nothing() {
+fn after_a_panic_the_nodes_that_do_not_depend_on_it_still_step() {
     let text = "[graph]\nclock = 'a'\n[policy]\npanic = 'hold'\n[roles]\na = 'length'\n\
                 [nodes.first]\ntype = 'count'\nin.value = 'a.value'\n[nodes.mute]\ntype = 'mute'\n\
                 in.value = 'a.value'\n[nodes.second]\ntype = 'count'\nin.value = 'a.value'\n";
@@ -105,8 +105,8 @@ fn what_comes_after_a_panic_is_absent_also_behind_a_node_that_gives_nothing() {
         rig.tick(ms).unwrap();
         seen.push([rig.freshness("first.steps"), rig.freshness("second.steps")]);
     }
-    use Freshness::{Lost, New};
-    assert_eq!(seen, [[New, New], [New, New], [New, Lost], [New, New], [New, New]]);
+    assert_eq!(seen, [[Freshness::New; 2]; 5]);
+    assert!(!rig.engine.halts().is_empty());
 }
 
 #[test]

@@ -147,8 +147,7 @@ fn a_failure_names_the_mode_its_reason_and_its_line() {
     rig.tick(0.0).unwrap();
     rig.tick(10.0).unwrap();
     let fault = rig.tick(20.0).unwrap_err();
-    let expected =
-        "a `fail` condition of mode `one` ended the run: 15 ms have passed in tick 3 at 0.020 s (graph.toml:14:8)";
+    let expected = "a `fail` condition of mode `one` holds: 15 ms have passed in tick 3 at 0.020 s (graph.toml:14:8)";
     assert_eq!(fault.to_string(), expected);
 }
 

@@ -112,7 +112,7 @@ fn of_a_pad_that_falls_silent_the_last_image_is_shown() {
 #[test]
 fn what_is_usual_is_shown_of_a_graph_that_does_not_say() {
     let shown = |request: &Request| -> Vec<String> {
-        Engine::new(loaded(request)).display().ports.iter().map(|(name, ..)| name.clone()).collect()
+        Engine::new(loaded(request)).display().iter().map(|shown| shown.name.clone()).collect()
     };
     let text = fs::read_to_string(tactflow_tests::workspace().join(VIEW)).unwrap();
     let silent = text.replace("show = [\"source.image\", \"error.error\"]\n", "");

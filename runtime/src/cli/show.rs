@@ -74,6 +74,10 @@ fn text(plan: &Compiled, has_colour: bool) -> String {
     page.section("roles", &roles.iter().map(|role| word(&role.name, &role.kind)).collect::<Vec<_>>(), &[]);
     page.section("commands", &commands.iter().map(|command| wire("", command)).collect::<Vec<_>>(), &[]);
     page.section("policy", &settings(&outline.policy), &[]);
+    for task in &outline.tasks {
+        page.section(&format!("graph of {}", task.name), &settings(&task.settings), &[]);
+        page.section(&format!("policy of {}", task.name), &settings(&task.policy), &[]);
+    }
     for mode in &outline.modes {
         page.section(&format!("modes.{}", mode.name), &settings(&mode.settings), &[]);
     }

@@ -8,4 +8,6 @@ mod session;
 
 pub(crate) use self::core::NodeRunner;
 pub use self::core::{Counters, ModeChange, Timing};
-pub use session::{Display, End, Engine, Halt, Interrupt, Logged, Outcome, Rest, RunOptions, run, run_virtual};
+pub use session::{
+    DisplayedPort, End, Engine, Halt, Interrupt, Logged, Outcome, Rest, RunOptions, TaskEnd, TaskRun, run, run_virtual,
+};

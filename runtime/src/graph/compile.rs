@@ -4,7 +4,7 @@ use std::cell::RefCell;
 
 use crate::catalogue::Catalogue;
 use crate::graph::bench::{self, OpenedBench};
-use crate::graph::build::{Builder, BuiltModes, build_modes};
+use crate::graph::build::{Builder, BuiltModes, build_modes, find_reach, plan_tasks};
 use crate::graph::check;
 use crate::graph::check::contact::ContactPorts;
 use crate::graph::check::generators::Generators;
@@ -12,7 +12,7 @@ use crate::graph::compiled::Compiled;
 use crate::graph::load::{Loader, Request};
 use crate::graph::net::Net;
 use crate::graph::outline::OutlineBuilder;
-use crate::graph::plan::{Plan, PlannedCommand, PlannedModes, PlannedNode};
+use crate::graph::plan::{Plan, PlannedCommand, PlannedMode, PlannedNode, PortRef};
 use crate::graph::syntax::{GraphTable, default_max_age_s};
 use crate::source::{Code, Diagnostics, Report, Severity, SourceMap};
 
@@ -57,11 +57,10 @@ pub(crate) fn compile_in(mut loader: Loader, catalogue: &Catalogue, request: &Re
     view.check_units(&builder.ports, &mut builder.diagnostics);
     check::times::check(&net, &opened, period, &mut builder.diagnostics);
     let modes = build_modes(&mut builder, &mut nodes);
-    let modes = check_modes(&net, modes, period, &mut builder.diagnostics);
+    let (modes, starts) = check_modes(&net, modes, period, &mut builder.diagnostics);
     let mut commands: Vec<PlannedCommand> = net.commands.iter().filter_map(|wire| builder.command(wire)).collect();
     commands.sort_by_key(|command| command.is_report);
-    let policy = flat.policy.as_ref().and_then(|(_, policy)| policy.clone()).unwrap_or_default();
-    let roles = builder.plan_roles(&policy);
+    let roles = builder.plan_roles();
     let ports = std::mem::take(&mut builder.ports);
     let (diagnostics, sources, of_nodes) = builder.finish();
     measured.extend(of_nodes);
@@ -71,7 +70,7 @@ pub(crate) fn compile_in(mut loader: Loader, catalogue: &Catalogue, request: &Re
     };
     assert_eq!(nodes.len(), flat.nodes.len(), "a graph without a mistake has all its nodes");
     log_plan(&nodes, &opened, &sources);
-    let max_gap = max_gap(flat.table.as_ref(), period);
+    let max_gap = max_gap(flat.root().table.as_ref(), period);
     let outline = OutlineBuilder {
         net: &net,
         opened: &opened,
@@ -83,20 +82,21 @@ pub(crate) fn compile_in(mut loader: Loader, catalogue: &Catalogue, request: &Re
         defaults: RefCell::default(),
     };
     let outline = outline.build();
-    let watching = modes.as_ref().map_or(&[][..], |modes| &modes.modes);
     let mut unused = Diagnostics::new();
-    check::unused::check(&net, watching, view.sources(), &mut unused);
+    check::unused::check(&net, &modes, view.sources(), &mut unused);
     let mut warnings = check::parts::move_out(&flat, &sources, warnings.into_iter().chain(unused).collect());
     warnings.sort_by_key(|warning| (warning.span.start, warning.code));
     // Several nodes may read the same number of [limits].
     warnings.dedup();
     let allowed = check::allow::silence(&flat, &mut warnings);
     let view = view.plan(&net, &nodes, &ports);
-    let reset_after = flat.table.as_ref().map_or(0, |table| (table.reset_after_ms * 1e6) as i64);
+    let shown: Vec<PortRef> = view.ports.iter().map(|port| port.source).collect();
+    let tasks = plan_tasks(&net, &ports, modes, (&starts, &shown), period);
+    let reach = find_reach(&net, &nodes);
     let period = ((period * 1e9).round() as i64).max(1);
     let (exports, facts) = (net.exports_by_name(), opened.facts(&net));
     let devices = opened.devices;
-    let plan = Plan { roles, devices, nodes, commands, clock, period, max_gap, reset_after, modes, policy, allowed };
+    let plan = Plan { roles, devices, nodes, commands, clock, period, tasks, reach, allowed };
     Ok(Compiled { plan, view, sources, warnings, outline, exports, facts })
 }
 
@@ -114,20 +114,25 @@ fn split(diagnostics: Diagnostics) -> (Diagnostics, Diagnostics) {
     diagnostics.into_iter().partition(|diagnostic| diagnostic.code.severity() == Severity::Error)
 }
 
-/// Checks the modes together, and returns them with the start mode.
-fn check_modes(net: &Net<'_>, built: BuiltModes, period: f64, diagnostics: &mut Diagnostics) -> Option<PlannedModes> {
+/// Checks the modes together, and returns them with the start mode of each task that has modes.
+fn check_modes(
+    net: &Net<'_>,
+    built: BuiltModes,
+    period: f64,
+    diagnostics: &mut Diagnostics,
+) -> (Vec<PlannedMode>, Vec<usize>) {
     let BuiltModes { modes, motions, demand, demand_changes, freezes } = built;
     let reads = |mode: usize, node: usize, port: usize| demand.of(node, &demand_changes[mode])[port];
     let contact = ContactPorts::new(net);
     let generators = Generators::new(net, &contact, &motions);
-    check::absent::check(net, &modes, &reads, &freezes, diagnostics);
+    check::absent::check(&modes, &reads, &freezes, diagnostics);
     check::overlap::check(net, &modes, diagnostics);
     check::motion::check(net, &contact, &modes, &generators, diagnostics);
     check::late::check(&modes, period, diagnostics);
     check::immediate::check(net, &modes, period, diagnostics);
-    let start = check::reachability::check(net, diagnostics)?;
-    check::approach::check(net, &contact, &modes, start, (&motions, &generators), diagnostics);
-    Some(PlannedModes { modes, start })
+    let starts = check::reachability::check(net, diagnostics);
+    check::approach::check(net, &contact, &modes, &starts, (&motions, &generators), diagnostics);
+    (modes, starts)
 }
 
 /// Logs the order of the nodes and the opened devices, for `-v`.

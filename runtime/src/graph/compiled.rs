@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 
 use crate::device::Driver;
 use crate::graph::outline::Outline;
-use crate::graph::plan::{AllowedWarning, Plan, PlannedNode, PlannedPort, PlannedView, Producer};
+use crate::graph::plan::{AllowedWarning, Plan, PlannedNode, PlannedPort, PlannedTask, PlannedView, Producer};
 use crate::source::{Code, Diagnostic, Report, SourceMap};
 
 /// A graph that was checked and built.
@@ -58,10 +58,11 @@ impl Compiled {
         &self.plan.allowed
     }
 
-    /// Returns all ports: those of the roles, then those of the nodes in step order.
+    /// Returns all ports: those of the roles, those of the nodes in step order, and the flags of modes.
     pub fn ports(&self) -> impl Iterator<Item = &PlannedPort> {
         let roles = self.plan.roles.iter().flat_map(|role| &role.ports);
-        roles.chain(self.plan.nodes.iter().flat_map(|node| &node.ports))
+        let flags = self.plan.tasks.iter().flat_map(|task| &task.flags).map(|(.., port)| port);
+        roles.chain(self.plan.nodes.iter().flat_map(|node| &node.ports)).chain(flags)
     }
 
     /// Returns the exports of the parts, each with the full name of the port behind it.
@@ -93,6 +94,8 @@ impl Compiled {
             let ports = match report.source.producer {
                 Producer::Role(role) => &self.plan.roles.get(role)?.ports,
                 Producer::Node(index) => &self.plan.nodes.iter().find(|node| node.index == index)?.ports,
+                // A report takes a pose, and a mode is a flag.
+                Producer::Task(_) => return None,
             };
             ports.get(report.source.port)
         })
@@ -104,9 +107,21 @@ impl Compiled {
         &self.facts
     }
 
-    /// Returns the names of the modes in file order.
+    /// Returns the names of the modes in file order; those of a part that is a task have its name before theirs.
     pub fn modes(&self) -> impl Iterator<Item = &str> {
-        self.plan.modes.iter().flat_map(|modes| &modes.modes).map(|mode| mode.name.as_str())
+        let modes = self.plan.tasks.iter().filter_map(|task| task.modes.as_ref());
+        modes.flat_map(|modes| &modes.modes).map(|mode| mode.name.as_str())
+    }
+
+    /// Returns the index of the task and the number of its mode with a name, as [`modes`](Self::modes) returns it.
+    #[must_use]
+    pub fn mode(&self, name: &str) -> Option<(usize, usize)> {
+        let tasks = self.plan.tasks.iter().enumerate();
+        let found = |(task, planned): (usize, &PlannedTask)| {
+            let number = planned.modes.as_ref()?.modes.iter().position(|mode| mode.name == name)?;
+            Some((task, number))
+        };
+        tasks.filter_map(found).next()
     }
 
     /// Returns the outline: the graph as it runs, with the origin of each value.

@@ -22,13 +22,13 @@ pub use compiled::Compiled;
 pub use load::Request;
 pub(crate) use load::{Loader, wrong_file_type};
 pub use outline::{
-    NO_SPAN, Outline, OutlinedBlock, OutlinedMode, OutlinedPort, OutlinedRole, OutlinedWire, OutlinedWord, Setting,
-    ValueOrigin,
+    NO_SPAN, Outline, OutlinedBlock, OutlinedMode, OutlinedPort, OutlinedRole, OutlinedTask, OutlinedWire,
+    OutlinedWord, Setting, ValueOrigin,
 };
 pub use plan::{AllowedWarning, PlannedPort};
 pub(crate) use plan::{
     Clock, Condition, Plan, PlannedCommand, PlannedDevice, PlannedExit, PlannedModes, PlannedNode, PlannedRole,
-    PlannedShow, PlannedView, PlannedWire, PortRef, Producer, Test,
+    PlannedShow, PlannedTask, PlannedView, PlannedWire, PortRef, Producer, Reach, Test,
 };
 pub use syntax::Policy;
 pub(crate) use syntax::{AgeLimit, ExitKind, PolicyTable, PortState, into_diagnostic};

@@ -9,10 +9,10 @@ use std::path::Path;
 use serde::Serialize;
 
 use crate::graph::bench::{OpenedBench, fill_facts};
-use crate::graph::load::MeasuredValues;
+use crate::graph::load::{MeasuredValues, Task};
 use crate::graph::net::{CommandWire, Net, Wire, WireOrigin};
 use crate::graph::plan::{PlannedNode, PlannedPort, PortRef};
-use crate::graph::syntax::{Block, GraphTable, LIMITS, ModeBlock, PolicyTable};
+use crate::graph::syntax::{Block, GraphTable, LIMITS, PolicyTable};
 use crate::node::{FilePath, Param, ParamSpec, Repeats, Spanned};
 use crate::source::{Diagnostics, Item, Key, Location, SourceMap, Table, Value, parse_table};
 
@@ -33,7 +33,10 @@ pub struct Outline {
     pub commands: Vec<OutlinedWire>,
     /// Section `[policy]`.
     pub policy: Vec<Setting>,
-    /// The modes.
+    /// The parts that are tasks.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub tasks: Vec<OutlinedTask>,
+    /// The modes; those of a part that is a task have its name before theirs.
     pub modes: Vec<OutlinedMode>,
     /// The nodes, in the order in which they step.
     pub nodes: Vec<OutlinedBlock>,
@@ -60,6 +63,17 @@ pub struct OutlinedRole {
     pub kind: OutlinedWord,
     /// The device that fills it.
     pub device: OutlinedWord,
+}
+
+/// A part that is a task.
+#[derive(Debug, Clone, Serialize)]
+pub struct OutlinedTask {
+    /// Its full name.
+    pub name: String,
+    /// The keys of its section [graph] that hold in a part.
+    pub settings: Vec<Setting>,
+    /// Its section [policy]; without one, that of the file around it holds.
+    pub policy: Vec<Setting>,
 }
 
 /// A mode.
@@ -174,22 +188,36 @@ pub(crate) struct OutlineBuilder<'a> {
 impl OutlineBuilder<'_> {
     pub(crate) fn build(&self) -> Outline {
         let flat = self.net.flat;
-        let policy = flat.policy.as_ref().map(|(section, _)| section);
         let command = |wire: &CommandWire| self.wire(self.net.command_name(wire), wire.source, &wire.origin);
         Outline {
             period_s: self.period,
             settings: self.graph(),
+            tasks: flat.tasks.iter().skip(1).map(|task| self.task(task)).collect(),
             roles: self.roles(),
             commands: self.net.commands.iter().map(command).collect(),
-            policy: self.table(policy.and_then(Value::as_table), &PolicyTable::fields(), "", None),
-            modes: flat.modes.iter().map(|mode| self.mode(mode)).collect(),
+            policy: self.policy(flat.root()),
+            modes: (0..flat.modes.len()).map(|mode| self.mode(mode)).collect(),
             nodes: self.nodes.iter().filter_map(|node| self.node(node)).collect(),
             devices: self.devices(),
         }
     }
 
+    fn policy(&self, task: &Task) -> Vec<Setting> {
+        let written = task.policy.as_ref().and_then(|(section, _)| section.as_table());
+        self.table(written, &PolicyTable::fields(), "", None)
+    }
+
+    /// The sections of a part that is a task: the keys of [graph] that hold in it, and its own [policy].
+    fn task(&self, task: &Task) -> OutlinedTask {
+        let given = task.settings.as_ref().and_then(Value::as_table);
+        let mut settings = self.table(given, &GraphTable::fields(), "", None);
+        settings.retain(|setting| ["start", "max_gap_ms", "reset_after_ms"].contains(&setting.path.as_str()));
+        let policy = task.policy.as_ref().map(|_| self.policy(task)).unwrap_or_default();
+        OutlinedTask { name: task.name().to_owned(), settings, policy }
+    }
+
     fn graph(&self) -> Vec<Setting> {
-        let given = self.net.flat.settings.as_ref().and_then(Value::as_table);
+        let given = self.net.flat.root().settings.as_ref().and_then(Value::as_table);
         let mut settings = self.table(given, &GraphTable::fields(), "", None);
         settings.retain(|setting| setting.path != "bench");
         if !settings.iter().any(|setting| setting.path == "max_gap_ms") {
@@ -374,7 +402,8 @@ impl OutlineBuilder<'_> {
         Some(value)
     }
 
-    fn mode(&self, block: &ModeBlock) -> OutlinedMode {
+    fn mode(&self, mode: usize) -> OutlinedMode {
+        let block = &self.net.flat.modes[mode];
         let mut settings = Vec::new();
         for (key, value) in &block.table.entries {
             match value.as_table().filter(|_| key.name == "set") {
@@ -382,7 +411,7 @@ impl OutlineBuilder<'_> {
                 None => self.leaves(value, &key.name, 0, &mut settings),
             }
         }
-        OutlinedMode { name: block.key.name.clone(), settings }
+        OutlinedMode { name: self.net.flat.mode_name(mode), settings }
     }
 
     /// Collects the values in nested tables, down to `depth` levels.

@@ -9,7 +9,7 @@ use std::time::Duration;
 use rtrb::{Consumer, Producer, RingBuffer};
 
 use super::{PortColumn, PortColumns, RecordFormat};
-use crate::engine::Engine;
+use crate::engine::{Engine, TaskRun};
 use crate::signal::Unit;
 
 /// Capacity of the ring buffer [rows].
@@ -55,9 +55,9 @@ impl Recorder {
         // The ring holds floats. Storing the bits keeps the time in nanoseconds exact; its value would be rounded.
         self.row[0] = f64::from_bits(engine.now() as u64);
         let (own, ports) = self.row[1..].split_at_mut(self.own);
-        if let [mode, halted] = own {
-            *mode = engine.mode_number().map_or(f64::NAN, |mode| mode as f64);
-            *halted = f64::from(u8::from(engine.is_halted()));
+        for (cells, task) in own.chunks_exact_mut(2).zip(with_modes(engine)) {
+            cells[0] = task.mode_number().map_or(f64::NAN, |mode| mode as f64);
+            cells[1] = f64::from(u8::from(task.is_halted()));
         }
         self.columns.read(engine.bus(), ports);
         while self.ring.slots() < self.row.len() {
@@ -86,11 +86,20 @@ impl Recorder {
     }
 }
 
-/// Returns the columns that belong to no port. A graph with modes has two: the number of the next tick's mode, from 0
-/// in the order of the file, and whether the commands are halted.
+/// Returns the columns that belong to no port. A task with modes has two: the number of the next tick's mode, from 0 in
+/// the order of the file, and whether its commands are halted. Those of a part have its name before theirs.
 fn own_columns(engine: &Engine) -> Vec<PortColumn> {
-    let names = if engine.mode().is_some() { &["mode", "halted"][..] } else { &[] };
-    names.iter().map(|name| PortColumn { name: (*name).to_owned(), part: String::new(), unit: Unit::ONE }).collect()
+    let column = |name: String| PortColumn { name, part: String::new(), unit: Unit::ONE };
+    let names = |task: &TaskRun| match task.name() {
+        "" => ["mode".to_owned(), "halted".to_owned()],
+        name => [format!("{name}.mode"), format!("{name}.halted")],
+    };
+    with_modes(engine).flat_map(names).map(column).collect()
+}
+
+/// Returns the tasks that have modes.
+fn with_modes(engine: &Engine) -> impl Iterator<Item = &TaskRun> {
+    engine.tasks().iter().filter(|task| task.mode().is_some())
 }
 
 fn write_rows(

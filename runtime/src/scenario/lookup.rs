@@ -46,8 +46,8 @@ pub(super) fn look_up(
             seed_keys: lookup.seeds(table, catalogue),
             from,
             never_lost,
-            stays_in: table.stays_in.as_ref().map(|word| word.value.clone()),
-            ends_in: table.ends_in.as_ref().map(|word| word.value.clone()),
+            stays_in: table.stays_in.as_ref().and_then(|word| lookup.mode(&word.value)),
+            ends_in: table.ends_in.as_ref().map(|word| (word.value.clone(), lookup.mode(&word.value))),
             checks,
             rows,
             warnings: plan.warnings_of_read(&lookup.read),
@@ -203,14 +203,14 @@ impl Lookup<'_> {
         self.mode(&word.value).or_else(|| self.unknown_mode(word))
     }
 
-    /// Finds the mode or the flag of `until`. The name of a port has a dot, and the name of a mode has none.
+    /// Finds the mode or the flag of `until`. The name of a port has a dot; that of a mode has one behind the name of its task.
     fn event(&mut self, word: &Spanned<String>) -> Option<Event> {
         let name = word.value.clone();
-        if name.contains('.') {
-            return Some(Event::BecomesTrue { column: self.flag(word)?, name });
-        }
         if let Some(mode) = self.mode(&name) {
             return Some(Event::Enters(mode));
+        }
+        if name.contains('.') {
+            return Some(Event::BecomesTrue { column: self.flag(word)?, name });
         }
         let flags = self.plan.ports().filter(|port| port.shape.kind() == Kind::Flag).map(|port| port.name.as_str());
         let help = suggestion(&name, self.plan.modes().chain(flags), "modes and flags");
@@ -219,8 +219,7 @@ impl Lookup<'_> {
 
     /// Finds a mode by its name.
     fn mode(&self, name: &str) -> Option<ModeName> {
-        let number = self.plan.modes().position(|known| known == name)?;
-        Some(ModeName { name: name.to_owned(), number })
+        Some(ModeName { name: name.to_owned(), place: self.plan.mode(name)? })
     }
 
     /// Reports a mode that does not exist.

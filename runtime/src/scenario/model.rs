@@ -2,7 +2,7 @@
 
 use super::figure::{Bound, Figure};
 use super::judge::FigureRow;
-use super::window::Window;
+use super::window::{ModeName, Window};
 use crate::graph::Request;
 use crate::source::Report;
 
@@ -22,8 +22,8 @@ pub struct Scenario {
     pub(super) from: Option<(String, String)>,
     /// Column of the flag that must never be lost.
     pub(super) never_lost: Option<String>,
-    pub(super) stays_in: Option<String>,
-    pub(super) ends_in: Option<String>,
+    pub(super) stays_in: Option<ModeName>,
+    pub(super) ends_in: Option<(String, Option<ModeName>)>,
     pub(super) checks: Vec<Check>,
     /// The rows of all figures, without values: those of the checks, then those of the run as a whole.
     pub(super) rows: Vec<FigureRow>,

@@ -5,7 +5,7 @@ use serde::Serialize;
 use super::measure::Reading;
 use super::model::{Check, Scenario};
 use super::window::{Event, ModeName, Readings, Window, WindowClock};
-use crate::engine::Engine;
+use crate::engine::{Engine, TaskRun};
 use crate::node::ScalarId;
 use crate::record::PortColumns;
 use crate::signal::Freshness;
@@ -30,8 +30,8 @@ pub(super) struct Observer<'s> {
     /// Time 0 of all figures in the graph's clock [ns].
     zero: Option<i64>,
     checks: Vec<CheckObserver<'s>>,
-    /// Number of the mode in which the next tick runs.
-    mode: Option<usize>,
+    /// Number of the mode of each task in which the next tick runs.
+    modes: Vec<Option<usize>>,
     /// Number of ticks in which the flag `never_lost` is not set.
     lost: u64,
     /// Number of ticks outside the mode `stays_in` after it was reached.
@@ -48,7 +48,7 @@ impl<'s> Observer<'s> {
             never_lost: scenario.never_lost.as_ref().map(|column| find(engine, column)),
             zero: None,
             checks: scenario.checks.iter().map(|check| CheckObserver::new(check, engine)).collect(),
-            mode: engine.mode_number(),
+            modes: modes(engine),
             lost: 0,
             away: 0,
             has_reached: false,
@@ -57,9 +57,9 @@ impl<'s> Observer<'s> {
 
     /// Observes the last tick.
     pub(super) fn observe(&mut self, engine: &Engine) {
-        let mode = std::mem::replace(&mut self.mode, engine.mode_number());
+        let before = std::mem::replace(&mut self.modes, modes(engine));
         if let Some(mode) = &self.scenario.stays_in {
-            let is_in = engine.mode() == Some(mode);
+            let is_in = is_in(&self.modes, mode);
             self.has_reached |= is_in;
             self.away += u64::from(self.has_reached && !is_in);
         }
@@ -69,7 +69,7 @@ impl<'s> Observer<'s> {
         }
         if self.zero.is_some() {
             self.lost += u64::from(!is_set(self.never_lost));
-            self.checks.iter_mut().for_each(|check| check.observe(engine, mode));
+            self.checks.iter_mut().for_each(|check| check.observe(engine, &before));
         }
     }
 
@@ -92,10 +92,24 @@ impl<'s> Observer<'s> {
         figures.extend(self.never_lost.map(|_| Some(self.lost as f64 * period)));
         let away = self.has_reached.then_some(self.away as f64 * period);
         figures.extend(self.scenario.stays_in.as_ref().map(|_| away));
-        let ends = |mode: &String| engine.mode() == Some(mode) || (mode == DONE && is_done);
+        let ends = |(name, mode): &(String, Option<ModeName>)| match mode {
+            Some(mode) => is_in(&self.modes, mode),
+            None => name == DONE && is_done,
+        };
         figures.extend(self.scenario.ends_in.as_ref().map(|mode| Some(f64::from(u8::from(ends(mode))))));
         figures
     }
+}
+
+/// Returns the number of the mode of each task in which the next tick runs.
+fn modes(engine: &Engine) -> Vec<Option<usize>> {
+    engine.tasks().iter().map(TaskRun::mode_number).collect()
+}
+
+/// Returns whether a mode is one of the numbers of all tasks.
+fn is_in(modes: &[Option<usize>], mode: &ModeName) -> bool {
+    let (task, number) = mode.place;
+    modes[task] == Some(number)
 }
 
 /// Collects the readings of one check.
@@ -125,10 +139,10 @@ impl<'s> CheckObserver<'s> {
         }
     }
 
-    /// Observes a tick from time 0 on, which ran in the mode of that number.
-    fn observe(&mut self, engine: &Engine, mode: Option<usize>) {
+    /// Observes a tick from time 0 on, which ran in the modes of those numbers.
+    fn observe(&mut self, engine: &Engine, modes: &[Option<usize>]) {
         let Window { during, until } = &self.check.window;
-        let is_mode = |known: &ModeName| mode == Some(known.number);
+        let is_mode = |known: &ModeName| is_in(modes, known);
         let holds = match until {
             Some(Event::Enters(known)) => Some(is_mode(known)),
             Some(Event::BecomesTrue { .. }) => {

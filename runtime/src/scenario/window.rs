@@ -9,8 +9,8 @@ use super::measure::Reading;
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct ModeName {
     pub(super) name: String,
-    /// Its number, from 0 in the order of the file.
-    pub(super) number: usize,
+    /// The index of its task, and its number there from 0 in the order of the file.
+    pub(super) place: (usize, usize),
 }
 
 /// What ends a window.

@@ -30,6 +30,14 @@ impl<T> Named<T> {
     }
 }
 
+impl<T> Named<T> {
+    /// Adds an entry with a name that no other one has.
+    pub(crate) fn push(&mut self, key: Key, value: T) {
+        self.places.insert(key.name.clone(), self.entries.len());
+        self.entries.push((key, value));
+    }
+}
+
 impl<T> Default for Named<T> {
     fn default() -> Self {
         Self { entries: Vec::new(), places: BTreeMap::new() }

@@ -4,7 +4,7 @@ use std::fmt::Write;
 
 use crate::cli::text::number::{number, seconds};
 use crate::cli::text::table::table;
-use crate::engine::{Engine, ModeChange, Rest};
+use crate::engine::{Engine, ModeChange, Rest, TaskEnd, TaskRun};
 use crate::graph::Policy;
 use crate::node::PortId;
 use crate::signal::Scalar;
@@ -68,7 +68,24 @@ impl LimitWatch {
 
 /// Writes the modes and the halts, one after the other, and leaves out what the graph does not have.
 pub(crate) fn events(engine: &Engine, end: i64) -> String {
-    modes(&engine.changes(), end) + &halts(engine)
+    let tables = engine.tasks().iter().map(|task| {
+        let end = task.ended_at().unwrap_or(end);
+        let table = modes(&task.changes(), end);
+        if table.is_empty() || task.name().is_empty() { table } else { format!("task `{}`\n{table}", task.name()) }
+    });
+    tables.collect::<String>() + &halts(engine) + &ends(engine)
+}
+
+/// Says how each task ended that is a part.
+fn ends(engine: &Engine) -> String {
+    let parts = engine.tasks().iter().skip(1).filter(|task| task.is_active());
+    let lines = parts.map(|task| match task.end() {
+        Some(TaskEnd::Done) => format!("task `{}` is done\n", task.name()),
+        Some(TaskEnd::Failed(fault)) => format!("task `{}` has failed: {fault}\n", task.name()),
+        None => String::new(),
+    });
+    let text: String = lines.collect();
+    if text.is_empty() { text } else { text + "\n" }
 }
 
 /// Writes the table of the modes.
@@ -93,14 +110,16 @@ fn modes(changes: &[ModeChange], end: i64) -> String {
 /// Lists the halts of the commands, each with its fault.
 fn halts(engine: &Engine) -> String {
     let mut text = String::new();
-    for halt in engine.halts().iter().take(MAX_LISTED) {
+    let all = engine.tasks().iter().flat_map(|task| task.halts().iter().map(move |halt| (task.name(), halt)));
+    for (task, halt) in all.take(MAX_LISTED) {
         let what = if halt.policy == Policy::Stop { "stopped" } else { "held" };
+        let of = if task.is_empty() { String::new() } else { format!(" of `{task}`") };
         let duration = match halt.until {
             Some(until) => format!("for {:.3} s", seconds(until - halt.fault.time)),
             None => "until the end".to_owned(),
         };
         // Writing to a string cannot fail.
-        let _ = writeln!(text, "commands {what} {duration}: {}", halt.fault);
+        let _ = writeln!(text, "commands{of} {what} {duration}: {}", halt.fault);
     }
     for Rest { role, fault, until } in engine.rests().iter().take(MAX_LISTED) {
         let duration = match until {
@@ -109,7 +128,9 @@ fn halts(engine: &Engine) -> String {
         };
         let _ = writeln!(text, "`{role}` stopped {duration}: {fault}");
     }
-    let more = engine.halts().len().saturating_sub(MAX_LISTED) as u64 + engine.unlisted_halts();
+    let listed: usize = engine.tasks().iter().map(|task| task.halts().len()).sum();
+    let unlisted: u64 = engine.tasks().iter().map(TaskRun::unlisted_halts).sum();
+    let more = listed.saturating_sub(MAX_LISTED) as u64 + unlisted;
     if more > 0 {
         let _ = writeln!(text, "commands held or stopped {more} more times");
     }

@@ -187,7 +187,15 @@ impl Job {
         for (at, word) in self.options.send.iter().filter(|(at, _)| *at > seconds(outcome.time)) {
             shell.warning(format_args!("`{word}` was not sent: the run ended before {at} s"));
         }
-        let End::Fault(fault) = &outcome.end else { return 0 };
+        let failed: Vec<(&str, &Fault)> = engine.failures().collect();
+        for (task, fault) in &failed {
+            shell.error(format_args!("task `{task}` has failed: {fault}; its commands went to zero"));
+        }
+        let is_told = |fault: &Fault| failed.iter().any(|(_, told)| *told == fault);
+        let End::Fault(fault) = &outcome.end else { return if failed.is_empty() { 0 } else { FAULTED } };
+        if is_told(fault) {
+            return FAULTED;
+        }
         shell.error(format_args!("{fault}; every command went to zero{}", endless_stop(engine, fault)));
         FAULTED
     }
@@ -202,11 +210,12 @@ impl Job {
     /// Checks that the graph or the runtime knows every word that is sent.
     fn check_words(&self, engine: &Engine) -> Result<(), String> {
         let is_own = |word: &str| ["stop", "resume"].iter().any(|own| word.eq_ignore_ascii_case(own));
-        let is_unknown = |word: &str| !is_own(word) && engine.words().all(|known| known != word);
+        let words = engine.words();
+        let is_unknown = |word: &str| !is_own(word) && words.iter().all(|known| known != word);
         let Some((_, word)) = self.options.send.iter().find(|(_, word)| is_unknown(word)) else { return Ok(()) };
-        let known: std::collections::BTreeSet<String> = engine.words().map(|word| format!("`{word}`")).collect();
-        let known = known.into_iter().collect::<Vec<_>>().join(", ");
-        Err(unknown("word", word, engine.words(), &format!("this graph accepts {known}")))
+        let known: Vec<String> = words.iter().map(|word| format!("`{word}`")).collect();
+        let known = known.join(", ");
+        Err(unknown("word", word, words.iter().map(String::as_str), &format!("this graph accepts {known}")))
     }
 }
 

@@ -72,7 +72,8 @@ impl Summary {
         for line in self.holds.cause(engine).into_iter().filter(|_| has_failed) {
             let _ = writeln!(text, "{line}");
         }
-        for warning in self.holds.warnings(outcome.time).into_iter().chain(chatter(&engine.changes())) {
+        let chatters = engine.tasks().iter().filter_map(|task| chatter(&task.changes()));
+        for warning in self.holds.warnings(outcome.time).into_iter().chain(chatters) {
             let _ = writeln!(text, "{warning}");
         }
         for ((port, _), counters) in engine.ports().iter().zip(engine.counters()) {

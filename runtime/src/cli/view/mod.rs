@@ -8,7 +8,7 @@ use crate::cli::text::chart::{chart, time_axis};
 use crate::cli::text::number::{number, seconds};
 use crate::cli::text::prose::{PageStyle, break_at_semicolons};
 use crate::cli::text::series::{Series, SeriesBin};
-use crate::engine::Engine;
+use crate::engine::{DisplayedPort, Engine};
 use crate::record::{PortColumn, PortColumns};
 use crate::signal::{Shape, Unit};
 use images::{ImageHistory, MIN_WIDE_PAGE};
@@ -45,10 +45,9 @@ impl RunView {
     pub(crate) fn new(engine: &Engine, bins: usize) -> Self {
         let mut images: Vec<ImageHistory> = Vec::new();
         let (mut plotted, mut ports) = (Vec::new(), Vec::new());
-        for (name, port, id) in &engine.display().ports {
+        for DisplayedPort { name, port, id, mark } in engine.display() {
             if let Shape::Image(shape) = &port.shape {
-                let mark = engine.display().contact.filter(|_| images.is_empty());
-                images.push(ImageHistory::new(name.clone(), *id, shape.clone(), mark));
+                images.push(ImageHistory::new(name.clone(), *id, shape.clone(), *mark));
             } else {
                 plotted.push(name.clone());
                 ports.push((port.clone(), *id));

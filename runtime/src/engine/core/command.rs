@@ -12,6 +12,8 @@ use crate::signal::line::{scale_to, step_toward};
 
 /// One command port of a device.
 pub(crate) struct CommandSlot {
+    /// The task that drives it.
+    pub(crate) task: usize,
     pub(crate) device: usize,
     source: PortId,
     command: usize,
@@ -25,8 +27,9 @@ pub(crate) struct CommandSlot {
 
 impl CommandSlot {
     pub(crate) fn new(source: PortId, planned: PlannedCommand) -> Self {
-        let PlannedCommand { device, port, age, accelerations, .. } = planned;
+        let PlannedCommand { task, device, port, age, accelerations, .. } = planned;
         Self {
+            task,
             device,
             source,
             command: port,
@@ -108,6 +111,7 @@ mod tests {
         let mut bus = Bus::default();
         let source = bus.add(&JointsShape { joints: vec![Default::default(); 2], ..Default::default() }.into());
         let slot = CommandSlot {
+            task: 0,
             device: 0,
             source,
             command: 0,

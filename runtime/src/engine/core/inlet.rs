@@ -26,6 +26,8 @@ pub struct Counters {
 
 /// Connects a device's port to a role's port on the bus.
 pub(crate) struct Inlet {
+    /// Index of its role.
+    pub(crate) role: usize,
     pub(crate) device: usize,
     pub(crate) counters: Counters,
     kind: Kind,
@@ -52,9 +54,10 @@ pub(crate) struct Inlet {
 }
 
 impl Inlet {
-    pub(crate) fn new(role: &PlannedRole, port: usize, id: PortId) -> Self {
+    pub(crate) fn new(number: usize, role: &PlannedRole, port: usize, id: PortId) -> Self {
         let shape = &role.ports[port].shape;
         Self {
+            role: number,
             device: role.device,
             counters: Counters::default(),
             kind: shape.kind(),

@@ -14,5 +14,5 @@ pub use modes::ModeChange;
 pub(crate) use modes::{ModeMachine, Transition};
 pub(crate) use runner::{AgedWire, NodeRunner};
 pub(crate) use slot::{DeviceLink, DeviceSlot};
-pub(crate) use tick::Core;
 pub use tick::Timing;
+pub(crate) use tick::{Core, TaskTick};

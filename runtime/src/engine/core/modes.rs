@@ -192,9 +192,14 @@ impl ModeMachine {
         })
     }
 
-    /// Returns the name of the current mode.
+    /// Returns the name of the current mode in the file of its task.
     pub(crate) fn name(&self) -> &str {
-        &self.modes[self.current].name
+        own_name(&self.modes[self.current].name)
+    }
+
+    /// Returns the name of the current mode with that of its task: `left.servo`.
+    pub(crate) fn full_name(&self) -> String {
+        self.modes[self.current].name.clone()
     }
 
     /// Returns the number of the current mode, from 0 in the order of the file.
@@ -213,7 +218,7 @@ impl ModeMachine {
         self.changes.iter().map(|(time, tick, mode, reason)| ModeChange {
             time: *time,
             tick: *tick,
-            mode: self.modes[*mode].name.clone(),
+            mode: own_name(&self.modes[*mode].name).to_owned(),
             reason: match *reason {
                 ChangeReason::Start => String::new(),
                 ChangeReason::Resumed => "the operator resumed".into(),
@@ -221,6 +226,11 @@ impl ModeMachine {
             },
         })
     }
+}
+
+/// Returns the name of a mode without that of its task.
+fn own_name(name: &str) -> &str {
+    name.rsplit_once('.').map_or(name, |(_, name)| name)
 }
 
 impl Exit {

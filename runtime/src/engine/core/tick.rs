@@ -7,7 +7,6 @@ use super::command::{CommandSlot, ReportSlot};
 use super::inlet::Inlet;
 use super::runner::NodeRunner;
 use super::slot::DeviceSlot;
-use crate::graph::Policy;
 use crate::node::{Bus, Tick};
 
 /// Everything a tick touches.
@@ -16,21 +15,53 @@ pub(crate) struct Core {
     pub(crate) inlets: Vec<Inlet>,
     pub(crate) tick: Tick,
     runners: Vec<NodeRunner>,
+    /// The task of each runner; empty for a graph with one task.
+    owners: Vec<usize>,
+    /// What holds in the tick for the nodes of each task.
+    pub(crate) tasks: Vec<TaskTick>,
     commands: Vec<CommandSlot>,
     reports: Vec<ReportSlot>,
     /// Index of the runner that is stepping. A panic is attributed to it.
     current: usize,
 }
 
+/// What holds in a tick for the nodes of one task.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct TaskTick {
+    /// Maximum time between two samples that counts as one step [s].
+    pub(crate) max_gap: f64,
+    /// Time of absence after which a state is reset [ns].
+    pub(crate) reset_after: i64,
+    /// Whether the commands of the task are held at zero.
+    pub(crate) is_halted: bool,
+    /// Whether the operator sent `resume` to the task before this tick.
+    pub(crate) is_resumed: bool,
+}
+
+impl TaskTick {
+    fn apply(&self, tick: &mut Tick) {
+        (tick.max_gap, tick.reset_after) = (self.max_gap, self.reset_after);
+        (tick.is_halted, tick.is_resumed) = (self.is_halted, self.is_resumed);
+    }
+}
+
 impl Core {
+    /// Creates the core. `runners` are the nodes in step order, each with its task; a graph with one
+    /// task names none.
     pub(crate) fn new(
         bus: Bus,
-        runners: Vec<NodeRunner>,
+        (runners, owners): (Vec<NodeRunner>, Vec<usize>),
         inlets: Vec<Inlet>,
         (commands, reports): (Vec<CommandSlot>, Vec<ReportSlot>),
-        tick: Tick,
+        tasks: Vec<TaskTick>,
     ) -> Self {
-        Self { bus, inlets, tick, runners, commands, reports, current: 0 }
+        let tick = Tick { index: 0, ..Tick::first() };
+        Self { bus, inlets, tick, runners, owners, tasks, commands, reports, current: 0 }
+    }
+
+    /// Returns the task of a runner.
+    pub(crate) fn task_of(&self, runner: usize) -> usize {
+        self.owners.get(runner).copied().unwrap_or(0)
     }
 
     /// Starts the tick at `now` [ns].
@@ -39,12 +70,12 @@ impl Core {
         self.tick = Tick { index: self.tick.index + 1, now, dt, ..self.tick };
     }
 
-    /// Steps the nodes, each at most once. Returns whether all values are finite.
-    pub(crate) fn run(&mut self, timing: &mut Timing) -> bool {
+    /// Steps the nodes from the runner `first` on, each at most once. Returns whether all values are finite.
+    pub(crate) fn run(&mut self, first: usize, timing: &mut Timing) -> bool {
         if Timing::is_due(self.tick.index) {
-            self.step_timed(timing);
+            self.step_timed(first, timing);
         } else {
-            self.step();
+            self.step(first);
         }
         self.bus.arenas.are_finite()
     }
@@ -52,8 +83,8 @@ impl Core {
     /// Runs latch, step and commit without the finite check and the timing.
     pub(crate) fn run_bare(&mut self, devices: &mut [DeviceSlot]) {
         self.latch(devices);
-        self.step();
-        self.commit(devices, false);
+        self.step(0);
+        self.commit(devices);
     }
 
     /// Latches the newest samples of the devices that have not failed.
@@ -66,17 +97,25 @@ impl Core {
         }
     }
 
-    fn step(&mut self) {
-        for (i, runner) in self.runners.iter_mut().enumerate() {
+    fn step(&mut self, first: usize) {
+        self.tasks[0].apply(&mut self.tick);
+        for (i, runner) in self.runners.iter_mut().enumerate().skip(first) {
             self.current = i;
+            if let Some(task) = self.owners.get(i) {
+                self.tasks[*task].apply(&mut self.tick);
+            }
             runner.visit(&mut self.tick, &mut self.bus);
         }
     }
 
-    fn step_timed(&mut self, timing: &mut Timing) {
+    fn step_timed(&mut self, first: usize, timing: &mut Timing) {
+        self.tasks[0].apply(&mut self.tick);
         let mut before = Instant::now();
-        for (i, runner) in self.runners.iter_mut().enumerate() {
+        for (i, runner) in self.runners.iter_mut().enumerate().skip(first) {
             self.current = i;
+            if let Some(task) = self.owners.get(i) {
+                self.tasks[*task].apply(&mut self.tick);
+            }
             runner.visit(&mut self.tick, &mut self.bus);
             let after = Instant::now();
             timing.nodes[i].add(after - before);
@@ -85,16 +124,10 @@ impl Core {
         timing.ticks += 1;
     }
 
-    /// Returns the inlet whose sample is too old, with its policy; the one with the strictest policy if there are
-    /// several.
-    pub(crate) fn stale(&self) -> Option<(Policy, usize)> {
-        let stale = self.inlets.iter().enumerate().filter(|(_, inlet)| inlet.is_stale(self.tick.now));
-        stale.map(|(i, inlet)| (inlet.stale, i)).max_by_key(|(policy, _)| *policy)
-    }
-
-    /// Commits the commands, which ramp to zero during a halt, and the reports.
-    pub(crate) fn commit(&mut self, devices: &mut [DeviceSlot], is_halted: bool) {
+    /// Commits the commands, which ramp to zero while their task is halted, and the reports.
+    pub(crate) fn commit(&mut self, devices: &mut [DeviceSlot]) {
         for command in &mut self.commands {
+            let is_halted = self.tasks[command.task].is_halted;
             command.commit(&self.bus, &mut devices[command.device].commands, &self.tick, is_halted);
         }
         for report in &self.reports {
@@ -124,9 +157,9 @@ impl Core {
         }
     }
 
-    /// Resets the runner with that index and all that step after it.
-    pub(crate) fn reset_from(&mut self, runner: usize) {
-        self.runners[runner..].iter_mut().for_each(NodeRunner::reset);
+    /// Resets the runner with that index.
+    pub(crate) fn reset(&mut self, runner: usize) {
+        self.runners[runner].reset();
     }
 
     /// Notes that the runner that stepped last has panicked.
@@ -134,9 +167,9 @@ impl Core {
         self.runners[self.current].set_panicked(self.tick.now);
     }
 
-    /// Returns the first runner that waits for its reset after a panic.
-    pub(crate) fn panicked(&self) -> Option<usize> {
-        self.runners.iter().position(NodeRunner::has_panicked)
+    /// Returns the first runner from `first` on that waits for its reset after a panic.
+    pub(crate) fn panicked(&self, first: usize) -> Option<usize> {
+        self.runners[first..].iter().position(NodeRunner::has_panicked).map(|at| first + at)
     }
 
     /// Returns the index of the runner that stepped last.

@@ -36,8 +36,9 @@ impl Engine {
         }
         let (node, place) = &self.names[budget.runner];
         let fault = self.fault(node, None, Cause::Spent, place.clone());
-        if self.policy.blind.0 == Policy::Fault {
-            return Err(fault);
+        let task = self.core.task_of(budget.runner);
+        if self.tasks[task].policy.blind.0 == Policy::Fault {
+            return self.fail(task, fault);
         }
         tracing::warn!("{fault}: `{}` stops", budget.role);
         if self.rests.len() < MAX_RESTS {

@@ -2,19 +2,19 @@
 
 use std::collections::BTreeMap;
 
-use super::engine::{Display, Engine, Logged};
-use super::halt::HaltMachine;
+use super::engine::{DisplayedPort, Engine, Logged};
 use super::schedule::TickSchedule;
-use super::trouble::{WatchedBudget, WatchedWire};
+use super::task_run::TaskRun;
+use super::trouble::{Origin, WatchedBudget, WatchedWire};
 use crate::device::{Commands, Driver, Samples};
 use crate::engine::core::{
-    AgedWire, CommandSlot, Core, DeviceLink, DeviceSlot, Inlet, ModeMachine, NodeRunner, ReportSlot, Timing,
+    AgedWire, CommandSlot, Core, DeviceLink, DeviceSlot, Inlet, ModeMachine, NodeRunner, ReportSlot, TaskTick, Timing,
 };
 use crate::graph::{
-    AgeLimit, Compiled, Plan, PlannedCommand, PlannedDevice, PlannedNode, PlannedPort, PlannedShow, PlannedView,
-    PlannedWire, Policy, PortRef, Producer,
+    AgeLimit, Compiled, Plan, PlannedCommand, PlannedDevice, PlannedNode, PlannedPort, PlannedShow, PlannedTask,
+    PlannedView, PlannedWire, Policy, PortRef, Producer,
 };
-use crate::node::{Bus, PortId, Tick};
+use crate::node::{Bus, PortId};
 use crate::signal::{Mark, Shape};
 use crate::source::SourceMap;
 
@@ -34,11 +34,14 @@ impl BusPorts {
         for (i, role) in plan.roles.iter().enumerate() {
             for (port, planned) in role.ports.iter().enumerate() {
                 let id = ports.add(PortRef { producer: Producer::Role(i), port }, planned);
-                inlets.push(Inlet::new(role, port, id));
+                inlets.push(Inlet::new(i, role, port, id));
             }
         }
         for (source, planned) in plan.nodes.iter().flat_map(PlannedNode::outputs) {
             ports.add(source, planned);
+        }
+        for (_, source, planned) in plan.tasks.iter().flat_map(|task| &task.flags) {
+            ports.add(*source, planned);
         }
         (ports, inlets)
     }
@@ -69,6 +72,11 @@ impl Engine {
         let place = |device: usize| sources.locate(plan.devices[device].span.start);
         let roles = plan.roles.iter().map(|role| (role.name.clone(), place(role.device))).collect();
         let names = plan.nodes.iter().map(|node| (node.name.clone(), sources.locate(node.span.start))).collect();
+        let mut owners: Vec<usize> = plan.nodes.iter().map(|node| node.task).collect();
+        owners.retain(|_| plan.tasks.len() > 1);
+        let writers = writers(&plan);
+        let filled = |device: usize| (0..plan.roles.len()).filter(|role| plan.roles[*role].device == device).collect();
+        let device_roles = (0..plan.devices.len()).map(filled).collect();
         let limits = limits(&plan.nodes, &ports);
         let budgets = budgets(&plan.nodes, &ports);
         let uncalibrated =
@@ -77,30 +85,27 @@ impl Engine {
         let (devices, reports) = (plan.devices.into_iter().enumerate(), report_shapes(&plan.commands));
         let devices = devices.map(|(i, device)| device_slot(i, device, &reports, &sources)).collect();
         let runners: Vec<NodeRunner> =
-            plan.nodes.into_iter().map(|node| runner(node, &mut ports, &mut watched)).collect();
+            plan.nodes.into_iter().enumerate().map(|node| runner(node, &mut ports, &mut watched)).collect();
         let (reports, commands): (Vec<_>, Vec<_>) = plan.commands.into_iter().partition(|wire| wire.is_report);
         let report = |report: &PlannedCommand| ReportSlot::new(ports.id(report.source), report);
         let slots = reports.iter().map(report).collect();
         let reported = reports.into_iter().map(|report| (report.name.join("."), report.device, report.port)).collect();
         let commands =
             commands.into_iter().map(|command| CommandSlot::new(ports.id(command.source), command)).collect();
-        let modes = plan.modes.map(|modes| {
-            ModeMachine::new(modes, |source| {
-                let (port, id) = ports.get(source);
-                (*id, port.shape.kind())
-            })
-        });
         let display = display(view, &ports);
-        let (max_gap, reset_after) = (plan.max_gap, plan.reset_after);
-        let tick = Tick { index: 0, now: 0, max_gap, reset_after, ..Tick::first() };
+        let contexts = plan.tasks.iter().map(task_tick).collect();
+        let tasks: Vec<TaskRun> = plan.tasks.into_iter().map(|task| task_run(task, &ports)).collect();
         let timing = Timing::new(runners.len());
-        let mut core = Core::new(ports.bus, runners, inlets, (commands, slots), tick);
-        modes.iter().for_each(|modes| core.switch(modes.configurations()));
+        let mut core = Core::new(ports.bus, (runners, owners), inlets, (commands, slots), contexts);
+        let modes = tasks.iter().filter_map(|task| task.modes.as_ref());
+        modes.for_each(|modes| core.switch(modes.configurations()));
         Self {
             timing,
             core,
-            modes,
-            is_done: false,
+            tasks,
+            reach: plan.reach,
+            device_roles,
+            writers,
             devices,
             schedule: TickSchedule::new(plan.clock, plan.period),
             ports: ports.list,
@@ -115,12 +120,8 @@ impl Engine {
             roles,
             reported,
             exports,
-            policy: plan.policy,
-            halts: HaltMachine::new(),
-            trouble: None,
             watched,
             panic: String::new(),
-            sent: None,
             late: 0,
             lateness: None,
             sources,
@@ -140,13 +141,34 @@ fn logged(node: &PlannedNode, ports: &BusPorts) -> Logged {
     Logged { node: node.name.clone(), due, inputs: wires.map(|wire| ports.get(wire.source).clone()).collect() }
 }
 
-fn display(view: PlannedView, ports: &BusPorts) -> Display {
-    let port = |PlannedShow { name, source }: PlannedShow| {
+fn display(view: PlannedView, ports: &BusPorts) -> Vec<DisplayedPort> {
+    let port = |PlannedShow { name, source, mark }: PlannedShow| {
         let (port, id) = ports.get(source).clone();
-        (name, port, id)
+        DisplayedPort { name, port, id, mark: mark.map(|mark| mark.map(|source| ports.id(source))) }
     };
-    let contact = view.mark.map(|mark| mark.map(|source| ports.id(source)));
-    Display { ports: view.ports.into_iter().map(port).collect(), contact }
+    view.ports.into_iter().map(port).collect()
+}
+
+/// Returns the index of the runner that writes each port, in the order of the ports on the bus.
+fn writers(plan: &Plan) -> Vec<Option<usize>> {
+    let roles = plan.roles.iter().flat_map(|role| &role.ports).map(|_| None);
+    let nodes = plan.nodes.iter().enumerate().flat_map(|(runner, node)| vec![Some(runner); node.ports.len()]);
+    let flags = plan.tasks.iter().flat_map(|task| &task.flags).map(|_| None);
+    roles.chain(nodes).chain(flags).collect()
+}
+
+fn task_tick(task: &PlannedTask) -> TaskTick {
+    TaskTick { max_gap: task.max_gap, reset_after: task.reset_after, is_halted: false, is_resumed: false }
+}
+
+fn task_run(mut task: PlannedTask, ports: &BusPorts) -> TaskRun {
+    let port = |source: PortRef| {
+        let (port, id) = ports.get(source);
+        (*id, port.shape.kind())
+    };
+    let modes = task.modes.take().map(|modes| ModeMachine::new(modes, port));
+    let flags = task.flags.iter().map(|(mode, source, _)| (*mode, ports.id(*source))).collect();
+    TaskRun::new(task, modes, flags)
 }
 
 /// Returns the ports on which limit nodes report the scale of the motion.
@@ -192,17 +214,19 @@ fn device_slot(
 /// Returns the commands and reports that stop the run, or halt every command, when they are too old.
 fn watched_commands(commands: &[PlannedCommand], ports: &BusPorts) -> Vec<WatchedWire> {
     let strict = commands.iter().filter(|command| command.age.stale > Policy::Hold);
-    let watched = strict.map(|PlannedCommand { source, age: AgeLimit { max_age, stale }, name, span, .. }| {
-        // The slot of a command or report checks the age itself, so the wire needs no mark of its own.
-        let (mark, [role, name]) = (ports.id(*source).mark, name.clone());
-        let aged = AgedWire { from: mark, to: mark, max_age: *max_age };
-        WatchedWire { aged, stale: *stale, node: role, port: Some(name), span: span.clone() }
-    });
+    let watched =
+        strict.map(|PlannedCommand { source, task, age: AgeLimit { max_age, stale }, name, span, .. }| {
+            // The slot of a command or report checks the age itself, so the wire needs no mark of its own.
+            let (mark, [role, name]) = (ports.id(*source).mark, name.clone());
+            let aged = AgedWire { from: mark, to: mark, max_age: *max_age };
+            let origin = Origin::Task(*task);
+            WatchedWire { aged, stale: *stale, node: role, port: Some(name), span: span.clone(), origin }
+        });
     watched.collect()
 }
 
 /// Creates the runner of a node. A wire with a maximum age gets a mark of its own and shares the value.
-fn runner(node: PlannedNode, ports: &mut BusPorts, watched: &mut Vec<WatchedWire>) -> NodeRunner {
+fn runner((i, node): (usize, PlannedNode), ports: &mut BusPorts, watched: &mut Vec<WatchedWire>) -> NodeRunner {
     let outputs = node.outputs().map(|(source, _)| ports.id(source)).collect();
     let mut aged = Vec::new();
     let mut end = |wire: &PlannedWire| {
@@ -215,7 +239,8 @@ fn runner(node: PlannedNode, ports: &mut BusPorts, watched: &mut Vec<WatchedWire
         aged.push(wire_end);
         if stale > Policy::Hold {
             let (node, span) = (node.name.clone(), wire.span.clone());
-            watched.push(WatchedWire { aged: wire_end, stale, node, port: None, span });
+            let origin = Origin::Runner(i);
+            watched.push(WatchedWire { aged: wire_end, stale, node, port: None, span, origin });
         }
         PortId { mark: to, ..id }
     };

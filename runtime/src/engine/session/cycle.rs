@@ -2,13 +2,13 @@
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
-use super::blame::owner;
 use super::engine::Engine;
-use super::trouble::{Trouble, panic_message};
+use super::task_run::{TaskEnd, TaskRun};
+use super::trouble::{Origin, Trouble, panic_message};
 use crate::device::DeviceError;
-use crate::engine::core::{DeviceLink, ModeMachine, Transition};
+use crate::engine::core::{DeviceLink, Transition};
 use crate::fault::{Cause, Fault};
-use crate::graph::Policy;
+use crate::graph::{Policy, PolicyTable};
 use crate::source::suggestion;
 
 impl Engine {
@@ -30,32 +30,33 @@ impl Engine {
         let due = self.clock_sample().is_some_and(|sample| sample <= now);
         self.core.begin(now);
         if let Some(by) = self.lateness.take() {
-            self.raise(self.policy.deadline, Trouble::Late(by))?;
+            self.raise(Origin::Run, |policy| policy.deadline, Trouble::Late(by))?;
         }
         let has_sampled = self.exchange_with_devices(now) || due;
         self.check_sizes();
         for i in 0..self.devices.len() {
             if self.devices[i].failed.is_some() {
-                self.raise(self.policy.device.0, Trouble::Device(i))?;
+                self.raise(Origin::Device(i), |policy| policy.device.0, Trouble::Device(i))?;
             }
         }
         for i in 0..self.core.inlets.len() {
             let inlet = &self.core.inlets[i];
             let device = &self.devices[inlet.device];
             if device.failed.is_none() && inlet.lost(&device.samples).is_some() {
-                self.raise(self.policy.device.0, Trouble::Lost(i))?;
+                self.raise(Origin::Role(inlet.role), |policy| policy.device.0, Trouble::Lost(i))?;
             }
         }
         self.schedule.ticked(now, has_sampled);
         if self.schedule.is_on_timer() {
-            self.raise(self.policy.clock, Trouble::Clock)?;
+            self.raise(Origin::Run, |policy| policy.clock, Trouble::Clock)?;
         }
         for i in 0..self.core.inlets.len() {
             let inlet = &mut self.core.inlets[i];
             let device = &self.devices[inlet.device];
             if device.failed.is_none() && !inlet.is_finite(&device.samples) {
                 inlet.reject(&device.samples);
-                self.raise(self.policy.not_finite.0, Trouble::NotFinite(i))?;
+                let role = inlet.role;
+                self.raise(Origin::Role(role), |policy| policy.not_finite.0, Trouble::NotFinite(i))?;
             }
         }
         Ok(())
@@ -68,63 +69,133 @@ impl Engine {
     /// Returns the fault that ends the run. The commands of this tick are not committed.
     pub fn step(&mut self) -> Result<(), Fault> {
         self.core.latch(&mut self.devices);
-        self.core.tick.is_resumed = self.halts.resumes;
-        if let Some((policy, inlet)) = self.core.stale() {
-            self.raise(policy, Trouble::Stale(inlet))?;
+        for (task, context) in self.tasks.iter().zip(&mut self.core.tasks) {
+            task.show_mode(&mut self.core.bus, &self.core.tick);
+            context.is_resumed = task.halts.resumes;
         }
-        match catch_unwind(AssertUnwindSafe(|| self.core.run(&mut self.timing))) {
-            Ok(true) => {}
-            Ok(false) => self.on_not_finite()?,
-            Err(panic) => self.on_panic(panic_message(&*panic))?,
-        }
+        self.raise_stale()?;
+        self.run_nodes()?;
         self.watch_budgets()?;
         for i in 0..self.watched.len() {
             let wire = &self.watched[i];
             if wire.aged.is_stale(&self.core.bus, self.core.tick.now) {
-                self.raise(wire.stale, Trouble::StaleWire(i))?;
+                let (origin, stale) = (wire.origin, wire.stale);
+                self.raise(origin, |_| stale, Trouble::StaleWire(i))?;
             }
         }
-        if let Some(runner) = self.core.panicked() {
-            self.raise(self.policy.panic.0, Trouble::Panicked(runner))?;
+        let mut first = 0;
+        while let Some(runner) = self.core.panicked(first) {
+            self.raise(Origin::Runner(runner), |policy| policy.panic.0, Trouble::Panicked(runner))?;
+            first = runner + 1;
         }
-        self.update_halt();
-        self.core.tick.is_halted = self.halts.is_halted();
-        self.core.commit(&mut self.devices, self.halts.is_halted());
+        for task in 0..self.tasks.len() {
+            self.update_halt(task);
+            self.core.tasks[task].is_halted = self.tasks[task].is_halted();
+        }
+        self.core.commit(&mut self.devices);
         self.decide()
     }
 
-    /// Raises a trouble of this tick. Of several, the one with the strictest policy is kept.
-    fn raise(&mut self, policy: Policy, trouble: Trouble) -> Result<(), Fault> {
-        match policy {
-            Policy::Count => {}
-            Policy::Fault => return Err(self.describe(trouble)),
-            Policy::Hold | Policy::Stop => {
-                let is_stricter = self.trouble.is_none_or(|(known, _)| policy > known);
-                self.trouble = if is_stricter { Some((policy, trouble)) } else { self.trouble };
+    /// Raises a trouble for each role whose newest sample is too old. Of several with the same policy, the last role is
+    /// named.
+    fn raise_stale(&mut self) -> Result<(), Fault> {
+        for i in (0..self.core.inlets.len()).rev() {
+            let inlet = &self.core.inlets[i];
+            if inlet.is_stale(self.core.tick.now) {
+                let (role, stale) = (inlet.role, inlet.stale);
+                self.raise(Origin::Role(role), |_| stale, Trouble::Stale(i))?;
             }
         }
         Ok(())
     }
 
-    /// Starts a halt if this tick had a trouble, or ends it if the trouble is over.
-    fn update_halt(&mut self) {
-        let trouble = self.trouble.take();
+    /// Steps the nodes. After a panic, the nodes behind the one that panicked still step.
+    fn run_nodes(&mut self) -> Result<(), Fault> {
+        let mut first = 0;
+        loop {
+            match catch_unwind(AssertUnwindSafe(|| self.core.run(first, &mut self.timing))) {
+                Ok(true) => return Ok(()),
+                Ok(false) => return self.on_not_finite(),
+                Err(panic) => self.on_panic(panic_message(&*panic))?,
+            }
+            first = self.core.current() + 1;
+        }
+    }
+
+    /// Returns whether a trouble from there concerns a task.
+    fn concerns(&self, origin: Origin, task: usize) -> bool {
+        let is_in = |tasks: Option<&Vec<usize>>| tasks.is_none_or(|tasks| tasks.contains(&task));
+        match origin {
+            _ if self.tasks.len() == 1 => true,
+            Origin::Run => true,
+            Origin::Task(of) => task == of,
+            Origin::Role(role) => is_in(self.reach.roles.get(role)),
+            Origin::Runner(runner) => is_in(self.reach.nodes.get(runner)),
+            Origin::Device(device) => self.device_roles[device].iter().any(|role| is_in(self.reach.roles.get(*role))),
+        }
+    }
+
+    /// Raises a trouble of this tick for each task that it concerns, under the policy of that task. Of several, a task
+    /// keeps the one with the strictest policy.
+    fn raise(
+        &mut self,
+        origin: Origin,
+        policy: impl Fn(&PolicyTable) -> Policy,
+        trouble: Trouble,
+    ) -> Result<(), Fault> {
+        for task in 0..self.tasks.len() {
+            if self.tasks[task].end.is_some() || !self.concerns(origin, task) {
+                continue;
+            }
+            match policy(&self.tasks[task].policy) {
+                Policy::Count => {}
+                Policy::Fault => self.fail(task, self.describe(trouble))?,
+                policy @ (Policy::Hold | Policy::Stop) => self.tasks[task].keep(policy, trouble),
+            }
+        }
+        Ok(())
+    }
+
+    /// Ends a task and those in it with a fault. Returns the fault if it ends the run.
+    pub(super) fn fail(&mut self, task: usize, fault: Fault) -> Result<(), Fault> {
+        if self.tasks[task].ends_run {
+            return Err(fault);
+        }
+        tracing::warn!("{fault}: the commands of `{}` ramp to zero", self.tasks[task].name);
+        self.end_task(task, &TaskEnd::Failed(fault.into()));
+        Ok(())
+    }
+
+    /// Ends a task and those in it.
+    fn end_task(&mut self, task: usize, end: &TaskEnd) {
+        for i in task..self.tasks.len() {
+            let is_in_it = std::iter::successors(Some(i), |i| self.tasks[*i].parent).any(|around| around == task);
+            if is_in_it && self.tasks[i].end.is_none() {
+                self.tasks[i].end = Some(end.clone());
+            }
+        }
+    }
+
+    /// Starts a halt of a task if it had a trouble in this tick, or ends it if the trouble is over.
+    fn update_halt(&mut self, number: usize) {
+        let trouble = self.tasks[number].trouble.take();
         if let Some((policy, trouble)) = trouble
-            && (self.halts.is_escalated_by(policy) || self.explains_halt(trouble))
+            && (self.tasks[number].halts.is_escalated_by(policy) || self.explains_halt(number, trouble))
         {
             let fault = self.describe(trouble);
-            self.halts.halt(policy, fault);
+            self.tasks[number].halts.halt(policy, fault);
         }
-        let resumes = self.halts.update(trouble.is_some(), self.core.tick.now);
-        if let Some(modes) = self.modes.as_mut().filter(|_| resumes) {
+        let task = &mut self.tasks[number];
+        let resumes = task.halts.update(trouble.is_some(), self.core.tick.now);
+        if let Some(modes) = task.modes.as_mut().filter(|_| resumes) {
             modes.restart(&self.core.tick);
             self.core.switch(modes.configurations());
         }
     }
 
     /// Whether a device has reported why its samples are missing, while the commands are held only for missing samples.
-    fn explains_halt(&self, trouble: Trouble) -> bool {
-        let last = self.halts.list.last().filter(|halt| halt.until.is_none());
+    fn explains_halt(&self, task: usize, trouble: Trouble) -> bool {
+        let last = self.tasks[task].halts.list.last().filter(|halt| halt.until.is_none());
         let is_silence = last.is_some_and(|halt| {
             halt.policy == Policy::Hold && matches!(halt.fault.cause, Cause::SilentClock | Cause::Stale { .. })
         });
@@ -132,33 +203,69 @@ impl Engine {
     }
 
     /// Sends an operator word. `stop` halts the commands and `resume` ends the halt, in upper or lower case; other
-    /// words go to the modes.
+    /// words go to the modes. A bare word reaches all tasks, and `left.stop` only the task `left` and those in it.
     ///
     /// # Errors
     /// Returns a message if no mode has a condition on the word, or if the commands wait for `resume`.
     pub fn send(&mut self, word: &str) -> Result<(), String> {
-        if word.eq_ignore_ascii_case("stop") {
-            self.halts.resumes = false;
-            self.trouble = Some((Policy::Stop, Trouble::Operator));
-        } else if word.eq_ignore_ascii_case("resume") {
-            self.halts.resumes = true;
-        } else if !self.words().any(|known| known == word) {
-            let known = self.words().collect::<std::collections::BTreeSet<_>>();
-            return Err(format!(
-                "no mode has a condition on `{word}`: {}",
-                suggestion(word, known.into_iter(), "words")
-            ));
-        } else if self.halts.is_stopped() {
-            return Err(format!("`{word}` has no effect while the commands are stopped: send `resume` first"));
-        } else {
-            self.sent = Some(word.to_owned());
+        let (to, bare) = self.addressee(word);
+        let mut has_reached = (false, false);
+        for task in 0..self.tasks.len() {
+            let mut around = std::iter::successors(Some(task), |task| self.tasks[*task].parent);
+            if self.tasks[task].end.is_some() || !around.any(|around| around == to) {
+                continue;
+            }
+            let task = &mut self.tasks[task];
+            let is_known = task.words().any(|known| known == bare);
+            if bare.eq_ignore_ascii_case("stop") {
+                task.halts.resumes = false;
+                task.trouble = Some((Policy::Stop, Trouble::Operator));
+            } else if bare.eq_ignore_ascii_case("resume") {
+                task.halts.resumes = true;
+            } else if is_known && !task.is_stopped() {
+                task.sent = Some(bare.to_owned());
+                has_reached.0 = true;
+                continue;
+            } else {
+                has_reached.1 |= is_known;
+                continue;
+            }
+            has_reached.0 = true;
         }
-        Ok(())
+        match has_reached {
+            (true, _) => Ok(()),
+            (false, true) => Err(format!("`{word}` has no effect while the commands are stopped: send `resume` first")),
+            (false, false) if self.words().iter().any(|known| known == word) => {
+                Err(format!("`{word}` has no effect: the task has ended"))
+            }
+            (false, false) => {
+                let known = self.words();
+                let known = suggestion(word, known.iter().map(String::as_str), "words");
+                Err(format!("no mode has a condition on `{word}`: {known}"))
+            }
+        }
     }
 
-    /// Returns the operator words that the graph accepts.
-    pub fn words(&self) -> impl Iterator<Item = &str> {
-        ["stop", "resume"].into_iter().chain(self.modes.iter().flat_map(ModeMachine::words))
+    /// Returns the task that a word is for, and the word without the name of the task.
+    fn addressee<'w>(&self, word: &'w str) -> (usize, &'w str) {
+        let named =
+            |(number, task): (usize, &TaskRun)| Some((number, word.strip_prefix(task.name())?.strip_prefix('.')?));
+        let named = self.tasks.iter().enumerate().skip(1).filter_map(named);
+        named.min_by_key(|(_, rest)| rest.len()).unwrap_or((0, word))
+    }
+
+    /// Returns the operator words that the graph accepts, each once and in the order of the alphabet.
+    #[must_use]
+    pub fn words(&self) -> Vec<String> {
+        let own = || ["stop", "resume"].into_iter();
+        let mut words: Vec<String> =
+            own().chain(self.tasks.iter().flat_map(TaskRun::words)).map(str::to_owned).collect();
+        for task in self.tasks.iter().skip(1) {
+            words.extend(own().chain(task.words()).map(|word| format!("{}.{word}", task.name())));
+        }
+        words.sort();
+        words.dedup();
+        words
     }
 
     /// Notes that the next tick begins `by` [ns] too late in real time.
@@ -167,18 +274,25 @@ impl Engine {
         self.lateness = Some(by);
     }
 
-    /// Evaluates the conditions of the current mode after a tick. While the commands wait for `resume`, the mode stays.
+    /// Evaluates the conditions of the current mode of each task after a tick. While the commands of a task wait for
+    /// `resume`, its mode stays. All tasks decide on the values of this tick, and on the modes at its start.
     fn decide(&mut self) -> Result<(), Fault> {
-        let sent = self.sent.take();
-        let Some(modes) = self.modes.as_mut().filter(|_| !self.halts.is_stopped()) else { return Ok(()) };
-        match modes.decide(&self.core.bus, &self.core.tick, sent.as_deref()) {
-            Transition::Stay => {}
-            Transition::Switched => self.core.switch(modes.configurations()),
-            Transition::Done => self.is_done = true,
-            Transition::Failed => {
-                let ((why, place), name) = (modes.taken(), modes.name().to_owned());
-                let (why, place) = (Cause::Mode(why.to_owned()), self.sources.locate(place));
-                return Err(self.fault(&name, None, why, place));
+        for number in 0..self.tasks.len() {
+            let task = &mut self.tasks[number];
+            let sent = task.sent.take();
+            if task.end.is_some() || task.halts.is_stopped() {
+                continue;
+            }
+            let Some(modes) = task.modes.as_mut() else { continue };
+            match modes.decide(&self.core.bus, &self.core.tick, sent.as_deref()) {
+                Transition::Stay => {}
+                Transition::Switched => self.core.switch(modes.configurations()),
+                Transition::Done => self.end_task(number, &TaskEnd::Done),
+                Transition::Failed => {
+                    let ((why, place), name) = (modes.taken(), modes.full_name());
+                    let (why, place) = (Cause::Mode(why.to_owned()), self.sources.locate(place));
+                    self.fail(number, self.fault(&name, None, why, place))?;
+                }
             }
         }
         Ok(())
@@ -262,7 +376,7 @@ impl Engine {
     }
 
     /// Handles a value that is not finite. Under every policy but `fault`, the outputs of the node and of all nodes
-    /// after it become absent, and those nodes are reset.
+    /// after it become absent, and those nodes are reset: in the tasks that read the value.
     #[cold]
     fn on_not_finite(&mut self) -> Result<(), Fault> {
         // Ports are in the order in which nodes write them, so the first that is not finite is the cause of the others.
@@ -272,39 +386,37 @@ impl Engine {
             !bus.arenas.is_finite(planned.shape.kind(), id.slot)
         };
         let port = (0..self.ports.len()).find(is_bad).expect("the finite check failed on some port");
-        self.raise(self.policy.not_finite.0, Trouble::NotFinite(port))?;
-        let runner = self.runner_of(port);
-        self.invalidate_from(runner);
-        self.core.reset_from(runner);
+        let runner = self.writers[port].unwrap_or(0);
+        self.raise(Origin::Runner(runner), |policy| policy.not_finite.0, Trouble::NotFinite(port))?;
+        let is_behind =
+            |behind: usize| behind >= runner && self.concerns(Origin::Runner(runner), self.core.task_of(behind));
+        let behind: Vec<bool> = (0..self.names.len()).map(is_behind).collect();
+        self.invalidate(&behind);
+        (0..behind.len()).filter(|runner| behind[*runner]).for_each(|runner| self.core.reset(runner));
         Ok(())
     }
 
-    /// Handles the panic of a node. Under every policy but `fault`, the node waits for its reset, and its outputs and
-    /// those of all nodes after it become absent.
+    /// Handles the panic of a node. Under every policy but `fault`, the node waits for its reset, and its outputs
+    /// are absent.
     #[cold]
     fn on_panic(&mut self, message: String) -> Result<(), Fault> {
         self.panic = message;
-        self.raise(self.policy.panic.0, Trouble::Panicked(self.core.current()))?;
+        let runner = self.core.current();
+        self.raise(Origin::Runner(runner), |policy| policy.panic.0, Trouble::Panicked(runner))?;
         self.core.set_panicked();
-        self.invalidate_from(self.core.current());
+        let own: Vec<bool> = (0..self.names.len()).map(|other| other == runner).collect();
+        self.invalidate(&own);
         Ok(())
     }
 
-    /// Makes the outputs of a runner and of all that step after it absent. Allocates their buffers again, because a
-    /// node that panics may lose its buffers.
-    fn invalidate_from(&mut self, runner: usize) {
-        // A node may have no outputs; then the ports of the next node that has some come first.
-        let first = |name: &String| self.ports.iter().position(|(port, _)| owner(&port.name) == name);
-        let from = self.names[runner..].iter().find_map(|(name, _)| first(name));
-        for (port, id) in &self.ports[from.unwrap_or(self.ports.len())..] {
-            self.core.bus.mark_mut(*id).lose(self.core.tick.index);
-            self.core.bus.arenas.renew(id.slot, &port.shape);
+    /// Makes the outputs of some runners absent. Allocates their buffers again, because a node that panics may lose its
+    /// buffers.
+    fn invalidate(&mut self, runners: &[bool]) {
+        for ((port, id), writer) in self.ports.iter().zip(&self.writers) {
+            if writer.is_some_and(|writer| runners[writer]) {
+                self.core.bus.mark_mut(*id).lose(self.core.tick.index);
+                self.core.bus.arenas.renew(id.slot, &port.shape);
+            }
         }
-    }
-
-    /// Returns the index of the runner that writes a port.
-    fn runner_of(&self, port: usize) -> usize {
-        let name = owner(&self.ports[port].0.name);
-        self.names.iter().position(|(known, _)| known == name).unwrap_or(0)
     }
 }

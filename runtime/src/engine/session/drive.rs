@@ -35,8 +35,9 @@ pub(crate) fn drive(engine: &mut Engine, until: i64, pacer: &mut impl Pacer, obs
             Err(fault) => return End::Fault(fault.into()),
         }
         let fault = pacer.after(engine);
-        if engine.is_done() {
-            return End::Done;
+        if engine.is_over() {
+            let failed = engine.failures().next().map(|(_, fault)| End::Fault(fault.clone().into()));
+            return failed.unwrap_or(End::Done);
         }
         if let Some(fault) = fault {
             return End::Fault(fault.into());
@@ -51,7 +52,8 @@ pub(crate) fn permanent_halt(engine: &Engine, can_resume: bool, is_endless: bool
     let has_failed_device = || engine.devices.iter().any(|device| device.failed.is_some());
     let is_lost = is_endless && has_failed_device() && !engine.has_end();
     let is_still = || engine.devices.iter().all(|device| device.commands.are_zero());
-    let last = engine.halts().last().filter(|_| (is_stopped || is_lost) && is_still())?;
+    let halts = engine.tasks().iter().filter(|task| task.end().is_none()).filter_map(|task| task.halts().last());
+    let last = halts.max_by_key(|halt| halt.fault.tick).filter(|_| (is_stopped || is_lost) && is_still())?;
     Some(last.fault.clone())
 }
 

@@ -1,11 +1,13 @@
 //! The engine: the state of a running graph and its accessors.
 
-use super::halt::{Halt, HaltMachine, Rest};
+use super::halt::{Halt, Rest};
 use super::schedule::TickSchedule;
-use super::trouble::{Trouble, WatchedBudget, WatchedWire};
+use super::task_run::{TaskEnd, TaskRun};
+use super::trouble::{WatchedBudget, WatchedWire};
 use crate::device::Report;
-use crate::engine::core::{Core, Counters, DeviceLink, DeviceSlot, ModeChange, ModeMachine, Timing};
-use crate::graph::{AllowedWarning, PlannedPort, Policy, PolicyTable};
+use crate::engine::core::{Core, Counters, DeviceLink, DeviceSlot, ModeChange, Timing};
+use crate::fault::Fault;
+use crate::graph::{AllowedWarning, PlannedPort, Reach};
 use crate::node::{Bus, PortId};
 use crate::signal::{Mark, Signal};
 use crate::source::{SourceMap, suggestion};
@@ -17,7 +19,7 @@ pub struct Engine {
     pub(super) schedule: TickSchedule,
     pub(super) ports: Vec<(PlannedPort, PortId)>,
     pub(super) logged: Vec<Logged>,
-    pub(super) display: Display,
+    pub(super) display: Vec<DisplayedPort>,
     /// Name and port of the scale that each limit reports.
     pub(super) limits: Vec<(String, PortId)>,
     pub(super) budgets: Vec<WatchedBudget>,
@@ -34,18 +36,18 @@ pub struct Engine {
     /// Name of each export of a part, and the port behind it.
     pub(super) exports: Vec<(String, String)>,
     pub(super) timing: Timing,
-    pub(super) modes: Option<ModeMachine>,
-    pub(super) is_done: bool,
-    pub(super) policy: PolicyTable,
-    pub(super) halts: HaltMachine,
+    /// The graph itself, and the parts that are tasks.
+    pub(super) tasks: Vec<TaskRun>,
+    /// The tasks that a trouble of each role and of each runner concerns.
+    pub(super) reach: Reach,
+    /// The roles that each device fills.
+    pub(super) device_roles: Vec<Vec<usize>>,
+    /// The runner that writes each port.
+    pub(super) writers: Vec<Option<usize>>,
     /// Wires whose policy stops the commands or ends the run when their value is too old.
     pub(super) watched: Vec<WatchedWire>,
-    /// The trouble of this tick with the strictest policy.
-    pub(super) trouble: Option<(Policy, Trouble)>,
     /// Message of the last panic of a node.
     pub(super) panic: String,
-    /// An operator word that the modes have not processed yet.
-    pub(super) sent: Option<String>,
     /// Ticks that began too late.
     pub(super) late: u64,
     /// How late the next tick begins, if it is too late [ns].
@@ -53,13 +55,17 @@ pub struct Engine {
     pub(super) sources: SourceMap,
 }
 
-/// The ports that a run displays, from the keys `show` and `mark` of the section [graph].
-#[derive(Debug, Clone, Default)]
-pub struct Display {
-    /// The ports, each with its name in the graph file.
-    pub ports: Vec<(String, PlannedPort, PortId)>,
-    /// The ports of the contact's x and y in the first image [m].
-    pub contact: Option<[PortId; 2]>,
+/// A port that a run displays, from the keys `show` and `mark` of the section [graph].
+#[derive(Debug, Clone)]
+pub struct DisplayedPort {
+    /// Its name in the graph file.
+    pub name: String,
+    /// Its full name and shape.
+    pub port: PlannedPort,
+    /// Its place on the bus.
+    pub id: PortId,
+    /// The ports of the x and the y of the contact that is marked in it [m], if it is an image.
+    pub mark: Option<[PortId; 2]>,
 }
 
 /// A node whose inputs are logged.
@@ -89,52 +95,71 @@ impl Engine {
         Some(self.schedule.next(clock))
     }
 
-    /// Whether a `done` condition of a mode holds.
+    /// Returns the tasks: the graph itself, and the parts that are tasks.
     #[must_use]
-    pub const fn is_done(&self) -> bool {
-        self.is_done
+    pub fn tasks(&self) -> &[TaskRun] {
+        &self.tasks
     }
 
-    /// Returns the name of the mode of the next tick, or `None` in a graph without modes.
+    /// Returns the graph itself as a task.
+    fn root(&self) -> &TaskRun {
+        &self.tasks[0]
+    }
+
+    /// Whether every task that has modes or commands has ended, and none of them has failed.
+    #[must_use]
+    pub fn is_done(&self) -> bool {
+        self.is_over() && self.failures().next().is_none()
+    }
+
+    /// Whether every task that has modes or commands is done or has failed.
+    pub(super) fn is_over(&self) -> bool {
+        self.tasks.iter().any(|task| task.end.is_some()) && !self.tasks.iter().any(TaskRun::is_awaited)
+    }
+
+    /// Returns the fault of each task that has failed, with the name of the task.
+    pub fn failures(&self) -> impl Iterator<Item = (&str, &Fault)> {
+        self.tasks.iter().filter_map(|task| match &task.end {
+            Some(TaskEnd::Failed(fault)) => Some((task.name(), &**fault)),
+            _ => None,
+        })
+    }
+
+    /// Returns the name of the mode of the next tick, or `None` if the graph itself has no modes.
     #[must_use]
     pub fn mode(&self) -> Option<&str> {
-        self.modes.as_ref().map(ModeMachine::name)
+        self.root().mode()
     }
 
     /// Returns the number of the mode of the next tick, from 0 in the order of the file.
     #[must_use]
     pub fn mode_number(&self) -> Option<usize> {
-        self.modes.as_ref().map(ModeMachine::number)
+        self.root().mode_number()
     }
 
-    /// Whether every command is zero or ramps to zero because of a halt.
+    /// Whether every command of the graph itself is zero or ramps to zero because of a halt.
     #[must_use]
     pub fn is_halted(&self) -> bool {
-        self.halts.is_halted()
+        self.root().is_halted()
     }
 
-    /// Returns the mode changes so far, the start mode first.
+    /// Returns the mode changes of the graph itself so far, the start mode first.
     #[must_use]
     pub fn changes(&self) -> Vec<ModeChange> {
-        self.modes.iter().flat_map(ModeMachine::changes).collect()
+        self.root().changes()
     }
 
-    /// Returns the halts so far, at most 1000.
+    /// Returns the halts of the graph itself so far, at most 1000.
     #[must_use]
     pub fn halts(&self) -> &[Halt] {
-        &self.halts.list
+        self.root().halts()
     }
 
-    /// Returns the number of halts beyond those that [`halts`](Self::halts) lists.
-    #[must_use]
-    pub const fn unlisted_halts(&self) -> u64 {
-        self.halts.unlisted
-    }
-
-    /// Whether the commands wait for the operator to resume.
+    /// Whether the commands of every task that has not ended wait for the operator to resume.
     #[must_use]
     pub fn is_stopped(&self) -> bool {
-        self.halts.is_stopped()
+        let mut awaited = self.tasks.iter().filter(|task| task.is_awaited()).peekable();
+        if awaited.peek().is_none() { self.root().is_stopped() } else { awaited.all(TaskRun::is_stopped) }
     }
 
     /// Returns the number of ticks that began too late.
@@ -205,7 +230,7 @@ impl Engine {
 
     /// Returns the ports that the graph asks to display.
     #[must_use]
-    pub const fn display(&self) -> &Display {
+    pub fn display(&self) -> &[DisplayedPort] {
         &self.display
     }
 

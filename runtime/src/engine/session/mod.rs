@@ -12,11 +12,13 @@ mod outcome;
 mod real_time;
 mod schedule;
 mod signals;
+mod task_run;
 mod trouble;
 
 pub use drive::run_virtual;
-pub use engine::{Display, Engine, Logged};
+pub use engine::{DisplayedPort, Engine, Logged};
 pub use halt::{Halt, Rest};
 pub use outcome::{End, Outcome, RunOptions};
 pub use real_time::run;
 pub use signals::Interrupt;
+pub use task_run::{TaskEnd, TaskRun};

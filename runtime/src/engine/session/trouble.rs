@@ -17,6 +17,22 @@ pub(crate) struct WatchedWire {
     pub(crate) port: Option<String>,
     /// Position of the wire in the source.
     pub(crate) span: Range<usize>,
+    pub(crate) origin: Origin,
+}
+
+/// Where a trouble comes from, which decides the tasks that it concerns.
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum Origin {
+    /// The whole run, such as its clock.
+    Run,
+    /// A role, by its index.
+    Role(usize),
+    /// A node, by the index of its runner.
+    Runner(usize),
+    /// A device, by its index.
+    Device(usize),
+    /// A task, by its index.
+    Task(usize),
 }
 
 /// A budget of a limiter.

@@ -15,11 +15,13 @@ use crate::source::{Code, Diagnostic, Diagnostics, quoted};
 /// What the exits of a mode refer to.
 pub(crate) struct ExitContext<'a> {
     pub(crate) net: &'a Net<'a>,
-    /// Index of each mode by its name.
+    /// The task whose modes they are.
+    pub(crate) task: usize,
+    /// Index of each mode of the task by its name.
     pub(crate) modes: BTreeMap<&'a str, usize>,
     /// Returns a built port, or `None` if its node has mistakes.
     pub(crate) port: &'a dyn Fn(PortRef) -> Option<&'a PlannedPort>,
-    /// The poses of the graph.
+    /// The poses of the task.
     pub(crate) poses: Vec<PortRef>,
     /// Default time after which a signal is lost [ns].
     pub(crate) lost_after: i64,
@@ -96,7 +98,7 @@ impl ExitContext<'_> {
                 if mode.is_some() {
                     return Ok(mode);
                 }
-                let known = self.net.flat.mode_names();
+                let known = self.net.flat.mode_names(self.task);
                 Diagnostic::unknown(Code::UnknownMode, "mode", &to.value, &to.span, known).into_err()
             }
             (None, true) => {
@@ -151,7 +153,7 @@ impl ExitContext<'_> {
     /// Returns the pose whose travel is measured: the one in `of`, or the only one in the graph.
     fn travel_pose(&self, span: &Range<usize>, table: &ExitTable) -> Resolved<PortRef> {
         if let Some(of) = &table.of {
-            let source = self.net.resolve(0, of)?;
+            let source = self.net.resolve(self.scope(), of)?;
             if self.net.port(source).kind == Kind::Pose {
                 return Ok(source);
             }
@@ -175,11 +177,17 @@ impl ExitContext<'_> {
 
     /// Resolves a port or a feature of one, with its name as written.
     fn watched(&self, word: &Spanned<String>) -> Resolved<(WatchedPort, String)> {
-        let (name, feature) = match word.value.match_indices('.').nth(1) {
-            Some((at, _)) => (&word.value[..at], Some(&word.value[at + 1..])),
-            None => (word.value.as_str(), None),
+        let resolve = |name: &str| {
+            self.net.resolve(self.scope(), &Spanned { value: name.to_owned(), span: word.part(0..name.len()) })
         };
-        let source = self.net.resolve(0, &Spanned { value: name.to_owned(), span: word.part(0..name.len()) })?;
+        // The last name may be that of a port, or that of a feature of the port before it.
+        let (name, feature, source) = match word.value.rsplit_once('.').filter(|(name, _)| name.contains('.')) {
+            None => (word.value.as_str(), None, resolve(&word.value)?),
+            Some((name, feature)) => match (resolve(name), resolve(&word.value)) {
+                (_, Ok(source)) => (word.value.as_str(), None, source),
+                (source, Err(_)) => (name, Some(feature), source?),
+            },
+        };
         let Some(feature) = feature else { return Ok((WatchedPort { source, feature: None }, name.to_owned())) };
         let unknown = |message: String| Diagnostic::new(Code::UnknownPort, word.span.clone(), message);
         let shape = &(self.port)(source).ok_or(None)?.shape;
@@ -195,6 +203,10 @@ impl ExitContext<'_> {
                 .into_err();
         };
         Ok((WatchedPort { source, feature: Some(at) }, format!("{name}.{feature}")))
+    }
+
+    fn scope(&self) -> usize {
+        self.net.flat.tasks[self.task].scope
     }
 
     fn port_condition(&self, when: &Spanned<String>, exit: &ModeExit) -> Resolved<(Condition, String)> {

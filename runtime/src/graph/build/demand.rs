@@ -110,6 +110,13 @@ fn always_read(net: &Net<'_>) -> Vec<Outputs> {
             always[node][command.source.port] = Components::ALL;
         }
     }
+    // What another task reads is computed in every mode: the modes of the two change at different times.
+    for (node, wires) in net.wires.iter().enumerate() {
+        let task = net.flat.task_with_modes(node);
+        let sources = wires.iter().filter_map(|wire| Some((wire.source.producer.node()?, wire.source.port)));
+        let foreign = sources.filter(|(source, _)| net.flat.task_with_modes(*source) != task);
+        foreign.for_each(|(source, port)| always[source][port] = Components::ALL);
+    }
     // A node with a delayed input steps before its source, so a pass backwards reaches it too late: it counts as
     // reading all.
     for (node, wires) in net.wires.iter().enumerate() {

@@ -5,6 +5,8 @@ mod demand;
 mod modes;
 mod nodes;
 mod params;
+mod tasks;
 
 pub(crate) use modes::{BuiltModes, build_modes};
 pub(crate) use nodes::Builder;
+pub(crate) use tasks::{find_reach, plan_tasks};

@@ -37,7 +37,8 @@ pub(crate) fn build_modes(builder: &mut Builder<'_>, nodes: &mut [PlannedNode]) 
     let freezes = nodes.iter_mut().map(want).collect();
     let mut motions = Motions::new((0..places.len()).map(|node| builder.motion(node)).collect());
     let (mut modes, mut demand_changes) = (Vec::new(), Vec::new());
-    for (block, exits) in net.flat.modes.iter().zip(exits(builder, nodes)) {
+    for (number, exits) in exits(builder, nodes).into_iter().enumerate() {
+        let block = &net.flat.modes[number];
         let mut variants = variants(block, builder);
         let changed: Vec<usize> = variants.keys().copied().collect();
         let built = |index: usize| match variants.get(&index) {
@@ -57,7 +58,7 @@ pub(crate) fn build_modes(builder: &mut Builder<'_>, nodes: &mut [PlannedNode]) 
         motions.add_mode(variants.iter().map(|(node, variant)| (*node, variant.motion)));
         demand_changes.push(changes);
         let configurations = adopt(block, variants, nodes, &places, &mut builder.diagnostics);
-        modes.push(PlannedMode { name: block.key.name.clone(), exits, configurations });
+        modes.push(PlannedMode { name: net.flat.mode_name(number), exits, configurations });
     }
     BuiltModes { modes, motions, demand, demand_changes, freezes }
 }
@@ -67,21 +68,35 @@ fn exits(builder: &mut Builder<'_>, nodes: &[PlannedNode]) -> Vec<Vec<PlannedExi
     let ports = &builder.ports;
     let port = |source: PortRef| -> Option<&PlannedPort> { ports.get(&source) };
     let poses = nodes.iter().flat_map(PlannedNode::outputs).filter(|(_, port)| port.shape.kind() == Kind::Pose);
-    let context = ExitContext {
+    let poses: Vec<_> = poses.map(|(source, port)| (source, port.name.as_str())).collect();
+    let flat = builder.net.flat;
+    let context = |task: usize| ExitContext {
         net: builder.net,
-        modes: builder.net.flat.mode_numbers(),
+        task,
+        modes: flat.mode_numbers(task),
         port: &port,
-        poses: poses.map(|(source, _)| source).collect(),
+        poses: poses
+            .iter()
+            .filter(|(_, name)| name.starts_with(&flat.tasks[task].prefix))
+            .map(|(pose, _)| *pose)
+            .collect(),
         lost_after: default_max_age_ns(builder.period),
     };
-    let (net, measured, diagnostics) = (builder.net, &mut builder.measured, &mut builder.diagnostics);
-    net.flat.modes.iter().map(|block| context.resolve(block, measured, diagnostics)).collect()
+    let contexts: Vec<_> = (0..flat.tasks.len()).map(context).collect();
+    let (measured, diagnostics) = (&mut builder.measured, &mut builder.diagnostics);
+    flat.modes.iter().map(|block| contexts[block.task].resolve(block, measured, diagnostics)).collect()
 }
 
 /// Builds the nodes whose parameters a mode sets.
 fn variants(block: &ModeBlock, builder: &mut Builder<'_>) -> BTreeMap<usize, Built> {
     let mut tables = BTreeMap::new();
-    collect_tables(builder.net.flat, 0, &block.set, &mut tables, &mut builder.diagnostics);
+    let (flat, task) = (builder.net.flat, block.task);
+    collect_tables(flat, flat.tasks[task].scope, &block.set, &mut tables, &mut builder.diagnostics);
+    tables.retain(|node, _| {
+        let is_own = flat.task_with_modes(*node) == Some(task);
+        builder.diagnostics.extend((!is_own).then(|| set_in_other_task(flat, *node, block)));
+        is_own
+    });
     let mut variants = BTreeMap::new();
     for (index, mut table) in tables {
         let Some(spec) = builder.net.spec(index) else { continue };
@@ -94,6 +109,16 @@ fn variants(block: &ModeBlock, builder: &mut Builder<'_>) -> BTreeMap<usize, Bui
         variants.extend(builder.variant(index, &params).map(|built| (index, built)));
     }
     variants
+}
+
+/// Reports a mode that sets a parameter in a part with modes of its own: two modes would decide about one node.
+fn set_in_other_task(flat: &FlatGraph, node: usize, block: &ModeBlock) -> Diagnostic {
+    let name = &flat.nodes[node].name;
+    let message = format!("mode `{}` sets `{name}`, which is in a part with modes of its own", block.key.name);
+    let place =
+        block.set.entries.iter().find(|(key, _)| name[flat.tasks[block.task].prefix.len()..].starts_with(&key.name));
+    let place = place.map_or_else(|| block.key.span.clone(), |(key, _)| key.span.clone());
+    Diagnostic::new(Code::UnknownKey, place, message).help("set it in a mode of that part, or under `set` of the part")
 }
 
 /// Collects the parameters that a mode sets of each node, through the parts.

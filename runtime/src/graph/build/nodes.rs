@@ -1,6 +1,6 @@
 //! Builds the nodes of a graph in step order, each from the shapes on its wires.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use crate::graph::bench::{BoundRole, OpenedBench, place_mistakes};
 use crate::graph::check::frames::Frames;
@@ -8,7 +8,7 @@ use crate::graph::check::units::{UnitMismatch, UnitOrigin, Units};
 use crate::graph::load::MeasuredValues;
 use crate::graph::net::{CommandWire, Net, WireOrigin};
 use crate::graph::plan::{PlannedCommand, PlannedNode, PlannedPort, PlannedRole, PlannedWire, PortRef, Producer};
-use crate::graph::syntax::{AgeLimit, Policy, PolicyTable, default_max_age_ns};
+use crate::graph::syntax::{AgeLimit, Policy, default_max_age_ns};
 use crate::node::{Built, Configured, Given, Motion, Need, NodeSpec, PortSpec, frame_args};
 use crate::signal::{FlagShape, Joint, Kind, Shape};
 use crate::source::{Code, Diagnostic, Diagnostics, Key, SourceMap, Value};
@@ -57,6 +57,7 @@ impl<'a> Builder<'a> {
             measured: MeasuredValues::default(),
         };
         builder.add_roles();
+        builder.add_modes();
         builder
     }
 
@@ -89,8 +90,42 @@ impl Builder<'_> {
         }
     }
 
+    /// Adds the flags of the modes of all tasks.
+    fn add_modes(&mut self) {
+        for task in 0..self.net.flat.tasks.len() {
+            for port in 0..self.net.flat.mode_names(task).count() {
+                let source = PortRef { producer: Producer::Task(task), port };
+                let span = self.net.place(source.producer);
+                let port = self.add_port(source, FlagShape.into());
+                self.origins.insert(source, UnitOrigin { span, text: format!("`{}` is a flag", port.name) });
+            }
+        }
+    }
+
+    /// Returns the tasks that read or command each role.
+    fn role_tasks(&self) -> Vec<BTreeSet<usize>> {
+        let net = self.net;
+        let mut tasks = vec![BTreeSet::new(); net.roles.len()];
+        let nodes = net.wires.iter().zip(&net.flat.nodes);
+        let wires =
+            nodes.flat_map(|(wires, node)| wires.iter().map(|wire| (wire.source, net.flat.scopes[node.scope].task)));
+        for (source, task) in wires.chain(net.commands.iter().map(|wire| (wire.source, wire.task))) {
+            if let Producer::Role(role) = source.producer {
+                tasks[role].insert(task);
+            }
+        }
+        for wire in &net.commands {
+            tasks[wire.role].insert(wire.task);
+        }
+        tasks
+    }
+
     /// Plans the roles, with their age limits.
-    pub(crate) fn plan_roles(&self, policy: &PolicyTable) -> Vec<PlannedRole> {
+    ///
+    /// Of several tasks that use a role, the strictest limit holds.
+    pub(crate) fn plan_roles(&self) -> Vec<PlannedRole> {
+        let policies: Vec<_> = (0..self.net.flat.tasks.len()).map(|task| self.net.flat.policy(task)).collect();
+        let tasks = self.role_tasks();
         let plan = |key: &Key, bound: &BoundRole, ports, age, is_observed| PlannedRole {
             name: key.name.clone(),
             device: bound.device,
@@ -105,7 +140,10 @@ impl Builder<'_> {
             let bound = bound.as_ref()?;
             let source = |port| PortRef { producer: Producer::Role(i), port };
             let ports = (0..bound.outputs.len()).map(|port| self.ports[&source(port)].clone()).collect();
-            Some(plan(key, bound, ports, policy.age_limit(&key.name, self.opened.period(bound)), false))
+            let limit =
+                |task: &usize| policies[*task].age_limit(self.net.flat.role_in(*task, i), self.opened.period(bound));
+            let strictest = tasks[i].iter().map(limit).reduce(|one, other| one.and(Some(other)));
+            Some(plan(key, bound, ports, strictest.unwrap_or_else(|| limit(&0)), false))
         });
         // The age of a sample for scenarios and recordings does not matter.
         let ageless = AgeLimit { max_age: i64::MAX, stale: Policy::Count };
@@ -185,6 +223,7 @@ impl Builder<'_> {
             holds: spec.limits.holds,
             budget: spec.limits.spends.and_then(|spent| self.budget(index, spec, spent)),
             is_uncalibrated: built.is_uncalibrated,
+            task: self.net.flat.scopes[node.scope].task,
             span: node.block.key.span.clone(),
         })
     }
@@ -307,6 +346,7 @@ impl Builder<'_> {
         }
         Some(PlannedCommand {
             source: wire.source,
+            task: wire.task,
             device: bound.device,
             is_report: wire.is_report,
             port: *number,

@@ -2,7 +2,6 @@
 
 use std::collections::BTreeMap;
 
-use crate::graph::net::Net;
 use crate::graph::plan::{Condition, PlannedMode, PortRef, Producer, Test, WatchedPort};
 use crate::graph::syntax::PortState;
 use crate::node::Components;
@@ -13,13 +12,12 @@ use crate::source::{Code, Diagnostic, Diagnostics};
 /// `reads` returns the components that a mode reads of a node's port. `freezes` holds which nodes make unused components
 /// absent.
 pub(crate) fn check(
-    net: &Net<'_>,
     modes: &[PlannedMode],
     reads: &dyn Fn(usize, usize, usize) -> Components,
     freezes: &BTreeMap<usize, bool>,
     diagnostics: &mut Diagnostics,
 ) {
-    for (number, (mode, block)) in modes.iter().zip(&net.flat.modes).enumerate() {
+    for (number, mode) in modes.iter().enumerate() {
         for exit in &mode.exits {
             let (Condition::Port(watched, _) | Condition::Lost(watched, _)) = &exit.condition else { continue };
             let WatchedPort { source: PortRef { producer: Producer::Node(node), port }, feature } = *watched else {
@@ -38,7 +36,7 @@ pub(crate) fn check(
             let name = exit.text.split('`').nth(1).unwrap_or_default();
             let message = format!(
                 "nothing reads `{name}` in mode `{}`, so it is absent there and this condition {what} holds",
-                block.key.name
+                mode.name
             );
             let help = "select the feature in this mode, or watch a port upstream of it";
             diagnostics.push(Diagnostic::new(Code::AbsentPort, exit.span.clone(), message).help(help));

@@ -12,9 +12,10 @@ pub(crate) fn silence(flat: &FlatGraph, warnings: &mut Diagnostics) -> Vec<Allow
     let mut allowed = Vec::new();
     for (entry, is_own) in flat.allow.iter().map(|entry| (entry, true)).chain(of_bench.map(|entry| (entry, false))) {
         let before = warnings.len();
-        warnings.retain(|warning| warning.code != entry.code);
+        let is_elsewhere = |place: usize| entry.within.as_ref().is_some_and(|within| !within.contains(&place));
+        warnings.retain(|warning| warning.code != entry.code || is_elsewhere(warning.span.start));
         match before - warnings.len() {
-            0 if is_own => {
+            0 if is_own && entry.within.is_none() => {
                 let message = format!("the graph has no warning `{}` to allow", entry.key.name);
                 warnings
                     .push(Diagnostic::new(Code::UnusedAllow, entry.key.span.clone(), message).help("remove the line"));

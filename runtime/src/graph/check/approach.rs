@@ -12,26 +12,29 @@ use crate::source::{Code, Diagnostic, Diagnostics, Value, quoted};
 
 /// Warns of each mode that waits for a contact and in which the sensor moves away from the object, or not at all.
 ///
-/// `start` is the start mode.
+/// `starts` are the start modes of the tasks.
 pub(crate) fn check(
     net: &Net<'_>,
     contact: &ContactPorts,
     modes: &[PlannedMode],
-    start: usize,
+    starts: &[usize],
     (motions, generators): (&Motions, &Generators),
     diagnostics: &mut Diagnostics,
 ) {
     let waits = |exit: &PlannedExit| waits(net, contact, exit);
-    let free = find_free(modes, start, &waits);
-    let is_always_still = (0..modes.len()).all(|mode| generators.of(mode).is_empty());
-    for i in (0..modes.len()).filter(|i| free[*i] && is_approach(&modes[*i], *i == start, &waits)) {
+    let free = find_free(modes, starts, &waits);
+    for i in (0..modes.len()).filter(|i| free[*i] && is_approach(&modes[*i], starts.contains(i), &waits)) {
+        let task = net.flat.modes[i].task;
+        let mut own = (0..modes.len()).filter(|mode| net.flat.modes[*mode].task == task);
+        let is_always_still = own.all(|mode| generators.of(mode).is_empty());
+        let all = generators.all_in(net, task);
         let moving = generators.of(i);
         let is_bounded = modes[i].exits.iter().any(|exit| matches!(exit.condition, Condition::Travel(..)));
-        let is_set = || generators.all.iter().any(|node| net.setting(i, *node).is_some());
+        let is_set = || all.iter().any(|node| net.setting(i, *node).is_some());
         // A task may wait at rest until it is touched, and move in other modes.
         let is_meant_to_move = is_bounded || is_always_still || is_set();
-        if moving.is_empty() && is_meant_to_move && !generators.all.is_empty() {
-            diagnostics.push(report(net, i, &generators.all, true));
+        if moving.is_empty() && is_meant_to_move && !all.is_empty() {
+            diagnostics.push(report(net, i, &all, true));
         } else if !moving.is_empty() && moving.iter().all(|node| motions.of(i, *node) == Motion::Retreat) {
             diagnostics.push(report(net, i, moving, false));
         }
@@ -40,9 +43,9 @@ pub(crate) fn check(
 
 /// Returns for each mode whether it begins without a contact: at the start, after a contact is lost, or after such a
 /// mode.
-fn find_free(modes: &[PlannedMode], start: usize, waits: &dyn Fn(&PlannedExit) -> bool) -> Vec<bool> {
+fn find_free(modes: &[PlannedMode], starts: &[usize], waits: &dyn Fn(&PlannedExit) -> bool) -> Vec<bool> {
     let mut begins_with_contact = vec![false; modes.len()];
-    let mut open = vec![start];
+    let mut open = starts.to_vec();
     for exit in modes.iter().flat_map(|mode| &mode.exits) {
         let Some(to) = exit.to else { continue };
         begins_with_contact[to] |= waits(exit);
@@ -78,7 +81,7 @@ fn waits(net: &Net<'_>, contact: &ContactPorts, exit: &PlannedExit) -> bool {
 
 fn report(net: &Net<'_>, mode: usize, generators: &[usize], is_still: bool) -> Diagnostic {
     let block = &net.flat.modes[mode];
-    let (name, names) = (&block.key.name, quoted(generators.iter().map(|node| &net.flat.nodes[*node].name)));
+    let (name, names) = (net.flat.mode_name(mode), quoted(generators.iter().map(|node| &net.flat.nodes[*node].name)));
     let message = match is_still {
         true => format!("mode `{name}` waits for a contact, but {names} does not move the sensor"),
         false => {

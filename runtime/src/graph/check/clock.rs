@@ -8,8 +8,9 @@ use crate::source::{Code, Diagnostic, Diagnostics, Edit};
 
 /// Returns what triggers the ticks and the period [s], or reports why there is no clock.
 pub(crate) fn check(net: &Net<'_>, opened: &OpenedBench, diagnostics: &mut Diagnostics) -> Option<(Clock, f64)> {
-    let has_clock = net.flat.table.as_ref().is_some_and(|table| table.clock.is_some() || table.rate_hz.is_some());
-    if !has_clock && net.flat.has_unknown_setting(diagnostics) {
+    let task = net.flat.root();
+    let has_clock = task.table.as_ref().is_some_and(|table| table.clock.is_some() || table.rate_hz.is_some());
+    if !has_clock && task.has_unknown_setting(diagnostics) {
         return None;
     }
     let (clock, period) = report(find_clock(net, opened), diagnostics)?;
@@ -20,7 +21,7 @@ pub(crate) fn check(net: &Net<'_>, opened: &OpenedBench, diagnostics: &mut Diagn
 fn find_clock(net: &Net<'_>, opened: &OpenedBench) -> Resolved<(Clock, f64)> {
     let flat = net.flat;
     // An invalid section [graph] has its own diagnostic.
-    let table = flat.table.as_ref().ok_or(None)?;
+    let (table, place) = (flat.root().table.as_ref().ok_or(None)?, &flat.root().place);
     let (message, span, help) = match (&table.clock, table.rate_hz) {
         (None, Some(rate)) => return Ok((Clock::Rate, 1.0 / rate)),
         (Some(word), None) => {
@@ -38,17 +39,17 @@ fn find_clock(net: &Net<'_>, opened: &OpenedBench) -> Resolved<(Clock, f64)> {
             let is_sensor = |role: &usize| net.roles[*role].is_some_and(|role| role.commands.is_empty());
             let sensor = (0..flat.roles.len()).find(is_sensor).map(|role| &flat.roles[role].0.name);
             let line = sensor.map_or_else(|| "rate_hz = 250".to_owned(), |role| format!("clock = \"{role}\""));
-            let diagnostic = Diagnostic::new(Code::BadClock, flat.place.clone(), "the graph has no clock");
+            let diagnostic = Diagnostic::new(Code::BadClock, place.clone(), "the graph has no clock");
             let diagnostic = diagnostic.help(format!("add `{line}` under [graph]"));
-            return diagnostic.edit(Edit::Below(flat.place.clone(), line)).into_err();
+            return diagnostic.edit(Edit::Below(place.clone(), line)).into_err();
         }
     };
     Diagnostic::new(Code::BadClock, span.clone(), message).help(help).into_err()
 }
 
 fn short_gap(flat: &FlatGraph, period: f64) -> Option<Diagnostic> {
-    let gap = flat.table.as_ref()?.max_gap_ms?;
-    let span = flat.settings.as_ref()?.as_table()?.get("max_gap_ms")?.span.clone();
+    let gap = flat.root().table.as_ref()?.max_gap_ms?;
+    let span = flat.root().settings.as_ref()?.as_table()?.get("max_gap_ms")?.span.clone();
     // The period of a device is rounded to nanoseconds, so it may be slightly longer than the same number here.
     let is_short = gap * 1e-3 < period * (1.0 - 1e-6);
     let message = format!("`max_gap_ms` is {gap} ms, but the period of the graph is {:.3} ms", period * 1e3);

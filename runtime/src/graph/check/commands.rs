@@ -7,7 +7,7 @@ use crate::source::{Code, Diagnostic, Diagnostics, Edit};
 
 /// Reports each command that nothing drives.
 pub(crate) fn check(net: &Net<'_>, diagnostics: &mut Diagnostics) {
-    let wires = net.flat.commands.iter().map(|(role, wire)| (role.name.as_str(), wire.key.name.as_str()));
+    let wires = net.flat.commands.iter().map(|entry| (entry.role.name.as_str(), entry.wire.key.name.as_str()));
     let driven: BTreeSet<(&str, &str)> = wires.clone().collect();
     // A wire to an unknown role or command has its own diagnostic, and may be meant for any that has no wire.
     let has_misspelt_role = driven.iter().any(|(role, _)| net.flat.roles.position(role).is_none());
@@ -30,7 +30,7 @@ pub(crate) fn check(net: &Net<'_>, diagnostics: &mut Diagnostics) {
                     Some(port) => {
                         let line = format!("{}.{} = \"{port}\"", key.name, command.name);
                         let edit = match net.flat.commands.last() {
-                            Some((_, wire)) => Edit::Below(wire.key.span.clone(), line.clone()),
+                            Some(entry) => Edit::Below(entry.wire.key.span.clone(), line.clone()),
                             None => Edit::Append(key.span.clone(), format!("\n[commands]\n{line}")),
                         };
                         diagnostic.help(format!("add `{line}` under [commands]")).edit(edit)

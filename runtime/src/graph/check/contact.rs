@@ -39,6 +39,7 @@ impl ContactPorts {
         match port.producer {
             _ if is_flag && declared.quantity.is_none() => false,
             Producer::Role(role) => is_sensor(net, role) && is_flag,
+            Producer::Task(_) => false,
             Producer::Node(node) => self.is_sensed[node] && (is_flag || self.is_segmented[node]),
         }
     }

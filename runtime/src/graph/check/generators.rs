@@ -94,28 +94,42 @@ fn known_roles(net: &Net<'_>, limiter: usize) -> Vec<usize> {
 
 /// The nodes that start a motion of the arm without a sample.
 pub(crate) struct Generators {
-    /// Those of a graph without modes, and of modes that change none of them.
-    pub(super) usual: Vec<usize>,
-    /// Those of each mode that changes some.
-    own: Vec<Option<Vec<usize>>>,
+    /// Those with the parameters of the graph.
+    usual: Vec<usize>,
+    /// Those of each mode, in its task.
+    of_modes: Vec<Vec<usize>>,
     /// All nodes that could start a motion with other parameters.
-    pub(super) all: Vec<usize>,
+    all: Vec<usize>,
 }
 
 impl Generators {
     pub(crate) fn new(net: &Net<'_>, contact: &ContactPorts, motions: &Motions) -> Self {
         let drives = Drives::new(net);
         let find = |is_still: &dyn Fn(usize) -> bool| find(net, contact, &drives, is_still);
-        let own = motions.changes.iter().enumerate().map(|(mode, changes)| {
-            (!changes.is_empty()).then(|| find(&|node| motions.of(mode, node) == Motion::Still))
+        let usual = find(&|node| motions.usual[node] == Motion::Still);
+        let of_modes = motions.changes.iter().enumerate().map(|(mode, changes)| {
+            let own = (!changes.is_empty()).then(|| find(&|node| motions.of(mode, node) == Motion::Still));
+            let task = net.flat.modes[mode].task;
+            let generators = own.unwrap_or_else(|| usual.clone()).into_iter();
+            generators.filter(|node| net.flat.task_with_modes(*node) == Some(task)).collect()
         });
-        let own = own.collect();
-        Self { usual: find(&|node| motions.usual[node] == Motion::Still), own, all: find(&|_| false) }
+        let of_modes = of_modes.collect();
+        Self { usual, of_modes, all: find(&|_| false) }
+    }
+
+    /// Returns the generators outside of all tasks with modes.
+    pub(super) fn outside_modes(&self, net: &Net<'_>) -> Vec<usize> {
+        self.usual.iter().copied().filter(|node| net.flat.task_with_modes(*node).is_none()).collect()
+    }
+
+    /// Returns the nodes of a task with modes that could start a motion with other parameters.
+    pub(super) fn all_in(&self, net: &Net<'_>, task: usize) -> Vec<usize> {
+        self.all.iter().copied().filter(|node| net.flat.task_with_modes(*node) == Some(task)).collect()
     }
 
     /// Returns the generators of a mode.
     pub(super) fn of(&self, mode: usize) -> &[usize] {
-        self.own[mode].as_ref().unwrap_or(&self.usual)
+        &self.of_modes[mode]
     }
 }
 

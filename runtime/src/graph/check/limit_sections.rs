@@ -51,13 +51,14 @@ fn unknown_arm(net: &Net<'_>, section: &LimitSection) -> Option<Diagnostic> {
     let role = section.role.as_ref()?;
     let limited = |index: &usize| net.roles[*index].is_none_or(|role| !role.limits.is_empty());
     let is_bound = net.flat.bench.as_ref().is_some_and(|bench| bench.bind.position(&role.name).is_some());
-    let index = net.flat.roles.position(&role.name);
+    let is_own = |index: &usize| section.task == 0 || net.flat.tasks[section.task].roles.contains(index);
+    let index = net.flat.roles.position(&role.name).filter(is_own);
     let is_observed = net.catalogue.roles().iter().any(|known| known.is_observed_as(&role.name));
     let is_of_another_task = index.is_none() && is_bound && !is_observed && section.owner == LimitOwner::Bench;
     if index.as_ref().is_some_and(limited) || is_of_another_task {
         return None;
     }
-    let arms = (0..net.flat.roles.len()).filter(limited).map(|index| net.name(Producer::Role(index)));
+    let arms = (0..net.flat.roles.len()).filter(limited).filter(is_own).map(|index| net.name(Producer::Role(index)));
     Some(Diagnostic::unknown(Code::UnknownPort, "arm", &role.name, &role.span, arms))
 }
 

@@ -169,7 +169,7 @@ fn report_missing(net: &Net<'_>, missing: &[&LimitRef<'_>]) -> Option<Diagnostic
     });
     let (span, message) = match beside.or_else(|| net.flat.task_limits()) {
         Some(LimitSection { span, .. }) => (span.clone(), format!("[limits] lacks {names}")),
-        None => (net.flat.place.clone(), format!("the graph has no section [limits]; it needs {names}")),
+        None => (net.flat.root().place.clone(), format!("the graph has no section [limits]; it needs {names}")),
     };
     let diagnostic = Diagnostic::new(Code::MissingLimit, span, message).note(first.span.clone(), "used here");
     let lines: String = lines.collect();

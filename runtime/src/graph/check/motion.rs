@@ -16,7 +16,7 @@ use crate::source::{Code, Diagnostic, Diagnostics, quoted};
 
 /// Reports generated motion that nothing ends, in a mode or in a graph without modes.
 ///
-/// A graph without modes counts as one mode.
+/// What no task with modes contains counts as one mode.
 pub(crate) fn check(
     net: &Net<'_>,
     contact: &ContactPorts,
@@ -24,10 +24,7 @@ pub(crate) fn check(
     found: &Generators,
     diagnostics: &mut Diagnostics,
 ) {
-    if modes.is_empty() {
-        report_in_graph(net, &found.usual, diagnostics);
-        return;
-    }
+    report_in_graph(net, &found.outside_modes(net), diagnostics);
     // An exit with a mistake may be the one that ends the motion.
     if net.flat.modes.iter().any(|mode| mode.has_any(diagnostics)) {
         return;
@@ -38,7 +35,7 @@ pub(crate) fn check(
     let (cycling, mut reported) = (endings.find_cycling(), BTreeSet::new());
     for (i, block) in net.flat.modes.iter().enumerate().filter(|(i, _)| !generators[*i].is_empty()) {
         if !ended[i] {
-            diagnostics.push(report_in_mode(net, generators[i], block));
+            diagnostics.push(report_in_mode(net, generators[i], (block, &modes[i].name)));
         } else if let Some(cycle) = endings.find_cycle(i, &cycling).filter(|_| !reported.contains(&i)) {
             diagnostics.push(report_cycle(net, generators[i], &cycle));
             reported.extend(cycle);
@@ -46,7 +43,7 @@ pub(crate) fn check(
     }
 }
 
-/// Reports the generators of a graph without modes.
+/// Reports the generators of which no mode decides.
 fn report_in_graph(net: &Net<'_>, generators: &[usize], diagnostics: &mut Diagnostics) {
     for node in generators {
         let key = &net.flat.nodes[*node].block.key;
@@ -59,9 +56,8 @@ fn report_in_graph(net: &Net<'_>, generators: &[usize], diagnostics: &mut Diagno
 }
 
 /// Reports the generators of a mode.
-fn report_in_mode(net: &Net<'_>, generators: &[usize], block: &ModeBlock) -> Diagnostic {
+fn report_in_mode(net: &Net<'_>, generators: &[usize], (block, mode): (&ModeBlock, &str)) -> Diagnostic {
     let names = quoted(generators.iter().map(|node| &net.flat.nodes[*node].name));
-    let mode = &block.key.name;
     let message = format!("in mode `{mode}` the arm moves without a gate, and nothing ends the motion of {names}");
     let bound =
         "add a bound such as `fail = { after_ms = 10000, after_travel_mm = 60 }`, or `on_lost` with a sensor signal";
@@ -76,7 +72,7 @@ fn report_in_mode(net: &Net<'_>, generators: &[usize], block: &ModeBlock) -> Dia
 /// Reports modes that follow each other without a contact, so that the bound of none of them is reached.
 fn report_cycle(net: &Net<'_>, generators: &[usize], cycle: &[usize]) -> Diagnostic {
     let blocks: Vec<&ModeBlock> = cycle.iter().map(|mode| &net.flat.modes[*mode]).collect();
-    let modes = quoted(blocks.iter().map(|block| &block.key.name));
+    let modes = quoted(cycle.iter().map(|mode| net.flat.mode_name(*mode)));
     let names = quoted(generators.iter().map(|node| &net.flat.nodes[*node].name));
     let way = match blocks.len() {
         1 => format!("mode {modes} can start again"),

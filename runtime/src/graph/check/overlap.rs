@@ -19,7 +19,7 @@ fn check_mode(net: &Net<'_>, mode: &PlannedMode, diagnostics: &mut Diagnostics) 
             first.to != second.to && first.priority == second.priority && !excludes(&first.condition, &second.condition)
         };
         let Some(first) = exits[..i].iter().find(is_clash) else { continue };
-        let name = |exit: &PlannedExit| exit.to.map_or("", |to| net.flat.modes[to].key.name.as_str());
+        let name = |exit: &PlannedExit| exit.to.map_or_else(String::new, |to| net.flat.mode_name(to));
         let message = format!(
             "two exits of `{}` can hold at once: to `{}` when {}, and to `{}` when {}",
             mode.name,

@@ -3,6 +3,7 @@
 use std::ops::Range;
 
 use crate::graph::bench::OpenedBench;
+use crate::graph::load::{Entity, Task};
 use crate::graph::net::{Net, WireOrigin};
 use crate::graph::plan::PortRef;
 use crate::node::shortest;
@@ -18,13 +19,14 @@ pub(crate) fn check(net: &Net<'_>, opened: &OpenedBench, period: f64, diagnostic
         let times = [("for_ms", exit.table.for_ms), ("after_ms", exit.table.after_ms)];
         times.into_iter().filter_map(|(key, time)| short(key, time?, period, &exit.span))
     }));
-    let reset = flat.settings.iter().filter_map(|settings| settings.as_table()?.get("reset_after_ms"));
-    let time = flat.table.as_ref().map(|table| table.reset_after_ms);
+    let root = flat.root();
+    let reset = root.settings.iter().filter_map(|settings| settings.as_table()?.get("reset_after_ms"));
+    let time = root.table.as_ref().map(|table| table.reset_after_ms);
     diagnostics.extend(reset.filter_map(|value| short("reset_after_ms", time?, period, &value.span)));
     let wires = net.wires.iter().flatten().map(|wire| (&wire.origin, wire.source));
     let wires = wires.chain(net.commands.iter().map(|wire| (&wire.origin, wire.source)));
     diagnostics.extend(wires.filter_map(|(origin, source)| short_age(net, opened, period, origin, source)));
-    diagnostics.extend(short_policies(net, opened));
+    diagnostics.extend(flat.tasks.iter().flat_map(|task| short_policies(net, opened, task)));
 }
 
 /// Returns the warning about a wire whose maximum age is shorter than the periods of all devices that it descends from.
@@ -41,10 +43,16 @@ fn short_age(
 }
 
 /// Returns the warnings about maximum ages in [policy], each compared with the device of its role.
-fn short_policies(net: &Net<'_>, opened: &OpenedBench) -> Diagnostics {
-    let Some((written, Some(policy))) = &net.flat.policy else { return Diagnostics::new() };
+fn short_policies(net: &Net<'_>, opened: &OpenedBench, task: &Task) -> Diagnostics {
+    let Some((written, Some(policy))) = &task.policy else { return Diagnostics::new() };
     let Some(table) = written.as_table() else { return Diagnostics::new() };
-    let roles = || net.flat.roles.names().enumerate();
+    let names = &net.flat.scopes[task.scope].names;
+    let roles = || {
+        names.iter().filter_map(|(name, (_, entity))| match entity {
+            Entity::Role(role) => Some((*role, name.as_str())),
+            _ => None,
+        })
+    };
     let all = table.get("max_age_ms").and_then(|value| {
         let period = opened.shortest_period(roles().map(|(role, _)| role))?;
         short("max_age_ms", policy.max_age_ms?, period, &value.span)

@@ -1,8 +1,10 @@
 //! Checks `show` and `mark` in the section [graph], and selects the ports that a run shows.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::iter::successors;
 use std::ops::Range;
 
+use crate::graph::load::Task;
 use crate::graph::net::{Net, report};
 use crate::graph::plan::{PlannedNode, PlannedPort, PlannedShow, PlannedView, PortRef, Producer};
 use crate::node::Spanned;
@@ -13,15 +15,45 @@ use crate::source::{Code, Diagnostic, Diagnostics};
 pub(crate) struct RequestedView {
     /// The ports of `show`, or `None` without that key.
     ports: Option<Vec<PlannedShow>>,
-    mark: Vec<(PortRef, Range<usize>)>,
+    /// The ports of `mark` in the graph itself, for a graph without `show`.
+    mark: Option<[PortRef; 2]>,
+    /// All ports of `mark`.
+    marks: Vec<(PortRef, Range<usize>)>,
 }
 
 /// Resolves the ports of `show` and `mark`, and reports those that cannot be shown.
+///
+/// A graph without `show` shows the ports of its parts that are tasks, with their prefix.
 pub(crate) fn check(net: &Net<'_>, diagnostics: &mut Diagnostics) -> RequestedView {
-    let table = net.flat.table.as_ref();
+    let has_show = |task: &Task| task.table.as_ref().is_some_and(|table| table.show.is_some());
+    let is_shown = |task: usize| {
+        let around = successors(net.flat.tasks[task].parent, |task| net.flat.tasks[*task].parent);
+        !around.into_iter().any(|task| has_show(&net.flat.tasks[task]))
+    };
+    let mut view = RequestedView { ports: None, mark: None, marks: Vec::new() };
+    for (number, task) in net.flat.tasks.iter().enumerate() {
+        let (shown, mark) = check_task(net, task, &mut view.marks, diagnostics);
+        if number == 0 {
+            view.mark = mark;
+        }
+        if let Some(shown) = shown.filter(|_| is_shown(number)) {
+            view.ports.get_or_insert_default().extend(shown);
+        }
+    }
+    view
+}
+
+/// Resolves the ports of `show` and `mark` of one task. The first image is marked.
+fn check_task(
+    net: &Net<'_>,
+    task: &Task,
+    marks: &mut Vec<(PortRef, Range<usize>)>,
+    diagnostics: &mut Diagnostics,
+) -> (Option<Vec<PlannedShow>>, Option<[PortRef; 2]>) {
+    let Some(table) = &task.table else { return (None, None) };
     let mut seen: BTreeSet<PortRef> = BTreeSet::new();
     let mut show = |word: &Spanned<String>| {
-        let source = report(net.resolve(0, word), diagnostics)?;
+        let source = report(net.resolve(task.scope, word), diagnostics)?;
         let kind = net.port(source).kind;
         let diagnostic = |code: Code, message: String| Diagnostic::new(code, word.span.clone(), message);
         if !can_be_shown(kind) {
@@ -33,21 +65,27 @@ pub(crate) fn check(net: &Net<'_>, diagnostics: &mut Diagnostics) -> RequestedVi
             let message = format!("`{}` is listed twice", word.value);
             diagnostics.push(diagnostic(Code::BadValue, message).help("remove it"));
         }
-        Some(PlannedShow { name: word.value.clone(), source })
+        Some(PlannedShow { name: format!("{}{}", task.prefix, word.value), source, mark: None })
     };
-    let words = table.and_then(|table| table.show.as_ref());
-    let ports = words.map(|words| words.iter().filter_map(&mut show).collect());
-    let mark = table.and_then(|table| table.mark.as_ref()).map_or(&[][..], |mark| &mark[..]);
+    let mut ports: Option<Vec<PlannedShow>> =
+        table.show.as_ref().map(|words| words.iter().filter_map(&mut show).collect());
+    let mark = table.mark.as_ref().map_or(&[][..], |mark| &mark[..]);
     let mark = mark.iter().filter_map(|word| {
-        let source = report(net.resolve(0, word), diagnostics)?;
+        let source = report(net.resolve(task.scope, word), diagnostics)?;
         let kind = net.port(source).kind;
         if kind != Kind::Scalar {
             let message = format!("`{}` is {}, but `mark` takes scalars", word.value, kind.with_article());
             diagnostics.push(Diagnostic::new(Code::KindMismatch, word.span.clone(), message));
         }
-        Some((source, word.span.clone()))
+        marks.push((source, word.span.clone()));
+        Some(source)
     });
-    RequestedView { mark: mark.collect(), ports }
+    let mark = mark.collect::<Vec<_>>().try_into().ok();
+    let is_image = |shown: &&mut PlannedShow| net.port(shown.source).kind == Kind::Image;
+    if let Some(image) = ports.iter_mut().flatten().find(is_image) {
+        image.mark = mark;
+    }
+    (ports, mark)
 }
 
 impl RequestedView {
@@ -58,7 +96,7 @@ impl RequestedView {
 
     /// Reports ports of `mark` that are not in metres, once the units are known.
     pub(crate) fn check_units(&self, ports: &BTreeMap<PortRef, PlannedPort>, diagnostics: &mut Diagnostics) {
-        for (source, span) in &self.mark {
+        for (source, span) in &self.marks {
             let Some(port) = ports.get(source) else { continue };
             if let Some(unit) = port.shape.unit().filter(|unit| *unit != Unit::METRE) {
                 let message = format!("`{}` is in {unit}, but `mark` expects a position in m", port.name);
@@ -74,13 +112,17 @@ impl RequestedView {
         nodes: &[PlannedNode],
         ports: &BTreeMap<PortRef, PlannedPort>,
     ) -> PlannedView {
-        let mark: Vec<PortRef> = self.mark.iter().map(|(source, _)| *source).collect();
         let named = |source: PortRef| {
             let name = net.name_in(0, source).unwrap_or(&ports[&source].name).to_owned();
-            PlannedShow { name, source }
+            PlannedShow { name, source, mark: None }
         };
-        let default = || default_ports(nodes, ports).into_iter().map(named).collect();
-        PlannedView { ports: self.ports.unwrap_or_else(default), mark: mark.try_into().ok() }
+        let default = || {
+            let mut shown: Vec<PlannedShow> = default_ports(nodes, ports).into_iter().map(named).collect();
+            let image = shown.iter_mut().find(|shown| net.port(shown.source).kind == Kind::Image);
+            image.into_iter().for_each(|image| image.mark = self.mark);
+            shown
+        };
+        PlannedView { ports: self.ports.unwrap_or_else(default) }
     }
 }
 

@@ -3,11 +3,12 @@
 use std::collections::BTreeMap;
 use std::ops::Range;
 
+use super::task::Task;
 use crate::graph::syntax::{
-    Allowance, BenchDocument, Block, GraphTable, LimitOwner, LimitSection, ModeBlock, PolicyTable, WireEntry,
+    Allowance, BenchDocument, Block, CommandEntry, LimitOwner, LimitSection, ModeBlock, PolicyTable, WireEntry,
 };
 use crate::node::Spanned;
-use crate::source::{Code, Diagnostic, Key, Named, Value};
+use crate::source::{Key, Named, Value};
 
 /// What a name in a scope refers to, by index.
 #[derive(Debug, Clone, Copy)]
@@ -35,6 +36,8 @@ pub(crate) struct Scope {
     pub(crate) roles: BTreeMap<String, String>,
     /// Where the text of the file of a part is.
     pub(crate) text: Range<usize>,
+    /// The innermost task around it.
+    pub(crate) task: usize,
 }
 
 /// A node with its full name and its scope.
@@ -48,33 +51,58 @@ pub(crate) struct FlatNode {
 /// A graph with all parts expanded, and its bench.
 #[derive(Debug, Default)]
 pub(crate) struct FlatGraph {
-    pub(crate) table: Option<GraphTable>,
-    /// The section [graph] as written.
-    pub(crate) settings: Option<Value>,
-    /// Span for diagnostics about the graph as a whole.
-    pub(crate) place: Range<usize>,
+    /// The graph itself, and the parts that are tasks.
+    pub(crate) tasks: Vec<Task>,
     /// The type of each role.
     pub(crate) roles: Named<Spanned<String>>,
     /// The arm that carries each sensor which names one.
     pub(crate) carriers: Named<Spanned<String>>,
     pub(crate) nodes: Vec<FlatNode>,
     pub(crate) scopes: Vec<Scope>,
-    pub(crate) commands: Vec<(Key, WireEntry)>,
+    pub(crate) commands: Vec<CommandEntry>,
     /// The limits of the task, the bench, the robots and the command line.
     pub(crate) limits: Vec<LimitSection>,
+    /// The modes of all tasks.
     pub(crate) modes: Vec<ModeBlock>,
-    /// The section [policy] as written, and parsed if it is valid.
-    pub(crate) policy: Option<(Value, Option<PolicyTable>)>,
     pub(crate) bench: Option<BenchDocument>,
     pub(crate) allow: Vec<Allowance>,
 }
 
 impl FlatGraph {
-    /// Returns whether the section [graph] has an unknown key, which may be meant for a missing one.
-    pub(crate) fn has_unknown_setting(&self, diagnostics: &[Diagnostic]) -> bool {
-        let keys = || self.settings.iter().filter_map(Value::as_table).flat_map(|table| &table.entries);
-        let is_key = |found: &Diagnostic| keys().any(|(key, _)| key.span == found.span);
-        diagnostics.iter().any(|found| found.code == Code::UnknownKey && is_key(found))
+    /// Returns the graph itself as a task.
+    pub(crate) fn root(&self) -> &Task {
+        &self.tasks[0]
+    }
+
+    /// Returns the tasks around a scope, the innermost first.
+    pub(crate) fn tasks_around(&self, scope: usize) -> impl Iterator<Item = usize> {
+        std::iter::successors(Some(self.scopes[scope].task), |task| self.tasks[*task].parent)
+    }
+
+    /// Returns the task around a node whose modes decide about it, or `None` if no task around it has modes.
+    pub(crate) fn task_with_modes(&self, node: usize) -> Option<usize> {
+        self.tasks_around(self.nodes[node].scope).find(|task| self.tasks[*task].has_modes)
+    }
+
+    /// Returns the policy of a task: its own section [policy], or that of the file around it.
+    pub(crate) fn policy(&self, task: usize) -> PolicyTable {
+        let around = std::iter::successors(Some(task), |task| self.tasks[*task].parent);
+        let mut sections = around.filter_map(|task| self.tasks[task].policy.as_ref());
+        sections.next().and_then(|(_, policy)| policy.clone()).unwrap_or_default()
+    }
+
+    /// Returns the name of a role in the file of a task, or its name in the graph if that file does not declare it.
+    pub(crate) fn role_in(&self, task: usize, role: usize) -> &str {
+        let names = self.tasks[task].parent.map(|_| &self.scopes[self.tasks[task].scope].names);
+        let mut names = names.into_iter().flatten();
+        let own = names.find(|(_, (_, entity))| matches!(entity, Entity::Role(own) if *own == role));
+        own.map_or(&self.roles[role].0.name, |(name, _)| name)
+    }
+
+    /// Returns the full name of a mode: `left.servo` of the task `left`.
+    pub(crate) fn mode_name(&self, mode: usize) -> String {
+        let ModeBlock { key, task, .. } = &self.modes[mode];
+        format!("{}{}", self.tasks[*task].prefix, key.name)
     }
 
     /// Returns the role of the graph that a name means which is written at `at`: in the file of a scope, or in one of
@@ -101,13 +129,14 @@ impl FlatGraph {
         self.limits.iter().find(|section| section.owner == LimitOwner::Task)
     }
 
-    /// Returns the names of the modes.
-    pub(crate) fn mode_names(&self) -> impl Iterator<Item = &str> + Clone {
-        self.modes.iter().map(|mode| mode.key.name.as_str())
+    /// Returns the names of the modes of a task, in its own file.
+    pub(crate) fn mode_names(&self, task: usize) -> impl Iterator<Item = &str> + Clone {
+        self.modes.iter().filter(move |mode| mode.task == task).map(|mode| mode.key.name.as_str())
     }
 
-    /// Returns the index of each mode by its name.
-    pub(crate) fn mode_numbers(&self) -> BTreeMap<&str, usize> {
-        self.mode_names().enumerate().map(|(number, name)| (name, number)).collect()
+    /// Returns the index of each mode of a task by its name there.
+    pub(crate) fn mode_numbers(&self, task: usize) -> BTreeMap<&str, usize> {
+        let own = self.modes.iter().enumerate().filter(|(_, mode)| mode.task == task);
+        own.map(|(number, mode)| (mode.key.name.as_str(), number)).collect()
     }
 }

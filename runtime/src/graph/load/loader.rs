@@ -6,7 +6,8 @@ use std::path::{Path, PathBuf};
 use super::flat::{FlatGraph, Scope};
 use super::measured::MeasuredValues;
 use super::request::Request;
-use crate::graph::syntax::{ALLOW_UNCALIBRATED, BenchDocument, LIMITS, ROBOT, Sections};
+use super::task::Task;
+use crate::graph::syntax::{ALLOW_UNCALIBRATED, BenchDocument, GraphDocument, LIMITS, ROBOT, Sections};
 use crate::source::{
     BuiltinFile, Code, Diagnostic, Diagnostics, Item, Key, SourceMap, Table, Value, parse_table, suggest_name,
 };
@@ -46,38 +47,26 @@ impl Loader {
             self.diagnostics.push(Diagnostic::new(Code::WrongFile, root.1, message).with_help(help));
             return flat;
         }
-        flat.place = root.1;
         root.0.merge(graph_set);
         let mut document = self.sections(|sections| sections.graph(&mut root.0));
-        flat.table = match &document.graph {
-            Some((span, table)) => {
-                flat.place = span.clone();
-                table.clone()
-            }
-            None => {
-                let message = "the graph has no section [graph]";
-                let help = "write a section [graph] with `clock = \"role\"` or `rate_hz = 250`, and a `bench`";
-                self.diagnostics.push(Diagnostic::new(Code::MissingKey, flat.place.clone(), message).help(help));
-                None
-            }
-        };
-        flat.settings = root.0.get("graph").cloned();
-        flat.bench = self.bench(request, &flat, &root.0, bench_set);
+        if document.graph.is_none() {
+            let message = "the graph has no section [graph]";
+            let help = "write a section [graph] with `clock = \"role\"` or `rate_hz = 250`, and a `bench`";
+            self.diagnostics.push(Diagnostic::new(Code::MissingKey, root.1.clone(), message).help(help));
+        }
+        let settings = root.0.get("graph").cloned();
+        let task = Task { place: root.1, settings, ends_run: true, ..Task::default() };
+        flat.bench = self.bench(request, (&document, &task), &root.0, bench_set);
         flat.bench.iter_mut().for_each(|bench| self.robots(bench));
         let bench = flat.bench.as_mut();
         self.diagnostics.extend(bench.into_iter().flat_map(|bench| bench.correct_names(&self.sources)));
         let binds = flat.bench.as_ref().map(|bench| bench.bind.clone()).unwrap_or_default();
         self.diagnostics.extend(document.correct_names(&binds, &[], &self.sources));
         flat.roles.clone_from(&document.roles);
-        flat.commands.clone_from(&document.commands);
-        flat.carriers.clone_from(&document.carriers);
-        flat.limits.clone_from(&document.limits);
+        self.add_task(&document, task, &Scope::default(), &mut flat);
+        self.flatten(document, "", Scope::default(), &mut flat);
         flat.limits.extend(flat.bench.iter().flat_map(|bench| bench.limits.iter().cloned()));
         flat.limits.extend(set_limits);
-        flat.modes.clone_from(&document.modes);
-        flat.policy.clone_from(&document.policy);
-        flat.allow.clone_from(&document.allow);
-        self.flatten(document, "", Scope::default(), &mut flat);
         flat
     }
 
@@ -91,9 +80,16 @@ impl Loader {
     }
 
     /// Loads the requested bench, or the sections of a bench in the graph, or the bench that the graph names.
-    fn bench(&mut self, request: &Request, flat: &FlatGraph, graph: &Table, mut set: Table) -> Option<BenchDocument> {
+    fn bench(
+        &mut self,
+        request: &Request,
+        (document, task): (&GraphDocument, &Task),
+        graph: &Table,
+        mut set: Table,
+    ) -> Option<BenchDocument> {
         // An invalid section [graph] has its own diagnostic.
-        let named = flat.table.as_ref()?.bench.as_ref();
+        let (place, table) = document.graph.as_ref()?;
+        let named = table.as_ref()?.bench.as_ref();
         if let Some(text) = &request.bench_text {
             let mut root = self.parse(Path::new("bench.toml"), text.clone())?.0;
             root.merge(set);
@@ -118,9 +114,9 @@ impl Loader {
             (None, None) if set.get("devices").is_some() => {
                 return Some(self.sections(|sections| sections.bench(&mut set)));
             }
-            (None, None) if flat.has_unknown_setting(&self.diagnostics) => return None,
+            (None, None) if task.has_unknown_setting(&self.diagnostics) => return None,
             (None, None) => {
-                let diagnostic = Diagnostic::new(Code::MissingKey, flat.place.clone(), "the graph has no bench");
+                let diagnostic = Diagnostic::new(Code::MissingKey, place.clone(), "the graph has no bench");
                 let help =
                     "name a bench under [graph] with `bench`, pass `--bench`, or write [bind] and [devices] here";
                 self.diagnostics.push(diagnostic.help(help));

@@ -5,8 +5,11 @@ mod loader;
 mod measured;
 mod parts;
 mod request;
+mod task;
+mod tasks;
 
 pub(crate) use flat::{Entity, FlatGraph, FlatNode, Scope};
 pub(crate) use loader::{Loader, wrong_file_type};
 pub(crate) use measured::MeasuredValues;
 pub use request::Request;
+pub(crate) use task::Task;

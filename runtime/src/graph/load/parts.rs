@@ -4,7 +4,8 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use super::flat::{Entity, FlatGraph, FlatNode, Scope};
 use super::loader::{Loader, wrong_file_type};
-use crate::graph::syntax::{GraphDocument, PartBlock, Use};
+use super::task::Task;
+use crate::graph::syntax::{GraphDocument, OnFail, PartBlock, TASK_SECTIONS, Use};
 use crate::node::FilePath;
 use crate::source::{Code, Diagnostic, Item, Key, Named, Table, Value, quoted, suggest_name};
 
@@ -24,8 +25,8 @@ impl Loader {
     ) -> usize {
         let index = flat.scopes.len();
         // Parts inside look up the roles while the rest of the scope is being read.
-        let (roles, text, parent) = (scope.roles.clone(), scope.text.clone(), scope.parent);
-        flat.scopes.push(Scope { roles, text, parent, ..Scope::default() });
+        let (roles, text, parent, task) = (scope.roles.clone(), scope.text.clone(), scope.parent, scope.task);
+        flat.scopes.push(Scope { roles, text, parent, task, ..Scope::default() });
         let mut reads: BTreeMap<String, Vec<Use>> = BTreeMap::new();
         let uses = if document.parts.is_empty() { Vec::new() } else { document.uses() };
         for reference in uses {
@@ -33,8 +34,9 @@ impl Loader {
             reads.entry(reference.name).or_default().extend(inside);
         }
         (scope.exports, scope.declared) = (document.exports, document.inputs);
-        for (i, (key, _)) in document.roles.iter().enumerate() {
-            self.declare(&mut scope, key, Entity::Role(i));
+        for (key, _) in document.roles.iter() {
+            let role = flat.roles.position(scope.roles.get(&key.name).unwrap_or(&key.name));
+            self.declare(&mut scope, key, role.map_or(Entity::Unknown, Entity::Role));
         }
         for block in document.nodes {
             self.declare(&mut scope, &block.key, Entity::Node(flat.nodes.len()));
@@ -86,7 +88,9 @@ impl Loader {
         }
         let (mut root, start) = self.read(&file.path, Some(file.span.clone()))?;
         let text = self.sources.file_at(start.start).span();
-        if let Some(what) = wrong_file_type(&root, "exports").filter(|_| root.get("inputs").is_none()) {
+        let is_task = TASK_SECTIONS.iter().any(|section| root.get(section).is_some());
+        let strange = wrong_file_type(&root, if is_task { "graph" } else { "exports" });
+        if let Some(what) = strange.filter(|_| root.get("inputs").is_none()) {
             let message = format!("this file is {what}, not a part");
             self.diagnostics.push(Diagnostic::new(Code::WrongFile, file.span.clone(), message));
             return None;
@@ -95,7 +99,7 @@ impl Loader {
         let strange = override_with(&mut root, &part.set);
         let mut document = self.sections(|sections| sections.part(&root));
         let wires: Vec<&Key> = part.wires.valid.iter().map(|wire| &wire.key).collect();
-        if let Some(mistake) = wrong_part(&document, file, &wires, reads) {
+        if let Some(mistake) = wrong_part(&document, file, &wires, reads).filter(|_| !is_task) {
             self.diagnostics.push(mistake);
             return None;
         }
@@ -114,9 +118,26 @@ impl Loader {
         self.open_parts.push(canonical);
         let inputs = part.wires.valid.iter().map(|wire| (wire.key.clone(), wire.clone())).collect();
         let key = part.key.clone();
-        let roles = self.part_roles(part, parent, flat);
-        let scope = Scope { inputs, parent: Some(parent), part: Some(key), roles, text, ..Scope::default() };
-        let inner = self.flatten(document, &format!("{prefix}{}.", part.key.name), scope, flat);
+        let (roles, around) = (self.part_roles(part, parent, flat), flat.scopes[parent].task);
+        let prefix = format!("{prefix}{}.", part.key.name);
+        let (parent, part_key) = (Some(parent), Some(key));
+        let mut scope = Scope { inputs, parent, part: part_key, roles, text, task: around, ..Scope::default() };
+        let ends_run = part.on_fail.as_ref().is_some_and(|(on_fail, _)| *on_fail == OnFail::Run);
+        if is_task {
+            scope.task = flat.tasks.len();
+            self.diagnostics.extend(Self::missing_roles(&part.key, &document, &scope, flat));
+            let settings = root.get("graph").cloned();
+            let (place, parent, index) = (start, Some(around), flat.scopes.len());
+            let task =
+                Task { prefix: prefix.clone(), parent, place, settings, scope: index, ends_run, ..Task::default() };
+            self.compare_roles(&part.key, &document, &scope, flat);
+            self.add_task(&document, task, &scope, flat);
+        } else if let Some((_, place)) = &part.on_fail {
+            let message =
+                format!("part `{}` has no modes, commands or roles of its own, so it cannot fail", part.key.name);
+            self.diagnostics.push(Diagnostic::new(Code::UnknownKey, place.clone(), message).help("remove `on_fail`"));
+        }
+        let inner = self.flatten(document, &prefix, scope, flat);
         self.open_parts.pop();
         Some(inner)
     }

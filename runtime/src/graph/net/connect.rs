@@ -1,10 +1,12 @@
 //! Connects wires and commands to their sources, and compares kinds.
 
+use std::collections::BTreeMap;
+
 use super::{CommandWire, Net, Wire, WireOrigin, report};
 use crate::device::RoleType;
 use crate::graph::load::FlatNode;
 use crate::graph::plan::{PortRef, Producer};
-use crate::graph::syntax::WireEntry;
+use crate::graph::syntax::{CommandEntry, WireEntry};
 use crate::node::{NodeSpec, Spanned};
 use crate::signal::Kind;
 use crate::source::{Code, Diagnostic, Diagnostics, quoted, suggest_name};
@@ -88,27 +90,35 @@ impl Net<'_> {
     /// Resolves the wires of commands and reports; wires with a mistake are left out.
     pub(super) fn connect_commands(&self, diagnostics: &mut Diagnostics) -> Vec<CommandWire> {
         let mut wires = Vec::new();
-        for (role, wire) in &self.flat.commands {
+        for CommandEntry { task, role, wire } in &self.flat.commands {
             let Some(index) = self.flat.roles.position(&role.name) else {
                 let known = self.flat.roles.names();
                 diagnostics.push(Diagnostic::unknown(Code::UnknownPort, "role", &role.name, &role.span, known));
                 continue;
             };
-            wires.extend(self.command(index, wire, diagnostics));
+            wires.extend(self.command(index, *task, wire, diagnostics));
         }
+        self.check_drivers(&wires, diagnostics);
         wires
     }
 
-    fn command(&self, role: usize, wire: &WireEntry, diagnostics: &mut Diagnostics) -> Option<CommandWire> {
-        let (source, key) = (report(self.resolve(0, &wire.from), diagnostics), &wire.key);
+    fn command(
+        &self,
+        role: usize,
+        task: usize,
+        wire: &WireEntry,
+        diagnostics: &mut Diagnostics,
+    ) -> Option<CommandWire> {
+        let scope = self.flat.tasks[task].scope;
+        let (source, key) = (report(self.resolve(scope, &wire.from), diagnostics), &wire.key);
         let RoleType { commands, reports, .. } = self.roles[role]?;
         let name = self.name(Producer::Role(role));
         let ports = commands.iter().map(|port| (false, port)).chain(reports.iter().map(|port| (true, port)));
         let Some((place, (is_report, port))) = ports.enumerate().find(|(_, (_, port))| port.name == key.name) else {
             let message = format!("`{name}` has no command `{}`", key.name);
             // A command that has a wire is not what was meant.
-            let wires = self.flat.commands.iter().filter(|(key, _)| key.name == name);
-            let is_open = |port: &&str| !wires.clone().any(|(_, wire)| wire.key.name == *port);
+            let wires = self.flat.commands.iter().filter(|entry| entry.role.name == name);
+            let is_open = |port: &&str| !wires.clone().any(|entry| entry.wire.key.name == *port);
             let known = || commands.iter().chain(reports).map(|port| &*port.name);
             let diagnostic = Diagnostic::new(Code::UnknownInput, key.span.clone(), message);
             diagnostics.push(match suggest_name(&key.name, known().filter(is_open)) {
@@ -117,12 +127,24 @@ impl Net<'_> {
             });
             return None;
         };
-        let (source, origin) = (source?, self.origin(0, wire));
+        let (source, origin) = (source?, self.origin(scope, wire));
         if self.port(source).kind != port.kind {
             diagnostics.push(self.kind_mismatch(source, &format!("{name}.{}", key.name), port.kind, &origin));
             return None;
         }
         let command = if is_report { place - commands.len() } else { place };
-        Some(CommandWire { role, command, is_report, origin, source })
+        Some(CommandWire { role, command, is_report, origin, source, task })
+    }
+
+    /// Reports commands and reports that two tasks drive.
+    fn check_drivers(&self, wires: &[CommandWire], diagnostics: &mut Diagnostics) {
+        let mut first: BTreeMap<(usize, bool, usize), &CommandWire> = BTreeMap::new();
+        for wire in wires {
+            let Some(other) = first.insert((wire.role, wire.is_report, wire.command), wire) else { continue };
+            let message = format!("two tasks drive `{}`", self.command_name(wire));
+            let diagnostic = wire.origin.diagnostic(Code::DuplicateName, message);
+            let diagnostic = diagnostic.note(other.origin.word.span.clone(), "the other one drives it here");
+            diagnostics.push(diagnostic.help("give each part an arm of its own with `roles`"));
+        }
     }
 }

@@ -6,6 +6,7 @@ use std::collections::BTreeMap;
 use super::Net;
 use super::meant_type::{Candidate, has_keys_of};
 use super::provenance::Provenance;
+use super::task_modes::TaskModes;
 use crate::catalogue::Catalogue;
 use crate::device::RoleType;
 use crate::graph::load::FlatGraph;
@@ -35,9 +36,12 @@ impl<'a> Net<'a> {
         check_carriers(flat, &roles, diagnostics);
         let (wires, commands, order, arms) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
         let scope_ports = flat.scopes.iter().map(|_| OnceCell::new()).collect();
-        let (provenance, mut settings) = (Provenance::default(), BTreeMap::<&str, Vec<_>>::new());
-        for (key, value) in flat.modes.iter().flat_map(|mode| &mode.set.entries) {
-            settings.entry(key.name.as_str()).or_default().push(value);
+        let (provenance, mut settings) = (Provenance::default(), BTreeMap::<String, Vec<_>>::new());
+        for mode in &flat.modes {
+            let prefix = &flat.tasks[mode.task].prefix;
+            for (key, value) in &mode.set.entries {
+                settings.entry(format!("{prefix}{}", key.name)).or_default().push(value);
+            }
         }
         Self {
             flat,
@@ -51,6 +55,7 @@ impl<'a> Net<'a> {
             provenance,
             arms,
             settings,
+            modes: TaskModes::all(flat),
             scope_ports,
         }
     }

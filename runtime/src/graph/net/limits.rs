@@ -39,13 +39,19 @@ impl<'a> Net<'a> {
         Some(path)
     }
 
-    /// Returns for each node the arms whose motion passes through it.
+    /// Returns for each node the arms whose motion passes through it, or those of its task if it is a part.
     pub(super) fn find_arms(&self) -> Vec<Vec<usize>> {
         let mut arms = vec![Vec::new(); self.nodes.len()];
         for wire in self.commands.iter().filter(|wire| !wire.is_report) {
             for stop in self.motion_path(wire).into_iter().flatten() {
                 arms[stop.node].push(wire.role);
             }
+        }
+        for (node, own) in arms.iter_mut().enumerate().filter(|(_, own)| own.is_empty()) {
+            // Elsewhere in a part that is a task, the limits of its own arms hold.
+            let task = self.flat.scopes[self.flat.nodes[node].scope].task;
+            let roles = self.flat.tasks[task].roles.iter().copied();
+            own.extend(roles.filter(|role| task > 0 && self.is_arm(*role)));
         }
         arms
     }
@@ -73,6 +79,7 @@ impl<'a> Net<'a> {
             (LimitOwner::Bench, Some(role)) => {
                 role.name == name || device(name).is_some_and(|own| device(&role.name) == Some(own))
             }
+            (LimitOwner::Task, _) if section.task > 0 && !self.flat.tasks[section.task].roles.contains(&arm) => false,
             (_, role) => role.as_ref().is_none_or(|role| role.name == name),
         }
     }

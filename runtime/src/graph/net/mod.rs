@@ -9,6 +9,7 @@ mod provenance;
 mod resolve;
 mod scope_ports;
 mod sorter;
+mod task_modes;
 mod wire;
 
 use std::cell::OnceCell;
@@ -17,7 +18,7 @@ use std::ops::Range;
 
 use crate::catalogue::Catalogue;
 use crate::device::RoleType;
-use crate::graph::load::FlatGraph;
+use crate::graph::load::{FlatGraph, Task};
 use crate::graph::plan::{PortRef, Producer};
 use crate::graph::syntax::NO_ARM;
 use crate::node::{NodeSpec, PortSpec, Spanned, frame_args};
@@ -25,6 +26,7 @@ use crate::source::{Code, Diagnostic, Diagnostics, Key, Value};
 
 use provenance::Provenance;
 use scope_ports::ScopePorts;
+use task_modes::TaskModes;
 pub(crate) use wire::{CommandWire, Wire, WireOrigin};
 
 /// What a name refers to. The error is a diagnostic, or `None` if another one explains why the name refers to nothing.
@@ -54,8 +56,10 @@ pub(crate) struct Net<'a> {
     provenance: Provenance,
     /// For each node the arms whose motion passes through it.
     arms: Vec<Vec<usize>>,
-    /// What modes set of each node and each part of the graph.
-    settings: BTreeMap<&'a str, Vec<&'a Value>>,
+    /// What modes set of each node and each part, by its full name.
+    settings: BTreeMap<String, Vec<&'a Value>>,
+    /// The modes of each task as ports.
+    modes: Vec<TaskModes>,
     /// The ports of each scope by name, which only suggestions and views need.
     scope_ports: Vec<OnceCell<ScopePorts>>,
 }
@@ -90,8 +94,13 @@ impl<'a> Net<'a> {
         if let Some(on) = self.flat.carriers.get(&key.name) {
             return self.flat.roles.position(&on.value).filter(|arm| *arm != sensor && self.is_arm(*arm));
         }
-        let mut arms = (0..self.roles.len()).filter(|role| self.is_arm(*role));
-        arms.next().filter(|arm| *arm != sensor && arms.next().is_none())
+        let all: Vec<usize> = (0..self.roles.len()).collect();
+        let tasks = self.flat.tasks.iter().skip(1).map(|task| &task.roles).filter(|roles| roles.contains(&sensor));
+        let only = |roles: &Vec<usize>| {
+            let mut arms = roles.iter().copied().filter(|role| self.is_arm(*role));
+            arms.next().filter(|arm| *arm != sensor && arms.next().is_none())
+        };
+        std::iter::once(&all).chain(tasks).find_map(only)
     }
 
     /// Returns the role of the graph that a name means which is written at `at`, in a parameter of a node.
@@ -148,6 +157,7 @@ impl<'a> Net<'a> {
         match producer {
             Producer::Role(i) => self.roles[i].map(|role| role.outputs.as_slice()),
             Producer::Node(i) => self.spec(i).map(|spec| spec.outputs.as_slice()),
+            Producer::Task(i) => Some(&self.modes[i].ports),
         }
     }
 
@@ -156,6 +166,7 @@ impl<'a> Net<'a> {
         match producer {
             Producer::Role(i) => &self.flat.roles[i].0.name,
             Producer::Node(i) => &self.flat.nodes[i].name,
+            Producer::Task(i) => &self.modes[i].name,
         }
     }
 
@@ -164,6 +175,7 @@ impl<'a> Net<'a> {
         match producer {
             Producer::Role(i) => self.flat.roles[i].0.span.clone(),
             Producer::Node(i) => self.flat.nodes[i].block.key.span.clone(),
+            Producer::Task(i) => self.flat.tasks[i].place.clone(),
         }
     }
 
@@ -176,10 +188,16 @@ impl<'a> Net<'a> {
         }
     }
 
-    /// Returns the part of the graph file that contains a node, or `None` for a node of the graph file itself.
+    /// Returns the part of the file of its task that contains a node, or `None` for a node of that file itself.
     pub(crate) fn part_of(&self, node: usize) -> Option<&'a Key> {
-        let (part, _) = self.flat.nodes[node].name.split_once('.')?;
-        self.flat.scopes[0].names.get(part).map(|(key, _)| key)
+        let task = self.task_of(node);
+        let (part, _) = self.flat.nodes[node].name[task.prefix.len()..].split_once('.')?;
+        self.flat.scopes[task.scope].names.get(part).map(|(key, _)| key)
+    }
+
+    /// Returns the innermost task around a node.
+    pub(crate) fn task_of(&self, node: usize) -> &'a Task {
+        &self.flat.tasks[self.flat.scopes[self.flat.nodes[node].scope].task]
     }
 
     /// Returns the declaration of the command or report at the end of a wire.
@@ -205,18 +223,21 @@ impl<'a> Net<'a> {
 
     /// Returns the tables of parameters that modes set of a node.
     pub(crate) fn settings_of(&self, node: usize) -> impl Iterator<Item = &'a Value> {
-        let mut path = self.flat.nodes[node].name.split('.');
-        let tables = path.next().and_then(|first| self.settings.get(first));
-        tables
-            .into_iter()
-            .flatten()
-            .filter_map(move |table| path.clone().try_fold(*table, |value, name| value.as_table()?.get(name)))
+        let flat = &self.flat.nodes[node];
+        let around = self.flat.tasks_around(flat.scope).map(|task| self.flat.tasks[task].prefix.len());
+        around.flat_map(move |start| {
+            let mut path = flat.name[start..].split('.');
+            let first = path.next().map_or(0, str::len);
+            let tables = self.settings.get(&flat.name[..start + first]).into_iter().flatten();
+            tables.filter_map(move |table| path.clone().try_fold(*table, |value, name| value.as_table()?.get(name)))
+        })
     }
 
     /// Returns the table of parameters that a mode sets of a node.
     pub(crate) fn setting(&self, mode: usize, node: usize) -> Option<&'a Value> {
-        let mut path = self.flat.nodes[node].name.split('.');
-        let first = self.flat.modes[mode].set.get(path.next()?)?;
+        let block = &self.flat.modes[mode];
+        let mut path = self.flat.nodes[node].name.strip_prefix(&self.flat.tasks[block.task].prefix)?.split('.');
+        let first = block.set.get(path.next()?)?;
         path.try_fold(first, |value, name| value.as_table()?.get(name))
     }
 

@@ -35,7 +35,8 @@ impl Provenance {
                 let word = match wire.source.producer {
                     Producer::Node(source) => self.words[source * self.width + i],
                     Producer::Role(role) if role / 64 == i => 1 << (role % 64),
-                    Producer::Role(_) => 0,
+                    // A mode is decided by several ports; a flag of it carries no value of theirs.
+                    Producer::Role(_) | Producer::Task(_) => 0,
                 };
                 has_changed |= word & !self.words[own + i] != 0;
                 self.words[own + i] |= word;
@@ -48,6 +49,7 @@ impl Provenance {
     pub(crate) fn roles(&self, producer: Producer) -> impl Iterator<Item = usize> {
         let (role, words) = match producer {
             Producer::Role(role) => (Some(role), &[][..]),
+            Producer::Task(_) => (None, &[][..]),
             Producer::Node(node) => (None, &self.words[node * self.width..][..self.width]),
         };
         // Each step clears the lowest bit, so that only bits that are set take time.

@@ -4,7 +4,7 @@ use super::scope_ports::ScopePorts;
 use super::{Net, Resolved};
 use crate::graph::load::{Entity, Scope};
 use crate::graph::plan::{PortRef, Producer};
-use crate::graph::syntax::INPUTS;
+use crate::graph::syntax::{INPUTS, MODES};
 use crate::node::{PortSpec, Spanned};
 use crate::source::{Code, Diagnostic, quoted, suggest_name};
 
@@ -36,7 +36,14 @@ impl Net<'_> {
             let message = format!("`{}` refers to itself, through the inputs and exports of parts", word.value);
             return diagnostic(Code::Loop, message).into_err();
         }
-        let Scope { names, inputs, declared, parent, .. } = &self.flat.scopes[scope];
+        let Scope { names, inputs, declared, parent, task, .. } = &self.flat.scopes[scope];
+        if let Some((name, rest)) = word.value.split_once('.').filter(|(_, rest)| rest.contains('.'))
+            && let Some((_, Entity::Part(inner))) = names.get(name)
+        {
+            // A path into a part, as in `left.touch.image`.
+            let rest = Spanned { value: rest.to_owned(), span: word.part(name.len() + 1..word.value.len()) };
+            return self.resolve_at_depth(*inner, &rest, depth + 1);
+        }
         let Some((name, port)) = word.value.split_once('.').filter(|(_, port)| !port.contains('.')) else {
             let diagnostic = unknown(format!("`{}` is not a port", word.value));
             return match self.port_like(scope, &word.value) {
@@ -55,6 +62,14 @@ impl Net<'_> {
             // An input that is declared and not wired has its own diagnostic.
             let wire = inputs.get(port).ok_or(None)?;
             return self.resolve_at_depth(parent, &wire.from, depth + 1);
+        }
+        if name == MODES && self.flat.tasks[*task].scope == scope {
+            let modes = self.flat.mode_names(*task);
+            let Some(number) = modes.clone().position(|mode| mode == port) else {
+                let message = format!("there is no mode `{port}`");
+                return unknown_port(port.len(), message).suggest(port, modes, "modes").into_err();
+            };
+            return Ok(PortRef { producer: Producer::Task(*task), port: number });
         }
         let Some((_, entity)) = names.get(name) else {
             if self.observed.iter().any(|(key, ..)| key.name == name) {

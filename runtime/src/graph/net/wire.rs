@@ -43,6 +43,8 @@ impl WireOrigin {
 #[derive(Debug, Clone)]
 pub(crate) struct CommandWire {
     pub(crate) role: usize,
+    /// The task whose file has the wire.
+    pub(crate) task: usize,
     /// Index of the command, or of the report, in the role's declaration.
     pub(crate) command: usize,
     /// Whether the wire leads to a report, which informs the device and moves nothing.

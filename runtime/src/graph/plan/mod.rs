@@ -2,13 +2,14 @@
 
 mod modes;
 mod port;
+mod tasks;
 mod view;
 
 use std::fmt;
 use std::ops::Range;
 
 use crate::device::{Description, Driver};
-use crate::graph::syntax::{AgeLimit, PolicyTable};
+use crate::graph::syntax::AgeLimit;
 use crate::node::{AnyNode, Need};
 use crate::signal::Shape;
 use crate::source::Code;
@@ -16,6 +17,7 @@ use crate::source::Code;
 pub(crate) use modes::{Condition, PlannedExit, PlannedMode, PlannedModes, Test, WatchedPort};
 pub use port::PlannedPort;
 pub(crate) use port::{PortRef, Producer};
+pub(crate) use tasks::{PlannedTask, Reach};
 pub(crate) use view::{PlannedShow, PlannedView};
 
 /// A role and the device bound to it.
@@ -67,6 +69,8 @@ pub(crate) struct PlannedNode {
     pub(crate) holds: &'static [&'static str],
     /// Index of the flag that is set while a budget of the limiter is spent, and the role whose commands it limits.
     pub(crate) budget: Option<(usize, String)>,
+    /// The innermost task around it.
+    pub(crate) task: usize,
     /// Whether its limits are in raw readings.
     pub(crate) is_uncalibrated: bool,
     /// Span of its name.
@@ -84,6 +88,8 @@ impl PlannedNode {
 /// A command or a report of a device, and the port that drives it.
 pub(crate) struct PlannedCommand {
     pub(crate) source: PortRef,
+    /// The task whose file has the wire.
+    pub(crate) task: usize,
     pub(crate) device: usize,
     /// Whether it is a report: a value that moves nothing.
     pub(crate) is_report: bool,
@@ -121,12 +127,9 @@ pub(crate) struct Plan {
     pub(crate) clock: Clock,
     /// Nominal time between two ticks [ns].
     pub(crate) period: i64,
-    /// Maximum time step between two samples; longer gaps count as this long [s].
-    pub(crate) max_gap: f64,
-    /// How long an input must be absent before the state of its node is reset [ns].
-    pub(crate) reset_after: i64,
-    pub(crate) modes: Option<PlannedModes>,
-    pub(crate) policy: PolicyTable,
+    /// The graph itself, and the parts that are tasks.
+    pub(crate) tasks: Vec<PlannedTask>,
+    pub(crate) reach: Reach,
     /// The warnings that [allow] silences.
     pub(crate) allowed: Vec<AllowedWarning>,
 }

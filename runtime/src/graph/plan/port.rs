@@ -2,26 +2,28 @@
 
 use crate::signal::Shape;
 
-/// The source of a wire: a role or a node.
+/// The source of a wire: a role, a node or the modes of a task.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub(crate) enum Producer {
     /// A role, by its index in the graph file.
     Role(usize),
     /// A node, by its index in the flat graph.
     Node(usize),
+    /// The modes of a task, by its index: a flag for each.
+    Task(usize),
 }
 
 impl Producer {
-    /// Returns the index of the node, or `None` for a role.
+    /// Returns the index of the node, or `None` for another producer.
     pub(crate) const fn node(self) -> Option<usize> {
         match self {
             Self::Node(node) => Some(node),
-            Self::Role(_) => None,
+            Self::Role(_) | Self::Task(_) => None,
         }
     }
 }
 
-/// A reference to one output of a role or a node.
+/// A reference to one output of a producer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub(crate) struct PortRef {
     pub(crate) producer: Producer,

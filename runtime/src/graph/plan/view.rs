@@ -6,8 +6,6 @@ use super::port::PortRef;
 #[derive(Debug, Clone, Default)]
 pub(crate) struct PlannedView {
     pub(crate) ports: Vec<PlannedShow>,
-    /// Ports of the x and the y of the contact, marked in the first image.
-    pub(crate) mark: Option<[PortRef; 2]>,
 }
 
 /// A port that is shown.
@@ -16,4 +14,6 @@ pub(crate) struct PlannedShow {
     /// Its name as written in the graph file.
     pub(crate) name: String,
     pub(crate) source: PortRef,
+    /// Ports of the x and the y of the contact that is marked in it, if it is an image.
+    pub(crate) mark: Option<[PortRef; 2]>,
 }

@@ -1,11 +1,10 @@
 //! The section `[allow]`: the warnings that a graph or a bench silences, each with its reason.
 
+use std::ops::Range;
+
 use super::read::read_table;
 use crate::node::{At, Mistake, Param, Reader};
 use crate::source::{Code, Key, Severity, Value};
-
-/// Name of the section.
-pub(super) const ALLOW: &str = "allow";
 
 /// An entry of `[allow]`.
 #[derive(Debug, Clone)]
@@ -14,6 +13,8 @@ pub(crate) struct Allowance {
     /// The code of the warnings that it silences.
     pub(crate) code: Code,
     pub(crate) reason: String,
+    /// The text of the part that allows them: those elsewhere are not silenced.
+    pub(crate) within: Option<Range<usize>>,
 }
 
 /// Reads the section; entries with a mistake are left out.
@@ -45,5 +46,5 @@ fn read_entry(key: Key, value: &Value, reader: &mut Reader<'_>) -> Option<Allowa
         reader.mistakes.push(Mistake::new(Code::BadValue, At::Span(value.span.clone()), message).help(help));
         return None;
     }
-    Some(Allowance { key, code, reason })
+    Some(Allowance { key, code, reason, within: None })
 }

@@ -39,6 +39,8 @@ pub(crate) struct LimitSection {
     pub(crate) table: Table,
     /// The role in `[limits.ROLE]`.
     pub(crate) role: Option<Key>,
+    /// The task that states it, if a task does.
+    pub(crate) task: usize,
 }
 
 impl LimitSection {
@@ -59,8 +61,13 @@ pub(crate) fn read_limits(root: &Table, owner: &LimitOwner, reader: &mut Reader<
     let table = read_table(Some(value), reader);
     let is_role = |(_, value): &(Key, Value)| matches!(&value.item, Item::Table(table) if table.fact().is_none());
     let (roles, own): (Vec<_>, Vec<_>) = table.entries.into_iter().partition(is_role);
-    let section =
-        |span: Range<usize>, table: Table, role: Option<Key>| LimitSection { owner: owner.clone(), span, table, role };
+    let section = |span: Range<usize>, table: Table, role: Option<Key>| LimitSection {
+        owner: owner.clone(),
+        span,
+        table,
+        role,
+        task: 0,
+    };
     let of_role = |(key, value): (Key, Value)| match value.item {
         Item::Table(table) => Some(section(key.span.clone(), table, Some(key))),
         _ => None,

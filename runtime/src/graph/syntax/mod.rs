@@ -17,9 +17,8 @@ pub(crate) use limits::{LimitOwner, LimitSection};
 pub(crate) use modes::{ExitKind, ExitTable, ModeBlock, ModeExit, PortState};
 pub(crate) use names::Use;
 pub use policy::Policy;
-pub(crate) use policy::{AgeLimit, PolicyTable, default_max_age_ns, default_max_age_s};
-pub(crate) use reserved::{INPUTS, LIMITS, NO_ARM, ROBOT};
+pub(crate) use policy::{AgeLimit, OnFail, PolicyTable, default_max_age_ns, default_max_age_s};
+pub(crate) use reserved::{ALLOW_UNCALIBRATED, INPUTS, LIMITS, MODES, NO_ARM, ROBOT, TASK_SECTIONS};
 pub(crate) use sections::{
-    ALLOW_UNCALIBRATED, BenchDocument, Block, GraphDocument, GraphTable, PartBlock, Sections, WireEntry,
-    into_diagnostic,
+    BenchDocument, Block, CommandEntry, GraphDocument, GraphTable, PartBlock, Sections, WireEntry, into_diagnostic,
 };

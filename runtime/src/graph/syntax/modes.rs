@@ -10,6 +10,8 @@ use crate::source::{Diagnostic, Item, Key, Table, Value};
 /// A mode: the parameters it sets and its exits.
 #[derive(Debug, Clone)]
 pub(crate) struct ModeBlock {
+    /// The task of which it is a mode.
+    pub(crate) task: usize,
     pub(crate) key: Key,
     /// The block as written.
     pub(crate) table: Table,
@@ -157,7 +159,7 @@ pub(super) fn read_mode(key: Key, mut table: Table, reader: &mut Reader<'_>) -> 
             _ => exits.extend(read_exits(kind, &value, reader)),
         }
     }
-    ModeBlock { key, table: whole, set, exits }
+    ModeBlock { task: 0, key, table: whole, set, exits }
 }
 
 /// Reads the exits of one table. `after_ms` and `after_travel_mm` together make two exits, one for each.

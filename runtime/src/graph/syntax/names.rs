@@ -6,7 +6,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 
-use super::reserved::{INPUTS, LIMITS, is_name};
+use super::reserved::{INPUTS, LIMITS, MODES, is_name};
 use super::sections::{BenchDocument, GraphDocument};
 use crate::node::Spanned;
 use crate::source::{
@@ -34,7 +34,9 @@ impl Use {
     /// Returns the reference to the port inside `name`, as a reference to a name of its own.
     pub(crate) fn inside(&self, name: &str) -> Option<Self> {
         let port = self.port.as_ref().filter(|_| self.name == name)?;
-        Some(Self { name: port.clone(), port: None, span: self.span.clone() })
+        // Behind the port, the name of a feature may follow.
+        let port = port.split('.').next().unwrap_or_default();
+        Some(Self { name: port.to_owned(), port: None, span: self.span.clone() })
     }
 }
 
@@ -120,7 +122,7 @@ impl GraphDocument {
         set: &[&Key],
         sources: &SourceMap,
     ) -> Diagnostics {
-        let uses = self.uses().into_iter().filter(|reference| reference.name != INPUTS);
+        let uses = self.uses().into_iter().filter(|reference| ![INPUTS, MODES].contains(&&*reference.name));
         let uses: Vec<Use> = uses.chain(set.iter().map(|key| Use::of_key(key))).collect();
         let roles = self.roles.len();
         let may_be = |i: usize, name: &str| i < roles || binds.position(name).is_none();

@@ -40,6 +40,23 @@ impl Param for Policy {
     }
 }
 
+/// What follows when a part that is a task fails.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum OnFail {
+    /// Its commands ramp to zero, and the other tasks go on.
+    Part,
+    /// The run ends.
+    Run,
+}
+
+impl Param for OnFail {
+    const EXPECTS: &'static str = "`part` or `run`";
+
+    fn read(value: &Value, reader: &mut Reader<'_>) -> Option<Self> {
+        read_word(value, &[("part", Self::Part), ("run", Self::Run)], Self::EXPECTS, reader)
+    }
+}
+
 /// Periods after which a value is too old, unless the graph sets another limit.
 const DEFAULT_MAX_AGE_PERIODS: f64 = 5.0;
 

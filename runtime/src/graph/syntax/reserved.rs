@@ -7,11 +7,39 @@ pub(crate) const NO_ARM: &str = "none";
 /// Key of a device for its robot, and section of the file that it names.
 pub(crate) const ROBOT: &str = "robot";
 
+/// The section [allow].
+pub(super) const ALLOW: &str = "allow";
+/// Key of a bench that allows limits in raw readings.
+pub(crate) const ALLOW_UNCALIBRATED: &str = "allow_uncalibrated";
+
+/// The sections of a graph file.
+pub(super) const GRAPH_SECTIONS: [&str; 13] = [
+    "graph",
+    "roles",
+    "parts",
+    "nodes",
+    "commands",
+    LIMITS,
+    "modes",
+    "policy",
+    "devices",
+    "bind",
+    "facts",
+    ALLOW,
+    ALLOW_UNCALIBRATED,
+];
+
+/// The sections that make a part a task: each is about its own roles.
+pub(crate) const TASK_SECTIONS: [&str; 6] = ["graph", "roles", "commands", LIMITS, "modes", "policy"];
+
 /// Name of the inputs of a part in `in.NAME = "inputs.INPUT"`.
 pub(crate) const INPUTS: &str = "inputs";
 
+/// Name of the modes of a task in the flag `modes.NAME`.
+pub(crate) const MODES: &str = "modes";
+
 /// Reserved names, which have another meaning in wires and facts.
-const RESERVED: [&str; 2] = [INPUTS, LIMITS];
+const RESERVED: [&str; 3] = [INPUTS, LIMITS, MODES];
 
 /// Returns whether a text is a valid name.
 pub(super) fn is_name(name: &str) -> bool {

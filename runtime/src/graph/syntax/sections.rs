@@ -3,16 +3,17 @@
 use std::collections::BTreeSet;
 use std::ops::Range;
 
-use super::allow::{ALLOW, Allowance, read_allow};
+use super::allow::{Allowance, read_allow};
 use super::correct::{
     correct_block, correct_facts, correct_keys, correct_part_file, correct_robot, correct_sections, correct_wires,
     separate_wires,
 };
 use super::limits::{LimitOwner, LimitSection, read_limits};
 use super::modes::{ModeBlock, read_mode};
-use super::policy::{AgeLimit, PolicyTable, WireTable};
+use super::policy::{AgeLimit, OnFail, PolicyTable, WireTable};
 use super::read::read_table;
-use super::reserved::{LIMITS, ROBOT, is_name};
+use super::reserved::ALLOW;
+use super::reserved::{ALLOW_UNCALIBRATED, GRAPH_SECTIONS, LIMITS, ROBOT, is_name};
 use super::robot::{RobotDocument, read_robot};
 use crate::node::{At, FilePath, Measured, Mistake, Param, Reader, Spanned};
 use crate::source::{Code, Diagnostic, Diagnostics, Item, Key, Named, SourceMap, Table, Value, suggest_name};
@@ -48,6 +49,16 @@ pub(crate) struct WireEntry {
     pub(crate) key: Key,
     pub(crate) from: Spanned<String>,
     pub(crate) age: Option<AgeLimit>,
+}
+
+/// A wire to a command or a report of a role.
+#[derive(Debug, Clone)]
+pub(crate) struct CommandEntry {
+    /// The task whose file has the wire.
+    pub(crate) task: usize,
+    /// The role of the graph, where the file names it.
+    pub(crate) role: Key,
+    pub(crate) wire: WireEntry,
 }
 
 /// The table `in` of a block.
@@ -113,6 +124,8 @@ pub(crate) struct PartBlock {
     pub(crate) set: Table,
     /// The role for each name of a role in the file of the part.
     pub(crate) roles: Named<Spanned<String>>,
+    /// Whether its failure ends the run, and the place of that key.
+    pub(crate) on_fail: Option<(OnFail, Range<usize>)>,
 }
 
 /// The sections of a graph file or of a part.
@@ -159,9 +172,6 @@ pub(crate) struct BenchDocument {
     pub(crate) allow: Vec<Allowance>,
 }
 
-/// Key of a bench that allows limits in raw readings.
-pub(crate) const ALLOW_UNCALIBRATED: &str = "allow_uncalibrated";
-
 /// Reads sections and collects their diagnostics.
 pub(crate) struct Sections<'a> {
     pub(super) reader: Reader<'a>,
@@ -185,28 +195,18 @@ impl<'a> Sections<'a> {
 
     /// Reads the sections of a graph file.
     pub(crate) fn graph(&mut self, root: &mut Table) -> GraphDocument {
-        const KEYS: [&str; 13] = [
-            "graph",
-            "roles",
-            "parts",
-            "nodes",
-            "commands",
-            LIMITS,
-            "modes",
-            "policy",
-            "devices",
-            "bind",
-            "facts",
-            ALLOW,
-            ALLOW_UNCALIBRATED,
-        ];
-        correct_sections(root, &KEYS, &mut self.reader);
+        correct_sections(root, &GRAPH_SECTIONS, &mut self.reader);
         for name in [ALLOW_UNCALIBRATED, "facts"] {
             let Some((key, _)) = root.entry(name).filter(|_| root.get("devices").is_none()) else { continue };
             let message = format!("`{name}` is a key of a bench, and a task cannot set it");
             let diagnostic = Diagnostic::new(Code::UnknownKey, key.span.clone(), message);
             self.diagnostics.push(diagnostic.help("move it to the bench file"));
         }
+        self.task(root)
+    }
+
+    /// Reads the sections of a task: of a graph, or of a part that is one.
+    fn task(&mut self, root: &Table) -> GraphDocument {
         let graph =
             root.entry("graph").map(|(key, value)| (key.span.clone(), GraphTable::read(value, &mut self.reader)));
         let commands = self.table(root.get("commands")).entries.into_iter().flat_map(|(role, value)| {
@@ -226,13 +226,14 @@ impl<'a> Sections<'a> {
 
     /// Corrects the names of the sections of a part, before the graph overrides values in them.
     pub(crate) fn correct_part(&mut self, root: &mut Table) {
-        correct_sections(root, &["inputs", "exports", "parts", "nodes"], &mut self.reader);
+        let sections: Vec<&str> = ["inputs", "exports"].into_iter().chain(GRAPH_SECTIONS).collect();
+        correct_sections(root, &sections, &mut self.reader);
     }
 
     /// Reads the sections of a part.
     pub(crate) fn part(&mut self, root: &Table) -> GraphDocument {
         let (inputs, exports) = (self.names(root.get("inputs")), self.names(root.get("exports")));
-        GraphDocument { inputs, exports, ..self.body(root) }
+        GraphDocument { inputs, exports, ..self.task(root) }
     }
 
     /// Reads the sections of a bench file.
@@ -345,7 +346,9 @@ impl<'a> Sections<'a> {
         separate_wires(&mut table, &mut self.reader);
         correct_wires(&mut table, sources, &mut self.reader);
         correct_part_file(&mut table, &mut self.reader);
-        correct_keys(&mut table, &["file", "in", "set", "roles"], "", &mut self.reader);
+        correct_keys(&mut table, &["file", "in", "set", "roles", "on_fail"], "", &mut self.reader);
+        let on_fail = table.remove("on_fail");
+        let on_fail = on_fail.and_then(|(key, value)| Some((OnFail::read(&value, &mut self.reader)?, key.span)));
         let roles = table.remove("roles").map(|(_, value)| self.words(Some(&value))).unwrap_or_default();
         let wires = self.wires(&mut table);
         let mut set = table.remove("set").map(|(_, value)| value);
@@ -360,7 +363,7 @@ impl<'a> Sections<'a> {
                 None
             }
         };
-        PartBlock { key, file, wires, set, roles }
+        PartBlock { key, file, wires, set, roles, on_fail }
     }
 
     /// Reads the table `in` of a block.
@@ -456,8 +459,7 @@ impl<'a> Sections<'a> {
             key.name = meant;
             return true;
         }
-        let help =
-            "a name has lower-case letters, digits and `_`, starts with a letter, and is not `inputs` or `limits`";
+        let help = "a name has lower-case letters, digits and `_`, starts with a letter, and is not `inputs`, `limits` or `modes`";
         self.diagnostics.push(diagnostic.help(help));
         false
     }
