@@ -183,7 +183,8 @@ impl Engine {
             && (self.tasks[number].halts.is_escalated_by(policy) || self.explains_halt(number, trouble))
         {
             let fault = self.describe(trouble);
-            self.tasks[number].halts.halt(policy, fault);
+            let task = &mut self.tasks[number];
+            task.halts.halt(&task.name, policy, fault);
         }
         let task = &mut self.tasks[number];
         let resumes = task.halts.update(trouble.is_some(), self.core.tick.now);
@@ -212,7 +213,10 @@ impl Engine {
         let mut has_reached = (false, false);
         for task in 0..self.tasks.len() {
             let mut around = std::iter::successors(Some(task), |task| self.tasks[*task].parent);
-            if self.tasks[task].end.is_some() || !around.any(|around| around == to) {
+            let has_end = self.tasks[task].end.is_some();
+            // Without commands and modes, only a graph with no other task has something to stop.
+            let is_empty = !self.tasks[task].is_active && self.tasks.len() > 1;
+            if has_end || is_empty || !around.any(|around| around == to) {
                 continue;
             }
             let task = &mut self.tasks[task];

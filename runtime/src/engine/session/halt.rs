@@ -72,10 +72,13 @@ impl HaltMachine {
         self.state == HaltState::Running || self.state == HaltState::Held && policy == Policy::Stop
     }
 
-    /// Starts a halt. Call it only if the policy [escalates](Self::is_escalated_by) the state.
-    pub(crate) fn halt(&mut self, policy: Policy, fault: Fault) {
+    /// Starts a halt of a task, whose name is empty for the graph itself. Call it only if the policy [escalates](Self::is_escalated_by) the state.
+    pub(crate) fn halt(&mut self, task: &str, policy: Policy, fault: Fault) {
         self.end(fault.time);
-        tracing::warn!("{fault}: every command ramps to zero");
+        match task {
+            "" => tracing::warn!("{fault}: every command ramps to zero"),
+            task => tracing::warn!("{fault}: the commands of `{task}` ramp to zero"),
+        }
         if self.list.len() < MAX_HALTS {
             self.list.push(Halt { fault, policy, until: None });
         } else {
@@ -136,7 +139,7 @@ mod tests {
             let mut halts = HaltMachine::new();
             for (i, (trouble, resumes, is_halted)) in case.iter().enumerate() {
                 if let Some(policy) = trouble.filter(|policy| halts.is_escalated_by(*policy)) {
-                    halts.halt(policy, fault());
+                    halts.halt("", policy, fault());
                 }
                 if *resumes {
                     halts.resumes = true;
