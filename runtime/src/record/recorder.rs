@@ -57,7 +57,9 @@ impl Recorder {
         let (own, ports) = self.row[1..].split_at_mut(self.own);
         for (cells, task) in own.chunks_exact_mut(2).zip(with_modes(engine)) {
             cells[0] = task.mode_number().map_or(f64::NAN, |mode| mode as f64);
-            cells[1] = f64::from(u8::from(task.is_halted()));
+            // The graph itself ends with the run.
+            let is_over = task.end().is_some() && !task.name().is_empty();
+            cells[1] = f64::from(u8::from(task.is_halted() || is_over));
         }
         self.columns.read(engine.bus(), ports);
         while self.ring.slots() < self.row.len() {
@@ -87,7 +89,8 @@ impl Recorder {
 }
 
 /// Returns the columns that belong to no port. A task with modes has two: the number of the next tick's mode, from 0 in
-/// the order of the file, and whether its commands are halted. Those of a part have its name before theirs.
+/// the order of the file, and whether its commands are halted,
+/// which they also are once it has ended. Those of a part have its name before theirs.
 fn own_columns(engine: &Engine) -> Vec<PortColumn> {
     let column = |name: String| PortColumn { name, part: String::new(), unit: Unit::ONE };
     let names = |task: &TaskRun| match task.name() {

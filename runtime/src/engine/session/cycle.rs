@@ -90,7 +90,7 @@ impl Engine {
         }
         for task in 0..self.tasks.len() {
             self.update_halt(task);
-            self.core.tasks[task].is_halted = self.tasks[task].is_halted();
+            self.core.tasks[task].is_halted = self.tasks[task].is_resting();
         }
         self.core.commit(&mut self.devices);
         self.decide()

@@ -101,9 +101,15 @@ impl TaskRun {
         self.is_active
     }
 
-    /// Whether its commands are zero or ramp to zero, because of a halt or because it has ended.
+    /// Whether its commands are zero or ramp to zero because of a halt.
     #[must_use]
     pub fn is_halted(&self) -> bool {
+        self.halts.is_halted()
+    }
+
+    /// Whether its commands are zero or ramp to zero, because of a halt or because it has ended.
+    #[must_use]
+    pub fn is_resting(&self) -> bool {
         self.halts.is_halted() || self.end.is_some()
     }
 
