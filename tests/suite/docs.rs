@@ -163,6 +163,14 @@ fn every_graph_of_the_reference_loads() {
 }
 
 #[test]
+fn the_two_arms_of_the_reference_are_those_that_ship() {
+    let [graph] = &blocks(&reference(), "toml two_arms")[..] else { panic!("one graph") };
+    assert!(file("graphs/two_arms.toml").ends_with(graph.as_str()));
+    compile(&catalogue(), &Request::file(shipped("two_arms.toml")))
+        .unwrap_or_else(|report| panic!("{}", report.render(false)));
+}
+
+#[test]
 fn every_set_of_the_reference_loads() {
     let page = reference();
     let (folder, ..) = world(&page, "set");

@@ -41,7 +41,7 @@ pub struct RoleType {
     /// `holds` of nodes; see [`Limits`](crate::node::Limits).
     pub limits: Vec<Cow<'static, str>>,
     /// Whether only scenarios and recordings may read it: a simulation knows its values, and no sensor does. A bench
-    /// binds it under the last word of its name, and no task declares it.
+    /// binds it under its name, or under one that ends with the last word of it, and no task declares it.
     pub is_observed: bool,
 }
 
@@ -49,7 +49,7 @@ impl RoleType {
     /// Whether it is for scenarios and recordings only, and a bench binds it as `name`.
     #[must_use]
     pub fn is_observed_as(&self, name: &str) -> bool {
-        self.is_observed && (self.name == name || self.observed_name() == name)
+        self.is_observed && (self.name == name || name.rsplit('_').next() == Some(self.observed_name()))
     }
 
     /// Returns the last word of its name, under which a bench binds it if it is for scenarios and recordings only.
