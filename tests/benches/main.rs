@@ -4,6 +4,7 @@
 mod chain;
 mod finger_press;
 mod fused;
+mod hand;
 
 use std::hint::black_box;
 use std::time::Instant;
@@ -136,10 +137,22 @@ fn load(family: &str, nodes: usize) {
     engine.tick(now).expect("the first tick has no fault");
 }
 
+/// Runs the hand with that many pads, for a tool that counts instructions: `tick -- hand 6 1000`.
+fn count_hand(pads: usize, ticks: u32) {
+    let mut engine = hand::hand(pads);
+    for _ in 0..ticks {
+        engine.refresh();
+        engine.step().expect("nothing fails");
+    }
+}
+
 fn main() {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     match arguments.as_slice() {
         [what, family, nodes] if what == "load" => load(family, nodes.parse().expect("a number of nodes")),
+        [what, pads, ticks] if what == "hand" => {
+            count_hand(pads.parse().expect("a number of pads"), ticks.parse().expect("a number of ticks"));
+        }
         [what, ticks] => count(what, ticks.parse().expect("a number of ticks")),
         _ => {
             chains();
