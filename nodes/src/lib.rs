@@ -60,11 +60,13 @@ pub fn catalogue() -> Catalogue {
         .role(roles::tactile_pad())
         .role(roles::velocity_arm())
         .role(roles::ground_truth())
+        .role(roles::true_object())
         // The first that fills a role is the one that examples take.
         .device::<devices::mock_pad::MockPad>()
         .device::<devices::recording::Player>()
         .device::<devices::mock_arm::MockArm>()
         .device::<sim::bench::SimBench>()
+        .device::<sim::pair::SimPair>()
         .device::<devices::lockstep::Lockstep>()
         .group("touch: from a tactile image to features of the contact")
         .node::<touch::tactile_source::TactileSource>()

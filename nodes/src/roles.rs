@@ -74,6 +74,33 @@ pub fn ground_truth() -> RoleType {
     }
 }
 
+/// Facts of a free object that a simulation knows and no sensor measures: for scenarios and the recorder. A bench binds
+/// it as `object`.
+#[must_use]
+pub fn true_object() -> RoleType {
+    let scalar = |name, doc, unit: &[&'static str]| PortSpec::new(name, doc, Kind::Scalar, unit);
+    RoleType {
+        name: "true_object".into(),
+        summary: "true values of an object that two pads hold, which only a simulation knows".into(),
+        outputs: vec![
+            scalar("x", "Centre of the object along x of the cell [m].", &["m"]),
+            scalar("y", "Centre of the object along y of the cell [m].", &["m"]),
+            scalar("z", "Height of the centre of the object in the cell [m].", &["m"]),
+            scalar("tilt", "Angle between the object's own z and the vertical [rad].", &["rad"]),
+            PortSpec::new("held", HELD, Kind::Flag, &[]),
+            scalar("squeeze", "Smaller one of the normal forces of both pads on the object [N].", &["N"]),
+            scalar("left_force", "Normal force on the left pad [N].", &["N"]),
+            scalar("right_force", "Normal force on the right pad [N].", &["N"]),
+            scalar("left_tangential", "Friction force on the left pad, in its plane [N].", &["N"]),
+            scalar("right_tangential", "Friction force on the right pad, in its plane [N].", &["N"]),
+            scalar("table_force", "Normal force of the table on the object [N].", &["N"]),
+        ],
+        is_observed: true,
+        ..RoleType::default()
+    }
+}
+
+const HELD: &str = "Whether both pads press on the object and the table does not bear it.";
 const PRESSURE: &str = "Mean force on the tactels in contact, of the image without noise; absent without contact \
     [N/tactel].";
 const ORIENTATION: &str = "Angle of the edge, pen or cable in the sensor's frame, from +x toward +y, in (-pi/2, pi/2]; \

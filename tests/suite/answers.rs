@@ -90,7 +90,11 @@ fn a_description_says_what_a_kind_a_role_and_a_device_are() {
         ("twist", &["twist (kind)", "Taken by", "projector.twist twist, frame A", "Produced by"]),
         (
             "velocity_arm",
-            &["velocity_arm (role)", "Filled by the devices: `mock_arm`, `sim_bench`, `lockstep`.", "Commands"],
+            &[
+                "velocity_arm (role)",
+                "Filled by the devices: `mock_arm`, `sim_bench`, `sim_pair`, `lockstep`.",
+                "Commands",
+            ],
         ),
         ("mock_arm", &["mock_arm (device)", "Fills the roles: `velocity_arm`.", "Parameters"]),
     ];

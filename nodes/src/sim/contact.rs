@@ -13,6 +13,7 @@
 use parry3d_f64::math::{Mat3, Pose3, Vec2, Vec3};
 use tactflow_runtime::signal::ImageShape;
 
+use super::bristle::BristleShear;
 use super::foam::{self, Foam, FoamColumn};
 use super::object::Object;
 
@@ -45,7 +46,7 @@ pub struct Wrench {
 
 impl Wrench {
     /// Adds a force at a place.
-    fn push(&mut self, place: Vec3, force: Vec3) {
+    pub(super) fn push(&mut self, place: Vec3, force: Vec3) {
         self.force += force;
         self.moment += place.cross(force);
     }
@@ -60,6 +61,8 @@ pub struct Contact {
     column: FoamColumn,
     /// Shear stiffness of a tactel [N/m].
     shear: f64,
+    /// Shear damping of a tactel [N s/m].
+    shear_damping: f64,
     /// The points that touch an object, in raster order.
     pub(super) touching: Vec<Touch>,
     tactels: Vec<Bristle>,
@@ -116,7 +119,7 @@ struct Bristle {
     normal: f64,
     object: usize,
     /// Shear of the foam along the pad's x and y [m].
-    shear: Vec2,
+    shear: BristleShear,
     /// Force on the pad along its x and y [N].
     friction: Vec2,
 }
@@ -137,6 +140,7 @@ impl Contact {
             fine,
             column: FoamColumn::new(&foam, area / points as f64),
             shear: foam.shear * area / foam::REFERENCE_AREA,
+            shear_damping: 0.0,
             touching: Vec::with_capacity(shape.tactels() * points),
             tactels: vec![Bristle::default(); shape.tactels()],
             slots: vec![NO_SLOT; shape.tactels() * points],
@@ -148,6 +152,14 @@ impl Contact {
             shape,
             foam,
         }
+    }
+
+    /// Damps the shear of the foam with the time constant of its compression, damping over stiffness.
+    ///
+    /// An object that only the pads hold would otherwise oscillate on the shear of the foam for ever.
+    #[must_use]
+    pub fn with_damped_shear(self) -> Self {
+        Self { shear_damping: self.shear * self.foam.damping / self.foam.stiffness, ..self }
     }
 
     /// Returns the friction force on the pad along its x and y, as of the last step [N].
@@ -272,12 +284,12 @@ impl Contact {
         let cols = self.shape.cols;
         for (index, tactel) in self.tactels.iter_mut().enumerate() {
             if tactel.normal == 0.0 {
-                (tactel.shear, tactel.friction) = (Vec2::ZERO, Vec2::ZERO);
+                (tactel.shear, tactel.friction) = (BristleShear::default(), Vec2::ZERO);
                 continue;
             }
             let place = Vec3::new(self.shape.x((index % cols) as f64), self.shape.y((index / cols) as f64), 0.0);
             let slide = -self.slides[tactel.object].at(place);
-            tactel.rub(dt, slide.truncate(), self.shear, &self.foam);
+            tactel.rub(dt, slide.truncate(), [self.shear, self.shear_damping], &self.foam);
             let push = tactel.friction.extend(0.0);
             wrench.push(place, push);
             loads[tactel.object] -= push;
@@ -289,23 +301,18 @@ impl Contact {
     pub(super) fn energy(&self, objects: &[Object]) -> f64 {
         let softness = |touch: &Touch| objects[touch.object].softness * self.parts();
         let columns: f64 = self.touching.iter().map(|touch| self.column.energy(touch.depth, softness(touch))).sum();
-        let bristles = self.tactels.iter().map(|t| self.shear / 2.0 * t.shear.length_squared());
+        let bristles = self.tactels.iter().map(|t| t.shear.energy(self.shear));
         columns + bristles.sum::<f64>()
     }
 }
 
 impl Bristle {
     /// Shears the foam by the `velocity` of the pad relative to the object [m/s], up to the friction limit.
-    fn rub(&mut self, dt: f64, velocity: Vec2, stiffness: f64, foam: &Foam) {
+    fn rub(&mut self, dt: f64, velocity: Vec2, spring: [f64; 2], foam: &Foam) {
         let speed = velocity.length() / STRIBECK_SPEED;
         let (still, sliding) = (foam.static_friction, foam.sliding_friction);
         let max_force = (sliding + (still - sliding) / (1.0 + speed * speed)) * self.normal;
-        self.shear += velocity * dt;
-        let force = stiffness * self.shear.length();
-        if force > max_force {
-            self.shear *= max_force / force;
-        }
-        self.friction = self.shear * -stiffness;
+        self.friction = self.shear.rub(dt, velocity, spring, max_force);
     }
 }
 

@@ -53,6 +53,14 @@ impl Foam {
     };
 }
 
+impl Foam {
+    /// Returns the slope of the force under a tactel of 5 mm by 5 mm at a compression of `c` [m], in N/m.
+    #[must_use]
+    pub(super) fn slope(&self, c: f64) -> f64 {
+        FoamColumn::new(self, REFERENCE_AREA).load(c).1
+    }
+}
+
 /// Area of the tactel that the values of [`Foam`] refer to [m²].
 pub(super) const REFERENCE_AREA: f64 = 0.005 * 0.005;
 

@@ -100,8 +100,8 @@ pub struct Object {
     sag_speed: Vec3,
     pub(super) pose: Pose3,
     velocity: Vec3,
-    /// Angular velocity about `axis` [rad/s].
-    spin: f64,
+    /// Angular velocity in the base [rad/s].
+    spin: Vec3,
 }
 
 /// Damping of a mount as a fraction of the critical one [1].
@@ -133,8 +133,32 @@ impl Object {
             sag_speed: Vec3::ZERO,
             pose: home,
             velocity: Vec3::ZERO,
-            spin: 0.0,
+            spin: Vec3::ZERO,
         })
+    }
+
+    /// Returns an object that is at rest at a pose in the base until [`Object::place`] moves it. Its surface has a
+    /// compliance of `softness` under a tactel of 5 mm by 5 mm [m/N].
+    #[must_use]
+    pub fn free(shape: Geometry, softness: f64, pose: Pose3) -> Self {
+        Self {
+            shape,
+            softness,
+            home: pose,
+            script: Vec::new(),
+            axis: Vec3::Z,
+            mount: None,
+            sag: Vec3::ZERO,
+            sag_speed: Vec3::ZERO,
+            pose,
+            velocity: Vec3::ZERO,
+            spin: Vec3::ZERO,
+        }
+    }
+
+    /// Moves the object to a pose, with a velocity of its centre [m/s] and an angular velocity [rad/s] in the base.
+    pub fn place(&mut self, pose: Pose3, velocity: Vec3, spin: Vec3) {
+        (self.pose, self.velocity, self.spin) = (pose, velocity, spin);
     }
 
     /// Advances by `dt` [s] to `time` [s] under the `force` of the pad [N].
@@ -157,19 +181,19 @@ impl Object {
         let (sin, cos) = libm::sincos(angle / 2.0);
         let turned = Rot3::from_xyzw(self.axis.x * sin, self.axis.y * sin, self.axis.z * sin, cos);
         self.pose = Pose3::from_parts(position, turned * self.home.rotation);
-        (self.velocity, self.spin) = (velocity, spin);
+        (self.velocity, self.spin) = (velocity, self.axis * spin);
     }
 
     /// Returns its velocity at a point in the base [m/s].
     #[must_use]
     pub fn velocity_at(&self, point: Vec3) -> Vec3 {
-        self.velocity + self.spin().cross(point - self.pose.translation)
+        self.velocity + self.spin.cross(point - self.pose.translation)
     }
 
     /// Returns its angular velocity in the base [rad/s].
     #[must_use]
     pub fn spin(&self) -> Vec3 {
-        self.axis * self.spin
+        self.spin
     }
 
     /// Returns the energy of the mount and of the mass on it [J].

@@ -102,6 +102,12 @@ impl Readout {
         Self { tactels: (0..tactels).map(tactel).collect(), electronics, noise: Random::new(seed, 2) }
     }
 
+    /// Returns the electronics with the random numbers of another noise.
+    #[must_use]
+    pub fn with_noise(self, noise: Random) -> Self {
+        Self { noise, ..self }
+    }
+
     /// Reads a frame of these forces [N], `dt` [s] after the last frame, into `counts`.
     pub fn read(&mut self, dt: f64, forces: &[f64], counts: &mut [f32]) {
         let electronics = &self.electronics;

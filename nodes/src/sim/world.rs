@@ -94,12 +94,3 @@ impl World {
         self.arm.energy() + self.contact.energy(&self.objects) + objects
     }
 }
-
-/// Returns whether steps of `dt` [s] resolve a spring and a damper; `stiffness` [1/s²] and `damping` [1/s] are divided
-/// by the mass.
-///
-/// Semi-implicit Euler is stable for dt² k + 2 dt c < 4. Half of that is left for the foam.
-#[must_use]
-pub fn is_resolved(stiffness: f64, damping: f64, dt: f64) -> bool {
-    dt * dt * stiffness + 2.0 * dt * damping <= 2.0
-}

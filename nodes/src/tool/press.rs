@@ -8,7 +8,7 @@ use tactflow_runtime::cli::Shell;
 use tactflow_runtime::cli::clap::{self, Parser};
 
 use super::arguments::{may_replace, pair, positive};
-use crate::sim::bench::MAX_TACTELS;
+use crate::sim::pad_model::MAX_TACTELS;
 use crate::sim::readout::{Electronics, Readout};
 
 /// Press the simulated pad with a bladder and write the log

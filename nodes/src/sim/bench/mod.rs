@@ -7,23 +7,23 @@
 mod check;
 
 use std::borrow::Cow;
-use std::collections::VecDeque;
 
 use tactflow_runtime::device::{Commands, Description, Device, DeviceError, Driver, Opened, Output, Samples, Stepped};
 use tactflow_runtime::node::{Describe, FilePath, Mistakes, Param, PortSpec};
 use tactflow_runtime::signal::{Image, ImageShape, Joint, Kind, Pose, Scalar, ScalarShape, Unit};
 
+use super::arm_model::ArmModel;
 use super::foam::Foam;
-use super::joints::{JointDynamics, SimArm};
+use super::frames::{Beats, Frames};
+use super::joints::SimArm;
 use super::object::{Object, ObjectParams};
+use super::pad_model::PadModel;
 use super::readout::{Electronics, Readout};
 use super::shape::pose3;
 use super::world::World;
-use crate::arm::chain::Chain;
-use crate::arm::model::load;
 use crate::arm::mount::Mount;
 use crate::devices::arm::{self, ArmPorts};
-use crate::devices::{Facts, nanos, pad, period_of};
+use crate::devices::{nanos, pad, period_of};
 use crate::random::Random;
 use crate::roles::ground_truth;
 use crate::usual::{USUAL_PRESSURE_N, USUAL_THRESHOLD_N};
@@ -105,12 +105,6 @@ pub struct Params {
     step_s: f64,
 }
 
-/// Inertia of the joints of an LWR in a bent posture, with rotors [kg m²].
-const INERTIA: [f64; 7] = [2.0, 2.0, 1.0, 0.8, 0.3, 0.25, 0.1];
-
-/// Largest number of tactels of a simulated pad.
-pub const MAX_TACTELS: usize = 128 * 128;
-
 /// A simulated bench: a foam pad on an arm in joint impedance control, and objects to touch.
 ///
 /// The bench closes the loop without hardware: commands move the arm and its pad, and contact gives an image and pushes
@@ -164,22 +158,12 @@ pub const MAX_TACTELS: usize = 128 * 128;
 /// ```
 #[derive(Describe)]
 pub struct SimBench {
-    image: Output<Image>,
     arm: ArmPorts,
     truth: TruthPorts,
     world: World,
-    readout: Readout,
+    frames: Frames,
     joints: Vec<Joint>,
-    period: i64,
-    latency: i64,
-    end: i64,
-    last: Option<i64>,
-    /// Images that are taken but not yet available, with their stamps.
-    taken: VecDeque<(i64, Vec<f32>)>,
-    /// Buffers for further images.
-    spare: Vec<Vec<f32>>,
-    /// Number of images that were handed over.
-    shown: u64,
+    beats: Beats,
     /// Number of exchanges that advanced the time.
     sequence: u64,
     threshold: f64,
@@ -212,60 +196,63 @@ impl Device for SimBench {
     type Params = Params;
 
     fn open(params: Params) -> Result<Opened, Mistakes> {
-        let chain = load(&params.urdf, &params.tip, &params.mount)?;
-        let start = arm::start_of(params.start.as_deref(), params.home.as_deref())?;
-        let joints = arm::joints(&chain, params.acceleration, &start)?;
-        let shape = ImageShape { rows: params.rows, cols: params.cols, pitch: [params.pitch; 2], unit: Unit::RAW };
-        check::check(&params, joints.joints.len(), &shape)?;
+        let (pad, model) = (params.pad(), params.arm());
+        let arm = model.load()?;
+        check::check(&params, &pad, &model, arm.joints.joints.len())?;
         let (period, latency) = (period_of(params.rate_hz), nanos(params.latency_s));
         let mut description = Description::every(period as f64 * 1e-9);
-        let image = pad::fill(&mut description, shape.clone(), pad_facts(&params)?);
-        let facts = arm::facts(&params.urdf, &params.tip, Some(params.home.as_deref().unwrap_or(&start)))?;
-        let arm = ArmPorts::fill(&mut description, &joints, facts);
-        let frames = (latency / period) as usize + 2;
+        let image = pad::fill(&mut description, pad.shape.clone(), pad.facts(&params.mount)?);
+        let joints = arm.joints.joints.clone();
+        let ports = ArmPorts::fill(&mut description, &arm.joints, model.facts(&arm)?);
+        let tactels = pad.shape.tactels();
+        let readout = Readout::new(tactels, pad.electronics.clone(), params.seed);
         let bench = Self {
-            image,
-            arm,
-            truth: TruthPorts::fill(&mut description, &shape),
-            readout: Readout::new(shape.tactels(), params.electronics.clone(), params.seed),
-            joints: joints.joints,
-            period,
-            latency,
-            end: params.for_s.map_or(i64::MAX, nanos),
-            last: None,
-            taken: VecDeque::with_capacity(frames),
-            spare: vec![vec![0.0; shape.tactels()]; frames],
-            shown: 0,
+            arm: ports,
+            truth: TruthPorts::fill(&mut description, &pad.shape),
+            frames: Frames::new(image, readout, tactels, [period, latency]),
+            joints,
+            beats: Beats::new(period, params.for_s.map_or(i64::MAX, nanos)),
             sequence: 0,
             threshold: params.threshold,
-            world: world(params, chain, start, shape)?,
+            world: world(params, model.arm(arm), pad.shape)?,
         };
         Ok(Opened { description, driver: Driver::Stepped(Box::new(bench)) })
     }
 }
 
-fn pad_facts(params: &Params) -> Result<Facts, Mistakes> {
-    let mut calibration = toml::Table::new();
-    if let Some(file) = &params.calibration {
-        calibration.insert("file".into(), arm::fact_of("calibration", file)?.into());
+impl Params {
+    fn pad(&self) -> PadModel {
+        PadModel {
+            shape: PadModel::shape(self.rows, self.cols, self.pitch),
+            points_apart: self.points_apart,
+            rate_hz: self.rate_hz,
+            latency_s: self.latency_s,
+            foam: self.foam.clone(),
+            electronics: self.electronics.clone(),
+            calibration: self.calibration.clone(),
+            threshold: self.threshold,
+            pressure: self.pressure,
+        }
     }
-    let mut facts = pad::facts(params.threshold, params.pressure, Unit::NEWTON, calibration);
-    let Electronics { common_noise, own_noise, .. } = params.electronics;
-    facts.push(pad::mount(&params.mount));
-    facts.extend([("common_noise".into(), common_noise.into()), ("own_noise".into(), own_noise.into())]);
-    Ok(facts)
+
+    fn arm(&self) -> ArmModel {
+        ArmModel {
+            urdf: self.urdf.clone(),
+            tip: self.tip.clone(),
+            mount: self.mount.clone(),
+            home: self.home.clone(),
+            start: self.start.clone(),
+            stiffness: self.stiffness,
+            damping_ratio: self.damping_ratio,
+            inertia: self.inertia.clone(),
+            friction: self.friction,
+            acceleration: self.acceleration,
+        }
+    }
 }
 
 /// Returns the world with its objects, which are placed relative to the sensor.
-fn world(params: Params, chain: Chain, start: Vec<f64>, shape: ImageShape) -> Result<World, Mistakes> {
-    let joint = |inertia: f64| JointDynamics {
-        stiffness: params.stiffness,
-        damping_ratio: params.damping_ratio,
-        inertia,
-        friction: params.friction,
-    };
-    let inertia = params.inertia.as_deref().unwrap_or(&INERTIA);
-    let arm = SimArm::new(chain, inertia.iter().copied().map(joint).collect(), start);
+fn world(params: Params, arm: SimArm, shape: ImageShape) -> Result<World, Mistakes> {
     let from = arm.motion().pose;
     let mut scatter = Random::new(params.seed, 3);
     let place = |(i, object): (usize, &ObjectParams)| {
@@ -279,49 +266,28 @@ fn world(params: Params, chain: Chain, start: Vec<f64>, shape: ImageShape) -> Re
 impl SimBench {
     /// Advances to `now` [ns] and takes the images that are due until then.
     fn advance(&mut self, now: i64, velocity: &[f64]) {
-        let begin = self.last.unwrap_or(-1);
-        let mut beat = (begin.div_euclid(self.period) + 1) * self.period;
-        while beat <= now {
+        let period = self.beats.period();
+        for beat in self.beats.pass(now) {
             self.world.advance(beat as f64 * 1e-9, velocity);
-            let forces = self.world.image();
-            let mut counts = match self.spare.pop() {
-                Some(room) => room,
-                // No buffer is free, so the oldest image, which was never read, is dropped.
-                None => self.taken.pop_front().expect("all buffers are in `taken`").1,
-            };
-            self.readout.read(self.period as f64 * 1e-9, forces, &mut counts);
-            self.taken.push_back((beat, counts));
-            beat += self.period;
+            self.frames.take(beat, period, self.world.image());
         }
-        if beat - self.period < now {
+        if now % period != 0 {
             self.world.advance(now as f64 * 1e-9, velocity);
-        }
-        self.last = Some(now);
-    }
-
-    /// Hands over the images that are available at `now` [ns].
-    fn show(&mut self, now: i64, samples: &mut Samples) {
-        while self.taken.front().is_some_and(|(stamp, _)| stamp + self.latency <= now) {
-            let (stamp, counts) = self.taken.pop_front().expect("the front was just checked");
-            self.shown += 1;
-            samples.write(self.image, stamp, self.shown).cells_mut().copy_from_slice(&counts);
-            self.spare.push(counts);
         }
     }
 }
 
 impl Stepped for SimBench {
     fn next(&self) -> Option<i64> {
-        let next = self.last.map_or(0, |last| (last / self.period + 1) * self.period);
-        (next < self.end).then_some(next)
+        self.beats.next()
     }
 
     fn end(&self) -> Option<i64> {
-        (self.end < i64::MAX).then(|| (self.end - 1) / self.period * self.period)
+        self.beats.end()
     }
 
     fn exchange(&mut self, now: i64, commands: &Commands, samples: &mut Samples) -> Result<(), DeviceError> {
-        if self.last.is_some_and(|last| now <= last) {
+        if self.beats.is_past(now) {
             return Ok(());
         }
         let velocity = commands.joints(self.arm.velocity);
@@ -331,7 +297,7 @@ impl Stepped for SimBench {
             return Err(DeviceError("the simulation diverged: make `step_s` smaller or the bench less stiff".into()));
         }
         self.sequence += 1;
-        self.show(now, samples);
+        self.frames.show(now, samples);
         let SimArm { position, equilibrium, .. } = &self.world.arm;
         self.arm.write(samples, now, self.sequence, [position, equilibrium]);
         self.write_truth(now, commands.report(self.arm.contact), samples);
@@ -344,7 +310,7 @@ impl SimBench {
     fn write_truth(&mut self, now: i64, report: Option<&Pose>, samples: &mut Samples) {
         let measured = report.and_then(|pose| self.world.measure(pose3(pose).translation));
         let truth = self.world.truth(self.threshold);
-        let noise = truth.pressure.map(|pressure| self.readout.noise(pressure, truth.tactels));
+        let noise = truth.pressure.map(|pressure| self.frames.readout().noise(pressure, truth.tactels));
         let value = |name: &str| match name {
             "force" => Some(truth.force),
             "tangential" => Some(truth.tangential),

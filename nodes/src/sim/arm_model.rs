@@ -1,0 +1,124 @@
+//! The model of a simulated arm: its kinematics, and the springs and dampers of its joints.
+
+use tactflow_runtime::node::{At, FilePath, Mistake, Mistakes};
+use tactflow_runtime::signal::JointsShape;
+use tactflow_runtime::source::Code;
+
+use super::joints::{JointDynamics, MAX_STRAIN, SimArm};
+use super::steps::is_resolved;
+use crate::arm::chain::Chain;
+use crate::arm::model::load;
+use crate::arm::mount::Mount;
+use crate::devices::{Facts, arm};
+
+/// Inertia of the joints of an LWR in a bent posture, with rotors [kg m²].
+const INERTIA: [f64; 7] = [2.0, 2.0, 1.0, 0.8, 0.3, 0.25, 0.1];
+
+/// The parameters of a simulated arm.
+#[derive(Debug, Clone)]
+pub struct ArmModel {
+    /// Model of the kinematics.
+    pub urdf: FilePath,
+    /// Link that carries the sensor.
+    pub tip: String,
+    /// Pose of the sensor on that link.
+    pub mount: Mount,
+    /// Posture that the arm prefers [rad; m for a prismatic joint].
+    pub home: Option<Vec<f64>>,
+    /// Posture at the start [rad; m for a prismatic joint]; `home` if not given.
+    pub start: Option<Vec<f64>>,
+    /// Stiffness of the joints [N m/rad].
+    pub stiffness: f64,
+    /// Damping of the joints as a fraction of the critical one [1].
+    pub damping_ratio: f64,
+    /// Inertia of each joint [kg m²]; that of an LWR if not given.
+    pub inertia: Option<Vec<f64>>,
+    /// Dry friction of the joints [N m].
+    pub friction: f64,
+    /// Largest acceleration that the arm states for each joint [rad/s²].
+    pub acceleration: f64,
+}
+
+/// An arm whose files are read.
+pub struct LoadedArm {
+    chain: Chain,
+    start: Vec<f64>,
+    /// Its joints, with their limits.
+    pub joints: JointsShape,
+}
+
+impl ArmModel {
+    /// Reads the kinematics.
+    ///
+    /// # Errors
+    /// If the model cannot be read, or if the arm cannot start where it should.
+    pub fn load(&self) -> Result<LoadedArm, Mistakes> {
+        let chain = load(&self.urdf, &self.tip, &self.mount)?;
+        let start = arm::start_of(self.start.as_deref(), self.home.as_deref())?;
+        let joints = arm::joints(&chain, self.acceleration, &start)?;
+        Ok(LoadedArm { chain, start, joints })
+    }
+
+    /// Returns the facts of the arm.
+    ///
+    /// # Errors
+    /// If the path of the model cannot be stated.
+    pub fn facts(&self, loaded: &LoadedArm) -> Result<Facts, Mistakes> {
+        arm::facts(&self.urdf, &self.tip, Some(self.home.as_deref().unwrap_or(&loaded.start)))
+    }
+
+    /// Returns the arm at rest in its first posture.
+    #[must_use]
+    pub fn arm(&self, loaded: LoadedArm) -> SimArm {
+        let joint = |inertia: f64| JointDynamics {
+            stiffness: self.stiffness,
+            damping_ratio: self.damping_ratio,
+            inertia,
+            friction: self.friction,
+        };
+        SimArm::new(loaded.chain, self.inertia().iter().copied().map(joint).collect(), loaded.start)
+    }
+
+    fn inertia(&self) -> &[f64] {
+        self.inertia.as_deref().unwrap_or(&INERTIA)
+    }
+
+    /// Returns the mistakes in the inertia of an arm of so many joints.
+    #[must_use]
+    pub fn check_inertia(&self, joints: usize) -> Mistakes {
+        let mut mistakes = Mistakes::new();
+        if let Some(inertia) = &self.inertia {
+            if inertia.len() != joints {
+                let message = format!("`inertia` has {} entries, but the arm has {joints} joints", inertia.len());
+                mistakes.push(Mistake::param("inertia", message));
+            }
+            if inertia.iter().any(|inertia| !(0.01..=1e3).contains(inertia)) {
+                mistakes.push(Mistake::param("inertia", "each inertia must be from 0.01 to 1000 kg m²"));
+            }
+        } else if joints != INERTIA.len() {
+            let message = format!("an arm of {joints} joints needs `inertia`");
+            mistakes.push(Mistake::new(Code::MissingKey, At::Node, message));
+        }
+        mistakes
+    }
+
+    /// Returns the mistakes in the springs and dampers of joints that steps of `dt` [s] do not resolve.
+    #[must_use]
+    pub fn check_motion(&self, dt: f64) -> Mistakes {
+        let min_inertia = self.inertia().iter().copied().fold(f64::INFINITY, f64::min);
+        let rate = self.stiffness / min_inertia;
+        let parts = [
+            ("stiffness", rate, 0.0),
+            ("damping_ratio", 0.0, 2.0 * self.damping_ratio * rate.sqrt()),
+            ("friction", self.friction / MAX_STRAIN / min_inertia, 0.0),
+        ];
+        let unresolved = parts.iter().filter(|(_, stiffness, damping)| !is_resolved(*stiffness, *damping, dt));
+        let mistake = |name: &str| {
+            let message = format!(
+                "a joint of {min_inertia} kg m² moves too fast for a `step_s` of {dt} s: make `step_s` smaller"
+            );
+            Mistake::param(name, message)
+        };
+        unresolved.map(|(name, _, _)| mistake(name)).collect()
+    }
+}

@@ -1,0 +1,322 @@
+//! `sim_pair`: a simulated cell of two arms with a pad each, and a free object that both pads can hold.
+//!
+//! Between two exchanges the cell advances in steps of at most `step_s`, at the velocities that were commanded last.
+//! Both pads take their images at the same times.
+
+pub mod body;
+pub mod carried;
+pub mod side;
+pub mod table;
+pub mod truth;
+pub mod world;
+
+#[cfg(test)]
+mod tests;
+
+use tactflow_runtime::device::{Commands, Description, Device, DeviceError, Driver, Opened, Samples, Stepped};
+use tactflow_runtime::node::{Describe, FilePath, Mistakes, Param, refuse_any};
+use tactflow_runtime::signal::{Joint, Pose};
+
+use self::carried::CarriedParams;
+use self::side::SideParams;
+use self::table::Table;
+use self::truth::ObjectPorts;
+use self::world::{ArmAndPad, PairWorld};
+use super::arm_model::{ArmModel, LoadedArm};
+use super::foam::Foam;
+use super::frames::{Beats, Frames};
+use super::joints::SimArm;
+use super::pad_model::PadModel;
+use super::readout::{Electronics, Readout};
+use super::shape::pose3;
+use super::steps::check_step;
+use crate::arm::mount::Mount;
+use crate::devices::arm::{self, ArmPorts};
+use crate::devices::{nanos, pad, period_of};
+use crate::random::Random;
+use crate::usual::{USUAL_PRESSURE_N, USUAL_REACH_M, USUAL_THRESHOLD_N};
+
+/// Parameters of `sim_pair`.
+#[derive(Debug, Clone, Param)]
+pub struct Params {
+    /// Seed of the noise and of the random offset of the object.
+    #[param(default = 1)]
+    seed: u64,
+    /// Duration of the run; unlimited if not given.
+    #[param(unit = "s", above = 0.0)]
+    for_s: Option<f64>,
+    /// The free object, which rests on the table at the start.
+    object: CarriedParams,
+    /// Height of the top of the table in the cell.
+    #[param(unit = "m", usual = -USUAL_REACH_M..=USUAL_REACH_M, default = 0.0)]
+    table_height: f64,
+    /// Coefficient of friction between the table and the object.
+    #[param(unit = "1", range = 0.0.., default = 0.4)]
+    table_friction: f64,
+    /// The first arm of the task, with the first pad.
+    left: SideParams,
+    /// The second arm of the task, with the second pad.
+    right: SideParams,
+    /// Number of rows of each pad.
+    #[param(range = 1..=1_000_000, default = 16)]
+    rows: usize,
+    /// Number of columns of each pad.
+    #[param(range = 1..=1_000_000, default = 16)]
+    cols: usize,
+    /// Distance between the centres of neighbouring tactels, along x and along y.
+    #[param(unit = "m", above = 0.0, default = 0.005)]
+    pitch: f64,
+    /// Frames per second.
+    #[param(unit = "1/s", range = 0.001..=1e6, default = 250.0)]
+    rate_hz: f64,
+    /// Time from taking an image until it is available.
+    #[param(unit = "s", range = 0.0.., default = 0.004)]
+    latency_s: f64,
+    /// Calibration file of the pads, stated as a fact for `calibrate`.
+    calibration: Option<FilePath>,
+    /// Noise threshold that the pads state as a fact.
+    #[param(unit = "N", range = 0.0.., usual = ..=USUAL_THRESHOLD_N, default = 0.015)]
+    threshold: f64,
+    /// Unit of pressure that the pads state as a fact.
+    #[param(unit = "N/tactel", above = 0.0, usual = ..=USUAL_PRESSURE_N, default = 0.1)]
+    pressure: f64,
+    /// Properties of the foam, with its friction on the object.
+    #[param(default = Foam::DEFAULT)]
+    foam: Foam,
+    /// Largest distance between simulated points of a pad.
+    #[param(unit = "m", above = 0.0, default = 0.001)]
+    points_apart: f64,
+    /// Properties of the electronics of both pads.
+    #[param(default = Electronics::DEFAULT)]
+    electronics: Electronics,
+    /// Model of both arms.
+    urdf: Option<FilePath>,
+    /// Link that carries the sensor.
+    tip: Option<String>,
+    /// Pose of the sensor on that link.
+    #[param(default = Mount::NONE)]
+    mount: Mount,
+    /// Posture that the arms prefer, stated as a fact; in m for a prismatic joint.
+    #[param(unit = "rad")]
+    home: Option<Vec<f64>>,
+    /// Joint positions at the start, one per joint; `home` if not given.
+    #[param(unit = "rad")]
+    start: Option<Vec<f64>>,
+    /// Stiffness of the joints.
+    #[param(unit = "N m/rad", above = 0.0, default = 200.0)]
+    stiffness: f64,
+    /// Damping of the joints as a fraction of the critical one.
+    #[param(unit = "1", range = 0.0.., default = 0.2)]
+    damping_ratio: f64,
+    /// Inertia of each joint; that of the seven joints of an LWR if not given.
+    #[param(unit = "kg m2")]
+    inertia: Option<Vec<f64>>,
+    /// Dry friction of the joints.
+    #[param(unit = "N m", range = 0.0.., default = 0.1)]
+    friction: f64,
+    /// Largest acceleration that the arms state for each joint.
+    #[param(unit = "rad/s2", above = 0.0, default = 10.0)]
+    acceleration: f64,
+    /// Longest step of the simulation; a light object makes the steps shorter.
+    #[param(unit = "s", above = 0.0, default = 0.002)]
+    step_s: f64,
+}
+
+/// A simulated cell: two arms with a foam pad each, and a free object that both pads can hold.
+///
+/// The pads, their electronics and the arms are those of `sim_bench`, and the parameters have the same names. Those of
+/// the device hold for both arms and pads; an arm that differs has its own values in `left` or `right`, such as
+/// `right.home`. The key `robot` of the device names the robot of both arms.
+///
+/// The frame of the cell has its z up. `left.base` and `right.base` are the bases of the arms in this frame. All of a
+/// task happens in the base of each arm, so that no task knows the cell.
+///
+/// The device fills `tactile_pad` and `velocity_arm` twice. The first pad and the first arm that the task lists under
+/// `[roles]` are `left`, the second ones `right`, whatever their names are. List both pads and both arms in this order.
+///
+/// The object is a rigid box or ball of uniform density. It moves and turns freely under gravity, the forces of both
+/// pads and those of the table. The coefficients of friction between the pads and the object are `static_friction` and
+/// `sliding_friction` of `foam`. Friction sticks and slips at every tactel, so the pads also hold the object against
+/// turning. The shear of the foam is damped with the time constant of its compression. The table is stiff: the object
+/// sinks in by 0.1 mm under its weight.
+///
+/// The steps are as short as the object needs: a light object between large pads needs short ones. The device refuses
+/// an object that needs more than 64 of them in a `step_s`.
+///
+/// It runs in virtual time, and the same commands and seed give the same bits. The facts of pads and arms are those of
+/// `sim_bench`. Both pads have the curves of the same `electronics.serial`, so that one calibration serves both, and
+/// each has its own noise. The role `true_object`, which a bench binds as `object`, gives the true position of the
+/// object, the forces on it and whether it is held to scenarios and recordings only.
+///
+/// Not simulated: contact of an arm or a pad with the other one or with the table; gravity on the arms, which their
+/// controllers compensate; air; further objects; and what `sim_bench` does not simulate.
+///
+/// ```toml
+/// [roles]
+/// pad = "tactile_pad"
+/// arm = "velocity_arm"
+///
+/// [commands]
+/// arm.velocity = "joint_limit.velocity"
+///
+/// [bind]
+/// pad = "cell"                        # the left one
+/// arm = "cell"
+///
+/// [devices.cell]
+/// type = "sim_pair"
+/// for_s = 4.0                         # [s]
+/// calibration = "builtin:calibrations/sim_pad.toml"
+/// urdf = "builtin:lwr4p.urdf"         # two KUKA LWR 4+
+/// tip = "lwr_7_link"
+/// mount = { xyz = [0.0, 0.0, 0.03] }  # of the sensors on their tips [m]
+/// start = [0.0, 0.5, 0.0, -1.3, 0.0, 1.3, 0.0]   # [rad]
+/// left.base = { xyz = [0.6, 0.0, 0.0] }           # in the cell, whose z is up [m]
+/// right.base = { xyz = [-0.6, 0.0, 0.0] }
+/// object = { shape = "ball", radius = 0.04, mass = 0.3 }   # [m, kg]
+/// ```
+#[derive(Describe)]
+pub struct SimPair {
+    sides: [Side; 2],
+    object: ObjectPorts,
+    world: PairWorld,
+    beats: Beats,
+    /// Number of exchanges that advanced the time.
+    sequence: u64,
+}
+
+/// What an arm and its pad exchange with the graph.
+struct Side {
+    arm: ArmPorts,
+    joints: Vec<Joint>,
+    frames: Frames,
+}
+
+/// Names of the arms in a bench file.
+const NAMES: [&str; 2] = ["left", "right"];
+
+impl Device for SimPair {
+    type Params = Params;
+
+    fn open(params: Params) -> Result<Opened, Mistakes> {
+        let pad = params.pad();
+        refuse_any(pad.check().into_iter().chain(check_step(params.step_s)))?;
+        let [left, right] = [params.load(0)?, params.load(1)?];
+        let max_step =
+            params.object.step(&params.foam, pad.shape.tactels() as f64 * params.pitch.powi(2), params.step_s)?;
+        let mut scatter = Random::new(params.seed, 3);
+        let offset = [0, 1].map(|_| scatter.uniform(-params.object.scatter, params.object.scatter));
+        let body = params.object.body(params.table_height, offset)?;
+        let table = Table::new(params.table_height, params.table_friction, &body);
+        let period = period_of(params.rate_hz);
+        let mut description = Description::every(period as f64 * 1e-9);
+        let noise = [2, 4].map(|stream| Random::new(params.seed, stream));
+        let [left_noise, right_noise] = noise;
+        let (left, left_arm) = params.side(&mut description, &pad, left, left_noise)?;
+        let (right, right_arm) = params.side(&mut description, &pad, right, right_noise)?;
+        let on_base = |side: &SideParams, arm: SimArm| {
+            let foam = params.foam.clone();
+            ArmAndPad::new(pose3(&Pose(side.base.pose())), arm, &pad.shape, foam, params.points_apart)
+        };
+        let arms = [on_base(&params.left, left_arm), on_base(&params.right, right_arm)];
+        let cell = Self {
+            sides: [left, right],
+            object: ObjectPorts::fill(&mut description),
+            world: PairWorld::new(arms, body, table, max_step),
+            beats: Beats::new(period, params.for_s.map_or(i64::MAX, nanos)),
+            sequence: 0,
+        };
+        Ok(Opened { description, driver: Driver::Stepped(Box::new(cell)) })
+    }
+}
+
+impl Params {
+    fn pad(&self) -> PadModel {
+        PadModel {
+            shape: PadModel::shape(self.rows, self.cols, self.pitch),
+            points_apart: self.points_apart,
+            rate_hz: self.rate_hz,
+            latency_s: self.latency_s,
+            foam: self.foam.clone(),
+            electronics: self.electronics.clone(),
+            calibration: self.calibration.clone(),
+            threshold: self.threshold,
+            pressure: self.pressure,
+        }
+    }
+
+    /// Reads and checks the model of the left (0) or the right arm (1).
+    fn load(&self, side: usize) -> Result<(ArmModel, LoadedArm), Mistakes> {
+        let (own, name) = ([&self.left, &self.right][side], NAMES[side]);
+        let model = own.model(name, self)?;
+        let place = |mistakes: Mistakes| own.place(name, mistakes);
+        let loaded = model.load().map_err(place)?;
+        refuse_any(place(model.check_inertia(loaded.joints.joints.len())))?;
+        refuse_any(place(model.check_motion(self.step_s)))?;
+        Ok((model, loaded))
+    }
+
+    /// Adds the roles of an arm and its pad to a description. Returns them and the simulated arm.
+    fn side(
+        &self,
+        description: &mut Description,
+        pad: &PadModel,
+        (model, loaded): (ArmModel, LoadedArm),
+        noise: Random,
+    ) -> Result<(Side, SimArm), Mistakes> {
+        let times = [period_of(self.rate_hz), nanos(self.latency_s)];
+        let image = pad::fill(description, pad.shape.clone(), pad.facts(&model.mount)?);
+        let arm = ArmPorts::fill(description, &loaded.joints, model.facts(&loaded)?);
+        let tactels = pad.shape.tactels();
+        let readout = Readout::new(tactels, pad.electronics.clone(), self.seed).with_noise(noise);
+        let joints = loaded.joints.joints.clone();
+        Ok((Side { arm, joints, frames: Frames::new(image, readout, tactels, times) }, model.arm(loaded)))
+    }
+}
+
+impl SimPair {
+    /// Advances to `now` [ns] and takes the images that are due until then.
+    fn advance(&mut self, now: i64, velocity: [&[f64]; 2]) {
+        let period = self.beats.period();
+        for beat in self.beats.pass(now) {
+            self.world.advance(beat as f64 * 1e-9, velocity);
+            for (side, arm) in self.sides.iter_mut().zip(&mut self.world.sides) {
+                side.frames.take(beat, period, arm.image());
+            }
+        }
+        if now % period != 0 {
+            self.world.advance(now as f64 * 1e-9, velocity);
+        }
+    }
+}
+
+impl Stepped for SimPair {
+    fn next(&self) -> Option<i64> {
+        self.beats.next()
+    }
+
+    fn end(&self) -> Option<i64> {
+        self.beats.end()
+    }
+
+    fn exchange(&mut self, now: i64, commands: &Commands, samples: &mut Samples) -> Result<(), DeviceError> {
+        if self.beats.is_past(now) {
+            return Ok(());
+        }
+        let velocity = [0, 1].map(|side: usize| commands.joints(self.sides[side].arm.velocity));
+        for (side, velocity) in self.sides.iter().zip(velocity) {
+            arm::check_velocity(&side.joints, velocity)?;
+        }
+        self.advance(now, velocity);
+        if !self.world.is_sound() {
+            return Err(DeviceError("the simulation diverged: make `step_s` smaller or the cell less stiff".into()));
+        }
+        self.sequence += 1;
+        for (side, ArmAndPad { arm, .. }) in self.sides.iter_mut().zip(&self.world.sides) {
+            side.frames.show(now, samples);
+            side.arm.write(samples, now, self.sequence, [&arm.position, &arm.equilibrium]);
+        }
+        self.object.write(&self.world, now, self.sequence, samples);
+        Ok(())
+    }
+}
