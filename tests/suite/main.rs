@@ -35,6 +35,7 @@ mod mutations;
 mod observed;
 mod operator;
 mod oracles;
+mod pads;
 mod paths;
 mod points;
 mod policies;
