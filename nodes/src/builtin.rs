@@ -17,4 +17,6 @@ pub const FILES: &[BuiltinFile] = &[
     ("parts/touch.toml", include_bytes!("../../graphs/parts/touch.toml")),
     ("parts/ruler.toml", include_bytes!("../../graphs/parts/ruler.toml")),
     ("parts/move.toml", include_bytes!("../../graphs/parts/move.toml")),
+    ("parts/two_pad_move.toml", include_bytes!("../../graphs/parts/two_pad_move.toml")),
+    ("parts/bare_move.toml", include_bytes!("../../graphs/parts/bare_move.toml")),
 ];

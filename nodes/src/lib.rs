@@ -59,6 +59,7 @@ pub fn catalogue() -> Catalogue {
         .files(builtin::FILES)
         .role(roles::tactile_pad())
         .role(roles::velocity_arm())
+        .role(roles::bare_arm())
         .role(roles::ground_truth())
         .role(roles::true_object())
         // The first that fills a role is the one that examples take.
@@ -99,6 +100,7 @@ pub fn catalogue() -> Catalogue {
         .group("limits: the limiters that every motion must pass through on its way to an arm")
         .node::<limits::bumpless::Bumpless>()
         .node::<limits::contact_limit::ContactLimit>()
+        .node::<limits::second_contact_limit::SecondContactLimit>()
         .node::<limits::workspace_limit::WorkspaceLimit>()
         .node::<limits::blind_limit::BlindLimit>()
         .node::<limits::twist_limit::TwistLimit>()

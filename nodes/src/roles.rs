@@ -38,6 +38,23 @@ pub fn velocity_arm() -> RoleType {
     }
 }
 
+/// An arm without a pad, which takes joint velocities. It has the ports of a [`velocity_arm`], so each device that fills
+/// that role fills this one.
+#[must_use]
+pub fn bare_arm() -> RoleType {
+    let arm = velocity_arm();
+    RoleType {
+        name: "bare_arm".into(),
+        summary: "an arm without a pad that is commanded with joint velocities".into(),
+        filled_as: Some(arm.name),
+        limits: arm.limits.into_iter().filter(|limit| !OF_PADS.contains(&&**limit)).collect(),
+        ..velocity_arm()
+    }
+}
+
+/// The limits that need a pad: a bare arm feels no contact, so nothing could enforce them.
+const OF_PADS: [&str; 3] = ["force", "peak", "blind"];
+
 const CONTACT: &str = "Pose of the contact in the base, as the task measures it [m].";
 
 const EQUILIBRIUM: &str = "Posture that the commands add up to: where a compliant arm would be if nothing held it; \

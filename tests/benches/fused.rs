@@ -195,8 +195,9 @@ impl Fused {
         let is_there = wanted.is_some() || *offset != Twist::default();
         if is_there {
             let load = contact_limit::load(&self.shape, &self.image, [0.5 * 2000.0, 0.5 * 240.0]);
-            contact_limit::bar(&mut twist, load.centre, load.sum / 2000.0, 0.5, 0.05);
-            contact_limit::bar(&mut twist, load.place, load.peak / 240.0, 0.5, 0.05);
+            let allowed = |times| contact_limit::allowed_speed(times, 0.5, 0.05);
+            contact_limit::bar(&mut twist, load.centre, allowed(load.sum / 2000.0));
+            contact_limit::bar(&mut twist, load.place, allowed(load.peak / 240.0));
             let (velocity, place) = (pose.0.rotation * twist.linear(), pose.0.translation.vector);
             let corners = [[-0.8, -0.4, 0.1], [-0.3, 0.4, 0.7]];
             twist.0 *= workspace_limit::scale(&velocity, &place, corners, 1.0, 2.0 * tick.max_gap);
@@ -213,7 +214,7 @@ impl Fused {
     /// The fraction of a motion that the budgets without a contact let pass.
     fn blind(&mut self, twist: &Twist, tick: &Tick) -> f64 {
         let motion = blind_limit::Motion::of(twist, &self.corners, &BLIND);
-        self.budget.touch(self.contact_at, false);
+        self.budget.touch([self.contact_at, None], false);
         self.budget.spend(self.speed, tick.dt);
         let scale = self.budget.scale(&motion, &BLIND, 0.0, 2.0 * tick.max_gap);
         self.speed = scale * motion.speed;

@@ -130,3 +130,84 @@ fn a_second_pad_on_an_arm_needs_a_limiter_of_its_own() {
     assert_eq!(second("{ type = 'tactile_pad', on = 'arm' }"), ["unlimited-command"]);
     assert_eq!(second("{ type = 'tactile_pad', on = 'none' }"), [""; 0], "it is on no arm");
 }
+
+/// A palm and a fingertip on one arm, each with a limiter of its own.
+fn two_on_one() -> Request {
+    Request::file(workspace().join("tests/data/two_pads/slide.toml"))
+}
+
+#[test]
+fn nothing_of_one_pad_of_an_arm_can_be_given_to_the_other_one() {
+    let third = ["bind.third='third'", "devices.third={ type = 'mock_pad' }"];
+    let two_arms = [
+        "roles.palm={ type = 'tactile_pad', on = 'arm' }",
+        "roles.other='velocity_arm'",
+        "bind.other='other'",
+        "devices.other={ type = 'mock_arm', robot = 'builtin:lwr4p.toml' }",
+    ];
+    let crossings: [(&[&str], &str); 24] = [
+        // One of the pads twice.
+        (&["parts.move.roles={ pad = 'palm', second_pad = 'palm' }"], "frame-mismatch"),
+        (&["parts.move.roles={ pad = 'finger', second_pad = 'finger' }"], "frame-mismatch"),
+        (&["parts.move.in.second_image='touch.image'"], "frame-mismatch"),
+        (&["parts.move.in.image='finger_touch.image'"], "frame-mismatch"),
+        (
+            &[
+                "parts.move.roles={ pad = 'palm', second_pad = 'palm' }",
+                "parts.move.in.second_image='touch.image'",
+                "parts.move.in.second_contact='touch.present'",
+            ],
+            "unlimited-command",
+        ),
+        // Swapped in one place and not in the other one.
+        (&["parts.move.roles={ pad = 'finger', second_pad = 'palm' }"], "frame-mismatch"),
+        (&["parts.move.in.image='finger_touch.image'", "parts.move.in.second_image='touch.image'"], "frame-mismatch"),
+        (&["parts.move.set.state.mount={ from = 'finger.mount' }"], "foreign-fact"),
+        (&["parts.move.set.second_state.mount={ from = 'palm.mount' }"], "foreign-fact"),
+        (&["parts.move.set.second_state.mount={ xyz = [0, 0, 0.1] }"], "bad-value"),
+        (&["parts.move.set.state.sensor='finger'"], "foreign-fact"),
+        (&["parts.move.set.second_state.sensor='palm'"], "foreign-fact"),
+        (&["parts.move.set.second_state.sensor='arm'"], "frame-mismatch"),
+        (&["parts.touch.roles.pad='finger'"], "foreign-fact"),
+        (&["parts.finger_touch.in.image='palm.image'"], "foreign-fact"),
+        // A pad whose limiter is missing, or is on another arm.
+        (&["parts.move.file='builtin:parts/move.toml'"], "unlimited-command"),
+        (&["roles.arm='bare_arm'"], "unlimited-command"),
+        (&["roles.finger={ type = 'tactile_pad', on = 'none' }"], "foreign-input"),
+        (&["roles.palm={ type = 'tactile_pad', on = 'none' }"], "foreign-fact"),
+        (&["roles.third='tactile_pad'", third[0], third[1]], "unlimited-command"),
+        (
+            &[
+                two_arms[0],
+                two_arms[1],
+                two_arms[2],
+                two_arms[3],
+                "roles.finger={ type = 'tactile_pad', on = 'other' }",
+            ],
+            "foreign-input",
+        ),
+        // Limits hold for both.
+        (&["parts.move.set.contact.force_n=15.1"], "loose-limit"),
+        (&["parts.move.set.second_contact.force_n=15.1"], "loose-limit"),
+        (&["parts.move.set.second_contact.force_n={ from = 'limits.none', optional = true }"], "missing-limit"),
+    ];
+    assert_eq!(codes(&two_on_one()), [""; 0], "it loads as it is");
+    let mut wrong = Vec::new();
+    for (sets, code) in crossings {
+        let found = codes(&sets.iter().fold(two_on_one(), |request, set| request.set(*set)));
+        if !found.contains(&code) {
+            wrong.push(format!("{sets:?}: {found:?} without {code}"));
+        }
+    }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+    // What is swapped everywhere is another graph, and each pad may have a tighter limit.
+    let swapped = [
+        "parts.move.roles={ pad = 'finger', second_pad = 'palm' }",
+        "parts.move.in.image='finger_touch.image'",
+        "parts.move.in.second_image='touch.image'",
+        "parts.move.in.contact='finger_touch.present'",
+        "parts.move.in.second_contact='touch.present'",
+    ];
+    assert_eq!(codes(&swapped.iter().fold(two_on_one(), |request, set| request.set(*set))), [""; 0]);
+    assert_eq!(codes(&two_on_one().set("parts.move.set.second_contact.force_n=5.0")), [""; 0]);
+}

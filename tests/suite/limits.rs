@@ -116,9 +116,12 @@ fn a_limiter_says_what_it_does_and_no_mode_can_set_it() {
     let catalogue = catalogue();
     let mut limiters = 0;
     for spec in catalogue.nodes().iter().map(|node| node.spec()) {
-        let Limits { through, holds, breaks, .. } = spec.limits;
+        let Limits { through, holds, breaks, guards, .. } = spec.limits;
         if let Some(through) = through {
             assert!(spec.inputs.iter().any(|input| input.name == through), "{}: {through}", spec.name);
+        }
+        if let Some(guards) = guards {
+            assert!(spec.inputs.iter().any(|input| input.name == guards), "{}: {guards}", spec.name);
         }
         for limit in holds {
             let share = spec.outputs.iter().find(|output| output.name == *limit);
@@ -132,7 +135,7 @@ fn a_limiter_says_what_it_does_and_no_mode_can_set_it() {
             assert!(live.is_empty(), "a mode could set {live:?} of `{}`", spec.name);
         }
     }
-    assert_eq!(limiters, 7);
+    assert_eq!(limiters, 8);
     // Whatever an arm asks for, some node holds.
     for limit in catalogue.roles().iter().flat_map(|role| &role.limits) {
         let is_held = catalogue.nodes().iter().any(|node| node.spec().limits.holds.contains(&&**limit));

@@ -43,9 +43,17 @@ pub struct RoleType {
     /// Whether only scenarios and recordings may read it: a simulation knows its values, and no sensor does. A bench
     /// binds it under its name, or under one that ends with the last word of it, and no task declares it.
     pub is_observed: bool,
+    /// Another type with the same ports: a device that fills it fills this one as well. The two differ in their limits.
+    pub filled_as: Option<Cow<'static, str>>,
 }
 
 impl RoleType {
+    /// Whether a device that fills roles of type `kind` can fill this one.
+    #[must_use]
+    pub fn is_filled_by(&self, kind: &str) -> bool {
+        self.name == kind || self.filled_as.as_deref() == Some(kind)
+    }
+
     /// Whether it is for scenarios and recordings only, and a bench binds it as `name`.
     #[must_use]
     pub fn is_observed_as(&self, name: &str) -> bool {

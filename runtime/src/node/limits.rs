@@ -13,13 +13,17 @@ pub struct Limits {
     pub holds: &'static [&'static str],
     /// The limits of the input that the output may violate. They must come later.
     pub breaks: &'static [&'static str],
+    /// The input that reads the sensor for which the limits hold. They hold for that sensor alone, so an arm with several
+    /// sensors needs such a limiter for each. The limits of the sensor in whose frame the motion is must survive it; it
+    /// may violate those of any other one.
+    pub guards: Option<&'static str>,
     /// The flag that is set once a budget of the limiter is spent, so that its arm rests until the budget is refilled.
     pub spends: Option<&'static str>,
 }
 
 impl Limits {
     /// No limit holds. Most nodes use it.
-    pub const NONE: Self = Self { through: None, holds: &[], breaks: &[], spends: None };
+    pub const NONE: Self = Self { through: None, holds: &[], breaks: &[], guards: None, spends: None };
 
     /// The limits of an input hold for the outputs, and no others; for example in a change of frame.
     #[must_use]

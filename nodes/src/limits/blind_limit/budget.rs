@@ -35,9 +35,9 @@ pub struct Motion {
 }
 
 impl Motion {
-    /// Returns the motion of a pad with these corners [m].
+    /// Returns the motion of pads with these corners [m].
     #[must_use]
-    pub fn of(twist: &Twist, corners: &[Vector3<f64>; 4], bounds: &Bounds) -> Self {
+    pub fn of(twist: &Twist, corners: &[Vector3<f64>], bounds: &Bounds) -> Self {
         let (linear, angular) = (twist.linear(), twist.angular());
         let speeds = corners.iter().map(|corner| (linear + angular.cross(corner)).norm());
         // The centre is slower than a corner, unless rounding says otherwise.
@@ -50,8 +50,8 @@ impl Motion {
 /// What has been spent since the last contact.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Budget {
-    /// Stamp of the first sample of the contact that lasts [ns].
-    contact_since: Option<i64>,
+    /// Stamp of the first sample of the contact that lasts, of each pad [ns].
+    contact_since: [Option<i64>; 2],
     /// Time of motion [s].
     time: f64,
     /// Way [m].
@@ -60,11 +60,14 @@ pub struct Budget {
 }
 
 impl Budget {
-    /// Notes the stamp of a sample with a contact [ns], or that there is none. A contact that lasts refills the budgets,
-    /// and so does the operator.
-    pub fn touch(&mut self, contact: Option<i64>, is_resumed: bool) {
-        self.contact_since = contact.map(|stamp| self.contact_since.unwrap_or(stamp));
-        let lasts = contact.zip(self.contact_since).is_some_and(|(stamp, since)| stamp - since >= MIN_CONTACT_NS);
+    /// Notes for each pad the stamp of a sample with a contact [ns], or that there is none. A contact of one pad that
+    /// lasts refills the budgets, and so does the operator.
+    pub fn touch(&mut self, contacts: [Option<i64>; 2], is_resumed: bool) {
+        let mut lasts = false;
+        for (contact, since) in contacts.into_iter().zip(&mut self.contact_since) {
+            *since = contact.map(|stamp| since.unwrap_or(stamp));
+            lasts |= contact.zip(*since).is_some_and(|(stamp, since)| stamp - since >= MIN_CONTACT_NS);
+        }
         if lasts || is_resumed {
             *self = Self { contact_since: self.contact_since, ..Self::default() };
         }

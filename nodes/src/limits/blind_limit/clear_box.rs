@@ -32,9 +32,9 @@ impl ClearBox {
         Ok(Some(Self { min, max }))
     }
 
-    /// Returns the smallest distance of a corner of the pad from a face of the box [m]; not positive if a corner is
+    /// Returns the smallest distance of a corner of a pad from a face of the box [m]; not positive if a corner is
     /// outside.
-    pub(super) fn room(&self, pose: &Pose, corners: &[Vector3<f64>; 4]) -> f64 {
+    pub(super) fn room(&self, pose: &Pose, corners: &[Vector3<f64>]) -> f64 {
         let distance = |corner: &Vector3<f64>| {
             let point = pose.0 * Point3::from(*corner);
             (0..3).map(|i| (point[i] - self.min[i]).min(self.max[i] - point[i])).fold(f64::INFINITY, f64::min)

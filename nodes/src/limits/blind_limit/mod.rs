@@ -3,16 +3,19 @@
 
 mod budget;
 mod clear_box;
+mod pads;
 
 use nalgebra::Vector3;
 use tactflow_runtime::node::{Describe, In, Inputs, Limits, Mistakes, Node, Out, Outputs, Param, Setup, State, Tick};
-use tactflow_runtime::signal::{Flag, Image, ImageShape, Pose, Scalar, Stamp, Twist};
+use tactflow_runtime::signal::{Flag, Image, Pose, Scalar, Stamp, Twist};
 
 use super::{fraction, max_age};
 use crate::motion::bounds::countable;
 use clear_box::ClearBox;
+use pads::Pads;
 
 pub use budget::{Bounds, Budget, Motion};
+pub use pads::corners;
 
 /// Bounds the time and the way of the motion since the last contact.
 ///
@@ -31,6 +34,9 @@ pub use budget::{Bounds, Budget, Motion};
 /// The bench may declare a box that is known to be empty, for transfers and retreats: `clear_min_m` and `clear_max_m`
 /// in its section `[facts.arm]`. Nothing counts while the whole pad is in it. A task cannot set it.
 ///
+/// An arm with two pads also wires `second_contact`, `second_image` and `second_pose`. Then a lasting contact of either
+/// pad refills the budgets, and the way is that of the fastest corner of both pads.
+///
 /// ```toml
 /// [nodes.blind_limit]
 /// type = "blind_limit"
@@ -48,8 +54,7 @@ pub use budget::{Bounds, Budget, Motion};
 pub struct BlindLimit {
     bounds: Bounds,
     clear: Option<ClearBox>,
-    /// Corners of the pad in its own frame [m].
-    corners: [Vector3<f64>; 4],
+    pads: Pads,
     /// Maximum age of the contact, the image and the pose [ns].
     max_age: i64,
 }
@@ -95,6 +100,15 @@ pub struct Inputs<'a> {
     /// Pose of the sensor in the base.
     #[port(frame = "A", reference = "B", quantity = "sensor_pose", known, sampled)]
     pose: Option<In<'a, Pose>>,
+    /// Whether something touches the second pad of the arm; an absent flag is no contact.
+    #[port(quantity = "contact", known, sampled, optional)]
+    second_contact: Option<In<'a, Flag>>,
+    /// The whole image of the second pad.
+    #[port(unit = "_", frame = "C", quantity = "tactile_image", known, sampled, optional)]
+    second_image: Option<In<'a, Image>>,
+    /// Pose of the second pad in the base.
+    #[port(frame = "C", reference = "B", quantity = "sensor_pose", known, sampled, optional)]
+    second_pose: Option<In<'a, Pose>>,
 }
 
 /// What `blind_limit` writes.
@@ -119,6 +133,8 @@ pub struct State {
     budget: Budget,
     /// Speed of the fastest corner in the last output [m/s].
     speed: f64,
+    /// The last known corners of the second pad in the frame of the first one [m].
+    second: Option<[Vector3<f64>; 4]>,
 }
 
 impl Node for BlindLimit {
@@ -133,31 +149,42 @@ impl Node for BlindLimit {
         // It stands before the speed limit, so that only that one scales what it lets pass.
         breaks: &["speed", "acceleration"],
         spends: Some("spent"),
+        ..Limits::NONE
     };
 
     fn new(params: Params, setup: &mut Setup<Self>) -> Result<Self, Mistakes> {
-        let image = setup.inputs.image.clone().unwrap_or_default();
+        let shapes = &setup.inputs;
+        let wired = [shapes.second_contact.is_some(), shapes.second_image.is_some(), shapes.second_pose.is_some()];
+        let pads = Pads::new([shapes.image.as_ref(), shapes.second_image.as_ref()], wired)?;
         let clear = ClearBox::new(params.clear_min_m, params.clear_max_m)?;
         (setup.outputs.blind, setup.outputs.left) = (fraction(), fraction());
         let max_age = max_age(params.max_age_ms, setup.period);
         let Params { blind_s: time, blind_mm, deceleration_m_per_s2: linear, .. } = params;
         let bounds = Bounds { time, way: blind_mm * 1e-3, linear, angular: params.deceleration_rad_per_s2 };
-        Ok(Self { bounds, clear, corners: corners(&image), max_age })
+        Ok(Self { bounds, clear, pads, max_age })
     }
 
     fn step(&self, tick: &Tick, inputs: Inputs<'_>, out: &mut Outputs, state: &mut State) {
         let is_fresh = |stamp: Stamp| stamp.age(tick.now) <= self.max_age;
-        let has_image = inputs.image.is_some_and(|image| is_fresh(image.stamp()));
-        let contact = inputs.contact.filter(|contact| **contact && has_image && is_fresh(contact.stamp()));
-        state.budget.touch(contact.map(|contact| contact.stamp().nanos), tick.is_resumed);
-        let pose = inputs.pose.filter(|pose| is_fresh(pose.stamp())).map(|pose| pose.value());
-        let room = self.clear.as_ref().zip(pose).map_or(0.0, |(clear, pose)| clear.room(pose, &self.corners));
+        let touched = |contact: Option<In<'_, Flag>>, image: Option<In<'_, Image>>| {
+            let has_image = image.is_some_and(|image| is_fresh(image.stamp()));
+            let contact = contact.filter(|contact| **contact && has_image && is_fresh(contact.stamp()));
+            contact.map(|contact| contact.stamp().nanos)
+        };
+        let contacts = [touched(inputs.contact, inputs.image), touched(inputs.second_contact, inputs.second_image)];
+        state.budget.touch(contacts, tick.is_resumed);
+        let is_known = |pose: &In<'_, Pose>| is_fresh(pose.stamp());
+        let pose = inputs.pose.filter(is_known).map(|pose| pose.value());
+        let second = inputs.second_pose.filter(is_known).map(|pose| pose.value());
+        state.second = pose.zip(second).and_then(|(pose, second)| self.pads.second(pose, second)).or(state.second);
+        let corners = self.pads.all(state.second.as_ref());
+        let room = self.clear.as_ref().zip(pose).map_or(0.0, |(clear, pose)| clear.room(pose, &corners));
         if !tick.is_halted && room <= 0.0 {
             state.budget.spend(state.speed, tick.dt);
         }
         let motion = inputs.twist.map(|twist| countable(&twist));
         let (scale, speed) = motion.as_ref().map_or((1.0, 0.0), |twist| {
-            let motion = Motion::of(twist, &self.corners, &self.bounds);
+            let motion = Motion::of(twist, &corners, &self.bounds);
             (state.budget.scale(&motion, &self.bounds, room, 2.0 * tick.max_gap), motion.speed)
         });
         state.speed = scale * speed;
@@ -168,13 +195,6 @@ impl Node for BlindLimit {
             out.blind.set(scale);
         }
     }
-}
-
-/// Returns the corners of a pad in its own frame [m].
-#[must_use]
-pub fn corners(shape: &ImageShape) -> [Vector3<f64>; 4] {
-    let [x, y] = [shape.cols as f64 * shape.pitch[0] / 2.0, shape.rows as f64 * shape.pitch[1] / 2.0];
-    [[x, y], [x, -y], [-x, y], [-x, -y]].map(|[x, y]| Vector3::new(x, y, 0.0))
 }
 
 #[cfg(test)]

@@ -2,7 +2,7 @@
 
 use nalgebra::IsometryMatrix3;
 use tactflow_runtime::harness::{NodeRig, places};
-use tactflow_runtime::signal::{FlagShape, PoseShape, Scalar, Shape, TwistShape, Unit};
+use tactflow_runtime::signal::{FlagShape, ImageShape, PoseShape, Scalar, Shape, TwistShape, Unit};
 
 use super::*;
 
@@ -162,6 +162,86 @@ fn nothing_counts_in_the_clear_box_and_the_motion_can_stop_behind_its_face() {
     // A corner of the pad sticks out.
     let mut corner = rig("clear_min_m = [-0.019, -1, -1]\nclear_max_m = [1, 1, 1]");
     assert!(run(&mut corner, 20.0, push, |_| Some(false)).way <= 0.05 + 1e-9);
+}
+
+/// Two pads of 40 mm by 40 mm, the second one 1 m away along x.
+fn two_pads(wires: &[&str]) -> Result<NodeRig, Mistakes> {
+    let pad = ImageShape { rows: 8, cols: 8, pitch: [0.005; 2], unit: Unit::NEWTON };
+    let shape = |name: &str| -> Shape {
+        match name.rsplit('_').next() {
+            Some("contact") => FlagShape.into(),
+            Some("image") => pad.clone().into(),
+            Some("pose") => PoseShape::default().into(),
+            _ => TwistShape.into(),
+        }
+    };
+    let all = ["twist", "contact", "image", "pose"].iter().chain(wires);
+    let wires: Vec<(&str, Shape)> = all.map(|name| (*name, shape(name))).collect();
+    NodeRig::new::<BlindLimit>(PARAMS, &wires)
+}
+
+const SECOND: [&str; 3] = ["second_contact", "second_image", "second_pose"];
+
+/// Steps an arm with two pads. `contacts` returns the contact of each at a time [ms]. Returns the way of the fastest
+/// corner of both pads [m].
+fn run_two(rig: &mut NodeRig, seconds: f64, wanted: Twist, contacts: impl Fn(f64) -> [bool; 2]) -> f64 {
+    let mut way = 0.0;
+    for step in 0..(seconds * 1e3 / MS) as usize {
+        let [first, second] = contacts(step as f64 * MS);
+        rig.set("twist", wanted);
+        for (name, contact) in [("contact", first), ("second_contact", second)] {
+            rig.set(name, contact);
+        }
+        for name in ["image", "second_image"] {
+            rig.set(name, Image::zeros(8, 8));
+        }
+        // The first pad is turned in the base, which must not matter.
+        let first = IsometryMatrix3::new(Vector3::new(0.3, 0.1, 0.2), Vector3::new(0.4, -0.2, 1.0));
+        rig.set("pose", Pose(first));
+        rig.set("second_pose", Pose(first * IsometryMatrix3::translation(1.0, 0.0, 0.0)));
+        rig.step_ms(MS);
+        let twist = rig.get::<Twist>("twist").copied().unwrap_or_default();
+        // Of the second pad the two outer corners are the farthest ones: 1.02 m along x and 0.02 m along y.
+        let outer = [Vector3::new(1.02, 0.02, 0.0), Vector3::new(1.02, -0.02, 0.0)];
+        let speed = outer.map(|corner| (twist.linear() + twist.angular().cross(&corner)).norm());
+        way += speed[0].max(speed[1]) * MS * 1e-3;
+    }
+    way
+}
+
+#[test]
+fn the_way_is_that_of_the_fastest_corner_of_both_pads() {
+    let turn = Twist([0.0, 0.0, 0.0, 0.0, 0.0, 0.05].into());
+    let mut rig = two_pads(&SECOND).unwrap();
+    let way = run_two(&mut rig, 20.0, turn, |_| [false, false]);
+    assert!(way <= 0.05 + 1e-9 && way > 0.045 && is_spent(&rig), "{way}");
+}
+
+#[test]
+fn a_contact_of_either_pad_that_lasts_refills_and_turns_of_both_do_not() {
+    let push = Twist([0.0, 0.0, 0.02, 0.0, 0.0, 0.0].into());
+    for contacts in [[true, false], [false, true]] {
+        let mut rig = two_pads(&SECOND).unwrap();
+        let way = run_two(&mut rig, 10.0, push, |_| contacts);
+        assert!((way - 0.2).abs() < 1e-3 && !is_spent(&rig), "{contacts:?}: {way}");
+    }
+    // Each of them touches for 20 ms in turn: something is always touched, and no contact lasts.
+    let mut rig = two_pads(&SECOND).unwrap();
+    let in_turn = |ms: f64| {
+        let is_first = ((ms / 20.0) as u64).is_multiple_of(2);
+        [is_first, !is_first]
+    };
+    run_two(&mut rig, 20.0, push, in_turn);
+    assert!(is_spent(&rig));
+}
+
+#[test]
+fn a_second_pad_needs_all_its_wires() {
+    for one in 0..3 {
+        for wires in [vec![SECOND[one]], SECOND.iter().copied().filter(|name| *name != SECOND[one]).collect()] {
+            assert_eq!(places("", &two_pads(&wires)), ["missing-input: `the node`"], "{wires:?}");
+        }
+    }
 }
 
 #[test]

@@ -5,16 +5,18 @@
 //! `peak`. The excess is subtracted from vz: a roll then goes on about the contact.
 
 mod ceilings;
+mod gauge;
 mod load;
 
-use tactflow_runtime::node::{Describe, In, Inputs, Limits, Mistakes, Node, Out, Outputs, Param, Setup, State, Tick};
-use tactflow_runtime::signal::{Image, ImageShape, Scalar, Stamp, Twist, Unit};
+use tactflow_runtime::node::{Describe, In, Inputs, Limits, Mistakes, Node, Out, Outputs, Param, Setup, Tick};
+use tactflow_runtime::signal::{Image, Scalar, Twist};
 
-use super::{fraction, max_age};
+use super::fraction;
 use crate::motion::bounds::countable;
 use crate::usual::{USUAL_FORCE_N, USUAL_M_PER_S, USUAL_PEAK_N};
 
-use ceilings::Ceilings;
+pub use gauge::Reading;
+pub(super) use gauge::{Gauge, Pressed};
 pub use load::{PadLoad, load};
 
 /// Stops the motion into an object when the force or a single tactel reaches its ceiling.
@@ -46,14 +48,10 @@ pub use load::{PadLoad, load};
 #[derive(Describe)]
 #[describe(every_tick)]
 pub struct ContactLimit {
-    params: Params,
-    ceilings: Ceilings,
-    shape: ImageShape,
-    /// Maximum age of the image [ns].
-    max_age: i64,
+    gauge: Gauge,
 }
 
-/// Parameters of `contact_limit`.
+/// Parameters of `contact_limit` and `second_contact_limit`.
 #[derive(Debug, Clone, Param)]
 pub struct Params {
     /// Ceiling of the sum of an image in N.
@@ -104,66 +102,56 @@ pub struct Outputs {
     peak: Out<Scalar>,
 }
 
-/// What `contact_limit` remembers.
-#[derive(State)]
-pub struct State {
-    /// Stamp of the image that `load` was computed from, if there was one.
-    stamp: Option<Stamp>,
-    /// Load of that image.
-    load: PadLoad,
-}
-
 impl Node for ContactLimit {
     type Params = Params;
     type Inputs<'a> = Inputs<'a>;
     type Outputs = Outputs;
-    type State = State;
+    type State = Reading;
 
     // The image and its age move on while a motion is held.
     const LIMITS: Limits = Limits {
         through: Some("twist"),
         holds: &["force", "peak"],
         breaks: &["workspace", "blind", "speed", "acceleration"],
+        guards: Some("image"),
         ..Limits::NONE
     };
 
     fn new(params: Params, setup: &mut Setup<Self>) -> Result<Self, Mistakes> {
-        let ceilings = Ceilings::new(&params, setup.inputs.image.unit, &mut setup.warnings)?;
-        setup.is_uncalibrated = setup.inputs.image.unit == Unit::RAW;
+        let gauge = Gauge::new(&params, &setup.inputs.image, setup.period, &mut setup.warnings)?;
+        setup.is_uncalibrated = gauge.is_uncalibrated();
         (setup.outputs.force, setup.outputs.peak) = (fraction(), fraction());
-        let max_age = max_age(params.max_age_ms, setup.period);
-        Ok(Self { params, ceilings, shape: setup.inputs.image.clone(), max_age })
+        Ok(Self { gauge })
     }
 
-    fn step(&self, tick: &Tick, inputs: Inputs<'_>, out: &mut Outputs, state: &mut State) {
-        let (Ceilings { force, peak }, &Params { begin, approach_m_per_s: approach, .. }) =
-            (self.ceilings, &self.params);
-        let stamp = inputs.image.stamp();
-        if stamp.age(tick.now) > self.max_age {
+    fn step(&self, tick: &Tick, inputs: Inputs<'_>, out: &mut Outputs, state: &mut Reading) {
+        if !self.gauge.is_fresh(inputs.image.stamp(), tick.now) {
             return;
         }
-        if inputs.image.is_new() || state.stamp != Some(stamp) {
-            state.stamp = Some(stamp);
-            state.load = load(&self.shape, &inputs.image, [begin * force, begin * peak]);
-        }
-        let (load, mut twist) = (&state.load, countable(&inputs.twist));
-        let force = bar(&mut twist, load.centre, load.sum / force, begin, approach);
-        let peak = bar(&mut twist, load.place, load.peak / peak, begin, approach);
+        let mut twist = countable(&inputs.twist);
+        let [sum, highest] = self.gauge.read(&inputs.image, state);
+        let [force, peak] = [sum, highest].map(|pressed| bar(&mut twist, pressed.point, pressed.allowed));
         out.twist.set(twist);
         // A NaN in the image makes the fraction NaN, which ends the run.
-        out.force.set(force + 0.0 * load.sum);
-        out.peak.set(peak + 0.0 * load.peak);
+        out.force.set(force + 0.0 * sum.load);
+        out.peak.set(peak + 0.0 * highest.load);
     }
 }
 
-/// Limits the approach at a point whose load is `times` its ceiling. Returns the fraction of the approach that passes.
+/// Returns the speed that a load of `times` its ceiling allows toward the object [m/s], or `None` if it allows any.
 ///
-/// The allowed speed falls linearly from `approach` [m/s], at the fraction `begin` of the ceiling, to 0 at the ceiling.
-pub fn bar(twist: &mut Twist, [x, y]: [f64; 2], times: f64, begin: f64, approach: f64) -> f64 {
+/// It falls linearly from `approach` [m/s], at the fraction `begin` of the ceiling, to 0 at the ceiling.
+#[must_use]
+pub fn allowed_speed(times: f64, begin: f64, approach: f64) -> Option<f64> {
     if times < begin || times <= 0.0 {
-        return 1.0;
+        return None;
     }
-    let allowed = if times < 1.0 { approach * (1.0 - times) / (1.0 - begin) } else { 0.0 };
+    Some(if times < 1.0 { approach * (1.0 - times) / (1.0 - begin) } else { 0.0 })
+}
+
+/// Limits the approach at a point of the pad to `allowed` [m/s]. Returns the fraction of the approach that passes.
+pub fn bar(twist: &mut Twist, [x, y]: [f64; 2], allowed: Option<f64>) -> f64 {
+    let Some(allowed) = allowed else { return 1.0 };
     let [_, _, vz, wx, wy, _] = twist.0.into();
     let speed = vz + wx * y - wy * x;
     if speed <= allowed {

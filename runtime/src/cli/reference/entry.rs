@@ -157,7 +157,7 @@ impl Entry {
 
     fn of_role(catalogue: &Catalogue, role: &RoleType) -> Self {
         let fills =
-            catalogue.devices().iter().filter(|device| roles_of(&***device).iter().any(|name| *name == role.name));
+            catalogue.devices().iter().filter(|device| roles_of(&***device).iter().any(|name| role.is_filled_by(name)));
         let name = role.observed_name();
         let doc = match role.is_observed {
             true => format!(

@@ -176,7 +176,8 @@ impl Opener<'_> {
         let device = self.device(bench, word)?;
         let description = &self.opened.devices[device].description;
         let is_free = |i: &usize| !self.taken.contains_key(&(device, *i));
-        let mut fitting = (0..description.fills.len()).filter(|i| description.fills[*i].role == kind.value);
+        let mut fitting =
+            (0..description.fills.len()).filter(|i| self.can_fill(&description.fills[*i].role, &kind.value));
         let Some(fills) = fitting.clone().find(is_free) else {
             let by = fitting.next().and_then(|i| self.taken.get(&(device, i)));
             let roles = quoted(description.roles());
@@ -226,7 +227,9 @@ impl Opener<'_> {
         let only = only.filter(|key| {
             let device = bench.bind.iter().find(|(other, _)| other.name == key.name);
             let device = device.and_then(|(_, word)| self.device(bench, word));
-            device.is_some_and(|device| self.opened.devices[device].description.roles().any(|role| role == kind))
+            device.is_some_and(|device| {
+                self.opened.devices[device].description.roles().any(|role| self.can_fill(role, kind))
+            })
         });
         let similar = suggest_name(name, strange.iter().map(|key| key.name.as_str()));
         if let Some(binding) = strange.iter().find(|key| similar == Some(&key.name)).or(only) {
@@ -260,6 +263,11 @@ impl Opener<'_> {
         .help(help)
     }
 
+    /// Returns whether a device that fills roles of the type `filled` can fill one of the type `kind`.
+    fn can_fill(&self, filled: &str, kind: &str) -> bool {
+        self.catalogue.role_type(kind).is_some_and(|role| role.is_filled_by(filled))
+    }
+
     /// Returns the device that can fill a role: one with its name, or the first that has a place for such a role.
     fn device_for(&mut self, bench: &BenchDocument, role: &str, kind: &str) -> Option<String> {
         let names: Vec<Spanned<String>> = bench
@@ -270,7 +278,8 @@ impl Opener<'_> {
         let mut fitting = Vec::new();
         for word in names {
             let Some(device) = self.device(bench, &word) else { continue };
-            let fills = self.opened.devices[device].description.roles().filter(|role| *role == kind).count();
+            let fills =
+                self.opened.devices[device].description.roles().filter(|role| self.can_fill(role, kind)).count();
             let is_taken = |name: &Key| self.kinds.get(&name.name).is_some_and(|taken| taken == kind);
             let taken = bench.bind.iter().filter(|(name, device)| device.value == word.value && is_taken(name)).count();
             fitting.extend((fills > taken).then_some(word.value));

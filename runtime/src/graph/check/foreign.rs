@@ -8,7 +8,7 @@ use crate::graph::plan::{PortRef, Producer};
 use crate::source::{Code, Diagnostic};
 
 /// Reports inputs of a limiter that must be known and descend from another role: neither `role`, whose command the
-/// motion is, nor the sensor in whose frame the motion is.
+/// motion is, nor a sensor on it, nor the sensor in whose frame the motion is.
 pub(super) fn check(
     net: &Net<'_>,
     frames: &mut Frames<'_>,
@@ -23,7 +23,8 @@ pub(super) fn check(
     for wire in net.wires[limiter].iter().filter(|wire| spec.inputs[wire.input].need.must_be_known) {
         let makers = find_makers(net, wire.source);
         let roles = makers.iter().flat_map(|maker| net.roles_of(maker.producer));
-        let mut foreign = roles.filter(|read| *read != role && Some(*read) != sensor);
+        let is_own = |read: &usize| *read == role || Some(*read) == sensor || net.carrier(*read) == Some(role);
+        let mut foreign = roles.filter(|read| !is_own(read));
         let Some(foreign) = foreign.next() else { continue };
         let [arm, other] = [role, foreign].map(|role| net.name(Producer::Role(role)));
         let message = format!(
@@ -40,12 +41,10 @@ pub(super) fn check(
     found
 }
 
-/// Returns the roles that the inputs of a limiter which must be known descend from.
-pub(super) fn read_roles(net: &Net<'_>, limiter: usize) -> Vec<usize> {
-    let spec = net.spec(limiter).filter(|spec| !spec.limits.holds.is_empty());
-    let Some(spec) = spec else { return Vec::new() };
-    let known = net.wires[limiter].iter().filter(|wire| spec.inputs[wire.input].need.must_be_known);
-    let makers = known.flat_map(|wire| find_makers(net, wire.source));
+/// Returns the roles that the input of a limiter descends from.
+pub(super) fn read_roles(net: &Net<'_>, limiter: usize, input: &str) -> Vec<usize> {
+    let wires = net.wires[limiter].iter().filter(|wire| net.input(limiter, wire).name == input);
+    let makers = wires.flat_map(|wire| find_makers(net, wire.source));
     makers.flat_map(|maker| net.roles_of(maker.producer).collect::<Vec<_>>()).collect()
 }
 

@@ -3,6 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::contact::{ContactPorts, is_sensor};
+use super::guards::can_carry;
 use super::limits::limiters;
 use crate::graph::net::{CommandWire, Net, Wire};
 use crate::graph::plan::PortRef;
@@ -78,7 +79,7 @@ impl<'a> Driven<'a> {
         let mut limiting: BTreeSet<usize> =
             limiters(net, wire).into_iter().flat_map(|node| known_roles(net, node)).collect();
         // A command whose limiters read no sensor has a mistake of its own.
-        if limiting.iter().all(|role| !is_sensor(net, *role)) {
+        if can_carry(net, wire.role) && limiting.iter().all(|role| !is_sensor(net, *role)) {
             limiting = net.roles_of(wire.source.producer).collect();
         }
         Self { wire, upstream, limiting }

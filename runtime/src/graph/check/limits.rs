@@ -8,6 +8,8 @@ use std::ops::Range;
 
 use super::foreign;
 use super::frames::{Frames, with_article};
+use super::guards::{self, Guards};
+use super::sums;
 use crate::device::RoleType;
 use crate::graph::net::limits::PathNode;
 use crate::graph::net::{CommandWire, Net, Wire, WireOrigin};
@@ -29,6 +31,7 @@ struct CommandPath<'a> {
 pub(crate) fn check(net: &Net<'_>, frames: &mut Frames<'_>, diagnostics: &mut Diagnostics) {
     for wire in net.commands.iter().filter(|wire| !wire.is_report) {
         // A missing wire has its own diagnostic, and hides the nodes behind it.
+        diagnostics.extend(guards::on_bare_arm(net, wire.role));
         let Some(path) = CommandPath::find(net, wire) else { continue };
         let mut held: Vec<&str> = Vec::new();
         let mut lost: Vec<(&str, &str)> = Vec::new();
@@ -43,7 +46,7 @@ pub(crate) fn check(net: &Net<'_>, frames: &mut Frames<'_>, diagnostics: &mut Di
         let required = path.role.limits.iter().map(|limit| &**limit);
         let missing: Vec<&str> = required.filter(|limit| !held.contains(limit)).collect();
         if missing.is_empty() {
-            diagnostics.extend(path.unprotected());
+            diagnostics.extend(Guards { net, wire, path: &path.nodes }.check(frames));
         } else {
             diagnostics.push(path.unlimited(&missing, &lost));
         }
@@ -73,25 +76,6 @@ impl<'a> CommandPath<'a> {
         Some(Self { net, wire, role: net.roles[wire.role]?, nodes: net.motion_path(wire)? })
     }
 
-    /// Reports sensors on the arm that no limiter reads, while limiters read another sensor of the same type: nothing
-    /// would bound the force on them.
-    fn unprotected(&self) -> Vec<Diagnostic> {
-        let Self { net, wire, .. } = self;
-        let kind = |role: usize| &net.flat.roles[role].1.value;
-        let read: BTreeSet<usize> = self.nodes.iter().flat_map(|stop| foreign::read_roles(net, stop.node)).collect();
-        let kinds: BTreeSet<&String> = read.iter().filter(|role| !net.is_arm(**role)).map(|role| kind(*role)).collect();
-        let is_open =
-            |role: &usize| net.carrier(*role) == Some(wire.role) && kinds.contains(kind(*role)) && !read.contains(role);
-        let arm = net.name(Producer::Role(wire.role));
-        let report = |role: usize| {
-            let (key, kind) = (&net.flat.roles[role].0, kind(role));
-            let message = format!("`{}` is on `{arm}`, and no limiter of `{arm}` reads it", key.name);
-            let help = format!("if it is on no arm, write `{} = {{ type = \"{kind}\", on = \"none\" }}`", key.name);
-            Diagnostic::new(Code::UnlimitedCommand, key.span.clone(), message).help(help)
-        };
-        (0..net.roles.len()).filter(is_open).map(report).collect()
-    }
-
     /// Returns the diagnostic of the missing limits, of which the nodes in `lost` broke some.
     fn unlimited(&self, missing: &[&str], lost: &[(&str, &str)]) -> Diagnostic {
         let Self { net, wire, .. } = self;
@@ -100,6 +84,9 @@ impl<'a> CommandPath<'a> {
         let source = net.port_name(wire.source);
         let plural = if missing.len() == 1 { "" } else { "s" };
         let message = format!("`{source}` drives `{consumer}` without the required limit{plural} {names}");
+        if let Some(help) = sums::help(net, wire, &self.nodes, missing) {
+            return wire.origin.diagnostic(Code::UnlimitedCommand, message).help(help);
+        }
         if let Some((help, edits)) = self.suggest_part(missing).filter(|_| lost.is_empty()) {
             let diagnostic = wire.origin.diagnostic(Code::UnlimitedCommand, message).help(help);
             return edits.into_iter().fold(diagnostic, Diagnostic::edit);
@@ -142,14 +129,20 @@ impl<'a> CommandPath<'a> {
             return None;
         }
         let parts = net.catalogue.builtin_files().iter().filter(|(name, _)| name.ends_with(".toml"));
-        let mut parts =
+        let parts =
             parts.filter_map(|(name, bytes)| Some((*name, str::from_utf8(bytes).ok()?.parse::<toml::Table>().ok()?)));
-        let (file, part) = parts.find(|(_, part)| {
-            let nodes = part.get("nodes").and_then(toml::Value::as_table);
-            let kinds: Vec<&str> =
-                nodes.into_iter().flatten().filter_map(|(_, node)| node.get("type")?.as_str()).collect();
-            limiters.iter().all(|limiter| kinds.contains(limiter))
-        })?;
+        let held = |part: &toml::Table| -> BTreeSet<&str> {
+            let nodes = part.get("nodes").and_then(toml::Value::as_table).into_iter().flatten();
+            let kinds = nodes.filter_map(|(_, node)| node.get("type")?.as_str());
+            kinds
+                .filter_map(|kind| net.catalogue.find_node(kind))
+                .flat_map(|(_, spec)| spec.limits.holds.iter().copied())
+                .collect()
+        };
+        let fits = parts.filter(|(_, part)| missing.iter().all(|limit| held(part).contains(limit)));
+        // A part with limits of which the arm knows nothing is for another arm.
+        let strange = |limit: &&str| !self.role.limits.iter().any(|known| known == limit);
+        let (file, part) = fits.min_by_key(|(_, part)| held(part).into_iter().filter(strange).count())?;
         let name = file.rsplit('/').next()?.strip_suffix(".toml")?;
         let role = net.name(Producer::Role(wire.role));
         let taken = &net.command_port(wire).name;

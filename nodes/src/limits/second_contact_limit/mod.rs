@@ -1,0 +1,179 @@
+//! `second_contact_limit`: the ceilings of a second pad of the arm, for a motion in the frame of the first pad.
+//!
+//! With n the normal of the second pad, p the point on it, and z the normal of the first pad, the second pad approaches
+//! its object at s = n·(v + ω × p). What exceeds the allowed speed is removed without a larger approach at any point of
+//! the first pad: a translation d changes the approach of all its points by z·d. If the pads do not face each other,
+//! n·z >= 0, the excess is removed along n. Otherwise it is removed along the part t of n that is perpendicular to z, up
+//! to the motion along t. What then remains is the first pad's own way out, which drives the second pad into its object:
+//! the whole motion is scaled. See decision 024.
+
+use nalgebra::{IsometryMatrix3, Vector3};
+use tactflow_runtime::node::{At, Describe, In, Inputs, Limits, Mistake, Mistakes, Node, Out, Outputs, Setup, Tick};
+use tactflow_runtime::signal::{Image, Pose, PoseShape, Scalar, Twist};
+use tactflow_runtime::source::Code;
+
+use super::contact_limit::{Gauge, Params, Pressed, Reading};
+use super::fraction;
+use crate::motion::bounds::countable;
+
+/// Below this sine of the angle between the normals, the pads face each other exactly: no direction along the first pad
+/// leads away from the object of the second one [1].
+const MIN_SINE: f64 = 1e-6;
+
+/// Pads at a smaller distance are at the same place [m].
+const SAME_PLACE_M: f64 = 1e-6;
+
+/// Stops the motion of a second pad into an object when its force or a single tactel reaches its ceiling.
+///
+/// An arm with two pads has a `contact_limit` for the pad in whose frame the motion is, and behind it a
+/// `second_contact_limit` for the other pad. Both have the same parameters, and each has its own image. The pads are
+/// fixed to each other, or move with joints that both poses contain.
+///
+/// `in.pose` is the pose of the pad in whose frame the motion is, and `in.image_pose` that of the pad of the image. Each
+/// comes from an `arm_state` with the `mount` of its pad.
+///
+/// The approach of the second pad is its speed along its own normal, at the point of the contact. The node never
+/// increases the approach of the first pad, at any of its points, so the limits of the `contact_limit` before it still
+/// hold. It reduces a retreat of the first pad only if this retreat itself presses the second pad against its object:
+/// then the whole motion is scaled. The retreat of the second pad is always free.
+///
+/// When the image or one of the poses is older than `max_age_ms` the output is absent.
+///
+/// `builtin:parts/two_pad_move.toml` contains both limiters.
+///
+/// ```toml
+/// [nodes.second_contact_limit]
+/// type = "second_contact_limit"
+/// in.twist = "contact_limit.twist"
+/// in.pose = "state.sensor_pose"
+/// in.image = "calibrate.image"
+/// in.image_pose = "state.sensor_pose"
+/// force_n = 15.0
+/// peak_n = 3.0
+/// approach_m_per_s = 0.05
+/// ```
+#[derive(Describe)]
+#[describe(every_tick)]
+pub struct SecondContactLimit {
+    gauge: Gauge,
+}
+
+/// What `second_contact_limit` reads.
+#[derive(Inputs)]
+pub struct Inputs<'a> {
+    /// Twist of the first pad's origin, in the frame of the first pad.
+    #[port(frame = "A")]
+    twist: In<'a, Twist>,
+    /// Pose of the first pad in the base.
+    #[port(frame = "A", reference = "B", quantity = "sensor_pose", known, sampled)]
+    pose: In<'a, Pose>,
+    /// The whole calibrated image of the second pad.
+    #[port(unit = "U", frame = "C", quantity = "tactile_image", known, sampled)]
+    image: In<'a, Image>,
+    /// Pose of the second pad in the base.
+    #[port(frame = "C", reference = "B", quantity = "sensor_pose", known, sampled)]
+    image_pose: In<'a, Pose>,
+}
+
+/// What `second_contact_limit` writes.
+#[derive(Outputs)]
+pub struct Outputs {
+    /// The same motion with a limited approach of the second pad.
+    #[port(frame = "A")]
+    twist: Out<Twist>,
+    /// Fraction of the approach that passes under the ceiling of the sum.
+    #[port(unit = "1", frame = "_")]
+    force: Out<Scalar>,
+    /// Fraction of the approach that passes under the ceiling of a tactel.
+    #[port(unit = "1", frame = "_")]
+    peak: Out<Scalar>,
+}
+
+impl Node for SecondContactLimit {
+    type Params = Params;
+    type Inputs<'a> = Inputs<'a>;
+    type Outputs = Outputs;
+    type State = Reading;
+
+    // The image, the poses and their ages move on while a motion is held.
+    const LIMITS: Limits = Limits {
+        through: Some("twist"),
+        holds: &["force", "peak"],
+        breaks: &["workspace", "blind", "speed", "acceleration"],
+        guards: Some("image"),
+        ..Limits::NONE
+    };
+
+    fn new(params: Params, setup: &mut Setup<Self>) -> Result<Self, Mistakes> {
+        let gauge = Gauge::new(&params, &setup.inputs.image, setup.period, &mut setup.warnings)?;
+        setup.is_uncalibrated = gauge.is_uncalibrated();
+        (setup.outputs.force, setup.outputs.peak) = (fraction(), fraction());
+        setup.warnings.extend(same_place([&setup.inputs.pose, &setup.inputs.image_pose]));
+        Ok(Self { gauge })
+    }
+
+    fn step(&self, tick: &Tick, inputs: Inputs<'_>, out: &mut Outputs, state: &mut Reading) {
+        let stamps = [inputs.image.stamp(), inputs.pose.stamp(), inputs.image_pose.stamp()];
+        if !stamps.into_iter().all(|stamp| self.gauge.is_fresh(stamp, tick.now)) {
+            return;
+        }
+        let second = inputs.pose.0.inverse() * inputs.image_pose.0;
+        let mut twist = countable(&inputs.twist);
+        let [sum, highest] = self.gauge.read(&inputs.image, state);
+        let [force, peak] = [sum, highest].map(|pressed| bar(&mut twist, &second, &pressed));
+        out.twist.set(twist);
+        // A NaN in the image makes the fraction NaN, which ends the run.
+        out.force.set(force + 0.0 * sum.load);
+        out.peak.set(peak + 0.0 * highest.load);
+    }
+}
+
+/// Returns the warning about two pads at one place: probably the bench does not state where one of them is mounted.
+fn same_place([first, second]: [&PoseShape; 2]) -> Option<Mistake> {
+    let (first, second) = (Vector3::from(first.start?), Vector3::from(second.start?));
+    if (first - second).amax() > SAME_PLACE_M {
+        return None;
+    }
+    let message = "both pads are at the same place, so one of them probably has no mount of its own";
+    let warning = Mistake::new(Code::UnusualValue, At::Node, message);
+    Some(warning.help("state the `mount` of each pad in the bench"))
+}
+
+/// Limits the approach at a point of the second pad, whose pose in the frame of the twist is `second`. Returns the
+/// fraction of the approach that passes.
+fn bar(twist: &mut Twist, second: &IsometryMatrix3<f64>, pressed: &Pressed) -> f64 {
+    let Some(allowed) = pressed.allowed else { return 1.0 };
+    let [x, y] = pressed.point;
+    let normal = second.rotation * Vector3::z();
+    let point = second.rotation * Vector3::new(x, y, 0.0) + second.translation.vector;
+    let velocity = twist.linear() + twist.angular().cross(&point);
+    let speed = normal.dot(&velocity);
+    if speed <= allowed {
+        return 1.0;
+    }
+    let change = retreat(&normal, &velocity, speed - allowed);
+    *twist = Twist::new(twist.linear() + change, twist.angular());
+    let left = speed + normal.dot(&change);
+    // Rounding alone must not scale the motion.
+    if left - allowed > 1e-12 * speed {
+        twist.0 *= allowed / left;
+    }
+    allowed / speed
+}
+
+/// Returns the translation that removes an `excess` of the approach along `normal`, or as much of it as is possible
+/// without a larger approach of the first pad, whose normal is z [m/s]. `velocity` is that of the point.
+fn retreat(normal: &Vector3<f64>, velocity: &Vector3<f64>, excess: f64) -> Vector3<f64> {
+    if normal.z >= 0.0 {
+        return normal * -excess;
+    }
+    let sine = (normal.x * normal.x + normal.y * normal.y).sqrt();
+    if sine < MIN_SINE {
+        return Vector3::zeros();
+    }
+    let along = Vector3::new(normal.x / sine, normal.y / sine, 0.0);
+    along * -(excess / sine).min(along.dot(velocity)).max(0.0)
+}
+
+#[cfg(test)]
+mod tests;
