@@ -15,7 +15,7 @@ use tactflow_runtime::graph::{Request, compile};
 use tactflow_runtime::harness::NodeRig;
 use tactflow_runtime::node::{Limits, Node};
 use tactflow_runtime::signal::{Image, ImageShape, Kind, Pose, PoseShape, Shape, Twist, TwistShape, Unit};
-use tactflow_runtime::source::{Code, Report};
+use tactflow_runtime::source::{Code, Diagnostic, Report};
 use tactflow_tests::{catalogue, shipped_graphs, workspace};
 use tempfile::TempDir;
 use toml::Table;
@@ -88,6 +88,34 @@ fn without_any_one_limiter_no_shipped_graph_loads() {
             assert!(help.unwrap().contains(&format!("`{kind}`")), "{graph} without `{name}`: {help:?}");
         }
     }
+}
+
+#[test]
+fn a_pose_that_no_sensor_measures_reaches_neither_a_limiter_nor_the_arm() {
+    let folder = copied();
+    let path = folder.path().join("parts/move.toml");
+    let part = fs::read_to_string(&path).unwrap();
+    let made = "[nodes.fixed]\ntype = \"static_pose\"\nframe = \"pad\"\nreference = \"arm.base\"\n\
+        [nodes.nothing]\ntype = \"static_pose\"\n\
+        [nodes.seen]\ntype = \"inverse_pose\"\nin.pose = \"state.sensor_pose\"\n\
+        [nodes.back]\ntype = \"inverse_pose\"\nin.pose = \"seen.pose\"\n\
+        [nodes.moved]\ntype = \"compose_poses\"\nin.inner = \"state.sensor_pose\"\nin.outer = \"nothing.pose\"\n";
+    let mut swapped = 0;
+    let wires =
+        part.match_indices("pose = \"state.sensor_pose\"").filter(|(at, _)| !part[..*at].ends_with("\nsensor_"));
+    for (at, measured) in wires {
+        for pose in ["fixed.pose", "back.pose", "moved.pose"] {
+            let (before, after) = (&part[..at], &part[at + measured.len()..]);
+            fs::write(&path, format!("{before}pose = \"{pose}\"{after}\n{made}")).unwrap();
+            let report = refused(&folder, "position.toml").unwrap_or_else(|| panic!("`{pose}` at {at}"));
+            let at_the_wire = |d: &&Diagnostic| d.code == Code::QuantityMismatch && d.message.contains(pose);
+            let found = report.diagnostics.iter().find(at_the_wire);
+            let found = found.unwrap_or_else(|| panic!("`{pose}` at {at}: {}", report.render(false)));
+            assert!(found.help.as_ref().unwrap().contains("state.sensor_pose"), "{:?}", found.help);
+            swapped += 1;
+        }
+    }
+    assert_eq!(swapped, 4 * 3, "workspace, blind, adjoint and ik_sink, each with three poses");
 }
 
 #[test]

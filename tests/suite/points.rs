@@ -2,6 +2,8 @@
 
 use std::fs;
 
+use tactflow_tests::workspace;
+
 use crate::cli::in_new_folder;
 use crate::tool::{Said, peer, say};
 
@@ -34,6 +36,32 @@ fn the_points_are_those_of_the_rows_and_a_reader_that_is_not_ours_finds_them() {
         assert_eq!(read, format!("{count} points of {rows} rows, x y z nx ny nz time{more}\n"));
         assert_eq!(said.out.lines().last().unwrap(), format!("wrote {ply}: {count} points"));
     }
+}
+
+#[test]
+fn one_name_of_a_port_of_a_part_works_wherever_a_user_writes_one() {
+    let (folder, ply) = in_new_folder("surface.ply");
+    let csv = ply.replace("surface.ply", "rows.csv");
+    let wanted = format!("--points=ruler.pose,touch.force={ply}");
+    let show = "--set=graph.show=['touch.force', 'seen.value']";
+    let wire = "--set=nodes.seen={ type = 'low_pass', time_constant_ms = 100, in = { value = 'touch.force' } }";
+    let args = ["run", "graphs/hybrid.toml", MOCK, show, wire, "--out", &csv, &wanted];
+    let said = say(&args);
+    assert_eq!((said.code, said.err.as_str()), (0, ""));
+    assert!(said.out.contains("touch.force"), "{}", said.out);
+    let points = fs::read(&ply).unwrap();
+    assert!(String::from_utf8_lossy(&points[..600]).contains("property double touch_force\n"));
+    // A recording holds the ports inside parts too, so its names are those of the nodes.
+    let rows = fs::read_to_string(&csv).unwrap();
+    assert!(rows.contains("# touch.moments.force [N]\n"), "{}", &rows[..800]);
+    let scenario = folder.path().join("force.toml");
+    let graph = workspace().join("graphs/hybrid.toml");
+    let bench = workspace().join("graphs/benches/mock.toml");
+    let check = "[check.force]\nof = \"touch.force\"\nnever_below = \"0.1 N\"";
+    let text = format!("[scenario]\ngraph = {graph:?}\nbench = {bench:?}\nfor_s = 2.0\n{check}\n");
+    fs::write(&scenario, text).unwrap();
+    let said = say(&["verify", scenario.to_str().unwrap()]);
+    assert_eq!((said.code, said.err.as_str()), (0, ""), "{}", said.out);
 }
 
 #[test]

@@ -73,7 +73,7 @@ pub struct Inputs<'a> {
     #[port(frame = "B")]
     twist: In<'a, Twist>,
     /// Pose of the sensor in the base.
-    #[port(frame = "S", reference = "B", quantity = "sensor_pose")]
+    #[port(frame = "S", reference = "B", quantity = "sensor_pose", known)]
     sensor_pose: In<'a, Pose>,
     /// Spatial Jacobian of the sensor in the base.
     #[port(frame = "B", robot = "R")]

@@ -2,9 +2,11 @@
 
 pub mod arm_state;
 pub mod chain;
+pub mod compose_poses;
 pub mod contact_point;
 pub mod damped;
 pub mod ik_sink;
+pub mod inverse_pose;
 pub mod joint_limits;
 mod joint_names;
 pub mod model;
@@ -12,3 +14,4 @@ pub mod model;
 mod models;
 pub mod mount;
 pub mod null_space;
+pub mod static_pose;

@@ -50,6 +50,21 @@ pub fn rotation_vector(rotation: &Rotation3<f64>) -> Vector3<f64> {
 }
 
 #[cfg(test)]
+pub(crate) mod testing {
+    use nalgebra::{IsometryMatrix3, Rotation3, Translation3, Vector3};
+    use proptest::prelude::*;
+    use tactflow_runtime::signal::Pose;
+
+    /// Any orientation, within a metre of the origin along each axis.
+    pub(crate) fn any_pose() -> impl Strategy<Value = Pose> {
+        ([-3.0..3.0, -3.0..3.0, -3.0..3.0], [-1.0..1.0, -1.0..1.0, -1.0..1.0]).prop_map(|(turn, place)| {
+            let rotation = Rotation3::new(Vector3::from(turn));
+            Pose(IsometryMatrix3::from_parts(Translation3::from(Vector3::from(place)), rotation))
+        })
+    }
+}
+
+#[cfg(test)]
 mod tests {
     use std::f64::consts::PI;
 

@@ -21,7 +21,7 @@ pub(crate) struct ExitContext<'a> {
     pub(crate) modes: BTreeMap<&'a str, usize>,
     /// Returns a built port, or `None` if its node has mistakes.
     pub(crate) port: &'a dyn Fn(PortRef) -> Option<&'a PlannedPort>,
-    /// The poses of the task.
+    /// The poses of the task that a sample can change.
     pub(crate) poses: Vec<PortRef>,
     /// Default time after which a signal is lost [ns].
     pub(crate) lost_after: i64,
@@ -154,17 +154,19 @@ impl ExitContext<'_> {
     fn travel_pose(&self, span: &Range<usize>, table: &ExitTable) -> Resolved<PortRef> {
         if let Some(of) = &table.of {
             let source = self.net.resolve(self.scope(), of)?;
-            if self.net.port(source).kind == Kind::Pose {
+            let is_pose = self.net.port(source).kind == Kind::Pose;
+            if is_pose && self.net.roles_of(source.producer).next().is_some() {
                 return Ok(source);
             }
-            let message = format!("`after_travel_mm` measures a pose, but `{}` is not a pose", of.value);
+            let is = if is_pose { "descends from no role, so it never moves" } else { "is not a pose" };
+            let message = format!("`after_travel_mm` measures a pose, but `{}` {is}", of.value);
             return bad_condition(&of.span, message).into_err();
         }
         match self.poses.as_slice() {
             [one] => Ok(*one),
             [] => bad_condition(
                 span,
-                "`after_travel_mm` needs a pose, but no port of the graph is a pose: use `after_ms` instead",
+                "`after_travel_mm` needs a measured pose, but the graph has none: use `after_ms` instead",
             )
             .into_err(),
             several => {

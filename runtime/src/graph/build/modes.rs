@@ -68,6 +68,7 @@ fn exits(builder: &mut Builder<'_>, nodes: &[PlannedNode]) -> Vec<Vec<PlannedExi
     let ports = &builder.ports;
     let port = |source: PortRef| -> Option<&PlannedPort> { ports.get(&source) };
     let poses = nodes.iter().flat_map(PlannedNode::outputs).filter(|(_, port)| port.shape.kind() == Kind::Pose);
+    let poses = poses.filter(|(source, _)| builder.net.roles_of(source.producer).next().is_some());
     let poses: Vec<_> = poses.map(|(source, port)| (source, port.name.as_str())).collect();
     let flat = builder.net.flat;
     let context = |task: usize| ExitContext {

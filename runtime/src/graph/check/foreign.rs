@@ -3,8 +3,9 @@
 use std::collections::BTreeSet;
 
 use super::frames::Frames;
-use crate::graph::net::Net;
+use crate::graph::net::{Net, Wire};
 use crate::graph::plan::{PortRef, Producer};
+use crate::signal::Kind;
 use crate::source::{Code, Diagnostic};
 
 /// Reports inputs of a limiter that must be known and descend from another role: neither `role`, whose command the
@@ -64,6 +65,30 @@ pub(super) fn on_another_arm(
     let message = format!("`{name}` limits the motion of `{arm}` in the frame of `{sensor}`, which is on `{carrier}`");
     let diagnostic = net.diagnostic_at(limiter, Code::ForeignInput, message);
     Some(diagnostic.help(format!("let the motion be in the frame of a sensor on `{arm}`")))
+}
+
+/// Reports poses with which a node behind a limiter expresses the motion, and that no quantity proves to be measured:
+/// with a pose that only has the right frames, the motion that the arm makes is not the one that was limited.
+pub(super) fn unproven_pose(net: &Net<'_>, frames: &mut Frames<'_>, node: usize) -> Option<Diagnostic> {
+    let is_pose = |wire: &&Wire| net.port(wire.source).kind == Kind::Pose;
+    let is_unproven = |wire: &&Wire| {
+        let needs_proof = net.input(node, wire).quantity.is_none();
+        needs_proof && find_makers(net, wire.source).iter().any(|maker| net.port(*maker).quantity.is_none())
+    };
+    let wire = net.wires[node].iter().filter(is_pose).find(is_unproven)?;
+    let (name, source) = (&net.flat.nodes[node].name, net.port_name(wire.source));
+    let message =
+        format!("`{name}` passes on a motion that is limited already, but nothing proves that `{source}` is measured");
+    let diagnostic = wire.origin.diagnostic(Code::QuantityMismatch, message);
+    let mut poses = net.ports_in(wire.origin.scope).filter(|(_, port)| {
+        let port = net.port(*port);
+        port.kind == Kind::Pose && port.quantity.is_some()
+    });
+    let wanted = frames.of(wire.source);
+    Some(match poses.find(|(_, port)| frames.of(*port) == wanted) {
+        Some((measured, _)) => diagnostic.instead(&wire.origin.word.value, &measured),
+        None => diagnostic.help(format!("move `{name}` before the limiters, or wire a pose that is measured")),
+    })
 }
 
 /// Returns the ports that make the value of a port: itself, or those whose quantity its node passes on. What else the

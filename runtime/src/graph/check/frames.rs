@@ -119,7 +119,7 @@ impl Frames<'_> {
             let input = spec.inputs.iter().find(|input| input.kind == kind)?;
             let output = spec.outputs.iter().find(|output| output.kind == kind)?;
             let pose = spec.inputs.iter().find(|input| input.kind == Kind::Pose)?;
-            let is_converter = *pose.args == [input.args[0].clone(), output.args[0].clone()];
+            let is_converter = kind != Kind::Pose && *pose.args == [input.args[0].clone(), output.args[0].clone()];
             is_converter.then_some((spec, input, output, pose))
         })?;
         let (name, converter) = (&spec.name, with_article(&spec.name));
@@ -147,13 +147,15 @@ impl Frames<'_> {
     fn find_pose(&mut self, wanted: &[Option<String>]) -> Option<PortRef> {
         let net = self.net;
         let nodes = (0..net.nodes.len()).map(Producer::Node);
-        let sources: Vec<PortRef> = nodes
+        let mut sources: Vec<PortRef> = nodes
             .flat_map(|producer| {
                 let outputs = net.outputs(producer).unwrap_or_default().iter().enumerate();
                 let poses = outputs.filter(|(_, output)| output.kind == Kind::Pose);
                 poses.map(move |(port, _)| PortRef { producer, port }).collect::<Vec<_>>()
             })
             .collect();
+        // A measured pose first: behind the limiters, no other one is accepted.
+        sources.sort_by_key(|source| net.port(*source).quantity.is_none());
         sources.into_iter().find(|source| self.of(*source) == wanted)
     }
 

@@ -51,6 +51,9 @@ pub(crate) fn check(net: &Net<'_>, frames: &mut Frames<'_>, diagnostics: &mut Di
             diagnostics.push(path.unlimited(&missing, &lost));
         }
         diagnostics.extend(path.mixed_frames(frames));
+        let first = path.nodes.iter().rposition(|stop| !stop.spec.limits.holds.is_empty()).unwrap_or(0);
+        let limited = path.nodes[..first].iter().filter(|stop| stop.spec.limits.holds.is_empty());
+        diagnostics.extend(limited.filter_map(|stop| foreign::unproven_pose(net, frames, stop.node)));
         // A wire in the wrong frame has its own diagnostic.
         let limiters = path.nodes.iter().filter(|stop| !stop.spec.limits.holds.is_empty());
         let limiters: Vec<_> = limiters.filter(|stop| !frames.has_clash(stop.node)).collect();
