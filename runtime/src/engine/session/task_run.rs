@@ -136,10 +136,12 @@ impl TaskRun {
         }
     }
 
-    /// Writes the flags of the modes in which the task is since the last tick. A task that has ended is in no mode.
+    /// Writes the flags of the modes in which the task is since the last tick. A task that has ended, or that waits for
+    /// the operator, is in no mode.
     pub(super) fn show_mode(&self, bus: &mut Bus, tick: &Tick) {
+        let is_running = self.end.is_none() && !self.halts.is_stopped();
         for (mode, port) in &self.flags {
-            let is_in = self.end.is_none() && self.mode_number() == Some(*mode);
+            let is_in = is_running && self.mode_number() == Some(*mode);
             *bus.slot_mut::<Flag>(*port) = is_in;
             bus.mark_mut(*port).renew(tick.index, Stamp::TIMELESS);
         }
