@@ -8,6 +8,7 @@ use super::ports::{PortTable, node_times};
 use crate::cli::text::prose::PageStyle;
 use crate::cli::view::RunView;
 use crate::engine::{Counters, End, Engine, Outcome};
+use crate::source::quoted;
 
 /// Maximum number of bins of a curve on the terminal: two for each character of the widest page.
 const MAX_BINS: usize = 256;
@@ -85,6 +86,9 @@ impl Summary {
         for (device, counts) in engine.counts().filter(|(_, counts)| !counts.is_empty()) {
             let counts: Vec<String> = counts.iter().map(|(what, count)| format!("{count} {what}")).collect();
             let _ = writeln!(text, "device `{device}`: {}", counts.join(", "));
+        }
+        if engine.commanded().len() > 1 {
+            let _ = writeln!(text, "collisions between {} are not checked", quoted(engine.commanded()));
         }
         if !engine.uncalibrated().is_empty() {
             let names = engine.uncalibrated().join("`, `");

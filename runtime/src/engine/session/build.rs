@@ -86,6 +86,9 @@ impl Engine {
         let devices = devices.map(|(i, device)| device_slot(i, device, &reports, &sources)).collect();
         let runners: Vec<NodeRunner> =
             plan.nodes.into_iter().enumerate().map(|node| runner(node, &mut ports, &mut watched)).collect();
+        let mut commanded: Vec<String> =
+            plan.commands.iter().filter(|wire| !wire.is_report).map(|wire| wire.name[0].clone()).collect();
+        commanded.dedup();
         let (reports, commands): (Vec<_>, Vec<_>) = plan.commands.into_iter().partition(|wire| wire.is_report);
         let report = |report: &PlannedCommand| ReportSlot::new(ports.id(report.source), report);
         let slots = reports.iter().map(report).collect();
@@ -118,6 +121,7 @@ impl Engine {
             allowed: plan.allowed,
             names,
             roles,
+            commanded,
             reported,
             exports,
             watched,

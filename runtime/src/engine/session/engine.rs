@@ -31,6 +31,8 @@ pub struct Engine {
     pub(super) names: Vec<(String, String)>,
     /// Name of each role, and the source location of its device.
     pub(super) roles: Vec<(String, String)>,
+    /// The roles that are commanded, each once.
+    pub(super) commanded: Vec<String>,
     /// Name `role.report` of each wired report, the index of its device, and its number there.
     pub(super) reported: Vec<(String, usize, usize)>,
     /// Name of each export of a part, and the port behind it.
@@ -238,6 +240,12 @@ impl Engine {
     /// 1.
     pub fn limits(&self) -> impl Iterator<Item = (&str, PortId)> {
         self.limits.iter().map(|(name, id)| (name.as_str(), *id))
+    }
+
+    /// Returns the roles that are commanded, each once.
+    #[must_use]
+    pub fn commanded(&self) -> &[String] {
+        &self.commanded
     }
 
     /// Returns the warnings that a section [allow] silences, each with its reason.

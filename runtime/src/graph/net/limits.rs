@@ -76,8 +76,8 @@ impl<'a> Net<'a> {
         match (&section.owner, &section.role) {
             (LimitOwner::Robot(robot), _) => device(name) == Some(robot),
             // A task may call an arm of the bench by another name.
-            (LimitOwner::Bench, Some(role)) => {
-                role.name == name || device(name).is_some_and(|own| device(&role.name) == Some(own))
+            (LimitOwner::Bench, Some(role)) if self.flat.roles.position(&role.name).is_none() => {
+                device(name).is_some_and(|own| device(&role.name) == Some(own))
             }
             (LimitOwner::Task, _) if section.task > 0 && !self.flat.tasks[section.task].roles.contains(&arm) => false,
             (_, role) => role.as_ref().is_none_or(|role| role.name == name),
