@@ -246,8 +246,8 @@ fn the_forces_of_both_pads_on_a_held_object_cancel() {
     assert!((left / wanted - 1.0).abs() < 0.01, "{left} N, not {wanted} N");
 }
 
-/// Returns the greatest energy of a cell in a second without commands, as a fraction of the first.
-fn greatest_energy(object: &CarriedParams, foam: &Foam, joint: JointDynamics, divisor: f64) -> f64 {
+/// Returns the greatest energies of a cell in two half seconds without commands, as fractions of the first energy.
+fn greatest_energy(object: &CarriedParams, foam: &Foam, joint: JointDynamics, divisor: f64) -> [f64; 2] {
     let mut world = cell_with(object, foam, [joint; 2], divisor);
     // The springs of the joints are loaded, then released; the arms push unequally, and the object drops on the table.
     world.sides[0].arm.equilibrium = vec![0.001, 0.004];
@@ -257,10 +257,11 @@ fn greatest_energy(object: &CarriedParams, foam: &Foam, joint: JointDynamics, di
     // The energy of the object at rest on the table does not count.
     let rest = object.mass * G * (place.z - 0.01);
     let first = world.energy() - rest;
-    let (mut greatest, mut touched) = (0.0f64, false);
-    for step in 1..=1000 {
-        world.advance(f64::from(step) * 0.001, STILL);
-        greatest = greatest.max((world.energy() - rest) / first);
+    let (mut greatest, mut touched) = ([0.0f64; 2], false);
+    for step in 0..1000 {
+        world.advance(f64::from(step + 1) * 0.001, STILL);
+        let half = &mut greatest[step as usize / 500];
+        *half = half.max((world.energy() - rest) / first);
         touched |= normal(&world)[0] > 0.5;
     }
     assert!(touched, "the pads touch the object");
@@ -279,10 +280,13 @@ fn energy_does_not_grow_without_commands() {
         (ball_of(0.1, 0.03), foam(0.5), undamped),
     ];
     for (case, (object, foam, joint)) in cases.into_iter().enumerate() {
-        // Semi-implicit Euler conserves an energy that differs from the true one by a term of the step.
-        for (divisor, bound) in [(1.0, 1.02), (4.0, 1.002)] {
-            let greatest = greatest_energy(&object, &foam, joint, divisor);
-            assert!(greatest < bound, "case {case}: {greatest} of the first energy, with steps by {divisor}");
+        // Semi-implicit Euler conserves an energy that differs from the true one by a term of the step. Without any
+        // loss in the foam it shows in the first impacts.
+        let coarse = if foam.damping == 0.0 { 1.03 } else { 1.001 };
+        for (divisor, bound) in [(1.0, coarse), (4.0, 1.002)] {
+            let [first, second] = greatest_energy(&object, &foam, joint, divisor);
+            assert!(first < bound, "case {case}: {first} of the first energy, with steps by {divisor}");
+            assert!(second <= first, "case {case}: it grows from {first} to {second}, with steps by {divisor}");
         }
     }
 }
