@@ -50,8 +50,8 @@ pub struct BlindLimit {
     clear: Option<ClearBox>,
     /// Corners of the pad in its own frame [m].
     corners: [Vector3<f64>; 4],
-    /// Maximum age of the contact, the image and the pose [ns].
-    max_age: i64,
+    /// Maximum ages of the contact, the image and the pose [ns].
+    max_ages: [i64; 3],
 }
 
 /// Parameters of `blind_limit`.
@@ -75,7 +75,8 @@ pub struct Params {
     /// Corner with the largest coordinates of that box.
     #[param(unit = "m", from_bench)]
     clear_max_m: Option<[f64; 3]>,
-    /// Maximum age of the contact, the image and the pose; five periods of the graph if not given.
+    /// Maximum age of the contact, the image and the pose; five periods of the slowest device behind each if not
+    /// given.
     #[param(unit = "ms", above = 0.0)]
     max_age_ms: Option<f64>,
 }
@@ -139,18 +140,20 @@ impl Node for BlindLimit {
         let image = setup.inputs.image.clone().unwrap_or_default();
         let clear = ClearBox::new(params.clear_min_m, params.clear_max_m)?;
         (setup.outputs.blind, setup.outputs.left) = (fraction(), fraction());
-        let max_age = max_age(params.max_age_ms, setup.period);
+        let max_age = |input| max_age(params.max_age_ms, setup.sample_period(input));
+        let max_ages = ["contact", "image", "pose"].map(max_age);
         let Params { blind_s: time, blind_mm, deceleration_m_per_s2: linear, .. } = params;
         let bounds = Bounds { time, way: blind_mm * 1e-3, linear, angular: params.deceleration_rad_per_s2 };
-        Ok(Self { bounds, clear, corners: corners(&image), max_age })
+        Ok(Self { bounds, clear, corners: corners(&image), max_ages })
     }
 
     fn step(&self, tick: &Tick, inputs: Inputs<'_>, out: &mut Outputs, state: &mut State) {
-        let is_fresh = |stamp: Stamp| stamp.age(tick.now) <= self.max_age;
-        let has_image = inputs.image.is_some_and(|image| is_fresh(image.stamp()));
-        let contact = inputs.contact.filter(|contact| **contact && has_image && is_fresh(contact.stamp()));
+        let is_fresh = |stamp: Stamp, max_age: i64| stamp.age(tick.now) <= max_age;
+        let [of_contact, of_image, of_pose] = self.max_ages;
+        let has_image = inputs.image.is_some_and(|image| is_fresh(image.stamp(), of_image));
+        let contact = inputs.contact.filter(|contact| **contact && has_image && is_fresh(contact.stamp(), of_contact));
         state.budget.touch(contact.map(|contact| contact.stamp().nanos), tick.is_resumed);
-        let pose = inputs.pose.filter(|pose| is_fresh(pose.stamp())).map(|pose| pose.value());
+        let pose = inputs.pose.filter(|pose| is_fresh(pose.stamp(), of_pose)).map(|pose| pose.value());
         let room = self.clear.as_ref().zip(pose).map_or(0.0, |(clear, pose)| clear.room(pose, &self.corners));
         if !tick.is_halted && room <= 0.0 {
             state.budget.spend(state.speed, tick.dt);

@@ -74,7 +74,7 @@ pub struct Params {
     /// Maximum speed of the approach at `begin`.
     #[param(unit = "m/s", above = 0.0, usual = ..=USUAL_M_PER_S)]
     approach_m_per_s: f64,
-    /// Maximum age of the image; five periods of the graph if not given.
+    /// Maximum age of the image; five periods of the slowest device behind it if not given.
     #[param(unit = "ms", above = 0.0)]
     max_age_ms: Option<f64>,
 }
@@ -131,7 +131,7 @@ impl Node for ContactLimit {
         let ceilings = Ceilings::new(&params, setup.inputs.image.unit, &mut setup.warnings)?;
         setup.is_uncalibrated = setup.inputs.image.unit == Unit::RAW;
         (setup.outputs.force, setup.outputs.peak) = (fraction(), fraction());
-        let max_age = max_age(params.max_age_ms, setup.period);
+        let max_age = max_age(params.max_age_ms, setup.sample_period("image"));
         Ok(Self { params, ceilings, shape: setup.inputs.image.clone(), max_age })
     }
 

@@ -5,6 +5,7 @@ mod demand;
 mod modes;
 mod nodes;
 mod params;
+mod sample_periods;
 
 pub(crate) use modes::{BuiltModes, build_modes};
 pub(crate) use nodes::Builder;

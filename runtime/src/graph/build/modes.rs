@@ -73,7 +73,7 @@ fn exits(builder: &mut Builder<'_>, nodes: &[PlannedNode]) -> Vec<Vec<PlannedExi
         modes: builder.net.flat.mode_numbers(),
         port: &port,
         poses: poses.map(|(source, _)| source).collect(),
-        lost_after: default_max_age_ns(builder.period),
+        lost_after: &|source| default_max_age_ns(builder.sample_periods.of(source.producer)),
     };
     let (net, measured, diagnostics) = (builder.net, &mut builder.measured, &mut builder.diagnostics);
     net.flat.modes.iter().map(|block| context.resolve(block, measured, diagnostics)).collect()
