@@ -41,6 +41,7 @@ mod paths;
 mod points;
 mod policies;
 mod quantities;
+mod rates;
 mod recordings;
 mod reference;
 mod reports;

@@ -47,7 +47,7 @@ pub struct Params {
     /// Maximum angular acceleration.
     #[param(unit = "rad/s2", above = 0.0, usual = ..=USUAL_RAD_PER_S2)]
     angular_rad_per_s2: f64,
-    /// Maximum age of the motion; five periods of the graph if not given.
+    /// Maximum age of the motion; five periods of the slowest device behind it if not given.
     #[param(unit = "ms", above = 0.0)]
     max_age_ms: Option<f64>,
 }
@@ -80,7 +80,7 @@ impl Node for AccelerationLimit {
 
     fn new(params: Params, setup: &mut Setup<Self>) -> Result<Self, Mistakes> {
         setup.outputs.acceleration = fraction();
-        let max_age = max_age(params.max_age_ms, setup.period);
+        let max_age = max_age(params.max_age_ms, setup.sample_period("twist"));
         Ok(Self { params, max_age })
     }
 

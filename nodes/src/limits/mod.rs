@@ -26,10 +26,10 @@ pub struct Inputs<'a> {
     twist: Option<In<'a, Twist>>,
 }
 
-/// Maximum age of an input in periods of the graph, if the parameter `max_age_ms` is not given.
+/// Maximum age of an input in sample periods, if the parameter `max_age_ms` is not given.
 const DEFAULT_MAX_AGE_PERIODS: f64 = 5.0;
 
-/// Returns the maximum age of an input [ns], from the parameter `max_age_ms` and the period of the graph [s].
+/// Returns the maximum age of an input [ns], from the parameter `max_age_ms` and the sample period of the input [s].
 fn max_age(max_age_ms: Option<f64>, period: f64) -> i64 {
     let seconds = max_age_ms.map_or(DEFAULT_MAX_AGE_PERIODS * period, |age| age * 1e-3);
     (seconds * 1e9) as i64

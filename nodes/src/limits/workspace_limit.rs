@@ -59,7 +59,7 @@ pub struct Params {
     /// Deceleration with which the sensor can stop before a face.
     #[param(unit = "m/s2", above = 0.0, usual = ..=USUAL_M_PER_S2)]
     deceleration_m_per_s2: f64,
-    /// Maximum age of the pose; five periods of the graph if not given.
+    /// Maximum age of the pose; five periods of the slowest device behind it if not given.
     #[param(unit = "ms", above = 0.0)]
     max_age_ms: Option<f64>,
 }
@@ -113,7 +113,7 @@ impl Node for WorkspaceLimit {
             setup.warnings.extend(start_outside(start, "max_m", &params.max_m, 1.0));
         }
         setup.outputs.workspace = fraction();
-        let max_age = max_age(params.max_age_ms, setup.period);
+        let max_age = max_age(params.max_age_ms, setup.sample_period("pose"));
         Ok(Self { params, max_age })
     }
 

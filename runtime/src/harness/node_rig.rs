@@ -68,7 +68,8 @@ impl NodeRig {
             wired[i].1.push(port);
             inputs.push(((*name).to_owned(), port));
         }
-        let built = configured.build(Given { inputs: given, period: 0.001 })?;
+        let sample_periods = vec![0.001; spec.inputs.len()];
+        let built = configured.build(Given { inputs: given, period: 0.001, sample_periods })?;
         let outputs: Vec<PortId> = built.outputs.iter().map(|shape| bus.add(shape)).collect();
         let runner = NodeRunner::new(built.node, &wired, outputs.clone(), N::EVERY_TICK);
         let (shapes, warnings) = (built.outputs, built.warnings);

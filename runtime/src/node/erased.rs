@@ -47,6 +47,9 @@ pub struct Given {
     pub inputs: Vec<Vec<(String, Shape)>>,
     /// Nominal time between two ticks [s].
     pub period: f64,
+    /// For each input, the nominal time between two samples of the slowest device behind its wires, at least `period`
+    /// [s].
+    pub sample_periods: Vec<f64>,
 }
 
 /// A node type: an entry of a catalogue.
@@ -150,9 +153,10 @@ struct WithParams<N: Node>(N::Params);
 impl<N: Node> Configured for WithParams<N> {
     fn build(self: Box<Self>, given: Given) -> Result<Built, Mistakes> {
         let inputs = <N::Inputs<'static> as InputSet<'static>>::shapes(given.inputs);
-        let (outputs, period) = (Default::default(), given.period);
+        let (outputs, period, sample_periods) = (Default::default(), given.period, given.sample_periods);
         let (motion, warnings) = (Motion::Any, Mistakes::new());
-        let mut setup = Setup::<N> { inputs, outputs, period, motion, is_uncalibrated: false, warnings };
+        let mut setup =
+            Setup::<N> { inputs, outputs, period, sample_periods, motion, is_uncalibrated: false, warnings };
         let node = N::new(self.0, &mut setup)?;
         let Setup { motion, is_uncalibrated, warnings, .. } = setup;
         let outputs = N::Outputs::into_shapes(setup.outputs);

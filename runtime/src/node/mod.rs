@@ -155,6 +155,8 @@ pub struct Setup<N: Node> {
     pub outputs: <N::Outputs as OutputSet>::Shapes,
     /// Nominal time between two ticks of the graph [s].
     pub period: f64,
+    /// The sample period of each input, see [`Setup::sample_period`] [s].
+    pub(crate) sample_periods: Vec<f64>,
     /// The motion that the node generates. A node whose output is computed from samples leaves it `Any`.
     pub motion: Motion,
     /// Set by a limiter whose limits are in raw readings, so that nothing is limited in newtons. The bench must allow
@@ -163,4 +165,19 @@ pub struct Setup<N: Node> {
     /// Warnings, which the node adds: what is valid, but probably a mistake. Each code has the severity of a warning,
     /// so that the graph still loads.
     pub warnings: Mistakes,
+}
+
+impl<N: Node> Setup<N> {
+    /// Returns the nominal time between two samples of an input [s]: that of the slowest device whose samples it waits
+    /// for, and at least `period`. Use it for the default age at which a value is too old.
+    ///
+    /// # Panics
+    /// If the node has no input of this name.
+    #[must_use]
+    pub fn sample_period(&self, input: &str) -> f64 {
+        let inputs = <N::Inputs<'static> as InputSet<'static>>::specs();
+        let at = inputs.iter().position(|declared| declared.name == input);
+        let at = at.unwrap_or_else(|| panic!("`{}` has no input `{input}`", N::NAME));
+        self.sample_periods[at]
+    }
 }

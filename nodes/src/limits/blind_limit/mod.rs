@@ -55,8 +55,8 @@ pub struct BlindLimit {
     bounds: Bounds,
     clear: Option<ClearBox>,
     pads: Pads,
-    /// Maximum age of the contact, the image and the pose [ns].
-    max_age: i64,
+    /// Maximum ages of the contact, the image and the pose of the first pad, and of those of the second one [ns].
+    max_ages: [[i64; 3]; 2],
 }
 
 /// Parameters of `blind_limit`.
@@ -80,7 +80,8 @@ pub struct Params {
     /// Corner with the largest coordinates of that box.
     #[param(unit = "m", from_bench)]
     clear_max_m: Option<[f64; 3]>,
-    /// Maximum age of the contact, the image and the pose; five periods of the graph if not given.
+    /// Maximum age of the contact, the image and the pose; five periods of the slowest device behind each if not
+    /// given.
     #[param(unit = "ms", above = 0.0)]
     max_age_ms: Option<f64>,
 }
@@ -158,24 +159,27 @@ impl Node for BlindLimit {
         let pads = Pads::new([shapes.image.as_ref(), shapes.second_image.as_ref()], wired)?;
         let clear = ClearBox::new(params.clear_min_m, params.clear_max_m)?;
         (setup.outputs.blind, setup.outputs.left) = (fraction(), fraction());
-        let max_age = max_age(params.max_age_ms, setup.period);
+        let max_age = |input| max_age(params.max_age_ms, setup.sample_period(input));
+        let max_ages = [["contact", "image", "pose"], ["second_contact", "second_image", "second_pose"]]
+            .map(|pad| pad.map(max_age));
         let Params { blind_s: time, blind_mm, deceleration_m_per_s2: linear, .. } = params;
         let bounds = Bounds { time, way: blind_mm * 1e-3, linear, angular: params.deceleration_rad_per_s2 };
-        Ok(Self { bounds, clear, pads, max_age })
+        Ok(Self { bounds, clear, pads, max_ages })
     }
 
     fn step(&self, tick: &Tick, inputs: Inputs<'_>, out: &mut Outputs, state: &mut State) {
-        let is_fresh = |stamp: Stamp| stamp.age(tick.now) <= self.max_age;
-        let touched = |contact: Option<In<'_, Flag>>, image: Option<In<'_, Image>>| {
-            let has_image = image.is_some_and(|image| is_fresh(image.stamp()));
-            let contact = contact.filter(|contact| **contact && has_image && is_fresh(contact.stamp()));
+        let is_fresh = |stamp: Stamp, max_age: i64| stamp.age(tick.now) <= max_age;
+        let [first, second] = self.max_ages;
+        let touched = |contact: Option<In<'_, Flag>>, image: Option<In<'_, Image>>, ages: [i64; 3]| {
+            let has_image = image.is_some_and(|image| is_fresh(image.stamp(), ages[1]));
+            let contact = contact.filter(|contact| **contact && has_image && is_fresh(contact.stamp(), ages[0]));
             contact.map(|contact| contact.stamp().nanos)
         };
-        let contacts = [touched(inputs.contact, inputs.image), touched(inputs.second_contact, inputs.second_image)];
+        let contacts =
+            [touched(inputs.contact, inputs.image, first), touched(inputs.second_contact, inputs.second_image, second)];
         state.budget.touch(contacts, tick.is_resumed);
-        let is_known = |pose: &In<'_, Pose>| is_fresh(pose.stamp());
-        let pose = inputs.pose.filter(is_known).map(|pose| pose.value());
-        let second = inputs.second_pose.filter(is_known).map(|pose| pose.value());
+        let pose = inputs.pose.filter(|pose| is_fresh(pose.stamp(), first[2])).map(|pose| pose.value());
+        let second = inputs.second_pose.filter(|pose| is_fresh(pose.stamp(), second[2])).map(|pose| pose.value());
         state.second = pose.zip(second).and_then(|(pose, second)| self.pads.second(pose, second)).or(state.second);
         let corners = self.pads.all(state.second.as_ref());
         let room = self.clear.as_ref().zip(pose).map_or(0.0, |(clear, pose)| clear.room(pose, &corners));

@@ -38,7 +38,7 @@ pub(in crate::limits) struct Pressed {
 }
 
 impl Gauge {
-    /// Creates the gauge of an image of this shape, in a graph with this period [s].
+    /// Creates the gauge of an image of this shape, whose samples come every `period` [s].
     pub(in crate::limits) fn new(
         params: &Params,
         shape: &ImageShape,

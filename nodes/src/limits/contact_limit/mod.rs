@@ -72,7 +72,7 @@ pub struct Params {
     /// Maximum speed of the approach at `begin`.
     #[param(unit = "m/s", above = 0.0, usual = ..=USUAL_M_PER_S)]
     approach_m_per_s: f64,
-    /// Maximum age of the image; five periods of the graph if not given.
+    /// Maximum age of the image; five periods of the slowest device behind it if not given.
     #[param(unit = "ms", above = 0.0)]
     max_age_ms: Option<f64>,
 }
@@ -118,7 +118,7 @@ impl Node for ContactLimit {
     };
 
     fn new(params: Params, setup: &mut Setup<Self>) -> Result<Self, Mistakes> {
-        let gauge = Gauge::new(&params, &setup.inputs.image, setup.period, &mut setup.warnings)?;
+        let gauge = Gauge::new(&params, &setup.inputs.image, setup.sample_period("image"), &mut setup.warnings)?;
         setup.is_uncalibrated = gauge.is_uncalibrated();
         (setup.outputs.force, setup.outputs.peak) = (fraction(), fraction());
         Ok(Self { gauge })

@@ -47,8 +47,10 @@ pub use limiter::Limiter;
 pub struct JointLimit {
     joints: Vec<Joint>,
     lead: f64,
-    /// Maximum age of the velocities and of the arm's state [ns].
+    /// Maximum age of the velocities [ns].
     max_age: i64,
+    /// Maximum age of the arm's state [ns].
+    max_age_of_arm: i64,
 }
 
 /// Parameters of `joint_limit`.
@@ -63,7 +65,8 @@ pub struct Params {
     /// Fraction of each joint's maximum speed that is used.
     #[param(unit = "1", range = 0.0..=1.0, default = 1.0)]
     speed: f64,
-    /// Maximum age of the velocities and of the arm's state; five periods of the graph if not given.
+    /// Maximum age of the velocities and of the arm's state; five periods of the slowest device behind each if not
+    /// given.
     #[param(unit = "ms", above = 0.0)]
     max_age_ms: Option<f64>,
 }
@@ -121,7 +124,9 @@ impl Node for JointLimit {
         setup.outputs.velocity = JointsShape { joints: joints.clone(), unit: Unit::RADIAN.per_second() };
         (setup.outputs.lead, setup.outputs.joint_position) = (fraction(), fraction());
         (setup.outputs.joint_speed, setup.outputs.joint_acceleration) = (fraction(), fraction());
-        Ok(Self { joints, lead: params.lead_rad, max_age: max_age(params.max_age_ms, setup.period) })
+        let max_age = |input| max_age(params.max_age_ms, setup.sample_period(input));
+        let max_age_of_arm = max_age("position").max(max_age("equilibrium"));
+        Ok(Self { joints, lead: params.lead_rad, max_age: max_age("velocity"), max_age_of_arm })
     }
 
     fn state(&self) -> Limiter {
@@ -130,8 +135,9 @@ impl Node for JointLimit {
 
     fn step(&self, tick: &Tick, inputs: Inputs<'_>, out: &mut Outputs, limiter: &mut Limiter) {
         let arm = inputs.position.stamp().oldest(inputs.equilibrium.stamp());
-        let is_fresh = |stamp: Stamp| stamp.age(tick.now) <= self.max_age && !tick.is_halted;
-        let wanted = inputs.velocity.filter(|velocity| is_fresh(velocity.stamp()) && is_fresh(arm));
+        let is_fresh = |stamp: Stamp, max_age: i64| stamp.age(tick.now) <= max_age && !tick.is_halted;
+        let is_arm_fresh = is_fresh(arm, self.max_age_of_arm);
+        let wanted = inputs.velocity.filter(|velocity| is_arm_fresh && is_fresh(velocity.stamp(), self.max_age));
         let wanted = wanted.map(|velocity| &*velocity.value().0);
         let (position, equilibrium) = (&inputs.position.0, &inputs.equilibrium.0);
         let Some([lead, position, speed, acceleration]) =

@@ -105,7 +105,7 @@ impl Node for SecondContactLimit {
     };
 
     fn new(params: Params, setup: &mut Setup<Self>) -> Result<Self, Mistakes> {
-        let gauge = Gauge::new(&params, &setup.inputs.image, setup.period, &mut setup.warnings)?;
+        let gauge = Gauge::new(&params, &setup.inputs.image, setup.sample_period("image"), &mut setup.warnings)?;
         setup.is_uncalibrated = gauge.is_uncalibrated();
         (setup.outputs.force, setup.outputs.peak) = (fraction(), fraction());
         setup.warnings.extend(same_place([&setup.inputs.pose, &setup.inputs.image_pose]));

@@ -23,8 +23,8 @@ pub(crate) struct ExitContext<'a> {
     pub(crate) port: &'a dyn Fn(PortRef) -> Option<&'a PlannedPort>,
     /// The poses of the task that a sample can change.
     pub(crate) poses: Vec<PortRef>,
-    /// Default time after which a signal is lost [ns].
-    pub(crate) lost_after: i64,
+    /// Returns the default time after which the signal of a port is lost [ns].
+    pub(crate) lost_after: &'a dyn Fn(PortRef) -> i64,
 }
 
 impl ExitContext<'_> {
@@ -146,7 +146,7 @@ impl ExitContext<'_> {
             return bad_condition(span, message).help(help).into_err();
         };
         let (watched, name) = self.watched(of)?;
-        let after = table.after_ms.map_or(self.lost_after, nanos);
+        let after = table.after_ms.map_or_else(|| (self.lost_after)(watched.source), nanos);
         Ok((Condition::Lost(watched, after), format!("`{name}` is lost")))
     }
 

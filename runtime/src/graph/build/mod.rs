@@ -5,6 +5,7 @@ mod demand;
 mod modes;
 mod nodes;
 mod params;
+mod sample_periods;
 mod tasks;
 
 pub(crate) use modes::{BuiltModes, build_modes};

@@ -71,6 +71,7 @@ fn exits(builder: &mut Builder<'_>, nodes: &[PlannedNode]) -> Vec<Vec<PlannedExi
     let poses = poses.filter(|(source, _)| builder.net.roles_of(source.producer).next().is_some());
     let poses: Vec<_> = poses.map(|(source, port)| (source, port.name.as_str())).collect();
     let flat = builder.net.flat;
+    let lost_after = |source: PortRef| default_max_age_ns(builder.sample_periods.of(source.producer));
     let context = |task: usize| ExitContext {
         net: builder.net,
         task,
@@ -81,7 +82,7 @@ fn exits(builder: &mut Builder<'_>, nodes: &[PlannedNode]) -> Vec<Vec<PlannedExi
             .filter(|(_, name)| name.starts_with(&flat.tasks[task].prefix))
             .map(|(pose, _)| *pose)
             .collect(),
-        lost_after: default_max_age_ns(builder.period),
+        lost_after: &lost_after,
     };
     let contexts: Vec<_> = (0..flat.tasks.len()).map(context).collect();
     let (measured, diagnostics) = (&mut builder.measured, &mut builder.diagnostics);

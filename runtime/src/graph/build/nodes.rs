@@ -2,6 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use super::sample_periods::SamplePeriods;
 use crate::graph::bench::{BoundRole, OpenedBench, place_mistakes};
 use crate::graph::check::frames::Frames;
 use crate::graph::check::units::{UnitMismatch, UnitOrigin, Units};
@@ -22,6 +23,8 @@ pub(crate) struct Builder<'a> {
     pub(super) sources: SourceMap,
     /// Nominal time between two ticks [s].
     pub(crate) period: f64,
+    /// Nominal time between two samples behind each port.
+    pub(super) sample_periods: SamplePeriods,
     /// Ports whose shape is known so far.
     pub(crate) ports: BTreeMap<PortRef, PlannedPort>,
     /// The unit variables of each node.
@@ -50,6 +53,7 @@ impl<'a> Builder<'a> {
             diagnostics,
             sources,
             period,
+            sample_periods: SamplePeriods::new(net, opened, period),
             ports: BTreeMap::new(),
             units: BTreeMap::new(),
             origins: BTreeMap::new(),
@@ -166,11 +170,15 @@ impl Builder<'_> {
         let (kind, spec) = self.net.nodes[index]?;
         let mut inputs: Vec<(Need, Vec<PlannedWire>)> =
             spec.inputs.iter().map(|input| (input.need, Vec::new())).collect();
-        let mut given = Given { inputs: vec![Vec::new(); spec.inputs.len()], period: self.period };
+        let count = spec.inputs.len();
+        let sample_periods = vec![self.period; count];
+        let mut given = Given { inputs: vec![Vec::new(); count], period: self.period, sample_periods };
         let mut units = Units::default();
         let mut is_complete = wires.len() == node.block.wires.valid.len();
         for wire in wires {
             let input = &spec.inputs[wire.input];
+            let slowest = &mut given.sample_periods[wire.input];
+            *slowest = slowest.max(self.sample_periods.of(wire.source.producer));
             inputs[wire.input].1.push(PlannedWire {
                 source: wire.source,
                 age: wire.origin.age,
@@ -358,9 +366,10 @@ impl Builder<'_> {
         })
     }
 
-    /// Returns the age limit of a command wire; the default is five periods of the graph.
+    /// Returns the age limit of a command wire; the default is five periods of the slowest device behind it.
     fn age_limit(&self, wire: &CommandWire) -> AgeLimit {
-        wire.origin.age.unwrap_or(AgeLimit { max_age: default_max_age_ns(self.period), stale: Policy::Hold })
+        let period = self.sample_periods.of(wire.source.producer);
+        wire.origin.age.unwrap_or(AgeLimit { max_age: default_max_age_ns(period), stale: Policy::Hold })
     }
 }
 

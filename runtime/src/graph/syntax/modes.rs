@@ -121,7 +121,7 @@ pub(crate) struct ExitTable {
     #[param(unit = "ms", range = 0.0..=3.6e6)]
     pub(crate) for_ms: Option<f64>,
     /// Time in the mode; for `on_lost`, how long the signal must be lost. The default of `on_lost` is five periods of
-    /// the graph.
+    /// the slowest device behind the signal.
     #[param(unit = "ms", range = 0.001..=3.6e6)]
     pub(crate) after_ms: Option<f64>,
     /// Distance that the sensor travels in the mode.
