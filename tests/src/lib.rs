@@ -24,6 +24,13 @@ pub fn shipped_graphs() -> Vec<PathBuf> {
     toml_files(&workspace().join("graphs"))
 }
 
+/// The tasks that ship and drive one arm, and not the graphs that consist of such tasks.
+#[must_use]
+pub fn single_tasks() -> Vec<PathBuf> {
+    let is_single = |path: &PathBuf| std::fs::read_to_string(path).is_ok_and(|text| text.contains("\n[commands]\n"));
+    shipped_graphs().into_iter().filter(is_single).collect()
+}
+
 /// A task that ships, on the bench whose pad and arm do as they are told.
 #[must_use]
 pub fn on_the_mock_bench(task: &str) -> Request {

@@ -16,7 +16,7 @@ use tactflow_runtime::harness::NodeRig;
 use tactflow_runtime::node::{Limits, Node};
 use tactflow_runtime::signal::{Image, ImageShape, Kind, Pose, PoseShape, Shape, Twist, TwistShape, Unit};
 use tactflow_runtime::source::{Code, Diagnostic, Report};
-use tactflow_tests::{catalogue, shipped_graphs, workspace};
+use tactflow_tests::{catalogue, shipped_graphs, single_tasks, workspace};
 use tempfile::TempDir;
 use toml::Table;
 
@@ -121,7 +121,7 @@ fn a_pose_that_no_sensor_measures_reaches_neither_a_limiter_nor_the_arm() {
 #[test]
 fn without_any_one_number_no_shipped_graph_loads() {
     let folder = copied();
-    for graph in shipped_graphs() {
+    for graph in single_tasks() {
         let graph = graph.file_name().unwrap().to_str().unwrap();
         let path = folder.path().join(graph);
         let whole = table(&path);

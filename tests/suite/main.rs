@@ -51,6 +51,7 @@ mod situations;
 mod svg;
 mod tick;
 mod tidy;
+mod together;
 mod tool;
 mod touch;
 mod udp_pad;

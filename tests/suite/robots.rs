@@ -5,7 +5,7 @@ use std::fs;
 use tactflow_runtime::engine::Engine;
 use tactflow_runtime::graph::{Request, compile};
 use tactflow_runtime::signal::{Features, Pose};
-use tactflow_tests::{catalogue, workspace};
+use tactflow_tests::{catalogue, single_tasks, workspace};
 
 use crate::course::get;
 
@@ -71,9 +71,8 @@ fn a_task_holds_the_contact_on_every_robot_with_only_another_bench() {
 
 #[test]
 fn every_shipped_task_loads_on_every_robot() {
-    let tasks = fs::read_dir(workspace().join("graphs")).unwrap().map(|entry| entry.unwrap().path());
-    let tasks: Vec<_> = tasks.filter(|path| path.extension().is_some_and(|end| end == "toml")).collect();
-    assert!(tasks.len() >= 9);
+    let tasks = single_tasks();
+    assert!(tasks.len() >= 10);
     for path in tasks {
         let text = fs::read_to_string(&path).unwrap();
         let bench = text.split("bench = \"benches/").nth(1).and_then(|rest| rest.split('"').next()).unwrap();

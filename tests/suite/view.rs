@@ -134,11 +134,7 @@ fn what_only_the_page_shows_is_not_lost() {
 
 #[test]
 fn every_task_says_what_it_shows_and_its_page_fits_on_a_screen() {
-    for graph in fs::read_dir(tactflow_tests::workspace().join("graphs")).unwrap() {
-        let path = graph.unwrap().path();
-        if path.extension().is_none_or(|extension| extension != "toml") {
-            continue;
-        }
+    for path in tactflow_tests::single_tasks() {
         let text = fs::read_to_string(&path).unwrap();
         assert!(text.contains("\nshow = [") && text.contains("\nmark = ["), "{}", path.display());
         let page = page(&[path.to_str().unwrap()]);
