@@ -27,6 +27,8 @@ struct CommandPath<'a> {
 
 /// Reports each command whose path lacks a required limit, with the node to insert and its place.
 pub(crate) fn check(net: &Net<'_>, frames: &mut Frames<'_>, diagnostics: &mut Diagnostics) {
+    diagnostics.extend((0..net.roles.len()).filter_map(|role| foreign::on_two_arms(net, role)));
+    let has_two_drivers = net.has_two_drivers();
     for wire in net.commands.iter().filter(|wire| !wire.is_report) {
         // A missing wire has its own diagnostic, and hides the nodes behind it.
         let Some(path) = CommandPath::find(net, wire) else { continue };
@@ -42,10 +44,10 @@ pub(crate) fn check(net: &Net<'_>, frames: &mut Frames<'_>, diagnostics: &mut Di
         }
         let required = path.role.limits.iter().map(|limit| &**limit);
         let missing: Vec<&str> = required.filter(|limit| !held.contains(limit)).collect();
-        if missing.is_empty() {
-            diagnostics.extend(path.unprotected());
-        } else {
+        if !missing.is_empty() {
             diagnostics.push(path.unlimited(&missing, &lost));
+        } else if !has_two_drivers {
+            diagnostics.extend(path.unprotected());
         }
         diagnostics.extend(path.mixed_frames(frames));
         // A wire in the wrong frame has its own diagnostic.
