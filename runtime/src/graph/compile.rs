@@ -27,12 +27,12 @@ pub fn compile(catalogue: &Catalogue, request: &Request) -> Result<Compiled, Rep
 /// Compiles a graph with a loader that may have read other files before.
 pub(crate) fn compile_in(mut loader: Loader, catalogue: &Catalogue, request: &Request) -> Result<Compiled, Report> {
     let mut flat = loader.load(request);
-    let Loader { mut sources, mut diagnostics, mut measured, .. } = loader;
+    let Loader { mut sources, mut diagnostics, mut measured, has_wrong_roles, .. } = loader;
     let is_unreadable = diagnostics
         .iter()
         .any(|d| matches!(d.code, Code::Syntax | Code::Unreadable | Code::EndlessPart | Code::WrongFile));
-    if is_unreadable {
-        // The checks would report everything that a missing file declares as missing.
+    if is_unreadable || has_wrong_roles {
+        // The checks would report everything that a missing file declares, or a missing role provides, as missing.
         return Err(Report::new(sources, split(diagnostics).0));
     }
     if let Some(bench) = &mut flat.bench {

@@ -379,17 +379,22 @@ impl Engine {
         (device.link, device.failed) = (DeviceLink::Gone, Some(why));
     }
 
-    /// Handles a value that is not finite. Under every policy but `fault`, the outputs of the node and of all nodes
-    /// after it become absent, and those nodes are reset: in the tasks that read the value.
+    /// Handles the values that are not finite. In a task the first is the cause of the others, because ports are in the
+    /// order in which nodes write them. Another task may have one of its own.
     #[cold]
     fn on_not_finite(&mut self) -> Result<(), Fault> {
-        // Ports are in the order in which nodes write them, so the first that is not finite is the cause of the others.
-        let bus = &self.core.bus;
-        let is_bad = |port: &usize| {
-            let (planned, id) = &self.ports[*port];
-            !bus.arenas.is_finite(planned.shape.kind(), id.slot)
-        };
-        let port = (0..self.ports.len()).find(is_bad).expect("the finite check failed on some port");
+        for port in 0..self.ports.len() {
+            let (planned, id) = &self.ports[port];
+            if !self.core.bus.arenas.is_finite(planned.shape.kind(), id.slot) {
+                self.drop_not_finite(port)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Handles the value of a port that is not finite. Under every policy but `fault`, the outputs of its node and of
+    /// all nodes after it become absent, and those nodes are reset: in the tasks that read the value.
+    fn drop_not_finite(&mut self, port: usize) -> Result<(), Fault> {
         let runner = self.writers[port].unwrap_or(0);
         self.raise(Origin::Runner(runner), |policy| policy.not_finite.0, Trouble::NotFinite(port))?;
         let is_behind =

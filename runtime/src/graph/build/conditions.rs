@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::f64::consts::FRAC_PI_2;
 use std::ops::Range;
 
-use crate::graph::load::MeasuredValues;
+use crate::graph::load::{Entity, MeasuredValues};
 use crate::graph::net::{Net, Resolved};
 use crate::graph::plan::{Condition, PlannedExit, PlannedPort, PortRef, Test, WatchedPort};
 use crate::graph::syntax::{ExitKind, ExitTable, ModeBlock, ModeExit, PortState, into_diagnostic};
@@ -187,6 +187,7 @@ impl ExitContext<'_> {
             None => (word.value.as_str(), None, resolve(&word.value)?),
             Some((name, feature)) => match (resolve(name), resolve(&word.value)) {
                 (_, Ok(source)) => (word.value.as_str(), None, source),
+                (Err(_), Err(found)) if self.is_path(word) => return Err(found),
                 (source, Err(_)) => (name, Some(feature), source?),
             },
         };
@@ -205,6 +206,15 @@ impl ExitContext<'_> {
                 .into_err();
         };
         Ok((WatchedPort { source, feature: Some(at) }, format!("{name}.{feature}")))
+    }
+
+    /// Returns whether a word is the path of a port in a part, such as `left.modes.servo`, and no feature of an export.
+    fn is_path(&self, word: &Spanned<String>) -> bool {
+        let scopes = &self.net.flat.scopes;
+        let mut names = word.value.split('.');
+        let part = names.next().and_then(|part| scopes[self.scope()].names.get(part));
+        let Some((_, Entity::Part(inner))) = part else { return false };
+        names.next().is_some_and(|port| scopes[*inner].exports.position(port).is_none())
     }
 
     fn scope(&self) -> usize {

@@ -1,6 +1,7 @@
 //! Checks that a node takes facts only of the roles that it reads: the model of one arm does not fit another one.
 
 use std::collections::BTreeSet;
+use std::iter::successors;
 use std::ops::Range;
 
 use crate::graph::net::Net;
@@ -105,7 +106,8 @@ fn report(net: &Net<'_>, node: usize, facts: &[&ForeignFact<'_>]) -> Diagnostic 
     };
     let message = format!("`{name}` takes {params} from the facts of `{role}`, but {why}");
     let place = facts[0].place.clone();
-    let diagnostic = match part {
+    let is_set_around = is_set_around(net, node, &place);
+    let diagnostic = match part.filter(|_| !is_set_around) {
         Some(part) => {
             Diagnostic::new(Code::ForeignFact, part.span.clone(), message).note(place, "the part takes it here")
         }
@@ -122,6 +124,14 @@ fn report(net: &Net<'_>, node: usize, facts: &[&ForeignFact<'_>]) -> Diagnostic 
     let kind = |role: &str| net.flat.roles.get(role).map(|kind| kind.value.as_str());
     let mut known = upstream.into_iter().chain(net.named_frames(node));
     let Some(own) = known.find(|own| kind(own) == kind(role)) else { return diagnostic };
+    if is_set_around {
+        let facts = quoted(facts.iter().map(|fact| format!("{{ from = \"{own}.{}\" }}", fact.fact)));
+        return diagnostic.help(format!("write {facts}"));
+    }
+    // The file of a task has names of its own for its nodes and its roles.
+    let task = net.flat.scopes[net.flat.nodes[node].scope].task;
+    let name = &name[net.flat.tasks[task].prefix.len()..];
+    let own = net.flat.roles.position(own).map_or(own, |own| net.flat.role_in(task, own));
     let path = part.and(name.split_once('.')).map(|(_, inner)| format!("set.{inner}.")).unwrap_or_default();
     let line = |fact: &&ForeignFact<'_>| format!("\n{path}{} = {{ from = \"{own}.{}\" }}", fact.param, fact.fact);
     let lines: String = facts.iter().map(line).collect();
@@ -131,6 +141,14 @@ fn report(net: &Net<'_>, node: usize, facts: &[&ForeignFact<'_>]) -> Diagnostic 
             .edit(Edit::Below(part.span.clone(), lines.trim_start().to_owned())),
         None => diagnostic.help(format!("write in [nodes.{name}]:{lines}")),
     }
+}
+
+/// Returns whether a parameter of a node was written in a file around that of its task, or on the command line.
+fn is_set_around(net: &Net<'_>, node: usize, place: &Range<usize>) -> bool {
+    let flat = net.flat;
+    let (scope, task) = (flat.nodes[node].scope, net.task_of(node).scope);
+    let around = successors(Some(scope), |scope| flat.scopes[*scope].parent.filter(|_| *scope != task));
+    task > 0 && !around.into_iter().any(|scope| flat.scopes[scope].text.contains(&place.start))
 }
 
 /// Returns the first of some roles that is an arm.

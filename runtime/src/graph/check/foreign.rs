@@ -60,6 +60,10 @@ pub(super) fn on_another_arm(
     let frame = frames.of(motion).into_iter().next().flatten()?;
     let sensor = net.flat.roles.position(&frame)?;
     let carrier = net.carrier(sensor).filter(|carrier| *carrier != arm && sensor != arm)?;
+    // A sensor on two arms has its own diagnostic.
+    if net.rival_carriers(sensor).is_some() {
+        return None;
+    }
     let [arm, sensor, carrier] = [arm, sensor, carrier].map(|role| net.name(Producer::Role(role)));
     let name = &net.flat.nodes[limiter].name;
     let message = format!("`{name}` limits the motion of `{arm}` in the frame of `{sensor}`, which is on `{carrier}`");
@@ -89,6 +93,26 @@ pub(super) fn unproven_pose(net: &Net<'_>, frames: &mut Frames<'_>, node: usize)
         Some((measured, _)) => diagnostic.instead(&wire.origin.word.value, &measured),
         None => diagnostic.help(format!("move `{name}` before the limiters, or wire a pose that is measured")),
     })
+}
+
+/// Reports a sensor that two parts have on different arms.
+pub(super) fn on_two_arms(net: &Net<'_>, sensor: usize) -> Option<Diagnostic> {
+    let rivals = net.rival_carriers(sensor)?;
+    let (key, kind) = &net.flat.roles[sensor];
+    let [(one, first), (other, second)] =
+        rivals.map(|(task, arm)| (&net.flat.tasks[task], net.name(Producer::Role(arm))));
+    let (name, kind) = (&key.name, &kind.value);
+    let message = format!(
+        "`{name}` moves with `{first}` in part `{}`, and with `{second}` in part `{}`",
+        one.name(),
+        other.name()
+    );
+    let mut diagnostic = Diagnostic::new(Code::ForeignInput, key.span.clone(), message);
+    let parts = [one, other].into_iter().filter_map(|task| net.flat.scopes[task.scope].part.as_ref());
+    diagnostic.notes.extend(parts.map(|part| (part.span.clone(), "this part takes it".to_owned())));
+    let on = format!("{name} = {{ type = \"{kind}\", on = \"{second}\" }}");
+    let help = format!("give each part a sensor of its own with `roles`, or say which arm carries it, as in `{on}`");
+    Some(diagnostic.help(help))
 }
 
 /// Returns the ports that make the value of a port: itself, or those whose quantity its node passes on. What else the

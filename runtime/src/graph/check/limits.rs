@@ -29,6 +29,8 @@ struct CommandPath<'a> {
 
 /// Reports each command whose path lacks a required limit, with the node to insert and its place.
 pub(crate) fn check(net: &Net<'_>, frames: &mut Frames<'_>, diagnostics: &mut Diagnostics) {
+    diagnostics.extend((0..net.roles.len()).filter_map(|role| foreign::on_two_arms(net, role)));
+    let has_two_drivers = net.has_two_drivers();
     for wire in net.commands.iter().filter(|wire| !wire.is_report) {
         // A missing wire has its own diagnostic, and hides the nodes behind it.
         diagnostics.extend(guards::on_bare_arm(net, wire.role));
@@ -45,10 +47,10 @@ pub(crate) fn check(net: &Net<'_>, frames: &mut Frames<'_>, diagnostics: &mut Di
         }
         let required = path.role.limits.iter().map(|limit| &**limit);
         let missing: Vec<&str> = required.filter(|limit| !held.contains(limit)).collect();
-        if missing.is_empty() {
-            diagnostics.extend(Guards { net, wire, path: &path.nodes }.check(frames));
-        } else {
+        if !missing.is_empty() {
             diagnostics.push(path.unlimited(&missing, &lost));
+        } else if !has_two_drivers {
+            diagnostics.extend(Guards { net, wire, path: &path.nodes }.check(frames));
         }
         diagnostics.extend(path.mixed_frames(frames));
         let first = path.nodes.iter().rposition(|stop| !stop.spec.limits.holds.is_empty()).unwrap_or(0);

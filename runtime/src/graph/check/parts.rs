@@ -15,7 +15,7 @@ pub(crate) fn move_out(flat: &FlatGraph, sources: &SourceMap, diagnostics: Diagn
         if !is_builtin(&diagnostic.span) {
             return diagnostic;
         }
-        let node = node_at(flat, sources, &diagnostic.span);
+        let node = node_at(flat, sources, &diagnostic);
         let moved = node.and_then(|node| Some((node, outermost(flat, node, &is_builtin)?)));
         match moved {
             Some((node, (part, path))) => at_part(diagnostic, node, part, &path),
@@ -25,12 +25,20 @@ pub(crate) fn move_out(flat: &FlatGraph, sources: &SourceMap, diagnostics: Diagn
     moved.collect()
 }
 
-/// Returns the node whose block contains a place: the last one that starts before it in the same file.
-fn node_at<'f>(flat: &'f FlatGraph, sources: &SourceMap, span: &Range<usize>) -> Option<&'f FlatNode> {
+/// Returns the node whose block contains the place of a diagnostic: the last one that starts before it in the same file.
+///
+/// Several parts may have the same file. Then it is the node of the part of which the message names a node first.
+fn node_at<'f>(flat: &'f FlatGraph, sources: &SourceMap, diagnostic: &Diagnostic) -> Option<&'f FlatNode> {
+    let Diagnostic { span, message, .. } = diagnostic;
     let file = sources.file_at(span.start).span();
-    let starts =
-        |node: &&FlatNode| file.contains(&node.block.key.span.start) && node.block.key.span.start <= span.start;
-    flat.nodes.iter().filter(starts).max_by_key(|node| node.block.key.span.start)
+    let start = |node: &FlatNode| node.block.key.span.start;
+    let starts = |node: &&FlatNode| file.contains(&start(node)) && start(node) <= span.start;
+    let last = flat.nodes.iter().filter(starts).map(start).max()?;
+    let named = |node: &&FlatNode| {
+        let part = &node.name[..node.name.len() - node.block.key.name.len()];
+        message.find(&format!("`{part}")).unwrap_or(usize::MAX)
+    };
+    flat.nodes.iter().filter(|node| start(node) == last).min_by_key(named)
 }
 
 /// Returns the place of the innermost part around a node that is written in the user's file, and the path from it to

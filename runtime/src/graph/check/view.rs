@@ -7,6 +7,7 @@ use std::ops::Range;
 use crate::graph::load::Task;
 use crate::graph::net::{Net, report};
 use crate::graph::plan::{PlannedNode, PlannedPort, PlannedShow, PlannedView, PortRef, Producer};
+use crate::graph::syntax::GraphTable;
 use crate::node::Spanned;
 use crate::signal::{Kind, Unit};
 use crate::source::{Code, Diagnostic, Diagnostics};
@@ -80,12 +81,29 @@ fn check_task(
         marks.push((source, word.span.clone()));
         Some(source)
     });
-    let mark = mark.collect::<Vec<_>>().try_into().ok();
+    let mark: Option<[PortRef; 2]> = mark.collect::<Vec<_>>().try_into().ok();
     let is_image = |shown: &&mut PlannedShow| net.port(shown.source).kind == Kind::Image;
-    if let Some(image) = ports.iter_mut().flatten().find(is_image) {
+    let image = ports.iter_mut().flatten().find(is_image);
+    let marked = mark.into_iter().flatten().chain(image.iter().map(|image| image.source));
+    diagnostics.extend(mark.and_then(|_| of_two_sensors(net, table, marked)));
+    if let Some(image) = image {
         image.mark = mark;
     }
     (ports, mark)
+}
+
+/// Reports a mark whose ports, or whose image, descend from different sensors.
+fn of_two_sensors(net: &Net<'_>, table: &GraphTable, marked: impl Iterator<Item = PortRef>) -> Option<Diagnostic> {
+    let marked: Vec<PortRef> = marked.collect();
+    let sensors = |port: &PortRef| net.roles_of(port.producer).collect::<BTreeSet<usize>>();
+    let of_x = sensors(marked.first()?);
+    let is_other = |port: &&PortRef| !of_x.is_empty() && !sensors(port).is_empty() && of_x.is_disjoint(&sensors(port));
+    let other = marked.iter().find(is_other)?;
+    let [x, other] = [&marked[0], other].map(|port| net.port_name(*port));
+    let message = format!("`{x}` and `{other}` are of different sensors");
+    let place = table.mark.as_ref()?[0].span.clone();
+    let help = "`mark` takes the x and the y of one contact, in the first image of `show`";
+    Some(Diagnostic::new(Code::ForeignInput, place, message).help(help))
 }
 
 impl RequestedView {

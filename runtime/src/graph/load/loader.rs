@@ -22,6 +22,8 @@ pub(crate) struct Loader {
     pub(super) open_parts: Vec<PathBuf>,
     /// Whether the maximum number of parts is exceeded, so that loading stops.
     pub(super) is_full: bool,
+    /// Whether a part that is a task has wrong roles, so that nothing is known about what it reads and commands.
+    pub(crate) has_wrong_roles: bool,
 }
 
 impl Loader {

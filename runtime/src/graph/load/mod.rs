@@ -6,6 +6,7 @@ mod measured;
 mod parts;
 mod request;
 mod task;
+mod task_roles;
 mod tasks;
 
 pub(crate) use flat::{Entity, FlatGraph, FlatNode, Scope};

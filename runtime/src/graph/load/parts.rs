@@ -5,6 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use super::flat::{Entity, FlatGraph, FlatNode, Scope};
 use super::loader::{Loader, wrong_file_type};
 use super::task::Task;
+use super::task_roles::TaskPart;
 use crate::graph::syntax::{GraphDocument, OnFail, PartBlock, TASK_SECTIONS, Use};
 use crate::node::FilePath;
 use crate::source::{Code, Diagnostic, Item, Key, Named, Table, Value, quoted, suggest_name};
@@ -42,9 +43,12 @@ impl Loader {
             self.declare(&mut scope, &block.key, Entity::Node(flat.nodes.len()));
             flat.nodes.push(FlatNode { name: format!("{prefix}{}", block.key.name), scope: index, block });
         }
+        let listed = document.parts.iter().flat_map(|part| part.roles.iter());
+        let outer = |name: &String| scope.roles.get(name).unwrap_or(name).clone();
+        let taken: BTreeSet<String> = listed.map(|(_, role)| outer(&role.value)).collect();
         for part in document.parts {
             let reads = reads.get(&part.key.name).map_or(&[][..], Vec::as_slice);
-            let inner = self.part(&part, reads, prefix, index, flat);
+            let inner = self.part(&part, (reads, &taken), prefix, index, flat);
             self.declare(&mut scope, &part.key, inner.map_or(Entity::Unknown, Entity::Part));
         }
         flat.scopes[index] = scope;
@@ -63,11 +67,12 @@ impl Loader {
         scope.names.insert(key.name.clone(), (key.clone(), entity));
     }
 
-    /// Loads a part whose ports the `reads` of its parent name, and returns the index of its scope.
+    /// Loads a part whose ports the `reads` of its parent name, and returns the index of its scope. The parts of the
+    /// parent list the roles `taken`.
     fn part(
         &mut self,
         part: &PartBlock,
-        reads: &[Use],
+        (reads, taken): (&[Use], &BTreeSet<String>),
         prefix: &str,
         parent: usize,
         flat: &mut FlatGraph,
@@ -96,6 +101,7 @@ impl Loader {
             return None;
         }
         self.sections(|sections| sections.correct_part(&mut root));
+        ignore_bench(&mut root);
         let strange = override_with(&mut root, &part.set);
         let mut document = self.sections(|sections| sections.part(&root));
         let wires: Vec<&Key> = part.wires.valid.iter().map(|wire| &wire.key).collect();
@@ -118,19 +124,18 @@ impl Loader {
         self.open_parts.push(canonical);
         let inputs = part.wires.valid.iter().map(|wire| (wire.key.clone(), wire.clone())).collect();
         let key = part.key.clone();
-        let (roles, around) = (self.part_roles(part, parent, flat), flat.scopes[parent].task);
+        let (roles, around) = (self.part_roles(part, is_task, parent, flat), flat.scopes[parent].task);
         let prefix = format!("{prefix}{}.", part.key.name);
         let (parent, part_key) = (Some(parent), Some(key));
         let mut scope = Scope { inputs, parent, part: part_key, roles, text, task: around, ..Scope::default() };
         let ends_run = part.on_fail.as_ref().is_some_and(|(on_fail, _)| *on_fail == OnFail::Run);
         if is_task {
             scope.task = flat.tasks.len();
-            self.diagnostics.extend(Self::missing_roles(&part.key, &document, &scope, flat));
+            self.check_roles(&TaskPart { part, document: &document, scope: &scope, taken }, flat);
             let settings = root.get("graph").cloned();
             let (place, parent, index) = (start, Some(around), flat.scopes.len());
             let task =
                 Task { prefix: prefix.clone(), parent, place, settings, scope: index, ends_run, ..Task::default() };
-            self.compare_roles(&part.key, &document, &scope, flat);
             self.add_task(&document, task, &scope, flat);
         } else if let Some((_, place)) = &part.on_fail {
             let message =
@@ -144,7 +149,13 @@ impl Loader {
 
     /// Returns the role of the graph for each name of a role in a part: those that the part lists, and those of the file
     /// around it.
-    fn part_roles(&mut self, part: &PartBlock, parent: usize, flat: &FlatGraph) -> BTreeMap<String, String> {
+    fn part_roles(
+        &mut self,
+        part: &PartBlock,
+        is_task: bool,
+        parent: usize,
+        flat: &FlatGraph,
+    ) -> BTreeMap<String, String> {
         let mut roles = flat.scopes[parent].roles.clone();
         for (inner, outer) in part.roles.iter() {
             let role = flat.role_at(parent, &outer.value, outer.span.start);
@@ -152,12 +163,13 @@ impl Loader {
                 let unknown = Diagnostic::unknown(Code::UnknownPort, "role", role, &outer.span, flat.roles.names());
                 self.diagnostics.push(unknown);
                 // What follows from the mistake is not reported.
+                self.has_wrong_roles |= is_task;
                 roles
                     .extend(suggest_name(role, flat.roles.names()).map(|meant| (inner.name.clone(), meant.to_owned())));
                 continue;
             }
-            // The name occurs here, and at least once in the file of the part.
-            if self.sources.occurrences(&inner.name) < 2 {
+            // The name occurs here, and at least once in the file of the part. That of a task declares its roles.
+            if !is_task && self.sources.occurrences(&inner.name) < 2 {
                 let message = format!("part `{}` has no role `{}`", part.key.name, inner.name);
                 self.diagnostics.push(Diagnostic::new(Code::UnknownKey, inner.span.clone(), message));
             }
@@ -206,6 +218,14 @@ fn wrong_part(document: &GraphDocument, file: &FilePath, wires: &[&Key], reads: 
     let own = quoted(document.exports.names());
     let help = format!("name the file of the part that is meant; the exports of this one are {own}");
     Some(Diagnostic::new(Code::UnknownPort, file.span.clone(), message + &more).help(help))
+}
+
+/// Removes the bench that a task names for itself, so that its file need not be there.
+fn ignore_bench(root: &mut Table) {
+    let graph = root.entries.iter_mut().find(|(key, _)| key.name == "graph");
+    if let Some((_, Value { item: Item::Table(table), .. })) = graph {
+        table.remove("bench");
+    }
 }
 
 /// Merges `set.NAME` of a part into its node NAME, or into the `set` of its part NAME. Returns the names of neither.

@@ -5,7 +5,7 @@ use super::loader::Loader;
 use super::task::Task;
 use crate::graph::syntax::{Allowance, CommandEntry, GraphDocument, LimitSection, ModeBlock, NO_ARM, WireEntry};
 use crate::node::Spanned;
-use crate::source::{Code, Diagnostic, Diagnostics, Key};
+use crate::source::{Code, Diagnostic, Key};
 
 impl Loader {
     /// Adds the task of a document, whose file has that scope, and moves the sections of the task there.
@@ -54,43 +54,5 @@ impl Loader {
                 }
             }
         }
-    }
-
-    /// Compares the types of the roles that a part declares with those of the roles of the graph.
-    pub(super) fn compare_roles(&mut self, part: &Key, document: &GraphDocument, scope: &Scope, flat: &FlatGraph) {
-        for (key, kind) in document.roles.iter() {
-            let outer = scope.roles.get(&key.name).unwrap_or(&key.name);
-            let Some(known) = flat.roles.get(outer).filter(|known| known.value != kind.value) else { continue };
-            let message =
-                format!("part `{}` takes a `{}`, but `{outer}` is a `{}`", part.name, kind.value, known.value);
-            let diagnostic = Diagnostic::new(Code::WrongRole, part.span.clone(), message);
-            let diagnostic = diagnostic.note(kind.span.clone(), "the part declares it here");
-            let help = format!("name another role in [parts.{}] with `roles.{}`", part.name, key.name);
-            self.diagnostics.push(diagnostic.note(known.span.clone(), "the graph declares it here").help(help));
-        }
-    }
-
-    /// Returns the mistakes of a part whose file declares roles that the graph does not have.
-    pub(super) fn missing_roles(part: &Key, document: &GraphDocument, scope: &Scope, flat: &FlatGraph) -> Diagnostics {
-        let known = || flat.roles.names();
-        let missing = document
-            .roles
-            .iter()
-            .filter(|(key, _)| !scope.roles.contains_key(&key.name) && flat.roles.position(&key.name).is_none());
-        let report = |(key, kind): &(Key, Spanned<String>)| {
-            let name = &key.name;
-            let message = format!("part `{}` takes a role `{name}`, and the graph has none of that name", part.name);
-            let fit = known().zip(flat.roles.iter()).filter(|(_, (_, other))| other.value == kind.value);
-            let fit: Vec<&str> = fit.map(|(name, _)| name).collect();
-            let help = match fit.as_slice() {
-                [] => format!("declare it under [roles]: `{name} = \"{}\"`", kind.value),
-                [first, ..] => {
-                    format!("name the role of the graph in [parts.{}]: `roles.{name} = \"{first}\"`", part.name)
-                }
-            };
-            let diagnostic = Diagnostic::new(Code::UnknownPort, part.span.clone(), message);
-            diagnostic.note(key.span.clone(), "the part declares it here").help(help)
-        };
-        missing.map(report).collect()
     }
 }

@@ -1,6 +1,7 @@
 //! Connects wires and commands to their sources, and compares kinds.
 
 use std::collections::BTreeMap;
+use std::ops::Range;
 
 use super::{CommandWire, Net, Wire, WireOrigin, report};
 use crate::device::RoleType;
@@ -98,7 +99,7 @@ impl Net<'_> {
             };
             wires.extend(self.command(index, *task, wire, diagnostics));
         }
-        self.check_drivers(&wires, diagnostics);
+        self.check_drivers(&mut wires, diagnostics);
         wires
     }
 
@@ -136,15 +137,22 @@ impl Net<'_> {
         Some(CommandWire { role, command, is_report, origin, source, task })
     }
 
-    /// Reports commands and reports that two tasks drive.
-    fn check_drivers(&self, wires: &[CommandWire], diagnostics: &mut Diagnostics) {
-        let mut first: BTreeMap<(usize, bool, usize), &CommandWire> = BTreeMap::new();
-        for wire in wires {
-            let Some(other) = first.insert((wire.role, wire.is_report, wire.command), wire) else { continue };
-            let message = format!("two tasks drive `{}`", self.command_name(wire));
+    /// Reports commands and reports that two tasks drive, and removes the second wire of each report.
+    fn check_drivers(&self, wires: &mut Vec<CommandWire>, diagnostics: &mut Diagnostics) {
+        let mut first: BTreeMap<(usize, bool, usize), (usize, Range<usize>)> = BTreeMap::new();
+        wires.retain(|wire| {
+            let own = (wire.task, wire.origin.word.span.clone());
+            let Some((task, place)) = first.insert((wire.role, wire.is_report, wire.command), own) else { return true };
+            let [one, other] = [task, wire.task].map(|task| match self.flat.tasks[task].name() {
+                "" => "the graph".to_owned(),
+                name => format!("part `{name}`"),
+            });
+            let message = format!("`{}` has two drivers: {one} and {other}", self.command_name(wire));
             let diagnostic = wire.origin.diagnostic(Code::DuplicateName, message);
-            let diagnostic = diagnostic.note(other.origin.word.span.clone(), "the other one drives it here");
-            diagnostics.push(diagnostic.help("give each part an arm of its own with `roles`"));
-        }
+            let diagnostic = diagnostic.note(place, "the other one drives it here");
+            diagnostics
+                .push(diagnostic.help("give each part an arm of its own with `roles`, or remove one of the wires"));
+            !wire.is_report
+        });
     }
 }

@@ -84,6 +84,9 @@ impl<'a> Net<'a> {
         if carrier.is_none() && self.flat.carriers.get(role).is_some_and(|on| on.value != NO_ARM) {
             return true;
         }
+        if self.flat.roles.position(role).is_some_and(|role| self.rival_carriers(role).is_some()) {
+            return true;
+        }
         let mut roles = self.roles_of(Producer::Node(node)).peekable();
         roles.peek().is_none() || roles.any(|read| self.name(Producer::Role(read)) == role || Some(read) == carrier)
     }
@@ -95,12 +98,27 @@ impl<'a> Net<'a> {
             return self.flat.roles.position(&on.value).filter(|arm| *arm != sensor && self.is_arm(*arm));
         }
         let all: Vec<usize> = (0..self.roles.len()).collect();
-        let tasks = self.flat.tasks.iter().skip(1).map(|task| &task.roles).filter(|roles| roles.contains(&sensor));
-        let only = |roles: &Vec<usize>| {
-            let mut arms = roles.iter().copied().filter(|role| self.is_arm(*role));
-            arms.next().filter(|arm| *arm != sensor && arms.next().is_none())
-        };
-        std::iter::once(&all).chain(tasks).find_map(only)
+        self.only_arm(&all, sensor).or_else(|| self.carriers_in_tasks(sensor).next().map(|(_, arm)| arm))
+    }
+
+    /// Returns the parts that have a sensor on their only arm, each with the arm.
+    fn carriers_in_tasks(&self, sensor: usize) -> impl Iterator<Item = (usize, usize)> {
+        let tasks = self.flat.tasks.iter().enumerate().skip(1).filter(move |(_, task)| task.roles.contains(&sensor));
+        tasks.filter_map(move |(number, task)| Some((number, self.only_arm(&task.roles, sensor)?)))
+    }
+
+    /// Returns the only arm among some roles, unless it is the sensor itself.
+    fn only_arm(&self, roles: &[usize], sensor: usize) -> Option<usize> {
+        let mut arms = roles.iter().copied().filter(|role| self.is_arm(*role));
+        arms.next().filter(|arm| *arm != sensor && arms.next().is_none())
+    }
+
+    /// Returns two parts that have one sensor on different arms, each with its arm, if no file says which arm it is on.
+    pub(crate) fn rival_carriers(&self, sensor: usize) -> Option<[(usize, usize); 2]> {
+        let first = self.carriers_in_tasks(sensor).next()?;
+        let second = self.carriers_in_tasks(sensor).find(|(_, arm)| *arm != first.1)?;
+        let is_open = self.flat.carriers.get(&self.flat.roles[sensor].0.name).is_none();
+        (is_open && !self.is_arm(sensor)).then_some([first, second])
     }
 
     /// Returns the role of the graph that a name means which is written at `at`, in a parameter of a node.
@@ -117,6 +135,14 @@ impl<'a> Net<'a> {
         let role =
             |value: &'a Value| Some(self.flat.role_at(self.flat.nodes[node].scope, value.as_str()?, value.span.start));
         values.filter_map(role).collect()
+    }
+
+    /// Returns whether two tasks drive one command, which has its own diagnostic: then nothing is known about the arms
+    /// that are meant.
+    pub(crate) fn has_two_drivers(&self) -> bool {
+        let mut seen = BTreeSet::new();
+        let mut wires = self.commands.iter().map(|wire| (wire.role, wire.is_report, wire.command));
+        !wires.all(|command| seen.insert(command))
     }
 
     /// Returns whether a role is commanded.

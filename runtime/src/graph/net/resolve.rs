@@ -45,9 +45,15 @@ impl Net<'_> {
             return self.resolve_at_depth(*inner, &rest, depth + 1);
         }
         let Some((name, port)) = word.value.split_once('.').filter(|(_, port)| !port.contains('.')) else {
-            let diagnostic = unknown(format!("`{}` is not a port", word.value));
+            let first = word.value.split('.').next().unwrap_or_default();
+            let is_path = word.value.contains('.') && first != INPUTS && !names.contains_key(first);
+            let diagnostic = match is_path {
+                true => unknown_name(first.len(), format!("there is no role, node or part `{first}`")),
+                false => unknown(format!("`{}` is not a port", word.value)),
+            };
             return match self.port_like(scope, &word.value) {
                 Some(port) => diagnostic.instead(&word.value, &port),
+                None if is_path => self.suggest_name_in(scope, first, diagnostic),
                 None => diagnostic.help(self.ports_help(scope, word)),
             }
             .into_err();
@@ -88,12 +94,15 @@ impl Net<'_> {
                     unknown_name(name.len(), message)
                         .help(format!("declare `{name}` under [roles]: the bench binds it"))
                 }
-                None => unknown_name(name.len(), message).suggest(name, known(), "roles, nodes and parts"),
+                None => self.suggest_name_in(scope, name, unknown_name(name.len(), message)),
             }
             .into_err();
         };
         self.port_of(*entity, port, depth).unwrap_or_else(|| {
             let message = format!("`{name}` has no output `{port}`");
+            if let Some(help) = self.path_help(name, *entity, port) {
+                return unknown_port(port.len(), message).help(help).into_err();
+            }
             unknown_port(port.len(), message).suggest(port, self.ports_of(*entity).into_iter(), "outputs").into_err()
         })
     }
@@ -112,6 +121,36 @@ impl Net<'_> {
         let Some(outputs) = self.outputs(producer) else { return Some(Err(None)) };
         let port = outputs.iter().position(|output| output.name == port)?;
         Some(Ok(PortRef { producer, port }))
+    }
+
+    /// Suggests a name for an unknown one in a scope, or how to get what the file around that scope calls by this name.
+    fn suggest_name_in(&self, scope: usize, name: &str, diagnostic: Diagnostic) -> Diagnostic {
+        let Scope { names, parent, part, roles, .. } = &self.flat.scopes[scope];
+        if let Some((own, _)) = roles.iter().find(|(own, outer)| *outer == name && names.contains_key(*own)) {
+            return diagnostic.instead(name, own);
+        }
+        let around = parent.filter(|around| self.flat.scopes[*around].names.contains_key(name));
+        if let Some(part) = around.and(part.as_ref()) {
+            return diagnostic.help(format!(
+                "`{name}` belongs to the file around this one: declare an input under [{INPUTS}] here, read it as \
+                 `{INPUTS}.NAME`, and wire it in [parts.{}] with `in.NAME`",
+                part.name
+            ));
+        }
+        let known = names.keys().map(String::as_str).chain(parent.map(|_| INPUTS));
+        diagnostic.suggest(name, known, "roles, nodes and parts")
+    }
+
+    /// Returns how to name a port in a part that does not export it: a flag of a mode, or any port if it has no exports.
+    fn path_help(&self, name: &str, entity: Entity, port: &str) -> Option<String> {
+        let Entity::Part(inner) = entity else { return None };
+        let Scope { exports, task, .. } = &self.flat.scopes[inner];
+        let is_mode = self.flat.tasks[*task].scope == inner && self.flat.mode_names(*task).any(|mode| mode == port);
+        if is_mode {
+            return Some(format!("write `{name}.{MODES}.{port}`, which is set while `{name}` is in that mode"));
+        }
+        let (example, _) = self.ports_in(inner).next().filter(|_| exports.is_empty())?;
+        Some(format!("name a port in the part by its path, such as `{name}.{example}`"))
     }
 
     /// Returns the help for a word that is not of the form `node.port`.

@@ -124,6 +124,8 @@ pub(crate) struct PartBlock {
     pub(crate) set: Table,
     /// The role for each name of a role in the file of the part.
     pub(crate) roles: Named<Spanned<String>>,
+    /// The names in `roles`, also those whose value is no text.
+    pub(crate) listed_roles: BTreeSet<String>,
     /// Whether its failure ends the run, and the place of that key.
     pub(crate) on_fail: Option<(OnFail, Range<usize>)>,
 }
@@ -349,7 +351,10 @@ impl<'a> Sections<'a> {
         correct_keys(&mut table, &["file", "in", "set", "roles", "on_fail"], "", &mut self.reader);
         let on_fail = table.remove("on_fail");
         let on_fail = on_fail.and_then(|(key, value)| Some((OnFail::read(&value, &mut self.reader)?, key.span)));
-        let roles = table.remove("roles").map(|(_, value)| self.words(Some(&value))).unwrap_or_default();
+        let roles = table.remove("roles").map(|(_, value)| value);
+        let listed = roles.as_ref().and_then(Value::as_table).into_iter().flat_map(|table| &table.entries);
+        let listed_roles = listed.map(|(key, _)| key.name.clone()).collect();
+        let roles = self.words(roles.as_ref());
         let wires = self.wires(&mut table);
         let mut set = table.remove("set").map(|(_, value)| value);
         set.iter_mut().for_each(|value| correct_facts(value, &mut self.reader));
@@ -363,7 +368,7 @@ impl<'a> Sections<'a> {
                 None
             }
         };
-        PartBlock { key, file, wires, set, roles, on_fail }
+        PartBlock { key, file, wires, set, roles, listed_roles, on_fail }
     }
 
     /// Reads the table `in` of a block.
