@@ -36,7 +36,7 @@ fn a_palm_and_five_fingers_hold_a_contact_each() {
 
 #[test]
 fn a_finger_without_an_object_fails_alone() {
-    let engine = run("hand.toml", &["devices.ring.objects=[]"], 6.0);
+    let engine = run("hand.toml", &["devices.ring.objects=[]"], 11.0);
     for task in parts(&engine) {
         let has_failed = matches!(task.end(), Some(TaskEnd::Failed(_)));
         assert_eq!(has_failed, task.name() == "ring", "{}", task.name());
