@@ -9,7 +9,7 @@ use std::path::Path;
 
 use crate::catalogue::Catalogue;
 use crate::graph::{Request, compile};
-use crate::node::PortSpec;
+use crate::node::{PortSpec, frame_args};
 use crate::signal::Kind;
 use crate::source::{Item, SourceMap, Table, Value, parse_table};
 
@@ -44,7 +44,9 @@ pub fn example_graph(catalogue: &Catalogue, name: &str) -> Result<String, String
     let target = &parts[start];
     let used = match target.is_device || !is_unused(&chosen, target) {
         true => None,
-        false => insert_into_wire(catalogue, &chosen, target).or_else(|| append_log(catalogue, &chosen, target)),
+        false => insert_into_wire(catalogue, &chosen, target)
+            .or_else(|| append_log(catalogue, &chosen, target))
+            .or_else(|| show_output(catalogue, &chosen, target)),
     };
     Ok(used.unwrap_or_else(|| text(&chosen, target, None)))
 }
@@ -111,6 +113,16 @@ fn append_log(catalogue: &Catalogue, chosen: &[&ExamplePart], target: &ExamplePa
     Some(graph).filter(|text| is_clean(catalogue, text))
 }
 
+/// Shows the first output of the target. Returns the graph if it loads without a warning.
+fn show_output(catalogue: &Catalogue, chosen: &[&ExamplePart], target: &ExamplePart) -> Option<String> {
+    let (_, spec) = catalogue.find_node(&target.kind)?;
+    let (name, port) = (target.names.first()?, &spec.outputs.first()?.name);
+    let graph = text(chosen, target, None);
+    let (head, rest) = graph.split_once("[graph]\n")?;
+    let graph = format!("{head}[graph]\nshow = [\"{name}.{port}\"]\n{rest}");
+    Some(graph).filter(|text| is_clean(catalogue, text))
+}
+
 /// Parses the examples of the catalogue: those of the nodes, then those of the devices.
 fn parts(catalogue: &Catalogue) -> Result<Vec<ExamplePart>, String> {
     let nodes = catalogue.specs().map(|spec| (spec.name.clone(), spec.example.clone(), false));
@@ -136,12 +148,21 @@ fn part(catalogue: &Catalogue, kind: &str, example: &str, is_device: bool) -> Re
         let inputs = node.as_table().and_then(|node| node.get("in")).and_then(Value::as_table);
         wires.extend(inputs.into_iter().flat_map(strings));
         collect_facts(node, &mut needs);
+        needs.extend(named_roles(catalogue, kind, node));
     }
     let commands = table("commands");
     wires.extend(commands.entries.iter().filter_map(|(_, wires)| wires.as_table()).flat_map(strings));
     needs.extend(wires.iter().filter_map(|wire| Some(wire.split_once('.')?.0.to_owned())));
     let names = keys(if is_device { &roles } else { &nodes });
     Ok(ExamplePart { kind: kind.to_owned(), is_device, names, sensors, needs, wires, sections: sections(example) })
+}
+
+/// Returns the roles whose frames the block of a node names.
+fn named_roles(catalogue: &Catalogue, kind: &str, block: &Value) -> Vec<String> {
+    let Some((_, spec)) = catalogue.find_node(kind) else { return Vec::new() };
+    let frames = spec.outputs.iter().flat_map(frame_args).filter_map(|arg| arg.strip_prefix('$'));
+    let named = frames.filter_map(|param| block.as_table()?.get(param)?.as_str());
+    named.filter_map(|frame| Some(frame.split('.').next()?.to_owned())).collect()
 }
 
 /// Returns the strings in a table.
