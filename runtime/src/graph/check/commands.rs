@@ -11,7 +11,8 @@ pub(crate) fn check(net: &Net<'_>, diagnostics: &mut Diagnostics) {
     let driven: BTreeSet<(&str, &str)> = wires.clone().collect();
     // A wire to an unknown role or command, or to one that has a wire, has its own diagnostic, and may be meant for any
     // that has none.
-    let has_misspelt_role = net.has_two_drivers() || driven.iter().any(|(role, _)| net.flat.roles.position(role).is_none());
+    let has_misspelt_role =
+        net.has_two_drivers() || driven.iter().any(|(role, _)| net.flat.roles.position(role).is_none());
     let has_port = |(role, port): &(&str, &str)| {
         let kind = net.flat.roles.position(role).and_then(|role| net.roles[role]);
         kind.is_some_and(|kind| kind.commands.iter().chain(&kind.reports).any(|known| known.name == *port))

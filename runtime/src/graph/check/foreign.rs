@@ -75,7 +75,8 @@ pub(super) fn on_another_arm(
 pub(super) fn on_two_arms(net: &Net<'_>, sensor: usize) -> Option<Diagnostic> {
     let rivals = net.rival_carriers(sensor)?;
     let (key, kind) = &net.flat.roles[sensor];
-    let [(one, first), (other, second)] = rivals.map(|(task, arm)| (&net.flat.tasks[task], net.name(Producer::Role(arm))));
+    let [(one, first), (other, second)] =
+        rivals.map(|(task, arm)| (&net.flat.tasks[task], net.name(Producer::Role(arm))));
     let (name, kind) = (&key.name, &kind.value);
     let message = format!(
         "`{name}` moves with `{first}` in part `{}`, and with `{second}` in part `{}`",

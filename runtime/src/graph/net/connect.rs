@@ -150,7 +150,8 @@ impl Net<'_> {
             let message = format!("`{}` has two drivers: {one} and {other}", self.command_name(wire));
             let diagnostic = wire.origin.diagnostic(Code::DuplicateName, message);
             let diagnostic = diagnostic.note(place, "the other one drives it here");
-            diagnostics.push(diagnostic.help("give each part an arm of its own with `roles`, or remove one of the wires"));
+            diagnostics
+                .push(diagnostic.help("give each part an arm of its own with `roles`, or remove one of the wires"));
             !wire.is_report
         });
     }
