@@ -49,6 +49,8 @@ mod robots;
 mod sim;
 mod situations;
 mod svg;
+mod task_crossings;
+mod tasks;
 mod tick;
 mod tidy;
 mod together;

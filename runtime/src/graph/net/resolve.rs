@@ -210,10 +210,14 @@ impl Net<'_> {
         self.scope_ports(scope).candidate(node, input)
     }
 
-    /// Returns the exports of the parts in the graph, each with the full name of the port behind it.
+    /// Returns the exports of the parts in the graph and in its tasks, and what the tasks call the roles: each with the
+    /// full name of the port behind it.
     pub(crate) fn exports_by_name(&self) -> Vec<(String, String)> {
-        let ports = self.ports_in(0).map(|(name, port)| (name, self.port_name(port)));
-        // A role or a node of the graph itself has its full name there.
+        let ports = self.flat.tasks.iter().flat_map(|task| {
+            let ports = self.ports_in(task.scope);
+            ports.map(|(name, port)| (format!("{}{name}", task.prefix), self.port_name(port)))
+        });
+        // A role of the graph, or a node of a task, has its full name there.
         ports.filter(|(name, port)| name != port).collect()
     }
 
