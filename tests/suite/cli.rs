@@ -338,7 +338,8 @@ fn ctrl_c_ends_an_endless_run_cleanly_and_soon() {
         running.signal(signal);
         let (took, said) = running.end();
         assert_eq!((said.code, said.err.as_str()), (0, ""), "{pace:?} {signal}");
-        assert!(took < Duration::from_secs(1), "{pace:?} {signal}: it took {took:?}");
+        // Far longer than it takes, and far shorter than the run.
+        assert!(took < Duration::from_secs(10), "{pace:?} {signal}: it took {took:?}");
         let ending = said.out.lines().find(|line| line.starts_with("interrupted after")).expect("a summary");
         let ticks = ending.split(" and ").nth(1).unwrap().split(' ').next().unwrap();
         let rows = peer("rows.py", &[&path]);

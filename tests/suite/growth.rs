@@ -28,7 +28,7 @@ struct Cost {
 }
 
 /// Returns the time that this thread has spent on a processor [ns].
-fn processor_time() -> f64 {
+pub(crate) fn processor_time() -> f64 {
     let text = fs::read_to_string("/proc/thread-self/schedstat").unwrap();
     text.split(' ').next().unwrap().parse().unwrap()
 }

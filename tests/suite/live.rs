@@ -73,11 +73,11 @@ fn run(peer: &Peer, duration: f64) -> (End, Vec<f64>, Vec<f64>) {
 
 #[test]
 fn every_sample_counts_once_and_silence_makes_it_old() {
-    let peer = Peer::start(20, 0.01, 5.0, "0");
-    let (end, steps, ages) = run(&peer, 0.8);
+    let peer = Peer::start(20, 0.02, 9.0, "0");
+    let (end, steps, ages) = run(&peer, 1.5);
     assert_eq!(end, End::Duration);
     let last = *steps.last().unwrap();
-    assert!((10.0..=20.0).contains(&last), "{last} of 20 samples; a late reader sees the newest only");
+    assert!((5.0..=20.0).contains(&last), "{last} of 20 samples; a late reader sees the newest only");
     assert!(steps.len() as f64 > last + 20.0, "a timer ticks on: {} ticks", steps.len());
     assert!(*ages.last().unwrap() > 200.0, "{ages:?}");
 }
@@ -152,11 +152,14 @@ fn a_driver_that_blocks_stops_neither_the_ticks_nor_the_end_of_the_run() {
 
 #[test]
 fn a_clock_device_that_is_late_is_waited_for() {
-    // Every 20 ms where 10 are nominal: late, but within the three periods of patience.
-    let (_, _, ages) = run(&Peer::start(40, 0.02, 5.0, "0"), 0.7);
-    let on_time = ages.iter().filter(|age| **age < 5.0).count();
-    let in_between = ages.iter().filter(|age| (5.0..20.0).contains(*age)).count();
-    assert!(on_time >= 15 && in_between * 2 < on_time, "a timer ticks between the samples: {ages:?}");
+    // Every 15 ms where 10 are nominal: late, but within the three periods of patience. A timer that does not wait would
+    // tick once or twice between two samples. On a busy machine, some are later than that.
+    let (_, steps, _) = run(&Peer::start(100, 0.015, 9.0, "0"), 1.4);
+    let first = steps.iter().position(|count| *count > 0.0).expect("there are samples");
+    let last = steps.iter().rposition(|count| *count < steps[steps.len() - 1]).expect("there are several") + 1;
+    let (ticks, samples) = (last - first, steps[last] - steps[first]);
+    let between = ticks as f64 - samples;
+    assert!(samples >= 20.0 && between * 2.0 < samples, "{between} ticks of a timer and {samples} samples: {steps:?}");
 }
 
 #[test]

@@ -1,10 +1,12 @@
 //! The device of docs/writing-a-device.md in a graph: a pad that goes silent holds the arm until it is back.
 
 use std::net::{SocketAddr, UdpSocket};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::{self, JoinHandle};
 use std::time::Duration;
 
-use tactflow_runtime::engine::{End, Engine, RunOptions, run};
+use tactflow_runtime::engine::{End, Engine, Halt, RunOptions, run};
 use tactflow_runtime::fault::Cause;
 use tactflow_runtime::graph::{Request, compile};
 use tactflow_tests::{catalogue, workspace};
@@ -17,32 +19,67 @@ enum Act {
     Frames(u32),
     /// Sends a datagram that is no frame.
     Nonsense,
-    /// Sends nothing for so long [ms], and waits for the next hello.
-    Silence(u64),
+    /// Sends nothing until the test says so, and waits for the next hello.
+    Silence,
+    /// Sends frames to the end of the test, 10 ms apart.
+    FramesToTheEnd,
 }
 
-/// A pad of 16 by 16 tactels that nothing touches. Returns its address.
-fn pad(script: Vec<Act>) -> (SocketAddr, JoinHandle<()>) {
+/// A pad of 16 by 16 tactels that nothing touches. It follows its script in steps that the test takes, as a busy machine
+/// has a time of its own.
+struct Pad {
+    address: SocketAddr,
+    /// Whether the silence is over.
+    speaks: Arc<AtomicBool>,
+    is_over: Arc<AtomicBool>,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl Pad {
+    /// Ends the pad, and fails if it has failed.
+    fn end(mut self) {
+        self.is_over.store(true, Ordering::SeqCst);
+        self.thread.take().expect("it ends once").join().unwrap();
+    }
+}
+
+impl Drop for Pad {
+    fn drop(&mut self) {
+        self.speaks.store(true, Ordering::SeqCst);
+        self.is_over.store(true, Ordering::SeqCst);
+    }
+}
+
+fn pad(script: Vec<Act>) -> Pad {
     let socket = UdpSocket::bind("127.0.0.1:0").unwrap();
     socket.set_read_timeout(Some(Duration::from_secs(10))).unwrap();
     let address = socket.local_addr().unwrap();
     let hello = move |socket: &UdpSocket| socket.recv_from(&mut [0; 8]).expect("the driver says hello").1;
-    let handle = thread::spawn(move || {
+    let [speaks, is_over] = [(); 2].map(|()| Arc::new(AtomicBool::new(false)));
+    let (may_speak, must_end) = (speaks.clone(), is_over.clone());
+    let wait = || thread::sleep(Duration::from_millis(10));
+    let thread = thread::spawn(move || {
         let mut driver = hello(&socket);
         let mut number = 0_u64;
+        let mut frame = |driver: SocketAddr| {
+            number += 1;
+            let datagram = [&number.to_le_bytes()[..], &[0; 4 * 256]].concat();
+            socket.send_to(&datagram, driver).unwrap();
+            wait();
+        };
         for act in script {
             match act {
-                Act::Frames(count) => {
-                    for _ in 0..count {
-                        number += 1;
-                        let datagram = [&number.to_le_bytes()[..], &[0; 4 * 256]].concat();
-                        socket.send_to(&datagram, driver).unwrap();
-                        thread::sleep(Duration::from_millis(10));
+                Act::Frames(count) => (0..count).for_each(|_| frame(driver)),
+                Act::FramesToTheEnd => {
+                    while !must_end.load(Ordering::SeqCst) {
+                        frame(driver);
                     }
                 }
                 Act::Nonsense => drop(socket.send_to(b"nonsense", driver).unwrap()),
-                Act::Silence(ms) => {
-                    thread::sleep(Duration::from_millis(ms));
+                Act::Silence => {
+                    while !may_speak.load(Ordering::SeqCst) {
+                        wait();
+                    }
                     socket.set_nonblocking(true).unwrap();
                     while socket.recv_from(&mut [0; 8]).is_ok() {}
                     socket.set_nonblocking(false).unwrap();
@@ -51,7 +88,7 @@ fn pad(script: Vec<Act>) -> (SocketAddr, JoinHandle<()>) {
             }
         }
     });
-    (address, handle)
+    Pad { address, speaks, is_over, thread: Some(thread) }
 }
 
 fn bench(address: SocketAddr) -> String {
@@ -63,32 +100,42 @@ fn bench(address: SocketAddr) -> String {
     )
 }
 
+fn is_lost(halt: &Halt) -> bool {
+    matches!(halt.fault.cause, Cause::Lost(_))
+}
+
 /// The pad states no pressure.
 const SETPOINT: &str = "nodes.error.setpoint.pressure=0.1";
 
 #[test]
 fn a_pad_that_goes_silent_holds_the_arm_until_it_is_back() {
-    let (address, handle) = pad(vec![Act::Frames(50), Act::Silence(400), Act::Frames(100)]);
+    let pad = pad(vec![Act::Frames(30), Act::Silence, Act::FramesToTheEnd]);
     let request = Request::file(workspace().join("graphs/force.toml")).set("policy.device='hold'").set(SETPOINT);
-    let request = Request { bench_text: Some(bench(address)), ..request };
+    let request = Request { bench_text: Some(bench(pad.address)), ..request };
     let compiled = compile(&catalogue(), &request).unwrap_or_else(|report| panic!("{}", report.render(false)));
     let mut engine = Engine::new(compiled);
     let mut fastest = Vec::new();
-    let options = RunOptions { duration: Some(1.5), ..RunOptions::default() };
+    let options = RunOptions { duration: Some(3.0), ..RunOptions::default() };
     let outcome = run(&mut engine, &options, &mut |engine| {
         let command = engine.commands("arm").unwrap();
         fastest.push((engine.now(), command.iter().fold(0.0, |fastest: f64, speed| fastest.max(speed.abs()))));
+        let is_long = |halt: &Halt| halt.until.is_none() && engine.now() - halt.fault.time > 200_000_000;
+        if engine.halts().iter().any(|halt| is_lost(halt) && is_long(halt)) {
+            pad.speaks.store(true, Ordering::SeqCst);
+        }
     });
     assert_eq!(outcome.unwrap().end, End::Duration);
-    handle.join().unwrap();
+    pad.end();
     let all: Vec<String> = engine.halts().iter().map(|halt| halt.fault.to_string()).collect();
-    let lost = engine.halts().iter().find(|halt| matches!(halt.fault.cause, Cause::Lost(_)));
+    // On a busy machine, a frame may be late too.
+    let length = |halt: &&Halt| halt.until.map_or(0, |until| until - halt.fault.time);
+    let lost = engine.halts().iter().filter(|halt| is_lost(halt)).max_by_key(length);
     let lost = lost.unwrap_or_else(|| panic!("{all:?}"));
     assert_eq!((lost.fault.node.as_str(), lost.fault.port.as_deref()), ("pad", Some("image")));
     assert!(lost.fault.to_string().contains("no frame for 100ms"), "{all:?}");
     let until = lost.until.expect("it is over when the pad is back");
     let held = until - lost.fault.time;
-    assert!((150_000_000..900_000_000).contains(&held), "{held} ns");
+    assert!(held > 200_000_000, "{held} ns");
     let moves = |from: i64, to: i64| fastest.iter().filter(|(at, _)| (from..to).contains(at)).any(|(_, v)| *v > 0.0);
     assert!(moves(0, lost.fault.time), "it approaches");
     assert!(!moves(until - 50_000_000, until), "it is held");
@@ -99,13 +146,14 @@ fn a_pad_that_goes_silent_holds_the_arm_until_it_is_back() {
 
 #[test]
 fn the_summary_of_a_run_says_what_a_device_has_counted() {
-    let (address, handle) = pad(vec![Act::Frames(5), Act::Nonsense, Act::Nonsense, Act::Frames(20)]);
+    let pad = pad(vec![Act::Frames(5), Act::Nonsense, Act::Nonsense, Act::FramesToTheEnd]);
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("bench.toml");
-    std::fs::write(&file, bench(address)).unwrap();
+    // The pad is never lost here, however late a frame is.
+    std::fs::write(&file, bench(pad.address).replace("silence_s = 0.1", "silence_s = 30.0")).unwrap();
     let bench = format!("--bench={}", file.display());
-    let Said { code, out, err } = say(&["run", "graphs/force.toml", &bench, "--for", "300ms", "--set", SETPOINT]);
+    let Said { code, out, err } = say(&["run", "graphs/force.toml", &bench, "--for", "1s", "--set", SETPOINT]);
     assert_eq!(code, 0, "{err}");
     assert!(out.contains("device `skin`: 2 bad frames\n"), "{out}");
-    handle.join().unwrap();
+    pad.end();
 }
