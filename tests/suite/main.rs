@@ -47,6 +47,7 @@ mod sim;
 mod situations;
 mod svg;
 mod task_crossings;
+mod task_folder;
 mod tasks;
 mod tick;
 mod tidy;
