@@ -4,7 +4,7 @@
 use tactflow_runtime::graph::compile;
 use tactflow_tests::catalogue;
 
-use crate::tasks::{Edit, Folder, LEFT_ROLES};
+use crate::task_folder::{Edit, Folder, LEFT_ROLES};
 
 /// The mistakes of a graph as text, with their codes; empty if it loads.
 fn mistakes(edits: &[Edit<'_>], set: &[&str]) -> (Vec<&'static str>, String) {
@@ -29,7 +29,7 @@ const TWO: &str = "two.toml";
 const LEFT: &str = "left.toml";
 
 /// Replaces the roles of the part `left`.
-fn in_left_block(text: &str) -> Edit<'_> {
+const fn in_left_block(text: &str) -> Edit<'_> {
     (TWO, LEFT_ROLES, text)
 }
 
@@ -49,81 +49,83 @@ fn it_loads_as_it_is() {
     }
 }
 
+/// Wrong roles: the changes, the code and what the message names.
+const OF_ROLES: &[(&[Edit<'static>], &str, &str)] = &[
+    (&[in_left_block("")], "unknown-port", "part `left` takes a role `pad`"),
+    (&[in_left_block("")], "unknown-port", "`roles.arm = \"left_arm\"`"),
+    (&[in_left_block("roles = { arm = 'left_arm' }")], "unknown-port", "`roles.pad = \"left_pad\"`"),
+    (&[in_left_block("roles = { pad = 'left_pad' }")], "unknown-port", "`roles.arm = \"left_arm\"`"),
+    (&[in_left_block("roles = { padd = 'left_pad', arm = 'left_arm' }")], "unknown-key", "did you mean `pad`?"),
+    (&[in_left_block("roles = { pad = 'left_pda', arm = 'left_arm' }")], "unknown-port", "did you mean `left_pad`?"),
+    (&[in_left_block("roles = { pad = 'pad', arm = 'left_arm' }")], "unknown-port", "roles here: `left_pad`"),
+    (
+        &[in_left_block("roles = { pad = 'right.touch', arm = 'left_arm' }")],
+        "unknown-port",
+        "there is no role `right.touch`",
+    ),
+    (&[in_left_block("roles = { pad = 'right.pad', arm = 'left_arm' }")], "unknown-port", "did you mean `right_pad`?"),
+    (&[in_left_block("roles = { pad = 3, arm = 'left_arm' }")], "bad-value", "expected a string"),
+    (
+        &[in_left_block("roles = { pad = 'left_arm', arm = 'left_arm' }")],
+        "wrong-role",
+        "takes a `tactile_pad`, but `left_arm`",
+    ),
+    (
+        &[in_left_block("roles = { pad = 'left_arm', arm = 'left_pad' }")],
+        "wrong-role",
+        "takes a `velocity_arm`, but `left_pad`",
+    ),
+    (
+        &[in_left_block("roles = { pad = 'right_pad', arm = 'left_arm' }")],
+        "foreign-input",
+        "`right_pad` moves with `left_arm` in part `left`, and with `right_arm` in part `right`",
+    ),
+    (
+        &[in_left_block("roles = { pad = 'left_pad', arm = 'right_arm' }")],
+        "duplicate-name",
+        "`right_arm.velocity` has two drivers: part `left` and part `right`",
+    ),
+    (
+        &[in_left_block("roles = { pad = 'right_pad', arm = 'right_arm' }")],
+        "duplicate-name",
+        "`right_arm.contact` has two drivers",
+    ),
+    (&[in_left_block("role = { pad = 'left_pad', arm = 'left_arm' }")], "unknown-key", "did you mean `roles`?"),
+    (
+        &[
+            in_left_block("roles = { pad = 'left_pad', arm = 'left_arm', pad2 = 'left_pad' }"),
+            (LEFT, "[roles]", "[roles]\npad2 = 'tactile_pad'"),
+        ],
+        "wrong-role",
+        "takes `pad2` and `pad`, and both are `left_pad`",
+    ),
+    (
+        &[(LEFT, "pad = \"tactile_pad\"", "pad = { type = 'tactile_pad', on = 'right_arm' }")],
+        "unknown-port",
+        "roles here: `pad`, `arm`",
+    ),
+    (
+        &[(TWO, "left_pad = \"tactile_pad\"", "left_pad = { type = 'tactile_pad', on = 'right_arm' }")],
+        "foreign-input",
+        "`left_pad`, which is on `right_arm`",
+    ),
+    (&[(TWO, "[parts.left]", "[parts.left_arm]")], "duplicate-name", "the name `left_arm` is used twice"),
+    (&[(TWO, "[parts.left]", "[parts.modes]")], "bad-name", "`modes` is not a valid name"),
+    (
+        &[in_left_block("roles = { pad = 'left_pad', arm = 'left_arm' }\non_fail = 'stop'")],
+        "bad-value",
+        "expected `part` or `run`",
+    ),
+    (
+        &[in_left_block("roles = { pad = 'left_pad', arm = 'left_arm' }\non_fial = 'run'")],
+        "unknown-key",
+        "did you mean `on_fail`?",
+    ),
+];
+
 #[test]
 fn the_roles_of_a_part_are_its_own() {
-    let roles = |text| (TWO, LEFT_ROLES, text);
-    assert_refused(&[
-        (&[roles("")], "unknown-port", "part `left` takes a role `pad`"),
-        (&[roles("")], "unknown-port", "`roles.arm = \"left_arm\"`"),
-        (&[roles("roles = { arm = 'left_arm' }")], "unknown-port", "`roles.pad = \"left_pad\"`"),
-        (&[roles("roles = { pad = 'left_pad' }")], "unknown-port", "`roles.arm = \"left_arm\"`"),
-        (&[roles("roles = { padd = 'left_pad', arm = 'left_arm' }")], "unknown-key", "did you mean `pad`?"),
-        (&[roles("roles = { pad = 'left_pda', arm = 'left_arm' }")], "unknown-port", "did you mean `left_pad`?"),
-        (&[roles("roles = { pad = 'pad', arm = 'left_arm' }")], "unknown-port", "roles here: `left_pad`"),
-        (
-            &[roles("roles = { pad = 'right.touch', arm = 'left_arm' }")],
-            "unknown-port",
-            "there is no role `right.touch`",
-        ),
-        (&[roles("roles = { pad = 'right.pad', arm = 'left_arm' }")], "unknown-port", "did you mean `right_pad`?"),
-        (&[roles("roles = { pad = 3, arm = 'left_arm' }")], "bad-value", "expected a string"),
-        (
-            &[roles("roles = { pad = 'left_arm', arm = 'left_arm' }")],
-            "wrong-role",
-            "takes a `tactile_pad`, but `left_arm`",
-        ),
-        (
-            &[roles("roles = { pad = 'left_arm', arm = 'left_pad' }")],
-            "wrong-role",
-            "takes a `velocity_arm`, but `left_pad`",
-        ),
-        (
-            &[roles("roles = { pad = 'right_pad', arm = 'left_arm' }")],
-            "foreign-input",
-            "`right_pad` moves with `left_arm` in part `left`, and with `right_arm` in part `right`",
-        ),
-        (
-            &[roles("roles = { pad = 'left_pad', arm = 'right_arm' }")],
-            "duplicate-name",
-            "`right_arm.velocity` has two drivers: part `left` and part `right`",
-        ),
-        (
-            &[roles("roles = { pad = 'right_pad', arm = 'right_arm' }")],
-            "duplicate-name",
-            "`right_arm.contact` has two drivers",
-        ),
-        (&[roles("role = { pad = 'left_pad', arm = 'left_arm' }")], "unknown-key", "did you mean `roles`?"),
-        (
-            &[
-                roles("roles = { pad = 'left_pad', arm = 'left_arm', pad2 = 'left_pad' }"),
-                (LEFT, "[roles]", "[roles]\npad2 = 'tactile_pad'"),
-            ],
-            "wrong-role",
-            "takes `pad2` and `pad`, and both are `left_pad`",
-        ),
-        (
-            &[(LEFT, "pad = \"tactile_pad\"", "pad = { type = 'tactile_pad', on = 'right_arm' }")],
-            "unknown-port",
-            "roles here: `pad`, `arm`",
-        ),
-        (
-            &[(TWO, "left_pad = \"tactile_pad\"", "left_pad = { type = 'tactile_pad', on = 'right_arm' }")],
-            "foreign-input",
-            "`left_pad`, which is on `right_arm`",
-        ),
-        (&[(TWO, "[parts.left]", "[parts.left_arm]")], "duplicate-name", "the name `left_arm` is used twice"),
-        (&[(TWO, "[parts.left]", "[parts.modes]")], "bad-name", "`modes` is not a valid name"),
-        (
-            &[roles("roles = { pad = 'left_pad', arm = 'left_arm' }\non_fail = 'stop'")],
-            "bad-value",
-            "expected `part` or `run`",
-        ),
-        (
-            &[roles("roles = { pad = 'left_pad', arm = 'left_arm' }\non_fial = 'run'")],
-            "unknown-key",
-            "did you mean `on_fail`?",
-        ),
-    ]);
+    assert_refused(OF_ROLES);
 }
 
 #[test]
@@ -214,174 +216,175 @@ fn input(from: &str) -> [(&'static str, &'static str, String); 2] {
     ]
 }
 
+const FAIL: &str = "fail = { after_ms = 10000, after_travel_mm = 60, of = \"move.sensor_pose\" }";
+const STILL: &str = "twist = [0, 0, 0, 0, 0, 0]          #";
+const GATE: &str = "twist = [0, 0, 0, 0, 0, 0]\nin.gate = \"inputs.partner\"          #";
+const DONE: Edit<'static> = (LEFT, "[modes.servo]", "[modes.servo]\ndone = { when = 'inputs.partner' }");
+const UNBOUND: Edit<'static> = (LEFT, FAIL, "");
+/// What the left task reads of the other one, with the changes, the code and what the message names.
+const OF_PORTS: &[(&str, &[Edit<'static>], &str, &str)] = &[
+    ("right.touch.present", &[UNBOUND, (LEFT, STILL, GATE)], "ungated-motion", "`left.reach`"),
+    ("right.modes.servo", &[UNBOUND, (LEFT, STILL, GATE)], "ungated-motion", "in mode `left.approach`"),
+    (
+        "right.touch.present",
+        &[UNBOUND, (LEFT, "when = \"touch.present\"", "when = \"inputs.partner\"")],
+        "ungated-motion",
+        "`left.reach`",
+    ),
+    (
+        "right.move.sensor_pose",
+        &[(LEFT, FAIL, "fail = { after_travel_mm = 60, of = 'inputs.partner' }")],
+        "ungated-motion",
+        "`left.reach`",
+    ),
+    (
+        "right.touch.present",
+        &[(LEFT, FAIL, "on_lost = { of = 'inputs.partner', to = 'servo' }")],
+        "ungated-motion",
+        "`left.reach`",
+    ),
+    (
+        "right.touch.present",
+        &[(LEFT, "in.contact = \"touch.present\"", "in.contact = \"inputs.partner\"")],
+        "foreign-input",
+        "descends from `right_pad`",
+    ),
+    (
+        "right.touch.image",
+        &[(LEFT, "in.image = \"touch.image\"", "in.image = \"inputs.partner\"")],
+        "frame-mismatch",
+        "`left.move.blind.image` takes an image in `left_pad`",
+    ),
+    (
+        "right.sum.twist",
+        &[(LEFT, "in.twist = \"sum.twist\"", "in.twist = \"inputs.partner\"")],
+        "foreign-input",
+        "left.toml:",
+    ),
+    (
+        "right.error.error",
+        &[(LEFT, "in.error = \"error.error\"", "in.error = \"inputs.partner\"")],
+        "foreign-input",
+        "in the frame of `right_pad`",
+    ),
+    (
+        "right.reach.twist",
+        &[(LEFT, "in.reach = \"reach.twist\"", "in.reach = \"inputs.partner\"")],
+        "frame-mismatch",
+        "`left_pad`",
+    ),
+    ("right.modes.serv", &[DONE], "unknown-port", "did you mean `servo`?"),
+    ("rihgt.modes.servo", &[DONE], "unknown-port", "did you mean `right`?"),
+    ("right.servo", &[DONE], "unknown-port", "write `right.modes.servo`"),
+    ("modes.servo", &[DONE], "unknown-port", "there is no mode `servo`"),
+    (
+        "right.touch.image",
+        &[(LEFT, "[modes.servo]", "[modes.servo]\ndone = { when = 'inputs.partner', is = 'true' }")],
+        "bad-condition",
+        "`inputs.partner` is an image",
+    ),
+    (
+        "right.modes.servo",
+        &[(LEFT, "[modes.servo]", "[modes.servo]\ndone = { when = 'inputs.partnr' }")],
+        "unknown-port",
+        "did you mean `partner`?",
+    ),
+    ("right.modes.servo", &[(TWO, "in.partner", "in.partnr"), DONE], "unknown-input", "did you mean `partner`?"),
+    (
+        "right.modes.servo",
+        &[(TWO, "in.partner = \"right.modes.servo\"", ""), DONE],
+        "missing-input",
+        "part `left` needs a wire to `in.partner`",
+    ),
+    (
+        "right.modes.servo",
+        &[(LEFT, "to = \"servo\"", "to = \"right.servo\"")],
+        "unknown-mode",
+        "there is no mode `right.servo`",
+    ),
+];
+
 #[test]
 fn the_ports_and_the_modes_of_the_other_task_bound_no_motion() {
-    const FAIL: &str = "fail = { after_ms = 10000, after_travel_mm = 60, of = \"move.sensor_pose\" }";
-    const STILL: &str = "twist = [0, 0, 0, 0, 0, 0]          #";
-    const GATE: &str = "twist = [0, 0, 0, 0, 0, 0]\nin.gate = \"inputs.partner\"          #";
-    let done = (LEFT, "[modes.servo]", "[modes.servo]\ndone = { when = 'inputs.partner' }");
-    let unbound = (LEFT, FAIL, "");
-    let cases: [(&str, &[Edit<'_>], &str, &str); 19] = [
-        ("right.touch.present", &[unbound, (LEFT, STILL, GATE)], "ungated-motion", "`left.reach`"),
-        ("right.modes.servo", &[unbound, (LEFT, STILL, GATE)], "ungated-motion", "in mode `left.approach`"),
-        (
-            "right.touch.present",
-            &[unbound, (LEFT, "when = \"touch.present\"", "when = \"inputs.partner\"")],
-            "ungated-motion",
-            "`left.reach`",
-        ),
-        (
-            "right.move.sensor_pose",
-            &[(LEFT, FAIL, "fail = { after_travel_mm = 60, of = 'inputs.partner' }")],
-            "ungated-motion",
-            "`left.reach`",
-        ),
-        (
-            "right.touch.present",
-            &[(LEFT, FAIL, "on_lost = { of = 'inputs.partner', to = 'servo' }")],
-            "ungated-motion",
-            "`left.reach`",
-        ),
-        (
-            "right.touch.present",
-            &[(LEFT, "in.contact = \"touch.present\"", "in.contact = \"inputs.partner\"")],
-            "foreign-input",
-            "descends from `right_pad`",
-        ),
-        (
-            "right.touch.image",
-            &[(LEFT, "in.image = \"touch.image\"", "in.image = \"inputs.partner\"")],
-            "frame-mismatch",
-            "`left.move.blind.image` takes an image in `left_pad`",
-        ),
-        (
-            "right.sum.twist",
-            &[(LEFT, "in.twist = \"sum.twist\"", "in.twist = \"inputs.partner\"")],
-            "foreign-input",
-            "left.toml:",
-        ),
-        (
-            "right.error.error",
-            &[(LEFT, "in.error = \"error.error\"", "in.error = \"inputs.partner\"")],
-            "foreign-input",
-            "in the frame of `right_pad`",
-        ),
-        (
-            "right.reach.twist",
-            &[(LEFT, "in.reach = \"reach.twist\"", "in.reach = \"inputs.partner\"")],
-            "frame-mismatch",
-            "`left_pad`",
-        ),
-        ("right.modes.serv", &[done], "unknown-port", "did you mean `servo`?"),
-        ("rihgt.modes.servo", &[done], "unknown-port", "did you mean `right`?"),
-        ("right.servo", &[done], "unknown-port", "write `right.modes.servo`"),
-        ("modes.servo", &[done], "unknown-port", "there is no mode `servo`"),
-        (
-            "right.touch.image",
-            &[(LEFT, "[modes.servo]", "[modes.servo]\ndone = { when = 'inputs.partner', is = 'true' }")],
-            "bad-condition",
-            "`inputs.partner` is an image",
-        ),
-        (
-            "right.modes.servo",
-            &[(LEFT, "[modes.servo]", "[modes.servo]\ndone = { when = 'inputs.partnr' }")],
-            "unknown-port",
-            "did you mean `partner`?",
-        ),
-        ("right.modes.servo", &[(TWO, "in.partner", "in.partnr"), done], "unknown-input", "did you mean `partner`?"),
-        (
-            "right.modes.servo",
-            &[(TWO, "in.partner = \"right.modes.servo\"", ""), done],
-            "missing-input",
-            "part `left` needs a wire to `in.partner`",
-        ),
-        (
-            "right.modes.servo",
-            &[(LEFT, "to = \"servo\"", "to = \"right.servo\"")],
-            "unknown-mode",
-            "there is no mode `right.servo`",
-        ),
-    ];
-    for (from, edits, code, names) in cases {
+    for (from, edits, code, names) in OF_PORTS {
         let wired = input(from);
         let wired: Vec<Edit<'_>> = wired.iter().map(|(file, at, to)| (*file, *at, to.as_str())).collect();
-        assert_refused(&[(&[&wired, edits].concat(), code, names)]);
+        assert_refused(&[(&[&wired, *edits].concat(), code, names)]);
     }
 }
 
+/// The modes of the graph itself.
+const fn root(modes: &str) -> [Edit<'_>; 2] {
+    [(TWO, "[graph]", "[graph]\nstart = 'a'"), (TWO, "", modes)]
+}
+
+/// Names that are those of another file: the changes, the code and what the message names.
+const OF_NAMES: &[(&[Edit<'static>], &str, &str)] = &[
+    (
+        &[(LEFT, "\"touch.present\", for_ms", "\"right.modes.servo\", for_ms")],
+        "unknown-port",
+        "`right` belongs to the file around this one",
+    ),
+    (&[(LEFT, "\"touch.present\", for_ms", "\"modes.serv\", for_ms")], "unknown-port", "did you mean `servo`?"),
+    (
+        &[(LEFT, "in.contact = \"touch.present\"", "in.contact = \"right.touch.present\"")],
+        "unknown-port",
+        "there is no role, node or part `right`",
+    ),
+    (
+        &[(LEFT, "in.image = \"pad.image\"", "in.image = \"right_pad.image\"")],
+        "unknown-port",
+        "there is no role, node or part `right_pad`",
+    ),
+    (
+        &[(LEFT, "start = \"approach\"", "start = \"right.approach\"")],
+        "unknown-mode",
+        "modes here: `approach`, `servo`",
+    ),
+    (&[(LEFT, "start = \"approach\"\n", "")], "missing-key", "left.toml:2:2"),
+    (
+        &[(LEFT, "\"touch.image\", \"error", "\"right.touch.image\", \"error")],
+        "unknown-port",
+        "there is no role, node or part `right`",
+    ),
+    (&[(TWO, "[graph]", "[graph]\nshow = ['touch.image']")], "unknown-port", "there is no role, node or part `touch`"),
+    (&[(TWO, "[graph]", "[graph]\nshow = ['lefft.touch.image']")], "unknown-port", "did you mean `left`?"),
+    (
+        &[(TWO, "[graph]", "[graph]\nmark = ['left.touch.x', 'right.touch.y']")],
+        "foreign-input",
+        "are of different sensors",
+    ),
+    (
+        &[(TWO, "[graph]", "[graph]\nshow = ['left.touch.image']\nmark = ['right.touch.x', 'right.touch.y']")],
+        "foreign-input",
+        "are of different sensors",
+    ),
+    (
+        &root("[modes.a]\nset.left.pid.gains.x = { kp = 1.0 }\ndone = { after_ms = 100 }"),
+        "unknown-key",
+        "which is in a part with modes of its own",
+    ),
+    (&root("[modes.a]\ngo = { to = 'left.servo', after_ms = 100 }"), "unknown-mode", "there is no mode `left.servo`"),
+    (&root("[modes.a]\ndone = { when = 'left.modes.serv' }"), "unknown-port", "did you mean `servo`?"),
+    (&root("[modes.a]\ndone = { when = 'left.servo' }"), "unknown-port", "write `left.modes.servo`"),
+    (&[(TWO, "[graph]", "[graph]\nstart = 'servo'")], "unknown-mode", "there is no mode `servo`"),
+    (
+        &[
+            (
+                TWO,
+                "",
+                "[nodes.push]\ntype = 'twist_source'\ntwist = [0, 0, 0.01, 0, 0, 0]\nin.gate = 'right.touch.present'",
+            ),
+            (TWO, LEFT_ROLES, "roles = { pad = 'left_pad', arm = 'left_arm' }\nin.more = 'push.twist'"),
+            (LEFT, "in.reach = \"reach.twist\"", "in.reach = \"reach.twist\"\nin.more = \"inputs.more\""),
+            (LEFT, "", "[inputs]\nmore = \"a motion\""),
+        ],
+        "ungated-motion",
+        "`push` moves the arm without a gate",
+    ),
+];
+
 #[test]
 fn the_names_of_one_task_are_not_those_of_the_other_one() {
-    let root = |modes| [(TWO, "[graph]", "[graph]\nstart = 'a'"), (TWO, "", modes)];
-    assert_refused(&[
-        (
-            &[(LEFT, "\"touch.present\", for_ms", "\"right.modes.servo\", for_ms")],
-            "unknown-port",
-            "`right` belongs to the file around this one",
-        ),
-        (&[(LEFT, "\"touch.present\", for_ms", "\"modes.serv\", for_ms")], "unknown-port", "did you mean `servo`?"),
-        (
-            &[(LEFT, "in.contact = \"touch.present\"", "in.contact = \"right.touch.present\"")],
-            "unknown-port",
-            "there is no role, node or part `right`",
-        ),
-        (
-            &[(LEFT, "in.image = \"pad.image\"", "in.image = \"right_pad.image\"")],
-            "unknown-port",
-            "there is no role, node or part `right_pad`",
-        ),
-        (
-            &[(LEFT, "start = \"approach\"", "start = \"right.approach\"")],
-            "unknown-mode",
-            "modes here: `approach`, `servo`",
-        ),
-        (&[(LEFT, "start = \"approach\"\n", "")], "missing-key", "left.toml:2:2"),
-        (
-            &[(LEFT, "\"touch.image\", \"error", "\"right.touch.image\", \"error")],
-            "unknown-port",
-            "there is no role, node or part `right`",
-        ),
-        (
-            &[(TWO, "[graph]", "[graph]\nshow = ['touch.image']")],
-            "unknown-port",
-            "there is no role, node or part `touch`",
-        ),
-        (&[(TWO, "[graph]", "[graph]\nshow = ['lefft.touch.image']")], "unknown-port", "did you mean `left`?"),
-        (
-            &[(TWO, "[graph]", "[graph]\nmark = ['left.touch.x', 'right.touch.y']")],
-            "foreign-input",
-            "are of different sensors",
-        ),
-        (
-            &[(TWO, "[graph]", "[graph]\nshow = ['left.touch.image']\nmark = ['right.touch.x', 'right.touch.y']")],
-            "foreign-input",
-            "are of different sensors",
-        ),
-        (
-            &root("[modes.a]\nset.left.pid.gains.x = { kp = 1.0 }\ndone = { after_ms = 100 }"),
-            "unknown-key",
-            "which is in a part with modes of its own",
-        ),
-        (
-            &root("[modes.a]\ngo = { to = 'left.servo', after_ms = 100 }"),
-            "unknown-mode",
-            "there is no mode `left.servo`",
-        ),
-        (&root("[modes.a]\ndone = { when = 'left.modes.serv' }"), "unknown-port", "did you mean `servo`?"),
-        (&root("[modes.a]\ndone = { when = 'left.servo' }"), "unknown-port", "write `left.modes.servo`"),
-        (&[(TWO, "[graph]", "[graph]\nstart = 'servo'")], "unknown-mode", "there is no mode `servo`"),
-        (
-            &[
-                (
-                    TWO,
-                    "",
-                    "[nodes.push]\ntype = 'twist_source'\ntwist = [0, 0, 0.01, 0, 0, 0]\nin.gate = 'right.touch.present'",
-                ),
-                (TWO, LEFT_ROLES, "roles = { pad = 'left_pad', arm = 'left_arm' }\nin.more = 'push.twist'"),
-                (LEFT, "in.reach = \"reach.twist\"", "in.reach = \"reach.twist\"\nin.more = \"inputs.more\""),
-                (LEFT, "", "[inputs]\nmore = \"a motion\""),
-            ],
-            "ungated-motion",
-            "`push` moves the arm without a gate",
-        ),
-    ]);
+    assert_refused(OF_NAMES);
 }

@@ -45,18 +45,7 @@ impl Net<'_> {
             return self.resolve_at_depth(*inner, &rest, depth + 1);
         }
         let Some((name, port)) = word.value.split_once('.').filter(|(_, port)| !port.contains('.')) else {
-            let first = word.value.split('.').next().unwrap_or_default();
-            let is_path = word.value.contains('.') && first != INPUTS && !names.contains_key(first);
-            let diagnostic = match is_path {
-                true => unknown_name(first.len(), format!("there is no role, node or part `{first}`")),
-                false => unknown(format!("`{}` is not a port", word.value)),
-            };
-            return match self.port_like(scope, &word.value) {
-                Some(port) => diagnostic.instead(&word.value, &port),
-                None if is_path => self.suggest_name_in(scope, first, diagnostic),
-                None => diagnostic.help(self.ports_help(scope, word)),
-            }
-            .into_err();
+            return self.not_a_port(scope, word).into_err();
         };
         if name == INPUTS
             && let Some(parent) = *parent
@@ -121,6 +110,24 @@ impl Net<'_> {
         let Some(outputs) = self.outputs(producer) else { return Some(Err(None)) };
         let port = outputs.iter().position(|output| output.name == port)?;
         Some(Ok(PortRef { producer, port }))
+    }
+
+    /// Reports a word that is neither `node.port` nor the path of a port in a part.
+    fn not_a_port(&self, scope: usize, word: &Spanned<String>) -> Diagnostic {
+        let first = word.value.split('.').next().unwrap_or_default();
+        let is_path = word.value.contains('.') && first != INPUTS && !self.flat.scopes[scope].names.contains_key(first);
+        let diagnostic = match is_path {
+            true => {
+                let message = format!("there is no role, node or part `{first}`");
+                Diagnostic::new(Code::UnknownPort, word.part(0..first.len()), message)
+            }
+            false => Diagnostic::new(Code::UnknownPort, word.span.clone(), format!("`{}` is not a port", word.value)),
+        };
+        match self.port_like(scope, &word.value) {
+            Some(port) => diagnostic.instead(&word.value, &port),
+            None if is_path => self.suggest_name_in(scope, first, diagnostic),
+            None => diagnostic.help(self.ports_help(scope, word)),
+        }
     }
 
     /// Suggests a name for an unknown one in a scope, or how to get what the file around that scope calls by this name.
