@@ -52,9 +52,8 @@ use tactflow_runtime::signal::{Scalar, Twist};
 #[cfg(feature = "cli")]
 pub use tool::tool;
 
-/// Everything there is: one line each.
-#[must_use]
-pub fn catalogue() -> Catalogue {
+/// The built-in files, the roles and the devices: one line each.
+fn edge() -> Catalogue {
     Catalogue::new()
         .files(builtin::FILES)
         .role(roles::tactile_pad())
@@ -69,6 +68,12 @@ pub fn catalogue() -> Catalogue {
         .device::<sim::bench::SimBench>()
         .device::<sim::pair::SimPair>()
         .device::<devices::lockstep::Lockstep>()
+}
+
+/// Everything there is: one line each.
+#[must_use]
+pub fn catalogue() -> Catalogue {
+    edge()
         .group("touch: from a tactile image to features of the contact")
         .node::<touch::tactile_source::TactileSource>()
         .node::<touch::calibrate::Calibrate>()

@@ -158,6 +158,9 @@ impl Engine {
 
     /// Ends a task and those in it with a fault. Returns the fault if it ends the run.
     pub(super) fn fail(&mut self, task: usize, fault: Fault) -> Result<(), Fault> {
+        if self.tasks[task].end.is_some() {
+            return Ok(());
+        }
         if self.tasks[task].ends_run {
             return Err(fault);
         }
