@@ -6,7 +6,7 @@ use std::fs;
 use nalgebra::{IsometryMatrix3, Vector3};
 use tactflow_runtime::engine::Engine;
 use tactflow_runtime::graph::{Compiled, Request, compile};
-use tactflow_runtime::signal::{Joints, Pose, Twist};
+use tactflow_runtime::signal::Pose;
 use tactflow_runtime::source::{Code, Report};
 use tactflow_tests::{catalogue, workspace};
 
@@ -82,6 +82,8 @@ fn with_the_blocks_that_the_message_names_the_graph_loads() {
     let read = |name: &str| fs::read_to_string(workspace().join("tests/errors").join(name)).unwrap();
     let folder = workspace().join("tests/errors");
     let absolute = |text: String| {
+        // The expected messages contain the blocks, too.
+        let text: String = text.lines().filter(|line| !line.starts_with('#')).map(|line| format!("{line}\n")).collect();
         let text = text.replace("\"../../graphs", &format!("\"{}/graphs", workspace().display()));
         text.replace("\"benches/", &format!("\"{}/benches/", folder.display()))
     };
@@ -203,7 +205,8 @@ fn a_bare_arm_moves_its_tip_along_its_own_axis_there_and_back() {
             let mut engine = Engine::new(load(&Request::text(format!("{BARE}{device}{facts}"))));
             let mut places = Vec::new();
             while let Some(next) = engine.next().filter(|next| *next < 1_900_000_000) {
-                if engine.tick(next).is_err() {
+                if let Err(fault) = engine.tick(next) {
+                    eprintln!("FAULT {next} {fault}");
                     break;
                 }
                 places.extend(get::<Pose>(&engine, "move.state.sensor_pose").map(|pose| (next, pose.0)));
@@ -232,7 +235,7 @@ fn a_bare_arm_has_all_limits_but_those_of_pads() {
     let start = BARE.find("[parts.move]").unwrap();
     let end = BARE.find("[modes.there]").unwrap();
     let text = format!("{}{direct}{}{}", &BARE[..start], &BARE[end..], ARMS[0]).replace("move.velocity", "ik.velocity");
-    assert!(help(&refused(&text)).contains("`builtin:parts/bare_move.toml`"), "{}", help(&refused(&text)));
+    assert!(help(&refused(&text)).contains("\"builtin:parts/bare_move.toml\""), "{}", help(&refused(&text)));
 }
 
 #[test]
@@ -264,21 +267,4 @@ fn without_any_one_limiter_of_its_part_no_arm_of_another_kind_loads() {
         }
         assert_eq!(removed, limiters, "{file}");
     }
-}
-
-#[test]
-fn the_arm_gets_no_velocity_while_a_pad_of_two_is_silent() {
-    let text = two_pads().replace("for_s = 4.0\nmount = { xyz = [0.06", "for_s = 1.0\nmount = { xyz = [0.06");
-    let mut engine = Engine::new(load(&Request::text(text)));
-    let mut last = Vec::new();
-    while let Some(next) = engine.next().filter(|next| *next < 2_000_000_000) {
-        if engine.tick(next).is_err() {
-            return;
-        }
-        if next > 1_500_000_000 {
-            last.extend(get::<Joints>(&engine, "move.joints.velocity").map(|joints| joints.0.clone()));
-            assert!(get::<Twist>(&engine, "move.second_contact.twist").is_none(), "the image is old");
-        }
-    }
-    assert!(last.iter().flatten().all(|v| v.abs() < 1e-9), "{last:?}");
 }

@@ -3,14 +3,15 @@
 //! With n the normal of the second pad, p the point on it, and z the normal of the first pad, the second pad approaches
 //! its object at s = n·(v + ω × p). What exceeds the allowed speed is removed without a larger approach at any point of
 //! the first pad: a translation d changes the approach of all its points by z·d. If the pads do not face each other,
-//! n·z >= 0, the excess is removed along n. Otherwise it is removed along the part t of n that is perpendicular to z, up
-//! to the motion along t. What then remains is the first pad's own way out, which drives the second pad into its object:
-//! the whole motion is scaled. See decision 024.
+//! n·z >= 0, the excess is removed along n. Otherwise it is removed along t, the part of n that is perpendicular to z.
+//! The speed along t that this may remove is u + r: the motion along t, and the retreat r of the first pad, so the arm
+//! slides aside at most as fast as it retreats. If that is not enough, the retreat itself drives the second pad into its
+//! object, and the whole motion is scaled; this needs an angle of more than 135 degrees between the normals. See
+//! decision 024.
 
 use nalgebra::{IsometryMatrix3, Vector3};
-use tactflow_runtime::node::{At, Describe, In, Inputs, Limits, Mistake, Mistakes, Node, Out, Outputs, Setup, Tick};
-use tactflow_runtime::signal::{Image, Pose, PoseShape, Scalar, Twist};
-use tactflow_runtime::source::Code;
+use tactflow_runtime::node::{Describe, In, Inputs, Limits, Mistakes, Node, Out, Outputs, Setup, Tick};
+use tactflow_runtime::signal::{Image, Pose, Scalar, Twist};
 
 use super::contact_limit::{Gauge, Params, Pressed, Reading};
 use super::fraction;
@@ -20,22 +21,23 @@ use crate::motion::bounds::countable;
 /// leads away from the object of the second one [1].
 const MIN_SINE: f64 = 1e-6;
 
-/// Pads at a smaller distance are at the same place [m].
-const SAME_PLACE_M: f64 = 1e-6;
+/// A speed below this fraction of the motion is rounding, which must not scale the motion [1].
+const NEGLIGIBLE: f64 = 1e-9;
 
 /// Stops the motion of a second pad into an object when its force or a single tactel reaches its ceiling.
 ///
 /// An arm with two pads has a `contact_limit` for the pad in whose frame the motion is, and behind it a
-/// `second_contact_limit` for the other pad. Both have the same parameters, and each has its own image. The pads are
-/// fixed to each other, or move with joints that both poses contain.
+/// `second_contact_limit` for the other pad. Both have the same parameters, and each has its own image. The pads must
+/// be fixed to each other: the motion of a finger joint is not limited.
 ///
 /// `in.pose` is the pose of the pad in whose frame the motion is, and `in.image_pose` that of the pad of the image. Each
 /// comes from an `arm_state` with the `mount` of its pad.
 ///
 /// The approach of the second pad is its speed along its own normal, at the point of the contact. The node never
-/// increases the approach of the first pad, at any of its points, so the limits of the `contact_limit` before it still
-/// hold. It reduces a retreat of the first pad only if this retreat itself presses the second pad against its object:
-/// then the whole motion is scaled. The retreat of the second pad is always free.
+/// makes an approach of the first pad faster, at any of its points, so the limits of the `contact_limit` before it still
+/// hold. While the normals of the pads are at most 135 degrees apart, it never reduces a retreat of the first pad, and
+/// may add a motion along the first pad, away from the object of the second one. Pads that face each other more exactly
+/// have no such way: then the whole motion is scaled. The retreat of the second pad is always free.
 ///
 /// When the image or one of the poses is older than `max_age_ms` the output is absent.
 ///
@@ -47,7 +49,7 @@ const SAME_PLACE_M: f64 = 1e-6;
 /// in.twist = "contact_limit.twist"
 /// in.pose = "state.sensor_pose"
 /// in.image = "calibrate.image"
-/// in.image_pose = "state.sensor_pose"
+/// in.image_pose = "state.sensor_pose"         # of the second pad, from an `arm_state` of its own
 /// force_n = 15.0
 /// peak_n = 3.0
 /// approach_m_per_s = 0.05
@@ -108,7 +110,6 @@ impl Node for SecondContactLimit {
         let gauge = Gauge::new(&params, &setup.inputs.image, setup.period, &mut setup.warnings)?;
         setup.is_uncalibrated = gauge.is_uncalibrated();
         (setup.outputs.force, setup.outputs.peak) = (fraction(), fraction());
-        setup.warnings.extend(same_place([&setup.inputs.pose, &setup.inputs.image_pose]));
         Ok(Self { gauge })
     }
 
@@ -128,17 +129,6 @@ impl Node for SecondContactLimit {
     }
 }
 
-/// Returns the warning about two pads at one place: probably the bench does not state where one of them is mounted.
-fn same_place([first, second]: [&PoseShape; 2]) -> Option<Mistake> {
-    let (first, second) = (Vector3::from(first.start?), Vector3::from(second.start?));
-    if (first - second).amax() > SAME_PLACE_M {
-        return None;
-    }
-    let message = "both pads are at the same place, so one of them probably has no mount of its own";
-    let warning = Mistake::new(Code::UnusualValue, At::Node, message);
-    Some(warning.help("state the `mount` of each pad in the bench"))
-}
-
 /// Limits the approach at a point of the second pad, whose pose in the frame of the twist is `second`. Returns the
 /// fraction of the approach that passes.
 fn bar(twist: &mut Twist, second: &IsometryMatrix3<f64>, pressed: &Pressed) -> f64 {
@@ -154,8 +144,8 @@ fn bar(twist: &mut Twist, second: &IsometryMatrix3<f64>, pressed: &Pressed) -> f
     let change = retreat(&normal, &velocity, speed - allowed);
     *twist = Twist::new(twist.linear() + change, twist.angular());
     let left = speed + normal.dot(&change);
-    // Rounding alone must not scale the motion.
-    if left - allowed > 1e-12 * speed {
+    let size = velocity.norm() + twist.angular().norm() * point.norm();
+    if left - allowed > NEGLIGIBLE * size {
         twist.0 *= allowed / left;
     }
     allowed / speed
@@ -172,7 +162,8 @@ fn retreat(normal: &Vector3<f64>, velocity: &Vector3<f64>, excess: f64) -> Vecto
         return Vector3::zeros();
     }
     let along = Vector3::new(normal.x / sine, normal.y / sine, 0.0);
-    along * -(excess / sine).min(along.dot(velocity)).max(0.0)
+    let most = along.dot(velocity) - velocity.z.min(0.0);
+    along * -(excess / sine).min(most).max(0.0)
 }
 
 #[cfg(test)]

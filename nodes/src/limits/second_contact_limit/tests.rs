@@ -127,7 +127,7 @@ proptest! {
         }
     }
 
-    /// A retreat of the first pad is reduced only if it alone would press the second pad faster than allowed.
+    /// A retreat of the first pad is reduced only if the normals are more than 135 degrees apart.
     #[test]
     fn a_retreat_of_the_first_pad_is_kept(
         wanted in (vector(0.5), vector(2.0)), mount in a_pose(1.0), load in 5.0..30.0f32, place in 0..16usize,
@@ -143,9 +143,8 @@ proptest! {
         let on_second = mount * Point3::new(point[0], point[1], 0.0);
         let along_first = (between.linear() + between.angular().cross(&on_second.coords)).z;
         let normal = mount * Vector3::z();
-        // The part of the second pad's approach that is the first pad's own motion along its normal.
-        let by_retreat = normal.z * along_first;
-        prop_assert!(is_kept || by_retreat > 0.0 && along_first < 0.0, "{between:?} became {out:?}");
+        let faces = normal.z < -std::f64::consts::FRAC_1_SQRT_2;
+        prop_assert!(is_kept || faces && along_first < 0.0, "{between:?} became {out:?}");
     }
 
     /// A second pad that is not in contact changes nothing, bit by bit.
@@ -195,8 +194,16 @@ fn closed_forms_of_the_ways_out() {
         ("side by side", turned(Vector3::y(), 0.0), [0.1, 0.05, 0.2], [0.1, 0.05, 0.0]),
         // n = (sin 120, 0, cos 120): pressing along x at 0.1 sin 120 is removed along x.
         ("120 degrees, along the first pad", turned(Vector3::y(), sixth), [0.1, 0.05, 0.0], [0.0, 0.05, 0.0]),
-        // s = 0.1 sin 120 + 0.05 * 0.5: x is reduced by s / sin 120 at most by 0.1; the rest is the retreat.
-        ("120 degrees, a retreat alone", turned(Vector3::y(), sixth), [0.0, 0.05, -0.05], [0.0; 3]),
+        // s = 0.05 * 0.5, which is removed along x.
+        ("120 degrees, a retreat alone", turned(Vector3::y(), sixth), [0.0, 0.05, -0.05], [-0.025 / sin, 0.05, -0.05]),
+        // n = (1/2, 0, -sin 120): 0.05 along x removes 0.025 of 0.05 sin 120.
+        ("150 degrees, a retreat alone", turned(Vector3::y(), half - sixth / 4.0), [0.0, 0.05, -0.05], [0.0; 3]),
+        (
+            "a right angle and a bit: the retreat goes on",
+            turned(Vector3::y(), right + 0.002),
+            [0.0, 0.05, -0.2],
+            [-0.2 * 0.002_f64.tan(), 0.05, -0.2],
+        ),
         // Away along x by enough: s = -0.1 sin 120 + 0.025 < 0.
         ("120 degrees, a retreat to the side", turned(Vector3::y(), sixth), [-0.1, 0.05, -0.05], [-0.1, 0.05, -0.05]),
         // The retreat of the first pad and the motion toward the second: 0.05 sin 120 pays for nothing of the retreat.

@@ -2,8 +2,8 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use super::carried::can_carry;
 use super::contact::{ContactPorts, is_sensor};
-use super::guards::can_carry;
 use super::limits::limiters;
 use crate::graph::net::{CommandWire, Net, Wire};
 use crate::graph::plan::PortRef;

@@ -2,14 +2,13 @@
 
 use std::collections::BTreeSet;
 
+use super::carried::{limits_of_sensors, on_no_arm, sensors_on};
 use super::foreign::read_roles;
 use super::frames::Frames;
 use super::second_guard::suggest;
-use crate::device::RoleType;
 use crate::graph::net::limits::PathNode;
 use crate::graph::net::{CommandWire, Net};
 use crate::graph::plan::{PortRef, Producer};
-use crate::node::{NodeSpec, PortSpec};
 use crate::source::{Code, Diagnostic, quoted};
 
 /// A command, and the nodes on its path that pass its motion on, the last one first.
@@ -41,31 +40,6 @@ impl Held {
     fn sensors(&self) -> BTreeSet<usize> {
         self.kept.iter().chain(&self.lost).map(|(_, sensor, _)| *sensor).collect()
     }
-}
-
-/// Reports sensors on an arm whose type has none of the limits that protect them.
-pub(super) fn on_bare_arm(net: &Net<'_>, arm: usize) -> Vec<Diagnostic> {
-    let Some(role) = net.roles[arm].filter(|role| !role.limits.is_empty()) else { return Vec::new() };
-    if !limits_of_sensors(net, role).is_empty() {
-        return Vec::new();
-    }
-    let has_limits = |known: &&RoleType| !limits_of_sensors(net, known).is_empty();
-    let fitting = net.catalogue.roles().iter().filter(has_limits).find(|known| role.is_filled_by(&known.name));
-    let arm_name = net.name(Producer::Role(arm));
-    let report = |sensor: usize| {
-        let (key, kind) = &net.flat.roles[sensor];
-        let message =
-            format!("`{}` is on `{arm_name}`, but no limiter of a `{}` bounds the force on it", key.name, role.name);
-        let other = fitting.map(|known| format!("\notherwise write `{arm_name} = \"{}\"`", known.name));
-        let help = format!("{}{}", on_no_arm(&key.name, &kind.value), other.unwrap_or_default());
-        Diagnostic::new(Code::UnlimitedCommand, key.span.clone(), message).help(help)
-    };
-    sensors_on(net, arm).into_iter().map(report).collect()
-}
-
-/// Returns whether an arm has limits that protect a sensor on it.
-pub(super) fn can_carry(net: &Net<'_>, arm: usize) -> bool {
-    net.roles[arm].is_none_or(|role| role.limits.is_empty() || !limits_of_sensors(net, role).is_empty())
 }
 
 impl Guards<'_> {
@@ -146,7 +120,7 @@ impl Guards<'_> {
         let message = format!("`{}` is on `{arm}`, and no limiter of `{arm}` bounds the force on it", key.name);
         let guard = self.path.iter().find(|stop| held.kept.iter().any(|(_, _, node)| *node == stop.node));
         let other = match held.sensors().len() {
-            0 | 1 => guard.and_then(|guard| suggest(self, guard, sensor, frames)),
+            0 | 1 => guard.and_then(|guard| suggest((self.wire, self.path), guard, sensor, self.net, frames)),
             _ => Some(format!("{TWO_AT_MOST}: `{}` have them", self.names(held).join("` and `"))),
         };
         let other = other.map(|help| format!("\notherwise {help}")).unwrap_or_default();
@@ -157,28 +131,3 @@ impl Guards<'_> {
 
 /// A limiter may increase the motion toward the objects of sensors other than its own and that of the frame.
 const TWO_AT_MOST: &str = "two sensors of an arm at most can have limits of their own";
-
-/// Returns the declarations of limiters that hold for one sensor each, with the input that reads it.
-pub(super) fn all<'n>(net: &'n Net<'_>) -> impl Iterator<Item = (&'n NodeSpec, &'n PortSpec)> {
-    net.catalogue.specs().filter_map(|spec| {
-        let guards = spec.limits.guards?;
-        Some((spec, spec.inputs.iter().find(|input| input.name == guards)?))
-    })
-}
-
-/// Returns the limits of an arm that hold for one sensor each, in their order.
-fn limits_of_sensors<'r>(net: &Net<'_>, arm: &'r RoleType) -> Vec<&'r str> {
-    let is_held = |limit: &&str| all(net).any(|(spec, _)| spec.limits.holds.contains(limit));
-    arm.limits.iter().map(|limit| &**limit).filter(is_held).collect()
-}
-
-/// Returns the sensors on an arm that such limiters can read.
-fn sensors_on(net: &Net<'_>, arm: usize) -> Vec<usize> {
-    let fits = |port: &PortSpec| all(net).any(|(_, input)| input.kind == port.kind && input.quantity == port.quantity);
-    let is_read = |role: &usize| net.roles[*role].is_some_and(|role| role.outputs.iter().any(fits));
-    (0..net.roles.len()).filter(|role| net.carrier(*role) == Some(arm)).filter(is_read).collect()
-}
-
-fn on_no_arm(sensor: &str, kind: &str) -> String {
-    format!("if it is on no arm, write `{sensor} = {{ type = \"{kind}\", on = \"none\" }}`")
-}

@@ -6,10 +6,10 @@
 use std::collections::BTreeSet;
 use std::ops::Range;
 
-use super::foreign;
 use super::frames::{Frames, with_article};
-use super::guards::{self, Guards};
+use super::guards::Guards;
 use super::sums;
+use super::{carried, foreign};
 use crate::device::RoleType;
 use crate::graph::net::limits::PathNode;
 use crate::graph::net::{CommandWire, Net, Wire, WireOrigin};
@@ -31,7 +31,7 @@ struct CommandPath<'a> {
 pub(crate) fn check(net: &Net<'_>, frames: &mut Frames<'_>, diagnostics: &mut Diagnostics) {
     for wire in net.commands.iter().filter(|wire| !wire.is_report) {
         // A missing wire has its own diagnostic, and hides the nodes behind it.
-        diagnostics.extend(guards::on_bare_arm(net, wire.role));
+        diagnostics.extend(carried::on_bare_arm(net, wire.role));
         let Some(path) = CommandPath::find(net, wire) else { continue };
         let mut held: Vec<&str> = Vec::new();
         let mut lost: Vec<(&str, &str)> = Vec::new();

@@ -4,6 +4,7 @@ pub(crate) mod absent;
 pub(crate) mod allow;
 pub(crate) mod approach;
 pub(crate) mod calibration;
+mod carried;
 pub(crate) mod clock;
 pub(crate) mod commands;
 pub(crate) mod contact;

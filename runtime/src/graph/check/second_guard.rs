@@ -1,25 +1,26 @@
 //! Suggests the limiter of a second sensor on an arm: a part that holds the limits of both, or a block to insert.
 
+use super::carried::guards;
 use super::frames::{Frames, with_article};
-use super::guards::{self, Guards};
-use crate::graph::net::Net;
 use crate::graph::net::limits::PathNode;
+use crate::graph::net::{CommandWire, Net};
 use crate::graph::plan::{PortRef, Producer};
 use crate::node::{NodeSpec, PortSpec, frame_args};
 use crate::signal::Kind;
 use crate::source::{FactRef, Table, Value};
 
 /// Returns what to write so that the limits of `sensor` hold as well. `guard` is the limiter of another sensor on the
-/// path.
+/// path of the command, whose last node is the first one.
 pub(super) fn suggest(
-    guards: &Guards<'_>,
+    (wire, path): (&CommandWire, &[PathNode<'_>]),
     guard: &PathNode<'_>,
     sensor: usize,
+    net: &Net<'_>,
     frames: &mut Frames<'_>,
 ) -> Option<String> {
-    let first = guards.net.flat.roles.position(&frames.of(guard.source).into_iter().next().flatten()?)?;
-    let second = Second { guards, guard, first, sensor, spec: find_spec(guards.net, guard.spec)? };
-    match guards.net.flat.nodes[guard.node].scope {
+    let first = net.flat.roles.position(&frames.of(guard.source).into_iter().next().flatten()?)?;
+    let second = Second { net, wire, path, guard, first, sensor, spec: find_spec(net, guard.spec)? };
+    match net.flat.nodes[guard.node].scope {
         0 => Some(second.block(frames)),
         scope => second.part(scope),
     }
@@ -32,12 +33,14 @@ fn find_spec<'n>(net: &'n Net<'_>, guard: &NodeSpec) -> Option<&'n NodeSpec> {
         let has_own_frame = through.is_some_and(|through| frame_args(through).first() != frame_args(input).first());
         has_own_frame && guard.limits.holds.iter().all(|limit| spec.limits.holds.contains(limit))
     };
-    guards::all(net).find(|(spec, input)| is_second(spec, input)).map(|(spec, _)| spec)
+    guards(net).find(|(spec, input)| is_second(spec, input)).map(|(spec, _)| spec)
 }
 
 /// The limiter of a second sensor.
 struct Second<'a> {
-    guards: &'a Guards<'a>,
+    net: &'a Net<'a>,
+    wire: &'a CommandWire,
+    path: &'a [PathNode<'a>],
     guard: &'a PathNode<'a>,
     /// The sensor in whose frame the motion is.
     first: usize,
@@ -48,7 +51,7 @@ struct Second<'a> {
 impl Second<'_> {
     /// Returns the block of a built-in part that replaces the part with the limiter of the first sensor.
     fn part(&self, scope: usize) -> Option<String> {
-        let net = self.guards.net;
+        let net = self.net;
         let old = &net.flat.scopes[scope];
         let name = &old.part.as_ref()?.name;
         let files = net.catalogue.builtin_files().iter().filter(|(file, _)| file.ends_with(".toml"));
@@ -71,7 +74,7 @@ impl Second<'_> {
 
     /// Returns what the names of roles in a part mean: those that the other part has, and a new one for the sensor.
     fn roles_of(&self, part: &toml::Table, scope: usize) -> Vec<String> {
-        let net = self.guards.net;
+        let net = self.net;
         let (given, sensor) = (&net.flat.scopes[scope].roles, net.name(Producer::Role(self.sensor)));
         let mut names: Vec<&str> =
             nodes(part).flat_map(facts).filter_map(|fact| Some(fact.split_once('.')?.0)).collect();
@@ -90,7 +93,7 @@ impl Second<'_> {
 
     /// Returns the port of the second sensor that fits an input of a part: the last one in the order of the graph.
     fn port_of(&self, part: &toml::Table, input: &str) -> Option<String> {
-        let net = self.guards.net;
+        let net = self.net;
         let word = format!("inputs.{input}");
         let read = nodes(part).find_map(|node| {
             let wires = node.get("in")?.as_table()?;
@@ -103,7 +106,7 @@ impl Second<'_> {
 
     /// Returns the last port of the graph that fits an input and descends from the second sensor alone.
     fn find_port(&self, input: &PortSpec) -> Option<String> {
-        let net = self.guards.net;
+        let net = self.net;
         let fits = |port: PortRef| {
             let declared = net.port(port);
             let is_known = declared.quantity == input.quantity || is_passed(declared.quantity.as_deref());
@@ -117,7 +120,7 @@ impl Second<'_> {
 
     /// Returns the block of the limiter behind the first one, and that of the pose of the second sensor if it has none.
     fn block(&self, frames: &mut Frames<'_>) -> String {
-        let (net, name) = (self.guards.net, &*self.spec.name);
+        let (net, name) = (self.net, &*self.spec.name);
         let first = &net.flat.nodes[self.guard.node].name;
         let output = self.guard.spec.outputs.first().map_or("", |port| &port.name);
         let through = self.spec.limits.through.unwrap_or_default();
@@ -144,9 +147,9 @@ impl Second<'_> {
         for (key, value) in params.into_iter().flat_map(|table| &table.entries) {
             block.push_str(&format!("\n{} = {}", key.name, text(value)));
         }
-        let taker = self.guards.path.iter().find(|stop| stop.source.producer == Producer::Node(self.guard.node));
+        let taker = self.path.iter().find(|stop| stop.source.producer == Producer::Node(self.guard.node));
         let taker = taker.map_or_else(
-            || net.command_name(self.guards.wire),
+            || net.command_name(self.wire),
             |stop| {
                 let through = stop.spec.limits.through.unwrap_or_default();
                 format!("{}.{through}", net.flat.nodes[stop.node].name)
@@ -160,7 +163,7 @@ impl Second<'_> {
 
     /// Returns the pose of the second sensor and the node that computes it: that of the first sensor with another frame.
     fn second_pose(&self, frames: &mut Frames<'_>) -> Option<(String, String)> {
-        let net = self.guards.net;
+        let net = self.net;
         let [first, sensor] = [self.first, self.sensor].map(|role| net.name(Producer::Role(role)));
         let of_first = pose_of(net, frames, self.first)?;
         let (own, port) = of_first.split_once('.')?;
