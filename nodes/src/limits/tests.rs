@@ -11,6 +11,7 @@ use tactflow_runtime::signal::{
 use super::acceleration_limit::AccelerationLimit;
 use super::bumpless::Bumpless;
 use super::contact_limit::ContactLimit;
+use super::second_contact_limit::SecondContactLimit;
 use super::twist_limit::TwistLimit;
 use super::workspace_limit::WorkspaceLimit;
 
@@ -21,8 +22,13 @@ const CEILINGS: &str = "force_n = 10.0\npeak_n = 4.0\napproach_m_per_s = 0.2";
 
 fn rig<N: Node>(params: &str) -> NodeRig {
     let pad = ImageShape { rows: 2, cols: 2, pitch: [0.01; 2], unit: Unit::NEWTON };
-    let all: [(&str, Shape); 3] =
-        [("twist", TwistShape.into()), ("image", pad.into()), ("pose", PoseShape::default().into())];
+    let pose = PoseShape::default();
+    let all: [(&str, Shape); 4] = [
+        ("twist", TwistShape.into()),
+        ("image", pad.into()),
+        ("pose", pose.clone().into()),
+        ("image_pose", pose.into()),
+    ];
     let inputs = of::<N>().spec().inputs;
     let wires = all.into_iter().filter(|(name, _)| inputs.iter().any(|input| input.name == *name));
     NodeRig::new::<N>(params, &wires.collect::<Vec<_>>()).unwrap_or_else(|mistakes| panic!("{}: {mistakes:?}", N::NAME))
@@ -45,6 +51,7 @@ fn a_finite_motion_of_any_size_stays_finite() {
     let mut limiters = [
         (rig::<Bumpless>(ACCELERATIONS), "bumpless"),
         (rig::<ContactLimit>(CEILINGS), "force"),
+        (rig::<SecondContactLimit>(CEILINGS), "peak"),
         (rig::<WorkspaceLimit>(BOX), "workspace"),
         (rig::<TwistLimit>(SPEEDS), "speed"),
         (rig::<AccelerationLimit>(ACCELERATIONS), "acceleration"),
@@ -55,6 +62,12 @@ fn a_finite_motion_of_any_size_stays_finite() {
                 rig.set("twist", twist([size, -size, size, size, size, -size].map(|v| sign * v)));
                 match *limit {
                     "force" => rig.set("image", Image::from_cells(2, &[9.0, 0.0, 0.0, 9.0])),
+                    "peak" => {
+                        rig.set("image", Image::from_cells(2, &[9.0, 0.0, 0.0, 9.0]));
+                        rig.set("pose", at(0.0, 0.0, 0.0));
+                        let turned = IsometryMatrix3::rotation(nalgebra::Vector3::new(0.3, 2.2, -0.4));
+                        rig.set("image_pose", Pose(turned));
+                    }
                     "workspace" => rig.set("pose", at(0.1, 0.0, 0.0)),
                     _ => {}
                 }

@@ -27,14 +27,14 @@ const NEGLIGIBLE: f64 = 1e-9;
 /// Stops the motion of a second pad into an object when its force or a single tactel reaches its ceiling.
 ///
 /// An arm with two pads has a `contact_limit` for the pad in whose frame the motion is, and behind it a
-/// `second_contact_limit` for the other pad. Both have the same parameters, and each has its own image. The pads are
-/// fixed to each other, or move with joints that both poses contain.
+/// `second_contact_limit` for the other pad. Both have the same parameters, and each has its own image. The pads must
+/// be fixed to each other: the motion of a finger joint is not limited.
 ///
 /// `in.pose` is the pose of the pad in whose frame the motion is, and `in.image_pose` that of the pad of the image. Each
 /// comes from an `arm_state` with the `mount` of its pad.
 ///
 /// The approach of the second pad is its speed along its own normal, at the point of the contact. The node never
-/// increases the approach of the first pad, at any of its points, so the limits of the `contact_limit` before it still
+/// makes an approach of the first pad faster, at any of its points, so the limits of the `contact_limit` before it still
 /// hold. While the normals of the pads are at most 135 degrees apart, it never reduces a retreat of the first pad, and
 /// may add a motion along the first pad, away from the object of the second one. Pads that face each other more exactly
 /// have no such way: then the whole motion is scaled. The retreat of the second pad is always free.
