@@ -205,10 +205,7 @@ fn a_bare_arm_moves_its_tip_along_its_own_axis_there_and_back() {
             let mut engine = Engine::new(load(&Request::text(format!("{BARE}{device}{facts}"))));
             let mut places = Vec::new();
             while let Some(next) = engine.next().filter(|next| *next < 1_900_000_000) {
-                if let Err(fault) = engine.tick(next) {
-                    eprintln!("FAULT {next} {fault}");
-                    break;
-                }
+                engine.tick(next).unwrap_or_else(|fault| panic!("{device}: {fault}"));
                 places.extend(get::<Pose>(&engine, "move.state.sensor_pose").map(|pose| (next, pose.0)));
             }
             let (_, start) = places[0];
