@@ -195,7 +195,8 @@ const BARE: &str = "[graph]\nclock = 'arm'\nstart = 'there'\n[roles]\narm = 'bar
 /// The devices that can fill the role of a bare arm.
 const ARMS: [&str; 2] = [
     "[devices.arm]\ntype = 'mock_arm'\nrobot = 'builtin:lwr4p.toml'\n",
-    "[devices.arm]\ntype = 'sim_bench'\nfor_s = 4.0\nrobot = 'builtin:lwr4p.toml'\ncalibration = 'builtin:calibrations/sim_pad.toml'\nobjects = []\n",
+    "[devices.arm]\ntype = 'sim_bench'\nfor_s = 4.0\nrobot = 'builtin:lwr4p.toml'\n\
+     calibration = 'builtin:calibrations/sim_pad.toml'\nobjects = []\n",
 ];
 
 #[test]
@@ -226,8 +227,10 @@ fn a_bare_arm_has_all_limits_but_those_of_pads() {
     let [bare, arm] = ["bare_arm", "velocity_arm"].map(|name| catalogue.role_type(name).expect("a role"));
     assert_eq!((&bare.outputs, &bare.commands, &bare.reports), (&arm.outputs, &arm.commands, &arm.reports));
     // Its part is the one that the message names, and each of its limiters is needed.
-    let direct = "[nodes.state]\ntype = 'arm_state'\nin.position = 'arm.position'\nsensor = 'arm'\nurdf = { from = 'arm.urdf' }\ntip = { from = 'arm.tip' }\n\
-        [nodes.ik]\ntype = 'ik_sink'\nin.twist = 'to_base.twist'\nin.sensor_pose = 'state.sensor_pose'\nin.jacobian = 'state.jacobian'\nin.joints = 'state.joints'\n\
+    let direct = "[nodes.state]\ntype = 'arm_state'\nin.position = 'arm.position'\nsensor = 'arm'\n\
+        urdf = { from = 'arm.urdf' }\ntip = { from = 'arm.tip' }\n\
+        [nodes.ik]\ntype = 'ik_sink'\nin.twist = 'to_base.twist'\nin.sensor_pose = 'state.sensor_pose'\n\
+        in.jacobian = 'state.jacobian'\nin.joints = 'state.joints'\n\
         [nodes.to_base]\ntype = 'adjoint'\nin.twist = 'wave.twist'\nin.pose = 'state.sensor_pose'\n";
     let start = BARE.find("[parts.move]").unwrap();
     let end = BARE.find("[modes.there]").unwrap();

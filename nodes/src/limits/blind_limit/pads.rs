@@ -13,8 +13,8 @@ pub(super) struct Pads {
 }
 
 impl Pads {
-    /// Creates the pads from the shapes of their images. `wired` is whether each of `second_contact`, `second_image` and
-    /// `second_pose` is: a second pad needs all three.
+    /// Creates the pads from the shapes of their images. `wired` is whether each of `second_contact`, `second_image`
+    /// and `second_pose` is: a second pad needs all three.
     pub(super) fn new([first, second]: [Option<&ImageShape>; 2], wired: [bool; 3]) -> Result<Self, Mistakes> {
         let names = ["second_contact", "second_image", "second_pose"];
         let missing = names.into_iter().zip(wired).find(|(_, is_wired)| !is_wired && wired.contains(&true));

@@ -5,8 +5,8 @@
 //! the first pad: a translation d changes the approach of all its points by z·d. If the pads do not face each other,
 //! n·z >= 0, the excess is removed along n. Otherwise it is removed along t, the part of n that is perpendicular to z.
 //! The speed along t that this may remove is u + r: the motion along t, and the retreat r of the first pad, so the arm
-//! slides aside at most as fast as it retreats. If that is not enough, the retreat itself drives the second pad into its
-//! object, and the whole motion is scaled; this needs an angle of more than 135 degrees between the normals. See
+//! slides aside at most as fast as it retreats. If that is not enough, the retreat itself drives the second pad into
+//! its object, and the whole motion is scaled; this needs an angle of more than 135 degrees between the normals. See
 //! decision 024.
 
 use nalgebra::{IsometryMatrix3, Vector3};
@@ -30,12 +30,12 @@ const NEGLIGIBLE: f64 = 1e-9;
 /// `second_contact_limit` for the other pad. Both have the same parameters, and each has its own image. The pads must
 /// be fixed to each other: the motion of a finger joint is not limited.
 ///
-/// `in.pose` is the pose of the pad in whose frame the motion is, and `in.image_pose` that of the pad of the image. Each
-/// comes from an `arm_state` with the `mount` of its pad.
+/// `in.pose` is the pose of the pad in whose frame the motion is, and `in.image_pose` that of the pad of the image.
+/// Each comes from an `arm_state` with the `mount` of its pad.
 ///
 /// The approach of the second pad is its speed along its own normal, at the point of the contact. The node never
-/// makes an approach of the first pad faster, at any of its points, so the limits of the `contact_limit` before it still
-/// hold. While the normals of the pads are at most 135 degrees apart, it never reduces a retreat of the first pad, and
+/// makes an approach of the first pad faster, at any of its points, so the limits of the `contact_limit` before it
+/// still hold. While the normals of the pads are at most 135 degrees apart, it never reduces a retreat of the first pad, and
 /// may add a motion along the first pad, away from the object of the second one. Pads that face each other more exactly
 /// have no such way: then the whole motion is scaled. The retreat of the second pad is always free.
 ///

@@ -138,7 +138,8 @@ proptest! {
         let [between, out] = Pair::new().pass(&wanted, &Pose::default(), &mount, [&idle, &heavy]);
         let here = IsometryMatrix3::identity();
         let corners = [[HALF, HALF], [-HALF, HALF], [HALF, -HALF], [-HALF, -HALF]];
-        let is_kept = corners.iter().all(|point| approach(&out, &here, *point) <= approach(&between, &here, *point) + 1e-6);
+        let is_slower = |point: &[f64; 2]| approach(&out, &here, *point) <= approach(&between, &here, *point) + 1e-6;
+        let is_kept = corners.iter().all(is_slower);
         let (point, _) = pressed(&heavy)[0];
         let on_second = mount * Point3::new(point[0], point[1], 0.0);
         let along_first = (between.linear() + between.angular().cross(&on_second.coords)).z;

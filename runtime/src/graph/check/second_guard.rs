@@ -157,11 +157,12 @@ impl Second<'_> {
         );
         let limiter = with_article(name);
         format!(
-            "insert {limiter} between `{first}.{output}` and `{taker}`, which then takes `{name}.{output}`:\n{block}{poses}"
+            "insert {limiter} between `{first}.{output}` and `{taker}`, which then takes `{name}.{output}`:\n\
+             {block}{poses}"
         )
     }
 
-    /// Returns the pose of the second sensor and the node that computes it: that of the first sensor with another frame.
+    /// Returns the pose of the second sensor and the node that computes it: that of the first one in another frame.
     fn second_pose(&self, frames: &mut Frames<'_>) -> Option<(String, String)> {
         let net = self.net;
         let [first, sensor] = [self.first, self.sensor].map(|role| net.name(Producer::Role(role)));
