@@ -50,6 +50,7 @@ mod sim;
 mod situations;
 mod svg;
 mod task_crossings;
+mod task_drivers;
 mod task_folder;
 mod tasks;
 mod tick;

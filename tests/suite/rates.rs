@@ -2,7 +2,7 @@
 
 use tactflow_runtime::engine::Engine;
 use tactflow_runtime::graph::{Request, compile};
-use tactflow_runtime::signal::{Pose, Twist};
+use tactflow_runtime::signal::{Features, Pose, Twist};
 use tactflow_tests::catalogue;
 
 /// Two pads, of 250 Hz and of 40 Hz. The arm slides while something touches the slow one, which falls silent at 2 s.
@@ -10,7 +10,7 @@ const GRAPH: &str = r#"
 [graph]
 clock = "fast"
 start = "slide"
-show = ["look.sum", "touch.image"]
+show = ["look.sum", "touch.image", "pid.control"]
 
 [roles]
 fast = { type = "tactile_pad", on = "none" }
@@ -27,6 +27,16 @@ in.image = "fast.image"
 [parts.touch]
 file = "builtin:parts/touch.toml"
 in.image = "pad.image"
+
+[nodes.error]
+type = "feature_error"
+in.force = "touch.force"
+setpoint = { force = 4.0 }
+
+[nodes.pid]
+type = "pid"
+in.error = "error.error"
+gains.force = { kp = 0.001, ki = 0.2 }
 
 [nodes.slide]
 type = "twist_source"
@@ -113,6 +123,24 @@ fn a_motion_from_a_slow_pad_is_as_steady_as_from_a_fast_one() {
     let (slow, fast) = (way(40.0), way(250.0));
     assert!((slow - fast).abs() < 1e-6, "{slow} m instead of {fast} m");
     assert!((fast - 0.005 * 1.4).abs() < 0.01 * fast, "{fast} m at 5 mm/s");
+}
+
+/// Returns what the controller has integrated until 1.9 s.
+fn integral(rate_hz: f64) -> f64 {
+    let mut engine = engine(rate_hz);
+    while let Some(next) = engine.next().filter(|next| *next <= 1_900_000_000) {
+        engine.tick(next).unwrap_or_else(|fault| panic!("{fault}"));
+    }
+    let control = engine.get::<Features>("pid.control").expect("the pad is pressed");
+    control.values().next().flatten().expect("the force is known")
+}
+
+#[test]
+fn an_integral_over_a_slow_pad_grows_as_over_a_fast_one() {
+    let (slow, fast) = (integral(40.0), integral(250.0));
+    // The press has 3 N and the setpoint 4 N, so the error is about 1 N for 1.9 s.
+    assert!((0.3..0.46).contains(&fast), "{fast}");
+    assert!((slow - fast).abs() < 0.05 * fast, "{slow} instead of {fast}");
 }
 
 #[test]

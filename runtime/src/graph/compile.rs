@@ -4,7 +4,7 @@ use std::cell::RefCell;
 
 use crate::catalogue::Catalogue;
 use crate::graph::bench::{self, OpenedBench};
-use crate::graph::build::{Builder, BuiltModes, build_modes, find_reach, plan_tasks};
+use crate::graph::build::{Builder, BuiltModes, build_modes, find_reach, max_gaps, plan_tasks};
 use crate::graph::check;
 use crate::graph::check::contact::ContactPorts;
 use crate::graph::check::generators::Generators;
@@ -13,7 +13,6 @@ use crate::graph::load::{Loader, Request};
 use crate::graph::net::Net;
 use crate::graph::outline::OutlineBuilder;
 use crate::graph::plan::{Plan, PlannedCommand, PlannedMode, PlannedNode, PortRef};
-use crate::graph::syntax::{GraphTable, default_max_age_s};
 use crate::source::{Code, Diagnostics, Report, Severity, SourceMap};
 
 /// Checks and builds a graph.
@@ -70,7 +69,7 @@ pub(crate) fn compile_in(mut loader: Loader, catalogue: &Catalogue, request: &Re
     };
     assert_eq!(nodes.len(), flat.nodes.len(), "a graph without a mistake has all its nodes");
     log_plan(&nodes, &opened, &sources);
-    let max_gap = max_gap(flat.root().table.as_ref(), period);
+    let gaps = max_gaps(&net, &opened, period);
     let outline = OutlineBuilder {
         net: &net,
         opened: &opened,
@@ -78,7 +77,7 @@ pub(crate) fn compile_in(mut loader: Loader, catalogue: &Catalogue, request: &Re
         nodes: &nodes,
         measured: &measured,
         period,
-        max_gap,
+        max_gap: gaps[0],
         defaults: RefCell::default(),
     };
     let outline = outline.build();
@@ -91,8 +90,8 @@ pub(crate) fn compile_in(mut loader: Loader, catalogue: &Catalogue, request: &Re
     let allowed = check::allow::silence(&flat, &mut warnings);
     let view = view.plan(&net, &nodes, &ports);
     let shown: Vec<PortRef> = view.ports.iter().map(|port| port.source).collect();
-    let tasks = plan_tasks(&net, &ports, modes, (&starts, &shown), period);
-    let reach = find_reach(&net, &nodes);
+    let reach = find_reach(&net, &nodes, &modes);
+    let tasks = plan_tasks(&net, &ports, modes, (&starts, &shown), &gaps);
     let period = ((period * 1e9).round() as i64).max(1);
     let (exports, facts) = (net.exports_by_name(), opened.facts(&net));
     let devices = opened.devices;
@@ -143,9 +142,4 @@ fn log_plan(nodes: &[PlannedNode], opened: &OpenedBench, sources: &SourceMap) {
     for device in &opened.devices {
         tracing::info!("opened device `{}` ({})", device.name, sources.locate(device.span.start));
     }
-}
-
-/// Returns the maximum time step between two samples [s].
-fn max_gap(table: Option<&GraphTable>, period: f64) -> f64 {
-    table.and_then(|table| table.max_gap_ms).map_or_else(|| default_max_age_s(period), |ms| ms * 1e-3)
 }

@@ -12,8 +12,8 @@ use crate::signal::line::{scale_to, step_toward};
 
 /// One command port of a device.
 pub(crate) struct CommandSlot {
-    /// The task that drives it.
-    pub(crate) task: usize,
+    /// The tasks that drive it. It rests while one of them does.
+    pub(crate) tasks: Box<[usize]>,
     pub(crate) device: usize,
     source: PortId,
     command: usize,
@@ -27,9 +27,9 @@ pub(crate) struct CommandSlot {
 
 impl CommandSlot {
     pub(crate) fn new(source: PortId, planned: PlannedCommand) -> Self {
-        let PlannedCommand { task, device, port, age, accelerations, .. } = planned;
+        let PlannedCommand { tasks, device, port, age, accelerations, .. } = planned;
         Self {
-            task,
+            tasks: tasks.into(),
             device,
             source,
             command: port,
@@ -111,7 +111,7 @@ mod tests {
         let mut bus = Bus::default();
         let source = bus.add(&JointsShape { joints: vec![Default::default(); 2], ..Default::default() }.into());
         let slot = CommandSlot {
-            task: 0,
+            tasks: Box::new([0]),
             device: 0,
             source,
             command: 0,

@@ -127,7 +127,7 @@ impl Core {
     /// Commits the commands, which ramp to zero while their task is halted, and the reports.
     pub(crate) fn commit(&mut self, devices: &mut [DeviceSlot]) {
         for command in &mut self.commands {
-            let is_halted = self.tasks[command.task].is_halted;
+            let is_halted = command.tasks.iter().any(|task| self.tasks[*task].is_halted);
             command.commit(&self.bus, &mut devices[command.device].commands, &self.tick, is_halted);
         }
         for report in &self.reports {

@@ -89,6 +89,8 @@ impl Engine {
         let mut commanded: Vec<String> =
             plan.commands.iter().filter(|wire| !wire.is_report).map(|wire| wire.name[0].clone()).collect();
         commanded.dedup();
+        let commands = plan.commands.iter().filter(|wire| !wire.is_report);
+        let drivers = commands.map(|wire| (wire.task, wire.tasks.clone())).collect();
         let (reports, commands): (Vec<_>, Vec<_>) = plan.commands.into_iter().partition(|wire| wire.is_report);
         let report = |report: &PlannedCommand| ReportSlot::new(ports.id(report.source), report);
         let slots = reports.iter().map(report).collect();
@@ -121,6 +123,7 @@ impl Engine {
             allowed: plan.allowed,
             names,
             roles,
+            drivers,
             commanded,
             reported,
             exports,

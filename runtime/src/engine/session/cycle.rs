@@ -242,7 +242,7 @@ impl Engine {
         match has_reached {
             (true, _) => Ok(()),
             (false, true) => Err(format!("`{word}` has no effect while the commands are stopped: send `resume` first")),
-            (false, false) if self.words().iter().any(|known| known == word) => {
+            (false, false) if self.tasks[to].end.is_some() => {
                 Err(format!("`{word}` has no effect: the task has ended"))
             }
             (false, false) => {
@@ -257,6 +257,9 @@ impl Engine {
     fn addressee<'w>(&self, word: &'w str) -> (usize, &'w str) {
         let named =
             |(number, task): (usize, &TaskRun)| Some((number, word.strip_prefix(task.name())?.strip_prefix('.')?));
+        if self.tasks.iter().any(|task| task.words().any(|known| known == word)) {
+            return (0, word);
+        }
         let named = self.tasks.iter().enumerate().skip(1).filter_map(named);
         named.min_by_key(|(_, rest)| rest.len()).unwrap_or((0, word))
     }

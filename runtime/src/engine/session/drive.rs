@@ -4,6 +4,7 @@ use std::time::Instant;
 
 use super::engine::Engine;
 use super::outcome::{End, Outcome};
+use super::task_run::TaskRun;
 use crate::fault::Fault;
 
 /// Paces a run and passes operator input to the engine between two ticks.
@@ -50,7 +51,9 @@ pub(crate) fn drive(engine: &mut Engine, until: i64, pacer: &mut impl Pacer, obs
 pub(crate) fn permanent_halt(engine: &Engine, can_resume: bool, is_endless: bool) -> Option<Fault> {
     let is_stopped = engine.is_stopped() && !can_resume;
     let has_failed_device = || engine.devices.iter().any(|device| device.failed.is_some());
-    let is_lost = is_endless && has_failed_device() && !engine.has_end();
+    // A device that only one task needs does not end the others.
+    let all_rest = || engine.tasks().iter().filter(|task| task.is_awaited()).all(TaskRun::is_halted);
+    let is_lost = is_endless && has_failed_device() && !engine.has_end() && all_rest();
     let is_still = || engine.devices.iter().all(|device| device.commands.are_zero());
     let halts = engine.tasks().iter().filter(|task| task.end().is_none()).filter_map(|task| task.halts().last());
     let last = halts.max_by_key(|halt| halt.fault.tick).filter(|_| (is_stopped || is_lost) && is_still())?;

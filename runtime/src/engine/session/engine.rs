@@ -31,6 +31,8 @@ pub struct Engine {
     pub(super) names: Vec<(String, String)>,
     /// Name of each role, and the source location of its device.
     pub(super) roles: Vec<(String, String)>,
+    /// For each command, the task whose file wires it, and the tasks that drive it.
+    pub(super) drivers: Vec<(usize, Vec<usize>)>,
     /// The roles that are commanded, each once.
     pub(super) commanded: Vec<String>,
     /// Name `role.report` of each wired report, the index of its device, and its number there.
@@ -116,7 +118,16 @@ impl Engine {
 
     /// Whether every task that has modes or commands is done or has failed.
     pub(super) fn is_over(&self) -> bool {
-        self.tasks.iter().any(|task| task.end.is_some()) && !self.tasks.iter().any(TaskRun::is_awaited)
+        self.tasks.iter().any(|task| task.end.is_some()) && (0..self.tasks.len()).all(|task| !self.is_awaited(task))
+    }
+
+    /// Whether the run waits for the end of a task. One without modes has ended when the tasks that drive its commands
+    /// have.
+    fn is_awaited(&self, task: usize) -> bool {
+        let has_ended = |driver: &usize| self.tasks[*driver].end.is_some();
+        let mut own = self.drivers.iter().filter(|(owner, _)| *owner == task).peekable();
+        let is_driven_by_ended = own.peek().is_some() && own.all(|(_, drivers)| drivers.iter().any(has_ended));
+        self.tasks[task].is_awaited() && (self.tasks[task].modes.is_some() || !is_driven_by_ended)
     }
 
     /// Returns the fault of each task that has failed, with the name of the task.

@@ -10,4 +10,4 @@ mod tasks;
 
 pub(crate) use modes::{BuiltModes, build_modes};
 pub(crate) use nodes::Builder;
-pub(crate) use tasks::{find_reach, plan_tasks};
+pub(crate) use tasks::{find_reach, max_gaps, plan_tasks};

@@ -355,6 +355,7 @@ impl Builder<'_> {
         Some(PlannedCommand {
             source: wire.source,
             task: wire.task,
+            tasks: motion_tasks(self.net, wire),
             device: bound.device,
             is_report: wire.is_report,
             port: *number,
@@ -371,6 +372,21 @@ impl Builder<'_> {
         let period = self.sample_periods.of(wire.source.producer);
         wire.origin.age.unwrap_or(AgeLimit { max_age: default_max_age_ns(period), stale: Policy::Hold })
     }
+}
+
+/// Returns the tasks of the nodes through which the motion of a command passes, and that of its wire.
+fn motion_tasks(net: &Net<'_>, command: &CommandWire) -> Vec<usize> {
+    let is_motion = |source: &PortRef| matches!(net.port(*source).kind, Kind::Twist | Kind::Joints);
+    let (mut tasks, mut seen) = (BTreeSet::from([command.task]), BTreeSet::new());
+    let mut open: Vec<usize> = command.source.producer.node().into_iter().collect();
+    while let Some(node) = open.pop() {
+        if net.flat.tasks.len() > 1 && seen.insert(node) {
+            tasks.insert(net.flat.scopes[net.flat.nodes[node].scope].task);
+            let sources = net.wires[node].iter().map(|wire| wire.source).filter(is_motion);
+            open.extend(sources.filter_map(|source| source.producer.node()));
+        }
+    }
+    tasks.into_iter().collect()
 }
 
 /// Returns the joints of a joint vector; other shapes have none.

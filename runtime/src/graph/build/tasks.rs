@@ -2,6 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use crate::graph::bench::OpenedBench;
 use crate::graph::load::Task;
 use crate::graph::net::Net;
 use crate::graph::plan::{
@@ -10,13 +11,13 @@ use crate::graph::plan::{
 use crate::graph::syntax::default_max_age_s;
 
 /// Plans the tasks with the modes of all of them, of which `starts` are the start modes. `shown` are the ports that the
-/// run shows, and `period` is that of the graph [s].
+/// run shows, and `gaps` the maximum time step of each task [s].
 pub(crate) fn plan_tasks(
     net: &Net<'_>,
     ports: &BTreeMap<PortRef, PlannedPort>,
     modes: Vec<PlannedMode>,
     (starts, shown): (&[usize], &[PortRef]),
-    period: f64,
+    gaps: &[f64],
 ) -> Vec<PlannedTask> {
     let flat = net.flat;
     let mut read: BTreeSet<PortRef> = net.wires.iter().flatten().map(|wire| wire.source).collect();
@@ -36,7 +37,6 @@ pub(crate) fn plan_tasks(
         let flag = |port: usize| PortRef { producer: Producer::Task(number), port };
         let flags = (0..modes.len()).filter(|mode| flat.tasks.len() > 1 || read.contains(&flag(*mode)));
         let flags = flags.map(|mode| (mode, flag(mode), ports[&flag(mode)].clone())).collect();
-        let gap = task.table.as_ref().and_then(|table| table.max_gap_ms);
         PlannedTask {
             name: task.name().to_owned(),
             parent: task.parent,
@@ -45,11 +45,22 @@ pub(crate) fn plan_tasks(
             flags,
             policy: flat.policy(number),
             ends_run: task.ends_run,
-            max_gap: gap.map_or_else(|| default_max_age_s(period), |ms| ms * 1e-3),
+            max_gap: gaps[number],
             reset_after: reset_after(net, number),
         }
     };
     flat.tasks.iter().zip(of_tasks).enumerate().map(plan).collect()
+}
+
+/// Returns the maximum time step between two samples in each task [s]: that of its section [graph], or five periods of
+/// the slowest device that it uses, and at least five of the graph, whose period is `period` [s].
+pub(crate) fn max_gaps(net: &Net<'_>, opened: &OpenedBench, period: f64) -> Vec<f64> {
+    let own = |task: &Task| task.table.as_ref().and_then(|table| table.max_gap_ms).map(|ms| ms * 1e-3);
+    let periods = |task: &Task| {
+        let bound = task.roles.iter().filter_map(|role| opened.roles.get(*role)?.as_ref());
+        bound.map(|bound| opened.period(bound)).fold(period, f64::max)
+    };
+    net.flat.tasks.iter().map(|task| own(task).unwrap_or_else(|| default_max_age_s(periods(task)))).collect()
 }
 
 /// Returns the number of each mode in its task.
@@ -70,7 +81,9 @@ fn reset_after(net: &Net<'_>, task: usize) -> i64 {
 }
 
 /// Finds the tasks that a trouble of each role and each node concerns.
-pub(crate) fn find_reach(net: &Net<'_>, nodes: &[PlannedNode]) -> Reach {
+///
+/// A task is also concerned by what only the conditions of its `modes` read.
+pub(crate) fn find_reach(net: &Net<'_>, nodes: &[PlannedNode], modes: &[PlannedMode]) -> Reach {
     let flat = net.flat;
     if flat.tasks.len() == 1 {
         return Reach::default();
@@ -82,6 +95,15 @@ pub(crate) fn find_reach(net: &Net<'_>, nodes: &[PlannedNode]) -> Reach {
         of_roles[wire.role].insert(wire.task);
         if let Some(node) = wire.source.producer.node() {
             of_nodes[node].insert(wire.task);
+        }
+    }
+    for (mode, block) in modes.iter().zip(&flat.modes) {
+        for watched in mode.exits.iter().filter_map(|exit| exit.condition.port()) {
+            match watched.producer {
+                Producer::Node(node) => of_nodes[node].insert(block.task),
+                Producer::Role(role) => of_roles[role].insert(block.task),
+                Producer::Task(_) => continue,
+            };
         }
     }
     // A delayed wire comes from a later node, so one pass may not be enough.

@@ -54,7 +54,8 @@ fn short_gap(flat: &FlatGraph, period: f64) -> Option<Diagnostic> {
     let is_short = gap * 1e-3 < period * (1.0 - 1e-6);
     let message = format!("`max_gap_ms` is {gap} ms, but the period of the graph is {:.3} ms", period * 1e3);
     is_short.then(|| {
-        Diagnostic::new(Code::BadValue, span, message)
-            .help("write at least one period, or remove `max_gap_ms` (the default is five periods)")
+        Diagnostic::new(Code::BadValue, span, message).help(
+            "write at least one period, or remove `max_gap_ms` (the default is five periods of the slowest device)",
+        )
     })
 }

@@ -12,6 +12,7 @@ use crate::source::{Code, Diagnostic, Diagnostics, Key, Table, Value};
 /// the command line that would loosen a limit.
 pub(crate) fn check(net: &Net<'_>, diagnostics: &mut Diagnostics) {
     diagnostics.extend(net.flat.limits.iter().filter_map(|section| unknown_arm(net, section)));
+    diagnostics.extend(net.flat.limits.iter().filter_map(|section| of_no_arm(net, section)));
     for arms in groups(net) {
         let names: BTreeSet<&str> = net.limit_sections(&arms).flat_map(names).collect();
         for name in names {
@@ -60,6 +61,19 @@ fn unknown_arm(net: &Net<'_>, section: &LimitSection) -> Option<Diagnostic> {
     }
     let arms = (0..net.flat.roles.len()).filter(limited).filter(is_own).map(|index| net.name(Producer::Role(index)));
     Some(Diagnostic::unknown(Code::UnknownPort, "arm", &role.name, &role.span, arms))
+}
+
+/// Reports limits of a part that declares no arm: they would hold for none.
+fn of_no_arm(net: &Net<'_>, section: &LimitSection) -> Option<Diagnostic> {
+    let task = &net.flat.tasks[section.task];
+    let is_arm = |role: &usize| net.roles[*role].is_none_or(|role| !role.limits.is_empty());
+    let is_empty = section.role.is_some() || section.table.entries.is_empty();
+    if section.task == 0 || is_empty || section.owner != LimitOwner::Task || task.roles.iter().any(is_arm) {
+        return None;
+    }
+    let message = format!("the limits of part `{}` hold for no arm, because its file declares none", task.name());
+    let help = "declare the arm in this file, as in `[roles]` with `arm = \"velocity_arm\"`";
+    Some(Diagnostic::new(Code::UnknownPort, section.span.clone(), message).help(help))
 }
 
 /// Returns the values of a limit with their keys, in the order of the sections.

@@ -90,6 +90,8 @@ pub(crate) struct PlannedCommand {
     pub(crate) source: PortRef,
     /// The task whose file has the wire.
     pub(crate) task: usize,
+    /// The tasks whose nodes make the motion, and the one whose file has the wire: the command rests while one does.
+    pub(crate) tasks: Vec<usize>,
     pub(crate) device: usize,
     /// Whether it is a report: a value that moves nothing.
     pub(crate) is_report: bool,

@@ -31,7 +31,7 @@ pub(crate) struct GraphTable {
     /// Default bench.
     pub(crate) bench: Option<FilePath>,
     /// Maximum time step between two samples; filters and integrals start afresh after a longer gap. The default is
-    /// five periods.
+    /// five periods of the slowest device of the task, and at least five of the graph.
     #[param(unit = "ms", above = 0.0)]
     pub(crate) max_gap_ms: Option<f64>,
     /// How long an input must be absent before the state of its node is reset.
