@@ -99,11 +99,17 @@ impl Core {
 
     fn step(&mut self, first: usize) {
         self.tasks[0].apply(&mut self.tick);
-        for (i, runner) in self.runners.iter_mut().enumerate().skip(first) {
-            self.current = i;
-            if let Some(task) = self.owners.get(i) {
-                self.tasks[*task].apply(&mut self.tick);
+        let runners = self.runners[first..].iter_mut().zip(first..);
+        if self.owners.is_empty() {
+            for (runner, i) in runners {
+                self.current = i;
+                runner.visit(&mut self.tick, &mut self.bus);
             }
+            return;
+        }
+        for (runner, i) in runners {
+            self.current = i;
+            self.tasks[self.owners[i]].apply(&mut self.tick);
             runner.visit(&mut self.tick, &mut self.bus);
         }
     }

@@ -75,8 +75,8 @@ impl Engine {
         let mut owners: Vec<usize> = plan.nodes.iter().map(|node| node.task).collect();
         owners.retain(|_| plan.tasks.len() > 1);
         let writers = writers(&plan);
-        let filled = |device: usize| (0..plan.roles.len()).filter(|role| plan.roles[*role].device == device).collect();
-        let device_roles = (0..plan.devices.len()).map(filled).collect();
+        let mut device_roles = vec![Vec::new(); plan.devices.len()];
+        plan.roles.iter().enumerate().for_each(|(i, role)| device_roles[role.device].push(i));
         let limits = limits(&plan.nodes, &ports);
         let budgets = budgets(&plan.nodes, &ports);
         let uncalibrated =

@@ -97,19 +97,18 @@ impl<'a> Net<'a> {
         if let Some(on) = self.flat.carriers.get(&key.name) {
             return self.flat.roles.position(&on.value).filter(|arm| *arm != sensor && self.is_arm(*arm));
         }
-        let all: Vec<usize> = (0..self.roles.len()).collect();
-        self.only_arm(&all, sensor).or_else(|| self.carriers_in_tasks(sensor).next().map(|(_, arm)| arm))
+        self.only_arm(0..self.roles.len(), sensor).or_else(|| self.carriers_in_tasks(sensor).next().map(|(_, arm)| arm))
     }
 
     /// Returns the parts that have a sensor on their only arm, each with the arm.
     fn carriers_in_tasks(&self, sensor: usize) -> impl Iterator<Item = (usize, usize)> {
         let tasks = self.flat.tasks.iter().enumerate().skip(1).filter(move |(_, task)| task.roles.contains(&sensor));
-        tasks.filter_map(move |(number, task)| Some((number, self.only_arm(&task.roles, sensor)?)))
+        tasks.filter_map(move |(number, task)| Some((number, self.only_arm(task.roles.iter().copied(), sensor)?)))
     }
 
     /// Returns the only arm among some roles, unless it is the sensor itself.
-    fn only_arm(&self, roles: &[usize], sensor: usize) -> Option<usize> {
-        let mut arms = roles.iter().copied().filter(|role| self.is_arm(*role));
+    fn only_arm(&self, roles: impl Iterator<Item = usize>, sensor: usize) -> Option<usize> {
+        let mut arms = roles.filter(|role| self.is_arm(*role));
         arms.next().filter(|arm| *arm != sensor && arms.next().is_none())
     }
 
