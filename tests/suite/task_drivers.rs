@@ -2,7 +2,7 @@
 
 use std::fs;
 
-use tactflow_runtime::engine::{Engine, run_virtual};
+use tactflow_runtime::engine::{End, Engine, run_virtual};
 use tactflow_runtime::graph::{Request, compile};
 use tactflow_runtime::signal::Joints;
 use tactflow_runtime::source::Code;
@@ -130,4 +130,17 @@ fn a_word_with_a_dot_is_that_of_the_mode_which_waits_for_it() {
     engine.send("plan.go").unwrap();
     engine.tick(4_000_000).unwrap();
     assert_eq!(engine.tasks()[1].mode(), Some("rest"));
+}
+
+#[test]
+fn the_failure_of_a_device_that_no_task_uses_ends_the_run() {
+    let request = Request::file(workspace().join("graphs/two_arms.toml"))
+        .set("roles.spare={ type = 'tactile_pad', on = 'none' }")
+        .set("bind.spare='spare'")
+        .set("devices.spare={ type = 'mock_pad', glitch = [{ at_s = 0.2, for_s = 1.0, kind = 'unplug' }] }");
+    let plan = compile(&catalogue(), &request).unwrap_or_else(|report| panic!("{}", report.render(false)));
+    let mut engine = Engine::new(plan);
+    let outcome = run_virtual(&mut engine, 1.0, &|| false, &mut |_| {});
+    let End::Fault(fault) = outcome.end else { panic!("{:?}", outcome.end) };
+    assert!(fault.to_string().starts_with("device `spare` failed"), "{fault}");
 }

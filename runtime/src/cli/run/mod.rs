@@ -191,9 +191,9 @@ impl Job {
         for (task, fault) in &failed {
             shell.error(format_args!("task `{task}` has failed: {fault}; its commands went to zero"));
         }
-        let is_told = |fault: &Fault| failed.iter().any(|(_, told)| *told == fault);
+        let is_reported = |fault: &Fault| failed.iter().any(|(_, reported)| *reported == fault);
         let End::Fault(fault) = &outcome.end else { return if failed.is_empty() { 0 } else { FAULTED } };
-        if is_told(fault) {
+        if is_reported(fault) {
             return FAULTED;
         }
         shell.error(format_args!("{fault}; every command went to zero{}", endless_stop(engine, fault)));

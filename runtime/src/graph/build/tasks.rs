@@ -124,6 +124,8 @@ pub(crate) fn find_reach(net: &Net<'_>, nodes: &[PlannedNode], modes: &[PlannedM
             }
         }
     }
+    // What no task uses concerns the graph itself.
+    of_roles.iter_mut().filter(|tasks| tasks.is_empty()).for_each(|tasks| tasks.extend([0]));
     let list = |set: &BTreeSet<usize>| set.iter().copied().collect();
     Reach {
         roles: of_roles.iter().map(list).collect(),
