@@ -20,6 +20,8 @@ pub enum Cause {
         /// Maximum age [ns].
         max_age: i64,
     },
+    /// A role has had no sample since the start.
+    NeverSampled,
     /// The value of a wire is too old for its node, command or report.
     StaleWire(Box<StaleWire>),
     /// The clock device sends no samples.
@@ -29,6 +31,8 @@ pub enum Cause {
         /// Delay of the tick [ns].
         by: i64,
     },
+    /// The commands to a device were not renewed in time, so it has stopped by itself.
+    LostLease,
     /// A budget of a limiter is spent.
     Spent,
     /// The operator sent `stop`.
@@ -81,8 +85,12 @@ impl fmt::Display for Fault {
                 let StaleWire { from, age, max_age } = &**wire;
                 write!(f, "`{from}` is {:.1} ms old at `{name}`, but the maximum is {:.1} ms", ms(*age), ms(*max_age))?;
             }
+            Cause::NeverSampled => write!(f, "`{name}` has had no sample since the start")?,
             Cause::SilentClock => write!(f, "the clock device `{name}` sends no samples")?,
             Cause::Late { by } => write!(f, "a tick began {:.1} ms late", ms(*by))?,
+            Cause::LostLease => {
+                write!(f, "the commands to device `{name}` were not renewed in time, so it stops by itself")?;
+            }
             Cause::Spent => write!(f, "`{name}` has spent its budget of motion without a contact")?,
             Cause::Operator => write!(f, "the operator sent `stop`")?,
             Cause::Mode(why) => write!(f, "a `fail` condition of mode `{name}` holds: {why}")?,

@@ -71,7 +71,7 @@ fn check(example: &str) -> Option<Report> {
         }
         fs::write(folder.path().join(*name), text).unwrap();
     }
-    match compile(&tactflow_nodes::catalogue(), &Request::file(folder.path().join("graph.toml"))) {
+    match compile(&tactflow_tests::catalogue(), &Request::file(folder.path().join("graph.toml"))) {
         Ok(plan) => plan.warnings(),
         Err(report) => Some(report),
     }

@@ -25,6 +25,7 @@ mod freshness;
 #[cfg(target_os = "linux")]
 mod growth;
 mod layers;
+mod leases;
 mod limits;
 mod lint;
 mod live;

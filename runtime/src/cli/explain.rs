@@ -61,6 +61,7 @@ pages! {
     "unused-node",
     "unusual-gain",
     "unusual-value",
+    "unwatched-device",
     "wrong-file",
     "wrong-role",
 }

@@ -4,6 +4,7 @@ use std::borrow::Cow;
 use std::marker::PhantomData;
 
 use super::RoleType;
+use super::silence::{OnSilence, Silence};
 use crate::signal::{JointsShape, Kind, Shape, Signal, Unit};
 
 /// A name that is written in the source or made at load.
@@ -30,6 +31,11 @@ type Name = Cow<'static, str>;
 pub struct Description {
     /// Nominal time between two samples [s].
     pub period: f64,
+    /// Time from the measurement of a sample to its arrival, as far as it is known [s]. The stamps of a live device are
+    /// earlier by this time.
+    pub latency: f64,
+    /// What a device that moves does without commands; `None` if it declares nothing. Only a live device needs it.
+    pub on_silence: Option<Silence>,
     pub(crate) fills: Vec<Filled>,
     pub(crate) outputs: Vec<StatedPort>,
     pub(crate) commands: Vec<StatedPort>,
@@ -57,7 +63,26 @@ impl Description {
     /// A device that samples every `period` [s] and fills no role yet.
     #[must_use]
     pub const fn every(period: f64) -> Self {
-        Self { period, fills: Vec::new(), outputs: Vec::new(), commands: Vec::new(), reports: Vec::new() }
+        Self {
+            period,
+            latency: 0.0,
+            on_silence: None,
+            fills: Vec::new(),
+            outputs: Vec::new(),
+            commands: Vec::new(),
+            reports: Vec::new(),
+        }
+    }
+
+    /// Declares what a device that moves does without commands: it is at rest `within` this time [s].
+    pub fn on_silence(&mut self, reaction: OnSilence, within: f64) {
+        self.on_silence = Some(Silence { reaction, within });
+    }
+
+    /// Returns the time after which the device has stopped by itself, if nothing is sent to it [s]. 100 ms if it
+    /// declares none.
+    pub(crate) fn silence(&self) -> f64 {
+        self.on_silence.as_ref().map_or(0.1, |silence| silence.within)
     }
 
     /// Adds a role that the device can fill. A device that has two pads adds `tactile_pad` twice.

@@ -2,6 +2,7 @@
 
 use std::borrow::Cow;
 
+use super::lease::Grant;
 use super::{Command, Description, Output, Report};
 use crate::signal::{Arenas, Kind, Shape, Signal};
 
@@ -117,6 +118,8 @@ impl Samples {
 #[derive(Debug, Clone, Default)]
 pub struct Commands {
     pub(crate) values: Vec<Box<[f64]>>,
+    /// For how long a live device may follow them.
+    pub(crate) grant: Grant,
     arenas: Arenas,
     reports: Vec<ReportValue>,
 }
@@ -150,7 +153,8 @@ impl Commands {
             is_present: false,
         };
         let reports = description.reports.iter().enumerate().map(room).collect();
-        Self { values: description.commands.iter().map(|port| zeros(&port.shape)).collect(), reports, arenas }
+        let values = description.commands.iter().map(|port| zeros(&port.shape)).collect();
+        Self { values, grant: Grant::default(), reports, arenas }
     }
 
     /// Returns the command of a port, one value per joint.
@@ -190,6 +194,11 @@ impl Commands {
         }
     }
 
+    /// Sets every command to zero.
+    pub(crate) fn rest(&mut self) {
+        self.values.iter_mut().for_each(|values| values.fill(0.0));
+    }
+
     /// Makes every report absent.
     pub(crate) fn clear_reports(&mut self) {
         self.reports.iter_mut().for_each(|report| report.is_present = false);
@@ -200,6 +209,12 @@ impl Commands {
         for (slot, values) in self.values.iter_mut().zip(&other.values) {
             slot.copy_from_slice(values);
         }
+        self.grant = other.grant;
+        self.copy_reports(other);
+    }
+
+    /// Copies the reports to the same device, in place.
+    pub(crate) fn copy_reports(&mut self, other: &Self) {
         for (port, report) in other.reports.iter().enumerate() {
             self.take_report(port, &other.arenas, report.is_present.then_some(report.slot));
         }

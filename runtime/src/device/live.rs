@@ -1,23 +1,26 @@
-//! Live devices: an async driver on one side, preallocated latest-value slots, and the tick on the other side.
+//! Live devices: an async driver on a thread of its own, preallocated slots with the newest values, and the tick on the
+//! other side.
 
 use std::borrow::Cow;
+use std::io;
 use std::sync::Arc;
-use std::time::Instant;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::thread::{JoinHandle, Thread};
+use std::time::{Duration, Instant};
 
 use async_trait::async_trait;
 use tokio::sync::{Notify, watch};
 use triple_buffer::TripleBuffer;
 
-use super::{Commands, DeviceError, Output, Samples};
+use super::clock::DeviceClock;
+use super::lease::{Grant, Lease};
+use super::{Commands, Description, DeviceError, Output, Samples};
 use crate::signal::Signal;
 
 /// A device that runs on its own, in real time.
-///
-/// The driver of a real robot declares a command timeout of its own. Only this timeout stops the arm after something
-/// that the process cannot observe, such as `kill -9` or a loss of power.
 #[async_trait]
 pub trait Live: Send {
-    /// Runs until [`Link::stopped`] or a failure.
+    /// Runs until [`Link::stopped`], [`Link::finish`] or a failure. It runs on a thread of its own, so it stops nothing else if it blocks.
     ///
     /// # Errors
     /// When the device fails; the run ends.
@@ -29,10 +32,19 @@ pub struct Link {
     staging: Samples,
     samples: triple_buffer::Input<Samples>,
     commands: triple_buffer::Output<Commands>,
-    sampled: Arc<Notify>,
+    lease: Lease,
+    clock: DeviceClock,
+    /// Number of writes in the samples that were published last.
+    published: Arc<AtomicU64>,
     commanded: Arc<Notify>,
-    stop: watch::Receiver<bool>,
+    /// Why the run has ended; empty while it runs.
+    stop: watch::Receiver<String>,
+    finished: Arc<AtomicBool>,
+    /// The thread of the tick, which waits for samples.
+    tick: Thread,
     epoch: Instant,
+    period: Duration,
+    latency: i64,
 }
 
 impl Link {
@@ -42,10 +54,33 @@ impl Link {
         at.saturating_duration_since(self.epoch).as_nanos() as i64
     }
 
+    /// Returns the stamp of a sample that has just arrived from a device without a clock [ns]: now, less the latency
+    /// that the device [states](Description::latency).
+    #[must_use]
+    pub fn arrival(&self) -> i64 {
+        self.stamp(Instant::now()) - self.latency
+    }
+
+    /// Returns the stamp of a sample that has just arrived, and that the device measured at `time` in its own clock
+    /// [ns]. The offset and the drift between the clocks are estimated from the samples.
+    ///
+    /// The age of a sample with this stamp is its true age, less the smallest delay of a sample and plus the latency
+    /// that the device [states](Description::latency).
+    pub fn stamp_of(&mut self, time: i64) -> i64 {
+        let arrived = self.stamp(Instant::now());
+        let steps = self.clock.steps;
+        let stamp = self.clock.stamp(time, arrived);
+        if self.clock.steps > steps {
+            self.count("steps of its clock");
+        }
+        stamp - self.latency
+    }
+
     /// Writes samples and publishes them; the graph sees the newest of each port.
     pub fn publish(&mut self, write: impl FnOnce(&mut Samples)) {
         self.hand_over(write);
-        self.sampled.notify_one();
+        self.published.store(self.staging.writes, Ordering::Release);
+        self.tick.unpark();
     }
 
     /// Makes a port absent until it is written again; see [`Samples::lost`]. The driver goes on, to reconnect for
@@ -65,15 +100,26 @@ impl Link {
         self.samples.publish();
     }
 
-    /// The newest commands.
+    /// Returns the commands as they hold at this moment.
+    ///
+    /// They are valid for a short time only. If the graph does not renew them, each call returns the next step of a ramp
+    /// to zero. So call this again for every command that is sent to the device.
     pub fn commands(&mut self) -> &Commands {
-        self.commands.read()
+        let now = self.epoch.elapsed().as_nanos() as i64;
+        self.lease.hold(self.commands.read(), now)
     }
 
-    /// Waits for the next commands. The future does not borrow the link.
+    /// Returns the time since the tick that computed the newest commands.
+    pub fn age(&mut self) -> Duration {
+        let now = self.epoch.elapsed().as_nanos() as i64;
+        Duration::from_nanos((now - self.commands.read().grant.since).max(0) as u64)
+    }
+
+    /// Waits for the next commands, for a period of the device at most: then those that hold may have changed by
+    /// themselves. The future does not borrow the link.
     pub fn commanded(&self) -> impl Future<Output = ()> + Send + use<> {
-        let commanded = Arc::clone(&self.commanded);
-        async move { commanded.notified().await }
+        let (commanded, period) = (Arc::clone(&self.commanded), self.period);
+        async move { drop(tokio::time::timeout(period, commanded.notified()).await) }
     }
 
     /// Waits for the end of the run. The future does not borrow the link.
@@ -81,43 +127,104 @@ impl Link {
         let mut stop = self.stop.clone();
         async move {
             // An error means that the graph's end is gone, which is an end too.
-            let _ = stop.wait_for(|stop| *stop).await;
+            let _ = stop.wait_for(|reason| !reason.is_empty()).await;
         }
+    }
+
+    /// Returns why the run has ended, for a device that reports it; empty while the run goes on.
+    #[must_use]
+    pub fn reason(&self) -> String {
+        self.stop.borrow().clone()
+    }
+
+    /// Ends the run, because the device has no more samples. The driver can return after this.
+    pub fn finish(&mut self) {
+        self.finished.store(true, Ordering::Release);
+        self.tick.unpark();
     }
 }
 
 /// The graph's end of the link to a live device.
 pub(crate) struct Linked {
-    pub(crate) samples: triple_buffer::Output<Samples>,
-    pub(crate) commands: triple_buffer::Input<Commands>,
-    pub(crate) sampled: Arc<Notify>,
-    pub(crate) commanded: Arc<Notify>,
-    pub(crate) stop: watch::Sender<bool>,
+    samples: triple_buffer::Output<Samples>,
+    commands: triple_buffer::Input<Commands>,
+    published: Arc<AtomicU64>,
+    commanded: Arc<Notify>,
+    stop: watch::Sender<String>,
+    finished: Arc<AtomicBool>,
+    /// The newest epoch of commands that the device refuses.
+    refused: Arc<AtomicU64>,
+    /// The epoch of the commands.
+    epoch: u64,
+    /// The time until which the commands are valid, if they move the device [ns].
+    moves_until: Option<i64>,
+    driver: Option<JoinHandle<Result<(), DeviceError>>>,
 }
 
-pub(crate) fn link(samples: &Samples, commands: &Commands, epoch: Instant) -> (Link, Linked) {
+/// What a link needs to know of the graph.
+pub(crate) struct LinkSetup<'a> {
+    pub(crate) description: &'a Description,
+    pub(crate) samples: &'a Samples,
+    pub(crate) commands: &'a Commands,
+    /// Maximum acceleration of each joint of each command [rad/s²].
+    pub(crate) accelerations: Vec<Vec<f64>>,
+    /// Time zero of the graph's clock.
+    pub(crate) epoch: Instant,
+}
+
+/// Starts a driver on a thread of its own, and returns the graph's end of the link to it. The calling thread is woken
+/// when the device has sampled.
+///
+/// # Errors
+/// If the operating system gives no thread.
+pub(crate) fn start(name: &str, driver: Box<dyn Live>, setup: LinkSetup<'_>) -> io::Result<Linked> {
+    let LinkSetup { description, samples, commands, accelerations, epoch } = setup;
     let (samples_in, samples_out) = TripleBuffer::new(samples).split();
     let (commands_in, commands_out) = TripleBuffer::new(commands).split();
-    let (sampled, commanded) = (Arc::new(Notify::new()), Arc::new(Notify::new()));
-    let (stop, stopping) = watch::channel(false);
+    let (stop, stopping) = watch::channel(String::new());
+    let period = Duration::from_secs_f64(description.period);
+    let lease =
+        Lease::new(commands.clone(), accelerations, period.as_nanos() as i64, (description.silence() * 1e9) as i64);
+    let refused = lease.refused();
+    let (published, commanded) = (Arc::new(AtomicU64::new(0)), Arc::new(Notify::new()));
+    let finished = Arc::new(AtomicBool::new(false));
     let link = Link {
         staging: samples.clone(),
         samples: samples_in,
         commands: commands_out,
-        sampled: Arc::clone(&sampled),
+        lease,
+        clock: DeviceClock::default(),
+        published: Arc::clone(&published),
         commanded: Arc::clone(&commanded),
         stop: stopping,
+        finished: Arc::clone(&finished),
+        tick: std::thread::current(),
         epoch,
+        period,
+        latency: (description.latency * 1e9) as i64,
     };
-    (link, Linked { samples: samples_out, commands: commands_in, sampled, commanded, stop })
+    let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build()?;
+    let thread = std::thread::Builder::new().name(format!("device {name}"));
+    let driver = Some(thread.spawn(move || runtime.block_on(driver.run(link)))?);
+    let (samples, commands) = (samples_out, commands_in);
+    let (epoch, moves_until) = (1, None);
+    Ok(Linked { samples, commands, published, commanded, stop, finished, refused, epoch, moves_until, driver })
 }
 
 impl Linked {
-    /// Hands over the commands.
-    pub(crate) fn send(&mut self, commands: &Commands) {
+    /// Hands over the commands of the tick at `now` [ns], which are valid for `lease` [ns].
+    pub(crate) fn send(&mut self, commands: &mut Commands, now: i64, lease: i64) {
+        let until = now + lease;
+        commands.grant = Grant { epoch: self.epoch, since: now, until };
+        self.moves_until = (!commands.are_zero()).then_some(until);
         self.commands.input_buffer_mut().copy_from(commands);
         self.commands.publish();
         self.commanded.notify_one();
+    }
+
+    /// Whether the device has sampled since `samples` were received.
+    pub(crate) fn has_sampled(&self, samples: &Samples) -> bool {
+        self.published.load(Ordering::Acquire) != samples.writes
     }
 
     /// Takes the newest samples. Buffers rotate; nothing is copied. Returns whether the device has sampled.
@@ -127,5 +234,44 @@ impl Linked {
             std::mem::swap(samples, self.samples.output_buffer_mut());
         }
         samples.writes != before
+    }
+
+    /// Whether the device has stopped, or stops, because its commands were not renewed up to `now` [ns].
+    pub(crate) fn has_lost_lease(&self, now: i64) -> bool {
+        self.refused.load(Ordering::Relaxed) >= self.epoch || self.moves_until.is_some_and(|until| until < now)
+    }
+
+    /// Refuses the commands of this epoch, so that the device rests until [`renew`](Self::renew).
+    pub(crate) fn refuse(&mut self) {
+        self.refused.fetch_max(self.epoch, Ordering::Relaxed);
+        self.moves_until = None;
+    }
+
+    /// Begins a new epoch, if the last one is refused.
+    pub(crate) fn renew(&mut self) {
+        if self.refused.load(Ordering::Relaxed) >= self.epoch {
+            self.epoch += 1;
+        }
+    }
+
+    /// Asks the driver to end, for a reason.
+    pub(crate) fn stop(&self, reason: &str) {
+        self.stop.send_replace(reason.to_owned());
+    }
+
+    /// Whether the device has no more samples.
+    pub(crate) fn is_finished(&self) -> bool {
+        self.finished.load(Ordering::Acquire)
+    }
+
+    /// Whether the driver runs no more.
+    pub(crate) fn has_ended(&self) -> bool {
+        self.driver.as_ref().is_none_or(JoinHandle::is_finished)
+    }
+
+    /// Returns how the driver has ended: `None` while it runs, or if this has been returned before. A panic is an error
+    /// with its message.
+    pub(crate) fn ended(&mut self) -> Option<std::thread::Result<Result<(), DeviceError>>> {
+        self.driver.take_if(|driver| driver.is_finished()).map(JoinHandle::join)
     }
 }

@@ -5,10 +5,13 @@
 //! lockstep. A [`Live`] device is an async driver that fills a latest-value slot, so a slow disk or network makes a
 //! sample old and never a tick late.
 
+mod clock;
 mod description;
 mod exchange;
+mod lease;
 mod live;
 mod misfits;
+mod silence;
 
 use std::borrow::Cow;
 use std::fmt;
@@ -22,7 +25,8 @@ pub use description::{Command, Description, Fill, Output, Report};
 pub use exchange::{Commands, Samples};
 pub(crate) use exchange::{PortSample, SampleState};
 pub use live::{Link, Live};
-pub(crate) use live::{Linked, link};
+pub(crate) use live::{LinkSetup, Linked, start};
+pub use silence::{OnSilence, Silence};
 
 /// The type of a role: the ports that a task reads, and the ports that it commands.
 #[derive(Debug, Clone, Default)]
@@ -125,6 +129,9 @@ pub trait Stepped: Send {
 pub enum Driver {
     /// Step by step with the graph.
     Stepped(Box<dyn Stepped>),
+    /// Step by step with the graph and with another program: each waits for the other one. Such a device does not run
+    /// beside a live one.
+    Lockstep(Box<dyn Stepped>),
     /// By itself, in real time.
     Live(Box<dyn Live>),
 }

@@ -39,6 +39,7 @@ pub(crate) fn compile_in(mut loader: Loader, catalogue: &Catalogue, request: &Re
     }
     let net = Net::new(&flat, catalogue, &mut diagnostics);
     let opened = bench::open(&net, &mut sources, &mut diagnostics);
+    check::silence::check(&opened, &mut diagnostics);
     check_wires(&net, &mut diagnostics);
     let view = check::view::check(&net, &mut diagnostics);
     let mut frames = check::frames::check(&net, &mut diagnostics);

@@ -2,28 +2,25 @@
 
 use std::time::{Duration, Instant};
 
-use tokio::runtime::{Builder, Runtime};
-use tokio::task::JoinHandle;
-
 use super::params::with_params;
 use crate::device::{
-    Commands, Description, Device, DeviceError, Driver, Linked, Opened, Output, SampleState, Samples, device_type, link,
+    Commands, Description, Device, DeviceError, Driver, LinkSetup, Linked, Opened, Output, SampleState, Samples,
+    device_type, start,
 };
 use crate::node::{Mistakes, Reader};
 use crate::signal::Signal;
 use crate::source::Value;
 
-/// A live device that runs on a tokio runtime of its own, in real time. The test takes the place of the graph: it waits
+/// A live device that runs on a thread of its own, in real time. The test takes the place of the graph: it waits
 /// for samples, sends commands and stops the device. Ports are named without their role: `value`.
 pub struct LinkRig {
     description: Description,
     linked: Linked,
     samples: Samples,
     commands: Commands,
+    epoch: Instant,
     /// For each output, how many of its samples [`next`](Self::next) has returned.
     seen: Vec<u64>,
-    driver: JoinHandle<Result<(), DeviceError>>,
-    runtime: Runtime,
 }
 
 impl LinkRig {
@@ -38,13 +35,14 @@ impl LinkRig {
         let open = |table: &Value, reader: &mut Reader<'_>| device_type::<D>().open(table, reader);
         let Opened { description, driver } = with_params(params, open)?;
         let Driver::Live(driver) = driver else { panic!("`{}` is a stepped device", D::NAME) };
-        let runtime = Builder::new_multi_thread().worker_threads(1).enable_all().build();
-        let runtime = runtime.expect("the operating system gives a thread");
         let (samples, commands) = (Samples::of(&description), Commands::of(&description));
-        let (theirs, linked) = link(&samples, &commands, Instant::now());
-        let driver = runtime.spawn(driver.run(theirs));
+        let epoch = Instant::now();
+        let accelerations = commands.values.iter().map(|values| vec![f64::INFINITY; values.len()]).collect();
+        let setup =
+            LinkSetup { description: &description, samples: &samples, commands: &commands, accelerations, epoch };
+        let linked = start(&D::NAME, driver, setup).expect("the operating system gives a thread");
         let seen = vec![0; samples.ports.len()];
-        Ok(Self { description, linked, samples, commands, seen, driver, runtime })
+        Ok(Self { description, linked, samples, commands, epoch, seen })
     }
 
     /// Waits for the next sample of a port. Returns `None` if none comes within `timeout`.
@@ -103,14 +101,14 @@ impl LinkRig {
         self.samples.counts.iter().find(|(known, _)| *known == what).map_or(0, |(_, count)| *count)
     }
 
-    /// Sends a command, one value per joint.
+    /// Sends a command, one value per joint. It is valid for 40 ms.
     ///
     /// # Panics
     /// If the device has no such command, or another number of joints.
     pub fn command(&mut self, port: &str, values: &[f64]) {
         let command = self.description.command(port).unwrap_or_else(|| panic!("the device has no command `{port}`"));
         self.commands.command(command, values);
-        self.linked.send(&self.commands);
+        self.send();
     }
 
     /// Reports a value to the device.
@@ -121,20 +119,35 @@ impl LinkRig {
         let report = self.description.report::<T>(port);
         let report = report.unwrap_or_else(|| panic!("the device reads no report `{port}` of that kind"));
         self.commands.set_report(report, value);
-        self.linked.send(&self.commands);
+        self.send();
+    }
+
+    fn send(&mut self) {
+        const LEASE: i64 = 40_000_000;
+        let now = self.epoch.elapsed().as_nanos() as i64;
+        self.linked.send(&mut self.commands, now, LEASE);
+    }
+
+    /// Lets a device move again that has stopped by itself, as the operator's `resume` does.
+    pub fn resume(&mut self) {
+        self.linked.renew();
     }
 
     /// Stops the device and waits until it has ended, for a second at most.
     ///
     /// # Errors
     /// Why the device failed, panicked, or did not end.
-    pub fn stop(self) -> Result<(), DeviceError> {
+    pub fn stop(mut self) -> Result<(), DeviceError> {
         const GRACE: Duration = Duration::from_secs(1);
-        self.linked.stop.send_replace(true);
-        match self.runtime.block_on(async { tokio::time::timeout(GRACE, self.driver).await }) {
-            Ok(Ok(ended)) => ended,
-            Ok(Err(error)) => Err(DeviceError(error.to_string())),
-            Err(_) => Err(DeviceError(format!("it is still running {GRACE:?} after it was stopped"))),
+        self.linked.stop("the test is over");
+        let end = Instant::now() + GRACE;
+        while !self.linked.has_ended() && Instant::now() < end {
+            std::thread::sleep(Duration::from_millis(1));
+        }
+        match self.linked.ended() {
+            Some(Ok(ended)) => ended,
+            Some(Err(_)) => Err("it panicked".into()),
+            None => Err(DeviceError(format!("it is still running {GRACE:?} after it was stopped"))),
         }
     }
 

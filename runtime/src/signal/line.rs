@@ -28,3 +28,25 @@ pub fn scale_to(size: f64, bound: f64) -> f64 {
 pub fn step_toward(from: f64, to: f64, scale: f64) -> f64 {
     if scale < 1.0 { from + (to - from) * scale } else { to }
 }
+
+/// Moves `values` toward `target` on a straight line, each by no more than its acceleration allows in `dt` [s].
+/// Returns whether they have reached it.
+///
+/// ```
+/// use tactflow_runtime::signal::line::approach;
+///
+/// let mut velocity = [1.0, 0.5];
+/// assert!(!approach(&mut velocity, |_| 0.0, &[5.0, 5.0], 0.1));
+/// assert_eq!(velocity, [0.5, 0.25]);
+/// ```
+pub fn approach(values: &mut [f64], target: impl Fn(usize) -> f64, accelerations: &[f64], dt: f64) -> bool {
+    let mut scale = 1.0_f64;
+    for (i, (value, acceleration)) in values.iter().zip(accelerations).enumerate() {
+        // An infinite acceleration times a `dt` of zero is NaN, which `min` ignores.
+        scale = scale.min(scale_to((target(i) - value).abs(), acceleration * dt));
+    }
+    for (i, value) in values.iter_mut().enumerate() {
+        *value = step_toward(*value, target(i), scale);
+    }
+    scale >= 1.0
+}

@@ -82,6 +82,8 @@ codes! {
     UnknownDevice "unknown-device",
     /// A command without a wire.
     UndrivenCommand "undriven-command",
+    /// A live device that moves and does not stop by itself without commands.
+    UnwatchedDevice "unwatched-device",
     /// A limiter that reads another arm or another arm's sensor.
     ForeignInput "foreign-input",
     /// A command whose path lacks a limit that its role requires.

@@ -1,5 +1,6 @@
-//! The device that docs/writing-a-device.md builds.
+//! The device that docs/writing-a-device.md builds, and a motor.
 
+pub mod udp_motor;
 pub mod udp_pad;
 
 use tactflow_runtime::catalogue::Catalogue;
@@ -7,5 +8,5 @@ use tactflow_runtime::catalogue::Catalogue;
 /// The devices.
 #[must_use]
 pub fn catalogue() -> Catalogue {
-    Catalogue::new().device::<udp_pad::UdpPad>()
+    Catalogue::new().role(udp_motor::role()).device::<udp_pad::UdpPad>().device::<udp_motor::UdpMotor>()
 }

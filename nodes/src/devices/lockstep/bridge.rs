@@ -4,8 +4,10 @@ use std::time::{Duration, Instant};
 
 use tactflow_runtime::device::{Commands, DeviceError, Output, Samples, Stepped};
 use tactflow_runtime::signal::Image;
+use tactflow_runtime::signal::line::approach;
 
 use super::Params;
+use super::frames::Frames;
 use super::message::{self, Hello, Obs, Reply};
 use super::socket::Socket;
 use crate::devices::arm::ArmPorts;
@@ -15,14 +17,10 @@ pub(super) struct Bridge {
     image: Output<Image>,
     arm: ArmPorts,
     socket: Socket,
-    hello: Hello,
+    frames: Frames,
     params: Params,
-    /// Time between two frames [ns].
-    period: i64,
     /// Time of the simulator at the first frame [s].
     begin: Option<f64>,
-    /// Number and time [s] of the last frame.
-    newest: Option<(u64, f64)>,
     /// The next frame, with its stamp [ns].
     pending: Option<(i64, Obs)>,
     /// Stamp of the last frame that was shown [ns].
@@ -41,15 +39,13 @@ impl Bridge {
             arm,
             socket,
             params,
-            period: ((hello.dt * 1e9).round() as i64).max(1),
             begin: None,
-            newest: None,
             pending: None,
             shown: None,
             unanswered: None,
             commanded: vec![0.0; hello.joints.len()],
             is_over: false,
-            hello,
+            frames: Frames::new(hello),
         }
     }
 
@@ -65,7 +61,8 @@ impl Bridge {
             }
         }
         // A frame that is less than a period ahead is shown at once, because the clock of a simulator may jitter.
-        if let Some((stamp, obs)) = self.pending.take_if(|(stamp, _)| *stamp < now.saturating_add(self.period)) {
+        if let Some((stamp, obs)) = self.pending.take_if(|(stamp, _)| *stamp < now.saturating_add(self.frames.period()))
+        {
             self.show(stamp, &obs, samples);
         }
         Ok(())
@@ -82,49 +79,20 @@ impl Bridge {
     /// Returns whether the simulator has sent that it ends the run.
     fn has_ended(&mut self) -> bool {
         while let Ok(Some(line)) = self.socket.line_within(Duration::ZERO) {
-            if message::message(&line, &self.hello) == Ok(None) {
+            if message::message(&line, &self.frames.hello) == Ok(None) {
                 return true;
             }
         }
         false
     }
 
-    /// Waits for the next frame. If the simulator does not wait for commands, returns the newest frame that has
-    /// arrived. Returns `None` at the end of the run.
+    /// Waits for the next frame. Returns it with its stamp [ns], or `None` at the end of the run.
     fn next_frame(&mut self) -> Result<Option<(i64, Obs)>, String> {
         let line = self.socket.line()?;
-        let mut frame = self.frame(&line)?;
-        while !self.hello.is_lockstep && frame.is_some() {
-            let Some(line) = self.socket.line_if_ready()? else { break };
-            frame = self.frame(&line)?;
-        }
+        let frame = self.frames.read(&line, self.socket.lines())?;
         self.is_over = frame.is_none();
-        Ok(frame)
-    }
-
-    /// Reads a frame. Returns it with its stamp [ns], or `None` at the end of the run.
-    fn frame(&mut self, line: &str) -> Result<Option<(i64, Obs)>, String> {
-        let frame = message::message(line, &self.hello).map_err(|why| self.in_line(why))?;
-        let Some(obs) = frame else { return Ok(None) };
-        let wrong = |why: String| Err(self.in_line(format!("obs {}: {why}", obs.seq)));
-        if let Some((seq, t)) = self.newest {
-            if obs.seq <= seq {
-                return wrong(format!(
-                    "`seq` is {} after a frame with {seq}, but it must increase with every frame",
-                    obs.seq
-                ));
-            }
-            if obs.t < t {
-                return wrong(format!("`t` is {} s after a frame at {t} s: the time must not go back", obs.t));
-            }
-        }
-        let begin = *self.begin.get_or_insert(obs.t);
-        self.newest = Some((obs.seq, obs.t));
-        Ok(Some((((obs.t - begin) * 1e9).round() as i64, obs)))
-    }
-
-    fn in_line(&self, why: String) -> String {
-        format!("line {}: {why}", self.socket.lines)
+        let begin = frame.as_ref().map_or(0.0, |obs| *self.begin.get_or_insert(obs.t));
+        Ok(frame.map(|obs| (((obs.t - begin) * 1e9).round() as i64, obs)))
     }
 
     fn show(&mut self, stamp: i64, obs: &Obs, samples: &mut Samples) {
@@ -142,9 +110,10 @@ impl Bridge {
         const MAX_RAMP: Duration = Duration::from_secs(5);
         let end = Instant::now() + MAX_RAMP;
         // A frame that cannot be read still counts, and the simulator waits for the answer.
-        let mut seq = self.unanswered.unwrap_or_else(|| self.newest.map_or(0, |(seq, _)| seq + 1));
+        let mut seq = self.unanswered.unwrap_or_else(|| self.frames.newest.map_or(0, |(seq, _)| seq + 1));
         loop {
-            let is_still = self.slow_down(Instant::now() >= end);
+            let deceleration = if Instant::now() >= end { f64::INFINITY } else { self.params.acceleration };
+            let is_still = slow_down(&mut self.commanded, deceleration, self.frames.hello.dt);
             if self.socket.send(&Reply::Cmd { seq, dq: &self.commanded, est: None }.line()).is_err() || is_still {
                 break;
             }
@@ -158,16 +127,6 @@ impl Bridge {
         self.end_run(why);
     }
 
-    /// Reduces the command by what the joints can decelerate in a frame, or to zero at once. Returns whether it is
-    /// zero.
-    fn slow_down(&mut self, at_once: bool) -> bool {
-        let step = self.params.acceleration * self.period as f64 * 1e-9;
-        let speed = self.commanded.iter().fold(0.0_f64, |speed, dq| speed.max(dq.abs()));
-        let is_still = at_once || speed <= step;
-        self.commanded.iter_mut().for_each(|dq| *dq = if is_still { 0.0 } else { *dq * (1.0 - step / speed) });
-        is_still
-    }
-
     /// Sends the end of the run, if it has not ended yet.
     fn end_run(&mut self, reason: &str) {
         if !std::mem::replace(&mut self.is_over, true) && self.socket.send(&Reply::End { reason }.line()).is_ok() {
@@ -176,11 +135,17 @@ impl Bridge {
     }
 }
 
+/// Reduces a command [rad/s] by what the joints can decelerate [rad/s²] in `dt` [s]. Returns whether it is zero.
+pub(super) fn slow_down(commanded: &mut [f64], deceleration: f64, dt: f64) -> bool {
+    let decelerations = vec![deceleration; commanded.len()];
+    approach(commanded, |_| 0.0, &decelerations, dt)
+}
+
 impl Stepped for Bridge {
     fn next(&self) -> Option<i64> {
         let next = match (&self.pending, self.shown) {
             (Some((stamp, _)), _) => *stamp,
-            (None, Some(shown)) => shown + self.period,
+            (None, Some(shown)) => shown + self.frames.period(),
             (None, None) => 0,
         };
         (!self.is_over).then_some(next)

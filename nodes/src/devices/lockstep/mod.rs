@@ -1,12 +1,15 @@
 //! `lockstep`: a pad and an arm in an external simulator, over TCP. `docs/lockstep.md` describes the protocol.
 
 mod bridge;
+mod frames;
+mod free;
+mod lines;
 mod message;
 mod socket;
 
 use std::time::Duration;
 
-use tactflow_runtime::device::{Description, Device, Driver, Opened};
+use tactflow_runtime::device::{Description, Device, Driver, OnSilence, Opened};
 use tactflow_runtime::node::{At, Describe, FilePath, Mistake, Mistakes, Param};
 use tactflow_runtime::signal::{ImageShape, Joint, JointsShape, Unit};
 use tactflow_runtime::source::Code;
@@ -16,6 +19,7 @@ use super::{Facts, pad};
 use crate::arm::model::load;
 use crate::builtin;
 use bridge::Bridge;
+use free::FreeRunning;
 use message::Hello;
 use socket::Socket;
 
@@ -95,8 +99,13 @@ impl Device for Lockstep {
         let image = pad::fill(&mut description, shape, pad_facts(&hello));
         let joints = joints(&hello, params.acceleration);
         let arm = ArmPorts::fill(&mut description, &joints, model_facts(&hello, &params)?);
-        let bridge = Bridge::new(image, arm, socket, hello, params);
-        Ok(Opened { description, driver: Driver::Stepped(Box::new(bridge)) })
+        description.on_silence(OnSilence::Holds, free::COMMAND_TIMEOUT.as_secs_f64());
+        let driver = if hello.is_lockstep {
+            Driver::Lockstep(Box::new(Bridge::new(image, arm, socket, hello, params)))
+        } else {
+            Driver::Live(Box::new(FreeRunning { image, arm, socket: Some(socket), hello, params }))
+        };
+        Ok(Opened { description, driver })
     }
 }
 

@@ -4,8 +4,8 @@ use std::io::{BufRead, BufReader, ErrorKind, Write};
 use std::net::{Shutdown, TcpStream, ToSocketAddrs};
 use std::time::{Duration, Instant};
 
-/// Maximum length of a line [bytes].
-const MAX_LINE_BYTES: usize = 1 << 20;
+use super::lines::Lines;
+
 /// Time between two attempts to connect to a simulator that is starting.
 const RETRY_PERIOD: Duration = Duration::from_millis(50);
 /// Minimum timeout of a call of the operating system, where 0 would be no timeout.
@@ -15,12 +15,7 @@ const MIN_TIMEOUT: Duration = Duration::from_millis(1);
 #[derive(Debug)]
 pub(super) struct Socket {
     stream: BufReader<TcpStream>,
-    /// The line that is being received.
-    line: Vec<u8>,
-    /// Whether the rest of that line is skipped because it is too long.
-    is_skipping: bool,
-    /// Number of lines received.
-    pub(super) lines: u64,
+    lines: Lines,
     /// Whether the simulator has closed its end.
     is_closed: bool,
     timeout: Duration,
@@ -50,7 +45,7 @@ impl Socket {
         stream.set_nodelay(true)?;
         stream.set_write_timeout(Some(timeout))?;
         let stream = BufReader::with_capacity(1 << 16, stream);
-        Ok(Self { stream, line: Vec::new(), is_skipping: false, lines: 0, is_closed: false, timeout })
+        Ok(Self { stream, lines: Lines::default(), is_closed: false, timeout })
     }
 
     /// Sends a line.
@@ -87,7 +82,7 @@ impl Socket {
                 return Ok(Some(line));
             }
             if self.is_closed {
-                let middle = if self.line.is_empty() { "" } else { " in the middle of a message" };
+                let middle = if self.lines.is_in_a_line() { " in the middle of a message" } else { "" };
                 return Err(format!("the simulator has closed the connection without an `end`{middle}"));
             }
             let left = end.saturating_duration_since(Instant::now());
@@ -98,51 +93,32 @@ impl Socket {
         }
     }
 
-    /// Returns the next line if it has arrived. Never waits.
-    ///
-    /// # Errors
-    /// If the line is not valid.
-    pub(super) fn line_if_ready(&mut self) -> Result<Option<String>, String> {
+    /// Takes a whole line from the bytes that have arrived.
+    fn take_line(&mut self) -> Result<Option<String>, String> {
         loop {
-            let line = self.take_line()?;
-            if line.is_some() || self.is_closed {
-                return Ok(line);
-            }
-            self.stream.get_ref().set_nonblocking(true).map_err(broken)?;
-            let received = self.receive_some();
-            self.stream.get_ref().set_nonblocking(false).map_err(broken)?;
-            if !received? {
-                return Ok(None);
+            let (taken, line) = self.lines.feed(self.stream.buffer());
+            self.stream.consume(taken);
+            if self.stream.buffer().is_empty() || line != Ok(None) {
+                return line;
             }
         }
     }
 
-    /// Takes a whole line from the bytes that have arrived.
-    fn take_line(&mut self) -> Result<Option<String>, String> {
-        loop {
-            let arrived = self.stream.buffer();
-            let end = arrived.iter().position(|byte| *byte == b'\n');
-            if !self.is_skipping {
-                self.line.extend_from_slice(&arrived[..end.unwrap_or(arrived.len())]);
-            }
-            let count = end.map_or(arrived.len(), |end| end + 1);
-            self.stream.consume(count);
-            let number = self.lines + 1;
-            self.lines += u64::from(end.is_some());
-            let is_skipped = self.is_skipping;
-            self.is_skipping &= end.is_none();
-            if self.line.len() > MAX_LINE_BYTES {
-                (self.line, self.is_skipping) = (Vec::new(), end.is_none());
-                return Err(format!("line {number}: it is longer than 1 MiB"));
-            }
-            if end.is_none() {
-                return Ok(None);
-            }
-            if !is_skipped {
-                let line = String::from_utf8(std::mem::take(&mut self.line));
-                return line.map(Some).map_err(|_| format!("line {number}: it is not UTF-8 text"));
-            }
-        }
+    /// Returns the number of lines received.
+    pub(super) fn lines(&self) -> u64 {
+        self.lines.count
+    }
+
+    /// Returns the connection for a driver that waits for several things at once, the bytes that have arrived, and the
+    /// line in which they are.
+    ///
+    /// # Errors
+    /// If the connection is broken.
+    pub(super) fn into_parts(self) -> std::io::Result<(TcpStream, Vec<u8>, Lines)> {
+        let arrived = self.stream.buffer().to_vec();
+        let stream = self.stream.into_inner();
+        stream.set_nonblocking(true)?;
+        Ok((stream, arrived, self.lines))
     }
 
     /// Waits for bytes for at most `time`.

@@ -8,7 +8,7 @@ use crate::device::Commands;
 use crate::graph::PlannedCommand;
 use crate::node::{Bus, PortId, Tick};
 use crate::signal::Joints;
-use crate::signal::line::{scale_to, step_toward};
+use crate::signal::line::approach;
 
 /// One command port of a device.
 pub(crate) struct CommandSlot {
@@ -16,11 +16,11 @@ pub(crate) struct CommandSlot {
     pub(crate) tasks: Box<[usize]>,
     pub(crate) device: usize,
     source: PortId,
-    command: usize,
+    pub(crate) command: usize,
     /// Maximum age of the graph's command [ns].
     max_age: i64,
     /// Maximum acceleration of each joint [rad/s²]; infinite if it has no limit.
-    accelerations: Box<[f64]>,
+    pub(crate) accelerations: Box<[f64]>,
     /// Whether it has reached the graph's command.
     follows: bool,
 }
@@ -82,20 +82,6 @@ impl ReportSlot {
         let is_fresh = mark.is_present() && mark.stamp().age(tick.now) <= self.max_age;
         commands.take_report(self.report, &bus.arenas, is_fresh.then_some(self.source.slot));
     }
-}
-
-/// Moves `values` toward `target` on a straight line, each joint by no more than its acceleration allows in `dt` [s].
-/// Returns whether they have reached it.
-fn approach(values: &mut [f64], target: impl Fn(usize) -> f64, accelerations: &[f64], dt: f64) -> bool {
-    let mut scale = 1.0_f64;
-    for (i, (value, acceleration)) in values.iter().zip(accelerations).enumerate() {
-        // An infinite acceleration times a `dt` of zero is NaN, which `min` ignores.
-        scale = scale.min(scale_to((target(i) - value).abs(), acceleration * dt));
-    }
-    for (i, value) in values.iter_mut().enumerate() {
-        *value = step_toward(*value, target(i), scale);
-    }
-    scale >= 1.0
 }
 
 #[cfg(test)]

@@ -5,6 +5,9 @@ use crate::graph::{PlannedRole, Policy};
 use crate::node::{Bus, PortId};
 use crate::signal::{Kind, Stamp};
 
+/// Time that a device has for its first sample [ns].
+const START_TIME: i64 = 2_000_000_000;
+
 /// Counts of the samples of a role's port.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Counters {
@@ -12,7 +15,7 @@ pub struct Counters {
     pub new: u64,
     /// Samples with the sequence number or the stamp of the one before.
     pub repeated: u64,
-    /// Sequence numbers that are missing.
+    /// Sequence numbers that are missing, and samples of live devices that were too old when they arrived.
     pub gaps: u64,
     /// Samples that were older than one period of their device when they arrived.
     pub late: u64,
@@ -51,10 +54,12 @@ pub(crate) struct Inlet {
     is_lost: bool,
     /// Whether the loss of the port is not a trouble, as for the ground truth.
     is_observed: bool,
+    /// Whether the device is live, so that a sample can arrive too late.
+    is_live: bool,
 }
 
 impl Inlet {
-    pub(crate) fn new(number: usize, role: &PlannedRole, port: usize, id: PortId) -> Self {
+    pub(crate) fn new(number: usize, role: &PlannedRole, port: usize, id: PortId, is_live: bool) -> Self {
         let shape = &role.ports[port].shape;
         Self {
             role: number,
@@ -72,6 +77,7 @@ impl Inlet {
             last: None,
             is_lost: false,
             is_observed: role.is_observed,
+            is_live,
         }
     }
 
@@ -124,6 +130,8 @@ impl Inlet {
             Some((stamp, _)) if sample.stamp < stamp => self.counters.went_back += 1,
             // A stamp in the future would look fresh until its time comes, and later samples would be dropped as older.
             _ if sample.stamp - now > self.period => self.counters.ahead += 1,
+            // The graph has been told that its sample is too old, and must not take an old one for the new one.
+            _ if self.is_live && now - sample.stamp > self.max_age => self.counters.gaps += missing + 1,
             _ => {
                 self.last = Some((sample.stamp, Some(sample.sequence)));
                 self.counters.new += 1;
@@ -152,19 +160,19 @@ impl Inlet {
         self.counters.not_finite += 1;
     }
 
-    /// Whether the newest sample is too old at `now` [ns]. Always `false` before the first sample, while the port is
-    /// lost, and under the policy `count`.
+    /// Whether the newest sample is too old at `now` [ns], or there is none after the time for the first one. Always
+    /// `false` while the port is lost, and under the policy `count`.
     pub(crate) fn is_stale(&self, now: i64) -> bool {
-        !self.is_lost && self.stale != Policy::Count && self.age(now).is_some_and(|age| age > self.max_age)
+        let is_late = match self.last {
+            Some((stamp, _)) => now - stamp > self.max_age,
+            None => !self.is_observed && now > self.max_age.max(START_TIME),
+        };
+        is_late && !self.is_lost && self.stale != Policy::Count
     }
 
-    /// Returns the age of the newest sample at `now`, 0 if there is none, and its maximum age [ns].
-    pub(crate) fn ages(&self, now: i64) -> (i64, i64) {
-        (self.age(now).unwrap_or(0), self.max_age)
-    }
-
-    fn age(&self, now: i64) -> Option<i64> {
-        self.last.map(|(stamp, _)| now - stamp)
+    /// Returns the age of the newest sample at `now`, or `None` without a sample, and its maximum age [ns].
+    pub(crate) fn ages(&self, now: i64) -> (Option<i64>, i64) {
+        (self.last.map(|(stamp, _)| now - stamp), self.max_age)
     }
 
     /// Makes the current value a pending sample of the device with the stamp `now` [ns].

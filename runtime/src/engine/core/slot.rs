@@ -1,11 +1,12 @@
 //! A device in the engine: its samples, its commands and its link.
 
-use crate::device::{Commands, Linked, Live, Samples, Stepped};
+use crate::device::{Commands, Description, Linked, Live, Samples, Stepped};
 
 /// A device with its exchange buffers.
 pub(crate) struct DeviceSlot {
     pub(crate) name: String,
     pub(crate) place: String,
+    pub(crate) description: Description,
     pub(crate) samples: Samples,
     pub(crate) commands: Commands,
     pub(crate) link: DeviceLink,

@@ -19,7 +19,7 @@ pub(crate) struct Core {
     owners: Vec<usize>,
     /// What holds in the tick for the nodes of each task.
     pub(crate) tasks: Vec<TaskTick>,
-    commands: Vec<CommandSlot>,
+    pub(crate) commands: Vec<CommandSlot>,
     reports: Vec<ReportSlot>,
     /// Index of the runner that is stepping. A panic is attributed to it.
     current: usize,

@@ -11,7 +11,8 @@ impl Engine {
         match trouble {
             Trouble::Stale(inlet) => {
                 let (age, max_age) = self.core.inlets[inlet].ages(self.core.tick.now);
-                self.port_fault(inlet, Cause::Stale { age, max_age })
+                let cause = age.map_or(Cause::NeverSampled, |age| Cause::Stale { age, max_age });
+                self.port_fault(inlet, cause)
             }
             Trouble::StaleWire(wire) => {
                 let WatchedWire { aged, node, port, span, .. } = &self.watched[wire];
@@ -30,6 +31,10 @@ impl Engine {
                 let device = &self.devices[device];
                 let why = device.failed.clone().unwrap_or_default();
                 self.fault(&device.name, None, Cause::Device(why), device.place.clone())
+            }
+            Trouble::Lease(device) => {
+                let device = &self.devices[device];
+                self.fault(&device.name, None, Cause::LostLease, device.place.clone())
             }
             Trouble::Lost(inlet) => {
                 let samples = &self.devices[self.core.inlets[inlet].device].samples;

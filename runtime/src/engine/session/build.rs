@@ -34,7 +34,8 @@ impl BusPorts {
         for (i, role) in plan.roles.iter().enumerate() {
             for (port, planned) in role.ports.iter().enumerate() {
                 let id = ports.add(PortRef { producer: Producer::Role(i), port }, planned);
-                inlets.push(Inlet::new(i, role, port, id));
+                let is_live = matches!(plan.devices[role.device].driver, Driver::Live(_));
+                inlets.push(Inlet::new(i, role, port, id, is_live));
             }
         }
         for (source, planned) in plan.nodes.iter().flat_map(PlannedNode::outputs) {
@@ -210,8 +211,9 @@ fn device_slot(
         name: device.name,
         samples: Samples::of(&device.description),
         commands: Commands::with_reports(&device.description, wired),
+        description: device.description,
         link: match device.driver {
-            Driver::Stepped(driver) => DeviceLink::Stepped(driver),
+            Driver::Stepped(driver) | Driver::Lockstep(driver) => DeviceLink::Stepped(driver),
             Driver::Live(driver) => DeviceLink::Idle(driver),
         },
         failed: None,

@@ -39,6 +39,7 @@ impl Engine {
                 self.raise(Origin::Device(i), |policy| policy.device.0, Trouble::Device(i))?;
             }
         }
+        self.check_leases(now)?;
         for i in 0..self.core.inlets.len() {
             let inlet = &self.core.inlets[i];
             let device = &self.devices[inlet.device];
@@ -47,7 +48,7 @@ impl Engine {
             }
         }
         self.schedule.ticked(now, has_sampled);
-        if self.schedule.is_on_timer() {
+        if self.schedule.is_silent() {
             self.raise(Origin::Run, |policy| policy.clock, Trouble::Clock)?;
         }
         for i in 0..self.core.inlets.len() {
@@ -93,6 +94,7 @@ impl Engine {
             self.core.tasks[task].is_halted = self.tasks[task].is_resting();
         }
         self.core.commit(&mut self.devices);
+        self.send_commands();
         self.decide()
     }
 
@@ -191,9 +193,25 @@ impl Engine {
         }
         let task = &mut self.tasks[number];
         let resumes = task.halts.update(trouble.is_some(), self.core.tick.now);
+        if resumes {
+            self.renew_leases(number);
+        }
+        let task = &mut self.tasks[number];
         if let Some(modes) = task.modes.as_mut().filter(|_| resumes) {
             modes.restart(&self.core.tick);
             self.core.switch(modes.configurations());
+        }
+    }
+
+    /// Lets the devices of a task move again that have stopped by themselves.
+    fn renew_leases(&mut self, task: usize) {
+        for i in 0..self.devices.len() {
+            let concerns = self.concerns(Origin::Device(i), task);
+            if let DeviceLink::Live(linked) = &mut self.devices[i].link
+                && concerns
+            {
+                linked.renew();
+            }
         }
     }
 
@@ -201,7 +219,8 @@ impl Engine {
     fn explains_halt(&self, task: usize, trouble: Trouble) -> bool {
         let last = self.tasks[task].halts.list.last().filter(|halt| halt.until.is_none());
         let is_silence = last.is_some_and(|halt| {
-            halt.policy == Policy::Hold && matches!(halt.fault.cause, Cause::SilentClock | Cause::Stale { .. })
+            halt.policy == Policy::Hold
+                && matches!(halt.fault.cause, Cause::SilentClock | Cause::NeverSampled | Cause::Stale { .. })
         });
         is_silence && matches!(trouble, Trouble::Device(_) | Trouble::Lost(_))
     }
@@ -315,6 +334,7 @@ impl Engine {
         let now = self.core.tick.now + self.schedule.period();
         self.core.begin(now);
         let is_still = self.core.ramp(&mut self.devices, self.schedule.period() as f64 * 1e-9);
+        self.send_commands();
         // A device that fails now does not change why the run ended: it stops by its own timeout.
         self.exchange_with_devices(now);
         is_still
@@ -338,8 +358,33 @@ impl Engine {
         }
     }
 
-    /// Sends every device its commands and receives its samples. A device that fails does not keep the others from
-    /// their commands. Returns whether a live clock device has sampled.
+    /// Hands over the commands of this tick to the live devices, which follow them for a short time.
+    fn send_commands(&mut self) {
+        let (now, lease) = (self.core.tick.now, self.schedule.lease());
+        for device in &mut self.devices {
+            if let DeviceLink::Live(linked) = &mut device.link {
+                linked.send(&mut device.commands, now, lease);
+            }
+        }
+    }
+
+    /// Stops the tasks of every device that has stopped by itself, because the last tick was too long ago.
+    fn check_leases(&mut self, now: i64) -> Result<(), Fault> {
+        for i in 0..self.devices.len() {
+            let device = &mut self.devices[i];
+            let DeviceLink::Live(linked) = &mut device.link else { continue };
+            if linked.has_lost_lease(now) {
+                linked.refuse();
+                // The device ramps by itself, so the graph starts again from rest.
+                device.commands.rest();
+                self.raise(Origin::Device(i), |_| Policy::Stop, Trouble::Lease(i))?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Exchanges commands and samples with every stepped device, and receives the samples of the live ones. A device that
+    /// fails does not keep the others from their commands. Returns whether a live clock device has sampled.
     fn exchange_with_devices(&mut self, now: i64) -> bool {
         let mut has_sampled = false;
         for i in 0..self.devices.len() {
@@ -355,7 +400,6 @@ impl Engine {
                     }
                 }
                 DeviceLink::Live(linked) => {
-                    linked.send(&device.commands);
                     let is_newer = linked.receive(&mut device.samples);
                     has_sampled |= is_newer && self.schedule.is_clock(i);
                 }

@@ -89,11 +89,15 @@ impl Engine {
     pub fn next(&self) -> Option<i64> {
         let mut clock = None;
         for (i, device) in self.devices.iter().enumerate() {
-            if let DeviceLink::Stepped(driver) = &device.link {
-                let next = driver.next()?;
-                if self.schedule.is_clock(i) {
-                    clock = Some(next);
+            match &device.link {
+                DeviceLink::Stepped(driver) => {
+                    let next = driver.next()?;
+                    if self.schedule.is_clock(i) {
+                        clock = Some(next);
+                    }
                 }
+                DeviceLink::Live(linked) if linked.is_finished() => return None,
+                _ => {}
             }
         }
         Some(self.schedule.next(clock))

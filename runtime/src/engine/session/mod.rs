@@ -5,6 +5,7 @@ mod budgets;
 mod build;
 mod cycle;
 mod drive;
+mod drivers;
 mod engine;
 mod halt;
 mod operator;

@@ -5,6 +5,12 @@ use crate::graph::Clock;
 /// Periods without a sample of the clock device after which a timer takes its place.
 const MAX_MISSED_PERIODS: i64 = 3;
 
+/// Periods for which the commands of a tick are valid, and the shortest such time [ns].
+const LEASE_PERIODS: i64 = 5;
+const MIN_LEASE: i64 = 40_000_000;
+/// Time that a clock device has for its first sample [ns]. Nothing moves before it.
+const START_TIME: i64 = 2_000_000_000;
+
 /// Computes the time of the next tick, in virtual or real time.
 #[derive(Debug, Clone)]
 pub(crate) struct TickSchedule {
@@ -14,11 +20,19 @@ pub(crate) struct TickSchedule {
     /// Time of the last tick [ns].
     last: Option<i64>,
     is_on_timer: bool,
+    /// Whether the clock device has sampled at all.
+    has_started: bool,
 }
 
 impl TickSchedule {
     pub(crate) const fn new(clock: Clock, period: i64) -> Self {
-        Self { clock, period, last: None, is_on_timer: false }
+        Self { clock, period, last: None, is_on_timer: false, has_started: false }
+    }
+
+    /// Returns the time for which the commands of a tick are valid [ns]: longer than a clock device may be silent before
+    /// a timer takes its place.
+    pub(crate) fn lease(&self) -> i64 {
+        MIN_LEASE.max(LEASE_PERIODS * self.period)
     }
 
     pub(crate) const fn period(&self) -> i64 {
@@ -38,9 +52,9 @@ impl TickSchedule {
         self.clock_device() == Some(device)
     }
 
-    /// Whether a timer replaces the clock device.
-    pub(crate) const fn is_on_timer(&self) -> bool {
-        self.is_on_timer
+    /// Whether the clock device should have sampled, and a timer replaces it.
+    pub(crate) fn is_silent(&self) -> bool {
+        self.is_on_timer && (self.has_started || self.last.is_some_and(|last| last >= START_TIME))
     }
 
     /// Returns the latest time of the next tick [ns]. After it, the schedule no longer waits for the clock device.
@@ -62,6 +76,7 @@ impl TickSchedule {
     /// Records a tick at `now` [ns]. `has_sampled`: whether the clock device has sampled since the last tick.
     pub(crate) fn ticked(&mut self, now: i64, has_sampled: bool) {
         self.is_on_timer = self.clock != Clock::Rate && !has_sampled;
+        self.has_started |= has_sampled;
         self.last = Some(now);
     }
 }

@@ -59,6 +59,8 @@ pub(crate) enum Trouble {
     Panicked(usize),
     /// A device has failed.
     Device(usize),
+    /// A device has stopped by itself, because its commands were not renewed.
+    Lease(usize),
     /// The device has reported the port of an inlet as lost.
     Lost(usize),
     /// The clock device sends no samples.

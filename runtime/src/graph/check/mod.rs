@@ -31,6 +31,7 @@ pub(crate) mod policy;
 pub(crate) mod quantities;
 pub(crate) mod reachability;
 mod second_guard;
+pub(crate) mod silence;
 mod sums;
 pub(crate) mod times;
 pub(crate) mod units;

@@ -1,0 +1,205 @@
+//! The lease of a device that moves: it follows the commands while they are valid, and then comes to rest by itself.
+//!
+//! A command is valid for a short time. A graph that runs renews it in every tick. If the graph hangs, or the process
+//! was stopped, the lease is lost: the commands ramp to zero, and those of the same epoch are refused. Only when the
+//! operator resumes does the graph begin a new epoch.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use super::Commands;
+use crate::signal::line::approach;
+
+/// For how long commands are valid.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub(crate) struct Grant {
+    /// It grows when the operator resumes after a lost lease.
+    pub(crate) epoch: u64,
+    /// Time of the tick that computed the commands [ns].
+    pub(crate) since: i64,
+    /// Time until which they are valid [ns].
+    pub(crate) until: i64,
+}
+
+/// What a device may do, from the commands of the graph and the time.
+#[derive(Debug)]
+pub(crate) struct Lease {
+    /// What the device was last told to do.
+    held: Commands,
+    /// Maximum acceleration of each joint of each command [rad/s²]; infinite without a limit.
+    accelerations: Vec<Vec<f64>>,
+    /// Time of the last call [ns].
+    at: i64,
+    /// Nominal time between two calls [ns].
+    period: i64,
+    /// Time without a command after which the device has stopped by itself [ns].
+    silence: i64,
+    /// Whether `held` has reached the commands of the graph.
+    follows: bool,
+    /// The epoch that is refused, and all before it.
+    refused: Arc<AtomicU64>,
+}
+
+impl Lease {
+    /// `held` are the commands at the start, which are zero.
+    pub(crate) fn new(held: Commands, accelerations: Vec<Vec<f64>>, period: i64, silence: i64) -> Self {
+        let refused = Arc::new(AtomicU64::new(0));
+        Self { held, accelerations, at: 0, period, silence, follows: false, refused }
+    }
+
+    /// Returns the number of the newest epoch that is refused. It is shared with the graph.
+    pub(crate) fn refused(&self) -> Arc<AtomicU64> {
+        Arc::clone(&self.refused)
+    }
+
+    /// Returns what the device may do at `now` [ns].
+    pub(crate) fn hold(&mut self, granted: &Commands, now: i64) -> &Commands {
+        let Grant { epoch, until, .. } = granted.grant;
+        let last = std::mem::replace(&mut self.at, now);
+        let has_stopped = now.saturating_sub(last) > self.silence && !self.held.are_zero();
+        // Commands of zero move nothing, so they need no lease.
+        let has_expired = now > until && !granted.are_zero();
+        if has_stopped || has_expired {
+            self.refused.fetch_max(epoch, Ordering::Relaxed);
+        }
+        if has_stopped {
+            // A ramp from the last velocity would move the device again.
+            self.held.rest();
+        }
+        // After a time without a call, the device must not jump to what the graph reached meanwhile.
+        self.follows &= now - last <= 2 * self.period;
+        let is_valid = epoch > self.refused.load(Ordering::Relaxed);
+        if is_valid {
+            self.follow(granted, now - last);
+        } else {
+            self.ramp(now - last.max(until.min(now)));
+        }
+        &self.held
+    }
+
+    /// Follows the commands of the graph; approaches them first, after a time in which it did not follow.
+    fn follow(&mut self, granted: &Commands, dt: i64) {
+        if self.follows {
+            self.held.copy_from(granted);
+            return;
+        }
+        let dt = dt.min(2 * self.period) as f64 * 1e-9;
+        self.follows = true;
+        for ((held, granted), accelerations) in
+            self.held.values.iter_mut().zip(&granted.values).zip(&self.accelerations)
+        {
+            self.follows &= approach(held, |i| granted[i], accelerations, dt);
+        }
+        self.held.copy_reports(granted);
+    }
+
+    /// Ramps to zero for `dt` [ns].
+    fn ramp(&mut self, dt: i64) {
+        self.follows = false;
+        for (held, accelerations) in self.held.values.iter_mut().zip(&self.accelerations) {
+            approach(held, |_| 0.0, accelerations, dt as f64 * 1e-9);
+        }
+        self.held.clear_reports();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::device::{Command, Description};
+    use crate::signal::JointsShape;
+
+    const MS: i64 = 1_000_000;
+
+    /// A lease on two joints of 10 rad/s² that are called every 4 ms and stop after a silence of 100 ms, and commands.
+    fn lease() -> (Lease, Commands, Command) {
+        let mut description = Description::every(0.004);
+        let joints = JointsShape { joints: vec![Default::default(); 2], ..Default::default() };
+        let velocity = description.fills("arm").command("velocity", joints);
+        let commands = Commands::of(&description);
+        (Lease::new(commands.clone(), vec![vec![10.0; 2]], 4 * MS, 100 * MS), commands, velocity)
+    }
+
+    fn grant(commands: &mut Commands, velocity: Command, values: [f64; 2], epoch: u64, now: i64) {
+        commands.command(velocity, &values);
+        commands.grant = Grant { epoch, since: now, until: now + 20 * MS };
+    }
+
+    #[test]
+    fn a_command_that_is_not_renewed_ramps_to_zero_and_its_epoch_is_refused() {
+        let (mut lease, mut commands, velocity) = lease();
+        let mut now = 0;
+        // It approaches the first command, 0.04 rad/s in each call.
+        for expected in [0.04, 0.08, 0.1, 0.1] {
+            now += 4 * MS;
+            grant(&mut commands, velocity, [0.1, 0.0], 1, now);
+            assert!((lease.hold(&commands, now).joints(velocity)[0] - expected).abs() < 1e-12);
+        }
+        let renewed = now;
+        for (ms, expected) in [(4, 0.1), (20, 0.1), (22, 0.08), (26, 0.04), (30, 0.0), (34, 0.0)] {
+            let held = lease.hold(&commands, renewed + ms * MS).joints(velocity)[0];
+            assert!((held - expected).abs() < 1e-12, "{held} after {ms} ms");
+        }
+        // The graph is back, but only a new epoch moves the device.
+        now = renewed + 300 * MS;
+        for (epoch, expected) in [(1, 0.0), (1, 0.0), (2, 0.04), (2, 0.08)] {
+            now += 4 * MS;
+            grant(&mut commands, velocity, [0.1, 0.0], epoch, now);
+            let held = lease.hold(&commands, now).joints(velocity)[0];
+            assert!((held - expected).abs() < 1e-12, "{held} in epoch {epoch}");
+        }
+    }
+
+    #[test]
+    fn a_process_that_was_stopped_does_not_move_the_device_when_it_continues() {
+        let (mut lease, mut commands, velocity) = lease();
+        for now in 1..=20 {
+            grant(&mut commands, velocity, [0.1, -0.1], 1, now * 4 * MS);
+            lease.hold(&commands, now * 4 * MS);
+        }
+        // Even if the tick is the first to go on and renews the command.
+        let now = 80 * MS + 5_000 * MS;
+        grant(&mut commands, velocity, [0.1, -0.1], 1, now);
+        assert_eq!(lease.hold(&commands, now).joints(velocity), [0.0, 0.0]);
+        assert_eq!(lease.hold(&commands, now + 4 * MS).joints(velocity), [0.0, 0.0]);
+    }
+
+    #[test]
+    fn a_device_at_rest_needs_no_lease() {
+        let (mut lease, mut commands, velocity) = lease();
+        grant(&mut commands, velocity, [0.0, 0.0], 1, 0);
+        assert!(lease.hold(&commands, 5_000 * MS).are_zero());
+        grant(&mut commands, velocity, [0.1, 0.0], 1, 5_900 * MS);
+        assert_eq!(lease.hold(&commands, 5_900 * MS).joints(velocity), [0.08, 0.0], "it does not jump");
+    }
+
+    proptest! {
+        #[test]
+        fn no_order_of_grants_and_calls_makes_a_device_jump_or_move_without_a_lease(
+            events in prop::collection::vec((0..30_i64, prop::option::of(prop::array::uniform2(-0.5..0.5_f64)), any::<bool>()), 1..120),
+        ) {
+            let (mut lease, mut commands, velocity) = lease();
+            let (mut now, mut epoch, mut graph, mut last, mut called) = (0, 1, [0.0; 2], [0.0; 2], 0);
+            for (ms, target, resumes) in events {
+                now += ms * MS;
+                epoch += u64::from(resumes);
+                if let Some(target) = target {
+                    // The graph itself respects the accelerations between two of its commands.
+                    let dt = (now - commands.grant.since).min(4 * MS) as f64 * 1e-9;
+                    approach(&mut graph, |i| target[i], &[10.0; 2], dt);
+                    grant(&mut commands, velocity, graph, epoch, now);
+                }
+                let held: [f64; 2] = lease.hold(&commands, now).joints(velocity).try_into().unwrap();
+                let dt = ((now - called) as f64 * 1e-9).max(0.004) + 0.004;
+                for i in 0..2 {
+                    prop_assert!((held[i] - last[i]).abs() <= 10.0 * dt + 1e-9, "{last:?} to {held:?}");
+                    let is_expired = now > commands.grant.until;
+                    prop_assert!(!is_expired || held[i].abs() < last[i].abs() || held[i] == 0.0 || now == called || now - commands.grant.until < MS);
+                }
+                (last, called) = (held, now);
+            }
+        }
+    }
+}

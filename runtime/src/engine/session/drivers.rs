@@ -1,0 +1,80 @@
+//! Starts and ends the drivers of live devices, each on a thread of its own.
+
+use std::io;
+use std::time::{Duration, Instant};
+
+use super::engine::Engine;
+use super::trouble::panic_message;
+use crate::device::{LinkSetup, Linked, start};
+use crate::engine::core::{CommandSlot, DeviceLink};
+
+impl Engine {
+    /// Starts the driver of each live device. `epoch` is time zero of the graph's clock.
+    pub(super) fn start_drivers(&mut self, epoch: Instant) -> io::Result<()> {
+        for (i, device) in self.devices.iter_mut().enumerate() {
+            if !matches!(device.link, DeviceLink::Idle(_)) {
+                continue;
+            }
+            let DeviceLink::Idle(driver) = std::mem::replace(&mut device.link, DeviceLink::Gone) else { continue };
+            tracing::info!("device `{}` starts", device.name);
+            let slots = self.core.commands.iter().filter(|slot| slot.device == i);
+            let setup = LinkSetup {
+                description: &device.description,
+                samples: &device.samples,
+                commands: &device.commands,
+                accelerations: accelerations(&device.commands.values, slots),
+                epoch,
+            };
+            device.link = DeviceLink::Live(start(&device.name, driver, setup)?);
+        }
+        Ok(())
+    }
+
+    /// Marks every live device as failed whose driver has ended, with or without an error.
+    pub(super) fn collect_ended_drivers(&mut self) {
+        for i in 0..self.devices.len() {
+            let DeviceLink::Live(linked) = &mut self.devices[i].link else { continue };
+            let message = match linked.ended() {
+                None => continue,
+                Some(Ok(Ok(()))) if linked.is_finished() => continue,
+                Some(Ok(Ok(()))) => "it ended before the run did".to_owned(),
+                Some(Ok(Err(error))) => error.0,
+                Some(Err(panic)) => format!("it panicked: {}", panic_message(&*panic)),
+            };
+            self.lose_device(i, message);
+        }
+    }
+
+    /// Stops the drivers for a reason, after they had time to send the zero command. Does not wait for a driver that
+    /// blocks.
+    pub(super) fn stop_drivers(&self, reason: &str) {
+        /// Time that a driver has to send its last command.
+        const LAST_COMMAND: Duration = Duration::from_millis(50);
+        /// Time that the drivers have to end.
+        const GRACE: Duration = Duration::from_secs(1);
+        let running = || self.links().filter(|linked| !linked.has_ended());
+        if running().next().is_none() {
+            return;
+        }
+        std::thread::sleep(LAST_COMMAND);
+        running().for_each(|linked| linked.stop(reason));
+        let end = Instant::now() + GRACE;
+        while running().next().is_some() && Instant::now() < end {
+            std::thread::sleep(Duration::from_millis(1));
+        }
+    }
+
+    fn links(&self) -> impl Iterator<Item = &Linked> {
+        self.devices.iter().filter_map(|device| match &device.link {
+            DeviceLink::Live(linked) => Some(linked),
+            _ => None,
+        })
+    }
+}
+
+/// Returns the accelerations of the joints of each command of a device, from the commands that the graph wires.
+fn accelerations<'c>(commands: &[Box<[f64]>], slots: impl Iterator<Item = &'c CommandSlot>) -> Vec<Vec<f64>> {
+    let mut accelerations: Vec<Vec<f64>> = commands.iter().map(|values| vec![f64::INFINITY; values.len()]).collect();
+    slots.for_each(|slot| accelerations[slot.command].copy_from_slice(&slot.accelerations));
+    accelerations
+}
