@@ -7,6 +7,7 @@ mod bad_data;
 mod blind;
 mod calibrate;
 mod cli;
+mod clocks;
 
 mod course;
 mod crossings;

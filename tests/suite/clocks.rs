@@ -1,0 +1,173 @@
+//! A simulator with a clock of its own: how old its frames are for the graph, and how soon each is answered.
+
+use std::io::{BufRead, BufReader, Write};
+use std::net::{TcpListener, TcpStream};
+use std::thread;
+use std::time::{Duration, Instant};
+
+use serde_json::{Value, json};
+use tactflow_runtime::engine::{self, Engine, RunOptions};
+use tactflow_runtime::graph::{Request, compile};
+use tactflow_runtime::signal::Joints;
+use tactflow_tests::{catalogue, workspace};
+
+/// Time between two frames.
+const PERIOD: Duration = Duration::from_millis(8);
+/// The smallest delay of a frame.
+const DELAY: Duration = Duration::from_millis(2);
+/// What frame `i` adds to the first joint, by which it is recognised [rad].
+const MARK: f64 = 1e-7;
+const START: [f64; 7] = [0.0, 0.5, 0.0, -1.3, 0.0, 1.3, 0.0];
+
+/// A simulator, and how its frames travel.
+#[derive(Debug, Clone, Copy)]
+struct Peer {
+    /// How much faster its clock runs [1].
+    drift: f64,
+    /// Largest additional delay of a frame.
+    jitter: Duration,
+    /// Number of frames that arrive together.
+    burst: u32,
+    /// Number of frames of each 250 that it does not send.
+    silent: u32,
+    frames: u32,
+}
+
+/// When a frame was measured, when it was sent, and when it was answered.
+struct Frame {
+    measured: Instant,
+    sent: Instant,
+    answered: Option<Instant>,
+}
+
+impl Peer {
+    fn hello() -> Value {
+        let names: Vec<String> =
+            ["a1", "a2", "e1", "a3", "a4", "a5", "a6"].iter().map(|name| format!("lwr_{name}_joint")).collect();
+        json!({
+            "type": "hello", "proto": 1, "dt": PERIOD.as_secs_f64(), "lockstep": false, "task": "nothing", "joints": names,
+            "q_min": vec![-2.9; 7], "q_max": vec![2.9; 7], "dq_max": vec![1.9; 7], "urdf": "lwr4p", "tip": "lwr_7_link",
+            "T_es": [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0.03, 0, 0, 0, 1], "rows": 4, "cols": 4, "pitch": 0.005,
+            "counts_per_unit": 100, "newton_per_unit": 0.1, "threshold_units": 0.15,
+        })
+    }
+
+    /// Serves one graph. Returns the frames that were sent, each with its number.
+    fn serve(self, mut stream: TcpStream) -> Vec<(u32, Frame)> {
+        stream.set_nodelay(true).unwrap();
+        writeln!(stream, "{}", Self::hello()).unwrap();
+        let answers = BufReader::new(stream.try_clone().unwrap());
+        let answers = thread::spawn(move || {
+            let mut seen = Vec::new();
+            for line in answers.lines().map_while(Result::ok) {
+                let message: Value = serde_json::from_str(&line).unwrap();
+                seen.extend(message["seq"].as_u64().map(|seq| (seq as u32, Instant::now())));
+            }
+            seen
+        });
+        let begin = Instant::now() + Duration::from_millis(100);
+        let mut frames = Vec::new();
+        for i in (1..=self.frames).filter(|i| i % 250 >= self.silent) {
+            let measured = begin + PERIOD * i;
+            // A number from 0 to 1, the same in each run.
+            let random = f64::from(i.wrapping_mul(2_654_435_769) >> 8) / f64::from(1 << 24);
+            let held = PERIOD * (self.burst - 1 - i % self.burst);
+            let due = measured + DELAY + held + self.jitter.mul_f64(random);
+            thread::sleep(due.saturating_duration_since(Instant::now()));
+            let t = 500.0 + PERIOD.as_secs_f64() * f64::from(i) * (1.0 + self.drift);
+            let mut q = START;
+            q[0] += MARK * f64::from(i);
+            let frame =
+                json!({"type": "obs", "seq": i, "t": t, "q": q, "dq": vec![0.0; 7], "q_eq": q, "img": vec![0; 16]});
+            let sent = Instant::now();
+            if writeln!(stream, "{frame}").is_err() {
+                break;
+            }
+            frames.push((i, Frame { measured, sent, answered: None }));
+        }
+        let _ = writeln!(stream, "{}", json!({"type": "end"}));
+        let _ = stream.shutdown(std::net::Shutdown::Write);
+        for (seq, at) in answers.join().unwrap() {
+            // Later answers to the same frame carry newer commands.
+            let frame = frames.iter_mut().find(|(i, _)| *i == seq);
+            frame.map(|(_, frame)| frame.answered.get_or_insert(at));
+        }
+        frames
+    }
+}
+
+/// What a run shows, after the first five seconds: the errors of the ages, and the times from a frame to its command [s],
+/// both from the smallest to the largest.
+struct Seen {
+    errors: Vec<f64>,
+    answers: Vec<f64>,
+}
+
+fn run(peer: Peer) -> Seen {
+    let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+    let address = listener.local_addr().unwrap();
+    let peer = thread::spawn(move || peer.serve(listener.accept().unwrap().0));
+    let graphs = workspace().join("graphs");
+    let request = Request::file(graphs.join("hybrid.toml")).bench(graphs.join("benches/lockstep.toml"));
+    let request = request.set(format!("devices.bench.address={address}"));
+    let plan = compile(&catalogue(), &request).unwrap_or_else(|report| panic!("{}", report.render(false)));
+    let mut engine = Engine::new(plan);
+    let (mut epoch, mut stamps) = (None::<Instant>, Vec::new());
+    let options = RunOptions { sends: vec![(1e6, "stop".into())], ..RunOptions::default() };
+    engine::run(&mut engine, &options, &mut |engine| {
+        // The tick began at least this long ago.
+        let zero = Instant::now() - Duration::from_nanos(engine.now() as u64);
+        epoch = Some(epoch.map_or(zero, |epoch| epoch.min(zero)));
+        if let Some(Joints(q)) = engine.get::<Joints>("arm.position") {
+            stamps.push((((q[0] - START[0]) / MARK).round() as u32, engine.mark("arm.position").stamp().nanos));
+        }
+    })
+    .unwrap();
+    stamps.dedup();
+    let (frames, epoch) = (peer.join().unwrap(), epoch.unwrap());
+    let late = frames[0].1.measured + Duration::from_secs(5);
+    let frames: Vec<&(u32, Frame)> = frames.iter().filter(|(_, frame)| frame.measured > late).collect();
+    let error = |(number, stamp): &(u32, i64)| {
+        let (_, frame) = frames.iter().find(|(i, _)| i == number)?;
+        let stamp = epoch + Duration::from_nanos(*stamp as u64);
+        let truth = frame.measured + DELAY;
+        Some((stamp - truth.min(stamp)).max(truth - stamp.min(truth)).as_secs_f64())
+    };
+    let sorted = |mut values: Vec<f64>| {
+        values.sort_by(f64::total_cmp);
+        values
+    };
+    // Of several frames that arrive together, the newest is answered.
+    let answer = |(_, frame): &&(u32, Frame)| Some((frame.answered? - frame.sent).as_secs_f64());
+    Seen {
+        errors: sorted(stamps.iter().filter_map(error).collect()),
+        answers: sorted(frames.iter().copied().filter_map(|frame| answer(&frame)).collect()),
+    }
+}
+
+/// Returns the value below which a share of the values is.
+fn quantile(values: &[f64], share: f64) -> f64 {
+    values[((values.len() - 1) as f64 * share) as usize]
+}
+
+#[test]
+fn ages_are_true_and_frames_are_answered_at_once_whatever_the_clock_of_the_simulator_does() {
+    let steady = Peer { drift: 0.0, jitter: Duration::ZERO, burst: 1, silent: 0, frames: 900 };
+    let peers = [
+        Peer { drift: 1e-4, ..steady },
+        Peer { drift: 0.05, jitter: Duration::from_millis(5), ..steady },
+        Peer { drift: -0.05, jitter: Duration::from_millis(5), silent: 60, ..steady },
+        Peer { drift: -0.005, burst: 3, ..steady },
+    ];
+    let runs: Vec<_> = peers.map(|peer| (peer, thread::spawn(move || run(peer)))).into_iter().collect();
+    for (peer, run) in runs {
+        let seen = run.join().unwrap();
+        assert!(seen.errors.len() > 50, "{peer:?}: {} frames", seen.errors.len());
+        let [error, answer] =
+            [&seen.errors, &seen.answers].map(|values| [0.5, 0.99].map(|share| quantile(values, share)));
+        println!("{peer:?}: error {error:?}, answer {answer:?}");
+        // Half of them, since a busy machine delays both sides.
+        assert!(error[0] < 0.001, "{peer:?}: {error:?} s");
+        assert!(answer[0] < 2.0 * PERIOD.as_secs_f64(), "{peer:?}: {answer:?} s");
+    }
+}
