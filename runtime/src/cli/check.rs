@@ -64,6 +64,7 @@ pub(crate) fn check(args: CheckArgs, shell: &Shell) -> u8 {
                 shell.say(&format!("{}: ok, {}", checked.graph, checked.summary));
             }
             checked.allowed.iter().for_each(|warning| shell.say(&warning.to_string()));
+            checked.silences.iter().for_each(|line| shell.say(line));
         }
         results.push(checked);
     }
@@ -82,8 +83,8 @@ fn check_graph(path: &Path, args: &CheckArgs, shell: &Shell) -> Checked {
             let figures = PlanJson { nodes: order.len(), ports, period_s, is_live, order };
             let summary = format!("{} nodes, one tick every {}", figures.nodes, milliseconds(figures.period_s));
             let ok = report.is_none() || !args.deny_warnings;
-            let allowed = plan.allowed().to_vec();
-            Checked { ok, figures: Some(figures), summary, allowed, ..Checked::of(path, report) }
+            let (allowed, silences) = (plan.allowed().to_vec(), plan.silences().to_vec());
+            Checked { ok, figures: Some(figures), summary, allowed, silences, ..Checked::of(path, report) }
         }
         Err(report) => Checked::of(path, Some(report)),
     }
@@ -119,6 +120,8 @@ struct Checked {
     /// The warnings that a section [allow] silences.
     #[serde(serialize_with = "allowed_json")]
     allowed: Vec<AllowedWarning>,
+    /// What each live device that moves does without commands.
+    silences: Vec<String>,
     #[serde(skip)]
     report: Option<Report>,
     /// What is printed of a good file.

@@ -39,8 +39,7 @@ pub(crate) fn compile_in(mut loader: Loader, catalogue: &Catalogue, request: &Re
     }
     let net = Net::new(&flat, catalogue, &mut diagnostics);
     let opened = bench::open(&net, &mut sources, &mut diagnostics);
-    check::silence::check(&opened, &mut diagnostics);
-    check_wires(&net, &mut diagnostics);
+    check_wires(&net, &opened, &mut diagnostics);
     let view = check::view::check(&net, &mut diagnostics);
     let mut frames = check::frames::check(&net, &mut diagnostics);
     check::quantities::check(&net, &mut diagnostics);
@@ -94,14 +93,15 @@ pub(crate) fn compile_in(mut loader: Loader, catalogue: &Catalogue, request: &Re
     let reach = find_reach(&net, &nodes, &modes);
     let tasks = plan_tasks(&net, &ports, modes, (&starts, &shown), &gaps);
     let period = ((period * 1e9).round() as i64).max(1);
-    let (exports, facts) = (net.exports_by_name(), opened.facts(&net));
-    let devices = opened.devices;
-    let plan = Plan { roles, devices, nodes, commands, clock, period, tasks, reach, allowed };
-    Ok(Compiled { plan, view, sources, warnings, outline, exports, facts })
+    let (exports, facts, silences) =
+        (net.exports_by_name(), opened.facts(&net), check::silence::describe(&net, &opened));
+    let plan = Plan { roles, devices: opened.devices, nodes, commands, clock, period, tasks, reach, allowed };
+    Ok(Compiled { plan, view, sources, warnings, outline, exports, facts, silences })
 }
 
 /// Checks what needs neither frames nor limits.
-fn check_wires(net: &Net<'_>, diagnostics: &mut Diagnostics) {
+fn check_wires(net: &Net<'_>, opened: &OpenedBench, diagnostics: &mut Diagnostics) {
+    check::silence::check(opened, diagnostics);
     check::inputs::check(net, diagnostics);
     check::commands::check(net, diagnostics);
     check::exports::check(net, diagnostics);

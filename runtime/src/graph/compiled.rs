@@ -18,6 +18,7 @@ pub struct Compiled {
     pub(crate) outline: Outline,
     pub(crate) exports: Vec<(String, String)>,
     pub(crate) facts: Vec<(String, toml::Value)>,
+    pub(crate) silences: Vec<String>,
 }
 
 impl Compiled {
@@ -50,6 +51,12 @@ impl Compiled {
         };
         let warnings: Vec<Diagnostic> = self.warnings.iter().filter(|warning| !is_used(warning)).cloned().collect();
         (!warnings.is_empty()).then(|| Report::new(self.sources.clone(), warnings))
+    }
+
+    /// Returns for each live device that moves what it does without commands, within which time and way.
+    #[must_use]
+    pub fn silences(&self) -> &[String] {
+        &self.silences
     }
 
     /// Returns the warnings that a section [allow] silences, each with its reason.

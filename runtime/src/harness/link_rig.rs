@@ -40,7 +40,7 @@ impl LinkRig {
         let accelerations = commands.values.iter().map(|values| vec![f64::INFINITY; values.len()]).collect();
         let setup =
             LinkSetup { description: &description, samples: &samples, commands: &commands, accelerations, epoch };
-        let linked = start(&D::NAME, driver, setup).expect("the operating system gives a thread");
+        let linked = start(D::NAME, driver, setup).expect("the operating system gives a thread");
         let seen = vec![0; samples.ports.len()];
         Ok(Self { description, linked, samples, commands, epoch, seen })
     }

@@ -5,7 +5,7 @@
 //! port is lost, and the driver connects again, until it succeeds or the run ends.
 
 use std::io;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use async_trait::async_trait;
 use tactflow_runtime::device::{Description, Device, DeviceError, Driver, Link, Live, Opened, Output};
@@ -62,6 +62,9 @@ pub struct Params {
     /// Time without a frame after which the pad is lost.
     #[param(unit = "s", above = 0.0, default = 0.2)]
     silence_s: f64,
+    /// Time from the measurement of a frame to its arrival. The frames have no stamp of their own.
+    #[param(unit = "ms", range = 0.0..=1e3, default = 0.0)]
+    latency_ms: f64,
     /// Force on a tactel that is above its noise.
     #[param(unit = "N", range = 0.0.., default = 0.015)]
     threshold: f64,
@@ -74,6 +77,7 @@ impl Device for UdpPad {
         let (rows, cols) = (params.rows, params.cols);
         let shape = ImageShape { rows, cols, pitch: [params.pitch; 2], unit: Unit::NEWTON };
         let mut description = Description::every(1.0 / params.rate_hz);
+        description.latency = params.latency_ms * 1e-3;
         let mut pad = description.fills("tactile_pad");
         let image = pad.output("image", shape);
         pad.fact_in("threshold", params.threshold, Unit::NEWTON);
@@ -130,7 +134,7 @@ impl UdpPad {
                 Ok(Err(error)) => return error,
                 Err(_) => return io::Error::new(io::ErrorKind::TimedOut, format!("no frame for {:?}", self.silence)),
             };
-            let stamp = link.stamp(Instant::now());
+            let stamp = link.arrival();
             match decode(&datagram[..length], &mut self.frame) {
                 Some(number) => link.publish(|samples| {
                     samples.write(self.image, stamp, number).cells_mut().copy_from_slice(&self.frame);

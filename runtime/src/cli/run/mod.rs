@@ -143,11 +143,13 @@ impl Job {
         let chosen = points.as_ref().map(|wanted| wanted.resolve(&plan)).transpose()?;
         let mut warnings = plan.warnings().into_iter().flat_map(|report| report.diagnostics);
         let start = warnings.find(|warning| warning.code == Code::StartOutside).map(|warning| warning.message);
+        let silences = plan.silences().to_vec();
         let mut engine = Engine::new(plan);
         self.check_words(&engine)?;
         let mut files = OutputFiles::create(self, chosen.as_ref(), &engine, !is_real)?;
         let period = milliseconds(seconds(engine.period()));
         self.say(shell, &format!("{}: {} nodes, one tick every {period}", self.title, engine.order().count()));
+        silences.iter().for_each(|line| self.say(shell, line));
         let mut summary = Summary::new(&engine, self.print == Print::Ports, start);
         let mut log = NodeLog::new(&engine);
         let (end, is_quiet) = (duration.or_else(|| engine.end().map(seconds)), self.print == Print::Nothing);

@@ -2,7 +2,8 @@
 
 use crate::device::{Driver, OnSilence};
 use crate::graph::bench::OpenedBench;
-use crate::graph::plan::PlannedDevice;
+use crate::graph::net::Net;
+use crate::graph::plan::{PlannedDevice, Producer};
 use crate::source::{Code, Diagnostic, Diagnostics};
 
 /// Reports live devices that move and do not declare how they stop, and simulators that a tick would wait for beside
@@ -21,6 +22,26 @@ pub(crate) fn check(opened: &OpenedBench, diagnostics: &mut Diagnostics) {
         let help = "let the simulator run by its own clock: `\"lockstep\": false` in its hello message";
         diagnostics.push(diagnostic.note(live.span.clone(), "the device in real time is here").help(help));
     }
+}
+
+/// Says for each live device that moves a role what it does without commands, within which time and way.
+pub(crate) fn describe(net: &Net<'_>, opened: &OpenedBench) -> Vec<String> {
+    let bound = opened.roles.iter().enumerate().filter_map(|(role, bound)| Some((role, bound.as_ref()?)));
+    let lines = bound.filter(|(_, bound)| !bound.commands.is_empty()).filter_map(|(role, bound)| {
+        let device = &opened.devices[bound.device];
+        let silence = device.description.on_silence.as_ref().filter(|_| matches!(device.driver, Driver::Live(_)))?;
+        let way = net.speed_limit(role).map(|speed| {
+            format!("; the sensor moves by {} mm at most, at {speed} m/s", round(speed * silence.within * 1e3))
+        });
+        let name = net.name(Producer::Role(role));
+        Some(format!("`{name}` without commands: {silence}{}", way.unwrap_or_default()))
+    });
+    lines.collect()
+}
+
+/// Rounds a number to three decimals.
+fn round(number: f64) -> f64 {
+    (number * 1e3).round() / 1e3
 }
 
 /// Reports a device that moves on when this process is silent, or does not say that it stops.

@@ -90,6 +90,14 @@ impl<'a> Net<'a> {
         values.cloned().reduce(|one, other| tighter(name, one, other))
     }
 
+    /// Returns the tightest limit on the speed of an arm, or `None` if nobody states one [m/s].
+    pub(crate) fn speed_limit(&self, arm: usize) -> Option<f64> {
+        let arms = [arm];
+        let entries = self.limit_sections(&arms).flat_map(|section| &section.table.entries);
+        let speeds = entries.filter(|(key, _)| unit_of_limit(&key.name) == Some("m/s"));
+        speeds.filter_map(|(key, value)| numbers(&key.name, value)).flatten().reduce(f64::min)
+    }
+
     /// Returns whether the sections contradict each other about a limit, so that it has no value.
     pub(crate) fn contradicts(&self, arms: &[usize], name: &str) -> bool {
         let mut values = self.limit_sections(arms).filter_map(|section| section.table.get(name));
