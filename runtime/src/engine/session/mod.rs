@@ -3,10 +3,12 @@
 mod blame;
 mod budgets;
 mod build;
+mod caught;
 mod cycle;
 mod drive;
 mod engine;
 mod halt;
+mod line_reader;
 mod operator;
 mod outcome;
 mod real_time;
@@ -14,6 +16,7 @@ mod schedule;
 mod signals;
 mod task_run;
 mod trouble;
+mod words;
 
 pub use drive::run_virtual;
 pub use engine::{DisplayedPort, Engine, Logged};

@@ -1,4 +1,4 @@
-//! Runs a graph in real time: pacing, live devices, operator input, Ctrl-C, and the ramp to zero at the end.
+//! Runs a graph in real time: pacing, live devices, operator input, signals, and the ramp to zero at the end.
 
 use std::io;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
@@ -11,11 +11,11 @@ use tokio::task::JoinSet;
 use super::drive::{Pacer, drive, permanent_halt};
 use super::engine::Engine;
 use super::operator::OperatorInput;
-use super::outcome::{Outcome, RunOptions};
-use super::signals::interrupts;
+use super::outcome::{End, Outcome, RunOptions};
+use super::signals::Interrupt;
 use super::trouble::panic_message;
 use crate::device::{DeviceError, link};
-use crate::engine::core::DeviceLink;
+use crate::engine::core::{DeviceLink, DeviceSlot};
 use crate::fault::Fault;
 
 /// Runs until a device ends, the time is over, the task is done, the operator interrupts or a fault occurs; then the
@@ -24,20 +24,24 @@ use crate::fault::Fault;
 /// # Errors
 /// If the tokio runtime or the signal handlers cannot be set up.
 pub fn run(engine: &mut Engine, options: &RunOptions, observe: &mut dyn FnMut(&Engine)) -> io::Result<Outcome> {
-    // A driver that blocks its thread stops neither the ticks nor Ctrl-C.
+    let interrupt = Interrupt::of_run()?;
     let worker = || Builder::new_multi_thread().worker_threads(1).enable_all().build();
-    let (session, drivers) = (worker()?, worker()?);
-    let mut pacer = RealTimePacer::start(engine, options, &session, &drivers)?;
+    let session = worker()?;
+    // A driver that blocks its thread stops neither the ticks nor the drivers of the other devices.
+    let is_idle = |device: &&DeviceSlot| matches!(device.link, DeviceLink::Idle(_));
+    let drivers = engine.devices.iter().filter(is_idle).map(|_| worker()).collect::<io::Result<Vec<Runtime>>>()?;
+    let mut pacer = RealTimePacer::start(engine, options, interrupt, &session, &drivers);
     // After a panic, for example in `observe`, the arm must come to rest before the unwinding goes on.
     let end = catch_unwind(AssertUnwindSafe(|| drive(engine, pacer.until, &mut pacer, observe)));
     let (time, ticks) = (engine.now(), engine.ticks());
     pacer.stop(engine);
     let wall = pacer.epoch.elapsed();
     // It ends the drivers that are still running, and does not wait for one that blocks.
-    drivers.shutdown_background();
+    drivers.into_iter().for_each(Runtime::shutdown_background);
     engine.finish(&end.as_ref().map_or_else(|_| "a panic".to_owned(), ToString::to_string));
     let end = end.unwrap_or_else(|panic| resume_unwind(panic));
-    Ok(Outcome { end, time, ticks, wall, late: engine.late() })
+    let signal = pacer.interrupt.signal().filter(|_| end == End::Interrupted);
+    Ok(Outcome { end, signal, time, ticks, wall, late: engine.late() })
 }
 
 struct RealTimePacer<'a> {
@@ -48,7 +52,11 @@ struct RealTimePacer<'a> {
     is_live: bool,
     /// Latest time of a tick [ns].
     until: i64,
-    interrupted: watch::Receiver<bool>,
+    interrupt: Interrupt,
+    /// The name of the signal that ends the run, from when it arrives.
+    signal: watch::Receiver<Option<&'static str>>,
+    /// Whether the operator knows that a run cannot be suspended.
+    has_refused: bool,
     drivers: JoinSet<Result<(), DeviceError>>,
     /// Index of the device that each driver task belongs to.
     tasks: Vec<(tokio::task::Id, usize)>,
@@ -57,15 +65,22 @@ struct RealTimePacer<'a> {
 }
 
 impl<'a> RealTimePacer<'a> {
-    fn start(engine: &mut Engine, options: &RunOptions, session: &'a Runtime, live: &Runtime) -> io::Result<Self> {
+    fn start(
+        engine: &mut Engine,
+        options: &RunOptions,
+        interrupt: Interrupt,
+        session: &'a Runtime,
+        live: &[Runtime],
+    ) -> Self {
         let epoch = Instant::now();
-        let (mut drivers, mut tasks) = (JoinSet::new(), Vec::new());
+        let (mut drivers, mut tasks, mut live) = (JoinSet::new(), Vec::new(), live.iter());
         for (i, device) in engine.devices.iter_mut().enumerate() {
             device.link = match std::mem::replace(&mut device.link, DeviceLink::Gone) {
                 DeviceLink::Idle(driver) => {
                     tracing::info!("device `{}` starts", device.name);
                     let (theirs, ours) = link(&device.samples, &device.commands, epoch);
-                    let task = drivers.spawn_on(driver.run(theirs), live.handle());
+                    let own = live.next().expect("there is a runtime for each live device");
+                    let task = drivers.spawn_on(driver.run(theirs), own.handle());
                     tasks.push((task.id(), i));
                     DeviceLink::Live(ours)
                 }
@@ -75,28 +90,38 @@ impl<'a> RealTimePacer<'a> {
         let is_live = !drivers.is_empty();
         let is_real = options.is_realtime || is_live;
         let until = options.duration.map_or(i64::MAX, |seconds| (seconds * 1e9) as i64);
-        let interrupted = session.block_on(async { interrupts() })?;
-        let input = OperatorInput::new(&options.sends, options.listens);
-        Ok(Self { session, epoch, is_real, is_live, until, interrupted, drivers, tasks, input, is_on_timer: false })
+        let signal = interrupt.requested();
+        let input = OperatorInput::new(&options.sends, options.listens, engine);
+        let (has_refused, is_on_timer) = (false, false);
+        Self {
+            session,
+            epoch,
+            is_real,
+            is_live,
+            until,
+            interrupt,
+            signal,
+            has_refused,
+            drivers,
+            tasks,
+            input,
+            is_on_timer,
+        }
     }
 }
 
 impl Pacer for RealTimePacer<'_> {
     fn is_interrupted(&self) -> bool {
-        *self.interrupted.borrow()
+        self.signal.borrow().is_some()
     }
 
     fn tick(&mut self, engine: &mut Engine, next: i64) -> Result<bool, Fault> {
         let (now, late) = if self.is_real { self.wait(engine, next) } else { (next, 0) };
-        if *self.interrupted.borrow() {
+        if self.is_interrupted() {
             return Ok(false);
         }
         self.collect_ended_drivers(engine);
-        while let Some(word) = self.input.next(now) {
-            if let Err(message) = engine.send(&word) {
-                tracing::warn!("{message}");
-            }
-        }
+        self.input.carry_out(engine, now);
         if late > engine.period() {
             engine.begin_late(late);
         }
@@ -105,6 +130,9 @@ impl Pacer for RealTimePacer<'_> {
 
     fn after(&mut self, engine: &Engine) -> Option<Fault> {
         self.log_clock(engine);
+        if self.interrupt.take_refused() > 0 && !std::mem::replace(&mut self.has_refused, true) {
+            tracing::warn!("a run cannot be suspended, because it would not stop the arm: Ctrl-C ends it");
+        }
         permanent_halt(engine, self.input.is_open(), !self.is_real && self.until == i64::MAX)
     }
 }
@@ -132,7 +160,7 @@ impl RealTimePacer<'_> {
             _ => None,
         });
         let has_live_clock = sampled.is_some();
-        let mut interrupted = self.interrupted.clone();
+        let mut signal = self.signal.clone();
         self.session.block_on(async {
             let sample = async {
                 match &sampled {
@@ -143,7 +171,7 @@ impl RealTimePacer<'_> {
             tokio::select! {
                 () = sample => {}
                 () = sleep_until(due) => {}
-                _ = interrupted.wait_for(|is| *is) => {}
+                _ = signal.wait_for(Option::is_some) => {}
             }
         });
         let now = self.epoch.elapsed().as_nanos() as i64;
@@ -168,13 +196,19 @@ impl RealTimePacer<'_> {
 
     /// Ramps every command to zero, in real time if the run was, and stops the drivers.
     fn stop(&mut self, engine: &mut Engine) {
+        /// Longest time of the ramp. With the two below, it stays within the 5 s in which a signal ends a run.
+        const MAX_RAMP: Duration = Duration::from_secs(3);
         /// Time that the drivers have to end.
         const STOP_TIMEOUT: Duration = Duration::from_secs(1);
         /// Time that a driver has to read its last command.
         const LAST_COMMAND_DELAY: Duration = Duration::from_millis(50);
+        let begin = Instant::now();
         while !engine.wind_down() {
-            if self.is_real {
-                std::thread::sleep(Duration::from_nanos(engine.period() as u64));
+            let left = MAX_RAMP.saturating_sub(begin.elapsed());
+            if left.is_zero() {
+                engine.cut_ramp();
+            } else if self.is_real {
+                std::thread::sleep(left.min(Duration::from_nanos(engine.period() as u64)));
             }
         }
         engine.wind_down();
@@ -189,6 +223,7 @@ impl RealTimePacer<'_> {
         }
         let drivers = std::mem::take(&mut self.drivers);
         let _ = self.session.block_on(async { tokio::time::timeout(STOP_TIMEOUT, drivers.join_all()).await });
+        self.input.finish();
     }
 }
 
