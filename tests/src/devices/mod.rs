@@ -1,5 +1,6 @@
-//! The device that docs/writing-a-device.md builds.
+//! The device that docs/writing-a-device.md builds, and one that misbehaves.
 
+pub mod blocking;
 pub mod udp_pad;
 
 use tactflow_runtime::catalogue::Catalogue;
@@ -7,5 +8,5 @@ use tactflow_runtime::catalogue::Catalogue;
 /// The devices.
 #[must_use]
 pub fn catalogue() -> Catalogue {
-    Catalogue::new().device::<udp_pad::UdpPad>()
+    Catalogue::new().device::<blocking::Blocking>().device::<udp_pad::UdpPad>()
 }

@@ -185,6 +185,11 @@ impl Engine {
         self.core.inlets.iter().any(|inlet| inlet.device == device && inlet.counters.new > 0)
     }
 
+    /// Whether a task wires or drives a command. Without one, a hold keeps nothing back.
+    fn commands_something(&self, task: usize) -> bool {
+        self.drivers.iter().any(|(owner, drivers)| *owner == task || drivers.contains(&task))
+    }
+
     /// Whether a trouble means that a device has not begun yet: nothing has been lost.
     fn is_before_start(&self, trouble: Trouble) -> bool {
         match trouble {
@@ -228,7 +233,7 @@ impl Engine {
             task.halts.halt(&task.name, policy, fault);
         }
         let trouble = trouble.map(|(_, trouble)| trouble);
-        if trouble.is_some_and(|trouble| self.is_before_start(trouble)) {
+        if trouble.is_some_and(|trouble| self.is_before_start(trouble)) || !self.commands_something(number) {
             self.tasks[number].halts.wait(self.core.tick.now);
         }
         let is_refused = self.tasks[number].halts.resumes && trouble.is_some() && self.tasks[number].is_stopped();

@@ -135,7 +135,10 @@ impl Warnings {
         }
         let counts = [
             (std::mem::take(&mut self.held_back), "lines from standard input were no words that have an effect"),
-            (std::mem::take(&mut self.dropped), "lines from standard input were dropped, because too many came at once"),
+            (
+                std::mem::take(&mut self.dropped),
+                "lines from standard input were dropped, because too many came at once",
+            ),
         ];
         for (count, what) in counts.into_iter().filter(|(count, _)| *count > 0) {
             self.burst += 1;
