@@ -31,16 +31,20 @@ pub(crate) struct LineReader(Arc<Mutex<Inbox>>);
 impl LineReader {
     /// Starts to read. A word that stops one of the tasks gets through however many others are read. `is_back_later`
     /// tells whether an input with an error can be read again later.
+    ///
+    /// # Errors
+    /// If there can be no further thread.
     pub(crate) fn start(
         input: impl Read + Send + 'static,
         tasks: Vec<String>,
         is_back_later: impl Fn(&std::io::Error) -> bool + Send + 'static,
-    ) -> Self {
+    ) -> std::io::Result<Self> {
         let inbox = Arc::new(Mutex::default());
         let splitter = Splitter { tasks, line: Vec::new(), is_too_long: false, found: Inbox::default() };
         let theirs = Arc::clone(&inbox);
-        std::thread::spawn(move || read(input, splitter, &theirs, &is_back_later));
-        Self(inbox)
+        let read = move || read(input, splitter, &theirs, &is_back_later);
+        std::thread::Builder::new().name("words".into()).spawn(read)?;
+        Ok(Self(inbox))
     }
 
     /// Calls `take` with what has been read, and returns whether more can come. It never waits for the reading thread: if
@@ -96,7 +100,7 @@ fn read(
             Ok(size) => {
                 was_away = false;
                 splitter.split(&chunk[..size]);
-                if !hand_over(&mut splitter.found) {
+                if !hand_over(&mut splitter.found) || size == CHUNK {
                     std::thread::sleep(REST);
                 }
             }
@@ -195,7 +199,7 @@ mod tests {
 
     /// What is found in an input, which is read to its end.
     fn found(input: impl Read + Send + 'static) -> Inbox {
-        let reader = LineReader::start(input, vec!["left".into()], |error| error.raw_os_error() == Some(5));
+        let reader = LineReader::start(input, vec!["left".into()], |error| error.raw_os_error() == Some(5)).unwrap();
         let mut inbox = Inbox::default();
         loop {
             let mut is_closed = false;

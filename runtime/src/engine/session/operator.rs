@@ -23,13 +23,16 @@ pub(crate) struct OperatorInput {
 
 impl OperatorInput {
     /// Takes words scheduled in the graph's time [s] and, if `reads_stdin`, the lines of the standard input.
-    pub(crate) fn new(scheduled: &[(f64, String)], reads_stdin: bool, engine: &Engine) -> Self {
+    ///
+    /// # Errors
+    /// If there can be no thread that reads.
+    pub(crate) fn new(scheduled: &[(f64, String)], reads_stdin: bool, engine: &Engine) -> std::io::Result<Self> {
         let mut scheduled: Vec<(i64, String)> =
             scheduled.iter().map(|(seconds, word)| ((seconds * 1e9) as i64, word.clone())).collect();
         scheduled.sort_by_key(|(at, _)| *at);
         let tasks: Vec<String> = engine.tasks().iter().skip(1).map(TaskRun::name).map(str::to_owned).collect();
-        let reader = reads_stdin.then(|| LineReader::start(stdin(), tasks.clone(), is_back_later));
-        Self { scheduled: scheduled.into(), tasks, reader, warnings: Warnings::default() }
+        let reader = reads_stdin.then(|| LineReader::start(stdin(), tasks.clone(), is_back_later)).transpose()?;
+        Ok(Self { scheduled: scheduled.into(), tasks, reader, warnings: Warnings::default() })
     }
 
     /// Sends the words that are due at `now` [ns] to the engine, each stop before all others.

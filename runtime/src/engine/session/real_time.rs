@@ -30,7 +30,7 @@ pub fn run(engine: &mut Engine, options: &RunOptions, observe: &mut dyn FnMut(&E
     // A driver that blocks its thread stops neither the ticks nor the drivers of the other devices.
     let is_idle = |device: &&DeviceSlot| matches!(device.link, DeviceLink::Idle(_));
     let drivers = engine.devices.iter().filter(is_idle).map(|_| worker()).collect::<io::Result<Vec<Runtime>>>()?;
-    let mut pacer = RealTimePacer::start(engine, options, interrupt, &session, &drivers);
+    let mut pacer = RealTimePacer::start(engine, options, interrupt, &session, &drivers)?;
     // After a panic, for example in `observe`, the arm must come to rest before the unwinding goes on.
     let end = catch_unwind(AssertUnwindSafe(|| drive(engine, pacer.until, &mut pacer, observe)));
     let (time, ticks) = (engine.now(), engine.ticks());
@@ -71,7 +71,8 @@ impl<'a> RealTimePacer<'a> {
         interrupt: Interrupt,
         session: &'a Runtime,
         live: &[Runtime],
-    ) -> Self {
+    ) -> io::Result<Self> {
+        let input = OperatorInput::new(&options.sends, options.listens, engine)?;
         let epoch = Instant::now();
         let (mut drivers, mut tasks, mut live) = (JoinSet::new(), Vec::new(), live.iter());
         for (i, device) in engine.devices.iter_mut().enumerate() {
@@ -91,9 +92,8 @@ impl<'a> RealTimePacer<'a> {
         let is_real = options.is_realtime || is_live;
         let until = options.duration.map_or(i64::MAX, |seconds| (seconds * 1e9) as i64);
         let signal = interrupt.requested();
-        let input = OperatorInput::new(&options.sends, options.listens, engine);
         let (has_refused, is_on_timer) = (false, false);
-        Self {
+        Ok(Self {
             session,
             epoch,
             is_real,
@@ -106,7 +106,7 @@ impl<'a> RealTimePacer<'a> {
             tasks,
             input,
             is_on_timer,
-        }
+        })
     }
 }
 
