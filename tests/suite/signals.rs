@@ -7,10 +7,12 @@ use std::time::{Duration, Instant};
 
 use crate::cli::{Running, in_new_folder};
 use crate::lockstep::{Peer, command, number};
-use crate::tool::{Said, tool};
+use crate::tool::{Said, said, tool};
 
 const HYBRID: &str = "graphs/hybrid.toml";
 const MOCK: &str = "--bench=graphs/benches/mock.toml";
+
+const IN_CONTACT: &str = "--set=devices.pad.press=[{ from_s = 0.3, force = 3.0, at = [0.008, -0.004] }]";
 
 /// The time in which a signal ends a run, with some for a busy machine.
 const SOON: Duration = Duration::from_millis(5500);
@@ -29,7 +31,7 @@ impl Approach {
         let (folder, path) = in_new_folder("rows.csv");
         let peer = Peer::start("--scene none --seconds 20 --wall");
         let mut command = command("hybrid", &peer.port, &[&["--out", &path], more].concat());
-        let running = Running::started(&mut command, Path::new(&path), 300_000);
+        let running = Running::started(&mut command, Path::new(&path), 150_000);
         Self { peer, running, _folder: folder }
     }
 
@@ -54,17 +56,14 @@ fn each_signal_ends_a_run_by_the_ramp() {
         assert!(number(&seen, "q_eq_moved") > 0.001, "{name}: it moved: {seen}");
         assert_eq!(number(&seen, "last_dq"), 0.0, "{name}: {seen}");
     };
-    for some in names.chunks(4) {
-        std::thread::scope(|scope| some.iter().for_each(|name| drop(scope.spawn(move || check(name)))));
-    }
+    std::thread::scope(|scope| names.iter().for_each(|name| drop(scope.spawn(move || check(name)))));
 }
 
 #[test]
 fn a_run_cannot_be_suspended() {
     let begin = Instant::now();
     let (_folder, path) = in_new_folder("rows.csv");
-    let press = "--set=devices.pad.press=[{ from_s = 0.3, force = 3.0, at = [0.008, -0.004] }]";
-    let args = ["run", HYBRID, MOCK, press, "--realtime", "--for", "2.5s", "--out", &path];
+    let args = ["run", HYBRID, MOCK, IN_CONTACT, "--realtime", "--for", "2.5s", "--out", &path];
     let running = Running::start(&args, Path::new(&path));
     for signal in ["-TSTP", "-TTIN", "-TTOU", "-XFSZ", "-TSTP"] {
         running.signal(signal);
@@ -75,6 +74,23 @@ fn a_run_cannot_be_suspended() {
     assert_eq!(said.err.matches("a run cannot be suspended").count(), 1, "{}", said.err);
     assert!(said.out.contains("the time limit ended the run after 2.500 s"), "{}", said.out);
     assert!(begin.elapsed() < Duration::from_secs(15));
+}
+
+#[test]
+fn a_run_in_the_background_of_a_terminal_goes_on_and_listens_when_it_comes_to_the_front() {
+    let mut command = Command::new("python3");
+    let tool = env!("CARGO_BIN_EXE_tactflow-under-test");
+    let args = ["run", HYBRID, MOCK, IN_CONTACT, "--realtime", "--listen", "--for", "3s", "--send", "90s:resume"];
+    command.arg("tests/peers/background.py").args(["stop", tool]).args(args).arg("--quiet");
+    let said = said(command.current_dir(tactflow_tests::workspace()));
+    // The terminal shows standard error too.
+    assert_eq!(said.code, 0, "{}", said.out);
+    let away =
+        "cannot read words from standard input: Input/output error (os error 5); bring the run to the foreground";
+    assert!(said.out.contains(away) && said.out.contains("the operator sent `stop`"), "{}", said.out);
+    let used = said.out.lines().find_map(|line| line.strip_prefix("processor: ")?.strip_suffix(" s"));
+    let used: f64 = used.unwrap().parse().unwrap();
+    assert!(used < 0.7, "{used} s of processor time in 1.3 s");
 }
 
 #[test]

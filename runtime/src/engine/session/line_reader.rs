@@ -107,12 +107,15 @@ fn read(
             Err(error) if error.kind() == ErrorKind::Interrupted => {}
             Err(error) if error.kind() == ErrorKind::WouldBlock => std::thread::sleep(WAIT),
             Err(error) => {
+                let is_away = is_back_later(&error);
                 if !was_away {
-                    splitter.found.lines.push_back(Err(format!("cannot read words from standard input: {error}")));
+                    let way_out = if is_away { "; bring the run to the foreground to send words" } else { "" };
+                    let message = format!("cannot read words from standard input: {error}{way_out}");
+                    splitter.found.lines.push_back(Err(message));
                     hand_over(&mut splitter.found);
                 }
                 was_away = true;
-                if !is_back_later(&error) {
+                if !is_away {
                     break;
                 }
                 std::thread::sleep(WAIT);
