@@ -302,19 +302,36 @@ impl Drop for Running {
 impl Running {
     /// Starts a run and waits until its first rows are in the file.
     pub(crate) fn start(args: &[&str], file: &Path) -> Self {
+        Self::started(&mut tool(args), file, 10_000)
+    }
+
+    /// Starts a run and waits until the file has that many bytes.
+    pub(crate) fn started(command: &mut Command, file: &Path, bytes: u64) -> Self {
         const PATIENCE: Duration = Duration::from_secs(20);
-        let running = Self(tool(args).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap());
+        let running = Self::of(command.stdout(Stdio::piped()));
         let start = Instant::now();
-        while fs::metadata(file).map_or(0, |file| file.len()) < 10_000 {
+        while fs::metadata(file).map_or(0, |file| file.len()) < bytes {
             assert!(start.elapsed() < PATIENCE, "no rows after {PATIENCE:?}");
             std::thread::sleep(Duration::from_millis(5));
         }
         running
     }
 
+    /// A run of a command, which need not write a file.
+    pub(crate) fn of(command: &mut Command) -> Self {
+        Self(command.stderr(Stdio::piped()).spawn().unwrap())
+    }
+
     pub(crate) fn signal(&self, name: &str) {
         let status = Command::new("kill").args([name, &self.0.id().to_string()]).status().unwrap();
         assert!(status.success());
+    }
+
+    /// How long it took to end.
+    pub(crate) fn gone(mut self) -> Duration {
+        let start = Instant::now();
+        self.0.wait().unwrap();
+        start.elapsed()
     }
 
     /// How long it took to end, and what it said.
@@ -332,7 +349,9 @@ impl Running {
 fn ctrl_c_ends_an_endless_run_cleanly_and_soon() {
     for (pace, signal) in [(None, "-INT"), (Some("--realtime"), "-INT"), (Some("--realtime"), "-TERM")] {
         let (_folder, path) = in_new_folder("rows.csv");
-        let mut args = vec!["run", HYBRID, MOCK, "--set=devices.pad.for_s=1e9", "--out", &path];
+        // In contact for ever, so that nothing but the signal ends it.
+        let press = "--set=devices.pad.press=[{ from_s = 0.3, force = 3.0, at = [0.008, -0.004] }]";
+        let mut args = vec!["run", HYBRID, MOCK, "--set=devices.pad.for_s=1e9", press, "--out", &path];
         args.extend(pace);
         let running = Running::start(&args, Path::new(&path));
         running.signal(signal);
@@ -340,7 +359,8 @@ fn ctrl_c_ends_an_endless_run_cleanly_and_soon() {
         assert_eq!((said.code, said.err.as_str()), (0, ""), "{pace:?} {signal}");
         // Far longer than it takes, and far shorter than the run.
         assert!(took < Duration::from_secs(10), "{pace:?} {signal}: it took {took:?}");
-        let ending = said.out.lines().find(|line| line.starts_with("interrupted after")).expect("a summary");
+        let by = format!("interrupted by SIG{} after", &signal[1..]);
+        let ending = said.out.lines().find(|line| line.starts_with(&by)).expect("a summary");
         let ticks = ending.split(" and ").nth(1).unwrap().split(' ').next().unwrap();
         let rows = peer("rows.py", &[&path]);
         assert!(rows.starts_with(&format!("{ticks} rows, ")), "{ending}: {rows}");

@@ -165,7 +165,6 @@ fn ages_are_true_and_frames_are_answered_at_once_whatever_the_clock_of_the_simul
         assert!(seen.errors.len() > 50, "{peer:?}: {} frames", seen.errors.len());
         let [error, answer] =
             [&seen.errors, &seen.answers].map(|values| [0.5, 0.99].map(|share| quantile(values, share)));
-        println!("{peer:?}: error {error:?}, answer {answer:?}");
         // Half of them, since a busy machine delays both sides.
         assert!(error[0] < 0.001, "{peer:?}: {error:?} s");
         assert!(answer[0] < 2.0 * PERIOD.as_secs_f64(), "{peer:?}: {answer:?} s");

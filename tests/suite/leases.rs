@@ -7,12 +7,9 @@ use std::process::{Child, Command, Stdio};
 use std::thread;
 use std::time::{Duration, Instant};
 
-use tactflow_runtime::device::{Description, Device, DeviceError, Driver, Link, Live, Opened};
 use tactflow_runtime::engine::{self, End, Engine, Outcome, RunOptions};
 use tactflow_runtime::fault::Cause;
 use tactflow_runtime::graph::{Request, compile};
-use tactflow_runtime::node::{Describe, Mistakes};
-use tactflow_runtime::signal::{Scalar, ScalarShape, Unit};
 use tactflow_runtime::source::Code;
 use tactflow_tests::catalogue;
 
@@ -24,7 +21,7 @@ const GRAPH: &str = "
 clock = 'motor'
 
 [roles]
-motor = 'motor'
+motor = 'drive'
 
 [commands]
 motor.velocity = 'motor.wanted'
@@ -155,38 +152,14 @@ fn without_anybody_to_resume_a_lost_lease_ends_the_run() {
     assert_eq!(motor.told().last().unwrap().1, 0.0);
 }
 
-/// A sensor whose driver blocks its thread.
-#[derive(Describe)]
-#[describe(name = "blocking_length")]
-struct Blocking;
-
-#[async_trait::async_trait]
-impl Live for Blocking {
-    async fn run(self: Box<Self>, _: Link) -> Result<(), DeviceError> {
-        thread::sleep(Duration::from_secs(20));
-        Err("too late".into())
-    }
-}
-
-impl Device for Blocking {
-    type Params = ();
-
-    fn open((): ()) -> Result<Opened, Mistakes> {
-        let mut description = Description::every(0.01);
-        description.fills("length").output::<Scalar>("value", ScalarShape::of(Unit::METRE));
-        Ok(Opened { description, driver: Driver::Live(Box::new(Self)) })
-    }
-}
-
 #[test]
 fn a_driver_that_blocks_does_not_keep_another_device_from_its_commands() {
     let motor = Motor::listen();
-    let bench = format!("{}\nbind.length = 'b'\ndevices.b.type = 'blocking_length'\n", motor.bench());
+    let bench = format!("{}\nbind.length = 'b'\ndevices.b.type = 'blocking'\n", motor.bench());
     let graph = format!("{GRAPH}\n[policy]\nstale = 'count'\n")
-        .replace("motor = 'motor'", "motor = 'motor'\nlength = 'length'");
+        .replace("motor = 'drive'", "motor = 'drive'\nlength = 'length'");
     let request = Request { bench_text: Some(bench), ..Request::text(graph) };
-    let plan = compile(&catalogue().device::<Blocking>(), &request)
-        .unwrap_or_else(|report| panic!("{}", report.render(false)));
+    let plan = compile(&catalogue(), &request).unwrap_or_else(|report| panic!("{}", report.render(false)));
     let mut engine = Engine::new(plan);
     let begin = Instant::now();
     let options = RunOptions { duration: Some(1.0), ..RunOptions::default() };

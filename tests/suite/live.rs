@@ -114,39 +114,24 @@ fn a_driver_that_panics_is_a_fault_of_its_device() {
     assert_eq!((fault.node.as_str(), fault.cause), ("b", Cause::Device("it panicked: brittle".into())));
 }
 
-/// A driver that blocks its thread instead of waiting.
-#[derive(Describe)]
-#[describe(name = "blocking")]
-struct Blocking;
-
-#[async_trait::async_trait]
-impl Live for Blocking {
-    async fn run(self: Box<Self>, _: Link) -> Result<(), DeviceError> {
-        std::thread::sleep(std::time::Duration::from_secs(20));
-        Err("too late".into())
-    }
-}
-
-impl Device for Blocking {
-    type Params = ();
-
-    fn open((): ()) -> Result<Opened, Mistakes> {
-        let mut description = Description::every(0.01);
-        description.fills("length").output::<Scalar>("value", ScalarShape::of(Unit::METRE));
-        Ok(Opened { description, driver: Driver::Live(Box::new(Self)) })
-    }
-}
-
 #[test]
-fn a_driver_that_blocks_stops_neither_the_ticks_nor_the_end_of_the_run() {
-    let bench_text = Some("devices.b.type = 'blocking'\nbind.a = 'b'".into());
-    let request = Request { bench_text, ..Request::text(format!("{GRAPH}\n[policy]\ndevice = \"hold\"\n")) };
-    let plan = compile(&catalogue().device::<Blocking>(), &request).unwrap();
+fn a_driver_that_blocks_stops_neither_the_ticks_nor_the_other_drivers_nor_the_end_of_the_run() {
+    let peer = Peer::start(50, 0.01, 9.0, "0");
+    let bench_text = Some(format!(
+        "devices.b.type = 'blocking'\nbind.a = 'b'\ndevices.tcp.type = 'line_length'\nbind.other = 'tcp'\n\
+         devices.tcp.address = '127.0.0.1:{}'",
+        peer.port
+    ));
+    let graph = GRAPH.replace("\na = \"length\"\n", "\na = \"length\"\nother = \"length\"\n");
+    let request = Request { bench_text, ..Request::text(format!("{graph}\n[policy]\ndevice = \"hold\"\n")) };
+    let plan = compile(&catalogue(), &request).unwrap_or_else(|report| panic!("{}", report.render(false)));
     let begin = std::time::Instant::now();
     let options = RunOptions { duration: Some(0.5), is_realtime: true, ..RunOptions::default() };
-    let outcome = engine::run(&mut Engine::new(plan), &options, &mut |_| {}).unwrap();
+    let mut engine = Engine::new(plan);
+    let outcome = engine::run(&mut engine, &options, &mut |_| {}).unwrap();
     assert_eq!(outcome.end, End::Duration);
     assert!(outcome.ticks >= 10, "a timer ticks on: {} ticks", outcome.ticks);
+    assert!(engine.get::<Scalar>("other.value").is_some(), "the other device is read");
     assert!(begin.elapsed().as_secs() < 10, "the end does not wait for the driver");
 }
 

@@ -12,14 +12,14 @@ use crate::cli::in_new_folder;
 use crate::tool::{Said, said, tool};
 
 /// The simulator and the port it listens on; it ends with the test.
-struct Peer {
+pub(crate) struct Peer {
     child: Child,
     out: BufReader<std::process::ChildStdout>,
-    port: String,
+    pub(crate) port: String,
 }
 
 impl Peer {
-    fn start(args: &str) -> Self {
+    pub(crate) fn start(args: &str) -> Self {
         let script = workspace().join("tests/peers/simulator.py");
         let mut command = Command::new("python3");
         command.arg(script).args(args.split_whitespace()).stdout(Stdio::piped());
@@ -31,7 +31,7 @@ impl Peer {
     }
 
     /// What it saw, once it has ended.
-    fn seen(mut self) -> Value {
+    pub(crate) fn seen(mut self) -> Value {
         let mut text = String::new();
         self.out.read_to_string(&mut text).unwrap();
         assert!(self.child.wait().unwrap().success(), "{text}");
@@ -47,7 +47,7 @@ impl Drop for Peer {
     }
 }
 
-fn command(graph: &str, port: &str, more: &[&str]) -> Command {
+pub(crate) fn command(graph: &str, port: &str, more: &[&str]) -> Command {
     let address = format!("devices.bench.address=127.0.0.1:{port}");
     let graph = format!("graphs/{graph}.toml");
     let mut args = vec!["run", &graph, "--bench", "graphs/benches/lockstep.toml", "--set", &address];
@@ -62,7 +62,7 @@ fn run(graph: &str, simulator: &str, more: &[&str]) -> (Said, Value) {
     (said, peer.seen())
 }
 
-fn number(seen: &Value, name: &str) -> f64 {
+pub(crate) fn number(seen: &Value, name: &str) -> f64 {
     seen[name].as_f64().unwrap_or_else(|| panic!("{name}: {seen}"))
 }
 

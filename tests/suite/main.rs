@@ -47,7 +47,10 @@ mod rates;
 mod recordings;
 mod reference;
 mod reports;
+mod resume;
 mod robots;
+#[cfg(unix)]
+mod signals;
 mod sim;
 mod situations;
 mod svg;
@@ -66,3 +69,4 @@ mod verify;
 mod view;
 mod warnings;
 mod windows;
+mod words;

@@ -88,7 +88,7 @@ fn what_each_trouble_does_under_each_policy() {
         assert_eq!(moves(&mut stopped, 0.99), Ok(false), "{case:?} stops");
         assert_eq!(moves(&mut stopped, 1.6), Ok(false), "{case:?} waits for the operator");
         assert!(stopped.is_stopped());
-        stopped.send("resume").unwrap();
+        assert_eq!(stopped.send("resume").is_ok(), case.ends, "{case:?}");
         assert_eq!(moves(&mut stopped, 2.4), Ok(case.ends), "{case:?} goes on when it may");
 
         let fault = moves(&mut engine(case, "fault"), 2.0).unwrap_err();

@@ -2,7 +2,6 @@
 
 use std::borrow::Cow;
 
-use super::lease::Grant;
 use super::{Command, Description, Output, Report};
 use crate::signal::{Arenas, Kind, Shape, Signal};
 
@@ -112,6 +111,17 @@ impl Samples {
         self.counts.clone_from(&other.counts);
         self.writes = other.writes;
     }
+}
+
+/// For how long commands are valid.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub(crate) struct Grant {
+    /// It grows when the operator resumes after a lost lease.
+    pub(crate) epoch: u64,
+    /// Time of the tick that computed the commands [ns].
+    pub(crate) since: i64,
+    /// Time until which they are valid [ns].
+    pub(crate) until: i64,
 }
 
 /// The commands of a device, and the reports to it.

@@ -7,19 +7,8 @@
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use super::Commands;
+use super::exchange::{Commands, Grant};
 use crate::signal::line::approach;
-
-/// For how long commands are valid.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub(crate) struct Grant {
-    /// It grows when the operator resumes after a lost lease.
-    pub(crate) epoch: u64,
-    /// Time of the tick that computed the commands [ns].
-    pub(crate) since: i64,
-    /// Time until which they are valid [ns].
-    pub(crate) until: i64,
-}
 
 /// What a device may do, from the commands of the graph and the time.
 #[derive(Debug)]

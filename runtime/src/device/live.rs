@@ -13,7 +13,8 @@ use tokio::sync::{Notify, watch};
 use triple_buffer::TripleBuffer;
 
 use super::clock::DeviceClock;
-use super::lease::{Grant, Lease};
+use super::exchange::Grant;
+use super::lease::Lease;
 use super::{Commands, Description, DeviceError, Output, Samples};
 use crate::signal::Signal;
 
@@ -156,6 +157,8 @@ pub(crate) struct Linked {
     refused: Arc<AtomicU64>,
     /// The epoch of the commands.
     epoch: u64,
+    /// The last epoch in which the lease was lost, as far as the graph knows.
+    lost: u64,
     /// The time until which the commands are valid, if they move the device [ns].
     moves_until: Option<i64>,
     driver: Option<JoinHandle<Result<(), DeviceError>>>,
@@ -207,8 +210,8 @@ pub(crate) fn start(name: &str, driver: Box<dyn Live>, setup: LinkSetup<'_>) -> 
     let thread = std::thread::Builder::new().name(format!("device {name}"));
     let driver = Some(thread.spawn(move || runtime.block_on(driver.run(link)))?);
     let (samples, commands) = (samples_out, commands_in);
-    let (epoch, moves_until) = (1, None);
-    Ok(Linked { samples, commands, published, commanded, stop, finished, refused, epoch, moves_until, driver })
+    let (epoch, lost, moves_until) = (1, 0, None);
+    Ok(Linked { samples, commands, published, commanded, stop, finished, refused, epoch, lost, moves_until, driver })
 }
 
 impl Linked {
@@ -236,15 +239,16 @@ impl Linked {
         samples.writes != before
     }
 
-    /// Whether the device has stopped, or stops, because its commands were not renewed up to `now` [ns].
-    pub(crate) fn has_lost_lease(&self, now: i64) -> bool {
-        self.refused.load(Ordering::Relaxed) >= self.epoch || self.moves_until.is_some_and(|until| until < now)
-    }
-
-    /// Refuses the commands of this epoch, so that the device rests until [`renew`](Self::renew).
-    pub(crate) fn refuse(&mut self) {
-        self.refused.fetch_max(self.epoch, Ordering::Relaxed);
-        self.moves_until = None;
+    /// Whether the device has stopped, or stops, because its commands were not renewed up to `now` [ns]. Returns `true`
+    /// once in an epoch. The device then rests until [`renew`](Self::renew).
+    pub(crate) fn loses_lease(&mut self, now: i64) -> bool {
+        let is_refused = self.refused.load(Ordering::Relaxed) >= self.epoch;
+        let is_lost = self.lost < self.epoch && (is_refused || self.moves_until.is_some_and(|until| until < now));
+        if is_lost {
+            self.refused.fetch_max(self.epoch, Ordering::Relaxed);
+            (self.lost, self.moves_until) = (self.epoch, None);
+        }
+        is_lost
     }
 
     /// Begins a new epoch, if the last one is refused.

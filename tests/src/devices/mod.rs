@@ -1,5 +1,6 @@
-//! The device that docs/writing-a-device.md builds, and a motor.
+//! The device that docs/writing-a-device.md builds, a motor, and a device that misbehaves.
 
+pub mod blocking;
 pub mod udp_motor;
 pub mod udp_pad;
 
@@ -8,5 +9,9 @@ use tactflow_runtime::catalogue::Catalogue;
 /// The devices.
 #[must_use]
 pub fn catalogue() -> Catalogue {
-    Catalogue::new().role(udp_motor::role()).device::<udp_pad::UdpPad>().device::<udp_motor::UdpMotor>()
+    Catalogue::new()
+        .role(udp_motor::role())
+        .device::<blocking::Blocking>()
+        .device::<udp_motor::UdpMotor>()
+        .device::<udp_pad::UdpPad>()
 }

@@ -16,7 +16,7 @@ use tactflow_runtime::signal::{Joint, Joints, JointsShape, Kind, Unit};
 pub fn role() -> RoleType {
     let velocity = |name, doc| PortSpec::new(name, doc, Kind::Joints, &["rad/s", "self"]);
     RoleType {
-        name: "motor".into(),
+        name: "drive".into(),
         summary: "a motor".into(),
         outputs: vec![velocity("wanted", "The velocity that the motor wants.")],
         commands: vec![velocity("velocity", "The velocity of the motor.")],
@@ -51,7 +51,7 @@ pub struct Params {
 ///
 /// ```toml
 /// [roles]
-/// motor = "motor"
+/// motor = "drive"
 ///
 /// [commands]
 /// motor.velocity = "motor.wanted"
@@ -92,7 +92,7 @@ impl Device for UdpMotor {
             start: None,
         };
         let shape = JointsShape { joints: vec![joint], unit: Unit::RADIAN.per_second() };
-        let mut motor = description.fills("motor");
+        let mut motor = description.fills("drive");
         let wanted = motor.output("wanted", shape.clone());
         let velocity = motor.command("velocity", shape);
         Ok(Opened { description, driver: Driver::Live(Box::new(Self { wanted, velocity, params })) })

@@ -7,13 +7,19 @@ use tactflow_runtime::signal::Scalar;
 #[derive(Describe)]
 pub struct Breaks {
     tick: u64,
-    panics: bool,
+    how: How,
+}
+
+enum How {
+    Nan,
+    Panic,
+    Hang,
 }
 
 /// Parameters of `breaks`.
 #[derive(Debug, Clone, Param)]
 pub struct Params {
-    /// How: `nan` or `panic`.
+    /// How: `nan`, `panic` or `hang`.
     how: String,
     /// In which tick.
     tick: u64,
@@ -42,16 +48,29 @@ impl Node for Breaks {
     type State = ();
 
     fn new(params: Params, _: &mut Setup<Self>) -> Result<Self, Mistakes> {
-        match params.how.as_str() {
-            "nan" => Ok(Self { tick: params.tick, panics: false }),
-            "panic" => Ok(Self { tick: params.tick, panics: true }),
-            other => Err(Mistake::param("how", format!("`{other}` is neither `nan` nor `panic`")).into()),
-        }
+        let how = match params.how.as_str() {
+            "nan" => How::Nan,
+            "panic" => How::Panic,
+            "hang" => How::Hang,
+            other => return Err(Mistake::param("how", format!("`{other}` is no way to break")).into()),
+        };
+        Ok(Self { tick: params.tick, how })
     }
 
     fn step(&self, tick: &Tick, inputs: Inputs<'_>, out: &mut Outputs, (): &mut ()) {
-        let is_due = tick.index == self.tick;
-        assert!(!(is_due && self.panics), "as told");
-        out.value.set(if is_due { f64::NAN } else { *inputs.value });
+        let value = if tick.index == self.tick { self.break_down() } else { *inputs.value };
+        out.value.set(value);
+    }
+}
+
+impl Breaks {
+    fn break_down(&self) -> f64 {
+        match self.how {
+            How::Nan => f64::NAN,
+            How::Panic => panic!("as told"),
+            How::Hang => loop {
+                std::thread::park();
+            },
+        }
     }
 }

@@ -21,7 +21,7 @@ use super::shell::panics::without_panic_messages;
 use super::shell::{FAULTED, Shell, unknown};
 use super::text::number::{milliseconds, seconds};
 use super::text::prose::PageStyle;
-use crate::engine::{self, End, Engine, Outcome, RunOptions};
+use crate::engine::{self, End, Engine, Interrupt, Outcome, RunOptions};
 use crate::fault::Fault;
 use crate::graph::{Compiled, Request, compile};
 use crate::record::PointsRequest;
@@ -135,6 +135,8 @@ impl Job {
     /// If the arguments do not fit the graph, before the run starts.
     fn run_plan(&self, plan: Compiled, shell: &Shell) -> Result<u8, String> {
         plan.warnings().iter().for_each(|report| shell.show(report));
+        // Until the process ends: its output may hang too.
+        let _interrupt = Interrupt::catch().map_err(|error| format!("cannot run: {error}"))?;
         let JobOptions { duration, realtime, send, listen, points, .. } = &self.options;
         let is_real = *realtime || plan.is_live();
         if *listen && !is_real {
@@ -233,11 +235,12 @@ fn endless_stop(engine: &Engine, fault: &Fault) -> &'static str {
 
 /// Describes how a run ended, and its speed.
 fn ending(outcome: &Outcome) -> String {
+    let interrupted = outcome.signal.map(|signal| format!("interrupted by {signal}"));
     let reason = match outcome.end {
         End::Finished => "a device has no more samples",
         End::Done => "a `done` condition ended the run",
         End::Duration => "the time limit ended the run",
-        End::Interrupted => "interrupted",
+        End::Interrupted => interrupted.as_deref().unwrap_or("interrupted"),
         End::Fault(_) => "a fault",
     };
     let (time, wall) = (seconds(outcome.time), outcome.wall.as_secs_f64());

@@ -3,13 +3,12 @@
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
 use super::engine::Engine;
-use super::task_run::{TaskEnd, TaskRun};
+use super::task_run::TaskEnd;
 use super::trouble::{Origin, Trouble, panic_message};
 use crate::device::DeviceError;
 use crate::engine::core::{DeviceLink, Transition};
 use crate::fault::{Cause, Fault};
 use crate::graph::{Policy, PolicyTable};
-use crate::source::suggestion;
 
 impl Engine {
     /// Runs the tick at `now` [ns]: exchange with the devices, then latch, step and commit.
@@ -152,10 +151,54 @@ impl Engine {
             match policy(&self.tasks[task].policy) {
                 Policy::Count => {}
                 Policy::Fault => self.fail(task, self.describe(trouble))?,
+                Policy::Hold if self.needs_resume(trouble) => self.tasks[task].keep(Policy::Stop, trouble),
                 policy @ (Policy::Hold | Policy::Stop) => self.tasks[task].keep(policy, trouble),
             }
         }
         Ok(())
+    }
+
+    /// Whether the commands wait for `resume` after a trouble, even under the policy `hold`. A sensor that was lost may
+    /// come back as it was. A device that moves something may have been moved, stopped or started anew meanwhile.
+    fn needs_resume(&self, trouble: Trouble) -> bool {
+        match trouble {
+            Trouble::Device(device) => self.is_mover(device),
+            Trouble::Lost(inlet) => {
+                let device = self.core.inlets[inlet].device;
+                self.is_mover(device) && self.has_sampled(device)
+            }
+            Trouble::Operator | Trouble::Lease(_) => true,
+            Trouble::Stale(_)
+            | Trouble::StaleWire(_)
+            | Trouble::NotFinite(_)
+            | Trouble::Panicked(_)
+            | Trouble::Clock
+            | Trouble::Late(_) => false,
+        }
+    }
+
+    /// Whether a device has commands.
+    fn is_mover(&self, device: usize) -> bool {
+        !self.devices[device].commands.values.is_empty()
+    }
+
+    /// Whether any sample of a device was taken over so far.
+    fn has_sampled(&self, device: usize) -> bool {
+        self.core.inlets.iter().any(|inlet| inlet.device == device && inlet.counters.new > 0)
+    }
+
+    /// Whether a task wires or drives a command. Without one, a hold keeps nothing back.
+    fn commands_something(&self, task: usize) -> bool {
+        self.drivers.iter().any(|(owner, drivers)| *owner == task || drivers.contains(&task))
+    }
+
+    /// Whether a trouble means that a device has not begun yet: nothing has been lost.
+    fn is_before_start(&self, trouble: Trouble) -> bool {
+        match trouble {
+            Trouble::Clock => self.schedule.clock_device().is_some_and(|device| !self.has_sampled(device)),
+            Trouble::Lost(inlet) => !self.has_sampled(self.core.inlets[inlet].device),
+            _ => false,
+        }
     }
 
     /// Ends a task and those in it with a fault. Returns the fault if it ends the run.
@@ -191,8 +234,17 @@ impl Engine {
             let task = &mut self.tasks[number];
             task.halts.halt(&task.name, policy, fault);
         }
+        let trouble = trouble.map(|(_, trouble)| trouble);
+        if trouble.is_some_and(|trouble| self.is_before_start(trouble)) || !self.commands_something(number) {
+            self.tasks[number].halts.wait(self.core.tick.now);
+        }
+        let is_refused = self.tasks[number].halts.resumes && trouble.is_some() && self.tasks[number].is_stopped();
+        if let Some(refusal) = trouble.filter(|_| is_refused).and_then(|trouble| self.refusal(trouble)) {
+            tracing::warn!("`resume` {refusal}");
+        }
         let task = &mut self.tasks[number];
-        let resumes = task.halts.update(trouble.is_some(), self.core.tick.now);
+        task.lasting = trouble;
+        let resumes = task.halts.update(&task.name, trouble.is_some(), self.core.tick.now);
         if resumes {
             self.renew_leases(number);
         }
@@ -223,78 +275,6 @@ impl Engine {
                 && matches!(halt.fault.cause, Cause::SilentClock | Cause::NeverSampled | Cause::Stale { .. })
         });
         is_silence && matches!(trouble, Trouble::Device(_) | Trouble::Lost(_))
-    }
-
-    /// Sends an operator word. `stop` halts the commands and `resume` ends the halt, in upper or lower case; other
-    /// words go to the modes. A bare word reaches all tasks, and `left.stop` only the task `left` and those in it.
-    ///
-    /// # Errors
-    /// Returns a message if no mode has a condition on the word, or if the commands wait for `resume`.
-    pub fn send(&mut self, word: &str) -> Result<(), String> {
-        let (to, bare) = self.addressee(word);
-        let mut has_reached = (false, false);
-        for task in 0..self.tasks.len() {
-            let mut around = std::iter::successors(Some(task), |task| self.tasks[*task].parent);
-            let has_end = self.tasks[task].end.is_some();
-            // Without commands and modes, only a graph with no other task has something to stop.
-            let is_empty = !self.tasks[task].is_active && self.tasks.len() > 1;
-            if has_end || is_empty || !around.any(|around| around == to) {
-                continue;
-            }
-            let task = &mut self.tasks[task];
-            let is_known = task.words().any(|known| known == bare);
-            if bare.eq_ignore_ascii_case("stop") {
-                task.halts.resumes = false;
-                task.trouble = Some((Policy::Stop, Trouble::Operator));
-            } else if bare.eq_ignore_ascii_case("resume") {
-                task.halts.resumes = true;
-            } else if is_known && !task.is_stopped() {
-                task.sent = Some(bare.to_owned());
-                has_reached.0 = true;
-                continue;
-            } else {
-                has_reached.1 |= is_known;
-                continue;
-            }
-            has_reached.0 = true;
-        }
-        match has_reached {
-            (true, _) => Ok(()),
-            (false, true) => Err(format!("`{word}` has no effect while the commands are stopped: send `resume` first")),
-            (false, false) if self.tasks[to].end.is_some() => {
-                Err(format!("`{word}` has no effect: the task has ended"))
-            }
-            (false, false) => {
-                let known = self.words();
-                let known = suggestion(word, known.iter().map(String::as_str), "words");
-                Err(format!("no mode has a condition on `{word}`: {known}"))
-            }
-        }
-    }
-
-    /// Returns the task that a word is for, and the word without the name of the task.
-    fn addressee<'w>(&self, word: &'w str) -> (usize, &'w str) {
-        let named =
-            |(number, task): (usize, &TaskRun)| Some((number, word.strip_prefix(task.name())?.strip_prefix('.')?));
-        if self.tasks.iter().any(|task| task.words().any(|known| known == word)) {
-            return (0, word);
-        }
-        let named = self.tasks.iter().enumerate().skip(1).filter_map(named);
-        named.min_by_key(|(_, rest)| rest.len()).unwrap_or((0, word))
-    }
-
-    /// Returns the operator words that the graph accepts, each once and in the order of the alphabet.
-    #[must_use]
-    pub fn words(&self) -> Vec<String> {
-        let own = || ["stop", "resume"].into_iter();
-        let mut words: Vec<String> =
-            own().chain(self.tasks.iter().flat_map(TaskRun::words)).map(str::to_owned).collect();
-        for task in self.tasks.iter().skip(1) {
-            words.extend(own().chain(task.words()).map(|word| format!("{}.{word}", task.name())));
-        }
-        words.sort();
-        words.dedup();
-        words
     }
 
     /// Notes that the next tick begins `by` [ns] too late in real time.
@@ -331,13 +311,26 @@ impl Engine {
     ///
     /// A run ends by calling this until it returns `true`, and once more so that the devices receive the zero.
     pub fn wind_down(&mut self) -> bool {
-        let now = self.core.tick.now + self.schedule.period();
+        self.wind_down_at(self.core.tick.now + self.schedule.period())
+    }
+
+    /// Ramps the commands toward zero up to the time `now` [ns], as [`wind_down`](Self::wind_down) does for one period.
+    pub(crate) fn wind_down_at(&mut self, now: i64) -> bool {
+        let dt = now - self.core.tick.now;
         self.core.begin(now);
-        let is_still = self.core.ramp(&mut self.devices, self.schedule.period() as f64 * 1e-9);
+        let is_still = self.core.ramp(&mut self.devices, dt as f64 * 1e-9);
         self.send_commands();
         // A device that fails now does not change why the run ended: it stops by its own timeout.
         self.exchange_with_devices(now);
         is_still
+    }
+
+    /// Sets every command to zero at once, because the ramp of an arm takes too long.
+    pub(crate) fn cut_ramp(&mut self) {
+        for device in self.devices.iter_mut().filter(|device| !device.commands.are_zero()) {
+            tracing::warn!("`{}` still moves: its ramp takes too long, so its command is zero at once", device.name);
+            device.commands.values.iter_mut().for_each(|values| values.fill(0.0));
+        }
     }
 
     /// Notifies the stepped devices that the run is over, and why.
@@ -373,8 +366,7 @@ impl Engine {
         for i in 0..self.devices.len() {
             let device = &mut self.devices[i];
             let DeviceLink::Live(linked) = &mut device.link else { continue };
-            if linked.has_lost_lease(now) {
-                linked.refuse();
+            if linked.loses_lease(now) {
                 // The device ramps by itself, so the graph starts again from rest.
                 device.commands.rest();
                 self.raise(Origin::Device(i), |_| Policy::Stop, Trouble::Lease(i))?;

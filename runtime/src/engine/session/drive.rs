@@ -78,7 +78,7 @@ pub fn run_virtual(
     while !engine.wind_down() {}
     engine.wind_down();
     engine.finish(&end.to_string());
-    Outcome { end, time, ticks, wall: epoch.elapsed(), late: 0 }
+    Outcome { end, signal: None, time, ticks, wall: epoch.elapsed(), late: 0 }
 }
 
 struct Virtual<'a> {

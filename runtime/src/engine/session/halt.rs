@@ -28,6 +28,9 @@ pub struct Rest {
     pub until: Option<i64>,
 }
 
+/// Longest hold that ends by itself [ns]. What lasts longer is no short gap any more, and the operator decides.
+const MAX_HOLD: i64 = 1_000_000_000;
+
 /// Number of halts that are kept for the summary.
 const MAX_HALTS: usize = 1000;
 
@@ -44,6 +47,8 @@ enum HaltState {
 /// The state of the halt machine and the list of halts.
 pub(crate) struct HaltMachine {
     state: HaltState,
+    /// Time from which a hold counts [ns].
+    since: i64,
     /// The halts so far, at most [`MAX_HALTS`].
     pub(crate) list: Vec<Halt>,
     /// Number of halts beyond [`MAX_HALTS`].
@@ -54,7 +59,7 @@ pub(crate) struct HaltMachine {
 
 impl HaltMachine {
     pub(crate) const fn new() -> Self {
-        Self { state: HaltState::Running, list: Vec::new(), unlisted: 0, resumes: false }
+        Self { state: HaltState::Running, since: 0, list: Vec::new(), unlisted: 0, resumes: false }
     }
 
     /// Whether the commands are zero or ramp to zero.
@@ -75,6 +80,7 @@ impl HaltMachine {
     /// Starts a halt of a task, whose name is empty for the graph itself. Call it only if the policy [escalates](Self::is_escalated_by) the state.
     pub(crate) fn halt(&mut self, task: &str, policy: Policy, fault: Fault) {
         self.end(fault.time);
+        self.since = fault.time;
         match task {
             "" => tracing::warn!("{fault}: every command ramps to zero"),
             task => tracing::warn!("{fault}: the commands of `{task}` ramp to zero"),
@@ -87,22 +93,38 @@ impl HaltMachine {
         self.state = if policy == Policy::Stop { HaltState::Stopped } else { HaltState::Held };
     }
 
-    /// Ends the halt if it can end after the tick at `now` [ns]. Returns whether the operator has resumed from a stop,
-    /// so that the modes must restart.
-    pub(crate) fn update(&mut self, has_trouble: bool, now: i64) -> bool {
+    /// Does not count the time of a hold up to `now` [ns].
+    pub(crate) const fn wait(&mut self, now: i64) {
+        self.since = now;
+    }
+
+    /// Ends the halt of a task if it can end after the tick at `now` [ns], and stops a task that has been held for too
+    /// long. Returns whether the operator has resumed from a stop, so that the modes must restart.
+    pub(crate) fn update(&mut self, task: &str, has_trouble: bool, now: i64) -> bool {
         let resumes = std::mem::take(&mut self.resumes);
         let previous = self.state;
         match (previous, has_trouble) {
             (HaltState::Held, false) => self.state = HaltState::Running,
             (HaltState::Stopped, false) if resumes => self.state = HaltState::Running,
-            // The trouble is not over yet, so the stop becomes a hold.
-            (HaltState::Stopped, true) if resumes => self.state = HaltState::Held,
+            (HaltState::Held, true) if now - self.since > MAX_HOLD => {
+                self.stop(task);
+                return false;
+            }
             _ => return false,
         }
-        if self.state == HaltState::Running {
-            self.end(now);
-        }
+        self.end(now);
         previous == HaltState::Stopped
+    }
+
+    /// Turns a hold into a stop.
+    #[cold]
+    fn stop(&mut self, task: &str) {
+        self.state = HaltState::Stopped;
+        if let Some(last) = self.list.last_mut().filter(|last| last.until.is_none()) {
+            last.policy = Policy::Stop;
+        }
+        let resume = if task.is_empty() { "resume".to_owned() } else { format!("{task}.resume") };
+        tracing::warn!("the commands have been held for more than 1 s, so they wait for `{resume}`");
     }
 
     fn end(&mut self, now: i64) {
@@ -130,10 +152,10 @@ mod tests {
             &[(hold, false, true), (hold, false, true), (None, false, false)],
             &[(stop, false, true), (None, false, true), (None, true, false)],
             &[(hold, false, true), (stop, false, true), (None, false, true), (None, true, false)],
-            &[(stop, false, true), (stop, true, true), (None, false, false)],
-            // A stop after the resume is a new stop.
-            &[(stop, false, true), (stop, true, true), (stop, false, true), (None, false, true), (None, true, false)],
-            &[(stop, false, true), (hold, false, true), (None, false, true), (None, true, false), (None, false, false)],
+            // A `resume` during the trouble has no effect, then or later.
+            &[(stop, false, true), (stop, true, true), (None, false, true), (None, true, false)],
+            &[(stop, false, true), (hold, true, true), (None, false, true), (None, true, false)],
+            &[(stop, false, true), (None, true, false), (stop, false, true), (None, false, true), (None, true, false)],
         ];
         for case in cases {
             let mut halts = HaltMachine::new();
@@ -144,10 +166,29 @@ mod tests {
                 if *resumes {
                     halts.resumes = true;
                 }
-                halts.update(trouble.is_some(), 10);
+                halts.update("", trouble.is_some(), 10);
                 assert_eq!(halts.is_halted(), *is_halted, "step {i} of {case:?}");
             }
             assert!(halts.list.iter().all(|halt| halt.until.is_some()));
+        }
+    }
+
+    #[test]
+    fn a_hold_that_lasts_longer_than_a_second_becomes_a_stop() {
+        // When its trouble is over, how much of that does not count, and whether it is a stop then [ms].
+        for (over, waits, is_stopped) in [(990, 0, false), (1020, 0, true), (5000, 4500, false), (5000, 3900, true)] {
+            let mut halts = HaltMachine::new();
+            halts.halt("", Policy::Hold, fault());
+            for now in (10..over).step_by(10) {
+                if now <= waits {
+                    halts.wait(now * 1_000_000);
+                }
+                halts.update("", true, now * 1_000_000);
+            }
+            halts.update("", false, over * 1_000_000);
+            assert_eq!((halts.is_halted(), halts.is_stopped()), (is_stopped, is_stopped), "{over}, {waits}");
+            let policy = if is_stopped { Policy::Stop } else { Policy::Hold };
+            assert_eq!((halts.list[0].policy, halts.list.len()), (policy, 1));
         }
     }
 }

@@ -3,11 +3,13 @@
 mod blame;
 mod budgets;
 mod build;
+mod caught;
 mod cycle;
 mod drive;
 mod drivers;
 mod engine;
 mod halt;
+mod line_reader;
 mod operator;
 mod outcome;
 mod real_time;
@@ -15,6 +17,7 @@ mod schedule;
 mod signals;
 mod task_run;
 mod trouble;
+mod words;
 
 pub use drive::run_virtual;
 pub use engine::{DisplayedPort, Engine, Logged};

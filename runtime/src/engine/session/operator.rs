@@ -1,76 +1,156 @@
 //! Operator words: those scheduled before the run, and those typed on the standard input during it.
 
 use std::collections::VecDeque;
-use std::io::{BufRead, BufReader, Read};
-use std::sync::mpsc::{Receiver, TryRecvError, channel};
+use std::io::{IsTerminal, stdin};
+
+use super::engine::Engine;
+use super::line_reader::{LineReader, stops};
+use super::task_run::TaskRun;
+
+/// Maximum number of words from the standard input that one tick carries out.
+const MAX_WORDS: usize = 8;
 
 /// The words that the operator sends to a run.
 pub(crate) struct OperatorInput {
     /// Time [ns] and word, in order of time.
     scheduled: VecDeque<(i64, String)>,
-    /// Lines of the standard input; `None` if it is not read or has ended.
-    lines: Option<Receiver<String>>,
+    /// The names of the tasks.
+    tasks: Vec<String>,
+    /// The standard input; `None` if it is not read or has ended.
+    reader: Option<LineReader>,
+    warnings: Warnings,
 }
 
 impl OperatorInput {
     /// Takes words scheduled in the graph's time [s] and, if `reads_stdin`, the lines of the standard input.
-    pub(crate) fn new(scheduled: &[(f64, String)], reads_stdin: bool) -> Self {
+    ///
+    /// # Errors
+    /// If there can be no thread that reads.
+    pub(crate) fn new(scheduled: &[(f64, String)], reads_stdin: bool, engine: &Engine) -> std::io::Result<Self> {
         let mut scheduled: Vec<(i64, String)> =
             scheduled.iter().map(|(seconds, word)| ((seconds * 1e9) as i64, word.clone())).collect();
         scheduled.sort_by_key(|(at, _)| *at);
-        Self { scheduled: scheduled.into(), lines: reads_stdin.then(|| read_lines(std::io::stdin())) }
+        let tasks: Vec<String> = engine.tasks().iter().skip(1).map(TaskRun::name).map(str::to_owned).collect();
+        let reader = reads_stdin.then(|| LineReader::start(stdin(), tasks.clone(), is_back_later)).transpose()?;
+        Ok(Self { scheduled: scheduled.into(), tasks, reader, warnings: Warnings::default() })
     }
 
-    /// Returns the next word that is due at `now` [ns].
-    pub(crate) fn next(&mut self, now: i64) -> Option<String> {
-        let line = self.lines.as_ref().map(Receiver::try_recv);
-        if line == Some(Err(TryRecvError::Disconnected)) {
-            self.lines = None;
+    /// Sends the words that are due at `now` [ns] to the engine, each stop before all others.
+    pub(crate) fn carry_out(&mut self, engine: &mut Engine, now: i64) {
+        let due = self.scheduled.partition_point(|(at, _)| *at <= now);
+        let due = self.scheduled.drain(..due).map(|(_, word)| word);
+        let (stop, others): (Vec<String>, Vec<String>) = due.partition(|word| stops(word, &self.tasks));
+        stop.iter().for_each(|word| warn(engine.send(word)));
+        self.carry_out_lines(engine, now);
+        others.iter().for_each(|word| warn(engine.send(word)));
+    }
+
+    /// Sends what has been read from the standard input.
+    fn carry_out_lines(&mut self, engine: &mut Engine, now: i64) {
+        let Some(reader) = &self.reader else { return };
+        let (mut words, mut dropped) = (Vec::new(), 0);
+        let is_open = reader.look(|inbox| {
+            // A stop voids the words that were read before it is carried out: they are all sent now, and refused.
+            let count = if inbox.stops.is_empty() { MAX_WORDS.min(inbox.lines.len()) } else { inbox.lines.len() };
+            words.extend(inbox.stops.drain(..).map(Ok));
+            words.extend(inbox.lines.drain(..count));
+            dropped = std::mem::take(&mut inbox.dropped);
+        });
+        if !is_open {
+            self.reader = None;
         }
-        line.and_then(Result::ok).or_else(|| self.scheduled.pop_front_if(|(at, _)| *at <= now).map(|(_, word)| word))
+        self.warnings.begin(now);
+        for word in words {
+            if let Err(message) = word.and_then(|word| engine.send(&word)) {
+                self.warnings.add(message);
+            }
+        }
+        self.warnings.drop_lines(dropped);
     }
 
     /// Whether another word can still arrive.
     pub(crate) fn is_open(&self) -> bool {
-        self.lines.is_some() || !self.scheduled.is_empty()
+        self.reader.is_some() || !self.scheduled.is_empty()
+    }
+
+    /// Prints the warnings that were held back.
+    pub(crate) fn finish(&mut self) {
+        self.warnings.finish();
     }
 }
 
-/// Reads the lines of an input on a thread, which ends with the input or with the process.
-fn read_lines(input: impl Read + Send + 'static) -> Receiver<String> {
-    let (sender, receiver) = channel();
-    std::thread::spawn(move || {
-        for line in BufReader::new(input).lines().map_while(Result::ok) {
-            let word = line.trim();
-            if !word.is_empty() && sender.send(word.to_owned()).is_err() {
-                break;
-            }
-        }
-    });
-    receiver
+/// Whether the standard input can be read again later: in the background, a terminal cannot be read.
+fn is_back_later(error: &std::io::Error) -> bool {
+    const EIO: i32 = 5;
+    error.raw_os_error() == Some(EIO) && stdin().is_terminal()
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
+fn warn(sent: Result<(), String>) {
+    if let Err(message) = sent {
+        tracing::warn!("{message}");
+    }
+}
 
-    #[test]
-    fn scheduled_words_are_sent_in_order_of_time() {
-        let mut input = OperatorInput::new(&[(0.2, "b".into()), (0.1, "a".into())], false);
-        assert_eq!(input.next(99_999_999), None);
-        assert_eq!(input.next(250_000_000).as_deref(), Some("a"));
-        assert_eq!(input.next(250_000_000).as_deref(), Some("b"));
-        assert!(input.next(i64::MAX).is_none() && !input.is_open());
+/// Warnings about the words: a few at once, and then one in each second.
+#[derive(Debug, Default)]
+struct Warnings {
+    /// The second of the graph's time in which the last warning was printed.
+    second: i64,
+    /// Number of warnings that have been printed at most one second after another.
+    burst: u64,
+    /// Number of warnings that were held back.
+    held_back: u64,
+    /// Number of lines that were dropped, and not reported yet.
+    dropped: u64,
+}
+
+impl Warnings {
+    /// Number of warnings that may follow each other without a pause.
+    const MAX_BURST: u64 = 8;
+
+    /// Begins the words at `now` [ns].
+    fn begin(&mut self, now: i64) {
+        let second = now / 1_000_000_000;
+        if second > self.second {
+            self.burst = self.burst.saturating_sub((second - self.second) as u64);
+            self.second = second;
+            self.report();
+        }
     }
 
-    #[test]
-    fn the_input_closes_after_its_last_line() {
-        let lines = read_lines(&b"  stop \n\nresume"[..]);
-        let mut input = OperatorInput { scheduled: VecDeque::new(), lines: Some(lines) };
-        let mut words = Vec::new();
-        while input.is_open() {
-            words.extend(input.next(0));
+    fn add(&mut self, message: String) {
+        if self.burst < Self::MAX_BURST {
+            self.burst += 1;
+            tracing::warn!("{message}");
+        } else {
+            self.held_back += 1;
         }
-        assert_eq!(words, ["stop", "resume"]);
+    }
+
+    fn drop_lines(&mut self, count: u64) {
+        self.dropped += count;
+    }
+
+    /// Prints how many warnings were held back, and how many lines were dropped.
+    fn report(&mut self) {
+        if self.burst >= Self::MAX_BURST {
+            return;
+        }
+        let counts = [
+            (std::mem::take(&mut self.held_back), "lines from standard input were no words that have an effect"),
+            (
+                std::mem::take(&mut self.dropped),
+                "lines from standard input were dropped, because too many came at once",
+            ),
+        ];
+        for (count, what) in counts.into_iter().filter(|(count, _)| *count > 0) {
+            self.burst += 1;
+            tracing::warn!("{count} more {what}");
+        }
+    }
+
+    fn finish(&mut self) {
+        self.burst = 0;
+        self.report();
     }
 }

@@ -51,6 +51,8 @@ impl fmt::Display for End {
 pub struct Outcome {
     /// Why it ended.
     pub end: End,
+    /// The name of the signal that ended it, such as `SIGINT`, if one did.
+    pub signal: Option<&'static str>,
     /// Time of the last tick in the graph's clock, without the ramp to zero [ns].
     pub time: i64,
     /// Number of ticks, without the ramp to zero.

@@ -1,17 +1,14 @@
-//! Runs a graph in real time: pacing, live devices, operator input, Ctrl-C, and the ramp to zero at the end.
+//! Runs a graph in real time: pacing, live devices, operator input, signals, and the ramp to zero at the end.
 
 use std::io;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::time::{Duration, Instant};
 
-use tokio::runtime::{Builder, Runtime};
-use tokio::sync::watch;
-
 use super::drive::{Pacer, drive, permanent_halt};
 use super::engine::Engine;
 use super::operator::OperatorInput;
-use super::outcome::{Outcome, RunOptions};
-use super::signals::interrupts;
+use super::outcome::{End, Outcome, RunOptions};
+use super::signals::Interrupt;
 use crate::engine::core::DeviceLink;
 use crate::fault::Fault;
 
@@ -19,10 +16,9 @@ use crate::fault::Fault;
 /// commands ramp to zero. Calls `observe` after every tick.
 ///
 /// # Errors
-/// If the tokio runtime or the signal handlers cannot be set up.
+/// If the signal handlers or the threads of the drivers cannot be set up.
 pub fn run(engine: &mut Engine, options: &RunOptions, observe: &mut dyn FnMut(&Engine)) -> io::Result<Outcome> {
-    let session = Builder::new_multi_thread().worker_threads(1).enable_all().build()?;
-    let mut pacer = RealTimePacer::start(engine, options, &session)?;
+    let mut pacer = RealTimePacer::start(engine, options, Interrupt::of_run()?)?;
     // After a panic, for example in `observe`, the arm must come to rest before the unwinding goes on.
     let end = catch_unwind(AssertUnwindSafe(|| drive(engine, pacer.until, &mut pacer, observe)));
     let (time, ticks) = (engine.now(), engine.ticks());
@@ -31,7 +27,8 @@ pub fn run(engine: &mut Engine, options: &RunOptions, observe: &mut dyn FnMut(&E
     let wall = pacer.epoch.elapsed();
     engine.finish(&reason);
     let end = end.unwrap_or_else(|panic| resume_unwind(panic));
-    Ok(Outcome { end, time, ticks, wall, late: engine.late() })
+    let signal = pacer.interrupt.signal().filter(|_| end == End::Interrupted);
+    Ok(Outcome { end, signal, time, ticks, wall, late: engine.late() })
 }
 
 struct RealTimePacer {
@@ -41,40 +38,38 @@ struct RealTimePacer {
     is_live: bool,
     /// Latest time of a tick [ns].
     until: i64,
-    interrupted: watch::Receiver<bool>,
+    interrupt: Interrupt,
+    /// Whether the operator knows that a run cannot be suspended.
+    has_refused: bool,
     input: OperatorInput,
     is_silent: bool,
 }
 
 impl RealTimePacer {
-    fn start(engine: &mut Engine, options: &RunOptions, session: &Runtime) -> io::Result<Self> {
-        let interrupted = session.block_on(async { interrupts() })?;
+    fn start(engine: &mut Engine, options: &RunOptions, interrupt: Interrupt) -> io::Result<Self> {
         let is_live = engine.is_live();
         let is_real = options.is_realtime || is_live;
         let until = options.duration.map_or(i64::MAX, |seconds| (seconds * 1e9) as i64);
-        let input = OperatorInput::new(&options.sends, options.listens);
+        let input = OperatorInput::new(&options.sends, options.listens, engine)?;
         let epoch = Instant::now();
         engine.start_drivers(epoch)?;
-        Ok(Self { epoch, is_real, is_live, until, interrupted, input, is_silent: false })
+        let (has_refused, is_silent) = (false, false);
+        Ok(Self { epoch, is_real, is_live, until, interrupt, has_refused, input, is_silent })
     }
 }
 
 impl Pacer for RealTimePacer {
     fn is_interrupted(&self) -> bool {
-        *self.interrupted.borrow()
+        self.interrupt.is_requested()
     }
 
     fn tick(&mut self, engine: &mut Engine, next: i64) -> Result<bool, Fault> {
         let (now, late) = if self.is_real { self.wait(engine, next) } else { (next, 0) };
-        if *self.interrupted.borrow() {
+        if self.is_interrupted() {
             return Ok(false);
         }
         engine.collect_ended_drivers();
-        while let Some(word) = self.input.next(now) {
-            if let Err(message) = engine.send(&word) {
-                tracing::warn!("{message}");
-            }
-        }
+        self.input.carry_out(engine, now);
         if late > engine.period() {
             engine.begin_late(late);
         }
@@ -83,6 +78,9 @@ impl Pacer for RealTimePacer {
 
     fn after(&mut self, engine: &Engine) -> Option<Fault> {
         self.log_clock(engine);
+        if self.interrupt.take_refused() > 0 && !std::mem::replace(&mut self.has_refused, true) {
+            tracing::warn!("a run cannot be suspended, because it would not stop the arm: Ctrl-C ends it");
+        }
         permanent_halt(engine, self.input.is_open(), !self.is_real && self.until == i64::MAX)
     }
 }
@@ -114,7 +112,7 @@ impl RealTimePacer {
         let has_sampled = || clock.is_some_and(|(linked, samples)| linked.has_sampled(samples));
         loop {
             let left = due.saturating_duration_since(Instant::now());
-            if left.is_zero() || has_sampled() || *self.interrupted.borrow() {
+            if left.is_zero() || has_sampled() || self.is_interrupted() {
                 break;
             }
             // A live device wakes the thread when it has sampled.
@@ -126,14 +124,30 @@ impl RealTimePacer {
         (if self.is_live { now } else { next.max(engine.now()) }, now - next)
     }
 
+    /// Ramps the commands toward zero. Live devices follow them at the current time, and not one period after another.
+    fn wind_down(&self, engine: &mut Engine) -> bool {
+        if !self.is_live {
+            return engine.wind_down();
+        }
+        engine.wind_down_at((self.epoch.elapsed().as_nanos() as i64).max(engine.now() + 1))
+    }
+
     /// Ramps every command to zero, in real time if the run was, and stops the drivers.
-    fn stop(&self, engine: &mut Engine, reason: &str) {
-        while !engine.wind_down() {
-            if self.is_real {
-                std::thread::sleep(Duration::from_nanos(engine.period() as u64));
+    fn stop(&mut self, engine: &mut Engine, reason: &str) {
+        /// Longest time of the ramp. With the time that the drivers have, it stays within the 5 s in which a signal ends
+        /// a run.
+        const MAX_RAMP: Duration = Duration::from_secs(3);
+        let begin = Instant::now();
+        while !self.wind_down(engine) {
+            let left = MAX_RAMP.saturating_sub(begin.elapsed());
+            if left.is_zero() {
+                engine.cut_ramp();
+            } else if self.is_real {
+                std::thread::sleep(left.min(Duration::from_nanos(engine.period() as u64)));
             }
         }
-        engine.wind_down();
+        self.wind_down(engine);
         engine.stop_drivers(reason);
+        self.input.finish();
     }
 }

@@ -26,6 +26,8 @@ pub struct TaskRun {
     pub(super) halts: HaltMachine,
     /// The trouble of this tick with the strictest policy.
     pub(super) trouble: Option<(Policy, Trouble)>,
+    /// The trouble of the last tick, if it had one.
+    pub(super) lasting: Option<Trouble>,
     /// An operator word that the modes have not processed yet.
     pub(super) sent: Option<String>,
     pub(super) end: Option<TaskEnd>,
@@ -40,8 +42,8 @@ pub struct TaskRun {
 impl TaskRun {
     pub(super) fn new(planned: PlannedTask, modes: Option<ModeMachine>, flags: Vec<(usize, PortId)>) -> Self {
         let PlannedTask { name, parent, policy, is_active, ends_run, .. } = planned;
-        let (halts, trouble, sent, end) = (HaltMachine::new(), None, None, None);
-        Self { name, parent, modes, policy, halts, trouble, sent, end, is_active, ends_run, flags }
+        let (halts, trouble, lasting, sent, end) = (HaltMachine::new(), None, None, None, None);
+        Self { name, parent, modes, policy, halts, trouble, lasting, sent, end, is_active, ends_run, flags }
     }
 
     /// Returns the full name of the task; it is empty for the graph itself.

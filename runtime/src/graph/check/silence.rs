@@ -14,12 +14,10 @@ pub(crate) fn check(opened: &OpenedBench, diagnostics: &mut Diagnostics) {
     diagnostics.extend(moving.filter_map(unwatched));
     let Some(live) = opened.devices.iter().find(is_live) else { return };
     for device in opened.devices.iter().filter(|device| matches!(device.driver, Driver::Lockstep(_))) {
-        let message = format!(
-            "device `{}` runs in lockstep, so a tick waits for it, but `{}` runs in real time",
-            device.name, live.name
-        );
+        let message =
+            format!("a tick waits for device `{}`, but the device `{}` runs in real time", device.name, live.name);
         let diagnostic = Diagnostic::new(Code::BadClock, device.span.clone(), message);
-        let help = "let the simulator run by its own clock: `\"lockstep\": false` in its hello message";
+        let help = "let the program behind it run by its own clock, without waiting for the graph";
         diagnostics.push(diagnostic.note(live.span.clone(), "the device in real time is here").help(help));
     }
 }
