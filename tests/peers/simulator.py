@@ -235,6 +235,9 @@ class Link:
         try:
             self.connection.sendall(data)
         except OSError:
+            # What the graph said before it closed the line counts.
+            while self.hear(0.0) is not None:
+                pass
             self.closed = True
 
     def hear(self, wait):

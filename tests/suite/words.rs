@@ -30,7 +30,7 @@ struct Heard {
 /// What a run reads, and the pause after it [ms].
 type Part = (Vec<u8>, u64);
 
-fn listen(args: &[&str], parts: Vec<Part>) -> Heard {
+fn listen(args: &[&str], parts: impl IntoIterator<Item = Part>) -> Heard {
     let begin = Instant::now();
     let mut child = tool(args).stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
     let mut input = child.stdin.take().unwrap();
@@ -57,7 +57,7 @@ fn peak_memory(child: &Child) -> u64 {
     line.trim().trim_end_matches(" kB").parse().unwrap()
 }
 
-fn hear(time: &str, parts: Vec<Part>) -> Heard {
+fn hear(time: &str, parts: impl IntoIterator<Item = Part>) -> Heard {
     listen(&[&TASK[..], &["--for", time]].concat(), parts)
 }
 
@@ -114,8 +114,7 @@ fn a_stop_gets_through_whatever_else_is_read() {
 
 #[test]
 fn an_endless_flood_starves_neither_the_ticks_nor_the_memory() {
-    let flood = vec![(b"y\n".repeat(50_000), 0); 100_000];
-    let heard = hear("3s", flood);
+    let heard = hear("3s", std::iter::repeat_with(|| (b"y\n".repeat(50_000), 0)));
     assert_eq!(heard.code, 0, "{}", heard.err);
     assert!(heard.took < Duration::from_secs(8), "{:?}", heard.took);
     assert!(heard.out.contains("after 3.000 s and 751 ticks"), "{}", heard.out);

@@ -102,13 +102,12 @@ impl Bridge {
         (self.shown, self.unanswered) = (Some(stamp), Some(obs.seq));
     }
 
-    /// Brings the arm to rest if the simulator still listens, whatever it sends, and ends the run.
-    fn stop(&mut self, why: &str) {
+    /// Brings the arm to rest if the simulator still listens, whatever it sends, and ends the run. After `max_ramp`, the
+    /// command is zero at once.
+    fn stop(&mut self, why: &str, max_ramp: Duration) {
         /// Maximum time to wait for a frame.
         const FRAME_TIMEOUT: Duration = Duration::from_millis(50);
-        /// Maximum duration of the ramp.
-        const MAX_RAMP: Duration = Duration::from_secs(5);
-        let end = Instant::now() + MAX_RAMP;
+        let end = Instant::now() + max_ramp;
         // A frame that cannot be read still counts, and the simulator waits for the answer.
         let mut seq = self.unanswered.unwrap_or_else(|| self.frames.newest.map_or(0, |(seq, _)| seq + 1));
         loop {
@@ -152,17 +151,25 @@ impl Stepped for Bridge {
     }
 
     fn exchange(&mut self, now: i64, commands: &Commands, samples: &mut Samples) -> Result<(), DeviceError> {
+        /// Maximum duration of the ramp after a failure.
+        const MAX_RAMP: Duration = Duration::from_secs(3);
         if self.is_over {
             return Ok(());
         }
         self.take_turn(now, commands, samples).map_err(|why| {
             let why = format!("the simulator at `{}`: {why}", self.params.address);
-            self.stop(&why);
+            self.stop(&why, MAX_RAMP);
             DeviceError(why)
         })
     }
 
     fn finish(&mut self, reason: &str) {
+        /// Maximum duration of what is left of the ramp.
+        const MAX_REST: Duration = Duration::from_millis(500);
+        // A frame that was not due yet leaves the last commands of the graph's ramp unsent.
+        if !self.is_over && self.commanded.iter().any(|dq| *dq != 0.0) {
+            self.stop(reason, MAX_REST);
+        }
         self.end_run(reason);
     }
 }
