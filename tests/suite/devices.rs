@@ -168,6 +168,22 @@ fn a_device_that_states_other_ports_than_its_role_does_not_load() {
     let message =
         "device `ruler` states the role type `tactil_pad`, which does not exist (did you mean `tactile_pad`?)";
     assert!(unknown.as_ref().is_err_and(|report| report.contains(message)), "{unknown:?}");
+    for twice in [
+        (|d| (length(d), length(d)).0) as Describe,
+        |d| {
+            length(d);
+            d.fills_on("left", "length").output::<Scalar>("value", metres());
+        },
+        |d| {
+            for side in ["left", "left"] {
+                d.fills_on(side, "length").output::<Scalar>("value", metres());
+            }
+        },
+    ] {
+        let report = load(Stated(twice)).expect_err("nothing tells them apart");
+        let message = "device `ruler` fills the role type `length` more than once without a side of its own for each";
+        assert!(report.contains(message) && report.matches("error[").count() == 1, "{report}");
+    }
     load(Stated(length)).unwrap();
     load(Stated(|description| {
         whole_arm(description);

@@ -1,12 +1,13 @@
 //! The lockstep bridge against a simulator in another language, which knows nothing of this one.
 
+use std::collections::BTreeSet;
 use std::fs;
 use std::io::{BufRead, BufReader, Read};
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
 use serde_json::Value;
-use tactflow_tests::workspace;
+use tactflow_tests::{single_tasks, workspace};
 
 use crate::cli::in_new_folder;
 use crate::tool::{Said, said, tool};
@@ -20,7 +21,11 @@ pub(crate) struct Peer {
 
 impl Peer {
     pub(crate) fn start(args: &str) -> Self {
-        let script = workspace().join("tests/peers/simulator.py");
+        Self::of("simulator.py", args)
+    }
+
+    pub(crate) fn of(script: &str, args: &str) -> Self {
+        let script = workspace().join("tests/peers").join(script);
         let mut command = Command::new("python3");
         command.arg(script).args(args.split_whitespace()).stdout(Stdio::piped());
         let mut child = command.spawn().expect("python3 is there");
@@ -98,6 +103,63 @@ fn a_ball_is_found_centred_and_measured() {
     // The ruler takes the pad's plane for the surface, and the foam gives way by a millimetre or two [m].
     assert!(number(&seen, "off") < 0.002, "{seen}");
     assert_eq!(seen["end"], Value::Null, "the simulator ends it: {seen}");
+}
+
+/// What a task achieves on the gantry: how far the contact is from the centre of the pad along x and y at most [m], how
+/// far a line is from the pad's y at most, as a cosine, and how far the sensor has moved in its plane at least [m].
+type Promise = ([f64; 2], f64, f64);
+
+const ANYWHERE: f64 = f64::INFINITY;
+const CENTRED: Promise = ([1e-3, 1e-3], ANYWHERE, 0.0);
+
+/// The tasks on the second simulator, each with its scene, its duration [s] and what it promises.
+const ON_THE_GANTRY: [(&str, &str, f64, Promise); 9] = [
+    ("force", "--scene rod --radius 0.006", 2.4, ([ANYWHERE; 2], ANYWHERE, 0.0)),
+    ("position", "--scene ball --offset 0.006 -0.004", 2.4, CENTRED),
+    ("hybrid", "--scene ball --offset 0.006 -0.004", 3.2, CENTRED),
+    ("rolling", "--scene ball --radius 0.05 --offset 0.006 -0.004", 3.2, CENTRED),
+    ("edge", "--scene edge --angle 1.2", 3.2, ([ANYWHERE; 2], 0.06, 0.0)),
+    ("cable", "--scene rod --radius 0.004 --angle 1.3 --offset 0.003 0", 3.2, ([1e-3, ANYWHERE], 0.03, 0.015)),
+    ("explore", "--scene plane", 4.0, CENTRED),
+    ("square", "--scene plane", 4.0, ([ANYWHERE; 2], ANYWHERE, 0.002)),
+    (
+        "seek_ridge",
+        "--scene ridge --radius 0.005 --length 0.06 --angle 1 --offset 0.005 0",
+        7.2,
+        ([1e-3, 0.02], 0.03, 0.02),
+    ),
+];
+
+#[test]
+fn every_task_works_on_a_second_simulator_with_only_a_bench_of_its_own() {
+    for (task, scene, seconds, (from_centre, from_y, way)) in ON_THE_GANTRY {
+        let peer = Peer::of("gantry.py", &format!("{scene} --seconds {seconds}"));
+        let address = format!("devices.bench.address=127.0.0.1:{}", peer.port);
+        let graph = format!("graphs/{task}.toml");
+        let args = ["run", &graph, "--bench", "tests/data/gantry_bench.toml", "--quiet", "--set", &address];
+        let said = said(&mut tool(&args));
+        let seen = peer.seen();
+        assert_eq!((said.code, seen["end"].as_str()), (0, None), "{task}: {}", said.err);
+        assert_eq!(number(&seen, "frames"), (seconds / 0.008).round(), "{task}: {seen}");
+        // It never left the object, and presses with p = 1.
+        assert_eq!(number(&seen, "lost"), 0.0, "{task}: {seen}");
+        assert!(task == "position" || (number(&seen, "pressure") - 1.0).abs() < 0.25, "{task}: {seen}");
+        assert!(
+            number(&seen, "x").abs() < from_centre[0] && number(&seen, "y").abs() < from_centre[1],
+            "{task}: {seen}"
+        );
+        assert!(number(&seen, "across") < from_y, "{task}: {seen}");
+        let moved = [0, 1].map(|axis: usize| seen["moved"][axis].as_f64().unwrap());
+        assert!(moved[0].hypot(moved[1]) > way, "{task}: {seen}");
+    }
+}
+
+#[test]
+fn all_tasks_that_do_not_play_a_recording_run_on_the_second_simulator() {
+    let tasks = single_tasks().into_iter().map(|path| path.file_stem().unwrap().to_str().unwrap().to_owned());
+    // The limits of `finger_press` are in the raw readings of its recording.
+    let tasks: BTreeSet<String> = tasks.filter(|task| task != "finger_press").collect();
+    assert_eq!(tasks, ON_THE_GANTRY.map(|(task, ..)| task.to_owned()).into());
 }
 
 /// What a simulator does wrong, a part of the message, and whether it still listens: then it gets at least two commands

@@ -7,6 +7,7 @@ use tactflow_runtime::signal::{Joints, Pose};
 use tactflow_tests::{catalogue, workspace};
 
 use crate::course::get;
+use crate::tool::say;
 
 /// Both arms press on the box of `graphs/benches/carried_box.toml` and move it 20 mm up.
 fn lift() -> Request {
@@ -101,15 +102,61 @@ fn the_same_seed_gives_the_same_bits_and_each_pad_its_own_noise() {
     assert_ne!(last[2], last[3], "each pad has its own noise");
 }
 
+/// The task whose roles of each name are on these sides of the cell.
+fn bound(sides: [(&str, &str); 4]) -> Request {
+    sides.iter().fold(lift(), |request, (role, side)| request.set(format!("bind.{role}=cell.{side}")))
+}
+
 #[test]
-fn the_first_pad_and_the_first_arm_of_a_task_are_the_left_ones() {
-    let bench = "devices.cell.right.base.xyz=[0.667, -0.1333, -0.4259]";
-    let mut engine = engine(&lift().set(bench));
-    // The right arm is 100 mm further away, so only the left pad touches.
-    run(&mut engine, 2.6, |_, _| ());
-    let present = ["left", "right"].map(|side| get::<bool>(&engine, &format!("{side}_touch.label.present")).copied());
-    assert_eq!(present, [Some(true), Some(false)]);
-    assert_eq!(scalar(&engine, "object.right_force"), 0.0);
+fn the_bench_says_on_which_side_of_the_cell_each_role_is() {
+    let swapped = [("left_pad", "right"), ("left_arm", "right"), ("right_pad", "left"), ("right_arm", "left")];
+    let same = swapped.map(|(role, _)| (role, role.split('_').next().unwrap()));
+    for (sides, expected) in [(same, [true, false]), (swapped, [false, true])] {
+        // The right arm of the cell is 100 mm further away, so only its left pad touches.
+        let far = "devices.cell.right.base.xyz=[0.667, -0.1333, -0.4259]";
+        let mut engine = engine(&bound(sides).set(far));
+        run(&mut engine, 2.6, |_, _| ());
+        let present =
+            ["left", "right"].map(|side| *get::<bool>(&engine, &format!("{side}_touch.label.present")).unwrap());
+        assert_eq!(present, expected, "{sides:?}");
+        assert_eq!(scalar(&engine, "object.right_force"), 0.0);
+    }
+}
+
+#[test]
+fn a_pad_is_on_the_side_of_its_arm() {
+    let crossed = [("left_pad", "right"), ("left_arm", "left"), ("right_pad", "left"), ("right_arm", "right")];
+    let report = compile(&catalogue(), &bound(crossed)).err().expect("the pads are on the other arms").render(false);
+    for message in [
+        "`left_pad` is on `left_arm`, which is the left side of `cell`",
+        "`right_pad` is on `right_arm`, which is the right side of `cell`",
+    ] {
+        assert!(report.contains(message), "{report}");
+    }
+    assert_eq!(report.matches("error[wrong-role]").count(), 2, "{report}");
+    let twice = lift().set("bind.right_pad=cell.left");
+    let report = compile(&catalogue(), &twice).err().expect("two roles have one pad").render(false);
+    assert!(report.contains("device `cell.left` already fills the role `left_pad`"), "{report}");
+}
+
+#[test]
+fn limits_in_a_bench_hold_for_the_arm_on_that_side() {
+    let graphs = workspace().join("graphs");
+    let text = std::fs::read_to_string(graphs.join("benches/carried_box.toml")).unwrap();
+    let text = text.replace("\"../", &format!("\"{}/", graphs.display()));
+    // An arm of the cell under another name than that of the task.
+    let text = text.replace("[devices.cell]", "first_arm = \"cell.left\"\n\n[devices.cell]");
+    let text = format!("{text}\n[limits.first_arm]\njoint_rad_per_s2 = 1.5\n");
+    let folder = tempfile::tempdir().unwrap();
+    let bench = folder.path().join("bench.toml");
+    std::fs::write(&bench, text).unwrap();
+    let said = say(&["show", "tests/data/two_arms/squeeze_and_lift.toml", "--bench", bench.to_str().unwrap()]);
+    assert_eq!(said.code, 0, "{}", said.err);
+    let limited = |node: &str| {
+        let block = said.out.split(&format!("[nodes.{node}]")).nth(1).expect("the node is shown");
+        block.split("\n[").next().unwrap().contains("acceleration = 1.5")
+    };
+    assert_eq!([limited("left_move.joints"), limited("right_move.joints")], [true, false], "{}", said.out);
 }
 
 #[test]

@@ -1,6 +1,6 @@
 //! What every arm states: the role `velocity_arm`, its joints, its ports and its facts.
 
-use tactflow_runtime::device::{Command, Description, DeviceError, Output, Report, Samples};
+use tactflow_runtime::device::{Command, Description, DeviceError, Fill, Output, Report, Samples};
 use tactflow_runtime::node::{At, FilePath, Mistake, Mistakes, refuse_any};
 use tactflow_runtime::signal::{Joint, Joints, JointsShape, Pose, Unit};
 use tactflow_runtime::source::Code;
@@ -17,10 +17,25 @@ pub(crate) struct ArmPorts {
     pub(crate) contact: Report<Pose>,
 }
 
+const ROLE: &str = "velocity_arm";
+
 impl ArmPorts {
     /// Adds the role `velocity_arm` to a description.
     pub(crate) fn fill(description: &mut Description, joints: &JointsShape, facts: Facts) -> Self {
-        let mut arm = description.fills("velocity_arm");
+        Self::state(description.fills(ROLE), joints, facts)
+    }
+
+    /// Adds the role `velocity_arm` on one side of a device to a description.
+    pub(crate) fn fill_on(
+        description: &mut Description,
+        side: &'static str,
+        joints: &JointsShape,
+        facts: Facts,
+    ) -> Self {
+        Self::state(description.fills_on(side, ROLE), joints, facts)
+    }
+
+    fn state(mut arm: Fill<'_>, joints: &JointsShape, facts: Facts) -> Self {
         arm.facts(facts);
         Self {
             position: arm.output("position", joints.clone()),

@@ -2,7 +2,7 @@
 
 use std::borrow::Cow;
 
-use tactflow_runtime::device::{Description, Output};
+use tactflow_runtime::device::{Description, Fill, Output};
 use tactflow_runtime::signal::{Image, ImageShape, Unit};
 
 use super::Facts;
@@ -10,7 +10,22 @@ use crate::arm::mount::Mount;
 
 /// Adds the role `tactile_pad` to a description. Returns the handle of its image.
 pub(crate) fn fill(description: &mut Description, shape: ImageShape, facts: Facts) -> Output<Image> {
-    let mut pad = description.fills("tactile_pad");
+    state(description.fills(ROLE), shape, facts)
+}
+
+/// Adds the role `tactile_pad` on one side of a device to a description. Returns the handle of its image.
+pub(crate) fn fill_on(
+    description: &mut Description,
+    side: &'static str,
+    shape: ImageShape,
+    facts: Facts,
+) -> Output<Image> {
+    state(description.fills_on(side, ROLE), shape, facts)
+}
+
+const ROLE: &str = "tactile_pad";
+
+fn state(mut pad: Fill<'_>, shape: ImageShape, facts: Facts) -> Output<Image> {
     pad.facts(facts);
     pad.output("image", shape)
 }

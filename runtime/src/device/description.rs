@@ -46,6 +46,8 @@ pub struct Description {
 #[derive(Debug, Clone)]
 pub(crate) struct Filled {
     pub(crate) role: Name,
+    /// Name of the side of the device, if it fills this type of role more than once.
+    pub(crate) side: Option<Name>,
     pub(crate) facts: Vec<(Name, toml::Value)>,
 }
 
@@ -85,9 +87,21 @@ impl Description {
         self.on_silence.as_ref().map_or(0.1, |silence| silence.within)
     }
 
-    /// Adds a role that the device can fill. A device that has two pads adds `tactile_pad` twice.
+    /// Adds a role that the device can fill.
     pub fn fills(&mut self, role: impl Into<Name>) -> Fill<'_> {
-        self.fills.push(Filled { role: role.into(), facts: Vec::new() });
+        self.add_role(role.into(), None)
+    }
+
+    /// Adds a role that the device can fill on one of its sides.
+    ///
+    /// A device with two pads adds `tactile_pad` twice, each with the name of its side. A bench binds a role to one of
+    /// them by this name: `left_pad = "cell.left"`.
+    pub fn fills_on(&mut self, side: impl Into<Name>, role: impl Into<Name>) -> Fill<'_> {
+        self.add_role(role.into(), Some(side.into()))
+    }
+
+    fn add_role(&mut self, role: Name, side: Option<Name>) -> Fill<'_> {
+        self.fills.push(Filled { role, side, facts: Vec::new() });
         let index = self.fills.len() - 1;
         Fill { description: self, index }
     }

@@ -232,7 +232,7 @@ impl OutlineBuilder<'_> {
         let device = |role: &str| self.net.flat.bench.as_ref()?.bind.get(role);
         let roles = self.net.flat.roles.iter();
         let role = |(key, kind): &(Key, Spanned<String>)| {
-            let device = self.word(device(&key.name)?);
+            let device = self.word(&device(&key.name)?.word);
             Some(OutlinedRole { name: key.name.clone(), kind: self.word(kind), device })
         };
         roles.filter_map(role).collect()

@@ -34,6 +34,9 @@ use search::Search;
 /// A gradient needs an e that depends on the place. If noise hides the slope, use longer legs. Three tactels are a good
 /// length, because the foam spreads the contact by one.
 ///
+/// A pad shows no more of a ridge than its own length, so the eccentricity of a line depends on the pad: a rod of 20 mm
+/// has 0.98 on a pad of 80 mm and 0.81 on one of 24 mm. A task for any pad uses lower bounds, such as `on_above = 0.75`.
+///
 /// ```toml
 /// [nodes.ridge]
 /// type = "ridge_guide"

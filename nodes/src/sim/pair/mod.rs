@@ -53,9 +53,9 @@ pub struct Params {
     /// Coefficient of friction between the table and the object.
     #[param(unit = "1", range = 0.0.., default = 0.4)]
     table_friction: f64,
-    /// The first arm of the task, with the first pad.
+    /// The arm and the pad of the side `left`.
     left: SideParams,
-    /// The second arm of the task, with the second pad.
+    /// The arm and the pad of the side `right`.
     right: SideParams,
     /// Number of rows of each pad.
     #[param(range = 1..=1_000_000, default = 16)]
@@ -131,8 +131,8 @@ pub struct Params {
 /// The frame of the cell has its z up. `left.base` and `right.base` are the bases of the arms in this frame. All of a
 /// task happens in the base of each arm, so that no task knows the cell.
 ///
-/// The device fills `tactile_pad` and `velocity_arm` twice. The first pad and the first arm that the task lists under
-/// `[roles]` are `left`, the second ones `right`, whatever their names are. List both pads and both arms in this order.
+/// The device fills `tactile_pad` and `velocity_arm` on two sides. A bench names the side of each role:
+/// `left_pad = "cell.left"`.
 ///
 /// The object is a rigid box or ball of uniform density. It moves and turns freely under gravity, the forces of both
 /// pads and those of the table. The coefficients of friction between the pads and the object are `static_friction` and
@@ -160,8 +160,8 @@ pub struct Params {
 /// arm.velocity = "joint_limit.velocity"
 ///
 /// [bind]
-/// pad = "cell"                        # the left one
-/// arm = "cell"
+/// pad = "cell.left"
+/// arm = "cell.left"
 ///
 /// [devices.cell]
 /// type = "sim_pair"
@@ -192,7 +192,7 @@ struct Side {
     frames: Frames,
 }
 
-/// Names of the arms in a bench file.
+/// Names of the sides in a bench file.
 const NAMES: [&str; 2] = ["left", "right"];
 
 impl Device for SimPair {
@@ -212,8 +212,8 @@ impl Device for SimPair {
         let mut description = Description::every(period as f64 * 1e-9);
         let noise = [2, 4].map(|stream| Random::new(params.seed, stream));
         let [left_noise, right_noise] = noise;
-        let (left, left_arm) = params.side(&mut description, &pad, left, left_noise)?;
-        let (right, right_arm) = params.side(&mut description, &pad, right, right_noise)?;
+        let (left, left_arm) = params.side(&mut description, &pad, NAMES[0], left, left_noise)?;
+        let (right, right_arm) = params.side(&mut description, &pad, NAMES[1], right, right_noise)?;
         let on_base = |side: &SideParams, arm: SimArm| {
             let foam = params.foam.clone();
             ArmAndPad::new(pose3(&Pose(side.base.pose())), arm, &pad.shape, foam, params.points_apart)
@@ -261,12 +261,13 @@ impl Params {
         &self,
         description: &mut Description,
         pad: &PadModel,
+        name: &'static str,
         (model, loaded): (ArmModel, LoadedArm),
         noise: Random,
     ) -> Result<(Side, SimArm), Mistakes> {
         let times = [period_of(self.rate_hz), nanos(self.latency_s)];
-        let image = pad::fill(description, pad.shape.clone(), pad.facts(&model.mount)?);
-        let arm = ArmPorts::fill(description, &loaded.joints, model.facts(&loaded)?);
+        let image = pad::fill_on(description, name, pad.shape.clone(), pad.facts(&model.mount)?);
+        let arm = ArmPorts::fill_on(description, name, &loaded.joints, model.facts(&loaded)?);
         let tactels = pad.shape.tactels();
         let readout = Readout::new(tactels, pad.electronics.clone(), self.seed).with_noise(noise);
         let joints = loaded.joints.joints.clone();

@@ -3,6 +3,7 @@
 mod facts;
 mod open;
 mod robots;
+mod sides;
 
 pub(crate) use facts::fill_facts;
 pub(crate) use open::{BoundRole, OpenedBench, open, place_mistakes};

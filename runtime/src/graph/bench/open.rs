@@ -4,12 +4,13 @@ use std::borrow::Cow;
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 
+use super::sides;
 use crate::catalogue::Catalogue;
 use crate::device::{Description, StatedPort};
 use crate::graph::load::MeasuredValues;
 use crate::graph::net::Net;
 use crate::graph::plan::PlannedDevice;
-use crate::graph::syntax::{BenchDocument, Block, WireEntry};
+use crate::graph::syntax::{BenchDocument, Binding, Block, WireEntry};
 use crate::node::{KnownUnits, Mistake, PortSpec, Reader, Spanned};
 use crate::signal::Shape;
 use crate::source::{
@@ -21,6 +22,8 @@ use crate::source::{
 pub(crate) struct BoundRole {
     /// Index among the opened devices.
     pub(crate) device: usize,
+    /// Index among the roles that the device can fill.
+    fills: usize,
     pub(crate) outputs: Vec<(usize, Shape)>,
     pub(crate) commands: Vec<(usize, Shape)>,
     pub(crate) reports: Vec<(usize, Shape)>,
@@ -48,6 +51,13 @@ impl OpenedBench {
     /// Returns the nominal sample period of the device of a role [s].
     pub(crate) fn period(&self, role: &BoundRole) -> f64 {
         self.devices[role.device].description.period
+    }
+
+    /// Returns the device that fills a role and its side, or `None` if the device has no sides.
+    fn side(&self, role: usize) -> Option<(usize, &str)> {
+        let bound = self.roles[role].as_ref()?;
+        let side = self.devices[bound.device].description.fills[bound.fills].side.as_deref()?;
+        Some((bound.device, side))
     }
 
     /// Returns the facts of the devices: `role.fact` and the value.
@@ -88,11 +98,13 @@ pub(crate) fn open(net: &Net<'_>, sources: &mut SourceMap, diagnostics: &mut Dia
         };
         opener.opened.roles.push(role);
     }
-    for (key, _, role) in &net.observed {
+    for (key, role) in &net.observed {
         let kind = Spanned { value: role.name.to_string(), span: key.span.clone() };
         let bound = bench.and_then(|bench| opener.role(bench, key, &kind));
         opener.opened.observed.push(bound);
     }
+    let crossed = sides::crossed(net, |role| opener.opened.side(role));
+    opener.diagnostics.extend(crossed);
     opener.opened
 }
 
@@ -122,7 +134,7 @@ impl Opener<'_> {
     /// Such a binding may belong to another task, unless it looks like a role that only scenarios read.
     fn check_unused_bindings(&mut self, bench: &BenchDocument, roles: &BTreeSet<&str>) {
         let observed = || self.catalogue.roles().iter().filter(|role| role.is_observed);
-        for (role, word) in bench.bind.iter().filter(|(role, _)| !roles.contains(&*role.name)) {
+        for (role, binding) in bench.bind.iter().filter(|(role, _)| !roles.contains(&*role.name)) {
             let is_right = observed().any(|known| known.is_observed_as(&role.name));
             let names = observed().map(|role| role.observed_name());
             if let Some(name) = suggest_name(&role.name, names).filter(|_| !is_right) {
@@ -130,8 +142,8 @@ impl Opener<'_> {
                 let diagnostic = Diagnostic::new(Code::ObservedRole, role.span.clone(), message);
                 self.diagnostics.push(diagnostic.help(format!("did you mean `{name}`?")));
             }
-            if !self.blocks.contains_key(&*word.value) {
-                self.diagnostics.push(unknown_device(word, bench));
+            if !self.blocks.contains_key(binding.device()) {
+                self.diagnostics.push(unknown_device(&binding.device_word(), bench));
             }
         }
     }
@@ -140,7 +152,7 @@ impl Opener<'_> {
     /// uses them.
     fn check_devices(&mut self, bench: &BenchDocument, roles: &BTreeSet<&str>) {
         let bound = bench.bind.iter().filter(|(role, _)| roles.contains(&*role.name));
-        let opened: BTreeSet<&str> = bound.map(|(_, word)| word.value.as_str()).collect();
+        let opened: BTreeSet<&str> = bound.map(|(_, binding)| binding.device()).collect();
         for device in &bench.devices {
             let Some(kind) = &device.kind else { continue };
             let Some(known) = self.catalogue.find_device(&kind.value) else {
@@ -166,36 +178,18 @@ impl Opener<'_> {
     }
 
     fn role(&mut self, bench: &BenchDocument, key: &Key, kind: &Spanned<String>) -> Option<BoundRole> {
-        let Some(word) = bench.bind.get(&key.name) else {
+        let Some(binding) = bench.bind.get(&key.name) else {
             if !bench.invalid.iter().any(|role| role.name == key.name) {
                 let unbound = self.unbound(bench, key, &kind.value);
                 self.diagnostics.push(unbound);
             }
             return None;
         };
-        let device = self.device(bench, word)?;
-        let description = &self.opened.devices[device].description;
-        let is_free = |i: &usize| !self.taken.contains_key(&(device, *i));
-        let mut fitting =
-            (0..description.fills.len()).filter(|i| self.can_fill(&description.fills[*i].role, &kind.value));
-        let Some(fills) = fitting.clone().find(is_free) else {
-            let by = fitting.next().and_then(|i| self.taken.get(&(device, i)));
-            let roles = quoted(description.roles());
-            let (device, role) = (&word.value, &key.name);
-            let (message, help) = match by {
-                Some(by) => (
-                    format!("device `{device}` already fills the role `{by}`"),
-                    "bind each role to its own device".into(),
-                ),
-                None => (
-                    format!("device `{device}` cannot fill the role `{role}` of type `{}`", kind.value),
-                    format!("it can fill: {roles}"),
-                ),
-            };
-            self.diagnostics.push(Diagnostic::new(Code::WrongRole, word.span.clone(), message).help(help));
-            return None;
-        };
+        let device = self.device(bench, &binding.device_word())?;
+        let fills = self.fill(device, binding, key, kind).map_err(|diagnostic| self.diagnostics.push(diagnostic));
+        let fills = fills.ok()?;
         self.taken.insert((device, fills), key.name.clone());
+        let description = &self.opened.devices[device].description;
         let role = self.catalogue.role_type(&kind.value)?;
         let number = |stated: &[StatedPort], declared: &[PortSpec]| {
             let port = |spec: &PortSpec| stated.iter().position(|port| port.fill == fills && port.name == spec.name);
@@ -211,11 +205,34 @@ impl Opener<'_> {
         let facts = stated.cloned().chain(own.iter().cloned()).collect();
         Some(BoundRole {
             device,
+            fills,
             outputs: number(&description.outputs, &role.outputs),
             commands: number(&description.commands, &role.commands),
             reports: number(&description.reports, &role.reports),
             facts,
         })
+    }
+
+    /// Returns the index of the role of an opened device that a binding means.
+    fn fill(&self, device: usize, binding: &Binding, key: &Key, kind: &Spanned<String>) -> Result<usize, Diagnostic> {
+        let description = &self.opened.devices[device].description;
+        let fills = 0..description.fills.len();
+        let fit: Vec<usize> = fills.filter(|i| self.can_fill(&description.fills[*i].role, &kind.value)).collect();
+        let wrong = |message: String| Diagnostic::new(Code::WrongRole, binding.word.span.clone(), message);
+        let (word, role) = (&binding.word.value, &key.name);
+        if fit.is_empty() {
+            let message =
+                format!("device `{}` cannot fill the role `{role}` of type `{}`", binding.device(), kind.value);
+            return Err(wrong(message).help(format!("it can fill: {}", quoted(description.roles()))));
+        }
+        let fills = sides::choose(description, &fit, binding, role)?;
+        match self.taken.get(&(device, fills)) {
+            Some(by) => {
+                let message = format!("device `{word}` already fills the role `{by}`");
+                Err(wrong(message).help("bind each role to its own device"))
+            }
+            None => Ok(fills),
+        }
     }
 
     /// Reports that no device is bound to a role: a binding has a similar name or is the only one left over, or there is
@@ -226,7 +243,7 @@ impl Opener<'_> {
         let only = strange.first().filter(|_| strange.len() == 1 && self.unbound.len() == 1);
         let only = only.filter(|key| {
             let device = bench.bind.iter().find(|(other, _)| other.name == key.name);
-            let device = device.and_then(|(_, word)| self.device(bench, word));
+            let device = device.and_then(|(_, binding)| self.device(bench, &binding.device_word()));
             device.is_some_and(|device| {
                 self.opened.devices[device].description.roles().any(|role| self.can_fill(role, kind))
             })
@@ -268,7 +285,8 @@ impl Opener<'_> {
         self.catalogue.role_type(kind).is_some_and(|role| role.is_filled_by(filled))
     }
 
-    /// Returns the device that can fill a role: one with its name, or the first that has a place for such a role.
+    /// Returns the binding of a role to a device that can fill it: to one with the name of the role, or to the first that
+    /// has a place for such a role.
     fn device_for(&mut self, bench: &BenchDocument, role: &str, kind: &str) -> Option<String> {
         let names: Vec<Spanned<String>> = bench
             .devices
@@ -278,11 +296,20 @@ impl Opener<'_> {
         let mut fitting = Vec::new();
         for word in names {
             let Some(device) = self.device(bench, &word) else { continue };
-            let fills =
-                self.opened.devices[device].description.roles().filter(|role| self.can_fill(role, kind)).count();
-            let is_taken = |name: &Key| self.kinds.get(&name.name).is_some_and(|taken| taken == kind);
-            let taken = bench.bind.iter().filter(|(name, device)| device.value == word.value && is_taken(name)).count();
-            fitting.extend((fills > taken).then_some(word.value));
+            let is_of_kind = |name: &Key| self.kinds.get(&name.name).is_some_and(|taken| taken == kind);
+            let taken: BTreeSet<&str> = bench
+                .bind
+                .iter()
+                .filter(|(name, _)| is_of_kind(name))
+                .map(|(_, binding)| &*binding.word.value)
+                .collect();
+            let fills = self.opened.devices[device].description.fills.iter();
+            let fit = fills.filter(|fill| self.can_fill(&fill.role, kind)).map(|fill| fill.side.as_deref());
+            let free: Vec<Option<&str>> =
+                fit.filter(|side| !taken.contains(&*binding_to(&word.value, *side))).collect();
+            let named = sides::named_in(role, free.iter().copied().flatten());
+            let side = named.map(Some).or_else(|| free.first().copied());
+            fitting.extend(side.map(|side| binding_to(&word.value, side)));
         }
         fitting
             .iter()
@@ -340,9 +367,16 @@ impl Opener<'_> {
     /// Reports where the ports of a device differ from those of its roles, and adds the reports that it does not read.
     fn check_ports(&mut self, description: &mut Description, block: &Block) -> bool {
         let before = self.diagnostics.len();
+        let wrong = |message: String| {
+            let kind = block.kind.as_ref().map_or("", |kind| &kind.value);
+            let help = format!("the mistake is in the device type `{kind}`, not in this file");
+            Diagnostic::new(Code::WrongRole, block.key.span.clone(), message).help(help)
+        };
+        let device = &block.key.name;
+        let indistinct = sides::indistinct(description);
+        self.diagnostics.extend(indistinct.map(|what| wrong(format!("device `{device}` {what}"))));
         for fill in 0..description.fills.len() {
             let name = description.fills[fill].role.clone();
-            let device = &block.key.name;
             let message = match self.catalogue.role_type(&name) {
                 Some(role) => {
                     let misfits = description.misfits(fill, role);
@@ -358,12 +392,15 @@ impl Opener<'_> {
                     format!("device `{device}` states the role type `{name}`, which does not exist ({help})")
                 }
             };
-            let kind = block.kind.as_ref().map_or("", |kind| &kind.value);
-            let help = format!("the mistake is in the device type `{kind}`, not in this file");
-            self.diagnostics.push(Diagnostic::new(Code::WrongRole, block.key.span.clone(), message).help(help));
+            self.diagnostics.push(wrong(message));
         }
         self.diagnostics.len() == before
     }
+}
+
+/// Returns the text that binds a role to a device, or to a side of it.
+fn binding_to(device: &str, side: Option<&str>) -> String {
+    side.map_or_else(|| device.to_owned(), |side| format!("{device}.{side}"))
 }
 
 fn unknown_device(word: &Spanned<String>, bench: &BenchDocument) -> Diagnostic {

@@ -151,7 +151,7 @@ impl Builder<'_> {
         });
         // The age of a sample for scenarios and recordings does not matter.
         let ageless = AgeLimit { max_age: i64::MAX, stale: Policy::Count };
-        let observed = self.net.observed.iter().zip(&self.opened.observed).filter_map(|((key, _, role), bound)| {
+        let observed = self.net.observed.iter().zip(&self.opened.observed).filter_map(|((key, role), bound)| {
             let bound = bound.as_ref()?;
             let port = |(spec, (_, shape)): (&PortSpec, &(usize, Shape))| PlannedPort {
                 name: format!("{}.{}", key.name, spec.name),

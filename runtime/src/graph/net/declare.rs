@@ -101,12 +101,12 @@ fn observed_roles<'a>(
     flat: &'a FlatGraph,
     catalogue: &'a Catalogue,
     diagnostics: &mut Diagnostics,
-) -> Vec<(&'a Key, &'a Spanned<String>, &'a RoleType)> {
+) -> Vec<(&'a Key, &'a RoleType)> {
     let bound = flat.bench.iter().flat_map(|bench| bench.bind.iter());
     let undeclared = bound.filter(|(key, _)| flat.roles.position(&key.name).is_none());
-    let all = undeclared.filter_map(|(key, device)| {
+    let all = undeclared.filter_map(|(key, _)| {
         let role = catalogue.roles().iter().find(|role| role.is_observed_as(&key.name))?;
-        Some((key, device, role))
+        Some((key, role))
     });
     let mut all: Vec<_> = all.collect();
     all.retain(|(key, ..)| {

@@ -72,12 +72,13 @@ impl<'a> Net<'a> {
     /// Returns whether the limits of a section hold for an arm.
     fn holds(&self, section: &LimitSection, arm: usize) -> bool {
         let name = self.name(Producer::Role(arm));
-        let device = |role: &str| self.flat.bench.as_ref()?.bind.get(role).map(|device| &device.value);
+        let binding = |role: &str| self.flat.bench.as_ref()?.bind.get(role);
+        let word = |role: &str| binding(role).map(|binding| &binding.word.value);
         match (&section.owner, &section.role) {
-            (LimitOwner::Robot(robot), _) => device(name) == Some(robot),
+            (LimitOwner::Robot(robot), _) => binding(name).is_some_and(|binding| binding.device() == robot),
             // A task may call an arm of the bench by another name.
             (LimitOwner::Bench, Some(role)) if self.flat.roles.position(&role.name).is_none() => {
-                device(name).is_some_and(|own| device(&role.name) == Some(own))
+                word(name).is_some_and(|own| word(&role.name) == Some(own))
             }
             (LimitOwner::Task, _) if section.task > 0 && !self.flat.tasks[section.task].roles.contains(&arm) => false,
             (_, role) => role.as_ref().is_none_or(|role| role.name == name),

@@ -21,7 +21,7 @@ use crate::device::RoleType;
 use crate::graph::load::{FlatGraph, Task};
 use crate::graph::plan::{PortRef, Producer};
 use crate::graph::syntax::NO_ARM;
-use crate::node::{NodeSpec, PortSpec, Spanned, frame_args};
+use crate::node::{NodeSpec, PortSpec, frame_args};
 use crate::source::{Code, Diagnostic, Diagnostics, Key, Value};
 
 use provenance::Provenance;
@@ -45,8 +45,8 @@ pub(crate) struct Net<'a> {
     pub(crate) roles: Vec<Option<&'a RoleType>>,
     /// Index of each node's type in the catalogue, and its declaration; `None` if it is unknown.
     pub(crate) nodes: Vec<Option<(usize, &'a NodeSpec)>>,
-    /// Roles that the bench binds for scenarios and recordings only: name, device and type.
-    pub(crate) observed: Vec<(&'a Key, &'a Spanned<String>, &'a RoleType)>,
+    /// Roles that the bench binds for scenarios and recordings only: name and type.
+    pub(crate) observed: Vec<(&'a Key, &'a RoleType)>,
     /// The resolved wires of each node.
     pub(crate) wires: Vec<Vec<Wire>>,
     /// The resolved wires of commands and reports.

@@ -111,7 +111,7 @@ fn could_be(section: &str, value: &Value) -> bool {
         "parts" => each(&has(&["file"])),
         "modes" => each(&has(&["go", "on_lost", "done", "fail", "set"])),
         "roles" => each(&|value| is_word(value) || value.as_table().is_some_and(is_role)),
-        "bind" => each(&is_word),
+        "bind" => each(&|value| is_word(value) || is_port(value)) && !each(&is_port),
         "commands" => {
             each(&|value| value.as_table().is_some_and(|table| table.entries.iter().all(|(_, v)| is_port(v))))
         }

@@ -1,6 +1,7 @@
 //! The sections of a graph file, a part and a bench, before names are resolved.
 
 mod allow;
+mod binding;
 mod correct;
 mod limits;
 mod modes;
@@ -13,6 +14,7 @@ mod roles;
 mod sections;
 
 pub(crate) use allow::Allowance;
+pub(crate) use binding::Binding;
 pub(crate) use limits::{LimitOwner, LimitSection};
 pub(crate) use modes::{ExitKind, ExitTable, ModeBlock, ModeExit, PortState};
 pub(crate) use names::Use;

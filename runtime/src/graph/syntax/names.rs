@@ -6,6 +6,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 
+use super::binding::Binding;
 use super::reserved::{INPUTS, LIMITS, MODES, is_name};
 use super::sections::{BenchDocument, GraphDocument};
 use crate::node::Spanned;
@@ -116,12 +117,7 @@ impl GraphDocument {
     /// Corrects the names of roles, nodes, parts and modes. Only a role can have a name that the bench `binds`.
     ///
     /// `set` are the names of nodes and parts that the graph around a part sets.
-    pub(crate) fn correct_names(
-        &mut self,
-        binds: &Named<Spanned<String>>,
-        set: &[&Key],
-        sources: &SourceMap,
-    ) -> Diagnostics {
+    pub(crate) fn correct_names(&mut self, binds: &Named<Binding>, set: &[&Key], sources: &SourceMap) -> Diagnostics {
         let uses = self.uses().into_iter().filter(|reference| ![INPUTS, MODES].contains(&&*reference.name));
         let uses: Vec<Use> = uses.chain(set.iter().map(|key| Use::of_key(key))).collect();
         let roles = self.roles.len();
@@ -165,7 +161,7 @@ impl GraphDocument {
 impl BenchDocument {
     /// Corrects the names of devices.
     pub(crate) fn correct_names(&mut self, sources: &SourceMap) -> Diagnostics {
-        let uses: Vec<Use> = self.bind.iter().map(|(_, word)| Use::of(word)).collect();
+        let uses: Vec<Use> = self.bind.iter().map(|(_, binding)| Use::of(&binding.word)).collect();
         let devices = self.devices.iter_mut().map(|device| &mut device.key);
         correct(Code::UnknownDevice, devices, &uses, &|_, _| true, false, sources)
     }

@@ -4,6 +4,7 @@ use std::collections::BTreeSet;
 use std::ops::Range;
 
 use super::allow::{Allowance, read_allow};
+use super::binding::Binding;
 use super::correct::{
     correct_block, correct_facts, correct_keys, correct_part_file, correct_robot, correct_sections, correct_wires,
     separate_wires,
@@ -156,7 +157,7 @@ pub(crate) struct GraphDocument {
 #[derive(Debug, Clone, Default)]
 pub(crate) struct BenchDocument {
     pub(crate) devices: Vec<Block>,
-    pub(crate) bind: Named<Spanned<String>>,
+    pub(crate) bind: Named<Binding>,
     /// The place of the name of the section [bind].
     pub(crate) place: Option<Range<usize>>,
     /// Roles whose binding is not a string, which has its own diagnostic.
@@ -274,7 +275,7 @@ impl<'a> Sections<'a> {
         let entries = section.and_then(|(_, value)| value.as_table()).into_iter().flat_map(|table| &table.entries);
         let invalid = entries.filter(is_invalid).map(|(key, _)| key.clone()).collect();
         let allow_uncalibrated = root.get(ALLOW_UNCALIBRATED).and_then(|value| bool::read(value, &mut self.reader));
-        let (bind, facts) = (self.words(root.get("bind")), self.named_tables(root.get("facts")));
+        let (bind, facts) = (self.bindings(root.get("bind")), self.named_tables(root.get("facts")));
         for (key, _) in facts.iter().filter(|(key, _)| bind.position(&key.name).is_none()) {
             let unknown = Diagnostic::unknown(Code::UnboundRole, "role", &key.name, &key.span, bind.names());
             self.diagnostics.push(unknown);
@@ -399,6 +400,12 @@ impl<'a> Sections<'a> {
         let table = self.table(value);
         let read = |(key, value): (Key, Value)| Some((key, Spanned::read(&value, &mut self.reader)?));
         table.entries.into_iter().filter_map(read).collect()
+    }
+
+    /// Reads the section [bind].
+    fn bindings(&mut self, value: Option<&Value>) -> Named<Binding> {
+        let words = self.words(value);
+        words.iter().map(|(key, word)| (key.clone(), Binding { word: word.clone() })).collect()
     }
 
     /// Reads a table whose values are wires, each a port or a table with an age limit.
