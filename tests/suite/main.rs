@@ -35,6 +35,7 @@ mod mutations;
 mod observed;
 mod operator;
 mod oracles;
+mod output;
 mod pads;
 mod pair;
 mod paths;

@@ -12,4 +12,4 @@ pub use output::{OutputFile, write_whole};
 #[cfg(feature = "cli")]
 pub use points::{PointPorts, PointRecorder, PointsRequest};
 pub use recorder::{Recorded, Recorder};
-pub use writer::RecordFormat;
+pub use writer::{RecordFormat, RowFormat};

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 
 use super::PortColumns;
 use super::output::{OutputFile, write_whole};
+use super::writer::seconds;
 use crate::engine::Engine;
 use crate::graph::{Compiled, PlannedPort};
 use crate::node::PortId;
@@ -138,7 +139,15 @@ impl PointRecorder {
         }
         let pose = bus.slot::<Pose>(self.pose).0;
         let (at, z) = (pose.translation.vector, pose.rotation.matrix().column(2).into_owned());
-        self.values.extend([at.x, at.y, at.z, -z.x, -z.y, -z.z, engine.now() as f64 * 1e-9]);
+        self.values.extend([
+            at.x,
+            at.y,
+            at.z,
+            -z.x,
+            -z.y,
+            -z.z,
+            seconds(engine.began().map_or(engine.now(), |began| began.time)),
+        ]);
         let from = self.values.len();
         self.values.resize(from + self.extra.list.len(), f64::NAN);
         self.extra.read(bus, &mut self.values[from..]);

@@ -9,8 +9,8 @@ use std::time::{Duration, Instant};
 use rtrb::{Consumer, Producer, RingBuffer};
 
 use super::output::{OutputFile, WriteError, Writing, not_read};
-use super::{PortColumn, PortColumns, RecordFormat};
-use crate::engine::{Engine, TaskRun};
+use super::{PortColumn, PortColumns, RowFormat};
+use crate::engine::{Beginning, Engine, TaskRun};
 use crate::signal::Unit;
 
 /// Capacity of the ring buffer [rows].
@@ -26,8 +26,8 @@ const CHUNK_BYTES: usize = 1 << 16;
 pub struct Recorder {
     columns: PortColumns,
     row: Vec<f64>,
-    /// Number of columns that belong to no port.
-    own: usize,
+    /// Number of columns for the time, and of those for the tasks.
+    own: [usize; 2],
     ring: Producer<f64>,
     writing: Writing<io::Result<()>>,
     /// Number of rows that were recorded, whether they are written or not.
@@ -52,7 +52,7 @@ impl Recorder {
     ///
     /// # Errors
     /// If the file cannot be created.
-    pub fn create(path: &Path, format: RecordFormat, engine: &Engine) -> io::Result<Self> {
+    pub fn create(path: &Path, format: RowFormat, engine: &Engine) -> io::Result<Self> {
         Self::start(OutputFile::create(path)?, format, engine)
     }
 
@@ -60,11 +60,12 @@ impl Recorder {
     ///
     /// # Errors
     /// If the thread cannot be started.
-    pub fn start(file: OutputFile, format: RecordFormat, engine: &Engine) -> io::Result<Self> {
+    pub fn start(file: OutputFile, format: RowFormat, engine: &Engine) -> io::Result<Self> {
         let columns = PortColumns::new(engine.ports());
-        let own = own_columns(engine);
-        let list: Vec<PortColumn> = own.iter().chain(&columns.list).cloned().collect();
-        let (row, own) = (vec![0.0; list.len() + 1], own.len());
+        let tasks = task_columns(engine);
+        let list: Vec<PortColumn> = tasks.iter().chain(&columns.list).cloned().collect();
+        let own = [format.times(), tasks.len()];
+        let row = vec![0.0; own[0] + list.len()];
         let (ring, drain) = RingBuffer::new(row.len() * RING_ROWS);
         let written = Arc::new(AtomicU64::new(0));
         let rows = written.clone();
@@ -76,10 +77,14 @@ impl Recorder {
     /// Records the last tick. While the ring is full, waits as long as `may_wait` returns true; then the row is lost.
     pub fn record(&mut self, engine: &Engine, may_wait: impl Fn() -> bool) {
         self.recorded += 1;
-        // The ring holds floats. Storing the bits keeps the time in nanoseconds exact; its value would be rounded.
-        self.row[0] = f64::from_bits(engine.now() as u64);
-        let (own, ports) = self.row[1..].split_at_mut(self.own);
-        for (cells, task) in own.chunks_exact_mut(2).zip(with_modes(engine)) {
+        let began = engine.began().unwrap_or(Beginning { time: engine.now(), wall: 0 });
+        let (times, row) = self.row.split_at_mut(self.own[0]);
+        for (cell, time) in times.iter_mut().zip([began.time, began.wall]) {
+            // The ring holds floats. Storing the bits keeps the time in nanoseconds exact; its value would be rounded.
+            *cell = f64::from_bits(time as u64);
+        }
+        let (tasks, ports) = row.split_at_mut(self.own[1]);
+        for (cells, task) in tasks.chunks_exact_mut(2).zip(with_modes(engine)) {
             cells[0] = task.mode_number().map_or(f64::NAN, |mode| mode as f64);
             // The graph itself ends with the run.
             let is_over = task.end().is_some() && !task.name().is_empty();
@@ -131,10 +136,10 @@ impl Recorded {
     }
 }
 
-/// Returns the columns that belong to no port. A task with modes has two: the number of the next tick's mode, from 0 in
+/// Returns the columns of the tasks. A task with modes has two: the number of the next tick's mode, from 0 in
 /// the order of the file, and whether its commands are halted,
 /// which they also are once it has ended. Those of a part have its name before theirs.
-fn own_columns(engine: &Engine) -> Vec<PortColumn> {
+fn task_columns(engine: &Engine) -> Vec<PortColumn> {
     let column = |name: String| PortColumn { name, part: String::new(), unit: Unit::ONE };
     let names = |task: &TaskRun| match task.name() {
         "" => ["mode".to_owned(), "halted".to_owned()],
@@ -151,7 +156,7 @@ fn with_modes(engine: &Engine) -> impl Iterator<Item = &TaskRun> {
 /// Formats and writes the rows, on a thread of its own.
 struct RowWriter<'w> {
     file: &'w mut OutputFile,
-    format: RecordFormat,
+    format: RowFormat,
     columns: &'w [PortColumn],
     /// Number of rows in the file.
     rows: &'w AtomicU64,
@@ -160,7 +165,7 @@ struct RowWriter<'w> {
 impl RowWriter<'_> {
     /// Writes rows until the other end of the ring is gone.
     fn run(mut self, mut ring: Consumer<f64>) -> io::Result<()> {
-        let (mut text, mut count, mut row) = (Vec::new(), 0, vec![0.0; self.columns.len() + 1]);
+        let (mut text, mut count, mut row) = (Vec::new(), 0, vec![0.0; self.format.times() + self.columns.len()]);
         self.format.header(self.columns, &mut text)?;
         self.file.write_lines(&text).map_err(|failed| failed.error)?;
         text.clear();
@@ -172,7 +177,7 @@ impl RowWriter<'_> {
                 for (cell, value) in row.iter_mut().zip(chunk) {
                     *cell = value;
                 }
-                self.format.row(self.columns, row[0].to_bits() as i64, &row[1..], &mut text)?;
+                self.format.row(self.columns, &row, &mut text)?;
                 count += 1;
                 if text.len() >= CHUNK_BYTES {
                     self.flush(&mut text, &mut count)?;

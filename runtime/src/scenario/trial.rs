@@ -64,7 +64,7 @@ impl Scenario {
                 return failed(0.0, first.unwrap_or_default());
             }
         };
-        let recorder = record.map(|path| Recorder::create(path, RecordFormat::Csv, &engine)).transpose();
+        let recorder = record.map(|path| Recorder::create(path, RecordFormat::Csv.rows(false), &engine)).transpose();
         let mut recorder = match recorder {
             Ok(recorder) => recorder,
             Err(error) => return failed(0.0, format!("the recording cannot be created: {error}")),

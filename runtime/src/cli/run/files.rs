@@ -51,10 +51,11 @@ impl<'j> OutputFiles<'j> {
         job: &'j Job,
         chosen: Option<&PointPorts>,
         engine: &Engine,
+        is_real: bool,
         shell: &Shell,
     ) -> Result<Self, String> {
         let JobOptions { out, points: wanted, svg, .. } = &job.options;
-        let rows = out.as_deref().map(|path| recorder(path, engine, shell)).transpose()?;
+        let rows = out.as_deref().map(|path| recorder(path, engine, is_real, shell)).transpose()?;
         let points = wanted.as_ref().zip(chosen).map(|(wanted, chosen)| {
             let file = open(&wanted.path, &[PointRecorder::FILE_START], "a file of points", shell)?;
             Ok::<_, String>(PointRecorder::new(file, chosen, engine))
@@ -99,6 +100,7 @@ impl<'j> OutputFiles<'j> {
         }
         let mut report = |path: &Path, result: io::Result<String>| match result {
             Ok(details) => say_wrote(job, shell, path, &details),
+            Err(error) if is_stdout(path) && error.kind() == io::ErrorKind::BrokenPipe => {}
             Err(error) => {
                 shell.error(format_args!("cannot write `{}`: {error}", path.display()));
                 code = FAULTED;
@@ -143,13 +145,13 @@ fn say_wrote(job: &Job, shell: &Shell, path: &Path, details: &str) {
     }
 }
 
-fn recorder(path: &Path, engine: &Engine, shell: &Shell) -> Result<Recorder, String> {
+fn recorder(path: &Path, engine: &Engine, is_real: bool, shell: &Shell) -> Result<Recorder, String> {
     let format = RecordFormat::of(path).or_else(|| is_special(path).then_some(RecordFormat::Csv));
     let format = format.ok_or_else(|| {
         format!("`{}` does not end in .csv or .ndjson: write for example `--out run.csv`", path.display())
     })?;
     let file = open(path, &RecordFormat::FILE_STARTS, "a recording of a run", shell)?;
-    Recorder::start(file, format, engine).map_err(|error| format!("cannot record: {error}"))
+    Recorder::start(file, format.rows(is_real), engine).map_err(|error| format!("cannot record: {error}"))
 }
 
 fn still(path: &Path, title: &str, engine: &Engine, shell: &Shell) -> Result<Still, String> {

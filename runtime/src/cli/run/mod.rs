@@ -3,6 +3,7 @@
 mod events;
 mod files;
 mod held;
+mod lateness;
 pub(super) mod log;
 mod ports;
 mod progress;
@@ -151,7 +152,7 @@ impl Job {
         let start = warnings.find(|warning| warning.code == Code::StartOutside).map(|warning| warning.message);
         let mut engine = Engine::new(plan);
         self.check_words(&engine)?;
-        let mut files = OutputFiles::create(self, chosen.as_ref(), &engine, shell)?;
+        let mut files = OutputFiles::create(self, chosen.as_ref(), &engine, is_real, shell)?;
         let patience = patience(is_real)?;
         shell.set_patience(&patience);
         let period = milliseconds(seconds(engine.period()));

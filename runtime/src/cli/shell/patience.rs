@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 use crate::engine::Interrupt;
 
 /// Time in which a reader must read something at the end of a run in real time.
-const MAX_IDLE: Duration = Duration::from_secs(5);
+const MAX_IDLE: Duration = Duration::from_secs(3);
 /// Time of waiting after which Ctrl-C is listened to again; before, nobody notices that the tool waits.
 const SHORT: Duration = Duration::from_millis(50);
 

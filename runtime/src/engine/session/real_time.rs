@@ -97,6 +97,9 @@ impl Pacer for RealTimePacer<'_> {
                 tracing::warn!("{message}");
             }
         }
+        if self.is_real {
+            engine.begin_measured(next + late, next);
+        }
         if late > engine.period() {
             engine.begin_late(late);
         }
