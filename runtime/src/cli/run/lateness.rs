@@ -56,7 +56,8 @@ mod tests {
 
     #[test]
     fn the_histogram_has_the_bins_with_ticks_and_the_latest_tick_has_a_reason() {
-        let mut punctuality = Punctuality { counts: [480, 0, 15, 4, 0, 1], ..Punctuality::default() };
+        let mut punctuality = Punctuality::default();
+        punctuality.counts = [480, 0, 15, 4, 0, 1];
         let table = "ticks began late by  ticks    part\n\
                      less than 0.1 ms       480  96.0 %\n\
                      0.3 to 1 ms             15   3.0 %\n\

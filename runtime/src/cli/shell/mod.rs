@@ -22,6 +22,9 @@ use crate::catalogue::Catalogue;
 use crate::cli::text::number::count_of;
 use crate::source::{Report, suggest_name};
 
+/// Interval at which the end of a write is awaited.
+const POLL_INTERVAL: Duration = Duration::from_micros(200);
+
 /// Exit code of a run that ended in a fault, and of a scenario that failed.
 pub const FAULTED: u8 = 1;
 /// Exit code of a file that does not load, and of an invalid command line.
@@ -37,13 +40,16 @@ pub struct Shell {
     patience: Mutex<Patience>,
     /// Whether standard output is a file of the run, so that all texts go to standard error.
     is_out_taken: AtomicBool,
+    /// Whether a reader did not read for a while, so that nothing waits for the order of lines any more.
+    is_stuck: AtomicBool,
 }
 
 impl Shell {
     /// Creates a shell that writes errors and warnings to `err`.
     pub(crate) fn new(catalogue: Catalogue, colour: Colour, arguments: clap::Command, err: OutStream) -> Self {
-        let (out, patience, is_out_taken) = (OutStream::new(standard_output()), Mutex::default(), false.into());
-        Self { catalogue, colour, arguments, out, err, patience, is_out_taken }
+        let (out, patience) = (OutStream::new(standard_output()), Mutex::default());
+        let [is_out_taken, is_stuck] = [false; 2].map(AtomicBool::new);
+        Self { catalogue, colour, arguments, out, err, patience, is_out_taken, is_stuck }
     }
 
     /// Returns the arguments of the tool, including those of all commands.
@@ -74,7 +80,8 @@ impl Shell {
     /// It returns before the line is written. A reader that closes the pipe early, such as `head`, is no error. Any
     /// other failure is reported at the end, once.
     pub fn say(&self, text: &str) {
-        let stream = if self.is_out_taken() { &self.err } else { &self.out };
+        let (stream, other) = if self.is_out_taken() { (&self.err, &self.out) } else { (&self.out, &self.err) };
+        self.come_after(other);
         stream.print(format!("{text}\n"));
     }
 
@@ -85,7 +92,7 @@ impl Shell {
 
     /// Prints the diagnostics of a graph to standard error.
     pub fn show(&self, report: &Report) {
-        self.err.print(report.render(self.has_colour_on_stderr()));
+        self.print_beside(report.render(self.has_colour_on_stderr()));
     }
 
     /// Prints the diagnostics of a graph that does not load, and returns the exit code.
@@ -96,7 +103,7 @@ impl Shell {
 
     /// Prints an error to standard error.
     pub fn error(&self, message: impl Display) {
-        self.err.print(format!("error: {message}\n"));
+        self.print_beside(format!("error: {message}\n"));
     }
 
     /// Prints an error to standard error and returns the exit code of an invalid command line.
@@ -107,12 +114,17 @@ impl Shell {
 
     /// Prints a warning to standard error.
     pub fn warning(&self, message: impl Display) {
-        self.err.print(format!("warning: {message}\n"));
+        self.print_beside(format!("warning: {message}\n"));
     }
 
     /// Prints a line to standard error that is neither an error nor a warning.
     pub(crate) fn say_beside(&self, text: &str) {
-        self.err.print(format!("{text}\n"));
+        self.print_beside(format!("{text}\n"));
+    }
+
+    fn print_beside(&self, text: String) {
+        self.come_after(&self.out);
+        self.err.print(text);
     }
 
     /// Draws a text on standard error in the place of the last drawing, if it is a terminal.
@@ -149,6 +161,19 @@ impl Shell {
         }
     }
 
+    /// Waits for a moment until the lines before are written, so that both streams keep their order on a terminal.
+    fn come_after(&self, other: &OutStream) {
+        let is_stuck = self.is_stuck.load(Ordering::Relaxed);
+        let mut waiting = self.patience().begin_short();
+        while !is_stuck && !other.is_idle() {
+            if !waiting.goes_on(other.progress()) {
+                self.is_stuck.store(true, Ordering::Relaxed);
+                return;
+            }
+            std::thread::sleep(POLL_INTERVAL);
+        }
+    }
+
     /// Writes what is left of the output, says what was lost, and returns the exit code.
     pub(crate) fn finish(&self, code: u8) -> u8 {
         self.settle();
@@ -174,7 +199,6 @@ impl Shell {
 
     /// Waits until the output is written, or until its readers are given up.
     fn settle(&self) {
-        const POLL_INTERVAL: Duration = Duration::from_micros(200);
         let mut waiting = self.patience().begin();
         while !(self.out.is_idle() && self.err.is_idle()) {
             if !waiting.goes_on(self.out.progress() + self.err.progress()) {

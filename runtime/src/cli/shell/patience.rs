@@ -7,6 +7,8 @@ use crate::engine::Interrupt;
 
 /// Time in which a reader must read something at the end of a run in real time.
 const MAX_IDLE: Duration = Duration::from_secs(3);
+/// The same for the order of lines on two streams.
+const MAX_ORDER_IDLE: Duration = Duration::from_millis(250);
 /// Time of waiting after which Ctrl-C is listened to again; before, nobody notices that the tool waits.
 const SHORT: Duration = Duration::from_millis(50);
 
@@ -34,20 +36,30 @@ impl Patience {
 
     /// Begins to wait for the rest, when the run is over and nothing moves any more.
     pub(crate) fn begin(&self) -> Waiting {
+        self.waiting(MAX_IDLE)
+    }
+
+    /// Begins to wait for the other stream, so that the lines of both keep their order on a terminal.
+    pub(crate) fn begin_short(&self) -> Waiting {
+        self.waiting(MAX_ORDER_IDLE)
+    }
+
+    fn waiting(&self, max_idle: Duration) -> Waiting {
         // Ctrl-C has ended the run already, so it does not end this as well.
         let is_limited = !self.may_wait();
         let interrupt = match self {
             Self::Interruptible(interrupt) if !is_limited => Some(interrupt.clone()),
             _ => None,
         };
-        Waiting { is_limited, interrupt, since: Instant::now(), progress: 0 }
+        Waiting { is_limited, max_idle, interrupt, since: Instant::now(), progress: 0 }
     }
 }
 
 /// Waits for a reader while it reads.
 pub(crate) struct Waiting {
-    /// Whether a reader that reads nothing is given up after [`MAX_IDLE`].
+    /// Whether a reader that reads nothing is given up after `max_idle`.
     is_limited: bool,
+    max_idle: Duration,
     interrupt: Option<Arc<Interrupt>>,
     /// Time of the last progress.
     since: Instant,
@@ -66,6 +78,7 @@ impl Waiting {
             self.interrupt = Interrupt::catch().ok().map(Arc::new);
         }
         let is_interrupted = self.interrupt.as_ref().is_some_and(|interrupt| interrupt.is_requested());
-        !is_interrupted && !(self.is_limited && idle > MAX_IDLE)
+        let is_over = self.is_limited && idle > self.max_idle;
+        !is_interrupted && !is_over
     }
 }

@@ -7,6 +7,7 @@ mod cycle;
 mod drive;
 mod engine;
 mod halt;
+mod measure;
 mod operator;
 mod outcome;
 mod punctuality;
