@@ -195,10 +195,10 @@ fn recordings_are_as_shown() {
         let plan = compile(&catalogue(), &Request::file(folder.join("push.toml")));
         let mut engine = Engine::new(plan.unwrap_or_else(|report| panic!("{}", report.render(false))));
         let path = folder.join(name);
-        let mut recorder = Recorder::create(&path, format, &engine, true).unwrap();
+        let mut recorder = Recorder::create(&path, format.rows(false), &engine).unwrap();
         let options = RunOptions { duration: Some(0.04), is_realtime: false, ..RunOptions::default() };
-        engine::run(&mut engine, &options, &mut |engine| recorder.record(engine)).unwrap();
-        recorder.finish().unwrap();
+        engine::run(&mut engine, &options, &mut |engine| recorder.record(engine, || true)).unwrap();
+        assert_eq!(recorder.finish(|_| true).rows, 3);
         assert_eq!([fs::read_to_string(path).unwrap()], *blocks(&page, fence));
     }
 }

@@ -37,6 +37,7 @@ mod mutations;
 mod observed;
 mod operator;
 mod oracles;
+mod output;
 mod pads;
 mod pair;
 mod paths;

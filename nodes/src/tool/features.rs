@@ -68,6 +68,10 @@ pub(super) struct FeaturesArgs {
 const DEFAULT_THRESHOLD: f64 = 0.05;
 
 pub(super) fn features(args: FeaturesArgs, shell: &Shell) -> u8 {
+    let options = JobOptions { duration: args.duration, out: args.out.clone(), ..JobOptions::default() };
+    if let Err(message) = options.reserve_output(shell) {
+        return shell.refuse(message);
+    }
     let text = match args.read() {
         Some(recording) => {
             let (threshold, origin) = args.threshold(&recording);
@@ -86,7 +90,6 @@ pub(super) fn features(args: FeaturesArgs, shell: &Shell) -> u8 {
     let set = args.settings().iter().map(|setting| format!("devices.recording.{setting}")).collect();
     let request = Request { set, ..Request::text(text) };
     let title = format!("features of {}", args.recording.display());
-    let options = JobOptions { duration: args.duration, out: args.out, ..JobOptions::default() };
     Job { request, title, options, print: Print::Ports }.run(shell)
 }
 

@@ -24,6 +24,7 @@ mod text;
 mod verify;
 mod view;
 
+use std::io;
 use std::process::ExitCode;
 
 use clap::{CommandFactory, FromArgMatches, Parser};
@@ -33,7 +34,9 @@ use crate::catalogue::Catalogue;
 
 use reference::{describe, list};
 
-use shell::Colour;
+use shell::signals::block_io_signals;
+use shell::stream::OutStream;
+use shell::{Colour, standard_error};
 
 /// The parser of arguments, for the commands of other crates.
 pub use clap;
@@ -49,8 +52,8 @@ pub use text::svg;
 #[command(name = "tactflow", version, max_term_width = 100)]
 #[command(subcommand_required = true, arg_required_else_help = true)]
 #[command(
-    after_help = "Exit codes: 0 success; 1 a run ended in a fault, or a scenario failed; 2 a file does not load, or the command \
-                       line is invalid."
+    after_help = "Exit codes: 0 success; 1 a run ended in a fault, a scenario failed, or output was lost; 2 a file does not load, or the \
+                       command line is invalid."
 )]
 struct Cli {
     /// When to use colours; `auto` uses them on a terminal, unless NO_COLOR is set
@@ -100,6 +103,7 @@ impl Tool {
     /// Runs the tool on the process's arguments.
     #[must_use]
     pub fn main(self) -> ExitCode {
+        block_io_signals();
         let matches = match self.arguments().try_get_matches() {
             Ok(matches) => matches,
             Err(error) => {
@@ -110,15 +114,14 @@ impl Tool {
             }
         };
         let cli = Cli::from_arg_matches(&matches).expect("the matches come from these arguments");
-        init_logging(&cli);
+        let err = OutStream::new(standard_error());
+        init_logging(&cli, err.clone());
         let arguments = self.arguments();
-        let shell = Shell::new(self.catalogue, cli.color, arguments);
+        let shell = Shell::new(self.catalogue, cli.color, arguments, err);
         let (name, matches) = matches.subcommand().expect("clap requires a subcommand");
         let command = self.commands.iter().find(|command| command.name() == name);
-        match (command.expect("clap accepts only these commands").run)(matches, &shell) {
-            0 if shell.is_cut() => FAULTED.into(),
-            code => code.into(),
-        }
+        let code = (command.expect("clap accepts only these commands").run)(matches, &shell);
+        shell.finish(code).into()
     }
 
     /// Returns the arguments of the tool, including those of all commands.
@@ -127,13 +130,29 @@ impl Tool {
     }
 }
 
-fn init_logging(cli: &Cli) {
+/// Sends the log to standard error, line by line.
+fn init_logging(cli: &Cli, err: OutStream) {
     let level = ["warn", "info", "debug"][usize::from(cli.verbose.min(2))];
     // Nodes that log are printed without `-v`.
     let level = format!("{level},{}=info", run::log::TARGET);
     let filter = EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new(level));
     let is_coloured = cli.color.is_on(&std::io::stderr());
-    tracing_subscriber::fmt().with_env_filter(filter).with_ansi(is_coloured).with_writer(std::io::stderr).init();
+    let log = tracing_subscriber::fmt().with_env_filter(filter).with_ansi(is_coloured);
+    log.with_writer(move || LogWriter(err.clone())).init();
+}
+
+/// Writes the lines of the log, each with one call.
+struct LogWriter(OutStream);
+
+impl io::Write for LogWriter {
+    fn write(&mut self, line: &[u8]) -> io::Result<usize> {
+        self.0.log(&String::from_utf8_lossy(line));
+        Ok(line.len())
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        Ok(())
+    }
 }
 
 #[cfg(test)]

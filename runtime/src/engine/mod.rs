@@ -9,5 +9,6 @@ mod session;
 pub(crate) use self::core::NodeRunner;
 pub use self::core::{Counters, ModeChange, Timing};
 pub use session::{
-    DisplayedPort, End, Engine, Halt, Interrupt, Logged, Outcome, Rest, RunOptions, TaskEnd, TaskRun, run, run_virtual,
+    Beginning, Culprit, DisplayedPort, End, Engine, Halt, Interrupt, LateTick, Logged, Outcome, Punctuality, Rest,
+    RunOptions, TaskEnd, TaskRun, run, run_virtual,
 };

@@ -1,13 +1,15 @@
 //! Recordings of runs: one row per tick with one column per scalar, and the points of a surface.
 
 mod columns;
+mod output;
 #[cfg(feature = "cli")]
 mod points;
 mod recorder;
 mod writer;
 
 pub use columns::{PortColumn, PortColumns, recorded};
+pub use output::{OutputFile, write_whole};
 #[cfg(feature = "cli")]
 pub use points::{PointPorts, PointRecorder, PointsRequest};
-pub use recorder::Recorder;
-pub use writer::RecordFormat;
+pub use recorder::{Recorded, Recorder};
+pub use writer::{RecordFormat, RowFormat};

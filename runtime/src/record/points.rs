@@ -1,10 +1,11 @@
 //! Records the points of a surface: each new value of a pose becomes a vertex of a PLY file.
 
-use std::fs::File;
-use std::io::{self, BufWriter, Write};
+use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
 use super::PortColumns;
+use super::output::{OutputFile, write_whole};
+use super::writer::seconds;
 use crate::engine::Engine;
 use crate::graph::{Compiled, PlannedPort};
 use crate::node::PortId;
@@ -23,10 +24,11 @@ pub struct PointsRequest {
 impl std::str::FromStr for PointsRequest {
     type Err = String;
 
-    /// Parses `surface.ply`, `ruler.pose=surface.ply`, or `ruler.pose,touch.pressure=surface.ply`.
+    /// Parses `surface.ply`, `ruler.pose=surface.ply`, or `ruler.pose,touch.pressure=surface.ply`. The file `-` is the
+    /// standard output.
     fn from_str(text: &str) -> Result<Self, String> {
         let (ports, path) = text.split_once('=').map_or((None, text), |(ports, path)| (Some(ports), path));
-        if Path::new(path).extension().is_none_or(|extension| extension != "ply") {
+        if path != "-" && Path::new(path).extension().is_none_or(|extension| extension != "ply") {
             return Err(format!(
                 "`{path}` is not a .ply file: write `surface.ply`, or ports and a file as in `ruler.pose=surface.ply`"
             ));
@@ -88,7 +90,7 @@ const POINT_COLUMNS: [&str; 7] = ["x", "y", "z", "nx", "ny", "nz", "time"];
 
 /// Collects the points of a run in memory, 56 bytes each, and writes them at the end, so no tick waits for the disk.
 pub struct PointRecorder {
-    file: File,
+    file: OutputFile,
     pose: PortId,
     extra: PortColumns,
     names: Vec<String>,
@@ -100,14 +102,12 @@ impl PointRecorder {
     /// The first bytes of a PLY file.
     pub const FILE_START: &'static str = "ply\n";
 
-    /// Creates the file.
-    ///
-    /// # Errors
-    /// If the file cannot be created.
+    /// Creates a recorder that writes to an open file.
     ///
     /// # Panics
     /// If the ports belong to another graph.
-    pub fn create(path: &Path, ports: &PointPorts, engine: &Engine) -> io::Result<Self> {
+    #[must_use]
+    pub fn new(file: OutputFile, ports: &PointPorts, engine: &Engine) -> Self {
         let id_of = |port: &PlannedPort| {
             let found = engine.ports().iter().find(|(other, _)| other.name == port.name);
             found.expect("the ports were resolved in the graph of this engine").1
@@ -128,7 +128,7 @@ impl PointRecorder {
         let extra: Vec<(PlannedPort, PortId)> =
             ports.extra.iter().map(|(_, port)| (port.clone(), id_of(port))).collect();
         let (pose, extra) = (id_of(&ports.pose), PortColumns::new(&extra));
-        Ok(Self { file: File::create(path)?, pose, extra, names, comments, values: Vec::with_capacity(1 << 16) })
+        Self { file, pose, extra, names, comments, values: Vec::with_capacity(1 << 16) }
     }
 
     /// Records the point of the last tick, if the pose is new.
@@ -139,27 +139,35 @@ impl PointRecorder {
         }
         let pose = bus.slot::<Pose>(self.pose).0;
         let (at, z) = (pose.translation.vector, pose.rotation.matrix().column(2).into_owned());
-        self.values.extend([at.x, at.y, at.z, -z.x, -z.y, -z.z, engine.now() as f64 * 1e-9]);
+        self.values.extend([
+            at.x,
+            at.y,
+            at.z,
+            -z.x,
+            -z.y,
+            -z.z,
+            seconds(engine.began().map_or(engine.now(), |began| began.time)),
+        ]);
         let from = self.values.len();
         self.values.resize(from + self.extra.list.len(), f64::NAN);
         self.extra.read(bus, &mut self.values[from..]);
     }
 
-    /// Writes the points, closes the file and returns the number of points.
+    /// Writes the points, closes the file and returns the number of points. Waits while `goes_on` returns true for the
+    /// number of bytes that have been written.
     ///
     /// # Errors
     /// If the file cannot be written.
-    pub fn finish(self) -> io::Result<usize> {
+    pub fn finish(self, goes_on: impl FnMut(u64) -> bool) -> io::Result<usize> {
         let count = self.values.len() / self.names.len();
-        let mut out = BufWriter::new(self.file);
-        writeln!(out, "{}format binary_little_endian 1.0", Self::FILE_START)?;
-        self.comments.iter().try_for_each(|comment| writeln!(out, "comment {comment}"))?;
-        writeln!(out, "element vertex {count}")?;
-        self.names.iter().try_for_each(|name| writeln!(out, "property double {name}"))?;
-        writeln!(out, "end_header")?;
-        self.values.iter().try_for_each(|value| out.write_all(&value.to_le_bytes()))?;
-        out.flush()?;
-        Ok(count)
+        let mut text = Vec::new();
+        writeln!(text, "{}format binary_little_endian 1.0", Self::FILE_START)?;
+        self.comments.iter().try_for_each(|comment| writeln!(text, "comment {comment}"))?;
+        writeln!(text, "element vertex {count}")?;
+        self.names.iter().try_for_each(|name| writeln!(text, "property double {name}"))?;
+        writeln!(text, "end_header")?;
+        text.extend(self.values.iter().flat_map(|value| value.to_le_bytes()));
+        write_whole(self.file, text, goes_on).map(|()| count)
     }
 }
 

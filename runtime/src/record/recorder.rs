@@ -1,61 +1,90 @@
 //! Records rows to a file. The tick writes them to a ring buffer, and a second thread formats and writes them.
 
-use std::fs::File;
-use std::io::{self, BufWriter, Write};
+use std::io::{self, ErrorKind};
 use std::path::Path;
-use std::thread::JoinHandle;
-use std::time::Duration;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::{Duration, Instant};
 
 use rtrb::{Consumer, Producer, RingBuffer};
 
-use super::{PortColumn, PortColumns, RecordFormat};
-use crate::engine::{Engine, TaskRun};
+use super::output::{OutputFile, WriteError, Writing, not_read};
+use super::{PortColumn, PortColumns, RowFormat};
+use crate::engine::{Beginning, Engine, TaskRun};
 use crate::signal::Unit;
 
 /// Capacity of the ring buffer [rows].
 const RING_ROWS: usize = 4096;
 /// Interval at which one side of the ring checks for work or for space.
 const POLL_INTERVAL: Duration = Duration::from_millis(1);
+/// Time for which a row may stay in memory; `kill -9` loses the rows of this time.
+const FLUSH_INTERVAL: Duration = Duration::from_millis(250);
+/// Size of the text that is written at once [bytes].
+const CHUNK_BYTES: usize = 1 << 16;
 
 /// Records every scalar of a graph, one row per tick.
 pub struct Recorder {
     columns: PortColumns,
     row: Vec<f64>,
-    /// Number of columns that belong to no port.
-    own: usize,
+    /// Number of columns for the time, and of those for the tasks.
+    own: [usize; 2],
     ring: Producer<f64>,
-    thread: JoinHandle<io::Result<()>>,
-    /// Whether the tick waits when the ring is full. Otherwise the row is dropped.
-    may_wait: bool,
-    dropped: u64,
+    writing: Writing<io::Result<()>>,
+    /// Number of rows that were recorded, whether they are written or not.
+    recorded: u64,
+    /// Number of rows in the file.
+    written: Arc<AtomicU64>,
+}
+
+/// What became of a recording.
+#[derive(Debug)]
+pub struct Recorded {
+    /// Number of rows in the file.
+    pub rows: u64,
+    /// Number of rows that are not in the file.
+    pub lost: u64,
+    /// The error that ended the recording.
+    pub error: Option<io::Error>,
 }
 
 impl Recorder {
     /// Creates the file and starts the writing thread.
     ///
-    /// With `may_wait`, a tick waits when the disk is too slow, and no row is lost. Without it, for runs in real time,
-    /// the row is dropped and counted.
-    ///
     /// # Errors
     /// If the file cannot be created.
-    pub fn create(path: &Path, format: RecordFormat, engine: &Engine, may_wait: bool) -> io::Result<Self> {
-        let columns = PortColumns::new(engine.ports());
-        let own = own_columns(engine);
-        let list: Vec<PortColumn> = own.iter().chain(&columns.list).cloned().collect();
-        let mut out = BufWriter::new(File::create(path)?);
-        format.header(&list, &mut out)?;
-        let width = list.len() + 1;
-        let (ring, drain) = RingBuffer::new(width * RING_ROWS);
-        let thread = std::thread::spawn(move || write_rows(drain, format, &list, out));
-        Ok(Self { row: vec![0.0; width], own: own.len(), columns, ring, thread, may_wait, dropped: 0 })
+    pub fn create(path: &Path, format: RowFormat, engine: &Engine) -> io::Result<Self> {
+        Self::start(OutputFile::create(path)?, format, engine)
     }
 
-    /// Records the last tick.
-    pub fn record(&mut self, engine: &Engine) {
-        // The ring holds floats. Storing the bits keeps the time in nanoseconds exact; its value would be rounded.
-        self.row[0] = f64::from_bits(engine.now() as u64);
-        let (own, ports) = self.row[1..].split_at_mut(self.own);
-        for (cells, task) in own.chunks_exact_mut(2).zip(with_modes(engine)) {
+    /// Starts the thread that writes to an open file.
+    ///
+    /// # Errors
+    /// If the thread cannot be started.
+    pub fn start(file: OutputFile, format: RowFormat, engine: &Engine) -> io::Result<Self> {
+        let columns = PortColumns::new(engine.ports());
+        let tasks = task_columns(engine);
+        let list: Vec<PortColumn> = tasks.iter().chain(&columns.list).cloned().collect();
+        let own = [format.times(), tasks.len()];
+        let row = vec![0.0; own[0] + list.len()];
+        let (ring, drain) = RingBuffer::new(row.len() * RING_ROWS);
+        let written = Arc::new(AtomicU64::new(0));
+        let rows = written.clone();
+        let writing =
+            Writing::start(file, move |file| RowWriter { file, format, columns: &list, rows: &rows }.run(drain))?;
+        Ok(Self { columns, row, own, ring, writing, recorded: 0, written })
+    }
+
+    /// Records the last tick. While the ring is full, waits as long as `may_wait` returns true; then the row is lost.
+    pub fn record(&mut self, engine: &Engine, may_wait: impl Fn() -> bool) {
+        self.recorded += 1;
+        let began = engine.began().unwrap_or(Beginning { time: engine.now(), wall: 0 });
+        let (times, row) = self.row.split_at_mut(self.own[0]);
+        for (cell, time) in times.iter_mut().zip([began.time, began.wall]) {
+            // The ring holds floats. Storing the bits keeps the time in nanoseconds exact; its value would be rounded.
+            *cell = f64::from_bits(time as u64);
+        }
+        let (tasks, ports) = row.split_at_mut(self.own[1]);
+        for (cells, task) in tasks.chunks_exact_mut(2).zip(with_modes(engine)) {
             cells[0] = task.mode_number().map_or(f64::NAN, |mode| mode as f64);
             // The graph itself ends with the run.
             let is_over = task.end().is_some() && !task.name().is_empty();
@@ -63,8 +92,7 @@ impl Recorder {
         }
         self.columns.read(engine.bus(), ports);
         while self.ring.slots() < self.row.len() {
-            if !self.may_wait || self.ring.is_abandoned() {
-                self.dropped += 1;
+            if self.has_ended() || !may_wait() {
                 return;
             }
             std::thread::sleep(POLL_INTERVAL);
@@ -77,21 +105,41 @@ impl Recorder {
         chunk.commit_all();
     }
 
-    /// Writes the remaining rows, closes the file and returns the number of dropped rows.
-    ///
-    /// # Errors
-    /// If the file could not be written.
-    pub fn finish(self) -> io::Result<u64> {
+    /// Whether an error has ended the recording.
+    #[must_use]
+    pub fn has_ended(&self) -> bool {
+        self.ring.is_abandoned()
+    }
+
+    /// Returns the number of rows in the file.
+    #[must_use]
+    pub fn rows(&self) -> u64 {
+        self.written.load(Ordering::Relaxed)
+    }
+
+    /// Writes the remaining rows and closes the file. Waits while `goes_on` returns true for the number of bytes that
+    /// have been written.
+    #[must_use]
+    pub fn finish(self, goes_on: impl FnMut(u64) -> bool) -> Recorded {
         drop(self.ring);
-        self.thread.join().map_err(|_| io::Error::other("the recorder's thread panicked"))??;
-        Ok(self.dropped)
+        let error = self.writing.finish(goes_on).unwrap_or_else(|| Err(not_read())).err();
+        let rows = self.written.load(Ordering::Relaxed);
+        Recorded { rows, lost: self.recorded - rows, error }
     }
 }
 
-/// Returns the columns that belong to no port. A task with modes has two: the number of the next tick's mode, from 0 in
+impl Recorded {
+    /// Whether the reader of a pipe closed it, as `head` does.
+    #[must_use]
+    pub fn is_closed_by_reader(&self) -> bool {
+        self.error.as_ref().is_some_and(|error| error.kind() == ErrorKind::BrokenPipe)
+    }
+}
+
+/// Returns the columns of the tasks. A task with modes has two: the number of the next tick's mode, from 0 in
 /// the order of the file, and whether its commands are halted,
 /// which they also are once it has ended. Those of a part have its name before theirs.
-fn own_columns(engine: &Engine) -> Vec<PortColumn> {
+fn task_columns(engine: &Engine) -> Vec<PortColumn> {
     let column = |name: String| PortColumn { name, part: String::new(), unit: Unit::ONE };
     let names = |task: &TaskRun| match task.name() {
         "" => ["mode".to_owned(), "halted".to_owned()],
@@ -105,25 +153,53 @@ fn with_modes(engine: &Engine) -> impl Iterator<Item = &TaskRun> {
     engine.tasks().iter().filter(|task| task.mode().is_some())
 }
 
-fn write_rows(
-    mut ring: Consumer<f64>,
-    format: RecordFormat,
-    columns: &[PortColumn],
-    mut out: impl Write,
-) -> io::Result<()> {
-    let mut row = vec![0.0; columns.len() + 1];
-    loop {
-        // Checked before the ring is drained, so rows written before the end are not lost.
-        let is_over = ring.is_abandoned();
-        while let Ok(chunk) = ring.read_chunk(row.len()) {
-            for (cell, value) in row.iter_mut().zip(chunk) {
-                *cell = value;
+/// Formats and writes the rows, on a thread of its own.
+struct RowWriter<'w> {
+    file: &'w mut OutputFile,
+    format: RowFormat,
+    columns: &'w [PortColumn],
+    /// Number of rows in the file.
+    rows: &'w AtomicU64,
+}
+
+impl RowWriter<'_> {
+    /// Writes rows until the other end of the ring is gone.
+    fn run(mut self, mut ring: Consumer<f64>) -> io::Result<()> {
+        let (mut text, mut count, mut row) = (Vec::new(), 0, vec![0.0; self.format.times() + self.columns.len()]);
+        self.format.header(self.columns, &mut text)?;
+        self.file.write_lines(&text).map_err(|failed| failed.error)?;
+        text.clear();
+        let mut flushed = Instant::now();
+        loop {
+            // Checked before the ring is drained, so rows written before the end are not lost.
+            let is_over = ring.is_abandoned();
+            while let Ok(chunk) = ring.read_chunk(row.len()) {
+                for (cell, value) in row.iter_mut().zip(chunk) {
+                    *cell = value;
+                }
+                self.format.row(self.columns, &row, &mut text)?;
+                count += 1;
+                if text.len() >= CHUNK_BYTES {
+                    self.flush(&mut text, &mut count)?;
+                }
             }
-            format.row(columns, row[0].to_bits() as i64, &row[1..], &mut out)?;
+            if is_over || flushed.elapsed() >= FLUSH_INTERVAL {
+                self.flush(&mut text, &mut count)?;
+                flushed = Instant::now();
+            }
+            if is_over {
+                return Ok(());
+            }
+            std::thread::sleep(POLL_INTERVAL);
         }
-        if is_over {
-            return out.flush();
-        }
-        std::thread::sleep(POLL_INTERVAL);
+    }
+
+    /// Writes a text of `count` rows.
+    fn flush(&mut self, text: &mut Vec<u8>, count: &mut u64) -> io::Result<()> {
+        let result = self.file.write_lines(text);
+        self.rows.fetch_add(result.as_ref().map_or_else(|failed| failed.lines, |()| *count), Ordering::Relaxed);
+        text.clear();
+        *count = 0;
+        result.map_err(|WriteError { error, .. }| error)
     }
 }

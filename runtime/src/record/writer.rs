@@ -1,5 +1,6 @@
 //! Writes rows as CSV or NDJSON.
 
+use std::borrow::Cow;
 use std::io::{self, Write};
 use std::path::Path;
 
@@ -31,43 +32,71 @@ impl RecordFormat {
         }
     }
 
+    /// Returns the format of the rows of a run. Those of a run in real time have the column `wall`, with the wall clock;
+    /// in virtual time, two runs write the same file.
+    #[must_use]
+    pub const fn rows(self, is_real: bool) -> RowFormat {
+        RowFormat { format: self, has_wall: is_real }
+    }
+}
+
+/// The format of the rows of a run: their times, and the values of the columns.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct RowFormat {
+    format: RecordFormat,
+    has_wall: bool,
+}
+
+impl RowFormat {
+    /// Returns the number of times in a row.
+    pub(super) fn times(self) -> usize {
+        self.names().len()
+    }
+
+    /// Returns the names of the times.
+    const fn names(self) -> &'static [&'static str] {
+        if self.has_wall { &["time", "wall"] } else { &["time"] }
+    }
+
     /// Writes the lines before the rows.
     pub(super) fn header(self, columns: &[PortColumn], out: &mut impl Write) -> io::Result<()> {
-        match self {
-            Self::Csv => {
-                writeln!(out, "# time [s]")?;
-                for column in columns {
-                    writeln!(out, "# {} [{}]", column.name, column.unit)?;
-                }
-                write!(out, "time")?;
-                columns.iter().try_for_each(|column| write!(out, ",{}", column.name))?;
+        match self.format {
+            RecordFormat::Csv => {
+                self.names().iter().try_for_each(|name| writeln!(out, "# {name} [s]"))?;
+                columns.iter().try_for_each(|column| writeln!(out, "# {} [{}]", cell(&column.name), column.unit))?;
+                write!(out, "{}", self.names().join(","))?;
+                columns.iter().try_for_each(|column| write!(out, ",{}", cell(&column.name)))?;
                 writeln!(out)
             }
-            Self::Ndjson => {
+            RecordFormat::Ndjson => {
                 write!(out, "{{\"units\":")?;
+                let times = self.names().iter().map(|name| (*name, "s".to_owned()));
                 let units = columns.iter().map(|column| (column.name.as_str(), column.unit.to_string()));
                 let mut json = serde_json::Serializer::new(&mut *out);
-                json.collect_map(std::iter::once(("time", "s".to_owned())).chain(units))?;
+                json.collect_map(times.chain(units))?;
                 writeln!(out, "}}")
             }
         }
     }
 
-    /// Writes one row: the time [ns] and one value per column. NaN stands for an absent value.
-    pub(super) fn row(self, columns: &[PortColumn], time: i64, row: &[f64], out: &mut impl Write) -> io::Result<()> {
-        let seconds = time as f64 * 1e-9;
-        match self {
-            Self::Csv => {
-                write!(out, "{seconds:?}")?;
+    /// Writes one row: the bits of the times [ns], and one value per column. NaN stands for an absent value.
+    pub(super) fn row(self, columns: &[PortColumn], row: &[f64], out: &mut impl Write) -> io::Result<()> {
+        let (times, row) = row.split_at(self.times());
+        let times = self.names().iter().zip(times).map(|(name, time)| (*name, seconds(time.to_bits() as i64)));
+        match self.format {
+            RecordFormat::Csv => {
+                for (i, (_, time)) in times.enumerate() {
+                    write!(out, "{}{time:?}", if i > 0 { "," } else { "" })?;
+                }
                 for value in row {
                     if value.is_nan() { write!(out, ",")? } else { write!(out, ",{value:?}")? }
                 }
                 writeln!(out)
             }
-            Self::Ndjson => {
+            RecordFormat::Ndjson => {
                 let mut json = serde_json::Serializer::new(&mut *out);
-                let mut map = json.serialize_map(Some(columns.len() + 1))?;
-                map.serialize_entry("time", &seconds)?;
+                let mut map = json.serialize_map(Some(columns.len() + self.times()))?;
+                times.into_iter().try_for_each(|(name, time)| map.serialize_entry(name, &time))?;
                 for (column, value) in columns.iter().zip(row) {
                     map.serialize_entry(&column.name, &Some(value).filter(|value| !value.is_nan()))?;
                 }
@@ -75,5 +104,64 @@ impl RecordFormat {
                 writeln!(out)
             }
         }
+    }
+}
+
+/// Converts nanoseconds to seconds. The result is the float next to the decimal number, so it is printed without noise.
+pub(super) fn seconds(nanos: i64) -> f64 {
+    const MAX_EXACT: i64 = 1 << 53;
+    // Beyond 104 days a float does not hold the nanoseconds, and microseconds still do.
+    if nanos.abs() < MAX_EXACT { nanos as f64 / 1e9 } else { (nanos / 1000) as f64 / 1e6 }
+}
+
+/// Returns a name as a cell of a CSV file: in quotes if it has characters that mean something there.
+fn cell(name: &str) -> Cow<'_, str> {
+    if name.contains([',', '"', '#', '\n', '\r', ' ']) {
+        // A reader of the comments takes the file line by line.
+        format!("\"{}\"", name.replace('"', "\"\"").replace(['\n', '\r'], " ")).into()
+    } else {
+        name.into()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::signal::Unit;
+
+    #[test]
+    fn times_are_printed_without_noise() {
+        let cases = [
+            (0, "0.0"),
+            (300_000_000, "0.3"),
+            (700_000_000, "0.7"),
+            (1_001_000_000, "1.001"),
+            (4_123_456_789, "4.123456789"),
+            (8_640_000_300_000_000, "8640000.3"),
+            (1_763_866_339_123_456_000, "1763866339.123456"),
+        ];
+        for (nanos, text) in cases {
+            assert_eq!(format!("{:?}", seconds(nanos)), text, "{nanos}");
+        }
+        for tick in 0..100_000 {
+            let text = format!("{:?}", seconds(tick * 4_000_000));
+            assert!(text.len() <= 7, "{text}");
+        }
+    }
+
+    #[test]
+    fn names_with_commas_are_quoted() {
+        let column = |name: &str| PortColumn { name: name.into(), part: String::new(), unit: Unit::NEWTON };
+        let columns = ["a.b", "mix.out.x,y", "mix.out.\"q\"", "arm.joint #1"].map(column);
+        let format = RecordFormat::Csv.rows(true);
+        let (mut text, mut row) = (Vec::new(), [1_300_000_000, 1_763_866_339_123_456_789].map(f64::from_bits).to_vec());
+        row.extend([0.5, f64::NAN, 1.0, -2.0]);
+        format.header(&columns, &mut text).expect("a vector takes everything");
+        format.row(&columns, &row, &mut text).expect("a vector takes everything");
+        let expected = "# time [s]\n# wall [s]\n# a.b [N]\n# \"mix.out.x,y\" [N]\n# \"mix.out.\"\"q\"\"\" [N]\n\
+                        # \"arm.joint #1\" [N]\n\
+                        time,wall,a.b,\"mix.out.x,y\",\"mix.out.\"\"q\"\"\",\"arm.joint #1\"\n\
+                        1.3,1763866339.123456,0.5,,1.0,-2.0\n";
+        assert_eq!(String::from_utf8_lossy(&text), expected);
     }
 }

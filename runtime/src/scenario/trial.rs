@@ -64,7 +64,7 @@ impl Scenario {
                 return failed(0.0, first.unwrap_or_default());
             }
         };
-        let recorder = record.map(|path| Recorder::create(path, RecordFormat::Csv, &engine, true)).transpose();
+        let recorder = record.map(|path| Recorder::create(path, RecordFormat::Csv.rows(false), &engine)).transpose();
         let mut recorder = match recorder {
             Ok(recorder) => recorder,
             Err(error) => return failed(0.0, format!("the recording cannot be created: {error}")),
@@ -73,16 +73,16 @@ impl Scenario {
         let outcome = run_virtual(&mut engine, self.for_s, is_interrupted, &mut |engine| {
             observer.observe(engine);
             if let Some(recorder) = &mut recorder {
-                recorder.record(engine);
+                recorder.record(engine, || !is_interrupted());
             }
         });
-        let written = recorder.map_or(Ok(0), Recorder::finish);
+        let unwritten = recorder.and_then(|recorder| recorder.finish(|_| true).error);
         let time = seconds(outcome.time);
         let is_short = time + 1.5 * seconds(engine.period()) < self.for_s;
-        let failure = match (&outcome.end, &written) {
+        let failure = match (&outcome.end, &unwritten) {
             (End::Interrupted, _) => return None,
             (End::Fault(fault), _) => Some(fault.to_string()),
-            (_, Err(error)) => Some(format!("the recording cannot be written: {error}")),
+            (_, Some(error)) => Some(format!("the recording cannot be written: {error}")),
             (End::Finished, _) if is_short => {
                 Some(format!("a device has no more samples after {time:.3} s, before `for_s` is over"))
             }

@@ -1,27 +1,49 @@
 //! The files that a run writes: `--out`, `--points` and `--svg`.
 
-use std::fmt::Display;
-use std::fs::File;
-use std::io::{self, Read};
+use std::io;
 use std::path::Path;
 
+use super::target::{is_special, is_stdout, open};
 use super::{Job, JobOptions};
+use crate::cli::shell::patience::Patience;
 use crate::cli::shell::{FAULTED, Shell};
 use crate::cli::still::Still;
+use crate::cli::text::number::count_of;
 use crate::cli::text::svg::Svg;
 use crate::engine::Engine;
-use crate::record::{PointPorts, PointRecorder, RecordFormat, Recorder};
+use crate::record::{PointPorts, PointRecorder, RecordFormat, Recorded, Recorder};
 
 /// The open files of a run.
 pub(crate) struct OutputFiles<'j> {
     job: &'j Job,
     rows: Option<Recorder>,
+    /// Whether the end of the recording by an error was reported.
+    has_reported_end: bool,
     points: Option<PointRecorder>,
     still: Option<Still>,
 }
 
+impl JobOptions {
+    /// Reserves standard output for a file of the run, if one of them is `-`. All texts go to standard error then.
+    ///
+    /// # Errors
+    /// If several files are `-`.
+    pub fn reserve_output(&self, shell: &Shell) -> Result<(), String> {
+        let points = self.points.as_ref().map(|points| points.path.as_path());
+        let files = [self.out.as_deref(), points, self.svg.as_deref()];
+        match files.into_iter().flatten().filter(|path| is_stdout(path)).count() {
+            0 => Ok(()),
+            1 => {
+                shell.take_output();
+                Ok(())
+            }
+            _ => Err("only one of `--out`, `--points` and `--svg` can be `-`".into()),
+        }
+    }
+}
+
 impl<'j> OutputFiles<'j> {
-    /// Creates the files before the run starts. `may_wait` lets the run wait for the disk.
+    /// Creates the files before the run starts, and waits for the readers of pipes.
     ///
     /// # Errors
     /// If one of them cannot be created.
@@ -29,20 +51,32 @@ impl<'j> OutputFiles<'j> {
         job: &'j Job,
         chosen: Option<&PointPorts>,
         engine: &Engine,
-        may_wait: bool,
+        is_real: bool,
+        shell: &Shell,
     ) -> Result<Self, String> {
         let JobOptions { out, points: wanted, svg, .. } = &job.options;
-        let rows = out.as_deref().map(|path| recorder(path, engine, may_wait)).transpose()?;
-        let points = wanted.as_ref().zip(chosen).map(|(wanted, chosen)| points(&wanted.path, chosen, engine));
+        let rows = out.as_deref().map(|path| recorder(path, engine, is_real, shell)).transpose()?;
+        let points = wanted.as_ref().zip(chosen).map(|(wanted, chosen)| {
+            let file = open(&wanted.path, &[PointRecorder::FILE_START], "a file of points", shell)?;
+            Ok::<_, String>(PointRecorder::new(file, chosen, engine))
+        });
         let points = points.transpose()?;
-        let still = svg.as_deref().map(|path| still(path, &job.title, engine)).transpose()?;
-        Ok(Self { job, rows, points, still })
+        let still = svg.as_deref().map(|path| still(path, &job.title, engine, shell)).transpose()?;
+        Ok(Self { job, rows, has_reported_end: false, points, still })
     }
 
     /// Adds the last tick of the engine.
-    pub(crate) fn add(&mut self, engine: &Engine) {
+    pub(crate) fn add(&mut self, engine: &Engine, patience: &Patience) {
         if let Some(rows) = &mut self.rows {
-            rows.record(engine);
+            rows.record(engine, || patience.may_wait());
+            if rows.has_ended() && !self.has_reported_end {
+                self.has_reported_end = true;
+                let path = self.job.options.out.as_deref().unwrap_or(Path::new("-"));
+                if !is_stdout(path) {
+                    let count = count_of(rows.rows() as usize, "row");
+                    tracing::warn!("the recording `{}` ends after {count}; the run goes on", path.display());
+                }
+            }
         }
         if let Some(points) = &mut self.points {
             points.record(engine);
@@ -56,64 +90,73 @@ impl<'j> OutputFiles<'j> {
     pub(crate) fn finish(self, shell: &Shell, engine: &Engine) -> u8 {
         let (job, mut code) = (self.job, 0);
         let JobOptions { out, points, svg, .. } = &job.options;
+        let patience = shell.patience();
+        let wait = || {
+            let mut waiting = patience.begin();
+            move |progress| waiting.goes_on(progress)
+        };
+        if let (Some(path), Some(rows)) = (out, self.rows) {
+            code = code.max(report_rows(job, shell, path, &rows.finish(wait())));
+        }
         let mut report = |path: &Path, result: io::Result<String>| match result {
-            Ok(details) => job.say(shell, &format!("wrote {}{details}", path.display())),
+            Ok(details) => say_wrote(job, shell, path, &details),
+            Err(error) if is_stdout(path) && error.kind() == io::ErrorKind::BrokenPipe => {}
             Err(error) => {
                 shell.error(format_args!("cannot write `{}`: {error}", path.display()));
                 code = FAULTED;
             }
         };
-        if let (Some(path), Some(rows)) = (out, self.rows) {
-            match rows.finish() {
-                Ok(dropped) if dropped > 0 => shell
-                    .warning(format_args!("`{}` lacks {dropped} rows, because the disk was too slow", path.display())),
-                result => report(path, result.map(|_| String::new())),
-            }
-        }
         if let (Some(wanted), Some(points)) = (points, self.points) {
-            report(&wanted.path, points.finish().map(|count| format!(": {count} points")));
+            report(&wanted.path, points.finish(wait()).map(|count| format!(": {count} points")));
         }
         if let (Some(path), Some(still)) = (svg, self.still) {
-            report(path, still.finish(engine).map(|()| String::new()));
+            report(path, still.finish(engine, wait()).map(|()| String::new()));
         }
         code
     }
 }
 
-fn recorder(path: &Path, engine: &Engine, may_wait: bool) -> Result<Recorder, String> {
-    let format = RecordFormat::of(path).ok_or_else(|| {
+/// Reports what became of the recording; returns the exit code.
+fn report_rows(job: &Job, shell: &Shell, path: &Path, recorded: &Recorded) -> u8 {
+    let Recorded { rows, lost, error } = recorded;
+    let name = path.display();
+    match error {
+        None if *lost > 0 => {
+            shell.warning(format_args!("`{name}` lacks {lost} rows, because it was written too slowly"));
+            0
+        }
+        None => {
+            say_wrote(job, shell, path, "");
+            0
+        }
+        // `head` has seen enough, which is no error.
+        Some(_) if is_stdout(path) && recorded.is_closed_by_reader() => 0,
+        Some(error) => {
+            let (count, all) = (count_of(*rows as usize, "row"), rows + lost);
+            shell.error(format_args!("cannot write `{name}`: {error}: it has the first {count} of {all}"));
+            FAULTED
+        }
+    }
+}
+
+fn say_wrote(job: &Job, shell: &Shell, path: &Path, details: &str) {
+    if !is_stdout(path) {
+        job.say(shell, &format!("wrote {}{details}", path.display()));
+    }
+}
+
+fn recorder(path: &Path, engine: &Engine, is_real: bool, shell: &Shell) -> Result<Recorder, String> {
+    let format = RecordFormat::of(path).or_else(|| is_special(path).then_some(RecordFormat::Csv));
+    let format = format.ok_or_else(|| {
         format!("`{}` does not end in .csv or .ndjson: write for example `--out run.csv`", path.display())
     })?;
-    refuse_other(path, &RecordFormat::FILE_STARTS, "a recording of a run")?;
-    Recorder::create(path, format, engine, may_wait).map_err(|error| cannot_create(path, error))
+    let file = open(path, &RecordFormat::FILE_STARTS, "a recording of a run", shell)?;
+    Recorder::start(file, format.rows(is_real), engine).map_err(|error| format!("cannot record: {error}"))
 }
 
-fn points(path: &Path, chosen: &PointPorts, engine: &Engine) -> Result<PointRecorder, String> {
-    refuse_other(path, &[PointRecorder::FILE_START], "a file of points")?;
-    PointRecorder::create(path, chosen, engine).map_err(|error| cannot_create(path, error))
-}
-
-fn still(path: &Path, title: &str, engine: &Engine) -> Result<Still, String> {
-    if path.extension().is_none_or(|extension| extension != "svg") {
+fn still(path: &Path, title: &str, engine: &Engine, shell: &Shell) -> Result<Still, String> {
+    if !is_special(path) && path.extension().is_none_or(|extension| extension != "svg") {
         return Err(format!("`{}` does not end in .svg: write for example `--svg run.svg`", path.display()));
     }
-    refuse_other(path, &[Svg::START], "an SVG picture")?;
-    Still::create(path, title, engine)
-}
-
-fn cannot_create(path: &Path, error: impl Display) -> String {
-    format!("cannot create `{}`: {error}", path.display())
-}
-
-/// Refuses to overwrite a file that does not begin like the output of a run, such as a recording that is being played.
-fn refuse_other(path: &Path, starts: &[&str], what: &str) -> Result<(), String> {
-    let mut start = Vec::new();
-    let read = File::open(path).and_then(|file| file.take(16).read_to_end(&mut start));
-    if read.is_ok() && !start.is_empty() && !starts.iter().any(|known| start.starts_with(known.as_bytes())) {
-        return Err(format!(
-            "`{}` exists and is not {what}, so it is not overwritten: write to another file",
-            path.display()
-        ));
-    }
-    Ok(())
+    Still::new(|| open(path, &[Svg::START], "an SVG picture", shell), title, engine)
 }

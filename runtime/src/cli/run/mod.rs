@@ -3,13 +3,16 @@
 mod events;
 mod files;
 mod held;
+mod lateness;
 pub(super) mod log;
 mod ports;
 mod progress;
 mod summary;
+mod target;
 mod time;
 
 use std::path::PathBuf;
+use std::sync::Arc;
 
 use files::OutputFiles;
 use log::NodeLog;
@@ -18,6 +21,7 @@ use summary::Summary;
 
 use super::shell::command::GraphArgs;
 use super::shell::panics::without_panic_messages;
+use super::shell::patience::Patience;
 use super::shell::{FAULTED, Shell, unknown};
 use super::text::number::{milliseconds, seconds};
 use super::text::prose::PageStyle;
@@ -84,7 +88,7 @@ pub struct JobOptions {
     /// Read words from standard input during the run, one per line; requires real time
     #[arg(long)]
     pub listen: bool,
-    /// Record all ports in a .csv or .ndjson file: one row per tick, one column per number
+    /// Record all ports in a .csv or .ndjson file: one row per tick, one column per number; `-` is standard output
     #[arg(short, long, value_name = "FILE")]
     pub out: Option<PathBuf>,
     /// Write the points of a pose to a .ply file: FILE for the reported pose, POSE=FILE, or POSE,PORT=FILE with more
@@ -123,6 +127,9 @@ impl Job {
     /// Runs the graph, prints the summary and returns the exit code.
     #[must_use]
     pub fn run(&self, shell: &Shell) -> u8 {
+        if let Err(message) = self.options.reserve_output(shell) {
+            return shell.refuse(message);
+        }
         match compile(shell.catalogue(), &self.request) {
             Ok(plan) => self.run_plan(plan, shell).unwrap_or_else(|message| shell.refuse(message)),
             Err(report) => shell.reject(&report),
@@ -148,24 +155,26 @@ impl Job {
         let silences = plan.silences().to_vec();
         let mut engine = Engine::new(plan);
         self.check_words(&engine)?;
-        let mut files = OutputFiles::create(self, chosen.as_ref(), &engine, !is_real)?;
+        let mut files = OutputFiles::create(self, chosen.as_ref(), &engine, is_real, shell)?;
+        let patience = patience(is_real)?;
+        shell.set_patience(&patience);
         let period = milliseconds(seconds(engine.period()));
         self.say(shell, &format!("{}: {} nodes, one tick every {period}", self.title, engine.order().count()));
         silences.iter().for_each(|line| self.say(shell, line));
         let mut summary = Summary::new(&engine, self.print == Print::Ports, start);
         let mut log = NodeLog::new(&engine);
-        let (end, is_quiet) = (duration.or_else(|| engine.end().map(seconds)), self.print == Print::Nothing);
-        let mut progress = Progress::new(end, is_quiet, shell.has_colour_on_stderr());
+        let end = duration.or_else(|| engine.end().map(seconds));
+        let terminal = Some(shell.err()).filter(|_| self.print != Print::Nothing);
+        let mut progress = Progress::new(end, terminal, shell.has_colour_on_stderr());
         let (sends, listens) = (send.clone(), *listen);
         let options = RunOptions { duration: *duration, is_realtime: *realtime, sends, listens };
         let outcome = without_panic_messages(|| {
             engine::run(&mut engine, &options, &mut |engine| {
                 summary.add(engine);
                 if log.is_due(engine) {
-                    progress.clear();
                     log.write(engine);
                 }
-                files.add(engine);
+                files.add(engine, &patience);
                 progress.show(seconds(engine.now()), engine.ticks(), |style| summary.live(style));
             })
         });
@@ -221,6 +230,15 @@ impl Job {
         let known = known.join(", ");
         Err(unknown("word", word, words.iter().map(String::as_str), &format!("this graph accepts {known}")))
     }
+}
+
+/// Returns how long a run waits for the readers of its output: in virtual time, nothing moves and nothing is lost.
+fn patience(is_real: bool) -> Result<Patience, String> {
+    if is_real {
+        return Ok(Patience::Limited);
+    }
+    let interrupt = Interrupt::catch().map_err(|error| format!("cannot run: {error}"))?;
+    Ok(Patience::Interruptible(Arc::new(interrupt)))
 }
 
 /// Explains a fault that is a stop without any source of the word `resume`.

@@ -1,12 +1,12 @@
 //! The progress and the live view of a run, drawn in place on a terminal and removed at the end.
 //!
-//! A separate thread writes to the terminal, so that a slow terminal never delays a tick. Drawings that it cannot keep
-//! up with are dropped.
+//! The thread of standard error writes to the terminal, so that a slow terminal never delays a tick. Drawings that it
+//! cannot keep up with are dropped.
 
-use std::io::{IsTerminal, Write, stderr};
-use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
+use std::io::{IsTerminal, stderr};
 use std::time::{Duration, Instant};
 
+use crate::cli::shell::stream::OutStream;
 use crate::cli::text::prose::PageStyle;
 
 /// Shorter runs show no progress.
@@ -24,74 +24,38 @@ pub(crate) struct Progress {
     /// Expected end of the run [s], if it is known.
     end: Option<f64>,
     has_colour: bool,
-    /// Sends drawings to the thread; `None` without a terminal.
-    thread: Option<SyncSender<Drawing>>,
+    /// Standard error; `None` without a terminal.
+    terminal: Option<OutStream>,
 }
 
-/// A text that replaces the last drawing, and the channel that acknowledges it, if somebody waits.
-type Drawing = (String, Option<SyncSender<()>>);
-
 impl Progress {
-    pub(crate) fn new(end: Option<f64>, is_quiet: bool, has_colour: bool) -> Self {
-        let thread = (stderr().is_terminal() && !is_quiet).then(|| {
-            let (sender, drawings) = sync_channel(1);
-            std::thread::spawn(move || draw(&drawings));
-            sender
-        });
-        Self { start: Instant::now(), drawn: None, end, has_colour, thread }
+    pub(crate) fn new(end: Option<f64>, err: Option<&OutStream>, has_colour: bool) -> Self {
+        let terminal = err.filter(|_| stderr().is_terminal()).cloned();
+        Self { start: Instant::now(), drawn: None, end, has_colour, terminal }
     }
 
     /// Draws the progress at `time` [s] and `ticks` below the parts of the view that `live` returns.
     pub(crate) fn show(&mut self, time: f64, ticks: u64, live: impl FnOnce(PageStyle) -> Vec<String>) {
         // Reading the clock costs more than a tick, so most ticks skip it.
-        let Some(thread) = self.thread.as_ref().filter(|_| ticks.is_multiple_of(16)) else { return };
+        let Some(terminal) = self.terminal.as_ref().filter(|_| ticks.is_multiple_of(16)) else { return };
         let now = Instant::now();
         let is_due = self.drawn.map_or(now - self.start >= MIN_RUN, |drawn| now - drawn >= INTERVAL);
-        if is_due {
+        if is_due && terminal.has_drawn() {
             self.drawn = Some(now);
             let line = line(time, ticks, self.end, (now - self.start).as_secs_f64());
             let size = terminal_size::terminal_size_of(stderr());
             let [width, height] = size.map_or([0, 0], |(width, height)| [width.0, height.0].map(usize::from));
             let live = PageStyle::of_width(width, self.has_colour).map(live).unwrap_or_default();
-            // While the thread still writes, this drawing is dropped.
-            let _ = thread.try_send((fitted(&live, &line, [width, height]), None));
+            terminal.draw(fitted(&live, &line, [width, height]));
         }
     }
 
     /// Removes the drawing.
     pub(crate) fn clear(&self) {
-        let Some(thread) = self.thread.as_ref().filter(|_| self.drawn.is_some()) else { return };
-        let (done, is_done) = sync_channel(1);
-        if thread.send((String::new(), Some(done))).is_ok() {
-            // A thread that has ended draws nothing more.
-            let _ = is_done.recv();
+        if let Some(terminal) = self.terminal.as_ref().filter(|_| self.drawn.is_some()) {
+            terminal.draw(String::new());
         }
     }
-}
-
-/// Draws until the run ends. Errors of the terminal are ignored.
-fn draw(drawings: &Receiver<Drawing>) {
-    let mut lines = 0;
-    for (text, done) in drawings {
-        let _ = stderr().lock().write_all(redrawn(lines, &text).as_bytes());
-        let _ = stderr().flush();
-        lines = text.lines().count();
-        if let Some(done) = done {
-            let _ = done.send(());
-        }
-    }
-}
-
-/// Returns the text with the escape codes that draw it over a text of `lines` lines.
-///
-/// Each line is overwritten, which avoids flicker. Wrapping is off, so that the number of lines on the terminal is
-/// known.
-fn redrawn(lines: usize, text: &str) -> String {
-    let up = if lines > 1 { format!("\x1b[{}A", lines - 1) } else { String::new() };
-    format!(
-        "\x1b[?7l\r{up}{}\x1b[J\x1b[?7h",
-        text.lines().map(|line| format!("{line}\x1b[K")).collect::<Vec<_>>().join("\r\n")
-    )
 }
 
 /// Puts as many parts of the live view above the line of progress as fit on the terminal.
@@ -139,12 +103,5 @@ mod tests {
         assert_eq!(fitted(&[], "line", [80, 50]), "line");
         assert_eq!(fitted(&live, "a long line", [7, 4]), "a long");
         assert_eq!(fitted(&live, "a long line", [0, 0]), "a long line", "a terminal of unknown size");
-    }
-
-    #[test]
-    fn a_text_is_drawn_over_the_last_one() {
-        assert_eq!(redrawn(0, "a\nb"), "\x1b[?7l\ra\x1b[K\r\nb\x1b[K\x1b[J\x1b[?7h");
-        assert_eq!(redrawn(2, "c"), "\x1b[?7l\r\x1b[1Ac\x1b[K\x1b[J\x1b[?7h");
-        assert_eq!(redrawn(3, ""), "\x1b[?7l\r\x1b[2A\x1b[J\x1b[?7h");
     }
 }

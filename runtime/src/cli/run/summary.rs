@@ -4,6 +4,7 @@ use std::fmt::Write;
 
 use super::events::{LimitWatch, events};
 use super::held::{HoldWatch, chatter};
+use super::lateness::lateness;
 use super::ports::{PortTable, node_times};
 use crate::cli::text::prose::PageStyle;
 use crate::cli::view::RunView;
@@ -97,6 +98,11 @@ impl Summary {
         for warning in engine.allowed() {
             let _ = writeln!(text, "{warning}");
         }
+        let lateness = lateness(engine);
+        if !lateness.is_empty() && !text.is_empty() {
+            text.push('\n');
+        }
+        text += &lateness;
         if outcome.late > 0 {
             let _ = writeln!(text, "{} ticks started more than one period late", outcome.late);
         }

@@ -1,18 +1,29 @@
 //! What every command uses: the catalogue, output and exit codes, and the shape of a command.
-#![allow(clippy::print_stderr, reason = "errors and warnings of the tool go to standard error")]
 
 pub(super) mod command;
 pub(super) mod json;
 pub(super) mod panics;
+pub(super) mod patience;
+pub(super) mod signals;
+pub(super) mod stream;
 
 use std::fmt::Display;
-use std::io::{ErrorKind, IsTerminal, Write};
+use std::fs::File;
+use std::io::{self, IsTerminal, stderr, stdout};
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Mutex, PoisonError};
+use std::time::Duration;
 
 use clap::ValueEnum;
 
+use self::patience::Patience;
+use self::stream::{Lost, OutStream};
 use crate::catalogue::Catalogue;
+use crate::cli::text::number::count_of;
 use crate::source::{Report, suggest_name};
+
+/// Interval at which the end of a write is awaited.
+const POLL_INTERVAL: Duration = Duration::from_micros(200);
 
 /// Exit code of a run that ended in a fault, and of a scenario that failed.
 pub const FAULTED: u8 = 1;
@@ -24,13 +35,21 @@ pub struct Shell {
     catalogue: Catalogue,
     colour: Colour,
     arguments: clap::Command,
-    /// Whether some output was lost.
-    is_cut: AtomicBool,
+    out: OutStream,
+    err: OutStream,
+    patience: Mutex<Patience>,
+    /// Whether standard output is a file of the run, so that all texts go to standard error.
+    is_out_taken: AtomicBool,
+    /// Whether a reader did not read for a while, so that nothing waits for the order of lines any more.
+    is_stuck: AtomicBool,
 }
 
 impl Shell {
-    pub(crate) const fn new(catalogue: Catalogue, colour: Colour, arguments: clap::Command) -> Self {
-        Self { catalogue, colour, arguments, is_cut: AtomicBool::new(false) }
+    /// Creates a shell that writes errors and warnings to `err`.
+    pub(crate) fn new(catalogue: Catalogue, colour: Colour, arguments: clap::Command, err: OutStream) -> Self {
+        let (out, patience) = (OutStream::new(standard_output()), Mutex::default());
+        let [is_out_taken, is_stuck] = [false; 2].map(AtomicBool::new);
+        Self { catalogue, colour, arguments, out, err, patience, is_out_taken, is_stuck }
     }
 
     /// Returns the arguments of the tool, including those of all commands.
@@ -45,31 +64,25 @@ impl Shell {
         &self.catalogue
     }
 
-    /// Whether standard output may have colours.
+    /// Whether the output of a command may have colours.
     #[must_use]
     pub fn has_colour(&self) -> bool {
-        self.colour.is_on(&std::io::stdout())
+        if self.is_out_taken() { self.has_colour_on_stderr() } else { self.colour.is_on(&stdout()) }
     }
 
     /// Whether standard error may have colours.
     pub(crate) fn has_colour_on_stderr(&self) -> bool {
-        self.colour.is_on(&std::io::stderr())
+        self.colour.is_on(&stderr())
     }
 
     /// Prints a line to standard output.
     ///
-    /// A reader that closes the pipe early, such as `head`, is no error. Any other failure is reported once.
+    /// It returns before the line is written. A reader that closes the pipe early, such as `head`, is no error. Any
+    /// other failure is reported at the end, once.
     pub fn say(&self, text: &str) {
-        let mut out = std::io::stdout().lock();
-        let Err(error) = writeln!(out, "{text}").and_then(|()| out.flush()) else { return };
-        if error.kind() != ErrorKind::BrokenPipe && !self.is_cut.swap(true, Ordering::Relaxed) {
-            self.error(format_args!("cannot write to standard output: {error}"));
-        }
-    }
-
-    /// Whether some output was lost.
-    pub(crate) fn is_cut(&self) -> bool {
-        self.is_cut.load(Ordering::Relaxed)
+        let (stream, other) = if self.is_out_taken() { (&self.err, &self.out) } else { (&self.out, &self.err) };
+        self.come_after(other);
+        stream.print(format!("{text}\n"));
     }
 
     /// Prints a value to standard output as JSON.
@@ -79,7 +92,7 @@ impl Shell {
 
     /// Prints the diagnostics of a graph to standard error.
     pub fn show(&self, report: &Report) {
-        eprint!("{}", report.render(self.colour.is_on(&std::io::stderr())));
+        self.print_beside(report.render(self.has_colour_on_stderr()));
     }
 
     /// Prints the diagnostics of a graph that does not load, and returns the exit code.
@@ -90,7 +103,7 @@ impl Shell {
 
     /// Prints an error to standard error.
     pub fn error(&self, message: impl Display) {
-        eprintln!("error: {message}");
+        self.print_beside(format!("error: {message}\n"));
     }
 
     /// Prints an error to standard error and returns the exit code of an invalid command line.
@@ -101,8 +114,130 @@ impl Shell {
 
     /// Prints a warning to standard error.
     pub fn warning(&self, message: impl Display) {
-        eprintln!("warning: {message}");
+        self.print_beside(format!("warning: {message}\n"));
     }
+
+    /// Prints a line to standard error that is neither an error nor a warning.
+    pub(crate) fn say_beside(&self, text: &str) {
+        self.print_beside(format!("{text}\n"));
+    }
+
+    fn print_beside(&self, text: String) {
+        self.come_after(&self.out);
+        self.err.print(text);
+    }
+
+    /// Draws a text on standard error in the place of the last drawing, if it is a terminal.
+    pub(crate) fn draw(&self, text: &str) {
+        if stderr().is_terminal() {
+            self.err.draw(text.to_owned());
+        }
+    }
+
+    /// Returns standard error.
+    pub(crate) const fn err(&self) -> &OutStream {
+        &self.err
+    }
+
+    /// Uses standard output for a file of the run; from now on, every text goes to standard error.
+    pub(crate) fn take_output(&self) {
+        self.is_out_taken.store(true, Ordering::Relaxed);
+    }
+
+    fn is_out_taken(&self) -> bool {
+        self.is_out_taken.load(Ordering::Relaxed)
+    }
+
+    /// Returns how long to wait for readers of the output.
+    pub(crate) fn patience(&self) -> Patience {
+        self.patience.lock().unwrap_or_else(PoisonError::into_inner).clone()
+    }
+
+    /// Sets how long to wait for readers of the output.
+    pub(crate) fn set_patience(&self, patience: &Patience) {
+        *self.patience.lock().unwrap_or_else(PoisonError::into_inner) = patience.clone();
+        for stream in [&self.out, &self.err] {
+            stream.set_patience(patience.clone());
+        }
+    }
+
+    /// Waits for a moment until the lines before are written, so that both streams keep their order on a terminal.
+    fn come_after(&self, other: &OutStream) {
+        let is_stuck = self.is_stuck.load(Ordering::Relaxed);
+        let mut waiting = self.patience().begin_short();
+        while !is_stuck && !other.is_idle() {
+            if !waiting.goes_on(other.progress()) {
+                self.is_stuck.store(true, Ordering::Relaxed);
+                return;
+            }
+            std::thread::sleep(POLL_INTERVAL);
+        }
+    }
+
+    /// Writes what is left of the output, says what was lost, and returns the exit code.
+    pub(crate) fn finish(&self, code: u8) -> u8 {
+        self.settle();
+        let (out, err) = (self.out.lost(), self.err.lost());
+        if err.lines > 0 {
+            let message = format!("warning: {}\n", lost_text("standard error", &err));
+            let can_take_it = err.error.is_none() && !self.err.is_closed();
+            match (can_take_it, self.is_out_taken()) {
+                (true, _) => self.err.print(message),
+                (false, false) => self.out.print(message),
+                // There is nobody left to tell.
+                (false, true) => {}
+            }
+        }
+        // `head` has seen enough, which is no error.
+        let is_cut = out.lines > 0 && !out.is_closed_by_reader;
+        if is_cut {
+            self.error(lost_text("standard output", &out));
+        }
+        self.settle();
+        if is_cut { code.max(FAULTED) } else { code }
+    }
+
+    /// Waits until the output is written, or until its readers are given up.
+    fn settle(&self) {
+        let mut waiting = self.patience().begin();
+        while !(self.out.is_idle() && self.err.is_idle()) {
+            if !waiting.goes_on(self.out.progress() + self.err.progress()) {
+                self.out.give_up();
+                self.err.give_up();
+                return;
+            }
+            std::thread::sleep(POLL_INTERVAL);
+        }
+    }
+}
+
+/// Describes what a stream has lost.
+fn lost_text(stream: &str, lost: &Lost) -> String {
+    let count = count_of(lost.lines as usize, "line");
+    match &lost.error {
+        Some(error) => format!("cannot write to {stream}: {error}: {count} lost"),
+        None => format!("{stream} was not read in time: {count} lost"),
+    }
+}
+
+/// Returns standard output as a file, for a thread that writes it.
+pub(crate) fn standard_output() -> io::Result<File> {
+    duplicate(&stdout())
+}
+
+/// Returns standard error as a file, for a thread that writes it.
+pub(crate) fn standard_error() -> io::Result<File> {
+    duplicate(&stderr())
+}
+
+#[cfg(unix)]
+fn duplicate(stream: &impl std::os::fd::AsFd) -> io::Result<File> {
+    stream.as_fd().try_clone_to_owned().map(File::from)
+}
+
+#[cfg(windows)]
+fn duplicate(stream: &impl std::os::windows::io::AsHandle) -> io::Result<File> {
+    stream.as_handle().try_clone_to_owned().map(File::from)
 }
 
 /// When to use colours.

@@ -4,9 +4,7 @@ mod image;
 mod layout;
 mod panel;
 
-use std::fs::File;
-use std::io::{self, Write};
-use std::path::Path;
+use std::io;
 
 use image::{draw_image, image_size};
 use layout::{CHARACTER, CURVES, LINE, TOP, WIDTH};
@@ -16,30 +14,34 @@ use crate::cli::text::number::{is_flat, seconds};
 use crate::cli::text::svg::{PlotAxis, Svg};
 use crate::cli::view::RunView;
 use crate::engine::{Engine, ModeChange};
+use crate::record::{OutputFile, write_whole};
 
 /// Maximum number of bins of a curve, several for each column of pixels.
 const MAX_BINS: usize = 4096;
 /// Collects a still picture of a run and writes it at the end.
 pub(crate) struct Still {
-    file: File,
+    file: OutputFile,
     title: String,
     view: RunView,
 }
 
 impl Still {
-    /// Creates the file.
+    /// Creates a picture that is written to an open file.
     ///
     /// # Errors
-    /// If the graph shows nothing or the file cannot be created.
-    pub(crate) fn create(path: &Path, title: &str, engine: &Engine) -> Result<Self, String> {
+    /// If the graph shows nothing.
+    pub(crate) fn new(
+        open: impl FnOnce() -> Result<OutputFile, String>,
+        title: &str,
+        engine: &Engine,
+    ) -> Result<Self, String> {
         let view = RunView::new(engine, MAX_BINS);
         if view.images.is_empty() && view.curves.is_empty() {
             return Err(
                 "`--svg` draws the ports that the graph shows: add `show = [\"node.port\"]` under [graph]".into()
             );
         }
-        let file = File::create(path).map_err(|error| format!("cannot create `{}`: {error}", path.display()))?;
-        Ok(Self { file, title: title.to_owned(), view })
+        Ok(Self { file: open()?, title: title.to_owned(), view })
     }
 
     /// Adds the last tick of the engine.
@@ -47,12 +49,13 @@ impl Still {
         self.view.add(engine);
     }
 
-    /// Writes the picture.
+    /// Writes the picture. Waits while `goes_on` returns true for the number of bytes that have been written.
     ///
     /// # Errors
     /// If it cannot be written.
-    pub(crate) fn finish(mut self, engine: &Engine) -> io::Result<()> {
-        self.file.write_all(draw(&self.title, &self.view, &engine.changes()).as_bytes())
+    pub(crate) fn finish(self, engine: &Engine, goes_on: impl FnMut(u64) -> bool) -> io::Result<()> {
+        let text = draw(&self.title, &self.view, &engine.changes());
+        write_whole(self.file, text.into_bytes(), goes_on)
     }
 }
 

@@ -4,15 +4,15 @@ mod table;
 mod verified;
 
 use std::collections::BTreeSet;
-use std::io::{IsTerminal, Write, stderr};
 use std::path::{Path, PathBuf};
-use std::sync::OnceLock;
 use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Arc, OnceLock};
 
 use verified::Verified;
 
 use super::shell::command::OutputFormat;
 use super::shell::panics::without_panic_messages;
+use super::shell::patience::Patience;
 use super::shell::{FAULTED, NOT_LOADED, Shell};
 use crate::catalogue::Catalogue;
 use crate::engine::Interrupt;
@@ -56,7 +56,7 @@ pub(crate) fn verify(args: VerifyArgs, shell: &Shell) -> u8 {
 
 fn verify_all(args: &VerifyArgs, shell: &Shell) -> Result<u8, String> {
     let mut all = prepare(args, shell.catalogue())?;
-    let is_complete = run(&mut all, args, shell.catalogue())?;
+    let is_complete = run(&mut all, args, shell)?;
     if args.json || args.format == OutputFormat::Json {
         shell.say_json(&table::json(&all));
     } else {
@@ -125,8 +125,9 @@ type PendingRun = (usize, Option<u64>);
 
 /// Runs all scenarios in parallel and returns whether all runs were completed. The results do not depend on the number
 /// of threads.
-fn run(all: &mut [Verified], args: &VerifyArgs, catalogue: &Catalogue) -> Result<bool, String> {
-    let interrupt = Interrupt::catch().map_err(|error| format!("cannot run: {error}"))?;
+fn run(all: &mut [Verified], args: &VerifyArgs, shell: &Shell) -> Result<bool, String> {
+    let interrupt = Arc::new(Interrupt::catch().map_err(|error| format!("cannot run: {error}"))?);
+    shell.set_patience(&Patience::Interruptible(interrupt.clone()));
     let runs = |(i, verified): (usize, &Verified)| {
         let seeds: Vec<Option<u64>> = verified.loaded.iter().flat_map(Scenario::runs).collect();
         seeds.into_iter().map(move |seed| (i, seed))
@@ -140,8 +141,8 @@ fn run(all: &mut [Verified], args: &VerifyArgs, catalogue: &Catalogue) -> Result
         let verified = &all[scenario];
         let record = args.out.as_deref().map(|folder| folder.join(record_name(&verified.name(), seed)));
         let scenario = verified.loaded.as_ref().ok()?;
-        let trial = scenario.run(catalogue, seed, record.as_deref(), &|| interrupt.is_requested());
-        show_progress(&format!("{} of {} runs", done.fetch_add(1, Ordering::Relaxed) + 1, work.len()));
+        let trial = scenario.run(shell.catalogue(), seed, record.as_deref(), &|| interrupt.is_requested());
+        shell.draw(&format!("{} of {} runs", done.fetch_add(1, Ordering::Relaxed) + 1, work.len()));
         trial
     };
     let worker = || {
@@ -156,7 +157,7 @@ fn run(all: &mut [Verified], args: &VerifyArgs, catalogue: &Catalogue) -> Result
             joined.for_each(|end| end.unwrap_or_else(|panic| std::panic::resume_unwind(panic)));
         });
     });
-    show_progress("");
+    shell.draw("");
     let is_complete = trials.iter().all(|trial| trial.get().is_some());
     for ((scenario, _), trial) in work.iter().zip(trials) {
         all[*scenario].trials.extend(trial.into_inner());
@@ -169,12 +170,4 @@ fn run(all: &mut [Verified], args: &VerifyArgs, catalogue: &Catalogue) -> Result
 
 fn record_name(scenario: &str, seed: Option<u64>) -> String {
     seed.map_or_else(|| format!("{scenario}.csv"), |seed| format!("{scenario}-{seed}.csv"))
-}
-
-/// Prints a line over the last one, if standard error is a terminal.
-fn show_progress(line: &str) {
-    if stderr().is_terminal() {
-        // Errors of the terminal are ignored.
-        let _ = write!(stderr(), "\r{line}\x1b[K");
-    }
 }

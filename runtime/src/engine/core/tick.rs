@@ -72,7 +72,7 @@ impl Core {
 
     /// Steps the nodes from the runner `first` on, each at most once. Returns whether all values are finite.
     pub(crate) fn run(&mut self, first: usize, timing: &mut Timing) -> bool {
-        if Timing::is_due(self.tick.index) {
+        if timing.is_due(self.tick.index) {
             self.step_timed(first, timing);
         } else {
             self.step(first);
@@ -128,6 +128,7 @@ impl Core {
             before = after;
         }
         timing.ticks += 1;
+        timing.last_tick = self.tick.index;
     }
 
     /// Commits the commands, which ramp to zero while their task is halted, and the reports.
@@ -191,22 +192,29 @@ pub struct NodeTime {
     pub total: Duration,
     /// Longest time in one tick.
     pub longest: Duration,
+    /// Time in the last timed tick.
+    pub(crate) last: Duration,
 }
 
 impl NodeTime {
     fn add(&mut self, time: Duration) {
-        self.total += time;
+        (self.total, self.last) = (self.total + time, time);
         self.longest = self.longest.max(time);
     }
 }
 
-/// Step times of the nodes. Only one tick in 64 is timed, because reading the clock costs more than most nodes.
+/// Step times of the nodes. One tick in 64 is timed, because reading the clock costs more than most nodes; in real time,
+/// every tick after one that was late.
 #[derive(Debug, Clone)]
 pub struct Timing {
     /// The nodes, in the order in which they step.
     pub nodes: Vec<NodeTime>,
     /// Number of timed ticks.
     pub ticks: u64,
+    /// Whether every tick is timed.
+    pub(crate) is_always_on: bool,
+    /// Number of the last timed tick.
+    pub(crate) last_tick: u64,
 }
 
 impl Timing {
@@ -214,10 +222,10 @@ impl Timing {
     const INTERVAL_TICKS: u64 = 64;
 
     pub(crate) fn new(nodes: usize) -> Self {
-        Self { nodes: vec![NodeTime::default(); nodes], ticks: 0 }
+        Self { nodes: vec![NodeTime::default(); nodes], ticks: 0, is_always_on: false, last_tick: 0 }
     }
 
-    const fn is_due(tick: u64) -> bool {
-        tick % Self::INTERVAL_TICKS == Self::INTERVAL_TICKS / 2
+    const fn is_due(&self, tick: u64) -> bool {
+        self.is_always_on || tick % Self::INTERVAL_TICKS == Self::INTERVAL_TICKS / 2
     }
 }

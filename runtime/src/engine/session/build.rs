@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 
 use super::engine::{DisplayedPort, Engine, Logged};
+use super::punctuality::Punctuality;
 use super::schedule::TickSchedule;
 use super::task_run::TaskRun;
 use super::trouble::{Origin, WatchedBudget, WatchedWire};
@@ -132,6 +133,7 @@ impl Engine {
             panic: String::new(),
             late: 0,
             lateness: None,
+            punctuality: Punctuality::default(),
             sources,
         }
     }

@@ -1,6 +1,7 @@
 //! One cycle of the engine: exchange with the devices, latch, step, commit, and the handling of each trouble.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::time::Instant;
 
 use super::engine::Engine;
 use super::task_run::TaskEnd;
@@ -383,12 +384,16 @@ impl Engine {
             let device = &mut self.devices[i];
             match &mut device.link {
                 DeviceLink::Stepped(driver) => {
+                    let before = self.timing.is_always_on.then(Instant::now);
                     let exchange = || driver.exchange(now, &device.commands, &mut device.samples);
                     let result = catch_unwind(AssertUnwindSafe(exchange));
                     let result = result
                         .unwrap_or_else(|panic| Err(DeviceError(format!("it panicked: {}", panic_message(&*panic)))));
                     if let Err(DeviceError(why)) = result {
                         self.lose_device(i, why);
+                    }
+                    if let Some(before) = before {
+                        self.punctuality.device_took(i, before.elapsed());
                     }
                 }
                 DeviceLink::Live(linked) => {

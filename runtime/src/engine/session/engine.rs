@@ -1,6 +1,7 @@
 //! The engine: the state of a running graph and its accessors.
 
 use super::halt::{Halt, Rest};
+use super::punctuality::Punctuality;
 use super::schedule::TickSchedule;
 use super::task_run::{TaskEnd, TaskRun};
 use super::trouble::{WatchedBudget, WatchedWire};
@@ -56,6 +57,7 @@ pub struct Engine {
     pub(super) late: u64,
     /// How late the next tick begins, if it is too late [ns].
     pub(super) lateness: Option<i64>,
+    pub(super) punctuality: Punctuality,
     pub(super) sources: SourceMap,
 }
 

@@ -70,6 +70,9 @@ impl Pacer for RealTimePacer {
         }
         engine.collect_ended_drivers();
         self.input.carry_out(engine, now);
+        if self.is_real {
+            engine.begin_measured(next + late, next);
+        }
         if late > engine.period() {
             engine.begin_late(late);
         }
