@@ -148,8 +148,8 @@ fn every_shipped_task_works_on_a_small_slow_pad() {
 
 #[test]
 fn a_ridge_is_kept_by_an_arm_with_little_damping() {
-    // While the contact is light, a line moves by the length of the pad for a tilt of a hundredth: rolling toward its
-    // middle makes such an arm oscillate, and the pad leaves the ridge.
+    // While the contact with a line is light, a small tilt moves its middle far: rolling toward it makes such an arm
+    // oscillate, and the pad leaves the ridge.
     let request = on_robot("seek_ridge", "ridge.toml", ROBOTS[2]).set("devices.bench.damping_ratio=0.2");
     let (modes, error, _) = shown(&request, 3.0);
     assert_eq!(modes, ["approach", "press", "turn", "follow"]);
