@@ -35,6 +35,12 @@ impl Peer {
         Self { child, out, port: port.trim().to_owned() }
     }
 
+    /// Sends it a signal.
+    pub(crate) fn signal(&self, name: &str) {
+        let kill = Command::new("kill").args([name, &self.child.id().to_string()]).status().unwrap();
+        assert!(kill.success());
+    }
+
     /// What it saw, once it has ended.
     pub(crate) fn seen(mut self) -> Value {
         let mut text = String::new();

@@ -167,3 +167,18 @@ fn a_reader_that_reads_nothing_does_not_keep_the_process() {
     assert!(took < SOON, "{took:?}");
     drop(reader);
 }
+
+#[test]
+fn a_simulator_that_hangs_does_not_keep_the_process() {
+    let (_folder, path) = in_new_folder("rows.csv");
+    let peer = Peer::start("--scene pen --seconds 1000");
+    let mut command = command("force", &peer.port, &["--out", &path]);
+    let running = Running::started(&mut command, Path::new(&path), 150_000);
+    peer.signal("-STOP");
+    std::thread::sleep(Duration::from_millis(300));
+    running.signal("-INT");
+    let (took, said) = running.end();
+    peer.signal("-KILL");
+    assert!(said.code == 0 && said.out.contains("interrupted by SIGINT"), "{}{}", said.out, said.err);
+    assert!(took < Duration::from_secs(3), "{took:?}");
+}

@@ -16,6 +16,7 @@ mod silence;
 use std::borrow::Cow;
 use std::fmt;
 use std::marker::PhantomData;
+use std::sync::atomic::AtomicBool;
 
 use crate::node::{Describe, Mistakes, Param, ParamSpec, PortSpec, Reader};
 use crate::source::Value;
@@ -117,6 +118,12 @@ pub trait Stepped: Send {
     /// # Errors
     /// If the device fails. The run ends.
     fn exchange(&mut self, now: i64, commands: &Commands, samples: &mut Samples) -> Result<(), DeviceError>;
+
+    /// Receives a flag that is set when the operator ends the run. A device that waits for another program looks at it
+    /// while it waits, and soon gives up.
+    fn watch(&mut self, is_ending: &'static AtomicBool) {
+        let _ = is_ending;
+    }
 
     /// Called at the end of the run, with its reason. Every command was zero in the last exchange. It is not called for
     /// a device that has failed.

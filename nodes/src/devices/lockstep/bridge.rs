@@ -1,5 +1,6 @@
 //! The exchange of frames and commands with a simulator, and how the arm is brought to rest at the end.
 
+use std::sync::atomic::AtomicBool;
 use std::time::{Duration, Instant};
 
 use tactflow_runtime::device::{Commands, DeviceError, Output, Samples, Stepped};
@@ -148,6 +149,10 @@ impl Stepped for Bridge {
             (None, None) => 0,
         };
         (!self.is_over).then_some(next)
+    }
+
+    fn watch(&mut self, is_ending: &'static AtomicBool) {
+        self.socket.watch(is_ending);
     }
 
     fn exchange(&mut self, now: i64, commands: &Commands, samples: &mut Samples) -> Result<(), DeviceError> {

@@ -2,6 +2,7 @@
 
 use std::io::{BufRead, BufReader, ErrorKind, Write};
 use std::net::{Shutdown, TcpStream, ToSocketAddrs};
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use super::lines::Lines;
@@ -10,6 +11,10 @@ use super::lines::Lines;
 const RETRY_PERIOD: Duration = Duration::from_millis(50);
 /// Minimum timeout of a call of the operating system, where 0 would be no timeout.
 const MIN_TIMEOUT: Duration = Duration::from_millis(1);
+/// Longest time between two looks at whether the operator ends the run.
+const LOOK: Duration = Duration::from_millis(20);
+/// Maximum time to wait for the simulator when the operator ends the run.
+const LAST_WAIT: Duration = Duration::from_millis(200);
 
 /// The connection to a simulator.
 #[derive(Debug)]
@@ -19,6 +24,8 @@ pub(super) struct Socket {
     /// Whether the simulator has closed its end.
     is_closed: bool,
     timeout: Duration,
+    /// Whether the operator ends the run; `None` before the run.
+    is_ending: Option<&'static AtomicBool>,
 }
 
 impl Socket {
@@ -43,9 +50,9 @@ impl Socket {
     fn new(stream: TcpStream, timeout: Duration) -> std::io::Result<Self> {
         // Each command is one small packet that the simulator waits for.
         stream.set_nodelay(true)?;
-        stream.set_write_timeout(Some(timeout))?;
+        stream.set_write_timeout(Some(LOOK))?;
         let stream = BufReader::with_capacity(1 << 16, stream);
-        Ok(Self { stream, lines: Lines::default(), is_closed: false, timeout })
+        Ok(Self { stream, lines: Lines::default(), is_closed: false, timeout, is_ending: None })
     }
 
     /// Sends a line.
@@ -53,12 +60,35 @@ impl Socket {
     /// # Errors
     /// Why it cannot be sent.
     pub(super) fn send(&mut self, line: &str) -> Result<(), String> {
-        self.stream.get_mut().write_all(line.as_bytes()).map_err(|error| match error.kind() {
-            ErrorKind::WouldBlock | ErrorKind::TimedOut => {
-                format!("the simulator has read no command for {} s", self.timeout.as_secs_f64())
+        let (begin, mut rest) = (Instant::now(), line.as_bytes());
+        while !rest.is_empty() {
+            match self.stream.get_mut().write(rest) {
+                Ok(count) => rest = &rest[count..],
+                Err(error) => match error.kind() {
+                    ErrorKind::Interrupted => {}
+                    ErrorKind::WouldBlock | ErrorKind::TimedOut if begin.elapsed() < self.patience() => {}
+                    ErrorKind::WouldBlock | ErrorKind::TimedOut => {
+                        return Err(format!(
+                            "the simulator has read no command for {} s",
+                            self.patience().as_secs_f64()
+                        ));
+                    }
+                    _ => return Err(format!("the simulator has closed the connection without an `end` ({error})")),
+                },
             }
-            _ => format!("the simulator has closed the connection without an `end` ({error})"),
-        })
+        }
+        Ok(())
+    }
+
+    /// Watches a flag that is set when the operator ends the run. The waits for the simulator are short then.
+    pub(super) const fn watch(&mut self, is_ending: &'static AtomicBool) {
+        self.is_ending = Some(is_ending);
+    }
+
+    /// Returns how long to wait for the simulator.
+    fn patience(&self) -> Duration {
+        let is_ending = self.is_ending.is_some_and(|flag| flag.load(Ordering::Acquire));
+        if is_ending { self.timeout.min(LAST_WAIT) } else { self.timeout }
     }
 
     /// Waits for the next line.
@@ -66,9 +96,16 @@ impl Socket {
     /// # Errors
     /// If no line arrives in time, or if it is not valid.
     pub(super) fn line(&mut self) -> Result<String, String> {
-        let timeout = self.timeout;
-        let silence = || format!("the simulator has sent nothing for {} s", timeout.as_secs_f64());
-        self.line_within(timeout)?.ok_or_else(silence)
+        let begin = Instant::now();
+        loop {
+            if let Some(line) = self.line_within(LOOK)? {
+                return Ok(line);
+            }
+            let patience = self.patience();
+            if begin.elapsed() >= patience {
+                return Err(format!("the simulator has sent nothing for {} s", patience.as_secs_f64()));
+            }
+        }
     }
 
     /// Waits for the next line for a `time`.

@@ -51,6 +51,11 @@ impl RealTimePacer {
         let is_real = options.is_realtime || is_live;
         let until = options.duration.map_or(i64::MAX, |seconds| (seconds * 1e9) as i64);
         let input = OperatorInput::new(&options.sends, options.listens, engine)?;
+        for device in &mut engine.devices {
+            if let DeviceLink::Stepped(driver) = &mut device.link {
+                driver.watch(interrupt.flag());
+            }
+        }
         let epoch = Instant::now();
         engine.start_drivers(epoch)?;
         let (has_refused, is_silent) = (false, false);
@@ -76,7 +81,11 @@ impl Pacer for RealTimePacer {
         if late > engine.period() {
             engine.begin_late(late);
         }
-        engine.tick(now).map(|()| true)
+        match engine.tick(now) {
+            // A device that waited for another program has given up.
+            Err(_) if self.is_interrupted() => Ok(false),
+            ticked => ticked.map(|()| true),
+        }
     }
 
     fn after(&mut self, engine: &Engine) -> Option<Fault> {

@@ -1,12 +1,10 @@
 //! What a signal does: it ends a run by the ramp, and the process soon after, whatever hangs.
 
 use std::io;
-use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::Builder;
 use std::time::{Duration, Instant};
-
-use tokio::sync::watch;
 
 use super::caught::{EXIT_INTERRUPTED, Signal, Wish, block_terminal_stops, exit_now, receive};
 
@@ -51,12 +49,17 @@ impl Interrupt {
     /// Whether a signal has asked to end the process.
     #[must_use]
     pub fn is_requested(&self) -> bool {
-        self.signal().is_some()
+        self.flag().load(Ordering::Acquire)
     }
 
     /// Returns the name of the first signal that has asked to end the process.
     pub(crate) fn signal(&self) -> Option<&'static str> {
-        *self.caught.requested.borrow()
+        self.caught.phase().signal
+    }
+
+    /// Returns the flag that a signal sets which asks to end the process.
+    pub(crate) fn flag(&self) -> &'static AtomicBool {
+        &self.caught.is_requested
     }
 
     /// Returns how often the process was asked to suspend itself since the last call, and refused.
@@ -72,7 +75,8 @@ impl Drop for Interrupt {
         phase.runs -= usize::from(self.is_run);
         if phase.guards == 0 {
             phase.signalled = None;
-            self.caught.requested.send_replace(None);
+            phase.signal = None;
+            self.caught.is_requested.store(false, Ordering::Release);
             self.caught.changed.notify_all();
         }
     }
@@ -83,8 +87,8 @@ struct Caught {
     phase: Mutex<Phase>,
     /// Notified when the time of the first signal changes.
     changed: Condvar,
-    /// The name of the first signal that asked to end the process.
-    requested: watch::Sender<Option<&'static str>>,
+    /// Whether a signal has asked to end the process.
+    is_requested: AtomicBool,
     /// How often it was asked to suspend itself.
     refused: AtomicUsize,
 }
@@ -95,8 +99,9 @@ struct Phase {
     guards: usize,
     /// Number of those that belong to a run.
     runs: usize,
-    /// When the first signal came that asked to end the process.
+    /// When the first signal came that asked to end the process, and its name.
     signalled: Option<Instant>,
+    signal: Option<&'static str>,
 }
 
 /// Returns the signals of the process. The first call installs the handlers and starts the threads.
@@ -109,7 +114,7 @@ fn caught() -> io::Result<&'static Caught> {
     let caught: &'static Caught = Box::leak(Box::new(Caught {
         phase: Mutex::default(),
         changed: Condvar::new(),
-        requested: watch::Sender::new(None),
+        is_requested: AtomicBool::new(false),
         refused: AtomicUsize::new(0),
     }));
     // It starts first: from the first signal on, there must be one.
@@ -137,7 +142,8 @@ impl Caught {
             Wish::End if phase.guards == 0 => signal.do_default(),
             Wish::End if phase.signalled.is_none() => {
                 phase.signalled = Some(Instant::now());
-                self.requested.send_replace(Some(signal.name));
+                phase.signal = Some(signal.name);
+                self.is_requested.store(true, Ordering::Release);
                 self.changed.notify_all();
             }
             Wish::End if phase.runs == 0 => exit_now(EXIT_INTERRUPTED),
@@ -153,8 +159,9 @@ impl Caught {
             phase = match left {
                 None => self.changed.wait(phase).unwrap_or_else(PoisonError::into_inner),
                 Some(Duration::ZERO) => {
+                    let signal = phase.signal.unwrap_or("a signal");
                     drop(phase);
-                    give_up(self.requested.borrow().unwrap_or("a signal"))
+                    give_up(signal)
                 }
                 Some(left) => self.changed.wait_timeout(phase, left).unwrap_or_else(PoisonError::into_inner).0,
             };
