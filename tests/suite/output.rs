@@ -111,6 +111,13 @@ fn a_reader_that_reads_nothing_delays_no_tick_and_lost_lines_are_counted() {
             );
         });
         scope.spawn(|| {
+            let (_folder, path) = in_new_folder("order.csv");
+            let said = said(&mut shell("$RUN --out $OUT 2>&1", &path));
+            let [first, last] = [said.out.find("INFO log"), said.out.rfind("INFO log")].map(Option::unwrap);
+            let [title, summary] = ["one tick every", "`--ports` prints"].map(|text| said.out.find(text).unwrap());
+            assert!(title < first && last < summary, "the streams keep their order: {title} {first} {last} {summary}");
+        });
+        scope.spawn(|| {
             let (_folder, path) = in_new_folder("terminal.csv");
             let script = "python3 tests/peers/frozen_terminal.py $RUN --out $OUT";
             let said = said(&mut shell(script, &path));
