@@ -1,4 +1,5 @@
-//! A simulator with a clock of its own: how old its frames are for the graph, and how soon each is answered.
+//! Clocks of devices: a simulator with a clock of its own, how old its frames are for the graph and how soon each is
+//! answered; and clocks that start late or come late.
 
 use std::io::{BufRead, BufReader, Write};
 use std::net::{TcpListener, TcpStream};
@@ -6,9 +7,12 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 use serde_json::{Value, json};
+use tactflow_runtime::device::{Description, Device, DeviceError, Driver, Link, Live, Opened, Output};
 use tactflow_runtime::engine::{self, Engine, RunOptions};
+use tactflow_runtime::fault::Cause;
 use tactflow_runtime::graph::{Request, compile};
-use tactflow_runtime::signal::Joints;
+use tactflow_runtime::node::{Describe, Mistakes, Param};
+use tactflow_runtime::signal::{Joints, Scalar, ScalarShape, Unit};
 use tactflow_tests::{catalogue, workspace};
 
 /// Time between two frames.
@@ -168,5 +172,97 @@ fn ages_are_true_and_frames_are_answered_at_once_whatever_the_clock_of_the_simul
         // Half of them, since a busy machine delays both sides.
         assert!(error[0] < 0.001, "{peer:?}: {error:?} s");
         assert!(answer[0] < 2.0 * PERIOD.as_secs_f64(), "{peer:?}: {answer:?} s");
+    }
+}
+
+/// A length that begins late, and then comes in intervals of its own; its period is 10 ms.
+#[derive(Describe)]
+#[describe(name = "late_length")]
+struct Late {
+    value: Output<Scalar>,
+    start: Duration,
+    interval: Duration,
+}
+
+/// Parameters of `late_length`.
+#[derive(Debug, Clone, Param)]
+struct LateParams {
+    /// Time of the first sample.
+    #[param(unit = "ms")]
+    start_ms: f64,
+    /// Time between two samples.
+    #[param(unit = "ms", default = 10.0)]
+    interval_ms: f64,
+}
+
+impl Device for Late {
+    type Params = LateParams;
+
+    fn open(params: LateParams) -> Result<Opened, Mistakes> {
+        let mut description = Description::every(0.01);
+        let value = description.fills("length").output("value", ScalarShape::of(Unit::METRE));
+        let [start, interval] = [params.start_ms, params.interval_ms].map(|ms| Duration::from_secs_f64(ms * 1e-3));
+        Ok(Opened { description, driver: Driver::Live(Box::new(Self { value, start, interval })) })
+    }
+}
+
+#[async_trait::async_trait]
+impl Live for Late {
+    async fn run(self: Box<Self>, mut link: Link) -> Result<(), DeviceError> {
+        let mut next = Instant::now() + self.start;
+        for number in 1.. {
+            let stopped = link.stopped();
+            tokio::select! {
+                () = tokio::time::sleep_until(next.into()) => {}
+                () = stopped => break,
+            }
+            let stamp = link.arrival();
+            link.publish(|samples| *samples.write(self.value, stamp, number) = number as f64);
+            next += self.interval;
+        }
+        Ok(())
+    }
+}
+
+/// Runs a graph whose clock is a late length. `observe` is called after each tick.
+fn run_late(params: &str, seconds: f64, observe: &mut dyn FnMut(&Engine)) -> Engine {
+    let graph = "graph.clock = 'a'\nroles.a = 'length'\nnodes.count = { type = 'count', in.value = 'a.value' }\n";
+    let bench = format!("bind.a = 'late'\ndevices.late = {{ type = 'late_length', {params} }}\n");
+    let request = Request { bench_text: Some(bench), ..Request::text(graph) };
+    let plan =
+        compile(&catalogue().device::<Late>(), &request).unwrap_or_else(|report| panic!("{}", report.render(false)));
+    let mut engine = Engine::new(plan);
+    let options = RunOptions { duration: Some(seconds), ..RunOptions::default() };
+    engine::run(&mut engine, &options, observe).unwrap();
+    engine
+}
+
+#[test]
+fn a_live_clock_that_starts_slowly_holds_nothing_and_one_that_never_starts_is_named() {
+    let engine = run_late("start_ms = 1000", 1.4, &mut |_| {});
+    assert!(engine.halts().is_empty(), "{:?}", engine.halts());
+    assert!(engine.get::<Scalar>("count.steps").is_some_and(|steps| *steps > 5.0));
+    let engine = run_late("start_ms = 1e6", 2.4, &mut |_| {});
+    let halt = &engine.halts()[0];
+    assert!(matches!(halt.fault.cause, Cause::NeverSampled | Cause::SilentClock), "{halt:?}");
+    assert!((2_000_000_000..2_300_000_000).contains(&halt.fault.time), "{halt:?}");
+}
+
+#[test]
+fn the_tick_of_a_timer_does_not_take_the_place_of_a_sample() {
+    // A timer ticks 30 ms after the last sample, and the sample comes one to three milliseconds later.
+    for interval in [31.0, 32.0, 33.0] {
+        let (mut ages, mut last) = (Vec::new(), 0.0);
+        run_late(&format!("start_ms = 0, interval_ms = {interval:.1}"), 1.2, &mut |engine| {
+            let steps = engine.get::<Scalar>("count.steps").copied().unwrap_or(0.0);
+            if steps > last {
+                ages.push(engine.mark("a.value").stamp().age(engine.now()) as f64 * 1e-9);
+                last = steps;
+            }
+        });
+        ages.sort_by(f64::total_cmp);
+        assert!(ages.len() > 25, "{interval} ms: {} samples", ages.len());
+        // The next tick of the timer is 10 ms later.
+        assert!(quantile(&ages, 0.5) < 0.005, "{interval} ms: {ages:?}");
     }
 }

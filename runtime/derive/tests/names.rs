@@ -46,7 +46,8 @@ pub struct Offset {
     offset: f64,
 }
 
-fn main() {
+#[test]
+fn sets_with_the_same_letters_name_the_inputs_they_mean() {
     assert_eq!(First::<Scalar>::specs().len() + Second::specs().len(), 2);
     assert_eq!(Rate::specs().len() + Sum::specs().len(), 2);
     assert_eq!(Offset::fields().len(), 1);
