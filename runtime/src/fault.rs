@@ -31,7 +31,8 @@ pub enum Cause {
         /// Delay of the tick [ns].
         by: i64,
     },
-    /// The commands to a device were not renewed in time, so it has stopped by itself.
+    /// A device got no valid command in time, so it has stopped by itself: the tick hung, the process was suspended, or
+    /// its driver sent nothing.
     LostLease,
     /// A budget of a limiter is spent.
     Spent,
@@ -89,7 +90,7 @@ impl fmt::Display for Fault {
             Cause::SilentClock => write!(f, "the clock device `{name}` sends no samples")?,
             Cause::Late { by } => write!(f, "a tick began {:.1} ms late", ms(*by))?,
             Cause::LostLease => {
-                write!(f, "the commands to device `{name}` were not renewed in time, so it stops by itself")?;
+                write!(f, "device `{name}` got no valid command in time, so it stops by itself")?;
             }
             Cause::Spent => write!(f, "`{name}` has spent its budget of motion without a contact")?,
             Cause::Operator => write!(f, "the operator sent `stop`")?,

@@ -8,15 +8,13 @@ use std::time::{Duration, Instant};
 
 use serde_json::{Value, json};
 use tactflow_runtime::device::{Description, Device, DeviceError, Driver, Link, Live, Opened, Output};
-use tactflow_runtime::engine::{self, Engine, RunOptions};
+use tactflow_runtime::engine::{self, Engine, Halt, RunOptions};
 use tactflow_runtime::fault::Cause;
 use tactflow_runtime::graph::{Request, compile};
 use tactflow_runtime::node::{Describe, Mistakes, Param};
 use tactflow_runtime::signal::{Joints, Scalar, ScalarShape, Unit};
 use tactflow_tests::{catalogue, workspace};
 
-/// Time between two frames.
-const PERIOD: Duration = Duration::from_millis(8);
 /// The smallest delay of a frame.
 const DELAY: Duration = Duration::from_millis(2);
 /// What frame `i` adds to the first joint, by which it is recognised [rad].
@@ -35,6 +33,8 @@ struct Peer {
     /// Number of frames of each 250 that it does not send.
     silent: u32,
     frames: u32,
+    /// Time between two frames.
+    period: Duration,
 }
 
 /// When a frame was measured, when it was sent, and when it was answered.
@@ -45,11 +45,11 @@ struct Frame {
 }
 
 impl Peer {
-    fn hello() -> Value {
+    fn hello(self) -> Value {
         let names: Vec<String> =
             ["a1", "a2", "e1", "a3", "a4", "a5", "a6"].iter().map(|name| format!("lwr_{name}_joint")).collect();
         json!({
-            "type": "hello", "proto": 1, "dt": PERIOD.as_secs_f64(), "lockstep": false, "task": "nothing", "joints": names,
+            "type": "hello", "proto": 1, "dt": self.period.as_secs_f64(), "lockstep": false, "task": "nothing", "joints": names,
             "q_min": vec![-2.9; 7], "q_max": vec![2.9; 7], "dq_max": vec![1.9; 7], "urdf": "lwr4p", "tip": "lwr_7_link",
             "T_es": [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0.03, 0, 0, 0, 1], "rows": 4, "cols": 4, "pitch": 0.005,
             "counts_per_unit": 100, "newton_per_unit": 0.1, "threshold_units": 0.15,
@@ -59,7 +59,7 @@ impl Peer {
     /// Serves one graph. Returns the frames that were sent, each with its number.
     fn serve(self, mut stream: TcpStream) -> Vec<(u32, Frame)> {
         stream.set_nodelay(true).unwrap();
-        writeln!(stream, "{}", Self::hello()).unwrap();
+        writeln!(stream, "{}", self.hello()).unwrap();
         let answers = BufReader::new(stream.try_clone().unwrap());
         let answers = thread::spawn(move || {
             let mut seen = Vec::new();
@@ -72,13 +72,13 @@ impl Peer {
         let begin = Instant::now() + Duration::from_millis(100);
         let mut frames = Vec::new();
         for i in (1..=self.frames).filter(|i| i % 250 >= self.silent) {
-            let measured = begin + PERIOD * i;
+            let measured = begin + self.period * i;
             // A number from 0 to 1, the same in each run.
             let random = f64::from(i.wrapping_mul(2_654_435_769) >> 8) / f64::from(1 << 24);
-            let held = PERIOD * (self.burst - 1 - i % self.burst);
+            let held = self.period * (self.burst - 1 - i % self.burst);
             let due = measured + DELAY + held + self.jitter.mul_f64(random);
             thread::sleep(due.saturating_duration_since(Instant::now()));
-            let t = 500.0 + PERIOD.as_secs_f64() * f64::from(i) * (1.0 + self.drift);
+            let t = 500.0 + self.period.as_secs_f64() * f64::from(i) * (1.0 + self.drift);
             let mut q = START;
             q[0] += MARK * f64::from(i);
             let frame =
@@ -105,6 +105,9 @@ impl Peer {
 struct Seen {
     errors: Vec<f64>,
     answers: Vec<f64>,
+    /// Number of frames that were answered, from the start.
+    answered: usize,
+    halts: Vec<Halt>,
 }
 
 fn run(peer: Peer) -> Seen {
@@ -129,6 +132,7 @@ fn run(peer: Peer) -> Seen {
     .unwrap();
     stamps.dedup();
     let (frames, epoch) = (peer.join().unwrap(), epoch.unwrap());
+    let answered = frames.iter().filter(|(_, frame)| frame.answered.is_some()).count();
     let late = frames[0].1.measured + Duration::from_secs(5);
     let frames: Vec<&(u32, Frame)> = frames.iter().filter(|(_, frame)| frame.measured > late).collect();
     let error = |(number, stamp): &(u32, i64)| {
@@ -144,6 +148,8 @@ fn run(peer: Peer) -> Seen {
     // Of several frames that arrive together, the newest is answered.
     let answer = |(_, frame): &&(u32, Frame)| Some((frame.answered? - frame.sent).as_secs_f64());
     Seen {
+        answered,
+        halts: engine.halts().to_vec(),
         errors: sorted(stamps.iter().filter_map(error).collect()),
         answers: sorted(frames.iter().copied().filter_map(|frame| answer(&frame)).collect()),
     }
@@ -156,7 +162,8 @@ fn quantile(values: &[f64], share: f64) -> f64 {
 
 #[test]
 fn ages_are_true_and_frames_are_answered_at_once_whatever_the_clock_of_the_simulator_does() {
-    let steady = Peer { drift: 0.0, jitter: Duration::ZERO, burst: 1, silent: 0, frames: 900 };
+    let steady =
+        Peer { drift: 0.0, jitter: Duration::ZERO, burst: 1, silent: 0, frames: 900, period: Duration::from_millis(8) };
     let peers = [
         Peer { drift: 1e-4, ..steady },
         Peer { drift: 0.05, jitter: Duration::from_millis(5), ..steady },
@@ -171,7 +178,7 @@ fn ages_are_true_and_frames_are_answered_at_once_whatever_the_clock_of_the_simul
             [&seen.errors, &seen.answers].map(|values| [0.5, 0.99].map(|share| quantile(values, share)));
         // Half of them, since a busy machine delays both sides.
         assert!(error[0] < 0.001, "{peer:?}: {error:?} s");
-        assert!(answer[0] < 2.0 * PERIOD.as_secs_f64(), "{peer:?}: {answer:?} s");
+        assert!(answer[0] < 2.0 * peer.period.as_secs_f64(), "{peer:?}: {answer:?} s");
     }
 }
 
@@ -265,4 +272,23 @@ fn the_tick_of_a_timer_does_not_take_the_place_of_a_sample() {
         // The next tick of the timer is 10 ms later.
         assert!(quantile(&ages, 0.5) < 0.005, "{interval} ms: {ages:?}");
     }
+}
+
+#[test]
+fn a_slow_simulator_keeps_its_lease_and_a_flood_of_frames_keeps_no_command_back() {
+    let slow = Peer {
+        drift: 0.0,
+        jitter: Duration::ZERO,
+        burst: 1,
+        silent: 0,
+        frames: 25,
+        period: Duration::from_millis(100),
+    };
+    let seen = run(slow);
+    assert!(seen.halts.is_empty(), "{:?}", seen.halts);
+    assert!(seen.answered > 20, "{} of 25 frames are answered", seen.answered);
+    // Frames whose times say 8 ms come as fast as the connection takes them.
+    let flood = Peer { frames: 20_000, period: Duration::from_micros(1), ..slow };
+    let seen = run(flood);
+    assert!(seen.answered > 100, "{} frames are answered", seen.answered);
 }

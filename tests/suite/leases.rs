@@ -64,9 +64,9 @@ impl Motor {
 }
 
 /// Runs the graph on a motor for three seconds. `act` is called after each tick, on its thread.
-fn run(more: &str, act: &mut dyn FnMut(&Engine)) -> (Outcome, Engine, Vec<(Instant, f64)>) {
+fn run(set: &str, act: &mut dyn FnMut(&Engine)) -> (Outcome, Engine, Vec<(Instant, f64)>) {
     let motor = Motor::listen();
-    let request = Request { bench_text: Some(motor.bench()), ..Request::text(format!("{GRAPH}{more}")) };
+    let request = Request { bench_text: Some(motor.bench()), ..Request::text(GRAPH) }.set(set);
     let plan = compile(&catalogue(), &request).unwrap_or_else(|report| panic!("{}", report.render(false)));
     let mut engine = Engine::new(plan);
     // With a word that is still to come, a stop does not end the run.
@@ -94,7 +94,7 @@ fn assert_smooth(told: &[(Instant, f64)]) {
 #[test]
 fn a_tick_that_hangs_leaves_the_motor_at_rest_until_the_operator_resumes() {
     let mut hung = None;
-    let (outcome, engine, told) = run("", &mut |engine| {
+    let (outcome, engine, told) = run("devices.motor.acceleration=10", &mut |engine| {
         if engine.now() > 500_000_000 && hung.is_none() {
             let begin = Instant::now();
             // It spins, as a node with an endless loop would.
@@ -119,7 +119,7 @@ fn a_tick_that_hangs_leaves_the_motor_at_rest_until_the_operator_resumes() {
 fn a_tick_of_300_ms_loses_the_lease_and_one_that_is_a_little_late_does_not() {
     for (late, is_lost) in [(300, true), (25, false)] {
         let mut acted = None;
-        let (_, engine, told) = run("", &mut |engine| {
+        let (_, engine, told) = run("devices.motor.acceleration=10", &mut |engine| {
             if engine.now() > 500_000_000 && acted.is_none() {
                 thread::sleep(Duration::from_millis(late));
                 acted = Some(Instant::now());
@@ -133,6 +133,41 @@ fn a_tick_of_300_ms_loses_the_lease_and_one_that_is_a_little_late_does_not() {
             assert_eq!(speed(&told, acted, acted + Duration::from_millis(1000)), 0.0, "it rests until `resume`");
         }
         assert_smooth(&told);
+    }
+}
+
+#[test]
+fn a_hang_that_is_shorter_than_the_ramp_does_not_end_the_ramp() {
+    // It stops for a second, from 1 rad/s. With nobody to resume, the run ends meanwhile, and waits for the ramp.
+    for can_resume in [true, false] {
+        let mut acted = None;
+        let mut act = |engine: &Engine| {
+            if engine.now() > 1_300_000_000 && acted.is_none() {
+                acted = Some(Instant::now());
+                thread::sleep(Duration::from_millis(90));
+            }
+        };
+        let told = if can_resume {
+            run("devices.motor.acceleration=1", &mut act).2
+        } else {
+            let motor = Motor::listen();
+            let request = Request { bench_text: Some(motor.bench()), ..Request::text(GRAPH) };
+            let plan = compile(&catalogue(), &request.set("devices.motor.acceleration=1")).unwrap();
+            let outcome = engine::run(&mut Engine::new(plan), &RunOptions::default(), &mut act).unwrap();
+            assert!(matches!(outcome.end, End::Fault(_)), "{:?}", outcome.end);
+            motor.told()
+        };
+        let acted = acted.unwrap();
+        let after = |ms: u64| acted + Duration::from_millis(ms);
+        assert!(speed(&told, after(0), after(40)) > 0.9, "it moved before");
+        assert!(speed(&told, after(300), after(500)) > 0.4, "it ramps for a second");
+        let resting = if can_resume { after(1300)..acted + Duration::from_secs(9) } else { after(1300)..after(5000) };
+        let is_moving = |(at, velocity): &&(Instant, f64)| resting.contains(at) && velocity.abs() > 0.0;
+        // In the other case the word `resume` comes 700 ms after the hang.
+        assert!(can_resume || told.iter().find(is_moving).is_none(), "it rests");
+        assert_eq!(told.last().unwrap().1, 0.0);
+        let largest = told.windows(2).map(|pair| (pair[1].1 - pair[0].1).abs()).fold(0.0, f64::max);
+        assert!(largest < 0.15, "a step of {largest} rad/s");
     }
 }
 

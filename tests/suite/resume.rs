@@ -190,3 +190,17 @@ fn a_late_tick_is_no_reason_to_wait() {
     run.run(3, "sm");
     assert_eq!(run.state(), MOVES);
 }
+
+#[test]
+fn a_mover_that_connects_again_before_the_next_tick_waits_as_well() {
+    let mut run = Run::new("device = 'hold'");
+    run.run(20, "sm");
+    assert_eq!(run.state(), MOVES);
+    // The loss and the next sample arrive in one tick.
+    run.lose("m.wish");
+    run.run(3, "sm");
+    assert_eq!(run.state(), STOPPED);
+    run.resume().unwrap();
+    run.run(10, "sm");
+    assert_eq!(run.state(), MOVES);
+}

@@ -1,4 +1,5 @@
 //! Two nodes in one file: each set of outputs and parameters names the inputs whose letters it uses.
+#![expect(dead_code, reason = "only the declarations are tested")]
 
 use tactflow_runtime::node::{In, InputSet, Inputs, Out, OutputSet, Outputs, Param};
 use tactflow_runtime::signal::{Scalar, Signal};

@@ -7,8 +7,11 @@
 
 /// Time after which a line is estimated anew [ns]. It uses the samples of one to two such times.
 const WINDOW: i64 = 10_000_000_000;
-/// Largest drift between the clocks [1].
+/// Largest drift between the clocks that is usual [1].
 const MAX_DRIFT: f64 = 0.1;
+/// Time after which another rate of the clock is certain, and the bounds of the rate [ns, 1].
+const RATE_TIME: f64 = 1e9;
+const RATES: [f64; 2] = [0.1, 10.0];
 /// Largest number of points in which a line is stored.
 const MAX_POINTS: usize = 256;
 /// Deviation from the line that only a step of the device's clock explains [ns].
@@ -17,8 +20,10 @@ const STEP: i64 = 50_000_000;
 const STEP_TIME: i64 = 2_000_000_000;
 
 /// Maps the times of a device to the clock of the graph.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone)]
 pub(crate) struct DeviceClock {
+    /// Time that a sample may go back, as reordered datagrams do [ns].
+    reordered: i64,
     /// The line in use, and the one that replaces it.
     lines: [Option<Envelope>; 2],
     /// The last time of the device, and the stamp that was made of it [ns].
@@ -27,36 +32,52 @@ pub(crate) struct DeviceClock {
     late_since: Option<i64>,
     /// How often the clock of the device has made a step.
     pub(crate) steps: u64,
+    /// Whether a wrong rate has been told.
+    has_told: bool,
 }
 
 impl DeviceClock {
+    /// The clock of a device that samples every `period` [ns].
+    pub(crate) fn new(period: i64) -> Self {
+        let reordered = STEP.max(period.saturating_mul(5));
+        Self { reordered, lines: [None, None], last: None, late_since: None, steps: 0, has_told: false }
+    }
+
+    /// Returns the rate of the device's clock, in its seconds for each second, if it is wrong and was not returned before.
+    pub(crate) fn take_wrong_rate(&mut self) -> Option<f64> {
+        let line = self.lines[0].as_ref().filter(|line| !self.has_told && line.is_long())?;
+        let rate = line.slope().recip();
+        self.has_told = (rate - 1.0).abs() > MAX_DRIFT;
+        self.has_told.then_some(rate)
+    }
+
     /// Returns the stamp of a sample that the device measured at `device` [ns in its own clock], and that arrived at
     /// `arrived` [ns].
     ///
     /// A sample with the time of the last one gets its stamp. The stamp of a later one is later. It is not after its
     /// arrival, except by a nanosecond for each of several samples that arrive at once.
     pub(crate) fn stamp(&mut self, device: i64, arrived: i64) -> i64 {
-        let last = self.last.filter(|(time, _)| time.saturating_sub(device) < STEP);
+        let last = self.last.filter(|(time, _)| time.saturating_sub(device) < self.reordered);
         if let Some((time, stamp)) = last.filter(|(time, _)| device <= *time) {
-            return stamp - (time - device);
+            return stamp.saturating_sub(time - device);
         }
         if self.has_stepped(device, arrived) {
             self.steps += 1;
-            (self.lines, self.late_since) = (Default::default(), None);
+            (self.lines, self.late_since) = ([None, None], None);
         }
         for line in self.lines.iter_mut().flatten() {
             line.add(device, arrived);
         }
         let is_due = |line: &Envelope| arrived - line.origin[1] >= WINDOW;
         if self.lines[0].as_ref().is_none_or(is_due) {
-            let new = self.lines[1].take().filter(is_due);
+            let new = self.lines[1].take_if(|line| is_due(line));
             if new.is_some() || self.lines[0].is_none() {
                 self.lines[0] = Some(new.unwrap_or_else(|| Envelope::new(device, arrived)));
             }
             self.lines[1].get_or_insert_with(|| Envelope::new(device, arrived));
         }
         let mapped = self.lines[0].as_ref().map_or(arrived, |line| line.at(device)).min(arrived);
-        let stamp = self.last.map_or(mapped, |(_, stamp)| mapped.max(stamp + 1));
+        let stamp = self.last.map_or(mapped, |(_, stamp)| mapped.max(stamp.saturating_add(1)));
         self.last = Some((device, stamp));
         stamp
     }
@@ -97,7 +118,8 @@ impl Envelope {
 
     /// Adds a point that is to the right of all others.
     fn add(&mut self, device: i64, arrived: i64) {
-        let point = [(device - self.origin[0]) as f64, (arrived - self.origin[1]) as f64];
+        let point =
+            [device.saturating_sub(self.origin[0]), arrived.saturating_sub(self.origin[1])].map(|time| time as f64);
         self.sum += point[0];
         self.count += 1.0;
         while let [.., a, b] = self.hull[..]
@@ -111,17 +133,29 @@ impl Envelope {
         self.hull.push(point);
     }
 
-    /// Returns the height of the line at a time of the device [ns].
+    /// Whether the line is long enough to tell any rate of the clock.
+    fn is_long(&self) -> bool {
+        self.hull.last().is_some_and(|last| last[1] - self.hull[0][1] >= RATE_TIME)
+    }
+
+    /// Returns the slope of the line: seconds of the graph for each second of the device.
     ///
     /// Of all lines below the points, it is the one with the smallest sum of distances: the side of the hull below the
     /// mean of the points.
-    fn at(&self, device: i64) -> i64 {
+    fn slope(&self) -> f64 {
         let mean = self.sum / self.count;
         let side = self.hull.windows(2).find(|side| side[1][0] >= mean);
         let slope = side.map_or(1.0, |side| (side[1][1] - side[0][1]) / (side[1][0] - side[0][0]));
-        let slope = slope.clamp(1.0 - MAX_DRIFT, 1.0 + MAX_DRIFT);
+        let [slowest, fastest] = if self.is_long() { RATES } else { [1.0 - MAX_DRIFT, 1.0 + MAX_DRIFT] };
+        slope.clamp(slowest, fastest)
+    }
+
+    /// Returns the height of the line at a time of the device [ns].
+    fn at(&self, device: i64) -> i64 {
+        let slope = self.slope();
         let height = self.hull.iter().map(|[x, y]| y - slope * x).fold(f64::INFINITY, f64::min);
-        self.origin[1] + (height + slope * (device - self.origin[0]) as f64).round() as i64
+        let x = device.saturating_sub(self.origin[0]) as f64;
+        self.origin[1].saturating_add((height + slope * x).round() as i64)
     }
 }
 
@@ -149,7 +183,7 @@ mod tests {
 
     /// Returns the largest error of an age after `from` [ns], against the true age less the smallest delay.
     fn error_after(from: i64, samples: &[[i64; 3]]) -> i64 {
-        let mut clock = DeviceClock::default();
+        let mut clock = DeviceClock::new(4 * MS);
         let errors = samples.iter().map(|[measured, own, arrived]| {
             let stamp = clock.stamp(*own, *arrived);
             // Of samples that arrive together, each is a nanosecond later than the one before.
@@ -186,7 +220,7 @@ mod tests {
 
     #[test]
     fn a_repeated_sample_has_the_stamp_of_the_first_and_an_older_one_goes_back() {
-        let mut clock = DeviceClock::default();
+        let mut clock = DeviceClock::new(4 * MS);
         clock.stamp(0, 5 * MS);
         let stamp = clock.stamp(4 * MS, 9 * MS);
         assert_eq!(stamp, 9 * MS);
@@ -199,7 +233,7 @@ mod tests {
     fn a_clock_that_is_set_is_followed_at_once_and_one_that_paused_after_two_seconds() {
         // By how much it is set, for how long it pauses [ms], and how many samples look too old.
         for (jump, pause, patience) in [(-50_000, 0, 0), (1_000_000_000, 0, 0), (0, 1_000, 502)] {
-            let mut clock = DeviceClock::default();
+            let mut clock = DeviceClock::new(4 * MS);
             (0..1_000).for_each(|i| _ = clock.stamp(i * 4 * MS, i * 4 * MS + MS));
             let ages = (1_000..2_000).map(|i| {
                 let arrived = i * 4 * MS + MS + pause * MS;
@@ -211,12 +245,56 @@ mod tests {
         }
     }
 
+    #[test]
+    fn a_drift_that_changes_is_followed_and_the_window_slides() {
+        let (mut clock, mut own) = (DeviceClock::new(4 * MS), 0.0);
+        for i in 0..30_000_i64 {
+            let measured = i * 4 * MS;
+            own += 4e6 * if measured < 60_000 * MS { 1.0002 } else { 1.0 };
+            let arrived = measured + 3 * MS + (noise(i) * 4.0 * MS as f64) as i64;
+            let error = (clock.stamp(own as i64, arrived) - (measured + 3 * MS)).abs();
+            assert!(measured < 5_000 * MS || error < 2 * MS, "{error} ns at {measured} ns");
+            let age = arrived - clock.lines[0].as_ref().unwrap().origin[1];
+            assert!(age <= 2 * WINDOW + 5 * MS, "the line is {age} ns old");
+        }
+        assert_eq!(clock.steps, 0);
+    }
+
+    #[test]
+    fn a_clock_at_half_the_speed_is_followed_and_told() {
+        let mut clock = DeviceClock::new(4 * MS);
+        let late = (0..2_000_i64).filter(|i| i * 8 - clock.stamp(i * 4 * MS, i * 8 * MS) / MS > 20).count();
+        assert!(late < 250, "{late} samples look old");
+        let rate = clock.take_wrong_rate().unwrap();
+        assert!((rate - 0.5).abs() < 0.01, "{rate}");
+        assert_eq!(clock.take_wrong_rate(), None, "once");
+    }
+
+    #[test]
+    fn a_datagram_that_comes_late_is_no_step_of_the_clock() {
+        let mut clock = DeviceClock::new(100 * MS);
+        (0..100).for_each(|i| _ = clock.stamp(i * 100 * MS, i * 100 * MS + MS));
+        let newest = clock.stamp(10_000 * MS, 10_001 * MS);
+        assert!(clock.stamp(9_800 * MS, 10_002 * MS) < newest - 150 * MS);
+        assert_eq!(clock.steps, 0);
+    }
+
     proptest! {
+        #[test]
+        fn no_time_of_a_device_is_too_large(times in prop::collection::vec((any::<i64>(), 0..1_000_000_000_000_i64), 1..50)) {
+            let mut clock = DeviceClock::new(4 * MS);
+            let mut arrived = 0;
+            for (own, later) in times {
+                arrived += later;
+                clock.stamp(own, arrived);
+            }
+        }
+
         #[test]
         fn stamps_of_later_samples_are_later_and_memory_is_bounded(
             steps in prop::collection::vec((1..50_000_000_i64, 0..50_000_000_i64), 1..600),
         ) {
-            let (mut clock, mut own, mut arrived, mut last) = (DeviceClock::default(), 0, 0, i64::MIN);
+            let (mut clock, mut own, mut arrived, mut last) = (DeviceClock::new(4 * MS), 0, 0, i64::MIN);
             for (forth, later) in steps {
                 own += forth;
                 arrived += later;

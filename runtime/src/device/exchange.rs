@@ -26,6 +26,9 @@ pub(crate) struct PortSample {
     /// How often the device has written the port.
     pub(crate) writes: u64,
     pub(crate) state: SampleState,
+    /// How often the device has lost the port, and why it did so last.
+    pub(crate) losses: u64,
+    pub(crate) loss: Cow<'static, str>,
 }
 
 /// The state of a port after its last write.
@@ -33,8 +36,8 @@ pub(crate) struct PortSample {
 pub(crate) enum SampleState {
     Value,
     Absent,
-    /// There is no value until the port is written again, for this reason.
-    Lost(Cow<'static, str>),
+    /// There is no value until the port is written again.
+    Lost,
 }
 
 impl Samples {
@@ -44,7 +47,8 @@ impl Samples {
         let mut samples = Self::default();
         for port in &description.outputs {
             let (kind, slot) = (port.shape.kind(), samples.arenas.add(&port.shape));
-            samples.ports.push(PortSample { kind, slot, stamp: 0, sequence: 0, writes: 0, state: SampleState::Absent });
+            let (state, loss) = (SampleState::Absent, "".into());
+            samples.ports.push(PortSample { kind, slot, stamp: 0, sequence: 0, writes: 0, state, losses: 0, loss });
         }
         samples
     }
@@ -76,7 +80,9 @@ impl Samples {
     /// As long as the port is lost, the graph's policy `device` applies: it holds the commands, stops them or ends the
     /// run.
     pub fn lost<T: Signal>(&mut self, port: Output<T>, why: impl Into<Cow<'static, str>>) {
-        self.ports[port.port].state = SampleState::Lost(why.into());
+        let sample = &mut self.ports[port.port];
+        sample.losses += u64::from(sample.state != SampleState::Lost);
+        (sample.state, sample.loss) = (SampleState::Lost, why.into());
     }
 
     /// Counts something for the summary of the run, as a plural noun: `"bad frames"`.

@@ -5,7 +5,7 @@
 //! operator resumes does the graph begin a new epoch.
 
 use std::sync::Arc;
-use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
 use super::exchange::{Commands, Grant};
 use crate::signal::line::approach;
@@ -25,31 +25,57 @@ pub(crate) struct Lease {
     silence: i64,
     /// Whether `held` has reached the commands of the graph.
     follows: bool,
-    /// The epoch that is refused, and all before it.
-    refused: Arc<AtomicU64>,
+    shared: Arc<LeaseState>,
+}
+
+/// What the device and the graph know of a lease.
+#[derive(Debug)]
+pub(crate) struct LeaseState {
+    /// The newest epoch whose commands the device refuses.
+    refused: AtomicU64,
+    /// Whether the device was last told to rest.
+    rests: AtomicBool,
+}
+
+impl LeaseState {
+    /// Whether the commands of an epoch are refused.
+    pub(crate) fn refuses(&self, epoch: u64) -> bool {
+        self.refused.load(Ordering::Acquire) >= epoch
+    }
+
+    /// Refuses the commands of an epoch, and of all before it.
+    pub(crate) fn refuse(&self, epoch: u64) {
+        self.refused.fetch_max(epoch, Ordering::AcqRel);
+    }
+
+    /// Whether the device was last told to rest.
+    pub(crate) fn rests(&self) -> bool {
+        self.rests.load(Ordering::Acquire)
+    }
 }
 
 impl Lease {
     /// `held` are the commands at the start, which are zero.
     pub(crate) fn new(held: Commands, accelerations: Vec<Vec<f64>>, period: i64, silence: i64) -> Self {
-        let refused = Arc::new(AtomicU64::new(0));
-        Self { held, accelerations, at: 0, period, silence, follows: false, refused }
+        let shared = Arc::new(LeaseState { refused: AtomicU64::new(0), rests: AtomicBool::new(true) });
+        Self { held, accelerations, at: 0, period, silence, follows: false, shared }
     }
 
-    /// Returns the number of the newest epoch that is refused. It is shared with the graph.
-    pub(crate) fn refused(&self) -> Arc<AtomicU64> {
-        Arc::clone(&self.refused)
+    /// Returns what the graph knows of the lease.
+    pub(crate) fn shared(&self) -> Arc<LeaseState> {
+        Arc::clone(&self.shared)
     }
 
     /// Returns what the device may do at `now` [ns].
     pub(crate) fn hold(&mut self, granted: &Commands, now: i64) -> &Commands {
         let Grant { epoch, until, .. } = granted.grant;
         let last = std::mem::replace(&mut self.at, now);
+        let was_refused = self.shared.refuses(epoch);
         let has_stopped = now.saturating_sub(last) > self.silence && !self.held.are_zero();
         // Commands of zero move nothing, so they need no lease.
         let has_expired = now > until && !granted.are_zero();
         if has_stopped || has_expired {
-            self.refused.fetch_max(epoch, Ordering::Relaxed);
+            self.shared.refuse(epoch);
         }
         if has_stopped {
             // A ramp from the last velocity would move the device again.
@@ -57,12 +83,15 @@ impl Lease {
         }
         // After a time without a call, the device must not jump to what the graph reached meanwhile.
         self.follows &= now - last <= 2 * self.period;
-        let is_valid = epoch > self.refused.load(Ordering::Relaxed);
-        if is_valid {
+        if !self.shared.refuses(epoch) {
             self.follow(granted, now - last);
+        } else if was_refused {
+            self.ramp(now - last);
         } else {
+            // The ramp begins when the commands expired, and not when that was noticed.
             self.ramp(now - last.max(until.min(now)));
         }
+        self.shared.rests.store(self.held.are_zero(), Ordering::Release);
         &self.held
     }
 
@@ -142,6 +171,28 @@ mod tests {
     }
 
     #[test]
+    fn a_graph_that_is_back_before_the_ramp_ends_does_not_end_the_ramp() {
+        let (mut lease, mut commands, velocity) = lease();
+        for now in 1..=100 {
+            grant(&mut commands, velocity, [1.0, 0.0], 1, now * 4 * MS);
+            lease.hold(&commands, now * 4 * MS);
+        }
+        // The commands expire 20 ms after the last one, and 40 ms later the graph renews them, with zero.
+        let renewed = 400 * MS;
+        let mut last = lease.hold(&commands, renewed + 60 * MS).joints(velocity)[0];
+        assert!((last - 0.6).abs() < 1e-9, "{last}");
+        for ms in (64..=116).step_by(4) {
+            grant(&mut commands, velocity, [0.0, 0.0], 1, renewed + ms * MS);
+            let held = lease.hold(&commands, renewed + ms * MS).joints(velocity)[0];
+            assert!((last - held - 0.04).abs() < 1e-9 || held == 0.0, "{last} to {held}");
+            last = held;
+        }
+        grant(&mut commands, velocity, [0.0, 0.0], 1, renewed + 140 * MS);
+        assert!(!lease.shared.rests());
+        assert!(lease.hold(&commands, renewed + 140 * MS).are_zero() && lease.shared.rests());
+    }
+
+    #[test]
     fn a_process_that_was_stopped_does_not_move_the_device_when_it_continues() {
         let (mut lease, mut commands, velocity) = lease();
         for now in 1..=20 {
@@ -180,13 +231,15 @@ mod tests {
                     approach(&mut graph, |i| target[i], &[10.0; 2], dt);
                     grant(&mut commands, velocity, graph, epoch, now);
                 }
+                let was_refused = lease.shared.refuses(commands.grant.epoch);
                 let held: [f64; 2] = lease.hold(&commands, now).joints(velocity).try_into().unwrap();
                 let dt = ((now - called) as f64 * 1e-9).max(0.004) + 0.004;
                 for i in 0..2 {
                     prop_assert!((held[i] - last[i]).abs() <= 10.0 * dt + 1e-9, "{last:?} to {held:?}");
-                    let is_expired = now > commands.grant.until;
-                    prop_assert!(!is_expired || held[i].abs() < last[i].abs() || held[i] == 0.0 || now == called || now - commands.grant.until < MS);
+                    let is_slower = held[i].abs() < last[i].abs() || held[i] == 0.0;
+                    prop_assert!(!was_refused || now == called || is_slower, "{last:?} to {held:?} in {epoch}");
                 }
+                prop_assert_eq!(lease.shared.rests(), held == [0.0; 2]);
                 (last, called) = (held, now);
             }
         }

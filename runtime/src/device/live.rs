@@ -14,7 +14,7 @@ use triple_buffer::TripleBuffer;
 
 use super::clock::DeviceClock;
 use super::exchange::Grant;
-use super::lease::Lease;
+use super::lease::{Lease, LeaseState};
 use super::{Commands, Description, DeviceError, Output, Samples};
 use crate::signal::Signal;
 
@@ -44,8 +44,10 @@ pub struct Link {
     /// The thread of the tick, which waits for samples.
     tick: Thread,
     epoch: Instant,
-    period: Duration,
+    /// Longest time between two commands.
+    cycle: Duration,
     latency: i64,
+    name: String,
 }
 
 impl Link {
@@ -73,6 +75,9 @@ impl Link {
         let stamp = self.clock.stamp(time, arrived);
         if self.clock.steps > steps {
             self.count("steps of its clock");
+        }
+        if let Some(rate) = self.clock.take_wrong_rate() {
+            tracing::warn!("the clock of device `{}` runs at {rate:.2} times real time", self.name);
         }
         stamp - self.latency
     }
@@ -110,17 +115,25 @@ impl Link {
         self.lease.hold(self.commands.read(), now)
     }
 
+    /// Refuses the commands of the graph until the operator resumes: [`commands`](Self::commands) ramps to zero. For a
+    /// driver that fails and can still bring the device to rest.
+    pub fn refuse(&mut self) {
+        let epoch = self.commands.read().grant.epoch;
+        self.lease.shared().refuse(epoch);
+    }
+
     /// Returns the time since the tick that computed the newest commands.
     pub fn age(&mut self) -> Duration {
         let now = self.epoch.elapsed().as_nanos() as i64;
         Duration::from_nanos((now - self.commands.read().grant.since).max(0) as u64)
     }
 
-    /// Waits for the next commands, for a period of the device at most: then those that hold may have changed by
-    /// themselves. The future does not borrow the link.
+    /// Waits for the next commands, for a period of the device and a quarter of its
+    /// [`on_silence`](Description::on_silence) at most: then those that hold may have changed by themselves. The future
+    /// does not borrow the link.
     pub fn commanded(&self) -> impl Future<Output = ()> + Send + use<> {
-        let (commanded, period) = (Arc::clone(&self.commanded), self.period);
-        async move { drop(tokio::time::timeout(period, commanded.notified()).await) }
+        let (commanded, cycle) = (Arc::clone(&self.commanded), self.cycle);
+        async move { drop(tokio::time::timeout(cycle, commanded.notified()).await) }
     }
 
     /// Waits for the end of the run. The future does not borrow the link.
@@ -153,14 +166,15 @@ pub(crate) struct Linked {
     commanded: Arc<Notify>,
     stop: watch::Sender<String>,
     finished: Arc<AtomicBool>,
-    /// The newest epoch of commands that the device refuses.
-    refused: Arc<AtomicU64>,
+    lease: Arc<LeaseState>,
     /// The epoch of the commands.
     epoch: u64,
     /// The last epoch in which the lease was lost, as far as the graph knows.
     lost: u64,
     /// The time until which the commands are valid, if they move the device [ns].
     moves_until: Option<i64>,
+    /// Time of the last tick that sent commands [ns].
+    sent: Option<i64>,
     driver: Option<JoinHandle<Result<(), DeviceError>>>,
 }
 
@@ -186,9 +200,11 @@ pub(crate) fn start(name: &str, driver: Box<dyn Live>, setup: LinkSetup<'_>) -> 
     let (commands_in, commands_out) = TripleBuffer::new(commands).split();
     let (stop, stopping) = watch::channel(String::new());
     let period = Duration::from_secs_f64(description.period);
-    let lease =
-        Lease::new(commands.clone(), accelerations, period.as_nanos() as i64, (description.silence() * 1e9) as i64);
-    let refused = lease.refused();
+    // A device must not take the time between two samples for silence.
+    let silence = Duration::from_secs_f64(description.silence());
+    let cycle = period.min(silence / 4);
+    let lease = Lease::new(commands.clone(), accelerations, cycle.as_nanos() as i64, silence.as_nanos() as i64);
+    let shared = lease.shared();
     let (published, commanded) = (Arc::new(AtomicU64::new(0)), Arc::new(Notify::new()));
     let finished = Arc::new(AtomicBool::new(false));
     let link = Link {
@@ -196,22 +212,34 @@ pub(crate) fn start(name: &str, driver: Box<dyn Live>, setup: LinkSetup<'_>) -> 
         samples: samples_in,
         commands: commands_out,
         lease,
-        clock: DeviceClock::default(),
+        clock: DeviceClock::new(period.as_nanos() as i64),
+        name: name.to_owned(),
         published: Arc::clone(&published),
         commanded: Arc::clone(&commanded),
         stop: stopping,
         finished: Arc::clone(&finished),
         tick: std::thread::current(),
         epoch,
-        period,
+        cycle,
         latency: (description.latency * 1e9) as i64,
     };
     let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build()?;
     let thread = std::thread::Builder::new().name(format!("device {name}"));
     let driver = Some(thread.spawn(move || runtime.block_on(driver.run(link)))?);
-    let (samples, commands) = (samples_out, commands_in);
-    let (epoch, lost, moves_until) = (1, 0, None);
-    Ok(Linked { samples, commands, published, commanded, stop, finished, refused, epoch, lost, moves_until, driver })
+    Ok(Linked {
+        samples: samples_out,
+        commands: commands_in,
+        published,
+        commanded,
+        stop,
+        finished,
+        lease: shared,
+        epoch: 1,
+        lost: 0,
+        moves_until: None,
+        sent: None,
+        driver,
+    })
 }
 
 impl Linked {
@@ -220,6 +248,7 @@ impl Linked {
         let until = now + lease;
         commands.grant = Grant { epoch: self.epoch, since: now, until };
         self.moves_until = (!commands.are_zero()).then_some(until);
+        self.sent = Some(now);
         self.commands.input_buffer_mut().copy_from(commands);
         self.commands.publish();
         self.commanded.notify_one();
@@ -239,21 +268,35 @@ impl Linked {
         samples.writes != before
     }
 
-    /// Whether the device has stopped, or stops, because its commands were not renewed up to `now` [ns]. Returns `true`
-    /// once in an epoch. The device then rests until [`renew`](Self::renew).
-    pub(crate) fn loses_lease(&mut self, now: i64) -> bool {
-        let is_refused = self.refused.load(Ordering::Relaxed) >= self.epoch;
-        let is_lost = self.lost < self.epoch && (is_refused || self.moves_until.is_some_and(|until| until < now));
+    /// Whether the device has stopped, or stops, because its commands were not renewed up to `now` [ns], or because the
+    /// process was suspended. Commands are valid for `lease` [ns]. Returns `true` once in an epoch. The device then rests until [`renew`](Self::renew).
+    pub(crate) fn loses_lease(&mut self, now: i64, lease: i64) -> bool {
+        /// Time between two ticks that only a suspended process explains [ns].
+        const SUSPENDED: i64 = 500_000_000;
+        let has_expired = self.moves_until.is_some_and(|until| until < now);
+        let was_suspended = self.sent.is_some_and(|sent| now - sent > SUSPENDED.max(2 * lease));
+        let is_lost = self.lost < self.epoch && (self.lease.refuses(self.epoch) || has_expired || was_suspended);
         if is_lost {
-            self.refused.fetch_max(self.epoch, Ordering::Relaxed);
-            (self.lost, self.moves_until) = (self.epoch, None);
+            self.refuse();
+            self.lost = self.epoch;
         }
         is_lost
     }
 
+    /// Refuses the commands of this epoch, so that the device comes to rest.
+    pub(crate) fn refuse(&mut self) {
+        self.lease.refuse(self.epoch);
+        self.moves_until = None;
+    }
+
+    /// Whether the device was last told to rest, or its driver runs no more.
+    pub(crate) fn rests(&self) -> bool {
+        self.lease.rests() || self.has_ended()
+    }
+
     /// Begins a new epoch, if the last one is refused.
     pub(crate) fn renew(&mut self) {
-        if self.refused.load(Ordering::Relaxed) >= self.epoch {
+        if self.lease.refuses(self.epoch) {
             self.epoch += 1;
         }
     }

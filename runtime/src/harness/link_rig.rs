@@ -90,7 +90,7 @@ impl LinkRig {
         let index = self.description.outputs.iter().position(|output| output.name == port);
         let index = index.unwrap_or_else(|| panic!("the device has no output `{port}`"));
         match &self.samples.ports[index].state {
-            SampleState::Lost(why) => Some(why),
+            SampleState::Lost => Some(&self.samples.ports[index].loss),
             SampleState::Value | SampleState::Absent => None,
         }
     }

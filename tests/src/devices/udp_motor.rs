@@ -113,14 +113,19 @@ impl Live for UdpMotor {
                 () = tokio::time::sleep_until(next.into()) => {}
                 () = stopped => break,
             }
-            // A motor that does not listen is no failure: it stops by itself.
-            let _ = socket.send(&link.commands().joints(self.velocity)[0].to_le_bytes());
+            self.send(&socket, &mut link);
         }
+        self.send(&socket, &mut link);
         Ok(())
     }
 }
 
 impl UdpMotor {
+    fn send(&self, socket: &UdpSocket, link: &mut Link) {
+        // A motor that does not listen is no failure: it stops by itself.
+        let _ = socket.send(&link.commands().joints(self.velocity)[0].to_le_bytes());
+    }
+
     fn connect(&self) -> io::Result<UdpSocket> {
         let socket = UdpSocket::bind("127.0.0.1:0")?;
         socket.connect(&self.params.address)?;

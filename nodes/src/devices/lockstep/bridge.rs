@@ -136,7 +136,7 @@ impl Bridge {
 }
 
 /// Reduces a command [rad/s] by what the joints can decelerate [rad/s²] in `dt` [s]. Returns whether it is zero.
-pub(super) fn slow_down(commanded: &mut [f64], deceleration: f64, dt: f64) -> bool {
+fn slow_down(commanded: &mut [f64], deceleration: f64, dt: f64) -> bool {
     let decelerations = vec![deceleration; commanded.len()];
     approach(commanded, |_| 0.0, &decelerations, dt)
 }

@@ -1,6 +1,6 @@
 //! A simulator that runs by its own clock and does not wait for commands.
 
-use std::io::{self, ErrorKind};
+use std::io::ErrorKind;
 use std::time::{Duration, Instant};
 
 use async_trait::async_trait;
@@ -9,11 +9,10 @@ use tactflow_runtime::signal::Image;
 use tokio::net::TcpStream;
 
 use super::Params;
-use super::bridge::slow_down;
 use super::frames::Frames;
 use super::lines::Lines;
 use super::message::{Hello, Obs, Reply};
-use super::socket::Socket;
+use super::socket::{Socket, broken, closed};
 use crate::devices::arm::ArmPorts;
 
 /// Time without a command after which such a simulator sets the velocity to zero.
@@ -45,10 +44,10 @@ impl Live for FreeRunning {
             outbox: Vec::new(),
             frames: Frames::new(self.hello.clone()),
             begin: None,
+            published: None,
             sent: vec![0.0; self.hello.joints.len()],
             answered: None,
             sent_at: Instant::now(),
-            acceleration: self.params.acceleration,
         };
         let silence = Duration::from_secs_f64(self.params.reply_s.min(1e6));
         match session.follow(&mut link, silence).await {
@@ -63,7 +62,7 @@ impl Live for FreeRunning {
             }
             Err(why) => {
                 let why = format!("the simulator at `{}`: {why}", self.params.address);
-                session.rest().await;
+                session.rest(&mut link).await;
                 session.leave(&why).await;
                 Err(DeviceError(why))
             }
@@ -101,12 +100,12 @@ struct Session {
     frames: Frames,
     /// Time of the simulator at the first frame [s].
     begin: Option<f64>,
+    /// The last frame that was published, and when.
+    published: Option<(u64, Instant)>,
     /// The last command [rad/s], the frame that it answered, and when it was sent.
     sent: Vec<f64>,
     answered: Option<u64>,
     sent_at: Instant,
-    /// Maximum acceleration of a joint [rad/s²].
-    acceleration: f64,
 }
 
 impl Session {
@@ -124,12 +123,12 @@ impl Session {
             tokio::select! {
                 biased;
                 () = stopped => return Ok(End::Graph),
+                () = commanded => self.send(link),
                 ready = self.stream.readable() => {
                     ready.map_err(broken)?;
                     self.receive()?;
                     heard = Instant::now();
                 }
-                () = commanded => self.send(link),
             }
             if heard.elapsed() > silence {
                 return Err(format!("the simulator has sent nothing for {} s", silence.as_secs_f64()));
@@ -140,10 +139,7 @@ impl Session {
     /// Receives the bytes that have arrived.
     fn receive(&mut self) -> Result<(), String> {
         match self.stream.try_read_buf(&mut self.arrived) {
-            Ok(0) => {
-                let middle = if self.lines.is_in_a_line() { " in the middle of a message" } else { "" };
-                Err(format!("the simulator has closed the connection without an `end`{middle}"))
-            }
+            Ok(0) => Err(closed(&self.lines)),
             Ok(_) => Ok(()),
             Err(error) if error.kind() == ErrorKind::WouldBlock => Ok(()),
             Err(error) => Err(broken(error)),
@@ -152,13 +148,15 @@ impl Session {
 
     /// Reads the frames that have arrived, and publishes the newest. Returns whether the run goes on.
     fn read(&mut self, link: &mut Link) -> Result<bool, String> {
-        let mut newest = None;
-        let mut taken = 0;
-        while taken < self.arrived.len() {
+        let (mut newest, mut taken, mut goes_on) = (None, 0, true);
+        while goes_on && taken < self.arrived.len() {
             let (count, line) = self.lines.feed(&self.arrived[taken..]);
             taken += count;
             let Some(line) = line? else { continue };
-            let Some(obs) = self.frames.read(&line, self.lines.count)? else { return Ok(false) };
+            let Some(obs) = self.frames.read(&line, self.lines.count)? else {
+                goes_on = false;
+                continue;
+            };
             let begin = *self.begin.get_or_insert(obs.t);
             newest = Some((link.stamp_of(((obs.t - begin) * 1e9).round() as i64), obs));
         }
@@ -166,30 +164,35 @@ impl Session {
         if let Some((stamp, obs)) = newest {
             self.publish(link, stamp, &obs);
         }
-        Ok(true)
+        Ok(goes_on)
     }
 
-    fn publish(&self, link: &mut Link, stamp: i64, obs: &Obs) {
+    fn publish(&mut self, link: &mut Link, stamp: i64, obs: &Obs) {
         link.publish(|samples| {
             let cells = samples.write(self.image, stamp, obs.seq).cells_mut();
             cells.iter_mut().zip(&obs.img).for_each(|(cell, counts)| *cell = *counts as f32);
             self.arm.write(samples, stamp, obs.seq, [&obs.q, &obs.q_eq]);
         });
+        self.published = Some((obs.seq, Instant::now()));
     }
 
     /// Sends the command that holds now, if it answers a frame, differs from the last one, or keeps the simulator from
     /// its timeout.
     fn send(&mut self, link: &mut Link) {
-        let newest = self.frames.newest.map(|(seq, _)| seq);
-        let Some(seq) = newest.filter(|_| self.flush()) else { return };
+        let age = link.age();
         let commands = link.commands();
         let dq = commands.joints(self.arm.velocity);
-        let is_due = self.answered != newest || self.sent != dq || self.sent_at.elapsed() >= KEEP_ALIVE;
-        if is_due {
-            let est = commands.report(self.arm.contact).map(|pose| pose.0.translation.vector.into());
+        // A tick that began before the frame was published has not seen it.
+        let seen = self.published.filter(|(_, at)| age < at.elapsed()).map(|(seq, _)| seq);
+        let seq = seen.or(self.answered).or(self.published.map(|(seq, _)| seq));
+        let is_due = self.answered != seq || self.sent != dq || self.sent_at.elapsed() >= KEEP_ALIVE;
+        let Some(seq) = seq.filter(|_| is_due) else { return };
+        let est = commands.report(self.arm.contact).map(|pose| pose.0.translation.vector.into());
+        let line = Reply::Cmd { seq, dq, est }.line();
+        if self.flush() {
             self.sent.copy_from_slice(dq);
-            self.put(&Reply::Cmd { seq, dq: &self.sent, est }.line());
-            (self.answered, self.sent_at) = (newest, Instant::now());
+            self.put(&line);
+            (self.answered, self.sent_at) = (Some(seq), Instant::now());
         }
     }
 
@@ -208,19 +211,26 @@ impl Session {
     }
 
     /// Brings the arm to rest after a failure, for as long as the simulator takes commands.
-    async fn rest(&mut self) {
-        const MAX_RAMP: Duration = Duration::from_secs(5);
-        let end = Instant::now() + MAX_RAMP;
+    async fn rest(&mut self, link: &mut Link) {
+        /// Longest time of the ramp; then the command is zero at once.
+        const MAX_RAMP: Duration = Duration::from_secs(3);
+        const MAX_REST: Duration = Duration::from_millis(3200);
+        link.refuse();
+        let begin = Instant::now();
         let seq = self.frames.newest.map_or(0, |(seq, _)| seq);
-        let dt = self.frames.hello.dt;
-        let mut is_still = self.sent.iter().all(|dq| *dq == 0.0);
-        while !is_still && Instant::now() < end {
-            is_still = slow_down(&mut self.sent, self.acceleration, dt);
+        while begin.elapsed() < MAX_REST {
+            self.sent.copy_from_slice(link.commands().joints(self.arm.velocity));
+            if begin.elapsed() > MAX_RAMP {
+                self.sent.fill(0.0);
+            }
             if self.flush() {
                 let line = Reply::Cmd { seq, dq: &self.sent, est: None }.line();
                 self.put(&line);
+                if self.sent.iter().all(|dq| *dq == 0.0) {
+                    return;
+                }
             }
-            tokio::time::sleep(Duration::from_secs_f64(dt)).await;
+            tokio::time::sleep(Duration::from_secs_f64(self.frames.hello.dt).min(KEEP_ALIVE)).await;
         }
     }
 
@@ -242,8 +252,4 @@ impl Session {
         })
         .await;
     }
-}
-
-fn broken(error: io::Error) -> String {
-    format!("the connection to the simulator broke: {error}")
 }

@@ -119,8 +119,7 @@ impl Socket {
                 return Ok(Some(line));
             }
             if self.is_closed {
-                let middle = if self.lines.is_in_a_line() { " in the middle of a message" } else { "" };
-                return Err(format!("the simulator has closed the connection without an `end`{middle}"));
+                return Err(closed(&self.lines));
             }
             let left = end.saturating_duration_since(Instant::now());
             if left.is_zero() {
@@ -207,6 +206,13 @@ fn attempt(address: &str, end: Instant) -> Result<TcpStream, String> {
     Err(why)
 }
 
-fn broken(error: std::io::Error) -> String {
+/// Returns the message of a connection that the simulator has closed.
+pub(super) fn closed(lines: &Lines) -> String {
+    let middle = if lines.is_in_a_line() { " in the middle of a message" } else { "" };
+    format!("the simulator has closed the connection without an `end`{middle}")
+}
+
+/// Returns the message of a connection that broke.
+pub(super) fn broken(error: std::io::Error) -> String {
     format!("the connection to the simulator broke: {error}")
 }

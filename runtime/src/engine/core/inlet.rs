@@ -5,8 +5,8 @@ use crate::graph::{PlannedRole, Policy};
 use crate::node::{Bus, PortId};
 use crate::signal::{Kind, Stamp};
 
-/// Time that a device has for its first sample [ns].
-const START_TIME: i64 = 2_000_000_000;
+/// Time that a device has for its first sample [ns]. Nothing moves before it.
+pub(crate) const START_TIME: i64 = 2_000_000_000;
 
 /// Counts of the samples of a role's port.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -50,8 +50,9 @@ pub(crate) struct Inlet {
     seen: Option<u64>,
     /// Stamp of the last sample that was taken over, and its sequence number unless the port was lost since.
     last: Option<(i64, Option<u64>)>,
-    /// Whether the device has reported the port as lost.
+    /// Whether the device has reported the port as lost, and how often so far.
     is_lost: bool,
+    losses: u64,
     /// Whether the loss of the port is not a trouble, as for the ground truth.
     is_observed: bool,
     /// Whether the device is live, so that a sample can arrive too late.
@@ -76,6 +77,7 @@ impl Inlet {
             seen: None,
             last: None,
             is_lost: false,
+            losses: 0,
             is_observed: role.is_observed,
             is_live,
         }
@@ -98,23 +100,26 @@ impl Inlet {
         self.sample(samples).is_none_or(|sample| samples.arenas.is_finite(self.kind, sample.slot))
     }
 
-    /// Returns why the device has lost the port, if that is a trouble.
+    /// Returns why the device has lost the port since the last latch, if that is a trouble. It may be back already.
     pub(crate) fn lost<'s>(&self, samples: &'s Samples) -> Option<&'s str> {
-        match &samples.ports[self.port].state {
-            SampleState::Lost(why) if !self.is_observed => Some(why),
-            _ => None,
-        }
+        let sample = &samples.ports[self.port];
+        let is_lost = matches!(sample.state, SampleState::Lost) || sample.losses != self.losses;
+        (is_lost && !self.is_observed).then_some(&*sample.loss)
     }
 
     /// Latches the pending sample, if there is one. Swaps the buffers instead of copying.
     pub(crate) fn latch(&mut self, samples: &mut Samples, bus: &mut Bus, tick: u64, now: i64) {
         let Samples { arenas, ports, .. } = samples;
         let sample = &ports[self.port];
-        self.is_lost = matches!(sample.state, SampleState::Lost(_));
-        if self.is_lost {
+        self.is_lost = matches!(sample.state, SampleState::Lost);
+        if self.is_lost || self.losses != sample.losses {
             // After a reconnection, the device may number its samples from 1 again.
-            (self.writes, self.seen) = (sample.writes, None);
+            self.seen = None;
             self.last = self.last.map(|(stamp, _)| (stamp, None));
+            self.losses = sample.losses;
+        }
+        if self.is_lost {
+            self.writes = sample.writes;
             self.lose(bus, tick);
             return;
         }

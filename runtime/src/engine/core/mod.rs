@@ -9,7 +9,7 @@ mod tick;
 
 pub(crate) use command::{CommandSlot, ReportSlot};
 pub use inlet::Counters;
-pub(crate) use inlet::Inlet;
+pub(crate) use inlet::{Inlet, START_TIME};
 pub use modes::ModeChange;
 pub(crate) use modes::{ModeMachine, Transition};
 pub(crate) use runner::{AgedWire, NodeRunner};

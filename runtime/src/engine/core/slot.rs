@@ -14,6 +14,17 @@ pub(crate) struct DeviceSlot {
     pub(crate) failed: Option<String>,
 }
 
+impl DeviceSlot {
+    /// Whether its commands are zero, and it was told so.
+    pub(crate) fn rests(&self) -> bool {
+        let was_told = match &self.link {
+            DeviceLink::Live(linked) => linked.rests(),
+            _ => true,
+        };
+        was_told && self.commands.are_zero()
+    }
+}
+
 /// How a device is linked to the engine.
 pub(crate) enum DeviceLink {
     /// A device that the engine steps.

@@ -260,8 +260,10 @@ impl Engine {
     fn renew_leases(&mut self, task: usize) {
         for i in 0..self.devices.len() {
             let concerns = self.concerns(Origin::Device(i), task);
-            if let DeviceLink::Live(linked) = &mut self.devices[i].link
+            let device = &mut self.devices[i];
+            if let DeviceLink::Live(linked) = &mut device.link
                 && concerns
+                && device.failed.is_none()
             {
                 linked.renew();
             }
@@ -330,7 +332,7 @@ impl Engine {
     pub(crate) fn cut_ramp(&mut self) {
         for device in self.devices.iter_mut().filter(|device| !device.commands.are_zero()) {
             tracing::warn!("`{}` still moves: its ramp takes too long, so its command is zero at once", device.name);
-            device.commands.values.iter_mut().for_each(|values| values.fill(0.0));
+            device.commands.rest();
         }
     }
 
@@ -364,10 +366,11 @@ impl Engine {
 
     /// Stops the tasks of every device that has stopped by itself, because the last tick was too long ago.
     fn check_leases(&mut self, now: i64) -> Result<(), Fault> {
+        let lease = self.schedule.lease();
         for i in 0..self.devices.len() {
             let device = &mut self.devices[i];
             let DeviceLink::Live(linked) = &mut device.link else { continue };
-            if linked.loses_lease(now) {
+            if linked.loses_lease(now, lease) {
                 // The device ramps by itself, so the graph starts again from rest.
                 device.commands.rest();
                 self.raise(Origin::Device(i), |_| Policy::Stop, Trouble::Lease(i))?;
@@ -396,11 +399,11 @@ impl Engine {
                         self.punctuality.device_took(i, before.elapsed());
                     }
                 }
-                DeviceLink::Live(linked) => {
+                DeviceLink::Live(linked) if device.failed.is_none() => {
                     let is_newer = linked.receive(&mut device.samples);
                     has_sampled |= is_newer && self.schedule.is_clock(i);
                 }
-                DeviceLink::Idle(_) | DeviceLink::Gone => {}
+                DeviceLink::Idle(_) | DeviceLink::Live(_) | DeviceLink::Gone => {}
             }
         }
         has_sampled
@@ -423,7 +426,12 @@ impl Engine {
     /// Marks a device as failed. The engine does not call it again.
     pub(crate) fn lose_device(&mut self, device: usize, why: String) {
         let device = &mut self.devices[device];
-        (device.link, device.failed) = (DeviceLink::Gone, Some(why));
+        device.failed.get_or_insert(why);
+        match &mut device.link {
+            // Its driver still runs, and brings it to rest.
+            DeviceLink::Live(linked) if !linked.has_ended() => linked.refuse(),
+            link => *link = DeviceLink::Gone,
+        }
     }
 
     /// Handles the values that are not finite. In a task the first is the cause of the others, because ports are in the

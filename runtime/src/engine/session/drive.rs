@@ -5,6 +5,7 @@ use std::time::Instant;
 use super::engine::Engine;
 use super::outcome::{End, Outcome};
 use super::task_run::TaskRun;
+use crate::engine::core::DeviceSlot;
 use crate::fault::Fault;
 
 /// Paces a run and passes operator input to the engine between two ticks.
@@ -54,7 +55,7 @@ pub(crate) fn permanent_halt(engine: &Engine, can_resume: bool, is_endless: bool
     // A device that only one task needs does not end the others.
     let all_rest = || engine.tasks().iter().filter(|task| task.is_awaited()).all(TaskRun::is_halted);
     let is_lost = is_endless && has_failed_device() && !engine.has_end() && all_rest();
-    let is_still = || engine.devices.iter().all(|device| device.commands.are_zero());
+    let is_still = || engine.devices.iter().all(DeviceSlot::rests);
     let halts = engine.tasks().iter().filter(|task| task.end().is_none()).filter_map(|task| task.halts().last());
     let last = halts.max_by_key(|halt| halt.fault.tick).filter(|_| (is_stopped || is_lost) && is_still())?;
     Some(last.fault.clone())

@@ -45,23 +45,24 @@ impl Engine {
         }
     }
 
-    /// Stops the drivers for a reason, after they had time to send the zero command. Does not wait for a driver that
-    /// blocks.
-    pub(super) fn stop_drivers(&self, reason: &str) {
-        /// Time that a driver has to send its last command.
+    /// Stops the drivers for a reason, once each has told its device to rest, or when `patience` is over. Does not wait
+    /// for a driver that blocks.
+    pub(super) fn stop_drivers(&self, reason: &str, patience: Duration) {
+        /// Time that a driver has to send its last command, beside two of its periods.
         const LAST_COMMAND: Duration = Duration::from_millis(50);
+        const MAX_LAST_COMMAND: Duration = Duration::from_millis(500);
         /// Time that the drivers have to end.
         const GRACE: Duration = Duration::from_secs(1);
         let running = || self.links().filter(|linked| !linked.has_ended());
         if running().next().is_none() {
             return;
         }
-        std::thread::sleep(LAST_COMMAND);
+        wait(patience, || running().all(Linked::rests));
+        let periods = self.devices.iter().filter(|device| matches!(device.link, DeviceLink::Live(_)));
+        let longest = periods.map(|device| device.description.period).fold(0.0, f64::max);
+        std::thread::sleep(Duration::from_secs_f64(2.0 * longest).clamp(LAST_COMMAND, MAX_LAST_COMMAND));
         running().for_each(|linked| linked.stop(reason));
-        let end = Instant::now() + GRACE;
-        while running().next().is_some() && Instant::now() < end {
-            std::thread::sleep(Duration::from_millis(1));
-        }
+        wait(GRACE, || running().next().is_none());
     }
 
     fn links(&self) -> impl Iterator<Item = &Linked> {
@@ -69,6 +70,14 @@ impl Engine {
             DeviceLink::Live(linked) => Some(linked),
             _ => None,
         })
+    }
+}
+
+/// Waits until something is so, for a time at most.
+fn wait(patience: Duration, is_so: impl Fn() -> bool) {
+    let end = Instant::now() + patience;
+    while !is_so() && Instant::now() < end {
+        std::thread::sleep(Duration::from_millis(1));
     }
 }
 

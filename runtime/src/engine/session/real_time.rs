@@ -159,7 +159,7 @@ impl RealTimePacer {
             }
         }
         self.wind_down(engine);
-        engine.stop_drivers(reason);
+        engine.stop_drivers(reason, MAX_RAMP.saturating_sub(begin.elapsed()));
         self.input.finish();
     }
 }

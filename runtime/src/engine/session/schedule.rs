@@ -1,5 +1,6 @@
 //! The times of the ticks.
 
+use crate::engine::core::START_TIME;
 use crate::graph::Clock;
 
 /// Periods without a sample of the clock device after which a timer takes its place.
@@ -8,8 +9,6 @@ const MAX_MISSED_PERIODS: i64 = 3;
 /// Periods for which the commands of a tick are valid, and the shortest such time [ns].
 const LEASE_PERIODS: i64 = 5;
 const MIN_LEASE: i64 = 40_000_000;
-/// Time that a clock device has for its first sample [ns]. Nothing moves before it.
-const START_TIME: i64 = 2_000_000_000;
 
 /// Computes the time of the next tick, in virtual or real time.
 #[derive(Debug, Clone)]
@@ -75,7 +74,9 @@ impl TickSchedule {
 
     /// Records a tick at `now` [ns]. `has_sampled`: whether the clock device has sampled since the last tick.
     pub(crate) fn ticked(&mut self, now: i64, has_sampled: bool) {
-        self.is_on_timer = self.clock != Clock::Rate && !has_sampled;
+        // After a tick that began late, the device has its time again.
+        let was_late = self.last.is_some() && now > self.deadline() + self.period;
+        self.is_on_timer = self.clock != Clock::Rate && !has_sampled && !was_late;
         self.has_started |= has_sampled;
         self.last = Some(now);
     }
