@@ -311,5 +311,5 @@ fn a_simulator_on_the_wall_clock_is_followed_and_not_queued() {
     assert!(begin.elapsed() > Duration::from_secs(2));
     assert!(number(&seen, "found") < 1.5, "{seen}");
     // It may skip frames on a busy machine, but the last command is for one of the last frames.
-    assert!(number(&seen, "commands") > 100.0 && seen["seqs"][4].as_f64().unwrap() > 480.0, "{seen}");
+    assert!(number(&seen, "commands") > 100.0 && seen["seqs"][4].as_f64().unwrap() > 400.0, "{seen}");
 }
