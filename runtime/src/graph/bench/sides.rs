@@ -69,8 +69,10 @@ pub(super) fn indistinct(description: &Description) -> Option<String> {
 pub(super) fn crossed<'d>(net: &Net<'_>, side: impl Fn(usize) -> Option<(usize, &'d str)>) -> Vec<Diagnostic> {
     let Some(bench) = &net.flat.bench else { return Vec::new() };
     let mistake = |sensor: usize| {
+        // Most devices have no sides, and to find the arm takes longer.
+        let (device, own) = side(sensor)?;
         let arm = net.carrier(sensor)?;
-        let ((device, own), (other, of_arm)) = (side(sensor)?, side(arm)?);
+        let (other, of_arm) = side(arm)?;
         let [sensor, arm] = [sensor, arm].map(|role| net.flat.roles[role].0.name.as_str());
         let binding = bench.bind.get(sensor).filter(|_| device == other && own != of_arm)?;
         let message = format!("`{sensor}` is on `{arm}`, which is the {of_arm} side of `{}`", binding.device());
