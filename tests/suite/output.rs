@@ -276,11 +276,13 @@ fn the_signal_that_ends_a_run_loses_no_row_of_a_slow_reader_and_the_process_ends
         scope.spawn(|| {
             let (_folder, path) = in_new_folder("rows.csv");
             let script = format!(
-                "mkfifo $OUT; (exec <$OUT; sleep 3; cat > $OUT.csv) & \
-                 $RUN {endless} -q --out $OUT & sleep 1.5; kill -INT $!; wait $!; code=$?; wait; exit $code"
+                "mkfifo $OUT; (exec <$OUT; sleep 3.5; cat > $OUT.csv) & \
+                 RUST_LOG=warn $RUN {endless} -q --out $OUT & sleep 2; kill -INT $!; wait $!; code=$?; wait; exit $code"
             );
             let said = said(&mut shell(&script, &path));
             assert_eq!((said.code, said.err.as_str()), (0, ""), "{}", said.out);
+            let size = fs::metadata(format!("{path}.csv")).unwrap().len();
+            assert!(size > 1 << 16, "the reader's pipe was full at the end: {size} bytes");
         });
         scope.spawn(|| {
             let (_folder, path) = in_new_folder("rows.csv");
