@@ -9,6 +9,6 @@ mod session;
 pub(crate) use self::core::NodeRunner;
 pub use self::core::{Counters, ModeChange, Timing};
 pub use session::{
-    Beginning, Culprit, DisplayedPort, End, Engine, Halt, Interrupt, LateTick, Logged, Outcome, Punctuality, Rest,
-    RunOptions, TaskEnd, TaskRun, run, run_virtual,
+    Beginning, DisplayedPort, End, Engine, Halt, Interrupt, LateTick, Logged, Outcome, Punctuality, Rest, RunOptions,
+    TaskEnd, TaskRun, TickUse, run, run_virtual,
 };

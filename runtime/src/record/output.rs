@@ -22,17 +22,8 @@ pub struct OutputFile {
     progress: Arc<AtomicU64>,
 }
 
-/// A write that failed.
-#[derive(Debug)]
-pub(super) struct WriteError {
-    /// Number of lines that were written before; a line that was cut is removed if possible.
-    pub(super) lines: u64,
-    /// What went wrong.
-    pub(super) error: io::Error,
-}
-
 impl OutputFile {
-    /// Creates a file, or opens what is there.
+    /// Creates a file, or opens what is there and removes its content.
     ///
     /// # Errors
     /// If that is not possible.
@@ -40,12 +31,33 @@ impl OutputFile {
         Ok(File::create(path)?.into())
     }
 
-    /// Writes whole lines. After an error, the file ends with a whole line, if it is a file.
+    /// Creates a file, or opens what is there and keeps its content until [`clear`](Self::clear).
     ///
     /// # Errors
-    /// Returns the error with the number of lines that were written.
-    pub(super) fn write_lines(&mut self, text: &[u8]) -> Result<(), WriteError> {
-        self.write(text).map_err(|(written, error)| {
+    /// If that is not possible.
+    pub fn open(path: &Path) -> io::Result<Self> {
+        Ok(File::options().write(true).create(true).truncate(false).open(path)?.into())
+    }
+
+    /// Removes the content of a file; a pipe or a device has none.
+    ///
+    /// # Errors
+    /// If that is not possible.
+    pub fn clear(&self) -> io::Result<()> {
+        if self.is_regular { self.file.set_len(0) } else { Ok(()) }
+    }
+
+    /// Writes whole lines and adds their number to `lines` as they are written. After an error, the file ends with a whole
+    /// line, if it is a file.
+    ///
+    /// # Errors
+    /// If they cannot be written.
+    pub(super) fn write_lines(&mut self, text: &[u8], lines: &AtomicU64) -> io::Result<()> {
+        let count = |piece: &[u8]| {
+            let ends = piece.iter().filter(|byte| **byte == b'\n').count();
+            lines.fetch_add(ends as u64, Ordering::Relaxed);
+        };
+        self.write_counted(text, count).map_err(|(written, error)| {
             let written = &text[..written];
             let whole = written.iter().rposition(|byte| *byte == b'\n').map_or(0, |end| end + 1);
             if self.is_regular {
@@ -53,20 +65,26 @@ impl OutputFile {
                 let cut = (written.len() - whole) as u64;
                 let _ = self.file.metadata().and_then(|file| self.file.set_len(file.len().saturating_sub(cut)));
             }
-            WriteError { lines: written.iter().filter(|byte| **byte == b'\n').count() as u64, error }
+            error
         })
     }
 
     /// Writes bytes. On an error, returns how many were written before.
     pub(super) fn write(&mut self, bytes: &[u8]) -> Result<(), (usize, io::Error)> {
+        self.write_counted(bytes, |_| {})
+    }
+
+    /// Writes bytes, and passes each piece to `count` once it is written.
+    fn write_counted(&mut self, bytes: &[u8], count: impl Fn(&[u8])) -> Result<(), (usize, io::Error)> {
         let size = if self.is_regular { usize::MAX } else { PIECE_BYTES };
         let mut done = 0;
         while done < bytes.len() {
             match self.file.write(&bytes[done..bytes.len().min(done.saturating_add(size))]) {
                 Ok(0) => return Err((done, ErrorKind::WriteZero.into())),
-                Ok(count) => {
-                    done += count;
-                    self.progress.fetch_add(count as u64, Ordering::Relaxed);
+                Ok(size) => {
+                    count(&bytes[done..done + size]);
+                    done += size;
+                    self.progress.fetch_add(size as u64, Ordering::Relaxed);
                 }
                 Err(error) if error.kind() == ErrorKind::Interrupted => {}
                 Err(error) if error.kind() == ErrorKind::WouldBlock => std::thread::sleep(RETRY_INTERVAL),
@@ -116,7 +134,7 @@ impl<T: Send + 'static> Writing<T> {
             }
             std::thread::sleep(POLL_INTERVAL);
         }
-        Some(self.thread.join().expect("nothing that a writer does panics"))
+        Some(self.thread.join().expect("a writer does not panic"))
     }
 }
 

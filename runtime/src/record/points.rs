@@ -28,10 +28,8 @@ impl std::str::FromStr for PointsRequest {
     /// standard output.
     fn from_str(text: &str) -> Result<Self, String> {
         let (ports, path) = text.split_once('=').map_or((None, text), |(ports, path)| (Some(ports), path));
-        if path != "-" && Path::new(path).extension().is_none_or(|extension| extension != "ply") {
-            return Err(format!(
-                "`{path}` is not a .ply file: write `surface.ply`, or ports and a file as in `ruler.pose=surface.ply`"
-            ));
+        if path.is_empty() {
+            return Err(not_points(Path::new(path)));
         }
         let ports: Vec<String> =
             ports.iter().flat_map(|ports| ports.split(',')).map(|port| port.trim().into()).collect();
@@ -47,7 +45,25 @@ pub struct PointPorts {
     extra: Vec<(String, PlannedPort)>,
 }
 
+/// The message about a path that does not end in .ply.
+fn not_points(path: &Path) -> String {
+    let path = path.display();
+    format!("`{path}` is not a .ply file: write `surface.ply`, or ports and a file as in `ruler.pose=surface.ply`")
+}
+
 impl PointsRequest {
+    /// Checks that the path ends in .ply.
+    ///
+    /// # Errors
+    /// Returns a message that says what to write instead.
+    pub fn check_extension(&self) -> Result<(), String> {
+        if self.path.extension().is_some_and(|extension| extension == "ply") {
+            Ok(())
+        } else {
+            Err(not_points(&self.path))
+        }
+    }
+
     /// Resolves the ports in a graph.
     ///
     /// # Errors
@@ -192,7 +208,7 @@ mod tests {
             );
         }
         for text in ["", "surface", "surface.csv", "ruler.pose=", "ruler.pose=surface.obj", "surface.ply=ruler.pose"] {
-            let error = text.parse::<PointsRequest>().unwrap_err();
+            let error = text.parse().and_then(|request: PointsRequest| request.check_extension()).unwrap_err();
             assert!(error.contains("is not a .ply file"), "{text}: {error}");
         }
     }

@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 
 use rtrb::{Consumer, Producer, RingBuffer};
 
-use super::output::{OutputFile, WriteError, Writing, not_read};
+use super::output::{OutputFile, Writing, not_read};
 use super::{PortColumn, PortColumns, RowFormat};
 use crate::engine::{Beginning, Engine, TaskRun};
 use crate::signal::Unit;
@@ -165,9 +165,9 @@ struct RowWriter<'w> {
 impl RowWriter<'_> {
     /// Writes rows until the other end of the ring is gone.
     fn run(mut self, mut ring: Consumer<f64>) -> io::Result<()> {
-        let (mut text, mut count, mut row) = (Vec::new(), 0, vec![0.0; self.format.times() + self.columns.len()]);
+        let (mut text, mut row) = (Vec::new(), vec![0.0; self.format.times() + self.columns.len()]);
         self.format.header(self.columns, &mut text)?;
-        self.file.write_lines(&text).map_err(|failed| failed.error)?;
+        self.file.write_lines(&text, &AtomicU64::new(0))?;
         text.clear();
         let mut flushed = Instant::now();
         loop {
@@ -178,13 +178,12 @@ impl RowWriter<'_> {
                     *cell = value;
                 }
                 self.format.row(self.columns, &row, &mut text)?;
-                count += 1;
                 if text.len() >= CHUNK_BYTES {
-                    self.flush(&mut text, &mut count)?;
+                    self.flush(&mut text)?;
                 }
             }
             if is_over || flushed.elapsed() >= FLUSH_INTERVAL {
-                self.flush(&mut text, &mut count)?;
+                self.flush(&mut text)?;
                 flushed = Instant::now();
             }
             if is_over {
@@ -194,12 +193,10 @@ impl RowWriter<'_> {
         }
     }
 
-    /// Writes a text of `count` rows.
-    fn flush(&mut self, text: &mut Vec<u8>, count: &mut u64) -> io::Result<()> {
-        let result = self.file.write_lines(text);
-        self.rows.fetch_add(result.as_ref().map_or_else(|failed| failed.lines, |()| *count), Ordering::Relaxed);
+    /// Writes a text of rows.
+    fn flush(&mut self, text: &mut Vec<u8>) -> io::Result<()> {
+        let result = self.file.write_lines(text, self.rows);
         text.clear();
-        *count = 0;
-        result.map_err(|WriteError { error, .. }| error)
+        result
     }
 }

@@ -5,7 +5,6 @@ use std::io::{self, Write};
 use std::path::Path;
 
 use serde::Serializer;
-use serde::ser::SerializeMap;
 
 use super::PortColumn;
 
@@ -82,11 +81,11 @@ impl RowFormat {
     /// Writes one row: the bits of the times [ns], and one value per column. NaN stands for an absent value.
     pub(super) fn row(self, columns: &[PortColumn], row: &[f64], out: &mut impl Write) -> io::Result<()> {
         let (times, row) = row.split_at(self.times());
-        let times = self.names().iter().zip(times).map(|(name, time)| (*name, seconds(time.to_bits() as i64)));
+        let times = self.names().iter().zip(times).map(|(name, time)| (*name, time_text(time.to_bits() as i64)));
         match self.format {
             RecordFormat::Csv => {
                 for (i, (_, time)) in times.enumerate() {
-                    write!(out, "{}{time:?}", if i > 0 { "," } else { "" })?;
+                    write!(out, "{}{time}", if i > 0 { "," } else { "" })?;
                 }
                 for value in row {
                     if value.is_nan() { write!(out, ",")? } else { write!(out, ",{value:?}")? }
@@ -94,17 +93,25 @@ impl RowFormat {
                 writeln!(out)
             }
             RecordFormat::Ndjson => {
-                let mut json = serde_json::Serializer::new(&mut *out);
-                let mut map = json.serialize_map(Some(columns.len() + self.times()))?;
-                times.into_iter().try_for_each(|(name, time)| map.serialize_entry(name, &time))?;
-                for (column, value) in columns.iter().zip(row) {
-                    map.serialize_entry(&column.name, &Some(value).filter(|value| !value.is_nan()))?;
+                for (i, (name, time)) in times.enumerate() {
+                    write!(out, "{}\"{name}\":{time}", if i > 0 { "," } else { "{" })?;
                 }
-                map.end()?;
-                writeln!(out)
+                for (column, value) in columns.iter().zip(row) {
+                    write!(out, ",")?;
+                    serde_json::to_writer(&mut *out, &column.name)?;
+                    write!(out, ":")?;
+                    serde_json::to_writer(&mut *out, &Some(value).filter(|value| !value.is_nan()))?;
+                }
+                writeln!(out, "}}")
             }
         }
     }
+}
+
+/// Writes nanoseconds as seconds, without an exponent and with at least one decimal.
+fn time_text(nanos: i64) -> String {
+    let seconds = seconds(nanos);
+    if seconds.fract() == 0.0 { format!("{seconds:.1}") } else { seconds.to_string() }
 }
 
 /// Converts nanoseconds to seconds. The result is the float next to the decimal number, so it is printed without noise.
@@ -133,6 +140,9 @@ mod tests {
     fn times_are_printed_without_noise() {
         let cases = [
             (0, "0.0"),
+            (1, "0.000000001"),
+            (2_193, "0.000002193"),
+            (5_000_000_000, "5.0"),
             (300_000_000, "0.3"),
             (700_000_000, "0.7"),
             (1_001_000_000, "1.001"),
@@ -141,10 +151,11 @@ mod tests {
             (1_763_866_339_123_456_000, "1763866339.123456"),
         ];
         for (nanos, text) in cases {
-            assert_eq!(format!("{:?}", seconds(nanos)), text, "{nanos}");
+            assert_eq!(time_text(nanos), text);
+            assert_eq!(text.parse(), Ok(seconds(nanos)));
         }
         for tick in 0..100_000 {
-            let text = format!("{:?}", seconds(tick * 4_000_000));
+            let text = time_text(tick * 4_000_000);
             assert!(text.len() <= 7, "{text}");
         }
     }

@@ -76,7 +76,7 @@ pub(crate) fn events(engine: &Engine, end: i64) -> String {
     tables.collect::<String>() + &halts(engine) + &ends(engine)
 }
 
-/// Says how each task ended that is a part.
+/// Lists the tasks that are parts and have ended, each with its end.
 fn ends(engine: &Engine) -> String {
     let parts = engine.tasks().iter().skip(1).filter(|task| task.is_active());
     let lines = parts.map(|task| match task.end() {

@@ -3,15 +3,15 @@
 use std::io;
 use std::path::Path;
 
-use super::target::{is_special, is_stdout, open};
+use super::target::{clear, is_special, is_stdout, open};
 use super::{Job, JobOptions};
 use crate::cli::shell::patience::Patience;
 use crate::cli::shell::{FAULTED, Shell};
 use crate::cli::still::Still;
 use crate::cli::text::number::count_of;
 use crate::cli::text::svg::Svg;
-use crate::engine::Engine;
-use crate::record::{PointPorts, PointRecorder, RecordFormat, Recorded, Recorder};
+use crate::engine::{Engine, Interrupt};
+use crate::record::{OutputFile, PointPorts, PointRecorder, PointsRequest, RecordFormat, Recorded, Recorder};
 
 /// The open files of a run.
 pub(crate) struct OutputFiles<'j> {
@@ -20,15 +20,17 @@ pub(crate) struct OutputFiles<'j> {
     /// Whether the end of the recording by an error was reported.
     has_reported_end: bool,
     points: Option<PointRecorder>,
-    still: Option<Still>,
+    still: Option<(Still, OutputFile)>,
 }
 
 impl JobOptions {
     /// Reserves standard output for a file of the run, if one of them is `-`. All texts go to standard error then.
     ///
     /// # Errors
-    /// If several files are `-`.
+    /// If several files are `-`, or if that of `--points` is no .ply file, pipe or device.
     pub fn reserve_output(&self, shell: &Shell) -> Result<(), String> {
+        let wanted = self.points.as_ref().filter(|points| !is_special(&points.path));
+        wanted.map_or(Ok(()), PointsRequest::check_extension)?;
         let points = self.points.as_ref().map(|points| points.path.as_path());
         let files = [self.out.as_deref(), points, self.svg.as_deref()];
         match files.into_iter().flatten().filter(|path| is_stdout(path)).count() {
@@ -43,25 +45,37 @@ impl JobOptions {
 }
 
 impl<'j> OutputFiles<'j> {
-    /// Creates the files before the run starts, and waits for the readers of pipes.
+    /// Creates the files before the run starts, and waits for the readers of pipes. All files are opened before the first
+    /// one loses its old content, so a run that is refused keeps them all.
     ///
     /// # Errors
-    /// If one of them cannot be created.
+    /// If one of them cannot be created, or if a signal ends the wait.
     pub(crate) fn create(
         job: &'j Job,
         chosen: Option<&PointPorts>,
         engine: &Engine,
         is_real: bool,
+        interrupt: &Interrupt,
         shell: &Shell,
     ) -> Result<Self, String> {
-        let JobOptions { out, points: wanted, svg, .. } = &job.options;
-        let rows = out.as_deref().map(|path| recorder(path, engine, is_real, shell)).transpose()?;
-        let points = wanted.as_ref().zip(chosen).map(|(wanted, chosen)| {
-            let file = open(&wanted.path, &[PointRecorder::FILE_START], "a file of points", shell)?;
-            Ok::<_, String>(PointRecorder::new(file, chosen, engine))
-        });
-        let points = points.transpose()?;
-        let still = svg.as_deref().map(|path| still(path, &job.title, engine, shell)).transpose()?;
+        let JobOptions { out, points, svg, .. } = &job.options;
+        let format = out.as_deref().map(format_of).transpose()?;
+        let still = svg.as_deref().map(|path| still(path, &job.title, engine)).transpose()?;
+        let open = |path: Option<&'j Path>, starts: &[&str], what| {
+            let opened = path.map(|path| Ok::<_, String>((path, open(path, starts, what, interrupt, shell)?)));
+            opened.transpose()
+        };
+        let points = points.as_ref().map(|points| points.path.as_path());
+        let rows = open(out.as_deref(), &RecordFormat::FILE_STARTS, "a recording of a run")?;
+        let points = open(points, &[PointRecorder::FILE_START], "a file of points")?;
+        let svg = open(svg.as_deref(), &[Svg::START], "an SVG picture")?;
+        [&rows, &points, &svg].into_iter().flatten().try_for_each(|(path, file)| clear(path, file))?;
+        let start = |((_, file), format): ((_, OutputFile), RecordFormat)| {
+            Recorder::start(file, format.rows(is_real), engine).map_err(|error| format!("cannot record: {error}"))
+        };
+        let rows = rows.zip(format).map(start).transpose()?;
+        let points = points.zip(chosen).map(|((_, file), chosen)| PointRecorder::new(file, chosen, engine));
+        let still = still.zip(svg).map(|(still, (_, file))| (still, file));
         Ok(Self { job, rows, has_reported_end: false, points, still })
     }
 
@@ -81,7 +95,7 @@ impl<'j> OutputFiles<'j> {
         if let Some(points) = &mut self.points {
             points.record(engine);
         }
-        if let Some(still) = &mut self.still {
+        if let Some((still, _)) = &mut self.still {
             still.add(engine);
         }
     }
@@ -109,8 +123,8 @@ impl<'j> OutputFiles<'j> {
         if let (Some(wanted), Some(points)) = (points, self.points) {
             report(&wanted.path, points.finish(wait()).map(|count| format!(": {count} points")));
         }
-        if let (Some(path), Some(still)) = (svg, self.still) {
-            report(path, still.finish(engine, wait()).map(|()| String::new()));
+        if let (Some(path), Some((still, file))) = (svg, self.still) {
+            report(path, still.finish(engine, file, wait()).map(|()| String::new()));
         }
         code
     }
@@ -122,14 +136,15 @@ fn report_rows(job: &Job, shell: &Shell, path: &Path, recorded: &Recorded) -> u8
     let name = path.display();
     match error {
         None if *lost > 0 => {
-            shell.warning(format_args!("`{name}` lacks {lost} rows, because it was written too slowly"));
-            0
+            let count = count_of(*lost as usize, "row");
+            shell.error(format_args!("`{name}` lacks {count}, because it was written too slowly"));
+            FAULTED
         }
         None => {
             say_wrote(job, shell, path, "");
             0
         }
-        // `head` has seen enough, which is no error.
+        // The reader closed the pipe, as `head` does, which is no error.
         Some(_) if is_stdout(path) && recorded.is_closed_by_reader() => 0,
         Some(error) => {
             let (count, all) = (count_of(*rows as usize, "row"), rows + lost);
@@ -145,18 +160,16 @@ fn say_wrote(job: &Job, shell: &Shell, path: &Path, details: &str) {
     }
 }
 
-fn recorder(path: &Path, engine: &Engine, is_real: bool, shell: &Shell) -> Result<Recorder, String> {
+fn format_of(path: &Path) -> Result<RecordFormat, String> {
     let format = RecordFormat::of(path).or_else(|| is_special(path).then_some(RecordFormat::Csv));
-    let format = format.ok_or_else(|| {
+    format.ok_or_else(|| {
         format!("`{}` does not end in .csv or .ndjson: write for example `--out run.csv`", path.display())
-    })?;
-    let file = open(path, &RecordFormat::FILE_STARTS, "a recording of a run", shell)?;
-    Recorder::start(file, format.rows(is_real), engine).map_err(|error| format!("cannot record: {error}"))
+    })
 }
 
-fn still(path: &Path, title: &str, engine: &Engine, shell: &Shell) -> Result<Still, String> {
+fn still(path: &Path, title: &str, engine: &Engine) -> Result<Still, String> {
     if !is_special(path) && path.extension().is_none_or(|extension| extension != "svg") {
         return Err(format!("`{}` does not end in .svg: write for example `--svg run.svg`", path.display()));
     }
-    Still::new(|| open(path, &[Svg::START], "an SVG picture", shell), title, engine)
+    Still::new(title, engine)
 }

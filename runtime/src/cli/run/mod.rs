@@ -22,7 +22,7 @@ use summary::Summary;
 use super::shell::command::GraphArgs;
 use super::shell::panics::without_panic_messages;
 use super::shell::patience::Patience;
-use super::shell::{FAULTED, Shell, unknown};
+use super::shell::{FAULTED, INTERRUPTED, Shell, unknown};
 use super::text::number::{milliseconds, seconds};
 use super::text::prose::PageStyle;
 use crate::engine::{self, End, Engine, Interrupt, Outcome, RunOptions};
@@ -142,8 +142,7 @@ impl Job {
     /// If the arguments do not fit the graph, before the run starts.
     fn run_plan(&self, plan: Compiled, shell: &Shell) -> Result<u8, String> {
         plan.warnings().iter().for_each(|report| shell.show(report));
-        // Until the process ends: its output may hang too.
-        let _interrupt = Interrupt::catch().map_err(|error| format!("cannot run: {error}"))?;
+        let interrupt = Arc::new(Interrupt::catch().map_err(|error| format!("cannot run: {error}"))?);
         let JobOptions { duration, realtime, send, listen, points, .. } = &self.options;
         let is_real = *realtime || plan.is_live();
         if *listen && !is_real {
@@ -155,9 +154,19 @@ impl Job {
         let silences = plan.silences().to_vec();
         let mut engine = Engine::new(plan);
         self.check_words(&engine)?;
-        let mut files = OutputFiles::create(self, chosen.as_ref(), &engine, is_real, shell)?;
-        let patience = patience(is_real)?;
+        let mut files = match OutputFiles::create(self, chosen.as_ref(), &engine, is_real, &interrupt, shell) {
+            Err(message) if interrupt.is_requested() => {
+                shell.error(message);
+                return Ok(INTERRUPTED);
+            }
+            files => files?,
+        };
+        // In virtual time nothing moves, so nothing needs to be lost. The shell keeps the signals until the process ends.
+        let patience = if is_real { Patience::Limited(interrupt) } else { Patience::Interruptible(interrupt) };
         shell.set_patience(&patience);
+        if self.print != Print::Nothing {
+            shell.print_text();
+        }
         let period = milliseconds(seconds(engine.period()));
         self.say(shell, &format!("{}: {} nodes, one tick every {period}", self.title, engine.order().count()));
         silences.iter().for_each(|line| self.say(shell, line));
@@ -178,6 +187,7 @@ impl Job {
                 progress.show(seconds(engine.now()), engine.ticks(), |style| summary.live(style));
             })
         });
+        shell.set_patience(&patience.after_run());
         progress.clear();
         if let Ok(outcome) = &outcome {
             let style = PageStyle::new(shell.has_colour());
@@ -230,15 +240,6 @@ impl Job {
         let known = known.join(", ");
         Err(unknown("word", word, words.iter().map(String::as_str), &format!("this graph accepts {known}")))
     }
-}
-
-/// Returns how long a run waits for the readers of its output: in virtual time, nothing moves and nothing is lost.
-fn patience(is_real: bool) -> Result<Patience, String> {
-    if is_real {
-        return Ok(Patience::Limited);
-    }
-    let interrupt = Interrupt::catch().map_err(|error| format!("cannot run: {error}"))?;
-    Ok(Patience::Interruptible(Arc::new(interrupt)))
 }
 
 /// Explains a fault that is a stop without any source of the word `resume`.

@@ -5,6 +5,7 @@ use std::io::{self, Read};
 use std::path::Path;
 
 use crate::cli::shell::{Shell, standard_output};
+use crate::engine::Interrupt;
 use crate::record::OutputFile;
 
 /// Whether a path stands for standard output.
@@ -17,19 +18,35 @@ pub(crate) fn is_special(path: &Path) -> bool {
     is_stdout(path) || fs::metadata(path).is_ok_and(|file| !file.is_file() && !file.is_dir())
 }
 
-/// Opens a file, and waits for the reader of a pipe. An existing file is overwritten only if it starts with one of
-/// `starts`, the first bytes of `what`.
+/// Opens a file without removing its content, and waits for the reader of a pipe. An existing file is accepted only if
+/// it starts with one of `starts`, the first bytes of `what`.
 ///
 /// # Errors
-/// Returns a message if the file cannot be created, or is of another sort.
-pub(crate) fn open(path: &Path, starts: &[&str], what: &str, shell: &Shell) -> Result<OutputFile, String> {
-    let opened = if is_stdout(path) {
-        standard_output().map(OutputFile::from)
-    } else {
-        refuse_other(path, starts, what)?;
-        open_path(path, shell)
-    };
-    opened.map_err(|error| format!("cannot create `{}`: {error}", path.display()))
+/// Returns a message if the file cannot be created, or is of another sort, or if a signal ends the wait.
+pub(crate) fn open(
+    path: &Path,
+    starts: &[&str],
+    what: &str,
+    interrupt: &Interrupt,
+    shell: &Shell,
+) -> Result<OutputFile, String> {
+    let cannot = |error: io::Error| format!("cannot create `{}`: {error}", path.display());
+    if is_stdout(path) {
+        return standard_output().map(OutputFile::from).map_err(cannot);
+    }
+    refuse_other(path, starts, what)?;
+    open_path(path, interrupt, shell).map_err(cannot)
+}
+
+/// Removes the content of a file that was opened; standard output may be a file to which others write too.
+///
+/// # Errors
+/// Returns a message if that is not possible.
+pub(crate) fn clear(path: &Path, file: &OutputFile) -> Result<(), String> {
+    if is_stdout(path) {
+        return Ok(());
+    }
+    file.clear().map_err(|error| format!("cannot create `{}`: {error}", path.display()))
 }
 
 /// Refuses to overwrite a file that does not begin like the output of a run, such as a recording that is being played.
@@ -49,29 +66,42 @@ fn refuse_other(path: &Path, starts: &[&str], what: &str) -> Result<(), String> 
     Ok(())
 }
 
-/// Opens a path. If it is a pipe without a reader, says so and waits for one.
+/// Opens a path. If it is a pipe without a reader, prints that it waits, and waits until a program opens the pipe for
+/// reading or a signal ends the wait.
 #[cfg(unix)]
-fn open_path(path: &Path, shell: &Shell) -> io::Result<OutputFile> {
+fn open_path(path: &Path, interrupt: &Interrupt, shell: &Shell) -> io::Result<OutputFile> {
     use std::os::unix::fs::{FileTypeExt, OpenOptionsExt};
+    use std::time::Duration;
 
-    use nix::fcntl::OFlag;
+    use nix::fcntl::{FcntlArg, OFlag, fcntl};
     use nix::libc::ENXIO;
 
+    /// Interval at which a pipe is tried again.
+    const RETRY_INTERVAL: Duration = Duration::from_millis(20);
+
     if !fs::metadata(path).is_ok_and(|file| file.file_type().is_fifo()) {
-        return OutputFile::create(path);
+        return OutputFile::open(path);
     }
-    let options = || File::options().write(true).to_owned();
-    let probe = options().custom_flags(OFlag::O_NONBLOCK.bits()).open(path);
-    if probe.as_ref().is_err_and(|error| error.raw_os_error() == Some(ENXIO)) {
+    let try_open = || File::options().write(true).custom_flags(OFlag::O_NONBLOCK.bits()).open(path);
+    let has_no_reader =
+        |opened: &io::Result<File>| opened.as_ref().is_err_and(|error| error.raw_os_error() == Some(ENXIO));
+    let mut opened = try_open();
+    if has_no_reader(&opened) {
         shell.say_beside(&format!("waiting for a reader of the pipe `{}`; Ctrl-C ends the wait", path.display()));
     }
-    // A reader that is there already sees one writer without a gap, because the probe stays open.
-    let opened = options().open(path)?;
-    drop(probe);
-    Ok(opened.into())
+    while has_no_reader(&opened) {
+        if let Some(signal) = interrupt.signal() {
+            return Err(io::Error::other(format!("{signal} ended the wait for a reader of the pipe")));
+        }
+        std::thread::sleep(RETRY_INTERVAL);
+        opened = try_open();
+    }
+    let file = opened?;
+    fcntl(&file, FcntlArg::F_SETFL(OFlag::empty()))?;
+    Ok(file.into())
 }
 
 #[cfg(not(unix))]
-fn open_path(path: &Path, _: &Shell) -> io::Result<OutputFile> {
-    OutputFile::create(path)
+fn open_path(path: &Path, _: &Interrupt, _: &Shell) -> io::Result<OutputFile> {
+    OutputFile::open(path)
 }

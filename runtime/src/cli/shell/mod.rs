@@ -29,6 +29,8 @@ const POLL_INTERVAL: Duration = Duration::from_micros(200);
 pub const FAULTED: u8 = 1;
 /// Exit code of a file that does not load, and of an invalid command line.
 pub const NOT_LOADED: u8 = 2;
+/// Exit code of a command that a signal ended before its work began.
+pub(crate) const INTERRUPTED: u8 = 130;
 
 /// The catalogue and the output of a running command.
 pub struct Shell {
@@ -40,6 +42,8 @@ pub struct Shell {
     patience: Mutex<Patience>,
     /// Whether standard output is a file of the run, so that all texts go to standard error.
     is_out_taken: AtomicBool,
+    /// Whether standard output is text for people, so that a warning may stand there.
+    is_out_text: AtomicBool,
     /// Whether a reader did not read for a while, so that nothing waits for the order of lines any more.
     is_stuck: AtomicBool,
 }
@@ -48,8 +52,8 @@ impl Shell {
     /// Creates a shell that writes errors and warnings to `err`.
     pub(crate) fn new(catalogue: Catalogue, colour: Colour, arguments: clap::Command, err: OutStream) -> Self {
         let (out, patience) = (OutStream::new(standard_output()), Mutex::default());
-        let [is_out_taken, is_stuck] = [false; 2].map(AtomicBool::new);
-        Self { catalogue, colour, arguments, out, err, patience, is_out_taken, is_stuck }
+        let [is_out_taken, is_out_text, is_stuck] = [false; 3].map(AtomicBool::new);
+        Self { catalogue, colour, arguments, out, err, patience, is_out_taken, is_out_text, is_stuck }
     }
 
     /// Returns the arguments of the tool, including those of all commands.
@@ -144,6 +148,11 @@ impl Shell {
         self.is_out_taken.store(true, Ordering::Relaxed);
     }
 
+    /// Notes that standard output is text for people. If nobody reads standard error, its last warning goes there.
+    pub(crate) fn print_text(&self) {
+        self.is_out_text.store(true, Ordering::Relaxed);
+    }
+
     fn is_out_taken(&self) -> bool {
         self.is_out_taken.load(Ordering::Relaxed)
     }
@@ -181,14 +190,13 @@ impl Shell {
         if err.lines > 0 {
             let message = format!("warning: {}\n", lost_text("standard error", &err));
             let can_take_it = err.error.is_none() && !self.err.is_closed();
-            match (can_take_it, self.is_out_taken()) {
-                (true, _) => self.err.print(message),
-                (false, false) => self.out.print(message),
-                // There is nobody left to tell.
-                (false, true) => {}
+            if can_take_it {
+                self.err.print(message);
+            } else if self.is_out_text.load(Ordering::Relaxed) && !self.is_out_taken() {
+                self.out.print(message);
             }
         }
-        // `head` has seen enough, which is no error.
+        // The reader closed the pipe, as `head` does, which is no error.
         let is_cut = out.lines > 0 && !out.is_closed_by_reader;
         if is_cut {
             self.error(lost_text("standard output", &out));

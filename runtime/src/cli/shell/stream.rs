@@ -258,7 +258,7 @@ impl Shared {
                     self.lock().progress += count as u64;
                 }
                 Err(error) if error.kind() == ErrorKind::Interrupted => {}
-                // Whoever shares a terminal or a pipe can make it refuse to block.
+                // Another process that shares the terminal or the pipe can set `O_NONBLOCK` on it.
                 Err(error) if error.kind() == ErrorKind::WouldBlock => std::thread::sleep(RETRY_INTERVAL),
                 Err(error) => return Err((done, error)),
             }
@@ -299,7 +299,8 @@ mod tests {
     fn a_queue_that_nobody_empties_is_bounded_and_what_is_lost_is_counted() {
         let (reader, writer) = io::pipe().expect("a pipe");
         let stream = OutStream::new(Ok(std::os::fd::OwnedFd::from(writer).into()));
-        stream.set_patience(Patience::Limited);
+        let interrupt = crate::engine::Interrupt::catch().expect("handlers of signals");
+        stream.set_patience(Patience::Limited(Arc::new(interrupt)));
         let line = "x".repeat(999) + "\n";
         (0..5000).for_each(|_| stream.log(&line));
         let lost = stream.lost();

@@ -18,30 +18,26 @@ use crate::record::{OutputFile, write_whole};
 
 /// Maximum number of bins of a curve, several for each column of pixels.
 const MAX_BINS: usize = 4096;
+
 /// Collects a still picture of a run and writes it at the end.
 pub(crate) struct Still {
-    file: OutputFile,
     title: String,
     view: RunView,
 }
 
 impl Still {
-    /// Creates a picture that is written to an open file.
+    /// Creates a picture.
     ///
     /// # Errors
     /// If the graph shows nothing.
-    pub(crate) fn new(
-        open: impl FnOnce() -> Result<OutputFile, String>,
-        title: &str,
-        engine: &Engine,
-    ) -> Result<Self, String> {
+    pub(crate) fn new(title: &str, engine: &Engine) -> Result<Self, String> {
         let view = RunView::new(engine, MAX_BINS);
         if view.images.is_empty() && view.curves.is_empty() {
             return Err(
                 "`--svg` draws the ports that the graph shows: add `show = [\"node.port\"]` under [graph]".into()
             );
         }
-        Ok(Self { file: open()?, title: title.to_owned(), view })
+        Ok(Self { title: title.to_owned(), view })
     }
 
     /// Adds the last tick of the engine.
@@ -49,13 +45,13 @@ impl Still {
         self.view.add(engine);
     }
 
-    /// Writes the picture. Waits while `goes_on` returns true for the number of bytes that have been written.
+    /// Writes the picture to `file`. Waits while `goes_on` returns true for the number of bytes that have been written.
     ///
     /// # Errors
     /// If it cannot be written.
-    pub(crate) fn finish(self, engine: &Engine, goes_on: impl FnMut(u64) -> bool) -> io::Result<()> {
+    pub(crate) fn finish(self, engine: &Engine, file: OutputFile, goes_on: impl FnMut(u64) -> bool) -> io::Result<()> {
         let text = draw(&self.title, &self.view, &engine.changes());
-        write_whole(self.file, text.into_bytes(), goes_on)
+        write_whole(file, text.into_bytes(), goes_on)
     }
 }
 

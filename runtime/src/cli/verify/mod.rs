@@ -127,7 +127,8 @@ type PendingRun = (usize, Option<u64>);
 /// of threads.
 fn run(all: &mut [Verified], args: &VerifyArgs, shell: &Shell) -> Result<bool, String> {
     let interrupt = Arc::new(Interrupt::catch().map_err(|error| format!("cannot run: {error}"))?);
-    shell.set_patience(&Patience::Interruptible(interrupt.clone()));
+    let patience = Patience::Interruptible(interrupt.clone());
+    shell.set_patience(&patience);
     let runs = |(i, verified): (usize, &Verified)| {
         let seeds: Vec<Option<u64>> = verified.loaded.iter().flat_map(Scenario::runs).collect();
         seeds.into_iter().map(move |seed| (i, seed))
@@ -157,6 +158,7 @@ fn run(all: &mut [Verified], args: &VerifyArgs, shell: &Shell) -> Result<bool, S
             joined.for_each(|end| end.unwrap_or_else(|panic| std::panic::resume_unwind(panic)));
         });
     });
+    shell.set_patience(&patience.after_run());
     shell.draw("");
     let is_complete = trials.iter().all(|trial| trial.get().is_some());
     for ((scenario, _), trial) in work.iter().zip(trials) {

@@ -32,7 +32,7 @@ pub(crate) fn drive(engine: &mut Engine, until: i64, pacer: &mut impl Pacer, obs
             return End::Duration;
         }
         match pacer.tick(engine, next) {
-            Ok(true) => observe(engine),
+            Ok(true) => engine.observe_measured(observe),
             Ok(false) => return End::Interrupted,
             Err(fault) => return End::Fault(fault.into()),
         }

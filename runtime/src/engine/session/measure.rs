@@ -1,9 +1,9 @@
 //! Measures when the ticks of a run in real time begin, and finds what made one late.
 
-use std::time::{Duration, SystemTime, UNIX_EPOCH};
+use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 use super::engine::Engine;
-use super::punctuality::{Beginning, Culprit, Punctuality};
+use super::punctuality::{Beginning, Punctuality, TickUse};
 use crate::engine::core::DeviceLink;
 
 /// A tick that is later than this part of a period makes the engine measure every tick from then on [1/period].
@@ -19,31 +19,32 @@ impl Engine {
         let due = if has_live_clock { last.map_or(time, |last| last.time + self.period()) } else { due };
         let by = (time - due).max(0);
         let is_late = by > self.period() / LATE_PART;
-        if let Some(last) = last.filter(|last| is_late && time - last.time > self.period()) {
-            self.find_culprit(last, Duration::from_nanos((time - last.time).unsigned_abs()));
-        }
+        let last = last.filter(|last| is_late && time - last.time > self.period());
+        let cause =
+            last.and_then(|last| self.use_of_tick(last, Duration::from_nanos((time - last.time).unsigned_abs())));
         self.timing.is_always_on |= is_late;
-        self.punctuality.count(Beginning { time, wall }, by);
+        self.punctuality.count(Beginning { time, wall }, by, cause);
     }
 
-    /// Finds what took most of the last tick, which began at `last` and lasted `duration`, if that tick was measured.
-    fn find_culprit(&mut self, last: Beginning, duration: Duration) {
+    /// Calls `observe` with this engine after a tick, and notes how long that took if every tick is timed.
+    pub(super) fn observe_measured(&mut self, observe: &mut dyn FnMut(&Self)) {
+        let before = self.timing.is_always_on.then(Instant::now);
+        observe(self);
+        self.punctuality.output = before.map_or(Duration::ZERO, |before| before.elapsed());
+    }
+
+    /// Returns what took the time of the last tick, which began at `last` and lasted `lasted`, if it was measured.
+    fn use_of_tick(&self, last: Beginning, lasted: Duration) -> Option<TickUse> {
         if self.timing.last_tick != self.core.tick.index || !self.timing.is_always_on {
-            return;
+            return None;
         }
-        let nodes = self.timing.nodes.iter().zip(&self.names);
-        let nodes = nodes.map(|(time, (name, _))| (time.last, "node", name));
+        let nodes = self.timing.nodes.iter().zip(&self.names).map(|(time, (name, _))| (time.last, "node", name));
         let devices = self.punctuality.devices.iter().zip(&self.devices);
-        let devices = devices.map(|(time, device)| (*time, "device", &device.name));
-        let slowest = nodes.chain(devices).max_by_key(|(took, ..)| *took);
-        let Some((took, sort, name)) = slowest.filter(|(took, ..)| 2 * *took >= duration) else {
-            self.punctuality.unexplained += 1;
-            return;
-        };
-        if self.punctuality.culprit.as_ref().is_none_or(|known| known.took < took) {
-            let name = format!("{sort} `{name}`");
-            self.punctuality.culprit = Some(Culprit { name, took, time: last.time });
-        }
+        let all = || nodes.clone().chain(devices.clone().map(|(time, device)| (*time, "device", &device.name)));
+        let together = all().map(|(took, ..)| took).sum();
+        let (took, sort, name) = all().max_by_key(|(took, ..)| *took)?;
+        let (slowest, output) = (format!("{sort} `{name}`"), self.punctuality.output);
+        Some(TickUse { time: last.time, lasted, slowest, took, together, output })
     }
 
     /// Returns when the last tick began by the clock, or `None` in virtual time, where no tick has such a time.

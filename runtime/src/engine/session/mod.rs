@@ -25,7 +25,7 @@ pub use drive::run_virtual;
 pub use engine::{DisplayedPort, Engine, Logged};
 pub use halt::{Halt, Rest};
 pub use outcome::{End, Outcome, RunOptions};
-pub use punctuality::{Beginning, Culprit, LateTick, Punctuality};
+pub use punctuality::{Beginning, LateTick, Punctuality, TickUse};
 pub use real_time::run;
 pub use signals::Interrupt;
 pub use task_run::{TaskEnd, TaskRun};

@@ -57,6 +57,12 @@ impl Interrupt {
         self.caught.phase().signal
     }
 
+    /// Returns the time since the first signal that has asked to end the process.
+    #[must_use]
+    pub fn since_signal(&self) -> Option<Duration> {
+        self.caught.phase().signalled.map(|at| at.elapsed())
+    }
+
     /// Returns the flag that a signal sets which asks to end the process.
     pub(crate) fn flag(&self) -> &'static AtomicBool {
         &self.caught.is_requested
