@@ -31,10 +31,10 @@ use clap::{CommandFactory, FromArgMatches, Parser};
 use tracing_subscriber::EnvFilter;
 
 use crate::catalogue::Catalogue;
+use crate::engine;
 
 use reference::{describe, list};
 
-use shell::signals::block_io_signals;
 use shell::stream::OutStream;
 use shell::{Colour, standard_error};
 
@@ -103,7 +103,8 @@ impl Tool {
     /// Runs the tool on the process's arguments.
     #[must_use]
     pub fn main(self) -> ExitCode {
-        block_io_signals();
+        // Without it, such a signal has its default effect; nothing else changes.
+        let _ = engine::block_io_signals();
         let matches = match self.arguments().try_get_matches() {
             Ok(matches) => matches,
             Err(error) => {

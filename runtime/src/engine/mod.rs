@@ -10,5 +10,5 @@ pub(crate) use self::core::NodeRunner;
 pub use self::core::{Counters, ModeChange, Timing};
 pub use session::{
     Beginning, DisplayedPort, End, Engine, Halt, Interrupt, LateTick, Logged, Outcome, Punctuality, Rest, RunOptions,
-    TaskEnd, TaskRun, TickUse, run, run_virtual,
+    TaskEnd, TaskRun, TickUse, block_io_signals, run, run_virtual,
 };

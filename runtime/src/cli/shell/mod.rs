@@ -4,7 +4,6 @@ pub(super) mod command;
 pub(super) mod json;
 pub(super) mod panics;
 pub(super) mod patience;
-pub(super) mod signals;
 pub(super) mod stream;
 
 use std::fmt::Display;

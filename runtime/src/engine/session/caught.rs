@@ -19,8 +19,6 @@ pub(crate) enum Wish {
     End,
     /// To suspend the process.
     Suspend,
-    /// Nothing: the system call that caused the signal returns an error.
-    Nothing,
 }
 
 #[cfg(unix)]
@@ -31,7 +29,7 @@ mod system {
     use nix::sys::signal::{SigSet, Signal as Blocked};
     use signal_hook::consts::{
         SIGALRM, SIGHUP, SIGINT, SIGIO, SIGPROF, SIGQUIT, SIGTERM, SIGTSTP, SIGTTIN, SIGTTOU, SIGUSR1, SIGUSR2,
-        SIGVTALRM, SIGXCPU, SIGXFSZ,
+        SIGVTALRM, SIGXCPU,
     };
     use signal_hook::iterator::Signals;
     use signal_hook::low_level::{emulate_default_handler, signal_name};
@@ -43,25 +41,19 @@ mod system {
     const SUSPEND: [i32; 3] = [SIGTSTP, SIGTTIN, SIGTTOU];
 
     pub(crate) fn receive(on: impl Fn(Signal) + Send + 'static) -> io::Result<()> {
-        let mut signals = Signals::new(END.into_iter().chain(SUSPEND).chain([SIGXFSZ]))?;
+        let mut signals = Signals::new(END.into_iter().chain(SUSPEND))?;
         let receive = move || {
             for number in signals.forever() {
-                let wish = match number {
-                    SIGXFSZ => Wish::Nothing,
-                    _ if SUSPEND.contains(&number) => Wish::Suspend,
-                    _ => Wish::End,
-                };
+                let wish = if SUSPEND.contains(&number) { Wish::Suspend } else { Wish::End };
                 on(Signal { name: signal_name(number).unwrap_or("a signal"), wish, number });
             }
         };
         Builder::new().name("signals".into()).spawn(receive).map(drop)
     }
 
-    pub(crate) fn block_terminal_stops() -> io::Result<()> {
-        let mut set = SigSet::empty();
-        set.add(Blocked::SIGTTIN);
-        set.add(Blocked::SIGTTOU);
-        Ok(set.thread_block()?)
+    pub(crate) fn block_io_signals() -> io::Result<()> {
+        let signals: SigSet = [Blocked::SIGTTIN, Blocked::SIGTTOU, Blocked::SIGXFSZ].into_iter().collect();
+        Ok(signals.thread_block()?)
     }
 
     impl Signal {
@@ -97,7 +89,7 @@ mod system {
         Builder::new().name("signals".into()).spawn(receive).map(drop)
     }
 
-    pub(crate) fn block_terminal_stops() -> io::Result<()> {
+    pub(crate) fn block_io_signals() -> io::Result<()> {
         Ok(())
     }
 
@@ -121,10 +113,16 @@ pub(crate) fn receive(on: impl Fn(Signal) + Send + 'static) -> io::Result<()> {
     system::receive(on)
 }
 
-/// Blocks SIGTTIN and SIGTTOU in this thread and in those that it starts. In the background, a read from the terminal
-/// then returns an error and a write succeeds. A handler does not suffice: the system would repeat the read for ever.
-pub(crate) fn block_terminal_stops() -> io::Result<()> {
-    system::block_terminal_stops()
+/// Blocks the signals that report a failed read or write, in this thread and in those that it starts: SIGTTIN and
+/// SIGTTOU of a terminal in whose background the process is, and SIGXFSZ of a file that reaches `ulimit -f`.
+///
+/// The read or write then succeeds or returns an error. A handler does not suffice: the system would repeat the read for
+/// ever.
+///
+/// # Errors
+/// If the operating system refuses it.
+pub fn block_io_signals() -> io::Result<()> {
+    system::block_io_signals()
 }
 
 /// Ends the process without waiting for any lock, buffer or thread.

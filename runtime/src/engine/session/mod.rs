@@ -21,6 +21,7 @@ mod task_run;
 mod trouble;
 mod words;
 
+pub use caught::block_io_signals;
 pub use drive::run_virtual;
 pub use engine::{DisplayedPort, Engine, Logged};
 pub use halt::{Halt, Rest};

@@ -6,7 +6,7 @@ use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::Builder;
 use std::time::{Duration, Instant};
 
-use super::caught::{EXIT_INTERRUPTED, Signal, Wish, block_terminal_stops, exit_now, receive};
+use super::caught::{EXIT_INTERRUPTED, Signal, Wish, block_io_signals, exit_now, receive};
 
 /// Time from the first signal to the end of the process, if something hangs. With the time for the message, it stays
 /// below the 5 s that the documentation promises.
@@ -37,7 +37,7 @@ impl Interrupt {
     }
 
     fn start(is_run: bool) -> io::Result<Self> {
-        block_terminal_stops()?;
+        block_io_signals()?;
         let caught = caught()?;
         let mut phase = caught.phase();
         phase.guards += 1;
@@ -139,7 +139,6 @@ impl Caught {
     fn on(&self, signal: Signal) {
         let mut phase = self.phase();
         match signal.wish {
-            Wish::Nothing => {}
             Wish::Suspend if phase.runs > 0 => drop(self.refused.fetch_add(1, Ordering::Relaxed)),
             Wish::Suspend => {
                 drop(phase);
