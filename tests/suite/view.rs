@@ -137,7 +137,7 @@ fn every_task_says_what_it_shows_and_its_page_fits_on_a_screen() {
     for path in tactflow_tests::single_tasks() {
         let text = fs::read_to_string(&path).unwrap();
         assert!(text.contains("\nshow = [") && text.contains("\nmark = ["), "{}", path.display());
-        let page = page(&[path.to_str().unwrap()]);
+        let page = page(&[path.to_str().unwrap(), "--for=6s"]);
         assert!(page.lines().count() <= 60, "{}: {}\n{page}", path.display(), page.lines().count());
     }
 }

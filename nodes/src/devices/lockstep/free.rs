@@ -17,6 +17,8 @@ use crate::devices::arm::ArmPorts;
 
 /// Time without a command after which such a simulator sets the velocity to zero.
 pub(super) const COMMAND_TIMEOUT: Duration = Duration::from_millis(100);
+/// Number of bytes that are received at once.
+const RECEIVED_BYTES: usize = 1 << 16;
 /// Maximum time between two commands.
 const KEEP_ALIVE: Duration = Duration::from_millis(40);
 
@@ -34,7 +36,8 @@ pub(super) struct FreeRunning {
 impl Live for FreeRunning {
     async fn run(mut self: Box<Self>, mut link: Link) -> Result<(), DeviceError> {
         let socket = self.socket.take().expect("a device runs once");
-        let (stream, arrived, lines) = socket.into_parts()?;
+        let (stream, mut arrived, lines) = socket.into_parts()?;
+        arrived.reserve(RECEIVED_BYTES);
         let mut session = Session {
             image: self.image,
             arm: self.arm,
@@ -201,8 +204,8 @@ impl Session {
         self.flush();
     }
 
-    /// Sends the rest of the last message. Returns whether the connection has taken all of it: if a simulator does not
-    /// read, no old command waits for it there.
+    /// Sends the rest of the last message. Returns whether the connection has taken all of it. No other message is made
+    /// before, so at most one waits here.
     fn flush(&mut self) -> bool {
         if let Ok(count) = self.stream.try_write(&self.outbox) {
             self.outbox.drain(..count);
