@@ -107,19 +107,25 @@ struct Envelope {
     /// Sum of the times of the device [ns], and their number.
     sum: f64,
     count: f64,
+    /// The last point [ns], and whether a point came so much later than the one before that its delay or its clock, and
+    /// not its rate, has changed.
+    last: [f64; 2],
+    has_jump: bool,
 }
 
 impl Envelope {
     fn new(device: i64, arrived: i64) -> Self {
         let mut hull = Vec::with_capacity(MAX_POINTS);
         hull.push([0.0; 2]);
-        Self { origin: [device, arrived], hull, sum: 0.0, count: 1.0 }
+        Self { origin: [device, arrived], hull, sum: 0.0, count: 1.0, last: [0.0; 2], has_jump: false }
     }
 
     /// Adds a point that is to the right of all others.
     fn add(&mut self, device: i64, arrived: i64) {
         let point =
             [device.saturating_sub(self.origin[0]), arrived.saturating_sub(self.origin[1])].map(|time| time as f64);
+        self.has_jump |= (point[1] - self.last[1]) - (point[0] - self.last[0]) > STEP as f64;
+        self.last = point;
         self.sum += point[0];
         self.count += 1.0;
         while let [.., a, b] = self.hull[..]
@@ -133,9 +139,9 @@ impl Envelope {
         self.hull.push(point);
     }
 
-    /// Whether the line is long enough to tell any rate of the clock.
+    /// Whether the line is long and steady enough to tell any rate of the clock.
     fn is_long(&self) -> bool {
-        self.hull.last().is_some_and(|last| last[1] - self.hull[0][1] >= RATE_TIME)
+        !self.has_jump && self.last[1] - self.hull[0][1] >= RATE_TIME
     }
 
     /// Returns the slope of the line: seconds of the graph for each second of the device.
@@ -242,6 +248,7 @@ mod tests {
             let late = ages.filter(|age| *age > MS).count();
             assert!(late <= patience, "{late} samples are late after a jump of {jump} ms and a pause of {pause} ms");
             assert_eq!(clock.steps, 1, "after a jump of {jump} ms and a pause of {pause} ms");
+            assert_eq!(clock.take_wrong_rate(), None, "a pause is no rate");
         }
     }
 
