@@ -32,7 +32,7 @@ pub(crate) struct DeviceClock {
     late_since: Option<i64>,
     /// How often the clock of the device has made a step.
     pub(crate) steps: u64,
-    /// Whether a wrong rate has been told.
+    /// Whether a wrong rate was returned before.
     has_told: bool,
 }
 

@@ -13,7 +13,7 @@ use crate::signal::line::approach;
 /// What a device may do, from the commands of the graph and the time.
 #[derive(Debug)]
 pub(crate) struct Lease {
-    /// What the device was last told to do.
+    /// The commands that the device got last.
     held: Commands,
     /// Maximum acceleration of each joint of each command [rad/s²]; infinite without a limit.
     accelerations: Vec<Vec<f64>>,
@@ -33,7 +33,7 @@ pub(crate) struct Lease {
 pub(crate) struct LeaseState {
     /// The newest epoch whose commands the device refuses.
     refused: AtomicU64,
-    /// Whether the device was last told to rest.
+    /// Whether the last commands that the device got are zero.
     rests: AtomicBool,
 }
 
@@ -48,7 +48,7 @@ impl LeaseState {
         self.refused.fetch_max(epoch, Ordering::AcqRel);
     }
 
-    /// Whether the device was last told to rest.
+    /// Whether the last commands that the device got are zero.
     pub(crate) fn rests(&self) -> bool {
         self.rests.load(Ordering::Acquire)
     }

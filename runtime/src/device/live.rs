@@ -289,7 +289,7 @@ impl Linked {
         self.moves_until = None;
     }
 
-    /// Whether the device was last told to rest, or its driver runs no more.
+    /// Whether the last commands that the device got are zero, or its driver has ended.
     pub(crate) fn rests(&self) -> bool {
         self.lease.rests() || self.has_ended()
     }

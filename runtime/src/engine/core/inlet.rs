@@ -135,7 +135,7 @@ impl Inlet {
             Some((stamp, _)) if sample.stamp < stamp => self.counters.went_back += 1,
             // A stamp in the future would look fresh until its time comes, and later samples would be dropped as older.
             _ if sample.stamp - now > self.period => self.counters.ahead += 1,
-            // The graph has been told that its sample is too old, and must not take an old one for the new one.
+            // A sample that is too old when it arrives must not replace the last one.
             _ if self.is_live && now - sample.stamp > self.max_age => self.counters.gaps += missing + 1,
             _ => {
                 self.last = Some((sample.stamp, Some(sample.sequence)));

@@ -15,13 +15,13 @@ pub(crate) struct DeviceSlot {
 }
 
 impl DeviceSlot {
-    /// Whether its commands are zero, and it was told so.
+    /// Whether its commands are zero, and a live device has got them.
     pub(crate) fn rests(&self) -> bool {
-        let was_told = match &self.link {
+        let has_got_them = match &self.link {
             DeviceLink::Live(linked) => linked.rests(),
             _ => true,
         };
-        was_told && self.commands.are_zero()
+        has_got_them && self.commands.are_zero()
     }
 }
 

@@ -45,7 +45,7 @@ impl Engine {
         }
     }
 
-    /// Stops the drivers for a reason, once each has told its device to rest, or when `patience` is over. Does not wait
+    /// Stops the drivers for a reason, once each device has got commands of zero, or when `patience` is over. Does not wait
     /// for a driver that blocks.
     pub(super) fn stop_drivers(&self, reason: &str, patience: Duration) {
         /// Time that a driver has to send its last command, beside two of its periods.
