@@ -115,11 +115,23 @@ impl Link {
         self.lease.hold(self.commands.read(), now)
     }
 
-    /// Refuses the commands of the graph until the operator resumes: [`commands`](Self::commands) ramps to zero. For a
-    /// driver that fails and can still bring the device to rest.
-    pub fn refuse(&mut self) {
+    /// Refuses the commands of the graph until the operator resumes: [`commands`](Self::commands) ramps to zero, and the
+    /// run stops. `why` completes "device `arm` does not follow commands:".
+    ///
+    /// For a robot whose controller stops by itself, and for a driver that fails and can still bring the device to rest.
+    /// Call it in every cycle in which the robot must not move; the first reason is kept until the operator resumes.
+    pub fn refuse(&mut self, why: impl Into<String>) {
         let epoch = self.commands.read().grant.epoch;
-        self.lease.shared().refuse(epoch);
+        let shared = self.lease.shared();
+        if !shared.refuses(epoch) {
+            shared.refuse_because(epoch, why.into());
+        }
+    }
+
+    /// Whether commands are refused, by the driver or by the graph, until the operator resumes.
+    pub fn refuses(&mut self) -> bool {
+        let epoch = self.commands.read().grant.epoch;
+        self.lease.shared().refuses(epoch)
     }
 
     /// Returns the time since the tick that computed the newest commands.
@@ -287,6 +299,11 @@ impl Linked {
     pub(crate) fn refuse(&mut self) {
         self.lease.refuse(self.epoch);
         self.moves_until = None;
+    }
+
+    /// Returns why the driver refuses the commands; `None` if it gave no reason.
+    pub(crate) fn refusal(&self) -> Option<String> {
+        self.lease.reason(self.epoch)
     }
 
     /// Whether the last commands that the device got are zero, or its driver has ended.

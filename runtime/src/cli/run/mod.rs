@@ -170,6 +170,7 @@ impl Job {
         let period = milliseconds(seconds(engine.period()));
         self.say(shell, &format!("{}: {} nodes, one tick every {period}", self.title, engine.order().count()));
         silences.iter().for_each(|line| self.say(shell, line));
+        shell.begin_log();
         let mut summary = Summary::new(&engine, self.print == Print::Ports, start);
         let mut log = NodeLog::new(&engine);
         let end = duration.or_else(|| engine.end().map(seconds));

@@ -380,7 +380,7 @@ impl Opener<'_> {
             let message = match self.catalogue.role_type(&name) {
                 Some(role) => {
                     let misfits = description.misfits(fill, role);
-                    description.add_reports(fill, role);
+                    description.add_optional_ports(fill, role);
                     if misfits.is_empty() {
                         continue;
                     }
