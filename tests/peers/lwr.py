@@ -124,12 +124,11 @@ class Controller:
                 self.counts["stranger_answers"] += 1
             if self.socket in ready:
                 bytes_ = self.socket.recv(1000)
-                if self.swallowed:
-                    self.swallowed -= 1
-                else:
-                    self.check(bytes_)
+                self.check(bytes_, self.swallowed > 0)
+                self.swallowed = max(0, self.swallowed - 1)
 
-    def check(self, bytes_):
+    def check(self, bytes_, is_swallowed):
+        """Checks an answer. The controller does not get one that is swallowed."""
         self.counts["answers"] += 1
         if len(bytes_) != CMD or struct.unpack_from("<HH", bytes_, 4) != (CMD, CMD_ID):
             self.counts["bad_answers"] += 1
@@ -160,13 +159,17 @@ class Controller:
             if not self.entered:
                 self.entry_jump = max(self.entry_jump, *(abs(a - b) for a, b in zip(position, sent["commanded"])))
             else:
-                step = max(abs(a - b) for a, b in zip(position, self.last["position"]))
+                # From where the driver was, or from where the controller is after a gap.
+                froms = (self.last["position"], sent["commanded"])
+                step = min(max(abs(a - b) for a, b in zip(position, start)) for start in froms)
                 self.largest_step = max(self.largest_step, step)
             self.counts["commands"] += 1
         self.entered = sent["takes"]
         self.last = {"sequence": sequence, "flags": flags, "position": position}
         self.impedance = impedance
         self.answered.add(reflected)
+        if is_swallowed:
+            return
         self.heard, self.answers = time.monotonic(), self.answers + 1
         if flags & JOINT_POSITION:
             self.fresh = position

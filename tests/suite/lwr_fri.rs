@@ -219,16 +219,16 @@ fn nothing_that_a_network_does_makes_the_target_jump() {
 fn after_each_thing_that_is_not_legal_it_rests_until_it_is_resumed() {
     let cases = [
         r#"{"at": 0.3, "do": "monitor"}"#,
-        r#"{"at": 0.3, "do": "power", "value": 0}, {"at": 0.6, "do": "power", "value": 127}"#,
-        r#"{"at": 0.3, "do": "error", "value": 16}, {"at": 0.6, "do": "error", "value": 0}"#,
-        r#"{"at": 0.3, "do": "control", "value": 2}, {"at": 0.6, "do": "control", "value": 3}"#,
-        r#"{"at": 0.3, "do": "quality", "value": 1}, {"at": 0.6, "do": "quality", "value": null}"#,
+        r#"{"at": 0.3, "do": "power", "value": 0}, {"at": 1.1, "do": "power", "value": 127}"#,
+        r#"{"at": 0.3, "do": "error", "value": 16}, {"at": 1.1, "do": "error", "value": 0}"#,
+        r#"{"at": 0.3, "do": "control", "value": 2}, {"at": 1.1, "do": "control", "value": 3}"#,
+        r#"{"at": 0.3, "do": "quality", "value": 1}, {"at": 1.1, "do": "quality", "value": null}"#,
         r#"{"at": 0.3, "do": "restart"}"#,
     ];
     let runs = cases.map(|events| {
         thread::spawn(move || {
             let events = format!("[{events}]");
-            let (mut rig, mut krc) = pair("", "--seconds 4 --silence-ms 3000 --restart-s 0.2 --lag-s 0.02", &events);
+            let (mut rig, mut krc) = pair("", "--seconds 5 --silence-ms 3000 --restart-s 0.8 --lag-s 0.02", &events);
             assert!(drive(&mut rig, 0.0, true, follows), "{events}");
             // It moves until the controller does not follow.
             let mut moved: f64 = 0.0;
