@@ -54,11 +54,12 @@ pub use tool::tool;
 
 /// The built-in files, the roles and the devices: one line each.
 fn edge() -> Catalogue {
-    Catalogue::new()
+    let catalogue = Catalogue::new()
         .files(builtin::FILES)
         .role(roles::tactile_pad())
         .role(roles::velocity_arm())
         .role(roles::bare_arm())
+        .role(roles::force_sensor())
         .role(roles::ground_truth())
         .role(roles::true_object())
         // The first that fills a role is the one that examples take.
@@ -67,7 +68,10 @@ fn edge() -> Catalogue {
         .device::<devices::mock_arm::MockArm>()
         .device::<sim::bench::SimBench>()
         .device::<sim::pair::SimPair>()
-        .device::<devices::lockstep::Lockstep>()
+        .device::<devices::lockstep::Lockstep>();
+    #[cfg(feature = "drivers")]
+    let catalogue = catalogue.device::<devices::lwr_fri::LwrFri>();
+    catalogue
 }
 
 /// Everything there is: one line each.
