@@ -59,6 +59,7 @@ fn edge() -> Catalogue {
         .role(roles::tactile_pad())
         .role(roles::velocity_arm())
         .role(roles::bare_arm())
+        .role(roles::force_sensor())
         .role(roles::ground_truth())
         .role(roles::true_object())
         // The first that fills a role is the one that examples take.

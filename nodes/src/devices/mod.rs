@@ -9,6 +9,7 @@ pub mod mock_pad;
 pub(crate) mod pad;
 pub mod recording;
 pub mod start;
+pub(crate) mod wrench;
 
 #[cfg(test)]
 pub(crate) mod testing;
