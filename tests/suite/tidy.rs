@@ -129,6 +129,7 @@ fn only_the_edge_names_tokio() {
         "runtime/src/engine/session/caught.rs",
         "runtime/src/engine/session/signals.rs",
         "nodes/src/devices/lockstep/free.rs",
+        "nodes/src/devices/lwr_fri/driver.rs",
     ];
     let edge = edge.map(|path| workspace().join(path));
     for (path, text) in sources(&["runtime/src", "nodes/src"]) {

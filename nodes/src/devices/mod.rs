@@ -4,11 +4,15 @@ use std::borrow::Cow;
 
 pub(crate) mod arm;
 pub mod lockstep;
+#[cfg(feature = "drivers")]
+pub mod lwr_fri;
 pub mod mock_arm;
 pub mod mock_pad;
 pub(crate) mod pad;
 pub mod recording;
+#[cfg(feature = "drivers")]
 pub mod start;
+#[cfg(feature = "drivers")]
 pub(crate) mod wrench;
 
 #[cfg(test)]

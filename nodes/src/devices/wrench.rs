@@ -8,7 +8,7 @@
 //! tip in the base and g down: f = R' (0, 0, -m g), t = c x f. The base stands upright.
 
 use nalgebra::{IsometryMatrix3, Rotation3, Vector3};
-use tactflow_runtime::device::{Description, Output, Samples};
+use tactflow_runtime::device::{Description, Link, Output, Samples};
 use tactflow_runtime::signal::{Features, FeaturesShape, Scalar, ScalarShape, Unit};
 
 use super::Facts;
@@ -48,6 +48,12 @@ impl WrenchPorts {
         for (port, value) in self.components.iter().zip(wrench) {
             *samples.write(*port, stamp, sequence) = *value;
         }
+    }
+
+    /// Makes all outputs absent until they are written again.
+    pub(crate) fn lose(&self, link: &mut Link, why: &str) {
+        link.lost(self.wrench, why.to_owned());
+        self.components.iter().for_each(|port| link.lost(*port, why.to_owned()));
     }
 }
 
@@ -128,7 +134,10 @@ mod tests {
     #[test]
     fn without_a_tool_nothing_is_subtracted() {
         let wrench = [1.0, 2.0, 3.0, 4.0, 5.0, 6.0];
-        assert_eq!(ToolWeight::new(0.0, [0.1, 0.2, 0.3]).without(&wrench, &pose_of([0.0; 3], [1.0; 3]).rotation), wrench);
+        assert_eq!(
+            ToolWeight::new(0.0, [0.1, 0.2, 0.3]).without(&wrench, &pose_of([0.0; 3], [1.0; 3]).rotation),
+            wrench
+        );
     }
 
     #[test]
