@@ -30,8 +30,7 @@ impl Checks {
         let [measured, commanded] = [state.q, state.target_q].map(|q| in_order(&self.order, &q));
         let offset = state.tcp_offset.or(self.tcp_offset);
         let tip = geometry::flange(&self.base, state.tcp_pose, offset.unwrap_or_default());
-        let report =
-            StartReport { measured: &measured, commanded: &commanded, target: &commanded, tip: Some(tip) };
+        let report = StartReport { measured: &measured, commanded: &commanded, target: &commanded, tip: Some(tip) };
         self.start.check(&report).map_err(|error| match offset {
             Some(_) => error.0,
             None => format!("{}. The robot does not report its TCP offset: write it as `tcp_offset`", error.0),
@@ -116,11 +115,10 @@ mod tests {
     #[test]
     fn a_base_that_is_turned_needs_its_yaw() {
         let mut turned = stretched();
-        // The controller of an arm whose model is turned by half a turn reports x and y with the other sign.
-        let at = geometry::flange(&geometry::base(PI), turned.tcp_pose, [0.0; 6]);
-        let p = at.translation.vector;
-        let r = at.rotation.scaled_axis();
-        turned.tcp_pose = [p.x, p.y, p.z, r.x, r.y, r.z];
+        // The controller of an arm whose model is turned by half a turn reports x and y with the other sign. A half turn
+        // about z after a quarter turn about x is a half turn about the axis between y and z.
+        let axis = PI * 0.5f64.sqrt();
+        turned.tcp_pose = [0.8172, 0.2329, 0.0628, 0.0, axis, axis];
         assert!(checks().check(&turned).is_err());
         assert_eq!(Checks { base: geometry::base(PI), ..checks() }.check(&turned), Ok(()));
     }

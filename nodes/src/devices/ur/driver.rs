@@ -12,7 +12,9 @@ use super::rtde::{Failure, Request, Stream};
 use super::script::{Ports, Script};
 use super::session::{End, Phase, Session};
 use super::status::Allowed;
+use crate::arm::chain::Chain;
 use crate::devices::arm::ArmPorts;
+use crate::devices::wrench::WrenchPorts;
 
 /// Time between two attempts to connect.
 const RETRY: Duration = Duration::from_millis(500);
@@ -21,6 +23,9 @@ const RETRY: Duration = Duration::from_millis(500);
 #[derive(Debug)]
 pub(super) struct Robot {
     pub(super) ports: ArmPorts,
+    pub(super) force: WrenchPorts,
+    /// Pose of the tip from the joints of the model.
+    pub(super) chain: Chain,
     pub(super) request: Request,
     /// Where the controller takes programs, as `host:port`.
     pub(super) script_address: String,
@@ -65,7 +70,8 @@ impl Live for Robot {
             let End::Lost(why) = end else { return Ok(()) };
             let why = self.failure(&why).0;
             link.refuse(why.clone());
-            self.ports.lost(&mut link, &why);
+            self.ports.lose(&mut link, &why);
+            self.force.lose(&mut link, &why);
             if idle(&mut link, tokio::time::sleep(RETRY)).await.is_none() {
                 return Ok(());
             }

@@ -23,7 +23,10 @@ use tactflow_runtime::node::{Describe, FilePath, Mistake, Mistakes, Param};
 use tactflow_runtime::signal::{Joint, JointsShape, Unit};
 
 use super::arm::{self, ArmPorts};
+use super::pad;
 use super::start::{StartBounds, StartCheck};
+use super::wrench::WrenchPorts;
+use crate::arm::chain::Chain;
 use crate::arm::model::load;
 use crate::arm::mount::Mount;
 use checks::Checks;
@@ -45,14 +48,8 @@ const DEFAULT_TIMEOUT_STEPS: f64 = 5.0;
 /// Steps that the controller needs to see that no message has come, and to begin its stop.
 const REACTION_STEPS: f64 = 3.0;
 /// The joints in the order of the controller, as the usual descriptions name them.
-const USUAL_JOINTS: [&str; JOINTS] = [
-    "shoulder_pan_joint",
-    "shoulder_lift_joint",
-    "elbow_joint",
-    "wrist_1_joint",
-    "wrist_2_joint",
-    "wrist_3_joint",
-];
+const USUAL_JOINTS: [&str; JOINTS] =
+    ["shoulder_pan_joint", "shoulder_lift_joint", "elbow_joint", "wrist_1_joint", "wrist_2_joint", "wrist_3_joint"];
 
 /// Parameters of `ur`.
 #[derive(Debug, Clone, Param)]
@@ -201,6 +198,7 @@ impl Device for Ur {
         let mut description = Description::every(1.0 / params.rate_hz);
         let facts = arm::facts(&params.urdf, &params.tip, params.home.as_deref())?;
         let ports = ArmPorts::fill(&mut description, &joints, facts);
+        let force = WrenchPorts::fill(&mut description, vec![pad::mount(&Mount::NONE)]);
         description.on_silence(OnSilence::Stops, silence(timeout_ms, params.rate_hz, &joints));
         let checks = Checks {
             start: StartCheck::new(to_flange, params.start.clone()),
@@ -209,17 +207,26 @@ impl Device for Ur {
             tcp_offset: params.tcp_offset,
             tool_mass: params.tool_mass.map(|mass| [mass, params.tool_mass_bound]),
         };
-        let robot = robot(&params, ports, checks, script, timeout_ms);
+        let robot = robot(&params, (ports, force), chain, checks, script, timeout_ms);
         Ok(Opened { description, driver: Driver::Live(Box::new(robot)) })
     }
 }
 
-fn robot(params: &Params, ports: ArmPorts, checks: Checks, script: Script, timeout_ms: i32) -> Robot {
+fn robot(
+    params: &Params,
+    (ports, force): (ArmPorts, WrenchPorts),
+    chain: Chain,
+    checks: Checks,
+    script: Script,
+    timeout_ms: i32,
+) -> Robot {
     let sends_program = params.start_by == Start::Send;
     let port = |number: usize| u16::try_from(number).expect("the range of the parameter");
     let vendor = [params.trajectory_port, params.command_port].map(port);
     Robot {
         ports,
+        force,
+        chain,
         request: Request {
             address: format!("{}:{}", params.address, params.rtde_port),
             rate_hz: params.rate_hz,

@@ -78,7 +78,8 @@ impl Script {
             (true, Some(version)) => choose(&self.text, version)?,
             (true, None) => return Err("the controller does not state its version, but the program needs it".into()),
         };
-        let [reverse, trajectory, command] = [ports.reverse, ports.trajectory, ports.command].map(|port| port.to_string());
+        let [reverse, trajectory, command] =
+            [ports.reverse, ports.trajectory, ports.command].map(|port| port.to_string());
         let values = [
             ("SERVER_IP_REPLACE", ports.host),
             ("SERVER_PORT_REPLACE", &reverse),
@@ -146,7 +147,8 @@ mod tests {
     fn the_makers_program_is_filled() {
         let body = vendor(SHAPE).unwrap().body(&PORTS, None).unwrap();
         assert_eq!(body, "\nm = 1000000\nread_timeout = 1\nsocket_open(\"10.1.2.3\", 50001, \"r\")\n");
-        let text = format!("{SHAPE}{{% if ROBOT_SOFTWARE_VERSION >= v5.9.1 %}}\nnew()\n{{% else %}}\nold()\n{{% endif %}}\n");
+        let text =
+            format!("{SHAPE}{{% if ROBOT_SOFTWARE_VERSION >= v5.9.1 %}}\nnew()\n{{% else %}}\nold()\n{{% endif %}}\n");
         let script = vendor(&text).unwrap();
         assert!(script.needs_version());
         assert!(script.body(&PORTS, Some([5, 9, 1])).unwrap().ends_with("new()\n"));
@@ -163,10 +165,7 @@ mod tests {
                 "it has no `read_timeout`, so a message cannot state when the robot stops",
             ),
             (&format!("{SHAPE}{{{{FORCE_REPLACE}}}}"), "the placeholder `{{FORCE_REPLACE}}` is unknown"),
-            (
-                &format!("{SHAPE}{{% if LICENCE %}}\n{{% endif %}}"),
-                "line 5: the condition `LICENCE` is not understood",
-            ),
+            (&format!("{SHAPE}{{% if LICENCE %}}\n{{% endif %}}"), "line 5: the condition `LICENCE` is not understood"),
         ] {
             assert_eq!(vendor(text).err().as_deref(), Some(why));
         }

@@ -3,11 +3,13 @@
 use std::time::{Duration, Instant};
 
 use tactflow_runtime::device::Link;
+use tactflow_runtime::signal::Twist;
 use tokio::net::TcpStream;
 use tokio::time::{sleep_until, timeout};
 
 use super::checks::{in_order, of_controller};
 use super::driver::Robot;
+use super::geometry;
 use super::message;
 use super::program::{Listeners, Reverse, Sending};
 use super::recipe::{JOINTS, State};
@@ -78,13 +80,7 @@ pub(super) struct Session<'a> {
 }
 
 impl<'a> Session<'a> {
-    pub(super) fn new(
-        robot: &'a Robot,
-        listeners: &'a Listeners,
-        stream: Stream,
-        host: String,
-        phase: Phase,
-    ) -> Self {
+    pub(super) fn new(robot: &'a Robot, listeners: &'a Listeners, stream: Stream, host: String, phase: Phase) -> Self {
         let now = Instant::now();
         let publishes = !matches!(phase, Phase::Starting { .. });
         Self {
@@ -194,7 +190,12 @@ impl<'a> Session<'a> {
             self.sent = [0.0; JOINTS];
             return None;
         }
-        if self.robot.sends_program && !has_sent && self.reverse.is_none() && is_stopped(state) {
+        // A program of an earlier run of ours ends by itself. Any other is replaced.
+        let is_free = is_stopped(state) || is_playing(state) && since.elapsed() > PROGRAM_SHOWS;
+        if self.robot.sends_program && !has_sent && self.reverse.is_none() && is_free {
+            if is_playing(state) {
+                tracing::warn!("a program runs on the robot: it is replaced");
+            }
             let ports = self.robot.script_ports(&self.host, self.listeners);
             return match self.robot.script.program(&ports, self.stream.version) {
                 Ok(program) => {
@@ -336,12 +337,17 @@ fn approached(last: &[f64; JOINTS], target: &[f64; JOINTS], acceleration: f64, d
     })
 }
 
-/// Writes postures in the order of the model.
 impl Robot {
+    /// Publishes a state, with the joints in the order of the model.
     fn write(&self, link: &mut Link, state: &State, stamp: i64, sequence: u64, follows: bool) {
         let [position, equilibrium] = [&state.q, &state.target_q].map(|q| in_order(&self.checks.order, q));
+        let tip = self.chain.forward(&position, &mut [Twist::default(); JOINTS]).0;
+        let wrench = state.tcp_force.map(|force| geometry::wrench_at(&tip, &self.checks.base, state.tcp_pose, force));
         link.publish(|samples| {
             self.ports.write_with_safety(samples, stamp, sequence, [&position, &equilibrium], follows);
+            if let Some(wrench) = wrench {
+                self.force.write(samples, stamp, sequence, &wrench);
+            }
         });
     }
 }
