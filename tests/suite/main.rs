@@ -67,6 +67,8 @@ mod tool;
 mod touch;
 mod udp_pad;
 mod units;
+mod ur;
+mod ur_process;
 mod verify;
 mod view;
 mod warnings;

@@ -129,6 +129,10 @@ fn only_the_edge_names_tokio() {
         "runtime/src/engine/session/caught.rs",
         "runtime/src/engine/session/signals.rs",
         "nodes/src/devices/lockstep/free.rs",
+        "nodes/src/devices/ur/driver.rs",
+        "nodes/src/devices/ur/program.rs",
+        "nodes/src/devices/ur/rtde.rs",
+        "nodes/src/devices/ur/session.rs",
         "nodes/src/devices/lwr_fri/driver.rs",
     ];
     let edge = edge.map(|path| workspace().join(path));

@@ -13,6 +13,8 @@ pub mod recording;
 #[cfg(feature = "drivers")]
 pub mod start;
 #[cfg(feature = "drivers")]
+pub mod ur;
+#[cfg(feature = "drivers")]
 pub(crate) mod wrench;
 
 #[cfg(test)]
