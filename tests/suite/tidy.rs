@@ -128,6 +128,9 @@ fn only_the_edge_names_tokio() {
         "runtime/src/device/live.rs",
         "runtime/src/engine/session/caught.rs",
         "runtime/src/engine/session/signals.rs",
+        "nodes/src/devices/agni/driver.rs",
+        "nodes/src/devices/agni/port.rs",
+        "nodes/src/devices/agni/session.rs",
         "nodes/src/devices/lockstep/free.rs",
     ];
     let edge = edge.map(|path| workspace().join(path));

@@ -2,6 +2,8 @@
 
 use std::borrow::Cow;
 
+#[cfg(feature = "drivers")]
+pub mod agni;
 pub(crate) mod arm;
 pub mod lockstep;
 pub mod mock_arm;
