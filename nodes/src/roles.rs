@@ -30,6 +30,7 @@ pub fn velocity_arm() -> RoleType {
             PortSpec::new("position", "Measured joint positions [rad].", Kind::Joints, &["rad", "self"])
                 .of_quantity("position"),
             PortSpec::new("equilibrium", EQUILIBRIUM, Kind::Joints, &["rad", "self"]).of_quantity("equilibrium"),
+            PortSpec::new("safety", SAFETY, Kind::Flag, &[]).optional(),
         ],
         commands: vec![PortSpec::new("velocity", "Joint velocities [rad/s].", Kind::Joints, &["rad/s", "self"])],
         reports: vec![PortSpec::new("contact", CONTACT, Kind::Pose, &["C", "self.base"])],
@@ -56,6 +57,9 @@ pub fn bare_arm() -> RoleType {
 const OF_PADS: [&str; 3] = ["force", "peak", "blind"];
 
 const CONTACT: &str = "Pose of the contact in the base, as the task measures it [m].";
+
+const SAFETY: &str = "Whether the controller follows commands: no stop is active, and its mode and its speed are those \
+    that the bench allows.";
 
 const EQUILIBRIUM: &str = "Posture that the commands add up to: where a compliant arm would be if nothing held it; \
     for a stiff arm, its position [rad].";

@@ -34,6 +34,8 @@ pub enum Cause {
     /// A device got no valid command in time, so it has stopped by itself: the tick hung, the process was suspended, or
     /// its driver sent nothing.
     LostLease,
+    /// A device does not follow commands, for this reason.
+    Refused(String),
     /// A budget of a limiter is spent.
     Spent,
     /// The operator sent `stop`.
@@ -92,6 +94,7 @@ impl fmt::Display for Fault {
             Cause::LostLease => {
                 write!(f, "device `{name}` got no valid command in time, so it stops by itself")?;
             }
+            Cause::Refused(why) => write!(f, "device `{name}` does not follow commands: {why}")?,
             Cause::Spent => write!(f, "`{name}` has spent its budget of motion without a contact")?,
             Cause::Operator => write!(f, "the operator sent `stop`")?,
             Cause::Mode(why) => write!(f, "a `fail` condition of mode `{name}` holds: {why}")?,

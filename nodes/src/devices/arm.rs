@@ -2,7 +2,7 @@
 
 use tactflow_runtime::device::{Command, Description, DeviceError, Fill, Output, Report, Samples};
 use tactflow_runtime::node::{At, FilePath, Mistake, Mistakes, refuse_any};
-use tactflow_runtime::signal::{Joint, Joints, JointsShape, Pose, Unit};
+use tactflow_runtime::signal::{Flag, FlagShape, Joint, Joints, JointsShape, Pose, Unit};
 use tactflow_runtime::source::Code;
 
 use super::Facts;
@@ -13,6 +13,7 @@ use crate::arm::chain::Chain;
 pub(crate) struct ArmPorts {
     position: Output<Joints>,
     equilibrium: Output<Joints>,
+    safety: Output<Flag>,
     pub(crate) velocity: Command,
     pub(crate) contact: Report<Pose>,
 }
@@ -40,15 +41,29 @@ impl ArmPorts {
         Self {
             position: arm.output("position", joints.clone()),
             equilibrium: arm.output("equilibrium", joints.clone()),
+            safety: arm.output("safety", FlagShape),
             velocity: arm.command("velocity", joints.in_unit(Unit::RADIAN.per_second())),
             contact: arm.report("contact"),
         }
     }
 
-    /// Writes a sample of both postures.
-    pub(crate) fn write(&self, samples: &mut Samples, stamp: i64, sequence: u64, [position, equilibrium]: [&[f64]; 2]) {
+    /// Writes a sample of both postures of an arm that always follows its commands.
+    pub(crate) fn write(&self, samples: &mut Samples, stamp: i64, sequence: u64, postures: [&[f64]; 2]) {
+        self.write_with_safety(samples, stamp, sequence, postures, true);
+    }
+
+    /// Writes a sample of both postures, and whether the controller follows commands.
+    pub(crate) fn write_with_safety(
+        &self,
+        samples: &mut Samples,
+        stamp: i64,
+        sequence: u64,
+        [position, equilibrium]: [&[f64]; 2],
+        follows_commands: bool,
+    ) {
         samples.write(self.position, stamp, sequence).0.copy_from_slice(position);
         samples.write(self.equilibrium, stamp, sequence).0.copy_from_slice(equilibrium);
+        *samples.write(self.safety, stamp, sequence) = follows_commands;
     }
 }
 

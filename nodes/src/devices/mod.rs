@@ -10,6 +10,7 @@ pub mod mock_arm;
 pub mod mock_pad;
 pub(crate) mod pad;
 pub mod recording;
+pub mod start;
 
 #[cfg(test)]
 pub(crate) mod testing;

@@ -5,6 +5,7 @@ use std::marker::PhantomData;
 
 use super::RoleType;
 use super::silence::{OnSilence, Silence};
+use crate::node::PortSpec;
 use crate::signal::{JointsShape, Kind, Shape, Signal, Unit};
 
 /// A name that is written in the source or made at load.
@@ -36,6 +37,9 @@ pub struct Description {
     pub latency: f64,
     /// What a device that moves does without commands; `None` if it declares nothing. Only a live device needs it.
     pub on_silence: Option<Silence>,
+    /// Whether it moves something real: a run uses a tenth of its limits until somebody has proven, with the command
+    /// that commissions a bench, that it stops by itself.
+    pub needs_commissioning: bool,
     pub(crate) fills: Vec<Filled>,
     pub(crate) outputs: Vec<StatedPort>,
     pub(crate) commands: Vec<StatedPort>,
@@ -69,6 +73,7 @@ impl Description {
             period,
             latency: 0.0,
             on_silence: None,
+            needs_commissioning: false,
             fills: Vec::new(),
             outputs: Vec::new(),
             commands: Vec::new(),
@@ -111,13 +116,18 @@ impl Description {
         self.fills.iter().map(|fill| &*fill.role)
     }
 
-    /// Adds the reports of a role that the device does not read, so that each has its number.
-    pub(crate) fn add_reports(&mut self, fill: usize, role: &RoleType) {
-        for spec in &role.reports {
-            let is_stated = |port: &StatedPort| port.fill == fill && port.name == spec.name;
-            if !self.reports.iter().any(is_stated) {
-                let shape = spec.kind.default_shape();
-                self.reports.push(StatedPort { fill, name: spec.name.clone(), shape });
+    /// Adds the reports of a role that the device does not read, and the optional outputs that it does not state, so that
+    /// each has its number. These outputs are always absent.
+    pub(crate) fn add_optional_ports(&mut self, fill: usize, role: &RoleType) {
+        add_missing(&mut self.reports, fill, role.reports.iter());
+        add_missing(&mut self.outputs, fill, role.outputs.iter().filter(|port| !port.need.must_be_wired));
+    }
+
+    /// Multiplies the maximum speed of each joint.
+    pub(crate) fn slow_down(&mut self, fraction: f64) {
+        for port in self.outputs.iter_mut().chain(&mut self.commands) {
+            if let Shape::Joints(shape) = &mut port.shape {
+                shape.joints.iter_mut().for_each(|joint| joint.speed *= fraction);
             }
         }
     }
@@ -151,6 +161,14 @@ impl Description {
     pub fn fact(&self, name: &str) -> Option<&toml::Value> {
         let facts = self.fills.iter().flat_map(|fill| &fill.facts);
         facts.into_iter().find(|(fact, _)| fact == name).map(|(_, value)| value)
+    }
+}
+
+fn add_missing<'s>(ports: &mut Vec<StatedPort>, fill: usize, declared: impl Iterator<Item = &'s PortSpec>) {
+    for spec in declared {
+        if !ports.iter().any(|port| port.fill == fill && port.name == spec.name) {
+            ports.push(StatedPort { fill, name: spec.name.clone(), shape: spec.kind.default_shape() });
+        }
     }
 }
 

@@ -4,8 +4,8 @@
 //! was stopped, the lease is lost: the commands ramp to zero, and those of the same epoch are refused. Only when the
 //! operator resumes does the graph begin a new epoch.
 
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
 
 use super::exchange::{Commands, Grant};
 use crate::signal::line::approach;
@@ -35,6 +35,8 @@ pub(crate) struct LeaseState {
     refused: AtomicU64,
     /// Whether the last commands that the device got are zero.
     rests: AtomicBool,
+    /// Why the driver refuses the commands, and of which epoch.
+    reason: Mutex<(u64, String)>,
 }
 
 impl LeaseState {
@@ -48,6 +50,23 @@ impl LeaseState {
         self.refused.fetch_max(epoch, Ordering::AcqRel);
     }
 
+    /// Refuses the commands of an epoch because the device does not follow them: `why`. The first reason holds.
+    #[cold]
+    pub(crate) fn refuse_because(&self, epoch: u64, why: String) {
+        let mut reason = self.reason.lock().unwrap_or_else(PoisonError::into_inner);
+        if !self.refuses(epoch) {
+            *reason = (epoch, why);
+        }
+        self.refuse(epoch);
+    }
+
+    /// Returns why the driver refuses the commands of an epoch; `None` if it gave no reason.
+    #[cold]
+    pub(crate) fn reason(&self, epoch: u64) -> Option<String> {
+        let reason = self.reason.lock().unwrap_or_else(PoisonError::into_inner);
+        (reason.0 == epoch).then(|| reason.1.clone())
+    }
+
     /// Whether the last commands that the device got are zero.
     pub(crate) fn rests(&self) -> bool {
         self.rests.load(Ordering::Acquire)
@@ -57,7 +76,8 @@ impl LeaseState {
 impl Lease {
     /// `held` are the commands at the start, which are zero.
     pub(crate) fn new(held: Commands, accelerations: Vec<Vec<f64>>, period: i64, silence: i64) -> Self {
-        let shared = Arc::new(LeaseState { refused: AtomicU64::new(0), rests: AtomicBool::new(true) });
+        let shared =
+            Arc::new(LeaseState { refused: AtomicU64::new(0), rests: AtomicBool::new(true), reason: Mutex::default() });
         Self { held, accelerations, at: 0, period, silence, follows: false, shared }
     }
 

@@ -14,11 +14,12 @@ impl Description {
     }
 }
 
-/// Compares one sort of ports. A device states all outputs and commands of a role, and the reports that it reads.
+/// Compares one sort of ports. A device states all outputs and commands of a role that are not optional, and the reports
+/// that it reads.
 fn misfits(sort: &str, stated: &[StatedPort], fill: usize, declared: &[PortSpec], is_complete: bool) -> Vec<String> {
     let stated: Vec<&StatedPort> = stated.iter().filter(|port| port.fill == fill).collect();
     let is_stated = |name: &str| stated.iter().any(|port| port.name == name);
-    let missing = declared.iter().filter(|port| is_complete && !is_stated(&port.name));
+    let missing = declared.iter().filter(|port| is_complete && port.need.must_be_wired && !is_stated(&port.name));
     let missing = missing.map(|port| format!("{sort} `{}` is missing", port.name));
     let wrong = stated.iter().enumerate().filter_map(|(i, port)| {
         let is_second = stated[..i].iter().any(|other| other.name == port.name);

@@ -50,7 +50,8 @@ pub struct PortSpec {
     /// What the value is, beside its unit: `position` is not `equilibrium`. A capital letter is a variable. `"$wire"` is
     /// the name of the wire. `None` if an output does not know it, or an input accepts any.
     pub quantity: Option<Cow<'static, str>>,
-    /// What an input needs; without meaning for an output.
+    /// What an input needs. An output of a role that [need not be wired](Need::must_be_wired) is one that a device need
+    /// not state; it is absent then. Without meaning for an output of a node.
     pub need: Need,
 }
 
@@ -67,6 +68,12 @@ impl PortSpec {
     #[must_use]
     pub fn of_quantity(self, quantity: &'static str) -> Self {
         Self { quantity: Some(quantity.into()), ..self }
+    }
+
+    /// Returns the declaration of an input that may be unwired, or of an output of a role that a device need not state.
+    #[must_use]
+    pub fn optional(self) -> Self {
+        Self { need: Need::OPTIONAL, ..self }
     }
 
     /// Returns the declaration of a port of signal `T`, with its arguments by name. It leaves out arguments that the

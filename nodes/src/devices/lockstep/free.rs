@@ -65,7 +65,7 @@ impl Live for FreeRunning {
             }
             Err(why) => {
                 let why = format!("the simulator at `{}`: {why}", self.params.address);
-                session.rest(&mut link).await;
+                session.rest(&mut link, &why).await;
                 session.leave(&why).await;
                 Err(DeviceError(why))
             }
@@ -214,11 +214,11 @@ impl Session {
     }
 
     /// Brings the arm to rest after a failure, for as long as the simulator takes commands.
-    async fn rest(&mut self, link: &mut Link) {
+    async fn rest(&mut self, link: &mut Link, why: &str) {
         /// Longest time of the ramp; then the command is zero at once.
         const MAX_RAMP: Duration = Duration::from_secs(3);
         const MAX_REST: Duration = Duration::from_millis(3200);
-        link.refuse();
+        link.refuse(why);
         let begin = Instant::now();
         let seq = self.frames.newest.map_or(0, |(seq, _)| seq);
         while begin.elapsed() < MAX_REST {

@@ -7,6 +7,7 @@ mod lateness;
 pub(super) mod log;
 mod ports;
 mod progress;
+mod slow;
 mod summary;
 mod target;
 mod time;
@@ -27,7 +28,7 @@ use super::text::number::{milliseconds, seconds};
 use super::text::prose::PageStyle;
 use crate::engine::{self, End, Engine, Interrupt, Outcome, RunOptions};
 use crate::fault::Fault;
-use crate::graph::{Compiled, Request, compile};
+use crate::graph::{Compiled, Request};
 use crate::record::PointsRequest;
 use crate::source::Code;
 
@@ -61,6 +62,10 @@ pub(crate) struct RunArgs {
     /// Print neither progress nor summary, only warnings and errors
     #[arg(short, long, conflicts_with = "ports")]
     quiet: bool,
+    /// Use this fraction of the limits of speed and acceleration, such as 0.1; the default is 0.1 on a bench that moves
+    /// a real arm and has not passed `doctor --move`
+    #[arg(long, value_name = "FRACTION", value_parser = slow::fraction)]
+    slow: Option<f64>,
 }
 
 pub(crate) fn run(args: RunArgs, shell: &Shell) -> u8 {
@@ -70,7 +75,8 @@ pub(crate) fn run(args: RunArgs, shell: &Shell) -> u8 {
         (_, true) => Print::Nothing,
         _ => Print::Page,
     };
-    Job { request: args.graph_args.request(args.graph), title, options: args.options, print }.run(shell)
+    let request = Request { slow: args.slow, ..args.graph_args.request(args.graph) };
+    Job { request, title, options: args.options, print }.run(shell)
 }
 
 /// The length, the words and the files of a run.
@@ -130,10 +136,11 @@ impl Job {
         if let Err(message) = self.options.reserve_output(shell) {
             return shell.refuse(message);
         }
-        match compile(shell.catalogue(), &self.request) {
-            Ok(plan) => self.run_plan(plan, shell).unwrap_or_else(|message| shell.refuse(message)),
-            Err(report) => shell.reject(&report),
-        }
+        let plan = match slow::compile(&self.request, shell) {
+            Ok(plan) => plan,
+            Err(code) => return code,
+        };
+        self.run_plan(plan, shell).unwrap_or_else(|message| shell.refuse(message))
     }
 
     /// Runs a plan and returns the exit code.
@@ -170,6 +177,7 @@ impl Job {
         let period = milliseconds(seconds(engine.period()));
         self.say(shell, &format!("{}: {} nodes, one tick every {period}", self.title, engine.order().count()));
         silences.iter().for_each(|line| self.say(shell, line));
+        shell.begin_log();
         let mut summary = Summary::new(&engine, self.print == Print::Ports, start);
         let mut log = NodeLog::new(&engine);
         let end = duration.or_else(|| engine.end().map(seconds));

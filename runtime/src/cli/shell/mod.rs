@@ -169,6 +169,11 @@ impl Shell {
         }
     }
 
+    /// Waits for a moment until the lines so far are written, before a log goes on in standard error.
+    pub(crate) fn begin_log(&self) {
+        self.come_after(&self.out);
+    }
+
     /// Waits for a moment until the lines before are written, so that both streams keep their order on a terminal.
     fn come_after(&self, other: &OutStream) {
         let is_stuck = self.is_stuck.load(Ordering::Relaxed);

@@ -2,6 +2,7 @@
 
 use super::engine::Engine;
 use super::trouble::{Trouble, WatchedWire};
+use crate::engine::core::DeviceLink;
 use crate::fault::{Cause, Fault, StaleWire};
 
 impl Engine {
@@ -34,7 +35,12 @@ impl Engine {
             }
             Trouble::Lease(device) => {
                 let device = &self.devices[device];
-                self.fault(&device.name, None, Cause::LostLease, device.place.clone())
+                let refusal = match &device.link {
+                    DeviceLink::Live(linked) => linked.refusal(),
+                    _ => None,
+                };
+                let cause = refusal.map_or(Cause::LostLease, Cause::Refused);
+                self.fault(&device.name, None, cause, device.place.clone())
             }
             Trouble::Lost(inlet) => {
                 let samples = &self.devices[self.core.inlets[inlet].device].samples;
