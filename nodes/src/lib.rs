@@ -54,7 +54,7 @@ pub use tool::tool;
 
 /// The built-in files, the roles and the devices: one line each.
 fn edge() -> Catalogue {
-    Catalogue::new()
+    let edge = Catalogue::new()
         .files(builtin::FILES)
         .role(roles::tactile_pad())
         .role(roles::velocity_arm())
@@ -67,7 +67,10 @@ fn edge() -> Catalogue {
         .device::<devices::mock_arm::MockArm>()
         .device::<sim::bench::SimBench>()
         .device::<sim::pair::SimPair>()
-        .device::<devices::lockstep::Lockstep>()
+        .device::<devices::lockstep::Lockstep>();
+    #[cfg(feature = "drivers")]
+    let edge = edge.device::<devices::stream::Stream>();
+    edge
 }
 
 /// Everything there is: one line each.

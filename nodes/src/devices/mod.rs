@@ -3,11 +3,15 @@
 use std::borrow::Cow;
 
 pub(crate) mod arm;
+#[cfg(feature = "drivers")]
+pub(crate) mod link;
 pub mod lockstep;
 pub mod mock_arm;
 pub mod mock_pad;
 pub(crate) mod pad;
 pub mod recording;
+#[cfg(feature = "drivers")]
+pub mod stream;
 
 #[cfg(test)]
 pub(crate) mod testing;
