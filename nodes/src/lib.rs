@@ -54,7 +54,7 @@ pub use tool::tool;
 
 /// The built-in files, the roles and the devices: one line each.
 fn edge() -> Catalogue {
-    let catalogue = Catalogue::new()
+    let edge = Catalogue::new()
         .files(builtin::FILES)
         .role(roles::tactile_pad())
         .role(roles::velocity_arm())
@@ -69,8 +69,8 @@ fn edge() -> Catalogue {
         .device::<sim::pair::SimPair>()
         .device::<devices::lockstep::Lockstep>();
     #[cfg(feature = "drivers")]
-    let catalogue = catalogue.device::<devices::agni::Agni>();
-    catalogue
+    let edge = edge.device::<devices::agni::Agni>();
+    edge
 }
 
 /// Everything there is: one line each.

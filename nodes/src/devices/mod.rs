@@ -5,6 +5,8 @@ use std::borrow::Cow;
 #[cfg(feature = "drivers")]
 pub mod agni;
 pub(crate) mod arm;
+#[cfg(feature = "drivers")]
+pub(crate) mod link;
 pub mod lockstep;
 pub mod mock_arm;
 pub mod mock_pad;

@@ -1,7 +1,6 @@
 //! The live driver: it connects, publishes frames, and connects again when the device is gone.
 
 use std::convert::Infallible;
-use std::io;
 use std::time::Duration;
 
 use async_trait::async_trait;
@@ -10,21 +9,14 @@ use tactflow_runtime::signal::Image;
 use tokio::time::{Instant, sleep};
 
 use super::messages::{Counts, Frame, Message};
+use super::port::Port;
 use super::sensors::{Pad, assign};
-use super::session::{Identity, Port, Session};
-
-/// Time before the first trial to connect again, and the longest one.
-const FIRST_PAUSE: Duration = Duration::from_millis(100);
-const MAX_PAUSE: Duration = Duration::from_secs(1);
-
-/// Opens the port of a device.
-pub(super) type Open = Box<dyn Fn() -> io::Result<Box<dyn Port>> + Send + Sync>;
+use super::session::{Identity, Session};
+use crate::devices::link::{Address, Backoff};
 
 /// The driver of a device.
 pub(super) struct Agni {
-    /// The name of the port, for messages.
-    pub(super) link: String,
-    pub(super) open: Open,
+    address: Address,
     pub(super) pads: Vec<PadPort>,
     /// Time between two frames that the sensors are asked for [0.1 ms].
     pub(super) period: Option<u16>,
@@ -80,16 +72,16 @@ enum Ended {
     Wrong(String),
 }
 
-impl From<io::Error> for Ended {
-    fn from(error: io::Error) -> Self {
-        Self::Lost(error.to_string())
+impl From<String> for Ended {
+    fn from(why: String) -> Self {
+        Self::Lost(why)
     }
 }
 
 #[async_trait]
 impl Live for Agni {
     async fn run(mut self: Box<Self>, mut link: Link) -> Result<(), DeviceError> {
-        let mut pause = FIRST_PAUSE;
+        let mut backoff = Backoff::new();
         loop {
             let (stopped, published) = (link.stopped(), self.frames());
             let ended = tokio::select! {
@@ -105,10 +97,12 @@ impl Live for Agni {
                 return Err(DeviceError(why));
             }
             link.count("reconnects");
-            pause = if self.frames() > published { FIRST_PAUSE } else { (2 * pause).min(MAX_PAUSE) };
+            if self.frames() > published {
+                backoff.reset();
+            }
             let stopped = link.stopped();
             tokio::select! {
-                () = sleep(pause) => {}
+                () = sleep(backoff.wait()) => {}
                 () = stopped => break,
             }
         }
@@ -122,15 +116,15 @@ impl Live for Agni {
 
 impl Agni {
     /// A driver that is not connected yet.
-    pub(super) fn new(link: String, open: Open, pads: Vec<PadPort>) -> Self {
-        Self { link, open, pads, period: None, stamp_unit: None, silence: Duration::ZERO, serial: None, session: None }
+    pub(super) fn new(address: Address, pads: Vec<PadPort>) -> Self {
+        Self { address, pads, period: None, stamp_unit: None, silence: Duration::ZERO, serial: None, session: None }
     }
 
     /// Returns the name of the device for messages: its port, and its serial number if it is known.
     fn name(&self) -> String {
         match &self.serial {
-            Some(serial) => format!("{} (serial number {serial})", self.link),
-            None => self.link.clone(),
+            Some(serial) => format!("{} (serial number {serial})", self.address),
+            None => self.address.to_string(),
         }
     }
 
@@ -145,7 +139,7 @@ impl Agni {
     }
 
     async fn session(&mut self, link: &mut Link) -> Result<Infallible, Ended> {
-        let port = (self.open)()?;
+        let port = Port::open(&self.address).await?;
         let session = self.session.insert(Session::new(port));
         let Identity { config, serial } = session.greet().await?;
         self.serial = serial;
@@ -207,17 +201,8 @@ impl Agni {
     /// Adds what the session has counted to the summary of the run.
     fn report(&mut self, link: &mut Link) {
         let Some(session) = &mut self.session else { return };
-        let counts = std::mem::take(&mut session.messages.counts);
-        if counts == Counts::default() {
-            return;
-        }
-        let Counts { rejected, resyncs, skipped } = counts;
-        // In one call, as each one hands over all samples.
-        link.publish(|samples| {
-            for (what, count) in [("rejected frames", rejected), ("resyncs", resyncs), ("skipped bytes", skipped)] {
-                (0..count).for_each(|_| samples.count(what));
-            }
-        });
+        let Counts { rejected, resyncs, skipped } = std::mem::take(&mut session.messages.counts);
+        link.count_each(&[("rejected frames", rejected), ("resyncs", resyncs), ("skipped bytes", skipped)]);
     }
 
     /// Returns the message about a device that has sent no frame for a while.

@@ -5,7 +5,7 @@
 //! | [`messages`] | the messages of the protocol, without any I/O |
 //! | [`layout`] | where the readings are in a payload |
 //! | [`sensors`] | which sensor is which pad |
-//! | [`session`] | the handshake |
+//! | [`port`], [`session`] | the port and the handshake |
 //! | [`driver`] | the driver |
 
 mod driver;
@@ -32,7 +32,7 @@ use crate::usual::{USUAL_PRESSURE_N, USUAL_THRESHOLD_N};
 /// Parameters of `agni`.
 #[derive(Debug, Clone, Param)]
 pub struct Params {
-    /// The serial port: `serial:/dev/serial/by-id/…`.
+    /// The port: `serial:/dev/serial/by-id/…`, or `tcp:HOST:PORT` for a server that passes on a serial port.
     link: String,
     /// The sensors that the bench uses, one for each pad.
     #[param(default = vec![SensorParams::first()])]
@@ -120,10 +120,10 @@ impl Device for Agni {
 
     fn open(params: Params) -> Result<Opened, Mistakes> {
         let mut mistakes = Mistakes::new();
-        let open = port::opener(&params.link).map_err(|mistake| mistakes.push(mistake)).ok();
+        let address = port::address(&params.link).map_err(|mistake| mistakes.push(mistake)).ok();
         let found = pads(params.sensors.clone(), &params.layouts).map_err(|found| mistakes.extend(found)).ok();
         mistakes.extend(params.check());
-        let (Some(open), Some(pads), true) = (open, found, mistakes.is_empty()) else { return Err(mistakes) };
+        let (Some(address), Some(pads), true) = (address, found, mistakes.is_empty()) else { return Err(mistakes) };
         let mut description = Description::every(1.0 / params.rate_hz);
         description.latency = params.latency_ms * 1e-3;
         let mut ports = Vec::new();
@@ -131,7 +131,7 @@ impl Device for Agni {
             let image = params.state(&mut description, &pad)?;
             ports.push(PadPort::new(pad, image));
         }
-        let mut driver = AgniDriver::new(params.link.clone(), open, ports);
+        let mut driver = AgniDriver::new(address, ports);
         driver.period = params.sets_rate.then(|| (1e4 / params.rate_hz).round().clamp(1.0, 65_535.0) as u16);
         driver.stamp_unit = params.stamp_unit_ms.map(|unit| unit * 1e6);
         driver.silence = Duration::from_secs_f64(params.silence_ms * 1e-3);

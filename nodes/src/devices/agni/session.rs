@@ -1,17 +1,14 @@
 //! A session with a device: the handshake, and then its messages.
 
-use std::io;
 use std::time::Duration;
 
-use tokio::io::{AsyncRead, AsyncReadExt, AsyncWrite, AsyncWriteExt};
-use tokio::time::{Instant, timeout, timeout_at};
+use tokio::time::{Instant, timeout_at};
 
 use super::messages::{
     ASK_CONFIG, ASK_SERIAL, ASK_TOPOLOGY, Config, Fault, Message, Messages, START, STOP, set_period,
 };
+use super::port::Port;
 
-/// Bytes that are read at once.
-const READ_BYTES: usize = 4096;
 /// Time without a byte after which a stopped device has nothing more to say.
 const QUIET: Duration = Duration::from_millis(30);
 /// Longest time to wait for this silence.
@@ -21,13 +18,6 @@ const CONFIG_TIMEOUT: Duration = Duration::from_millis(500);
 const CONFIG_TRIALS: usize = 3;
 /// Time to wait for what a device need not answer.
 const OPTIONAL_TIMEOUT: Duration = Duration::from_millis(100);
-/// Longest time to send a command.
-const SEND_TIMEOUT: Duration = Duration::from_millis(500);
-
-/// A port to a device.
-pub(super) trait Port: AsyncRead + AsyncWrite + Send + Unpin {}
-
-impl<T: AsyncRead + AsyncWrite + Send + Unpin> Port for T {}
 
 /// What a device has said in the handshake.
 #[derive(Debug, Default)]
@@ -39,7 +29,9 @@ pub(super) struct Identity {
 
 /// A connection to a device.
 pub(super) struct Session {
-    port: Box<dyn Port>,
+    port: Port,
+    /// The bytes that have arrived last.
+    arrived: Vec<u8>,
     pub(super) messages: Messages,
     /// The last error that the device has reported.
     pub(super) fault: Option<Fault>,
@@ -47,15 +39,15 @@ pub(super) struct Session {
 
 impl Session {
     /// Begins a session on a port.
-    pub(super) fn new(port: Box<dyn Port>) -> Self {
-        Self { port, messages: Messages::default(), fault: None }
+    pub(super) fn new(port: Port) -> Self {
+        Self { port, arrived: Vec::new(), messages: Messages::default(), fault: None }
     }
 
     /// Stops the device, and asks what it is: the configuration, the serial number and the topology.
     ///
     /// # Errors
     /// If the port breaks, or no configuration comes.
-    pub(super) async fn greet(&mut self) -> io::Result<Identity> {
+    pub(super) async fn greet(&mut self) -> Result<Identity, String> {
         self.send(&STOP).await?;
         self.flush().await?;
         let config = self.config().await?;
@@ -73,7 +65,7 @@ impl Session {
         Ok(Identity { config, serial })
     }
 
-    async fn config(&mut self) -> io::Result<Config> {
+    async fn config(&mut self) -> Result<Config, String> {
         for _ in 0..CONFIG_TRIALS {
             self.send(&ASK_CONFIG).await?;
             let config = self.answer(CONFIG_TIMEOUT, |message| match message {
@@ -85,14 +77,14 @@ impl Session {
             }
         }
         let fault = self.fault.take().map_or_else(String::new, |fault| format!("; it reports {fault}"));
-        Err(io::Error::new(io::ErrorKind::TimedOut, format!("the device does not send its configuration{fault}")))
+        Err(format!("the device does not send its configuration{fault}"))
     }
 
     /// Sets the time between two frames [0.1 ms], if it is given, and starts all sensors.
     ///
     /// # Errors
     /// If the port breaks.
-    pub(super) async fn start(&mut self, sensors: impl Iterator<Item = u8>, tenths: Option<u16>) -> io::Result<()> {
+    pub(super) async fn start(&mut self, sensors: impl Iterator<Item = u8>, tenths: Option<u16>) -> Result<(), String> {
         if let Some(tenths) = tenths {
             for sensor in sensors {
                 self.send(&set_period(sensor, tenths)).await?;
@@ -105,15 +97,13 @@ impl Session {
     ///
     /// # Errors
     /// If the port breaks.
-    pub(super) async fn receive(&mut self, until: Instant) -> io::Result<bool> {
-        let mut bytes = [0; READ_BYTES];
-        match timeout_at(until, self.port.read(&mut bytes)).await {
-            Ok(Ok(0)) => Err(io::Error::new(io::ErrorKind::UnexpectedEof, "the port is closed")),
-            Ok(Ok(count)) => {
-                self.messages.push(&bytes[..count]);
+    pub(super) async fn receive(&mut self, until: Instant) -> Result<bool, String> {
+        match timeout_at(until, self.port.receive(&mut self.arrived)).await {
+            Ok(received) => {
+                received?;
+                self.messages.push(&self.arrived);
                 Ok(true)
             }
-            Ok(Err(error)) => Err(error),
             Err(_) => Ok(false),
         }
     }
@@ -123,17 +113,12 @@ impl Session {
         let _ = self.send(&STOP).await;
     }
 
-    async fn send(&mut self, message: &[u8]) -> io::Result<()> {
-        let sent = async {
-            self.port.write_all(message).await?;
-            self.port.flush().await
-        };
-        let too_slow = || io::Error::new(io::ErrorKind::TimedOut, "the device takes no commands");
-        timeout(SEND_TIMEOUT, sent).await.unwrap_or_else(|_| Err(too_slow()))
+    async fn send(&mut self, message: &[u8]) -> Result<(), String> {
+        self.port.send(message).await
     }
 
     /// Reads what is on its way until the device is silent.
-    async fn flush(&mut self) -> io::Result<()> {
+    async fn flush(&mut self) -> Result<(), String> {
         let end = Instant::now() + MAX_FLUSH;
         while Instant::now() < end && self.receive(end.min(Instant::now() + QUIET)).await? {
             self.messages.clear();
@@ -143,7 +128,11 @@ impl Session {
     }
 
     /// Waits for a message that `pick` takes, and keeps the last error of the device.
-    async fn answer<T>(&mut self, limit: Duration, pick: impl Fn(Message<'_>) -> Option<T>) -> io::Result<Option<T>> {
+    async fn answer<T>(
+        &mut self,
+        limit: Duration,
+        pick: impl Fn(Message<'_>) -> Option<T>,
+    ) -> Result<Option<T>, String> {
         let end = Instant::now() + limit;
         loop {
             while let Some(message) = self.messages.next() {

@@ -1,12 +1,12 @@
 //! The device over a pipe in memory, and the mistakes in its parameters.
 
-use std::io;
 use std::sync::{Arc, Mutex};
 
 use proptest::prelude::*;
 use tactflow_runtime::harness::LinkRig;
 use tokio::io::{AsyncReadExt, AsyncWriteExt, duplex};
 
+use super::port::Port;
 use super::session::Session;
 use super::*;
 use crate::devices::testing::open;
@@ -20,8 +20,9 @@ fn messages_of(params: &str) -> Vec<String> {
 fn each_mistake_in_the_parameters_is_named() {
     let link = "link = 'serial:/dev/null'\n";
     for (params, expected) in [
-        ("link = '/dev/ttyACM0'", "`/dev/ttyACM0` is no serial port"),
-        ("link = 'serial:'", "`serial:` is no serial port"),
+        ("link = '/dev/ttyACM0'", "`/dev/ttyACM0` does not begin with a kind of link"),
+        ("link = 'serial:'", "the path of the serial port is missing"),
+        ("link = 'udp:5005'", "`udp:5005` is no serial port"),
         (&format!("{link}threshold = 0.1"), "the pad has no forces, so it has no `threshold` in N"),
         (&format!("{link}sensors = [{{ layout = 'glov' }}]"), "no layout is called `glov`"),
         (
@@ -66,12 +67,12 @@ fn several_sensors_are_several_pads_of_their_sizes() {
 fn a_port_that_is_not_there_is_lost_and_the_device_can_be_stopped() {
     let mut rig = LinkRig::start::<Agni>("link = 'serial:/dev/no_such_port'").unwrap();
     assert!(rig.wait_until(Duration::from_secs(5), |rig| rig.lost("image").is_some()));
-    assert!(rig.lost("image").unwrap().starts_with("serial:/dev/no_such_port"), "{:?}", rig.lost("image"));
+    assert!(rig.lost("image").unwrap().starts_with("/dev/no_such_port: "), "{:?}", rig.lost("image"));
     rig.stop().unwrap();
 }
 
 /// Runs a session against a device that is a function of the bytes that it gets.
-fn greet(answer: impl Fn(&[u8]) -> Vec<u8> + Send + 'static) -> (io::Result<session::Identity>, Vec<u8>) {
+fn greet(answer: impl Fn(&[u8]) -> Vec<u8> + Send + 'static) -> (Result<session::Identity, String>, Vec<u8>) {
     let runtime = tokio::runtime::Builder::new_current_thread().enable_all().start_paused(true).build().unwrap();
     runtime.block_on(async {
         let (host, mut device) = duplex(4096);
@@ -84,7 +85,7 @@ fn greet(answer: impl Fn(&[u8]) -> Vec<u8> + Send + 'static) -> (io::Result<sess
                 let _ = device.write_all(&answer(&bytes[..count])).await;
             }
         });
-        let mut session = Session::new(Box::new(host));
+        let mut session = Session::new(Port::Pipe(host));
         let identity = session.greet().await;
         if identity.is_ok() {
             session.start([1].into_iter(), Some(10)).await.unwrap();
@@ -117,10 +118,10 @@ fn the_handshake_sends_the_literal_bytes_in_their_order() {
 #[test]
 fn a_device_that_only_talks_to_humans_is_lost_with_its_error() {
     let (identity, _) = greet(|bytes| if bytes[3] == 0xC0 { hex("F0C4FEF0CA") } else { b"help: press h\r\n".to_vec() });
-    let why = identity.unwrap_err().to_string();
+    let why = identity.unwrap_err();
     assert_eq!(why, "the device does not send its configuration");
     let (identity, _) = greet(|bytes| if bytes[3] == 0xC0 { hex("F0C4FEF03A") } else { Vec::new() });
-    let why = identity.unwrap_err().to_string();
+    let why = identity.unwrap_err();
     assert_eq!(why, "the device does not send its configuration; it reports a wrong checksum in a command");
 }
 
