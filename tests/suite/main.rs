@@ -8,6 +8,8 @@ mod answers;
 mod bad_data;
 mod blind;
 mod calibrate;
+#[cfg(unix)]
+mod cell;
 mod cli;
 mod clocks;
 

@@ -27,7 +27,6 @@ use self::layout::LayoutParams;
 use self::sensors::{Pad, SensorParams, pads};
 use super::{arm, pad};
 use crate::arm::mount::Mount;
-use crate::usual::{USUAL_PRESSURE_N, USUAL_THRESHOLD_N};
 
 /// Parameters of `agni`.
 #[derive(Debug, Clone, Param)]
@@ -65,10 +64,10 @@ pub struct Params {
     #[param(unit = "N", above = 0.0)]
     full_scale: Option<f64>,
     /// Force on a tactel that is above its noise. The default is 5 % of `full_scale`, or 0.015 N with a `calibration`.
-    #[param(unit = "N", range = 0.0.., usual = ..=USUAL_THRESHOLD_N)]
+    #[param(unit = "N", range = 0.0..)]
     threshold: Option<f64>,
     /// Unit of pressure that the pad states as a fact: p = 1 in the paper.
-    #[param(unit = "N/tactel", above = 0.0, usual = ..=USUAL_PRESSURE_N, default = 0.1)]
+    #[param(unit = "N/tactel", above = 0.0, default = 0.1)]
     pressure: f64,
     /// Pose of the pad on the tip of its arm, stated as a fact.
     #[param(default = Mount::NONE)]

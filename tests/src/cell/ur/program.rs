@@ -48,24 +48,22 @@ pub(super) struct Program {
 }
 
 impl Program {
-    /// Starts a script: opens its sockets, and waits for messages at `reverse`, or at the socket whose name begins with
-    /// `reverse`.
+    /// Starts a script: opens its sockets. Messages come over the one whose name begins with `reverse`, or over the
+    /// only one; `reverse` replaces its address.
     ///
     /// # Errors
     /// If a socket cannot be opened, or the script opens no reverse interface.
     pub(super) fn start(script: &str, reverse: Option<&str>) -> io::Result<Self> {
-        let (mut sockets, mut commands) = (Vec::new(), None);
-        for (address, name) in opened(script).into_iter().take(MAX_SOCKETS) {
-            let is_reverse = name.starts_with("reverse") || name.is_empty();
-            let address = if is_reverse { reverse.unwrap_or(&address) } else { &address };
-            let stream = connect(address)?;
-            if is_reverse && commands.is_none() {
-                commands = Some(stream.try_clone()?);
-            }
-            sockets.push(stream);
+        let mut opened = opened(script);
+        opened.truncate(MAX_SOCKETS);
+        let named = opened.iter().position(|(_, name)| name.starts_with("reverse"));
+        let commands = named.or_else(|| (opened.len() == 1).then_some(0));
+        let mut sockets = Vec::new();
+        for (i, (address, _)) in opened.iter().enumerate() {
+            sockets.push(connect(reverse.filter(|_| commands == Some(i)).unwrap_or(address))?);
         }
         let mut stream = match (commands, reverse) {
-            (Some(stream), _) => stream,
+            (Some(at), _) => sockets[at].try_clone()?,
             (None, Some(address)) => {
                 let stream = connect(address)?;
                 sockets.push(stream.try_clone()?);
