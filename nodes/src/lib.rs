@@ -54,11 +54,12 @@ pub use tool::tool;
 
 /// The built-in files, the roles and the devices: one line each.
 fn edge() -> Catalogue {
-    let edge = Catalogue::new()
+    let catalogue = Catalogue::new()
         .files(builtin::FILES)
         .role(roles::tactile_pad())
         .role(roles::velocity_arm())
         .role(roles::bare_arm())
+        .role(roles::force_sensor())
         .role(roles::ground_truth())
         .role(roles::true_object())
         // The first that fills a role is the one that examples take.
@@ -69,8 +70,11 @@ fn edge() -> Catalogue {
         .device::<sim::pair::SimPair>()
         .device::<devices::lockstep::Lockstep>();
     #[cfg(feature = "drivers")]
-    let edge = edge.device::<devices::agni::Agni>();
-    edge
+    let catalogue = catalogue
+        .device::<devices::agni::Agni>()
+        .device::<devices::lwr_fri::LwrFri>()
+        .device::<devices::ur::Ur>();
+    catalogue
 }
 
 /// Everything there is: one line each.

@@ -53,6 +53,27 @@ pub fn bare_arm() -> RoleType {
     }
 }
 
+/// A sensor of the force and the torque on the tool of an arm.
+#[must_use]
+pub fn force_sensor() -> RoleType {
+    let force = |name, doc| PortSpec::new(name, doc, Kind::Scalar, &["N", "self"]);
+    let torque = |name, doc| PortSpec::new(name, doc, Kind::Scalar, &["N m", "self"]);
+    RoleType {
+        name: "force_sensor".into(),
+        summary: "a sensor of the force and the torque on the tool of an arm".into(),
+        outputs: vec![
+            PortSpec::new("wrench", WRENCH, Kind::Features, &["_", "self"]),
+            force("fx", "Force along x of the tip [N]."),
+            force("fy", "Force along y of the tip [N]."),
+            force("fz", "Force along z of the tip [N]."),
+            torque("tx", "Torque about x of the tip [N m]."),
+            torque("ty", "Torque about y of the tip [N m]."),
+            torque("tz", "Torque about z of the tip [N m]."),
+        ],
+        ..RoleType::default()
+    }
+}
+
 /// The limits that need a pad: a bare arm feels no contact, so nothing could enforce them.
 const OF_PADS: [&str; 3] = ["force", "peak", "blind"];
 
@@ -63,6 +84,9 @@ const SAFETY: &str = "Whether the controller follows commands: no stop is active
 
 const EQUILIBRIUM: &str = "Posture that the commands add up to: where a compliant arm would be if nothing held it; \
     for a stiff arm, its position [rad].";
+
+const WRENCH: &str = "The wrench that the environment exerts on the tool, about the origin of the tip and in its axes: \
+    fx, fy, fz [N], tx, ty, tz [N m]. The other ports are its components.";
 
 /// Facts of the contact that a simulation knows and no sensor measures: for scenarios and the recorder. A device that
 /// fills it gives all of it, and says of what does not apply that it is absent.

@@ -137,6 +137,11 @@ fn only_the_edge_names_tokio() {
         "nodes/src/devices/link/udp.rs",
         "nodes/src/devices/link/websocket.rs",
         "nodes/src/devices/lockstep/free.rs",
+        "nodes/src/devices/ur/driver.rs",
+        "nodes/src/devices/ur/program.rs",
+        "nodes/src/devices/ur/rtde.rs",
+        "nodes/src/devices/ur/session.rs",
+        "nodes/src/devices/lwr_fri/driver.rs",
     ];
     let edge = edge.map(|path| workspace().join(path));
     for (path, text) in sources(&["runtime/src", "nodes/src"]) {

@@ -1,5 +1,7 @@
 //! What every arm states: the role `velocity_arm`, its joints, its ports and its facts.
 
+#[cfg(feature = "drivers")]
+use tactflow_runtime::device::Link;
 use tactflow_runtime::device::{Command, Description, DeviceError, Fill, Output, Report, Samples};
 use tactflow_runtime::node::{At, FilePath, Mistake, Mistakes, refuse_any};
 use tactflow_runtime::signal::{Flag, FlagShape, Joint, Joints, JointsShape, Pose, Unit};
@@ -64,6 +66,14 @@ impl ArmPorts {
         samples.write(self.position, stamp, sequence).0.copy_from_slice(position);
         samples.write(self.equilibrium, stamp, sequence).0.copy_from_slice(equilibrium);
         *samples.write(self.safety, stamp, sequence) = follows_commands;
+    }
+
+    /// Makes all outputs absent until they are written again.
+    #[cfg(feature = "drivers")]
+    pub(crate) fn lose(&self, link: &mut Link, why: &str) {
+        link.lost(self.position, why.to_owned());
+        link.lost(self.equilibrium, why.to_owned());
+        link.lost(self.safety, why.to_owned());
     }
 }
 

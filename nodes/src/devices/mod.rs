@@ -8,11 +8,18 @@ pub(crate) mod arm;
 #[cfg(feature = "drivers")]
 pub(crate) mod link;
 pub mod lockstep;
+#[cfg(feature = "drivers")]
+pub mod lwr_fri;
 pub mod mock_arm;
 pub mod mock_pad;
 pub(crate) mod pad;
 pub mod recording;
+#[cfg(feature = "drivers")]
 pub mod start;
+#[cfg(feature = "drivers")]
+pub mod ur;
+#[cfg(feature = "drivers")]
+pub(crate) mod wrench;
 
 #[cfg(test)]
 pub(crate) mod testing;

@@ -68,10 +68,14 @@ impl<'a> KnownUnits<'a> {
             return Some((UnitSize::of(unit), unit.to_string()));
         }
         let size = UnitSize::parse_with(declared, &|symbol| self.letter(symbol, component))?;
+        let mut is_divisor = false;
         let symbols = declared.split_inclusive(['/', ' ']).map(|part| {
             let symbol = part.trim_end_matches(['/', ' ', '2', '3']);
-            let unit = self.letter(symbol, component);
-            unit.map_or_else(|| part.to_owned(), |unit| part.replacen(symbol, &unit.to_string(), 1))
+            let is_divided = std::mem::replace(&mut is_divisor, part.ends_with('/'));
+            let Some(unit) = self.letter(symbol, component) else { return part.to_owned() };
+            // Divided by `N m` is `m/N/m`: behind a slash, each factor needs its own.
+            let unit = if is_divided { unit.to_string().replace(' ', "/") } else { unit.to_string() };
+            part.replacen(symbol, &unit, 1)
         });
         Some((size, symbols.collect()))
     }

@@ -21,6 +21,8 @@ pub enum Base {
     Axial,
     /// Newton.
     Newton,
+    /// Newton metre, of a torque.
+    NewtonMetre,
     /// Kilopascal.
     Kilopascal,
     /// Counts of the sensor's converter, before any calibration.
@@ -29,13 +31,14 @@ pub enum Base {
     Tactel,
 }
 
-const NAMES: [(Base, &str); 9] = [
+const NAMES: [(Base, &str); 10] = [
     (Base::One, "1"),
     (Base::Metre, "m"),
     (Base::SquareMetre, "m2"),
     (Base::Radian, "rad"),
     (Base::Axial, "rad mod pi"),
     (Base::Newton, "N"),
+    (Base::NewtonMetre, "N m"),
     (Base::Kilopascal, "kPa"),
     (Base::Raw, "raw"),
     (Base::Tactel, "tactel"),
@@ -65,6 +68,8 @@ impl Unit {
     pub const AXIAL: Self = Self::of(Base::Axial);
     /// Newton.
     pub const NEWTON: Self = Self::of(Base::Newton);
+    /// Newton metre, of a torque.
+    pub const NEWTON_METRE: Self = Self::of(Base::NewtonMetre);
     /// Counts of the converter.
     pub const RAW: Self = Self::of(Base::Raw);
 
