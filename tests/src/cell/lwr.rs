@@ -74,6 +74,8 @@ pub(super) struct Lwr {
     perfect_since: Option<f64>,
     /// Joint positions of the last command [rad].
     target: Option<Vec<f64>>,
+    /// Whether a command has come since the last beat, in time or late.
+    has_command: bool,
     /// Velocity that the last command meant [rad/s].
     velocity: Vec<f64>,
     /// The KRL variables of the last answer, which come back to the driver.
@@ -147,6 +149,7 @@ impl Lwr {
             has_commanded: false,
             perfect_since: None,
             target: None,
+            has_command: false,
             velocity: vec![0.0; JOINTS],
             krl: [0; 132],
             flags: None,
@@ -156,7 +159,7 @@ impl Lwr {
 
     /// Reads the answers since the last beat.
     fn receive(&mut self, log: &mut Log) -> io::Result<()> {
-        self.connection.has_answer = false;
+        (self.connection.has_answer, self.has_command) = (false, false);
         while let Ok(answer) = self.answers.try_recv() {
             let Some(cmd) = Cmd::read(&answer.bytes) else {
                 self.counts.rejected += 1;
@@ -164,11 +167,10 @@ impl Lwr {
             };
             self.counts.answers += 1;
             self.connection.reflected = cmd.sequence;
-            if cmd.reflected != self.connection.sequence {
-                self.counts.late += 1;
-                continue;
-            }
-            self.connection.has_answer = true;
+            // A late answer moves the arm, but it does not make the connection better.
+            let is_in_time = cmd.reflected == self.connection.sequence;
+            self.counts.late += u64::from(!is_in_time);
+            self.connection.has_answer |= is_in_time;
             self.krl.copy_from_slice(&answer.bytes[8..140]);
             if self.flags.is_some_and(|flags| flags != cmd.flags) && self.is_commanding {
                 self.counts.changed_flags += 1;
@@ -181,6 +183,7 @@ impl Lwr {
                 };
                 log.command(answer.arrived, self.is_commanding, &asked)?;
                 self.target = Some(cmd.position);
+                self.has_command = true;
             }
         }
         self.connection.judge(&self.script);
@@ -202,7 +205,7 @@ impl Lwr {
             self.velocity = vec![0.0; JOINTS];
             return self.velocity.clone();
         }
-        if let (true, Some(target)) = (self.connection.has_answer, &self.target) {
+        if let (true, Some(target)) = (self.has_command, &self.target) {
             let asked = target.iter().zip(&posture.equilibrium).map(|(target, q)| (target - q) / self.period);
             self.velocity = asked.collect();
         } else if self.connection.missed > 1 {
@@ -483,5 +486,14 @@ mod tests {
         beat(&mut lwr, &driver, &mut log, &posture(0.5, 0.5), Some(0.9));
         assert_eq!(lwr.beat(&posture(0.6, 0.5), &mut log).unwrap(), [0.0; JOINTS]);
         assert!(!lwr.is_commanding && lwr.counts.faults == 1);
+    }
+
+    proptest::proptest! {
+        #[test]
+        fn any_datagram_is_an_answer_or_rejected(mut bytes in proptest::collection::vec(0u8.., CMD_BYTES - 1..CMD_BYTES + 2)) {
+            bytes[4..8].copy_from_slice(&[0x78, 0x01, 0x05, 0x10]);
+            let cmd = Cmd::read(&bytes);
+            proptest::prop_assert!(cmd.is_none_or(|cmd| bytes.len() == CMD_BYTES && cmd.position.iter().all(|q| q.is_finite())));
+        }
     }
 }

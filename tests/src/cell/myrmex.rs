@@ -256,4 +256,16 @@ mod tests {
         words.sort_unstable();
         assert_eq!(words, (0..256).collect::<Vec<_>>());
     }
+
+    proptest::proptest! {
+        #[test]
+        fn any_bytes_of_a_host_are_obeyed_or_skipped(bodies: Vec<(bool, Vec<u8>)>) {
+            let (mut pad, _host) = pad();
+            for (has_header, body) in bodies {
+                pad.inbox.extend(HEADER.iter().take(if has_header { 2 } else { 0 }).chain(&body));
+                pad.inbox.truncate(MAX_INBOX);
+                pad.obey().unwrap();
+            }
+        }
+    }
 }

@@ -1,8 +1,9 @@
 //! Tasks that run against the cell: over a serial pad and the LWR, and over a pad behind TCP and the UR. The same task
 //! on the same bench without wires says how good they can be.
 
-use std::fmt::Write;
+use std::fmt::Write as _;
 use std::fs;
+use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
 use tactflow_runtime::engine::{End, Engine, RunOptions, run};
@@ -12,10 +13,19 @@ use tactflow_tests::{catalogue, workspace};
 use super::{Cell, Figures, ball, free_udp_port};
 use crate::sim::course;
 
-/// Frames of the pad per second: as many as a busy machine simulates in time.
-const RATE_HZ: f64 = 100.0;
-/// Duration of a task [s].
-const DURATION: f64 = 6.0;
+/// A run of the task.
+#[derive(Debug, Clone, Copy)]
+struct Trial {
+    /// Frames of the pad per second.
+    rate_hz: f64,
+    /// Duration [s].
+    duration: f64,
+}
+
+/// As many frames as a busy machine simulates in time, and as long as it takes to hold the contact.
+const SHORT: Trial = Trial { rate_hz: 100.0, duration: 6.0 };
+/// The rate of the paper.
+const LONG: Trial = Trial { rate_hz: 250.0, duration: 30.0 };
 /// Time at the end in which the contact is held [s].
 const HELD: f64 = 1.5;
 /// Pressure that the task keeps [N per tactel].
@@ -76,12 +86,12 @@ fn calibration(folder: &Path, full: f64, unit: &str) -> PathBuf {
 }
 
 /// Runs the hybrid task on a bench, and returns the engine at its end.
-fn run_hybrid(bench: String) -> Engine {
+fn run_hybrid(bench: String, trial: Trial) -> Engine {
     let graph = workspace().join("graphs/hybrid.toml");
     let request = Request { bench_text: Some(bench), ..Request::file(graph) };
     let plan = compile(&catalogue(), &request).unwrap_or_else(|report| panic!("{}", report.render(false)));
     let mut engine = Engine::new(plan);
-    let options = RunOptions { duration: Some(DURATION), ..RunOptions::default() };
+    let options = RunOptions { duration: Some(trial.duration), ..RunOptions::default() };
     let outcome = run(&mut engine, &options, &mut |_| {}).unwrap();
     assert_eq!(outcome.end, End::Duration, "{:?}", engine.halts());
     assert_eq!(engine.mode(), Some("servo"), "{:?}", engine.changes());
@@ -96,32 +106,37 @@ fn truth(figures: &Figures) -> Vec<[f64; 4]> {
     figures.truth.iter().filter(|row| row[0] < end).map(|row| [row[0], row[2], row[3], row[4]]).collect()
 }
 
-/// Checks the quality of a run against that of the same task without wires.
-fn compare(figures: &Figures) {
-    let request = Request::file(workspace().join("graphs/hybrid.toml"))
-        .bench(ball())
-        .set(format!("devices.bench.rate_hz={RATE_HZ:?}"));
-    let without = course(&request, DURATION, &["truth.x", "truth.y", "truth.pressure"]);
-    let rows: Vec<[f64; 4]> =
-        without.iter().enumerate().map(|(i, row)| [i as f64 / RATE_HZ, row[0], row[1], row[2]]).collect();
-    let (without, with) = (Held::of(&rows), Held::of(&truth(figures)));
-    let text = format!("without wires: {without:?}\n{}", figures.summary);
-    without.check("without wires");
+/// Returns how well the same task holds the contact without wires.
+fn without_wires(trial: Trial, bench: &Path, set: &[&str]) -> Held {
+    let rate = format!("devices.bench.rate_hz={:?}", trial.rate_hz);
+    let request = Request::file(workspace().join("graphs/hybrid.toml")).bench(bench).set(rate);
+    let request = set.iter().fold(request, |request, set| request.set(*set));
+    let rows = course(&request, trial.duration, &["truth.x", "truth.y", "truth.pressure"]);
+    let rows = rows.iter().enumerate().map(|(i, row)| [i as f64 / trial.rate_hz, row[0], row[1], row[2]]);
+    Held::of(&rows.collect::<Vec<_>>())
+}
+
+/// Checks the quality of a run, and that it is that of the same task without wires. Returns the figures of both.
+fn compare(figures: &Figures, without: &Held, trial: Trial) -> String {
+    let with = Held::of(&truth(figures));
+    let text = format!("over wires:    {with:?}\nwithout wires: {without:?}\n{}\n", figures.summary);
+    without.check(&text);
     with.check(&text);
     let age = &figures.summary["since_image_ms"];
-    assert!(age["count"].as_u64().unwrap() > 100 && age["p50"].as_f64().unwrap() < 1e3 / RATE_HZ + 10.0, "{age}");
+    assert!(age["count"].as_u64().unwrap() > 100 && age["p50"].as_f64().unwrap() < 1e3 / trial.rate_hz + 10.0, "{age}");
+    text
 }
 
-fn simulation() -> String {
-    format!("[set]\nrate_hz = {RATE_HZ:?}\nlatency_s = 0.0\nfor_s = 1e6\n")
+fn simulation(trial: Trial) -> String {
+    format!("[set]\nrate_hz = {:?}\nlatency_s = 0.0\nfor_s = 1e6\n", trial.rate_hz)
 }
 
-#[test]
-fn the_hybrid_task_holds_a_contact_over_a_serial_pad_and_the_lwr() {
+/// Runs the task over a serial pad and the LWR. Returns its figures.
+fn serial_pad_and_lwr(trial: Trial) -> String {
     let port = free_udp_port();
     let wires = format!(
         "{}[pad]\nwire = 'myrmex'\n[arm]\nwire = 'lwr'\nto = '127.0.0.1:{port}'\nmissed_per_level = 50\n",
-        simulation()
+        simulation(trial)
     );
     let cell = Cell::start(&ball(), &wires);
     let calibration = calibration(cell.folder.path(), 4095.0, "1");
@@ -133,7 +148,7 @@ fn the_hybrid_task_holds_a_contact_over_a_serial_pad_and_the_lwr() {
         [devices.skin]
         type = 'agni'
         link = 'serial:{}'
-        rate_hz = {RATE_HZ:?}
+        rate_hz = {:?}
         calibration = '{}'
         mount = {{ xyz = [0.0, 0.0, 0.03] }}
         [devices.lwr]
@@ -145,10 +160,11 @@ fn the_hybrid_task_holds_a_contact_over_a_serial_pad_and_the_lwr() {
         workspace_max_m = [-0.3, 0.4, 0.7]
         ",
         cell.pad_path().display(),
+        trial.rate_hz,
         calibration.display(),
         workspace().join("graphs/robots/lwr4p.toml").display()
     );
-    drop(run_hybrid(bench));
+    drop(run_hybrid(bench, trial));
     let figures = cell.end();
     let arm = &figures.summary["arm"];
     assert_eq!(
@@ -157,7 +173,7 @@ fn the_hybrid_task_holds_a_contact_over_a_serial_pad_and_the_lwr() {
         "{}",
         figures.summary
     );
-    compare(&figures);
+    compare(&figures, &without_wires(trial, &ball(), &[]), trial)
 }
 
 /// A bench with the ball in front of a UR5e, which is stiffer than an LWR.
@@ -171,15 +187,16 @@ fn ur_bench(folder: &Path) -> PathBuf {
     path
 }
 
-#[test]
-fn the_hybrid_task_holds_a_contact_over_a_pad_behind_tcp_and_the_ur() {
+/// Runs the task over a pad behind TCP and the UR. Returns its figures.
+fn tcp_pad_and_ur(trial: Trial) -> String {
     let folder = tempfile::tempdir().unwrap();
     let reverse = std::net::TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap().port();
     let wires = format!(
         "{}stiffness = 2000.0\n[pad]\nwire = 'tcp'\n[arm]\nwire = 'ur'\nreverse = '127.0.0.1:{reverse}'\n",
-        simulation()
+        simulation(trial)
     );
-    let cell = Cell::start(&ur_bench(folder.path()), &wires);
+    let ball = ur_bench(folder.path());
+    let cell = Cell::start(&ball, &wires);
     let place = |device: &str, port: &str| cell.place[device][port].as_u64().unwrap();
     let bench = format!(
         "
@@ -196,7 +213,7 @@ fn the_hybrid_task_holds_a_contact_over_a_pad_behind_tcp_and_the_ur() {
         shape = [16, 16]
         check = 'sum16le'
         clock.counter = {{ offset = 2, cell = 'u32le' }}
-        rate_hz = {RATE_HZ:?}
+        rate_hz = {:?}
         timeout_ms = 500
         pitch = 0.005
         calibration = '{}'
@@ -216,15 +233,35 @@ fn the_hybrid_task_holds_a_contact_over_a_pad_behind_tcp_and_the_ur() {
         workspace_max_m = [1.0, 1.0, 1.0]
         ",
         place("pad", "port"),
+        trial.rate_hz,
         workspace().join("graphs/calibrations/sim_pad.toml").display(),
         workspace().join("graphs/robots/ur5e.toml").display(),
         place("arm", "rtde_port"),
         place("arm", "script_port"),
     );
-    drop(run_hybrid(bench));
+    drop(run_hybrid(bench, trial));
     let figures = cell.end();
     let arm = &figures.summary["arm"];
     let counts = [&arm["programs"], &arm["faults"], &arm["timeouts"], &arm["stops"]];
     assert_eq!(counts, [1, 0, 0, 1].map(serde_json::Value::from).each_ref(), "{}", figures.summary);
-    compare(&figures);
+    compare(&figures, &without_wires(trial, &ball, &["devices.bench.stiffness=2000.0"]), trial)
+}
+
+#[test]
+fn the_hybrid_task_holds_a_contact_over_a_serial_pad_and_the_lwr() {
+    serial_pad_and_lwr(SHORT);
+}
+
+#[test]
+fn the_hybrid_task_holds_a_contact_over_a_pad_behind_tcp_and_the_ur() {
+    tcp_pad_and_ur(SHORT);
+}
+
+#[test]
+#[ignore = "it takes a minute on a machine that does nothing else: `.ci/edge` runs it"]
+fn figures_of_the_hybrid_task_over_wires() {
+    let lwr = serial_pad_and_lwr(LONG);
+    let ur = tcp_pad_and_ur(LONG);
+    let text = format!("\na serial pad and the LWR\n{lwr}\na pad behind TCP and the UR\n{ur}\n");
+    std::io::stdout().write_all(text.as_bytes()).unwrap();
 }

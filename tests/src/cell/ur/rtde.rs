@@ -280,4 +280,24 @@ mod tests {
             rtde.serve(&values(0.0)).unwrap();
         }
     }
+
+    proptest::proptest! {
+        #[test]
+        fn any_packets_of_a_client_are_answered_or_end_the_link(packets: Vec<(u8, Vec<u8>)>) {
+            let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, 0)).unwrap();
+            let _peer = TcpStream::connect(listener.local_addr().unwrap()).unwrap();
+            let mut client = Client::new(listener.accept().unwrap().0);
+            for (command, payload) in packets {
+                for command in [command, b'V', b'O', b'I', b'S'] {
+                    client.inbox.extend(((payload.len() + 3) as u16).to_be_bytes());
+                    client.inbox.push(command);
+                    client.inbox.extend(&payload);
+                    if client.answer(&values(0.0)).is_none() {
+                        return Ok(());
+                    }
+                    client.publish(&values(1.0));
+                }
+            }
+        }
+    }
 }
