@@ -44,7 +44,8 @@ fn stable_name(path: &str, ports: &[PathBuf]) -> String {
     }
     let own = std::fs::canonicalize(path).ok();
     let same = |port: &&PathBuf| own.is_some() && std::fs::canonicalize(port).ok() == own;
-    let name = ports.iter().find(same).map_or_else(|| format!("a name in {BY_ID}"), |port| format!("`{}`", port.display()));
+    let name =
+        ports.iter().find(same).map_or_else(|| format!("a name in {BY_ID}"), |port| format!("`{}`", port.display()));
     format!("; it may come back under another number: use {name}")
 }
 

@@ -18,9 +18,8 @@ impl WebSocket {
         let host = peer.split('/').next().unwrap_or_default();
         let stream = TcpStream::connect(host).await.map_err(|error| error.to_string())?;
         stream.set_nodelay(true).map_err(|error| error.to_string())?;
-        let config = WebSocketConfig::default()
-            .max_message_size(Some(RECEIVED_BYTES))
-            .max_frame_size(Some(RECEIVED_BYTES));
+        let config =
+            WebSocketConfig::default().max_message_size(Some(RECEIVED_BYTES)).max_frame_size(Some(RECEIVED_BYTES));
         let shaken = client_async_with_config(format!("ws://{peer}"), stream, Some(config)).await;
         let (stream, _) = shaken.map_err(|error| format!("the peer is no WebSocket server: {error}"))?;
         Ok(Self { stream })

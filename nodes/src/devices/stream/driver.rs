@@ -144,7 +144,10 @@ impl PadDriver {
         let mut has_image = false;
         while let Some(read) = self.reader.next(&mut self.cells) {
             (has_image, self.strange, self.is_lost) = (true, 0, false);
-            let stamp = read.time.map_or_else(|| link.arrival(), |time| link.stamp_of(time));
+            let stamp = match read.time {
+                Some(time) => link.stamp_of(time),
+                None => link.arrival(),
+            };
             link.publish(|samples| {
                 samples.write(self.image, stamp, read.number).cells_mut().copy_from_slice(&self.cells);
             });
@@ -181,7 +184,8 @@ impl PadDriver {
     fn silence(&self, since: Duration) -> String {
         let silent = format!("no frame for {} ms", since.as_millis());
         if self.strange == 0 {
-            let asked = if self.plan.start.is_empty() && self.plan.poll.is_none() { "" } else { " and does not answer" };
+            let asked =
+                if self.plan.start.is_empty() && self.plan.poll.is_none() { "" } else { " and does not answer" };
             return format!("{silent}: the pad sends nothing{asked}");
         }
         if self.reader.is_ambiguous() {
@@ -190,6 +194,9 @@ impl PadDriver {
                  `plausible` tells the right one"
             );
         }
-        format!("{silent}: {} bytes came, and none of them is a frame; check `baud`, `frame`, `mark` and `length`", self.strange)
+        format!(
+            "{silent}: {} bytes came, and none of them is a frame; check `baud`, `frame`, `mark` and `length`",
+            self.strange
+        )
     }
 }

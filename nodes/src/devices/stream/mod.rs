@@ -81,13 +81,14 @@ fn facts(params: &Params) -> Result<Facts, Mistakes> {
         None => calibration.insert("gain".to_owned(), 1.0.into()),
     };
     let unit = params.unit;
-    let mut facts: Facts = vec![
-        ("dead".into(), toml::Value::Array(Vec::new())),
-        ("calibration".into(), calibration.into()),
-    ];
+    let mut facts: Facts =
+        vec![("dead".into(), toml::Value::Array(Vec::new())), ("calibration".into(), calibration.into())];
     facts.extend(params.threshold.map(|threshold| ("threshold".into(), format!("{threshold} {unit}").into())));
     let pressure = params.pressure.map(|pressure| format!("{pressure} {}", unit.per_tactel()));
     facts.extend(pressure.map(|pressure| ("pressure".into(), pressure.into())));
     facts.extend(params.mount.as_ref().map(pad::mount));
     Ok(facts)
 }
+
+#[cfg(test)]
+mod tests;

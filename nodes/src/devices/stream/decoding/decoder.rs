@@ -9,7 +9,7 @@ use super::words::find_words;
 
 /// Where a number of a frame stands beside its cells.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Param)]
-pub struct Place {
+pub(crate) struct Place {
     /// Offset from the first byte of the frame; in text, the number of values before it.
     pub(crate) offset: usize,
     /// Type of the number.
@@ -176,7 +176,8 @@ mod tests {
         assert_eq!(values, [1.0, 2.0, 3.0]);
         let stamp = Place { offset: 0, cell: Field::Dec };
         assert_eq!(decoder.beside(b"1234, 1,2,3", stamp), Some(Reading::Decimal(1234.0)));
-        for text in ["1234,1,2", "1234,1,2,3,4", "1234,1,x,3", "1234,1,,3", "1234,1,inf,3", "1234,1,nan,3", "\u{fffd}"] {
+        for text in ["1234,1,2", "1234,1,2,3,4", "1234,1,x,3", "1234,1,,3", "1234,1,inf,3", "1234,1,nan,3", "\u{fffd}"]
+        {
             assert!(!decoder.read(text.as_bytes(), &mut values), "{text}");
         }
         assert!(!decoder.read(&[0xFF, b' ', 0xFE, b' ', 0xFD, b' ', 0xFC], &mut values), "no UTF-8");

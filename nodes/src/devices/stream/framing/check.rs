@@ -5,7 +5,7 @@ use tactflow_runtime::node::Param;
 
 /// Order of the bytes of a number.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Param)]
-pub enum ByteOrder {
+pub(crate) enum ByteOrder {
     /// The low byte first.
     Le,
     /// The high byte first.
@@ -158,7 +158,12 @@ mod tests {
         for name in names() {
             assert!(Sum::of(&name).is_some(), "{name}");
         }
-        let published = [("crc-8/smbus", 0xF4), ("crc-16/modbus", 0x4B37), ("CRC-16/XMODEM", 0x31C3), ("crc-32/iso-hdlc", 0xCBF4_3926)];
+        let published = [
+            ("crc-8/smbus", 0xF4),
+            ("crc-16/modbus", 0x4B37),
+            ("CRC-16/XMODEM", 0x31C3),
+            ("crc-32/iso-hdlc", 0xCBF4_3926),
+        ];
         for (name, expected) in published {
             assert_eq!(check(name, 0, 0).sum.of_bytes(DIGITS), expected, "{name}");
         }

@@ -5,20 +5,20 @@ use tactflow_runtime::source::Code;
 
 use super::bounds::{MAX_LENGTH, MAX_WORD};
 use super::order::{Shape, plausible};
+use super::params::{Framing, Params};
+use super::text::{bytes_of, is_bare_hex};
 use super::useless;
 use crate::devices::link::Address;
-use crate::devices::stream::framing::check::{Check, Sum, names};
 use crate::devices::stream::decoding::decoder::{Decoder, Layout, Place};
 use crate::devices::stream::decoding::parts::Parts;
 use crate::devices::stream::framing::Framer;
+use crate::devices::stream::framing::check::{Check, Sum, names};
 use crate::devices::stream::framing::lines::Lines;
 use crate::devices::stream::framing::marked::Marked;
 use crate::devices::stream::framing::messages::Messages;
 use crate::devices::stream::framing::packets::{Coding, Packets};
 use crate::devices::stream::framing::replies::Replies;
 use crate::devices::stream::framing::rule::{Length, Rule};
-use super::params::{Framing, Params};
-use super::text::{bytes_of, is_bare_hex};
 
 /// What finds frames and reads them.
 pub(crate) struct Frame {
@@ -46,10 +46,12 @@ pub(crate) fn frame(
         let message = format!("values {} apart overlap: a value has {}", stride, amount(params, params.cell.size()));
         mistakes.push(Mistake::param("stride", message).help("leave it out for values without a gap"));
     }
-    let is_header = matches!(params.frame, Framing::Sync | Framing::Reply | Framing::Datagram | Framing::Cobs | Framing::Slip);
+    let is_header =
+        matches!(params.frame, Framing::Sync | Framing::Reply | Framing::Datagram | Framing::Cobs | Framing::Slip);
     let header = if is_header { mark.len() + params.mark_at.unwrap_or(0) } else { 0 };
     let offset = params.offset.unwrap_or(if params.cell.is_text() { 0 } else { header });
-    let end = (count - 1).checked_mul(stride).and_then(|step| step.checked_add(offset)?.checked_add(params.cell.size()));
+    let end =
+        (count - 1).checked_mul(stride).and_then(|step| step.checked_add(offset)?.checked_add(params.cell.size()));
     let end = end.filter(|end| *end <= MAX_LENGTH).or_else(|| {
         let message = format!("a frame is longer than {}", amount(params, MAX_LENGTH));
         mistakes.push(Mistake::param(if params.offset.is_some() { "offset" } else { "shape" }, message));
@@ -90,7 +92,8 @@ fn check_keys(params: &Params, address: Option<&Address>, mistakes: &mut Mistake
     let takes_text = matches!(params.frame, Framing::Lines | Framing::Datagram);
     if is_text && !takes_text {
         let message = "numbers in text need `frame = \"lines\"` or `frame = \"datagram\"`";
-        mistakes.push(Mistake::param("cell", message).help("or write the type of the bytes, such as `cell = \"u16le\"`"));
+        mistakes
+            .push(Mistake::param("cell", message).help("or write the type of the bytes, such as `cell = \"u16le\"`"));
     }
     if params.frame == Framing::Lines && !is_text {
         let message = "lines hold numbers in text: `cell` is `dec` or `hex`";
@@ -108,7 +111,8 @@ fn check_keys(params: &Params, address: Option<&Address>, mistakes: &mut Mistake
     if is_text {
         let why = "for numbers in text";
         let set = [("check", params.check != "none"), ("mask", params.mask.is_some()), ("shift", params.shift > 0)];
-        mistakes.extend(set.into_iter().filter(|(_, is_set)| *is_set).map(|(key, _)| useless(key, why, "leave it out")));
+        mistakes
+            .extend(set.into_iter().filter(|(_, is_set)| *is_set).map(|(key, _)| useless(key, why, "leave it out")));
         if params.frame == Framing::Datagram && params.mark.is_some() {
             mistakes.push(useless("mark", why, "leave it out: each datagram is a frame"));
         }
@@ -184,7 +188,8 @@ fn length(params: &Params, (end, after): (usize, usize), mistakes: &mut Mistakes
     if let Some((lengths, place, first)) = parts {
         let before = mistakes.len();
         for length in lengths.iter().filter(|length| **length < end + after || **length > MAX_LENGTH) {
-            let message = format!("a part of {length} bytes is too short or too long: its last value ends at byte {end}");
+            let message =
+                format!("a part of {length} bytes is too short or too long: its last value ends at byte {end}");
             let help = format!("write from {} to {MAX_LENGTH}", end + after);
             mistakes.push(Mistake::param("parts.lengths", message).help(help));
         }
@@ -225,7 +230,8 @@ fn check_places(params: &Params, length: &Length, after: usize, mistakes: &mut M
     for (key, place) in places.into_iter().filter_map(|(key, place)| Some((key, place?))) {
         if place.cell.is_text() != params.cell.is_text() {
             let help = "write `dec` or `hex` for a number in text, and a type of bytes for a number in bytes";
-            let message = format!("the values of the frame are {}", if params.cell.is_text() { "text" } else { "bytes" });
+            let message =
+                format!("the values of the frame are {}", if params.cell.is_text() { "text" } else { "bytes" });
             mistakes.push(Mistake::param(format!("{key}.cell"), message).help(help));
         } else if place.offset.checked_add(place.cell.size()).is_none_or(|behind| behind > end) {
             let message = format!("it ends behind the frame, which has {}", amount(params, end));

@@ -13,12 +13,12 @@ use std::time::Duration;
 
 use tactflow_runtime::node::{Mistake, Mistakes};
 
+use crate::devices::link::Address;
 use crate::devices::stream::decoding::clock::{Counter, Stamps};
 use crate::devices::stream::decoding::decoder::{Decoder, Image, Place};
 use crate::devices::stream::decoding::order::Grid;
 use crate::devices::stream::decoding::parts::Parts;
 use crate::devices::stream::framing::Framer;
-use crate::devices::link::Address;
 use params::Params;
 
 /// Everything that a driver needs to know of a pad.
@@ -63,7 +63,8 @@ impl Plan {
         let shape = order::shape(params, &mut mistakes);
         let made = shape.and_then(|shape| {
             let parts = parts::parts(params, &shape, &mut mistakes);
-            let frame = frame::frame(params, &shape, parts.as_ref(), link.as_ref().map(|link| &link.address), &mut mistakes);
+            let frame =
+                frame::frame(params, &shape, parts.as_ref(), link.as_ref().map(|link| &link.address), &mut mistakes);
             let image = order::image(params, &shape, &mut mistakes);
             Some((shape, parts, frame?, image?))
         });
@@ -77,9 +78,8 @@ impl Plan {
         }
         let period = Duration::from_secs_f64(1.0 / params.rate_hz);
         let timeout = params.timeout_ms.map(|ms| Duration::from_secs_f64((ms * 1e-3).min(1e6)));
-        let stamp = params.clock.stamp.map(|stamp| {
-            Stamps::new(Place { offset: stamp.offset, cell: stamp.cell }, stamp.unit)
-        });
+        let stamp =
+            params.clock.stamp.map(|stamp| Stamps::new(Place { offset: stamp.offset, cell: stamp.cell }, stamp.unit));
         Ok(Self {
             address: link.address,
             baud: link.baud,

@@ -4,9 +4,9 @@ use tactflow_runtime::node::{At, Mistake, Mistakes};
 use tactflow_runtime::source::Code;
 
 use super::bounds::MAX_VALUES;
+use super::params::{Params, Scale};
 use super::useless;
 use crate::devices::stream::decoding::order::Grid;
-use super::params::{Params, Scale};
 
 /// Rows and columns in the order of the bytes, and the axes of each tactel.
 pub(crate) struct Shape {
@@ -120,7 +120,8 @@ pub(crate) fn image(params: &Params, shape: &Shape, mistakes: &mut Mistakes) -> 
         Some(lut) => Grid::with_lut(shape.rows, shape.cols, lut),
     };
     let grid = grid.map_err(|message| {
-        let help = "each index from 0 to the last cell is there once: cell `i` of the image is value `lut[i]` of the frame";
+        let help =
+            "each index from 0 to the last cell is there once: cell `i` of the image is value `lut[i]` of the frame";
         mistakes.push(Mistake::param("lut", message).help(help));
     });
     let grid = params.order.iter().fold(grid.ok()?, |grid, turn| grid.turned(*turn));

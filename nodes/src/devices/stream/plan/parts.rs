@@ -4,8 +4,8 @@ use tactflow_runtime::node::{At, Mistake, Mistakes};
 use tactflow_runtime::source::Code;
 
 use super::order::Shape;
-use crate::devices::stream::decoding::parts::{PartNumber, Parts};
 use super::params::{Framing, Params};
+use crate::devices::stream::decoding::parts::{PartNumber, Parts};
 
 pub(crate) fn parts(params: &Params, shape: &Shape, mistakes: &mut Mistakes) -> Option<Parts> {
     let parts = params.parts.as_ref()?;

@@ -5,11 +5,11 @@ use std::net::IpAddr;
 use tactflow_runtime::node::{At, Mistake, Mistakes};
 use tactflow_runtime::source::Code;
 
+use super::params::{Framing, Params};
+use super::text::bytes_of;
 use super::useless;
 use crate::devices::link::Address;
 use crate::devices::link::address::FORMS;
-use super::params::{Framing, Params};
-use super::text::bytes_of;
 
 /// The link, with what belongs to one kind of it.
 pub(crate) struct Link {
@@ -75,7 +75,8 @@ pub(crate) fn sent(params: &Params, address: Option<&Address>, mistakes: &mut Mi
         }
     }
     if params.frame == Framing::Reply && params.poll.is_none() {
-        let mistake = Mistake::new(Code::MissingKey, At::Param("frame".into()), "a reply needs `poll`, what is sent for it");
+        let mistake =
+            Mistake::new(Code::MissingKey, At::Param("frame".into()), "a reply needs `poll`, what is sent for it");
         mistakes.push(mistake.help("write `poll = \"A\"` or `poll = \"hex:41\"`, or another `frame`"));
     }
     Some(Sent { start: start?.unwrap_or_default(), stop: stop?.unwrap_or_default(), poll: poll? })
