@@ -144,7 +144,10 @@ impl PadDriver {
         let mut has_image = false;
         while let Some(read) = self.reader.next(&mut self.cells) {
             (has_image, self.strange, self.is_lost) = (true, 0, false);
-            let stamp = read.time.map_or_else(|| link.arrival(), |time| link.stamp_of(time));
+            let stamp = match read.time {
+                Some(time) => link.stamp_of(time),
+                None => link.arrival(),
+            };
             link.publish(|samples| {
                 samples.write(self.image, stamp, read.number).cells_mut().copy_from_slice(&self.cells);
             });

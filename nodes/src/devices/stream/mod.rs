@@ -89,3 +89,6 @@ fn facts(params: &Params) -> Result<Facts, Mistakes> {
     facts.extend(params.mount.as_ref().map(pad::mount));
     Ok(facts)
 }
+
+#[cfg(test)]
+mod tests;

@@ -4,7 +4,7 @@ use tactflow_runtime::node::Param;
 
 /// The type of a cell: a number in bytes, or a number in text.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Param)]
-pub enum Cell {
+pub(crate) enum Cell {
     /// A byte from 0 to 255.
     U8,
     /// A byte from -128 to 127.
@@ -37,7 +37,7 @@ pub enum Cell {
 
 /// The type of a stamp, of a counter and of the number of a part.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Param)]
-pub enum Field {
+pub(crate) enum Field {
     /// A byte.
     U8,
     /// 16 bits, the low byte first.

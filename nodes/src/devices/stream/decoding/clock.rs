@@ -6,7 +6,7 @@ use super::decoder::{Place, Reading};
 
 /// Unit of a stamp.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Param)]
-pub enum StampUnit {
+pub(crate) enum StampUnit {
     /// Seconds.
     S,
     /// Milliseconds.

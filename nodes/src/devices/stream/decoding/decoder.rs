@@ -9,7 +9,7 @@ use super::words::find_words;
 
 /// Where a number of a frame stands beside its cells.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Param)]
-pub struct Place {
+pub(crate) struct Place {
     /// Offset from the first byte of the frame; in text, the number of values before it.
     pub(crate) offset: usize,
     /// Type of the number.

@@ -4,7 +4,7 @@ use tactflow_runtime::node::Param;
 
 /// A turn of the image.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Param)]
-pub enum Turn {
+pub(crate) enum Turn {
     /// Exchanges rows and columns: the first row becomes the first column.
     Transpose,
     /// Reverses each row: the first column becomes the last one.

@@ -114,7 +114,8 @@ mod tests {
     /// A frame in that many parts of two values; which parts complete a frame, and which spoil one.
     fn gather(parts: &mut Parts, sequence: &[usize]) -> (Vec<usize>, Vec<usize>) {
         let all: Vec<Gathered> = sequence.iter().map(|part| parts.gather(*part, None, |_, _| true)).collect();
-        let which = |is_so: fn(&Gathered) -> bool| all.iter().enumerate().filter(|(_, it)| is_so(it)).map(|(i, _)| i);
+        let which =
+            |is_so: fn(&Gathered) -> bool| all.iter().enumerate().filter(move |(_, it)| is_so(it)).map(|(i, _)| i);
         (which(|it| it.is_complete).collect(), which(|it| it.is_spoiled).collect())
     }
 

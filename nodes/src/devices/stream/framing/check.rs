@@ -5,7 +5,7 @@ use tactflow_runtime::node::Param;
 
 /// Order of the bytes of a number.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Param)]
-pub enum ByteOrder {
+pub(crate) enum ByteOrder {
     /// The low byte first.
     Le,
     /// The high byte first.

@@ -133,3 +133,6 @@ impl Pending {
         self.start = 0;
     }
 }
+
+#[cfg(test)]
+mod tests;

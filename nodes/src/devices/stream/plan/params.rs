@@ -12,7 +12,7 @@ use crate::devices::stream::framing::check::ByteOrder;
 
 /// How frames are told apart.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Param)]
-pub enum Framing {
+pub(crate) enum Framing {
     /// Each frame begins with the bytes of `mark`.
     Sync,
     /// Each frame ends with the bytes of `mark`.
@@ -133,7 +133,7 @@ pub struct Params {
 
 /// From a value of the frame to a value of the image: `gain * value + offset`, or `gain * (invert_full - value) + offset`.
 #[derive(Debug, Clone, Copy, PartialEq, Param)]
-pub struct Scale {
+pub(crate) struct Scale {
     /// The reading of an unloaded tactel, if readings fall with the load.
     #[param(unit = "raw")]
     pub(crate) invert_full: Option<f64>,
@@ -151,7 +151,7 @@ impl Scale {
 
 /// How a frame is put together from parts, which come one after the other.
 #[derive(Debug, Clone, PartialEq, Eq, Param)]
-pub struct PartParams {
+pub(crate) struct PartParams {
     /// The number of a part.
     pub(crate) index: Option<Place>,
     /// Number of the first part.
@@ -170,7 +170,7 @@ pub struct PartParams {
 
 /// The clock of a pad.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Param)]
-pub struct ClockParams {
+pub(crate) struct ClockParams {
     /// The time of the measurement, in the clock of the pad.
     pub(crate) stamp: Option<StampParams>,
     /// The number of the frame, or of the part.
@@ -183,7 +183,7 @@ impl ClockParams {
 
 /// Where the stamp of a frame stands.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Param)]
-pub struct StampParams {
+pub(crate) struct StampParams {
     /// Offset from the first byte of the frame; in a text, the number of values before it.
     pub(crate) offset: usize,
     /// Type of the stamp.
