@@ -31,6 +31,7 @@ mod limits;
 mod lint;
 mod live;
 mod lockstep;
+mod lwr_fri;
 mod merge;
 mod modes;
 mod mutations;

@@ -2,6 +2,7 @@
 
 mod arguments;
 mod calibrate;
+mod doctor;
 mod features;
 mod press;
 
@@ -15,4 +16,5 @@ pub fn tool(catalogue: Catalogue) -> Tool {
         .command(derived(features::features))
         .command(derived(calibrate::run))
         .command(derived(press::run))
+        .command(derived(doctor::run))
 }

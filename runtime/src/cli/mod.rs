@@ -13,6 +13,7 @@
 //! arguments that clap derives.
 
 mod check;
+mod commissioning;
 mod completions;
 mod explain;
 mod reference;
@@ -40,6 +41,7 @@ use shell::{Colour, standard_error};
 
 /// The parser of arguments, for the commands of other crates.
 pub use clap;
+pub use commissioning::{Commissioning, Proof, UNCOMMISSIONED_FRACTION};
 pub use explain::explanation;
 pub use reference::pages::reference;
 pub use run::{Job, JobOptions, Print, duration};

@@ -37,6 +37,9 @@ pub struct Description {
     pub latency: f64,
     /// What a device that moves does without commands; `None` if it declares nothing. Only a live device needs it.
     pub on_silence: Option<Silence>,
+    /// Whether it moves something real: a run uses a tenth of its limits until somebody has proven, with the command
+    /// that commissions a bench, that it stops by itself.
+    pub needs_commissioning: bool,
     pub(crate) fills: Vec<Filled>,
     pub(crate) outputs: Vec<StatedPort>,
     pub(crate) commands: Vec<StatedPort>,
@@ -70,6 +73,7 @@ impl Description {
             period,
             latency: 0.0,
             on_silence: None,
+            needs_commissioning: false,
             fills: Vec::new(),
             outputs: Vec::new(),
             commands: Vec::new(),
@@ -117,6 +121,20 @@ impl Description {
     pub(crate) fn add_optional_ports(&mut self, fill: usize, role: &RoleType) {
         add_missing(&mut self.reports, fill, role.reports.iter());
         add_missing(&mut self.outputs, fill, role.outputs.iter().filter(|port| !port.need.must_be_wired));
+    }
+
+    /// Multiplies the maximum speed of each joint.
+    pub(crate) fn slow_down(&mut self, fraction: f64) {
+        for port in self.outputs.iter_mut().chain(&mut self.commands) {
+            if let Shape::Joints(shape) = &mut port.shape {
+                shape.joints.iter_mut().for_each(|joint| joint.speed *= fraction);
+            }
+        }
+    }
+
+    /// The outputs of all roles with their shapes, in the order in which they were stated.
+    pub fn outputs(&self) -> impl Iterator<Item = (&str, &Shape)> {
+        self.outputs.iter().map(|port| (&*port.name, &port.shape))
     }
 
     /// Returns the first output of that name and kind.

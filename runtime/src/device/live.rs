@@ -41,6 +41,8 @@ pub struct Link {
     /// Why the run has ended; empty while it runs.
     stop: watch::Receiver<String>,
     finished: Arc<AtomicBool>,
+    /// Whether it must send nothing.
+    mute: Arc<AtomicBool>,
     /// The thread of the tick, which waits for samples.
     tick: Thread,
     epoch: Instant,
@@ -134,6 +136,13 @@ impl Link {
         self.lease.shared().refuses(epoch)
     }
 
+    /// Whether the driver must send nothing to the device, as if this process had died. A driver of a device that moves
+    /// asks before each message: the command that commissions a bench measures how the device stops by itself.
+    #[must_use]
+    pub fn is_mute(&self) -> bool {
+        self.mute.load(Ordering::Acquire)
+    }
+
     /// Returns the time since the tick that computed the newest commands.
     pub fn age(&mut self) -> Duration {
         let now = self.epoch.elapsed().as_nanos() as i64;
@@ -178,6 +187,8 @@ pub(crate) struct Linked {
     commanded: Arc<Notify>,
     stop: watch::Sender<String>,
     finished: Arc<AtomicBool>,
+    /// Whether the driver must send nothing.
+    mute: Arc<AtomicBool>,
     lease: Arc<LeaseState>,
     /// The epoch of the commands.
     epoch: u64,
@@ -218,7 +229,7 @@ pub(crate) fn start(name: &str, driver: Box<dyn Live>, setup: LinkSetup<'_>) -> 
     let lease = Lease::new(commands.clone(), accelerations, cycle.as_nanos() as i64, silence.as_nanos() as i64);
     let shared = lease.shared();
     let (published, commanded) = (Arc::new(AtomicU64::new(0)), Arc::new(Notify::new()));
-    let finished = Arc::new(AtomicBool::new(false));
+    let [finished, mute] = [(); 2].map(|()| Arc::new(AtomicBool::new(false)));
     let link = Link {
         staging: samples.clone(),
         samples: samples_in,
@@ -230,6 +241,7 @@ pub(crate) fn start(name: &str, driver: Box<dyn Live>, setup: LinkSetup<'_>) -> 
         commanded: Arc::clone(&commanded),
         stop: stopping,
         finished: Arc::clone(&finished),
+        mute: Arc::clone(&mute),
         tick: std::thread::current(),
         epoch,
         cycle,
@@ -245,6 +257,7 @@ pub(crate) fn start(name: &str, driver: Box<dyn Live>, setup: LinkSetup<'_>) -> 
         commanded,
         stop,
         finished,
+        mute,
         lease: shared,
         epoch: 1,
         lost: 0,
@@ -316,6 +329,11 @@ impl Linked {
         if self.lease.refuses(self.epoch) {
             self.epoch += 1;
         }
+    }
+
+    /// Keeps the driver from sending anything to the device, or lets it send again.
+    pub(crate) fn mute(&self, is_mute: bool) {
+        self.mute.store(is_mute, Ordering::Release);
     }
 
     /// Asks the driver to end, for a reason.

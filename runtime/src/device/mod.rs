@@ -5,6 +5,7 @@
 //! lockstep. A [`Live`] device is an async driver that fills a latest-value slot, so a slow disk or network makes a
 //! sample old and never a tick late.
 
+mod attached;
 mod clock;
 mod description;
 mod exchange;
@@ -21,6 +22,7 @@ use std::sync::atomic::AtomicBool;
 use crate::node::{Describe, Mistakes, Param, ParamSpec, PortSpec, Reader};
 use crate::source::Value;
 
+pub use attached::Attached;
 pub(crate) use description::StatedPort;
 pub use description::{Command, Description, Fill, Output, Report};
 pub use exchange::{Commands, Samples};

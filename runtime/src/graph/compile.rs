@@ -10,7 +10,7 @@ use crate::graph::check::contact::ContactPorts;
 use crate::graph::check::generators::Generators;
 use crate::graph::compiled::Compiled;
 use crate::graph::load::{Loader, Request};
-use crate::graph::net::Net;
+use crate::graph::net::{Net, slow_down};
 use crate::graph::outline::OutlineBuilder;
 use crate::graph::plan::{Plan, PlannedCommand, PlannedMode, PlannedNode, PortRef};
 use crate::source::{Code, Diagnostics, Report, Severity, SourceMap};
@@ -37,8 +37,10 @@ pub(crate) fn compile_in(mut loader: Loader, catalogue: &Catalogue, request: &Re
     if let Some(bench) = &mut flat.bench {
         bench::add_robots(bench, catalogue, &mut diagnostics);
     }
+    let slow = request.slow.unwrap_or(1.0);
+    slow_down(&mut flat.limits, slow);
     let net = Net::new(&flat, catalogue, &mut diagnostics);
-    let opened = bench::open(&net, &mut sources, &mut diagnostics);
+    let opened = bench::open(&net, slow, &mut sources, &mut diagnostics);
     check_wires(&net, &opened, &mut diagnostics);
     let view = check::view::check(&net, &mut diagnostics);
     let mut frames = check::frames::check(&net, &mut diagnostics);
@@ -95,8 +97,9 @@ pub(crate) fn compile_in(mut loader: Loader, catalogue: &Catalogue, request: &Re
     let period = ((period * 1e9).round() as i64).max(1);
     let (exports, facts, silences) =
         (net.exports_by_name(), opened.facts(&net), check::silence::describe(&net, &opened));
+    let to_commission = bench::to_commission(&net, &opened);
     let plan = Plan { roles, devices: opened.devices, nodes, commands, clock, period, tasks, reach, allowed };
-    Ok(Compiled { plan, view, sources, warnings, outline, exports, facts, silences })
+    Ok(Compiled { plan, view, sources, warnings, outline, exports, facts, silences, to_commission })
 }
 
 /// Checks what needs neither frames nor limits.

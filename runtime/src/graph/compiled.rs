@@ -3,6 +3,7 @@
 use std::collections::BTreeSet;
 
 use crate::device::Driver;
+use crate::graph::bench::CommissionedDevice;
 use crate::graph::outline::Outline;
 use crate::graph::plan::{AllowedWarning, Plan, PlannedNode, PlannedPort, PlannedTask, PlannedView, Producer};
 use crate::source::{Code, Diagnostic, Report, SourceMap};
@@ -19,6 +20,7 @@ pub struct Compiled {
     pub(crate) exports: Vec<(String, String)>,
     pub(crate) facts: Vec<(String, toml::Value)>,
     pub(crate) silences: Vec<String>,
+    pub(crate) to_commission: Vec<CommissionedDevice>,
 }
 
 impl Compiled {
@@ -57,6 +59,12 @@ impl Compiled {
     #[must_use]
     pub fn silences(&self) -> &[String] {
         &self.silences
+    }
+
+    /// Returns the devices that must be commissioned before they use all of their limits, each with the path of the file
+    /// that declares it.
+    pub fn to_commission(&self) -> impl Iterator<Item = (&CommissionedDevice, &str)> {
+        self.to_commission.iter().map(|device| (device, self.sources.file_at(device.at).name.as_str()))
     }
 
     /// Returns the warnings that a section [allow] silences, each with its reason.

@@ -16,6 +16,7 @@ mod outline;
 mod plan;
 mod syntax;
 
+pub use bench::{BenchDevice, CommissionedDevice, OpenBench, open_bench};
 pub use compile::compile;
 pub(crate) use compile::compile_in;
 pub use compiled::Compiled;

@@ -7,6 +7,7 @@ mod lateness;
 pub(super) mod log;
 mod ports;
 mod progress;
+mod slow;
 mod summary;
 mod target;
 mod time;
@@ -27,7 +28,7 @@ use super::text::number::{milliseconds, seconds};
 use super::text::prose::PageStyle;
 use crate::engine::{self, End, Engine, Interrupt, Outcome, RunOptions};
 use crate::fault::Fault;
-use crate::graph::{Compiled, Request, compile};
+use crate::graph::{Compiled, Request};
 use crate::record::PointsRequest;
 use crate::source::Code;
 
@@ -61,6 +62,10 @@ pub(crate) struct RunArgs {
     /// Print neither progress nor summary, only warnings and errors
     #[arg(short, long, conflicts_with = "ports")]
     quiet: bool,
+    /// Use this fraction of the limits of speed and acceleration, such as 0.1; the default is 0.1 on a bench that moves
+    /// a real arm and has not passed `doctor --move`
+    #[arg(long, value_name = "FRACTION", value_parser = slow::fraction)]
+    slow: Option<f64>,
 }
 
 pub(crate) fn run(args: RunArgs, shell: &Shell) -> u8 {
@@ -70,7 +75,8 @@ pub(crate) fn run(args: RunArgs, shell: &Shell) -> u8 {
         (_, true) => Print::Nothing,
         _ => Print::Page,
     };
-    Job { request: args.graph_args.request(args.graph), title, options: args.options, print }.run(shell)
+    let request = Request { slow: args.slow, ..args.graph_args.request(args.graph) };
+    Job { request, title, options: args.options, print }.run(shell)
 }
 
 /// The length, the words and the files of a run.
@@ -130,10 +136,11 @@ impl Job {
         if let Err(message) = self.options.reserve_output(shell) {
             return shell.refuse(message);
         }
-        match compile(shell.catalogue(), &self.request) {
-            Ok(plan) => self.run_plan(plan, shell).unwrap_or_else(|message| shell.refuse(message)),
-            Err(report) => shell.reject(&report),
-        }
+        let plan = match slow::compile(&self.request, shell) {
+            Ok(plan) => plan,
+            Err(code) => return code,
+        };
+        self.run_plan(plan, shell).unwrap_or_else(|message| shell.refuse(message))
     }
 
     /// Runs a plan and returns the exit code.
@@ -177,7 +184,8 @@ impl Job {
         let terminal = Some(shell.err()).filter(|_| self.print != Print::Nothing);
         let mut progress = Progress::new(end, terminal, shell.has_colour_on_stderr());
         let (sends, listens) = (send.clone(), *listen);
-        let options = RunOptions { duration: *duration, is_realtime: *realtime, sends, listens };
+        let options =
+            RunOptions { duration: *duration, is_realtime: *realtime, sends, listens, ..RunOptions::default() };
         let outcome = without_panic_messages(|| {
             engine::run(&mut engine, &options, &mut |engine| {
                 summary.add(engine);

@@ -1,10 +1,15 @@
 //! The bench: opens devices and inserts their facts into parameters.
 
+mod all;
+mod commissioning;
 mod facts;
 mod open;
 mod robots;
 mod sides;
 
+pub use all::{BenchDevice, OpenBench, open_bench};
+pub use commissioning::CommissionedDevice;
+pub(crate) use commissioning::to_commission;
 pub(crate) use facts::fill_facts;
 pub(crate) use open::{BoundRole, OpenedBench, open, place_mistakes};
 pub(crate) use robots::add_robots;

@@ -69,20 +69,11 @@ impl OpenedBench {
     }
 }
 
-/// Opens the devices of all roles.
-pub(crate) fn open(net: &Net<'_>, sources: &mut SourceMap, diagnostics: &mut Diagnostics) -> OpenedBench {
-    let mut opener = Opener {
-        catalogue: net.catalogue,
-        sources,
-        diagnostics,
-        blocks: net.flat.bench.iter().flat_map(|bench| &bench.devices).map(|block| (&*block.key.name, block)).collect(),
-        tried: BTreeMap::new(),
-        taken: BTreeMap::new(),
-        kinds: net.flat.roles.iter().map(|(key, kind)| (key.name.clone(), kind.value.clone())).collect(),
-        unbound: Vec::new(),
-        opened: OpenedBench::default(),
-    };
+/// Opens the devices of all roles. Their joints move at most at `slow` times their speeds.
+pub(crate) fn open(net: &Net<'_>, slow: f64, sources: &mut SourceMap, diagnostics: &mut Diagnostics) -> OpenedBench {
     let bench = net.flat.bench.as_ref();
+    let mut opener = Opener::new(net.catalogue, bench, slow, sources, diagnostics);
+    opener.kinds = net.flat.roles.iter().map(|(key, kind)| (key.name.clone(), kind.value.clone())).collect();
     let is_bound = |role: &&String| bench.is_none_or(|bench| bench.bind.position(role).is_some());
     opener.unbound = opener.kinds.keys().filter(|role| !is_bound(role)).cloned().collect();
     if let Some(bench) = bench {
@@ -111,7 +102,7 @@ pub(crate) fn open(net: &Net<'_>, sources: &mut SourceMap, diagnostics: &mut Dia
 /// Valid sample periods of a device [s]; a period is also counted in whole nanoseconds.
 const PERIOD_RANGE_S: std::ops::RangeInclusive<f64> = 1e-6..=1e3;
 
-struct Opener<'a> {
+pub(super) struct Opener<'a> {
     catalogue: &'a Catalogue,
     sources: &'a mut SourceMap,
     diagnostics: &'a mut Vec<Diagnostic>,
@@ -125,10 +116,35 @@ struct Opener<'a> {
     /// The roles of the task with their types, and those of them that no device is bound to.
     kinds: BTreeMap<String, String>,
     unbound: Vec<String>,
-    opened: OpenedBench,
+    /// Fraction of the speeds of joints that is used.
+    slow: f64,
+    pub(super) opened: OpenedBench,
 }
 
-impl Opener<'_> {
+impl<'a> Opener<'a> {
+    pub(super) fn new(
+        catalogue: &'a Catalogue,
+        bench: Option<&'a BenchDocument>,
+        slow: f64,
+        sources: &'a mut SourceMap,
+        diagnostics: &'a mut Vec<Diagnostic>,
+    ) -> Self {
+        let blocks =
+            bench.into_iter().flat_map(|bench| &bench.devices).map(|block| (&*block.key.name, block)).collect();
+        Self {
+            catalogue,
+            sources,
+            diagnostics,
+            blocks,
+            tried: BTreeMap::new(),
+            taken: BTreeMap::new(),
+            kinds: BTreeMap::new(),
+            unbound: Vec::new(),
+            slow,
+            opened: OpenedBench::default(),
+        }
+    }
+
     /// Checks the bindings that none of the `roles` uses.
     ///
     /// Such a binding may belong to another task, unless it looks like a role that only scenarios read.
@@ -150,7 +166,7 @@ impl Opener<'_> {
 
     /// Checks the types of all devices, and the parameters of those that are not opened because none of the `roles`
     /// uses them.
-    fn check_devices(&mut self, bench: &BenchDocument, roles: &BTreeSet<&str>) {
+    pub(super) fn check_devices(&mut self, bench: &BenchDocument, roles: &BTreeSet<&str>) {
         let bound = bench.bind.iter().filter(|(role, _)| roles.contains(&*role.name));
         let opened: BTreeSet<&str> = bound.map(|(_, binding)| binding.device()).collect();
         for device in &bench.devices {
@@ -325,7 +341,8 @@ impl Opener<'_> {
         keys.filter(|key| !self.kinds.contains_key(&key.name) && !is_observed(key)).collect()
     }
 
-    fn device(&mut self, bench: &BenchDocument, word: &Spanned<String>) -> Option<usize> {
+    /// Opens a device, the first time it is named. Returns its index, or `None` if it has mistakes.
+    pub(super) fn device(&mut self, bench: &BenchDocument, word: &Spanned<String>) -> Option<usize> {
         if let Some(opened) = self.tried.get(&word.value) {
             return *opened;
         }
@@ -359,6 +376,7 @@ impl Opener<'_> {
         if !self.check_ports(&mut description, block) {
             return None;
         }
+        description.slow_down(self.slow);
         let (name, span) = (word.value.clone(), block.key.span.clone());
         self.opened.devices.push(PlannedDevice { name, driver, description, span });
         Some(self.opened.devices.len() - 1)

@@ -125,7 +125,20 @@ impl Loader {
                 return None;
             }
         };
-        let (mut root, place) = self.read(&path, span)?;
+        self.bench_file(&path, span, set)
+    }
+
+    /// Reads a bench file, and the files of its robots.
+    pub(crate) fn load_bench(&mut self, path: &Path) -> Option<BenchDocument> {
+        let mut bench = self.bench_file(path, None, Table::default())?;
+        self.robots(&mut bench);
+        let corrected = bench.correct_names(&self.sources);
+        self.diagnostics.extend(corrected);
+        Some(bench)
+    }
+
+    fn bench_file(&mut self, path: &Path, from: Option<Range<usize>>, set: Table) -> Option<BenchDocument> {
+        let (mut root, place) = self.read(path, from)?;
         if let Some(what) = wrong_file_type(&root, "devices") {
             let message = format!("this is {what}, not a bench");
             self.diagnostics.push(Diagnostic::new(Code::WrongFile, place, message));

@@ -15,6 +15,8 @@ pub struct Request {
     pub bench_text: Option<String>,
     /// Assignments `key=value` that override values of the files.
     pub set: Vec<String>,
+    /// Fraction of the limits of speed and acceleration that is used, of the joints as well; `None` for all of it.
+    pub slow: Option<f64>,
 }
 
 impl Request {
@@ -33,6 +35,12 @@ impl Request {
     pub fn bench(mut self, path: impl Into<PathBuf>) -> Self {
         self.bench = Some(path.into());
         self
+    }
+
+    /// Uses a fraction of the limits of speed and acceleration, from 0 to 1.
+    #[must_use]
+    pub fn slow(self, fraction: f64) -> Self {
+        Self { slow: Some(fraction), ..self }
     }
 
     /// Overrides a value of the files, for example `nodes.pid.gains.x.kp=3`.

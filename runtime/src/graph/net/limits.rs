@@ -158,7 +158,7 @@ fn tighter(name: &str, one: Value, other: Value) -> Value {
 }
 
 /// Returns the finite numbers of a limit in the unit of its name, or `None` if it has others.
-fn numbers(name: &str, value: &Value) -> Option<Vec<f64>> {
+pub(super) fn numbers(name: &str, value: &Value) -> Option<Vec<f64>> {
     match &value.item {
         Item::Integer(number) => Some(vec![*number as f64]),
         Item::Float(number) => number.is_finite().then(|| vec![*number]),

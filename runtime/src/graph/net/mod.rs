@@ -8,6 +8,7 @@ mod order;
 mod provenance;
 mod resolve;
 mod scope_ports;
+mod slow;
 mod sorter;
 mod task_modes;
 mod wire;
@@ -26,6 +27,7 @@ use crate::source::{Code, Diagnostic, Diagnostics, Key, Value};
 
 use provenance::Provenance;
 use scope_ports::ScopePorts;
+pub(crate) use slow::slow_down;
 use task_modes::TaskModes;
 pub(crate) use wire::{CommandWire, Wire, WireOrigin};
 
