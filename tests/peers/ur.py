@@ -19,6 +19,7 @@ import time
 
 DEFAULTS = {
     "rate": 125.0,              # steps per second
+    "rtde_port": 0,             # where it listens; 0 is any free port
     "q": [0.0, -1.7, -2.0, -1.0124, 1.5708, 0.0],
     "protocol": True,           # whether it accepts version 2
     "version": [5, 12, 4, 0],   # of its software
@@ -115,13 +116,13 @@ class Robot:
         self.reverse, self.bytes, self.deadline, self.stops_at = None, b"", None, STOPJ
         self.swallows, self.holds, self.rested, self.is_cut = False, False, True, False
         self.program = None
-        self.rtde, self.script = self.listen(), self.listen()
+        self.rtde, self.script = self.listen(self.s["rtde_port"]), self.listen(0)
         self.say(rtde=self.rtde.getsockname()[1], script=self.script.getsockname()[1])
 
-    def listen(self):
+    def listen(self, port):
         listener = socket.socket()
         listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        listener.bind(("127.0.0.1", 0))
+        listener.bind(("127.0.0.1", port))
         listener.listen(8)
         return listener
 
@@ -355,7 +356,8 @@ class Robot:
         elif command == b"v":
             self.put(client, self.packet(b"v", struct.pack(">4I", *self.s["version"])))
         elif command == b"O":
-            rate, names = struct.unpack(">d", payload[:8])[0], payload[8:].decode().split(",")
+            # Some clients end the list with a comma.
+            rate, names = struct.unpack(">d", payload[:8])[0], payload[8:].decode().rstrip(",").split(",")
             client.outputs = [(name, self.kind(name)) for name in names]
             client.every = max(1, round(self.s["rate"] / rate))
             kinds = ",".join(kind for _, kind in client.outputs)

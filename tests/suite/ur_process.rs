@@ -30,7 +30,7 @@ const REST: f64 = 0.2 + 0.024 + 0.075 + 0.15;
 fn process(peer: &Peer) -> (TempDir, Child) {
     let (folder, graph) = in_new_folder("graph.toml");
     fs::write(&graph, format!("{GRAPH}{}", peer.params(""))).unwrap();
-    let mut command = tool(&["run", &graph, "--listen"]);
+    let mut command = tool(&["run", &graph, "--listen", "--slow", "1"]);
     let child = command.stdin(Stdio::piped()).stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap();
     until(|| peer.motion(0.0).0 > 0.25);
     (folder, child)
@@ -100,7 +100,7 @@ fn a_halt_names_what_the_robot_does() {
     for (word, message) in [
         ("protective_stop", "device `arm` does not follow commands: the robot is in protective stop (safety_mode 3)"),
         ("set safety_mode 7", "the robot is in robot emergency stop (safety_mode 7)"),
-        ("set slider 0.4", "the speed slider is at 40 % and slows every motion: move it to 100 % or more"),
+        ("set slider 0.4", "the speed slider is at 40 % and slows every motion: raise it to 100 %"),
         ("pause", "the program on the robot is paused"),
         ("stop_program", "the program on the robot is stopped"),
     ] {

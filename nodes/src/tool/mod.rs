@@ -18,7 +18,6 @@ pub fn tool(catalogue: Catalogue) -> Tool {
         .command(derived(features::features))
         .command(derived(calibrate::run))
         .command(derived(doctor::run))
-        .command(derived(press::run))
         .command(derived(press::run));
     #[cfg(feature = "drivers")]
     let tool = tool.command(derived(pads::run));

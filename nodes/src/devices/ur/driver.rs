@@ -60,7 +60,6 @@ impl Live for Robot {
                 Ok(stream) => {
                     let end = self.serve(stream, &mut listeners, phase, &mut link).await?;
                     phase = Phase::Refused;
-                    link.count("reconnects");
                     end
                 }
                 Err(Failure::Final(why)) => return Err(self.failure(&why)),
@@ -68,6 +67,7 @@ impl Live for Robot {
                 Err(Failure::Again(why)) => End::Lost(why),
             };
             let End::Lost(why) = end else { return Ok(()) };
+            link.count("reconnects");
             let why = self.failure(&why).0;
             link.refuse(why.clone());
             self.ports.lose(&mut link, &why);
@@ -126,7 +126,7 @@ async fn idle<T>(link: &mut Link, future: impl Future<Output = T>) -> Option<T> 
             () = stopped => return None,
             value = &mut future => return Some(value),
             // Nothing is sent, but the graph must see that the commands come to rest.
-            () = commanded => drop(link.commands()),
+            () = commanded => _ = link.commands(),
         }
     }
 }

@@ -199,6 +199,7 @@ impl Device for Ur {
         let facts = arm::facts(&params.urdf, &params.tip, params.home.as_deref())?;
         let ports = ArmPorts::fill(&mut description, &joints, facts);
         let force = WrenchPorts::fill(&mut description, vec![pad::mount(&Mount::NONE)]);
+        description.needs_commissioning = true;
         description.on_silence(OnSilence::Stops, silence(timeout_ms, params.rate_hz, &joints));
         description.needs_commissioning = true;
         let checks = Checks {

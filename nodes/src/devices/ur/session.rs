@@ -125,7 +125,7 @@ impl<'a> Session<'a> {
                 }
             }
             if self.ends() {
-                self.leave().await;
+                self.leave(link.is_mute()).await;
                 return End::Run;
             }
         }
@@ -187,7 +187,6 @@ impl<'a> Session<'a> {
         if self.reverse.is_some() && is_playing(state) {
             self.phase = Phase::Ready;
             self.sending = None;
-            self.sent = [0.0; JOINTS];
             return None;
         }
         // A program of an earlier run of ours ends by itself. Any other is replaced.
@@ -260,6 +259,9 @@ impl<'a> Session<'a> {
             self.sent = [0.0; JOINTS];
             return;
         };
+        if link.is_mute() {
+            return;
+        }
         let target = if matches!(self.phase, Phase::Starting { .. }) { [0.0; JOINTS] } else { held };
         let velocity = approached(&self.sent, &target, self.robot.acceleration, dt);
         match reverse.send(&message::velocity(self.robot.timeout_ms, &velocity)) {
@@ -307,9 +309,9 @@ impl<'a> Session<'a> {
         self.ending.is_some_and(|since| rests || since.elapsed() > MAX_REST)
     }
 
-    /// Ends the program on the robot.
-    async fn leave(&mut self) {
-        let Some(reverse) = &mut self.reverse else { return };
+    /// Ends the program on the robot, unless nothing may be sent.
+    async fn leave(&mut self, is_mute: bool) {
+        let Some(reverse) = self.reverse.as_mut().filter(|_| !is_mute) else { return };
         let end = Instant::now() + MAX_LEAVE;
         let message = message::end(self.robot.timeout_ms);
         while matches!(reverse.send(&message), Ok(false)) && Instant::now() < end {

@@ -41,7 +41,7 @@ impl Allowed {
         if state.speed_fraction < self.min_speed_fraction - SLIDER_TOLERANCE {
             let [slider, least] = [state.speed_fraction, self.min_speed_fraction].map(|part| 100.0 * part);
             return Some(format!(
-                "the speed slider is at {slider:.0} % and slows every motion: move it to {least:.0} % or more"
+                "the speed slider is at {slider:.0} % and slows every motion: raise it to {least:.0} %"
             ));
         }
         None
@@ -125,7 +125,7 @@ mod tests {
             (7, 99, 1.0, Some("the robot is in an unknown safety mode (safety_mode 99)")),
             (7, 2, 1.0, Some("the robot is in reduced mode: leave it, or write `allow_reduced = true`")),
             (5, 1, 1.0, Some("the robot is not running but idle (robot_mode 5): release its brakes")),
-            (7, 1, 0.5, Some("the speed slider is at 50 % and slows every motion: move it to 100 % or more")),
+            (7, 1, 0.5, Some("the speed slider is at 50 % and slows every motion: raise it to 100 %")),
         ];
         for (robot, safety, slider, why) in cases {
             assert_eq!(allowed.refusal(&state(robot, safety, slider)).as_deref(), why);
