@@ -132,6 +132,11 @@ impl Description {
         }
     }
 
+    /// The outputs of all roles with their shapes, in the order in which they were stated.
+    pub fn outputs(&self) -> impl Iterator<Item = (&str, &Shape)> {
+        self.outputs.iter().map(|port| (&*port.name, &port.shape))
+    }
+
     /// Returns the first output of that name and kind.
     #[must_use]
     pub fn output<T: Signal>(&self, name: &str) -> Option<Output<T>> {

@@ -184,7 +184,8 @@ impl Job {
         let terminal = Some(shell.err()).filter(|_| self.print != Print::Nothing);
         let mut progress = Progress::new(end, terminal, shell.has_colour_on_stderr());
         let (sends, listens) = (send.clone(), *listen);
-        let options = RunOptions { duration: *duration, is_realtime: *realtime, sends, listens };
+        let options =
+            RunOptions { duration: *duration, is_realtime: *realtime, sends, listens, ..RunOptions::default() };
         let outcome = without_panic_messages(|| {
             engine::run(&mut engine, &options, &mut |engine| {
                 summary.add(engine);

@@ -300,6 +300,16 @@ impl Engine {
         Some(device.commands.values.iter().flat_map(|values| values.iter().copied()).collect())
     }
 
+    /// Keeps the driver of a live device from sending anything to it, as if this process had died, or lets it send again;
+    /// see [`Link::is_mute`](crate::device::Link::is_mute).
+    pub fn mute(&self, device: &str, is_mute: bool) {
+        for slot in self.devices.iter().filter(|slot| slot.name == device) {
+            if let DeviceLink::Live(linked) = &slot.link {
+                linked.mute(is_mute);
+            }
+        }
+    }
+
     /// Returns what the graph reports to a device on `role.report`, or `None` while that is absent or not wired.
     #[must_use]
     pub fn report<T: Signal>(&self, name: &str) -> Option<&T> {

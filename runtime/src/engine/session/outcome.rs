@@ -1,6 +1,8 @@
 //! The options of a run and its outcome.
 
 use std::fmt;
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
 use std::time::Duration;
 
 use crate::fault::Fault;
@@ -17,6 +19,8 @@ pub struct RunOptions {
     pub sends: Vec<(f64, String)>,
     /// Whether to read operator words from the standard input, one per line.
     pub listens: bool,
+    /// Ends the run as Ctrl-C does, once somebody sets it.
+    pub cancel: Option<Arc<AtomicBool>>,
 }
 
 /// Why a run ended.

@@ -2,6 +2,8 @@
 
 use std::io;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use super::drive::{Pacer, drive, permanent_halt};
@@ -39,6 +41,7 @@ struct RealTimePacer {
     /// Latest time of a tick [ns].
     until: i64,
     interrupt: Interrupt,
+    cancel: Option<Arc<AtomicBool>>,
     /// Whether the operator knows that a run cannot be suspended.
     has_refused: bool,
     input: OperatorInput,
@@ -59,13 +62,15 @@ impl RealTimePacer {
         let epoch = Instant::now();
         engine.start_drivers(epoch)?;
         let (has_refused, is_silent) = (false, false);
-        Ok(Self { epoch, is_real, is_live, until, interrupt, has_refused, input, is_silent })
+        let cancel = options.cancel.clone();
+        Ok(Self { epoch, is_real, is_live, until, interrupt, cancel, has_refused, input, is_silent })
     }
 }
 
 impl Pacer for RealTimePacer {
     fn is_interrupted(&self) -> bool {
-        self.interrupt.is_requested()
+        let is_cancelled = || self.cancel.as_ref().is_some_and(|cancel| cancel.load(Ordering::Relaxed));
+        self.interrupt.is_requested() || is_cancelled()
     }
 
     fn tick(&mut self, engine: &mut Engine, next: i64) -> Result<bool, Fault> {

@@ -1,0 +1,373 @@
+//! One connection to the robot: its phases, its samples and its velocities.
+
+use std::time::{Duration, Instant};
+
+use tactflow_runtime::device::Link;
+use tactflow_runtime::signal::Twist;
+use tokio::net::TcpStream;
+use tokio::time::{sleep_until, timeout};
+
+use super::checks::{in_order, of_controller};
+use super::driver::Robot;
+use super::geometry;
+use super::message;
+use super::program::{Listeners, Reverse, Sending};
+use super::recipe::{JOINTS, State};
+use super::rtde::Stream;
+use super::status::{is_playing, is_stopped, runtime_name};
+
+/// Longest time for which the first sample waits until the robot can be moved.
+const MAX_FIRST_SAMPLE: Duration = Duration::from_secs(1);
+/// Time for the state of the robot to show why its program has closed the connection.
+const REASON: Duration = Duration::from_millis(50);
+/// Time for the state of the robot to show that its program runs.
+const PROGRAM_SHOWS: Duration = Duration::from_millis(500);
+/// Longest time of a ramp at the end of a run.
+const MAX_REST: Duration = Duration::from_millis(700);
+/// Time for the program on the robot to end.
+const MAX_LEAVE: Duration = Duration::from_millis(200);
+/// Longest time in which the velocity may have changed between two messages [s].
+const MAX_STEP_S: f64 = 0.1;
+
+/// How a session ends.
+#[derive(Debug)]
+pub(super) enum End {
+    /// The run is over.
+    Run,
+    /// The connection is lost, for this reason.
+    Lost(String),
+}
+
+/// What the driver waits for.
+#[derive(Debug, Clone, Copy)]
+pub(super) enum Phase {
+    /// The program on the robot starts.
+    Starting { since: Instant, has_sent: bool },
+    /// The robot follows velocities.
+    Ready,
+    /// The robot must not move, until the operator resumes.
+    Refused,
+}
+
+impl Phase {
+    /// The program is to start now.
+    pub(super) fn start() -> Self {
+        Self::Starting { since: Instant::now(), has_sent: false }
+    }
+}
+
+/// One connection to the robot.
+pub(super) struct Session<'a> {
+    robot: &'a Robot,
+    listeners: &'a Listeners,
+    stream: Stream,
+    /// Our address, as the robot sees it.
+    host: String,
+    reverse: Option<Reverse>,
+    connected: Instant,
+    /// When the program has closed its connection.
+    closed: Option<Instant>,
+    sending: Option<Sending>,
+    phase: Phase,
+    begin: Instant,
+    heard: Instant,
+    publishes: bool,
+    /// The last velocity [rad/s], in the order of the controller, and the time of the robot then [s].
+    sent: [f64; JOINTS],
+    sent_at: f64,
+    counted: u64,
+    ending: Option<Instant>,
+}
+
+impl<'a> Session<'a> {
+    pub(super) fn new(robot: &'a Robot, listeners: &'a Listeners, stream: Stream, host: String, phase: Phase) -> Self {
+        let now = Instant::now();
+        let publishes = !matches!(phase, Phase::Starting { .. });
+        Self {
+            robot,
+            listeners,
+            stream,
+            host,
+            reverse: None,
+            connected: now,
+            closed: None,
+            sending: None,
+            phase,
+            begin: now,
+            heard: now,
+            publishes,
+            sent: [0.0; JOINTS],
+            sent_at: 0.0,
+            counted: 0,
+            ending: None,
+        }
+    }
+
+    /// Publishes samples and sends velocities until the run or the connection ends.
+    pub(super) async fn follow(&mut self, link: &mut Link) -> End {
+        let silence = self.robot.silence;
+        loop {
+            let stopped = link.stopped();
+            tokio::select! {
+                biased;
+                () = stopped, if self.ending.is_none() => self.ending = Some(Instant::now()),
+                ready = self.stream.readable() => {
+                    let cycle = ready.map_err(|error| error.to_string()).and_then(|()| self.cycle(link));
+                    if let Err(why) = cycle {
+                        return End::Lost(why);
+                    }
+                }
+                accepted = self.listeners.accept() => self.accept(link, accepted),
+                () = closed(self.reverse.as_ref()) => self.disconnect(),
+                // It is the last one: after a suspension of this process, the samples that have arrived come first.
+                () = sleep_until((self.heard + silence).into()) => {
+                    return End::Lost(format!("no sample for {silence:?}"));
+                }
+            }
+            if self.ends() {
+                self.leave(link.is_mute()).await;
+                return End::Run;
+            }
+        }
+    }
+
+    /// Reads what has arrived: publishes the newest state, and sends one velocity.
+    fn cycle(&mut self, link: &mut Link) -> Result<(), String> {
+        let (mut newest, mut illegal, allowed) = (None, None, self.robot.allowed);
+        let received = self.stream.receive(|state| {
+            if illegal.is_none() {
+                illegal = allowed.refusal(&state);
+            }
+            newest = Some(state);
+        });
+        if self.stream.bad_packets > self.counted {
+            self.counted = self.stream.bad_packets;
+            link.count("bad packets");
+        }
+        if let Some(state) = newest {
+            self.heard = Instant::now();
+            self.advance(link, &state, illegal);
+            self.publish(link, &state);
+            self.command(link, &state);
+        }
+        received
+    }
+
+    /// Goes on to the next phase.
+    fn advance(&mut self, link: &mut Link, state: &State, illegal: Option<String>) {
+        if matches!(self.phase, Phase::Refused) && !link.refuses() {
+            // The operator resumes.
+            self.phase = Phase::start();
+        }
+        let why = match self.phase {
+            Phase::Starting { since, has_sent } => illegal.or_else(|| self.start(state, since, has_sent)),
+            Phase::Ready => illegal.or_else(|| self.trouble(state)),
+            Phase::Refused => None,
+        };
+        if let Some(why) = why {
+            self.phase = Phase::Refused;
+            self.publishes = true;
+            link.refuse(why);
+        }
+        // A program that is paused would read old messages when it goes on.
+        let has_shown = matches!(self.phase, Phase::Ready) || self.connected.elapsed() > PROGRAM_SHOWS;
+        if !is_playing(state) && has_shown {
+            self.abort();
+        }
+    }
+
+    /// Brings the program on the robot to run. Returns why it does not.
+    fn start(&mut self, state: &State, since: Instant, has_sent: bool) -> Option<String> {
+        if let Err(why) = self.robot.checks.check(state) {
+            return Some(why);
+        }
+        if let Some(why) = self.sending.as_mut().and_then(Sending::failure) {
+            return Some(why);
+        }
+        if self.reverse.is_some() && is_playing(state) {
+            self.phase = Phase::Ready;
+            self.sending = None;
+            return None;
+        }
+        // A program of an earlier run of ours ends by itself. Any other is replaced.
+        let is_free = is_stopped(state) || is_playing(state) && since.elapsed() > PROGRAM_SHOWS;
+        if self.robot.sends_program && !has_sent && self.reverse.is_none() && is_free {
+            if is_playing(state) {
+                tracing::warn!("a program runs on the robot: it is replaced");
+            }
+            let ports = self.robot.script_ports(&self.host, self.listeners);
+            return match self.robot.script.program(&ports, self.stream.version) {
+                Ok(program) => {
+                    self.sending = Some(Sending::begin(self.robot.script_address.clone(), program));
+                    self.phase = Phase::Starting { since, has_sent: true };
+                    None
+                }
+                Err(why) => Some(why),
+            };
+        }
+        (since.elapsed() > self.robot.start).then(|| self.why_not_started(state, has_sent))
+    }
+
+    fn why_not_started(&self, state: &State, has_sent: bool) -> String {
+        let ([port, ..], host) = (self.listeners.ports(), &self.host);
+        let (runtime, start) = (runtime_name(state), self.robot.start);
+        if self.reverse.is_some() || !has_sent && self.robot.sends_program {
+            return format!("the program on the robot is {runtime}: stop it, then resume");
+        }
+        if self.robot.sends_program {
+            return format!(
+                "the robot has not connected to {host}, port {port}, within {start:?}: switch it to remote control, and \
+                 check `host` and the firewall"
+            );
+        }
+        format!(
+            "no program on the robot has connected to {host}, port {port}: press play on the pendant, and resume when the \
+             program runs"
+        )
+    }
+
+    /// Returns why a robot that was ready is not any more.
+    fn trouble(&mut self, state: &State) -> Option<String> {
+        if !is_playing(state) {
+            return Some(format!("the program on the robot is {}", runtime_name(state)));
+        }
+        let closed = self.closed.filter(|at| at.elapsed() >= REASON);
+        closed.map(|_| "the program on the robot has ended".to_owned())
+    }
+
+    fn publish(&mut self, link: &mut Link, state: &State) {
+        let is_ready = matches!(self.phase, Phase::Ready);
+        self.publishes |= is_ready || self.begin.elapsed() > MAX_FIRST_SAMPLE;
+        if !self.publishes {
+            return;
+        }
+        let stamp = link.stamp_of((state.time * 1e9).round() as i64);
+        let sequence = (state.time * self.robot.rate_hz).round() as u64;
+        self.robot.write(link, state, stamp, sequence, is_ready);
+    }
+
+    /// Sends the velocity that holds now.
+    fn command(&mut self, link: &mut Link, state: &State) {
+        // The lease must be asked in every cycle, also when nothing is connected.
+        let held = of_controller(&self.robot.checks.order, link.commands().joints(self.robot.ports.velocity));
+        let dt = (state.time - self.sent_at).clamp(1.0 / self.robot.rate_hz, MAX_STEP_S);
+        self.sent_at = state.time;
+        if link.is_mute() {
+            return;
+        }
+        let Some(reverse) = &mut self.reverse else {
+            self.sent = [0.0; JOINTS];
+            return;
+        };
+        if link.is_mute() {
+            return;
+        }
+        let target = if matches!(self.phase, Phase::Starting { .. }) { [0.0; JOINTS] } else { held };
+        let velocity = approached(&self.sent, &target, self.robot.acceleration, dt);
+        match reverse.send(&message::velocity(self.robot.timeout_ms, &velocity)) {
+            Ok(true) => self.sent = velocity,
+            Ok(false) => link.count("messages that the robot did not take"),
+            Err(_) => self.disconnect(),
+        }
+    }
+
+    fn accept(&mut self, link: &mut Link, accepted: std::io::Result<TcpStream>) {
+        // With the maker's or our own program that we send, a connection is expected only then.
+        let is_expected = match self.phase {
+            Phase::Starting { has_sent, .. } => has_sent || !self.robot.sends_program,
+            Phase::Refused => !self.robot.sends_program,
+            Phase::Ready => false,
+        };
+        if !is_expected || self.reverse.is_some() || self.ending.is_some() {
+            link.count("connections that were not expected");
+            return;
+        }
+        if let Ok(reverse) = accepted.and_then(Reverse::new) {
+            self.reverse = Some(reverse);
+            self.connected = Instant::now();
+            self.closed = None;
+        }
+    }
+
+    fn disconnect(&mut self) {
+        self.reverse = None;
+        self.sent = [0.0; JOINTS];
+        self.closed = Some(Instant::now());
+    }
+
+    /// Closes the connection of the program, so that it ends.
+    pub(super) fn abort(&mut self) {
+        if let Some(reverse) = self.reverse.take() {
+            reverse.abort();
+            self.disconnect();
+        }
+    }
+
+    /// Whether the run is over and the robot rests.
+    fn ends(&self) -> bool {
+        let rests = self.reverse.is_none() || self.sent == [0.0; JOINTS];
+        self.ending.is_some_and(|since| rests || since.elapsed() > MAX_REST)
+    }
+
+    /// Ends the program on the robot, unless nothing may be sent.
+    async fn leave(&mut self, is_mute: bool) {
+        let Some(reverse) = self.reverse.as_mut().filter(|_| !is_mute) else { return };
+        let end = Instant::now() + MAX_LEAVE;
+        let message = message::end(self.robot.timeout_ms);
+        while matches!(reverse.send(&message), Ok(false)) && Instant::now() < end {
+            tokio::time::sleep(Duration::from_millis(2)).await;
+        }
+        let _ = timeout(end.saturating_duration_since(Instant::now()), reverse.closed()).await;
+    }
+}
+
+/// Waits until the program closes its connection; for ever if there is none.
+async fn closed(reverse: Option<&Reverse>) {
+    match reverse {
+        Some(reverse) => reverse.closed().await,
+        None => std::future::pending().await,
+    }
+}
+
+/// Returns the next velocity on the way from the last one to a target [rad/s].
+///
+/// The commands themselves are within the acceleration of the joints. This one matters when the robot joins in while the
+/// graph already moves. A target of zero holds at once: the lease commands it without a ramp only to a robot that has
+/// stopped by itself.
+fn approached(last: &[f64; JOINTS], target: &[f64; JOINTS], acceleration: f64, dt: f64) -> [f64; JOINTS] {
+    let step = 2.0 * acceleration * dt;
+    std::array::from_fn(|i| match target[i] {
+        0.0 => 0.0,
+        target => last[i] + (target - last[i]).clamp(-step, step),
+    })
+}
+
+impl Robot {
+    /// Publishes a state, with the joints in the order of the model.
+    fn write(&self, link: &mut Link, state: &State, stamp: i64, sequence: u64, follows: bool) {
+        let [position, equilibrium] = [&state.q, &state.target_q].map(|q| in_order(&self.checks.order, q));
+        let tip = self.chain.forward(&position, &mut [Twist::default(); JOINTS]).0;
+        let wrench = state.tcp_force.map(|force| geometry::wrench_at(&tip, &self.checks.base, state.tcp_pose, force));
+        link.publish(|samples| {
+            self.ports.write_with_safety(samples, stamp, sequence, [&position, &equilibrium], follows);
+            if let Some(wrench) = wrench {
+                self.force.write(samples, stamp, sequence, &wrench);
+            }
+        });
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_velocity_joins_in_without_a_jump_and_stops_at_once() {
+        let target = [1.0, -1.0, 0.01, 0.0, 0.0, 0.0];
+        let first = approached(&[0.0; JOINTS], &target, 10.0, 0.002);
+        assert_eq!(first, [0.04, -0.04, 0.01, 0.0, 0.0, 0.0]);
+        let many = (0..100).fold([0.0; JOINTS], |last, _| approached(&last, &target, 10.0, 0.002));
+        assert_eq!(many, target);
+        assert_eq!(approached(&many, &[0.0; JOINTS], 10.0, 0.002), [0.0; JOINTS]);
+    }
+}
