@@ -14,9 +14,10 @@ use std::time::{Duration, Instant};
 
 use serde_json::Value;
 use tactflow_nodes::devices::lwr_fri::LwrFri;
+use tactflow_runtime::graph::{Request, compile};
 use tactflow_runtime::harness::LinkRig;
 use tactflow_runtime::signal::{Features, Flag, Joints, Scalar};
-use tactflow_tests::workspace;
+use tactflow_tests::{catalogue, workspace};
 
 /// A limit for what takes a moment on a machine that is not busy.
 const SOON: Duration = Duration::from_secs(20);
@@ -350,4 +351,51 @@ fn a_controller_that_is_silent_is_lost_and_found_again() {
         assert!(rig.lost("safety").unwrap().contains("has sent nothing for 100 ms"), "{:?}", rig.lost("safety"));
     }
     rig.stop().unwrap();
+}
+
+/// A task that presses with 5 N, as far as its features go.
+const PRESS: &str = "
+[graph]
+clock = 'force'
+[roles]
+force = 'force_sensor'
+[nodes.calm]
+type = 'low_pass'
+in.value = 'force.tx'
+time_constant_ms = 20
+[nodes.error]
+type = 'feature_error'
+in.fz = 'force.fz'
+in.tx = 'calm.value'
+setpoint = { fz = '-5 N', tx = '200 mN m' }
+[nodes.pid]
+type = 'pid'
+in.error = 'error.error'
+gains.fz = { kp = 1.0 }
+gains.tx = { kp = 1.0 }
+[nodes.jacobian]
+type = 'inverse_jacobian'
+in.control = 'pid.control'
+columns.fz = [0, 0, '-1 mm/N', 0, 0, 0]
+columns.tx = [0, 0, 0, '0.1 rad/N/m', 0, 0]
+[bind]
+force = 'arm'
+[devices.arm]
+type = 'lwr_fri'
+robot = 'builtin:lwr4p.toml'
+";
+
+#[test]
+fn the_nodes_of_touch_work_on_forces_and_torques() {
+    let load = |text: &str| compile(&catalogue(), &Request::text(text));
+    load(PRESS).unwrap_or_else(|report| panic!("{}", report.render(false)));
+    for (right, wrong, part) in [
+        ("'200 mN m'", "'200 mN'", "[N m]"),
+        ("'0.1 rad/N/m'", "'0.1 rad/N'", "[rad/N/m]"),
+        ("in.fz = 'force.fz'", "in.fz = 'force.wrench'", "wrench"),
+    ] {
+        let report = load(&PRESS.replace(right, wrong)).err().unwrap_or_else(|| panic!("{wrong} loads"));
+        let text = report.render(false);
+        assert!(text.contains(part), "{text}");
+    }
 }
