@@ -53,7 +53,7 @@ class Controller:
         self.stranger = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self.target = ("127.0.0.1", args.port)
         # Its own program is where an offset takes the arm home: only the sum of both fields is the posture.
-        self.krl, self.measured, self.total = [f32(q + 0.01) for q in args.home], args.home[:], args.home[:]
+        self.krl, self.measured, self.total = [f32(q + 0.01) for q in args.home], [q + args.sag for q in args.home], args.home[:]
         self.last_step, self.missed, self.state, self.power, self.error = [0.0] * 7, 0, MONITOR, 0x7F, 0
         self.control, self.forced, self.sequence, self.time = args.control, None, 0, 0.0
         self.begin = time.monotonic()
@@ -184,7 +184,7 @@ class Controller:
         self.last_step = [a - b for a, b in zip(self.total, before)] if self.takes() else [0.0] * 7
         self.fresh = None
         share = 1.0 - math.exp(-self.dt / self.args.lag_s) if self.args.lag_s else 1.0
-        self.measured = [m + share * (t - m) for m, t in zip(self.measured, self.total)]
+        self.measured = [m + share * (t + self.args.sag - m) for m, t in zip(self.measured, self.total)]
         self.largest_lead = max(self.largest_lead, *(abs(t - m) for t, m in zip(self.total, self.measured)))
 
     def enter(self, state):
@@ -321,6 +321,7 @@ def main():
     parser.add_argument("--seconds", type=float, default=5.0)
     parser.add_argument("--silence-ms", type=float, default=150.0)
     parser.add_argument("--lag-s", type=float, default=0.0, help="time constant of the arm; 0 if it follows at once")
+    parser.add_argument("--sag", type=float, default=0.003, help="of each joint below its command [rad]")
     parser.add_argument("--control", type=int, default=3)
     parser.add_argument("--start-s", type=float, default=0.1)
     parser.add_argument("--restart-s", type=float, help="time after which the program starts again after a drop")
