@@ -59,6 +59,8 @@ mod robots;
 mod signals;
 mod sim;
 mod situations;
+#[cfg(target_os = "linux")]
+mod stream;
 mod svg;
 mod task_crossings;
 mod task_drivers;

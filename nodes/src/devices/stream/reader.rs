@@ -91,7 +91,9 @@ impl Reader {
     /// Forgets what has arrived, as after a new connection.
     pub(super) fn forget(&mut self) {
         self.framer.forget();
-        self.parts.iter_mut().for_each(|parts| drop(parts.forget()));
+        if let Some(parts) = &mut self.parts {
+            parts.forget();
+        }
         self.counter.iter_mut().for_each(Counter::forget);
         self.has_last = false;
         self.current.clear();
