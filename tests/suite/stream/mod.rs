@@ -352,3 +352,54 @@ fn the_pads_that_ship_are_listed() {
     assert_eq!(json[0]["sensor"], "builtin:pads/myrmex_v2.toml");
     assert_eq!(say(&["pads", "nothing"]).code, 2);
 }
+
+#[test]
+fn what_a_pad_sends_is_guessed_and_the_description_loads() {
+    // What the data sheets say: the length and the mark of a frame, its checksum, and the number of its cells.
+    let cases = [
+        ("flexitac_16x32", &["mark = \"hex:AA55\"", "length = 514", "cell = \"u8\"", "shape = [16, 32]"][..]),
+        ("aa550399_32x32", &["mark = \"hex:AA550399\"", "length = 1028", "shape = [32, 32]"]),
+        ("anyskin", &["frame = \"trailer\"", "mark = \"hex:0D0A\"", "length = 82"]),
+        ("velostat_ascii", &["frame = \"lines\"", "cell = \"dec\"", "shape = [16, 16]"]),
+        ("myrmex_v2", &["mark = \"hex:F0C401\"", "length = 520", "check = \"xor8\"", "cell = \"u16le\"", "offset = 7"]),
+    ];
+    let folder = tempfile::tempdir().unwrap();
+    let mut pads: Vec<(Fake, std::process::Child)> = Vec::new();
+    for (pad, _) in cases {
+        let mut fake = Fake::start(pad, "pty");
+        fake.does("go");
+        let mut args = vec!["sniff", &fake.link, "--baud", "115200", "--for", "2s", "-o"];
+        let file = folder.path().join(pad).display().to_string();
+        args.push(&file);
+        args.extend((pad == "myrmex_v2").then_some("--send=hex:F0C400F1C5"));
+        let mut command = crate::tool::tool(&args);
+        let child = command.stdout(std::process::Stdio::piped()).spawn().unwrap();
+        pads.push((fake, child));
+    }
+    for ((pad, keys), (fake, child)) in cases.into_iter().zip(pads) {
+        let output = child.wait_with_output().unwrap();
+        let out = String::from_utf8_lossy(&output.stdout);
+        assert!(output.status.success(), "{pad}: {out}");
+        let file = folder.path().join(pad);
+        let text = std::fs::read_to_string(&file).unwrap();
+        for key in keys {
+            assert!(text.contains(&format!("{key}\n")) || text.contains(&format!("{key}  #")), "{pad}: {key}\n{text}");
+        }
+        assert_eq!(report(&format!("sensor = {file:?}\nlink = \"serial:/dev/null\"\n")), "", "{pad}");
+        drop(fake);
+    }
+}
+
+#[test]
+fn a_link_without_frames_is_no_guess() {
+    let mut fake = Fake::start("flexitac_16x16", "tcp");
+    let child =
+        crate::tool::tool(&["sniff", &fake.link, "--for", "300ms"]).stderr(std::process::Stdio::piped()).spawn();
+    fake.does("flood 2000");
+    let output = child.unwrap().wait_with_output().unwrap();
+    assert_eq!(output.status.code(), Some(1));
+    assert!(String::from_utf8_lossy(&output.stderr).contains("no frames were found"));
+    let said = say(&["sniff", "/dev/ttyUSB0"]);
+    assert_eq!(said.code, 2);
+    assert!(said.err.contains("does not begin with a kind of link"), "{}", said.err);
+}

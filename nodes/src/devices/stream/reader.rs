@@ -83,6 +83,11 @@ impl Reader {
         self.framer.ask();
     }
 
+    /// Whether a frame was asked for and has not come.
+    pub(super) const fn is_waiting(&self) -> bool {
+        self.framer.is_waiting()
+    }
+
     /// Whether the mark stands at several places of every frame.
     pub(super) const fn is_ambiguous(&self) -> bool {
         self.framer.is_ambiguous()
