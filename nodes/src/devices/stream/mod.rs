@@ -15,8 +15,12 @@ use tactflow_runtime::signal::{Image, ImageShape};
 
 use super::{Facts, arm, pad};
 use driver::PadDriver;
+#[cfg(feature = "cli")]
+pub(crate) use framing::check::{has_checksum, names as checksums, size_of as checksum_size};
 use plan::Plan;
 pub use plan::params::Params;
+#[cfg(feature = "cli")]
+pub(crate) use plan::text::bytes_of;
 
 /// A tactile pad that is described in TOML: its link, its frames and its cells.
 ///
