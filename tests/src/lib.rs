@@ -1,5 +1,7 @@
 //! What the tests share: where things are, and small nodes that make one sentence of the semantics visible.
 
+#[cfg(unix)]
+pub mod cell;
 pub mod devices;
 pub mod examples;
 pub mod large;

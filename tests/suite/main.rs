@@ -2,10 +2,14 @@
 #![allow(clippy::unwrap_used, reason = "clippy knows a test by its attribute, and this crate is nothing but tests")]
 
 mod absence;
+#[cfg(unix)]
+mod agni;
 mod answers;
 mod bad_data;
 mod blind;
 mod calibrate;
+#[cfg(unix)]
+mod cell;
 mod cli;
 mod clocks;
 

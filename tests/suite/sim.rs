@@ -13,7 +13,7 @@ fn hybrid() -> Request {
 }
 
 /// Runs for some time; what `column` says in each tick, NaN where it is absent.
-fn course(request: &Request, seconds: f64, names: &[&str]) -> Vec<Vec<f64>> {
+pub(crate) fn course(request: &Request, seconds: f64, names: &[&str]) -> Vec<Vec<f64>> {
     let plan = compile(&catalogue(), request).unwrap_or_else(|report| panic!("{}", report.render(false)));
     let mut engine = Engine::new(plan);
     let columns = tactflow_runtime::record::PortColumns::new(engine.ports());

@@ -2,7 +2,11 @@
 
 use std::borrow::Cow;
 
+#[cfg(feature = "drivers")]
+pub mod agni;
 pub(crate) mod arm;
+#[cfg(feature = "drivers")]
+pub(crate) mod link;
 pub mod lockstep;
 #[cfg(feature = "drivers")]
 pub mod lwr_fri;

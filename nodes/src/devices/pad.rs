@@ -16,7 +16,7 @@ pub(crate) fn fill(description: &mut Description, shape: ImageShape, facts: Fact
 /// Adds the role `tactile_pad` on one side of a device to a description. Returns the handle of its image.
 pub(crate) fn fill_on(
     description: &mut Description,
-    side: &'static str,
+    side: impl Into<Cow<'static, str>>,
     shape: ImageShape,
     facts: Facts,
 ) -> Output<Image> {

@@ -4,6 +4,8 @@ mod arguments;
 mod calibrate;
 mod doctor;
 mod features;
+#[cfg(feature = "drivers")]
+mod pads;
 mod press;
 
 use tactflow_runtime::catalogue::Catalogue;
@@ -12,9 +14,12 @@ use tactflow_runtime::cli::{Tool, derived};
 /// Returns the tool with all commands, for a catalogue that includes that of this crate.
 #[must_use]
 pub fn tool(catalogue: Catalogue) -> Tool {
-    Tool::new(catalogue)
+    let tool = Tool::new(catalogue)
         .command(derived(features::features))
         .command(derived(calibrate::run))
-        .command(derived(press::run))
         .command(derived(doctor::run))
+        .command(derived(press::run));
+    #[cfg(feature = "drivers")]
+    let tool = tool.command(derived(pads::run));
+    tool
 }

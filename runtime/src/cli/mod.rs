@@ -45,7 +45,7 @@ pub use commissioning::{Commissioning, Proof, UNCOMMISSIONED_FRACTION};
 pub use explain::explanation;
 pub use reference::pages::reference;
 pub use run::{Job, JobOptions, Print, duration};
-pub use shell::command::{Subcommand, derived};
+pub use shell::command::{OutputFormat, Subcommand, derived};
 pub use shell::{FAULTED, NOT_LOADED, Shell};
 pub use text::svg;
 

@@ -87,9 +87,14 @@ impl Samples {
 
     /// Counts something for the summary of the run, as a plural noun: `"bad frames"`.
     pub fn count(&mut self, what: &'static str) {
+        self.count_by(what, 1);
+    }
+
+    /// Counts something several times; see [`count`](Self::count).
+    pub fn count_by(&mut self, what: &'static str, times: u64) {
         match self.counts.iter_mut().find(|(known, _)| *known == what) {
-            Some((_, count)) => *count += 1,
-            None => self.counts.push((what, 1)),
+            Some((_, count)) => *count += times,
+            None => self.counts.push((what, times)),
         }
     }
 

@@ -102,6 +102,14 @@ impl Link {
         self.hand_over(|samples| samples.count(what));
     }
 
+    /// Counts several things at once, each as often as its number says; see [`count`](Self::count).
+    pub fn count_each(&mut self, counts: &[(&'static str, u64)]) {
+        let mut counts = counts.iter().filter(|(_, times)| *times > 0).peekable();
+        if counts.peek().is_some() {
+            self.hand_over(|samples| counts.for_each(|(what, times)| samples.count_by(what, *times)));
+        }
+    }
+
     fn hand_over(&mut self, write: impl FnOnce(&mut Samples)) {
         write(&mut self.staging);
         self.samples.input_buffer_mut().copy_from(&self.staging);

@@ -35,7 +35,7 @@ pub(crate) fn compile_in(mut loader: Loader, catalogue: &Catalogue, request: &Re
         return Err(Report::new(sources, split(diagnostics).0));
     }
     if let Some(bench) = &mut flat.bench {
-        bench::add_robots(bench, catalogue, &mut diagnostics);
+        bench::add_models(bench, catalogue, &mut diagnostics);
     }
     let slow = request.slow.unwrap_or(1.0);
     slow_down(&mut flat.limits, slow);

@@ -324,6 +324,9 @@ impl Fri {
 
     /// Sends the posture that holds now.
     fn answer(&mut self, reflected: u16, to: SocketAddr, socket: &UdpSocket, link: &mut Link) {
+        if link.is_mute() {
+            return;
+        }
         let Some(bytes) = self.next_answer(reflected, true) else { return };
         if socket.try_send_to(&bytes, to).is_err() {
             link.count("unsent answers");

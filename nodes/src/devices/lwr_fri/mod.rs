@@ -161,6 +161,7 @@ impl Device for LwrFri {
         let target = Target::new(Bounds::new(&joints, params.max_step.unwrap_or(f64::INFINITY)));
         let mut description = Description::every(params.sample_ms * 1e-3);
         description.on_silence(OnSilence::Stops, params.silence_ms * 1e-3);
+        description.needs_commissioning = true;
         let facts = arm::facts(&params.urdf, &params.tip, params.home.as_deref())?;
         let shape = JointsShape { joints, unit: Unit::RADIAN };
         let ports = ArmPorts::fill(&mut description, &shape, facts);

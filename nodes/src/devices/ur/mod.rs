@@ -201,6 +201,7 @@ impl Device for Ur {
         let force = WrenchPorts::fill(&mut description, vec![pad::mount(&Mount::NONE)]);
         description.needs_commissioning = true;
         description.on_silence(OnSilence::Stops, silence(timeout_ms, params.rate_hz, &joints));
+        description.needs_commissioning = true;
         let checks = Checks {
             start: StartCheck::new(to_flange, params.start.clone()),
             order,

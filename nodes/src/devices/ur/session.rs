@@ -255,6 +255,9 @@ impl<'a> Session<'a> {
         let held = of_controller(&self.robot.checks.order, link.commands().joints(self.robot.ports.velocity));
         let dt = (state.time - self.sent_at).clamp(1.0 / self.robot.rate_hz, MAX_STEP_S);
         self.sent_at = state.time;
+        if link.is_mute() {
+            return;
+        }
         let Some(reverse) = &mut self.reverse else {
             self.sent = [0.0; JOINTS];
             return;

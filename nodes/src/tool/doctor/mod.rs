@@ -48,6 +48,9 @@ pub(super) struct DoctorArgs {
     moves: bool,
 }
 
+/// Time that a controller needs for a new session, after it has noticed the end of the last one.
+const NEW_SESSION: Duration = Duration::from_millis(500);
+
 /// What the doctor found, in the order of its severity.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 enum Severity {
@@ -134,7 +137,11 @@ fn prove(
         let (Some(role), Some(silence)) = (role, silence) else { continue };
         let arm = Arm { role, device, within: silence.within };
         let findings = match stop::is_allowed(shell, &arm) {
-            true => stop::prove(shell, bench, &arm),
+            true => {
+                // The controller notices first that the session of the examination is over.
+                thread::sleep(Duration::from_secs_f64(arm.within) + NEW_SESSION);
+                stop::prove(shell, bench, &arm)
+            }
             false => vec![Finding::warning("not moved")],
         };
         worst = worst.max(print(shell, &format!("{role}: the stop"), &findings));

@@ -96,7 +96,12 @@ impl Patient {
         }
         for port in &self.ports {
             findings.extend(port.lost.iter().map(|why| Finding::problem(format!("{} was lost: {why}", port.name))));
-            findings.extend(port.describe());
+            // Another posture of the same joints has the same names and ranges.
+            let is_first =
+                self.ports.iter().find(|other| other.kind == port.kind).is_some_and(|first| first.name == port.name);
+            if is_first || port.kind != Kind::Joints {
+                findings.extend(port.describe());
+            }
         }
         findings.extend(self.attached.counts().iter().map(|(what, count)| Finding::fine(format!("{count} {what}"))));
         if let Some(silence) = &description.on_silence {

@@ -160,6 +160,7 @@ impl Track {
 
 /// Returns a task that moves the tip of a bare arm backwards.
 fn task(role: &str) -> String {
+    let patience = PATIENCE_S * 1e3;
     format!(
         "[graph]
 clock = \"{role}\"
@@ -184,11 +185,11 @@ in.equilibrium = \"{role}.equilibrium\"
 
 [modes.wait]
 go = {{ to = \"back\", when = \"{role}.safety\", for_ms = 200 }}
-fail = {{ after_s = {PATIENCE_S} }}
+fail = {{ after_ms = {patience} }}
 
 [modes.back]
 set.guide.twist = [0, 0, -{SPEED}, 0, 0, 0]
-done = {{ after_s = {PATIENCE_S} }}
+done = {{ after_ms = {patience} }}
 
 [limits]
 linear_m_per_s = {SPEED}

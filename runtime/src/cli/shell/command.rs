@@ -76,7 +76,9 @@ impl GraphArgs {
 
 /// Output for a person or for a program.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub(crate) enum OutputFormat {
+pub enum OutputFormat {
+    /// For a person.
     Text,
+    /// For a program.
     Json,
 }

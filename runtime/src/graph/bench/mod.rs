@@ -3,13 +3,13 @@
 mod all;
 mod commissioning;
 mod facts;
+mod models;
 mod open;
-mod robots;
 mod sides;
 
 pub use all::{BenchDevice, OpenBench, open_bench};
 pub use commissioning::CommissionedDevice;
 pub(crate) use commissioning::to_commission;
 pub(crate) use facts::fill_facts;
+pub(crate) use models::add_models;
 pub(crate) use open::{BoundRole, OpenedBench, open, place_mistakes};
-pub(crate) use robots::add_robots;

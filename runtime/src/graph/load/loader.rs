@@ -7,7 +7,7 @@ use super::flat::{FlatGraph, Scope};
 use super::measured::MeasuredValues;
 use super::request::Request;
 use super::task::Task;
-use crate::graph::syntax::{ALLOW_UNCALIBRATED, BenchDocument, GraphDocument, LIMITS, ROBOT, Sections};
+use crate::graph::syntax::{ALLOW_UNCALIBRATED, BenchDocument, GraphDocument, LIMITS, ROBOT, SENSOR, Sections};
 use crate::source::{
     BuiltinFile, Code, Diagnostic, Diagnostics, Item, Key, SourceMap, Table, Value, parse_table, suggest_name,
 };
@@ -59,7 +59,7 @@ impl Loader {
         let settings = root.0.get("graph").cloned();
         let task = Task { place: root.1, settings, ends_run: true, ..Task::default() };
         flat.bench = self.bench(request, (&document, &task), &root.0, bench_set);
-        flat.bench.iter_mut().for_each(|bench| self.robots(bench));
+        flat.bench.iter_mut().for_each(|bench| self.models(bench));
         let bench = flat.bench.as_mut();
         self.diagnostics.extend(bench.into_iter().flat_map(|bench| bench.correct_names(&self.sources)));
         let binds = flat.bench.as_ref().map(|bench| bench.bind.clone()).unwrap_or_default();
@@ -148,18 +148,19 @@ impl Loader {
         Some(self.sections(|sections| sections.bench(&mut root)))
     }
 
-    /// Reads the files of the robots that the devices of a bench drive.
-    fn robots(&mut self, bench: &mut BenchDocument) {
-        for (device, file) in &bench.robot_files {
-            let Some((mut root, _)) = self.read(&file.path, Some(file.span.clone())) else { continue };
-            if let Some(what) = wrong_file_type(&root, ROBOT) {
-                let message = format!("this is {what}, not a robot");
-                self.diagnostics.push(Diagnostic::new(Code::WrongFile, file.span.clone(), message));
+    /// Reads the files of the robots and the sensors of the devices of a bench.
+    fn models(&mut self, bench: &mut BenchDocument) {
+        for from in &bench.model_files {
+            let place = from.file.span.clone();
+            let Some((mut root, _)) = self.read(&from.file.path, Some(place.clone())) else { continue };
+            if let Some(other) = wrong_file_type(&root, from.what) {
+                let message = format!("this is {other}, not a {}", from.what);
+                self.diagnostics.push(Diagnostic::new(Code::WrongFile, place, message));
                 continue;
             }
-            let robot = self.sections(|sections| sections.robot(&mut root, device));
-            bench.limits.extend(robot.limits.iter().cloned());
-            bench.robots.push((device.clone(), robot));
+            let model = self.sections(|sections| sections.model(&mut root, from));
+            bench.limits.extend(model.limits.iter().cloned());
+            bench.models.push((from.clone(), model));
         }
     }
 
@@ -272,6 +273,7 @@ pub(crate) fn wrong_file_type(root: &Table, expected: &str) -> Option<&'static s
         ("devices", "a bench"),
         ("exports", "a part"),
         (ROBOT, "a robot"),
+        (SENSOR, "a sensor"),
     ];
     types.iter().find(|(section, _)| root.get(section).is_some()).map(|(_, what)| *what)
 }

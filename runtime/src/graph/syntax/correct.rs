@@ -1,6 +1,6 @@
 //! Misspelt keys of sections and blocks: each is reported once, and what it holds is read as it was meant.
 
-use super::reserved::{INPUTS, ROBOT, is_name};
+use super::reserved::{INPUTS, is_name};
 use crate::node::{At, Mistake, Reader};
 use crate::source::{Code, Item, Key, Meant, Table, Value, suggest_name};
 
@@ -182,13 +182,13 @@ pub(super) fn correct_part_file(table: &mut Table, reader: &mut Reader<'_>) {
     }
 }
 
-/// Corrects the key `robot` of a device, which names a file.
-pub(super) fn correct_robot(table: &mut Table, reader: &mut Reader<'_>) {
+/// Corrects the key `what` of a device, which names the file of its robot or of its sensor.
+pub(super) fn correct_model(table: &mut Table, what: &'static str, reader: &mut Reader<'_>) {
     let is_file = |value: &Value| value.as_str().is_some_and(|text| text.ends_with(".toml"));
-    let is_close = |name: &str| suggest_name(name, std::iter::once(ROBOT)).is_some();
-    let found = table.entries.iter().find(|(key, value)| key.name != ROBOT && is_file(value) && is_close(&key.name));
-    if let Some(name) = found.map(|(key, _)| key.name.clone()).filter(|_| table.get(ROBOT).is_none()) {
-        rename(table, &name, ROBOT, reader);
+    let is_close = |name: &str| suggest_name(name, std::iter::once(what)).is_some();
+    let found = table.entries.iter().find(|(key, value)| key.name != what && is_file(value) && is_close(&key.name));
+    if let Some(name) = found.map(|(key, _)| key.name.clone()).filter(|_| table.get(what).is_none()) {
+        rename(table, &name, what, reader);
     }
 }
 

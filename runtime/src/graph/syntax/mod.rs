@@ -4,12 +4,12 @@ mod allow;
 mod binding;
 mod correct;
 mod limits;
+mod model;
 mod modes;
 mod names;
 mod policy;
 mod read;
 mod reserved;
-mod robot;
 mod roles;
 mod sections;
 
@@ -20,7 +20,7 @@ pub(crate) use modes::{ExitKind, ExitTable, ModeBlock, ModeExit, PortState};
 pub(crate) use names::Use;
 pub use policy::Policy;
 pub(crate) use policy::{AgeLimit, OnFail, PolicyTable, default_max_age_ns, default_max_age_s};
-pub(crate) use reserved::{ALLOW_UNCALIBRATED, INPUTS, LIMITS, MODES, NO_ARM, ROBOT, TASK_SECTIONS};
+pub(crate) use reserved::{ALLOW_UNCALIBRATED, INPUTS, LIMITS, MODES, NO_ARM, ROBOT, SENSOR, TASK_SECTIONS};
 pub(crate) use sections::{
     BenchDocument, Block, CommandEntry, GraphDocument, GraphTable, PartBlock, Sections, WireEntry, into_diagnostic,
 };

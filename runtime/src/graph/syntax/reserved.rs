@@ -6,6 +6,10 @@ pub(crate) const LIMITS: &str = "limits";
 pub(crate) const NO_ARM: &str = "none";
 /// Key of a device for its robot, and section of the file that it names.
 pub(crate) const ROBOT: &str = "robot";
+/// Key of a device for its sensor, and section of the file that it names.
+pub(crate) const SENSOR: &str = "sensor";
+/// The keys of a device that name the file of what it drives or reads.
+pub(crate) const MODELS: [&str; 2] = [ROBOT, SENSOR];
 
 /// The section [allow].
 pub(super) const ALLOW: &str = "allow";

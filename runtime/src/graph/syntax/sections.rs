@@ -6,16 +6,16 @@ use std::ops::Range;
 use super::allow::{Allowance, read_allow};
 use super::binding::Binding;
 use super::correct::{
-    correct_block, correct_facts, correct_keys, correct_part_file, correct_robot, correct_sections, correct_wires,
+    correct_block, correct_facts, correct_keys, correct_model, correct_part_file, correct_sections, correct_wires,
     separate_wires,
 };
 use super::limits::{LimitOwner, LimitSection, read_limits};
+use super::model::{ModelDocument, ModelFile, read_model};
 use super::modes::{ModeBlock, read_mode};
 use super::policy::{AgeLimit, OnFail, PolicyTable, WireTable};
 use super::read::read_table;
 use super::reserved::ALLOW;
-use super::reserved::{ALLOW_UNCALIBRATED, GRAPH_SECTIONS, LIMITS, ROBOT, is_name};
-use super::robot::{RobotDocument, read_robot};
+use super::reserved::{ALLOW_UNCALIBRATED, GRAPH_SECTIONS, LIMITS, MODELS, is_name};
 use crate::node::{At, FilePath, Measured, Mistake, Param, Reader, Spanned};
 use crate::source::{Code, Diagnostic, Diagnostics, Item, Key, Named, SourceMap, Table, Value, suggest_name};
 
@@ -166,10 +166,10 @@ pub(crate) struct BenchDocument {
     pub(crate) facts: Vec<(Key, Table)>,
     /// The limits of the cell, and of the robots of its devices.
     pub(crate) limits: Vec<LimitSection>,
-    /// The file of the robot of each device that has one, in the order of the file.
-    pub(crate) robot_files: Vec<(Key, FilePath)>,
-    /// What these files say of each robot, by device.
-    pub(crate) robots: Vec<(Key, RobotDocument)>,
+    /// The files of the robots and sensors of its devices, in the order of the file.
+    pub(crate) model_files: Vec<ModelFile>,
+    /// What these files say.
+    pub(crate) models: Vec<(ModelFile, ModelDocument)>,
     /// Whether limits may be in raw readings.
     pub(crate) allow_uncalibrated: bool,
     pub(crate) allow: Vec<Allowance>,
@@ -252,21 +252,23 @@ impl<'a> Sections<'a> {
         read_limits(root, &LimitOwner::CommandLine, &mut self.reader)
     }
 
-    /// Reads the sections of the file of a robot that `device` drives.
-    pub(crate) fn robot(&mut self, root: &mut Table, device: &Key) -> RobotDocument {
-        read_robot(root, device, &mut self.reader)
+    /// Reads the sections of the file of a robot or of a sensor.
+    pub(crate) fn model(&mut self, root: &mut Table, from: &ModelFile) -> ModelDocument {
+        read_model(root, from, &mut self.reader)
     }
 
     /// Reads the sections of a bench in a file that may have others. Its [allow] and [limits] belong to the graph.
     pub(crate) fn own_bench(&mut self, root: &Table) -> BenchDocument {
         let devices = self.named_tables(root.get("devices"));
         let names = names_of(&devices);
-        let mut robot_files = Vec::new();
+        let mut model_files = Vec::new();
         let block = |(key, mut table): (Key, Table)| {
             correct_block(&mut table, &[], &mut self.reader);
-            correct_robot(&mut table, &mut self.reader);
-            let robot = table.remove(ROBOT).and_then(|(_, value)| FilePath::read(&value, &mut self.reader));
-            robot_files.extend(robot.map(|file| (key.clone(), file)));
+            for what in MODELS {
+                correct_model(&mut table, what, &mut self.reader);
+                let file = table.remove(what).and_then(|(_, value)| FilePath::read(&value, &mut self.reader));
+                model_files.extend(file.map(|file| ModelFile { device: key.clone(), what, file }));
+            }
             self.block(key, table, &names)
         };
         let devices = devices.into_iter().map(block).collect();
@@ -289,7 +291,7 @@ impl<'a> Sections<'a> {
             invalid,
             facts,
             allow_uncalibrated,
-            robot_files,
+            model_files,
             ..BenchDocument::default()
         }
     }

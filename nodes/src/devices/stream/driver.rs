@@ -1,0 +1,202 @@
+//! The driver of a pad: it opens the link, publishes each image, and opens the link again when it is gone.
+
+use std::time::{Duration, Instant};
+
+use async_trait::async_trait;
+use tactflow_runtime::device::{DeviceError, Link, Live, Output};
+use tactflow_runtime::signal::Image;
+use tokio::time::{sleep, sleep_until, timeout};
+
+use super::plan::Plan;
+use super::reader::{Reader, Tally};
+use crate::devices::link::{Backoff, Connection, RECEIVED_BYTES};
+
+/// Time that a pad has for its first frame: many boards start anew when their port is opened.
+const FIRST_FRAME_TIME: Duration = Duration::from_secs(3);
+/// Time of silence after which the link is opened again. Opening it more often would keep such a board from starting.
+const REOPEN_TIME: Duration = Duration::from_secs(6);
+/// Longest time for the bytes at the end of a run to be sent.
+const STOP_TIME: Duration = Duration::from_millis(300);
+/// Shortest time without bytes that is a pause.
+const MIN_PAUSE: Duration = Duration::from_millis(1);
+
+/// A pad that is described and ready to run.
+pub(super) struct PadDriver {
+    image: Output<Image>,
+    plan: Plan,
+    reader: Reader,
+    /// The newest image.
+    cells: Vec<f32>,
+    received: Vec<u8>,
+    is_lost: bool,
+    /// Number of bytes since the last frame.
+    strange: u64,
+}
+
+/// Why a connection has ended.
+enum End {
+    Run,
+    Lost(String),
+}
+
+#[async_trait]
+impl Live for PadDriver {
+    async fn run(mut self: Box<Self>, mut link: Link) -> Result<(), DeviceError> {
+        let (mut backoff, mut was_open) = (Backoff::new(), false);
+        loop {
+            let stopped = link.stopped();
+            let opened = tokio::select! {
+                biased;
+                () = stopped => return Ok(()),
+                opened = Connection::open(&self.plan.address, self.plan.baud, self.plan.from) => opened,
+            };
+            let why = match opened {
+                Ok(mut connection) => {
+                    if std::mem::replace(&mut was_open, true) {
+                        link.count("reconnects");
+                    }
+                    match self.follow(&mut connection, &mut link, &mut backoff).await {
+                        End::Run => {
+                            // Nothing can be done if the pad does not take it.
+                            let _ = timeout(STOP_TIME, connection.send(&self.plan.stop)).await;
+                            return Ok(());
+                        }
+                        End::Lost(why) => why,
+                    }
+                }
+                Err(why) => why,
+            };
+            self.lose(&mut link, &why);
+            let stopped = link.stopped();
+            tokio::select! {
+                () = stopped => return Ok(()),
+                () = sleep(backoff.wait()) => {}
+            }
+        }
+    }
+}
+
+impl PadDriver {
+    pub(super) fn new(image: Output<Image>, plan: Plan) -> Self {
+        let (reader, cells) = (Reader::new(&plan), vec![0.0; plan.size[0] * plan.size[1]]);
+        let received = Vec::with_capacity(RECEIVED_BYTES);
+        Self { image, plan, reader, cells, received, is_lost: false, strange: 0 }
+    }
+
+    /// Publishes images until the run or the connection ends.
+    async fn follow(&mut self, connection: &mut Connection, link: &mut Link, backoff: &mut Backoff) -> End {
+        self.reader.forget();
+        if let Err(why) = connection.send(&self.plan.start).await {
+            return End::Lost(why);
+        }
+        let pause = (self.plan.period / 4).max(MIN_PAUSE);
+        let (mut heard, mut read, mut poll_at) = (Instant::now(), Instant::now(), Instant::now());
+        let mut patience = self.plan.timeout.max(FIRST_FRAME_TIME);
+        let stopped = link.stopped();
+        tokio::pin!(stopped);
+        loop {
+            let limit = heard + if self.is_lost { REOPEN_TIME } else { patience };
+            tokio::select! {
+                biased;
+                () = &mut stopped => return End::Run,
+                received = connection.receive(&mut self.received) => {
+                    if let Err(why) = received {
+                        return End::Lost(why);
+                    }
+                    let is_after_pause = read.elapsed() > pause;
+                    read = Instant::now();
+                    if self.read(connection, link, is_after_pause) {
+                        (heard, patience) = (Instant::now(), self.plan.timeout);
+                        backoff.reset();
+                    }
+                }
+                () = sleep_until(poll_at.into()), if self.plan.poll.is_some() => {
+                    poll_at = (poll_at + self.plan.period).max(Instant::now());
+                    if let Err(why) = self.ask(connection).await {
+                        return End::Lost(why);
+                    }
+                }
+                () = sleep_until(limit.into()) => {
+                    let why = self.silence(heard.elapsed());
+                    if self.is_lost {
+                        return End::Lost(why);
+                    }
+                    self.lose(link, &why);
+                    // A pad that was without power waits for this again.
+                    if let Err(why) = connection.send(&self.plan.start).await {
+                        return End::Lost(why);
+                    }
+                }
+            }
+        }
+    }
+
+    /// Asks for a frame.
+    async fn ask(&mut self, connection: &mut Connection) -> Result<(), String> {
+        self.reader.ask();
+        connection.send(self.plan.poll.as_deref().unwrap_or_default()).await
+    }
+
+    /// Publishes the images in what was received. Returns whether there is one.
+    fn read(&mut self, connection: &mut Connection, link: &mut Link, is_after_pause: bool) -> bool {
+        self.strange += self.received.len() as u64;
+        self.reader.push(&self.received, is_after_pause);
+        let mut has_image = false;
+        while let Some(read) = self.reader.next(&mut self.cells) {
+            (has_image, self.strange, self.is_lost) = (true, 0, false);
+            let stamp = match read.time {
+                Some(time) => link.stamp_of(time),
+                None => link.arrival(),
+            };
+            link.publish(|samples| {
+                samples.write(self.image, stamp, read.number).cells_mut().copy_from_slice(&self.cells);
+            });
+        }
+        if has_image {
+            connection.accept_sender();
+        }
+        self.count(link, connection.take_foreign());
+        has_image
+    }
+
+    /// Adds to the counts of the run.
+    fn count(&mut self, link: &mut Link, foreign: u64) {
+        let Tally { frames, rejected, resyncs, skipped, repeated, lost, late } = std::mem::take(&mut self.reader.tally);
+        let counts = [
+            ("frames", frames),
+            ("rejected frames", rejected),
+            ("resyncs", resyncs),
+            ("skipped bytes", skipped),
+            ("repeated frames", repeated),
+            ("lost frames", lost),
+            ("late frames", late),
+            ("foreign datagrams", foreign),
+        ];
+        link.count_each(&counts);
+    }
+
+    fn lose(&mut self, link: &mut Link, why: &str) {
+        self.is_lost = true;
+        link.lost(self.image, format!("{}: {why}", self.plan.address));
+    }
+
+    /// Says why there is no frame.
+    fn silence(&self, since: Duration) -> String {
+        let silent = format!("no frame for {} ms", since.as_millis());
+        if self.strange == 0 {
+            let asked =
+                if self.plan.start.is_empty() && self.plan.poll.is_none() { "" } else { " and does not answer" };
+            return format!("{silent}: the pad sends nothing{asked}");
+        }
+        if self.reader.is_ambiguous() {
+            return format!(
+                "{silent}: the data has the `mark` at the same place in every frame; a longer `mark`, a `check` or \
+                 `plausible` tells the right one"
+            );
+        }
+        format!(
+            "{silent}: {} bytes came, and none of them is a frame; check `baud`, `frame`, `mark` and `length`",
+            self.strange
+        )
+    }
+}

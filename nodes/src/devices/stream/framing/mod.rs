@@ -1,0 +1,138 @@
+//! Framing: from bytes as they arrive to whole frames. It is pure: it reads and writes nothing else.
+//!
+//! Bytes are pushed in pieces of any size, and frames come out as soon as they are complete. The bytes that wait are
+//! bounded by four frames and one piece.
+
+pub(crate) mod check;
+pub(crate) mod lines;
+pub(crate) mod marked;
+pub(crate) mod messages;
+pub(crate) mod packets;
+pub(crate) mod replies;
+pub(crate) mod rule;
+
+use std::ops::Range;
+
+use lines::Lines;
+use marked::Marked;
+use messages::Messages;
+use packets::Packets;
+use replies::Replies;
+
+/// What framing has counted.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub(crate) struct Counts {
+    /// Frames that were complete and wrong, or not where they should be.
+    pub(crate) rejected: u64,
+    /// How often the place of the frames was lost.
+    pub(crate) resyncs: u64,
+    /// Bytes that belong to no frame.
+    pub(crate) skipped: u64,
+}
+
+/// Finds the frames in a stream of bytes.
+#[derive(Clone)]
+pub(crate) enum Framer {
+    Marked(Marked),
+    Lines(Lines),
+    Packets(Packets),
+    Messages(Messages),
+    Replies(Replies),
+}
+
+/// Whether the content of a frame makes sense.
+pub(crate) type IsSound<'a> = &'a mut dyn FnMut(&[u8]) -> bool;
+
+impl Framer {
+    /// Adds bytes that have arrived. `is_after_pause` says that nothing had arrived for a while before.
+    pub(crate) fn push(&mut self, bytes: &[u8], is_after_pause: bool) {
+        match self {
+            Self::Marked(framer) => framer.push(bytes, is_after_pause),
+            Self::Lines(framer) => framer.push(bytes),
+            Self::Packets(framer) => framer.push(bytes),
+            Self::Messages(framer) => framer.push(bytes),
+            Self::Replies(framer) => framer.push(bytes),
+        }
+    }
+
+    /// Returns the next frame, or `None` if more bytes are needed. Call it again until then.
+    pub(crate) fn next(&mut self, is_sound: IsSound<'_>) -> Option<&[u8]> {
+        match self {
+            Self::Marked(framer) => framer.next(is_sound),
+            Self::Lines(framer) => framer.next(is_sound),
+            Self::Packets(framer) => framer.next(is_sound),
+            Self::Messages(framer) => framer.next(is_sound),
+            Self::Replies(framer) => framer.next(is_sound),
+        }
+    }
+
+    /// States that a frame is asked for now.
+    pub(crate) fn ask(&mut self) {
+        if let Self::Replies(framer) = self {
+            framer.ask();
+        }
+    }
+
+    /// Forgets the bytes so far, as after a new connection.
+    pub(crate) fn forget(&mut self) {
+        match self {
+            Self::Marked(framer) => framer.forget(),
+            Self::Lines(framer) => framer.forget(),
+            Self::Packets(framer) => framer.forget(),
+            Self::Messages(framer) => framer.forget(),
+            Self::Replies(framer) => framer.forget(),
+        }
+    }
+
+    /// Returns what was counted so far.
+    pub(crate) fn counts(&self) -> Counts {
+        match self {
+            Self::Marked(framer) => framer.counts,
+            Self::Lines(framer) => framer.counts,
+            Self::Packets(framer) => framer.counts,
+            Self::Messages(framer) => framer.counts,
+            Self::Replies(framer) => framer.counts,
+        }
+    }
+
+    /// Whether the mark stands at several places of every frame, so that the right one is not known.
+    pub(crate) const fn is_ambiguous(&self) -> bool {
+        matches!(self, Self::Marked(framer) if framer.is_ambiguous)
+    }
+}
+
+/// Bytes that wait, with a position up to which they are done with.
+#[derive(Debug, Clone, Default)]
+struct Pending {
+    bytes: Vec<u8>,
+    start: usize,
+}
+
+impl Pending {
+    /// Adds bytes, and drops those that are done with.
+    fn push(&mut self, bytes: &[u8]) {
+        self.bytes.drain(..self.start);
+        self.start = 0;
+        self.bytes.extend_from_slice(bytes);
+    }
+
+    /// Takes the bytes up to the next `end`, without it. They stay where they are until the next push.
+    fn take_until(&mut self, end: u8) -> Option<Range<usize>> {
+        let length = self.bytes[self.start..].iter().position(|byte| *byte == end)?;
+        let taken = self.start..self.start + length;
+        self.start = taken.end + 1;
+        Some(taken)
+    }
+
+    fn rest(&self) -> &[u8] {
+        &self.bytes[self.start..]
+    }
+
+    fn clear(&mut self) {
+        self.bytes.clear();
+        self.start = 0;
+    }
+}
+
+#[cfg(test)]
+mod tests;

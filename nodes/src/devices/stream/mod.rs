@@ -1,0 +1,94 @@
+//! `stream`: a tactile pad that is described in TOML.
+//!
+//! [`link`](super::link) receives bytes, `framing` finds the frames in them, `decoding` reads the cells, and `driver`
+//! publishes the images. `plan` checks the description. Only `driver` and `link` do I/O.
+
+mod decoding;
+mod driver;
+mod framing;
+mod plan;
+mod reader;
+
+use tactflow_runtime::device::{Description, Device, Driver, Opened, Output};
+use tactflow_runtime::node::{Describe, Mistakes};
+use tactflow_runtime::signal::{Image, ImageShape};
+
+use super::{Facts, arm, pad};
+use driver::PadDriver;
+use plan::Plan;
+pub use plan::params::Params;
+
+/// A tactile pad that is described in TOML: its link, its frames and its cells.
+///
+/// The description of a pad stands in a file of its own, with the section `[sensor]`, and holds wherever the pad is
+/// used. The bench names it with `sensor`, and adds the `link`. Keys of the bench replace those of the file.
+/// `tactflow pads` lists the descriptions that ship, and `docs/pads.md` describes a new pad step by step.
+///
+/// **Frames.** A frame with a `check` is delivered if its checksum holds. Without one, a frame is delivered if it is
+/// the third in a row that has its `mark` where `length` says, and from then on each frame as soon as it is complete.
+/// Lines, packets and datagrams have borders that do not occur in the data, so the first good one is delivered. After a
+/// frame that is not where it should be, the next one is looked for one byte behind its beginning. If the data has the
+/// mark at the same place in every frame, only a pause between the frames can say where they begin; without a pause,
+/// nothing is delivered. A value that is not finite, or not `plausible`, spoils its frame.
+///
+/// **Text.** With `cell = "dec"` or `"hex"`, a frame is numbers with commas, semicolons or white space between them.
+/// `offset`, `stride` and `length` count values.
+///
+/// **Silence.** A pad that sends no frame for `timeout_ms` is lost. The device sends `start` again, and opens the link
+/// again, until a frame comes or the run ends. A board may need 3 s for its first frame.
+///
+/// The device counts `frames`, `rejected frames`, `resyncs`, `skipped bytes`, `repeated frames`, `lost frames` (gaps of
+/// the counter), `late frames` (older than the last one), `foreign datagrams` and `reconnects`. It states the facts
+/// `dead` (no tactel is), `calibration`, and if they are given `threshold`, `pressure` and `mount`. The zero of the pad
+/// is that of `calibrate`: set `tare_at_start` there.
+///
+/// ```toml
+/// [roles]
+/// pad = "tactile_pad"
+///
+/// [bind]
+/// pad = "skin"
+///
+/// [devices.skin]
+/// type = "stream"
+/// sensor = "builtin:pads/flexitac_16x32.toml"
+/// link = "serial:/dev/serial/by-id/usb-1a86_USB_Serial-if00-port0"
+/// ```
+#[derive(Debug, Describe)]
+pub struct Stream {
+    image: Output<Image>,
+}
+
+impl Device for Stream {
+    type Params = Params;
+
+    fn open(params: Params) -> Result<Opened, Mistakes> {
+        let plan = Plan::new(&params)?;
+        let [rows, cols] = plan.size;
+        let shape = ImageShape { rows, cols, pitch: [params.pitch; 2], unit: params.unit };
+        let mut description = Description::every(1.0 / params.rate_hz);
+        description.latency = params.latency_ms * 1e-3;
+        let stream = Self { image: pad::fill(&mut description, shape, facts(&params)?) };
+        let driver = PadDriver::new(stream.image, plan);
+        Ok(Opened { description, driver: Driver::Live(Box::new(driver)) })
+    }
+}
+
+fn facts(params: &Params) -> Result<Facts, Mistakes> {
+    let mut calibration = toml::Table::new();
+    match &params.calibration {
+        Some(file) => calibration.insert("file".to_owned(), arm::fact_of("calibration", file)?.into()),
+        None => calibration.insert("gain".to_owned(), 1.0.into()),
+    };
+    let unit = params.unit;
+    let mut facts: Facts =
+        vec![("dead".into(), toml::Value::Array(Vec::new())), ("calibration".into(), calibration.into())];
+    facts.extend(params.threshold.map(|threshold| ("threshold".into(), format!("{threshold} {unit}").into())));
+    let pressure = params.pressure.map(|pressure| format!("{pressure} {}", unit.per_tactel()));
+    facts.extend(pressure.map(|pressure| ("pressure".into(), pressure.into())));
+    facts.extend(params.mount.as_ref().map(pad::mount));
+    Ok(facts)
+}
+
+#[cfg(test)]
+mod tests;
