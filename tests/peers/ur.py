@@ -137,7 +137,6 @@ class Robot:
 
     def told(self, line):
         word, *rest = line.split()
-        value = json.loads(rest[0]) if rest else None
         if word == "set":  # set slider 0.5
             self.s[rest[0]] = json.loads(rest[1])
         elif word == "protective_stop":
@@ -155,13 +154,13 @@ class Robot:
         elif word == "dial":  # one more connection of the program
             self.dial(self.program, is_second=True)
         elif word == "urcap":  # press play: the node asks for its program
-            self.ask(value)
+            self.ask(int(rest[0]))
         elif word == "cut":  # in the middle of a sample
             self.is_cut = True
         elif word == "swallow":
-            self.swallows = value
+            self.swallows = rest[0] == "true"
         elif word == "hold":
-            self.holds = value
+            self.holds = rest[0] == "true"
         elif word == "bytes":
             for client in self.clients:
                 self.put(client, bytes.fromhex(rest[0]))
@@ -381,7 +380,8 @@ class Robot:
         """Sends a sample to each client that has started."""
         if self.swallows:
             return
-        for client in [client for client in self.clients if client.runs and self.steps % client.every == 0]:
+        due = [client for client in self.clients if client.runs and self.steps % client.every == 0]
+        for client in due:
             self.samples += 1
             if self.s["texts"] and self.samples % self.s["texts"] == 0:
                 self.text(client, "a text between samples")
@@ -391,7 +391,7 @@ class Robot:
                 self.drop(client)
             else:
                 self.put(client, sample)
-        self.is_cut = self.is_cut and not self.clients
+        self.is_cut = self.is_cut and not due
 
     # The loop.
 

@@ -59,6 +59,7 @@ mod robots;
 mod signals;
 mod sim;
 mod situations;
+mod slow;
 mod svg;
 mod task_crossings;
 mod task_drivers;

@@ -188,7 +188,8 @@ fn it_starts_the_program_and_the_robot_follows() {
     let [force, down] = [2, 5].map(|i| wrench.components()[i].get().unwrap());
     assert!((force + 3.0).abs() < 1e-3 && (down + 0.3).abs() < 1e-3, "{wrench:?}");
     assert_eq!(rig.count("bad packets"), 0);
-    rig.wait_until(Duration::from_secs(1), |_| peer.velocities(0.0).last().unwrap().1 == [0.0; 6]);
+    let rests = |_: &LinkRig| peer.events().iter().rev().find_map(|event| event["speed"].as_f64()) == Some(0.0);
+    assert!(rig.wait_until(SOON, rests), "the commands have expired");
     rig.stop().unwrap();
     let ended = peer.wait(0, |event| event["ended"].is_string());
     assert_eq!((ended["ended"].as_str(), ended["speed"].as_f64()), (Some("asked to"), Some(0.0)));
@@ -253,9 +254,14 @@ fn what_is_wrong_before_the_first_velocity_keeps_the_program_from_the_robot() {
         let peer = Peer::start(settings.clone());
         let mut rig = peer.rig(more);
         assert!(rig.wait_until(SOON, |rig| rig.get::<Flag>("safety") == Some(&false)), "{settings}");
-        push(&mut rig, Duration::from_millis(300));
+        // The first command is refused, with the reason.
+        let end = Instant::now() + SOON;
+        while rig.refusal().is_none() && Instant::now() < end {
+            push(&mut rig, Duration::from_millis(50));
+        }
+        push(&mut rig, Duration::from_millis(200));
         assert!(!follows(&rig) && peer.count(|event| event["program"].is_u64()) == 0, "{settings}");
-        let refusal = rig.refusal().unwrap();
+        let refusal = rig.refusal().unwrap_or_else(|| panic!("{settings}"));
         assert!(refusal.contains(why), "{refusal}");
         rig.stop().unwrap();
     }

@@ -15,8 +15,9 @@ use crate::tool::tool;
 use crate::ur::{Peer, SOON};
 
 /// The last joint turns, for as long as the run lasts.
-const GRAPH: &str = "[graph]\nclock = 'arm'\n[roles]\narm = 'bare_arm'\n[commands]\narm.velocity = 'move.velocity'\n\
+const GRAPH: &str = "[graph]\nclock = 'arm'\nstart = 'go'\n[roles]\narm = 'bare_arm'\n[commands]\narm.velocity = 'move.velocity'\n\
     [nodes.turn]\ntype = 'twist_source'\ntwist = [0, 0, 0, 0, 0, 0.3]\n\
+    [modes.go]\nfail = { after_ms = 60000 }\n\
     [parts.move]\nfile = 'builtin:parts/bare_move.toml'\nin.twist = 'turn.twist'\nin.position = 'arm.position'\n\
     in.equilibrium = 'arm.equilibrium'\n\
     [limits]\nlinear_m_per_s = 0.05\nangular_rad_per_s = 0.8\nlinear_m_per_s2 = 2.0\nangular_rad_per_s2 = 10.0\n\

@@ -126,7 +126,9 @@ async fn idle<T>(link: &mut Link, future: impl Future<Output = T>) -> Option<T> 
             () = stopped => return None,
             value = &mut future => return Some(value),
             // Nothing is sent, but the graph must see that the commands come to rest.
-            () = commanded => _ = link.commands(),
+            () = commanded => {
+                link.commands();
+            }
         }
     }
 }

@@ -270,7 +270,9 @@ fn timeout(params: &Params) -> Result<i32, Mistakes> {
 /// reaction of the controller, and the stop from the highest speed.
 fn silence(timeout_ms: i32, rate_hz: f64, joints: &JointsShape) -> f64 {
     let fastest = joints.joints.iter().map(|joint| joint.speed).fold(0.0, f64::max);
-    f64::from(timeout_ms) * 1e-3 + REACTION_STEPS / rate_hz + fastest / STOP_DECELERATION
+    let within = f64::from(timeout_ms) * 1e-3 + REACTION_STEPS / rate_hz + fastest / STOP_DECELERATION;
+    // Whole milliseconds, as people read them.
+    (within * 1e3).ceil() * 1e-3
 }
 
 /// Returns, for each joint of the controller, its place in the model.

@@ -65,6 +65,8 @@ pub(super) struct Session<'a> {
     host: String,
     reverse: Option<Reverse>,
     connected: Instant,
+    /// Whether the program was seen to run since it has connected.
+    has_played: bool,
     /// When the program has closed its connection.
     closed: Option<Instant>,
     sending: Option<Sending>,
@@ -90,6 +92,7 @@ impl<'a> Session<'a> {
             host,
             reverse: None,
             connected: now,
+            has_played: false,
             closed: None,
             sending: None,
             phase,
@@ -170,8 +173,8 @@ impl<'a> Session<'a> {
             link.refuse(why);
         }
         // A program that is paused would read old messages when it goes on.
-        let has_shown = matches!(self.phase, Phase::Ready) || self.connected.elapsed() > PROGRAM_SHOWS;
-        if !is_playing(state) && has_shown {
+        self.has_played |= is_playing(state);
+        if !is_playing(state) && (self.has_played || self.connected.elapsed() > PROGRAM_SHOWS) {
             self.abort();
         }
     }
@@ -285,6 +288,7 @@ impl<'a> Session<'a> {
         if let Ok(reverse) = accepted.and_then(Reverse::new) {
             self.reverse = Some(reverse);
             self.connected = Instant::now();
+            self.has_played = false;
             self.closed = None;
         }
     }

@@ -3,8 +3,8 @@
 use std::path::Path;
 
 use super::commissioning::{CommissionedDevice, fingerprint};
+use super::models::add_models;
 use super::open::Opener;
-use super::robots::add_robots;
 use crate::catalogue::Catalogue;
 use crate::device::Opened;
 use crate::graph::load::Loader;
@@ -40,7 +40,7 @@ pub fn open_bench(catalogue: &Catalogue, path: &Path) -> Result<OpenBench, Repor
     let bench = loader.load_bench(path);
     let Loader { mut sources, mut diagnostics, .. } = loader;
     let Some(mut bench) = bench else { return Err(Report::new(sources, diagnostics)) };
-    add_robots(&mut bench, catalogue, &mut diagnostics);
+    add_models(&mut bench, catalogue, &mut diagnostics);
     let mut opener = Opener::new(catalogue, Some(&bench), 1.0, &mut sources, &mut diagnostics);
     opener.check_devices(&bench, &bench.bind.iter().map(|(role, _)| role.name.as_str()).collect());
     for (_, binding) in bench.bind.iter() {

@@ -131,7 +131,7 @@ impl Loader {
     /// Reads a bench file, and the files of its robots.
     pub(crate) fn load_bench(&mut self, path: &Path) -> Option<BenchDocument> {
         let mut bench = self.bench_file(path, None, Table::default())?;
-        self.robots(&mut bench);
+        self.models(&mut bench);
         let corrected = bench.correct_names(&self.sources);
         self.diagnostics.extend(corrected);
         Some(bench)
