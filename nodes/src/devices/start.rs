@@ -131,7 +131,7 @@ mod tests {
     use crate::arm::model::load;
     use crate::arm::mount::Mount;
 
-    const HOME: [f64; 6] = [0.0, -1.7, -2.0, -1.0124, 1.5708, 0.0];
+    const HOME: [f64; 6] = [0.0, -1.7, -2.0, -1.0124, 1.57, 0.0];
 
     fn check() -> StartCheck {
         let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../graphs/robots/ur5e.urdf").into();
