@@ -229,7 +229,8 @@ fn after_each_thing_that_is_not_legal_it_rests_until_it_is_resumed() {
     let runs = cases.map(|events| {
         thread::spawn(move || {
             let events = format!("[{events}]");
-            let (mut rig, mut krc) = pair("", "--seconds 5 --silence-ms 3000 --restart-s 0.8 --lag-s 0.02", &events);
+            let more = "stiffness = 200.0\ndamping_ratio = 0.2";
+            let (mut rig, mut krc) = pair(more, "--seconds 5 --silence-ms 3000 --restart-s 0.8 --lag-s 0.02", &events);
             assert!(drive(&mut rig, 0.0, true, follows), "{events}");
             // It moves until the controller does not follow.
             let mut moved: f64 = 0.0;

@@ -12,7 +12,7 @@ use tokio::net::UdpSocket;
 use tokio::time::timeout;
 
 use super::intake::{Arrival, Intake, Stated};
-use super::permit::{obstacle, takes_positions};
+use super::permit::{accepts_flags, is_in_command, obstacle, sample_time, takes_positions};
 use super::target::Target;
 use super::wire::{Answer, CMD_BYTES, Impedance, Krl, MSR_BYTES, Report};
 use crate::arm::chain::Chain;
@@ -66,7 +66,9 @@ pub(super) struct Fri {
     has_followed: bool,
     /// When the controller sent its first measurement.
     first: Option<Instant>,
-    /// Whether the impedance was sent before the controller took positions.
+    /// Time between two measurements: the longer one of those that the bench and the controller state [s].
+    sample_time: f64,
+    /// Whether the answers set the impedance.
     sets_impedance: bool,
     notes: Notes,
 }
@@ -119,7 +121,7 @@ impl Fri {
         allowed: Option<IpAddr>,
     ) -> Self {
         let columns = vec![Twist::default(); chain.joints().len()];
-        let intake = Intake::new(allowed);
+        let (intake, sample_time) = (Intake::new(allowed), settings.sample_time);
         Self {
             settings,
             ports,
@@ -134,6 +136,7 @@ impl Fri {
             phase: Phase::Mirrored,
             has_followed: false,
             first: None,
+            sample_time,
             sets_impedance: false,
             notes: Notes::default(),
         }
@@ -169,7 +172,7 @@ impl Fri {
     /// Returns the time without a datagram after which the controller is lost.
     fn patience(&self) -> Duration {
         match self.first {
-            Some(_) => Duration::from_secs_f64(LOST_SAMPLES * self.settings.sample_time).max(MIN_LOST),
+            Some(_) => Duration::from_secs_f64(LOST_SAMPLES * self.sample_time).max(MIN_LOST),
             None => FIRST_DATAGRAM,
         }
     }
@@ -248,9 +251,12 @@ impl Fri {
             link.refuse("its controller has begun a new session");
         }
         self.phase = Phase::Mirrored;
+        if self.first.is_none() {
+            // An earlier run may have left the controller in the state command, with other flags.
+            self.sets_impedance = !is_in_command(report);
+        }
         self.first.get_or_insert(now);
-        // Flags change only while the controller takes no positions.
-        self.sets_impedance = !takes_positions(report);
+        self.sample_time = self.settings.sample_time.max(sample_time(report));
         let (stated, expected) = (report.sample_time, self.settings.sample_time);
         let is_other = (stated - expected).abs() > SAMPLE_TIME_ERROR * expected;
         if is_other && !std::mem::replace(&mut self.notes.has_sample_time, true) {
@@ -268,7 +274,7 @@ impl Fri {
         self.settings.krl_ints.iter().for_each(|(place, value)| krl.set_int(*place, *value));
         self.krl = Some(krl);
         let takes = takes_positions(report);
-        self.sets_impedance |= !takes;
+        self.sets_impedance |= accepts_flags(report);
         let mut why = obstacle(report, !self.settings.impedance.is_none()).or_else(|| self.unset_impedance());
         if !takes {
             self.target.mirror(&report.commanded);
@@ -285,7 +291,7 @@ impl Fri {
             self.refuse(why, now, link);
         }
         let velocity = link.commands().joints(self.ports.velocity);
-        if self.phase == Phase::Checked && self.target.step(velocity, report.sample_time, now) {
+        if self.phase == Phase::Checked && self.target.step(velocity, sample_time(report), now) {
             link.count("shortened steps");
         }
         follows
@@ -303,11 +309,10 @@ impl Fri {
         }
     }
 
-    /// Returns why the arm must not move if its impedance is not that of the bench: flags change only while the controller
-    /// takes no positions.
+    /// Returns why the arm must not move if its impedance is not that of the bench: flags change only in the state monitor.
     fn unset_impedance(&self) -> Option<String> {
         let is_unset = !self.settings.impedance.is_none() && !self.sets_impedance;
-        let why = "it took positions before this run could set its impedance: let the KRL program stop and start FRI";
+        let why = "it was in the state command before this run could set its impedance: let the KRL program stop and start FRI";
         is_unset.then(|| why.to_owned())
     }
 

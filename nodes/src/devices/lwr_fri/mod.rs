@@ -95,7 +95,7 @@ pub struct Params {
 /// controller, the KRL program and the first run. **It has not been run on a robot.**
 ///
 /// **Motion.** While the controller takes positions (FRI state command, drives on), the device integrates the commanded
-/// velocity from the posture that the controller commanded at the begin. Each step lasts the sample time that the
+/// velocity from the posture that the controller commanded at its start. Each step lasts the sample time that the
 /// controller states. At any other time, it mirrors the posture that the controller commands. Lost datagrams add no
 /// motion. A step is never longer than `max_step`, and ends at the limits of the joints.
 ///

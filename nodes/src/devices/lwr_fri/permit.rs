@@ -7,6 +7,7 @@ const QUALITIES: [&str; 4] = ["unacceptable", "bad", "ok", "perfect"];
 const CONTROLS: [&str; 4] =
     ["another mode", "position control", "Cartesian impedance control", "joint impedance control"];
 
+const MONITOR: u16 = 1;
 const COMMAND: u16 = 2;
 const OK: u16 = 2;
 const POSITION: u16 = 1;
@@ -18,6 +19,21 @@ const SAMPLE_TIME_S: std::ops::RangeInclusive<f64> = 0.0005..=0.2;
 /// Whether the controller takes positions from the driver. At any other time the driver mirrors its posture.
 pub(super) fn takes_positions(report: &Report) -> bool {
     report.state == COMMAND && report.power != 0
+}
+
+/// Whether the flags of an answer may change.
+pub(super) fn accepts_flags(report: &Report) -> bool {
+    report.state == MONITOR
+}
+
+/// Whether the session is in the state command, with or without drives.
+pub(super) fn is_in_command(report: &Report) -> bool {
+    report.state == COMMAND
+}
+
+/// Returns the time between two measurements, or 0 if the controller states none that FRI can have [s].
+pub(super) fn sample_time(report: &Report) -> f64 {
+    if SAMPLE_TIME_S.contains(&report.sample_time) { report.sample_time } else { 0.0 }
 }
 
 /// Returns why the arm must not move; `None` if it may. `sets_impedance` is whether the driver sets the stiffness or the
@@ -48,7 +64,7 @@ pub(super) fn obstacle(report: &Report, sets_impedance: bool) -> Option<String> 
         let or = if sets_impedance { "" } else { " or joint impedance control (3)" };
         return Some(format!("it is in {control}: let the KRL program select {wanted}{or}"));
     }
-    if !SAMPLE_TIME_S.contains(&report.sample_time) {
+    if sample_time(report) == 0.0 {
         return Some(format!("it states a sample time of {} s: open FRI with 1 to 100 ms", report.sample_time));
     }
     None
@@ -99,7 +115,8 @@ mod tests {
             }
         }
         for sample_time in [0.0, -0.004, 0.3] {
-            assert!(obstacle(&report(sample_time, [2, 3, 0x7f, 1, 0]), false).is_some(), "{sample_time} s");
+            let report = report(sample_time, [2, 3, 0x7f, 1, 0]);
+            assert!(obstacle(&report, false).is_some() && super::sample_time(&report) == 0.0, "{sample_time} s");
         }
     }
 
