@@ -417,3 +417,22 @@ fn a_cable_that_swallows_bytes_leaves_the_robot_at_rest_until_the_operator_resum
     move_until(&mut rig, |rig| follows(rig) && is_moving(&peer, cut + 0.6));
     rig.stop().unwrap();
 }
+
+#[test]
+fn a_driver_that_sends_nothing_proves_that_the_robot_stops_by_itself() {
+    let mut peer = Peer::start(json!({}));
+    let mut rig = peer.rig("");
+    move_until(&mut rig, |rig| follows(rig) && is_moving(&peer, 0.0));
+    rig.mute(true);
+    let muted = peer.tell("mark");
+    push(&mut rig, Duration::from_millis(400));
+    assert_eq!(peer.wait(0, |event| event["ended"].is_string())["ended"], "silence");
+    assert!(peer.motion(muted).1 < muted + 0.2 + 0.024 + 0.025 + 0.1, "{} after {muted}", peer.motion(muted).1);
+    assert!(peer.velocities(muted + 0.05).is_empty());
+    // It still receives.
+    assert!(rig.next::<Joints>("position", SOON).is_some() && !follows(&rig));
+    rig.mute(false);
+    rig.resume();
+    move_until(&mut rig, |rig| follows(rig) && is_moving(&peer, muted + 0.4));
+    rig.stop().unwrap();
+}
