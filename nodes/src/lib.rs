@@ -70,8 +70,11 @@ fn edge() -> Catalogue {
         .device::<sim::pair::SimPair>()
         .device::<devices::lockstep::Lockstep>();
     #[cfg(feature = "drivers")]
-    let catalogue =
-        catalogue.device::<devices::agni::Agni>().device::<devices::lwr_fri::LwrFri>().device::<devices::ur::Ur>();
+    let catalogue = catalogue
+        .device::<devices::stream::Stream>()
+        .device::<devices::agni::Agni>()
+        .device::<devices::lwr_fri::LwrFri>()
+        .device::<devices::ur::Ur>();
     catalogue
 }
 

@@ -59,6 +59,9 @@ mod robots;
 mod signals;
 mod sim;
 mod situations;
+mod slow;
+#[cfg(target_os = "linux")]
+mod stream;
 mod svg;
 mod task_crossings;
 mod task_drivers;

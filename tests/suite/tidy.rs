@@ -142,6 +142,8 @@ fn only_the_edge_names_tokio() {
         "nodes/src/devices/ur/rtde.rs",
         "nodes/src/devices/ur/session.rs",
         "nodes/src/devices/lwr_fri/driver.rs",
+        "nodes/src/devices/stream/driver.rs",
+        "nodes/src/tool/sniff.rs",
     ];
     let edge = edge.map(|path| workspace().join(path));
     for (path, text) in sources(&["runtime/src", "nodes/src"]) {

@@ -17,6 +17,8 @@ pub mod recording;
 #[cfg(feature = "drivers")]
 pub mod start;
 #[cfg(feature = "drivers")]
+pub mod stream;
+#[cfg(feature = "drivers")]
 pub mod ur;
 #[cfg(feature = "drivers")]
 pub(crate) mod wrench;

@@ -7,6 +7,8 @@ mod features;
 #[cfg(feature = "drivers")]
 mod pads;
 mod press;
+#[cfg(feature = "drivers")]
+mod sniff;
 
 use tactflow_runtime::catalogue::Catalogue;
 use tactflow_runtime::cli::{Tool, derived};
@@ -20,6 +22,6 @@ pub fn tool(catalogue: Catalogue) -> Tool {
         .command(derived(doctor::run))
         .command(derived(press::run));
     #[cfg(feature = "drivers")]
-    let tool = tool.command(derived(pads::run));
+    let tool = tool.command(derived(pads::run)).command(derived(sniff::run));
     tool
 }

@@ -82,7 +82,10 @@ fn example(
         wrong.push(format!("the example of `{name}` has no block in `[{section}]` with `type = \"{name}\"`"));
     }
     for block in found.filter_map(toml::Value::as_table) {
-        for key in block.keys().filter(|key| *key != "type" && !(*key == "in" && inputs.is_some())) {
+        // A device may take its parameters from a file.
+        let is_file = |key: &str| inputs.is_none() && matches!(key, "robot" | "sensor");
+        let is_known = |key: &str| key == "type" || (key == "in" && inputs.is_some()) || is_file(key);
+        for key in block.keys().filter(|key| !is_known(key)) {
             if !params.iter().any(|param| param.name == key) {
                 wrong.push(format!("the example of `{name}` sets `{key}`, which is not a parameter of it"));
             }

@@ -43,6 +43,9 @@ pub struct Params {
     keeps_moving: bool,
     /// What stops it then.
     watchdog: Option<String>,
+    /// Whether it counts as a real arm.
+    #[param(default = false)]
+    needs_commissioning: bool,
 }
 
 /// A motor that gets its velocity as UDP datagrams.
@@ -83,6 +86,7 @@ impl Device for UdpMotor {
             false => OnSilence::Holds,
         };
         description.on_silence(reaction, params.silence_ms * 1e-3);
+        description.needs_commissioning = params.needs_commissioning;
         let joint = Joint {
             name: "shaft".into(),
             lower: f64::NEG_INFINITY,

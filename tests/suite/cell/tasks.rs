@@ -149,6 +149,7 @@ fn serial_pad_and_lwr(trial: Trial) -> String {
         type = 'agni'
         link = 'serial:{}'
         rate_hz = {:?}
+        silence_ms = 1000
         calibration = '{}'
         mount = {{ xyz = [0.0, 0.0, 0.03] }}
         [devices.lwr]

@@ -77,9 +77,9 @@ const NODES: &[(&str, &[&str])] = &[
     ("limits", &["motion", "usual", "limits"]),
     ("arm", &["motion", "usual"]),
     ("flow", &["flow"]),
-    ("devices", &["arm", "builtin", "recordings", "devices"]),
+    ("devices", &["arm", "builtin", "motion", "recordings", "usual", "devices"]),
     ("sim", &["arm", "devices", "motion", "usual", "random", "roles", "sim"]),
-    ("tool", &["calibration", "recordings", "sim"]),
+    ("tool", &["builtin", "calibration", "devices", "recordings", "sim", "tool"]),
 ];
 
 /// The folder a file stands in; a file beside `lib.rs` is a room of its own.

@@ -17,6 +17,8 @@ const FIRST_FRAME_TIME: Duration = Duration::from_secs(3);
 const REOPEN_TIME: Duration = Duration::from_secs(6);
 /// Longest time for the bytes at the end of a run to be sent.
 const STOP_TIME: Duration = Duration::from_millis(300);
+/// Time for an answer, at least; then the question is asked again.
+const REPLY_TIME: Duration = Duration::from_millis(200);
 /// Shortest time without bytes that is a pause.
 const MIN_PAUSE: Duration = Duration::from_millis(1);
 
@@ -91,27 +93,21 @@ impl PadDriver {
         }
         let pause = (self.plan.period / 4).max(MIN_PAUSE);
         let (mut heard, mut read, mut poll_at) = (Instant::now(), Instant::now(), Instant::now());
+        // When a question that has no answer is asked again.
+        let mut again = Instant::now();
         let mut patience = self.plan.timeout.max(FIRST_FRAME_TIME);
         let stopped = link.stopped();
         tokio::pin!(stopped);
         loop {
+            let ask_at = if self.reader.is_waiting() { poll_at.max(again) } else { poll_at };
             let limit = heard + if self.is_lost { REOPEN_TIME } else { patience };
             tokio::select! {
                 biased;
                 () = &mut stopped => return End::Run,
-                received = connection.receive(&mut self.received) => {
-                    if let Err(why) = received {
-                        return End::Lost(why);
-                    }
-                    let is_after_pause = read.elapsed() > pause;
-                    read = Instant::now();
-                    if self.read(connection, link, is_after_pause) {
-                        (heard, patience) = (Instant::now(), self.plan.timeout);
-                        backoff.reset();
-                    }
-                }
-                () = sleep_until(poll_at.into()), if self.plan.poll.is_some() => {
+                // Before the bytes: a flood of them must not keep the clock from running.
+                () = sleep_until(ask_at.into()), if self.plan.poll.is_some() => {
                     poll_at = (poll_at + self.plan.period).max(Instant::now());
+                    again = Instant::now() + (5 * self.plan.period).max(REPLY_TIME);
                     if let Err(why) = self.ask(connection).await {
                         return End::Lost(why);
                     }
@@ -125,6 +121,17 @@ impl PadDriver {
                     // A pad that was without power waits for this again.
                     if let Err(why) = connection.send(&self.plan.start).await {
                         return End::Lost(why);
+                    }
+                }
+                received = connection.receive(&mut self.received) => {
+                    if let Err(why) = received {
+                        return End::Lost(why);
+                    }
+                    let is_after_pause = read.elapsed() > pause;
+                    read = Instant::now();
+                    if self.read(connection, link, is_after_pause) {
+                        (heard, patience) = (Instant::now(), self.plan.timeout);
+                        backoff.reset();
                     }
                 }
             }

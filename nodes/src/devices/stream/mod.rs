@@ -11,12 +11,16 @@ mod reader;
 
 use tactflow_runtime::device::{Description, Device, Driver, Opened, Output};
 use tactflow_runtime::node::{Describe, Mistakes};
-use tactflow_runtime::signal::{Image, ImageShape};
+use tactflow_runtime::signal::{Image, ImageShape, Unit};
 
 use super::{Facts, arm, pad};
 use driver::PadDriver;
+#[cfg(feature = "cli")]
+pub(crate) use framing::check::{has_checksum, names as checksums, size_of as checksum_size};
 use plan::Plan;
 pub use plan::params::Params;
+#[cfg(feature = "cli")]
+pub(crate) use plan::text::bytes_of;
 
 /// A tactile pad that is described in TOML: its link, its frames and its cells.
 ///
@@ -80,7 +84,8 @@ fn facts(params: &Params) -> Result<Facts, Mistakes> {
         Some(file) => calibration.insert("file".to_owned(), arm::fact_of("calibration", file)?.into()),
         None => calibration.insert("gain".to_owned(), 1.0.into()),
     };
-    let unit = params.unit;
+    // What `calibrate` makes of the image.
+    let unit = if params.calibration.is_some() { Unit::NEWTON } else { params.unit };
     let mut facts: Facts =
         vec![("dead".into(), toml::Value::Array(Vec::new())), ("calibration".into(), calibration.into())];
     facts.extend(params.threshold.map(|threshold| ("threshold".into(), format!("{threshold} {unit}").into())));

@@ -83,6 +83,11 @@ impl Reader {
         self.framer.ask();
     }
 
+    /// Whether a frame was asked for and has not come.
+    pub(super) const fn is_waiting(&self) -> bool {
+        self.framer.is_waiting()
+    }
+
     /// Whether the mark stands at several places of every frame.
     pub(super) const fn is_ambiguous(&self) -> bool {
         self.framer.is_ambiguous()
@@ -91,7 +96,9 @@ impl Reader {
     /// Forgets what has arrived, as after a new connection.
     pub(super) fn forget(&mut self) {
         self.framer.forget();
-        self.parts.iter_mut().for_each(|parts| drop(parts.forget()));
+        if let Some(parts) = &mut self.parts {
+            parts.forget();
+        }
         self.counter.iter_mut().for_each(Counter::forget);
         self.has_last = false;
         self.current.clear();

@@ -53,7 +53,7 @@ fn each_mistake_is_at_its_key_with_a_way_out() {
         ("frame = 'datagram'", "frame", "sends bytes without borders"),
         ("frame = 'reply'\nmark =", "frame", "a reply needs `poll`"),
         ("frame = 'cobs'\nmark =\nmark_at = 1", "mark_at", "`mark_at` has no meaning with this `frame`"),
-        ("mark_at = 40", "mark_at", ""),
+        ("mark_at = 40\noffset = 2", "mark_at", "the mark ends behind the frame, which has 8 bytes"),
         ("mask = 256", "mask", "the mask 256 is not from 1 to 255"),
         ("mask = 0", "mask", "the mask 0 is not from 1 to 255"),
         ("cell = 'f32le'\nmask = 255", "mask", "`mask` has no meaning for a float"),

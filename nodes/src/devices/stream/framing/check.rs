@@ -78,6 +78,18 @@ pub(crate) fn names() -> Vec<String> {
     SIMPLE.iter().map(|name| (*name).to_owned()).chain(crcs).collect()
 }
 
+/// Returns the number of bytes of a checksum; 0 if there is none of that name.
+#[cfg(feature = "cli")]
+pub(crate) fn size_of(name: &str) -> usize {
+    Sum::of(name).flatten().map_or(0, |(sum, _)| sum.size())
+}
+
+/// Whether a frame has the checksum of that name over all its bytes, with `after` bytes behind it.
+#[cfg(feature = "cli")]
+pub(crate) fn has_checksum(name: &str, frame: &[u8], after: usize) -> bool {
+    Sum::of(name).flatten().is_some_and(|(sum, order)| Check { sum, order, from: 0, after }.holds(frame))
+}
+
 impl Sum {
     /// Returns the checksum of that name and its order of bytes, `Some(None)` for `none`, or `None` if there is none.
     pub(crate) fn of(name: &str) -> Option<Option<(Self, ByteOrder)>> {

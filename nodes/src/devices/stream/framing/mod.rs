@@ -73,6 +73,11 @@ impl Framer {
         }
     }
 
+    /// Whether a frame was asked for and has not come.
+    pub(crate) const fn is_waiting(&self) -> bool {
+        matches!(self, Self::Replies(framer) if framer.is_asked)
+    }
+
     /// Forgets the bytes so far, as after a new connection.
     pub(crate) fn forget(&mut self) {
         match self {

@@ -16,7 +16,7 @@ pub(crate) struct Replies {
     buffer: Vec<u8>,
     /// The last reply.
     reply: Vec<u8>,
-    is_asked: bool,
+    pub(super) is_asked: bool,
     /// Number of good replies in a row.
     row: u32,
     pub(super) counts: Counts,

@@ -119,10 +119,10 @@ pub struct Params {
     /// Distance between the centres of neighbouring tactels, along x and along y.
     #[param(unit = "m", above = 0.0)]
     pub(crate) pitch: f64,
-    /// Noise threshold that the pad states as a fact.
+    /// Noise threshold that the pad states as a fact; in N with a `calibration`.
     #[param(unit = "$unit", range = 0.0..)]
     pub(crate) threshold: Option<f64>,
-    /// Unit of pressure that the pad states as a fact, per tactel: p = 1 in the paper.
+    /// Unit of pressure that the pad states as a fact, per tactel: p = 1 in the paper; in N with a `calibration`.
     #[param(unit = "$unit", above = 0.0)]
     pub(crate) pressure: Option<f64>,
     /// A calibration file from `tactflow calibrate`, stated as a fact. It converts the image to forces.
