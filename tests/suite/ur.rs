@@ -436,3 +436,39 @@ fn a_driver_that_sends_nothing_proves_that_the_robot_stops_by_itself() {
     move_until(&mut rig, |rig| follows(rig) && is_moving(&peer, muted + 0.4));
     rig.stop().unwrap();
 }
+
+#[test]
+fn packets_that_are_none_are_counted_and_a_wrong_size_ends_the_connection() {
+    let mut peer = Peer::start(json!({}));
+    let mut rig = peer.rig("");
+    move_until(&mut rig, |rig| follows(rig) && is_moving(&peer, 0.0));
+    // An unknown command, a sample that is too short, one of another recipe, and a text that is cut.
+    for (i, bytes) in ["00055a0102", "00065501ffff", "000455ff", "00044d09"].iter().enumerate() {
+        peer.tell(&format!("bytes {bytes}"));
+        move_until(&mut rig, |rig| rig.count("bad packets") > i as u64);
+    }
+    let later = peer.tell("mark");
+    move_until(&mut rig, |rig| follows(rig) && is_moving(&peer, later));
+    peer.tell("bytes 0001");
+    assert!(rig.wait_until(SOON, |rig| rig.count("reconnects") > 0));
+    assert!(rig.refusal().unwrap().contains("a packet states a size of 1 bytes"), "{:?}", rig.refusal());
+    rig.stop().unwrap();
+}
+
+#[test]
+fn messages_that_are_late_move_nothing() {
+    let mut peer = Peer::start(json!({}));
+    let mut rig = peer.rig("");
+    move_until(&mut rig, |rig| follows(rig) && is_moving(&peer, 0.0));
+    // The robot gets no message, but its states still arrive.
+    let held = peer.tell("hold true");
+    push(&mut rig, Duration::from_millis(400));
+    assert_eq!(peer.wait(0, |event| event["ended"].is_string())["ended"], "silence");
+    peer.tell("hold false");
+    push(&mut rig, Duration::from_millis(400));
+    assert!(peer.motion(held).1 < held + 0.2 + 0.024 + 0.025 + 0.1, "{} after {held}", peer.motion(held).1);
+    assert!(!follows(&rig) && rig.refusal().unwrap().contains("the program on the robot"), "{:?}", rig.refusal());
+    rig.resume();
+    move_until(&mut rig, |rig| follows(rig) && is_moving(&peer, held + 0.5));
+    rig.stop().unwrap();
+}
