@@ -177,11 +177,16 @@ fn serial_pad_and_lwr(trial: Trial) -> String {
     compare(&figures, &without_wires(trial, &ball(), &[]), trial)
 }
 
+/// What the UR5e may reach.
+const UR_WORKSPACE: &str = "workspace_min_m = [-1.0, -1.0, 0.0]\nworkspace_max_m = [1.0, 1.0, 1.0]\n";
+
 /// A bench with the ball in front of a UR5e, which is stiffer than an LWR.
 fn ur_bench(folder: &Path) -> PathBuf {
     let text = fs::read_to_string(ball()).unwrap();
     let robots = workspace().join("graphs/robots");
     let text = text.replace("../robots/lwr4p.toml", robots.join("ur5e.toml").to_str().unwrap());
+    let (text, _) = text.split_once("[limits]").expect("the bench has limits");
+    let text = format!("{text}[limits]\n{UR_WORKSPACE}");
     let text = text.replace("../calibrations", workspace().join("graphs/calibrations").to_str().unwrap());
     let path = folder.join("bench.toml");
     fs::write(&path, text).unwrap();
@@ -230,8 +235,7 @@ fn tcp_pad_and_ur(trial: Trial) -> String {
         script_port = {}
         receive_timeout_ms = 200
         [limits]
-        workspace_min_m = [-1.0, -1.0, 0.0]
-        workspace_max_m = [1.0, 1.0, 1.0]
+        {UR_WORKSPACE}
         ",
         place("pad", "port"),
         trial.rate_hz,
