@@ -53,7 +53,7 @@ class Controller:
         self.stranger = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self.target = ("127.0.0.1", args.port)
         # Its own program is where an offset takes the arm home: only the sum of both fields is the posture.
-        self.krl, self.measured, self.total = [f32(q + 0.01) for q in args.home], args.home[:], args.home[:]
+        self.krl, self.measured, self.total = [f32(q + 0.01) for q in args.home], [q + args.sag for q in args.home], args.home[:]
         self.last_step, self.missed, self.state, self.power, self.error = [0.0] * 7, 0, MONITOR, 0x7F, 0
         self.control, self.forced, self.sequence, self.time = args.control, None, 0, 0.0
         self.begin = time.monotonic()
@@ -124,12 +124,11 @@ class Controller:
                 self.counts["stranger_answers"] += 1
             if self.socket in ready:
                 bytes_ = self.socket.recv(1000)
-                if self.swallowed:
-                    self.swallowed -= 1
-                else:
-                    self.check(bytes_)
+                self.check(bytes_, self.swallowed > 0)
+                self.swallowed = max(0, self.swallowed - 1)
 
-    def check(self, bytes_):
+    def check(self, bytes_, is_swallowed):
+        """Checks an answer. The controller does not get one that is swallowed."""
         self.counts["answers"] += 1
         if len(bytes_) != CMD or struct.unpack_from("<HH", bytes_, 4) != (CMD, CMD_ID):
             self.counts["bad_answers"] += 1
@@ -160,13 +159,17 @@ class Controller:
             if not self.entered:
                 self.entry_jump = max(self.entry_jump, *(abs(a - b) for a, b in zip(position, sent["commanded"])))
             else:
-                step = max(abs(a - b) for a, b in zip(position, self.last["position"]))
+                # From where the driver was, or from where the controller is after a gap.
+                froms = (self.last["position"], sent["commanded"])
+                step = min(max(abs(a - b) for a, b in zip(position, start)) for start in froms)
                 self.largest_step = max(self.largest_step, step)
             self.counts["commands"] += 1
         self.entered = sent["takes"]
         self.last = {"sequence": sequence, "flags": flags, "position": position}
         self.impedance = impedance
         self.answered.add(reflected)
+        if is_swallowed:
+            return
         self.heard, self.answers = time.monotonic(), self.answers + 1
         if flags & JOINT_POSITION:
             self.fresh = position
@@ -181,7 +184,7 @@ class Controller:
         self.last_step = [a - b for a, b in zip(self.total, before)] if self.takes() else [0.0] * 7
         self.fresh = None
         share = 1.0 - math.exp(-self.dt / self.args.lag_s) if self.args.lag_s else 1.0
-        self.measured = [m + share * (t - m) for m, t in zip(self.measured, self.total)]
+        self.measured = [m + share * (t + self.args.sag - m) for m, t in zip(self.measured, self.total)]
         self.largest_lead = max(self.largest_lead, *(abs(t - m) for t, m in zip(self.total, self.measured)))
 
     def enter(self, state):
@@ -318,6 +321,7 @@ def main():
     parser.add_argument("--seconds", type=float, default=5.0)
     parser.add_argument("--silence-ms", type=float, default=150.0)
     parser.add_argument("--lag-s", type=float, default=0.0, help="time constant of the arm; 0 if it follows at once")
+    parser.add_argument("--sag", type=float, default=0.003, help="of each joint below its command [rad]")
     parser.add_argument("--control", type=int, default=3)
     parser.add_argument("--start-s", type=float, default=0.1)
     parser.add_argument("--restart-s", type=float, help="time after which the program starts again after a drop")

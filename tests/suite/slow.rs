@@ -22,8 +22,7 @@ fn speeds(slow: &[&str]) -> [f64; 2] {
         assert_ne!(found, Vec::<usize>::new(), "{start}: {names:?}");
         found
     };
-    let (linear, joints) = (columns("move.acceleration.twist.v"), columns("move.velocity."));
-    let joints = if joints.is_empty() { columns("move.joints.velocity.") } else { joints };
+    let (linear, joints) = (columns("move.acceleration.twist.v"), columns("move.joints.velocity."));
     let mut most = [0.0_f64; 2];
     for line in lines {
         let cells: Vec<f64> = line.split(',').map(|cell| cell.parse().unwrap_or(0.0)).collect();
@@ -58,10 +57,13 @@ fn every_shipped_task_loads_slowly() {
 const GRAPH: &str = "
 [graph]
 clock = 'motor'
+bench = 'bench.toml'
 [roles]
 motor = 'drive'
 [commands]
 motor.velocity = 'motor.wanted'
+";
+const BENCH: &str = "
 [bind]
 motor = 'motor'
 [devices.motor]
@@ -72,23 +74,25 @@ needs_commissioning = true
 
 #[test]
 fn a_real_arm_is_slow_until_it_is_commissioned_and_again_after_a_change() {
-    let (_folder, path) = in_new_folder("graph.toml");
-    fs::write(&path, GRAPH).unwrap();
-    let run = || said(&mut tool(&["run", &path, "--for", "200ms", "-q"]));
+    let (folder, graph) = in_new_folder("graph.toml");
+    let path = folder.path().join("bench.toml");
+    fs::write(&graph, GRAPH).unwrap();
+    fs::write(&path, BENCH).unwrap();
+    let run = || said(&mut tool(&["run", &graph, "--for", "200ms", "-q"]));
     let warning = "device `motor` has not passed `tactflow doctor ";
     assert!(run().err.contains(warning), "{}", run().err);
     // What `doctor --move` writes.
-    let bench = open_bench(&catalogue(), path.as_ref()).unwrap_or_else(|report| panic!("{}", report.render(false)));
+    let bench = open_bench(&catalogue(), &path).unwrap_or_else(|report| panic!("{}", report.render(false)));
     let device = bench.devices[0].to_commission.as_ref().unwrap();
     let mut commissioning = Commissioning::default();
     let proof = Proof { fingerprint: device.fingerprint.clone(), stopped_after_ms: 80.0, stopped_after_mrad: 1.0 };
     commissioning.add("motor", proof);
-    commissioning.write(path.as_ref()).unwrap();
+    commissioning.write(&path).unwrap();
     assert!(!run().err.contains(warning), "{}", run().err);
-    fs::write(&path, GRAPH.replace("needs", "acceleration = 5.0\nneeds")).unwrap();
+    fs::write(&path, BENCH.replace("needs", "acceleration = 5.0\nneeds")).unwrap();
     assert!(run().err.contains(warning), "another acceleration is another device");
-    fs::write(&path, GRAPH).unwrap();
-    fs::write(Commissioning::path(path.as_ref()), "motor = 'yes'").unwrap();
+    fs::write(&path, BENCH).unwrap();
+    fs::write(Commissioning::path(&path), "motor = 'yes'").unwrap();
     let broken = run();
     assert!(broken.code == 2 && broken.err.contains("is not a file of `tactflow doctor --move`"), "{}", broken.err);
 }

@@ -37,7 +37,7 @@ use super::{damped, joint_limits, null_space};
 /// in.sensor_pose = "state.sensor_pose"
 /// in.jacobian = "state.jacobian"
 /// in.joints = "state.joints"
-/// posture = [0.0, 0.5, 0.0, -1.3, 0.0, 1.3, 0.0]   # [rad]
+/// posture = { from = "arm.home", optional = true }   # [rad]
 /// ```
 #[derive(Describe)]
 pub struct IkSink {

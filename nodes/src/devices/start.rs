@@ -9,6 +9,7 @@ use tactflow_runtime::node::Param;
 use tactflow_runtime::signal::Twist;
 
 use crate::arm::chain::Chain;
+use crate::motion::pose::rotation_vector;
 use crate::usual::{USUAL_LENGTH_M, USUAL_RAD};
 
 /// Largest difference between the target of the driver and the posture that the controller commands [rad].
@@ -99,7 +100,8 @@ impl StartCheck {
     fn check_tip(&self, measured: &[f64], reported: &IsometryMatrix3<f64>) -> Result<(), DeviceError> {
         let computed = self.chain.forward(measured, &mut vec![Twist::default(); measured.len()]).0;
         let away = (computed.translation.vector - reported.translation.vector).norm();
-        let turned = computed.rotation.angle_to(&reported.rotation);
+        // From the sine and the cosine: a rotation in single precision can have a cosine above 1.
+        let turned = rotation_vector(&(computed.rotation.inverse() * reported.rotation)).norm();
         let is_near = away <= self.bounds.tip && turned <= self.bounds.tip_angle;
         if is_near {
             return Ok(());
@@ -176,6 +178,20 @@ mod tests {
         assert!(away.contains("they are 2.1 mm and 0.0° apart, and the maximum is 2.0 mm and 1.0°"), "{away}");
         assert!(reports(1.1, 0.0).is_err());
         assert!(reports(0.0, f64::NAN).is_err());
+    }
+
+    /// A rotation whose numbers are rounded to single precision is not orthonormal in double precision.
+    #[test]
+    fn a_pose_in_single_precision_is_compared_too() {
+        let check = check();
+        for i in 0..1000 {
+            let measured: [f64; 6] = std::array::from_fn(|joint| HOME[joint] + 1e-3 * f64::from(i));
+            let mut tip = check.chain.forward(&measured, &mut [Twist::default(); 6]).0;
+            let rounded = tip.rotation.matrix().map(|entry| f64::from(entry as f32));
+            tip.rotation = Rotation3::from_matrix_unchecked(rounded);
+            let report = StartReport { measured: &measured, commanded: &measured, target: &measured, tip: Some(tip) };
+            assert_eq!(check.check(&report), Ok(()), "{i}");
+        }
     }
 
     #[test]

@@ -77,7 +77,7 @@ const NODES: &[(&str, &[&str])] = &[
     ("limits", &["motion", "usual", "limits"]),
     ("arm", &["motion", "usual"]),
     ("flow", &["flow"]),
-    ("devices", &["arm", "builtin", "recordings", "devices"]),
+    ("devices", &["arm", "builtin", "motion", "recordings", "usual", "devices"]),
     ("sim", &["arm", "devices", "motion", "usual", "random", "roles", "sim"]),
     ("tool", &["builtin", "calibration", "devices", "recordings", "sim", "tool"]),
 ];

@@ -403,3 +403,18 @@ fn a_link_without_frames_is_no_guess() {
     assert_eq!(said.code, 2);
     assert!(said.err.contains("does not begin with a kind of link"), "{}", said.err);
 }
+
+#[test]
+fn the_example_of_the_page_is_a_description() {
+    let page = std::fs::read_to_string(workspace().join("docs/pads.md")).unwrap();
+    let (_, block) = page.split_once("```toml sensor\n").unwrap();
+    let (block, _) = block.split_once("```").unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("my_pad.toml");
+    // The length that the page computes, and one that is too short.
+    for (length, is_right) in [(198, true), (197, false)] {
+        std::fs::write(&file, format!("{block}length = {length}\n")).unwrap();
+        let report = report(&format!("sensor = {file:?}\nlink = \"serial:/dev/null\"\n"));
+        assert_eq!(report.is_empty(), is_right, "{report}");
+    }
+}

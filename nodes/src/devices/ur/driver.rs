@@ -6,48 +6,13 @@ use std::time::Duration;
 use async_trait::async_trait;
 use tactflow_runtime::device::{DeviceError, Link, Live};
 
-use super::checks::Checks;
-use super::program::{Listeners, PortNumbers};
-use super::rtde::{Failure, Request, Stream};
-use super::script::{Ports, Script};
+use super::program::Listeners;
+use super::robot::Robot;
+use super::rtde::{Failure, Stream};
 use super::session::{End, Phase, Session};
-use super::status::Allowed;
-use crate::arm::chain::Chain;
-use crate::devices::arm::ArmPorts;
-use crate::devices::wrench::WrenchPorts;
 
 /// Time between two attempts to connect.
 const RETRY: Duration = Duration::from_millis(500);
-
-/// A robot, as the bench describes it.
-#[derive(Debug)]
-pub(super) struct Robot {
-    pub(super) ports: ArmPorts,
-    pub(super) force: WrenchPorts,
-    /// Pose of the tip from the joints of the model.
-    pub(super) chain: Chain,
-    pub(super) request: Request,
-    /// Where the controller takes programs, as `host:port`.
-    pub(super) script_address: String,
-    /// Our address, as the robot sees it; that of the connection if not given.
-    pub(super) host: Option<String>,
-    pub(super) port_numbers: PortNumbers,
-    pub(super) script: Script,
-    /// Whether we send the program; otherwise a node of External Control asks for it.
-    pub(super) sends_program: bool,
-    pub(super) allowed: Allowed,
-    pub(super) checks: Checks,
-    /// Samples per second [Hz].
-    pub(super) rate_hz: f64,
-    /// Time after which the program stops without a message [ms].
-    pub(super) timeout_ms: i32,
-    /// Time without a sample after which the connection is lost.
-    pub(super) silence: Duration,
-    /// Longest time until the program on the robot runs.
-    pub(super) start: Duration,
-    /// Maximum acceleration of a joint [rad/s²].
-    pub(super) acceleration: f64,
-}
 
 #[async_trait]
 impl Live for Robot {
@@ -104,15 +69,6 @@ impl Robot {
             session.abort();
         }
         Ok(end)
-    }
-
-    pub(super) fn script_ports<'h>(&self, host: &'h str, listeners: &Listeners) -> Ports<'h> {
-        let [reverse, trajectory, command] = listeners.ports();
-        Ports { host, reverse, trajectory, command }
-    }
-
-    fn failure(&self, why: &str) -> DeviceError {
-        DeviceError(format!("the robot at {}: {why}", self.request.address))
     }
 }
 

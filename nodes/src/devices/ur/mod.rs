@@ -10,6 +10,7 @@ mod message;
 mod packet;
 mod program;
 mod recipe;
+mod robot;
 mod rtde;
 mod script;
 mod session;
@@ -30,9 +31,9 @@ use crate::arm::chain::Chain;
 use crate::arm::model::load;
 use crate::arm::mount::Mount;
 use checks::Checks;
-use driver::Robot;
 use program::PortNumbers;
 use recipe::JOINTS;
+use robot::Robot;
 use rtde::Request;
 use script::Script;
 use status::Allowed;
@@ -100,10 +101,10 @@ pub struct Params {
     #[param(default = false)]
     allow_reduced: bool,
     /// Lowest position of the speed slider at which the robot is moved. A lower one slows every motion.
-    #[param(range = 0.01..=1.0, default = 1.0)]
+    #[param(unit = "1", range = 0.01..=1.0, default = 1.0)]
     min_speed_fraction: f64,
-    /// Pose of the tool centre point in the flange, x, y, z [m] and a rotation vector [rad], for a robot that does not
-    /// report it.
+    /// Pose of the tool centre point in the flange, x, y, z and a rotation vector, for a robot that does not report it.
+    #[param(unit = "m, rad")]
     tcp_offset: Option<[f64; 6]>,
     /// Mass of the tool, to be compared with the payload that is set on the robot.
     #[param(unit = "kg", range = 0.0..=100.0)]
@@ -175,6 +176,7 @@ enum Start {
 /// address = "192.168.0.10"
 /// urdf = "builtin:ur5e.urdf"
 /// tip = "tool0"
+/// home = [0.0, -1.7, -2.0, -1.0124, 1.5708, 0.0]   # [rad]
 /// ```
 #[derive(Describe)]
 pub struct Ur;

@@ -3,16 +3,14 @@
 use std::time::{Duration, Instant};
 
 use tactflow_runtime::device::Link;
-use tactflow_runtime::signal::Twist;
 use tokio::net::TcpStream;
 use tokio::time::{sleep_until, timeout};
 
-use super::checks::{in_order, of_controller};
-use super::driver::Robot;
-use super::geometry;
+use super::checks::of_controller;
 use super::message;
 use super::program::{Listeners, Reverse, Sending};
 use super::recipe::{JOINTS, State};
+use super::robot::Robot;
 use super::rtde::Stream;
 use super::status::{is_playing, is_stopped, runtime_name};
 
@@ -344,21 +342,6 @@ fn approached(last: &[f64; JOINTS], target: &[f64; JOINTS], acceleration: f64, d
         0.0 => 0.0,
         target => last[i] + (target - last[i]).clamp(-step, step),
     })
-}
-
-impl Robot {
-    /// Publishes a state, with the joints in the order of the model.
-    fn write(&self, link: &mut Link, state: &State, stamp: i64, sequence: u64, follows: bool) {
-        let [position, equilibrium] = [&state.q, &state.target_q].map(|q| in_order(&self.checks.order, q));
-        let tip = self.chain.forward(&position, &mut [Twist::default(); JOINTS]).0;
-        let wrench = state.tcp_force.map(|force| geometry::wrench_at(&tip, &self.checks.base, state.tcp_pose, force));
-        link.publish(|samples| {
-            self.ports.write_with_safety(samples, stamp, sequence, [&position, &equilibrium], follows);
-            if let Some(wrench) = wrench {
-                self.force.write(samples, stamp, sequence, &wrench);
-            }
-        });
-    }
 }
 
 #[cfg(test)]

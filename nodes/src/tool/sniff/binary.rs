@@ -174,3 +174,82 @@ fn cells(frames: &[&[u8]], header: usize, end: usize) -> (usize, &'static str, u
     }
     (header, "u8", end - header)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// What is heard of frames, each after a pause or not, from the middle of a frame on.
+    fn heard(frames: &[Vec<u8>], has_pauses: bool) -> Heard {
+        let cut = frames[0].len() / 3;
+        let mut heard = Heard { bytes: frames[0][cut..].to_vec(), pauses: vec![0], seconds: 1.0 };
+        for frame in &frames[1..] {
+            if has_pauses {
+                heard.pauses.push(heard.bytes.len());
+            }
+            heard.bytes.extend(frame);
+        }
+        heard
+    }
+
+    fn keys(heard: &Heard) -> Vec<String> {
+        let guess = guess(heard).expect("there are frames");
+        guess.keys.iter().map(|(key, value, _)| format!("{key} = {value}")).collect()
+    }
+
+    fn assert_has(keys: &[String], expected: &[&str]) {
+        for key in expected {
+            assert!(keys.iter().any(|found| found == key), "{key}: {keys:?}");
+        }
+    }
+
+    #[test]
+    fn a_header_a_length_and_cells_of_bytes() {
+        let frame = |n: usize| {
+            let cells = (0..512).map(|k| ((7 * n + 3 * k) % 251) as u8);
+            [0xAA, 0x55].into_iter().chain(cells).collect::<Vec<u8>>()
+        };
+        let frames: Vec<Vec<u8>> = (0..20).map(frame).collect();
+        let expected = ["frame = \"sync\"", "mark = \"hex:AA55\"", "length = 514", "shape = [16, 32]", "offset = 2"];
+        assert_has(&keys(&heard(&frames, true)), &expected);
+        assert_has(&keys(&heard(&frames, false)), &expected);
+    }
+
+    #[test]
+    fn a_checksum_a_stamp_and_cells_of_12_bits() {
+        let frame = |n: u32| {
+            let mut frame = vec![0xF0, 0xC4, 0x01];
+            frame.extend((n * 4000).to_le_bytes());
+            frame.extend(
+                (0..256_u32).flat_map(|k| ((k % 16) as u16 * 4096 + ((7 * n + 37 * k) % 4096) as u16).to_le_bytes()),
+            );
+            frame.push(frame.iter().fold(0, |xor, byte| xor ^ byte));
+            frame
+        };
+        let frames: Vec<Vec<u8>> = (0..20).map(frame).collect();
+        let expected = ["mark = \"hex:F0C401\"", "check = \"xor8\"", "length = 520", "offset = 7"];
+        assert_has(&keys(&heard(&frames, true)), &expected);
+    }
+
+    #[test]
+    fn a_trailer_of_floats() {
+        let frame = |n: usize| {
+            let chips = (0..5).flat_map(|k| [24.5, 1.0, -2.0, ((7 * n + 3 * k) % 251) as f32]);
+            chips.flat_map(f32::to_le_bytes).chain([0x0D, 0x0A]).collect::<Vec<u8>>()
+        };
+        let frames: Vec<Vec<u8>> = (0..40).map(frame).collect();
+        assert_has(&keys(&heard(&frames, true)), &["frame = \"trailer\"", "mark = \"hex:0D0A\"", "length = 82"]);
+    }
+
+    #[test]
+    fn bytes_without_a_pattern_are_no_frames() {
+        let mut random = 1_u32;
+        let bytes = (0..5000).map(|_| {
+            random = random.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            (random >> 24) as u8
+        });
+        assert_eq!(guess(&Heard { bytes: bytes.collect(), ..Heard::default() }), None);
+        assert_eq!(guess(&Heard::default()), None);
+        assert_eq!(guess(&Heard { bytes: vec![0; 5000], ..Heard::default() }), None);
+    }
+}

@@ -69,3 +69,32 @@ pub(super) fn rate(frames: usize, seconds: f64) -> String {
     let rate = frames as f64 / seconds.max(1e-3);
     format!("{:.1}", rate.clamp(0.1, 1e5))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn keys(text: &str) -> Option<Vec<String>> {
+        let heard = Heard { bytes: text.as_bytes().to_vec(), pauses: vec![0], seconds: 1.0 };
+        guess(&heard).map(|guess| guess.keys.iter().map(|(key, value, _)| format!("{key} = {value}")).collect())
+    }
+
+    #[test]
+    fn lines_of_numbers_are_frames_or_rows() {
+        let row = |count: usize| vec!["12"; count].join(",");
+        let lines = keys(&format!("34,12\n{}", format!("{}\r\n", row(256)).repeat(8))).unwrap();
+        assert!(lines.contains(&"shape = [16, 16]".to_owned()) && lines.len() == 4, "{lines:?}");
+        for (end, mark) in [("\n", "mark = \"\""), ("END\n", "mark = \"END\""), ("frame 7\n", "mark = \"frame\"")] {
+            let block = format!("{}{end}", format!("{}\n", row(8)).repeat(4));
+            let rows = keys(&format!("2,2\n{}", block.repeat(6))).unwrap();
+            assert!(rows.contains(&mark.to_owned()) && rows.contains(&"shape = [4, 8]".to_owned()), "{rows:?}");
+        }
+    }
+
+    #[test]
+    fn other_text_is_no_frame() {
+        assert_eq!(keys(&"hello\n".repeat(20)), None);
+        assert_eq!(keys("1,2\n3"), None);
+        assert_eq!(keys("\u{fffd}\u{fffd}\u{fffd}"), None);
+    }
+}
