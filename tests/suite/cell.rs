@@ -131,13 +131,14 @@ fn a_cell_moves_as_it_is_commanded_and_rests_when_nobody_answers() {
     let cell = Cell::start(&ball(), &wires);
     assert!(cell.pad_path().starts_with("/dev"), "{:?}", cell.place);
     drive(&driver, 0.05);
-    // Nobody answers any more. The quality falls to bad within 50 periods of 4 ms.
-    let mut msr = [0; 1000];
-    while {
+    // Nobody answers any more. The quality falls to bad within 50 periods of 4 ms, and the compliant arm swings out.
+    let (mut msr, mut last, mut at_rest) = ([0; 1000], 0.0, 0);
+    while at_rest < 100 {
         driver.recv_from(&mut msr).unwrap();
-        msr[144]
-    } == 2
-    {}
+        let position = f32::from_le_bytes([msr[216], msr[217], msr[218], msr[219]]);
+        let is_at_rest = msr[144] == 1 && (position - last).abs() < 1e-5;
+        (last, at_rest) = (position, if is_at_rest { at_rest + 1 } else { 0 });
+    }
     let Figures { summary, truth, commands } = cell.end();
     let arm = &summary["arm"];
     assert_eq!((&arm["starts"], &arm["drops"], &arm["faults"]), (&1.into(), &1.into(), &0.into()), "{summary}");

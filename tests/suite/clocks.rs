@@ -286,7 +286,7 @@ fn a_slow_simulator_keeps_its_lease_and_a_flood_of_frames_keeps_no_command_back(
     };
     let seen = run(slow);
     assert!(seen.halts.is_empty(), "{:?}", seen.halts);
-    assert!(seen.answered > 20, "{} of 25 frames are answered", seen.answered);
+    assert!(seen.answered > 12, "{} of 25 frames are answered", seen.answered);
     // Frames whose times say 8 ms come as fast as the connection takes them.
     let flood = Peer { frames: 20_000, period: Duration::from_micros(1), ..slow };
     let seen = run(flood);

@@ -39,6 +39,7 @@ mod lwr_fri;
 mod merge;
 mod modes;
 mod mutations;
+mod new;
 mod observed;
 mod operator;
 mod oracles;

@@ -258,6 +258,10 @@ fn what_is_wrong_before_the_first_velocity_keeps_the_program_from_the_robot() {
         let end = Instant::now() + SOON;
         while rig.refusal().is_none() && Instant::now() < end {
             push(&mut rig, Duration::from_millis(50));
+            // A machine that is too busy to renew a command in time gives no reason.
+            if rig.refusal().is_none() {
+                rig.resume();
+            }
         }
         push(&mut rig, Duration::from_millis(200));
         assert!(!follows(&rig) && peer.count(|event| event["program"].is_u64()) == 0, "{settings}");
@@ -415,5 +419,60 @@ fn a_cable_that_swallows_bytes_leaves_the_robot_at_rest_until_the_operator_resum
     assert!(!follows(&rig));
     rig.resume();
     move_until(&mut rig, |rig| follows(rig) && is_moving(&peer, cut + 0.6));
+    rig.stop().unwrap();
+}
+
+#[test]
+fn a_driver_that_sends_nothing_proves_that_the_robot_stops_by_itself() {
+    let mut peer = Peer::start(json!({}));
+    let mut rig = peer.rig("");
+    move_until(&mut rig, |rig| follows(rig) && is_moving(&peer, 0.0));
+    rig.mute(true);
+    let muted = peer.tell("mark");
+    push(&mut rig, Duration::from_millis(400));
+    assert_eq!(peer.wait(0, |event| event["ended"].is_string())["ended"], "silence");
+    assert!(peer.motion(muted).1 < muted + 0.2 + 0.024 + 0.025 + 0.1, "{} after {muted}", peer.motion(muted).1);
+    assert!(peer.velocities(muted + 0.05).is_empty());
+    // It still receives.
+    assert!(rig.next::<Joints>("position", SOON).is_some() && !follows(&rig));
+    rig.mute(false);
+    rig.resume();
+    move_until(&mut rig, |rig| follows(rig) && is_moving(&peer, muted + 0.4));
+    rig.stop().unwrap();
+}
+
+#[test]
+fn packets_that_are_none_are_counted_and_a_wrong_size_ends_the_connection() {
+    let mut peer = Peer::start(json!({}));
+    let mut rig = peer.rig("");
+    move_until(&mut rig, |rig| follows(rig) && is_moving(&peer, 0.0));
+    // An unknown command, a sample that is too short, one of another recipe, and a text that is cut.
+    for (i, bytes) in ["00055a0102", "00065501ffff", "000455ff", "00044d09"].iter().enumerate() {
+        peer.tell(&format!("bytes {bytes}"));
+        move_until(&mut rig, |rig| rig.count("bad packets") > i as u64);
+    }
+    let later = peer.tell("mark");
+    move_until(&mut rig, |rig| follows(rig) && is_moving(&peer, later));
+    peer.tell("bytes 0001");
+    let is_named = |why: &str| why.ends_with("a packet states a size of 1 bytes, but its header has 3");
+    assert!(rig.wait_until(SOON, |rig| rig.lost("position").is_some_and(is_named)));
+    rig.stop().unwrap();
+}
+
+#[test]
+fn messages_that_are_late_move_nothing() {
+    let mut peer = Peer::start(json!({}));
+    let mut rig = peer.rig("");
+    move_until(&mut rig, |rig| follows(rig) && is_moving(&peer, 0.0));
+    // The robot gets no message, but its states still arrive.
+    let held = peer.tell("hold true");
+    push(&mut rig, Duration::from_millis(400));
+    assert_eq!(peer.wait(0, |event| event["ended"].is_string())["ended"], "silence");
+    peer.tell("hold false");
+    push(&mut rig, Duration::from_millis(400));
+    assert!(peer.motion(held).1 < held + 0.2 + 0.024 + 0.025 + 0.1, "{} after {held}", peer.motion(held).1);
+    assert!(!follows(&rig));
+    rig.resume();
+    move_until(&mut rig, |rig| follows(rig) && is_moving(&peer, held + 0.5));
     rig.stop().unwrap();
 }

@@ -4,6 +4,7 @@ mod arguments;
 mod calibrate;
 mod doctor;
 mod features;
+mod new;
 #[cfg(feature = "drivers")]
 mod pads;
 mod press;
@@ -20,6 +21,7 @@ pub fn tool(catalogue: Catalogue) -> Tool {
         .command(derived(features::features))
         .command(derived(calibrate::run))
         .command(derived(doctor::run))
+        .command(derived(new::run))
         .command(derived(press::run));
     #[cfg(feature = "drivers")]
     let tool = tool.command(derived(pads::run)).command(derived(sniff::run));

@@ -13,7 +13,6 @@
 //! arguments that clap derives.
 
 mod check;
-mod commissioning;
 mod completions;
 mod explain;
 mod reference;
@@ -41,10 +40,9 @@ use shell::{Colour, standard_error};
 
 /// The parser of arguments, for the commands of other crates.
 pub use clap;
-pub use commissioning::{Commissioning, Proof, UNCOMMISSIONED_FRACTION};
 pub use explain::explanation;
 pub use reference::pages::reference;
-pub use run::{Job, JobOptions, Print, duration};
+pub use run::{Commissioning, Job, JobOptions, Print, Proof, duration};
 pub use shell::command::{OutputFormat, Subcommand, derived};
 pub use shell::{FAULTED, NOT_LOADED, Shell};
 pub use text::svg;

@@ -7,6 +7,9 @@ pub mod line_length;
 pub mod mix;
 pub mod pair;
 pub mod plus;
+/// The node that `tactflow new node` writes.
+#[path = "../../../nodes/src/tool/new/node.rs"]
+pub mod template_node;
 pub mod unit_delay;
 
 use tactflow_runtime::catalogue::Catalogue;
@@ -29,6 +32,7 @@ pub fn catalogue() -> Catalogue {
         .node::<mix::Mix>()
         .node::<pair::Pair>()
         .node::<plus::Plus>()
+        .node::<template_node::TemplateNode>()
         .node::<unit_delay::UnitDelay>()
 }
 

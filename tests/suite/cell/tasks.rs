@@ -18,14 +18,17 @@ use crate::sim::course;
 struct Trial {
     /// Frames of the pad per second.
     rate_hz: f64,
+    /// Time between two messages of the LWR [ms].
+    fri_ms: f64,
     /// Duration [s].
     duration: f64,
 }
 
 /// As many frames as a busy machine simulates in time, and as long as it takes to hold the contact.
-const SHORT: Trial = Trial { rate_hz: 100.0, duration: 6.0 };
-/// The rate of the paper.
-const LONG: Trial = Trial { rate_hz: 250.0, duration: 30.0 };
+const SHORT: Trial = Trial { rate_hz: 100.0, fri_ms: 4.0, duration: 6.0 };
+/// The rate of the paper. The robot sends twice as often, so that the first other command after an image is the answer to
+/// this image.
+const LONG: Trial = Trial { rate_hz: 250.0, fri_ms: 2.0, duration: 30.0 };
 /// Time at the end in which the contact is held [s].
 const HELD: f64 = 1.5;
 /// Pressure that the task keeps [N per tactel].
@@ -85,17 +88,35 @@ fn calibration(folder: &Path, full: f64, unit: &str) -> PathBuf {
     path
 }
 
-/// Runs the hybrid task on a bench, and returns the engine at its end.
-fn run_hybrid(bench: String, trial: Trial) -> Engine {
+/// Runs the hybrid task on a bench.
+///
+/// # Errors
+/// If the run was held or stopped, as on a machine that is too busy to send commands in time.
+fn run_hybrid(bench: String, trial: Trial) -> Result<(), String> {
     let graph = workspace().join("graphs/hybrid.toml");
     let request = Request { bench_text: Some(bench), ..Request::file(graph) };
     let plan = compile(&catalogue(), &request).unwrap_or_else(|report| panic!("{}", report.render(false)));
     let mut engine = Engine::new(plan);
     let options = RunOptions { duration: Some(trial.duration), ..RunOptions::default() };
     let outcome = run(&mut engine, &options, &mut |_| {}).unwrap();
-    assert_eq!(outcome.end, End::Duration, "{:?}", engine.halts());
+    if outcome.end != End::Duration || !engine.halts().is_empty() {
+        return Err(format!("{:?} {:?}", outcome.end, engine.halts()));
+    }
     assert_eq!(engine.mode(), Some("servo"), "{:?}", engine.changes());
-    engine
+    Ok(())
+}
+
+/// Runs a trial up to three times, until it was not held by a busy machine. Returns its figures.
+fn patiently(run: fn(Trial) -> Result<String, String>, trial: Trial) -> String {
+    const TRIALS: usize = 3;
+    let mut held = Vec::new();
+    for _ in 0..TRIALS {
+        match run(trial) {
+            Ok(figures) => return figures,
+            Err(why) => held.push(why),
+        }
+    }
+    panic!("it was held {TRIALS} times: {held:?}");
 }
 
 /// Returns time, centre and pressure of each row of truth.csv.
@@ -132,11 +153,16 @@ fn simulation(trial: Trial) -> String {
 }
 
 /// Runs the task over a serial pad and the LWR. Returns its figures.
-fn serial_pad_and_lwr(trial: Trial) -> String {
+///
+/// # Errors
+/// If the run was held.
+fn serial_pad_and_lwr(trial: Trial) -> Result<String, String> {
     let port = free_udp_port();
     let wires = format!(
-        "{}[pad]\nwire = 'myrmex'\n[arm]\nwire = 'lwr'\nto = '127.0.0.1:{port}'\nmissed_per_level = 50\n",
-        simulation(trial)
+        "{}[pad]\nwire = 'myrmex'\n[arm]\nwire = 'lwr'\nto = '127.0.0.1:{port}'\nmissed_per_level = 50\n\
+         period_ms = {:?}\n",
+        simulation(trial),
+        trial.fri_ms
     );
     let cell = Cell::start(&ball(), &wires);
     let calibration = calibration(cell.folder.path(), 4095.0, "1");
@@ -155,6 +181,7 @@ fn serial_pad_and_lwr(trial: Trial) -> String {
         [devices.lwr]
         type = 'lwr_fri'
         port = {port}
+        sample_ms = {:?}
         robot = '{}'
         [limits]
         workspace_min_m = [-0.8, -0.4, 0.1]
@@ -163,9 +190,10 @@ fn serial_pad_and_lwr(trial: Trial) -> String {
         cell.pad_path().display(),
         trial.rate_hz,
         calibration.display(),
+        trial.fri_ms,
         workspace().join("graphs/robots/lwr4p.toml").display()
     );
-    drop(run_hybrid(bench, trial));
+    run_hybrid(bench, trial)?;
     let figures = cell.end();
     let arm = &figures.summary["arm"];
     assert_eq!(
@@ -174,14 +202,19 @@ fn serial_pad_and_lwr(trial: Trial) -> String {
         "{}",
         figures.summary
     );
-    compare(&figures, &without_wires(trial, &ball(), &[]), trial)
+    Ok(compare(&figures, &without_wires(trial, &ball(), &[]), trial))
 }
+
+/// What the UR5e may reach.
+const UR_WORKSPACE: &str = "workspace_min_m = [-1.0, -1.0, 0.0]\nworkspace_max_m = [1.0, 1.0, 1.0]\n";
 
 /// A bench with the ball in front of a UR5e, which is stiffer than an LWR.
 fn ur_bench(folder: &Path) -> PathBuf {
     let text = fs::read_to_string(ball()).unwrap();
     let robots = workspace().join("graphs/robots");
     let text = text.replace("../robots/lwr4p.toml", robots.join("ur5e.toml").to_str().unwrap());
+    let (text, _) = text.split_once("[limits]").expect("the bench has limits");
+    let text = format!("{text}[limits]\n{UR_WORKSPACE}");
     let text = text.replace("../calibrations", workspace().join("graphs/calibrations").to_str().unwrap());
     let path = folder.join("bench.toml");
     fs::write(&path, text).unwrap();
@@ -189,7 +222,10 @@ fn ur_bench(folder: &Path) -> PathBuf {
 }
 
 /// Runs the task over a pad behind TCP and the UR. Returns its figures.
-fn tcp_pad_and_ur(trial: Trial) -> String {
+///
+/// # Errors
+/// If the run was held.
+fn tcp_pad_and_ur(trial: Trial) -> Result<String, String> {
     let folder = tempfile::tempdir().unwrap();
     let reverse = std::net::TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap().port();
     let wires = format!(
@@ -230,8 +266,7 @@ fn tcp_pad_and_ur(trial: Trial) -> String {
         script_port = {}
         receive_timeout_ms = 200
         [limits]
-        workspace_min_m = [-1.0, -1.0, 0.0]
-        workspace_max_m = [1.0, 1.0, 1.0]
+        {UR_WORKSPACE}
         ",
         place("pad", "port"),
         trial.rate_hz,
@@ -240,29 +275,29 @@ fn tcp_pad_and_ur(trial: Trial) -> String {
         place("arm", "rtde_port"),
         place("arm", "script_port"),
     );
-    drop(run_hybrid(bench, trial));
+    run_hybrid(bench, trial)?;
     let figures = cell.end();
     let arm = &figures.summary["arm"];
     let counts = [&arm["programs"], &arm["faults"], &arm["timeouts"], &arm["stops"]];
     assert_eq!(counts, [1, 0, 0, 1].map(serde_json::Value::from).each_ref(), "{}", figures.summary);
-    compare(&figures, &without_wires(trial, &ball, &["devices.bench.stiffness=2000.0"]), trial)
+    Ok(compare(&figures, &without_wires(trial, &ball, &["devices.bench.stiffness=2000.0"]), trial))
 }
 
 #[test]
 fn the_hybrid_task_holds_a_contact_over_a_serial_pad_and_the_lwr() {
-    serial_pad_and_lwr(SHORT);
+    patiently(serial_pad_and_lwr, SHORT);
 }
 
 #[test]
 fn the_hybrid_task_holds_a_contact_over_a_pad_behind_tcp_and_the_ur() {
-    tcp_pad_and_ur(SHORT);
+    patiently(tcp_pad_and_ur, SHORT);
 }
 
 #[test]
 #[ignore = "it takes a minute on a machine that does nothing else: `.ci/edge` runs it"]
 fn figures_of_the_hybrid_task_over_wires() {
-    let lwr = serial_pad_and_lwr(LONG);
-    let ur = tcp_pad_and_ur(LONG);
+    let lwr = patiently(serial_pad_and_lwr, LONG);
+    let ur = patiently(tcp_pad_and_ur, LONG);
     let text = format!("\na serial pad and the LWR\n{lwr}\na pad behind TCP and the UR\n{ur}\n");
     std::io::stdout().write_all(text.as_bytes()).unwrap();
 }

@@ -30,94 +30,97 @@ fn refused(keys: &str) -> Mistakes {
     }
 }
 
+/// Keys that are wrong, the key at which the mistake is, and a part of its message.
+const MISTAKES: &[(&str, &str, &str)] = &[
+    ("link = '/dev/ttyUSB0'", "link", "does not begin with a kind of link"),
+    ("baud =", "link", "a serial port needs `baud`"),
+    ("mark =", "frame", "`mark` is missing: the bytes with which each frame begins"),
+    ("mark = 'AA55'", "mark", "`AA55` is a text of 4 bytes"),
+    ("mark = 'hex:AA5'", "mark", "3 hexadecimal digits are not whole bytes"),
+    ("mark = ''", "mark", "`mark` is empty"),
+    ("length = 7", "length", "the last value ends after 8 bytes, but the length is 7"),
+    ("length = 8\ncheck = 'sum16le'", "length", "the last value ends after 8 bytes, and 2 more follow it, but"),
+    ("length = 100_000", "length", "a frame has at most 65536 bytes"),
+    ("frame = 'trailer'\nlength = 7", "length", "the last value ends after 6 bytes, and 2 more follow it, but"),
+    ("check = 'crc-16/modbuss'", "check", "no checksum is called `crc-16/modbuss`"),
+    ("check_from = 2", "check_from", "`check_from` has no meaning without a `check`"),
+    ("check = 'xor8'\ncheck_from = 8", "check_from", "the checksum covers nothing: it stands at byte 8"),
+    ("check_order = 'le'", "check_order", "`check_order` has no meaning without a `check`"),
+    ("cell = 'dec'", "cell", "numbers in text need `frame = \"lines\"`"),
+    ("frame = 'lines'\nmark =", "cell", "lines hold numbers in text"),
+    ("frame = 'lines'\nmark =\ncell = 'dec'\ncheck = 'xor8'", "check", "no meaning for numbers in text"),
+    ("frame = 'datagram'", "frame", "sends bytes without borders"),
+    ("frame = 'reply'\nmark =", "frame", "a reply needs `poll`"),
+    ("frame = 'cobs'\nmark =\nmark_at = 1", "mark_at", "`mark_at` has no meaning with this `frame`"),
+    ("mark_at = 40\noffset = 2", "mark_at", "the mark ends behind the frame, which has 8 bytes"),
+    ("mask = 256", "mask", "the mask 256 is not from 1 to 255"),
+    ("mask = 0", "mask", "the mask 0 is not from 1 to 255"),
+    ("cell = 'f32le'\nmask = 255", "mask", "`mask` has no meaning for a float"),
+    ("cell = 'f32le'\nshift = 4", "shift", "`shift` has no meaning for a float"),
+    ("cell = 'u16le'\nstride = 1", "stride", "values 1 apart overlap: a value has 2 bytes"),
+    ("offset = 70_000", "offset", "a frame is longer than 65536 bytes"),
+    ("shape = [2]", "shape", "`shape` has 1 numbers"),
+    ("shape = [0, 3]", "shape", "`shape` has a number that is 0"),
+    ("shape = [1000, 1000]", "shape", "1000 by 1000 by 1 values are more than 262144"),
+    ("axes = ['x']", "axes", "`axes` has no meaning for a `shape` of two numbers"),
+    ("axis = 'x'", "axis", "`axis` has no meaning for a `shape` of two numbers"),
+    ("shape = [2, 3, 2]", "shape", "a tactel has 2 values, and `axes` names 0"),
+    ("shape = [2, 3, 2]\naxes = ['x']", "axes", "a tactel has 2 values, and `axes` names 1"),
+    ("shape = [2, 3, 2]\naxes = ['x', 'x']", "axes", "two axes are called `x`"),
+    ("shape = [2, 3, 2]\naxes = ['x', 'z']", "axes", "`axis` is missing"),
+    ("shape = [2, 3, 2]\naxes = ['x', 'z']\naxis = 'y'", "axis", "no axis is called `y`"),
+    ("plausible = { value = [3, 1] }", "plausible.value", "the least value 3 is above the greatest value 1"),
+    ("plausible = { valeu = [1, 3] }", "plausible.valeu", "no axis is called `valeu`"),
+    ("lut = [0, 1, 2, 3, 4, 4]", "lut", "`lut` has the index 4 twice, and the index 5 is missing"),
+    ("lut = [0, 1]", "lut", "`lut` has 2 indices, and 2 by 3 cells need 6"),
+    ("lut = [0, 1, 2, 3, 4, 6]", "lut", "`lut` has the index 6, and the last cell is 5"),
+    ("scale = { gain = 0 }", "scale.gain", "with a `gain` of 0 the image is always the same"),
+    ("clock = { counter = { offset = 8, cell = 'u8' } }", "clock.counter.offset", "it ends behind the frame"),
+    (
+        "length = 10\nclock = { stamp = { offset = 8, cell = 'dec', unit = 'ms' } }",
+        "clock.stamp.cell",
+        "the values of the frame are bytes",
+    ),
+    ("parts = { values = 4 }", "parts.values", "a frame of 6 values has no whole number of parts with 4 values"),
+    ("parts = { values = 3 }", "parts", "a part needs `index`, its number, or `start`"),
+    (
+        "parts = { values = 3, index = { offset = 2, cell = 'u8' }, start = { offset = 2, cell = 'u8' } }",
+        "parts.start",
+        "`index` and `start` exclude each other",
+    ),
+    (
+        "parts = { values = 3, index = { offset = 2, cell = 'u8' }, first = 1, completes = 3 }",
+        "parts.completes",
+        "`completes` is no part: they are 1 to 2",
+    ),
+    (
+        "parts = { values = 3, index = { offset = 2, cell = 'u8' }, lengths = [8] }",
+        "parts.lengths",
+        "`lengths` has 1 numbers, and a frame has 2 parts",
+    ),
+    (
+        "parts = { values = 3, index = { offset = 2, cell = 'u8' }, lengths = [4, 9] }\noffset = 3",
+        "parts.lengths",
+        "a part of 4 bytes is too short or too long: its last value ends at byte 6",
+    ),
+    ("start = 'hex:0'", "start", "1 hexadecimal digits are not whole bytes"),
+    ("stop = ''", "stop", "`stop` is empty"),
+    ("from = '10.0.0.1'", "from", "`from` has no meaning with the link `/dev/null`"),
+    ("link = 'udp:5005'\nfrom = 'pad'", "from", "`pad` is not the address of a host"),
+    ("link = 'udp:5005'\nstart = 'go'", "start", "`start` has no receiver: `udp:5005` only listens"),
+];
+
 #[test]
 fn each_mistake_is_at_its_key_with_a_way_out() {
-    let cases = [
-        ("link = '/dev/ttyUSB0'", "link", "does not begin with a kind of link"),
-        ("baud =", "link", "a serial port needs `baud`"),
-        ("mark =", "frame", "`mark` is missing: the bytes with which each frame begins"),
-        ("mark = 'AA55'", "mark", "`AA55` is a text of 4 bytes"),
-        ("mark = 'hex:AA5'", "mark", "3 hexadecimal digits are not whole bytes"),
-        ("mark = ''", "mark", "`mark` is empty"),
-        ("length = 7", "length", "the last value ends after 8 bytes, but the length is 7"),
-        ("length = 8\ncheck = 'sum16le'", "length", "the last value ends after 8 bytes, and 2 more follow it, but"),
-        ("length = 100_000", "length", "a frame has at most 65536 bytes"),
-        ("frame = 'trailer'\nlength = 7", "length", "the last value ends after 6 bytes, and 2 more follow it, but"),
-        ("check = 'crc-16/modbuss'", "check", "no checksum is called `crc-16/modbuss`"),
-        ("check_from = 2", "check_from", "`check_from` has no meaning without a `check`"),
-        ("check = 'xor8'\ncheck_from = 8", "check_from", "the checksum covers nothing: it stands at byte 8"),
-        ("check_order = 'le'", "check_order", "`check_order` has no meaning without a `check`"),
-        ("cell = 'dec'", "cell", "numbers in text need `frame = \"lines\"`"),
-        ("frame = 'lines'\nmark =", "cell", "lines hold numbers in text"),
-        ("frame = 'lines'\nmark =\ncell = 'dec'\ncheck = 'xor8'", "check", "no meaning for numbers in text"),
-        ("frame = 'datagram'", "frame", "sends bytes without borders"),
-        ("frame = 'reply'\nmark =", "frame", "a reply needs `poll`"),
-        ("frame = 'cobs'\nmark =\nmark_at = 1", "mark_at", "`mark_at` has no meaning with this `frame`"),
-        ("mark_at = 40\noffset = 2", "mark_at", "the mark ends behind the frame, which has 8 bytes"),
-        ("mask = 256", "mask", "the mask 256 is not from 1 to 255"),
-        ("mask = 0", "mask", "the mask 0 is not from 1 to 255"),
-        ("cell = 'f32le'\nmask = 255", "mask", "`mask` has no meaning for a float"),
-        ("cell = 'f32le'\nshift = 4", "shift", "`shift` has no meaning for a float"),
-        ("cell = 'u16le'\nstride = 1", "stride", "values 1 apart overlap: a value has 2 bytes"),
-        ("offset = 70_000", "offset", "a frame is longer than 65536 bytes"),
-        ("shape = [2]", "shape", "`shape` has 1 numbers"),
-        ("shape = [0, 3]", "shape", "`shape` has a number that is 0"),
-        ("shape = [1000, 1000]", "shape", "1000 by 1000 by 1 values are more than 262144"),
-        ("axes = ['x']", "axes", "`axes` has no meaning for a `shape` of two numbers"),
-        ("axis = 'x'", "axis", "`axis` has no meaning for a `shape` of two numbers"),
-        ("shape = [2, 3, 2]", "shape", "a tactel has 2 values, and `axes` names 0"),
-        ("shape = [2, 3, 2]\naxes = ['x']", "axes", "a tactel has 2 values, and `axes` names 1"),
-        ("shape = [2, 3, 2]\naxes = ['x', 'x']", "axes", "two axes are called `x`"),
-        ("shape = [2, 3, 2]\naxes = ['x', 'z']", "axes", "`axis` is missing"),
-        ("shape = [2, 3, 2]\naxes = ['x', 'z']\naxis = 'y'", "axis", "no axis is called `y`"),
-        ("plausible = { value = [3, 1] }", "plausible.value", "the least value 3 is above the greatest value 1"),
-        ("plausible = { valeu = [1, 3] }", "plausible.valeu", "no axis is called `valeu`"),
-        ("lut = [0, 1, 2, 3, 4, 4]", "lut", "`lut` has the index 4 twice, and the index 5 is missing"),
-        ("lut = [0, 1]", "lut", "`lut` has 2 indices, and 2 by 3 cells need 6"),
-        ("lut = [0, 1, 2, 3, 4, 6]", "lut", "`lut` has the index 6, and the last cell is 5"),
-        ("scale = { gain = 0 }", "scale.gain", "with a `gain` of 0 the image is always the same"),
-        ("clock = { counter = { offset = 8, cell = 'u8' } }", "clock.counter.offset", "it ends behind the frame"),
-        (
-            "length = 10\nclock = { stamp = { offset = 8, cell = 'dec', unit = 'ms' } }",
-            "clock.stamp.cell",
-            "the values of the frame are bytes",
-        ),
-        ("parts = { values = 4 }", "parts.values", "a frame of 6 values has no whole number of parts with 4 values"),
-        ("parts = { values = 3 }", "parts", "a part needs `index`, its number, or `start`"),
-        (
-            "parts = { values = 3, index = { offset = 2, cell = 'u8' }, start = { offset = 2, cell = 'u8' } }",
-            "parts.start",
-            "`index` and `start` exclude each other",
-        ),
-        (
-            "parts = { values = 3, index = { offset = 2, cell = 'u8' }, first = 1, completes = 3 }",
-            "parts.completes",
-            "`completes` is no part: they are 1 to 2",
-        ),
-        (
-            "parts = { values = 3, index = { offset = 2, cell = 'u8' }, lengths = [8] }",
-            "parts.lengths",
-            "`lengths` has 1 numbers, and a frame has 2 parts",
-        ),
-        (
-            "parts = { values = 3, index = { offset = 2, cell = 'u8' }, lengths = [4, 9] }\noffset = 3",
-            "parts.lengths",
-            "a part of 4 bytes is too short or too long: its last value ends at byte 6",
-        ),
-        ("start = 'hex:0'", "start", "1 hexadecimal digits are not whole bytes"),
-        ("stop = ''", "stop", "`stop` is empty"),
-        ("from = '10.0.0.1'", "from", "`from` has no meaning with the link `/dev/null`"),
-        ("link = 'udp:5005'\nfrom = 'pad'", "from", "`pad` is not the address of a host"),
-        ("link = 'udp:5005'\nstart = 'go'", "start", "`start` has no receiver: `udp:5005` only listens"),
-    ];
-    for (keys, path, message) in cases {
+    for (keys, path, message) in MISTAKES {
         let mistakes = refused(keys);
         let is_there = mistakes.iter().any(|mistake| {
             matches!(&mistake.at, At::Param(at) | At::Key(at) if at == path) && mistake.message.contains(message)
         });
         assert!(is_there, "{keys}\n{mistakes:#?}");
     }
-    let with_help = cases.iter().flat_map(|(keys, ..)| refused(keys)).filter(|mistake| mistake.help.is_some()).count();
+    let with_help =
+        MISTAKES.iter().flat_map(|(keys, ..)| refused(keys)).filter(|mistake| mistake.help.is_some()).count();
     assert!(with_help > 40, "{with_help} mistakes have a way out");
 }
 

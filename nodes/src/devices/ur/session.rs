@@ -24,6 +24,8 @@ const PROGRAM_SHOWS: Duration = Duration::from_millis(500);
 const MAX_REST: Duration = Duration::from_millis(700);
 /// Time for the program on the robot to end.
 const MAX_LEAVE: Duration = Duration::from_millis(200);
+/// Time in which what has arrived already is seen.
+const ARRIVED: Duration = Duration::from_millis(10);
 /// Longest time in which the velocity may have changed between two messages [s].
 const MAX_STEP_S: f64 = 0.1;
 
@@ -120,9 +122,11 @@ impl<'a> Session<'a> {
                 }
                 accepted = self.listeners.accept() => self.accept(link, accepted),
                 () = closed(self.reverse.as_ref()) => self.disconnect(),
-                // It is the last one: after a suspension of this process, the samples that have arrived come first.
                 () = sleep_until((self.heard + silence).into()) => {
-                    return End::Lost(format!("no sample for {silence:?}"));
+                    // A process that was suspended sees its time run out before it sees what has arrived.
+                    if timeout(ARRIVED, self.stream.readable()).await.is_err() {
+                        return End::Lost(format!("no sample for {silence:?}"));
+                    }
                 }
             }
             if self.ends() {

@@ -13,6 +13,8 @@ const MIN_FRAMES: usize = 4;
 const MIN_LENGTH: usize = 4;
 /// Share of the frames that have the mark at its place, in percent.
 const MIN_REGULAR_PERCENT: usize = 70;
+/// Difference between two shares that are equally good, in percent.
+const REGULAR_MARGIN_PERCENT: usize = 5;
 /// Longest mark that is looked for.
 const MAX_MARK: usize = 4;
 /// The usual marks.
@@ -76,19 +78,18 @@ fn row(bytes: &[u8]) -> Option<Row<'_>> {
     for (i, pair) in bytes.array_windows().enumerate() {
         places.entry(*pair).or_default().push(i);
     }
-    let mut best: Option<(usize, Row<'_>)> = None;
+    let mut found = Vec::new();
     for places in places.values().filter(|places| places.len() >= MIN_FRAMES) {
         let Some((length, start, steps)) = longest_run(places) else { continue };
-        let expected = bytes.len() / length;
-        let regular = 100 * steps / expected.max(1);
-        if length < MIN_LENGTH || steps + 1 < MIN_FRAMES || regular < MIN_REGULAR_PERCENT {
-            continue;
-        }
-        if best.as_ref().is_none_or(|(most, _)| regular > *most) {
-            best = Some((regular, Row { bytes: &bytes[start..start + steps * length], length, start }));
+        let regular = 100 * steps / (bytes.len() / length).max(1);
+        if length >= MIN_LENGTH && steps + 1 >= MIN_FRAMES && regular >= MIN_REGULAR_PERCENT {
+            found.push((regular, Row { bytes: &bytes[start..start + steps * length], length, start }));
         }
     }
-    best.map(|(_, row)| row)
+    // What comes in every second frame is as regular as what comes in each.
+    let most = found.iter().map(|(regular, _)| *regular).max()?;
+    let regular = found.into_iter().filter(|(regular, _)| regular + REGULAR_MARGIN_PERCENT >= most);
+    regular.map(|(_, row)| row).min_by_key(|row| row.length)
 }
 
 /// Finds the longest run of equal steps. Returns the step, the first place and the number of steps.

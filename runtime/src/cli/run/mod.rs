@@ -1,5 +1,6 @@
 //! `run`: runs a graph, prints a summary and writes recordings.
 
+mod commissioning;
 mod events;
 mod files;
 mod held;
@@ -32,6 +33,7 @@ use crate::graph::{Compiled, Request};
 use crate::record::PointsRequest;
 use crate::source::Code;
 
+pub use commissioning::{Commissioning, Proof};
 pub use time::duration;
 
 /// Run a graph and print a summary

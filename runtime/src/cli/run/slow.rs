@@ -1,6 +1,6 @@
 //! The fraction of the limits that a run uses.
 
-use crate::cli::commissioning::{UNCOMMISSIONED_FRACTION, uncommissioned};
+use super::commissioning::{UNCOMMISSIONED_FRACTION, uncommissioned};
 use crate::cli::shell::Shell;
 use crate::graph::{self, Compiled, Request};
 

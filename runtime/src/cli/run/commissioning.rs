@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 use crate::graph::{CommissionedDevice, Compiled};
 
 /// Fraction of the limits that a run uses while a device is not commissioned.
-pub const UNCOMMISSIONED_FRACTION: f64 = 0.1;
+pub(super) const UNCOMMISSIONED_FRACTION: f64 = 0.1;
 
 /// What was proven of the devices of a bench, by name.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
@@ -77,7 +77,7 @@ impl Commissioning {
 ///
 /// # Errors
 /// If a file beside a bench cannot be read.
-pub(crate) fn uncommissioned(plan: &Compiled) -> Result<Vec<(String, String)>, String> {
+pub(super) fn uncommissioned(plan: &Compiled) -> Result<Vec<(String, String)>, String> {
     let mut missing = Vec::new();
     for (device, bench) in plan.to_commission() {
         if !Commissioning::read(Path::new(bench))?.covers(device) {
