@@ -79,7 +79,7 @@ mod tests {
     #[test]
     fn a_ramp_has_a_constant_change() {
         let shape = ScalarShape::of(Unit::NEWTON);
-        let mut rig = NodeRig::<TemplateNode>::new("gain = 2.0", &[("value", shape.into())]).unwrap();
+        let mut rig = NodeRig::new::<TemplateNode>("gain = 2.0", &[("value", shape.into())]).unwrap();
         let mut change = |i: i32| {
             rig.set("value", 0.5 * f64::from(i));
             rig.step_ms(4.0);
