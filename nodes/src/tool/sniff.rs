@@ -140,7 +140,7 @@ fn description(guess: &Guess, baud: u32, sent: Option<&str>) -> String {
         "# A pad that `tactflow sniff` has heard: check each key, and measure `pitch`\n[sensor]\n".to_owned();
     let mut line = |key: &str, value: &str, comment: &str| {
         let comment = if comment.is_empty() { String::new() } else { format!("  # {comment}") };
-        let _ = writeln!(text, "{}{comment}", format!("{key} = {value}"));
+        let _ = writeln!(text, "{key} = {value}{comment}");
     };
     if baud > 0 {
         line("baud", &baud.to_string(), "");

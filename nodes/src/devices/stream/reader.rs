@@ -109,11 +109,11 @@ impl Reader {
         loop {
             let Self { framer, decoder, parts, part, .. } = self;
             let mut is_sound = |frame: &[u8]| is_sound(frame, decoder, parts.as_ref(), part);
-            let frame = framer.next(&mut is_sound).map(|frame| {
-                // Its values are those of `part`.
+            let frame = framer.next(&mut is_sound);
+            // The values of `part` become those of the frame.
+            if let Some(frame) = frame {
                 is_sound(frame);
-                frame
-            });
+            }
             let Some(frame) = frame else {
                 self.count_framing();
                 return None;

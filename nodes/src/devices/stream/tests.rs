@@ -237,8 +237,7 @@ fn frames_come_in_parts_by_the_index_of_their_first_value() {
 fn shipped(name: &str) -> String {
     let (_, bytes) = builtin::FILES.iter().find(|(file, _)| *file == format!("pads/{name}.toml")).unwrap();
     let text = std::str::from_utf8(bytes).unwrap();
-    let text = text.replace("[sensor]\n", "link = 'serial:/dev/null'\n").replace("[sensor.", "[");
-    text
+    text.replace("[sensor]\n", "link = 'serial:/dev/null'\n").replace("[sensor.", "[")
 }
 
 #[test]

@@ -57,7 +57,7 @@ impl Parts {
             PartNumber::Index { first, .. } => number.checked_sub(first)?,
             PartNumber::Start { .. } => {
                 let values = self.values as u64;
-                (number % values == 0).then_some(number / values)?
+                number.is_multiple_of(values).then_some(number / values)?
             }
         };
         usize::try_from(part).ok().filter(|part| *part < self.count)

@@ -18,9 +18,9 @@ pub(crate) enum Sum {
     Xor8,
     Sum8,
     Sum16,
-    Crc8(Crc<u8, Table<1>>),
-    Crc16(Crc<u16, Table<1>>),
-    Crc32(Crc<u32, Table<1>>),
+    Crc8(Box<Crc<u8, Table<1>>>),
+    Crc16(Box<Crc<u16, Table<1>>>),
+    Crc32(Box<Crc<u32, Table<1>>>),
 }
 
 /// A checksum at the end of a frame.
@@ -110,9 +110,9 @@ impl Sum {
         let (_, parameters) = CRCS.iter().find(|(known, _)| *known == constant)?;
         let order = |is_reflected: bool| if is_reflected { ByteOrder::Le } else { ByteOrder::Be };
         Some(match parameters {
-            Parameters::Crc8(crc) => (Self::Crc8(Crc::<u8, Table<1>>::new(crc)), ByteOrder::Le),
-            Parameters::Crc16(crc) => (Self::Crc16(Crc::<u16, Table<1>>::new(crc)), order(crc.refout)),
-            Parameters::Crc32(crc) => (Self::Crc32(Crc::<u32, Table<1>>::new(crc)), order(crc.refout)),
+            Parameters::Crc8(crc) => (Self::Crc8(Box::new(Crc::<u8, Table<1>>::new(crc))), ByteOrder::Le),
+            Parameters::Crc16(crc) => (Self::Crc16(Box::new(Crc::<u16, Table<1>>::new(crc))), order(crc.refout)),
+            Parameters::Crc32(crc) => (Self::Crc32(Box::new(Crc::<u32, Table<1>>::new(crc))), order(crc.refout)),
         })
     }
 

@@ -13,7 +13,7 @@ pub(crate) fn bytes_of(text: &str) -> Result<Vec<u8>, (String, String)> {
     if let Some(strange) = digits.iter().find(|digit| !digit.is_ascii_hexdigit()) {
         return Err((format!("`{strange}` is not a hexadecimal digit"), help()));
     }
-    if digits.len() % 2 != 0 {
+    if !digits.len().is_multiple_of(2) {
         return Err((format!("{} hexadecimal digits are not whole bytes", digits.len()), help()));
     }
     let value = |digit: char| digit.to_digit(16).unwrap_or_default() as u8;
@@ -22,7 +22,7 @@ pub(crate) fn bytes_of(text: &str) -> Result<Vec<u8>, (String, String)> {
 
 /// Whether a text looks like bytes in hexadecimal digits without their prefix.
 pub(crate) fn is_bare_hex(text: &str) -> bool {
-    text.len() % 2 == 0 && text.len() >= 2 && text.chars().all(|digit| digit.is_ascii_hexdigit())
+    text.len().is_multiple_of(2) && text.len() >= 2 && text.chars().all(|digit| digit.is_ascii_hexdigit())
 }
 
 #[cfg(test)]
