@@ -131,6 +131,7 @@ fn only_the_edge_names_tokio() {
         "nodes/src/devices/agni/driver.rs",
         "nodes/src/devices/agni/port.rs",
         "nodes/src/devices/agni/session.rs",
+        "nodes/src/devices/agni/tests.rs",
         "nodes/src/devices/link/mod.rs",
         "nodes/src/devices/link/serial.rs",
         "nodes/src/devices/link/tcp.rs",
