@@ -65,7 +65,7 @@ pub(crate) fn compile_in(mut loader: Loader, catalogue: &Catalogue, request: &Re
     let ports = std::mem::take(&mut builder.ports);
     let (diagnostics, sources, of_nodes) = builder.finish();
     measured.extend(of_nodes);
-    let (mistakes, warnings) = split(check::parts::move_out(&flat, &sources, diagnostics));
+    let (mistakes, mut warnings) = split(check::parts::move_out(&flat, &sources, diagnostics));
     let Some((clock, _)) = clock.filter(|_| mistakes.is_empty()) else {
         return Err(Report::new(sources, mistakes));
     };
@@ -83,12 +83,8 @@ pub(crate) fn compile_in(mut loader: Loader, catalogue: &Catalogue, request: &Re
         defaults: RefCell::default(),
     };
     let outline = outline.build();
-    let mut unused = Diagnostics::new();
-    check::unused::check(&net, &modes, view.sources(), &mut unused);
-    let mut warnings = check::parts::move_out(&flat, &sources, warnings.into_iter().chain(unused).collect());
-    warnings.sort_by_key(|warning| (warning.span.start, warning.code));
-    // Several nodes may read the same number of [limits].
-    warnings.dedup();
+    check::unused::check(&net, &modes, view.sources(), &mut warnings);
+    let mut warnings = sorted(check::parts::move_out(&flat, &sources, warnings));
     let allowed = check::allow::silence(&flat, &mut warnings);
     let view = view.plan(&net, &nodes, &ports);
     let shown: Vec<PortRef> = view.ports.iter().map(|port| port.source).collect();
@@ -110,6 +106,13 @@ fn check_wires(net: &Net<'_>, opened: &OpenedBench, diagnostics: &mut Diagnostic
     check::exports::check(net, diagnostics);
     check::delays::check(net, diagnostics);
     check::policy::check(net, diagnostics);
+}
+
+/// Sorts warnings by their place. Several nodes may read the same number of [limits].
+fn sorted(mut warnings: Diagnostics) -> Diagnostics {
+    warnings.sort_by_key(|warning| (warning.span.start, warning.code));
+    warnings.dedup();
+    warnings
 }
 
 /// Separates the mistakes from the warnings.

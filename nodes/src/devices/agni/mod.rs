@@ -2,11 +2,11 @@
 //!
 //! | module | what it holds |
 //! |---|---|
-//! | [`messages`] | the messages of the protocol, without any I/O |
-//! | [`layout`] | where the readings are in a payload |
-//! | [`sensors`] | which sensor is which pad |
-//! | [`port`], [`session`] | the port and the handshake |
-//! | [`driver`] | the driver |
+//! | `messages` | the messages of the protocol, without any I/O |
+//! | `layout` | where the readings are in a payload |
+//! | `sensors` | which sensor is which pad |
+//! | `port`, `session` | the port and the handshake |
+//! | `driver` | the driver |
 
 mod driver;
 mod layout;

@@ -103,7 +103,7 @@ pub(super) fn prove(shell: &Shell, bench: &Path, arm: &Arm<'_>) -> Vec<Finding> 
 
 fn judge(shell: &Shell, bench: &Path, arm: &Arm<'_>, track: &Track, halt: Option<String>) -> Vec<Finding> {
     let Some(silent) = track.silent else {
-        let why = halt.map_or_else(|| "it got no command".to_owned(), |halt| halt);
+        let why = halt.unwrap_or_else(|| "it got no command".to_owned());
         return vec![Finding::problem(format!("the arm did not move: {why}"))];
     };
     let Some((time, way)) = track.stop() else {
