@@ -88,6 +88,13 @@ impl Attached {
         &self.samples.counts
     }
 
+    /// Takes the place of a graph that commands nothing: it renews commands of zero. Without it, no commands hold, and a
+    /// driver cannot refuse them.
+    pub fn rest(&mut self) {
+        self.commands.rest();
+        self.send();
+    }
+
     /// Returns why the driver refuses commands; `None` while it follows them, or if it gave no reason.
     #[must_use]
     pub fn refusal(&self) -> Option<String> {

@@ -93,7 +93,7 @@ pub(crate) fn compile_in(mut loader: Loader, catalogue: &Catalogue, request: &Re
     let period = ((period * 1e9).round() as i64).max(1);
     let (exports, facts, silences) =
         (net.exports_by_name(), opened.facts(&net), check::silence::describe(&net, &opened));
-    let to_commission = bench::to_commission(&net, &opened);
+    let to_commission = bench::to_commission(&net, &opened, &sources);
     let plan = Plan { roles, devices: opened.devices, nodes, commands, clock, period, tasks, reach, allowed };
     Ok(Compiled { plan, view, sources, warnings, outline, exports, facts, silences, to_commission })
 }

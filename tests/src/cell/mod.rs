@@ -6,13 +6,13 @@
 //!
 //! | module | what it holds |
 //! |---|---|
-//! | [`setup`] | the file that describes a cell |
-//! | [`simulation`] | the bench, stepped with the clock |
-//! | [`pty`] | a pseudo-terminal in the place of a serial port |
-//! | [`flexitac`], [`myrmex`], [`tcp_pad`] | the sensors |
-//! | [`lwr`], [`ur`] | the robots |
-//! | [`log`] | what arrived, when, and what it did |
-//! | [`run`] | the loop over all of them |
+//! | `setup` | the file that describes a cell |
+//! | `simulation` | the bench, stepped with the clock |
+//! | `pty` | a pseudo-terminal in the place of a serial port |
+//! | `flexitac`, `myrmex`, `tcp_pad` | the sensors |
+//! | `lwr`, `ur` | the robots |
+//! | `log` | what arrived, when, and what it did |
+//! | `run` | the loop over all of them |
 //!
 //! The first line of its output is JSON with the ports and paths that it serves, and the last one is JSON with its
 //! figures. It ends when its standard input ends, on SIGTERM, and after `for_s`.

@@ -1,6 +1,6 @@
 //! `stream`: a tactile pad that is described in TOML.
 //!
-//! [`link`](super::link) receives bytes, `framing` finds the frames in them, `decoding` reads the cells, and `driver`
+//! `link` receives bytes, `framing` finds the frames in them, `decoding` reads the cells, and `driver`
 //! publishes the images. `plan` checks the description. Only `driver` and `link` do I/O.
 
 mod decoding;

@@ -47,7 +47,10 @@ impl Patient {
         description: Description,
         driver: Box<dyn Live>,
     ) -> io::Result<Self> {
-        let attached = Attached::start(name, description, driver)?;
+        let mut attached = Attached::start(name, description, driver)?;
+        // An arm is only listened to.
+        attached.mute(true);
+        attached.rest();
         let port = |(name, shape): (&str, &Shape)| Port {
             name: name.to_owned(),
             kind: shape.kind(),
@@ -110,6 +113,7 @@ impl Patient {
         }
         findings
             .extend(self.attached.refusal().map(|why| Finding::problem(format!("it does not follow commands: {why}"))));
+        findings.extend(self.attached.refusal().map(|why| Finding::problem(format!("it would not move: {why}"))));
         let has_ended = self.has_ended;
         match self.attached.stop("the examination is over") {
             Err(error) => findings.push(Finding::problem(error.to_string())),

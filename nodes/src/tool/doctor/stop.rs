@@ -20,6 +20,8 @@ const MOTION_S: f64 = 1.5;
 const PATIENCE_S: f64 = 30.0;
 /// Time for which the arm is watched after it should be at rest [s].
 const WATCH_S: f64 = 1.0;
+/// Time before the silence in which the arm must move [s].
+const JUST_BEFORE_S: f64 = 0.2;
 /// Motion of a joint below which it rests [rad].
 const REST_RAD: f64 = 2e-5;
 
@@ -51,6 +53,8 @@ struct Track {
     samples: Vec<(f64, Vec<f64>)>,
     /// Time at which this process fell silent.
     silent: Option<f64>,
+    /// Why the commands were held before that.
+    halt: Option<String>,
 }
 
 /// Moves an arm, measures its stop and notes the proof beside the bench.
@@ -80,6 +84,9 @@ pub(super) fn prove(shell: &Shell, bench: &Path, arm: &Arm<'_>) -> Vec<Finding> 
         if moves {
             began.get_or_insert(now);
         }
+        if track.silent.is_none() && track.halt.is_none() {
+            track.halt = engine.halts().first().map(|halt| halt.fault.to_string());
+        }
         if began.is_some_and(|began| now > began + MOTION_S) && track.silent.is_none() {
             engine.mute(&arm.device.name, true);
             track.silent = Some(now);
@@ -95,16 +102,18 @@ pub(super) fn prove(shell: &Shell, bench: &Path, arm: &Arm<'_>) -> Vec<Finding> 
             track.samples.push((mark.stamp().nanos as f64 * 1e-9, joints.0.to_vec()));
         }
     });
+    // Also after Ctrl-C in the silence.
+    engine.mute(&arm.device.name, false);
     match outcome {
         Err(error) => vec![Finding::problem(format!("cannot run: {error}"))],
-        Ok(_) => judge(shell, bench, arm, &track, engine.halts().first().map(|halt| halt.fault.to_string())),
+        Ok(_) => judge(shell, bench, arm, &track),
     }
 }
 
-fn judge(shell: &Shell, bench: &Path, arm: &Arm<'_>, track: &Track, halt: Option<String>) -> Vec<Finding> {
-    let Some(silent) = track.silent else {
-        let why = halt.unwrap_or_else(|| "it got no command".to_owned());
-        return vec![Finding::problem(format!("the arm did not move: {why}"))];
+fn judge(shell: &Shell, bench: &Path, arm: &Arm<'_>, track: &Track) -> Vec<Finding> {
+    let (Some(silent), None) = (track.silent, &track.halt) else {
+        let why = track.halt.as_deref().unwrap_or("it got no command");
+        return vec![Finding::problem(format!("the arm did not move as it was commanded: {why}"))];
     };
     let Some((time, way)) = track.stop() else {
         return vec![Finding::problem(
@@ -146,10 +155,11 @@ impl Track {
     fn stop(&self) -> Option<(f64, f64)> {
         let silent = self.silent?;
         let off = |one: &[f64], other: &[f64]| one.iter().zip(other).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
-        let (_, first) = self.samples.first()?;
         let (last_time, last) = self.samples.last()?;
-        let (_, at) = self.samples.iter().rev().find(|(time, _)| *time <= silent)?;
-        if off(first, at) < REST_RAD || *last_time <= silent {
+        let at_or_before = |limit: f64| self.samples.iter().rev().find(|(time, _)| *time <= limit);
+        let ((_, at), (_, before)) = (at_or_before(silent)?, at_or_before(silent - JUST_BEFORE_S)?);
+        // An arm that had stopped for another reason proves nothing.
+        if off(before, at) < REST_RAD || *last_time <= silent {
             return None;
         }
         let moving = self.samples.iter().rev().find(|(_, posture)| off(posture, last) > REST_RAD);
@@ -212,14 +222,14 @@ mod tests {
             let time = f64::from(i) * 0.01;
             (time, vec![0.0, 0.1 * time.min(stop)])
         };
-        Track { samples: (0..=200).map(sample).collect(), silent: Some(1.0) }
+        Track { samples: (0..=200).map(sample).collect(), silent: Some(1.0), halt: None }
     }
 
     #[test]
     fn the_stop_is_measured_from_the_silence() {
         let (time, way) = track(1.25).stop().unwrap();
         assert!((time - 0.24).abs() < 0.011 && (way - 0.025).abs() < 1e-9, "{time} s, {way} rad");
-        assert_eq!(track(0.9).stop().unwrap().0, 0.0, "it had stopped before");
+        assert_eq!(track(0.7).stop(), None, "it had stopped before");
     }
 
     #[test]

@@ -62,7 +62,9 @@ impl Timing {
         let mut findings = vec![Finding::fine(text)];
         let is_off = (rate / declared - 1.0).abs() > RATE_TOLERANCE;
         if is_off {
-            findings.push(Finding::warning(format!("the rate is not the declared one: write `rate_hz = {rate:.0}`")));
+            findings.push(Finding::warning(format!(
+                "the rate is not the declared one: correct it in the bench, to {rate:.0} Hz"
+            )));
         }
         findings
     }
@@ -102,7 +104,10 @@ mod tests {
     #[test]
     fn another_rate_and_silence_are_found() {
         let findings = timing(0.02, 50).describe("image", 0.01, 1.0);
-        assert_eq!(findings[1], Finding::warning("the rate is not the declared one: write `rate_hz = 50`"));
+        assert_eq!(
+            findings[1],
+            Finding::warning("the rate is not the declared one: correct it in the bench, to 50 Hz")
+        );
         assert_eq!(Timing::default().describe("image", 0.01, 3.0)[0].severity, Severity::Problem);
         assert_eq!(timing(0.01, 1).describe("image", 0.01, 3.0)[0].severity, Severity::Problem);
     }

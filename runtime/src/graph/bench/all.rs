@@ -53,7 +53,7 @@ pub fn open_bench(catalogue: &Catalogue, path: &Path) -> Result<OpenBench, Repor
     let device = |device: PlannedDevice| {
         let block = bench.devices.iter().find(|block| block.key.name == device.name)?;
         Some(BenchDevice {
-            to_commission: fingerprint(block, &device),
+            to_commission: fingerprint(block, &device, &sources),
             name: device.name,
             kind: block.kind.as_ref()?.value.clone(),
             opened: Opened { description: device.description, driver: device.driver },

@@ -1,8 +1,8 @@
 //! The devices that must be commissioned before they use all of their limits, each with a fingerprint of what was proven
 //! of it.
 //!
-//! The fingerprint covers the parameters of the device, which include those of its robot, and the files that its facts
-//! name, such as the model of the arm. It says whether something has changed, and it keeps nobody from changing it.
+//! The fingerprint covers the parameters of the device, which include those of its robot, the files that these and its
+//! facts name, such as the model of the arm, and the version of this crate. It says whether something has changed, and it keeps nobody from changing it.
 
 use std::fs;
 
@@ -10,6 +10,7 @@ use super::open::OpenedBench;
 use crate::graph::net::Net;
 use crate::graph::plan::PlannedDevice;
 use crate::graph::syntax::Block;
+use crate::source::{Item, SourceMap, Value};
 
 /// A device that must be commissioned.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -30,17 +31,19 @@ impl CommissionedDevice {
 }
 
 /// Returns the opened devices that must be commissioned.
-pub(crate) fn to_commission(net: &Net<'_>, opened: &OpenedBench) -> Vec<CommissionedDevice> {
+pub(crate) fn to_commission(net: &Net<'_>, opened: &OpenedBench, sources: &SourceMap) -> Vec<CommissionedDevice> {
     let blocks: Vec<&Block> = net.flat.bench.iter().flat_map(|bench| &bench.devices).collect();
     let block_of = |device: &PlannedDevice| blocks.iter().find(|block| block.key.name == device.name);
-    opened.devices.iter().filter_map(|device| fingerprint(block_of(device)?, device)).collect()
+    opened.devices.iter().filter_map(|device| fingerprint(block_of(device)?, device, sources)).collect()
 }
 
 /// Returns the fingerprint of a device, or `None` if it need not be commissioned.
-pub(super) fn fingerprint(block: &Block, device: &PlannedDevice) -> Option<CommissionedDevice> {
+pub(super) fn fingerprint(block: &Block, device: &PlannedDevice, sources: &SourceMap) -> Option<CommissionedDevice> {
     let mut hash = Fnv::default();
     hash.add(block.kind.as_ref().map_or("", |kind| &kind.value).as_bytes());
-    hash.add(serde_json::to_string(&block.params).unwrap_or_default().as_bytes());
+    hash.add(serde_json::to_string(&block.params).expect("every key is a string").as_bytes());
+    hash.add(env!("CARGO_PKG_VERSION").as_bytes());
+    add_files(&mut hash, &block.params, sources);
     for (_, value) in device.description.fills.iter().flat_map(|fill| &fill.facts) {
         let file = value.as_str().and_then(|path| fs::read(path).ok());
         hash.add(&file.unwrap_or_else(|| value.to_string().into_bytes()));
@@ -48,6 +51,20 @@ pub(super) fn fingerprint(block: &Block, device: &PlannedDevice) -> Option<Commi
     let (name, fingerprint) = (device.name.clone(), format!("{:016x}", hash.0));
     let at = device.span.start;
     device.description.needs_commissioning.then_some(CommissionedDevice { name, fingerprint, at })
+}
+
+/// Adds the content of each file that a parameter names.
+fn add_files(hash: &mut Fnv, value: &Value, sources: &SourceMap) {
+    match &value.item {
+        Item::String(text) => {
+            if let Ok(bytes) = fs::read(sources.path(text, value.span.start)) {
+                hash.add(&bytes);
+            }
+        }
+        Item::Array(items) => items.iter().for_each(|item| add_files(hash, item, sources)),
+        Item::Table(table) => table.entries.iter().for_each(|(_, value)| add_files(hash, value, sources)),
+        _ => {}
+    }
 }
 
 /// The hash FNV-1a of 64 bits. Unlike the hash of the standard library, it is the same in each of its versions.
