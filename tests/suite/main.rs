@@ -18,6 +18,8 @@ mod crossings;
 mod determinism;
 mod devices;
 mod docs;
+#[cfg(target_os = "linux")]
+mod doctor;
 mod erased;
 mod errors;
 mod examples;
