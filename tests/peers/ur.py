@@ -38,6 +38,8 @@ DEFAULTS = {
     "force": [0.0] * 6,
     "dials": 1,                 # connections that the program opens
     "texts": 0,                 # every so many samples, a text comes before a sample
+    "from": "127.0.0.1",        # address from which it connects
+    "late": 0.0,                # time until it answers [s]
     "drift": 1.0,               # rate of its clock
 }
 
@@ -115,6 +117,7 @@ class Robot:
         self.clients, self.scripts, self.kept = [], [], []
         self.reverse, self.bytes, self.deadline, self.stops_at = None, b"", None, STOPJ
         self.swallows, self.holds, self.rested, self.is_cut = False, False, True, False
+        self.garbles = False
         self.program = None
         self.rtde, self.script = self.listen(self.s["rtde_port"]), self.listen(0)
         self.say(rtde=self.rtde.getsockname()[1], script=self.script.getsockname()[1])
@@ -161,6 +164,8 @@ class Robot:
             self.swallows = rest[0] == "true"
         elif word == "hold":
             self.holds = rest[0] == "true"
+        elif word == "garble":  # packets come, but no samples
+            self.garbles = rest[0] == "true"
         elif word == "bytes":
             for client in self.clients:
                 self.put(client, bytes.fromhex(rest[0]))
@@ -171,11 +176,14 @@ class Robot:
     # The program.
 
     def ask(self, port):
-        with socket.create_connection(("127.0.0.1", port), timeout=5) as stream:
-            stream.sendall(b"request_program\n")
-            text = b""
-            while part := stream.recv(65536):
-                text += part
+        text = b""
+        try:
+            with socket.create_connection(("127.0.0.1", port), timeout=5, source_address=self.own()) as stream:
+                stream.sendall(b"request_program\n")
+                while part := stream.recv(65536):
+                    text += part
+        except OSError as error:
+            self.say(asked=str(error))
         self.run(text.decode())
 
     def run(self, text):
@@ -200,9 +208,12 @@ class Robot:
         for i in range(self.s["dials"]):
             self.dial(self.program, is_second=i > 0)
 
+    def own(self):
+        return self.s["from"], 0
+
     def dial(self, target, is_second=False):
         try:
-            stream = socket.create_connection(target, timeout=5)
+            stream = socket.create_connection(target, timeout=5, source_address=self.own())
         except OSError as error:
             self.say(dialled=str(error))
             return self.end("no connection")
@@ -385,7 +396,7 @@ class Robot:
             self.samples += 1
             if self.s["texts"] and self.samples % self.s["texts"] == 0:
                 self.text(client, "a text between samples")
-            sample = self.sample(client)
+            sample = self.packet(b"Z", b"\x01") if self.garbles else self.sample(client)
             if self.is_cut:
                 self.put(client, sample[:len(sample) // 2])
                 self.drop(client)
@@ -416,6 +427,8 @@ class Robot:
                     self.say(ignored=len(text))
 
     def loop(self):
+        time.sleep(self.s["late"])
+        self.begin += self.s["late"]
         os.set_blocking(0, False)
         words = b""
         while True:

@@ -79,6 +79,7 @@ mod udp_pad;
 mod units;
 mod ur;
 mod ur_process;
+mod ur_start;
 mod verify;
 mod view;
 mod warnings;

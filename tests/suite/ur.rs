@@ -118,13 +118,13 @@ impl Peer {
         )
     }
 
-    fn rig(&self, more: &str) -> LinkRig {
+    pub(crate) fn rig(&self, more: &str) -> LinkRig {
         LinkRig::start::<Ur>(&self.params(more)).unwrap_or_else(|mistakes| panic!("{mistakes:?}"))
     }
 }
 
 /// Commands a velocity until something is so. A machine that is too busy to renew it in time resumes.
-fn move_until(rig: &mut LinkRig, is_so: impl Fn(&LinkRig) -> bool) {
+pub(crate) fn move_until(rig: &mut LinkRig, is_so: impl Fn(&LinkRig) -> bool) {
     let end = Instant::now() + SOON;
     while !is_so(rig) {
         assert!(Instant::now() < end, "it does not happen");
@@ -135,7 +135,7 @@ fn move_until(rig: &mut LinkRig, is_so: impl Fn(&LinkRig) -> bool) {
 }
 
 /// Commands a velocity for a time, and never resumes.
-fn push(rig: &mut LinkRig, time: Duration) {
+pub(crate) fn push(rig: &mut LinkRig, time: Duration) {
     let end = Instant::now() + time;
     while Instant::now() < end {
         rig.command("velocity", &MOVE);
@@ -143,12 +143,12 @@ fn push(rig: &mut LinkRig, time: Duration) {
     }
 }
 
-fn follows(rig: &LinkRig) -> bool {
+pub(crate) fn follows(rig: &LinkRig) -> bool {
     rig.get::<Flag>("safety") == Some(&true)
 }
 
 /// Whether a message with the whole velocity has arrived.
-fn is_moving(peer: &Peer, from: f64) -> bool {
+pub(crate) fn is_moving(peer: &Peer, from: f64) -> bool {
     peer.velocities(from).iter().any(|(_, qd)| *qd == MOVE)
 }
 

@@ -23,6 +23,10 @@ impl Live for Robot {
             let Some(stream) = idle(&mut link, Stream::open(&self.request)).await else { return Ok(()) };
             let end = match stream {
                 Ok(stream) => {
+                    if matches!(phase, Phase::Starting { .. }) {
+                        // The time until the robot answers is not that of its program.
+                        phase = Phase::start();
+                    }
                     let end = self.serve(stream, &mut listeners, phase, &mut link).await?;
                     phase = Phase::Refused;
                     end
@@ -57,12 +61,15 @@ impl Robot {
         let Ok(host) = self.host.clone().map_or(own, Ok) else {
             return Ok(End::Lost("the connection has no address of its own".into()));
         };
+        let Ok(peer) = self.peer.map_or_else(|| stream.peer_address(), Ok) else {
+            return Ok(End::Lost("the connection is closed".into()));
+        };
         if !self.sends_program {
             let ports = self.script_ports(&host, listeners);
             let body = self.script.body(&ports, stream.version).map_err(|why| self.failure(&why))?;
-            listeners.serve(Arc::from(body));
+            listeners.serve(Arc::from(body), peer);
         }
-        let mut session = Session::new(self, listeners, stream, host, phase);
+        let mut session = Session::new(self, listeners, stream, (host, peer), phase);
         let end = session.follow(link).await;
         if matches!(end, End::Lost(_)) {
             // Nobody sees what the robot does now, so its program is to end.

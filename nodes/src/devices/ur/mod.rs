@@ -17,6 +17,7 @@ mod session;
 mod status;
 mod template;
 
+use std::net::IpAddr;
 use std::time::Duration;
 
 use tactflow_runtime::device::{Description, Device, Driver, OnSilence, Opened};
@@ -117,6 +118,9 @@ pub struct Params {
     start: StartBounds,
     /// Our address, as the robot sees it; that of our connection to the robot if not given.
     host: Option<String>,
+    /// IP address from which the robot connects to us, behind a translation of addresses or from a container; that of our
+    /// connection to the robot if not given. Connections from elsewhere are closed.
+    robot_host: Option<String>,
     /// Our port that the program on the robot connects to; 0 is any free one.
     #[param(range = 0..=65535, default = 50001)]
     reverse_port: usize,
@@ -201,7 +205,6 @@ impl Device for Ur {
         let facts = arm::facts(&params.urdf, &params.tip, params.home.as_deref())?;
         let ports = ArmPorts::fill(&mut description, &joints, facts);
         let force = WrenchPorts::fill(&mut description, vec![pad::mount(&Mount::NONE)]);
-        description.needs_commissioning = true;
         description.on_silence(OnSilence::Stops, silence(timeout_ms, params.rate_hz, &joints));
         description.needs_commissioning = true;
         let checks = Checks {
@@ -211,7 +214,7 @@ impl Device for Ur {
             tcp_offset: params.tcp_offset,
             tool_mass: params.tool_mass.map(|mass| [mass, params.tool_mass_bound]),
         };
-        let robot = robot(&params, (ports, force), chain, checks, script, timeout_ms);
+        let robot = Robot { peer: peer(&params)?, ..robot(&params, (ports, force), chain, checks, script, timeout_ms) };
         Ok(Opened { description, driver: Driver::Live(Box::new(robot)) })
     }
 }
@@ -239,6 +242,7 @@ fn robot(
         },
         script_address: format!("{}:{}", params.address, params.script_port),
         host: params.host.clone(),
+        peer: None,
         port_numbers: PortNumbers {
             reverse: port(params.reverse_port),
             request: (!sends_program).then(|| port(params.request_port)),
@@ -254,6 +258,15 @@ fn robot(
         start: Duration::from_secs_f64(params.start_s),
         acceleration: params.acceleration,
     }
+}
+
+/// Returns where the program on the robot connects from, if it is given.
+fn peer(params: &Params) -> Result<Option<IpAddr>, Mistakes> {
+    let parsed = params.robot_host.as_ref().map(|host| {
+        let message = format!("`{host}` is not an IP address: write one such as \"192.168.0.10\"");
+        host.parse().map_err(|_| Mistake::param("robot_host", message))
+    });
+    Ok(parsed.transpose()?)
 }
 
 /// Returns the time that each message gives to the next one [ms].

@@ -1,7 +1,9 @@
 //! The program on the robot: how it gets there, and the connection that it opens to us.
 
 use std::io::{self, ErrorKind};
+use std::net::{IpAddr, SocketAddr};
 use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 
 use tokio::io::{AsyncReadExt, AsyncWriteExt};
@@ -26,6 +28,8 @@ pub(super) struct Listeners {
     trajectory: u16,
     command: u16,
     tasks: Vec<JoinHandle<()>>,
+    /// Requests from elsewhere than the robot, not counted yet.
+    strangers: Arc<AtomicU64>,
     serving: Option<JoinHandle<()>>,
 }
 
@@ -57,7 +61,7 @@ impl Listeners {
             tasks.push(tokio::spawn(keep(listener)));
         }
         let [trajectory, command] = vendor;
-        Ok(Self { reverse, request, trajectory, command, tasks, serving: None })
+        Ok(Self { reverse, request, trajectory, command, tasks, strangers: Arc::default(), serving: None })
     }
 
     /// Returns the ports that the program connects to: velocities, trajectories, commands.
@@ -65,16 +69,21 @@ impl Listeners {
         [number(&self.reverse), self.trajectory, self.command]
     }
 
-    /// Waits for a connection of the program.
-    pub(super) async fn accept(&self) -> io::Result<TcpStream> {
-        self.reverse.accept().await.map(|(stream, _)| stream)
+    /// Waits for a connection, and returns where it comes from.
+    pub(super) async fn accept(&self) -> io::Result<(TcpStream, SocketAddr)> {
+        self.reverse.accept().await
     }
 
-    /// Gives `program` to each node of External Control that asks for it from now on.
-    pub(super) fn serve(&mut self, program: Arc<str>) {
+    /// Returns the number of requests from elsewhere than the robot since the last call.
+    pub(super) fn take_strangers(&self) -> u64 {
+        self.strangers.swap(0, Ordering::Relaxed)
+    }
+
+    /// Gives `program` to each node of External Control that asks for it from now on, at the address of the robot.
+    pub(super) fn serve(&mut self, program: Arc<str>, robot: IpAddr) {
         self.stop_serving();
         if let Some(listener) = &self.request {
-            self.serving = Some(tokio::spawn(serve(Arc::clone(listener), program)));
+            self.serving = Some(tokio::spawn(serve(Arc::clone(listener), program, robot, Arc::clone(&self.strangers))));
         }
     }
 
@@ -112,8 +121,24 @@ async fn drain(stream: &mut TcpStream) {
     while stream.read(&mut rest).await.is_ok_and(|count| count > 0) {}
 }
 
-async fn serve(listener: Arc<TcpListener>, program: Arc<str>) {
+/// Whether a connection comes from the robot. If not, logs it.
+pub(super) fn is_from(peer: SocketAddr, robot: IpAddr) -> bool {
+    let is_robot = peer.ip().to_canonical() == robot.to_canonical();
+    if !is_robot {
+        tracing::warn!(
+            "a connection from {} is closed: the robot is at {robot}; if it is the robot, write `robot_host`",
+            peer.ip()
+        );
+    }
+    is_robot
+}
+
+async fn serve(listener: Arc<TcpListener>, program: Arc<str>, robot: IpAddr, strangers: Arc<AtomicU64>) {
     while let Ok((stream, peer)) = listener.accept().await {
+        if !is_from(peer, robot) {
+            strangers.fetch_add(1, Ordering::Relaxed);
+            continue;
+        }
         match timeout(MAX_EXCHANGE, answer(stream, &program)).await {
             Ok(Ok(())) => tracing::info!("the robot at {} has got its program", peer.ip()),
             Ok(Err(error)) => tracing::warn!("a request for a program from {} failed: {error}", peer.ip()),
@@ -239,7 +264,10 @@ impl Reverse {
         }
     }
 
-    /// Closes the connection at once. The program gets none of the messages that are still on their way.
+    /// Closes the connection at once, so that the program ends when it reads on.
+    ///
+    /// A program that is paused keeps its last velocity, and messages that have arrived before. When it goes on, it may
+    /// run a few steps of this velocity until it reads that the connection is closed.
     pub(super) fn abort(self) {
         let _ = self.stream.set_zero_linger();
     }

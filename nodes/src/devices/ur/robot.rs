@@ -1,5 +1,6 @@
 //! A robot, as the bench describes it.
 
+use std::net::IpAddr;
 use std::time::Duration;
 
 use tactflow_runtime::device::{DeviceError, Link};
@@ -28,6 +29,8 @@ pub(super) struct Robot {
     pub(super) script_address: String,
     /// Our address, as the robot sees it; that of the connection if not given.
     pub(super) host: Option<String>,
+    /// Where its program connects from; the address of the connection if not given.
+    pub(super) peer: Option<IpAddr>,
     pub(super) port_numbers: PortNumbers,
     pub(super) script: Script,
     /// Whether we send the program; otherwise a node of External Control asks for it.

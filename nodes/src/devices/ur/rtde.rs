@@ -172,6 +172,11 @@ impl Stream {
     pub(super) fn own_address(&self) -> io::Result<IpAddr> {
         self.stream.local_addr().map(|address: SocketAddr| address.ip())
     }
+
+    /// Returns the address of the robot.
+    pub(super) fn peer_address(&self) -> io::Result<IpAddr> {
+        self.stream.peer_addr().map(|address: SocketAddr| address.ip())
+    }
 }
 
 fn closed(splitter: &Splitter) -> String {

@@ -1,5 +1,6 @@
 //! One connection to the robot: its phases, its samples and its velocities.
 
+use std::net::{IpAddr, SocketAddr};
 use std::time::{Duration, Instant};
 
 use tactflow_runtime::device::Link;
@@ -8,7 +9,7 @@ use tokio::time::{sleep_until, timeout};
 
 use super::checks::of_controller;
 use super::message;
-use super::program::{Listeners, Reverse, Sending};
+use super::program::{Listeners, Reverse, Sending, is_from};
 use super::recipe::{JOINTS, State};
 use super::robot::Robot;
 use super::rtde::Stream;
@@ -26,6 +27,8 @@ const MAX_REST: Duration = Duration::from_millis(700);
 const MAX_LEAVE: Duration = Duration::from_millis(200);
 /// Time in which what has arrived already is seen.
 const ARRIVED: Duration = Duration::from_millis(10);
+/// Connections of others, and those of the robot that are not expected.
+const STRANGERS: &str = "connections that were not expected";
 /// Longest time in which the velocity may have changed between two messages [s].
 const MAX_STEP_S: f64 = 0.1;
 
@@ -63,6 +66,8 @@ pub(super) struct Session<'a> {
     stream: Stream,
     /// Our address, as the robot sees it.
     host: String,
+    /// The only address from which its program connects.
+    peer: IpAddr,
     reverse: Option<Reverse>,
     connected: Instant,
     /// Whether the program was seen to run since it has connected.
@@ -71,6 +76,8 @@ pub(super) struct Session<'a> {
     closed: Option<Instant>,
     sending: Option<Sending>,
     phase: Phase,
+    /// Whether the commands were refused when the lease was asked last.
+    was_refused: bool,
     begin: Instant,
     heard: Instant,
     publishes: bool,
@@ -82,7 +89,14 @@ pub(super) struct Session<'a> {
 }
 
 impl<'a> Session<'a> {
-    pub(super) fn new(robot: &'a Robot, listeners: &'a Listeners, stream: Stream, host: String, phase: Phase) -> Self {
+    /// The robot sees us at `host`, and its program connects from `peer`.
+    pub(super) fn new(
+        robot: &'a Robot,
+        listeners: &'a Listeners,
+        stream: Stream,
+        (host, peer): (String, IpAddr),
+        phase: Phase,
+    ) -> Self {
         let now = Instant::now();
         let publishes = !matches!(phase, Phase::Starting { .. });
         Self {
@@ -90,12 +104,14 @@ impl<'a> Session<'a> {
             listeners,
             stream,
             host,
+            peer,
             reverse: None,
             connected: now,
             has_played: false,
             closed: None,
             sending: None,
             phase,
+            was_refused: false,
             begin: now,
             heard: now,
             publishes,
@@ -118,6 +134,10 @@ impl<'a> Session<'a> {
                     let cycle = ready.map_err(|error| error.to_string()).and_then(|()| self.cycle(link));
                     if let Err(why) = cycle {
                         return End::Lost(why);
+                    }
+                    // What has arrived may contain no sample.
+                    if self.heard.elapsed() > silence {
+                        return End::Lost(format!("no sample for {silence:?}"));
                     }
                 }
                 accepted = self.listeners.accept() => self.accept(link, accepted),
@@ -145,23 +165,32 @@ impl<'a> Session<'a> {
             }
             newest = Some(state);
         });
-        if self.stream.bad_packets > self.counted {
-            self.counted = self.stream.bad_packets;
-            link.count("bad packets");
-        }
+        let bad = self.stream.bad_packets - std::mem::replace(&mut self.counted, self.stream.bad_packets);
+        link.count_each(&[("bad packets", bad), (STRANGERS, self.listeners.take_strangers())]);
         if let Some(state) = newest {
             self.heard = Instant::now();
             self.advance(link, &state, illegal);
             self.publish(link, &state);
             self.command(link, &state);
+        } else {
+            // The lease must be asked also when nothing is sent.
+            link.commands();
         }
         received
     }
 
     /// Goes on to the next phase.
     fn advance(&mut self, link: &mut Link, state: &State, illegal: Option<String>) {
-        if matches!(self.phase, Phase::Refused) && !link.refuses() {
-            // The operator resumes.
+        let is_refused = link.refuses();
+        let was_refused = std::mem::replace(&mut self.was_refused, is_refused);
+        let resumes = match self.phase {
+            // It checks in each cycle.
+            Phase::Starting { .. } => false,
+            Phase::Ready => was_refused && !is_refused,
+            Phase::Refused => !is_refused,
+        };
+        if resumes {
+            // The operator resumes. A program that runs goes on.
             self.phase = Phase::start();
         }
         let why = match self.phase {
@@ -174,7 +203,7 @@ impl<'a> Session<'a> {
             self.publishes = true;
             link.refuse(why);
         }
-        // A program that is paused would read old messages when it goes on.
+        // A program that is paused is to end when it goes on.
         self.has_played |= is_playing(state);
         if !is_playing(state) && (self.has_played || self.connected.elapsed() > PROGRAM_SHOWS) {
             self.abort();
@@ -183,6 +212,10 @@ impl<'a> Session<'a> {
 
     /// Brings the program on the robot to run. Returns why it does not.
     fn start(&mut self, state: &State, since: Instant, has_sent: bool) -> Option<String> {
+        if self.sent != [0.0; JOINTS] {
+            // The checks are those of a still robot.
+            return None;
+        }
         if let Err(why) = self.robot.checks.check(state) {
             return Some(why);
         }
@@ -255,6 +288,9 @@ impl<'a> Session<'a> {
     fn command(&mut self, link: &mut Link, state: &State) {
         // The lease must be asked in every cycle, also when nothing is connected.
         let held = of_controller(&self.robot.checks.order, link.commands().joints(self.robot.ports.velocity));
+        // The operator may have resumed since `advance`. Then these commands are new, and nothing is checked yet.
+        let (was_refused, is_refused) = (self.was_refused, link.refuses());
+        self.was_refused |= is_refused;
         let dt = (state.time - self.sent_at).clamp(1.0 / self.robot.rate_hz, MAX_STEP_S);
         self.sent_at = state.time;
         if link.is_mute() {
@@ -264,11 +300,14 @@ impl<'a> Session<'a> {
             self.sent = [0.0; JOINTS];
             return;
         };
-        if link.is_mute() {
-            return;
-        }
-        let target = if matches!(self.phase, Phase::Starting { .. }) { [0.0; JOINTS] } else { held };
-        let velocity = approached(&self.sent, &target, self.robot.acceleration, dt);
+        let acceleration = self.robot.acceleration;
+        let velocity = match self.phase {
+            Phase::Ready if !was_refused => approached(&self.sent, &held, acceleration, dt),
+            Phase::Ready | Phase::Refused if is_refused => {
+                approached(&self.sent, &lowered(&self.sent, &held), acceleration, dt)
+            }
+            _ => slowed(&self.sent, acceleration, dt),
+        };
         match reverse.send(&message::velocity(self.robot.timeout_ms, &velocity)) {
             Ok(true) => self.sent = velocity,
             Ok(false) => link.count("messages that the robot did not take"),
@@ -276,18 +315,20 @@ impl<'a> Session<'a> {
         }
     }
 
-    fn accept(&mut self, link: &mut Link, accepted: std::io::Result<TcpStream>) {
+    fn accept(&mut self, link: &mut Link, accepted: std::io::Result<(TcpStream, SocketAddr)>) {
+        let Ok((stream, from)) = accepted else { return };
         // With the maker's or our own program that we send, a connection is expected only then.
         let is_expected = match self.phase {
             Phase::Starting { has_sent, .. } => has_sent || !self.robot.sends_program,
             Phase::Refused => !self.robot.sends_program,
             Phase::Ready => false,
         };
-        if !is_expected || self.reverse.is_some() || self.ending.is_some() {
-            link.count("connections that were not expected");
+        let is_robot = is_from(from, self.peer);
+        if !is_robot || !is_expected || self.reverse.is_some() || self.ending.is_some() {
+            link.count(STRANGERS);
             return;
         }
-        if let Ok(reverse) = accepted.and_then(Reverse::new) {
+        if let Ok(reverse) = Reverse::new(stream) {
             self.reverse = Some(reverse);
             self.connected = Instant::now();
             self.has_played = false;
@@ -348,6 +389,17 @@ fn approached(last: &[f64; JOINTS], target: &[f64; JOINTS], acceleration: f64, d
     })
 }
 
+/// Returns the part of a target that is between rest and the last velocity [rad/s]: no joint gets faster.
+fn lowered(last: &[f64; JOINTS], target: &[f64; JOINTS]) -> [f64; JOINTS] {
+    std::array::from_fn(|i| target[i].clamp(last[i].min(0.0), last[i].max(0.0)))
+}
+
+/// Returns the next velocity on the way from the last one to rest [rad/s].
+fn slowed(last: &[f64; JOINTS], acceleration: f64, dt: f64) -> [f64; JOINTS] {
+    let step = acceleration * dt;
+    last.map(|v| v - v.clamp(-step, step))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -360,5 +412,13 @@ mod tests {
         let many = (0..100).fold([0.0; JOINTS], |last, _| approached(&last, &target, 10.0, 0.002));
         assert_eq!(many, target);
         assert_eq!(approached(&many, &[0.0; JOINTS], 10.0, 0.002), [0.0; JOINTS]);
+    }
+
+    #[test]
+    fn a_robot_that_may_not_move_only_gets_slower() {
+        let last = [1.0, -1.0, 0.01, 0.0, 0.0, 0.5];
+        assert_eq!(slowed(&last, 10.0, 0.002), [0.98, -0.98, 0.0, 0.0, 0.0, 0.48]);
+        let target = [0.5, -2.0, -0.01, 0.3, -0.3, 0.5];
+        assert_eq!(lowered(&last, &target), [0.5, -1.0, 0.0, 0.0, 0.0, 0.5]);
     }
 }
