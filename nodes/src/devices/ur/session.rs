@@ -194,7 +194,9 @@ impl<'a> Session<'a> {
             self.phase = Phase::start();
         }
         let why = match self.phase {
-            Phase::Starting { since, has_sent } => illegal.or_else(|| self.start(state, since, has_sent)),
+            Phase::Starting { since, has_sent } => {
+                illegal.or_else(|| self.start(state, since, has_sent, link.is_mute()))
+            }
             Phase::Ready => illegal.or_else(|| self.trouble(state)),
             Phase::Refused => None,
         };
@@ -211,7 +213,7 @@ impl<'a> Session<'a> {
     }
 
     /// Brings the program on the robot to run. Returns why it does not.
-    fn start(&mut self, state: &State, since: Instant, has_sent: bool) -> Option<String> {
+    fn start(&mut self, state: &State, since: Instant, has_sent: bool, is_mute: bool) -> Option<String> {
         if self.sent != [0.0; JOINTS] {
             // The checks are those of a still robot.
             return None;
@@ -225,6 +227,10 @@ impl<'a> Session<'a> {
         if self.reverse.is_some() && is_playing(state) {
             self.phase = Phase::Ready;
             self.sending = None;
+            return None;
+        }
+        if is_mute {
+            // It is only listened to.
             return None;
         }
         // A program of an earlier run of ours ends by itself. Any other is replaced.
