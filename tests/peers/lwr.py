@@ -63,6 +63,7 @@ class Controller:
         self.sent, self.answered, self.newest = {}, set(), None
         self.lost, self.held, self.swallowed, self.ints = 0, [], 0, [0] * 16
         self.last, self.entered, self.fresh = None, False, None
+        self.frozen, self.kept = False, []
         self.counts = {
             "sent": 0, "answers": 0, "bad_answers": 0, "mirror_errors": 0, "flag_errors": 0, "sequence_errors": 0,
             "unknown_answers": 0, "stranger_answers": 0, "drops": 0, "commands": 0,
@@ -105,6 +106,7 @@ class Controller:
         self.sent[sequence] = {"takes": self.takes(), "state": self.state, "commanded": commanded, "at": time.monotonic()}
         self.sent.pop((sequence - 2000) % 65536, None)
         self.newest = sequence
+        self.kept = [*self.kept[-149:], bytes(bytes_)]
         return bytes(bytes_)
 
     def pose(self):
@@ -177,7 +179,9 @@ class Controller:
     def move(self):
         """The arm for a cycle: it follows the newest answer, or goes on for a while without one."""
         before = self.total
-        if self.takes() and self.fresh is not None:
+        if self.frozen:
+            pass
+        elif self.takes() and self.fresh is not None:
             self.total, self.missed = self.fresh, 0
         elif self.takes() and self.missed < EXTRAPOLATED:
             self.total, self.missed = [a + b for a, b in zip(self.total, self.last_step)], self.missed + 1
@@ -242,6 +246,8 @@ class Controller:
         elif do == "hold":  # sends this one and the next ones together, the newest first if they are swapped
             self.held, self.hold, self.swap = [], count, event.get("swap", False)
             return self.usual(bytes_)
+        elif do == "old":
+            self.socket.sendto(self.kept[0], self.target)
         elif do == "short":
             self.socket.sendto(bytes_[:-1], self.target)
         elif do == "long":

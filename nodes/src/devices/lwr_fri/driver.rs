@@ -29,6 +29,8 @@ const MIN_LOST: Duration = Duration::from_millis(100);
 const LEAVE: Duration = Duration::from_millis(500);
 /// Difference between the sample times of the controller and of the bench, as a fraction, that is worth a warning [1].
 const SAMPLE_TIME_ERROR: f64 = 0.01;
+/// Datagrams that are read at once, at most. The operating system keeps fewer.
+const MAX_QUEUED: usize = 256;
 
 /// What the bench says of the connection.
 pub(super) struct Settings {
@@ -70,7 +72,21 @@ pub(super) struct Fri {
     sample_time: f64,
     /// Whether the answers set the impedance.
     sets_impedance: bool,
+    /// Whether the last answer could not be sent.
+    is_unsent: bool,
+    /// Whether commands were refused at the end of the last cycle.
+    was_refused: bool,
     notes: Notes,
+}
+
+/// The newest measurement of those that came together.
+struct Newest {
+    report: Report,
+    from: SocketAddr,
+    /// Whether a session begins with it, or with one that it replaces.
+    is_first: bool,
+    /// Measurements before it that are lost, or that it replaces.
+    lost: u16,
 }
 
 /// What the controller does with positions.
@@ -105,7 +121,9 @@ impl Live for Fri {
             () = stopped => {}
         }
         // The arm is at rest.
-        let _ = timeout(LEAVE, self.leave(&socket)).await;
+        if !link.is_mute() {
+            let _ = timeout(LEAVE, self.leave(&socket)).await;
+        }
         Ok(())
     }
 }
@@ -138,6 +156,8 @@ impl Fri {
             first: None,
             sample_time,
             sets_impedance: false,
+            is_unsent: false,
+            was_refused: false,
             notes: Notes::default(),
         }
     }
@@ -151,7 +171,17 @@ impl Fri {
             let patience = self.patience();
             match timeout(patience, socket.recv_from(&mut datagram)).await {
                 Ok(Ok((length, from))) => {
-                    if self.take(&datagram[..length], from, socket, link) {
+                    let mut newest = None;
+                    let mut is_heard = self.take(&datagram[..length], from, &mut newest, socket, link);
+                    // After this process was stopped, old measurements wait: only the newest says where the arm is.
+                    for _ in 1..MAX_QUEUED {
+                        let Ok((length, from)) = socket.try_recv_from(&mut datagram) else { break };
+                        is_heard |= self.take(&datagram[..length], from, &mut newest, socket, link);
+                    }
+                    if let Some(newest) = newest {
+                        self.act(&newest, socket, link);
+                    }
+                    if is_heard {
                         (heard, is_lost) = (Instant::now(), false);
                     }
                 }
@@ -196,8 +226,15 @@ impl Fri {
         self.force.lose(link, &why);
     }
 
-    /// Takes a datagram. Returns whether it is a measurement of the controller.
-    fn take(&mut self, datagram: &[u8], from: SocketAddr, socket: &UdpSocket, link: &mut Link) -> bool {
+    /// Takes a datagram: a new measurement becomes the `newest`. Returns whether it is a measurement of the controller.
+    fn take(
+        &mut self,
+        datagram: &[u8],
+        from: SocketAddr,
+        newest: &mut Option<Newest>,
+        socket: &UdpSocket,
+        link: &mut Link,
+    ) -> bool {
         let Some(report) = Report::decode(datagram) else {
             link.count("bad datagrams");
             if !std::mem::replace(&mut self.notes.has_bad_datagram, true) {
@@ -216,24 +253,38 @@ impl Fri {
                 }
                 return false;
             }
-            Arrival::Repeated => {
-                link.count("repeated datagrams");
-                self.answer(sequence, from, socket, link);
-            }
-            Arrival::Late => {
+            Arrival::Implausible => {
                 link.count("late datagrams");
-                self.answer(sequence, from, socket, link);
+                return false;
             }
-            arrival @ (Arrival::First | Arrival::Next { .. }) => {
-                if arrival == Arrival::First {
-                    self.begin_session(&report, now, link);
+            arrival @ (Arrival::Repeated | Arrival::Late) => {
+                link.count(if arrival == Arrival::Late { "late datagrams" } else { "repeated datagrams" });
+                if newest.is_none() {
+                    self.answer(sequence, from, socket, link);
                 }
-                let follows = self.advance(&report, now, link);
-                self.answer(sequence, from, socket, link);
-                self.publish(&report, arrival, follows, link);
+            }
+            Arrival::First => {
+                let lost = newest.take().map_or(0, |replaced| replaced.lost.saturating_add(1));
+                *newest = Some(Newest { report, from, is_first: true, lost });
+            }
+            Arrival::Next { lost } => {
+                let (is_first, before) =
+                    newest.take().map_or((false, 0), |replaced| (replaced.is_first, replaced.lost.saturating_add(1)));
+                *newest = Some(Newest { report, from, is_first, lost: lost.saturating_add(before) });
             }
         }
         true
+    }
+
+    /// Moves by the newest measurement, answers it and publishes it.
+    fn act(&mut self, newest: &Newest, socket: &UdpSocket, link: &mut Link) {
+        let (report, now) = (&newest.report, Instant::now());
+        if newest.is_first {
+            self.begin_session(report, now, link);
+        }
+        let follows = self.advance(report, now, link);
+        self.answer(report.sequence, newest.from, socket, link);
+        self.publish(report, newest.lost, follows, link);
     }
 
     fn warn_of_stranger(&self, from: SocketAddr) {
@@ -273,8 +324,13 @@ impl Fri {
         let mut krl = report.krl.clone();
         self.settings.krl_ints.iter().for_each(|(place, value)| krl.set_int(*place, *value));
         self.krl = Some(krl);
-        let takes = takes_positions(report);
+        // What is not sent must not move the target.
+        let takes = takes_positions(report) && !link.is_mute();
         self.sets_impedance |= accepts_flags(report);
+        if self.phase == Phase::Checked && self.was_refused && !link.refuses() {
+            // The operator has resumed.
+            self.phase = Phase::Unchecked;
+        }
         let mut why = obstacle(report, !self.settings.impedance.is_none()).or_else(|| self.unset_impedance());
         if !takes {
             self.target.mirror(&report.commanded);
@@ -284,23 +340,29 @@ impl Fri {
             self.target.mirror(&report.commanded);
             why = why.or_else(|| self.fault_at_start(report));
             self.phase = if why.is_none() { Phase::Checked } else { Phase::Unchecked };
+        } else if let Some(fault) = self.target.fault_of_following(&report.commanded, self.sample_time) {
+            self.target.mirror(&report.commanded);
+            self.phase = Phase::Unchecked;
+            why = why.or(Some(fault));
         }
         let follows = why.is_none();
-        self.has_followed |= follows;
+        self.has_followed |= follows && self.phase == Phase::Checked;
         if let Some(why) = why {
-            self.refuse(why, now, link);
+            self.refuse(why, report, now, link);
         }
         let velocity = link.commands().joints(self.ports.velocity);
-        if self.phase == Phase::Checked && self.target.step(velocity, sample_time(report), now) {
+        let steps = self.phase == Phase::Checked && !self.is_unsent;
+        if steps && self.target.step(velocity, sample_time(report), now) {
             link.count("shortened steps");
         }
+        self.was_refused = link.refuses();
         follows
     }
 
-    /// Refuses commands. Before the arm has followed any, it waits for the controller instead.
-    fn refuse(&mut self, why: String, now: Instant, link: &mut Link) {
+    /// Refuses commands. Before the arm has followed any, it waits for the state command instead.
+    fn refuse(&mut self, why: String, report: &Report, now: Instant, link: &mut Link) {
         let waited = self.first.map_or(0.0, |first| (now - first).as_secs_f64());
-        let is_waiting = !self.has_followed && self.phase == Phase::Mirrored && waited < self.settings.wait_s;
+        let is_waiting = !self.has_followed && !is_in_command(report) && waited < self.settings.wait_s;
         if !is_waiting {
             link.refuse(why);
         } else if self.notes.waits_for.as_ref() != Some(&why) {
@@ -333,7 +395,8 @@ impl Fri {
             return;
         }
         let Some(bytes) = self.next_answer(reflected, true) else { return };
-        if socket.try_send_to(&bytes, to).is_err() {
+        self.is_unsent = socket.try_send_to(&bytes, to).is_err();
+        if self.is_unsent {
             link.count("unsent answers");
         }
     }
@@ -346,15 +409,15 @@ impl Fri {
         Some(Answer { sequence: self.answered, reflected, krl, position, impedance }.encode(is_driving))
     }
 
-    fn publish(&mut self, report: &Report, arrival: Arrival, follows: bool, link: &mut Link) {
+    fn publish(&mut self, report: &Report, lost: u16, follows: bool, link: &mut Link) {
         let tip = self.chain.forward(&report.measured, &mut self.columns).0;
         let wrench = moved(&report.wrench, &self.settings.tool);
         let wrench = self.settings.weight.without(&wrench, &tip.rotation);
         let (stamp, number) = (link.stamp_of(self.intake.time()), self.intake.number);
         let postures: [&[f64]; 2] = [&report.measured, self.target.position()];
         link.publish(|samples| {
-            if let Arrival::Next { lost } = arrival {
-                (0..lost).for_each(|_| samples.count("lost datagrams"));
+            if lost > 0 {
+                samples.count_by("lost datagrams", u64::from(lost));
             }
             self.ports.write_with_safety(samples, stamp, number, postures, follows);
             self.force.write(samples, stamp, number, &wrench);

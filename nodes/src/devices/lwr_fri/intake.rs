@@ -5,9 +5,9 @@ use std::time::{Duration, Instant};
 
 /// Time without a datagram after which a session is over, and another address can be the controller.
 const SESSION_SILENCE: Duration = Duration::from_secs(1);
-/// Numbers that a late datagram is behind the newest, at most. One that is further behind is of a new session.
+/// Numbers that a late datagram is behind the newest, at most. One that is further behind is implausible.
 const MAX_BEHIND: i16 = 100;
-/// Numbers that a datagram is ahead of the newest, at most.
+/// Numbers that a datagram is ahead of the newest, at most. One that is further ahead is implausible.
 const MAX_AHEAD: i16 = 2000;
 /// How far the time that the controller states may be ahead of the one that its samples add up to [s].
 const MAX_AHEAD_S: f64 = 0.05;
@@ -26,6 +26,8 @@ pub(super) enum Arrival {
     Repeated,
     /// It was sent before the newest.
     Late,
+    /// Its number fits neither before nor after the newest: it is very late, or the controller numbers anew.
+    Implausible,
     /// It comes from another address than the controller's.
     Stranger,
 }
@@ -47,6 +49,8 @@ struct Session {
     sequence: u16,
     /// Time of the newest sample [s].
     time: f64,
+    /// Number of the last datagram, if it is implausible.
+    implausible: Option<u16>,
 }
 
 /// What a datagram states of itself.
@@ -91,13 +95,15 @@ impl Intake {
                 let expected = session.time + steps as f64 * stated.sample_time;
                 let is_ahead = stated.time > expected + MAX_AHEAD_S;
                 let time = if is_ahead { stated.time } else { expected };
-                *session = Session { heard: now, sequence: stated.sequence, time, address: from };
+                *session = Session { heard: now, sequence: stated.sequence, time, address: from, implausible: None };
             }
             (Arrival::First, session) => {
                 self.number += 1;
-                *session = Some(Session { address: from, heard: now, sequence: stated.sequence, time: stated.time });
+                let Stated { sequence, time, .. } = stated;
+                *session = Some(Session { address: from, heard: now, sequence, time, implausible: None });
             }
-            (Arrival::Repeated | Arrival::Late, Some(session)) => session.heard = now,
+            (Arrival::Repeated | Arrival::Late, Some(session)) => (session.heard, session.implausible) = (now, None),
+            (Arrival::Implausible, Some(session)) => session.implausible = Some(stated.sequence),
             _ => {}
         }
         arrival
@@ -115,7 +121,11 @@ impl Intake {
             0 => Arrival::Repeated,
             ahead @ 1..=MAX_AHEAD => Arrival::Next { lost: ahead as u16 - 1 },
             behind if (-MAX_BEHIND..0).contains(&behind) => Arrival::Late,
-            _ => Arrival::First,
+            // One that is very late must not begin a session: two that follow each other do.
+            _ => match session.implausible.map(|last| sequence.wrapping_sub(last) as i16) {
+                Some(1..=MAX_BEHIND) => Arrival::First,
+                _ => Arrival::Implausible,
+            },
         }
     }
 }
@@ -134,7 +144,7 @@ mod tests {
 
     #[test]
     fn a_sample_counts_once_and_the_lost_ones_are_known() {
-        use Arrival::{First, Late, Next, Repeated};
+        use Arrival::{First, Implausible, Late, Next, Repeated};
         let (mut intake, mut now) = (Intake::default(), Instant::now());
         let cases = [
             (65533, First, 1),
@@ -146,10 +156,20 @@ mod tests {
             (6, Next { lost: 5 }, 10),
             (37, Next { lost: 30 }, 41),
             (36, Late, 41),
+            // Very late ones do not begin a session.
+            (65400, Implausible, 41),
+            (38, Next { lost: 0 }, 42),
+            (65401, Implausible, 42),
+            (38, Repeated, 42),
+            (65402, Implausible, 42),
+            (65402, Implausible, 42),
             // The controller starts again.
-            (50000, First, 42),
-            (1, First, 43),
-            (2, Next { lost: 0 }, 44),
+            (50000, Implausible, 42),
+            (50001, First, 43),
+            (50002, Next { lost: 0 }, 44),
+            (1, Implausible, 44),
+            (3, First, 45),
+            (4, Next { lost: 0 }, 46),
         ];
         for (sequence, arrival, number) in cases {
             now += Duration::from_millis(4);

@@ -13,6 +13,11 @@ use super::wire::{JOINTS, Joints};
 /// Steps that may follow each other at once, after datagrams that came late together. A process that was stopped finds
 /// more of them, and must not run through all.
 const MAX_BURST: f64 = 3.0;
+/// How far the controller may be from the target, in steps at maximum speed. Answers are some cycles on their way, and
+/// some are lost.
+const MAX_STEPS_APART: f64 = 10.0;
+/// What the precision of the wire adds to a difference between two postures [rad].
+const ROUNDING: f64 = 1e-5;
 
 /// The commanded posture, and the velocity with which it moves.
 #[derive(Debug, Clone)]
@@ -73,6 +78,24 @@ impl Target {
         (self.credit, self.counted) = (0.0, None);
     }
 
+    /// Returns why the controller, which commands a `posture` [rad], does not follow the target; `None` if it does. `dt` is
+    /// the sample time [s].
+    pub(super) fn fault_of_following(&self, posture: &Joints, dt: f64) -> Option<String> {
+        let room = |i: usize| MAX_STEPS_APART * self.room(i, dt) + ROUNDING;
+        let apart = |i: usize| (posture[i] - self.position[i]).abs();
+        let joint = (0..JOINTS).find(|i| apart(*i) > room(*i))?;
+        let (number, apart, room) = (joint + 1, apart(joint), room(joint));
+        Some(format!(
+            "its controller does not follow: it commands joint {number} from the base {apart:.4} rad away from the answers, \
+             and {room:.4} rad are allowed"
+        ))
+    }
+
+    /// Returns the maximum step of a joint in a sample time `dt` [s].
+    const fn room(&self, joint: usize, dt: f64) -> f64 {
+        self.bounds.step.min(self.bounds.speed[joint] * dt)
+    }
+
     /// Moves at a `velocity` [rad/s] for a sample time `dt` [s], up to the moment `now`. From rest, it reaches the
     /// velocity with the accelerations of the joints. Returns whether it moves less than it was told.
     pub(super) fn step(&mut self, velocity: &[f64], dt: f64, now: Instant) -> bool {
@@ -85,8 +108,7 @@ impl Target {
         } else {
             self.follows = approach(&mut self.velocity, |i| velocity[i], &self.bounds.acceleration, dt);
         }
-        let room = |i: usize| self.bounds.step.min(self.bounds.speed[i] * dt);
-        let scale = |(i, v): (usize, &f64)| scale_to((v * time).abs(), room(i));
+        let scale = |(i, v): (usize, &f64)| scale_to((v * time).abs(), self.room(i, dt));
         let scale = self.velocity.iter().enumerate().map(scale).fold(1.0, f64::min);
         let mut is_shortened = scale < 1.0;
         for ((q, v), (lower, upper)) in self.position.iter_mut().zip(&self.velocity).zip(&self.bounds.ends) {
@@ -173,6 +195,21 @@ mod tests {
         let (before, late) = (target.position()[0], now + Duration::from_millis(740));
         (0..175).for_each(|_| _ = target.step(&along_first(0.5), DT, late));
         assert!((target.position()[0] - before - 3.0 * 0.5 * DT).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_controller_far_from_the_target_does_not_follow() {
+        // 2 rad/s for 4 ms are 8 mrad, ten of which are 80 mrad; a shorter step counts instead.
+        for (step, most) in [(1.0, 0.08), (0.001, 0.01)] {
+            let target = target(10.0, step);
+            for (share, follows) in [(0.0, true), (0.99, true), (-0.99, true), (1.01, false), (-1.01, false)] {
+                let mut posture = START;
+                posture[3] += share * most;
+                let fault = target.fault_of_following(&posture, DT);
+                assert_eq!(fault.is_none(), follows, "{share} of {most} rad: {fault:?}");
+                assert!(fault.is_none_or(|fault| fault.contains("joint 4 ")));
+            }
+        }
     }
 
     #[test]
