@@ -364,30 +364,40 @@ fn what_a_pad_sends_is_guessed_and_the_description_loads() {
         ("myrmex_v2", &["mark = \"hex:F0C401\"", "length = 520", "check = \"xor8\"", "cell = \"u16le\"", "offset = 7"]),
     ];
     let folder = tempfile::tempdir().unwrap();
-    let mut pads: Vec<(Fake, std::process::Child)> = Vec::new();
-    for (pad, _) in cases {
-        let mut fake = Fake::start(pad, "pty");
-        fake.does("go");
-        let mut args = vec!["sniff", &fake.link, "--baud", "115200", "--for", "2s", "-o"];
-        let file = folder.path().join(pad).display().to_string();
-        args.push(&file);
-        args.extend((pad == "myrmex_v2").then_some("--send=hex:F0C400F1C5"));
-        let mut command = crate::tool::tool(&args);
-        let child = command.stdout(std::process::Stdio::piped()).spawn().unwrap();
-        pads.push((fake, child));
-    }
-    for ((pad, keys), (fake, child)) in cases.into_iter().zip(pads) {
-        let output = child.wait_with_output().unwrap();
-        let out = String::from_utf8_lossy(&output.stdout);
-        assert!(output.status.success(), "{pad}: {out}");
-        let file = folder.path().join(pad);
-        let text = std::fs::read_to_string(&file).unwrap();
-        for key in keys {
-            assert!(text.contains(&format!("{key}\n")) || text.contains(&format!("{key}  #")), "{pad}: {key}\n{text}");
+    std::thread::scope(|scope| {
+        for (pad, keys) in cases {
+            let file = folder.path().join(pad).display().to_string();
+            scope.spawn(move || {
+                let mut fake = Fake::start(pad, "pty");
+                fake.does("go");
+                // The pauses between the frames are a part of the guess, and a busy machine makes others.
+                let mut wrong = String::new();
+                let right = (0..3).find_map(|_| {
+                    let text = guessed(pad, &fake.link, &file);
+                    let has = |key: &&str| text.contains(&format!("{key}\n")) || text.contains(&format!("{key}  #"));
+                    let is_right = keys.iter().all(has);
+                    if !is_right {
+                        wrong += &text;
+                    }
+                    is_right.then_some(text)
+                });
+                let text = right.unwrap_or_else(|| panic!("{pad}: {keys:?} is not in\n{wrong}"));
+                std::fs::write(&file, text).unwrap();
+                assert_eq!(report(&format!("sensor = {file:?}\nlink = \"serial:/dev/null\"\n")), "", "{pad}");
+            });
         }
-        assert_eq!(report(&format!("sensor = {file:?}\nlink = \"serial:/dev/null\"\n")), "", "{pad}");
-        drop(fake);
-    }
+    });
+}
+
+/// Returns the description that `sniff` writes of a pad.
+fn guessed(pad: &str, link: &str, file: &str) -> String {
+    let mut args = vec!["sniff", link, "--baud", "115200", "--for", "1s", "-o", file];
+    args.extend((pad == "myrmex_v2").then_some("--send=hex:F0C400F1C5"));
+    let output = crate::tool::tool(&args).output().unwrap();
+    assert!(output.status.success(), "{pad}: {}", String::from_utf8_lossy(&output.stdout));
+    let text = std::fs::read_to_string(file).unwrap();
+    std::fs::remove_file(file).unwrap();
+    text
 }
 
 #[test]
