@@ -34,11 +34,15 @@ impl CommissionedDevice {
 pub(crate) fn to_commission(net: &Net<'_>, opened: &OpenedBench, sources: &SourceMap) -> Vec<CommissionedDevice> {
     let blocks: Vec<&Block> = net.flat.bench.iter().flat_map(|bench| &bench.devices).collect();
     let block_of = |device: &PlannedDevice| blocks.iter().find(|block| block.key.name == device.name);
-    opened.devices.iter().filter_map(|device| fingerprint(block_of(device)?, device, sources)).collect()
+    let real = opened.devices.iter().filter(|device| device.description.needs_commissioning);
+    real.filter_map(|device| fingerprint(block_of(device)?, device, sources)).collect()
 }
 
 /// Returns the fingerprint of a device, or `None` if it need not be commissioned.
 pub(super) fn fingerprint(block: &Block, device: &PlannedDevice, sources: &SourceMap) -> Option<CommissionedDevice> {
+    if !device.description.needs_commissioning {
+        return None;
+    }
     let mut hash = Fnv::default();
     hash.add(block.kind.as_ref().map_or("", |kind| &kind.value).as_bytes());
     hash.add(serde_json::to_string(&block.params).expect("every key is a string").as_bytes());
@@ -50,7 +54,7 @@ pub(super) fn fingerprint(block: &Block, device: &PlannedDevice, sources: &Sourc
     }
     let (name, fingerprint) = (device.name.clone(), format!("{:016x}", hash.0));
     let at = device.span.start;
-    device.description.needs_commissioning.then_some(CommissionedDevice { name, fingerprint, at })
+    Some(CommissionedDevice { name, fingerprint, at })
 }
 
 /// Adds the content of each file that a parameter names.
