@@ -97,7 +97,7 @@ impl Target {
     }
 
     /// Moves at a `velocity` [rad/s] for a sample time `dt` [s], up to the moment `now`. From rest, it reaches the
-    /// velocity with the accelerations of the joints. Returns whether it moves less than it was told.
+    /// velocity with the accelerations of the joints. Returns whether the step was shortened.
     pub(super) fn step(&mut self, velocity: &[f64], dt: f64, now: Instant) -> bool {
         let elapsed = self.counted.replace(now).map_or(0.0, |counted| (now - counted).as_secs_f64());
         self.credit = (self.credit + elapsed).min(MAX_BURST * dt);

@@ -198,7 +198,7 @@ impl PadDriver {
         if self.reader.is_ambiguous() {
             return format!(
                 "{silent}: the data has the `mark` at the same place in every frame; a longer `mark`, a `check` or \
-                 `plausible` tells the right one"
+                 `plausible` identifies the right one"
             );
         }
         format!(

@@ -5,7 +5,7 @@
 
 use super::decoder::Place;
 
-/// How the parts of a frame are told apart.
+/// How a part of a frame is identified.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum PartNumber {
     /// By a number, which begins at `first`.

@@ -10,7 +10,7 @@ use crate::devices::stream::decoding::decoder::Place;
 use crate::devices::stream::decoding::order::Turn;
 use crate::devices::stream::framing::check::ByteOrder;
 
-/// How frames are told apart.
+/// How the beginning and the end of a frame are found.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Param)]
 pub(crate) enum Framing {
     /// Each frame begins with the bytes of `mark`.
@@ -47,7 +47,7 @@ pub struct Params {
     pub(crate) stop: Option<String>,
     /// What to send to ask for a frame, `rate_hz` times a second.
     pub(crate) poll: Option<String>,
-    /// How frames are told apart.
+    /// How the beginning and the end of a frame are found.
     pub(crate) frame: Framing,
     /// The bytes that begin or end a frame, such as `hex:AA55`; with `lines`, the beginning of the line that ends a frame.
     pub(crate) mark: Option<String>,
