@@ -4,6 +4,7 @@ mod arguments;
 mod calibrate;
 mod doctor;
 mod features;
+mod guided;
 mod new;
 #[cfg(feature = "drivers")]
 mod pads;

@@ -44,7 +44,7 @@ pub use explain::explanation;
 pub use reference::pages::reference;
 pub use run::{Commissioning, Job, JobOptions, Print, Proof, duration};
 pub use shell::command::{OutputFormat, Subcommand, derived};
-pub use shell::{FAULTED, NOT_LOADED, Shell};
+pub use shell::{FAULTED, INTERRUPTED, NOT_LOADED, Shell};
 pub use text::svg;
 
 /// Tactile servoing from graph files.

@@ -56,6 +56,18 @@ impl Attached {
         self.samples.get(self.output::<T>(port))
     }
 
+    /// Returns the newest value of an output of the description, or `None` while it is absent or lost.
+    #[must_use]
+    pub fn read<T: Signal>(&self, output: Output<T>) -> Option<&T> {
+        self.samples.get(output)
+    }
+
+    /// Returns how often an output of the description was written.
+    #[must_use]
+    pub fn writes<T: Signal>(&self, output: Output<T>) -> u64 {
+        self.samples.ports[output.port].writes
+    }
+
     /// Returns the stamp of the newest sample of a port, in ns since the start, and how often the port was written.
     ///
     /// # Panics

@@ -143,6 +143,14 @@ impl Description {
         find(&self.outputs, name, T::KIND).map(Output::at)
     }
 
+    /// Returns the output of that name and kind on a side of the device, or on any side if `side` is `None`.
+    #[must_use]
+    pub fn output_on<T: Signal>(&self, side: Option<&str>, name: &str) -> Option<Output<T>> {
+        let is_on = |port: &StatedPort| side.is_none() || self.fills[port.fill].side.as_deref() == side;
+        let is_it = |port: &StatedPort| port.name == name && port.shape.kind() == T::KIND && is_on(port);
+        self.outputs.iter().position(is_it).map(Output::at)
+    }
+
     /// Returns the first command of that name.
     #[must_use]
     pub fn command(&self, name: &str) -> Option<Command> {
@@ -159,6 +167,20 @@ impl Description {
     #[must_use]
     pub fn shape(&self, name: &str) -> Option<&Shape> {
         self.outputs.iter().chain(&self.commands).find(|port| port.name == name).map(|port| &port.shape)
+    }
+
+    /// Returns the shape of an output.
+    #[must_use]
+    pub fn shape_of<T: Signal>(&self, output: Output<T>) -> &Shape {
+        &self.outputs[output.port].shape
+    }
+
+    /// Returns a fact of the role of a type that the device fills on a side, or on any side if `side` is `None`.
+    #[must_use]
+    pub fn fact_on(&self, side: Option<&str>, role: &str, name: &str) -> Option<&toml::Value> {
+        let is_it = |fill: &&Filled| fill.role == role && (side.is_none() || fill.side.as_deref() == side);
+        let facts = &self.fills.iter().find(is_it)?.facts;
+        facts.iter().find(|(fact, _)| fact == name).map(|(_, value)| value)
     }
 
     /// Returns the first fact of that name.

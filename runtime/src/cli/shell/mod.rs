@@ -29,7 +29,7 @@ pub const FAULTED: u8 = 1;
 /// Exit code of a file that does not load, and of an invalid command line.
 pub const NOT_LOADED: u8 = 2;
 /// Exit code of a command that a signal ended before its work began.
-pub(crate) const INTERRUPTED: u8 = 130;
+pub const INTERRUPTED: u8 = 130;
 
 /// The catalogue and the output of a running command.
 pub struct Shell {
