@@ -28,9 +28,10 @@ pub(crate) use plan::text::bytes_of;
 /// used. The bench names it with `sensor`, and adds the `link`. Keys of the bench replace those of the file.
 /// `tactflow pads` lists the descriptions that ship, and `docs/pads.md` describes a new pad step by step.
 ///
-/// **Frames.** A frame with a `check` is delivered if its checksum holds. Without one, a frame is delivered if it is
-/// the third in a row that has its `mark` where `length` says, and from then on each frame as soon as it is complete.
-/// Lines, packets and datagrams have borders that do not occur in the data, so the first good one is delivered. After a
+/// **Frames.** A frame is delivered if it is the third in a row that has its `mark` where `length` says, and from then
+/// on each frame as soon as it is complete. A frame whose `check` does not hold is never delivered. A CRC of 16 bits or
+/// more is a proof, so such a frame need not be the third in a row; a shorter checksum holds by chance too often. Lines,
+/// packets and datagrams have borders that do not occur in the data, so the first good one is delivered. After a
 /// frame that is not where it should be, the next one is looked for one byte behind its beginning. If the data has the
 /// mark at the same place in every frame, only a pause between the frames can say where they begin; without a pause,
 /// nothing is delivered. A value that is not finite, or not `plausible`, spoils its frame.

@@ -261,7 +261,7 @@ fn a_frame_of_myrmex_has_its_length_its_table_and_its_checksum() {
     }
     frame.push(frame.iter().fold(0, |xor, byte| xor ^ byte));
     assert_eq!(frame.len(), 520);
-    let cells = pad.last(&frame);
+    let cells = pad.last(&frame.repeat(3));
     let blocks = [[208, 224, 32, 0], [192, 48, 16, 64], [176, 144, 112, 80], [160, 240, 128, 96]];
     for r in 0..16 {
         for c in 0..16 {
@@ -269,8 +269,10 @@ fn a_frame_of_myrmex_has_its_length_its_table_and_its_checksum() {
             assert_eq!(cells[16 * r + c], (4095 - word) as f32, "row {r}, column {c}");
         }
     }
+    let good = frame.clone();
     frame[100] ^= 1;
     assert_eq!(pad.read(&frame), []);
+    assert_eq!(pad.read(&good).len(), 1);
     assert_eq!(pad.reader.tally.rejected, 1);
 }
 

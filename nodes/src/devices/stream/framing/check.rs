@@ -139,6 +139,12 @@ impl Sum {
 }
 
 impl Check {
+    /// Whether a single frame with this checksum is believed: bytes that are no frame have it by chance once in 65,536
+    /// times, or more rarely.
+    pub(crate) const fn is_proof(&self) -> bool {
+        matches!(self.sum, Sum::Crc16(_) | Sum::Crc32(_))
+    }
+
     /// Whether a frame has the right checksum.
     pub(crate) fn holds(&self, frame: &[u8]) -> bool {
         let Some(end) = frame.len().checked_sub(self.after + self.sum.size()) else { return false };

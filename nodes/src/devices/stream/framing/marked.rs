@@ -1,7 +1,9 @@
 //! Frames with a mark at a fixed place: a header (`sync`) or a trailer.
 //!
-//! The mark can occur in the data. So a frame with a mark is only believed if its checksum holds, or if it is the third
-//! in a row. From then on each frame is delivered as soon as it is complete, until one is not where it should be.
+//! The mark can occur in the data, and a checksum of 8 bits holds by chance once in 256 times. So a frame is only
+//! believed if it has a CRC of 16 bits or more, or if it is the third in a row. From then on each frame is delivered as
+//! soon as it is complete, until one is not where it should be. A frame with a wrong checksum, and a good one in its
+//! place behind it, was damaged on the way: it is dropped, and nothing else.
 //!
 //! If the data has the mark at the same place in several frames, there are several rows of frames. Then only a pause
 //! can say which is the right one: most pads send a frame and rest. A row whose frames begin after a pause is right
@@ -10,10 +12,11 @@
 
 use std::collections::VecDeque;
 
+use super::check::Check;
 use super::rule::{Length, Rule, Verdict};
 use super::{Counts, IsSound};
 
-/// Number of frames in a row after which frames without a checksum are believed.
+/// Number of frames in a row after which frames without a CRC of 16 bits or more are believed.
 const ROW: usize = 3;
 /// Number of pauses that are remembered.
 const PAUSES: usize = 8;
@@ -105,6 +108,15 @@ impl Marked {
             Verdict::Good(length) if self.is_followed(self.start + length) => {
                 return Step::Frame(self.start, self.start + length);
             }
+            Verdict::Bad(length) if self.rule.check.is_some() => match self.next_verdict(length, is_sound) {
+                Verdict::Wait => return Step::Wait,
+                Verdict::Good(_) => {
+                    self.counts.rejected += 1;
+                    self.skip_to(self.start + length);
+                    return Step::Again;
+                }
+                _ => {}
+            },
             _ => {}
         }
         self.counts.rejected += 1;
@@ -112,6 +124,11 @@ impl Marked {
         self.is_locked = false;
         self.skip_to(self.start + 1);
         Step::Again
+    }
+
+    /// Judges the frame behind one of this length.
+    fn next_verdict(&self, length: usize, is_sound: IsSound<'_>) -> Verdict {
+        self.rule.judge(&self.buffer[self.start + length..], is_sound)
     }
 
     /// Whether the bytes behind a frame, as far as they have arrived, can be the next one. A frame that has lost a
@@ -123,7 +140,7 @@ impl Marked {
     /// Looks for a frame that can be believed.
     fn search(&mut self, is_sound: IsSound<'_>) -> Step {
         let Some(candidate) = self.candidate() else { return Step::Wait };
-        if self.rule.check.is_some() {
+        if self.rule.check.as_ref().is_some_and(Check::is_proof) {
             return match self.rule.judge(&self.buffer[candidate..], is_sound) {
                 Verdict::Wait => Step::Wait,
                 Verdict::Good(length) => self.lock(candidate, candidate + length),
@@ -141,7 +158,7 @@ impl Marked {
 
     /// Gives up the candidate at the start.
     fn refuse(&mut self, verdict: Verdict) -> Step {
-        self.counts.rejected += u64::from(verdict == Verdict::Bad);
+        self.counts.rejected += u64::from(matches!(verdict, Verdict::Bad(_)));
         self.skip_to(self.start + 1);
         Step::Again
     }

@@ -31,8 +31,8 @@ pub(crate) enum Verdict {
     Wait,
     /// They do not have the mark, or no length.
     Stranger,
-    /// They are a whole frame with the mark, and it is wrong.
-    Bad,
+    /// They begin with a frame of this length that has the mark, and it is wrong.
+    Bad(usize),
     /// They begin with a frame of this length.
     Good(usize),
 }
@@ -84,7 +84,7 @@ impl Rule {
             Some(frame) if self.check.as_ref().is_none_or(|check| check.holds(frame)) && is_sound(frame) => {
                 Verdict::Good(length)
             }
-            Some(_) => Verdict::Bad,
+            Some(_) => Verdict::Bad(length),
         }
     }
 

@@ -59,17 +59,68 @@ fn the_third_frame_in_a_row_is_the_first_that_is_believed() {
     assert_eq!(framer.counts(), Counts::default());
 }
 
-#[test]
-fn a_good_checksum_is_believed_at_once() {
-    let mut bytes = frame(7)[..9].to_vec();
+/// A frame of 12 bytes with a CRC of 16 bits.
+fn with_crc(number: u8) -> Vec<u8> {
+    let mut bytes = frame(number);
+    let crc = crc::Crc::<u16>::new(&crc::CRC_16_MODBUS).checksum(&bytes);
+    bytes.extend(crc.to_le_bytes());
+    bytes
+}
+
+/// A frame of 11 bytes with a checksum of 8 bits.
+fn with_xor(number: u8) -> Vec<u8> {
+    let mut bytes = frame(number);
     bytes.push(bytes.iter().fold(0, |xor, byte| xor ^ byte));
-    let mut framer = sync(10, Some("xor8"));
-    assert_eq!(frames(&mut framer, &[(b"hello", false), (&bytes, false)]), std::slice::from_ref(&bytes));
-    bytes[5] ^= 1;
-    assert_eq!(frames(&mut framer, &[(&bytes, false)]), [[0; 0]; 0]);
-    bytes[5] ^= 1;
-    assert_eq!(frames(&mut framer, &[(&bytes, false)]), [bytes]);
-    assert_eq!(framer.counts(), Counts { rejected: 1, resyncs: 1, skipped: 15 });
+    bytes
+}
+
+#[test]
+fn a_good_crc_is_believed_at_once() {
+    let mut framer = sync(12, Some("crc-16/modbus"));
+    assert_eq!(frames(&mut framer, &[(b"hello", false), (&with_crc(7), false)]), [with_crc(7)]);
+    assert_eq!(framer.counts(), Counts { rejected: 0, resyncs: 0, skipped: 5 });
+}
+
+#[test]
+fn a_checksum_of_8_bits_is_believed_in_the_third_frame_in_a_row() {
+    let mut framer = sync(11, Some("xor8"));
+    let bytes = [b"hello".to_vec(), with_xor(1), with_xor(2), with_xor(3), with_xor(4)].concat();
+    assert_eq!(frames(&mut framer, &[(&bytes, false)]), [with_xor(3), with_xor(4)]);
+}
+
+#[test]
+fn a_frame_that_was_damaged_on_the_way_is_the_only_one_that_is_dropped() {
+    let mut framer = sync(11, Some("xor8"));
+    let mut broken = with_xor(4);
+    broken[5] ^= 1;
+    let bytes = [with_xor(1), with_xor(2), with_xor(3), broken, with_xor(5), with_xor(6)].concat();
+    for (i, byte) in bytes.iter().enumerate() {
+        let found = frames(&mut framer, &[(&[*byte], false)]);
+        let number = (i / 11 + 1) as u8;
+        let is_sent = i % 11 == 10 && [3, 5, 6].contains(&number);
+        assert_eq!(found, if is_sent { vec![with_xor(number)] } else { vec![] }, "byte {i}");
+    }
+    assert_eq!(framer.counts(), Counts { rejected: 1, resyncs: 0, skipped: 11 });
+}
+
+#[test]
+fn a_frame_in_the_payload_with_its_own_checksum_is_no_frame() {
+    // Each frame of 22 bytes holds a whole frame of the same form, but for its place.
+    let inner = [&MARK[..], &[9, 9, 9]].concat();
+    let outer = |number: u8| {
+        let mut bytes = [&MARK[..], &[number], &inner, &[number; 13]].concat();
+        bytes.push(bytes.iter().fold(0, |xor, byte| xor ^ byte));
+        bytes
+    };
+    // What begins at the inner mark has a good checksum once.
+    let mut second = outer(2);
+    let from_inner = [&outer(1)[3..], &second[..3]].concat();
+    second[2] ^= from_inner[..21].iter().fold(0, |xor, byte| xor ^ byte) ^ from_inner[21];
+    second[21] = second[..21].iter().fold(0, |xor, byte| xor ^ byte);
+    let bytes = [&outer(1)[1..], &second, &outer(3), &outer(4), &outer(5)].concat();
+    let found = frames(&mut sync(22, Some("xor8")), &[(&bytes, false)]);
+    assert!(found.iter().all(|frame| (3..=5).any(|number| *frame == outer(number))), "{found:?}");
+    assert_eq!(found.last(), Some(&outer(5)));
 }
 
 #[test]
