@@ -6,6 +6,9 @@ the quality falls, and below ok the session drops to monitor and the arm stops. 
 It checks every answer, and prints what it saw as lines of JSON: `state` and `do` when they happen, `cycle` for each
 measurement with `--cycles`, and `end` with all counts.
 
+With `--guided`, a person guides the arm by hand: each line `move q1 … q7` [rad] on the standard input puts it there at
+once, and is answered with the event `moved`. The controller ends with the standard input.
+
     python3 lwr.py --port 49938 --seconds 5 --events '[{"at": 1.0, "do": "lose", "count": 5}]'
 """
 
@@ -29,6 +32,9 @@ AXES = [("z", 1, 0.11), ("y", -1, 0.2005), ("z", 1, 0.2), ("y", 1, 0.2), ("z", 1
 EXTRAPOLATED = 5  # cycles without an answer in which the arm goes on
 
 
+GRAVITY = 9.80665  # [m/s2]
+
+
 def f32(value):
     return struct.unpack("<f", struct.pack("<f", value))[0]
 
@@ -42,6 +48,14 @@ def flange(q):
         turn = [[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]] if axis == "z" else [[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]]
         r = [[sum(row[k] * turn[k][j] for k in range(3)) for j in range(3)] for row in r]
     return [value for row, at in zip(r, z) for value in row + [at]]
+
+
+def weight(mass, centre, pose):
+    """The force [N] and the torque [N m] of a mass [kg] with its centre [m] in the frame of the flange."""
+    # The third row of the rotation is the vertical in the axes of the flange.
+    force = [-mass * GRAVITY * up for up in pose[8:11]]
+    torque = [centre[i - 2] * force[i - 1] - centre[i - 1] * force[i - 2] for i in range(3)]
+    return force + torque
 
 
 class Controller:
@@ -63,7 +77,7 @@ class Controller:
         self.sent, self.answered, self.newest = {}, set(), None
         self.lost, self.held, self.swallowed, self.ints = 0, [], 0, [0] * 16
         self.last, self.entered, self.fresh = None, False, None
-        self.frozen, self.kept = False, []
+        self.frozen, self.kept, self.orders, self.is_left = False, [], b"", False
         self.counts = {
             "sent": 0, "answers": 0, "bad_answers": 0, "mirror_errors": 0, "flag_errors": 0, "sequence_errors": 0,
             "unknown_answers": 0, "stranger_answers": 0, "drops": 0, "commands": 0,
@@ -101,7 +115,8 @@ class Controller:
         struct.pack_into("<12f", bytes_, 244, *self.pose())
         struct.pack_into("<7f", bytes_, 292, *self.krl)
         struct.pack_into("<7f", bytes_, 320, *offset)
-        x, y, z, tx, ty, tz = self.args.wrench
+        of_tool = weight(self.args.tool[0], self.args.tool[1:], flange(self.measured))
+        x, y, z, tx, ty, tz = [a + b for a, b in zip(self.args.wrench, of_tool)]
         struct.pack_into("<6f", bytes_, 500, x, y, z, tz, ty, tx)
         self.sent[sequence] = {"takes": self.takes(), "state": self.state, "commanded": commanded, "at": time.monotonic()}
         self.sent.pop((sequence - 2000) % 65536, None)
@@ -190,6 +205,19 @@ class Controller:
         share = 1.0 - math.exp(-self.dt / self.args.lag_s) if self.args.lag_s else 1.0
         self.measured = [m + share * (t + self.args.sag - m) for m, t in zip(self.measured, self.total)]
         self.largest_lead = max(self.largest_lead, *(abs(t - m) for t, m in zip(self.total, self.measured)))
+
+    def guide(self):
+        """Takes what a person has written on the standard input."""
+        while self.args.guided and select.select([0], [], [], 0)[0]:
+            data = os.read(0, 4096)
+            self.args.guided, self.is_left = data != b"", data == b""
+            *lines, self.orders = (self.orders + data).split(b"\n")
+            for line in lines:
+                word, *numbers = line.split()
+                assert word == b"move" and len(numbers) == 7, line
+                self.total = [f32(float(number)) for number in numbers]
+                self.measured = [q + self.args.sag for q in self.total]
+                self.say("moved")
 
     def enter(self, state):
         if state == self.state:
@@ -289,6 +317,7 @@ class Controller:
         due, end = time.monotonic(), self.begin + self.args.seconds
         while time.monotonic() < end and not self.is_over():
             self.move()
+            self.guide()
             self.program()
             self.sequence = (self.sequence + 1) % 65536
             event = self.due()
@@ -307,7 +336,7 @@ class Controller:
     def is_over(self):
         """Whether the driver has left: it answers no more, after it did."""
         is_silent = self.heard is not None and time.monotonic() - self.heard > 1.0
-        return self.args.until_silent and is_silent and not self.events
+        return self.is_left or self.args.until_silent and is_silent and not self.events
 
     def finish(self):
         trips = sorted(self.round_trips) or [0.0]
@@ -340,6 +369,8 @@ def main():
     parser.add_argument("--pose-off", type=float, default=0.0, help="how far the reported flange is off along x [m]")
     parser.add_argument("--home", type=float, nargs=7, default=HOME)
     parser.add_argument("--wrench", type=float, nargs=6, default=[0.0] * 6, help="fx fy fz tx ty tz [N, N m]")
+    parser.add_argument("--tool", type=float, nargs=4, default=[0.0] * 4, help="mass [kg] and centre x y z [m] in the flange")
+    parser.add_argument("--guided", action="store_true")
     parser.add_argument("--events", type=json.loads, default=[])
     Controller(parser.parse_args()).run()
 

@@ -8,6 +8,8 @@ each with a line:
     go, pause               send frames, 10 ms apart, or nothing
     split N                 write each frame in pieces of N bytes
     marks none|moving|fixed put the marker into the payload
+    press X Y               a grid shows a touch: X along its columns and Y along its rows, each from -1 to 1
+    release                 a grid shows the noise of a pad that nobody touches
     raw HEX                 send bytes between two frames
     lose, add, flip         take a byte out of the next frame, put one in, or change one
     repeat N                send the next frame N times
@@ -49,9 +51,26 @@ def cells(n, count, marks):
     return found
 
 
+def touched(n, rows, cols, place):
+    """Noise of one step around 10, and a touch of about two tactels around a place, if there is one."""
+    found = [10 + (7 * n + 3 * k) % 2 for k in range(rows * cols)]
+    if place is not None:
+        x, y = (place[0] + 1) / 2 * (cols - 1), (place[1] + 1) / 2 * (rows - 1)
+        for k in range(rows * cols):
+            away = ((k % cols - x) ** 2 + (k // cols - y) ** 2) ** 0.5
+            found[k] += round(100 * max(0.0, 1 - away / 2.5))
+    return found
+
+
 def grid(rows, cols):
-    """FlexiTac: AA 55 and a byte for each tactel."""
-    return lambda n, marks: [b"\xaa\x55" + bytes(cells(n, rows * cols, marks))]
+    """FlexiTac: AA 55 and a byte for each tactel. `marks` is the place of a touch too, with None for no touch."""
+
+    def packets(n, marks):
+        is_touch = not isinstance(marks, str)
+        found = touched(n, rows, cols, marks) if is_touch else cells(n, rows * cols, marks)
+        return [b"\xaa\x55" + bytes(found)]
+
+    return packets
 
 
 def cushion(n, marks):
@@ -333,6 +352,10 @@ class Pad:
                 self.pieces = int(rest[0])
             elif word == "marks":
                 self.marks = rest[0]
+            elif word == "press":
+                self.marks = (float(rest[0]), float(rest[1]))
+            elif word == "release":
+                self.marks = None
             elif word == "raw":
                 self.link.send(bytes.fromhex(rest[0]))
             elif word in ("lose", "add", "flip"):

@@ -36,6 +36,7 @@ DEFAULTS = {
     "tcp_error": 0.0,           # added to the x of the pose that it reports [m]
     "deflection": 0.0,          # added to the measured position of the elbow [rad]
     "force": [0.0] * 6,
+    "lacks": [0.0] * 4,         # mass [kg] and centre in the flange [m] of what the payload lacks; the TCP is the flange
     "dials": 1,                 # connections that the program opens
     "texts": 0,                 # every so many samples, a text comes before a sample
     "from": "127.0.0.1",        # address from which it connects
@@ -101,6 +102,14 @@ def tcp_pose(q, offset):
     return [pose[0][3], pose[1][3], pose[2][3]] + vector(pose)
 
 
+def weight(lacks, flange):
+    """The force [N] and the torque [N m] of a weight on the flange, about its origin and along the axes of the base."""
+    mass, *centre = lacks
+    x, y, _ = (sum(flange[i][k] * centre[k] for k in range(3)) for i in range(3))
+    down = -9.80665 * mass
+    return [0.0, 0.0, down, y * down, -x * down, 0.0]
+
+
 class Client:
     """A connection of RTDE."""
 
@@ -142,6 +151,8 @@ class Robot:
         word, *rest = line.split()
         if word == "set":  # set slider 0.5
             self.s[rest[0]] = json.loads(rest[1])
+        elif word == "move":  # a hand guides the robot: move q1 ... q6
+            self.q = [float(angle) for angle in rest]
         elif word == "protective_stop":
             self.s["safety_mode"], self.s["runtime_state"], self.stops_at = 3, 4, PROTECTIVE
             self.wanted = [0.0] * 6
@@ -291,9 +302,11 @@ class Robot:
         if name == "actual_TCP_pose":
             pose = tcp_pose(measured, s["tcp_offset"])
             return [pose[0] + s["tcp_error"]] + pose[1:]
+        if name == "actual_TCP_force":
+            return [a + b for a, b in zip(s["force"], weight(s["lacks"], turn(tcp_pose(measured, s["tcp_offset"])[3:])))]
         return {
             "timestamp": 1000.0 + self.steps * self.dt * s["drift"], "actual_q": measured, "target_q": q,
-            "actual_qd": self.qd, "target_qd": self.qd, "actual_TCP_speed": [0.0] * 6, "actual_TCP_force": s["force"],
+            "actual_qd": self.qd, "target_qd": self.qd, "actual_TCP_speed": [0.0] * 6,
             "tcp_offset": s["tcp_offset"], "payload": s["payload"], "robot_mode": s["robot_mode"],
             "safety_mode": s["safety_mode"], "runtime_state": s["runtime_state"], "speed_scaling": s["slider"],
             "target_speed_fraction": s["slider"], "robot_status_bits": 3, "safety_status_bits": 1,

@@ -8,6 +8,8 @@ mod answers;
 mod bad_data;
 mod blind;
 mod calibrate;
+#[cfg(target_os = "linux")]
+mod calibrate_guided;
 #[cfg(unix)]
 mod cell;
 mod cli;

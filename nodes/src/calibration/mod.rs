@@ -1,17 +1,25 @@
-//! Calibration of a pad: from a log of presses with a reference force to a curve for each tactel.
+//! Calibration of a pad and of what carries it: the curves of its tactels, its mount on the arm, and the weight of the
+//! tool.
 //!
-//! [`log`] is the input, [`samples`] finds which tactel bore which force, [`fit`] fits its [`curve`], [`file`] writes
+//! From a log of presses with a reference force to a curve for each tactel: [`log`] is the input, [`samples`] finds which tactel bore which force, [`fit`] fits its [`curve`], [`file`] writes
 //! and reads the curves, [`report`] measures how good they are and [`plot`] draws them, as Fig. 1 of the paper does.
-//! None of this runs in a graph: there the node `calibrate` reads the file.
+//!
+//! From still postures of an arm: [`pad_mount`] is where the pad is on the tip, from one point that was touched in
+//! several postures, and [`tool_weight`] is the mass and the centre of mass of the tool, from the wrenches of a force
+//! sensor.
+//!
+//! None of this runs in a graph: there the node `calibrate` reads the file, and the bench holds the numbers.
 
 pub mod curve;
 pub mod file;
 pub mod fit;
 pub mod log;
+pub mod pad_mount;
 #[cfg(feature = "cli")]
 pub mod plot;
 pub mod report;
 pub mod samples;
+pub mod tool_weight;
 
 use tactflow_runtime::signal::Unit;
 

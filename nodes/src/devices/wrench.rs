@@ -12,14 +12,12 @@ use tactflow_runtime::device::{Description, Link, Output, Samples};
 use tactflow_runtime::signal::{Features, FeaturesShape, Scalar, ScalarShape, Unit};
 
 use super::Facts;
+use crate::motion::weight::weight;
 
 /// A force and a torque, `[fx, fy, fz, tx, ty, tz]` [N, N m].
 pub(crate) type Wrench = [f64; 6];
 
 const NAMES: [&str; 6] = ["fx", "fy", "fz", "tx", "ty", "tz"];
-
-/// Acceleration of gravity [m/s²].
-const GRAVITY: f64 = 9.80665;
 
 /// The ports of the role `force_sensor`.
 #[derive(Debug, Clone, Copy)]
@@ -76,12 +74,17 @@ impl ToolWeight {
         Self { mass, centre: centre.into() }
     }
 
+    /// Returns the facts of the weight that is subtracted.
+    #[cfg(feature = "drivers")]
+    pub(crate) fn facts(&self) -> Facts {
+        let centre: Vec<f64> = self.centre.iter().copied().collect();
+        vec![("tool_mass".into(), self.mass.into()), ("tool_com".into(), centre.into())]
+    }
+
     /// Returns a wrench without the weight of the tool, at the rotation of the tip in the base. It has the axes of the
     /// tip.
     pub(crate) fn without(&self, measured: &Wrench, tip: &Rotation3<f64>) -> Wrench {
-        let force = tip.inverse() * Vector3::new(0.0, 0.0, -self.mass * GRAVITY);
-        let torque = self.centre.cross(&force);
-        let weight = [force.x, force.y, force.z, torque.x, torque.y, torque.z];
+        let weight = weight(self.mass, &self.centre, tip);
         std::array::from_fn(|i| measured[i] - weight[i])
     }
 }

@@ -1,10 +1,13 @@
-//! Poses from roll, pitch and yaw, and the rotation vector of a rotation.
+//! Poses from roll, pitch and yaw and back, and the rotation vector of a rotation.
 
 use nalgebra::{IsometryMatrix3, Matrix3, Rotation3, Translation3, Vector3};
 
 /// Below this sine, an angle above a right angle is close to a half turn, where the axis is not in the difference
 /// R - R' [1].
 const HALF_TURN_SINE: f64 = 1e-4;
+
+/// Below this cosine of the pitch, roll and yaw turn about the same axis [1].
+const MIN_PITCH_COSINE: f64 = 1e-9;
 
 /// Returns the pose with a translation [m] and with roll, pitch and yaw [rad]: Rz(yaw) Ry(pitch) Rx(roll), as in a
 /// URDF.
@@ -18,6 +21,26 @@ pub fn pose_of(xyz: [f64; 3], [roll, pitch, yaw]: [f64; 3]) -> IsometryMatrix3<f
         -sp,     cp * sr,                cp * cr,
     );
     IsometryMatrix3::from_parts(Translation3::from(xyz), Rotation3::from_matrix_unchecked(rotation))
+}
+
+/// Returns roll, pitch and yaw of a rotation [rad], so that [`pose_of`] makes it again. With a pitch of ±pi/2 only the
+/// difference or the sum of roll and yaw is determined; the yaw is then 0.
+///
+/// ```
+/// use tactflow_nodes::motion::pose::{pose_of, rpy_of};
+///
+/// let rpy = rpy_of(&pose_of([0.0; 3], [0.1, -0.2, 0.3]).rotation);
+/// assert!((0..3).all(|i| (rpy[i] - [0.1, -0.2, 0.3][i]).abs() < 1e-15));
+/// ```
+#[must_use]
+pub fn rpy_of(rotation: &Rotation3<f64>) -> [f64; 3] {
+    let r = rotation.matrix();
+    let cosine = libm::hypot(r[(0, 0)], r[(1, 0)]);
+    let yaw = if cosine > MIN_PITCH_COSINE { libm::atan2(r[(1, 0)], r[(0, 0)]) } else { 0.0 };
+    // The roll that goes with this yaw, from the two columns of the rotation that are never short.
+    let (sin, cos) = libm::sincos(yaw);
+    let roll = libm::atan2(r[(0, 2)] * sin - r[(1, 2)] * cos, r[(1, 1)] * cos - r[(0, 1)] * sin);
+    [roll, libm::atan2(-r[(2, 0)], cosine), yaw]
 }
 
 /// Returns the rotation vector of a rotation, the logarithm of its matrix: the axis, as long as the angle from 0 to pi
@@ -81,6 +104,17 @@ mod tests {
             let got = pose_of([1.0, 2.0, 3.0], [roll, pitch, yaw]);
             prop_assert!((got.rotation.matrix() - wanted.matrix()).norm() < 1e-14);
             prop_assert_eq!(got.translation.vector, Vector3::new(1.0, 2.0, 3.0));
+        }
+
+        #[test]
+        fn a_rotation_has_the_roll_pitch_and_yaw_that_make_it(
+            roll in -3.2..3.2,
+            pitch in prop_oneof![-3.2..3.2, Just(PI / 2.0), Just(-PI / 2.0), (PI / 2.0 - 1e-8)..(PI / 2.0 + 1e-8)],
+            yaw in -3.2..3.2,
+        ) {
+            let rotation = pose_of([0.0; 3], [roll, pitch, yaw]).rotation;
+            let made = pose_of([0.0; 3], rpy_of(&rotation)).rotation;
+            prop_assert!((made.matrix() - rotation.matrix()).norm() < 1e-8, "{made} {rotation}");
         }
 
         #[test]

@@ -71,7 +71,7 @@ const NODES: &[(&str, &[&str])] = &[
     ("usual", &[]),
     ("recordings/common", &[]),
     ("recordings", &["random", "recordings"]),
-    ("calibration", &["random", "recordings", "calibration"]),
+    ("calibration", &["motion", "random", "recordings", "calibration"]),
     ("touch", &["motion", "usual", "calibration", "touch"]),
     ("servo", &["motion", "usual", "servo"]),
     ("limits", &["motion", "usual", "limits"]),
@@ -79,7 +79,7 @@ const NODES: &[(&str, &[&str])] = &[
     ("flow", &["flow"]),
     ("devices", &["arm", "builtin", "motion", "recordings", "usual", "devices"]),
     ("sim", &["arm", "devices", "motion", "usual", "random", "roles", "sim"]),
-    ("tool", &["builtin", "calibration", "devices", "recordings", "sim", "tool"]),
+    ("tool", &["arm", "builtin", "calibration", "devices", "motion", "recordings", "sim", "touch", "tool"]),
 ];
 
 /// The folder a file stands in; a file beside `lib.rs` is a room of its own.

@@ -14,17 +14,17 @@ use tempfile::TempDir;
 pub(super) const SOON: Duration = Duration::from_secs(20);
 
 /// A pad on the other end of a link; it ends with the test.
-pub(super) struct Fake {
+pub(crate) struct Fake {
     child: Child,
     input: Option<ChildStdin>,
     output: BufReader<ChildStdout>,
     /// What a driver opens.
-    pub(super) link: String,
+    pub(crate) link: String,
     _folder: TempDir,
 }
 
 impl Fake {
-    pub(super) fn start(pad: &str, link: &str) -> Self {
+    pub(crate) fn start(pad: &str, link: &str) -> Self {
         let folder = tempfile::tempdir().unwrap();
         let mut command = Command::new("python3");
         command.arg(workspace().join("tests/peers/pad.py")).args([pad, link, "--path"]).arg(folder.path().join("port"));
@@ -37,7 +37,7 @@ impl Fake {
     }
 
     /// Has the pad do something, and returns its answer.
-    pub(super) fn answer(&mut self, what: &str) -> String {
+    pub(crate) fn answer(&mut self, what: &str) -> String {
         let input = self.input.as_mut().expect("it has not ended");
         writeln!(input, "{what}").unwrap();
         let mut answer = String::new();
@@ -45,7 +45,7 @@ impl Fake {
         answer.trim().to_owned()
     }
 
-    pub(super) fn does(&mut self, what: &str) {
+    pub(crate) fn does(&mut self, what: &str) {
         assert_eq!(self.answer(what), "ok", "{what}");
     }
 }

@@ -10,7 +10,8 @@ use tactflow_runtime::harness::LinkRig;
 use tactflow_tests::{catalogue, workspace};
 
 use crate::tool::{Said, say};
-use fake::{Fake, SOON, driver, expect_count, expect_images, shipped};
+pub(crate) use fake::Fake;
+use fake::{SOON, driver, expect_count, expect_images, shipped};
 
 /// The pads that ship.
 const PADS: [&str; 9] = [

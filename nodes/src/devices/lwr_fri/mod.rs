@@ -114,12 +114,13 @@ pub struct Params {
 /// comparison of the pose at the start finds a wrong order.
 ///
 /// **Force.** The role `force_sensor` is the external wrench that the controller estimates at its tool, moved to `tip`,
-/// without the weight of `tool_mass`. Give `tool_mass` only for a load that the controller does not know.
+/// without the weight of `tool_mass`. Give `tool_mass` only for a load that the controller does not know; `tactflow
+/// calibrate tool` measures it.
 ///
 /// Without answers, the session drops to monitor and the arm stops, within `silence_ms`. The device counts `bad
 /// datagrams`, `lost datagrams`, `late datagrams`, `repeated datagrams`, `datagrams of a second controller`, `shortened
-/// steps` and `unsent answers`. It states the facts `urdf`, `tip` and, if it is given, `home` of the arm, and the `mount`
-/// of the force sensor, which is the tip itself.
+/// steps` and `unsent answers`. It states the facts `urdf`, `tip` and, if it is given, `home` of the arm, and of the
+/// force sensor the `mount`, which is the tip itself, and the weight that is subtracted, `tool_mass` and `tool_com`.
 ///
 /// ```toml
 /// [roles]
@@ -165,7 +166,8 @@ impl Device for LwrFri {
         let facts = arm::facts(&params.urdf, &params.tip, params.home.as_deref())?;
         let shape = JointsShape { joints, unit: Unit::RADIAN };
         let ports = ArmPorts::fill(&mut description, &shape, facts);
-        let force = WrenchPorts::fill(&mut description, vec![pad::mount(&Mount::NONE)]);
+        let weight = ToolWeight::new(params.tool_mass, params.tool_com);
+        let force = WrenchPorts::fill(&mut description, [vec![pad::mount(&Mount::NONE)], weight.facts()].concat());
         let settings = Settings {
             port: params.port as u16,
             sample_time: params.sample_ms * 1e-3,
@@ -174,7 +176,7 @@ impl Device for LwrFri {
             krl_ints_at_end,
             wait_s: params.wait_s,
             tool: params.tool.pose(),
-            weight: ToolWeight::new(params.tool_mass, params.tool_com),
+            weight,
         };
         let check = StartCheck::new(load(&params.urdf, &params.tip, &params.tool)?, params.start);
         let driver = Fri::new(settings, ports, force, target, check, chain, allowed);

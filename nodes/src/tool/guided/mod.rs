@@ -62,6 +62,13 @@ impl<T> Clone for CellPort<T> {
 
 impl<T> Copy for CellPort<T> {}
 
+impl<T: Signal> CellPort<T> {
+    /// Returns the output in the description of its device.
+    pub(super) const fn output(self) -> Output<T> {
+        self.output
+    }
+}
+
 /// A role that the bench binds, and the device that fills it.
 #[derive(Debug, Clone)]
 pub(super) struct BoundRole {
@@ -129,9 +136,13 @@ impl<'s> GuidedCell<'s> {
             self.bound.iter().filter_map(|bound| Some((bound, self.port::<T>(bound, output)?))).collect();
         let names = || fitting.iter().map(|(bound, _)| format!("`{}`", bound.role)).collect::<Vec<_>>().join(", ");
         let found = |index: usize| (fitting[index].0.clone(), fitting[index].1);
+        // A device that fills several roles is the same arm in each.
+        let is_one = |list: &[(&BoundRole, CellPort<T>)]| {
+            list.windows(2).all(|two| (&two[0].0.device, &two[0].0.side) == (&two[1].0.device, &two[1].0.side))
+        };
         match (wanted, fitting.len()) {
             (_, 0) => Err(self.none_of(what)),
-            (None, 1) => Ok(found(0)),
+            (None, _) if is_one(&fitting) => Ok(found(0)),
             (None, _) => {
                 Err(format!("the bench binds several roles with {what}: name one of {} with `{option}`", names()))
             }

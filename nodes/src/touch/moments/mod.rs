@@ -134,10 +134,9 @@ impl Node for Moments {
             Weighing::Force => sums,
             other => other.add_up(&inputs.image, &inputs.region),
         };
-        if sums.force > 0.0 {
-            let (j, i) = (sums.x / sums.force, sums.y / sums.force);
-            out.x.set(self.shape.x(sums.first[1] + j));
-            out.y.set(self.shape.y(sums.first[0] + i));
+        if let Some([x, y]) = sums.centre(&self.shape) {
+            out.x.set(x);
+            out.y.set(y);
             let ellipse = ellipse(&sums, self.shape.pitch);
             out.anisotropy.set(ellipse.anisotropy());
             if let Some(orientation) = ellipse.orientation(self.min_anisotropy) {

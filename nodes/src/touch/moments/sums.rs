@@ -1,7 +1,7 @@
 //! Sums over a region, and the ellipse with its second moments: shared by all nodes that measure a contact.
 
 use tactflow_runtime::node::{At, Mistake, Mistakes, Param};
-use tactflow_runtime::signal::{Image, Mask};
+use tactflow_runtime::signal::{Image, ImageShape, Mask};
 use tactflow_runtime::source::Code;
 
 use crate::motion::axis::half_angle;
@@ -86,6 +86,16 @@ pub struct Sums {
     xx: f64,
     xy: f64,
     yy: f64,
+}
+
+impl Sums {
+    /// Returns the centre of gravity along the sensor's x and y, from the middle of the pad [m]; `None` if the sum of the
+    /// weights is not positive.
+    #[must_use]
+    pub fn centre(&self, shape: &ImageShape) -> Option<[f64; 2]> {
+        let (j, i) = (self.x / self.force, self.y / self.force);
+        (self.force > 0.0).then(|| [shape.x(self.first[1] + j), shape.y(self.first[0] + i)])
+    }
 }
 
 /// Returns the sums over a region with each tactel weighted by a function of its value.

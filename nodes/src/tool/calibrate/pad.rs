@@ -1,35 +1,23 @@
-//! `tactflow calibrate`: makes a calibration file, a picture and a report from logs.
+//! `tactflow calibrate LOG…`: makes a calibration file, a picture and a report from logs.
 
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 
 use tactflow_runtime::cli::Shell;
-use tactflow_runtime::cli::clap::{self, Parser};
+use tactflow_runtime::cli::clap::{self, Args};
 use tactflow_runtime::signal::Unit;
 use tactflow_runtime::source::{Code, Diagnostic, Report, SourceMap};
 
-use super::arguments::{may_replace, pair, positive};
+use super::super::arguments::{may_replace, pair, positive};
 use crate::calibration::log::Log;
 use crate::calibration::report::{CalibrationReport, Settings, TactelStatus, calibrate};
 use crate::calibration::samples::LoadKind;
 use crate::calibration::{CurveKind, file, plot};
 use crate::recordings::{self, Assumed, Hints, Refusal};
 
-/// Make a calibration file for a pad from logs with a reference force
-#[derive(Parser)]
-#[command(name = "calibrate")]
-#[command(
-    after_help = "A log is a recording with a force [N] for each frame: a CSV file with the columns time, force and the tactels, \
-or an .npz file with images and force. It starts unloaded. See docs/calibration.md.
-
-Examples:
-  tactflow calibrate press.csv                          prints the report only
-  tactflow calibrate press.csv -o pad.toml --svg pad.svg
-  tactflow calibrate bladder1.npz bladder2.npz --load uniform --curve piecewise -o pad.toml
-
-Exit codes: 0 success; 2 a log or a file cannot be used."
-)]
-pub(super) struct CalibrateArgs {
+/// The arguments of a calibration of the tactels.
+#[derive(Args)]
+pub(super) struct PadArgs {
     /// Logs of one pad
     #[arg(required = true, value_name = "LOG")]
     logs: Vec<PathBuf>,
@@ -71,7 +59,7 @@ const ASSUMED: Assumed = Assumed { unit: Unit::RAW, pitch: [0.005; 2], rate_hz: 
 /// Maximum residual of a calibration that is written, as a fraction of the maximum force.
 const MAX_RESIDUAL: f64 = 0.25;
 
-pub(super) fn run(args: CalibrateArgs, shell: &Shell) -> u8 {
+pub(super) fn run(args: PadArgs, shell: &Shell) -> u8 {
     let refuse = |message: String| shell.refuse(message);
     let logs =
         check(&args).map_err(refuse).and_then(|()| args.logs.iter().map(|path| read(path, &args, shell)).collect());
@@ -80,7 +68,7 @@ pub(super) fn run(args: CalibrateArgs, shell: &Shell) -> u8 {
 }
 
 /// Checks the arguments and the files to write, before the long calculation.
-fn check(args: &CalibrateArgs) -> Result<(), String> {
+fn check(args: &PadArgs) -> Result<(), String> {
     if args.bearing.is_some() && args.load == LoadKind::Probe {
         return Err("`--bearing` needs `--load uniform`: the force of a probe is on one tactel".into());
     }
@@ -88,7 +76,7 @@ fn check(args: &CalibrateArgs) -> Result<(), String> {
     args.svg.as_deref().map_or(Ok(()), |path| may_replace(path, "an SVG picture", |text| text.contains("<svg")))
 }
 
-fn make(args: &CalibrateArgs, logs: &[Log], shell: &Shell) -> Result<(), String> {
+fn make(args: &PadArgs, logs: &[Log], shell: &Shell) -> Result<(), String> {
     for (path, log) in args.logs.iter().zip(logs) {
         let (first, describe) = (&logs[0], |log: &Log| format!("{} x {} tactels in {}", log.rows, log.cols, log.unit));
         if (log.rows, log.cols, log.unit) != (first.rows, first.cols, first.unit) {
@@ -129,7 +117,7 @@ fn write(path: &Path, text: &str) -> Result<(), String> {
 }
 
 /// Returns the comment of the file: how it was made.
-fn origin(args: &CalibrateArgs, report: &CalibrationReport) -> String {
+fn origin(args: &PadArgs, report: &CalibrationReport) -> String {
     let names = args.logs.iter().map(|path| path.file_name().unwrap_or_default().to_string_lossy().into_owned());
     let load = match args.load {
         LoadKind::Probe => "a probe on one tactel at a time",
@@ -150,7 +138,7 @@ fn origin(args: &CalibrateArgs, report: &CalibrationReport) -> String {
 }
 
 /// Reads one log. Prints why it cannot be used, and returns the exit code.
-fn read(path: &Path, args: &CalibrateArgs, shell: &Shell) -> Result<Log, u8> {
+fn read(path: &Path, args: &PadArgs, shell: &Shell) -> Result<Log, u8> {
     let name = path.display().to_string();
     let bytes = std::fs::read(path).map_err(|error| shell.refuse(format_args!("cannot read `{name}`: {error}")))?;
     let hints = Hints {
