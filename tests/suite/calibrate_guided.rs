@@ -19,7 +19,7 @@ use tactflow_tests::workspace;
 use tempfile::TempDir;
 
 use crate::stream::Fake;
-use crate::tool::tool;
+use crate::tool::{say, tool};
 
 /// Time within which anything happens on a busy machine.
 const SOON: Duration = Duration::from_secs(30);
@@ -132,6 +132,23 @@ impl Cell {
     fn value(&self, device: &str, key: &str) -> toml::Value {
         let bench: toml::Table = self.now().parse().unwrap();
         bench["devices"][device][key].clone()
+    }
+}
+
+#[test]
+fn calibrate_has_three_uses() {
+    let help = say(&["calibrate", "--help"]);
+    assert_eq!(help.code, 0, "{}", help.err);
+    for text in
+        ["calibrate [OPTIONS] <LOG>...", "calibrate <tool|mount>", "tool   Weigh the tool", "mount  Measure where"]
+    {
+        assert!(help.out.contains(text), "{text}: {}", help.out);
+    }
+    let none = say(&["calibrate"]);
+    assert!(none.code == 2 && none.err.contains("<LOG>..."), "{}", none.err);
+    for what in ["tool", "mount"] {
+        let stepped = say(&["calibrate", what, "graphs/benches/mock.toml"]);
+        assert!(stepped.code == 2 && stepped.err.contains("so nobody can guide it"), "{}", stepped.err);
     }
 }
 
@@ -268,6 +285,9 @@ fn a_controller_that_subtracts_the_weight_gets_what_its_payload_lacks() {
     // (0.5 * 40 + 0.231 * 50) / 0.731 and 0.231 * 10 / 0.731.
     dialogue.hears(&["set the payload to 0.731 kg with its centre at [0.0, 3.2, 43.2] mm"]);
     assert_eq!((dialogue.end(), cell.now()), (0, cell.text.clone()), "{}", dialogue.said);
+    robot.write("mark");
+    robot.hears(&["\"mark\""]);
+    assert!(!robot.said.contains("\"program\""), "no program was sent to the robot: {}", robot.said);
 }
 
 /// The flange of an LWR 4+ in its base: its table of Denavit and Hartenberg, with the distances of its maker [m].

@@ -19,8 +19,8 @@ use crate::tool::guided::{BenchFile, BoundRole, CellPort, GuidedArm, GuidedCell,
 /// Measure where a pad is on the arm: touch one fixed point in four postures
 #[derive(Args)]
 #[command(
-    after_help = "The arm is guided by hand, and nothing is sent to it. Fix a pin with a round tip on the table, and touch it lightly with
-the pad: near each corner, with the tool tilted another way each time. The result is the mount with its residual.
+    after_help = "The arm is guided by hand, and nothing is sent to it. Fix a pin with a round tip on the table, and touch it lightly with \
+the pad: near each corner, with the tool tilted another way each time. The result is the mount with its residual. \
 After a typed `yes`, `mount` of the pad is written into the bench.
 
 Examples:

@@ -8,12 +8,12 @@ use tactflow_runtime::cli::clap::{self, Args};
 use tactflow_runtime::signal::Unit;
 use tactflow_runtime::source::{Code, Diagnostic, Report, SourceMap};
 
-use super::super::arguments::{may_replace, pair, positive};
 use crate::calibration::log::Log;
 use crate::calibration::report::{CalibrationReport, Settings, TactelStatus, calibrate};
 use crate::calibration::samples::LoadKind;
 use crate::calibration::{CurveKind, file, plot};
 use crate::recordings::{self, Assumed, Hints, Refusal};
+use crate::tool::arguments::{may_replace, pair, positive};
 
 /// The arguments of a calibration of the tactels.
 #[derive(Args)]

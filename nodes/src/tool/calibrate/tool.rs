@@ -18,9 +18,9 @@ use crate::tool::guided::{BenchFile, BoundRole, CellPort, GuidedArm, GuidedCell,
 /// Weigh the tool: hold the arm still in four postures
 #[derive(Args)]
 #[command(
-    after_help = "The arm is guided by hand, and nothing is sent to it. In each posture another side of the tool is down, and nothing
-touches the tool. The result is the mass and the centre of mass, the constant offset of the sensor, and the residual.
-After a typed `yes`, `tool_mass` and `tool_com` of the device are written into the bench. If the controller subtracts
+    after_help = "The arm is guided by hand, and nothing is sent to it. In each posture another side of the tool is down, and nothing \
+touches the tool. The result is the mass and the centre of mass, the constant offset of the sensor, and the residual. \
+After a typed `yes`, `tool_mass` and `tool_com` of the device are written into the bench. If the controller subtracts \
 the weight itself, the result is what to correct in its payload, and nothing is written.
 
 Examples:
