@@ -15,9 +15,15 @@ use urdf_rs::{JointType, Robot};
 use super::chain::{Chain, ChainSegment, JointKind};
 use super::mount::Mount;
 use crate::motion::pose::pose_of;
+use crate::usual::USUAL_RAD;
 
 /// Position limit of a joint without one [rad; m for a prismatic joint].
 pub const UNBOUNDED: f64 = 1e9;
+/// Speed that no joint of an arm has [rad/s; m/s for a prismatic joint]. A greater one is in another unit, and the arm
+/// would take many seconds to stop from it.
+const MAX_SPEED: f64 = 50.0;
+/// Length that no link of an arm has [m].
+const MAX_LENGTH: f64 = 10.0;
 
 /// Reads the chain from the root of a URDF file to the sensor on its link `tip`, for a node or a device with the
 /// parameters `urdf`, `tip` and `mount`.
@@ -136,6 +142,13 @@ impl Model<'_> {
         if !(limit.velocity > 0.0 && limit.velocity.is_finite()) {
             return bad("has no speed limit: `<limit>` needs a `velocity` greater than 0");
         }
+        if limit.velocity > MAX_SPEED {
+            let (speed, converted) = (limit.velocity, six_digits(limit.velocity.to_radians()));
+            return bad(&format!(
+                "has a speed of {speed} rad/s (m/s if prismatic), which no arm has: if it is in degrees, write \
+                 `velocity=\"{converted}\"`"
+            ));
+        }
         let joint = Joint { name: joint.name.clone(), lower, upper, speed: limit.velocity, ..Joint::default() };
         Ok(ChainSegment { fixed, axis: axis.normalize(), motion, joint })
     }
@@ -145,8 +158,30 @@ impl Model<'_> {
         if xyz.iter().chain(&rpy).any(|number| !number.is_finite()) {
             return Err(self.mistake(&joint.name, format!("the origin of joint `{}` is not finite", joint.name)));
         }
+        if let Some(length) = xyz.iter().find(|length| length.abs() > MAX_LENGTH) {
+            let message = format!(
+                "the origin of joint `{}` is {length} m away: `xyz` of a URDF is in m; if this is in mm, write `{}`",
+                joint.name,
+                six_digits(length * 1e-3)
+            );
+            return Err(self.mistake(&joint.name, message));
+        }
+        if let Some(angle) = rpy.iter().find(|angle| angle.abs() > USUAL_RAD) {
+            let message = format!(
+                "the origin of joint `{}` is turned by {angle} rad: `rpy` of a URDF is in rad; if this is in degrees, \
+                 write `{}`",
+                joint.name,
+                six_digits(angle.to_radians())
+            );
+            return Err(self.mistake(&joint.name, message));
+        }
         Ok(pose_of(xyz, rpy))
     }
+}
+
+/// Rounds a number for a message.
+fn six_digits(number: f64) -> f64 {
+    (number * 1e6).round() / 1e6
 }
 
 fn one_line(text: &str) -> String {

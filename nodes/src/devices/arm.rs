@@ -9,6 +9,7 @@ use tactflow_runtime::source::Code;
 
 use super::Facts;
 use crate::arm::chain::Chain;
+use crate::usual::USUAL_RAD;
 
 /// The ports of the role `velocity_arm`.
 #[derive(Debug, Clone, Copy)]
@@ -85,18 +86,29 @@ pub(crate) fn joints(chain: &Chain, acceleration: f64, start: &[f64]) -> Result<
     let joints = chain.joints().iter().enumerate();
     let joints = joints.map(|(i, joint)| Joint { acceleration, start: start.get(i).copied(), ..joint.clone() });
     let joints: Vec<Joint> = joints.collect();
-    if start.len() != joints.len() {
-        let message = format!("`start` has {} entries, but the arm has {} joints", start.len(), joints.len());
-        return Err(Mistake::param("start", message).into());
+    check_posture("start", start, &joints)?;
+    Ok(JointsShape { joints, unit: Unit::RADIAN })
+}
+
+/// Checks that a posture has one position for each joint, and that each is in its range.
+///
+/// # Errors
+/// The difference, at the parameter that states the posture.
+pub(crate) fn check_posture(param: &str, posture: &[f64], joints: &[Joint]) -> Result<(), Mistakes> {
+    if posture.len() != joints.len() {
+        let message = format!("`{param}` has {} entries, but the arm has {} joints", posture.len(), joints.len());
+        return Err(Mistake::param(param, message).into());
     }
-    let outside = joints.iter().zip(start).filter(|(joint, q)| !(joint.lower..=joint.upper).contains(*q));
+    let outside = joints.iter().zip(posture).filter(|(joint, q)| !(joint.lower..=joint.upper).contains(*q));
     refuse_any(outside.map(|(Joint { name, lower, upper, .. }, q)| {
         let message = format!(
-            "joint `{name}` cannot start at {q}: its range is {lower:.4} to {upper:.4} (rad, or m if prismatic)"
+            "`{param}` puts joint `{name}` at {q}, outside of its range from {lower:.4} to {upper:.4} (rad, or m if \
+             prismatic)"
         );
-        Mistake::param("start", message)
-    }))?;
-    Ok(JointsShape { joints, unit: Unit::RADIAN })
+        let is_degrees = (*lower..=*upper).contains(&q.to_radians()) && q.abs() > USUAL_RAD;
+        let mistake = Mistake::param(param, message);
+        if is_degrees { mistake.help(format!("if it is in degrees, write `{:.4}`", q.to_radians())) } else { mistake }
+    }))
 }
 
 /// Checks that every commanded velocity is finite.

@@ -91,6 +91,7 @@ impl Device for MockArm {
 
     fn open(params: Params) -> Result<Opened, Mistakes> {
         let chain = load(&params.urdf, &params.tip, &Mount::NONE)?;
+        params.home.as_ref().map_or(Ok(()), |home| arm::check_posture("home", home, chain.joints()))?;
         let start = arm::start_of(params.start.as_deref(), params.home.as_deref())?;
         let joints = arm::joints(&chain, params.acceleration, &start)?;
         check_holds(&params.hold)?;
@@ -269,7 +270,7 @@ mod tests {
             ("start = [0, 0]", "`start` has 2 entries, but the arm has 7 joints"),
             (
                 "start = [0, 0, 0, 0, 0, 0, 3]",
-                "joint `lwr_a6_joint` cannot start at 3: its range is -2.9671 to 2.9671 (rad, or m if prismatic)",
+                "`start` puts joint `lwr_a6_joint` at 3, outside of its range from -2.9671 to 2.9671 (rad, or m if prismatic)",
             ),
             (
                 "start = [0, 0, 0, 0, 0, 0, 0]\nhold = [{ from_s = 2, to_s = 1 }]",

@@ -54,6 +54,7 @@ impl ArmModel {
     /// If the model cannot be read, or if the arm cannot start where it should.
     pub fn load(&self) -> Result<LoadedArm, Mistakes> {
         let chain = load(&self.urdf, &self.tip, &self.mount)?;
+        self.home.as_ref().map_or(Ok(()), |home| arm::check_posture("home", home, chain.joints()))?;
         let start = arm::start_of(self.start.as_deref(), self.home.as_deref())?;
         let joints = arm::joints(&chain, self.acceleration, &start)?;
         Ok(LoadedArm { chain, start, joints })

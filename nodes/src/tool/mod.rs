@@ -8,6 +8,7 @@ mod guided;
 mod new;
 #[cfg(feature = "drivers")]
 mod pads;
+mod pose;
 mod press;
 #[cfg(feature = "drivers")]
 mod sniff;
@@ -23,6 +24,7 @@ pub fn tool(catalogue: Catalogue) -> Tool {
         .command(derived(calibrate::run))
         .command(derived(doctor::run))
         .command(derived(new::run))
+        .command(derived(pose::run))
         .command(derived(press::run));
     #[cfg(feature = "drivers")]
     let tool = tool.command(derived(pads::run)).command(derived(sniff::run));

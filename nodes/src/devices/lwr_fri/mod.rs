@@ -184,18 +184,14 @@ impl Device for LwrFri {
     }
 }
 
-/// Checks that the model has the joints of an LWR, and that `home` has one entry for each.
+/// Checks that the model has the joints of an LWR, and that `home` is a posture of them.
 fn check_chain(chain: &Chain, params: &Params) -> Result<(), Mistakes> {
     let count = chain.joints().len();
     if count != JOINTS {
         let message = format!("the model has {count} joints up to `{}`, but an LWR has {JOINTS}", params.tip);
         return Err(Mistake::param("tip", message).into());
     }
-    let other = params.home.as_ref().filter(|home| home.len() != JOINTS);
-    refuse_any(other.map(|home| {
-        let message = format!("`home` has {} entries, but the arm has {JOINTS} joints", home.len());
-        Mistake::param("home", message)
-    }))
+    params.home.as_ref().map_or(Ok(()), |home| arm::check_posture("home", home, chain.joints()))
 }
 
 /// Returns the values of the joints, `None` without any.

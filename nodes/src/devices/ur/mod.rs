@@ -21,7 +21,7 @@ use std::net::IpAddr;
 use std::time::Duration;
 
 use tactflow_runtime::device::{Description, Device, Driver, OnSilence, Opened};
-use tactflow_runtime::node::{Describe, FilePath, Mistake, Mistakes, Param};
+use tactflow_runtime::node::{At, Describe, FilePath, Mistake, Mistakes, Param};
 use tactflow_runtime::signal::{Joint, JointsShape, Unit};
 
 use super::arm::{self, ArmPorts};
@@ -191,12 +191,13 @@ impl Device for Ur {
     fn open(params: Params) -> Result<Opened, Mistakes> {
         let chain = load(&params.urdf, &params.tip, &Mount::NONE)?;
         let flange = params.flange.as_ref().unwrap_or(&params.tip);
-        let to_flange = load(&params.urdf, flange, &Mount::NONE)?;
+        let to_flange = load(&params.urdf, flange, &Mount::NONE).map_err(|mistakes| of_flange(mistakes, &params))?;
         let order = order(chain.joints(), params.joints.as_deref())?;
         if to_flange.joints().len() != JOINTS {
             let message = format!("{} joints move between the root and `{flange}`, not 6", to_flange.joints().len());
             return Err(Mistake::param("flange", message).into());
         }
+        params.home.as_ref().map_or(Ok(()), |home| arm::check_posture("home", home, chain.joints()))?;
         let timeout_ms = timeout(&params)?;
         let joint = |joint: &Joint| Joint { acceleration: params.acceleration, start: None, ..joint.clone() };
         let joints = JointsShape { joints: chain.joints().iter().map(joint).collect(), unit: Unit::RADIAN };
@@ -217,6 +218,13 @@ impl Device for Ur {
         let robot = Robot { peer: peer(&params)?, ..robot(&params, (ports, force), chain, checks, script, timeout_ms) };
         Ok(Opened { description, driver: Driver::Live(Box::new(robot)) })
     }
+}
+
+/// Returns mistakes in the link of the flange at the parameter that names it.
+fn of_flange(mut mistakes: Mistakes, params: &Params) -> Mistakes {
+    let is_tip = |mistake: &&mut Mistake| params.flange.is_some() && mistake.at == At::Param("tip".into());
+    mistakes.iter_mut().filter(is_tip).for_each(|mistake| mistake.at = At::Param("flange".into()));
+    mistakes
 }
 
 fn robot(

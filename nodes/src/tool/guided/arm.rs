@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use nalgebra::IsometryMatrix3;
 use tactflow_runtime::catalogue::Catalogue;
+use tactflow_runtime::device::Description;
 use tactflow_runtime::node::FilePath;
 use tactflow_runtime::signal::{Joint, Joints, Twist};
 use tactflow_runtime::source::SourceMap;
@@ -44,7 +45,8 @@ impl GuidedArm {
     /// If there is none, or several, or if its model cannot be read.
     pub(crate) fn find(cell: &GuidedCell<'_>, wanted: Option<&str>) -> Result<Self, String> {
         let (bound, position) = cell.role::<Joints>("position", "an arm", wanted, "--arm")?;
-        let chain = chain(cell, &bound, position)?;
+        let description = cell.device(position).description();
+        let chain = chain(cell.shell().catalogue(), description, &bound)?;
         Ok(Self { bound, position, chain })
     }
 
@@ -82,14 +84,17 @@ impl GuidedArm {
     }
 }
 
-fn chain(cell: &GuidedCell<'_>, bound: &BoundRole, position: CellPort<Joints>) -> Result<Chain, String> {
+/// Returns the chain from the base to the tip of an arm, by what its device states.
+///
+/// # Errors
+/// If the device states no arm, or if its model cannot be read.
+pub(crate) fn chain(catalogue: &Catalogue, description: &Description, bound: &BoundRole) -> Result<Chain, String> {
     let fact = |name: &str| {
-        let description = cell.device(position).description();
         let value = description.fact_on(bound.side.as_deref(), "velocity_arm", name);
         let text = value.and_then(|value| value.as_str()).map(str::to_owned);
         text.ok_or_else(|| format!("device `{}` states no `{name}`", bound.device))
     };
-    let urdf = file(cell.shell().catalogue(), &fact("urdf")?);
+    let urdf = file(catalogue, &fact("urdf")?);
     load(&urdf, &fact("tip")?, &Mount::NONE).map_err(|mistakes| {
         let why = mistakes.first().map_or("", |mistake| &mistake.message);
         format!("the model of device `{}` cannot be read: {why}", bound.device)

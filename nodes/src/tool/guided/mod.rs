@@ -16,7 +16,7 @@ use tactflow_runtime::engine::Interrupt;
 use tactflow_runtime::graph::{BenchDevice, OpenBench, open_bench};
 use tactflow_runtime::signal::Signal;
 
-pub(super) use arm::{GuidedArm, StillPosture};
+pub(super) use arm::{GuidedArm, StillPosture, chain};
 pub(super) use bench_file::{BenchFile, numbers};
 
 /// Longest time between two looks at the devices, which wake the thread when they sample.
@@ -275,7 +275,7 @@ impl<'s> GuidedCell<'s> {
 }
 
 /// Splits the word that a bench binds: a device, perhaps with its side.
-fn bound_role(role: String, word: &str) -> BoundRole {
+pub(super) fn bound_role(role: String, word: &str) -> BoundRole {
     let (device, side) = word.split_once('.').map_or((word, None), |(device, side)| (device, Some(side.to_owned())));
     BoundRole { role, device: device.to_owned(), side }
 }

@@ -29,7 +29,7 @@ pub(crate) fn describe(net: &Net<'_>, opened: &OpenedBench) -> Vec<String> {
         let device = &opened.devices[bound.device];
         let silence = device.description.on_silence.as_ref().filter(|_| matches!(device.driver, Driver::Live(_)))?;
         let way = net.speed_limit(role).map(|speed| {
-            format!("; the sensor moves by {} mm at most, at {speed} m/s", round(speed * silence.within * 1e3))
+            format!("; the sensor moves by {} mm at most, at {} m/s", round(speed * silence.within * 1e3), round(speed))
         });
         let name = net.name(Producer::Role(role));
         Some(format!("`{name}` without commands: {silence}{}", way.unwrap_or_default()))

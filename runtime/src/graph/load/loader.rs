@@ -45,7 +45,14 @@ impl Loader {
         let Some(mut root) = root else { return flat };
         if let Some(what) = wrong_file_type(&root.0, "graph") {
             let message = format!("this is {what}, not a graph");
-            let help = (what == SCENARIO).then(|| "run it with `tactflow verify`".to_owned());
+            let help = match what {
+                SCENARIO => Some("run it with `tactflow verify`".to_owned()),
+                BENCH => Some(format!(
+                    "name a task, and this file as its bench: `TASK.toml --bench {}`",
+                    request.graph.display()
+                )),
+                _ => None,
+            };
             self.diagnostics.push(Diagnostic::new(Code::WrongFile, root.1, message).with_help(help));
             return flat;
         }
@@ -152,6 +159,13 @@ impl Loader {
     fn models(&mut self, bench: &mut BenchDocument) {
         for from in &bench.model_files {
             let place = from.file.span.clone();
+            if from.file.path.extension().is_some_and(|end| end == "urdf") {
+                let what = from.what;
+                let message = format!("this is a model, and `{what}` names a file with a section [{what}]");
+                let help = format!("write the model as `urdf`, or make a {what} file: `tactflow new {what} NAME`");
+                self.diagnostics.push(Diagnostic::new(Code::WrongFile, place, message).help(help));
+                continue;
+            }
             let Some((mut root, _)) = self.read(&from.file.path, Some(place.clone())) else { continue };
             if let Some(other) = wrong_file_type(&root, from.what) {
                 let message = format!("this is {other}, not a {}", from.what);
@@ -260,6 +274,7 @@ fn is_one_assignment(table: &Table, text: &str) -> bool {
 
 /// Name of the type of a file with the section [scenario].
 const SCENARIO: &str = "a scenario";
+const BENCH: &str = "a bench";
 
 /// Returns the type of a file, if it lacks the section `expected` and has the sections of another type.
 pub(crate) fn wrong_file_type(root: &Table, expected: &str) -> Option<&'static str> {
@@ -270,7 +285,7 @@ pub(crate) fn wrong_file_type(root: &Table, expected: &str) -> Option<&'static s
     let types = [
         ("scenario", SCENARIO),
         ("graph", "a graph"),
-        ("devices", "a bench"),
+        ("devices", BENCH),
         ("exports", "a part"),
         (ROBOT, "a robot"),
         (SENSOR, "a sensor"),
