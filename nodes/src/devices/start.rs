@@ -43,6 +43,9 @@ pub(crate) struct StartReport<'r> {
     pub(crate) commanded: &'r [f64],
     /// The posture from which the driver integrates velocities [rad]; the commanded one if it does not integrate.
     pub(crate) target: &'r [f64],
+    /// How far the measured posture was from the commanded one when the arm followed commands last, if it did before in
+    /// this session of its controller [rad].
+    pub(crate) held: Option<&'r [f64]>,
     /// The pose of the tip in the base that the robot reports for the measured posture, if it does [m].
     pub(crate) tip: Option<IsometryMatrix3<f64>>,
 }
@@ -85,11 +88,14 @@ impl StartCheck {
                 return Err(DeviceError(message));
             }
             let bound = self.bounds.deflection;
-            if (measured - commanded).abs() > bound {
+            let (deflection, held) = (measured - commanded, report.held.map_or(0.0, |held| held[i]));
+            // An arm that is soft and presses is deflected, and stays so when it goes on.
+            if deflection.abs() > bound && (deflection - held).abs() > bound {
                 let message = format!(
                     "joint `{name}` is at {measured:.4} rad, but the controller commands {commanded:.4} rad: they differ \
-                     by more than {bound} rad. Free the arm, check the load data of the tool, or raise \
-                     `start.deflection`"
+                     by more than {bound} rad{}. Free the arm, check the load data of the tool, or raise \
+                     `start.deflection`",
+                    report.held.map_or_else(String::new, |_| format!(", and by {held:.4} rad when it moved last"))
                 );
                 return Err(DeviceError(message));
             }
@@ -148,7 +154,7 @@ mod tests {
         let mut postures = [HOME; 3];
         postures[which][2] += by;
         let [measured, commanded, target] = &postures;
-        check().check(&StartReport { measured, commanded, target, tip: None })
+        check().check(&StartReport { measured, commanded, target, held: None, tip: None })
     }
 
     #[test]
@@ -164,6 +170,32 @@ mod tests {
     }
 
     #[test]
+    fn an_arm_that_pressed_when_it_halted_goes_on_with_the_same_deflection() {
+        let check = check();
+        let mut commanded = HOME;
+        commanded[2] += 0.09;
+        let deflected_by = |by: f64, held: f64| {
+            let mut measured = commanded;
+            measured[2] += by;
+            let held = std::array::from_fn::<f64, 6, _>(|i| if i == 2 { held } else { 0.0 });
+            let report = StartReport {
+                measured: &measured,
+                commanded: &commanded,
+                target: &commanded,
+                held: Some(&held),
+                tip: None,
+            };
+            check.check(&report).map_err(|error| error.0)
+        };
+        assert_eq!(deflected_by(-0.09, -0.09), Ok(()));
+        assert_eq!(deflected_by(-0.13, -0.09), Ok(()), "within the bound of what it was");
+        assert_eq!(deflected_by(0.0, -0.09), Ok(()), "what it pressed on is gone");
+        let more = deflected_by(-0.15, -0.09).unwrap_err();
+        assert!(more.contains("differ by more than 0.05 rad, and by -0.0900 rad when it moved last. Free"), "{more}");
+        assert!(deflected_by(0.06, -0.09).is_err() && deflected_by(-0.06, 0.0).is_err());
+    }
+
+    #[test]
     fn a_model_that_puts_the_tip_elsewhere_is_refused() {
         let check = check();
         let reports = |turn: f64, shift: f64| {
@@ -171,7 +203,7 @@ mod tests {
             let turn = Rotation3::from_axis_angle(&Vector3::x_axis(), turn.to_radians());
             let at = tip(&check);
             let tip = IsometryMatrix3::from_parts(shift * at.translation, turn * at.rotation);
-            check.check(&StartReport { measured: &HOME, commanded: &HOME, target: &HOME, tip: Some(tip) })
+            check.check(&StartReport { measured: &HOME, commanded: &HOME, target: &HOME, held: None, tip: Some(tip) })
         };
         assert_eq!(reports(0.9, 0.0019), Ok(()));
         let away = reports(0.0, 0.0021).unwrap_err().0;
@@ -189,7 +221,13 @@ mod tests {
             let mut tip = check.chain.forward(&measured, &mut [Twist::default(); 6]).0;
             let rounded = tip.rotation.matrix().map(|entry| f64::from(entry as f32));
             tip.rotation = Rotation3::from_matrix_unchecked(rounded);
-            let report = StartReport { measured: &measured, commanded: &measured, target: &measured, tip: Some(tip) };
+            let report = StartReport {
+                measured: &measured,
+                commanded: &measured,
+                target: &measured,
+                held: None,
+                tip: Some(tip),
+            };
             assert_eq!(check.check(&report), Ok(()), "{i}");
         }
     }
@@ -200,7 +238,7 @@ mod tests {
         let mut swapped = HOME;
         swapped.swap(0, 2);
         let tip = Some(tip(&check));
-        let report = StartReport { measured: &swapped, commanded: &swapped, target: &swapped, tip };
+        let report = StartReport { measured: &swapped, commanded: &swapped, target: &swapped, held: None, tip };
         let message = check.check(&report).unwrap_err().0;
         assert!(message.contains("the order of the joints"), "{message}");
     }

@@ -131,7 +131,7 @@ impl Link {
     /// For a robot whose controller stops by itself, and for a driver that fails and can still bring the device to rest.
     /// Call it in every cycle in which the robot must not move; the first reason is kept until the operator resumes.
     pub fn refuse(&mut self, why: impl Into<String>) {
-        let epoch = self.commands.read().grant.epoch;
+        let epoch = self.epoch();
         let shared = self.lease.shared();
         if !shared.refuses(epoch) {
             shared.refuse_because(epoch, why.into());
@@ -140,8 +140,17 @@ impl Link {
 
     /// Whether commands are refused, by the driver or by the graph, until the operator resumes.
     pub fn refuses(&mut self) -> bool {
-        let epoch = self.commands.read().grant.epoch;
+        let epoch = self.epoch();
         self.lease.shared().refuses(epoch)
+    }
+
+    /// Returns the epoch of the newest commands. Each `resume` of the operator after a refusal begins another one.
+    ///
+    /// A driver that checks its device before it moves again compares the epoch that it has checked with that of the
+    /// commands: ask after [`commands`](Self::commands). [`refuses`](Self::refuses) alone shows no resume that came between
+    /// two calls.
+    pub fn epoch(&mut self) -> u64 {
+        self.commands.read().grant.epoch
     }
 
     /// Whether the driver must send nothing to the device, as if this process had died. A driver of a device that moves

@@ -14,7 +14,7 @@ use tokio::time::timeout;
 use super::intake::{Arrival, Intake, Stated};
 use super::permit::{accepts_flags, is_in_command, obstacle, sample_time, takes_positions};
 use super::target::Target;
-use super::wire::{Answer, CMD_BYTES, Impedance, Krl, MSR_BYTES, Report};
+use super::wire::{Answer, CMD_BYTES, Impedance, Joints, Krl, MSR_BYTES, Report};
 use crate::arm::chain::Chain;
 use crate::devices::arm::ArmPorts;
 use crate::devices::start::{StartCheck, StartReport};
@@ -74,8 +74,10 @@ pub(super) struct Fri {
     sets_impedance: bool,
     /// Whether the last answer could not be sent.
     is_unsent: bool,
-    /// Whether commands were refused at the end of the last cycle.
-    was_refused: bool,
+    /// Epoch of the commands for which the arm was checked.
+    checked: Option<u64>,
+    /// How far the measured posture was from the commanded one when the arm followed commands last in this session [rad].
+    held: Option<Joints>,
     notes: Notes,
 }
 
@@ -157,7 +159,8 @@ impl Fri {
             sample_time,
             sets_impedance: false,
             is_unsent: false,
-            was_refused: false,
+            checked: None,
+            held: None,
             notes: Notes::default(),
         }
     }
@@ -218,7 +221,7 @@ impl Fri {
                 self.settings.port
             ),
         };
-        self.phase = Phase::Mirrored;
+        (self.phase, self.held) = (Phase::Mirrored, None);
         if self.has_followed {
             link.refuse(why.clone());
         }
@@ -283,6 +286,7 @@ impl Fri {
             self.begin_session(report, now, link);
         }
         let follows = self.advance(report, now, link);
+        self.step(report, now, link);
         self.answer(report.sequence, newest.from, socket, link);
         self.publish(report, newest.lost, follows, link);
     }
@@ -301,7 +305,7 @@ impl Fri {
         if self.has_followed {
             link.refuse("its controller has begun a new session");
         }
-        self.phase = Phase::Mirrored;
+        (self.phase, self.held) = (Phase::Mirrored, None);
         if self.first.is_none() {
             // An earlier run may have left the controller in the state command, with other flags.
             self.sets_impedance = !is_in_command(report);
@@ -318,7 +322,7 @@ impl Fri {
         }
     }
 
-    /// Mirrors the posture of the controller, or moves by the commands for a sample time. Returns whether the arm
+    /// Goes on to the next phase, and mirrors the posture of the controller unless the arm moves. Returns whether the arm
     /// follows commands.
     fn advance(&mut self, report: &Report, now: Instant, link: &mut Link) -> bool {
         let mut krl = report.krl.clone();
@@ -327,7 +331,8 @@ impl Fri {
         // What is not sent must not move the target.
         let takes = takes_positions(report) && !link.is_mute();
         self.sets_impedance |= accepts_flags(report);
-        if self.phase == Phase::Checked && self.was_refused && !link.refuses() {
+        let epoch = link.epoch();
+        if self.phase == Phase::Checked && self.checked != Some(epoch) {
             // The operator has resumed.
             self.phase = Phase::Unchecked;
         }
@@ -339,7 +344,7 @@ impl Fri {
             // The arm rests where the controller is, and the first step begins there.
             self.target.mirror(&report.commanded);
             why = why.or_else(|| self.fault_at_start(report));
-            self.phase = if why.is_none() { Phase::Checked } else { Phase::Unchecked };
+            (self.phase, self.checked) = (if why.is_none() { Phase::Checked } else { Phase::Unchecked }, Some(epoch));
         } else if let Some(fault) = self.target.fault_of_following(&report.commanded, self.sample_time) {
             self.target.mirror(&report.commanded);
             self.phase = Phase::Unchecked;
@@ -347,16 +352,24 @@ impl Fri {
         }
         let follows = why.is_none();
         self.has_followed |= follows && self.phase == Phase::Checked;
+        if follows && self.phase == Phase::Checked && !link.refuses() {
+            self.held = Some(std::array::from_fn(|i| report.measured[i] - report.commanded[i]));
+        }
         if let Some(why) = why {
             self.refuse(why, report, now, link);
         }
-        let velocity = link.commands().joints(self.ports.velocity);
-        let steps = self.phase == Phase::Checked && !self.is_unsent;
-        if steps && self.target.step(velocity, sample_time(report), now) {
+        follows
+    }
+
+    /// Moves the target by the commands for a sample time, while the arm may follow them.
+    fn step(&mut self, report: &Report, now: Instant, link: &mut Link) {
+        let held = link.commands().joints(self.ports.velocity);
+        let velocity: Joints = std::array::from_fn(|i| held[i]);
+        // The operator may have resumed since `advance`. Then these commands are new, and nothing is checked yet.
+        let is_checked = self.phase == Phase::Checked && self.checked == Some(link.epoch());
+        if is_checked && !self.is_unsent && self.target.step(&velocity, sample_time(report), now) {
             link.count("shortened steps");
         }
-        self.was_refused = link.refuses();
-        follows
     }
 
     /// Refuses commands. Before the arm has followed any, it waits for the state command instead.
@@ -384,6 +397,7 @@ impl Fri {
             measured: &report.measured,
             commanded: &report.commanded,
             target: self.target.position(),
+            held: self.held.as_ref().map(|held| &held[..]),
             tip: Some(report.pose),
         };
         self.check.check(&start).err().map(|error| error.0)
@@ -458,3 +472,6 @@ impl Fri {
         }
     }
 }
+
+#[cfg(test)]
+mod tests;

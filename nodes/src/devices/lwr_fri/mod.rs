@@ -100,7 +100,8 @@ pub struct Params {
 /// motion. A step is never longer than `max_step`, and ends at the limits of the joints.
 ///
 /// **Start.** Before each motion from the state monitor, the device compares the commanded posture with the measured
-/// one, and the pose of the tool with the model. A difference that is greater than `start` allows refuses the motion.
+/// one, and the pose of the tool with the model. A difference that is greater than `start` allows refuses the motion. An
+/// arm that is deflected because it presses goes on after a halt, unless its deflection has changed by more than that.
 /// The arm rests until the controller reaches the state command for the first time, for `wait_s` at most.
 ///
 /// **Safety.** A drop to monitor, drives that are off, an error, a wrong control mode and a quality below ok stop the
@@ -147,44 +148,49 @@ impl Device for LwrFri {
     type Params = Params;
 
     fn open(params: Params) -> Result<Opened, Mistakes> {
-        let chain = load(&params.urdf, &params.tip, &Mount::NONE)?;
-        check_chain(&chain, &params)?;
-        let (krl_ints, krl_ints_at_end) =
-            collect_both(krl_ints("krl_ints", &params.krl_ints), krl_ints("krl_ints_at_end", &params.krl_ints_at_end))?;
-        let (stiffness, damping) = collect_both(
-            per_joint("stiffness", params.stiffness.as_ref()),
-            per_joint("damping_ratio", params.damping_ratio.as_ref()),
-        )?;
-        let allowed = params.controller.as_deref().map(address).transpose()?;
-        let joints = chain.joints().iter();
-        let joints: Vec<Joint> =
-            joints.map(|joint| Joint { acceleration: params.acceleration, start: None, ..joint.clone() }).collect();
-        let target = Target::new(Bounds::new(&joints, params.max_step.unwrap_or(f64::INFINITY)));
-        let mut description = Description::every(params.sample_ms * 1e-3);
-        description.on_silence(OnSilence::Stops, params.silence_ms * 1e-3);
-        description.needs_commissioning = true;
-        let facts = arm::facts(&params.urdf, &params.tip, params.home.as_deref())?;
-        let shape = JointsShape { joints, unit: Unit::RADIAN };
-        let ports = ArmPorts::fill(&mut description, &shape, facts);
-        let weight = ToolWeight::new(params.tool_mass, params.tool_com);
-        let force = WrenchPorts::fill(&mut description, [vec![pad::mount(&Mount::NONE)], weight.facts()].concat());
-        let settings = Settings {
-            port: params.port as u16,
-            sample_time: params.sample_ms * 1e-3,
-            impedance: Impedance { stiffness, damping },
-            krl_ints,
-            krl_ints_at_end,
-            wait_s: params.wait_s,
-            tool: params.tool.pose(),
-            weight,
-        };
-        let check = StartCheck::new(load(&params.urdf, &params.tip, &params.tool)?, params.start);
-        let driver = Fri::new(settings, ports, force, target, check, chain, allowed);
+        let (description, driver) = opened(params)?;
         Ok(Opened { description, driver: Driver::Live(Box::new(driver)) })
     }
 }
 
-/// Checks that the model has the joints of an LWR, and that `home` is a posture of them.
+/// Returns what the device states, and its driver.
+fn opened(params: Params) -> Result<(Description, Fri), Mistakes> {
+    let chain = load(&params.urdf, &params.tip, &Mount::NONE)?;
+    check_chain(&chain, &params)?;
+    let (krl_ints, krl_ints_at_end) =
+        collect_both(krl_ints("krl_ints", &params.krl_ints), krl_ints("krl_ints_at_end", &params.krl_ints_at_end))?;
+    let (stiffness, damping) = collect_both(
+        per_joint("stiffness", params.stiffness.as_ref()),
+        per_joint("damping_ratio", params.damping_ratio.as_ref()),
+    )?;
+    let allowed = params.controller.as_deref().map(address).transpose()?;
+    let joints = chain.joints().iter();
+    let joints: Vec<Joint> =
+        joints.map(|joint| Joint { acceleration: params.acceleration, start: None, ..joint.clone() }).collect();
+    let target = Target::new(Bounds::new(&joints, params.max_step.unwrap_or(f64::INFINITY)));
+    let mut description = Description::every(params.sample_ms * 1e-3);
+    description.on_silence(OnSilence::Stops, params.silence_ms * 1e-3);
+    description.needs_commissioning = true;
+    let facts = arm::facts(&params.urdf, &params.tip, params.home.as_deref())?;
+    let shape = JointsShape { joints, unit: Unit::RADIAN };
+    let ports = ArmPorts::fill(&mut description, &shape, facts);
+    let weight = ToolWeight::new(params.tool_mass, params.tool_com);
+    let force = WrenchPorts::fill(&mut description, [vec![pad::mount(&Mount::NONE)], weight.facts()].concat());
+    let settings = Settings {
+        port: params.port as u16,
+        sample_time: params.sample_ms * 1e-3,
+        impedance: Impedance { stiffness, damping },
+        krl_ints,
+        krl_ints_at_end,
+        wait_s: params.wait_s,
+        tool: params.tool.pose(),
+        weight,
+    };
+    let check = StartCheck::new(load(&params.urdf, &params.tip, &params.tool)?, params.start);
+    Ok((description, Fri::new(settings, ports, force, target, check, chain, allowed)))
+}
+
+/// Checks that the model has the joints of an LWR, and that `home` has one entry for each.
 fn check_chain(chain: &Chain, params: &Params) -> Result<(), Mistakes> {
     let count = chain.joints().len();
     if count != JOINTS {

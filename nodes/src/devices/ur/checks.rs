@@ -30,7 +30,8 @@ impl Checks {
         let [measured, commanded] = [state.q, state.target_q].map(|q| in_order(&self.order, &q));
         let offset = state.tcp_offset.or(self.tcp_offset);
         let tip = geometry::flange(&self.base, state.tcp_pose, offset.unwrap_or_default());
-        let report = StartReport { measured: &measured, commanded: &commanded, target: &commanded, tip: Some(tip) };
+        let report =
+            StartReport { measured: &measured, commanded: &commanded, target: &commanded, held: None, tip: Some(tip) };
         self.start.check(&report).map_err(|error| match offset {
             Some(_) => error.0,
             None => format!("{}. The robot does not report its TCP offset: write it as `tcp_offset`", error.0),

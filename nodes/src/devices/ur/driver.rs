@@ -6,10 +6,11 @@ use std::time::Duration;
 use async_trait::async_trait;
 use tactflow_runtime::device::{DeviceError, Link, Live};
 
+use super::course::Phase;
 use super::program::Listeners;
 use super::robot::Robot;
 use super::rtde::{Failure, Stream};
-use super::session::{End, Phase, Session};
+use super::session::{End, Session};
 
 /// Time between two attempts to connect.
 const RETRY: Duration = Duration::from_millis(500);

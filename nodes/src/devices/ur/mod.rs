@@ -4,6 +4,7 @@
 //! `speedj`. Each message states when the program must stop without another one.
 
 mod checks;
+mod course;
 mod driver;
 mod geometry;
 mod message;

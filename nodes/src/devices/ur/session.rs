@@ -8,6 +8,7 @@ use tokio::net::TcpStream;
 use tokio::time::{sleep_until, timeout};
 
 use super::checks::of_controller;
+use super::course::{Course, Phase};
 use super::message;
 use super::program::{Listeners, Reverse, Sending, is_from};
 use super::recipe::{JOINTS, State};
@@ -41,24 +42,6 @@ pub(super) enum End {
     Lost(String),
 }
 
-/// What the driver waits for.
-#[derive(Debug, Clone, Copy)]
-pub(super) enum Phase {
-    /// The program on the robot starts.
-    Starting { since: Instant, has_sent: bool },
-    /// The robot follows velocities.
-    Ready,
-    /// The robot must not move, until the operator resumes.
-    Refused,
-}
-
-impl Phase {
-    /// The program is to start now.
-    pub(super) fn start() -> Self {
-        Self::Starting { since: Instant::now(), has_sent: false }
-    }
-}
-
 /// One connection to the robot.
 pub(super) struct Session<'a> {
     robot: &'a Robot,
@@ -76,8 +59,8 @@ pub(super) struct Session<'a> {
     closed: Option<Instant>,
     sending: Option<Sending>,
     phase: Phase,
-    /// Whether the commands were refused when the lease was asked last.
-    was_refused: bool,
+    /// Epoch of the commands for which the robot was checked.
+    checked: Option<u64>,
     begin: Instant,
     heard: Instant,
     publishes: bool,
@@ -111,7 +94,7 @@ impl<'a> Session<'a> {
             closed: None,
             sending: None,
             phase,
-            was_refused: false,
+            checked: None,
             begin: now,
             heard: now,
             publishes,
@@ -181,16 +164,15 @@ impl<'a> Session<'a> {
 
     /// Goes on to the next phase.
     fn advance(&mut self, link: &mut Link, state: &State, illegal: Option<String>) {
-        let is_refused = link.refuses();
-        let was_refused = std::mem::replace(&mut self.was_refused, is_refused);
+        let epoch = link.epoch();
         let resumes = match self.phase {
             // It checks in each cycle.
             Phase::Starting { .. } => false,
-            Phase::Ready => was_refused && !is_refused,
-            Phase::Refused => !is_refused,
+            Phase::Ready => self.checked != Some(epoch),
+            Phase::Refused => !link.refuses(),
         };
         if resumes {
-            // The operator resumes. A program that runs goes on.
+            // The operator has resumed. A program that runs goes on.
             self.phase = Phase::start();
         }
         let why = match self.phase {
@@ -200,6 +182,9 @@ impl<'a> Session<'a> {
             Phase::Ready => illegal.or_else(|| self.trouble(state)),
             Phase::Refused => None,
         };
+        if matches!(self.phase, Phase::Ready) {
+            self.checked = Some(epoch);
+        }
         if let Some(why) = why {
             self.phase = Phase::Refused;
             self.publishes = true;
@@ -295,8 +280,7 @@ impl<'a> Session<'a> {
         // The lease must be asked in every cycle, also when nothing is connected.
         let held = of_controller(&self.robot.checks.order, link.commands().joints(self.robot.ports.velocity));
         // The operator may have resumed since `advance`. Then these commands are new, and nothing is checked yet.
-        let (was_refused, is_refused) = (self.was_refused, link.refuses());
-        self.was_refused |= is_refused;
+        let (is_checked, is_refused) = (self.checked == Some(link.epoch()), link.refuses());
         let dt = (state.time - self.sent_at).clamp(1.0 / self.robot.rate_hz, MAX_STEP_S);
         self.sent_at = state.time;
         if link.is_mute() {
@@ -306,14 +290,8 @@ impl<'a> Session<'a> {
             self.sent = [0.0; JOINTS];
             return;
         };
-        let acceleration = self.robot.acceleration;
-        let velocity = match self.phase {
-            Phase::Ready if !was_refused => approached(&self.sent, &held, acceleration, dt),
-            Phase::Ready | Phase::Refused if is_refused => {
-                approached(&self.sent, &lowered(&self.sent, &held), acceleration, dt)
-            }
-            _ => slowed(&self.sent, acceleration, dt),
-        };
+        let course = Course::of(self.phase, is_checked, is_refused);
+        let velocity = course.next(&self.sent, &held, self.robot.acceleration, dt);
         match reverse.send(&message::velocity(self.robot.timeout_ms, &velocity)) {
             Ok(true) => self.sent = velocity,
             Ok(false) => link.count("messages that the robot did not take"),
@@ -379,52 +357,5 @@ async fn closed(reverse: Option<&Reverse>) {
     match reverse {
         Some(reverse) => reverse.closed().await,
         None => std::future::pending().await,
-    }
-}
-
-/// Returns the next velocity on the way from the last one to a target [rad/s].
-///
-/// The commands themselves are within the acceleration of the joints. This one matters when the robot joins in while the
-/// graph already moves. A target of zero holds at once: the lease commands it without a ramp only to a robot that has
-/// stopped by itself.
-fn approached(last: &[f64; JOINTS], target: &[f64; JOINTS], acceleration: f64, dt: f64) -> [f64; JOINTS] {
-    let step = 2.0 * acceleration * dt;
-    std::array::from_fn(|i| match target[i] {
-        0.0 => 0.0,
-        target => last[i] + (target - last[i]).clamp(-step, step),
-    })
-}
-
-/// Returns the part of a target that is between rest and the last velocity [rad/s]: no joint gets faster.
-fn lowered(last: &[f64; JOINTS], target: &[f64; JOINTS]) -> [f64; JOINTS] {
-    std::array::from_fn(|i| target[i].clamp(last[i].min(0.0), last[i].max(0.0)))
-}
-
-/// Returns the next velocity on the way from the last one to rest [rad/s].
-fn slowed(last: &[f64; JOINTS], acceleration: f64, dt: f64) -> [f64; JOINTS] {
-    let step = acceleration * dt;
-    last.map(|v| v - v.clamp(-step, step))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_velocity_joins_in_without_a_jump_and_stops_at_once() {
-        let target = [1.0, -1.0, 0.01, 0.0, 0.0, 0.0];
-        let first = approached(&[0.0; JOINTS], &target, 10.0, 0.002);
-        assert_eq!(first, [0.04, -0.04, 0.01, 0.0, 0.0, 0.0]);
-        let many = (0..100).fold([0.0; JOINTS], |last, _| approached(&last, &target, 10.0, 0.002));
-        assert_eq!(many, target);
-        assert_eq!(approached(&many, &[0.0; JOINTS], 10.0, 0.002), [0.0; JOINTS]);
-    }
-
-    #[test]
-    fn a_robot_that_may_not_move_only_gets_slower() {
-        let last = [1.0, -1.0, 0.01, 0.0, 0.0, 0.5];
-        assert_eq!(slowed(&last, 10.0, 0.002), [0.98, -0.98, 0.0, 0.0, 0.0, 0.48]);
-        let target = [0.5, -2.0, -0.01, 0.3, -0.3, 0.5];
-        assert_eq!(lowered(&last, &target), [0.5, -1.0, 0.0, 0.0, 0.0, 0.5]);
     }
 }
