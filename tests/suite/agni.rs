@@ -1,29 +1,18 @@
 //! The device `agni` against a device in another process, on a pseudo-terminal.
 
-use std::collections::VecDeque;
-use std::io::{BufRead, BufReader, Write};
 use std::path::PathBuf;
-use std::process::{Child, ChildStdin, Command, Stdio};
-use std::sync::mpsc::{Receiver, channel};
 use std::thread;
 use std::time::{Duration, Instant};
 
-use serde_json::Value;
 use tactflow_nodes::devices::agni::Agni;
 use tactflow_runtime::harness::LinkRig;
 use tactflow_runtime::signal::Image;
-use tactflow_tests::workspace;
 
-/// Longest time to wait for anything.
-const SOON: Duration = Duration::from_secs(20);
+use crate::peer::{Process, SOON};
 
 /// The device.
 struct Sensor {
-    child: Child,
-    orders: ChildStdin,
-    said: Receiver<Value>,
-    /// The commands that it has got.
-    got: VecDeque<String>,
+    process: Process,
     link: PathBuf,
     _folder: tempfile::TempDir,
 }
@@ -32,20 +21,10 @@ impl Sensor {
     fn start(arguments: &[&str]) -> Self {
         let folder = tempfile::tempdir().unwrap();
         let link = folder.path().join("pad");
-        let mut command = Command::new("python3");
-        command.arg(workspace().join("tests/peers/agni.py")).arg(&link).args(arguments);
-        let mut child = command.stdin(Stdio::piped()).stdout(Stdio::piped()).spawn().unwrap();
-        let orders = child.stdin.take().unwrap();
-        let out = BufReader::new(child.stdout.take().unwrap());
-        let (say, said) = channel();
-        thread::spawn(move || {
-            for line in out.lines().map_while(Result::ok) {
-                let _ = say.send(serde_json::from_str(&line).unwrap());
-            }
-        });
-        let sensor = Self { child, orders, said, got: VecDeque::new(), link, _folder: folder };
-        assert!(sensor.said.recv_timeout(SOON).unwrap().get("ready").is_some());
-        sensor
+        let arguments = [link.to_str().unwrap()].into_iter().chain(arguments.iter().copied());
+        let process = Process::start("agni.py", arguments);
+        process.wait(0, |said| said["ready"].is_string());
+        Self { process, link, _folder: folder }
     }
 
     fn rig(&self, params: &str) -> LinkRig {
@@ -54,19 +33,20 @@ impl Sensor {
     }
 
     fn order(&mut self, line: &str) {
-        writeln!(self.orders, "{line}").unwrap();
+        self.process.say(line);
     }
 
     /// Asks for its number of frames, and whether it runs. Whatever it was ordered before has begun then.
     fn ask(&mut self) -> (u64, bool) {
+        let from = self.process.count();
         self.order("ask it");
-        loop {
-            let said = self.said.recv_timeout(SOON).expect("it answers");
-            match said.get("got") {
-                Some(got) => self.got.push_back(got.as_str().unwrap().to_owned()),
-                None => return (said["frames"].as_u64().unwrap(), said["is_started"] == true),
-            }
-        }
+        let said = self.process.wait(from, |said| said["tag"] == "it");
+        (said["frames"].as_u64().unwrap(), said["is_started"] == true)
+    }
+
+    /// The commands that it has got.
+    fn got(&self) -> Vec<String> {
+        self.process.said(0).iter().filter_map(|said| said["got"].as_str().map(str::to_owned)).collect()
     }
 
     /// Waits until it has stopped sending frames, as a host has asked for.
@@ -79,13 +59,6 @@ impl Sensor {
             thread::sleep(Duration::from_millis(5));
         }
         false
-    }
-}
-
-impl Drop for Sensor {
-    fn drop(&mut self) {
-        let _ = self.child.kill();
-        let _ = self.child.wait();
     }
 }
 
@@ -117,7 +90,8 @@ fn a_sensor_is_stopped_asked_started_and_stopped_again() {
     assert!(sensor.ask().1);
     rig.stop().unwrap();
     assert!(sensor.wait_for_stop(), "it goes on after the run");
-    let got: Vec<&str> = sensor.got.iter().map(String::as_str).collect();
+    let got = sensor.got();
+    let got: Vec<&str> = got.iter().map(String::as_str).collect();
     let expected =
         ["F0C4000034", "F0C400C0F4", "F0C400C2F6", "F0C400C1F5", "F0C401D002000A00ED", "F0C400F1C5", "F0C4000034"];
     // A busy machine may make the device late with its configuration.

@@ -2,12 +2,12 @@
 
 use std::fs;
 use std::io::{Read, Write};
-use std::net::UdpSocket;
 use std::process::{Child, Command, Stdio};
 
 use tactflow_tests::workspace;
 use tempfile::tempdir;
 
+use crate::peer::free_udp_port;
 use crate::tool::{Said, tool};
 
 /// A controller that sends to a port, until it is dropped.
@@ -36,10 +36,6 @@ fn bench(port: u16) -> String {
     )
 }
 
-fn free_port() -> u16 {
-    UdpSocket::bind("127.0.0.1:0").unwrap().local_addr().unwrap().port()
-}
-
 /// Runs the tool with a line on its standard input.
 fn answered(args: &[&str], line: &str) -> Said {
     let mut child = tool(args).stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
@@ -53,7 +49,7 @@ fn answered(args: &[&str], line: &str) -> Said {
 
 #[test]
 fn an_arm_is_described_and_it_moves_and_is_commissioned_only_after_a_yes() {
-    let (folder, port) = (tempdir().unwrap(), free_port());
+    let (folder, port) = (tempdir().unwrap(), free_udp_port());
     let path = folder.path().join("cell.toml");
     let note = folder.path().join("cell.commissioned.toml");
     fs::write(&path, bench(port)).unwrap();
@@ -76,7 +72,7 @@ fn an_arm_is_described_and_it_moves_and_is_commissioned_only_after_a_yes() {
 fn a_device_that_sends_nothing_is_a_problem() {
     let folder = tempdir().unwrap();
     let path = folder.path().join("cell.toml");
-    fs::write(&path, bench(free_port())).unwrap();
+    fs::write(&path, bench(free_udp_port())).unwrap();
     let silent = answered(&["doctor", path.to_str().unwrap(), "--for", "300ms", "--move"], "yes\n");
     assert_eq!(silent.code, 1, "{}{}", silent.out, silent.err);
     assert!(silent.out.contains("problem: position: no sample in 0.3 s"), "{}", silent.out);

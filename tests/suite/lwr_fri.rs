@@ -5,10 +5,7 @@
 
 mod process;
 
-use std::io::{BufRead, BufReader};
 use std::net::UdpSocket;
-use std::process::{Child, Command, Stdio};
-use std::sync::mpsc::{Receiver, channel};
 use std::thread;
 use std::time::{Duration, Instant};
 
@@ -19,86 +16,38 @@ use tactflow_runtime::harness::LinkRig;
 use tactflow_runtime::signal::{Features, Flag, Joints, Scalar};
 use tactflow_tests::{catalogue, workspace};
 
-/// A limit for what takes a moment on a machine that is not busy.
-const SOON: Duration = Duration::from_secs(20);
+use crate::peer::{Process, SOON, free_udp_port};
+
 /// Velocity of the first joint [rad/s].
 const SPEED: f64 = 0.2;
 /// What the precision of the wire adds to a step [rad].
 const ROUNDING: f64 = 5e-7;
 
-/// A controller, and what it said so far.
-struct Controller {
-    child: Child,
-    lines: Receiver<Value>,
-    said: Vec<Value>,
-}
+/// A controller in another process.
+struct Controller(Process);
 
 impl Controller {
     /// Starts a controller that sends to a port.
     fn start(port: u16, args: &str, events: &str) -> Self {
-        let script = workspace().join("tests/peers/lwr.py");
-        let mut command = Command::new("python3");
-        command.arg(script).args(["--port", &port.to_string()]).args(args.split_whitespace());
-        command.args(["--events", events]).stdout(Stdio::piped());
-        let mut child = command.spawn().expect("python3 is there");
-        let out = BufReader::new(child.stdout.take().unwrap());
-        let (sender, lines) = channel();
-        thread::spawn(move || {
-            for line in out.lines().map_while(Result::ok) {
-                let said = serde_json::from_str(&line).unwrap_or_else(|error| panic!("{error}: {line}"));
-                if sender.send(said).is_err() {
-                    return;
-                }
-            }
-        });
-        Self { child, lines, said: Vec::new() }
-    }
-
-    /// Takes what it has said since.
-    fn listen(&mut self) -> &[Value] {
-        self.said.extend(self.lines.try_iter());
-        &self.said
+        let port = port.to_string();
+        let args = ["--port", &port, "--events", events].into_iter().chain(args.split_whitespace());
+        Self(Process::start("lwr.py", args))
     }
 
     /// Whether it has said something.
-    fn has_said(&mut self, is_it: impl Fn(&Value) -> bool) -> bool {
-        self.listen().iter().any(is_it)
+    fn has_said(&self, is_it: impl Fn(&Value) -> bool) -> bool {
+        self.0.has_said(is_it)
     }
 
     /// Waits until it says something, and returns that.
-    fn wait_for(&mut self, is_it: impl Fn(&Value) -> bool) -> Value {
-        let end = Instant::now() + SOON;
-        let mut seen = 0;
-        loop {
-            self.listen();
-            if let Some(found) = self.said[seen..].iter().find(|said| is_it(said)) {
-                return found.clone();
-            }
-            seen = self.said.len();
-            let left = end.saturating_duration_since(Instant::now());
-            match self.lines.recv_timeout(left) {
-                Ok(said) => self.said.push(said),
-                Err(_) => panic!("it said only {:?}", self.said.iter().rev().take(5).collect::<Vec<_>>()),
-            }
-        }
+    fn wait_for(&self, is_it: impl Fn(&Value) -> bool) -> Value {
+        self.0.wait(0, is_it)
     }
 
     /// Returns what it saw, once it has ended.
-    fn seen(&mut self) -> Value {
+    fn seen(&self) -> Value {
         self.wait_for(|said| said["event"] == "end")
     }
-}
-
-impl Drop for Controller {
-    fn drop(&mut self) {
-        let _ = self.child.kill();
-        let _ = self.child.wait();
-    }
-}
-
-/// Returns a UDP port that is free.
-fn free_port() -> u16 {
-    UdpSocket::bind("127.0.0.1:0").unwrap().local_addr().unwrap().port()
 }
 
 fn arm(port: u16, more: &str) -> LinkRig {
@@ -109,7 +58,7 @@ fn arm(port: u16, more: &str) -> LinkRig {
 
 /// An arm and its controller.
 fn pair(more: &str, args: &str, events: &str) -> (LinkRig, Controller) {
-    let port = free_port();
+    let port = free_udp_port();
     let rig = arm(port, more);
     (rig, Controller::start(port, args, events))
 }
@@ -164,7 +113,7 @@ fn at_every_rate_it_mirrors_then_integrates_and_answers_each_datagram() {
         thread::spawn(move || {
             let more = format!("sample_ms = {sample_ms}");
             let args = format!("--sample-ms {sample_ms} --seconds 3 --silence-ms 600");
-            let (mut rig, mut krc) = pair(&more, &args, "[]");
+            let (mut rig, krc) = pair(&more, &args, "[]");
             assert!(drive(&mut rig, 0.0, true, follows), "{sample_ms} ms: it never follows");
             let begin = rig.get::<Joints>("equilibrium").unwrap().0[0];
             assert!(drive(&mut rig, SPEED, true, |rig| {
@@ -199,7 +148,7 @@ const NETWORK: &str = r#"[
 
 #[test]
 fn nothing_that_a_network_does_makes_the_target_jump() {
-    let (mut rig, mut krc) = pair("", "--seconds 3.5 --silence-ms 3000 --lag-s 0.02", NETWORK);
+    let (mut rig, krc) = pair("", "--seconds 3.5 --silence-ms 3000 --lag-s 0.02", NETWORK);
     assert!(drive(&mut rig, 0.0, true, follows));
     assert!(drive(&mut rig, SPEED, true, |_| krc.has_said(|said| said["what"] == "swallow")));
     let before = rig.get::<Joints>("equilibrium").unwrap().0[0];
@@ -222,7 +171,7 @@ fn nothing_that_a_network_does_makes_the_target_jump() {
 
 #[test]
 fn while_it_sends_nothing_the_target_stays_with_the_controller() {
-    let (mut rig, mut krc) = pair("", "--seconds 3 --silence-ms 3000", "[]");
+    let (mut rig, krc) = pair("", "--seconds 3 --silence-ms 3000", "[]");
     assert!(drive(&mut rig, 0.0, true, follows));
     for is_mute in [false, true, false] {
         rig.mute(is_mute);
@@ -237,7 +186,7 @@ fn while_it_sends_nothing_the_target_stays_with_the_controller() {
 #[test]
 fn a_controller_that_does_not_follow_the_answers_stops_the_arm() {
     let events = r#"[{"at": 0.3, "do": "frozen", "value": true}]"#;
-    let (mut rig, mut krc) = pair("max_step = 0.002", "--seconds 3 --silence-ms 3000", events);
+    let (mut rig, krc) = pair("max_step = 0.002", "--seconds 3 --silence-ms 3000", events);
     assert!(drive(&mut rig, 0.0, true, follows));
     assert!(drive(&mut rig, SPEED, true, |_| krc.has_said(|said| said["what"] == "frozen")));
     assert!(drive(&mut rig, SPEED, false, |rig| rig.refusal().is_some_and(|why| why.contains("does not follow"))));
@@ -259,15 +208,15 @@ fn after_each_thing_that_is_not_legal_it_rests_until_it_is_resumed() {
         thread::spawn(move || {
             let events = format!("[{events}]");
             let more = "stiffness = 200.0\ndamping_ratio = 0.2";
-            let (mut rig, mut krc) = pair(more, "--seconds 5 --silence-ms 3000 --restart-s 0.8 --lag-s 0.02", &events);
+            let (mut rig, krc) = pair(more, "--seconds 5 --silence-ms 3000 --restart-s 0.8 --lag-s 0.02", &events);
             assert!(drive(&mut rig, 0.0, true, follows), "{events}");
             // It moves until the controller does not follow.
             let mut moved: f64 = 0.0;
             let start = rig.get::<Joints>("equilibrium").unwrap().0[0];
-            let is_done = |krc: &mut Controller| krc.has_said(|said| said["event"] == "do");
+            let is_done = |krc: &Controller| krc.has_said(|said| said["event"] == "do");
             assert!(drive(&mut rig, SPEED, true, |rig| {
                 moved = moved.max(rig.get::<Joints>("equilibrium").map_or(0.0, |q| q.0[0] - start));
-                is_done(&mut krc)
+                is_done(&krc)
             }));
             assert!(moved > 0.01, "{events}: it moved by {moved} rad");
             // It follows again by itself, but rests: nobody resumes.
@@ -304,7 +253,7 @@ fn an_arm_that_is_not_as_its_model_says_never_moves() {
     ];
     let runs = cases.map(|(more, args, events)| {
         thread::spawn(move || {
-            let (mut rig, mut krc) = pair(more, &format!("{args} --seconds 1.5 --silence-ms 600"), events);
+            let (mut rig, krc) = pair(more, &format!("{args} --seconds 1.5 --silence-ms 600"), events);
             assert!(drive(&mut rig, SPEED, true, |rig| {
                 assert!(!follows(rig), "{more} {args}");
                 krc.has_said(|said| said["event"] == "end")
@@ -323,7 +272,7 @@ fn it_sets_the_impedance_talks_to_the_program_and_leaves_with_cleared_flags() {
     let more = "stiffness = [200, 200, 200, 100, 100, 50, 50]\ndamping_ratio = 0.25\nkrl_ints = { 1 = 10 }\n\
                 krl_ints_at_end = { 2 = 1 }";
     let args = "--seconds 20 --silence-ms 600 --start-int 1 10 --stop-int 2 1 --until-silent";
-    let (mut rig, mut krc) = pair(more, args, "[]");
+    let (mut rig, krc) = pair(more, args, "[]");
     assert!(drive(&mut rig, 0.0, true, follows));
     rig.stop().unwrap();
     let seen = krc.seen();
@@ -343,7 +292,7 @@ fn the_wrench_is_that_on_the_tool_without_its_weight() {
     let (sin, cos) = (0.041_580_662_433_290_48, 0.999_135_150_273_279_4);
     let weight = 9.80665;
     let args = "--sag 0 --seconds 1.5 --wrench 1 2 3 0.1 0.2 0.3";
-    let (mut rig, mut krc) = pair("tool_mass = 1.0\ntool_com = [0.0, 0.0, 0.1]", args, "[]");
+    let (mut rig, krc) = pair("tool_mass = 1.0\ntool_com = [0.0, 0.0, 0.1]", args, "[]");
     assert!(drive(&mut rig, 0.0, true, |rig| rig.get::<Features>("wrench").is_some()));
     let wrench: Vec<f64> = rig.get::<Features>("wrench").unwrap().values().map(Option::unwrap).collect();
     let (x, z) = (-weight * sin, weight * cos);
@@ -368,13 +317,13 @@ fn a_port_that_another_program_has_is_an_error() {
 
 #[test]
 fn a_controller_that_is_silent_is_lost_and_found_again() {
-    let port = free_port();
+    let port = free_udp_port();
     let mut rig = arm(port, "");
     assert!(rig.wait_until(SOON, |rig| rig.lost("position").is_some()));
     let why = rig.lost("position").unwrap().to_owned();
     assert!(why.starts_with(&format!("no datagram of FRI 1.0 has come on the UDP port {port} for 2000 ms")), "{why}");
     for _ in 0..2 {
-        let mut krc = Controller::start(port, "--seconds 1", "[]");
+        let krc = Controller::start(port, "--seconds 1", "[]");
         assert!(rig.wait_until(SOON, |rig| rig.get::<Joints>("position").is_some()));
         krc.seen();
         assert!(rig.wait_until(SOON, |rig| rig.lost("position").is_some()));

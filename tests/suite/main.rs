@@ -51,6 +51,7 @@ mod output;
 mod pads;
 mod pair;
 mod paths;
+mod peer;
 mod points;
 mod policies;
 mod quantities;

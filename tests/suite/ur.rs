@@ -1,9 +1,5 @@
 //! The device `ur` against a robot in another process, `tests/peers/ur.py`: what arrives there, and when it rests.
 
-use std::io::{BufRead, BufReader, Write};
-use std::process::{Child, ChildStdin, Command, Stdio};
-use std::sync::{Arc, Mutex};
-use std::thread;
 use std::time::{Duration, Instant};
 
 use serde_json::{Value, json};
@@ -12,8 +8,8 @@ use tactflow_runtime::harness::LinkRig;
 use tactflow_runtime::signal::{Features, Flag, Joints};
 use tactflow_tests::workspace;
 
-/// Long enough for a machine that is five times slower, and busy.
-pub(crate) const SOON: Duration = Duration::from_secs(20);
+use crate::peer::{Process, SOON, free_tcp_port};
+
 /// Velocities of the tests [rad/s].
 const MOVE: [f64; 6] = [0.1, 0.0, 0.0, 0.0, 0.0, -0.1];
 /// Maximum acceleration of a joint in the tests [rad/s²].
@@ -21,61 +17,33 @@ const ACCELERATION: f64 = 10.0;
 
 /// A robot in another process.
 pub(crate) struct Peer {
-    child: Child,
-    words: ChildStdin,
-    events: Arc<Mutex<Vec<Value>>>,
+    process: Process,
     pub(crate) ports: [u64; 2],
-}
-
-impl Drop for Peer {
-    fn drop(&mut self) {
-        let _ = self.child.kill();
-        let _ = self.child.wait();
-    }
 }
 
 impl Peer {
     pub(crate) fn start(settings: Value) -> Self {
-        let mut command = Command::new("python3");
-        command.arg(workspace().join("tests/peers/ur.py")).arg(settings.to_string());
-        let mut child = command.stdin(Stdio::piped()).stdout(Stdio::piped()).spawn().unwrap();
-        let words = child.stdin.take().unwrap();
-        let mut lines = BufReader::new(child.stdout.take().unwrap()).lines();
-        let first: Value = serde_json::from_str(&lines.next().unwrap().unwrap()).unwrap();
-        let events = Arc::new(Mutex::new(Vec::new()));
-        let seen = Arc::clone(&events);
-        thread::spawn(move || {
-            for line in lines.map_while(Result::ok) {
-                seen.lock().unwrap().push(serde_json::from_str(&line).unwrap());
-            }
-        });
+        let process = Process::start("ur.py", [settings.to_string().as_str()]);
+        let first = process.wait(0, |event| event["rtde"].is_u64());
         let ports = ["rtde", "script"].map(|port| first[port].as_u64().unwrap());
-        Self { child, words, events, ports }
+        Self { process, ports }
     }
 
     /// Changes the robot, and waits until it has changed. Returns the time of the robot [s].
     pub(crate) fn tell(&mut self, line: &str) -> f64 {
-        let from = self.events().len();
-        writeln!(self.words, "{line}").unwrap();
+        let from = self.process.count();
+        self.process.say(line);
         let event = self.wait(from, |event| event["told"] == line);
         event["t"].as_f64().unwrap()
     }
 
     pub(crate) fn events(&self) -> Vec<Value> {
-        self.events.lock().unwrap().clone()
+        self.process.said(0)
     }
 
     /// Waits for an event, from the one with a number.
     pub(crate) fn wait(&self, from: usize, is_it: impl Fn(&Value) -> bool) -> Value {
-        let end = Instant::now() + SOON;
-        loop {
-            if let Some(found) = self.events().into_iter().skip(from).find(&is_it) {
-                return found;
-            }
-            let last: Vec<Value> = self.events().into_iter().rev().take(5).collect();
-            assert!(Instant::now() < end, "it does not happen; the last events are {last:?}");
-            thread::sleep(Duration::from_millis(2));
-        }
+        self.process.wait(from, is_it)
     }
 
     /// The velocities that arrived from a time on, each with the time [s], [rad/s].
@@ -371,7 +339,7 @@ fn a_second_connection_gets_no_velocity() {
 
 #[test]
 fn a_node_of_external_control_gets_the_program_that_it_asks_for() {
-    let port = std::net::TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap().port();
+    let port = free_tcp_port();
     let mut peer = Peer::start(json!({}));
     let mut rig = peer.rig(&format!("start_by = 'urcap'\nrequest_port = {port}\nstart_s = 0.5"));
     assert!(rig.wait_until(SOON, |rig| rig.get::<Flag>("safety") == Some(&false)), "nobody has pressed play");

@@ -11,8 +11,9 @@ use serde_json::json;
 use tempfile::TempDir;
 
 use crate::cli::in_new_folder;
+use crate::peer::SOON;
 use crate::tool::tool;
-use crate::ur::{Peer, SOON};
+use crate::ur::Peer;
 
 /// The last joint turns, for as long as the run lasts.
 const GRAPH: &str = "[graph]\nclock = 'arm'\nstart = 'go'\n[roles]\narm = 'bare_arm'\n[commands]\narm.velocity = 'move.velocity'\n\

@@ -7,7 +7,8 @@ use tactflow_nodes::devices::ur::Ur;
 use tactflow_runtime::harness::LinkRig;
 use tactflow_runtime::signal::{Flag, Joints};
 
-use crate::ur::{Peer, SOON, follows, is_moving, move_until, push};
+use crate::peer::{SOON, free_tcp_port};
+use crate::ur::{Peer, follows, is_moving, move_until, push};
 
 /// What the device counts.
 const STRANGERS: &str = "connections that were not expected";
@@ -32,7 +33,7 @@ fn a_connection_from_elsewhere_than_the_robot_is_closed() {
 
 #[test]
 fn a_request_from_elsewhere_than_the_robot_gets_no_program() {
-    let port = std::net::TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap().port();
+    let port = free_tcp_port();
     let mut peer = Peer::start(json!({ "from": "127.0.0.2" }));
     let mut rig = peer.rig(&format!("start_by = 'urcap'\nrequest_port = {port}\nstart_s = 0.5"));
     assert!(rig.wait_until(SOON, |rig| rig.get::<Flag>("safety") == Some(&false)), "nobody has pressed play");

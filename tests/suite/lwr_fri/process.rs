@@ -2,6 +2,7 @@
 
 use std::fs;
 use std::io::Write;
+use std::process::{Child, Command, Stdio};
 
 use tempfile::TempDir;
 
@@ -33,7 +34,7 @@ struct Run {
 
 /// Starts the graph, and a controller with its process.
 fn start(args: &str, events: &str) -> Run {
-    let port = free_port();
+    let port = free_udp_port();
     let (folder, graph) = in_new_folder("graph.toml");
     fs::write(&graph, format!("{GRAPH}port = {port}\n")).unwrap();
     let err = folder.path().join("err.txt");
@@ -54,10 +55,9 @@ impl Run {
     fn resume_until_it_moves(&mut self) {
         for _ in 0..40 {
             self.resume();
-            let from = self.krc.listen().len();
+            let from = self.krc.0.count();
             thread::sleep(Duration::from_millis(300));
-            self.krc.listen();
-            if speed(&self.krc.said[from..]) > 3e-5 {
+            if speed(&self.krc.0.said(from)) > 3e-5 {
                 return;
             }
         }
@@ -126,7 +126,7 @@ fn a_drop_to_monitor_stops_the_run_and_it_goes_on_after_resume() {
     let again = run.krc.wait_for(|said| said["event"] == "state" && said["state"] == 2 && is_after(said, dropped));
     let again = number(&again, "t");
     run.krc.wait_for(|said| said["event"] == "cycle" && is_after(said, again + 0.5));
-    let after: Vec<Value> = run.krc.said.iter().filter(|said| is_after(said, dropped + 0.1)).cloned().collect();
+    let after: Vec<Value> = run.krc.0.said(0).iter().filter(|said| is_after(said, dropped + 0.1)).cloned().collect();
     assert!(after.len() > 50 && speed(&after) < STILL, "{} lines, {}", after.len(), speed(&after));
     run.wait_for_err("does not follow commands: its FRI session is in the state monitor (1)");
     run.resume_until_it_moves();
@@ -139,9 +139,10 @@ fn a_drop_to_monitor_stops_the_run_and_it_goes_on_after_resume() {
 fn a_process_that_is_killed_leaves_an_arm_that_stops_within_the_declared_time() {
     for at in [0.05, 0.41, 0.83] {
         let events = format!(r#"[{{"at": {at}, "do": "kill_process"}}]"#);
-        let mut run = start("--seconds 4 --silence-ms 150 --until-silent", &events);
+        let run = start("--seconds 4 --silence-ms 150 --until-silent", &events);
         run.krc.seen();
-        let killed = between(&run.krc.said, "kill_process", None);
+        let said = run.krc.0.said(0);
+        let killed = between(&said, "kill_process", None);
         let late = |said: &&Value| number(said, "t") > number(&killed[0], "t") + 0.2;
         let after: Vec<Value> = killed.iter().filter(late).cloned().collect();
         assert!(after.len() > 20 && speed(&after) < STILL, "{at} s: {}", speed(&after));
@@ -155,14 +156,19 @@ fn a_process_that_was_stopped_and_continues_moves_nothing_until_the_operator_res
     let mut run = start("--seconds 20 --silence-ms 150 --restart-s 0.1 --until-silent", events);
     let continued = run.krc.wait_for(|said| said["what"] == "continue_process");
     run.krc.wait_for(|said| number(said, "t") > number(&continued, "t") + 1.0);
-    let after = between(&run.krc.said, "continue_process", None);
+    let said = run.krc.0.said(0);
+    let after = between(&said, "continue_process", None);
     assert!(speed(after) < STILL, "{}", speed(after));
-    let stopped = between(&run.krc.said, "stop_process", Some("continue_process"));
+    let stopped = between(&said, "stop_process", Some("continue_process"));
     let late = |said: &&Value| number(said, "t") > number(&stopped[0], "t") + 0.2;
     let rest: Vec<Value> = stopped.iter().filter(late).cloned().collect();
     assert!(speed(&rest) < STILL && stopped.iter().any(is_drop));
     run.resume_until_it_moves();
-    assert_clean(&run.end(), 0.004);
+    let seen = run.end();
+    assert_clean(&seen, 0.004);
+    // 0.7 s of measurements lie in the socket then. Only the one that was read at the signal, and the newest, may be
+    // answered; each pause of a busy machine adds as many.
+    assert!(count(&seen, "old_answers") < 20, "{seen}");
 }
 
 #[test]
@@ -175,7 +181,7 @@ fn a_cable_that_swallows_everything_for_a_moment_stops_the_arm_until_the_operato
         run.krc.wait_for(is_drop);
         run.krc.wait_for(|said| number(said, "t") > number(&cut, "t") + 1.5);
         let late = |said: &&Value| number(said, "t") > number(&cut, "t") + 0.2;
-        let rest: Vec<Value> = run.krc.said.iter().filter(late).cloned().collect();
+        let rest: Vec<Value> = run.krc.0.said(0).iter().filter(late).cloned().collect();
         assert!(speed(&rest) < STILL, "{what}: {}", speed(&rest));
         run.resume_until_it_moves();
         assert_clean(&run.end(), 0.004);
