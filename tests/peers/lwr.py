@@ -27,8 +27,10 @@ MSR, MSR_ID, CMD, CMD_ID = 916, 0x2006, 376, 0x1005
 OFF, MONITOR, COMMAND = 0, 1, 2
 JOINT_POSITION, JOINT_STIFFNESS, JOINT_DAMPING = 0x1, 0x10, 0x20
 HOME = [0.0, 0.5, 0.0, -1.3, 0.0, 1.3, 0.0]
-# The axis of each joint from the base on, and the distance before it [m]; and the distance of the flange.
-AXES = [("z", 1, 0.11), ("y", -1, 0.2005), ("z", 1, 0.2), ("y", 1, 0.2), ("z", 1, 0.2), ("y", -1, 0.19), ("z", 1, 0.078)]
+# The published parameters of Denavit and Hartenberg: for each joint, the displacement along z [m] and the twist about x
+# [quarter turns].
+TABLE = [(0.310, 1), (0.0, -1), (0.400, -1), (0.0, 1), (0.390, 1), (0.0, -1), (0.078, 0)]
+OLD_S = 0.2  # age of a measurement that nobody may answer any more
 EXTRAPOLATED = 5  # cycles without an answer in which the arm goes on
 
 
@@ -39,15 +41,17 @@ def f32(value):
     return struct.unpack("<f", struct.pack("<f", value))[0]
 
 
+def times(a, b):
+    return [[sum(a[i][k] * b[k][j] for k in range(4)) for j in range(4)] for i in range(4)]
+
+
 def flange(q):
     """The rows of the pose of the flange in the base."""
-    r, z = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]], [0.0, 0.0, 0.0]
-    for (axis, sign, distance), angle in zip(AXES, q):
-        z = [a + row[2] * distance for a, row in zip(z, r)]
-        s, c = math.sin(sign * angle), math.cos(angle)
-        turn = [[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]] if axis == "z" else [[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]]
-        r = [[sum(row[k] * turn[k][j] for k in range(3)) for j in range(3)] for row in r]
-    return [value for row, at in zip(r, z) for value in row + [at]]
+    pose = [[float(i == j) for j in range(4)] for i in range(4)]
+    for (d, twist), angle in zip(TABLE, q):
+        c, s, ca, sa = math.cos(angle), math.sin(angle), float(twist == 0), float(twist)
+        pose = times(pose, [[c, -s * ca, s * sa, 0], [s, c * ca, -c * sa, 0], [0, sa, ca, d], [0, 0, 0, 1]])
+    return [value for row in pose[:3] for value in row]
 
 
 def weight(mass, centre, pose):
@@ -80,7 +84,7 @@ class Controller:
         self.frozen, self.kept, self.orders, self.is_left = False, [], b"", False
         self.counts = {
             "sent": 0, "answers": 0, "bad_answers": 0, "mirror_errors": 0, "flag_errors": 0, "sequence_errors": 0,
-            "unknown_answers": 0, "stranger_answers": 0, "drops": 0, "commands": 0,
+            "unknown_answers": 0, "stranger_answers": 0, "old_answers": 0, "drops": 0, "commands": 0,
         }
         self.largest_step = self.entry_jump = self.largest_lead = 0.0
         self.flags, self.impedance, self.round_trips = [], None, []
@@ -155,7 +159,10 @@ class Controller:
         if sent is None:
             self.counts["unknown_answers"] += 1
             return
-        self.round_trips.append(time.monotonic() - sent["at"])
+        age = time.monotonic() - sent["at"]
+        self.round_trips.append(age)
+        if age > OLD_S:
+            self.counts["old_answers"] += 1
         (flags,) = struct.unpack_from("<I", bytes_, 140)
         position = list(struct.unpack_from("<7f", bytes_, 144))
         self.ints = list(struct.unpack_from("<16i", bytes_, 72))

@@ -6,6 +6,9 @@
 //! equilibrium of the compliant arm. A connection that is less than ok, and a step that is faster than a joint, take it
 //! back to monitor mode, where the arm rests.
 
+mod kinematics;
+mod wire;
+
 use std::io;
 use std::net::{Ipv4Addr, SocketAddr, ToSocketAddrs, UdpSocket};
 use std::sync::mpsc::{Receiver, sync_channel};
@@ -14,15 +17,13 @@ use std::time::Instant;
 
 use serde_json::{Value, json};
 
+use self::kinematics::flange;
+use self::wire::{CMD_BYTES, Cmd, MSR_BYTES, MSR_ID, Msr};
 use super::ArmWire;
 use super::log::Log;
 use super::simulation::Posture;
 
 const JOINTS: usize = 7;
-const MSR_BYTES: usize = 916;
-const CMD_BYTES: usize = 376;
-const MSR_ID: u16 = 0x2006;
-const CMD_ID: u16 = 0x1005;
 /// Flag of a CMD with joint positions.
 const HAS_POSITION: u32 = 1;
 /// Difference between a mirrored posture and the commanded one that the controller accepts: what 32 bits resolve [rad].
@@ -262,7 +263,7 @@ impl Lwr {
         msr.f32s(188, &[40.0; JOINTS]);
         msr.f32s(216, &posture.position);
         let commanded: Vec<f64> = posture.equilibrium.iter().map(|q| q - self.script.offset).collect();
-        let pose: Vec<f64> = posture.tip.to_matrix().transpose().as_slice()[..12].to_vec();
+        let pose: Vec<f64> = flange(&posture.position).to_matrix().transpose().as_slice()[..12].to_vec();
         msr.f32s(244, &pose);
         msr.f32s(292, &commanded);
         msr.f32s(320, &[self.script.offset; JOINTS]);
@@ -294,50 +295,6 @@ impl Connection {
             if self.missed.is_multiple_of(script.missed_per_level) {
                 self.quality = self.quality.saturating_sub(1);
             }
-        }
-    }
-}
-
-/// An answer of the driver.
-struct Cmd {
-    sequence: u16,
-    reflected: u16,
-    flags: u32,
-    position: Vec<f64>,
-}
-
-impl Cmd {
-    /// Reads a datagram, or returns `None` if it is no CMD.
-    fn read(bytes: &[u8]) -> Option<Self> {
-        let word = |at: usize| u16::from_le_bytes([bytes[at], bytes[at + 1]]);
-        let long = |at: usize| [bytes[at], bytes[at + 1], bytes[at + 2], bytes[at + 3]];
-        if bytes.len() != CMD_BYTES || usize::from(word(4)) != CMD_BYTES || word(6) != CMD_ID {
-            return None;
-        }
-        let position: Vec<f64> = (0..JOINTS).map(|i| f64::from(f32::from_le_bytes(long(144 + 4 * i)))).collect();
-        let is_finite = position.iter().all(|q| q.is_finite());
-        let cmd = Self { sequence: word(0), reflected: word(2), flags: u32::from_le_bytes(long(140)), position };
-        is_finite.then_some(cmd)
-    }
-}
-
-/// A message that is being written.
-struct Msr([u8; MSR_BYTES]);
-
-impl Msr {
-    fn u16s(&mut self, at: usize, values: &[u16]) {
-        for (i, value) in values.iter().enumerate() {
-            self.0[at + 2 * i..at + 2 * i + 2].copy_from_slice(&value.to_le_bytes());
-        }
-    }
-
-    fn u32(&mut self, at: usize, value: u32) {
-        self.0[at..at + 4].copy_from_slice(&value.to_le_bytes());
-    }
-
-    fn f32s(&mut self, at: usize, values: &[f64]) {
-        for (i, value) in values.iter().enumerate() {
-            self.0[at + 4 * i..at + 4 * i + 4].copy_from_slice(&(*value as f32).to_le_bytes());
         }
     }
 }
@@ -486,14 +443,5 @@ mod tests {
         beat(&mut lwr, &driver, &mut log, &posture(0.5, 0.5), Some(0.9));
         assert_eq!(lwr.beat(&posture(0.6, 0.5), &mut log).unwrap(), [0.0; JOINTS]);
         assert!(!lwr.is_commanding && lwr.counts.faults == 1);
-    }
-
-    proptest::proptest! {
-        #[test]
-        fn any_datagram_is_an_answer_or_rejected(mut bytes in proptest::collection::vec(0u8.., CMD_BYTES - 1..CMD_BYTES + 2)) {
-            bytes[4..8].copy_from_slice(&[0x78, 0x01, 0x05, 0x10]);
-            let cmd = Cmd::read(&bytes);
-            proptest::prop_assert!(cmd.is_none_or(|cmd| bytes.len() == CMD_BYTES && cmd.position.iter().all(|q| q.is_finite())));
-        }
     }
 }
