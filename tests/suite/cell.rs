@@ -1,22 +1,23 @@
 //! The simulated cell as a process, and tasks that run against it over the wires of real devices.
 
 use std::fs;
-use std::io::{BufRead, BufReader};
+use std::io::{BufRead, BufReader, Write};
 use std::net::UdpSocket;
 use std::path::{Path, PathBuf};
 use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
-use std::time::Duration;
 
 use serde_json::Value;
 use tactflow_tests::workspace;
 
+use crate::peer::SOON;
+
+mod attacks;
+pub(crate) mod benches;
+mod relay;
 mod tasks;
 
-/// Longest time to wait for anything.
-const SOON: Duration = Duration::from_secs(20);
-
 /// A cell that runs.
-struct Cell {
+pub(crate) struct Cell {
     child: Child,
     input: Option<ChildStdin>,
     output: BufReader<ChildStdout>,
@@ -33,11 +34,13 @@ struct Figures {
     truth: Vec<Vec<f64>>,
     /// Rows of commands.csv: time, time since the last image, whether it is followed, velocities.
     commands: Vec<Vec<f64>>,
+    /// Rows of motion.csv: time and the largest speed of a joint.
+    motion: Vec<Vec<f64>>,
 }
 
 impl Cell {
     /// Starts a cell. Its file gets the pad and the arm from `wires`.
-    fn start(bench: &Path, wires: &str) -> Self {
+    pub(crate) fn start(bench: &Path, wires: &str) -> Self {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("cell.toml");
         fs::write(&path, format!("bench = '{}'\nlog = 'log'\n{wires}", bench.display())).unwrap();
@@ -56,6 +59,21 @@ impl Cell {
         self.place["pad"]["path"].as_str().unwrap().into()
     }
 
+    /// A port on which it serves a device.
+    pub(crate) fn port(&self, (device, name): (&str, &str)) -> u16 {
+        self.place[device][name].as_u64().and_then(|port| port.try_into().ok()).unwrap()
+    }
+
+    /// Says a word to the cell. Returns when it came [s], and how fast the arm moved then [rad/s].
+    fn tell(&mut self, word: &str) -> [f64; 2] {
+        writeln!(self.input.as_mut().expect("it has not ended"), "{word}").unwrap();
+        let mut line = String::new();
+        self.output.read_line(&mut line).unwrap();
+        let told: Value = serde_json::from_str(&line).unwrap_or_else(|error| panic!("{error}: {line:?}"));
+        assert_eq!(told["told"], word);
+        ["t_s", "speed_rad_s"].map(|key| told[key].as_f64().unwrap())
+    }
+
     /// Ends the cell, by the end of its input.
     fn end(mut self) -> Figures {
         self.input = None;
@@ -71,6 +89,7 @@ impl Cell {
             summary: serde_json::from_str(&line).unwrap(),
             truth: rows("truth.csv"),
             commands: rows("commands.csv"),
+            motion: rows("motion.csv"),
         }
     }
 }
@@ -84,11 +103,6 @@ impl Drop for Cell {
 
 fn ball() -> PathBuf {
     workspace().join("graphs/benches/ball.toml")
-}
-
-/// Returns a UDP port that nobody uses.
-fn free_udp_port() -> u16 {
-    UdpSocket::bind("127.0.0.1:0").unwrap().local_addr().unwrap().port()
 }
 
 /// Answers each MSR of the controller until `until` says so of a position: in command mode joint 1 moves on by 0.4 mrad
@@ -139,13 +153,15 @@ fn a_cell_moves_as_it_is_commanded_and_rests_when_nobody_answers() {
         let is_at_rest = msr[144] == 1 && (position - last).abs() < 1e-5;
         (last, at_rest) = (position, if is_at_rest { at_rest + 1 } else { 0 });
     }
-    let Figures { summary, truth, commands } = cell.end();
+    let Figures { summary, truth, commands, motion } = cell.end();
     let arm = &summary["arm"];
     assert_eq!((&arm["starts"], &arm["drops"], &arm["faults"]), (&1.into(), &1.into(), &0.into()), "{summary}");
     assert_eq!(arm["unmirrored"], 0, "{summary}");
     let followed: Vec<f64> = commands.iter().filter(|row| row[2] == 1.0).map(|row| row[3]).collect();
     let mean = followed.iter().sum::<f64>() / followed.len() as f64;
     assert!((mean - 0.1).abs() < 0.02, "{mean}");
+    let fastest = motion.iter().map(|row| row[1]).fold(0.0, f64::max);
+    assert!((fastest - 0.1).abs() < 0.02 && motion.last().unwrap()[1] == 0.0, "{fastest}");
     assert!(truth.last().unwrap()[11] < 0.01, "it rests: {:?}", truth.last());
     assert!((truth.last().unwrap()[6] - truth[0][6]).abs() > 0.02, "its tip has moved along y");
 }

@@ -1,5 +1,5 @@
-//! What a cell writes down: each command when it arrives, the truth at each image, and how old the image was that was
-//! sent last.
+//! What a cell writes down: each command when it arrives, the motion at each beat of the robot, the truth at each image,
+//! and how old the image was that was sent last.
 
 use std::collections::VecDeque;
 use std::fs::{self, File};
@@ -22,6 +22,7 @@ const CHANGE: f64 = 1e-4;
 pub(super) struct Log {
     begin: Instant,
     commands: Option<BufWriter<File>>,
+    motion: Option<BufWriter<File>>,
     truth: Option<BufWriter<File>>,
     /// The last images: when each was sent, and whether a command has changed since.
     frames: VecDeque<(Instant, bool)>,
@@ -53,6 +54,7 @@ impl Log {
         Ok(Self {
             begin,
             commands: file("commands.csv", &header)?,
+            motion: file("motion.csv", "t_s,speed_rad_s")?,
             truth: file(
                 "truth.csv",
                 "t_s,force_n,x_m,y_m,pressure_n,tip_x_m,tip_y_m,tip_z_m,sensor_x_m,sensor_y_m,sensor_z_m,speed_rad_s",
@@ -85,12 +87,21 @@ impl Log {
         let or_empty = |value: Option<f64>| value.map_or_else(String::new, |value| format!("{value:.6}"));
         let [x, y] = [0, 1].map(|i| or_empty(posture.centre.map(|centre| centre[i])));
         let [tip, sensor] = [&posture.tip, &posture.sensor].map(|pose| pose.translation.vector);
-        let speed = posture.speed.iter().fold(0.0_f64, |most, speed| most.max(speed.abs()));
+        let speed = fastest(&posture.speed);
         write!(file, "{:.4},{:.4},{x},{y},{}", posture.time, posture.force, or_empty(posture.pressure))?;
         for place in tip.iter().chain(&sensor) {
             write!(file, ",{place:.6}")?;
         }
         writeln!(file, ",{speed:.6}")
+    }
+
+    /// Notes at which velocities the robot moves its joints from a beat on [rad/s].
+    ///
+    /// # Errors
+    /// If the file cannot be written.
+    pub(super) fn beat(&mut self, time: f64, velocity: &[f64]) -> io::Result<()> {
+        let Some(file) = &mut self.motion else { return Ok(()) };
+        writeln!(file, "{time:.5},{:.6}", fastest(velocity))
     }
 
     /// Notes a command that arrived at `at`: the velocities that it asks for [rad/s], and whether the robot follows it.
@@ -132,7 +143,7 @@ impl Log {
     /// # Errors
     /// If the files cannot be written.
     pub(super) fn end(&mut self) -> io::Result<Value> {
-        for file in self.commands.iter_mut().chain(&mut self.truth) {
+        for file in self.commands.iter_mut().chain(&mut self.motion).chain(&mut self.truth) {
             file.flush()?;
         }
         Ok(json!({
@@ -143,6 +154,11 @@ impl Log {
             "answer_ms": percentiles(&mut self.answers),
         }))
     }
+}
+
+/// Returns the largest speed of a joint [rad/s].
+pub(super) fn fastest(velocity: &[f64]) -> f64 {
+    velocity.iter().fold(0.0, |most, speed| most.max(speed.abs()))
 }
 
 /// Returns the number, the median, the 99th percentile and the largest of some times.

@@ -15,7 +15,7 @@
 //! | `run` | the loop over all of them |
 //!
 //! The first line of its output is JSON with the ports and paths that it serves, and the last one is JSON with its
-//! figures. It ends when its standard input ends, on SIGTERM, and after `for_s`.
+//! figures. A line on its standard input is answered with the time and the motion. It ends when its standard input ends, on SIGTERM, and after `for_s`.
 
 mod flexitac;
 mod log;

@@ -1,9 +1,10 @@
 //! The loop of a cell: it steps the simulation with the clock, sends images and beats of the robot, and writes down
 //! what arrives.
 
-use std::io::{self, Read, Write};
+use std::io::{self, BufRead, Write};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{Receiver, channel};
 use std::thread;
 use std::time::{Duration, Instant};
 
@@ -12,7 +13,7 @@ use signal_hook::consts::SIGTERM;
 use signal_hook::flag;
 
 use super::flexitac::Flexitac;
-use super::log::Log;
+use super::log::{Log, fastest};
 use super::lwr::{Lwr, Script};
 use super::myrmex::{Identity, Myrmex};
 use super::setup::{ArmSetup, PadSetup, Setup};
@@ -35,12 +36,12 @@ pub fn run(setup: &Setup, out: &mut dyn Write) -> Result<(), String> {
     let text = |error: io::Error| error.to_string();
     let pad = pad(&setup.pad).map_err(|error| format!("the pad: {error}"))?;
     let arm = arm(&setup.arm, &simulation).map_err(|error| format!("the arm: {error}"))?;
-    let is_ending = ending().map_err(text)?;
+    let words = Words::listen().map_err(text)?;
     writeln!(out, "{}", json!({ "pad": pad.place(), "arm": arm.place() })).and_then(|()| out.flush()).map_err(text)?;
     let begin = Instant::now();
     let log = Log::begin(setup.log.as_deref(), simulation.joints().len(), begin).map_err(text)?;
     let mut cell = Cell { simulation, pad, arm, log, begin, delayed: Duration::ZERO, velocity: Vec::new() };
-    let ended = cell.follow(setup.for_s, &is_ending);
+    let ended = cell.follow(setup.for_s, &words, out);
     let figures = cell.figures().map_err(text)?;
     // Whoever has started the cell may be gone.
     let _ = writeln!(out, "{figures}").and_then(|()| out.flush());
@@ -71,17 +72,34 @@ fn arm(setup: &ArmSetup, simulation: &Simulation) -> io::Result<Box<dyn ArmWire>
     })
 }
 
-/// Returns a flag that is set on SIGTERM, and when the standard input ends.
-fn ending() -> io::Result<Arc<AtomicBool>> {
-    let is_ending = Arc::new(AtomicBool::new(false));
-    flag::register(SIGTERM, Arc::clone(&is_ending))?;
-    let at_end = Arc::clone(&is_ending);
-    thread::Builder::new().name("input".into()).spawn(move || {
-        let (mut input, mut bytes) = (io::stdin(), [0; 256]);
-        while input.read(&mut bytes).is_ok_and(|count| count > 0) {}
-        at_end.store(true, Ordering::SeqCst);
-    })?;
-    Ok(is_ending)
+/// What is written to the standard input of the cell.
+struct Words {
+    /// Whether it has ended, or SIGTERM has come.
+    is_ending: Arc<AtomicBool>,
+    /// Its lines, each with the time at which it came.
+    lines: Receiver<(Instant, String)>,
+}
+
+impl Words {
+    /// Listens to SIGTERM and to the standard input.
+    fn listen() -> io::Result<Self> {
+        let is_ending = Arc::new(AtomicBool::new(false));
+        flag::register(SIGTERM, Arc::clone(&is_ending))?;
+        let at_end = Arc::clone(&is_ending);
+        let (send, lines) = channel();
+        thread::Builder::new().name("input".into()).spawn(move || {
+            for line in io::stdin().lock().lines().map_while(Result::ok) {
+                // Whoever follows the cell may have ended.
+                let _ = send.send((Instant::now(), line));
+            }
+            at_end.store(true, Ordering::SeqCst);
+        })?;
+        Ok(Self { is_ending, lines })
+    }
+
+    fn is_ending(&self) -> bool {
+        self.is_ending.load(Ordering::SeqCst)
+    }
 }
 
 struct Cell {
@@ -98,18 +116,19 @@ struct Cell {
 }
 
 impl Cell {
-    fn follow(&mut self, for_s: Option<f64>, is_ending: &AtomicBool) -> Result<(), String> {
+    fn follow(&mut self, for_s: Option<f64>, words: &Words, out: &mut dyn Write) -> Result<(), String> {
         let period = (self.arm.period() * 1e9).round() as i64;
         let end = for_s.map_or(i64::MAX, |end| (end * 1e9) as i64);
         self.velocity = vec![0.0; self.simulation.joints().len()];
         let mut beat = 0;
-        while !is_ending.load(Ordering::SeqCst) {
+        while !words.is_ending() {
+            self.answer(words, out).map_err(|error| error.to_string())?;
             let Some(image) = self.simulation.next_image() else { return Ok(()) };
             let now = image.min(beat);
             if now > end {
                 return Ok(());
             }
-            if !self.wait_for(now, is_ending) {
+            if !self.wait_for(now, words) {
                 return Ok(());
             }
             self.simulation.step(now, &self.velocity)?;
@@ -117,6 +136,7 @@ impl Cell {
             if now == beat {
                 beat += period;
                 self.velocity = self.arm.beat(&posture, &mut self.log).map_err(|error| format!("the arm: {error}"))?;
+                self.log.beat(posture.time, &self.velocity).map_err(|error| format!("the log: {error}"))?;
             }
             self.pad.serve().map_err(|error| format!("the pad: {error}"))?;
             if now == image {
@@ -130,7 +150,7 @@ impl Cell {
 
     /// Sleeps until a time of the simulation [ns]. A cell that is too slow moves its start instead. Returns whether the
     /// cell goes on.
-    fn wait_for(&mut self, time: i64, is_ending: &AtomicBool) -> bool {
+    fn wait_for(&mut self, time: i64, words: &Words) -> bool {
         let due = self.begin + Duration::from_nanos(time as u64);
         loop {
             let now = Instant::now();
@@ -143,11 +163,21 @@ impl Cell {
                 }
                 return true;
             }
-            if is_ending.load(Ordering::SeqCst) {
+            if words.is_ending() {
                 return false;
             }
             thread::sleep((due - now).min(MAX_SLEEP));
         }
+    }
+
+    /// Answers each line of the standard input with the time at which it came, and how fast the arm moves now.
+    fn answer(&self, words: &Words, out: &mut dyn Write) -> io::Result<()> {
+        for (at, line) in words.lines.try_iter() {
+            let time = at.saturating_duration_since(self.begin).as_secs_f64();
+            writeln!(out, "{}", json!({ "told": line, "t_s": time, "speed_rad_s": fastest(&self.velocity) }))?;
+            out.flush()?;
+        }
+        Ok(())
     }
 
     fn figures(&mut self) -> io::Result<Value> {

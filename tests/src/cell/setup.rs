@@ -2,7 +2,7 @@
 //!
 //! ```toml
 //! bench = "graphs/benches/ball.toml"      # relative to this file
-//! log = "log"                             # folder of commands.csv and truth.csv; nothing is logged without it
+//! log = "log"                             # folder of commands.csv, motion.csv and truth.csv; no log without it
 //! for_s = 20.0                            # without it, the cell runs until its standard input ends
 //!
 //! [set]                                   # parameters of the `sim_bench`, instead of those of the bench

@@ -1,16 +1,16 @@
 //! Tasks that run against the cell: over a serial pad and the LWR, and over a pad behind TCP and the UR. The same task
 //! on the same bench without wires says how good they can be.
 
-use std::fmt::Write as _;
-use std::fs;
-use std::io::Write as _;
-use std::path::{Path, PathBuf};
+use std::io::Write;
+use std::path::Path;
 
 use tactflow_runtime::engine::{End, Engine, RunOptions, run};
 use tactflow_runtime::graph::{Request, compile};
 use tactflow_tests::{catalogue, workspace};
 
-use super::{Cell, Figures, ball, free_udp_port};
+use super::benches::{calibration, lwr_bench, lwr_wires, simulation, ur_ball, ur_bench, ur_wires};
+use super::{Cell, Figures, ball};
+use crate::peer::{free_tcp_port, free_udp_port};
 use crate::sim::course;
 
 /// A run of the task.
@@ -67,27 +67,6 @@ impl Held {
     }
 }
 
-/// Returns the shipped calibration of the simulated pad, for readings that are `full` times smaller, in another unit.
-fn calibration(folder: &Path, full: f64, unit: &str) -> PathBuf {
-    let text = fs::read_to_string(workspace().join("graphs/calibrations/sim_pad.toml")).unwrap();
-    let table: toml::Table = toml::from_str(&text).unwrap();
-    let mut scaled = format!(
-        "kind = 'calibration'\nversion = 1\ncurve = 'rational'\nrows = 16\ncols = 16\nreading = '{unit}'\nunit = 'N'\n\
-         dead = []\ntactels = [\n"
-    );
-    for tactel in table["tactels"].as_array().unwrap() {
-        let number = |name: &str| tactel[name].as_float().unwrap();
-        let (offset, gain, squash) = (number("offset") / full, number("gain") * full, number("squash") * full);
-        let (at, most) = (&tactel["at"], number("most"));
-        writeln!(scaled, "{{ at = {at}, offset = {offset}, gain = {gain}, squash = {squash}, most = {most} }},")
-            .unwrap();
-    }
-    scaled.push_str("]\n");
-    let path = folder.join("calibration.toml");
-    fs::write(&path, scaled).unwrap();
-    path
-}
-
 /// Runs the hybrid task on a bench.
 ///
 /// # Errors
@@ -106,14 +85,18 @@ fn run_hybrid(bench: String, trial: Trial) -> Result<(), String> {
     Ok(())
 }
 
-/// Runs a trial up to three times, until it was not held by a busy machine. Returns its figures.
+/// Runs a trial up to three times, until it was not held by a busy machine, and prints each that was. Returns its figures.
 fn patiently(run: fn(Trial) -> Result<String, String>, trial: Trial) -> String {
     const TRIALS: usize = 3;
     let mut held = Vec::new();
     for _ in 0..TRIALS {
         match run(trial) {
             Ok(figures) => return figures,
-            Err(why) => held.push(why),
+            Err(why) => {
+                // Behind the back of the harness, which prints only what a test that fails has said.
+                writeln!(std::io::stdout(), "trial {} was held: {why}", held.len() + 1).unwrap();
+                held.push(why);
+            }
         }
     }
     panic!("it was held {TRIALS} times: {held:?}");
@@ -148,51 +131,16 @@ fn compare(figures: &Figures, without: &Held, trial: Trial) -> String {
     text
 }
 
-fn simulation(trial: Trial) -> String {
-    format!("[set]\nrate_hz = {:?}\nlatency_s = 0.0\nfor_s = 1e6\n", trial.rate_hz)
-}
-
 /// Runs the task over a serial pad and the LWR. Returns its figures.
 ///
 /// # Errors
 /// If the run was held.
 fn serial_pad_and_lwr(trial: Trial) -> Result<String, String> {
     let port = free_udp_port();
-    let wires = format!(
-        "{}[pad]\nwire = 'myrmex'\n[arm]\nwire = 'lwr'\nto = '127.0.0.1:{port}'\nmissed_per_level = 50\n\
-         period_ms = {:?}\n",
-        simulation(trial),
-        trial.fri_ms
-    );
+    let wires = format!("{}{}", simulation(trial.rate_hz), lwr_wires(port, trial.fri_ms, "missed_per_level = 50\n"));
     let cell = Cell::start(&ball(), &wires);
     let calibration = calibration(cell.folder.path(), 4095.0, "1");
-    let bench = format!(
-        "
-        [bind]
-        pad = 'skin'
-        arm = 'lwr'
-        [devices.skin]
-        type = 'agni'
-        link = 'serial:{}'
-        rate_hz = {:?}
-        silence_ms = 1000
-        calibration = '{}'
-        mount = {{ xyz = [0.0, 0.0, 0.03] }}
-        [devices.lwr]
-        type = 'lwr_fri'
-        port = {port}
-        sample_ms = {:?}
-        robot = '{}'
-        [limits]
-        workspace_min_m = [-0.8, -0.4, 0.1]
-        workspace_max_m = [-0.3, 0.4, 0.7]
-        ",
-        cell.pad_path().display(),
-        trial.rate_hz,
-        calibration.display(),
-        trial.fri_ms,
-        workspace().join("graphs/robots/lwr4p.toml").display()
-    );
+    let bench = lwr_bench(&cell.pad_path(), &calibration, port, trial.rate_hz, trial.fri_ms);
     run_hybrid(bench, trial)?;
     let figures = cell.end();
     let arm = &figures.summary["arm"];
@@ -205,76 +153,18 @@ fn serial_pad_and_lwr(trial: Trial) -> Result<String, String> {
     Ok(compare(&figures, &without_wires(trial, &ball(), &[]), trial))
 }
 
-/// What the UR5e may reach.
-const UR_WORKSPACE: &str = "workspace_min_m = [-1.0, -1.0, 0.0]\nworkspace_max_m = [1.0, 1.0, 1.0]\n";
-
-/// A bench with the ball in front of a UR5e, which is stiffer than an LWR.
-fn ur_bench(folder: &Path) -> PathBuf {
-    let text = fs::read_to_string(ball()).unwrap();
-    let robots = workspace().join("graphs/robots");
-    let text = text.replace("../robots/lwr4p.toml", robots.join("ur5e.toml").to_str().unwrap());
-    let (text, _) = text.split_once("[limits]").expect("the bench has limits");
-    let text = format!("{text}[limits]\n{UR_WORKSPACE}");
-    let text = text.replace("../calibrations", workspace().join("graphs/calibrations").to_str().unwrap());
-    let path = folder.join("bench.toml");
-    fs::write(&path, text).unwrap();
-    path
-}
-
 /// Runs the task over a pad behind TCP and the UR. Returns its figures.
 ///
 /// # Errors
 /// If the run was held.
 fn tcp_pad_and_ur(trial: Trial) -> Result<String, String> {
     let folder = tempfile::tempdir().unwrap();
-    let reverse = std::net::TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap().port();
-    let wires = format!(
-        "{}stiffness = 2000.0\n[pad]\nwire = 'tcp'\n[arm]\nwire = 'ur'\nreverse = '127.0.0.1:{reverse}'\n",
-        simulation(trial)
-    );
-    let ball = ur_bench(folder.path());
+    let reverse = free_tcp_port();
+    let wires = format!("{}{}", simulation(trial.rate_hz), ur_wires(reverse, ""));
+    let ball = ur_ball(folder.path());
     let cell = Cell::start(&ball, &wires);
-    let place = |device: &str, port: &str| cell.place[device][port].as_u64().unwrap();
-    let bench = format!(
-        "
-        [bind]
-        pad = 'skin'
-        arm = 'arm'
-        [devices.skin]
-        type = 'stream'
-        link = 'tcp:127.0.0.1:{}'
-        frame = 'sync'
-        mark = 'hex:5446'
-        cell = 'u16le'
-        offset = 6
-        shape = [16, 16]
-        check = 'sum16le'
-        clock.counter = {{ offset = 2, cell = 'u32le' }}
-        rate_hz = {:?}
-        timeout_ms = 500
-        pitch = 0.005
-        calibration = '{}'
-        threshold = 0.015
-        pressure = 0.1
-        mount = {{ xyz = [0.0, 0.0, 0.03] }}
-        [devices.arm]
-        type = 'ur'
-        address = '127.0.0.1'
-        robot = '{}'
-        reverse_port = {reverse}
-        rtde_port = {}
-        script_port = {}
-        receive_timeout_ms = 200
-        [limits]
-        {UR_WORKSPACE}
-        ",
-        place("pad", "port"),
-        trial.rate_hz,
-        workspace().join("graphs/calibrations/sim_pad.toml").display(),
-        workspace().join("graphs/robots/ur5e.toml").display(),
-        place("arm", "rtde_port"),
-        place("arm", "script_port"),
-    );
+    let [pad, rtde, script] = [("pad", "port"), ("arm", "rtde_port"), ("arm", "script_port")].map(|at| cell.port(at));
+    let bench = ur_bench(pad, [reverse, rtde, script], trial.rate_hz);
     run_hybrid(bench, trial)?;
     let figures = cell.end();
     let arm = &figures.summary["arm"];

@@ -1,5 +1,6 @@
 //! Pads that are described in TOML, against pads in another process.
 
+mod clients;
 mod fake;
 
 use std::time::{Duration, Instant};
