@@ -28,6 +28,8 @@ mod examples;
 mod explain;
 mod faults;
 mod features;
+#[cfg(target_os = "linux")]
+mod first_robot;
 mod fixes;
 mod flow;
 mod freshness;

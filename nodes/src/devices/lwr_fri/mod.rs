@@ -190,7 +190,7 @@ fn opened(params: Params) -> Result<(Description, Fri), Mistakes> {
     Ok((description, Fri::new(settings, ports, force, target, check, chain, allowed)))
 }
 
-/// Checks that the model has the joints of an LWR, and that `home` has one entry for each.
+/// Checks that the model has the joints of an LWR, and that `home` is a posture of them.
 fn check_chain(chain: &Chain, params: &Params) -> Result<(), Mistakes> {
     let count = chain.joints().len();
     if count != JOINTS {

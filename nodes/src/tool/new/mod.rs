@@ -75,7 +75,7 @@ impl What {
         let path = file.display();
         match self {
             Self::Task => format!("next: `tactflow run {path}`"),
-            Self::Bench => format!("next: correct the lines that end with `yours`, then `tactflow doctor {path}`"),
+            Self::Bench => format!("next: correct the lines with the comment `yours`, then `tactflow doctor {path}`"),
             Self::Pad => format!(
                 "next: correct it from the data sheet, and name it in a bench: `type = \"stream\"`, `sensor = \"{path}\"`"
             ),
