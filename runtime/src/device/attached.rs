@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 
 use super::exchange::SampleState;
 use super::live::{LinkSetup, Linked, Live, start};
-use super::{Commands, Description, DeviceError, Output, Samples};
+use super::{ClockReading, Commands, Description, DeviceError, Output, Samples};
 use crate::signal::Signal;
 
 /// Time for which a command is valid, as under a graph of 125 Hz or more [ns].
@@ -74,7 +74,16 @@ impl Attached {
     /// If the device has no such output.
     #[must_use]
     pub fn stamp(&self, port: &str) -> (i64, u64) {
-        let sample = &self.samples.ports[self.index(port)];
+        self.stamp_at(self.index(port))
+    }
+
+    /// Returns what [`stamp`](Self::stamp) returns, of the output at a place among [`Description::outputs`].
+    ///
+    /// # Panics
+    /// If the device has fewer outputs.
+    #[must_use]
+    pub fn stamp_at(&self, place: usize) -> (i64, u64) {
+        let sample = &self.samples.ports[place];
         (sample.stamp, sample.writes)
     }
 
@@ -90,8 +99,23 @@ impl Attached {
     /// If the device has no such output.
     #[must_use]
     pub fn lost(&self, port: &str) -> Option<&str> {
-        let sample = &self.samples.ports[self.index(port)];
+        self.lost_at(self.index(port))
+    }
+
+    /// Returns why the output at a place among [`Description::outputs`] is lost, or `None` if it is not.
+    ///
+    /// # Panics
+    /// If the device has fewer outputs.
+    #[must_use]
+    pub fn lost_at(&self, place: usize) -> Option<&str> {
+        let sample = &self.samples.ports[place];
         (sample.state == SampleState::Lost).then_some(&*sample.loss)
+    }
+
+    /// Returns what the device's own clock shows, if the stamps of its samples are made of it.
+    #[must_use]
+    pub const fn clock(&self) -> Option<ClockReading> {
+        self.samples.clock
     }
 
     /// Returns what the device has counted, in the order in which it first did.

@@ -19,6 +19,19 @@ const STEP: i64 = 50_000_000;
 /// Time for which all samples must be that late before this is taken for a step [ns].
 const STEP_TIME: i64 = 2_000_000_000;
 
+/// What the own clock of a device shows, against the clock of the graph.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ClockReading {
+    /// Time of the newest sample in the clock of the device [ns].
+    pub device: i64,
+    /// The same time in the clock of the graph, later by the smallest delay of a sample [ns].
+    pub graph: i64,
+    /// Seconds of the device for each second of the graph; `None` until there are steady samples of a second.
+    pub rate: Option<f64>,
+    /// Time over which the rate was measured [s].
+    pub seconds: f64,
+}
+
 /// Maps the times of a device to the clock of the graph.
 #[derive(Debug, Clone)]
 pub(crate) struct DeviceClock {
@@ -49,6 +62,13 @@ impl DeviceClock {
         let rate = line.slope().recip();
         self.has_told = (rate - 1.0).abs() > MAX_DRIFT;
         self.has_told.then_some(rate)
+    }
+
+    /// Returns what the clock of the device shows; `None` before its first sample.
+    pub(crate) fn reading(&self) -> Option<ClockReading> {
+        let ((device, graph), line) = (self.last?, self.lines[0].as_ref()?);
+        let rate = line.is_long().then(|| line.slope().recip());
+        Some(ClockReading { device, graph, rate, seconds: line.last[1] * 1e-9 })
     }
 
     /// Returns the stamp of a sample that the device measured at `device` [ns in its own clock], and that arrived at
@@ -275,6 +295,22 @@ mod tests {
         let rate = clock.take_wrong_rate().unwrap();
         assert!((rate - 0.5).abs() < 0.01, "{rate}");
         assert_eq!(clock.take_wrong_rate(), None, "once");
+    }
+
+    #[test]
+    fn a_drift_is_read_after_a_second() {
+        let mut clock = DeviceClock::new(4 * MS);
+        assert_eq!(clock.reading(), None);
+        for (i, [_, own, arrived]) in samples(3e-4, 4 * MS, 750, |_| 0).into_iter().enumerate() {
+            let stamp = clock.stamp(own, arrived);
+            let reading = clock.reading().expect("there are samples");
+            assert_eq!((reading.device, reading.graph), (own, stamp));
+            assert_eq!(reading.rate.is_some(), i >= 250, "sample {i}");
+        }
+        let reading = clock.reading().expect("there are samples");
+        let rate = reading.rate.expect("there are three seconds of samples");
+        assert!((rate - 1.0003).abs() < 1e-6, "{rate}");
+        assert!((reading.seconds - 2.996).abs() < 1e-9, "{} s", reading.seconds);
     }
 
     #[test]

@@ -137,6 +137,11 @@ impl Description {
         self.outputs.iter().map(|port| (&*port.name, &port.shape))
     }
 
+    /// The side of each output, in the order of [`outputs`](Self::outputs); `None` for a role without a side.
+    pub fn output_sides(&self) -> impl Iterator<Item = Option<&str>> {
+        self.outputs.iter().map(|port| self.fills[port.fill].side.as_deref())
+    }
+
     /// Returns the first output of that name and kind.
     #[must_use]
     pub fn output<T: Signal>(&self, name: &str) -> Option<Output<T>> {

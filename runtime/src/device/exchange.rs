@@ -2,7 +2,7 @@
 
 use std::borrow::Cow;
 
-use super::{Command, Description, Output, Report};
+use super::{ClockReading, Command, Description, Output, Report};
 use crate::signal::{Arenas, Kind, Shape, Signal};
 
 /// The newest sample of each output of a device, and the counts of the device.
@@ -13,6 +13,8 @@ pub struct Samples {
     /// How often any port was written.
     pub(crate) writes: u64,
     pub(crate) counts: Vec<(&'static str, u64)>,
+    /// The device's own clock, if stamps are made of it.
+    pub(crate) clock: Option<ClockReading>,
 }
 
 #[derive(Debug, Clone)]
@@ -120,7 +122,7 @@ impl Samples {
         }
         self.ports.clone_from(&other.ports);
         self.counts.clone_from(&other.counts);
-        self.writes = other.writes;
+        (self.writes, self.clock) = (other.writes, other.clock);
     }
 }
 

@@ -75,6 +75,7 @@ impl Link {
         let arrived = self.stamp(Instant::now());
         let steps = self.clock.steps;
         let stamp = self.clock.stamp(time, arrived);
+        self.staging.clock = self.clock.reading();
         if self.clock.steps > steps {
             self.count("steps of its clock");
         }

@@ -23,6 +23,7 @@ use crate::node::{Describe, Mistakes, Param, ParamSpec, PortSpec, Reader};
 use crate::source::Value;
 
 pub use attached::Attached;
+pub use clock::ClockReading;
 pub(crate) use description::StatedPort;
 pub use description::{Command, Description, Fill, Output, Report};
 pub use exchange::{Commands, Samples};

@@ -25,6 +25,8 @@ pub struct BenchDevice {
     pub name: String,
     /// Its `type`.
     pub kind: String,
+    /// Its parameters, with those of its robot and its sensor, as the files write them.
+    pub params: toml::Table,
     /// What it states, and its driver.
     pub opened: Opened,
     /// Its fingerprint, if it must be commissioned.
@@ -56,6 +58,7 @@ pub fn open_bench(catalogue: &Catalogue, path: &Path) -> Result<OpenBench, Repor
             to_commission: fingerprint(block, &device, &sources),
             name: device.name,
             kind: block.kind.as_ref()?.value.clone(),
+            params: block.params.read().unwrap_or_default(),
             opened: Opened { description: device.description, driver: device.driver },
         })
     };
