@@ -2,6 +2,8 @@
 
 mod binary;
 mod heard;
+mod parts;
+mod replies;
 mod text;
 
 use std::fmt::Write as _;
@@ -10,7 +12,7 @@ use std::time::{Duration, Instant};
 
 use tactflow_runtime::cli::{Shell, clap, duration};
 
-use super::arguments::may_replace;
+use super::arguments::{may_replace, positive};
 use crate::devices::link::{Address, Connection};
 use heard::{Guess, Heard};
 
@@ -25,6 +27,9 @@ Examples:
   tactflow sniff serial:/dev/ttyACM0
   tactflow sniff serial:/dev/ttyUSB0 --baud 2000000 -o my_pad.toml
   tactflow sniff serial:/dev/ttyACM0 --send hex:F0C400F1C5
+  tactflow sniff serial:/dev/ttyUSB0 --baud 115200 --poll A --rate 30
+
+Some pads start after a command (--send), and some answer a question with each frame (--poll).
 
 Exit codes: 0 a guess was made; 1 no frames were found; 2 the link does not open, or the file cannot be written."
 )]
@@ -37,6 +42,12 @@ pub(super) struct SniffArgs {
     /// What to send first: text, or bytes such as hex:F0C4
     #[arg(long, value_name = "BYTES")]
     send: Option<String>,
+    /// What to send to ask for each frame: text, or bytes such as hex:F0C4
+    #[arg(long, value_name = "BYTES")]
+    poll: Option<String>,
+    /// With --poll: how often to ask, in times per second
+    #[arg(long, value_name = "HZ", value_parser = positive, default_value = "30", requires = "poll")]
+    rate: f64,
     /// How long to listen at each speed
     #[arg(long = "for", value_name = "TIME", value_parser = duration, default_value = "3s")]
     time: f64,
@@ -51,6 +62,8 @@ const BAUDS: [u32; 10] = [115_200, 2_000_000, 1_000_000, 921_600, 460_800, 230_4
 const MAX_BYTES: usize = 1 << 16;
 /// Time without bytes that is a pause.
 const PAUSE: Duration = Duration::from_millis(2);
+/// Time without bytes after which an answer is complete.
+const ANSWERED: Duration = Duration::from_millis(5);
 /// Number of bytes that are shown.
 const SHOWN_BYTES: usize = 64;
 
@@ -59,8 +72,8 @@ pub(super) fn run(args: SniffArgs, shell: &Shell) -> u8 {
         Ok(address) => address,
         Err(message) => return shell.refuse(message),
     };
-    let sent = match args.send.as_deref().map(crate::devices::stream::bytes_of).transpose() {
-        Ok(sent) => sent.unwrap_or_default(),
+    let words = match Words::read(&args) {
+        Ok(words) => words,
         Err((message, help)) => return shell.refuse(format_args!("{message}\nhelp: {help}")),
     };
     let bauds = match (&address, args.baud) {
@@ -74,35 +87,69 @@ pub(super) fn run(args: SniffArgs, shell: &Shell) -> u8 {
     };
     for baud in bauds {
         let time = Duration::from_secs_f64(args.time.clamp(0.1, 3600.0));
-        let heard = match runtime.block_on(listen(&address, *baud, &sent, time)) {
+        let heard = match runtime.block_on(listen(&address, *baud, &words, time)) {
             Ok(heard) => heard,
             Err(message) => return shell.refuse(format_args!("{address}: {message}")),
         };
         let at = if *baud > 0 { format!(" at {baud} baud") } else { String::new() };
         shell.say(&format!("{} bytes in {:.1} s{at}{}", heard.bytes.len(), heard.seconds, dump(&heard.bytes)));
-        if let Some(guess) = text::guess(&heard).or_else(|| binary::guess(&heard)) {
-            let description = description(&guess, *baud, args.send.as_deref());
+        let guess = text::guess(&heard).or_else(|| replies::guess(&heard)).or_else(|| binary::guess(&heard));
+        if let Some(guess) = guess {
+            let description = description(&guess, *baud, &args);
             guess.findings.iter().for_each(|finding| shell.say(&format!("- {finding}")));
             return write(&args, &description, shell);
         }
     }
     shell.error(
-        "no frames were found\nhelp: press on the pad while it is heard, try `--baud` or `--send`, and listen longer with `--for`",
+        "no frames were found\nhelp: press on the pad while it is heard, try `--baud`, `--send` or `--poll`, and listen longer \
+         with `--for`",
     );
     1
 }
 
+/// What is sent to a pad.
+struct Words {
+    start: Vec<u8>,
+    /// What asks for a frame, and the time between two questions.
+    poll: Option<(Vec<u8>, Duration)>,
+}
+
+impl Words {
+    /// Reads the bytes of the arguments.
+    ///
+    /// # Errors
+    /// What is wrong, and what to write instead.
+    fn read(args: &SniffArgs) -> Result<Self, (String, String)> {
+        let bytes = |text: &Option<String>| text.as_deref().map(crate::devices::stream::bytes_of).transpose();
+        let period = Duration::from_secs_f64((1.0 / args.rate).min(60.0));
+        Ok(Self { start: bytes(&args.send)?.unwrap_or_default(), poll: bytes(&args.poll)?.map(|poll| (poll, period)) })
+    }
+}
+
 /// Listens on a link.
-async fn listen(address: &Address, baud: u32, sent: &[u8], time: Duration) -> Result<Heard, String> {
+async fn listen(address: &Address, baud: u32, words: &Words, time: Duration) -> Result<Heard, String> {
     let mut connection = Connection::open(address, baud, None).await?;
-    if !sent.is_empty() {
-        connection.send(sent).await?;
+    if !words.start.is_empty() {
+        connection.send(&words.start).await?;
     }
     let (mut heard, mut buffer) = (Heard::default(), Vec::new());
     let end = Instant::now() + time;
-    let (mut begin, mut last) = (None, None::<Instant>);
+    let (mut begin, mut last, mut ask_at) = (None, None::<Instant>, Instant::now());
     while heard.bytes.len() < MAX_BYTES {
-        let received = tokio::time::timeout_at(end.into(), connection.receive(&mut buffer)).await;
+        let limit = if words.poll.is_some() { end.min(ask_at) } else { end };
+        let received = tokio::time::timeout_at(limit.into(), connection.receive(&mut buffer)).await;
+        if let (Err(_), Some((question, period))) = (&received, &words.poll)
+            && Instant::now() < end
+        {
+            // An answer that is still arriving belongs to the last question.
+            let answering = last.map(|last| last + ANSWERED).filter(|free| *free > Instant::now());
+            if answering.is_none() {
+                heard.asks.push(heard.bytes.len());
+                connection.send(question).await?;
+            }
+            ask_at = answering.unwrap_or_else(|| (ask_at + *period).max(Instant::now()));
+            continue;
+        }
         match received {
             Err(_) => break,
             Ok(Err(message)) if heard.bytes.is_empty() => return Err(message),
@@ -135,7 +182,7 @@ fn dump(bytes: &[u8]) -> String {
 }
 
 /// The text of the description.
-fn description(guess: &Guess, baud: u32, sent: Option<&str>) -> String {
+fn description(guess: &Guess, baud: u32, args: &SniffArgs) -> String {
     let mut text =
         "# A pad that `tactflow sniff` has heard: check each key, and measure `pitch`\n[sensor]\n".to_owned();
     let mut line = |key: &str, value: &str, comment: &str| {
@@ -145,8 +192,8 @@ fn description(guess: &Guess, baud: u32, sent: Option<&str>) -> String {
     if baud > 0 {
         line("baud", &baud.to_string(), "");
     }
-    if let Some(sent) = sent {
-        line("start", &format!("{sent:?}"), "");
+    for (key, sent) in [("start", &args.send), ("poll", &args.poll)] {
+        sent.iter().for_each(|sent| line(key, &format!("{sent:?}"), ""));
     }
     guess.keys.iter().for_each(|(key, value, comment)| line(key, value, comment));
     line("pitch", "0.005", "[m]");

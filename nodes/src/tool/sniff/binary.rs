@@ -1,9 +1,11 @@
 //! Guesses the frames in bytes: the period by a mark that comes again and again, its place by the pauses, and the
 //! checksum by trying those that are known.
 
+use std::cmp::Reverse;
 use std::collections::BTreeMap;
 
 use super::heard::{Guess, Heard, is_usual, rows_and_cols};
+use super::parts::numbering;
 use super::text::rate;
 use crate::devices::stream::{checksum_size, checksums, has_checksum};
 
@@ -18,7 +20,7 @@ const REGULAR_MARGIN_PERCENT: usize = 5;
 /// Longest mark that is looked for.
 const MAX_MARK: usize = 4;
 /// The usual marks.
-const KNOWN: [&[u8]; 8] = [
+pub(super) const KNOWN: [&[u8]; 8] = [
     &[0xAA, 0x55, 0x03, 0x99],
     &[0xF0, 0xC4, 0x01],
     &[0xFF, 0xFE, 0xFE, 0xFF],
@@ -46,10 +48,7 @@ pub(super) fn guess(heard: &Heard) -> Option<Guess> {
     let (frame, mark) = mark(frames[0], &constant)?;
     let is_trailer = frame == "trailer";
     let trailer = if is_trailer { mark.len() } else { 0 };
-    let is_different = frames.iter().any(|frame| *frame != frames[0]);
-    let holds = |name: &&String| is_different && frames.iter().all(|frame| has_checksum(name, frame, trailer));
-    let names = checksums();
-    let check = names.iter().find(holds);
+    let check = checksum(&frames, trailer);
     let digits: String = mark.iter().map(|byte| format!("{byte:02X}")).collect();
     let mut findings = vec![format!("{} frames of {} bytes", frames.len(), row.length)];
     findings.push(format!("each has {digits} at its {}", if is_trailer { "end" } else { "beginning" }));
@@ -57,19 +56,32 @@ pub(super) fn guess(heard: &Heard) -> Option<Guess> {
         true => "a pause is before each frame".to_owned(),
         false => "there is no pause between the frames: the mark may be at another place".to_owned(),
     });
-    findings.extend(check.map(|check| format!("the checksum is {check}")));
-    let after = trailer + check.map_or(0, |check| checksum_size(check));
+    findings.extend(check.as_ref().map(|check| format!("the checksum is {check}")));
+    let end = row.length - trailer - check.as_deref().map_or(0, checksum_size);
     let header = if is_trailer { 0 } else { mark.len() };
-    let (offset, cell, count) = cells(&frames, header, row.length - after);
-    let (rows, cols) = rows_and_cols(count);
+    let parts = numbering(&frames, header, end);
+    let (offset, cell, count) = cells(&frames, parts.as_ref().map_or(header, |parts| parts.offset + 1), end);
+    let packets = parts.as_ref().map_or(1, |parts| parts.count);
+    let (rows, cols) = rows_and_cols(packets * count);
     let mut keys = vec![("frame", format!("{frame:?}"), ""), ("mark", format!("\"hex:{digits}\""), "")];
-    keys.extend(check.map(|check| ("check", format!("{check:?}"), "")));
+    keys.extend(check.as_ref().map(|check| ("check", format!("{check:?}"), "")));
     keys.push(("length", row.length.to_string(), ""));
     keys.push(("cell", format!("{cell:?}"), "check it"));
     keys.push(("offset", offset.to_string(), ""));
     keys.push(("shape", format!("[{rows}, {cols}]"), "rows and columns; check them"));
-    keys.push(("rate_hz", rate(heard.bytes.len() / row.length, heard.seconds), "as it was heard"));
+    if let Some(parts) = parts {
+        findings.push(format!("a byte counts them from {}: {packets} of them are an image", parts.first));
+        keys.push(("parts", parts.key(count), ""));
+    }
+    keys.push(("rate_hz", rate(heard.bytes.len() / row.length / packets, heard.seconds), "as it was heard"));
     Some(Guess { findings, keys })
+}
+
+/// Returns the name of the checksum that all frames have, if they differ. `trailer` bytes are behind it.
+pub(super) fn checksum(frames: &[&[u8]], trailer: usize) -> Option<String> {
+    let is_different = frames.iter().any(|frame| *frame != frames[0]);
+    let holds = |name: &String| is_different && frames.iter().all(|frame| has_checksum(name, frame, trailer));
+    checksums().iter().find(|name| holds(name)).cloned()
 }
 
 /// Finds the longest row of frames: two bytes that come again after one length.
@@ -80,28 +92,42 @@ fn row(bytes: &[u8]) -> Option<Row<'_>> {
     }
     let mut found = Vec::new();
     for places in places.values().filter(|places| places.len() >= MIN_FRAMES) {
-        let Some((length, start, steps)) = longest_run(places) else { continue };
-        let regular = 100 * steps / (bytes.len() / length).max(1);
+        let Some(Run { length, start, steps, all }) = longest_run(places) else { continue };
+        // Of all bytes, and not of the longest run: a gap in what was heard cuts a run, and shortens a long one by less.
+        let regular = 100 * all * length / bytes.len();
         if length >= MIN_LENGTH && steps + 1 >= MIN_FRAMES && regular >= MIN_REGULAR_PERCENT {
             found.push((regular, Row { bytes: &bytes[start..start + steps * length], length, start }));
         }
     }
     // What comes in every second frame is as regular as what comes in each.
-    let most = found.iter().map(|(regular, _)| *regular).max()?;
-    let regular = found.into_iter().filter(|(regular, _)| regular + REGULAR_MARGIN_PERCENT >= most);
+    let (most, Reverse(whole)) = found.iter().map(|(regular, row)| (*regular, Reverse(row.length))).max()?;
+    let is_regular =
+        |regular: usize, length: usize| regular + REGULAR_MARGIN_PERCENT >= most && whole.is_multiple_of(length);
+    let regular = found.into_iter().filter(|(regular, row)| is_regular(*regular, row.length));
     regular.map(|(_, row)| row).min_by_key(|row| row.length)
 }
 
-/// Finds the longest run of equal steps. Returns the step, the first place and the number of steps.
-fn longest_run(places: &[usize]) -> Option<(usize, usize, usize)> {
+/// Places that are one length apart.
+struct Run {
+    length: usize,
+    /// The first place of the longest run, and its number of steps.
+    start: usize,
+    steps: usize,
+    /// Number of all steps of this length from a place to the next one.
+    all: usize,
+}
+
+/// Finds the most usual step from a place to the next one, and the longest run of it.
+fn longest_run(places: &[usize]) -> Option<Run> {
     let mut counts = BTreeMap::<usize, usize>::new();
     places.windows(2).for_each(|pair| *counts.entry(pair[1] - pair[0]).or_default() += 1);
-    let (step, _) = counts.into_iter().max_by_key(|(step, count)| count * step)?;
+    let (step, all) = counts.into_iter().max_by_key(|(step, count)| count * step)?;
     // The pair may stand in the data too: only the places that are one step apart count.
     let is_there = |place: usize| places.binary_search(&place).is_ok();
     let starts = places.iter().filter(|place| place.checked_sub(step).is_none_or(|before| !is_there(before)));
     let length = |start: usize| (1..).take_while(|i| is_there(start + i * step)).count();
-    starts.map(|start| (step, *start, length(*start))).max_by_key(|(.., steps)| *steps)
+    let runs = starts.map(|start| Run { length: step, start: *start, steps: length(*start), all });
+    runs.max_by_key(|run| run.steps)
 }
 
 /// Returns where the first frame of a row begins, and whether a pause says so.
@@ -145,7 +171,7 @@ fn mark<'f>(frame: &'f [u8], constant: &[bool]) -> Option<(&'static str, &'f [u8
 }
 
 /// Guesses the offset, the type and the number of the cells.
-fn cells(frames: &[&[u8]], header: usize, end: usize) -> (usize, &'static str, usize) {
+pub(super) fn cells(frames: &[&[u8]], header: usize, end: usize) -> (usize, &'static str, usize) {
     const MAX_HEADER: usize = 16;
     let is_wide = |offset: usize| {
         let spread = |first: usize| {
@@ -183,7 +209,7 @@ mod tests {
     /// What is heard of frames, each after a pause or not, from the middle of a frame on.
     fn heard(frames: &[Vec<u8>], has_pauses: bool) -> Heard {
         let cut = frames[0].len() / 3;
-        let mut heard = Heard { bytes: frames[0][cut..].to_vec(), pauses: vec![0], seconds: 1.0 };
+        let mut heard = Heard { bytes: frames[0][cut..].to_vec(), pauses: vec![0], seconds: 1.0, asks: Vec::new() };
         for frame in &frames[1..] {
             if has_pauses {
                 heard.pauses.push(heard.bytes.len());
@@ -240,6 +266,31 @@ mod tests {
         };
         let frames: Vec<Vec<u8>> = (0..40).map(frame).collect();
         assert_has(&keys(&heard(&frames, true)), &["frame = \"trailer\"", "mark = \"hex:0D0A\"", "length = 82"]);
+    }
+
+    #[test]
+    fn old_bytes_before_a_gap_and_few_frames_do_not_make_it_longer() {
+        let frame = |n: usize| -> Vec<u8> {
+            [0xAA, 0x55].into_iter().chain((0..512).map(|k| ((7 * n + 3 * k) % 251) as u8)).collect()
+        };
+        // What the system has kept from before, and then the frames of another time.
+        let old: Vec<u8> = (0..8).flat_map(frame).take(4095).collect();
+        for count in 4..40 {
+            let bytes = old.iter().copied().chain((50..50 + count).flat_map(frame)).collect();
+            let keys = keys(&Heard { bytes, seconds: 1.0, ..Heard::default() });
+            assert_has(&keys, &["length = 514", "mark = \"hex:AA55\""]);
+        }
+    }
+
+    #[test]
+    fn packets_with_an_index_make_one_image() {
+        let packet = |n: usize| {
+            let cells = (0..128).map(|k| ((7 * n + 3 * k) % 251) as u8);
+            [0xAA, 0x55, 0x03, 0x99, 1 + (n % 8) as u8].into_iter().chain(cells).collect::<Vec<u8>>()
+        };
+        let packets: Vec<Vec<u8>> = (0..60).map(packet).collect();
+        let parts = "parts = { index = { offset = 4, cell = \"u8\" }, first = 1, values = 128 }";
+        assert_has(&keys(&heard(&packets, true)), &["length = 133", "shape = [32, 32]", "offset = 5", parts]);
     }
 
     #[test]

@@ -6,6 +6,8 @@ pub(super) struct Heard {
     pub(super) bytes: Vec<u8>,
     /// Places of the first bytes after a pause.
     pub(super) pauses: Vec<usize>,
+    /// Number of bytes before each question.
+    pub(super) asks: Vec<usize>,
     /// Time over which they came [s].
     pub(super) seconds: f64,
 }

@@ -75,7 +75,7 @@ mod tests {
     use super::*;
 
     fn keys(text: &str) -> Option<Vec<String>> {
-        let heard = Heard { bytes: text.as_bytes().to_vec(), pauses: vec![0], seconds: 1.0 };
+        let heard = Heard { bytes: text.as_bytes().to_vec(), pauses: vec![0], seconds: 1.0, asks: Vec::new() };
         guess(&heard).map(|guess| guess.keys.iter().map(|(key, value, _)| format!("{key} = {value}")).collect())
     }
 
