@@ -340,6 +340,11 @@ impl Fri {
         if !takes {
             self.target.mirror(&report.commanded);
             self.phase = Phase::Mirrored;
+            // An arm that is only listened to never gets as far as the first command.
+            let is_listened_to = link.is_mute() && !self.has_followed;
+            if let Some(fault) = self.fault_at_start(report).filter(|_| is_listened_to) {
+                link.refuse(fault);
+            }
         } else if self.phase != Phase::Checked {
             // The arm rests where the controller is, and the first step begins there.
             self.target.mirror(&report.commanded);
@@ -375,7 +380,9 @@ impl Fri {
     /// Refuses commands. Before the arm has followed any, it waits for the state command instead.
     fn refuse(&mut self, why: String, report: &Report, now: Instant, link: &mut Link) {
         let waited = self.first.map_or(0.0, |first| (now - first).as_secs_f64());
-        let is_waiting = !self.has_followed && !is_in_command(report) && waited < self.settings.wait_s;
+        // Without answers, the controller does not reach the state command.
+        let may_wait = link.is_mute() || waited < self.settings.wait_s;
+        let is_waiting = !self.has_followed && !is_in_command(report) && may_wait;
         if !is_waiting {
             link.refuse(why);
         } else if self.notes.waits_for.as_ref() != Some(&why) {

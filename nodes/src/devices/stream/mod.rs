@@ -14,6 +14,8 @@ use tactflow_runtime::node::{Describe, Mistakes};
 use tactflow_runtime::signal::{Image, ImageShape, Unit};
 
 use super::{Facts, arm, pad};
+#[cfg(feature = "cli")]
+pub(crate) use decoding::order::{Grid, Turn};
 use driver::PadDriver;
 #[cfg(feature = "cli")]
 pub(crate) use framing::check::{has_checksum, names as checksums, size_of as checksum_size};

@@ -1,11 +1,22 @@
 //! `tactflow doctor`: connects to every device of a bench and says what it saw. Without `--move`, nothing moves.
 
 mod arm;
+mod clock;
 mod host;
 mod pad;
 mod patient;
+#[cfg(feature = "drivers")]
+mod place;
+#[cfg(feature = "drivers")]
+mod press;
+#[cfg(feature = "drivers")]
+mod remedy;
 mod stop;
+#[cfg(feature = "drivers")]
+mod symmetry;
 mod timing;
+#[cfg(feature = "drivers")]
+mod touch;
 
 use std::path::{Path, PathBuf};
 use std::thread;
@@ -24,18 +35,25 @@ use stop::Arm;
 #[derive(Parser)]
 #[command(name = "doctor")]
 #[command(
-    after_help = "It prints for each live device: rate, jitter and age of its samples, lost and rejected frames, the noise of a pad
-without a load, the joints of an arm and their order, and what the device does without commands. Nothing moves.
+    after_help = "It prints for each live device: rate, jitter and age of its samples, the rate of its clock, lost and rejected frames,
+the noise of a pad without a load, the joints of an arm and their order, and what the device does without commands. Nothing
+moves.
 
 Examples:
   tactflow doctor graphs/benches/lwr_fri.toml
   tactflow doctor cell.toml --for 30s
+  tactflow doctor cell.toml --press
   tactflow doctor cell.toml --move
+
+With `--press`, it asks you to press the four corners of each pad, one after the other, and names a flipped or swapped axis
+with the line that corrects it. If the pad has a `mount`, the corners are named in the base of the arm, so that a mistake in
+the mount shows too.
 
 With `--move`, it also proves that each real arm stops by itself when its commands cease, and notes the proof in a file
 beside the bench. Until then, `tactflow run` uses a tenth of the limits of speed and acceleration.
 
-Exit codes: 0 no problem; 1 a device failed, or sent nothing; 2 the bench does not load."
+Exit codes: 0 no problem; 1 a device failed, sent nothing or would not move, or an axis of a pad is wrong; 2 the bench does
+not load; 130 Ctrl-C ended `--press`."
 )]
 pub(super) struct DoctorArgs {
     /// Bench file
@@ -46,6 +64,9 @@ pub(super) struct DoctorArgs {
     /// After a typed `yes`, move each real arm by some millimetres at 5 mm/s, send nothing more, and measure how it stops
     #[arg(long = "move")]
     moves: bool,
+    #[cfg(feature = "drivers")]
+    #[command(flatten)]
+    press: press::PressArgs,
 }
 
 /// Time that a controller needs for a new session, after it has noticed the end of the last one.
@@ -99,7 +120,9 @@ pub(super) fn run(args: DoctorArgs, shell: &Shell) -> u8 {
         bind.iter().filter(|(_, word)| is_own(word)).map(|(role, _)| format!("`{role}`")).collect()
     };
     let (mut patients, mut arms) = (Vec::new(), Vec::new());
-    for BenchDevice { name, kind, opened, to_commission } in devices {
+    #[cfg(feature = "drivers")]
+    let described: Vec<_> = devices.iter().map(remedy::Described::of).collect();
+    for BenchDevice { name, kind, opened, to_commission, .. } in devices {
         arms.extend(to_commission.map(|device| (device, opened.description.on_silence.clone())));
         let title = format!("{name}: {kind} as {}", roles(&name).join(", "));
         match opened.driver {
@@ -114,9 +137,19 @@ pub(super) fn run(args: DoctorArgs, shell: &Shell) -> u8 {
         }
     }
     watch(&mut patients, args.duration, &interrupt);
+    for patient in &patients {
+        worst = worst.max(print(shell, patient.title(), &patient.findings(args.duration)));
+    }
     for patient in patients {
-        let (title, findings) = patient.discharge(args.duration);
-        worst = worst.max(print(shell, &title, &findings));
+        let title = patient.title().to_owned();
+        if let Err(error) = patient.stop() {
+            worst = worst.max(print(shell, &title, &[Finding::problem(error.to_string())]));
+        }
+    }
+    #[cfg(feature = "drivers")]
+    match args.press.examine(shell, &args.bench, args.duration, &described) {
+        Ok(severity) => worst = worst.max(severity),
+        Err(code) => return code,
     }
     if args.moves && worst != Severity::Problem {
         worst = worst.max(prove(shell, &args.bench, &arms, &bind));

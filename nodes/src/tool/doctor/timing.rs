@@ -33,6 +33,11 @@ impl Timing {
         }
     }
 
+    /// Returns the median age of a sample on arrival [s]; 0 without samples.
+    pub(super) fn median_age(&self) -> f64 {
+        if self.ages.is_empty() { 0.0 } else { quantile(&self.ages, 0.5) }
+    }
+
     /// Describes the samples of a port with a nominal `period` [s] after `watched` seconds.
     pub(super) fn describe(&self, port: &str, period: f64, watched: f64) -> Vec<Finding> {
         let Some(first) = self.first else {

@@ -175,6 +175,12 @@ impl Ellipse {
         (anisotropy > 0.0 && anisotropy >= min_anisotropy).then(|| half_angle(self.sine, self.cosine))
     }
 
+    /// Returns the sum of the variances [m²].
+    #[must_use]
+    pub const fn spread(&self) -> f64 {
+        self.spread
+    }
+
     /// Returns the variances along the long and the short axis [m²].
     ///
     /// Both are 0 if the region has no extent, or if negative tactels make their sum negative.

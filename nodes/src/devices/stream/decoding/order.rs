@@ -15,6 +15,22 @@ pub(crate) enum Turn {
     Rot90,
 }
 
+#[cfg(feature = "cli")]
+impl Turn {
+    /// All turns.
+    pub(crate) const ALL: [Self; 4] = [Self::FlipX, Self::FlipY, Self::Transpose, Self::Rot90];
+
+    /// Returns the word of a description for it.
+    pub(crate) const fn word(self) -> &'static str {
+        match self {
+            Self::Transpose => "transpose",
+            Self::FlipX => "flip_x",
+            Self::FlipY => "flip_y",
+            Self::Rot90 => "rot90",
+        }
+    }
+}
+
 /// A grid of indices into the cells of a frame.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct Grid {
