@@ -77,6 +77,12 @@ def cushion(n, marks):
     return [b"\xaa\x55\x03\x99" + bytes(cells(n, 1024, marks))]
 
 
+def mat(n, marks):
+    """Eight packets: delimiter, number from 0 on, 128 values."""
+    found = bytes(cells(n, 1024, marks))
+    return [b"\xaa\x55\x03\x99" + bytes([i]) + found[128 * i : 128 * (i + 1)] for i in range(8)]
+
+
 def glove(n, marks):
     """Two packets: delimiter, order, type 01 (left), 128 values; the second one has four floats more."""
     found = bytes(cells(n, 256, marks))
@@ -128,6 +134,7 @@ PADS = {
     "flexitac_12x32": grid(12, 32),
     "aa550399_32x32": cushion,
     "aa550399_glove": glove,
+    "mat_in_parts": mat,
     "anyskin": anyskin,
     "velostat_ascii": velostat_ascii,
     "velostat_binary": velostat_binary,

@@ -11,14 +11,14 @@ use tactflow_runtime::signal::Image;
 use crate::peer::{Process, SOON};
 
 /// The device.
-struct Sensor {
+pub(crate) struct Sensor {
     process: Process,
-    link: PathBuf,
+    pub(crate) link: PathBuf,
     _folder: tempfile::TempDir,
 }
 
 impl Sensor {
-    fn start(arguments: &[&str]) -> Self {
+    pub(crate) fn start(arguments: &[&str]) -> Self {
         let folder = tempfile::tempdir().unwrap();
         let link = folder.path().join("pad");
         let arguments = [link.to_str().unwrap()].into_iter().chain(arguments.iter().copied());

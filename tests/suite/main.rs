@@ -22,6 +22,8 @@ mod devices;
 mod docs;
 #[cfg(target_os = "linux")]
 mod doctor;
+#[cfg(target_os = "linux")]
+mod doctor_press;
 mod erased;
 mod errors;
 mod examples;

@@ -1,7 +1,7 @@
 //! Pads that are described in TOML, against pads in another process.
 
 mod clients;
-mod fake;
+pub(crate) mod fake;
 
 use std::time::{Duration, Instant};
 
@@ -356,6 +356,9 @@ fn the_pads_that_ship_are_listed() {
     assert_eq!(say(&["pads", "nothing"]).code, 2);
 }
 
+/// The parts of a mat whose images come in eight packets.
+const MAT_PARTS: &str = "parts = { index = { offset = 4, cell = \"u8\" }, first = 0, values = 128 }";
+
 #[test]
 fn what_a_pad_sends_is_guessed_and_the_description_loads() {
     // What the data sheets say: the length and the mark of a frame, its checksum, and the number of its cells.
@@ -364,6 +367,8 @@ fn what_a_pad_sends_is_guessed_and_the_description_loads() {
         ("aa550399_32x32", &["mark = \"hex:AA550399\"", "length = 1028", "shape = [32, 32]"]),
         ("anyskin", &["frame = \"trailer\"", "mark = \"hex:0D0A\"", "length = 82"]),
         ("velostat_ascii", &["frame = \"lines\"", "cell = \"dec\"", "shape = [16, 16]"]),
+        ("velostat_binary", &["frame = \"reply\"", "poll = \"A\"", "cell = \"u8\"", "shape = [16, 16]"]),
+        ("mat_in_parts", &["mark = \"hex:AA550399\"", "length = 133", "offset = 5", "shape = [32, 32]", MAT_PARTS]),
         ("myrmex_v2", &["mark = \"hex:F0C401\"", "length = 520", "check = \"xor8\"", "cell = \"u16le\"", "offset = 7"]),
     ];
     let folder = tempfile::tempdir().unwrap();
@@ -396,6 +401,7 @@ fn what_a_pad_sends_is_guessed_and_the_description_loads() {
 fn guessed(pad: &str, link: &str, file: &str) -> String {
     let mut args = vec!["sniff", link, "--baud", "115200", "--for", "1s", "-o", file];
     args.extend((pad == "myrmex_v2").then_some("--send=hex:F0C400F1C5"));
+    args.extend((pad == "velostat_binary").then_some("--poll=A"));
     let output = crate::tool::tool(&args).output().unwrap();
     assert!(output.status.success(), "{pad}: {}", String::from_utf8_lossy(&output.stdout));
     let text = std::fs::read_to_string(file).unwrap();
