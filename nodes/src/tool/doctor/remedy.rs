@@ -1,7 +1,5 @@
 //! What corrects a pad whose corners are not where they should be, as lines to paste.
 
-use std::fmt::Display;
-
 use tactflow_runtime::graph::BenchDevice;
 use tactflow_runtime::signal::{Image, ImageShape};
 
@@ -142,8 +140,8 @@ fn list(turns: &[Turn]) -> String {
 }
 
 /// Says where a line belongs. It replaces that of the bench and that of a file of a sensor.
-fn paste(device: &Described, lines: impl Display) -> String {
-    let lines = lines.to_string().replace('\n', "`, `");
+fn paste(device: &Described, lines: &str) -> String {
+    let lines = lines.replace('\n', "`, `");
     format!("Write `{lines}` into `[devices.{}]` of the bench, in place of what is there", device.name)
 }
 
