@@ -37,6 +37,7 @@ mod flow;
 mod freshness;
 #[cfg(target_os = "linux")]
 mod growth;
+mod keep_out;
 mod layers;
 mod leases;
 mod limits;

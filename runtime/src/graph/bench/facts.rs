@@ -55,7 +55,12 @@ fn is_left_out(value: &Value, node: Option<usize>, net: &Net<'_>, opened: &Opene
         let arms = node.map_or(&[][..], |node| net.arms_of(node));
         return net.limit(arms, fact.word.split_once('.').map_or("", |(_, name)| name)).is_none();
     }
-    node.is_some_and(is_foreign) || find_fact(&fact, &value.span, node, net, opened).is_err()
+    // A misspelt name of a fact that is there is not one that may be missing.
+    let is_missing = || match find_fact(&fact, &value.span, node, net, opened) {
+        Ok(_) => false,
+        Err(unknown) => unknown.is_none_or(|unknown| unknown.fix.is_empty()),
+    };
+    node.is_some_and(is_foreign) || is_missing()
 }
 
 /// Returns the fact that a reference in a parameter of `node` names, as a value at `span`.

@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 
 use crate::graph::net::Net;
-use crate::graph::net::limits::{is_looser, is_lower_bound, length, twin};
+use crate::graph::net::limits::{Form, form, is_looser, is_lower_bound, twin};
 use crate::graph::plan::Producer;
 use crate::graph::syntax::{LIMITS, LimitOwner, LimitSection};
 use crate::source::{Code, Diagnostic, Diagnostics, Key, Table, Value};
@@ -16,7 +16,7 @@ pub(crate) fn check(net: &Net<'_>, diagnostics: &mut Diagnostics) {
     for arms in groups(net) {
         let names: BTreeSet<&str> = net.limit_sections(&arms).flat_map(names).collect();
         for name in names {
-            let found = different_lengths(net, &arms, name).or_else(|| excluded(net, &arms, name));
+            let found = different_forms(net, &arms, name).or_else(|| excluded(net, &arms, name));
             diagnostics.extend(found.or_else(|| loosened(net, &arms, name)));
         }
     }
@@ -82,11 +82,11 @@ fn values<'n>(net: &'n Net<'_>, arms: &'n [usize], name: &'n str) -> impl Iterat
 }
 
 /// Reports a limit that is a list in one section and a number, or a list of another length, in another one.
-fn different_lengths(net: &Net<'_>, arms: &[usize], name: &str) -> Option<Diagnostic> {
-    let described = |value: &Value| length(value).map_or("one value".to_owned(), |length| format!("{length} values"));
+fn different_forms(net: &Net<'_>, arms: &[usize], name: &str) -> Option<Diagnostic> {
     let (_, first) = values(net, arms, name).next()?;
-    let (_, other) = values(net, arms, name).find(|(_, value)| length(value) != length(first))?;
-    let message = format!("the limit `{name}` has {}, but {} elsewhere", described(other), described(first));
+    let (_, other) = values(net, arms, name).find(|(_, value)| form(value) != form(first))?;
+    let [described, elsewhere] = [other, first].map(|value| form(value).in_words());
+    let message = format!("the limit `{name}` has {described}, but {elsewhere} elsewhere");
     let diagnostic = Diagnostic::new(Code::BadValue, other.span.clone(), message);
     Some(diagnostic.note(first.span.clone(), "it is stated here, too").help("state it in the same form everywhere"))
 }
@@ -110,10 +110,14 @@ fn excluded(net: &Net<'_>, arms: &[usize], name: &str) -> Option<Diagnostic> {
     Some(diagnostic.help("all of them hold at once: let their boxes overlap"))
 }
 
-/// Reports an assignment on the command line that is looser than what the files state.
+/// Reports an assignment on the command line that is looser than what the files state. Rows are added to those of the
+/// files, so they loosen nothing.
 fn loosened(net: &Net<'_>, arms: &[usize], name: &str) -> Option<Diagnostic> {
     let is_set = |section: &&LimitSection| section.owner == LimitOwner::CommandLine;
     let (key, value) = net.limit_sections(arms).filter(is_set).find_map(|section| section.table.entry(name))?;
+    if form(value) == Form::Rows {
+        return None;
+    }
     let files = net.limit_sections(arms).filter(|section| !is_set(section));
     let stated = files.filter_map(|section| Some((section, section.table.get(name)?)));
     let (section, bound) = stated.into_iter().find(|(_, bound)| is_looser(name, value, bound))?;

@@ -15,7 +15,7 @@ use crate::graph::net::limits::PathNode;
 use crate::graph::net::{CommandWire, Net, Wire, WireOrigin};
 use crate::graph::plan::{PortRef, Producer};
 use crate::graph::syntax::LIMITS;
-use crate::node::{NodeSpec, Spanned};
+use crate::node::{NodeSpec, ParamSpec, Spanned};
 use crate::signal::Kind;
 use crate::source::{Code, Diagnostic, Diagnostics, Edit, quoted};
 
@@ -153,10 +153,18 @@ impl<'a> CommandPath<'a> {
         let taken = &net.command_port(wire).name;
         let mut block = format!("[parts.{name}]\nfile = \"builtin:{file}\"");
         let readers = net.catalogue.limit_readers();
-        if !limiters.iter().all(|kind| readers.limits_of(kind).all(|limit| self.is_given(limit))) {
+        let has_default = |kind: &str, limit: &str| {
+            let params = net.catalogue.find_node(kind).map_or(&[][..], |(_, spec)| &spec.params);
+            let reads = |param: &ParamSpec| readers.limit_of(kind, param.name) == Some(limit);
+            params.iter().any(|param| param.default.is_some() && reads(param))
+        };
+        let needed =
+            |kind: &&str| readers.limits_of(kind).filter(|limit| !has_default(kind, limit)).collect::<Vec<_>>();
+        let needed: BTreeSet<&str> = limiters.iter().flat_map(needed).collect();
+        if !needed.iter().all(|limit| self.is_given(limit)) {
             let help = format!(
                 "route the motion through the part `builtin:{file}`, and write its limits under [limits]: {}",
-                quoted(limiters.iter().flat_map(|kind| readers.limits_of(kind)).collect::<BTreeSet<_>>())
+                quoted(needed)
             );
             return Some((help, Vec::new()));
         }

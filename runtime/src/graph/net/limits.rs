@@ -102,8 +102,8 @@ impl<'a> Net<'a> {
     /// Returns whether the sections contradict each other about a limit, so that it has no value.
     pub(crate) fn contradicts(&self, arms: &[usize], name: &str) -> bool {
         let mut values = self.limit_sections(arms).filter_map(|section| section.table.get(name));
-        let first = values.next().map(length);
-        values.any(|value| Some(length(value)) != first) || self.excludes_all(arms, name)
+        let first = values.next().map(form);
+        values.any(|value| Some(form(value)) != first) || self.excludes_all(arms, name)
     }
 
     /// Returns whether the bounds of which a limit is one exclude each other, although no section alone is wrong.
@@ -124,24 +124,76 @@ impl<'a> Net<'a> {
     }
 }
 
-/// Returns whether a value is looser than a bound of the limit `name`, in any of its entries.
+/// The form of the value of a limit. All sections state a limit in the same form.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Form {
+    /// A single value.
+    One,
+    /// A list of so many values, such as a corner of a box.
+    Entries(usize),
+    /// Any number of lists, such as planes. Each of them is a limit of its own.
+    Rows,
+}
+
+impl Form {
+    /// Returns the form in words.
+    pub(crate) fn in_words(self) -> String {
+        match self {
+            Self::One => "one value".to_owned(),
+            Self::Entries(count) => format!("{count} values"),
+            Self::Rows => "a list of lists".to_owned(),
+        }
+    }
+}
+
+/// Returns the form of the value of a limit.
+pub(crate) fn form(value: &Value) -> Form {
+    let is_list = |item: &Value| matches!(item.item, Item::Array(_));
+    match &value.item {
+        Item::Array(items) if items.is_empty() || items.iter().any(is_list) => Form::Rows,
+        Item::Array(items) => Form::Entries(items.len()),
+        _ => Form::One,
+    }
+}
+
+/// Returns whether a value is looser than a bound of the limit `name`: in any of its entries, or because it lacks a row.
 pub(crate) fn is_looser(name: &str, value: &Value, bound: &Value) -> bool {
+    if let (Item::Array(rows), Item::Array(bounds)) = (&value.item, &bound.item)
+        && [form(value), form(bound)] == [Form::Rows; 2]
+    {
+        return bounds.iter().any(|bound| !has_row(name, rows, bound));
+    }
     let (Some(values), Some(bounds)) = (numbers(name, value), numbers(name, bound)) else { return false };
     let is_looser = |(value, bound): (&f64, &f64)| if is_lower_bound(name) { value < bound } else { value > bound };
     values.iter().zip(&bounds).any(is_looser)
 }
 
-/// Returns the number of values of a limit that is a list, or `None` if it is none.
-pub(crate) fn length(value: &Value) -> Option<usize> {
-    match &value.item {
-        Item::Array(items) => Some(items.len()),
-        _ => None,
-    }
+/// Returns whether a list of rows contains a row.
+fn has_row(name: &str, rows: &[Value], row: &Value) -> bool {
+    let is_same = |own: &Value| own == row || numbers(name, own).is_some_and(|own| numbers(name, row) == Some(own));
+    rows.iter().any(is_same)
 }
 
-/// Returns the tighter one of two values of a limit, entry by entry. A value that is no number is returned, so that it
-/// is reported.
+/// Returns the rows of both lists, each once: of rows, all hold together.
+fn all_rows(name: &str, mut ones: Vec<Value>, others: Vec<Value>) -> Item {
+    for row in others {
+        if !has_row(name, &ones, &row) {
+            ones.push(row);
+        }
+    }
+    Item::Array(ones)
+}
+
+/// Returns the tighter one of two values of a limit, entry by entry, or the rows of both. A value that is no number is
+/// returned, so that it is reported.
 fn tighter(name: &str, one: Value, other: Value) -> Value {
+    let is_of_rows = [form(&one), form(&other)] == [Form::Rows; 2];
+    let (one, other) = match (one, other) {
+        (Value { item: Item::Array(ones), span }, Value { item: Item::Array(others), .. }) if is_of_rows => {
+            return Value { item: all_rows(name, ones, others), span };
+        }
+        pair => pair,
+    };
     if numbers(name, &one).is_none() {
         return one;
     }
@@ -253,6 +305,40 @@ mod tests {
                 assert_eq!(numbers(name, &held), Some(tightest.clone()), "{name}: {one} and {other}");
             }
         }
+    }
+
+    #[test]
+    fn of_two_lists_of_rows_every_row_holds_once() {
+        let cases = [
+            ("[]", "[]", vec![]),
+            ("[]", "[[0, 0, 1, 0.1]]", vec![[0.0, 0.0, 1.0, 0.1]]),
+            ("[[0, 0, 1, 0.1]]", "[[0.0, 0.0, 1.0, 0.1]]", vec![[0.0, 0.0, 1.0, 0.1]]),
+            ("[[0, 0, 1, 0.1]]", "[[0, 0, 1, 0.2]]", vec![[0.0, 0.0, 1.0, 0.1], [0.0, 0.0, 1.0, 0.2]]),
+        ];
+        for (one, other, mut all) in cases {
+            for (one, other) in [(one, other), (other, one)] {
+                let held = tighter("keep_out", value(one), value(other));
+                let Item::Array(rows) = &held.item else { panic!("{held:?}") };
+                assert_eq!(form(&held), Form::Rows);
+                let mut held: Vec<_> = rows.iter().map(|row| numbers("keep_out", row).expect("numbers")).collect();
+                held.sort_by(|one, other| one.partial_cmp(other).expect("finite"));
+                all.sort_by(|one, other| one.partial_cmp(other).expect("finite"));
+                assert_eq!(held, all, "{one} and {other}");
+            }
+        }
+        // A row that is wrong stays, so that it is reported.
+        let held = tighter("keep_out", value("[[0, 0, 1, 0.1]]"), value("[[0, 0, 1, 'far']]"));
+        assert!(matches!(&held.item, Item::Array(rows) if rows.len() == 2), "{held:?}");
+    }
+
+    #[test]
+    fn a_list_of_rows_is_looser_if_it_lacks_one() {
+        let bound = value("[[0, 0, 1, 0.1], [1, 0, 0, '2 mm']]");
+        assert!(!is_looser("keep_out", &bound.clone(), &bound));
+        assert!(!is_looser("keep_out", &value("[[0, 0, 1, 0.2], [0.0, 0.0, 1.0, 0.1]]"), &value("[[0, 0, 1, 0.1]]")));
+        assert!(is_looser("keep_out", &value("[[0, 0, 1, 0.1]]"), &bound));
+        assert!(is_looser("keep_out", &value("[]"), &bound));
+        assert!(!is_looser("keep_out", &value("[]"), &value("[]")));
     }
 
     #[test]

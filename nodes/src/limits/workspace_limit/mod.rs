@@ -1,8 +1,10 @@
-//! `workspace_limit`: the sensor's origin stays in a box of the base.
+//! `workspace_limit`: the sensor's origin stays in a box of the base, and before planes.
 //!
-//! At the distance d from a face the origin moves toward it at most at the speed from which it can stop:
+//! At the distance d from a face or a plane the origin moves toward it at most at the speed from which it can stop:
 //! v τ + v²/(2a) <= d. τ is twice the graph's `max_gap_ms`, because a command acts one tick after its inputs were read.
 //! At a face and beyond it only the way back is free. One factor scales the whole twist, so its direction stays.
+
+mod planes;
 
 use nalgebra::Vector3;
 use tactflow_runtime::node::{
@@ -11,20 +13,27 @@ use tactflow_runtime::node::{
 use tactflow_runtime::signal::{Pose, Scalar, Twist};
 use tactflow_runtime::source::Code;
 
+use planes::Rows;
+
 use super::{fraction, max_age};
 use crate::motion::bounds::{countable, scale_within};
 use crate::motion::braking::stopping_speed;
 use crate::usual::{USUAL_M_PER_S2, USUAL_REACH_M};
 
-/// Keeps the sensor in a box of the workspace, with room to brake.
+pub use planes::Plane;
+
+/// Keeps the sensor in a box of the workspace and before planes, with room to brake.
 ///
 /// The sensor's origin stays between the corners `min_m` and `max_m` of a box in the base. It brakes before a face, so
 /// that it can stop with `deceleration_m_per_s2`; at the face only the way back is free. The motion is scaled as a
 /// whole and keeps its direction: it goes on along a face only if the task does not push against the face.
 ///
+/// Each row `[nx, ny, nz, d]` of `keep_out` is one more face, in any direction: a table, a wall, a fixture. The sensor's
+/// origin p stays where n·p >= d. n is a unit vector in the base that points to the free side, and d is in metres.
+///
 /// `deceleration_m_per_s2` must not exceed the linear acceleration of the `acceleration_limit` behind it. That node
 /// keeps the direction of a change of motion, so rotating back and forth at full speed delays the braking. The sensor
-/// then passes a face by at most its maximum speed times the time in which the whole motion can be reversed: 8 mm with
+/// then passes a face or a plane by at most its maximum speed times the time in which the whole motion can be reversed: 8 mm with
 /// 0.05 m/s, 0.8 rad/s, 1 m/s² and 10 rad/s². The worst case found at 250 Hz is 2.3 mm.
 ///
 /// It checks the sensor's origin and no other point: a large sensor or holder needs a smaller box. When the pose is
@@ -37,12 +46,14 @@ use crate::usual::{USUAL_M_PER_S2, USUAL_REACH_M};
 /// in.pose = "state.sensor_pose"
 /// min_m = [-0.8, -0.4, 0.1]
 /// max_m = [-0.3, 0.4, 0.7]
+/// keep_out = [[0.0, 0.0, 1.0, 0.12]]     # a table at z = 0.12 m
 /// deceleration_m_per_s2 = 0.5
 /// ```
 #[derive(Describe)]
 #[describe(every_tick)]
 pub struct WorkspaceLimit {
     params: Params,
+    planes: Box<[Plane]>,
     /// Maximum age of the pose [ns].
     max_age: i64,
 }
@@ -56,6 +67,10 @@ pub struct Params {
     /// Corner of the box with the largest coordinates.
     #[param(unit = "m", usual = -USUAL_REACH_M..=USUAL_REACH_M)]
     max_m: [f64; 3],
+    /// Planes `[nx, ny, nz, d]` in the base behind which the sensor must not be: n·p >= d, with a unit vector n that
+    /// points to the free side.
+    #[param(unit = "1, 1, 1, m", default = Rows::default())]
+    keep_out: Rows,
     /// Deceleration with which the sensor can stop before a face.
     #[param(unit = "m/s2", above = 0.0, usual = ..=USUAL_M_PER_S2)]
     deceleration_m_per_s2: f64,
@@ -108,13 +123,17 @@ impl Node for WorkspaceLimit {
             };
             return Err(Mistake::param(param, message).help(help).into());
         }
+        let planes = planes::planes(&params.keep_out)?;
+        planes::check_room(&params.keep_out, &planes, [&params.min_m, &params.max_m])?;
+        setup.warnings.extend(planes::unusual_distances(&params.keep_out));
         if let Some(start) = &setup.inputs.pose.start {
             setup.warnings.extend(start_outside(start, "min_m", &params.min_m, -1.0));
             setup.warnings.extend(start_outside(start, "max_m", &params.max_m, 1.0));
+            setup.warnings.extend(planes::start_behind(start, &params.keep_out, &planes));
         }
         setup.outputs.workspace = fraction();
         let max_age = max_age(params.max_age_ms, setup.sample_period("pose"));
-        Ok(Self { params, max_age })
+        Ok(Self { params, planes, max_age })
     }
 
     fn step(&self, tick: &Tick, inputs: Inputs<'_>, out: &mut Outputs, (): &mut ()) {
@@ -124,7 +143,11 @@ impl Node for WorkspaceLimit {
         let Params { min_m: min, max_m: max, deceleration_m_per_s2: deceleration, .. } = self.params;
         let (twist, pose) = (countable(&inputs.twist), inputs.pose.0);
         let (velocity, position) = (pose.rotation * twist.linear(), pose.translation.vector);
-        let scale = scale(&velocity, &position, [min, max], deceleration, 2.0 * tick.max_gap);
+        let delay = 2.0 * tick.max_gap;
+        let mut scale = scale(&velocity, &position, [min, max], deceleration, delay);
+        if !self.planes.is_empty() {
+            scale = scale.min(planes::scale(&self.planes, &velocity, &position, deceleration, delay));
+        }
         out.twist.set(Twist(twist.0 * scale));
         out.workspace.set(scale);
     }
@@ -173,3 +196,6 @@ pub fn scale(
     };
     scale_within(velocity.norm(), (0..3).map(toward))
 }
+
+#[cfg(test)]
+mod tests;
